@@ -1,0 +1,319 @@
+//! Plain `f32` runner of an exported policy: the baseline against which quantized policies are judged.
+
+use std::collections::{HashMap, VecDeque};
+use std::path::Path;
+
+use anyhow::{Context, Result, bail, ensure};
+use safetensors::{Dtype, SafeTensors};
+use serde_json::Value;
+
+use crate::{ACT_DIM, OBS_DIM};
+
+/// A chunk policy: the network proposes a chunk of actions, the first `execute` of them are played, then it is asked
+/// again.
+#[derive(Debug)]
+pub struct PolicyF32 {
+    layers: Vec<Layer>,
+    execute: usize,
+    contract: Contract,
+    queue: VecDeque<[f32; ACT_DIM]>,
+}
+
+#[derive(Debug)]
+struct Layer {
+    op: Op,
+    /// Name under which the output is kept for a later `add`.
+    save: Option<String>,
+}
+
+#[derive(Debug)]
+enum Op {
+    Normalize {
+        mean: Vec<f32>,
+        scale: Vec<f32>,
+        clip: Option<f32>,
+    },
+    /// Weights are row-major, one row for each output.
+    Linear {
+        weight: Vec<f32>,
+        bias: Vec<f32>,
+    },
+    Relu,
+    LayerNorm {
+        weight: Vec<f32>,
+        bias: Vec<f32>,
+        eps: f32,
+    },
+    Add {
+        with: String,
+    },
+}
+
+/// From network output to joint velocity (rad/s): `raw * scale + offset`, then clamped to `[low, high]`.
+#[derive(Debug)]
+struct Contract {
+    scale: [f32; ACT_DIM],
+    offset: [f32; ACT_DIM],
+    low: [f32; ACT_DIM],
+    high: [f32; ACT_DIM],
+}
+
+impl PolicyF32 {
+    /// Loads `policy.json` and `policy.safetensors` from the folder `dir`.
+    ///
+    /// # Errors
+    /// If a file is missing or malformed, or if the policy does not map [`OBS_DIM`] observations to chunks of
+    /// [`ACT_DIM`] actions.
+    pub fn load(dir: &Path) -> Result<Self> {
+        let json_path = dir.join("policy.json");
+        let tensor_path = dir.join("policy.safetensors");
+        let json = std::fs::read_to_string(&json_path).with_context(|| format!("read {}", json_path.display()))?;
+        let bytes = std::fs::read(&tensor_path).with_context(|| format!("read {}", tensor_path.display()))?;
+        let spec: Value = serde_json::from_str(&json).with_context(|| format!("parse {}", json_path.display()))?;
+        let tensors = SafeTensors::deserialize(&bytes).with_context(|| format!("parse {}", tensor_path.display()))?;
+        Self::build(&spec, &tensors).with_context(|| format!("policy in {}", dir.display()))
+    }
+
+    fn build(spec: &Value, tensors: &SafeTensors<'_>) -> Result<Self> {
+        let chunk = count(spec, "chunk")?;
+        let execute = count(spec, "execute")?;
+        ensure!((1..=chunk).contains(&execute), "execute = {execute} is not within 1..={chunk}");
+        for (key, expected) in [("obs_dim", OBS_DIM), ("act_dim", ACT_DIM)] {
+            let found = count(spec, key)?;
+            ensure!(found == expected, "{key} is {found}, this task has {expected}");
+        }
+
+        let mut layers = Vec::new();
+        let mut width = OBS_DIM;
+        let mut saved = HashMap::new();
+        for (i, op) in list(spec, "ops")?.iter().enumerate() {
+            let context = || format!("op {i}");
+            let layer_op = read_op(op, tensors, width, &saved).with_context(context)?;
+            if let Op::Linear { bias, .. } = &layer_op {
+                width = bias.len();
+            }
+            let save = op.get("save").map(|_| text(op, "save")).transpose().with_context(context)?;
+            if let Some(name) = save {
+                saved.insert(name.to_owned(), width);
+            }
+            layers.push(Layer { op: layer_op, save: save.map(str::to_owned) });
+        }
+        ensure!(width == chunk * ACT_DIM, "the last op has {width} outputs, chunk * act_dim is {}", chunk * ACT_DIM);
+
+        let action = spec.get("action").context("no `action` object")?;
+        let contract = Contract {
+            scale: numbers(action, "scale")?,
+            offset: numbers(action, "offset")?,
+            low: numbers(action, "low")?,
+            high: numbers(action, "high")?,
+        };
+        ensure!(contract.low.iter().zip(&contract.high).all(|(low, high)| low <= high), "`action`: low is above high");
+        Ok(Self { layers, execute, contract, queue: VecDeque::new() })
+    }
+
+    /// Forgets the queued actions; call it before every episode.
+    pub fn reset(&mut self) {
+        self.queue.clear();
+    }
+
+    /// The next action (joint velocities, rad/s) at the observation `obs` ([`OBS_DIM`] values).
+    ///
+    /// # Panics
+    /// If `obs` has another length.
+    pub fn act(&mut self, obs: &[f32]) -> [f32; ACT_DIM] {
+        if self.queue.is_empty() {
+            let raw = self.raw(obs);
+            let (actions, _) = raw.as_chunks::<ACT_DIM>();
+            self.queue.extend(actions.iter().take(self.execute).map(|action| self.contract.apply(action)));
+        }
+        self.queue.pop_front().expect("execute is at least 1")
+    }
+
+    /// The network's output at `obs` ([`OBS_DIM`] values): normalised actions, chunk step by chunk step.
+    ///
+    /// # Panics
+    /// If `obs` has another length.
+    pub fn raw(&self, obs: &[f32]) -> Vec<f32> {
+        assert_eq!(obs.len(), OBS_DIM, "length of the observation");
+        let mut saved: HashMap<&str, Vec<f32>> = HashMap::new();
+        let mut x = obs.to_vec();
+        for layer in &self.layers {
+            layer.op.apply(&mut x, &saved);
+            if let Some(name) = &layer.save {
+                saved.insert(name, x.clone());
+            }
+        }
+        x
+    }
+}
+
+impl Contract {
+    fn apply(&self, raw: &[f32; ACT_DIM]) -> [f32; ACT_DIM] {
+        core::array::from_fn(|i| (raw[i] * self.scale[i] + self.offset[i]).clamp(self.low[i], self.high[i]))
+    }
+}
+
+impl Op {
+    fn apply(&self, x: &mut Vec<f32>, saved: &HashMap<&str, Vec<f32>>) {
+        match self {
+            Self::Normalize { mean, scale, clip } => {
+                for ((x, mean), scale) in x.iter_mut().zip(mean).zip(scale) {
+                    *x = (*x - mean) * scale;
+                    if let Some(clip) = clip {
+                        *x = x.clamp(-clip, *clip);
+                    }
+                }
+            }
+            Self::Linear { weight, bias } => {
+                let rows = weight.chunks_exact(x.len());
+                *x = rows
+                    .zip(bias)
+                    .map(|(row, bias)| bias + row.iter().zip(&*x).map(|(w, x)| w * x).sum::<f32>())
+                    .collect();
+            }
+            Self::Relu => x.iter_mut().for_each(|x| *x = x.max(0.0)),
+            Self::LayerNorm { weight, bias, eps } => {
+                let count = x.len() as f32;
+                let mean = x.iter().sum::<f32>() / count;
+                let variance = x.iter().map(|x| (x - mean) * (x - mean)).sum::<f32>() / count;
+                let factor = 1.0 / (variance + eps).sqrt();
+                for ((x, weight), bias) in x.iter_mut().zip(weight).zip(bias) {
+                    *x = (*x - mean) * factor * weight + bias;
+                }
+            }
+            Self::Add { with } => {
+                for (x, other) in x.iter_mut().zip(&saved[with.as_str()]) {
+                    *x += other;
+                }
+            }
+        }
+    }
+}
+
+/// Reads one op whose input has `width` values, and checks every shape so that running it cannot fail.
+fn read_op(op: &Value, tensors: &SafeTensors<'_>, width: usize, saved: &HashMap<String, usize>) -> Result<Op> {
+    let vector = |key: &str, len: usize| tensor(tensors, text(op, key)?, &[len]);
+    Ok(match text(op, "op")? {
+        "normalize" => Op::Normalize {
+            mean: vector("mean", width)?,
+            scale: vector("scale", width)?,
+            clip: op.get("clip").map(|_| positive(op, "clip")).transpose()?,
+        },
+        "linear" => {
+            let name = text(op, "w")?;
+            let shape = tensors.tensor(name).with_context(|| format!("tensor {name}"))?.shape().to_vec();
+            let outputs = *shape.first().with_context(|| format!("tensor {name} has no dimension"))?;
+            Op::Linear { weight: tensor(tensors, name, &[outputs, width])?, bias: vector("b", outputs)? }
+        }
+        "relu" => Op::Relu,
+        "layernorm" => {
+            Op::LayerNorm { weight: vector("w_ln", width)?, bias: vector("b_ln", width)?, eps: positive(op, "eps")? }
+        }
+        "add" => {
+            let with = text(op, "with")?;
+            ensure!(saved.get(with) == Some(&width), "no output of width {width} was saved as {with:?}");
+            Op::Add { with: with.to_owned() }
+        }
+        other => bail!("op {other:?} is not supported"),
+    })
+}
+
+/// The `f32` tensor `name`, which must have shape `shape`.
+fn tensor(tensors: &SafeTensors<'_>, name: &str, shape: &[usize]) -> Result<Vec<f32>> {
+    let view = tensors.tensor(name).with_context(|| format!("tensor {name}"))?;
+    ensure!(view.dtype() == Dtype::F32, "tensor {name} has type {:?}, expected F32", view.dtype());
+    ensure!(view.shape() == shape, "tensor {name} has shape {:?}, expected {shape:?}", view.shape());
+    let (values, _) = view.data().as_chunks::<4>();
+    Ok(values.iter().map(|&bytes| f32::from_le_bytes(bytes)).collect())
+}
+
+fn text<'a>(object: &'a Value, key: &str) -> Result<&'a str> {
+    object.get(key).and_then(Value::as_str).with_context(|| format!("no text {key:?}"))
+}
+
+fn list<'a>(object: &'a Value, key: &str) -> Result<&'a [Value]> {
+    object.get(key).and_then(Value::as_array).map(Vec::as_slice).with_context(|| format!("no list {key:?}"))
+}
+
+fn count(object: &Value, key: &str) -> Result<usize> {
+    let number = object.get(key).and_then(Value::as_u64).with_context(|| format!("no whole number {key:?}"))?;
+    // The bound keeps products of sizes far from overflow.
+    ensure!(number <= 1 << 16, "{key:?} = {number} is too large");
+    Ok(number as usize)
+}
+
+fn positive(object: &Value, key: &str) -> Result<f32> {
+    let number = object.get(key).and_then(Value::as_f64).with_context(|| format!("no number {key:?}"))?;
+    ensure!(number > 0.0, "{key:?} = {number} is not positive");
+    Ok(number as f32)
+}
+
+fn numbers(object: &Value, key: &str) -> Result<[f32; ACT_DIM]> {
+    let values: Option<Vec<f32>> = list(object, key)?.iter().map(|x| x.as_f64().map(|x| x as f32)).collect();
+    values.and_then(|values| values.try_into().ok()).with_context(|| format!("{key:?} is not {ACT_DIM} numbers"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use safetensors::tensor::TensorView;
+    use serde_json::json;
+
+    /// Loads a network of one linear layer with zero weights and bias 0, 1, 2, ... for chunks of `chunk` actions.
+    fn linear_policy(chunk: usize, change: impl Fn(&mut Value)) -> Result<PolicyF32> {
+        let outputs = chunk * ACT_DIM;
+        let weight = vec![0; outputs * OBS_DIM * 4];
+        let bias: Vec<u8> = (0..outputs).flat_map(|i| (i as f32).to_le_bytes()).collect();
+        let views = [
+            ("w", TensorView::new(Dtype::F32, vec![outputs, OBS_DIM], &weight)?),
+            ("b", TensorView::new(Dtype::F32, vec![outputs], &bias)?),
+        ];
+        let bytes = safetensors::serialize(views, None)?;
+        let mut spec = json!({
+            "chunk": chunk, "execute": 2, "obs_dim": OBS_DIM, "act_dim": ACT_DIM,
+            "ops": [{"op": "linear", "w": "w", "b": "b"}],
+            "action": {"scale": [2, 2, 2, 2, 2, 2], "offset": [1, 1, 1, 1, 1, 1],
+                       "low": [0, 0, 0, 0, 0, 0], "high": [20, 20, 20, 20, 20, 20]},
+        });
+        change(&mut spec);
+        PolicyF32::build(&spec, &SafeTensors::deserialize(&bytes)?)
+    }
+
+    #[test]
+    fn plays_the_first_actions_of_a_chunk_through_the_contract() {
+        let mut policy = linear_policy(3, |_| ()).unwrap();
+        let obs = [0.0; OBS_DIM];
+        assert_eq!(policy.raw(&obs).len(), 3 * ACT_DIM);
+        let first = [1.0, 3.0, 5.0, 7.0, 9.0, 11.0];
+        assert_eq!(policy.act(&obs), first);
+        assert_eq!(policy.act(&obs), [13.0, 15.0, 17.0, 19.0, 20.0, 20.0]);
+        assert_eq!(policy.act(&obs), first);
+        policy.reset();
+        assert_eq!(policy.act(&obs), first);
+    }
+
+    #[test]
+    fn layernorm_matches_a_worked_example() {
+        let op = Op::LayerNorm { weight: vec![1.0, 2.0], bias: vec![0.5, 0.0], eps: 1e-12 };
+        let mut x = vec![1.0, 3.0];
+        op.apply(&mut x, &HashMap::new());
+        assert_eq!(x, [-0.5, 2.0]);
+    }
+
+    #[test]
+    fn bad_policies_are_errors() {
+        for (key, value) in [
+            ("chunk", json!(4)),
+            ("execute", json!(0)),
+            ("execute", json!(4)),
+            ("obs_dim", json!(3)),
+            ("ops", json!([{"op": "softmax"}])),
+            ("ops", json!([{"op": "add", "with": "h0"}])),
+            ("ops", json!([{"op": "linear", "w": "b", "b": "b"}])),
+            ("action", json!({"scale": [1]})),
+        ] {
+            assert!(linear_policy(3, |spec| spec[key] = value.clone()).is_err(), "{key} = {value}");
+        }
+        assert!(PolicyF32::load(Path::new("no-such-folder")).is_err());
+    }
+}

@@ -1,0 +1,96 @@
+//! Replays golden kernel cases from standard input (see `host-tests/src/golden.rs`) through the backend that was compiled in
+//! and through the portable one, and ends with a failure at the first sum that differs.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[cfg(not(target_os = "none"))]
+fn main() {
+    eprintln!("this is firmware: build it with --target thumbv7em-none-eabihf");
+    std::process::exit(1);
+}
+
+#[cfg(target_os = "none")]
+mod firmware {
+    use core::fmt::Write as _;
+
+    use actq_firmware_demo::host::{self, File};
+    use actq_kernels::activations::{Prepared, prepared_words};
+    use actq_kernels::format::{Block, BlockShape, QUAD, Width};
+    use actq_kernels::gemv::{self, gemv};
+    use actq_kernels::portable;
+    use cortex_m::singleton;
+    use cortex_m_semihosting::hio;
+
+    const WORDS: usize = 64 * 1024;
+    const QUADS: usize = 64;
+
+    #[cortex_m_rt::entry]
+    fn main() -> ! {
+        let outcome = run();
+        if let Ok(mut out) = hio::hstdout() {
+            let _ = match outcome {
+                Ok(cases) => writeln!(out, "{:?}: {cases} cases", gemv::BACKEND),
+                Err((case, why)) => writeln!(out, "{:?}: case {case}: {why}", gemv::BACKEND),
+            };
+        }
+        host::exit(outcome.is_ok())
+    }
+
+    fn run() -> Result<usize, (usize, &'static str)> {
+        let input = File::open(c"/dev/stdin", false).ok_or((0, "standard input cannot be opened"))?;
+        let buffer = singleton!(: [u32; WORDS] = [0; WORDS]).ok_or((0, "buffer"))?;
+        let mut case = 0;
+        loop {
+            match play(&input, buffer) {
+                Ok(true) => case += 1,
+                Ok(false) => return Ok(case),
+                Err(why) => return Err((case, why)),
+            }
+        }
+    }
+
+    fn read(input: &File, words: &mut [u32]) -> Result<(), &'static str> {
+        if input.read_exact(bytemuck::cast_slice_mut(words)) { Ok(()) } else { Err("the stream is cut") }
+    }
+
+    /// Plays a case; false at the end of the stream.
+    fn play(input: &File, buffer: &mut [u32]) -> Result<bool, &'static str> {
+        let mut head = [0u32; 5];
+        read(input, &mut head[..1])?;
+        if head[0] == 0 {
+            return Ok(false);
+        }
+        read(input, &mut head[1..])?;
+        let [bits, rows, cols, group, start] = head.map(|w| w as usize);
+        let width = Width::from_bits(bits as u32).ok_or("width")?;
+        let shape = BlockShape { width, rows, cols, group };
+        let weights = start..start + shape.words();
+        let x = weights.end + start..weights.end + start + prepared_words(cols, group);
+        read(input, buffer.get_mut(weights.clone()).ok_or("the case is too large")?)?;
+        read(input, buffer.get_mut(x.clone()).ok_or("the case is too large")?)?;
+        let mut expected = [[0i32; QUAD]; QUADS];
+        let expected = expected.get_mut(..shape.quads()).ok_or("the case is too large")?;
+        if !input.read_exact(bytemuck::cast_slice_mut(expected)) {
+            return Err("the stream is cut");
+        }
+        let block = Block::new(shape, &buffer[weights]).ok_or("shape")?;
+        let x = Prepared::new(&buffer[x], cols, group).ok_or("activations")?;
+        let same = |sums: &[[i32; QUAD]]| {
+            // The sums of padding rows have no meaning.
+            sums.as_flattened().iter().zip(expected.as_flattened()).take(rows).all(|(a, b)| a == b)
+        };
+        let mut sums = [[0x5555_5555; QUAD]; QUADS];
+        gemv(&block, &x, 0, &mut sums[..shape.quads()]).map_err(|_| "mismatch")?;
+        if !same(&sums) {
+            return Err("sums of the compiled backend differ");
+        }
+        if sums[shape.quads()..].as_flattened().iter().any(|s| *s != 0x5555_5555) {
+            return Err("the compiled backend wrote behind its output");
+        }
+        sums = [[0; QUAD]; QUADS];
+        portable::gemv(&block, &x, 0, &mut sums[..shape.quads()]);
+        if !same(&sums) {
+            return Err("sums of the portable backend differ");
+        }
+        Ok(true)
+    }
+}

@@ -1,0 +1,28 @@
+//! Marks for the instruction counter (`xtask/insn-count`): it counts what is executed between a call of [`actq_count_begin`] and the
+//! next call of [`actq_count_end`].
+
+/// Starts a region.
+#[unsafe(no_mangle)]
+#[inline(never)]
+pub extern "C" fn actq_count_begin() {
+    // An instruction that the compiler must keep, so that the call is not removed.
+    cortex_m::asm::nop();
+}
+
+/// Ends a region.
+#[unsafe(no_mangle)]
+#[inline(never)]
+pub extern "C" fn actq_count_end() {
+    // One more than in `actq_count_begin`: equal functions are merged into one.
+    cortex_m::asm::nop();
+    cortex_m::asm::nop();
+}
+
+/// Runs `work` as a counted region.
+#[inline(always)]
+pub fn region<T>(work: impl FnOnce() -> T) -> T {
+    actq_count_begin();
+    let result = work();
+    actq_count_end();
+    result
+}

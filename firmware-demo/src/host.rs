@@ -1,0 +1,61 @@
+//! The host that runs QEMU, or a debugger, through semihosting: the command line, standard input and output, the exit status.
+
+use cortex_m_semihosting::{debug, syscall};
+use heapless::String;
+
+/// Ends the run.
+pub fn exit(success: bool) -> ! {
+    debug::exit(if success { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });
+    loop {
+        cortex_m::asm::wfi();
+    }
+}
+
+/// The text after the program's name on the command line (QEMU: `-append`); empty where the host gives none.
+pub fn arguments() -> String<64> {
+    let mut buffer = [0u8; 128];
+    let block = [buffer.as_mut_ptr() as usize, buffer.len() - 1];
+    // SAFETY: SYS_GET_CMDLINE writes at most the length in the block to the buffer, which outlives the call.
+    let failed = unsafe { syscall!(GET_CMDLINE, block[0], block[1]) } != 0;
+    let text = core::ffi::CStr::from_bytes_until_nul(&buffer).ok().and_then(|t| t.to_str().ok());
+    let mut arguments = String::new();
+    if let (false, Some((_, rest))) = (failed, text.and_then(|t| t.trim().split_once(' '))) {
+        let _ = arguments.push_str(rest.trim());
+    }
+    arguments
+}
+
+/// An open file of the host.
+#[derive(Debug)]
+pub struct File(usize);
+
+impl File {
+    /// Opens the host's file at `path`, which ends with a zero byte; `write` truncates it.
+    pub fn open(path: &core::ffi::CStr, write: bool) -> Option<Self> {
+        let mode = if write { 5 } else { 1 }; // "wb", "rb"
+        // SAFETY: SYS_OPEN reads the path, whose length is given without its zero.
+        let handle = unsafe { syscall!(OPEN, path.as_ptr() as usize, mode, path.count_bytes()) };
+        (handle != usize::MAX).then_some(Self(handle))
+    }
+
+    /// Fills `buffer`; false where the file ended before.
+    pub fn read_exact(&self, mut buffer: &mut [u8]) -> bool {
+        while !buffer.is_empty() {
+            // SAFETY: SYS_READ writes at most `len` bytes to the buffer.
+            let left = unsafe { syscall!(READ, self.0, buffer.as_mut_ptr() as usize, buffer.len()) };
+            // It returns how many bytes it did not read.
+            if left >= buffer.len() {
+                return false;
+            }
+            let read = buffer.len() - left;
+            buffer = &mut buffer[read..];
+        }
+        true
+    }
+
+    /// Writes all of `bytes`; false where the host refused.
+    pub fn write_all(&self, bytes: &[u8]) -> bool {
+        // SAFETY: SYS_WRITE reads `len` bytes from the buffer; it returns how many it did not write.
+        unsafe { syscall!(WRITE, self.0, bytes.as_ptr() as usize, bytes.len()) == 0 }
+    }
+}

@@ -1,0 +1,114 @@
+//! The demo firmware: checks its image, self-tests it, and runs it.
+//!
+//! Without arguments it plays the image's self-test observations and prints the actions' bits. With the argument `serve` it
+//! reads observations from standard input and writes actions to standard output, in the protocol of `actq serve`.
+//!
+//! The image is the one in the slot, if there is one, else the one that was built in (environment variable `ACTQ_IMAGE`).
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[cfg(not(target_os = "none"))]
+fn main() {
+    eprintln!("this is firmware: build it with --target thumbv7em-none-eabihf, or see `cargo demo`");
+    std::process::exit(1);
+}
+
+#[cfg(target_os = "none")]
+mod firmware {
+    use core::fmt::{Display, Write as _};
+
+    use actq_firmware_demo::{count, host, slot};
+    use actq_kernels::{Head, Image};
+    use cortex_m::singleton;
+    use cortex_m_semihosting::hio;
+
+    /// Includes a file at an address that is a multiple of 4.
+    #[repr(C, align(4))]
+    struct Aligned<T: ?Sized>(T);
+    static BUILT_IN: &Aligned<[u8]> = &Aligned(*include_bytes!(env!(
+        "ACTQ_IMAGE",
+        "set ACTQ_IMAGE to the absolute path of the image to build in (`actq quantize` makes one)"
+    )));
+
+    /// Scratch words; the image says how many it needs.
+    const SCRATCH: usize = 24 * 1024;
+    /// The longest observation that `serve` takes.
+    const MAX_OBSERVATION: usize = 1024;
+
+    #[cortex_m_rt::entry]
+    fn main() -> ! {
+        let outcome = run();
+        if let Err(message) = &outcome
+            && let Ok(mut err) = hio::hstderr()
+        {
+            let _ = writeln!(err, "firmware: {message}");
+        }
+        host::exit(outcome.is_ok())
+    }
+
+    type Message = heapless::String<120>;
+
+    fn message(what: &str, detail: impl Display) -> Message {
+        let mut text = Message::new();
+        // A text longer than the buffer is cut; nothing depends on it.
+        let _ = write!(text, "{what}: {detail}");
+        text
+    }
+
+    fn run() -> Result<(), Message> {
+        let image = Image::new_checked(slot::image().unwrap_or(&BUILT_IN.0)).map_err(|e| message("image", e))?;
+        let scratch = singleton!(: [u32; SCRATCH] = [0; SCRATCH]).ok_or_else(|| message("scratch", "taken twice"))?;
+        let mut head = Head::new(image, scratch).map_err(|e| message("head", e))?;
+        head.self_test().map_err(|e| message("self-test", e))?;
+        match host::arguments().as_str() {
+            "" => replay(&mut head),
+            "serve" => serve(&mut head),
+            other => Err(message("unknown argument", other)),
+        }
+    }
+
+    /// Plays the self-test observations and prints each action's bits.
+    fn replay(head: &mut Head<'_, '_>) -> Result<(), Message> {
+        let mut out = hio::hstdout().map_err(|()| message("output", "no semihosting host"))?;
+        let image = *head.image();
+        let _ = writeln!(out, "{}: crc32 {:08x}, self-test passed", image.name(), image.crc());
+        let mut step = 0;
+        while let Some((observation, _)) = image.self_test(step) {
+            let action =
+                count::region(|| head.step(bytemuck::cast_slice(observation))).map_err(|e| message("step", e))?;
+            let _ = write!(out, "step {step}:");
+            for a in action {
+                let _ = write!(out, " {:08x}", a.to_bits());
+            }
+            let _ = writeln!(out);
+            step += 1;
+        }
+        Ok(())
+    }
+
+    /// Answers `R` and `S` from standard input until it ends.
+    fn serve(head: &mut Head<'_, '_>) -> Result<(), Message> {
+        let input = host::File::open(c"/dev/stdin", false).ok_or_else(|| message("input", "cannot be opened"))?;
+        let output = host::File::open(c"/dev/stdout", true).ok_or_else(|| message("output", "cannot be opened"))?;
+        let mut buffer = [0f32; MAX_OBSERVATION];
+        let observation = buffer
+            .get_mut(..head.image().obs_len())
+            .ok_or_else(|| message("observation", "too long for the buffer"))?;
+        let mut command = [0u8];
+        while input.read_exact(&mut command) {
+            match command {
+                [b'R'] => head.reset(),
+                [b'S'] => {
+                    if !input.read_exact(bytemuck::cast_slice_mut(observation)) {
+                        return Err(message("input", "ended inside an observation"));
+                    }
+                    let action = count::region(|| head.step(observation)).map_err(|e| message("step", e))?;
+                    if !output.write_all(bytemuck::cast_slice(action)) {
+                        return Err(message("output", "cannot be written"));
+                    }
+                }
+                [other] => return Err(message("unknown command byte", other)),
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,165 @@
+//! Kernel cases with their expected sums, as one stream of little-endian words that the host and the firmware read.
+//!
+//! A case: width, rows, cols, group, start (words of padding to put before weights and activations, 0 to 3), then the packed
+//! words, the prepared activations, and four sums per quad. The stream ends with a width of 0.
+
+use actq_kernels::activations::{Prepared, prepare, prepared_words};
+use actq_kernels::format::{Block, BlockShape, QUAD, Width, pack};
+
+/// A deterministic generator (splitmix64).
+#[derive(Clone, Debug)]
+pub struct Random(pub u64);
+
+impl Random {
+    /// 64 random bits.
+    pub fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// A number below `n`.
+    pub fn below(&mut self, n: usize) -> usize {
+        (self.bits() % n as u64) as usize
+    }
+
+    /// A number in -1..1.
+    pub fn unit(&mut self) -> f32 {
+        (self.bits() >> 40) as f32 / (1u32 << 23) as f32 - 1.0
+    }
+}
+
+/// How a case's numbers are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Draw {
+    /// Uniform.
+    Uniform,
+    /// Weights at either end of their range, activations at plus or minus the largest.
+    Ends,
+    /// Every product at its largest and of one sign: the worst case of the accumulators.
+    Worst,
+}
+
+/// A block with activations.
+#[derive(Clone, Debug)]
+pub struct Case {
+    /// Shape of the block.
+    pub shape: BlockShape,
+    /// Row-major codes.
+    pub codes: Vec<u8>,
+    /// Row-major group scales.
+    pub scales: Vec<u8>,
+    /// Activations.
+    pub x: Vec<i16>,
+}
+
+impl Case {
+    /// Draws a case with activations up to `x_max`.
+    pub fn draw(random: &mut Random, shape: BlockShape, x_max: i16, draw: Draw) -> Self {
+        let mask = (1u32 << shape.width.bits()) - 1;
+        let (lowest, highest) = match shape.width {
+            Width::W8 => (0x80, 0x7f),
+            _ => (0, mask as u8),
+        };
+        let x = (0..shape.cols)
+            .map(|_| match draw {
+                Draw::Uniform => (random.unit() * f32::from(x_max)) as i16,
+                Draw::Ends | Draw::Worst => [x_max, -x_max][random.below(2)],
+            })
+            .collect::<Vec<_>>();
+        let codes = (0..shape.rows * shape.cols)
+            .map(|i| match draw {
+                Draw::Uniform => (random.bits() as u32 & mask) as u8,
+                Draw::Ends => [lowest, highest][random.below(2)],
+                Draw::Worst => [lowest, highest][usize::from((x[i % shape.cols] > 0) == (i / shape.cols % 2 == 0))],
+            })
+            .collect();
+        let scales = (0..shape.rows * shape.groups())
+            .map(|_| if draw == Draw::Uniform { random.bits() as u8 } else { 255 })
+            .collect();
+        Self { shape, codes, scales, x }
+    }
+
+    /// The packed words.
+    pub fn words(&self) -> Vec<u32> {
+        let mut words = vec![0; self.shape.words()];
+        assert!(pack(self.shape, &self.codes, &self.scales, &mut words).is_some(), "the case fits its shape");
+        words
+    }
+
+    /// The prepared activations.
+    pub fn prepared(&self) -> Vec<u32> {
+        let mut out = vec![!0; prepared_words(self.shape.cols, self.shape.group)];
+        prepare(&self.x, self.shape.group, &mut out);
+        out
+    }
+
+    /// The sums by the definition, straight from codes and activations, modulo 2^32; those of padding rows are 0.
+    pub fn sums(&self) -> Vec<[i32; QUAD]> {
+        let shape = self.shape;
+        let mut sums = vec![[0i32; QUAD]; shape.quads()];
+        for (row, codes) in self.codes.chunks_exact(shape.cols).enumerate() {
+            let scale = |col: usize| col.checked_div(shape.group).map_or(1, |g| self.scales[row * shape.groups() + g]);
+            let sum = codes.iter().zip(&self.x).enumerate().fold(0i64, |sum, (col, (&code, &x))| {
+                sum + i64::from(shape.width.level(code)) * i64::from(scale(col)) * i64::from(x)
+            });
+            sums[row / QUAD][row % QUAD] = sum as i32;
+        }
+        sums
+    }
+
+    /// Runs `gemv` on the case, with `start` words before the weights and the activations.
+    pub fn run(&self, start: usize, gemv: impl Fn(&Block<'_>, &Prepared<'_>, &mut [[i32; QUAD]])) -> Vec<[i32; QUAD]> {
+        let shift = |words: Vec<u32>| [vec![!0; start], words].concat();
+        let (words, prepared) = (shift(self.words()), shift(self.prepared()));
+        let mut sums = vec![[0; QUAD]; self.shape.quads()];
+        let block = Block::new(self.shape, &words[start..]);
+        let x = Prepared::new(&prepared[start..], self.shape.cols, self.shape.group);
+        if let (Some(block), Some(x)) = (block, x) {
+            gemv(&block, &x, &mut sums);
+        }
+        // The sums of padding rows have no meaning.
+        sums.as_flattened_mut()[self.shape.rows..].fill(0);
+        sums
+    }
+
+    /// Appends the case to a stream.
+    fn write(&self, start: usize, out: &mut Vec<u32>) {
+        let shape = self.shape;
+        out.extend([shape.width.bits(), shape.rows as u32, shape.cols as u32, shape.group as u32, start as u32]);
+        out.extend(self.words());
+        out.extend(self.prepared());
+        out.extend(self.sums().as_flattened().iter().map(|&s| s as u32));
+    }
+}
+
+/// All widths and groups over all lengths from 1 to 67 and larger ones, with 1 to 9 rows, int8 and int16 activations, random
+/// and extreme values.
+pub fn cases(seed: u64) -> Vec<Case> {
+    let mut random = Random(seed);
+    let mut cases = Vec::new();
+    for width in Width::ALL {
+        for group in [0, 32, 64, 128] {
+            for cols in (1..=67).chain([96, 127, 128, 129, 160, 255, 256, 300, 512, 515, 1024]) {
+                for draw in [Draw::Uniform, Draw::Ends, Draw::Worst] {
+                    let rows = 1 + random.below(9);
+                    let x_max = [127, i16::MAX][random.below(2)];
+                    cases.push(Case::draw(&mut random, BlockShape { width, rows, cols, group }, x_max, draw));
+                }
+            }
+        }
+    }
+    cases
+}
+
+/// The cases as the firmware reads them, at every alignment that words can have in a 16-byte line.
+pub fn stream(cases: &[Case]) -> Vec<u8> {
+    let mut words = Vec::new();
+    for (i, case) in cases.iter().enumerate() {
+        case.write(i % 4, &mut words);
+    }
+    words.push(0);
+    words.iter().flat_map(|w| w.to_le_bytes()).collect()
+}

@@ -1,0 +1,17 @@
+//! What the tests and `xtask` share: golden kernel cases, and the firmware under QEMU.
+#![forbid(unsafe_code)]
+
+pub mod golden;
+pub mod qemu;
+
+use std::path::{Path, PathBuf};
+
+/// The workspace's root.
+pub fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."))
+}
+
+/// The folder of shared policies, where `ACTQ_SHARED` names it: tests on them run only then.
+pub fn shared_policies() -> Option<PathBuf> {
+    Some(PathBuf::from(std::env::var_os("ACTQ_SHARED")?).join("policies"))
+}

@@ -1,0 +1,209 @@
+//! Building the firmware and running it under QEMU.
+
+use std::fs;
+use std::io::{Read as _, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Output, Stdio};
+
+use anyhow::{Context, Result, bail, ensure};
+use object::{Object as _, ObjectSection as _, ObjectSymbol as _};
+
+/// The emulator.
+pub const QEMU: &str = "qemu-system-arm";
+
+/// A target of the firmware.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Target {
+    /// thumbv7em-none-eabihf: with FPU
+    Fpu,
+    /// thumbv7em-none-eabi: floats in software
+    NoFpu,
+}
+
+impl Target {
+    /// rustc's name.
+    pub fn triple(self) -> &'static str {
+        match self {
+            Self::Fpu => "thumbv7em-none-eabihf",
+            Self::NoFpu => "thumbv7em-none-eabi",
+        }
+    }
+}
+
+/// The folder that cargo builds into.
+pub fn target_dir() -> PathBuf {
+    std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| crate::root().join("target"), |dir| crate::root().join(dir))
+}
+
+fn cargo_build(what: &str, arguments: &[&str], environment: &[(&str, &str)]) -> Result<()> {
+    let output = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+        .current_dir(crate::root())
+        .args(["build", "--release", "--quiet"])
+        .args(arguments)
+        .envs(environment.iter().copied())
+        .output()
+        .context("cargo cannot be started")?;
+    ensure!(output.status.success(), "{what} does not build:\n{}", String::from_utf8_lossy(&output.stderr));
+    Ok(())
+}
+
+/// Builds a firmware binary with `image` built in and gives the path of its ELF file.
+pub fn build(binary: &str, target: Target, image: &Path) -> Result<PathBuf> {
+    let image = fs::canonicalize(image).with_context(|| format!("{}: cannot be read", image.display()))?;
+    cargo_build(
+        &format!("firmware {binary} for {}", target.triple()),
+        &["--package", "actq-firmware-demo", "--bin", binary, "--target", target.triple()],
+        &[("ACTQ_IMAGE", &image.to_string_lossy())],
+    )?;
+    Ok(target_dir().join(target.triple()).join("release").join(binary))
+}
+
+/// QEMU with `elf`, an image in the slot if one is given, and arguments for the firmware.
+pub fn command(elf: &Path, slot: Option<&Path>, arguments: &str) -> Command {
+    let mut command = Command::new(QEMU);
+    command
+        .args(["-M", "mps2-an386", "-display", "none", "-monitor", "none", "-serial", "none"])
+        .args(["-semihosting-config", "enable=on,target=native"])
+        .arg("-kernel")
+        .arg(elf);
+    if !arguments.is_empty() {
+        command.arg("-append").arg(arguments);
+    }
+    if let Some(image) = slot {
+        command.arg("-device").arg(format!("loader,file={},addr=0x00200000,force-raw=on", image.display()));
+    }
+    command
+}
+
+fn spawn(command: &mut Command) -> Result<Child> {
+    command.spawn().with_context(|| format!("{QEMU} cannot be started; `cargo xtask doctor` says how to install it"))
+}
+
+/// Runs a firmware that ends by itself; `input` is its standard input.
+pub fn run(mut command: Command, input: &[u8]) -> Result<Output> {
+    let mut child = spawn(command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()))?;
+    let mut stdin = child.stdin.take().context("no standard input")?;
+    std::thread::scope(|scope| {
+        // A firmware that stops early closes the pipe; its exit status tells why.
+        scope.spawn(move || drop(stdin.write_all(input)));
+        child.wait_with_output().context("QEMU does not end")
+    })
+}
+
+/// A firmware under QEMU that serves as a policy.
+#[derive(Debug)]
+pub struct Server {
+    child: Child,
+    stdin: Option<ChildStdin>,
+    stdout: ChildStdout,
+    act_len: usize,
+}
+
+impl Server {
+    /// Starts `command` (made by [`command`] with the argument `serve`) for actions of `act_len` values.
+    pub fn start(mut command: Command, act_len: usize) -> Result<Self> {
+        let mut child = spawn(command.stdin(Stdio::piped()).stdout(Stdio::piped()))?;
+        let stdin = child.stdin.take();
+        let stdout = child.stdout.take().context("no standard output")?;
+        Ok(Self { child, stdin, stdout, act_len })
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> Result<()> {
+        self.stdin.as_mut().context("the firmware has ended")?.write_all(bytes).context("the firmware has ended")
+    }
+
+    /// Resets the policy.
+    pub fn reset(&mut self) -> Result<()> {
+        self.send(b"R")
+    }
+
+    /// The action for an observation.
+    pub fn step(&mut self, observation: &[f32]) -> Result<Vec<f32>> {
+        let mut frame = vec![b'S'];
+        frame.extend(observation.iter().flat_map(|v| v.to_le_bytes()));
+        self.send(&frame)?;
+        let mut bytes = vec![0; 4 * self.act_len];
+        self.stdout.read_exact(&mut bytes).context("the firmware ended without an action")?;
+        Ok(bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
+    }
+
+    /// Ends the firmware, which must do so with success.
+    pub fn finish(mut self) -> Result<()> {
+        self.stdin = None;
+        let status = self.child.wait().context("QEMU does not end")?;
+        ensure!(status.success(), "the firmware ended with a failure");
+        Ok(())
+    }
+}
+
+/// Counts instructions in the regions that a firmware marks.
+#[derive(Debug)]
+pub struct Counter {
+    plugin: PathBuf,
+    out: tempfile::NamedTempFile,
+}
+
+impl Counter {
+    /// Builds the plugin for the QEMU that is installed.
+    pub fn build() -> Result<Self> {
+        let api = plugin_api()?;
+        cargo_build("the counting plugin", &["--package", "insn-count"], &[("ACTQ_QEMU_API", &api.to_string())])?;
+        let name = format!("{}insn_count{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
+        Ok(Self { plugin: target_dir().join("release").join(name), out: tempfile::NamedTempFile::new()? })
+    }
+
+    /// Adds the plugin to a command that runs `elf`.
+    pub fn attach(&self, command: &mut Command, elf: &Path) -> Result<()> {
+        let (begin, begin_len) = symbol(elf, "actq_count_begin")?;
+        let (end, _) = symbol(elf, "actq_count_end")?;
+        command.arg("-plugin").arg(format!(
+            "{},out={},begin={begin:x},begin_end={:x},end={end:x}",
+            self.plugin.display(),
+            self.out.path().display(),
+            begin + begin_len,
+        ));
+        Ok(())
+    }
+
+    /// Instructions of every region of the run that has ended, in order.
+    pub fn counts(&self) -> Result<Vec<u64>> {
+        let text = fs::read_to_string(self.out.path())?;
+        text.lines().map(|line| line.parse().context("the counter's output is not a number")).collect()
+    }
+}
+
+/// The plugin API of the installed QEMU: 1 up to 9.0, 2 from 9.1 on (QEMU's docs/devel/tcg-plugins).
+fn plugin_api() -> Result<u32> {
+    let version = version()?;
+    let number = version.split_whitespace().find(|w| w.starts_with(|c: char| c.is_ascii_digit()));
+    let mut parts = number.unwrap_or("").split('.').map(|p| p.parse::<u32>().unwrap_or(0));
+    let (major, minor) = (parts.next().unwrap_or(0), parts.next().unwrap_or(0));
+    match (major, minor) {
+        (..7, _) => bail!("{version} is too old, 7.0 is needed"),
+        (7 | 8, _) | (9, 0) => Ok(1),
+        _ => Ok(2),
+    }
+}
+
+/// First line of QEMU's own version text.
+pub fn version() -> Result<String> {
+    let output = Command::new(QEMU).arg("--version").output().with_context(|| format!("{QEMU} is not installed"))?;
+    Ok(String::from_utf8_lossy(&output.stdout).lines().next().unwrap_or_default().to_owned())
+}
+
+/// Address (without the Thumb bit) and length of a function.
+fn symbol(elf: &Path, name: &str) -> Result<(u64, u64)> {
+    let data = fs::read(elf).with_context(|| format!("{}: cannot be read", elf.display()))?;
+    let file = object::File::parse(&*data).with_context(|| format!("{}: not an ELF file", elf.display()))?;
+    let symbol = file.symbols().find(|s| s.name() == Ok(name));
+    let symbol = symbol.with_context(|| format!("{}: symbol {name} is missing", elf.display()))?;
+    Ok((symbol.address() & !1, symbol.size()))
+}
+
+/// Bytes of flash that an ELF file takes: code, constants (the built-in image among them) and initial values.
+pub fn flash_bytes(elf: &Path) -> Result<u64> {
+    let data = fs::read(elf).with_context(|| format!("{}: cannot be read", elf.display()))?;
+    let file = object::File::parse(&*data).with_context(|| format!("{}: not an ELF file", elf.display()))?;
+    let flash = [".vector_table", ".text", ".rodata", ".data"];
+    Ok(file.sections().filter(|s| s.name().is_ok_and(|n| flash.contains(&n))).map(|s| s.size()).sum())
+}

@@ -1,0 +1,271 @@
+@ GEMV loop nest for Armv7E-M, stamped over the packed layouts of kernels/src/format.
+@
+@ Arguments: r0 weights, r1 prepared x, r2 acc, r3 quads (>= 1), [sp] x_end, [sp+4] bytes of a group in x.
+@
+@ In the loops: r0 weights, r1 x, r2 mask, r3 and r4 activation pairs, r5-r8 the four rows' sums t, r9-r12 weight words,
+@ lr the extracted pair of codes.
+@
+@ Frame: 0 x, 4 acc, 8 quads, 12 x_end, 16 group bytes, 20 end of this group, 24-39 sums over groups.
+
+    .syntax unified
+    .thumb
+
+@ t[r] += (codes of row r, pair at bit `rot`) * pair, for four rows
+.macro mac4 rot, pair
+    and lr, r2, r9, ror #\rot
+    smlad r5, lr, \pair, r5
+    and lr, r2, r10, ror #\rot
+    smlad r6, lr, \pair, r6
+    and lr, r2, r11, ror #\rot
+    smlad r7, lr, \pair, r7
+    and lr, r2, r12, ror #\rot
+    smlad r8, lr, \pair, r8
+.endm
+
+@ the same at rotation 0, which has no encoding as ROR
+.macro mac4_first pair
+    and lr, r2, r9
+    smlad r5, lr, \pair, r5
+    and lr, r2, r10
+    smlad r6, lr, \pair, r6
+    and lr, r2, r11
+    smlad r7, lr, \pair, r7
+    and lr, r2, r12
+    smlad r8, lr, \pair, r8
+.endm
+
+@ the share of pair 15 that word k of the 3-bit layout holds
+.macro mac4_spare mask, pair
+    and lr, r9, #\mask
+    smlad r5, lr, \pair, r5
+    and lr, r10, #\mask
+    smlad r6, lr, \pair, r6
+    and lr, r11, #\mask
+    smlad r7, lr, \pair, r7
+    and lr, r12, #\mask
+    smlad r8, lr, \pair, r8
+.endm
+
+@ signed bytes 0 and 2 (or, rotated by 8, 1 and 3) of four rows
+.macro mac4_bytes pair, rot:vararg
+    sxtb16 lr, r9 \rot
+    smlad r5, lr, \pair, r5
+    sxtb16 lr, r10 \rot
+    smlad r6, lr, \pair, r6
+    sxtb16 lr, r11 \rot
+    smlad r7, lr, \pair, r7
+    sxtb16 lr, r12 \rot
+    smlad r8, lr, \pair, r8
+.endm
+
+.macro weights
+    ldmia.w r0!, {r9-r12}
+.endm
+
+.macro pairs
+    ldmia.w r1!, {r3, r4}
+.endm
+
+@ One unit of each layout. Prepared x of the unit starts at r1 and is passed.
+.macro unit_w2
+    weights
+    pairs
+    mac4_first r3
+    mac4 2, r4
+    pairs
+    mac4 4, r3
+    mac4 6, r4
+    pairs
+    mac4 8, r3
+    mac4 10, r4
+    pairs
+    mac4 12, r3
+    mac4 14, r4
+.endm
+
+.macro unit_w4
+    weights
+    pairs
+    mac4_first r3
+    mac4 4, r4
+    pairs
+    mac4 8, r3
+    mac4 12, r4
+.endm
+
+.macro unit_w8
+    weights
+    pairs
+    mac4_bytes r3
+    mac4_bytes r4, , ror #8
+.endm
+
+@ Pair 15 stands in three words; r4 holds it throughout, so the others come one by one through r3.
+.macro unit_w3
+    ldr.w r4, [r1, #60]
+    weights
+    ldr.w r3, [r1], #4
+    mac4 1, r3
+    ldr.w r3, [r1], #4
+    mac4 4, r3
+    ldr.w r3, [r1], #4
+    mac4 7, r3
+    ldr.w r3, [r1], #4
+    mac4 10, r3
+    ldr.w r3, [r1], #4
+    mac4 13, r3
+    mac4_spare 0x00020002, r4
+    weights
+    ldr.w r3, [r1], #4
+    mac4 2, r3
+    ldr.w r3, [r1], #4
+    mac4 5, r3
+    ldr.w r3, [r1], #4
+    mac4 8, r3
+    ldr.w r3, [r1], #4
+    mac4 11, r3
+    ldr.w r3, [r1], #4
+    mac4 14, r3
+    mac4_spare 0x00040004, r4
+    weights
+    ldr.w r3, [r1], #4
+    mac4 3, r3
+    ldr.w r3, [r1], #4
+    mac4 6, r3
+    ldr.w r3, [r1], #4
+    mac4 9, r3
+    ldr.w r3, [r1], #4
+    mac4 12, r3
+    ldr.w r3, [r1], #8
+    mac4 15, r3
+    mac4_spare 0x00080008, r4
+.endm
+
+@ The start value of a group's sums from the sum of x: -(2^b - 1) * sum, which takes the codes' offset back.
+.macro start_sums bits
+    ldr r8, [r1], #4
+    .if \bits < 8
+    sub r8, r8, r8, lsl #\bits
+    .else
+    movs r8, #0
+    .endif
+    mov r5, r8
+    mov r6, r8
+    mov r7, r8
+.endm
+
+.macro prologue mask
+    push {r4-r11, lr}
+    sub sp, sp, #44
+    ldr r4, [sp, #80]
+    ldr r5, [sp, #84]
+    str r1, [sp, #0]
+    str r2, [sp, #4]
+    str r3, [sp, #8]
+    str r4, [sp, #12]
+    str r5, [sp, #16]
+    .if \mask
+    movw r2, #(\mask & 0xffff)
+    movt r2, #(\mask >> 16)
+    .endif
+.endm
+
+.macro epilogue
+    add sp, sp, #44
+    pop {r4-r11, pc}
+.endm
+
+@ Rows with one scale each: the sums of a whole row are the result.
+.macro row_kernel name, bits, mask, unit
+    .section .text.\name, "ax", %progbits
+    .global \name
+    .type \name, %function
+    .thumb_func
+    .balign 16
+\name:
+    prologue \mask
+1:
+    ldr r1, [sp, #0]
+    start_sums \bits
+    .balign 4
+2:
+    \unit
+    ldr lr, [sp, #12]
+    cmp r1, lr
+    bne.w 2b
+    ldr lr, [sp, #4]
+    stmia.w lr!, {r5-r8}
+    str lr, [sp, #4]
+    ldr lr, [sp, #8]
+    subs lr, lr, #1
+    str lr, [sp, #8]
+    bne.w 1b
+    epilogue
+    .size \name, . - \name
+.endm
+
+@ Rows with a u8 scale per group: each group's sums are multiplied with its scales and added up on the stack.
+.macro group_kernel name, bits, mask, unit
+    .section .text.\name, "ax", %progbits
+    .global \name
+    .type \name, %function
+    .thumb_func
+    .balign 16
+\name:
+    prologue \mask
+1:
+    ldr r1, [sp, #0]
+    movs r3, #0
+    movs r4, #0
+    strd r3, r4, [sp, #24]
+    strd r3, r4, [sp, #32]
+3:
+    @ the end of this group, or of the vector where that comes first
+    ldrd r3, r4, [sp, #12]
+    add r4, r4, r1
+    cmp r4, r3
+    it hi
+    movhi r4, r3
+    str r4, [sp, #20]
+    start_sums \bits
+    .balign 4
+2:
+    \unit
+    ldr lr, [sp, #20]
+    cmp r1, lr
+    bne.w 2b
+    add lr, sp, #24
+    ldmia.w lr, {r9-r12}
+    ldr r3, [r0], #4
+    uxtb r4, r3
+    mla r9, r5, r4, r9
+    uxtb.w r4, r3, ror #8
+    mla r10, r6, r4, r10
+    uxtb.w r4, r3, ror #16
+    mla r11, r7, r4, r11
+    lsrs r4, r3, #24
+    mla r12, r8, r4, r12
+    stmia.w lr, {r9-r12}
+    ldr lr, [sp, #12]
+    cmp r1, lr
+    bne.w 3b
+    ldr lr, [sp, #4]
+    stmia.w lr!, {r9-r12}
+    str lr, [sp, #4]
+    ldr lr, [sp, #8]
+    subs lr, lr, #1
+    str lr, [sp, #8]
+    bne.w 1b
+    epilogue
+    .size \name, . - \name
+.endm
+
+    row_kernel actq_w2_row, 2, 0x00060006, unit_w2
+    row_kernel actq_w3_row, 3, 0x000e000e, unit_w3
+    row_kernel actq_w4_row, 4, 0x001e001e, unit_w4
+    row_kernel actq_w8_row, 8, 0, unit_w8
+    group_kernel actq_w2_group, 2, 0x00060006, unit_w2
+    group_kernel actq_w3_group, 3, 0x000e000e, unit_w3
+    group_kernel actq_w4_group, 4, 0x001e001e, unit_w4
+    group_kernel actq_w8_group, 8, 0, unit_w8
+    .text

@@ -1,0 +1,152 @@
+//! The errors of parsing, of construction and of a step.
+
+use core::fmt;
+
+/// Why [`crate::Image::new_checked`] refused an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum ImageError {
+    /// The bytes do not start at a multiple of 4 in memory.
+    Misaligned,
+    /// Fewer bytes than a header.
+    TooShort,
+    /// The first four bytes are not `ACTQ`.
+    Magic,
+    /// The image's format version is not the one that this crate reads.
+    Version,
+    /// The image was packed for kernels of another layout; quantize the policy again.
+    Layout,
+    /// The header's length differs from the number of bytes given.
+    Length,
+    /// The checksum does not match: the image is damaged.
+    Checksum,
+    /// A field that must be zero is not.
+    Reserved,
+    /// The policy kind is unknown.
+    Kind,
+    /// Chunk or execute length is zero, or execute exceeds chunk.
+    Chunk,
+    /// A section lies outside the image.
+    Section,
+    /// An arena region lies outside the scratch memory.
+    Arena,
+    /// An operation's source and destination overlap.
+    Overlap,
+    /// An operation code is unknown.
+    Op,
+    /// A length is zero, or two lengths of an operation disagree.
+    Shape,
+    /// A matrix block's width is not 2, 3, 4 or 8 bits.
+    Width,
+    /// A group size is not 0, 32, 64 or 128.
+    Group,
+    /// A row index lies outside the output or occurs twice.
+    Index,
+    /// A constant is NaN, infinite or of the wrong sign.
+    Constant,
+    /// A row's worst case exceeds the int32 accumulator.
+    Overflow,
+    /// A lower action limit exceeds the upper one.
+    Limits,
+    /// The policy's name is not UTF-8.
+    Name,
+}
+
+impl fmt::Display for ImageError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Misaligned => "image is not aligned to 4 bytes",
+            Self::TooShort => "image is shorter than its header",
+            Self::Magic => "not an actq image (magic differs)",
+            Self::Version => "image format version is not supported",
+            Self::Layout => "image was packed for another kernel layout; quantize again",
+            Self::Length => "image length differs from its header",
+            Self::Checksum => "image checksum differs: the image is damaged",
+            Self::Reserved => "a reserved field is not zero",
+            Self::Kind => "unknown policy kind",
+            Self::Chunk => "chunk and execute lengths do not fit",
+            Self::Section => "a section lies outside the image",
+            Self::Arena => "a region lies outside the scratch memory",
+            Self::Overlap => "source and destination of an operation overlap",
+            Self::Op => "unknown operation",
+            Self::Shape => "lengths of an operation do not fit",
+            Self::Width => "weight width is not 2, 3, 4 or 8 bits",
+            Self::Group => "group size is not 0, 32, 64 or 128",
+            Self::Index => "output index out of range or repeated",
+            Self::Constant => "a constant is not finite or has the wrong sign",
+            Self::Overflow => "a row can overflow its int32 accumulator",
+            Self::Limits => "action limits are reversed",
+            Self::Name => "policy name is not UTF-8",
+        })
+    }
+}
+
+impl core::error::Error for ImageError {}
+
+/// Why [`crate::Head::new`] refused the scratch memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum HeadError {
+    /// The scratch slice has fewer words than the image asks for.
+    ScratchTooSmall {
+        /// Words needed.
+        needed: usize,
+        /// Words given.
+        given: usize,
+    },
+}
+
+impl fmt::Display for HeadError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::ScratchTooSmall { needed, given } => {
+                write!(f, "scratch memory has {given} words, the image needs {needed}")
+            }
+        }
+    }
+}
+
+impl core::error::Error for HeadError {}
+
+/// Why [`crate::Head::step`] gave no action. The head's state is as if it had been reset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum StepError {
+    /// The observation's length differs from the image's.
+    ObservationLength {
+        /// Values expected.
+        expected: usize,
+        /// Values given.
+        given: usize,
+    },
+    /// An observation value is NaN or infinite.
+    ObservationNotFinite {
+        /// Its position.
+        index: usize,
+    },
+    /// A value inside the network or an action left the range of f32.
+    NotFinite,
+    /// The self-test vector gave other bits than the image records.
+    SelfTest {
+        /// The step of the vector that differed.
+        step: usize,
+    },
+}
+
+impl fmt::Display for StepError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::ObservationLength { expected, given } => {
+                write!(f, "observation has {given} values, the policy takes {expected}")
+            }
+            Self::ObservationNotFinite { index } => write!(f, "observation value {index} is not finite"),
+            Self::NotFinite => f.write_str("the network produced a value that is not finite"),
+            Self::SelfTest { step } => write!(f, "self-test step {step} gave other bits than the image records"),
+        }
+    }
+}
+
+impl core::error::Error for StepError {}

@@ -1,0 +1,45 @@
+//! Low-bit GEMV kernels and an action-head executor for microcontrollers: `no_std`, no allocation, no panic after
+//! [`Image::new_checked`].
+//!
+//! A robot policy's last layers, or a whole small policy, are quantized on a host (by the command `actq`) into one image of
+//! bytes. This crate runs that image in place from flash:
+//!
+//! ```
+//! # fn run(bytes: &[u8], scratch: &mut [u32], observation: &[f32]) -> Result<(), Box<dyn std::error::Error>> {
+//! use actq_kernels::{Head, Image};
+//!
+//! let image = Image::new_checked(bytes)?; // checksum, layout, bounds, overflow limits: all of it here, once
+//! let mut head = Head::new(image, scratch)?; // `image.scratch_words()` says how many words
+//! head.reset();
+//! let action = head.step(observation)?; // the same bits on every machine
+//! # let _ = action; Ok(())
+//! # }
+//! ```
+//!
+//! The arithmetic, in the order in which it happens, is documented in [`linear`]; the packed layouts in [`format`]; the image
+//! in `docs/FORMAT.md`. Everything outside the integer GEMV is IEEE 754 binary32 in a fixed order, without fused
+//! multiply-add, so that a host, QEMU and a board give identical bits.
+#![cfg_attr(not(test), no_std)]
+#![deny(unsafe_code)]
+
+pub mod activations;
+#[cfg(actq_armv7em)]
+#[allow(unsafe_code, reason = "the assembler backend; every block carries its proof")]
+pub mod armv7em;
+pub mod dequantize;
+mod error;
+pub mod format;
+pub mod gemv;
+pub mod head;
+pub mod image;
+pub mod linear;
+pub mod math;
+pub mod norm;
+pub mod portable;
+pub mod recurrent;
+pub mod reference;
+
+pub use error::{HeadError, ImageError, StepError};
+pub use format::{Block, BlockShape, Width};
+pub use head::Head;
+pub use image::Image;

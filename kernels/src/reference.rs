@@ -1,0 +1,22 @@
+//! The plain GEMV: decodes one weight at a time by the packer's inverse. Slow, and what the others are compared with.
+
+use crate::activations::Prepared;
+use crate::format::Block;
+
+/// The value that a GEMV computes for `row`: `sum over groups of scale * sum over columns of level * x`, modulo 2^32.
+pub fn dot(block: &Block<'_>, x: &Prepared<'_>, row: usize) -> i32 {
+    (0..block.shape().cols).fold(0i32, |sum, col| {
+        let weight = block.level(row, col) * i32::from(block.group_scale(row, col));
+        sum.wrapping_add(weight.wrapping_mul(i32::from(x.value(col))))
+    })
+}
+
+/// As [`crate::gemv::gemv`].
+pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_quad: usize, acc: &mut [[i32; 4]]) {
+    for (quad, sums) in acc.iter_mut().enumerate() {
+        for (r, sum) in sums.iter_mut().enumerate() {
+            let row = (first_quad + quad) * 4 + r;
+            *sum = if row < block.shape().rows { dot(block, x, row) } else { 0 };
+        }
+    }
+}

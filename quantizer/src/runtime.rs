@@ -1,0 +1,45 @@
+//! An image in memory and the executor over it, for the host.
+
+use std::fs;
+use std::path::Path;
+
+use actq_kernels::{Head, Image};
+use anyhow::{Context, Result};
+
+/// The bytes of an image at an address that is a multiple of 4.
+#[derive(Clone, Debug)]
+pub struct ImageBuffer {
+    words: Vec<u32>,
+    len: usize,
+}
+
+impl ImageBuffer {
+    /// Copies `bytes`.
+    pub fn new(bytes: &[u8]) -> Self {
+        let mut words = vec![0u32; bytes.len().div_ceil(4)];
+        bytemuck::cast_slice_mut(&mut words)[..bytes.len()].copy_from_slice(bytes);
+        Self { words, len: bytes.len() }
+    }
+
+    /// Reads a file.
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = fs::read(path).with_context(|| format!("{}: cannot be read", path.display()))?;
+        Ok(Self::new(&bytes))
+    }
+
+    /// The bytes.
+    pub fn bytes(&self) -> &[u8] {
+        &bytemuck::cast_slice(&self.words)[..self.len]
+    }
+
+    /// Parses the image; `path` names it in the error.
+    pub fn image(&self, path: &Path) -> Result<Image<'_>> {
+        Image::new_checked(self.bytes()).with_context(|| path.display().to_string())
+    }
+}
+
+/// Runs `work` with a head over `image` in fresh scratch memory.
+pub fn with_head<T>(image: Image<'_>, work: impl FnOnce(&mut Head<'_, '_>) -> Result<T>) -> Result<T> {
+    let mut scratch = vec![0u32; image.scratch_words()];
+    work(&mut Head::new(image, &mut scratch)?)
+}

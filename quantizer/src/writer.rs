@@ -1,0 +1,272 @@
+//! Lays an image out and writes it to a file.
+
+use std::io::Write as _;
+use std::path::Path;
+
+use actq_kernels::format::{self, LAYOUT_STAMP};
+use actq_kernels::image::{Kind, Region, checksum, half_words, header as h, header::op};
+use actq_kernels::math::Function;
+use anyhow::{Context, Result, bail, ensure};
+
+use crate::graph::{Graph, NodeKind};
+use crate::lower::{Step, StepKind, lower, product};
+use crate::policy::Policy;
+use crate::quantize::{Outcome, Quantized};
+use crate::runtime::{ImageBuffer, with_head};
+
+/// The image of a policy with its quantized matrices, one per matrix of the graph. The self-test vector is computed by the
+/// executor itself.
+pub fn image(policy: &Policy, matrices: &[Outcome]) -> Result<Vec<u8>> {
+    let group = matrices.first().map_or(0, |m| m.quantized.group);
+    let program = lower(&policy.graph, policy.act_len, group)?;
+    let mut writer = Writer { words: vec![0; h::WORDS], packed: Vec::new() };
+    writer.packed = matrices.iter().map(|m| writer.weights(&m.quantized)).collect::<Result<_>>()?;
+    let records = program
+        .steps
+        .iter()
+        .map(|step| writer.op(&policy.graph, step, matrices))
+        .collect::<Result<Vec<[u32; h::OP_WORDS]>>>()?;
+    let ops = writer.push(records.into_iter().flatten());
+    let contract = writer.words.len() as u32;
+    let mut flags = 0;
+    for (bit, (_, array)) in policy.contract.arrays().into_iter().enumerate() {
+        if let Some(array) = array {
+            flags |= 1 << bit;
+            writer.push_floats(array);
+        }
+    }
+    let name = writer.push_bytes(policy.name.as_bytes());
+    let steps = policy.execute + 2;
+    let observations = self_test_observations(&policy.graph, steps);
+    let self_test = writer.words.len() as u32;
+    for observation in &observations {
+        writer.push_floats(observation);
+        writer.push_floats(&vec![0.0; policy.act_len]);
+    }
+    let kind = match policy.kind {
+        Kind::Step => 0,
+        Kind::Chunk => 1,
+    };
+    let words = &mut writer.words;
+    words[0] = h::MAGIC;
+    words[h::W_VERSION] = halves(h::VERSION.into(), h::WORDS)?;
+    words[h::W_LAYOUT] = LAYOUT_STAMP;
+    words[h::W_KIND] = kind | halves(0, program.steps.len())?;
+    words[h::W_OPS] = ops;
+    words[h::W_SIZES] = halves(policy.graph.obs_len, policy.act_len)?;
+    words[h::W_CHUNK] = halves(policy.chunk, policy.execute)?;
+    words[h::W_SCRATCH] = program.words as u32;
+    words[h::W_STATE] = halves(program.state.offset, program.state.len)?;
+    words[h::W_OBS_OUT] = halves(program.observation.offset, program.output.offset)?;
+    words[h::W_ACTION_WORK] = halves(program.action.offset, program.work.offset)?;
+    words[h::W_WORK_FLAGS] = halves(program.work.len, flags)?;
+    words[h::W_CONTRACT] = contract;
+    words[h::W_RATE] = policy.rate_hz.to_bits();
+    words[h::W_SELF_TEST] = self_test;
+    words[h::W_STEPS_NAME] = halves(steps, policy.name.len())?;
+    words[h::W_NAME] = name;
+    for (word, bytes) in words[h::W_DIGEST..].iter_mut().zip(policy.digest.chunks_exact(4)) {
+        *word = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
+    }
+    let actions = self_test_actions(&seal(words), &observations)?;
+    for (step, action) in actions.iter().enumerate() {
+        let at = self_test as usize + step * (policy.graph.obs_len + policy.act_len) + policy.graph.obs_len;
+        for (word, value) in words[at..].iter_mut().zip(action) {
+            *word = value.to_bits();
+        }
+    }
+    Ok(seal(words))
+}
+
+/// Fills in length and checksum and gives the bytes.
+fn seal(words: &[u32]) -> Vec<u8> {
+    let mut bytes: Vec<u8> = words.iter().flat_map(|w| w.to_le_bytes()).collect();
+    let len = (bytes.len() as u32).to_le_bytes();
+    bytes[4 * h::W_BYTES..][..4].copy_from_slice(&len);
+    let crc = checksum(&bytes).to_le_bytes();
+    bytes[4 * h::W_CRC..][..4].copy_from_slice(&crc);
+    bytes
+}
+
+/// Observations that reach every input: spread over about two standard deviations where the policy normalizes, else over -1
+/// to 1, from a fixed generator.
+fn self_test_observations(graph: &Graph, steps: usize) -> Vec<Vec<f32>> {
+    let mut state = 0x2545_f491u32;
+    let mut noise = move || {
+        state ^= state << 13;
+        state ^= state >> 17;
+        state ^= state << 5;
+        state as i32 as f32 / i32::MAX as f32
+    };
+    let norm = graph.nodes.iter().find_map(|node| match &node.kind {
+        NodeKind::Normalize { mean, scale, .. } if node.input == 0 => Some((mean, scale)),
+        _ => None,
+    });
+    let mut value = |i: usize| match norm {
+        Some((mean, scale)) if scale[i].abs() > 1e-6 => mean[i] + 2.0 * noise() / scale[i],
+        _ => noise(),
+    };
+    (0..steps).map(|_| (0..graph.obs_len).map(&mut value).collect()).collect()
+}
+
+fn self_test_actions(bytes: &[u8], observations: &[Vec<f32>]) -> Result<Vec<Vec<f32>>> {
+    let buffer = ImageBuffer::new(bytes);
+    let image = buffer.image(Path::new("the new image"))?;
+    with_head(image, |head| {
+        observations.iter().map(|obs| Ok(head.step(obs).context("self-test of the new image")?.to_vec())).collect()
+    })
+}
+
+/// Writes `bytes` to `path` so that a failure leaves no part of a file behind.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    let dir = match path.parent() {
+        Some(dir) if !dir.as_os_str().is_empty() => dir,
+        _ => Path::new("."),
+    };
+    let write = || -> Result<()> {
+        let mut file = tempfile::NamedTempFile::new_in(dir)?;
+        file.write_all(bytes)?;
+        #[cfg(unix)]
+        {
+            // A temporary file is private to its owner; an image is as readable as any other output.
+            use std::os::unix::fs::PermissionsExt as _;
+            file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644))?;
+        }
+        file.as_file().sync_all()?;
+        file.persist(path)?;
+        Ok(())
+    };
+    write().with_context(|| format!("{}: cannot be written", path.display()))
+}
+
+/// Two u16 in a word.
+fn halves(low: usize, high: usize) -> Result<u32> {
+    let fits = low <= 0xffff && high <= 0xffff;
+    ensure!(fits, "a size of the policy ({}) exceeds the format's limit of 65535", low.max(high));
+    Ok(low as u32 | (high as u32) << 16)
+}
+
+/// Where the parts of a matrix stand.
+struct Packed {
+    /// Block records.
+    records: Vec<u32>,
+}
+
+struct Writer {
+    words: Vec<u32>,
+    packed: Vec<Packed>,
+}
+
+impl Writer {
+    /// Appends words and gives their offset.
+    fn push(&mut self, words: impl IntoIterator<Item = u32>) -> u32 {
+        let offset = self.words.len() as u32;
+        self.words.extend(words);
+        offset
+    }
+
+    fn push_floats(&mut self, values: &[f32]) -> u32 {
+        self.push(values.iter().map(|v| v.to_bits()))
+    }
+
+    fn push_bytes(&mut self, bytes: &[u8]) -> u32 {
+        self.push(bytes.chunks(4).map(|c| c.iter().rev().fold(0, |word, b| word << 8 | u32::from(*b))))
+    }
+
+    /// Packs a matrix's blocks.
+    fn weights(&mut self, matrix: &Quantized) -> Result<Packed> {
+        let blocks = matrix.blocks();
+        let in_order = Quantized::in_order(&blocks);
+        let mut records = Vec::new();
+        for (shape, rows) in &blocks {
+            let codes: Vec<u8> =
+                rows.iter().flat_map(|r| &matrix.codes[r * matrix.cols..][..matrix.cols]).copied().collect();
+            let groups = matrix.groups();
+            let group_scales: Vec<u8> =
+                rows.iter().flat_map(|r| &matrix.group_scales[r * groups..][..groups]).copied().collect();
+            let mut words = vec![0; shape.words()];
+            format::pack(*shape, &codes, &group_scales, &mut words)
+                .context("a matrix has a shape that cannot be packed")?;
+            let weights = self.push(words.into_iter().map(u32::from_le));
+            let scales: Vec<u16> = rows.iter().map(|&r| matrix.scales[r].to_bits()).collect();
+            let scales = self.push(half_words(&scales));
+            let index = if in_order {
+                0
+            } else {
+                let index = rows.iter().map(|&r| u16::try_from(r)).collect::<Result<Vec<_>, _>>()?;
+                self.push(half_words(&index))
+            };
+            records.extend([shape.width.bits() | halves(0, shape.rows)?, weights, scales, index]);
+        }
+        Ok(Packed { records })
+    }
+
+    fn op(&mut self, graph: &Graph, step: &Step<Region>, matrices: &[Outcome]) -> Result<[u32; 4]> {
+        let mut detail = 0u8;
+        let mut src_len = 0;
+        let (code, data) = match step.kind {
+            StepKind::Normalize { node } => {
+                let NodeKind::Normalize { mean, scale, pre_clip, clip } = &graph.nodes[node].kind else {
+                    bail!("node {node} is no normalize")
+                };
+                let data = self.push_floats(&[*pre_clip, *clip]);
+                self.push_floats(mean);
+                self.push_floats(scale);
+                (op::NORMALIZE, data)
+            }
+            StepKind::Linear { node, product: which, accumulate } => {
+                let (matrix, bias) = product(&graph.nodes[node], which).context("a node without such a product")?;
+                detail = u8::from(accumulate);
+                src_len = graph.matrices[matrix].cols;
+                (op::LINEAR, self.matrix(matrix, &matrices[matrix], bias)?)
+            }
+            StepKind::Function(function) => {
+                detail = Function::ALL.iter().position(|f| *f == function).unwrap_or_default() as u8;
+                (op::FUNCTION, 0)
+            }
+            StepKind::LayerNorm { node } => {
+                let NodeKind::LayerNorm { weight, bias, eps } = &graph.nodes[node].kind else {
+                    bail!("node {node} is no layernorm")
+                };
+                let data = self.push_floats(&[*eps]);
+                self.push_floats(weight);
+                self.push_floats(bias);
+                (op::LAYER_NORM, data)
+            }
+            StepKind::RmsNorm { node } => {
+                let NodeKind::RmsNorm { weight, eps } = &graph.nodes[node].kind else {
+                    bail!("node {node} is no rmsnorm")
+                };
+                let data = self.push_floats(&[*eps]);
+                self.push_floats(weight);
+                (op::RMS_NORM, data)
+            }
+            StepKind::Add => (op::ADD, 0),
+            StepKind::Copy => (op::COPY, 0),
+            StepKind::LstmCell => (op::LSTM_CELL, 0),
+            StepKind::GruCell => (op::GRU_CELL, 0),
+        };
+        let offset = |region: Option<Region>| region.map_or(0, |r| r.offset);
+        Ok([
+            u32::from(code) | u32::from(detail) << 8 | halves(0, step.dst.len)?,
+            halves(step.dst.offset, offset(step.src))?,
+            halves(src_len, offset(step.extra))?,
+            data,
+        ])
+    }
+
+    /// The record of a matrix; where several operations share one, each has its own record over the same weights.
+    fn matrix(&mut self, index: usize, outcome: &Outcome, bias: &[f32]) -> Result<u32> {
+        let quantized = &outcome.quantized;
+        ensure!(quantized.rows <= h::MAX_ROWS, "a matrix has {} rows, {} are supported", quantized.rows, h::MAX_ROWS);
+        let bias = if bias.iter().all(|b| *b == 0.0) { 0 } else { self.push_floats(bias) };
+        let records = self.packed[index].records.clone();
+        let record = [
+            halves(quantized.rows, quantized.cols)?,
+            halves(quantized.group, outcome.x_max.into())?,
+            halves(records.len() / h::BLOCK_WORDS, 0)?,
+            bias,
+        ];
+        Ok(self.push(record.into_iter().chain(records)))
+    }
+}

@@ -1,0 +1,254 @@
+//! `cargo demo`: the UR3 policy from its PyTorch weights to a Cortex-M4, in closed loop.
+
+use std::fs;
+use std::path::Path;
+
+use actq::eval;
+use actq::inspect::{bits_per_weight, table};
+use actq::policy::Policy;
+use actq::quantize::{Activations, Budget, Method, Options, moments, quantize};
+use actq::runtime::{ImageBuffer, with_head};
+use actq::{dataset::Dataset, writer};
+use actq_host_tests::qemu::{self, Counter, Server, Target};
+use actq_kernels::image::Op;
+use actq_kernels::{Head, Image, Width};
+use actq_ur3::policy_f32::PolicyF32;
+use actq_ur3::task::{Outcome, run_episode};
+use anyhow::{Context, Result, ensure};
+
+/// First seed of the closed-loop episodes; the policy was trained and calibrated on others.
+const FIRST_SEED: u64 = 1000;
+
+/// A policy's column in the table.
+struct Column {
+    name: String,
+    cells: Vec<String>,
+}
+
+const ROWS: [&str; 9] = [
+    "bits per weight",
+    "image bytes",
+    "against f32",
+    "scratch RAM bytes",
+    "held-out NMSE",
+    "closed-loop success",
+    "tracking error",
+    "instructions per evaluation",
+    "instructions per MAC",
+];
+
+pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
+    let root = actq_host_tests::root();
+    let policy_dir = root.join("examples/ur3/policy");
+    let work = qemu::target_dir().join("demo");
+    fs::create_dir_all(&work)?;
+    let policy = Policy::load(&policy_dir)?;
+    let f32_bytes = 4 * policy.graph.parameters();
+    let dataset = Dataset::load(&policy_dir.join("calib.npz"), policy.graph.obs_len, policy.chunk * policy.act_len)?;
+    println!("\nQuantizing {} ({} parameters, {f32_bytes} bytes in f32)", policy.name, policy.graph.parameters());
+    let moments = moments::collect(&policy.graph, &dataset, |_| {});
+
+    println!("Closed loop in f32, {episodes} episodes");
+    let mut reference = PolicyF32::load(&policy_dir)?;
+    let outcomes = closed_loop(episodes, |seed| {
+        reference.reset();
+        Ok(run_episode(seed, |obs| reference.act(obs)))
+    })?;
+    let mut columns = vec![Column {
+        name: "f32".into(),
+        cells: vec![
+            "32".into(),
+            f32_bytes.to_string(),
+            "1.0x".into(),
+            "-".into(),
+            "0".into(),
+            success(&outcomes),
+            tracking(&outcomes),
+        ],
+    }];
+
+    let counter = Counter::build()?;
+    let mut report = Vec::new();
+    for width in [Width::W8, Width::W3] {
+        let options =
+            Options { method: Method::Gptq, budget: Budget::Width(width), group: 0, activations: Activations::Int8 };
+        let bytes = writer::image(&policy, &quantize(&policy.graph, &moments, &options)?)?;
+        let path = work.join(format!("ur3-{}bit.actq", width.bits()));
+        writer::write(&path, &bytes)?;
+        let buffer = ImageBuffer::new(&bytes);
+        let image = buffer.image(&path)?;
+        println!("Closed loop at {} bits, {episodes} episodes on the host", width.bits());
+        let outcomes = with_head(image, |head| closed_loop(episodes, |seed| episode_on_host(head, seed)))?;
+        println!(
+            "Closed loop at {} bits, {qemu_episodes} episodes with the firmware in QEMU as the policy",
+            width.bits()
+        );
+        let firmware = Firmware::run(&path, image, &counter, qemu_episodes)?;
+        let nmse = eval::evaluate(image, &eval::heldout(&policy_dir, &image)?)?.nmse;
+        columns.push(Column {
+            name: format!("{}-bit", width.bits()),
+            cells: vec![
+                format!("{:.2}", bits_per_weight(&image)),
+                bytes.len().to_string(),
+                format!("{:.1}x", f32_bytes as f64 / bytes.len() as f64),
+                (4 * image.scratch_words()).to_string(),
+                format!("{nmse:.1e}"),
+                success(&outcomes),
+                tracking(&outcomes),
+                firmware.instructions.to_string(),
+                format!("{:.2}", firmware.instructions as f64 / macs(&image) as f64),
+            ],
+        });
+        report.push(format!(
+            "{}-bit firmware in QEMU: success {}, identical bits: {} of {} actions, {} bytes of code beside the image",
+            width.bits(),
+            success(&firmware.outcomes),
+            firmware.identical,
+            firmware.actions,
+            firmware.code_bytes,
+        ));
+        ensure!(firmware.identical == firmware.actions, "the firmware's actions differ from the host's");
+    }
+
+    let names: Vec<&str> = std::iter::once("UR3 reach").chain(columns.iter().map(|c| c.name.as_str())).collect();
+    let mut summary = table(&names);
+    for (i, row) in ROWS.iter().enumerate() {
+        let cells = columns.iter().map(|c| c.cells.get(i).cloned().unwrap_or_else(|| "-".into()));
+        summary.add_row(std::iter::once((*row).to_owned()).chain(cells));
+    }
+    println!("\n{summary}\n\n{}\n", report.join("\n"));
+    println!(
+        "Instructions counted on the Cortex-M4, a whole call each:\n\n{}",
+        kernels(&work.join("ur3-3bit.actq"), &counter)?
+    );
+    Ok(())
+}
+
+fn closed_loop(episodes: u64, mut episode: impl FnMut(u64) -> Result<Outcome>) -> Result<Vec<Outcome>> {
+    (FIRST_SEED..FIRST_SEED + episodes).map(&mut episode).collect()
+}
+
+/// One episode with a fallible policy; its first error ends up here.
+fn episode(seed: u64, mut step: impl FnMut(&[f32]) -> Result<[f32; 6]>) -> Result<Outcome> {
+    let mut failure = None;
+    let outcome = run_episode(seed, |obs| {
+        if failure.is_some() {
+            return [0.0; 6];
+        }
+        step(obs).unwrap_or_else(|error| {
+            failure = Some(error);
+            [0.0; 6]
+        })
+    });
+    failure.map_or(Ok(outcome), Err)
+}
+
+fn episode_on_host(head: &mut Head<'_, '_>, seed: u64) -> Result<Outcome> {
+    head.reset();
+    episode(seed, |obs| Ok(head.step(obs)?.try_into()?))
+}
+
+fn success(outcomes: &[Outcome]) -> String {
+    format!("{} of {}", outcomes.iter().filter(|o| o.success).count(), outcomes.len())
+}
+
+fn tracking(outcomes: &[Outcome]) -> String {
+    let mean = outcomes.iter().map(|o| o.tracking_error_m).sum::<f64>() / outcomes.len().max(1) as f64;
+    format!("{:.2} mm", 1e3 * mean)
+}
+
+fn macs(image: &Image<'_>) -> usize {
+    image
+        .ops()
+        .map(|op| match op {
+            Op::Linear { matrix, .. } => matrix.rows * matrix.cols,
+            _ => 0,
+        })
+        .sum()
+}
+
+/// What a run of the firmware as the policy gave.
+struct Firmware {
+    outcomes: Vec<Outcome>,
+    actions: usize,
+    /// Actions whose bits are those of the host executor on the same observations.
+    identical: usize,
+    /// Mean over the steps that evaluate the network.
+    instructions: u64,
+    code_bytes: u64,
+}
+
+impl Firmware {
+    fn run(path: &Path, image: Image<'_>, counter: &Counter, episodes: u64) -> Result<Self> {
+        let elf = qemu::build("actq-firmware-demo", Target::Fpu, path)?;
+        let mut command = qemu::command(&elf, None, "serve");
+        counter.attach(&mut command, &elf)?;
+        let mut server = Server::start(command, image.act_len())?;
+        let (mut actions, mut identical) = (0, 0);
+        // Whether each step evaluates the network or plays on from its chunk.
+        let mut evaluates = Vec::new();
+        let outcomes = with_head(image, |head| {
+            closed_loop(episodes, |seed| {
+                head.reset();
+                server.reset()?;
+                let mut step = 0;
+                episode(seed, |obs| {
+                    let action = server.step(obs)?;
+                    let same = action.iter().zip(head.step(obs)?).all(|(a, b)| a.to_bits() == b.to_bits());
+                    actions += 1;
+                    identical += usize::from(same);
+                    evaluates.push(step % image.execute() == 0);
+                    step += 1;
+                    action.as_slice().try_into().context("an action has not six values")
+                })
+            })
+        })?;
+        server.finish()?;
+        let counts = counter.counts()?;
+        ensure!(counts.len() == evaluates.len(), "the counter saw {} steps of {}", counts.len(), evaluates.len());
+        let evaluated: Vec<u64> = counts.iter().zip(&evaluates).filter(|(_, e)| **e).map(|(c, _)| *c).collect();
+        Ok(Self {
+            outcomes,
+            actions,
+            identical,
+            instructions: evaluated.iter().sum::<u64>() / evaluated.len().max(1) as u64,
+            code_bytes: qemu::flash_bytes(&elf)? - image.bytes() as u64,
+        })
+    }
+}
+
+/// The kernels and a naive loop, counted side by side.
+fn kernels(image: &Path, counter: &Counter) -> Result<String> {
+    let elf = qemu::build("bench", Target::Fpu, image)?;
+    let mut command = qemu::command(&elf, None, "");
+    counter.attach(&mut command, &elf)?;
+    let output = qemu::run(command, &[])?;
+    ensure!(output.status.success(), "the bench firmware failed: {}", String::from_utf8_lossy(&output.stderr));
+    let counts = counter.counts()?;
+    let lines = String::from_utf8(output.stdout)?;
+    ensure!(lines.lines().count() == counts.len(), "the bench firmware and the counter disagree");
+    let mut rows = table(&["kernel", "bits", "scales", "shape", "instructions", "per MAC", "against naive"]);
+    let naive = *counts.first().context("the bench firmware measured nothing")? as f64;
+    for (line, count) in lines.lines().zip(counts) {
+        let fields: Vec<&str> = line.split_whitespace().collect();
+        let [name, bits, group, shape_rows, cols] = fields[..] else {
+            anyhow::bail!("the bench firmware printed {line:?}");
+        };
+        let macs = shape_rows.parse::<f64>()? * cols.parse::<f64>()?;
+        let scales = match (name, group) {
+            ("naive-f32", _) => "-".to_owned(),
+            (_, "0") => "row".to_owned(),
+            (_, group) => group.to_owned(),
+        };
+        rows.add_row([
+            name.to_owned(),
+            bits.to_owned(),
+            scales,
+            format!("{shape_rows}x{cols}"),
+            count.to_string(),
+            format!("{:.2}", count as f64 / macs),
+            format!("{:.1}x", naive / count as f64),
+        ]);
+    }
+    Ok(rows.to_string())
+}

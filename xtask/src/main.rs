@@ -1,0 +1,50 @@
+//! What people and CI type: `cargo demo`, `cargo verify`, `cargo xtask doctor`.
+#![forbid(unsafe_code)]
+
+mod demo;
+mod setup;
+mod verify;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Commands of the actq workspace.
+#[derive(Parser)]
+#[command(name = "xtask", max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Quantize the UR3 policy, run it on a Cortex-M4 in QEMU in closed loop, and show what it costs and gives
+    Demo {
+        /// Closed-loop episodes of each policy on the host
+        #[arg(long, default_value_t = 100)]
+        episodes: u64,
+        /// Closed-loop episodes with the firmware in QEMU as the policy
+        #[arg(long, default_value_t = 20)]
+        qemu_episodes: u64,
+    },
+    /// Everything that CI checks: format, lints, documentation, tests on the host and under QEMU
+    Verify,
+    /// Check and install what the other commands need: Rust targets and QEMU
+    Doctor,
+}
+
+fn main() -> ExitCode {
+    let outcome = match Cli::parse().command {
+        Command::Demo { episodes, qemu_episodes } => setup::ensure().and_then(|()| demo::run(episodes, qemu_episodes)),
+        Command::Verify => setup::ensure().and_then(|()| verify::run()),
+        Command::Doctor => setup::ensure().map(|()| println!("all there")),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("\nerror: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! What CI checks. Every step runs, and all failures are reported at the end.
+
+use std::process::Command;
+use std::time::Instant;
+
+use actq_host_tests::qemu::{Target, target_dir};
+use anyhow::{Context, Result, bail};
+
+/// A step: its name, the arguments of cargo, and environment variables.
+type Step<'a> = (&'a str, Vec<&'a str>, Vec<(&'a str, String)>);
+
+/// Runs all steps.
+pub(crate) fn run() -> Result<()> {
+    // The firmware includes an image by path. Lints and documentation do not run it, so any file will do for them.
+    let placeholder = target_dir().join("verify-image");
+    std::fs::create_dir_all(target_dir())?;
+    std::fs::write(&placeholder, [0u8; 4]).with_context(|| placeholder.display().to_string())?;
+    let image = || ("ACTQ_IMAGE", placeholder.display().to_string());
+    let deny = || ("RUSTDOCFLAGS", "-D warnings".to_owned());
+    let firmware = |command, target: Target| {
+        vec![command, "--package", "actq-firmware-demo", "--package", "actq-kernels", "--target", target.triple()]
+    };
+    let lints = ["--", "-D", "warnings"];
+    let mut steps: Vec<Step<'_>> = vec![
+        ("format", vec!["fmt", "--all", "--check"], vec![]),
+        (
+            "lints",
+            [&["clippy", "--workspace", "--all-targets", "--exclude", "actq-firmware-demo"], &lints[..]].concat(),
+            vec![],
+        ),
+    ];
+    for target in [Target::Fpu, Target::NoFpu] {
+        steps.push(("lints of the firmware", [firmware("clippy", target), lints.to_vec()].concat(), vec![image()]));
+    }
+    steps.extend([
+        (
+            "documentation",
+            vec!["doc", "--no-deps", "--workspace", "--exclude", "actq-firmware-demo", "--exclude", "xtask"],
+            vec![deny()],
+        ),
+        (
+            "documentation of the firmware",
+            [firmware("doc", Target::Fpu), vec!["--no-deps"]].concat(),
+            vec![deny(), image()],
+        ),
+        ("tests", vec!["test", "--release"], vec![]),
+    ]);
+    let mut failed = Vec::new();
+    for (name, arguments, environment) in steps {
+        println!("\n== {name}: cargo {}", arguments.join(" "));
+        let start = Instant::now();
+        let status = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+            .current_dir(actq_host_tests::root())
+            .args(&arguments)
+            .envs(environment)
+            .status()
+            .context("cargo cannot be started")?;
+        println!(
+            "== {name}: {} in {:.0} s",
+            if status.success() { "ok" } else { "FAILED" },
+            start.elapsed().as_secs_f32()
+        );
+        if !status.success() {
+            failed.push(name);
+        }
+    }
+    if !failed.is_empty() {
+        bail!("failed: {}", failed.join(", "));
+    }
+    println!("\nall checks passed");
+    Ok(())
+}
