@@ -75,9 +75,9 @@ struct QuantizeArgs {
     /// Bits per weight of the whole, scales and padding counted; each matrix gets a width
     #[arg(long, value_name = "X")]
     bpw: Option<f64>,
-    /// Columns that share a u8 scale: 32, 64 or 128; 0 = one scale a row
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = group)]
-    group: usize,
+    /// Columns that share a u8 scale: 32, 64 or 128; 0 = one scale a row [default: 32 for rtn, 0 for gptq]
+    #[arg(long, value_name = "N", value_parser = group)]
+    group: Option<usize>,
     /// Bits of the activations, whose scale is found at run time
     #[arg(long, value_name = "BITS", default_value = "8")]
     activations: ActivationArg,
@@ -188,7 +188,9 @@ fn run_quantize(args: &QuantizeArgs) -> Result<()> {
         ActivationArg::Int8 => Activations::Int8,
         ActivationArg::Int16 => Activations::Int16,
     };
-    let options = Options { method, budget, group: args.group, activations };
+    // Error feedback makes good what one scale a row loses; plain rounding has only its scales.
+    let default_group = if method == Method::Rtn { 32 } else { 0 };
+    let options = Options { method, budget, group: args.group.unwrap_or(default_group), activations };
     let outcomes = quantize(&policy.graph, &moments, &options)?;
     let bytes = writer::image(&policy, &outcomes)?;
     writer::write(&args.out, &bytes)?;
