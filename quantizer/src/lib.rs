@@ -3,8 +3,9 @@
 //! [`policy::Policy`] reads `policy.json` and `policy.safetensors` into a [`graph::Graph`]; [`quantize`] turns every weight
 //! matrix into codes and scales; [`lower`] places values in the arena and [`writer`] lays the bytes out. [`eval`] and [`serve`]
 //! run the finished image through the same executor that the firmware runs.
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
+pub mod backprop;
 pub mod dataset;
 pub mod eval;
 pub mod graph;
