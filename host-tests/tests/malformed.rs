@@ -505,48 +505,65 @@ fn mutate(random: &mut Random, draft: &mut Draft, structure: &[usize]) {
     draft.seal();
 }
 
-/// Plays an accepted image in dirty memory of exactly the size that it asks for. Whatever it answers, an action that it gives
-/// is finite and inside the image's own limits.
-fn play(image: Image<'_>, random: &mut Random) {
-    let mut scratch = vec![random.bits() as u32; image.scratch_words()];
-    let mut head = Head::new(image, &mut scratch).expect("the scratch memory has the image's size");
-    let contract = image.contract();
-    let limit = |array: &[u32], i: usize| array.get(i).map(|w| f32::from_bits(u32::from_le(*w)));
-    for _ in 0..3 {
-        let observation: Vec<f32> = (0..image.obs_len()).map(|_| 3.0 * random.unit()).collect();
-        let Ok(action) = head.step(&observation) else { continue };
-        for (i, a) in action.iter().enumerate() {
-            assert!(a.is_finite(), "action {i} is {a}");
-            assert!(limit(contract.low, i).is_none_or(|low| *a >= low), "action {i} is {a}, below its limit");
-            assert!(limit(contract.high, i).is_none_or(|high| *a <= high), "action {i} is {a}, above its limit");
-        }
-    }
-    let _ = head.self_test();
-}
-
-#[test]
-fn what_is_accepted_runs() {
+/// Hands the images of 20,000 mutations that are accepted, and that ask for a bearable amount of memory, to `see`; gives their
+/// number. A panic in `see` fails with the numbers of all such cases.
+fn accepted(see: impl Fn(Image<'_>, &mut Random)) -> u64 {
     const CASES: u64 = 20_000;
     const MOST_SCRATCH: usize = 1 << 20;
     let structure = VALID.structure();
-    let mut played = 0;
-    let mut failed = Vec::new();
+    let (mut seen, mut failed) = (0, Vec::new());
     for case in 0..CASES {
         let mut random = Random(case);
         let mut draft = VALID.clone();
         mutate(&mut random, &mut draft, &structure);
         let outcome = catch_unwind(AssertUnwindSafe(|| {
-            let accepted = draft.check().ok().filter(|image| image.scratch_words() <= MOST_SCRATCH);
-            accepted.map(|image| play(image, &mut random)).is_some()
+            let image = draft.check().ok().filter(|image| image.scratch_words() <= MOST_SCRATCH);
+            image.map(|image| see(image, &mut random)).is_some()
         }));
         match outcome {
-            Ok(ran) => played += u64::from(ran),
+            Ok(accepted) => seen += u64::from(accepted),
             Err(_) => failed.push(case),
         }
     }
     assert!(failed.is_empty(), "cases {failed:?}");
-    assert!(
-        (CASES / 20..CASES).contains(&played),
-        "{played} of {CASES} images were accepted: too few to show anything"
-    );
+    seen
+}
+
+/// Three steps and the self-test in memory of exactly the size that the image asks for, filled with `fill`: the bits of the
+/// actions that it gives.
+fn play(image: Image<'_>, fill: u32, random: &mut Random) -> Vec<Option<Vec<u32>>> {
+    let mut scratch = vec![fill; image.scratch_words()];
+    let mut head = Head::new(image, &mut scratch).expect("the scratch memory has the image's size");
+    let mut step = || {
+        let observation: Vec<f32> = (0..image.obs_len()).map(|_| 3.0 * random.unit()).collect();
+        head.step(&observation).ok().map(|action| action.iter().map(|a| a.to_bits()).collect())
+    };
+    let actions = vec![step(), step(), step()];
+    let _ = head.self_test();
+    actions
+}
+
+#[test]
+fn what_is_accepted_runs_and_keeps_its_limits() {
+    let seen = accepted(|image, random| {
+        let contract = image.contract();
+        let limit = |array: &[u32], i: usize| array.get(i).map(|w| f32::from_bits(u32::from_le(*w)));
+        let fill = random.bits() as u32;
+        for action in play(image, fill, random).into_iter().flatten() {
+            for (i, a) in action.into_iter().map(f32::from_bits).enumerate() {
+                assert!(a.is_finite(), "action {i} is {a}");
+                assert!(limit(contract.low, i).is_none_or(|low| a >= low), "action {i} is {a}, below its limit");
+                assert!(limit(contract.high, i).is_none_or(|high| a <= high), "action {i} is {a}, above its limit");
+            }
+        }
+    });
+    assert!(seen > 1000, "{seen} images were accepted: too few to show anything");
+}
+
+#[test]
+fn what_is_accepted_does_not_see_what_its_memory_held() {
+    accepted(|image, random| {
+        let other = play(image, 0x3f80_0000, &mut random.clone());
+        assert_eq!(play(image, 0, random), other);
+    });
 }

@@ -203,16 +203,17 @@ fn single_matrix_image(case: &Case) -> Vec<u8> {
         rate_hz: 50.0,
         contract: actq::policy::Contract::default(),
         graph,
+        weights: rows * cols,
         digest: [0; 32],
     };
     let quantized = Quantized {
         rows,
         cols,
         group,
-        widths: vec![width; rows],
+        widths: vec![Some(width); rows],
         scales: (0..rows).map(|r| half::bf16::from_f32(0.01 * (r + 1) as f32)).collect(),
         group_scales: case.scales.clone(),
         codes: case.codes.clone(),
     };
-    actq::writer::image(&policy, &[Outcome { quantized, error: 0.0, x_max: 127 }]).expect("the policy fits the format")
+    actq::writer::image(&policy, &[Outcome { quantized, error: None, x_max: 127 }]).expect("the policy fits the format")
 }

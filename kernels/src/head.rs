@@ -23,6 +23,8 @@ impl<'a, 's> Head<'a, 's> {
     pub fn new(image: Image<'a>, scratch: &'s mut [u32]) -> Result<Self, HeadError> {
         let (needed, given) = (image.scratch_words(), scratch.len());
         let arena = scratch.get_mut(..needed).ok_or(HeadError::ScratchTooSmall { needed, given })?;
+        // Nothing depends on what the memory held.
+        arena.fill(0);
         let mut head = Self { image, arena, played: 0, started: false };
         head.reset();
         Ok(head)

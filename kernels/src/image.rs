@@ -63,6 +63,8 @@ pub mod header {
     pub const W_STEPS_NAME: usize = 17;
     /// Offset of the policy's name.
     pub const W_NAME: usize = 18;
+    /// Weights of the source policy's matrices.
+    pub const W_WEIGHTS: usize = 19;
     /// SHA-256 of the source policy, 8 words.
     pub const W_DIGEST: usize = 20;
 
@@ -352,6 +354,11 @@ impl<'a> Image<'a> {
         digest
     }
 
+    /// Weights of the source policy's matrices, before anything was removed.
+    pub fn source_weights(&self) -> usize {
+        self.word(h::W_WEIGHTS) as usize
+    }
+
     /// CRC-32 of the image, as in the header.
     pub fn crc(&self) -> u32 {
         self.word(h::W_CRC)
@@ -479,8 +486,8 @@ impl<'a> Image<'a> {
     }
 
     fn check(&self) -> Result<(), ImageError> {
-        let reserved = [self.word(19), self.word(28), self.word(29), self.word(30), self.word(31)];
-        if reserved != [0; 5] || (self.word(h::W_KIND) >> 8) as u8 != 0 || self.high(h::W_WORK_FLAGS) >> 5 != 0 {
+        let reserved = [self.word(28), self.word(29), self.word(30), self.word(31)];
+        if reserved != [0; 4] || (self.word(h::W_KIND) >> 8) as u8 != 0 || self.high(h::W_WORK_FLAGS) >> 5 != 0 {
             return Err(ImageError::Reserved);
         }
         match (self.word(h::W_KIND) as u8, self.chunk(), self.execute()) {
@@ -489,7 +496,7 @@ impl<'a> Image<'a> {
             (0 | 1, ..) => return Err(ImageError::Chunk),
             _ => return Err(ImageError::Kind),
         }
-        if self.obs_len() == 0 || self.act_len() == 0 {
+        if self.obs_len() == 0 || self.act_len() == 0 || self.op_count() == 0 {
             return Err(ImageError::Shape);
         }
         let (out, action) = (self.output(), self.action());
@@ -497,7 +504,10 @@ impl<'a> Image<'a> {
             self.in_arena(region)?;
         }
         // What survives from one step to the next must not be written by anything else.
-        if out.overlaps(action) || out.overlaps(self.observation()) || action.overlaps(self.observation()) {
+        let (obs, work, state) = (self.observation(), self.work(), self.state());
+        let pairs =
+            [(out, action), (out, obs), (action, obs), (work, action), (work, state), (state, obs), (state, action)];
+        if pairs.iter().any(|(a, b)| a.overlaps(*b)) {
             return Err(ImageError::Overlap);
         }
         if !(self.rate_hz().is_finite() && self.rate_hz() > 0.0) {
@@ -508,7 +518,10 @@ impl<'a> Image<'a> {
         if core::str::from_utf8(name.get(..name_len).unwrap_or(&[])).is_err() {
             return Err(ImageError::Name);
         }
-        self.constants(self.word(h::W_SELF_TEST) as usize, self.self_test_steps() * (self.obs_len() + self.act_len()))?;
+        self.constants(
+            self.word(h::W_SELF_TEST) as usize,
+            self.self_test_steps().saturating_mul(self.obs_len() + self.act_len()),
+        )?;
         self.check_contract()?;
         self.checked(self.word(h::W_OPS) as usize, self.op_count() * h::OP_WORDS)?;
         (0..self.op_count()).try_for_each(|i| self.check_op(i))
@@ -537,12 +550,27 @@ impl<'a> Image<'a> {
         let detail = (self.word(at) >> 8) as u8;
         let data = self.word(at + 3) as usize;
         // Shapes of the matrix are read before the op is built, so that a bad offset is named as such.
-        if self.word(at) as u8 == h::op::LINEAR {
-            self.checked(data, h::MATRIX_WORDS)?;
-        }
+        match self.word(at) as u8 {
+            h::op::LINEAR => self.checked(data, h::MATRIX_WORDS)?,
+            h::op::NORMALIZE | h::op::LAYER_NORM | h::op::RMS_NORM => self.checked(data, 1)?,
+            _ => &[],
+        };
         let op = self.op(i).ok_or(ImageError::Op)?;
         let uses_detail = matches!(op, Op::Function { .. } | Op::Linear { .. });
         if (!uses_detail && detail != 0) || (matches!(op, Op::Linear { .. }) && detail > 1) {
+            return Err(ImageError::Reserved);
+        }
+        // Whether the operation has a source, a source length, a third region, constants; fields that it has not are zero.
+        let has = match op {
+            Op::Linear { .. } => [true, true, false, true],
+            Op::Normalize { .. } => [true, false, false, true],
+            Op::LayerNorm { .. } | Op::RmsNorm { .. } => [false, false, false, true],
+            Op::Function { .. } => [false; 4],
+            Op::Add { .. } | Op::Copy { .. } => [true, false, false, false],
+            Op::LstmCell { .. } | Op::GruCell { .. } => [true, false, true, false],
+        };
+        let fields = [self.high(at + 1), self.low(at + 2), self.high(at + 2), data];
+        if has.iter().zip(fields).any(|(has, field)| !has && field != 0) {
             return Err(ImageError::Reserved);
         }
         let clip = |x: f32| if x > 0.0 { Ok(()) } else { Err(ImageError::Constant) };
@@ -591,6 +619,11 @@ impl<'a> Image<'a> {
             return Err(ImageError::Shape);
         }
         self.in_arena(dst)?;
+        // The last action carries the step limit; only the contract writes it.
+        let cell_over_action = matches!(op, Op::LstmCell { cell, .. } if cell.overlaps(self.action()));
+        if dst.overlaps(self.action()) || cell_over_action {
+            return Err(ImageError::Overlap);
+        }
         for src in sources.into_iter().flatten() {
             self.in_arena(src)?;
             if src.overlaps(dst) {

@@ -8,13 +8,11 @@ use actq_kernels::image::{Kind, Op, Region};
 use actq_kernels::linear::Matrix;
 use comfy_table::{CellAlignment, Table, presets};
 
-/// Bits per weight of all matrices: codes, padding, scales, indexes and block records over the number of weights. A matrix
-/// that several operations share counts once.
+/// Bits per weight of the policy as it was trained: codes, padding, scales, indexes and block records of all matrices over the
+/// number of the source's weights. A matrix that several operations share counts once.
 pub fn bits_per_weight(image: &Image<'_>) -> f64 {
-    let (bytes, weights) = distinct(image)
-        .iter()
-        .fold((0, 0), |(bytes, weights), m| (bytes + m.weight_bytes(), weights + m.rows * m.cols));
-    if weights == 0 { 0.0 } else { 8.0 * bytes as f64 / weights as f64 }
+    let bytes: usize = distinct(image).iter().map(Matrix::weight_bytes).sum();
+    8.0 * bytes as f64 / image.source_weights().max(1) as f64
 }
 
 /// The matrices, each once.

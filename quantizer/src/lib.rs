@@ -13,6 +13,7 @@ pub mod inspect;
 pub mod lower;
 pub mod policy;
 pub mod quantize;
+pub mod random;
 pub mod runtime;
 pub mod serve;
 pub mod writer;

@@ -6,15 +6,13 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use actq::dataset::Dataset;
-use actq::graph::Graph;
 use actq::inspect::{group_name, report, table};
 use actq::policy::Policy;
-use actq::quantize::moments::{Moments, collect};
-use actq::quantize::{Activations, Budget, Method, Options, Outcome, quantize};
+use actq::quantize::{Activations, Budget, Method, Options, Outcome, Progress, quantize_policy};
 use actq::runtime::ImageBuffer;
 use actq::{eval, serve, writer};
 use actq_kernels::Width;
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result};
 use clap::{Parser, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -73,17 +71,26 @@ struct QuantizeArgs {
     #[arg(long, value_name = "N", conflicts_with = "bpw", value_parser = width)]
     bits: Option<Width>,
     /// Bits per weight of the whole, scales and padding counted; each matrix gets a width
-    #[arg(long, value_name = "X")]
+    #[arg(long, value_name = "X", value_parser = positive)]
     bpw: Option<f64>,
     /// Columns that share a u8 scale: 32, 64 or 128; 0 = one scale a row [default: 32 for rtn, 0 for gptq]
     #[arg(long, value_name = "N", value_parser = group)]
     group: Option<usize>,
-    /// Bits of the activations, whose scale is found at run time
-    #[arg(long, value_name = "BITS", default_value = "8")]
-    activations: ActivationArg,
-    /// How codes are chosen [default: gptq where calib.npz is there, else rtn]
+    /// Bits of the activations, whose scale is found at run time [default: for best chosen per matrix, else 8]
+    #[arg(long, value_name = "BITS")]
+    activations: Option<ActivationArg>,
+    /// How codes are chosen [default: best where calib.npz is there, else rtn]
     #[arg(long)]
     method: Option<MethodArg>,
+    /// Steps of distillation for --method best [default: 8000, recurrent policies 1200]
+    #[arg(long, value_name = "N")]
+    steps: Option<usize>,
+    /// Seed of everything that is drawn
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Threads to use; the image does not depend on it [default: all cores]
+    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
+    threads: usize,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -102,6 +109,8 @@ enum MethodArg {
     Rtn,
     /// Column-wise error feedback with the inputs' second moment (needs calib.npz)
     Gptq,
+    /// A width for every row, pruning, and distillation on the recorded observations (needs calib.npz)
+    Best,
 }
 
 fn width(text: &str) -> Result<Width, String> {
@@ -112,6 +121,11 @@ fn width(text: &str) -> Result<Width, String> {
 fn group(text: &str) -> Result<usize, String> {
     let known = text.parse().ok().filter(|g| matches!(g, 0 | 32 | 64 | 128));
     known.ok_or_else(|| "groups have 32, 64 or 128 columns, or 0 for none".to_owned())
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0);
+    number.ok_or_else(|| "a number above 0 is needed".to_owned())
 }
 
 fn main() -> ExitCode {
@@ -156,51 +170,63 @@ fn run(command: Command) -> Result<()> {
 }
 
 fn run_quantize(args: &QuantizeArgs) -> Result<()> {
-    let budget = match (args.bits, args.bpw) {
-        (_, Some(bpw)) => {
-            ensure!(bpw.is_finite() && bpw > 0.0, "--bpw is {bpw}, it must be above 0");
-            Budget::BitsPerWeight(bpw)
-        }
-        (bits, None) => Budget::Width(bits.unwrap_or(Width::W3)),
-    };
     let policy = Policy::load(&args.policy_dir)?;
+    let parameters = policy.graph.parameters();
     let calib = args.policy_dir.join("calib.npz");
     let method = match args.method {
         Some(MethodArg::Rtn) => Method::Rtn,
         Some(MethodArg::Gptq) => Method::Gptq,
-        None if calib.exists() => Method::Gptq,
+        Some(MethodArg::Best) => Method::Best,
+        None if calib.exists() => Method::Best,
         None => Method::Rtn,
     };
-    let moments = match method {
-        Method::Rtn => Vec::new(),
-        Method::Gptq => {
-            let dataset = Dataset::load(&calib, policy.graph.obs_len, policy.chunk * policy.act_len)?;
-            let bar = ProgressBar::new(dataset.frames() as u64).with_style(
-                ProgressStyle::with_template("calibrating {bar:40} {pos}/{len} frames, {eta} left")
-                    .context("progress bar")?,
-            );
-            let moments = collect(&policy.graph, &dataset, |frames| bar.set_position(frames as u64));
-            bar.finish_and_clear();
-            moments
+    let budget = match (args.bits, args.bpw) {
+        (_, Some(bpw)) => Budget::BitsPerWeight(bpw),
+        (bits, None) => Budget::Width(bits.unwrap_or(Width::W3)),
+    };
+    // What learns makes good what one scale a row loses; plain rounding has only its scales.
+    let default_group = if method == Method::Rtn { 32 } else { 0 };
+    let options = Options {
+        method,
+        budget,
+        group: args.group.unwrap_or(default_group),
+        activations: match args.activations {
+            Some(ActivationArg::Int8) => Activations::Int8,
+            Some(ActivationArg::Int16) => Activations::Int16,
+            None => Activations::Auto,
+        },
+        steps: args.steps,
+        seed: args.seed,
+    };
+    let dataset = match method {
+        Method::Rtn => None,
+        Method::Gptq | Method::Best => {
+            Some(Dataset::load(&calib, policy.graph.obs_len, policy.chunk * policy.act_len)?)
         }
     };
-    let activations = match args.activations {
-        ActivationArg::Int8 => Activations::Int8,
-        ActivationArg::Int16 => Activations::Int16,
-    };
-    // Error feedback makes good what one scale a row loses; plain rounding has only its scales.
-    let default_group = if method == Method::Rtn { 32 } else { 0 };
-    let options = Options { method, budget, group: args.group.unwrap_or(default_group), activations };
-    let outcomes = quantize(&policy.graph, &moments, &options)?;
+    rayon::ThreadPoolBuilder::new().num_threads(args.threads).build_global().context("threads cannot be started")?;
+    let bar = ProgressBar::new(1);
+    bar.set_style(ProgressStyle::with_template("{msg:12} {bar:40} {pos}/{len} {eta} left").context("progress bar")?);
+    let (policy, outcomes) = quantize_policy(&policy, dataset.as_ref(), &options, &mut |p| {
+        let (name, done, all) = match p {
+            Progress::Calibrate(done, all) => ("calibrating", done, all),
+            Progress::Sensitivity => ("sensitivity", 0, 1),
+            Progress::Distill(done, all, _) => ("distilling", done, all),
+        };
+        bar.set_message(name);
+        bar.set_length(all as u64);
+        bar.set_position(done as u64);
+    })?;
+    bar.finish_and_clear();
     let bytes = writer::image(&policy, &outcomes)?;
     writer::write(&args.out, &bytes)?;
-    print_summary(&policy.graph, &moments, &outcomes);
-    let f32_bytes = 4 * policy.graph.parameters();
+    print_summary(&policy, &outcomes);
+    let f32_bytes = 4 * parameters;
     println!(
         "\n{}: {} bytes. The policy's {} parameters take {f32_bytes} bytes in f32 ({:.1}x) and {} in bf16 ({:.1}x).",
         args.out.display(),
         bytes.len(),
-        policy.graph.parameters(),
+        parameters,
         f32_bytes as f64 / bytes.len() as f64,
         f32_bytes / 2,
         f32_bytes as f64 / 2.0 / bytes.len() as f64,
@@ -208,32 +234,26 @@ fn run_quantize(args: &QuantizeArgs) -> Result<()> {
     Ok(())
 }
 
-fn print_summary(graph: &Graph, moments: &[Moments], outcomes: &[Outcome]) {
-    let error = if moments.is_empty() { "error (weights)" } else { "error (outputs)" };
-    let mut rows = table(&["matrix", "shape", "bits", "group", "bits/weight", "bytes", "x max", error]);
+fn print_summary(policy: &Policy, outcomes: &[Outcome]) {
+    let mut rows = table(&["matrix", "shape", "bits", "group", "bytes", "x max", "error"]);
     let mut total = 0;
-    for (matrix, outcome) in graph.matrices.iter().zip(outcomes) {
+    for (matrix, outcome) in policy.graph.matrices.iter().zip(outcomes) {
         let quantized = &outcome.quantized;
         let bytes = quantized.bytes();
         total += bytes;
         rows.add_row([
             matrix.name.clone(),
             format!("{}x{}", matrix.rows, matrix.cols),
-            quantized.blocks().iter().map(|(s, _)| s.width.bits().to_string()).collect::<Vec<_>>().join(","),
+            quantized.width_counts(),
             group_name(quantized.group),
-            format!("{:.3}", 8.0 * bytes as f64 / matrix.data.len() as f64),
             bytes.to_string(),
             outcome.x_max.to_string(),
-            format!("{:.2e}", outcome.error),
+            outcome.error.map_or("-".to_owned(), |e| format!("{e:.2e}")),
         ]);
     }
-    rows.add_row([
-        "all".to_owned(),
-        String::new(),
-        String::new(),
-        String::new(),
-        format!("{:.3}", 8.0 * total as f64 / graph.weights() as f64),
-        total.to_string(),
-    ]);
     println!("{rows}");
+    println!(
+        "\n{total} bytes of weights, {:.3} bits each, everything counted",
+        8.0 * total as f64 / policy.weights as f64
+    );
 }

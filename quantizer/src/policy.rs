@@ -14,7 +14,7 @@ use sha2::{Digest, Sha256};
 use crate::graph::{Graph, Matrix, Node, NodeKind, Part, ValueId};
 
 /// A policy as it was trained.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Policy {
     /// Where it was read from.
     pub dir: PathBuf,
@@ -34,6 +34,8 @@ pub struct Policy {
     pub contract: Contract,
     /// The network.
     pub graph: Graph,
+    /// Weights of all its matrices as they were trained, which bits per weight refer to.
+    pub weights: usize,
     /// SHA-256 of policy.json, then policy.safetensors.
     pub digest: [u8; 32],
 }
@@ -190,6 +192,7 @@ impl Policy {
             act_len: json.act_dim,
             rate_hz,
             contract,
+            weights: builder.graph.weights(),
             graph: std::mem::replace(&mut builder.graph, Graph::new(0)),
             digest,
         })

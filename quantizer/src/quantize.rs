@@ -1,15 +1,23 @@
 //! Weight matrices into codes and scales.
 
+pub mod allocate;
+pub mod best;
+pub mod compact;
+pub mod distill;
 pub mod gptq;
 pub mod moments;
 pub mod scale;
+pub mod sensitivity;
+pub mod windows;
 
 use actq_kernels::format::{BlockShape, Width};
 use actq_kernels::image::block_bytes;
 use anyhow::{Result, bail, ensure};
 use half::bf16;
 
+use crate::dataset::Dataset;
 use crate::graph::{Graph, Matrix};
+use crate::policy::Policy;
 use moments::Moments;
 
 /// How codes are chosen.
@@ -19,6 +27,8 @@ pub enum Method {
     Rtn,
     /// Column-wise error feedback with the second moment of the matrix's input (GPTQ, arXiv 2210.17323).
     Gptq,
+    /// Widths by rows, pruning and distillation ([`best`]).
+    Best,
 }
 
 /// Bits of the activations.
@@ -28,6 +38,18 @@ pub enum Activations {
     Int8,
     /// Up to -32767 to 32767, as far as the int32 accumulator allows.
     Int16,
+    /// int16 where it lowers the error noticeably, int8 elsewhere; methods that do not measure take int8.
+    Auto,
+}
+
+impl Activations {
+    /// The largest magnitude.
+    pub fn limit(self) -> u16 {
+        match self {
+            Self::Int8 | Self::Auto => 127,
+            Self::Int16 => i16::MAX as u16,
+        }
+    }
 }
 
 /// How many bits the weights may take.
@@ -50,6 +72,21 @@ pub struct Options {
     pub group: usize,
     /// Bits of the activations.
     pub activations: Activations,
+    /// Steps of distillation; None: as many as suit the network.
+    pub steps: Option<usize>,
+    /// Seed of everything that is drawn.
+    pub seed: u64,
+}
+
+/// What is being done, for a progress bar.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Progress {
+    /// Running the f32 network: frames done, frames in all.
+    Calibrate(usize, usize),
+    /// Running derivatives back.
+    Sensitivity,
+    /// Learning: steps done, steps in all, loss of the last batch.
+    Distill(usize, usize, f32),
 }
 
 /// A quantized matrix.
@@ -61,8 +98,8 @@ pub struct Quantized {
     pub cols: usize,
     /// Columns per u8 scale; 0 = none.
     pub group: usize,
-    /// The width of each row.
-    pub widths: Vec<Width>,
+    /// The width of each row; a row without one has no bits and gives its bias alone.
+    pub widths: Vec<Option<Width>>,
     /// The scale of each row.
     pub scales: Vec<bf16>,
     /// `rows * groups` scales; empty without groups.
@@ -79,7 +116,7 @@ impl Quantized {
 
     /// Level times group scale at (`row`, `col`): the weight divided by the row's scale.
     pub fn integer(&self, row: usize, col: usize) -> i32 {
-        let level = self.widths[row].level(self.codes[row * self.cols + col]);
+        let level = self.widths[row].map_or(0, |width| width.level(self.codes[row * self.cols + col]));
         match self.group {
             0 => level,
             group => level * i32::from(self.group_scales[row * self.groups() + col / group]),
@@ -93,19 +130,32 @@ impl Quantized {
             .collect()
     }
 
+    /// How many rows have which width, as text: `3`, or `0x12 2x200 4x44`.
+    pub fn width_counts(&self) -> String {
+        let count = |width: Option<Width>| self.widths.iter().filter(|w| **w == width).count();
+        let all = std::iter::once(None).chain(Width::ALL.map(Some));
+        let used: Vec<(u32, usize)> =
+            all.map(|w| (w.map_or(0, Width::bits), count(w))).filter(|(_, n)| *n > 0).collect();
+        match used[..] {
+            [(bits, _)] => bits.to_string(),
+            _ => used.iter().map(|(bits, n)| format!("{bits}x{n}")).collect::<Vec<_>>().join(" "),
+        }
+    }
+
     /// Rows sorted by width, as blocks: shape and rows of each. A matrix of one width is one block in the rows' own order.
     pub fn blocks(&self) -> Vec<(BlockShape, Vec<usize>)> {
         Width::ALL
             .into_iter()
             .filter_map(|width| {
-                let rows: Vec<usize> = (0..self.rows).filter(|&r| self.widths[r] == width).collect();
+                let rows: Vec<usize> = (0..self.rows).filter(|&r| self.widths[r] == Some(width)).collect();
                 let shape = BlockShape { width, rows: rows.len(), cols: self.cols, group: self.group };
                 (!rows.is_empty()).then_some((shape, rows))
             })
             .collect()
     }
 
-    /// Whether the blocks' rows follow each other in the order of the output, so that no index is stored.
+    /// Whether the blocks' rows follow each other in the order of the output, so that no index is stored. (Missing rows may
+    /// only be the last.)
     pub fn in_order(blocks: &[(BlockShape, Vec<usize>)]) -> bool {
         blocks.iter().flat_map(|(_, rows)| rows).enumerate().all(|(i, &row)| i == row)
     }
@@ -136,10 +186,36 @@ impl Quantized {
 pub struct Outcome {
     /// Codes and scales.
     pub quantized: Quantized,
-    /// `E |(W' - W) x|^2 / E |W x|^2` under the second moment of the calibration inputs; without them, of white inputs.
-    pub error: f64,
+    /// `E |(W' - W) x|^2 / E |W x|^2` under the second moment of the calibration inputs; without them, of white inputs. None
+    /// where the matrix was learned anew, so that its own error says nothing.
+    pub error: Option<f64>,
     /// Activation magnitude.
     pub x_max: u16,
+}
+
+/// Quantizes a policy: the policy as it became (its graph may have lost elements and its biases may have learned), and its
+/// matrices. `dataset` holds the recorded observations that every method but rtn needs.
+pub fn quantize_policy(
+    policy: &Policy,
+    dataset: Option<&Dataset>,
+    options: &Options,
+    progress: &mut dyn FnMut(Progress),
+) -> Result<(Policy, Vec<Outcome>)> {
+    let graph = &policy.graph;
+    let moments = match (options.method, dataset) {
+        (Method::Rtn, _) => Vec::new(),
+        (_, None) => bail!("recorded observations are needed: put calib.npz beside policy.json, or use --method rtn"),
+        (_, Some(dataset)) => {
+            let frames = dataset.frames();
+            moments::collect(graph, dataset, |done| progress(Progress::Calibrate(done, frames)))
+        }
+    };
+    let (Method::Best, Some(dataset)) = (options.method, dataset) else {
+        return Ok((policy.clone(), quantize(graph, &moments, options)?));
+    };
+    ensure!(options.group == 0, "method best gives every row its own scale; --group goes with the other methods");
+    let found = best::quantize(graph, dataset, &moments, options, progress)?;
+    Ok((Policy { graph: found.graph, ..policy.clone() }, found.outcomes))
 }
 
 /// Quantizes every matrix of `graph`. `moments` has one entry per matrix, or is empty where the method needs none.
@@ -151,14 +227,12 @@ pub fn quantize(graph: &Graph, moments: &[Moments], options: &Options) -> Result
         let quantized = match (options.method, moment) {
             (Method::Rtn, _) => scale::round_to_nearest(matrix, width, options.group),
             (Method::Gptq, Some(moment)) => gptq::quantize(matrix, width, options.group, moment)?,
+            (Method::Best, _) => bail!("best quantizes whole policies"),
             (Method::Gptq, None) => bail!("gptq needs recorded observations: put calib.npz beside policy.json"),
         };
-        let limit = match options.activations {
-            Activations::Int8 => 127,
-            Activations::Int16 => i16::MAX as u16,
-        };
-        let x_max = quantized.x_max(limit)?;
-        Ok(Outcome { error: moments::relative_error(matrix, &quantized.dequantized(), moment), quantized, x_max })
+        let x_max = quantized.x_max(options.activations.limit())?;
+        let error = Some(moments::relative_error(matrix, &quantized.dequantized(), moment));
+        Ok(Outcome { error, quantized, x_max })
     };
     let indexes = 0..graph.matrices.len();
     match options.budget {
@@ -166,31 +240,38 @@ pub fn quantize(graph: &Graph, moments: &[Moments], options: &Options) -> Result
         Budget::BitsPerWeight(limit) => {
             let tries: Vec<Vec<Outcome>> =
                 indexes.map(|i| Width::ALL.into_iter().map(|width| one(i, width)).collect()).collect::<Result<_>>()?;
-            let chosen = allocate(&tries, limit * graph.weights() as f64 / 8.0)?;
+            let chosen = allocate(&tries, limit * graph.weights() as f64 / 8.0, graph.weights())?;
             Ok(tries.into_iter().zip(chosen).map(|(mut tries, choice)| tries.swap_remove(choice)).collect())
         }
     }
 }
 
-/// One of each matrix's tries, narrow to wide, so that the bytes stay within `limit`: starting from the narrowest, always the
-/// upgrade that lowers the sum of relative errors most per byte and still fits.
-fn allocate(tries: &[Vec<Outcome>], limit: f64) -> Result<Vec<usize>> {
+/// One of each matrix's tries so that the bytes stay within `limit`: starting from the narrowest, always the change that lowers
+/// the sum of relative errors most per byte and still fits. (A wider try can take fewer bytes, where it pads less.)
+fn allocate(tries: &[Vec<Outcome>], limit: f64, weights: usize) -> Result<Vec<usize>> {
+    let size = |m: usize, choice: usize| tries[m][choice].quantized.bytes();
+    let error = |m: usize, choice: usize| tries[m][choice].error.unwrap_or(0.0);
     let mut chosen = vec![0; tries.len()];
-    let mut bytes: usize = tries.iter().map(|t| t[0].quantized.bytes()).sum();
+    let mut bytes: usize = (0..tries.len()).map(|m| size(m, 0)).sum();
     ensure!(
         bytes as f64 <= limit,
-        "the budget is too small: 2 bits a weight with scales and padding take {bytes} bytes, {limit:.0} are allowed"
+        "the budget is too small: 2 bits a weight with scales and padding take {bytes} bytes ({:.3} bits a weight), \
+         {limit:.0} bytes are allowed",
+        8.0 * bytes as f64 / weights as f64,
     );
     loop {
-        let upgrade = |m: usize| {
-            let now = &tries[m][chosen[m]];
-            let next = tries[m].get(chosen[m] + 1)?;
-            let more = next.quantized.bytes() - now.quantized.bytes();
-            ((bytes + more) as f64 <= limit).then(|| (m, more, (now.error - next.error) / more as f64))
-        };
-        let best = (0..tries.len()).filter_map(upgrade).max_by(|a, b| a.2.total_cmp(&b.2));
-        let Some((m, more, _)) = best else { return Ok(chosen) };
-        chosen[m] += 1;
-        bytes += more;
+        let mut best: Option<(f64, usize, usize, usize)> = None;
+        for m in 0..tries.len() {
+            for choice in 0..tries[m].len() {
+                let after = bytes - size(m, chosen[m]) + size(m, choice);
+                let gain = error(m, chosen[m]) - error(m, choice);
+                let rate = gain / after.saturating_sub(bytes).max(1) as f64;
+                if after as f64 <= limit && gain > 0.0 && best.is_none_or(|(known, ..)| rate > known) {
+                    best = Some((rate, m, choice, after));
+                }
+            }
+        }
+        let Some((_, m, choice, after)) = best else { return Ok(chosen) };
+        (chosen[m], bytes) = (choice, after);
     }
 }

@@ -65,6 +65,7 @@ pub fn image(policy: &Policy, matrices: &[Outcome]) -> Result<Vec<u8>> {
     words[h::W_SELF_TEST] = self_test;
     words[h::W_STEPS_NAME] = halves(steps, policy.name.len())?;
     words[h::W_NAME] = name;
+    words[h::W_WEIGHTS] = policy.weights as u32;
     for (word, bytes) in words[h::W_DIGEST..].iter_mut().zip(policy.digest.chunks_exact(4)) {
         *word = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
     }

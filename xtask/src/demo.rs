@@ -70,8 +70,14 @@ pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
     let counter = Counter::build()?;
     let mut report = Vec::new();
     for width in [Width::W8, Width::W3] {
-        let options =
-            Options { method: Method::Gptq, budget: Budget::Width(width), group: 0, activations: Activations::Int8 };
+        let options = Options {
+            method: Method::Gptq,
+            budget: Budget::Width(width),
+            group: 0,
+            activations: Activations::Int8,
+            steps: None,
+            seed: 1,
+        };
         let bytes = writer::image(&policy, &quantize(&policy.graph, &moments, &options)?)?;
         let path = work.join(format!("ur3-{}bit.actq", width.bits()));
         writer::write(&path, &bytes)?;

@@ -43,7 +43,7 @@ pub fn quantize(matrix: &Matrix, width: Width, group: usize, moments: &Moments) 
         rows,
         cols,
         group,
-        widths: vec![width; rows],
+        widths: vec![Some(width); rows],
         scales: scales.rows,
         group_scales: scales.groups,
         codes,

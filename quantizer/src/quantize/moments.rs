@@ -10,8 +10,18 @@ use crate::graph::{Evaluator, Graph, Matrix};
 pub struct Moments {
     /// `cols * cols`, symmetric.
     pub second: DMatrix<f64>,
+    /// `E[x]`
+    pub mean: Vec<f64>,
     /// Number of input vectors.
     pub count: usize,
+}
+
+impl Moments {
+    /// `E[(x - E[x]) (x - E[x])']`
+    pub fn centred(&self) -> DMatrix<f64> {
+        let mean = nalgebra::DVectorView::from_slice(&self.mean, self.mean.len());
+        &self.second - mean * mean.transpose()
+    }
 }
 
 /// Input vectors gathered before they are multiplied out at once.
@@ -23,7 +33,9 @@ pub fn collect(graph: &Graph, dataset: &Dataset, mut progress: impl FnMut(usize)
     let mut sums: Vec<_> = graph
         .matrices
         .iter()
-        .map(|m| (Moments { second: DMatrix::zeros(m.cols, m.cols), count: 0 }, Vec::<f64>::new()))
+        .map(|m| {
+            (Moments { second: DMatrix::zeros(m.cols, m.cols), mean: vec![0.0; m.cols], count: 0 }, Vec::<f64>::new())
+        })
         .collect();
     let mut evaluator = Evaluator::new(graph);
     let mut frames = 0;
@@ -44,7 +56,9 @@ pub fn collect(graph: &Graph, dataset: &Dataset, mut progress: impl FnMut(usize)
     sums.into_iter()
         .map(|(mut moments, mut batch)| {
             flush(&mut moments, &mut batch);
-            moments.second /= moments.count.max(1) as f64;
+            let count = moments.count.max(1) as f64;
+            moments.second /= count;
+            moments.mean.iter_mut().for_each(|m| *m /= count);
             moments
         })
         .collect()
@@ -54,6 +68,7 @@ fn flush(moments: &mut Moments, batch: &mut Vec<f64>) {
     let cols = moments.second.nrows();
     let x = DMatrix::from_column_slice(cols, batch.len() / cols, batch);
     moments.second.gemm(1.0, &x, &x.transpose(), 1.0);
+    moments.mean.iter_mut().zip(x.row_iter()).for_each(|(m, x)| *m += x.sum());
     moments.count += x.ncols();
     batch.clear();
 }

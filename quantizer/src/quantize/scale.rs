@@ -104,7 +104,7 @@ pub fn round_to_nearest(matrix: &Matrix, width: Width, group: usize) -> Quantize
         rows: matrix.rows,
         cols: matrix.cols,
         group,
-        widths: vec![width; matrix.rows],
+        widths: vec![Some(width); matrix.rows],
         scales: scales.rows,
         group_scales: scales.groups,
         codes,

@@ -1,0 +1,123 @@
+//! The pipeline: how much every row matters, a width for each to the budget, removal of what has none, and distillation.
+
+use anyhow::Result;
+
+use super::allocate::{Rows, allocate, energies, removals};
+use super::compact::{Dimension, compact, dimensions};
+use super::distill::{Task, distill, loss};
+use super::moments::Moments;
+use super::sensitivity::{Side, importance, output_moments};
+use super::windows::Windows;
+use super::{Activations, Budget, Options, Outcome, Progress, Quantized};
+use crate::backprop::{Network, Weights};
+use crate::dataset::Dataset;
+use crate::graph::Graph;
+use crate::random::Random;
+
+/// Steps of distillation: frames' and windows' networks.
+const STEPS: usize = 8000;
+const WINDOW_STEPS: usize = 1200;
+
+/// The network as it became, with its quantized matrices.
+#[derive(Clone, Debug)]
+pub struct Best {
+    /// Hidden elements without bits are gone, biases and norms have learned.
+    pub graph: Graph,
+    /// The matrices of `graph`.
+    pub outcomes: Vec<Outcome>,
+}
+
+/// Quantizes a network on its recorded observations.
+pub fn quantize(
+    graph: &Graph,
+    dataset: &Dataset,
+    moments: &[Moments],
+    options: &Options,
+    progress: &mut dyn FnMut(Progress),
+) -> Result<Best> {
+    progress(Progress::Sensitivity);
+    let windows = Windows::new(graph, dataset);
+    let inputs: Vec<Vec<f64>> = moments.iter().map(|m| importance(&m.second, Side::Input)).collect();
+    let outputs: Vec<Vec<f64>> =
+        output_moments(&windows, options.seed).iter().map(|g| importance(g, Side::Output)).collect();
+    let (limit_bytes, forced) = match options.budget {
+        Budget::Width(width) => (f64::INFINITY, Some(width)),
+        Budget::BitsPerWeight(bits) => (bits * graph.weights() as f64 / 8.0, None),
+    };
+    let centred: Vec<Vec<f64>> = moments.iter().map(|m| importance(&m.centred(), Side::Input)).collect();
+    let dimensions = dimensions(graph);
+    let rows: Vec<Rows> = graph
+        .matrices
+        .iter()
+        .enumerate()
+        .map(|(m, matrix)| {
+            let energy = energies(matrix, &inputs[m], &outputs[m]);
+            let made = Dimension::made_by(&dimensions, m);
+            let removal = made.map_or_else(|| energy.clone(), |d| removals(graph, d, &centred, &outputs));
+            Rows { energy, removal, forced }
+        })
+        .collect();
+    let widths = allocate(graph, &dimensions, &rows, limit_bytes)?;
+    let means: Vec<Vec<f64>> = moments.iter().map(|m| m.mean.clone()).collect();
+    let compacted = compact(graph, &dimensions, &widths, &means);
+    let importance: Vec<Vec<f64>> = compacted
+        .columns
+        .iter()
+        .zip(&inputs)
+        .map(|(columns, importance)| columns.iter().map(|&c| importance[c]).collect())
+        .collect();
+    let all = |limit: u16| vec![limit; graph.matrices.len()];
+    let learned_with = match options.activations {
+        Activations::Int16 => all(i16::MAX as u16),
+        Activations::Int8 | Activations::Auto => all(127),
+    };
+    let steps = options.steps.unwrap_or(if windows.recurrent() { WINDOW_STEPS } else { STEPS });
+    let task = Task {
+        graph: &compacted.graph,
+        widths: &compacted.widths,
+        importance: &importance,
+        x_max: &learned_with,
+        steps,
+        seed: options.seed,
+    };
+    let (quantized, graph) = distill(&task, &windows, |step, loss| progress(Progress::Distill(step, steps, loss)));
+    let limits = match options.activations {
+        Activations::Auto => choose_activations(&graph, &quantized, &windows, options.seed),
+        Activations::Int8 | Activations::Int16 => learned_with,
+    };
+    let outcomes = quantized
+        .into_iter()
+        .zip(limits)
+        .map(|(quantized, limit)| Ok(Outcome { x_max: quantized.x_max(limit)?, quantized, error: None }))
+        .collect::<Result<_>>()?;
+    Ok(Best { graph, outcomes })
+}
+
+/// An int16 input must lower the error by this share of it to be worth its slower kernel.
+const WORTH: f32 = 0.03;
+/// Batches that the choice is measured on, and samples in each.
+const MEASURED: usize = 8;
+const SAMPLES: usize = 256;
+
+/// int16 for each matrix whose input, rounded to int8, adds more than [`WORTH`] of the whole error; int8 for the others.
+fn choose_activations(graph: &Graph, quantized: &[Quantized], windows: &Windows<'_>, seed: u64) -> Vec<u16> {
+    let mut weights = Weights::of(graph);
+    for (weights, quantized) in weights.matrices.iter_mut().zip(quantized) {
+        weights.iter_mut().zip(quantized.dequantized()).for_each(|(w, q)| *w = q);
+    }
+    let error = |x_max: &[u16]| -> f32 {
+        let network = Network { graph, x_max };
+        let samples = (SAMPLES / windows.window).max(8);
+        let batches = (0..MEASURED).map(|i| windows.batch(samples, false, &mut Random(seed + i as u64)));
+        batches.map(|batch| loss(&network, &weights, windows, batch)).sum()
+    };
+    let int8 = vec![127; quantized.len()];
+    let with_int8 = error(&int8);
+    (0..quantized.len())
+        .map(|m| {
+            let mut x_max = int8.clone();
+            x_max[m] = i16::MAX as u16;
+            if with_int8 - error(&x_max) > WORTH * with_int8 { i16::MAX as u16 } else { 127 }
+        })
+        .collect()
+}

@@ -1,0 +1,175 @@
+//! Removing what has no bits, and putting rows in the order of their widths, where both cost nothing at run time.
+//!
+//! A [`Dimension`] is a hidden vector that one matrix makes and that reaches only matrices, through elementwise functions. Its
+//! elements may be permuted, and an element that is constant can be folded into the biases of the matrices that it feeds.
+
+use actq_kernels::Width;
+
+use super::allocate::Widths;
+use crate::graph::{Graph, Matrix, NodeKind, ValueId};
+
+/// A hidden vector that may be permuted and pruned. Numbers are matrices of the graph.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Dimension {
+    /// The matrix whose rows make it.
+    pub maker: usize,
+    /// The matrices whose columns it feeds.
+    pub consumers: Vec<usize>,
+    /// The linear node that makes it.
+    node: usize,
+}
+
+impl Dimension {
+    /// The dimension that feeds matrix `m`.
+    pub fn feeding(dimensions: &[Self], m: usize) -> Option<&Self> {
+        dimensions.iter().find(|d| d.consumers.contains(&m))
+    }
+
+    /// The dimension that matrix `m` makes.
+    pub fn made_by(dimensions: &[Self], m: usize) -> Option<&Self> {
+        dimensions.iter().find(|d| d.maker == m)
+    }
+
+    /// How many of its elements have bits.
+    pub fn kept(&self, widths: &Widths) -> usize {
+        widths[self.maker].iter().flatten().count()
+    }
+
+    /// The kept elements, narrow to wide.
+    fn order(&self, widths: &Widths) -> Vec<usize> {
+        let of = |width: Width| (0..widths[self.maker].len()).filter(move |&r| widths[self.maker][r] == Some(width));
+        Width::ALL.into_iter().flat_map(of).collect()
+    }
+}
+
+/// Which nodes read a value.
+fn readers(graph: &Graph, value: ValueId) -> Vec<usize> {
+    let reads = |kind: &NodeKind, input: ValueId| match kind {
+        NodeKind::Concat(parts) => parts.iter().any(|p| p.value == value),
+        NodeKind::Add { with } => input == value || *with == value,
+        _ => input == value,
+    };
+    (0..graph.nodes.len()).filter(|&n| reads(&graph.nodes[n].kind, graph.nodes[n].input)).collect()
+}
+
+/// The dimensions of a graph.
+pub fn dimensions(graph: &Graph) -> Vec<Dimension> {
+    let uses = |m: usize| graph.nodes.iter().filter(|n| matrices_of(&n.kind).contains(&m)).count();
+    let linear = |n: usize| match graph.nodes[n].kind {
+        NodeKind::Linear { matrix, .. } if uses(matrix) == 1 => Some(matrix),
+        _ => None,
+    };
+    (0..graph.nodes.len())
+        .filter_map(|node| {
+            let maker = linear(node)?;
+            let mut value = node + 1;
+            // Follow the elementwise functions as long as the value has no other reader.
+            loop {
+                if value == graph.output() {
+                    return None;
+                }
+                let next = readers(graph, value);
+                match next[..] {
+                    [one] if matches!(graph.nodes[one].kind, NodeKind::Function(_)) => value = one + 1,
+                    _ => {
+                        let consumers = next.into_iter().map(consumer(graph, &uses)).collect::<Option<Vec<_>>>()?;
+                        return (!consumers.is_empty()).then_some(Dimension { maker, consumers, node });
+                    }
+                }
+            }
+        })
+        .collect()
+}
+
+/// The matrix through which a node reads its input, where that is all it does with it.
+fn consumer<'a>(graph: &'a Graph, uses: &'a impl Fn(usize) -> usize) -> impl Fn(usize) -> Option<usize> + 'a {
+    move |node| {
+        let matrix = match graph.nodes[node].kind {
+            NodeKind::Linear { matrix, .. } => matrix,
+            NodeKind::Lstm { input, .. } | NodeKind::Gru { input, .. } => input,
+            _ => return None,
+        };
+        (uses(matrix) == 1).then_some(matrix)
+    }
+}
+
+fn matrices_of(kind: &NodeKind) -> Vec<usize> {
+    match kind {
+        NodeKind::Linear { matrix, .. } => vec![*matrix],
+        NodeKind::Lstm { input, state, .. } | NodeKind::Gru { input, state, .. } => vec![*input, *state],
+        _ => Vec::new(),
+    }
+}
+
+/// A graph whose hidden vectors hold only the elements that have bits.
+#[derive(Clone, Debug)]
+pub struct Compacted {
+    /// The graph.
+    pub graph: Graph,
+    /// Widths of the matrices' rows in the new order.
+    pub widths: Widths,
+    /// For every matrix which of the former columns it has, in the new order.
+    pub columns: Vec<Vec<usize>>,
+}
+
+/// Removes the elements that have no bits and sorts the others by width. `means` gives the mean input of every matrix: what a
+/// removed element contributed on average goes into the biases.
+pub fn compact(graph: &Graph, dimensions: &[Dimension], widths: &Widths, means: &[Vec<f64>]) -> Compacted {
+    let mut graph = graph.clone();
+    let mut widths = widths.clone();
+    let mut kept: Vec<Vec<usize>> = graph.matrices.iter().map(|m| (0..m.cols).collect()).collect();
+    for dimension in dimensions {
+        let order = dimension.order(&widths);
+        let gone: Vec<usize> =
+            (0..widths[dimension.maker].len()).filter(|&r| widths[dimension.maker][r].is_none()).collect();
+        for &consumer in &dimension.consumers {
+            let matrix = &mut graph.matrices[consumer];
+            let contribution: Vec<f32> = matrix
+                .data
+                .chunks_exact(matrix.cols)
+                .map(|row| gone.iter().map(|&c| f64::from(row[c]) * means[consumer][c]).sum::<f64>() as f32)
+                .collect();
+            *matrix = columns(matrix, &order);
+            kept[consumer].clone_from(&order);
+            add_to_bias(&mut graph, consumer, &contribution);
+        }
+        let maker = &mut graph.matrices[dimension.maker];
+        *maker = rows(maker, &order);
+        widths[dimension.maker] = order.iter().map(|&r| widths[dimension.maker][r]).collect();
+        if let NodeKind::Linear { bias, .. } = &mut graph.nodes[dimension.node].kind {
+            *bias = order.iter().map(|&r| bias[r]).collect();
+        }
+        // The functions behind it keep the new length.
+        let mut value = dimension.node;
+        loop {
+            graph.nodes[value].len = order.len();
+            match readers(&graph, value + 1)[..] {
+                [next] if matches!(graph.nodes[next].kind, NodeKind::Function(_)) => value = next,
+                _ => break,
+            }
+        }
+    }
+    Compacted { graph, widths, columns: kept }
+}
+
+fn rows(matrix: &Matrix, order: &[usize]) -> Matrix {
+    let data = order.iter().flat_map(|&r| &matrix.data[r * matrix.cols..][..matrix.cols]).copied().collect();
+    Matrix { name: matrix.name.clone(), rows: order.len(), cols: matrix.cols, data }
+}
+
+fn columns(matrix: &Matrix, order: &[usize]) -> Matrix {
+    let data = matrix.data.chunks_exact(matrix.cols).flat_map(|row| order.iter().map(|&c| row[c])).collect();
+    Matrix { name: matrix.name.clone(), rows: matrix.rows, cols: order.len(), data }
+}
+
+fn add_to_bias(graph: &mut Graph, matrix: usize, values: &[f32]) {
+    for node in &mut graph.nodes {
+        let bias = match &mut node.kind {
+            NodeKind::Linear { matrix: m, bias } if *m == matrix => bias,
+            NodeKind::Lstm { input, bias, .. } if *input == matrix => bias,
+            NodeKind::Gru { input, input_bias, .. } if *input == matrix => input_bias,
+            _ => continue,
+        };
+        bias.iter_mut().zip(values).for_each(|(b, v)| *b += v);
+    }
+}
