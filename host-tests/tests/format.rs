@@ -57,18 +57,19 @@ fn library_bytes() -> Vec<u8> {
         rate_hz: 50.0,
         contract: Contract { low: Some(vec![-40.0; 3]), high: Some(vec![40.0; 3]), ..Contract::default() },
         graph,
+        weights: 6,
         digest: std::array::from_fn(|i| i as u8),
     };
     let quantized = Quantized {
         rows: 3,
         cols: 2,
         group: 0,
-        widths: vec![Width::W2; 3],
+        widths: vec![Some(Width::W2); 3],
         scales: SCALES.map(bf16::from_f32).to_vec(),
         group_scales: Vec::new(),
         codes: LEVELS.as_flattened().iter().map(|&level| Width::W2.nearest_code(level as f32)).collect(),
     };
-    let outcome = Outcome { quantized, error: 0.0, x_max: 127 };
+    let outcome = Outcome { quantized, error: None, x_max: 127 };
     actq::writer::image(&policy, &[outcome]).expect("the policy fits the format")
 }
 

@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 
 use actq::graph::{Graph, Matrix, Node, NodeKind};
 use actq::policy::{Contract, Policy};
-use actq::quantize::{Activations, Budget, Method, Options, Outcome, quantize};
+use actq::quantize::{Budget, Method, Options, Outcome, quantize};
 use actq_host_tests::golden::Random;
 use actq_kernels::format::Width;
 use actq_kernels::image::{Kind, checksum, header as h, header::op};
@@ -38,8 +38,7 @@ fn valid_image() -> Vec<u8> {
     ];
     graph.nodes = nodes.into_iter().enumerate().map(|(input, (kind, len))| Node { kind, input, len }).collect();
     let at_width = |width| {
-        let options =
-            Options { method: Method::Rtn, budget: Budget::Width(width), group: 32, activations: Activations::Int8 };
+        let options = Options { group: 32, ..Options::new(Method::Rtn, Budget::Width(width)) };
         quantize(&graph, &[], &options).expect("the graph can be quantized")
     };
     let [w2, w3, w4, w8] = Width::ALL.map(at_width);
@@ -59,6 +58,7 @@ fn valid_image() -> Vec<u8> {
             high: Some(vec![1.0; ACT]),
             max_step: Some(vec![0.25; ACT]),
         },
+        weights: graph.weights(),
         graph,
         digest: [7; 32],
     };
@@ -250,7 +250,6 @@ fn headers_that_cannot_be_are_refused() {
         ("a longer header", E::Version, |d| d.set_high(h::W_VERSION, 33)),
         ("a length one word off", E::Length, |d| d.set(h::W_BYTES, d.get(h::W_BYTES) + 4)),
         ("another layout stamp", E::Layout, |d| d.set(h::W_LAYOUT, 2)),
-        ("reserved word 19", E::Reserved, |d| d.set(19, 1)),
         ("reserved word 28", E::Reserved, |d| d.set(28, 1)),
         ("reserved word 29", E::Reserved, |d| d.set(29, 1)),
         ("reserved word 30", E::Reserved, |d| d.set(30, 1)),

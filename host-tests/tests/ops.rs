@@ -254,7 +254,7 @@ fn deviation(
 
 fn rtn(policy: &Policy, group: usize) -> Result<Vec<Outcome>> {
     let budget = Budget::Width(Width::W8);
-    let options = Options { method: Method::Rtn, budget, group, activations: Activations::Int16 };
+    let options = Options { group, activations: Activations::Int16, ..Options::new(Method::Rtn, budget) };
     quantize(&policy.graph, &[], &options)
 }
 

@@ -24,8 +24,7 @@ fn ur3() -> PathBuf {
 }
 
 fn rtn(policy: &Policy, width: Width, group: usize, activations: Activations) -> Result<Vec<u8>> {
-    let options =
-        Options { method: Method::Rtn, budget: Budget::Width(width), group, activations, steps: None, seed: 1 };
+    let options = Options { group, activations, ..Options::new(Method::Rtn, Budget::Width(width)) };
     writer::image(policy, &quantize(&policy.graph, &[], &options)?)
 }
 
@@ -196,14 +195,7 @@ fn gptq_beats_rounding_at_low_bits() -> Result<()> {
     let calib = Dataset::load(&dir.join("calib.npz"), policy.graph.obs_len, policy.chunk * policy.act_len)?;
     let moments = actq::quantize::moments::collect(&policy.graph, &calib, |_| {});
     let nmse = |graph: &Graph, method| -> Result<f64> {
-        let options = Options {
-            method,
-            budget: Budget::Width(Width::W3),
-            group: 0,
-            activations: Activations::Int8,
-            steps: None,
-            seed: 1,
-        };
+        let options = Options::new(method, Budget::Width(Width::W3));
         let buffer = ImageBuffer::new(&writer::image(&policy, &quantize(graph, &moments, &options)?)?);
         let image = buffer.image(&dir)?;
         Ok(eval::evaluate(image, &eval::heldout(&dir, &image)?)?.nmse)

@@ -1,7 +1,7 @@
 //! The command `actq`.
 #![forbid(unsafe_code)]
 
-use std::io;
+use std::io::{self, Write as _};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -143,24 +143,30 @@ fn run(command: Command) -> Result<()> {
         Command::Quantize(args) => run_quantize(&args),
         Command::Inspect { image } => {
             let buffer = ImageBuffer::read(&image)?;
-            print!("{}", report(&buffer.image(&image)?));
-            Ok(())
+            print(&report(&buffer.image(&image)?))
         }
         Command::Eval { image, policy, json } => {
             let buffer = ImageBuffer::read(&image)?;
             let image = buffer.image(&image)?;
             let report = eval::evaluate(image, &eval::heldout(&policy, &image)?)?;
             if json {
-                println!("{}", serde_json::to_string(&report)?);
-            } else {
-                println!("observations   {}", report.steps);
-                println!("nmse           {:.3e}   (mean squared error / variance, mean over dimensions)", report.nmse);
-                println!("worst nmse     {:.3e}   (dimension {})", report.worst_nmse, report.worst_dimension);
-                println!("largest error  {:.4}", report.max_abs);
-                println!("bits/weight    {:.3}", report.bpw);
-                println!("image          {} bytes", report.bytes);
+                return print(&(serde_json::to_string(&report)? + "\n"));
             }
-            Ok(())
+            print(&format!(
+                "observations   {}\n\
+                 nmse           {:.3e}   (mean squared error / variance, mean over dimensions)\n\
+                 worst nmse     {:.3e}   (dimension {})\n\
+                 largest error  {:.4}\n\
+                 bits/weight    {:.3}\n\
+                 image          {} bytes\n",
+                report.steps,
+                report.nmse,
+                report.worst_nmse,
+                report.worst_dimension,
+                report.max_abs,
+                report.bpw,
+                report.bytes,
+            ))
         }
         Command::Serve { image } => {
             let buffer = ImageBuffer::read(&image)?;
@@ -220,21 +226,28 @@ fn run_quantize(args: &QuantizeArgs) -> Result<()> {
     bar.finish_and_clear();
     let bytes = writer::image(&policy, &outcomes)?;
     writer::write(&args.out, &bytes)?;
-    print_summary(&policy, &outcomes);
     let f32_bytes = 4 * parameters;
-    println!(
-        "\n{}: {} bytes. The policy's {} parameters take {f32_bytes} bytes in f32 ({:.1}x) and {} in bf16 ({:.1}x).",
+    print(&format!(
+        "{}\n{}: {} bytes. The policy's {parameters} parameters take {f32_bytes} bytes in f32 ({:.1}x) and {} in bf16 \
+         ({:.1}x).\n",
+        summary(&policy, &outcomes),
         args.out.display(),
         bytes.len(),
-        parameters,
         f32_bytes as f64 / bytes.len() as f64,
         f32_bytes / 2,
         f32_bytes as f64 / 2.0 / bytes.len() as f64,
-    );
-    Ok(())
+    ))
 }
 
-fn print_summary(policy: &Policy, outcomes: &[Outcome]) {
+/// Prints; that a reader has gone away (as `head` does) is no error.
+fn print(text: &str) -> Result<()> {
+    match io::stdout().write_all(text.as_bytes()) {
+        Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        other => other.context("standard output cannot be written"),
+    }
+}
+
+fn summary(policy: &Policy, outcomes: &[Outcome]) -> String {
     let mut rows = table(&["matrix", "shape", "bits", "group", "bytes", "x max", "error"]);
     let mut total = 0;
     for (matrix, outcome) in policy.graph.matrices.iter().zip(outcomes) {
@@ -251,9 +264,6 @@ fn print_summary(policy: &Policy, outcomes: &[Outcome]) {
             outcome.error.map_or("-".to_owned(), |e| format!("{e:.2e}")),
         ]);
     }
-    println!("{rows}");
-    println!(
-        "\n{total} bytes of weights, {:.3} bits each, everything counted",
-        8.0 * total as f64 / policy.weights as f64
-    );
+    let bits = 8.0 * total as f64 / policy.weights.max(1) as f64;
+    format!("{rows}\n\n{total} bytes of weights, {bits:.3} bits each, everything counted\n")
 }

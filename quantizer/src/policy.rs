@@ -141,6 +141,9 @@ impl Policy {
 
     fn build(dir: &Path, json: &Json, builder: &mut Builder<'_>, digest: [u8; 32]) -> Result<Self> {
         ensure!(json.obs_dim > 0 && json.act_dim > 0, "obs_dim and act_dim must be at least 1");
+        for (name, n) in [("obs_dim", json.obs_dim), ("act_dim", json.act_dim), ("chunk", json.chunk.unwrap_or(1))] {
+            ensure!(n <= usize::from(u16::MAX), "{name} is {n}, 65535 is the most");
+        }
         ensure!(!json.ops.is_empty(), "ops is empty");
         ensure!(json.name.len() <= 200, "name is longer than 200 bytes");
         let (kind, chunk, execute) = match json.kind.as_deref().unwrap_or("step") {
@@ -181,6 +184,10 @@ impl Policy {
             );
             ensure!(array.iter().all(|v| v.is_finite()), "action.{name} holds a value that is not finite");
         }
+        if let (Some(low), Some(high)) = (&contract.low, &contract.high) {
+            ensure!(low.iter().zip(high).all(|(l, h)| l <= h), "action.low exceeds action.high");
+        }
+        ensure!(contract.max_step.iter().flatten().all(|s| *s >= 0.0), "action.max_step holds a negative value");
         let rate_hz = json.control_hz.unwrap_or(50.0);
         ensure!(rate_hz.is_finite() && rate_hz > 0.0, "control_hz must be above 0");
         Ok(Self {
@@ -313,7 +320,7 @@ impl Builder<'_> {
 
     fn recurrent(&mut self, op: &JsonOp, len: usize) -> Result<NodeKind> {
         let hidden = op.hidden.context("needs the key hidden")?;
-        ensure!(hidden > 0, "hidden must be at least 1");
+        ensure!((1..=usize::from(u16::MAX)).contains(&hidden), "hidden is {hidden}, it must be 1 to 65535");
         let (gates, order) = if op.op == "lstm" { (4, "i,f,g,o") } else { (3, "r,z,n") };
         if let Some(gates) = &op.gates {
             ensure!(gates == order, "gates are {gates:?}; only torch's order {order:?} is supported");

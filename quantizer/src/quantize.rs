@@ -78,6 +78,13 @@ pub struct Options {
     pub seed: u64,
 }
 
+impl Options {
+    /// A method and a budget, one scale a row, everything else as it suits the method.
+    pub fn new(method: Method, budget: Budget) -> Self {
+        Self { method, budget, group: 0, activations: Activations::Auto, steps: None, seed: 1 }
+    }
+}
+
 /// What is being done, for a progress bar.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Progress {

@@ -6,7 +6,7 @@ use std::path::Path;
 use actq::eval;
 use actq::inspect::{bits_per_weight, table};
 use actq::policy::Policy;
-use actq::quantize::{Activations, Budget, Method, Options, moments, quantize};
+use actq::quantize::{Budget, Method, Options, moments, quantize};
 use actq::runtime::{ImageBuffer, with_head};
 use actq::{dataset::Dataset, writer};
 use actq_host_tests::qemu::{self, Counter, Server, Target};
@@ -70,14 +70,7 @@ pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
     let counter = Counter::build()?;
     let mut report = Vec::new();
     for width in [Width::W8, Width::W3] {
-        let options = Options {
-            method: Method::Gptq,
-            budget: Budget::Width(width),
-            group: 0,
-            activations: Activations::Int8,
-            steps: None,
-            seed: 1,
-        };
+        let options = Options::new(Method::Gptq, Budget::Width(width));
         let bytes = writer::image(&policy, &quantize(&policy.graph, &moments, &options)?)?;
         let path = work.join(format!("ur3-{}bit.actq", width.bits()));
         writer::write(&path, &bytes)?;
