@@ -1,8 +1,13 @@
 //! Weight matrices into codes and scales.
 
+pub mod actquant;
 pub mod gptq;
+pub mod hsic;
 pub mod moments;
+pub mod prepared;
 pub mod scale;
+
+use std::fmt;
 
 use actq_kernels::format::{BlockShape, Width};
 use actq_kernels::image::block_bytes;
@@ -19,6 +24,30 @@ pub enum Method {
     Rtn,
     /// Column-wise error feedback with the second moment of the matrix's input (GPTQ, arXiv 2210.17323).
     Gptq,
+    /// Round to nearest, widths by HSIC scores, scales by the Fisher information of the action loss (ActQuant, arXiv
+    /// 2605.24011).
+    ActQuant,
+}
+
+impl Method {
+    /// Columns per u8 scale where the user asks for none in particular. Error feedback makes good what one scale a row loses;
+    /// rounding has only its scales.
+    pub fn default_group(self) -> usize {
+        match self {
+            Self::Rtn | Self::ActQuant => 32,
+            Self::Gptq => 0,
+        }
+    }
+}
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Rtn => "rtn",
+            Self::Gptq => "gptq",
+            Self::ActQuant => "actquant",
+        })
+    }
 }
 
 /// Bits of the activations.
@@ -38,6 +67,27 @@ pub enum Budget {
     /// The widths that keep the whole below this many bits per weight, everything counted.
     BitsPerWeight(f64),
 }
+
+/// The error of a [`Budget::BitsPerWeight`] that not even the narrowest widths keep.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BudgetTooSmall {
+    /// What the narrowest widths take.
+    pub bytes: usize,
+    /// What is allowed.
+    pub limit: f64,
+}
+
+impl fmt::Display for BudgetTooSmall {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { bytes, limit } = self;
+        write!(
+            f,
+            "the budget is too small: 2 bits a weight with scales and padding take {bytes} bytes, {limit:.0} are allowed"
+        )
+    }
+}
+
+impl std::error::Error for BudgetTooSmall {}
 
 /// What to quantize to.
 #[derive(Clone, Copy, Debug)]
@@ -142,7 +192,24 @@ pub struct Outcome {
     pub x_max: u16,
 }
 
-/// Quantizes every matrix of `graph`. `moments` has one entry per matrix, or is empty where the method needs none.
+impl Outcome {
+    /// Measures what became of `matrix`.
+    pub fn new(
+        matrix: &Matrix,
+        quantized: Quantized,
+        moments: Option<&Moments>,
+        activations: Activations,
+    ) -> Result<Self> {
+        let limit = match activations {
+            Activations::Int8 => 127,
+            Activations::Int16 => i16::MAX as u16,
+        };
+        let x_max = quantized.x_max(limit)?;
+        Ok(Self { error: moments::relative_error(matrix, &quantized.dequantized(), moments), quantized, x_max })
+    }
+}
+
+/// Quantizes every matrix of `graph`, with another method than [`Method::ActQuant`], which has its own function. `moments` has one entry per matrix, or is empty where the method needs none.
 pub fn quantize(graph: &Graph, moments: &[Moments], options: &Options) -> Result<Vec<Outcome>> {
     ensure!(matches!(options.group, 0 | 32 | 64 | 128), "group is {}, it must be 0, 32, 64 or 128", options.group);
     let one = |i: usize, width| -> Result<Outcome> {
@@ -152,13 +219,9 @@ pub fn quantize(graph: &Graph, moments: &[Moments], options: &Options) -> Result
             (Method::Rtn, _) => scale::round_to_nearest(matrix, width, options.group),
             (Method::Gptq, Some(moment)) => gptq::quantize(matrix, width, options.group, moment)?,
             (Method::Gptq, None) => bail!("gptq needs recorded observations: put calib.npz beside policy.json"),
+            (Method::ActQuant, _) => bail!("actquant needs more than moments: see quantize::actquant"),
         };
-        let limit = match options.activations {
-            Activations::Int8 => 127,
-            Activations::Int16 => i16::MAX as u16,
-        };
-        let x_max = quantized.x_max(limit)?;
-        Ok(Outcome { error: moments::relative_error(matrix, &quantized.dequantized(), moment), quantized, x_max })
+        Outcome::new(matrix, quantized, moment, options.activations)
     };
     let indexes = 0..graph.matrices.len();
     match options.budget {
@@ -177,10 +240,7 @@ pub fn quantize(graph: &Graph, moments: &[Moments], options: &Options) -> Result
 fn allocate(tries: &[Vec<Outcome>], limit: f64) -> Result<Vec<usize>> {
     let mut chosen = vec![0; tries.len()];
     let mut bytes: usize = tries.iter().map(|t| t[0].quantized.bytes()).sum();
-    ensure!(
-        bytes as f64 <= limit,
-        "the budget is too small: 2 bits a weight with scales and padding take {bytes} bytes, {limit:.0} are allowed"
-    );
+    ensure!(bytes as f64 <= limit, BudgetTooSmall { bytes, limit });
     loop {
         let upgrade = |m: usize| {
             let now = &tries[m][chosen[m]];
