@@ -27,7 +27,7 @@ pub struct Series {
 pub struct Mark {
     /// Where.
     pub at: (f64, f64),
-    /// What is written beside it.
+    /// What the legend says of it.
     pub label: String,
 }
 
@@ -64,8 +64,8 @@ impl Axes {
             (x, y) = ((0.0, 1.0), (0.0, 1.0));
         }
         let step = tick_step(x.1 - x.0);
-        let y = (y.0.floor() as i32, y.1.ceil() as i32);
-        // Half a step of air, or the outermost markers would sit on the frame.
+        // Some air, or the outermost markers would sit on the frame.
+        let y = ((y.0 - 0.08).floor() as i32, (y.1 + 0.08).ceil() as i32);
         Self { x: (x.0 - 0.5 * step, x.1 + 0.5 * step), y: (y.0, y.1.max(y.0 + 1)) }
     }
 
@@ -115,46 +115,38 @@ impl Plot {
             line(svg, axes, index, series)?;
         }
         if let Some(mark) = &self.mark {
-            let (x, y) = (axes.x(mark.at.0), axes.y(mark.at.1));
-            writeln!(
-                svg,
-                r##"<circle cx="{x:.1}" cy="{y:.1}" r="10" fill="none" stroke="#333" stroke-width="1.5"/>"##
-            )?;
-            // To the left of the point and below it: lines that fall to the right leave that side free.
-            let (x, y) = (x - 14.0, y + 24.0);
-            let anchor = if x > LEFT + 8.0 * mark.label.len() as f64 { "end" } else { "start" };
-            text(svg, x, y, &format!(r#"text-anchor="{anchor}" {HALO}"#), &mark.label)?;
+            writeln!(svg, "{}", ring(axes.x(mark.at.0), axes.y(mark.at.1), 10.0))?;
         }
         self.legend(svg)?;
         writeln!(svg, "</svg>")
     }
 
     fn legend(&self, svg: &mut String) -> std::fmt::Result {
-        let longest = self.series.iter().map(|s| s.name.chars().count()).max().unwrap_or(0) as f64;
-        let (width, height) = (60.0 + 7.5 * longest, 12.0 + 20.0 * self.series.len() as f64);
+        let names: Vec<&str> =
+            self.series.iter().map(|s| s.name.as_str()).chain(self.mark.iter().map(|m| m.label.as_str())).collect();
+        let longest = names.iter().map(|name| name.chars().count()).max().unwrap_or(0) as f64;
+        let (width, height) = (62.0 + 7.0 * longest, 12.0 + 20.0 * names.len() as f64);
         let left = WIDTH - RIGHT - 10.0 - width;
         let top = TOP + 10.0;
         writeln!(
             svg,
             r##"<rect x="{left:.1}" y="{top:.1}" width="{width:.1}" height="{height:.1}" rx="3" fill="#fff" fill-opacity="0.9" stroke="#ccc"/>"##
         )?;
-        for (index, series) in self.series.iter().enumerate() {
+        let (from, to) = (left + 10.0, left + 42.0);
+        for (index, name) in names.iter().enumerate() {
             let y = top + 16.0 + 20.0 * index as f64;
-            let colour = COLOURS[index % COLOURS.len()];
-            let (from, to) = (left + 10.0, left + 42.0);
-            writeln!(
-                svg,
-                r#"<path d="M{from:.1} {y:.1}H{to:.1}" stroke="{colour}" stroke-width="2"/>{}"#,
-                marker(index, 0.5 * (from + to), y)
-            )?;
-            text(svg, left + 50.0, y + 4.5, "", &series.name)?;
+            if index < self.series.len() {
+                let colour = COLOURS[index % COLOURS.len()];
+                writeln!(svg, r#"<path d="M{from:.1} {y:.1}H{to:.1}" stroke="{colour}" stroke-width="2"/>"#)?;
+                writeln!(svg, "{}", marker(index, 0.5 * (from + to), y))?;
+            } else {
+                writeln!(svg, "{}", ring(0.5 * (from + to), y, 7.0))?;
+            }
+            text(svg, left + 50.0, y + 4.5, "", name)?;
         }
         Ok(())
     }
 }
-
-/// Keeps text readable over lines.
-const HALO: &str = r##"stroke="#fff" stroke-width="4" stroke-linejoin="round" paint-order="stroke""##;
 
 fn text(svg: &mut String, x: f64, y: f64, attributes: &str, content: &str) -> std::fmt::Result {
     let content = content.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
@@ -212,6 +204,10 @@ fn line(svg: &mut String, axes: &Axes, index: usize, series: &Series) -> std::fm
     Ok(())
 }
 
+fn ring(x: f64, y: f64, radius: f64) -> String {
+    format!(r##"<circle cx="{x:.1}" cy="{y:.1}" r="{radius}" fill="none" stroke="#333" stroke-width="1.5"/>"##)
+}
+
 /// Every series has its own shape as well as its own colour.
 fn marker(index: usize, x: f64, y: f64) -> String {
     let style = format!(r##"fill="{}" stroke="#fff" stroke-width="1.2""##, COLOURS[index % COLOURS.len()]);
@@ -242,8 +238,8 @@ mod tests {
         plot.mark = Some(Mark { at: points[1], label: "knee".into() });
         let svg = plot.svg();
         assert!(svg.contains("a &lt; b &amp; c"));
-        // Three points, one in the legend, and the ring.
-        assert_eq!(svg.matches("<circle").count(), 5);
+        // Three points and a ring, and both in the legend.
+        assert_eq!(svg.matches("<circle").count(), 6);
         let axes = Axes::around(&plot.series);
         for (x, y) in points {
             assert!((LEFT..WIDTH - RIGHT).contains(&axes.x(x)) && (TOP..=HEIGHT - BOTTOM).contains(&axes.y(y)));

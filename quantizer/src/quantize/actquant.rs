@@ -5,7 +5,9 @@
 //! weighted by the [`fisher`] information of the action loss, by the same search that plain rounding uses. Where the budget is
 //! one width for all, stage 1 is skipped.
 //!
-//! The paper leaves the action head at 16 bits; here it is quantized like everything else.
+//! The paper leaves the action head at 16 bits; here it is quantized like everything else. Its blocks are those of llama.cpp, whose
+//! search also multiplies the importance by `sqrt(mean of the row's w^2 + w^2)`; here the importance stands alone, as in the
+//! paper's objective.
 
 pub mod allocation;
 pub mod fisher;

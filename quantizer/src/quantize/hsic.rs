@@ -17,7 +17,8 @@ impl Kernel {
     /// The Gaussian kernel `k(a, b) = exp(-|a - b|^2 / (2 sigma^2))` of `samples`, `[sample, element]`.
     ///
     /// `sigma^2` is the median of `|a - b|^2` over all pairs of different samples (of an even number of pairs, the upper of the
-    /// two in the middle); their mean where the median is 0. Samples that are all equal give a kernel of zeros.
+    /// two in the middle); their mean where the median is 0. Samples that are all equal give a kernel of zeros. This is the usual
+    /// median heuristic, which no scale of the samples changes; ActQuant's code takes that median as `sigma` itself.
     pub fn gaussian(samples: &Array2<f64>) -> Self {
         let mut kernel = squared_distances(samples);
         let sigma2 = median_or_mean(&kernel);

@@ -20,7 +20,8 @@ const LAMBDA_Y: f64 = 1.0;
 ///
 /// ActQuant (arXiv 2605.24011) scores values Z by the HSIC bottleneck `F(Z) = -lambda_x HSIC(X, Z) + lambda_y HSIC(Y, Z)`, and a
 /// matrix by `sens = F(output) - F(input)`. As in the authors' code, X is the same for every matrix, namely the input of the
-/// network's first one, so that `sens` says how far the matrix moves the values from the observation towards the actions.
+/// network's first one, so that `sens` says how far the matrix moves the values from the observation towards the actions. (Their
+/// scripts can allocate by `F(output)` alone, too.)
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Score {
     /// HSIC(X, the matrix's input)
