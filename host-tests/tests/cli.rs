@@ -72,8 +72,14 @@ impl Fixture {
         self.0.path().join("out").join(name)
     }
 
-    /// `actq quantize` of the policy with more arguments, separated by spaces.
+    /// `actq quantize` of the policy with more arguments, separated by spaces; by gptq where they name no method. (The default
+    /// method learns, for which the recording here is too short.)
     fn quantize(&self, out: &Path, options: &str) -> Result<Output> {
+        let method = if options.contains("--method") { "" } else { "--method gptq" };
+        self.quantize_as_given(out, &format!("{options} {method}"))
+    }
+
+    fn quantize_as_given(&self, out: &Path, options: &str) -> Result<Output> {
         let mut command = Command::new(binary());
         command.arg("quantize").arg(self.policy()).arg("--out").arg(out).args(options.split_whitespace());
         run(command, b"")
@@ -425,15 +431,22 @@ fn a_budget_that_is_too_small_names_the_least() -> Result<()> {
 }
 
 #[test]
-fn defaults_are_three_bits_and_gptq_where_there_is_a_recording() -> Result<()> {
+fn the_default_method_follows_from_what_is_there() -> Result<()> {
     let fixture = Fixture::new()?;
+    let out = fixture.out("default.actq");
     let bytes = |options: &str| Ok::<_, anyhow::Error>(fs::read(fixture.image(options)?)?);
-    let gptq = bytes("--bits 3 --method gptq --group 0 --activations 8")?;
-    let rtn = bytes("--bits 3 --method rtn")?;
+    let default = |options: &str| {
+        succeeded(&fixture.quantize_as_given(&out, options)?)?;
+        Ok::<_, anyhow::Error>(fs::read(&out)?)
+    };
+    let gptq = bytes("--bits 3 --method gptq --group 32 --activations 8")?;
+    let rtn = bytes("--bits 3 --method rtn --activations 8")?;
     assert_ne!(gptq, rtn);
-    assert_eq!(bytes("")?, gptq);
+    // A recording: the method that learns, which says how many frames it needs; with groups, gptq.
+    failed(&fixture.quantize_as_given(&out, "")?, 1, &["calib.npz", "frames", "200"])?;
+    assert_eq!(default("--group 32")?, gptq);
     fs::remove_file(fixture.policy().join("calib.npz"))?;
-    assert_eq!(bytes("")?, rtn);
+    assert_eq!(default("")?, rtn);
     Ok(())
 }
 

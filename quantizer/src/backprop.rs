@@ -95,15 +95,26 @@ enum Saved {
     Input(Array2<f32>),
     /// Normalized values and the reciprocal deviation of each sample.
     Norm(Array2<f32>, Vec<f32>),
-    /// Inputs of both products, previous hidden state (as the cell saw it), and the cell's values side by side.
-    Cell {
-        x: Array2<f32>,
-        h: Array2<f32>,
-        previous: [Array2<f32>; 2],
-        gates: Array2<f32>,
-        other: Array2<f32>,
-    },
+    /// What a recurrent cell saw.
+    Cell(Box<Cell>),
 }
+
+/// A recurrent cell's inputs and inner values.
+#[derive(Debug)]
+struct Cell {
+    /// Inputs of both products, as they entered them.
+    x: Array2<f32>,
+    h: Array2<f32>,
+    /// Hidden and cell state before the step.
+    previous: [Array2<f32>; 2],
+    /// LSTM: all gates before their functions. GRU: the input's share of them.
+    gates: Array2<f32>,
+    /// LSTM: cell state after the step. GRU: the state's share of the gates.
+    other: Array2<f32>,
+}
+
+/// Is shown the derivative by the output of a matrix product: matrix, node, whether of the state, derivative.
+pub type See<'a> = dyn FnMut(usize, usize, bool, &Array2<f32>) + 'a;
 
 /// One step's forward pass.
 #[derive(Debug)]
@@ -123,7 +134,7 @@ impl Pass {
     pub fn product_input(&self, node: usize, of_state: bool) -> Option<&Array2<f32>> {
         match &self.saved[node] {
             Saved::Input(x) => Some(x),
-            Saved::Cell { x, h, .. } => Some(if of_state { h } else { x }),
+            Saved::Cell(cell) => Some(if of_state { &cell.h } else { &cell.x }),
             _ => None,
         }
     }
@@ -223,8 +234,8 @@ impl Network<'_> {
                     for ((gates, mut c), mut h) in gates.rows().into_iter().zip(c.rows_mut()).zip(h.rows_mut()) {
                         lstm_cell(contiguous(&gates), contiguous_mut(&mut c), contiguous_mut(&mut h));
                     }
-                    let saved = Saved::Cell { x, h: hq, previous, gates, other: c.clone() };
-                    (h.clone(), saved)
+                    let cell = Cell { x, h: hq, previous, gates, other: c.clone() };
+                    (h.clone(), Saved::Cell(Box::new(cell)))
                 }
                 NodeKind::Gru { input, state: w_hh, .. } => {
                     let [h, _] = &mut state[i];
@@ -237,7 +248,7 @@ impl Network<'_> {
                     for ((a, b), mut h) in a.rows().into_iter().zip(b.rows()).zip(h.rows_mut()) {
                         gru_cell(contiguous(&a), contiguous(&b), contiguous_mut(&mut h));
                     }
-                    (h.clone(), Saved::Cell { x, h: hq, previous, gates: a, other: b })
+                    (h.clone(), Saved::Cell(Box::new(Cell { x, h: hq, previous, gates: a, other: b })))
                 }
             };
             values.push(y);
@@ -247,8 +258,8 @@ impl Network<'_> {
     }
 
     /// Steps back through one pass. `d_output` is the loss's derivative by the network's output; `d_state`, by the state after
-    /// the step, becomes that by the state before it. `grads` gets the derivatives by the weights added. `see` is shown the
-    /// derivative by the output of every matrix product: matrix, node, whether of the state, derivative.
+    /// the step, becomes that by the state before it. `grads` gets the derivatives by the weights added. `see` is shown
+    /// every matrix product.
     pub fn backward(
         &self,
         weights: &Weights,
@@ -256,7 +267,7 @@ impl Network<'_> {
         d_output: Array2<f32>,
         d_state: &mut State,
         grads: &mut Weights,
-        see: &mut dyn FnMut(usize, usize, bool, &Array2<f32>),
+        see: &mut See<'_>,
     ) {
         let mut d_values: Vec<Option<Array2<f32>>> = vec![None; pass.values.len()];
         d_values[pass.values.len() - 1] = Some(d_output);
@@ -330,10 +341,8 @@ impl Network<'_> {
                         from += part.len;
                     }
                 }
-                (
-                    NodeKind::Lstm { hidden, input, state: w_hh, .. },
-                    Saved::Cell { x, h, previous, gates, other: c },
-                ) => {
+                (NodeKind::Lstm { hidden, input, state: w_hh, .. }, Saved::Cell(cell)) => {
+                    let Cell { x, h, previous, gates, other: c } = &**cell;
                     let [d_h, d_c] = &mut d_state[i];
                     dy += &*d_h;
                     let mut d_gates = Array2::zeros(gates.raw_dim());
@@ -361,10 +370,8 @@ impl Network<'_> {
                     *d_h = d_gates.dot(&weights.matrices[*w_hh]);
                     give(node.input, d_gates.dot(&weights.matrices[*input]));
                 }
-                (
-                    NodeKind::Gru { hidden, input, state: w_hh, .. },
-                    Saved::Cell { x, h, previous, gates: a, other: b },
-                ) => {
+                (NodeKind::Gru { hidden, input, state: w_hh, .. }, Saved::Cell(cell)) => {
+                    let Cell { x, h, previous, gates: a, other: b } = &**cell;
                     let [d_h, _] = &mut d_state[i];
                     dy += &*d_h;
                     let (mut d_a, mut d_b) = (Array2::zeros(a.raw_dim()), Array2::zeros(b.raw_dim()));

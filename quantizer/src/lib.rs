@@ -11,11 +11,13 @@ pub mod eval;
 pub mod graph;
 pub mod inspect;
 pub mod lower;
+pub mod plot;
 pub mod policy;
 pub mod quantize;
 pub mod random;
 pub mod runtime;
 pub mod serve;
+pub mod sweep;
 pub mod writer;
 
 /// The versions that take part in making an image; recorded in reports.

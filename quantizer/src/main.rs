@@ -5,12 +5,14 @@ use std::io::{self, Write as _};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use actq::dataset::Dataset;
+use actq::graph::Graph;
 use actq::inspect::{group_name, report, table};
 use actq::policy::Policy;
-use actq::quantize::{Activations, Budget, Method, Options, Outcome, Progress, quantize_policy};
+use actq::quantize::actquant::Statistics;
+use actq::quantize::prepared::Prepared;
+use actq::quantize::{Activations, Budget, Method, Options, Outcome};
 use actq::runtime::ImageBuffer;
-use actq::{eval, serve, writer};
+use actq::{eval, serve, sweep, writer};
 use actq_kernels::Width;
 use anyhow::{Context, Result};
 use clap::{Parser, Subcommand, ValueEnum};
@@ -30,7 +32,7 @@ struct Cli {
 enum Command {
     /// Quantize a policy into an image
     ///
-    /// POLICY_DIR holds policy.json (the op list), policy.safetensors (the weights) and, for --method gptq, calib.npz
+    /// POLICY_DIR holds policy.json (the op list), policy.safetensors (the weights) and, for every method but rtn, calib.npz
     /// (recorded observations: array "obs" [episode, step, value], optionally "length" [episode]).
     ///
     /// Example: actq quantize policies/ur3 --bits 3 --out ur3.actq
@@ -51,6 +53,14 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Compare methods at several budgets on heldout.npz
+    ///
+    /// A cell of the table is the error (mean squared error / variance of the actions, mean over dimensions) and the true bits
+    /// per weight, scales and padding counted; "-" where not even 2 bits fit. Every method uses its default groups; activations
+    /// are int8.
+    ///
+    /// Example: actq sweep policies/ur3 --bpw 2.5,3,4 --svg ur3.svg
+    Sweep(SweepArgs),
     /// Run an image as a policy over standard input and output
     ///
     /// Little-endian: "R" resets and has no reply; "S" and the observation as f32 are answered by the action as f32.
@@ -73,13 +83,14 @@ struct QuantizeArgs {
     /// Bits per weight of the whole, scales and padding counted; each matrix gets a width
     #[arg(long, value_name = "X", value_parser = positive)]
     bpw: Option<f64>,
-    /// Columns that share a u8 scale: 32, 64 or 128; 0 = one scale a row [default: 32 for rtn, 0 for gptq]
+    /// Columns that share a u8 scale: 32, 64 or 128; 0 = one scale a row [default: 32 for rtn and actquant,
+    /// 0 for gptq and best]
     #[arg(long, value_name = "N", value_parser = group)]
     group: Option<usize>,
     /// Bits of the activations, whose scale is found at run time [default: for best chosen per matrix, else 8]
     #[arg(long, value_name = "BITS")]
     activations: Option<ActivationArg>,
-    /// How codes are chosen [default: best where calib.npz is there, else rtn]
+    /// How codes are chosen [default: best where calib.npz is there (gptq with --group), else rtn]
     #[arg(long)]
     method: Option<MethodArg>,
     /// Steps of distillation for --method best [default: 8000, recurrent policies 1200]
@@ -91,6 +102,24 @@ struct QuantizeArgs {
     /// Threads to use; the image does not depend on it [default: all cores]
     #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
     threads: usize,
+}
+
+#[derive(clap::Args)]
+struct SweepArgs {
+    /// The policy's folder
+    policy_dir: PathBuf,
+    /// Methods to compare
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "rtn,gptq,actquant,best")]
+    methods: Vec<MethodArg>,
+    /// Bits per weight of the whole that are allowed
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "2,2.5,3,4", value_parser = positive)]
+    bpw: Vec<f64>,
+    /// Draw error over bits, and mark the knee of the best method
+    #[arg(long, value_name = "FILE")]
+    svg: Option<PathBuf>,
+    /// Write errors, bits, bytes and scores
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -109,8 +138,21 @@ enum MethodArg {
     Rtn,
     /// Column-wise error feedback with the inputs' second moment (needs calib.npz)
     Gptq,
+    /// Widths by HSIC scores, scales by the Fisher information of the actions (needs calib.npz with actions)
+    Actquant,
     /// A width for every row, pruning, and distillation on the recorded observations (needs calib.npz)
     Best,
+}
+
+impl From<MethodArg> for Method {
+    fn from(arg: MethodArg) -> Self {
+        match arg {
+            MethodArg::Rtn => Self::Rtn,
+            MethodArg::Gptq => Self::Gptq,
+            MethodArg::Actquant => Self::ActQuant,
+            MethodArg::Best => Self::Best,
+        }
+    }
 }
 
 fn width(text: &str) -> Result<Width, String> {
@@ -168,6 +210,7 @@ fn run(command: Command) -> Result<()> {
                 report.bytes,
             ))
         }
+        Command::Sweep(args) => run_sweep(&args),
         Command::Serve { image } => {
             let buffer = ImageBuffer::read(&image)?;
             serve::serve(buffer.image(&image)?, io::stdin().lock(), io::stdout().lock())
@@ -176,26 +219,20 @@ fn run(command: Command) -> Result<()> {
 }
 
 fn run_quantize(args: &QuantizeArgs) -> Result<()> {
-    let policy = Policy::load(&args.policy_dir)?;
-    let parameters = policy.graph.parameters();
-    let calib = args.policy_dir.join("calib.npz");
+    let source = Policy::load(&args.policy_dir)?;
+    let group = args.group.unwrap_or(0);
     let method = match args.method {
-        Some(MethodArg::Rtn) => Method::Rtn,
-        Some(MethodArg::Gptq) => Method::Gptq,
-        Some(MethodArg::Best) => Method::Best,
-        None if calib.exists() => Method::Best,
-        None => Method::Rtn,
+        Some(method) => method.into(),
+        None if !args.policy_dir.join("calib.npz").exists() => Method::Rtn,
+        None if group > 0 => Method::Gptq,
+        None => Method::Best,
     };
     let budget = match (args.bits, args.bpw) {
         (_, Some(bpw)) => Budget::BitsPerWeight(bpw),
         (bits, None) => Budget::Width(bits.unwrap_or(Width::W3)),
     };
-    // What learns makes good what one scale a row loses; plain rounding has only its scales.
-    let default_group = if method == Method::Rtn { 32 } else { 0 };
     let options = Options {
-        method,
-        budget,
-        group: args.group.unwrap_or(default_group),
+        group: args.group.unwrap_or(method.default_group()),
         activations: match args.activations {
             Some(ActivationArg::Int8) => Activations::Int8,
             Some(ActivationArg::Int16) => Activations::Int16,
@@ -203,29 +240,22 @@ fn run_quantize(args: &QuantizeArgs) -> Result<()> {
         },
         steps: args.steps,
         seed: args.seed,
-    };
-    let dataset = match method {
-        Method::Rtn => None,
-        Method::Gptq | Method::Best => {
-            Some(Dataset::load(&calib, policy.graph.obs_len, policy.chunk * policy.act_len)?)
-        }
+        ..Options::new(method, budget)
     };
     rayon::ThreadPoolBuilder::new().num_threads(args.threads).build_global().context("threads cannot be started")?;
-    let bar = ProgressBar::new(1);
-    bar.set_style(ProgressStyle::with_template("{msg:12} {bar:40} {pos}/{len} {eta} left").context("progress bar")?);
-    let (policy, outcomes) = quantize_policy(&policy, dataset.as_ref(), &options, &mut |p| {
-        let (name, done, all) = match p {
-            Progress::Calibrate(done, all) => ("calibrating", done, all),
-            Progress::Sensitivity => ("sensitivity", 0, 1),
-            Progress::Distill(done, all, _) => ("distilling", done, all),
-        };
-        bar.set_message(name);
-        bar.set_length(all as u64);
-        bar.set_position(done as u64);
-    })?;
+    let bar = progress_bar()?;
+    bar.set_message("calibrating");
+    let prepared = Prepared::new(&source, method, |share| set_share(&bar, share))?;
+    bar.reset();
+    bar.set_message("quantizing");
+    let (policy, outcomes) = prepared.quantize(&options, |share| set_share(&bar, share))?;
     bar.finish_and_clear();
     let bytes = writer::image(&policy, &outcomes)?;
     writer::write(&args.out, &bytes)?;
+    if let Some(statistics) = &prepared.actquant {
+        print(&scores(&policy.graph, statistics, budget, &outcomes))?;
+    }
+    let parameters = source.graph.parameters();
     let f32_bytes = 4 * parameters;
     print(&format!(
         "{}\n{}: {} bytes. The policy's {parameters} parameters take {f32_bytes} bytes in f32 ({:.1}x) and {} in bf16 \
@@ -245,6 +275,54 @@ fn print(text: &str) -> Result<()> {
         Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),
         other => other.context("standard output cannot be written"),
     }
+}
+
+/// Steps of the progress bar; the work reports the share done.
+const PROGRESS: u64 = 1000;
+
+fn progress_bar() -> Result<ProgressBar> {
+    let style = ProgressStyle::with_template("{msg:32} {bar:40} {percent:>3}%, {eta} left").context("progress bar")?;
+    Ok(ProgressBar::new(PROGRESS).with_style(style))
+}
+
+fn set_share(bar: &ProgressBar, share: f64) {
+    bar.set_position((share * PROGRESS as f64) as u64);
+}
+
+fn run_sweep(args: &SweepArgs) -> Result<()> {
+    let policy = Policy::load(&args.policy_dir)?;
+    let methods: Vec<Method> = args.methods.iter().map(|&m| m.into()).collect();
+    let bar = progress_bar()?;
+    let sweep = sweep::run(&policy, &methods, &args.bpw, |work, share| {
+        bar.set_message(work.to_owned());
+        set_share(&bar, share);
+    })?;
+    bar.finish_and_clear();
+    let knee = sweep.knee.as_ref().map_or(String::new(), |knee| {
+        format!("\nknee: {} at {:.3} bits per weight, NMSE {:.2e}\n", knee.method, knee.bpw, knee.nmse)
+    });
+    print(&format!("{}\n{knee}", sweep.table()))?;
+    let write = |path: &Option<PathBuf>, text: &dyn Fn() -> Result<String>| -> Result<()> {
+        let Some(path) = path else { return Ok(()) };
+        writer::write(path, text()?.as_bytes())
+    };
+    write(&args.svg, &|| Ok(sweep.svg()))?;
+    write(&args.json, &|| Ok(serde_json::to_string_pretty(&sweep)? + "\n"))
+}
+
+fn scores(graph: &Graph, statistics: &Statistics, budget: Budget, outcomes: &[Outcome]) -> String {
+    let (_, equal) = statistics.effective_scores();
+    let mut rows = table(&["matrix", "HSIC score", "bits"]);
+    for ((matrix, score), outcome) in graph.matrices.iter().zip(&statistics.scores).zip(outcomes) {
+        let bits = outcome.quantized.width_counts();
+        rows.add_row([matrix.name.clone(), format!("{:.4}", score.sens()), bits]);
+    }
+    let note = match budget {
+        Budget::Width(_) => "One width for all: the scores are not used.",
+        Budget::BitsPerWeight(_) if equal => "No score is above 0: every matrix counts the same.",
+        Budget::BitsPerWeight(_) => "Scores below 0 count as 0.",
+    };
+    format!("{rows}\n{note}\n\n")
 }
 
 fn summary(policy: &Policy, outcomes: &[Outcome]) -> String {

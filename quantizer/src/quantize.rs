@@ -1,23 +1,26 @@
 //! Weight matrices into codes and scales.
 
+pub mod actquant;
 pub mod allocate;
 pub mod best;
 pub mod compact;
 pub mod distill;
 pub mod gptq;
+pub mod hsic;
 pub mod moments;
+pub mod prepared;
 pub mod scale;
 pub mod sensitivity;
 pub mod windows;
+
+use std::fmt;
 
 use actq_kernels::format::{BlockShape, Width};
 use actq_kernels::image::block_bytes;
 use anyhow::{Result, bail, ensure};
 use half::bf16;
 
-use crate::dataset::Dataset;
 use crate::graph::{Graph, Matrix};
-use crate::policy::Policy;
 use moments::Moments;
 
 /// How codes are chosen.
@@ -27,8 +30,33 @@ pub enum Method {
     Rtn,
     /// Column-wise error feedback with the second moment of the matrix's input (GPTQ, arXiv 2210.17323).
     Gptq,
+    /// Round to nearest, widths by HSIC scores, scales by the Fisher information of the action loss (ActQuant, arXiv
+    /// 2605.24011).
+    ActQuant,
     /// Widths by rows, pruning and distillation ([`best`]).
     Best,
+}
+
+impl Method {
+    /// Columns per u8 scale where the user asks for none in particular. Error feedback and learning make good what one scale
+    /// a row loses; rounding has only its scales.
+    pub fn default_group(self) -> usize {
+        match self {
+            Self::Rtn | Self::ActQuant => 32,
+            Self::Gptq | Self::Best => 0,
+        }
+    }
+}
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Rtn => "rtn",
+            Self::Gptq => "gptq",
+            Self::ActQuant => "actquant",
+            Self::Best => "best",
+        })
+    }
 }
 
 /// Bits of the activations.
@@ -61,6 +89,31 @@ pub enum Budget {
     BitsPerWeight(f64),
 }
 
+/// The error of a budget that not even the narrowest widths keep.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BudgetTooSmall {
+    /// What the narrowest widths take.
+    pub bytes: usize,
+    /// What is allowed.
+    pub limit: f64,
+    /// Weights of the policy.
+    pub weights: usize,
+}
+
+impl fmt::Display for BudgetTooSmall {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { bytes, limit, weights } = *self;
+        let bits = 8.0 * bytes as f64 / weights.max(1) as f64;
+        write!(
+            f,
+            "the budget is too small: with scales and padding the least is {bytes} bytes ({bits:.3} bits a weight), \
+             {limit:.0} bytes are allowed"
+        )
+    }
+}
+
+impl std::error::Error for BudgetTooSmall {}
+
 /// What to quantize to.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
@@ -83,17 +136,6 @@ impl Options {
     pub fn new(method: Method, budget: Budget) -> Self {
         Self { method, budget, group: 0, activations: Activations::Auto, steps: None, seed: 1 }
     }
-}
-
-/// What is being done, for a progress bar.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Progress {
-    /// Running the f32 network: frames done, frames in all.
-    Calibrate(usize, usize),
-    /// Running derivatives back.
-    Sensitivity,
-    /// Learning: steps done, steps in all, loss of the last batch.
-    Distill(usize, usize, f32),
 }
 
 /// A quantized matrix.
@@ -200,32 +242,21 @@ pub struct Outcome {
     pub x_max: u16,
 }
 
-/// Quantizes a policy: the policy as it became (its graph may have lost elements and its biases may have learned), and its
-/// matrices. `dataset` holds the recorded observations that every method but rtn needs.
-pub fn quantize_policy(
-    policy: &Policy,
-    dataset: Option<&Dataset>,
-    options: &Options,
-    progress: &mut dyn FnMut(Progress),
-) -> Result<(Policy, Vec<Outcome>)> {
-    let graph = &policy.graph;
-    let moments = match (options.method, dataset) {
-        (Method::Rtn, _) => Vec::new(),
-        (_, None) => bail!("recorded observations are needed: put calib.npz beside policy.json, or use --method rtn"),
-        (_, Some(dataset)) => {
-            let frames = dataset.frames();
-            moments::collect(graph, dataset, |done| progress(Progress::Calibrate(done, frames)))
-        }
-    };
-    let (Method::Best, Some(dataset)) = (options.method, dataset) else {
-        return Ok((policy.clone(), quantize(graph, &moments, options)?));
-    };
-    ensure!(options.group == 0, "method best gives every row its own scale; --group goes with the other methods");
-    let found = best::quantize(graph, dataset, &moments, options, progress)?;
-    Ok((Policy { graph: found.graph, ..policy.clone() }, found.outcomes))
+impl Outcome {
+    /// Measures what became of `matrix`.
+    pub fn new(
+        matrix: &Matrix,
+        quantized: Quantized,
+        moments: Option<&Moments>,
+        activations: Activations,
+    ) -> Result<Self> {
+        let x_max = quantized.x_max(activations.limit())?;
+        let error = Some(moments::relative_error(matrix, &quantized.dequantized(), moments));
+        Ok(Self { error, quantized, x_max })
+    }
 }
 
-/// Quantizes every matrix of `graph`. `moments` has one entry per matrix, or is empty where the method needs none.
+/// Quantizes every matrix of `graph` by rtn or gptq. `moments` has one entry per matrix, or is empty where the method needs none.
 pub fn quantize(graph: &Graph, moments: &[Moments], options: &Options) -> Result<Vec<Outcome>> {
     ensure!(matches!(options.group, 0 | 32 | 64 | 128), "group is {}, it must be 0, 32, 64 or 128", options.group);
     let one = |i: usize, width| -> Result<Outcome> {
@@ -234,12 +265,10 @@ pub fn quantize(graph: &Graph, moments: &[Moments], options: &Options) -> Result
         let quantized = match (options.method, moment) {
             (Method::Rtn, _) => scale::round_to_nearest(matrix, width, options.group),
             (Method::Gptq, Some(moment)) => gptq::quantize(matrix, width, options.group, moment)?,
-            (Method::Best, _) => bail!("best quantizes whole policies"),
             (Method::Gptq, None) => bail!("gptq needs recorded observations: put calib.npz beside policy.json"),
+            (method, _) => bail!("{method} takes more than moments: see quantize::prepared"),
         };
-        let x_max = quantized.x_max(options.activations.limit())?;
-        let error = Some(moments::relative_error(matrix, &quantized.dequantized(), moment));
-        Ok(Outcome { error, quantized, x_max })
+        Outcome::new(matrix, quantized, moment, options.activations)
     };
     let indexes = 0..graph.matrices.len();
     match options.budget {
@@ -260,12 +289,7 @@ fn allocate(tries: &[Vec<Outcome>], limit: f64, weights: usize) -> Result<Vec<us
     let error = |m: usize, choice: usize| tries[m][choice].error.unwrap_or(0.0);
     let mut chosen = vec![0; tries.len()];
     let mut bytes: usize = (0..tries.len()).map(|m| size(m, 0)).sum();
-    ensure!(
-        bytes as f64 <= limit,
-        "the budget is too small: 2 bits a weight with scales and padding take {bytes} bytes ({:.3} bits a weight), \
-         {limit:.0} bytes are allowed",
-        8.0 * bytes as f64 / weights as f64,
-    );
+    ensure!(bytes as f64 <= limit, BudgetTooSmall { bytes, limit, weights });
     loop {
         let mut best: Option<(f64, usize, usize, usize)> = None;
         for m in 0..tries.len() {

@@ -11,6 +11,7 @@ use actq_kernels::format::BlockShape;
 use actq_kernels::image::block_bytes;
 use anyhow::{Result, ensure};
 
+use super::BudgetTooSmall;
 use super::compact::Dimension;
 use crate::graph::{Graph, Matrix};
 
@@ -76,7 +77,8 @@ pub fn bytes(graph: &Graph, dimensions: &[Dimension], widths: &Widths) -> usize 
                 .filter(|(_, n)| *n > 0)
                 .collect();
             let all_rows = used.iter().map(|(_, n)| n).sum::<usize>() == widths[m].len();
-            let indexed = !sorted && !(used.len() == 1 && all_rows);
+            let one_width = used.len() == 1 && all_rows;
+            let indexed = !(sorted || one_width);
             used.iter()
                 .map(|&(width, rows)| block_bytes(BlockShape { width, rows, cols: kept_cols, group: 0 }, indexed))
                 .sum::<usize>()
@@ -91,10 +93,7 @@ pub fn allocate(graph: &Graph, dimensions: &[Dimension], rows: &[Rows], limit: f
     let largest = rows.iter().flat_map(|r| &r.energy).fold(1e-300f64, |m, e| m.max(*e));
     let (mut low, mut high) = ((largest * 1e-18).ln(), (largest * 10.0).ln());
     let least = bytes(graph, dimensions, &at(high.exp()));
-    ensure!(
-        least as f64 <= limit,
-        "the budget is too small: {limit:.0} bytes are allowed, at least {least} are needed"
-    );
+    ensure!(least as f64 <= limit, BudgetTooSmall { bytes: least, limit, weights: graph.weights() });
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
         if bytes(graph, dimensions, &at(middle.exp())) as f64 <= limit {
@@ -134,10 +133,11 @@ fn choose(graph: &Graph, dimensions: &[Dimension], rows: &[Rows], multiplier: f6
             })
             .collect();
         widths = next;
-        // A dimension keeps at least one element, so that no matrix becomes empty.
-        for dimension in dimensions {
-            if dimension.kept(&widths) == 0 {
-                widths[dimension.maker][0] = Some(Width::W2);
+        // A matrix without any rows would cut the actions off from the observations.
+        for (widths, rows) in widths.iter_mut().zip(rows) {
+            if widths.iter().all(Option::is_none) {
+                let most = (0..rows.energy.len()).max_by(|&a, &b| rows.energy[a].total_cmp(&rows.energy[b]));
+                widths[most.unwrap_or(0)] = Some(Width::W2);
             }
         }
     }

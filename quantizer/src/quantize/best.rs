@@ -1,6 +1,6 @@
 //! The pipeline: how much every row matters, a width for each to the budget, removal of what has none, and distillation.
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 
 use super::allocate::{Rows, allocate, energies, removals};
 use super::compact::{Dimension, compact, dimensions};
@@ -8,43 +8,73 @@ use super::distill::{Task, distill, loss};
 use super::moments::Moments;
 use super::sensitivity::{Side, importance, output_moments};
 use super::windows::Windows;
-use super::{Activations, Budget, Options, Outcome, Progress, Quantized};
+use super::{Activations, Budget, Options, Outcome, Quantized};
 use crate::backprop::{Network, Weights};
 use crate::dataset::Dataset;
 use crate::graph::Graph;
 use crate::random::Random;
 
-/// Steps of distillation: frames' and windows' networks.
+/// Frames that learning needs at least.
+const LEAST_FRAMES: usize = 200;
+/// Steps of distillation: of feed-forward and of recurrent networks.
 const STEPS: usize = 8000;
 const WINDOW_STEPS: usize = 1200;
 
-/// The network as it became, with its quantized matrices.
-#[derive(Clone, Debug)]
-pub struct Best {
-    /// Hidden elements without bits are gone, biases and norms have learned.
-    pub graph: Graph,
-    /// The matrices of `graph`.
-    pub outcomes: Vec<Outcome>,
+/// The seed of the statistics, which are the same for every budget.
+const SEED: u64 = 1;
+
+/// What the pipeline takes from the recorded observations, for any number of budgets.
+#[derive(Debug)]
+pub struct Statistics<'a> {
+    windows: Windows<'a>,
+    /// Importance of every matrix's columns; of its columns about their means; of its rows.
+    inputs: Vec<Vec<f64>>,
+    centred: Vec<Vec<f64>>,
+    outputs: Vec<Vec<f64>>,
+    /// Mean input of every matrix.
+    means: Vec<Vec<f64>>,
 }
 
-/// Quantizes a network on its recorded observations.
+impl<'a> Statistics<'a> {
+    /// Runs the f32 network over `dataset`, forwards and backwards. `moments` are those of the matrices' inputs.
+    pub fn collect(graph: &'a Graph, dataset: &Dataset, moments: &[Moments]) -> Result<Self> {
+        let frames = dataset.frames();
+        ensure!(
+            frames >= LEAST_FRAMES,
+            "{}: {frames} frames are recorded, {LEAST_FRAMES} are needed: learning from fewer repeats them by heart",
+            dataset.path.display()
+        );
+        let windows = Windows::new(graph, dataset);
+        ensure!(
+            windows.output_variance.iter().any(|v| *v > 0.0),
+            "{}: the policy gives the same action at every observation",
+            dataset.path.display()
+        );
+        let outputs = output_moments(&windows, SEED);
+        Ok(Self {
+            windows,
+            inputs: moments.iter().map(|m| importance(&m.second, Side::Input)).collect(),
+            centred: moments.iter().map(|m| importance(&m.centred(), Side::Input)).collect(),
+            outputs: outputs.iter().map(|g| importance(g, Side::Output)).collect(),
+            means: moments.iter().map(|m| m.mean.clone()).collect(),
+        })
+    }
+}
+
+/// Quantizes a network. Returns it as it became (hidden elements without bits are gone, biases and norms have learned) and its
+/// quantized matrices. `progress` gets the share done.
 pub fn quantize(
     graph: &Graph,
-    dataset: &Dataset,
-    moments: &[Moments],
+    statistics: &Statistics<'_>,
     options: &Options,
-    progress: &mut dyn FnMut(Progress),
-) -> Result<Best> {
-    progress(Progress::Sensitivity);
-    let windows = Windows::new(graph, dataset);
-    let inputs: Vec<Vec<f64>> = moments.iter().map(|m| importance(&m.second, Side::Input)).collect();
-    let outputs: Vec<Vec<f64>> =
-        output_moments(&windows, options.seed).iter().map(|g| importance(g, Side::Output)).collect();
+    mut progress: impl FnMut(f64),
+) -> Result<(Graph, Vec<Outcome>)> {
+    ensure!(options.group == 0, "best gives every row one scale; --group goes with the other methods");
+    let Statistics { windows, inputs, centred, outputs, means } = statistics;
     let (limit_bytes, forced) = match options.budget {
         Budget::Width(width) => (f64::INFINITY, Some(width)),
         Budget::BitsPerWeight(bits) => (bits * graph.weights() as f64 / 8.0, None),
     };
-    let centred: Vec<Vec<f64>> = moments.iter().map(|m| importance(&m.centred(), Side::Input)).collect();
     let dimensions = dimensions(graph);
     let rows: Vec<Rows> = graph
         .matrices
@@ -53,17 +83,16 @@ pub fn quantize(
         .map(|(m, matrix)| {
             let energy = energies(matrix, &inputs[m], &outputs[m]);
             let made = Dimension::made_by(&dimensions, m);
-            let removal = made.map_or_else(|| energy.clone(), |d| removals(graph, d, &centred, &outputs));
+            let removal = made.map_or_else(|| energy.clone(), |d| removals(graph, d, centred, outputs));
             Rows { energy, removal, forced }
         })
         .collect();
     let widths = allocate(graph, &dimensions, &rows, limit_bytes)?;
-    let means: Vec<Vec<f64>> = moments.iter().map(|m| m.mean.clone()).collect();
-    let compacted = compact(graph, &dimensions, &widths, &means);
+    let compacted = compact(graph, &dimensions, &widths, means);
     let importance: Vec<Vec<f64>> = compacted
         .columns
         .iter()
-        .zip(&inputs)
+        .zip(inputs)
         .map(|(columns, importance)| columns.iter().map(|&c| importance[c]).collect())
         .collect();
     let all = |limit: u16| vec![limit; graph.matrices.len()];
@@ -80,9 +109,9 @@ pub fn quantize(
         steps,
         seed: options.seed,
     };
-    let (quantized, graph) = distill(&task, &windows, |step, loss| progress(Progress::Distill(step, steps, loss)));
+    let (quantized, graph) = distill(&task, windows, |step| progress(step as f64 / steps as f64));
     let limits = match options.activations {
-        Activations::Auto => choose_activations(&graph, &quantized, &windows, options.seed),
+        Activations::Auto => choose_activations(&graph, &quantized, windows, options.seed),
         Activations::Int8 | Activations::Int16 => learned_with,
     };
     let outcomes = quantized
@@ -90,7 +119,7 @@ pub fn quantize(
         .zip(limits)
         .map(|(quantized, limit)| Ok(Outcome { x_max: quantized.x_max(limit)?, quantized, error: None }))
         .collect::<Result<_>>()?;
-    Ok(Best { graph, outcomes })
+    Ok((graph, outcomes))
 }
 
 /// An int16 input must lower the error by this share of it to be worth its slower kernel.

@@ -173,3 +173,77 @@ fn add_to_bias(graph: &mut Graph, matrix: usize, values: &[f32]) {
         bias.iter_mut().zip(values).for_each(|(b, v)| *b += v);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::graph::{Evaluator, Node};
+    use actq_kernels::math::Function;
+
+    /// 3 -> 5 tanh -> [2 and, through a residual sum, 5] with values that differ everywhere.
+    fn graph() -> Graph {
+        let mut graph = Graph::new(3);
+        let mut matrix = |rows: usize, cols: usize| {
+            let data = (0..rows * cols).map(|i| ((i * 7 + rows) as f32 * 0.37).sin()).collect();
+            graph.matrices.push(Matrix { name: "m".into(), rows, cols, data });
+        };
+        matrix(5, 3);
+        matrix(4, 5);
+        matrix(4, 4);
+        let bias = |n: usize| (0..n).map(|i| 0.1 * i as f32 - 0.2).collect();
+        graph.nodes = vec![
+            Node { kind: NodeKind::Linear { matrix: 0, bias: bias(5) }, input: 0, len: 5 },
+            Node { kind: NodeKind::Function(Function::Tanh), input: 1, len: 5 },
+            Node { kind: NodeKind::Linear { matrix: 1, bias: bias(4) }, input: 2, len: 4 },
+            Node { kind: NodeKind::Linear { matrix: 2, bias: bias(4) }, input: 3, len: 4 },
+            Node { kind: NodeKind::Add { with: 3 }, input: 4, len: 4 },
+        ];
+        graph
+    }
+
+    fn output(graph: &Graph) -> Vec<f32> {
+        Evaluator::new(graph).step(&[0.3, -0.7, 1.1], &mut |_, _| {})
+    }
+
+    #[test]
+    fn only_what_feeds_matrices_alone_is_a_dimension() {
+        // The second matrix's output is also summed, the third's is the network's output.
+        let expected = Dimension { maker: 0, consumers: vec![1], node: 0 };
+        assert_eq!(dimensions(&graph()), vec![expected]);
+    }
+
+    #[test]
+    fn sorting_by_width_changes_nothing() {
+        let graph = graph();
+        let widths = vec![
+            vec![Some(Width::W8), Some(Width::W2), Some(Width::W4), Some(Width::W2), Some(Width::W3)],
+            vec![Some(Width::W4); 4],
+            vec![Some(Width::W4); 4],
+        ];
+        let compacted = compact(&graph, &dimensions(&graph), &widths, &[vec![0.0; 3], vec![0.0; 5], vec![0.0; 4]]);
+        assert_eq!(compacted.columns[1], [1, 3, 4, 2, 0]);
+        assert!(compacted.widths[0].is_sorted());
+        for (a, b) in output(&graph).iter().zip(output(&compacted.graph)) {
+            assert!((a - b).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn a_removed_element_leaves_its_mean() {
+        let graph = graph();
+        let mut widths: Widths = graph.matrices.iter().map(|m| vec![Some(Width::W4); m.rows]).collect();
+        widths[0][2] = None;
+        // At this observation the removed element has exactly its mean, so nothing may change.
+        let mut hidden = Vec::new();
+        Evaluator::new(&graph).step(&[0.3, -0.7, 1.1], &mut |m, x| {
+            if m == 1 {
+                hidden = x.iter().map(|v| f64::from(*v)).collect();
+            }
+        });
+        let compacted = compact(&graph, &dimensions(&graph), &widths, &[vec![0.0; 3], hidden, vec![0.0; 4]]);
+        assert_eq!((compacted.graph.matrices[0].rows, compacted.graph.matrices[1].cols), (4, 4));
+        for (a, b) in output(&graph).iter().zip(output(&compacted.graph)) {
+            assert!((a - b).abs() < 1e-6);
+        }
+    }
+}

@@ -178,12 +178,8 @@ pub struct Task<'a> {
 }
 
 /// Learns codes, scales, biases and norms. Returns the quantized matrices, and puts biases and norms into `graph`. `progress` is
-/// called after each step with its number and the batch's loss (mean squared error over variance).
-pub fn distill(
-    task: &Task<'_>,
-    windows: &Windows<'_>,
-    mut progress: impl FnMut(usize, f32),
-) -> (Vec<Quantized>, Graph) {
+/// called after each step with its number.
+pub fn distill(task: &Task<'_>, windows: &Windows<'_>, mut progress: impl FnMut(usize)) -> (Vec<Quantized>, Graph) {
     let network = Network { graph: task.graph, x_max: task.x_max };
     let mut weights = Weights::of(task.graph);
     let mut latents: Vec<Latent> = weights
@@ -203,7 +199,7 @@ pub fn distill(
             latent.weights(weights);
         }
         let seeds: Vec<u64> = (0..SHARDS).map(|_| random.bits()).collect();
-        let shards: Vec<(Weights, f32)> = seeds
+        let shards: Vec<Weights> = seeds
             .into_par_iter()
             .map(|seed| {
                 let batch = windows.batch(size / SHARDS, true, &mut Random(seed));
@@ -211,10 +207,8 @@ pub fn distill(
             })
             .collect();
         let mut grads = weights.zeros_like();
-        let mut loss = 0.0;
-        for (shard, shard_loss) in &shards {
+        for shard in &shards {
             grads.add(shard);
-            loss += shard_loss / SHARDS as f32;
         }
         if windows.recurrent() {
             clip(&mut grads);
@@ -229,23 +223,23 @@ pub fn distill(
         }
         let by_vector = grads.vectors.iter().flatten().flatten().copied();
         adam_vectors.step(weights.vectors.iter_mut().flatten().flatten(), by_vector, RATE_VECTOR * fall, t);
-        progress(step + 1, loss);
+        progress(step + 1);
     }
     let mut graph = task.graph.clone();
     weights.store_vectors(&mut graph);
     (latents.iter().map(Latent::quantized).collect(), graph)
 }
 
-/// The loss's derivative by the (rounded) weights on a batch, and the loss.
-fn gradient(network: &Network<'_>, weights: &Weights, windows: &Windows<'_>, batch: Batch) -> (Weights, f32) {
-    let (passes, errors, loss) = run(network, weights, windows, batch);
+/// The loss's derivative by the (rounded) weights on a batch.
+fn gradient(network: &Network<'_>, weights: &Weights, windows: &Windows<'_>, batch: Batch) -> Weights {
+    let (passes, errors, _) = run(network, weights, windows, batch);
     let mut grads = weights.zeros_like();
     let samples = errors.first().map_or(0, Array2::nrows);
     let mut d_state = zero_state(network.graph, samples);
     for (pass, error) in passes.iter().zip(errors).rev() {
         network.backward(weights, pass, error, &mut d_state, &mut grads, &mut |_, _, _, _| {});
     }
-    (grads, loss)
+    grads
 }
 
 /// The mean over samples and outputs of squared error over variance, against the f32 network.

@@ -82,7 +82,7 @@ mod tests {
         // Inputs of 8 hidden causes.
         let mixing = DMatrix::from_fn(cols, 8, |_, _| noise(&mut seed));
         let x = mixing * DMatrix::from_fn(8, 400, |_, _| noise(&mut seed));
-        let moments = Moments { second: &x * x.transpose() / 400.0, count: 400 };
+        let moments = Moments { second: &x * x.transpose() / 400.0, mean: vec![0.0; cols], count: 400 };
         for width in [Width::W2, Width::W3, Width::W4] {
             for group in [0, 32] {
                 let error = |q: &Quantized| moments::relative_error(&matrix, &q.dequantized(), Some(&moments));
@@ -98,7 +98,7 @@ mod tests {
         let mut seed = 3;
         let matrix =
             Matrix { name: "w".into(), rows: 5, cols: 20, data: (0..100).map(|_| noise(&mut seed) as f32).collect() };
-        let moments = Moments { second: DMatrix::identity(20, 20), count: 1 };
+        let moments = Moments { second: DMatrix::identity(20, 20), mean: vec![0.0; 20], count: 1 };
         let gptq = quantize(&matrix, Width::W3, 0, &moments).expect("positive definite");
         assert_eq!(gptq.codes, scale::round_to_nearest(&matrix, Width::W3, 0).codes);
     }

@@ -54,10 +54,12 @@ pub struct Scales {
 }
 
 impl Scales {
-    /// Fits the scales of every row, or of every group of every row.
+    /// Fits the scales of every row, or of every group of every row. `importance` has an entry per column, or one per weight, or
+    /// none.
     pub fn fit(matrix: &Matrix, width: Width, group: usize, importance: &[f64]) -> Self {
         let mut scales = Self { group, rows: Vec::new(), groups: Vec::new() };
-        for row in matrix.data.chunks_exact(matrix.cols) {
+        for (r, row) in matrix.data.chunks_exact(matrix.cols).enumerate() {
+            let importance = if importance.len() > matrix.cols { &importance[r * matrix.cols..] } else { importance };
             if group == 0 {
                 scales.rows.push(bf16::from_f32(fit(row, importance, width)));
                 continue;
@@ -97,13 +99,17 @@ impl Scales {
 
 /// Rounds every weight to the nearest level of its scale.
 pub fn round_to_nearest(matrix: &Matrix, width: Width, group: usize) -> Quantized {
-    let scales = Scales::fit(matrix, width, group, &[]);
+    round_to(matrix, width, Scales::fit(matrix, width, group, &[]))
+}
+
+/// Rounds every weight to the nearest level of these scales.
+pub fn round_to(matrix: &Matrix, width: Width, scales: Scales) -> Quantized {
     let codes =
         matrix.data.iter().enumerate().map(|(i, &w)| scales.code(width, i / matrix.cols, i % matrix.cols, w)).collect();
     Quantized {
         rows: matrix.rows,
         cols: matrix.cols,
-        group,
+        group: scales.group,
         widths: vec![Some(width); matrix.rows],
         scales: scales.rows,
         group_scales: scales.groups,

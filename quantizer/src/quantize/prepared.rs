@@ -1,0 +1,64 @@
+//! A method with all that it needs to know about the recorded observations.
+
+use anyhow::{Result, ensure};
+
+use super::actquant::Statistics;
+use super::moments::{Moments, collect};
+use super::{Method, Options, Outcome, actquant, best, quantize};
+use crate::dataset::Dataset;
+use crate::policy::Policy;
+
+/// A method made ready once, to quantize a policy for any number of budgets.
+#[derive(Debug)]
+pub struct Prepared<'a> {
+    policy: &'a Policy,
+    method: Method,
+    /// Of every matrix's input; empty where the method needs none.
+    moments: Vec<Moments>,
+    /// Of ActQuant; otherwise `None`.
+    pub actquant: Option<Statistics>,
+    /// What best learns from; otherwise `None`.
+    best: Option<best::Statistics<'a>>,
+}
+
+impl<'a> Prepared<'a> {
+    /// Reads `calib.npz` of the policy's folder if the method needs it, and collects. `progress` gets the share done.
+    pub fn new(policy: &'a Policy, method: Method, mut progress: impl FnMut(f64)) -> Result<Self> {
+        let graph = &policy.graph;
+        let calib = || -> Result<Dataset> {
+            let path = policy.dir.join("calib.npz");
+            ensure!(path.exists(), "{method} needs recorded observations: put calib.npz beside policy.json");
+            Dataset::load(&path, graph.obs_len, policy.chunk * policy.act_len)
+        };
+        let mut prepared = Self { policy, method, moments: Vec::new(), actquant: None, best: None };
+        match method {
+            Method::Rtn => {}
+            Method::Gptq | Method::Best => {
+                let dataset = calib()?;
+                let all = dataset.frames().max(1) as f64;
+                prepared.moments = collect(graph, &dataset, |frames| progress(frames as f64 / all));
+                if method == Method::Best {
+                    prepared.best = Some(best::Statistics::collect(graph, &dataset, &prepared.moments)?);
+                }
+            }
+            Method::ActQuant => prepared.actquant = Some(Statistics::collect(graph, &calib()?, progress)?),
+        }
+        Ok(prepared)
+    }
+
+    /// Quantizes the policy: the policy as it became (its graph may have lost elements, its biases may have learned), and its
+    /// matrices. `options.method` is the one that was prepared. `progress` gets the share done.
+    pub fn quantize(&self, options: &Options, progress: impl FnMut(f64)) -> Result<(Policy, Vec<Outcome>)> {
+        let graph = &self.policy.graph;
+        ensure!(options.method == self.method, "prepared for {}, not for {}", self.method, options.method);
+        if let Some(statistics) = &self.best {
+            let (graph, outcomes) = best::quantize(graph, statistics, options, progress)?;
+            return Ok((Policy { graph, ..self.policy.clone() }, outcomes));
+        }
+        let outcomes = match &self.actquant {
+            Some(statistics) => actquant::quantize(graph, statistics, options)?,
+            None => quantize(graph, &self.moments, options)?,
+        };
+        Ok((self.policy.clone(), outcomes))
+    }
+}

@@ -1,0 +1,207 @@
+//! The error of several methods at several budgets, as a table, as JSON and as a plot.
+
+use std::path::Path;
+
+use anyhow::Result;
+use comfy_table::Table;
+use serde::Serialize;
+
+use crate::plot::{Mark, Plot, Series};
+use crate::policy::Policy;
+use crate::quantize::actquant::score::Score;
+use crate::quantize::prepared::Prepared;
+use crate::quantize::{Budget, BudgetTooSmall, Method, Options};
+use crate::runtime::ImageBuffer;
+use crate::{eval, inspect, writer};
+
+/// One image.
+#[derive(Clone, Debug, Serialize)]
+pub struct Point {
+    /// Bits per weight that were allowed.
+    pub budget: f64,
+    /// Errors, true bits per weight, bytes.
+    #[serde(flatten)]
+    pub report: eval::Report,
+    /// The widths that occur in each matrix.
+    pub bits: Vec<Vec<u32>>,
+}
+
+/// One method at all budgets.
+#[derive(Clone, Debug, Serialize)]
+pub struct Curve {
+    /// The method's name.
+    pub method: String,
+    /// One per budget; `None` where the budget is too small for the method.
+    pub points: Vec<Option<Point>>,
+    /// ActQuant's scores, per matrix.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scores: Option<Vec<Score>>,
+}
+
+/// The point of the best method beyond which a further bit gains least.
+#[derive(Clone, Debug, Serialize)]
+pub struct Knee {
+    /// The method.
+    pub method: String,
+    /// True bits per weight.
+    pub bpw: f64,
+    /// Its error.
+    pub nmse: f64,
+}
+
+/// All of it.
+#[derive(Clone, Debug, Serialize)]
+pub struct Sweep {
+    /// The policy's name.
+    pub policy: String,
+    /// The names of its matrices.
+    pub matrices: Vec<String>,
+    /// Bits per weight that were allowed.
+    pub budgets: Vec<f64>,
+    /// One per method.
+    pub curves: Vec<Curve>,
+    /// See [`knee`].
+    pub knee: Option<Knee>,
+}
+
+/// Quantizes `policy` by every method for every budget and runs each image over the folder's `heldout.npz`. `progress` gets what
+/// is being done and the share of the whole that is done.
+pub fn run(policy: &Policy, methods: &[Method], budgets: &[f64], mut progress: impl FnMut(&str, f64)) -> Result<Sweep> {
+    let mut curves = Vec::new();
+    for (m, &method) in methods.iter().enumerate() {
+        // Calibration counts as much as one budget.
+        let done = |steps: f64| (m as f64 + steps / (1 + budgets.len()) as f64) / methods.len() as f64;
+        let prepared = Prepared::new(policy, method, |share| progress(&format!("{method}, calibrating"), done(share)))?;
+        let mut points = Vec::new();
+        for (b, &budget) in budgets.iter().enumerate() {
+            let work = format!("{method}, {budget} bits per weight");
+            points
+                .push(point(policy, &prepared, method, budget, |share| progress(&work, done(1.0 + b as f64 + share)))?);
+        }
+        let scores = prepared.actquant.map(|statistics| statistics.scores);
+        curves.push(Curve { method: method.to_string(), points, scores });
+    }
+    let knee = knee(&curves);
+    let matrices = policy.graph.matrices.iter().map(|m| m.name.clone()).collect();
+    Ok(Sweep { policy: policy.name.clone(), matrices, budgets: budgets.to_vec(), curves, knee })
+}
+
+fn point(
+    policy: &Policy,
+    prepared: &Prepared<'_>,
+    method: Method,
+    budget: f64,
+    progress: impl FnMut(f64),
+) -> Result<Option<Point>> {
+    let options = Options { group: method.default_group(), ..Options::new(method, Budget::BitsPerWeight(budget)) };
+    let (quantized, outcomes) = match prepared.quantize(&options, progress) {
+        Ok(found) => found,
+        Err(error) if error.is::<BudgetTooSmall>() => return Ok(None),
+        Err(error) => return Err(error),
+    };
+    let buffer = ImageBuffer::new(&writer::image(&quantized, &outcomes)?);
+    let image = buffer.image(Path::new("image in memory"))?;
+    let report = eval::evaluate(image, &eval::heldout(&policy.dir, &image)?)?;
+    let bits = outcomes
+        .iter()
+        .map(|outcome| outcome.quantized.blocks().iter().map(|(shape, _)| shape.width.bits()).collect())
+        .collect();
+    Ok(Some(Point { budget, report, bits }))
+}
+
+/// The knee of the best method.
+///
+/// The best method has the lowest error at most budgets; among equals, the one named first. Its knee is the point furthest below
+/// the chord from its first point to its last, in log error over true bits per weight: up to there a bit gains more than on
+/// average, after it less. `None` where no point is below the chord.
+pub fn knee(curves: &[Curve]) -> Option<Knee> {
+    let budgets = curves.iter().map(|c| c.points.len()).max()?;
+    let mut wins = vec![0; curves.len()];
+    for budget in 0..budgets {
+        let error = |c: usize| Some((c, curves[c].points.get(budget)?.as_ref()?.report.nmse));
+        if let Some((best, _)) = (0..curves.len()).filter_map(error).min_by(|a, b| a.1.total_cmp(&b.1)) {
+            wins[best] += 1;
+        }
+    }
+    let best = (0..curves.len()).rev().max_by_key(|&c| wins[c])?;
+    let line = line(&curves[best]);
+    let (&(x0, y0), &(x1, y1)) = (line.first()?, line.last()?);
+    let below = |&(x, y): &(f64, f64)| y0.ln() + (y1 / y0).ln() * (x - x0) / (x1 - x0) - y.ln();
+    let (depth, (bpw, nmse)) = line.iter().map(|point| (below(point), *point)).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (depth > 1e-9).then(|| Knee { method: curves[best].method.clone(), bpw, nmse })
+}
+
+/// True bits per weight and error of a curve's points, from few bits to many, each image once. An error of 0 has no logarithm;
+/// it counts as the smallest that f32 actions can show.
+fn line(curve: &Curve) -> Vec<(f64, f64)> {
+    let mut line: Vec<(f64, f64)> =
+        curve.points.iter().flatten().map(|p| (p.report.bpw, p.report.nmse.max(1e-14))).collect();
+    line.sort_by(|a, b| a.0.total_cmp(&b.0));
+    line.dedup();
+    line
+}
+
+impl Sweep {
+    /// One row per budget, one column per method: error and true bits per weight.
+    pub fn table(&self) -> Table {
+        let header: Vec<&str> = [""].into_iter().chain(self.curves.iter().map(|c| c.method.as_str())).collect();
+        let mut table = inspect::table(&header);
+        for (b, budget) in self.budgets.iter().enumerate() {
+            let cell = |curve: &Curve| match &curve.points[b] {
+                Some(point) => format!("{:.2e} at {:.3}", point.report.nmse, point.report.bpw),
+                None => "-".to_owned(),
+            };
+            table.add_row([format!("{budget} bits")].into_iter().chain(self.curves.iter().map(cell)));
+        }
+        table
+    }
+
+    /// Error over true bits per weight, a line per method.
+    pub fn svg(&self) -> String {
+        let series = |curve: &Curve| Series { name: curve.method.clone(), points: line(curve) };
+        Plot {
+            title: format!("{}: action error over bits per weight", self.policy),
+            x_label: "bits per weight, everything counted".to_owned(),
+            y_label: "NMSE of the actions, held-out observations".to_owned(),
+            series: self.curves.iter().map(series).collect(),
+            mark: self.knee.as_ref().map(|knee| Mark {
+                at: (knee.bpw, knee.nmse),
+                label: format!("knee: {:.2} bits, NMSE {:.2e}", knee.bpw, knee.nmse),
+            }),
+        }
+        .svg()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn curve(method: &str, points: &[(f64, f64)]) -> Curve {
+        let point = |&(bpw, nmse): &(f64, f64)| {
+            let report =
+                eval::Report { nmse, worst_nmse: nmse, max_abs: 0.0, steps: 1, bpw, bytes: 1, worst_dimension: 0 };
+            (nmse > 0.0).then_some(Point { budget: bpw, report, bits: Vec::new() })
+        };
+        Curve { method: method.to_owned(), points: points.iter().map(point).collect(), scores: None }
+    }
+
+    #[test]
+    fn the_knee_is_where_the_best_curve_bends() {
+        let worse = curve("worse", &[(2.0, 0.9), (2.5, 0.8), (3.0, 0.5), (4.0, 1e-4)]);
+        let better = curve("better", &[(2.0, 0.5), (2.5, 0.01), (3.0, 0.006), (4.0, 0.003)]);
+        let found = knee(&[worse.clone(), better]).expect("a knee");
+        assert_eq!((found.method.as_str(), found.bpw), ("better", 2.5));
+        assert!(knee(&[worse]).is_none(), "a curve above its chord has no knee");
+        assert!(knee(&[]).is_none());
+        assert!(knee(&[curve("one", &[(3.0, 0.1)])]).is_none());
+    }
+
+    #[test]
+    fn a_budget_that_is_too_small_leaves_a_dash() {
+        let curves = vec![curve("a", &[(2.0, 0.0), (3.0, 0.1)])];
+        let sweep = Sweep { policy: "p".into(), matrices: Vec::new(), budgets: vec![2.0, 3.0], curves, knee: None };
+        let text = sweep.table().to_string();
+        assert!(text.contains('-') && text.contains("1.00e-1 at 3.000"), "{text}");
+    }
+}
