@@ -9,6 +9,7 @@ use actq::quantize::{Budget, BudgetTooSmall, Method, Options};
 use actq::runtime::ImageBuffer;
 use actq::writer;
 use actq_host_tests::{root, shared_policies};
+use actq_kernels::Width;
 use anyhow::Result;
 
 fn ur3() -> PathBuf {
@@ -60,11 +61,37 @@ fn the_image_does_not_depend_on_the_number_of_threads() -> Result<()> {
 }
 
 #[test]
+fn an_image_fits_the_flash_that_it_is_given() -> Result<()> {
+    let policy = Policy::load(&ur3())?;
+    let prepared = Prepared::new(&policy, Method::Best, |_| {})?;
+    for bytes in [64 << 10, 96 << 10, 200 << 10] {
+        let options = Options { budget: Budget::ImageBytes(bytes), ..best(1.0, 2) };
+        let len = image(&prepared, &options)?.len();
+        assert!(len <= bytes && len > bytes - bytes / 10, "{len} for {bytes}");
+    }
+    let tiny = Options { budget: Budget::ImageBytes(1000), ..best(1.0, 2) };
+    assert!(image(&prepared, &tiny).is_err());
+    Ok(())
+}
+
+#[test]
+fn a_forced_width_reaches_every_row() -> Result<()> {
+    let policy = Policy::load(&ur3())?;
+    let prepared = Prepared::new(&policy, Method::Best, |_| {})?;
+    let forced = |name: &str| Options { forced: vec![(name.into(), Width::W4)], ..best(2.0, 2) };
+    let (_, outcomes) = prepared.quantize(&forced("out.weight"), |_| {})?;
+    let out = policy.graph.matrices.iter().position(|m| m.name == "out.weight");
+    assert!(out.is_some_and(|m| outcomes[m].quantized.widths.iter().all(|w| *w == Some(Width::W4))));
+    assert!(prepared.quantize(&forced("no.such"), |_| {}).is_err());
+    Ok(())
+}
+
+#[test]
 fn another_seed_gives_another_image() -> Result<()> {
     let policy = Policy::load(&ur3())?;
     let prepared = Prepared::new(&policy, Method::Best, |_| {})?;
     let options = best(2.0, 5);
-    assert_ne!(image(&prepared, &options)?, image(&prepared, &Options { seed: 2, ..options })?);
+    assert_ne!(image(&prepared, &options)?, image(&prepared, &Options { seed: 2, ..options.clone() })?);
     Ok(())
 }
 
@@ -74,7 +101,7 @@ fn halves_gptq(dir: &Path, steps: usize) -> Result<()> {
     let policy = Policy::load(dir)?;
     let prepared = Prepared::new(&policy, Method::Best, |_| {})?;
     let gptq = Prepared::new(&policy, Method::Gptq, |_| {})?;
-    for (bits, width) in [(3.0, actq_kernels::Width::W3), (2.0, actq_kernels::Width::W2)] {
+    for (bits, width) in [(3.0, Width::W3), (2.0, Width::W2)] {
         let ours = report(dir, &image(&prepared, &best(bits, steps))?)?;
         let theirs = report(dir, &image(&gptq, &Options::new(Method::Gptq, Budget::Width(width)))?)?;
         assert!(ours.bpw < theirs.bpw);

@@ -83,6 +83,15 @@ struct QuantizeArgs {
     /// Bits per weight of the whole, scales and padding counted; each matrix gets a width
     #[arg(long, value_name = "X", value_parser = positive)]
     bpw: Option<f64>,
+    /// Bytes of the whole image, as 98304 or 96K
+    #[arg(long, value_name = "SIZE", conflicts_with_all = ["bits", "bpw"], value_parser = size)]
+    flash: Option<usize>,
+    /// Force the width of a matrix, by its tensor's name (method best); may be repeated
+    #[arg(long, value_name = "NAME=BITS", value_parser = forced)]
+    width: Vec<(String, Width)>,
+    /// Keep a matrix at 8 bits (method best); may be repeated
+    #[arg(long, value_name = "NAME")]
+    protect: Vec<String>,
     /// Columns that share a u8 scale: 32, 64 or 128; 0 = one scale a row [default: 32 for rtn and actquant,
     /// 0 for gptq and best]
     #[arg(long, value_name = "N", value_parser = group)]
@@ -160,6 +169,20 @@ fn width(text: &str) -> Result<Width, String> {
     known.ok_or_else(|| "weights have 2, 3, 4 or 8 bits".to_owned())
 }
 
+fn forced(text: &str) -> Result<(String, Width), String> {
+    let (name, bits) = text.split_once('=').ok_or_else(|| "the form is NAME=BITS".to_owned())?;
+    Ok((name.to_owned(), width(bits)?))
+}
+
+fn size(text: &str) -> Result<usize, String> {
+    let (digits, unit) = match text.strip_suffix(['K', 'k']) {
+        Some(digits) => (digits, 1024),
+        None => (text, 1),
+    };
+    let bytes = digits.parse().ok().and_then(|n: usize| n.checked_mul(unit)).filter(|n| *n > 0);
+    bytes.ok_or_else(|| "a size is a number of bytes, or of KiB with a K behind it".to_owned())
+}
+
 fn group(text: &str) -> Result<usize, String> {
     let known = text.parse().ok().filter(|g| matches!(g, 0 | 32 | 64 | 128));
     known.ok_or_else(|| "groups have 32, 64 or 128 columns, or 0 for none".to_owned())
@@ -227,10 +250,12 @@ fn run_quantize(args: &QuantizeArgs) -> Result<()> {
         None if group > 0 => Method::Gptq,
         None => Method::Best,
     };
-    let budget = match (args.bits, args.bpw) {
-        (_, Some(bpw)) => Budget::BitsPerWeight(bpw),
-        (bits, None) => Budget::Width(bits.unwrap_or(Width::W3)),
+    let budget = match (args.bits, args.bpw, args.flash) {
+        (_, Some(bpw), _) => Budget::BitsPerWeight(bpw),
+        (.., Some(bytes)) => Budget::ImageBytes(bytes),
+        (bits, ..) => Budget::Width(bits.unwrap_or(Width::W3)),
     };
+    let protected = args.protect.iter().map(|name| (name.clone(), Width::W8));
     let options = Options {
         group: args.group.unwrap_or(method.default_group()),
         activations: match args.activations {
@@ -240,6 +265,7 @@ fn run_quantize(args: &QuantizeArgs) -> Result<()> {
         },
         steps: args.steps,
         seed: args.seed,
+        forced: args.width.iter().cloned().chain(protected).collect(),
         ..Options::new(method, budget)
     };
     rayon::ThreadPoolBuilder::new().num_threads(args.threads).build_global().context("threads cannot be started")?;
@@ -319,8 +345,8 @@ fn scores(graph: &Graph, statistics: &Statistics, budget: Budget, outcomes: &[Ou
     }
     let note = match budget {
         Budget::Width(_) => "One width for all: the scores are not used.",
-        Budget::BitsPerWeight(_) if equal => "No score is above 0: every matrix counts the same.",
-        Budget::BitsPerWeight(_) => "Scores below 0 count as 0.",
+        _ if equal => "No score is above 0: every matrix counts the same.",
+        _ => "Scores below 0 count as 0.",
     };
     format!("{rows}\n{note}\n\n")
 }

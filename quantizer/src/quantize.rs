@@ -87,6 +87,20 @@ pub enum Budget {
     Width(Width),
     /// The widths that keep the whole below this many bits per weight, everything counted.
     BitsPerWeight(f64),
+    /// The widths that keep the whole image within this many bytes.
+    ImageBytes(usize),
+}
+
+impl Budget {
+    /// Bytes that the weights may take; infinite where the width is given. [`prepared::Prepared::quantize`] has turned image bytes
+    /// into bits per weight.
+    fn weight_bytes(self, graph: &Graph) -> f64 {
+        match self {
+            Self::Width(_) => f64::INFINITY,
+            Self::BitsPerWeight(bits) => bits * graph.weights() as f64 / 8.0,
+            Self::ImageBytes(bytes) => bytes as f64,
+        }
+    }
 }
 
 /// The error of a budget that not even the narrowest widths keep.
@@ -115,7 +129,7 @@ impl fmt::Display for BudgetTooSmall {
 impl std::error::Error for BudgetTooSmall {}
 
 /// What to quantize to.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Options {
     /// How codes are chosen.
     pub method: Method,
@@ -129,12 +143,14 @@ pub struct Options {
     pub steps: Option<usize>,
     /// Seed of everything that is drawn.
     pub seed: u64,
+    /// Matrices, by their tensors' names, whose rows all get a certain width (method best).
+    pub forced: Vec<(String, Width)>,
 }
 
 impl Options {
     /// A method and a budget, one scale a row, everything else as it suits the method.
     pub fn new(method: Method, budget: Budget) -> Self {
-        Self { method, budget, group: 0, activations: Activations::Auto, steps: None, seed: 1 }
+        Self { method, budget, group: 0, activations: Activations::Auto, steps: None, seed: 1, forced: Vec::new() }
     }
 }
 
@@ -273,10 +289,10 @@ pub fn quantize(graph: &Graph, moments: &[Moments], options: &Options) -> Result
     let indexes = 0..graph.matrices.len();
     match options.budget {
         Budget::Width(width) => indexes.map(|i| one(i, width)).collect(),
-        Budget::BitsPerWeight(limit) => {
+        Budget::BitsPerWeight(_) | Budget::ImageBytes(_) => {
             let tries: Vec<Vec<Outcome>> =
                 indexes.map(|i| Width::ALL.into_iter().map(|width| one(i, width)).collect()).collect::<Result<_>>()?;
-            let chosen = allocate(&tries, limit * graph.weights() as f64 / 8.0, graph.weights())?;
+            let chosen = allocate(&tries, options.budget.weight_bytes(graph), graph.weights())?;
             Ok(tries.into_iter().zip(chosen).map(|(mut tries, choice)| tries.swap_remove(choice)).collect())
         }
     }

@@ -59,8 +59,8 @@ impl Statistics {
 pub fn quantize(graph: &Graph, statistics: &Statistics, options: &Options) -> Result<Vec<Outcome>> {
     let widths = match options.budget {
         Budget::Width(width) => vec![width; graph.matrices.len()],
-        Budget::BitsPerWeight(bpw) => {
-            let limit = bpw * graph.weights() as f64 / 8.0;
+        Budget::BitsPerWeight(_) | Budget::ImageBytes(_) => {
+            let limit = options.budget.weight_bytes(graph);
             allocation::allocate(graph, &statistics.effective_scores().0, options.group, limit)?
         }
     };

@@ -11,7 +11,7 @@ use super::windows::Windows;
 use super::{Activations, Budget, Options, Outcome, Quantized};
 use crate::backprop::{Network, Weights};
 use crate::dataset::Dataset;
-use crate::graph::Graph;
+use crate::graph::{Graph, Matrix};
 use crate::random::Random;
 
 /// Frames that learning needs at least.
@@ -71,9 +71,13 @@ pub fn quantize(
 ) -> Result<(Graph, Vec<Outcome>)> {
     ensure!(options.group == 0, "best gives every row one scale; --group goes with the other methods");
     let Statistics { windows, inputs, centred, outputs, means } = statistics;
-    let (limit_bytes, forced) = match options.budget {
-        Budget::Width(width) => (f64::INFINITY, Some(width)),
-        Budget::BitsPerWeight(bits) => (bits * graph.weights() as f64 / 8.0, None),
+    for (name, _) in &options.forced {
+        let names = || graph.matrices.iter().map(|m| m.name.as_str()).collect::<Vec<_>>().join(", ");
+        ensure!(graph.matrices.iter().any(|m| m.name == *name), "no matrix is named {name:?}; there are {}", names());
+    }
+    let forced = |matrix: &Matrix| match options.budget {
+        Budget::Width(width) => Some(width),
+        _ => options.forced.iter().find(|(name, _)| *name == matrix.name).map(|(_, width)| *width),
     };
     let dimensions = dimensions(graph);
     let rows: Vec<Rows> = graph
@@ -84,10 +88,10 @@ pub fn quantize(
             let energy = energies(matrix, &inputs[m], &outputs[m]);
             let made = Dimension::made_by(&dimensions, m);
             let removal = made.map_or_else(|| energy.clone(), |d| removals(graph, d, centred, outputs));
-            Rows { energy, removal, forced }
+            Rows { energy, removal, forced: forced(matrix) }
         })
         .collect();
-    let widths = allocate(graph, &dimensions, &rows, limit_bytes)?;
+    let widths = allocate(graph, &dimensions, &rows, options.budget.weight_bytes(graph))?;
     let compacted = compact(graph, &dimensions, &widths, means);
     let importance: Vec<Vec<f64>> = compacted
         .columns

@@ -1,12 +1,14 @@
 //! A method with all that it needs to know about the recorded observations.
 
+use actq_kernels::Width;
 use anyhow::{Result, ensure};
 
 use super::actquant::Statistics;
 use super::moments::{Moments, collect};
-use super::{Method, Options, Outcome, actquant, best, quantize};
+use super::{Budget, Method, Options, Outcome, actquant, best, quantize};
 use crate::dataset::Dataset;
 use crate::policy::Policy;
+use crate::writer;
 
 /// A method made ready once, to quantize a policy for any number of budgets.
 #[derive(Debug)]
@@ -51,6 +53,15 @@ impl<'a> Prepared<'a> {
     pub fn quantize(&self, options: &Options, progress: impl FnMut(f64)) -> Result<(Policy, Vec<Outcome>)> {
         let graph = &self.policy.graph;
         ensure!(options.method == self.method, "prepared for {}, not for {}", self.method, options.method);
+        ensure!(
+            options.forced.is_empty() || self.method == Method::Best,
+            "widths of single matrices go with method best, not with {}",
+            self.method
+        );
+        let options = &match options.budget {
+            Budget::ImageBytes(bytes) => Options { budget: self.within_image(bytes)?, ..options.clone() },
+            _ => options.clone(),
+        };
         if let Some(statistics) = &self.best {
             let (graph, outcomes) = best::quantize(graph, statistics, options, progress)?;
             return Ok((Policy { graph, ..self.policy.clone() }, outcomes));
@@ -60,5 +71,15 @@ impl<'a> Prepared<'a> {
             None => quantize(graph, &self.moments, options)?,
         };
         Ok((self.policy.clone(), outcomes))
+    }
+
+    /// The budget for the weights that leaves room for everything else in an image of `bytes` bytes.
+    fn within_image(&self, bytes: usize) -> Result<Budget> {
+        let policy = self.policy;
+        let plain = quantize(&policy.graph, &[], &Options::new(Method::Rtn, Budget::Width(Width::W2)))?;
+        let weights: usize = plain.iter().map(|m| m.quantized.bytes()).sum();
+        let rest = writer::image(policy, &plain)?.len() - weights;
+        ensure!(bytes > rest, "{bytes} bytes are allowed, but all but the weights already takes {rest}");
+        Ok(Budget::BitsPerWeight(8.0 * (bytes - rest) as f64 / policy.graph.weights().max(1) as f64))
     }
 }
