@@ -13,5 +13,6 @@ pub fn root() -> &'static Path {
 
 /// The folder of shared policies, where `ACTQ_SHARED` names it: tests on them run only then.
 pub fn shared_policies() -> Option<PathBuf> {
-    Some(PathBuf::from(std::env::var_os("ACTQ_SHARED")?).join("policies"))
+    let folder = std::env::var_os("ACTQ_SHARED").filter(|folder| !folder.is_empty())?;
+    Some(PathBuf::from(folder).join("policies"))
 }
