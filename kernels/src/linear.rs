@@ -1,16 +1,16 @@
 //! A quantized matrix times a vector, from f32 to f32: the order of operations that every machine follows.
 //!
-//! 1. `x` is quantized to integers `q` with one scale ([`crate::activations::quantize`]).
+//! 1. `x` is quantized to integers `q` with one scale ([`crate::activations::Scale`]).
 //! 2. Per row, the integer sum `acc = sum_g s_g * sum_c level * q` in int32 ([`crate::gemv`]).
 //! 3. `y = start + acc * (row_scale * x_scale)`, each operation rounded to f32, where `start` is the bias, or, where the
 //!    operation accumulates, the sum of the old `y` and the bias. Rows that no block holds (0 bits) keep `start`.
 
-use crate::activations::{self, NotFinite, Prepared};
-use crate::format::{Block, QUAD};
+use crate::activations::{NotFinite, Prepared, Scale, max_prepared_words, prepared_words};
+use crate::format::{Block, Lanes, STRIP};
 use crate::gemv::gemv;
 
-/// Quads whose sums stand on the stack at once.
-const CHUNK: usize = 8;
+/// Rows whose sums stand on the stack at once.
+const RUN: usize = 8 * STRIP;
 
 /// A matrix in an image: blocks of rows and a bias.
 #[derive(Clone, Copy, Debug)]
@@ -37,10 +37,11 @@ pub struct RowBlock<'a> {
     /// The packed codes.
     pub block: Block<'a>,
     /// bf16 row scales, two a word.
-    pub(crate) scales: &'a [u32],
+    pub scales: &'a [u32],
     /// u16 output indexes, two a word; empty where the rows follow each other from `first_row` on.
-    pub(crate) index: &'a [u32],
-    pub(crate) first_row: usize,
+    pub index: &'a [u32],
+    /// The output index of the first row, where there is no index.
+    pub first_row: usize,
 }
 
 /// Half `i` of a run of packed u16.
@@ -63,37 +64,71 @@ impl RowBlock<'_> {
     pub fn output(&self, i: usize) -> usize {
         if self.index.is_empty() { self.first_row + i } else { half_word(self.index, i) as usize }
     }
+
+    /// Adds the rows' products with a vector that was prepared for the block to their places in `y`; what is missing in `y`
+    /// is left out.
+    pub fn accumulate(&self, x: &Prepared<'_>, x_scale: Scale, y: &mut [f32]) {
+        let shape = self.block.shape();
+        let mut sums = [0; RUN];
+        for first in (0..shape.padded_rows()).step_by(RUN) {
+            let acc = &mut sums[..RUN.min(shape.padded_rows() - first)];
+            if gemv(&self.block, x, first, acc).is_err() {
+                return;
+            }
+            let acc = &acc[..acc.len().min(shape.rows - first)];
+            let done = self.scale_add(first, acc, x_scale, y);
+            for (i, acc) in (first..).zip(acc).skip(done) {
+                if let Some(y) = y.get_mut(self.output(i)) {
+                    *y += *acc as f32 * (self.scale(i) * x_scale.get());
+                }
+            }
+        }
+    }
+
+    /// Does the same to the rows from `first` on, as many as the backend can; returns how many those are.
+    #[cfg(actq_fpu)]
+    fn scale_add(&self, first: usize, acc: &[i32], x_scale: Scale, y: &mut [f32]) -> usize {
+        match (self.scales.get(first / 2..), y.get_mut(self.first_row + first..)) {
+            (Some(scales), Some(y)) if self.index.is_empty() => {
+                crate::armv7em::scale_add(acc, scales, x_scale.get(), y)
+            }
+            _ => 0,
+        }
+    }
+
+    #[cfg(not(actq_fpu))]
+    fn scale_add(&self, _first: usize, _acc: &[i32], _x_scale: Scale, _y: &mut [f32]) -> usize {
+        0
+    }
 }
 
 impl Matrix<'_> {
-    /// Words that the prepared activations take.
+    /// The lanes of the matrix's blocks.
+    pub const fn lanes(&self) -> Lanes {
+        Lanes::of(self.x_max, self.group)
+    }
+
+    /// Words that the prepared activations take at most.
     pub fn prepared_words(&self) -> usize {
-        activations::prepared_words(self.cols, self.group)
+        max_prepared_words(self.cols, self.group)
     }
 
     /// `y = W x + b`, or `y = y + b + W x` where `accumulate`. `work` holds at least [`Self::prepared_words`] words; `x` and
     /// `y` have the matrix's lengths (what is missing is left out).
     pub fn apply(&self, x: &[f32], work: &mut [u32], y: &mut [f32], accumulate: bool) -> Result<(), NotFinite> {
-        let Some(work) = work.get_mut(..self.prepared_words()) else { return Ok(()) };
-        let x_scale = activations::quantize(x, self.x_max, self.group, work)?;
+        let x_scale = Scale::new(x, self.x_max)?;
         self.start(y, accumulate);
-        let Some(x) = Prepared::new(work, self.cols, self.group) else { return Ok(()) };
+        let mut last = None;
         for rows in self.blocks() {
-            let mut quad = 0;
-            let quads = rows.block.shape().quads();
-            while quad < quads {
-                let mut acc = [[0i32; QUAD]; CHUNK];
-                if gemv(&rows.block, &x, quad, &mut acc).is_err() {
-                    return Ok(());
-                }
-                let first = quad * QUAD;
-                let count = (rows.block.shape().rows - first).min(CHUNK * QUAD);
-                for (i, acc) in acc.as_flattened().iter().enumerate().take(count) {
-                    if let Some(y) = y.get_mut(rows.output(first + i)) {
-                        *y += *acc as f32 * (rows.scale(first + i) * x_scale);
-                    }
-                }
-                quad += CHUNK;
+            let shape = rows.block.shape();
+            let Some(work) = work.get_mut(..prepared_words(shape)) else { return Ok(()) };
+            // Layouts prepare the activations differently; the blocks of one width share them.
+            if last != Some(shape.width) {
+                x_scale.quantize(x, shape, work);
+                last = Some(shape.width);
+            }
+            if let Some(x) = Prepared::new(work, shape) {
+                rows.accumulate(&x, x_scale, y);
             }
         }
         Ok(())

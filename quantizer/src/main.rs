@@ -214,12 +214,12 @@ fn print_summary(graph: &Graph, moments: &[Moments], outcomes: &[Outcome]) {
     let mut total = 0;
     for (matrix, outcome) in graph.matrices.iter().zip(outcomes) {
         let quantized = &outcome.quantized;
-        let bytes = quantized.bytes();
+        let bytes = outcome.bytes();
         total += bytes;
         rows.add_row([
             matrix.name.clone(),
             format!("{}x{}", matrix.rows, matrix.cols),
-            quantized.blocks().iter().map(|(s, _)| s.width.bits().to_string()).collect::<Vec<_>>().join(","),
+            outcome.blocks().iter().map(|(s, _)| s.width.bits().to_string()).collect::<Vec<_>>().join(","),
             group_name(quantized.group),
             format!("{:.3}", 8.0 * bytes as f64 / matrix.data.len() as f64),
             bytes.to_string(),

@@ -4,7 +4,7 @@ pub mod gptq;
 pub mod moments;
 pub mod scale;
 
-use actq_kernels::format::{BlockShape, Width};
+use actq_kernels::format::{BlockShape, Lanes, Width};
 use actq_kernels::image::block_bytes;
 use anyhow::{Result, bail, ensure};
 use half::bf16;
@@ -93,28 +93,9 @@ impl Quantized {
             .collect()
     }
 
-    /// Rows sorted by width, as blocks: shape and rows of each. A matrix of one width is one block in the rows' own order.
-    pub fn blocks(&self) -> Vec<(BlockShape, Vec<usize>)> {
-        Width::ALL
-            .into_iter()
-            .filter_map(|width| {
-                let rows: Vec<usize> = (0..self.rows).filter(|&r| self.widths[r] == width).collect();
-                let shape = BlockShape { width, rows: rows.len(), cols: self.cols, group: self.group };
-                (!rows.is_empty()).then_some((shape, rows))
-            })
-            .collect()
-    }
-
     /// Whether the blocks' rows follow each other in the order of the output, so that no index is stored.
     pub fn in_order(blocks: &[(BlockShape, Vec<usize>)]) -> bool {
         blocks.iter().flat_map(|(_, rows)| rows).enumerate().all(|(i, &row)| i == row)
-    }
-
-    /// Bytes of codes, padding, scales, indexes and block records.
-    pub fn bytes(&self) -> usize {
-        let blocks = self.blocks();
-        let indexed = !Self::in_order(&blocks);
-        blocks.iter().map(|(shape, _)| block_bytes(*shape, indexed)).sum()
     }
 
     /// The largest activation magnitude whose worst-case row sum stays within int32, at most `limit`.
@@ -140,6 +121,34 @@ pub struct Outcome {
     pub error: f64,
     /// Activation magnitude.
     pub x_max: u16,
+}
+
+impl Outcome {
+    /// The lanes that the matrix is packed for.
+    pub fn lanes(&self) -> Lanes {
+        Lanes::of(self.x_max, self.quantized.group)
+    }
+
+    /// Rows sorted by width, as blocks: shape and rows of each. A matrix of one width is one block in the rows' own order.
+    pub fn blocks(&self) -> Vec<(BlockShape, Vec<usize>)> {
+        let matrix = &self.quantized;
+        let lanes = self.lanes();
+        Width::ALL
+            .into_iter()
+            .filter_map(|width| {
+                let rows: Vec<usize> = (0..matrix.rows).filter(|&r| matrix.widths[r] == width).collect();
+                let shape = BlockShape { width, lanes, rows: rows.len(), cols: matrix.cols, group: matrix.group };
+                (!rows.is_empty()).then_some((shape, rows))
+            })
+            .collect()
+    }
+
+    /// Bytes of codes, padding, scales, indexes and block records.
+    pub fn bytes(&self) -> usize {
+        let blocks = self.blocks();
+        let indexed = !Quantized::in_order(&blocks);
+        blocks.iter().map(|(shape, _)| block_bytes(*shape, indexed)).sum()
+    }
 }
 
 /// Quantizes every matrix of `graph`. `moments` has one entry per matrix, or is empty where the method needs none.
@@ -176,7 +185,7 @@ pub fn quantize(graph: &Graph, moments: &[Moments], options: &Options) -> Result
 /// upgrade that lowers the sum of relative errors most per byte and still fits.
 fn allocate(tries: &[Vec<Outcome>], limit: f64) -> Result<Vec<usize>> {
     let mut chosen = vec![0; tries.len()];
-    let mut bytes: usize = tries.iter().map(|t| t[0].quantized.bytes()).sum();
+    let mut bytes: usize = tries.iter().map(|t| t[0].bytes()).sum();
     ensure!(
         bytes as f64 <= limit,
         "the budget is too small: 2 bits a weight with scales and padding take {bytes} bytes, {limit:.0} are allowed"
@@ -185,7 +194,7 @@ fn allocate(tries: &[Vec<Outcome>], limit: f64) -> Result<Vec<usize>> {
         let upgrade = |m: usize| {
             let now = &tries[m][chosen[m]];
             let next = tries[m].get(chosen[m] + 1)?;
-            let more = next.quantized.bytes() - now.quantized.bytes();
+            let more = next.bytes() - now.bytes();
             ((bytes + more) as f64 <= limit).then(|| (m, more, (now.error - next.error) / more as f64))
         };
         let best = (0..tries.len()).filter_map(upgrade).max_by(|a, b| a.2.total_cmp(&b.2));

@@ -16,9 +16,9 @@ mod firmware {
     use core::hint::black_box;
 
     use actq_firmware_demo::{count, host};
-    use actq_kernels::activations::{Prepared, prepared_words, quantize};
-    use actq_kernels::format::{Block, BlockShape, QUAD, Width, pack};
-    use actq_kernels::gemv::gemv;
+    use actq_kernels::activations::{Prepared, Scale, prepared_words};
+    use actq_kernels::format::{Block, BlockShape, Lanes, Width, pack};
+    use actq_kernels::linear::RowBlock;
     use cortex_m::singleton;
     use cortex_m_semihosting::hio;
 
@@ -33,6 +33,8 @@ mod firmware {
         x: [f32; COLS],
         prepared: [u32; COLS],
         y: [f32; ROWS],
+        bias: [f32; ROWS],
+        row_scales: [u32; ROWS / 2],
     }
 
     #[cortex_m_rt::entry]
@@ -45,6 +47,8 @@ mod firmware {
             x: [0.0; COLS],
             prepared: [0; COLS],
             y: [0.0; ROWS],
+            bias: [0.5; ROWS],
+            row_scales: [0x3c00_3c00; ROWS / 2],
         });
         host::exit(buffers.is_some_and(|buffers| run(buffers).is_some()))
     }
@@ -67,12 +71,13 @@ mod firmware {
         writeln!(out, "naive-f32 32 0 {ROWS} {COLS}").ok()?;
         for width in Width::ALL {
             for group in [0, 32] {
-                let shape = BlockShape { width, rows: ROWS, cols: COLS, group };
+                let shape = BlockShape { width, lanes: Lanes::of(127, group), rows: ROWS, cols: COLS, group };
                 let words = b.words.get_mut(..shape.words())?;
                 pack(shape, &b.codes, b.scales.get(..ROWS * shape.groups())?, words)?;
                 let block = Block::new(shape, words)?;
-                let prepared = b.prepared.get_mut(..prepared_words(COLS, group))?;
-                count::region(|| product(&block, black_box(&b.x), prepared, &mut b.y))?;
+                let prepared = b.prepared.get_mut(..prepared_words(shape))?;
+                let rows = RowBlock { block, scales: &b.row_scales, index: &[], first_row: 0 };
+                count::region(|| product(&rows, black_box(&b.x), &b.bias, prepared, &mut b.y))?;
                 black_box(&b.y);
                 writeln!(out, "gemv {} {group} {ROWS} {COLS}", width.bits()).ok()?;
             }
@@ -80,17 +85,12 @@ mod firmware {
         Some(())
     }
 
-    fn product(block: &Block<'_>, x: &[f32], prepared: &mut [u32], y: &mut [f32]) -> Option<()> {
-        let BlockShape { cols, group, .. } = block.shape();
-        let scale = quantize(x, 127, group, prepared).ok()?;
-        let x = Prepared::new(prepared, cols, group)?;
-        for (chunk, y) in y.chunks_mut(8 * QUAD).enumerate() {
-            let mut sums = [[0; QUAD]; 8];
-            gemv(block, &x, 8 * chunk, &mut sums).ok()?;
-            for (y, sum) in y.iter_mut().zip(sums.as_flattened()) {
-                *y = *sum as f32 * scale;
-            }
-        }
+    fn product(rows: &RowBlock<'_>, x: &[f32], bias: &[f32], prepared: &mut [u32], y: &mut [f32]) -> Option<()> {
+        let shape = rows.block.shape();
+        let scale = Scale::new(x, 127).ok()?;
+        y.copy_from_slice(bias);
+        scale.quantize(x, shape, prepared);
+        rows.accumulate(&Prepared::new(prepared, shape)?, scale, y);
         Some(())
     }
 
