@@ -73,7 +73,9 @@ impl Case {
             .map(|i| match draw {
                 Draw::Uniform => (random.bits() as u32 & mask) as u8,
                 Draw::Ends => [lowest, highest][random.below(2)],
-                Draw::Worst => [lowest, highest][usize::from((x[i % shape.cols] > 0) == (i / shape.cols % 2 == 0))],
+                Draw::Worst => {
+                    [lowest, highest][usize::from((x[i % shape.cols] > 0) == (i / shape.cols).is_multiple_of(2))]
+                }
             })
             .collect();
         let scales = (0..shape.rows * shape.groups())

@@ -8,7 +8,7 @@
 //! chunk is its start words and its int16 pairs, column `2j` in the low half. The last chunk is padded with zeros, so that the
 //! columns are a multiple of [`PAD_COLS`].
 
-use crate::format::{BlockShape, PAD_COLS, XFormat};
+use crate::format::{BlockShape, PAD_COLS, Start, XFormat};
 
 /// `1.5 * 2^23`: see the module's rounding rule.
 pub const ROUND: f32 = 12_582_912.0;
@@ -17,7 +17,7 @@ pub const ROUND: f32 = 12_582_912.0;
 pub const TINY: f32 = f32::from_bits(27 << 23);
 
 /// How a prepared vector is laid out: the layout's needs, with the lengths of the vector.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy)]
 struct Plan {
     format: XFormat,
     cols: usize,
@@ -31,7 +31,7 @@ struct Plan {
 
 impl Plan {
     const fn new(shape: BlockShape) -> Self {
-        let format = shape.x_format();
+        let format = shape.layout().x;
         let padded = shape.cols.next_multiple_of(PAD_COLS);
         let group = if shape.group == 0 || shape.group > padded { padded } else { shape.group };
         let chunk = if format.chunk < group { format.chunk } else { group };
@@ -52,6 +52,21 @@ impl Plan {
         group * self.group_words() + (col / self.chunk + 1) * self.format.starts.len() + col / 2
     }
 
+    /// See [`Prepared::bounds`]. Single lanes read no more than the block's own units; with row scales, the vector's sum
+    /// stands behind the end.
+    #[cfg(actq_armv7em)]
+    const fn bounds(self, shape: BlockShape) -> (usize, usize) {
+        let cols = shape.units() * shape.layout().cell.cols;
+        let end = self.words_before(cols - 1) + 1;
+        match self.format.starts {
+            [start] if self.format.sum => {
+                let sum_inside = (shape.group != 0) as usize;
+                (end + sum_inside, 0usize.wrapping_sub(self.padded / self.chunk * start.bias as usize))
+            }
+            _ => (end, 4 * self.chunk_words()),
+        }
+    }
+
     const fn words(self) -> usize {
         // The last pair of the vector is followed by its group's sum only.
         self.words_before(self.padded - 1) + 1 + self.format.sum as usize
@@ -67,19 +82,31 @@ pub const fn prepared_words(shape: BlockShape) -> usize {
 #[derive(Clone, Copy, Debug)]
 pub struct Prepared<'a> {
     words: &'a [u32],
-    plan: Plan,
+    /// The shape without its rows.
+    shape: BlockShape,
+    #[cfg(actq_armv7em)]
+    bounds: (usize, usize),
 }
 
 impl<'a> Prepared<'a> {
     /// Names a vector that [`Scale::quantize`] or [`prepare`] wrote for blocks of this shape (their rows do not matter); `None` where
     /// the length differs from [`prepared_words`] or the shape is not valid.
     pub fn new(words: &'a [u32], shape: BlockShape) -> Option<Self> {
-        (shape.is_valid() && words.len() == prepared_words(shape)).then_some(Self { words, plan: Plan::new(shape) })
+        let shape = BlockShape { rows: 1, ..shape };
+        if !shape.is_valid() || words.len() != prepared_words(shape) {
+            return None;
+        }
+        Some(Self {
+            words,
+            shape,
+            #[cfg(actq_armv7em)]
+            bounds: Plan::new(shape).bounds(shape),
+        })
     }
 
     /// Whether the vector was prepared for blocks of this shape.
     pub fn fits(&self, shape: BlockShape) -> bool {
-        self.plan == Plan::new(shape)
+        self.shape == BlockShape { rows: 1, ..shape }
     }
 
     /// All words.
@@ -89,43 +116,29 @@ impl<'a> Prepared<'a> {
 
     /// The groups' words, each with its sum where the layout has one.
     pub(crate) fn groups(&self) -> impl Iterator<Item = &'a [u32]> {
-        self.words.chunks(self.plan.group_words())
+        self.words.chunks(Plan::new(self.shape).group_words())
     }
 
     /// Words of a full chunk, start words included.
     pub(crate) fn chunk_words(&self) -> usize {
-        self.plan.chunk_words()
+        Plan::new(self.shape).chunk_words()
     }
 
-    /// Words up to where the assembler stops reading x. Single lanes read no more than the block's own units; with row scales,
-    /// the vector's sum is behind the end.
+    /// What the assembler is told about the vector: the words up to where it stops reading, and either the bytes of a chunk or,
+    /// where chunks are summed without being taken apart, minus the biases of all chunks.
     #[cfg(actq_armv7em)]
-    pub(crate) fn chunks_end(&self, shape: BlockShape) -> usize {
-        let cols = (shape.units() * shape.cell().cols).max(1);
-        let sum_inside = self.plan.format.sum && shape.group != 0;
-        self.plan.words_before(cols - 1) + 1 + usize::from(sum_inside)
-    }
-
-    /// The kernels' last argument: bytes of a chunk, or, where chunks are summed without being taken apart, minus the biases
-    /// of all chunks.
-    #[cfg(actq_armv7em)]
-    pub(crate) fn kernel_argument(&self) -> usize {
-        if self.plan.format.sum {
-            let bias = self.plan.format.starts.iter().map(|s| s.bias).sum::<i32>();
-            let chunks = self.plan.padded.div_ceil(self.plan.chunk);
-            0usize.wrapping_sub(chunks * bias as usize)
-        } else {
-            4 * self.plan.chunk_words()
-        }
+    pub(crate) fn bounds(&self) -> (usize, usize) {
+        self.bounds
     }
 
     /// The value of column `col`; 0 when out of range.
     pub fn value(&self, col: usize) -> i16 {
-        if col >= self.plan.padded {
+        let plan = Plan::new(self.shape);
+        if col >= plan.padded {
             return 0;
         }
-        let word = self.words.get(self.plan.words_before(col)).copied().unwrap_or(0);
-        ((word >> (16 * (col % 2))) as i16) >> self.plan.format.shift
+        let word = self.words.get(plan.words_before(col)).copied().unwrap_or(0);
+        ((word >> (16 * (col % 2))) as i16) >> plan.format.shift
     }
 }
 
@@ -165,7 +178,8 @@ impl Scale {
     /// Writes the integers of `x`, prepared for blocks of `shape`, into `out`, which holds [`prepared_words`] words (a shorter
     /// `out` is filled as far as it goes). Missing values of `x` count as zeros.
     pub fn quantize(self, x: &[f32], shape: BlockShape, out: &mut [u32]) {
-        fill(x, Plan::new(shape), out, |x, shift, out| quantize_pairs(x, self.inverse, shift, out));
+        let quantizer = Quantizer { inverse: self.inverse };
+        fill(x, Plan::new(shape), out, &quantizer);
     }
 }
 
@@ -178,63 +192,119 @@ fn magnitude_bits(x: &[f32]) -> u32 {
     x.iter().fold(0u32, |m, v| m.max(v.to_bits() & 0x7fff_ffff))
 }
 
-/// Writes `round(x * inverse) << shift` as pairs and returns the sum of the rounded values. `out` holds the pairs exactly.
-fn quantize_pairs(x: &[f32], inverse: f32, shift: u32, out: &mut [u32]) -> i32 {
-    #[cfg(actq_fpu)]
-    let (x, out, sum) = crate::armv7em::quantize_pairs(x, inverse, shift, out);
-    #[cfg(not(actq_fpu))]
-    let sum = 0;
-    pairs(x, shift, out, |v| (v * inverse + ROUND).to_bits()).wrapping_add(sum)
-}
-
 /// Writes integers prepared for blocks of `shape` into `out`; lengths as for [`Scale::quantize`].
 pub fn prepare(x: &[i16], shape: BlockShape, out: &mut [u32]) {
-    fill(x, Plan::new(shape), out, |x, shift, out| pairs(x, shift, out, |v| v as u16 as u32));
+    fill(x, Plan::new(shape), out, &Copier);
 }
 
-/// Writes pairs; `value` gives an integer whose low 16 bits count. Returns the sum of the integers.
+/// What turns values into the integers of a prepared vector.
+trait Source {
+    type Value: Copy;
+
+    /// An integer whose low 16 bits count.
+    fn integer(&self, value: Self::Value) -> u32;
+
+    /// Writes `chunks` whole chunks of `cols` values, each with one start word, and returns the sum of their integers; `None`,
+    /// with nothing written, where the backend has no code for that.
+    fn chunks(
+        &self,
+        _x: &[Self::Value],
+        _shift: u32,
+        _start: Start,
+        _counts: (usize, usize),
+        _out: &mut [u32],
+    ) -> Option<i32> {
+        None
+    }
+}
+
+struct Copier;
+
+impl Source for Copier {
+    type Value = i16;
+
+    fn integer(&self, value: i16) -> u32 {
+        value as u16 as u32
+    }
+}
+
+struct Quantizer {
+    inverse: f32,
+}
+
+impl Source for Quantizer {
+    type Value = f32;
+
+    #[inline(always)]
+    fn integer(&self, value: f32) -> u32 {
+        (value * self.inverse + ROUND).to_bits()
+    }
+
+    #[cfg(actq_fpu)]
+    #[inline(always)]
+    fn chunks(&self, x: &[f32], shift: u32, start: Start, counts: (usize, usize), out: &mut [u32]) -> Option<i32> {
+        crate::armv7em::quantize(x, self.inverse, shift, start, counts, out)
+    }
+}
+
+/// Lays a vector out.
 #[inline(always)]
-fn pairs<T: Copy>(x: &[T], shift: u32, out: &mut [u32], value: impl Fn(T) -> u32) -> i32 {
+fn fill<S: Source>(x: &[S::Value], plan: Plan, out: &mut [u32], source: &S) {
+    let XFormat { starts, sum, .. } = plan.format;
+    let x = x.get(..plan.cols).unwrap_or(x);
+    let mut groups = x.chunks(plan.group);
+    for out in out.chunks_mut(plan.group_words()) {
+        let (out, sum_word) = out.split_at_mut(out.len() - usize::from(sum));
+        let (mut x, mut out) = (groups.next().unwrap_or(&[]), out);
+        let mut group_sum = 0i32;
+        // Whole chunks at once, where each has but one start word.
+        if let [start] = *starts {
+            let count = x.len() / plan.chunk;
+            if let Some(sum) = source.chunks(x, plan.format.shift, start, (count, plan.chunk), out) {
+                group_sum = sum;
+                x = x.get(count * plan.chunk..).unwrap_or(&[]);
+                out = out.get_mut(count * plan.chunk_words()..).unwrap_or_default();
+            }
+        }
+        let mut chunks = x.chunks(plan.chunk);
+        for out in out.chunks_mut(plan.chunk_words()) {
+            group_sum = group_sum.wrapping_add(chunk(chunks.next().unwrap_or(&[]), plan.format, out, source));
+        }
+        if let Some(word) = sum_word.first_mut() {
+            *word = group_sum as u32;
+        }
+    }
+}
+
+/// Writes a chunk, as far as `x` goes and then zeros, and returns the sum of its integers.
+fn chunk<S: Source>(mut x: &[S::Value], format: XFormat, out: &mut [u32], source: &S) -> i32 {
+    let XFormat { shift, starts, .. } = format;
     let mut sum = 0i32;
-    for (pair, word) in x.chunks(2).zip(out) {
-        let (low, high) = (value(pair[0]), pair.get(1).map_or(0, |v| value(*v)));
+    let eights = x.len() & !7;
+    // The backend writes a start word, too; it is overwritten below.
+    let mut done = 0;
+    if let Some((last, _)) = starts.split_last()
+        && let Some(out) = out.get_mut(starts.len() - 1..)
+        && let Some(part) = source.chunks(x, shift, *last, (1, eights), out)
+    {
+        sum = part;
+        done = eights;
+    }
+    x = x.get(done..).unwrap_or(&[]);
+    let Some((start_words, pairs)) = out.split_at_mut_checked(starts.len()) else { return 0 };
+    let mut pairs = pairs.get_mut(done / 2..).unwrap_or_default();
+    for x in x.chunks(2) {
+        let Some((word, rest)) = core::mem::take(&mut pairs).split_first_mut() else { break };
+        let (low, high) = (source.integer(x[0]), x.get(1).map_or(0, |v| source.integer(*v)));
         sum = sum.wrapping_add(low as i16 as i32).wrapping_add(high as i16 as i32);
         *word = ((low << shift) & 0xffff) | (high << shift << 16);
+        pairs = rest;
+    }
+    pairs.fill(0);
+    for (word, start) in start_words.iter_mut().zip(starts) {
+        *word = start.bias.wrapping_add(start.factor.wrapping_mul(sum)) as u32;
     }
     sum
-}
-
-/// Lays a vector out; `write(x, shift, out)` writes a chunk's pairs, as far as `x` goes, and returns the sum of their values.
-#[inline(always)]
-fn fill<T>(x: &[T], plan: Plan, mut out: &mut [u32], mut write: impl FnMut(&[T], u32, &mut [u32]) -> i32) {
-    let x = x.get(..plan.cols).unwrap_or(x);
-    let mut group_sum = 0i32;
-    for first in (0..plan.padded).step_by(plan.chunk) {
-        let last = (first + plan.chunk).min(plan.padded);
-        let x = x.get(first..last).or(x.get(first..)).unwrap_or(&[]);
-        let starts = plan.format.starts;
-        let Some((chunk, rest)) = core::mem::take(&mut out).split_at_mut_checked(starts.len() + (last - first) / 2)
-        else {
-            return;
-        };
-        out = rest;
-        let (start_words, pairs) = chunk.split_at_mut(starts.len());
-        let (filled, padding) = pairs.split_at_mut(x.len().div_ceil(2));
-        let sum = write(x, plan.format.shift, filled);
-        padding.fill(0);
-        for (word, start) in start_words.iter_mut().zip(starts) {
-            *word = start.bias.wrapping_add(start.factor.wrapping_mul(sum)) as u32;
-        }
-        group_sum = group_sum.wrapping_add(sum);
-        if plan.format.sum
-            && (last.is_multiple_of(plan.group) || last == plan.padded)
-            && let Some((word, rest)) = core::mem::take(&mut out).split_first_mut()
-        {
-            *word = group_sum as u32;
-            group_sum = 0;
-            out = rest;
-        }
-    }
 }
 
 /// Words that suffice for a prepared vector of any layout.

@@ -268,21 +268,28 @@ macro_rules! with_format {
 }
 pub(crate) use with_format;
 
-const fn cell_of<F: Format>() -> Cell {
-    F::CELL
+/// The constants of a layout, for code that is not generic over it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Layout {
+    pub(crate) cell: Cell,
+    strip: usize,
+    step: usize,
+    pub(crate) x: XFormat,
 }
 
-const fn step_of<F: Format>() -> usize {
-    F::STEP
+impl Layout {
+    const fn of<F: Format>() -> Self {
+        Self { cell: F::CELL, strip: F::STRIP, step: F::STEP, x: F::X }
+    }
 }
 
-const fn strip_of<F: Format>() -> usize {
-    F::STRIP
-}
-
-const fn x_format_of<F: Format>() -> XFormat {
-    F::X
-}
+/// By width and lanes. A table in memory takes fewer instructions than a choice for every constant.
+static LAYOUTS: [[Layout; 2]; 4] = [
+    [Layout::of::<w2::W2>(), Layout::of::<w2_paired::W2Paired>()],
+    [Layout::of::<w3::W3>(), Layout::of::<w3_paired::W3Paired>()],
+    [Layout::of::<w4::W4>(), Layout::of::<w4_paired::W4Paired>()],
+    [Layout::of::<w8::W8>(), Layout::of::<w8_paired::W8Paired>()],
+];
 
 /// `c + a.lo * b.lo + a.hi * b.hi` over signed 16-bit halves, modulo 2^32: what the SMLAD instruction computes.
 #[inline(always)]
@@ -317,14 +324,8 @@ impl BlockShape {
         self.rows >= 1 && self.rows <= 0xffff && self.cols >= 1 && self.cols <= 0xffff && group
     }
 
-    /// The layout's cell.
-    pub const fn cell(self) -> Cell {
-        with_format!(self, cell_of::<_>())
-    }
-
-    /// What the prepared activations look like.
-    pub const fn x_format(self) -> XFormat {
-        with_format!(self, x_format_of::<_>())
+    pub(crate) const fn layout(self) -> &'static Layout {
+        &LAYOUTS[self.width as usize][self.lanes as usize]
     }
 
     /// Rows with the padding.
@@ -334,14 +335,14 @@ impl BlockShape {
 
     /// Units in a row.
     pub const fn units(self) -> usize {
-        self.cols.next_multiple_of(with_format!(self, step_of::<_>())) / self.cell().cols
+        self.cols.next_multiple_of(self.layout().step) / self.layout().cell.cols
     }
 
     /// Units in a full group; all units of a row where there are no group scales.
     pub const fn units_per_group(self) -> usize {
         match self.group {
             0 => self.units(),
-            group => group / self.cell().cols,
+            group => group / self.layout().cell.cols,
         }
     }
 
@@ -355,7 +356,7 @@ impl BlockShape {
 
     /// Words of four rows, scales included; a strip of eight has twice as many.
     pub const fn quad_words(self) -> usize {
-        self.units() * self.cell().words * (QUAD / self.cell().rows) + self.groups()
+        self.units() * self.layout().cell.words * (QUAD / self.layout().cell.rows) + self.groups()
     }
 
     /// Words of the block.
@@ -365,7 +366,7 @@ impl BlockShape {
 
     /// First row and rows of the strip that `row` is in.
     const fn strip(self, row: usize) -> (usize, usize) {
-        let height = with_format!(self, strip_of::<_>());
+        let height = self.layout().strip;
         let first = row / height * height;
         let left = self.padded_rows() - first;
         (first, if left < height { left } else { height })
@@ -374,7 +375,7 @@ impl BlockShape {
     /// Index of the first word of a cell and the distance to its next word: the cell that holds `row` in unit `unit`.
     const fn cell_at(self, row: usize, unit: usize) -> (usize, usize) {
         let (first, height) = self.strip(row);
-        let Cell { rows, words, .. } = self.cell();
+        let Cell { rows, words, .. } = self.layout().cell;
         let scales_before = match self.group {
             0 => 0,
             _ => unit / self.units_per_group() * (height / QUAD),
@@ -389,7 +390,7 @@ impl BlockShape {
         let (first, height) = self.strip(row);
         let last = (group + 1) * self.units_per_group();
         let units = if last < self.units() { last } else { self.units() };
-        let Cell { rows, words, .. } = self.cell();
+        let Cell { rows, words, .. } = self.layout().cell;
         let scales_before = group * (height / QUAD) + (row - first) / QUAD;
         first / QUAD * self.quad_words() + units * words * (height / rows) + scales_before
     }
@@ -399,6 +400,7 @@ impl BlockShape {
 #[derive(Clone, Copy, Debug)]
 pub struct Block<'a> {
     shape: BlockShape,
+    quad_words: usize,
     words: &'a [u32],
 }
 
@@ -406,7 +408,11 @@ impl<'a> Block<'a> {
     /// Pairs `words` (little-endian words as they stand in the image) with their shape; `None` where the shape is not
     /// valid or the length differs from [`BlockShape::words`].
     pub fn new(shape: BlockShape, words: &'a [u32]) -> Option<Self> {
-        (shape.is_valid() && words.len() == shape.words()).then_some(Self { shape, words })
+        (shape.is_valid() && words.len() == shape.words()).then(|| Self {
+            shape,
+            quad_words: shape.quad_words(),
+            words,
+        })
     }
 
     /// The shape.
@@ -414,9 +420,14 @@ impl<'a> Block<'a> {
         self.shape
     }
 
+    /// As [`BlockShape::quad_words`].
+    pub fn quad_words(&self) -> usize {
+        self.quad_words
+    }
+
     /// The words of the rows from `first_row`, a multiple of [`STRIP`], on; empty when out of range.
     pub fn rows_from(&self, first_row: usize) -> &'a [u32] {
-        self.words.get((first_row / QUAD).saturating_mul(self.shape.quad_words())..).unwrap_or(&[])
+        self.words.get((first_row / QUAD).saturating_mul(self.quad_words)..).unwrap_or(&[])
     }
 
     /// The code at (`row`, `col`); 0 when out of range.
@@ -431,7 +442,7 @@ impl<'a> Block<'a> {
     pub(crate) fn cell(&self, row: usize, unit: usize) -> [u32; 3] {
         let (at, step) = self.shape.cell_at(row, unit);
         let mut cell = [0u32; 3];
-        for (k, word) in cell.iter_mut().enumerate().take(self.shape.cell().words) {
+        for (k, word) in cell.iter_mut().enumerate().take(self.shape.layout().cell.words) {
             *word = u32::from_le(self.words.get(at + k * step).copied().unwrap_or(0));
         }
         cell

@@ -6,6 +6,8 @@
 //!    operation accumulates, the sum of the old `y` and the bias. Rows that no block holds (0 bits) keep `start`.
 
 use crate::activations::{NotFinite, Prepared, Scale, max_prepared_words, prepared_words};
+#[cfg(actq_fpu)]
+use crate::armv7em;
 use crate::format::{Block, Lanes, STRIP};
 use crate::gemv::gemv;
 
@@ -65,40 +67,65 @@ impl RowBlock<'_> {
         if self.index.is_empty() { self.first_row + i } else { half_word(self.index, i) as usize }
     }
 
-    /// Adds the rows' products with a vector that was prepared for the block to their places in `y`; what is missing in `y`
-    /// is left out.
-    pub fn accumulate(&self, x: &Prepared<'_>, x_scale: Scale, y: &mut [f32]) {
+    /// `y = start + acc * (row_scale * x_scale)` for the block's rows and their places in `y`, with a vector that was prepared
+    /// for the block. `start` holds the bits of the whole output's biases; without it, y itself is the start. Nothing is done
+    /// where `start` or `y` is too short.
+    pub fn apply(&self, x: &Prepared<'_>, x_scale: Scale, start: Option<&[u32]>, y: &mut [f32]) {
         let shape = self.block.shape();
-        let mut sums = [0; RUN];
-        for first in (0..shape.padded_rows()).step_by(RUN) {
-            let acc = &mut sums[..RUN.min(shape.padded_rows() - first)];
-            if gemv(&self.block, x, first, acc).is_err() {
+        let mut first = 0;
+        // Rows in order have room for their sums in y itself, except those of a last strip that padding fills.
+        if let (Some(start), true) = (start, self.index.is_empty()) {
+            let whole = self.first_row..self.first_row + (shape.rows & !(STRIP - 1));
+            let (Some(start), Some(y)) = (start.get(whole.clone()), y.get_mut(whole)) else { return };
+            if gemv(&self.block, x, 0, bytemuck::cast_slice_mut(y)).is_err() {
                 return;
             }
-            let acc = &acc[..acc.len().min(shape.rows - first)];
-            let done = self.scale_add(first, acc, x_scale, y);
-            for (i, acc) in (first..).zip(acc).skip(done) {
-                if let Some(y) = y.get_mut(self.output(i)) {
-                    *y += *acc as f32 * (self.scale(i) * x_scale.get());
-                }
+            self.scale_in_place(x_scale.get(), start, y);
+            first = y.len();
+        }
+        if first == shape.rows {
+            return;
+        }
+        let mut sums = [0; RUN];
+        while first < shape.rows {
+            let sums = &mut sums[..RUN.min(shape.padded_rows() - first)];
+            if gemv(&self.block, x, first, sums).is_err() {
+                return;
             }
+            let sums = &sums[..sums.len().min(shape.rows - first)];
+            self.scale_rows(first, sums, x_scale.get(), start, y);
+            first += sums.len();
         }
     }
 
-    /// Does the same to the rows from `first` on, as many as the backend can; returns how many those are.
-    #[cfg(actq_fpu)]
-    fn scale_add(&self, first: usize, acc: &[i32], x_scale: Scale, y: &mut [f32]) -> usize {
-        match (self.scales.get(first / 2..), y.get_mut(self.first_row + first..)) {
-            (Some(scales), Some(y)) if self.index.is_empty() => {
-                crate::armv7em::scale_add(acc, scales, x_scale.get(), y)
+    /// Turns the integer sums in y, of the first `y.len()` rows, into results.
+    fn scale_in_place(&self, x_scale: f32, start: &[u32], y: &mut [f32]) {
+        #[cfg(actq_fpu)]
+        let done = armv7em::scale(armv7em::Operands::SumsInPlace(start), self.scales, x_scale, y);
+        #[cfg(not(actq_fpu))]
+        let done = 0;
+        for (i, (y, start)) in y.iter_mut().zip(start).enumerate().skip(done) {
+            *y = f32::from_bits(u32::from_le(*start)) + y.to_bits() as i32 as f32 * (self.scale(i) * x_scale);
+        }
+    }
+
+    /// Adds the sums of the rows from `first` on, scaled, to what `start` or y holds.
+    fn scale_rows(&self, first: usize, sums: &[i32], x_scale: f32, start: Option<&[u32]>, y: &mut [f32]) {
+        #[cfg(actq_fpu)]
+        let done = match (start, self.scales.get(first / 2..), y.get_mut(self.first_row + first..)) {
+            (None, Some(scales), Some(y)) if self.index.is_empty() => {
+                armv7em::scale(armv7em::Operands::StartInPlace(sums), scales, x_scale, y)
             }
             _ => 0,
+        };
+        #[cfg(not(actq_fpu))]
+        let done = 0;
+        for (i, sum) in (first..).zip(sums).skip(done) {
+            let at = self.output(i);
+            let Some(y) = y.get_mut(at) else { continue };
+            let start = start.and_then(|s| s.get(at)).map_or(*y, |bits| f32::from_bits(u32::from_le(*bits)));
+            *y = start + *sum as f32 * (self.scale(i) * x_scale);
         }
-    }
-
-    #[cfg(not(actq_fpu))]
-    fn scale_add(&self, _first: usize, _acc: &[i32], _x_scale: Scale, _y: &mut [f32]) -> usize {
-        0
     }
 }
 
@@ -117,7 +144,11 @@ impl Matrix<'_> {
     /// `y` have the matrix's lengths (what is missing is left out).
     pub fn apply(&self, x: &[f32], work: &mut [u32], y: &mut [f32], accumulate: bool) -> Result<(), NotFinite> {
         let x_scale = Scale::new(x, self.x_max)?;
-        self.start(y, accumulate);
+        // One pass over the output where every row has its bias and is written once, in order.
+        let start = if accumulate || self.bias.is_empty() || !self.is_whole() { None } else { Some(self.bias) };
+        if start.is_none() {
+            self.start(y, accumulate);
+        }
         let mut last = None;
         for rows in self.blocks() {
             let shape = rows.block.shape();
@@ -128,10 +159,19 @@ impl Matrix<'_> {
                 last = Some(shape.width);
             }
             if let Some(x) = Prepared::new(work, shape) {
-                rows.accumulate(&x, x_scale, y);
+                rows.apply(&x, x_scale, start, y);
             }
         }
         Ok(())
+    }
+
+    /// Whether the blocks hold all rows in the order of the output.
+    fn is_whole(&self) -> bool {
+        let mut rows = 0;
+        self.blocks().all(|block| {
+            rows += block.block.shape().rows;
+            block.index.is_empty()
+        }) && rows == self.rows
     }
 
     fn start(&self, y: &mut [f32], accumulate: bool) {

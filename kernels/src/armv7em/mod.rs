@@ -9,7 +9,9 @@
 use core::arch::global_asm;
 
 use crate::activations::Prepared;
-use crate::format::{Block, BlockShape, Lanes, QUAD, STRIP, Width};
+#[cfg(actq_fpu)]
+use crate::format::Start;
+use crate::format::{Block, QUAD, STRIP};
 
 global_asm!(include_str!("single.s"), options(raw));
 global_asm!(include_str!("paired_w2.s"), options(raw));
@@ -54,51 +56,46 @@ kernels! {
     actq_w8_paired_row actq_w8_paired_group
 }
 
-/// The kernels for strips of eight rows, where the layout has them, and of four.
-fn kernels(shape: BlockShape) -> (Option<Kernel>, Kernel) {
-    let grouped = shape.group != 0;
-    match (shape.width, shape.lanes, grouped) {
-        (Width::W2, Lanes::Single, false) => (None, actq_w2_row),
-        (Width::W3, Lanes::Single, false) => (None, actq_w3_row),
-        (Width::W4, Lanes::Single, false) => (None, actq_w4_row),
-        (Width::W8, Lanes::Single, false) => (None, actq_w8_row),
-        (Width::W2, Lanes::Single, true) => (None, actq_w2_group),
-        (Width::W3, Lanes::Single, true) => (None, actq_w3_group),
-        (Width::W4, Lanes::Single, true) => (None, actq_w4_group),
-        (Width::W8, Lanes::Single, true) => (None, actq_w8_group),
-        (Width::W2, Lanes::Paired, false) => (Some(actq_w2_paired_row), actq_w2_paired_row4),
-        (Width::W3, Lanes::Paired, false) => (None, actq_w3_paired_row),
-        (Width::W4, Lanes::Paired, false) => (Some(actq_w4_paired_row), actq_w4_paired_row4),
-        (Width::W8, Lanes::Paired, false) => (None, actq_w8_paired_row),
-        (Width::W2, Lanes::Paired, true) => (Some(actq_w2_paired_group), actq_w2_paired_group4),
-        (Width::W3, Lanes::Paired, true) => (None, actq_w3_paired_group),
-        (Width::W4, Lanes::Paired, true) => (Some(actq_w4_paired_group), actq_w4_paired_group4),
-        (Width::W8, Lanes::Paired, true) => (None, actq_w8_paired_group),
-    }
-}
+/// The kernel for strips of eight rows, where the layout has them, and that for strips of four.
+type Kernels = (Option<Kernel>, Kernel);
+
+/// By width, lanes and whether there are group scales.
+static KERNELS: [[[Kernels; 2]; 2]; 4] = [
+    [
+        [(None, actq_w2_row), (None, actq_w2_group)],
+        [(Some(actq_w2_paired_row), actq_w2_paired_row4), (Some(actq_w2_paired_group), actq_w2_paired_group4)],
+    ],
+    [
+        [(None, actq_w3_row), (None, actq_w3_group)], //
+        [(None, actq_w3_paired_row), (None, actq_w3_paired_group)],
+    ],
+    [
+        [(None, actq_w4_row), (None, actq_w4_group)],
+        [(Some(actq_w4_paired_row), actq_w4_paired_row4), (Some(actq_w4_paired_group), actq_w4_paired_group4)],
+    ],
+    [
+        [(None, actq_w8_row), (None, actq_w8_group)], //
+        [(None, actq_w8_paired_row), (None, actq_w8_paired_group)],
+    ],
+];
 
 /// As [`crate::gemv::gemv`], for lengths that were checked there.
+#[inline(never)]
 pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i32]) {
     let shape = block.shape();
     let weights = block.rows_from(first_row);
     let quads = acc.len() / QUAD;
-    if weights.len() < quads * shape.quad_words() || !x.fits(shape) {
+    if weights.len() < quads * block.quad_words() {
         return;
     }
-    let (eight, four) = kernels(shape);
+    let (eight, four) = KERNELS[shape.width as usize][shape.lanes as usize][usize::from(shape.group != 0)];
     let strips = if eight.is_some() { acc.len() / STRIP } else { 0 };
     let (first, last) = acc.split_at_mut(strips * STRIP);
-    let x_end = x.chunks_end(shape);
-    let extra = x.kernel_argument();
-    if shape.lanes == Lanes::Paired {
-        // The kernels for layouts whose rows may take several chunks add to the sums.
-        first.fill(0);
-        last.fill(0);
-    }
+    let (x_end, extra) = x.bounds();
     // SAFETY: `weights` holds the words of `acc.len()` rows from `first_row` on, which is a multiple of 8, so strips begin
     // there and after the strips of eight: each call reads the words of its strips and writes as many sums. It reads the
     // prepared vector from its begin to `x_end`, and the sum of x that stands there where the layout has row scales and a
-    // sum; both are in the vector, because it was prepared for this shape. The slices are of u32 and i32, so every address
+    // sum; both are in the vector, because it was prepared for a block of this shape. The slices are of u32 and i32, so every address
     // is a multiple of 4, as LDM and LDRD demand.
     unsafe {
         let x_words = x.words().as_ptr();
@@ -106,7 +103,7 @@ pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i3
             kernel(weights.as_ptr(), x_words, first.as_mut_ptr(), strips, x_words.add(x_end), extra);
         }
         if !last.is_empty() {
-            let weights = weights.as_ptr().add(strips * STRIP / QUAD * shape.quad_words());
+            let weights = weights.as_ptr().add(strips * STRIP / QUAD * block.quad_words());
             four(weights, x_words, last.as_mut_ptr(), last.len() / QUAD, x_words.add(x_end), extra);
         }
     }
@@ -128,49 +125,77 @@ pub fn magnitude_bits(x: &[f32]) -> u32 {
     rest.iter().fold(largest, |m, v| m.max(v.to_bits() & 0x7fff_ffff))
 }
 
-/// Quantizes as many values of `x` as the assembler takes; returns what is left of `x` and `out`, and the sum.
+/// Quantizes `chunks` chunks of `cols` values, a multiple of 8: writes for each a start word and its pairs, shifted left by
+/// `shift`. Returns the sum of all integers, or `None`, with nothing written, where the lengths do not fit.
 #[cfg(actq_fpu)]
-pub fn quantize_pairs<'a, 'b>(
-    x: &'a [f32],
+#[inline(always)]
+pub fn quantize(
+    x: &[f32],
     inverse: f32,
     shift: u32,
-    out: &'b mut [u32],
-) -> (&'a [f32], &'b mut [u32], i32) {
-    let kernel = match shift {
-        0 => actq_quantize0,
-        1 => actq_quantize1,
-        2 => actq_quantize2,
-        3 => actq_quantize3,
-        _ => return (x, out, 0),
-    };
-    let (eights, x) = x.split_at((x.len() & !7).min((2 * out.len()) & !7));
-    let (pairs, out) = out.split_at_mut(eights.len() / 2);
-    let sum = if eights.is_empty() {
-        0
-    } else {
-        // SAFETY: the length is that of the slice, a multiple of 8 and not 0, and twice that of the pairs.
-        unsafe { kernel(inverse, crate::activations::ROUND, eights.as_ptr(), pairs.as_mut_ptr(), eights.len()) }
-    };
-    (x, out, sum)
+    start: Start,
+    (chunks, cols): (usize, usize),
+    out: &mut [u32],
+) -> Option<i32> {
+    let kernel = *QUANTIZE.get(shift as usize)?;
+    if chunks == 0 || cols == 0 || cols % 8 != 0 || x.len() < chunks * cols || out.len() < chunks * (1 + cols / 2) {
+        return None;
+    }
+    let (x, out) = (x.as_ptr(), out.as_mut_ptr());
+    // SAFETY: the kernel reads `chunks * cols` floats and writes `chunks * (1 + cols / 2)` words; both were compared above.
+    Some(unsafe { kernel(inverse, crate::activations::ROUND, x, out, chunks, cols / 8, start.bias, start.factor) })
 }
 
-/// `y[i] += acc[i] * (scale[i] * x_scale)` for as many as the assembler takes, with two bf16 scales a word; returns how many
-/// those are.
+/// By shift.
 #[cfg(actq_fpu)]
-pub fn scale_add(acc: &[i32], scales: &[u32], x_scale: f32, y: &mut [f32]) -> usize {
-    let len = acc.len().min(2 * scales.len()).min(y.len()) & !3;
+static QUANTIZE: [Quantize; 4] = [actq_quantize0, actq_quantize1, actq_quantize2, actq_quantize3];
+
+/// Where [`scale`] finds the integer sums and the values that the results are added to.
+#[cfg(actq_fpu)]
+#[derive(Clone, Copy, Debug)]
+pub enum Operands<'a> {
+    /// The sums' bits in the output, the bits of the start values apart.
+    SumsInPlace(&'a [u32]),
+    /// The start values in the output, the sums apart.
+    StartInPlace(&'a [i32]),
+}
+
+/// `y[i] = start[i] + sum[i] * (scale[i] * x_scale)` for as many as the assembler takes, with two bf16 scales a word; returns
+/// how many those are.
+#[cfg(actq_fpu)]
+pub fn scale(operands: Operands<'_>, scales: &[u32], x_scale: f32, y: &mut [f32]) -> usize {
+    let (sums, start, len): (*const i32, *const f32, _) = match operands {
+        Operands::SumsInPlace(start) => (y.as_ptr().cast(), start.as_ptr().cast(), start.len()),
+        Operands::StartInPlace(sums) => (sums.as_ptr(), y.as_ptr(), sums.len()),
+    };
+    let len = len.min(2 * scales.len()).min(y.len()) & !7;
     if len > 0 {
-        // SAFETY: all three slices hold at least `len` values, which is a multiple of 4 and not 0.
-        unsafe { actq_scale_add(x_scale, acc.as_ptr(), scales.as_ptr(), y.as_mut_ptr(), len) }
+        // SAFETY: all operands hold at least `len` values, which is a multiple of 8 and not 0; eight are read before the same
+        // place in `y` is written.
+        unsafe { actq_scale_add(x_scale, sums, scales.as_ptr(), start, y.as_mut_ptr(), len) }
     }
     len
 }
 
 #[cfg(actq_fpu)]
+macro_rules! quantize_kernels {
+    ($($name:ident)*) => {
+        /// Writes `chunks` chunks of `eights` times eight values at `x` to `out`.
+        type Quantize = unsafe extern "C" fn(
+            inverse: f32, round: f32, x: *const f32, out: *mut u32, chunks: usize, eights: usize, bias: i32, factor: i32,
+        ) -> i32;
+
+        unsafe extern "C" {
+            $(fn $name(
+                inverse: f32, round: f32, x: *const f32, out: *mut u32, chunks: usize, eights: usize, bias: i32, factor: i32,
+            ) -> i32;)*
+        }
+    };
+}
+#[cfg(actq_fpu)]
+quantize_kernels!(actq_quantize0 actq_quantize1 actq_quantize2 actq_quantize3);
+
+#[cfg(actq_fpu)]
 unsafe extern "C" {
-    fn actq_quantize0(inverse: f32, round: f32, x: *const f32, out: *mut u32, len: usize) -> i32;
-    fn actq_quantize1(inverse: f32, round: f32, x: *const f32, out: *mut u32, len: usize) -> i32;
-    fn actq_quantize2(inverse: f32, round: f32, x: *const f32, out: *mut u32, len: usize) -> i32;
-    fn actq_quantize3(inverse: f32, round: f32, x: *const f32, out: *mut u32, len: usize) -> i32;
-    fn actq_scale_add(x_scale: f32, acc: *const i32, scales: *const u32, y: *mut f32, len: usize);
+    fn actq_scale_add(x_scale: f32, sums: *const i32, scales: *const u32, start: *const f32, y: *mut f32, len: usize);
 }

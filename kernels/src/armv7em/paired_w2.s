@@ -92,11 +92,10 @@
     ldr r1, [sp, #40]
 .endm
 
+@ r8: where the sums of the next strip go, r9: strips left, this one included
 .macro d2_next_strip
-    str r8, [sp, #48]
-    ldr r2, [sp, #52]
-    subs r2, r2, #1
-    str r2, [sp, #52]
+    subs r9, r9, #1
+    strd r8, r9, [sp, #48]
     bne.w 1b
     add sp, sp, #60
     pop {r4-r11, pc}
@@ -150,7 +149,7 @@
     cmp r1, lr
     bne.w 2b
     ldr r7, [sp, #56]
-    ldr r8, [sp, #48]
+    ldrd r8, r9, [sp, #48]
     d2_rows r3, r4
     d2_rows r5, r6
     .if \rows == 8
@@ -213,12 +212,12 @@
     ldrd r12, lr, [sp, #32]
     cmp r1, lr
     bne.w 2b
-    ldr r8, [sp, #48]
+    ldrd r8, r9, [sp, #48]
     .if \rows == 8
-    ldmia.w sp, {r2, r7, r9, r12}
+    ldmia.w sp, {r2, r7, r10, r11}
     asr r2, r2, #1
-    asr r9, r9, #1
-    stmia.w r8!, {r2, r7, r9, r12}
+    asr r10, r10, #1
+    stmia.w r8!, {r2, r7, r10, r11}
     .endif
     asr r3, r3, #1
     asr r5, r5, #1

@@ -61,11 +61,10 @@
     str r4, [sp, #32]
 .endm
 
+@ r9: where the sums of the next strip go, r10: strips left, this one included
 .macro d3_next_strip
-    str r9, [sp, #24]
-    ldr r9, [sp, #28]
-    subs r9, r9, #1
-    str r9, [sp, #28]
+    subs r10, r10, #1
+    strd r9, r10, [sp, #24]
     bne.w 1b
     add sp, sp, #44
     pop {r4-r11, pc}
@@ -104,13 +103,13 @@ actq_w3_paired_row:
     @ What is left of a sum of t without its high half is 8 * even = 4 * the even row's level sum; the odd row's is
     @ 2 * odd + sum(x).
     ldr lr, [sp, #36]
-    ldr r9, [sp, #24]
     sub r3, r10, r7, lsl #16
     asrs r3, r3, #2
     add r4, lr, r7, lsl #1
     sub r5, r11, r8, lsl #16
     asrs r5, r5, #2
     add r6, lr, r8, lsl #1
+    ldrd r9, r10, [sp, #24]
     stmia.w r9!, {r3-r6}
     d3_next_strip
     .size actq_w3_paired_row, . - actq_w3_paired_row
@@ -159,7 +158,7 @@ actq_w3_paired_group:
     ldr lr, [sp, #32]
     cmp r1, lr
     bne.w 2b
-    ldr r9, [sp, #24]
+    ldrd r9, r10, [sp, #24]
     stmia.w r9!, {r3-r6}
     d3_next_strip
     .size actq_w3_paired_group, . - actq_w3_paired_group

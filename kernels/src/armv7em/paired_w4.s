@@ -5,7 +5,8 @@
 @ In the loops: r0 weights, r1 x, r2 mask, r3 and r4 activation pairs, r5-r7 the sums p, q, k of the first four rows, r8-r10 of
 @ the others (or of all in a strip of four), r11 and r12 weight words, lr the extracted codes.
 @
-@ Frame: 0-31 sums over groups (group kernel), 32 mask, 36 end of this chunk, 40 x_end, 44 chunk bytes, 48 x, 52 acc, 56 strips.
+@ Frame: 0-31 sums over groups (group kernel), 0 end of this chunk (row kernel), 32 x, 36 mask, 40 end of the first chunk, 44
+@ x_end, 48 acc, 52 strips, 56 chunk bytes.
 
     .syntax unified
     .thumb
@@ -67,38 +68,44 @@
     movw r12, #0xf00f
     movt r12, #0xf00f
     ldrd r4, r5, [sp, #96]
-    str r12, [sp, #32]
-    strd r4, r5, [sp, #40]
-    strd r1, r2, [sp, #48]
-    str r3, [sp, #56]
+    strd r1, r12, [sp, #32]
+    str r4, [sp, #44]
+    strd r2, r3, [sp, #48]
+    str r5, [sp, #56]
 .endm
 
-.macro c4_next_strip out
-    str \out, [sp, #52]
-    ldr r3, [sp, #56]
-    subs r3, r3, #1
-    str r3, [sp, #56]
+@ r11: where the sums of the next strip go, r12: strips left, this one included
+.macro c4_next_strip
+    subs r12, r12, #1
+    strd r11, r12, [sp, #48]
     bne.w 1b
     add sp, sp, #60
     pop {r4-r11, pc}
 .endm
 
-@ Adds the four rows' sums to those at r11: A from the low 20 bits of k - 2^8*q, then the others.
-.macro c4_add p, q, k
-    sub lr, \k, \q, lsl #8
-    sbfx lr, lr, #0, #20
-    sub \p, \p, lr
-    sub \k, \k, lr
+@ The four rows' sums as r2-r4 and `d`: A from the low 20 bits of k - 2^8*q, then the others. `d` may be `p`.
+.macro c4_sums p, q, k, d
+    sub r2, \k, \q, lsl #8
+    sbfx r2, r2, #0, #20
+    sub \p, \p, r2
+    sub \k, \k, r2
     sub \q, \q, \k, asr #8
-    ldmia.w r11, {r2, r3, r4, r12}
-    add r2, r2, lr
-    add r3, r3, \p, asr #12
-    add r4, r4, \k, asr #8
-    add r12, r12, \q, asr #12
-    stmia.w r11!, {r2, r3, r4, r12}
+    asr r3, \p, #12
+    asr r4, \k, #8
+    asr \d, \q, #12
 .endm
 
-@ The sums in acc are 0 at the start.
+@ Adds r2-r4 and `d` to the sums at r11.
+.macro c4_add d
+    ldrd r6, r7, [r11]
+    add r2, r2, r6
+    add r3, r3, r7
+    ldrd r6, r7, [r11, #8]
+    add r4, r4, r6
+    add \d, \d, r7
+    stmia.w r11!, {r2-r4, \d}
+.endm
+
 .macro c4_row_kernel name, rows
     .section .text.\name, "ax", %progbits
     .global \name
@@ -107,17 +114,16 @@
     .balign 16
 \name:
     c4_prologue
-1:
-    ldr r1, [sp, #48]
-3:
-    @ the end of this chunk, or of the vector where that comes first
-    ldrd r3, r4, [sp, #40]
-    add r4, r4, r1
-    cmp r4, r3
+    @ the end of the first chunk, or of the vector where that comes first
+    add r5, r5, r1
+    cmp r5, r4
     it hi
-    movhi r4, r3
-    ldr r2, [sp, #32]
-    str r4, [sp, #36]
+    movhi r5, r4
+    str r5, [sp, #40]
+    str r5, [sp, #0]
+1:
+    ldrd r1, r2, [sp, #32]
+3:
     ldmia.w r1!, {r9, r10}
     .if \rows == 8
     mov r5, r9
@@ -130,18 +136,47 @@
     .rept 8
     c4_cols4 \rows
     .endr
-    ldr lr, [sp, #36]
+    ldr lr, [sp, #0]
     cmp r1, lr
     bne.w 2b
-    ldr r11, [sp, #52]
+    ldrd r12, lr, [sp, #40]
+    ldr r11, [sp, #48]
+    cmp r1, r12
+    bne.n 4f
     .if \rows == 8
-    c4_add r5, r6, r7
+    c4_sums r5, r6, r7, r5
+    stmia.w r11!, {r2-r5}
     .endif
-    c4_add r8, r9, r10
-    ldr lr, [sp, #40]
+    c4_sums r8, r9, r10, r8
+    stmia.w r11!, {r2-r4, r8}
     cmp r1, lr
-    bne.w 3b
-    c4_next_strip r11
+    bne.n 5f
+6:
+    ldr r12, [sp, #52]
+    c4_next_strip
+4:
+    @ A later chunk's sums are added to those before.
+    .if \rows == 8
+    c4_sums r5, r6, r7, r5
+    c4_add r5
+    .endif
+    c4_sums r8, r9, r10, r8
+    c4_add r8
+    cmp r1, lr
+    bne.n 5f
+    ldr r12, [sp, #40]
+    str r12, [sp, #0]
+    b.n 6b
+5:
+    @ the next chunk's end
+    ldr r3, [sp, #56]
+    add r3, r3, r1
+    cmp r3, lr
+    it hi
+    movhi r3, lr
+    str r3, [sp, #0]
+    ldr r2, [sp, #36]
+    b.w 3b
     .size \name, . - \name
 .endm
 
@@ -181,8 +216,7 @@
     strd r3, r4, [sp, #16]
     strd r3, r4, [sp, #24]
     .endif
-    ldr r1, [sp, #48]
-    ldr r2, [sp, #32]
+    ldrd r1, r2, [sp, #32]
     .balign 4
 2:
     c4_cols4_start \rows
@@ -211,19 +245,18 @@
     smlawt r4, r10, r12, r4
     smlawt r5, r9, r11, r5
     stmia.w r7, {r2-r5}
-    ldr r2, [sp, #32]
-    ldr lr, [sp, #40]
+    ldr r2, [sp, #36]
+    ldr lr, [sp, #44]
     cmp r1, lr
     bne.w 2b
-    ldr r7, [sp, #52]
+    ldrd r11, r12, [sp, #48]
+    ldmia.w r7, {r2-r5}
     .if \rows == 8
-    ldmia.w sp, {r2-r5, r8-r10, r12}
-    stmia.w r7!, {r2-r5, r8-r10, r12}
-    .else
-    ldmia.w sp, {r2-r5}
-    stmia.w r7!, {r2-r5}
+    ldmia.w sp, {r6-r9}
+    stmia.w r11!, {r6-r9}
     .endif
-    c4_next_strip r7
+    stmia.w r11!, {r2-r5}
+    c4_next_strip
     .size \name, . - \name
 .endm
 

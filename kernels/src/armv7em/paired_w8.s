@@ -5,7 +5,8 @@
 @ In the loops: r0 weights, r1 x, r2-r5 activation pairs, r6 and r8 the sums of rows 0 and 2, r7 and r9 those of rows 0 and 2
 @ plus 2^8 times those of rows 1 and 3, r10-r12 and lr weight words.
 @
-@ Frame: 0-15 sums over groups (group kernel), 16 x, 20 acc, 24 strips, 28 end of this chunk, 32 x_end, 36 chunk bytes.
+@ Frame: 0-15 sums over groups (group kernel), 16 x, 20 end of this chunk, 24 end of the first chunk, 28 x_end, 32 acc,
+@ 36 strips, 40 chunk bytes.
 
     .syntax unified
     .thumb
@@ -44,22 +45,29 @@
     push {r4-r11, lr}
     sub sp, sp, #44
     ldrd r4, r5, [sp, #80]
-    strd r1, r2, [sp, #16]
-    str r3, [sp, #24]
-    strd r4, r5, [sp, #32]
+    str r1, [sp, #16]
+    str r4, [sp, #28]
+    strd r2, r3, [sp, #32]
+    str r5, [sp, #40]
 .endm
 
-.macro r8_next_strip out
-    str \out, [sp, #20]
-    ldr r10, [sp, #24]
-    subs r10, r10, #1
-    str r10, [sp, #24]
+@ r10: where the sums of the next strip go, r11: strips left, this one included
+.macro r8_next_strip
+    subs r11, r11, #1
+    strd r10, r11, [sp, #32]
     bne.w 1b
     add sp, sp, #44
     pop {r4-r11, pc}
 .endm
 
-@ The sums in acc are 0 at the start.
+@ the four rows' sums as r6-r9
+.macro r8_sums
+    sub r7, r7, r6
+    asr r7, r7, #8
+    sub r9, r9, r8
+    asr r9, r9, #8
+.endm
+
     .section .text.actq_w8_paired_row, "ax", %progbits
     .global actq_w8_paired_row
     .type actq_w8_paired_row, %function
@@ -67,36 +75,54 @@
     .balign 16
 actq_w8_paired_row:
     r8_prologue
+    @ the end of the first chunk, or of the vector where that comes first
+    add r5, r5, r1
+    cmp r5, r4
+    it hi
+    movhi r5, r4
+    strd r5, r5, [sp, #20]
 1:
     ldr r1, [sp, #16]
 3:
-    @ the end of this chunk, or of the vector where that comes first
-    ldrd r10, r11, [sp, #32]
-    add r11, r11, r1
-    cmp r11, r10
-    it hi
-    movhi r11, r10
-    str r11, [sp, #28]
     r8_start
     .balign 4
 2:
     r8_cols32
-    ldr r2, [sp, #28]
+    ldr r2, [sp, #20]
     cmp r1, r2
     bne.w 2b
-    ldr r10, [sp, #20]
-    ldr r11, [sp, #32]
-    ldmia.w r10, {r2-r5}
-    sub r7, r7, r6
-    sub r9, r9, r8
-    add r2, r2, r6
-    add r3, r3, r7, asr #8
-    add r4, r4, r8
-    add r5, r5, r9, asr #8
-    stmia.w r10!, {r2-r5}
-    cmp r1, r11
-    bne.w 3b
-    r8_next_strip r10
+    ldrd r2, r3, [sp, #24]
+    ldrd r10, r11, [sp, #32]
+    r8_sums
+    cmp r1, r2
+    bne.n 4f
+    stmia.w r10!, {r6-r9}
+    cmp r1, r3
+    bne.n 5f
+6:
+    r8_next_strip
+4:
+    @ A later chunk's sums are added to those before.
+    ldrd r4, r5, [r10]
+    add r6, r6, r4
+    add r7, r7, r5
+    ldrd r4, r5, [r10, #8]
+    add r8, r8, r4
+    add r9, r9, r5
+    stmia.w r10!, {r6-r9}
+    cmp r1, r3
+    bne.n 5f
+    str r2, [sp, #20]
+    b.n 6b
+5:
+    @ the next chunk's end
+    ldr r2, [sp, #40]
+    add r2, r2, r1
+    cmp r2, r3
+    it hi
+    movhi r2, r3
+    str r2, [sp, #20]
+    b.w 3b
     .size actq_w8_paired_row, . - actq_w8_paired_row
 
     .section .text.actq_w8_paired_group, "ax", %progbits
@@ -115,10 +141,7 @@ actq_w8_paired_group:
 2:
     r8_start
     r8_cols32
-    sub r7, r7, r6
-    asr r7, r7, #8
-    sub r9, r9, r8
-    asr r9, r9, #8
+    r8_sums
     ldr r10, [r0], #4
     ldmia.w sp, {r2-r5}
     uxtb.w r11, r10
@@ -130,11 +153,11 @@ actq_w8_paired_group:
     lsr r11, r10, #24
     mla r5, r9, r11, r5
     stmia.w sp, {r2-r5}
-    ldr lr, [sp, #32]
+    ldr lr, [sp, #28]
     cmp r1, lr
     bne.w 2b
-    ldr r10, [sp, #20]
+    ldrd r10, r11, [sp, #32]
     stmia.w r10!, {r2-r5}
-    r8_next_strip r10
+    r8_next_strip
     .size actq_w8_paired_group, . - actq_w8_paired_group
     .text
