@@ -40,6 +40,8 @@ pub enum Draw {
     Ends,
     /// Every product at its largest and of one sign: the worst case of the accumulators.
     Worst,
+    /// All activations equal, each row's weights at one end of their range: the longest way of one lane and not of another.
+    Aligned,
 }
 
 /// A block with activations.
@@ -63,16 +65,20 @@ impl Case {
             Width::W8 => (0x80, 0x7f),
             _ => (0, mask as u8),
         };
+        let sign = [x_max, -x_max][random.below(2)];
+        let ends = (0..shape.rows).map(|_| [lowest, highest][random.below(2)]).collect::<Vec<_>>();
         let x = (0..shape.cols)
             .map(|_| match draw {
                 Draw::Uniform => (random.unit() * f32::from(x_max)) as i16,
                 Draw::Ends | Draw::Worst => [x_max, -x_max][random.below(2)],
+                Draw::Aligned => sign,
             })
             .collect::<Vec<_>>();
         let codes = (0..shape.rows * shape.cols)
             .map(|i| match draw {
                 Draw::Uniform => (random.bits() as u32 & mask) as u8,
                 Draw::Ends => [lowest, highest][random.below(2)],
+                Draw::Aligned => ends[i / shape.cols],
                 Draw::Worst => {
                     [lowest, highest][usize::from((x[i % shape.cols] > 0) == (i / shape.cols).is_multiple_of(2))]
                 }
@@ -144,8 +150,8 @@ pub fn cases(seed: u64) -> Vec<Case> {
     let mut random = Random(seed);
     let mut cases = Vec::new();
     for (width, lanes, group) in layouts() {
-        for cols in (1..=67).chain([96, 127, 128, 129, 160, 255, 256, 257, 300, 512, 515, 1024]) {
-            for draw in [Draw::Uniform, Draw::Ends, Draw::Worst] {
+        for cols in (1..=67).chain([96, 127, 128, 129, 160, 255, 256, 257, 300, 512, 515, 1024, 2048]) {
+            for draw in [Draw::Uniform, Draw::Ends, Draw::Worst, Draw::Aligned] {
                 let rows = 1 + random.below(17);
                 let x_max = match lanes {
                     Lanes::Single => [127, i16::MAX][random.below(2)],

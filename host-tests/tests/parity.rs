@@ -5,7 +5,7 @@ use actq_kernels::activations::{NotFinite, Prepared, Scale, prepared_words};
 use actq_kernels::dequantize;
 use actq_kernels::format::{Block, BlockShape, Lanes, STRIP, Width, pack};
 use actq_kernels::gemv::{BACKEND, Backend, Mismatch, gemv};
-use actq_kernels::linear::{worst_case, worst_case_bound};
+use actq_kernels::linear::{RowBlock, worst_case, worst_case_bound};
 use actq_kernels::{portable, reference};
 use half::f16;
 use proptest::prelude::*;
@@ -17,7 +17,7 @@ fn shapes() -> impl Strategy<Value = BlockShape> {
 }
 
 fn cases() -> impl Strategy<Value = Case> {
-    let draw = prop::sample::select(vec![Draw::Uniform, Draw::Ends, Draw::Worst]);
+    let draw = prop::sample::select(vec![Draw::Uniform, Draw::Ends, Draw::Worst, Draw::Aligned]);
     (shapes(), any::<u64>(), 1..=i16::MAX, draw).prop_map(|(shape, seed, x_max, draw)| {
         let x_max = match shape.lanes {
             Lanes::Single => x_max,
@@ -145,6 +145,68 @@ fn shapes_and_lengths_that_do_not_fit_are_refused() {
         let prepared = vec![0; prepared_words(other)];
         let x = Prepared::new(&prepared, other).expect("the length is right");
         assert_eq!(gemv(&block, &x, 0, &mut [0; 8]), Err(Mismatch), "{other:?}");
+    }
+}
+
+/// An image's block record with another byte for the lanes, under a valid checksum.
+fn with_lanes(image: &[u8], lanes: u8) -> Vec<u8> {
+    use actq_kernels::image::{checksum, header as h};
+    let word =
+        |bytes: &[u8], at: usize| u32::from_le_bytes(bytes[4 * at..][..4].try_into().expect("four bytes")) as usize;
+    let matrix = word(image, word(image, h::W_OPS) + 3);
+    let mut image = image.to_vec();
+    image[4 * (matrix + h::MATRIX_WORDS) + 1] = lanes;
+    let crc = checksum(&image).to_le_bytes();
+    image[4 * h::W_CRC..][..4].copy_from_slice(&crc);
+    image
+}
+
+#[test]
+fn an_image_states_the_lanes_that_follow_from_its_activations() {
+    let shape = BlockShape { width: Width::W2, lanes: Lanes::Paired, rows: 9, cols: 40, group: 0 };
+    let image = single_matrix_image(&Case::draw(&mut Random(7), shape, 1, Draw::Uniform));
+    let check = |bytes: &[u8]| {
+        let buffer = actq::runtime::ImageBuffer::new(bytes);
+        actq_kernels::Image::new_checked(buffer.bytes()).map(|_| ())
+    };
+    assert_eq!(check(&with_lanes(&image, 1)), Ok(()));
+    for lanes in [0, 2, 255] {
+        assert_eq!(check(&with_lanes(&image, lanes)), Err(actq_kernels::ImageError::Lanes), "{lanes}");
+    }
+}
+
+/// Row blocks compute `start + acc * (row_scale * x_scale)` in this order, with biases in one pass or in y before.
+#[test]
+fn scaling_keeps_the_documented_order_of_operations() {
+    let mut random = Random(11);
+    for (width, lanes, group) in golden::layouts() {
+        for rows in [1, 3, 8, 13, 17, 72] {
+            let shape = BlockShape { width, lanes, rows, cols: 45, group };
+            let case = Case::draw(&mut random, shape, 127, Draw::Uniform);
+            let words = case.words();
+            let scales: Vec<u32> =
+                (0..rows.div_ceil(2)).map(|_| 0x3c00_3c00 | random.bits() as u32 & 0x7f_007f).collect();
+            let bias: Vec<u32> = (0..rows).map(|_| random.unit().to_bits()).collect();
+            let x: Vec<f32> = (0..45).map(|_| random.unit()).collect();
+            let block = Block::new(shape, &words).expect("the words fit the shape");
+            let block = RowBlock { block, scales: &scales, index: &[], first_row: 0 };
+            let scale = Scale::new(&x, 127).expect("all values are finite");
+            let mut prepared = vec![0; prepared_words(shape)];
+            scale.quantize(&x, shape, &mut prepared);
+            let prepared = Prepared::new(&prepared, shape).expect("the length is right");
+            let expected: Vec<u32> = (0..rows)
+                .map(|i| {
+                    let acc = reference::dot(&block.block, &prepared, i) as f32;
+                    (f32::from_bits(bias[i]) + acc * (block.scale(i) * scale.get())).to_bits()
+                })
+                .collect();
+            let mut y = vec![0.0; rows];
+            block.apply(&prepared, scale, Some(&bias), &mut y);
+            assert_eq!(y.iter().map(|y| y.to_bits()).collect::<Vec<_>>(), expected, "{shape:?}");
+            let mut y: Vec<f32> = bias.iter().map(|b| f32::from_bits(*b)).collect();
+            block.apply(&prepared, scale, None, &mut y);
+            assert_eq!(y.iter().map(|y| y.to_bits()).collect::<Vec<_>>(), expected, "{shape:?}, start in y");
+        }
     }
 }
 
