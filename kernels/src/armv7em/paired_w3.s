@@ -7,10 +7,10 @@
 @ start value), r7 and r8 activation pairs, r9 t of rows 0 and 1, r10 and r11 sums of the two t over chunks, r12 sums of their
 @ high halves side by side, lr the extracted codes.
 @
-@ The high halves of 32 columns stay within `4 * 127 * 32 = 16256`.
+@ The high halves of 64 columns stay within `4 * 127 * 64 = 32512`.
 @
 @ Frame: 0-15 sums over groups (group kernel) or 0-7 sums of the high halves (row kernel), 16 x, 20 minus the biases, 24 acc,
-@ 28 strips, 32 x_end, 36 sum of x.
+@ 28 strips, 32 x_end, 36 sum of x, 40 whether the number of 32 columns is odd.
 
     .syntax unified
     .thumb
@@ -41,7 +41,7 @@
     d3_set r4, 10, r8, r6, r6
 .endm
 
-@ the same, then its sums are added to those of the 32 columns
+@ the same, then its sums are added to those of the chunks before
 .macro d3_next_chunk
     d3_chunk
     add r10, r10, r9
@@ -77,19 +77,32 @@
     .balign 16
 actq_w3_paired_row:
     d3_prologue
-    ldr r4, [r4]
-    str r4, [sp, #36]
+    ldr r5, [r4]
+    str r5, [sp, #36]
+    @ 32 columns take 80 bytes of x: bit 4 of the length says whether their number is odd.
+    sub r4, r4, r1
+    and r4, r4, #16
+    str r4, [sp, #40]
 1:
     ldrd r1, r10, [sp, #16]
     mov r11, r10
     movs r4, #0
     strd r4, r4, [sp, #0]
+    @ The loop takes 64 columns and is entered in its middle for an odd number of 32.
+    ldr r12, [sp, #40]
+    cmp r12, #0
+    bne.w 3f
     .balign 4
 2:
     d3_chunk
     add r10, r10, r9
     add r11, r11, r6
     pkhtb r12, r6, r9, asr #16
+    d3_next_chunk
+    d3_next_chunk
+    d3_next_chunk
+4:
+    d3_next_chunk
     d3_next_chunk
     d3_next_chunk
     d3_next_chunk
@@ -112,6 +125,9 @@ actq_w3_paired_row:
     ldrd r9, r10, [sp, #24]
     stmia.w r9!, {r3-r6}
     d3_next_strip
+3:
+    movs r12, #0
+    b.w 4b
     .size actq_w3_paired_row, . - actq_w3_paired_row
 
     .section .text.actq_w3_paired_group, "ax", %progbits

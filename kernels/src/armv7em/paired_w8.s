@@ -85,8 +85,15 @@ actq_w8_paired_row:
     ldr r1, [sp, #16]
 3:
     r8_start
+    @ The loop takes 64 columns and is entered in its middle for an odd number of 32.
+    ldr r10, [sp, #20]
+    sub r10, r10, r1
+    tst r10, #64
+    bne.w 7f
     .balign 4
 2:
+    r8_cols32
+7:
     r8_cols32
     ldr r2, [sp, #20]
     cmp r1, r2
