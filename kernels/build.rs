@@ -3,9 +3,14 @@
 
 fn main() {
     println!("cargo::rustc-check-cfg=cfg(actq_armv7em)");
+    println!("cargo::rustc-check-cfg=cfg(actq_fpu)");
     println!("cargo::rerun-if-changed=build.rs");
     let target = std::env::var("TARGET").unwrap_or_default();
     if target.starts_with("thumbv7em") {
         println!("cargo::rustc-cfg=actq_armv7em");
+        // The hard-float target; the kernels that convert from and to f32 need its registers.
+        if target.ends_with("eabihf") {
+            println!("cargo::rustc-cfg=actq_fpu");
+        }
     }
 }

@@ -1,10 +1,10 @@
 //! Kernel cases with their expected sums, as one stream of little-endian words that the host and the firmware read.
 //!
-//! A case: width, rows, cols, group, start (words of padding to put before weights and activations, 0 to 3), then the packed
-//! words, the prepared activations, and four sums per quad. The stream ends with a width of 0.
+//! A case: width, lanes, rows, cols, group, start (words of padding to put before weights and activations, 0 to 3), then the
+//! packed words, the prepared activations, and the sums with those of padding rows. The stream ends with a width of 0.
 
 use actq_kernels::activations::{Prepared, prepare, prepared_words};
-use actq_kernels::format::{Block, BlockShape, QUAD, Width, pack};
+use actq_kernels::format::{Block, BlockShape, Lanes, Width, pack};
 
 /// A deterministic generator (splitmix64).
 #[derive(Clone, Debug)]
@@ -40,6 +40,8 @@ pub enum Draw {
     Ends,
     /// Every product at its largest and of one sign: the worst case of the accumulators.
     Worst,
+    /// All activations equal, each row's weights at one end of their range: the longest way of one lane and not of another.
+    Aligned,
 }
 
 /// A block with activations.
@@ -63,16 +65,20 @@ impl Case {
             Width::W8 => (0x80, 0x7f),
             _ => (0, mask as u8),
         };
+        let sign = [x_max, -x_max][random.below(2)];
+        let ends = (0..shape.rows).map(|_| [lowest, highest][random.below(2)]).collect::<Vec<_>>();
         let x = (0..shape.cols)
             .map(|_| match draw {
                 Draw::Uniform => (random.unit() * f32::from(x_max)) as i16,
                 Draw::Ends | Draw::Worst => [x_max, -x_max][random.below(2)],
+                Draw::Aligned => sign,
             })
             .collect::<Vec<_>>();
         let codes = (0..shape.rows * shape.cols)
             .map(|i| match draw {
                 Draw::Uniform => (random.bits() as u32 & mask) as u8,
                 Draw::Ends => [lowest, highest][random.below(2)],
+                Draw::Aligned => ends[i / shape.cols],
                 Draw::Worst => {
                     [lowest, highest][usize::from((x[i % shape.cols] > 0) == (i / shape.cols).is_multiple_of(2))]
                 }
@@ -93,67 +99,76 @@ impl Case {
 
     /// The prepared activations.
     pub fn prepared(&self) -> Vec<u32> {
-        let mut out = vec![!0; prepared_words(self.shape.cols, self.shape.group)];
-        prepare(&self.x, self.shape.group, &mut out);
+        let mut out = vec![!0; prepared_words(self.shape)];
+        prepare(&self.x, self.shape, &mut out);
         out
     }
 
     /// The sums by the definition, straight from codes and activations, modulo 2^32; those of padding rows are 0.
-    pub fn sums(&self) -> Vec<[i32; QUAD]> {
+    pub fn sums(&self) -> Vec<i32> {
         let shape = self.shape;
-        let mut sums = vec![[0i32; QUAD]; shape.quads()];
+        let mut sums = vec![0; shape.padded_rows()];
         for (row, codes) in self.codes.chunks_exact(shape.cols).enumerate() {
             let scale = |col: usize| col.checked_div(shape.group).map_or(1, |g| self.scales[row * shape.groups() + g]);
             let sum = codes.iter().zip(&self.x).enumerate().fold(0i64, |sum, (col, (&code, &x))| {
                 sum + i64::from(shape.width.level(code)) * i64::from(scale(col)) * i64::from(x)
             });
-            sums[row / QUAD][row % QUAD] = sum as i32;
+            sums[row] = sum as i32;
         }
         sums
     }
 
     /// Runs `gemv` on the case, with `start` words before the weights and the activations.
-    pub fn run(&self, start: usize, gemv: impl Fn(&Block<'_>, &Prepared<'_>, &mut [[i32; QUAD]])) -> Vec<[i32; QUAD]> {
+    pub fn run(&self, start: usize, gemv: impl Fn(&Block<'_>, &Prepared<'_>, &mut [i32])) -> Vec<i32> {
         let shift = |words: Vec<u32>| [vec![!0; start], words].concat();
         let (words, prepared) = (shift(self.words()), shift(self.prepared()));
-        let mut sums = vec![[0; QUAD]; self.shape.quads()];
+        let mut sums = vec![0; self.shape.padded_rows()];
         let block = Block::new(self.shape, &words[start..]);
-        let x = Prepared::new(&prepared[start..], self.shape.cols, self.shape.group);
+        let x = Prepared::new(&prepared[start..], self.shape);
         if let (Some(block), Some(x)) = (block, x) {
             gemv(&block, &x, &mut sums);
         }
         // The sums of padding rows have no meaning.
-        sums.as_flattened_mut()[self.shape.rows..].fill(0);
+        sums[self.shape.rows..].fill(0);
         sums
     }
 
     /// Appends the case to a stream.
     fn write(&self, start: usize, out: &mut Vec<u32>) {
         let shape = self.shape;
-        out.extend([shape.width.bits(), shape.rows as u32, shape.cols as u32, shape.group as u32, start as u32]);
+        let lanes = u32::from(shape.lanes.code());
+        out.extend([shape.width.bits(), lanes, shape.rows as u32, shape.cols as u32, shape.group as u32, start as u32]);
         out.extend(self.words());
         out.extend(self.prepared());
-        out.extend(self.sums().as_flattened().iter().map(|&s| s as u32));
+        out.extend(self.sums().iter().map(|&s| s as u32));
     }
 }
 
-/// All widths and groups over all lengths from 1 to 67 and larger ones, with 1 to 9 rows, int8 and int16 activations, random
-/// and extreme values.
+/// All layouts and groups over all lengths from 1 to 67 and larger ones, with 1 to 17 rows, random and extreme values, and
+/// activations up to the layout's limit.
 pub fn cases(seed: u64) -> Vec<Case> {
     let mut random = Random(seed);
     let mut cases = Vec::new();
-    for width in Width::ALL {
-        for group in [0, 32, 64, 128] {
-            for cols in (1..=67).chain([96, 127, 128, 129, 160, 255, 256, 300, 512, 515, 1024]) {
-                for draw in [Draw::Uniform, Draw::Ends, Draw::Worst] {
-                    let rows = 1 + random.below(9);
-                    let x_max = [127, i16::MAX][random.below(2)];
-                    cases.push(Case::draw(&mut random, BlockShape { width, rows, cols, group }, x_max, draw));
-                }
+    for (width, lanes, group) in layouts() {
+        for cols in (1..=67).chain([96, 127, 128, 129, 160, 255, 256, 257, 300, 512, 515, 1024, 2048]) {
+            for draw in [Draw::Uniform, Draw::Ends, Draw::Worst, Draw::Aligned] {
+                let rows = 1 + random.below(17);
+                let x_max = match lanes {
+                    Lanes::Single => [127, i16::MAX][random.below(2)],
+                    Lanes::Paired => 127,
+                };
+                cases.push(Case::draw(&mut random, BlockShape { width, lanes, rows, cols, group }, x_max, draw));
             }
         }
     }
     cases
+}
+
+/// All valid combinations of width, lanes and group.
+pub fn layouts() -> impl Iterator<Item = (Width, Lanes, usize)> {
+    let of = |(width, lanes)| [0, 32, 64, 128].map(|group| (width, lanes, group));
+    let all = Width::ALL.into_iter().flat_map(|width| Lanes::ALL.map(|lanes| (width, lanes)));
+    all.flat_map(of).filter(|&(width, lanes, group)| BlockShape { width, lanes, rows: 1, cols: 1, group }.is_valid())
 }
 
 /// The cases as the firmware reads them, at every alignment that words can have in a 16-byte line.

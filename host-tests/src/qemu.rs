@@ -165,11 +165,51 @@ impl Counter {
         Ok(())
     }
 
-    /// Instructions of every region of the run that has ended, in order.
-    pub fn counts(&self) -> Result<Vec<u64>> {
+    /// The regions of the run that has ended, in order.
+    pub fn regions(&self) -> Result<Vec<Region>> {
         let text = fs::read_to_string(self.out.path())?;
-        text.lines().map(|line| line.parse().context("the counter's output is not a number")).collect()
+        let mut regions: Vec<Region> = Vec::new();
+        for line in text.lines() {
+            let fields: Vec<&str> = line.split(' ').collect();
+            match (&fields[..], regions.last_mut()) {
+                (["region", instructions], _) => {
+                    regions.push(Region { instructions: instructions.parse()?, executed: Vec::new() });
+                }
+                ([address, count, jumps], Some(region)) => region.executed.push(Executed {
+                    address: u64::from_str_radix(address, 16)?,
+                    count: count.parse()?,
+                    jumps: jumps.parse()?,
+                }),
+                _ => bail!("the counter wrote {line:?}"),
+            }
+        }
+        Ok(regions)
     }
+
+    /// Instructions of every region.
+    pub fn counts(&self) -> Result<Vec<u64>> {
+        Ok(self.regions()?.iter().map(|region| region.instructions).collect())
+    }
+}
+
+/// What was executed between two marks.
+#[derive(Clone, Debug)]
+pub struct Region {
+    /// Instructions.
+    pub instructions: u64,
+    /// Each instruction that was executed, by address.
+    pub executed: Vec<Executed>,
+}
+
+/// How often an instruction was executed.
+#[derive(Clone, Copy, Debug)]
+pub struct Executed {
+    /// Address.
+    pub address: u64,
+    /// Executions.
+    pub count: u64,
+    /// How many of them did not go on at the next instruction.
+    pub jumps: u64,
 }
 
 /// The plugin API of the installed QEMU: 1 up to 9.0, 2 from 9.1 on (QEMU's docs/devel/tcg-plugins).

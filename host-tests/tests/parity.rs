@@ -1,30 +1,30 @@
 //! Packing, the reference and the portable kernels against the definition, by property and on the golden cases.
 
 use actq_host_tests::golden::{self, Case, Draw, Random};
-use actq_kernels::activations::{NotFinite, Prepared, prepared_words, quantize};
+use actq_kernels::activations::{NotFinite, Prepared, Scale, prepared_words};
 use actq_kernels::dequantize;
-use actq_kernels::format::{Block, BlockShape, QUAD, Width, pack};
+use actq_kernels::format::{Block, BlockShape, Lanes, STRIP, Width, pack};
 use actq_kernels::gemv::{BACKEND, Backend, Mismatch, gemv};
-use actq_kernels::linear::{worst_case, worst_case_bound};
+use actq_kernels::linear::{RowBlock, worst_case, worst_case_bound};
 use actq_kernels::{portable, reference};
 use half::f16;
 use proptest::prelude::*;
 
 fn shapes() -> impl Strategy<Value = BlockShape> {
-    let width = prop::sample::select(Width::ALL.to_vec());
-    let group = prop::sample::select(vec![0, 32, 64, 128]);
-    (width, 1..14usize, 1..140usize, group).prop_map(|(width, rows, cols, group)| BlockShape {
-        width,
-        rows,
-        cols,
-        group,
-    })
+    let layout = prop::sample::select(golden::layouts().collect::<Vec<_>>());
+    (layout, 1..18usize, prop_oneof![9 => 1..140usize, 1 => 140..700usize])
+        .prop_map(|((width, lanes, group), rows, cols)| BlockShape { width, lanes, rows, cols, group })
 }
 
 fn cases() -> impl Strategy<Value = Case> {
-    let draw = prop::sample::select(vec![Draw::Uniform, Draw::Ends, Draw::Worst]);
-    (shapes(), any::<u64>(), 1..=i16::MAX, draw)
-        .prop_map(|(shape, seed, x_max, draw)| Case::draw(&mut Random(seed), shape, x_max, draw))
+    let draw = prop::sample::select(vec![Draw::Uniform, Draw::Ends, Draw::Worst, Draw::Aligned]);
+    (shapes(), any::<u64>(), 1..=i16::MAX, draw).prop_map(|(shape, seed, x_max, draw)| {
+        let x_max = match shape.lanes {
+            Lanes::Single => x_max,
+            Lanes::Paired => 1 + x_max % 127,
+        };
+        Case::draw(&mut Random(seed), shape, x_max, draw)
+    })
 }
 
 fn check_backends(case: &Case, start: usize) {
@@ -59,15 +59,14 @@ proptest! {
     }
 
     #[test]
-    fn any_run_of_quads_gives_the_same_sums(case in cases(), first in 0..4usize) {
+    fn any_run_of_strips_gives_the_same_sums(case in cases(), first in 0..3usize, strips in 1..3usize) {
         let all = case.sums();
-        let first = first.min(all.len() - 1);
+        let first = STRIP * first.min((all.len() - 1) / STRIP);
+        let last = (first + STRIP * strips).min(all.len());
         let part = case.run(0, |b, x, acc| {
-            let mut sums = vec![[0; QUAD]; acc.len() - first];
-            gemv(b, x, first, &mut sums).expect("the activations belong to the block");
-            acc[first..].copy_from_slice(&sums);
+            gemv(b, x, first, &mut acc[first..last]).expect("the activations belong to the block, the rows to strips");
         });
-        prop_assert_eq!(&part[first..], &all[first..]);
+        prop_assert_eq!(&part[first..last], &all[first..last]);
     }
 
     #[test]
@@ -78,7 +77,7 @@ proptest! {
         let worst = worst_case(&block, x_max);
         prop_assert!(worst <= worst_case_bound(&block, x_max));
         if worst <= i64::from(i32::MAX) {
-            prop_assert!(case.sums().as_flattened().iter().all(|s| i64::from(s.unsigned_abs()) <= worst));
+            prop_assert!(case.sums().iter().all(|s| i64::from(s.unsigned_abs()) <= worst));
         }
     }
 
@@ -86,11 +85,15 @@ proptest! {
     fn quantized_activations_round_to_half_a_step(
         x in prop::collection::vec(-1e6f32..1e6, 1..200),
         x_max in prop::sample::select(vec![127u16, 2047, 32767]),
-        group in prop::sample::select(vec![0usize, 32, 64, 128]),
+        shape in shapes(),
     ) {
-        let mut words = vec![!0; prepared_words(x.len(), group)];
-        let scale = quantize(&x, x_max, group, &mut words).expect("all values are finite");
-        let prepared = Prepared::new(&words, x.len(), group).expect("the length is right");
+        let shape = BlockShape { cols: x.len(), ..shape };
+        let x_max = if shape.lanes == Lanes::Paired { 127 } else { x_max };
+        let mut words = vec![!0; prepared_words(shape)];
+        let scale = Scale::new(&x, x_max).expect("all values are finite");
+        scale.quantize(&x, shape, &mut words);
+        let scale = scale.get();
+        let prepared = Prepared::new(&words, shape).expect("the length is right");
         for (i, x) in x.iter().enumerate() {
             let q = prepared.value(i);
             prop_assert!(q.unsigned_abs() <= x_max);
@@ -116,7 +119,7 @@ fn this_build_uses_the_portable_backend() {
 
 #[test]
 fn shapes_and_lengths_that_do_not_fit_are_refused() {
-    let shape = BlockShape { width: Width::W3, rows: 5, cols: 33, group: 0 };
+    let shape = BlockShape { width: Width::W3, lanes: Lanes::Single, rows: 5, cols: 33, group: 0 };
     let mut words = vec![0; shape.words()];
     assert!(pack(shape, &[0; 5 * 33], &[], &mut words).is_some());
     assert!(pack(shape, &[0; 5 * 33 - 1], &[], &mut words).is_none(), "too few codes");
@@ -126,25 +129,102 @@ fn shapes_and_lengths_that_do_not_fit_are_refused() {
         BlockShape { rows: 0, ..shape },
         BlockShape { cols: 0, ..shape },
         BlockShape { group: 16, ..shape },
+        BlockShape { lanes: Lanes::Paired, group: 64, ..shape },
         BlockShape { cols: 1 << 16, ..shape },
     ] {
         assert!(Block::new(bad, &vec![0; bad.words()]).is_none(), "{bad:?}");
     }
     let block = Block::new(shape, &words).expect("the words fit the shape");
-    let other = vec![0; prepared_words(33, 32)];
-    let x = Prepared::new(&other, 33, 32).expect("the length is right");
-    assert_eq!(gemv(&block, &x, 0, &mut [[0; QUAD]; 2]), Err(Mismatch), "another group");
+    let prepared = vec![0; prepared_words(shape)];
+    let x = Prepared::new(&prepared, shape).expect("the length is right");
+    assert_eq!(gemv(&block, &x, 0, &mut [0; 8]), Ok(()));
+    assert_eq!(gemv(&block, &x, 0, &mut [0; 4]), Err(Mismatch), "half a strip");
+    assert_eq!(gemv(&block, &x, 4, &mut [0; 4]), Err(Mismatch), "from the middle of a strip");
+    assert_eq!(gemv(&block, &x, 0, &mut [0; 16]), Err(Mismatch), "more rows than the block has");
+    for other in [BlockShape { group: 32, ..shape }, BlockShape { lanes: Lanes::Paired, ..shape }] {
+        let prepared = vec![0; prepared_words(other)];
+        let x = Prepared::new(&prepared, other).expect("the length is right");
+        assert_eq!(gemv(&block, &x, 0, &mut [0; 8]), Err(Mismatch), "{other:?}");
+    }
+}
+
+/// An image's block record with another byte for the lanes, under a valid checksum.
+fn with_lanes(image: &[u8], lanes: u8) -> Vec<u8> {
+    use actq_kernels::image::{checksum, header as h};
+    let word =
+        |bytes: &[u8], at: usize| u32::from_le_bytes(bytes[4 * at..][..4].try_into().expect("four bytes")) as usize;
+    let matrix = word(image, word(image, h::W_OPS) + 3);
+    let mut image = image.to_vec();
+    image[4 * (matrix + h::MATRIX_WORDS) + 1] = lanes;
+    let crc = checksum(&image).to_le_bytes();
+    image[4 * h::W_CRC..][..4].copy_from_slice(&crc);
+    image
+}
+
+#[test]
+fn an_image_states_the_lanes_that_follow_from_its_activations() {
+    let shape = BlockShape { width: Width::W2, lanes: Lanes::Paired, rows: 9, cols: 40, group: 0 };
+    let image = single_matrix_image(&Case::draw(&mut Random(7), shape, 1, Draw::Uniform));
+    let check = |bytes: &[u8]| {
+        let buffer = actq::runtime::ImageBuffer::new(bytes);
+        actq_kernels::Image::new_checked(buffer.bytes()).map(|_| ())
+    };
+    assert_eq!(check(&with_lanes(&image, 1)), Ok(()));
+    for lanes in [0, 2, 255] {
+        assert_eq!(check(&with_lanes(&image, lanes)), Err(actq_kernels::ImageError::Lanes), "{lanes}");
+    }
+}
+
+/// Row blocks compute `start + acc * (row_scale * x_scale)` in this order, with biases in one pass or in y before.
+#[test]
+fn scaling_keeps_the_documented_order_of_operations() {
+    let mut random = Random(11);
+    for (width, lanes, group) in golden::layouts() {
+        for rows in [1, 3, 8, 13, 17, 72] {
+            let shape = BlockShape { width, lanes, rows, cols: 45, group };
+            let case = Case::draw(&mut random, shape, 127, Draw::Uniform);
+            let words = case.words();
+            let scales: Vec<u32> =
+                (0..rows.div_ceil(2)).map(|_| 0x3c00_3c00 | random.bits() as u32 & 0x7f_007f).collect();
+            let bias: Vec<u32> = (0..rows).map(|_| random.unit().to_bits()).collect();
+            let x: Vec<f32> = (0..45).map(|_| random.unit()).collect();
+            let block = Block::new(shape, &words).expect("the words fit the shape");
+            let block = RowBlock { block, scales: &scales, index: &[], first_row: 0 };
+            let scale = Scale::new(&x, 127).expect("all values are finite");
+            let mut prepared = vec![0; prepared_words(shape)];
+            scale.quantize(&x, shape, &mut prepared);
+            let prepared = Prepared::new(&prepared, shape).expect("the length is right");
+            let expected: Vec<u32> = (0..rows)
+                .map(|i| {
+                    let acc = reference::dot(&block.block, &prepared, i) as f32;
+                    (f32::from_bits(bias[i]) + acc * (block.scale(i) * scale.get())).to_bits()
+                })
+                .collect();
+            let mut y = vec![0.0; rows];
+            block.apply(&prepared, scale, Some(&bias), &mut y);
+            assert_eq!(y.iter().map(|y| y.to_bits()).collect::<Vec<_>>(), expected, "{shape:?}");
+            let mut y: Vec<f32> = bias.iter().map(|b| f32::from_bits(*b)).collect();
+            block.apply(&prepared, scale, None, &mut y);
+            assert_eq!(y.iter().map(|y| y.to_bits()).collect::<Vec<_>>(), expected, "{shape:?}, start in y");
+        }
+    }
 }
 
 #[test]
 fn vectors_that_are_not_finite_are_refused_and_tiny_ones_are_zero() {
-    let mut words = [0; 17];
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-        assert_eq!(quantize(&[1.0, bad], 127, 0, &mut words), Err(NotFinite));
+        assert_eq!(Scale::new(&[1.0, bad], 127), Err(NotFinite));
     }
-    words.fill(!0);
-    assert_eq!(quantize(&[1e-35, -1e-40, 0.0], 127, 0, &mut words), Ok(0.0));
-    assert!(words.iter().all(|w| *w == 0));
+    let tiny = [1e-35, -1e-40, 0.0];
+    let scale = Scale::new(&tiny, 127).expect("all values are finite");
+    assert_eq!(scale.get(), 0.0);
+    for (width, lanes, group) in golden::layouts() {
+        let shape = BlockShape { width, lanes, rows: 1, cols: 3, group };
+        let mut words = vec![!0; prepared_words(shape)];
+        scale.quantize(&tiny, shape, &mut words);
+        let x = Prepared::new(&words, shape).expect("the length is right");
+        assert!((0..3).all(|col| x.value(col) == 0));
+    }
 }
 
 #[test]
@@ -152,7 +232,7 @@ fn dequantization_agrees_over_its_three_types() {
     let mut random = Random(5);
     for width in Width::ALL {
         for group in [0, 32] {
-            let shape = BlockShape { width, rows: 6, cols: 70, group };
+            let shape = BlockShape { width, lanes: Lanes::Paired, rows: 6, cols: 70, group };
             let case = Case::draw(&mut random, shape, 1, Draw::Uniform);
             // The image is the only source of row blocks; one with a single matrix holds the case.
             let image = single_matrix_image(&case);
@@ -188,7 +268,7 @@ fn dequantization_agrees_over_its_three_types() {
 fn single_matrix_image(case: &Case) -> Vec<u8> {
     use actq::graph::{Graph, Matrix, Node, NodeKind};
     use actq::quantize::{Outcome, Quantized};
-    let BlockShape { width, rows, cols, group } = case.shape;
+    let BlockShape { width, rows, cols, group, .. } = case.shape;
     let mut graph = Graph::new(cols);
     graph.matrices.push(Matrix { name: "w".into(), rows, cols, data: vec![0.0; rows * cols] });
     let kind = NodeKind::Linear { matrix: 0, bias: vec![0.5; rows] };

@@ -39,6 +39,8 @@ pub enum ImageError {
     Shape,
     /// A matrix block's width is not 2, 3, 4 or 8 bits.
     Width,
+    /// A block's lanes are not those that follow from its matrix's activations and group.
+    Lanes,
     /// A group size is not 0, 32, 64 or 128.
     Group,
     /// A row index lies outside the output or occurs twice.
@@ -72,6 +74,7 @@ impl fmt::Display for ImageError {
             Self::Op => "unknown operation",
             Self::Shape => "lengths of an operation do not fit",
             Self::Width => "weight width is not 2, 3, 4 or 8 bits",
+            Self::Lanes => "lanes of a block do not follow from its matrix's activations",
             Self::Group => "group size is not 0, 32, 64 or 128",
             Self::Index => "output index out of range or repeated",
             Self::Constant => "a constant is not finite or has the wrong sign",

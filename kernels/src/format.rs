@@ -1,37 +1,54 @@
 //! Packed weight layouts: what stands in flash, written once for the packer, the reference and the kernels.
 //!
-//! A [`Block`] is a run of rows of one [`Width`]. Four rows are interleaved into a **quad**, so that one load of activations
-//! serves four rows and the weight stream is read strictly forward. A quad is a run of **units**: the smallest number of
-//! columns that fills whole words in every row. Word `k` of the four rows stand side by side:
+//! A [`Block`] is a run of rows of one [`Width`]. Its rows are interleaved in **strips** of 4 or 8, so that one load of
+//! activations serves them all and the weight stream is read strictly forward. A layout packs **cells**: a few rows by a few
+//! columns in whole words. A strip is a run of **units**, each one cell high in columns and as many cells as the strip's rows
+//! need; word `k` of all cells of a unit stand side by side:
 //!
 //! ```text
-//! quad q:  unit 0: w0(r0) w0(r1) w0(r2) w0(r3) [w1(r0) .. w1(r3) ...]   unit 1: ...   [scales of group 0]   ...
+//! strip:  unit 0: w0(cell 0) w0(cell 1) .. [w1(cell 0) w1(cell 1) ..]   unit 1: ...   [scales of group 0]   ...
 //! ```
 //!
-//! With group scales, one word of four u8 (row 0 in the low byte) follows the units of each group. Rows beyond the block's
-//! last one, up to the quad's fourth, and columns beyond the last, up to the unit's end, are padding with code 0.
+//! With group scales, a word of four u8 for every four rows (the first in the low byte) follows the units of each group. Where
+//! at most four rows are left for the last strip of eight, it is a strip of four. Rows beyond the block's last one, up to the
+//! strip's end, and columns beyond the last, up to a multiple of the kernel's step, are padding with code 0.
 //!
-//! | width | levels (weight / scale) | columns per unit | words per unit and row | bits per weight before scales |
+//! Every width has two layouts. In **single** lanes, each signed 16-bit lane of an SMLAD operand holds one weight, and the
+//! activations may have 16 bits. In **paired** lanes a lane holds the weights of two rows, one SMLAD makes four MACs, and the
+//! sums are taken apart when they are full; that needs `|x| <= 127`.
+//!
+//! | layout | levels (weight / scale) | cell: rows x columns in words | strip | bits per weight before scales |
 //! |---|---|---|---|---|
-//! | [`w2`] | -3, -1, 1, 3 | 16 | 1 | 2 |
-//! | [`w3`] | -7, -5 .. 7 | 32 | 3 | 3 |
-//! | [`w4`] | -15, -13 .. 15 | 8 | 1 | 4 |
-//! | [`w8`] | -128 .. 127 | 4 | 1 | 8 |
+//! | [`w2`] | -3, -1, 1, 3 | 1 x 16 in 1 | 4 | 2 |
+//! | [`w3`] | -7, -5 .. 7 | 1 x 32 in 3 | 4 | 3 |
+//! | [`w4`] | -15, -13 .. 15 | 1 x 8 in 1 | 4 | 4 |
+//! | [`w8`] | -128 .. 127 | 1 x 4 in 1 | 4 | 8 |
+//! | [`w2_paired`] | as w2 | 2 x 8 in 1 | 8 | 2 |
+//! | [`w3_paired`] | as w3 | 4 x 8 in 3 | 4 | 3 |
+//! | [`w4_paired`] | as w4 | 4 x 2 in 1 | 8 | 4 |
+//! | [`w8_paired`] | as w8 | 2 x 2 in 1 | 4 | 8 |
 //!
 //! Narrow widths use the mid-rise grid of odd levels: for bell-shaped weights four levels at ±1, ±3 lose about a third less
-//! than -2 .. 1 do. A level is `2*code - (2^b - 1)`; the kernels extract the doubled code with the same AND that would extract
-//! the code, and the subtraction is one start value per group, `-(2^b - 1) * sum(x)`.
+//! than -2 .. 1 do. A level is `2*code - (2^b - 1)`; the kernels multiply with the codes, and what the codes' offset adds is
+//! taken back by the start values that stand in the prepared activations ([`XFormat`]).
 
 pub mod w2;
+pub mod w2_paired;
 pub mod w3;
+pub mod w3_paired;
 pub mod w4;
+pub mod w4_paired;
 pub mod w8;
+pub mod w8_paired;
 
 /// Changes whenever a packed layout changes meaning; stamped into every image.
-pub const LAYOUT_STAMP: u32 = 1;
+pub const LAYOUT_STAMP: u32 = 2;
 
-/// Rows interleaved in one quad.
+/// Rows that share a word of group scales; blocks are padded to a multiple of this many rows.
 pub const QUAD: usize = 4;
+
+/// Rows of the highest strip: runs of rows that are computed together start at multiples of this.
+pub const STRIP: usize = 8;
 
 /// Activations are padded with zeros to a multiple of this many columns, which every layout's unit divides.
 pub const PAD_COLS: usize = 32;
@@ -105,44 +122,174 @@ impl Width {
             }
         }
     }
+}
 
-    pub(crate) const fn unit(self) -> Unit {
+/// How many weights a 16-bit lane of an SMLAD operand holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Lanes {
+    /// One.
+    Single,
+    /// Two, of different rows; activations are at most 127.
+    Paired,
+}
+
+impl Lanes {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Single, Self::Paired];
+
+    /// The largest activation that paired lanes hold.
+    pub const PAIRED_X_MAX: u16 = 127;
+
+    /// The lanes of a matrix with activations up to `x_max` and scale groups of `group` columns: paired where they can be,
+    /// which is for int8 activations and row scales or groups of 32.
+    pub const fn of(x_max: u16, group: usize) -> Self {
+        if x_max <= Self::PAIRED_X_MAX && matches!(group, 0 | 32) { Self::Paired } else { Self::Single }
+    }
+
+    /// As it stands in a block record: 0 or 1.
+    pub const fn code(self) -> u8 {
         match self {
-            Self::W2 => w2::UNIT,
-            Self::W3 => w3::UNIT,
-            Self::W4 => w4::UNIT,
-            Self::W8 => w8::UNIT,
+            Self::Single => 0,
+            Self::Paired => 1,
+        }
+    }
+
+    /// The inverse of [`Self::code`].
+    pub const fn from_code(code: u8) -> Option<Self> {
+        match code {
+            0 => Some(Self::Single),
+            1 => Some(Self::Paired),
+            _ => None,
         }
     }
 }
 
-/// The size of a layout's unit.
+/// The size of a layout's cell.
 #[derive(Clone, Copy, Debug)]
-pub struct Unit {
-    /// Columns that a unit covers; divides [`PAD_COLS`].
+pub struct Cell {
+    /// Rows; divides [`QUAD`].
+    pub rows: usize,
+    /// Columns; divides [`PAD_COLS`].
     pub cols: usize,
-    /// Words per row of a unit.
+    /// Words.
     pub words: usize,
 }
 
-/// What a layout file provides. The kernels for a quad are in [`crate::portable`] and `crate::armv7em`.
+impl Cell {
+    /// Whether the cell's words hold codes of `bits` bits and nothing else.
+    pub const fn is_full(self, bits: u32) -> bool {
+        self.rows * self.cols * bits as usize == 32 * self.words
+            && QUAD.is_multiple_of(self.rows)
+            && PAD_COLS.is_multiple_of(self.cols)
+    }
+}
+
+/// What a layout needs in the prepared activations: they are cut into chunks, whose sums a kernel takes apart before they can
+/// overflow.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct XFormat {
+    /// The int16 pairs hold `x << shift`.
+    pub shift: u32,
+    /// Columns of a chunk; a chunk ends with its scale group, too.
+    pub chunk: usize,
+    /// Words before a chunk's pairs: what the kernel's sums start from.
+    pub starts: &'static [Start],
+    /// Whether each group's chunks (the whole row's where there are no groups) are followed by the sum of the group's x.
+    pub sum: bool,
+}
+
+/// A start value, `bias + factor * sum(x)` over the chunk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Start {
+    /// Keeps a lane from borrowing from its neighbour.
+    pub bias: i32,
+    /// Takes back what the codes' offset adds.
+    pub factor: i32,
+}
+
+impl XFormat {
+    /// Of single lanes: one start value a group.
+    const fn single(starts: &'static [Start]) -> Self {
+        Self { shift: 0, chunk: usize::MAX, starts, sum: false }
+    }
+}
+
+/// Sums of a cell before they are taken apart.
+pub type Sums = [i32; 3];
+
+/// What a layout file provides. Its kernel in assembler is in `crate::armv7em`.
 pub trait Format {
-    /// Columns and words of a unit.
-    const UNIT: Unit;
     /// Code width.
     const WIDTH: Width;
+    /// Rows, columns and words of a cell.
+    const CELL: Cell;
+    /// Rows of a strip: [`QUAD`] or [`STRIP`].
+    const STRIP: usize;
+    /// Rows are padded to a multiple of this many columns, the step of the kernel's loop.
+    const STEP: usize;
+    /// What the prepared activations look like.
+    const X: XFormat;
 
-    /// Puts `code` into a row's words of a unit; the words' field must be zero before.
-    fn insert(words: &mut [u32], col: usize, code: u8);
+    /// Puts `code` into a cell's words; the field must be zero before.
+    fn insert(words: &mut [u32; 3], row: usize, col: usize, code: u8);
 
-    /// The code at `col` of a unit, from the row's words.
-    fn extract(words: &[u32], col: usize) -> u8;
+    /// The code at (`row`, `col`) of a cell.
+    fn extract(words: &[u32; 3], row: usize, col: usize) -> u8;
 
-    /// Adds a unit's products to four rows' sums, modulo 2^32: `t[r] += sum((level + offset) * x)`, where offset is
-    /// `2^bits - 1` for the narrow widths and 0 at 8 bits. `words` holds [`QUAD`]` * UNIT.words` words, `x` holds
-    /// `UNIT.cols / 2` int16 pairs.
-    fn mac_quad(words: &[u32], x: &[u32], t: &mut [i32; QUAD]);
+    /// The sums that a chunk starts with, from its start words.
+    fn start(starts: &[u32]) -> Sums {
+        [starts.first().map_or(0, |w| *w as i32); 3]
+    }
+
+    /// Adds a cell's products to its sums, modulo 2^32. `x` holds `CELL.cols / 2` int16 pairs.
+    fn mac(words: &[u32; 3], x: &[u32], t: &mut Sums);
+
+    /// Adds what a chunk's sums mean, `sum(level * x)` of each of the cell's rows. Where [`XFormat::sum`] says so, the sum of
+    /// the group's x is still missing in rows of odd index.
+    fn finish(t: &Sums, rows: &mut [i32]);
 }
+
+/// Calls a function that is generic over the layout of `$shape`.
+macro_rules! with_format {
+    ($shape:expr, $call:ident::<_>($($argument:expr),*)) => {{
+        use $crate::format::{Lanes, Width, w2, w2_paired, w3, w3_paired, w4, w4_paired, w8, w8_paired};
+        match ($shape.width, $shape.lanes) {
+            (Width::W2, Lanes::Single) => $call::<w2::W2>($($argument),*),
+            (Width::W3, Lanes::Single) => $call::<w3::W3>($($argument),*),
+            (Width::W4, Lanes::Single) => $call::<w4::W4>($($argument),*),
+            (Width::W8, Lanes::Single) => $call::<w8::W8>($($argument),*),
+            (Width::W2, Lanes::Paired) => $call::<w2_paired::W2Paired>($($argument),*),
+            (Width::W3, Lanes::Paired) => $call::<w3_paired::W3Paired>($($argument),*),
+            (Width::W4, Lanes::Paired) => $call::<w4_paired::W4Paired>($($argument),*),
+            (Width::W8, Lanes::Paired) => $call::<w8_paired::W8Paired>($($argument),*),
+        }
+    }};
+}
+pub(crate) use with_format;
+
+/// The constants of a layout, for code that is not generic over it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Layout {
+    pub(crate) cell: Cell,
+    strip: usize,
+    step: usize,
+    pub(crate) x: XFormat,
+}
+
+impl Layout {
+    const fn of<F: Format>() -> Self {
+        Self { cell: F::CELL, strip: F::STRIP, step: F::STEP, x: F::X }
+    }
+}
+
+/// By width and lanes. A table in memory takes fewer instructions than a choice for every constant.
+static LAYOUTS: [[Layout; 2]; 4] = [
+    [Layout::of::<w2::W2>(), Layout::of::<w2_paired::W2Paired>()],
+    [Layout::of::<w3::W3>(), Layout::of::<w3_paired::W3Paired>()],
+    [Layout::of::<w4::W4>(), Layout::of::<w4_paired::W4Paired>()],
+    [Layout::of::<w8::W8>(), Layout::of::<w8_paired::W8Paired>()],
+];
 
 /// `c + a.lo * b.lo + a.hi * b.hi` over signed 16-bit halves, modulo 2^32: what the SMLAD instruction computes.
 #[inline(always)]
@@ -157,6 +304,8 @@ pub(crate) fn smlad(a: u32, b: u32, c: i32) -> i32 {
 pub struct BlockShape {
     /// Code width.
     pub width: Width,
+    /// Weights in a lane.
+    pub lanes: Lanes,
     /// Rows, at least 1.
     pub rows: usize,
     /// Columns, at least 1.
@@ -166,30 +315,34 @@ pub struct BlockShape {
 }
 
 impl BlockShape {
-    /// Whether the lengths are usable: rows and columns from 1 to 65535 and a known group.
+    /// Whether the lengths are usable: rows and columns from 1 to 65535 and a group that the lanes know.
     pub const fn is_valid(self) -> bool {
-        self.rows >= 1
-            && self.rows <= 0xffff
-            && self.cols >= 1
-            && self.cols <= 0xffff
-            && matches!(self.group, 0 | 32 | 64 | 128)
+        let group = match self.lanes {
+            Lanes::Single => matches!(self.group, 0 | 32 | 64 | 128),
+            Lanes::Paired => matches!(self.group, 0 | 32),
+        };
+        self.rows >= 1 && self.rows <= 0xffff && self.cols >= 1 && self.cols <= 0xffff && group
     }
 
-    /// Number of quads.
-    pub const fn quads(self) -> usize {
-        self.rows.div_ceil(QUAD)
+    pub(crate) const fn layout(self) -> &'static Layout {
+        &LAYOUTS[self.width as usize][self.lanes as usize]
+    }
+
+    /// Rows with the padding.
+    pub const fn padded_rows(self) -> usize {
+        self.rows.next_multiple_of(QUAD)
     }
 
     /// Units in a row.
     pub const fn units(self) -> usize {
-        self.cols.div_ceil(self.width.unit().cols)
+        self.cols.next_multiple_of(self.layout().step) / self.layout().cell.cols
     }
 
     /// Units in a full group; all units of a row where there are no group scales.
     pub const fn units_per_group(self) -> usize {
         match self.group {
             0 => self.units(),
-            group => group / self.width.unit().cols,
+            group => group / self.layout().cell.cols,
         }
     }
 
@@ -201,30 +354,45 @@ impl BlockShape {
         }
     }
 
-    /// Words of a quad, scales included.
+    /// Words of four rows, scales included; a strip of eight has twice as many.
     pub const fn quad_words(self) -> usize {
-        self.units() * self.width.unit().words * QUAD + self.groups()
+        self.units() * self.layout().cell.words * (QUAD / self.layout().cell.rows) + self.groups()
     }
 
     /// Words of the block.
     pub const fn words(self) -> usize {
-        self.quads() * self.quad_words()
+        self.padded_rows() / QUAD * self.quad_words()
     }
 
-    /// Index of word 0 of (`row`, `unit`); word k of the same unit stands [`QUAD`]` * k` words later.
-    const fn unit_at(self, row: usize, unit: usize) -> usize {
+    /// First row and rows of the strip that `row` is in.
+    const fn strip(self, row: usize) -> (usize, usize) {
+        let height = self.layout().strip;
+        let first = row / height * height;
+        let left = self.padded_rows() - first;
+        (first, if left < height { left } else { height })
+    }
+
+    /// Index of the first word of a cell and the distance to its next word: the cell that holds `row` in unit `unit`.
+    const fn cell_at(self, row: usize, unit: usize) -> (usize, usize) {
+        let (first, height) = self.strip(row);
+        let Cell { rows, words, .. } = self.layout().cell;
         let scales_before = match self.group {
             0 => 0,
-            _ => unit / self.units_per_group(),
+            _ => unit / self.units_per_group() * (height / QUAD),
         };
-        (row / QUAD) * self.quad_words() + unit * self.width.unit().words * QUAD + scales_before + row % QUAD
+        let step = height / rows;
+        let strip = first / QUAD * self.quad_words();
+        (strip + unit * words * step + scales_before + (row - first) / rows, step)
     }
 
-    /// Index of the word that holds the scales of `group` for the quad of `row`.
+    /// Index of the word that holds the scale of `group` for `row`.
     const fn scale_at(self, row: usize, group: usize) -> usize {
+        let (first, height) = self.strip(row);
         let last = (group + 1) * self.units_per_group();
         let units = if last < self.units() { last } else { self.units() };
-        (row / QUAD) * self.quad_words() + units * self.width.unit().words * QUAD + group
+        let Cell { rows, words, .. } = self.layout().cell;
+        let scales_before = group * (height / QUAD) + (row - first) / QUAD;
+        first / QUAD * self.quad_words() + units * words * (height / rows) + scales_before
     }
 }
 
@@ -232,6 +400,7 @@ impl BlockShape {
 #[derive(Clone, Copy, Debug)]
 pub struct Block<'a> {
     shape: BlockShape,
+    quad_words: usize,
     words: &'a [u32],
 }
 
@@ -239,7 +408,11 @@ impl<'a> Block<'a> {
     /// Pairs `words` (little-endian words as they stand in the image) with their shape; `None` where the shape is not
     /// valid or the length differs from [`BlockShape::words`].
     pub fn new(shape: BlockShape, words: &'a [u32]) -> Option<Self> {
-        (shape.is_valid() && words.len() == shape.words()).then_some(Self { shape, words })
+        (shape.is_valid() && words.len() == shape.words()).then(|| Self {
+            shape,
+            quad_words: shape.quad_words(),
+            words,
+        })
     }
 
     /// The shape.
@@ -247,28 +420,32 @@ impl<'a> Block<'a> {
         self.shape
     }
 
-    /// The words of the quads from `first_quad` on; empty when out of range.
-    pub fn quads_from(&self, first_quad: usize) -> &'a [u32] {
-        self.words.get(first_quad.saturating_mul(self.shape.quad_words())..).unwrap_or(&[])
+    /// As [`BlockShape::quad_words`].
+    pub fn quad_words(&self) -> usize {
+        self.quad_words
+    }
+
+    /// The words of the rows from `first_row`, a multiple of [`STRIP`], on; empty when out of range.
+    pub fn rows_from(&self, first_row: usize) -> &'a [u32] {
+        self.words.get((first_row / QUAD).saturating_mul(self.quad_words)..).unwrap_or(&[])
     }
 
     /// The code at (`row`, `col`); 0 when out of range.
     pub fn code(&self, row: usize, col: usize) -> u8 {
-        match self.shape.width {
-            Width::W2 => self.code_of::<w2::W2>(row, col),
-            Width::W3 => self.code_of::<w3::W3>(row, col),
-            Width::W4 => self.code_of::<w4::W4>(row, col),
-            Width::W8 => self.code_of::<w8::W8>(row, col),
+        if row >= self.shape.rows || col >= self.shape.cols {
+            return 0;
         }
+        with_format!(self.shape, code_of::<_>(self, row, col))
     }
 
-    fn code_of<F: Format>(&self, row: usize, col: usize) -> u8 {
-        let at = self.shape.unit_at(row, col / F::UNIT.cols);
-        let mut unit = [0u32; 3];
-        for (k, word) in unit.iter_mut().enumerate().take(F::UNIT.words) {
-            *word = u32::from_le(self.words.get(at + k * QUAD).copied().unwrap_or(0));
+    /// The words of the cell that holds `row` in unit `unit`.
+    pub(crate) fn cell(&self, row: usize, unit: usize) -> [u32; 3] {
+        let (at, step) = self.shape.cell_at(row, unit);
+        let mut cell = [0u32; 3];
+        for (k, word) in cell.iter_mut().enumerate().take(self.shape.layout().cell.words) {
+            *word = u32::from_le(self.words.get(at + k * step).copied().unwrap_or(0));
         }
-        F::extract(&unit, col % F::UNIT.cols)
+        cell
     }
 
     /// The level at (`row`, `col`), without any scale.
@@ -288,6 +465,10 @@ impl<'a> Block<'a> {
     }
 }
 
+fn code_of<F: Format>(block: &Block<'_>, row: usize, col: usize) -> u8 {
+    F::extract(&block.cell(row, col / F::CELL.cols), row % F::CELL.rows, col % F::CELL.cols)
+}
+
 /// Packs a block.
 ///
 /// `codes` is row-major, `rows * cols`; `scales` is row-major, `rows * groups()` (empty without groups); `out` holds exactly
@@ -301,12 +482,7 @@ pub fn pack(shape: BlockShape, codes: &[u8], scales: &[u8], out: &mut [u32]) -> 
         return None;
     }
     out.fill(0);
-    match shape.width {
-        Width::W2 => pack_codes::<w2::W2>(shape, codes, out),
-        Width::W3 => pack_codes::<w3::W3>(shape, codes, out),
-        Width::W4 => pack_codes::<w4::W4>(shape, codes, out),
-        Width::W8 => pack_codes::<w8::W8>(shape, codes, out),
-    }
+    with_format!(shape, pack_codes::<_>(shape, codes, out));
     if shape.groups() > 0 {
         for (row, row_scales) in scales.chunks_exact(shape.groups()).enumerate() {
             for (group, &scale) in row_scales.iter().enumerate() {
@@ -321,14 +497,20 @@ pub fn pack(shape: BlockShape, codes: &[u8], scales: &[u8], out: &mut [u32]) -> 
 }
 
 fn pack_codes<F: Format>(shape: BlockShape, codes: &[u8], out: &mut [u32]) {
-    for (row, row_codes) in codes.chunks_exact(shape.cols).enumerate() {
-        for (unit, unit_codes) in row_codes.chunks(F::UNIT.cols).enumerate() {
+    for first_row in (0..shape.padded_rows()).step_by(F::CELL.rows) {
+        for unit in 0..shape.units() {
+            // Padding has code 0, too, which is not always a field of zeros.
             let mut words = [0u32; 3];
-            for (col, &code) in unit_codes.iter().enumerate() {
-                F::insert(&mut words, col, code);
+            for row in 0..F::CELL.rows {
+                for col in 0..F::CELL.cols {
+                    let at = unit * F::CELL.cols + col;
+                    let code = if at < shape.cols { codes.get((first_row + row) * shape.cols + at) } else { None };
+                    F::insert(&mut words, row, col, code.copied().unwrap_or(0));
+                }
             }
-            for (k, &word) in words.iter().enumerate().take(F::UNIT.words) {
-                out[shape.unit_at(row, unit) + k * QUAD] = word;
+            let (at, step) = shape.cell_at(first_row, unit);
+            for (k, &word) in words.iter().enumerate().take(F::CELL.words) {
+                out[at + k * step] = word;
             }
         }
     }

@@ -1,7 +1,7 @@
 //! The GEMV, and the one place that chooses its backend.
 
 use crate::activations::Prepared;
-use crate::format::{Block, QUAD};
+use crate::format::{Block, STRIP};
 
 /// A backend that can be compiled in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,24 +15,28 @@ pub enum Backend {
 /// The backend that [`gemv`] uses in this build.
 pub const BACKEND: Backend = if cfg!(actq_armv7em) { Backend::Armv7em } else { Backend::Portable };
 
-/// The block and the prepared vector do not belong together: other columns or another group size.
+/// The block and the prepared vector do not belong together (other columns, another group size or layout), or the rows are
+/// no whole strips.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mismatch;
 
-/// Multiplies quads of a block's rows with a prepared vector.
+/// Multiplies a run of a block's rows with a prepared vector.
 ///
-/// `acc[q][r]` becomes `sum over groups of scale * sum over columns of level * x`, modulo 2^32, for row
-/// `4 * (first_quad + q) + r`. The sums of padding rows have no meaning. As many quads are computed as both `acc` and the
-/// block hold; the rest of `acc` is left as it was.
+/// `acc[i]` becomes `sum over groups of scale * sum over columns of level * x`, modulo 2^32, for row `first_row + i`. The run
+/// starts at a multiple of [`STRIP`]; it ends at another or where the block does, padded to a multiple of
+/// [`crate::format::QUAD`] rows. The sums of padding rows have no meaning.
 ///
 /// The true sum fits an i32 where [`crate::linear::worst_case`] says so, which [`crate::Image::new_checked`] has verified.
-pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_quad: usize, acc: &mut [[i32; QUAD]]) -> Result<(), Mismatch> {
-    if block.shape().cols != x.cols || block.shape().group != x.group {
+pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i32]) -> Result<(), Mismatch> {
+    let shape = block.shape();
+    let end = first_row.saturating_add(acc.len());
+    let ends_well = end == shape.padded_rows() || end < shape.padded_rows() && end.is_multiple_of(STRIP);
+    if !x.fits(shape) || !first_row.is_multiple_of(STRIP) || !ends_well {
         return Err(Mismatch);
     }
     #[cfg(actq_armv7em)]
-    crate::armv7em::gemv(block, x, first_quad, acc);
+    crate::armv7em::gemv(block, x, first_row, acc);
     #[cfg(not(actq_armv7em))]
-    crate::portable::gemv(block, x, first_quad, acc);
+    crate::portable::gemv(block, x, first_row, acc);
     Ok(())
 }

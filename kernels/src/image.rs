@@ -4,7 +4,7 @@
 //! from its start, offsets in the arena (the scratch memory) count words too.
 
 use crate::error::ImageError;
-use crate::format::{Block, BlockShape, LAYOUT_STAMP, Width};
+use crate::format::{Block, BlockShape, LAYOUT_STAMP, Lanes, Width};
 use crate::linear::{Matrix, RowBlock, worst_case, worst_case_bound};
 use crate::math::Function;
 
@@ -681,11 +681,12 @@ impl<'a> Image<'a> {
     fn check_block(&self, matrix: &Matrix<'a>, at: usize, first_row: usize) -> Result<RowBlock<'a>, ImageError> {
         let head = self.word(at);
         let width = Width::from_bits(head & 0xff).ok_or(ImageError::Width)?;
-        if head >> 8 & 0xff != 0 {
-            return Err(ImageError::Reserved);
+        let lanes = Lanes::from_code((head >> 8) as u8).ok_or(ImageError::Lanes)?;
+        if lanes != matrix.lanes() {
+            return Err(ImageError::Lanes);
         }
         let rows = (head >> 16) as usize;
-        let shape = BlockShape { width, rows, cols: matrix.cols, group: matrix.group };
+        let shape = BlockShape { width, lanes, rows, cols: matrix.cols, group: matrix.group };
         if !shape.is_valid() || rows > matrix.rows {
             return Err(ImageError::Shape);
         }
@@ -704,7 +705,8 @@ fn row_block<'a>(matrix: &Matrix<'a>, record: &'a [u32], first_row: usize) -> Op
     let word = |i: usize| record.get(i).map_or(0, |w| u32::from_le(*w));
     let rows = (word(0) >> 16) as usize;
     let width = Width::from_bits(word(0) & 0xff)?;
-    let shape = BlockShape { width, rows, cols: matrix.cols, group: matrix.group };
+    let lanes = Lanes::from_code((word(0) >> 8) as u8)?;
+    let shape = BlockShape { width, lanes, rows, cols: matrix.cols, group: matrix.group };
     let section = |offset: u32, len: usize| {
         let offset = offset as usize;
         offset.checked_add(len).and_then(|end| matrix.image.get(offset..end))

@@ -1,16 +1,18 @@
 //! A quantized matrix times a vector, from f32 to f32: the order of operations that every machine follows.
 //!
-//! 1. `x` is quantized to integers `q` with one scale ([`crate::activations::quantize`]).
+//! 1. `x` is quantized to integers `q` with one scale ([`crate::activations::Scale`]).
 //! 2. Per row, the integer sum `acc = sum_g s_g * sum_c level * q` in int32 ([`crate::gemv`]).
 //! 3. `y = start + acc * (row_scale * x_scale)`, each operation rounded to f32, where `start` is the bias, or, where the
 //!    operation accumulates, the sum of the old `y` and the bias. Rows that no block holds (0 bits) keep `start`.
 
-use crate::activations::{self, NotFinite, Prepared};
-use crate::format::{Block, QUAD};
+use crate::activations::{NotFinite, Prepared, Scale, max_prepared_words, prepared_words};
+#[cfg(actq_fpu)]
+use crate::armv7em;
+use crate::format::{Block, Lanes, STRIP};
 use crate::gemv::gemv;
 
-/// Quads whose sums stand on the stack at once.
-const CHUNK: usize = 8;
+/// Rows whose sums stand on the stack at once.
+const RUN: usize = 8 * STRIP;
 
 /// A matrix in an image: blocks of rows and a bias.
 #[derive(Clone, Copy, Debug)]
@@ -37,10 +39,11 @@ pub struct RowBlock<'a> {
     /// The packed codes.
     pub block: Block<'a>,
     /// bf16 row scales, two a word.
-    pub(crate) scales: &'a [u32],
+    pub scales: &'a [u32],
     /// u16 output indexes, two a word; empty where the rows follow each other from `first_row` on.
-    pub(crate) index: &'a [u32],
-    pub(crate) first_row: usize,
+    pub index: &'a [u32],
+    /// The output index of the first row, where there is no index.
+    pub first_row: usize,
 }
 
 /// Half `i` of a run of packed u16.
@@ -63,40 +66,112 @@ impl RowBlock<'_> {
     pub fn output(&self, i: usize) -> usize {
         if self.index.is_empty() { self.first_row + i } else { half_word(self.index, i) as usize }
     }
+
+    /// `y = start + acc * (row_scale * x_scale)` for the block's rows and their places in `y`, with a vector that was prepared
+    /// for the block. `start` holds the bits of the whole output's biases; without it, y itself is the start. Nothing is done
+    /// where `start` or `y` is too short.
+    pub fn apply(&self, x: &Prepared<'_>, x_scale: Scale, start: Option<&[u32]>, y: &mut [f32]) {
+        let shape = self.block.shape();
+        let mut first = 0;
+        // Rows in order have room for their sums in y itself, except those of a last strip that padding fills.
+        if let (Some(start), true) = (start, self.index.is_empty()) {
+            let whole = self.first_row..self.first_row + (shape.rows & !(STRIP - 1));
+            let (Some(start), Some(y)) = (start.get(whole.clone()), y.get_mut(whole)) else { return };
+            if gemv(&self.block, x, 0, bytemuck::cast_slice_mut(y)).is_err() {
+                return;
+            }
+            self.scale_in_place(x_scale.get(), start, y);
+            first = y.len();
+        }
+        if first == shape.rows {
+            return;
+        }
+        let mut sums = [0; RUN];
+        while first < shape.rows {
+            let sums = &mut sums[..RUN.min(shape.padded_rows() - first)];
+            if gemv(&self.block, x, first, sums).is_err() {
+                return;
+            }
+            let sums = &sums[..sums.len().min(shape.rows - first)];
+            self.scale_rows(first, sums, x_scale.get(), start, y);
+            first += sums.len();
+        }
+    }
+
+    /// Turns the integer sums in y, of the first `y.len()` rows, into results.
+    fn scale_in_place(&self, x_scale: f32, start: &[u32], y: &mut [f32]) {
+        #[cfg(actq_fpu)]
+        let done = armv7em::scale(armv7em::Operands::SumsInPlace(start), self.scales, x_scale, y);
+        #[cfg(not(actq_fpu))]
+        let done = 0;
+        for (i, (y, start)) in y.iter_mut().zip(start).enumerate().skip(done) {
+            *y = f32::from_bits(u32::from_le(*start)) + y.to_bits() as i32 as f32 * (self.scale(i) * x_scale);
+        }
+    }
+
+    /// Adds the sums of the rows from `first` on, scaled, to what `start` or y holds.
+    fn scale_rows(&self, first: usize, sums: &[i32], x_scale: f32, start: Option<&[u32]>, y: &mut [f32]) {
+        #[cfg(actq_fpu)]
+        let done = match (start, self.scales.get(first / 2..), y.get_mut(self.first_row + first..)) {
+            (None, Some(scales), Some(y)) if self.index.is_empty() => {
+                armv7em::scale(armv7em::Operands::StartInPlace(sums), scales, x_scale, y)
+            }
+            _ => 0,
+        };
+        #[cfg(not(actq_fpu))]
+        let done = 0;
+        for (i, sum) in (first..).zip(sums).skip(done) {
+            let at = self.output(i);
+            let Some(y) = y.get_mut(at) else { continue };
+            let start = start.and_then(|s| s.get(at)).map_or(*y, |bits| f32::from_bits(u32::from_le(*bits)));
+            *y = start + *sum as f32 * (self.scale(i) * x_scale);
+        }
+    }
 }
 
 impl Matrix<'_> {
-    /// Words that the prepared activations take.
+    /// The lanes of the matrix's blocks.
+    pub const fn lanes(&self) -> Lanes {
+        Lanes::of(self.x_max, self.group)
+    }
+
+    /// Words that the prepared activations take at most.
     pub fn prepared_words(&self) -> usize {
-        activations::prepared_words(self.cols, self.group)
+        max_prepared_words(self.cols, self.group)
     }
 
     /// `y = W x + b`, or `y = y + b + W x` where `accumulate`. `work` holds at least [`Self::prepared_words`] words; `x` and
     /// `y` have the matrix's lengths (what is missing is left out).
     pub fn apply(&self, x: &[f32], work: &mut [u32], y: &mut [f32], accumulate: bool) -> Result<(), NotFinite> {
-        let Some(work) = work.get_mut(..self.prepared_words()) else { return Ok(()) };
-        let x_scale = activations::quantize(x, self.x_max, self.group, work)?;
-        self.start(y, accumulate);
-        let Some(x) = Prepared::new(work, self.cols, self.group) else { return Ok(()) };
+        let x_scale = Scale::new(x, self.x_max)?;
+        // One pass over the output where every row has its bias and is written once, in order.
+        let start = if accumulate || self.bias.is_empty() || !self.is_whole() { None } else { Some(self.bias) };
+        if start.is_none() {
+            self.start(y, accumulate);
+        }
+        let mut last = None;
         for rows in self.blocks() {
-            let mut quad = 0;
-            let quads = rows.block.shape().quads();
-            while quad < quads {
-                let mut acc = [[0i32; QUAD]; CHUNK];
-                if gemv(&rows.block, &x, quad, &mut acc).is_err() {
-                    return Ok(());
-                }
-                let first = quad * QUAD;
-                let count = (rows.block.shape().rows - first).min(CHUNK * QUAD);
-                for (i, acc) in acc.as_flattened().iter().enumerate().take(count) {
-                    if let Some(y) = y.get_mut(rows.output(first + i)) {
-                        *y += *acc as f32 * (rows.scale(first + i) * x_scale);
-                    }
-                }
-                quad += CHUNK;
+            let shape = rows.block.shape();
+            let Some(work) = work.get_mut(..prepared_words(shape)) else { return Ok(()) };
+            // Layouts prepare the activations differently; the blocks of one width share them.
+            if last != Some(shape.width) {
+                x_scale.quantize(x, shape, work);
+                last = Some(shape.width);
+            }
+            if let Some(x) = Prepared::new(work, shape) {
+                rows.apply(&x, x_scale, start, y);
             }
         }
         Ok(())
+    }
+
+    /// Whether the blocks hold all rows in the order of the output.
+    fn is_whole(&self) -> bool {
+        let mut rows = 0;
+        self.blocks().all(|block| {
+            rows += block.block.shape().rows;
+            block.index.is_empty()
+        }) && rows == self.rows
     }
 
     fn start(&self, y: &mut [f32], accumulate: bool) {

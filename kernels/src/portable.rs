@@ -1,56 +1,35 @@
-//! The GEMV in plain Rust, for any target: the algorithm of the assembler backend, instruction for instruction where it can be.
+//! The GEMV in plain Rust, for any target: the arithmetic of the assembler backend, sum for sum.
 
 use crate::activations::Prepared;
-use crate::format::{Block, Format, QUAD, Width, w2, w3, w4, w8};
+use crate::format::{Block, Format, QUAD, with_format};
 
-/// As [`crate::gemv::gemv`].
-pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_quad: usize, acc: &mut [[i32; QUAD]]) {
-    match block.shape().width {
-        Width::W2 => gemv_of::<w2::W2>(block, x, first_quad, acc),
-        Width::W3 => gemv_of::<w3::W3>(block, x, first_quad, acc),
-        Width::W4 => gemv_of::<w4::W4>(block, x, first_quad, acc),
-        Width::W8 => gemv_of::<w8::W8>(block, x, first_quad, acc),
-    }
+/// As [`crate::gemv::gemv`], for lengths that were checked there.
+pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i32]) {
+    with_format!(block.shape(), gemv_of::<_>(block, x, first_row, acc));
 }
 
-/// The start value of a group's sums: what the codes' offset adds to every row, taken back.
-#[inline(always)]
-fn start(width: Width, sum: u32) -> i32 {
-    match width {
-        Width::W8 => 0,
-        // -(2^b - 1) * sum
-        _ => (sum as i32).wrapping_sub((sum as i32) << width.bits()),
-    }
-}
-
-fn gemv_of<F: Format>(block: &Block<'_>, x: &Prepared<'_>, first_quad: usize, acc: &mut [[i32; QUAD]]) {
+fn gemv_of<F: Format>(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i32]) {
     let shape = block.shape();
-    let quads = block.quads_from(first_quad).chunks_exact(shape.quad_words());
-    let unit_words = F::UNIT.words * QUAD;
-    let group_units = shape.units_per_group();
-    // A group's part of the prepared vector and of the quad; the last group may be shorter.
-    let group_x = 1 + group_units * F::UNIT.cols / 2;
-    let group_words = group_units * unit_words + usize::from(shape.group != 0);
-    for (quad, sums) in quads.zip(acc) {
-        *sums = [0; QUAD];
-        let x_groups = match shape.group {
-            0 => x.words.chunks(x.words.len().max(1)),
-            _ => x.words.chunks(group_x),
-        };
-        for (words, x) in quad.chunks(group_words).zip(x_groups) {
-            let Some((&sum, x)) = x.split_first() else { continue };
-            let mut t = [start(F::WIDTH, sum); QUAD];
-            for (words, x) in words.chunks_exact(unit_words).zip(x.chunks_exact(F::UNIT.cols / 2)) {
-                F::mac_quad(words, x, &mut t);
-            }
-            match (shape.group, words.last()) {
-                (0, _) | (_, None) => *sums = t,
-                (_, Some(&scales)) => {
-                    for (r, (sum, t)) in sums.iter_mut().zip(t).enumerate() {
-                        let scale = i32::from((u32::from_le(scales) >> (8 * r)) as u8);
-                        *sum = sum.wrapping_add(t.wrapping_mul(scale));
-                    }
+    let last_row = shape.padded_rows();
+    for (first, acc) in (first_row..last_row).step_by(F::CELL.rows).zip(acc.chunks_exact_mut(F::CELL.rows)) {
+        acc.fill(0);
+        let mut unit = 0;
+        for (group, words) in x.groups().enumerate() {
+            let mut sums = [0i32; QUAD];
+            let (chunks, sum) = words.split_at(words.len() - usize::from(F::X.sum));
+            for chunk in chunks.chunks(x.chunk_words()) {
+                let (starts, pairs) = chunk.split_at(F::X.starts.len());
+                let mut t = F::start(starts);
+                for pairs in pairs.chunks_exact(F::CELL.cols / 2).take(shape.units() - unit) {
+                    F::mac(&block.cell(first, unit), pairs, &mut t);
+                    unit += 1;
                 }
+                F::finish(&t, &mut sums[..F::CELL.rows]);
+            }
+            for (r, (acc, sum_of_row)) in acc.iter_mut().zip(sums).enumerate() {
+                let x_sum = if r % 2 == 1 { sum.first().map_or(0, |s| *s as i32) } else { 0 };
+                let scale = i32::from(block.group_scale(first + r, group * shape.group));
+                *acc = acc.wrapping_add(sum_of_row.wrapping_add(x_sum).wrapping_mul(scale));
             }
         }
     }

@@ -12,11 +12,8 @@ pub fn dot(block: &Block<'_>, x: &Prepared<'_>, row: usize) -> i32 {
 }
 
 /// As [`crate::gemv::gemv`].
-pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_quad: usize, acc: &mut [[i32; 4]]) {
-    for (quad, sums) in acc.iter_mut().enumerate() {
-        for (r, sum) in sums.iter_mut().enumerate() {
-            let row = (first_quad + quad) * 4 + r;
-            *sum = if row < block.shape().rows { dot(block, x, row) } else { 0 };
-        }
+pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i32]) {
+    for (row, sum) in (first_row..).zip(acc) {
+        *sum = if row < block.shape().rows { dot(block, x, row) } else { 0 };
     }
 }

@@ -18,7 +18,7 @@ pub fn bits_per_weight(image: &Image<'_>) -> f64 {
 /// The matrices, each once.
 fn distinct<'a>(image: &Image<'a>) -> Vec<Matrix<'a>> {
     let mut seen = BTreeSet::new();
-    let place = |m: &Matrix<'a>| m.blocks().next().map(|rows| rows.block.quads_from(0).as_ptr() as usize);
+    let place = |m: &Matrix<'a>| m.blocks().next().map(|rows| rows.block.rows_from(0).as_ptr() as usize);
     image
         .ops()
         .filter_map(|op| match op {

@@ -4,7 +4,7 @@
 //! outlives a step (recurrent state, the last action, the chunk) has a place of its own; the other buffers share memory by
 //! their lifetimes, first fit.
 
-use actq_kernels::activations::prepared_words;
+use actq_kernels::activations::max_prepared_words;
 use actq_kernels::image::Region;
 use actq_kernels::math::Function;
 use anyhow::{Result, ensure};
@@ -296,7 +296,7 @@ impl Lowering<'_> {
             placed.push((buffer, life));
         }
         let work_offset = ends.into_iter().max().unwrap_or(top);
-        let work_len = self.graph.matrices.iter().map(|m| prepared_words(m.cols, group)).max().unwrap_or(0);
+        let work_len = self.graph.matrices.iter().map(|m| max_prepared_words(m.cols, group)).max().unwrap_or(0);
         let words = work_offset + work_len;
         ensure!(
             words <= usize::from(u16::MAX),

@@ -356,7 +356,7 @@ fn summary(policy: &Policy, outcomes: &[Outcome]) -> String {
     let mut total = 0;
     for (matrix, outcome) in policy.graph.matrices.iter().zip(outcomes) {
         let quantized = &outcome.quantized;
-        let bytes = quantized.bytes();
+        let bytes = outcome.bytes();
         total += bytes;
         rows.add_row([
             matrix.name.clone(),

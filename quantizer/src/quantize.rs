@@ -15,7 +15,7 @@ pub mod windows;
 
 use std::fmt;
 
-use actq_kernels::format::{BlockShape, Width};
+use actq_kernels::format::{BlockShape, Lanes, Width};
 use actq_kernels::image::block_bytes;
 use anyhow::{Result, bail, ensure};
 use half::bf16;
@@ -147,7 +147,28 @@ pub struct Options {
     pub forced: Vec<(String, Width)>,
 }
 
+/// How rows are packed, beside their widths.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Packing {
+    /// Lanes of the activations.
+    pub lanes: Lanes,
+    /// Columns per u8 scale; 0 = none.
+    pub group: usize,
+}
+
+impl Packing {
+    /// The shape of a block of rows.
+    pub fn shape(self, width: Width, rows: usize, cols: usize) -> BlockShape {
+        BlockShape { width, lanes: self.lanes, rows, cols, group: self.group }
+    }
+}
+
 impl Options {
+    /// How matrices are packed before any of them is found to need int16 activations.
+    pub fn packing(&self) -> Packing {
+        Packing { lanes: Lanes::of(self.activations.limit(), self.group), group: self.group }
+    }
+
     /// A method and a budget, one scale a row, everything else as it suits the method.
     pub fn new(method: Method, budget: Budget) -> Self {
         Self { method, budget, group: 0, activations: Activations::Auto, steps: None, seed: 1, forced: Vec::new() }
@@ -207,29 +228,10 @@ impl Quantized {
         }
     }
 
-    /// Rows sorted by width, as blocks: shape and rows of each. A matrix of one width is one block in the rows' own order.
-    pub fn blocks(&self) -> Vec<(BlockShape, Vec<usize>)> {
-        Width::ALL
-            .into_iter()
-            .filter_map(|width| {
-                let rows: Vec<usize> = (0..self.rows).filter(|&r| self.widths[r] == Some(width)).collect();
-                let shape = BlockShape { width, rows: rows.len(), cols: self.cols, group: self.group };
-                (!rows.is_empty()).then_some((shape, rows))
-            })
-            .collect()
-    }
-
     /// Whether the blocks' rows follow each other in the order of the output, so that no index is stored. (Missing rows may
     /// only be the last.)
     pub fn in_order(blocks: &[(BlockShape, Vec<usize>)]) -> bool {
         blocks.iter().flat_map(|(_, rows)| rows).enumerate().all(|(i, &row)| i == row)
-    }
-
-    /// Bytes of codes, padding, scales, indexes and block records.
-    pub fn bytes(&self) -> usize {
-        let blocks = self.blocks();
-        let indexed = !Self::in_order(&blocks);
-        blocks.iter().map(|(shape, _)| block_bytes(*shape, indexed)).sum()
     }
 
     /// The largest activation magnitude whose worst-case row sum stays within int32, at most `limit`.
@@ -270,6 +272,32 @@ impl Outcome {
         let error = Some(moments::relative_error(matrix, &quantized.dequantized(), moments));
         Ok(Self { error, quantized, x_max })
     }
+
+    /// The lanes that the matrix is packed for.
+    pub fn lanes(&self) -> Lanes {
+        Lanes::of(self.x_max, self.quantized.group)
+    }
+
+    /// Rows sorted by width, as blocks: shape and rows of each. A matrix of one width is one block in the rows' own order.
+    pub fn blocks(&self) -> Vec<(BlockShape, Vec<usize>)> {
+        let matrix = &self.quantized;
+        let lanes = self.lanes();
+        Width::ALL
+            .into_iter()
+            .filter_map(|width| {
+                let rows: Vec<usize> = (0..matrix.rows).filter(|&r| matrix.widths[r] == Some(width)).collect();
+                let shape = BlockShape { width, lanes, rows: rows.len(), cols: matrix.cols, group: matrix.group };
+                (!rows.is_empty()).then_some((shape, rows))
+            })
+            .collect()
+    }
+
+    /// Bytes of codes, padding, scales, indexes and block records.
+    pub fn bytes(&self) -> usize {
+        let blocks = self.blocks();
+        let indexed = !Quantized::in_order(&blocks);
+        blocks.iter().map(|(shape, _)| block_bytes(*shape, indexed)).sum()
+    }
 }
 
 /// Quantizes every matrix of `graph` by rtn or gptq. `moments` has one entry per matrix, or is empty where the method needs none.
@@ -301,7 +329,7 @@ pub fn quantize(graph: &Graph, moments: &[Moments], options: &Options) -> Result
 /// One of each matrix's tries so that the bytes stay within `limit`: starting from the narrowest, always the change that lowers
 /// the sum of relative errors most per byte and still fits. (A wider try can take fewer bytes, where it pads less.)
 fn allocate(tries: &[Vec<Outcome>], limit: f64, weights: usize) -> Result<Vec<usize>> {
-    let size = |m: usize, choice: usize| tries[m][choice].quantized.bytes();
+    let size = |m: usize, choice: usize| tries[m][choice].bytes();
     let error = |m: usize, choice: usize| tries[m][choice].error.unwrap_or(0.0);
     let mut chosen = vec![0; tries.len()];
     let mut bytes: usize = (0..tries.len()).map(|m| size(m, 0)).sum();

@@ -102,10 +102,8 @@ fn point(
     let buffer = ImageBuffer::new(&writer::image(&quantized, &outcomes)?);
     let image = buffer.image(Path::new("image in memory"))?;
     let report = eval::evaluate(image, &eval::heldout(&policy.dir, &image)?)?;
-    let bits = outcomes
-        .iter()
-        .map(|outcome| outcome.quantized.blocks().iter().map(|(shape, _)| shape.width.bits()).collect())
-        .collect();
+    let bits =
+        outcomes.iter().map(|outcome| outcome.blocks().iter().map(|(shape, _)| shape.width.bits()).collect()).collect();
     Ok(Some(Point { budget, report, bits }))
 }
 

@@ -20,7 +20,7 @@ pub fn image(policy: &Policy, matrices: &[Outcome]) -> Result<Vec<u8>> {
     let group = matrices.first().map_or(0, |m| m.quantized.group);
     let program = lower(&policy.graph, policy.act_len, group)?;
     let mut writer = Writer { words: vec![0; h::WORDS], packed: Vec::new() };
-    writer.packed = matrices.iter().map(|m| writer.weights(&m.quantized)).collect::<Result<_>>()?;
+    writer.packed = matrices.iter().map(|m| writer.weights(m)).collect::<Result<_>>()?;
     let records = program
         .steps
         .iter()
@@ -175,8 +175,9 @@ impl Writer {
     }
 
     /// Packs a matrix's blocks.
-    fn weights(&mut self, matrix: &Quantized) -> Result<Packed> {
-        let blocks = matrix.blocks();
+    fn weights(&mut self, outcome: &Outcome) -> Result<Packed> {
+        let matrix = &outcome.quantized;
+        let blocks = outcome.blocks();
         let in_order = Quantized::in_order(&blocks);
         let mut records = Vec::new();
         for (shape, rows) in &blocks {
@@ -197,7 +198,12 @@ impl Writer {
                 let index = rows.iter().map(|&r| u16::try_from(r)).collect::<Result<Vec<_>, _>>()?;
                 self.push(half_words(&index))
             };
-            records.extend([shape.width.bits() | halves(0, shape.rows)?, weights, scales, index]);
+            records.extend([
+                shape.width.bits() | u32::from(shape.lanes.code()) << 8 | halves(0, shape.rows)?,
+                weights,
+                scales,
+                index,
+            ]);
         }
         Ok(Packed { records })
     }

@@ -17,6 +17,8 @@ use actq_ur3::policy_f32::PolicyF32;
 use actq_ur3::task::{Outcome, run_episode};
 use anyhow::{Context, Result, ensure};
 
+use crate::bench;
+
 /// First seed of the closed-loop episodes; the policy was trained and calibrated on others.
 const FIRST_SEED: u64 = 1000;
 
@@ -118,9 +120,10 @@ pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
         summary.add_row(std::iter::once((*row).to_owned()).chain(cells));
     }
     println!("\n{summary}\n\n{}\n", report.join("\n"));
+    let records = bench::measure(&work.join("ur3-3.0-bits.actq"), &counter)?;
     println!(
-        "Instructions counted on the Cortex-M4, a whole call each:\n\n{}",
-        kernels(&work.join("ur3-3.0-bits.actq"), &counter)?
+        "A whole call each on the Cortex-M4, instructions counted, cycles modelled:\n\n{}",
+        bench::report(&records, Some((256, 256)))
     );
     Ok(())
 }
@@ -216,40 +219,4 @@ impl Firmware {
             code_bytes: qemu::flash_bytes(&elf)? - image.bytes() as u64,
         })
     }
-}
-
-/// The kernels and a naive loop, counted side by side.
-fn kernels(image: &Path, counter: &Counter) -> Result<String> {
-    let elf = qemu::build("bench", Target::Fpu, image)?;
-    let mut command = qemu::command(&elf, None, "");
-    counter.attach(&mut command, &elf)?;
-    let output = qemu::run(command, &[])?;
-    ensure!(output.status.success(), "the bench firmware failed: {}", String::from_utf8_lossy(&output.stderr));
-    let counts = counter.counts()?;
-    let lines = String::from_utf8(output.stdout)?;
-    ensure!(lines.lines().count() == counts.len(), "the bench firmware and the counter disagree");
-    let mut rows = table(&["kernel", "bits", "scales", "shape", "instructions", "per MAC", "against naive"]);
-    let naive = *counts.first().context("the bench firmware measured nothing")? as f64;
-    for (line, count) in lines.lines().zip(counts) {
-        let fields: Vec<&str> = line.split_whitespace().collect();
-        let [name, bits, group, shape_rows, cols] = fields[..] else {
-            anyhow::bail!("the bench firmware printed {line:?}");
-        };
-        let macs = shape_rows.parse::<f64>()? * cols.parse::<f64>()?;
-        let scales = match (name, group) {
-            ("naive-f32", _) => "-".to_owned(),
-            (_, "0") => "row".to_owned(),
-            (_, group) => group.to_owned(),
-        };
-        rows.add_row([
-            name.to_owned(),
-            bits.to_owned(),
-            scales,
-            format!("{shape_rows}x{cols}"),
-            count.to_string(),
-            format!("{:.2}", count as f64 / macs),
-            format!("{:.1}x", naive / count as f64),
-        ]);
-    }
-    Ok(rows.to_string())
 }

@@ -1,10 +1,12 @@
-//! What people and CI type: `cargo demo`, `cargo verify`, `cargo xtask doctor`.
+//! What people and CI type: `cargo demo`, `cargo verify`, `cargo xtask bench`, `cargo xtask doctor`.
 #![forbid(unsafe_code)]
 
+mod bench;
 mod demo;
 mod setup;
 mod verify;
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -28,6 +30,12 @@ enum Command {
         #[arg(long, default_value_t = 20)]
         qemu_episodes: u64,
     },
+    /// Count the kernels' instructions on a Cortex-M4 in QEMU and model their cycles
+    Bench {
+        /// Write the figures as JSON, too
+        #[arg(long)]
+        json: Option<PathBuf>,
+    },
     /// Everything that CI checks: format, lints, documentation, tests on the host and under QEMU
     Verify,
     /// Check and install what the other commands need: Rust targets and QEMU
@@ -37,6 +45,7 @@ enum Command {
 fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Demo { episodes, qemu_episodes } => setup::ensure().and_then(|()| demo::run(episodes, qemu_episodes)),
+        Command::Bench { json } => setup::ensure().and_then(|()| bench::run(json.as_deref())),
         Command::Verify => setup::ensure().and_then(|()| verify::run()),
         Command::Doctor => setup::ensure().map(|()| println!("all there")),
     };

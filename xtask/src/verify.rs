@@ -3,8 +3,10 @@
 use std::process::Command;
 use std::time::Instant;
 
-use actq_host_tests::qemu::{Target, target_dir};
+use actq_host_tests::qemu::Target;
 use anyhow::{Context, Result, bail};
+
+use crate::bench::placeholder;
 
 /// A step: its name, the arguments of cargo, and environment variables.
 type Step<'a> = (&'a str, Vec<&'a str>, Vec<(&'a str, String)>);
@@ -12,9 +14,7 @@ type Step<'a> = (&'a str, Vec<&'a str>, Vec<(&'a str, String)>);
 /// Runs all steps.
 pub(crate) fn run() -> Result<()> {
     // The firmware includes an image by path. Lints and documentation do not run it, so any file will do for them.
-    let placeholder = target_dir().join("verify-image");
-    std::fs::create_dir_all(target_dir())?;
-    std::fs::write(&placeholder, [0u8; 4]).with_context(|| placeholder.display().to_string())?;
+    let placeholder = placeholder()?;
     let image = || ("ACTQ_IMAGE", placeholder.display().to_string());
     let deny = || ("RUSTDOCFLAGS", "-D warnings".to_owned());
     let firmware = |command, target: Target| {

@@ -1,7 +1,7 @@
 //! Counted kernel calls: each prints a line `name bits group rows cols`, in the order of the counted regions.
 //!
-//! A region is a whole call: activations from f32, the product, and the results back in f32. The naive loop in f32 is the
-//! yardstick.
+//! A region is a whole call: activations from f32, the product, and the results back in f32 with row scales and biases. The
+//! yardsticks are a naive loop in f32, and 8-bit rows with SXTB16 and SMLAD as one would write them with intrinsics.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
@@ -12,38 +12,45 @@ fn main() {
 
 #[cfg(target_os = "none")]
 mod firmware {
+    use core::arch::asm;
     use core::fmt::Write as _;
     use core::hint::black_box;
 
     use actq_firmware_demo::{count, host};
-    use actq_kernels::activations::{Prepared, prepared_words, quantize};
-    use actq_kernels::format::{Block, BlockShape, QUAD, Width, pack};
-    use actq_kernels::gemv::gemv;
+    use actq_kernels::activations::{Prepared, Scale, prepared_words};
+    use actq_kernels::format::{Block, BlockShape, Lanes, Width, pack};
+    use actq_kernels::linear::RowBlock;
     use cortex_m::singleton;
     use cortex_m_semihosting::hio;
 
-    const ROWS: usize = 256;
-    const COLS: usize = 256;
+    const SHAPES: [(usize, usize); 5] = [(64, 256), (256, 256), (512, 512), (128, 1024), (28, 256)];
+    const WEIGHTS: usize = 512 * 512;
+    const ROWS: usize = 512;
+    const COLS: usize = 1024;
 
     struct Buffers {
-        codes: [u8; ROWS * COLS],
-        scales: [u8; ROWS * COLS / 32],
-        weights: [f32; ROWS * COLS],
-        words: [u32; ROWS * COLS / 4 + ROWS * COLS / 128],
+        codes: [u8; WEIGHTS],
+        scales: [u8; WEIGHTS / 32],
+        weights: [f32; WEIGHTS],
+        words: [u32; WEIGHTS / 4 + WEIGHTS / 128],
         x: [f32; COLS],
         prepared: [u32; COLS],
+        row_scales: [u32; ROWS / 2],
+        bias: [u32; ROWS],
         y: [f32; ROWS],
     }
 
     #[cortex_m_rt::entry]
     fn main() -> ! {
         let buffers = singleton!(: Buffers = Buffers {
-            codes: [0; ROWS * COLS],
-            scales: [0; ROWS * COLS / 32],
-            weights: [0.0; ROWS * COLS],
-            words: [0; ROWS * COLS / 4 + ROWS * COLS / 128],
+            codes: [0; WEIGHTS],
+            scales: [0; WEIGHTS / 32],
+            weights: [0.0; WEIGHTS],
+            words: [0; WEIGHTS / 4 + WEIGHTS / 128],
             x: [0.0; COLS],
             prepared: [0; COLS],
+            row_scales: [0; ROWS / 2],
+            bias: [0; ROWS],
             y: [0.0; ROWS],
         });
         host::exit(buffers.is_some_and(|buffers| run(buffers).is_some()))
@@ -62,42 +69,113 @@ mod firmware {
         b.scales.iter_mut().for_each(|s| *s = random() as u8);
         b.weights.iter_mut().for_each(|w| *w = random() as i32 as f32);
         b.x.iter_mut().for_each(|x| *x = random() as i32 as f32);
-        count::region(|| naive(&b.weights, black_box(&b.x), &mut b.y));
-        black_box(&b.y);
-        writeln!(out, "naive-f32 32 0 {ROWS} {COLS}").ok()?;
-        for width in Width::ALL {
-            for group in [0, 32] {
-                let shape = BlockShape { width, rows: ROWS, cols: COLS, group };
-                let words = b.words.get_mut(..shape.words())?;
-                pack(shape, &b.codes, b.scales.get(..ROWS * shape.groups())?, words)?;
-                let block = Block::new(shape, words)?;
-                let prepared = b.prepared.get_mut(..prepared_words(COLS, group))?;
-                count::region(|| product(&block, black_box(&b.x), prepared, &mut b.y))?;
-                black_box(&b.y);
-                writeln!(out, "gemv {} {group} {ROWS} {COLS}", width.bits()).ok()?;
-            }
-        }
-        Some(())
-    }
-
-    fn product(block: &Block<'_>, x: &[f32], prepared: &mut [u32], y: &mut [f32]) -> Option<()> {
-        let BlockShape { cols, group, .. } = block.shape();
-        let scale = quantize(x, 127, group, prepared).ok()?;
-        let x = Prepared::new(prepared, cols, group)?;
-        for (chunk, y) in y.chunks_mut(8 * QUAD).enumerate() {
-            let mut sums = [[0; QUAD]; 8];
-            gemv(block, &x, 8 * chunk, &mut sums).ok()?;
-            for (y, sum) in y.iter_mut().zip(sums.as_flattened()) {
-                *y = *sum as f32 * scale;
+        b.bias.iter_mut().for_each(|x| *x = (random() as i32 as f32).to_bits());
+        b.row_scales.fill(0x3c00_3c80);
+        for (rows, cols) in SHAPES {
+            let x = b.x.get(..cols)?;
+            let (bias, y) = (b.bias.get(..rows)?, b.y.get_mut(..rows)?);
+            let weights = b.weights.get(..rows * cols)?;
+            count::region(|| naive(weights, black_box(x), bias, y));
+            writeln!(out, "naive-f32 32 0 {rows} {cols}").ok()?;
+            let codes = b.codes.get(..rows * cols)?;
+            let pairs = b.prepared.get_mut(..cols / 2)?;
+            count::region(|| int8(codes, black_box(x), &b.row_scales, bias, pairs, y))?;
+            writeln!(out, "int8-smlad 8 0 {rows} {cols}").ok()?;
+            for (name, x_max) in [("gemv-a8", 127), ("gemv-a16", 2047)] {
+                for width in Width::ALL {
+                    for group in [0, 32] {
+                        let shape = BlockShape { width, lanes: Lanes::of(x_max, group), rows, cols, group };
+                        let words = b.words.get_mut(..shape.words())?;
+                        pack(shape, codes, b.scales.get(..rows * shape.groups())?, words)?;
+                        let block = Block::new(shape, words)?;
+                        let scales = b.row_scales.get(..rows.div_ceil(2))?;
+                        let block = RowBlock { block, scales, index: &[], first_row: 0 };
+                        let prepared = b.prepared.get_mut(..prepared_words(shape))?;
+                        count::region(|| product(&block, black_box(x), x_max, bias, prepared, y))?;
+                        black_box(&y);
+                        writeln!(out, "{name} {} {group} {rows} {cols}", width.bits()).ok()?;
+                    }
+                }
             }
         }
         Some(())
     }
 
     #[inline(never)]
-    fn naive(weights: &[f32], x: &[f32], y: &mut [f32]) {
-        for (row, y) in weights.chunks_exact(COLS).zip(y) {
-            *y = row.iter().zip(x).fold(0.0, |sum, (w, x)| sum + w * x);
+    fn product(
+        rows: &RowBlock<'_>,
+        x: &[f32],
+        x_max: u16,
+        bias: &[u32],
+        prepared: &mut [u32],
+        y: &mut [f32],
+    ) -> Option<()> {
+        let shape = rows.block.shape();
+        let scale = Scale::new(x, x_max).ok()?;
+        scale.quantize(x, shape, prepared);
+        rows.apply(&Prepared::new(prepared, shape)?, scale, Some(bias), y);
+        Some(())
+    }
+
+    #[inline(never)]
+    fn naive(weights: &[f32], x: &[f32], bias: &[u32], y: &mut [f32]) {
+        for ((row, y), bias) in weights.chunks_exact(x.len()).zip(y).zip(bias) {
+            *y = row.iter().zip(x).fold(f32::from_bits(*bias), |sum, (w, x)| sum + w * x);
         }
+    }
+
+    /// Signed bytes 0 and 2, or 1 and 3, as halfwords.
+    macro_rules! sxtb16 {
+        ($word:expr $(, $rotate:literal)?) => {{
+            let pair: u32;
+            // SAFETY: computes from registers to a register.
+            unsafe {
+                asm!(
+                    concat!("sxtb16 {0}, {1}", $($rotate)?),
+                    out(reg) pair, in(reg) $word, options(pure, nomem, nostack)
+                );
+            }
+            pair
+        }};
+    }
+
+    #[inline(always)]
+    fn smlad(a: u32, b: u32, c: i32) -> i32 {
+        let sum;
+        // SAFETY: computes from registers to a register, and may set the Q flag, which `preserves_flags` would deny.
+        unsafe {
+            asm!("smlad {0}, {1}, {2}, {3}", out(reg) sum, in(reg) a, in(reg) b, in(reg) c, options(pure, nomem, nostack));
+        }
+        sum
+    }
+
+    /// Four columns a step: a word of weights becomes the pairs (0, 2) and (1, 3), in which order the activations are
+    /// prepared.
+    #[inline(never)]
+    fn int8(
+        weights: &[u8],
+        x: &[f32],
+        row_scales: &[u32],
+        bias: &[u32],
+        pairs: &mut [u32],
+        y: &mut [f32],
+    ) -> Option<()> {
+        let scale = Scale::new(x, 127).ok()?;
+        let inverse = 1.0 / scale.get();
+        for (x, pair) in x.chunks_exact(4).zip(pairs.chunks_exact_mut(2)) {
+            let q = |i: usize| u32::from((x[i] * inverse + actq_kernels::activations::ROUND).to_bits() as u16);
+            pair[0] = q(0) | q(2) << 16;
+            pair[1] = q(1) | q(3) << 16;
+        }
+        let weights: &[u32] = bytemuck::try_cast_slice(weights).ok()?;
+        for (i, ((row, y), bias)) in weights.chunks_exact(x.len() / 4).zip(y).zip(bias).enumerate() {
+            let sum = row
+                .iter()
+                .zip(pairs.chunks_exact(2))
+                .fold(0, |sum, (&w, pair)| smlad(sxtb16!(w, ", ror #8"), pair[1], smlad(sxtb16!(w), pair[0], sum)));
+            let row_scale = f32::from_bits(row_scales.get(i / 2)? >> (16 * (i % 2)) << 16);
+            *y = f32::from_bits(*bias) + sum as f32 * (row_scale * scale.get());
+        }
+        Some(())
     }
 }

@@ -14,14 +14,14 @@ mod firmware {
 
     use actq_firmware_demo::host::{self, File};
     use actq_kernels::activations::{Prepared, prepared_words};
-    use actq_kernels::format::{Block, BlockShape, QUAD, Width};
+    use actq_kernels::format::{Block, BlockShape, Lanes, Width};
     use actq_kernels::gemv::{self, gemv};
     use actq_kernels::portable;
     use cortex_m::singleton;
     use cortex_m_semihosting::hio;
 
     const WORDS: usize = 64 * 1024;
-    const QUADS: usize = 64;
+    const ROWS: usize = 256;
 
     #[cortex_m_rt::entry]
     fn main() -> ! {
@@ -54,40 +54,39 @@ mod firmware {
 
     /// Plays a case; false at the end of the stream.
     fn play(input: &File, buffer: &mut [u32]) -> Result<bool, &'static str> {
-        let mut head = [0u32; 5];
+        let mut head = [0u32; 6];
         read(input, &mut head[..1])?;
         if head[0] == 0 {
             return Ok(false);
         }
         read(input, &mut head[1..])?;
-        let [bits, rows, cols, group, start] = head.map(|w| w as usize);
+        let [bits, lanes, rows, cols, group, start] = head.map(|w| w as usize);
         let width = Width::from_bits(bits as u32).ok_or("width")?;
-        let shape = BlockShape { width, rows, cols, group };
+        let lanes = Lanes::from_code(lanes as u8).ok_or("lanes")?;
+        let shape = BlockShape { width, lanes, rows, cols, group };
         let weights = start..start + shape.words();
-        let x = weights.end + start..weights.end + start + prepared_words(cols, group);
+        let x = weights.end + start..weights.end + start + prepared_words(shape);
         read(input, buffer.get_mut(weights.clone()).ok_or("the case is too large")?)?;
         read(input, buffer.get_mut(x.clone()).ok_or("the case is too large")?)?;
-        let mut expected = [[0i32; QUAD]; QUADS];
-        let expected = expected.get_mut(..shape.quads()).ok_or("the case is too large")?;
+        let mut expected = [0i32; ROWS];
+        let expected = expected.get_mut(..shape.padded_rows()).ok_or("the case is too large")?;
         if !input.read_exact(bytemuck::cast_slice_mut(expected)) {
             return Err("the stream is cut");
         }
         let block = Block::new(shape, &buffer[weights]).ok_or("shape")?;
-        let x = Prepared::new(&buffer[x], cols, group).ok_or("activations")?;
-        let same = |sums: &[[i32; QUAD]]| {
-            // The sums of padding rows have no meaning.
-            sums.as_flattened().iter().zip(expected.as_flattened()).take(rows).all(|(a, b)| a == b)
-        };
-        let mut sums = [[0x5555_5555; QUAD]; QUADS];
-        gemv(&block, &x, 0, &mut sums[..shape.quads()]).map_err(|_| "mismatch")?;
+        let x = Prepared::new(&buffer[x], shape).ok_or("activations")?;
+        // The sums of padding rows have no meaning.
+        let same = |sums: &[i32]| sums.iter().zip(&*expected).take(rows).all(|(a, b)| a == b);
+        let mut sums = [0x5555_5555; ROWS];
+        gemv(&block, &x, 0, &mut sums[..shape.padded_rows()]).map_err(|_| "mismatch")?;
         if !same(&sums) {
             return Err("sums of the compiled backend differ");
         }
-        if sums[shape.quads()..].as_flattened().iter().any(|s| *s != 0x5555_5555) {
+        if sums[shape.padded_rows()..].iter().any(|s| *s != 0x5555_5555) {
             return Err("the compiled backend wrote behind its output");
         }
-        sums = [[0; QUAD]; QUADS];
-        portable::gemv(&block, &x, 0, &mut sums[..shape.quads()]);
+        sums = [0; ROWS];
+        portable::gemv(&block, &x, 0, &mut sums[..shape.padded_rows()]);
         if !same(&sums) {
             return Err("sums of the portable backend differ");
         }

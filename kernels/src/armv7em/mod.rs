@@ -1,26 +1,36 @@
-//! The GEMV in Armv7E-M assembler (Cortex-M4 and M7): SMLAD makes two MACs a cycle.
+//! The GEMV in Armv7E-M assembler (Cortex-M4 and M7): SMLAD makes two MACs a cycle, four with paired lanes.
 //!
-//! `gemv.s` holds one loop nest, stamped over the four layouts, with and without group scales. Each computes exactly what
-//! [`crate::portable`] computes; the tests run both on the same data.
+//! `single.s` holds one loop nest, stamped over the four layouts of single lanes; the layouts of paired lanes have a file
+//! each. Every kernel comes with and without group scales and computes exactly what [`crate::portable`] computes; the tests
+//! run both on the same data.
 //!
 //! SMLAD sets the Q flag; the procedure call standard lets a call change it.
 
 use core::arch::global_asm;
 
 use crate::activations::Prepared;
-use crate::format::{Block, QUAD, Width};
+#[cfg(actq_fpu)]
+use crate::format::Start;
+use crate::format::{Block, QUAD, STRIP};
 
-global_asm!(include_str!("gemv.s"), options(raw));
+global_asm!(include_str!("single.s"), options(raw));
+global_asm!(include_str!("paired_w2.s"), options(raw));
+global_asm!(include_str!("paired_w3.s"), options(raw));
+global_asm!(include_str!("paired_w4.s"), options(raw));
+global_asm!(include_str!("paired_w8.s"), options(raw));
+global_asm!(include_str!("vector.s"), options(raw));
+#[cfg(actq_fpu)]
+global_asm!(include_str!("vector_fpu.s"), options(raw));
 
-/// Reads `quads` quads at `weights` and the prepared vector from `x` up to `x_end`, writes four sums per quad at `acc`.
-/// `group_bytes` is the length of one group in the prepared vector, its sum word included.
+/// Reads `strips` strips at `weights` and the prepared vector from `x` up to `x_end`, writes the strips' sums at `acc`. What
+/// `extra` is, the kernel's file says.
 type Kernel = unsafe extern "C" fn(
     weights: *const u32,
     x: *const u32,
-    acc: *mut [i32; QUAD],
-    quads: usize,
+    acc: *mut i32,
+    strips: usize,
     x_end: *const u32,
-    group_bytes: usize,
+    extra: usize,
 );
 
 macro_rules! kernels {
@@ -29,41 +39,163 @@ macro_rules! kernels {
             $(fn $name(
                 weights: *const u32,
                 x: *const u32,
-                acc: *mut [i32; QUAD],
-                quads: usize,
+                acc: *mut i32,
+                strips: usize,
                 x_end: *const u32,
-                group_bytes: usize,
+                extra: usize,
             );)*
         }
     };
 }
-kernels!(actq_w2_row actq_w3_row actq_w4_row actq_w8_row actq_w2_group actq_w3_group actq_w4_group actq_w8_group);
+kernels! {
+    actq_w2_row actq_w3_row actq_w4_row actq_w8_row
+    actq_w2_group actq_w3_group actq_w4_group actq_w8_group
+    actq_w2_paired_row actq_w2_paired_row4 actq_w2_paired_group actq_w2_paired_group4
+    actq_w3_paired_row actq_w3_paired_group
+    actq_w4_paired_row actq_w4_paired_row4 actq_w4_paired_group actq_w4_paired_group4
+    actq_w8_paired_row actq_w8_paired_group
+}
 
-/// As [`crate::gemv::gemv`].
-pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_quad: usize, acc: &mut [[i32; QUAD]]) {
+/// The kernel for strips of eight rows, where the layout has them, and that for strips of four.
+type Kernels = (Option<Kernel>, Kernel);
+
+/// By width, lanes and whether there are group scales.
+static KERNELS: [[[Kernels; 2]; 2]; 4] = [
+    [
+        [(None, actq_w2_row), (None, actq_w2_group)],
+        [(Some(actq_w2_paired_row), actq_w2_paired_row4), (Some(actq_w2_paired_group), actq_w2_paired_group4)],
+    ],
+    [
+        [(None, actq_w3_row), (None, actq_w3_group)], //
+        [(None, actq_w3_paired_row), (None, actq_w3_paired_group)],
+    ],
+    [
+        [(None, actq_w4_row), (None, actq_w4_group)],
+        [(Some(actq_w4_paired_row), actq_w4_paired_row4), (Some(actq_w4_paired_group), actq_w4_paired_group4)],
+    ],
+    [
+        [(None, actq_w8_row), (None, actq_w8_group)], //
+        [(None, actq_w8_paired_row), (None, actq_w8_paired_group)],
+    ],
+];
+
+/// As [`crate::gemv::gemv`], for lengths that were checked there.
+#[inline(never)]
+pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i32]) {
     let shape = block.shape();
-    let weights = block.quads_from(first_quad);
-    let quads = acc.len().min(shape.quads().saturating_sub(first_quad));
-    let kernel: Kernel = match (shape.width, shape.group) {
-        (Width::W2, 0) => actq_w2_row,
-        (Width::W3, 0) => actq_w3_row,
-        (Width::W4, 0) => actq_w4_row,
-        (Width::W8, 0) => actq_w8_row,
-        (Width::W2, _) => actq_w2_group,
-        (Width::W3, _) => actq_w3_group,
-        (Width::W4, _) => actq_w4_group,
-        (Width::W8, _) => actq_w8_group,
-    };
-    let unit_cols = shape.width.unit().cols;
-    let x_words = shape.groups().max(1) + shape.units() * unit_cols / 2;
-    let group_bytes = 4 * (1 + shape.units_per_group() * unit_cols / 2);
-    if quads == 0 || weights.len() < quads * shape.quad_words() || x.words.len() < x_words {
+    let weights = block.rows_from(first_row);
+    let quads = acc.len() / QUAD;
+    if weights.len() < quads * block.quad_words() {
         return;
     }
-    // SAFETY: the lengths were compared just above: the kernel reads `quads * quad_words` words at `weights` and `x_words`
-    // words at `x` (units divide PAD_COLS, so `x_words` never passes the padding), and writes `quads` elements of `acc`.
-    // The slices are of u32 and i32, so every address is a multiple of 4, as LDM and LDRD demand.
+    let (eight, four) = KERNELS[shape.width as usize][shape.lanes as usize][usize::from(shape.group != 0)];
+    let strips = if eight.is_some() { acc.len() / STRIP } else { 0 };
+    let (first, last) = acc.split_at_mut(strips * STRIP);
+    let (x_end, extra) = x.bounds();
+    // SAFETY: `weights` holds the words of `acc.len()` rows from `first_row` on, which is a multiple of 8, so strips begin
+    // there and after the strips of eight: each call reads the words of its strips and writes as many sums. It reads the
+    // prepared vector from its begin to `x_end`, and the sum of x that stands there where the layout has row scales and a
+    // sum; both are in the vector, because it was prepared for a block of this shape. The slices are of u32 and i32, so every address
+    // is a multiple of 4, as LDM and LDRD demand.
     unsafe {
-        kernel(weights.as_ptr(), x.words.as_ptr(), acc.as_mut_ptr(), quads, x.words.as_ptr().add(x_words), group_bytes);
+        let x_words = x.words().as_ptr();
+        if let (Some(kernel), 1..) = (eight, strips) {
+            kernel(weights.as_ptr(), x_words, first.as_mut_ptr(), strips, x_words.add(x_end), extra);
+        }
+        if !last.is_empty() {
+            let weights = weights.as_ptr().add(strips * STRIP / QUAD * block.quad_words());
+            four(weights, x_words, last.as_mut_ptr(), last.len() / QUAD, x_words.add(x_end), extra);
+        }
     }
+}
+
+unsafe extern "C" {
+    fn actq_magnitude(x: *const f32, len: usize) -> u32;
+}
+
+/// The bits of the largest magnitude.
+pub fn magnitude_bits(x: &[f32]) -> u32 {
+    let (eights, rest) = x.split_at(x.len() & !7);
+    let largest = if eights.is_empty() {
+        0
+    } else {
+        // SAFETY: the length is that of the slice, a multiple of 8 and not 0.
+        unsafe { actq_magnitude(eights.as_ptr(), eights.len()) >> 1 }
+    };
+    rest.iter().fold(largest, |m, v| m.max(v.to_bits() & 0x7fff_ffff))
+}
+
+/// Quantizes `chunks` chunks of `cols` values, a multiple of 8: writes for each a start word and its pairs, shifted left by
+/// `shift`. Returns the sum of all integers, or `None`, with nothing written, where the lengths do not fit.
+#[cfg(actq_fpu)]
+#[inline(always)]
+pub fn quantize(
+    x: &[f32],
+    inverse: f32,
+    shift: u32,
+    start: Start,
+    (chunks, cols): (usize, usize),
+    out: &mut [u32],
+) -> Option<i32> {
+    let kernel = *QUANTIZE.get(shift as usize)?;
+    if chunks == 0 || cols == 0 || cols % 8 != 0 || x.len() < chunks * cols || out.len() < chunks * (1 + cols / 2) {
+        return None;
+    }
+    let (x, out) = (x.as_ptr(), out.as_mut_ptr());
+    // SAFETY: the kernel reads `chunks * cols` floats and writes `chunks * (1 + cols / 2)` words; both were compared above.
+    Some(unsafe { kernel(inverse, crate::activations::ROUND, x, out, chunks, cols / 8, start.bias, start.factor) })
+}
+
+/// By shift.
+#[cfg(actq_fpu)]
+static QUANTIZE: [Quantize; 4] = [actq_quantize0, actq_quantize1, actq_quantize2, actq_quantize3];
+
+/// Where [`scale`] finds the integer sums and the values that the results are added to.
+#[cfg(actq_fpu)]
+#[derive(Clone, Copy, Debug)]
+pub enum Operands<'a> {
+    /// The sums' bits in the output, the bits of the start values apart.
+    SumsInPlace(&'a [u32]),
+    /// The start values in the output, the sums apart.
+    StartInPlace(&'a [i32]),
+}
+
+/// `y[i] = start[i] + sum[i] * (scale[i] * x_scale)` for as many as the assembler takes, with two bf16 scales a word; returns
+/// how many those are.
+#[cfg(actq_fpu)]
+pub fn scale(operands: Operands<'_>, scales: &[u32], x_scale: f32, y: &mut [f32]) -> usize {
+    let (sums, start, len): (*const i32, *const f32, _) = match operands {
+        Operands::SumsInPlace(start) => (y.as_ptr().cast(), start.as_ptr().cast(), start.len()),
+        Operands::StartInPlace(sums) => (sums.as_ptr(), y.as_ptr(), sums.len()),
+    };
+    let len = len.min(2 * scales.len()).min(y.len()) & !7;
+    if len > 0 {
+        // SAFETY: all operands hold at least `len` values, which is a multiple of 8 and not 0; eight are read before the same
+        // place in `y` is written.
+        unsafe { actq_scale_add(x_scale, sums, scales.as_ptr(), start, y.as_mut_ptr(), len) }
+    }
+    len
+}
+
+#[cfg(actq_fpu)]
+macro_rules! quantize_kernels {
+    ($($name:ident)*) => {
+        /// Writes `chunks` chunks of `eights` times eight values at `x` to `out`.
+        type Quantize = unsafe extern "C" fn(
+            inverse: f32, round: f32, x: *const f32, out: *mut u32, chunks: usize, eights: usize, bias: i32, factor: i32,
+        ) -> i32;
+
+        unsafe extern "C" {
+            $(fn $name(
+                inverse: f32, round: f32, x: *const f32, out: *mut u32, chunks: usize, eights: usize, bias: i32, factor: i32,
+            ) -> i32;)*
+        }
+    };
+}
+#[cfg(actq_fpu)]
+quantize_kernels!(actq_quantize0 actq_quantize1 actq_quantize2 actq_quantize3);
+
+#[cfg(actq_fpu)]
+unsafe extern "C" {
+    fn actq_scale_add(x_scale: f32, sums: *const i32, scales: *const u32, start: *const f32, y: *mut f32, len: usize);
 }

@@ -1,4 +1,4 @@
-//! 2-bit codes: one word holds 16 columns of a row, exactly 2 bits a weight.
+//! 2-bit codes, single lanes: one word holds 16 columns of a row, exactly 2 bits a weight.
 //!
 //! Columns pair up for SMLAD: pair `j` is columns `2j` (low lane) and `2j + 1` (high lane). Its codes stand at bits
 //! `2j + 1` and `2j + 17` of a 32-bit ring, so that `ror(word, 2j) & 0x0006_0006` is both **doubled** codes, each in its lane:
@@ -8,19 +8,18 @@
 //! pair  7  6  6 ..  1  0  0  7  7  6 .. 1 1 0 0  7    (bits 1-16: even columns; bits 17-31 and 0: odd columns)
 //! ```
 
-use super::{Format, QUAD, Unit, Width, smlad};
+use super::{Cell, Format, QUAD, Start, Sums, Width, XFormat, smlad};
 
 /// Bits of a code.
 pub const BITS: u32 = 2;
-/// One word, 16 columns.
-pub const UNIT: Unit = Unit { cols: 16, words: 1 };
-const _: () = assert!(UNIT.cols * BITS as usize == 32 * UNIT.words);
 
 /// The doubled code of both lanes.
 const MASK: u32 = 0x0006_0006;
 
-/// The 2-bit layout.
+/// The 2-bit layout of single lanes.
 pub struct W2;
+
+const _: () = assert!(W2::CELL.is_full(BITS));
 
 /// Where a column's code starts in the word's ring of bits.
 const fn bit(col: usize) -> u32 {
@@ -28,23 +27,28 @@ const fn bit(col: usize) -> u32 {
 }
 
 impl Format for W2 {
-    const UNIT: Unit = UNIT;
     const WIDTH: Width = Width::W2;
+    const CELL: Cell = Cell { rows: 1, cols: 16, words: 1 };
+    const STRIP: usize = QUAD;
+    const STEP: usize = 16;
+    const X: XFormat = XFormat::single(&[Start { bias: 0, factor: -3 }]);
 
-    fn insert(words: &mut [u32], col: usize, code: u8) {
+    fn insert(words: &mut [u32; 3], _row: usize, col: usize, code: u8) {
         words[0] |= (code as u32 & 3).rotate_left(bit(col));
     }
 
-    fn extract(words: &[u32], col: usize) -> u8 {
+    fn extract(words: &[u32; 3], _row: usize, col: usize) -> u8 {
         (words[0].rotate_right(bit(col)) & 3) as u8
     }
 
     #[inline(always)]
-    fn mac_quad(words: &[u32], x: &[u32], t: &mut [i32; QUAD]) {
+    fn mac(words: &[u32; 3], x: &[u32], t: &mut Sums) {
         for (j, &x) in x.iter().enumerate() {
-            for (t, &word) in t.iter_mut().zip(words) {
-                *t = smlad(u32::from_le(word).rotate_right(2 * j as u32) & MASK, x, *t);
-            }
+            t[0] = smlad(words[0].rotate_right(2 * j as u32) & MASK, x, t[0]);
         }
+    }
+
+    fn finish(t: &Sums, rows: &mut [i32]) {
+        rows[0] = rows[0].wrapping_add(t[0]);
     }
 }

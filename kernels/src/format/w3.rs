@@ -1,4 +1,4 @@
-//! 3-bit codes: three words hold 32 columns of a row, exactly 3 bits a weight.
+//! 3-bit codes, single lanes: three words hold 32 columns of a row, exactly 3 bits a weight.
 //!
 //! Pair `j` is columns `2j` (low lane) and `2j + 1` (high lane). A 16-bit lane holds five 3-bit fields and one spare bit.
 //! Word `k` holds pairs `5k` to `5k + 4`; the three words' spare bits hold pair 15, bit `k` of its code in word `k`. In word
@@ -12,13 +12,10 @@
 //!
 //! `ror(word, k + 1 + 3f) & 0x000e_000e` is field `f` doubled; `word & (0x0002_0002 << k)` is the share of pair 15.
 
-use super::{Format, QUAD, Unit, Width, smlad};
+use super::{Cell, Format, QUAD, Start, Sums, Width, XFormat, smlad};
 
 /// Bits of a code.
 pub const BITS: u32 = 3;
-/// Three words, 32 columns.
-pub const UNIT: Unit = Unit { cols: 32, words: 3 };
-const _: () = assert!(UNIT.cols * BITS as usize == 32 * UNIT.words);
 
 /// The doubled code of both lanes.
 const MASK: u32 = 0x000e_000e;
@@ -27,8 +24,10 @@ const SPARE: u32 = 0x0002_0002;
 /// Whole fields in a lane.
 const FIELDS: usize = 5;
 
-/// The 3-bit layout.
+/// The 3-bit layout of single lanes.
 pub struct W3;
+
+const _: () = assert!(W3::CELL.is_full(BITS));
 
 /// Word and first bit of a column's code, for the pairs 0 to 14.
 const fn field(col: usize) -> (usize, u32) {
@@ -42,41 +41,44 @@ const fn spare(k: usize, col: usize) -> u32 {
 }
 
 impl Format for W3 {
-    const UNIT: Unit = UNIT;
     const WIDTH: Width = Width::W3;
+    const CELL: Cell = Cell { rows: 1, cols: 32, words: 3 };
+    const STRIP: usize = QUAD;
+    const STEP: usize = 32;
+    const X: XFormat = XFormat::single(&[Start { bias: 0, factor: -7 }]);
 
-    fn insert(words: &mut [u32], col: usize, code: u8) {
-        if col / 2 < FIELDS * UNIT.words {
+    fn insert(words: &mut [u32; 3], _row: usize, col: usize, code: u8) {
+        if col / 2 < FIELDS * W3::CELL.words {
             let (word, bit) = field(col);
             words[word] |= (code as u32 & 7).rotate_left(bit);
         } else {
-            for (k, word) in words.iter_mut().enumerate().take(UNIT.words) {
+            for (k, word) in words.iter_mut().enumerate().take(W3::CELL.words) {
                 *word |= (code as u32 >> k & 1) << spare(k, col);
             }
         }
     }
 
-    fn extract(words: &[u32], col: usize) -> u8 {
-        if col / 2 < FIELDS * UNIT.words {
+    fn extract(words: &[u32; 3], _row: usize, col: usize) -> u8 {
+        if col / 2 < FIELDS * W3::CELL.words {
             let (word, bit) = field(col);
             (words[word].rotate_right(bit) & 7) as u8
         } else {
-            (0..UNIT.words).map(|k| ((words[k] >> spare(k, col) & 1) << k) as u8).sum()
+            (0..W3::CELL.words).map(|k| ((words[k] >> spare(k, col) & 1) << k) as u8).sum()
         }
     }
 
     #[inline(always)]
-    fn mac_quad(words: &[u32], x: &[u32], t: &mut [i32; QUAD]) {
+    fn mac(words: &[u32; 3], x: &[u32], t: &mut Sums) {
         let last = x.last().copied().unwrap_or(0);
-        for (k, (words, x)) in words.chunks_exact(QUAD).zip(x.chunks_exact(FIELDS)).enumerate() {
+        for (k, (&word, x)) in words.iter().zip(x.chunks_exact(FIELDS)).enumerate() {
             for (f, &x) in x.iter().enumerate() {
-                for (t, &word) in t.iter_mut().zip(words) {
-                    *t = smlad(u32::from_le(word).rotate_right((k + 1 + 3 * f) as u32) & MASK, x, *t);
-                }
+                t[0] = smlad(word.rotate_right((k + 1 + 3 * f) as u32) & MASK, x, t[0]);
             }
-            for (t, &word) in t.iter_mut().zip(words) {
-                *t = smlad(u32::from_le(word) & (SPARE << k), last, *t);
-            }
+            t[0] = smlad(word & (SPARE << k), last, t[0]);
         }
+    }
+
+    fn finish(t: &Sums, rows: &mut [i32]) {
+        rows[0] = rows[0].wrapping_add(t[0]);
     }
 }

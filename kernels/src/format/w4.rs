@@ -1,4 +1,4 @@
-//! 4-bit codes: one word holds 8 columns of a row, exactly 4 bits a weight.
+//! 4-bit codes, single lanes: one word holds 8 columns of a row, exactly 4 bits a weight.
 //!
 //! As [`super::w2`], with four pairs a word: pair `j` is columns `2j` and `2j + 1`, its codes stand at bits `4j + 1` and
 //! `4j + 17` of a 32-bit ring, and `ror(word, 4j) & 0x001e_001e` is both doubled codes:
@@ -8,19 +8,18 @@
 //! pair   3     2     1     0     3     2   1   0  3    (bits 1-16: even columns; bits 17-31 and 0: odd columns)
 //! ```
 
-use super::{Format, QUAD, Unit, Width, smlad};
+use super::{Cell, Format, QUAD, Start, Sums, Width, XFormat, smlad};
 
 /// Bits of a code.
 pub const BITS: u32 = 4;
-/// One word, 8 columns.
-pub const UNIT: Unit = Unit { cols: 8, words: 1 };
-const _: () = assert!(UNIT.cols * BITS as usize == 32 * UNIT.words);
 
 /// The doubled code of both lanes.
 const MASK: u32 = 0x001e_001e;
 
-/// The 4-bit layout.
+/// The 4-bit layout of single lanes.
 pub struct W4;
+
+const _: () = assert!(W4::CELL.is_full(BITS));
 
 /// Where a column's code starts in the word's ring of bits.
 const fn bit(col: usize) -> u32 {
@@ -28,23 +27,28 @@ const fn bit(col: usize) -> u32 {
 }
 
 impl Format for W4 {
-    const UNIT: Unit = UNIT;
     const WIDTH: Width = Width::W4;
+    const CELL: Cell = Cell { rows: 1, cols: 8, words: 1 };
+    const STRIP: usize = QUAD;
+    const STEP: usize = 8;
+    const X: XFormat = XFormat::single(&[Start { bias: 0, factor: -15 }]);
 
-    fn insert(words: &mut [u32], col: usize, code: u8) {
+    fn insert(words: &mut [u32; 3], _row: usize, col: usize, code: u8) {
         words[0] |= (code as u32 & 15).rotate_left(bit(col));
     }
 
-    fn extract(words: &[u32], col: usize) -> u8 {
+    fn extract(words: &[u32; 3], _row: usize, col: usize) -> u8 {
         (words[0].rotate_right(bit(col)) & 15) as u8
     }
 
     #[inline(always)]
-    fn mac_quad(words: &[u32], x: &[u32], t: &mut [i32; QUAD]) {
+    fn mac(words: &[u32; 3], x: &[u32], t: &mut Sums) {
         for (j, &x) in x.iter().enumerate() {
-            for (t, &word) in t.iter_mut().zip(words) {
-                *t = smlad(u32::from_le(word).rotate_right(4 * j as u32) & MASK, x, *t);
-            }
+            t[0] = smlad(words[0].rotate_right(4 * j as u32) & MASK, x, t[0]);
         }
+    }
+
+    fn finish(t: &Sums, rows: &mut [i32]) {
+        rows[0] = rows[0].wrapping_add(t[0]);
     }
 }

@@ -1,4 +1,4 @@
-//! 8-bit codes, two's complement: one word holds 4 columns of a row.
+//! 8-bit codes, single lanes, two's complement: one word holds 4 columns of a row.
 //!
 //! Bytes 0 and 2 are columns 0 and 1, bytes 1 and 3 are columns 2 and 3, so that SXTB16 of the word and of the word rotated
 //! by 8 are the two pairs, signed, each value in its lane:
@@ -8,16 +8,15 @@
 //! column  3   1   2   0
 //! ```
 
-use super::{Format, QUAD, Unit, Width, smlad};
+use super::{Cell, Format, QUAD, Start, Sums, Width, XFormat, smlad};
 
 /// Bits of a code.
 pub const BITS: u32 = 8;
-/// One word, 4 columns.
-pub const UNIT: Unit = Unit { cols: 4, words: 1 };
-const _: () = assert!(UNIT.cols * BITS as usize == 32 * UNIT.words);
 
-/// The 8-bit layout.
+/// The 8-bit layout of single lanes.
 pub struct W8;
+
+const _: () = assert!(W8::CELL.is_full(BITS));
 
 /// Where a column's code starts in the word.
 const fn bit(col: usize) -> u32 {
@@ -31,23 +30,28 @@ fn sxtb16(word: u32) -> u32 {
 }
 
 impl Format for W8 {
-    const UNIT: Unit = UNIT;
     const WIDTH: Width = Width::W8;
+    const CELL: Cell = Cell { rows: 1, cols: 4, words: 1 };
+    const STRIP: usize = QUAD;
+    const STEP: usize = 4;
+    const X: XFormat = XFormat::single(&[Start { bias: 0, factor: 0 }]);
 
-    fn insert(words: &mut [u32], col: usize, code: u8) {
+    fn insert(words: &mut [u32; 3], _row: usize, col: usize, code: u8) {
         words[0] |= (code as u32) << bit(col);
     }
 
-    fn extract(words: &[u32], col: usize) -> u8 {
+    fn extract(words: &[u32; 3], _row: usize, col: usize) -> u8 {
         (words[0] >> bit(col)) as u8
     }
 
     #[inline(always)]
-    fn mac_quad(words: &[u32], x: &[u32], t: &mut [i32; QUAD]) {
+    fn mac(words: &[u32; 3], x: &[u32], t: &mut Sums) {
         for (j, &x) in x.iter().enumerate() {
-            for (t, &word) in t.iter_mut().zip(words) {
-                *t = smlad(sxtb16(u32::from_le(word) >> (8 * j)), x, *t);
-            }
+            t[0] = smlad(sxtb16(words[0] >> (8 * j)), x, t[0]);
         }
+    }
+
+    fn finish(t: &Sums, rows: &mut [i32]) {
+        rows[0] = rows[0].wrapping_add(t[0]);
     }
 }

@@ -61,7 +61,7 @@ pub fn quantize(graph: &Graph, statistics: &Statistics, options: &Options) -> Re
         Budget::Width(width) => vec![width; graph.matrices.len()],
         Budget::BitsPerWeight(_) | Budget::ImageBytes(_) => {
             let limit = options.budget.weight_bytes(graph);
-            allocation::allocate(graph, &statistics.effective_scores().0, options.group, limit)?
+            allocation::allocate(graph, &statistics.effective_scores().0, options.packing(), limit)?
         }
     };
     let matrices = graph.matrices.iter().zip(widths).zip(&statistics.importance);
@@ -196,7 +196,7 @@ mod tests {
         let statistics = Statistics::collect(&graph, &dataset, |_| {}).expect("statistics");
         let uniform = quantize(&graph, &statistics, &options(Budget::Width(Width::W3))).expect("quantized");
         assert!(uniform.iter().all(|o| o.quantized.widths.iter().all(|w| *w == Some(Width::W3))));
-        let bytes = |outcomes: &[Outcome]| -> usize { outcomes.iter().map(|o| o.quantized.bytes()).sum() };
+        let bytes = |outcomes: &[Outcome]| -> usize { outcomes.iter().map(|o| o.bytes()).sum() };
         let limit = 8.0 * (bytes(&uniform) + 40) as f64 / graph.weights() as f64;
         let mixed = quantize(&graph, &statistics, &options(Budget::BitsPerWeight(limit))).expect("quantized");
         assert!(8.0 * bytes(&mixed) as f64 / graph.weights() as f64 <= limit);

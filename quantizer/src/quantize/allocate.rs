@@ -7,12 +7,11 @@
 //! count as its saving.
 
 use actq_kernels::Width;
-use actq_kernels::format::BlockShape;
 use actq_kernels::image::block_bytes;
 use anyhow::{Result, ensure};
 
-use super::BudgetTooSmall;
 use super::compact::Dimension;
+use super::{BudgetTooSmall, Packing};
 use crate::graph::{Graph, Matrix};
 
 /// Expected squared error of a row in units of its own energy: that of the mid-rise grid with error feedback. At 8 bits more
@@ -66,7 +65,7 @@ pub fn removals(graph: &Graph, dimension: &Dimension, h: &[Vec<f64>], g: &[Vec<f
 
 /// Bytes of all matrices with these widths: rows without bits and the columns that compaction removes are gone, everything
 /// else is counted. Rows of a `dimension` are sorted by width, others are indexed where widths are mixed.
-pub fn bytes(graph: &Graph, dimensions: &[Dimension], widths: &Widths) -> usize {
+pub fn bytes(graph: &Graph, dimensions: &[Dimension], widths: &Widths, packing: Packing) -> usize {
     (0..graph.matrices.len())
         .map(|m| {
             let kept_cols = Dimension::feeding(dimensions, m).map_or(graph.matrices[m].cols, |d| d.kept(widths).max(1));
@@ -79,24 +78,28 @@ pub fn bytes(graph: &Graph, dimensions: &[Dimension], widths: &Widths) -> usize 
             let all_rows = used.iter().map(|(_, n)| n).sum::<usize>() == widths[m].len();
             let one_width = used.len() == 1 && all_rows;
             let indexed = !(sorted || one_width);
-            used.iter()
-                .map(|&(width, rows)| block_bytes(BlockShape { width, rows, cols: kept_cols, group: 0 }, indexed))
-                .sum::<usize>()
+            used.iter().map(|&(width, rows)| block_bytes(packing.shape(width, rows, kept_cols), indexed)).sum::<usize>()
         })
         .sum()
 }
 
 /// Chooses the widths so that [`bytes`] stays within `limit`.
-pub fn allocate(graph: &Graph, dimensions: &[Dimension], rows: &[Rows], limit: f64) -> Result<Widths> {
+pub fn allocate(
+    graph: &Graph,
+    dimensions: &[Dimension],
+    rows: &[Rows],
+    packing: Packing,
+    limit: f64,
+) -> Result<Widths> {
     let at = |multiplier: f64| choose(graph, dimensions, rows, multiplier);
     // Multipliers in units of error per bit; the range covers everything from 8 bits to none for any scale of energies.
     let largest = rows.iter().flat_map(|r| &r.energy).fold(1e-300f64, |m, e| m.max(*e));
     let (mut low, mut high) = ((largest * 1e-18).ln(), (largest * 10.0).ln());
-    let least = bytes(graph, dimensions, &at(high.exp()));
+    let least = bytes(graph, dimensions, &at(high.exp()), packing);
     ensure!(least as f64 <= limit, BudgetTooSmall { bytes: least, limit, weights: graph.weights() });
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
-        if bytes(graph, dimensions, &at(middle.exp())) as f64 <= limit {
+        if bytes(graph, dimensions, &at(middle.exp()), packing) as f64 <= limit {
             high = middle;
         } else {
             low = middle;

@@ -91,7 +91,7 @@ pub fn quantize(
             Rows { energy, removal, forced: forced(matrix) }
         })
         .collect();
-    let widths = allocate(graph, &dimensions, &rows, options.budget.weight_bytes(graph))?;
+    let widths = allocate(graph, &dimensions, &rows, options.packing(), options.budget.weight_bytes(graph))?;
     let compacted = compact(graph, &dimensions, &widths, means);
     let importance: Vec<Vec<f64>> = compacted
         .columns
@@ -113,17 +113,25 @@ pub fn quantize(
         steps,
         seed: options.seed,
     };
-    let (quantized, graph) = distill(&task, windows, |step| progress(step as f64 / steps as f64));
-    let limits = match options.activations {
-        Activations::Auto => choose_activations(&graph, &quantized, windows, options.seed),
-        Activations::Int8 | Activations::Int16 => learned_with,
+    let (quantized, learned) = distill(&task, windows, |step| progress(step as f64 / steps as f64));
+    let wanted = match options.activations {
+        Activations::Auto => choose_activations(&learned, &quantized, windows, options.seed),
+        Activations::Int8 | Activations::Int16 => learned_with.clone(),
     };
-    let outcomes = quantized
-        .into_iter()
-        .zip(limits)
-        .map(|(quantized, limit)| Ok(Outcome { x_max: quantized.x_max(limit)?, quantized, error: None }))
-        .collect::<Result<_>>()?;
-    Ok((graph, outcomes))
+    let outcome = |quantized: &Quantized, limit: u16| -> Result<Outcome> {
+        Ok(Outcome { x_max: quantized.x_max(limit)?, quantized: quantized.clone(), error: None })
+    };
+    let mut outcomes: Vec<Outcome> =
+        quantized.iter().zip(learned_with).map(|(q, limit)| outcome(q, limit)).collect::<Result<_>>()?;
+    // int16 is packed in another layout, which may pad more; it is taken where it still fits.
+    for (m, &limit) in wanted.iter().enumerate() {
+        let other = outcome(&quantized[m], limit)?;
+        let total = outcomes.iter().map(Outcome::bytes).sum::<usize>() - outcomes[m].bytes() + other.bytes();
+        if total as f64 <= options.budget.weight_bytes(graph) {
+            outcomes[m] = other;
+        }
+    }
+    Ok((learned, outcomes))
 }
 
 /// An int16 input must lower the error by this share of it to be worth its slower kernel.

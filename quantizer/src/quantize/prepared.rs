@@ -77,7 +77,7 @@ impl<'a> Prepared<'a> {
     fn within_image(&self, bytes: usize) -> Result<Budget> {
         let policy = self.policy;
         let plain = quantize(&policy.graph, &[], &Options::new(Method::Rtn, Budget::Width(Width::W2)))?;
-        let weights: usize = plain.iter().map(|m| m.quantized.bytes()).sum();
+        let weights: usize = plain.iter().map(|m| m.bytes()).sum();
         let rest = writer::image(policy, &plain)?.len() - weights;
         ensure!(bytes > rest, "{bytes} bytes are allowed, but all but the weights already takes {rest}");
         Ok(Budget::BitsPerWeight(8.0 * (bytes - rest) as f64 / policy.graph.weights().max(1) as f64))

@@ -1,15 +1,19 @@
 //! A QEMU plugin that counts executed instructions exactly.
 //!
 //! `qemu-system-arm ... -plugin libinsn_count.so,out=FILE,begin=ADDR,begin_end=ADDR,end=ADDR`: counting starts when execution
-//! leaves the function at `begin..begin_end`, stops when it enters the function at `end`, and each such region adds a line with
-//! the number of instructions to FILE. The call of `end` itself is not counted. Addresses are hexadecimal.
+//! leaves the function at `begin..begin_end` and stops when it enters the function at `end`. The call of `end` itself is not
+//! counted. Addresses are hexadecimal.
+//!
+//! Each such region adds lines to FILE: `region N` with the number of instructions, then for every instruction that was
+//! executed `ADDR COUNT JUMPS`, where JUMPS says how often execution did not go on at the next instruction.
 //!
 //! Only functions that every plugin API since QEMU 7.2 has in the same form are used; the API version that QEMU asks for is set
 //! when the plugin is built (environment variable `ACTQ_QEMU_API`, default 1; 2 from QEMU 9.1 on).
 
+use std::collections::BTreeMap;
 use std::ffi::{CStr, c_char, c_int, c_uint, c_void};
 use std::fs::File;
-use std::io::{BufWriter, Write as _};
+use std::io::{self, BufWriter, Write as _};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 
@@ -37,43 +41,91 @@ unsafe extern "C" {
     fn qemu_plugin_tb_n_insns(tb: *const c_void) -> usize;
     fn qemu_plugin_tb_get_insn(tb: *const c_void, index: usize) -> *mut c_void;
     fn qemu_plugin_insn_vaddr(insn: *const c_void) -> u64;
+    fn qemu_plugin_insn_size(insn: *const c_void) -> usize;
 }
 
 static BEGIN: AtomicU64 = AtomicU64::new(0);
 static BEGIN_END: AtomicU64 = AtomicU64::new(0);
 static END: AtomicU64 = AtomicU64::new(0);
 static COUNTING: AtomicBool = AtomicBool::new(false);
-static COUNT: AtomicU64 = AtomicU64::new(0);
+/// Where execution goes on if the last counted instruction does not jump; 0 at the start of a region.
+static NEXT: AtomicU64 = AtomicU64::new(0);
+/// The address of the last counted instruction.
+static LAST: AtomicU64 = AtomicU64::new(0);
 static OUT: Mutex<Option<BufWriter<File>>> = Mutex::new(None);
+/// Every translated instruction by its address. They live as long as QEMU does.
+static INSTRUCTIONS: Mutex<BTreeMap<u64, &'static Instruction>> = Mutex::new(BTreeMap::new());
+
+/// An instruction of the guest. The guest has one CPU, so relaxed counters lose nothing.
+struct Instruction {
+    address: u64,
+    size: u64,
+    count: AtomicU64,
+    jumps: AtomicU64,
+}
 
 unsafe extern "C" fn on_execute(_vcpu: c_uint, data: *mut c_void) {
-    // The data is the instruction's address itself.
-    let pc = data as u64;
-    if (BEGIN.load(Relaxed)..BEGIN_END.load(Relaxed)).contains(&pc) {
+    // SAFETY: `on_translate` hands over a reference that lives forever.
+    let instruction = unsafe { &*data.cast_const().cast::<Instruction>() };
+    let address = instruction.address;
+    if (BEGIN.load(Relaxed)..BEGIN_END.load(Relaxed)).contains(&address) {
         COUNTING.store(true, Relaxed);
-        COUNT.store(0, Relaxed);
+        NEXT.store(0, Relaxed);
     } else if COUNTING.load(Relaxed) {
-        if pc == END.load(Relaxed) {
+        if address == END.load(Relaxed) {
             COUNTING.store(false, Relaxed);
-            if let Ok(mut out) = OUT.lock()
-                && let Some(out) = out.as_mut()
-            {
-                let _ = writeln!(out, "{}", COUNT.load(Relaxed).saturating_sub(1));
-            }
+            let _ = write_region();
         } else {
-            COUNT.fetch_add(1, Relaxed);
+            let next = NEXT.load(Relaxed);
+            if next != 0 && next != address {
+                count_jump(LAST.load(Relaxed));
+            }
+            instruction.count.fetch_add(1, Relaxed);
+            LAST.store(address, Relaxed);
+            NEXT.store(address + instruction.size, Relaxed);
         }
     }
 }
 
+fn count_jump(address: u64) {
+    if let Some(instruction) = INSTRUCTIONS.lock().ok().and_then(|all| all.get(&address).copied()) {
+        instruction.jumps.fetch_add(1, Relaxed);
+    }
+}
+
+/// Writes the counts of the region that has ended, and sets them back.
+fn write_region() -> io::Result<()> {
+    let (Ok(mut out), Ok(all)) = (OUT.lock(), INSTRUCTIONS.lock()) else { return Ok(()) };
+    let Some(out) = out.as_mut() else { return Ok(()) };
+    // The call of `end`.
+    if let Some(call) = all.get(&LAST.load(Relaxed)) {
+        call.count.fetch_sub(1, Relaxed);
+    }
+    writeln!(out, "region {}", all.values().map(|i| i.count.load(Relaxed)).sum::<u64>())?;
+    for instruction in all.values() {
+        let (count, jumps) = (instruction.count.swap(0, Relaxed), instruction.jumps.swap(0, Relaxed));
+        if count > 0 {
+            writeln!(out, "{:x} {count} {jumps}", instruction.address)?;
+        }
+    }
+    Ok(())
+}
+
 unsafe extern "C" fn on_translate(_id: Id, tb: *mut c_void) {
+    let Ok(mut all) = INSTRUCTIONS.lock() else { return };
     // SAFETY: QEMU hands over a translation block that is valid during this call; indexes stay below its length, and the
     // callback has the signature that QEMU expects. Flag 0: the callback reads no registers.
     unsafe {
         for i in 0..qemu_plugin_tb_n_insns(tb) {
             let insn = qemu_plugin_tb_get_insn(tb, i);
-            let address = qemu_plugin_insn_vaddr(insn) as usize as *mut c_void;
-            qemu_plugin_register_vcpu_insn_exec_cb(insn, on_execute, 0, address);
+            let address = qemu_plugin_insn_vaddr(insn);
+            let size = qemu_plugin_insn_size(insn) as u64;
+            let new = || -> &'static Instruction {
+                Box::leak(Box::new(Instruction { address, size, count: AtomicU64::new(0), jumps: AtomicU64::new(0) }))
+            };
+            let instruction: &'static Instruction = all.entry(address).or_insert_with(new);
+            let data = std::ptr::from_ref(instruction).cast_mut().cast();
+            qemu_plugin_register_vcpu_insn_exec_cb(insn, on_execute, 0, data);
         }
     }
 }

@@ -1,15 +1,15 @@
 //! Stage 1 of ActQuant, second half: a width for every matrix from the scores.
 
-use actq_kernels::format::{BlockShape, Width};
+use actq_kernels::format::Width;
 use actq_kernels::image::block_bytes;
 use anyhow::{Result, ensure};
 
 use crate::graph::{Graph, Matrix, NodeKind};
-use crate::quantize::BudgetTooSmall;
+use crate::quantize::{BudgetTooSmall, Packing};
 
 /// Bytes of a matrix at one width: codes, padding, scales and the block record.
-fn bytes(matrix: &Matrix, width: Width, group: usize) -> usize {
-    block_bytes(BlockShape { width, rows: matrix.rows, cols: matrix.cols, group }, false)
+fn bytes(matrix: &Matrix, width: Width, packing: Packing) -> usize {
+    block_bytes(packing.shape(width, matrix.rows, matrix.cols), false)
 }
 
 /// The error that a matrix of this score is taken to make at this width: `score * 2^(-2 bits)`.
@@ -42,10 +42,10 @@ pub fn layers(graph: &Graph) -> Vec<usize> {
 /// # Errors
 ///
 /// [`BudgetTooSmall`] if the narrowest widths take more.
-pub fn allocate(graph: &Graph, scores: &[f64], group: usize, limit: f64) -> Result<Vec<Width>> {
+pub fn allocate(graph: &Graph, scores: &[f64], packing: Packing, limit: f64) -> Result<Vec<Width>> {
     let layers = layers(graph);
     let mut chosen = vec![0; graph.matrices.len()];
-    let size = |m: usize, choice: usize| bytes(&graph.matrices[m], Width::ALL[choice], group);
+    let size = |m: usize, choice: usize| bytes(&graph.matrices[m], Width::ALL[choice], packing);
     let mut used: usize = (0..chosen.len()).map(|m| size(m, 0)).sum();
     ensure!(used as f64 <= limit, BudgetTooSmall { bytes: used, limit, weights: graph.weights() });
     loop {
@@ -73,6 +73,9 @@ pub fn allocate(graph: &Graph, scores: &[f64], group: usize, limit: f64) -> Resu
 #[cfg(test)]
 mod tests {
     use super::*;
+    use actq_kernels::format::Lanes;
+
+    const PACKING: Packing = Packing { lanes: Lanes::Paired, group: 32 };
     use crate::graph::Node;
     use crate::quantize::actquant::testing::lstm;
 
@@ -87,7 +90,7 @@ mod tests {
     }
 
     fn total(graph: &Graph, widths: &[Width]) -> usize {
-        graph.matrices.iter().zip(widths).map(|(m, w)| bytes(m, *w, 32)).sum()
+        graph.matrices.iter().zip(widths).map(|(m, w)| bytes(m, *w, PACKING)).sum()
     }
 
     /// For separate layers of equal size the objective is a sum of functions of the bytes that fall ever more slowly, where
@@ -101,7 +104,7 @@ mod tests {
         for scores in [[1.0, 0.5, 0.25, 0.1], [3.0, 3.0, 1e-3, 0.0], [1.0, 1.1, 1.2, 40.0]] {
             for bpw in [2.6, 2.9, 3.1, 3.4, 3.9, 5.0, 9.0] {
                 let limit = bpw * graph.weights() as f64 / 8.0;
-                let greedy = allocate(&graph, &scores, 32, limit).expect("fits");
+                let greedy = allocate(&graph, &scores, PACKING, limit).expect("fits");
                 let used = total(&graph, &greedy);
                 assert!(used as f64 <= limit);
                 let best = (0..256usize)
@@ -118,11 +121,11 @@ mod tests {
     #[test]
     fn a_budget_below_two_bits_is_refused_and_zero_scores_still_use_the_rest() {
         let graph = chain(3);
-        let error = allocate(&graph, &[1.0; 3], 32, 2.0 * graph.weights() as f64 / 8.0).expect_err("too small");
+        let error = allocate(&graph, &[1.0; 3], PACKING, 2.0 * graph.weights() as f64 / 8.0).expect_err("too small");
         assert!(error.downcast_ref::<BudgetTooSmall>().is_some());
-        let widths = allocate(&graph, &[0.0; 3], 32, 1e9).expect("fits");
+        let widths = allocate(&graph, &[0.0; 3], PACKING, 1e9).expect("fits");
         assert_eq!(widths, [Width::W8; 3]);
-        let spread = allocate(&graph, &[0.0; 3], 32, 3.6 * graph.weights() as f64 / 8.0).expect("fits");
+        let spread = allocate(&graph, &[0.0; 3], PACKING, 3.6 * graph.weights() as f64 / 8.0).expect("fits");
         assert_eq!(spread, [Width::W3; 3]);
     }
 

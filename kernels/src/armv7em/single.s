@@ -1,11 +1,11 @@
-@ GEMV loop nest for Armv7E-M, stamped over the packed layouts of kernels/src/format.
+@ GEMV loop nest for Armv7E-M, stamped over the layouts of single lanes in kernels/src/format: strips of four rows.
 @
-@ Arguments: r0 weights, r1 prepared x, r2 acc, r3 quads (>= 1), [sp] x_end, [sp+4] bytes of a group in x.
+@ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1), [sp] x_end, [sp+4] bytes of a chunk in x.
 @
 @ In the loops: r0 weights, r1 x, r2 mask, r3 and r4 activation pairs, r5-r8 the four rows' sums t, r9-r12 weight words,
 @ lr the extracted pair of codes.
 @
-@ Frame: 0 x, 4 acc, 8 quads, 12 x_end, 16 group bytes, 20 end of this group, 24-39 sums over groups.
+@ Frame: 0 x, 4 acc, 8 strips, 12 x_end, 16 chunk bytes, 20 end of this group, 24-39 sums over groups.
 
     .syntax unified
     .thumb
@@ -141,14 +141,9 @@
     mac4_spare 0x00080008, r4
 .endm
 
-@ The start value of a group's sums from the sum of x: -(2^b - 1) * sum, which takes the codes' offset back.
-.macro start_sums bits
+@ All four rows' sums of a group start from the same value.
+.macro start_sums
     ldr r8, [r1], #4
-    .if \bits < 8
-    sub r8, r8, r8, lsl #\bits
-    .else
-    movs r8, #0
-    .endif
     mov r5, r8
     mov r6, r8
     mov r7, r8
@@ -176,7 +171,7 @@
 .endm
 
 @ Rows with one scale each: the sums of a whole row are the result.
-.macro row_kernel name, bits, mask, unit
+.macro row_kernel name, mask, unit
     .section .text.\name, "ax", %progbits
     .global \name
     .type \name, %function
@@ -186,7 +181,7 @@
     prologue \mask
 1:
     ldr r1, [sp, #0]
-    start_sums \bits
+    start_sums
     .balign 4
 2:
     \unit
@@ -205,7 +200,7 @@
 .endm
 
 @ Rows with a u8 scale per group: each group's sums are multiplied with its scales and added up on the stack.
-.macro group_kernel name, bits, mask, unit
+.macro group_kernel name, mask, unit
     .section .text.\name, "ax", %progbits
     .global \name
     .type \name, %function
@@ -227,7 +222,7 @@
     it hi
     movhi r4, r3
     str r4, [sp, #20]
-    start_sums \bits
+    start_sums
     .balign 4
 2:
     \unit
@@ -260,12 +255,12 @@
     .size \name, . - \name
 .endm
 
-    row_kernel actq_w2_row, 2, 0x00060006, unit_w2
-    row_kernel actq_w3_row, 3, 0x000e000e, unit_w3
-    row_kernel actq_w4_row, 4, 0x001e001e, unit_w4
-    row_kernel actq_w8_row, 8, 0, unit_w8
-    group_kernel actq_w2_group, 2, 0x00060006, unit_w2
-    group_kernel actq_w3_group, 3, 0x000e000e, unit_w3
-    group_kernel actq_w4_group, 4, 0x001e001e, unit_w4
-    group_kernel actq_w8_group, 8, 0, unit_w8
+    row_kernel actq_w2_row, 0x00060006, unit_w2
+    row_kernel actq_w3_row, 0x000e000e, unit_w3
+    row_kernel actq_w4_row, 0x001e001e, unit_w4
+    row_kernel actq_w8_row, 0, unit_w8
+    group_kernel actq_w2_group, 0x00060006, unit_w2
+    group_kernel actq_w3_group, 0x000e000e, unit_w3
+    group_kernel actq_w4_group, 0x001e001e, unit_w4
+    group_kernel actq_w8_group, 0, unit_w8
     .text

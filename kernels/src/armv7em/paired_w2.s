@@ -1,0 +1,233 @@
+@ GEMV for 2-bit codes in paired lanes (kernels/src/format/w2_paired.rs): strips of eight rows, or four.
+@
+@ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1), [sp] x_end, [sp+4] minus the biases of all chunks.
+@ x_end is where the last chunk ends; with row scales, the sum of x stands there.
+@
+@ In the loops: r0 weights, r1 x, r3-r6 activation pairs, r7-r9 and r2 the sums t of row pairs 0 to 3 (r7 and r2 in a strip
+@ of four; r2 is the last, because a chunk's start value comes with its first pairs), r10 and r11 weight words, r12 the mask,
+@ lr the extracted codes.
+@
+@ Frame: 0-31 sums over chunks, (sum of t, sum of its high half) of each row pair; 32 mask, 36 x_end, 40 x, 44 minus the biases,
+@ 48 acc, 52 strips, 56 sum of x.
+
+    .syntax unified
+    .thumb
+
+@ t += (codes at bit `rot` of both rows and lanes) * pair
+.macro d2_set rot, word, pair, t, from
+    .if \rot
+    and lr, r12, \word, ror #\rot
+    .else
+    and lr, r12, \word
+    .endif
+    smlad \t, lr, \pair, \from
+.endm
+
+@ eight columns of a row pair
+.macro d2_word word, t, from
+    d2_set 0, \word, r3, \t, \from
+    d2_set 4, \word, r4, \t, \t
+    d2_set 8, \word, r5, \t, \t
+    d2_set 12, \word, r6, \t, \t
+.endm
+
+@ Eight columns of a strip. The first eight of a chunk load the start value into r2 and start all sums from it.
+.macro d2_cols8 rows, first
+    .if \first
+    ldmia.w r1!, {r2-r6}
+    .else
+    ldmia.w r1!, {r3-r6}
+    .endif
+    ldrd r10, r11, [r0], #8
+    .if \first
+    d2_word r10, r7, r2
+    .else
+    d2_word r10, r7, r7
+    .endif
+    .if \rows == 4
+    d2_word r11, r2, r2
+    .else
+    .if \first
+    d2_word r11, r8, r2
+    .else
+    d2_word r11, r8, r8
+    .endif
+    ldrd r10, r11, [r0], #8
+    .if \first
+    d2_word r10, r9, r2
+    .else
+    d2_word r10, r9, r9
+    .endif
+    d2_word r11, r2, r2
+    .endif
+.endm
+
+.macro d2_chunk rows
+    d2_cols8 \rows, 1
+    d2_cols8 \rows, 0
+    d2_cols8 \rows, 0
+    d2_cols8 \rows, 0
+.endm
+
+.macro d2_prologue
+    push {r4-r11, lr}
+    sub sp, sp, #60
+    movw r12, #0xc003
+    movt r12, #0xc003
+    ldrd r4, r5, [sp, #96]
+    strd r12, r4, [sp, #32]
+    strd r1, r5, [sp, #40]
+    strd r2, r3, [sp, #48]
+.endm
+
+@ Sums over chunks from `low`, `high`; x to its begin.
+.macro d2_begin rows, low, high
+    strd \low, \high, [sp, #0]
+    strd \low, \high, [sp, #8]
+    .if \rows == 8
+    strd \low, \high, [sp, #16]
+    strd \low, \high, [sp, #24]
+    .endif
+    ldr r12, [sp, #32]
+    ldr r1, [sp, #40]
+.endm
+
+@ r8: where the sums of the next strip go, r9: strips left, this one included
+.macro d2_next_strip
+    subs r9, r9, #1
+    strd r8, r9, [sp, #48]
+    bne.w 1b
+    add sp, sp, #60
+    pop {r4-r11, pc}
+.endm
+
+@ What is left of t without its high half is 4 * even = 2 * the even row's level sum; the odd row's is 2 * odd + sum(x).
+.macro d2_rows even, odd
+    sub \even, \even, \odd, lsl #16
+    asr \even, \even, #1
+    add \odd, r7, \odd, lsl #1
+.endm
+
+.macro d2_row_kernel name, rows
+    .section .text.\name, "ax", %progbits
+    .global \name
+    .type \name, %function
+    .thumb_func
+    .balign 16
+\name:
+    d2_prologue
+    ldr r4, [r4]
+    str r4, [sp, #56]
+1:
+    ldr r4, [sp, #44]
+    movs r5, #0
+    d2_begin \rows, r4, r5
+    .balign 4
+2:
+    d2_chunk \rows
+    .if \rows == 8
+    ldmia.w sp, {r3-r6, r10-r12, lr}
+    add r3, r3, r7
+    add r4, r4, r7, asr #16
+    add r5, r5, r8
+    add r6, r6, r8, asr #16
+    add r10, r10, r9
+    add r11, r11, r9, asr #16
+    add r12, r12, r2
+    add lr, lr, r2, asr #16
+    stmia.w sp, {r3-r6, r10-r12, lr}
+    ldrd r12, lr, [sp, #32]
+    .else
+    ldmia.w sp, {r3-r6}
+    add r3, r3, r7
+    add r4, r4, r7, asr #16
+    add r5, r5, r2
+    add r6, r6, r2, asr #16
+    stmia.w sp, {r3-r6}
+    ldr lr, [sp, #36]
+    .endif
+    cmp r1, lr
+    bne.w 2b
+    ldr r7, [sp, #56]
+    ldrd r8, r9, [sp, #48]
+    d2_rows r3, r4
+    d2_rows r5, r6
+    .if \rows == 8
+    ldrd r12, lr, [sp, #24]
+    d2_rows r10, r11
+    d2_rows r12, lr
+    stmia.w r8!, {r3-r6, r10-r12, lr}
+    .else
+    stmia.w r8!, {r3-r6}
+    .endif
+    d2_next_strip
+    .size \name, . - \name
+.endm
+
+@ Sums r3-r6 of four rows over groups, from two row pairs' t and the group's `scales`; r12 holds the sum of x. Even rows sum
+@ 4 * even * scale, odd rows (2 * odd + sum(x)) * scale.
+.macro d2_scale scales, t0, t1
+    uxtb16 lr, \scales
+    uxtb16 \scales, \scales, ror #8
+    smlabb r4, r12, \scales, r4
+    smlabt r6, r12, \scales, r6
+    add \scales, \scales, \scales
+    smlatb r4, \t0, \scales, r4
+    smlatt r6, \t1, \scales, r6
+    sub \t0, \t0, #0x8000
+    sub \t1, \t1, #0x8000
+    smlabb r3, \t0, lr, r3
+    smlabt r5, \t1, lr, r5
+.endm
+
+.macro d2_group_kernel name, rows
+    .section .text.\name, "ax", %progbits
+    .global \name
+    .type \name, %function
+    .thumb_func
+    .balign 16
+\name:
+    d2_prologue
+1:
+    movs r4, #0
+    d2_begin \rows, r4, r4
+    .balign 4
+2:
+    d2_chunk \rows
+    ldr r12, [r1], #4
+    ldmia.w sp, {r3-r6}
+    .if \rows == 8
+    ldrd r10, r11, [r0], #8
+    d2_scale r10, r7, r8
+    stmia.w sp, {r3-r6}
+    add r10, sp, #16
+    ldmia.w r10, {r3-r6}
+    d2_scale r11, r9, r2
+    stmia.w r10, {r3-r6}
+    .else
+    ldr r10, [r0], #4
+    d2_scale r10, r7, r2
+    stmia.w sp, {r3-r6}
+    .endif
+    ldrd r12, lr, [sp, #32]
+    cmp r1, lr
+    bne.w 2b
+    ldrd r8, r9, [sp, #48]
+    .if \rows == 8
+    ldmia.w sp, {r2, r7, r10, r11}
+    asr r2, r2, #1
+    asr r10, r10, #1
+    stmia.w r8!, {r2, r7, r10, r11}
+    .endif
+    asr r3, r3, #1
+    asr r5, r5, #1
+    stmia.w r8!, {r3-r6}
+    d2_next_strip
+    .size \name, . - \name
+.endm
+
+    d2_row_kernel actq_w2_paired_row, 8
+    d2_row_kernel actq_w2_paired_row4, 4
+    d2_group_kernel actq_w2_paired_group, 8
+    d2_group_kernel actq_w2_paired_group4, 4
+    .text

@@ -1,0 +1,181 @@
+@ GEMV for 3-bit codes in paired lanes (kernels/src/format/w3_paired.rs): strips of four rows.
+@
+@ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1), [sp] x_end, [sp+4] minus the biases of all chunks.
+@ x_end is where the last chunk ends; with row scales, the sum of x stands there.
+@
+@ In the loops: r0 weights, r1 x, r2 mask, r3-r5 weight words, r6 the sums t of rows 2 and 3 (it comes first with the chunk's
+@ start value), r7 and r8 activation pairs, r9 t of rows 0 and 1, r10 and r11 sums of the two t over chunks, r12 sums of their
+@ high halves side by side, lr the extracted codes.
+@
+@ The high halves of 64 columns stay within `4 * 127 * 64 = 32512`.
+@
+@ Frame: 0-15 sums over groups (group kernel) or 0-7 sums of the high halves (row kernel), 16 x, 20 minus the biases, 24 acc,
+@ 28 strips, 32 x_end, 36 sum of x, 40 whether the number of 32 columns is odd.
+
+    .syntax unified
+    .thumb
+
+.macro d3_set word, rot, pair, t, from
+    .if \rot
+    and lr, r2, \word, ror #\rot
+    .else
+    and lr, r2, \word
+    .endif
+    smlad \t, lr, \pair, \from
+.endm
+
+@ A chunk of eight columns; afterwards r9 and r6 hold its sums t.
+.macro d3_chunk
+    ldmia.w r1!, {r6-r8}
+    ldmia.w r0!, {r3-r5}
+    d3_set r3, 0, r7, r9, r6
+    d3_set r3, 6, r7, r6, r6
+    d3_set r4, 0, r8, r9, r9
+    d3_set r4, 6, r8, r6, r6
+    ldmia.w r1!, {r7, r8}
+    eor r3, r3, r4, ror #2
+    eor r4, r5, r4, ror #4
+    d3_set r5, 0, r7, r9, r9
+    d3_set r5, 6, r7, r6, r6
+    d3_set r3, 10, r8, r9, r9
+    d3_set r4, 10, r8, r6, r6
+.endm
+
+@ the same, then its sums are added to those of the chunks before
+.macro d3_next_chunk
+    d3_chunk
+    add r10, r10, r9
+    add r11, r11, r6
+    pkhtb lr, r6, r9, asr #16
+    sadd16 r12, r12, lr
+.endm
+
+.macro d3_prologue
+    push {r4-r11, lr}
+    sub sp, sp, #44
+    ldrd r4, r5, [sp, #80]
+    strd r1, r5, [sp, #16]
+    strd r2, r3, [sp, #24]
+    movw r2, #0xe007
+    movt r2, #0xe007
+    str r4, [sp, #32]
+.endm
+
+@ r9: where the sums of the next strip go, r10: strips left, this one included
+.macro d3_next_strip
+    subs r10, r10, #1
+    strd r9, r10, [sp, #24]
+    bne.w 1b
+    add sp, sp, #44
+    pop {r4-r11, pc}
+.endm
+
+    .section .text.actq_w3_paired_row, "ax", %progbits
+    .global actq_w3_paired_row
+    .type actq_w3_paired_row, %function
+    .thumb_func
+    .balign 16
+actq_w3_paired_row:
+    d3_prologue
+    ldr r5, [r4]
+    str r5, [sp, #36]
+    @ 32 columns take 80 bytes of x: bit 4 of the length says whether their number is odd.
+    sub r4, r4, r1
+    and r4, r4, #16
+    str r4, [sp, #40]
+1:
+    ldrd r1, r10, [sp, #16]
+    mov r11, r10
+    movs r4, #0
+    strd r4, r4, [sp, #0]
+    @ The loop takes 64 columns and is entered in its middle for an odd number of 32.
+    ldr r12, [sp, #40]
+    cmp r12, #0
+    bne.w 3f
+    .balign 4
+2:
+    d3_chunk
+    add r10, r10, r9
+    add r11, r11, r6
+    pkhtb r12, r6, r9, asr #16
+    d3_next_chunk
+    d3_next_chunk
+    d3_next_chunk
+4:
+    d3_next_chunk
+    d3_next_chunk
+    d3_next_chunk
+    d3_next_chunk
+    ldrd r7, r8, [sp, #0]
+    ldr lr, [sp, #32]
+    sxtah r7, r7, r12
+    add r8, r8, r12, asr #16
+    strd r7, r8, [sp, #0]
+    cmp r1, lr
+    bne.w 2b
+    @ What is left of a sum of t without its high half is 8 * even = 4 * the even row's level sum; the odd row's is
+    @ 2 * odd + sum(x).
+    ldr lr, [sp, #36]
+    sub r3, r10, r7, lsl #16
+    asrs r3, r3, #2
+    add r4, lr, r7, lsl #1
+    sub r5, r11, r8, lsl #16
+    asrs r5, r5, #2
+    add r6, lr, r8, lsl #1
+    ldrd r9, r10, [sp, #24]
+    stmia.w r9!, {r3-r6}
+    d3_next_strip
+3:
+    movs r12, #0
+    b.w 4b
+    .size actq_w3_paired_row, . - actq_w3_paired_row
+
+    .section .text.actq_w3_paired_group, "ax", %progbits
+    .global actq_w3_paired_group
+    .type actq_w3_paired_group, %function
+    .thumb_func
+    .balign 16
+actq_w3_paired_group:
+    d3_prologue
+1:
+    ldr r1, [sp, #16]
+    movs r4, #0
+    strd r4, r4, [sp, #0]
+    strd r4, r4, [sp, #8]
+    .balign 4
+2:
+    @ the first of a group's four chunks takes all four biases away
+    d3_chunk
+    sub r10, r9, #0x20000
+    sub r11, r6, #0x20000
+    pkhtb r12, r6, r9, asr #16
+    d3_next_chunk
+    d3_next_chunk
+    d3_next_chunk
+    @ The four level sums, at most 7 * 127 * 32 = 28448: r10 and r11 of the even rows, both halves of r12 of the odd ones.
+    sub r10, r10, r12, lsl #16
+    asr r10, r10, #2
+    sub r11, r11, r12
+    uxtah r11, r11, r12
+    asr r11, r11, #2
+    ldr r9, [r0], #4
+    ldr lr, [r1], #4
+    pkhbt lr, lr, lr, lsl #16
+    sadd16 r12, r12, r12
+    sadd16 r12, r12, lr
+    uxtb16 r8, r9
+    uxtb16 r9, r9, ror #8
+    ldmia.w sp, {r3-r6}
+    smlabb r3, r10, r8, r3
+    smlabb r4, r12, r9, r4
+    smlabt r5, r11, r8, r5
+    smlatt r6, r12, r9, r6
+    stmia.w sp, {r3-r6}
+    ldr lr, [sp, #32]
+    cmp r1, lr
+    bne.w 2b
+    ldrd r9, r10, [sp, #24]
+    stmia.w r9!, {r3-r6}
+    d3_next_strip
+    .size actq_w3_paired_group, . - actq_w3_paired_group
+    .text

@@ -1,0 +1,267 @@
+@ GEMV for 4-bit codes in paired lanes (kernels/src/format/w4_paired.rs): strips of eight rows, or four.
+@
+@ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1), [sp] x_end, [sp+4] bytes of a chunk in x.
+@
+@ In the loops: r0 weights, r1 x, r2 mask, r3 and r4 activation pairs, r5-r7 the sums p, q, k of the first four rows, r8-r10 of
+@ the others (or of all in a strip of four), r11 and r12 weight words, lr the extracted codes.
+@
+@ Frame: 0-31 sums over groups (group kernel), 0 end of this chunk (row kernel), 32 x, 36 mask, 40 end of the first chunk, 44
+@ x_end, 48 acc, 52 strips, 56 chunk bytes.
+
+    .syntax unified
+    .thumb
+
+@ two columns of four rows
+.macro c4_word word, pair, p, q, k, p0, q0, k0
+    and lr, r2, \word
+    smlad \p, lr, \pair, \p0
+    and lr, r2, \word, ror #8
+    smlad \q, lr, \pair, \q0
+    and \word, \word, #0x0f0f0f0f
+    smlad \k, \word, \pair, \k0
+.endm
+
+.macro c4_first word, pair
+    c4_word \word, \pair, r5, r6, r7, r5, r6, r7
+.endm
+
+.macro c4_last word, pair
+    c4_word \word, \pair, r8, r9, r10, r8, r9, r10
+.endm
+
+@ four columns of a strip
+.macro c4_cols4 rows
+    ldmia.w r1!, {r3, r4}
+    ldrd r11, r12, [r0], #8
+    .if \rows == 8
+    c4_first r11, r3
+    c4_last r12, r3
+    ldrd r11, r12, [r0], #8
+    c4_first r11, r4
+    c4_last r12, r4
+    .else
+    c4_last r11, r3
+    c4_last r12, r4
+    .endif
+.endm
+
+@ The chunk's start values, and its first four columns, which start from them.
+.macro c4_cols4_start rows
+    ldmia.w r1!, {r9, r10}
+    ldmia.w r1!, {r3, r4}
+    ldrd r11, r12, [r0], #8
+    .if \rows == 8
+    c4_word r11, r3, r5, r6, r7, r9, r9, r10
+    c4_word r12, r3, r8, r9, r10, r9, r9, r10
+    ldrd r11, r12, [r0], #8
+    c4_first r11, r4
+    c4_last r12, r4
+    .else
+    c4_word r11, r3, r8, r9, r10, r9, r9, r10
+    c4_last r12, r4
+    .endif
+.endm
+
+.macro c4_prologue
+    push {r4-r11, lr}
+    sub sp, sp, #60
+    movw r12, #0xf00f
+    movt r12, #0xf00f
+    ldrd r4, r5, [sp, #96]
+    strd r1, r12, [sp, #32]
+    str r4, [sp, #44]
+    strd r2, r3, [sp, #48]
+    str r5, [sp, #56]
+.endm
+
+@ r11: where the sums of the next strip go, r12: strips left, this one included
+.macro c4_next_strip
+    subs r12, r12, #1
+    strd r11, r12, [sp, #48]
+    bne.w 1b
+    add sp, sp, #60
+    pop {r4-r11, pc}
+.endm
+
+@ The four rows' sums as r2-r4 and `d`: A from the low 20 bits of k - 2^8*q, then the others. `d` may be `p`.
+.macro c4_sums p, q, k, d
+    sub r2, \k, \q, lsl #8
+    sbfx r2, r2, #0, #20
+    sub \p, \p, r2
+    sub \k, \k, r2
+    sub \q, \q, \k, asr #8
+    asr r3, \p, #12
+    asr r4, \k, #8
+    asr \d, \q, #12
+.endm
+
+@ Adds r2-r4 and `d` to the sums at r11.
+.macro c4_add d
+    ldrd r6, r7, [r11]
+    add r2, r2, r6
+    add r3, r3, r7
+    ldrd r6, r7, [r11, #8]
+    add r4, r4, r6
+    add \d, \d, r7
+    stmia.w r11!, {r2-r4, \d}
+.endm
+
+.macro c4_row_kernel name, rows
+    .section .text.\name, "ax", %progbits
+    .global \name
+    .type \name, %function
+    .thumb_func
+    .balign 16
+\name:
+    c4_prologue
+    @ the end of the first chunk, or of the vector where that comes first
+    add r5, r5, r1
+    cmp r5, r4
+    it hi
+    movhi r5, r4
+    str r5, [sp, #40]
+    str r5, [sp, #0]
+1:
+    ldrd r1, r2, [sp, #32]
+3:
+    ldmia.w r1!, {r9, r10}
+    .if \rows == 8
+    mov r5, r9
+    mov r6, r9
+    mov r7, r10
+    .endif
+    mov r8, r9
+    .balign 4
+2:
+    .rept 8
+    c4_cols4 \rows
+    .endr
+    ldr lr, [sp, #0]
+    cmp r1, lr
+    bne.w 2b
+    ldrd r12, lr, [sp, #40]
+    ldr r11, [sp, #48]
+    cmp r1, r12
+    bne.n 4f
+    .if \rows == 8
+    c4_sums r5, r6, r7, r5
+    stmia.w r11!, {r2-r5}
+    .endif
+    c4_sums r8, r9, r10, r8
+    stmia.w r11!, {r2-r4, r8}
+    cmp r1, lr
+    bne.n 5f
+6:
+    ldr r12, [sp, #52]
+    c4_next_strip
+4:
+    @ A later chunk's sums are added to those before.
+    .if \rows == 8
+    c4_sums r5, r6, r7, r5
+    c4_add r5
+    .endif
+    c4_sums r8, r9, r10, r8
+    c4_add r8
+    cmp r1, lr
+    bne.n 5f
+    ldr r12, [sp, #40]
+    str r12, [sp, #0]
+    b.n 6b
+5:
+    @ the next chunk's end
+    ldr r3, [sp, #56]
+    add r3, r3, r1
+    cmp r3, lr
+    it hi
+    movhi r3, lr
+    str r3, [sp, #0]
+    ldr r2, [sp, #36]
+    b.w 3b
+    .size \name, . - \name
+.endm
+
+@ lr, p, k and q become 2^12 * (A, B, C, D), of at most 17 + 12 bits.
+.macro c4_rows p, q, k
+    sub lr, \k, \q, lsl #8
+    lsl lr, lr, #12
+    sub \p, \p, lr, asr #12
+    sub \k, \k, lr, asr #12
+    lsl \k, \k, #4
+    sub \q, \q, \k, asr #12
+.endm
+
+@ r12 and r11 become 2^4 * the scales of rows 0 and 2, 1 and 3: SMLAW takes 2^16 away from the product.
+.macro c4_scales
+    ldr r11, [r0], #4
+    uxtb16 r12, r11
+    lsl r12, r12, #4
+    uxtb16 r11, r11, ror #8
+    lsl r11, r11, #4
+.endm
+
+.macro c4_group_kernel name, rows
+    .section .text.\name, "ax", %progbits
+    .global \name
+    .type \name, %function
+    .thumb_func
+    .balign 16
+\name:
+    c4_prologue
+1:
+    movs r3, #0
+    movs r4, #0
+    strd r3, r4, [sp, #0]
+    strd r3, r4, [sp, #8]
+    .if \rows == 8
+    strd r3, r4, [sp, #16]
+    strd r3, r4, [sp, #24]
+    .endif
+    ldrd r1, r2, [sp, #32]
+    .balign 4
+2:
+    c4_cols4_start \rows
+    .rept 7
+    c4_cols4 \rows
+    .endr
+    .if \rows == 8
+    c4_rows r5, r6, r7
+    c4_scales
+    ldmia.w sp, {r2-r4}
+    smlawb r2, lr, r12, r2
+    ldr lr, [sp, #12]
+    smlawb r3, r5, r11, r3
+    smlawt r4, r7, r12, r4
+    smlawt lr, r6, r11, lr
+    stmia.w sp, {r2-r4, lr}
+    add r7, sp, #16
+    .else
+    mov r7, sp
+    .endif
+    c4_rows r8, r9, r10
+    c4_scales
+    ldmia.w r7, {r2-r5}
+    smlawb r2, lr, r12, r2
+    smlawb r3, r8, r11, r3
+    smlawt r4, r10, r12, r4
+    smlawt r5, r9, r11, r5
+    stmia.w r7, {r2-r5}
+    ldr r2, [sp, #36]
+    ldr lr, [sp, #44]
+    cmp r1, lr
+    bne.w 2b
+    ldrd r11, r12, [sp, #48]
+    ldmia.w r7, {r2-r5}
+    .if \rows == 8
+    ldmia.w sp, {r6-r9}
+    stmia.w r11!, {r6-r9}
+    .endif
+    stmia.w r11!, {r2-r5}
+    c4_next_strip
+    .size \name, . - \name
+.endm
+
+    c4_row_kernel actq_w4_paired_row, 8
+    c4_row_kernel actq_w4_paired_row4, 4
+    c4_group_kernel actq_w4_paired_group, 8
+    c4_group_kernel actq_w4_paired_group4, 4
+    .text

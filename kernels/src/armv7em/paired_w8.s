@@ -1,0 +1,170 @@
+@ GEMV for 8-bit codes in paired lanes (kernels/src/format/w8_paired.rs): strips of four rows.
+@
+@ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1), [sp] x_end, [sp+4] bytes of a chunk in x.
+@
+@ In the loops: r0 weights, r1 x, r2-r5 activation pairs, r6 and r8 the sums of rows 0 and 2, r7 and r9 those of rows 0 and 2
+@ plus 2^8 times those of rows 1 and 3, r10-r12 and lr weight words.
+@
+@ Frame: 0-15 sums over groups (group kernel), 16 x, 20 end of this chunk, 24 end of the first chunk, 28 x_end, 32 acc,
+@ 36 strips, 40 chunk bytes.
+
+    .syntax unified
+    .thumb
+
+@ two columns of two rows
+.macro r8_word word, pair, even, both
+    smlad \both, \word, \pair, \both
+    uxtb16 \word, \word
+    smlad \even, \word, \pair, \even
+.endm
+
+.macro r8_cols4 pair0, pair1
+    ldmia.w r0!, {r10-r12, lr}
+    r8_word r10, \pair0, r6, r7
+    r8_word r11, \pair0, r8, r9
+    r8_word r12, \pair1, r6, r7
+    r8_word lr, \pair1, r8, r9
+.endm
+
+.macro r8_cols32
+    .rept 4
+    ldmia.w r1!, {r2-r5}
+    r8_cols4 r2, r3
+    r8_cols4 r4, r5
+    .endr
+.endm
+
+.macro r8_start
+    ldr r6, [r1], #4
+    mov r7, r6
+    mov r8, r6
+    mov r9, r6
+.endm
+
+.macro r8_prologue
+    push {r4-r11, lr}
+    sub sp, sp, #44
+    ldrd r4, r5, [sp, #80]
+    str r1, [sp, #16]
+    str r4, [sp, #28]
+    strd r2, r3, [sp, #32]
+    str r5, [sp, #40]
+.endm
+
+@ r10: where the sums of the next strip go, r11: strips left, this one included
+.macro r8_next_strip
+    subs r11, r11, #1
+    strd r10, r11, [sp, #32]
+    bne.w 1b
+    add sp, sp, #44
+    pop {r4-r11, pc}
+.endm
+
+@ the four rows' sums as r6-r9
+.macro r8_sums
+    sub r7, r7, r6
+    asr r7, r7, #8
+    sub r9, r9, r8
+    asr r9, r9, #8
+.endm
+
+    .section .text.actq_w8_paired_row, "ax", %progbits
+    .global actq_w8_paired_row
+    .type actq_w8_paired_row, %function
+    .thumb_func
+    .balign 16
+actq_w8_paired_row:
+    r8_prologue
+    @ the end of the first chunk, or of the vector where that comes first
+    add r5, r5, r1
+    cmp r5, r4
+    it hi
+    movhi r5, r4
+    strd r5, r5, [sp, #20]
+1:
+    ldr r1, [sp, #16]
+3:
+    r8_start
+    @ The loop takes 64 columns and is entered in its middle for an odd number of 32.
+    ldr r10, [sp, #20]
+    sub r10, r10, r1
+    tst r10, #64
+    bne.w 7f
+    .balign 4
+2:
+    r8_cols32
+7:
+    r8_cols32
+    ldr r2, [sp, #20]
+    cmp r1, r2
+    bne.w 2b
+    ldrd r2, r3, [sp, #24]
+    ldrd r10, r11, [sp, #32]
+    r8_sums
+    cmp r1, r2
+    bne.n 4f
+    stmia.w r10!, {r6-r9}
+    cmp r1, r3
+    bne.n 5f
+6:
+    r8_next_strip
+4:
+    @ A later chunk's sums are added to those before.
+    ldrd r4, r5, [r10]
+    add r6, r6, r4
+    add r7, r7, r5
+    ldrd r4, r5, [r10, #8]
+    add r8, r8, r4
+    add r9, r9, r5
+    stmia.w r10!, {r6-r9}
+    cmp r1, r3
+    bne.n 5f
+    str r2, [sp, #20]
+    b.n 6b
+5:
+    @ the next chunk's end
+    ldr r2, [sp, #40]
+    add r2, r2, r1
+    cmp r2, r3
+    it hi
+    movhi r2, r3
+    str r2, [sp, #20]
+    b.w 3b
+    .size actq_w8_paired_row, . - actq_w8_paired_row
+
+    .section .text.actq_w8_paired_group, "ax", %progbits
+    .global actq_w8_paired_group
+    .type actq_w8_paired_group, %function
+    .thumb_func
+    .balign 16
+actq_w8_paired_group:
+    r8_prologue
+1:
+    ldr r1, [sp, #16]
+    movs r4, #0
+    strd r4, r4, [sp, #0]
+    strd r4, r4, [sp, #8]
+    .balign 4
+2:
+    r8_start
+    r8_cols32
+    r8_sums
+    ldr r10, [r0], #4
+    ldmia.w sp, {r2-r5}
+    uxtb.w r11, r10
+    mla r2, r6, r11, r2
+    uxtb.w r11, r10, ror #8
+    mla r3, r7, r11, r3
+    uxtb.w r11, r10, ror #16
+    mla r4, r8, r11, r4
+    lsr r11, r10, #24
+    mla r5, r9, r11, r5
+    stmia.w sp, {r2-r5}
+    ldr lr, [sp, #28]
+    cmp r1, lr
+    bne.w 2b
+    ldrd r10, r11, [sp, #32]
+    stmia.w r10!, {r2-r5}
+    r8_next_strip
+    .size actq_w8_paired_group, . - actq_w8_paired_group
+    .text
