@@ -27,6 +27,10 @@ struct Plan {
     group: usize,
     /// Columns of a chunk.
     chunk: usize,
+    /// Columns of a group's first chunk, which is short where they do not fill all.
+    first_chunk: usize,
+    /// Chunks of a group.
+    chunks: usize,
 }
 
 impl Plan {
@@ -38,59 +42,56 @@ impl Plan {
         };
         let group = if shape.group == 0 || shape.group > padded { padded } else { shape.group };
         let chunk = if format.chunk < group { format.chunk } else { group };
-        Self { format, cols: shape.cols, padded, group, chunk }
+        let full_chunks = group / chunk;
+        let (first_chunk, chunks) = match group - full_chunks * chunk {
+            0 => (chunk, full_chunks),
+            short => (short, full_chunks + 1),
+        };
+        Self { format, cols: shape.cols, padded, group, chunk, first_chunk, chunks }
     }
 
     const fn chunk_words(self) -> usize {
         self.format.starts.len() + self.chunk / 2
     }
 
-    /// Columns of a group's first chunk, which is short where they do not fill all.
-    const fn first_chunk(self) -> usize {
-        match self.group % self.chunk {
-            0 => self.chunk,
-            short => short,
-        }
-    }
-
     const fn group_words(self) -> usize {
-        self.group / 2 + self.group.div_ceil(self.chunk) * self.format.starts.len() + self.format.sum as usize
+        self.group / 2 + self.chunks * self.format.starts.len() + self.format.sum as usize
     }
 
     /// Words before the pair of column `col`.
     const fn words_before(self, col: usize) -> usize {
         let (group, col) = (col / self.group, col % self.group);
-        let full_before = (col + self.chunk - self.first_chunk()) / self.chunk;
+        let full_before = (col + self.chunk - self.first_chunk) / self.chunk;
         group * self.group_words() + (full_before + 1) * self.format.starts.len() + col / 2
+    }
+
+    const fn words(self) -> usize {
+        if self.padded == self.group {
+            return self.group_words();
+        }
+        // The last pair of the vector is followed by its group's sum only.
+        self.words_before(self.padded - 1) + 1 + self.format.sum as usize
     }
 
     /// See [`Prepared::bounds`]. Single lanes read no more than the block's own units; with row scales, the vector's sum
     /// stands behind the end.
     #[cfg(actq_armv7em)]
     const fn bounds(self, shape: BlockShape) -> (usize, usize) {
-        let cols = shape.units() * shape.layout().cell.cols;
-        let end = self.words_before(cols - 1) + 1;
-        match self.format.starts {
-            [start] if self.format.sum => {
-                let sum_inside = (shape.group != 0) as usize;
-                (end + sum_inside, 0usize.wrapping_sub(self.padded.div_ceil(self.chunk) * start.bias as usize))
-            }
-            // Single lanes step by whole groups.
-            _ => (end, 4 * (self.format.starts.len() + self.first_chunk() / 2)),
-        }
+        let unread = (self.padded - shape.units() * shape.layout().cell.cols) / 2;
+        let sum_behind = (self.format.sum && shape.group == 0) as usize;
+        let extra = match self.format.starts {
+            [start] if self.format.sum => 0usize.wrapping_sub(self.chunks * start.bias as usize),
+            starts => 4 * (starts.len() + self.first_chunk / 2),
+        };
+        (self.words() - unread - sum_behind, extra)
     }
 
     /// Steps of 8 columns that the first pass through the loop of a kernel for row scales leaves out.
     #[cfg(actq_armv7em)]
     const fn skip(self) -> usize {
-        // A pass takes several chunks where they are shorter.
-        let first = if self.format.chunk < self.format.run { self.padded } else { self.first_chunk() };
-        (first.next_multiple_of(self.format.run) - first) / 8
-    }
-
-    const fn words(self) -> usize {
-        // The last pair of the vector is followed by its group's sum only.
-        self.words_before(self.padded - 1) + 1 + self.format.sum as usize
+        // A pass takes several chunks where they are shorter. Passes are powers of two.
+        let first = if self.format.chunk < self.format.run { self.padded } else { self.first_chunk };
+        (0usize.wrapping_sub(first) & (self.format.run - 1)) / 8
     }
 }
 
@@ -116,16 +117,17 @@ impl<'a> Prepared<'a> {
     /// the length differs from [`prepared_words`] or the shape is not valid.
     pub fn new(words: &'a [u32], shape: BlockShape) -> Option<Self> {
         let shape = BlockShape { rows: 1, ..shape };
-        if !shape.is_valid() || words.len() != prepared_words(shape) {
+        if !shape.is_valid() {
             return None;
         }
-        Some(Self {
+        let plan = Plan::new(shape);
+        (words.len() == plan.words()).then_some(Self {
             words,
             shape,
             #[cfg(actq_armv7em)]
-            bounds: Plan::new(shape).bounds(shape),
+            bounds: plan.bounds(shape),
             #[cfg(actq_armv7em)]
-            skip: Plan::new(shape).skip(),
+            skip: plan.skip(),
         })
     }
 
@@ -147,7 +149,7 @@ impl<'a> Prepared<'a> {
     /// The chunks of a group's words, without its sum.
     pub(crate) fn chunks(&self, group: &'a [u32]) -> impl Iterator<Item = &'a [u32]> {
         let plan = Plan::new(self.shape);
-        let first = plan.format.starts.len() + plan.first_chunk() / 2;
+        let first = plan.format.starts.len() + plan.first_chunk / 2;
         let (first, rest) = group.split_at(first.min(group.len()));
         core::iter::once(first).chain(rest.chunks(plan.chunk_words()))
     }
@@ -291,7 +293,7 @@ fn fill<S: Source>(x: &[S::Value], plan: Plan, out: &mut [u32], source: &S) {
         let (out, sum_word) = out.split_at_mut(out.len() - usize::from(sum));
         let (mut x, mut out) = (groups.next().unwrap_or(&[]), out);
         let mut group_sum = 0i32;
-        let first = plan.first_chunk();
+        let first = plan.first_chunk;
         if first != plan.chunk {
             let (first_x, rest_x) = x.split_at(first.min(x.len()));
             let (first_out, rest_out) = out.split_at_mut((starts.len() + first / 2).min(out.len()));
