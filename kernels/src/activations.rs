@@ -5,10 +5,10 @@
 //!
 //! A prepared vector is made for the layout that reads it ([`XFormat`]): for each group of columns (the whole row where the
 //! weights have no group scales) its chunks, and behind them, where the layout asks for it, the sum of the group's values. A
-//! chunk is its start words and its int16 pairs, column `2j` in the low half. The last chunk is padded with zeros, so that the
-//! columns are a multiple of [`PAD_COLS`].
+//! chunk is its start words and its int16 pairs, column `2j` in the low half. The last one is padded with zeros up to where the
+//! weights are, or to a multiple of [`PAD_COLS`] with single lanes.
 
-use crate::format::{BlockShape, PAD_COLS, Start, XFormat};
+use crate::format::{BlockShape, Lanes, PAD_COLS, Start, XFormat};
 
 /// `1.5 * 2^23`: see the module's rounding rule.
 pub const ROUND: f32 = 12_582_912.0;
@@ -27,15 +27,27 @@ struct Plan {
     group: usize,
     /// Columns of a chunk.
     chunk: usize,
+    /// Columns of a group's first chunk, which is short where they do not fill all.
+    first_chunk: usize,
+    /// Chunks of a group.
+    chunks: usize,
 }
 
 impl Plan {
     const fn new(shape: BlockShape) -> Self {
         let format = shape.layout().x;
-        let padded = shape.cols.next_multiple_of(PAD_COLS);
+        let padded = match shape.lanes {
+            Lanes::Single => shape.cols.next_multiple_of(PAD_COLS),
+            Lanes::Paired => shape.units() * shape.layout().cell.cols,
+        };
         let group = if shape.group == 0 || shape.group > padded { padded } else { shape.group };
         let chunk = if format.chunk < group { format.chunk } else { group };
-        Self { format, cols: shape.cols, padded, group, chunk }
+        let full_chunks = group / chunk;
+        let (first_chunk, chunks) = match group - full_chunks * chunk {
+            0 => (chunk, full_chunks),
+            short => (short, full_chunks + 1),
+        };
+        Self { format, cols: shape.cols, padded, group, chunk, first_chunk, chunks }
     }
 
     const fn chunk_words(self) -> usize {
@@ -43,33 +55,43 @@ impl Plan {
     }
 
     const fn group_words(self) -> usize {
-        self.group / 2 + self.group.div_ceil(self.chunk) * self.format.starts.len() + self.format.sum as usize
+        self.group / 2 + self.chunks * self.format.starts.len() + self.format.sum as usize
     }
 
     /// Words before the pair of column `col`.
     const fn words_before(self, col: usize) -> usize {
         let (group, col) = (col / self.group, col % self.group);
-        group * self.group_words() + (col / self.chunk + 1) * self.format.starts.len() + col / 2
+        let full_before = (col + self.chunk - self.first_chunk) / self.chunk;
+        group * self.group_words() + (full_before + 1) * self.format.starts.len() + col / 2
+    }
+
+    const fn words(self) -> usize {
+        if self.padded == self.group {
+            return self.group_words();
+        }
+        // The last pair of the vector is followed by its group's sum only.
+        self.words_before(self.padded - 1) + 1 + self.format.sum as usize
     }
 
     /// See [`Prepared::bounds`]. Single lanes read no more than the block's own units; with row scales, the vector's sum
     /// stands behind the end.
     #[cfg(actq_armv7em)]
     const fn bounds(self, shape: BlockShape) -> (usize, usize) {
-        let cols = shape.units() * shape.layout().cell.cols;
-        let end = self.words_before(cols - 1) + 1;
-        match self.format.starts {
-            [start] if self.format.sum => {
-                let sum_inside = (shape.group != 0) as usize;
-                (end + sum_inside, 0usize.wrapping_sub(self.padded / self.chunk * start.bias as usize))
-            }
-            _ => (end, 4 * self.chunk_words()),
-        }
+        let unread = (self.padded - shape.units() * shape.layout().cell.cols) / 2;
+        let sum_behind = (self.format.sum && shape.group == 0) as usize;
+        let extra = match self.format.starts {
+            [start] if self.format.sum => 0usize.wrapping_sub(self.chunks * start.bias as usize),
+            starts => 4 * (starts.len() + self.first_chunk / 2),
+        };
+        (self.words() - unread - sum_behind, extra)
     }
 
-    const fn words(self) -> usize {
-        // The last pair of the vector is followed by its group's sum only.
-        self.words_before(self.padded - 1) + 1 + self.format.sum as usize
+    /// Steps of 8 columns that the first pass through the loop of a kernel for row scales leaves out.
+    #[cfg(actq_armv7em)]
+    const fn skip(self) -> usize {
+        // A pass takes several chunks where they are shorter. Passes are powers of two.
+        let first = if self.format.chunk < self.format.run { self.padded } else { self.first_chunk };
+        (0usize.wrapping_sub(first) & (self.format.run - 1)) / 8
     }
 }
 
@@ -86,6 +108,8 @@ pub struct Prepared<'a> {
     shape: BlockShape,
     #[cfg(actq_armv7em)]
     bounds: (usize, usize),
+    #[cfg(actq_armv7em)]
+    skip: usize,
 }
 
 impl<'a> Prepared<'a> {
@@ -93,14 +117,17 @@ impl<'a> Prepared<'a> {
     /// the length differs from [`prepared_words`] or the shape is not valid.
     pub fn new(words: &'a [u32], shape: BlockShape) -> Option<Self> {
         let shape = BlockShape { rows: 1, ..shape };
-        if !shape.is_valid() || words.len() != prepared_words(shape) {
+        if !shape.is_valid() {
             return None;
         }
-        Some(Self {
+        let plan = Plan::new(shape);
+        (words.len() == plan.words()).then_some(Self {
             words,
             shape,
             #[cfg(actq_armv7em)]
-            bounds: Plan::new(shape).bounds(shape),
+            bounds: plan.bounds(shape),
+            #[cfg(actq_armv7em)]
+            skip: plan.skip(),
         })
     }
 
@@ -119,16 +146,25 @@ impl<'a> Prepared<'a> {
         self.words.chunks(Plan::new(self.shape).group_words())
     }
 
-    /// Words of a full chunk, start words included.
-    pub(crate) fn chunk_words(&self) -> usize {
-        Plan::new(self.shape).chunk_words()
+    /// The chunks of a group's words, without its sum.
+    pub(crate) fn chunks(&self, group: &'a [u32]) -> impl Iterator<Item = &'a [u32]> {
+        let plan = Plan::new(self.shape);
+        let first = plan.format.starts.len() + plan.first_chunk / 2;
+        let (first, rest) = group.split_at(first.min(group.len()));
+        core::iter::once(first).chain(rest.chunks(plan.chunk_words()))
     }
 
-    /// What the assembler is told about the vector: the words up to where it stops reading, and either the bytes of a chunk or,
+    /// What the assembler is told about the vector: the words up to where it stops reading, and either the bytes of the first chunk or,
     /// where chunks are summed without being taken apart, minus the biases of all chunks.
     #[cfg(actq_armv7em)]
     pub(crate) fn bounds(&self) -> (usize, usize) {
         self.bounds
+    }
+
+    /// Steps of 8 columns that the first pass through a kernel's loop leaves out.
+    #[cfg(actq_armv7em)]
+    pub(crate) fn skip(&self) -> usize {
+        self.skip
     }
 
     /// The value of column `col`; 0 when out of range.
@@ -257,11 +293,18 @@ fn fill<S: Source>(x: &[S::Value], plan: Plan, out: &mut [u32], source: &S) {
         let (out, sum_word) = out.split_at_mut(out.len() - usize::from(sum));
         let (mut x, mut out) = (groups.next().unwrap_or(&[]), out);
         let mut group_sum = 0i32;
+        let first = plan.first_chunk;
+        if first != plan.chunk {
+            let (first_x, rest_x) = x.split_at(first.min(x.len()));
+            let (first_out, rest_out) = out.split_at_mut((starts.len() + first / 2).min(out.len()));
+            group_sum = chunk(first_x, plan.format, first_out, source);
+            (x, out) = (rest_x, rest_out);
+        }
         // Whole chunks at once, where each has but one start word.
         if let [start] = *starts {
             let count = x.len() / plan.chunk;
             if let Some(sum) = source.chunks(x, plan.format.shift, start, (count, plan.chunk), out) {
-                group_sum = sum;
+                group_sum = group_sum.wrapping_add(sum);
                 x = x.get(count * plan.chunk..).unwrap_or(&[]);
                 out = out.get_mut(count * plan.chunk_words()..).unwrap_or_default();
             }
@@ -309,7 +352,7 @@ fn chunk<S: Source>(mut x: &[S::Value], format: XFormat, out: &mut [u32], source
 
 /// Words that suffice for a prepared vector of any layout.
 pub const fn max_prepared_words(cols: usize, group: usize) -> usize {
-    use crate::format::{Lanes, Width};
+    use crate::format::Width;
     let mut most = 0;
     let mut i = 0;
     while i < Width::ALL.len() * Lanes::ALL.len() {

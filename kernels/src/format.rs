@@ -191,8 +191,10 @@ impl Cell {
 pub struct XFormat {
     /// The int16 pairs hold `x << shift`.
     pub shift: u32,
-    /// Columns of a chunk; a chunk ends with its scale group, too.
+    /// Columns of a chunk; a chunk ends with its scale group, too. Where a row's chunks are not all full, the first is short.
     pub chunk: usize,
+    /// Columns of a pass through the loop of the kernel for row scales; the first pass may be short.
+    pub run: usize,
     /// Words before a chunk's pairs: what the kernel's sums start from.
     pub starts: &'static [Start],
     /// Whether each group's chunks (the whole row's where there are no groups) are followed by the sum of the group's x.
@@ -211,7 +213,7 @@ pub struct Start {
 impl XFormat {
     /// Of single lanes: one start value a group.
     const fn single(starts: &'static [Start]) -> Self {
-        Self { shift: 0, chunk: usize::MAX, starts, sum: false }
+        Self { shift: 0, chunk: usize::MAX, run: 1, starts, sum: false }
     }
 }
 
@@ -333,9 +335,13 @@ impl BlockShape {
         self.rows.next_multiple_of(QUAD)
     }
 
-    /// Units in a row.
+    /// Units in a row. With paired lanes, all groups are whole.
     pub const fn units(self) -> usize {
-        self.cols.next_multiple_of(self.layout().step) / self.layout().cell.cols
+        let step = match (self.lanes, self.group) {
+            (Lanes::Paired, 1..) => self.group,
+            _ => self.layout().step,
+        };
+        self.cols.next_multiple_of(step) / self.layout().cell.cols
     }
 
     /// Units in a full group; all units of a row where there are no group scales.

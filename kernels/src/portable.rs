@@ -17,7 +17,7 @@ fn gemv_of<F: Format>(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc
         for (group, words) in x.groups().enumerate() {
             let mut sums = [0i32; QUAD];
             let (chunks, sum) = words.split_at(words.len() - usize::from(F::X.sum));
-            for chunk in chunks.chunks(x.chunk_words()) {
+            for chunk in x.chunks(chunks) {
                 let (starts, pairs) = chunk.split_at(F::X.starts.len());
                 let mut t = F::start(starts);
                 for pairs in pairs.chunks_exact(F::CELL.cols / 2).take(shape.units() - unit) {

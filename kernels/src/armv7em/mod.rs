@@ -23,7 +23,8 @@ global_asm!(include_str!("vector.s"), options(raw));
 global_asm!(include_str!("vector_fpu.s"), options(raw));
 
 /// Reads `strips` strips at `weights` and the prepared vector from `x` up to `x_end`, writes the strips' sums at `acc`. What
-/// `extra` is, the kernel's file says.
+/// `extra` is, the kernel's file says; the first pass through the loop of a kernel for paired lanes with row scales leaves
+/// `skip` steps of 8 columns out.
 type Kernel = unsafe extern "C" fn(
     weights: *const u32,
     x: *const u32,
@@ -31,6 +32,7 @@ type Kernel = unsafe extern "C" fn(
     strips: usize,
     x_end: *const u32,
     extra: usize,
+    skip: usize,
 );
 
 macro_rules! kernels {
@@ -43,6 +45,7 @@ macro_rules! kernels {
                 strips: usize,
                 x_end: *const u32,
                 extra: usize,
+                skip: usize,
             );)*
         }
     };
@@ -100,11 +103,11 @@ pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i3
     unsafe {
         let x_words = x.words().as_ptr();
         if let (Some(kernel), 1..) = (eight, strips) {
-            kernel(weights.as_ptr(), x_words, first.as_mut_ptr(), strips, x_words.add(x_end), extra);
+            kernel(weights.as_ptr(), x_words, first.as_mut_ptr(), strips, x_words.add(x_end), extra, x.skip());
         }
         if !last.is_empty() {
             let weights = weights.as_ptr().add(strips * STRIP / QUAD * block.quad_words());
-            four(weights, x_words, last.as_mut_ptr(), last.len() / QUAD, x_words.add(x_end), extra);
+            four(weights, x_words, last.as_mut_ptr(), last.len() / QUAD, x_words.add(x_end), extra, x.skip());
         }
     }
 }

@@ -1,6 +1,7 @@
 @ GEMV for 2-bit codes in paired lanes (kernels/src/format/w2_paired.rs): strips of eight rows, or four.
 @
-@ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1), [sp] x_end, [sp+4] minus the biases of all chunks.
+@ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1), [sp] x_end, [sp+4] minus the biases of all chunks,
+@ [sp+8] steps of 8 columns that the first pass through the row kernel's loop leaves out.
 @ x_end is where the last chunk ends; with row scales, the sum of x stands there.
 @
 @ In the loops: r0 weights, r1 x, r3-r6 activation pairs, r7-r9 and r2 the sums t of row pairs 0 to 3 (r7 and r2 in a strip
@@ -8,7 +9,7 @@
 @ lr the extracted codes.
 @
 @ Frame: 0-31 sums over chunks, (sum of t, sum of its high half) of each row pair; 32 mask, 36 x_end, 40 x, 44 minus the biases,
-@ 48 acc, 52 strips, 56 sum of x.
+@ 48 acc, 52 strips, 56 sum of x, 60 steps left out.
 
     .syntax unified
     .thumb
@@ -71,10 +72,10 @@
 
 .macro d2_prologue
     push {r4-r11, lr}
-    sub sp, sp, #60
+    sub sp, sp, #68
     movw r12, #0xc003
     movt r12, #0xc003
-    ldrd r4, r5, [sp, #96]
+    ldrd r4, r5, [sp, #104]
     strd r12, r4, [sp, #32]
     strd r1, r5, [sp, #40]
     strd r2, r3, [sp, #48]
@@ -97,7 +98,7 @@
     subs r9, r9, #1
     strd r8, r9, [sp, #48]
     bne.w 1b
-    add sp, sp, #60
+    add sp, sp, #68
     pop {r4-r11, pc}
 .endm
 
@@ -118,13 +119,32 @@
     d2_prologue
     ldr r4, [r4]
     str r4, [sp, #56]
+    ldr r4, [sp, #112]
+    str r4, [sp, #60]
 1:
     ldr r4, [sp, #44]
     movs r5, #0
     d2_begin \rows, r4, r5
+    ldr lr, [sp, #60]
+    cmp lr, #0
+    beq.w 2f
+    @ A short first chunk: all sums start before the first step that is not left out.
+    ldr r2, [r1], #4
+    mov r7, r2
+    mov r8, r2
+    mov r9, r2
+    tbh [pc, lr, lsl #1]
+7:
+    .irp step, 2f, 11f, 12f, 13f
+    .hword (\step - 7b) / 2
+    .endr
     .balign 4
 2:
-    d2_chunk \rows
+    d2_cols8 \rows, 1
+    .irp step, 11, 12, 13
+\step:
+    d2_cols8 \rows, 0
+    .endr
     .if \rows == 8
     ldmia.w sp, {r3-r6, r10-r12, lr}
     add r3, r3, r7

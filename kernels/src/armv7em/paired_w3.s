@@ -1,6 +1,7 @@
 @ GEMV for 3-bit codes in paired lanes (kernels/src/format/w3_paired.rs): strips of four rows.
 @
-@ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1), [sp] x_end, [sp+4] minus the biases of all chunks.
+@ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1), [sp] x_end, [sp+4] minus the biases of all chunks,
+@ [sp+8] steps of 8 columns that the first pass through the row kernel's loop leaves out.
 @ x_end is where the last chunk ends; with row scales, the sum of x stands there.
 @
 @ In the loops: r0 weights, r1 x, r2 mask, r3-r5 weight words, r6 the sums t of rows 2 and 3 (it comes first with the chunk's
@@ -10,7 +11,7 @@
 @ The high halves of 64 columns stay within `4 * 127 * 64 = 32512`.
 @
 @ Frame: 0-15 sums over groups (group kernel) or 0-7 sums of the high halves (row kernel), 16 x, 20 minus the biases, 24 acc,
-@ 28 strips, 32 x_end, 36 sum of x, 40 whether the number of 32 columns is odd.
+@ 28 strips, 32 x_end, 36 sum of x, 40 steps left out.
 
     .syntax unified
     .thumb
@@ -79,33 +80,30 @@ actq_w3_paired_row:
     d3_prologue
     ldr r5, [r4]
     str r5, [sp, #36]
-    @ 32 columns take 80 bytes of x: bit 4 of the length says whether their number is odd.
-    sub r4, r4, r1
-    and r4, r4, #16
-    str r4, [sp, #40]
+    ldr r5, [sp, #88]
+    str r5, [sp, #40]
 1:
     ldrd r1, r10, [sp, #16]
     mov r11, r10
     movs r4, #0
     strd r4, r4, [sp, #0]
-    @ The loop takes 64 columns and is entered in its middle for an odd number of 32.
-    ldr r12, [sp, #40]
-    cmp r12, #0
-    bne.w 3f
+    ldr r9, [sp, #40]
+    movs r12, #0
+    tbh [pc, r9, lsl #1]
+7:
+    .irp step, 2f, 11f, 12f, 13f, 14f, 15f, 16f, 17f
+    .hword (\step - 7b) / 2
+    .endr
     .balign 4
 2:
     d3_chunk
     add r10, r10, r9
     add r11, r11, r6
     pkhtb r12, r6, r9, asr #16
+    .irp step, 11, 12, 13, 14, 15, 16, 17
+\step:
     d3_next_chunk
-    d3_next_chunk
-    d3_next_chunk
-4:
-    d3_next_chunk
-    d3_next_chunk
-    d3_next_chunk
-    d3_next_chunk
+    .endr
     ldrd r7, r8, [sp, #0]
     ldr lr, [sp, #32]
     sxtah r7, r7, r12
@@ -125,9 +123,6 @@ actq_w3_paired_row:
     ldrd r9, r10, [sp, #24]
     stmia.w r9!, {r3-r6}
     d3_next_strip
-3:
-    movs r12, #0
-    b.w 4b
     .size actq_w3_paired_row, . - actq_w3_paired_row
 
     .section .text.actq_w3_paired_group, "ax", %progbits

@@ -1,12 +1,13 @@
 @ GEMV for 4-bit codes in paired lanes (kernels/src/format/w4_paired.rs): strips of eight rows, or four.
 @
-@ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1), [sp] x_end, [sp+4] bytes of a chunk in x.
+@ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1), [sp] x_end, [sp+4] bytes of the first chunk
+@ in x, [sp+8] steps of 8 columns that the first pass through the row kernel's loop leaves out.
 @
 @ In the loops: r0 weights, r1 x, r2 mask, r3 and r4 activation pairs, r5-r7 the sums p, q, k of the first four rows, r8-r10 of
 @ the others (or of all in a strip of four), r11 and r12 weight words, lr the extracted codes.
 @
 @ Frame: 0-31 sums over groups (group kernel), 0 end of this chunk (row kernel), 32 x, 36 mask, 40 end of the first chunk, 44
-@ x_end, 48 acc, 52 strips, 56 chunk bytes.
+@ x_end, 48 acc, 52 strips, 56 steps left out.
 
     .syntax unified
     .thumb
@@ -71,7 +72,8 @@
     strd r1, r12, [sp, #32]
     str r4, [sp, #44]
     strd r2, r3, [sp, #48]
-    str r5, [sp, #56]
+    ldr r6, [sp, #104]
+    str r6, [sp, #56]
 .endm
 
 @ r11: where the sums of the next strip go, r12: strips left, this one included
@@ -106,6 +108,16 @@
     stmia.w r11!, {r2-r4, \d}
 .endm
 
+.macro c4_start rows
+    ldmia.w r1!, {r9, r10}
+    .if \rows == 8
+    mov r5, r9
+    mov r6, r9
+    mov r7, r10
+    .endif
+    mov r8, r9
+.endm
+
 .macro c4_row_kernel name, rows
     .section .text.\name, "ax", %progbits
     .global \name
@@ -114,26 +126,25 @@
     .balign 16
 \name:
     c4_prologue
-    @ the end of the first chunk, or of the vector where that comes first
     add r5, r5, r1
-    cmp r5, r4
-    it hi
-    movhi r5, r4
     str r5, [sp, #40]
     str r5, [sp, #0]
 1:
     ldrd r1, r2, [sp, #32]
+    c4_start \rows
+    ldr lr, [sp, #56]
+    tbh [pc, lr, lsl #1]
+7:
+    .irp step, 10f, 11f, 12f, 13f
+    .hword (\step - 7b) / 2
+    .endr
 3:
-    ldmia.w r1!, {r9, r10}
-    .if \rows == 8
-    mov r5, r9
-    mov r6, r9
-    mov r7, r10
-    .endif
-    mov r8, r9
+    c4_start \rows
     .balign 4
 2:
-    .rept 8
+    .irp step, 10, 11, 12, 13
+\step:
+    c4_cols4 \rows
     c4_cols4 \rows
     .endr
     ldr lr, [sp, #0]
@@ -168,12 +179,8 @@
     str r12, [sp, #0]
     b.n 6b
 5:
-    @ the next chunk's end
-    ldr r3, [sp, #56]
-    add r3, r3, r1
-    cmp r3, lr
-    it hi
-    movhi r3, lr
+    @ All chunks but the first are full: 256 columns and two start words.
+    add r3, r1, #520
     str r3, [sp, #0]
     ldr r2, [sp, #36]
     b.w 3b

@@ -1,12 +1,13 @@
 @ GEMV for 8-bit codes in paired lanes (kernels/src/format/w8_paired.rs): strips of four rows.
 @
-@ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1), [sp] x_end, [sp+4] bytes of a chunk in x.
+@ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1), [sp] x_end, [sp+4] bytes of the first chunk
+@ in x, [sp+8] steps of 8 columns that the first pass through the row kernel's loop leaves out.
 @
 @ In the loops: r0 weights, r1 x, r2-r5 activation pairs, r6 and r8 the sums of rows 0 and 2, r7 and r9 those of rows 0 and 2
 @ plus 2^8 times those of rows 1 and 3, r10-r12 and lr weight words.
 @
 @ Frame: 0-15 sums over groups (group kernel), 16 x, 20 end of this chunk, 24 end of the first chunk, 28 x_end, 32 acc,
-@ 36 strips, 40 chunk bytes.
+@ 36 strips, 40 steps left out.
 
     .syntax unified
     .thumb
@@ -26,12 +27,10 @@
     r8_word lr, \pair1, r8, r9
 .endm
 
-.macro r8_cols32
-    .rept 4
+.macro r8_cols8
     ldmia.w r1!, {r2-r5}
     r8_cols4 r2, r3
     r8_cols4 r4, r5
-    .endr
 .endm
 
 .macro r8_start
@@ -45,10 +44,11 @@
     push {r4-r11, lr}
     sub sp, sp, #44
     ldrd r4, r5, [sp, #80]
+    ldr r6, [sp, #88]
     str r1, [sp, #16]
     str r4, [sp, #28]
     strd r2, r3, [sp, #32]
-    str r5, [sp, #40]
+    str r6, [sp, #40]
 .endm
 
 @ r10: where the sums of the next strip go, r11: strips left, this one included
@@ -75,26 +75,25 @@
     .balign 16
 actq_w8_paired_row:
     r8_prologue
-    @ the end of the first chunk, or of the vector where that comes first
     add r5, r5, r1
-    cmp r5, r4
-    it hi
-    movhi r5, r4
     strd r5, r5, [sp, #20]
 1:
     ldr r1, [sp, #16]
+    r8_start
+    ldr r10, [sp, #40]
+    tbh [pc, r10, lsl #1]
+7:
+    .irp step, 10f, 11f, 12f, 13f, 14f, 15f, 16f, 17f
+    .hword (\step - 7b) / 2
+    .endr
 3:
     r8_start
-    @ The loop takes 64 columns and is entered in its middle for an odd number of 32.
-    ldr r10, [sp, #20]
-    sub r10, r10, r1
-    tst r10, #64
-    bne.w 7f
     .balign 4
 2:
-    r8_cols32
-7:
-    r8_cols32
+    .irp step, 10, 11, 12, 13, 14, 15, 16, 17
+\step:
+    r8_cols8
+    .endr
     ldr r2, [sp, #20]
     cmp r1, r2
     bne.w 2b
@@ -122,12 +121,8 @@ actq_w8_paired_row:
     str r2, [sp, #20]
     b.n 6b
 5:
-    @ the next chunk's end
-    ldr r2, [sp, #40]
-    add r2, r2, r1
-    cmp r2, r3
-    it hi
-    movhi r2, r3
+    @ All chunks but the first are full: 512 columns and a start word.
+    add r2, r1, #1028
     str r2, [sp, #20]
     b.w 3b
     .size actq_w8_paired_row, . - actq_w8_paired_row
@@ -147,7 +142,9 @@ actq_w8_paired_group:
     .balign 4
 2:
     r8_start
-    r8_cols32
+    .rept 4
+    r8_cols8
+    .endr
     r8_sums
     ldr r10, [r0], #4
     ldmia.w sp, {r2-r5}

@@ -16,7 +16,7 @@
 //! the high halves is taken away in the end. The even row's level sum is then half of what is left, the odd row's is
 //! `2*odd + sum(x)`.
 
-use super::{Cell, Format, PAD_COLS, STRIP, Start, Sums, Width, XFormat, smlad};
+use super::{Cell, Format, STRIP, Start, Sums, Width, XFormat, smlad};
 
 /// Bits of a code.
 pub const BITS: u32 = 2;
@@ -40,8 +40,9 @@ impl Format for W2Paired {
     const WIDTH: Width = Width::W2;
     const CELL: Cell = Cell { rows: 2, cols: 8, words: 1 };
     const STRIP: usize = STRIP;
-    const STEP: usize = PAD_COLS;
-    const X: XFormat = XFormat { shift: 2, chunk: 32, starts: &[Start { bias: 0x8000, factor: -6 }], sum: true };
+    const STEP: usize = 8;
+    const X: XFormat =
+        XFormat { shift: 2, run: 32, chunk: 32, starts: &[Start { bias: 0x8000, factor: -6 }], sum: true };
 
     fn insert(words: &mut [u32; 3], row: usize, col: usize, code: u8) {
         let (bit, sign) = field(row, col);

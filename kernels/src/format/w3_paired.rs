@@ -18,7 +18,7 @@
 //! holds `8*sum((code - 3.5) * x) + 0x8000`: at most `8 * 3.5 * 127 * 8 = 28448` away from the middle after a chunk of 8
 //! columns. All else is as in [`super::w2_paired`].
 
-use super::{Cell, Format, PAD_COLS, QUAD, Start, Sums, Width, XFormat, smlad};
+use super::{Cell, Format, QUAD, Start, Sums, Width, XFormat, smlad};
 
 /// Bits of a code.
 pub const BITS: u32 = 3;
@@ -73,8 +73,9 @@ impl Format for W3Paired {
     const WIDTH: Width = Width::W3;
     const CELL: Cell = Cell { rows: 4, cols: 8, words: 3 };
     const STRIP: usize = QUAD;
-    const STEP: usize = PAD_COLS;
-    const X: XFormat = XFormat { shift: 3, chunk: 8, starts: &[Start { bias: 0x8000, factor: -28 }], sum: true };
+    const STEP: usize = 8;
+    const X: XFormat =
+        XFormat { shift: 3, run: 64, chunk: 8, starts: &[Start { bias: 0x8000, factor: -28 }], sum: true };
 
     fn insert(cell: &mut [u32; 3], row: usize, col: usize, code: u8) {
         let (set, bit, sign) = field(row, col);

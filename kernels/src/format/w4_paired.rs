@@ -19,7 +19,7 @@
 //! `B = (p - A) / 2^12` and `D = (q - C) / 2^12` are exact. That holds while all sums have 20 bits: `15 * 127 * 256 = 487680`
 //! is below `2^19 = 524288`, so a chunk has up to 256 columns.
 
-use super::{Cell, Format, PAD_COLS, STRIP, Start, Sums, Width, XFormat, smlad};
+use super::{Cell, Format, STRIP, Start, Sums, Width, XFormat, smlad};
 
 /// Bits of a code.
 pub const BITS: u32 = 4;
@@ -49,9 +49,10 @@ impl Format for W4Paired {
     const WIDTH: Width = Width::W4;
     const CELL: Cell = Cell { rows: 4, cols: 2, words: 1 };
     const STRIP: usize = STRIP;
-    const STEP: usize = PAD_COLS;
+    const STEP: usize = 8;
     const X: XFormat = XFormat {
         shift: 1,
+        run: 32,
         chunk: 256,
         // Even rows have codes, for 2*code - 15; odd rows code - 8, for 2*(code - 8) + 1.
         starts: &[Start { bias: 0, factor: -15 + (1 << 12) }, Start { bias: 0, factor: -15 - (15 << 8) }],

@@ -12,7 +12,7 @@
 //! Both start from `-128 * sum(x)`, and the odd row's sum is their difference over 2^8. It has 24 bits as long as
 //! `128 * 127 * 512 = 8323072` is below `2^23 = 8388608`: a chunk has up to 512 columns.
 
-use super::{Cell, Format, PAD_COLS, QUAD, Start, Sums, Width, XFormat, smlad};
+use super::{Cell, Format, QUAD, Start, Sums, Width, XFormat, smlad};
 
 /// Bits of a code.
 pub const BITS: u32 = 8;
@@ -36,8 +36,9 @@ impl Format for W8Paired {
     const WIDTH: Width = Width::W8;
     const CELL: Cell = Cell { rows: 2, cols: 2, words: 1 };
     const STRIP: usize = QUAD;
-    const STEP: usize = PAD_COLS;
-    const X: XFormat = XFormat { shift: 0, chunk: 512, starts: &[Start { bias: 0, factor: -128 }], sum: false };
+    const STEP: usize = 8;
+    const X: XFormat =
+        XFormat { shift: 0, run: 64, chunk: 512, starts: &[Start { bias: 0, factor: -128 }], sum: false };
 
     fn insert(words: &mut [u32; 3], row: usize, col: usize, code: u8) {
         let (bit, offset) = field(row, col);
