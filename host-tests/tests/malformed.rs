@@ -65,9 +65,10 @@ fn valid_image() -> Vec<u8> {
     actq::writer::image(&policy, &matrices).expect("the policy fits the format")
 }
 
-/// Even rows of `a`, odd rows of `b`.
+/// Even rows of `a`, odd rows of `b`, for activations beyond int8, so that they are packed in single lanes.
 fn interleaved(a: &Outcome, b: &Outcome) -> Outcome {
     let (mut out, other) = (a.clone(), &b.quantized);
+    out.x_max = 255;
     let mixed = &mut out.quantized;
     let (cols, groups) = (mixed.cols, mixed.groups());
     for row in (1..mixed.rows).step_by(2) {
@@ -249,7 +250,7 @@ fn headers_that_cannot_be_are_refused() {
         ("a later version", E::Version, |d| d.set_low(h::W_VERSION, 2)),
         ("a longer header", E::Version, |d| d.set_high(h::W_VERSION, 33)),
         ("a length one word off", E::Length, |d| d.set(h::W_BYTES, d.get(h::W_BYTES) + 4)),
-        ("another layout stamp", E::Layout, |d| d.set(h::W_LAYOUT, 2)),
+        ("another layout stamp", E::Layout, |d| d.set(h::W_LAYOUT, d.get(h::W_LAYOUT) + 1)),
         ("reserved word 28", E::Reserved, |d| d.set(28, 1)),
         ("reserved word 29", E::Reserved, |d| d.set(29, 1)),
         ("reserved word 30", E::Reserved, |d| d.set(30, 1)),
@@ -389,7 +390,9 @@ fn matrices_that_cannot_be_are_refused() {
         ("bias NaN", E::Constant, |d| d.set_f32(d.offset(d.data(FIRST) + 3), NAN)),
         ("width 5", E::Width, |d| d.set_low(d.block(FIRST, 0), 5)),
         ("width 0", E::Width, |d| d.set_low(d.block(FIRST, 0), 0)),
-        ("reserved byte beside the width", E::Reserved, |d| d.set_low(d.block(FIRST, 0), 4 | 1 << 8)),
+        ("unknown lanes", E::Lanes, |d| d.set_low(d.block(FIRST, 0), 4 | 2 << 8)),
+        ("single lanes for int8 activations", E::Lanes, |d| d.set_low(d.block(FIRST, 0), 4)),
+        ("paired lanes for int16 activations", E::Lanes, |d| d.set_low(d.block(OUTPUT, 0), 2 | 1 << 8)),
         ("a block of no rows", E::Shape, |d| d.set_high(d.block(FIRST, 0), 0)),
         ("a block with more rows than the matrix", E::Shape, |d| d.set_high(d.block(FIRST, 0), UNITS as u32 + 1)),
         ("weights outside", E::Section, |d| d.set(d.block(FIRST, 0) + 1, d.0.len() as u32 - 1)),
