@@ -88,7 +88,7 @@ pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i3
     let shape = block.shape();
     let weights = block.rows_from(first_row);
     let quads = acc.len() / QUAD;
-    if weights.len() < quads * block.quad_words() {
+    if weights.len() < quads * block.quad_words() || !x.fits(block.shape()) {
         return;
     }
     let (eight, four) = KERNELS[shape.width as usize][shape.lanes as usize][usize::from(shape.group != 0)];
