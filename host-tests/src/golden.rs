@@ -3,33 +3,9 @@
 //! A case: width, lanes, rows, cols, group, start (words of padding to put before weights and activations, 0 to 3), then the
 //! packed words, the prepared activations, and the sums with those of padding rows. The stream ends with a width of 0.
 
+pub use actq::random::Random;
 use actq_kernels::activations::{Prepared, prepare, prepared_words};
 use actq_kernels::format::{Block, BlockShape, Lanes, Width, pack};
-
-/// A deterministic generator (splitmix64).
-#[derive(Clone, Debug)]
-pub struct Random(pub u64);
-
-impl Random {
-    /// 64 random bits.
-    pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// A number below `n`.
-    pub fn below(&mut self, n: usize) -> usize {
-        (self.bits() % n as u64) as usize
-    }
-
-    /// A number in -1..1.
-    pub fn unit(&mut self) -> f32 {
-        (self.bits() >> 40) as f32 / (1u32 << 23) as f32 - 1.0
-    }
-}
 
 /// How a case's numbers are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
