@@ -74,7 +74,7 @@ impl fmt::Display for ImageError {
             Self::Op => "unknown operation",
             Self::Shape => "lengths of an operation do not fit",
             Self::Width => "weight width is not 2, 3, 4 or 8 bits",
-            Self::Lanes => "lanes of a block do not follow from its matrix's activations",
+            Self::Lanes => "lanes of a block do not follow from its matrix's activations and groups",
             Self::Group => "group size is not 0, 32, 64 or 128",
             Self::Index => "output index out of range or repeated",
             Self::Constant => "a constant is not finite or has the wrong sign",
