@@ -99,11 +99,7 @@ pub fn quantize(
         .zip(inputs)
         .map(|(columns, importance)| columns.iter().map(|&c| importance[c]).collect())
         .collect();
-    let all = |limit: u16| vec![limit; graph.matrices.len()];
-    let learned_with = match options.activations {
-        Activations::Int16 => all(i16::MAX as u16),
-        Activations::Int8 | Activations::Auto => all(127),
-    };
+    let learned_with = vec![options.activations.limit(); graph.matrices.len()];
     let steps = options.steps.unwrap_or(if windows.recurrent() { WINDOW_STEPS } else { STEPS });
     let task = Task {
         graph: &compacted.graph,

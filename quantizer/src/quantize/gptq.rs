@@ -63,25 +63,17 @@ fn feedback(second: &DMatrix<f64>, order: &[usize]) -> Result<DMatrix<f64>> {
 mod tests {
     use super::*;
     use crate::quantize::{moments, scale};
-
-    /// A small deterministic generator (splitmix64), uniform in -1..1.
-    fn noise(seed: &mut u64) -> f64 {
-        *seed = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = *seed;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
+    use crate::random::Random;
 
     #[test]
     fn feedback_lowers_the_output_error_for_correlated_inputs() {
         let (rows, cols) = (16, 48);
-        let mut seed = 7;
-        let data = (0..rows * cols).map(|_| noise(&mut seed) as f32).collect();
+        let mut random = Random(7);
+        let data = (0..rows * cols).map(|_| random.unit()).collect();
         let matrix = Matrix { name: "w".into(), rows, cols, data };
         // Inputs of 8 hidden causes.
-        let mixing = DMatrix::from_fn(cols, 8, |_, _| noise(&mut seed));
-        let x = mixing * DMatrix::from_fn(8, 400, |_, _| noise(&mut seed));
+        let mixing = DMatrix::from_fn(cols, 8, |_, _| f64::from(random.unit()));
+        let x = mixing * DMatrix::from_fn(8, 400, |_, _| f64::from(random.unit()));
         let moments = Moments { second: &x * x.transpose() / 400.0, mean: vec![0.0; cols], count: 400 };
         for width in [Width::W2, Width::W3, Width::W4] {
             for group in [0, 32] {
@@ -95,9 +87,8 @@ mod tests {
 
     #[test]
     fn uncorrelated_equal_inputs_reduce_to_rounding() {
-        let mut seed = 3;
-        let matrix =
-            Matrix { name: "w".into(), rows: 5, cols: 20, data: (0..100).map(|_| noise(&mut seed) as f32).collect() };
+        let mut random = Random(3);
+        let matrix = Matrix { name: "w".into(), rows: 5, cols: 20, data: (0..100).map(|_| random.unit()).collect() };
         let moments = Moments { second: DMatrix::identity(20, 20), mean: vec![0.0; 20], count: 1 };
         let gptq = quantize(&matrix, Width::W3, 0, &moments).expect("positive definite");
         assert_eq!(gptq.codes, scale::round_to_nearest(&matrix, Width::W3, 0).codes);
