@@ -475,19 +475,15 @@ fn derivative(function: Function) -> fn(f32, f32) -> f32 {
 mod tests {
     use super::*;
     use crate::graph::{Node, Part};
+    use crate::random::Random;
 
-    fn noise(seed: &mut u64) -> f32 {
-        *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (*seed >> 40) as f32 / (1u32 << 23) as f32 - 1.0
-    }
-
-    fn random(len: usize, seed: &mut u64) -> Vec<f32> {
-        (0..len).map(|_| noise(seed)).collect()
+    fn random(len: usize, seed: &mut Random) -> Vec<f32> {
+        (0..len).map(|_| seed.unit()).collect()
     }
 
     /// A graph with every kind of node.
     fn graph() -> Graph {
-        let mut seed = 11;
+        let mut seed = Random(11);
         let mut graph = Graph::new(5);
         let mut push = |kind: NodeKind, input: usize, matrices: &[(usize, usize)]| {
             for &(rows, cols) in matrices {
@@ -498,7 +494,7 @@ mod tests {
             graph.nodes.push(Node { kind, input, len });
             graph.output()
         };
-        let vector = |n: usize, seed: u64| random(n, &mut { seed });
+        let vector = |n: usize, seed: u64| random(n, &mut Random(seed));
         let weight = |n: usize, seed: u64| vector(n, seed).iter().map(|v| 1.0 + 0.3 * v).collect::<Vec<_>>();
         let normal =
             push(NodeKind::Normalize { mean: vector(5, 1), scale: weight(5, 2), pre_clip: 10.0, clip: 3.0 }, 0, &[]);
@@ -530,8 +526,8 @@ mod tests {
     const STEPS: usize = 3;
 
     fn observations() -> Vec<Array2<f32>> {
-        let mut seed = 5;
-        (0..STEPS).map(|_| Array2::from_shape_fn((2, 5), |_| noise(&mut seed))).collect()
+        let mut seed = Random(5);
+        (0..STEPS).map(|_| Array2::from_shape_fn((2, 5), |_| seed.unit())).collect()
     }
 
     /// A loss over all steps with different weights on each output.

@@ -83,15 +83,12 @@ fn median_or_mean(distances: &Array2<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
 
     /// A small deterministic generator, uniform in -1..1.
-    fn noise(seed: &mut u64) -> f64 {
-        *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (*seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
-
-    fn samples(n: usize, len: usize, mut seed: u64) -> Array2<f64> {
-        Array2::from_shape_fn((n, len), |_| noise(&mut seed))
+    fn samples(n: usize, len: usize, seed: u64) -> Array2<f64> {
+        let mut random = Random(seed);
+        Array2::from_shape_fn((n, len), |_| f64::from(random.unit()))
     }
 
     /// The definition, with H written out.
