@@ -5,6 +5,7 @@ pub mod allocate;
 pub mod best;
 pub mod compact;
 pub mod distill;
+pub mod feedback;
 pub mod gptq;
 pub mod hsic;
 pub mod moments;

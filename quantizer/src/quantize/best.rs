@@ -1,10 +1,14 @@
-//! The pipeline: how much every row matters, a width for each to the budget, removal of what has none, and distillation.
+//! The pipeline: how much every row matters, a width for each to the budget, removal of what has none, and distillation, or, with
+//! 0 steps of it, two-sided error feedback.
 
 use anyhow::{Result, ensure};
+use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 use super::allocate::{Rows, allocate, energies, removals};
-use super::compact::{Dimension, compact, dimensions};
+use super::compact::{Compacted, Dimension, add_to_bias, compact, dimensions};
 use super::distill::{Task, distill, loss};
+use super::feedback::feedback;
 use super::moments::Moments;
 use super::sensitivity::{Side, importance, output_moments};
 use super::windows::Windows;
@@ -31,13 +35,15 @@ pub struct Statistics<'a> {
     inputs: Vec<Vec<f64>>,
     centred: Vec<Vec<f64>>,
     outputs: Vec<Vec<f64>>,
-    /// Mean input of every matrix.
-    means: Vec<Vec<f64>>,
+    /// Of every matrix's input.
+    moments: Vec<Moments>,
+    /// `G` of every matrix.
+    output_moments: Vec<DMatrix<f64>>,
 }
 
 impl<'a> Statistics<'a> {
     /// Runs the f32 network over `dataset`, forwards and backwards. `moments` are those of the matrices' inputs.
-    pub fn collect(graph: &'a Graph, dataset: &Dataset, moments: &[Moments]) -> Result<Self> {
+    pub fn collect(graph: &'a Graph, dataset: &Dataset, moments: Vec<Moments>) -> Result<Self> {
         let frames = dataset.frames();
         ensure!(
             frames >= LEAST_FRAMES,
@@ -50,13 +56,14 @@ impl<'a> Statistics<'a> {
             "{}: the policy gives the same action at every observation",
             dataset.path.display()
         );
-        let outputs = output_moments(&windows, SEED);
+        let output_moments = output_moments(&windows, SEED);
         Ok(Self {
             windows,
             inputs: moments.iter().map(|m| importance(&m.second, Side::Input)).collect(),
             centred: moments.iter().map(|m| importance(&m.centred(), Side::Input)).collect(),
-            outputs: outputs.iter().map(|g| importance(g, Side::Output)).collect(),
-            means: moments.iter().map(|m| m.mean.clone()).collect(),
+            outputs: output_moments.iter().map(|g| importance(g, Side::Output)).collect(),
+            moments,
+            output_moments,
         })
     }
 }
@@ -70,7 +77,7 @@ pub fn quantize(
     mut progress: impl FnMut(f64),
 ) -> Result<(Graph, Vec<Outcome>)> {
     ensure!(options.group == 0, "best gives every row one scale; --group goes with the other methods");
-    let Statistics { windows, inputs, centred, outputs, means } = statistics;
+    let Statistics { windows, inputs, centred, outputs, moments, .. } = statistics;
     for (name, _) in &options.forced {
         let names = || graph.matrices.iter().map(|m| m.name.as_str()).collect::<Vec<_>>().join(", ");
         ensure!(graph.matrices.iter().any(|m| m.name == *name), "no matrix is named {name:?}; there are {}", names());
@@ -92,7 +99,7 @@ pub fn quantize(
         })
         .collect();
     let widths = allocate(graph, &dimensions, &rows, options.packing(), options.budget.weight_bytes(graph))?;
-    let compacted = compact(graph, &dimensions, &widths, means);
+    let compacted = compact(graph, &dimensions, &widths, moments);
     let importance: Vec<Vec<f64>> = compacted
         .columns
         .iter()
@@ -109,7 +116,10 @@ pub fn quantize(
         steps,
         seed: options.seed,
     };
-    let (quantized, learned) = distill(&task, windows, |step| progress(step as f64 / steps as f64));
+    let (quantized, learned) = match steps {
+        0 => feed_back(&compacted, &importance, statistics),
+        _ => distill(&task, windows, |step| progress(step as f64 / steps as f64)),
+    };
     let wanted = match options.activations {
         Activations::Auto => choose_activations(&learned, &quantized, windows, options.seed),
         Activations::Int8 | Activations::Int16 => learned_with.clone(),
@@ -128,6 +138,28 @@ pub fn quantize(
         }
     }
     Ok((learned, outcomes))
+}
+
+/// Quantizes without learning: every matrix by two-sided error feedback, the mean error into the biases.
+fn feed_back(compacted: &Compacted, importance: &[Vec<f64>], statistics: &Statistics<'_>) -> (Vec<Quantized>, Graph) {
+    let part = |second: &DMatrix<f64>, of: &[usize]| second.select_rows(of).select_columns(of);
+    let mut graph = compacted.graph.clone();
+    let one = |m: usize| {
+        let (columns, moments) = (&compacted.columns[m], &statistics.moments[m]);
+        let input = Moments {
+            second: part(&moments.second, columns),
+            mean: columns.iter().map(|&c| moments.mean[c]).collect(),
+            count: moments.count,
+        };
+        let output = part(&statistics.output_moments[m], &compacted.rows[m]);
+        feedback(&compacted.graph.matrices[m], &compacted.widths[m], &importance[m], &input, &output)
+    };
+    let found: Vec<(Quantized, Vec<f32>)> = (0..graph.matrices.len()).into_par_iter().map(one).collect();
+    let quantized = found.into_iter().enumerate().map(|(m, (quantized, shift))| {
+        add_to_bias(&mut graph, m, &shift);
+        quantized
+    });
+    (quantized.collect(), graph)
 }
 
 /// An int16 input must lower the error by this share of it to be worth its slower kernel.

@@ -40,7 +40,8 @@ impl<'a> Prepared<'a> {
                 let all = dataset.frames().max(1) as f64;
                 prepared.moments = collect(graph, &dataset, |frames| progress(frames as f64 / all));
                 if method == Method::Best {
-                    prepared.best = Some(best::Statistics::collect(graph, &dataset, &prepared.moments)?);
+                    prepared.best =
+                        Some(best::Statistics::collect(graph, &dataset, std::mem::take(&mut prepared.moments))?);
                 }
             }
             Method::ActQuant => prepared.actquant = Some(Statistics::collect(graph, &calib()?, progress)?),

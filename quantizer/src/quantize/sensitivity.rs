@@ -16,7 +16,7 @@ use crate::random::Random;
 const BATCHES: usize = 24;
 const SAMPLES: usize = 128;
 /// Added to a moment's diagonal, as a share of its mean.
-const DAMPING_INPUT: f64 = 0.01;
+pub const DAMPING_INPUT: f64 = 0.01;
 const DAMPING_OUTPUT: f64 = 0.02;
 
 /// `G` of every matrix, `rows * rows`.
@@ -64,18 +64,11 @@ pub enum Side {
 /// costs that nothing compensates, and of its conditional diagonal, which remains where those after it (in order of falling
 /// diagonal) compensate as far as they can.
 pub fn importance(second: &DMatrix<f64>, side: Side) -> Vec<f64> {
-    let n = second.nrows();
-    let share = match side {
-        Side::Input => DAMPING_INPUT,
-        Side::Output => DAMPING_OUTPUT,
-    };
-    let damping = share * second.trace() / n as f64;
-    let mut order: Vec<usize> = (0..n).collect();
-    // Rising, so that the factor's diagonal is conditioned on those that come after in falling order.
-    order.sort_by(|&a, &b| second[(a, a)].total_cmp(&second[(b, b)]));
-    let damped =
-        DMatrix::from_fn(n, n, |i, j| second[(order[i], order[j])] + if i == j { damping.max(1e-30) } else { 0.0 });
-    let mut importance: Vec<f64> = (0..n).map(|i| second[(i, i)] + damping).collect();
+    let (order, damped) = damped(second, side);
+    let mut importance = vec![0.0; order.len()];
+    for (i, &at) in order.iter().enumerate() {
+        importance[at] = damped[(i, i)];
+    }
     if let Some(factor) = damped.cholesky() {
         let l = factor.l_dirty();
         for (i, &at) in order.iter().enumerate() {
@@ -83,4 +76,19 @@ pub fn importance(second: &DMatrix<f64>, side: Side) -> Vec<f64> {
         }
     }
     importance
+}
+
+/// A moment with its rows and columns in order of rising diagonal, and a share of the mean diagonal added to it; and the order.
+/// The triangular factor's diagonal is then conditioned on those that come after, which are the largest.
+pub fn damped(second: &DMatrix<f64>, side: Side) -> (Vec<usize>, DMatrix<f64>) {
+    let n = second.nrows();
+    let share = match side {
+        Side::Input => DAMPING_INPUT,
+        Side::Output => DAMPING_OUTPUT,
+    };
+    let damping = (share * second.trace() / n as f64).max(1e-30);
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by(|&a, &b| second[(a, a)].total_cmp(&second[(b, b)]));
+    let damped = DMatrix::from_fn(n, n, |i, j| second[(order[i], order[j])] + if i == j { damping } else { 0.0 });
+    (order, damped)
 }
