@@ -99,7 +99,7 @@ struct QuantizeArgs {
     /// Bits of the activations, whose scale is found at run time [default: for best chosen per matrix, else 8]
     #[arg(long, value_name = "BITS")]
     activations: Option<ActivationArg>,
-    /// How codes are chosen [default: best where calib.npz is there (gptq with --group), else rtn]
+    /// How codes are chosen [default: best where calib.npz is there, else rtn]
     #[arg(long)]
     method: Option<MethodArg>,
     /// Steps of distillation for --method best [default: 8000, recurrent policies 1200]
@@ -243,11 +243,9 @@ fn run(command: Command) -> Result<()> {
 
 fn run_quantize(args: &QuantizeArgs) -> Result<()> {
     let source = Policy::load(&args.policy_dir)?;
-    let group = args.group.unwrap_or(0);
     let method = match args.method {
         Some(method) => method.into(),
         None if !args.policy_dir.join("calib.npz").exists() => Method::Rtn,
-        None if group > 0 => Method::Gptq,
         None => Method::Best,
     };
     let budget = match (args.bits, args.bpw, args.flash) {

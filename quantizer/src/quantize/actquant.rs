@@ -78,7 +78,7 @@ fn quantize_matrix(matrix: &Matrix, width: Width, group: usize, importance: &Arr
     let mean = importance.iter().map(|&i| f64::from(i)).sum::<f64>() / importance.len().max(1) as f64;
     let least = if mean > 0.0 { FLOOR * mean } else { 1.0 };
     let importance: Vec<f64> = importance.iter().map(|&i| f64::from(i) + least).collect();
-    round_to(matrix, width, Scales::fit(matrix, width, group, &importance))
+    round_to(matrix, width, Scales::fit(matrix, &vec![Some(width); matrix.rows], group, &importance))
 }
 
 #[cfg(test)]

@@ -76,7 +76,7 @@ pub fn quantize(
     options: &Options,
     mut progress: impl FnMut(f64),
 ) -> Result<(Graph, Vec<Outcome>)> {
-    ensure!(options.group == 0, "best gives every row one scale; --group goes with the other methods");
+    ensure!(matches!(options.group, 0 | 32 | 64 | 128), "group is {}, it must be 0, 32, 64 or 128", options.group);
     let Statistics { windows, inputs, centred, outputs, moments, .. } = statistics;
     for (name, _) in &options.forced {
         let names = || graph.matrices.iter().map(|m| m.name.as_str()).collect::<Vec<_>>().join(", ");
@@ -111,13 +111,14 @@ pub fn quantize(
     let task = Task {
         graph: &compacted.graph,
         widths: &compacted.widths,
+        group: options.group,
         importance: &importance,
         x_max: &learned_with,
         steps,
         seed: options.seed,
     };
     let (quantized, learned) = match steps {
-        0 => feed_back(&compacted, &importance, statistics),
+        0 => feed_back(&compacted, options.group, &importance, statistics),
         _ => distill(&task, windows, |step| progress(step as f64 / steps as f64)),
     };
     let wanted = match options.activations {
@@ -141,7 +142,12 @@ pub fn quantize(
 }
 
 /// Quantizes without learning: every matrix by two-sided error feedback, the mean error into the biases.
-fn feed_back(compacted: &Compacted, importance: &[Vec<f64>], statistics: &Statistics<'_>) -> (Vec<Quantized>, Graph) {
+fn feed_back(
+    compacted: &Compacted,
+    group: usize,
+    importance: &[Vec<f64>],
+    statistics: &Statistics<'_>,
+) -> (Vec<Quantized>, Graph) {
     let part = |second: &DMatrix<f64>, of: &[usize]| second.select_rows(of).select_columns(of);
     let mut graph = compacted.graph.clone();
     let one = |m: usize| {
@@ -152,7 +158,7 @@ fn feed_back(compacted: &Compacted, importance: &[Vec<f64>], statistics: &Statis
             count: moments.count,
         };
         let output = part(&statistics.output_moments[m], &compacted.rows[m]);
-        feedback(&compacted.graph.matrices[m], &compacted.widths[m], &importance[m], &input, &output)
+        feedback(&compacted.graph.matrices[m], &compacted.widths[m], group, &importance[m], &input, &output)
     };
     let found: Vec<(Quantized, Vec<f32>)> = (0..graph.matrices.len()).into_par_iter().map(one).collect();
     let quantized = found.into_iter().enumerate().map(|(m, (quantized, shift))| {

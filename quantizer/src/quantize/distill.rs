@@ -12,10 +12,10 @@ use ndarray::Array2;
 use rayon::prelude::*;
 
 use super::Quantized;
-use super::scale::fit;
+use super::scale::Scales;
 use super::windows::{Batch, Windows};
 use crate::backprop::{Network, Pass, Weights, zero_state};
-use crate::graph::Graph;
+use crate::graph::{Graph, Matrix};
 use crate::random::Random;
 
 /// Learning rates: latent weights in steps, logarithms of the scales, biases and norms.
@@ -30,6 +30,9 @@ const SHARDS: usize = 4;
 /// The gradient's norm is limited to this for recurrent networks.
 const CLIP: f32 = 1.0;
 
+/// Scales that are smaller count as this, so that their logarithm is finite.
+const SMALLEST: f32 = 1e-12;
+
 /// A matrix while it learns.
 struct Latent {
     widths: Vec<Option<Width>>,
@@ -37,6 +40,8 @@ struct Latent {
     codes: Array2<f32>,
     /// Natural logarithm of each row's scale.
     log_scales: Vec<f32>,
+    /// The scales that learning started from, of which those of groups stay.
+    fitted: Scales,
 }
 
 /// What rounds a latent code: the lowest and highest code, and the level of code `c`, `step * c + base`.
@@ -51,23 +56,28 @@ fn grid(width: Width) -> (f32, f32, f32, f32) {
 }
 
 impl Latent {
-    fn new(weights: &Array2<f32>, widths: &[Option<Width>], importance: &[f64]) -> Self {
-        let mut codes = Array2::zeros(weights.raw_dim());
-        let mut log_scales = Vec::with_capacity(widths.len());
-        for (r, width) in widths.iter().enumerate() {
-            let row = weights.row(r).to_vec();
-            let scale = width.map_or(1.0, |w| fit(&row, importance, w)).max(1e-12);
-            log_scales.push(scale.ln());
-            if let Some(width) = *width {
-                let (_, _, step, base) = grid(width);
-                codes.row_mut(r).iter_mut().zip(&row).for_each(|(c, w)| *c = (w / scale - base) / step);
+    fn new(matrix: &Matrix, widths: &[Option<Width>], group: usize, importance: &[f64]) -> Self {
+        let fitted = Scales::fit(matrix, widths, group, importance);
+        let log_scales: Vec<f32> = fitted.rows.iter().map(|s| s.to_f32().max(SMALLEST).ln()).collect();
+        let mut latent =
+            Self { widths: widths.to_vec(), codes: Array2::zeros((matrix.rows, matrix.cols)), log_scales, fitted };
+        for (r, row) in matrix.data.chunks_exact(matrix.cols).enumerate() {
+            let Some(width) = widths[r] else { continue };
+            let (_, _, step, base) = grid(width);
+            for (c, w) in row.iter().enumerate() {
+                latent.codes[[r, c]] = (w / latent.at(r, c) - base) / step;
             }
         }
-        Self { widths: widths.to_vec(), codes, log_scales }
+        latent
     }
 
     fn scale(&self, row: usize) -> f32 {
         bf16::from_f32(self.log_scales[row].exp()).to_f32()
+    }
+
+    /// What a level is multiplied with.
+    fn at(&self, row: usize, col: usize) -> f32 {
+        self.scale(row) * f32::from(self.fitted.group_scale(row, col))
     }
 
     /// The weights that the rounded codes stand for.
@@ -80,7 +90,8 @@ impl Latent {
             };
             let (low, high, step, base) = grid(width);
             let scale = self.scale(r);
-            for (w, c) in out.iter_mut().zip(self.codes.row(r)) {
+            for (i, (w, c)) in out.iter_mut().zip(self.codes.row(r)).enumerate() {
+                let scale = scale * f32::from(self.fitted.group_scale(r, i));
                 *w = (c.round_ties_even().clamp(low, high) * step + base) * scale;
             }
         }
@@ -97,7 +108,8 @@ impl Latent {
             };
             let (low, high, step, base) = grid(width);
             let scale = self.scale(r);
-            for (g, c) in grad.iter_mut().zip(self.codes.row(r)) {
+            for (i, (g, c)) in grad.iter_mut().zip(self.codes.row(r)).enumerate() {
+                let scale = scale * f32::from(self.fitted.group_scale(r, i));
                 by_scale[r] += *g * (c.round_ties_even().clamp(low, high) * step + base) * scale;
                 // Beyond the grid only a pull back inside passes.
                 let outside = (*c < low - 0.5 && *g > 0.0) || (*c > high + 0.5 && *g < 0.0);
@@ -119,10 +131,10 @@ impl Latent {
         Quantized {
             rows,
             cols,
-            group: 0,
+            group: self.fitted.group,
             widths: self.widths.clone(),
             scales: (0..rows).map(|r| bf16::from_f32(self.scale(r))).collect(),
-            group_scales: Vec::new(),
+            group_scales: self.fitted.groups.clone(),
             codes: self.codes.indexed_iter().map(|((r, _), c)| code(r, c)).collect(),
         }
     }
@@ -167,6 +179,8 @@ pub struct Task<'a> {
     pub graph: &'a Graph,
     /// Width of every row of every matrix.
     pub widths: &'a [Vec<Option<Width>>],
+    /// Columns per u8 scale; 0 = none.
+    pub group: usize,
     /// Importance of every column of every matrix, for the first scales.
     pub importance: &'a [Vec<f64>],
     /// Activation magnitude of every matrix.
@@ -182,13 +196,9 @@ pub struct Task<'a> {
 pub fn distill(task: &Task<'_>, windows: &Windows<'_>, mut progress: impl FnMut(usize)) -> (Vec<Quantized>, Graph) {
     let network = Network { graph: task.graph, x_max: task.x_max };
     let mut weights = Weights::of(task.graph);
-    let mut latents: Vec<Latent> = weights
-        .matrices
-        .iter()
-        .zip(task.widths)
-        .zip(task.importance)
-        .map(|((w, widths), importance)| Latent::new(w, widths, importance))
-        .collect();
+    let matrices = task.graph.matrices.iter().zip(task.widths).zip(task.importance);
+    let mut latents: Vec<Latent> =
+        matrices.map(|((matrix, widths), importance)| Latent::new(matrix, widths, task.group, importance)).collect();
     let mut adam_codes: Vec<Adam> = latents.iter().map(|_| Adam::default()).collect();
     let mut adam_scales: Vec<Adam> = latents.iter().map(|_| Adam::default()).collect();
     let mut adam_vectors = Adam::default();

@@ -13,7 +13,7 @@ use nalgebra::DMatrix;
 
 use super::Quantized;
 use super::moments::Moments;
-use super::scale::fit;
+use super::scale::Scales;
 use super::sensitivity::{Side, damped};
 use crate::graph::Matrix;
 
@@ -66,7 +66,7 @@ impl Factor {
     }
 }
 
-/// Quantizes `matrix`, whose rows have these widths. `input` holds the moments of its input, `output` is `G`; `importance` weighs
+/// Quantizes `matrix`, whose rows have these widths and `group` columns a scale (0 = none). `input` holds the moments of its input, `output` is `G`; `importance` weighs
 /// the columns for the first scales.
 ///
 /// The mean error is left to the biases, so that `H` is taken about the input's mean: returns the matrix and what is to be added
@@ -74,21 +74,19 @@ impl Factor {
 pub fn feedback(
     matrix: &Matrix,
     widths: &[Option<Width>],
+    group: usize,
     importance: &[f64],
     input: &Moments,
     output: &DMatrix<f64>,
 ) -> (Quantized, Vec<f32>) {
     let (rows, cols) = (matrix.rows, matrix.cols);
     let (h, g) = (Factor::new(&input.centred(), Side::Input), Factor::new(output, Side::Output));
-    let row_scale = |(row, width): (&[f32], &Option<Width>)| width.map_or(1.0, |w| fit(row, importance, w));
-    let mut scales: Vec<bf16> =
-        matrix.data.chunks_exact(cols).zip(widths).map(|row| bf16::from_f32(row_scale(row))).collect();
+    let mut scales = Scales::fit(matrix, widths, group, importance);
     let mut codes = vec![0u8; rows * cols];
     // What is rounded less what was wanted.
     let mut errors = vec![0f64; rows * cols];
-    let value = |width: Width, code: u8, scale: bf16| f64::from(width.level(code)) * scale.to_f64();
-    let nearest = |width: Width, wanted: f64, scale: bf16| {
-        width.nearest_code(if scale > bf16::ZERO { (wanted / scale.to_f64()) as f32 } else { 0.0 })
+    let value = |scales: &Scales, width: Width, r: usize, c: usize, code: u8| {
+        f64::from(width.level(code)) * f64::from(scales.at(r, c))
     };
     let mut carried = vec![0f64; cols];
     let mut done = vec![0f64; cols];
@@ -104,9 +102,9 @@ pub fn feedback(
             let weight = f64::from(matrix.data[r * cols + c]);
             let rounded = widths[r].map_or(0.0, |width| {
                 let before: f64 = h.below(j)[j + 1..].iter().zip(&done[j + 1..]).map(|(l, z)| l * z).sum();
-                let code = nearest(width, weight - carried[c] - before, scales[r]);
+                let code = scales.code(width, r, c, (weight - carried[c] - before) as f32);
                 codes[r * cols + c] = code;
-                value(width, code, scales[r])
+                value(&scales, width, r, c, code)
             });
             errors[r * cols + c] = rounded - weight;
             done[j] = rounded - weight + carried[c];
@@ -128,32 +126,34 @@ pub fn feedback(
             let own = g.row(r)[r];
             for c in 0..cols {
                 let at = r * cols + c;
-                let now = value(width, codes[at], scales[r]);
-                let code = nearest(width, now - done[c] / (own * h.row(c)[c]), scales[r]);
+                let now = value(&scales, width, r, c, codes[at]);
+                let code = scales.code(width, r, c, (now - done[c] / (own * h.row(c)[c])) as f32);
                 if code != codes[at] {
-                    let step = value(width, code, scales[r]) - now;
+                    let step = value(&scales, width, r, c, code) - now;
                     codes[at] = code;
                     errors[at] += step;
                     done.iter_mut().zip(h.row(c)).for_each(|(d, h)| *d += own * step * h);
                 }
             }
             // The scale at which the derivative along the row's levels vanishes.
-            let levels: Vec<f64> = (0..cols).map(|c| f64::from(width.level(codes[r * cols + c]))).collect();
+            let level = |c: usize| f64::from(width.level(codes[r * cols + c])) * f64::from(scales.group_scale(r, c));
+            let levels: Vec<f64> = (0..cols).map(level).collect();
             let slope: f64 = levels.iter().zip(&done).map(|(l, d)| l * d).sum();
             let curvature: f64 = own * levels.iter().enumerate().map(|(c, l)| l * dot(h.row(c), &levels)).sum::<f64>();
             if curvature > 0.0 {
-                let wanted = bf16::from_f64(scales[r].to_f64() - slope / curvature);
+                let scale = &mut scales.rows[r];
+                let wanted = bf16::from_f64(scale.to_f64() - slope / curvature);
                 if wanted > bf16::ZERO {
-                    let step = wanted.to_f64() - scales[r].to_f64();
+                    let step = wanted.to_f64() - scale.to_f64();
                     errors[r * cols..][..cols].iter_mut().zip(&levels).for_each(|(e, l)| *e += step * l);
-                    scales[r] = wanted;
+                    *scale = wanted;
                 }
             }
         }
     }
     let shift = errors.chunks_exact(cols).map(|e| -dot(e, &input.mean) as f32).collect();
     let widths = widths.to_vec();
-    (Quantized { rows, cols, group: 0, widths, scales, group_scales: Vec::new(), codes }, shift)
+    (Quantized { rows, cols, group, widths, scales: scales.rows, group_scales: scales.groups, codes }, shift)
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
@@ -195,7 +195,7 @@ mod tests {
         for width in [Width::W2, Width::W3, Width::W4] {
             let one_sided = gptq::quantize(&matrix, width, 0, &input).expect("positive definite");
             let widths = vec![Some(width); ROWS];
-            let (both, shift) = feedback(&matrix, &widths, &[], &input, &output);
+            let (both, shift) = feedback(&matrix, &widths, 0, &[], &input, &output);
             let [plain, one, both] = [&scale::round_to_nearest(&matrix, width, 0), &one_sided, &both]
                 .map(|q| error(&matrix, q, &input.second, &output));
             assert!(both < 0.5 * one && one < plain, "{width:?}: {both}, {one}, {plain}");
@@ -208,7 +208,7 @@ mod tests {
     fn unit_moments_reduce_to_rounding_with_fitted_scales() {
         let (matrix, ..) = case();
         let unit = Moments { second: DMatrix::identity(COLS, COLS), mean: vec![0.0; COLS], count: 1 };
-        let (found, _) = feedback(&matrix, &[Some(Width::W3); ROWS], &[], &unit, &DMatrix::identity(ROWS, ROWS));
+        let (found, _) = feedback(&matrix, &[Some(Width::W3); ROWS], 0, &[], &unit, &DMatrix::identity(ROWS, ROWS));
         for (r, row) in matrix.data.chunks_exact(COLS).enumerate() {
             let scale = found.scales[r].to_f32();
             let nearest: Vec<u8> = row.iter().map(|w| Width::W3.nearest_code(w / scale)).collect();
@@ -226,7 +226,7 @@ mod tests {
         input.second += &mean * mean.transpose();
         let mut widths = vec![Some(Width::W2); ROWS];
         widths[3] = None;
-        let (found, shift) = feedback(&matrix, &widths, &[], &input, &output);
+        let (found, shift) = feedback(&matrix, &widths, 0, &[], &input, &output);
         let weights = found.dequantized();
         assert!(weights[3 * COLS..4 * COLS].iter().all(|w| *w == 0.0));
         for r in 0..ROWS {

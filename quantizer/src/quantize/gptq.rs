@@ -18,7 +18,7 @@ const DAMPING: f64 = 0.01;
 pub fn quantize(matrix: &Matrix, width: Width, group: usize, moments: &Moments) -> Result<Quantized> {
     let (rows, cols) = (matrix.rows, matrix.cols);
     let diagonal: Vec<f64> = moments.second.diagonal().iter().copied().collect();
-    let scales = Scales::fit(matrix, width, group, &diagonal);
+    let scales = Scales::fit(matrix, &vec![Some(width); matrix.rows], group, &diagonal);
     let mut order: Vec<usize> = (0..cols).collect();
     order.sort_by(|&a, &b| diagonal[b].total_cmp(&diagonal[a]));
     let feedback = feedback(&moments.second, &order).with_context(|| format!("tensor {:?}", matrix.name))?;

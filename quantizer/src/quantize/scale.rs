@@ -54,20 +54,21 @@ pub struct Scales {
 }
 
 impl Scales {
-    /// Fits the scales of every row, or of every group of every row. `importance` has an entry per column, or one per weight, or
-    /// none.
-    pub fn fit(matrix: &Matrix, width: Width, group: usize, importance: &[f64]) -> Self {
+    /// Fits the scales of every row, or of every group of every row; those of rows without a width are 1. `importance` has an entry
+    /// per column, or one per weight, or none.
+    pub fn fit(matrix: &Matrix, widths: &[Option<Width>], group: usize, importance: &[f64]) -> Self {
         let mut scales = Self { group, rows: Vec::new(), groups: Vec::new() };
-        for (r, row) in matrix.data.chunks_exact(matrix.cols).enumerate() {
+        for (r, (row, width)) in matrix.data.chunks_exact(matrix.cols).zip(widths).enumerate() {
             let importance = if importance.len() > matrix.cols { &importance[r * matrix.cols..] } else { importance };
+            let fit = |w: &[f32], importance: &[f64]| width.map_or(1.0, |width| fit(w, importance, width));
             if group == 0 {
-                scales.rows.push(bf16::from_f32(fit(row, importance, width)));
+                scales.rows.push(bf16::from_f32(fit(row, importance)));
                 continue;
             }
             let wanted: Vec<f32> = row
                 .chunks(group)
                 .enumerate()
-                .map(|(g, w)| fit(w, importance.get(g * group..).unwrap_or(&[]), width))
+                .map(|(g, w)| fit(w, importance.get(g * group..).unwrap_or(&[])))
                 .collect();
             let largest = wanted.iter().fold(0f32, |m, s| m.max(*s));
             let base = bf16::from_f32(largest / 255.0);
@@ -81,13 +82,17 @@ impl Scales {
         scales
     }
 
+    /// What the row's scale is multiplied with at (`row`, `col`); 1 where there are no groups.
+    pub fn group_scale(&self, row: usize, col: usize) -> u8 {
+        match self.group {
+            0 => 1,
+            group => self.groups[row * (self.groups.len() / self.rows.len()) + col / group],
+        }
+    }
+
     /// What a level is multiplied with at (`row`, `col`).
     pub fn at(&self, row: usize, col: usize) -> f32 {
-        let scale = self.rows[row].to_f32();
-        match self.group {
-            0 => scale,
-            group => scale * f32::from(self.groups[row * (self.groups.len() / self.rows.len()) + col / group]),
-        }
+        self.rows[row].to_f32() * f32::from(self.group_scale(row, col))
     }
 
     /// The code nearest to `weight` at (`row`, `col`).
@@ -99,7 +104,7 @@ impl Scales {
 
 /// Rounds every weight to the nearest level of its scale.
 pub fn round_to_nearest(matrix: &Matrix, width: Width, group: usize) -> Quantized {
-    round_to(matrix, width, Scales::fit(matrix, width, group, &[]))
+    round_to(matrix, width, Scales::fit(matrix, &vec![Some(width); matrix.rows], group, &[]))
 }
 
 /// Rounds every weight to the nearest level of these scales.
