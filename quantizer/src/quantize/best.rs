@@ -2,7 +2,7 @@
 
 use anyhow::{Result, ensure};
 
-use super::allocate::{Rows, allocate, energies, removals};
+use super::allocate::{Allocation, Rows, allocate, energies, removals};
 use super::compact::{Dimension, compact, dimensions};
 use super::distill::{Task, distill, loss};
 use super::moments::Moments;
@@ -59,6 +59,11 @@ impl<'a> Statistics<'a> {
             means: moments.iter().map(|m| m.mean.clone()).collect(),
         })
     }
+
+    /// Steps of distillation where none are asked for.
+    pub fn default_steps(&self) -> usize {
+        if self.windows.recurrent() { WINDOW_STEPS } else { STEPS }
+    }
 }
 
 /// Quantizes a network. Returns it as it became (hidden elements without bits are gone, biases and norms have learned) and its
@@ -100,7 +105,7 @@ pub fn quantize(
         .map(|(columns, importance)| columns.iter().map(|&c| importance[c]).collect())
         .collect();
     let learned_with = vec![options.activations.limit(); graph.matrices.len()];
-    let steps = options.steps.unwrap_or(if windows.recurrent() { WINDOW_STEPS } else { STEPS });
+    let steps = options.steps.unwrap_or(statistics.default_steps());
     let task = Task {
         graph: &compacted.graph,
         widths: &compacted.widths,
@@ -115,7 +120,7 @@ pub fn quantize(
         Activations::Int8 | Activations::Int16 => learned_with.clone(),
     };
     let outcome = |quantized: &Quantized, limit: u16| -> Result<Outcome> {
-        Ok(Outcome { x_max: quantized.x_max(limit)?, quantized: quantized.clone(), error: None })
+        Ok(Outcome { x_max: quantized.x_max(limit)?, quantized: quantized.clone(), error: None, allocation: None })
     };
     let mut outcomes: Vec<Outcome> =
         quantized.iter().zip(learned_with).map(|(q, limit)| outcome(q, limit)).collect::<Result<_>>()?;
@@ -126,6 +131,13 @@ pub fn quantize(
         if total as f64 <= options.budget.weight_bytes(graph) {
             outcomes[m] = other;
         }
+    }
+    for (m, ((outcome, rows), widths)) in outcomes.iter_mut().zip(rows).zip(widths).enumerate() {
+        let expected = widths.iter().enumerate().map(|(r, width)| rows.expected(r, *width)).collect();
+        let Rows { energy, removal, .. } = rows;
+        let (rows, columns) = (compacted.rows[m].clone(), compacted.columns[m].clone());
+        let allocation = Allocation { widths, energy, removal, expected, inputs: inputs[m].clone(), rows, columns };
+        outcome.allocation = Some(allocation);
     }
     Ok((learned, outcomes))
 }

@@ -108,6 +108,8 @@ pub struct Compacted {
     pub graph: Graph,
     /// Widths of the matrices' rows in the new order.
     pub widths: Widths,
+    /// For every matrix which of the former rows it has, in the new order.
+    pub rows: Vec<Vec<usize>>,
     /// For every matrix which of the former columns it has, in the new order.
     pub columns: Vec<Vec<usize>>,
 }
@@ -117,7 +119,8 @@ pub struct Compacted {
 pub fn compact(graph: &Graph, dimensions: &[Dimension], widths: &Widths, means: &[Vec<f64>]) -> Compacted {
     let mut graph = graph.clone();
     let mut widths = widths.clone();
-    let mut kept: Vec<Vec<usize>> = graph.matrices.iter().map(|m| (0..m.cols).collect()).collect();
+    let mut kept_rows: Vec<Vec<usize>> = graph.matrices.iter().map(|m| (0..m.rows).collect()).collect();
+    let mut kept_columns: Vec<Vec<usize>> = graph.matrices.iter().map(|m| (0..m.cols).collect()).collect();
     for dimension in dimensions {
         let order = dimension.order(&widths);
         let gone: Vec<usize> =
@@ -130,12 +133,13 @@ pub fn compact(graph: &Graph, dimensions: &[Dimension], widths: &Widths, means: 
                 .map(|row| gone.iter().map(|&c| f64::from(row[c]) * means[consumer][c]).sum::<f64>() as f32)
                 .collect();
             *matrix = columns(matrix, &order);
-            kept[consumer].clone_from(&order);
+            kept_columns[consumer].clone_from(&order);
             add_to_bias(&mut graph, consumer, &contribution);
         }
         let maker = &mut graph.matrices[dimension.maker];
         *maker = rows(maker, &order);
         widths[dimension.maker] = order.iter().map(|&r| widths[dimension.maker][r]).collect();
+        kept_rows[dimension.maker].clone_from(&order);
         if let NodeKind::Linear { bias, .. } = &mut graph.nodes[dimension.node].kind {
             *bias = order.iter().map(|&r| bias[r]).collect();
         }
@@ -149,7 +153,7 @@ pub fn compact(graph: &Graph, dimensions: &[Dimension], widths: &Widths, means: 
             }
         }
     }
-    Compacted { graph, widths, columns: kept }
+    Compacted { graph, widths, rows: kept_rows, columns: kept_columns }
 }
 
 fn rows(matrix: &Matrix, order: &[usize]) -> Matrix {
@@ -222,6 +226,7 @@ mod tests {
         ];
         let compacted = compact(&graph, &dimensions(&graph), &widths, &[vec![0.0; 3], vec![0.0; 5], vec![0.0; 4]]);
         assert_eq!(compacted.columns[1], [1, 3, 4, 2, 0]);
+        assert_eq!(compacted.rows, [vec![1, 3, 4, 2, 0], vec![0, 1, 2, 3], vec![0, 1, 2, 3]]);
         assert!(compacted.widths[0].is_sorted());
         for (a, b) in output(&graph).iter().zip(output(&compacted.graph)) {
             assert!((a - b).abs() < 1e-6);
