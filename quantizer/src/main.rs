@@ -19,7 +19,7 @@ use actq::sweep::Learning;
 use actq::widths::{self, Widths};
 use actq::{eval, serve, sweep, writer};
 use actq_kernels::Width;
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use clap::{Parser, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -276,6 +276,8 @@ fn run(command: Command) -> Result<()> {
 
 fn run_quantize(args: &QuantizeArgs) -> Result<()> {
     let source = Policy::load(&args.policy_dir)?;
+    let one_file = args.save_stats.as_ref() == Some(&args.out);
+    ensure!(!one_file, "{}: image and statistics need two files", args.out.display());
     let group = args.group.unwrap_or(0);
     let method = match args.method {
         Some(method) => method.into(),
