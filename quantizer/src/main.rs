@@ -63,7 +63,7 @@ enum Command {
     /// per weight, scales and padding counted; "-" where not even 2 bits fit. Every method uses its default groups; activations
     /// are int8, for best int16 where it pays. A star marks the knee of a policy's best method.
     ///
-    /// Example: actq sweep policies/ur3 --bpw 2.5,3,4 --svg ur3.svg
+    /// Example: actq sweep policies/ur3 policies/go1 --bpw 2.5,3,4 --svg errors.svg
     Sweep(SweepArgs),
     /// Run an image as a policy over standard input and output
     ///
@@ -305,23 +305,23 @@ fn run_quantize(args: &QuantizeArgs) -> Result<()> {
     };
     let started = Instant::now();
     start_threads(args.threads)?;
-    let measured = args.max_nmse.map(|limit| Ok::<_, anyhow::Error>((limit, Measure::new(&source)?))).transpose()?;
+    let measure = args.max_nmse.map(|_| Measure::new(&source)).transpose()?;
     let bar = progress_bar()?;
     bar.set_message("calibrating");
     let prepared = Prepared::new(&source, method, |share| set_share(&bar, share))?;
     bar.reset();
     bar.set_message("quantizing");
-    let (policy, outcomes, options, note) = match &measured {
+    let (policy, outcomes, options, note) = match args.max_nmse.zip(measure.as_ref()) {
         None => {
             let (policy, outcomes) = prepared.quantize(&options, |share| set_share(&bar, share))?;
             (policy, outcomes, options, String::new())
         }
         Some((limit, measure)) => {
-            let found = search::smallest(&source, &prepared, &options, *limit, measure, |work, share| {
+            let found = search::smallest(&source, &prepared, &options, limit, measure, |work, share| {
                 bar.set_message(work.to_owned());
                 set_share(&bar, share);
             })?;
-            let note = format!("{}\n", found.report(*limit, measure));
+            let note = format!("{}\n", found.report(limit, measure));
             (found.policy, found.outcomes, found.options, note)
         }
     };
@@ -406,10 +406,6 @@ fn run_sweep(args: &SweepArgs) -> Result<()> {
         })?);
     }
     bar.finish_and_clear();
-    let (svg, json) = (sweep::svg(&sweeps), serde_json::to_string_pretty(&sweeps)? + "\n");
-    let files = [(&args.svg, svg), (&args.json, json)];
-    let files: Vec<_> = files.iter().filter_map(|(path, text)| Some((path.as_deref()?, text))).collect();
-    writer::write_all(&files)?;
     let mut knees = String::new();
     for sweep in &sweeps {
         if let Some(knee) = &sweep.knee {
@@ -419,7 +415,11 @@ fn run_sweep(args: &SweepArgs) -> Result<()> {
             );
         }
     }
-    print(&format!("{}\n{knees}\n", sweep::table(&sweeps)))
+    print(&format!("{}\n{knees}\n", sweep::table(&sweeps)))?;
+    let (svg, json) = (sweep::svg(&sweeps), serde_json::to_string_pretty(&sweeps)? + "\n");
+    let files = [(&args.svg, svg), (&args.json, json)];
+    let files: Vec<_> = files.iter().filter_map(|(path, text)| Some((path.as_deref()?, text))).collect();
+    writer::write_all(&files)
 }
 
 fn scores(graph: &Graph, statistics: &Statistics, budget: Budget, outcomes: &[Outcome]) -> String {

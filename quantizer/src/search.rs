@@ -4,7 +4,7 @@
 //! method that learns first looks with an eighth of the steps, at most [`LOOKS`] times; then, from the budget found so, with all
 //! its steps. What is returned has kept the limit with all its steps. Tries stop when the next smaller budget is known to
 //! fail, or after [`TRIES`] ([`PLAIN_TRIES`] for methods that do not learn): then a smaller budget may do, and the tries tell
-//! which range is open. Errors fall with bits but for small ripples; the search takes them as falling.
+//! which range is open. The search takes errors as falling with bits.
 
 use std::path::Path;
 

@@ -376,3 +376,22 @@ fn energies(svg: &mut String, rows: &[&Row], across: f64, y: f64, decades: Decad
         right - LEFT
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn decades_hold_the_values_and_end_at_a_floor() {
+        let decades = Decades::around([0.0, 2e-3, 0.5].into_iter()).expect("values above 0");
+        assert_eq!((decades.top, decades.floor), (0, -3));
+        assert_eq!((decades.share(1.0), decades.share(1e-3), decades.share(0.0)), (0.0, 1.0, 1.0));
+        assert!(decades.share(0.5) < decades.share(2e-3), "larger values stand higher");
+        // A value far below the others must not flatten them.
+        let deep = Decades::around([1e-30, 3.0].into_iter()).expect("values above 0");
+        assert_eq!((deep.top, deep.floor), (1, 1 - DECADES));
+        assert!(Decades::around([0.0].into_iter()).is_none());
+        let one = Decades::around([1.0].into_iter()).expect("a value above 0");
+        assert_eq!((one.top, one.floor), (0, -1));
+    }
+}
