@@ -333,25 +333,29 @@ fn the_fewest_bits_keep_the_error() -> Result<()> {
     Ok(())
 }
 
+/// The steps of every try, from the table of tries.
+fn steps_tried(said: &str) -> Vec<&str> {
+    let cells = said.lines().skip(1).map(|line| line.split_whitespace().nth(1));
+    cells.map_while(|steps| steps).collect()
+}
+
 #[test]
 fn a_method_that_learns_looks_with_few_steps_and_ends_with_all() -> Result<()> {
     let fixture = Fixture::new()?;
     let options = "--method best --steps 40 --max-nmse 0.05";
     let said = succeeded(&fixture.quantize(&format!("--out a.actq {options}"))?)?;
-    let steps: Vec<&str> = said
-        .lines()
-        .skip(1)
-        .map_while(|line| match line.split_whitespace().collect::<Vec<_>>()[..] {
-            [_, steps, ..] => Some(steps),
-            _ => None,
-        })
-        .collect();
+    let steps = steps_tried(&said);
     let looks = steps.iter().take_while(|s| **s == "5").count();
     ensure!((1..=6).contains(&looks) && (1..=5).contains(&(steps.len() - looks)), "{said}");
     ensure!(steps[looks..].iter().all(|s| *s == "40"), "{said}");
     ensure!(fixture.nmse("a.actq")? <= 0.05, "{said}");
     succeeded(&fixture.quantize(&format!("--out b.actq {options} --threads 1"))?)?;
     ensure!(fs::read(fixture.path("a.actq"))? == fs::read(fixture.path("b.actq"))?, "two runs differ");
+    // Without steps there is nothing to take an eighth of.
+    let said = succeeded(&fixture.quantize("--out c.actq --method best --steps 0 --max-nmse 0.3")?)?;
+    let steps = steps_tried(&said);
+    ensure!(!steps.is_empty() && steps.iter().all(|s| *s == "0"), "{said}");
+    ensure!(fixture.nmse("c.actq")? <= 0.3, "{said}");
     Ok(())
 }
 

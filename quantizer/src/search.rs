@@ -3,7 +3,7 @@
 //! Budgets are multiples of a tenth of a bit per weight. Each try is a whole quantization whose image is run by the executor. A
 //! method that learns first looks with an eighth of the steps, at most [`LOOKS`] times; then, from the budget found so, with all
 //! its steps. What is returned has kept the limit with all its steps. Tries stop when the next smaller budget is known to
-//! fail, or after [`TRIES`] ([`PLAIN_TRIES`] for methods that do not learn): then a smaller budget may do, and the tries tell
+//! fail, or after [`TRIES`] ([`PLAIN_TRIES`] without learning, or with too few steps to share): then a smaller budget may do, and the tries tell
 //! which range is open. The search takes errors as falling with bits.
 
 use std::path::Path;
@@ -133,11 +133,7 @@ pub fn smallest(
     let mut found = None;
     let mut run = |cell: usize, steps: usize| -> Result<f64> {
         let budget = cell as f64 / PER_BIT as f64;
-        let options = Options {
-            budget: Budget::BitsPerWeight(budget),
-            steps: (all_steps > 0).then_some(steps),
-            ..options.clone()
-        };
+        let options = Options { budget: Budget::BitsPerWeight(budget), steps: Some(steps), ..options.clone() };
         let work = format!("try {}: {budget} bits per weight", tries.len() + 1);
         let report = match prepared.quantize(&options, |share| progress(&work, share)) {
             Err(error) if error.is::<BudgetTooSmall>() => None,

@@ -108,10 +108,10 @@ pub struct Compacted {
     pub graph: Graph,
     /// Widths of the matrices' rows in the new order.
     pub widths: Widths,
-    /// For every matrix which of the former rows it has, in the new order.
-    pub rows: Vec<Vec<usize>>,
     /// For every matrix which of the former columns it has, in the new order.
     pub columns: Vec<Vec<usize>>,
+    /// The same for the rows.
+    pub rows: Vec<Vec<usize>>,
 }
 
 /// Removes the elements that have no bits and sorts the others by width. `means` gives the mean input of every matrix: what a
@@ -119,12 +119,13 @@ pub struct Compacted {
 pub fn compact(graph: &Graph, dimensions: &[Dimension], widths: &Widths, means: &[Vec<f64>]) -> Compacted {
     let mut graph = graph.clone();
     let mut widths = widths.clone();
+    let mut kept: Vec<Vec<usize>> = graph.matrices.iter().map(|m| (0..m.cols).collect()).collect();
     let mut kept_rows: Vec<Vec<usize>> = graph.matrices.iter().map(|m| (0..m.rows).collect()).collect();
-    let mut kept_columns: Vec<Vec<usize>> = graph.matrices.iter().map(|m| (0..m.cols).collect()).collect();
     for dimension in dimensions {
         let order = dimension.order(&widths);
         let gone: Vec<usize> =
             (0..widths[dimension.maker].len()).filter(|&r| widths[dimension.maker][r].is_none()).collect();
+        kept_rows[dimension.maker].clone_from(&order);
         for &consumer in &dimension.consumers {
             let matrix = &mut graph.matrices[consumer];
             let contribution: Vec<f32> = matrix
@@ -133,13 +134,12 @@ pub fn compact(graph: &Graph, dimensions: &[Dimension], widths: &Widths, means: 
                 .map(|row| gone.iter().map(|&c| f64::from(row[c]) * means[consumer][c]).sum::<f64>() as f32)
                 .collect();
             *matrix = columns(matrix, &order);
-            kept_columns[consumer].clone_from(&order);
+            kept[consumer].clone_from(&order);
             add_to_bias(&mut graph, consumer, &contribution);
         }
         let maker = &mut graph.matrices[dimension.maker];
         *maker = rows(maker, &order);
         widths[dimension.maker] = order.iter().map(|&r| widths[dimension.maker][r]).collect();
-        kept_rows[dimension.maker].clone_from(&order);
         if let NodeKind::Linear { bias, .. } = &mut graph.nodes[dimension.node].kind {
             *bias = order.iter().map(|&r| bias[r]).collect();
         }
@@ -153,7 +153,7 @@ pub fn compact(graph: &Graph, dimensions: &[Dimension], widths: &Widths, means: 
             }
         }
     }
-    Compacted { graph, widths, rows: kept_rows, columns: kept_columns }
+    Compacted { graph, widths, columns: kept, rows: kept_rows }
 }
 
 fn rows(matrix: &Matrix, order: &[usize]) -> Matrix {
