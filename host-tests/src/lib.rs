@@ -1,6 +1,7 @@
-//! What the tests and `xtask` share: golden kernel cases, and the firmware under QEMU.
+//! What the tests and `xtask` share: golden kernel cases, the command `actq`, and the firmware under QEMU.
 #![forbid(unsafe_code)]
 
+pub mod command;
 pub mod cycles;
 pub mod golden;
 pub mod qemu;

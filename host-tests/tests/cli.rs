@@ -4,14 +4,13 @@ use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::{Read as _, Write as _};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
-use std::sync::OnceLock;
+use std::process::{Output, Stdio};
 
 use actq::graph::Evaluator;
 use actq::policy::Policy;
 use actq::runtime::{ImageBuffer, with_head};
+use actq_host_tests::command::{actq, all, failed, run, succeeded};
 use actq_host_tests::golden::Random;
-use actq_host_tests::{qemu, root};
 use actq_kernels::Width;
 use actq_kernels::image::Op;
 use anyhow::{Context, Result, ensure};
@@ -29,19 +28,6 @@ const CHUNK: usize = 4;
 const EXECUTE: usize = 2;
 const EPISODES: usize = 3;
 const STEPS: usize = 20;
-
-/// The command; built once, since cargo does not build the binaries of a dependency.
-fn binary() -> &'static Path {
-    static BINARY: OnceLock<PathBuf> = OnceLock::new();
-    BINARY.get_or_init(|| {
-        let built = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
-            .current_dir(root())
-            .args(["build", "--quiet", "--package", "actq", "--bin", "actq"])
-            .status();
-        assert!(built.is_ok_and(|status| status.success()), "actq does not build");
-        qemu::target_dir().join("debug").join(format!("actq{}", std::env::consts::EXE_SUFFIX))
-    })
-}
 
 /// A folder with a policy, its recordings and a place for images.
 struct Fixture(TempDir);
@@ -80,8 +66,8 @@ impl Fixture {
     }
 
     fn quantize_as_given(&self, out: &Path, options: &str) -> Result<Output> {
-        let mut command = Command::new(binary());
-        command.arg("quantize").arg(self.policy()).arg("--out").arg(out).args(options.split_whitespace());
+        let mut command = actq(&["quantize"]);
+        command.arg(self.policy()).arg("--out").arg(out).args(options.split_whitespace());
         run(command, b"")
     }
 
@@ -93,8 +79,8 @@ impl Fixture {
     }
 
     fn eval(&self, image: &Path) -> Result<Value> {
-        let mut command = Command::new(binary());
-        command.arg("eval").arg(image).arg("--policy").arg(self.policy()).arg("--json");
+        let mut command = actq(&["eval"]);
+        command.arg(image).arg("--policy").arg(self.policy()).arg("--json");
         Ok(serde_json::from_str(&succeeded(&run(command, b"")?)?)?)
     }
 
@@ -206,46 +192,6 @@ fn replace(policy: &Path, name: &'static str, dtype: Dtype, shape: &[usize], byt
     let mut tensors = tensors();
     tensors.insert(name, (dtype, shape.to_vec(), bytes));
     write_tensors(policy, &tensors)
-}
-
-/// The actq command with arguments.
-fn actq(arguments: &[&str]) -> Command {
-    let mut command = Command::new(binary());
-    command.args(arguments);
-    command
-}
-
-fn run(mut command: Command, input: &[u8]) -> Result<Output> {
-    let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn()?;
-    let mut stdin = child.stdin.take().context("no standard input")?;
-    // A command that stops early closes the pipe; its exit status tells why.
-    drop(stdin.write_all(input));
-    drop(stdin);
-    Ok(child.wait_with_output()?)
-}
-
-/// Standard output of a run that must have ended well.
-fn succeeded(output: &Output) -> Result<String> {
-    ensure!(output.status.code() == Some(0), "{}: {}", output.status, String::from_utf8_lossy(&output.stderr));
-    Ok(String::from_utf8(output.stdout.clone())?)
-}
-
-/// Requires an exit status and a message that holds `words`, and no panic.
-fn failed(output: &Output, status: i32, words: &[&str]) -> Result<()> {
-    let message = String::from_utf8_lossy(&output.stderr);
-    ensure!(output.status.code() == Some(status), "{} instead of {status}: {message}", output.status);
-    ensure!(!message.trim().is_empty() && !message.contains("panicked"), "no message but {message:?}");
-    let missing: Vec<_> = words.iter().filter(|word| !message.contains(**word)).collect();
-    ensure!(missing.is_empty(), "{missing:?} not in the message: {message}");
-    Ok(())
-}
-
-/// Fails with all errors of `results`, so that one wrong message does not hide the others.
-fn all(results: impl IntoIterator<Item = (String, Result<()>)>) -> Result<()> {
-    let wrong: Vec<String> =
-        results.into_iter().filter_map(|(what, result)| Some(format!("{what}: {:#}", result.err()?))).collect();
-    ensure!(wrong.is_empty(), "\n{}", wrong.join("\n"));
-    Ok(())
 }
 
 fn text(path: &Path) -> String {

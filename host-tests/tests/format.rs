@@ -70,7 +70,7 @@ fn library_bytes() -> Vec<u8> {
         group_scales: Vec::new(),
         codes: LEVELS.as_flattened().iter().map(|&level| Width::W2.nearest_code(level as f32)).collect(),
     };
-    let outcome = Outcome { quantized, error: None, x_max: 127 };
+    let outcome = Outcome { quantized, error: None, x_max: 127, allocation: None };
     actq::writer::image(&policy, &[outcome]).expect("the policy fits the format")
 }
 

@@ -295,5 +295,6 @@ fn single_matrix_image(case: &Case) -> Vec<u8> {
         group_scales: case.scales.clone(),
         codes: case.codes.clone(),
     };
-    actq::writer::image(&policy, &[Outcome { quantized, error: None, x_max: 127 }]).expect("the policy fits the format")
+    actq::writer::image(&policy, &[Outcome { quantized, error: None, x_max: 127, allocation: None }])
+        .expect("the policy fits the format")
 }

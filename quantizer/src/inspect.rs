@@ -15,8 +15,13 @@ pub fn bits_per_weight(image: &Image<'_>) -> f64 {
     8.0 * bytes as f64 / image.source_weights().max(1) as f64
 }
 
-/// The matrices, each once.
-fn distinct<'a>(image: &Image<'a>) -> Vec<Matrix<'a>> {
+/// Bytes as hexadecimal digits.
+pub(crate) fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// The matrices, each once, in the order of the operations that use them first.
+pub(crate) fn distinct<'a>(image: &Image<'a>) -> Vec<Matrix<'a>> {
     let mut seen = BTreeSet::new();
     let place = |m: &Matrix<'a>| m.blocks().next().map(|rows| rows.block.rows_from(0).as_ptr() as usize);
     image
@@ -57,7 +62,7 @@ pub fn group_name(group: usize) -> String {
 /// The report that `actq inspect` prints.
 pub fn report(image: &Image<'_>) -> String {
     let mut text = String::new();
-    let digest: String = image.digest().iter().map(|b| format!("{b:02x}")).collect();
+    let digest = hex(&image.digest());
     let kind = match image.kind() {
         Kind::Step => "step".to_owned(),
         Kind::Chunk => format!("chunk of {}, {} executed", image.chunk(), image.execute()),

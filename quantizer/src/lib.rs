@@ -16,8 +16,11 @@ pub mod policy;
 pub mod quantize;
 pub mod random;
 pub mod runtime;
+pub mod search;
 pub mod serve;
+pub mod stats;
 pub mod sweep;
+pub mod widths;
 pub mod writer;
 
 /// The versions that take part in making an image; recorded in reports.

@@ -4,6 +4,7 @@
 use std::io::{self, Write as _};
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::time::Instant;
 
 use actq::graph::Graph;
 use actq::inspect::{group_name, report, table};
@@ -12,9 +13,13 @@ use actq::quantize::actquant::Statistics;
 use actq::quantize::prepared::Prepared;
 use actq::quantize::{Activations, Budget, Method, Options, Outcome};
 use actq::runtime::ImageBuffer;
+use actq::search::{self, Measure};
+use actq::stats::{Asked, Stats};
+use actq::sweep::Learning;
+use actq::widths::{self, Widths};
 use actq::{eval, serve, sweep, writer};
 use actq_kernels::Width;
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use clap::{Parser, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -38,10 +43,9 @@ enum Command {
     /// Example: actq quantize policies/ur3 --bits 3 --out ur3.actq
     Quantize(QuantizeArgs),
     /// Show what is in an image: operations, matrices, bits, memory, the action contract
-    Inspect {
-        /// The image
-        image: PathBuf,
-    },
+    ///
+    /// Example: actq inspect ur3.actq --widths --stats ur3.json --svg ur3.svg
+    Inspect(InspectArgs),
     /// Compare an image's actions with the recorded f32 actions of heldout.npz
     Eval {
         /// The image
@@ -57,9 +61,9 @@ enum Command {
     ///
     /// A cell of the table is the error (mean squared error / variance of the actions, mean over dimensions) and the true bits
     /// per weight, scales and padding counted; "-" where not even 2 bits fit. Every method uses its default groups; activations
-    /// are int8.
+    /// are int8, for best int16 where it pays. A star marks the knee of a policy's best method.
     ///
-    /// Example: actq sweep policies/ur3 --bpw 2.5,3,4 --svg ur3.svg
+    /// Example: actq sweep policies/ur3 policies/go1 --bpw 2.5,3,4 --svg errors.svg
     Sweep(SweepArgs),
     /// Run an image as a policy over standard input and output
     ///
@@ -86,14 +90,18 @@ struct QuantizeArgs {
     /// Bytes of the whole image, as 98304 or 96K
     #[arg(long, value_name = "SIZE", conflicts_with_all = ["bits", "bpw"], value_parser = size)]
     flash: Option<usize>,
+    /// The fewest bits whose error (NMSE, as eval measures it) is at most X, to a tenth of a bit per weight; measured on
+    /// heldout.npz, else on calib.npz
+    #[arg(long, value_name = "X", conflicts_with_all = ["bits", "bpw", "flash"], value_parser = positive)]
+    max_nmse: Option<f64>,
     /// Force the width of a matrix, by its tensor's name (method best); may be repeated
     #[arg(long, value_name = "NAME=BITS", value_parser = forced)]
     width: Vec<(String, Width)>,
     /// Keep a matrix at 8 bits (method best); may be repeated
     #[arg(long, value_name = "NAME")]
     protect: Vec<String>,
-    /// Columns that share a u8 scale: 32, 64 or 128; 0 = one scale a row [default: 32 for rtn and actquant,
-    /// 0 for gptq and best]
+    /// Columns that share a u8 scale: 32, 64 or 128; 0 = one scale a row, which the kernels like best [default: 32 for
+    /// rtn and actquant, 0 for gptq and best]
     #[arg(long, value_name = "N", value_parser = group)]
     group: Option<usize>,
     /// Bits of the activations, whose scale is found at run time [default: for best chosen per matrix, else 8]
@@ -102,7 +110,8 @@ struct QuantizeArgs {
     /// How codes are chosen [default: best where calib.npz is there, else rtn]
     #[arg(long)]
     method: Option<MethodArg>,
-    /// Steps of distillation for --method best [default: 8000, recurrent policies 1200]
+    /// Steps of distillation for --method best; 0 = none, but two-sided error feedback: seconds, and a larger error at few
+    /// bits [default: 8000, recurrent policies 1200]
     #[arg(long, value_name = "N")]
     steps: Option<usize>,
     /// Seed of everything that is drawn
@@ -111,12 +120,31 @@ struct QuantizeArgs {
     /// Threads to use; the image does not depend on it [default: all cores]
     #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
     threads: usize,
+    /// Write the statistics and the allocation as JSON, for `actq inspect --stats`
+    #[arg(long, value_name = "FILE")]
+    save_stats: Option<PathBuf>,
+}
+
+#[derive(clap::Args)]
+struct InspectArgs {
+    /// The image
+    image: PathBuf,
+    /// Show instead which rows have which width
+    #[arg(long)]
+    widths: bool,
+    /// What --save-stats wrote with this image: adds why rows have their widths, and the rows that were removed
+    #[arg(long, value_name = "FILE", requires = "widths")]
+    stats: Option<PathBuf>,
+    /// Draw the widths
+    #[arg(long, value_name = "FILE", requires = "widths")]
+    svg: Option<PathBuf>,
 }
 
 #[derive(clap::Args)]
 struct SweepArgs {
-    /// The policy's folder
-    policy_dir: PathBuf,
+    /// The policies' folders
+    #[arg(required = true)]
+    policy_dirs: Vec<PathBuf>,
     /// Methods to compare
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "rtn,gptq,actquant,best")]
     methods: Vec<MethodArg>,
@@ -126,9 +154,18 @@ struct SweepArgs {
     /// Draw error over bits, and mark the knee of the best method
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
-    /// Write errors, bits, bytes and scores
+    /// Write errors, bits, bytes, allocations and scores: an array with one object per policy
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// Steps of distillation for method best [default: 8000, recurrent policies 1200]
+    #[arg(long, value_name = "N")]
+    steps: Option<usize>,
+    /// Seed of everything that is drawn
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Threads to use; no figure depends on it [default: all cores]
+    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
+    threads: usize,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -206,10 +243,7 @@ fn main() -> ExitCode {
 fn run(command: Command) -> Result<()> {
     match command {
         Command::Quantize(args) => run_quantize(&args),
-        Command::Inspect { image } => {
-            let buffer = ImageBuffer::read(&image)?;
-            print(&report(&buffer.image(&image)?))
-        }
+        Command::Inspect(args) => run_inspect(&args),
         Command::Eval { image, policy, json } => {
             let buffer = ImageBuffer::read(&image)?;
             let image = buffer.image(&image)?;
@@ -243,6 +277,8 @@ fn run(command: Command) -> Result<()> {
 
 fn run_quantize(args: &QuantizeArgs) -> Result<()> {
     let source = Policy::load(&args.policy_dir)?;
+    let one_file = args.save_stats.as_ref() == Some(&args.out);
+    ensure!(!one_file, "{}: image and statistics need two files", args.out.display());
     let method = match args.method {
         Some(method) => method.into(),
         None if !args.policy_dir.join("calib.npz").exists() => Method::Rtn,
@@ -266,30 +302,54 @@ fn run_quantize(args: &QuantizeArgs) -> Result<()> {
         forced: args.width.iter().cloned().chain(protected).collect(),
         ..Options::new(method, budget)
     };
-    rayon::ThreadPoolBuilder::new().num_threads(args.threads).build_global().context("threads cannot be started")?;
+    let started = Instant::now();
+    start_threads(args.threads)?;
+    let measure = args.max_nmse.map(|_| Measure::new(&source)).transpose()?;
     let bar = progress_bar()?;
     bar.set_message("calibrating");
     let prepared = Prepared::new(&source, method, |share| set_share(&bar, share))?;
     bar.reset();
     bar.set_message("quantizing");
-    let (policy, outcomes) = prepared.quantize(&options, |share| set_share(&bar, share))?;
+    let (policy, outcomes, options, note) = match args.max_nmse.zip(measure.as_ref()) {
+        None => {
+            let (policy, outcomes) = prepared.quantize(&options, |share| set_share(&bar, share))?;
+            (policy, outcomes, options, String::new())
+        }
+        Some((limit, measure)) => {
+            let found = search::smallest(&source, &prepared, &options, limit, measure, |work, share| {
+                bar.set_message(work.to_owned());
+                set_share(&bar, share);
+            })?;
+            let note = format!("{}\n", found.report(limit, measure));
+            (found.policy, found.outcomes, found.options, note)
+        }
+    };
     bar.finish_and_clear();
     let bytes = writer::image(&policy, &outcomes)?;
-    writer::write(&args.out, &bytes)?;
+    let mut files = vec![(args.out.as_path(), bytes.clone())];
+    if let Some(path) = &args.save_stats {
+        let asked = args.max_nmse.map_or(budget.into(), Asked::MaxNmse);
+        let buffer = ImageBuffer::new(&bytes);
+        let (scores, steps) = (prepared.actquant.as_ref().map_or(&[][..], |s| &s.scores), prepared.steps(&options));
+        let stats = Stats::new(&source, asked, &options, &outcomes, scores, steps, &buffer.image(&args.out)?);
+        files.push((path, stats.json()?.into_bytes()));
+    }
+    writer::write_all(&files)?;
     if let Some(statistics) = &prepared.actquant {
-        print(&scores(&policy.graph, statistics, budget, &outcomes))?;
+        print(&scores(&policy.graph, statistics, options.budget, &outcomes))?;
     }
     let parameters = source.graph.parameters();
     let f32_bytes = 4 * parameters;
     print(&format!(
-        "{}\n{}: {} bytes. The policy's {parameters} parameters take {f32_bytes} bytes in f32 ({:.1}x) and {} in bf16 \
-         ({:.1}x).\n",
+        "{note}{}\n{}: {} bytes. The policy's {parameters} parameters take {f32_bytes} bytes in f32 ({:.1}x) and {} in bf16 \
+         ({:.1}x).\nTook {:.1} s.\n",
         summary(&policy, &outcomes),
         args.out.display(),
         bytes.len(),
         f32_bytes as f64 / bytes.len() as f64,
         f32_bytes / 2,
         f32_bytes as f64 / 2.0 / bytes.len() as f64,
+        started.elapsed().as_secs_f64(),
     ))
 }
 
@@ -313,25 +373,52 @@ fn set_share(bar: &ProgressBar, share: f64) {
     bar.set_position((share * PROGRESS as f64) as u64);
 }
 
+fn start_threads(threads: usize) -> Result<()> {
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().context("threads cannot be started")
+}
+
+fn run_inspect(args: &InspectArgs) -> Result<()> {
+    let buffer = ImageBuffer::read(&args.image)?;
+    let image = buffer.image(&args.image)?;
+    if !args.widths {
+        return print(&report(&image));
+    }
+    let stats = args.stats.as_deref().map(|path| Stats::read(path, &image)).transpose()?;
+    let widths = Widths::new(&image, stats.as_ref())?;
+    if let Some(path) = &args.svg {
+        writer::write(path, widths.svg().as_bytes())?;
+    }
+    print(&widths.report())
+}
+
 fn run_sweep(args: &SweepArgs) -> Result<()> {
-    let policy = Policy::load(&args.policy_dir)?;
+    start_threads(args.threads)?;
     let methods: Vec<Method> = args.methods.iter().map(|&m| m.into()).collect();
+    let learning = Learning { steps: args.steps, seed: args.seed };
+    let policies = args.policy_dirs.iter().map(|dir| Policy::load(dir)).collect::<Result<Vec<_>>>()?;
     let bar = progress_bar()?;
-    let sweep = sweep::run(&policy, &methods, &args.bpw, |work, share| {
-        bar.set_message(work.to_owned());
-        set_share(&bar, share);
-    })?;
+    let mut sweeps = Vec::new();
+    for (p, policy) in policies.iter().enumerate() {
+        sweeps.push(sweep::run(policy, &methods, &args.bpw, learning, |work, share| {
+            bar.set_message(format!("{}: {work}", policy.name));
+            set_share(&bar, (p as f64 + share) / policies.len() as f64);
+        })?);
+    }
     bar.finish_and_clear();
-    let knee = sweep.knee.as_ref().map_or(String::new(), |knee| {
-        format!("\nknee: {} at {:.3} bits per weight, NMSE {:.2e}\n", knee.method, knee.bpw, knee.nmse)
-    });
-    print(&format!("{}\n{knee}", sweep.table()))?;
-    let write = |path: &Option<PathBuf>, text: &dyn Fn() -> Result<String>| -> Result<()> {
-        let Some(path) = path else { return Ok(()) };
-        writer::write(path, text()?.as_bytes())
-    };
-    write(&args.svg, &|| Ok(sweep.svg()))?;
-    write(&args.json, &|| Ok(serde_json::to_string_pretty(&sweep)? + "\n"))
+    let mut knees = String::new();
+    for sweep in &sweeps {
+        if let Some(knee) = &sweep.knee {
+            knees += &format!(
+                "\n* knee of {}: {} at {:.3} bits per weight, NMSE {:.2e}",
+                sweep.policy, knee.method, knee.bpw, knee.nmse
+            );
+        }
+    }
+    print(&format!("{}\n{knees}\n", sweep::table(&sweeps)))?;
+    let (svg, json) = (sweep::svg(&sweeps), serde_json::to_string_pretty(&sweeps)? + "\n");
+    let files = [(&args.svg, svg), (&args.json, json)];
+    let files: Vec<_> = files.iter().filter_map(|(path, text)| Some((path.as_deref()?, text))).collect();
+    writer::write_all(&files)
 }
 
 fn scores(graph: &Graph, statistics: &Statistics, budget: Budget, outcomes: &[Outcome]) -> String {
@@ -367,5 +454,7 @@ fn summary(policy: &Policy, outcomes: &[Outcome]) -> String {
         ]);
     }
     let bits = 8.0 * total as f64 / policy.weights.max(1) as f64;
-    format!("{rows}\n\n{total} bytes of weights, {bits:.3} bits each, everything counted\n")
+    let by_row = outcomes.iter().any(|outcome| outcome.allocation.is_some());
+    let widths = if by_row { widths::line(policy, outcomes) + "\n" } else { String::new() };
+    format!("{rows}\n\n{total} bytes of weights, {bits:.3} bits each, everything counted\n{widths}")
 }

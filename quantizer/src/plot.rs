@@ -1,4 +1,4 @@
-//! A line plot with a logarithmic vertical axis, as SVG.
+//! Pictures as SVG: the parts that all of them share, and a line plot with a logarithmic vertical axis.
 
 use std::fmt::Write as _;
 
@@ -12,6 +12,37 @@ const BOTTOM: f64 = 64.0;
 
 /// Okabe and Ito's palette, which colour-blind readers can tell apart, in an order of strong contrast on white.
 const COLOURS: [&str; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
+
+/// An SVG document of this size with a white ground, filled by `draw`.
+pub(crate) fn document(
+    width: f64,
+    height: f64,
+    draw: impl FnOnce(&mut String) -> std::fmt::Result,
+) -> Result<String, std::fmt::Error> {
+    let mut svg = String::new();
+    writeln!(
+        svg,
+        r##"<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}" font-family="Helvetica, Arial, 'Liberation Sans', sans-serif" font-size="13" fill="#333">"##
+    )?;
+    writeln!(svg, r##"<rect width="100%" height="100%" fill="#fff"/>"##)?;
+    draw(&mut svg)?;
+    writeln!(svg, "</svg>")?;
+    Ok(svg)
+}
+
+/// Text, escaped.
+pub(crate) fn text(svg: &mut String, x: f64, y: f64, attributes: &str, content: &str) -> std::fmt::Result {
+    let content = content.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+    writeln!(svg, r#"<text x="{x:.1}" y="{y:.1}" {attributes}>{content}</text>"#)
+}
+
+/// A power of ten as a label.
+pub(crate) fn decade_label(decade: i32) -> String {
+    match decade {
+        -3..=3 => format!("{}", 10f64.powi(decade)),
+        _ => format!("1e{decade}"),
+    }
+}
 
 /// One line with a marker at every point.
 #[derive(Clone, Debug)]
@@ -88,22 +119,28 @@ fn tick_step(length: f64) -> f64 {
     [5.0, 2.0, 1.0].into_iter().map(|m| m * power).find(|step| length / step >= 4.0).unwrap_or(power)
 }
 
+/// Plots below each other in one SVG document.
+pub fn stacked(plots: &[Plot]) -> String {
+    // Writing to a string can't fail.
+    document(WIDTH, HEIGHT * plots.len() as f64, |svg| {
+        for (i, plot) in plots.iter().enumerate() {
+            writeln!(svg, r#"<g transform="translate(0 {})">"#, HEIGHT * i as f64)?;
+            plot.write(svg)?;
+            writeln!(svg, "</g>")?;
+        }
+        Ok(())
+    })
+    .unwrap_or_default()
+}
+
 impl Plot {
     /// The picture as an SVG document.
     pub fn svg(&self) -> String {
-        let axes = Axes::around(&self.series);
-        let mut svg = String::new();
-        // Writing to a string can't fail.
-        let _ = self.write(&mut svg, &axes);
-        svg
+        stacked(std::slice::from_ref(self))
     }
 
-    fn write(&self, svg: &mut String, axes: &Axes) -> std::fmt::Result {
-        writeln!(
-            svg,
-            r##"<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}" font-family="Helvetica, Arial, 'Liberation Sans', sans-serif" font-size="13" fill="#333">"##
-        )?;
-        writeln!(svg, r##"<rect width="100%" height="100%" fill="#fff"/>"##)?;
+    fn write(&self, svg: &mut String) -> std::fmt::Result {
+        let axes = &Axes::around(&self.series);
         let middle = 0.5 * (LEFT + WIDTH - RIGHT);
         text(svg, middle, 30.0, r#"text-anchor="middle" font-size="17" font-weight="bold""#, &self.title)?;
         text(svg, middle, HEIGHT - 18.0, r#"text-anchor="middle" font-size="14""#, &self.x_label)?;
@@ -117,8 +154,7 @@ impl Plot {
         if let Some(mark) = &self.mark {
             writeln!(svg, "{}", ring(axes.x(mark.at.0), axes.y(mark.at.1), 10.0))?;
         }
-        self.legend(svg)?;
-        writeln!(svg, "</svg>")
+        self.legend(svg)
     }
 
     fn legend(&self, svg: &mut String) -> std::fmt::Result {
@@ -148,11 +184,6 @@ impl Plot {
     }
 }
 
-fn text(svg: &mut String, x: f64, y: f64, attributes: &str, content: &str) -> std::fmt::Result {
-    let content = content.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
-    writeln!(svg, r#"<text x="{x:.1}" y="{y:.1}" {attributes}>{content}</text>"#)
-}
-
 fn grid(svg: &mut String, axes: &Axes) -> std::fmt::Result {
     let (right, bottom) = (WIDTH - RIGHT, HEIGHT - BOTTOM);
     for decade in axes.y.0..=axes.y.1 {
@@ -180,13 +211,6 @@ fn grid(svg: &mut String, axes: &Axes) -> std::fmt::Result {
         right - LEFT,
         bottom - TOP
     )
-}
-
-fn decade_label(decade: i32) -> String {
-    match decade {
-        -3..=3 => format!("{}", 10f64.powi(decade)),
-        _ => format!("1e{decade}"),
-    }
 }
 
 fn line(svg: &mut String, axes: &Axes, index: usize, series: &Series) -> std::fmt::Result {

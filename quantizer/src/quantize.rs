@@ -22,6 +22,7 @@ use anyhow::{Result, bail, ensure};
 use half::bf16;
 
 use crate::graph::{Graph, Matrix};
+use allocate::Allocation;
 use moments::Moments;
 
 /// How codes are chosen.
@@ -259,6 +260,8 @@ pub struct Outcome {
     pub error: Option<f64>,
     /// Activation magnitude.
     pub x_max: u16,
+    /// What became of the rows and columns, where they have widths of their own (method best).
+    pub allocation: Option<Allocation>,
 }
 
 impl Outcome {
@@ -271,7 +274,12 @@ impl Outcome {
     ) -> Result<Self> {
         let x_max = quantized.x_max(activations.limit())?;
         let error = Some(moments::relative_error(matrix, &quantized.dequantized(), moments));
-        Ok(Self { error, quantized, x_max })
+        Ok(Self { error, quantized, x_max, allocation: None })
+    }
+
+    /// The width of every row of the matrix as it was trained: also of those that are gone.
+    pub fn trained_widths(&self) -> &[Option<Width>] {
+        self.allocation.as_ref().map_or(&self.quantized.widths, |allocation| &allocation.widths)
     }
 
     /// The lanes that the matrix is packed for.

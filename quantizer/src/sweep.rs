@@ -1,17 +1,19 @@
-//! The error of several methods at several budgets, as a table, as JSON and as a plot.
+//! The error of several methods at several budgets on one policy or several, as a table, as JSON and as a plot.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
+use actq_kernels::Width;
 use anyhow::Result;
 use comfy_table::Table;
 use serde::Serialize;
 
-use crate::plot::{Mark, Plot, Series};
+use crate::plot::{Mark, Plot, Series, stacked};
 use crate::policy::Policy;
-use crate::quantize::actquant::score::Score;
 use crate::quantize::prepared::Prepared;
-use crate::quantize::{Budget, BudgetTooSmall, Method, Options};
+use crate::quantize::{Budget, BudgetTooSmall, Method, Options, Outcome};
 use crate::runtime::ImageBuffer;
+use crate::stats::HsicScore;
 use crate::{eval, inspect, writer};
 
 /// One image.
@@ -22,8 +24,8 @@ pub struct Point {
     /// Errors, true bits per weight, bytes.
     #[serde(flatten)]
     pub report: eval::Report,
-    /// The widths that occur in each matrix.
-    pub bits: Vec<Vec<u32>>,
+    /// The allocation: for each matrix how many of its rows, as it was trained, have how many bits (0: none).
+    pub rows: Vec<BTreeMap<u32, usize>>,
 }
 
 /// One method at all budgets.
@@ -35,7 +37,7 @@ pub struct Curve {
     pub points: Vec<Option<Point>>,
     /// ActQuant's scores, per matrix.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub scores: Option<Vec<Score>>,
+    pub scores: Option<Vec<HsicScore>>,
 }
 
 /// The point of the best method beyond which a further bit gains least.
@@ -64,9 +66,24 @@ pub struct Sweep {
     pub knee: Option<Knee>,
 }
 
+/// How methods learn.
+#[derive(Clone, Copy, Debug)]
+pub struct Learning {
+    /// Steps of distillation; None: as many as suit the network.
+    pub steps: Option<usize>,
+    /// Seed of everything that is drawn.
+    pub seed: u64,
+}
+
 /// Quantizes `policy` by every method for every budget and runs each image over the folder's `heldout.npz`. `progress` gets what
 /// is being done and the share of the whole that is done.
-pub fn run(policy: &Policy, methods: &[Method], budgets: &[f64], mut progress: impl FnMut(&str, f64)) -> Result<Sweep> {
+pub fn run(
+    policy: &Policy,
+    methods: &[Method],
+    budgets: &[f64],
+    learning: Learning,
+    mut progress: impl FnMut(&str, f64),
+) -> Result<Sweep> {
     let mut curves = Vec::new();
     for (m, &method) in methods.iter().enumerate() {
         // Calibration counts as much as one budget.
@@ -75,10 +92,13 @@ pub fn run(policy: &Policy, methods: &[Method], budgets: &[f64], mut progress: i
         let mut points = Vec::new();
         for (b, &budget) in budgets.iter().enumerate() {
             let work = format!("{method}, {budget} bits per weight");
-            points
-                .push(point(policy, &prepared, method, budget, |share| progress(&work, done(1.0 + b as f64 + share)))?);
+            let Learning { steps, seed } = learning;
+            let plain = Options::new(method, Budget::BitsPerWeight(budget));
+            let options = Options { group: method.default_group(), steps, seed, ..plain };
+            let share = |share| progress(&work, done(1.0 + b as f64 + share));
+            points.push(point(policy, &prepared, budget, &options, share)?);
         }
-        let scores = prepared.actquant.map(|statistics| statistics.scores);
+        let scores = prepared.actquant.map(|statistics| statistics.scores.iter().map(HsicScore::from).collect());
         curves.push(Curve { method: method.to_string(), points, scores });
     }
     let knee = knee(&curves);
@@ -89,12 +109,11 @@ pub fn run(policy: &Policy, methods: &[Method], budgets: &[f64], mut progress: i
 fn point(
     policy: &Policy,
     prepared: &Prepared<'_>,
-    method: Method,
     budget: f64,
+    options: &Options,
     progress: impl FnMut(f64),
 ) -> Result<Option<Point>> {
-    let options = Options { group: method.default_group(), ..Options::new(method, Budget::BitsPerWeight(budget)) };
-    let (quantized, outcomes) = match prepared.quantize(&options, progress) {
+    let (quantized, outcomes) = match prepared.quantize(options, progress) {
         Ok(found) => found,
         Err(error) if error.is::<BudgetTooSmall>() => return Ok(None),
         Err(error) => return Err(error),
@@ -102,9 +121,15 @@ fn point(
     let buffer = ImageBuffer::new(&writer::image(&quantized, &outcomes)?);
     let image = buffer.image(Path::new("image in memory"))?;
     let report = eval::evaluate(image, &eval::heldout(&policy.dir, &image)?)?;
-    let bits =
-        outcomes.iter().map(|outcome| outcome.blocks().iter().map(|(shape, _)| shape.width.bits()).collect()).collect();
-    Ok(Some(Point { budget, report, bits }))
+    Ok(Some(Point { budget, report, rows: outcomes.iter().map(rows).collect() }))
+}
+
+fn rows(outcome: &Outcome) -> BTreeMap<u32, usize> {
+    let mut rows = BTreeMap::new();
+    for width in outcome.trained_widths() {
+        *rows.entry(width.map_or(0, Width::bits)).or_default() += 1;
+    }
+    rows
 }
 
 /// The knee of the best method.
@@ -140,22 +165,7 @@ fn line(curve: &Curve) -> Vec<(f64, f64)> {
 }
 
 impl Sweep {
-    /// One row per budget, one column per method: error and true bits per weight.
-    pub fn table(&self) -> Table {
-        let header: Vec<&str> = [""].into_iter().chain(self.curves.iter().map(|c| c.method.as_str())).collect();
-        let mut table = inspect::table(&header);
-        for (b, budget) in self.budgets.iter().enumerate() {
-            let cell = |curve: &Curve| match &curve.points[b] {
-                Some(point) => format!("{:.2e} at {:.3}", point.report.nmse, point.report.bpw),
-                None => "-".to_owned(),
-            };
-            table.add_row([format!("{budget} bits")].into_iter().chain(self.curves.iter().map(cell)));
-        }
-        table
-    }
-
-    /// Error over true bits per weight, a line per method.
-    pub fn svg(&self) -> String {
+    fn plot(&self) -> Plot {
         let series = |curve: &Curve| Series { name: curve.method.clone(), points: line(curve) };
         Plot {
             title: format!("{}: action error over bits per weight", self.policy),
@@ -167,8 +177,40 @@ impl Sweep {
                 label: format!("knee: {:.2} bits, NMSE {:.2e}", knee.bpw, knee.nmse),
             }),
         }
-        .svg()
     }
+
+    /// Whether a point is the knee.
+    fn is_knee(&self, curve: &Curve, point: &Point) -> bool {
+        self.knee.as_ref().is_some_and(|knee| knee.method == curve.method && knee.bpw == point.report.bpw)
+    }
+}
+
+/// One row per policy and budget, one column per method: error and true bits per weight, and a star at each policy's knee. All
+/// sweeps have the same methods.
+pub fn table(sweeps: &[Sweep]) -> Table {
+    let methods = sweeps.first().map_or(&[][..], |sweep| &sweep.curves).iter().map(|c| c.method.as_str());
+    let header: Vec<&str> = ["policy", "budget"].into_iter().chain(methods).collect();
+    let mut table = inspect::table(&header);
+    for sweep in sweeps {
+        for (b, budget) in sweep.budgets.iter().enumerate() {
+            let cell = |curve: &Curve| match &curve.points[b] {
+                Some(point) => {
+                    let star = if sweep.is_knee(curve, point) { '*' } else { ' ' };
+                    format!("{:.2e} at {:.3}{star}", point.report.nmse, point.report.bpw)
+                }
+                None => "- ".to_owned(),
+            };
+            let name = if b == 0 { sweep.policy.clone() } else { String::new() };
+            let front = [name, format!("{budget} bits")];
+            table.add_row(front.into_iter().chain(sweep.curves.iter().map(cell)));
+        }
+    }
+    table
+}
+
+/// Error over true bits per weight, a line per method, a plot per policy.
+pub fn svg(sweeps: &[Sweep]) -> String {
+    stacked(&sweeps.iter().map(Sweep::plot).collect::<Vec<_>>())
 }
 
 #[cfg(test)]
@@ -179,7 +221,7 @@ mod tests {
         let point = |&(bpw, nmse): &(f64, f64)| {
             let report =
                 eval::Report { nmse, worst_nmse: nmse, max_abs: 0.0, steps: 1, bpw, bytes: 1, worst_dimension: 0 };
-            (nmse > 0.0).then_some(Point { budget: bpw, report, bits: Vec::new() })
+            (nmse > 0.0).then_some(Point { budget: bpw, report, rows: Vec::new() })
         };
         Curve { method: method.to_owned(), points: points.iter().map(point).collect(), scores: None }
     }
@@ -196,10 +238,30 @@ mod tests {
     }
 
     #[test]
+    fn the_table_has_every_policy_and_marks_its_knee() {
+        let sweep = |policy: &str, points| {
+            let curves = vec![curve("best", points)];
+            let knee = knee(&curves);
+            let budgets = vec![2.0, 2.5, 4.0];
+            Sweep { policy: policy.into(), matrices: Vec::new(), budgets, curves, knee }
+        };
+        let sweeps = [
+            sweep("arm", &[(2.0, 0.5), (2.5, 0.01), (4.0, 0.003)]),
+            sweep("leg", &[(2.0, 0.5), (2.5, 0.4), (4.0, 0.003)]),
+        ];
+        let text = table(&sweeps).to_string();
+        let line = |word: &str| text.lines().filter(|l| l.contains(word)).map(str::to_owned).collect::<Vec<_>>();
+        assert!(line("arm")[0].contains("5.00e-1 at 2.000") && line("leg").len() == 1, "{text}");
+        assert_eq!(line("*").len(), 1, "{text}");
+        assert!(line("*")[0].contains("1.00e-2 at 2.500*"), "{text}");
+        assert_eq!(svg(&sweeps).matches("<polyline").count(), 2);
+    }
+
+    #[test]
     fn a_budget_that_is_too_small_leaves_a_dash() {
         let curves = vec![curve("a", &[(2.0, 0.0), (3.0, 0.1)])];
         let sweep = Sweep { policy: "p".into(), matrices: Vec::new(), budgets: vec![2.0, 3.0], curves, knee: None };
-        let text = sweep.table().to_string();
+        let text = table(&[sweep]).to_string();
         assert!(text.contains('-') && text.contains("1.00e-1 at 3.000"), "{text}");
     }
 }

@@ -42,6 +42,33 @@ pub struct Rows {
     pub forced: Option<Width>,
 }
 
+impl Rows {
+    /// The expected error of row `r` at a width.
+    pub fn expected(&self, r: usize, width: Option<Width>) -> f64 {
+        width.map_or(self.removal[r], |width| epsilon(width) * self.energy[r])
+    }
+}
+
+/// What became of the rows and columns of a matrix as it was trained, and why. Errors are squared differences of the actions over
+/// their variances, summed over the network's outputs.
+#[derive(Clone, Debug)]
+pub struct Allocation {
+    /// The width of each of its rows; `None` for rows without bits.
+    pub widths: Vec<Option<Width>>,
+    /// See [`Rows::energy`].
+    pub energy: Vec<f64>,
+    /// See [`Rows::removal`].
+    pub removal: Vec<f64>,
+    /// The expected error of each row at its width.
+    pub expected: Vec<f64>,
+    /// The importance `h` of each of its columns.
+    pub inputs: Vec<f64>,
+    /// Its row behind each row that is left.
+    pub rows: Vec<usize>,
+    /// Its column behind each column that is left.
+    pub columns: Vec<usize>,
+}
+
 /// The energies of a matrix's rows for the importances of its columns (`h`) and rows (`g`).
 pub fn energies(matrix: &Matrix, h: &[f64], g: &[f64]) -> Vec<f64> {
     let rows = matrix.data.chunks_exact(matrix.cols).zip(g);
@@ -121,12 +148,9 @@ fn choose(graph: &Graph, dimensions: &[Dimension], rows: &[Rows], multiplier: f6
                 // One bit per bit of each row that a column crosses.
                 let saving: f64 = made.map_or(0.0, |d| d.consumers.iter().map(|&c| bits_of(c)).sum());
                 let overhead = if made.is_some() { 16.0 } else { 32.0 };
-                let cost = |r: usize, width: Option<Width>| match width {
-                    None => rows[m].removal[r] - multiplier * saving,
-                    Some(width) => {
-                        let bits = cols * f64::from(width.bits()) + overhead;
-                        epsilon(width) * rows[m].energy[r] + multiplier * bits
-                    }
+                let cost = |r: usize, width: Option<Width>| {
+                    let bits = width.map_or(-saving, |width| cols * f64::from(width.bits()) + overhead);
+                    rows[m].expected(r, width) + multiplier * bits
                 };
                 let best = |r: usize| {
                     let order = |a: &&Option<Width>, b: &&Option<Width>| cost(r, **a).total_cmp(&cost(r, **b));

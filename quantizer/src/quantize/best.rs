@@ -5,7 +5,7 @@ use anyhow::{Result, ensure};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::allocate::{Rows, allocate, energies, removals};
+use super::allocate::{Allocation, Rows, allocate, energies, removals};
 use super::compact::{Compacted, Dimension, add_to_bias, compact, dimensions};
 use super::distill::{Task, distill, loss};
 use super::feedback::feedback;
@@ -66,6 +66,11 @@ impl<'a> Statistics<'a> {
             output_moments,
         })
     }
+
+    /// Steps of distillation where none are asked for.
+    pub fn default_steps(&self) -> usize {
+        if self.windows.recurrent() { WINDOW_STEPS } else { STEPS }
+    }
 }
 
 /// Quantizes a network. Returns it as it became (hidden elements without bits are gone, biases and norms have learned) and its
@@ -107,7 +112,7 @@ pub fn quantize(
         .map(|(columns, importance)| columns.iter().map(|&c| importance[c]).collect())
         .collect();
     let learned_with = vec![options.activations.limit(); graph.matrices.len()];
-    let steps = options.steps.unwrap_or(if windows.recurrent() { WINDOW_STEPS } else { STEPS });
+    let steps = options.steps.unwrap_or(statistics.default_steps());
     let task = Task {
         graph: &compacted.graph,
         widths: &compacted.widths,
@@ -126,7 +131,7 @@ pub fn quantize(
         Activations::Int8 | Activations::Int16 => learned_with.clone(),
     };
     let outcome = |quantized: &Quantized, limit: u16| -> Result<Outcome> {
-        Ok(Outcome { x_max: quantized.x_max(limit)?, quantized: quantized.clone(), error: None })
+        Ok(Outcome { x_max: quantized.x_max(limit)?, quantized: quantized.clone(), error: None, allocation: None })
     };
     let mut outcomes: Vec<Outcome> =
         quantized.iter().zip(learned_with).map(|(q, limit)| outcome(q, limit)).collect::<Result<_>>()?;
@@ -137,6 +142,13 @@ pub fn quantize(
         if total as f64 <= options.budget.weight_bytes(graph) {
             outcomes[m] = other;
         }
+    }
+    for (m, ((outcome, rows), widths)) in outcomes.iter_mut().zip(rows).zip(widths).enumerate() {
+        let expected = widths.iter().enumerate().map(|(r, width)| rows.expected(r, *width)).collect();
+        let Rows { energy, removal, .. } = rows;
+        let (rows, columns) = (compacted.rows[m].clone(), compacted.columns[m].clone());
+        let allocation = Allocation { widths, energy, removal, expected, inputs: inputs[m].clone(), rows, columns };
+        outcome.allocation = Some(allocation);
     }
     Ok((learned, outcomes))
 }

@@ -262,6 +262,7 @@ mod tests {
         ];
         let compacted = compact(&graph, &dimensions(&graph), &widths, &moments(&graph, &[0.0; 5]));
         assert_eq!(compacted.columns[1], [1, 3, 4, 2, 0]);
+        assert_eq!(compacted.rows, [vec![1, 3, 4, 2, 0], vec![0, 1, 2, 3], vec![0, 1, 2, 3]]);
         assert!(compacted.widths[0].is_sorted());
         for (a, b) in output(&graph).iter().zip(output(&compacted.graph)) {
             assert!((a - b).abs() < 1e-6);

@@ -74,6 +74,11 @@ impl<'a> Prepared<'a> {
         Ok((self.policy.clone(), outcomes))
     }
 
+    /// Steps of distillation with these options; 0 for methods that do not learn.
+    pub fn steps(&self, options: &Options) -> usize {
+        self.best.as_ref().map_or(0, |statistics| options.steps.unwrap_or(statistics.default_steps()))
+    }
+
     /// The budget for the weights that leaves room for everything else in an image of `bytes` bytes.
     fn within_image(&self, bytes: usize) -> Result<Budget> {
         let policy = self.policy;

@@ -35,10 +35,19 @@ pub struct Score {
 }
 
 impl Score {
+    /// `F(input)`
+    pub fn f_input(&self) -> f64 {
+        LAMBDA_Y * self.y_input - LAMBDA_X * self.x_input
+    }
+
+    /// `F(output)`
+    pub fn f_output(&self) -> f64 {
+        LAMBDA_Y * self.y_output - LAMBDA_X * self.x_output
+    }
+
     /// `F(output) - F(input)`
     pub fn sens(&self) -> f64 {
-        let bottleneck = |x, y| LAMBDA_Y * y - LAMBDA_X * x;
-        bottleneck(self.x_output, self.y_output) - bottleneck(self.x_input, self.y_input)
+        self.f_output() - self.f_input()
     }
 }
 
