@@ -6,6 +6,7 @@
 #![deny(unsafe_code)]
 
 pub mod backprop;
+pub mod check;
 pub mod dataset;
 pub mod eval;
 pub mod graph;
@@ -18,6 +19,7 @@ pub mod random;
 pub mod runtime;
 pub mod serve;
 pub mod sweep;
+pub mod unrounded;
 pub mod writer;
 
 /// The versions that take part in making an image; recorded in reports.

@@ -3,9 +3,9 @@
 use anyhow::{Context, Result};
 use ndarray::{Array2, Axis, Zip, linalg::general_mat_mul};
 
-use crate::backprop::{Network, Pass, Weights, zero_state};
+use crate::backprop::{Network, Pass, Weights, start_state, zero_state};
 use crate::dataset::Dataset;
-use crate::graph::{Graph, NodeKind};
+use crate::graph::Graph;
 
 /// Steps that a recurrent network's gradient runs back.
 const WINDOW: usize = 16;
@@ -22,7 +22,7 @@ const EQUAL: f32 = 1e-3;
 /// `dL/dy_d` is the sign of `y_d - t_d`. Recorded actions are mostly the policy's own, where `L` has its kink: there the sign is
 /// random, both with equal probability (of a fixed seed), whose square has the expectation `sum over d of (dy_d/dw)^2`.
 ///
-/// A recurrent network's gradient is truncated: episodes are run from the zero state, cut into windows of 16 steps, and each
+/// A recurrent network's gradient is truncated: episodes are run from their starting state, cut into windows of 16 steps, and each
 /// window's last frame is one sample whose gradient runs back to the start of the window. Shorter rests are left out. All else
 /// is exact: contributions of several steps or uses are summed before they are squared.
 ///
@@ -30,7 +30,7 @@ const EQUAL: f32 = 1e-3;
 pub fn importance(graph: &Graph, dataset: &Dataset, mut progress: impl FnMut(f64)) -> Result<Vec<Array2<f32>>> {
     let weights = Weights::of(graph);
     let network = Network { graph, x_max: &[] };
-    let recurrent = graph.nodes.iter().any(|n| matches!(n.kind, NodeKind::Lstm { .. } | NodeKind::Gru { .. }));
+    let recurrent = graph.state_len() > 0;
     let longest = dataset.length.iter().copied().max().unwrap_or(0);
     let window = if recurrent { WINDOW.min(longest) } else { 1 };
     let every = (dataset.frames() / window.max(1)).div_ceil(SAMPLES).max(1);
@@ -38,6 +38,12 @@ pub fn importance(graph: &Graph, dataset: &Dataset, mut progress: impl FnMut(f64
 
     let mut alive: Vec<usize> = (0..dataset.length.len()).collect();
     let mut state = zero_state(graph, alive.len());
+    for &episode in &alive {
+        let start = start_state(graph, dataset.start(episode).as_deref());
+        for (all, one) in state.iter_mut().flatten().zip(start.iter().flatten()) {
+            all.row_mut(episode).assign(&one.row(0));
+        }
+    }
     let mut fisher = weights.zeros_like().matrices;
     // The gradients themselves are not asked for, but the backward pass adds to them.
     let mut unused = weights.zeros_like();
