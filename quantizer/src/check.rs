@@ -56,7 +56,7 @@ impl Check {
         (heldout > TIMES * calib && heldout > calib + ABOVE).then(|| {
             format!(
                 "the held-out error is {:.1} times the calibration error: the image fits what was recorded for it better \
-                 than what it will see; record more and more varied episodes, or allow more bits",
+                 than what it will see; record more episodes, and more varied ones",
                 heldout / calib
             )
         })
@@ -68,4 +68,46 @@ pub fn recording_notes(calib: Option<&Dataset>, heldout: Option<&Dataset>) -> Ve
     let Some(range) = calib.map(Range::of) else { return Vec::new() };
     let outside = heldout.and_then(|heldout| range.warning(heldout));
     [range.constant_note(), outside].into_iter().flatten().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn report(nmse: f64) -> Report {
+        Report { nmse, worst_nmse: nmse, max_abs: 0.0, steps: 7, bpw: 3.0, bytes: 100, worst_dimension: 0 }
+    }
+
+    fn errors(calib: Option<f64>, heldout: f64) -> Check {
+        let activations = ActivationShare { unrounded_nmse: 0.0, share: 0.125, int16: vec![0, 4], linear: 5 };
+        Check { heldout: report(heldout), calib: calib.map(report), activations }
+    }
+
+    #[test]
+    fn a_held_out_error_far_above_the_calibration_error_is_worth_a_warning() {
+        let warning = errors(Some(0.002), 0.0084).overfit_warning().expect("a warning");
+        assert!(warning.starts_with("the held-out error is 4.2 times the calibration error: "), "{warning}");
+        // Less than three times; less than 0.002 above; no calibration recording.
+        for (calib, heldout) in [(Some(0.01), 0.029), (Some(1e-5), 0.002), (None, 0.5)] {
+            assert_eq!(errors(calib, heldout).overfit_warning(), None, "{calib:?} {heldout}");
+        }
+    }
+
+    #[test]
+    fn the_summary_has_a_line_for_each_error() {
+        assert_eq!(
+            errors(Some(0.002), 0.0084).summary(),
+            "calibration nmse  2.000e-3   (7 observations)\n\
+             held-out nmse     8.400e-3   (7 observations)\n\
+             activations       12% of the error (int8; linear operations in int16: 0, 4)\n"
+        );
+        let mut one = errors(None, 0.5);
+        one.activations = ActivationShare { int16: Vec::new(), share: -0.01, ..one.activations };
+        assert_eq!(
+            one.summary(),
+            "held-out nmse     5.000e-1   (7 observations)\nactivations       -1% of the error (int8)\n"
+        );
+        one.activations.int16 = vec![0, 1, 2, 3, 4];
+        assert_eq!(one.activations.to_string(), "-1% of the error (int16)");
+    }
 }

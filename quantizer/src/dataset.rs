@@ -3,6 +3,8 @@
 mod arrays;
 pub mod range;
 pub mod recording;
+#[cfg(test)]
+mod tests;
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -233,7 +235,7 @@ fn lengths(array: &Stored, episodes: usize, steps: usize) -> Result<Vec<usize>> 
         array.shape
     );
     let one = |(episode, n): (usize, i64)| {
-        let n = usize::try_from(n).with_context(|| format!("array \"length\" holds {n} for episode {episode}"))?;
+        let n = usize::try_from(n).ok().with_context(|| format!("array \"length\" holds {n} for episode {episode}"))?;
         ensure!(n <= steps, "episode {episode} has the length {n}, but the array \"obs\" holds {steps} steps");
         Ok(n)
     };

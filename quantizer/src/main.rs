@@ -358,7 +358,8 @@ fn print(text: &str) -> Result<()> {
 const PROGRESS: u64 = 1000;
 
 fn progress_bar() -> Result<ProgressBar> {
-    let style = ProgressStyle::with_template("{msg:32} {bar:40} {percent:>3}%, {eta} left").context("progress bar")?;
+    // Within 80 columns: a bar that wraps flickers.
+    let style = ProgressStyle::with_template("{msg:30} {bar:30} {percent:>3}%, {eta} left").context("progress bar")?;
     Ok(ProgressBar::new(PROGRESS).with_style(style))
 }
 

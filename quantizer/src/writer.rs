@@ -118,14 +118,16 @@ fn self_test_actions(bytes: &[u8], observations: &[Vec<f32>]) -> Result<Vec<Vec<
     })
 }
 
-/// Writes `bytes` to `path` so that a failure leaves no part of a file behind.
+/// Writes `bytes` to `path` so that neither a failure nor an end of the process leaves part of a file there. (A process that is
+/// killed while it writes can leave a hidden file of this name with the ending .part.)
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     let dir = match path.parent() {
         Some(dir) if !dir.as_os_str().is_empty() => dir,
         _ => Path::new("."),
     };
     let write = || -> Result<()> {
-        let mut file = tempfile::NamedTempFile::new_in(dir)?;
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let mut file = tempfile::Builder::new().prefix(&format!(".{name}.")).suffix(".part").tempfile_in(dir)?;
         file.write_all(bytes)?;
         #[cfg(unix)]
         {

@@ -94,7 +94,8 @@ fn npz(path: &Path) -> Result<Arrays> {
     const BROKEN: &str = "not an .npz archive, or one that was cut off";
     let file = BufReader::new(File::open(path).context("cannot be read")?);
     let mut npz = NpzReader::new(file).context(BROKEN)?;
-    let names = npz.names().context(BROKEN)?;
+    let mut names = npz.names().context(BROKEN)?;
+    names.sort_unstable();
     let mut known = BTreeMap::new();
     for name in NAMES.into_iter().filter(|name| names.iter().any(|n| n == name)) {
         let array = numpy(&mut InArchive(&mut npz, name)).with_context(|| format!("array {name:?} cannot be read"))?;

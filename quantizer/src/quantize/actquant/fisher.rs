@@ -168,7 +168,7 @@ mod tests {
         window: std::ops::Range<usize>,
     ) -> f64 {
         let network = Network { graph, x_max: &[] };
-        let mut state = zero_state(graph, 1);
+        let mut state = start_state(graph, dataset.start(episode).as_deref());
         let mut sum = 0.0;
         for step in 0..window.end {
             let pass = network.forward(weights, rows(&dataset.obs, &[episode], step), &mut state);
@@ -178,9 +178,9 @@ mod tests {
         sum
     }
 
-    fn compare(graph: &Graph, steps: usize, window: usize) {
+    fn compare(graph: &Graph, steps: usize, window: usize, state: Option<Array2<f32>>) {
         // Recorded actions far from the policy's own: no kink nearby, no random signs.
-        let mut dataset = dataset(graph, 2, steps);
+        let mut dataset = Dataset { state, ..dataset(graph, 2, steps) };
         let action = dataset.action.as_mut().expect("actions");
         action.indexed_iter_mut().for_each(|((e, s, d), a)| *a += if (e + s + d) % 3 == 0 { 3.0 } else { -4.0 });
         let found = importance(graph, &dataset, |_| {}).expect("importance");
@@ -209,9 +209,11 @@ mod tests {
 
     #[test]
     fn agrees_with_finite_differences() {
-        compare(&mlp(), 3, 1);
+        compare(&mlp(), 3, 1, None);
         // One window from the zero state: nothing is truncated.
-        compare(&lstm(), 5, 5);
+        compare(&lstm(), 5, 5, None);
+        let state = Array2::from_shape_fn((2, 6), |(e, v)| 0.8 - 0.25 * (v + e) as f32);
+        compare(&lstm(), 5, 5, Some(state));
     }
 
     #[test]
