@@ -82,11 +82,15 @@ pub fn zero_state(graph: &Graph, batch: usize) -> State {
     graph.nodes.iter().map(|n| n.kind.state_lens().map(|len| Array2::zeros((batch, len)))).collect()
 }
 
-/// The state of one sample, its values in the order of [`Graph::state_len`]; `None`: zero.
-pub fn start_state(graph: &Graph, values: Option<&[f32]>) -> State {
-    let mut state = zero_state(graph, 1);
-    let places = state.iter_mut().flatten().flatten();
-    places.zip(values.unwrap_or_default()).for_each(|(to, from)| *to = *from);
+/// A batch's state from every sample's values in the order of [`Graph::state_len`]; `None`: zero.
+pub fn start_state(graph: &Graph, starts: &[Option<Vec<f32>>]) -> State {
+    let mut state = zero_state(graph, starts.len());
+    for (sample, start) in starts.iter().enumerate() {
+        let mut values = start.iter().flatten();
+        for array in state.iter_mut().flatten() {
+            array.row_mut(sample).iter_mut().zip(values.by_ref()).for_each(|(to, from)| *to = *from);
+        }
+    }
     state
 }
 

@@ -343,7 +343,8 @@ fn run_quantize(args: &QuantizeArgs) -> Result<()> {
 
 /// Notes go to standard error, so that the report stays as it is.
 fn note(notes: impl IntoIterator<Item = String>) {
-    notes.into_iter().for_each(|note| eprintln!("note: {note}"));
+    // That nobody reads them is no error.
+    notes.into_iter().for_each(|note| drop(writeln!(io::stderr(), "note: {note}")));
 }
 
 /// Prints; that a reader has gone away (as `head` does) is no error.

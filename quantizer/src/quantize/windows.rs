@@ -58,7 +58,7 @@ impl<'a> Windows<'a> {
             let rows: Vec<f32> = dataset.episode(e).flatten().collect();
             let episode = Array2::from_shape_vec((length, graph.obs_len), rows).unwrap_or_default();
             if recurrent {
-                let mut state = start_state(graph, dataset.start(e).as_deref());
+                let mut state = start_state(graph, &[dataset.start(e)]);
                 let mut kept = zero_state(graph, length);
                 for (t, obs) in episode.axis_chunks_iter(Axis(0), 1).enumerate() {
                     for (kept, now) in kept.iter_mut().flatten().zip(state.iter().flatten()) {

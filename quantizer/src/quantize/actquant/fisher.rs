@@ -22,9 +22,9 @@ const EQUAL: f32 = 1e-3;
 /// `dL/dy_d` is the sign of `y_d - t_d`. Recorded actions are mostly the policy's own, where `L` has its kink: there the sign is
 /// random, both with equal probability (of a fixed seed), whose square has the expectation `sum over d of (dy_d/dw)^2`.
 ///
-/// A recurrent network's gradient is truncated: episodes are run from their starting state, cut into windows of 16 steps, and each
-/// window's last frame is one sample whose gradient runs back to the start of the window. Shorter rests are left out. All else
-/// is exact: contributions of several steps or uses are summed before they are squared.
+/// A recurrent network's gradient is truncated: episodes are run from their starting state, cut into windows of 16 steps, and
+/// each window's last frame is one sample whose gradient runs back to the start of the window. Shorter rests are left out. All
+/// else is exact: contributions of several steps or uses are summed before they are squared.
 ///
 /// `progress` gets the share done.
 pub fn importance(graph: &Graph, dataset: &Dataset, mut progress: impl FnMut(f64)) -> Result<Vec<Array2<f32>>> {
@@ -37,13 +37,8 @@ pub fn importance(graph: &Graph, dataset: &Dataset, mut progress: impl FnMut(f64
     let equal = deviations(dataset).context("array \"action\" is missing")?.map(|d| EQUAL * d);
 
     let mut alive: Vec<usize> = (0..dataset.length.len()).collect();
-    let mut state = zero_state(graph, alive.len());
-    for &episode in &alive {
-        let start = start_state(graph, dataset.start(episode).as_deref());
-        for (all, one) in state.iter_mut().flatten().zip(start.iter().flatten()) {
-            all.row_mut(episode).assign(&one.row(0));
-        }
-    }
+    let starts: Vec<_> = alive.iter().map(|&episode| dataset.start(episode)).collect();
+    let mut state = start_state(graph, &starts);
     let mut fisher = weights.zeros_like().matrices;
     // The gradients themselves are not asked for, but the backward pass adds to them.
     let mut unused = weights.zeros_like();
@@ -168,7 +163,7 @@ mod tests {
         window: std::ops::Range<usize>,
     ) -> f64 {
         let network = Network { graph, x_max: &[] };
-        let mut state = start_state(graph, dataset.start(episode).as_deref());
+        let mut state = start_state(graph, &[dataset.start(episode)]);
         let mut sum = 0.0;
         for step in 0..window.end {
             let pass = network.forward(weights, rows(&dataset.obs, &[episode], step), &mut state);
@@ -210,7 +205,7 @@ mod tests {
     #[test]
     fn agrees_with_finite_differences() {
         compare(&mlp(), 3, 1, None);
-        // One window from the zero state: nothing is truncated.
+        // One window from the start, which is zero or recorded: nothing is truncated.
         compare(&lstm(), 5, 5, None);
         let state = Array2::from_shape_fn((2, 6), |(e, v)| 0.8 - 0.25 * (v + e) as f32);
         compare(&lstm(), 5, 5, Some(state));
