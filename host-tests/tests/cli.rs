@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::{Read as _, Write as _};
 use std::path::{Path, PathBuf};
-use std::process::{Output, Stdio};
+use std::process::{Child, Command, Output, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
 
 use actq::graph::Evaluator;
 use actq::policy::Policy;
@@ -15,7 +17,7 @@ use actq_kernels::Width;
 use actq_kernels::image::Op;
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array1, Array3};
-use ndarray_npy::NpzWriter;
+use ndarray_npy::{NpzWriter, WriteNpyExt as _};
 use safetensors::Dtype;
 use safetensors::tensor::{TensorView, serialize};
 use serde_json::{Value, json};
@@ -468,7 +470,18 @@ const SPOILT: &[Spoilt] = &[
     ("weights cut off", |p| cut(&p.join("policy.safetensors"), 100), "", &["policy.safetensors"]),
     ("weights empty", |p| cut(&p.join("policy.safetensors"), 0), "", &["policy.safetensors"]),
     ("unknown op", |p| edit(p, "/ops/2", json!({"op": "swish"})), "", &["policy.json", "op 2", "swish"]),
-    ("unknown key", |p| edit(p, "/ops/1/bias", json!("in.bias")), "", &["policy.json", "bias"]),
+    (
+        "unknown key",
+        |p| edit(p, "/ops/1/bias", json!("in.bias")),
+        "",
+        &["policy.json: op 1 (linear) has the key \"bias\"; its keys are op, input, save, w, b"],
+    ),
+    (
+        "key of another op",
+        |p| edit(p, "/ops/2/clip", json!(5)),
+        "",
+        &["policy.json: op 2 (tanh) has the key \"clip\"; its keys are op, input, save"],
+    ),
     ("no op", |p| edit(p, "/ops", json!([])), "", &["policy.json", "ops"]),
     ("no w", |p| edit(p, "/ops/3", json!({"op": "linear"})), "", &["policy.json", "op 3", "linear"]),
     ("no such tensor", |p| edit(p, "/ops/3/w", json!("gone")), "", &["policy.safetensors", "op 3", "gone"]),
@@ -504,7 +517,35 @@ const SPOILT: &[Spoilt] = &[
     ("limits reversed", |p| edit(p, "/action/low", json!([0, 2, 0])), "", &["policy.json", "low"]),
     ("negative step", |p| edit(p, "/action/max_step", json!([1, -1, 1])), "", &["policy.json", "max_step"]),
     ("control rate 0", |p| edit(p, "/control_hz", json!(0)), "", &["policy.json", "control_hz"]),
-    ("no recording", |p| Ok(fs::remove_file(p.join("calib.npz"))?), "--method gptq", &["calib.npz"]),
+    (
+        "no recording",
+        |p| Ok(fs::remove_file(p.join("calib.npz"))?),
+        "--method gptq",
+        &[
+            "gptq needs recorded observations: put calib.npz, calib.npy or calib.safetensors beside policy.json",
+            "--calib",
+        ],
+    ),
+    (
+        "two recordings",
+        |p| Ok(fs::write(p.join("calib.npy"), "")?),
+        "",
+        &["policy: calib.npz and calib.npy are there; leave one of them"],
+    ),
+    (
+        "two held-out recordings",
+        |p| Ok(fs::write(p.join("heldout.safetensors"), "")?),
+        "",
+        &["heldout.npz and heldout.safetensors are there"],
+    ),
+    ("held-out recording cut off", |p| cut(&p.join("heldout.npz"), 100), "", &["heldout.npz", "cut off"]),
+    ("too few frames", |p| calib(p, OBS, 0.0, 13), "", &["calib.npz", "15 frames are recorded, 16 are needed"]),
+    (
+        "too few frames to learn from",
+        |_| Ok(()),
+        "--method best",
+        &["calib.npz", "47 frames are recorded, 200 are needed: learning from fewer repeats them by heart"],
+    ),
     ("recording cut off", |p| cut(&p.join("calib.npz"), 100), "", &["calib.npz"]),
     ("recording empty", |p| cut(&p.join("calib.npz"), 0), "", &["calib.npz"]),
     ("wider recording", |p| calib(p, OBS + 1, 0.0, 1), "", &["calib.npz", "obs", "41", "40"]),
@@ -560,6 +601,18 @@ fn bad_policies_are_named_and_leave_no_file() -> Result<()> {
         };
         ((*what).to_owned(), run())
     }))
+}
+
+/// As an exporter writes it that puts out every key.
+#[test]
+fn a_key_without_a_value_says_nothing() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let before = fs::read(fixture.image("")?)?;
+    edit(&fixture.policy(), "/ops/2/clip", Value::Null)?;
+    let after = fs::read(fixture.image("")?)?;
+    // The folder's digest differs, and with it the checksum.
+    assert_eq!(before[128..], after[128..]);
+    Ok(())
 }
 
 #[test]
@@ -630,8 +683,6 @@ fn eval_names_what_is_wrong_with_a_recording() -> Result<()> {
         ensure!(output.stdout.is_empty(), "something is printed");
         failed(&output, 1, words)
     };
-    write_recording(&path, &obs, None, full)?;
-    eval(&["heldout.npz", "action"]).context("no actions")?;
     write_recording(&path, &obs, Some(&action(ACT)), full)?;
     eval(&["heldout.npz", "action"]).context("actions of another width")?;
     write_recording(&path, &draw_observations(1, OBS - 1), Some(&action(CHUNK * ACT)), full)?;
@@ -642,6 +693,222 @@ fn eval_names_what_is_wrong_with_a_recording() -> Result<()> {
     eval(&["heldout.npz"]).context("no steps")?;
     fs::remove_file(&path)?;
     eval(&["heldout.npz"]).context("no recording")
+}
+
+/// Writes a recording's observations alone.
+fn write_npy(path: &Path, obs: &Array3<f32>) -> Result<()> {
+    Ok(obs.write_npy(File::create(path)?)?)
+}
+
+#[test]
+fn a_recording_may_be_named_and_of_any_format() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let policy = fixture.policy();
+    let image = fs::read(fixture.image("--bits 3 --group 32")?)?;
+    // Another name and another format, the same frames: the same image.
+    let obs = draw_observations(5, OBS);
+    let named = fixture.out("mine.safetensors");
+    let bytes: Vec<u8> = obs.iter().flat_map(|v| f64::from(*v).to_le_bytes()).collect();
+    let length: Vec<u8> = [STEPS as i32, 7, STEPS as i32].iter().flat_map(|n| n.to_le_bytes()).collect();
+    let views = [
+        ("obs", TensorView::new(Dtype::F64, vec![EPISODES, STEPS, OBS], &bytes)?),
+        ("length", TensorView::new(Dtype::I32, vec![EPISODES], &length)?),
+    ];
+    fs::write(&named, serialize(views, None)?)?;
+    fs::remove_file(policy.join("calib.npz"))?;
+    let options = format!("--bits 3 --group 32 --calib {}", text(&named));
+    let out = fixture.out("named.actq");
+    succeeded(&fixture.quantize(&out, &options)?)?;
+    assert_eq!(fs::read(&out)?, image);
+    // With groups and a recording the default is gptq, wherever the recording is.
+    succeeded(&fixture.quantize_as_given(&out, &options)?)?;
+    assert_eq!(fs::read(&out)?, image);
+    let missing = fixture.quantize(&out, "--calib none.npz")?;
+    failed(&missing, 1, &["none.npz: cannot be read"])
+}
+
+#[test]
+fn eval_takes_a_named_recording_and_asks_the_policy_for_its_actions() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let image = text(&fixture.image("--bits 4")?);
+    let policy = text(&fixture.policy());
+    let heldout = fixture.policy().join("heldout.npz");
+    let named = fixture.out("drive.npz");
+    fs::rename(&heldout, &named)?;
+    let eval = |arguments: &[&str]| run(actq(&[&["eval", &image, "--json"], arguments].concat()), b"");
+    let expected = succeeded(&eval(&["--heldout", &text(&named)])?)?;
+    assert_eq!(serde_json::from_str::<Value>(&expected)?["steps"], json!(2 * STEPS + 7));
+    failed(
+        &eval(&["--policy", &policy])?,
+        1,
+        &["actq eval needs recorded observations: put heldout.npz, heldout.npy or heldout.safetensors", "--heldout"],
+    )?;
+    failed(&eval(&[])?, 2, &["--policy"])?;
+    // Observations alone: the image's own policy gives the actions, another does not.
+    write_recording(&heldout, &draw_observations(6, OBS), None, [STEPS as i64, 7, STEPS as i64])?;
+    assert_eq!(succeeded(&eval(&["--policy", &policy])?)?, expected);
+    failed(&eval(&["--heldout", &text(&heldout)])?, 1, &["heldout.npz: array \"action\" is missing", "--policy"])?;
+    fs::remove_file(&heldout)?;
+    write_npy(&fixture.policy().join("heldout.npy"), &draw_observations(6, OBS))?;
+    let all: Value = serde_json::from_str(&succeeded(&eval(&["--policy", &policy])?)?)?;
+    assert_eq!(all["steps"], json!(EPISODES * STEPS));
+    edit(&fixture.policy(), "/control_hz", json!(26))?;
+    failed(&eval(&["--policy", &policy])?, 1, &["heldout.npy: array \"action\" is missing"])
+}
+
+#[test]
+fn sweep_takes_named_recordings() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let policy = fixture.policy();
+    let (calib, heldout) = (fixture.out("c.npz"), fixture.out("h.npz"));
+    fs::rename(policy.join("calib.npz"), &calib)?;
+    fs::rename(policy.join("heldout.npz"), &heldout)?;
+    let sweep = |more: &[&str]| {
+        let policy = text(&policy);
+        run(actq(&[&["sweep", &policy, "--methods", "rtn,gptq", "--bpw", "4"], more].concat()), b"")
+    };
+    failed(&sweep(&[])?, 1, &["actq sweep needs recorded observations: put heldout.npz", "--heldout"])?;
+    failed(
+        &sweep(&["--heldout", &text(&heldout)])?,
+        1,
+        &["gptq needs recorded observations: put calib.npz", "--calib"],
+    )?;
+    let table = succeeded(&sweep(&["--heldout", &text(&heldout), "--calib", &text(&calib)])?)?;
+    ensure!(table.contains("4 bits") && table.contains("gptq"), "{table}");
+    Ok(())
+}
+
+/// Lines on standard error, all of them notes.
+fn notes(output: &Output) -> Result<Vec<String>> {
+    succeeded(output)?;
+    let text = String::from_utf8(output.stderr.clone())?;
+    let lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    ensure!(!text.contains(['\r', '\x1b']) && lines.iter().all(|line| line.starts_with("note: ")), "{text:?}");
+    Ok(lines)
+}
+
+#[test]
+fn quantize_tells_both_errors_and_what_is_wrong_with_the_recordings() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let policy = fixture.policy();
+    let out = fixture.out("image.actq");
+    let quantize = || fixture.quantize(&out, "--bits 8");
+    // Every held-out value is within the calibrated range; no progress bar, no escape sequences where nobody looks.
+    let wide = 1.3 * draw_observations(5, OBS);
+    write_recording(&policy.join("calib.npz"), &wide, None, [STEPS as i64; EPISODES])?;
+    let output = quantize()?;
+    assert_eq!(notes(&output)?, Vec::<String>::new());
+    let report = succeeded(&output)?;
+    let number = |name: &str| -> Result<f64> {
+        let line =
+            report.lines().find_map(|line| line.strip_prefix(name)).with_context(|| format!("{name}: {report}"))?;
+        Ok(line.split_whitespace().next().context("no number")?.trim_end_matches('%').parse()?)
+    };
+    let nmse = fixture.eval(&out)?["nmse"].as_f64().context("nmse")?;
+    ensure!((number("held-out nmse")? / nmse - 1.0).abs() < 1e-3, "{nmse} in {report}");
+    ensure!(number("calibration nmse")? > 0.0);
+    // At 8 bits most of the error comes from the activations.
+    ensure!((20.0..=100.0).contains(&number("activations")?) && report.contains("of the error (int8)"), "{report}");
+    let people = succeeded(&run(actq(&["eval", &text(&out), "--policy", &text(&policy)]), b"")?)?;
+    ensure!(people.contains("activations") && people.contains("of the error (int8)"), "{people}");
+
+    // Two dimensions stand still in the recording, and one of them moves in the other.
+    let mut obs = draw_observations(5, OBS);
+    for row in obs.rows_mut() {
+        let mut row = row;
+        (row[4], row[5]) = (0.5, 0.25);
+    }
+    write_npy(&policy.join("calib.npy"), &obs)?;
+    fs::remove_file(policy.join("calib.npz"))?;
+    let mut moving = draw_observations(6, OBS);
+    moving.rows_mut().into_iter().for_each(|mut row| row[4] = 0.5);
+    write_recording(&policy.join("heldout.npz"), &moving, None, [STEPS as i64, 7, STEPS as i64])?;
+    let warnings = notes(&quantize()?)?;
+    ensure!(warnings.len() == 2, "{warnings:?}");
+    ensure!(warnings[0].starts_with("note: observation dimensions 4-5 never change in calib.npy: "), "{warnings:?}");
+    let outside = "note: 100.0% of the observations in heldout.npz leave the range of calib.npy by more than 10% of it, in \
+                   dimensions 5 (100.0%)";
+    ensure!(warnings[1].starts_with(outside), "{warnings:?}");
+    let eval = run(actq(&["eval", &text(&out), "--policy", &text(&policy), "--json"]), b"")?;
+    assert_eq!(notes(&eval)?, warnings[1..]);
+    // A broken recording to compare with does not keep eval from its work.
+    cut(&policy.join("calib.npy"), 100)?;
+    let eval = notes(&run(actq(&["eval", &text(&out), "--policy", &text(&policy), "--json"]), b"")?)?;
+    ensure!(eval.len() == 1 && eval[0].starts_with("note: the calibrated range is not known: "), "{eval:?}");
+    Ok(())
+}
+
+#[test]
+fn an_image_that_fits_its_calibration_alone_is_warned_of() -> Result<()> {
+    let fixture = Fixture::new()?;
+    // Held out are small motions, beside which the error that was small for large ones is large.
+    let obs = 0.05 * draw_observations(6, OBS);
+    write_recording(&fixture.policy().join("heldout.npz"), &obs, None, [STEPS as i64; EPISODES])?;
+    let warnings = notes(&fixture.quantize(&fixture.out("image.actq"), "--bits 2")?)?;
+    ensure!(warnings.len() == 1 && warnings[0].contains("times the calibration error"), "{warnings:?}");
+    Ok(())
+}
+
+/// Ctrl-C while the quantizer learns.
+#[cfg(unix)]
+#[test]
+fn an_interrupt_leaves_no_file() -> Result<()> {
+    use std::os::unix::process::ExitStatusExt as _;
+    let fixture = Fixture::new()?;
+    let random = &mut Random(8);
+    let obs = Array3::from_shape_simple_fn((1, 300, OBS), || 2.0 * random.unit());
+    fs::remove_file(fixture.policy().join("calib.npz"))?;
+    write_npy(&fixture.policy().join("calib.npy"), &obs)?;
+    let out = fixture.out("image.actq");
+    fs::write(&out, "an image that is in use")?;
+    let before = fixture.snapshot()?;
+    let policy = text(&fixture.policy());
+    let mut command = actq(&["quantize", &policy, "--method", "best", "--steps", "100000000", "--out", &text(&out)]);
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn()?;
+    sleep(Duration::from_secs(1));
+    ensure!(child.try_wait()?.is_none(), "the command has ended by itself");
+    interrupt(&child)?;
+    let output = child.wait_with_output()?;
+    assert_eq!(output.status.signal(), Some(2), "{output:?}");
+    ensure!(fixture.snapshot()? == before, "files have changed");
+    Ok(())
+}
+
+#[cfg(unix)]
+fn interrupt(child: &Child) -> Result<()> {
+    // A child that has just ended cannot be interrupted, which is no error.
+    Command::new("kill").args(["-INT", &child.id().to_string()]).stderr(Stdio::null()).status()?;
+    Ok(())
+}
+
+/// Interrupts all over the time that the command takes, the writing among it: the old image is there, or the whole new one.
+#[cfg(unix)]
+#[test]
+fn an_interrupt_at_any_time_leaves_a_whole_image() -> Result<()> {
+    const TRIES: u32 = 40;
+    let fixture = Fixture::new()?;
+    let out = fixture.out("image.actq");
+    let (policy, file) = (text(&fixture.policy()), text(&out));
+    let start = || {
+        let mut command = actq(&["quantize", &policy, "--method", "rtn", "--out", &file]);
+        command.stdout(Stdio::null()).stderr(Stdio::null()).spawn()
+    };
+    let began = Instant::now();
+    ensure!(start()?.wait()?.success());
+    let (whole, time) = (fs::read(&out)?, began.elapsed());
+    let mut seen = [0; 2];
+    for i in 0..TRIES {
+        fs::write(&out, "old")?;
+        let mut child = start()?;
+        sleep(time * i / TRIES);
+        interrupt(&child)?;
+        child.wait()?;
+        let found = fs::read(&out)?;
+        ensure!(found == b"old" || found == whole, "{} bytes after interrupt {i}", found.len());
+        seen[usize::from(found == whole)] += 1;
+    }
+    ensure!(seen[0] > 0, "no interrupt came in time: {seen:?}");
+    Ok(())
 }
 
 /// `actq inspect image | head -1` is how people use it.

@@ -285,6 +285,7 @@ fn headers_that_cannot_be_are_refused() {
             // 9 bytes are named; the ninth is the first of a character's two.
             d.set(d.offset(h::W_NAME) + 2, 0xa4c3);
         }),
+        ("self-test of no steps", E::SelfTest, |d| d.set_low(h::W_STEPS_NAME, 0)),
         ("self-test outside", E::Section, |d| d.set(h::W_SELF_TEST, d.0.len() as u32 - 1)),
         ("self-test at a huge offset", E::Section, |d| d.set(h::W_SELF_TEST, HUGE)),
         ("self-test of too many steps", E::Section, |d| d.set_low(h::W_STEPS_NAME, 0xffff)),

@@ -4,7 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use actq::dataset::Dataset;
+use actq::dataset::recording::Recording;
+use actq::dataset::{Dataset, Sizes};
 use actq::eval;
 use actq::graph::Graph;
 use actq::policy::Policy;
@@ -139,7 +140,7 @@ fn same_bits(elf: &Path, bytes: &[u8], dataset: &Dataset) -> Result<()> {
 /// All widths with int8 and int16 activations; the build without FPU, which is slower, runs one image.
 fn policy_has_the_same_bits(dir: &Path) -> Result<()> {
     let policy = Policy::load(dir)?;
-    let dataset = Dataset::load(&dir.join("heldout.npz"), policy.graph.obs_len, policy.chunk * policy.act_len)?;
+    let dataset = Recording::Heldout.require(Some(dir), None, Sizes::of(&policy), "this test")?;
     let elf = firmware("actq-firmware-demo", Target::Fpu)?;
     for activations in [Activations::Int8, Activations::Int16] {
         for width in Width::ALL {
@@ -192,7 +193,7 @@ fn eight_bits_stay_close_to_the_recorded_actions() -> Result<()> {
 fn gptq_beats_rounding_at_low_bits() -> Result<()> {
     let dir = ur3();
     let policy = Policy::load(&dir)?;
-    let calib = Dataset::load(&dir.join("calib.npz"), policy.graph.obs_len, policy.chunk * policy.act_len)?;
+    let calib = Recording::Calib.require(Some(&dir), None, Sizes::of(&policy), "gptq")?;
     let moments = actq::quantize::moments::collect(&policy.graph, &calib, |_| {});
     let nmse = |graph: &Graph, method| -> Result<f64> {
         let options = Options::new(method, Budget::Width(Width::W3));

@@ -53,6 +53,8 @@ pub enum ImageError {
     Limits,
     /// The policy's name is not UTF-8.
     Name,
+    /// The self-test vector has no steps.
+    SelfTest,
 }
 
 impl fmt::Display for ImageError {
@@ -81,6 +83,7 @@ impl fmt::Display for ImageError {
             Self::Overflow => "a row can overflow its int32 accumulator",
             Self::Limits => "action limits are reversed",
             Self::Name => "policy name is not UTF-8",
+            Self::SelfTest => "the self-test vector has no steps",
         })
     }
 }

@@ -39,6 +39,12 @@ impl<'a, 's> Head<'a, 's> {
         self.started = false;
     }
 
+    /// The recurrent state, to read or to set: of each operation in order an LSTM's hidden, then cell state, or a GRU's state.
+    /// A reset zeroes it.
+    pub fn state_mut(&mut self) -> &mut [f32] {
+        self.floats_mut(self.image.state())
+    }
+
     /// The image.
     pub fn image(&self) -> &Image<'a> {
         &self.image

@@ -518,6 +518,10 @@ impl<'a> Image<'a> {
         if core::str::from_utf8(name.get(..name_len).unwrap_or(&[])).is_err() {
             return Err(ImageError::Name);
         }
+        // A head that tests nothing would report success.
+        if self.self_test_steps() == 0 {
+            return Err(ImageError::SelfTest);
+        }
         self.constants(
             self.word(h::W_SELF_TEST) as usize,
             self.self_test_steps().saturating_mul(self.obs_len() + self.act_len()),

@@ -79,12 +79,19 @@ pub type State = Vec<[Array2<f32>; 2]>;
 
 /// The zero state for a batch.
 pub fn zero_state(graph: &Graph, batch: usize) -> State {
-    let width = |kind: &NodeKind| match kind {
-        NodeKind::Lstm { hidden, .. } => [*hidden, *hidden],
-        NodeKind::Gru { hidden, .. } => [*hidden, 0],
-        _ => [0, 0],
-    };
-    graph.nodes.iter().map(|n| width(&n.kind).map(|w| Array2::zeros((batch, w)))).collect()
+    graph.nodes.iter().map(|n| n.kind.state_lens().map(|len| Array2::zeros((batch, len)))).collect()
+}
+
+/// A batch's state from every sample's values in the order of [`Graph::state_len`]; `None`: zero.
+pub fn start_state(graph: &Graph, starts: &[Option<Vec<f32>>]) -> State {
+    let mut state = zero_state(graph, starts.len());
+    for (sample, start) in starts.iter().enumerate() {
+        let mut values = start.iter().flatten();
+        for array in state.iter_mut().flatten() {
+            array.row_mut(sample).iter_mut().zip(values.by_ref()).for_each(|(to, from)| *to = *from);
+        }
+    }
+    state
 }
 
 /// What a node keeps for its backward pass.

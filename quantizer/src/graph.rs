@@ -122,6 +122,15 @@ impl NodeKind {
             _ => len,
         }
     }
+
+    /// Lengths of the hidden and of the cell state; 0 where there is none.
+    pub fn state_lens(&self) -> [usize; 2] {
+        match self {
+            Self::Lstm { hidden, .. } => [*hidden, *hidden],
+            Self::Gru { hidden, .. } => [*hidden, 0],
+            _ => [0, 0],
+        }
+    }
 }
 
 /// A network.
@@ -149,6 +158,12 @@ impl Graph {
     /// Length of a value.
     pub fn len_of(&self, value: ValueId) -> usize {
         if value == 0 { self.obs_len } else { self.nodes[value - 1].len }
+    }
+
+    /// Values of the recurrent state: of each node in order its hidden state, then its cell state. An image keeps them in the
+    /// same order.
+    pub fn state_len(&self) -> usize {
+        self.nodes.iter().flat_map(|node| node.kind.state_lens()).sum()
     }
 
     /// Weights and biases and all other constants, counted as the f32 policy stores them.
@@ -180,7 +195,7 @@ impl Graph {
 pub struct Evaluator<'g> {
     graph: &'g Graph,
     /// Hidden and cell state of each node; empty where it has none.
-    state: Vec<(Vec<f32>, Vec<f32>)>,
+    state: Vec<[Vec<f32>; 2]>,
 }
 
 impl<'g> Evaluator<'g> {
@@ -193,11 +208,14 @@ impl<'g> Evaluator<'g> {
 
     /// Zeroes the recurrent state.
     pub fn reset(&mut self) {
-        let zeros = |node: &Node| match node.kind {
-            NodeKind::Lstm { hidden, .. } | NodeKind::Gru { hidden, .. } => (vec![0.0; hidden], vec![0.0; hidden]),
-            _ => (Vec::new(), Vec::new()),
-        };
-        self.state = self.graph.nodes.iter().map(zeros).collect();
+        self.start(None);
+    }
+
+    /// Sets the recurrent state, in the order of [`Graph::state_len`]; `None`: zero.
+    pub fn start(&mut self, state: Option<&[f32]>) {
+        self.state = self.graph.nodes.iter().map(|node| node.kind.state_lens().map(|len| vec![0.0; len])).collect();
+        let values = self.state.iter_mut().flatten().flatten();
+        values.zip(state.unwrap_or_default()).for_each(|(to, from)| *to = *from);
     }
 
     /// The network's output for one observation of the graph's length. `tap` sees every matrix's index and input vector.
@@ -236,7 +254,7 @@ impl<'g> Evaluator<'g> {
                     parts.iter().flat_map(|p| values[p.value][p.from..p.from + p.len].iter().copied()).collect()
                 }
                 NodeKind::Lstm { input, state: w_hh, bias, .. } => {
-                    let (h, c) = state;
+                    let [h, c] = state;
                     tap(*input, x);
                     tap(*w_hh, h);
                     let gates = affine(&matrices[*w_hh], h, &affine(&matrices[*input], x, bias));
@@ -244,7 +262,7 @@ impl<'g> Evaluator<'g> {
                     h.clone()
                 }
                 NodeKind::Gru { input, state: w_hh, input_bias, state_bias, .. } => {
-                    let (h, _) = state;
+                    let [h, _] = state;
                     tap(*input, x);
                     tap(*w_hh, h);
                     let a = affine(&matrices[*input], x, input_bias);

@@ -6,6 +6,7 @@
 #![deny(unsafe_code)]
 
 pub mod backprop;
+pub mod check;
 pub mod dataset;
 pub mod eval;
 pub mod graph;
@@ -20,6 +21,7 @@ pub mod search;
 pub mod serve;
 pub mod stats;
 pub mod sweep;
+pub mod unrounded;
 pub mod widths;
 pub mod writer;
 

@@ -6,6 +6,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
+use actq::dataset::Sizes;
+use actq::dataset::range::Range;
+use actq::dataset::recording::Recording;
 use actq::graph::Graph;
 use actq::inspect::{group_name, report, table};
 use actq::policy::Policy;
@@ -15,9 +18,8 @@ use actq::quantize::{Activations, Budget, Method, Options, Outcome};
 use actq::runtime::ImageBuffer;
 use actq::search::{self, Measure};
 use actq::stats::{Asked, Stats};
-use actq::sweep::Learning;
 use actq::widths::{self, Widths};
-use actq::{eval, serve, sweep, writer};
+use actq::{check, eval, serve, sweep, writer};
 use actq_kernels::Width;
 use anyhow::{Context, Result, ensure};
 use clap::{Parser, Subcommand, ValueEnum};
@@ -37,8 +39,11 @@ struct Cli {
 enum Command {
     /// Quantize a policy into an image
     ///
-    /// POLICY_DIR holds policy.json (the op list), policy.safetensors (the weights) and, for every method but rtn, calib.npz
-    /// (recorded observations: array "obs" [episode, step, value], optionally "length" [episode]).
+    /// POLICY_DIR holds policy.json (the op list), policy.safetensors (the weights) and, for every method but rtn, a recording
+    /// to learn from: calib.npz or calib.safetensors with the arrays "obs" [episode, step, value] and optionally "action" (the
+    /// network's raw output at each observation), "length" [episode] (valid steps) and "state" [episode, value] (recurrent
+    /// state before the first step), or calib.npy with the observations alone. Two axes [frame, value] are one episode. Where
+    /// heldout.npz, .npy or .safetensors is there too, the image is run on both, and errors and warnings are printed.
     ///
     /// Example: actq quantize policies/ur3 --bits 3 --out ur3.actq
     Quantize(QuantizeArgs),
@@ -46,18 +51,27 @@ enum Command {
     ///
     /// Example: actq inspect ur3.actq --widths --stats ur3.json --svg ur3.svg
     Inspect(InspectArgs),
-    /// Compare an image's actions with the recorded f32 actions of heldout.npz
+    /// Compare an image's actions with the f32 policy's on held-out observations
+    ///
+    /// The recording is heldout.npz, .npy or .safetensors in POLICY_DIR, or the file named. It holds "obs" and "action"; without
+    /// "action", the policy in POLICY_DIR gives the actions. Also printed: how much of the error comes from rounding the
+    /// activations, and, where calib.npz, .npy or .safetensors is there, a warning if the observations leave its range.
+    ///
+    /// Example: actq eval ur3.actq --policy policies/ur3
     Eval {
         /// The image
         image: PathBuf,
-        /// The folder with heldout.npz
-        #[arg(long, value_name = "POLICY_DIR")]
-        policy: PathBuf,
+        /// The policy's folder, with the recordings
+        #[arg(long, value_name = "POLICY_DIR", required_unless_present = "heldout")]
+        policy: Option<PathBuf>,
+        /// The held-out recording: .npz, .npy or .safetensors [default: the one in POLICY_DIR]
+        #[arg(long, value_name = "FILE")]
+        heldout: Option<PathBuf>,
         /// Print one JSON object: nmse, worst_nmse, max_abs, steps, bpw, bytes
         #[arg(long)]
         json: bool,
     },
-    /// Compare methods at several budgets on heldout.npz
+    /// Compare methods at several budgets on held-out observations
     ///
     /// A cell of the table is the error (mean squared error / variance of the actions, mean over dimensions) and the true bits
     /// per weight, scales and padding counted; "-" where not even 2 bits fit. Every method uses its default groups; activations
@@ -81,6 +95,9 @@ struct QuantizeArgs {
     /// The image to write
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
+    /// The recording to learn from: .npz, .npy or .safetensors [default: calib.* in POLICY_DIR]
+    #[arg(long, value_name = "FILE")]
+    calib: Option<PathBuf>,
     /// Bits of every weight: 2, 3, 4 or 8 [default: 3]
     #[arg(long, value_name = "N", conflicts_with = "bpw", value_parser = width)]
     bits: Option<Width>,
@@ -91,7 +108,7 @@ struct QuantizeArgs {
     #[arg(long, value_name = "SIZE", conflicts_with_all = ["bits", "bpw"], value_parser = size)]
     flash: Option<usize>,
     /// The fewest bits whose error (NMSE, as eval measures it) is at most X, to a tenth of a bit per weight; measured on
-    /// heldout.npz, else on calib.npz
+    /// the held-out recording, else on that of calibration
     #[arg(long, value_name = "X", conflicts_with_all = ["bits", "bpw", "flash"], value_parser = positive)]
     max_nmse: Option<f64>,
     /// Force the width of a matrix, by its tensor's name (method best); may be repeated
@@ -107,7 +124,7 @@ struct QuantizeArgs {
     /// Bits of the activations, whose scale is found at run time [default: for best chosen per matrix, else 8]
     #[arg(long, value_name = "BITS")]
     activations: Option<ActivationArg>,
-    /// How codes are chosen [default: best where calib.npz is there, else rtn]
+    /// How codes are chosen [default: best where there is a recording to learn from, else rtn]
     #[arg(long)]
     method: Option<MethodArg>,
     /// Steps of distillation for --method best; 0 = none, but two-sided error feedback: seconds, and a larger error at few
@@ -151,6 +168,12 @@ struct SweepArgs {
     /// Bits per weight of the whole that are allowed
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "2,2.5,3,4", value_parser = positive)]
     bpw: Vec<f64>,
+    /// The recording to learn from: .npz, .npy or .safetensors [default: calib.* in POLICY_DIR]
+    #[arg(long, value_name = "FILE")]
+    calib: Option<PathBuf>,
+    /// The held-out recording to measure on [default: heldout.* in POLICY_DIR]
+    #[arg(long, value_name = "FILE")]
+    heldout: Option<PathBuf>,
     /// Draw error over bits, and mark the knee of the best method
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
@@ -182,11 +205,11 @@ enum ActivationArg {
 enum MethodArg {
     /// Round to nearest
     Rtn,
-    /// Column-wise error feedback with the inputs' second moment (needs calib.npz)
+    /// Column-wise error feedback with the inputs' second moment (needs a recording)
     Gptq,
-    /// Widths by HSIC scores, scales by the Fisher information of the actions (needs calib.npz with actions)
+    /// Widths by HSIC scores, scales by the Fisher information of the actions (needs a recording with actions)
     Actquant,
-    /// A width for every row, pruning, and distillation on the recorded observations (needs calib.npz)
+    /// A width for every row, pruning, and distillation on the recorded observations (needs a recording)
     Best,
 }
 
@@ -244,10 +267,15 @@ fn run(command: Command) -> Result<()> {
     match command {
         Command::Quantize(args) => run_quantize(&args),
         Command::Inspect(args) => run_inspect(&args),
-        Command::Eval { image, policy, json } => {
+        Command::Eval { image, policy, heldout, json } => {
             let buffer = ImageBuffer::read(&image)?;
             let image = buffer.image(&image)?;
-            let report = eval::evaluate(image, &eval::heldout(&policy, &image)?)?;
+            let dataset = eval::heldout_from(policy.as_deref(), heldout.as_deref(), &image)?;
+            let report = eval::evaluate(image, &dataset)?;
+            match Recording::Calib.load(policy.as_deref(), None, Sizes::of_image(&image)) {
+                Ok(calib) => note(calib.and_then(|calib| Range::of(&calib).warning(&dataset))),
+                Err(error) => note([format!("the calibrated range is not known: {error:#}")]),
+            }
             if json {
                 return print(&(serde_json::to_string(&report)? + "\n"));
             }
@@ -256,6 +284,7 @@ fn run(command: Command) -> Result<()> {
                  nmse           {:.3e}   (mean squared error / variance, mean over dimensions)\n\
                  worst nmse     {:.3e}   (dimension {})\n\
                  largest error  {:.4}\n\
+                 activations    {}\n\
                  bits/weight    {:.3}\n\
                  image          {} bytes\n",
                 report.steps,
@@ -263,6 +292,7 @@ fn run(command: Command) -> Result<()> {
                 report.worst_nmse,
                 report.worst_dimension,
                 report.max_abs,
+                eval::activation_share(image, &dataset, report.nmse)?,
                 report.bpw,
                 report.bytes,
             ))
@@ -279,9 +309,13 @@ fn run_quantize(args: &QuantizeArgs) -> Result<()> {
     let source = Policy::load(&args.policy_dir)?;
     let one_file = args.save_stats.as_ref() == Some(&args.out);
     ensure!(!one_file, "{}: image and statistics need two files", args.out.display());
+    let (dir, sizes) = (Some(args.policy_dir.as_path()), Sizes::of(&source));
+    let calib = Recording::Calib.load(dir, args.calib.as_deref(), sizes)?;
+    let heldout = Recording::Heldout.load(dir, None, sizes)?;
+    note(check::recording_notes(calib.as_ref(), heldout.as_ref()));
     let method = match args.method {
         Some(method) => method.into(),
-        None if !args.policy_dir.join("calib.npz").exists() => Method::Rtn,
+        None if calib.is_none() => Method::Rtn,
         None => Method::Best,
     };
     let budget = match (args.bits, args.bpw, args.flash) {
@@ -304,13 +338,13 @@ fn run_quantize(args: &QuantizeArgs) -> Result<()> {
     };
     let started = Instant::now();
     start_threads(args.threads)?;
-    let measure = args.max_nmse.map(|_| Measure::new(&source)).transpose()?;
+    let measure = args.max_nmse.map(|_| Measure::new(&source, calib.as_ref(), heldout.as_ref())).transpose()?;
     let bar = progress_bar()?;
     bar.set_message("calibrating");
-    let prepared = Prepared::new(&source, method, |share| set_share(&bar, share))?;
+    let prepared = Prepared::with_recording(&source, method, calib.as_ref(), |share| set_share(&bar, share))?;
     bar.reset();
     bar.set_message("quantizing");
-    let (policy, outcomes, options, note) = match args.max_nmse.zip(measure.as_ref()) {
+    let (policy, outcomes, options, search) = match args.max_nmse.zip(measure.as_ref()) {
         None => {
             let (policy, outcomes) = prepared.quantize(&options, |share| set_share(&bar, share))?;
             (policy, outcomes, options, String::new())
@@ -341,7 +375,7 @@ fn run_quantize(args: &QuantizeArgs) -> Result<()> {
     let parameters = source.graph.parameters();
     let f32_bytes = 4 * parameters;
     print(&format!(
-        "{note}{}\n{}: {} bytes. The policy's {parameters} parameters take {f32_bytes} bytes in f32 ({:.1}x) and {} in bf16 \
+        "{search}{}\n{}: {} bytes. The policy's {parameters} parameters take {f32_bytes} bytes in f32 ({:.1}x) and {} in bf16 \
          ({:.1}x).\nTook {:.1} s.\n",
         summary(&policy, &outcomes),
         args.out.display(),
@@ -350,7 +384,24 @@ fn run_quantize(args: &QuantizeArgs) -> Result<()> {
         f32_bytes / 2,
         f32_bytes as f64 / 2.0 / bytes.len() as f64,
         started.elapsed().as_secs_f64(),
-    ))
+    ))?;
+    let Some(heldout) = heldout else { return Ok(()) };
+    let buffer = ImageBuffer::new(&bytes);
+    match check::check(&source, buffer.image(&args.out)?, calib.as_ref(), &heldout) {
+        Ok(check) => {
+            print(&format!("\n{}", check.summary()))?;
+            note(check.overfit_warning());
+        }
+        // The image is written, and nothing is wrong with it.
+        Err(error) => note([format!("the held-out error is not known: {error:#}")]),
+    }
+    Ok(())
+}
+
+/// Notes go to standard error, so that the report stays as it is.
+fn note(notes: impl IntoIterator<Item = String>) {
+    // That nobody reads them is no error.
+    notes.into_iter().for_each(|note| drop(writeln!(io::stderr(), "note: {note}")));
 }
 
 /// Prints; that a reader has gone away (as `head` does) is no error.
@@ -365,7 +416,8 @@ fn print(text: &str) -> Result<()> {
 const PROGRESS: u64 = 1000;
 
 fn progress_bar() -> Result<ProgressBar> {
-    let style = ProgressStyle::with_template("{msg:32} {bar:40} {percent:>3}%, {eta} left").context("progress bar")?;
+    // Within 80 columns: a bar that wraps flickers.
+    let style = ProgressStyle::with_template("{msg:30} {bar:30} {percent:>3}%, {eta} left").context("progress bar")?;
     Ok(ProgressBar::new(PROGRESS).with_style(style))
 }
 
@@ -394,12 +446,27 @@ fn run_inspect(args: &InspectArgs) -> Result<()> {
 fn run_sweep(args: &SweepArgs) -> Result<()> {
     start_threads(args.threads)?;
     let methods: Vec<Method> = args.methods.iter().map(|&m| m.into()).collect();
-    let learning = Learning { steps: args.steps, seed: args.seed };
     let policies = args.policy_dirs.iter().map(|dir| Policy::load(dir)).collect::<Result<Vec<_>>>()?;
+    let named = args.calib.is_some() || args.heldout.is_some();
+    ensure!(policies.len() == 1 || !named, "--calib and --heldout go with one policy");
     let bar = progress_bar()?;
     let mut sweeps = Vec::new();
     for (p, policy) in policies.iter().enumerate() {
-        sweeps.push(sweep::run(policy, &methods, &args.bpw, learning, |work, share| {
+        let (dir, sizes) = (Some(policy.dir.as_path()), Sizes::of(policy));
+        let calib = Recording::Calib.load(dir, args.calib.as_deref(), sizes)?;
+        let mut heldout = Recording::Heldout.require(dir, args.heldout.as_deref(), sizes, "actq sweep")?;
+        heldout.fill_actions(&policy.graph);
+        bar.suspend(|| note(check::recording_notes(calib.as_ref(), Some(&heldout))));
+        let plan = sweep::Plan {
+            policy,
+            calib: calib.as_ref(),
+            heldout: &heldout,
+            methods: &methods,
+            budgets: &args.bpw,
+            steps: args.steps,
+            seed: args.seed,
+        };
+        sweeps.push(sweep::run(&plan, |work, share| {
             bar.set_message(format!("{}: {work}", policy.name));
             set_share(&bar, (p as f64 + share) / policies.len() as f64);
         })?);

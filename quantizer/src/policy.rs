@@ -9,6 +9,7 @@ use actq_kernels::math::Function;
 use anyhow::{Context, Result, bail, ensure};
 use safetensors::{Dtype, SafeTensors};
 use serde::Deserialize;
+use serde_json::Value;
 use sha2::{Digest, Sha256};
 
 use crate::graph::{Graph, Matrix, Node, NodeKind, Part, ValueId};
@@ -82,7 +83,7 @@ struct Json {
     ops: Vec<JsonOp>,
 }
 
-/// One op; which keys it may have depends on `op`.
+/// One op; [`JsonOp::keys`] says which keys it may have.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct JsonOp {
@@ -115,6 +116,40 @@ enum Input {
     Many(Vec<String>),
 }
 
+impl JsonOp {
+    /// Refuses keys that an op does not have: one that is ignored would be another policy. Whatever else is wrong with `json` is
+    /// left to the reader.
+    fn check_keys(json: &Value) -> Result<()> {
+        for (i, op) in json["ops"].as_array().into_iter().flatten().enumerate() {
+            let (Some(op), Some(name)) = (op.as_object(), op["op"].as_str()) else { continue };
+            let Some(own) = Self::keys(name) else { continue };
+            let keys = [&["op", "input", "save"], own].concat();
+            // A key without a value says nothing.
+            let mut given = op.iter().filter(|(_, value)| !value.is_null()).map(|(key, _)| key);
+            if let Some(key) = given.find(|key| !keys.contains(&key.as_str())) {
+                bail!("op {i} ({name}) has the key {key:?}; its keys are {}", keys.join(", "));
+            }
+        }
+        Ok(())
+    }
+
+    /// The keys of an op beside those of every op; `None` for an unknown op.
+    fn keys(op: &str) -> Option<&'static [&'static str]> {
+        Some(match op {
+            "identity" => &[],
+            "normalize" => &["mean", "scale", "pre_clip", "clip"],
+            "linear" => &["w", "b"],
+            "layernorm" => &["w_ln", "b_ln", "eps"],
+            "rmsnorm" => &["w_ln", "eps"],
+            "add" => &["with"],
+            "lstm" | "gru" => &["hidden", "gates", "w_ih", "w_hh", "b_ih", "b_hh"],
+            "gelu" => &["approximate"],
+            name if Function::ALL.iter().any(|f| f.name() == name) => &[],
+            _ => return None,
+        })
+    }
+}
+
 impl Policy {
     /// Reads `policy.json` and `policy.safetensors` from `dir`. Every error names the file and the op or tensor.
     pub fn load(dir: &Path) -> Result<Self> {
@@ -124,8 +159,10 @@ impl Policy {
         let json_bytes = fs::read(&json_path).with_context(|| format!("{}: cannot be read", json_path.display()))?;
         let weight_bytes =
             fs::read(&weights_path).with_context(|| format!("{}: cannot be read", weights_path.display()))?;
-        let json: Json = serde_json::from_slice(&json_bytes)
-            .with_context(|| format!("{}: not a policy description", json_path.display()))?;
+        let not_json = || format!("{}: not a policy description", json_path.display());
+        let value: Value = serde_json::from_slice(&json_bytes).with_context(not_json)?;
+        JsonOp::check_keys(&value).with_context(|| json_path.display().to_string())?;
+        let json: Json = serde_json::from_slice(&json_bytes).with_context(not_json)?;
         let tensors = SafeTensors::deserialize(&weight_bytes)
             .with_context(|| format!("{}: not a safetensors file", weights_path.display()))?;
         let mut digest = Sha256::new();

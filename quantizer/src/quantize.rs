@@ -318,7 +318,7 @@ pub fn quantize(graph: &Graph, moments: &[Moments], options: &Options) -> Result
         let quantized = match (options.method, moment) {
             (Method::Rtn, _) => scale::round_to_nearest(matrix, width, options.group),
             (Method::Gptq, Some(moment)) => gptq::quantize(matrix, width, options.group, moment)?,
-            (Method::Gptq, None) => bail!("gptq needs recorded observations: put calib.npz beside policy.json"),
+            (Method::Gptq, None) => bail!("gptq needs the moments of recorded observations"),
             (method, _) => bail!("{method} takes more than moments: see quantize::prepared"),
         };
         Outcome::new(matrix, quantized, moment, options.activations)

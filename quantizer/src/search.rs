@@ -6,16 +6,16 @@
 //! fail, or after [`TRIES`] ([`PLAIN_TRIES`] without learning, or with too few steps to share): then a smaller budget may do, and the tries tell
 //! which range is open. The search takes errors as falling with bits.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use actq_kernels::Width;
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Context, Result, bail};
 use comfy_table::Table;
-use ndarray::Array3;
 
 use crate::dataset::Dataset;
+use crate::dataset::recording::Recording;
 use crate::eval::{self, Report};
-use crate::graph::Evaluator;
 use crate::inspect;
 use crate::policy::Policy;
 use crate::quantize::prepared::Prepared;
@@ -39,30 +39,22 @@ const SLOPE: f64 = 2.0 * std::f64::consts::LN_2;
 
 /// A recording to measure errors on.
 #[derive(Debug)]
-pub struct Measure {
-    dataset: Dataset,
+pub struct Measure<'a> {
+    dataset: Cow<'a, Dataset>,
     /// Whether the method has not seen it.
     pub held_out: bool,
 }
 
-impl Measure {
-    /// `heldout.npz` of the policy's folder with its actions; without that file, `calib.npz` with the f32 network's.
-    pub fn new(policy: &Policy) -> Result<Self> {
-        let out_len = policy.chunk * policy.act_len;
-        let load = |name: &str| Dataset::load(&policy.dir.join(name), policy.graph.obs_len, out_len);
-        let exists = |name: &str| policy.dir.join(name).exists();
-        if exists("heldout.npz") {
-            let dataset = load("heldout.npz")?;
-            let missing = || anyhow!("{}: array \"action\" is missing", dataset.path.display());
-            dataset.action.as_ref().ok_or_else(missing)?;
-            return Ok(Self { dataset, held_out: true });
+impl<'a> Measure<'a> {
+    /// Measures on the held-out recording; without one, on what the method learns from. Missing actions are those of the f32
+    /// network.
+    pub fn new(policy: &Policy, calib: Option<&'a Dataset>, heldout: Option<&'a Dataset>) -> Result<Self> {
+        let dataset = heldout.or(calib).with_context(|| Recording::Heldout.missing("a limit to the error"))?;
+        let mut dataset = Cow::Borrowed(dataset);
+        if dataset.action.is_none() {
+            dataset.to_mut().fill_actions(&policy.graph);
         }
-        if !exists("calib.npz") {
-            bail!("an error can only be measured on recorded observations: put heldout.npz beside policy.json");
-        }
-        let mut dataset = load("calib.npz")?;
-        dataset.action = Some(actions(policy, &dataset));
-        Ok(Self { dataset, held_out: false })
+        Ok(Self { dataset, held_out: heldout.is_some() })
     }
 
     /// The errors of an image.
@@ -70,21 +62,6 @@ impl Measure {
         let buffer = ImageBuffer::new(bytes);
         eval::evaluate(buffer.image(Path::new("image in memory"))?, &self.dataset)
     }
-}
-
-/// What the f32 network gives at every recorded observation.
-fn actions(policy: &Policy, dataset: &Dataset) -> Array3<f32> {
-    let (episodes, steps, _) = dataset.obs.dim();
-    let mut actions = Array3::zeros((episodes, steps, policy.chunk * policy.act_len));
-    let mut evaluator = Evaluator::new(&policy.graph);
-    for episode in 0..episodes {
-        evaluator.reset();
-        for (step, obs) in dataset.episode(episode).enumerate() {
-            let action = evaluator.step(&obs, &mut |_, _| {});
-            actions.slice_mut(ndarray::s![episode, step, ..]).iter_mut().zip(action).for_each(|(to, a)| *to = a);
-        }
-    }
-    actions
 }
 
 /// One quantization.
@@ -124,7 +101,7 @@ pub fn smallest(
     prepared: &Prepared<'_>,
     options: &Options,
     limit: f64,
-    measure: &Measure,
+    measure: &Measure<'_>,
     mut progress: impl FnMut(&str, f64),
 ) -> Result<Found> {
     let top = top(policy, options)?;
@@ -247,7 +224,7 @@ fn narrow(
 
 impl Found {
     /// The tries, and what follows from them, for people.
-    pub fn report(&self, limit: f64, measure: &Measure) -> String {
+    pub fn report(&self, limit: f64, measure: &Measure<'_>) -> String {
         let (nmse, budget) = (self.report.nmse, self.budget);
         let cells = ((budget - self.fails) * PER_BIT as f64).round();
         let below = if cells <= 1.0 && self.fails > 0.0 {
@@ -259,9 +236,10 @@ impl Found {
         } else {
             "none below was tried".to_owned()
         };
+        let file = measure.dataset.path.file_name().unwrap_or_default().to_string_lossy();
         let on = match measure.held_out {
-            true => "heldout.npz".to_owned(),
-            false => "calib.npz, as there is no heldout.npz: on new observations the error may be larger".to_owned(),
+            true => file.into_owned(),
+            false => format!("{file}, as there is no held-out recording: on new observations the error may be larger"),
         };
         format!(
             "{}\n\n{budget:.1} bits per weight keep the error within {limit}: NMSE {nmse:.2e}; {below}.\nMeasured on {on}.\n",

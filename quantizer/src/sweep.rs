@@ -8,6 +8,7 @@ use anyhow::Result;
 use comfy_table::Table;
 use serde::Serialize;
 
+use crate::dataset::Dataset;
 use crate::plot::{Mark, Plot, Series, stacked};
 use crate::policy::Policy;
 use crate::quantize::prepared::Prepared;
@@ -66,37 +67,42 @@ pub struct Sweep {
     pub knee: Option<Knee>,
 }
 
-/// How methods learn.
-#[derive(Clone, Copy, Debug)]
-pub struct Learning {
+/// What to compare.
+#[derive(Debug)]
+pub struct Plan<'a> {
+    /// The policy.
+    pub policy: &'a Policy,
+    /// What the methods learn from; only rtn does without.
+    pub calib: Option<&'a Dataset>,
+    /// What errors are measured on, with actions.
+    pub heldout: &'a Dataset,
+    /// The methods.
+    pub methods: &'a [Method],
+    /// Bits per weight that are allowed.
+    pub budgets: &'a [f64],
     /// Steps of distillation; None: as many as suit the network.
     pub steps: Option<usize>,
     /// Seed of everything that is drawn.
     pub seed: u64,
 }
 
-/// Quantizes `policy` by every method for every budget and runs each image over the folder's `heldout.npz`. `progress` gets what
+/// Quantizes the policy by every method for every budget and runs each image over the held-out recording. `progress` gets what
 /// is being done and the share of the whole that is done.
-pub fn run(
-    policy: &Policy,
-    methods: &[Method],
-    budgets: &[f64],
-    learning: Learning,
-    mut progress: impl FnMut(&str, f64),
-) -> Result<Sweep> {
+pub fn run(plan: &Plan<'_>, mut progress: impl FnMut(&str, f64)) -> Result<Sweep> {
+    let Plan { policy, calib, heldout, methods, budgets, steps, seed } = *plan;
     let mut curves = Vec::new();
     for (m, &method) in methods.iter().enumerate() {
         // Calibration counts as much as one budget.
         let done = |steps: f64| (m as f64 + steps / (1 + budgets.len()) as f64) / methods.len() as f64;
-        let prepared = Prepared::new(policy, method, |share| progress(&format!("{method}, calibrating"), done(share)))?;
+        let work = format!("{method}, calibrating");
+        let prepared = Prepared::with_recording(policy, method, calib, |share| progress(&work, done(share)))?;
         let mut points = Vec::new();
         for (b, &budget) in budgets.iter().enumerate() {
             let work = format!("{method}, {budget} bits per weight");
-            let Learning { steps, seed } = learning;
             let plain = Options::new(method, Budget::BitsPerWeight(budget));
             let options = Options { group: method.default_group(), steps, seed, ..plain };
             let share = |share| progress(&work, done(1.0 + b as f64 + share));
-            points.push(point(policy, &prepared, budget, &options, share)?);
+            points.push(point(heldout, &prepared, budget, &options, share)?);
         }
         let scores = prepared.actquant.map(|statistics| statistics.scores.iter().map(HsicScore::from).collect());
         curves.push(Curve { method: method.to_string(), points, scores });
@@ -107,7 +113,7 @@ pub fn run(
 }
 
 fn point(
-    policy: &Policy,
+    heldout: &Dataset,
     prepared: &Prepared<'_>,
     budget: f64,
     options: &Options,
@@ -120,7 +126,7 @@ fn point(
     };
     let buffer = ImageBuffer::new(&writer::image(&quantized, &outcomes)?);
     let image = buffer.image(Path::new("image in memory"))?;
-    let report = eval::evaluate(image, &eval::heldout(&policy.dir, &image)?)?;
+    let report = eval::evaluate(image, heldout)?;
     Ok(Some(Point { budget, report, rows: outcomes.iter().map(rows).collect() }))
 }
 

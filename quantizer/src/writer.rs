@@ -119,7 +119,8 @@ fn self_test_actions(bytes: &[u8], observations: &[Vec<f32>]) -> Result<Vec<Vec<
     })
 }
 
-/// Writes `bytes` to `path` so that a failure leaves no part of a file behind.
+/// Writes `bytes` to `path` so that neither a failure nor an end of the process leaves part of a file there. (A process that is
+/// killed while it writes can leave a hidden file of this name with the ending .part.)
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     write_all(&[(path, bytes)])
 }
@@ -142,7 +143,8 @@ fn stage(path: &Path, bytes: &[u8]) -> Result<NamedTempFile> {
         _ => Path::new("."),
     };
     ensure!(!path.is_dir(), "it is a folder");
-    let mut file = NamedTempFile::new_in(dir)?;
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let mut file = tempfile::Builder::new().prefix(&format!(".{name}.")).suffix(".part").tempfile_in(dir)?;
     file.write_all(bytes)?;
     #[cfg(unix)]
     {

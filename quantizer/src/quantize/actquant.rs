@@ -146,7 +146,7 @@ pub(crate) mod testing {
                 }
             }
         }
-        Dataset { path: "test".into(), obs, action: Some(action), length: vec![steps; episodes] }
+        Dataset { path: "test".into(), obs, action: Some(action), length: vec![steps; episodes], state: None }
     }
 }
 

@@ -44,12 +44,7 @@ pub struct Statistics<'a> {
 impl<'a> Statistics<'a> {
     /// Runs the f32 network over `dataset`, forwards and backwards. `moments` are those of the matrices' inputs.
     pub fn collect(graph: &'a Graph, dataset: &Dataset, moments: Vec<Moments>) -> Result<Self> {
-        let frames = dataset.frames();
-        ensure!(
-            frames >= LEAST_FRAMES,
-            "{}: {frames} frames are recorded, {LEAST_FRAMES} are needed: learning from fewer repeats them by heart",
-            dataset.path.display()
-        );
+        dataset.require_frames(LEAST_FRAMES, "learning from fewer repeats them by heart")?;
         let windows = Windows::new(graph, dataset);
         ensure!(
             windows.output_variance.iter().any(|v| *v > 0.0),

@@ -229,11 +229,11 @@ mod tests {
         let (found, shift) = feedback(&matrix, &widths, 0, &[], &input, &output);
         let weights = found.dequantized();
         assert!(weights[3 * COLS..4 * COLS].iter().all(|w| *w == 0.0));
-        for r in 0..ROWS {
-            let at = r * COLS..(r + 1) * COLS;
-            let pairs = matrix.data[at.clone()].iter().zip(&weights[at]).zip(&input.mean);
-            let expected: f64 = pairs.map(|((w, q), m)| (f64::from(*w) - f64::from(*q)) * m).sum();
-            assert!((expected - f64::from(shift[r])).abs() < 1e-3, "row {r}: {expected} and {}", shift[r]);
+        let rows = matrix.data.chunks_exact(COLS).zip(weights.chunks_exact(COLS)).zip(shift);
+        for (r, ((wanted, got), shift)) in rows.enumerate() {
+            let errors = wanted.iter().zip(got).map(|(w, q)| f64::from(*w) - f64::from(*q));
+            let expected: f64 = errors.zip(&input.mean).map(|(e, m)| e * m).sum();
+            assert!((expected - f64::from(shift)).abs() < 1e-3, "row {r}: {expected} and {shift}");
         }
     }
 }

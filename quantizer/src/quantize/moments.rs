@@ -40,7 +40,7 @@ pub fn collect(graph: &Graph, dataset: &Dataset, mut progress: impl FnMut(usize)
     let mut evaluator = Evaluator::new(graph);
     let mut frames = 0;
     for episode in 0..dataset.length.len() {
-        evaluator.reset();
+        evaluator.start(dataset.start(episode).as_deref());
         for obs in dataset.episode(episode) {
             evaluator.step(&obs, &mut |m, x| {
                 let (moments, batch) = &mut sums[m];

@@ -1,14 +1,18 @@
 //! A method with all that it needs to know about the recorded observations.
 
 use actq_kernels::Width;
-use anyhow::{Result, ensure};
+use anyhow::{Context as _, Result, ensure};
 
 use super::actquant::Statistics;
 use super::moments::{Moments, collect};
 use super::{Budget, Method, Options, Outcome, actquant, best, quantize};
-use crate::dataset::Dataset;
+use crate::dataset::recording::Recording;
+use crate::dataset::{Dataset, Sizes};
 use crate::policy::Policy;
 use crate::writer;
+
+/// Frames that every method with a recording needs at least; best needs more.
+const LEAST_FRAMES: usize = 16;
 
 /// A method made ready once, to quantize a policy for any number of budgets.
 #[derive(Debug)]
@@ -24,13 +28,28 @@ pub struct Prepared<'a> {
 }
 
 impl<'a> Prepared<'a> {
-    /// Reads `calib.npz` of the policy's folder if the method needs it, and collects. `progress` gets the share done.
-    pub fn new(policy: &'a Policy, method: Method, mut progress: impl FnMut(f64)) -> Result<Self> {
+    /// Reads the calibration recording of the policy's folder if the method needs it, and collects. `progress` gets the share
+    /// done.
+    pub fn new(policy: &'a Policy, method: Method, progress: impl FnMut(f64)) -> Result<Self> {
+        let calib = match method {
+            Method::Rtn => None,
+            _ => Recording::Calib.load(Some(&policy.dir), None, Sizes::of(policy))?,
+        };
+        Self::with_recording(policy, method, calib.as_ref(), progress)
+    }
+
+    /// Collects what the method needs from `calib`, a recording that fits the policy. `progress` gets the share done.
+    pub fn with_recording(
+        policy: &'a Policy,
+        method: Method,
+        calib: Option<&Dataset>,
+        mut progress: impl FnMut(f64),
+    ) -> Result<Self> {
         let graph = &policy.graph;
-        let calib = || -> Result<Dataset> {
-            let path = policy.dir.join("calib.npz");
-            ensure!(path.exists(), "{method} needs recorded observations: put calib.npz beside policy.json");
-            Dataset::load(&path, graph.obs_len, policy.chunk * policy.act_len)
+        let calib = || -> Result<&Dataset> {
+            let calib = calib.with_context(|| Recording::Calib.missing(&method.to_string()))?;
+            calib.require_frames(LEAST_FRAMES, "statistics of fewer are those of a few chance observations")?;
+            Ok(calib)
         };
         let mut prepared = Self { policy, method, moments: Vec::new(), actquant: None, best: None };
         match method {
@@ -38,13 +57,13 @@ impl<'a> Prepared<'a> {
             Method::Gptq | Method::Best => {
                 let dataset = calib()?;
                 let all = dataset.frames().max(1) as f64;
-                prepared.moments = collect(graph, &dataset, |frames| progress(frames as f64 / all));
+                prepared.moments = collect(graph, dataset, |frames| progress(frames as f64 / all));
                 if method == Method::Best {
-                    prepared.best =
-                        Some(best::Statistics::collect(graph, &dataset, std::mem::take(&mut prepared.moments))?);
+                    let moments = std::mem::take(&mut prepared.moments);
+                    prepared.best = Some(best::Statistics::collect(graph, dataset, moments)?);
                 }
             }
-            Method::ActQuant => prepared.actquant = Some(Statistics::collect(graph, &calib()?, progress)?),
+            Method::ActQuant => prepared.actquant = Some(Statistics::collect(graph, calib()?, progress)?),
         }
         Ok(prepared)
     }

@@ -3,9 +3,9 @@
 
 use ndarray::{Array2, Axis};
 
-use crate::backprop::{Network, State, Weights, zero_state};
+use crate::backprop::{Network, State, Weights, start_state, zero_state};
 use crate::dataset::Dataset;
-use crate::graph::{Graph, NodeKind};
+use crate::graph::Graph;
 use crate::random::Random;
 
 /// Steps of a window of a recurrent network.
@@ -50,7 +50,7 @@ impl<'a> Windows<'a> {
     pub fn new(graph: &'a Graph, dataset: &Dataset) -> Self {
         let weights = Weights::of(graph);
         let network = Network { graph, x_max: &[] };
-        let recurrent = graph.nodes.iter().any(|n| matches!(n.kind, NodeKind::Lstm { .. } | NodeKind::Gru { .. }));
+        let recurrent = graph.state_len() > 0;
         let mut episodes = Vec::new();
         let mut states = Vec::new();
         let mut outputs = Vec::new();
@@ -58,7 +58,7 @@ impl<'a> Windows<'a> {
             let rows: Vec<f32> = dataset.episode(e).flatten().collect();
             let episode = Array2::from_shape_vec((length, graph.obs_len), rows).unwrap_or_default();
             if recurrent {
-                let mut state = zero_state(graph, 1);
+                let mut state = start_state(graph, &[dataset.start(e)]);
                 let mut kept = zero_state(graph, length);
                 for (t, obs) in episode.axis_chunks_iter(Axis(0), 1).enumerate() {
                     for (kept, now) in kept.iter_mut().flatten().zip(state.iter().flatten()) {

@@ -3,9 +3,9 @@
 use anyhow::{Context, Result};
 use ndarray::{Array2, Axis, Zip, linalg::general_mat_mul};
 
-use crate::backprop::{Network, Pass, Weights, zero_state};
+use crate::backprop::{Network, Pass, Weights, start_state, zero_state};
 use crate::dataset::Dataset;
-use crate::graph::{Graph, NodeKind};
+use crate::graph::Graph;
 
 /// Steps that a recurrent network's gradient runs back.
 const WINDOW: usize = 16;
@@ -22,22 +22,23 @@ const EQUAL: f32 = 1e-3;
 /// `dL/dy_d` is the sign of `y_d - t_d`. Recorded actions are mostly the policy's own, where `L` has its kink: there the sign is
 /// random, both with equal probability (of a fixed seed), whose square has the expectation `sum over d of (dy_d/dw)^2`.
 ///
-/// A recurrent network's gradient is truncated: episodes are run from the zero state, cut into windows of 16 steps, and each
-/// window's last frame is one sample whose gradient runs back to the start of the window. Shorter rests are left out. All else
-/// is exact: contributions of several steps or uses are summed before they are squared.
+/// A recurrent network's gradient is truncated: episodes are run from their starting state, cut into windows of 16 steps, and
+/// each window's last frame is one sample whose gradient runs back to the start of the window. Shorter rests are left out. All
+/// else is exact: contributions of several steps or uses are summed before they are squared.
 ///
 /// `progress` gets the share done.
 pub fn importance(graph: &Graph, dataset: &Dataset, mut progress: impl FnMut(f64)) -> Result<Vec<Array2<f32>>> {
     let weights = Weights::of(graph);
     let network = Network { graph, x_max: &[] };
-    let recurrent = graph.nodes.iter().any(|n| matches!(n.kind, NodeKind::Lstm { .. } | NodeKind::Gru { .. }));
+    let recurrent = graph.state_len() > 0;
     let longest = dataset.length.iter().copied().max().unwrap_or(0);
     let window = if recurrent { WINDOW.min(longest) } else { 1 };
     let every = (dataset.frames() / window.max(1)).div_ceil(SAMPLES).max(1);
     let equal = deviations(dataset).context("array \"action\" is missing")?.map(|d| EQUAL * d);
 
     let mut alive: Vec<usize> = (0..dataset.length.len()).collect();
-    let mut state = zero_state(graph, alive.len());
+    let starts: Vec<_> = alive.iter().map(|&episode| dataset.start(episode)).collect();
+    let mut state = start_state(graph, &starts);
     let mut fisher = weights.zeros_like().matrices;
     // The gradients themselves are not asked for, but the backward pass adds to them.
     let mut unused = weights.zeros_like();
@@ -162,7 +163,7 @@ mod tests {
         window: std::ops::Range<usize>,
     ) -> f64 {
         let network = Network { graph, x_max: &[] };
-        let mut state = zero_state(graph, 1);
+        let mut state = start_state(graph, &[dataset.start(episode)]);
         let mut sum = 0.0;
         for step in 0..window.end {
             let pass = network.forward(weights, rows(&dataset.obs, &[episode], step), &mut state);
@@ -172,9 +173,9 @@ mod tests {
         sum
     }
 
-    fn compare(graph: &Graph, steps: usize, window: usize) {
+    fn compare(graph: &Graph, steps: usize, window: usize, state: Option<Array2<f32>>) {
         // Recorded actions far from the policy's own: no kink nearby, no random signs.
-        let mut dataset = dataset(graph, 2, steps);
+        let mut dataset = Dataset { state, ..dataset(graph, 2, steps) };
         let action = dataset.action.as_mut().expect("actions");
         action.indexed_iter_mut().for_each(|((e, s, d), a)| *a += if (e + s + d) % 3 == 0 { 3.0 } else { -4.0 });
         let found = importance(graph, &dataset, |_| {}).expect("importance");
@@ -203,9 +204,11 @@ mod tests {
 
     #[test]
     fn agrees_with_finite_differences() {
-        compare(&mlp(), 3, 1);
-        // One window from the zero state: nothing is truncated.
-        compare(&lstm(), 5, 5);
+        compare(&mlp(), 3, 1, None);
+        // One window from the start, which is zero or recorded: nothing is truncated.
+        compare(&lstm(), 5, 5, None);
+        let state = Array2::from_shape_fn((2, 6), |(e, v)| 0.8 - 0.25 * (v + e) as f32);
+        compare(&lstm(), 5, 5, Some(state));
     }
 
     #[test]

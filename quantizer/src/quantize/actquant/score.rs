@@ -96,7 +96,7 @@ impl Samples {
         let mut evaluator = Evaluator::new(graph);
         let mut frame = 0;
         for episode in 0..dataset.length.len() {
-            evaluator.reset();
+            evaluator.start(dataset.start(episode).as_deref());
             for (at, obs) in dataset.episode(episode).enumerate() {
                 let row = (frame % step == 0).then_some(frame / step);
                 let mut uses = vec![0.0; graph.matrices.len()];
