@@ -387,12 +387,9 @@ fn the_default_method_follows_from_what_is_there() -> Result<()> {
         succeeded(&fixture.quantize_as_given(&out, options)?)?;
         Ok::<_, anyhow::Error>(fs::read(&out)?)
     };
-    let gptq = bytes("--bits 3 --method gptq --group 32 --activations 8")?;
     let rtn = bytes("--bits 3 --method rtn --activations 8")?;
-    assert_ne!(gptq, rtn);
-    // A recording: the method that learns, which says how many frames it needs; with groups, gptq.
+    // A recording: the method that learns, which says how many frames it needs.
     failed(&fixture.quantize_as_given(&out, "")?, 1, &["calib.npz", "frames", "200"])?;
-    assert_eq!(default("--group 32")?, gptq);
     fs::remove_file(fixture.policy().join("calib.npz"))?;
     assert_eq!(default("")?, rtn);
     Ok(())
@@ -720,9 +717,8 @@ fn a_recording_may_be_named_and_of_any_format() -> Result<()> {
     let out = fixture.out("named.actq");
     succeeded(&fixture.quantize(&out, &options)?)?;
     assert_eq!(fs::read(&out)?, image);
-    // With groups and a recording the default is gptq, wherever the recording is.
-    succeeded(&fixture.quantize_as_given(&out, &options)?)?;
-    assert_eq!(fs::read(&out)?, image);
+    // Where there is a recording, wherever it is, the default is the method that learns.
+    failed(&fixture.quantize_as_given(&out, &options)?, 1, &["mine.safetensors", "frames", "200"])?;
     let missing = fixture.quantize(&out, "--calib none.npz")?;
     failed(&missing, 1, &["none.npz: cannot be read"])
 }
