@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 pub mod cycles;
+pub mod evaluation;
 pub mod golden;
 pub mod qemu;
 

@@ -172,9 +172,12 @@ impl Counter {
         for line in text.lines() {
             let fields: Vec<&str> = line.split(' ').collect();
             match (&fields[..], regions.last_mut()) {
-                (["region", instructions], _) => {
-                    regions.push(Region { instructions: instructions.parse()?, executed: Vec::new() });
-                }
+                (["region", instructions, code_lines, data_lines], _) => regions.push(Region {
+                    instructions: instructions.parse()?,
+                    code_lines: code_lines.parse()?,
+                    data_lines: data_lines.parse()?,
+                    executed: Vec::new(),
+                }),
                 ([address, count, jumps], Some(region)) => region.executed.push(Executed {
                     address: u64::from_str_radix(address, 16)?,
                     count: count.parse()?,
@@ -185,11 +188,6 @@ impl Counter {
         }
         Ok(regions)
     }
-
-    /// Instructions of every region.
-    pub fn counts(&self) -> Result<Vec<u64>> {
-        Ok(self.regions()?.iter().map(|region| region.instructions).collect())
-    }
 }
 
 /// What was executed between two marks.
@@ -197,6 +195,10 @@ impl Counter {
 pub struct Region {
     /// Instructions.
     pub instructions: u64,
+    /// Lines of code fetched from flash into an empty cache of 64 lines of 16 bytes.
+    pub code_lines: u64,
+    /// Lines of data fetched from flash into an empty cache of 8 lines of 16 bytes.
+    pub data_lines: u64,
     /// Each instruction that was executed, by address.
     pub executed: Vec<Executed>,
 }

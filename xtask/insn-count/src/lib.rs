@@ -1,11 +1,16 @@
-//! A QEMU plugin that counts executed instructions exactly.
+//! A QEMU plugin that counts executed instructions exactly, and the lines of flash that caches would have to fetch for them.
 //!
 //! `qemu-system-arm ... -plugin libinsn_count.so,out=FILE,begin=ADDR,begin_end=ADDR,end=ADDR`: counting starts when execution
 //! leaves the function at `begin..begin_end` and stops when it enters the function at `end`. The call of `end` itself is not
 //! counted. Addresses are hexadecimal.
 //!
-//! Each such region adds lines to FILE: `region N` with the number of instructions, then for every instruction that was
-//! executed `ADDR COUNT JUMPS`, where JUMPS says how often execution did not go on at the next instruction.
+//! Each such region adds lines to FILE: `region N CODE DATA` with the number of instructions and of lines that were fetched from
+//! flash for code and for data, then for every instruction that was executed `ADDR COUNT JUMPS`, where JUMPS says how often
+//! execution did not go on at the next instruction.
+//!
+//! Flash is what lies below 0x20000000, the code region of the Cortex-M's memory map. Fetched lines are those that the caches of
+//! an STM32F4 would miss (reference manual RM0090, section 3.5.2): lines of 16 bytes, 64 for code and 8 for data, the least
+//! recently used one replaced, both empty at the start of a region.
 //!
 //! Only functions that every plugin API since QEMU 7.2 has in the same form are used; the API version that QEMU asks for is set
 //! when the plugin is built (environment variable `ACTQ_QEMU_API`, default 1; 2 from QEMU 9.1 on).
@@ -27,6 +32,7 @@ pub static qemu_plugin_version: c_int = match option_env!("ACTQ_QEMU_API") {
 type Id = u64;
 type TranslateCallback = unsafe extern "C" fn(Id, *mut c_void);
 type ExecuteCallback = unsafe extern "C" fn(c_uint, *mut c_void);
+type MemoryCallback = unsafe extern "C" fn(c_uint, u32, u64, *mut c_void);
 type ExitCallback = unsafe extern "C" fn(Id, *mut c_void);
 
 unsafe extern "C" {
@@ -35,6 +41,13 @@ unsafe extern "C" {
         insn: *mut c_void,
         callback: ExecuteCallback,
         flags: c_int,
+        data: *mut c_void,
+    );
+    fn qemu_plugin_register_vcpu_mem_cb(
+        insn: *mut c_void,
+        callback: MemoryCallback,
+        flags: c_int,
+        accesses: c_int,
         data: *mut c_void,
     );
     fn qemu_plugin_register_atexit_cb(id: Id, callback: ExitCallback, data: *mut c_void);
@@ -55,6 +68,56 @@ static LAST: AtomicU64 = AtomicU64::new(0);
 static OUT: Mutex<Option<BufWriter<File>>> = Mutex::new(None);
 /// Every translated instruction by its address. They live as long as QEMU does.
 static INSTRUCTIONS: Mutex<BTreeMap<u64, &'static Instruction>> = Mutex::new(BTreeMap::new());
+
+/// Where the flash ends.
+const FLASH_END: u64 = 0x2000_0000;
+/// Bytes of a line, as a power of two.
+const LINE: u32 = 4;
+/// `QEMU_PLUGIN_MEM_R`: loads only.
+const LOADS: c_int = 1;
+
+static CODE: Mutex<Cache> = Mutex::new(Cache { capacity: 64, lines: Vec::new(), misses: 0 });
+static DATA: Mutex<Cache> = Mutex::new(Cache { capacity: 8, lines: Vec::new(), misses: 0 });
+/// The line of the last counted instruction; the cache has it.
+static LAST_LINE: AtomicU64 = AtomicU64::new(u64::MAX);
+
+/// A cache of lines, the least recently used one first.
+struct Cache {
+    capacity: usize,
+    lines: Vec<u64>,
+    misses: u64,
+}
+
+impl Cache {
+    fn access(&mut self, line: u64) {
+        match self.lines.iter().rposition(|l| *l == line) {
+            Some(at) => self.lines[at..].rotate_left(1),
+            None => {
+                self.misses += 1;
+                if self.lines.len() == self.capacity {
+                    self.lines.remove(0);
+                }
+                self.lines.push(line);
+            }
+        }
+    }
+
+    /// Empties the cache and gives the misses since it was empty.
+    fn drain(&mut self) -> u64 {
+        self.lines.clear();
+        std::mem::take(&mut self.misses)
+    }
+}
+
+fn access(cache: &Mutex<Cache>, line: u64) {
+    if let Ok(mut cache) = cache.lock() {
+        cache.access(line);
+    }
+}
+
+fn drain(cache: &Mutex<Cache>) -> u64 {
+    cache.lock().map_or(0, |mut cache| cache.drain())
+}
 
 /// An instruction of the guest. The guest has one CPU, so relaxed counters lose nothing.
 struct Instruction {
@@ -81,9 +144,20 @@ unsafe extern "C" fn on_execute(_vcpu: c_uint, data: *mut c_void) {
                 count_jump(LAST.load(Relaxed));
             }
             instruction.count.fetch_add(1, Relaxed);
+            // An instruction that straddles two lines counts for its first one; the next instruction fetches the second.
+            let line = address >> LINE;
+            if line != LAST_LINE.swap(line, Relaxed) && address < FLASH_END {
+                access(&CODE, line);
+            }
             LAST.store(address, Relaxed);
             NEXT.store(address + instruction.size, Relaxed);
         }
+    }
+}
+
+unsafe extern "C" fn on_load(_vcpu: c_uint, _info: u32, address: u64, _data: *mut c_void) {
+    if address < FLASH_END && COUNTING.load(Relaxed) {
+        access(&DATA, address >> LINE);
     }
 }
 
@@ -101,7 +175,9 @@ fn write_region() -> io::Result<()> {
     if let Some(call) = all.get(&LAST.load(Relaxed)) {
         call.count.fetch_sub(1, Relaxed);
     }
-    writeln!(out, "region {}", all.values().map(|i| i.count.load(Relaxed)).sum::<u64>())?;
+    let (code, data) = (drain(&CODE), drain(&DATA));
+    LAST_LINE.store(u64::MAX, Relaxed);
+    writeln!(out, "region {} {code} {data}", all.values().map(|i| i.count.load(Relaxed)).sum::<u64>())?;
     for instruction in all.values() {
         let (count, jumps) = (instruction.count.swap(0, Relaxed), instruction.jumps.swap(0, Relaxed));
         if count > 0 {
@@ -114,7 +190,7 @@ fn write_region() -> io::Result<()> {
 unsafe extern "C" fn on_translate(_id: Id, tb: *mut c_void) {
     let Ok(mut all) = INSTRUCTIONS.lock() else { return };
     // SAFETY: QEMU hands over a translation block that is valid during this call; indexes stay below its length, and the
-    // callback has the signature that QEMU expects. Flag 0: the callback reads no registers.
+    // callbacks have the signatures that QEMU expects. Flag 0: they read no registers.
     unsafe {
         for i in 0..qemu_plugin_tb_n_insns(tb) {
             let insn = qemu_plugin_tb_get_insn(tb, i);
@@ -126,6 +202,7 @@ unsafe extern "C" fn on_translate(_id: Id, tb: *mut c_void) {
             let instruction: &'static Instruction = all.entry(address).or_insert_with(new);
             let data = std::ptr::from_ref(instruction).cast_mut().cast();
             qemu_plugin_register_vcpu_insn_exec_cb(insn, on_execute, 0, data);
+            qemu_plugin_register_vcpu_mem_cb(insn, on_load, 0, LOADS, std::ptr::null_mut());
         }
     }
 }
