@@ -4,8 +4,9 @@
 //! leaves the function at `begin..begin_end` and stops when it enters the function at `end`. The call of `end` itself is not
 //! counted. Addresses are hexadecimal.
 //!
-//! Each such region adds lines to FILE: `region N CODE DATA` with the number of instructions and of lines that were fetched from
-//! flash for code and for data, then for every instruction that was executed `ADDR COUNT JUMPS`, where JUMPS says how often
+//! Each such region adds lines to FILE: `region N DATA CODE NEXT1 .. NEXT8` with the number of instructions and of lines that were
+//! fetched from flash: for data, for code after a jump, and for code that went on behind a line of which 1 to 8 instructions were
+//! executed, while which that next line can be prefetched; then for every instruction that was executed `ADDR COUNT JUMPS`, where JUMPS says how often
 //! execution did not go on at the next instruction.
 //!
 //! Flash is what lies below 0x20000000, the code region of the Cortex-M's memory map. Fetched lines are those that the caches of
@@ -73,50 +74,81 @@ static INSTRUCTIONS: Mutex<BTreeMap<u64, &'static Instruction>> = Mutex::new(BTr
 const FLASH_END: u64 = 0x2000_0000;
 /// Bytes of a line, as a power of two.
 const LINE: u32 = 4;
-/// `QEMU_PLUGIN_MEM_R`: loads only.
-const LOADS: c_int = 1;
+/// `QEMU_PLUGIN_MEM_RW`: loads and stores. (QEMU 7.2 gives stores where only loads are asked for; nothing stores to flash.)
+const ACCESSES: c_int = 3;
+/// Instructions that a line holds.
+const LINE_INSTRUCTIONS: usize = 8;
 
-static CODE: Mutex<Cache> = Mutex::new(Cache { capacity: 64, lines: Vec::new(), misses: 0 });
-static DATA: Mutex<Cache> = Mutex::new(Cache { capacity: 8, lines: Vec::new(), misses: 0 });
-/// The line of the last counted instruction; the cache has it.
-static LAST_LINE: AtomicU64 = AtomicU64::new(u64::MAX);
+static FLASH: Mutex<Flash> = Mutex::new(Flash::new());
+
+/// The flash's caches, and what they fetched in this region.
+struct Flash {
+    code: Cache,
+    data: Cache,
+    /// The line of the last counted instruction, and how many were executed since execution came to it.
+    line: Option<u64>,
+    executed: usize,
+    data_lines: u64,
+    code_lines: u64,
+    next_lines: [u64; LINE_INSTRUCTIONS],
+}
+
+impl Flash {
+    const fn new() -> Self {
+        Self {
+            code: Cache { capacity: 64, lines: Vec::new() },
+            data: Cache { capacity: 8, lines: Vec::new() },
+            line: None,
+            executed: 0,
+            data_lines: 0,
+            code_lines: 0,
+            next_lines: [0; LINE_INSTRUCTIONS],
+        }
+    }
+
+    /// An instruction is executed. One that straddles two lines counts for its first one; the next one fetches the second.
+    fn execute(&mut self, line: u64) {
+        if self.line != Some(line) {
+            if !self.code.access(line) {
+                let next = self.line.is_some_and(|last| last + 1 == line);
+                match self.next_lines.get_mut(self.executed.saturating_sub(1)) {
+                    Some(count) if next => *count += 1,
+                    // A loop inside of a line leaves all the time that its successor needs.
+                    None if next => self.next_lines[LINE_INSTRUCTIONS - 1] += 1,
+                    _ => self.code_lines += 1,
+                }
+            }
+            (self.line, self.executed) = (Some(line), 0);
+        }
+        self.executed += 1;
+    }
+
+    fn load(&mut self, line: u64) {
+        self.data_lines += u64::from(!self.data.access(line));
+    }
+}
 
 /// A cache of lines, the least recently used one first.
 struct Cache {
     capacity: usize,
     lines: Vec<u64>,
-    misses: u64,
 }
 
 impl Cache {
-    fn access(&mut self, line: u64) {
-        match self.lines.iter().rposition(|l| *l == line) {
+    /// Whether the cache has the line; it has it afterwards.
+    fn access(&mut self, line: u64) -> bool {
+        let found = self.lines.iter().rposition(|l| *l == line);
+        match found {
             Some(at) => self.lines[at..].rotate_left(1),
             None => {
-                self.misses += 1;
                 if self.lines.len() == self.capacity {
                     self.lines.remove(0);
                 }
                 self.lines.push(line);
             }
         }
+        found.is_some()
     }
-
-    /// Empties the cache and gives the misses since it was empty.
-    fn drain(&mut self) -> u64 {
-        self.lines.clear();
-        std::mem::take(&mut self.misses)
-    }
-}
-
-fn access(cache: &Mutex<Cache>, line: u64) {
-    if let Ok(mut cache) = cache.lock() {
-        cache.access(line);
-    }
-}
-
-fn drain(cache: &Mutex<Cache>) -> u64 {
-    cache.lock().map_or(0, |mut cache| cache.drain())
 }
 
 /// An instruction of the guest. The guest has one CPU, so relaxed counters lose nothing.
@@ -144,10 +176,10 @@ unsafe extern "C" fn on_execute(_vcpu: c_uint, data: *mut c_void) {
                 count_jump(LAST.load(Relaxed));
             }
             instruction.count.fetch_add(1, Relaxed);
-            // An instruction that straddles two lines counts for its first one; the next instruction fetches the second.
-            let line = address >> LINE;
-            if line != LAST_LINE.swap(line, Relaxed) && address < FLASH_END {
-                access(&CODE, line);
+            if address < FLASH_END
+                && let Ok(mut flash) = FLASH.lock()
+            {
+                flash.execute(address >> LINE);
             }
             LAST.store(address, Relaxed);
             NEXT.store(address + instruction.size, Relaxed);
@@ -155,9 +187,12 @@ unsafe extern "C" fn on_execute(_vcpu: c_uint, data: *mut c_void) {
     }
 }
 
-unsafe extern "C" fn on_load(_vcpu: c_uint, _info: u32, address: u64, _data: *mut c_void) {
-    if address < FLASH_END && COUNTING.load(Relaxed) {
-        access(&DATA, address >> LINE);
+unsafe extern "C" fn on_access(_vcpu: c_uint, _info: u32, address: u64, _data: *mut c_void) {
+    if address < FLASH_END
+        && COUNTING.load(Relaxed)
+        && let Ok(mut flash) = FLASH.lock()
+    {
+        flash.load(address >> LINE);
     }
 }
 
@@ -175,9 +210,12 @@ fn write_region() -> io::Result<()> {
     if let Some(call) = all.get(&LAST.load(Relaxed)) {
         call.count.fetch_sub(1, Relaxed);
     }
-    let (code, data) = (drain(&CODE), drain(&DATA));
-    LAST_LINE.store(u64::MAX, Relaxed);
-    writeln!(out, "region {} {code} {data}", all.values().map(|i| i.count.load(Relaxed)).sum::<u64>())?;
+    let Ok(mut flash) = FLASH.lock() else { return Ok(()) };
+    let Flash { data_lines, code_lines, next_lines, .. } = std::mem::replace(&mut *flash, Flash::new());
+    let instructions = all.values().map(|i| i.count.load(Relaxed)).sum::<u64>();
+    write!(out, "region {instructions} {data_lines} {code_lines}")?;
+    next_lines.iter().try_for_each(|count| write!(out, " {count}"))?;
+    writeln!(out)?;
     for instruction in all.values() {
         let (count, jumps) = (instruction.count.swap(0, Relaxed), instruction.jumps.swap(0, Relaxed));
         if count > 0 {
@@ -202,7 +240,7 @@ unsafe extern "C" fn on_translate(_id: Id, tb: *mut c_void) {
             let instruction: &'static Instruction = all.entry(address).or_insert_with(new);
             let data = std::ptr::from_ref(instruction).cast_mut().cast();
             qemu_plugin_register_vcpu_insn_exec_cb(insn, on_execute, 0, data);
-            qemu_plugin_register_vcpu_mem_cb(insn, on_load, 0, LOADS, std::ptr::null_mut());
+            qemu_plugin_register_vcpu_mem_cb(insn, on_access, 0, ACCESSES, std::ptr::null_mut());
         }
     }
 }
