@@ -21,6 +21,12 @@ use crate::qemu::Region;
 /// Cycles to refill the pipeline after a taken branch; the manual gives 1 to 3.
 const REFILL: u64 = 2;
 
+/// Bytes of a line of the STM32F4's flash.
+const LINE: u64 = 16;
+
+/// Lines that its instruction cache holds.
+pub const CODE_LINES: u64 = 64;
+
 /// What the time of an instruction depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
@@ -467,8 +473,9 @@ impl Code {
         Ok(costs)
     }
 
-    /// Bytes of the longest innermost loop of a function: from the target of a conditional branch back to that branch, with no
-    /// other such loop inside; 0 without loops.
+    /// Lines of flash that the longest innermost loop of a function takes where the function starts at a line: from the target
+    /// of a conditional branch back to that branch, with no other such loop inside; 0 without loops. A loop of more than
+    /// [`CODE_LINES`] misses the cache at every line.
     pub fn longest_inner_loop(&self, function: &Function) -> Result<u64> {
         let mut loops: Vec<(u64, u64)> = Vec::new();
         let mut address = function.address;
@@ -478,13 +485,14 @@ impl Code {
             if let Some(target) = branch_target(address, first, second)
                 && (function.address..=address).contains(&target)
             {
-                loops.push((target, address + instruction.size));
+                loops.push((target - function.address, address - function.address + instruction.size));
             }
             address += instruction.size;
         }
         let contains = |outer: &(u64, u64), inner: &(u64, u64)| outer.0 <= inner.0 && inner.1 <= outer.1;
         let innermost = |at: &&(u64, u64)| !loops.iter().any(|other| other != *at && contains(at, other));
-        Ok(loops.iter().filter(innermost).map(|(start, end)| end - start).max().unwrap_or(0))
+        let lines = |(start, end): &(u64, u64)| end.div_ceil(LINE) - start / LINE;
+        Ok(loops.iter().filter(innermost).map(lines).max().unwrap_or(0))
     }
 }
 
@@ -620,14 +628,20 @@ mod tests {
         assert_eq!(branch_target(0x100, 0xe7f7, 0), None); // b.n
     }
 
-    /// Two loops in one, and a loop over one instruction.
+    /// A loop in a loop, and one that begins in a line's last halfword.
     #[test]
     fn the_longest_inner_loop_has_no_other_inside() -> Result<()> {
-        let halves: [u16; 8] = [0xbf00, 0xbf00, 0xbf00, 0xd1fc, 0xbf00, 0xd1f9, 0xbf00, 0xd1fd];
-        let bytes = halves.iter().flat_map(|h| h.to_le_bytes()).collect();
-        let function = Function { name: "f".into(), address: 0x100, size: 16 };
-        let code = Code { sections: vec![(0x100, bytes)], functions: vec![function.clone()] };
-        assert_eq!(code.longest_inner_loop(&function)?, 6);
+        let mut halves = [0xbf00u16; 24];
+        halves[3] = 0xd1fd; // bne.n to 0x102
+        halves[20] = 0xd1ea; // bne.n to 0x100
+        let lines = |halves: &[u16]| {
+            let bytes = halves.iter().flat_map(|h| h.to_le_bytes()).collect();
+            let function = Function { name: "f".into(), address: 0x100, size: 48 };
+            Code { sections: vec![(0x100, bytes)], functions: vec![] }.longest_inner_loop(&function)
+        };
+        assert_eq!(lines(&halves)?, 1);
+        halves[16] = 0xd1f5; // bne.n to 0x10e
+        assert_eq!(lines(&halves)?, 3);
         Ok(())
     }
 

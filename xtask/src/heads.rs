@@ -19,7 +19,8 @@ use serde::Serialize;
 
 use crate::bench::{Cycles, placeholder};
 
-/// Steps of distillation: too few for accuracy. Only the widths of the rows matter here, and those are chosen before.
+/// Steps of distillation: too few for accuracy, but the widths of the rows, which matter here, are chosen before. (Which
+/// matrices take int16 activations is chosen after, and may differ a little.)
 const STEPS: usize = 50;
 
 /// Clock of an STM32F405 in Hz.
