@@ -4,7 +4,7 @@
 const WORDS: usize = 4 * 1024;
 const PAINT: u32 = 0x5a5a_a5a5;
 
-/// Runs `work` and gives the bytes of stack that it wrote below its caller's frame.
+/// Runs `work` and gives how many bytes below this function's frame it wrote to.
 #[inline(never)]
 pub fn depth<T>(work: impl FnOnce() -> T) -> (T, usize) {
     let top = cortex_m::register::msp::read() as usize / 4;

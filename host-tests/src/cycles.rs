@@ -475,7 +475,7 @@ impl Code {
 
     /// Lines of flash that the longest innermost loop of a function takes where the function starts at a line: from the target
     /// of a conditional branch back to that branch, with no other such loop inside; 0 without loops. A loop of more than
-    /// [`CODE_LINES`] misses the cache at every line.
+    /// [`CODE_LINES`] misses a cache that replaces the least recently used line at every line.
     pub fn longest_inner_loop(&self, function: &Function) -> Result<u64> {
         let mut loops: Vec<(u64, u64)> = Vec::new();
         let mut address = function.address;

@@ -1,5 +1,7 @@
 //! The instruction counter and the model of cycles on a whole head.
 
+use std::collections::BTreeSet;
+
 use actq::eval;
 use actq::policy::Policy;
 use actq::quantize::{Budget, Method, Options, quantize};
@@ -38,7 +40,10 @@ fn a_step_of_a_head_reads_each_weight_once() -> Result<()> {
     assert_eq!(by_function.iter().map(|(_, cost)| cost.instructions).sum::<u64>(), region.instructions);
     assert_eq!(by_function.iter().map(|(_, cost)| cost.cycles).sum::<u64>(), code.cycles(&region, 0)?);
     assert!(by_function.iter().all(|(name, _)| name != "?"), "{by_function:?}");
-    let lines = region.data_lines + region.code_lines + region.next_lines.iter().sum::<u64>();
+    let code_lines = region.code_lines + region.next_lines.iter().sum::<u64>();
+    let executed: BTreeSet<u64> = region.executed.iter().map(|executed| executed.address / 16).collect();
+    assert!(code_lines >= executed.len() as u64, "{code_lines} lines fetched, {} executed", executed.len());
+    let lines = region.data_lines + code_lines;
     let waits = code.cycles(&region, 5)? - code.cycles(&region, 0)?;
     assert!((5 * region.data_lines..=5 * lines).contains(&waits), "{waits}");
 

@@ -78,7 +78,9 @@ pub(crate) fn run(json: Option<&Path>, wait_states: u64, by_function: bool) -> R
         println!("\nTheir instructions, by function\n\n{}", heads::report_functions(&heads));
     }
     if wait_states > 0 {
-        println!("\nwith waits: every line that the caches of an STM32F4 miss costs {wait_states} cycles");
+        println!(
+            "\nwith waits: flash of {wait_states} wait states behind the caches of an STM32F4, a model (docs/KERNELS.md)"
+        );
     }
     if let Some(path) = json {
         let kernels = kernels.iter().map(Entry::Kernel);

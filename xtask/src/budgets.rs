@@ -20,6 +20,9 @@ const SLACK: u64 = 2;
 /// Bytes of the runtime's code, which no budget raises, like [`CODE_LINES`] for an inner loop.
 const RUNTIME_LIMIT: u64 = 24 * 1024;
 
+/// Functions that are shown where the runtime is too large.
+const SHOWN: usize = 20;
+
 const RUNTIME: &str = "bytes of code, whole runtime";
 const LOOP: &str = "lines of inner loop, ";
 
@@ -58,8 +61,8 @@ pub(crate) fn run(update: bool) -> Result<()> {
     let stale = difference(&budgets.figures, &measured);
     ensure!(
         stale.is_empty(),
-        "budgets.json is not about what was measured; `cargo xtask budgets --update` renews it: {}",
-        stale.join("; ")
+        "budgets.json is not about what was measured; `cargo xtask budgets --update` renews it:\n  {}",
+        stale.join("\n  ")
     );
     let excess = compare(&budgets, &measured, &rustc);
     if excess.is_empty() {
@@ -74,6 +77,9 @@ pub(crate) fn run(update: bool) -> Result<()> {
         rows.add_row([name.clone(), allowed.to_string(), measured.to_string(), format!("+{difference}"), percent]);
     }
     println!("\n{rows}\n");
+    if excess.iter().any(|excess| excess.name == RUNTIME) {
+        println!("The runtime's largest functions\n\n{}\n", largest_functions(&runtime()?));
+    }
     bail!("{} of {} figures are above their budgets", excess.len(), measured.len())
 }
 
@@ -136,13 +142,28 @@ fn measure() -> Result<Figures> {
 /// Bytes of code of the whole runtime and of every function in assembler, and the lines of its longest inner loop, which the
 /// instruction cache must hold.
 fn code() -> Result<Figures> {
-    let code = Code::read(&qemu::build("runtime", Target::Fpu, &placeholder()?)?)?;
+    let code = runtime()?;
     let mut figures = Figures::from([(RUNTIME.to_owned(), code.bytes())]);
     for function in code.functions().iter().filter(|f| f.name.starts_with("actq_") && !f.name.contains("::")) {
         figures.insert(format!("bytes of code, {}", function.name), function.size);
         figures.insert(format!("{LOOP}{}", function.name), code.longest_inner_loop(function)?);
     }
     Ok(figures)
+}
+
+/// The code of everything that an application calls.
+fn runtime() -> Result<Code> {
+    Code::read(&qemu::build("runtime", Target::Fpu, &placeholder()?)?)
+}
+
+fn largest_functions(code: &Code) -> String {
+    let mut functions: Vec<_> = code.functions().iter().collect();
+    functions.sort_by_key(|function| std::cmp::Reverse(function.size));
+    let mut rows = table(&["bytes", "function"]);
+    for function in functions.iter().take(SHOWN) {
+        rows.add_row([function.size.to_string(), function.name.clone()]);
+    }
+    rows.to_string()
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
 //! Counted kernel calls: each prints a line `name bits group rows cols`, in the order of the counted regions.
 //!
 //! A region is a whole call: activations from f32, the product, and the results back in f32 with row scales and biases. What an
-//! image would hold stands in the image slot, so that its lines count as fetched from flash. The yardsticks are a naive loop in f32, and 8-bit rows with SXTB16 and SMLAD as one would write them with intrinsics.
+//! image would hold stands in the image slot, so that its lines count as fetched from flash. The yardsticks are a naive loop in
+//! f32, and 8-bit rows with SXTB16 and SMLAD as one would write them with intrinsics.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
