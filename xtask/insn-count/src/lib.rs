@@ -4,10 +4,10 @@
 //! leaves the function at `begin..begin_end` and stops when it enters the function at `end`. The call of `end` itself is not
 //! counted. Addresses are hexadecimal.
 //!
-//! Each such region adds lines to FILE: `region N DATA CODE NEXT1 .. NEXT8` with the number of instructions and of lines that were
-//! fetched from flash: for data, for code after a jump, and for code that goes on behind a line of which 1 to 8 instructions were
-//! executed (meanwhile the next line can be prefetched); then for every instruction that was executed `ADDR COUNT JUMPS`, where JUMPS says how often
-//! execution did not go on at the next instruction.
+//! Each such region adds lines to FILE: `region N DATA CODE NEXT1 .. NEXT8` with the number of instructions and of lines
+//! fetched from flash: for data, for code after a jump, and for code that goes on behind a line of which 1 to 8 instructions
+//! were executed (meanwhile the next line can be prefetched). Then, for every instruction that was executed, `ADDR COUNT JUMPS`,
+//! where JUMPS says how often execution did not go on at the next instruction.
 //!
 //! Flash is what lies below 0x20000000, the code region of the Cortex-M's memory map. Fetched lines are those that the caches of
 //! an STM32F4 would miss (reference manual RM0090, section 3.5.2): lines of 16 bytes, 64 for code and 8 for data, the least
