@@ -1,11 +1,12 @@
-//! What the firmware binaries share: the host's files through semihosting, the image slot, and the marks between which
-//! instructions are counted.
+//! What the firmware binaries share: the host's files through semihosting, the image slot, the marks between which
+//! instructions are counted, and how deep the stack gets.
 #![no_std]
 #![cfg(target_os = "none")]
 
 pub mod count;
 pub mod host;
 pub mod slot;
+pub mod stack;
 
 use core::fmt::Write as _;
 use core::panic::PanicInfo;

@@ -3,23 +3,37 @@
 //! The counter says how often each instruction was executed and how often execution jumped away from it. An instruction that
 //! was not jumped to follows the one before it in memory, so pairs of neighbours, on which the pipeline's stalls depend, are
 //! known exactly as well. What each class of instructions takes is from the Cortex-M4 Technical Reference Manual, tables 3-1
-//! and 7-1, with memory that never waits. It is a model: a board's flash adds wait states.
+//! and 7-1, with memory that never waits. It is a model.
+//!
+//! A board's flash waits. The counter plays every instruction and every load in order through the caches of an STM32F4 (see
+//! `xtask/insn-count`), so the lines that they miss are exact for caches that are empty at first. A line costs the flash's wait
+//! states; the next line of code is prefetched while the line before it is executed, one cycle an instruction. That is a model,
+//! too: fetches of code and data do not delay each other, and RAM never waits. An STM32F405 at 168 MHz has 5 wait states.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
-use object::{Object as _, ObjectSection as _, SectionKind};
+use object::{Object as _, ObjectSection as _, ObjectSymbol as _, SectionKind, SymbolKind};
 
 use crate::qemu::Region;
 
 /// Cycles to refill the pipeline after a taken branch; the manual gives 1 to 3.
 const REFILL: u64 = 2;
 
+/// Bytes of a line of the STM32F4's flash.
+const LINE: u64 = 16;
+
+/// Lines that its instruction cache holds.
+pub const CODE_LINES: u64 = 64;
+
 /// What the time of an instruction depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
-    /// Data processing, multiplication, and all that takes one cycle.
+    /// Data processing, and all else that takes one cycle.
     Alu,
+    /// Multiplication in one cycle, the SIMD ones with accumulation among them.
+    Multiply,
     /// MLA and MLS.
     MultiplyAccumulate,
     /// UDIV and SDIV take 2 to 12 cycles.
@@ -30,10 +44,14 @@ pub enum Class {
     Store,
     /// A store to an address with a register as offset.
     StoreIndexed,
-    /// LDRD, STRD and doubles.
-    Double,
-    /// LDM, STM, PUSH, POP, VLDM and VSTM of so many registers.
-    Multiple(u32),
+    /// LDRD, and VLDR of a double.
+    LoadDouble,
+    /// STRD, and VSTR of a double.
+    StoreDouble,
+    /// LDM, POP and VLDM of so many registers.
+    LoadMultiple(u32),
+    /// STM, PUSH and VSTM of so many registers.
+    StoreMultiple(u32),
     /// A load of so many registers, one of them the program counter.
     Return(u32),
     /// A branch that is always taken.
@@ -50,6 +68,42 @@ pub enum Class {
     FloatDivide,
     /// VMOV, VMRS and VMSR.
     FloatMove,
+}
+
+/// What an instruction does, for people.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Kind {
+    /// Data processing.
+    Alu,
+    /// Multiplication, with or without accumulation, and division.
+    Multiply,
+    /// Loads, of floats too.
+    Load,
+    /// Stores, of floats too.
+    Store,
+    /// Branches, calls and returns.
+    Branch,
+    /// Floating-point arithmetic and moves.
+    Float,
+}
+
+impl Kind {
+    /// All, in order.
+    pub const ALL: [Self; 6] = [Self::Alu, Self::Multiply, Self::Load, Self::Store, Self::Branch, Self::Float];
+}
+
+impl Class {
+    /// What it does.
+    pub fn kind(self) -> Kind {
+        match self {
+            Self::Alu | Self::IfThen => Kind::Alu,
+            Self::Multiply | Self::MultiplyAccumulate | Self::Divide => Kind::Multiply,
+            Self::Load | Self::LoadDouble | Self::LoadMultiple(_) => Kind::Load,
+            Self::Store | Self::StoreIndexed | Self::StoreDouble | Self::StoreMultiple(_) => Kind::Store,
+            Self::Return(_) | Self::Branch | Self::Conditional => Kind::Branch,
+            Self::Float | Self::FloatAccumulate | Self::FloatDivide | Self::FloatMove => Kind::Float,
+        }
+    }
 }
 
 /// A decoded instruction. Registers are sets of bits.
@@ -109,6 +163,7 @@ impl Instruction {
             0x4 if bits(half, 11, 11) == 1 => new(Class::Load).writes(set(middle)),
             0x4 if bits(half, 10, 10) == 0 => match bits(half, 9, 6) {
                 8 | 10 | 11 => new(Class::Alu), // TST, CMP, CMN
+                13 => new(Class::Multiply).writes(set(low)),
                 _ => alu(low),
             },
             0x4 => match (bits(half, 9, 8), low | bits(half, 7, 7) << 3) {
@@ -132,8 +187,8 @@ impl Instruction {
             0xb => match bits(half, 11, 8) {
                 0 => alu(13),
                 1 | 3 | 9 | 11 => new(Class::Conditional), // CBZ, CBNZ
-                4 | 5 => new(Class::Multiple(bits(half, 8, 0).count_ones())).address(set(13)),
-                12 => new(Class::Multiple(bits(half, 7, 0).count_ones())).writes(bits(half, 7, 0)).address(set(13)),
+                4 | 5 => new(Class::StoreMultiple(bits(half, 8, 0).count_ones())).address(set(13)),
+                12 => new(Class::LoadMultiple(bits(half, 7, 0).count_ones())).writes(bits(half, 7, 0)).address(set(13)),
                 13 => new(Class::Return(bits(half, 8, 0).count_ones())).writes(bits(half, 7, 0)),
                 15 if bits(half, 3, 0) != 0 => new(Class::IfThen),
                 2 | 10 => alu(low), // extensions, REV
@@ -141,8 +196,11 @@ impl Instruction {
             },
             0xc => {
                 let list = bits(half, 7, 0);
-                let writes = if bits(half, 11, 11) == 1 { list } else { 0 };
-                new(Class::Multiple(list.count_ones())).writes(writes | set(middle)).address(set(middle))
+                let (class, writes) = match bits(half, 11, 11) {
+                    1 => (Class::LoadMultiple(list.count_ones()), list),
+                    _ => (Class::StoreMultiple(list.count_ones()), 0),
+                };
+                new(class).writes(writes | set(middle)).address(set(middle))
             }
             0xd if bits(half, 11, 8) < 14 => new(Class::Conditional),
             0xe => new(Class::Branch),
@@ -163,10 +221,10 @@ impl Instruction {
             _ if bits(first, 12, 11) != 2 && op & 0x40 != 0 => Self::decode_float(first, second),
             1 if op & 0x64 == 0 => {
                 let list = u32::from(second);
-                let class = if load && list >> 15 == 1 {
-                    Class::Return(list.count_ones())
-                } else {
-                    Class::Multiple(list.count_ones())
+                let class = match (load, list >> 15) {
+                    (true, 1) => Class::Return(list.count_ones()),
+                    (true, _) => Class::LoadMultiple(list.count_ones()),
+                    _ => Class::StoreMultiple(list.count_ones()),
                 };
                 new(class).writes(if load { list | set(base) } else { set(base) }).address(set(base))
             }
@@ -175,8 +233,8 @@ impl Instruction {
                 _ if first & 0xfff0 == 0xe8d0 && second & 0xffe0 == 0xf000 => new(Class::Branch),
                 _ if matches!(first & 0xfff0, 0xe840 | 0xe8c0) => new(Class::Store).address(set(base)),
                 _ if matches!(first & 0xfff0, 0xe850 | 0xe8d0) => new(Class::Load).writes(set(data)).address(set(base)),
-                true => new(Class::Double).writes(set(data) | set(result)).address(set(base)),
-                false => new(Class::Double).address(set(base)),
+                true => new(Class::LoadDouble).writes(set(data) | set(result)).address(set(base)),
+                false => new(Class::StoreDouble).address(set(base)),
             },
             1 => alu(),
             2 if bits(second, 15, 15) == 0 => alu(),
@@ -199,13 +257,13 @@ impl Instruction {
             }
             _ if op & 0x70 == 0x20 => new(Class::Alu).writes(set(result)),
             _ if op & 0x78 == 0x30 => {
-                let class = if op == 0x30 && data != 15 { Class::MultiplyAccumulate } else { Class::Alu };
+                let class = if op == 0x30 && data != 15 { Class::MultiplyAccumulate } else { Class::Multiply };
                 new(class).writes(set(result))
             }
             // Long multiplication and division.
             _ => match op & 7 {
                 1 | 3 => new(Class::Divide).writes(set(result)),
-                _ => new(Class::Alu).writes(set(result) | set(data)),
+                _ => new(Class::Multiply).writes(set(result) | set(data)),
             },
         }
     }
@@ -227,13 +285,16 @@ impl Instruction {
         if first & 0xfe00 == 0xec00 {
             if bits(first, 8, 8) == 1 && bits(first, 5, 5) == 0 {
                 let class = match (double, load) {
-                    (true, _) => Class::Double,
-                    (_, true) => Class::Load,
-                    _ => Class::Store,
+                    (true, true) => Class::LoadDouble,
+                    (true, false) => Class::StoreDouble,
+                    (false, true) => Class::Load,
+                    (false, false) => Class::Store,
                 };
                 return Self { float_writes: if load { d } else { 0 }, ..new(class).address(set(base)) };
             }
-            return new(Class::Multiple(bits(second, 7, 0))).address(set(base));
+            let registers = bits(second, 7, 0);
+            let class = if load { Class::LoadMultiple(registers) } else { Class::StoreMultiple(registers) };
+            return new(class).address(set(base));
         }
         if bits(second, 4, 4) == 1 {
             let (writes, reads) = if load { (set(core), n) } else { (0, 0) };
@@ -256,12 +317,13 @@ impl Instruction {
     /// Cycles after a jump, a taken conditional branch excepted.
     fn cycles(&self) -> u64 {
         match self.class {
-            Class::Alu | Class::IfThen | Class::Float | Class::FloatMove | Class::Store | Class::Conditional => 1,
+            Class::Alu | Class::Multiply | Class::IfThen | Class::Float | Class::FloatMove => 1,
+            Class::Store | Class::Conditional => 1,
             Class::MultiplyAccumulate | Class::Load | Class::StoreIndexed => 2,
-            Class::Double | Class::FloatAccumulate => 3,
+            Class::LoadDouble | Class::StoreDouble | Class::FloatAccumulate => 3,
             Class::Divide => 7,
             Class::FloatDivide => 14,
-            Class::Multiple(n) => 1 + u64::from(n),
+            Class::LoadMultiple(n) | Class::StoreMultiple(n) => 1 + u64::from(n),
             Class::Return(n) => 1 + u64::from(n) + REFILL,
             Class::Branch => 1 + REFILL,
         }
@@ -269,11 +331,9 @@ impl Instruction {
 
     /// Cycles behind `before`.
     fn cycles_behind(&self, before: &Self) -> u64 {
-        let memory =
-            matches!(self.class, Class::Load | Class::Store | Class::StoreIndexed | Class::Double | Class::Multiple(_));
+        let memory = matches!(self.class.kind(), Kind::Load | Kind::Store);
         let address_comes_late = before.writes & self.address != 0;
-        let computed =
-            matches!(before.class, Class::Alu | Class::MultiplyAccumulate | Class::Divide | Class::FloatMove);
+        let computed = matches!(before.class.kind(), Kind::Alu | Kind::Multiply) || before.class == Class::FloatMove;
         let single = matches!(self.class, Class::Load | Class::StoreIndexed);
         let mut cycles = self.cycles();
         if single && before.class == Class::Load && !address_comes_late {
@@ -293,6 +353,27 @@ impl Instruction {
 #[derive(Clone, Debug)]
 pub struct Code {
     sections: Vec<(u64, Vec<u8>)>,
+    functions: Vec<Function>,
+}
+
+/// A function of a firmware.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Function {
+    /// Name, demangled, without its hash.
+    pub name: String,
+    /// Address, without the Thumb bit.
+    pub address: u64,
+    /// Bytes.
+    pub size: u64,
+}
+
+/// What was executed of something, and its modelled cycles with memory that never waits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Cost {
+    /// Instructions.
+    pub instructions: u64,
+    /// Cycles.
+    pub cycles: u64,
 }
 
 impl Code {
@@ -302,7 +383,27 @@ impl Code {
         let file = object::File::parse(&*data).with_context(|| format!("{}: not an ELF file", elf.display()))?;
         let code = file.sections().filter(|s| s.kind() == SectionKind::Text);
         let sections = code.map(|s| Ok((s.address(), s.data()?.to_vec()))).collect::<Result<_>>()?;
-        Ok(Self { sections })
+        let mut functions: Vec<Function> = file
+            .symbols()
+            .filter(|s| s.kind() == SymbolKind::Text && s.size() > 0)
+            .map(|s| Function {
+                name: format!("{:#}", rustc_demangle::demangle(s.name().unwrap_or("?"))),
+                address: s.address() & !1,
+                size: s.size(),
+            })
+            .collect();
+        functions.sort_by_key(|f| f.address);
+        Ok(Self { sections, functions })
+    }
+
+    /// Bytes of all code.
+    pub fn bytes(&self) -> u64 {
+        self.sections.iter().map(|(_, bytes)| bytes.len() as u64).sum()
+    }
+
+    /// All functions, by address.
+    pub fn functions(&self) -> &[Function] {
+        &self.functions
     }
 
     fn half(&self, address: u64) -> Option<u16> {
@@ -317,9 +418,8 @@ impl Code {
         Ok(Instruction::decode(first, self.half(address + 2).unwrap_or(0)))
     }
 
-    /// Modelled cycles of a region.
-    pub fn cycles(&self, region: &Region) -> Result<u64> {
-        let mut cycles = 0;
+    /// Visits every executed instruction of a region with its address and its cost.
+    fn walk(&self, region: &Region, mut visit: impl FnMut(u64, &Instruction, Cost)) -> Result<()> {
         let mut before: Option<(u64, u64, Instruction)> = None;
         for executed in &region.executed {
             let instruction = self.instruction(executed.address)?;
@@ -329,20 +429,94 @@ impl Code {
                 _ => (None, 0),
             };
             ensure!(follows <= executed.count, "the counts at {:#x} contradict each other", executed.address);
-            cycles += (executed.count - follows) * instruction.cycles();
+            let mut cycles = (executed.count - follows) * instruction.cycles();
             cycles += follows * behind.map_or(0, |before| instruction.cycles_behind(before));
             if instruction.class == Class::Conditional {
                 cycles += executed.jumps * REFILL;
             }
+            visit(executed.address, &instruction, Cost { instructions: executed.count, cycles });
             before = Some((executed.address + instruction.size, executed.count - executed.jumps, instruction));
         }
+        Ok(())
+    }
+
+    /// Modelled cycles of a region, with flash that makes the fetch of a line wait for so many cycles.
+    pub fn cycles(&self, region: &Region, wait_states: u64) -> Result<u64> {
+        // The fetch of a line takes one cycle more than it waits; an instruction before it takes one at least.
+        let fetch = |executed: u64| (wait_states + 1).saturating_sub(executed).min(wait_states);
+        let next: u64 = region.next_lines.iter().zip(1..).map(|(lines, executed)| lines * fetch(executed)).sum();
+        let mut cycles = wait_states * (region.code_lines + region.data_lines) + next;
+        self.walk(region, |_, _, cost| cycles += cost.cycles)?;
         Ok(cycles)
     }
+
+    /// The instructions of a region by what they do, in the order of [`Kind::ALL`].
+    pub fn by_kind(&self, region: &Region) -> Result<[u64; Kind::ALL.len()]> {
+        let mut counts = [0; Kind::ALL.len()];
+        self.walk(region, |_, instruction, cost| counts[instruction.class.kind() as usize] += cost.instructions)?;
+        Ok(counts)
+    }
+
+    /// What a region spends in each function that it runs, the most instructions first.
+    pub fn by_function(&self, region: &Region) -> Result<Vec<(String, Cost)>> {
+        let mut costs: BTreeMap<&str, Cost> = BTreeMap::new();
+        self.walk(region, |address, _, cost| {
+            let before = self.functions.partition_point(|f| f.address <= address);
+            let function = before.checked_sub(1).and_then(|i| self.functions.get(i));
+            let name = function.filter(|f| address < f.address + f.size).map_or("?", |f| &f.name);
+            let sum = costs.entry(name).or_default();
+            sum.instructions += cost.instructions;
+            sum.cycles += cost.cycles;
+        })?;
+        let mut costs: Vec<_> = costs.into_iter().map(|(name, cost)| (name.to_owned(), cost)).collect();
+        costs.sort_by_key(|(_, cost)| std::cmp::Reverse(cost.instructions));
+        Ok(costs)
+    }
+
+    /// Lines of flash that the longest innermost loop of a function takes where the function starts at a line: from the target
+    /// of a conditional branch back to that branch, with no other such loop inside; 0 without loops. A loop of more than
+    /// [`CODE_LINES`] misses a cache that replaces the least recently used line at every line.
+    pub fn longest_inner_loop(&self, function: &Function) -> Result<u64> {
+        let mut loops: Vec<(u64, u64)> = Vec::new();
+        let mut address = function.address;
+        while address < function.address + function.size {
+            let instruction = self.instruction(address)?;
+            let (first, second) = (self.half(address).unwrap_or(0), self.half(address + 2).unwrap_or(0));
+            if let Some(target) = branch_target(address, first, second)
+                && (function.address..=address).contains(&target)
+            {
+                loops.push((target - function.address, address - function.address + instruction.size));
+            }
+            address += instruction.size;
+        }
+        let contains = |outer: &(u64, u64), inner: &(u64, u64)| outer.0 <= inner.0 && inner.1 <= outer.1;
+        let innermost = |at: &&(u64, u64)| !loops.iter().any(|other| other != *at && contains(at, other));
+        let lines = |(start, end): &(u64, u64)| end.div_ceil(LINE) - start / LINE;
+        Ok(loops.iter().filter(innermost).map(lines).max().unwrap_or(0))
+    }
+}
+
+/// Where a conditional branch (B<cond>, not CBZ, which only goes forward) at `address` goes to.
+fn branch_target(address: u64, first: u16, second: u16) -> Option<u64> {
+    if Instruction::decode(first, second).class != Class::Conditional {
+        return None;
+    }
+    let sign_extend = |value: u32, bits: u32| i64::from((value << (32 - bits)) as i32 >> (32 - bits));
+    let offset = match first >> 12 {
+        0xd => sign_extend(bits(first, 7, 0) << 1, 9),
+        0xf => {
+            let high = bits(first, 10, 10) << 20 | bits(second, 11, 11) << 19 | bits(second, 13, 13) << 18;
+            sign_extend(high | bits(first, 5, 0) << 12 | bits(second, 10, 0) << 1, 21)
+        }
+        _ => return None,
+    };
+    (address + 4).checked_add_signed(offset)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::qemu::Executed;
 
     fn check(halves: [u16; 2], size: u64, class: Class, writes: u32, address: u32) {
         let decoded = Instruction::decode(halves[0], halves[1]);
@@ -356,47 +530,48 @@ mod tests {
         check([0x2b04, 0x0000], 2, Class::Alu, 0x0000, 0x0000); // cmp r3, #4
         check([0x4211, 0x0000], 2, Class::Alu, 0x0000, 0x0000); // tst r1, r2
         check([0x4699, 0x0000], 2, Class::Alu, 0x0200, 0x0000); // mov r9, r3
+        check([0x4351, 0x0000], 2, Class::Multiply, 0x0002, 0x0000); // muls r1, r2, r1
         check([0x4770, 0x0000], 2, Class::Branch, 0x0000, 0x0000); // bx lr
         check([0x4a02, 0x0000], 2, Class::Load, 0x0004, 0x0000); // ldr r2, [pc, #8]
         check([0x50d1, 0x0000], 2, Class::StoreIndexed, 0x0000, 0x000c); // str r1, [r2, r3]
         check([0x5cd1, 0x0000], 2, Class::Load, 0x0002, 0x000c); // ldrb r1, [r2, r3]
         check([0x9901, 0x0000], 2, Class::Load, 0x0002, 0x2000); // ldr r1, [sp, #4]
         check([0x8063, 0x0000], 2, Class::Store, 0x0000, 0x0010); // strh r3, [r4, #2]
-        check([0xb5f0, 0x0000], 2, Class::Multiple(5), 0x0000, 0x2000); // push {r4, r5, r6, r7, lr}
+        check([0xb5f0, 0x0000], 2, Class::StoreMultiple(5), 0x0000, 0x2000); // push {r4, r5, r6, r7, lr}
         check([0xbd10, 0x0000], 2, Class::Return(2), 0x0010, 0x0000); // pop {r4, pc}
-        check([0xbc30, 0x0000], 2, Class::Multiple(2), 0x0030, 0x2000); // pop {r4, r5}
+        check([0xbc30, 0x0000], 2, Class::LoadMultiple(2), 0x0030, 0x2000); // pop {r4, r5}
         check([0xbf08, 0x0000], 2, Class::IfThen, 0x0000, 0x0000); // it eq
         check([0xb2d1, 0x0000], 2, Class::Alu, 0x0002, 0x0000); // uxtbeq r1, r2
-        check([0xcb03, 0x0000], 2, Class::Multiple(2), 0x000b, 0x0008); // ldmia r3!, {r0, r1}
+        check([0xcb03, 0x0000], 2, Class::LoadMultiple(2), 0x000b, 0x0008); // ldmia r3!, {r0, r1}
         check([0xbf00, 0x0000], 2, Class::Alu, 0x0000, 0x0000); // nop
-        check([0xe8b1, 0x0078], 4, Class::Multiple(4), 0x007a, 0x0002); // ldmia.w r1!, {r3, r4, r5, r6}
+        check([0xe8b1, 0x0078], 4, Class::LoadMultiple(4), 0x007a, 0x0002); // ldmia.w r1!, {r3, r4, r5, r6}
         check([0xe8bd, 0x8ff0], 4, Class::Return(9), 0xaff0, 0x2000); // ldmia.w sp!, {r4, r5, r6, r7, r8, r9, sl, fp, pc}
-        check([0xe8a8, 0x0078], 4, Class::Multiple(4), 0x0100, 0x0100); // stmia.w r8!, {r3, r4, r5, r6}
-        check([0xe8f0, 0xab02], 4, Class::Double, 0x0c00, 0x0001); // ldrd sl, fp, [r0], #8
-        check([0xe9cd, 0x2302], 4, Class::Double, 0x0000, 0x2000); // strd r2, r3, [sp, #8]
+        check([0xe8a8, 0x0078], 4, Class::StoreMultiple(4), 0x0100, 0x0100); // stmia.w r8!, {r3, r4, r5, r6}
+        check([0xe8f0, 0xab02], 4, Class::LoadDouble, 0x0c00, 0x0001); // ldrd sl, fp, [r0], #8
+        check([0xe9cd, 0x2302], 4, Class::StoreDouble, 0x0000, 0x2000); // strd r2, r3, [sp, #8]
         check([0xe8df, 0xf000], 4, Class::Branch, 0x0000, 0x0000); // tbb [pc, r0]
         check([0xea02, 0x1e39], 4, Class::Alu, 0x4000, 0x0000); // and.w lr, r2, r9, ror #4
         check([0xebb1, 0x0f0e], 4, Class::Alu, 0x0000, 0x0000); // cmp.w r1, lr
         check([0xf24c, 0x0203], 4, Class::Alu, 0x0004, 0x0000); // movw r2, #49155
         check([0xf5a7, 0x4700], 4, Class::Alu, 0x0080, 0x0000); // sub.w r7, r7, #32768
         check([0xf34e, 0x0e13], 4, Class::Alu, 0x4000, 0x0000); // sbfx lr, lr, #0, #20
-        check([0xfb2e, 0x5503], 4, Class::Alu, 0x0020, 0x0000); // smlad r5, lr, r3, r5
+        check([0xfb2e, 0x5503], 4, Class::Multiply, 0x0020, 0x0000); // smlad r5, lr, r3, r5
         check([0xfb05, 0x9904], 4, Class::MultiplyAccumulate, 0x0200, 0x0000); // mla r9, r5, r4, r9
-        check([0xfb02, 0xf103], 4, Class::Alu, 0x0002, 0x0000); // mul.w r1, r2, r3
-        check([0xfb3e, 0x220c], 4, Class::Alu, 0x0004, 0x0000); // smlawb r2, lr, ip, r2
-        check([0xfb17, 0x442a], 4, Class::Alu, 0x0010, 0x0000); // smlatb r4, r7, sl, r4
+        check([0xfb02, 0xf103], 4, Class::Multiply, 0x0002, 0x0000); // mul.w r1, r2, r3
+        check([0xfb3e, 0x220c], 4, Class::Multiply, 0x0004, 0x0000); // smlawb r2, lr, ip, r2
+        check([0xfb17, 0x442a], 4, Class::Multiply, 0x0010, 0x0000); // smlatb r4, r7, sl, r4
         check([0xeac6, 0x4c29], 4, Class::Alu, 0x1000, 0x0000); // pkhtb ip, r6, r9, asr #16
         check([0xfa9c, 0xfc0e], 4, Class::Alu, 0x1000, 0x0000); // sadd16 ip, ip, lr
         check([0xfa3f, 0xfe99], 4, Class::Alu, 0x4000, 0x0000); // uxtb16 lr, r9, ror #8
         check([0xfa07, 0xf78c], 4, Class::Alu, 0x0080, 0x0000); // sxtah r7, r7, ip
         check([0xfbb2, 0xf1f3], 4, Class::Divide, 0x0002, 0x0000); // udiv r1, r2, r3
-        check([0xfba3, 0x1204], 4, Class::Alu, 0x0006, 0x0000); // umull r1, r2, r3, r4
+        check([0xfba3, 0x1204], 4, Class::Multiply, 0x0006, 0x0000); // umull r1, r2, r3, r4
         check([0xf8dd, 0xe024], 4, Class::Load, 0x4000, 0x2000); // ldr.w lr, [sp, #36]
         check([0xf852, 0x1029], 4, Class::Load, 0x0002, 0x0204); // ldr.w r1, [r2, r9, lsl #2]
         check([0xf842, 0x1029], 4, Class::StoreIndexed, 0x0000, 0x0204); // str.w r1, [r2, r9, lsl #2]
         check([0xf8c2, 0x9004], 4, Class::Store, 0x0000, 0x0004); // str.w r9, [r2, #4]
-        check([0xecb0, 0x4a08], 4, Class::Multiple(8), 0x0000, 0x0001); // vldmia r0!, {s8-s15}
-        check([0xed2d, 0x8a09], 4, Class::Multiple(9), 0x0000, 0x2000); // vpush {s16-s24}
+        check([0xecb0, 0x4a08], 4, Class::LoadMultiple(8), 0x0000, 0x0001); // vldmia r0!, {s8-s15}
+        check([0xed2d, 0x8a09], 4, Class::StoreMultiple(9), 0x0000, 0x2000); // vpush {s16-s24}
         check([0xed93, 0x1a02], 4, Class::Load, 0x0000, 0x0008); // vldr s2, [r3, #8]
         check([0xed83, 0x1a02], 4, Class::Store, 0x0000, 0x0008); // vstr s2, [r3, #8]
         check([0xec5e, 0x4a14], 4, Class::FloatMove, 0x4010, 0x0000); // vmov r4, lr, s8, s9
@@ -442,5 +617,52 @@ mod tests {
         let multiply = ldr([0xee24, 0x4a80]); // vmul.f32 s8, s9, s0
         let add = ldr([0xee38, 0x4a04]); // vadd.f32 s8, s16, s8
         assert_eq!((add.cycles(), add.cycles_behind(&multiply)), (1, 2));
+    }
+
+    #[test]
+    fn branches_go_where_the_encoding_says() {
+        assert_eq!(branch_target(0x100, 0xd0fe, 0), Some(0x100)); // beq.n to itself
+        assert_eq!(branch_target(0x100, 0xd1f7, 0), Some(0xf2)); // bne.n
+        assert_eq!(branch_target(0x100, 0xf47f, 0xaffd), Some(0xfe)); // bne.w
+        assert_eq!(branch_target(0x1000, 0xf47f, 0xae00), Some(0xc04)); // bne.w, 1020 bytes back
+        assert_eq!(branch_target(0x100, 0xe7f7, 0), None); // b.n
+    }
+
+    /// A loop in a loop, and one that begins in a line's last halfword.
+    #[test]
+    fn the_longest_inner_loop_has_no_other_inside() -> Result<()> {
+        let mut halves = [0xbf00u16; 24];
+        halves[3] = 0xd1fd; // bne.n to 0x102
+        halves[20] = 0xd1ea; // bne.n to 0x100
+        let lines = |halves: &[u16]| {
+            let bytes = halves.iter().flat_map(|h| h.to_le_bytes()).collect();
+            let function = Function { name: "f".into(), address: 0x100, size: 48 };
+            Code { sections: vec![(0x100, bytes)], functions: vec![] }.longest_inner_loop(&function)
+        };
+        assert_eq!(lines(&halves)?, 1);
+        halves[16] = 0xd1f5; // bne.n to 0x10e
+        assert_eq!(lines(&halves)?, 3);
+        Ok(())
+    }
+
+    #[test]
+    fn costs_go_to_kinds_functions_and_lines() -> Result<()> {
+        // ldr r1, [sp, #4]; muls r1, r2, r1 | bne.n back to the start
+        let bytes = [0x9901u16, 0x4351, 0xd1fc].iter().flat_map(|h| h.to_le_bytes()).collect();
+        let function = |name: &str, address, size| Function { name: name.into(), address, size };
+        let functions = vec![function("first", 0x100, 4), function("second", 0x104, 2)];
+        let code = Code { sections: vec![(0x100, bytes)], functions };
+        let at = |address, jumps| Executed { address, count: 3, jumps };
+        let executed = vec![at(0x100, 0), at(0x102, 0), at(0x104, 2)];
+        let region =
+            Region { instructions: 9, data_lines: 2, code_lines: 1, next_lines: vec![0, 1, 0, 3, 0, 7], executed };
+        assert_eq!(code.by_kind(&region)?, [0, 3, 3, 0, 3, 0]);
+        let costs = [
+            ("first".to_owned(), Cost { instructions: 6, cycles: 3 * (2 + 1) }),
+            ("second".to_owned(), Cost { instructions: 3, cycles: 3 + 2 * REFILL }),
+        ];
+        assert_eq!(code.by_function(&region)?, costs);
+        assert_eq!((code.cycles(&region, 0)?, code.cycles(&region, 5)?), (16, 16 + 3 * 5 + 4 + 3 * 2));
+        Ok(())
     }
 }

@@ -3,6 +3,7 @@
 
 pub mod command;
 pub mod cycles;
+pub mod evaluation;
 pub mod golden;
 pub mod qemu;
 

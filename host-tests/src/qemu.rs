@@ -172,9 +172,13 @@ impl Counter {
         for line in text.lines() {
             let fields: Vec<&str> = line.split(' ').collect();
             match (&fields[..], regions.last_mut()) {
-                (["region", instructions], _) => {
-                    regions.push(Region { instructions: instructions.parse()?, executed: Vec::new() });
-                }
+                (["region", instructions, data_lines, code_lines, next @ ..], _) => regions.push(Region {
+                    instructions: instructions.parse()?,
+                    data_lines: data_lines.parse()?,
+                    code_lines: code_lines.parse()?,
+                    next_lines: next.iter().map(|count| Ok(count.parse()?)).collect::<Result<_>>()?,
+                    executed: Vec::new(),
+                }),
                 ([address, count, jumps], Some(region)) => region.executed.push(Executed {
                     address: u64::from_str_radix(address, 16)?,
                     count: count.parse()?,
@@ -185,11 +189,6 @@ impl Counter {
         }
         Ok(regions)
     }
-
-    /// Instructions of every region.
-    pub fn counts(&self) -> Result<Vec<u64>> {
-        Ok(self.regions()?.iter().map(|region| region.instructions).collect())
-    }
 }
 
 /// What was executed between two marks.
@@ -197,6 +196,12 @@ impl Counter {
 pub struct Region {
     /// Instructions.
     pub instructions: u64,
+    /// Lines of data fetched from flash into a cache of 8 lines of 16 bytes, empty at first.
+    pub data_lines: u64,
+    /// Lines of code fetched from flash after a jump into a cache of 64 lines of 16 bytes, empty at first.
+    pub code_lines: u64,
+    /// Lines of code fetched into it behind the line before, by how many instructions, from one on, were executed there.
+    pub next_lines: Vec<u64>,
     /// Each instruction that was executed, by address.
     pub executed: Vec<Executed>,
 }

@@ -1,26 +1,46 @@
-//! `cargo xtask bench`: the kernels on the Cortex-M4, counted and modelled.
+//! `cargo xtask bench`: kernels and whole heads on the Cortex-M4, counted and modelled.
 
 use std::path::{Path, PathBuf};
 
-use actq::inspect::table;
+use actq::inspect::{group_name, table};
 use actq_host_tests::cycles::Code;
 use actq_host_tests::qemu::{self, Counter, Target};
 use anyhow::{Context, Result, bail, ensure};
 use serde::Serialize;
 
+use crate::heads;
+
 /// A counted call: activations from f32, the product, and the results back in f32.
 #[derive(Debug, Serialize)]
 pub(crate) struct Record {
-    name: String,
+    pub(crate) name: String,
     /// Bits of a weight.
-    bits: u32,
+    pub(crate) bits: u32,
     /// Columns per u8 scale; 0 = one scale a row.
-    group: usize,
-    rows: usize,
-    cols: usize,
-    instructions: u64,
-    /// Modelled: zero-wait memory.
-    cycles: u64,
+    pub(crate) group: usize,
+    pub(crate) rows: usize,
+    pub(crate) cols: usize,
+    pub(crate) instructions: u64,
+    #[serde(flatten)]
+    cycles: Cycles,
+}
+
+/// Modelled cycles.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct Cycles {
+    /// With memory that never waits.
+    pub(crate) cycles: u64,
+    /// With the wait states that were asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) cycles_with_waits: Option<u64>,
+}
+
+impl Cycles {
+    /// `wait_states` 0 asks for none.
+    pub(crate) fn new(code: &Code, region: &qemu::Region, wait_states: u64) -> Result<Self> {
+        let with_waits = (wait_states > 0).then(|| code.cycles(region, wait_states)).transpose()?;
+        Ok(Self { cycles: code.cycles(region, 0)?, cycles_with_waits: with_waits })
+    }
 }
 
 impl Record {
@@ -31,15 +51,41 @@ impl Record {
     fn shape(&self) -> (usize, usize) {
         (self.rows, self.cols)
     }
+
+    /// Whether this is a kernel of the runtime, and not a yardstick.
+    pub(crate) fn is_kernel(&self) -> bool {
+        self.name.starts_with("gemv")
+    }
 }
 
-pub(crate) fn run(json: Option<&Path>) -> Result<()> {
+/// What the JSON file holds.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Entry<'a> {
+    Kernel(&'a Record),
+    Head(&'a heads::Record),
+}
+
+pub(crate) fn run(json: Option<&Path>, wait_states: u64, by_function: bool) -> Result<()> {
+    let counter = Counter::build()?;
     // The bench firmware carries an image like every firmware, but does not run it.
-    let image = placeholder()?;
-    let records = measure(&image, &Counter::build()?)?;
-    println!("\nWhole calls on the Cortex-M4: instructions counted, cycles modelled\n\n{}", report(&records, None));
+    let kernels = measure(&placeholder()?, &counter, wait_states)?;
+    println!("\nWhole calls on the Cortex-M4: instructions counted, cycles modelled\n\n{}", report(&kernels, None));
+    let heads = heads::measure(&heads::policies(), &counter, wait_states)?;
+    println!("\nWhole heads: a step that evaluates the network\n\n{}", heads::report(&heads));
+    println!("\nTheir instructions per MAC, by kind\n\n{}", heads::report_kinds(&heads));
+    if by_function {
+        println!("\nTheir instructions, by function\n\n{}", heads::report_functions(&heads));
+    }
+    if wait_states > 0 {
+        println!(
+            "\nwith waits: flash of {wait_states} wait states behind the caches of an STM32F4, a model (docs/KERNELS.md)"
+        );
+    }
     if let Some(path) = json {
-        std::fs::write(path, serde_json::to_string_pretty(&records)? + "\n")
+        let kernels = kernels.iter().map(Entry::Kernel);
+        let all: Vec<Entry<'_>> = kernels.chain(heads.iter().map(|head| Entry::Head(&head.record))).collect();
+        std::fs::write(path, serde_json::to_string_pretty(&all)? + "\n")
             .with_context(|| format!("{}: cannot be written", path.display()))?;
     }
     Ok(())
@@ -54,7 +100,7 @@ pub(crate) fn placeholder() -> Result<PathBuf> {
 }
 
 /// Runs the bench firmware.
-pub(crate) fn measure(image: &Path, counter: &Counter) -> Result<Vec<Record>> {
+pub(crate) fn measure(image: &Path, counter: &Counter, wait_states: u64) -> Result<Vec<Record>> {
     let elf = qemu::build("bench", Target::Fpu, image)?;
     let mut command = qemu::command(&elf, None, "");
     counter.attach(&mut command, &elf)?;
@@ -74,7 +120,7 @@ pub(crate) fn measure(image: &Path, counter: &Counter) -> Result<Vec<Record>> {
             rows: rows.parse()?,
             cols: cols.parse()?,
             instructions: region.instructions,
-            cycles: code.cycles(region)?,
+            cycles: Cycles::new(&code, region, wait_states)?,
         })
     };
     lines.lines().zip(&regions).map(record).collect()
@@ -82,26 +128,37 @@ pub(crate) fn measure(image: &Path, counter: &Counter) -> Result<Vec<Record>> {
 
 /// The records as a table, all of them or those of one shape.
 pub(crate) fn report(records: &[Record], shape: Option<(usize, usize)>) -> String {
-    let mut rows =
-        table(&["kernel", "bits", "scales", "shape", "instructions", "per MAC", "cycles", "per MAC", "against f32"]);
+    let waits = records.iter().any(|r| r.cycles.cycles_with_waits.is_some());
+    let mut header =
+        vec!["kernel", "bits", "scales", "shape", "instructions", "per MAC", "cycles", "per MAC", "against f32"];
+    header.push("against int8");
+    if waits {
+        header.extend(["with waits", "per MAC"]);
+    }
+    let mut rows = table(&header);
     for record in records.iter().filter(|r| shape.is_none_or(|shape| r.shape() == shape)) {
-        let naive = records.iter().find(|r| r.name == "naive-f32" && r.shape() == record.shape());
-        let scales = match (record.name.as_str(), record.group) {
-            ("naive-f32", _) => "-".to_owned(),
-            (_, 0) => "row".to_owned(),
-            (_, group) => group.to_string(),
+        let cycles = record.cycles.cycles;
+        let against = |name| {
+            let other = records.iter().find(|r| r.name == name && r.shape() == record.shape());
+            other.map_or("-".to_owned(), |other| format!("{:.1}x", other.cycles.cycles as f64 / cycles as f64))
         };
-        rows.add_row([
+        let per_mac = |count: u64| format!("{:.3}", count as f64 / record.macs());
+        let mut row = vec![
             record.name.clone(),
             record.bits.to_string(),
-            scales,
+            if record.name == "naive-f32" { "-".to_owned() } else { group_name(record.group) },
             format!("{}x{}", record.rows, record.cols),
             record.instructions.to_string(),
-            format!("{:.3}", record.instructions as f64 / record.macs()),
-            record.cycles.to_string(),
-            format!("{:.3}", record.cycles as f64 / record.macs()),
-            naive.map_or("-".to_owned(), |n| format!("{:.1}x", n.cycles as f64 / record.cycles as f64)),
-        ]);
+            per_mac(record.instructions),
+            cycles.to_string(),
+            per_mac(cycles),
+            against("naive-f32"),
+            against("int8-smlad"),
+        ];
+        if let Some(cycles) = record.cycles.cycles_with_waits {
+            row.extend([cycles.to_string(), per_mac(cycles)]);
+        }
+        rows.add_row(row);
     }
     rows.to_string()
 }

@@ -9,15 +9,14 @@ use actq::policy::Policy;
 use actq::quantize::prepared::Prepared;
 use actq::quantize::{Budget, Method, Options};
 use actq::runtime::{ImageBuffer, with_head};
-use actq::writer;
+use actq_host_tests::evaluation;
 use actq_host_tests::qemu::{self, Counter, Server, Target};
-use actq_kernels::image::Op;
 use actq_kernels::{Head, Image, Width};
 use actq_ur3::policy_f32::PolicyF32;
 use actq_ur3::task::{Outcome, run_episode};
 use anyhow::{Context, Result, ensure};
 
-use crate::bench;
+use crate::{bench, heads};
 
 /// First seed of the closed-loop episodes; the policy was trained and calibrated on others.
 const FIRST_SEED: u64 = 1000;
@@ -78,17 +77,18 @@ pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
     for (name, options) in [("8 bits", eight), ("3.0 bits", best(3.0)), ("2.0 bits", best(2.0))] {
         println!("Quantizing to {name} by {}", options.method);
         let prepared = Prepared::new(&policy, options.method, |_| {})?;
-        let (quantized, matrices) = prepared.quantize(&options, |_| {})?;
-        let bytes = writer::image(&quantized, &matrices)?;
         let path = work.join(format!("ur3 {name}.actq").replace(' ', "-"));
-        writer::write(&path, &bytes)?;
+        let bytes = heads::write_image(&prepared, &options, &path)?;
         let buffer = ImageBuffer::new(&bytes);
         let image = buffer.image(&path)?;
         println!("Closed loop at {name}, {episodes} episodes on the host");
         let outcomes = with_head(image, |head| closed_loop(episodes, |seed| episode_on_host(head, seed)))?;
         println!("Closed loop at {name}, {qemu_episodes} episodes with the firmware in QEMU as the policy");
-        let firmware = Firmware::run(&path, image, &counter, qemu_episodes)?;
-        let nmse = eval::evaluate(image, &eval::heldout(&policy_dir, &image)?)?.nmse;
+        let elf = qemu::build("actq-firmware-demo", Target::Fpu, &path)?;
+        let firmware = Firmware::run(&elf, image, qemu_episodes)?;
+        let heldout = eval::heldout(&policy_dir, &image)?;
+        let instructions = evaluation::count(&counter, &elf, None, &image, heldout.episode(0))?.instructions;
+        let nmse = eval::evaluate(image, &heldout)?.nmse;
         columns.push(Column {
             name: name.into(),
             cells: vec![
@@ -99,8 +99,8 @@ pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
                 format!("{nmse:.1e}"),
                 success(&outcomes),
                 tracking(&outcomes),
-                firmware.instructions.to_string(),
-                format!("{:.2}", firmware.instructions as f64 / macs(&image) as f64),
+                instructions.to_string(),
+                format!("{:.2}", instructions as f64 / policy.graph.weights() as f64),
             ],
         });
         report.push(format!(
@@ -108,7 +108,7 @@ pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
             success(&firmware.outcomes),
             firmware.identical,
             firmware.actions,
-            firmware.code_bytes,
+            qemu::flash_bytes(&elf)? - image.bytes() as u64,
         ));
         ensure!(firmware.identical == firmware.actions, "the firmware's actions differ from the host's");
     }
@@ -120,7 +120,7 @@ pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
         summary.add_row(std::iter::once((*row).to_owned()).chain(cells));
     }
     println!("\n{summary}\n\n{}\n", report.join("\n"));
-    let records = bench::measure(&work.join("ur3-3.0-bits.actq"), &counter)?;
+    let records = bench::measure(&work.join("ur3-3.0-bits.actq"), &counter, 0)?;
     println!(
         "A whole call each on the Cortex-M4, instructions counted, cycles modelled:\n\n{}",
         bench::report(&records, Some((256, 256)))
@@ -161,62 +161,32 @@ fn tracking(outcomes: &[Outcome]) -> String {
     format!("{:.2} mm", 1e3 * mean)
 }
 
-fn macs(image: &Image<'_>) -> usize {
-    image
-        .ops()
-        .map(|op| match op {
-            Op::Linear { matrix, .. } => matrix.rows * matrix.cols,
-            _ => 0,
-        })
-        .sum()
-}
-
 /// What a run of the firmware as the policy gave.
 struct Firmware {
     outcomes: Vec<Outcome>,
     actions: usize,
     /// Actions whose bits are those of the host executor on the same observations.
     identical: usize,
-    /// Mean over the steps that evaluate the network.
-    instructions: u64,
-    code_bytes: u64,
 }
 
 impl Firmware {
-    fn run(path: &Path, image: Image<'_>, counter: &Counter, episodes: u64) -> Result<Self> {
-        let elf = qemu::build("actq-firmware-demo", Target::Fpu, path)?;
-        let mut command = qemu::command(&elf, None, "serve");
-        counter.attach(&mut command, &elf)?;
-        let mut server = Server::start(command, image.act_len())?;
+    fn run(elf: &Path, image: Image<'_>, episodes: u64) -> Result<Self> {
+        let mut server = Server::start(qemu::command(elf, None, "serve"), image.act_len())?;
         let (mut actions, mut identical) = (0, 0);
-        // Whether each step evaluates the network or plays on from its chunk.
-        let mut evaluates = Vec::new();
         let outcomes = with_head(image, |head| {
             closed_loop(episodes, |seed| {
                 head.reset();
                 server.reset()?;
-                let mut step = 0;
                 episode(seed, |obs| {
                     let action = server.step(obs)?;
                     let same = action.iter().zip(head.step(obs)?).all(|(a, b)| a.to_bits() == b.to_bits());
                     actions += 1;
                     identical += usize::from(same);
-                    evaluates.push(step % image.execute() == 0);
-                    step += 1;
                     action.as_slice().try_into().context("an action has not six values")
                 })
             })
         })?;
         server.finish()?;
-        let counts = counter.counts()?;
-        ensure!(counts.len() == evaluates.len(), "the counter saw {} steps of {}", counts.len(), evaluates.len());
-        let evaluated: Vec<u64> = counts.iter().zip(&evaluates).filter(|(_, e)| **e).map(|(c, _)| *c).collect();
-        Ok(Self {
-            outcomes,
-            actions,
-            identical,
-            instructions: evaluated.iter().sum::<u64>() / evaluated.len().max(1) as u64,
-            code_bytes: qemu::flash_bytes(&elf)? - image.bytes() as u64,
-        })
+        Ok(Self { outcomes, actions, identical })
     }
 }

@@ -1,8 +1,10 @@
-//! What people and CI type: `cargo demo`, `cargo verify`, `cargo xtask bench`, `cargo xtask doctor`.
+//! What people and CI type: `cargo demo`, `cargo verify`, `cargo xtask bench`, `cargo xtask budgets`, `cargo xtask doctor`.
 #![forbid(unsafe_code)]
 
 mod bench;
+mod budgets;
 mod demo;
+mod heads;
 mod setup;
 mod verify;
 
@@ -30,11 +32,25 @@ enum Command {
         #[arg(long, default_value_t = 20)]
         qemu_episodes: u64,
     },
-    /// Count the kernels' instructions on a Cortex-M4 in QEMU and model their cycles
+    /// Count the instructions of kernels and whole heads on a Cortex-M4 in QEMU and model their cycles
+    ///
+    /// The heads are that of the UR3 policy and, where ACTQ_SHARED names their folder, those of the shared policies.
     Bench {
         /// Write the figures as JSON, too
         #[arg(long)]
         json: Option<PathBuf>,
+        /// Also model a flash with so many wait states behind the caches of an STM32F4; an STM32F405 at 168 MHz has 5
+        #[arg(long, value_name = "N", default_value_t = 0)]
+        wait_states: u64,
+        /// Show in which functions the heads spend their instructions
+        #[arg(long)]
+        by_function: bool,
+    },
+    /// Measure instructions, code, scratch and stack, and compare them with budgets.json
+    Budgets {
+        /// Write what was measured to budgets.json
+        #[arg(long)]
+        update: bool,
     },
     /// Everything that CI checks: format, lints, documentation, tests on the host and under QEMU
     Verify,
@@ -45,7 +61,10 @@ enum Command {
 fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Demo { episodes, qemu_episodes } => setup::ensure().and_then(|()| demo::run(episodes, qemu_episodes)),
-        Command::Bench { json } => setup::ensure().and_then(|()| bench::run(json.as_deref())),
+        Command::Bench { json, wait_states, by_function } => {
+            setup::ensure().and_then(|()| bench::run(json.as_deref(), wait_states, by_function))
+        }
+        Command::Budgets { update } => setup::ensure().and_then(|()| budgets::run(update)),
         Command::Verify => setup::ensure().and_then(|()| verify::run()),
         Command::Doctor => setup::ensure().map(|()| println!("all there")),
     };

@@ -44,6 +44,7 @@ pub(crate) fn run() -> Result<()> {
             vec![deny(), image()],
         ),
         ("tests", vec!["test", "--release"], vec![]),
+        ("budgets", vec!["run", "--release", "--package", "xtask", "--", "budgets"], vec![]),
     ]);
     let mut failed = Vec::new();
     for (name, arguments, environment) in steps {

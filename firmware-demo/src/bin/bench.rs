@@ -1,7 +1,8 @@
 //! Counted kernel calls: each prints a line `name bits group rows cols`, in the order of the counted regions.
 //!
-//! A region is a whole call: activations from f32, the product, and the results back in f32 with row scales and biases. The
-//! yardsticks are a naive loop in f32, and 8-bit rows with SXTB16 and SMLAD as one would write them with intrinsics.
+//! A region is a whole call: activations from f32, the product, and the results back in f32 with row scales and biases. What an
+//! image would hold stands in the image slot, so that its lines count as fetched from flash. The yardsticks are a naive loop in
+//! f32, and 8-bit rows with SXTB16 and SMLAD as one would write them with intrinsics.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
@@ -28,35 +29,40 @@ mod firmware {
     const ROWS: usize = 512;
     const COLS: usize = 1024;
 
-    struct Buffers {
+    /// What an image holds.
+    #[repr(C)]
+    struct Flash {
         codes: [u8; WEIGHTS],
         scales: [u8; WEIGHTS / 32],
         weights: [f32; WEIGHTS],
         words: [u32; WEIGHTS / 4 + WEIGHTS / 128],
-        x: [f32; COLS],
-        prepared: [u32; COLS],
         row_scales: [u32; ROWS / 2],
         bias: [u32; ROWS],
+    }
+
+    struct Ram {
+        x: [f32; COLS],
+        prepared: [u32; COLS],
         y: [f32; ROWS],
+    }
+
+    unsafe extern "C" {
+        static mut _image_slot_start: Flash;
+        static _image_slot_end: u8;
     }
 
     #[cortex_m_rt::entry]
     fn main() -> ! {
-        let buffers = singleton!(: Buffers = Buffers {
-            codes: [0; WEIGHTS],
-            scales: [0; WEIGHTS / 32],
-            weights: [0.0; WEIGHTS],
-            words: [0; WEIGHTS / 4 + WEIGHTS / 128],
-            x: [0.0; COLS],
-            prepared: [0; COLS],
-            row_scales: [0; ROWS / 2],
-            bias: [0; ROWS],
-            y: [0.0; ROWS],
-        });
-        host::exit(buffers.is_some_and(|buffers| run(buffers).is_some()))
+        let ram = singleton!(: Ram = Ram { x: [0.0; COLS], prepared: [0; COLS], y: [0.0; ROWS] });
+        let slot = (&raw const _image_slot_end as usize) - (&raw const _image_slot_start as usize);
+        let fits = size_of::<Flash>() <= slot;
+        // SAFETY: memory.x gives the slot's bounds, aligned to 4, in memory that nothing else uses; QEMU's code memory can be
+        // written. Every bit pattern is a value of the arrays' types, and this is the only reference.
+        let flash = unsafe { (&raw mut _image_slot_start).as_mut() };
+        host::exit(fits && flash.zip(ram).is_some_and(|(flash, ram)| run(flash, ram).is_some()))
     }
 
-    fn run(b: &mut Buffers) -> Option<()> {
+    fn run(b: &mut Flash, ram: &mut Ram) -> Option<()> {
         let mut out = hio::hstdout().ok()?;
         let mut seed = 0x1234_5678u32;
         let mut random = move || {
@@ -68,17 +74,17 @@ mod firmware {
         b.codes.iter_mut().for_each(|c| *c = random() as u8);
         b.scales.iter_mut().for_each(|s| *s = random() as u8);
         b.weights.iter_mut().for_each(|w| *w = random() as i32 as f32);
-        b.x.iter_mut().for_each(|x| *x = random() as i32 as f32);
+        ram.x.iter_mut().for_each(|x| *x = random() as i32 as f32);
         b.bias.iter_mut().for_each(|x| *x = (random() as i32 as f32).to_bits());
         b.row_scales.fill(0x3c00_3c80);
         for (rows, cols) in SHAPES {
-            let x = b.x.get(..cols)?;
-            let (bias, y) = (b.bias.get(..rows)?, b.y.get_mut(..rows)?);
+            let x = ram.x.get(..cols)?;
+            let (bias, y) = (b.bias.get(..rows)?, ram.y.get_mut(..rows)?);
             let weights = b.weights.get(..rows * cols)?;
             count::region(|| naive(weights, black_box(x), bias, y));
             writeln!(out, "naive-f32 32 0 {rows} {cols}").ok()?;
             let codes = b.codes.get(..rows * cols)?;
-            let pairs = b.prepared.get_mut(..cols / 2)?;
+            let pairs = ram.prepared.get_mut(..cols / 2)?;
             count::region(|| int8(codes, black_box(x), &b.row_scales, bias, pairs, y))?;
             writeln!(out, "int8-smlad 8 0 {rows} {cols}").ok()?;
             for (name, x_max) in [("gemv-a8", 127), ("gemv-a16", 2047)] {
@@ -90,7 +96,7 @@ mod firmware {
                         let block = Block::new(shape, words)?;
                         let scales = b.row_scales.get(..rows.div_ceil(2))?;
                         let block = RowBlock { block, scales, index: &[], first_row: 0 };
-                        let prepared = b.prepared.get_mut(..prepared_words(shape))?;
+                        let prepared = ram.prepared.get_mut(..prepared_words(shape))?;
                         count::region(|| product(&block, black_box(x), x_max, bias, prepared, y))?;
                         black_box(&y);
                         writeln!(out, "{name} {} {group} {rows} {cols}", width.bits()).ok()?;

@@ -1,11 +1,17 @@
-//! A QEMU plugin that counts executed instructions exactly.
+//! A QEMU plugin that counts executed instructions exactly, and the lines of flash that caches would have to fetch for them.
 //!
 //! `qemu-system-arm ... -plugin libinsn_count.so,out=FILE,begin=ADDR,begin_end=ADDR,end=ADDR`: counting starts when execution
 //! leaves the function at `begin..begin_end` and stops when it enters the function at `end`. The call of `end` itself is not
 //! counted. Addresses are hexadecimal.
 //!
-//! Each such region adds lines to FILE: `region N` with the number of instructions, then for every instruction that was
-//! executed `ADDR COUNT JUMPS`, where JUMPS says how often execution did not go on at the next instruction.
+//! Each such region adds lines to FILE: `region N DATA CODE NEXT1 .. NEXT8` with the number of instructions and of lines
+//! fetched from flash: for data, for code after a jump, and for code that goes on behind a line of which 1 to 8 instructions
+//! were executed (meanwhile the next line can be prefetched). Then, for every instruction that was executed, `ADDR COUNT JUMPS`,
+//! where JUMPS says how often execution did not go on at the next instruction.
+//!
+//! Flash is what lies below 0x20000000, the code region of the Cortex-M's memory map. Fetched lines are those that the caches of
+//! an STM32F4 would miss (reference manual RM0090, section 3.5.2): lines of 16 bytes, 64 for code and 8 for data, the least
+//! recently used one replaced, both empty at the start of a region.
 //!
 //! Only functions that every plugin API since QEMU 7.2 has in the same form are used; the API version that QEMU asks for is set
 //! when the plugin is built (environment variable `ACTQ_QEMU_API`, default 1; 2 from QEMU 9.1 on).
@@ -27,6 +33,7 @@ pub static qemu_plugin_version: c_int = match option_env!("ACTQ_QEMU_API") {
 type Id = u64;
 type TranslateCallback = unsafe extern "C" fn(Id, *mut c_void);
 type ExecuteCallback = unsafe extern "C" fn(c_uint, *mut c_void);
+type MemoryCallback = unsafe extern "C" fn(c_uint, u32, u64, *mut c_void);
 type ExitCallback = unsafe extern "C" fn(Id, *mut c_void);
 
 unsafe extern "C" {
@@ -35,6 +42,13 @@ unsafe extern "C" {
         insn: *mut c_void,
         callback: ExecuteCallback,
         flags: c_int,
+        data: *mut c_void,
+    );
+    fn qemu_plugin_register_vcpu_mem_cb(
+        insn: *mut c_void,
+        callback: MemoryCallback,
+        flags: c_int,
+        accesses: c_int,
         data: *mut c_void,
     );
     fn qemu_plugin_register_atexit_cb(id: Id, callback: ExitCallback, data: *mut c_void);
@@ -55,6 +69,87 @@ static LAST: AtomicU64 = AtomicU64::new(0);
 static OUT: Mutex<Option<BufWriter<File>>> = Mutex::new(None);
 /// Every translated instruction by its address. They live as long as QEMU does.
 static INSTRUCTIONS: Mutex<BTreeMap<u64, &'static Instruction>> = Mutex::new(BTreeMap::new());
+
+/// Where the flash ends.
+const FLASH_END: u64 = 0x2000_0000;
+/// Bytes of a line, as a power of two.
+const LINE: u32 = 4;
+/// `QEMU_PLUGIN_MEM_RW`: loads and stores. (QEMU 7.2 gives stores where only loads are asked for; nothing stores to flash.)
+const ACCESSES: c_int = 3;
+/// Instructions that a line holds.
+const LINE_INSTRUCTIONS: usize = 8;
+
+static FLASH: Mutex<Flash> = Mutex::new(Flash::new());
+
+/// The flash's caches, and what they fetched in this region.
+struct Flash {
+    code: Cache,
+    data: Cache,
+    /// The line of the last counted instruction, and how many were executed since execution came to it.
+    line: Option<u64>,
+    executed: usize,
+    data_lines: u64,
+    code_lines: u64,
+    next_lines: [u64; LINE_INSTRUCTIONS],
+}
+
+impl Flash {
+    const fn new() -> Self {
+        Self {
+            code: Cache { capacity: 64, lines: Vec::new() },
+            data: Cache { capacity: 8, lines: Vec::new() },
+            line: None,
+            executed: 0,
+            data_lines: 0,
+            code_lines: 0,
+            next_lines: [0; LINE_INSTRUCTIONS],
+        }
+    }
+
+    /// An instruction is executed. One that straddles two lines counts for its first one; the next one fetches the second.
+    fn execute(&mut self, line: u64) {
+        if self.line != Some(line) {
+            if !self.code.access(line) {
+                let next = self.line.is_some_and(|last| last + 1 == line);
+                match self.next_lines.get_mut(self.executed.saturating_sub(1)) {
+                    Some(count) if next => *count += 1,
+                    // A loop inside of a line leaves all the time that its successor needs.
+                    None if next => self.next_lines[LINE_INSTRUCTIONS - 1] += 1,
+                    _ => self.code_lines += 1,
+                }
+            }
+            (self.line, self.executed) = (Some(line), 0);
+        }
+        self.executed += 1;
+    }
+
+    fn load(&mut self, line: u64) {
+        self.data_lines += u64::from(!self.data.access(line));
+    }
+}
+
+/// A cache of lines, the least recently used one first.
+struct Cache {
+    capacity: usize,
+    lines: Vec<u64>,
+}
+
+impl Cache {
+    /// Whether the cache has the line; it has it afterwards.
+    fn access(&mut self, line: u64) -> bool {
+        let found = self.lines.iter().rposition(|l| *l == line);
+        match found {
+            Some(at) => self.lines[at..].rotate_left(1),
+            None => {
+                if self.lines.len() == self.capacity {
+                    self.lines.remove(0);
+                }
+                self.lines.push(line);
+            }
+        }
+        found.is_some()
+    }
+}
 
 /// An instruction of the guest. The guest has one CPU, so relaxed counters lose nothing.
 struct Instruction {
@@ -81,9 +176,23 @@ unsafe extern "C" fn on_execute(_vcpu: c_uint, data: *mut c_void) {
                 count_jump(LAST.load(Relaxed));
             }
             instruction.count.fetch_add(1, Relaxed);
+            if address < FLASH_END
+                && let Ok(mut flash) = FLASH.lock()
+            {
+                flash.execute(address >> LINE);
+            }
             LAST.store(address, Relaxed);
             NEXT.store(address + instruction.size, Relaxed);
         }
+    }
+}
+
+unsafe extern "C" fn on_access(_vcpu: c_uint, _info: u32, address: u64, _data: *mut c_void) {
+    if address < FLASH_END
+        && COUNTING.load(Relaxed)
+        && let Ok(mut flash) = FLASH.lock()
+    {
+        flash.load(address >> LINE);
     }
 }
 
@@ -101,7 +210,12 @@ fn write_region() -> io::Result<()> {
     if let Some(call) = all.get(&LAST.load(Relaxed)) {
         call.count.fetch_sub(1, Relaxed);
     }
-    writeln!(out, "region {}", all.values().map(|i| i.count.load(Relaxed)).sum::<u64>())?;
+    let Ok(mut flash) = FLASH.lock() else { return Ok(()) };
+    let Flash { data_lines, code_lines, next_lines, .. } = std::mem::replace(&mut *flash, Flash::new());
+    let instructions = all.values().map(|i| i.count.load(Relaxed)).sum::<u64>();
+    write!(out, "region {instructions} {data_lines} {code_lines}")?;
+    next_lines.iter().try_for_each(|count| write!(out, " {count}"))?;
+    writeln!(out)?;
     for instruction in all.values() {
         let (count, jumps) = (instruction.count.swap(0, Relaxed), instruction.jumps.swap(0, Relaxed));
         if count > 0 {
@@ -114,7 +228,7 @@ fn write_region() -> io::Result<()> {
 unsafe extern "C" fn on_translate(_id: Id, tb: *mut c_void) {
     let Ok(mut all) = INSTRUCTIONS.lock() else { return };
     // SAFETY: QEMU hands over a translation block that is valid during this call; indexes stay below its length, and the
-    // callback has the signature that QEMU expects. Flag 0: the callback reads no registers.
+    // callbacks have the signatures that QEMU expects. Flag 0: they read no registers.
     unsafe {
         for i in 0..qemu_plugin_tb_n_insns(tb) {
             let insn = qemu_plugin_tb_get_insn(tb, i);
@@ -126,6 +240,7 @@ unsafe extern "C" fn on_translate(_id: Id, tb: *mut c_void) {
             let instruction: &'static Instruction = all.entry(address).or_insert_with(new);
             let data = std::ptr::from_ref(instruction).cast_mut().cast();
             qemu_plugin_register_vcpu_insn_exec_cb(insn, on_execute, 0, data);
+            qemu_plugin_register_vcpu_mem_cb(insn, on_access, 0, ACCESSES, std::ptr::null_mut());
         }
     }
 }
