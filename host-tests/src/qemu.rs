@@ -25,6 +25,9 @@ pub enum Target {
 }
 
 impl Target {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Fpu, Self::NoFpu, Self::NoDsp, Self::Small];
+
     /// rustc's name.
     pub fn triple(self) -> &'static str {
         match self {

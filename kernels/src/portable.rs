@@ -1,4 +1,7 @@
 //! The GEMV in plain Rust, for any target: the arithmetic of the assembler backend, sum for sum.
+//!
+//! The loops are written for a compiler that has few registers and knows the layout: a strip's cells are walked side by side,
+//! so that an activation is loaded once for all of them, and lengths are constants wherever the layout gives them.
 
 use crate::activations::Prepared;
 use crate::format::{Block, Format, QUAD, Sums, with_format};
@@ -24,7 +27,7 @@ struct Lengths {
 fn strips<F: Format>(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i32]) {
     let shape = block.shape();
     let group = x.groups().next().unwrap_or(&[]);
-    let first_chunk = x.chunks(&group[..group.len() - usize::from(F::X.sum)]).next().unwrap_or(&[]);
+    let first_chunk = x.chunks(split(group, group.len().wrapping_sub(usize::from(F::X.sum))).0).next().unwrap_or(&[]);
     let lengths = Lengths {
         x_group: group.len().max(1),
         first_chunk: first_chunk.len(),
@@ -70,7 +73,7 @@ fn strip_of<F: Format, const CELLS: usize>(mut words: &[u32], mut x: &[u32], len
         let (weights, rest) = split(words, weights_and_scales);
         words = rest;
         let (mut weights, scales) = split(weights, weights.len().wrapping_sub(scales));
-        let (mut group, x_sum) = split(group, group.len() - usize::from(F::X.sum));
+        let (mut group, x_sum) = split(group, group.len().wrapping_sub(usize::from(F::X.sum)));
         let mut sums = [[0i32; QUAD]; CELLS];
         let length = F::X.starts.len() + F::X.chunk / 2;
         if F::X.chunk == usize::MAX {
