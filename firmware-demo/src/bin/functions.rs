@@ -1,4 +1,5 @@
-//! Counted functions: each prints a line `name elements`, in the order of the counted regions.
+//! Counted functions: each prints a line `name elements hash`, in the order of the counted regions. The hash is of the
+//! results' bits; `host-tests/tests/functions.rs` computes the same on the host.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
@@ -31,26 +32,30 @@ mod firmware {
 
     fn run() -> Option<()> {
         let mut out = hio::hstdout().ok()?;
+        let mut line = |name: &str, results: &[f32]| {
+            let hash = results.iter().fold(0u32, |hash, v| hash.rotate_left(5) ^ v.to_bits());
+            writeln!(out, "{name} {LEN} {hash:08x}").ok()
+        };
+        let constants = values::<LEN>().map(f32::to_bits);
         for function in Function::ALL {
             let mut x = values::<LEN>();
             count::region(|| function.apply(black_box(&mut x)));
-            black_box(x);
-            writeln!(out, "{} {LEN}", function.name()).ok()?;
+            line(function.name(), &x)?;
         }
-        let (mut x, constants) = (values::<LEN>(), values::<LEN>().map(f32::to_bits));
+        let mut x = values::<LEN>();
         count::region(|| norm::layer_norm(black_box(&mut x), &constants, &constants, 1e-5));
-        writeln!(out, "layernorm {LEN}").ok()?;
+        line("layernorm", &x)?;
+        let mut x = values::<LEN>();
         count::region(|| norm::rms_norm(black_box(&mut x), &constants, 1e-5));
-        writeln!(out, "rmsnorm {LEN}").ok()?;
-        let mut h = [0.0; LEN];
-        count::region(|| norm::normalize(black_box(&x), &constants, &constants, 1.0, 5.0, black_box(&mut h)));
-        writeln!(out, "normalize {LEN}").ok()?;
-        let (a, b) = (values::<{ 4 * LEN }>(), values::<{ 3 * LEN }>());
-        count::region(|| recurrent::lstm_cell(black_box(&a), &mut x, black_box(&mut h)));
-        writeln!(out, "lstm {LEN}").ok()?;
-        let a = a.get(..3 * LEN)?;
-        count::region(|| recurrent::gru_cell(black_box(a), &b, black_box(&mut h)));
-        black_box((x, h));
-        writeln!(out, "gru {LEN}").ok()
+        line("rmsnorm", &x)?;
+        let (x, mut y) = (values::<LEN>(), [0.0; LEN]);
+        count::region(|| norm::normalize(black_box(&x), &constants, &constants, 1.0, 5.0, black_box(&mut y)));
+        line("normalize", &y)?;
+        let (gates, mut c, mut h) = (values::<{ 4 * LEN }>(), values::<LEN>(), [0.0; LEN]);
+        count::region(|| recurrent::lstm_cell(black_box(&gates), &mut c, black_box(&mut h)));
+        line("lstm", &h)?;
+        let (a, b, mut h) = (values::<{ 3 * LEN }>(), values::<{ 3 * LEN }>(), values::<LEN>());
+        count::region(|| recurrent::gru_cell(black_box(&a), &b, black_box(&mut h)));
+        line("gru", &h)
     }
 }
