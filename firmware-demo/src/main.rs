@@ -30,9 +30,9 @@ mod firmware {
     )));
 
     /// Scratch words; the image says how many it needs.
-    const SCRATCH: usize = 24 * 1024;
+    const SCRATCH: usize = if cfg!(actq_small) { 1536 } else { 24 * 1024 };
     /// The longest observation that `serve` takes.
-    const MAX_OBSERVATION: usize = 1024;
+    const MAX_OBSERVATION: usize = if cfg!(actq_small) { 64 } else { 1024 };
 
     #[cortex_m_rt::entry]
     fn main() -> ! {

@@ -18,14 +18,32 @@ pub enum Target {
     Fpu,
     /// thumbv7em-none-eabi: floats in software
     NoFpu,
+    /// thumbv7m-none-eabi, Cortex-M3: the portable kernels
+    NoDsp,
+    /// thumbv6m-none-eabi, Cortex-M0: the portable kernels in little memory
+    Small,
 }
 
 impl Target {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Fpu, Self::NoFpu, Self::NoDsp, Self::Small];
+
     /// rustc's name.
     pub fn triple(self) -> &'static str {
         match self {
             Self::Fpu => "thumbv7em-none-eabihf",
             Self::NoFpu => "thumbv7em-none-eabi",
+            Self::NoDsp => "thumbv7m-none-eabi",
+            Self::Small => "thumbv6m-none-eabi",
+        }
+    }
+
+    /// QEMU's machine.
+    pub fn machine(self) -> &'static str {
+        match self {
+            Self::Fpu | Self::NoFpu => "mps2-an386",
+            Self::NoDsp => "mps2-an385",
+            Self::Small => "microbit",
         }
     }
 }
@@ -49,20 +67,36 @@ fn cargo_build(what: &str, arguments: &[&str], environment: &[(&str, &str)]) -> 
 
 /// Builds a firmware binary with `image` built in and gives the path of its ELF file.
 pub fn build(binary: &str, target: Target, image: &Path) -> Result<PathBuf> {
+    build_in(&target_dir(), binary, target, image, &[])
+}
+
+/// As [`build`], without the assembler (`ACTQ_BACKEND=portable`); in a folder of its own, so that builds of both kinds stay.
+pub fn build_portable(binary: &str, target: Target, image: &Path) -> Result<PathBuf> {
+    build_in(&target_dir().join("portable"), binary, target, image, &[("ACTQ_BACKEND", "portable")])
+}
+
+fn build_in(dir: &Path, binary: &str, target: Target, image: &Path, environment: &[(&str, &str)]) -> Result<PathBuf> {
     let image = fs::canonicalize(image).with_context(|| format!("{}: cannot be read", image.display()))?;
+    let folder = dir.to_string_lossy();
+    let package = ["--package", "actq-firmware-demo", "--bin", binary, "--target", target.triple()];
     cargo_build(
         &format!("firmware {binary} for {}", target.triple()),
-        &["--package", "actq-firmware-demo", "--bin", binary, "--target", target.triple()],
-        &[("ACTQ_IMAGE", &image.to_string_lossy())],
+        &[&package[..], &["--target-dir", &folder]].concat(),
+        &[environment, &[("ACTQ_IMAGE", &image.to_string_lossy())]].concat(),
     )?;
-    Ok(target_dir().join(target.triple()).join("release").join(binary))
+    Ok(dir.join(target.triple()).join("release").join(binary))
 }
 
 /// QEMU with `elf`, an image in the slot if one is given, and arguments for the firmware.
 pub fn command(elf: &Path, slot: Option<&Path>, arguments: &str) -> Command {
+    command_on(Target::Fpu, elf, slot, arguments)
+}
+
+/// As [`command`], on the machine of a target; only those of a Cortex-M4 or M3 have a slot.
+pub fn command_on(target: Target, elf: &Path, slot: Option<&Path>, arguments: &str) -> Command {
     let mut command = Command::new(QEMU);
     command
-        .args(["-M", "mps2-an386", "-display", "none", "-monitor", "none", "-serial", "none"])
+        .args(["-M", target.machine(), "-display", "none", "-monitor", "none", "-serial", "none"])
         .args(["-semihosting-config", "enable=on,target=native"])
         .arg("-kernel")
         .arg(elf);

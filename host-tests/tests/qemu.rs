@@ -60,6 +60,22 @@ fn kernels_give_the_golden_sums_on_the_target() -> Result<()> {
 }
 
 #[test]
+fn portable_kernels_give_the_golden_sums_on_the_targets_without_assembler() -> Result<()> {
+    let cases = golden::cases(1);
+    // What fits the memory of the small one.
+    let short: Vec<_> = cases.iter().filter(|c| c.words().len() + c.prepared().len() < 1500).cloned().collect();
+    ensure!(short.len() > cases.len() / 2, "too few cases are short");
+    for (target, cases) in [(Target::NoDsp, &cases), (Target::Small, &short)] {
+        let elf = firmware("golden", target)?;
+        let output = qemu::run(qemu::command_on(target, &elf, None, ""), &golden::stream(cases))?;
+        let text = String::from_utf8_lossy(&output.stdout);
+        ensure!(output.status.success(), "{target:?}: {text}");
+        assert_eq!(text.trim(), format!("Portable: {} cases", cases.len()));
+    }
+    Ok(())
+}
+
+#[test]
 fn a_wrong_sum_fails_the_golden_run() -> Result<()> {
     let mut stream = golden::stream(&golden::cases(1)[..3]);
     let last_sum = stream.len() - 8;
@@ -80,8 +96,9 @@ fn the_built_in_image_replays_its_self_test() -> Result<()> {
         let bits: String = action.iter().map(|w| format!(" {:08x}", u32::from_le(*w))).collect();
         expected += &format!("step {step}:{bits}\n");
     }
-    for target in [Target::Fpu, Target::NoFpu] {
-        let output = qemu::run(qemu::command(&firmware("actq-firmware-demo", target)?, None, ""), &[])?;
+    for target in [Target::Fpu, Target::NoFpu, Target::NoDsp, Target::Small] {
+        let elf = firmware("actq-firmware-demo", target)?;
+        let output = qemu::run(qemu::command_on(target, &elf, None, ""), &[])?;
         assert_eq!(String::from_utf8_lossy(&output.stdout), expected, "{target:?}");
         assert!(output.status.success());
     }

@@ -1,6 +1,14 @@
 //! The elementwise parts of recurrent cells. The matrix products are ordinary linear operations of the image.
 
-use crate::math::{sigmoid, tanh};
+use crate::math::{exp_fraction, sigmoid, tanh_fraction};
+
+/// `sigmoid(gate) * tanh(x)`, by one division.
+#[inline(always)]
+fn gated(gate: f32, x: f32) -> f32 {
+    let (on, off) = exp_fraction(gate);
+    let (n, d) = tanh_fraction(x);
+    (on * n) / ((on + off) * d)
+}
 
 /// One LSTM cell in torch's gate order: `gates = [i | f | g | o]`, each of the length of `h` and `c`.
 /// `c = sigmoid(f) * c + sigmoid(i) * tanh(g)`, `h = sigmoid(o) * tanh(c)`.
@@ -9,8 +17,8 @@ pub fn lstm_cell(gates: &[f32], c: &mut [f32], h: &mut [f32]) {
     let gate = |k: usize| gates.get(k * n..).unwrap_or(&[]);
     let rows = gate(0).iter().zip(gate(1)).zip(gate(2)).zip(gate(3));
     for ((c, h), (((i, f), g), o)) in c.iter_mut().zip(h).zip(rows) {
-        *c = sigmoid(*f) * *c + sigmoid(*i) * tanh(*g);
-        *h = sigmoid(*o) * tanh(*c);
+        *c = sigmoid(*f) * *c + gated(*i, *g);
+        *h = gated(*o, *c);
     }
 }
 
@@ -23,7 +31,9 @@ pub fn gru_cell(a: &[f32], b: &[f32], h: &mut [f32]) {
     let hidden = gate(b, 0).iter().zip(gate(b, 1)).zip(gate(b, 2));
     for (h, (((ar, az), an), ((br, bz), bn))) in h.iter_mut().zip(input.zip(hidden)) {
         let r = sigmoid(*ar + *br);
-        let z = sigmoid(*az + *bz);
-        *h = (1.0 - z) * tanh(*an + r * *bn) + z * *h;
+        // z = keep / (keep + renew), 1 - z = renew / (keep + renew).
+        let (keep, renew) = exp_fraction(*az + *bz);
+        let (n, d) = tanh_fraction(*an + r * *bn);
+        *h = (renew * n + keep * *h * d) / ((keep + renew) * d);
     }
 }

@@ -7,6 +7,7 @@ use actq_host_tests::qemu::Target;
 use anyhow::{Context, Result, bail};
 
 use crate::bench::placeholder;
+use crate::setup::RISCV;
 
 /// A step: its name, the arguments of cargo, and environment variables.
 type Step<'a> = (&'a str, Vec<&'a str>, Vec<(&'a str, String)>);
@@ -31,6 +32,12 @@ pub(crate) fn run() -> Result<()> {
     ];
     for target in [Target::Fpu, Target::NoFpu] {
         steps.push(("lints of the firmware", [firmware("clippy", target), lints.to_vec()].concat(), vec![image()]));
+    }
+    let others = [Target::NoDsp.triple(), Target::Small.triple(), RISCV].map(|triple| ["--target", triple]).concat();
+    for (name, command, arguments) in
+        [("lints of the portable kernels", "clippy", &lints[..]), ("portable kernels", "build", &["--release"])]
+    {
+        steps.push((name, [&[command, "--package", "actq-kernels"], &others[..], arguments].concat(), vec![]));
     }
     steps.extend([
         (

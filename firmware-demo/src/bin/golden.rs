@@ -20,7 +20,8 @@ mod firmware {
     use cortex_m::singleton;
     use cortex_m_semihosting::hio;
 
-    const WORDS: usize = 64 * 1024;
+    /// Of the largest case, weights and activations.
+    const WORDS: usize = if cfg!(actq_small) { 1536 } else { 64 * 1024 };
     const ROWS: usize = 256;
 
     #[cortex_m_rt::entry]

@@ -1,0 +1,101 @@
+//! The functions on the Cortex-M4's FPU: the host's bits, and what they cost.
+
+use actq::policy::Policy;
+use actq::quantize::{Budget, Method, Options, quantize};
+use actq::runtime::ImageBuffer;
+use actq::writer;
+use actq_host_tests::cycles::Code;
+use actq_host_tests::qemu::{self, Counter, Target};
+use actq_host_tests::{root, shared_policies};
+use actq_kernels::image::Op;
+use actq_kernels::math::Function;
+use actq_kernels::{Width, norm, recurrent};
+use anyhow::{Result, ensure};
+
+/// Elements.
+const LEN: usize = 256;
+
+/// Instructions per element of one function.
+const LIMIT: u64 = 30;
+
+/// Functions of an element: an LSTM cell has three gates by sigmoid and two hyperbolic tangents, a GRU cell two gates and one.
+fn functions(name: &str) -> u64 {
+    match name {
+        "lstm" => 5,
+        "gru" => 3,
+        _ => 1,
+    }
+}
+
+/// What `firmware-demo/src/bin/functions.rs` computes: names and hashes of the results, in its order.
+fn expected() -> Vec<(&'static str, u32)> {
+    fn values(n: usize) -> Vec<f32> {
+        (0..n).map(|i| i as f32 * (6.0 / n as f32) - 6.0).collect()
+    }
+    let hash = |results: &[f32]| results.iter().fold(0u32, |hash, v| hash.rotate_left(5) ^ v.to_bits());
+    let mut all = Vec::new();
+    let constants: Vec<u32> = values(LEN).into_iter().map(f32::to_bits).collect();
+    let mut add = |name, run: &dyn Fn(&mut [f32])| {
+        let mut x = values(LEN);
+        run(&mut x);
+        all.push((name, hash(&x)));
+    };
+    for function in Function::ALL {
+        add(function.name(), &|x| function.apply(x));
+    }
+    add("layernorm", &|x| norm::layer_norm(x, &constants, &constants, 1e-5));
+    add("rmsnorm", &|x| norm::rms_norm(x, &constants, 1e-5));
+    add("normalize", &|y| norm::normalize(&values(LEN), &constants, &constants, 1.0, 5.0, y));
+    add("lstm", &|h| recurrent::lstm_cell(&values(4 * LEN), &mut values(LEN), h));
+    add("gru", &|h| recurrent::gru_cell(&values(3 * LEN), &values(3 * LEN), h));
+    all
+}
+
+#[test]
+fn every_function_has_the_same_bits_and_stays_within_its_instructions() -> Result<()> {
+    // This firmware includes no image: any file will do.
+    let elf = qemu::build("functions", Target::Fpu, &root().join("Cargo.toml"))?;
+    let counter = Counter::build()?;
+    let mut command = qemu::command(&elf, None, "");
+    counter.attach(&mut command, &elf)?;
+    let output = qemu::run(command, &[])?;
+    ensure!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let (text, regions, code) = (String::from_utf8(output.stdout)?, counter.regions()?, Code::read(&elf)?);
+    let expected = expected();
+    ensure!(text.lines().count() == expected.len() && regions.len() == expected.len(), "{text}");
+    for ((line, region), (name, hash)) in text.lines().zip(regions).zip(expected) {
+        assert_eq!(line, format!("{name} {LEN} {hash:08x}"));
+        let per_element = |count: u64| count as f64 / LEN as f64;
+        let (instructions, cycles) = (per_element(region.instructions), per_element(code.cycles(&region)?));
+        println!("{name:10} {instructions:7.2} instructions {cycles:7.2} cycles");
+        let limit = LIMIT * functions(name);
+        assert!(instructions > 1.0 && instructions <= limit as f64, "{name}: {instructions} instructions an element");
+    }
+    Ok(())
+}
+
+/// The gates of an LSTM are a small part of its head.
+#[test]
+fn a_head_with_an_lstm_stays_within_its_instructions() -> Result<()> {
+    let Some(policies) = shared_policies() else { return Ok(()) };
+    let policy = Policy::load(&policies.join("g1_lstm256"))?;
+    let options = Options::new(Method::Rtn, Budget::Width(Width::W3));
+    let bytes = writer::image(&policy, &quantize(&policy.graph, &[], &options)?)?;
+    let file = tempfile::NamedTempFile::new()?;
+    writer::write(file.path(), &bytes)?;
+    let buffer = ImageBuffer::new(&bytes);
+    let macs = |op: Op<'_>| if let Op::Linear { matrix, .. } = op { matrix.rows * matrix.cols } else { 0 };
+    let macs = buffer.image(file.path())?.ops().map(macs).sum::<usize>() as f64;
+    let elf = qemu::build("actq-firmware-demo", Target::Fpu, file.path())?;
+    let counter = Counter::build()?;
+    let mut command = qemu::command(&elf, None, "");
+    counter.attach(&mut command, &elf)?;
+    ensure!(qemu::run(command, &[])?.status.success(), "the firmware failed");
+    let counts = counter.counts()?;
+    ensure!(!counts.is_empty(), "no step was counted");
+    for count in counts {
+        println!("g1_lstm256 at 3 bits: {:.3} instructions per MAC", count as f64 / macs);
+        assert!(count as f64 <= 1.30 * macs, "{count} instructions for {macs} MACs");
+    }
+    Ok(())
+}

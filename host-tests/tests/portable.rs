@@ -1,0 +1,42 @@
+//! What the portable kernels cost where they run alone.
+
+use actq_host_tests::qemu::{self, Counter, Target};
+use actq_host_tests::root;
+use anyhow::{Result, ensure};
+
+/// Instructions of a whole call of 256 x 256 weights by width, lanes and group. The firmware compares the results with the
+/// reference's, bit for bit.
+fn counts(target: Target) -> Result<Vec<(String, f64)>> {
+    // This firmware includes no image: any file will do.
+    let elf = qemu::build_portable("portable", target, &root().join("Cargo.toml"))?;
+    let counter = Counter::build()?;
+    let mut command = qemu::command_on(target, &elf, None, "");
+    counter.attach(&mut command, &elf)?;
+    let output = qemu::run(command, &[])?;
+    let text = String::from_utf8(output.stdout)?;
+    ensure!(output.status.success(), "{text}");
+    let regions = counter.counts()?;
+    // Four widths, two kinds of lanes, row scales and groups of 32.
+    ensure!(text.lines().count() == 16 && regions.len() == 16, "{} regions: {text}", regions.len());
+    Ok(text.lines().zip(regions).map(|(line, count)| (line.to_owned(), count as f64 / (256.0 * 256.0))).collect())
+}
+
+fn stay_within(target: Target, limit: f64) -> Result<()> {
+    for (line, per_mac) in counts(target)? {
+        println!("{target:?} {line}: {per_mac:.3}");
+        assert!(line.starts_with("Portable "), "{line}");
+        assert!(per_mac > 1.0 && per_mac <= limit, "{target:?}, {line}: {per_mac:.3} instructions per MAC");
+    }
+    Ok(())
+}
+
+#[test]
+fn without_assembler_a_mac_takes_few_instructions() -> Result<()> {
+    stay_within(Target::Fpu, 3.5)
+}
+
+/// Without the DSP extension, a product takes more instructions, and the conversions from and to f32 are in software.
+#[test]
+fn without_dsp_and_fpu_a_mac_takes_few_instructions() -> Result<()> {
+    stay_within(Target::NoDsp, 6.5)
+}
