@@ -1,6 +1,6 @@
 //! What the portable kernels cost where they run alone.
 
-use actq_host_tests::qemu::{self, Counter, Target};
+use actq_host_tests::qemu::{self, Counter, Region, Target};
 use actq_host_tests::root;
 use anyhow::{Result, ensure};
 
@@ -15,10 +15,11 @@ fn counts(target: Target) -> Result<Vec<(String, f64)>> {
     let output = qemu::run(command, &[])?;
     let text = String::from_utf8(output.stdout)?;
     ensure!(output.status.success(), "{text}");
-    let regions = counter.counts()?;
+    let regions = counter.regions()?;
     // Four widths, two kinds of lanes, row scales and groups of 32.
     ensure!(text.lines().count() == 16 && regions.len() == 16, "{} regions: {text}", regions.len());
-    Ok(text.lines().zip(regions).map(|(line, count)| (line.to_owned(), count as f64 / (256.0 * 256.0))).collect())
+    let per_mac = |region: Region| region.instructions as f64 / (256.0 * 256.0);
+    Ok(text.lines().zip(regions).map(|(line, region)| (line.to_owned(), per_mac(region))).collect())
 }
 
 fn stay_within(target: Target, limit: f64) -> Result<()> {
