@@ -3,11 +3,12 @@
 @ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1), [sp] x_end, [sp+4] bytes of the first chunk
 @ in x, [sp+8] steps of 8 columns that the first pass through the row kernel's loop leaves out.
 @
-@ In the loops: r0 weights, r1 x, r2 mask, r3 and r4 activation pairs, r5-r7 the sums p, q, k of the first four rows, r8-r10 of
-@ the others (or of all in a strip of four), r11 and r12 weight words, lr the extracted codes.
+@ In the loops: r0 weights, r1 x, r2 mask, r9 and r10 activation pairs, r5-r7 the sums p, q, k of the first four rows, r8, r3
+@ and r4 those of the others (or of all in a strip of four; two are low registers, because a chunk's start values come with its
+@ first pairs), r11 and r12 weight words, lr the extracted codes.
 @
-@ Frame: 0-31 sums over groups (group kernel), 0 end of this chunk (row kernel), 32 x, 36 mask, 40 end of the first chunk, 44
-@ x_end, 48 acc, 52 strips, 56 steps left out.
+@ Frame: 0-31 sums over groups, those of the last four rows first (group kernel), 0 end of this chunk (row kernel), 32 x, 36 mask,
+@ 40 end of the first chunk (row kernel) or mask (group kernel), 44 x_end, 48 acc, 52 strips, 56 steps left out.
 
     .syntax unified
     .thumb
@@ -27,39 +28,35 @@
 .endm
 
 .macro c4_last word, pair
-    c4_word \word, \pair, r8, r9, r10, r8, r9, r10
+    c4_word \word, \pair, r8, r3, r4, r8, r3, r4
 .endm
 
-@ four columns of a strip
-.macro c4_cols4 rows
-    ldmia.w r1!, {r3, r4}
-    ldrd r11, r12, [r0], #8
-    .if \rows == 8
-    c4_first r11, r3
-    c4_last r12, r3
-    ldrd r11, r12, [r0], #8
-    c4_first r11, r4
-    c4_last r12, r4
+@ Four columns of a strip. The first four of a chunk come with the start values and start all sums from them.
+.macro c4_cols4 rows, first=0
+    .if \first
+    ldmia.w r1!, {r3, r4, r9, r10}
     .else
-    c4_last r11, r3
-    c4_last r12, r4
-    .endif
-.endm
-
-@ The chunk's start values, and its first four columns, which start from them.
-.macro c4_cols4_start rows
     ldmia.w r1!, {r9, r10}
-    ldmia.w r1!, {r3, r4}
+    .endif
     ldrd r11, r12, [r0], #8
     .if \rows == 8
-    c4_word r11, r3, r5, r6, r7, r9, r9, r10
-    c4_word r12, r3, r8, r9, r10, r9, r9, r10
-    ldrd r11, r12, [r0], #8
-    c4_first r11, r4
-    c4_last r12, r4
+    .if \first
+    c4_word r11, r9, r5, r6, r7, r3, r3, r4
+    c4_word r12, r9, r8, r3, r4, r3, r3, r4
     .else
-    c4_word r11, r3, r8, r9, r10, r9, r9, r10
-    c4_last r12, r4
+    c4_first r11, r9
+    c4_last r12, r9
+    .endif
+    ldrd r11, r12, [r0], #8
+    c4_first r11, r10
+    c4_last r12, r10
+    .else
+    .if \first
+    c4_word r11, r9, r8, r3, r4, r3, r3, r4
+    .else
+    c4_last r11, r9
+    .endif
+    c4_last r12, r10
     .endif
 .endm
 
@@ -85,37 +82,37 @@
     pop {r4-r11, pc}
 .endm
 
-@ The four rows' sums as r2-r4 and `d`: A from the low 20 bits of k - 2^8*q, then the others. `d` may be `p`.
-.macro c4_sums p, q, k, d
-    sub r2, \k, \q, lsl #8
-    sbfx r2, r2, #0, #20
-    sub \p, \p, r2
-    sub \k, \k, r2
+@ The four rows' sums as `a`, `b`, `c` and `d`: A from the low 20 bits of k - 2^8*q, then the others.
+.macro c4_sums p, q, k, a, b, c, d
+    sub \a, \k, \q, lsl #8
+    sbfx \a, \a, #0, #20
+    sub \p, \p, \a
+    sub \k, \k, \a
     sub \q, \q, \k, asr #8
-    asr r3, \p, #12
-    asr r4, \k, #8
+    asr \b, \p, #12
+    asr \c, \k, #8
     asr \d, \q, #12
 .endm
 
-@ Adds r2-r4 and `d` to the sums at r11.
-.macro c4_add d
-    ldrd r6, r7, [r11]
-    add r2, r2, r6
-    add r3, r3, r7
-    ldrd r6, r7, [r11, #8]
-    add r4, r4, r6
-    add \d, \d, r7
-    stmia.w r11!, {r2-r4, \d}
+@ Adds `a` to `d` to the sums at r11.
+.macro c4_add a, b, c, d, old0, old1
+    ldrd \old0, \old1, [r11]
+    add \a, \a, \old0
+    add \b, \b, \old1
+    ldrd \old0, \old1, [r11, #8]
+    add \c, \c, \old0
+    add \d, \d, \old1
+    stmia.w r11!, {\a, \b, \c, \d}
 .endm
 
 .macro c4_start rows
-    ldmia.w r1!, {r9, r10}
+    ldmia.w r1!, {r3, r4}
     .if \rows == 8
-    mov r5, r9
-    mov r6, r9
-    mov r7, r10
+    mov r5, r3
+    mov r6, r3
+    mov r7, r4
     .endif
-    mov r8, r9
+    mov r8, r3
 .endm
 
 .macro c4_row_kernel name, rows
@@ -155,11 +152,11 @@
     cmp r1, r12
     bne.n 4f
     .if \rows == 8
-    c4_sums r5, r6, r7, r5
-    stmia.w r11!, {r2-r5}
+    c4_sums r5, r6, r7, r2, r9, r10, r12
+    stmia.w r11!, {r2, r9, r10, r12}
     .endif
-    c4_sums r8, r9, r10, r8
-    stmia.w r11!, {r2-r4, r8}
+    c4_sums r8, r3, r4, r2, r5, r6, r7
+    stmia.w r11!, {r2, r5, r6, r7}
     cmp r1, lr
     bne.n 5f
 6:
@@ -168,11 +165,11 @@
 4:
     @ A later chunk's sums are added to those before.
     .if \rows == 8
-    c4_sums r5, r6, r7, r5
-    c4_add r5
+    c4_sums r5, r6, r7, r2, r9, r10, r12
+    c4_add r2, r9, r10, r12, r5, r6
     .endif
-    c4_sums r8, r9, r10, r8
-    c4_add r8
+    c4_sums r8, r3, r4, r2, r5, r6, r7
+    c4_add r2, r5, r6, r7, r9, r10
     cmp r1, lr
     bne.n 5f
     ldr r12, [sp, #40]
@@ -187,23 +184,18 @@
     .size \name, . - \name
 .endm
 
-@ lr, p, k and q become 2^12 * (A, B, C, D), of at most 17 + 12 bits.
+@ lr, p, k and q become 2^12 * (A, B, C, D), of at most 17 + 12 bits; r12 and r11 2^4 * the scales of rows 0 and 2, 1 and 3: SMLAW
+@ takes 2^16 away from the product. r2 is the mask inverted.
 .macro c4_rows p, q, k
+    ldr r11, [r0], #4
     sub lr, \k, \q, lsl #8
     lsl lr, lr, #12
     sub \p, \p, lr, asr #12
     sub \k, \k, lr, asr #12
     lsl \k, \k, #4
     sub \q, \q, \k, asr #12
-.endm
-
-@ r12 and r11 become 2^4 * the scales of rows 0 and 2, 1 and 3: SMLAW takes 2^16 away from the product.
-.macro c4_scales
-    ldr r11, [r0], #4
-    uxtb16 r12, r11
-    lsl r12, r12, #4
-    uxtb16 r11, r11, ror #8
-    lsl r11, r11, #4
+    and r12, r2, r11, lsl #4
+    and r11, r2, r11, lsr #4
 .endm
 
 .macro c4_group_kernel name, rows
@@ -214,6 +206,7 @@
     .balign 16
 \name:
     c4_prologue
+    str r12, [sp, #40]
 1:
     movs r3, #0
     movs r4, #0
@@ -226,43 +219,39 @@
     ldrd r1, r2, [sp, #32]
     .balign 4
 2:
-    c4_cols4_start \rows
+    c4_cols4 \rows, 1
     .rept 7
     c4_cols4 \rows
     .endr
+    mvn r2, r2
     .if \rows == 8
     c4_rows r5, r6, r7
-    c4_scales
-    ldmia.w sp, {r2-r4}
-    smlawb r2, lr, r12, r2
-    ldr lr, [sp, #12]
-    smlawb r3, r5, r11, r3
-    smlawt r4, r7, r12, r4
-    smlawt lr, r6, r11, lr
-    stmia.w sp, {r2-r4, lr}
-    add r7, sp, #16
-    .else
-    mov r7, sp
+    ldrd r9, r10, [sp, #16]
+    smlawb r9, lr, r12, r9
+    smlawb r10, r5, r11, r10
+    strd r9, r10, [sp, #16]
+    ldrd r9, r10, [sp, #24]
+    smlawt r9, r7, r12, r9
+    smlawt r10, r6, r11, r10
+    strd r9, r10, [sp, #24]
     .endif
-    c4_rows r8, r9, r10
-    c4_scales
-    ldmia.w r7, {r2-r5}
-    smlawb r2, lr, r12, r2
-    smlawb r3, r8, r11, r3
-    smlawt r4, r10, r12, r4
-    smlawt r5, r9, r11, r5
-    stmia.w r7, {r2-r5}
-    ldr r2, [sp, #36]
-    ldr lr, [sp, #44]
+    c4_rows r8, r3, r4
+    ldmia.w sp, {r5-r7, r9}
+    smlawb r5, lr, r12, r5
+    smlawb r6, r8, r11, r6
+    smlawt r7, r4, r12, r7
+    smlawt r9, r3, r11, r9
+    stmia.w sp, {r5-r7, r9}
+    ldrd r2, lr, [sp, #40]
     cmp r1, lr
     bne.w 2b
     ldrd r11, r12, [sp, #48]
-    ldmia.w r7, {r2-r5}
     .if \rows == 8
-    ldmia.w sp, {r6-r9}
-    stmia.w r11!, {r6-r9}
+    ldrd r2, r3, [sp, #16]
+    ldrd r4, r8, [sp, #24]
+    stmia.w r11!, {r2-r4, r8}
     .endif
-    stmia.w r11!, {r2-r5}
+    stmia.w r11!, {r5-r7, r9}
     c4_next_strip
     .size \name, . - \name
 .endm
