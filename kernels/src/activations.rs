@@ -66,6 +66,12 @@ impl Plan {
         Self { format, cols: shape.cols, padded, group, groups, chunk, first_chunk, chunks }
     }
 
+    /// The plan where the columns are valid. What is prepared for another invalid shape fits no block.
+    #[inline(always)]
+    fn checked(shape: BlockShape) -> Option<Self> {
+        (1..=0xffff).contains(&shape.cols).then(|| Self::new(shape))
+    }
+
     const fn chunk_words(&self) -> usize {
         self.format.starts.len() + self.chunk / 2
     }
@@ -124,7 +130,7 @@ pub const fn prepared_words(shape: BlockShape) -> usize {
 #[derive(Clone, Copy, Debug)]
 pub struct Prepared<'a> {
     words: &'a [u32],
-    /// The shape without its rows.
+    /// The shape; its rows do not matter.
     shape: BlockShape,
     #[cfg(actq_armv7em)]
     bounds: (usize, usize),
@@ -136,7 +142,7 @@ impl<'a> Prepared<'a> {
     /// Names a vector that [`Scale::quantize`] or [`prepare`] wrote for blocks of this shape (their rows do not matter); `None`
     /// where the length differs from [`prepared_words`] or the shape is not valid.
     pub fn new(words: &'a [u32], shape: BlockShape) -> Option<Self> {
-        let plan = shape.is_valid().then(|| Plan::new(shape))?;
+        let plan = Plan::checked(shape)?;
         (words.len() == plan.words()).then(|| Self::planned(words, shape, &plan))
     }
 
@@ -144,7 +150,7 @@ impl<'a> Prepared<'a> {
     fn planned(words: &'a [u32], shape: BlockShape, _plan: &Plan) -> Self {
         Self {
             words,
-            shape: BlockShape { rows: 1, ..shape },
+            shape,
             #[cfg(actq_armv7em)]
             bounds: _plan.bounds(shape),
             #[cfg(actq_armv7em)]
@@ -154,7 +160,8 @@ impl<'a> Prepared<'a> {
 
     /// Whether the vector was prepared for blocks of this shape.
     pub fn fits(&self, shape: BlockShape) -> bool {
-        self.shape == BlockShape { rows: 1, ..shape }
+        let BlockShape { width, lanes, rows: _, cols, group } = self.shape;
+        (width, lanes, cols, group) == (shape.width, shape.lanes, shape.cols, shape.group)
     }
 
     /// All words.
@@ -215,16 +222,15 @@ pub struct Scale {
 impl Scale {
     /// The scale of `x` for integers in `-x_max ..= x_max`. `x_max` is 127 for int8 activations and at most 32767.
     pub fn new(x: &[f32], x_max: u16) -> Result<Self, NotFinite> {
-        let amax = f32::from_bits(magnitude_bits(x));
-        if !amax.is_finite() {
+        let bits = magnitude_bits(x);
+        if bits >= f32::INFINITY.to_bits() {
             return Err(NotFinite);
         }
-        let x_max = f32::from(x_max);
-        Ok(if amax < TINY {
-            Self { scale: 0.0, inverse: 0.0 }
-        } else {
-            Self { scale: amax / x_max, inverse: x_max / amax }
-        })
+        if bits < TINY.to_bits() {
+            return Ok(Self { scale: 0.0, inverse: 0.0 });
+        }
+        let (amax, x_max) = (f32::from_bits(bits), f32::from(x_max));
+        Ok(Self { scale: amax / x_max, inverse: x_max / amax })
     }
 
     /// The factor of the integers.
@@ -314,25 +320,29 @@ impl Source for Quantizer {
 /// Lays a vector out.
 #[inline(always)]
 fn fill<'w, S: Source>(x: &[S::Value], shape: BlockShape, out: &'w mut [u32], source: &S) -> Option<Prepared<'w>> {
-    let plan = shape.is_valid().then(|| Plan::new(shape))?;
+    let plan = Plan::checked(shape)?;
     let out = out.get_mut(..plan.words())?;
     let x = x.get(..plan.cols).unwrap_or(x);
     // All whole groups at once; a vector without groups is one.
-    let groups = if x.len() == plan.padded { plan.groups } else { x.len() / plan.group };
+    let groups = match plan.groups {
+        1 => usize::from(x.len() == plan.padded),
+        _ => x.len() >> plan.group.trailing_zeros(),
+    };
     let Plan { chunks, first_chunk: first, chunk, .. } = plan;
     let done = match source.groups(x, plan.format, Groups { groups, chunks, first, chunk }, out) {
         Some(_) => groups,
         None => 0,
     };
     if done < plan.groups {
-        rest(x, &plan, done, out, source);
+        rest(x, shape, done, out, source);
     }
     Some(Prepared::planned(out, shape, &plan))
 }
 
-/// Writes the groups from `done` on.
+/// Writes the groups from `done` on. Seldom needed, so it makes its own plan.
 #[inline(never)]
-fn rest<S: Source>(x: &[S::Value], plan: &Plan, done: usize, out: &mut [u32], source: &S) {
+fn rest<S: Source>(x: &[S::Value], shape: BlockShape, done: usize, out: &mut [u32], source: &S) {
+    let plan = &Plan::new(shape);
     let mut groups = x.chunks(plan.group).skip(done);
     for out in out.chunks_mut(plan.group_words()).skip(done) {
         group(groups.next().unwrap_or(&[]), plan, out, source);

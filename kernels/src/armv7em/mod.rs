@@ -13,7 +13,7 @@ use crate::activations::Prepared;
 use crate::activations::{Groups, ROUND};
 use crate::format::{Block, QUAD, STRIP};
 #[cfg(actq_fpu)]
-use crate::format::{Start, XFormat};
+use crate::format::{self, Format, XFormat};
 use crate::gemv::Mismatch;
 
 global_asm!(include_str!("single.s"), options(raw));
@@ -137,16 +137,12 @@ pub fn magnitude_bits(x: &[f32]) -> u32 {
 #[inline(always)]
 pub(crate) fn quantize(x: &[f32], inverse: f32, format: &XFormat, run: Groups, out: &mut [u32]) -> Option<i32> {
     let Groups { groups, chunks, first, chunk } = run;
-    if groups == 0 || chunks == 0 || first == 0 || chunk == 0 || (first | chunk) % 8 != 0 {
+    if groups == 0 || chunks == 0 || first < 8 || chunk < 8 || (first | chunk) % 8 != 0 || first.max(chunk) > format.chunk {
         return None;
     }
-    let (kernel, start, second): (Quantize, _, _) = match (format.shift, format.starts, format.sum) {
-        (0, [start], false) => (actq_quantize0, start, 0),
-        (1, [start, Start { bias: 0, factor }], false) => (actq_quantize1, start, *factor),
-        (2, [start], true) => (actq_quantize2, start, 0),
-        (3, [start], true) if first == 8 && chunk == 8 => (actq_quantize3, start, 0),
-        _ => return None,
-    };
+    let [start, more @ ..] = format.starts else { return None };
+    let kernel = *QUANTIZE.get(format.shift as usize)?;
+    let second = more.first().map_or(0, |start| start.factor);
     let cols = first + (chunks - 1) * chunk;
     let words = chunks * format.starts.len() + cols / 2 + usize::from(format.sum);
     if x.len() < groups * cols || out.len() < groups * words {
@@ -155,7 +151,7 @@ pub(crate) fn quantize(x: &[f32], inverse: f32, format: &XFormat, run: Groups, o
     let (x, out) = (x.as_ptr(), out.as_mut_ptr());
     let (first, chunk) = (first / 8, chunk / 8);
     // SAFETY: all counts are 1 or more. The kernel reads the columns of all groups and writes their words; both lengths were
-    // compared above. Its layout has as many start words and sums as `format`.
+    // compared above. (Chunks of at most eight columns have eight.) It writes as many start words and sums as `format` has, which `has_quantizer` says of every layout.
     Some(unsafe { kernel(inverse, ROUND, x, out, groups, chunks, first, chunk, start.bias, start.factor, second) })
 }
 
@@ -192,6 +188,30 @@ macro_rules! quantize_kernels {
 }
 #[cfg(actq_fpu)]
 quantize_kernels!(actq_quantize0 actq_quantize1 actq_quantize2 actq_quantize3);
+
+/// By shift.
+#[cfg(actq_fpu)]
+static QUANTIZE: [Quantize; 4] = [actq_quantize0, actq_quantize1, actq_quantize2, actq_quantize3];
+
+/// Whether the kernel of the layout's shift writes what the layout asks for: two start words, the second without a bias, at
+/// shift 1; sums from 2 on; chunks of eight at 3.
+#[cfg(actq_fpu)]
+const fn has_quantizer<F: Format>() -> bool {
+    let starts = match F::X.starts {
+        [_] => F::X.shift != 1,
+        [_, second] => F::X.shift == 1 && second.bias == 0,
+        _ => false,
+    };
+    starts && F::X.sum == (F::X.shift >= 2) && (F::X.shift == 3) == (F::X.chunk == 8) && F::X.shift <= 3
+}
+
+#[cfg(actq_fpu)]
+const _: () = {
+    assert!(has_quantizer::<format::w2::W2>() && has_quantizer::<format::w2_paired::W2Paired>());
+    assert!(has_quantizer::<format::w3::W3>() && has_quantizer::<format::w3_paired::W3Paired>());
+    assert!(has_quantizer::<format::w4::W4>() && has_quantizer::<format::w4_paired::W4Paired>());
+    assert!(has_quantizer::<format::w8::W8>() && has_quantizer::<format::w8_paired::W8Paired>());
+};
 
 #[cfg(actq_fpu)]
 unsafe extern "C" {
