@@ -112,12 +112,12 @@ impl Plan {
         (self.words() - unread - sum_behind, extra)
     }
 
-    /// Steps of 8 columns that the first pass through the loop of a kernel for row scales leaves out.
+    /// Steps that the first pass through the loop of a kernel for row scales leaves out. Passes and steps are powers of two, and
+    /// chunks that are longer than a pass are whole passes.
     #[cfg(actq_armv7em)]
-    const fn skip(&self) -> usize {
-        // A pass takes several chunks where they are shorter. Passes are powers of two.
-        let first = if self.format.chunk < self.format.run { self.padded } else { self.first_chunk };
-        (0usize.wrapping_sub(first) & (self.format.run - 1)) / 8
+    const fn skip(&self, shape: BlockShape) -> usize {
+        let step = shape.layout().step;
+        (0usize.wrapping_sub(round_up(shape.cols, step)) & (self.format.run - 1)) >> step.trailing_zeros()
     }
 }
 
@@ -154,7 +154,7 @@ impl<'a> Prepared<'a> {
             #[cfg(actq_armv7em)]
             bounds: _plan.bounds(shape),
             #[cfg(actq_armv7em)]
-            skip: _plan.skip(),
+            skip: _plan.skip(shape),
         }
     }
 
@@ -189,7 +189,7 @@ impl<'a> Prepared<'a> {
         self.bounds
     }
 
-    /// Steps of 8 columns that the first pass through a kernel's loop leaves out.
+    /// The layout's steps that the first pass through a kernel's loop leaves out.
     #[cfg(actq_armv7em)]
     pub(crate) fn skip(&self) -> usize {
         self.skip

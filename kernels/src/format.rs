@@ -213,7 +213,7 @@ pub struct Start {
 impl XFormat {
     /// Of single lanes: one start value a group.
     const fn single(starts: &'static [Start]) -> Self {
-        Self { shift: 0, chunk: usize::MAX, run: 1, starts, sum: false }
+        Self { shift: 0, chunk: usize::MAX, run: PAD_COLS, starts, sum: false }
     }
 }
 
@@ -275,7 +275,7 @@ pub(crate) use with_format;
 pub(crate) struct Layout {
     pub(crate) cell: Cell,
     strip: usize,
-    step: usize,
+    pub(crate) step: usize,
     pub(crate) x: XFormat,
 }
 

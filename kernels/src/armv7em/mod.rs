@@ -26,8 +26,8 @@ global_asm!(include_str!("vector.s"), options(raw));
 global_asm!(include_str!("vector_fpu.s"), options(raw));
 
 /// Reads `strips` strips at `weights` and the prepared vector from `x` up to `x_end`, writes the strips' sums at `acc`. What
-/// `extra` is, the kernel's file says; the first pass through the loop of a kernel for paired lanes with row scales leaves
-/// `skip` steps of 8 columns out.
+/// `extra` is, the kernel's file says; the first pass through the loop of a kernel for row scales leaves `skip` of the layout's
+/// steps out.
 type Kernel = unsafe extern "C" fn(
     weights: *const u32,
     x: *const u32,

@@ -1,11 +1,13 @@
 @ GEMV loop nest for Armv7E-M, stamped over the layouts of single lanes in kernels/src/format: strips of four rows.
 @
-@ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1), [sp] x_end, [sp+4] bytes of a chunk in x.
+@ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1), [sp] x_end, [sp+4] bytes of a chunk in x, [sp+8] units that the
+@ first pass through the row kernel's loop leaves out.
 @
 @ In the loops: r0 weights, r1 x, r2 mask, r3 and r4 activation pairs, r5-r8 the four rows' sums t, r9-r12 weight words,
 @ lr the extracted pair of codes.
 @
-@ Frame: 0 x, 4 acc, 8 strips, 12 x_end, 16 chunk bytes, 20 end of this group, 24-39 sums over groups.
+@ Frame: 0 x, 4 acc, 8 strips, 12 x_end, 16 chunk bytes, 20 end of this group, 24-39 sums over groups, 40 units left
+@ out.
 
     .syntax unified
     .thumb
@@ -159,6 +161,8 @@
     str r3, [sp, #8]
     str r4, [sp, #12]
     str r5, [sp, #16]
+    ldr r4, [sp, #88]
+    str r4, [sp, #40]
     .if \mask
     movw r2, #(\mask & 0xffff)
     movt r2, #(\mask >> 16)
@@ -170,8 +174,9 @@
     pop {r4-r11, pc}
 .endm
 
-@ Rows with one scale each: the sums of a whole row are the result.
-.macro row_kernel name, mask, unit
+@ Rows with one scale each: the sums of a whole row are the result. A pass takes 32 columns; `more` are labels for its units but
+@ the first, `ahead` the same as they are named before they come.
+.macro row_kernel name, mask, unit, ahead, more
     .section .text.\name, "ax", %progbits
     .global \name
     .type \name, %function
@@ -182,18 +187,31 @@
 1:
     ldr r1, [sp, #0]
     start_sums
+    .ifnb \more
+    ldr lr, [sp, #40]
+    tbh [pc, lr, lsl #1]
+7:
+    .hword (2f - 7b) / 2
+    .irp step, \ahead
+    .hword (\step - 7b) / 2
+    .endr
+    .endif
     .balign 4
 2:
     \unit
+    .ifnb \more
+    .irp step, \more
+\step:
+    \unit
+    .endr
+    .endif
     ldr lr, [sp, #12]
     cmp r1, lr
     bne.w 2b
-    ldr lr, [sp, #4]
+    ldrd lr, r3, [sp, #4]
     stmia.w lr!, {r5-r8}
-    str lr, [sp, #4]
-    ldr lr, [sp, #8]
-    subs lr, lr, #1
-    str lr, [sp, #8]
+    subs r3, r3, #1
+    strd lr, r3, [sp, #4]
     bne.w 1b
     epilogue
     .size \name, . - \name
@@ -255,10 +273,10 @@
     .size \name, . - \name
 .endm
 
-    row_kernel actq_w2_row, 0x00060006, unit_w2
+    row_kernel actq_w2_row, 0x00060006, unit_w2, "11f", "11"
     row_kernel actq_w3_row, 0x000e000e, unit_w3
-    row_kernel actq_w4_row, 0x001e001e, unit_w4
-    row_kernel actq_w8_row, 0, unit_w8
+    row_kernel actq_w4_row, 0x001e001e, unit_w4, "11f, 12f, 13f", "11, 12, 13"
+    row_kernel actq_w8_row, 0, unit_w8, "11f, 12f, 13f, 14f, 15f, 16f, 17f", "11, 12, 13, 14, 15, 16, 17"
     group_kernel actq_w2_group, 0x00060006, unit_w2
     group_kernel actq_w3_group, 0x000e000e, unit_w3
     group_kernel actq_w4_group, 0x001e001e, unit_w4
