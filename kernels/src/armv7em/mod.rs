@@ -11,9 +11,9 @@ use core::arch::global_asm;
 use crate::activations::Prepared;
 #[cfg(actq_fpu)]
 use crate::activations::{Groups, ROUND};
-use crate::format::{Block, QUAD, STRIP};
 #[cfg(actq_fpu)]
 use crate::format::{self, Format, XFormat};
+use crate::format::{Block, QUAD, STRIP};
 use crate::gemv::Mismatch;
 
 global_asm!(include_str!("single.s"), options(raw));
@@ -137,7 +137,13 @@ pub fn magnitude_bits(x: &[f32]) -> u32 {
 #[inline(always)]
 pub(crate) fn quantize(x: &[f32], inverse: f32, format: &XFormat, run: Groups, out: &mut [u32]) -> Option<i32> {
     let Groups { groups, chunks, first, chunk } = run;
-    if groups == 0 || chunks == 0 || first < 8 || chunk < 8 || (first | chunk) % 8 != 0 || first.max(chunk) > format.chunk {
+    if groups == 0
+        || chunks == 0
+        || first < 8
+        || chunk < 8
+        || (first | chunk) % 8 != 0
+        || first.max(chunk) > format.chunk
+    {
         return None;
     }
     let [start, more @ ..] = format.starts else { return None };
