@@ -7,8 +7,8 @@
 @ r8, r3, r4 those of the others (or of all in a strip of four; two are low registers, because a chunk's start values come with
 @ its first pairs), r9 and r10 weight words, lr the extracted codes.
 @
-@ Frame of the row kernel: 0 end of the first chunk, 4 x_end, 8 acc, 12 strips, 16 end of this chunk, 20 x, 24 mask, 28 steps left
-@ out; of the group kernel: 0-31 sums over groups, in the order of the registers that take them, 32 mask, 36 x_end, 40 acc,
+@ Frame of the row kernel: 0 x_end where there is but one chunk, or 0, 4 x_end, 8 acc, 12 strips, 16 end of this chunk, 20 x,
+@ 24 mask, 28 steps left out, 32 end of the first chunk; of the group kernel: 0-31 sums over groups, in the order of the registers that take them, 32 mask, 36 x_end, 40 acc,
 @ 44 strips, 48 x.
 
     .syntax unified
@@ -122,10 +122,15 @@
 \name:
     c4_prologue
     add r5, r5, r1
-    strd r5, r4, [sp, #0]
+    str r4, [sp, #4]
     strd r2, r3, [sp, #8]
     strd r5, r1, [sp, #16]
     strd r12, r6, [sp, #24]
+    str r5, [sp, #32]
+    cmp r5, r4
+    it ne
+    movne r4, #0
+    str r4, [sp, #0]
 1:
     ldrd r1, r2, [sp, #20]
     ldr lr, [sp, #28]
@@ -156,12 +161,21 @@
     .endif
     c4_sums r8, r3, r4, r2, r5, r6, r7
     stmia.w r11!, {r2, r5, r6, r7}
-    cmp r1, r10
-    bne.n 5f
 6:
     c4_next_strip 8
 4:
-    @ A later chunk's sums are added to those before.
+    @ One of several chunks: its sums are added to those before, which are 0 at the first.
+    ldr lr, [sp, #32]
+    cmp r1, lr
+    bne.n 8f
+    movs r9, #0
+    .irp at, 0, 8
+    strd r9, r9, [r11, #\at]
+    .if \rows == 8
+    strd r9, r9, [r11, #(16 + \at)]
+    .endif
+    .endr
+8:
     .if \rows == 8
     c4_sums r6, r7, r5, r2, r6, r7, lr
     c4_add r2, r6, r7, lr, r5, r9
@@ -170,7 +184,7 @@
     c4_add r2, r5, r6, r7, r9, lr
     cmp r1, r10
     bne.n 5f
-    ldr r9, [sp, #0]
+    ldr r9, [sp, #32]
     str r9, [sp, #16]
     b.n 6b
 5:

@@ -6,7 +6,8 @@
 @ In the loops: r0 weights, r1 x, r2-r5 activation pairs, r6 and r8 the sums of rows 0 and 2, r7 and r9 those of rows 0 and 2
 @ plus 2^8 times those of rows 1 and 3, r10-r12 and lr weight words.
 @
-@ Frame of the row kernel: 0 end of the first chunk, 4 x_end, 8 acc, 12 strips, 16 x, 20 steps left out, 24 end of this chunk;
+@ Frame of the row kernel: 0 x_end where there is but one chunk, or 0, 4 x_end, 8 acc, 12 strips, 16 x, 20 steps left out, 24 end of
+@ this chunk, 28 end of the first chunk;
 @ of the group kernel: 0-15 sums over groups, 16 x, 28 x_end, 32 acc, 36 strips.
 
     .syntax unified
@@ -46,7 +47,7 @@
     ldrd r4, r5, [sp, #80]
     ldr r6, [sp, #88]
     add r5, r5, r1
-    strd r5, r4, [sp, #0]
+    str r4, [sp, #4]
     strd r2, r3, [sp, #8]
     strd r1, r6, [sp, #16]
 .endm
@@ -75,7 +76,11 @@
     .balign 16
 actq_w8_paired_row:
     r8_prologue
-    str r5, [sp, #24]
+    strd r5, r5, [sp, #24]
+    cmp r5, r4
+    it ne
+    movne r4, #0
+    str r4, [sp, #0]
 1:
     ldrd r1, r10, [sp, #16]
     r8_start
@@ -100,18 +105,20 @@ actq_w8_paired_row:
     cmp r1, r2
     bne.n 4f
     stmia.w r10!, {r6-r9}
-    cmp r1, r3
-    bne.n 5f
 6:
     r8_next_strip 8
 4:
-    @ A later chunk's sums are added to those before.
+    @ One of several chunks. A later one's sums are added to those before.
+    ldr r2, [sp, #28]
+    cmp r1, r2
+    beq.n 8f
     ldrd r4, r5, [r10]
     add r6, r6, r4
     add r7, r7, r5
     ldrd r4, r5, [r10, #8]
     add r8, r8, r4
     add r9, r9, r5
+8:
     stmia.w r10!, {r6-r9}
     cmp r1, r3
     bne.n 5f
