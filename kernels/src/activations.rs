@@ -140,7 +140,7 @@ pub struct Prepared<'a> {
 
 impl<'a> Prepared<'a> {
     /// Names a vector that [`Scale::quantize`] or [`prepare`] wrote for blocks of this shape (their rows do not matter); `None`
-    /// where the length differs from [`prepared_words`] or the shape is not valid.
+    /// where the length differs from [`prepared_words`] or there are no columns or too many.
     pub fn new(words: &'a [u32], shape: BlockShape) -> Option<Self> {
         let plan = Plan::checked(shape)?;
         (words.len() == plan.words()).then(|| Self::planned(words, shape, &plan))
@@ -239,8 +239,8 @@ impl Scale {
     }
 
     /// Writes the integers of `x`, prepared for blocks of `shape`, to the first [`prepared_words`] words of `out`, and names
-    /// them. Missing values of `x` count as zeros. `None`, with nothing written, where the shape is not valid or `out` is too
-    /// short.
+    /// them. Missing values of `x` count as zeros. `None`, with nothing written, where `out` is too short, or there are no columns
+    /// or too many.
     #[inline(always)]
     pub fn quantize<'w>(self, x: &[f32], shape: BlockShape, out: &'w mut [u32]) -> Option<Prepared<'w>> {
         fill(x, shape, out, &Quantizer { inverse: self.inverse })

@@ -5,6 +5,8 @@
 //! 3. `y = start + acc * (row_scale * x_scale)`, each operation rounded to f32, where `start` is the bias, or, where the
 //!    operation accumulates, the sum of the old `y` and the bias. Rows that no block holds (0 bits) keep `start`.
 
+use core::ops::Range;
+
 use crate::activations::{NotFinite, Prepared, Scale, max_prepared_words};
 #[cfg(actq_fpu)]
 use crate::armv7em;
@@ -53,6 +55,12 @@ pub(crate) fn half_word(words: &[u32], i: usize) -> u16 {
     (u32::from_le(word) >> (16 * (i % 2))) as u16
 }
 
+/// A part of the biases, if there are any; `None` where they are too short.
+#[inline(always)]
+fn slice_of(start: Option<&[u32]>, at: Range<usize>) -> Option<Option<&[u32]>> {
+    start.map_or(Some(None), |start| start.get(at).map(Some))
+}
+
 impl RowBlock<'_> {
     /// The scale of the block's row `i`.
     #[inline(always)]
@@ -79,7 +87,8 @@ impl RowBlock<'_> {
         // Rows in order have room for their sums in y itself, except those of a last strip that padding fills.
         let whole = if shape.rows == shape.padded_rows() { shape.rows } else { shape.rows & !(STRIP - 1) };
         if whole > 0 {
-            let Some(y) = y.get_mut(self.first_row..self.first_row + whole) else { return };
+            let at = self.first_row..self.first_row + whole;
+            let (Some(start), Some(y)) = (slice_of(start, at.clone()), y.get_mut(at)) else { return };
             if gemv(&self.block, x, 0, bytemuck::cast_slice_mut(y)).is_err() {
                 return;
             }
@@ -108,8 +117,8 @@ impl RowBlock<'_> {
             }
             let sums = &sums[..sums.len().min(shape.rows - first)];
             if self.index.is_empty() {
-                let at = self.first_row + first;
-                let Some(y) = y.get_mut(at..at + sums.len()) else { return };
+                let at = self.first_row + first..self.first_row + first + sums.len();
+                let (Some(start), Some(y)) = (slice_of(start, at.clone()), y.get_mut(at)) else { return };
                 self.scale_in_order(first, Some(sums), x_scale, start, y);
             } else {
                 self.scale_by_index(first, sums, x_scale, start, y);
@@ -118,13 +127,8 @@ impl RowBlock<'_> {
         }
     }
 
-    /// Turns the sums of the rows from `first` on, in y itself where there are none apart, into results; `y` begins there.
+    /// Turns the sums of as many rows as `y` has, from `first` on, into results. What is `None` stands in y itself.
     fn scale_in_order(&self, first: usize, sums: Option<&[i32]>, x_scale: f32, start: Option<&[u32]>, y: &mut [f32]) {
-        let start = match start.map(|start| start.get(self.first_row + first..)) {
-            Some(None) => return,
-            Some(start) => start,
-            None => None,
-        };
         #[cfg(actq_fpu)]
         armv7em::scale(sums, start, self.scales.get(first / 2..).unwrap_or(&[]), x_scale, y);
         #[cfg(not(actq_fpu))]

@@ -157,7 +157,8 @@ pub(crate) fn quantize(x: &[f32], inverse: f32, format: &XFormat, run: Groups, o
     let (x, out) = (x.as_ptr(), out.as_mut_ptr());
     let (first, chunk) = (first / 8, chunk / 8);
     // SAFETY: all counts are 1 or more. The kernel reads the columns of all groups and writes their words; both lengths were
-    // compared above. (Chunks of at most eight columns have eight.) It writes as many start words and sums as `format` has, which `has_quantizer` says of every layout.
+    // compared above. It writes as many start words and sums as `format` has, which `has_quantizer` says of every layout, and
+    // where it takes eight columns for a chunk, that is the format's limit and so `first` and `chunk`.
     Some(unsafe { kernel(inverse, ROUND, x, out, groups, chunks, first, chunk, start.bias, start.factor, second) })
 }
 

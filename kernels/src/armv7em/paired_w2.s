@@ -184,9 +184,9 @@
     .size \name, . - \name
 .endm
 
-@ Adds a group's sums t of two row pairs, times its `scales`, to the sums of four rows: even0, odd0, even1 and odd1. r12 holds the
-@ sum of x. Even rows sum 4 * even * scale, odd rows (2 * odd + sum(x)) * scale. First the odd rows, then the even ones with their
-@ scales in `evens`.
+@ Adds a group's sums t of two row pairs, times the odd rows' `scales`, to the sums of the odd rows, and then, times the scales
+@ `evens`, to those of the even rows. r12 holds the sum of x. Even rows sum 4 * even * scale, odd rows
+@ (2 * odd + sum(x)) * scale.
 .macro d2_scale_odd scales, t0, t1, odd0, odd1
     smlabb \odd0, r12, \scales, \odd0
     smlabt \odd1, r12, \scales, \odd1
@@ -221,14 +221,13 @@
     .if \rows == 8
     ldrd r10, r11, [r0], #8
     .else
-    mov r8, r2
     ldr r10, [r0], #4
     .endif
     uxtb16 lr, r10
     uxtb16 r10, r10, ror #8
+    .if \rows == 8
     d2_scale_odd r10, r7, r8, r4, r6
     d2_scale_even lr, r7, r8, r3, r5
-    .if \rows == 8
     uxtb16 r10, r11
     uxtb16 r11, r11, ror #8
     ldrd r7, r8, [sp, #16]
@@ -237,6 +236,8 @@
     d2_scale_even r10, r9, r2, r11, r12
     stmia.w sp, {r3-r8, r11, r12}
     .else
+    d2_scale_odd r10, r7, r2, r4, r6
+    d2_scale_even lr, r7, r2, r3, r5
     stmia.w sp, {r3-r6}
     .endif
     ldrd r12, lr, [sp, #32]

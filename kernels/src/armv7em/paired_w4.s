@@ -8,8 +8,8 @@
 @ its first pairs), r9 and r10 weight words, lr the extracted codes.
 @
 @ Frame of the row kernel: 0 x_end where there is but one chunk, or 0, 4 x_end, 8 acc, 12 strips, 16 end of this chunk, 20 x,
-@ 24 mask, 28 steps left out, 32 end of the first chunk; of the group kernel: 0-31 sums over groups, in the order of the registers that take them, 32 mask, 36 x_end, 40 acc,
-@ 44 strips, 48 x.
+@ 24 mask, 28 steps left out, 32 end of the first chunk; of the group kernel: 0-31 sums over groups, in the order of the
+@ registers that take them, 32 mask, 36 x_end, 40 acc, 44 strips, 48 x.
 
     .syntax unified
     .thumb

@@ -6,9 +6,8 @@
 @ In the loops: r0 weights, r1 x, r2-r5 activation pairs, r6 and r8 the sums of rows 0 and 2, r7 and r9 those of rows 0 and 2
 @ plus 2^8 times those of rows 1 and 3, r10-r12 and lr weight words.
 @
-@ Frame of the row kernel: 0 x_end where there is but one chunk, or 0, 4 x_end, 8 acc, 12 strips, 16 x, 20 steps left out, 24 end of
-@ this chunk, 28 end of the first chunk;
-@ of the group kernel: 0-15 sums over groups, 16 x, 28 x_end, 32 acc, 36 strips.
+@ Frame of the row kernel: 0 x_end where there is but one chunk, or 0, 4 x_end, 8 acc, 12 strips, 16 x, 20 steps left out,
+@ 24 end of this chunk, 28 end of the first chunk; of the group kernel: 0-15 sums over groups, 16 x, 28 x_end, 32 acc, 36 strips.
 
     .syntax unified
     .thumb
