@@ -1,7 +1,7 @@
 //! Packing, the reference and the portable kernels against the definition, by property and on the golden cases.
 
 use actq_host_tests::golden::{self, Case, Draw, Random};
-use actq_kernels::activations::{NotFinite, Prepared, Scale, prepared_words};
+use actq_kernels::activations::{NotFinite, Prepared, Scale, prepare, prepared_words};
 use actq_kernels::dequantize;
 use actq_kernels::format::{Block, BlockShape, Lanes, STRIP, Width, pack};
 use actq_kernels::gemv::{BACKEND, Backend, Mismatch, gemv};
@@ -94,6 +94,11 @@ proptest! {
         scale.quantize(&x, shape, &mut words);
         let scale = scale.get();
         let prepared = Prepared::new(&words, shape).expect("the length is right");
+        // What integers give, word for word: start words, sums and padding, too.
+        let integers: Vec<i16> = (0..x.len()).map(|col| prepared.value(col)).collect();
+        let mut expected = vec![!0; words.len() + 1];
+        prop_assert_eq!(prepare(&integers, shape, &mut expected).map(|x| x.words()), Some(&*words));
+        prop_assert_eq!(expected.last(), Some(&!0));
         for (i, x) in x.iter().enumerate() {
             let q = prepared.value(i);
             prop_assert!(q.unsigned_abs() <= x_max);
@@ -135,6 +140,8 @@ fn shapes_and_lengths_that_do_not_fit_are_refused() {
         assert!(Block::new(bad, &vec![0; bad.words()]).is_none(), "{bad:?}");
     }
     let block = Block::new(shape, &words).expect("the words fit the shape");
+    assert!(prepare(&[1; 33], shape, &mut vec![0; prepared_words(shape) - 1]).is_none(), "too few words");
+    assert!(prepare(&[], BlockShape { cols: 0, ..shape }, &mut [0; 8]).is_none(), "no columns");
     let prepared = vec![0; prepared_words(shape)];
     let x = Prepared::new(&prepared, shape).expect("the length is right");
     assert_eq!(gemv(&block, &x, 0, &mut [0; 8]), Ok(()));

@@ -8,7 +8,7 @@
 //! chunk is its start words and its int16 pairs, column `2j` in the low half. The last one is padded with zeros up to where the
 //! weights are, or to a multiple of [`PAD_COLS`] with single lanes.
 
-use crate::format::{BlockShape, Lanes, PAD_COLS, Start, XFormat};
+use crate::format::{BlockShape, Lanes, PAD_COLS, XFormat, div_up, round_up};
 
 /// `1.5 * 2^23`: see the module's rounding rule.
 pub const ROUND: f32 = 12_582_912.0;
@@ -17,14 +17,16 @@ pub const ROUND: f32 = 12_582_912.0;
 pub const TINY: f32 = f32::from_bits(27 << 23);
 
 /// How a prepared vector is laid out: the layout's needs, with the lengths of the vector.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct Plan {
-    format: XFormat,
+    format: &'static XFormat,
     cols: usize,
     /// Columns with the padding.
     padded: usize,
     /// Columns of a group; all of them where there are no groups.
     group: usize,
+    /// Groups; the last one may be short.
+    groups: usize,
     /// Columns of a chunk.
     chunk: usize,
     /// Columns of a group's first chunk, which is short where they do not fill all.
@@ -34,50 +36,74 @@ struct Plan {
 }
 
 impl Plan {
+    /// Every call of a kernel comes through here; all lengths but the vector's are powers of two, so nothing is divided.
+    #[inline(always)]
     const fn new(shape: BlockShape) -> Self {
-        let format = shape.layout().x;
+        let format = &shape.layout().x;
         let padded = match shape.lanes {
-            Lanes::Single => shape.cols.next_multiple_of(PAD_COLS),
-            Lanes::Paired => shape.units() * shape.layout().cell.cols,
+            Lanes::Single => round_up(shape.cols, PAD_COLS),
+            Lanes::Paired => round_up(shape.cols, shape.step()),
         };
-        let group = if shape.group == 0 || shape.group > padded { padded } else { shape.group };
-        let chunk = if format.chunk < group { format.chunk } else { group };
-        let full_chunks = group / chunk;
-        let (first_chunk, chunks) = match group - full_chunks * chunk {
-            0 => (chunk, full_chunks),
-            short => (short, full_chunks + 1),
+        let (group, groups) = match shape.group {
+            group @ 1.. if group < padded => (group, div_up(padded, group)),
+            _ => (padded, 1),
         };
-        Self { format, cols: shape.cols, padded, group, chunk, first_chunk, chunks }
+        if format.chunk >= group {
+            return Self {
+                format,
+                cols: shape.cols,
+                padded,
+                group,
+                groups,
+                chunk: group,
+                first_chunk: group,
+                chunks: 1,
+            };
+        }
+        let chunk = format.chunk;
+        let chunks = div_up(group, chunk);
+        let first_chunk = group - (chunks - 1) * chunk;
+        Self { format, cols: shape.cols, padded, group, groups, chunk, first_chunk, chunks }
     }
 
-    const fn chunk_words(self) -> usize {
+    /// The plan where the columns are valid. What is prepared for another invalid shape fits no block.
+    #[inline(always)]
+    fn checked(shape: BlockShape) -> Option<Self> {
+        (1..=0xffff).contains(&shape.cols).then(|| Self::new(shape))
+    }
+
+    const fn chunk_words(&self) -> usize {
         self.format.starts.len() + self.chunk / 2
     }
 
-    const fn group_words(self) -> usize {
-        self.group / 2 + self.chunks * self.format.starts.len() + self.format.sum as usize
+    const fn group_words(&self) -> usize {
+        self.group / 2 + self.extra_words()
+    }
+
+    /// Words of a group that hold no pairs. A short group has but one chunk, like all groups of single lanes.
+    const fn extra_words(&self) -> usize {
+        self.chunks * self.format.starts.len() + self.format.sum as usize
     }
 
     /// Words before the pair of column `col`.
-    const fn words_before(self, col: usize) -> usize {
+    const fn words_before(&self, col: usize) -> usize {
         let (group, col) = (col / self.group, col % self.group);
         let full_before = (col + self.chunk - self.first_chunk) / self.chunk;
         group * self.group_words() + (full_before + 1) * self.format.starts.len() + col / 2
     }
 
-    const fn words(self) -> usize {
-        if self.padded == self.group {
-            return self.group_words();
-        }
-        // The last pair of the vector is followed by its group's sum only.
-        self.words_before(self.padded - 1) + 1 + self.format.sum as usize
+    const fn words(&self) -> usize {
+        self.padded / 2 + self.groups * self.extra_words()
     }
 
     /// See [`Prepared::bounds`]. Single lanes read no more than the block's own units; with row scales, the vector's sum
     /// stands behind the end.
     #[cfg(actq_armv7em)]
-    const fn bounds(self, shape: BlockShape) -> (usize, usize) {
-        let unread = (self.padded - shape.units() * shape.layout().cell.cols) / 2;
+    const fn bounds(&self, shape: BlockShape) -> (usize, usize) {
+        let unread = match shape.lanes {
+            Lanes::Single => (self.padded - round_up(shape.cols, shape.step())) / 2,
+            Lanes::Paired => 0,
+        };
         let sum_behind = (self.format.sum && shape.group == 0) as usize;
         let extra = match self.format.starts {
             [start] if self.format.sum => 0usize.wrapping_sub(self.chunks * start.bias as usize),
@@ -86,12 +112,12 @@ impl Plan {
         (self.words() - unread - sum_behind, extra)
     }
 
-    /// Steps of 8 columns that the first pass through the loop of a kernel for row scales leaves out.
+    /// Steps that the first pass through the loop of a kernel for row scales leaves out. Passes and steps are powers of two, and
+    /// chunks that are longer than a pass are whole passes.
     #[cfg(actq_armv7em)]
-    const fn skip(self) -> usize {
-        // A pass takes several chunks where they are shorter. Passes are powers of two.
-        let first = if self.format.chunk < self.format.run { self.padded } else { self.first_chunk };
-        (0usize.wrapping_sub(first) & (self.format.run - 1)) / 8
+    const fn skip(&self, shape: BlockShape) -> usize {
+        let step = shape.layout().step;
+        (0usize.wrapping_sub(round_up(shape.cols, step)) & (self.format.run - 1)) >> step.trailing_zeros()
     }
 }
 
@@ -104,7 +130,7 @@ pub const fn prepared_words(shape: BlockShape) -> usize {
 #[derive(Clone, Copy, Debug)]
 pub struct Prepared<'a> {
     words: &'a [u32],
-    /// The shape without its rows.
+    /// The shape; its rows do not matter.
     shape: BlockShape,
     #[cfg(actq_armv7em)]
     bounds: (usize, usize),
@@ -113,27 +139,29 @@ pub struct Prepared<'a> {
 }
 
 impl<'a> Prepared<'a> {
-    /// Names a vector that [`Scale::quantize`] or [`prepare`] wrote for blocks of this shape (their rows do not matter); `None` where
-    /// the length differs from [`prepared_words`] or the shape is not valid.
+    /// Names a vector that [`Scale::quantize`] or [`prepare`] wrote for blocks of this shape (their rows do not matter); `None`
+    /// where the length differs from [`prepared_words`] or there are no columns or too many.
     pub fn new(words: &'a [u32], shape: BlockShape) -> Option<Self> {
-        let shape = BlockShape { rows: 1, ..shape };
-        if !shape.is_valid() {
-            return None;
-        }
-        let plan = Plan::new(shape);
-        (words.len() == plan.words()).then_some(Self {
+        let plan = Plan::checked(shape)?;
+        (words.len() == plan.words()).then(|| Self::planned(words, shape, &plan))
+    }
+
+    #[inline(always)]
+    fn planned(words: &'a [u32], shape: BlockShape, _plan: &Plan) -> Self {
+        Self {
             words,
             shape,
             #[cfg(actq_armv7em)]
-            bounds: plan.bounds(shape),
+            bounds: _plan.bounds(shape),
             #[cfg(actq_armv7em)]
-            skip: plan.skip(),
-        })
+            skip: _plan.skip(shape),
+        }
     }
 
     /// Whether the vector was prepared for blocks of this shape.
     pub fn fits(&self, shape: BlockShape) -> bool {
-        self.shape == BlockShape { rows: 1, ..shape }
+        let BlockShape { width, lanes, rows: _, cols, group } = self.shape;
+        (width, lanes, cols, group) == (shape.width, shape.lanes, shape.cols, shape.group)
     }
 
     /// All words.
@@ -161,7 +189,7 @@ impl<'a> Prepared<'a> {
         self.bounds
     }
 
-    /// Steps of 8 columns that the first pass through a kernel's loop leaves out.
+    /// The layout's steps that the first pass through a kernel's loop leaves out.
     #[cfg(actq_armv7em)]
     pub(crate) fn skip(&self) -> usize {
         self.skip
@@ -194,16 +222,15 @@ pub struct Scale {
 impl Scale {
     /// The scale of `x` for integers in `-x_max ..= x_max`. `x_max` is 127 for int8 activations and at most 32767.
     pub fn new(x: &[f32], x_max: u16) -> Result<Self, NotFinite> {
-        let amax = f32::from_bits(magnitude_bits(x));
-        if !amax.is_finite() {
+        let bits = magnitude_bits(x);
+        if bits >= f32::INFINITY.to_bits() {
             return Err(NotFinite);
         }
-        let x_max = f32::from(x_max);
-        Ok(if amax < TINY {
-            Self { scale: 0.0, inverse: 0.0 }
-        } else {
-            Self { scale: amax / x_max, inverse: x_max / amax }
-        })
+        if bits < TINY.to_bits() {
+            return Ok(Self { scale: 0.0, inverse: 0.0 });
+        }
+        let (amax, x_max) = (f32::from_bits(bits), f32::from(x_max));
+        Ok(Self { scale: amax / x_max, inverse: x_max / amax })
     }
 
     /// The factor of the integers.
@@ -211,11 +238,12 @@ impl Scale {
         self.scale
     }
 
-    /// Writes the integers of `x`, prepared for blocks of `shape`, into `out`, which holds [`prepared_words`] words (a shorter
-    /// `out` is filled as far as it goes). Missing values of `x` count as zeros.
-    pub fn quantize(self, x: &[f32], shape: BlockShape, out: &mut [u32]) {
-        let quantizer = Quantizer { inverse: self.inverse };
-        fill(x, Plan::new(shape), out, &quantizer);
+    /// Writes the integers of `x`, prepared for blocks of `shape`, to the first [`prepared_words`] words of `out`, and names
+    /// them. Missing values of `x` count as zeros. `None`, with nothing written, where `out` is too short, or there are no columns
+    /// or too many.
+    #[inline(always)]
+    pub fn quantize<'w>(self, x: &[f32], shape: BlockShape, out: &'w mut [u32]) -> Option<Prepared<'w>> {
+        fill(x, shape, out, &Quantizer { inverse: self.inverse })
     }
 }
 
@@ -228,9 +256,22 @@ fn magnitude_bits(x: &[f32]) -> u32 {
     x.iter().fold(0u32, |m, v| m.max(v.to_bits() & 0x7fff_ffff))
 }
 
-/// Writes integers prepared for blocks of `shape` into `out`; lengths as for [`Scale::quantize`].
-pub fn prepare(x: &[i16], shape: BlockShape, out: &mut [u32]) {
-    fill(x, Plan::new(shape), out, &Copier);
+/// As [`Scale::quantize`], of integers.
+pub fn prepare<'w>(x: &[i16], shape: BlockShape, out: &'w mut [u32]) -> Option<Prepared<'w>> {
+    fill(x, shape, out, &Copier)
+}
+
+/// A run of whole groups, each of `first` columns and then chunks of `chunk` columns.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(not(actq_fpu), expect(dead_code, reason = "only the FPU's backend has code for whole groups"))]
+pub(crate) struct Groups {
+    pub(crate) groups: usize,
+    /// Chunks of a group.
+    pub(crate) chunks: usize,
+    /// Columns of a group's first chunk.
+    pub(crate) first: usize,
+    /// Columns of the other chunks.
+    pub(crate) chunk: usize,
 }
 
 /// What turns values into the integers of a prepared vector.
@@ -240,16 +281,9 @@ trait Source {
     /// An integer whose low 16 bits count.
     fn integer(&self, value: Self::Value) -> u32;
 
-    /// Writes `chunks` whole chunks of `cols` values, each with one start word, and returns the sum of their integers; `None`,
-    /// with nothing written, where the backend has no code for that.
-    fn chunks(
-        &self,
-        _x: &[Self::Value],
-        _shift: u32,
-        _start: Start,
-        _counts: (usize, usize),
-        _out: &mut [u32],
-    ) -> Option<i32> {
+    /// Writes groups with all that belongs to them, and returns the sum of the last group's integers where the layout asks
+    /// for sums; `None`, with nothing written, where the backend has no code for these lengths.
+    fn groups(&self, _x: &[Self::Value], _format: &XFormat, _groups: Groups, _out: &mut [u32]) -> Option<i32> {
         None
     }
 }
@@ -278,76 +312,96 @@ impl Source for Quantizer {
 
     #[cfg(actq_fpu)]
     #[inline(always)]
-    fn chunks(&self, x: &[f32], shift: u32, start: Start, counts: (usize, usize), out: &mut [u32]) -> Option<i32> {
-        crate::armv7em::quantize(x, self.inverse, shift, start, counts, out)
+    fn groups(&self, x: &[f32], format: &XFormat, groups: Groups, out: &mut [u32]) -> Option<i32> {
+        crate::armv7em::quantize(x, self.inverse, format, groups, out)
     }
 }
 
 /// Lays a vector out.
 #[inline(always)]
-fn fill<S: Source>(x: &[S::Value], plan: Plan, out: &mut [u32], source: &S) {
-    let XFormat { starts, sum, .. } = plan.format;
+fn fill<'w, S: Source>(x: &[S::Value], shape: BlockShape, out: &'w mut [u32], source: &S) -> Option<Prepared<'w>> {
+    let plan = Plan::checked(shape)?;
+    let out = out.get_mut(..plan.words())?;
     let x = x.get(..plan.cols).unwrap_or(x);
-    let mut groups = x.chunks(plan.group);
-    for out in out.chunks_mut(plan.group_words()) {
-        let (out, sum_word) = out.split_at_mut(out.len() - usize::from(sum));
-        let (mut x, mut out) = (groups.next().unwrap_or(&[]), out);
-        let mut group_sum = 0i32;
-        let first = plan.first_chunk;
-        if first != plan.chunk {
-            let (first_x, rest_x) = x.split_at(first.min(x.len()));
-            let (first_out, rest_out) = out.split_at_mut((starts.len() + first / 2).min(out.len()));
-            group_sum = chunk(first_x, plan.format, first_out, source);
-            (x, out) = (rest_x, rest_out);
-        }
-        // Whole chunks at once, where each has but one start word.
-        if let [start] = *starts {
-            let count = x.len() / plan.chunk;
-            if let Some(sum) = source.chunks(x, plan.format.shift, start, (count, plan.chunk), out) {
-                group_sum = group_sum.wrapping_add(sum);
-                x = x.get(count * plan.chunk..).unwrap_or(&[]);
-                out = out.get_mut(count * plan.chunk_words()..).unwrap_or_default();
-            }
-        }
-        let mut chunks = x.chunks(plan.chunk);
-        for out in out.chunks_mut(plan.chunk_words()) {
-            group_sum = group_sum.wrapping_add(chunk(chunks.next().unwrap_or(&[]), plan.format, out, source));
-        }
-        if let Some(word) = sum_word.first_mut() {
-            *word = group_sum as u32;
-        }
+    // All whole groups at once; a vector without groups is one.
+    let groups = match plan.groups {
+        1 => usize::from(x.len() == plan.padded),
+        _ => x.len() >> plan.group.trailing_zeros(),
+    };
+    let Plan { chunks, first_chunk: first, chunk, .. } = plan;
+    let done = match source.groups(x, plan.format, Groups { groups, chunks, first, chunk }, out) {
+        Some(_) => groups,
+        None => 0,
+    };
+    if done < plan.groups {
+        rest(x, shape, done, out, source);
+    }
+    Some(Prepared::planned(out, shape, &plan))
+}
+
+/// Writes the groups from `done` on. Seldom needed, so it makes its own plan.
+#[inline(never)]
+fn rest<S: Source>(x: &[S::Value], shape: BlockShape, done: usize, out: &mut [u32], source: &S) {
+    let plan = &Plan::new(shape);
+    let mut groups = x.chunks(plan.group).skip(done);
+    for out in out.chunks_mut(plan.group_words()).skip(done) {
+        group(groups.next().unwrap_or(&[]), plan, out, source);
     }
 }
 
-/// Writes a chunk, as far as `x` goes and then zeros, and returns the sum of its integers.
-fn chunk<S: Source>(mut x: &[S::Value], format: XFormat, out: &mut [u32], source: &S) -> i32 {
-    let XFormat { shift, starts, .. } = format;
+/// Writes a group that is not whole, or all of it where the backend has no code.
+fn group<S: Source>(x: &[S::Value], plan: &Plan, out: &mut [u32], source: &S) {
+    let (mut out, sum_word) = out.split_at_mut(out.len() - usize::from(plan.format.sum));
     let mut sum = 0i32;
-    let eights = x.len() & !7;
-    // The backend writes a start word, too; it is overwritten below.
-    let mut done = 0;
-    if let Some((last, _)) = starts.split_last()
-        && let Some(out) = out.get_mut(starts.len() - 1..)
-        && let Some(part) = source.chunks(x, shift, *last, (1, eights), out)
-    {
+    let mut columns = plan.first_chunk;
+    let mut x = x;
+    // Whole chunks at once, unless the first is short and x does not fill it.
+    let whole = if x.len() < plan.first_chunk { 0 } else { 1 + (x.len() - plan.first_chunk) / plan.chunk };
+    let run = Groups { groups: 1, chunks: whole, first: plan.first_chunk, chunk: plan.chunk };
+    if let Some(part) = source.groups(x, plan.format, run, out) {
         sum = part;
-        done = eights;
+        let done = plan.first_chunk + (whole - 1) * plan.chunk;
+        x = x.get(done..).unwrap_or(&[]);
+        out = out.get_mut(whole * plan.format.starts.len() + done / 2..).unwrap_or_default();
+        columns = plan.chunk;
     }
-    x = x.get(done..).unwrap_or(&[]);
-    let Some((start_words, pairs)) = out.split_at_mut_checked(starts.len()) else { return 0 };
+    while !out.is_empty() {
+        let words = plan.format.starts.len() + columns / 2;
+        let (this, rest) = out.split_at_mut(words.min(out.len()));
+        let (this_x, rest_x) = x.split_at(columns.min(x.len()));
+        sum = sum.wrapping_add(chunk(this_x, plan.format, this, source));
+        (x, out, columns) = (rest_x, rest, plan.chunk);
+    }
+    if let Some(word) = sum_word.first_mut() {
+        *word = sum as u32;
+    }
+}
+
+/// Writes a chunk, as far as `x` goes and then zeros, and returns the sum of its integers where the layout asks for sums.
+fn chunk<S: Source>(x: &[S::Value], format: &XFormat, out: &mut [u32], source: &S) -> i32 {
+    let XFormat { shift, starts, .. } = *format;
+    // The backend takes eights. What it writes behind them, as for a whole group, is overwritten below.
+    let eights = x.len() & !7;
+    let run = Groups { groups: 1, chunks: 1, first: eights, chunk: eights };
+    let (sum, done) = source.groups(x, format, run, out).map_or((0, 0), |sum| (sum, eights));
+    let Some((start_words, pairs)) = out.split_at_mut_checked(starts.len()) else { return sum };
+    if done == 0 {
+        start_words.iter_mut().zip(starts).for_each(|(word, start)| *word = start.bias as u32);
+    }
     let mut pairs = pairs.get_mut(done / 2..).unwrap_or_default();
-    for x in x.chunks(2) {
+    let mut rest_sum = 0i32;
+    for x in x.get(done..).unwrap_or(&[]).chunks(2) {
         let Some((word, rest)) = core::mem::take(&mut pairs).split_first_mut() else { break };
         let (low, high) = (source.integer(x[0]), x.get(1).map_or(0, |v| source.integer(*v)));
-        sum = sum.wrapping_add(low as i16 as i32).wrapping_add(high as i16 as i32);
+        rest_sum = rest_sum.wrapping_add(low as i16 as i32).wrapping_add(high as i16 as i32);
         *word = ((low << shift) & 0xffff) | (high << shift << 16);
         pairs = rest;
     }
     pairs.fill(0);
     for (word, start) in start_words.iter_mut().zip(starts) {
-        *word = start.bias.wrapping_add(start.factor.wrapping_mul(sum)) as u32;
+        *word = word.wrapping_add(start.factor.wrapping_mul(rest_sum) as u32);
     }
-    sum
+    sum.wrapping_add(rest_sum)
 }
 
 /// Words that suffice for a prepared vector of any layout.

@@ -213,7 +213,7 @@ pub struct Start {
 impl XFormat {
     /// Of single lanes: one start value a group.
     const fn single(starts: &'static [Start]) -> Self {
-        Self { shift: 0, chunk: usize::MAX, run: 1, starts, sum: false }
+        Self { shift: 0, chunk: usize::MAX, run: PAD_COLS, starts, sum: false }
     }
 }
 
@@ -275,7 +275,7 @@ pub(crate) use with_format;
 pub(crate) struct Layout {
     pub(crate) cell: Cell,
     strip: usize,
-    step: usize,
+    pub(crate) step: usize,
     pub(crate) x: XFormat,
 }
 
@@ -299,6 +299,16 @@ pub(crate) fn smlad(a: u32, b: u32, c: i32) -> i32 {
     let lo = (a as i16 as i32).wrapping_mul(b as i16 as i32);
     let hi = ((a as i32) >> 16).wrapping_mul((b as i32) >> 16);
     c.wrapping_add(lo).wrapping_add(hi)
+}
+
+/// `len` up to a multiple of `step`, a power of two.
+pub(crate) const fn round_up(len: usize, step: usize) -> usize {
+    (len + step - 1) & !(step - 1)
+}
+
+/// How many times `step`, a power of two, covers `len`.
+pub(crate) const fn div_up(len: usize, step: usize) -> usize {
+    (len + step - 1) >> step.trailing_zeros()
 }
 
 /// The shape of a [`Block`]: rows of one width.
@@ -326,6 +336,7 @@ impl BlockShape {
         self.rows >= 1 && self.rows <= 0xffff && self.cols >= 1 && self.cols <= 0xffff && group
     }
 
+    #[inline(always)]
     pub(crate) const fn layout(self) -> &'static Layout {
         &LAYOUTS[self.width as usize][self.lanes as usize]
     }
@@ -335,13 +346,17 @@ impl BlockShape {
         self.rows.next_multiple_of(QUAD)
     }
 
-    /// Units in a row. With paired lanes, all groups are whole.
-    pub const fn units(self) -> usize {
-        let step = match (self.lanes, self.group) {
+    /// Columns that the weights are padded to a multiple of. With paired lanes, all groups are whole.
+    pub(crate) const fn step(self) -> usize {
+        match (self.lanes, self.group) {
             (Lanes::Paired, 1..) => self.group,
             _ => self.layout().step,
-        };
-        self.cols.next_multiple_of(step) / self.layout().cell.cols
+        }
+    }
+
+    /// Units in a row.
+    pub const fn units(self) -> usize {
+        round_up(self.cols, self.step()) / self.layout().cell.cols
     }
 
     /// Units in a full group; all units of a row where there are no group scales.

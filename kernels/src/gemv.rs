@@ -31,12 +31,11 @@ pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i3
     let shape = block.shape();
     let end = first_row.saturating_add(acc.len());
     let ends_well = end == shape.padded_rows() || end < shape.padded_rows() && end.is_multiple_of(STRIP);
-    if !x.fits(shape) || !first_row.is_multiple_of(STRIP) || !ends_well {
+    if !first_row.is_multiple_of(STRIP) || !ends_well {
         return Err(Mismatch);
     }
     #[cfg(actq_armv7em)]
-    crate::armv7em::gemv(block, x, first_row, acc);
+    return crate::armv7em::gemv(block, x, first_row, acc);
     #[cfg(not(actq_armv7em))]
-    crate::portable::gemv(block, x, first_row, acc);
-    Ok(())
+    x.fits(shape).then(|| crate::portable::gemv(block, x, first_row, acc)).ok_or(Mismatch)
 }

@@ -5,7 +5,9 @@
 //! 3. `y = start + acc * (row_scale * x_scale)`, each operation rounded to f32, where `start` is the bias, or, where the
 //!    operation accumulates, the sum of the old `y` and the bias. Rows that no block holds (0 bits) keep `start`.
 
-use crate::activations::{NotFinite, Prepared, Scale, max_prepared_words, prepared_words};
+use core::ops::Range;
+
+use crate::activations::{NotFinite, Prepared, Scale, max_prepared_words};
 #[cfg(actq_fpu)]
 use crate::armv7em;
 use crate::format::{Block, Lanes, STRIP};
@@ -53,6 +55,12 @@ pub(crate) fn half_word(words: &[u32], i: usize) -> u16 {
     (u32::from_le(word) >> (16 * (i % 2))) as u16
 }
 
+/// A part of the biases, if there are any; `None` where they are too short.
+#[inline(always)]
+fn slice_of(start: Option<&[u32]>, at: Range<usize>) -> Option<Option<&[u32]>> {
+    start.map_or(Some(None), |start| start.get(at).map(Some))
+}
+
 impl RowBlock<'_> {
     /// The scale of the block's row `i`.
     #[inline(always)]
@@ -72,20 +80,35 @@ impl RowBlock<'_> {
     /// where `start` or `y` is too short.
     pub fn apply(&self, x: &Prepared<'_>, x_scale: Scale, start: Option<&[u32]>, y: &mut [f32]) {
         let shape = self.block.shape();
-        let mut first = 0;
+        let x_scale = x_scale.get();
+        if start.is_none() || !self.index.is_empty() {
+            return self.apply_runs::<RUN>(0, x, x_scale, start, y);
+        }
         // Rows in order have room for their sums in y itself, except those of a last strip that padding fills.
-        if let (Some(start), true) = (start, self.index.is_empty()) {
-            let whole = self.first_row..self.first_row + (shape.rows & !(STRIP - 1));
-            let (Some(start), Some(y)) = (start.get(whole.clone()), y.get_mut(whole)) else { return };
+        let whole = if shape.rows == shape.padded_rows() { shape.rows } else { shape.rows & !(STRIP - 1) };
+        if whole > 0 {
+            let at = self.first_row..self.first_row + whole;
+            let (Some(start), Some(y)) = (slice_of(start, at.clone()), y.get_mut(at)) else { return };
             if gemv(&self.block, x, 0, bytemuck::cast_slice_mut(y)).is_err() {
                 return;
             }
-            self.scale_in_place(x_scale.get(), start, y);
-            first = y.len();
+            self.scale_in_order(0, None, x_scale, start, y);
         }
-        if first == shape.rows {
-            return;
+        if whole < shape.rows {
+            self.apply_runs::<STRIP>(whole, x, x_scale, start, y);
         }
+    }
+
+    /// As [`Self::apply`], for the rows from `first` on, with the sums of `RUN` rows on the stack at once.
+    fn apply_runs<const RUN: usize>(
+        &self,
+        mut first: usize,
+        x: &Prepared<'_>,
+        x_scale: f32,
+        start: Option<&[u32]>,
+        y: &mut [f32],
+    ) {
+        let shape = self.block.shape();
         let mut sums = [0; RUN];
         while first < shape.rows {
             let sums = &mut sums[..RUN.min(shape.padded_rows() - first)];
@@ -93,34 +116,32 @@ impl RowBlock<'_> {
                 return;
             }
             let sums = &sums[..sums.len().min(shape.rows - first)];
-            self.scale_rows(first, sums, x_scale.get(), start, y);
+            if self.index.is_empty() {
+                let at = self.first_row + first..self.first_row + first + sums.len();
+                let (Some(start), Some(y)) = (slice_of(start, at.clone()), y.get_mut(at)) else { return };
+                self.scale_in_order(first, Some(sums), x_scale, start, y);
+            } else {
+                self.scale_by_index(first, sums, x_scale, start, y);
+            }
             first += sums.len();
         }
     }
 
-    /// Turns the integer sums in y, of the first `y.len()` rows, into results.
-    fn scale_in_place(&self, x_scale: f32, start: &[u32], y: &mut [f32]) {
+    /// Turns the sums of as many rows as `y` has, from `first` on, into results. What is `None` stands in y itself.
+    fn scale_in_order(&self, first: usize, sums: Option<&[i32]>, x_scale: f32, start: Option<&[u32]>, y: &mut [f32]) {
         #[cfg(actq_fpu)]
-        let done = armv7em::scale(armv7em::Operands::SumsInPlace(start), self.scales, x_scale, y);
+        armv7em::scale(sums, start, self.scales.get(first / 2..).unwrap_or(&[]), x_scale, y);
         #[cfg(not(actq_fpu))]
-        let done = 0;
-        for (i, (y, start)) in y.iter_mut().zip(start).enumerate().skip(done) {
-            *y = f32::from_bits(u32::from_le(*start)) + y.to_bits() as i32 as f32 * (self.scale(i) * x_scale);
+        for (i, y) in y.iter_mut().enumerate() {
+            let start = start.and_then(|s| s.get(i)).map_or(*y, |bits| f32::from_bits(u32::from_le(*bits)));
+            let sum = sums.and_then(|s| s.get(i)).map_or(y.to_bits() as i32, |sum| *sum);
+            *y = start + sum as f32 * (self.scale(first + i) * x_scale);
         }
     }
 
-    /// Adds the sums of the rows from `first` on, scaled, to what `start` or y holds.
-    fn scale_rows(&self, first: usize, sums: &[i32], x_scale: f32, start: Option<&[u32]>, y: &mut [f32]) {
-        #[cfg(actq_fpu)]
-        let done = match (start, self.scales.get(first / 2..), y.get_mut(self.first_row + first..)) {
-            (None, Some(scales), Some(y)) if self.index.is_empty() => {
-                armv7em::scale(armv7em::Operands::StartInPlace(sums), scales, x_scale, y)
-            }
-            _ => 0,
-        };
-        #[cfg(not(actq_fpu))]
-        let done = 0;
-        for (i, sum) in (first..).zip(sums).skip(done) {
+    /// Adds the sums of the rows from `first` on, scaled, to what `start` or y holds at the rows' places.
+    fn scale_by_index(&self, first: usize, sums: &[i32], x_scale: f32, start: Option<&[u32]>, y: &mut [f32]) {
+        for (i, sum) in (first..).zip(sums) {
             let at = self.output(i);
             let Some(y) = y.get_mut(at) else { continue };
             let start = start.and_then(|s| s.get(at)).map_or(*y, |bits| f32::from_bits(u32::from_le(*bits)));
@@ -149,17 +170,15 @@ impl Matrix<'_> {
         if start.is_none() {
             self.start(y, accumulate);
         }
-        let mut last = None;
+        let mut prepared: Option<Prepared<'_>> = None;
         for rows in self.blocks() {
             let shape = rows.block.shape();
-            let Some(work) = work.get_mut(..prepared_words(shape)) else { return Ok(()) };
             // Layouts prepare the activations differently; the blocks of one width share them.
-            if last != Some(shape.width) {
-                x_scale.quantize(x, shape, work);
-                last = Some(shape.width);
+            if prepared.is_none_or(|x| !x.fits(shape)) {
+                prepared = x_scale.quantize(x, shape, work);
             }
-            if let Some(x) = Prepared::new(work, shape) {
-                rows.apply(&x, x_scale, start, y);
+            if let Some(x) = &prepared {
+                rows.apply(x, x_scale, start, y);
             }
         }
         Ok(())

@@ -18,7 +18,7 @@ mod firmware {
     use core::hint::black_box;
 
     use actq_firmware_demo::{count, host};
-    use actq_kernels::activations::{Prepared, Scale, prepared_words};
+    use actq_kernels::activations::{Scale, prepared_words};
     use actq_kernels::format::{Block, BlockShape, Lanes, Width, pack};
     use actq_kernels::linear::RowBlock;
     use cortex_m::singleton;
@@ -118,8 +118,7 @@ mod firmware {
     ) -> Option<()> {
         let shape = rows.block.shape();
         let scale = Scale::new(x, x_max).ok()?;
-        scale.quantize(x, shape, prepared);
-        rows.apply(&Prepared::new(prepared, shape)?, scale, Some(bias), y);
+        rows.apply(&scale.quantize(x, shape, prepared)?, scale, Some(bias), y);
         Some(())
     }
 

@@ -13,9 +13,10 @@ mod firmware {
     use core::fmt::Write as _;
 
     use actq_firmware_demo::host::{self, File};
-    use actq_kernels::activations::{Prepared, prepared_words};
+    use actq_kernels::activations::{Prepared, Scale, prepared_words};
     use actq_kernels::format::{Block, BlockShape, Lanes, Width};
     use actq_kernels::gemv::{self, gemv};
+    use actq_kernels::linear::RowBlock;
     use actq_kernels::portable;
     use cortex_m::singleton;
     use cortex_m_semihosting::hio;
@@ -23,6 +24,7 @@ mod firmware {
     /// Of the largest case, weights and activations.
     const WORDS: usize = if cfg!(actq_small) { 1536 } else { 64 * 1024 };
     const ROWS: usize = 256;
+    const COLS: usize = 2048;
 
     #[cortex_m_rt::entry]
     fn main() -> ! {
@@ -91,6 +93,43 @@ mod firmware {
         if !same(&sums) {
             return Err("sums of the portable backend differ");
         }
+        float_path(&block, &x, &expected[..rows])?;
         Ok(true)
+    }
+
+    /// The way from f32 to f32 on the case's numbers. Integers whose largest magnitude is the limit have the scale 1, so the
+    /// prepared vector must be the case's own, word for word.
+    fn float_path(block: &Block<'_>, x: &Prepared<'_>, sums: &[i32]) -> Result<(), &'static str> {
+        let shape = block.shape();
+        let mut floats = [0f32; COLS];
+        let floats = floats.get_mut(..shape.cols).ok_or("the case is too large")?;
+        floats.iter_mut().enumerate().for_each(|(col, f)| *f = f32::from(x.value(col)));
+        let limit = floats.iter().fold(1, |limit, f| (f.abs() as u16).max(limit));
+        let scale = Scale::new(floats, limit).map_err(|_| "the largest magnitude is not finite")?;
+        let mut words = [0x5555_5555; 2 * COLS];
+        let prepared = scale.quantize(floats, shape, &mut words).ok_or("the case is too large")?;
+        if prepared.words() != x.words() {
+            return Err("the quantized vector differs");
+        }
+        let used = x.words().len();
+        if words[used..].iter().any(|w| *w != 0x5555_5555) {
+            return Err("the quantizer wrote behind its output");
+        }
+        let scales: [u32; ROWS / 2] = core::array::from_fn(|i| 0x3c80_3f00 + 0x0001_0003 * i as u32);
+        let start: [u32; ROWS] = core::array::from_fn(|i| (i as f32 - 7.5).to_bits());
+        let rows = RowBlock { block: *block, scales: &scales, index: &[], first_row: 3 };
+        for in_y in [false, true] {
+            let mut y = start.map(f32::from_bits);
+            rows.apply(x, scale, (!in_y).then_some(&start), &mut y);
+            for (i, y) in y.iter().enumerate() {
+                let start = f32::from_bits(start[i]);
+                let sum = i.checked_sub(3).and_then(|row| Some((row, *sums.get(row)?)));
+                let expected = sum.map_or(start, |(row, sum)| start + sum as f32 * (rows.scale(row) * scale.get()));
+                if y.to_bits() != expected.to_bits() {
+                    return Err("the results in f32 differ");
+                }
+            }
+        }
+        Ok(())
     }
 }

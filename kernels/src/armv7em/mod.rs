@@ -10,8 +10,11 @@ use core::arch::global_asm;
 
 use crate::activations::Prepared;
 #[cfg(actq_fpu)]
-use crate::format::Start;
+use crate::activations::{Groups, ROUND};
+#[cfg(actq_fpu)]
+use crate::format::{self, Format, XFormat};
 use crate::format::{Block, QUAD, STRIP};
+use crate::gemv::Mismatch;
 
 global_asm!(include_str!("single.s"), options(raw));
 global_asm!(include_str!("paired_w2.s"), options(raw));
@@ -23,8 +26,8 @@ global_asm!(include_str!("vector.s"), options(raw));
 global_asm!(include_str!("vector_fpu.s"), options(raw));
 
 /// Reads `strips` strips at `weights` and the prepared vector from `x` up to `x_end`, writes the strips' sums at `acc`. What
-/// `extra` is, the kernel's file says; the first pass through the loop of a kernel for paired lanes with row scales leaves
-/// `skip` steps of 8 columns out.
+/// `extra` is, the kernel's file says; the first pass through the loop of a kernel for row scales leaves `skip` of the layout's
+/// steps out.
 type Kernel = unsafe extern "C" fn(
     weights: *const u32,
     x: *const u32,
@@ -82,14 +85,14 @@ static KERNELS: [[[Kernels; 2]; 2]; 4] = [
     ],
 ];
 
-/// As [`crate::gemv::gemv`], for lengths that were checked there.
+/// As [`crate::gemv::gemv`], for rows that were checked there.
 #[inline(never)]
-pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i32]) {
+pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i32]) -> Result<(), Mismatch> {
     let shape = block.shape();
     let weights = block.rows_from(first_row);
     let quads = acc.len() / QUAD;
-    if weights.len() < quads * block.quad_words() || !x.fits(block.shape()) {
-        return;
+    if weights.len() < quads * block.quad_words() || !x.fits(shape) {
+        return Err(Mismatch);
     }
     let (eight, four) = KERNELS[shape.width as usize][shape.lanes as usize][usize::from(shape.group != 0)];
     let strips = if eight.is_some() { acc.len() / STRIP } else { 0 };
@@ -110,6 +113,7 @@ pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i3
             four(weights, x_words, last.as_mut_ptr(), last.len() / QUAD, x_words.add(x_end), extra, x.skip());
         }
     }
+    Ok(())
 }
 
 unsafe extern "C" {
@@ -128,75 +132,93 @@ pub fn magnitude_bits(x: &[f32]) -> u32 {
     rest.iter().fold(largest, |m, v| m.max(v.to_bits() & 0x7fff_ffff))
 }
 
-/// Quantizes `chunks` chunks of `cols` values, a multiple of 8: writes for each a start word and its pairs, shifted left by
-/// `shift`. Returns the sum of all integers, or `None`, with nothing written, where the lengths do not fit.
+/// As [`crate::activations`] describes it; `None`, with nothing written, where the lengths do not fit.
 #[cfg(actq_fpu)]
 #[inline(always)]
-pub fn quantize(
-    x: &[f32],
-    inverse: f32,
-    shift: u32,
-    start: Start,
-    (chunks, cols): (usize, usize),
-    out: &mut [u32],
-) -> Option<i32> {
-    let kernel = *QUANTIZE.get(shift as usize)?;
-    if chunks == 0 || cols == 0 || cols % 8 != 0 || x.len() < chunks * cols || out.len() < chunks * (1 + cols / 2) {
+pub(crate) fn quantize(x: &[f32], inverse: f32, format: &XFormat, run: Groups, out: &mut [u32]) -> Option<i32> {
+    let Groups { groups, chunks, first, chunk } = run;
+    if groups == 0
+        || chunks == 0
+        || first < 8
+        || chunk < 8
+        || (first | chunk) % 8 != 0
+        || first.max(chunk) > format.chunk
+    {
+        return None;
+    }
+    let [start, more @ ..] = format.starts else { return None };
+    let kernel = *QUANTIZE.get(format.shift as usize)?;
+    let second = more.first().map_or(0, |start| start.factor);
+    let cols = first + (chunks - 1) * chunk;
+    let words = chunks * format.starts.len() + cols / 2 + usize::from(format.sum);
+    if x.len() < groups * cols || out.len() < groups * words {
         return None;
     }
     let (x, out) = (x.as_ptr(), out.as_mut_ptr());
-    // SAFETY: the kernel reads `chunks * cols` floats and writes `chunks * (1 + cols / 2)` words; both were compared above.
-    Some(unsafe { kernel(inverse, crate::activations::ROUND, x, out, chunks, cols / 8, start.bias, start.factor) })
+    let (first, chunk) = (first / 8, chunk / 8);
+    // SAFETY: all counts are 1 or more. The kernel reads the columns of all groups and writes their words; both lengths were
+    // compared above. It writes as many start words and sums as `format` has, which `has_quantizer` says of every layout, and
+    // where it takes eight columns for a chunk, that is the format's limit and so `first` and `chunk`.
+    Some(unsafe { kernel(inverse, ROUND, x, out, groups, chunks, first, chunk, start.bias, start.factor, second) })
 }
 
-/// By shift.
+/// `y[i] = start[i] + sum[i] * (scale[i] * x_scale)`, with two bf16 scales a word; what is `None` stands in y, the sums with
+/// their bits. As far as the shortest goes.
 #[cfg(actq_fpu)]
-static QUANTIZE: [Quantize; 4] = [actq_quantize0, actq_quantize1, actq_quantize2, actq_quantize3];
-
-/// Where [`scale`] finds the integer sums and the values that the results are added to.
-#[cfg(actq_fpu)]
-#[derive(Clone, Copy, Debug)]
-pub enum Operands<'a> {
-    /// The sums' bits in the output, the bits of the start values apart.
-    SumsInPlace(&'a [u32]),
-    /// The start values in the output, the sums apart.
-    StartInPlace(&'a [i32]),
-}
-
-/// `y[i] = start[i] + sum[i] * (scale[i] * x_scale)` for as many as the assembler takes, with two bf16 scales a word; returns
-/// how many those are.
-#[cfg(actq_fpu)]
-pub fn scale(operands: Operands<'_>, scales: &[u32], x_scale: f32, y: &mut [f32]) -> usize {
-    let (sums, start, len): (*const i32, *const f32, _) = match operands {
-        Operands::SumsInPlace(start) => (y.as_ptr().cast(), start.as_ptr().cast(), start.len()),
-        Operands::StartInPlace(sums) => (sums.as_ptr(), y.as_ptr(), sums.len()),
-    };
-    let len = len.min(2 * scales.len()).min(y.len()) & !7;
-    if len > 0 {
-        // SAFETY: all operands hold at least `len` values, which is a multiple of 8 and not 0; eight are read before the same
-        // place in `y` is written.
-        unsafe { actq_scale_add(x_scale, sums, scales.as_ptr(), start, y.as_mut_ptr(), len) }
-    }
-    len
+#[inline(always)]
+pub(crate) fn scale(sums: Option<&[i32]>, start: Option<&[u32]>, scales: &[u32], x_scale: f32, y: &mut [f32]) {
+    let len = y.len().min(2 * scales.len());
+    let len = len.min(sums.map_or(len, <[_]>::len)).min(start.map_or(len, <[_]>::len));
+    let to = y.as_mut_ptr();
+    let sums = sums.map_or(to.cast_const().cast(), <[_]>::as_ptr);
+    let start = start.map_or(to.cast_const(), |start| start.as_ptr().cast());
+    // SAFETY: all operands hold at least `len` values; no place in `y` is written before what stands there was read.
+    unsafe { actq_scale_add(x_scale, sums, scales.as_ptr(), start, to, len) }
 }
 
 #[cfg(actq_fpu)]
 macro_rules! quantize_kernels {
     ($($name:ident)*) => {
-        /// Writes `chunks` chunks of `eights` times eight values at `x` to `out`.
+        /// Writes `groups` groups of `chunks` chunks, the first of `first` times eight values and the others of `eights`.
         type Quantize = unsafe extern "C" fn(
-            inverse: f32, round: f32, x: *const f32, out: *mut u32, chunks: usize, eights: usize, bias: i32, factor: i32,
+            inverse: f32, round: f32, x: *const f32, out: *mut u32,
+            groups: usize, chunks: usize, first: usize, eights: usize, bias: i32, factor: i32, second_factor: i32,
         ) -> i32;
 
         unsafe extern "C" {
             $(fn $name(
-                inverse: f32, round: f32, x: *const f32, out: *mut u32, chunks: usize, eights: usize, bias: i32, factor: i32,
+                inverse: f32, round: f32, x: *const f32, out: *mut u32,
+                groups: usize, chunks: usize, first: usize, eights: usize, bias: i32, factor: i32, second_factor: i32,
             ) -> i32;)*
         }
     };
 }
 #[cfg(actq_fpu)]
 quantize_kernels!(actq_quantize0 actq_quantize1 actq_quantize2 actq_quantize3);
+
+/// By shift.
+#[cfg(actq_fpu)]
+static QUANTIZE: [Quantize; 4] = [actq_quantize0, actq_quantize1, actq_quantize2, actq_quantize3];
+
+/// Whether the kernel of the layout's shift writes what the layout asks for: two start words, the second without a bias, at
+/// shift 1; sums from 2 on; chunks of eight at 3.
+#[cfg(actq_fpu)]
+const fn has_quantizer<F: Format>() -> bool {
+    let starts = match F::X.starts {
+        [_] => F::X.shift != 1,
+        [_, second] => F::X.shift == 1 && second.bias == 0,
+        _ => false,
+    };
+    starts && F::X.sum == (F::X.shift >= 2) && (F::X.shift == 3) == (F::X.chunk == 8) && F::X.shift <= 3
+}
+
+#[cfg(actq_fpu)]
+const _: () = {
+    assert!(has_quantizer::<format::w2::W2>() && has_quantizer::<format::w2_paired::W2Paired>());
+    assert!(has_quantizer::<format::w3::W3>() && has_quantizer::<format::w3_paired::W3Paired>());
+    assert!(has_quantizer::<format::w4::W4>() && has_quantizer::<format::w4_paired::W4Paired>());
+    assert!(has_quantizer::<format::w8::W8>() && has_quantizer::<format::w8_paired::W8Paired>());
+};
 
 #[cfg(actq_fpu)]
 unsafe extern "C" {

@@ -8,7 +8,7 @@
 @ of four; r2 is the last, because a chunk's start value comes with its first pairs), r10 and r11 weight words, r12 the mask,
 @ lr the extracted codes.
 @
-@ Frame: 0-31 sums over chunks, (sum of t, sum of its high half) of each row pair; 32 mask, 36 x_end, 40 x, 44 minus the biases,
+@ Frame: 0-31 sums over chunks, (sum of t, sum of its high half) of each row pair, or sums over groups; 32 mask, 36 x_end, 40 x, 44 minus the biases,
 @ 48 acc, 52 strips, 56 sum of x, 60 steps left out.
 
     .syntax unified
@@ -93,10 +93,10 @@
     ldr r1, [sp, #40]
 .endm
 
-@ r8: where the sums of the next strip go, r9: strips left, this one included
-.macro d2_next_strip
-    subs r9, r9, #1
-    strd r8, r9, [sp, #48]
+@ `to`: where the sums of the next strip go, `left`: strips left, this one included
+.macro d2_next_strip to=r8, left=r9
+    subs \left, \left, #1
+    strd \to, \left, [sp, #48]
     bne.w 1b
     add sp, sp, #68
     pop {r4-r11, pc}
@@ -184,20 +184,22 @@
     .size \name, . - \name
 .endm
 
-@ Sums r3-r6 of four rows over groups, from two row pairs' t and the group's `scales`; r12 holds the sum of x. Even rows sum
-@ 4 * even * scale, odd rows (2 * odd + sum(x)) * scale.
-.macro d2_scale scales, t0, t1
-    uxtb16 lr, \scales
-    uxtb16 \scales, \scales, ror #8
-    smlabb r4, r12, \scales, r4
-    smlabt r6, r12, \scales, r6
+@ Adds a group's sums t of two row pairs, times the odd rows' `scales`, to the sums of the odd rows, and then, times the scales
+@ `evens`, to those of the even rows. r12 holds the sum of x. Even rows sum 4 * even * scale, odd rows
+@ (2 * odd + sum(x)) * scale.
+.macro d2_scale_odd scales, t0, t1, odd0, odd1
+    smlabb \odd0, r12, \scales, \odd0
+    smlabt \odd1, r12, \scales, \odd1
     add \scales, \scales, \scales
-    smlatb r4, \t0, \scales, r4
-    smlatt r6, \t1, \scales, r6
+    smlatb \odd0, \t0, \scales, \odd0
+    smlatt \odd1, \t1, \scales, \odd1
     sub \t0, \t0, #0x8000
     sub \t1, \t1, #0x8000
-    smlabb r3, \t0, lr, r3
-    smlabt r5, \t1, lr, r5
+.endm
+
+.macro d2_scale_even evens, t0, t1, even0, even1
+    smlabb \even0, \t0, \evens, \even0
+    smlabt \even1, \t1, \evens, \even1
 .endm
 
 .macro d2_group_kernel name, rows
@@ -218,31 +220,41 @@
     ldmia.w sp, {r3-r6}
     .if \rows == 8
     ldrd r10, r11, [r0], #8
-    d2_scale r10, r7, r8
-    stmia.w sp, {r3-r6}
-    add r10, sp, #16
-    ldmia.w r10, {r3-r6}
-    d2_scale r11, r9, r2
-    stmia.w r10, {r3-r6}
     .else
     ldr r10, [r0], #4
-    d2_scale r10, r7, r2
+    .endif
+    uxtb16 lr, r10
+    uxtb16 r10, r10, ror #8
+    .if \rows == 8
+    d2_scale_odd r10, r7, r8, r4, r6
+    d2_scale_even lr, r7, r8, r3, r5
+    uxtb16 r10, r11
+    uxtb16 r11, r11, ror #8
+    ldrd r7, r8, [sp, #16]
+    d2_scale_odd r11, r9, r2, r7, r8
+    ldrd r11, r12, [sp, #24]
+    d2_scale_even r10, r9, r2, r11, r12
+    stmia.w sp, {r3-r8, r11, r12}
+    .else
+    d2_scale_odd r10, r7, r2, r4, r6
+    d2_scale_even lr, r7, r2, r3, r5
     stmia.w sp, {r3-r6}
     .endif
     ldrd r12, lr, [sp, #32]
     cmp r1, lr
     bne.w 2b
-    ldrd r8, r9, [sp, #48]
-    .if \rows == 8
-    ldmia.w sp, {r2, r7, r10, r11}
-    asr r2, r2, #1
-    asr r10, r10, #1
-    stmia.w r8!, {r2, r7, r10, r11}
-    .endif
+    ldrd r9, r10, [sp, #48]
     asr r3, r3, #1
     asr r5, r5, #1
-    stmia.w r8!, {r3-r6}
-    d2_next_strip
+    stmia.w r9!, {r3-r6}
+    .if \rows == 8
+    ldr r12, [sp, #28]
+    asr r11, r11, #1
+    asr r12, r12, #1
+    strd r11, r7, [r9], #8
+    strd r12, r8, [r9], #8
+    .endif
+    d2_next_strip r9, r10
     .size \name, . - \name
 .endm
 

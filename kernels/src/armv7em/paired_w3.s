@@ -6,7 +6,7 @@
 @
 @ In the loops: r0 weights, r1 x, r2 mask, r3-r5 weight words, r6 the sums t of rows 2 and 3 (it comes first with the chunk's
 @ start value), r7 and r8 activation pairs, r9 t of rows 0 and 1, r10 and r11 sums of the two t over chunks, r12 sums of their
-@ high halves side by side, lr the extracted codes.
+@ high halves side by side, lr the extracted codes, or the sum of x.
 @
 @ The high halves of 64 columns stay within `4 * 127 * 64 = 32512`.
 @
@@ -16,39 +16,45 @@
     .syntax unified
     .thumb
 
-.macro d3_set word, rot, pair, t, from
+@ t += (codes at bit `rot` of both rows and lanes) * pair; `codes` takes the extracted codes.
+.macro d3_set codes, word, rot, pair, t, from
     .if \rot
-    and lr, r2, \word, ror #\rot
+    and \codes, r2, \word, ror #\rot
     .else
-    and lr, r2, \word
+    and \codes, r2, \word
     .endif
-    smlad \t, lr, \pair, \from
+    smlad \t, \codes, \pair, \from
 .endm
 
-@ A chunk of eight columns; afterwards r9 and r6 hold its sums t.
-.macro d3_chunk
+@ A chunk of eight columns; afterwards r9 and r6 hold its sums t. With `sum`, the sum of x behind the chunk goes to lr, which the
+@ second half leaves alone.
+.macro d3_chunk sum=0
     ldmia.w r1!, {r6-r8}
     ldmia.w r0!, {r3-r5}
-    d3_set r3, 0, r7, r9, r6
-    d3_set r3, 6, r7, r6, r6
-    d3_set r4, 0, r8, r9, r9
-    d3_set r4, 6, r8, r6, r6
+    d3_set lr, r3, 0, r7, r9, r6
+    d3_set lr, r3, 6, r7, r6, r6
+    d3_set lr, r4, 0, r8, r9, r9
+    d3_set lr, r4, 6, r8, r6, r6
+    .if \sum
+    ldmia.w r1!, {r7, r8, lr}
+    .else
     ldmia.w r1!, {r7, r8}
+    .endif
     eor r3, r3, r4, ror #2
     eor r4, r5, r4, ror #4
-    d3_set r5, 0, r7, r9, r9
-    d3_set r5, 6, r7, r6, r6
-    d3_set r3, 10, r8, r9, r9
-    d3_set r4, 10, r8, r6, r6
+    d3_set r3, r3, 10, r8, r9, r9
+    d3_set r3, r5, 0, r7, r9, r9
+    d3_set r5, r5, 6, r7, r6, r6
+    d3_set r4, r4, 10, r8, r6, r6
 .endm
 
 @ the same, then its sums are added to those of the chunks before
-.macro d3_next_chunk
-    d3_chunk
+.macro d3_next_chunk sum=0
+    d3_chunk \sum
     add r10, r10, r9
     add r11, r11, r6
-    pkhtb lr, r6, r9, asr #16
-    sadd16 r12, r12, lr
+    pkhtb r3, r6, r9, asr #16
+    sadd16 r12, r12, r3
 .endm
 
 .macro d3_prologue
@@ -146,18 +152,18 @@ actq_w3_paired_group:
     pkhtb r12, r6, r9, asr #16
     d3_next_chunk
     d3_next_chunk
-    d3_next_chunk
+    d3_next_chunk 1
     @ The four level sums, at most 7 * 127 * 32 = 28448: r10 and r11 of the even rows, both halves of r12 of the odd ones.
     sub r10, r10, r12, lsl #16
     asr r10, r10, #2
     sub r11, r11, r12
     uxtah r11, r11, r12
     asr r11, r11, #2
-    ldr r9, [r0], #4
-    ldr lr, [r1], #4
     pkhbt lr, lr, lr, lsl #16
     sadd16 r12, r12, r12
     sadd16 r12, r12, lr
+    ldr r9, [r0], #4
+    ldr lr, [sp, #32]
     uxtb16 r8, r9
     uxtb16 r9, r9, ror #8
     ldmia.w sp, {r3-r6}
@@ -166,7 +172,6 @@ actq_w3_paired_group:
     smlabt r5, r11, r8, r5
     smlatt r6, r12, r9, r6
     stmia.w sp, {r3-r6}
-    ldr lr, [sp, #32]
     cmp r1, lr
     bne.w 2b
     ldrd r9, r10, [sp, #24]

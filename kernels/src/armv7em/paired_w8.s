@@ -6,8 +6,8 @@
 @ In the loops: r0 weights, r1 x, r2-r5 activation pairs, r6 and r8 the sums of rows 0 and 2, r7 and r9 those of rows 0 and 2
 @ plus 2^8 times those of rows 1 and 3, r10-r12 and lr weight words.
 @
-@ Frame: 0-15 sums over groups (group kernel), 16 x, 20 end of this chunk, 24 end of the first chunk, 28 x_end, 32 acc,
-@ 36 strips, 40 steps left out.
+@ Frame of the row kernel: 0 x_end where there is but one chunk, or 0, 4 x_end, 8 acc, 12 strips, 16 x, 20 steps left out,
+@ 24 end of this chunk, 28 end of the first chunk; of the group kernel: 0-15 sums over groups, 16 x, 28 x_end, 32 acc, 36 strips.
 
     .syntax unified
     .thumb
@@ -45,16 +45,16 @@
     sub sp, sp, #44
     ldrd r4, r5, [sp, #80]
     ldr r6, [sp, #88]
-    str r1, [sp, #16]
-    str r4, [sp, #28]
-    strd r2, r3, [sp, #32]
-    str r6, [sp, #40]
+    add r5, r5, r1
+    str r4, [sp, #4]
+    strd r2, r3, [sp, #8]
+    strd r1, r6, [sp, #16]
 .endm
 
-@ r10: where the sums of the next strip go, r11: strips left, this one included
-.macro r8_next_strip
+@ r10: where the sums of the next strip go, r11: strips left, this one included; both are kept at `acc`.
+.macro r8_next_strip acc
     subs r11, r11, #1
-    strd r10, r11, [sp, #32]
+    strd r10, r11, [sp, #\acc]
     bne.w 1b
     add sp, sp, #44
     pop {r4-r11, pc}
@@ -75,12 +75,14 @@
     .balign 16
 actq_w8_paired_row:
     r8_prologue
-    add r5, r5, r1
-    strd r5, r5, [sp, #20]
+    strd r5, r5, [sp, #24]
+    cmp r5, r4
+    it ne
+    movne r4, #0
+    str r4, [sp, #0]
 1:
-    ldr r1, [sp, #16]
+    ldrd r1, r10, [sp, #16]
     r8_start
-    ldr r10, [sp, #40]
     tbh [pc, r10, lsl #1]
 7:
     .irp step, 10f, 11f, 12f, 13f, 14f, 15f, 16f, 17f
@@ -94,36 +96,37 @@ actq_w8_paired_row:
 \step:
     r8_cols8
     .endr
-    ldr r2, [sp, #20]
+    ldr r2, [sp, #24]
     cmp r1, r2
     bne.w 2b
-    ldrd r2, r3, [sp, #24]
-    ldrd r10, r11, [sp, #32]
+    ldmia.w sp, {r2, r3, r10, r11}
     r8_sums
     cmp r1, r2
     bne.n 4f
     stmia.w r10!, {r6-r9}
-    cmp r1, r3
-    bne.n 5f
 6:
-    r8_next_strip
+    r8_next_strip 8
 4:
-    @ A later chunk's sums are added to those before.
+    @ One of several chunks. A later one's sums are added to those before.
+    ldr r2, [sp, #28]
+    cmp r1, r2
+    beq.n 8f
     ldrd r4, r5, [r10]
     add r6, r6, r4
     add r7, r7, r5
     ldrd r4, r5, [r10, #8]
     add r8, r8, r4
     add r9, r9, r5
+8:
     stmia.w r10!, {r6-r9}
     cmp r1, r3
     bne.n 5f
-    str r2, [sp, #20]
+    str r2, [sp, #24]
     b.n 6b
 5:
     @ All chunks but the first are full: 512 columns and a start word.
     add r2, r1, #1028
-    str r2, [sp, #20]
+    str r2, [sp, #24]
     b.w 3b
     .size actq_w8_paired_row, . - actq_w8_paired_row
 
@@ -134,6 +137,8 @@ actq_w8_paired_row:
     .balign 16
 actq_w8_paired_group:
     r8_prologue
+    str r4, [sp, #28]
+    strd r2, r3, [sp, #32]
 1:
     ldr r1, [sp, #16]
     movs r4, #0
@@ -162,6 +167,6 @@ actq_w8_paired_group:
     bne.w 2b
     ldrd r10, r11, [sp, #32]
     stmia.w r10!, {r2-r5}
-    r8_next_strip
+    r8_next_strip 32
     .size actq_w8_paired_group, . - actq_w8_paired_group
     .text
