@@ -1,16 +1,20 @@
-//! Puts the memory.x of the target's machine on the linker's path.
+//! Puts the workspace's memory.x on the linker's path, and fits it to a small machine.
 
 use std::path::Path;
 
+/// QEMU's microbit, a Cortex-M0, has 256 KB of flash, no image slot behind them, and 16 KB of RAM.
+const MICROBIT: [(&str, u32); 3] =
+    [("_stack_start", 0x2000_4000), ("_image_slot_start", 0x0004_0000), ("_image_slot_end", 0x0004_0000)];
+
 fn main() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."));
+    println!("cargo::rustc-link-search={}", root.display());
+    println!("cargo::rerun-if-changed={}", root.join("memory.x").display());
     println!("cargo::rustc-check-cfg=cfg(actq_small)");
-    let target = std::env::var("TARGET").unwrap_or_default();
-    // A Cortex-M0 has little memory: QEMU has it as the microbit. The machines of the others have one layout.
-    let small = target.starts_with("thumbv6m");
-    if small {
+    if std::env::var("TARGET").is_ok_and(|target| target.starts_with("thumbv6m")) {
         println!("cargo::rustc-cfg=actq_small");
+        for (symbol, value) in MICROBIT {
+            println!("cargo::rustc-link-arg-bins=--defsym={symbol}={value:#x}");
+        }
     }
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(if small { "microbit" } else { "mps2" });
-    println!("cargo::rustc-link-search={}", folder.display());
-    println!("cargo::rerun-if-changed={}", folder.join("memory.x").display());
 }
