@@ -23,8 +23,8 @@ mod firmware {
 
     /// Of the largest case, weights and activations.
     const WORDS: usize = if cfg!(actq_small) { 1536 } else { 64 * 1024 };
-    const ROWS: usize = 256;
-    const COLS: usize = 2048;
+    const ROWS: usize = if cfg!(actq_small) { 32 } else { 256 };
+    const COLS: usize = if cfg!(actq_small) { 256 } else { 2048 };
 
     #[cortex_m_rt::entry]
     fn main() -> ! {
