@@ -1,8 +1,10 @@
-//! What the tests and `xtask` share: golden kernel cases, and the firmware under QEMU.
+//! What the tests and `xtask` share: golden kernel cases, drawn networks, and the firmware under QEMU.
 #![forbid(unsafe_code)]
 
 pub mod cycles;
 pub mod golden;
+pub mod networks;
+pub mod profile;
 pub mod qemu;
 
 use std::path::{Path, PathBuf};

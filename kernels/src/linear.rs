@@ -5,14 +5,18 @@
 //! 3. `y = start + acc * (row_scale * x_scale)`, each operation rounded to f32, where `start` is the bias, or, where the
 //!    operation accumulates, the sum of the old `y` and the bias. Rows that no block holds (0 bits) keep `start`.
 
+use core::ops::Range;
+
 use crate::activations::{NotFinite, Prepared, Scale, max_prepared_words, prepared_words};
 #[cfg(actq_fpu)]
 use crate::armv7em;
-use crate::format::{Block, Lanes, STRIP};
+use crate::format::{Block, Lanes, QUAD, STRIP};
 use crate::gemv::gemv;
+use crate::image::header::BLOCK_WORDS;
+use crate::slice::{Budget, LinearCursor, Price};
 
 /// Rows whose sums stand on the stack at once.
-const RUN: usize = 8 * STRIP;
+pub(crate) const RUN: usize = 8 * STRIP;
 
 /// A matrix in an image: blocks of rows and a bias.
 #[derive(Clone, Copy, Debug)]
@@ -71,40 +75,57 @@ impl RowBlock<'_> {
     /// for the block. `start` holds the bits of the whole output's biases; without it, y itself is the start. Nothing is done
     /// where `start` or `y` is too short.
     pub fn apply(&self, x: &Prepared<'_>, x_scale: Scale, start: Option<&[u32]>, y: &mut [f32]) {
-        let shape = self.block.shape();
-        let mut first = 0;
+        self.apply_rows(0..self.block.shape().rows, x, x_scale, start, y);
+    }
+
+    /// As [`Self::apply`], for a run of the block's rows, which starts at a multiple of [`STRIP`] and ends at another or with
+    /// the block.
+    pub(crate) fn apply_rows(
+        &self,
+        rows: Range<usize>,
+        x: &Prepared<'_>,
+        x_scale: Scale,
+        start: Option<&[u32]>,
+        y: &mut [f32],
+    ) {
+        let mut first = rows.start;
         // Rows in order have room for their sums in y itself, except those of a last strip that padding fills.
         if let (Some(start), true) = (start, self.index.is_empty()) {
-            let whole = self.first_row..self.first_row + (shape.rows & !(STRIP - 1));
-            let (Some(start), Some(y)) = (start.get(whole.clone()), y.get_mut(whole)) else { return };
-            if gemv(&self.block, x, 0, bytemuck::cast_slice_mut(y)).is_err() {
-                return;
+            let whole = self.first_row + first..self.first_row + (rows.end & !(STRIP - 1));
+            if !whole.is_empty() {
+                let (Some(start), Some(y)) = (start.get(whole.clone()), y.get_mut(whole)) else { return };
+                if gemv(&self.block, x, first, bytemuck::cast_slice_mut(y)).is_err() {
+                    return;
+                }
+                self.scale_in_place(first, x_scale.get(), start, y);
+                first += y.len();
             }
-            self.scale_in_place(x_scale.get(), start, y);
-            first = y.len();
         }
-        if first == shape.rows {
+        if first >= rows.end {
             return;
         }
         let mut sums = [0; RUN];
-        while first < shape.rows {
-            let sums = &mut sums[..RUN.min(shape.padded_rows() - first)];
+        while first < rows.end {
+            let sums = &mut sums[..RUN.min(rows.end.next_multiple_of(QUAD) - first)];
             if gemv(&self.block, x, first, sums).is_err() {
                 return;
             }
-            let sums = &sums[..sums.len().min(shape.rows - first)];
+            let sums = &sums[..sums.len().min(rows.end - first)];
             self.scale_rows(first, sums, x_scale.get(), start, y);
             first += sums.len();
         }
     }
 
-    /// Turns the integer sums in y, of the first `y.len()` rows, into results.
-    fn scale_in_place(&self, x_scale: f32, start: &[u32], y: &mut [f32]) {
+    /// Turns the integer sums in y, of the rows from `first`, a multiple of [`STRIP`], on, into results.
+    fn scale_in_place(&self, first: usize, x_scale: f32, start: &[u32], y: &mut [f32]) {
         #[cfg(actq_fpu)]
-        let done = armv7em::scale(armv7em::Operands::SumsInPlace(start), self.scales, x_scale, y);
+        let done = {
+            let scales = self.scales.get(first / 2..).unwrap_or(&[]);
+            armv7em::scale(armv7em::Operands::SumsInPlace(start), scales, x_scale, y)
+        };
         #[cfg(not(actq_fpu))]
         let done = 0;
-        for (i, (y, start)) in y.iter_mut().zip(start).enumerate().skip(done) {
+        for (i, (y, start)) in (first..).zip(y.iter_mut().zip(start)).skip(done) {
             *y = f32::from_bits(u32::from_le(*start)) + y.to_bits() as i32 as f32 * (self.scale(i) * x_scale);
         }
     }
@@ -143,26 +164,71 @@ impl Matrix<'_> {
     /// `y = W x + b`, or `y = y + b + W x` where `accumulate`. `work` holds at least [`Self::prepared_words`] words; `x` and
     /// `y` have the matrix's lengths (what is missing is left out).
     pub fn apply(&self, x: &[f32], work: &mut [u32], y: &mut [f32], accumulate: bool) -> Result<(), NotFinite> {
-        let x_scale = Scale::new(x, self.x_max)?;
+        let mut budget = Budget::UNLIMITED;
+        self.resume(&mut LinearCursor::default(), &mut budget, x, work, y, accumulate)?;
+        Ok(())
+    }
+
+    /// As [`Self::apply`], from where `at` stands and as far as the budget reaches; true when all is done.
+    pub(crate) fn resume(
+        &self,
+        at: &mut LinearCursor,
+        budget: &mut Budget,
+        x: &[f32],
+        work: &mut [u32],
+        y: &mut [f32],
+        accumulate: bool,
+    ) -> Result<bool, NotFinite> {
+        let x_scale = match at.scale {
+            Some(scale) => scale,
+            None if budget.take(1, || Price::magnitude(self)) == 0 => return Ok(false),
+            None => *at.scale.insert(Scale::new(x, self.x_max)?),
+        };
         // One pass over the output where every row has its bias and is written once, in order.
-        let start = if accumulate || self.bias.is_empty() || !self.is_whole() { None } else { Some(self.bias) };
-        if start.is_none() {
-            self.start(y, accumulate);
+        let start = self.start_values(accumulate);
+        if start.is_none() && at.started < y.len() {
+            let end = at.started + budget.take(y.len() - at.started, || Price::bias(accumulate));
+            self.start(at.started..end, y, accumulate);
+            at.started = end;
+            if end < y.len() {
+                return Ok(false);
+            }
         }
-        let mut last = None;
-        for rows in self.blocks() {
+        for rows in self.blocks().skip(at.block) {
             let shape = rows.block.shape();
-            let Some(work) = work.get_mut(..prepared_words(shape)) else { return Ok(()) };
+            let Some(work) = work.get_mut(..prepared_words(shape)) else { return Ok(true) };
             // Layouts prepare the activations differently; the blocks of one width share them.
-            if last != Some(shape.width) {
+            if at.prepared != Some(shape.width) {
+                if budget.take(1, || Price::prepare(&rows)) == 0 {
+                    return Ok(false);
+                }
                 x_scale.quantize(x, shape, work);
-                last = Some(shape.width);
+                at.prepared = Some(shape.width);
             }
             if let Some(x) = Prepared::new(work, shape) {
-                rows.apply(&x, x_scale, start, y);
+                let strips =
+                    budget.take((shape.rows - at.row).div_ceil(STRIP), || Price::strips(&rows, start.is_some()));
+                let end = shape.rows.min(at.row + strips * STRIP);
+                rows.apply_rows(at.row..end, &x, x_scale, start, y);
+                at.row = end;
+                if end < shape.rows {
+                    return Ok(false);
+                }
             }
+            at.block += 1;
+            at.row = 0;
         }
-        Ok(())
+        Ok(true)
+    }
+
+    /// The bits of the values that the output starts from, where these are the biases and every row is written once, in order.
+    pub fn start_values(&self, accumulate: bool) -> Option<&[u32]> {
+        if accumulate || self.bias.is_empty() || !self.is_whole() { None } else { Some(self.bias) }
+    }
+
+    /// Blocks of rows.
+    pub(crate) fn block_count(&self) -> usize {
+        self.records.len() / BLOCK_WORDS
     }
 
     /// Whether the blocks hold all rows in the order of the output.
@@ -174,11 +240,14 @@ impl Matrix<'_> {
         }) && rows == self.rows
     }
 
-    fn start(&self, y: &mut [f32], accumulate: bool) {
+    /// Sets outputs to their biases, or adds these.
+    fn start(&self, outputs: Range<usize>, y: &mut [f32], accumulate: bool) {
+        let bias = self.bias.get(outputs.clone()).unwrap_or(&[]);
+        let Some(y) = y.get_mut(outputs) else { return };
         if !accumulate {
             y.fill(0.0);
         }
-        for (y, &bias) in y.iter_mut().zip(self.bias) {
+        for (y, &bias) in y.iter_mut().zip(bias) {
             let bias = f32::from_bits(u32::from_le(bias));
             *y = if accumulate { *y + bias } else { bias };
         }

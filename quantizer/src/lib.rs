@@ -18,6 +18,7 @@ pub mod random;
 pub mod runtime;
 pub mod serve;
 pub mod sweep;
+pub mod time;
 pub mod writer;
 
 /// The versions that take part in making an image; recorded in reports.

@@ -12,6 +12,7 @@ use actq::quantize::actquant::Statistics;
 use actq::quantize::prepared::Prepared;
 use actq::quantize::{Activations, Budget, Method, Options, Outcome};
 use actq::runtime::ImageBuffer;
+use actq::time::{self, StepTime};
 use actq::{eval, serve, sweep, writer};
 use actq_kernels::Width;
 use anyhow::{Context, Result};
@@ -37,10 +38,16 @@ enum Command {
     ///
     /// Example: actq quantize policies/ur3 --bits 3 --out ur3.actq
     Quantize(QuantizeArgs),
-    /// Show what is in an image: operations, matrices, bits, memory, the action contract
+    /// Show what is in an image: operations, matrices, bits, memory, time on a Cortex-M4, the action contract
     Inspect {
         /// The image
         image: PathBuf,
+        /// The processor's clock, in Hz or as 168M
+        #[arg(long, value_name = "HZ", default_value = "168M", value_parser = time::clock)]
+        clock: f64,
+        /// Print the predicted time of every operation and of the step as one JSON object
+        #[arg(long)]
+        json: bool,
     },
     /// Compare an image's actions with the recorded f32 actions of heldout.npz
     Eval {
@@ -206,9 +213,14 @@ fn main() -> ExitCode {
 fn run(command: Command) -> Result<()> {
     match command {
         Command::Quantize(args) => run_quantize(&args),
-        Command::Inspect { image } => {
+        Command::Inspect { image, clock, json } => {
             let buffer = ImageBuffer::read(&image)?;
-            print(&report(&buffer.image(&image)?))
+            let image = buffer.image(&image)?;
+            let step = StepTime::new(&image, clock);
+            if json {
+                return print(&(serde_json::to_string(&step)? + "\n"));
+            }
+            print(&format!("{}\n{}", report(&image), step.report()))
         }
         Command::Eval { image, policy, json } => {
             let buffer = ImageBuffer::read(&image)?;

@@ -1,8 +1,9 @@
-//! What people and CI type: `cargo demo`, `cargo verify`, `cargo xtask bench`, `cargo xtask doctor`.
+//! What people and CI type: `cargo demo`, `cargo verify`, `cargo xtask bench`, `cargo xtask fit`, `cargo xtask doctor`.
 #![forbid(unsafe_code)]
 
 mod bench;
 mod demo;
+mod fit;
 mod setup;
 mod verify;
 
@@ -36,6 +37,8 @@ enum Command {
         #[arg(long)]
         json: Option<PathBuf>,
     },
+    /// Measure the cost model's rates anew (after every change of the kernels)
+    Fit,
     /// Everything that CI checks: format, lints, documentation, tests on the host and under QEMU
     Verify,
     /// Check and install what the other commands need: Rust targets and QEMU
@@ -46,6 +49,7 @@ fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Demo { episodes, qemu_episodes } => setup::ensure().and_then(|()| demo::run(episodes, qemu_episodes)),
         Command::Bench { json } => setup::ensure().and_then(|()| bench::run(json.as_deref())),
+        Command::Fit => setup::ensure().and_then(|()| fit::run()),
         Command::Verify => setup::ensure().and_then(|()| verify::run()),
         Command::Doctor => setup::ensure().map(|()| println!("all there")),
     };
