@@ -93,6 +93,12 @@ struct QuantizeArgs {
     /// Bytes of the whole image, as 98304 or 96K
     #[arg(long, value_name = "SIZE", conflicts_with_all = ["bits", "bpw"], value_parser = size)]
     flash: Option<usize>,
+    /// Milliseconds that a step may take on a Cortex-M4, predicted; takes the most bits that keep them
+    #[arg(long, value_name = "X", conflicts_with_all = ["bits", "bpw", "flash"], value_parser = positive)]
+    ms: Option<f64>,
+    /// The processor's clock for --ms, in Hz or as 168M
+    #[arg(long, value_name = "HZ", requires = "ms", default_value = "168M", value_parser = time::clock)]
+    clock: f64,
     /// Force the width of a matrix, by its tensor's name (method best); may be repeated
     #[arg(long, value_name = "NAME=BITS", value_parser = forced)]
     width: Vec<(String, Width)>,
@@ -286,7 +292,11 @@ fn run_quantize(args: &QuantizeArgs) -> Result<()> {
     let prepared = Prepared::new(&source, method, |share| set_share(&bar, share))?;
     bar.reset();
     bar.set_message("quantizing");
-    let (policy, outcomes) = prepared.quantize(&options, |share| set_share(&bar, share))?;
+    let limit = args.ms.map(|milliseconds| time::Limit { milliseconds, clock_hz: args.clock });
+    let (policy, outcomes) = match limit {
+        Some(limit) => limit.quantize(&prepared, &options, |share| set_share(&bar, share))?,
+        None => prepared.quantize(&options, |share| set_share(&bar, share))?,
+    };
     bar.finish_and_clear();
     let bytes = writer::image(&policy, &outcomes)?;
     writer::write(&args.out, &bytes)?;

@@ -3,10 +3,15 @@
 use actq_kernels::Image;
 use actq_kernels::cost::{self, Cost};
 use actq_kernels::image::Op;
-use anyhow::Result;
+use anyhow::{Context, Result, ensure};
 use serde::Serialize;
 
 use crate::inspect::table;
+use crate::policy::Policy;
+use crate::quantize::prepared::Prepared;
+use crate::quantize::{Activations, Budget, BudgetTooSmall, Options, Outcome};
+use crate::runtime::ImageBuffer;
+use crate::writer;
 
 /// Clock of the processor that is assumed where none is given: 168 MHz, that of an STM32F407.
 pub const CLOCK: f64 = 168e6;
@@ -119,5 +124,89 @@ impl StepTime {
             self.clock_hz / 1e6,
             self.least_budget,
         )
+    }
+}
+
+/// The largest number of milliseconds that a step may take, at a clock.
+#[derive(Clone, Copy, Debug)]
+pub struct Limit {
+    /// Milliseconds.
+    pub milliseconds: f64,
+    /// The processor's clock in Hz.
+    pub clock_hz: f64,
+}
+
+/// More bits than any image takes.
+const MOST_BITS: f64 = 10.0;
+/// Tries between the least and the most bits; the last two differ by a hundredth of a bit.
+const TRIES: usize = 10;
+
+impl Limit {
+    /// Predicted milliseconds of a quantized policy's step.
+    fn predict(&self, policy: &Policy, outcomes: &[Outcome]) -> Result<f64> {
+        let buffer = ImageBuffer::new(&writer::image(policy, outcomes)?);
+        Ok(StepTime::new(&buffer.image(&policy.dir)?, self.clock_hz).milliseconds)
+    }
+
+    /// Quantizes with the most bits per weight whose step keeps the limit; `options.budget` does not count.
+    ///
+    /// The bits are found with int8 activations (where the options do not ask for int16) and without learning, on which no time
+    /// depends; then the policy is quantized once. Activations that the method would rather have in int16 are, as far as the
+    /// time allows. `progress` gets the share done.
+    pub fn quantize(
+        &self,
+        prepared: &Prepared<'_>,
+        options: &Options,
+        mut progress: impl FnMut(f64),
+    ) -> Result<(Policy, Vec<Outcome>)> {
+        let limit = self.milliseconds;
+        let activations = match options.activations {
+            Activations::Auto => Activations::Int8,
+            given => given,
+        };
+        let draft = Options { activations, steps: Some(1), ..options.clone() };
+        let with =
+            |bits: f64| prepared.quantize(&Options { budget: Budget::BitsPerWeight(bits), ..draft.clone() }, |_| {});
+        let time = |bits: f64| with(bits).and_then(|(policy, outcomes)| self.predict(&policy, &outcomes));
+        let (mut low, mut high) = (least_bits(with(f64::MIN_POSITIVE))?, MOST_BITS);
+        let fastest = time(low)?;
+        ensure!(
+            fastest <= limit,
+            "{limit} ms are allowed, but the fastest is {fastest:.3} ms at {} MHz, with {low:.3} bits a weight",
+            self.clock_hz / 1e6
+        );
+        if time(high)? <= limit {
+            low = high;
+        }
+        for _ in 0..TRIES {
+            let middle = 0.5 * (low + high);
+            if time(middle)? <= limit {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        let chosen = Options { budget: Budget::BitsPerWeight(low), ..options.clone() };
+        let (policy, mut outcomes) = prepared.quantize(&chosen, &mut progress)?;
+        // Back to int8, the largest matrix first.
+        let mut wide: Vec<usize> = (0..outcomes.len()).filter(|&m| outcomes[m].x_max > activations.limit()).collect();
+        wide.sort_by_key(|&m| outcomes[m].quantized.codes.len());
+        while self.predict(&policy, &outcomes)? > limit {
+            let m = wide.pop().context("the step takes longer than was predicted before learning")?;
+            outcomes[m].x_max = outcomes[m].quantized.x_max(activations.limit())?;
+        }
+        Ok((policy, outcomes))
+    }
+}
+
+/// The fewest bits per weight that a method takes, from its refusal of almost none.
+fn least_bits<T>(refused: Result<T>) -> Result<f64> {
+    match refused {
+        Ok(_) => Ok(f64::MIN_POSITIVE),
+        Err(error) => match error.downcast_ref::<BudgetTooSmall>() {
+            // A little more, so that the division's rounding does not count.
+            Some(least) => Ok((1.0 + 1e-9) * 8.0 * least.bytes as f64 / least.weights.max(1) as f64),
+            None => Err(error),
+        },
     }
 }
