@@ -94,7 +94,7 @@ impl<'a, 's> Head<'a, 's> {
 
     /// Runs at most `budget` instructions of the step that was begun, by the cost model ([`crate::cost`]), and gives the action
     /// once it is ready; then, again and again until the next [`Self::begin`]. Steps that play on from a chunk have little to
-    /// do, and are ready at the first poll. `u32::MAX` is no limit.
+    /// do, and are ready at the first poll. A budget of 2^28 or more is no limit.
     ///
     /// The cost model is that of the build for thumbv7em-none-eabihf; elsewhere pieces are cut in the same places. However a
     /// step is cut, its bits are the same.

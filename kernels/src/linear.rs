@@ -125,8 +125,9 @@ impl RowBlock<'_> {
         };
         #[cfg(not(actq_fpu))]
         let done = 0;
-        for (i, (y, start)) in (first..).zip(y.iter_mut().zip(start)).skip(done) {
-            *y = f32::from_bits(u32::from_le(*start)) + y.to_bits() as i32 as f32 * (self.scale(i) * x_scale);
+        for (i, (y, start)) in y.iter_mut().zip(start).enumerate().skip(done) {
+            let scale = self.scale(first + i) * x_scale;
+            *y = f32::from_bits(u32::from_le(*start)) + y.to_bits() as i32 as f32 * scale;
         }
     }
 
@@ -141,7 +142,8 @@ impl RowBlock<'_> {
         };
         #[cfg(not(actq_fpu))]
         let done = 0;
-        for (i, sum) in (first..).zip(sums).skip(done) {
+        for (i, sum) in sums.iter().enumerate().skip(done) {
+            let i = first + i;
             let at = self.output(i);
             let Some(y) = y.get_mut(at) else { continue };
             let start = start.and_then(|s| s.get(at)).map_or(*y, |bits| f32::from_bits(u32::from_le(*bits)));

@@ -303,11 +303,12 @@ fn run_quantize(args: &QuantizeArgs) -> Result<()> {
     if let Some(statistics) = &prepared.actquant {
         print(&scores(&policy.graph, statistics, budget, &outcomes))?;
     }
+    let time = limit.map_or(Ok(String::new()), |limit| limit.predict(&bytes).map(|step| step.sentence()))?;
     let parameters = source.graph.parameters();
     let f32_bytes = 4 * parameters;
     print(&format!(
         "{}\n{}: {} bytes. The policy's {parameters} parameters take {f32_bytes} bytes in f32 ({:.1}x) and {} in bf16 \
-         ({:.1}x).\n",
+         ({:.1}x).\n{time}",
         summary(&policy, &outcomes),
         args.out.display(),
         bytes.len(),

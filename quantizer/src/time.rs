@@ -1,5 +1,7 @@
 //! Time on the target: what the cost model (`actq_kernels::cost`) says of an image at a clock.
 
+use std::path::Path;
+
 use actq_kernels::Image;
 use actq_kernels::cost::{self, Cost};
 use actq_kernels::image::Op;
@@ -117,12 +119,18 @@ impl StepTime {
         }
         row("all", String::new(), self.macs, self.instructions, self.cycles, 1e3 * self.milliseconds);
         format!(
-            "{rows}\n\n\
-             A step takes {:.3} ms at {} MHz, predicted for a Cortex-M4 with FPU and memory that never waits.\n\
-             Polls of at least {} instructions take it in pieces.\n",
+            "{rows}\n\n{}Polls of at least {} instructions take it in pieces.\n",
+            self.sentence(),
+            self.least_budget
+        )
+    }
+
+    /// The time of the step, as a sentence.
+    pub fn sentence(&self) -> String {
+        format!(
+            "A step takes {:.3} ms at {} MHz, predicted for a Cortex-M4 with FPU and memory that never waits.\n",
             self.milliseconds,
-            self.clock_hz / 1e6,
-            self.least_budget,
+            self.clock_hz / 1e6
         )
     }
 }
@@ -142,10 +150,14 @@ const MOST_BITS: f64 = 10.0;
 const TRIES: usize = 10;
 
 impl Limit {
-    /// Predicted milliseconds of a quantized policy's step.
-    fn predict(&self, policy: &Policy, outcomes: &[Outcome]) -> Result<f64> {
-        let buffer = ImageBuffer::new(&writer::image(policy, outcomes)?);
-        Ok(StepTime::new(&buffer.image(&policy.dir)?, self.clock_hz).milliseconds)
+    /// The predicted time of an image's step.
+    pub fn predict(&self, bytes: &[u8]) -> Result<StepTime> {
+        let buffer = ImageBuffer::new(bytes);
+        Ok(StepTime::new(&buffer.image(Path::new("the new image"))?, self.clock_hz))
+    }
+
+    fn milliseconds_of(&self, policy: &Policy, outcomes: &[Outcome]) -> Result<f64> {
+        Ok(self.predict(&writer::image(policy, outcomes)?)?.milliseconds)
     }
 
     /// Quantizes with the most bits per weight whose step keeps the limit; `options.budget` does not count.
@@ -167,7 +179,7 @@ impl Limit {
         let draft = Options { activations, steps: Some(1), ..options.clone() };
         let with =
             |bits: f64| prepared.quantize(&Options { budget: Budget::BitsPerWeight(bits), ..draft.clone() }, |_| {});
-        let time = |bits: f64| with(bits).and_then(|(policy, outcomes)| self.predict(&policy, &outcomes));
+        let time = |bits: f64| with(bits).and_then(|(policy, outcomes)| self.milliseconds_of(&policy, &outcomes));
         let (mut low, mut high) = (least_bits(with(f64::MIN_POSITIVE))?, MOST_BITS);
         let fastest = time(low)?;
         ensure!(
@@ -191,7 +203,7 @@ impl Limit {
         // Back to int8, the largest matrix first.
         let mut wide: Vec<usize> = (0..outcomes.len()).filter(|&m| outcomes[m].x_max > activations.limit()).collect();
         wide.sort_by_key(|&m| outcomes[m].quantized.codes.len());
-        while self.predict(&policy, &outcomes)? > limit {
+        while self.milliseconds_of(&policy, &outcomes)? > limit {
             let m = wide.pop().context("the step takes longer than was predicted before learning")?;
             outcomes[m].x_max = outcomes[m].quantized.x_max(activations.limit())?;
         }
