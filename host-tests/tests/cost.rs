@@ -7,7 +7,7 @@ use actq::policy::Policy;
 use actq::quantize::prepared::Prepared;
 use actq::quantize::{Activations, Budget, Method, Options};
 use actq::runtime::{ImageBuffer, with_head};
-use actq::time::{CLOCK, StepTime};
+use actq::time::{CLOCK, Limit, StepTime};
 use actq::writer;
 use actq_host_tests::profile;
 use actq_host_tests::qemu::{self, Counter, Target};
@@ -145,5 +145,22 @@ fn polls_stay_within_their_budget() -> Result<()> {
         }
     }
     ensure!(tried >= 10, "only {tried} budgets were not below the least");
+    Ok(())
+}
+
+#[test]
+fn a_budget_of_time_is_kept_and_used() -> Result<()> {
+    let policy = Policy::load(&ur3())?;
+    let prepared = Prepared::new(&policy, Method::Best, |_| {})?;
+    for milliseconds in [1.6, 2.4] {
+        let limit = Limit { milliseconds, clock_hz: CLOCK };
+        let (policy, outcomes) = limit.quantize(&prepared, &best(1.0), |_| {})?;
+        let step = limit.predict(&writer::image(&policy, &outcomes)?)?;
+        assert!(step.milliseconds <= milliseconds, "{} ms for {milliseconds}", step.milliseconds);
+        assert!(step.milliseconds > 0.97 * milliseconds, "{} ms for {milliseconds}", step.milliseconds);
+    }
+    let limit = Limit { milliseconds: 0.01, clock_hz: CLOCK };
+    let refused = limit.quantize(&prepared, &best(1.0), |_| {}).map(|_| ()).expect_err("nothing is so fast");
+    assert!(refused.to_string().contains("the fastest is"), "{refused}");
     Ok(())
 }

@@ -35,7 +35,7 @@ fn network(seed: u64) -> Result<(Policy, Vec<Outcome>)> {
         let which = if indexed { row * 7 % 5 } else { 4 * row / rows };
         Width::ALL.get(which).copied().or((row == 0).then_some(Width::W2))
     };
-    let mut last = builder.linear((rows, OBSERVATION), activations, width, group, seed % 2 == 0)?;
+    let mut last = builder.linear((rows, OBSERVATION), activations, width, group, seed.is_multiple_of(2))?;
     let [mean, scale] = [builder.values(rows), builder.values(rows)];
     last = builder.node(NodeKind::Normalize { mean, scale, pre_clip: 4.0, clip: 2.0 }, last);
     let kept = last;
@@ -272,7 +272,7 @@ fn an_error_resets() -> Result<()> {
     with_head(buffer.image(Path::new("overflow"))?, |head| {
         let observations = observations(1);
         let expected = whole(head, &observations[..1])?;
-        head.begin(&vec![f32::MAX; OBSERVATION])?;
+        head.begin(&[f32::MAX; OBSERVATION])?;
         let least = head.image().least_budget();
         let error = loop {
             match head.poll(least) {
