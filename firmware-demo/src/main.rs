@@ -1,7 +1,9 @@
 //! The demo firmware: checks its image, self-tests it, and runs it.
 //!
 //! Without arguments it plays the image's self-test observations and prints the actions' bits. With the argument `serve` it
-//! reads observations from standard input and writes actions to standard output, in the protocol of `actq serve`.
+//! reads observations from standard input and writes actions to standard output, in the protocol of `actq serve`. `poll N` does
+//! the same in polls of N instructions, `ops N` in polls of one operation each. Every step, or begin and each poll, is a counted
+//! region.
 //!
 //! The image is the one in the slot, if there is one, else the one that was built in (environment variable `ACTQ_IMAGE`).
 #![cfg_attr(target_os = "none", no_std, no_main)]
@@ -15,9 +17,10 @@ fn main() {
 #[cfg(target_os = "none")]
 mod firmware {
     use core::fmt::{Display, Write as _};
+    use core::task::Poll;
 
     use actq_firmware_demo::{count, host, slot};
-    use actq_kernels::{Head, Image};
+    use actq_kernels::{Head, Image, StepError};
     use cortex_m::singleton;
     use cortex_m_semihosting::hio;
 
@@ -59,10 +62,43 @@ mod firmware {
         let scratch = singleton!(: [u32; SCRATCH] = [0; SCRATCH]).ok_or_else(|| message("scratch", "taken twice"))?;
         let mut head = Head::new(image, scratch).map_err(|e| message("head", e))?;
         head.self_test().map_err(|e| message("self-test", e))?;
-        match host::arguments().as_str() {
-            "" => replay(&mut head),
-            "serve" => serve(&mut head),
-            other => Err(message("unknown argument", other)),
+        let arguments = host::arguments();
+        match arguments.split_once(' ').map_or((arguments.as_str(), None), |(mode, n)| (mode, n.parse().ok())) {
+            ("", None) => replay(&mut head),
+            ("serve", None) => serve(&mut head, Run::Whole),
+            ("poll", Some(budget)) => serve(&mut head, Run::Polls(budget)),
+            ("ops", Some(budget)) => serve(&mut head, Run::Ops(budget)),
+            _ => Err(message("unknown argument", arguments.as_str())),
+        }
+    }
+
+    /// How a step is run.
+    #[derive(Clone, Copy)]
+    enum Run {
+        Whole,
+        /// In polls of so many instructions.
+        Polls(u32),
+        /// In polls that also end behind each operation.
+        Ops(u32),
+    }
+
+    impl Run {
+        fn step<'h>(self, head: &'h mut Head<'_, '_>, observation: &[f32]) -> Result<&'h [f32], StepError> {
+            match self {
+                Self::Whole => return count::region(|| head.step(observation)),
+                Self::Polls(budget) => {
+                    count::region(|| head.begin(observation))?;
+                    while count::region(|| head.poll(budget).map(|p| p.is_pending()))? {}
+                }
+                Self::Ops(budget) => {
+                    count::region(|| head.begin(observation))?;
+                    while count::region(|| head.poll_op(budget).map(|p| p.is_pending()))? {}
+                }
+            }
+            match head.poll(u32::MAX)? {
+                Poll::Ready(action) => Ok(action),
+                Poll::Pending => Err(StepError::NotBegun),
+            }
         }
     }
 
@@ -86,7 +122,7 @@ mod firmware {
     }
 
     /// Answers `R` and `S` from standard input until it ends.
-    fn serve(head: &mut Head<'_, '_>) -> Result<(), Message> {
+    fn serve(head: &mut Head<'_, '_>, run: Run) -> Result<(), Message> {
         let input = host::File::open(c"/dev/stdin", false).ok_or_else(|| message("input", "cannot be opened"))?;
         let output = host::File::open(c"/dev/stdout", true).ok_or_else(|| message("output", "cannot be opened"))?;
         let mut buffer = [0f32; MAX_OBSERVATION];
@@ -101,7 +137,7 @@ mod firmware {
                     if !input.read_exact(bytemuck::cast_slice_mut(observation)) {
                         return Err(message("input", "ended inside an observation"));
                     }
-                    let action = count::region(|| head.step(observation)).map_err(|e| message("step", e))?;
+                    let action = run.step(head, observation).map_err(|e| message("step", e))?;
                     if !output.write_all(bytemuck::cast_slice(action)) {
                         return Err(message("output", "cannot be written"));
                     }

@@ -1,10 +1,12 @@
-//! What the tests and `xtask` share: golden kernel cases, the command `actq`, and the firmware under QEMU.
+//! What the tests and `xtask` share: golden kernel cases, drawn networks, the command `actq`, and the firmware under QEMU.
 #![forbid(unsafe_code)]
 
 pub mod command;
 pub mod cycles;
 pub mod evaluation;
 pub mod golden;
+pub mod networks;
+pub mod profile;
 pub mod qemu;
 
 use std::path::{Path, PathBuf};

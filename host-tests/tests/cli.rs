@@ -216,6 +216,52 @@ fn inspect_shows_name_source_scratch_and_contract() -> Result<()> {
 }
 
 #[test]
+fn inspect_predicts_the_time_of_every_operation() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let path = text(&fixture.image("")?);
+    let inspect = |arguments: &[&str]| succeeded(&run(actq(&[&["inspect", &path], arguments].concat()), b"")?);
+    let json = |clock: &str| -> Result<Value> { Ok(serde_json::from_str(&inspect(&["--json", "--clock", clock])?)?) };
+    let step = json("100M")?;
+    let ops = step["ops"].as_array().context("no operations")?;
+    for key in ["instructions", "cycles", "macs"] {
+        let number = |value: &Value| value[key].as_u64().with_context(|| format!("{key} is no number"));
+        let sum = ops.iter().map(number).sum::<Result<u64>>()?;
+        // Operations are rounded one by one.
+        ensure!(sum.abs_diff(number(&step)?) <= ops.len() as u64 && sum > 0, "{key}: {sum} against {step}");
+    }
+    let milliseconds = |step: &Value| step["milliseconds"].as_f64().context("no milliseconds");
+    let cycles = step["cycles"].as_f64().context("no cycles")?;
+    ensure!((milliseconds(&step)? - cycles / 100e3).abs() < 1e-9, "{step}");
+    ensure!((milliseconds(&json("50000K")?)? - 2.0 * milliseconds(&step)?).abs() < 1e-9, "half the clock");
+    let report = inspect(&[])?;
+    let cycles = step["cycles"].to_string();
+    ensure!(report.contains("at 168 MHz") && report.contains(&cycles), "{report}");
+    Ok(())
+}
+
+#[test]
+fn a_budget_of_time_is_kept_or_refused() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let (policy, out) = (text(&fixture.policy()), text(&fixture.out("timed.actq")));
+    let quantize = |arguments: &[&str]| {
+        run(actq(&[&["quantize", &policy, "--out", &out, "--method", "rtn", "--clock", "1M"], arguments].concat()), b"")
+    };
+    let time = || -> Result<f64> {
+        let json = succeeded(&run(actq(&["inspect", &out, "--json", "--clock", "1M"]), b"")?)?;
+        serde_json::from_str::<Value>(&json)?["milliseconds"].as_f64().context("no milliseconds")
+    };
+    ensure!(succeeded(&quantize(&["--ms", "1000"])?)?.contains("A step takes"), "the time is not printed");
+    let slowest = time()?;
+    let refused = quantize(&["--ms", "0.001"])?;
+    failed(&refused, 1, &["0.001 ms are allowed", "the fastest is", "1 MHz"])?;
+    let limit = 0.98 * slowest;
+    let kept = quantize(&["--ms", &limit.to_string()])?;
+    succeeded(&kept)?;
+    ensure!(time()? <= limit, "{} ms for {limit}", time()?);
+    Ok(())
+}
+
+#[test]
 fn eval_prints_one_object_with_six_numbers() -> Result<()> {
     let fixture = Fixture::new()?;
     let path = fixture.image("--bits 8")?;

@@ -419,3 +419,33 @@ pub const fn max_prepared_words(cols: usize, group: usize) -> usize {
     }
     most
 }
+
+/// What the cost of preparing and of reading a vector depends on.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Extent {
+    /// Columns with the padding.
+    pub(crate) columns: usize,
+    /// Groups; 1 where the weights have no group scales.
+    pub(crate) groups: usize,
+    /// Chunks of all groups.
+    pub(crate) chunks: usize,
+    /// Those of them that are written one by one, because they are short or hold padding.
+    pub(crate) single_chunks: usize,
+    /// Passes through a kernel's loop that are more than a step of its columns: groups, or runs of a row.
+    pub(crate) passes: usize,
+}
+
+/// The extent of a vector for blocks of this shape.
+pub(crate) const fn extent(shape: BlockShape) -> Extent {
+    let plan = Plan::new(shape);
+    let groups = plan.padded.div_ceil(plan.group);
+    let passes = match (shape.group, plan.format.run) {
+        (0, 1) => 0,
+        (0, run) => plan.padded.div_ceil(run),
+        _ => groups,
+    };
+    let short = plan.first_chunk != plan.chunk;
+    let padded = plan.cols < plan.padded && !(short && plan.chunks == 1);
+    let single_chunks = groups * short as usize + padded as usize;
+    Extent { columns: plan.padded, groups, chunks: groups * plan.chunks, single_chunks, passes }
+}

@@ -116,7 +116,8 @@ impl fmt::Display for HeadError {
 
 impl core::error::Error for HeadError {}
 
-/// Why [`crate::Head::step`] gave no action. The head's state is as if it had been reset.
+/// Why a step gave no action. The head's state is as if it had been reset, except after [`StepError::Budget`] and
+/// [`StepError::NotBegun`], which change nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -140,6 +141,15 @@ pub enum StepError {
         /// The step of the vector that differed.
         step: usize,
     },
+    /// The budget of a poll is smaller than the image's least.
+    Budget {
+        /// Instructions needed: [`crate::Image::least_budget`].
+        needed: u32,
+        /// Instructions given.
+        given: u32,
+    },
+    /// A poll without a step that was begun.
+    NotBegun,
 }
 
 impl fmt::Display for StepError {
@@ -151,6 +161,10 @@ impl fmt::Display for StepError {
             Self::ObservationNotFinite { index } => write!(f, "observation value {index} is not finite"),
             Self::NotFinite => f.write_str("the network produced a value that is not finite"),
             Self::SelfTest { step } => write!(f, "self-test step {step} gave other bits than the image records"),
+            Self::Budget { needed, given } => {
+                write!(f, "a poll has {given} instructions, the image needs at least {needed}")
+            }
+            Self::NotBegun => f.write_str("no step was begun: begin takes the observation, then poll"),
         }
     }
 }

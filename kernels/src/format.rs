@@ -341,6 +341,16 @@ impl BlockShape {
         &LAYOUTS[self.width as usize][self.lanes as usize]
     }
 
+    /// Rows of a strip: [`QUAD`] or [`STRIP`].
+    pub(crate) const fn strip_rows(self) -> usize {
+        self.layout().strip
+    }
+
+    /// Columns of a unit.
+    pub(crate) const fn cell_cols(self) -> usize {
+        self.layout().cell.cols
+    }
+
     /// Rows with the padding.
     pub const fn padded_rows(self) -> usize {
         self.rows.next_multiple_of(QUAD)

@@ -1,10 +1,14 @@
-//! The executor: runs an image's operations on an observation, keeps the recurrent state and the chunk queue, and applies the
-//! action contract.
+//! The executor: runs an image's operations on an observation, at once or in pieces, keeps the recurrent state and the chunk
+//! queue, and applies the action contract.
+
+use core::ops::Range;
+use core::task::Poll;
 
 use crate::activations::NotFinite;
 use crate::error::{HeadError, StepError};
 use crate::image::{Image, Op, Region};
 use crate::math::clamp;
+use crate::slice::{Budget, Cursor, Price};
 use crate::{norm, recurrent};
 
 /// A head: an image and the scratch memory that it runs in.
@@ -12,10 +16,24 @@ use crate::{norm, recurrent};
 pub struct Head<'a, 's> {
     image: Image<'a>,
     arena: &'s mut [u32],
+    /// [`Image::least_budget`].
+    least_budget: u32,
+    phase: Phase,
     /// Actions of the current chunk that have been played; 0 = the network must run.
     played: usize,
     /// Whether an action has been given since the reset, so that the step limit has something to hold on to.
     started: bool,
+}
+
+/// What the arena holds of a step.
+#[derive(Clone, Copy, Debug)]
+enum Phase {
+    /// Nothing.
+    Idle,
+    /// An observation, and what has been done with it.
+    Begun(Cursor),
+    /// The action.
+    Ready,
 }
 
 impl<'a, 's> Head<'a, 's> {
@@ -25,18 +43,25 @@ impl<'a, 's> Head<'a, 's> {
         let arena = scratch.get_mut(..needed).ok_or(HeadError::ScratchTooSmall { needed, given })?;
         // Nothing depends on what the memory held.
         arena.fill(0);
-        let mut head = Self { image, arena, played: 0, started: false };
+        let least_budget = image.least_budget();
+        let mut head = Self { image, arena, least_budget, phase: Phase::Idle, played: 0, started: false };
         head.reset();
         Ok(head)
     }
 
-    /// Forgets the recurrent state, the rest of a chunk and the last action.
+    /// Forgets the recurrent state, the rest of a chunk, the last action and a step that was begun.
     pub fn reset(&mut self) {
+        self.forget();
+        self.phase = Phase::Idle;
+        self.played = 0;
+        self.started = false;
+    }
+
+    /// Zeroes the recurrent state.
+    fn forget(&mut self) {
         if let Some(state) = self.arena.get_mut(self.image.state().range()) {
             state.fill(0);
         }
-        self.played = 0;
-        self.started = false;
     }
 
     /// The recurrent state, to read or to set: of each operation in order an LSTM's hidden, then cell state, or a GRU's state.
@@ -50,37 +75,117 @@ impl<'a, 's> Head<'a, 's> {
         &self.image
     }
 
-    /// The action for `observation`: of the next chunk position where the image is chunked, after the action contract.
+    /// The action for `observation`: of the next chunk position where the image is chunked, after the action contract. It is
+    /// [`Self::begin`] and one [`Self::poll`] without a limit.
     ///
     /// On an error the head resets itself, so that no part of a failed evaluation reaches a later action.
     pub fn step(&mut self, observation: &[f32]) -> Result<&[f32], StepError> {
-        self.try_step(observation).inspect_err(|_| self.reset())?;
+        self.begin(observation)?;
+        self.finish()?;
         Ok(self.floats(self.image.action()))
     }
 
-    fn try_step(&mut self, observation: &[f32]) -> Result<(), StepError> {
-        self.load(observation)?;
-        self.advance()
+    /// Begins a step: takes the observation. The work itself is done by [`Self::poll`].
+    ///
+    /// A step that was begun and is not ready is dropped. If a poll has already worked on it, the recurrent state may be partly
+    /// that of the dropped step, and is zeroed as by [`Self::reset`]; the last action stays, so that the step limit holds.
+    ///
+    /// On an error the head resets itself.
+    pub fn begin(&mut self, observation: &[f32]) -> Result<(), StepError> {
+        self.drop_step();
+        self.load(observation).inspect_err(|_| self.reset())?;
+        self.start();
+        Ok(())
     }
 
-    /// One step on the observation that the arena holds.
-    fn advance(&mut self) -> Result<(), StepError> {
-        if self.played == 0 {
-            self.evaluate()?;
+    /// Runs at most `budget` instructions of the step that was begun, by the cost model ([`crate::cost`]), and gives the action
+    /// once it is ready; then, again and again until the next [`Self::begin`]. Steps that play on from a chunk have little to
+    /// do, and are ready at the first poll. A budget of 2^28 or more is no limit.
+    ///
+    /// The cost model is that of the build for thumbv7em-none-eabihf; elsewhere pieces are cut in the same places. However a
+    /// step is cut, its bits are the same.
+    ///
+    /// # Errors
+    ///
+    /// [`StepError::Budget`] where `budget` is below [`Image::least_budget`], and [`StepError::NotBegun`], change nothing. On
+    /// others the head resets itself.
+    pub fn poll(&mut self, budget: u32) -> Result<Poll<&[f32]>, StepError> {
+        self.poll_until(budget, false)
+    }
+
+    /// As [`Self::poll`], but also stops behind each of the image's operations: to measure them one by one.
+    pub fn poll_op(&mut self, budget: u32) -> Result<Poll<&[f32]>, StepError> {
+        self.poll_until(budget, true)
+    }
+
+    fn poll_until(&mut self, budget: u32, one_op: bool) -> Result<Poll<&[f32]>, StepError> {
+        if budget < self.least_budget {
+            return Err(StepError::Budget { needed: self.least_budget, given: budget });
         }
-        self.act()?;
-        self.played += 1;
-        if self.played == self.image.execute() {
-            self.played = 0;
+        let ready = match self.phase {
+            Phase::Idle => return Err(StepError::NotBegun),
+            Phase::Begun(cursor) => {
+                self.advance(cursor, Budget::of_poll(budget), one_op).inspect_err(|_| self.reset())?
+            }
+            Phase::Ready => true,
+        };
+        Ok(if ready { Poll::Ready(self.floats(self.image.action())) } else { Poll::Pending })
+    }
+
+    /// See [`Self::begin`].
+    fn drop_step(&mut self) {
+        if let Phase::Begun(cursor) = self.phase
+            && cursor != self.fresh()
+        {
+            self.forget();
+        }
+        self.phase = Phase::Idle;
+    }
+
+    /// Where a step begins: before the first operation, or, within a chunk, behind the last.
+    fn fresh(&self) -> Cursor {
+        Cursor { op: if self.played == 0 { 0 } else { self.image.op_count() }, ..Cursor::default() }
+    }
+
+    /// Begins a step with the observation that the arena holds.
+    fn start(&mut self) {
+        self.phase = Phase::Begun(self.fresh());
+    }
+
+    /// Takes the step that was begun to its end.
+    fn finish(&mut self) -> Result<(), StepError> {
+        if let Phase::Begun(cursor) = self.phase {
+            self.advance(cursor, Budget::UNLIMITED, false).inspect_err(|_| self.reset())?;
         }
         Ok(())
     }
 
+    /// Goes on from `cursor` as far as the budget reaches; true when the action is ready.
+    fn advance(&mut self, mut cursor: Cursor, mut budget: Budget, one_op: bool) -> Result<bool, StepError> {
+        let done = self.evaluate(&mut cursor, &mut budget, one_op).map_err(|NotFinite| StepError::NotFinite)?;
+        if !done || budget.take(1, || Price::action(&self.image)) == 0 {
+            self.phase = Phase::Begun(cursor);
+            return Ok(false);
+        }
+        self.act()?;
+        self.phase = Phase::Ready;
+        self.played += 1;
+        if self.played == self.image.execute() {
+            self.played = 0;
+        }
+        Ok(true)
+    }
+
     /// The network's raw output for `observation` (`chunk * act_len` values), before the action contract. Advances the
-    /// recurrent state, and drops what was left of a chunk.
+    /// recurrent state, and drops what was left of a chunk or of a step that was begun.
     pub fn infer(&mut self, observation: &[f32]) -> Result<&[f32], StepError> {
+        self.drop_step();
         self.played = 0;
-        let outcome = self.load(observation).and_then(|()| self.evaluate());
+        let mut budget = Budget::UNLIMITED;
+        let outcome = self.load(observation).and_then(|()| {
+            let done = self.evaluate(&mut Cursor::default(), &mut budget, false);
+            done.map_err(|NotFinite| StepError::NotFinite)
+        });
         outcome.inspect_err(|_| self.reset())?;
         Ok(self.floats(self.image.output()))
     }
@@ -99,7 +204,8 @@ impl<'a, 's> Head<'a, 's> {
             for (to, from) in self.floats_mut(self.image.observation()).iter_mut().zip(observation) {
                 *to = f32::from_bits(u32::from_le(*from));
             }
-            self.advance()?;
+            self.start();
+            self.finish()?;
             let action = self.floats(self.image.action());
             if !action.iter().map(|a| a.to_bits()).eq(expected.iter().map(|w| u32::from_le(*w))) {
                 return Err(StepError::SelfTest { step });
@@ -124,12 +230,22 @@ impl<'a, 's> Head<'a, 's> {
         Ok(())
     }
 
-    fn evaluate(&mut self) -> Result<(), StepError> {
+    /// Runs operations from `cursor` on; true behind the last one.
+    fn evaluate(&mut self, cursor: &mut Cursor, budget: &mut Budget, one_op: bool) -> Result<bool, NotFinite> {
         let work = self.image.work();
-        for op in self.image.ops() {
-            run(&op, self.arena, work).map_err(|NotFinite| StepError::NotFinite)?;
+        while cursor.op < self.image.op_count() {
+            // In a checked image every record parses.
+            if let Some(op) = self.image.op(cursor.op)
+                && !(budget.enter(&op) && run(&op, self.arena, work, cursor, budget)?)
+            {
+                return Ok(false);
+            }
+            *cursor = Cursor { op: cursor.op + 1, ..Cursor::default() };
+            if one_op {
+                return Ok(false);
+            }
         }
-        Ok(())
+        Ok(true)
     }
 
     /// Takes the chunk's current action through the contract.
@@ -183,58 +299,90 @@ fn regions<const N: usize>(arena: &mut [u32], regions: [Region; N]) -> Option<[&
     arena.get_disjoint_mut(regions.map(Region::range)).ok()
 }
 
-fn run(op: &Op<'_>, arena: &mut [u32], work: Region) -> Result<(), NotFinite> {
+/// Runs an operation from where the cursor stands; true at its end. An operation whose regions do not fit, which the image's
+/// check has excluded, does nothing.
+fn run(
+    op: &Op<'_>,
+    arena: &mut [u32],
+    work: Region,
+    cursor: &mut Cursor,
+    budget: &mut Budget,
+) -> Result<bool, NotFinite> {
     let f = bytemuck::cast_slice_mut::<u32, f32>;
-    match *op {
+    // Elements that this piece takes, and whether it is the last.
+    let mut elements = |len: usize| -> (Range<usize>, bool) {
+        let end = cursor.done + budget.take(len - cursor.done, || Price::elements(op));
+        let range = cursor.done..end;
+        cursor.done = end;
+        (range, end == len)
+    };
+    let done = match *op {
         Op::Normalize { src, dst, mean, scale, pre_clip, clip } => {
-            if let Some([src, dst]) = regions(arena, [src, dst]) {
-                norm::normalize(f(src), mean, scale, pre_clip, clip, f(dst));
-            }
+            let Some([src, dst]) = regions(arena, [src, dst]) else { return Ok(true) };
+            let (range, done) = elements(dst.len());
+            let of = |constants| <[u32]>::get(constants, range.clone()).unwrap_or(&[]);
+            norm::normalize(f(part(src, &range)), of(mean), of(scale), pre_clip, clip, f(part(dst, &range)));
+            done
         }
         Op::Linear { src, dst, matrix, accumulate } => {
-            if let Some([src, dst, work]) = regions(arena, [src, dst, work]) {
-                matrix.apply(f(src), work, f(dst), accumulate)?;
-            }
+            let Some([src, dst, work]) = regions(arena, [src, dst, work]) else { return Ok(true) };
+            matrix.resume(&mut cursor.linear, budget, f(src), work, f(dst), accumulate)?
         }
         Op::Function { dst, function } => {
-            if let Some([dst]) = regions(arena, [dst]) {
-                function.apply(f(dst));
-            }
+            let Some([dst]) = regions(arena, [dst]) else { return Ok(true) };
+            let (range, done) = elements(dst.len());
+            function.apply(f(part(dst, &range)));
+            done
         }
         Op::LayerNorm { dst, weight, bias, eps } => {
-            if let Some([dst]) = regions(arena, [dst]) {
+            let Some([dst]) = regions(arena, [dst]) else { return Ok(true) };
+            let all = budget.take(1, || Price::whole(op)) > 0;
+            if all {
                 norm::layer_norm(f(dst), weight, bias, eps);
             }
+            all
         }
         Op::RmsNorm { dst, weight, eps } => {
-            if let Some([dst]) = regions(arena, [dst]) {
+            let Some([dst]) = regions(arena, [dst]) else { return Ok(true) };
+            let all = budget.take(1, || Price::whole(op)) > 0;
+            if all {
                 norm::rms_norm(f(dst), weight, eps);
             }
+            all
         }
         Op::Add { src, dst } => {
-            if let Some([src, dst]) = regions(arena, [src, dst]) {
-                for (to, from) in f(dst).iter_mut().zip(f(src)) {
-                    *to += *from;
-                }
+            let Some([src, dst]) = regions(arena, [src, dst]) else { return Ok(true) };
+            let (range, done) = elements(dst.len());
+            for (to, from) in f(part(dst, &range)).iter_mut().zip(f(part(src, &range))) {
+                *to += *from;
             }
+            done
         }
         Op::Copy { src, dst } => {
-            if let Some([src, dst]) = regions(arena, [src, dst]) {
-                for (to, from) in dst.iter_mut().zip(src) {
-                    *to = *from;
-                }
+            let Some([src, dst]) = regions(arena, [src, dst]) else { return Ok(true) };
+            let (range, done) = elements(dst.len());
+            for (to, from) in part(dst, &range).iter_mut().zip(part(src, &range)) {
+                *to = *from;
             }
+            done
         }
         Op::LstmCell { src, dst, cell } => {
-            if let Some([src, dst, cell]) = regions(arena, [src, dst, cell]) {
-                recurrent::lstm_cell(f(src), f(cell), f(dst));
-            }
+            let Some([src, dst, cell]) = regions(arena, [src, dst, cell]) else { return Ok(true) };
+            let (range, done) = elements(dst.len());
+            recurrent::lstm_elements(range, f(src), f(cell), f(dst));
+            done
         }
         Op::GruCell { src, dst, hidden } => {
-            if let Some([src, dst, hidden]) = regions(arena, [src, dst, hidden]) {
-                recurrent::gru_cell(f(src), f(hidden), f(dst));
-            }
+            let Some([src, dst, hidden]) = regions(arena, [src, dst, hidden]) else { return Ok(true) };
+            let (range, done) = elements(dst.len());
+            recurrent::gru_elements(range, f(src), f(hidden), f(dst));
+            done
         }
-    }
-    Ok(())
+    };
+    Ok(done)
+}
+
+/// Some of a region's words.
+fn part<'r>(region: &'r mut [u32], range: &Range<usize>) -> &'r mut [u32] {
+    region.get_mut(range.clone()).unwrap_or_default()
 }

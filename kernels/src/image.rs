@@ -394,6 +394,11 @@ impl<'a> Image<'a> {
         Region { offset: self.high(h::W_ACTION_WORK), len: self.low(h::W_WORK_FLAGS) }
     }
 
+    /// The least budget, in modelled instructions, with which [`crate::Head::poll`] runs the image.
+    pub fn least_budget(&self) -> u32 {
+        crate::slice::least_budget(self)
+    }
+
     /// Number of operations.
     pub fn op_count(&self) -> usize {
         self.high(h::W_KIND)
@@ -434,7 +439,7 @@ impl<'a> Image<'a> {
     }
 
     /// Operation `i`; `None` past the end. (Within a checked image every record parses.)
-    fn op(&self, i: usize) -> Option<Op<'a>> {
+    pub(crate) fn op(&self, i: usize) -> Option<Op<'a>> {
         let at = self.word(h::W_OPS) as usize + i * h::OP_WORDS;
         let head = self.word(at);
         let (kind, detail, len) = (head as u8, (head >> 8) as u8, (head >> 16) as usize);

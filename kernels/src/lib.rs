@@ -26,6 +26,7 @@ pub mod activations;
 #[cfg(actq_armv7em)]
 #[allow(unsafe_code, reason = "the assembler backend; every block carries its proof")]
 pub mod armv7em;
+pub mod cost;
 pub mod dequantize;
 mod error;
 pub mod format;
@@ -38,6 +39,7 @@ pub mod norm;
 pub mod portable;
 pub mod recurrent;
 pub mod reference;
+mod slice;
 
 pub use error::{HeadError, ImageError, StepError};
 pub use format::{Block, BlockShape, Width};

@@ -7,14 +7,16 @@
 
 use core::ops::Range;
 
-use crate::activations::{NotFinite, Prepared, Scale, max_prepared_words};
+use crate::activations::{NotFinite, Prepared, Scale, max_prepared_words, prepared_words};
 #[cfg(actq_fpu)]
 use crate::armv7em;
-use crate::format::{Block, Lanes, STRIP};
+use crate::format::{Block, Lanes, QUAD, STRIP};
 use crate::gemv::gemv;
+use crate::image::header::BLOCK_WORDS;
+use crate::slice::{Budget, LinearCursor, Price};
 
 /// Rows whose sums stand on the stack at once.
-const RUN: usize = 8 * STRIP;
+pub(crate) const RUN: usize = 8 * STRIP;
 
 /// A matrix in an image: blocks of rows and a bias.
 #[derive(Clone, Copy, Debug)]
@@ -79,43 +81,55 @@ impl RowBlock<'_> {
     /// for the block. `start` holds the bits of the whole output's biases; without it, y itself is the start. Nothing is done
     /// where `start` or `y` is too short.
     pub fn apply(&self, x: &Prepared<'_>, x_scale: Scale, start: Option<&[u32]>, y: &mut [f32]) {
-        let shape = self.block.shape();
+        self.apply_rows(0..self.block.shape().rows, x, x_scale, start, y);
+    }
+
+    /// As [`Self::apply`], for a run of the block's rows, which starts at a multiple of [`STRIP`] and ends at another or with
+    /// the block.
+    pub(crate) fn apply_rows(
+        &self,
+        rows: Range<usize>,
+        x: &Prepared<'_>,
+        x_scale: Scale,
+        start: Option<&[u32]>,
+        y: &mut [f32],
+    ) {
         let x_scale = x_scale.get();
         if start.is_none() || !self.index.is_empty() {
-            return self.apply_runs::<RUN>(0, x, x_scale, start, y);
+            return self.apply_runs::<RUN>(rows, x, x_scale, start, y);
         }
         // Rows in order have room for their sums in y itself, except those of a last strip that padding fills.
-        let whole = if shape.rows == shape.padded_rows() { shape.rows } else { shape.rows & !(STRIP - 1) };
-        if whole > 0 {
-            let at = self.first_row..self.first_row + whole;
+        let whole = if rows.end.is_multiple_of(QUAD) { rows.end } else { rows.end & !(STRIP - 1) };
+        if rows.start < whole {
+            let at = self.first_row + rows.start..self.first_row + whole;
             let (Some(start), Some(y)) = (slice_of(start, at.clone()), y.get_mut(at)) else { return };
-            if gemv(&self.block, x, 0, bytemuck::cast_slice_mut(y)).is_err() {
+            if gemv(&self.block, x, rows.start, bytemuck::cast_slice_mut(y)).is_err() {
                 return;
             }
-            self.scale_in_order(0, None, x_scale, start, y);
+            self.scale_in_order(rows.start, None, x_scale, start, y);
         }
-        if whole < shape.rows {
-            self.apply_runs::<STRIP>(whole, x, x_scale, start, y);
+        if whole < rows.end {
+            self.apply_runs::<STRIP>(whole..rows.end, x, x_scale, start, y);
         }
     }
 
-    /// As [`Self::apply`], for the rows from `first` on, with the sums of `RUN` rows on the stack at once.
+    /// As [`Self::apply`], for a run of rows as there, with the sums of `RUN` rows on the stack at once.
     fn apply_runs<const RUN: usize>(
         &self,
-        mut first: usize,
+        rows: Range<usize>,
         x: &Prepared<'_>,
         x_scale: f32,
         start: Option<&[u32]>,
         y: &mut [f32],
     ) {
-        let shape = self.block.shape();
+        let mut first = rows.start;
         let mut sums = [0; RUN];
-        while first < shape.rows {
-            let sums = &mut sums[..RUN.min(shape.padded_rows() - first)];
+        while first < rows.end {
+            let sums = &mut sums[..RUN.min(rows.end.next_multiple_of(QUAD) - first)];
             if gemv(&self.block, x, first, sums).is_err() {
                 return;
             }
-            let sums = &sums[..sums.len().min(shape.rows - first)];
+            let sums = &sums[..sums.len().min(rows.end - first)];
             if self.index.is_empty() {
                 let at = self.first_row + first..self.first_row + first + sums.len();
                 let (Some(start), Some(y)) = (slice_of(start, at.clone()), y.get_mut(at)) else { return };
@@ -164,24 +178,74 @@ impl Matrix<'_> {
     /// `y = W x + b`, or `y = y + b + W x` where `accumulate`. `work` holds at least [`Self::prepared_words`] words; `x` and
     /// `y` have the matrix's lengths (what is missing is left out).
     pub fn apply(&self, x: &[f32], work: &mut [u32], y: &mut [f32], accumulate: bool) -> Result<(), NotFinite> {
-        let x_scale = Scale::new(x, self.x_max)?;
+        let mut budget = Budget::UNLIMITED;
+        self.resume(&mut LinearCursor::default(), &mut budget, x, work, y, accumulate)?;
+        Ok(())
+    }
+
+    /// As [`Self::apply`], from where `at` stands and as far as the budget reaches; true when all is done.
+    pub(crate) fn resume(
+        &self,
+        at: &mut LinearCursor,
+        budget: &mut Budget,
+        x: &[f32],
+        work: &mut [u32],
+        y: &mut [f32],
+        accumulate: bool,
+    ) -> Result<bool, NotFinite> {
+        let x_scale = match at.scale {
+            Some(scale) => scale,
+            None if budget.take(1, || Price::magnitude(self)) == 0 => return Ok(false),
+            None => *at.scale.insert(Scale::new(x, self.x_max)?),
+        };
         // One pass over the output where every row has its bias and is written once, in order.
-        let start = if accumulate || self.bias.is_empty() || !self.is_whole() { None } else { Some(self.bias) };
-        if start.is_none() {
-            self.start(y, accumulate);
+        let start = self.start_values(accumulate);
+        if start.is_none() && at.started < y.len() {
+            let end = at.started + budget.take(y.len() - at.started, || Price::bias(accumulate));
+            self.start(at.started..end, y, accumulate);
+            at.started = end;
+            if end < y.len() {
+                return Ok(false);
+            }
         }
         let mut prepared: Option<Prepared<'_>> = None;
-        for rows in self.blocks() {
+        for rows in self.blocks().skip(at.block) {
             let shape = rows.block.shape();
             // Layouts prepare the activations differently; the blocks of one width share them.
             if prepared.is_none_or(|x| !x.fits(shape)) {
-                prepared = x_scale.quantize(x, shape, work);
+                prepared = if at.prepared == Some(shape.width) {
+                    work.get(..prepared_words(shape)).and_then(|work| Prepared::new(work, shape))
+                } else if budget.take(1, || Price::prepare(&rows)) > 0 {
+                    at.prepared = Some(shape.width);
+                    x_scale.quantize(x, shape, work)
+                } else {
+                    return Ok(false);
+                };
             }
             if let Some(x) = &prepared {
-                rows.apply(x, x_scale, start, y);
+                let strips =
+                    budget.take((shape.rows - at.row).div_ceil(STRIP), || Price::strips(&rows, start.is_some()));
+                let end = shape.rows.min(at.row + strips * STRIP);
+                rows.apply_rows(at.row..end, x, x_scale, start, y);
+                at.row = end;
+                if end < shape.rows {
+                    return Ok(false);
+                }
             }
+            at.block += 1;
+            at.row = 0;
         }
-        Ok(())
+        Ok(true)
+    }
+
+    /// The bits of the values that the output starts from, where these are the biases and every row is written once, in order.
+    pub fn start_values(&self, accumulate: bool) -> Option<&[u32]> {
+        if accumulate || self.bias.is_empty() || !self.is_whole() { None } else { Some(self.bias) }
+    }
+
+    /// Blocks of rows.
+    pub(crate) fn block_count(&self) -> usize {
+        self.records.len() / BLOCK_WORDS
     }
 
     /// Whether the blocks hold all rows in the order of the output.
@@ -193,11 +257,14 @@ impl Matrix<'_> {
         }) && rows == self.rows
     }
 
-    fn start(&self, y: &mut [f32], accumulate: bool) {
+    /// Sets outputs to their biases, or adds these.
+    fn start(&self, outputs: Range<usize>, y: &mut [f32], accumulate: bool) {
+        let bias = self.bias.get(outputs.clone()).unwrap_or(&[]);
+        let Some(y) = y.get_mut(outputs) else { return };
         if !accumulate {
             y.fill(0.0);
         }
-        for (y, &bias) in y.iter_mut().zip(self.bias) {
+        for (y, &bias) in y.iter_mut().zip(bias) {
             let bias = f32::from_bits(u32::from_le(bias));
             *y = if accumulate { *y + bias } else { bias };
         }

@@ -1,5 +1,7 @@
 //! The elementwise parts of recurrent cells. The matrix products are ordinary linear operations of the image.
 
+use core::ops::Range;
+
 use crate::math::{exp_fraction, sigmoid, tanh_fraction};
 
 /// `sigmoid(gate) * tanh(x)`, by one division.
@@ -13,8 +15,14 @@ fn gated(gate: f32, x: f32) -> f32 {
 /// One LSTM cell in torch's gate order: `gates = [i | f | g | o]`, each of the length of `h` and `c`.
 /// `c = sigmoid(f) * c + sigmoid(i) * tanh(g)`, `h = sigmoid(o) * tanh(c)`.
 pub fn lstm_cell(gates: &[f32], c: &mut [f32], h: &mut [f32]) {
+    lstm_elements(0..h.len(), gates, c, h);
+}
+
+/// As [`lstm_cell`], for some of the elements.
+pub(crate) fn lstm_elements(elements: Range<usize>, gates: &[f32], c: &mut [f32], h: &mut [f32]) {
     let n = h.len();
-    let gate = |k: usize| gates.get(k * n..).unwrap_or(&[]);
+    let gate = |k: usize| gates.get(k * n + elements.start..).unwrap_or(&[]);
+    let (Some(c), Some(h)) = (c.get_mut(elements.clone()), h.get_mut(elements.clone())) else { return };
     let rows = gate(0).iter().zip(gate(1)).zip(gate(2)).zip(gate(3));
     for ((c, h), (((i, f), g), o)) in c.iter_mut().zip(h).zip(rows) {
         *c = sigmoid(*f) * *c + gated(*i, *g);
@@ -25,8 +33,14 @@ pub fn lstm_cell(gates: &[f32], c: &mut [f32], h: &mut [f32]) {
 /// One GRU cell in torch's gate order: `a = W_ih x + b_ih`, `b = W_hh h + b_hh`, each `[r | z | n]`.
 /// `h = (1 - z) * tanh(a_n + r * b_n) + z * h` with `r = sigmoid(a_r + b_r)`, `z = sigmoid(a_z + b_z)`.
 pub fn gru_cell(a: &[f32], b: &[f32], h: &mut [f32]) {
+    gru_elements(0..h.len(), a, b, h);
+}
+
+/// As [`gru_cell`], for some of the elements.
+pub(crate) fn gru_elements(elements: Range<usize>, a: &[f32], b: &[f32], h: &mut [f32]) {
     let n = h.len();
-    let gate = |gates, k: usize| -> &[f32] { <[f32]>::get(gates, k * n..).unwrap_or(&[]) };
+    let gate = |gates, k: usize| -> &[f32] { <[f32]>::get(gates, k * n + elements.start..).unwrap_or(&[]) };
+    let Some(h) = h.get_mut(elements.clone()) else { return };
     let input = gate(a, 0).iter().zip(gate(a, 1)).zip(gate(a, 2));
     let hidden = gate(b, 0).iter().zip(gate(b, 1)).zip(gate(b, 2));
     for (h, (((ar, az), an), ((br, bz), bn))) in h.iter_mut().zip(input.zip(hidden)) {

@@ -100,18 +100,31 @@ pub fn report(image: &Image<'_>) -> String {
     text
 }
 
+/// The name of an operation.
+pub fn op_name(op: &Op<'_>) -> &'static str {
+    match op {
+        Op::Normalize { .. } => "normalize",
+        Op::Linear { .. } => "linear",
+        Op::Function { function, .. } => function.name(),
+        Op::LayerNorm { .. } => "layernorm",
+        Op::RmsNorm { .. } => "rmsnorm",
+        Op::Add { .. } => "add",
+        Op::Copy { .. } => "copy",
+        Op::LstmCell { .. } => "lstm cell",
+        Op::GruCell { .. } => "gru cell",
+    }
+}
+
 fn row(op: &Op<'_>) -> Vec<String> {
     let region = |r: &Region| format!("{}+{}", r.offset, r.len);
-    let line = |name: &str, dst: &Region, src: Option<&Region>, detail: String| {
-        vec![name.to_owned(), region(dst), src.map_or(String::new(), region), detail]
+    let line = |dst: &Region, src: Option<&Region>, detail: String| {
+        vec![op_name(op).to_owned(), region(dst), src.map_or(String::new(), region), detail]
     };
     match op {
-        Op::Normalize { src, dst, pre_clip, clip, .. } => {
-            line("normalize", dst, Some(src), format!("clip {pre_clip} {clip}"))
-        }
+        Op::Normalize { src, dst, pre_clip, clip, .. } => line(dst, Some(src), format!("clip {pre_clip} {clip}")),
         Op::Linear { src, dst, matrix, accumulate } => {
             let detail = format!("{}x{}{}", matrix.rows, matrix.cols, if *accumulate { " added" } else { "" });
-            let mut cells = line("linear", dst, Some(src), detail);
+            let mut cells = line(dst, Some(src), detail);
             cells.extend([
                 widths(matrix),
                 group_name(matrix.group),
@@ -120,12 +133,12 @@ fn row(op: &Op<'_>) -> Vec<String> {
             ]);
             cells
         }
-        Op::Function { dst, function } => line(function.name(), dst, None, String::new()),
-        Op::LayerNorm { dst, eps, .. } => line("layernorm", dst, None, format!("eps {eps}")),
-        Op::RmsNorm { dst, eps, .. } => line("rmsnorm", dst, None, format!("eps {eps}")),
-        Op::Add { src, dst } => line("add", dst, Some(src), String::new()),
-        Op::Copy { src, dst } => line("copy", dst, Some(src), String::new()),
-        Op::LstmCell { src, dst, cell } => line("lstm cell", dst, Some(src), format!("cell {}", region(cell))),
-        Op::GruCell { src, dst, hidden } => line("gru cell", dst, Some(src), format!("gates {}", region(hidden))),
+        Op::Function { dst, .. } => line(dst, None, String::new()),
+        Op::LayerNorm { dst, eps, .. } => line(dst, None, format!("eps {eps}")),
+        Op::RmsNorm { dst, eps, .. } => line(dst, None, format!("eps {eps}")),
+        Op::Add { src, dst } => line(dst, Some(src), String::new()),
+        Op::Copy { src, dst } => line(dst, Some(src), String::new()),
+        Op::LstmCell { src, dst, cell } => line(dst, Some(src), format!("cell {}", region(cell))),
+        Op::GruCell { src, dst, hidden } => line(dst, Some(src), format!("gates {}", region(hidden))),
     }
 }

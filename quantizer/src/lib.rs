@@ -21,6 +21,7 @@ pub mod search;
 pub mod serve;
 pub mod stats;
 pub mod sweep;
+pub mod time;
 pub mod unrounded;
 pub mod widths;
 pub mod writer;

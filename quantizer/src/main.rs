@@ -18,6 +18,7 @@ use actq::quantize::{Activations, Budget, Method, Options, Outcome};
 use actq::runtime::ImageBuffer;
 use actq::search::{self, Measure};
 use actq::stats::{Asked, Stats};
+use actq::time::{self, StepTime};
 use actq::widths::{self, Widths};
 use actq::{check, eval, serve, sweep, writer};
 use actq_kernels::Width;
@@ -47,7 +48,7 @@ enum Command {
     ///
     /// Example: actq quantize policies/ur3 --bits 3 --out ur3.actq
     Quantize(QuantizeArgs),
-    /// Show what is in an image: operations, matrices, bits, memory, the action contract
+    /// Show what is in an image: operations, matrices, bits, memory, time on a Cortex-M4, the action contract
     ///
     /// Example: actq inspect ur3.actq --widths --stats ur3.json --svg ur3.svg
     Inspect(InspectArgs),
@@ -111,6 +112,12 @@ struct QuantizeArgs {
     /// the held-out recording, else on that of calibration
     #[arg(long, value_name = "X", conflicts_with_all = ["bits", "bpw", "flash"], value_parser = positive)]
     max_nmse: Option<f64>,
+    /// Milliseconds that a step may take on a Cortex-M4, predicted; takes the most bits that keep them
+    #[arg(long, value_name = "X", conflicts_with_all = ["bits", "bpw", "flash", "max_nmse"], value_parser = positive)]
+    ms: Option<f64>,
+    /// The processor's clock for --ms, in Hz or as 168M
+    #[arg(long, value_name = "HZ", requires = "ms", default_value = "168M", value_parser = time::clock)]
+    clock: f64,
     /// Force the width of a matrix, by its tensor's name (method best); may be repeated
     #[arg(long, value_name = "NAME=BITS", value_parser = forced)]
     width: Vec<(String, Width)>,
@@ -146,6 +153,12 @@ struct QuantizeArgs {
 struct InspectArgs {
     /// The image
     image: PathBuf,
+    /// The processor's clock, in Hz or as 168M
+    #[arg(long, value_name = "HZ", default_value = "168M", value_parser = time::clock)]
+    clock: f64,
+    /// Print the predicted time of every operation and of the step as one JSON object
+    #[arg(long, conflicts_with = "widths")]
+    json: bool,
     /// Show instead which rows have which width
     #[arg(long)]
     widths: bool,
@@ -344,12 +357,17 @@ fn run_quantize(args: &QuantizeArgs) -> Result<()> {
     let prepared = Prepared::with_recording(&source, method, calib.as_ref(), |share| set_share(&bar, share))?;
     bar.reset();
     bar.set_message("quantizing");
-    let (policy, outcomes, options, search) = match args.max_nmse.zip(measure.as_ref()) {
-        None => {
+    let limit = args.ms.map(|milliseconds| time::Limit { milliseconds, clock_hz: args.clock });
+    let (policy, outcomes, options, search) = match (args.max_nmse.zip(measure.as_ref()), limit) {
+        (None, None) => {
             let (policy, outcomes) = prepared.quantize(&options, |share| set_share(&bar, share))?;
             (policy, outcomes, options, String::new())
         }
-        Some((limit, measure)) => {
+        (None, Some(limit)) => {
+            let (policy, outcomes, options) = limit.quantize(&prepared, &options, |share| set_share(&bar, share))?;
+            (policy, outcomes, options, String::new())
+        }
+        (Some((limit, measure)), _) => {
             let found = search::smallest(&source, &prepared, &options, limit, measure, |work, share| {
                 bar.set_message(work.to_owned());
                 set_share(&bar, share);
@@ -362,7 +380,11 @@ fn run_quantize(args: &QuantizeArgs) -> Result<()> {
     let bytes = writer::image(&policy, &outcomes)?;
     let mut files = vec![(args.out.as_path(), bytes.clone())];
     if let Some(path) = &args.save_stats {
-        let asked = args.max_nmse.map_or(budget.into(), Asked::MaxNmse);
+        let asked = match (args.max_nmse, limit) {
+            (Some(nmse), _) => Asked::MaxNmse(nmse),
+            (_, Some(time::Limit { milliseconds, clock_hz })) => Asked::Time { milliseconds, clock_hz },
+            _ => budget.into(),
+        };
         let buffer = ImageBuffer::new(&bytes);
         let (scores, steps) = (prepared.actquant.as_ref().map_or(&[][..], |s| &s.scores), prepared.steps(&options));
         let stats = Stats::new(&source, asked, &options, &outcomes, scores, steps, &buffer.image(&args.out)?);
@@ -372,11 +394,12 @@ fn run_quantize(args: &QuantizeArgs) -> Result<()> {
     if let Some(statistics) = &prepared.actquant {
         print(&scores(&policy.graph, statistics, options.budget, &outcomes))?;
     }
+    let time = limit.map_or(Ok(String::new()), |limit| limit.predict(&bytes).map(|step| step.sentence()))?;
     let parameters = source.graph.parameters();
     let f32_bytes = 4 * parameters;
     print(&format!(
         "{search}{}\n{}: {} bytes. The policy's {parameters} parameters take {f32_bytes} bytes in f32 ({:.1}x) and {} in bf16 \
-         ({:.1}x).\nTook {:.1} s.\n",
+         ({:.1}x).\n{time}Took {:.1} s.\n",
         summary(&policy, &outcomes),
         args.out.display(),
         bytes.len(),
@@ -433,7 +456,11 @@ fn run_inspect(args: &InspectArgs) -> Result<()> {
     let buffer = ImageBuffer::read(&args.image)?;
     let image = buffer.image(&args.image)?;
     if !args.widths {
-        return print(&report(&image));
+        let step = StepTime::new(&image, args.clock);
+        return print(&match args.json {
+            true => serde_json::to_string(&step)? + "\n",
+            false => format!("{}\n{}", report(&image), step.report()),
+        });
     }
     let stats = args.stats.as_deref().map(|path| Stats::read(path, &image)).transpose()?;
     let widths = Widths::new(&image, stats.as_ref())?;

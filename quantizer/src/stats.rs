@@ -56,6 +56,13 @@ pub enum Asked {
     ImageBytes(usize),
     /// The largest error (NMSE) of the fewest bits.
     MaxNmse(f64),
+    /// The longest predicted step of the most bits.
+    Time {
+        /// Milliseconds.
+        milliseconds: f64,
+        /// At this clock.
+        clock_hz: f64,
+    },
 }
 
 impl From<Budget> for Asked {

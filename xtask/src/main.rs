@@ -1,9 +1,11 @@
-//! What people and CI type: `cargo demo`, `cargo verify`, `cargo xtask bench`, `cargo xtask budgets`, `cargo xtask doctor`.
+//! What people and CI type: `cargo demo`, `cargo verify`, `cargo xtask bench`, `cargo xtask budgets`, `cargo xtask fit`,
+//! `cargo xtask doctor`.
 #![forbid(unsafe_code)]
 
 mod bench;
 mod budgets;
 mod demo;
+mod fit;
 mod heads;
 mod setup;
 mod verify;
@@ -52,6 +54,8 @@ enum Command {
         #[arg(long)]
         update: bool,
     },
+    /// Measure the cost model's rates anew (after every change of the kernels)
+    Fit,
     /// Everything that CI checks: format, lints, documentation, tests on the host and under QEMU
     Verify,
     /// Check and install what the other commands need: Rust targets and QEMU
@@ -65,6 +69,7 @@ fn main() -> ExitCode {
             setup::ensure().and_then(|()| bench::run(json.as_deref(), wait_states, by_function))
         }
         Command::Budgets { update } => setup::ensure().and_then(|()| budgets::run(update)),
+        Command::Fit => setup::ensure().and_then(|()| fit::run()),
         Command::Verify => setup::ensure().and_then(|()| verify::run()),
         Command::Doctor => setup::ensure().map(|()| println!("all there")),
     };

@@ -1,0 +1,166 @@
+//! The cost model's predictions against what QEMU counts, and the pieces of a step against their budget.
+
+use std::path::{Path, PathBuf};
+
+use actq::dataset::Dataset;
+use actq::policy::Policy;
+use actq::quantize::prepared::Prepared;
+use actq::quantize::{Activations, Budget, Method, Options};
+use actq::runtime::{ImageBuffer, with_head};
+use actq::time::{CLOCK, Limit, StepTime};
+use actq::writer;
+use actq_host_tests::profile;
+use actq_host_tests::qemu::{self, Counter, Target};
+use actq_host_tests::{root, shared_policies};
+use actq_kernels::Width;
+use actq_kernels::cost::{Cost, of_step};
+use anyhow::{Context, Result, ensure};
+
+/// Steps that each image runs, spread over the held-out recordings.
+const STEPS: usize = 24;
+/// Largest error of a predicted step.
+const ERROR: f64 = 0.01;
+
+fn ur3() -> PathBuf {
+    root().join("examples/ur3/policy")
+}
+
+fn firmware() -> Result<PathBuf> {
+    // Images are run from the slot; the one that is built in is any.
+    let path = qemu::target_dir().join("cost-test.actq");
+    let policy = Policy::load(&ur3())?;
+    let options = Options::new(Method::Rtn, Budget::Width(Width::W2));
+    writer::write(&path, &image(&Prepared::new(&policy, Method::Rtn, |_| {})?, &options)?)?;
+    qemu::build("actq-firmware-demo", Target::Fpu, &path)
+}
+
+fn image(prepared: &Prepared<'_>, options: &Options) -> Result<Vec<u8>> {
+    let (policy, outcomes) = prepared.quantize(options, |_| {})?;
+    writer::image(&policy, &outcomes)
+}
+
+fn best(bits: f64) -> Options {
+    // Steps of learning change the weights' values, on which no time depends.
+    Options { steps: Some(2), ..Options::new(Method::Best, Budget::BitsPerWeight(bits)) }
+}
+
+fn rtn(width: Width, group: usize, activations: Activations) -> Options {
+    Options { group, activations, ..Options::new(Method::Rtn, Budget::Width(width)) }
+}
+
+fn observations(dir: &Path, policy: &Policy) -> Result<Vec<Vec<f32>>> {
+    let dataset = Dataset::load(&dir.join("heldout.npz"), policy.graph.obs_len, policy.chunk * policy.act_len)?;
+    let all: Vec<Vec<f32>> = (0..dataset.length.len()).flat_map(|e| dataset.episode(e)).collect();
+    ensure!(all.len() >= STEPS, "too few recorded observations");
+    Ok(all.iter().step_by(all.len() / STEPS).take(STEPS).cloned().collect())
+}
+
+/// Predicts the step of every image, and compares with the mean over recorded observations.
+fn predictions_hold(dir: &Path, images: &[Options]) -> Result<()> {
+    let (elf, counter) = (firmware()?, Counter::build()?);
+    let policy = Policy::load(dir)?;
+    let observations = observations(dir, &policy)?;
+    for options in images {
+        let bytes = image(&Prepared::new(&policy, options.method, |_| {})?, options)?;
+        let buffer = ImageBuffer::new(&bytes);
+        let image = buffer.image(dir)?;
+        let counted: Vec<Cost> = profile::steps(&elf, &counter, &bytes, &observations)?;
+        let evaluated: Vec<Cost> = counted.iter().step_by(image.execute()).copied().collect();
+        let mean = |of: fn(&Cost) -> u64| evaluated.iter().map(of).sum::<u64>() as f64 / evaluated.len() as f64;
+        let predicted = of_step(&image);
+        for (what, predicted, counted) in [
+            ("instructions", predicted.instructions, mean(|c| c.instructions)),
+            ("cycles", predicted.cycles, mean(|c| c.cycles)),
+        ] {
+            let error = predicted as f64 / counted - 1.0;
+            let at =
+                format!("{}, {options:?}: {predicted} {what}, {counted:.0} counted: {:+.2}%", policy.name, 1e2 * error);
+            println!("{at}");
+            ensure!(error.abs() < ERROR, "{at}");
+        }
+        let time = StepTime::new(&image, CLOCK);
+        ensure!(time.cycles == predicted.cycles && time.instructions == predicted.instructions, "{time:?}");
+    }
+    Ok(())
+}
+
+/// Whole steps of rtn images, with groups and without, and of the method best.
+fn images() -> Vec<Options> {
+    vec![
+        best(2.0),
+        best(3.0),
+        rtn(Width::W4, 32, Activations::Int8),
+        rtn(Width::W8, 32, Activations::Int8),
+        rtn(Width::W4, 64, Activations::Int16),
+        rtn(Width::W8, 0, Activations::Int16),
+    ]
+}
+
+#[test]
+fn ur3_steps_take_what_was_predicted() -> Result<()> {
+    predictions_hold(&ur3(), &images())
+}
+
+#[test]
+fn steps_of_shared_policies_take_what_was_predicted() -> Result<()> {
+    let Some(policies) = shared_policies() else { return Ok(()) };
+    for name in ["go1_mlp", "g1_lstm256", "fetch_pickplace"] {
+        predictions_hold(
+            &policies.join(name),
+            &[best(2.0), rtn(Width::W3, 32, Activations::Int8), rtn(Width::W8, 0, Activations::Int16)],
+        )?;
+    }
+    Ok(())
+}
+
+/// Every poll stays within its budget, and the actions have the same bits as on the host.
+#[test]
+fn polls_stay_within_their_budget() -> Result<()> {
+    let (elf, counter) = (firmware()?, Counter::build()?);
+    let policy = Policy::load(&ur3())?;
+    let observations = observations(&ur3(), &policy)?;
+    let mut tried = 0;
+    for options in images() {
+        let bytes = image(&Prepared::new(&policy, options.method, |_| {})?, &options)?;
+        let buffer = ImageBuffer::new(&bytes);
+        let image = buffer.image(&ur3())?;
+        let expected = with_head(image, |head| {
+            observations[..4].iter().map(|obs| Ok(head.step(obs)?.to_vec())).collect::<Result<Vec<_>>>()
+        })?;
+        for budget in [2_000, 5_000, 20_000, image.least_budget()] {
+            let at = || format!("{options:?} in polls of {budget}");
+            let run = profile::regions(&elf, &counter, &bytes, &format!("poll {budget}"), &observations[..4]);
+            if budget < image.least_budget() {
+                ensure!(run.is_err(), "{}: less than the least, {}", at(), image.least_budget());
+                continue;
+            }
+            let (costs, actions) = run.with_context(at)?;
+            let bits = |actions: &[Vec<f32>]| actions.iter().flatten().map(|a| a.to_bits()).collect::<Vec<_>>();
+            ensure!(bits(&actions) == bits(&expected), "{}: other bits", at());
+            let largest = costs.iter().map(|c| c.instructions).max().unwrap_or(0);
+            let all: u64 = costs.iter().map(|c| c.instructions).sum();
+            println!("{}: {} polls, the largest {largest}, in all {all}", at(), costs.len());
+            ensure!(largest <= u64::from(budget), "{}: {largest} instructions", at());
+            tried += 1;
+        }
+    }
+    ensure!(tried >= 10, "only {tried} budgets were not below the least");
+    Ok(())
+}
+
+#[test]
+fn a_budget_of_time_is_kept_and_used() -> Result<()> {
+    let policy = Policy::load(&ur3())?;
+    let prepared = Prepared::new(&policy, Method::Best, |_| {})?;
+    for milliseconds in [1.6, 2.4] {
+        let limit = Limit { milliseconds, clock_hz: CLOCK };
+        let (policy, outcomes) = limit.quantize(&prepared, &best(1.0), |_| {})?;
+        let step = limit.predict(&writer::image(&policy, &outcomes)?)?;
+        assert!(step.milliseconds <= milliseconds, "{} ms for {milliseconds}", step.milliseconds);
+        assert!(step.milliseconds > 0.97 * milliseconds, "{} ms for {milliseconds}", step.milliseconds);
+    }
+    let limit = Limit { milliseconds: 0.01, clock_hz: CLOCK };
+    let refused = limit.quantize(&prepared, &best(1.0), |_| {}).map(|_| ()).expect_err("nothing is so fast");
+    assert!(refused.to_string().contains("the fastest is"), "{refused}");
+    Ok(())
+}
