@@ -63,11 +63,12 @@ mod firmware {
         let mut head = Head::new(image, scratch).map_err(|e| message("head", e))?;
         head.self_test().map_err(|e| message("self-test", e))?;
         let arguments = host::arguments();
-        match arguments.split_once(' ').map_or((arguments.as_str(), None), |(mode, n)| (mode, n.parse().ok())) {
-            ("", None) => replay(&mut head),
-            ("serve", None) => serve(&mut head, Run::Whole),
-            ("poll", Some(budget)) => serve(&mut head, Run::Polls(budget)),
-            ("ops", Some(budget)) => serve(&mut head, Run::Ops(budget)),
+        let number = arguments.split_once(' ').and_then(|(_, n)| n.parse().ok());
+        match (arguments.split(' ').next(), number) {
+            _ if arguments.is_empty() => replay(&mut head),
+            _ if arguments == "serve" => serve(&mut head, Run::Whole),
+            (Some("poll"), Some(budget)) => serve(&mut head, Run::Polls(budget)),
+            (Some("ops"), Some(budget)) => serve(&mut head, Run::Ops(budget)),
             _ => Err(message("unknown argument", arguments.as_str())),
         }
     }

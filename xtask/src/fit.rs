@@ -250,7 +250,7 @@ fn solve(samples: &[&Sample], of: impl Fn(Cost) -> u64) -> Rates {
                 break;
             }
             used.retain(|&i| rates[i] > 1e-12);
-            (0..n).filter(|i| !used.contains(i)).collect::<Vec<_>>().into_iter().for_each(|i| rates[i] = 0.0);
+            rates.iter_mut().enumerate().filter(|(i, _)| !used.contains(i)).for_each(|(_, rate)| *rate = 0.0);
         }
     }
     (0..n).map(|i| (features[i], rates[i] / scale[i])).collect()
@@ -288,16 +288,13 @@ fn most(samples: &[Sample], polls: &[(f64, usize)], rates: &Rates) -> Rates {
         .map(Feature::function)
         .chain([Feature::NORMALIZE_VALUE, Feature::LSTM_VALUE, Feature::GRU_VALUE, Feature::CONTRACT])
         .collect();
-    for sample in samples {
-        let single = sample.features.contains_key(&Feature::POLL_OP);
-        for &feature in varying.iter().filter(|f| single || **f == Feature::CONTRACT) {
+    // Whole steps differ in much; only parts of them by themselves say what a value takes.
+    for sample in samples.iter().filter(|s| s.features.contains_key(&Feature::POLL_OP)) {
+        for &feature in &varying {
             let Some(&n) = sample.features.get(&feature).filter(|n| **n >= 30.0) else { continue };
             let excess = sample.cost.instructions as f64 - predicted(sample, rates);
-            // Whole steps differ in much; only operations by themselves say what a value takes.
-            if single {
-                let at_most = most.entry(feature).or_default();
-                *at_most = at_most.max(rate(feature) + excess / n);
-            }
+            let at_most = most.entry(feature).or_default();
+            *at_most = at_most.max(rate(feature) + excess / n);
         }
     }
     // What a limit adds to an operation, and to each of its pieces.
