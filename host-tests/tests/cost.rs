@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use actq::dataset::Dataset;
+use actq::dataset::{Dataset, Sizes};
 use actq::policy::Policy;
 use actq::quantize::prepared::Prepared;
 use actq::quantize::{Activations, Budget, Method, Options};
@@ -49,7 +49,7 @@ fn rtn(width: Width, group: usize, activations: Activations) -> Options {
 }
 
 fn observations(dir: &Path, policy: &Policy) -> Result<Vec<Vec<f32>>> {
-    let dataset = Dataset::load(&dir.join("heldout.npz"), policy.graph.obs_len, policy.chunk * policy.act_len)?;
+    let dataset = Dataset::load(&dir.join("heldout.npz"), Sizes::of(policy))?;
     let all: Vec<Vec<f32>> = (0..dataset.length.len()).flat_map(|e| dataset.episode(e)).collect();
     ensure!(all.len() >= STEPS, "too few recorded observations");
     Ok(all.iter().step_by(all.len() / STEPS).take(STEPS).cloned().collect())
@@ -154,7 +154,7 @@ fn a_budget_of_time_is_kept_and_used() -> Result<()> {
     let prepared = Prepared::new(&policy, Method::Best, |_| {})?;
     for milliseconds in [1.6, 2.4] {
         let limit = Limit { milliseconds, clock_hz: CLOCK };
-        let (policy, outcomes) = limit.quantize(&prepared, &best(1.0), |_| {})?;
+        let (policy, outcomes, _) = limit.quantize(&prepared, &best(1.0), |_| {})?;
         let step = limit.predict(&writer::image(&policy, &outcomes)?)?;
         assert!(step.milliseconds <= milliseconds, "{} ms for {milliseconds}", step.milliseconds);
         assert!(step.milliseconds > 0.97 * milliseconds, "{} ms for {milliseconds}", step.milliseconds);

@@ -2,318 +2,318 @@
 
 #[rustfmt::skip]
 pub(super) const RATES: &[[f64; 3]] = &[
-    [100.319, 186.657, 100.319], // a step, with its operations and its action aside
-    [10.498, 13.496, 10.498], // a value of the observation
-    [271.562, 409.177, 271.562], // an action
-    [22.601, 38.938, 22.601], // a value of the action
-    [8.935, 10.661, 9.857], // a value of an array of the action contract
-    [83.922, 176.983, 83.922], // a call that runs one operation
-    [0.000, 0.000, 83.922], // a call that runs pieces
-    [0.000, 0.000, 33.832], // an operation that a poll comes to
-    [0.000, 0.000, 244.796], // a piece
-    [433.165, 778.654, 433.165], // a linear operation
-    [0.000, 0.000, 980.284], // a block of rows of a linear operation that a poll comes to
-    [26.986, 36.959, 26.986], // eight values compared by magnitude
-    [9.676, 13.100, 9.676], // a value compared by magnitude
-    [256.489, 419.673, 256.489], // a block of rows whose order is looked at
-    [48.345, 85.066, 48.345], // a linear operation that sets its output up before the rows are added
-    [1.462, 3.116, 1.462], // an output set to 0 before the rows are added
-    [3.886, 5.943, 3.886], // an output set to its bias before the rows are added
-    [154.788, 235.947, 154.788], // a block of rows in order, whole strips
-    [144.865, 251.804, 144.865], // a block of rows with sums on the stack
-    [95.099, 125.810, 95.099], // a run of rows with sums on the stack
-    [57.294, 105.503, 57.294], // eight rows scaled by the assembler
-    [31.125, 42.393, 31.125], // a row in order scaled
-    [34.466, 50.875, 34.466], // a row with an index scaled
-    [284.572, 479.834, 284.572], // a normalization
-    [24.506, 28.504, 24.591], // a value normalized
-    [303.912, 532.885, 303.912], // a layer norm
-    [17.763, 25.512, 17.763], // a value of a layer norm
-    [259.201, 473.060, 259.201], // an RMS norm
-    [10.251, 12.496, 10.251], // a value of an RMS norm
-    [215.889, 390.037, 215.889], // an addition
-    [5.248, 6.746, 5.248], // a value added
-    [215.680, 389.973, 215.680], // a copy
-    [2.749, 4.249, 2.749], // a value copied
-    [284.573, 524.593, 284.573], // an LSTM cell
-    [204.937, 378.800, 204.995], // an element of an LSTM cell
-    [304.298, 545.701, 304.298], // a GRU cell
-    [134.971, 246.912, 134.998], // an element of a GRU cell
-    [179.919, 350.188, 179.919], // a function's operation
-    [8.065, 9.057, 8.278], // an element of relu
-    [20.918, 32.788, 34.187], // an element of elu
-    [38.047, 74.336, 38.187], // an element of silu
-    [68.006, 119.514, 68.065], // an element of gelu
-    [45.048, 86.330, 45.187], // an element of gelu_tanh
-    [48.010, 86.025, 48.065], // an element of tanh
-    [38.047, 74.336, 38.187], // an element of sigmoid
+    [100.563, 187.230, 100.563], // a step, with its operations and its action aside
+    [10.498, 13.495, 10.498], // a value of the observation
+    [270.156, 404.627, 270.156], // an action
+    [23.601, 31.893, 23.601], // a value of the action
+    [8.248, 11.375, 9.054], // a value of an array of the action contract
+    [85.734, 180.383, 85.734], // a call that runs one operation
+    [0.000, 0.000, 85.734], // a call that runs pieces
+    [0.000, 0.000, 49.964], // an operation that a poll comes to
+    [0.000, 0.000, 211.893], // a piece
+    [397.494, 708.623, 397.494], // a linear operation
+    [0.000, 0.000, 876.027], // a block of rows of a linear operation that a poll comes to
+    [26.605, 36.378, 26.605], // eight values compared by magnitude
+    [3.934, 3.036, 3.934], // a value compared by magnitude
+    [195.341, 281.959, 195.341], // a block of rows whose order is looked at
+    [109.036, 193.316, 109.036], // a linear operation that sets its output up before the rows are added
+    [1.455, 2.996, 1.455], // an output set to 0 before the rows are added
+    [4.775, 7.622, 4.775], // an output set to its bias before the rows are added
+    [14.278, 26.048, 14.278], // a block of rows in order, whole strips
+    [0.000, 0.000, 0.000], // a block of rows with sums on the stack
+    [36.111, 61.248, 36.111], // a run of rows with sums on the stack
+    [15.984, 15.433, 15.984], // eight rows scaled by the assembler
+    [0.000, 0.000, 0.000], // a row in order scaled
+    [27.534, 36.968, 27.534], // a row with an index scaled
+    [287.534, 479.729, 287.534], // a normalization
+    [24.769, 29.014, 24.992], // a value normalized
+    [301.101, 526.489, 301.101], // a layer norm
+    [17.763, 25.511, 17.763], // a value of a layer norm
+    [259.393, 471.663, 259.393], // an RMS norm
+    [10.250, 12.496, 10.250], // a value of an RMS norm
+    [210.782, 387.692, 210.782], // an addition
+    [5.248, 6.749, 5.248], // a value added
+    [213.713, 392.358, 213.713], // a copy
+    [2.750, 4.249, 2.750], // a value copied
+    [282.499, 526.298, 282.499], // an LSTM cell
+    [119.970, 201.911, 216.887], // an element of an LSTM cell
+    [301.391, 544.989, 301.391], // a GRU cell
+    [86.983, 147.950, 159.749], // an element of a GRU cell
+    [204.476, 374.343, 204.476], // a function's operation
+    [7.535, 8.408, 7.569], // an element of relu
+    [18.927, 35.643, 52.984], // an element of elu
+    [25.553, 48.586, 48.569], // an element of silu
+    [29.763, 46.522, 29.782], // an element of gelu
+    [28.578, 54.631, 51.630], // an element of gelu_tanh
+    [25.553, 48.073, 48.569], // an element of tanh
+    [24.587, 47.622, 47.630], // an element of sigmoid
     [0.000, 0.000, 0.000], // 2 bits single rows prepared: a vector
     [0.000, 0.000, 0.000], // 2 bits single rows prepared: a group
-    [793.668, 1330.782, 793.668], // 2 bits single rows prepared: a chunk
-    [92.339, 121.371, 92.339], // 2 bits single rows prepared: a chunk written by itself
-    [32.159, 46.281, 32.159], // 2 bits single rows prepared: eight values
-    [16.287, 22.384, 16.287], // 2 bits single rows prepared: a value of the rest
-    [1.713, 3.322, 1.713], // 2 bits single rows prepared: a pair of padding
-    [688.810, 1175.525, 688.810], // 2 bits single groups prepared: a vector
+    [803.800, 1285.811, 803.800], // 2 bits single rows prepared: a chunk
+    [218.204, 313.645, 218.204], // 2 bits single rows prepared: a chunk written by itself
+    [31.976, 45.954, 31.976], // 2 bits single rows prepared: eight values
+    [20.943, 30.490, 20.943], // 2 bits single rows prepared: a value of the rest
+    [3.729, 6.772, 3.729], // 2 bits single rows prepared: a pair of padding
+    [840.754, 1366.849, 840.754], // 2 bits single groups prepared: a vector
     [0.000, 0.000, 0.000], // 2 bits single groups prepared: a group
-    [120.960, 184.575, 120.960], // 2 bits single groups prepared: a chunk
-    [109.862, 155.970, 109.862], // 2 bits single groups prepared: a chunk written by itself
-    [32.750, 47.681, 32.750], // 2 bits single groups prepared: eight values
-    [10.601, 11.111, 10.601], // 2 bits single groups prepared: a value of the rest
-    [0.000, 0.052, 0.000], // 2 bits single groups prepared: a pair of padding
+    [7.172, 7.797, 7.172], // 2 bits single groups prepared: a chunk
+    [132.556, 180.049, 132.556], // 2 bits single groups prepared: a chunk written by itself
+    [33.509, 48.504, 33.509], // 2 bits single groups prepared: eight values
+    [38.131, 56.685, 38.131], // 2 bits single groups prepared: a value of the rest
+    [12.752, 21.425, 12.752], // 2 bits single groups prepared: a pair of padding
     [0.000, 0.000, 0.000], // 2 bits paired rows prepared: a vector
-    [803.070, 1374.117, 803.070], // 2 bits paired rows prepared: a group
+    [726.717, 1148.372, 726.717], // 2 bits paired rows prepared: a group
     [0.000, 0.000, 0.000], // 2 bits paired rows prepared: a chunk
-    [130.546, 205.395, 130.546], // 2 bits paired rows prepared: a chunk written by itself
-    [39.454, 54.454, 39.454], // 2 bits paired rows prepared: eight values
-    [10.292, 8.718, 10.292], // 2 bits paired rows prepared: a value of the rest
-    [0.000, 0.000, 0.000], // 2 bits paired rows prepared: a pair of padding
-    [675.723, 1224.268, 675.723], // 2 bits paired groups prepared: a vector
+    [42.397, 63.907, 42.397], // 2 bits paired rows prepared: a chunk written by itself
+    [39.951, 55.278, 39.951], // 2 bits paired rows prepared: eight values
+    [41.377, 60.749, 41.377], // 2 bits paired rows prepared: a value of the rest
+    [71.022, 104.526, 71.022], // 2 bits paired rows prepared: a pair of padding
+    [786.880, 1263.341, 786.880], // 2 bits paired groups prepared: a vector
     [0.000, 0.000, 0.000], // 2 bits paired groups prepared: a group
-    [85.718, 155.365, 85.718], // 2 bits paired groups prepared: a chunk
-    [122.826, 148.449, 122.826], // 2 bits paired groups prepared: a chunk written by itself
-    [45.800, 59.194, 45.800], // 2 bits paired groups prepared: eight values
-    [5.839, 4.843, 5.839], // 2 bits paired groups prepared: a value of the rest
-    [0.000, 0.000, 0.000], // 2 bits paired groups prepared: a pair of padding
+    [167.609, 231.494, 167.609], // 2 bits paired groups prepared: a chunk
+    [159.565, 233.664, 159.565], // 2 bits paired groups prepared: a chunk written by itself
+    [0.000, 0.000, 0.000], // 2 bits paired groups prepared: eight values
+    [30.824, 43.982, 30.824], // 2 bits paired groups prepared: a value of the rest
+    [2.677, 6.002, 2.677], // 2 bits paired groups prepared: a pair of padding
     [0.000, 0.000, 0.000], // 3 bits single rows prepared: a vector
     [0.000, 0.000, 0.000], // 3 bits single rows prepared: a group
-    [788.373, 1319.233, 788.373], // 3 bits single rows prepared: a chunk
-    [93.584, 124.686, 93.584], // 3 bits single rows prepared: a chunk written by itself
-    [32.200, 46.353, 32.200], // 3 bits single rows prepared: eight values
-    [15.782, 21.247, 15.782], // 3 bits single rows prepared: a value of the rest
-    [1.750, 3.350, 1.750], // 3 bits single rows prepared: a pair of padding
-    [688.950, 1175.208, 688.950], // 3 bits single groups prepared: a vector
+    [781.944, 1248.076, 781.944], // 3 bits single rows prepared: a chunk
+    [254.682, 366.410, 254.682], // 3 bits single rows prepared: a chunk written by itself
+    [32.152, 46.292, 32.152], // 3 bits single rows prepared: eight values
+    [14.314, 20.868, 14.314], // 3 bits single rows prepared: a value of the rest
+    [1.592, 4.018, 1.592], // 3 bits single rows prepared: a pair of padding
+    [847.350, 1381.441, 847.350], // 3 bits single groups prepared: a vector
     [0.000, 0.000, 0.000], // 3 bits single groups prepared: a group
-    [121.219, 185.085, 121.219], // 3 bits single groups prepared: a chunk
-    [110.153, 157.159, 110.153], // 3 bits single groups prepared: a chunk written by itself
-    [32.758, 47.690, 32.758], // 3 bits single groups prepared: eight values
-    [10.654, 11.047, 10.654], // 3 bits single groups prepared: a value of the rest
-    [0.000, 0.000, 0.000], // 3 bits single groups prepared: a pair of padding
+    [8.631, 10.266, 8.631], // 3 bits single groups prepared: a chunk
+    [141.563, 189.490, 141.563], // 3 bits single groups prepared: a chunk written by itself
+    [33.068, 47.717, 33.068], // 3 bits single groups prepared: eight values
+    [36.434, 54.767, 36.434], // 3 bits single groups prepared: a value of the rest
+    [11.355, 19.303, 11.355], // 3 bits single groups prepared: a pair of padding
     [0.000, 0.000, 0.000], // 3 bits paired rows prepared: a vector
-    [813.661, 1401.167, 813.661], // 3 bits paired rows prepared: a group
-    [48.271, 65.349, 48.271], // 3 bits paired rows prepared: a chunk
-    [67.160, 93.426, 67.160], // 3 bits paired rows prepared: a chunk written by itself
+    [784.932, 1258.814, 784.932], // 3 bits paired rows prepared: a group
+    [39.595, 55.780, 39.595], // 3 bits paired rows prepared: a chunk
+    [312.506, 464.186, 312.506], // 3 bits paired rows prepared: a chunk written by itself
     [0.000, 0.000, 0.000], // 3 bits paired rows prepared: eight values
-    [13.201, 19.779, 13.201], // 3 bits paired rows prepared: a value of the rest
+    [10.945, 14.518, 10.945], // 3 bits paired rows prepared: a value of the rest
     [0.000, 0.000, 0.000], // 3 bits paired rows prepared: a pair of padding
-    [674.220, 1223.837, 674.220], // 3 bits paired groups prepared: a vector
+    [830.737, 1351.401, 830.737], // 3 bits paired groups prepared: a vector
     [0.000, 0.000, 0.000], // 3 bits paired groups prepared: a group
-    [76.117, 108.973, 76.117], // 3 bits paired groups prepared: a chunk
-    [30.769, 40.245, 30.769], // 3 bits paired groups prepared: a chunk written by itself
+    [40.977, 57.609, 40.977], // 3 bits paired groups prepared: a chunk
+    [130.545, 192.886, 130.545], // 3 bits paired groups prepared: a chunk written by itself
     [0.000, 0.000, 0.000], // 3 bits paired groups prepared: eight values
-    [11.172, 11.285, 11.172], // 3 bits paired groups prepared: a value of the rest
-    [8.974, 13.288, 8.974], // 3 bits paired groups prepared: a pair of padding
+    [39.911, 57.940, 39.911], // 3 bits paired groups prepared: a value of the rest
+    [26.960, 40.099, 26.960], // 3 bits paired groups prepared: a pair of padding
     [0.000, 0.000, 0.000], // 4 bits single rows prepared: a vector
     [0.000, 0.000, 0.000], // 4 bits single rows prepared: a group
-    [789.023, 1322.493, 789.023], // 4 bits single rows prepared: a chunk
-    [96.396, 126.988, 96.396], // 4 bits single rows prepared: a chunk written by itself
-    [32.151, 46.247, 32.151], // 4 bits single rows prepared: eight values
-    [15.173, 20.610, 15.173], // 4 bits single rows prepared: a value of the rest
-    [1.436, 2.960, 1.436], // 4 bits single rows prepared: a pair of padding
-    [689.088, 1175.541, 689.088], // 4 bits single groups prepared: a vector
+    [798.954, 1273.345, 798.954], // 4 bits single rows prepared: a chunk
+    [220.885, 324.330, 220.885], // 4 bits single rows prepared: a chunk written by itself
+    [31.989, 45.978, 31.989], // 4 bits single rows prepared: eight values
+    [20.084, 27.697, 20.084], // 4 bits single rows prepared: a value of the rest
+    [3.583, 6.131, 3.583], // 4 bits single rows prepared: a pair of padding
+    [839.242, 1365.199, 839.242], // 4 bits single groups prepared: a vector
     [0.000, 0.000, 0.000], // 4 bits single groups prepared: a group
-    [120.976, 184.781, 120.976], // 4 bits single groups prepared: a chunk
-    [109.907, 156.829, 109.907], // 4 bits single groups prepared: a chunk written by itself
-    [32.750, 47.673, 32.750], // 4 bits single groups prepared: eight values
-    [10.694, 11.154, 10.694], // 4 bits single groups prepared: a value of the rest
-    [0.000, 0.000, 0.000], // 4 bits single groups prepared: a pair of padding
+    [6.861, 7.316, 6.861], // 4 bits single groups prepared: a chunk
+    [128.341, 171.049, 128.341], // 4 bits single groups prepared: a chunk written by itself
+    [33.580, 48.612, 33.580], // 4 bits single groups prepared: eight values
+    [38.937, 58.418, 38.937], // 4 bits single groups prepared: a value of the rest
+    [13.291, 22.512, 13.291], // 4 bits single groups prepared: a pair of padding
     [0.000, 0.000, 0.000], // 4 bits paired rows prepared: a vector
-    [770.909, 1273.064, 770.909], // 4 bits paired rows prepared: a group
-    [124.140, 237.200, 124.140], // 4 bits paired rows prepared: a chunk
-    [30.888, 40.627, 30.888], // 4 bits paired rows prepared: a chunk written by itself
-    [37.060, 51.372, 37.060], // 4 bits paired rows prepared: eight values
-    [12.148, 15.528, 12.148], // 4 bits paired rows prepared: a value of the rest
-    [0.000, 0.000, 0.000], // 4 bits paired rows prepared: a pair of padding
-    [668.298, 1216.856, 668.298], // 4 bits paired groups prepared: a vector
+    [739.541, 1170.103, 739.541], // 4 bits paired rows prepared: a group
+    [0.000, 0.000, 0.000], // 4 bits paired rows prepared: a chunk
+    [63.926, 90.909, 63.926], // 4 bits paired rows prepared: a chunk written by itself
+    [37.241, 51.851, 37.241], // 4 bits paired rows prepared: eight values
+    [39.322, 56.924, 39.322], // 4 bits paired rows prepared: a value of the rest
+    [61.153, 91.859, 61.153], // 4 bits paired rows prepared: a pair of padding
+    [788.785, 1268.730, 788.785], // 4 bits paired groups prepared: a vector
     [0.000, 0.000, 0.000], // 4 bits paired groups prepared: a group
-    [158.913, 263.970, 158.913], // 4 bits paired groups prepared: a chunk
-    [45.587, 35.780, 45.587], // 4 bits paired groups prepared: a chunk written by itself
-    [48.749, 62.894, 48.749], // 4 bits paired groups prepared: eight values
-    [5.208, 4.049, 5.208], // 4 bits paired groups prepared: a value of the rest
-    [0.000, 0.000, 0.000], // 4 bits paired groups prepared: a pair of padding
+    [164.883, 231.574, 164.883], // 4 bits paired groups prepared: a chunk
+    [153.653, 225.275, 153.653], // 4 bits paired groups prepared: a chunk written by itself
+    [0.000, 0.000, 0.000], // 4 bits paired groups prepared: eight values
+    [33.170, 47.125, 33.170], // 4 bits paired groups prepared: a value of the rest
+    [3.107, 6.519, 3.107], // 4 bits paired groups prepared: a pair of padding
     [0.000, 0.000, 0.000], // 8 bits single rows prepared: a vector
     [0.000, 0.000, 0.000], // 8 bits single rows prepared: a group
-    [795.291, 1324.902, 795.291], // 8 bits single rows prepared: a chunk
-    [71.778, 96.325, 71.778], // 8 bits single rows prepared: a chunk written by itself
-    [32.040, 45.961, 32.040], // 8 bits single rows prepared: eight values
-    [16.316, 21.146, 16.316], // 8 bits single rows prepared: a value of the rest
-    [2.717, 4.405, 2.717], // 8 bits single rows prepared: a pair of padding
-    [689.318, 1175.356, 689.318], // 8 bits single groups prepared: a vector
+    [805.030, 1276.489, 805.030], // 8 bits single rows prepared: a chunk
+    [228.182, 336.487, 228.182], // 8 bits single rows prepared: a chunk written by itself
+    [32.163, 46.119, 32.163], // 8 bits single rows prepared: eight values
+    [21.461, 29.457, 21.461], // 8 bits single rows prepared: a value of the rest
+    [1.998, 3.181, 1.998], // 8 bits single rows prepared: a pair of padding
+    [837.245, 1363.543, 837.245], // 8 bits single groups prepared: a vector
     [0.000, 0.000, 0.000], // 8 bits single groups prepared: a group
-    [121.075, 185.297, 121.075], // 8 bits single groups prepared: a chunk
-    [110.033, 157.344, 110.033], // 8 bits single groups prepared: a chunk written by itself
-    [32.751, 47.662, 32.751], // 8 bits single groups prepared: eight values
-    [10.790, 11.331, 10.790], // 8 bits single groups prepared: a value of the rest
-    [0.000, 0.000, 0.000], // 8 bits single groups prepared: a pair of padding
+    [6.613, 7.038, 6.613], // 8 bits single groups prepared: a chunk
+    [126.902, 167.192, 126.902], // 8 bits single groups prepared: a chunk written by itself
+    [33.616, 48.614, 33.616], // 8 bits single groups prepared: eight values
+    [39.273, 59.152, 39.273], // 8 bits single groups prepared: a value of the rest
+    [13.441, 22.828, 13.441], // 8 bits single groups prepared: a pair of padding
     [0.000, 0.000, 0.000], // 8 bits paired rows prepared: a vector
-    [797.660, 1325.966, 797.660], // 8 bits paired rows prepared: a group
-    [15.970, 64.659, 15.970], // 8 bits paired rows prepared: a chunk
-    [114.432, 158.008, 114.432], // 8 bits paired rows prepared: a chunk written by itself
-    [32.302, 46.328, 32.302], // 8 bits paired rows prepared: eight values
-    [9.968, 12.540, 9.968], // 8 bits paired rows prepared: a value of the rest
-    [0.000, 0.000, 0.000], // 8 bits paired rows prepared: a pair of padding
-    [665.077, 1213.153, 665.077], // 8 bits paired groups prepared: a vector
+    [784.751, 1246.031, 784.751], // 8 bits paired rows prepared: a group
+    [0.000, 0.000, 0.000], // 8 bits paired rows prepared: a chunk
+    [177.969, 272.319, 177.969], // 8 bits paired rows prepared: a chunk written by itself
+    [32.450, 46.589, 32.450], // 8 bits paired rows prepared: eight values
+    [28.371, 38.599, 28.371], // 8 bits paired rows prepared: a value of the rest
+    [23.860, 33.522, 23.860], // 8 bits paired rows prepared: a pair of padding
+    [814.475, 1332.115, 814.475], // 8 bits paired groups prepared: a vector
     [0.000, 0.000, 0.000], // 8 bits paired groups prepared: a group
-    [79.001, 135.969, 79.001], // 8 bits paired groups prepared: a chunk
-    [126.406, 158.858, 126.406], // 8 bits paired groups prepared: a chunk written by itself
-    [43.072, 59.489, 43.072], // 8 bits paired groups prepared: eight values
-    [5.033, 2.795, 5.033], // 8 bits paired groups prepared: a value of the rest
-    [0.000, 0.000, 0.000], // 8 bits paired groups prepared: a pair of padding
-    [62.151, 132.036, 62.151], // 2 bits single rows, 4 rows: a call
+    [144.711, 206.964, 144.711], // 8 bits paired groups prepared: a chunk
+    [148.344, 212.150, 148.344], // 8 bits paired groups prepared: a chunk written by itself
+    [0.000, 0.000, 0.000], // 8 bits paired groups prepared: eight values
+    [32.947, 47.758, 32.947], // 8 bits paired groups prepared: a value of the rest
+    [3.653, 7.140, 3.653], // 8 bits paired groups prepared: a pair of padding
+    [29.645, 45.949, 29.645], // 2 bits single rows, 4 rows: a call
     [0.000, 0.000, 0.000], // 2 bits single rows, 4 rows: a strip
-    [0.000, 0.000, 0.000], // 2 bits single rows, 4 rows: a pass or group of a strip
-    [8.483, 7.676, 8.483], // 2 bits single rows, 4 rows: a chunk of a strip
-    [4.499, 5.434, 4.499], // 2 bits single rows, 4 rows: a column of a strip
+    [7.057, 12.539, 7.057], // 2 bits single rows, 4 rows: a pass or group of a strip
+    [26.494, 53.485, 26.494], // 2 bits single rows, 4 rows: a chunk of a strip
+    [4.205, 4.885, 4.205], // 2 bits single rows, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 2 bits single rows, 8 rows: a call
     [0.000, 0.000, 0.000], // 2 bits single rows, 8 rows: a strip
     [0.000, 0.000, 0.000], // 2 bits single rows, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 2 bits single rows, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 2 bits single rows, 8 rows: a column of a strip
-    [75.999, 161.538, 75.999], // 2 bits single groups, 4 rows: a call
-    [7.826, 9.277, 7.826], // 2 bits single groups, 4 rows: a strip
-    [26.382, 44.956, 26.382], // 2 bits single groups, 4 rows: a pass or group of a strip
+    [0.000, 1.221, 0.000], // 2 bits single groups, 4 rows: a call
+    [29.537, 59.923, 29.537], // 2 bits single groups, 4 rows: a strip
+    [24.095, 43.728, 24.095], // 2 bits single groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 2 bits single groups, 4 rows: a chunk of a strip
-    [4.502, 5.437, 4.502], // 2 bits single groups, 4 rows: a column of a strip
+    [4.405, 5.240, 4.405], // 2 bits single groups, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 2 bits single groups, 8 rows: a call
     [0.000, 0.000, 0.000], // 2 bits single groups, 8 rows: a strip
     [0.000, 0.000, 0.000], // 2 bits single groups, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 2 bits single groups, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 2 bits single groups, 8 rows: a column of a strip
     [0.000, 0.000, 0.000], // 2 bits paired rows, 4 rows: a call
-    [89.063, 182.718, 89.063], // 2 bits paired rows, 4 rows: a strip
+    [119.806, 206.933, 119.806], // 2 bits paired rows, 4 rows: a strip
     [0.000, 0.000, 0.000], // 2 bits paired rows, 4 rows: a pass or group of a strip
-    [32.036, 49.121, 32.036], // 2 bits paired rows, 4 rows: a chunk of a strip
-    [1.499, 2.064, 1.499], // 2 bits paired rows, 4 rows: a column of a strip
-    [83.158, 178.847, 83.158], // 2 bits paired rows, 8 rows: a call
-    [24.025, 32.163, 24.025], // 2 bits paired rows, 8 rows: a strip
+    [38.376, 65.095, 38.376], // 2 bits paired rows, 4 rows: a chunk of a strip
+    [1.292, 1.566, 1.292], // 2 bits paired rows, 4 rows: a column of a strip
+    [94.410, 159.483, 94.410], // 2 bits paired rows, 8 rows: a call
+    [65.584, 122.666, 65.584], // 2 bits paired rows, 8 rows: a strip
     [0.000, 0.000, 0.000], // 2 bits paired rows, 8 rows: a pass or group of a strip
-    [17.990, 39.748, 17.990], // 2 bits paired rows, 8 rows: a chunk of a strip
-    [4.211, 5.189, 4.211], // 2 bits paired rows, 8 rows: a column of a strip
+    [15.174, 34.899, 15.174], // 2 bits paired rows, 8 rows: a chunk of a strip
+    [4.323, 5.377, 4.323], // 2 bits paired rows, 8 rows: a column of a strip
     [0.000, 0.000, 0.000], // 2 bits paired groups, 4 rows: a call
-    [100.492, 215.929, 100.492], // 2 bits paired groups, 4 rows: a strip
+    [67.298, 135.803, 67.298], // 2 bits paired groups, 4 rows: a strip
     [0.000, 0.000, 0.000], // 2 bits paired groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 2 bits paired groups, 4 rows: a chunk of a strip
-    [2.774, 3.913, 2.774], // 2 bits paired groups, 4 rows: a column of a strip
-    [87.199, 187.268, 87.199], // 2 bits paired groups, 8 rows: a call
-    [12.948, 21.924, 12.948], // 2 bits paired groups, 8 rows: a strip
+    [2.661, 3.744, 2.661], // 2 bits paired groups, 4 rows: a column of a strip
+    [40.353, 79.462, 40.353], // 2 bits paired groups, 8 rows: a call
+    [56.233, 110.037, 56.233], // 2 bits paired groups, 8 rows: a strip
     [0.000, 0.000, 0.000], // 2 bits paired groups, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 2 bits paired groups, 8 rows: a chunk of a strip
-    [5.376, 7.151, 5.376], // 2 bits paired groups, 8 rows: a column of a strip
-    [65.607, 139.549, 65.607], // 3 bits single rows, 4 rows: a call
+    [5.344, 7.090, 5.344], // 2 bits paired groups, 8 rows: a column of a strip
+    [40.174, 63.468, 40.174], // 3 bits single rows, 4 rows: a call
     [0.000, 0.000, 0.000], // 3 bits single rows, 4 rows: a strip
     [0.000, 0.000, 0.000], // 3 bits single rows, 4 rows: a pass or group of a strip
-    [8.708, 8.073, 8.708], // 3 bits single rows, 4 rows: a chunk of a strip
-    [5.186, 6.151, 5.186], // 3 bits single rows, 4 rows: a column of a strip
+    [26.300, 51.581, 26.300], // 3 bits single rows, 4 rows: a chunk of a strip
+    [5.204, 6.177, 5.204], // 3 bits single rows, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 3 bits single rows, 8 rows: a call
     [0.000, 0.000, 0.000], // 3 bits single rows, 8 rows: a strip
     [0.000, 0.000, 0.000], // 3 bits single rows, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 3 bits single rows, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 3 bits single rows, 8 rows: a column of a strip
-    [75.319, 160.700, 75.319], // 3 bits single groups, 4 rows: a call
-    [7.904, 9.449, 7.904], // 3 bits single groups, 4 rows: a strip
-    [26.368, 44.912, 26.368], // 3 bits single groups, 4 rows: a pass or group of a strip
+    [0.000, 0.000, 0.000], // 3 bits single groups, 4 rows: a call
+    [25.780, 53.602, 25.780], // 3 bits single groups, 4 rows: a strip
+    [24.830, 44.291, 24.830], // 3 bits single groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 3 bits single groups, 4 rows: a chunk of a strip
-    [5.189, 6.155, 5.189], // 3 bits single groups, 4 rows: a column of a strip
+    [5.199, 6.169, 5.199], // 3 bits single groups, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 3 bits single groups, 8 rows: a call
     [0.000, 0.000, 0.000], // 3 bits single groups, 8 rows: a strip
     [0.000, 0.000, 0.000], // 3 bits single groups, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 3 bits single groups, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 3 bits single groups, 8 rows: a column of a strip
-    [66.450, 143.112, 66.450], // 3 bits paired rows, 4 rows: a call
-    [16.476, 23.653, 16.476], // 3 bits paired rows, 4 rows: a strip
-    [6.492, 13.151, 6.492], // 3 bits paired rows, 4 rows: a pass or group of a strip
+    [37.113, 54.409, 37.113], // 3 bits paired rows, 4 rows: a call
+    [36.691, 67.840, 36.691], // 3 bits paired rows, 4 rows: a strip
+    [7.245, 14.567, 7.245], // 3 bits paired rows, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 3 bits paired rows, 4 rows: a chunk of a strip
-    [3.109, 4.112, 3.109], // 3 bits paired rows, 4 rows: a column of a strip
+    [3.105, 4.101, 3.105], // 3 bits paired rows, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 3 bits paired rows, 8 rows: a call
     [0.000, 0.000, 0.000], // 3 bits paired rows, 8 rows: a strip
     [0.000, 0.000, 0.000], // 3 bits paired rows, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 3 bits paired rows, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 3 bits paired rows, 8 rows: a column of a strip
-    [85.250, 185.975, 85.250], // 3 bits paired groups, 4 rows: a call
-    [5.591, 10.229, 5.591], // 3 bits paired groups, 4 rows: a strip
+    [2.019, 0.000, 2.019], // 3 bits paired groups, 4 rows: a call
+    [26.672, 55.353, 26.672], // 3 bits paired groups, 4 rows: a strip
     [0.000, 0.000, 0.000], // 3 bits paired groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 3 bits paired groups, 4 rows: a chunk of a strip
-    [3.752, 5.127, 3.752], // 3 bits paired groups, 4 rows: a column of a strip
+    [3.725, 5.102, 3.725], // 3 bits paired groups, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 3 bits paired groups, 8 rows: a call
     [0.000, 0.000, 0.000], // 3 bits paired groups, 8 rows: a strip
     [0.000, 0.000, 0.000], // 3 bits paired groups, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 3 bits paired groups, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 3 bits paired groups, 8 rows: a column of a strip
-    [66.371, 139.615, 66.371], // 4 bits single rows, 4 rows: a call
+    [33.785, 55.868, 33.785], // 4 bits single rows, 4 rows: a call
     [0.000, 0.000, 0.000], // 4 bits single rows, 4 rows: a strip
-    [0.000, 0.000, 0.000], // 4 bits single rows, 4 rows: a pass or group of a strip
-    [8.419, 7.562, 8.419], // 4 bits single rows, 4 rows: a chunk of a strip
-    [4.750, 6.123, 4.750], // 4 bits single rows, 4 rows: a column of a strip
+    [6.008, 10.478, 6.008], // 4 bits single rows, 4 rows: a pass or group of a strip
+    [26.493, 53.676, 26.493], // 4 bits single rows, 4 rows: a chunk of a strip
+    [4.300, 5.262, 4.300], // 4 bits single rows, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 4 bits single rows, 8 rows: a call
     [0.000, 0.000, 0.000], // 4 bits single rows, 8 rows: a strip
     [0.000, 0.000, 0.000], // 4 bits single rows, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 4 bits single rows, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 4 bits single rows, 8 rows: a column of a strip
-    [75.603, 160.969, 75.603], // 4 bits single groups, 4 rows: a call
-    [7.843, 9.291, 7.843], // 4 bits single groups, 4 rows: a strip
-    [26.387, 44.961, 26.387], // 4 bits single groups, 4 rows: a pass or group of a strip
+    [0.000, 0.000, 0.000], // 4 bits single groups, 4 rows: a call
+    [29.999, 60.852, 29.999], // 4 bits single groups, 4 rows: a strip
+    [24.164, 43.849, 24.164], // 4 bits single groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 4 bits single groups, 4 rows: a chunk of a strip
-    [4.752, 6.124, 4.752], // 4 bits single groups, 4 rows: a column of a strip
+    [4.464, 5.548, 4.464], // 4 bits single groups, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 4 bits single groups, 8 rows: a call
     [0.000, 0.000, 0.000], // 4 bits single groups, 8 rows: a strip
     [0.000, 0.000, 0.000], // 4 bits single groups, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 4 bits single groups, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 4 bits single groups, 8 rows: a column of a strip
     [0.000, 0.000, 0.000], // 4 bits paired rows, 4 rows: a call
-    [21.417, 92.158, 21.417], // 4 bits paired rows, 4 rows: a strip
-    [0.000, 0.000, 0.000], // 4 bits paired rows, 4 rows: a pass or group of a strip
-    [78.004, 99.365, 78.004], // 4 bits paired rows, 4 rows: a chunk of a strip
-    [3.354, 4.326, 3.354], // 4 bits paired rows, 4 rows: a column of a strip
-    [73.862, 162.080, 73.862], // 4 bits paired rows, 8 rows: a call
-    [0.000, 0.000, 0.000], // 4 bits paired rows, 8 rows: a strip
-    [2.947, 6.005, 2.947], // 4 bits paired rows, 8 rows: a pass or group of a strip
-    [28.335, 31.026, 28.335], // 4 bits paired rows, 8 rows: a chunk of a strip
-    [6.757, 8.255, 6.757], // 4 bits paired rows, 8 rows: a column of a strip
+    [59.023, 112.690, 59.023], // 4 bits paired rows, 4 rows: a strip
+    [0.000, 7.094, 0.000], // 4 bits paired rows, 4 rows: a pass or group of a strip
+    [61.468, 94.676, 61.468], // 4 bits paired rows, 4 rows: a chunk of a strip
+    [3.452, 4.291, 3.452], // 4 bits paired rows, 4 rows: a column of a strip
+    [81.950, 141.895, 81.950], // 4 bits paired rows, 8 rows: a call
+    [16.499, 25.783, 16.499], // 4 bits paired rows, 8 rows: a strip
+    [1.689, 4.193, 1.689], // 4 bits paired rows, 8 rows: a pass or group of a strip
+    [48.604, 90.685, 48.604], // 4 bits paired rows, 8 rows: a chunk of a strip
+    [6.827, 8.351, 6.827], // 4 bits paired rows, 8 rows: a column of a strip
     [0.000, 0.000, 0.000], // 4 bits paired groups, 4 rows: a call
-    [97.759, 217.819, 97.759], // 4 bits paired groups, 4 rows: a strip
+    [59.691, 124.875, 59.691], // 4 bits paired groups, 4 rows: a strip
     [0.000, 0.000, 0.000], // 4 bits paired groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 4 bits paired groups, 4 rows: a chunk of a strip
-    [4.208, 5.573, 4.208], // 4 bits paired groups, 4 rows: a column of a strip
-    [86.997, 185.115, 86.997], // 4 bits paired groups, 8 rows: a call
-    [8.781, 22.987, 8.781], // 4 bits paired groups, 8 rows: a strip
+    [4.012, 5.352, 4.012], // 4 bits paired groups, 4 rows: a column of a strip
+    [31.684, 65.472, 31.684], // 4 bits paired groups, 8 rows: a call
+    [53.930, 107.712, 53.930], // 4 bits paired groups, 8 rows: a strip
     [0.000, 0.000, 0.000], // 4 bits paired groups, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 4 bits paired groups, 8 rows: a chunk of a strip
-    [8.034, 10.247, 8.034], // 4 bits paired groups, 8 rows: a column of a strip
-    [66.178, 143.560, 66.178], // 8 bits single rows, 4 rows: a call
+    [7.850, 10.096, 7.850], // 4 bits paired groups, 8 rows: a column of a strip
+    [29.266, 54.495, 29.266], // 8 bits single rows, 4 rows: a call
     [0.000, 0.000, 0.000], // 8 bits single rows, 4 rows: a strip
-    [0.000, 0.000, 0.000], // 8 bits single rows, 4 rows: a pass or group of a strip
-    [7.853, 6.676, 7.853], // 8 bits single rows, 4 rows: a chunk of a strip
-    [5.249, 7.498, 5.249], // 8 bits single rows, 4 rows: a column of a strip
+    [7.519, 13.431, 7.519], // 8 bits single rows, 4 rows: a pass or group of a strip
+    [25.088, 51.127, 25.088], // 8 bits single rows, 4 rows: a chunk of a strip
+    [4.372, 5.788, 4.372], // 8 bits single rows, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 8 bits single rows, 8 rows: a call
     [0.000, 0.000, 0.000], // 8 bits single rows, 8 rows: a strip
     [0.000, 0.000, 0.000], // 8 bits single rows, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 8 bits single rows, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 8 bits single rows, 8 rows: a column of a strip
-    [73.117, 158.004, 73.117], // 8 bits single groups, 4 rows: a call
-    [7.860, 9.350, 7.860], // 8 bits single groups, 4 rows: a strip
-    [26.385, 44.944, 26.385], // 8 bits single groups, 4 rows: a pass or group of a strip
+    [0.000, 0.000, 0.000], // 8 bits single groups, 4 rows: a call
+    [29.996, 60.805, 29.996], // 8 bits single groups, 4 rows: a strip
+    [24.218, 43.931, 24.218], // 8 bits single groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 8 bits single groups, 4 rows: a chunk of a strip
-    [5.252, 7.499, 5.252], // 8 bits single groups, 4 rows: a column of a strip
+    [4.588, 6.172, 4.588], // 8 bits single groups, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 8 bits single groups, 8 rows: a call
     [0.000, 0.000, 0.000], // 8 bits single groups, 8 rows: a strip
     [0.000, 0.000, 0.000], // 8 bits single groups, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 8 bits single groups, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 8 bits single groups, 8 rows: a column of a strip
-    [69.113, 153.881, 69.113], // 8 bits paired rows, 4 rows: a call
-    [0.000, 0.000, 0.000], // 8 bits paired rows, 4 rows: a strip
-    [2.035, 4.752, 2.035], // 8 bits paired rows, 4 rows: a pass or group of a strip
-    [17.480, 23.352, 17.480], // 8 bits paired rows, 4 rows: a chunk of a strip
-    [3.384, 4.887, 3.384], // 8 bits paired rows, 4 rows: a column of a strip
+    [32.235, 56.722, 32.235], // 8 bits paired rows, 4 rows: a call
+    [33.538, 54.243, 33.538], // 8 bits paired rows, 4 rows: a strip
+    [2.467, 5.093, 2.467], // 8 bits paired rows, 4 rows: a pass or group of a strip
+    [0.000, 9.485, 0.000], // 8 bits paired rows, 4 rows: a chunk of a strip
+    [3.384, 4.889, 3.384], // 8 bits paired rows, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 8 bits paired rows, 8 rows: a call
     [0.000, 0.000, 0.000], // 8 bits paired rows, 8 rows: a strip
     [0.000, 0.000, 0.000], // 8 bits paired rows, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 8 bits paired rows, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 8 bits paired rows, 8 rows: a column of a strip
-    [86.103, 188.187, 86.103], // 8 bits paired groups, 4 rows: a call
-    [6.516, 11.163, 6.516], // 8 bits paired groups, 4 rows: a strip
+    [0.000, 0.000, 0.000], // 8 bits paired groups, 4 rows: a call
+    [27.780, 56.447, 27.780], // 8 bits paired groups, 4 rows: a strip
     [0.000, 0.000, 0.000], // 8 bits paired groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 8 bits paired groups, 4 rows: a chunk of a strip
-    [4.066, 6.097, 4.066], // 8 bits paired groups, 4 rows: a column of a strip
+    [4.069, 6.103, 4.069], // 8 bits paired groups, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 8 bits paired groups, 8 rows: a call
     [0.000, 0.000, 0.000], // 8 bits paired groups, 8 rows: a strip
     [0.000, 0.000, 0.000], // 8 bits paired groups, 8 rows: a pass or group of a strip
