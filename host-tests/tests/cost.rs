@@ -113,22 +113,22 @@ fn steps_of_shared_policies_take_what_was_predicted() -> Result<()> {
     Ok(())
 }
 
-/// Every poll stays within its budget, and the actions have the same bits as on the host.
-#[test]
-fn polls_stay_within_their_budget() -> Result<()> {
+/// Runs every image in polls of several budgets: each stays within its budget, and the actions have the same bits as on the
+/// host. Gives how many budgets were not below the least.
+fn polls_keep_their_budget(dir: &Path, images: &[Options]) -> Result<usize> {
     let (elf, counter) = (firmware()?, Counter::build()?);
-    let policy = Policy::load(&ur3())?;
-    let observations = observations(&ur3(), &policy)?;
+    let policy = Policy::load(dir)?;
+    let observations = observations(dir, &policy)?;
     let mut tried = 0;
-    for options in images() {
-        let bytes = image(&Prepared::new(&policy, options.method, |_| {})?, &options)?;
+    for options in images {
+        let bytes = image(&Prepared::new(&policy, options.method, |_| {})?, options)?;
         let buffer = ImageBuffer::new(&bytes);
-        let image = buffer.image(&ur3())?;
+        let image = buffer.image(dir)?;
         let expected = with_head(image, |head| {
             observations[..4].iter().map(|obs| Ok(head.step(obs)?.to_vec())).collect::<Result<Vec<_>>>()
         })?;
         for budget in [2_000, 5_000, 20_000, image.least_budget()] {
-            let at = || format!("{options:?} in polls of {budget}");
+            let at = || format!("{}, {options:?} in polls of {budget}", policy.name);
             let run = profile::regions(&elf, &counter, &bytes, &format!("poll {budget}"), &observations[..4]);
             if budget < image.least_budget() {
                 ensure!(run.is_err(), "{}: less than the least, {}", at(), image.least_budget());
@@ -144,7 +144,22 @@ fn polls_stay_within_their_budget() -> Result<()> {
             tried += 1;
         }
     }
+    Ok(tried)
+}
+
+#[test]
+fn polls_stay_within_their_budget() -> Result<()> {
+    let tried = polls_keep_their_budget(&ur3(), &images())?;
     ensure!(tried >= 10, "only {tried} budgets were not below the least");
+    Ok(())
+}
+
+#[test]
+fn polls_of_shared_policies_stay_within_their_budget() -> Result<()> {
+    let Some(policies) = shared_policies() else { return Ok(()) };
+    for name in ["go1_mlp", "g1_lstm256", "fetch_pickplace"] {
+        polls_keep_their_budget(&policies.join(name), &[best(2.0), rtn(Width::W4, 32, Activations::Int8)])?;
+    }
     Ok(())
 }
 
