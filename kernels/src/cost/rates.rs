@@ -2,17 +2,17 @@
 
 #[rustfmt::skip]
 pub(super) const RATES: &[[f64; 3]] = &[
-    [100.563, 187.230, 100.563], // a step, with its operations and its action aside
+    [100.563, 187.229, 100.563], // a step, with its operations and its action aside
     [10.498, 13.495, 10.498], // a value of the observation
-    [270.156, 404.627, 270.156], // an action
+    [270.156, 404.628, 270.156], // an action
     [23.601, 31.893, 23.601], // a value of the action
     [8.248, 11.375, 9.054], // a value of an array of the action contract
-    [85.734, 180.383, 85.734], // a call that runs one operation
+    [85.734, 180.382, 85.734], // a call that runs one operation
     [0.000, 0.000, 85.734], // a call that runs pieces
-    [0.000, 0.000, 49.964], // an operation that a poll comes to
-    [0.000, 0.000, 211.893], // a piece
-    [397.494, 708.623, 397.494], // a linear operation
-    [0.000, 0.000, 876.027], // a block of rows of a linear operation that a poll comes to
+    [0.000, 0.000, 53.250], // an operation that a poll comes to
+    [0.000, 0.000, 209.306], // a piece
+    [397.494, 708.624, 397.494], // a linear operation
+    [0.000, 0.000, 871.051], // a block of rows of a linear operation that a poll comes to
     [26.605, 36.378, 26.605], // eight values compared by magnitude
     [3.934, 3.036, 3.934], // a value compared by magnitude
     [195.341, 281.959, 195.341], // a block of rows whose order is looked at
@@ -25,28 +25,28 @@ pub(super) const RATES: &[[f64; 3]] = &[
     [15.984, 15.433, 15.984], // eight rows scaled by the assembler
     [0.000, 0.000, 0.000], // a row in order scaled
     [27.534, 36.968, 27.534], // a row with an index scaled
-    [287.534, 479.729, 287.534], // a normalization
+    [287.534, 479.730, 287.534], // a normalization
     [24.769, 29.014, 24.992], // a value normalized
     [301.101, 526.489, 301.101], // a layer norm
     [17.763, 25.511, 17.763], // a value of a layer norm
-    [259.393, 471.663, 259.393], // an RMS norm
+    [259.393, 471.664, 259.393], // an RMS norm
     [10.250, 12.496, 10.250], // a value of an RMS norm
     [210.782, 387.692, 210.782], // an addition
     [5.248, 6.749, 5.248], // a value added
-    [213.713, 392.358, 213.713], // a copy
+    [213.713, 392.359, 213.713], // a copy
     [2.750, 4.249, 2.750], // a value copied
-    [282.499, 526.298, 282.499], // an LSTM cell
+    [282.499, 526.299, 282.499], // an LSTM cell
     [119.970, 201.911, 216.887], // an element of an LSTM cell
     [301.391, 544.989, 301.391], // a GRU cell
     [86.983, 147.950, 159.749], // an element of a GRU cell
-    [204.476, 374.343, 204.476], // a function's operation
+    [204.476, 374.329, 204.476], // a function's operation
     [7.535, 8.408, 7.569], // an element of relu
     [18.927, 35.643, 52.984], // an element of elu
-    [25.553, 48.586, 48.569], // an element of silu
-    [29.763, 46.522, 29.782], // an element of gelu
+    [25.553, 48.587, 48.569], // an element of silu
+    [29.763, 46.771, 29.782], // an element of gelu
     [28.578, 54.631, 51.630], // an element of gelu_tanh
     [25.553, 48.073, 48.569], // an element of tanh
-    [24.587, 47.622, 47.630], // an element of sigmoid
+    [24.587, 47.617, 47.630], // an element of sigmoid
     [0.000, 0.000, 0.000], // 2 bits single rows prepared: a vector
     [0.000, 0.000, 0.000], // 2 bits single rows prepared: a group
     [803.800, 1285.811, 803.800], // 2 bits single rows prepared: a chunk
@@ -62,7 +62,7 @@ pub(super) const RATES: &[[f64; 3]] = &[
     [38.131, 56.685, 38.131], // 2 bits single groups prepared: a value of the rest
     [12.752, 21.425, 12.752], // 2 bits single groups prepared: a pair of padding
     [0.000, 0.000, 0.000], // 2 bits paired rows prepared: a vector
-    [726.717, 1148.372, 726.717], // 2 bits paired rows prepared: a group
+    [726.717, 1148.371, 726.717], // 2 bits paired rows prepared: a group
     [0.000, 0.000, 0.000], // 2 bits paired rows prepared: a chunk
     [42.397, 63.907, 42.397], // 2 bits paired rows prepared: a chunk written by itself
     [39.951, 55.278, 39.951], // 2 bits paired rows prepared: eight values
@@ -90,7 +90,7 @@ pub(super) const RATES: &[[f64; 3]] = &[
     [36.434, 54.767, 36.434], // 3 bits single groups prepared: a value of the rest
     [11.355, 19.303, 11.355], // 3 bits single groups prepared: a pair of padding
     [0.000, 0.000, 0.000], // 3 bits paired rows prepared: a vector
-    [784.932, 1258.814, 784.932], // 3 bits paired rows prepared: a group
+    [784.932, 1258.815, 784.932], // 3 bits paired rows prepared: a group
     [39.595, 55.780, 39.595], // 3 bits paired rows prepared: a chunk
     [312.506, 464.186, 312.506], // 3 bits paired rows prepared: a chunk written by itself
     [0.000, 0.000, 0.000], // 3 bits paired rows prepared: eight values
@@ -120,7 +120,7 @@ pub(super) const RATES: &[[f64; 3]] = &[
     [0.000, 0.000, 0.000], // 4 bits paired rows prepared: a vector
     [739.541, 1170.103, 739.541], // 4 bits paired rows prepared: a group
     [0.000, 0.000, 0.000], // 4 bits paired rows prepared: a chunk
-    [63.926, 90.909, 63.926], // 4 bits paired rows prepared: a chunk written by itself
+    [63.926, 90.908, 63.926], // 4 bits paired rows prepared: a chunk written by itself
     [37.241, 51.851, 37.241], // 4 bits paired rows prepared: eight values
     [39.322, 56.924, 39.322], // 4 bits paired rows prepared: a value of the rest
     [61.153, 91.859, 61.153], // 4 bits paired rows prepared: a pair of padding
@@ -162,7 +162,7 @@ pub(super) const RATES: &[[f64; 3]] = &[
     [29.645, 45.949, 29.645], // 2 bits single rows, 4 rows: a call
     [0.000, 0.000, 0.000], // 2 bits single rows, 4 rows: a strip
     [7.057, 12.539, 7.057], // 2 bits single rows, 4 rows: a pass or group of a strip
-    [26.494, 53.485, 26.494], // 2 bits single rows, 4 rows: a chunk of a strip
+    [26.494, 53.484, 26.494], // 2 bits single rows, 4 rows: a chunk of a strip
     [4.205, 4.885, 4.205], // 2 bits single rows, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 2 bits single rows, 8 rows: a call
     [0.000, 0.000, 0.000], // 2 bits single rows, 8 rows: a strip
@@ -184,8 +184,8 @@ pub(super) const RATES: &[[f64; 3]] = &[
     [0.000, 0.000, 0.000], // 2 bits paired rows, 4 rows: a pass or group of a strip
     [38.376, 65.095, 38.376], // 2 bits paired rows, 4 rows: a chunk of a strip
     [1.292, 1.566, 1.292], // 2 bits paired rows, 4 rows: a column of a strip
-    [94.410, 159.483, 94.410], // 2 bits paired rows, 8 rows: a call
-    [65.584, 122.666, 65.584], // 2 bits paired rows, 8 rows: a strip
+    [94.410, 159.484, 94.410], // 2 bits paired rows, 8 rows: a call
+    [65.584, 122.665, 65.584], // 2 bits paired rows, 8 rows: a strip
     [0.000, 0.000, 0.000], // 2 bits paired rows, 8 rows: a pass or group of a strip
     [15.174, 34.899, 15.174], // 2 bits paired rows, 8 rows: a chunk of a strip
     [4.323, 5.377, 4.323], // 2 bits paired rows, 8 rows: a column of a strip
@@ -260,11 +260,11 @@ pub(super) const RATES: &[[f64; 3]] = &[
     [0.000, 0.000, 0.000], // 4 bits single groups, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 4 bits single groups, 8 rows: a column of a strip
     [0.000, 0.000, 0.000], // 4 bits paired rows, 4 rows: a call
-    [59.023, 112.690, 59.023], // 4 bits paired rows, 4 rows: a strip
+    [59.023, 112.689, 59.023], // 4 bits paired rows, 4 rows: a strip
     [0.000, 7.094, 0.000], // 4 bits paired rows, 4 rows: a pass or group of a strip
-    [61.468, 94.676, 61.468], // 4 bits paired rows, 4 rows: a chunk of a strip
+    [61.468, 94.677, 61.468], // 4 bits paired rows, 4 rows: a chunk of a strip
     [3.452, 4.291, 3.452], // 4 bits paired rows, 4 rows: a column of a strip
-    [81.950, 141.895, 81.950], // 4 bits paired rows, 8 rows: a call
+    [81.950, 141.896, 81.950], // 4 bits paired rows, 8 rows: a call
     [16.499, 25.783, 16.499], // 4 bits paired rows, 8 rows: a strip
     [1.689, 4.193, 1.689], // 4 bits paired rows, 8 rows: a pass or group of a strip
     [48.604, 90.685, 48.604], // 4 bits paired rows, 8 rows: a chunk of a strip
