@@ -72,6 +72,15 @@ impl Plan {
         (1..=0xffff).contains(&shape.cols).then(|| Self::new(shape))
     }
 
+    /// Chunks in the first columns of a group; `last`: with one that they do not fill.
+    const fn chunks_in(&self, columns: usize, last: bool) -> usize {
+        if columns < self.first_chunk {
+            return last as usize;
+        }
+        let behind = columns - self.first_chunk;
+        1 + if last { behind.div_ceil(self.chunk) } else { behind / self.chunk }
+    }
+
     const fn chunk_words(&self) -> usize {
         self.format.starts.len() + self.chunk / 2
     }
@@ -429,7 +438,7 @@ pub(crate) struct Extent {
     pub(crate) groups: usize,
     /// Chunks of all groups.
     pub(crate) chunks: usize,
-    /// Those of them that are written one by one, because they are short or hold padding.
+    /// Those of them that are written one by one, because the columns do not fill them or, with them, the group's first.
     pub(crate) single_chunks: usize,
     /// Passes through a kernel's loop that are more than a step of its columns: groups, or runs of a row.
     pub(crate) passes: usize,
@@ -444,8 +453,8 @@ pub(crate) const fn extent(shape: BlockShape) -> Extent {
         (0, run) => plan.padded.div_ceil(run),
         _ => groups,
     };
-    let short = plan.first_chunk != plan.chunk;
-    let padded = plan.cols < plan.padded && !(short && plan.chunks == 1);
-    let single_chunks = groups * short as usize + padded as usize;
+    let before = (groups - 1) * plan.group;
+    let full = plan.chunks_in(plan.cols - before, false);
+    let single_chunks = if plan.cols == plan.padded { 0 } else { plan.chunks_in(plan.padded - before, true) - full };
     Extent { columns: plan.padded, groups, chunks: groups * plan.chunks, single_chunks, passes }
 }

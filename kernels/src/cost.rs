@@ -344,10 +344,15 @@ pub(crate) fn prepare(shape: BlockShape, add: &mut dyn FnMut(Feature, usize)) {
 fn block(rows: &RowBlock<'_>, start: bool, add: &mut dyn FnMut(Feature, usize)) {
     let shape = rows.block.shape();
     let in_order = rows.index.is_empty();
-    let whole = if in_order && start { shape.rows & !(STRIP - 1) } else { 0 };
+    let whole = match (in_order && start, shape.rows.is_multiple_of(QUAD)) {
+        (false, _) => 0,
+        (true, true) => shape.rows,
+        (true, false) => shape.rows & !(STRIP - 1),
+    };
     if whole > 0 {
         add(Feature::IN_PLACE, 1);
         add(Feature::SCALED_EIGHT, whole / STRIP);
+        add(Feature::SCALED_REST, whole % STRIP);
         products(shape, whole, 1, add);
     }
     let left = shape.rows - whole;
@@ -356,13 +361,11 @@ fn block(rows: &RowBlock<'_>, start: bool, add: &mut dyn FnMut(Feature, usize)) 
         add(Feature::STACK, 1);
         add(Feature::RUN, runs);
         products(shape, left, runs, add);
-        match (in_order, start) {
-            (false, _) => add(Feature::SCALED_INDEXED, left),
-            (true, true) => add(Feature::SCALED_REST, left),
-            (true, false) => {
-                add(Feature::SCALED_EIGHT, left / STRIP);
-                add(Feature::SCALED_REST, left % STRIP);
-            }
+        if in_order {
+            add(Feature::SCALED_EIGHT, left / STRIP);
+            add(Feature::SCALED_REST, left % STRIP);
+        } else {
+            add(Feature::SCALED_INDEXED, left);
         }
     }
 }

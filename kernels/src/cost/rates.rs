@@ -2,318 +2,318 @@
 
 #[rustfmt::skip]
 pub(super) const RATES: &[[f64; 3]] = &[
-    [100.563, 187.229, 100.563], // a step, with its operations and its action aside
+    [100.554, 187.215, 100.554], // a step, with its operations and its action aside
     [10.498, 13.495, 10.498], // a value of the observation
-    [270.156, 404.628, 270.156], // an action
+    [270.190, 404.690, 270.190], // an action
     [23.601, 31.893, 23.601], // a value of the action
     [8.248, 11.375, 9.054], // a value of an array of the action contract
-    [85.734, 180.382, 85.734], // a call that runs one operation
-    [0.000, 0.000, 85.734], // a call that runs pieces
-    [0.000, 0.000, 53.250], // an operation that a poll comes to
-    [0.000, 0.000, 209.306], // a piece
-    [397.494, 708.624, 397.494], // a linear operation
-    [0.000, 0.000, 871.051], // a block of rows of a linear operation that a poll comes to
-    [26.605, 36.378, 26.605], // eight values compared by magnitude
-    [3.934, 3.036, 3.934], // a value compared by magnitude
-    [195.341, 281.959, 195.341], // a block of rows whose order is looked at
-    [109.036, 193.316, 109.036], // a linear operation that sets its output up before the rows are added
-    [1.455, 2.996, 1.455], // an output set to 0 before the rows are added
-    [4.775, 7.622, 4.775], // an output set to its bias before the rows are added
-    [14.278, 26.048, 14.278], // a block of rows in order, whole strips
-    [0.000, 0.000, 0.000], // a block of rows with sums on the stack
-    [36.111, 61.248, 36.111], // a run of rows with sums on the stack
-    [15.984, 15.433, 15.984], // eight rows scaled by the assembler
-    [0.000, 0.000, 0.000], // a row in order scaled
-    [27.534, 36.968, 27.534], // a row with an index scaled
-    [287.534, 479.730, 287.534], // a normalization
-    [24.769, 29.014, 24.992], // a value normalized
-    [301.101, 526.489, 301.101], // a layer norm
-    [17.763, 25.511, 17.763], // a value of a layer norm
-    [259.393, 471.664, 259.393], // an RMS norm
+    [85.681, 180.288, 85.681], // a call that runs one operation
+    [0.000, 0.000, 85.681], // a call that runs pieces
+    [0.000, 0.000, 80.482], // an operation that a poll comes to
+    [0.000, 0.000, 214.280], // a piece
+    [397.911, 710.129, 397.911], // a linear operation
+    [0.000, 0.000, 836.313], // a block of rows of a linear operation that a poll comes to
+    [26.937, 36.892, 26.937], // eight values compared by magnitude
+    [9.959, 12.531, 9.959], // a value compared by magnitude
+    [192.472, 276.539, 192.472], // a block of rows whose order is looked at
+    [110.880, 194.521, 110.880], // a linear operation that sets its output up before the rows are added
+    [1.211, 2.584, 1.211], // an output set to 0 before the rows are added
+    [4.812, 7.695, 4.812], // an output set to its bias before the rows are added
+    [126.122, 195.496, 126.122], // a block of rows in order, whole strips
+    [35.198, 49.132, 35.198], // a block of rows with sums on the stack
+    [107.914, 175.600, 107.914], // a run of rows with sums on the stack
+    [49.029, 76.766, 49.029], // eight rows scaled by the assembler
+    [8.740, 14.951, 8.740], // a row in order scaled
+    [32.165, 45.364, 32.165], // a row with an index scaled
+    [287.588, 479.825, 287.588], // a normalization
+    [24.769, 29.013, 24.992], // a value normalized
+    [301.154, 526.584, 301.154], // a layer norm
+    [17.762, 25.511, 17.762], // a value of a layer norm
+    [259.445, 471.757, 259.445], // an RMS norm
     [10.250, 12.496, 10.250], // a value of an RMS norm
-    [210.782, 387.692, 210.782], // an addition
+    [210.835, 387.786, 210.835], // an addition
     [5.248, 6.749, 5.248], // a value added
-    [213.713, 392.359, 213.713], // a copy
+    [213.765, 392.452, 213.765], // a copy
     [2.750, 4.249, 2.750], // a value copied
-    [282.499, 526.299, 282.499], // an LSTM cell
-    [119.970, 201.911, 216.887], // an element of an LSTM cell
-    [301.391, 544.989, 301.391], // a GRU cell
-    [86.983, 147.950, 159.749], // an element of a GRU cell
-    [204.476, 374.329, 204.476], // a function's operation
+    [282.564, 526.417, 282.564], // an LSTM cell
+    [119.968, 201.908, 216.887], // an element of an LSTM cell
+    [301.450, 545.096, 301.450], // a GRU cell
+    [86.982, 147.948, 159.749], // an element of a GRU cell
+    [204.529, 374.435, 204.529], // a function's operation
     [7.535, 8.408, 7.569], // an element of relu
     [18.927, 35.643, 52.984], // an element of elu
-    [25.553, 48.587, 48.569], // an element of silu
-    [29.763, 46.771, 29.782], // an element of gelu
+    [25.553, 48.586, 48.569], // an element of silu
+    [29.762, 46.771, 29.781], // an element of gelu
     [28.578, 54.631, 51.630], // an element of gelu_tanh
     [25.553, 48.073, 48.569], // an element of tanh
-    [24.587, 47.617, 47.630], // an element of sigmoid
+    [24.587, 47.622, 47.630], // an element of sigmoid
     [0.000, 0.000, 0.000], // 2 bits single rows prepared: a vector
     [0.000, 0.000, 0.000], // 2 bits single rows prepared: a group
-    [803.800, 1285.811, 803.800], // 2 bits single rows prepared: a chunk
-    [218.204, 313.645, 218.204], // 2 bits single rows prepared: a chunk written by itself
-    [31.976, 45.954, 31.976], // 2 bits single rows prepared: eight values
-    [20.943, 30.490, 20.943], // 2 bits single rows prepared: a value of the rest
-    [3.729, 6.772, 3.729], // 2 bits single rows prepared: a pair of padding
-    [840.754, 1366.849, 840.754], // 2 bits single groups prepared: a vector
+    [721.389, 1149.391, 721.389], // 2 bits single rows prepared: a chunk
+    [223.867, 325.872, 223.867], // 2 bits single rows prepared: a chunk written by itself
+    [32.031, 46.026, 32.031], // 2 bits single rows prepared: eight values
+    [18.942, 26.734, 18.942], // 2 bits single rows prepared: a value of the rest
+    [3.730, 6.466, 3.730], // 2 bits single rows prepared: a pair of padding
+    [644.756, 1049.693, 644.756], // 2 bits single groups prepared: a vector
     [0.000, 0.000, 0.000], // 2 bits single groups prepared: a group
-    [7.172, 7.797, 7.172], // 2 bits single groups prepared: a chunk
-    [132.556, 180.049, 132.556], // 2 bits single groups prepared: a chunk written by itself
-    [33.509, 48.504, 33.509], // 2 bits single groups prepared: eight values
-    [38.131, 56.685, 38.131], // 2 bits single groups prepared: a value of the rest
-    [12.752, 21.425, 12.752], // 2 bits single groups prepared: a pair of padding
+    [9.172, 11.113, 9.172], // 2 bits single groups prepared: a chunk
+    [259.664, 386.062, 259.664], // 2 bits single groups prepared: a chunk written by itself
+    [33.060, 47.806, 33.060], // 2 bits single groups prepared: eight values
+    [13.709, 17.822, 13.709], // 2 bits single groups prepared: a value of the rest
+    [1.705, 3.362, 1.705], // 2 bits single groups prepared: a pair of padding
     [0.000, 0.000, 0.000], // 2 bits paired rows prepared: a vector
-    [726.717, 1148.371, 726.717], // 2 bits paired rows prepared: a group
+    [663.689, 1055.577, 663.689], // 2 bits paired rows prepared: a group
     [0.000, 0.000, 0.000], // 2 bits paired rows prepared: a chunk
-    [42.397, 63.907, 42.397], // 2 bits paired rows prepared: a chunk written by itself
-    [39.951, 55.278, 39.951], // 2 bits paired rows prepared: eight values
-    [41.377, 60.749, 41.377], // 2 bits paired rows prepared: a value of the rest
-    [71.022, 104.526, 71.022], // 2 bits paired rows prepared: a pair of padding
-    [786.880, 1263.341, 786.880], // 2 bits paired groups prepared: a vector
+    [312.934, 460.846, 312.934], // 2 bits paired rows prepared: a chunk written by itself
+    [39.677, 54.795, 39.677], // 2 bits paired rows prepared: eight values
+    [6.905, 10.092, 6.905], // 2 bits paired rows prepared: a value of the rest
+    [0.000, 0.000, 0.000], // 2 bits paired rows prepared: a pair of padding
+    [672.019, 1088.403, 672.019], // 2 bits paired groups prepared: a vector
     [0.000, 0.000, 0.000], // 2 bits paired groups prepared: a group
-    [167.609, 231.494, 167.609], // 2 bits paired groups prepared: a chunk
-    [159.565, 233.664, 159.565], // 2 bits paired groups prepared: a chunk written by itself
-    [0.000, 0.000, 0.000], // 2 bits paired groups prepared: eight values
-    [30.824, 43.982, 30.824], // 2 bits paired groups prepared: a value of the rest
-    [2.677, 6.002, 2.677], // 2 bits paired groups prepared: a pair of padding
+    [82.407, 129.546, 82.407], // 2 bits paired groups prepared: a chunk
+    [252.510, 376.251, 252.510], // 2 bits paired groups prepared: a chunk written by itself
+    [20.784, 24.658, 20.784], // 2 bits paired groups prepared: eight values
+    [14.019, 17.462, 14.019], // 2 bits paired groups prepared: a value of the rest
+    [0.000, 0.000, 0.000], // 2 bits paired groups prepared: a pair of padding
     [0.000, 0.000, 0.000], // 3 bits single rows prepared: a vector
     [0.000, 0.000, 0.000], // 3 bits single rows prepared: a group
-    [781.944, 1248.076, 781.944], // 3 bits single rows prepared: a chunk
-    [254.682, 366.410, 254.682], // 3 bits single rows prepared: a chunk written by itself
-    [32.152, 46.292, 32.152], // 3 bits single rows prepared: eight values
-    [14.314, 20.868, 14.314], // 3 bits single rows prepared: a value of the rest
-    [1.592, 4.018, 1.592], // 3 bits single rows prepared: a pair of padding
-    [847.350, 1381.441, 847.350], // 3 bits single groups prepared: a vector
+    [672.635, 1064.430, 672.635], // 3 bits single rows prepared: a chunk
+    [262.937, 391.079, 262.937], // 3 bits single rows prepared: a chunk written by itself
+    [32.198, 46.322, 32.198], // 3 bits single rows prepared: eight values
+    [13.535, 17.683, 13.535], // 3 bits single rows prepared: a value of the rest
+    [0.950, 1.840, 0.950], // 3 bits single rows prepared: a pair of padding
+    [652.128, 1065.755, 652.128], // 3 bits single groups prepared: a vector
     [0.000, 0.000, 0.000], // 3 bits single groups prepared: a group
-    [8.631, 10.266, 8.631], // 3 bits single groups prepared: a chunk
-    [141.563, 189.490, 141.563], // 3 bits single groups prepared: a chunk written by itself
-    [33.068, 47.717, 33.068], // 3 bits single groups prepared: eight values
-    [36.434, 54.767, 36.434], // 3 bits single groups prepared: a value of the rest
-    [11.355, 19.303, 11.355], // 3 bits single groups prepared: a pair of padding
+    [10.035, 12.687, 10.035], // 3 bits single groups prepared: a chunk
+    [261.253, 386.908, 261.253], // 3 bits single groups prepared: a chunk written by itself
+    [32.775, 47.246, 32.775], // 3 bits single groups prepared: eight values
+    [13.353, 17.397, 13.353], // 3 bits single groups prepared: a value of the rest
+    [1.049, 2.164, 1.049], // 3 bits single groups prepared: a pair of padding
     [0.000, 0.000, 0.000], // 3 bits paired rows prepared: a vector
-    [784.932, 1258.815, 784.932], // 3 bits paired rows prepared: a group
-    [39.595, 55.780, 39.595], // 3 bits paired rows prepared: a chunk
-    [312.506, 464.186, 312.506], // 3 bits paired rows prepared: a chunk written by itself
+    [677.342, 1073.246, 677.342], // 3 bits paired rows prepared: a group
+    [39.289, 55.254, 39.289], // 3 bits paired rows prepared: a chunk
+    [292.949, 430.072, 292.949], // 3 bits paired rows prepared: a chunk written by itself
     [0.000, 0.000, 0.000], // 3 bits paired rows prepared: eight values
-    [10.945, 14.518, 10.945], // 3 bits paired rows prepared: a value of the rest
+    [13.845, 18.806, 13.845], // 3 bits paired rows prepared: a value of the rest
     [0.000, 0.000, 0.000], // 3 bits paired rows prepared: a pair of padding
-    [830.737, 1351.401, 830.737], // 3 bits paired groups prepared: a vector
+    [738.359, 1209.280, 738.359], // 3 bits paired groups prepared: a vector
     [0.000, 0.000, 0.000], // 3 bits paired groups prepared: a group
-    [40.977, 57.609, 40.977], // 3 bits paired groups prepared: a chunk
-    [130.545, 192.886, 130.545], // 3 bits paired groups prepared: a chunk written by itself
-    [0.000, 0.000, 0.000], // 3 bits paired groups prepared: eight values
-    [39.911, 57.940, 39.911], // 3 bits paired groups prepared: a value of the rest
-    [26.960, 40.099, 26.960], // 3 bits paired groups prepared: a pair of padding
+    [0.000, 0.000, 0.000], // 3 bits paired groups prepared: a chunk
+    [13.794, 51.308, 13.794], // 3 bits paired groups prepared: a chunk written by itself
+    [40.102, 56.255, 40.102], // 3 bits paired groups prepared: eight values
+    [56.404, 77.099, 56.404], // 3 bits paired groups prepared: a value of the rest
+    [43.003, 55.010, 43.003], // 3 bits paired groups prepared: a pair of padding
     [0.000, 0.000, 0.000], // 4 bits single rows prepared: a vector
     [0.000, 0.000, 0.000], // 4 bits single rows prepared: a group
-    [798.954, 1273.345, 798.954], // 4 bits single rows prepared: a chunk
-    [220.885, 324.330, 220.885], // 4 bits single rows prepared: a chunk written by itself
-    [31.989, 45.978, 31.989], // 4 bits single rows prepared: eight values
-    [20.084, 27.697, 20.084], // 4 bits single rows prepared: a value of the rest
-    [3.583, 6.131, 3.583], // 4 bits single rows prepared: a pair of padding
-    [839.242, 1365.199, 839.242], // 4 bits single groups prepared: a vector
+    [676.020, 1072.846, 676.020], // 4 bits single rows prepared: a chunk
+    [255.373, 378.444, 255.373], // 4 bits single rows prepared: a chunk written by itself
+    [32.078, 46.118, 32.078], // 4 bits single rows prepared: eight values
+    [13.869, 18.250, 13.869], // 4 bits single rows prepared: a value of the rest
+    [1.015, 1.989, 1.015], // 4 bits single rows prepared: a pair of padding
+    [646.746, 1053.855, 646.746], // 4 bits single groups prepared: a vector
     [0.000, 0.000, 0.000], // 4 bits single groups prepared: a group
-    [6.861, 7.316, 6.861], // 4 bits single groups prepared: a chunk
-    [128.341, 171.049, 128.341], // 4 bits single groups prepared: a chunk written by itself
-    [33.580, 48.612, 33.580], // 4 bits single groups prepared: eight values
-    [38.937, 58.418, 38.937], // 4 bits single groups prepared: a value of the rest
-    [13.291, 22.512, 13.291], // 4 bits single groups prepared: a pair of padding
+    [8.702, 10.302, 8.702], // 4 bits single groups prepared: a chunk
+    [254.236, 374.415, 254.236], // 4 bits single groups prepared: a chunk written by itself
+    [33.161, 47.980, 33.161], // 4 bits single groups prepared: eight values
+    [14.664, 19.820, 14.664], // 4 bits single groups prepared: a value of the rest
+    [2.371, 4.757, 2.371], // 4 bits single groups prepared: a pair of padding
     [0.000, 0.000, 0.000], // 4 bits paired rows prepared: a vector
-    [739.541, 1170.103, 739.541], // 4 bits paired rows prepared: a group
-    [0.000, 0.000, 0.000], // 4 bits paired rows prepared: a chunk
-    [63.926, 90.908, 63.926], // 4 bits paired rows prepared: a chunk written by itself
-    [37.241, 51.851, 37.241], // 4 bits paired rows prepared: eight values
-    [39.322, 56.924, 39.322], // 4 bits paired rows prepared: a value of the rest
-    [61.153, 91.859, 61.153], // 4 bits paired rows prepared: a pair of padding
-    [788.785, 1268.730, 788.785], // 4 bits paired groups prepared: a vector
+    [616.522, 972.509, 616.522], // 4 bits paired rows prepared: a group
+    [50.889, 94.167, 50.889], // 4 bits paired rows prepared: a chunk
+    [306.166, 455.905, 306.166], // 4 bits paired rows prepared: a chunk written by itself
+    [36.885, 51.270, 36.885], // 4 bits paired rows prepared: eight values
+    [7.997, 9.309, 7.997], // 4 bits paired rows prepared: a value of the rest
+    [0.000, 0.000, 0.000], // 4 bits paired rows prepared: a pair of padding
+    [668.022, 1084.964, 668.022], // 4 bits paired groups prepared: a vector
     [0.000, 0.000, 0.000], // 4 bits paired groups prepared: a group
-    [164.883, 231.574, 164.883], // 4 bits paired groups prepared: a chunk
-    [153.653, 225.275, 153.653], // 4 bits paired groups prepared: a chunk written by itself
-    [0.000, 0.000, 0.000], // 4 bits paired groups prepared: eight values
-    [33.170, 47.125, 33.170], // 4 bits paired groups prepared: a value of the rest
-    [3.107, 6.519, 3.107], // 4 bits paired groups prepared: a pair of padding
+    [88.486, 138.918, 88.486], // 4 bits paired groups prepared: a chunk
+    [247.256, 370.186, 247.256], // 4 bits paired groups prepared: a chunk written by itself
+    [18.658, 22.434, 18.658], // 4 bits paired groups prepared: eight values
+    [15.593, 19.368, 15.593], // 4 bits paired groups prepared: a value of the rest
+    [0.000, 0.000, 0.000], // 4 bits paired groups prepared: a pair of padding
     [0.000, 0.000, 0.000], // 8 bits single rows prepared: a vector
     [0.000, 0.000, 0.000], // 8 bits single rows prepared: a group
-    [805.030, 1276.489, 805.030], // 8 bits single rows prepared: a chunk
-    [228.182, 336.487, 228.182], // 8 bits single rows prepared: a chunk written by itself
-    [32.163, 46.119, 32.163], // 8 bits single rows prepared: eight values
-    [21.461, 29.457, 21.461], // 8 bits single rows prepared: a value of the rest
-    [1.998, 3.181, 1.998], // 8 bits single rows prepared: a pair of padding
-    [837.245, 1363.543, 837.245], // 8 bits single groups prepared: a vector
+    [713.122, 1130.524, 713.122], // 8 bits single rows prepared: a chunk
+    [230.893, 338.861, 230.893], // 8 bits single rows prepared: a chunk written by itself
+    [32.020, 45.900, 32.020], // 8 bits single rows prepared: eight values
+    [15.995, 21.287, 15.995], // 8 bits single rows prepared: a value of the rest
+    [2.181, 3.606, 2.181], // 8 bits single rows prepared: a pair of padding
+    [645.457, 1051.892, 645.457], // 8 bits single groups prepared: a vector
     [0.000, 0.000, 0.000], // 8 bits single groups prepared: a group
-    [6.613, 7.038, 6.613], // 8 bits single groups prepared: a chunk
-    [126.902, 167.192, 126.902], // 8 bits single groups prepared: a chunk written by itself
-    [33.616, 48.614, 33.616], // 8 bits single groups prepared: eight values
-    [39.273, 59.152, 39.273], // 8 bits single groups prepared: a value of the rest
-    [13.441, 22.828, 13.441], // 8 bits single groups prepared: a pair of padding
+    [8.654, 10.330, 8.654], // 8 bits single groups prepared: a chunk
+    [253.126, 371.492, 253.126], // 8 bits single groups prepared: a chunk written by itself
+    [33.152, 47.921, 33.152], // 8 bits single groups prepared: eight values
+    [14.908, 20.394, 14.908], // 8 bits single groups prepared: a value of the rest
+    [2.479, 5.004, 2.479], // 8 bits single groups prepared: a pair of padding
     [0.000, 0.000, 0.000], // 8 bits paired rows prepared: a vector
-    [784.751, 1246.031, 784.751], // 8 bits paired rows prepared: a group
-    [0.000, 0.000, 0.000], // 8 bits paired rows prepared: a chunk
-    [177.969, 272.319, 177.969], // 8 bits paired rows prepared: a chunk written by itself
-    [32.450, 46.589, 32.450], // 8 bits paired rows prepared: eight values
-    [28.371, 38.599, 28.371], // 8 bits paired rows prepared: a value of the rest
-    [23.860, 33.522, 23.860], // 8 bits paired rows prepared: a pair of padding
-    [814.475, 1332.115, 814.475], // 8 bits paired groups prepared: a vector
+    [571.921, 911.035, 571.921], // 8 bits paired rows prepared: a group
+    [122.902, 190.180, 122.902], // 8 bits paired rows prepared: a chunk
+    [270.044, 399.157, 270.044], // 8 bits paired rows prepared: a chunk written by itself
+    [32.274, 46.325, 32.274], // 8 bits paired rows prepared: eight values
+    [11.944, 15.247, 11.944], // 8 bits paired rows prepared: a value of the rest
+    [0.000, 0.000, 0.000], // 8 bits paired rows prepared: a pair of padding
+    [612.630, 1007.132, 612.630], // 8 bits paired groups prepared: a vector
     [0.000, 0.000, 0.000], // 8 bits paired groups prepared: a group
-    [144.711, 206.964, 144.711], // 8 bits paired groups prepared: a chunk
-    [148.344, 212.150, 148.344], // 8 bits paired groups prepared: a chunk written by itself
-    [0.000, 0.000, 0.000], // 8 bits paired groups prepared: eight values
-    [32.947, 47.758, 32.947], // 8 bits paired groups prepared: a value of the rest
-    [3.653, 7.140, 3.653], // 8 bits paired groups prepared: a pair of padding
-    [29.645, 45.949, 29.645], // 2 bits single rows, 4 rows: a call
+    [26.939, 39.598, 26.939], // 8 bits paired groups prepared: a chunk
+    [276.084, 415.702, 276.084], // 8 bits paired groups prepared: a chunk written by itself
+    [29.297, 41.656, 29.297], // 8 bits paired groups prepared: eight values
+    [12.213, 14.682, 12.213], // 8 bits paired groups prepared: a value of the rest
+    [0.000, 0.000, 0.000], // 8 bits paired groups prepared: a pair of padding
+    [0.000, 13.029, 0.000], // 2 bits single rows, 4 rows: a call
     [0.000, 0.000, 0.000], // 2 bits single rows, 4 rows: a strip
-    [7.057, 12.539, 7.057], // 2 bits single rows, 4 rows: a pass or group of a strip
-    [26.494, 53.484, 26.494], // 2 bits single rows, 4 rows: a chunk of a strip
-    [4.205, 4.885, 4.205], // 2 bits single rows, 4 rows: a column of a strip
+    [3.275, 6.819, 3.275], // 2 bits single rows, 4 rows: a pass or group of a strip
+    [12.157, 26.069, 12.157], // 2 bits single rows, 4 rows: a chunk of a strip
+    [4.306, 5.038, 4.306], // 2 bits single rows, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 2 bits single rows, 8 rows: a call
     [0.000, 0.000, 0.000], // 2 bits single rows, 8 rows: a strip
     [0.000, 0.000, 0.000], // 2 bits single rows, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 2 bits single rows, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 2 bits single rows, 8 rows: a column of a strip
-    [0.000, 1.221, 0.000], // 2 bits single groups, 4 rows: a call
-    [29.537, 59.923, 29.537], // 2 bits single groups, 4 rows: a strip
-    [24.095, 43.728, 24.095], // 2 bits single groups, 4 rows: a pass or group of a strip
+    [86.743, 152.758, 86.743], // 2 bits single groups, 4 rows: a call
+    [13.138, 29.492, 13.138], // 2 bits single groups, 4 rows: a strip
+    [23.938, 43.472, 23.938], // 2 bits single groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 2 bits single groups, 4 rows: a chunk of a strip
-    [4.405, 5.240, 4.405], // 2 bits single groups, 4 rows: a column of a strip
+    [4.403, 5.237, 4.403], // 2 bits single groups, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 2 bits single groups, 8 rows: a call
     [0.000, 0.000, 0.000], // 2 bits single groups, 8 rows: a strip
     [0.000, 0.000, 0.000], // 2 bits single groups, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 2 bits single groups, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 2 bits single groups, 8 rows: a column of a strip
     [0.000, 0.000, 0.000], // 2 bits paired rows, 4 rows: a call
-    [119.806, 206.933, 119.806], // 2 bits paired rows, 4 rows: a strip
+    [67.797, 121.478, 67.797], // 2 bits paired rows, 4 rows: a strip
     [0.000, 0.000, 0.000], // 2 bits paired rows, 4 rows: a pass or group of a strip
-    [38.376, 65.095, 38.376], // 2 bits paired rows, 4 rows: a chunk of a strip
-    [1.292, 1.566, 1.292], // 2 bits paired rows, 4 rows: a column of a strip
-    [94.410, 159.484, 94.410], // 2 bits paired rows, 8 rows: a call
-    [65.584, 122.665, 65.584], // 2 bits paired rows, 8 rows: a strip
+    [38.528, 67.445, 38.528], // 2 bits paired rows, 4 rows: a chunk of a strip
+    [1.352, 1.596, 1.352], // 2 bits paired rows, 4 rows: a column of a strip
+    [54.199, 96.156, 54.199], // 2 bits paired rows, 8 rows: a call
+    [30.207, 57.758, 30.207], // 2 bits paired rows, 8 rows: a strip
     [0.000, 0.000, 0.000], // 2 bits paired rows, 8 rows: a pass or group of a strip
-    [15.174, 34.899, 15.174], // 2 bits paired rows, 8 rows: a chunk of a strip
-    [4.323, 5.377, 4.323], // 2 bits paired rows, 8 rows: a column of a strip
+    [20.033, 42.245, 20.033], // 2 bits paired rows, 8 rows: a chunk of a strip
+    [4.177, 5.157, 4.177], // 2 bits paired rows, 8 rows: a column of a strip
     [0.000, 0.000, 0.000], // 2 bits paired groups, 4 rows: a call
-    [67.298, 135.803, 67.298], // 2 bits paired groups, 4 rows: a strip
+    [55.500, 113.318, 55.500], // 2 bits paired groups, 4 rows: a strip
     [0.000, 0.000, 0.000], // 2 bits paired groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 2 bits paired groups, 4 rows: a chunk of a strip
-    [2.661, 3.744, 2.661], // 2 bits paired groups, 4 rows: a column of a strip
-    [40.353, 79.462, 40.353], // 2 bits paired groups, 8 rows: a call
-    [56.233, 110.037, 56.233], // 2 bits paired groups, 8 rows: a strip
+    [2.778, 3.939, 2.778], // 2 bits paired groups, 4 rows: a column of a strip
+    [44.361, 85.986, 44.361], // 2 bits paired groups, 8 rows: a call
+    [23.348, 48.953, 23.348], // 2 bits paired groups, 8 rows: a strip
     [0.000, 0.000, 0.000], // 2 bits paired groups, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 2 bits paired groups, 8 rows: a chunk of a strip
     [5.344, 7.090, 5.344], // 2 bits paired groups, 8 rows: a column of a strip
-    [40.174, 63.468, 40.174], // 3 bits single rows, 4 rows: a call
+    [41.057, 84.751, 41.057], // 3 bits single rows, 4 rows: a call
     [0.000, 0.000, 0.000], // 3 bits single rows, 4 rows: a strip
     [0.000, 0.000, 0.000], // 3 bits single rows, 4 rows: a pass or group of a strip
-    [26.300, 51.581, 26.300], // 3 bits single rows, 4 rows: a chunk of a strip
-    [5.204, 6.177, 5.204], // 3 bits single rows, 4 rows: a column of a strip
+    [10.672, 22.054, 10.672], // 3 bits single rows, 4 rows: a chunk of a strip
+    [5.186, 6.152, 5.186], // 3 bits single rows, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 3 bits single rows, 8 rows: a call
     [0.000, 0.000, 0.000], // 3 bits single rows, 8 rows: a strip
     [0.000, 0.000, 0.000], // 3 bits single rows, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 3 bits single rows, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 3 bits single rows, 8 rows: a column of a strip
-    [0.000, 0.000, 0.000], // 3 bits single groups, 4 rows: a call
-    [25.780, 53.602, 25.780], // 3 bits single groups, 4 rows: a strip
-    [24.830, 44.291, 24.830], // 3 bits single groups, 4 rows: a pass or group of a strip
+    [84.771, 148.255, 84.771], // 3 bits single groups, 4 rows: a call
+    [9.706, 23.593, 9.706], // 3 bits single groups, 4 rows: a strip
+    [24.773, 44.180, 24.773], // 3 bits single groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 3 bits single groups, 4 rows: a chunk of a strip
-    [5.199, 6.169, 5.199], // 3 bits single groups, 4 rows: a column of a strip
+    [5.192, 6.159, 5.192], // 3 bits single groups, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 3 bits single groups, 8 rows: a call
     [0.000, 0.000, 0.000], // 3 bits single groups, 8 rows: a strip
     [0.000, 0.000, 0.000], // 3 bits single groups, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 3 bits single groups, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 3 bits single groups, 8 rows: a column of a strip
-    [37.113, 54.409, 37.113], // 3 bits paired rows, 4 rows: a call
-    [36.691, 67.840, 36.691], // 3 bits paired rows, 4 rows: a strip
-    [7.245, 14.567, 7.245], // 3 bits paired rows, 4 rows: a pass or group of a strip
+    [38.412, 79.780, 38.412], // 3 bits paired rows, 4 rows: a call
+    [20.746, 37.842, 20.746], // 3 bits paired rows, 4 rows: a strip
+    [6.709, 14.013, 6.709], // 3 bits paired rows, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 3 bits paired rows, 4 rows: a chunk of a strip
-    [3.105, 4.101, 3.105], // 3 bits paired rows, 4 rows: a column of a strip
+    [3.107, 4.101, 3.107], // 3 bits paired rows, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 3 bits paired rows, 8 rows: a call
     [0.000, 0.000, 0.000], // 3 bits paired rows, 8 rows: a strip
     [0.000, 0.000, 0.000], // 3 bits paired rows, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 3 bits paired rows, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 3 bits paired rows, 8 rows: a column of a strip
-    [2.019, 0.000, 2.019], // 3 bits paired groups, 4 rows: a call
-    [26.672, 55.353, 26.672], // 3 bits paired groups, 4 rows: a strip
+    [0.000, 0.000, 0.000], // 3 bits paired groups, 4 rows: a call
+    [10.650, 25.368, 10.650], // 3 bits paired groups, 4 rows: a strip
     [0.000, 0.000, 0.000], // 3 bits paired groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 3 bits paired groups, 4 rows: a chunk of a strip
-    [3.725, 5.102, 3.725], // 3 bits paired groups, 4 rows: a column of a strip
+    [3.715, 5.088, 3.715], // 3 bits paired groups, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 3 bits paired groups, 8 rows: a call
     [0.000, 0.000, 0.000], // 3 bits paired groups, 8 rows: a strip
     [0.000, 0.000, 0.000], // 3 bits paired groups, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 3 bits paired groups, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 3 bits paired groups, 8 rows: a column of a strip
-    [33.785, 55.868, 33.785], // 4 bits single rows, 4 rows: a call
+    [45.454, 88.870, 45.454], // 4 bits single rows, 4 rows: a call
     [0.000, 0.000, 0.000], // 4 bits single rows, 4 rows: a strip
-    [6.008, 10.478, 6.008], // 4 bits single rows, 4 rows: a pass or group of a strip
-    [26.493, 53.676, 26.493], // 4 bits single rows, 4 rows: a chunk of a strip
-    [4.300, 5.262, 4.300], // 4 bits single rows, 4 rows: a column of a strip
+    [3.324, 6.478, 3.324], // 4 bits single rows, 4 rows: a pass or group of a strip
+    [12.079, 26.137, 12.079], // 4 bits single rows, 4 rows: a chunk of a strip
+    [4.366, 5.359, 4.366], // 4 bits single rows, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 4 bits single rows, 8 rows: a call
     [0.000, 0.000, 0.000], // 4 bits single rows, 8 rows: a strip
     [0.000, 0.000, 0.000], // 4 bits single rows, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 4 bits single rows, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 4 bits single rows, 8 rows: a column of a strip
-    [0.000, 0.000, 0.000], // 4 bits single groups, 4 rows: a call
-    [29.999, 60.852, 29.999], // 4 bits single groups, 4 rows: a strip
-    [24.164, 43.849, 24.164], // 4 bits single groups, 4 rows: a pass or group of a strip
+    [83.036, 145.140, 83.036], // 4 bits single groups, 4 rows: a call
+    [13.638, 30.481, 13.638], // 4 bits single groups, 4 rows: a strip
+    [24.044, 43.659, 24.044], // 4 bits single groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 4 bits single groups, 4 rows: a chunk of a strip
-    [4.464, 5.548, 4.464], // 4 bits single groups, 4 rows: a column of a strip
+    [4.462, 5.543, 4.462], // 4 bits single groups, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 4 bits single groups, 8 rows: a call
     [0.000, 0.000, 0.000], // 4 bits single groups, 8 rows: a strip
     [0.000, 0.000, 0.000], // 4 bits single groups, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 4 bits single groups, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 4 bits single groups, 8 rows: a column of a strip
     [0.000, 0.000, 0.000], // 4 bits paired rows, 4 rows: a call
-    [59.023, 112.689, 59.023], // 4 bits paired rows, 4 rows: a strip
-    [0.000, 7.094, 0.000], // 4 bits paired rows, 4 rows: a pass or group of a strip
-    [61.468, 94.677, 61.468], // 4 bits paired rows, 4 rows: a chunk of a strip
-    [3.452, 4.291, 3.452], // 4 bits paired rows, 4 rows: a column of a strip
-    [81.950, 141.896, 81.950], // 4 bits paired rows, 8 rows: a call
-    [16.499, 25.783, 16.499], // 4 bits paired rows, 8 rows: a strip
-    [1.689, 4.193, 1.689], // 4 bits paired rows, 8 rows: a pass or group of a strip
-    [48.604, 90.685, 48.604], // 4 bits paired rows, 8 rows: a chunk of a strip
-    [6.827, 8.351, 6.827], // 4 bits paired rows, 8 rows: a column of a strip
+    [0.000, 14.262, 0.000], // 4 bits paired rows, 4 rows: a strip
+    [0.000, 0.000, 0.000], // 4 bits paired rows, 4 rows: a pass or group of a strip
+    [76.462, 122.765, 76.462], // 4 bits paired rows, 4 rows: a chunk of a strip
+    [3.421, 4.427, 3.421], // 4 bits paired rows, 4 rows: a column of a strip
+    [44.195, 77.965, 44.195], // 4 bits paired rows, 8 rows: a call
+    [0.000, 0.000, 0.000], // 4 bits paired rows, 8 rows: a strip
+    [2.839, 5.903, 2.839], // 4 bits paired rows, 8 rows: a pass or group of a strip
+    [31.251, 53.869, 31.251], // 4 bits paired rows, 8 rows: a chunk of a strip
+    [6.789, 8.298, 6.789], // 4 bits paired rows, 8 rows: a column of a strip
     [0.000, 0.000, 0.000], // 4 bits paired groups, 4 rows: a call
-    [59.691, 124.875, 59.691], // 4 bits paired groups, 4 rows: a strip
+    [52.349, 108.903, 52.349], // 4 bits paired groups, 4 rows: a strip
     [0.000, 0.000, 0.000], // 4 bits paired groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 4 bits paired groups, 4 rows: a chunk of a strip
-    [4.012, 5.352, 4.012], // 4 bits paired groups, 4 rows: a column of a strip
-    [31.684, 65.472, 31.684], // 4 bits paired groups, 8 rows: a call
-    [53.930, 107.712, 53.930], // 4 bits paired groups, 8 rows: a strip
+    [4.114, 5.527, 4.114], // 4 bits paired groups, 4 rows: a column of a strip
+    [40.335, 79.115, 40.335], // 4 bits paired groups, 8 rows: a call
+    [21.255, 46.870, 21.255], // 4 bits paired groups, 8 rows: a strip
     [0.000, 0.000, 0.000], // 4 bits paired groups, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 4 bits paired groups, 8 rows: a chunk of a strip
-    [7.850, 10.096, 7.850], // 4 bits paired groups, 8 rows: a column of a strip
-    [29.266, 54.495, 29.266], // 8 bits single rows, 4 rows: a call
+    [7.847, 10.093, 7.847], // 4 bits paired groups, 8 rows: a column of a strip
+    [14.007, 39.324, 14.007], // 8 bits single rows, 4 rows: a call
     [0.000, 0.000, 0.000], // 8 bits single rows, 4 rows: a strip
-    [7.519, 13.431, 7.519], // 8 bits single rows, 4 rows: a pass or group of a strip
-    [25.088, 51.127, 25.088], // 8 bits single rows, 4 rows: a chunk of a strip
-    [4.372, 5.788, 4.372], // 8 bits single rows, 4 rows: a column of a strip
+    [4.708, 8.972, 4.708], // 8 bits single rows, 4 rows: a pass or group of a strip
+    [10.438, 23.461, 10.438], // 8 bits single rows, 4 rows: a chunk of a strip
+    [4.448, 5.909, 4.448], // 8 bits single rows, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 8 bits single rows, 8 rows: a call
     [0.000, 0.000, 0.000], // 8 bits single rows, 8 rows: a strip
     [0.000, 0.000, 0.000], // 8 bits single rows, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 8 bits single rows, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 8 bits single rows, 8 rows: a column of a strip
-    [0.000, 0.000, 0.000], // 8 bits single groups, 4 rows: a call
-    [29.996, 60.805, 29.996], // 8 bits single groups, 4 rows: a strip
-    [24.218, 43.931, 24.218], // 8 bits single groups, 4 rows: a pass or group of a strip
+    [82.354, 145.316, 82.354], // 8 bits single groups, 4 rows: a call
+    [13.618, 30.419, 13.618], // 8 bits single groups, 4 rows: a strip
+    [24.058, 43.676, 24.058], // 8 bits single groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 8 bits single groups, 4 rows: a chunk of a strip
-    [4.588, 6.172, 4.588], // 8 bits single groups, 4 rows: a column of a strip
+    [4.587, 6.170, 4.587], // 8 bits single groups, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 8 bits single groups, 8 rows: a call
     [0.000, 0.000, 0.000], // 8 bits single groups, 8 rows: a strip
     [0.000, 0.000, 0.000], // 8 bits single groups, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 8 bits single groups, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 8 bits single groups, 8 rows: a column of a strip
-    [32.235, 56.722, 32.235], // 8 bits paired rows, 4 rows: a call
-    [33.538, 54.243, 33.538], // 8 bits paired rows, 4 rows: a strip
-    [2.467, 5.093, 2.467], // 8 bits paired rows, 4 rows: a pass or group of a strip
-    [0.000, 9.485, 0.000], // 8 bits paired rows, 4 rows: a chunk of a strip
-    [3.384, 4.889, 3.384], // 8 bits paired rows, 4 rows: a column of a strip
+    [18.704, 46.060, 18.704], // 8 bits paired rows, 4 rows: a call
+    [0.000, 0.000, 0.000], // 8 bits paired rows, 4 rows: a strip
+    [2.509, 5.306, 2.509], // 8 bits paired rows, 4 rows: a pass or group of a strip
+    [17.213, 33.323, 17.213], // 8 bits paired rows, 4 rows: a chunk of a strip
+    [3.377, 4.877, 3.377], // 8 bits paired rows, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 8 bits paired rows, 8 rows: a call
     [0.000, 0.000, 0.000], // 8 bits paired rows, 8 rows: a strip
     [0.000, 0.000, 0.000], // 8 bits paired rows, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 8 bits paired rows, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 8 bits paired rows, 8 rows: a column of a strip
-    [0.000, 0.000, 0.000], // 8 bits paired groups, 4 rows: a call
-    [27.780, 56.447, 27.780], // 8 bits paired groups, 4 rows: a strip
+    [92.497, 158.644, 92.497], // 8 bits paired groups, 4 rows: a call
+    [11.561, 26.336, 11.561], // 8 bits paired groups, 4 rows: a strip
     [0.000, 0.000, 0.000], // 8 bits paired groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 8 bits paired groups, 4 rows: a chunk of a strip
-    [4.069, 6.103, 4.069], // 8 bits paired groups, 4 rows: a column of a strip
+    [4.063, 6.093, 4.063], // 8 bits paired groups, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 8 bits paired groups, 8 rows: a call
     [0.000, 0.000, 0.000], // 8 bits paired groups, 8 rows: a strip
     [0.000, 0.000, 0.000], // 8 bits paired groups, 8 rows: a pass or group of a strip
