@@ -3,10 +3,11 @@
 use std::fmt::Write as _;
 
 /// Size of the picture and of the margins around the axes, in SVG's units (pixels at 96 dpi).
-const WIDTH: f64 = 760.0;
+const WIDTH: f64 = 980.0;
 const HEIGHT: f64 = 480.0;
 const LEFT: f64 = 84.0;
-const RIGHT: f64 = 28.0;
+/// Holds the legend, which covers nothing there.
+const RIGHT: f64 = 264.0;
 const TOP: f64 = 56.0;
 const BOTTOM: f64 = 64.0;
 
@@ -162,8 +163,7 @@ impl Plot {
             self.series.iter().map(|s| s.name.as_str()).chain(self.mark.iter().map(|m| m.label.as_str())).collect();
         let longest = names.iter().map(|name| name.chars().count()).max().unwrap_or(0) as f64;
         let (width, height) = (62.0 + 7.0 * longest, 12.0 + 20.0 * names.len() as f64);
-        let left = WIDTH - RIGHT - 10.0 - width;
-        let top = TOP + 10.0;
+        let (left, top) = (WIDTH - RIGHT + 14.0, TOP);
         writeln!(
             svg,
             r##"<rect x="{left:.1}" y="{top:.1}" width="{width:.1}" height="{height:.1}" rx="3" fill="#fff" fill-opacity="0.9" stroke="#ccc"/>"##
