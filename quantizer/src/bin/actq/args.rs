@@ -1,0 +1,248 @@
+//! The command line.
+
+use std::path::PathBuf;
+
+use actq::quantize::Method;
+use actq::time;
+use actq_kernels::Width;
+use clap::{Parser, Subcommand, ValueEnum};
+
+/// Quantizes robot policies to 2, 3, 4 or 8 bits and packs them into one image for a microcontroller.
+///
+/// Exit status: 0 on success, 1 on an error, 2 on a wrong command line.
+#[derive(Parser)]
+#[command(name = "actq", version, max_term_width = 100)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Subcommand)]
+pub(crate) enum Command {
+    /// Quantize a policy into an image
+    ///
+    /// POLICY_DIR holds policy.json (the op list), policy.safetensors (the weights) and, for every method but rtn, a recording
+    /// to learn from: calib.npz or calib.safetensors with the arrays "obs" [episode, step, value] and optionally "action" (the
+    /// network's raw output at each observation), "length" [episode] (valid steps) and "state" [episode, value] (recurrent
+    /// state before the first step), or calib.npy with the observations alone. Two axes [frame, value] are one episode. Where
+    /// heldout.npz, .npy or .safetensors is there too, the image is run on both, and errors and warnings are printed.
+    ///
+    /// Example: actq quantize policies/ur3 --bits 3 --out ur3.actq
+    Quantize(QuantizeArgs),
+    /// Show what is in an image: operations, matrices, bits, memory, time on a Cortex-M4, the action contract
+    ///
+    /// Example: actq inspect ur3.actq --widths --stats ur3.json --svg ur3.svg
+    Inspect(InspectArgs),
+    /// Compare an image's actions with the f32 policy's on held-out observations
+    ///
+    /// The recording is heldout.npz, .npy or .safetensors in POLICY_DIR, or the file named. It holds "obs" and "action"; without
+    /// "action", the policy in POLICY_DIR gives the actions. Also printed: how much of the error comes from rounding the
+    /// activations, and, where calib.npz, .npy or .safetensors is there, a warning if the observations leave its range.
+    ///
+    /// Example: actq eval ur3.actq --policy policies/ur3
+    Eval {
+        /// The image
+        image: PathBuf,
+        /// The policy's folder, with the recordings
+        #[arg(long, value_name = "POLICY_DIR", required_unless_present = "heldout")]
+        policy: Option<PathBuf>,
+        /// The held-out recording: .npz, .npy or .safetensors [default: the one in POLICY_DIR]
+        #[arg(long, value_name = "FILE")]
+        heldout: Option<PathBuf>,
+        /// Print one JSON object: nmse, worst_nmse, max_abs, steps, bpw, bytes
+        #[arg(long)]
+        json: bool,
+    },
+    /// Compare methods at several budgets on held-out observations
+    ///
+    /// A cell of the table is the error (mean squared error / variance of the actions, mean over dimensions) and the true bits
+    /// per weight, scales and padding counted; "-" where not even 2 bits fit. Every method uses its default groups; activations
+    /// are int8, for best int16 where it pays. A star marks the knee of a policy's best method.
+    ///
+    /// Example: actq sweep policies/ur3 policies/go1 --bpw 2.5,3,4 --svg errors.svg
+    Sweep(SweepArgs),
+    /// Run an image as a policy over standard input and output
+    ///
+    /// Little-endian: "R" resets and has no reply; "S" and the observation as f32 are answered by the action as f32.
+    Serve {
+        /// The image
+        image: PathBuf,
+    },
+}
+
+#[derive(clap::Args)]
+pub(crate) struct QuantizeArgs {
+    /// The policy's folder
+    pub(crate) policy_dir: PathBuf,
+    /// The image to write
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: PathBuf,
+    /// The recording to learn from: .npz, .npy or .safetensors [default: calib.* in POLICY_DIR]
+    #[arg(long, value_name = "FILE")]
+    pub(crate) calib: Option<PathBuf>,
+    /// Bits of every weight: 2, 3, 4 or 8 [default: 3]
+    #[arg(long, value_name = "N", conflicts_with = "bpw", value_parser = width)]
+    pub(crate) bits: Option<Width>,
+    /// Bits per weight of the whole, scales and padding counted; each matrix gets a width
+    #[arg(long, value_name = "X", value_parser = positive)]
+    pub(crate) bpw: Option<f64>,
+    /// Bytes of the whole image, as 98304 or 96K
+    #[arg(long, value_name = "SIZE", conflicts_with_all = ["bits", "bpw"], value_parser = size)]
+    pub(crate) flash: Option<usize>,
+    /// The fewest bits whose error (NMSE, as eval measures it) is at most X, to a tenth of a bit per weight; measured on
+    /// the held-out recording, else on that of calibration
+    #[arg(long, value_name = "X", conflicts_with_all = ["bits", "bpw", "flash"], value_parser = positive)]
+    pub(crate) max_nmse: Option<f64>,
+    /// Milliseconds that a step may take on a Cortex-M4, predicted; takes the most bits that keep them
+    #[arg(long, value_name = "X", conflicts_with_all = ["bits", "bpw", "flash", "max_nmse"], value_parser = positive)]
+    pub(crate) ms: Option<f64>,
+    /// The processor's clock for --ms, in Hz or as 168M
+    #[arg(long, value_name = "HZ", requires = "ms", default_value = "168M", value_parser = time::clock)]
+    pub(crate) clock: f64,
+    /// Force the width of a matrix, by its tensor's name (method best); may be repeated
+    #[arg(long, value_name = "NAME=BITS", value_parser = forced)]
+    pub(crate) width: Vec<(String, Width)>,
+    /// Keep a matrix at 8 bits (method best); may be repeated
+    #[arg(long, value_name = "NAME")]
+    pub(crate) protect: Vec<String>,
+    /// Columns that share a u8 scale: 32, 64 or 128; 0 = one scale a row, which the kernels like best [default: 32 for
+    /// rtn and actquant, 0 for gptq and best]
+    #[arg(long, value_name = "N", value_parser = group)]
+    pub(crate) group: Option<usize>,
+    /// Bits of the activations, whose scale is found at run time [default: for best chosen per matrix, else 8]
+    #[arg(long, value_name = "BITS")]
+    pub(crate) activations: Option<ActivationArg>,
+    /// How codes are chosen [default: best where there is a recording to learn from, else rtn]
+    #[arg(long)]
+    pub(crate) method: Option<MethodArg>,
+    /// Steps of distillation for --method best; 0 = none, but two-sided error feedback: seconds, and a larger error at few
+    /// bits [default: 8000, recurrent policies 1200]
+    #[arg(long, value_name = "N")]
+    pub(crate) steps: Option<usize>,
+    /// Seed of everything that is drawn
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Threads to use; the image does not depend on it [default: all cores]
+    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
+    pub(crate) threads: usize,
+    /// Write the statistics and the allocation as JSON, for `actq inspect --stats`
+    #[arg(long, value_name = "FILE")]
+    pub(crate) save_stats: Option<PathBuf>,
+}
+
+#[derive(clap::Args)]
+pub(crate) struct InspectArgs {
+    /// The image
+    pub(crate) image: PathBuf,
+    /// The processor's clock, in Hz or as 168M
+    #[arg(long, value_name = "HZ", default_value = "168M", value_parser = time::clock)]
+    pub(crate) clock: f64,
+    /// Print the predicted time of every operation and of the step as one JSON object
+    #[arg(long, conflicts_with = "widths")]
+    pub(crate) json: bool,
+    /// Show instead which rows have which width
+    #[arg(long)]
+    pub(crate) widths: bool,
+    /// What --save-stats wrote with this image: adds why rows have their widths, and the rows that were removed
+    #[arg(long, value_name = "FILE", requires = "widths")]
+    pub(crate) stats: Option<PathBuf>,
+    /// Draw the widths
+    #[arg(long, value_name = "FILE", requires = "widths")]
+    pub(crate) svg: Option<PathBuf>,
+}
+
+#[derive(clap::Args)]
+pub(crate) struct SweepArgs {
+    /// The policies' folders
+    #[arg(required = true)]
+    pub(crate) policy_dirs: Vec<PathBuf>,
+    /// Methods to compare
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "rtn,gptq,actquant,best")]
+    pub(crate) methods: Vec<MethodArg>,
+    /// Bits per weight of the whole that are allowed
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "2,2.5,3,4", value_parser = positive)]
+    pub(crate) bpw: Vec<f64>,
+    /// The recording to learn from: .npz, .npy or .safetensors [default: calib.* in POLICY_DIR]
+    #[arg(long, value_name = "FILE")]
+    pub(crate) calib: Option<PathBuf>,
+    /// The held-out recording to measure on [default: heldout.* in POLICY_DIR]
+    #[arg(long, value_name = "FILE")]
+    pub(crate) heldout: Option<PathBuf>,
+    /// Draw error over bits, and mark the knee of the best method
+    #[arg(long, value_name = "FILE")]
+    pub(crate) svg: Option<PathBuf>,
+    /// Write errors, bits, bytes, allocations and scores: an array with one object per policy
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: Option<PathBuf>,
+    /// Steps of distillation for method best [default: 8000, recurrent policies 1200]
+    #[arg(long, value_name = "N")]
+    pub(crate) steps: Option<usize>,
+    /// Seed of everything that is drawn
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Threads to use; no figure depends on it [default: all cores]
+    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
+    pub(crate) threads: usize,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+pub(crate) enum ActivationArg {
+    /// int8
+    #[value(name = "8")]
+    Int8,
+    /// int16
+    #[value(name = "16")]
+    Int16,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+pub(crate) enum MethodArg {
+    /// Round to nearest
+    Rtn,
+    /// Column-wise error feedback with the inputs' second moment (needs a recording)
+    Gptq,
+    /// Widths by HSIC scores, scales by the Fisher information of the actions (needs a recording with actions)
+    Actquant,
+    /// A width for every row, pruning, and distillation on the recorded observations (needs a recording)
+    Best,
+}
+
+impl From<MethodArg> for Method {
+    fn from(arg: MethodArg) -> Self {
+        match arg {
+            MethodArg::Rtn => Self::Rtn,
+            MethodArg::Gptq => Self::Gptq,
+            MethodArg::Actquant => Self::ActQuant,
+            MethodArg::Best => Self::Best,
+        }
+    }
+}
+
+fn width(text: &str) -> Result<Width, String> {
+    let known = text.parse().ok().and_then(Width::from_bits);
+    known.ok_or_else(|| "weights have 2, 3, 4 or 8 bits".to_owned())
+}
+
+fn forced(text: &str) -> Result<(String, Width), String> {
+    let (name, bits) = text.split_once('=').ok_or_else(|| "the form is NAME=BITS".to_owned())?;
+    Ok((name.to_owned(), width(bits)?))
+}
+
+fn size(text: &str) -> Result<usize, String> {
+    let (digits, unit) = match text.strip_suffix(['K', 'k']) {
+        Some(digits) => (digits, 1024),
+        None => (text, 1),
+    };
+    let bytes = digits.parse().ok().and_then(|n: usize| n.checked_mul(unit)).filter(|n| *n > 0);
+    bytes.ok_or_else(|| "a size is a number of bytes, or of KiB with a K behind it".to_owned())
+}
+
+fn group(text: &str) -> Result<usize, String> {
+    let known = text.parse().ok().filter(|g| matches!(g, 0 | 32 | 64 | 128));
+    known.ok_or_else(|| "groups have 32, 64 or 128 columns, or 0 for none".to_owned())
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0);
+    number.ok_or_else(|| "a number above 0 is needed".to_owned())
+}

@@ -1,0 +1,171 @@
+//! The command `actq`.
+#![forbid(unsafe_code)]
+
+mod args;
+mod quantize;
+
+use std::io::{self, Write as _};
+use std::process::ExitCode;
+
+use actq::dataset::Sizes;
+use actq::dataset::range::Range;
+use actq::dataset::recording::Recording;
+use actq::inspect::report;
+use actq::policy::Policy;
+use actq::quantize::Method;
+use actq::runtime::ImageBuffer;
+use actq::stats::Stats;
+use actq::time::StepTime;
+use actq::widths::Widths;
+use actq::{check, eval, serve, sweep, writer};
+use anyhow::{Context, Result, ensure};
+use clap::Parser as _;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use args::{Cli, Command, InspectArgs, SweepArgs};
+
+fn main() -> ExitCode {
+    match run(Cli::parse().command) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("actq: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(command: Command) -> Result<()> {
+    match command {
+        Command::Quantize(args) => quantize::run(&args),
+        Command::Inspect(args) => run_inspect(&args),
+        Command::Eval { image, policy, heldout, json } => {
+            let buffer = ImageBuffer::read(&image)?;
+            let image = buffer.image(&image)?;
+            let dataset = eval::heldout_from(policy.as_deref(), heldout.as_deref(), &image)?;
+            let report = eval::evaluate(image, &dataset)?;
+            match Recording::Calib.load(policy.as_deref(), None, Sizes::of_image(&image)) {
+                Ok(calib) => note(calib.and_then(|calib| Range::of(&calib).warning(&dataset))),
+                Err(error) => note([format!("the calibrated range is not known: {error:#}")]),
+            }
+            if json {
+                return print(&(serde_json::to_string(&report)? + "\n"));
+            }
+            print(&format!(
+                "observations   {}\n\
+                 nmse           {:.3e}   (mean squared error / variance, mean over dimensions)\n\
+                 worst nmse     {:.3e}   (dimension {})\n\
+                 largest error  {:.4}\n\
+                 activations    {}\n\
+                 bits/weight    {:.3}\n\
+                 image          {} bytes\n",
+                report.steps,
+                report.nmse,
+                report.worst_nmse,
+                report.worst_dimension,
+                report.max_abs,
+                eval::activation_share(image, &dataset, report.nmse)?,
+                report.bpw,
+                report.bytes,
+            ))
+        }
+        Command::Sweep(args) => run_sweep(&args),
+        Command::Serve { image } => {
+            let buffer = ImageBuffer::read(&image)?;
+            serve::serve(buffer.image(&image)?, io::stdin().lock(), io::stdout().lock())
+        }
+    }
+}
+
+/// Notes go to standard error, so that the report stays as it is.
+fn note(notes: impl IntoIterator<Item = String>) {
+    // That nobody reads them is no error.
+    notes.into_iter().for_each(|note| drop(writeln!(io::stderr(), "note: {note}")));
+}
+
+/// Prints; that a reader has gone away (as `head` does) is no error.
+fn print(text: &str) -> Result<()> {
+    match io::stdout().write_all(text.as_bytes()) {
+        Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        other => other.context("standard output cannot be written"),
+    }
+}
+
+/// Steps of the progress bar; the work reports the share done.
+const PROGRESS: u64 = 1000;
+
+fn progress_bar() -> Result<ProgressBar> {
+    // Within 80 columns: a bar that wraps flickers.
+    let style = ProgressStyle::with_template("{msg:30} {bar:30} {percent:>3}%, {eta} left").context("progress bar")?;
+    Ok(ProgressBar::new(PROGRESS).with_style(style))
+}
+
+fn set_share(bar: &ProgressBar, share: f64) {
+    bar.set_position((share * PROGRESS as f64) as u64);
+}
+
+fn start_threads(threads: usize) -> Result<()> {
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().context("threads cannot be started")
+}
+
+fn run_inspect(args: &InspectArgs) -> Result<()> {
+    let buffer = ImageBuffer::read(&args.image)?;
+    let image = buffer.image(&args.image)?;
+    if !args.widths {
+        let step = StepTime::new(&image, args.clock);
+        return print(&match args.json {
+            true => serde_json::to_string(&step)? + "\n",
+            false => format!("{}\n{}", report(&image), step.report()),
+        });
+    }
+    let stats = args.stats.as_deref().map(|path| Stats::read(path, &image)).transpose()?;
+    let widths = Widths::new(&image, stats.as_ref())?;
+    if let Some(path) = &args.svg {
+        writer::write(path, widths.svg().as_bytes())?;
+    }
+    print(&widths.report())
+}
+
+fn run_sweep(args: &SweepArgs) -> Result<()> {
+    start_threads(args.threads)?;
+    let methods: Vec<Method> = args.methods.iter().map(|&m| m.into()).collect();
+    let policies = args.policy_dirs.iter().map(|dir| Policy::load(dir)).collect::<Result<Vec<_>>>()?;
+    let named = args.calib.is_some() || args.heldout.is_some();
+    ensure!(policies.len() == 1 || !named, "--calib and --heldout go with one policy");
+    let bar = progress_bar()?;
+    let mut sweeps = Vec::new();
+    for (p, policy) in policies.iter().enumerate() {
+        let (dir, sizes) = (Some(policy.dir.as_path()), Sizes::of(policy));
+        let calib = Recording::Calib.load(dir, args.calib.as_deref(), sizes)?;
+        let mut heldout = Recording::Heldout.require(dir, args.heldout.as_deref(), sizes, "actq sweep")?;
+        heldout.fill_actions(&policy.graph);
+        bar.suspend(|| note(check::recording_notes(calib.as_ref(), Some(&heldout))));
+        let plan = sweep::Plan {
+            policy,
+            calib: calib.as_ref(),
+            heldout: &heldout,
+            methods: &methods,
+            budgets: &args.bpw,
+            steps: args.steps,
+            seed: args.seed,
+        };
+        sweeps.push(sweep::run(&plan, |work, share| {
+            bar.set_message(format!("{}: {work}", policy.name));
+            set_share(&bar, (p as f64 + share) / policies.len() as f64);
+        })?);
+    }
+    bar.finish_and_clear();
+    let mut knees = String::new();
+    for sweep in &sweeps {
+        if let Some(knee) = &sweep.knee {
+            knees += &format!(
+                "\n* knee of {}: {} at {:.3} bits per weight, NMSE {:.2e}",
+                sweep.policy, knee.method, knee.bpw, knee.nmse
+            );
+        }
+    }
+    print(&format!("{}\n{knees}\n", sweep::table(&sweeps)))?;
+    let (svg, json) = (sweep::svg(&sweeps), serde_json::to_string_pretty(&sweeps)? + "\n");
+    let files = [(&args.svg, svg), (&args.json, json)];
+    let files: Vec<_> = files.iter().filter_map(|(path, text)| Some((path.as_deref()?, text))).collect();
+    writer::write_all(&files)
+}
