@@ -9,12 +9,14 @@ use actq::quantize::{Activations, Budget, Method, Options};
 use actq::runtime::{ImageBuffer, with_head};
 use actq::time::{CLOCK, Limit, StepTime};
 use actq::writer;
+use actq_host_tests::networks::Builder;
 use actq_host_tests::profile;
 use actq_host_tests::qemu::{self, Counter, Target};
 use actq_host_tests::{root, shared_policies};
 use actq_kernels::Width;
 use actq_kernels::cost::{Cost, of_step};
-use anyhow::{Context, Result, ensure};
+use actq_kernels::image::Op;
+use anyhow::{Context, Result, bail, ensure};
 
 /// Steps that each image runs, spread over the held-out recordings.
 const STEPS: usize = 24;
@@ -180,5 +182,39 @@ fn a_budget_of_time_is_kept_and_used() -> Result<()> {
     let limit = Limit { milliseconds: 0.01, clock_hz: CLOCK };
     let refused = limit.quantize(&prepared, &best(1.0), |_| {}).map(|_| ()).expect_err("nothing is so fast");
     assert!(refused.to_string().contains("the fastest is"), "{refused}");
+    Ok(())
+}
+
+/// A matrix of rows of all widths against matrices of its blocks alone, counted; with the rows of a width behind each other, and
+/// scattered, so that they need an index.
+#[test]
+fn mixed_widths_cost_little_more_than_their_blocks() -> Result<()> {
+    const ROWS: usize = 64;
+    const COLS: usize = 256;
+    let (elf, counter) = (firmware()?, Counter::build()?);
+    for activations in [Activations::Int8, Activations::Int16] {
+        let mut builder = Builder::new(COLS);
+        let linear = |builder: &mut Builder, rows, widths: &dyn Fn(usize) -> Width| {
+            builder.linear((rows, COLS), activations, |row| Some(widths(row)), 0, true)
+        };
+        for width in Width::ALL {
+            linear(&mut builder, ROWS, &|_| width)?;
+        }
+        linear(&mut builder, 4 * ROWS, &|row| Width::ALL[row / ROWS])?;
+        linear(&mut builder, 4 * ROWS, &|row| Width::ALL[row % 4])?;
+        let (policy, outcomes) = builder.finish("mixed".to_owned(), false);
+        let bytes = writer::image(&policy, &outcomes)?;
+        let buffer = ImageBuffer::new(&bytes);
+        let image = buffer.image(Path::new("mixed"))?;
+        let observation = (0..COLS).map(|i| (i as f32).sin()).collect();
+        let parts = profile::parts(&elf, &counter, &image, &bytes, &[observation], u32::MAX)?.remove(0);
+        let linear = image.ops().zip(&parts.ops).filter(|(op, _)| matches!(op, Op::Linear { .. }));
+        let counts: Vec<u64> = linear.map(|(_, cost)| cost.instructions).collect();
+        let [alone @ .., in_order, indexed] = &counts[..] else { bail!("{counts:?}") };
+        let alone: u64 = alone.iter().sum();
+        println!("{activations:?}: blocks alone {alone}, in order {in_order}, indexed {indexed}");
+        ensure!(*in_order as f64 <= 1.03 * alone as f64, "{in_order} in order, {alone} alone");
+        ensure!(*indexed as f64 <= 1.03 * alone as f64, "{indexed} with an index, {alone} alone");
+    }
     Ok(())
 }
