@@ -61,6 +61,8 @@ mod firmware {
         let image = Image::new_checked(slot::image().unwrap_or(&BUILT_IN.0)).map_err(|e| message("image", e))?;
         let scratch = singleton!(: [u32; SCRATCH] = [0; SCRATCH]).ok_or_else(|| message("scratch", "taken twice"))?;
         let mut head = Head::new(image, scratch).map_err(|e| message("head", e))?;
+        // Once, and not within the first step that is counted.
+        head.least_budget();
         head.self_test().map_err(|e| message("self-test", e))?;
         let arguments = host::arguments();
         let number = arguments.split_once(' ').and_then(|(_, n)| n.parse().ok());

@@ -38,6 +38,14 @@ impl Target {
         }
     }
 
+    /// The profile of a build that chooses its backend by the target (`Cargo.toml`).
+    fn profile(self) -> &'static str {
+        match self {
+            Self::Fpu | Self::NoFpu => "firmware",
+            Self::NoDsp | Self::Small => "release",
+        }
+    }
+
     /// QEMU's machine.
     pub fn machine(self) -> &'static str {
         match self {
@@ -56,7 +64,7 @@ pub fn target_dir() -> PathBuf {
 fn cargo_build(what: &str, arguments: &[&str], environment: &[(&str, &str)]) -> Result<()> {
     let output = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
         .current_dir(crate::root())
-        .args(["build", "--release", "--quiet"])
+        .args(["build", "--quiet"])
         .args(arguments)
         .envs(environment.iter().copied())
         .output()
@@ -67,24 +75,31 @@ fn cargo_build(what: &str, arguments: &[&str], environment: &[(&str, &str)]) -> 
 
 /// Builds a firmware binary with `image` built in and gives the path of its ELF file.
 pub fn build(binary: &str, target: Target, image: &Path) -> Result<PathBuf> {
-    build_in(&target_dir(), binary, target, image, &[])
+    build_in(&target_dir(), binary, target, image, target.profile(), &[])
 }
 
 /// As [`build`], without the assembler (`ACTQ_BACKEND=portable`); in a folder of its own, so that builds of both kinds stay.
 pub fn build_portable(binary: &str, target: Target, image: &Path) -> Result<PathBuf> {
-    build_in(&target_dir().join("portable"), binary, target, image, &[("ACTQ_BACKEND", "portable")])
+    build_in(&target_dir().join("portable"), binary, target, image, "release", &[("ACTQ_BACKEND", "portable")])
 }
 
-fn build_in(dir: &Path, binary: &str, target: Target, image: &Path, environment: &[(&str, &str)]) -> Result<PathBuf> {
+fn build_in(
+    dir: &Path,
+    binary: &str,
+    target: Target,
+    image: &Path,
+    profile: &str,
+    environment: &[(&str, &str)],
+) -> Result<PathBuf> {
     let image = fs::canonicalize(image).with_context(|| format!("{}: cannot be read", image.display()))?;
     let folder = dir.to_string_lossy();
     let package = ["--package", "actq-firmware-demo", "--bin", binary, "--target", target.triple()];
     cargo_build(
         &format!("firmware {binary} for {}", target.triple()),
-        &[&package[..], &["--target-dir", &folder]].concat(),
+        &[&package[..], &["--profile", profile, "--target-dir", &folder]].concat(),
         &[environment, &[("ACTQ_IMAGE", &image.to_string_lossy())]].concat(),
     )?;
-    Ok(dir.join(target.triple()).join("release").join(binary))
+    Ok(dir.join(target.triple()).join(profile).join(binary))
 }
 
 /// QEMU with `elf`, an image in the slot if one is given, and arguments for the firmware.
@@ -181,7 +196,11 @@ impl Counter {
     /// Builds the plugin for the QEMU that is installed.
     pub fn build() -> Result<Self> {
         let api = plugin_api()?;
-        cargo_build("the counting plugin", &["--package", "insn-count"], &[("ACTQ_QEMU_API", &api.to_string())])?;
+        cargo_build(
+            "the counting plugin",
+            &["--release", "--package", "insn-count"],
+            &[("ACTQ_QEMU_API", &api.to_string())],
+        )?;
         let name = format!("{}insn_count{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
         Ok(Self { plugin: target_dir().join("release").join(name), out: tempfile::NamedTempFile::new()? })
     }

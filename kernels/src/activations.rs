@@ -37,7 +37,7 @@ struct Plan {
 
 impl Plan {
     /// Every call of a kernel comes through here; all lengths but the vector's are powers of two, so nothing is divided.
-    #[inline(always)]
+    #[inline(never)]
     const fn new(shape: BlockShape) -> Self {
         let format = &shape.layout().x;
         let padded = match shape.lanes {
@@ -116,6 +116,8 @@ impl Plan {
         let sum_behind = (self.format.sum && shape.group == 0) as usize;
         let extra = match self.format.starts {
             [start] if self.format.sum => 0usize.wrapping_sub(self.chunks * start.bias as usize),
+            // Single lanes with row scales: there are no groups to count.
+            _ if shape.group == 0 && matches!(shape.lanes, Lanes::Single) => 0,
             starts => 4 * (starts.len() + self.first_chunk / 2),
         };
         (self.words() - unread - sum_behind, extra)
@@ -191,8 +193,9 @@ impl<'a> Prepared<'a> {
         core::iter::once(first).chain(rest.chunks(plan.chunk_words()))
     }
 
-    /// What the assembler is told about the vector: the words up to where it stops reading, and either the bytes of the first chunk or,
-    /// where chunks are summed without being taken apart, minus the biases of all chunks.
+    /// What the assembler is told about the vector: the words up to where it stops reading, and either the bytes of the first
+    /// chunk (0 for single lanes with row scales), or, where chunks are summed without being taken apart, minus the biases of
+    /// all chunks.
     #[cfg(actq_armv7em)]
     pub(crate) fn bounds(&self) -> (usize, usize) {
         self.bounds
@@ -250,7 +253,7 @@ impl Scale {
     /// Writes the integers of `x`, prepared for blocks of `shape`, to the first [`prepared_words`] words of `out`, and names
     /// them. Missing values of `x` count as zeros. `None`, with nothing written, where `out` is too short, or there are no columns
     /// or too many.
-    #[inline(always)]
+    #[inline(never)]
     pub fn quantize<'w>(self, x: &[f32], shape: BlockShape, out: &'w mut [u32]) -> Option<Prepared<'w>> {
         fill(x, shape, out, &Quantizer { inverse: self.inverse })
     }
@@ -352,20 +355,21 @@ fn fill<'w, S: Source>(x: &[S::Value], shape: BlockShape, out: &'w mut [u32], so
 #[inline(never)]
 fn rest<S: Source>(x: &[S::Value], shape: BlockShape, done: usize, out: &mut [u32], source: &S) {
     let plan = &Plan::new(shape);
-    let mut groups = x.chunks(plan.group).skip(done);
-    for out in out.chunks_mut(plan.group_words()).skip(done) {
+    let mut groups = x.chunks(plan.group.max(1)).skip(done);
+    for out in out.chunks_mut(plan.group_words().max(1)).skip(done) {
         group(groups.next().unwrap_or(&[]), plan, out, source);
     }
 }
 
 /// Writes a group that is not whole, or all of it where the backend has no code.
 fn group<S: Source>(x: &[S::Value], plan: &Plan, out: &mut [u32], source: &S) {
-    let (mut out, sum_word) = out.split_at_mut(out.len() - usize::from(plan.format.sum));
+    let sum_at = out.len().saturating_sub(usize::from(plan.format.sum));
+    let Some((mut out, sum_word)) = out.split_at_mut_checked(sum_at) else { return };
     let mut sum = 0i32;
     let mut columns = plan.first_chunk;
     let mut x = x;
     // Whole chunks at once, unless the first is short and x does not fill it.
-    let whole = if x.len() < plan.first_chunk { 0 } else { 1 + (x.len() - plan.first_chunk) / plan.chunk };
+    let whole = if x.len() < plan.first_chunk { 0 } else { 1 + (x.len() - plan.first_chunk) / plan.chunk.max(1) };
     let run = Groups { groups: 1, chunks: whole, first: plan.first_chunk, chunk: plan.chunk };
     if let Some(part) = source.groups(x, plan.format, run, out) {
         sum = part;

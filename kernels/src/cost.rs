@@ -9,6 +9,7 @@
 //! limits, and whatever of exp's range the compiler turned into branches) the expected cost is that of standard normal values,
 //! and a third rate says what one element takes at most; pieces of a step ([`crate::Head::poll`]) are measured by that.
 
+#[allow(clippy::approx_constant, reason = "measured values, some of which happen to be near a constant")]
 mod rates;
 
 use core::fmt;

@@ -277,11 +277,12 @@ pub(crate) struct Layout {
     strip: usize,
     pub(crate) step: usize,
     pub(crate) x: XFormat,
+    extract: fn(&[u32; 3], usize, usize) -> u8,
 }
 
 impl Layout {
     const fn of<F: Format>() -> Self {
-        Self { cell: F::CELL, strip: F::STRIP, step: F::STEP, x: F::X }
+        Self { cell: F::CELL, strip: F::STRIP, step: F::STEP, x: F::X, extract: F::extract }
     }
 }
 
@@ -304,6 +305,11 @@ pub(crate) fn smlad(a: u32, b: u32, c: i32) -> i32 {
 /// `len` up to a multiple of `step`, a power of two.
 pub(crate) const fn round_up(len: usize, step: usize) -> usize {
     (len + step - 1) & !(step - 1)
+}
+
+/// How many times `step`, a power of two, fits into `len`. Without a division and its panic.
+const fn div_down(len: usize, step: usize) -> usize {
+    len >> step.trailing_zeros()
 }
 
 /// How many times `step`, a power of two, covers `len`.
@@ -365,15 +371,17 @@ impl BlockShape {
     }
 
     /// Units in a row.
+    #[inline(never)]
     pub const fn units(self) -> usize {
-        round_up(self.cols, self.step()) / self.layout().cell.cols
+        div_down(round_up(self.cols, self.step()), self.layout().cell.cols)
     }
 
     /// Units in a full group; all units of a row where there are no group scales.
+    #[inline(never)]
     pub const fn units_per_group(self) -> usize {
         match self.group {
             0 => self.units(),
-            group => group / self.layout().cell.cols,
+            group => div_down(group, self.layout().cell.cols),
         }
     }
 
@@ -381,13 +389,14 @@ impl BlockShape {
     pub const fn groups(self) -> usize {
         match self.group {
             0 => 0,
-            group => self.cols.div_ceil(group),
+            group => div_up(self.cols, group),
         }
     }
 
     /// Words of four rows, scales included; a strip of eight has twice as many.
+    #[inline(never)]
     pub const fn quad_words(self) -> usize {
-        self.units() * self.layout().cell.words * (QUAD / self.layout().cell.rows) + self.groups()
+        self.units() * self.layout().cell.words * div_down(QUAD, self.layout().cell.rows) + self.groups()
     }
 
     /// Words of the block.
@@ -398,7 +407,7 @@ impl BlockShape {
     /// First row and rows of the strip that `row` is in.
     const fn strip(self, row: usize) -> (usize, usize) {
         let height = self.layout().strip;
-        let first = row / height * height;
+        let first = row & !(height - 1);
         let left = self.padded_rows() - first;
         (first, if left < height { left } else { height })
     }
@@ -409,11 +418,11 @@ impl BlockShape {
         let Cell { rows, words, .. } = self.layout().cell;
         let scales_before = match self.group {
             0 => 0,
-            _ => unit / self.units_per_group() * (height / QUAD),
+            _ => div_down(unit, self.units_per_group()) * (height / QUAD),
         };
-        let step = height / rows;
+        let step = div_down(height, rows);
         let strip = first / QUAD * self.quad_words();
-        (strip + unit * words * step + scales_before + (row - first) / rows, step)
+        (strip + unit * words * step + scales_before + div_down(row - first, rows), step)
     }
 
     /// Index of the word that holds the scale of `group` for `row`.
@@ -423,7 +432,7 @@ impl BlockShape {
         let units = if last < self.units() { last } else { self.units() };
         let Cell { rows, words, .. } = self.layout().cell;
         let scales_before = group * (height / QUAD) + (row - first) / QUAD;
-        first / QUAD * self.quad_words() + units * words * (height / rows) + scales_before
+        first / QUAD * self.quad_words() + units * words * div_down(height, rows) + scales_before
     }
 }
 
@@ -466,7 +475,9 @@ impl<'a> Block<'a> {
         if row >= self.shape.rows || col >= self.shape.cols {
             return 0;
         }
-        with_format!(self.shape, code_of::<_>(self, row, col))
+        let layout = self.shape.layout();
+        let Cell { rows, cols, .. } = layout.cell;
+        (layout.extract)(&self.cell(row, div_down(col, cols)), row & (rows - 1), col & (cols - 1))
     }
 
     /// The words of the cell that holds `row` in unit `unit`.
@@ -489,15 +500,11 @@ impl<'a> Block<'a> {
         match self.shape.group {
             0 => 1,
             group => {
-                let word = self.words.get(self.shape.scale_at(row, col / group)).copied().unwrap_or(0);
+                let word = self.words.get(self.shape.scale_at(row, div_down(col, group))).copied().unwrap_or(0);
                 (u32::from_le(word) >> (8 * (row % QUAD))) as u8
             }
         }
     }
-}
-
-fn code_of<F: Format>(block: &Block<'_>, row: usize, col: usize) -> u8 {
-    F::extract(&block.cell(row, col / F::CELL.cols), row % F::CELL.rows, col % F::CELL.cols)
 }
 
 /// Packs a block.

@@ -7,8 +7,9 @@ use core::task::Poll;
 use crate::activations::NotFinite;
 use crate::error::{HeadError, StepError};
 use crate::image::{Image, Op, Region};
+use crate::linear::{copy, copy_le};
 use crate::math::clamp;
-use crate::slice::{Budget, Cursor, Price};
+use crate::slice::{Budget, Cursor, Meter, Price, Unlimited};
 use crate::{norm, recurrent};
 
 /// A head: an image and the scratch memory that it runs in.
@@ -16,7 +17,7 @@ use crate::{norm, recurrent};
 pub struct Head<'a, 's> {
     image: Image<'a>,
     arena: &'s mut [u32],
-    /// [`Image::least_budget`].
+    /// [`Self::least_budget`], once it was computed; 0 before.
     least_budget: u32,
     phase: Phase,
     /// Actions of the current chunk that have been played; 0 = the network must run.
@@ -43,13 +44,13 @@ impl<'a, 's> Head<'a, 's> {
         let arena = scratch.get_mut(..needed).ok_or(HeadError::ScratchTooSmall { needed, given })?;
         // Nothing depends on what the memory held.
         arena.fill(0);
-        let least_budget = image.least_budget();
-        let mut head = Self { image, arena, least_budget, phase: Phase::Idle, played: 0, started: false };
+        let mut head = Self { image, arena, least_budget: 0, phase: Phase::Idle, played: 0, started: false };
         head.reset();
         Ok(head)
     }
 
     /// Forgets the recurrent state, the rest of a chunk, the last action and a step that was begun.
+    #[inline(never)]
     pub fn reset(&mut self) {
         self.forget();
         self.phase = Phase::Idle;
@@ -58,10 +59,9 @@ impl<'a, 's> Head<'a, 's> {
     }
 
     /// Zeroes the recurrent state.
+    #[inline(never)]
     fn forget(&mut self) {
-        if let Some(state) = self.arena.get_mut(self.image.state().range()) {
-            state.fill(0);
-        }
+        self.words_mut(self.image.state()).fill(0);
     }
 
     /// The recurrent state, to read or to set: of each operation in order an LSTM's hidden, then cell state, or a GRU's state.
@@ -80,7 +80,7 @@ impl<'a, 's> Head<'a, 's> {
     ///
     /// On an error the head resets itself, so that no part of a failed evaluation reaches a later action.
     pub fn step(&mut self, observation: &[f32]) -> Result<&[f32], StepError> {
-        self.begin(observation)?;
+        self.take(observation)?;
         self.finish()?;
         Ok(self.floats(self.image.action()))
     }
@@ -90,8 +90,22 @@ impl<'a, 's> Head<'a, 's> {
     /// A step that was begun and is not ready is dropped. If a poll has already worked on it, the recurrent state may be partly
     /// that of the dropped step, and is zeroed as by [`Self::reset`]; the last action stays, so that the step limit holds.
     ///
-    /// On an error the head resets itself.
+    /// On an error the head resets itself. The first call takes longer where [`Self::least_budget`] was not called before.
     pub fn begin(&mut self, observation: &[f32]) -> Result<(), StepError> {
+        self.least_budget();
+        self.take(observation)
+    }
+
+    /// [`Image::least_budget`], computed once, which takes about as long as a short step. (Not by [`Self::new`]: where steps are
+    /// not cut, the cost model is not in the program.)
+    pub fn least_budget(&mut self) -> u32 {
+        if self.least_budget == 0 {
+            self.least_budget = self.image.least_budget();
+        }
+        self.least_budget
+    }
+
+    fn take(&mut self, observation: &[f32]) -> Result<(), StepError> {
         self.drop_step();
         self.load(observation).inspect_err(|_| self.reset())?;
         self.start();
@@ -125,7 +139,7 @@ impl<'a, 's> Head<'a, 's> {
         let ready = match self.phase {
             Phase::Idle => return Err(StepError::NotBegun),
             Phase::Begun(cursor) => {
-                self.advance(cursor, Budget::of_poll(budget), one_op).inspect_err(|_| self.reset())?
+                self.advance(cursor, &mut Budget::of_poll(budget), one_op).inspect_err(|_| self.reset())?
             }
             Phase::Ready => true,
         };
@@ -135,7 +149,7 @@ impl<'a, 's> Head<'a, 's> {
     /// See [`Self::begin`].
     fn drop_step(&mut self) {
         if let Phase::Begun(cursor) = self.phase
-            && cursor != self.fresh()
+            && cursor.has_left(self.fresh())
         {
             self.forget();
         }
@@ -155,14 +169,14 @@ impl<'a, 's> Head<'a, 's> {
     /// Takes the step that was begun to its end.
     fn finish(&mut self) -> Result<(), StepError> {
         if let Phase::Begun(cursor) = self.phase {
-            self.advance(cursor, Budget::UNLIMITED, false).inspect_err(|_| self.reset())?;
+            self.advance(cursor, &mut Unlimited, false).inspect_err(|_| self.reset())?;
         }
         Ok(())
     }
 
     /// Goes on from `cursor` as far as the budget reaches; true when the action is ready.
-    fn advance(&mut self, mut cursor: Cursor, mut budget: Budget, one_op: bool) -> Result<bool, StepError> {
-        let done = self.evaluate(&mut cursor, &mut budget, one_op).map_err(|NotFinite| StepError::NotFinite)?;
+    fn advance(&mut self, mut cursor: Cursor, budget: &mut impl Meter, one_op: bool) -> Result<bool, StepError> {
+        let done = self.evaluate(&mut cursor, budget, one_op).map_err(|NotFinite| StepError::NotFinite)?;
         if !done || budget.take(1, || Price::action(&self.image)) == 0 {
             self.phase = Phase::Begun(cursor);
             return Ok(false);
@@ -181,9 +195,8 @@ impl<'a, 's> Head<'a, 's> {
     pub fn infer(&mut self, observation: &[f32]) -> Result<&[f32], StepError> {
         self.drop_step();
         self.played = 0;
-        let mut budget = Budget::UNLIMITED;
         let outcome = self.load(observation).and_then(|()| {
-            let done = self.evaluate(&mut Cursor::default(), &mut budget, false);
+            let done = self.evaluate(&mut Cursor::default(), &mut Unlimited, false);
             done.map_err(|NotFinite| StepError::NotFinite)
         });
         outcome.inspect_err(|_| self.reset())?;
@@ -201,13 +214,11 @@ impl<'a, 's> Head<'a, 's> {
     fn play_self_test(&mut self) -> Result<(), StepError> {
         let mut step = 0;
         while let Some((observation, expected)) = self.image.self_test(step) {
-            for (to, from) in self.floats_mut(self.image.observation()).iter_mut().zip(observation) {
-                *to = f32::from_bits(u32::from_le(*from));
-            }
+            copy_le(observation, self.words_mut(self.image.observation()));
             self.start();
             self.finish()?;
             let action = self.floats(self.image.action());
-            if !action.iter().map(|a| a.to_bits()).eq(expected.iter().map(|w| u32::from_le(*w))) {
+            if action.iter().zip(expected).any(|(a, w)| a.to_bits() != u32::from_le(*w)) {
                 return Err(StepError::SelfTest { step });
             }
             step += 1;
@@ -216,6 +227,7 @@ impl<'a, 's> Head<'a, 's> {
     }
 
     /// Checks the observation and puts it into the arena.
+    #[inline(never)]
     fn load(&mut self, observation: &[f32]) -> Result<(), StepError> {
         let (expected, given) = (self.image.obs_len(), observation.len());
         if expected != given {
@@ -224,14 +236,13 @@ impl<'a, 's> Head<'a, 's> {
         if let Some(index) = observation.iter().position(|v| !v.is_finite()) {
             return Err(StepError::ObservationNotFinite { index });
         }
-        for (to, from) in self.floats_mut(self.image.observation()).iter_mut().zip(observation) {
-            *to = *from;
-        }
+        copy(bytemuck::cast_slice(observation), self.words_mut(self.image.observation()));
         Ok(())
     }
 
     /// Runs operations from `cursor` on; true behind the last one.
-    fn evaluate(&mut self, cursor: &mut Cursor, budget: &mut Budget, one_op: bool) -> Result<bool, NotFinite> {
+    #[inline(never)]
+    fn evaluate(&mut self, cursor: &mut Cursor, budget: &mut impl Meter, one_op: bool) -> Result<bool, NotFinite> {
         let work = self.image.work();
         while cursor.op < self.image.op_count() {
             // In a checked image every record parses.
@@ -249,6 +260,7 @@ impl<'a, 's> Head<'a, 's> {
     }
 
     /// Takes the chunk's current action through the contract.
+    #[inline(never)]
     fn act(&mut self) -> Result<(), StepError> {
         let contract = self.image.contract();
         let (output, action) = (self.image.output(), self.image.action());
@@ -285,18 +297,31 @@ impl<'a, 's> Head<'a, 's> {
         Ok(())
     }
 
+    #[inline(never)]
     fn floats(&self, region: Region) -> &[f32] {
         bytemuck::cast_slice(self.arena.get(region.range()).unwrap_or(&[]))
     }
 
     fn floats_mut(&mut self, region: Region) -> &mut [f32] {
-        bytemuck::cast_slice_mut(self.arena.get_mut(region.range()).unwrap_or(&mut []))
+        bytemuck::cast_slice_mut(self.words_mut(region))
+    }
+
+    #[inline(never)]
+    fn words_mut(&mut self, region: Region) -> &mut [u32] {
+        part(self.arena, &region.range())
     }
 }
 
+/// Stands for a region that an operation has not.
+const NONE: Region = Region { offset: 0, len: 0 };
+
 /// The regions of an operation as slices; `None` where they overlap or lie outside, which the image's check has excluded.
-fn regions<const N: usize>(arena: &mut [u32], regions: [Region; N]) -> Option<[&mut [u32]; N]> {
-    arena.get_disjoint_mut(regions.map(Region::range)).ok()
+#[inline(never)]
+fn regions(arena: &mut [u32], a: Region, b: Region, c: Region) -> Option<(&mut [u32], &mut [u32], &mut [u32])> {
+    match arena.get_disjoint_mut([a.range(), b.range(), c.range()]) {
+        Ok([a, b, c]) => Some((a, b, c)),
+        Err(_) => None,
+    }
 }
 
 /// Runs an operation from where the cursor stands; true at its end. An operation whose regions do not fit, which the image's
@@ -306,7 +331,7 @@ fn run(
     arena: &mut [u32],
     work: Region,
     cursor: &mut Cursor,
-    budget: &mut Budget,
+    budget: &mut impl Meter,
 ) -> Result<bool, NotFinite> {
     let f = bytemuck::cast_slice_mut::<u32, f32>;
     // Elements that this piece takes, and whether it is the last.
@@ -318,24 +343,24 @@ fn run(
     };
     let done = match *op {
         Op::Normalize { src, dst, mean, scale, pre_clip, clip } => {
-            let Some([src, dst]) = regions(arena, [src, dst]) else { return Ok(true) };
+            let Some((src, dst, _)) = regions(arena, src, dst, NONE) else { return Ok(true) };
             let (range, done) = elements(dst.len());
             let of = |constants| <[u32]>::get(constants, range.clone()).unwrap_or(&[]);
             norm::normalize(f(part(src, &range)), of(mean), of(scale), pre_clip, clip, f(part(dst, &range)));
             done
         }
         Op::Linear { src, dst, matrix, accumulate } => {
-            let Some([src, dst, work]) = regions(arena, [src, dst, work]) else { return Ok(true) };
+            let Some((src, dst, work)) = regions(arena, src, dst, work) else { return Ok(true) };
             matrix.resume(&mut cursor.linear, budget, f(src), work, f(dst), accumulate)?
         }
         Op::Function { dst, function } => {
-            let Some([dst]) = regions(arena, [dst]) else { return Ok(true) };
+            let Some((dst, ..)) = regions(arena, dst, NONE, NONE) else { return Ok(true) };
             let (range, done) = elements(dst.len());
             function.apply(f(part(dst, &range)));
             done
         }
         Op::LayerNorm { dst, weight, bias, eps } => {
-            let Some([dst]) = regions(arena, [dst]) else { return Ok(true) };
+            let Some((dst, ..)) = regions(arena, dst, NONE, NONE) else { return Ok(true) };
             let all = budget.take(1, || Price::whole(op)) > 0;
             if all {
                 norm::layer_norm(f(dst), weight, bias, eps);
@@ -343,7 +368,7 @@ fn run(
             all
         }
         Op::RmsNorm { dst, weight, eps } => {
-            let Some([dst]) = regions(arena, [dst]) else { return Ok(true) };
+            let Some((dst, ..)) = regions(arena, dst, NONE, NONE) else { return Ok(true) };
             let all = budget.take(1, || Price::whole(op)) > 0;
             if all {
                 norm::rms_norm(f(dst), weight, eps);
@@ -351,29 +376,25 @@ fn run(
             all
         }
         Op::Add { src, dst } => {
-            let Some([src, dst]) = regions(arena, [src, dst]) else { return Ok(true) };
+            let Some((src, dst, _)) = regions(arena, src, dst, NONE) else { return Ok(true) };
             let (range, done) = elements(dst.len());
-            for (to, from) in f(part(dst, &range)).iter_mut().zip(f(part(src, &range))) {
-                *to += *from;
-            }
+            norm::add(f(part(src, &range)), f(part(dst, &range)));
             done
         }
         Op::Copy { src, dst } => {
-            let Some([src, dst]) = regions(arena, [src, dst]) else { return Ok(true) };
+            let Some((src, dst, _)) = regions(arena, src, dst, NONE) else { return Ok(true) };
             let (range, done) = elements(dst.len());
-            for (to, from) in part(dst, &range).iter_mut().zip(part(src, &range)) {
-                *to = *from;
-            }
+            copy(part(src, &range), part(dst, &range));
             done
         }
         Op::LstmCell { src, dst, cell } => {
-            let Some([src, dst, cell]) = regions(arena, [src, dst, cell]) else { return Ok(true) };
+            let Some((src, dst, cell)) = regions(arena, src, dst, cell) else { return Ok(true) };
             let (range, done) = elements(dst.len());
             recurrent::lstm_elements(range, f(src), f(cell), f(dst));
             done
         }
         Op::GruCell { src, dst, hidden } => {
-            let Some([src, dst, hidden]) = regions(arena, [src, dst, hidden]) else { return Ok(true) };
+            let Some((src, dst, hidden)) = regions(arena, src, dst, hidden) else { return Ok(true) };
             let (range, done) = elements(dst.len());
             recurrent::gru_elements(range, f(src), f(hidden), f(dst));
             done
@@ -383,6 +404,7 @@ fn run(
 }
 
 /// Some of a region's words.
+#[inline(never)]
 fn part<'r>(region: &'r mut [u32], range: &Range<usize>) -> &'r mut [u32] {
     region.get_mut(range.clone()).unwrap_or_default()
 }

@@ -93,6 +93,14 @@ pub mod header {
 
 use header as h;
 
+fn low(word: u32) -> usize {
+    (word & 0xffff) as usize
+}
+
+fn high(word: u32) -> usize {
+    (word >> 16) as usize
+}
+
 /// What a policy's output means.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
@@ -232,6 +240,8 @@ pub struct Contract<'a> {
 #[derive(Clone, Copy, Debug)]
 pub struct Image<'a> {
     words: &'a [u32],
+    /// The first of them.
+    header: &'a [u32; h::WORDS],
 }
 
 impl<'a> Image<'a> {
@@ -247,20 +257,20 @@ impl<'a> Image<'a> {
             return Err(ImageError::TooShort);
         }
         let words: &[u32] = bytemuck::try_cast_slice(bytes).map_err(|_| ImageError::Length)?;
-        let image = Self { words };
-        if image.word(0) != h::MAGIC {
+        let image = Self { words, header: words.first_chunk().ok_or(ImageError::TooShort)? };
+        if image.head(0) != h::MAGIC {
             return Err(ImageError::Magic);
         }
-        if image.low(h::W_VERSION) != h::VERSION as usize || image.high(h::W_VERSION) != h::WORDS {
+        if low(image.head(h::W_VERSION)) != h::VERSION as usize || high(image.head(h::W_VERSION)) != h::WORDS {
             return Err(ImageError::Version);
         }
-        if image.word(h::W_BYTES) as usize != bytes.len() {
+        if image.head(h::W_BYTES) as usize != bytes.len() {
             return Err(ImageError::Length);
         }
-        if image.word(h::W_CRC) != checksum(bytes) {
+        if image.head(h::W_CRC) != checksum(bytes) {
             return Err(ImageError::Checksum);
         }
-        if image.word(h::W_LAYOUT) != LAYOUT_STAMP {
+        if image.head(h::W_LAYOUT) != LAYOUT_STAMP {
             return Err(ImageError::Layout);
         }
         image.check()?;
@@ -271,29 +281,38 @@ impl<'a> Image<'a> {
         u32::from_le(self.words.get(i).copied().unwrap_or(0))
     }
 
+    /// A word of the header.
+    #[inline(always)]
+    fn head(&self, i: usize) -> u32 {
+        u32::from_le(self.header[i])
+    }
+
     fn low(&self, i: usize) -> usize {
-        (self.word(i) & 0xffff) as usize
+        low(self.word(i))
     }
 
     fn high(&self, i: usize) -> usize {
-        (self.word(i) >> 16) as usize
+        high(self.word(i))
     }
 
     fn float(&self, i: usize) -> f32 {
         f32::from_bits(self.word(i))
     }
 
+    #[inline(never)]
     fn section(&self, offset: usize, len: usize) -> &'a [u32] {
         offset.checked_add(len).and_then(|end| self.words.get(offset..end)).unwrap_or(&[])
     }
 
     /// `len` words at `offset`, refused where they are not all in the image.
+    #[inline(never)]
     fn checked(&self, offset: usize, len: usize) -> Result<&'a [u32], ImageError> {
         let section = self.section(offset, len);
         if section.len() == len && (len == 0 || offset >= h::WORDS) { Ok(section) } else { Err(ImageError::Section) }
     }
 
     /// `len` f32 constants at `offset`, refused where one is not finite.
+    #[inline(never)]
     fn constants(&self, offset: usize, len: usize) -> Result<&'a [u32], ImageError> {
         let section = self.checked(offset, len)?;
         if section.iter().all(|&w| f32::from_bits(u32::from_le(w)).is_finite()) {
@@ -305,43 +324,43 @@ impl<'a> Image<'a> {
 
     /// Length of an observation.
     pub fn obs_len(&self) -> usize {
-        self.low(h::W_SIZES)
+        low(self.head(h::W_SIZES))
     }
 
     /// Length of an action.
     pub fn act_len(&self) -> usize {
-        self.high(h::W_SIZES)
+        high(self.head(h::W_SIZES))
     }
 
     /// What the output means.
     pub fn kind(&self) -> Kind {
-        if self.word(h::W_KIND) as u8 == 1 { Kind::Chunk } else { Kind::Step }
+        if self.head(h::W_KIND) as u8 == 1 { Kind::Chunk } else { Kind::Step }
     }
 
     /// Actions in the network's output.
     pub fn chunk(&self) -> usize {
-        self.low(h::W_CHUNK)
+        low(self.head(h::W_CHUNK))
     }
 
     /// How many of a chunk's actions are executed before the network runs again.
     pub fn execute(&self) -> usize {
-        self.high(h::W_CHUNK)
+        high(self.head(h::W_CHUNK))
     }
 
     /// Words of scratch memory that a head needs.
     pub fn scratch_words(&self) -> usize {
-        self.word(h::W_SCRATCH) as usize
+        self.head(h::W_SCRATCH) as usize
     }
 
     /// Control rate in Hz that the policy was trained for.
     pub fn rate_hz(&self) -> f32 {
-        self.float(h::W_RATE)
+        f32::from_bits(self.head(h::W_RATE))
     }
 
     /// The policy's name.
     pub fn name(&self) -> &'a str {
-        let len = self.high(h::W_STEPS_NAME);
-        let bytes: &[u8] = bytemuck::cast_slice(self.section(self.word(h::W_NAME) as usize, len.div_ceil(4)));
+        let len = high(self.head(h::W_STEPS_NAME));
+        let bytes: &[u8] = bytemuck::cast_slice(self.section(self.head(h::W_NAME) as usize, len.div_ceil(4)));
         core::str::from_utf8(bytes.get(..len).unwrap_or(&[])).unwrap_or("")
     }
 
@@ -356,12 +375,12 @@ impl<'a> Image<'a> {
 
     /// Weights of the source policy's matrices, before anything was removed.
     pub fn source_weights(&self) -> usize {
-        self.word(h::W_WEIGHTS) as usize
+        self.head(h::W_WEIGHTS) as usize
     }
 
     /// CRC-32 of the image, as in the header.
     pub fn crc(&self) -> u32 {
-        self.word(h::W_CRC)
+        self.head(h::W_CRC)
     }
 
     /// Bytes of the image.
@@ -371,27 +390,27 @@ impl<'a> Image<'a> {
 
     /// Arena region that a reset zeroes.
     pub fn state(&self) -> Region {
-        Region { offset: self.low(h::W_STATE), len: self.high(h::W_STATE) }
+        Region { offset: low(self.head(h::W_STATE)), len: high(self.head(h::W_STATE)) }
     }
 
     /// Arena region of the observation.
     pub fn observation(&self) -> Region {
-        Region { offset: self.low(h::W_OBS_OUT), len: self.obs_len() }
+        Region { offset: low(self.head(h::W_OBS_OUT)), len: self.obs_len() }
     }
 
     /// Arena region of the network's output.
     pub fn output(&self) -> Region {
-        Region { offset: self.high(h::W_OBS_OUT), len: self.chunk() * self.act_len() }
+        Region { offset: high(self.head(h::W_OBS_OUT)), len: self.chunk() * self.act_len() }
     }
 
     /// Arena region of the action.
     pub fn action(&self) -> Region {
-        Region { offset: self.low(h::W_ACTION_WORK), len: self.act_len() }
+        Region { offset: low(self.head(h::W_ACTION_WORK)), len: self.act_len() }
     }
 
     /// Arena region in which activations are prepared.
     pub fn work(&self) -> Region {
-        Region { offset: self.high(h::W_ACTION_WORK), len: self.low(h::W_WORK_FLAGS) }
+        Region { offset: high(self.head(h::W_ACTION_WORK)), len: low(self.head(h::W_WORK_FLAGS)) }
     }
 
     /// The least budget, in modelled instructions, with which [`crate::Head::poll`] runs the image.
@@ -401,7 +420,7 @@ impl<'a> Image<'a> {
 
     /// Number of operations.
     pub fn op_count(&self) -> usize {
-        self.high(h::W_KIND)
+        high(self.head(h::W_KIND))
     }
 
     /// The operations in order.
@@ -412,8 +431,8 @@ impl<'a> Image<'a> {
 
     /// The action contract.
     pub fn contract(&self) -> Contract<'a> {
-        let mut offset = self.word(h::W_CONTRACT) as usize;
-        let flags = self.high(h::W_WORK_FLAGS);
+        let mut offset = self.head(h::W_CONTRACT) as usize;
+        let flags = high(self.head(h::W_WORK_FLAGS));
         let mut array = |bit: usize| {
             let len = if flags >> bit & 1 == 1 { self.act_len() } else { 0 };
             let section = self.section(offset, len);
@@ -425,7 +444,7 @@ impl<'a> Image<'a> {
 
     /// Steps of the self-test vector.
     pub fn self_test_steps(&self) -> usize {
-        self.low(h::W_STEPS_NAME)
+        low(self.head(h::W_STEPS_NAME))
     }
 
     /// Observation (f32 bits) and expected action (f32 bits) of a self-test step, played in order after a reset.
@@ -434,13 +453,13 @@ impl<'a> Image<'a> {
             return None;
         }
         let (obs, act) = (self.obs_len(), self.act_len());
-        let offset = self.word(h::W_SELF_TEST) as usize + step * (obs + act);
+        let offset = self.head(h::W_SELF_TEST) as usize + step * (obs + act);
         Some((self.section(offset, obs), self.section(offset + obs, act)))
     }
 
     /// Operation `i`; `None` past the end. (Within a checked image every record parses.)
     pub(crate) fn op(&self, i: usize) -> Option<Op<'a>> {
-        let at = self.word(h::W_OPS) as usize + i * h::OP_WORDS;
+        let at = self.head(h::W_OPS) as usize + i * h::OP_WORDS;
         let head = self.word(at);
         let (kind, detail, len) = (head as u8, (head >> 8) as u8, (head >> 16) as usize);
         let dst = Region { offset: self.low(at + 1), len };
@@ -491,11 +510,11 @@ impl<'a> Image<'a> {
     }
 
     fn check(&self) -> Result<(), ImageError> {
-        let reserved = [self.word(28), self.word(29), self.word(30), self.word(31)];
-        if reserved != [0; 4] || (self.word(h::W_KIND) >> 8) as u8 != 0 || self.high(h::W_WORK_FLAGS) >> 5 != 0 {
+        let reserved = self.header[28] | self.header[29] | self.header[30] | self.header[31];
+        if reserved != 0 || (self.head(h::W_KIND) >> 8) as u8 != 0 || high(self.head(h::W_WORK_FLAGS)) >> 5 != 0 {
             return Err(ImageError::Reserved);
         }
-        match (self.word(h::W_KIND) as u8, self.chunk(), self.execute()) {
+        match (self.head(h::W_KIND) as u8, self.chunk(), self.execute()) {
             (0, 1, 1) => {}
             (1, chunk, execute) if (1..=chunk).contains(&execute) => {}
             (0 | 1, ..) => return Err(ImageError::Chunk),
@@ -518,9 +537,9 @@ impl<'a> Image<'a> {
         if !(self.rate_hz().is_finite() && self.rate_hz() > 0.0) {
             return Err(ImageError::Constant);
         }
-        let name_len = self.high(h::W_STEPS_NAME);
-        let name: &[u8] = bytemuck::cast_slice(self.checked(self.word(h::W_NAME) as usize, name_len.div_ceil(4))?);
-        if core::str::from_utf8(name.get(..name_len).unwrap_or(&[])).is_err() {
+        let name_len = high(self.head(h::W_STEPS_NAME));
+        let name: &[u8] = bytemuck::cast_slice(self.checked(self.head(h::W_NAME) as usize, name_len.div_ceil(4))?);
+        if !is_utf8(name.get(..name_len).unwrap_or(&[])) {
             return Err(ImageError::Name);
         }
         // A head that tests nothing would report success.
@@ -528,17 +547,17 @@ impl<'a> Image<'a> {
             return Err(ImageError::SelfTest);
         }
         self.constants(
-            self.word(h::W_SELF_TEST) as usize,
+            self.head(h::W_SELF_TEST) as usize,
             self.self_test_steps().saturating_mul(self.obs_len() + self.act_len()),
         )?;
         self.check_contract()?;
-        self.checked(self.word(h::W_OPS) as usize, self.op_count() * h::OP_WORDS)?;
+        self.checked(self.head(h::W_OPS) as usize, self.op_count() * h::OP_WORDS)?;
         (0..self.op_count()).try_for_each(|i| self.check_op(i))
     }
 
     fn check_contract(&self) -> Result<(), ImageError> {
-        let arrays = (self.high(h::W_WORK_FLAGS) & 0x1f).count_ones() as usize;
-        self.constants(self.word(h::W_CONTRACT) as usize, arrays * self.act_len())?;
+        let arrays = (high(self.head(h::W_WORK_FLAGS)) & 0x1f).count_ones() as usize;
+        self.constants(self.head(h::W_CONTRACT) as usize, arrays * self.act_len())?;
         let contract = self.contract();
         let float = |w: &u32| f32::from_bits(u32::from_le(*w));
         if contract.low.iter().zip(contract.high).any(|(low, high)| float(low) > float(high)) {
@@ -554,8 +573,9 @@ impl<'a> Image<'a> {
         if region.offset + region.len <= self.scratch_words() { Ok(()) } else { Err(ImageError::Arena) }
     }
 
+    #[inline(never)]
     fn check_op(&self, i: usize) -> Result<(), ImageError> {
-        let at = self.word(h::W_OPS) as usize + i * h::OP_WORDS;
+        let at = self.head(h::W_OPS) as usize + i * h::OP_WORDS;
         let detail = (self.word(at) >> 8) as u8;
         let data = self.word(at + 3) as usize;
         // Shapes of the matrix are read before the op is built, so that a bad offset is named as such.
@@ -564,7 +584,7 @@ impl<'a> Image<'a> {
             h::op::NORMALIZE | h::op::LAYER_NORM | h::op::RMS_NORM => self.checked(data, 1)?,
             _ => &[],
         };
-        let op = self.op(i).ok_or(ImageError::Op)?;
+        let Some(op) = &self.op(i) else { return Err(ImageError::Op) };
         let uses_detail = matches!(op, Op::Function { .. } | Op::Linear { .. });
         if (!uses_detail && detail != 0) || (matches!(op, Op::Linear { .. }) && detail > 1) {
             return Err(ImageError::Reserved);
@@ -584,7 +604,7 @@ impl<'a> Image<'a> {
         }
         let clip = |x: f32| if x > 0.0 { Ok(()) } else { Err(ImageError::Constant) };
         // In-place operations have no source; the region stands in for itself.
-        let (dst, sources) = match op {
+        let (dst, sources) = match *op {
             Op::Normalize { src, dst, pre_clip, clip: limit, .. } => {
                 self.checked(data, 2)?;
                 clip(pre_clip)?;
@@ -592,8 +612,8 @@ impl<'a> Image<'a> {
                 self.constants(data + 2, 2 * dst.len)?;
                 (dst, [Some(src), None])
             }
-            Op::Linear { src, dst, matrix, .. } => {
-                self.check_matrix(data, &matrix)?;
+            Op::Linear { src, dst, ref matrix, .. } => {
+                self.check_matrix(data, matrix)?;
                 if matrix.cols != src.len || matrix.rows != dst.len {
                     return Err(ImageError::Shape);
                 }
@@ -642,6 +662,7 @@ impl<'a> Image<'a> {
         Ok(())
     }
 
+    #[inline(never)]
     fn check_matrix(&self, at: usize, matrix: &Matrix<'a>) -> Result<(), ImageError> {
         let blocks = self.low(at + 2);
         if self.high(at + 2) != 0 {
@@ -664,7 +685,10 @@ impl<'a> Image<'a> {
         let mut seen = [0u32; h::MAX_ROWS / 32];
         let mut first_row = 0;
         for i in 0..blocks {
-            let rows = self.check_block(matrix, at + h::MATRIX_WORDS + i * h::BLOCK_WORDS, first_row)?;
+            let record = at + h::MATRIX_WORDS + i * h::BLOCK_WORDS;
+            self.check_block(matrix, record)?;
+            let record = self.section(record, h::BLOCK_WORDS);
+            let Some(rows) = row_block(matrix, record, first_row) else { return Err(ImageError::Section) };
             first_row += rows.block.shape().rows;
             for row in 0..rows.block.shape().rows {
                 let output = rows.output(row);
@@ -687,7 +711,8 @@ impl<'a> Image<'a> {
         Ok(())
     }
 
-    fn check_block(&self, matrix: &Matrix<'a>, at: usize, first_row: usize) -> Result<RowBlock<'a>, ImageError> {
+    #[inline(never)]
+    fn check_block(&self, matrix: &Matrix<'a>, at: usize) -> Result<(), ImageError> {
         let head = self.word(at);
         let width = Width::from_bits(head & 0xff).ok_or(ImageError::Width)?;
         let lanes = Lanes::from_code((head >> 8) as u8).ok_or(ImageError::Lanes)?;
@@ -704,13 +729,40 @@ impl<'a> Image<'a> {
         if self.word(at + 3) != 0 {
             self.checked(self.word(at + 3) as usize, rows.div_ceil(2))?;
         }
-        let record = self.section(at, h::BLOCK_WORDS);
-        row_block(matrix, record, first_row).ok_or(ImageError::Section)
+        Ok(())
     }
 }
 
+/// What `core::str::from_utf8` finds, in a quarter of its code.
+fn is_utf8(bytes: &[u8]) -> bool {
+    // Bytes that must follow, the code point so far, and the least one that needs so many bytes.
+    let (mut more, mut point, mut least) = (0, 0, 0);
+    for &byte in bytes {
+        let byte = u32::from(byte);
+        if more > 0 {
+            if byte & 0xc0 != 0x80 {
+                return false;
+            }
+            (more, point) = (more - 1, point << 6 | byte & 0x3f);
+            if more == 0 && (point < least || point > 0x10_ffff || (0xd800..0xe000).contains(&point)) {
+                return false;
+            }
+        } else {
+            (more, point, least) = match byte {
+                0..0x80 => (0, 0, 0),
+                0xc0..0xe0 => (1, byte & 0x1f, 0x80),
+                0xe0..0xf0 => (2, byte & 0x0f, 0x800),
+                0xf0..0xf8 => (3, byte & 0x07, 0x1_0000),
+                _ => return false,
+            };
+        }
+    }
+    more == 0
+}
+
 /// The block of a record; `None` where its words do not fit its shape.
-fn row_block<'a>(matrix: &Matrix<'a>, record: &'a [u32], first_row: usize) -> Option<RowBlock<'a>> {
+#[inline(never)]
+pub(crate) fn row_block<'a>(matrix: &Matrix<'a>, record: &'a [u32], first_row: usize) -> Option<RowBlock<'a>> {
     let word = |i: usize| record.get(i).map_or(0, |w| u32::from_le(*w));
     let rows = (word(0) >> 16) as usize;
     let width = Width::from_bits(word(0) & 0xff)?;
@@ -767,4 +819,25 @@ pub fn checksum(bytes: &[u8]) -> u32 {
 /// Packs u16 values two a word, as scales and indexes stand in the image.
 pub fn half_words(values: &[u16]) -> impl Iterator<Item = u32> + '_ {
     values.chunks(2).map(|pair| pair.iter().rev().fold(0u32, |word, v| word << 16 | u32::from(*v)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_utf8;
+
+    /// All sequences of up to four bytes from those where the rules change.
+    #[test]
+    fn utf8_is_what_core_says() {
+        let edges =
+            [0x00, 0x7f, 0x80, 0x8f, 0x90, 0x9f, 0xa0, 0xbf, 0xc0, 0xc1, 0xc2, 0xdf, 0xe0, 0xe1, 0xec, 0xed, 0xee];
+        let edges = [&edges[..], &[0xef, 0xf0, 0xf1, 0xf3, 0xf4, 0xf5, 0xf7, 0xf8, 0xff]].concat();
+        let mut sequences = vec![Vec::new()];
+        for _ in 0..4 {
+            let longer = sequences.iter().flat_map(|s: &Vec<u8>| edges.iter().map(|b| [&s[..], &[*b]].concat()));
+            sequences = longer.collect();
+            for bytes in &sequences {
+                assert_eq!(is_utf8(bytes), core::str::from_utf8(bytes).is_ok(), "{bytes:x?}");
+            }
+        }
+    }
 }

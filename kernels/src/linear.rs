@@ -12,8 +12,8 @@ use crate::activations::{NotFinite, Prepared, Scale, max_prepared_words, prepare
 use crate::armv7em;
 use crate::format::{Block, Lanes, QUAD, STRIP};
 use crate::gemv::gemv;
-use crate::image::header::BLOCK_WORDS;
-use crate::slice::{Budget, LinearCursor, Price};
+use crate::image::{header::BLOCK_WORDS, row_block};
+use crate::slice::{LinearCursor, Meter, Price, Unlimited};
 
 /// Rows whose sums stand on the stack at once.
 pub(crate) const RUN: usize = 8 * STRIP;
@@ -57,6 +57,22 @@ pub(crate) fn half_word(words: &[u32], i: usize) -> u16 {
     (u32::from_le(word) >> (16 * (i % 2))) as u16
 }
 
+/// `to = from`, as far as both go. On the target not by memcpy, which takes as much code as a kernel.
+pub(crate) fn copy(from: &[u32], to: &mut [u32]) {
+    #[cfg(actq_armv7em)]
+    crate::armv7em::copy(from, to);
+    #[cfg(not(actq_armv7em))]
+    to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
+}
+
+/// As [`copy`], of words as they stand in the image.
+pub(crate) fn copy_le(from: &[u32], to: &mut [u32]) {
+    copy(from, to);
+    if cfg!(target_endian = "big") {
+        to.iter_mut().for_each(|word| *word = u32::from_le(*word));
+    }
+}
+
 /// A part of the biases, if there are any; `None` where they are too short.
 #[inline(always)]
 fn slice_of(start: Option<&[u32]>, at: Range<usize>) -> Option<Option<&[u32]>> {
@@ -96,7 +112,7 @@ impl RowBlock<'_> {
     ) {
         let x_scale = x_scale.get();
         if start.is_none() || !self.index.is_empty() {
-            return self.apply_runs::<RUN>(rows, x, x_scale, start, y);
+            return self.apply_runs(&mut [0; RUN], rows, x, x_scale, start, y);
         }
         // Rows in order have room for their sums in y itself, except those of a last strip that padding fills.
         let whole = if rows.end.is_multiple_of(QUAD) { rows.end } else { rows.end & !(STRIP - 1) };
@@ -109,13 +125,15 @@ impl RowBlock<'_> {
             self.scale_in_order(rows.start, None, x_scale, start, y);
         }
         if whole < rows.end {
-            self.apply_runs::<STRIP>(whole..rows.end, x, x_scale, start, y);
+            self.apply_runs(&mut [0; STRIP], whole..rows.end, x, x_scale, start, y);
         }
     }
 
-    /// As [`Self::apply`], for a run of rows as there, with the sums of `RUN` rows on the stack at once.
-    fn apply_runs<const RUN: usize>(
+    /// As [`Self::apply`], for a run of rows as there, as many at once as have room in `sums`.
+    #[inline(never)]
+    fn apply_runs(
         &self,
+        sums: &mut [i32],
         rows: Range<usize>,
         x: &Prepared<'_>,
         x_scale: f32,
@@ -123,13 +141,13 @@ impl RowBlock<'_> {
         y: &mut [f32],
     ) {
         let mut first = rows.start;
-        let mut sums = [0; RUN];
         while first < rows.end {
-            let sums = &mut sums[..RUN.min(rows.end.next_multiple_of(QUAD) - first)];
+            let run = sums.len().min(rows.end.next_multiple_of(QUAD) - first);
+            let Some(sums) = sums.get_mut(..run) else { return };
             if gemv(&self.block, x, first, sums).is_err() {
                 return;
             }
-            let sums = &sums[..sums.len().min(rows.end - first)];
+            let sums = sums.get(..rows.end - first).unwrap_or(sums);
             if self.index.is_empty() {
                 let at = self.first_row + first..self.first_row + first + sums.len();
                 let (Some(start), Some(y)) = (slice_of(start, at.clone()), y.get_mut(at)) else { return };
@@ -153,13 +171,32 @@ impl RowBlock<'_> {
         }
     }
 
-    /// Adds the sums of the rows from `first` on, scaled, to what `start` or y holds at the rows' places.
+    /// Adds the sums of the rows from `first`, an even number, on, scaled, to what `start` or y holds at the rows' places.
+    #[inline(never)]
     fn scale_by_index(&self, first: usize, sums: &[i32], x_scale: f32, start: Option<&[u32]>, y: &mut [f32]) {
-        for (i, sum) in (first..).zip(sums) {
-            let at = self.output(i);
-            let Some(y) = y.get_mut(at) else { continue };
-            let start = start.and_then(|s| s.get(at)).map_or(*y, |bits| f32::from_bits(u32::from_le(*bits)));
-            *y = start + *sum as f32 * (self.scale(i) * x_scale);
+        let words = |words| <[u32]>::get(words, first / 2..).unwrap_or(&[]);
+        if let Some(start) = start {
+            for i in (first..first + sums.len()).map(|i| self.output(i)) {
+                if let (Some(y), Some(start)) = (y.get_mut(i), start.get(i)) {
+                    *y = f32::from_bits(u32::from_le(*start));
+                }
+            }
+        }
+        let mut add = |sum: i32, scale: u32, at: u32| {
+            if let Some(y) = y.get_mut(at as usize) {
+                *y += sum as f32 * (f32::from_bits(scale) * x_scale);
+            }
+        };
+        // Two rows to a word of scales and of indexes.
+        let (pairs, rest) = sums.as_chunks::<2>();
+        let mut words =
+            words(self.scales).iter().zip(words(self.index)).map(|(s, i)| (u32::from_le(*s), u32::from_le(*i)));
+        for ([even, odd], (scales, at)) in pairs.iter().zip(&mut words) {
+            add(*even, scales << 16, at & 0xffff);
+            add(*odd, scales & 0xffff_0000, at >> 16);
+        }
+        if let (Some(sum), Some((scales, at))) = (rest.first(), words.next()) {
+            add(*sum, scales << 16, at & 0xffff);
         }
     }
 }
@@ -178,8 +215,7 @@ impl Matrix<'_> {
     /// `y = W x + b`, or `y = y + b + W x` where `accumulate`. `work` holds at least [`Self::prepared_words`] words; `x` and
     /// `y` have the matrix's lengths (what is missing is left out).
     pub fn apply(&self, x: &[f32], work: &mut [u32], y: &mut [f32], accumulate: bool) -> Result<(), NotFinite> {
-        let mut budget = Budget::UNLIMITED;
-        self.resume(&mut LinearCursor::default(), &mut budget, x, work, y, accumulate)?;
+        self.resume(&mut LinearCursor::default(), &mut Unlimited, x, work, y, accumulate)?;
         Ok(())
     }
 
@@ -187,7 +223,7 @@ impl Matrix<'_> {
     pub(crate) fn resume(
         &self,
         at: &mut LinearCursor,
-        budget: &mut Budget,
+        budget: &mut impl Meter,
         x: &[f32],
         work: &mut [u32],
         y: &mut [f32],
@@ -209,7 +245,13 @@ impl Matrix<'_> {
             }
         }
         let mut prepared: Option<Prepared<'_>> = None;
-        for rows in self.blocks().skip(at.block) {
+        let mut first_row = 0;
+        for (i, record) in self.records.as_chunks::<BLOCK_WORDS>().0.iter().enumerate() {
+            let Some(rows) = row_block(self, record, first_row) else { continue };
+            first_row += rows.block.shape().rows;
+            if i < at.block {
+                continue;
+            }
             let shape = rows.block.shape();
             // Layouts prepare the activations differently; the blocks of one width share them.
             if prepared.is_none_or(|x| !x.fits(shape)) {
@@ -251,9 +293,10 @@ impl Matrix<'_> {
     /// Whether the blocks hold all rows in the order of the output.
     fn is_whole(&self) -> bool {
         let mut rows = 0;
-        self.blocks().all(|block| {
-            rows += block.block.shape().rows;
-            block.index.is_empty()
+        let (records, _) = self.records.as_chunks::<BLOCK_WORDS>();
+        records.iter().all(|[head, _, _, index]| {
+            rows += (u32::from_le(*head) >> 16) as usize;
+            *index == 0
         }) && rows == self.rows
     }
 
@@ -261,12 +304,12 @@ impl Matrix<'_> {
     fn start(&self, outputs: Range<usize>, y: &mut [f32], accumulate: bool) {
         let bias = self.bias.get(outputs.clone()).unwrap_or(&[]);
         let Some(y) = y.get_mut(outputs) else { return };
-        if !accumulate {
+        if accumulate {
+            y.iter_mut().zip(bias).for_each(|(y, bias)| *y += f32::from_bits(u32::from_le(*bias)));
+        } else if bias.is_empty() {
             y.fill(0.0);
-        }
-        for (y, &bias) in y.iter_mut().zip(bias) {
-            let bias = f32::from_bits(u32::from_le(bias));
-            *y = if accumulate { *y + bias } else { bias };
+        } else {
+            copy_le(bias, bytemuck::cast_slice_mut(y));
         }
     }
 }

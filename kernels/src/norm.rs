@@ -1,8 +1,9 @@
-//! Normalizations.
+//! Normalizations, and sums of vectors.
 
 use crate::math::clamp;
 
 /// `y = clamp((clamp(x, ±pre_clip) - mean) * scale, ±clip)`; an infinite clip does nothing. `mean` and `scale` hold f32 bits.
+#[inline(never)]
 pub fn normalize(x: &[f32], mean: &[u32], scale: &[u32], pre_clip: f32, clip: f32, y: &mut [f32]) {
     for (((y, x), &mean), &scale) in y.iter_mut().zip(x).zip(mean).zip(scale) {
         let x = clamp(*x, -pre_clip, pre_clip);
@@ -13,24 +14,63 @@ pub fn normalize(x: &[f32], mean: &[u32], scale: &[u32], pre_clip: f32, clip: f3
 
 /// In place `(x - mean) / sqrt(variance + eps) * weight + bias`, mean and biased variance over the vector (torch's LayerNorm).
 /// Sums run in order from the first element.
+#[inline(never)]
 pub fn layer_norm(x: &mut [f32], weight: &[u32], bias: &[u32], eps: f32) {
     let n = x.len().max(1) as f32;
-    let mean = x.iter().fold(0.0, |sum, v| sum + v) / n;
-    let variance = x.iter().fold(0.0, |sum, v| sum + (v - mean) * (v - mean)) / n;
-    let inverse = 1.0 / libm::sqrtf(variance + eps);
-    for ((x, &weight), &bias) in x.iter_mut().zip(weight).zip(bias) {
-        *x = (*x - mean) * inverse * constant(weight) + constant(bias);
+    let mean = sum(x, |v| v) / n;
+    let variance = sum(x, |v| (v - mean) * (v - mean)) / n;
+    let inverse = 1.0 / sqrt(variance + eps);
+    let apply = |x: &mut f32, weight: u32, bias: u32| *x = (*x - mean) * inverse * constant(weight) + constant(bias);
+    let ((pairs, rest), (weights, weight), (biases, bias)) =
+        (x.as_chunks_mut::<2>(), weight.as_chunks::<2>(), bias.as_chunks::<2>());
+    for ((x, weight), bias) in pairs.iter_mut().zip(weights).zip(biases) {
+        apply(&mut x[0], weight[0], bias[0]);
+        apply(&mut x[1], weight[1], bias[1]);
+    }
+    for ((x, weight), bias) in rest.iter_mut().zip(weight).zip(bias) {
+        apply(x, *weight, *bias);
     }
 }
 
 /// In place `x / sqrt(mean(x^2) + eps) * weight`.
+#[inline(never)]
 pub fn rms_norm(x: &mut [f32], weight: &[u32], eps: f32) {
     let n = x.len().max(1) as f32;
-    let mean_square = x.iter().fold(0.0, |sum, v| sum + v * v) / n;
-    let inverse = 1.0 / libm::sqrtf(mean_square + eps);
+    let mean_square = sum(x, |v| v * v) / n;
+    let inverse = 1.0 / sqrt(mean_square + eps);
     for (x, &weight) in x.iter_mut().zip(weight) {
         *x = *x * inverse * constant(weight);
     }
+}
+
+/// `y += x`, as far as both go.
+#[inline(never)]
+pub fn add(x: &[f32], y: &mut [f32]) {
+    let len = x.len().min(y.len());
+    let ((xs, x_rest), (ys, y_rest)) = (x[..len].as_chunks::<4>(), y[..len].as_chunks_mut::<4>());
+    for (y, x) in ys.iter_mut().zip(xs) {
+        *y = [y[0] + x[0], y[1] + x[1], y[2] + x[2], y[3] + x[3]];
+    }
+    for (y, x) in y_rest.iter_mut().zip(x_rest) {
+        *y += *x;
+    }
+}
+
+/// The sum in order from the first element, four in a pass.
+#[inline(always)]
+fn sum(x: &[f32], of: impl Fn(f32) -> f32) -> f32 {
+    let (fours, rest) = x.as_chunks::<4>();
+    let sum = fours.iter().fold(0.0, |sum, [a, b, c, d]| sum + of(*a) + of(*b) + of(*c) + of(*d));
+    rest.iter().fold(sum, |sum, v| sum + of(*v))
+}
+
+/// The square root, correctly rounded on every machine.
+#[inline(always)]
+fn sqrt(x: f32) -> f32 {
+    #[cfg(actq_fpu)]
+    return crate::armv7em::sqrt(x);
+    #[cfg(not(actq_fpu))]
+    libm::sqrtf(x)
 }
 
 /// An f32 constant as it stands in the image.

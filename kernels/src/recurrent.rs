@@ -19,6 +19,7 @@ pub fn lstm_cell(gates: &[f32], c: &mut [f32], h: &mut [f32]) {
 }
 
 /// As [`lstm_cell`], for some of the elements.
+#[inline(never)]
 pub(crate) fn lstm_elements(elements: Range<usize>, gates: &[f32], c: &mut [f32], h: &mut [f32]) {
     let n = h.len();
     let gate = |k: usize| gates.get(k * n + elements.start..).unwrap_or(&[]);
@@ -37,6 +38,7 @@ pub fn gru_cell(a: &[f32], b: &[f32], h: &mut [f32]) {
 }
 
 /// As [`gru_cell`], for some of the elements.
+#[inline(never)]
 pub(crate) fn gru_elements(elements: Range<usize>, a: &[f32], b: &[f32], h: &mut [f32]) {
     let n = h.len();
     let gate = |gates, k: usize| -> &[f32] { <[f32]>::get(gates, k * n + elements.start..).unwrap_or(&[]) };

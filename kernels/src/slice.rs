@@ -84,6 +84,31 @@ impl Price {
     }
 }
 
+/// Says how far a piece of work may go.
+pub(crate) trait Meter {
+    /// Takes as many of `units` as there is room for, and says how many those are.
+    fn take(&mut self, units: usize, price: impl FnOnce() -> Price) -> usize;
+
+    /// Takes the price of coming to an operation, at its start or in its midst; false where it does not fit.
+    fn enter(&mut self, op: &Op<'_>) -> bool;
+}
+
+/// No limit. Where steps are not cut, no code asks for a price, and the cost model is not in the program.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Unlimited;
+
+impl Meter for Unlimited {
+    #[inline(always)]
+    fn take(&mut self, units: usize, _: impl FnOnce() -> Price) -> usize {
+        units
+    }
+
+    #[inline(always)]
+    fn enter(&mut self, _: &Op<'_>) -> bool {
+        true
+    }
+}
+
 /// What may still be spent.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Budget {
@@ -91,7 +116,7 @@ pub(crate) struct Budget {
 }
 
 impl Budget {
-    pub(crate) const UNLIMITED: Self = Self { left: u32::MAX };
+    const UNLIMITED: Self = Self { left: u32::MAX };
 
     /// The budget of a poll with `instructions`, of which the poll itself takes a part.
     pub(crate) fn of_poll(instructions: u32) -> Self {
@@ -99,12 +124,6 @@ impl Budget {
             Some(parts) => Self { left: parts.saturating_sub(poll()) },
             None => Self::UNLIMITED,
         }
-    }
-
-    /// Takes as many of `units` as there is room for, and says how many those are.
-    #[inline(always)]
-    pub(crate) fn take(&mut self, units: usize, price: impl FnOnce() -> Price) -> usize {
-        if self.left == u32::MAX { units } else { self.take_priced(units, price()) }
     }
 
     #[inline(never)]
@@ -117,20 +136,23 @@ impl Budget {
         units
     }
 
-    /// Takes the price of coming to an operation, at its start or in its midst; false where it does not fit.
-    #[inline(always)]
-    pub(crate) fn enter(&mut self, op: &Op<'_>) -> bool {
-        if self.left == u32::MAX {
-            return true;
-        }
-        self.pay(entrance(op))
-    }
-
     #[inline(never)]
     fn pay(&mut self, price: u32) -> bool {
         let left = self.left.checked_sub(price);
         self.left = left.unwrap_or(0);
         left.is_some()
+    }
+}
+
+impl Meter for Budget {
+    #[inline(always)]
+    fn take(&mut self, units: usize, price: impl FnOnce() -> Price) -> usize {
+        if self.left == u32::MAX { units } else { self.take_priced(units, price()) }
+    }
+
+    #[inline(always)]
+    fn enter(&mut self, op: &Op<'_>) -> bool {
+        self.left == u32::MAX || self.pay(entrance(op))
     }
 }
 
@@ -173,6 +195,14 @@ pub(crate) struct Cursor {
     pub(crate) done: usize,
     /// Of a linear operation.
     pub(crate) linear: LinearCursor,
+}
+
+impl Cursor {
+    /// Whether work has been done since `begin`, the start of an operation.
+    pub(crate) fn has_left(&self, begin: Self) -> bool {
+        // A linear operation begins with its scale.
+        self.op != begin.op || self.done > 0 || self.linear.scale.is_some()
+    }
 }
 
 /// Where a linear operation stands.

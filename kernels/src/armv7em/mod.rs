@@ -1,7 +1,7 @@
 //! The GEMV in Armv7E-M assembler (Cortex-M4 and M7): SMLAD makes two MACs a cycle, four with paired lanes.
 //!
 //! `single.s` holds one loop nest, stamped over the four layouts of single lanes; the layouts of paired lanes have a file
-//! each. Every kernel comes with and without group scales and computes exactly what [`crate::portable`] computes; the tests
+//! each, with a kernel for row scales and one for group scales. All compute exactly what [`crate::portable`] computes; the tests
 //! run both on the same data.
 //!
 //! SMLAD sets the Q flag; the procedure call standard lets a call change it.
@@ -54,8 +54,7 @@ macro_rules! kernels {
     };
 }
 kernels! {
-    actq_w2_row actq_w3_row actq_w4_row actq_w8_row
-    actq_w2_group actq_w3_group actq_w4_group actq_w8_group
+    actq_w2 actq_w3 actq_w4 actq_w8
     actq_w2_paired_row actq_w2_paired_row4 actq_w2_paired_group actq_w2_paired_group4
     actq_w3_paired_row actq_w3_paired_group
     actq_w4_paired_row actq_w4_paired_row4 actq_w4_paired_group actq_w4_paired_group4
@@ -68,19 +67,19 @@ type Kernels = (Option<Kernel>, Kernel);
 /// By width, lanes and whether there are group scales.
 static KERNELS: [[[Kernels; 2]; 2]; 4] = [
     [
-        [(None, actq_w2_row), (None, actq_w2_group)],
+        [(None, actq_w2), (None, actq_w2)],
         [(Some(actq_w2_paired_row), actq_w2_paired_row4), (Some(actq_w2_paired_group), actq_w2_paired_group4)],
     ],
     [
-        [(None, actq_w3_row), (None, actq_w3_group)], //
+        [(None, actq_w3), (None, actq_w3)], //
         [(None, actq_w3_paired_row), (None, actq_w3_paired_group)],
     ],
     [
-        [(None, actq_w4_row), (None, actq_w4_group)],
+        [(None, actq_w4), (None, actq_w4)],
         [(Some(actq_w4_paired_row), actq_w4_paired_row4), (Some(actq_w4_paired_group), actq_w4_paired_group4)],
     ],
     [
-        [(None, actq_w8_row), (None, actq_w8_group)], //
+        [(None, actq_w8), (None, actq_w8)], //
         [(None, actq_w8_paired_row), (None, actq_w8_paired_group)],
     ],
 ];
@@ -96,7 +95,7 @@ pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i3
     }
     let (eight, four) = KERNELS[shape.width as usize][shape.lanes as usize][usize::from(shape.group != 0)];
     let strips = if eight.is_some() { acc.len() / STRIP } else { 0 };
-    let (first, last) = acc.split_at_mut(strips * STRIP);
+    let Some((first, last)) = acc.split_at_mut_checked(strips * STRIP) else { return Err(Mismatch) };
     let (x_end, extra) = x.bounds();
     // SAFETY: `weights` holds the words of `acc.len()` rows from `first_row` on, which is a multiple of 8, so strips begin
     // there and after the strips of eight: each call reads the words of its strips and writes as many sums. It reads the
@@ -118,6 +117,17 @@ pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i3
 
 unsafe extern "C" {
     fn actq_magnitude(x: *const f32, len: usize) -> u32;
+    fn actq_copy(from: *const u32, to: *mut u32, len: usize);
+}
+
+/// `to = from`, as far as both go.
+#[inline(always)]
+pub(crate) fn copy(from: &[u32], to: &mut [u32]) {
+    let len = from.len().min(to.len());
+    if len > 0 {
+        // SAFETY: both hold at least `len` words, and do not overlap, because one of them is borrowed mutably.
+        unsafe { actq_copy(from.as_ptr(), to.as_mut_ptr(), len) }
+    }
 }
 
 /// The bits of the largest magnitude.
@@ -134,7 +144,7 @@ pub fn magnitude_bits(x: &[f32]) -> u32 {
 
 /// As [`crate::activations`] describes it; `None`, with nothing written, where the lengths do not fit.
 #[cfg(actq_fpu)]
-#[inline(always)]
+#[inline(never)]
 pub(crate) fn quantize(x: &[f32], inverse: f32, format: &XFormat, run: Groups, out: &mut [u32]) -> Option<i32> {
     let Groups { groups, chunks, first, chunk } = run;
     if groups == 0
@@ -165,7 +175,7 @@ pub(crate) fn quantize(x: &[f32], inverse: f32, format: &XFormat, run: Groups, o
 /// `y[i] = start[i] + sum[i] * (scale[i] * x_scale)`, with two bf16 scales a word; what is `None` stands in y, the sums with
 /// their bits. As far as the shortest goes.
 #[cfg(actq_fpu)]
-#[inline(always)]
+#[inline(never)]
 pub(crate) fn scale(sums: Option<&[i32]>, start: Option<&[u32]>, scales: &[u32], x_scale: f32, y: &mut [f32]) {
     let len = y.len().min(2 * scales.len());
     let len = len.min(sums.map_or(len, <[_]>::len)).min(start.map_or(len, <[_]>::len));
@@ -174,6 +184,14 @@ pub(crate) fn scale(sums: Option<&[i32]>, start: Option<&[u32]>, scales: &[u32],
     let start = start.map_or(to.cast_const(), |start| start.as_ptr().cast());
     // SAFETY: all operands hold at least `len` values; no place in `y` is written before what stands there was read.
     unsafe { actq_scale_add(x_scale, sums, scales.as_ptr(), start, to, len) }
+}
+
+/// The FPU's square root, which is correctly rounded as IEEE 754 has it.
+#[cfg(actq_fpu)]
+#[inline(always)]
+pub(crate) fn sqrt(x: f32) -> f32 {
+    // SAFETY: a function of one register.
+    unsafe { actq_sqrt(x) }
 }
 
 #[cfg(actq_fpu)]
@@ -222,5 +240,6 @@ const _: () = {
 
 #[cfg(actq_fpu)]
 unsafe extern "C" {
+    fn actq_sqrt(x: f32) -> f32;
     fn actq_scale_add(x_scale: f32, sums: *const i32, scales: *const u32, start: *const f32, y: *mut f32, len: usize);
 }

@@ -5,7 +5,7 @@
 @ x_end is where the last chunk ends; with row scales, the sum of x stands there.
 @
 @ In the loops: r0 weights, r1 x, r3-r6 activation pairs, r7-r9 and r2 the sums t of row pairs 0 to 3 (r7 and r2 in a strip
-@ of four; r2 is the last, because a chunk's start value comes with its first pairs), r10 and r11 weight words, r12 the mask,
+@ of four, and r8 the end of the chunk; r2 is the last, because a chunk's start value comes with its first pairs), r10 and r11 weight words, r12 the mask,
 @ lr the extracted codes.
 @
 @ Frame: 0-31 sums over chunks, (sum of t, sum of its high half) of each row pair, or sums over groups; 32 mask, 36 x_end, 40 x, 44 minus the biases,
@@ -64,10 +64,21 @@
 .endm
 
 .macro d2_chunk rows
-    d2_cols8 \rows, 1
-    d2_cols8 \rows, 0
-    d2_cols8 \rows, 0
-    d2_cols8 \rows, 0
+    .if \rows == 8
+    d2_cols8 8, 1
+    d2_cols8 8, 0
+    d2_cols8 8, 0
+    d2_cols8 8, 0
+    .else
+    ldr r2, [r1], #4
+    mov r7, r2
+    add r8, r1, #64
+3:
+    d2_cols8 4, 0
+    d2_cols8 4, 0
+    cmp r1, r8
+    bne.n 3b
+    .endif
 .endm
 
 .macro d2_prologue
@@ -109,7 +120,7 @@
     add \odd, r7, \odd, lsl #1
 .endm
 
-.macro d2_row_kernel name, rows
+.macro d2_row_kernel name, rows, end
     .section .text.\name, "ax", %progbits
     .global \name
     .type \name, %function
@@ -126,6 +137,7 @@
     movs r5, #0
     d2_begin \rows, r4, r5
     ldr lr, [sp, #60]
+    .if \rows == 8
     cmp lr, #0
     beq.w 2f
     @ A short first chunk: all sums start before the first step that is not left out.
@@ -140,11 +152,23 @@
     .endr
     .balign 4
 2:
-    d2_cols8 \rows, 1
+    d2_cols8 8, 1
     .irp step, 11, 12, 13
 \step:
-    d2_cols8 \rows, 0
+    d2_cols8 8, 0
     .endr
+    .else
+    @ Seldom more than a strip of a block, so its loop is short: eight columns. lr: steps that this chunk leaves out.
+2:
+    ldr r2, [r1], #4
+    mov r7, r2
+    add r8, r1, #64
+    sub r8, r8, lr, lsl #4
+3:
+    d2_cols8 4, 0
+    cmp r1, r8
+    bne.n 3b
+    .endif
     .if \rows == 8
     ldmia.w sp, {r3-r6, r10-r12, lr}
     add r3, r3, r7
@@ -164,9 +188,10 @@
     add r5, r5, r2
     add r6, r6, r2, asr #16
     stmia.w sp, {r3-r6}
-    ldr lr, [sp, #36]
+    ldr r8, [sp, #36]
+    mov.w lr, #0
     .endif
-    cmp r1, lr
+    cmp r1, \end
     bne.w 2b
     ldr r7, [sp, #56]
     ldrd r8, r9, [sp, #48]
@@ -258,8 +283,8 @@
     .size \name, . - \name
 .endm
 
-    d2_row_kernel actq_w2_paired_row, 8
-    d2_row_kernel actq_w2_paired_row4, 4
+    d2_row_kernel actq_w2_paired_row, 8, lr
+    d2_row_kernel actq_w2_paired_row4, 4, r8
     d2_group_kernel actq_w2_paired_group, 8
     d2_group_kernel actq_w2_paired_group4, 4
     .text

@@ -133,22 +133,31 @@
     str r4, [sp, #0]
 1:
     ldrd r1, r2, [sp, #20]
+    .if \rows == 8
     ldr lr, [sp, #28]
-    c4_start \rows
+    c4_start 8
     tbh [pc, lr, lsl #1]
 7:
     .irp step, 10f, 11f, 12f, 13f
     .hword (\step - 7b) / 2
     .endr
 3:
-    c4_start \rows
+    c4_start 8
     .balign 4
 2:
     .irp step, 10, 11, 12, 13
 \step:
-    c4_cols4 \rows
-    c4_cols4 \rows
+    c4_cols4 8
+    c4_cols4 8
     .endr
+    .else
+    @ Seldom more than a strip of a block, so its loop is short: eight columns, of which no pass leaves out any.
+3:
+    c4_start 4
+2:
+    c4_cols4 4
+    c4_cols4 4
+    .endif
     ldr lr, [sp, #16]
     cmp r1, lr
     bne.w 2b
@@ -236,9 +245,19 @@
     .balign 4
 2:
     c4_cols4 \rows, 1
+    .if \rows == 8
     .rept 7
-    c4_cols4 \rows
+    c4_cols4 8
     .endr
+    .else
+    add r5, r1, #56
+    c4_cols4 4
+3:
+    c4_cols4 4
+    c4_cols4 4
+    cmp r1, r5
+    bne.n 3b
+    .endif
     mvn r2, r2
     .if \rows == 8
     c4_rows r6, r7, r5

@@ -1,12 +1,13 @@
 @ GEMV loop nest for Armv7E-M, stamped over the layouts of single lanes in kernels/src/format: strips of four rows.
 @
-@ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1), [sp] x_end, [sp+4] bytes of a chunk in x, [sp+8] units that the
-@ loop leaves out in a short pass: with row scales it is the first pass, with group scales the last group's first.
+@ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1), [sp] x_end, [sp+4] bytes of a group in x, or 0 with row
+@ scales, [sp+8] units that the loop leaves out in a short pass: with row scales it is the first pass, with group scales the last
+@ group's first.
 @
 @ In the loops: r0 weights, r1 x, r2 mask, r3 and r4 activation pairs, r5-r8 the four rows' sums t, r9-r12 weight words,
 @ lr the extracted pair of codes.
 @
-@ Frame: 0-15 sums over groups, 16 x, 20 acc, 24 strips, 28 x_end, 32 chunk bytes, 36 end of this group, 40 units left out.
+@ Frame: 0-15 sums over groups, 16 x, 20 acc, 24 strips, 28 x_end, 32 group bytes, 36 end of this group, 40 units left out.
 
     .syntax unified
     .thumb
@@ -150,21 +151,6 @@
     mov r7, r8
 .endm
 
-.macro prologue mask
-    push {r4-r11, lr}
-    sub sp, sp, #44
-    ldrd r4, r5, [sp, #80]
-    ldr r6, [sp, #88]
-    strd r1, r2, [sp, #16]
-    strd r3, r4, [sp, #24]
-    str r5, [sp, #32]
-    str r6, [sp, #40]
-    .if \mask
-    movw r2, #(\mask & 0xffff)
-    movt r2, #(\mask >> 16)
-    .endif
-.endm
-
 @ Goes to the first unit of a pass that is not left out. `ahead` are the labels of the units but the first, which is at 2.
 .macro enter_pass ahead
     .ifnb \ahead
@@ -191,97 +177,83 @@
     .endif
 .endm
 
-@ Stores the strip's results and goes on with the next one.
-.macro next_strip t0, t1, t2, t3
-    ldrd lr, r3, [sp, #20]
-    stmia.w lr!, {\t0, \t1, \t2, \t3}
-    subs r3, r3, #1
-    strd lr, r3, [sp, #20]
-    bne.w 1b
-    add sp, sp, #44
-    pop {r4-r11, pc}
-.endm
-
-@ Rows with one scale each: the sums of a whole row are the result.
-.macro row_kernel name, mask, unit, ahead, more
+@ A kernel for both kinds of scales. With a u8 scale per group, each group's sums are multiplied with its scales and added up on
+@ the stack; groups are whole passes, except the last. Rows with one scale each are one group, whose sums are the result; its
+@ end does not change from strip to strip.
+.macro kernel name, mask, unit, ahead, more
     .section .text.\name, "ax", %progbits
     .global \name
     .type \name, %function
     .thumb_func
     .balign 16
 \name:
-    prologue \mask
+    push {r4-r11, lr}
+    sub sp, sp, #44
+    ldrd r4, r5, [sp, #80]
+    ldr r6, [sp, #88]
+    strd r1, r2, [sp, #16]
+    strd r3, r4, [sp, #24]
+    strd r5, r4, [sp, #32]
+    str r6, [sp, #40]
+    .if \mask
+    movw r2, #(\mask & 0xffff)
+    movt r2, #(\mask >> 16)
+    .endif
 1:
     ldr r1, [sp, #16]
-    start_sums
-    enter_pass "\ahead"
-    pass \unit, "\more"
-    ldr lr, [sp, #28]
-    cmp r1, lr
-    bne.w 2b
-    next_strip r5, r6, r7, r8
-    .size \name, . - \name
-.endm
-
-@ Rows with a u8 scale per group: each group's sums are multiplied with its scales and added up on the stack. Groups are whole
-@ passes, except the last.
-.macro group_kernel name, mask, unit, ahead, more
-    .section .text.\name, "ax", %progbits
-    .global \name
-    .type \name, %function
-    .thumb_func
-    .balign 16
-\name:
-    prologue \mask
-1:
-    ldr r1, [sp, #16]
-    movs r3, #0
-    movs r4, #0
-    strd r3, r4, [sp, #0]
-    strd r3, r4, [sp, #8]
-3:
     ldrd r3, r4, [sp, #28]
+    cbz r4, 4f
+    movs r5, #0
+    strd r5, r5, [sp, #0]
+    strd r5, r5, [sp, #8]
+3:
     add r4, r4, r1
     cmp r4, r3
     blo.n 8f
     @ The last group: its first pass may be short.
     str r3, [sp, #36]
+4:
     start_sums
     .ifb \ahead
-    b.n 2f
+    b.w 2f
     .endif
     enter_pass "\ahead"
+    @ The wide instructions here leave nothing for the loop's alignment to fill.
 8:
-    str r4, [sp, #36]
+    str.w r4, [sp, #36]
     start_sums
     pass \unit, "\more"
-    ldr lr, [sp, #36]
+    ldrd r3, lr, [sp, #32]
     cmp r1, lr
     bne.w 2b
+    cbz r3, 9f
     ldmia.w sp, {r9-r12}
     ldr r3, [r0], #4
     uxtb r4, r3
-    mla r9, r5, r4, r9
+    mla r5, r5, r4, r9
     uxtb.w r4, r3, ror #8
-    mla r10, r6, r4, r10
+    mla r6, r6, r4, r10
     uxtb.w r4, r3, ror #16
-    mla r11, r7, r4, r11
+    mla r7, r7, r4, r11
     lsrs r4, r3, #24
-    mla r12, r8, r4, r12
-    stmia.w sp, {r9-r12}
-    ldr lr, [sp, #28]
-    cmp r1, lr
+    mla r8, r8, r4, r12
+    stmia.w sp, {r5-r8}
+    ldrd r3, r4, [sp, #28]
+    cmp r1, r3
     bne.w 3b
-    next_strip r9, r10, r11, r12
+9:
+    ldrd lr, r3, [sp, #20]
+    stmia.w lr!, {r5-r8}
+    subs r3, r3, #1
+    strd lr, r3, [sp, #20]
+    bne.w 1b
+    add sp, sp, #44
+    pop {r4-r11, pc}
     .size \name, . - \name
 .endm
 
-    row_kernel actq_w2_row, 0x00060006, unit_w2, "11f", "11"
-    row_kernel actq_w3_row, 0x000e000e, unit_w3
-    row_kernel actq_w4_row, 0x001e001e, unit_w4, "11f, 12f, 13f", "11, 12, 13"
-    row_kernel actq_w8_row, 0, unit_w8, "11f, 12f, 13f, 14f, 15f, 16f, 17f", "11, 12, 13, 14, 15, 16, 17"
-    group_kernel actq_w2_group, 0x00060006, unit_w2, "11f", "11"
-    group_kernel actq_w3_group, 0x000e000e, unit_w3
-    group_kernel actq_w4_group, 0x001e001e, unit_w4, "11f, 12f, 13f", "11, 12, 13"
-    group_kernel actq_w8_group, 0, unit_w8, "11f, 12f, 13f, 14f, 15f, 16f, 17f", "11, 12, 13, 14, 15, 16, 17"
+    kernel actq_w2, 0x00060006, unit_w2, "11f", "11"
+    kernel actq_w3, 0x000e000e, unit_w3
+    kernel actq_w4, 0x001e001e, unit_w4, "11f, 12f, 13f", "11, 12, 13"
+    kernel actq_w8, 0, unit_w8, "11f, 12f, 13f, 14f, 15f, 16f, 17f", "11, 12, 13, 14, 15, 16, 17"
     .text

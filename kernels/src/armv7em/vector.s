@@ -1,4 +1,4 @@
-@ The largest magnitude of a vector of f32, without an FPU.
+@ Vectors of words: the largest magnitude of f32 without an FPU, and a copy.
 
     .syntax unified
     .thumb
@@ -26,5 +26,34 @@ actq_magnitude:
     pop {r4-r9}
     bx lr
     .size actq_magnitude, . - actq_magnitude
+
+@ Copies r2 words (> 0) from r0 to r1.
+    .section .text.actq_copy, "ax", %progbits
+    .global actq_copy
+    .type actq_copy, %function
+    .thumb_func
+    .balign 4
+actq_copy:
+    push {r4-r7}
+    subs r2, r2, #4
+    blo.n 2f
+    .balign 4
+1:
+    ldmia r0!, {r4-r7}
+    stmia r1!, {r4-r7}
+    subs r2, r2, #4
+    bhs.n 1b
+2:
+    adds r2, r2, #4
+    beq.n 4f
+3:
+    ldr r4, [r0], #4
+    str r4, [r1], #4
+    subs r2, r2, #1
+    bne.n 3b
+4:
+    pop {r4-r7}
+    bx lr
+    .size actq_copy, . - actq_copy
 
     .text

@@ -209,4 +209,15 @@ actq_scale_add:
     vpop {s16-s24}
     pop {r4-r8, pc}
     .size actq_scale_add, . - actq_scale_add
+
+@ s0: the square root of s0
+    .section .text.actq_sqrt, "ax", %progbits
+    .global actq_sqrt
+    .type actq_sqrt, %function
+    .thumb_func
+    .balign 4
+actq_sqrt:
+    vsqrt.f32 s0, s0
+    bx lr
+    .size actq_sqrt, . - actq_sqrt
     .text

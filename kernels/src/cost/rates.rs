@@ -2,318 +2,318 @@
 
 #[rustfmt::skip]
 pub(super) const RATES: &[[f64; 3]] = &[
-    [100.554, 187.215, 100.554], // a step, with its operations and its action aside
-    [10.498, 13.495, 10.498], // a value of the observation
-    [270.190, 404.690, 270.190], // an action
-    [23.601, 31.893, 23.601], // a value of the action
-    [8.248, 11.375, 9.054], // a value of an array of the action contract
-    [85.681, 180.288, 85.681], // a call that runs one operation
-    [0.000, 0.000, 85.681], // a call that runs pieces
-    [0.000, 0.000, 80.482], // an operation that a poll comes to
-    [0.000, 0.000, 214.280], // a piece
-    [397.911, 710.129, 397.911], // a linear operation
-    [0.000, 0.000, 836.313], // a block of rows of a linear operation that a poll comes to
-    [26.937, 36.892, 26.937], // eight values compared by magnitude
-    [9.959, 12.531, 9.959], // a value compared by magnitude
-    [192.472, 276.539, 192.472], // a block of rows whose order is looked at
-    [110.880, 194.521, 110.880], // a linear operation that sets its output up before the rows are added
-    [1.211, 2.584, 1.211], // an output set to 0 before the rows are added
-    [4.812, 7.695, 4.812], // an output set to its bias before the rows are added
-    [126.122, 195.496, 126.122], // a block of rows in order, whole strips
-    [35.198, 49.132, 35.198], // a block of rows with sums on the stack
-    [107.914, 175.600, 107.914], // a run of rows with sums on the stack
-    [49.029, 76.766, 49.029], // eight rows scaled by the assembler
-    [8.740, 14.951, 8.740], // a row in order scaled
-    [32.165, 45.364, 32.165], // a row with an index scaled
-    [287.588, 479.825, 287.588], // a normalization
-    [24.769, 29.013, 24.992], // a value normalized
-    [301.154, 526.584, 301.154], // a layer norm
-    [17.762, 25.511, 17.762], // a value of a layer norm
-    [259.445, 471.757, 259.445], // an RMS norm
-    [10.250, 12.496, 10.250], // a value of an RMS norm
-    [210.835, 387.786, 210.835], // an addition
-    [5.248, 6.749, 5.248], // a value added
-    [213.765, 392.452, 213.765], // a copy
-    [2.750, 4.249, 2.750], // a value copied
-    [282.564, 526.417, 282.564], // an LSTM cell
-    [119.968, 201.908, 216.887], // an element of an LSTM cell
-    [301.450, 545.096, 301.450], // a GRU cell
-    [86.982, 147.948, 159.749], // an element of a GRU cell
-    [204.529, 374.435, 204.529], // a function's operation
-    [7.535, 8.408, 7.569], // an element of relu
-    [18.927, 35.643, 52.984], // an element of elu
-    [25.553, 48.586, 48.569], // an element of silu
-    [29.762, 46.771, 29.781], // an element of gelu
-    [28.578, 54.631, 51.630], // an element of gelu_tanh
-    [25.553, 48.073, 48.569], // an element of tanh
-    [24.587, 47.622, 47.630], // an element of sigmoid
+    [94.155, 167.321, 94.155], // a step, with its operations and its action aside
+    [8.999, 14.497, 8.999], // a value of the observation
+    [327.576, 533.994, 327.576], // an action
+    [41.612, 56.598, 41.612], // a value of the action
+    [5.483, 5.102, 6.047], // a value of an array of the action contract
+    [91.048, 181.673, 91.048], // a call that runs one operation
+    [0.000, 0.000, 91.048], // a call that runs pieces
+    [0.000, 0.000, 167.417], // an operation that a poll comes to
+    [0.000, 0.000, 359.843], // a piece
+    [418.805, 742.435, 418.805], // a linear operation
+    [0.000, 0.000, 688.165], // a block of rows of a linear operation that a poll comes to
+    [26.994, 37.018, 26.994], // eight values compared by magnitude
+    [7.730, 9.976, 7.730], // a value compared by magnitude
+    [0.000, 0.000, 0.000], // a block of rows whose order is looked at
+    [111.191, 211.676, 111.191], // a linear operation that sets its output up before the rows are added
+    [1.429, 3.140, 1.429], // an output set to 0 before the rows are added
+    [0.000, 0.642, 0.000], // an output set to its bias before the rows are added
+    [156.621, 242.700, 156.621], // a block of rows in order, whole strips
+    [92.839, 153.199, 92.839], // a block of rows with sums on the stack
+    [157.155, 261.532, 157.155], // a run of rows with sums on the stack
+    [54.143, 92.578, 54.143], // eight rows scaled by the assembler
+    [10.672, 19.479, 10.672], // a row in order scaled
+    [18.712, 24.998, 18.712], // a row with an index scaled
+    [445.969, 756.354, 445.969], // a normalization
+    [23.998, 31.997, 24.000], // a value normalized
+    [395.351, 749.737, 395.351], // a layer norm
+    [18.010, 26.751, 18.010], // a value of a layer norm
+    [325.503, 631.470, 325.503], // an RMS norm
+    [10.750, 18.498, 10.750], // a value of an RMS norm
+    [341.475, 613.693, 341.475], // an addition
+    [4.990, 5.726, 4.990], // a value added
+    [333.863, 603.803, 333.863], // a copy
+    [1.000, 3.500, 1.000], // a value copied
+    [376.108, 693.723, 376.108], // an LSTM cell
+    [119.979, 201.947, 216.888], // an element of an LSTM cell
+    [392.190, 708.646, 392.190], // a GRU cell
+    [86.929, 147.931, 155.718], // an element of a GRU cell
+    [324.726, 600.020, 324.726], // a function's operation
+    [7.705, 8.539, 7.795], // an element of relu
+    [17.787, 35.272, 44.067], // an element of elu
+    [25.033, 52.332, 42.067], // an element of silu
+    [29.860, 48.071, 30.310], // an element of gelu
+    [28.050, 58.429, 45.098], // an element of gelu_tanh
+    [25.033, 52.266, 42.067], // an element of tanh
+    [24.033, 51.264, 41.067], // an element of sigmoid
     [0.000, 0.000, 0.000], // 2 bits single rows prepared: a vector
     [0.000, 0.000, 0.000], // 2 bits single rows prepared: a group
-    [721.389, 1149.391, 721.389], // 2 bits single rows prepared: a chunk
-    [223.867, 325.872, 223.867], // 2 bits single rows prepared: a chunk written by itself
-    [32.031, 46.026, 32.031], // 2 bits single rows prepared: eight values
-    [18.942, 26.734, 18.942], // 2 bits single rows prepared: a value of the rest
-    [3.730, 6.466, 3.730], // 2 bits single rows prepared: a pair of padding
-    [644.756, 1049.693, 644.756], // 2 bits single groups prepared: a vector
+    [707.004, 1250.521, 707.004], // 2 bits single rows prepared: a chunk
+    [295.168, 476.029, 295.168], // 2 bits single rows prepared: a chunk written by itself
+    [32.072, 46.087, 32.072], // 2 bits single rows prepared: eight values
+    [19.804, 28.736, 19.804], // 2 bits single rows prepared: a value of the rest
+    [3.436, 6.714, 3.436], // 2 bits single rows prepared: a pair of padding
+    [614.208, 1088.519, 614.208], // 2 bits single groups prepared: a vector
     [0.000, 0.000, 0.000], // 2 bits single groups prepared: a group
-    [9.172, 11.113, 9.172], // 2 bits single groups prepared: a chunk
-    [259.664, 386.062, 259.664], // 2 bits single groups prepared: a chunk written by itself
-    [33.060, 47.806, 33.060], // 2 bits single groups prepared: eight values
-    [13.709, 17.822, 13.709], // 2 bits single groups prepared: a value of the rest
-    [1.705, 3.362, 1.705], // 2 bits single groups prepared: a pair of padding
+    [9.275, 10.559, 9.275], // 2 bits single groups prepared: a chunk
+    [343.588, 551.881, 343.588], // 2 bits single groups prepared: a chunk written by itself
+    [32.901, 47.689, 32.901], // 2 bits single groups prepared: eight values
+    [12.344, 16.867, 12.344], // 2 bits single groups prepared: a value of the rest
+    [0.000, 1.720, 0.000], // 2 bits single groups prepared: a pair of padding
     [0.000, 0.000, 0.000], // 2 bits paired rows prepared: a vector
-    [663.689, 1055.577, 663.689], // 2 bits paired rows prepared: a group
-    [0.000, 0.000, 0.000], // 2 bits paired rows prepared: a chunk
-    [312.934, 460.846, 312.934], // 2 bits paired rows prepared: a chunk written by itself
-    [39.677, 54.795, 39.677], // 2 bits paired rows prepared: eight values
-    [6.905, 10.092, 6.905], // 2 bits paired rows prepared: a value of the rest
+    [655.153, 1163.029, 655.153], // 2 bits paired rows prepared: a group
+    [8.490, 15.039, 8.490], // 2 bits paired rows prepared: a chunk
+    [366.388, 586.369, 366.388], // 2 bits paired rows prepared: a chunk written by itself
+    [37.507, 50.879, 37.507], // 2 bits paired rows prepared: eight values
+    [9.588, 14.820, 9.588], // 2 bits paired rows prepared: a value of the rest
     [0.000, 0.000, 0.000], // 2 bits paired rows prepared: a pair of padding
-    [672.019, 1088.403, 672.019], // 2 bits paired groups prepared: a vector
+    [652.098, 1151.092, 652.098], // 2 bits paired groups prepared: a vector
     [0.000, 0.000, 0.000], // 2 bits paired groups prepared: a group
-    [82.407, 129.546, 82.407], // 2 bits paired groups prepared: a chunk
-    [252.510, 376.251, 252.510], // 2 bits paired groups prepared: a chunk written by itself
-    [20.784, 24.658, 20.784], // 2 bits paired groups prepared: eight values
-    [14.019, 17.462, 14.019], // 2 bits paired groups prepared: a value of the rest
+    [38.156, 86.250, 38.156], // 2 bits paired groups prepared: a chunk
+    [339.949, 540.508, 339.949], // 2 bits paired groups prepared: a chunk written by itself
+    [31.659, 35.230, 31.659], // 2 bits paired groups prepared: eight values
+    [12.813, 16.716, 12.813], // 2 bits paired groups prepared: a value of the rest
     [0.000, 0.000, 0.000], // 2 bits paired groups prepared: a pair of padding
     [0.000, 0.000, 0.000], // 3 bits single rows prepared: a vector
     [0.000, 0.000, 0.000], // 3 bits single rows prepared: a group
-    [672.635, 1064.430, 672.635], // 3 bits single rows prepared: a chunk
-    [262.937, 391.079, 262.937], // 3 bits single rows prepared: a chunk written by itself
-    [32.198, 46.322, 32.198], // 3 bits single rows prepared: eight values
-    [13.535, 17.683, 13.535], // 3 bits single rows prepared: a value of the rest
-    [0.950, 1.840, 0.950], // 3 bits single rows prepared: a pair of padding
-    [652.128, 1065.755, 652.128], // 3 bits single groups prepared: a vector
+    [672.770, 1182.757, 672.770], // 3 bits single rows prepared: a chunk
+    [323.239, 528.585, 323.239], // 3 bits single rows prepared: a chunk written by itself
+    [32.172, 46.271, 32.172], // 3 bits single rows prepared: eight values
+    [15.721, 20.968, 15.721], // 3 bits single rows prepared: a value of the rest
+    [1.298, 2.626, 1.298], // 3 bits single rows prepared: a pair of padding
+    [626.763, 1106.822, 626.763], // 3 bits single groups prepared: a vector
     [0.000, 0.000, 0.000], // 3 bits single groups prepared: a group
-    [10.035, 12.687, 10.035], // 3 bits single groups prepared: a chunk
-    [261.253, 386.908, 261.253], // 3 bits single groups prepared: a chunk written by itself
-    [32.775, 47.246, 32.775], // 3 bits single groups prepared: eight values
-    [13.353, 17.397, 13.353], // 3 bits single groups prepared: a value of the rest
-    [1.049, 2.164, 1.049], // 3 bits single groups prepared: a pair of padding
+    [9.897, 12.130, 9.897], // 3 bits single groups prepared: a chunk
+    [337.692, 554.594, 337.692], // 3 bits single groups prepared: a chunk written by itself
+    [32.656, 47.098, 32.656], // 3 bits single groups prepared: eight values
+    [13.155, 16.161, 13.155], // 3 bits single groups prepared: a value of the rest
+    [0.000, 0.198, 0.000], // 3 bits single groups prepared: a pair of padding
     [0.000, 0.000, 0.000], // 3 bits paired rows prepared: a vector
-    [677.342, 1073.246, 677.342], // 3 bits paired rows prepared: a group
-    [39.289, 55.254, 39.289], // 3 bits paired rows prepared: a chunk
-    [292.949, 430.072, 292.949], // 3 bits paired rows prepared: a chunk written by itself
+    [674.109, 1186.486, 674.109], // 3 bits paired rows prepared: a group
+    [39.217, 55.018, 39.217], // 3 bits paired rows prepared: a chunk
+    [345.225, 544.076, 345.225], // 3 bits paired rows prepared: a chunk written by itself
     [0.000, 0.000, 0.000], // 3 bits paired rows prepared: eight values
-    [13.845, 18.806, 13.845], // 3 bits paired rows prepared: a value of the rest
+    [14.133, 19.787, 14.133], // 3 bits paired rows prepared: a value of the rest
     [0.000, 0.000, 0.000], // 3 bits paired rows prepared: a pair of padding
-    [738.359, 1209.280, 738.359], // 3 bits paired groups prepared: a vector
+    [715.069, 1270.764, 715.069], // 3 bits paired groups prepared: a vector
     [0.000, 0.000, 0.000], // 3 bits paired groups prepared: a group
     [0.000, 0.000, 0.000], // 3 bits paired groups prepared: a chunk
-    [13.794, 51.308, 13.794], // 3 bits paired groups prepared: a chunk written by itself
-    [40.102, 56.255, 40.102], // 3 bits paired groups prepared: eight values
-    [56.404, 77.099, 56.404], // 3 bits paired groups prepared: a value of the rest
-    [43.003, 55.010, 43.003], // 3 bits paired groups prepared: a pair of padding
+    [0.000, 0.000, 0.000], // 3 bits paired groups prepared: a chunk written by itself
+    [39.869, 55.886, 39.869], // 3 bits paired groups prepared: eight values
+    [65.893, 100.447, 65.893], // 3 bits paired groups prepared: a value of the rest
+    [52.270, 81.641, 52.270], // 3 bits paired groups prepared: a pair of padding
     [0.000, 0.000, 0.000], // 4 bits single rows prepared: a vector
     [0.000, 0.000, 0.000], // 4 bits single rows prepared: a group
-    [676.020, 1072.846, 676.020], // 4 bits single rows prepared: a chunk
-    [255.373, 378.444, 255.373], // 4 bits single rows prepared: a chunk written by itself
-    [32.078, 46.118, 32.078], // 4 bits single rows prepared: eight values
-    [13.869, 18.250, 13.869], // 4 bits single rows prepared: a value of the rest
-    [1.015, 1.989, 1.015], // 4 bits single rows prepared: a pair of padding
-    [646.746, 1053.855, 646.746], // 4 bits single groups prepared: a vector
+    [671.851, 1182.787, 671.851], // 4 bits single rows prepared: a chunk
+    [319.626, 520.729, 319.626], // 4 bits single rows prepared: a chunk written by itself
+    [32.101, 46.174, 32.101], // 4 bits single rows prepared: eight values
+    [15.882, 21.528, 15.882], // 4 bits single rows prepared: a value of the rest
+    [1.304, 2.935, 1.304], // 4 bits single rows prepared: a pair of padding
+    [614.561, 1092.882, 614.561], // 4 bits single groups prepared: a vector
     [0.000, 0.000, 0.000], // 4 bits single groups prepared: a group
-    [8.702, 10.302, 8.702], // 4 bits single groups prepared: a chunk
-    [254.236, 374.415, 254.236], // 4 bits single groups prepared: a chunk written by itself
-    [33.161, 47.980, 33.161], // 4 bits single groups prepared: eight values
-    [14.664, 19.820, 14.664], // 4 bits single groups prepared: a value of the rest
-    [2.371, 4.757, 2.371], // 4 bits single groups prepared: a pair of padding
+    [8.799, 9.670, 8.799], // 4 bits single groups prepared: a chunk
+    [340.156, 538.066, 340.156], // 4 bits single groups prepared: a chunk written by itself
+    [33.010, 47.886, 33.010], // 4 bits single groups prepared: eight values
+    [13.013, 19.244, 13.013], // 4 bits single groups prepared: a value of the rest
+    [0.511, 3.389, 0.511], // 4 bits single groups prepared: a pair of padding
     [0.000, 0.000, 0.000], // 4 bits paired rows prepared: a vector
-    [616.522, 972.509, 616.522], // 4 bits paired rows prepared: a group
-    [50.889, 94.167, 50.889], // 4 bits paired rows prepared: a chunk
-    [306.166, 455.905, 306.166], // 4 bits paired rows prepared: a chunk written by itself
-    [36.885, 51.270, 36.885], // 4 bits paired rows prepared: eight values
-    [7.997, 9.309, 7.997], // 4 bits paired rows prepared: a value of the rest
+    [592.171, 1034.344, 592.171], // 4 bits paired rows prepared: a group
+    [76.889, 159.988, 76.889], // 4 bits paired rows prepared: a chunk
+    [359.375, 584.017, 359.375], // 4 bits paired rows prepared: a chunk written by itself
+    [36.490, 50.386, 36.490], // 4 bits paired rows prepared: eight values
+    [11.145, 14.005, 11.145], // 4 bits paired rows prepared: a value of the rest
     [0.000, 0.000, 0.000], // 4 bits paired rows prepared: a pair of padding
-    [668.022, 1084.964, 668.022], // 4 bits paired groups prepared: a vector
+    [651.221, 1154.758, 651.221], // 4 bits paired groups prepared: a vector
     [0.000, 0.000, 0.000], // 4 bits paired groups prepared: a group
-    [88.486, 138.918, 88.486], // 4 bits paired groups prepared: a chunk
-    [247.256, 370.186, 247.256], // 4 bits paired groups prepared: a chunk written by itself
-    [18.658, 22.434, 18.658], // 4 bits paired groups prepared: eight values
-    [15.593, 19.368, 15.593], // 4 bits paired groups prepared: a value of the rest
+    [40.219, 95.057, 40.219], // 4 bits paired groups prepared: a chunk
+    [340.002, 540.107, 340.002], // 4 bits paired groups prepared: a chunk written by itself
+    [30.542, 33.147, 30.542], // 4 bits paired groups prepared: eight values
+    [13.922, 18.442, 13.922], // 4 bits paired groups prepared: a value of the rest
     [0.000, 0.000, 0.000], // 4 bits paired groups prepared: a pair of padding
     [0.000, 0.000, 0.000], // 8 bits single rows prepared: a vector
     [0.000, 0.000, 0.000], // 8 bits single rows prepared: a group
-    [713.122, 1130.524, 713.122], // 8 bits single rows prepared: a chunk
-    [230.893, 338.861, 230.893], // 8 bits single rows prepared: a chunk written by itself
-    [32.020, 45.900, 32.020], // 8 bits single rows prepared: eight values
-    [15.995, 21.287, 15.995], // 8 bits single rows prepared: a value of the rest
-    [2.181, 3.606, 2.181], // 8 bits single rows prepared: a pair of padding
-    [645.457, 1051.892, 645.457], // 8 bits single groups prepared: a vector
+    [681.128, 1187.520, 681.128], // 8 bits single rows prepared: a chunk
+    [309.459, 506.067, 309.459], // 8 bits single rows prepared: a chunk written by itself
+    [31.950, 45.728, 31.950], // 8 bits single rows prepared: eight values
+    [16.590, 22.115, 16.590], // 8 bits single rows prepared: a value of the rest
+    [1.883, 3.204, 1.883], // 8 bits single rows prepared: a pair of padding
+    [613.038, 1090.311, 613.038], // 8 bits single groups prepared: a vector
     [0.000, 0.000, 0.000], // 8 bits single groups prepared: a group
-    [8.654, 10.330, 8.654], // 8 bits single groups prepared: a chunk
-    [253.126, 371.492, 253.126], // 8 bits single groups prepared: a chunk written by itself
-    [33.152, 47.921, 33.152], // 8 bits single groups prepared: eight values
-    [14.908, 20.394, 14.908], // 8 bits single groups prepared: a value of the rest
-    [2.479, 5.004, 2.479], // 8 bits single groups prepared: a pair of padding
+    [8.736, 9.734, 8.736], // 8 bits single groups prepared: a chunk
+    [339.143, 534.573, 339.143], // 8 bits single groups prepared: a chunk written by itself
+    [33.005, 47.815, 33.005], // 8 bits single groups prepared: eight values
+    [13.254, 19.948, 13.254], // 8 bits single groups prepared: a value of the rest
+    [0.615, 3.701, 0.615], // 8 bits single groups prepared: a pair of padding
     [0.000, 0.000, 0.000], // 8 bits paired rows prepared: a vector
-    [571.921, 911.035, 571.921], // 8 bits paired rows prepared: a group
-    [122.902, 190.180, 122.902], // 8 bits paired rows prepared: a chunk
-    [270.044, 399.157, 270.044], // 8 bits paired rows prepared: a chunk written by itself
-    [32.274, 46.325, 32.274], // 8 bits paired rows prepared: eight values
-    [11.944, 15.247, 11.944], // 8 bits paired rows prepared: a value of the rest
+    [532.876, 961.500, 532.876], // 8 bits paired rows prepared: a group
+    [142.088, 221.060, 142.088], // 8 bits paired rows prepared: a chunk
+    [344.397, 546.547, 344.397], // 8 bits paired rows prepared: a chunk written by itself
+    [31.974, 45.747, 31.974], // 8 bits paired rows prepared: eight values
+    [11.888, 17.699, 11.888], // 8 bits paired rows prepared: a value of the rest
     [0.000, 0.000, 0.000], // 8 bits paired rows prepared: a pair of padding
-    [612.630, 1007.132, 612.630], // 8 bits paired groups prepared: a vector
+    [604.684, 1080.411, 604.684], // 8 bits paired groups prepared: a vector
     [0.000, 0.000, 0.000], // 8 bits paired groups prepared: a group
-    [26.939, 39.598, 26.939], // 8 bits paired groups prepared: a chunk
-    [276.084, 415.702, 276.084], // 8 bits paired groups prepared: a chunk written by itself
-    [29.297, 41.656, 29.297], // 8 bits paired groups prepared: eight values
-    [12.213, 14.682, 12.213], // 8 bits paired groups prepared: a value of the rest
+    [0.000, 0.000, 0.000], // 8 bits paired groups prepared: a chunk
+    [359.278, 589.624, 359.278], // 8 bits paired groups prepared: a chunk written by itself
+    [35.881, 51.321, 35.881], // 8 bits paired groups prepared: eight values
+    [11.732, 13.777, 11.732], // 8 bits paired groups prepared: a value of the rest
     [0.000, 0.000, 0.000], // 8 bits paired groups prepared: a pair of padding
-    [0.000, 13.029, 0.000], // 2 bits single rows, 4 rows: a call
+    [1.524, 17.274, 1.524], // 2 bits single rows, 4 rows: a call
     [0.000, 0.000, 0.000], // 2 bits single rows, 4 rows: a strip
-    [3.275, 6.819, 3.275], // 2 bits single rows, 4 rows: a pass or group of a strip
-    [12.157, 26.069, 12.157], // 2 bits single rows, 4 rows: a chunk of a strip
-    [4.306, 5.038, 4.306], // 2 bits single rows, 4 rows: a column of a strip
+    [2.820, 6.844, 2.820], // 2 bits single rows, 4 rows: a pass or group of a strip
+    [12.949, 27.933, 12.949], // 2 bits single rows, 4 rows: a chunk of a strip
+    [4.318, 5.065, 4.318], // 2 bits single rows, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 2 bits single rows, 8 rows: a call
     [0.000, 0.000, 0.000], // 2 bits single rows, 8 rows: a strip
     [0.000, 0.000, 0.000], // 2 bits single rows, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 2 bits single rows, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 2 bits single rows, 8 rows: a column of a strip
-    [86.743, 152.758, 86.743], // 2 bits single groups, 4 rows: a call
-    [13.138, 29.492, 13.138], // 2 bits single groups, 4 rows: a strip
-    [23.938, 43.472, 23.938], // 2 bits single groups, 4 rows: a pass or group of a strip
+    [86.198, 162.875, 86.198], // 2 bits single groups, 4 rows: a call
+    [11.537, 25.111, 11.537], // 2 bits single groups, 4 rows: a strip
+    [23.812, 42.398, 23.812], // 2 bits single groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 2 bits single groups, 4 rows: a chunk of a strip
-    [4.403, 5.237, 4.403], // 2 bits single groups, 4 rows: a column of a strip
+    [4.407, 5.273, 4.407], // 2 bits single groups, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 2 bits single groups, 8 rows: a call
     [0.000, 0.000, 0.000], // 2 bits single groups, 8 rows: a strip
     [0.000, 0.000, 0.000], // 2 bits single groups, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 2 bits single groups, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 2 bits single groups, 8 rows: a column of a strip
     [0.000, 0.000, 0.000], // 2 bits paired rows, 4 rows: a call
-    [67.797, 121.478, 67.797], // 2 bits paired rows, 4 rows: a strip
+    [54.662, 96.473, 54.662], // 2 bits paired rows, 4 rows: a strip
     [0.000, 0.000, 0.000], // 2 bits paired rows, 4 rows: a pass or group of a strip
-    [38.528, 67.445, 38.528], // 2 bits paired rows, 4 rows: a chunk of a strip
-    [1.352, 1.596, 1.352], // 2 bits paired rows, 4 rows: a column of a strip
-    [54.199, 96.156, 54.199], // 2 bits paired rows, 8 rows: a call
-    [30.207, 57.758, 30.207], // 2 bits paired rows, 8 rows: a strip
+    [33.724, 63.913, 33.724], // 2 bits paired rows, 4 rows: a chunk of a strip
+    [1.935, 2.330, 1.935], // 2 bits paired rows, 4 rows: a column of a strip
+    [48.170, 92.299, 48.170], // 2 bits paired rows, 8 rows: a call
+    [25.652, 43.077, 25.652], // 2 bits paired rows, 8 rows: a strip
     [0.000, 0.000, 0.000], // 2 bits paired rows, 8 rows: a pass or group of a strip
-    [20.033, 42.245, 20.033], // 2 bits paired rows, 8 rows: a chunk of a strip
-    [4.177, 5.157, 4.177], // 2 bits paired rows, 8 rows: a column of a strip
+    [19.721, 41.382, 19.721], // 2 bits paired rows, 8 rows: a chunk of a strip
+    [4.179, 5.170, 4.179], // 2 bits paired rows, 8 rows: a column of a strip
     [0.000, 0.000, 0.000], // 2 bits paired groups, 4 rows: a call
-    [55.500, 113.318, 55.500], // 2 bits paired groups, 4 rows: a strip
+    [46.115, 100.156, 46.115], // 2 bits paired groups, 4 rows: a strip
     [0.000, 0.000, 0.000], // 2 bits paired groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 2 bits paired groups, 4 rows: a chunk of a strip
-    [2.778, 3.939, 2.778], // 2 bits paired groups, 4 rows: a column of a strip
-    [44.361, 85.986, 44.361], // 2 bits paired groups, 8 rows: a call
-    [23.348, 48.953, 23.348], // 2 bits paired groups, 8 rows: a strip
+    [3.010, 4.213, 3.010], // 2 bits paired groups, 4 rows: a column of a strip
+    [36.363, 80.582, 36.363], // 2 bits paired groups, 8 rows: a call
+    [17.584, 32.620, 17.584], // 2 bits paired groups, 8 rows: a strip
     [0.000, 0.000, 0.000], // 2 bits paired groups, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 2 bits paired groups, 8 rows: a chunk of a strip
-    [5.344, 7.090, 5.344], // 2 bits paired groups, 8 rows: a column of a strip
-    [41.057, 84.751, 41.057], // 3 bits single rows, 4 rows: a call
+    [5.348, 7.095, 5.348], // 2 bits paired groups, 8 rows: a column of a strip
+    [32.092, 78.828, 32.092], // 3 bits single rows, 4 rows: a call
     [0.000, 0.000, 0.000], // 3 bits single rows, 4 rows: a strip
     [0.000, 0.000, 0.000], // 3 bits single rows, 4 rows: a pass or group of a strip
-    [10.672, 22.054, 10.672], // 3 bits single rows, 4 rows: a chunk of a strip
-    [5.186, 6.152, 5.186], // 3 bits single rows, 4 rows: a column of a strip
+    [12.127, 26.281, 12.127], // 3 bits single rows, 4 rows: a chunk of a strip
+    [5.186, 6.183, 5.186], // 3 bits single rows, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 3 bits single rows, 8 rows: a call
     [0.000, 0.000, 0.000], // 3 bits single rows, 8 rows: a strip
     [0.000, 0.000, 0.000], // 3 bits single rows, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 3 bits single rows, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 3 bits single rows, 8 rows: a column of a strip
-    [84.771, 148.255, 84.771], // 3 bits single groups, 4 rows: a call
-    [9.706, 23.593, 9.706], // 3 bits single groups, 4 rows: a strip
-    [24.773, 44.180, 24.773], // 3 bits single groups, 4 rows: a pass or group of a strip
+    [78.893, 157.635, 78.893], // 3 bits single groups, 4 rows: a call
+    [9.169, 19.783, 9.169], // 3 bits single groups, 4 rows: a strip
+    [23.698, 42.125, 23.698], // 3 bits single groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 3 bits single groups, 4 rows: a chunk of a strip
-    [5.192, 6.159, 5.192], // 3 bits single groups, 4 rows: a column of a strip
+    [5.195, 6.196, 5.195], // 3 bits single groups, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 3 bits single groups, 8 rows: a call
     [0.000, 0.000, 0.000], // 3 bits single groups, 8 rows: a strip
     [0.000, 0.000, 0.000], // 3 bits single groups, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 3 bits single groups, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 3 bits single groups, 8 rows: a column of a strip
-    [38.412, 79.780, 38.412], // 3 bits paired rows, 4 rows: a call
-    [20.746, 37.842, 20.746], // 3 bits paired rows, 4 rows: a strip
-    [6.709, 14.013, 6.709], // 3 bits paired rows, 4 rows: a pass or group of a strip
+    [30.111, 73.667, 30.111], // 3 bits paired rows, 4 rows: a call
+    [18.165, 29.650, 18.165], // 3 bits paired rows, 4 rows: a strip
+    [6.582, 14.079, 6.582], // 3 bits paired rows, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 3 bits paired rows, 4 rows: a chunk of a strip
-    [3.107, 4.101, 3.107], // 3 bits paired rows, 4 rows: a column of a strip
+    [3.110, 4.104, 3.110], // 3 bits paired rows, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 3 bits paired rows, 8 rows: a call
     [0.000, 0.000, 0.000], // 3 bits paired rows, 8 rows: a strip
     [0.000, 0.000, 0.000], // 3 bits paired rows, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 3 bits paired rows, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 3 bits paired rows, 8 rows: a column of a strip
     [0.000, 0.000, 0.000], // 3 bits paired groups, 4 rows: a call
-    [10.650, 25.368, 10.650], // 3 bits paired groups, 4 rows: a strip
+    [7.988, 17.583, 7.988], // 3 bits paired groups, 4 rows: a strip
     [0.000, 0.000, 0.000], // 3 bits paired groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 3 bits paired groups, 4 rows: a chunk of a strip
-    [3.715, 5.088, 3.715], // 3 bits paired groups, 4 rows: a column of a strip
+    [3.714, 5.087, 3.714], // 3 bits paired groups, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 3 bits paired groups, 8 rows: a call
     [0.000, 0.000, 0.000], // 3 bits paired groups, 8 rows: a strip
     [0.000, 0.000, 0.000], // 3 bits paired groups, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 3 bits paired groups, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 3 bits paired groups, 8 rows: a column of a strip
-    [45.454, 88.870, 45.454], // 4 bits single rows, 4 rows: a call
+    [37.049, 84.144, 37.049], // 4 bits single rows, 4 rows: a call
     [0.000, 0.000, 0.000], // 4 bits single rows, 4 rows: a strip
-    [3.324, 6.478, 3.324], // 4 bits single rows, 4 rows: a pass or group of a strip
-    [12.079, 26.137, 12.079], // 4 bits single rows, 4 rows: a chunk of a strip
-    [4.366, 5.359, 4.366], // 4 bits single rows, 4 rows: a column of a strip
+    [3.056, 6.642, 3.056], // 4 bits single rows, 4 rows: a pass or group of a strip
+    [12.814, 28.060, 12.814], // 4 bits single rows, 4 rows: a chunk of a strip
+    [4.373, 5.383, 4.373], // 4 bits single rows, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 4 bits single rows, 8 rows: a call
     [0.000, 0.000, 0.000], // 4 bits single rows, 8 rows: a strip
     [0.000, 0.000, 0.000], // 4 bits single rows, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 4 bits single rows, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 4 bits single rows, 8 rows: a column of a strip
-    [83.036, 145.140, 83.036], // 4 bits single groups, 4 rows: a call
-    [13.638, 30.481, 13.638], // 4 bits single groups, 4 rows: a strip
-    [24.044, 43.659, 24.044], // 4 bits single groups, 4 rows: a pass or group of a strip
+    [84.008, 154.330, 84.008], // 4 bits single groups, 4 rows: a call
+    [12.059, 26.290, 12.059], // 4 bits single groups, 4 rows: a strip
+    [23.919, 42.598, 23.919], // 4 bits single groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 4 bits single groups, 4 rows: a chunk of a strip
-    [4.462, 5.543, 4.462], // 4 bits single groups, 4 rows: a column of a strip
+    [4.466, 5.578, 4.466], // 4 bits single groups, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 4 bits single groups, 8 rows: a call
     [0.000, 0.000, 0.000], // 4 bits single groups, 8 rows: a strip
     [0.000, 0.000, 0.000], // 4 bits single groups, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 4 bits single groups, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 4 bits single groups, 8 rows: a column of a strip
     [0.000, 0.000, 0.000], // 4 bits paired rows, 4 rows: a call
-    [0.000, 14.262, 0.000], // 4 bits paired rows, 4 rows: a strip
+    [0.498, 46.364, 0.498], // 4 bits paired rows, 4 rows: a strip
     [0.000, 0.000, 0.000], // 4 bits paired rows, 4 rows: a pass or group of a strip
-    [76.462, 122.765, 76.462], // 4 bits paired rows, 4 rows: a chunk of a strip
-    [3.421, 4.427, 3.421], // 4 bits paired rows, 4 rows: a column of a strip
-    [44.195, 77.965, 44.195], // 4 bits paired rows, 8 rows: a call
+    [57.966, 56.932, 57.966], // 4 bits paired rows, 4 rows: a chunk of a strip
+    [3.761, 5.163, 3.761], // 4 bits paired rows, 4 rows: a column of a strip
+    [38.438, 74.446, 38.438], // 4 bits paired rows, 8 rows: a call
     [0.000, 0.000, 0.000], // 4 bits paired rows, 8 rows: a strip
-    [2.839, 5.903, 2.839], // 4 bits paired rows, 8 rows: a pass or group of a strip
-    [31.251, 53.869, 31.251], // 4 bits paired rows, 8 rows: a chunk of a strip
-    [6.789, 8.298, 6.789], // 4 bits paired rows, 8 rows: a column of a strip
+    [3.133, 6.172, 3.133], // 4 bits paired rows, 8 rows: a pass or group of a strip
+    [26.381, 38.333, 26.381], // 4 bits paired rows, 8 rows: a chunk of a strip
+    [6.771, 8.283, 6.771], // 4 bits paired rows, 8 rows: a column of a strip
     [0.000, 0.000, 0.000], // 4 bits paired groups, 4 rows: a call
-    [52.349, 108.903, 52.349], // 4 bits paired groups, 4 rows: a strip
+    [43.707, 96.669, 43.707], // 4 bits paired groups, 4 rows: a strip
     [0.000, 0.000, 0.000], // 4 bits paired groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 4 bits paired groups, 4 rows: a chunk of a strip
-    [4.114, 5.527, 4.114], // 4 bits paired groups, 4 rows: a column of a strip
-    [40.335, 79.115, 40.335], // 4 bits paired groups, 8 rows: a call
-    [21.255, 46.870, 21.255], // 4 bits paired groups, 8 rows: a strip
+    [4.344, 5.859, 4.344], // 4 bits paired groups, 4 rows: a column of a strip
+    [33.083, 74.480, 33.083], // 4 bits paired groups, 8 rows: a call
+    [15.428, 30.487, 15.428], // 4 bits paired groups, 8 rows: a strip
     [0.000, 0.000, 0.000], // 4 bits paired groups, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 4 bits paired groups, 8 rows: a chunk of a strip
-    [7.847, 10.093, 7.847], // 4 bits paired groups, 8 rows: a column of a strip
-    [14.007, 39.324, 14.007], // 8 bits single rows, 4 rows: a call
+    [7.851, 10.098, 7.851], // 4 bits paired groups, 8 rows: a column of a strip
+    [24.910, 69.234, 24.910], // 8 bits single rows, 4 rows: a call
     [0.000, 0.000, 0.000], // 8 bits single rows, 4 rows: a strip
-    [4.708, 8.972, 4.708], // 8 bits single rows, 4 rows: a pass or group of a strip
-    [10.438, 23.461, 10.438], // 8 bits single rows, 4 rows: a chunk of a strip
-    [4.448, 5.909, 4.448], // 8 bits single rows, 4 rows: a column of a strip
+    [3.598, 7.604, 3.598], // 8 bits single rows, 4 rows: a pass or group of a strip
+    [12.127, 27.141, 12.127], // 8 bits single rows, 4 rows: a chunk of a strip
+    [4.482, 5.982, 4.482], // 8 bits single rows, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 8 bits single rows, 8 rows: a call
     [0.000, 0.000, 0.000], // 8 bits single rows, 8 rows: a strip
     [0.000, 0.000, 0.000], // 8 bits single rows, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 8 bits single rows, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 8 bits single rows, 8 rows: a column of a strip
-    [82.354, 145.316, 82.354], // 8 bits single groups, 4 rows: a call
-    [13.618, 30.419, 13.618], // 8 bits single groups, 4 rows: a strip
-    [24.058, 43.676, 24.058], // 8 bits single groups, 4 rows: a pass or group of a strip
+    [83.528, 154.979, 83.528], // 8 bits single groups, 4 rows: a call
+    [12.046, 26.232, 12.046], // 8 bits single groups, 4 rows: a strip
+    [23.933, 42.608, 23.933], // 8 bits single groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 8 bits single groups, 4 rows: a chunk of a strip
-    [4.587, 6.170, 4.587], // 8 bits single groups, 4 rows: a column of a strip
+    [4.591, 6.205, 4.591], // 8 bits single groups, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 8 bits single groups, 8 rows: a call
     [0.000, 0.000, 0.000], // 8 bits single groups, 8 rows: a strip
     [0.000, 0.000, 0.000], // 8 bits single groups, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 8 bits single groups, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 8 bits single groups, 8 rows: a column of a strip
-    [18.704, 46.060, 18.704], // 8 bits paired rows, 4 rows: a call
+    [26.063, 67.254, 26.063], // 8 bits paired rows, 4 rows: a call
     [0.000, 0.000, 0.000], // 8 bits paired rows, 4 rows: a strip
-    [2.509, 5.306, 2.509], // 8 bits paired rows, 4 rows: a pass or group of a strip
-    [17.213, 33.323, 17.213], // 8 bits paired rows, 4 rows: a chunk of a strip
-    [3.377, 4.877, 3.377], // 8 bits paired rows, 4 rows: a column of a strip
+    [2.724, 5.977, 2.724], // 8 bits paired rows, 4 rows: a pass or group of a strip
+    [14.875, 25.671, 14.875], // 8 bits paired rows, 4 rows: a chunk of a strip
+    [3.378, 4.877, 3.378], // 8 bits paired rows, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 8 bits paired rows, 8 rows: a call
     [0.000, 0.000, 0.000], // 8 bits paired rows, 8 rows: a strip
     [0.000, 0.000, 0.000], // 8 bits paired rows, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 8 bits paired rows, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 8 bits paired rows, 8 rows: a column of a strip
-    [92.497, 158.644, 92.497], // 8 bits paired groups, 4 rows: a call
-    [11.561, 26.336, 11.561], // 8 bits paired groups, 4 rows: a strip
+    [79.117, 152.798, 79.117], // 8 bits paired groups, 4 rows: a call
+    [8.777, 18.322, 8.777], // 8 bits paired groups, 4 rows: a strip
     [0.000, 0.000, 0.000], // 8 bits paired groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 8 bits paired groups, 4 rows: a chunk of a strip
-    [4.063, 6.093, 4.063], // 8 bits paired groups, 4 rows: a column of a strip
+    [4.064, 6.095, 4.064], // 8 bits paired groups, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 8 bits paired groups, 8 rows: a call
     [0.000, 0.000, 0.000], // 8 bits paired groups, 8 rows: a strip
     [0.000, 0.000, 0.000], // 8 bits paired groups, 8 rows: a pass or group of a strip

@@ -86,7 +86,7 @@ impl Format for W3Paired {
 
     fn extract(cell: &[u32; 3], row: usize, col: usize) -> u8 {
         let (set, bit, sign) = field(row, col);
-        (sets(*cell)[set] >> bit & 7 ^ sign) as u8
+        (sets(*cell)[set & 7] >> bit & 7 ^ sign) as u8
     }
 
     #[inline(always)]
