@@ -9,10 +9,10 @@ pub(super) const RATES: &[[f64; 3]] = &[
     [5.483, 5.102, 6.047], // a value of an array of the action contract
     [91.048, 181.673, 91.048], // a call that runs one operation
     [0.000, 0.000, 91.048], // a call that runs pieces
-    [0.000, 0.000, 167.417], // an operation that a poll comes to
-    [0.000, 0.000, 359.843], // a piece
+    [0.000, 0.000, 168.073], // an operation that a poll comes to
+    [0.000, 0.000, 360.214], // a piece
     [418.805, 742.435, 418.805], // a linear operation
-    [0.000, 0.000, 688.165], // a block of rows of a linear operation that a poll comes to
+    [0.000, 0.000, 701.145], // a block of rows of a linear operation that a poll comes to
     [26.994, 37.018, 26.994], // eight values compared by magnitude
     [7.730, 9.976, 7.730], // a value compared by magnitude
     [0.000, 0.000, 0.000], // a block of rows whose order is looked at
