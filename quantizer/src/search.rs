@@ -1,9 +1,9 @@
 //! The smallest budget whose measured error stays within a limit.
 //!
 //! Budgets are multiples of a tenth of a bit per weight. Each try is a whole quantization whose image is run by the executor. A
-//! method that learns first looks with an eighth of the steps, at most [`LOOKS`] times; then, from the budget found so, with all
+//! method that learns first looks with an eighth of the steps, at most `LOOKS` times; then, from the budget found so, with all
 //! its steps. What is returned has kept the limit with all its steps. Tries stop when the next smaller budget is known to
-//! fail, or after [`TRIES`] ([`PLAIN_TRIES`] without learning, or with too few steps to share): then a smaller budget may do, and the tries tell
+//! fail, or after `TRIES` (`PLAIN_TRIES` without learning, or with too few steps to share): then a smaller budget may do, and the tries tell
 //! which range is open. The search takes errors as falling with bits.
 
 use std::borrow::Cow;
