@@ -22,7 +22,7 @@ mod firmware {
 
     /// Of the largest case, weights and activations.
     const WORDS: usize = if cfg!(actq_small) { 1536 } else { 64 * 1024 };
-    const ROWS: usize = 256;
+    const ROWS: usize = if cfg!(actq_small) { 32 } else { 256 };
 
     #[cortex_m_rt::entry]
     fn main() -> ! {
