@@ -10,7 +10,8 @@ fn main() {
     if small {
         println!("cargo::rustc-cfg=actq_small");
     }
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(if small { "microbit" } else { "mps2" });
+    let package = std::env::var("CARGO_MANIFEST_DIR").unwrap_or_default();
+    let folder = Path::new(&package).join(if small { "microbit" } else { "mps2" });
     println!("cargo::rustc-link-search={}", folder.display());
     println!("cargo::rerun-if-changed={}", folder.join("memory.x").display());
 }
