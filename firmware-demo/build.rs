@@ -7,7 +7,9 @@ const MICROBIT: [(&str, u32); 3] =
     [("_stack_start", 0x2000_4000), ("_image_slot_start", 0x0004_0000), ("_image_slot_end", 0x0004_0000)];
 
 fn main() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."));
+    // The variable of this run: a build script may have been compiled for another checkout.
+    let package = std::env::var("CARGO_MANIFEST_DIR").unwrap_or_default();
+    let root = Path::new(&package).parent().unwrap_or(Path::new("."));
     println!("cargo::rustc-link-search={}", root.display());
     println!("cargo::rerun-if-changed={}", root.join("memory.x").display());
     println!("cargo::rustc-check-cfg=cfg(actq_small)");
