@@ -66,8 +66,8 @@ impl Factor {
     }
 }
 
-/// Quantizes `matrix`, whose rows have these widths and `group` columns a scale (0 = none). `input` holds the moments of its input, `output` is `G`; `importance` weighs
-/// the columns for the first scales.
+/// Quantizes `matrix`, whose rows have these widths and `group` columns a scale (0 = none). `input` holds the moments of its
+/// input, `output` is `G`; `importance` weighs the columns for the first scales.
 ///
 /// The mean error is left to the biases, so that `H` is taken about the input's mean: returns the matrix and what is to be added
 /// to the biases behind it.
@@ -94,14 +94,13 @@ pub fn feedback(
         let r = g.order[i];
         carried.fill(0.0);
         for (&other, m) in g.order.iter().zip(g.below(i)).skip(i + 1) {
-            let errors = &errors[other * cols..][..cols];
-            carried.iter_mut().zip(errors).for_each(|(carried, e)| *carried += m * e);
+            add(&mut carried, *m, &errors[other * cols..][..cols]);
         }
         for j in (0..cols).rev() {
             let c = h.order[j];
             let weight = f64::from(matrix.data[r * cols + c]);
             let rounded = widths[r].map_or(0.0, |width| {
-                let before: f64 = h.below(j)[j + 1..].iter().zip(&done[j + 1..]).map(|(l, z)| l * z).sum();
+                let before = dot(&h.below(j)[j + 1..], &done[j + 1..]);
                 let code = scales.code(width, r, c, (weight - carried[c] - before) as f32);
                 codes[r * cols + c] = code;
                 value(&scales, width, r, c, code)
@@ -116,12 +115,11 @@ pub fn feedback(
             // Row r of G E H, which is half the derivative of the error by the row.
             carried.fill(0.0);
             for (other, m) in g.row(r).iter().enumerate() {
-                let errors = &errors[other * cols..][..cols];
-                carried.iter_mut().zip(errors).for_each(|(carried, e)| *carried += m * e);
+                add(&mut carried, *m, &errors[other * cols..][..cols]);
             }
             done.fill(0.0);
             for (c, x) in carried.iter().enumerate() {
-                done.iter_mut().zip(h.row(c)).for_each(|(d, h)| *d += x * h);
+                add(&mut done, *x, h.row(c));
             }
             let own = g.row(r)[r];
             for c in 0..cols {
@@ -132,20 +130,20 @@ pub fn feedback(
                     let step = value(&scales, width, r, c, code) - now;
                     codes[at] = code;
                     errors[at] += step;
-                    done.iter_mut().zip(h.row(c)).for_each(|(d, h)| *d += own * step * h);
+                    add(&mut done, own * step, h.row(c));
                 }
             }
             // The scale at which the derivative along the row's levels vanishes.
             let level = |c: usize| f64::from(width.level(codes[r * cols + c])) * f64::from(scales.group_scale(r, c));
             let levels: Vec<f64> = (0..cols).map(level).collect();
-            let slope: f64 = levels.iter().zip(&done).map(|(l, d)| l * d).sum();
+            let slope = dot(&levels, &done);
             let curvature: f64 = own * levels.iter().enumerate().map(|(c, l)| l * dot(h.row(c), &levels)).sum::<f64>();
             if curvature > 0.0 {
                 let scale = &mut scales.rows[r];
                 let wanted = bf16::from_f64(scale.to_f64() - slope / curvature);
                 if wanted > bf16::ZERO {
                     let step = wanted.to_f64() - scale.to_f64();
-                    errors[r * cols..][..cols].iter_mut().zip(&levels).for_each(|(e, l)| *e += step * l);
+                    add(&mut errors[r * cols..][..cols], step, &levels);
                     *scale = wanted;
                 }
             }
@@ -154,6 +152,11 @@ pub fn feedback(
     let shift = errors.chunks_exact(cols).map(|e| -dot(e, &input.mean) as f32).collect();
     let widths = widths.to_vec();
     (Quantized { rows, cols, group, widths, scales: scales.rows, group_scales: scales.groups, codes }, shift)
+}
+
+/// `to += factor * from`
+fn add(to: &mut [f64], factor: f64, from: &[f64]) {
+    to.iter_mut().zip(from).for_each(|(to, from)| *to += factor * from);
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
