@@ -4,7 +4,7 @@
 //! packed words, the prepared activations, and the sums with those of padding rows. The stream ends with a width of 0.
 
 pub use actq::random::Random;
-use actq_kernels::activations::{Prepared, prepare, prepared_words};
+use actq_kernels::activations::{Plan, Prepared, prepare};
 use actq_kernels::format::{Block, BlockShape, Lanes, Width, pack};
 
 /// How a case's numbers are drawn.
@@ -75,9 +75,15 @@ impl Case {
 
     /// The prepared activations.
     pub fn prepared(&self) -> Vec<u32> {
-        let mut out = vec![!0; prepared_words(self.shape)];
-        prepare(&self.x, self.shape, &mut out);
+        let plan = self.plan();
+        let mut out = vec![!0; plan.words()];
+        prepare(&self.x, &plan, &mut out);
         out
+    }
+
+    /// How its activations are prepared.
+    pub fn plan(&self) -> Plan {
+        Plan::new(self.shape).expect("the shape is valid")
     }
 
     /// The sums by the definition, straight from codes and activations, modulo 2^32; those of padding rows are 0.
@@ -100,7 +106,8 @@ impl Case {
         let (words, prepared) = (shift(self.words()), shift(self.prepared()));
         let mut sums = vec![0; self.shape.padded_rows()];
         let block = Block::new(self.shape, &words[start..]);
-        let x = Prepared::new(&prepared[start..], self.shape);
+        let plan = self.plan();
+        let x = Prepared::new(&prepared[start..], &plan);
         if let (Some(block), Some(x)) = (block, x) {
             gemv(&block, &x, &mut sums);
         }

@@ -94,12 +94,12 @@ fn the_hex_example_reads_as_documented() {
     assert_eq!(image.source_weights(), 6);
     assert_eq!(bytes[4 * h::W_CRC..][..4], checksum(&bytes).to_le_bytes());
     assert_eq!((image.kind(), image.chunk(), image.execute()), (Kind::Step, 1, 1));
-    assert_eq!((image.obs_len(), image.act_len(), image.scratch_words()), (2, 3, 25));
+    assert_eq!((image.obs_len(), image.act_len(), image.scratch_words()), (2, 3, 41));
     assert_eq!(image.state(), Region { offset: 0, len: 0 });
     assert_eq!(image.observation(), Region { offset: 0, len: 2 });
     assert_eq!(image.output(), Region { offset: 2, len: 3 });
     assert_eq!(image.action(), Region { offset: 5, len: 3 });
-    assert_eq!(image.work(), Region { offset: 8, len: 17 });
+    assert_eq!(image.work(), Region { offset: 8, len: 33 });
     assert_eq!((image.rate_hz(), image.name()), (50.0, "tiny"));
     assert_eq!(image.digest(), std::array::from_fn(|i| i as u8));
 
@@ -374,15 +374,31 @@ fn the_work_area_is_as_long_as_documented() {
     assert_eq!(
         rows,
         [
-            ["0", "max(ceil(c / 32) * 16, ceil(c / 8) * 5) + 1"],
-            ["32, 64, 128", "ceil(c / group) * (group * 5 / 8 + 1)"],
+            ["0", "1 + max(ceil(c / 32) * 16, ceil(c / 8) * 5)"],
+            ["0, where 8 does not divide c", "1 + max(ceil(c / 32) * 32, ceil(c / 8) * 9)"],
+            ["0, where 8 does but 32 does not", "1 + ceil(c / 32) * 32"],
+            ["32", "ceil(c / 32) * 21"],
+            ["32, where it does not divide c", "ceil(c / 32) * 37"],
+            ["64, 128", "ceil(c / group) * (group / 2 + 1)"],
+            ["64, 128, where it does not divide c", "ceil(c / group) * (group + 1)"],
         ]
     );
     for cols in (1..1200usize).chain([4095, 4096, 65535]) {
-        let words = (cols.div_ceil(32) * 16).max(cols.div_ceil(8) * 5) + 1;
-        assert_eq!(max_prepared_words(cols, 0), words, "{cols} columns");
+        let thirty_twos = cols.div_ceil(32);
+        let words = match (cols % 8, cols % 32) {
+            (0, 0) => (thirty_twos * 16).max(cols / 8 * 5),
+            (0, _) => thirty_twos * 32,
+            _ => (thirty_twos * 32).max(cols.div_ceil(8) * 9),
+        };
+        assert_eq!(max_prepared_words(cols, 0), 1 + words, "{cols} columns");
         for group in [32, 64, 128] {
-            let words = cols.div_ceil(group) * (group * 5 / 8 + 1);
+            let words = match (group, cols.is_multiple_of(group)) {
+                (32, true) => 21,
+                (32, false) => 37,
+                (_, true) => group / 2 + 1,
+                (_, false) => group + 1,
+            };
+            let words = cols.div_ceil(group) * words;
             assert_eq!(max_prepared_words(cols, group), words, "{cols} columns, groups of {group}");
         }
     }

@@ -1,7 +1,7 @@
 //! Packing, the reference and the portable kernels against the definition, by property and on the golden cases.
 
 use actq_host_tests::golden::{self, Case, Draw, Random};
-use actq_kernels::activations::{NotFinite, Prepared, Scale, prepare, prepared_words};
+use actq_kernels::activations::{NotFinite, Plan, Prepared, Scale, prepare};
 use actq_kernels::dequantize;
 use actq_kernels::format::{Block, BlockShape, Lanes, STRIP, Width, pack};
 use actq_kernels::gemv::{BACKEND, Backend, Mismatch, gemv};
@@ -89,15 +89,15 @@ proptest! {
     ) {
         let shape = BlockShape { cols: x.len(), ..shape };
         let x_max = if shape.lanes == Lanes::Paired { 127 } else { x_max };
-        let mut words = vec![!0; prepared_words(shape)];
+        let plan = Plan::new(shape).expect("the shape is valid");
+        let mut words = vec![!0; plan.room(x.len())];
         let scale = Scale::new(&x, x_max).expect("all values are finite");
-        scale.quantize(&x, shape, &mut words);
+        let prepared = scale.quantize(&x, &plan, &mut words).expect("there is room");
         let scale = scale.get();
-        let prepared = Prepared::new(&words, shape).expect("the length is right");
         // What integers give, word for word: start words, sums and padding, too.
         let integers: Vec<i16> = (0..x.len()).map(|col| prepared.value(col)).collect();
-        let mut expected = vec![!0; words.len() + 1];
-        prop_assert_eq!(prepare(&integers, shape, &mut expected).map(|x| x.words()), Some(&*words));
+        let mut expected = vec![!0; plan.words() + 1];
+        prop_assert_eq!(prepare(&integers, &plan, &mut expected).map(|x| x.words()), Some(prepared.words()));
         prop_assert_eq!(expected.last(), Some(&!0));
         for (i, x) in x.iter().enumerate() {
             let q = prepared.value(i);
@@ -140,17 +140,22 @@ fn shapes_and_lengths_that_do_not_fit_are_refused() {
         assert!(Block::new(bad, &vec![0; bad.words()]).is_none(), "{bad:?}");
     }
     let block = Block::new(shape, &words).expect("the words fit the shape");
-    assert!(prepare(&[1; 33], shape, &mut vec![0; prepared_words(shape) - 1]).is_none(), "too few words");
-    assert!(prepare(&[], BlockShape { cols: 0, ..shape }, &mut [0; 8]).is_none(), "no columns");
-    let prepared = vec![0; prepared_words(shape)];
-    let x = Prepared::new(&prepared, shape).expect("the length is right");
+    let plan = Plan::of(&block);
+    assert!(prepare(&[1; 33], &plan, &mut vec![0; plan.words() - 1]).is_none(), "too few words");
+    let scale = Scale::new(&[1.0; 33], 127).expect("all values are finite");
+    assert!(scale.quantize(&[1.0; 33], &plan, &mut vec![0; plan.room(33) - 1]).is_none(), "too little room");
+    assert!(Plan::new(BlockShape { cols: 0, ..shape }).is_none(), "no columns");
+    let prepared = vec![0; plan.words()];
+    assert!(Prepared::new(&prepared[1..], &plan).is_none(), "too few words");
+    let x = Prepared::new(&prepared, &plan).expect("the length is right");
     assert_eq!(gemv(&block, &x, 0, &mut [0; 8]), Ok(()));
     assert_eq!(gemv(&block, &x, 0, &mut [0; 4]), Err(Mismatch), "half a strip");
     assert_eq!(gemv(&block, &x, 4, &mut [0; 4]), Err(Mismatch), "from the middle of a strip");
     assert_eq!(gemv(&block, &x, 0, &mut [0; 16]), Err(Mismatch), "more rows than the block has");
     for other in [BlockShape { group: 32, ..shape }, BlockShape { lanes: Lanes::Paired, ..shape }] {
-        let prepared = vec![0; prepared_words(other)];
-        let x = Prepared::new(&prepared, other).expect("the length is right");
+        let plan = Plan::new(other).expect("the shape is valid");
+        let prepared = vec![0; plan.words()];
+        let x = Prepared::new(&prepared, &plan).expect("the length is right");
         assert_eq!(gemv(&block, &x, 0, &mut [0; 8]), Err(Mismatch), "{other:?}");
     }
 }
@@ -198,9 +203,9 @@ fn scaling_keeps_the_documented_order_of_operations() {
             let block = Block::new(shape, &words).expect("the words fit the shape");
             let block = RowBlock { block, scales: &scales, index: &[], first_row: 0 };
             let scale = Scale::new(&x, 127).expect("all values are finite");
-            let mut prepared = vec![0; prepared_words(shape)];
-            scale.quantize(&x, shape, &mut prepared);
-            let prepared = Prepared::new(&prepared, shape).expect("the length is right");
+            let plan = Plan::of(&block.block);
+            let mut prepared = vec![0; plan.room(x.len())];
+            let prepared = scale.quantize(&x, &plan, &mut prepared).expect("there is room");
             let expected: Vec<u32> = (0..rows)
                 .map(|i| {
                     let acc = reference::dot(&block.block, &prepared, i) as f32;
@@ -227,9 +232,9 @@ fn vectors_that_are_not_finite_are_refused_and_tiny_ones_are_zero() {
     assert_eq!(scale.get(), 0.0);
     for (width, lanes, group) in golden::layouts() {
         let shape = BlockShape { width, lanes, rows: 1, cols: 3, group };
-        let mut words = vec![!0; prepared_words(shape)];
-        scale.quantize(&tiny, shape, &mut words);
-        let x = Prepared::new(&words, shape).expect("the length is right");
+        let plan = Plan::new(shape).expect("the shape is valid");
+        let mut words = vec![!0; plan.room(tiny.len())];
+        let x = scale.quantize(&tiny, &plan, &mut words).expect("there is room");
         assert!((0..3).all(|col| x.value(col) == 0));
     }
 }

@@ -5,10 +5,10 @@
 //!
 //! A prepared vector is made for the layout that reads it ([`XFormat`]): for each group of columns (the whole row where the
 //! weights have no group scales) its chunks, and behind them, where the layout asks for it, the sum of the group's values. A
-//! chunk is its start words and its int16 pairs, column `2j` in the low half. The last one is padded with zeros up to where the
-//! weights are, or to a multiple of [`PAD_COLS`] with single lanes.
+//! chunk is its start words and its int16 pairs, column `2j` in the low half. Zeros fill the last group, or, where there are no
+//! groups, a kernel's step ([`PAD_COLS`] with single lanes). A [`Plan`] has all lengths.
 
-use crate::format::{BlockShape, Lanes, PAD_COLS, XFormat, div_up, round_up};
+use crate::format::{Block, BlockShape, Lanes, Layout, PAD_COLS, Width, XFormat, div_down, div_up, round_up};
 
 /// `1.5 * 2^23`: see the module's rounding rule.
 pub const ROUND: f32 = 12_582_912.0;
@@ -16,205 +16,208 @@ pub const ROUND: f32 = 12_582_912.0;
 /// Vectors whose largest magnitude is below this (2^-100) count as zero, so that the reciprocal of the scale stays finite.
 pub const TINY: f32 = f32::from_bits(27 << 23);
 
-/// How a prepared vector is laid out: the layout's needs, with the lengths of the vector.
+/// How a vector is prepared for blocks of a shape, and what their kernels are told of it. Groups and chunks are whole: zeros fill
+/// them.
 #[derive(Clone, Copy, Debug)]
-struct Plan {
-    format: &'static XFormat,
-    cols: usize,
+pub struct Plan {
+    /// The shape; its rows do not matter.
+    shape: BlockShape,
+    pub(crate) layout: &'static Layout,
     /// Columns with the padding.
-    padded: usize,
-    /// Columns of a group; all of them where there are no groups.
-    group: usize,
-    /// Groups; the last one may be short.
-    groups: usize,
-    /// Columns of a chunk.
-    chunk: usize,
-    /// Columns of a group's first chunk, which is short where they do not fill all.
-    first_chunk: usize,
+    pub(crate) padded: usize,
+    /// Groups; 1 where the weights have no group scales.
+    pub(crate) groups: usize,
     /// Chunks of a group.
-    chunks: usize,
+    pub(crate) chunks: usize,
+    /// Columns of a group's first chunk; the others have [`XFormat::chunk`].
+    pub(crate) first: usize,
+    /// Words of the prepared vector.
+    words: usize,
+    #[cfg(actq_armv7em)]
+    told: Told,
+}
+
+/// What a kernel is told of a vector.
+#[cfg(actq_armv7em)]
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Told {
+    /// The words up to where it stops reading. Single lanes read no more than the block's own units; with row scales, the
+    /// vector's sum stands behind the end.
+    pub(crate) end: usize,
+    /// Where chunks are summed without being taken apart, minus the biases of all of them; for single lanes with row scales 0;
+    /// else the bytes of a group's first chunk.
+    pub(crate) extra: usize,
+    /// Steps that the first pass through the loop of a kernel for row scales leaves out.
+    pub(crate) skip: usize,
 }
 
 impl Plan {
+    /// The plan for blocks of this shape, whose rows do not matter; `None` where it is not valid.
+    pub const fn new(shape: BlockShape) -> Option<Self> {
+        if shape.is_valid() { Some(Self::of_valid(shape)) } else { None }
+    }
+
+    /// The plan for a block.
+    pub fn of(block: &Block<'_>) -> Self {
+        Self::of_valid(block.shape())
+    }
+
     /// Every call of a kernel comes through here; all lengths but the vector's are powers of two, so nothing is divided.
     #[inline(never)]
-    const fn new(shape: BlockShape) -> Self {
-        let format = &shape.layout().x;
+    const fn of_valid(shape: BlockShape) -> Self {
+        let layout = shape.layout();
+        let format = &layout.x;
+        let read = round_up(shape.cols, shape.step());
         let padded = match shape.lanes {
-            Lanes::Single => round_up(shape.cols, PAD_COLS),
-            Lanes::Paired => round_up(shape.cols, shape.step()),
+            Lanes::Single => round_up(read, if shape.group > PAD_COLS { shape.group } else { PAD_COLS }),
+            Lanes::Paired => read,
         };
         let (group, groups) = match shape.group {
-            group @ 1.. if group < padded => (group, div_up(padded, group)),
-            _ => (padded, 1),
+            0 => (padded, 1),
+            group => (group, div_down(padded, group)),
         };
-        if format.chunk >= group {
-            return Self {
-                format,
-                cols: shape.cols,
-                padded,
-                group,
-                groups,
-                chunk: group,
-                first_chunk: group,
-                chunks: 1,
-            };
+        let before = (group - 1) >> layout.chunk_log;
+        let (chunks, first) = (before + 1, group - (before << layout.chunk_log));
+        let starts = format.start_words;
+        let words = padded / 2 + groups * (chunks * starts + format.sum as usize);
+        Self {
+            shape,
+            layout,
+            padded,
+            groups,
+            chunks,
+            first,
+            words,
+            #[cfg(actq_armv7em)]
+            told: Told {
+                end: words - (padded - read) / 2 - (format.sum && shape.group == 0) as usize,
+                extra: match shape.lanes {
+                    _ if format.sum => 0usize.wrapping_sub(chunks * format.starts[0].bias as usize),
+                    Lanes::Single if shape.group == 0 => 0,
+                    _ => 4 * starts + 2 * first,
+                },
+                // Passes and steps are powers of two, and chunks that are longer than a pass are whole passes.
+                skip: (0usize.wrapping_sub(read) & (format.run - 1)) >> layout.step_log,
+            },
         }
-        let chunk = format.chunk;
-        let chunks = div_up(group, chunk);
-        let first_chunk = group - (chunks - 1) * chunk;
-        Self { format, cols: shape.cols, padded, group, groups, chunk, first_chunk, chunks }
     }
 
-    /// The plan where the columns are valid. What is prepared for another invalid shape fits no block.
+    /// Whether what is prepared by this plan is for blocks of this shape.
     #[inline(always)]
-    fn checked(shape: BlockShape) -> Option<Self> {
-        (1..=0xffff).contains(&shape.cols).then(|| Self::new(shape))
+    pub fn fits(&self, shape: BlockShape) -> bool {
+        let BlockShape { width, lanes, rows: _, cols, group } = self.shape;
+        (width, lanes, cols, group) == (shape.width, shape.lanes, shape.cols, shape.group)
     }
 
-    /// Chunks in the first columns of a group; `last`: with one that they do not fill.
-    const fn chunks_in(&self, columns: usize, last: bool) -> usize {
-        if columns < self.first_chunk {
-            return last as usize;
-        }
-        let behind = columns - self.first_chunk;
-        1 + if last { behind.div_ceil(self.chunk) } else { behind / self.chunk }
+    /// Words of the prepared vector.
+    pub const fn words(&self) -> usize {
+        self.words
     }
 
-    const fn chunk_words(&self) -> usize {
-        self.format.starts.len() + self.chunk / 2
+    /// Words that preparing a vector of `len` values needs. A vector that does not fill its groups is copied first and filled
+    /// up with zeros: to the end of the room, while the prepared words grow from its begin.
+    pub const fn room(&self, len: usize) -> usize {
+        if len == self.padded { self.words } else { self.words + self.padded / 2 }
     }
 
+    /// Columns of a group.
+    const fn group(&self) -> usize {
+        self.first + (self.chunks - 1) * self.layout.x.chunk
+    }
+
+    /// Words of a group.
     const fn group_words(&self) -> usize {
-        self.group / 2 + self.extra_words()
+        self.group() / 2 + self.chunks * self.layout.x.start_words + self.layout.x.sum as usize
     }
 
-    /// Words of a group that hold no pairs. A short group has but one chunk, like all groups of single lanes.
-    const fn extra_words(&self) -> usize {
-        self.chunks * self.format.starts.len() + self.format.sum as usize
+    /// Words of a chunk of so many columns.
+    const fn chunk_words(&self, columns: usize) -> usize {
+        self.layout.x.start_words + columns / 2
     }
 
     /// Words before the pair of column `col`.
     const fn words_before(&self, col: usize) -> usize {
-        let (group, col) = (col / self.group, col % self.group);
-        let full_before = (col + self.chunk - self.first_chunk) / self.chunk;
-        group * self.group_words() + (full_before + 1) * self.format.starts.len() + col / 2
+        let (group, col) = (col / self.group(), col % self.group());
+        let full_before = (col + self.layout.x.chunk - self.first) / self.layout.x.chunk;
+        group * self.group_words() + (full_before + 1) * self.layout.x.start_words + col / 2
     }
 
-    const fn words(&self) -> usize {
-        self.padded / 2 + self.groups * self.extra_words()
-    }
-
-    /// See [`Prepared::bounds`]. Single lanes read no more than the block's own units; with row scales, the vector's sum
-    /// stands behind the end.
-    #[cfg(actq_armv7em)]
-    const fn bounds(&self, shape: BlockShape) -> (usize, usize) {
-        let unread = match shape.lanes {
-            Lanes::Single => (self.padded - round_up(shape.cols, shape.step())) / 2,
-            Lanes::Paired => 0,
+    /// What the cost of preparing and of reading a vector depends on.
+    pub(crate) const fn extent(&self) -> Extent {
+        let passes = match (self.shape.group, self.layout.x.run) {
+            (0, 1) => 0,
+            (0, run) => div_up(self.padded, run),
+            _ => self.groups,
         };
-        let sum_behind = (self.format.sum && shape.group == 0) as usize;
-        let extra = match self.format.starts {
-            [start] if self.format.sum => 0usize.wrapping_sub(self.chunks * start.bias as usize),
-            // Single lanes with row scales: there are no groups to count.
-            _ if shape.group == 0 && matches!(shape.lanes, Lanes::Single) => 0,
-            starts => 4 * (starts.len() + self.first_chunk / 2),
-        };
-        (self.words() - unread - sum_behind, extra)
-    }
-
-    /// Steps that the first pass through the loop of a kernel for row scales leaves out. Passes and steps are powers of two, and
-    /// chunks that are longer than a pass are whole passes.
-    #[cfg(actq_armv7em)]
-    const fn skip(&self, shape: BlockShape) -> usize {
-        let step = shape.layout().step;
-        (0usize.wrapping_sub(round_up(shape.cols, step)) & (self.format.run - 1)) >> step.trailing_zeros()
+        Extent { columns: self.padded, groups: self.groups, chunks: self.groups * self.chunks, passes }
     }
 }
 
-/// Words of a prepared vector for a block of this shape.
-pub const fn prepared_words(shape: BlockShape) -> usize {
-    Plan::new(shape).words()
+/// See [`Plan::extent`].
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Extent {
+    /// Columns with the padding.
+    pub(crate) columns: usize,
+    /// Groups; 1 where the weights have no group scales.
+    pub(crate) groups: usize,
+    /// Chunks of all groups.
+    pub(crate) chunks: usize,
+    /// Passes through a kernel's loop that are more than a step of its columns: groups, or runs of a row.
+    pub(crate) passes: usize,
 }
 
 /// A prepared vector.
 #[derive(Clone, Copy, Debug)]
 pub struct Prepared<'a> {
     words: &'a [u32],
-    /// The shape; its rows do not matter.
-    shape: BlockShape,
-    #[cfg(actq_armv7em)]
-    bounds: (usize, usize),
-    #[cfg(actq_armv7em)]
-    skip: usize,
+    plan: &'a Plan,
 }
 
 impl<'a> Prepared<'a> {
-    /// Names a vector that [`Scale::quantize`] or [`prepare`] wrote for blocks of this shape (their rows do not matter); `None`
-    /// where the length differs from [`prepared_words`] or there are no columns or too many.
-    pub fn new(words: &'a [u32], shape: BlockShape) -> Option<Self> {
-        let plan = Plan::checked(shape)?;
-        (words.len() == plan.words()).then(|| Self::planned(words, shape, &plan))
-    }
-
+    /// Names a vector that [`Scale::quantize`] or [`prepare`] wrote by this plan to the first of `words`; `None` where they are
+    /// fewer than [`Plan::words`].
     #[inline(always)]
-    fn planned(words: &'a [u32], shape: BlockShape, _plan: &Plan) -> Self {
-        Self {
-            words,
-            shape,
-            #[cfg(actq_armv7em)]
-            bounds: _plan.bounds(shape),
-            #[cfg(actq_armv7em)]
-            skip: _plan.skip(shape),
-        }
+    pub fn new(words: &'a [u32], plan: &'a Plan) -> Option<Self> {
+        Some(Self { words: words.get(..plan.words)?, plan })
     }
 
-    /// Whether the vector was prepared for blocks of this shape.
-    pub fn fits(&self, shape: BlockShape) -> bool {
-        let BlockShape { width, lanes, rows: _, cols, group } = self.shape;
-        (width, lanes, cols, group) == (shape.width, shape.lanes, shape.cols, shape.group)
+    /// How the vector was prepared.
+    #[inline(always)]
+    pub fn plan(&self) -> &'a Plan {
+        self.plan
     }
 
     /// All words.
+    #[inline(always)]
     pub fn words(&self) -> &'a [u32] {
         self.words
     }
 
     /// The groups' words, each with its sum where the layout has one.
     pub(crate) fn groups(&self) -> impl Iterator<Item = &'a [u32]> {
-        self.words.chunks(Plan::new(self.shape).group_words())
+        self.words.chunks(self.plan.group_words())
     }
 
     /// The chunks of a group's words, without its sum.
     pub(crate) fn chunks(&self, group: &'a [u32]) -> impl Iterator<Item = &'a [u32]> {
-        let plan = Plan::new(self.shape);
-        let first = plan.format.starts.len() + plan.first_chunk / 2;
-        let (first, rest) = group.split_at(first.min(group.len()));
-        core::iter::once(first).chain(rest.chunks(plan.chunk_words()))
+        let (first, rest) = group.split_at(self.plan.chunk_words(self.plan.first).min(group.len()));
+        core::iter::once(first).chain(rest.chunks(self.plan.chunk_words(self.plan.layout.x.chunk)))
     }
 
-    /// What the assembler is told about the vector: the words up to where it stops reading, and either the bytes of the first
-    /// chunk (0 for single lanes with row scales), or, where chunks are summed without being taken apart, minus the biases of
-    /// all chunks.
+    /// What the assembler is told about the vector.
     #[cfg(actq_armv7em)]
-    pub(crate) fn bounds(&self) -> (usize, usize) {
-        self.bounds
-    }
-
-    /// The layout's steps that the first pass through a kernel's loop leaves out.
-    #[cfg(actq_armv7em)]
-    pub(crate) fn skip(&self) -> usize {
-        self.skip
+    #[inline(always)]
+    pub(crate) fn told(&self) -> Told {
+        self.plan.told
     }
 
     /// The value of column `col`; 0 when out of range.
     pub fn value(&self, col: usize) -> i16 {
-        let plan = Plan::new(self.shape);
-        if col >= plan.padded {
+        if col >= self.plan.padded {
             return 0;
         }
-        let word = self.words.get(plan.words_before(col)).copied().unwrap_or(0);
-        ((word >> (16 * (col % 2))) as i16) >> plan.format.shift
+        let word = self.words.get(self.plan.words_before(col)).copied().unwrap_or(0);
+        ((word >> (16 * (col % 2))) as i16) >> self.plan.layout.x.shift
     }
 }
 
@@ -250,12 +253,18 @@ impl Scale {
         self.scale
     }
 
-    /// Writes the integers of `x`, prepared for blocks of `shape`, to the first [`prepared_words`] words of `out`, and names
-    /// them. Missing values of `x` count as zeros. `None`, with nothing written, where `out` is too short, or there are no columns
-    /// or too many.
+    /// Writes the integers of `x` as `plan` has it to the first [`Plan::words`] words of `out`, and names them. Missing values of
+    /// `x` count as zeros. `None`, with nothing written, where `out` is shorter than [`Plan::room`]; all of that may be
+    /// overwritten.
     #[inline(never)]
-    pub fn quantize<'w>(self, x: &[f32], shape: BlockShape, out: &'w mut [u32]) -> Option<Prepared<'w>> {
-        fill(x, shape, out, &Quantizer { inverse: self.inverse })
+    pub fn quantize<'w>(self, x: &[f32], plan: &'w Plan, out: &'w mut [u32]) -> Option<Prepared<'w>> {
+        let x = x.get(..plan.shape.cols).unwrap_or(x);
+        let room = out.get_mut(..plan.room(x.len()))?;
+        #[cfg(actq_fpu)]
+        crate::armv7em::quantize(x, self.inverse, plan, room);
+        #[cfg(not(actq_fpu))]
+        lay_out(x, plan, room, |value: f32| (value * self.inverse + ROUND).to_bits());
+        Prepared::new(out, plan)
     }
 }
 
@@ -269,196 +278,61 @@ fn magnitude_bits(x: &[f32]) -> u32 {
 }
 
 /// As [`Scale::quantize`], of integers.
-pub fn prepare<'w>(x: &[i16], shape: BlockShape, out: &'w mut [u32]) -> Option<Prepared<'w>> {
-    fill(x, shape, out, &Copier)
+pub fn prepare<'w>(x: &[i16], plan: &'w Plan, out: &'w mut [u32]) -> Option<Prepared<'w>> {
+    let x = x.get(..plan.shape.cols).unwrap_or(x);
+    lay_out(x, plan, out.get_mut(..plan.words)?, |value| value as u16 as u32);
+    Prepared::new(out, plan)
 }
 
-/// A run of whole groups, each of `first` columns and then chunks of `chunk` columns.
-#[derive(Clone, Copy, Debug)]
-#[cfg_attr(not(actq_fpu), expect(dead_code, reason = "only the FPU's backend has code for whole groups"))]
-pub(crate) struct Groups {
-    pub(crate) groups: usize,
-    /// Chunks of a group.
-    pub(crate) chunks: usize,
-    /// Columns of a group's first chunk.
-    pub(crate) first: usize,
-    /// Columns of the other chunks.
-    pub(crate) chunk: usize,
-}
-
-/// What turns values into the integers of a prepared vector.
-trait Source {
-    type Value: Copy;
-
-    /// An integer whose low 16 bits count.
-    fn integer(&self, value: Self::Value) -> u32;
-
-    /// Writes groups with all that belongs to them, and returns the sum of the last group's integers where the layout asks
-    /// for sums; `None`, with nothing written, where the backend has no code for these lengths.
-    fn groups(&self, _x: &[Self::Value], _format: &XFormat, _groups: Groups, _out: &mut [u32]) -> Option<i32> {
-        None
-    }
-}
-
-struct Copier;
-
-impl Source for Copier {
-    type Value = i16;
-
-    fn integer(&self, value: i16) -> u32 {
-        value as u16 as u32
-    }
-}
-
-struct Quantizer {
-    inverse: f32,
-}
-
-impl Source for Quantizer {
-    type Value = f32;
-
-    #[inline(always)]
-    fn integer(&self, value: f32) -> u32 {
-        (value * self.inverse + ROUND).to_bits()
-    }
-
-    #[cfg(actq_fpu)]
-    #[inline(always)]
-    fn groups(&self, x: &[f32], format: &XFormat, groups: Groups, out: &mut [u32]) -> Option<i32> {
-        crate::armv7em::quantize(x, self.inverse, format, groups, out)
-    }
-}
-
-/// Lays a vector out.
-#[inline(always)]
-fn fill<'w, S: Source>(x: &[S::Value], shape: BlockShape, out: &'w mut [u32], source: &S) -> Option<Prepared<'w>> {
-    let plan = Plan::checked(shape)?;
-    let out = out.get_mut(..plan.words())?;
-    let x = x.get(..plan.cols).unwrap_or(x);
-    // All whole groups at once; a vector without groups is one.
-    let groups = match plan.groups {
-        1 => usize::from(x.len() == plan.padded),
-        _ => x.len() >> plan.group.trailing_zeros(),
-    };
-    let Plan { chunks, first_chunk: first, chunk, .. } = plan;
-    let done = match source.groups(x, plan.format, Groups { groups, chunks, first, chunk }, out) {
-        Some(_) => groups,
-        None => 0,
-    };
-    if done < plan.groups {
-        rest(x, shape, done, out, source);
-    }
-    Some(Prepared::planned(out, shape, &plan))
-}
-
-/// Writes the groups from `done` on. Seldom needed, so it makes its own plan.
-#[inline(never)]
-fn rest<S: Source>(x: &[S::Value], shape: BlockShape, done: usize, out: &mut [u32], source: &S) {
-    let plan = &Plan::new(shape);
-    let mut groups = x.chunks(plan.group.max(1)).skip(done);
-    for out in out.chunks_mut(plan.group_words().max(1)).skip(done) {
-        group(groups.next().unwrap_or(&[]), plan, out, source);
-    }
-}
-
-/// Writes a group that is not whole, or all of it where the backend has no code.
-fn group<S: Source>(x: &[S::Value], plan: &Plan, out: &mut [u32], source: &S) {
-    let sum_at = out.len().saturating_sub(usize::from(plan.format.sum));
-    let Some((mut out, sum_word)) = out.split_at_mut_checked(sum_at) else { return };
-    let mut sum = 0i32;
-    let mut columns = plan.first_chunk;
+/// Lays a vector out: any values, of which `integer` makes integers whose low 16 bits count.
+fn lay_out<V: Copy>(x: &[V], plan: &Plan, out: &mut [u32], integer: impl Fn(V) -> u32) {
     let mut x = x;
-    // Whole chunks at once, unless the first is short and x does not fill it.
-    let whole = if x.len() < plan.first_chunk { 0 } else { 1 + (x.len() - plan.first_chunk) / plan.chunk.max(1) };
-    let run = Groups { groups: 1, chunks: whole, first: plan.first_chunk, chunk: plan.chunk };
-    if let Some(part) = source.groups(x, plan.format, run, out) {
-        sum = part;
-        let done = plan.first_chunk + (whole - 1) * plan.chunk;
-        x = x.get(done..).unwrap_or(&[]);
-        out = out.get_mut(whole * plan.format.starts.len() + done / 2..).unwrap_or_default();
-        columns = plan.chunk;
-    }
-    while !out.is_empty() {
-        let words = plan.format.starts.len() + columns / 2;
-        let (this, rest) = out.split_at_mut(words.min(out.len()));
-        let (this_x, rest_x) = x.split_at(columns.min(x.len()));
-        sum = sum.wrapping_add(chunk(this_x, plan.format, this, source));
-        (x, out, columns) = (rest_x, rest, plan.chunk);
-    }
-    if let Some(word) = sum_word.first_mut() {
-        *word = sum as u32;
+    for group in out.chunks_exact_mut(plan.group_words()).take(plan.groups) {
+        let (mut chunks, sum_word) = group.split_at_mut(group.len() - usize::from(plan.layout.x.sum));
+        let mut sum = 0i32;
+        let mut columns = plan.first;
+        while !chunks.is_empty() {
+            let (this, rest) = chunks.split_at_mut(plan.chunk_words(columns).min(chunks.len()));
+            let (this_x, rest_x) = x.split_at(columns.min(x.len()));
+            sum = sum.wrapping_add(chunk(this_x, &plan.layout.x, this, &integer));
+            (x, chunks, columns) = (rest_x, rest, plan.layout.x.chunk);
+        }
+        if let Some(word) = sum_word.first_mut() {
+            *word = sum as u32;
+        }
     }
 }
 
-/// Writes a chunk, as far as `x` goes and then zeros, and returns the sum of its integers where the layout asks for sums.
-fn chunk<S: Source>(x: &[S::Value], format: &XFormat, out: &mut [u32], source: &S) -> i32 {
-    let XFormat { shift, starts, .. } = *format;
-    // The backend takes eights. What it writes behind them, as for a whole group, is overwritten below.
-    let eights = x.len() & !7;
-    let run = Groups { groups: 1, chunks: 1, first: eights, chunk: eights };
-    let (sum, done) = source.groups(x, format, run, out).map_or((0, 0), |sum| (sum, eights));
-    let Some((start_words, pairs)) = out.split_at_mut_checked(starts.len()) else { return sum };
-    if done == 0 {
-        start_words.iter_mut().zip(starts).for_each(|(word, start)| *word = start.bias as u32);
+/// Writes a chunk, as far as `x` goes and then zeros, and returns the sum of its integers.
+fn chunk<V: Copy>(x: &[V], format: &XFormat, out: &mut [u32], integer: &impl Fn(V) -> u32) -> i32 {
+    let (starts, pairs) = out.split_at_mut(format.start_words.min(out.len()));
+    let (whole, rest) = x.as_chunks::<2>();
+    let odd = rest.first().map(|low| (integer(*low), 0));
+    let values = whole.iter().map(|[low, high]| (integer(*low), integer(*high))).chain(odd);
+    let mut sum = 0i32;
+    let filled = x.len().div_ceil(2).min(pairs.len());
+    for (word, (low, high)) in pairs.iter_mut().zip(values) {
+        sum = sum.wrapping_add(low as i16 as i32).wrapping_add(high as i16 as i32);
+        *word = ((low << format.shift) & 0xffff) | (high << format.shift << 16);
     }
-    let mut pairs = pairs.get_mut(done / 2..).unwrap_or_default();
-    let mut rest_sum = 0i32;
-    for x in x.get(done..).unwrap_or(&[]).chunks(2) {
-        let Some((word, rest)) = core::mem::take(&mut pairs).split_first_mut() else { break };
-        let (low, high) = (source.integer(x[0]), x.get(1).map_or(0, |v| source.integer(*v)));
-        rest_sum = rest_sum.wrapping_add(low as i16 as i32).wrapping_add(high as i16 as i32);
-        *word = ((low << shift) & 0xffff) | (high << shift << 16);
-        pairs = rest;
+    pairs.iter_mut().skip(filled).for_each(|word| *word = 0);
+    for (word, start) in starts.iter_mut().zip(format.starts) {
+        *word = start.bias.wrapping_add(start.factor.wrapping_mul(sum)) as u32;
     }
-    pairs.fill(0);
-    for (word, start) in start_words.iter_mut().zip(starts) {
-        *word = word.wrapping_add(start.factor.wrapping_mul(rest_sum) as u32);
-    }
-    sum.wrapping_add(rest_sum)
+    sum
 }
 
-/// Words that suffice for a prepared vector of any layout.
+/// Words that suffice to prepare a vector for blocks of any layout that has such groups.
 pub const fn max_prepared_words(cols: usize, group: usize) -> usize {
-    use crate::format::Width;
     let mut most = 0;
     let mut i = 0;
     while i < Width::ALL.len() * Lanes::ALL.len() {
         let (width, lanes) = (Width::ALL[i / Lanes::ALL.len()], Lanes::ALL[i % Lanes::ALL.len()]);
-        let words = prepared_words(BlockShape { width, lanes, rows: 1, cols, group });
-        if words > most {
-            most = words;
+        if let Some(plan) = Plan::new(BlockShape { width, lanes, rows: 1, cols, group }) {
+            let words = plan.room(cols);
+            most = if words > most { words } else { most };
         }
         i += 1;
     }
     most
-}
-
-/// What the cost of preparing and of reading a vector depends on.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Extent {
-    /// Columns with the padding.
-    pub(crate) columns: usize,
-    /// Groups; 1 where the weights have no group scales.
-    pub(crate) groups: usize,
-    /// Chunks of all groups.
-    pub(crate) chunks: usize,
-    /// Those of them that are written one by one, because the columns do not fill them or, with them, the group's first.
-    pub(crate) single_chunks: usize,
-    /// Passes through a kernel's loop that are more than a step of its columns: groups, or runs of a row.
-    pub(crate) passes: usize,
-}
-
-/// The extent of a vector for blocks of this shape.
-pub(crate) const fn extent(shape: BlockShape) -> Extent {
-    let plan = Plan::new(shape);
-    let groups = plan.padded.div_ceil(plan.group);
-    let passes = match (shape.group, plan.format.run) {
-        (0, 1) => 0,
-        (0, run) => plan.padded.div_ceil(run),
-        _ => groups,
-    };
-    let before = (groups - 1) * plan.group;
-    let full = plan.chunks_in(plan.cols - before, false);
-    let single_chunks = if plan.cols == plan.padded { 0 } else { plan.chunks_in(plan.padded - before, true) - full };
-    Extent { columns: plan.padded, groups, chunks: groups * plan.chunks, single_chunks, passes }
 }

@@ -14,7 +14,7 @@ mod rates;
 
 use core::fmt;
 
-use crate::activations::extent;
+use crate::activations::{Extent, Plan};
 use crate::format::{BlockShape, Lanes, QUAD, STRIP, Width};
 use crate::image::{Image, Op};
 use crate::linear::{Matrix, RUN, RowBlock};
@@ -104,15 +104,8 @@ const PREPARES: usize = FUNCTIONS + Function::ALL.len();
 const KERNELS: usize = PREPARES + LAYOUTS * PREPARE.len();
 const LAYOUTS: usize = 16;
 /// Features of preparing a vector, for each layout.
-const PREPARE: [&str; 7] = [
-    "a vector",
-    "a group",
-    "a chunk",
-    "a chunk written by itself",
-    "eight values",
-    "a value of the rest",
-    "a pair of padding",
-];
+const PREPARE: [&str; 6] =
+    ["a vector", "a group", "a chunk", "eight values", "a vector that zeros fill up", "a value of such a vector"];
 /// Features of a GEMV, for each layout with strips of four and of eight rows.
 const KERNEL: [&str; 5] =
     ["a call", "a strip", "a pass or group of a strip", "a chunk of a strip", "a column of a strip"];
@@ -324,18 +317,17 @@ pub(crate) fn magnitude(cols: usize, add: &mut dyn FnMut(Feature, usize)) {
     add(Feature::MAGNITUDE_REST, cols % 8);
 }
 
+/// Blocks in an image have valid shapes.
+fn extent(shape: BlockShape) -> Extent {
+    Plan::new(shape).map(|plan| plan.extent()).unwrap_or_default()
+}
+
 /// Preparing an input for blocks of this shape.
 pub(crate) fn prepare(shape: BlockShape, add: &mut dyn FnMut(Feature, usize)) {
-    let extent = extent(shape);
-    let counts: [usize; PREPARE.len()] = [
-        1,
-        extent.groups,
-        extent.chunks,
-        extent.single_chunks,
-        shape.cols / 8,
-        shape.cols % 8,
-        (extent.columns - shape.cols) / 2,
-    ];
+    let Extent { columns, groups, chunks, .. } = extent(shape);
+    let filled = columns != shape.cols;
+    let counts: [usize; PREPARE.len()] =
+        [1, groups, chunks, columns / 8, usize::from(filled), if filled { columns } else { 0 }];
     for (which, count) in (0..).zip(counts) {
         add(Feature::prepare(shape, which), count);
     }

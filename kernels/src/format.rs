@@ -42,7 +42,7 @@ pub mod w8;
 pub mod w8_paired;
 
 /// Changes whenever a packed layout changes meaning; stamped into every image.
-pub const LAYOUT_STAMP: u32 = 2;
+pub const LAYOUT_STAMP: u32 = 3;
 
 /// Rows that share a word of group scales; blocks are padded to a multiple of this many rows.
 pub const QUAD: usize = 4;
@@ -191,12 +191,15 @@ impl Cell {
 pub struct XFormat {
     /// The int16 pairs hold `x << shift`.
     pub shift: u32,
-    /// Columns of a chunk; a chunk ends with its scale group, too. Where a row's chunks are not all full, the first is short.
+    /// Columns of a chunk, a power of two; a chunk ends with its scale group, too. Where a row's chunks are not all full, the
+    /// first is short.
     pub chunk: usize,
     /// Columns of a pass through the loop of the kernel for row scales; the first pass may be short.
     pub run: usize,
-    /// Words before a chunk's pairs: what the kernel's sums start from.
-    pub starts: &'static [Start],
+    /// Words before a chunk's pairs, 1 or 2: what the kernel's sums start from.
+    pub start_words: usize,
+    /// What they hold.
+    pub starts: [Start; 2],
     /// Whether each group's chunks (the whole row's where there are no groups) are followed by the sum of the group's x.
     pub sum: bool,
 }
@@ -210,10 +213,19 @@ pub struct Start {
     pub factor: i32,
 }
 
+impl Start {
+    /// No start value.
+    pub const NONE: Self = Self { bias: 0, factor: 0 };
+}
+
 impl XFormat {
+    /// A chunk that holds any group, or a row without groups: rows have at most 65535 columns.
+    pub const ALL: usize = 1 << 16;
+
     /// Of single lanes: one start value a group.
-    const fn single(starts: &'static [Start]) -> Self {
-        Self { shift: 0, chunk: usize::MAX, run: PAD_COLS, starts, sum: false }
+    const fn single(factor: i32) -> Self {
+        let starts = [Start { bias: 0, factor }, Start::NONE];
+        Self { shift: 0, chunk: Self::ALL, run: PAD_COLS, start_words: 1, starts, sum: false }
     }
 }
 
@@ -277,12 +289,37 @@ pub(crate) struct Layout {
     strip: usize,
     pub(crate) step: usize,
     pub(crate) x: XFormat,
+    /// Binary logarithms, because nothing is divided when a GEMV is called.
+    pub(crate) chunk_log: u32,
+    #[cfg(actq_armv7em)]
+    pub(crate) strip_log: u32,
+    #[cfg(actq_armv7em)]
+    pub(crate) step_log: u32,
+    #[cfg(actq_armv7em)]
+    pub(crate) kernels: [crate::armv7em::Kernels; 2],
+    #[cfg(actq_fpu)]
+    pub(crate) quantize: crate::armv7em::Quantize,
     extract: fn(&[u32; 3], usize, usize) -> u8,
 }
 
 impl Layout {
     const fn of<F: Format>() -> Self {
-        Self { cell: F::CELL, strip: F::STRIP, step: F::STEP, x: F::X, extract: F::extract }
+        Self {
+            cell: F::CELL,
+            strip: F::STRIP,
+            step: F::STEP,
+            x: F::X,
+            chunk_log: F::X.chunk.trailing_zeros(),
+            #[cfg(actq_armv7em)]
+            strip_log: F::STRIP.trailing_zeros(),
+            #[cfg(actq_armv7em)]
+            step_log: F::STEP.trailing_zeros(),
+            #[cfg(actq_armv7em)]
+            kernels: crate::armv7em::kernels::<F>(),
+            #[cfg(actq_fpu)]
+            quantize: crate::armv7em::quantizer::<F>(),
+            extract: F::extract,
+        }
     }
 }
 
@@ -308,7 +345,7 @@ pub(crate) const fn round_up(len: usize, step: usize) -> usize {
 }
 
 /// How many times `step`, a power of two, fits into `len`. Without a division and its panic.
-const fn div_down(len: usize, step: usize) -> usize {
+pub(crate) const fn div_down(len: usize, step: usize) -> usize {
     len >> step.trailing_zeros()
 }
 
@@ -463,6 +500,12 @@ impl<'a> Block<'a> {
     /// As [`BlockShape::quad_words`].
     pub fn quad_words(&self) -> usize {
         self.quad_words
+    }
+
+    /// All words.
+    #[inline(always)]
+    pub fn words(&self) -> &'a [u32] {
+        self.words
     }
 
     /// The words of the rows from `first_row`, a multiple of [`STRIP`], on; empty when out of range.

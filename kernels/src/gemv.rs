@@ -27,15 +27,16 @@ pub struct Mismatch;
 /// [`crate::format::QUAD`] rows. The sums of padding rows have no meaning.
 ///
 /// The true sum fits an i32 where [`crate::linear::worst_case`] says so, which [`crate::Image::new_checked`] has verified.
+#[inline(never)]
 pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i32]) -> Result<(), Mismatch> {
     let shape = block.shape();
-    let end = first_row.saturating_add(acc.len());
-    let ends_well = end == shape.padded_rows() || end < shape.padded_rows() && end.is_multiple_of(STRIP);
+    let Some(left) = shape.padded_rows().checked_sub(first_row) else { return Err(Mismatch) };
+    let ends_well = acc.len() == left || acc.len() < left && acc.len().is_multiple_of(STRIP);
     if !first_row.is_multiple_of(STRIP) || !ends_well {
         return Err(Mismatch);
     }
     #[cfg(actq_armv7em)]
     return crate::armv7em::gemv(block, x, first_row, acc);
     #[cfg(not(actq_armv7em))]
-    x.fits(shape).then(|| crate::portable::gemv(block, x, first_row, acc)).ok_or(Mismatch)
+    x.plan().fits(shape).then(|| crate::portable::gemv(block, x, first_row, acc)).ok_or(Mismatch)
 }

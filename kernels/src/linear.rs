@@ -7,7 +7,7 @@
 
 use core::ops::Range;
 
-use crate::activations::{NotFinite, Prepared, Scale, max_prepared_words, prepared_words};
+use crate::activations::{NotFinite, Plan, Prepared, Scale, max_prepared_words};
 #[cfg(actq_fpu)]
 use crate::armv7em;
 use crate::format::{Block, Lanes, QUAD, STRIP};
@@ -73,10 +73,19 @@ pub(crate) fn copy_le(from: &[u32], to: &mut [u32]) {
     }
 }
 
-/// A part of the biases, if there are any; `None` where they are too short.
+/// `len` of the outputs from `first` on, with their biases if there are any; `None` where there are too few.
 #[inline(always)]
-fn slice_of(start: Option<&[u32]>, at: Range<usize>) -> Option<Option<&[u32]>> {
-    start.map_or(Some(None), |start| start.get(at).map(Some))
+fn outputs<'y>(
+    first: usize,
+    len: usize,
+    start: Option<&'y [u32]>,
+    y: &'y mut [f32],
+) -> Option<(Option<&'y [u32]>, &'y mut [f32])> {
+    let start = match start {
+        Some(start) => Some(start.get(first..)?.get(..len)?),
+        None => None,
+    };
+    Some((start, y.get_mut(first..)?.get_mut(..len)?))
 }
 
 impl RowBlock<'_> {
@@ -117,8 +126,8 @@ impl RowBlock<'_> {
         // Rows in order have room for their sums in y itself, except those of a last strip that padding fills.
         let whole = if rows.end.is_multiple_of(QUAD) { rows.end } else { rows.end & !(STRIP - 1) };
         if rows.start < whole {
-            let at = self.first_row + rows.start..self.first_row + whole;
-            let (Some(start), Some(y)) = (slice_of(start, at.clone()), y.get_mut(at)) else { return };
+            let first = self.first_row + rows.start;
+            let Some((start, y)) = outputs(first, whole - rows.start, start, y) else { return };
             if gemv(&self.block, x, rows.start, bytemuck::cast_slice_mut(y)).is_err() {
                 return;
             }
@@ -149,8 +158,7 @@ impl RowBlock<'_> {
             }
             let sums = sums.get(..rows.end - first).unwrap_or(sums);
             if self.index.is_empty() {
-                let at = self.first_row + first..self.first_row + first + sums.len();
-                let (Some(start), Some(y)) = (slice_of(start, at.clone()), y.get_mut(at)) else { return };
+                let Some((start, y)) = outputs(self.first_row + first, sums.len(), start, y) else { return };
                 self.scale_in_order(first, Some(sums), x_scale, start, y);
             } else {
                 self.scale_by_index(first, sums, x_scale, start, y);
@@ -244,31 +252,31 @@ impl Matrix<'_> {
                 return Ok(false);
             }
         }
-        let mut prepared: Option<Prepared<'_>> = None;
+        let mut plan: Option<Plan> = None;
         let mut first_row = 0;
         for (i, record) in self.records.as_chunks::<BLOCK_WORDS>().0.iter().enumerate() {
             let Some(rows) = row_block(self, record, first_row) else { continue };
-            first_row += rows.block.shape().rows;
+            let shape = rows.block.shape();
+            first_row += shape.rows;
             if i < at.block {
                 continue;
             }
-            let shape = rows.block.shape();
             // Layouts prepare the activations differently; the blocks of one width share them.
-            if prepared.is_none_or(|x| !x.fits(shape)) {
-                prepared = if at.prepared == Some(shape.width) {
-                    work.get(..prepared_words(shape)).and_then(|work| Prepared::new(work, shape))
-                } else if budget.take(1, || Price::prepare(&rows)) > 0 {
+            if !plan.as_ref().is_some_and(|plan| plan.fits(shape)) {
+                let plan = plan.insert(Plan::of(&rows.block));
+                if at.prepared != Some(shape.width) {
+                    if budget.take(1, || Price::prepare(&rows)) == 0 {
+                        return Ok(false);
+                    }
                     at.prepared = Some(shape.width);
-                    x_scale.quantize(x, shape, work)
-                } else {
-                    return Ok(false);
-                };
+                    x_scale.quantize(x, plan, work);
+                }
             }
-            if let Some(x) = &prepared {
+            if let Some(x) = plan.as_ref().and_then(|plan| Prepared::new(work, plan)) {
                 let strips =
                     budget.take((shape.rows - at.row).div_ceil(STRIP), || Price::strips(&rows, start.is_some()));
                 let end = shape.rows.min(at.row + strips * STRIP);
-                rows.apply_rows(at.row..end, x, x_scale, start, y);
+                rows.apply_rows(at.row..end, &x, x_scale, start, y);
                 at.row = end;
                 if end < shape.rows {
                     return Ok(false);

@@ -4,7 +4,7 @@
 //! so that an activation is loaded once for all of them, and lengths are constants wherever the layout gives them.
 
 use crate::activations::Prepared;
-use crate::format::{Block, Format, QUAD, Sums, with_format};
+use crate::format::{Block, Format, QUAD, Sums, XFormat, with_format};
 
 /// As [`crate::gemv::gemv`], for lengths that were checked there.
 pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i32]) {
@@ -75,8 +75,8 @@ fn strip_of<F: Format, const CELLS: usize>(mut words: &[u32], mut x: &[u32], len
         let (mut weights, scales) = split(weights, weights.len().wrapping_sub(scales));
         let (mut group, x_sum) = split(group, group.len().wrapping_sub(usize::from(F::X.sum)));
         let mut sums = [[0i32; QUAD]; CELLS];
-        let length = F::X.starts.len() + F::X.chunk / 2;
-        if F::X.chunk == usize::MAX {
+        let length = F::X.start_words + F::X.chunk / 2;
+        if F::X.chunk == XFormat::ALL {
             chunk::<F, CELLS>(weights, group, pass, &mut sums);
         } else {
             // All chunks but the first have a length that the compiler knows.
@@ -103,7 +103,7 @@ fn strip_of<F: Format, const CELLS: usize>(mut words: &[u32], mut x: &[u32], len
 fn strip_of_32<F: Format, const CELLS: usize>(words: &[u32], x: &[u32], acc: &mut [i32]) {
     const COLS: usize = 32;
     let cols = if F::X.chunk < COLS { F::X.chunk } else { COLS };
-    let length = F::X.starts.len() + cols / 2;
+    let length = F::X.start_words + cols / 2;
     let weights = weights_of::<F>(length) * CELLS;
     let chunks = COLS / cols;
     let quads = CELLS * F::CELL.rows / QUAD;
@@ -159,13 +159,13 @@ fn store<F: Format, const CELLS: usize>(totals: &[[i32; QUAD]; CELLS], acc: &mut
 /// Words of weights in a cell's rows for a chunk of so many words.
 #[inline(always)]
 const fn weights_of<F: Format>(chunk: usize) -> usize {
-    chunk.saturating_sub(F::X.starts.len()) / (F::CELL.cols / 2) * F::CELL.words
+    chunk.saturating_sub(F::X.start_words) / (F::CELL.cols / 2) * F::CELL.words
 }
 
 /// Adds a chunk's products.
 #[inline(always)]
 fn chunk<F: Format, const CELLS: usize>(weights: &[u32], x: &[u32], pass: usize, sums: &mut [[i32; QUAD]; CELLS]) {
-    let (starts, x) = split(x, F::X.starts.len());
+    let (starts, x) = split(x, F::X.start_words);
     let mut t = [F::start(starts); CELLS];
     // Long cells leave registers for no more than two.
     if F::CELL.cols == 32 {

@@ -18,7 +18,7 @@ mod firmware {
     use core::hint::black_box;
 
     use actq_firmware_demo::{count, host};
-    use actq_kernels::activations::{Scale, prepared_words};
+    use actq_kernels::activations::{Plan, Scale};
     use actq_kernels::format::{Block, BlockShape, Lanes, Width, pack};
     use actq_kernels::linear::RowBlock;
     use cortex_m::singleton;
@@ -96,8 +96,7 @@ mod firmware {
                         let block = Block::new(shape, words)?;
                         let scales = b.row_scales.get(..rows.div_ceil(2))?;
                         let block = RowBlock { block, scales, index: &[], first_row: 0 };
-                        let prepared = ram.prepared.get_mut(..prepared_words(shape))?;
-                        count::region(|| product(&block, black_box(x), x_max, bias, prepared, y))?;
+                        count::region(|| product(&block, black_box(x), x_max, bias, &mut ram.prepared, y))?;
                         black_box(&y);
                         writeln!(out, "{name} {} {group} {rows} {cols}", width.bits()).ok()?;
                     }
@@ -116,9 +115,8 @@ mod firmware {
         prepared: &mut [u32],
         y: &mut [f32],
     ) -> Option<()> {
-        let shape = rows.block.shape();
         let scale = Scale::new(x, x_max).ok()?;
-        rows.apply(&scale.quantize(x, shape, prepared)?, scale, Some(bias), y);
+        rows.apply(&scale.quantize(x, &Plan::of(&rows.block), prepared)?, scale, Some(bias), y);
         Some(())
     }
 

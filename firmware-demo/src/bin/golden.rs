@@ -13,7 +13,7 @@ mod firmware {
     use core::fmt::Write as _;
 
     use actq_firmware_demo::host::{self, File};
-    use actq_kernels::activations::{Prepared, Scale, prepared_words};
+    use actq_kernels::activations::{Plan, Prepared, Scale};
     use actq_kernels::format::{Block, BlockShape, Lanes, Width};
     use actq_kernels::gemv::{self, gemv};
     use actq_kernels::linear::RowBlock;
@@ -67,8 +67,9 @@ mod firmware {
         let width = Width::from_bits(bits as u32).ok_or("width")?;
         let lanes = Lanes::from_code(lanes as u8).ok_or("lanes")?;
         let shape = BlockShape { width, lanes, rows, cols, group };
+        let plan = Plan::new(shape).ok_or("shape")?;
         let weights = start..start + shape.words();
-        let x = weights.end + start..weights.end + start + prepared_words(shape);
+        let x = weights.end + start..weights.end + start + plan.words();
         read(input, buffer.get_mut(weights.clone()).ok_or("the case is too large")?)?;
         read(input, buffer.get_mut(x.clone()).ok_or("the case is too large")?)?;
         let mut expected = [0i32; ROWS];
@@ -77,7 +78,7 @@ mod firmware {
             return Err("the stream is cut");
         }
         let block = Block::new(shape, &buffer[weights]).ok_or("shape")?;
-        let x = Prepared::new(&buffer[x], shape).ok_or("activations")?;
+        let x = Prepared::new(&buffer[x], &plan).ok_or("activations")?;
         // The sums of padding rows have no meaning.
         let same = |sums: &[i32]| sums.iter().zip(&*expected).take(rows).all(|(a, b)| a == b);
         let mut sums = [0x5555_5555; ROWS];
@@ -107,13 +108,13 @@ mod firmware {
         let limit = floats.iter().fold(1, |limit, f| (f.abs() as u16).max(limit));
         let scale = Scale::new(floats, limit).map_err(|_| "the largest magnitude is not finite")?;
         let mut words = [0x5555_5555; 2 * COLS];
-        let prepared = scale.quantize(floats, shape, &mut words).ok_or("the case is too large")?;
+        let prepared = scale.quantize(floats, x.plan(), &mut words).ok_or("the case is too large")?;
         if prepared.words() != x.words() {
             return Err("the quantized vector differs");
         }
-        let used = x.words().len();
-        if words[used..].iter().any(|w| *w != 0x5555_5555) {
-            return Err("the quantizer wrote behind its output");
+        let room = x.plan().room(shape.cols);
+        if words[room..].iter().any(|w| *w != 0x5555_5555) {
+            return Err("the quantizer wrote behind its room");
         }
         let scales: [u32; ROWS / 2] = core::array::from_fn(|i| 0x3c80_3f00 + 0x0001_0003 * i as u32);
         let start: [u32; ROWS] = core::array::from_fn(|i| (i as f32 - 7.5).to_bits());

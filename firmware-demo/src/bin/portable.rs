@@ -17,7 +17,7 @@ mod firmware {
     use core::hint::black_box;
 
     use actq_firmware_demo::{count, host};
-    use actq_kernels::activations::{Prepared, Scale, prepared_words};
+    use actq_kernels::activations::{Plan, Prepared, Scale};
     use actq_kernels::format::{Block, BlockShape, Lanes, Width, pack};
     use actq_kernels::linear::RowBlock;
     use actq_kernels::{gemv, reference};
@@ -67,10 +67,10 @@ mod firmware {
                     pack(shape, &b.codes, b.scales.get(..ROWS * shape.groups())?, words)?;
                     let block = Block::new(shape, words)?;
                     let rows = RowBlock { block, scales: &row_scales, index: &[], first_row: 0 };
-                    let prepared = b.prepared.get_mut(..prepared_words(shape))?;
+                    let (plan, prepared) = (Plan::of(&block), &mut b.prepared);
                     let mut y = [0.0; ROWS];
                     let scale = count::region(|| product(&rows, black_box(&x), x_max, &bias, prepared, &mut y))?;
-                    let prepared = Prepared::new(prepared, shape)?;
+                    let prepared = Prepared::new(prepared, &plan)?;
                     for (i, (y, bias)) in y.iter().zip(&bias).enumerate() {
                         let acc = reference::dot(&rows.block, &prepared, i) as f32;
                         let expected = f32::from_bits(*bias) + acc * (rows.scale(i) * scale.get());
@@ -95,10 +95,8 @@ mod firmware {
         prepared: &mut [u32],
         y: &mut [f32],
     ) -> Option<Scale> {
-        let shape = rows.block.shape();
         let scale = Scale::new(x, x_max).ok()?;
-        scale.quantize(x, shape, prepared);
-        rows.apply(&Prepared::new(prepared, shape)?, scale, Some(bias), y);
+        rows.apply(&scale.quantize(x, &Plan::of(&rows.block), prepared)?, scale, Some(bias), y);
         Some(scale)
     }
 }

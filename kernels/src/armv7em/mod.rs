@@ -10,10 +10,10 @@ use core::arch::global_asm;
 
 use crate::activations::Prepared;
 #[cfg(actq_fpu)]
-use crate::activations::{Groups, ROUND};
+use crate::activations::{Plan, ROUND};
 #[cfg(actq_fpu)]
-use crate::format::{self, Format, XFormat};
-use crate::format::{Block, QUAD, STRIP};
+use crate::format::XFormat;
+use crate::format::{Block, Format, QUAD, Width};
 use crate::gemv::Mismatch;
 
 global_asm!(include_str!("single.s"), options(raw));
@@ -28,7 +28,7 @@ global_asm!(include_str!("vector_fpu.s"), options(raw));
 /// Reads `strips` strips at `weights` and the prepared vector from `x` up to `x_end`, writes the strips' sums at `acc`. What
 /// `extra` is, the kernel's file says; the first pass through the loop of a kernel for row scales leaves `skip` of the layout's
 /// steps out.
-type Kernel = unsafe extern "C" fn(
+pub(crate) type Kernel = unsafe extern "C" fn(
     weights: *const u32,
     x: *const u32,
     acc: *mut i32,
@@ -61,55 +61,52 @@ kernels! {
     actq_w8_paired_row actq_w8_paired_group
 }
 
-/// The kernel for strips of eight rows, where the layout has them, and that for strips of four.
-type Kernels = (Option<Kernel>, Kernel);
+/// The kernel for the layout's strips, and that for a last strip of four rows; where strips have four rows, they are one.
+pub(crate) type Kernels = [Kernel; 2];
 
-/// By width, lanes and whether there are group scales.
-static KERNELS: [[[Kernels; 2]; 2]; 4] = [
-    [
-        [(None, actq_w2), (None, actq_w2)],
-        [(Some(actq_w2_paired_row), actq_w2_paired_row4), (Some(actq_w2_paired_group), actq_w2_paired_group4)],
-    ],
-    [
-        [(None, actq_w3), (None, actq_w3)], //
-        [(None, actq_w3_paired_row), (None, actq_w3_paired_group)],
-    ],
-    [
-        [(None, actq_w4), (None, actq_w4)],
-        [(Some(actq_w4_paired_row), actq_w4_paired_row4), (Some(actq_w4_paired_group), actq_w4_paired_group4)],
-    ],
-    [
-        [(None, actq_w8), (None, actq_w8)], //
-        [(None, actq_w8_paired_row), (None, actq_w8_paired_group)],
-    ],
-];
+/// The layout's kernels for row scales and for group scales.
+pub(crate) const fn kernels<F: Format>() -> [Kernels; 2] {
+    match (F::WIDTH, F::CELL.rows) {
+        (Width::W2, 1) => [[actq_w2; 2]; 2],
+        (Width::W3, 1) => [[actq_w3; 2]; 2],
+        (Width::W4, 1) => [[actq_w4; 2]; 2],
+        (Width::W8, 1) => [[actq_w8; 2]; 2],
+        (Width::W2, _) => [[actq_w2_paired_row, actq_w2_paired_row4], [actq_w2_paired_group, actq_w2_paired_group4]],
+        (Width::W3, _) => [[actq_w3_paired_row; 2], [actq_w3_paired_group; 2]],
+        (Width::W4, _) => [[actq_w4_paired_row, actq_w4_paired_row4], [actq_w4_paired_group, actq_w4_paired_group4]],
+        (Width::W8, _) => [[actq_w8_paired_row; 2], [actq_w8_paired_group; 2]],
+    }
+}
 
 /// As [`crate::gemv::gemv`], for rows that were checked there.
-#[inline(never)]
-pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i32]) -> Result<(), Mismatch> {
+#[inline(always)]
+pub(crate) fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i32]) -> Result<(), Mismatch> {
     let shape = block.shape();
-    let weights = block.rows_from(first_row);
-    let quads = acc.len() / QUAD;
-    if weights.len() < quads * block.quad_words() || !x.fits(shape) {
+    if !x.plan().fits(shape) {
         return Err(Mismatch);
     }
-    let (eight, four) = KERNELS[shape.width as usize][shape.lanes as usize][usize::from(shape.group != 0)];
-    let strips = if eight.is_some() { acc.len() / STRIP } else { 0 };
-    let Some((first, last)) = acc.split_at_mut_checked(strips * STRIP) else { return Err(Mismatch) };
-    let (x_end, extra) = x.bounds();
-    // SAFETY: `weights` holds the words of `acc.len()` rows from `first_row` on, which is a multiple of 8, so strips begin
-    // there and after the strips of eight: each call reads the words of its strips and writes as many sums. It reads the
-    // prepared vector from its begin to `x_end`, and the sum of x that stands there where the layout has row scales and a
-    // sum; both are in the vector, because it was prepared for a block of this shape. The slices are of u32 and i32, so every address
-    // is a multiple of 4, as LDM and LDRD demand.
+    let layout = x.plan().layout;
+    let [kernel, four] = layout.kernels[usize::from(shape.group != 0)];
+    let strips = acc.len() >> layout.strip_log;
+    let rows = strips << layout.strip_log;
+    let rest = acc.len() - rows;
+    let told = x.told();
+    // SAFETY: the rows from `first_row` on, as many as `acc` has, are rows of the block or of its padding: that is checked before,
+    // as is that `first_row` is a multiple of 8, so that a strip begins there. A block has the words of all of its rows
+    // (`Block::new`). Each call reads the words of its strips and writes as many sums. It reads the prepared vector from its
+    // begin to `end`, and the sum of x that stands there where the layout has row scales and a sum; both are in the vector,
+    // because it was prepared for a block of this shape (`Plan::of`). The slices are of u32 and i32, so every address is a
+    // multiple of 4, as LDM and LDRD demand.
     unsafe {
-        let x_words = x.words().as_ptr();
-        if let (Some(kernel), 1..) = (eight, strips) {
-            kernel(weights.as_ptr(), x_words, first.as_mut_ptr(), strips, x_words.add(x_end), extra, x.skip());
+        let weights = block.words().as_ptr().add(first_row / QUAD * block.quad_words());
+        let (x, acc) = (x.words().as_ptr(), acc.as_mut_ptr());
+        let end = x.add(told.end);
+        if strips > 0 {
+            kernel(weights, x, acc, strips, end, told.extra, told.skip);
         }
-        if !last.is_empty() {
-            let weights = weights.as_ptr().add(strips * STRIP / QUAD * block.quad_words());
-            four(weights, x_words, last.as_mut_ptr(), last.len() / QUAD, x_words.add(x_end), extra, x.skip());
+        if rest > 0 {
+            let weights = weights.add(rows / QUAD * block.quad_words());
+            four(weights, x, acc.add(rows), 1, end, told.extra, told.skip);
         }
     }
     Ok(())
@@ -142,34 +139,53 @@ pub fn magnitude_bits(x: &[f32]) -> u32 {
     rest.iter().fold(largest, |m, v| m.max(v.to_bits() & 0x7fff_ffff))
 }
 
-/// As [`crate::activations`] describes it; `None`, with nothing written, where the lengths do not fit.
+/// Quantizes `x` by the plan to the first words of `room`; nothing where that is shorter than [`Plan::room`].
 #[cfg(actq_fpu)]
+#[inline(always)]
+pub(crate) fn quantize(x: &[f32], inverse: f32, plan: &Plan, room: &mut [u32]) {
+    if x.len() != plan.padded {
+        return quantize_filled(x, inverse, plan, room);
+    }
+    if plan.words() <= room.len() {
+        // SAFETY: x has the plan's columns, and the room has its words.
+        unsafe { quantize_padded(x.as_ptr(), inverse, plan, room.as_mut_ptr()) }
+    }
+}
+
+/// As [`quantize`], of a vector that does not fill its groups: from a copy at the end of the room that does.
+#[cfg(actq_fpu)]
+#[cold]
 #[inline(never)]
-pub(crate) fn quantize(x: &[f32], inverse: f32, format: &XFormat, run: Groups, out: &mut [u32]) -> Option<i32> {
-    let Groups { groups, chunks, first, chunk } = run;
-    if groups == 0
-        || chunks == 0
-        || first < 8
-        || chunk < 8
-        || (first | chunk) % 8 != 0
-        || first.max(chunk) > format.chunk
-    {
-        return None;
+fn quantize_filled(x: &[f32], inverse: f32, plan: &Plan, room: &mut [u32]) {
+    let Some(at) = plan.room(x.len()).checked_sub(plan.padded) else { return };
+    let Some(padded) = room.get_mut(at..at + plan.padded) else { return };
+    copy(bytemuck::cast_slice(x), padded);
+    padded.iter_mut().skip(x.len()).for_each(|word| *word = 0);
+    let out = room.as_mut_ptr();
+    // SAFETY: the room holds the copy from `at` on, and so the plan's words, which are fewer. What is written never reaches what
+    // is still to be read: behind `n` columns of the copy those are `n / 2` words and start words and sums, of which there are
+    // `at` in all.
+    unsafe { quantize_padded(out.add(at).cast_const().cast(), inverse, plan, out) }
+}
+
+/// Quantizes the plan's padded columns at `x` to its words at `out`.
+///
+/// # Safety
+///
+/// Both lie in memory of that length; where they overlap, `x` begins at least as many words behind `out` as the plan has start
+/// words and sums.
+#[cfg(actq_fpu)]
+#[inline(always)]
+unsafe fn quantize_padded(x: *const f32, inverse: f32, plan: &Plan, out: *mut u32) {
+    let XFormat { chunk, starts: [start, second], .. } = plan.layout.x;
+    let (first, chunk) = (plan.first / 8, chunk / 8);
+    let kernel = plan.layout.quantize;
+    // SAFETY: `of_valid` makes all counts 1 or more and all lengths multiples of 8 columns. The kernel reads eight columns before
+    // it writes them. It writes as many start words and sums as the format has, which `quantizer` says of every layout, and where
+    // it takes eight columns for a chunk, that is the format's limit and so `first` and `chunk`.
+    unsafe {
+        kernel(inverse, ROUND, x, out, plan.groups, plan.chunks, first, chunk, start.bias, start.factor, second.factor);
     }
-    let [start, more @ ..] = format.starts else { return None };
-    let kernel = *QUANTIZE.get(format.shift as usize)?;
-    let second = more.first().map_or(0, |start| start.factor);
-    let cols = first + (chunks - 1) * chunk;
-    let words = chunks * format.starts.len() + cols / 2 + usize::from(format.sum);
-    if x.len() < groups * cols || out.len() < groups * words {
-        return None;
-    }
-    let (x, out) = (x.as_ptr(), out.as_mut_ptr());
-    let (first, chunk) = (first / 8, chunk / 8);
-    // SAFETY: all counts are 1 or more. The kernel reads the columns of all groups and writes their words; both lengths were
-    // compared above. It writes as many start words and sums as `format` has, which `has_quantizer` says of every layout, and
-    // where it takes eight columns for a chunk, that is the format's limit and so `first` and `chunk`.
-    Some(unsafe { kernel(inverse, ROUND, x, out, groups, chunks, first, chunk, start.bias, start.factor, second) })
 }
 
 /// `y[i] = start[i] + sum[i] * (scale[i] * x_scale)`, with two bf16 scales a word; what is `None` stands in y, the sums with
@@ -198,7 +214,7 @@ pub(crate) fn sqrt(x: f32) -> f32 {
 macro_rules! quantize_kernels {
     ($($name:ident)*) => {
         /// Writes `groups` groups of `chunks` chunks, the first of `first` times eight values and the others of `eights`.
-        type Quantize = unsafe extern "C" fn(
+        pub(crate) type Quantize = unsafe extern "C" fn(
             inverse: f32, round: f32, x: *const f32, out: *mut u32,
             groups: usize, chunks: usize, first: usize, eights: usize, bias: i32, factor: i32, second_factor: i32,
         ) -> i32;
@@ -214,29 +230,15 @@ macro_rules! quantize_kernels {
 #[cfg(actq_fpu)]
 quantize_kernels!(actq_quantize0 actq_quantize1 actq_quantize2 actq_quantize3);
 
-/// By shift.
+/// The kernel that writes what the layout asks for: two start words, the second without a bias, at shift 1; sums from 2 on;
+/// chunks of eight at 3.
 #[cfg(actq_fpu)]
-static QUANTIZE: [Quantize; 4] = [actq_quantize0, actq_quantize1, actq_quantize2, actq_quantize3];
-
-/// Whether the kernel of the layout's shift writes what the layout asks for: two start words, the second without a bias, at
-/// shift 1; sums from 2 on; chunks of eight at 3.
-#[cfg(actq_fpu)]
-const fn has_quantizer<F: Format>() -> bool {
-    let starts = match F::X.starts {
-        [_] => F::X.shift != 1,
-        [_, second] => F::X.shift == 1 && second.bias == 0,
-        _ => false,
-    };
-    starts && F::X.sum == (F::X.shift >= 2) && (F::X.shift == 3) == (F::X.chunk == 8) && F::X.shift <= 3
+pub(crate) const fn quantizer<F: Format>() -> Quantize {
+    let XFormat { shift, chunk, start_words, starts: [_, second], sum, .. } = F::X;
+    assert!(shift <= 3 && start_words == if shift == 1 { 2 } else { 1 } && second.bias == 0);
+    assert!(sum == (shift >= 2) && (chunk == 8) == (shift == 3) && chunk % 8 == 0);
+    [actq_quantize0, actq_quantize1, actq_quantize2, actq_quantize3][shift as usize]
 }
-
-#[cfg(actq_fpu)]
-const _: () = {
-    assert!(has_quantizer::<format::w2::W2>() && has_quantizer::<format::w2_paired::W2Paired>());
-    assert!(has_quantizer::<format::w3::W3>() && has_quantizer::<format::w3_paired::W3Paired>());
-    assert!(has_quantizer::<format::w4::W4>() && has_quantizer::<format::w4_paired::W4Paired>());
-    assert!(has_quantizer::<format::w8::W8>() && has_quantizer::<format::w8_paired::W8Paired>());
-};
 
 #[cfg(actq_fpu)]
 unsafe extern "C" {

@@ -7,9 +7,10 @@
 @ r8, r3, r4 those of the others (or of all in a strip of four; two are low registers, because a chunk's start values come with
 @ its first pairs), r9 and r10 weight words, lr the extracted codes.
 @
-@ Frame of the row kernel: 0 x_end where there is but one chunk, or 0, 4 x_end, 8 acc, 12 strips, 16 end of this chunk, 20 x,
-@ 24 mask, 28 steps left out, 32 end of the first chunk; of the group kernel: 0-31 sums over groups, in the order of the
-@ registers that take them, 32 mask, 36 x_end, 40 acc, 44 strips, 48 x.
+@ Frame of the row kernel: 0 x behind its first start words, 4-27 r3-r8 as these set them, 28 end of the first chunk, 32 acc,
+@ 36 end of acc, or, where a row has several chunks or its first pass leaves steps out, acc behind this strip, 40 end of this
+@ chunk, 44 x_end, 48 end of acc, 52 steps left out; of the group kernel: 0-31 sums over groups, in the order of the registers
+@ that take them, 32 mask, 36 x_end, 40 acc, 44 strips, 48 x.
 
     .syntax unified
     .thumb
@@ -61,23 +62,11 @@
     .endif
 .endm
 
-@ r12: the mask, r4: x_end, r5: bytes of the first chunk, r6: steps left out
-.macro c4_prologue
+.macro c4_prologue frame
     push {r4-r11, lr}
-    sub sp, sp, #52
+    sub sp, sp, #\frame
     movw r12, #0xf00f
     movt r12, #0xf00f
-    ldrd r4, r5, [sp, #88]
-    ldr r6, [sp, #96]
-.endm
-
-@ `to`: where the sums of the next strip go, `left`: strips left, this one included; both are kept at `acc`.
-.macro c4_next_strip acc, to=r11, left=r12
-    subs \left, \left, #1
-    strd \to, \left, [sp, #\acc]
-    bne.w 1b
-    add sp, sp, #52
-    pop {r4-r11, pc}
 .endm
 
 @ The four rows' sums as `a` to `d`: A from the low 20 bits of k - 2^8*q, then the others. `b` may be p, `c` may be q.
@@ -92,24 +81,22 @@
     asr \c, \k, #8
 .endm
 
-@ Adds four sums to those at r11.
+@ Adds four sums to those at r12.
 .macro c4_add a, b, c, d, old0, old1
-    ldrd \old0, \old1, [r11]
+    ldrd \old0, \old1, [r12]
     add \a, \a, \old0
     add \b, \b, \old1
-    ldrd \old0, \old1, [r11, #8]
+    ldrd \old0, \old1, [r12, #8]
     add \c, \c, \old0
     add \d, \d, \old1
-    stmia.w r11!, {\a, \b, \c, \d}
+    stmia.w r12!, {\a, \b, \c, \d}
 .endm
 
-.macro c4_start rows
+.macro c4_start
     ldmia.w r1!, {r3, r4}
-    .if \rows == 8
+    mov r5, r4
     mov r6, r3
     mov r7, r3
-    mov r5, r4
-    .endif
     mov r8, r3
 .endm
 
@@ -120,30 +107,38 @@
     .thumb_func
     .balign 16
 \name:
-    c4_prologue
-    add r5, r5, r1
-    str r4, [sp, #4]
-    strd r2, r3, [sp, #8]
-    strd r5, r1, [sp, #16]
-    strd r12, r6, [sp, #24]
-    str r5, [sp, #32]
-    cmp r5, r4
+    c4_prologue 60
+    ldrd r9, r10, [sp, #96]
+    ldr r11, [sp, #104]
+    add r10, r10, r1
+    add lr, r2, r3, lsl #(3 + \rows / 4)
+    c4_start
+    stmia.w sp, {r1, r3-r8}
+    strd r10, r2, [sp, #28]
+    strd r10, r9, [sp, #40]
+    strd lr, r11, [sp, #48]
+    cmp r10, r9
+    it eq
+    cmpeq r11, #0
     it ne
-    movne r4, #0
-    str r4, [sp, #0]
-1:
-    ldrd r1, r2, [sp, #20]
+    addne lr, r2, #(4 * \rows)
+    str lr, [sp, #36]
+    mov r2, r12
     .if \rows == 8
-    ldr lr, [sp, #28]
-    c4_start 8
-    tbh [pc, lr, lsl #1]
+    beq.n 1f
+9:
+    ldmia.w sp, {r1, r3-r8}
+    tbh [pc, r11, lsl #1]
 7:
     .irp step, 10f, 11f, 12f, 13f
     .hword (\step - 7b) / 2
     .endr
 3:
-    c4_start 8
+    c4_start
+    b.n 2f
     .balign 4
+1:
+    ldmia.w sp, {r1, r3-r8}
 2:
     .irp step, 10, 11, 12, 13
 \step:
@@ -152,55 +147,64 @@
     .endr
     .else
     @ Seldom more than a strip of a block, so its loop is short: eight columns, of which no pass leaves out any.
+1:
+9:
+    ldmia.w sp, {r1, r3-r8}
+    b.n 2f
 3:
-    c4_start 4
+    c4_start
 2:
     c4_cols4 4
     c4_cols4 4
     .endif
-    ldr lr, [sp, #16]
+    ldr lr, [sp, #40]
     cmp r1, lr
     bne.w 2b
-    ldmia.w sp, {r9-r12}
+    ldrd r9, r12, [sp, #28]
     cmp r1, r9
     bne.n 4f
     .if \rows == 8
-    c4_sums r6, r7, r5, r2, r6, r7, lr
-    stmia.w r11!, {r2, r6, r7, lr}
+    c4_sums r6, r7, r5, r9, r10, r11, lr
+    stmia.w r12!, {r9-r11, lr}
     .endif
-    c4_sums r8, r3, r4, r2, r5, r6, r7
-    stmia.w r11!, {r2, r5, r6, r7}
+    c4_sums r8, r3, r4, r5, r6, r7, r9
+    stmia.w r12!, {r5-r7, r9}
 6:
-    c4_next_strip 8
-4:
-    @ One of several chunks: its sums are added to those before, which are 0 at the first.
-    ldr lr, [sp, #32]
-    cmp r1, lr
-    bne.n 8f
-    movs r9, #0
-    .irp at, 0, 8
-    strd r9, r9, [r11, #\at]
-    .if \rows == 8
-    strd r9, r9, [r11, #(16 + \at)]
-    .endif
-    .endr
-8:
-    .if \rows == 8
-    c4_sums r6, r7, r5, r2, r6, r7, lr
-    c4_add r2, r6, r7, lr, r5, r9
-    .endif
-    c4_sums r8, r3, r4, r2, r5, r6, r7
-    c4_add r2, r5, r6, r7, r9, lr
-    cmp r1, r10
+    ldr r11, [sp, #36]
+    str r12, [sp, #32]
+    cmp r12, r11
+    bne.w 1b
+    ldrd r9, r10, [sp, #44]
+    cmp r1, r9
     bne.n 5f
-    ldr r9, [sp, #32]
-    str r9, [sp, #16]
-    b.n 6b
+    cmp r12, r10
+    beq.n 8f
+    add r11, r12, #(4 * \rows)
+    str r11, [sp, #36]
+    ldr r9, [sp, #28]
+    str r9, [sp, #40]
+    ldr r11, [sp, #52]
+    b.w 9b
+8:
+    add sp, sp, #60
+    pop {r4-r11, pc}
+4:
+    @ A later chunk: its sums are added to those before.
+    .if \rows == 8
+    c4_sums r6, r7, r5, r9, r10, r11, lr
+    c4_add r9, r10, r11, lr, r5, r6
+    .endif
+    c4_sums r8, r3, r4, r5, r6, r7, r9
+    c4_add r5, r6, r7, r9, r10, r11
+    ldr r9, [sp, #44]
+    cmp r1, r9
+    beq.n 6b
 5:
     @ All chunks but the first are full: 256 columns and two start words.
+    sub r12, r12, #(4 * \rows)
+    str r12, [sp, #32]
     add r3, r1, #520
-    str r3, [sp, #16]
-    ldr r2, [sp, #24]
+    str r3, [sp, #40]
     b.w 3b
     .size \name, . - \name
 .endm
@@ -227,7 +231,8 @@
     .thumb_func
     .balign 16
 \name:
-    c4_prologue
+    c4_prologue 52
+    ldr r4, [sp, #88]
     strd r12, r4, [sp, #32]
     strd r2, r3, [sp, #40]
     str r1, [sp, #48]
@@ -295,7 +300,11 @@
     .endif
     strd r8, r2, [r10], #8
     strd r9, r5, [r10], #8
-    c4_next_strip 40, r10, lr
+    subs lr, lr, #1
+    strd r10, lr, [sp, #40]
+    bne.w 1b
+    add sp, sp, #52
+    pop {r4-r11, pc}
     .size \name, . - \name
 .endm
 

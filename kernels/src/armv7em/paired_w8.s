@@ -6,8 +6,9 @@
 @ In the loops: r0 weights, r1 x, r2-r5 activation pairs, r6 and r8 the sums of rows 0 and 2, r7 and r9 those of rows 0 and 2
 @ plus 2^8 times those of rows 1 and 3, r10-r12 and lr weight words.
 @
-@ Frame of the row kernel: 0 x_end where there is but one chunk, or 0, 4 x_end, 8 acc, 12 strips, 16 x, 20 steps left out,
-@ 24 end of this chunk, 28 end of the first chunk; of the group kernel: 0-15 sums over groups, 16 x, 28 x_end, 32 acc, 36 strips.
+@ Frame of the row kernel: 0 x behind its first start word, 4-19 that word four times, 20 end of the first chunk, 24 acc, 28 end of
+@ acc, or, where a row has several chunks or its first pass leaves steps out, acc behind this strip, 32 end of this chunk,
+@ 36 x_end, 40 end of acc, 44 steps left out; of the group kernel: 0-15 sums over groups, 16 x, 28 x_end, 32 acc, 36 strips.
 
     .syntax unified
     .thumb
@@ -40,26 +41,6 @@
     mov r9, r6
 .endm
 
-.macro r8_prologue
-    push {r4-r11, lr}
-    sub sp, sp, #44
-    ldrd r4, r5, [sp, #80]
-    ldr r6, [sp, #88]
-    add r5, r5, r1
-    str r4, [sp, #4]
-    strd r2, r3, [sp, #8]
-    strd r1, r6, [sp, #16]
-.endm
-
-@ r10: where the sums of the next strip go, r11: strips left, this one included; both are kept at `acc`.
-.macro r8_next_strip acc
-    subs r11, r11, #1
-    strd r10, r11, [sp, #\acc]
-    bne.w 1b
-    add sp, sp, #44
-    pop {r4-r11, pc}
-.endm
-
 @ the four rows' sums as r6-r9
 .macro r8_sums
     sub r7, r7, r6
@@ -74,15 +55,26 @@
     .thumb_func
     .balign 16
 actq_w8_paired_row:
-    r8_prologue
-    strd r5, r5, [sp, #24]
-    cmp r5, r4
-    it ne
-    movne r4, #0
-    str r4, [sp, #0]
-1:
-    ldrd r1, r10, [sp, #16]
+    push {r4-r11, lr}
+    sub sp, sp, #52
+    ldrd r4, r5, [sp, #88]
+    ldr r10, [sp, #96]
+    add r5, r5, r1
     r8_start
+    stmia.w sp, {r1, r6-r9}
+    add r11, r2, r3, lsl #4
+    strd r5, r2, [sp, #20]
+    strd r5, r4, [sp, #32]
+    strd r11, r10, [sp, #40]
+    cmp r5, r4
+    it eq
+    cmpeq r10, #0
+    it ne
+    addne r11, r2, #16
+    str r11, [sp, #28]
+    beq.n 1f
+9:
+    ldmia.w sp, {r1, r6-r9}
     tbh [pc, r10, lsl #1]
 7:
     .irp step, 10f, 11f, 12f, 13f, 14f, 15f, 16f, 17f
@@ -90,43 +82,59 @@ actq_w8_paired_row:
     .endr
 3:
     r8_start
+    b.n 2f
     .balign 4
+1:
+    ldmia.w sp, {r1, r6-r9}
 2:
     .irp step, 10, 11, 12, 13, 14, 15, 16, 17
 \step:
     r8_cols8
     .endr
-    ldr r2, [sp, #24]
+    ldr r2, [sp, #32]
     cmp r1, r2
     bne.w 2b
-    ldmia.w sp, {r2, r3, r10, r11}
+    ldrd r2, r10, [sp, #20]
     r8_sums
     cmp r1, r2
     bne.n 4f
     stmia.w r10!, {r6-r9}
 6:
-    r8_next_strip 8
-4:
-    @ One of several chunks. A later one's sums are added to those before.
-    ldr r2, [sp, #28]
-    cmp r1, r2
+    ldr r11, [sp, #28]
+    str r10, [sp, #24]
+    cmp r10, r11
+    bne.w 1b
+    ldrd r4, r5, [sp, #36]
+    cmp r1, r4
+    bne.n 5f
+    cmp r10, r5
     beq.n 8f
+    add r11, r10, #16
+    str r11, [sp, #28]
+    str r2, [sp, #32]
+    ldr r10, [sp, #44]
+    b.w 9b
+8:
+    add sp, sp, #52
+    pop {r4-r11, pc}
+4:
+    @ A later chunk: its sums are added to those before.
     ldrd r4, r5, [r10]
     add r6, r6, r4
     add r7, r7, r5
     ldrd r4, r5, [r10, #8]
     add r8, r8, r4
     add r9, r9, r5
-8:
+    ldr r4, [sp, #36]
     stmia.w r10!, {r6-r9}
-    cmp r1, r3
-    bne.n 5f
-    str r2, [sp, #24]
-    b.n 6b
+    cmp r1, r4
+    beq.n 6b
 5:
     @ All chunks but the first are full: 512 columns and a start word.
+    sub r10, r10, #16
+    str r10, [sp, #24]
     add r2, r1, #1028
-    str r2, [sp, #24]
+    str r2, [sp, #32]
     b.w 3b
     .size actq_w8_paired_row, . - actq_w8_paired_row
 
@@ -136,7 +144,10 @@ actq_w8_paired_row:
     .thumb_func
     .balign 16
 actq_w8_paired_group:
-    r8_prologue
+    push {r4-r11, lr}
+    sub sp, sp, #44
+    ldr r4, [sp, #80]
+    str r1, [sp, #16]
     str r4, [sp, #28]
     strd r2, r3, [sp, #32]
 1:
@@ -167,6 +178,10 @@ actq_w8_paired_group:
     bne.w 2b
     ldrd r10, r11, [sp, #32]
     stmia.w r10!, {r2-r5}
-    r8_next_strip 32
+    subs r11, r11, #1
+    strd r10, r11, [sp, #32]
+    bne.w 1b
+    add sp, sp, #44
+    pop {r4-r11, pc}
     .size actq_w8_paired_group, . - actq_w8_paired_group
     .text

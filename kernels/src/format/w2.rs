@@ -8,7 +8,7 @@
 //! pair  7  6  6 ..  1  0  0  7  7  6 .. 1 1 0 0  7    (bits 1-16: even columns; bits 17-31 and 0: odd columns)
 //! ```
 
-use super::{Cell, Format, QUAD, Start, Sums, Width, XFormat, smlad};
+use super::{Cell, Format, QUAD, Sums, Width, XFormat, smlad};
 
 /// Bits of a code.
 pub const BITS: u32 = 2;
@@ -31,7 +31,7 @@ impl Format for W2 {
     const CELL: Cell = Cell { rows: 1, cols: 16, words: 1 };
     const STRIP: usize = QUAD;
     const STEP: usize = 16;
-    const X: XFormat = XFormat::single(&[Start { bias: 0, factor: -3 }]);
+    const X: XFormat = XFormat::single(-3);
 
     fn insert(words: &mut [u32; 3], _row: usize, col: usize, code: u8) {
         words[0] |= (code as u32 & 3).rotate_left(bit(col));

@@ -41,8 +41,14 @@ impl Format for W2Paired {
     const CELL: Cell = Cell { rows: 2, cols: 8, words: 1 };
     const STRIP: usize = STRIP;
     const STEP: usize = 8;
-    const X: XFormat =
-        XFormat { shift: 2, run: 32, chunk: 32, starts: &[Start { bias: 0x8000, factor: -6 }], sum: true };
+    const X: XFormat = XFormat {
+        shift: 2,
+        run: 32,
+        chunk: 32,
+        start_words: 1,
+        starts: [Start { bias: 0x8000, factor: -6 }, Start::NONE],
+        sum: true,
+    };
 
     fn insert(words: &mut [u32; 3], row: usize, col: usize, code: u8) {
         let (bit, sign) = field(row, col);

@@ -12,7 +12,7 @@
 //!
 //! `ror(word, k + 1 + 3f) & 0x000e_000e` is field `f` doubled; `word & (0x0002_0002 << k)` is the share of pair 15.
 
-use super::{Cell, Format, QUAD, Start, Sums, Width, XFormat, smlad};
+use super::{Cell, Format, QUAD, Sums, Width, XFormat, smlad};
 
 /// Bits of a code.
 pub const BITS: u32 = 3;
@@ -45,7 +45,7 @@ impl Format for W3 {
     const CELL: Cell = Cell { rows: 1, cols: 32, words: 3 };
     const STRIP: usize = QUAD;
     const STEP: usize = 32;
-    const X: XFormat = XFormat::single(&[Start { bias: 0, factor: -7 }]);
+    const X: XFormat = XFormat::single(-7);
 
     fn insert(words: &mut [u32; 3], _row: usize, col: usize, code: u8) {
         if col / 2 < FIELDS * W3::CELL.words {

@@ -74,8 +74,14 @@ impl Format for W3Paired {
     const CELL: Cell = Cell { rows: 4, cols: 8, words: 3 };
     const STRIP: usize = QUAD;
     const STEP: usize = 8;
-    const X: XFormat =
-        XFormat { shift: 3, run: 64, chunk: 8, starts: &[Start { bias: 0x8000, factor: -28 }], sum: true };
+    const X: XFormat = XFormat {
+        shift: 3,
+        run: 64,
+        chunk: 8,
+        start_words: 1,
+        starts: [Start { bias: 0x8000, factor: -28 }, Start::NONE],
+        sum: true,
+    };
 
     fn insert(cell: &mut [u32; 3], row: usize, col: usize, code: u8) {
         let (set, bit, sign) = field(row, col);

@@ -8,7 +8,7 @@
 //! pair   3     2     1     0     3     2   1   0  3    (bits 1-16: even columns; bits 17-31 and 0: odd columns)
 //! ```
 
-use super::{Cell, Format, QUAD, Start, Sums, Width, XFormat, smlad};
+use super::{Cell, Format, QUAD, Sums, Width, XFormat, smlad};
 
 /// Bits of a code.
 pub const BITS: u32 = 4;
@@ -31,7 +31,7 @@ impl Format for W4 {
     const CELL: Cell = Cell { rows: 1, cols: 8, words: 1 };
     const STRIP: usize = QUAD;
     const STEP: usize = 8;
-    const X: XFormat = XFormat::single(&[Start { bias: 0, factor: -15 }]);
+    const X: XFormat = XFormat::single(-15);
 
     fn insert(words: &mut [u32; 3], _row: usize, col: usize, code: u8) {
         words[0] |= (code as u32 & 15).rotate_left(bit(col));

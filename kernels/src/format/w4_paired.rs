@@ -55,7 +55,8 @@ impl Format for W4Paired {
         run: 32,
         chunk: 256,
         // Even rows have codes, for 2*code - 15; odd rows code - 8, for 2*(code - 8) + 1.
-        starts: &[Start { bias: 0, factor: -15 + (1 << 12) }, Start { bias: 0, factor: -15 - (15 << 8) }],
+        start_words: 2,
+        starts: [Start { bias: 0, factor: -15 + (1 << 12) }, Start { bias: 0, factor: -15 - (15 << 8) }],
         sum: false,
     };
 

@@ -8,7 +8,7 @@
 //! column  3   1   2   0
 //! ```
 
-use super::{Cell, Format, QUAD, Start, Sums, Width, XFormat, smlad};
+use super::{Cell, Format, QUAD, Sums, Width, XFormat, smlad};
 
 /// Bits of a code.
 pub const BITS: u32 = 8;
@@ -34,7 +34,7 @@ impl Format for W8 {
     const CELL: Cell = Cell { rows: 1, cols: 4, words: 1 };
     const STRIP: usize = QUAD;
     const STEP: usize = 4;
-    const X: XFormat = XFormat::single(&[Start { bias: 0, factor: 0 }]);
+    const X: XFormat = XFormat::single(0);
 
     fn insert(words: &mut [u32; 3], _row: usize, col: usize, code: u8) {
         words[0] |= (code as u32) << bit(col);

@@ -37,8 +37,14 @@ impl Format for W8Paired {
     const CELL: Cell = Cell { rows: 2, cols: 2, words: 1 };
     const STRIP: usize = QUAD;
     const STEP: usize = 8;
-    const X: XFormat =
-        XFormat { shift: 0, run: 64, chunk: 512, starts: &[Start { bias: 0, factor: -128 }], sum: false };
+    const X: XFormat = XFormat {
+        shift: 0,
+        run: 64,
+        chunk: 512,
+        start_words: 1,
+        starts: [Start { bias: 0, factor: -128 }, Start::NONE],
+        sum: false,
+    };
 
     fn insert(words: &mut [u32; 3], row: usize, col: usize, code: u8) {
         let (bit, offset) = field(row, col);
