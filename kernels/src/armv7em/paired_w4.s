@@ -64,7 +64,9 @@
 
 .macro c4_prologue frame
     push {r4-r11, lr}
+    .if \frame
     sub sp, sp, #\frame
+    .endif
     movw r12, #0xf00f
     movt r12, #0xf00f
 .endm
@@ -100,18 +102,17 @@
     mov r8, r3
 .endm
 
-.macro c4_row_kernel name, rows
-    .section .text.\name, "ax", %progbits
-    .global \name
-    .type \name, %function
+    .section .text.actq_w4_paired_row, "ax", %progbits
+    .global actq_w4_paired_row
+    .type actq_w4_paired_row, %function
     .thumb_func
     .balign 16
-\name:
+actq_w4_paired_row:
     c4_prologue 60
     ldrd r9, r10, [sp, #96]
     ldr r11, [sp, #104]
     add r10, r10, r1
-    add lr, r2, r3, lsl #(3 + \rows / 4)
+    add lr, r2, r3, lsl #5
     c4_start
     stmia.w sp, {r1, r3-r8}
     strd r10, r2, [sp, #28]
@@ -121,10 +122,9 @@
     it eq
     cmpeq r11, #0
     it ne
-    addne lr, r2, #(4 * \rows)
+    addne lr, r2, #32
     str lr, [sp, #36]
     mov r2, r12
-    .if \rows == 8
     beq.n 1f
 9:
     ldmia.w sp, {r1, r3-r8}
@@ -145,43 +145,30 @@
     c4_cols4 8
     c4_cols4 8
     .endr
-    .else
-    @ Seldom more than a strip of a block, so its loop is short: eight columns, of which no pass leaves out any.
-1:
-9:
-    ldmia.w sp, {r1, r3-r8}
-    b.n 2f
-3:
-    c4_start
-2:
-    c4_cols4 4
-    c4_cols4 4
-    .endif
     ldr lr, [sp, #40]
     cmp r1, lr
     bne.w 2b
     ldrd r9, r12, [sp, #28]
     cmp r1, r9
     bne.n 4f
-    .if \rows == 8
     c4_sums r6, r7, r5, r9, r10, r11, lr
     stmia.w r12!, {r9-r11, lr}
-    .endif
     c4_sums r8, r3, r4, r5, r6, r7, r9
     stmia.w r12!, {r5-r7, r9}
-6:
     ldr r11, [sp, #36]
     str r12, [sp, #32]
     cmp r12, r11
     bne.w 1b
-    ldrd r9, r10, [sp, #44]
+    ldr r9, [sp, #44]
     cmp r1, r9
     bne.n 5f
+7:
+    ldr r10, [sp, #48]
     cmp r12, r10
     beq.n 8f
-    add r11, r12, #(4 * \rows)
-    str r11, [sp, #36]
+    add r11, r12, #32
     ldr r9, [sp, #28]
+    strd r12, r11, [sp, #32]
     str r9, [sp, #40]
     ldr r11, [sp, #52]
     b.w 9b
@@ -190,24 +177,55 @@
     pop {r4-r11, pc}
 4:
     @ A later chunk: its sums are added to those before.
-    .if \rows == 8
     c4_sums r6, r7, r5, r9, r10, r11, lr
     c4_add r9, r10, r11, lr, r5, r6
-    .endif
     c4_sums r8, r3, r4, r5, r6, r7, r9
     c4_add r5, r6, r7, r9, r10, r11
     ldr r9, [sp, #44]
     cmp r1, r9
-    beq.n 6b
+    beq.n 7b
 5:
     @ All chunks but the first are full: 256 columns and two start words.
-    sub r12, r12, #(4 * \rows)
+    sub r12, r12, #32
     str r12, [sp, #32]
     add r3, r1, #520
     str r3, [sp, #40]
     b.w 3b
-    .size \name, . - \name
-.endm
+    .size actq_w4_paired_row, . - actq_w4_paired_row
+
+@ The last strip of a block, so its loop is short: eight columns, of which no pass leaves out any. r5: x_end, r6: end of this chunk,
+@ r7: acc.
+    .section .text.actq_w4_paired_row4, "ax", %progbits
+    .global actq_w4_paired_row4
+    .type actq_w4_paired_row4, %function
+    .thumb_func
+    .balign 16
+actq_w4_paired_row4:
+    c4_prologue 0
+    mov r7, r2
+    mov r2, r12
+    ldrd r5, r6, [sp, #36]
+    add r6, r6, r1
+    movs r9, #0
+    strd r9, r9, [r7]
+    strd r9, r9, [r7, #8]
+1:
+    ldmia.w r1!, {r3, r4}
+    mov r8, r3
+2:
+    c4_cols4 4
+    c4_cols4 4
+    cmp r1, r6
+    bne.n 2b
+    c4_sums r8, r3, r4, r9, r10, r11, lr
+    mov r12, r7
+    c4_add r9, r10, r11, lr, r3, r4
+    @ All chunks but the first are full: 256 columns and two start words.
+    add r6, r1, #520
+    cmp r1, r5
+    bne.n 1b
+    pop {r4-r11, pc}
+    .size actq_w4_paired_row4, . - actq_w4_paired_row4
 
 @ lr, p, k and q become 2^12 * (A, B, C, D), of at most 17 + 12 bits; r10 and r9 2^4 * the scales of rows 0 and 2, 1 and 3: SMLAW
 @ takes 2^16 away from the product. r2 is the mask inverted.
@@ -308,8 +326,6 @@
     .size \name, . - \name
 .endm
 
-    c4_row_kernel actq_w4_paired_row, 8
-    c4_row_kernel actq_w4_paired_row4, 4
     c4_group_kernel actq_w4_paired_group, 8
     c4_group_kernel actq_w4_paired_group4, 4
     .text

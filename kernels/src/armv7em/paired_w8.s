@@ -99,18 +99,19 @@ actq_w8_paired_row:
     cmp r1, r2
     bne.n 4f
     stmia.w r10!, {r6-r9}
-6:
     ldr r11, [sp, #28]
     str r10, [sp, #24]
     cmp r10, r11
     bne.w 1b
-    ldrd r4, r5, [sp, #36]
+    ldr r4, [sp, #36]
     cmp r1, r4
     bne.n 5f
+7:
+    ldr r5, [sp, #40]
     cmp r10, r5
     beq.n 8f
     add r11, r10, #16
-    str r11, [sp, #28]
+    strd r10, r11, [sp, #24]
     str r2, [sp, #32]
     ldr r10, [sp, #44]
     b.w 9b
@@ -128,7 +129,7 @@ actq_w8_paired_row:
     ldr r4, [sp, #36]
     stmia.w r10!, {r6-r9}
     cmp r1, r4
-    beq.n 6b
+    beq.n 7b
 5:
     @ All chunks but the first are full: 512 columns and a start word.
     sub r10, r10, #16
