@@ -66,7 +66,7 @@ fn portable_kernels_give_the_golden_sums_on_the_targets_without_assembler() -> R
     let fits = |c: &&golden::Case| c.shape.cols <= 256 && c.words().len() + c.prepared().len() < 1500;
     let short: Vec<_> = cases.iter().filter(fits).cloned().collect();
     ensure!(short.len() > cases.len() / 2, "too few cases are short");
-    for (target, cases) in [(Target::NoDsp, &cases), (Target::Small, &short)] {
+    for (target, cases) in [(Target::NoDsp, &cases), (Target::Small, &short), (Target::Riscv, &cases)] {
         let elf = firmware("golden", target)?;
         let output = qemu::run(qemu::command_on(target, &elf, None, ""), &golden::stream(cases))?;
         let text = String::from_utf8_lossy(&output.stdout);
@@ -97,7 +97,7 @@ fn the_built_in_image_replays_its_self_test() -> Result<()> {
         let bits: String = action.iter().map(|w| format!(" {:08x}", u32::from_le(*w))).collect();
         expected += &format!("step {step}:{bits}\n");
     }
-    for target in [Target::Fpu, Target::NoFpu, Target::NoDsp, Target::Small] {
+    for target in Target::ALL {
         let elf = firmware("actq-firmware-demo", target)?;
         let output = qemu::run(qemu::command_on(target, &elf, None, ""), &[])?;
         assert_eq!(String::from_utf8_lossy(&output.stdout), expected, "{target:?}");
