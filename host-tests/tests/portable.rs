@@ -42,8 +42,8 @@ fn without_dsp_and_fpu_a_mac_takes_few_instructions() -> Result<()> {
     stay_within(Target::NoDsp, 6.5)
 }
 
-/// RV32IMAC has no instruction that multiplies and adds, or that extracts bits: each weight takes two of either.
+/// RV32IMAC has no instruction that multiplies and adds, and none that extracts bits: a weight takes two of both.
 #[test]
 fn on_riscv_a_mac_takes_few_instructions() -> Result<()> {
-    stay_within(Target::Riscv, 9.5)
+    stay_within(Target::Riscv, 9.0)
 }
