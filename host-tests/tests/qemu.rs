@@ -82,8 +82,11 @@ fn a_wrong_sum_fails_the_golden_run() -> Result<()> {
     let last_sum = stream.len() - 8;
     // The last case may end in padding rows, whose sums are not compared: all four of its last quad's are changed.
     stream[last_sum - 12..last_sum + 4].iter_mut().for_each(|byte| *byte ^= 1);
-    let output = qemu::run(qemu::command(&firmware("golden", Target::Fpu)?, None, ""), &stream)?;
-    assert!(!output.status.success(), "{}", String::from_utf8_lossy(&output.stdout));
+    for target in [Target::Fpu, Target::Riscv] {
+        let output = qemu::run(qemu::command_on(target, &firmware("golden", target)?, None, ""), &stream)?;
+        let text = String::from_utf8_lossy(&output.stdout);
+        assert!(!output.status.success() && text.contains("case 2: sums"), "{target:?}: {text}");
+    }
     Ok(())
 }
 
@@ -122,10 +125,12 @@ fn a_damaged_image_in_the_slot_is_refused() -> Result<()> {
 
 #[test]
 fn an_unknown_argument_is_refused() -> Result<()> {
-    let elf = firmware("actq-firmware-demo", Target::Fpu)?;
-    let output = qemu::run(qemu::command(&elf, None, "fly"), &[])?;
-    assert!(!output.status.success());
-    assert!(String::from_utf8_lossy(&output.stderr).contains("unknown argument: fly"), "{output:?}");
+    for target in [Target::Fpu, Target::Riscv] {
+        let elf = firmware("actq-firmware-demo", target)?;
+        let output = qemu::run(qemu::command_on(target, &elf, None, "fly"), &[])?;
+        assert!(!output.status.success());
+        assert!(String::from_utf8_lossy(&output.stderr).contains("unknown argument: fly"), "{target:?}: {output:?}");
+    }
     Ok(())
 }
 
