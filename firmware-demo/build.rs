@@ -1,4 +1,4 @@
-//! Puts the workspace's memory.x on the linker's path, and fits it to a small machine.
+//! Puts the workspace's memory.x and memory-riscv32.x on the linker's path, and fits the first to a small machine.
 
 use std::path::Path;
 
@@ -11,7 +11,9 @@ fn main() {
     let package = std::env::var("CARGO_MANIFEST_DIR").unwrap_or_default();
     let root = Path::new(&package).parent().unwrap_or(Path::new("."));
     println!("cargo::rustc-link-search={}", root.display());
-    println!("cargo::rerun-if-changed={}", root.join("memory.x").display());
+    for script in ["memory.x", "memory-riscv32.x"] {
+        println!("cargo::rerun-if-changed={}", root.join(script).display());
+    }
     println!("cargo::rustc-check-cfg=cfg(actq_small)");
     if std::env::var("TARGET").is_ok_and(|target| target.starts_with("thumbv6m")) {
         println!("cargo::rustc-cfg=actq_small");

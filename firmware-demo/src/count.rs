@@ -1,12 +1,14 @@
 //! Marks for the instruction counter (`xtask/insn-count`): it counts what is executed between a call of [`actq_count_begin`] and the
 //! next call of [`actq_count_end`].
 
+use crate::machine::asm;
+
 /// Starts a region.
 #[unsafe(no_mangle)]
 #[inline(never)]
 pub extern "C" fn actq_count_begin() {
     // An instruction that the compiler must keep, so that the call is not removed.
-    cortex_m::asm::nop();
+    asm::nop();
 }
 
 /// Ends a region.
@@ -14,8 +16,8 @@ pub extern "C" fn actq_count_begin() {
 #[inline(never)]
 pub extern "C" fn actq_count_end() {
     // One more than in `actq_count_begin`: equal functions are merged into one.
-    cortex_m::asm::nop();
-    cortex_m::asm::nop();
+    asm::nop();
+    asm::nop();
 }
 
 /// Runs `work` as a counted region.

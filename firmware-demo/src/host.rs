@@ -1,13 +1,15 @@
 //! The host that runs QEMU, or a debugger, through semihosting: the command line, standard input and output, the exit status.
 
-use cortex_m_semihosting::{debug, syscall};
 use heapless::String;
+
+use crate::machine::asm;
+use crate::machine::semihosting::{debug, syscall};
 
 /// Ends the run.
 pub fn exit(success: bool) -> ! {
     debug::exit(if success { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });
     loop {
-        cortex_m::asm::wfi();
+        asm::wfi();
     }
 }
 

@@ -1,11 +1,13 @@
-//! What the firmware binaries share: the host's files through semihosting, the image slot, the marks between which
-//! instructions are counted, and how deep the stack gets.
+//! What the firmware binaries share: the processor's crates, the host's files through semihosting, the image slot, the marks
+//! between which instructions are counted, and how deep the stack gets.
 #![no_std]
 #![cfg(target_os = "none")]
 
 pub mod count;
 pub mod host;
+pub mod machine;
 pub mod slot;
+#[cfg(target_arch = "arm")]
 pub mod stack;
 
 use core::fmt::Write as _;
@@ -14,8 +16,16 @@ use core::panic::PanicInfo;
 /// A fault of the firmware itself ends the run with a failure, and says where.
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
-    if let Ok(mut out) = cortex_m_semihosting::hio::hstderr() {
+    if let Ok(mut out) = machine::semihosting::hio::hstderr() {
         let _ = writeln!(out, "{info}");
     }
     host::exit(false)
+}
+
+/// An exception ends the run with a failure, too, and says which and where; riscv-rt would loop.
+#[cfg(target_arch = "riscv32")]
+#[unsafe(export_name = "abort")]
+extern "C" fn exception() -> ! {
+    use riscv::register::{mcause, mepc};
+    panic!("exception {} at {:#x}", mcause::read().code(), mepc::read())
 }

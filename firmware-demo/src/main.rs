@@ -19,10 +19,9 @@ mod firmware {
     use core::fmt::{Display, Write as _};
     use core::task::Poll;
 
+    use actq_firmware_demo::machine::{entry, semihosting::hio, singleton};
     use actq_firmware_demo::{count, host, slot};
     use actq_kernels::{Head, Image, StepError};
-    use cortex_m::singleton;
-    use cortex_m_semihosting::hio;
 
     /// Includes a file at an address that is a multiple of 4.
     #[repr(C, align(4))]
@@ -37,7 +36,7 @@ mod firmware {
     /// The longest observation that `serve` takes.
     const MAX_OBSERVATION: usize = if cfg!(actq_small) { 64 } else { 1024 };
 
-    #[cortex_m_rt::entry]
+    #[entry]
     fn main() -> ! {
         let outcome = run();
         if let Err(message) = &outcome

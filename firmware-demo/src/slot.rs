@@ -12,8 +12,8 @@ unsafe extern "C" {
 pub fn image() -> Option<&'static [u8]> {
     let (start, end) = (&raw const _image_slot_start, &raw const _image_slot_end);
     let words = (end as usize - start as usize) / 4;
-    // SAFETY: memory.x gives the slot these bounds in readable memory, aligned to 4, which nothing else uses and nothing writes
-    // while the firmware runs.
+    // SAFETY: the linker script gives the slot these bounds in readable memory, aligned to 4, which nothing else uses and nothing
+    // writes while the firmware runs; where there is no slot, they are equal and not null.
     let slot = unsafe { core::slice::from_raw_parts(start, words) };
     if slot.first() != Some(&MAGIC) {
         return None;

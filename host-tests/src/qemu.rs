@@ -8,9 +8,6 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Output, Stdio};
 use anyhow::{Context, Result, bail, ensure};
 use object::{Object as _, ObjectSection as _, ObjectSymbol as _};
 
-/// The emulator.
-pub const QEMU: &str = "qemu-system-arm";
-
 /// A target of the firmware.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Target {
@@ -22,11 +19,13 @@ pub enum Target {
     NoDsp,
     /// thumbv6m-none-eabi, Cortex-M0: the portable kernels in little memory
     Small,
+    /// riscv32imac-unknown-none-elf: the portable kernels
+    Riscv,
 }
 
 impl Target {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Fpu, Self::NoFpu, Self::NoDsp, Self::Small];
+    pub const ALL: [Self; 5] = [Self::Fpu, Self::NoFpu, Self::NoDsp, Self::Small, Self::Riscv];
 
     /// rustc's name.
     pub fn triple(self) -> &'static str {
@@ -35,6 +34,7 @@ impl Target {
             Self::NoFpu => "thumbv7em-none-eabi",
             Self::NoDsp => "thumbv7m-none-eabi",
             Self::Small => "thumbv6m-none-eabi",
+            Self::Riscv => "riscv32imac-unknown-none-elf",
         }
     }
 
@@ -42,16 +42,25 @@ impl Target {
     fn profile(self) -> &'static str {
         match self {
             Self::Fpu | Self::NoFpu => "firmware",
-            Self::NoDsp | Self::Small => "release",
+            Self::NoDsp | Self::Small | Self::Riscv => "release",
         }
     }
 
-    /// QEMU's machine.
-    pub fn machine(self) -> &'static str {
+    /// QEMU's program.
+    pub fn emulator(self) -> &'static str {
         match self {
-            Self::Fpu | Self::NoFpu => "mps2-an386",
-            Self::NoDsp => "mps2-an385",
-            Self::Small => "microbit",
+            Self::Fpu | Self::NoFpu | Self::NoDsp | Self::Small => "qemu-system-arm",
+            Self::Riscv => "qemu-system-riscv32",
+        }
+    }
+
+    /// QEMU's machine, as arguments. A SiFive E31 has RV32IMAC and nothing else: what it lacks is an illegal instruction.
+    fn machine(self) -> &'static [&'static str] {
+        match self {
+            Self::Fpu | Self::NoFpu => &["-M", "mps2-an386"],
+            Self::NoDsp => &["-M", "mps2-an385"],
+            Self::Small => &["-M", "microbit"],
+            Self::Riscv => &["-M", "virt", "-cpu", "sifive-e31", "-bios", "none"],
         }
     }
 }
@@ -109,9 +118,10 @@ pub fn command(elf: &Path, slot: Option<&Path>, arguments: &str) -> Command {
 
 /// As [`command`], on the machine of a target; only those of a Cortex-M4 or M3 have a slot.
 pub fn command_on(target: Target, elf: &Path, slot: Option<&Path>, arguments: &str) -> Command {
-    let mut command = Command::new(QEMU);
+    let mut command = Command::new(target.emulator());
     command
-        .args(["-M", target.machine(), "-display", "none", "-monitor", "none", "-serial", "none"])
+        .args(target.machine())
+        .args(["-display", "none", "-monitor", "none", "-serial", "none"])
         .args(["-semihosting-config", "enable=on,target=native"])
         .arg("-kernel")
         .arg(elf);
@@ -125,7 +135,10 @@ pub fn command_on(target: Target, elf: &Path, slot: Option<&Path>, arguments: &s
 }
 
 fn spawn(command: &mut Command) -> Result<Child> {
-    command.spawn().with_context(|| format!("{QEMU} cannot be started; `cargo xtask doctor` says how to install it"))
+    let emulator = command.get_program().to_string_lossy().into_owned();
+    command
+        .spawn()
+        .with_context(|| format!("{emulator} cannot be started; `cargo xtask doctor` says how to install it"))
 }
 
 /// Runs a firmware that ends by itself; `input` is its standard input.
@@ -270,9 +283,10 @@ pub struct Executed {
     pub jumps: u64,
 }
 
-/// The plugin API of the installed QEMU: 1 up to 9.0, 2 from 9.1 on (QEMU's docs/devel/tcg-plugins).
+/// The plugin API of the installed QEMU: 1 up to 9.0, 2 from 9.1 on (QEMU's docs/devel/tcg-plugins). The emulators of all targets
+/// are taken to be of one release; QEMU refuses a plugin of another API.
 fn plugin_api() -> Result<u32> {
-    let version = version()?;
+    let version = version(Target::Fpu.emulator())?;
     let number = version.split_whitespace().find(|w| w.starts_with(|c: char| c.is_ascii_digit()));
     let mut parts = number.unwrap_or("").split('.').map(|p| p.parse::<u32>().unwrap_or(0));
     let (major, minor) = (parts.next().unwrap_or(0), parts.next().unwrap_or(0));
@@ -283,9 +297,10 @@ fn plugin_api() -> Result<u32> {
     }
 }
 
-/// First line of QEMU's own version text.
-pub fn version() -> Result<String> {
-    let output = Command::new(QEMU).arg("--version").output().with_context(|| format!("{QEMU} is not installed"))?;
+/// First line of an emulator's own version text.
+pub fn version(emulator: &str) -> Result<String> {
+    let output = Command::new(emulator).arg("--version").output();
+    let output = output.with_context(|| format!("{emulator} is not installed"))?;
     Ok(String::from_utf8_lossy(&output.stdout).lines().next().unwrap_or_default().to_owned())
 }
 

@@ -41,3 +41,9 @@ fn without_assembler_a_mac_takes_few_instructions() -> Result<()> {
 fn without_dsp_and_fpu_a_mac_takes_few_instructions() -> Result<()> {
     stay_within(Target::NoDsp, 6.5)
 }
+
+/// RV32IMAC has no instruction that multiplies and adds, and none that extracts bits: a weight takes two of both.
+#[test]
+fn on_riscv_a_mac_takes_few_instructions() -> Result<()> {
+    stay_within(Target::Riscv, 9.0)
+}

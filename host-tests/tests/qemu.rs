@@ -66,7 +66,7 @@ fn portable_kernels_give_the_golden_sums_on_the_targets_without_assembler() -> R
     let fits = |c: &&golden::Case| c.shape.cols <= 256 && c.words().len() + c.prepared().len() < 1500;
     let short: Vec<_> = cases.iter().filter(fits).cloned().collect();
     ensure!(short.len() > cases.len() / 2, "too few cases are short");
-    for (target, cases) in [(Target::NoDsp, &cases), (Target::Small, &short)] {
+    for (target, cases) in [(Target::NoDsp, &cases), (Target::Small, &short), (Target::Riscv, &cases)] {
         let elf = firmware("golden", target)?;
         let output = qemu::run(qemu::command_on(target, &elf, None, ""), &golden::stream(cases))?;
         let text = String::from_utf8_lossy(&output.stdout);
@@ -82,8 +82,11 @@ fn a_wrong_sum_fails_the_golden_run() -> Result<()> {
     let last_sum = stream.len() - 8;
     // The last case may end in padding rows, whose sums are not compared: all four of its last quad's are changed.
     stream[last_sum - 12..last_sum + 4].iter_mut().for_each(|byte| *byte ^= 1);
-    let output = qemu::run(qemu::command(&firmware("golden", Target::Fpu)?, None, ""), &stream)?;
-    assert!(!output.status.success(), "{}", String::from_utf8_lossy(&output.stdout));
+    for target in [Target::Fpu, Target::Riscv] {
+        let output = qemu::run(qemu::command_on(target, &firmware("golden", target)?, None, ""), &stream)?;
+        let text = String::from_utf8_lossy(&output.stdout);
+        assert!(!output.status.success() && text.contains("case 2: sums"), "{target:?}: {text}");
+    }
     Ok(())
 }
 
@@ -97,7 +100,7 @@ fn the_built_in_image_replays_its_self_test() -> Result<()> {
         let bits: String = action.iter().map(|w| format!(" {:08x}", u32::from_le(*w))).collect();
         expected += &format!("step {step}:{bits}\n");
     }
-    for target in [Target::Fpu, Target::NoFpu, Target::NoDsp, Target::Small] {
+    for target in Target::ALL {
         let elf = firmware("actq-firmware-demo", target)?;
         let output = qemu::run(qemu::command_on(target, &elf, None, ""), &[])?;
         assert_eq!(String::from_utf8_lossy(&output.stdout), expected, "{target:?}");
@@ -122,10 +125,12 @@ fn a_damaged_image_in_the_slot_is_refused() -> Result<()> {
 
 #[test]
 fn an_unknown_argument_is_refused() -> Result<()> {
-    let elf = firmware("actq-firmware-demo", Target::Fpu)?;
-    let output = qemu::run(qemu::command(&elf, None, "fly"), &[])?;
-    assert!(!output.status.success());
-    assert!(String::from_utf8_lossy(&output.stderr).contains("unknown argument: fly"), "{output:?}");
+    for target in [Target::Fpu, Target::Riscv] {
+        let elf = firmware("actq-firmware-demo", target)?;
+        let output = qemu::run(qemu::command_on(target, &elf, None, "fly"), &[])?;
+        assert!(!output.status.success());
+        assert!(String::from_utf8_lossy(&output.stderr).contains("unknown argument: fly"), "{target:?}: {output:?}");
+    }
     Ok(())
 }
 

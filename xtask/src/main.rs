@@ -13,6 +13,7 @@ mod verify;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use actq_host_tests::qemu::Target;
 use clap::{Parser, Subcommand};
 
 /// Commands of the actq workspace.
@@ -63,15 +64,16 @@ enum Command {
 }
 
 fn main() -> ExitCode {
+    let cortex_m4 = || setup::ensure(&[Target::Fpu]);
     let outcome = match Cli::parse().command {
-        Command::Demo { episodes, qemu_episodes } => setup::ensure().and_then(|()| demo::run(episodes, qemu_episodes)),
+        Command::Demo { episodes, qemu_episodes } => cortex_m4().and_then(|()| demo::run(episodes, qemu_episodes)),
         Command::Bench { json, wait_states, by_function } => {
-            setup::ensure().and_then(|()| bench::run(json.as_deref(), wait_states, by_function))
+            cortex_m4().and_then(|()| bench::run(json.as_deref(), wait_states, by_function))
         }
-        Command::Budgets { update } => setup::ensure().and_then(|()| budgets::run(update)),
-        Command::Fit => setup::ensure().and_then(|()| fit::run()),
-        Command::Verify => setup::ensure().and_then(|()| verify::run()),
-        Command::Doctor => setup::ensure().map(|()| println!("all there")),
+        Command::Budgets { update } => cortex_m4().and_then(|()| budgets::run(update)),
+        Command::Fit => cortex_m4().and_then(|()| fit::run()),
+        Command::Verify => setup::ensure(&Target::ALL).and_then(|()| verify::run()),
+        Command::Doctor => setup::ensure(&Target::ALL).map(|()| println!("all there")),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

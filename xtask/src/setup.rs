@@ -3,21 +3,22 @@
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use actq_host_tests::qemu::{self, QEMU, Target};
+use actq_host_tests::qemu::{self, Target};
 use anyhow::{Context, Result, bail, ensure};
 
-/// A target that the kernels are built for but that nothing here runs: the usual packages of QEMU for Arm have no RISC-V.
-pub(crate) const RISCV: &str = "riscv32imac-unknown-none-elf";
-
-/// Installs what is missing, where that can be done without asking.
-pub(crate) fn ensure() -> Result<()> {
-    for triple in Target::ALL.map(Target::triple).into_iter().chain([RISCV]) {
-        rust_target(triple)?;
+/// Installs what these targets need and is missing, where that can be done without asking.
+pub(crate) fn ensure(targets: &[Target]) -> Result<()> {
+    for target in targets {
+        rust_target(target.triple())?;
     }
-    if qemu::version().is_err() {
-        install_qemu()?;
+    let mut emulators: Vec<_> = targets.iter().map(|target| target.emulator()).collect();
+    emulators.dedup();
+    for emulator in emulators {
+        if qemu::version(emulator).is_err() {
+            install(emulator)?;
+        }
+        println!("{emulator}: {}", qemu::version(emulator)?);
     }
-    println!("{}", qemu::version()?);
     Ok(())
 }
 
@@ -45,27 +46,29 @@ fn rust_target(triple: &str) -> Result<()> {
         .with_context(|| format!("the Rust target {triple} is missing; `rustup target add {triple}` adds it"))
 }
 
-fn install_qemu() -> Result<()> {
+fn install(emulator: &str) -> Result<()> {
     let exists = |program: &str| Command::new(program).arg("--version").output().is_ok();
     let root = output("id", &["-u"]).is_ok_and(|id| id.trim() == "0");
+    let riscv = emulator == Target::Riscv.emulator();
     if exists("apt-get") {
+        // A package has the emulator's name, or provides it: RISC-V's is qemu-system-misc in Debian 12.
         if root {
             run("apt-get", &["update", "--quiet"])?;
-            return run("apt-get", &["install", "--yes", "--quiet", "--no-install-recommends", "qemu-system-arm"]);
+            return run("apt-get", &["install", "--yes", "--quiet", "--no-install-recommends", emulator]);
         }
-        bail!("{QEMU} is missing; type: sudo apt-get install qemu-system-arm");
+        bail!("{emulator} is missing; type: sudo apt-get install {emulator}");
     }
     if exists("brew") {
         return run("brew", &["install", "qemu"]);
     }
-    for (manager, line) in [
-        ("dnf", "sudo dnf install qemu-system-arm"),
-        ("pacman", "sudo pacman -S qemu-system-arm"),
-        ("zypper", "sudo zypper install qemu-arm"),
+    for (manager, line, arm_package, riscv_package) in [
+        ("dnf", "sudo dnf install", "qemu-system-arm", "qemu-system-riscv"),
+        ("pacman", "sudo pacman -S", "qemu-system-arm", "qemu-system-riscv"),
+        ("zypper", "sudo zypper install", "qemu-arm", "qemu-extra"),
     ] {
         if exists(manager) {
-            bail!("{QEMU} is missing; type: {line}");
+            bail!("{emulator} is missing; type: {line} {}", if riscv { riscv_package } else { arm_package });
         }
     }
-    bail!("{QEMU} is missing; install QEMU 7.0 or later for Arm systems")
+    bail!("{emulator} is missing; install QEMU 7.0 or later for {} systems", if riscv { "RISC-V" } else { "Arm" })
 }

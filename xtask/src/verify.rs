@@ -7,7 +7,6 @@ use actq_host_tests::qemu::Target;
 use anyhow::{Context, Result, bail};
 
 use crate::bench::placeholder;
-use crate::setup::RISCV;
 
 /// A step: its name, the arguments of cargo, and environment variables.
 type Step<'a> = (&'a str, Vec<&'a str>, Vec<(&'a str, String)>);
@@ -30,10 +29,13 @@ pub(crate) fn run() -> Result<()> {
             vec![],
         ),
     ];
-    for target in [Target::Fpu, Target::NoFpu] {
-        steps.push(("lints of the firmware", [firmware("clippy", target), lints.to_vec()].concat(), vec![image()]));
+    // RISC-V has the binaries that run on it; the others measure the Cortex-M4.
+    let portable = ["--lib", "--bin", "actq-firmware-demo", "--bin", "golden", "--bin", "portable"];
+    for (target, binaries) in [(Target::Fpu, &[][..]), (Target::NoFpu, &[]), (Target::Riscv, &portable)] {
+        let arguments = [&firmware("clippy", target), binaries, &lints].concat();
+        steps.push(("lints of the firmware", arguments, vec![image()]));
     }
-    let others = [Target::NoDsp.triple(), Target::Small.triple(), RISCV].map(|triple| ["--target", triple]).concat();
+    let others = [Target::NoDsp, Target::Small, Target::Riscv].map(|target| ["--target", target.triple()]).concat();
     for (name, command, arguments) in
         [("lints of the portable kernels", "clippy", &lints[..]), ("portable kernels", "build", &["--release"])]
     {

@@ -13,20 +13,19 @@ mod firmware {
     use core::fmt::Write as _;
 
     use actq_firmware_demo::host::{self, File};
+    use actq_firmware_demo::machine::{entry, semihosting::hio, singleton};
     use actq_kernels::activations::{Plan, Prepared, Scale};
     use actq_kernels::format::{Block, BlockShape, Lanes, Width};
     use actq_kernels::gemv::{self, gemv};
     use actq_kernels::linear::RowBlock;
     use actq_kernels::portable;
-    use cortex_m::singleton;
-    use cortex_m_semihosting::hio;
 
     /// Of the largest case, weights and activations.
     const WORDS: usize = if cfg!(actq_small) { 1536 } else { 64 * 1024 };
     const ROWS: usize = if cfg!(actq_small) { 32 } else { 256 };
     const COLS: usize = if cfg!(actq_small) { 256 } else { 2048 };
 
-    #[cortex_m_rt::entry]
+    #[entry]
     fn main() -> ! {
         let outcome = run();
         if let Ok(mut out) = hio::hstdout() {

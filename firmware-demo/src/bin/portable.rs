@@ -16,13 +16,12 @@ mod firmware {
     use core::fmt::Write as _;
     use core::hint::black_box;
 
+    use actq_firmware_demo::machine::{entry, semihosting::hio, singleton};
     use actq_firmware_demo::{count, host};
     use actq_kernels::activations::{Plan, Prepared, Scale};
     use actq_kernels::format::{Block, BlockShape, Lanes, Width, pack};
     use actq_kernels::linear::RowBlock;
     use actq_kernels::{gemv, reference};
-    use cortex_m::singleton;
-    use cortex_m_semihosting::hio;
 
     const ROWS: usize = 256;
     const COLS: usize = 256;
@@ -34,7 +33,7 @@ mod firmware {
         prepared: [u32; 2 * COLS],
     }
 
-    #[cortex_m_rt::entry]
+    #[entry]
     fn main() -> ! {
         let buffers = singleton!(: Buffers = Buffers {
             codes: [0; ROWS * COLS],

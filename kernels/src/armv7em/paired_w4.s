@@ -1,6 +1,6 @@
 @ GEMV for 4-bit codes in paired lanes (kernels/src/format/w4_paired.rs): strips of eight rows, or four.
 @
-@ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1), [sp] x_end, [sp+4] bytes of the first chunk
+@ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1; of four rows there is one), [sp] x_end, [sp+4] bytes of the first chunk
 @ in x, [sp+8] steps of 8 columns that the first pass through the row kernel's loop leaves out.
 @
 @ In the loops: r0 weights, r1 x, r2 mask, r11 and r12 activation pairs, r6, r7, r5 the sums p, q, k of the first four rows,
