@@ -4,7 +4,8 @@
 //! the sum's low mantissa bits are the rounded value in two's complement. It is one FPU addition, and the same bits everywhere.
 //!
 //! A prepared vector is made for the layout that reads it ([`XFormat`]): for each group of columns (the whole row where the
-//! weights have no group scales) its chunks, and behind them, where the layout asks for it, the sum of the group's values. A
+//! weights have no group scales) its chunks, and behind them, where the layout asks for it, the sum of the group's values. Where it
+//! takes groups in pairs, a pair is prepared as a group of two chunks, with the first group's sum in the low half of the word. A
 //! chunk is its start words and its int16 pairs, column `2j` in the low half. Zeros fill the last group, or, where there are no
 //! groups, a kernel's step ([`PAD_COLS`] with single lanes). A [`Plan`] has all lengths.
 
@@ -47,7 +48,7 @@ pub(crate) struct Told {
     /// Where chunks are summed without being taken apart, minus the biases of all of them; for single lanes with row scales 0;
     /// else the bytes of a group's first chunk.
     pub(crate) extra: usize,
-    /// Steps that the first pass through the loop of a kernel for row scales leaves out.
+    /// Steps that the first pass through the loop of a kernel for row scales leaves out, or the last pair of groups.
     pub(crate) skip: usize,
 }
 
@@ -68,11 +69,13 @@ impl Plan {
         let layout = shape.layout();
         let format = &layout.x;
         let read = round_up(shape.cols, shape.step());
-        let padded = match shape.lanes {
-            Lanes::Single => round_up(read, if shape.group > PAD_COLS { shape.group } else { PAD_COLS }),
-            Lanes::Paired => read,
+        let together = shape.group << format.pairs as u32;
+        let least = match shape.lanes {
+            Lanes::Single => PAD_COLS,
+            Lanes::Paired => 1,
         };
-        let (group, groups) = match shape.group {
+        let padded = round_up(read, if together > least { together } else { least });
+        let (group, groups) = match together {
             0 => (padded, 1),
             group => (group, div_down(padded, group)),
         };
@@ -97,7 +100,8 @@ impl Plan {
                     _ => 4 * starts + 2 * first,
                 },
                 // Passes and steps are powers of two, and chunks that are longer than a pass are whole passes.
-                skip: (0usize.wrapping_sub(read) & (format.run - 1)) >> layout.step_log,
+                skip: (0usize.wrapping_sub(read) & (if together > shape.group { together } else { format.run } - 1))
+                    >> layout.step_log,
             },
         }
     }
@@ -118,6 +122,11 @@ impl Plan {
     /// up with zeros: to the end of the room, while the prepared words grow from its begin.
     pub const fn room(&self, len: usize) -> usize {
         if len == self.padded { self.words } else { self.words + self.padded / 2 }
+    }
+
+    /// Whether groups are prepared in pairs ([`XFormat::pairs`]), which are the plan's groups then.
+    pub(crate) const fn in_pairs(&self) -> bool {
+        self.layout.x.pairs && self.shape.group != 0
     }
 
     /// Columns of a group.
@@ -289,16 +298,19 @@ fn lay_out<V: Copy>(x: &[V], plan: &Plan, out: &mut [u32], integer: impl Fn(V) -
     let mut x = x;
     for group in out.chunks_exact_mut(plan.group_words()).take(plan.groups) {
         let (mut chunks, sum_word) = group.split_at_mut(group.len() - usize::from(plan.layout.x.sum));
-        let mut sum = 0i32;
+        let (mut sum, mut last) = (0i32, 0);
         let mut columns = plan.first;
         while !chunks.is_empty() {
             let (this, rest) = chunks.split_at_mut(plan.chunk_words(columns).min(chunks.len()));
             let (this_x, rest_x) = x.split_at(columns.min(x.len()));
-            sum = sum.wrapping_add(chunk(this_x, &plan.layout.x, this, &integer));
+            last = chunk(this_x, &plan.layout.x, this, &integer);
+            sum = sum.wrapping_add(last);
             (x, chunks, columns) = (rest_x, rest, plan.layout.x.chunk);
         }
         if let Some(word) = sum_word.first_mut() {
-            *word = sum as u32;
+            // A pair's groups are chunks.
+            let halves = (sum.wrapping_sub(last) & 0xffff) | last << 16;
+            *word = if plan.in_pairs() { halves } else { sum } as u32;
         }
     }
 }

@@ -9,7 +9,9 @@
 //! strip:  unit 0: w0(cell 0) w0(cell 1) .. [w1(cell 0) w1(cell 1) ..]   unit 1: ...   [scales of group 0]   ...
 //! ```
 //!
-//! With group scales, a word of four u8 for every four rows (the first in the low byte) follows the units of each group. Where
+//! With group scales, a word of four u8 for every four rows (the first in the low byte) follows the units of each group. In
+//! strips of eight of [`w2_paired`], the scales of two groups follow the units of both: a word for every two rows, with theirs
+//! in the first group and then theirs in the second; a last group that is left over has its own. Where
 //! at most four rows are left for the last strip of eight, it is a strip of four. Rows beyond the block's last one, up to the
 //! strip's end, and columns beyond the last, up to a multiple of the kernel's step, are padding with code 0.
 //!
@@ -42,7 +44,7 @@ pub mod w8;
 pub mod w8_paired;
 
 /// Changes whenever a packed layout changes meaning; stamped into every image.
-pub const LAYOUT_STAMP: u32 = 3;
+pub const LAYOUT_STAMP: u32 = 4;
 
 /// Rows that share a word of group scales; blocks are padded to a multiple of this many rows.
 pub const QUAD: usize = 4;
@@ -202,6 +204,9 @@ pub struct XFormat {
     pub starts: [Start; 2],
     /// Whether each group's chunks (the whole row's where there are no groups) are followed by the sum of the group's x.
     pub sum: bool,
+    /// Whether groups are taken in pairs: two are prepared as one, with both sums in the halves of a word, and the scales of
+    /// strips of eight stand behind both groups' units.
+    pub pairs: bool,
 }
 
 /// A start value, `bias + factor * sum(x)` over the chunk.
@@ -225,7 +230,7 @@ impl XFormat {
     /// Of single lanes: one start value a group.
     const fn single(factor: i32) -> Self {
         let starts = [Start { bias: 0, factor }, Start::NONE];
-        Self { shift: 0, chunk: Self::ALL, run: PAD_COLS, start_words: 1, starts, sum: false }
+        Self { shift: 0, chunk: Self::ALL, run: PAD_COLS, start_words: 1, starts, sum: false, pairs: false }
     }
 }
 
@@ -453,23 +458,38 @@ impl BlockShape {
     const fn cell_at(self, row: usize, unit: usize) -> (usize, usize) {
         let (first, height) = self.strip(row);
         let Cell { rows, words, .. } = self.layout().cell;
-        let scales_before = match self.group {
+        let groups_before = match self.group {
             0 => 0,
-            _ => div_down(unit, self.units_per_group()) * (height / QUAD),
+            _ => div_down(unit, self.units_per_group()),
         };
+        // The scales of a pair stand behind its second group.
+        let groups_before = if self.in_pairs(height) { groups_before & !1 } else { groups_before };
+        let scales_before = groups_before * (height / QUAD);
         let step = div_down(height, rows);
         let strip = first / QUAD * self.quad_words();
         (strip + unit * words * step + scales_before + div_down(row - first, rows), step)
     }
 
-    /// Index of the word that holds the scale of `group` for `row`.
-    const fn scale_at(self, row: usize, group: usize) -> usize {
+    /// Whether the scales of a strip of so many rows stand behind pairs of groups.
+    const fn in_pairs(self, height: usize) -> bool {
+        self.layout().x.pairs && height == STRIP
+    }
+
+    /// Index of the word that holds the scale of `group` for `row`, and the scale's first bit.
+    const fn scale_at(self, row: usize, group: usize) -> (usize, usize) {
         let (first, height) = self.strip(row);
-        let last = (group + 1) * self.units_per_group();
+        let row = row - first;
+        let pair = self.in_pairs(height) && (group | 1) < self.groups();
+        let (first_group, last_group) = if pair { (group & !1, group | 1) } else { (group, group) };
+        let last = (last_group + 1) * self.units_per_group();
         let units = if last < self.units() { last } else { self.units() };
         let Cell { rows, words, .. } = self.layout().cell;
-        let scales_before = group * (height / QUAD) + (row - first) / QUAD;
-        first / QUAD * self.quad_words() + units * words * div_down(height, rows) + scales_before
+        let before = first / QUAD * self.quad_words() + units * words * div_down(height, rows);
+        let scales_before = first_group * (height / QUAD);
+        match pair {
+            true => (before + scales_before + row / 2, 16 * (group % 2) + 8 * (row % 2)),
+            false => (before + scales_before + row / QUAD, 8 * (row % QUAD)),
+        }
     }
 }
 
@@ -543,8 +563,8 @@ impl<'a> Block<'a> {
         match self.shape.group {
             0 => 1,
             group => {
-                let word = self.words.get(self.shape.scale_at(row, div_down(col, group))).copied().unwrap_or(0);
-                (u32::from_le(word) >> (8 * (row % QUAD))) as u8
+                let (at, bit) = self.shape.scale_at(row, div_down(col, group));
+                (u32::from_le(self.words.get(at).copied().unwrap_or(0)) >> bit) as u8
             }
         }
     }
@@ -567,7 +587,8 @@ pub fn pack(shape: BlockShape, codes: &[u8], scales: &[u8], out: &mut [u32]) -> 
     if shape.groups() > 0 {
         for (row, row_scales) in scales.chunks_exact(shape.groups()).enumerate() {
             for (group, &scale) in row_scales.iter().enumerate() {
-                out[shape.scale_at(row, group)] |= (scale as u32) << (8 * (row % QUAD));
+                let (at, bit) = shape.scale_at(row, group);
+                out[at] |= (scale as u32) << bit;
             }
         }
     }

@@ -93,7 +93,8 @@ fn strip_of<F: Format, const CELLS: usize>(mut words: &[u32], mut x: &[u32], len
                 }
             }
         }
-        scale::<F, CELLS>(sums, scales, x_sum, &mut totals);
+        let x_sum = x_sum.first().map_or(0, |sum| *sum as i32);
+        scale::<F, CELLS>(sums, core::array::from_fn(|quad| scale_word(scales, quad)), x_sum, &mut totals);
     }
     store::<F, CELLS>(&totals, acc);
 }
@@ -109,35 +110,68 @@ fn strip_of_32<F: Format, const CELLS: usize>(words: &[u32], x: &[u32], acc: &mu
     let quads = CELLS * F::CELL.rows / QUAD;
     let pass = if F::CELL.cols < 16 && cols > 8 { 2 } else { 1 };
     let mut totals = [[0i32; QUAD]; CELLS];
-    let words = words.chunks_exact(chunks * weights + quads);
-    for (words, x) in words.zip(x.chunks_exact(chunks * length + usize::from(F::X.sum))) {
+    let group = |words: &[u32], x: &[u32]| {
         let mut sums = [[0i32; QUAD]; CELLS];
         for k in 0..chunks {
             chunk::<F, CELLS>(&words[k * weights..][..weights], &x[k * length..][..length], pass, &mut sums);
         }
-        scale::<F, CELLS>(sums, &words[chunks * weights..], &x[chunks * length..], &mut totals);
+        sums
+    };
+    let (units, x_units) = (chunks * weights, chunks * length);
+    if !F::X.pairs {
+        for (words, x) in words.chunks_exact(units + quads).zip(x.chunks_exact(x_units + usize::from(F::X.sum))) {
+            let scales = core::array::from_fn(|quad| scale_word(&words[units..], quad));
+            let x_sum = x.get(x_units).map_or(0, |sum| *sum as i32);
+            scale::<F, CELLS>(group(words, x), scales, x_sum, &mut totals);
+        }
+        return store::<F, CELLS>(&totals, acc);
+    }
+    let mut words = words;
+    for x in x.chunks_exact(2 * x_units + 1) {
+        let x_sums = [x[2 * x_units] as i16 as i32, x[2 * x_units] as i32 >> 16];
+        if quads == 2 && words.len() >= 2 * (units + quads) {
+            let (pair, rest) = words.split_at(2 * (units + quads));
+            words = rest;
+            for (k, x_sum) in x_sums.into_iter().enumerate() {
+                // Rows 2i and 2i + 1 of both groups share a word.
+                let half = |i: usize| u32::from_le(pair[2 * units + i]) >> (16 * k) & 0xffff;
+                let scales = core::array::from_fn(|quad| half(2 * quad) | half(2 * quad + 1) << 16);
+                scale::<F, CELLS>(group(&pair[k * units..], &x[k * x_units..]), scales, x_sum, &mut totals);
+            }
+            continue;
+        }
+        for (k, x_sum) in x_sums.into_iter().enumerate() {
+            let Some((now, rest)) = words.split_at_checked(units + quads) else { break };
+            words = rest;
+            let scales = core::array::from_fn(|quad| scale_word(&now[units..], quad));
+            scale::<F, CELLS>(group(now, &x[k * x_units..]), scales, x_sum, &mut totals);
+        }
     }
     store::<F, CELLS>(&totals, acc);
+}
+
+/// The scales of four rows; ones where there are none.
+#[inline(always)]
+fn scale_word(scales: &[u32], quad: usize) -> u32 {
+    scales.get(quad).map_or(0x0101_0101, |word| u32::from_le(*word))
 }
 
 /// Adds the sums of a group, times its scales, to the strip's.
 #[inline(always)]
 fn scale<F: Format, const CELLS: usize>(
     mut sums: [[i32; QUAD]; CELLS],
-    scales: &[u32],
-    x_sum: &[u32],
+    scales: [u32; 2],
+    x_sum: i32,
     totals: &mut [[i32; QUAD]; CELLS],
 ) {
     if F::X.sum {
-        let x_sum = x_sum.first().map_or(0, |sum| *sum as i32);
         for sums in &mut sums {
             for sum in sums.iter_mut().skip(1).step_by(2) {
                 *sum = sum.wrapping_add(x_sum);
             }
         }
     }
-    for quad in 0..CELLS * F::CELL.rows / QUAD {
-        let scale = scales.get(quad).map_or(0x0101_0101, |word| u32::from_le(*word));
+    for (quad, scale) in scales.into_iter().enumerate().take(CELLS * F::CELL.rows / QUAD) {
         for row in 0..QUAD {
             let (i, r) = ((QUAD * quad + row) / F::CELL.rows, (QUAD * quad + row) % F::CELL.rows);
             let scale = scale >> (8 * row) & 0xff;

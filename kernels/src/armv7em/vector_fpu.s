@@ -32,7 +32,8 @@
 @ those sums.
 @
 @ [sp] is how many eights the first chunk of a group has, [sp+4] how many the others; [sp+8] and [sp+12] are the first start
-@ word's bias and factor, [sp+16] the second one's factor.
+@ word's bias and factor, [sp+16] the second one's factor, or, where there is but one, not 0 where groups are pairs of chunks: their sums
+@ are halves of the word then.
 @
 @ r4-r7 pairs, r8 sum of a chunk, r9 where its start words go, r10 sum of a group, both sums times 2^shift, r11 eights left,
 @ r12 a pair of ones. r3 is kept at the frame's begin, so what was at [sp] is 40 bytes further.
@@ -84,7 +85,12 @@ actq_quantize\shift:
     subs r3, r3, #1
     bne.n 2b
     .if \sum
+    ldr r4, [sp, #56]
     asr r10, r10, #\shift
+    cbz r4, 4f
+    sub r10, r10, r8
+    pkhbt r10, r10, r8, lsl #16
+4:
     str r10, [r1], #4
     .endif
     subs r2, r2, #1

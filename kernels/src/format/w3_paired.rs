@@ -81,6 +81,7 @@ impl Format for W3Paired {
         start_words: 1,
         starts: [Start { bias: 0x8000, factor: -28 }, Start::NONE],
         sum: true,
+        pairs: false,
     };
 
     fn insert(cell: &mut [u32; 3], row: usize, col: usize, code: u8) {

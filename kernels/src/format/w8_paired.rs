@@ -44,6 +44,7 @@ impl Format for W8Paired {
         start_words: 1,
         starts: [Start { bias: 0, factor: -128 }, Start::NONE],
         sum: false,
+        pairs: false,
     };
 
     fn insert(words: &mut [u32; 3], row: usize, col: usize, code: u8) {
