@@ -1,6 +1,6 @@
 @ GEMV for 2-bit codes in paired lanes (kernels/src/format/w2_paired.rs): strips of eight rows, or four.
 @
-@ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1), [sp] x_end, [sp+4] minus the biases of all chunks,
+@ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1; of four rows there is one), [sp] x_end, [sp+4] minus the biases of all chunks,
 @ [sp+8] steps of 8 columns that the first pass through the row kernel's loop leaves out; with group scales not 0 where the last
 @ pair of groups is but one.
 @ x_end is where the last chunk ends; with row scales, the sum of x stands there.
@@ -10,7 +10,8 @@
 @ and r11 weight words, r12 the mask, lr the extracted codes.
 @
 @ Frame: 0-31 sums over chunks, (sum of t, sum of its high half) of each row pair, or sums over groups; 32 mask, 36 x_end, 40 x, 44 minus the biases,
-@ 48 acc, 52 strips, 56 sum of x, 60 steps left out.
+@ 48 acc, 52 strips, or end of acc, or, where the first pass leaves steps out, acc behind this strip, 56 sum of x, 60 steps left
+@ out, 64 end of acc.
 
     .syntax unified
     .thumb
@@ -71,24 +72,12 @@
 .endm
 
 @ Sums over chunks from `low`, `high`; x to its begin.
-.macro d2_begin rows, low, high
-    strd \low, \high, [sp, #0]
-    strd \low, \high, [sp, #8]
-    .if \rows == 8
-    strd \low, \high, [sp, #16]
-    strd \low, \high, [sp, #24]
-    .endif
+.macro d2_begin low, high
+    .irp at, 0, 8, 16, 24
+    strd \low, \high, [sp, #\at]
+    .endr
     ldr r12, [sp, #32]
     ldr r1, [sp, #40]
-.endm
-
-@ `to`: where the sums of the next strip go, `left`: strips left, this one included
-.macro d2_next_strip to=r8, left=r9
-    subs \left, \left, #1
-    strd \to, \left, [sp, #48]
-    bne.w 1b
-    add sp, sp, #68
-    pop {r4-r11, pc}
 .endm
 
 @ What is left of t without its high half is 4 * even = 2 * the even row's level sum; the odd row's is 2 * odd + sum(x).
@@ -98,27 +87,29 @@
     add \odd, r7, \odd, lsl #1
 .endm
 
-.macro d2_row_kernel name, rows, end
-    .section .text.\name, "ax", %progbits
-    .global \name
-    .type \name, %function
+    .section .text.actq_w2_paired_row, "ax", %progbits
+    .global actq_w2_paired_row
+    .type actq_w2_paired_row, %function
     .thumb_func
     .balign 16
-\name:
+actq_w2_paired_row:
     d2_prologue
-    ldr r4, [r4]
-    str r4, [sp, #56]
-    ldr r4, [sp, #112]
-    str r4, [sp, #60]
-1:
+    ldr r6, [r4]
+    ldr lr, [sp, #112]
+    add r3, r2, r3, lsl #5
+    str r6, [sp, #56]
+    strd lr, r3, [sp, #60]
+    cmp lr, #0
+    it ne
+    addne r3, r2, #32
+    str r3, [sp, #52]
+    beq.n 1f
+9:
+    @ A short first chunk: all sums start before the first step that is not left out.
     ldr r4, [sp, #44]
     movs r5, #0
-    d2_begin \rows, r4, r5
+    d2_begin r4, r5
     ldr lr, [sp, #60]
-    .if \rows == 8
-    cmp lr, #0
-    beq.w 2f
-    @ A short first chunk: all sums start before the first step that is not left out.
     ldr r2, [r1], #4
     mov r7, r2
     mov r8, r2
@@ -129,25 +120,16 @@
     .hword (\step - 7b) / 2
     .endr
     .balign 4
+1:
+    ldr r4, [sp, #44]
+    movs r5, #0
+    d2_begin r4, r5
 2:
     d2_cols8 8, 1
     .irp step, 11, 12, 13
 \step:
     d2_cols8 8, 0
     .endr
-    .else
-    @ Seldom more than a strip of a block, so its loop is short: eight columns. lr: steps that this chunk leaves out.
-2:
-    ldr r2, [r1], #4
-    mov r7, r2
-    add r8, r1, #64
-    sub r8, r8, lr, lsl #4
-3:
-    d2_cols8 4, 0
-    cmp r1, r8
-    bne.n 3b
-    .endif
-    .if \rows == 8
     ldmia.w sp, {r3-r6, r10-r12, lr}
     add r3, r3, r2
     add r4, r4, r2, asr #16
@@ -159,7 +141,52 @@
     add lr, lr, r9, asr #16
     stmia.w sp, {r3-r6, r10-r12, lr}
     ldrd r12, lr, [sp, #32]
-    .else
+    cmp r1, lr
+    bne.w 2b
+    ldr r7, [sp, #56]
+    ldrd r8, r9, [sp, #48]
+    d2_rows r3, r4
+    d2_rows r5, r6
+    ldrd r12, lr, [sp, #24]
+    d2_rows r10, r11
+    d2_rows r12, lr
+    stmia.w r8!, {r3-r6, r10-r12, lr}
+    str r8, [sp, #48]
+    cmp r8, r9
+    bne.w 1b
+    ldr r9, [sp, #64]
+    cmp r8, r9
+    beq.n 8f
+    add r8, r8, #32
+    str r8, [sp, #52]
+    b.w 9b
+8:
+    add sp, sp, #68
+    pop {r4-r11, pc}
+    .size actq_w2_paired_row, . - actq_w2_paired_row
+
+@ The last strip of a block, so its loop is short: eight columns. r9: steps that this chunk leaves out.
+    .section .text.actq_w2_paired_row4, "ax", %progbits
+    .global actq_w2_paired_row4
+    .type actq_w2_paired_row4, %function
+    .thumb_func
+    .balign 16
+actq_w2_paired_row4:
+    d2_prologue
+    ldr r9, [sp, #112]
+    movs r6, #0
+    strd r5, r6, [sp, #0]
+    strd r5, r6, [sp, #8]
+2:
+    ldr r2, [r1], #4
+    mov r7, r2
+    add r8, r1, #64
+    sub r8, r8, r9, lsl #4
+    movs r9, #0
+3:
+    d2_cols8 4, 0
+    cmp r1, r8
+    bne.n 3b
     ldmia.w sp, {r3-r6}
     add r3, r3, r7
     add r4, r4, r7, asr #16
@@ -167,25 +194,16 @@
     add r6, r6, r2, asr #16
     stmia.w sp, {r3-r6}
     ldr r8, [sp, #36]
-    mov.w lr, #0
-    .endif
-    cmp r1, \end
-    bne.w 2b
-    ldr r7, [sp, #56]
-    ldrd r8, r9, [sp, #48]
+    cmp r1, r8
+    bne.n 2b
+    ldr r7, [r1]
     d2_rows r3, r4
     d2_rows r5, r6
-    .if \rows == 8
-    ldrd r12, lr, [sp, #24]
-    d2_rows r10, r11
-    d2_rows r12, lr
-    stmia.w r8!, {r3-r6, r10-r12, lr}
-    .else
-    stmia.w r8!, {r3-r6}
-    .endif
-    d2_next_strip
-    .size \name, . - \name
-.endm
+    ldr r8, [sp, #48]
+    stmia.w r8, {r3-r6}
+    add sp, sp, #68
+    pop {r4-r11, pc}
+    .size actq_w2_paired_row4, . - actq_w2_paired_row4
 
 @ Adds a group's sums t of two row pairs, times the odd rows' `scales`, to the sums of the odd rows, and then, times the scales
 @ `evens`, to those of the even rows. r12 holds the sum of x. Even rows sum 4 * even * scale, odd rows
@@ -343,7 +361,7 @@ actq_w2_paired_group:
     b.w 9b
     .size actq_w2_paired_group, . - actq_w2_paired_group
 
-@ Strips of four have a word of scales behind each group. r9: from a group's end in x to its sum, 68 bytes in the first of two.
+@ A strip of four has a word of scales behind each group. r9: from a group's end in x to its sum, 68 bytes in the first of two.
     .section .text.actq_w2_paired_group4, "ax", %progbits
     .global actq_w2_paired_group4
     .type actq_w2_paired_group4, %function
@@ -353,12 +371,15 @@ actq_w2_paired_group4:
     d2_prologue
     ldr r5, [sp, #112]
     cbz r5, 1f
+    @ Behind the end of the last group are its partner's start word and the sums.
     sub r4, r4, #8
     str r4, [sp, #36]
 1:
     movs r5, #0
-    d2_begin 4, r5, r5
-    movs r9, #68
+    strd r5, r5, [sp, #0]
+    strd r5, r5, [sp, #8]
+    movs r4, #68
+    mov r9, r4
 2:
     ldr r2, [r1], #4
     mov r7, r2
@@ -373,20 +394,18 @@ actq_w2_paired_group4:
     ldmia.w sp, {r3-r6}
     d2_scale r10, lr, r7, r2, r3, r4, r5, r6
     stmia.w sp, {r3-r6}
-    rsbs r9, r9, #70
+    rsb r9, r9, #70
     cmp r9, #68
     it eq
     addeq r1, r1, #4
     ldrd r12, lr, [sp, #32]
     cmp r1, lr
-    bne.w 2b
-    ldrd r9, r10, [sp, #48]
+    bne.n 2b
+    ldr r9, [sp, #48]
     asr r3, r3, #1
     asr r5, r5, #1
-    stmia.w r9!, {r3-r6}
-    d2_next_strip r9, r10
+    stmia.w r9, {r3-r6}
+    add sp, sp, #68
+    pop {r4-r11, pc}
     .size actq_w2_paired_group4, . - actq_w2_paired_group4
-
-    d2_row_kernel actq_w2_paired_row, 8, lr
-    d2_row_kernel actq_w2_paired_row4, 4, r8
     .text

@@ -10,8 +10,9 @@
 @
 @ The high halves of 64 columns stay within `4 * 127 * 64 = 32512`.
 @
-@ Frame: 0-15 sums over groups (group kernel) or 0-7 sums of the high halves (row kernel), 16 x, 20 minus the biases, 24 acc,
-@ 28 strips, 32 x_end, 36 sum of x, 40 steps left out.
+@ Frame of the row kernel: 0 x, 4 and 8 minus the biases, 12 0, 16-23 sums of the high halves, 24 acc, 28 end of acc, or, where the
+@ first pass leaves steps out, acc behind this strip, 32 x_end, 36 sum of x, 40 end of acc, 44 steps left out; of the group kernel:
+@ 0-15 sums over groups, 16 x, 24 acc, 28 strips, 32 x_end.
 
     .syntax unified
     .thumb
@@ -83,24 +84,36 @@
     .thumb_func
     .balign 16
 actq_w3_paired_row:
-    d3_prologue
-    ldr r5, [r4]
-    str r5, [sp, #36]
-    ldr r5, [sp, #88]
-    str r5, [sp, #40]
-1:
-    ldrd r1, r10, [sp, #16]
+    push {r4-r11, lr}
+    sub sp, sp, #52
+    ldrd r4, r10, [sp, #88]
+    ldr r9, [sp, #96]
     mov r11, r10
-    movs r4, #0
-    strd r4, r4, [sp, #0]
-    ldr r9, [sp, #40]
     movs r12, #0
+    stmia.w sp, {r1, r10-r12}
+    ldr r5, [r4]
+    add r6, r2, r3, lsl #4
+    strd r4, r5, [sp, #32]
+    strd r6, r9, [sp, #40]
+    cmp r9, #0
+    it ne
+    addne r6, r2, #16
+    strd r2, r6, [sp, #24]
+    movw r2, #0xe007
+    movt r2, #0xe007
+    beq.n 1f
+9:
+    ldmia.w sp, {r1, r10-r12}
+    strd r12, r12, [sp, #16]
     tbh [pc, r9, lsl #1]
 7:
     .irp step, 2f, 11f, 12f, 13f, 14f, 15f, 16f, 17f
     .hword (\step - 7b) / 2
     .endr
     .balign 4
+1:
+    ldmia.w sp, {r1, r10-r12}
+    strd r12, r12, [sp, #16]
 2:
     d3_chunk
     add r10, r10, r9
@@ -110,11 +123,11 @@ actq_w3_paired_row:
 \step:
     d3_next_chunk
     .endr
-    ldrd r7, r8, [sp, #0]
+    ldrd r7, r8, [sp, #16]
     ldr lr, [sp, #32]
     sxtah r7, r7, r12
     add r8, r8, r12, asr #16
-    strd r7, r8, [sp, #0]
+    strd r7, r8, [sp, #16]
     cmp r1, lr
     bne.w 2b
     @ What is left of a sum of t without its high half is 8 * even = 4 * the even row's level sum; the odd row's is
@@ -128,7 +141,19 @@ actq_w3_paired_row:
     add r6, lr, r8, lsl #1
     ldrd r9, r10, [sp, #24]
     stmia.w r9!, {r3-r6}
-    d3_next_strip
+    str r9, [sp, #24]
+    cmp r9, r10
+    bne.w 1b
+    ldr r10, [sp, #40]
+    cmp r9, r10
+    beq.n 8f
+    add r9, r9, #16
+    str r9, [sp, #28]
+    ldr r9, [sp, #44]
+    b.w 9b
+8:
+    add sp, sp, #52
+    pop {r4-r11, pc}
     .size actq_w3_paired_row, . - actq_w3_paired_row
 
     .section .text.actq_w3_paired_group, "ax", %progbits
