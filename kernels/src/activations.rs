@@ -69,13 +69,11 @@ impl Plan {
         let layout = shape.layout();
         let format = &layout.x;
         let read = round_up(shape.cols, shape.step());
-        let together = shape.group << format.pairs as u32;
-        let least = match shape.lanes {
-            Lanes::Single => PAD_COLS,
-            Lanes::Paired => 1,
-        };
-        let padded = round_up(read, if together > least { together } else { least });
-        let (group, groups) = match together {
+        // Two groups where they are taken in pairs.
+        let pair_log = if shape.group == 0 { 0 } else { format.pairs as u32 };
+        let group = shape.group << pair_log;
+        let padded = round_up(read, if group > layout.pad { group } else { layout.pad });
+        let (group, groups) = match group {
             0 => (padded, 1),
             group => (group, div_down(padded, group)),
         };
@@ -100,8 +98,7 @@ impl Plan {
                     _ => 4 * starts + 2 * first,
                 },
                 // Passes and steps are powers of two, and chunks that are longer than a pass are whole passes.
-                skip: (0usize.wrapping_sub(read) & (if together > shape.group { together } else { format.run } - 1))
-                    >> layout.step_log,
+                skip: (0usize.wrapping_sub(read) & ((format.run << pair_log) - 1)) >> layout.step_log,
             },
         }
     }

@@ -294,6 +294,8 @@ pub(crate) struct Layout {
     strip: usize,
     pub(crate) step: usize,
     pub(crate) x: XFormat,
+    /// Columns that activations are padded to a multiple of, where their group is not longer.
+    pub(crate) pad: usize,
     /// Binary logarithms, because nothing is divided when a GEMV is called.
     pub(crate) chunk_log: u32,
     #[cfg(actq_armv7em)]
@@ -314,6 +316,7 @@ impl Layout {
             strip: F::STRIP,
             step: F::STEP,
             x: F::X,
+            pad: if F::X.chunk == XFormat::ALL { PAD_COLS } else { 1 },
             chunk_log: F::X.chunk.trailing_zeros(),
             #[cfg(actq_armv7em)]
             strip_log: F::STRIP.trailing_zeros(),
