@@ -4,8 +4,9 @@
 //! the sum's low mantissa bits are the rounded value in two's complement. It is one FPU addition, and the same bits everywhere.
 //!
 //! A prepared vector is made for the layout that reads it ([`XFormat`]): for each group of columns (the whole row where the
-//! weights have no group scales) its chunks, and behind them, where the layout asks for it, the sum of the group's values. Where it
-//! takes groups in pairs, a pair is prepared as a group of two chunks, with the first group's sum in the low half of the word. A
+//! weights have no group scales) its chunks, and behind them, where the layout asks for it, the sum of the row's values, or, twice, in
+//! both halves of a word, the group's. Where the layout takes groups in pairs, a pair is prepared as a group of two chunks, and the
+//! halves of its word are their sums. A
 //! chunk is its start words and its int16 pairs, column `2j` in the low half. Zeros fill the last group, or, where there are no
 //! groups, a kernel's step ([`PAD_COLS`] with single lanes). A [`Plan`] has all lengths.
 
@@ -22,7 +23,7 @@ pub const TINY: f32 = f32::from_bits(27 << 23);
 #[derive(Clone, Copy, Debug)]
 pub struct Plan {
     /// The shape; its rows do not matter.
-    shape: BlockShape,
+    pub(crate) shape: BlockShape,
     pub(crate) layout: &'static Layout,
     /// Columns with the padding.
     pub(crate) padded: usize,
@@ -119,11 +120,6 @@ impl Plan {
     /// up with zeros: to the end of the room, while the prepared words grow from its begin.
     pub const fn room(&self, len: usize) -> usize {
         if len == self.padded { self.words } else { self.words + self.padded / 2 }
-    }
-
-    /// Whether groups are prepared in pairs ([`XFormat::pairs`]), which are the plan's groups then.
-    pub(crate) const fn in_pairs(&self) -> bool {
-        self.layout.x.pairs && self.shape.group != 0
     }
 
     /// Columns of a group.
@@ -305,9 +301,11 @@ fn lay_out<V: Copy>(x: &[V], plan: &Plan, out: &mut [u32], integer: impl Fn(V) -
             (x, chunks, columns) = (rest_x, rest, plan.layout.x.chunk);
         }
         if let Some(word) = sum_word.first_mut() {
-            // A pair's groups are chunks.
-            let halves = (sum.wrapping_sub(last) & 0xffff) | last << 16;
-            *word = if plan.in_pairs() { halves } else { sum } as u32;
+            // A pair's groups are chunks; without pairs, both halves are the group's.
+            let first = if plan.layout.x.pairs { sum.wrapping_sub(last) } else { sum };
+            let second = if plan.layout.x.pairs { last } else { sum };
+            let halves = (first & 0xffff) | second << 16;
+            *word = if plan.shape.group == 0 { sum } else { halves } as u32;
         }
     }
 }

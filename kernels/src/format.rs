@@ -202,9 +202,10 @@ pub struct XFormat {
     pub start_words: usize,
     /// What they hold.
     pub starts: [Start; 2],
-    /// Whether each group's chunks (the whole row's where there are no groups) are followed by the sum of the group's x.
+    /// Whether the row's chunks are followed by the sum of its x; those of a group by the sum of the group's, in both halves of a
+    /// word.
     pub sum: bool,
-    /// Whether groups are taken in pairs: two are prepared as one, with both sums in the halves of a word, and the scales of
+    /// Whether groups are taken in pairs: two are prepared as one, with their sums in the halves of the word, and the scales of
     /// strips of eight stand behind both groups' units.
     pub pairs: bool,
 }

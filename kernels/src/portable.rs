@@ -121,7 +121,7 @@ fn strip_of_32<F: Format, const CELLS: usize>(words: &[u32], x: &[u32], acc: &mu
     if !F::X.pairs {
         for (words, x) in words.chunks_exact(units + quads).zip(x.chunks_exact(x_units + usize::from(F::X.sum))) {
             let scales = core::array::from_fn(|quad| scale_word(&words[units..], quad));
-            let x_sum = x.get(x_units).map_or(0, |sum| *sum as i32);
+            let x_sum = x.get(x_units).map_or(0, |sum| *sum as i16 as i32);
             scale::<F, CELLS>(group(words, x), scales, x_sum, &mut totals);
         }
         return store::<F, CELLS>(&totals, acc);

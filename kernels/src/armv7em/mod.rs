@@ -184,7 +184,7 @@ unsafe fn quantize_padded(x: *const f32, inverse: f32, plan: &Plan, out: *mut u3
     // it writes them. It writes as many start words and sums as the format has, which `quantizer` says of every layout, and where
     // it takes eight columns for a chunk, that is the format's limit and so `first` and `chunk`.
     unsafe {
-        let last = if plan.in_pairs() { 1 } else { second.factor };
+        let last = if plan.layout.x.sum { plan.shape.group as i32 } else { second.factor };
         kernel(inverse, ROUND, x, out, plan.groups, plan.chunks, first, chunk, start.bias, start.factor, last);
     }
 }
@@ -215,7 +215,7 @@ pub(crate) fn sqrt(x: f32) -> f32 {
 macro_rules! quantize_kernels {
     ($($name:ident)*) => {
         /// Writes `groups` groups of `chunks` chunks, the first of `first` times eight values and the others of `eights`. `last` is
-        /// the second start word's factor, or, with one start word, whether groups are pairs of chunks.
+        /// the second start word's factor, or, where sums are written, not 0 where those of groups are.
         pub(crate) type Quantize = unsafe extern "C" fn(
             inverse: f32, round: f32, x: *const f32, out: *mut u32,
             groups: usize, chunks: usize, first: usize, eights: usize, bias: i32, factor: i32, last: i32,

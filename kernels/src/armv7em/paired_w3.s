@@ -27,7 +27,7 @@
     smlad \t, \codes, \pair, \from
 .endm
 
-@ A chunk of eight columns; afterwards r9 and r6 hold its sums t. With `sum`, the sum of x behind the chunk goes to lr, which the
+@ A chunk of eight columns; afterwards r9 and r6 hold its sums t. With `sum`, the sum of x behind the chunk, in both halves of a word, goes to lr, which the
 @ second half leaves alone.
 .macro d3_chunk sum=0
     ldmia.w r1!, {r6-r8}
@@ -184,7 +184,6 @@ actq_w3_paired_group:
     sub r11, r11, r12
     uxtah r11, r11, r12
     asr r11, r11, #2
-    pkhbt lr, lr, lr, lsl #16
     sadd16 r12, r12, r12
     sadd16 r12, r12, lr
     ldr r9, [r0], #4

@@ -62,6 +62,34 @@
     .endif
 .endm
 
+@ Eight columns of a strip of eight, whose first pair is in r10. Loads take words for which there is room and not those of the next
+@ columns alone, so that there are five and not six. After the last eight, r10 holds the scales of the first four rows.
+.macro c4_cols8 first=0, last=0
+    ldmia.w r0!, {r9, r11, r12}
+    .if \first
+    c4_word r9, r10, r6, r7, r5, r3, r3, r4
+    c4_word r11, r10, r8, r3, r4, r3, r3, r4
+    .else
+    c4_first r9, r10
+    c4_last r11, r10
+    .endif
+    ldmia.w r1!, {r9, r10}
+    c4_first r12, r9
+    ldrd r11, r12, [r0], #8
+    c4_last r11, r9
+    c4_first r12, r10
+    ldmia.w r0!, {r9, r11, r12}
+    c4_last r9, r10
+    .if \last
+    ldr r9, [r1], #4
+    ldr r10, [r0], #4
+    .else
+    ldmia.w r1!, {r9, r10}
+    .endif
+    c4_first r11, r9
+    c4_last r12, r9
+.endm
+
 .macro c4_prologue frame
     push {r4-r11, lr}
     .if \frame
@@ -230,15 +258,14 @@ actq_w4_paired_row4:
 @ lr, p, k and q become 2^12 * (A, B, C, D), of at most 17 + 12 bits; r10 and r9 2^4 * the scales of rows 0 and 2, 1 and 3: SMLAW
 @ takes 2^16 away from the product. r2 is the mask inverted.
 .macro c4_rows p, q, k
-    ldr r9, [r0], #4
     sub lr, \k, \q, lsl #8
     lsl lr, lr, #12
     sub \p, \p, lr, asr #12
     sub \k, \k, lr, asr #12
     lsl \k, \k, #4
     sub \q, \q, \k, asr #12
-    and r10, r2, r9, lsl #4
-    and r9, r2, r9, lsr #4
+    and r9, r2, r10, lsr #4
+    and r10, r2, r10, lsl #4
 .endm
 
 @ The sums over groups: r6, r11, r7, r12 of the first four rows, r8, r2, r9, r5 of the others.
@@ -254,25 +281,26 @@ actq_w4_paired_row4:
     strd r12, r4, [sp, #32]
     strd r2, r3, [sp, #40]
     str r1, [sp, #48]
+    mov r2, r12
 1:
     movs r3, #0
-    movs r4, #0
-    strd r3, r4, [sp, #0]
-    strd r3, r4, [sp, #8]
+    strd r3, r3, [sp, #0]
+    strd r3, r3, [sp, #8]
     .if \rows == 8
-    strd r3, r4, [sp, #16]
-    strd r3, r4, [sp, #24]
+    strd r3, r3, [sp, #16]
+    strd r3, r3, [sp, #24]
     .endif
     ldr r1, [sp, #48]
-    ldr r2, [sp, #32]
     .balign 4
 2:
-    c4_cols4 \rows, 1
     .if \rows == 8
-    .rept 7
-    c4_cols4 8
-    .endr
+    ldmia.w r1!, {r3, r4, r10}
+    c4_cols8 1
+    c4_cols8
+    c4_cols8
+    c4_cols8 0, 1
     .else
+    c4_cols4 4, 1
     add r5, r1, #56
     c4_cols4 4
 3:
@@ -291,6 +319,7 @@ actq_w4_paired_row4:
     smlawb r6, lr, r10, r6
     smlawt r7, r5, r10, r7
     .endif
+    ldr r10, [r0], #4
     c4_rows r8, r3, r4
     ldrd r2, r5, [sp, #0]
     smlawb r2, r8, r9, r2
@@ -310,13 +339,13 @@ actq_w4_paired_row4:
     ldrd r2, lr, [sp, #32]
     cmp r1, lr
     bne.w 2b
-    ldr r2, [sp, #0]
+    ldr r3, [sp, #0]
     ldrd r10, lr, [sp, #40]
     .if \rows == 8
     strd r6, r11, [r10], #8
     strd r7, r12, [r10], #8
     .endif
-    strd r8, r2, [r10], #8
+    strd r8, r3, [r10], #8
     strd r9, r5, [r10], #8
     subs lr, lr, #1
     strd r10, lr, [sp, #40]

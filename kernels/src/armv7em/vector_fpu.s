@@ -32,8 +32,8 @@
 @ those sums.
 @
 @ [sp] is how many eights the first chunk of a group has, [sp+4] how many the others; [sp+8] and [sp+12] are the first start
-@ word's bias and factor, [sp+16] the second one's factor, or, where there is but one, not 0 where groups are pairs of chunks: their sums
-@ are halves of the word then.
+@ word's bias and factor, [sp+16] the second one's factor, or, where there are sums, not 0 where they are those of
+@ groups: halves of a word, at shift 2 of the two chunks of a pair of groups, at 3 twice the group's.
 @
 @ r4-r7 pairs, r8 sum of a chunk, r9 where its start words go, r10 sum of a group, both sums times 2^shift, r11 eights left,
 @ r12 a pair of ones. r3 is kept at the frame's begin, so what was at [sp] is 40 bytes further.
@@ -133,6 +133,10 @@ actq_quantize3:
     stmia.w r1!, {r3-r7}
     subs r8, r8, #1
     bne.n 1b
+    ldr r4, [sp, #56]
+    cbz r4, 4f
+    pkhbt r10, r10, r10, lsl #16
+4:
     str r10, [r1], #4
     subs r2, r2, #1
     bne.n 2b
