@@ -11,6 +11,9 @@ pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i3
     with_format!(block.shape(), strips::<_>(block, x, first_row, acc));
 }
 
+/// Columns of the usual groups.
+const COLS: usize = 32;
+
 /// Lengths in words.
 #[derive(Clone, Copy)]
 struct Lengths {
@@ -94,7 +97,7 @@ fn strip_of<F: Format, const CELLS: usize>(mut words: &[u32], mut x: &[u32], len
             }
         }
         let x_sum = x_sum.first().map_or(0, |sum| *sum as i32);
-        scale::<F, CELLS>(sums, core::array::from_fn(|quad| scale_word(scales, quad)), x_sum, &mut totals);
+        scale::<F, CELLS>(sums, |quad| scale_word(scales, quad), x_sum, &mut totals);
     }
     store::<F, CELLS>(&totals, acc);
 }
@@ -102,7 +105,9 @@ fn strip_of<F: Format, const CELLS: usize>(mut words: &[u32], mut x: &[u32], len
 /// As [`strip_of`], for whole groups of 32 columns.
 #[inline(never)]
 fn strip_of_32<F: Format, const CELLS: usize>(words: &[u32], x: &[u32], acc: &mut [i32]) {
-    const COLS: usize = 32;
+    if F::X.pairs {
+        return strip_of_pairs::<F, CELLS>(words, x, acc);
+    }
     let cols = if F::X.chunk < COLS { F::X.chunk } else { COLS };
     let length = F::X.start_words + cols / 2;
     let weights = weights_of::<F>(length) * CELLS;
@@ -110,41 +115,44 @@ fn strip_of_32<F: Format, const CELLS: usize>(words: &[u32], x: &[u32], acc: &mu
     let quads = CELLS * F::CELL.rows / QUAD;
     let pass = if F::CELL.cols < 16 && cols > 8 { 2 } else { 1 };
     let mut totals = [[0i32; QUAD]; CELLS];
-    let group = |words: &[u32], x: &[u32]| {
+    let words = words.chunks_exact(chunks * weights + quads);
+    for (words, x) in words.zip(x.chunks_exact(chunks * length + usize::from(F::X.sum))) {
         let mut sums = [[0i32; QUAD]; CELLS];
         for k in 0..chunks {
             chunk::<F, CELLS>(&words[k * weights..][..weights], &x[k * length..][..length], pass, &mut sums);
         }
-        sums
-    };
-    let (units, x_units) = (chunks * weights, chunks * length);
-    if !F::X.pairs {
-        for (words, x) in words.chunks_exact(units + quads).zip(x.chunks_exact(x_units + usize::from(F::X.sum))) {
-            let scales = core::array::from_fn(|quad| scale_word(&words[units..], quad));
-            let x_sum = x.get(x_units).map_or(0, |sum| *sum as i16 as i32);
-            scale::<F, CELLS>(group(words, x), scales, x_sum, &mut totals);
-        }
-        return store::<F, CELLS>(&totals, acc);
+        let x_sum = x.get(chunks * length).map_or(0, |halves| *halves as i16 as i32);
+        let scales = &words[chunks * weights..];
+        scale::<F, CELLS>(sums, |quad| scale_word(scales, quad), x_sum, &mut totals);
     }
-    let mut words = words;
-    for x in x.chunks_exact(2 * x_units + 1) {
-        let x_sums = [x[2 * x_units] as i16 as i32, x[2 * x_units] as i32 >> 16];
-        if quads == 2 && words.len() >= 2 * (units + quads) {
-            let (pair, rest) = words.split_at(2 * (units + quads));
-            words = rest;
-            for (k, x_sum) in x_sums.into_iter().enumerate() {
-                // Rows 2i and 2i + 1 of both groups share a word.
-                let half = |i: usize| u32::from_le(pair[2 * units + i]) >> (16 * k) & 0xffff;
-                let scales = core::array::from_fn(|quad| half(2 * quad) | half(2 * quad + 1) << 16);
-                scale::<F, CELLS>(group(&pair[k * units..], &x[k * x_units..]), scales, x_sum, &mut totals);
-            }
-            continue;
-        }
-        for (k, x_sum) in x_sums.into_iter().enumerate() {
-            let Some((now, rest)) = words.split_at_checked(units + quads) else { break };
-            words = rest;
-            let scales = core::array::from_fn(|quad| scale_word(&now[units..], quad));
-            scale::<F, CELLS>(group(now, &x[k * x_units..]), scales, x_sum, &mut totals);
+    store::<F, CELLS>(&totals, acc);
+}
+
+/// As [`strip_of_32`], for layouts that take groups in pairs; a group is a chunk.
+#[inline(always)]
+fn strip_of_pairs<F: Format, const CELLS: usize>(mut words: &[u32], x: &[u32], acc: &mut [i32]) {
+    let length = F::X.start_words + COLS / 2;
+    let weights = weights_of::<F>(length) * CELLS;
+    let quads = CELLS * F::CELL.rows / QUAD;
+    let mut totals = [[0i32; QUAD]; CELLS];
+    for x in x.chunks_exact(2 * length + 1) {
+        let together = quads == 2 && words.len() >= 2 * (weights + quads);
+        let (both, rest) = split(words, 2 * (weights + quads));
+        words = rest;
+        for k in 0..2 {
+            let (at, scales_at) =
+                if together { (weights, 2 * weights) } else { (weights + quads, k * quads + (k + 1) * weights) };
+            let (Some(now), Some(scales)) = (both.get(k * at..k * at + weights), both.get(scales_at..)) else { break };
+            let mut sums = [[0i32; QUAD]; CELLS];
+            chunk::<F, CELLS>(now, &x[k * length..][..length], 2, &mut sums);
+            // Rows 2i and 2i + 1 of both groups share a word.
+            let half = |i: usize| scale_word(scales, i) >> (16 * k) & 0xffff;
+            let of_quad = |quad| match together {
+                true => half(2 * quad) | half(2 * quad + 1) << 16,
+                false => scale_word(scales, quad),
+            };
+            let x_sum = (x[2 * length] >> (16 * k)) as i16 as i32;
+            scale::<F, CELLS>(sums, of_quad, x_sum, &mut totals);
         }
     }
     store::<F, CELLS>(&totals, acc);
@@ -160,7 +168,7 @@ fn scale_word(scales: &[u32], quad: usize) -> u32 {
 #[inline(always)]
 fn scale<F: Format, const CELLS: usize>(
     mut sums: [[i32; QUAD]; CELLS],
-    scales: [u32; 2],
+    scales: impl Fn(usize) -> u32,
     x_sum: i32,
     totals: &mut [[i32; QUAD]; CELLS],
 ) {
@@ -171,7 +179,8 @@ fn scale<F: Format, const CELLS: usize>(
             }
         }
     }
-    for (quad, scale) in scales.into_iter().enumerate().take(CELLS * F::CELL.rows / QUAD) {
+    for quad in 0..CELLS * F::CELL.rows / QUAD {
+        let scale = scales(quad);
         for row in 0..QUAD {
             let (i, r) = ((QUAD * quad + row) / F::CELL.rows, (QUAD * quad + row) % F::CELL.rows);
             let scale = scale >> (8 * row) & 0xff;
