@@ -15,6 +15,11 @@
 //! are summed without being taken apart: the high halves for themselves, and all of `t` modulo 2^32, from which the sum of
 //! the high halves is taken away in the end. The even row's level sum is then half of what is left, the odd row's is
 //! `2*odd + sum(x)`.
+//!
+//! With group scales, two groups' low halves without the bias and their high halves, at most `2 * 127 * 32 = 8128`, are pairs
+//! of int16 that one SMLAD each multiplies with both groups' scales (the odd rows' doubled: 510 at most). The sums over groups
+//! are modulo 2^32. The even row's is twice its level sum, which is sure to fit up to 11052 columns: `2 * 3 * 127 * 255` times
+//! as much is less than `2^31`.
 
 use super::{Cell, Format, STRIP, Start, Sums, Width, XFormat, smlad};
 
