@@ -62,7 +62,7 @@ impl Function {
     /// Applies the function to every element.
     pub fn apply(self, x: &mut [f32]) {
         match self {
-            Self::Relu => each_four(x, relu),
+            Self::Relu => each(x, relu),
             Self::Elu => each(x, elu),
             Self::Silu => each(x, silu),
             Self::Gelu => each_four(x, gelu),
@@ -153,10 +153,11 @@ pub fn exp(x: f32) -> f32 {
     n / d
 }
 
-/// `max(x, 0)`
+/// `max(x, 0)`. By the bits, as an unsigned number: what is negative or not a number stands above infinity.
 #[inline(always)]
 pub fn relu(x: f32) -> f32 {
-    if x > 0.0 { x } else { 0.0 }
+    let bits = x.to_bits();
+    f32::from_bits(if bits > f32::INFINITY.to_bits() { 0 } else { bits })
 }
 
 /// `x` where positive, else `exp(x) - 1`
