@@ -62,13 +62,13 @@ impl Function {
     /// Applies the function to every element.
     pub fn apply(self, x: &mut [f32]) {
         match self {
-            Self::Relu => each(x, relu),
-            Self::Elu => each(x, elu),
+            Self::Relu => each_two(x, relu),
+            Self::Elu => each_ratio(x, &ELU),
             Self::Silu => each(x, silu),
-            Self::Gelu => each_four(x, gelu),
+            Self::Gelu => each(x, gelu),
             Self::GeluTanh => each(x, gelu_tanh),
-            Self::Tanh => each(x, tanh),
-            Self::Sigmoid => each(x, sigmoid),
+            Self::Tanh => each_ratio(x, &TANH),
+            Self::Sigmoid => each_ratio(x, &SIGMOID),
         }
     }
 }
@@ -81,18 +81,46 @@ fn each(x: &mut [f32], function: impl Fn(f32) -> f32) {
     }
 }
 
-/// As [`each`], four in a pass, where the instructions of the loop count.
+/// As [`each`], two in a pass, where the loop takes most of the time.
 #[inline(never)]
-fn each_four(x: &mut [f32], function: impl Fn(f32) -> f32) {
-    let (fours, rest) = x.as_chunks_mut::<4>();
-    for [a, b, c, d] in fours {
-        *a = function(*a);
-        *b = function(*b);
-        *c = function(*c);
-        *d = function(*d);
+fn each_two(x: &mut [f32], function: impl Fn(f32) -> f32) {
+    let (pairs, rest) = x.as_chunks_mut::<2>();
+    for [a, b] in pairs {
+        (*a, *b) = (function(*a), function(*b));
     }
-    for x in rest {
+    if let [x] = rest {
         *x = function(*x);
+    }
+}
+
+/// `(n - a d) / (b n + d)` with `n / d = e^x` or another power, and x itself above `end`.
+struct Ratio {
+    factor: f32,
+    a: f32,
+    b: f32,
+    end: f32,
+}
+
+const ELU: Ratio = Ratio { factor: EXP, a: 1.0, b: 0.0, end: 0.0 };
+const TANH: Ratio = Ratio { factor: 2.0 * EXP, a: 1.0, b: 1.0, end: f32::INFINITY };
+const SIGMOID: Ratio = Ratio { factor: EXP, a: 0.0, b: 1.0, end: f32::INFINITY };
+
+impl Ratio {
+    #[inline(always)]
+    fn of(&self, x: f32) -> f32 {
+        if x > self.end {
+            return x;
+        }
+        let (n, d) = exp2(x * self.factor, QUARTER);
+        (n - self.a * d) / (self.b * n + d)
+    }
+}
+
+/// One loop for the functions that are such a ratio.
+#[inline(never)]
+fn each_ratio(x: &mut [f32], ratio: &Ratio) {
+    for x in x {
+        *x = ratio.of(*x);
     }
 }
 
@@ -108,45 +136,44 @@ pub fn clamp(x: f32, low: f32, high: f32) -> f32 {
     }
 }
 
-/// The largest magnitude of an exponent of 2. Beyond, all functions here have come to their limits as far as f32 tells.
-const MAX_EXPONENT: u32 = 32;
-
-/// `2^y` as a fraction of two positive numbers, for a `y` limited to -32 ..= 31. What uses it has to divide anyway.
+/// `2^(y / one)` as a fraction of two positive numbers, for a finite y and a power of two that does not overflow: `one` sets the
+/// unit, and changes nothing else. The exponent stays within -33 ..= 33; there, all functions here have come to their limits as
+/// far as f32 tells. What uses the fraction has to divide anyway.
 ///
-/// `y = n + f` with `|f| <= 1/2`. `2^f = (Q + f P) / (Q - f P)`, where `f P / Q` is `tanh(f ln 2 / 2)` with
+/// In units, `y = n + f` with `|f| <= 1/2`. `2^f = (Q + f P) / (Q - f P)`, where `f P / Q` is `tanh(f ln 2 / 2)` with
 /// `P = p0 + p1 f^2` and `Q = q0 + f^2`, fitted for the smallest relative error, 1e-10. `n` is added to the numerator's
-/// exponent. The numbers are between 17 and 25, times `2^n` in the numerator.
+/// exponent. The numbers are between 17 and 25 times `one^2`, and times `2^n` in the numerator.
 #[inline(always)]
-pub(crate) fn exp2(y: f32) -> (f32, f32) {
-    let mut y = y;
-    let mut shifted = y + ROUND;
-    // As unsigned numbers, both ends in one comparison.
-    if shifted.to_bits().wrapping_sub(ROUND.to_bits() - MAX_EXPONENT) >= 2 * MAX_EXPONENT {
-        y = limit(y);
-        shifted = y + ROUND;
-    }
-    let f = y - (shifted - ROUND);
+fn exp2(y: f32, one: f32) -> (f32, f32) {
+    // An even number more than 1.5 * 2^23: where y is so large that this is half a unit of its last place, sums would be ties,
+    // and f not small.
+    let round = (ROUND + 2.0) * one;
+    let n = (y + round) - round;
+    let f = y - n;
     let square = f * f;
-    let p = (0.057_690_073 * square + 7.215_289) * f;
-    let q = square + 20.818_924;
-    // The low bits of `shifted` are n; the product with 2^23 drops what stands above them.
-    (f32::from_bits((q + p).to_bits().wrapping_add(shifted.to_bits() << 23)), q - p)
+    let p = (0.057_690_073 / one * square + 7.215_289 * one) * f;
+    let q = square + 20.818_924 * one * one;
+    // With 26 bits behind the point, 6 are left for n: the conversion limits it. The exponent of an f32 begins at bit 23.
+    let n = (n * (FIXED_ONE / one)) as i32 >> 3;
+    (f32::from_bits((q + p).to_bits().wrapping_add(n as u32)), q - p)
 }
 
-/// Rare, and so a call and not instructions in the way of every element.
-#[cold]
-#[inline(never)]
-fn limit(y: f32) -> f32 {
-    clamp(y, -(MAX_EXPONENT as f32), (MAX_EXPONENT - 1) as f32)
-}
+/// 1 with 26 bits behind the point.
+const FIXED_ONE: f32 = (1 << 26) as f32;
+
+/// Exponents in quarters: no product of an f32 and their factor overflows.
+const QUARTER: f32 = 0.25;
+
+/// The factor of x in the exponent of `e^x`, in quarters.
+const EXP: f32 = core::f32::consts::LOG2_E * QUARTER;
 
 /// `e^x` as a fraction.
 #[inline(always)]
 pub(crate) fn exp_fraction(x: f32) -> (f32, f32) {
-    exp2(x * core::f32::consts::LOG2_E)
+    exp2(x * EXP, QUARTER)
 }
 
-/// `e^x`, for an `x` limited to -22.18 ..= 21.48.
+/// `e^x`. Beyond -22 ..= 22 it stays near the value there.
 #[inline(always)]
 pub fn exp(x: f32) -> f32 {
     let (n, d) = exp_fraction(x);
@@ -163,11 +190,7 @@ pub fn relu(x: f32) -> f32 {
 /// `x` where positive, else `exp(x) - 1`
 #[inline(always)]
 pub fn elu(x: f32) -> f32 {
-    if x > 0.0 {
-        return x;
-    }
-    let (n, d) = exp_fraction(x);
-    (n - d) / d
+    ELU.of(x)
 }
 
 /// `1 / (1 + exp(-x))`
@@ -187,7 +210,7 @@ pub fn tanh(x: f32) -> f32 {
 /// `tanh(x)` as a fraction.
 #[inline(always)]
 pub(crate) fn tanh_fraction(x: f32) -> (f32, f32) {
-    let (n, d) = exp2(x * (2.0 * core::f32::consts::LOG2_E));
+    let (n, d) = exp2(x * (2.0 * EXP), QUARTER);
     (n - d, n + d)
 }
 
@@ -197,32 +220,35 @@ pub fn silu(x: f32) -> f32 {
     x * sigmoid(x)
 }
 
-/// `max(x, 0) - a * tail(a)` with `a = |x|`, where `tail = 1 - Phi` is `p^8`, a power of a polynomial that was fitted for the
-/// smallest error of `a * tail / max(1, a)`, 5e-8. From 5.5 on, `a * tail` is below 1.1e-7 and stays what it is there.
+/// `max(x, 0) - a * tail(a)` with `a = |x|`, where `tail = 1 - Phi` is `p^-8 / 2`, a power of a polynomial of `a / 2` that was
+/// fitted for the smallest error of `a * tail / max(1, a)`, 2e-8. A large `a` makes `p^8` infinite and the tail 0.
 #[inline(always)]
 pub fn gelu(x: f32) -> f32 {
-    const END: f32 = 5.5;
-    let a = f32::from_bits(x.to_bits() & 0x7fff_ffff);
-    let a = if a > END { END } else { a };
-    let p = 3.560_515e-6;
-    let p = p * a - 3.936_551e-5;
-    let p = p * a - 2.359_049_6e-5;
-    let p = p * a + 1.594_202_8e-3;
-    let p = p * a - 7.503_642_6e-4;
-    let p = p * a - 3.189_156e-2;
-    let p = p * a - 9.146_535e-2;
-    let p = p * a + 0.917_004_6;
+    let half = 0.5 * x;
+    let a = half.abs();
+    let p = 6.679_063_7e-4;
+    let p = p * a - 1.657_510_9e-3;
+    let p = p * a + 5.107_744_6e-3;
+    let p = p * a + 4.925_853_6e-3;
+    let p = p * a + 1.479_901_65e-2;
+    let p = p * a + 6.904_621_4e-2;
+    let p = p * a + 0.179_101_59;
+    let p = p * a + 0.199_468_39;
+    let p = p * a + 1.0;
     let p = p * p;
     let p = p * p;
-    // max(x, 0) without a comparison: zero where the sign bit is set.
-    f32::from_bits(x.to_bits() & !((x.to_bits() as i32 >> 31) as u32)) - p * p * a
+    let p = p * p;
+    // max(x, 0) without a comparison.
+    (half + a) - a / p
 }
 
 /// `x * sigmoid(2 u)` with `u = sqrt(2 / pi) (x + 0.044715 x^3)`, which is `x / 2 * (1 + tanh(u))`.
 #[inline(always)]
 pub fn gelu_tanh(x: f32) -> f32 {
     // The factors of x and x^3 in 2 u log2(e).
-    let (n, d) = exp2(x * (2.302_208_2 + 0.102_943_24 * (x * x)));
+    let y = x * (2.302_208_2 * FIXED_ONE + 0.102_943_24 * FIXED_ONE * (x * x));
+    // As an integer, it is limited to -32 ..= 32: the cube of a large x is not finite.
+    let (n, d) = exp2(y as i32 as f32, FIXED_ONE);
     x * (n / (n + d))
 }
 

@@ -18,8 +18,16 @@ pub fn normalize(x: &[f32], mean: &[u32], scale: &[u32], pre_clip: f32, clip: f3
 pub fn layer_norm(x: &mut [f32], weight: &[u32], bias: &[u32], eps: f32) {
     let mean = sum(x, |v| v) / count(x);
     let inverse = inverse_deviation(x, mean, eps);
-    for ((x, &weight), &bias) in x.iter_mut().zip(weight).zip(bias) {
-        *x = (*x - mean) * inverse * constant(weight) + constant(bias);
+    let apply = |x: &mut f32, weight: u32, bias: u32| *x = (*x - mean) * inverse * constant(weight) + constant(bias);
+    let (Some(weight), Some(bias)) = (weight.get(..x.len()), bias.get(..x.len())) else { return };
+    let ((pairs, rest), (weights, weight), (biases, bias)) =
+        (x.as_chunks_mut::<2>(), weight.as_chunks::<2>(), bias.as_chunks::<2>());
+    for ((x, weight), bias) in pairs.iter_mut().zip(weights).zip(biases) {
+        apply(&mut x[0], weight[0], bias[0]);
+        apply(&mut x[1], weight[1], bias[1]);
+    }
+    if let ([x], [weight], [bias]) = (rest, weight, bias) {
+        apply(x, *weight, *bias);
     }
 }
 
@@ -42,7 +50,12 @@ fn inverse_deviation(x: &[f32], center: f32, eps: f32) -> f32 {
 /// `y += x`, as far as both go.
 #[inline(never)]
 pub fn add(x: &[f32], y: &mut [f32]) {
-    for (y, x) in y.iter_mut().zip(x) {
+    let len = x.len().min(y.len());
+    let ((xs, x_rest), (ys, y_rest)) = (x[..len].as_chunks::<2>(), y[..len].as_chunks_mut::<2>());
+    for (y, x) in ys.iter_mut().zip(xs) {
+        *y = [y[0] + x[0], y[1] + x[1]];
+    }
+    if let ([y], [x]) = (y_rest, x_rest) {
         *y += *x;
     }
 }
@@ -51,14 +64,12 @@ fn count(x: &[f32]) -> f32 {
     x.len().max(1) as f32
 }
 
-/// The sum in order from the first element, two in a pass.
+/// The sum in order from the first element, four in a pass.
 #[inline(always)]
 fn sum(x: &[f32], of: impl Fn(f32) -> f32) -> f32 {
-    let sum = x.as_chunks::<2>().0.iter().fold(0.0, |sum, [a, b]| sum + of(*a) + of(*b));
-    match x.last() {
-        Some(last) if x.len() % 2 == 1 => sum + of(*last),
-        _ => sum,
-    }
+    let (fours, rest) = x.as_chunks::<4>();
+    let sum = fours.iter().fold(0.0, |sum, [a, b, c, d]| sum + of(*a) + of(*b) + of(*c) + of(*d));
+    rest.iter().fold(sum, |sum, v| sum + of(*v))
 }
 
 /// The square root, correctly rounded on every machine.
