@@ -61,3 +61,21 @@ pub(crate) fn gru_elements(elements: Range<usize>, a: &[f32], b: &[f32], h: &mut
     }
     Some(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gates_of_every_magnitude_keep_the_state_small() {
+        for bits in (0..0x7f00_0000u32).step_by(4001) {
+            for x in [f32::from_bits(bits), -f32::from_bits(bits)] {
+                let (mut c, mut h) = ([0.5], [0.5]);
+                lstm_cell(&[x; 4], &mut c, &mut h);
+                assert!(c[0].abs() <= 1.5 && h[0].abs() <= 1.0, "{x}: {c:?} {h:?}");
+                gru_cell(&[x; 3], &[0.5 * x; 3], &mut h);
+                assert!(h[0].abs() <= 1.0, "{x}: {h:?}");
+            }
+        }
+    }
+}
