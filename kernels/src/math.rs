@@ -84,13 +84,13 @@ fn each<T: Copy>(x: &mut [T], function: impl Fn(T) -> T) {
 /// Two elements in a pass, where the instructions of the loop count; `each` is called once more for an odd one.
 #[inline(never)]
 fn in_pairs(x: &mut [f32], each: fn(&mut [[f32; 2]])) {
-    let (pairs, rest) = x.as_chunks_mut::<2>();
-    each(pairs);
-    if let [last] = rest {
-        let mut pair = [[*last; 2]];
+    let (odd, pairs) = x.as_rchunks_mut::<2>();
+    if let [odd] = odd {
+        let mut pair = [[*odd; 2]];
         each(&mut pair);
-        *last = pair[0][0];
+        *odd = pair[0][0];
     }
+    each(pairs);
 }
 
 /// `(n - a d) / (b n + d)` with `n / d = e^x` or another power, and x itself above `end`.
@@ -231,7 +231,7 @@ pub fn gelu(x: f32) -> f32 {
     // max(x, 0) without a comparison.
     let positive = half + a;
     let a = if a > END { END } else { a };
-    let p = 4.969_944_7e-4;
+    let p = 4.969_945e-4;
     let p = p * a - 2.747_417_2e-3;
     let p = p * a - 8.232_198e-4;
     let p = p * a + 2.781_584_9e-2;

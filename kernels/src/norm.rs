@@ -20,14 +20,14 @@ pub fn layer_norm(x: &mut [f32], weight: &[u32], bias: &[u32], eps: f32) {
     let inverse = inverse_deviation(x, mean, eps);
     let apply = |x: &mut f32, weight: u32, bias: u32| *x = (*x - mean) * inverse * constant(weight) + constant(bias);
     let (Some(weight), Some(bias)) = (weight.get(..x.len()), bias.get(..x.len())) else { return };
-    let ((pairs, rest), (weights, weight), (biases, bias)) =
-        (x.as_chunks_mut::<2>(), weight.as_chunks::<2>(), bias.as_chunks::<2>());
+    let ((odd, pairs), (weight, weights), (bias, biases)) =
+        (x.as_rchunks_mut::<2>(), weight.as_rchunks::<2>(), bias.as_rchunks::<2>());
+    if let ([x], [weight], [bias]) = (odd, weight, bias) {
+        apply(x, *weight, *bias);
+    }
     for ((x, weight), bias) in pairs.iter_mut().zip(weights).zip(biases) {
         apply(&mut x[0], weight[0], bias[0]);
         apply(&mut x[1], weight[1], bias[1]);
-    }
-    if let ([x], [weight], [bias]) = (rest, weight, bias) {
-        apply(x, *weight, *bias);
     }
 }
 
@@ -51,12 +51,12 @@ fn inverse_deviation(x: &[f32], center: f32, eps: f32) -> f32 {
 #[inline(never)]
 pub fn add(x: &[f32], y: &mut [f32]) {
     let len = x.len().min(y.len());
-    let ((xs, x_rest), (ys, y_rest)) = (x[..len].as_chunks::<2>(), y[..len].as_chunks_mut::<2>());
+    let ((x, xs), (y, ys)) = (x[..len].as_rchunks::<2>(), y[..len].as_rchunks_mut::<2>());
+    if let ([y], [x]) = (y, x) {
+        *y += *x;
+    }
     for (y, x) in ys.iter_mut().zip(xs) {
         *y = [y[0] + x[0], y[1] + x[1]];
-    }
-    if let ([y], [x]) = (y_rest, x_rest) {
-        *y += *x;
     }
 }
 
@@ -67,9 +67,9 @@ fn count(x: &[f32]) -> f32 {
 /// The sum in order from the first element, four in a pass.
 #[inline(always)]
 fn sum(x: &[f32], of: impl Fn(f32) -> f32) -> f32 {
-    let (fours, rest) = x.as_chunks::<4>();
-    let sum = fours.iter().fold(0.0, |sum, [a, b, c, d]| sum + of(*a) + of(*b) + of(*c) + of(*d));
-    rest.iter().fold(sum, |sum, v| sum + of(*v))
+    let (rest, fours) = x.as_rchunks::<4>();
+    let sum = rest.iter().fold(0.0, |sum, v| sum + of(*v));
+    fours.iter().fold(sum, |sum, [a, b, c, d]| sum + of(*a) + of(*b) + of(*c) + of(*d))
 }
 
 /// The square root, correctly rounded on every machine.
