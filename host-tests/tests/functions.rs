@@ -33,7 +33,7 @@ fn expected() -> Vec<(&'static str, u32)> {
         (0..n).map(|i| i as f32 * (6.0 / n as f32) - 6.0).collect()
     }
     fn magnitudes(n: usize) -> Vec<f32> {
-        (0..n as u32).map(|i| f32::from_bits(i << 31 | i * (0x7f80_0000 / n as u32))).collect()
+        (0..n as u32).map(|i| f32::from_bits((i << 31) | (i * (0x7f80_0000 / n as u32)))).collect()
     }
     let bits = |v: &f32| if v.is_nan() { f32::NAN.to_bits() } else { v.to_bits() };
     let hash = |results: &[&[f32]]| {

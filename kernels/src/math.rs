@@ -145,17 +145,23 @@ pub fn clamp(x: f32, low: f32, high: f32) -> f32 {
 /// exponent. The numbers are between 17 and 25 times `one^2`, and times `2^n` in the numerator.
 #[inline(always)]
 fn exp2(y: f32, one: f32) -> (f32, f32) {
-    // 2 more than 1.5 * 2^23, which could be half a unit in the last place of a large y: then the sum would be a tie, and f not
-    // small. (A large positive y whose sum needs a bit more has a large f, but next to the numerator the denominator is nothing.)
-    let round = (ROUND + 2.0) * one;
+    let [round, p1, p0, q0] = exp2_constants(one);
     let n = (y + round) - round;
     let f = y - n;
     let square = f * f;
-    let p = (0.057_690_073 / one * square + 7.215_289 * one) * f;
-    let q = square + 20.818_924 * one * one;
+    let p = (p1 * square + p0) * f;
+    let q = square + q0;
     // With 26 bits behind the point, 6 are left for n: the conversion limits it. The exponent of an f32 begins at bit 23.
     let n = (n * (FIXED_ONE / one)) as i32 >> 3;
     (f32::from_bits((q + p).to_bits().wrapping_add(n as u32)), q - p)
+}
+
+/// What rounds in these units, p1, p0 and q0.
+const fn exp2_constants(one: f32) -> [f32; 4] {
+    // 2 more than 1.5 * 2^23, which could be half a unit in the last place of a large y: then the sum would be a tie, and f not
+    // small. (A large positive y whose sum needs a bit more has a large f, but next to the numerator the denominator is nothing.)
+    let round = (ROUND + 2.0) * one;
+    [round, 0.057_690_073 / one, 7.215_289 * one, 20.818_924 * one * one]
 }
 
 /// 1 with 26 bits behind the point.
@@ -166,6 +172,13 @@ const QUARTER: f32 = 0.25;
 
 /// The factor of x in the exponent of `e^x`, in quarters.
 const EXP: f32 = core::f32::consts::LOG2_E * QUARTER;
+
+/// What the assembler of recurrent cells takes: the factors of x for `e^x` and `e^(2 x)`, and the constants of [`exp2`].
+#[cfg(actq_fpu)]
+pub(crate) static CELL: [f32; 6] = {
+    let [round, p1, p0, q0] = exp2_constants(QUARTER);
+    [EXP, 2.0 * EXP, round, p1, p0, q0]
+};
 
 /// `e^x` as a fraction.
 #[inline(always)]

@@ -33,7 +33,7 @@ mod firmware {
 
     /// Every magnitude, with both signs.
     fn magnitudes<const N: usize>() -> [f32; N] {
-        core::array::from_fn(|i| f32::from_bits((i as u32) << 31 | i as u32 * (0x7f80_0000 / N as u32)))
+        core::array::from_fn(|i| f32::from_bits(((i as u32) << 31) | (i as u32 * (0x7f80_0000 / N as u32))))
     }
 
     fn run() -> Option<()> {
