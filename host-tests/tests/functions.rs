@@ -32,22 +32,41 @@ fn expected() -> Vec<(&'static str, u32)> {
     fn values(n: usize) -> Vec<f32> {
         (0..n).map(|i| i as f32 * (6.0 / n as f32) - 6.0).collect()
     }
-    let hash = |results: &[f32]| results.iter().fold(0u32, |hash, v| hash.rotate_left(5) ^ v.to_bits());
+    fn magnitudes(n: usize) -> Vec<f32> {
+        (0..n as u32).map(|i| f32::from_bits((i << 31) | (i * (0x7f80_0000 / n as u32)))).collect()
+    }
+    let bits = |v: &f32| if v.is_nan() { f32::NAN.to_bits() } else { v.to_bits() };
+    let hash = |results: &[&[f32]]| {
+        results.iter().copied().flatten().map(bits).fold(0u32, |hash, bits| hash.rotate_left(5) ^ bits)
+    };
     let mut all = Vec::new();
     let constants: Vec<u32> = values(LEN).into_iter().map(f32::to_bits).collect();
+    for function in Function::ALL {
+        let (mut x, mut y) = (values(LEN), magnitudes(LEN));
+        function.apply(&mut x);
+        function.apply(&mut y);
+        all.push((function.name(), hash(&[&x, &y])));
+    }
     let mut add = |name, run: &dyn Fn(&mut [f32])| {
         let mut x = values(LEN);
         run(&mut x);
-        all.push((name, hash(&x)));
+        all.push((name, hash(&[&x])));
     };
-    for function in Function::ALL {
-        add(function.name(), &|x| function.apply(x));
-    }
     add("layernorm", &|x| norm::layer_norm(x, &constants, &constants, 1e-5));
     add("rmsnorm", &|x| norm::rms_norm(x, &constants, 1e-5));
     add("normalize", &|y| norm::normalize(&values(LEN), &constants, &constants, 1.0, 5.0, y));
-    add("lstm", &|h| recurrent::lstm_cell(&values(4 * LEN), &mut values(LEN), h));
-    add("gru", &|h| recurrent::gru_cell(&values(3 * LEN), &values(3 * LEN), h));
+    let lstm = |gates: &[f32]| {
+        let (mut c, mut h) = (values(LEN), vec![0.0; LEN]);
+        recurrent::lstm_cell(gates, &mut c, &mut h);
+        [h, c].concat()
+    };
+    all.push(("lstm", hash(&[&lstm(&values(4 * LEN)), &lstm(&magnitudes(4 * LEN))])));
+    let gru = |a: &[f32]| {
+        let mut h = values(LEN);
+        recurrent::gru_cell(a, &values(3 * LEN), &mut h);
+        h
+    };
+    all.push(("gru", hash(&[&gru(&values(3 * LEN)), &gru(&magnitudes(3 * LEN))])));
     all
 }
 

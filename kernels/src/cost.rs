@@ -6,8 +6,8 @@
 //! writes `cost/rates.rs`.
 //!
 //! Most code takes the same instructions whatever the values. Where it branches on values (elu, normalize and the action's
-//! limits, and whatever of exp's range the compiler turned into branches) the expected cost is that of standard normal values,
-//! and a third rate says what one element takes at most; pieces of a step ([`crate::Head::poll`]) are measured by that.
+//! limits) the expected cost is that of standard normal values, and a third rate says what one element takes at most; pieces of
+//! a step ([`crate::Head::poll`]) are measured by that.
 
 #[allow(clippy::approx_constant, reason = "measured values, some of which happen to be near a constant")]
 mod rates;

@@ -57,6 +57,12 @@ pub(crate) fn half_word(words: &[u32], i: usize) -> u16 {
     (u32::from_le(word) >> (16 * (i % 2))) as u16
 }
 
+/// The value of a bf16, which is the upper half of an f32.
+#[inline(always)]
+fn bf16(bits: u16) -> f32 {
+    f32::from_bits(u32::from(bits) << 16)
+}
+
 /// `to = from`, as far as both go. On the target not by memcpy, which takes as much code as a kernel.
 pub(crate) fn copy(from: &[u32], to: &mut [u32]) {
     #[cfg(actq_armv7em)]
@@ -92,8 +98,7 @@ impl RowBlock<'_> {
     /// The scale of the block's row `i`.
     #[inline(always)]
     pub fn scale(&self, i: usize) -> f32 {
-        // bf16 is the upper half of f32.
-        f32::from_bits((half_word(self.scales, i) as u32) << 16)
+        bf16(half_word(self.scales, i))
     }
 
     /// The output index of the block's row `i`.
@@ -103,8 +108,8 @@ impl RowBlock<'_> {
     }
 
     /// `y = start + acc * (row_scale * x_scale)` for the block's rows and their places in `y`, with a vector that was prepared
-    /// for the block. `start` holds the bits of the whole output's biases; without it, y itself is the start. Nothing is done
-    /// where `start` or `y` is too short.
+    /// for the block. `start` holds the bits of the whole output's biases; without it, and for rows with an index, y itself is
+    /// the start. Nothing is done where `start` or `y` is too short.
     pub fn apply(&self, x: &Prepared<'_>, x_scale: Scale, start: Option<&[u32]>, y: &mut [f32]) {
         self.apply_rows(0..self.block.shape().rows, x, x_scale, start, y);
     }
@@ -161,7 +166,7 @@ impl RowBlock<'_> {
                 let Some((start, y)) = outputs(self.first_row + first, sums.len(), start, y) else { return };
                 self.scale_in_order(first, Some(sums), x_scale, start, y);
             } else {
-                self.scale_by_index(first, sums, x_scale, start, y);
+                self.scale_by_index(first, sums, x_scale, y);
             }
             first += sums.len();
         }
@@ -179,32 +184,15 @@ impl RowBlock<'_> {
         }
     }
 
-    /// Adds the sums of the rows from `first`, an even number, on, scaled, to what `start` or y holds at the rows' places.
+    /// Adds the sums of the rows from `first` on, scaled, to what stands at the rows' places.
     #[inline(never)]
-    fn scale_by_index(&self, first: usize, sums: &[i32], x_scale: f32, start: Option<&[u32]>, y: &mut [f32]) {
-        let words = |words| <[u32]>::get(words, first / 2..).unwrap_or(&[]);
-        if let Some(start) = start {
-            for i in (first..first + sums.len()).map(|i| self.output(i)) {
-                if let (Some(y), Some(start)) = (y.get_mut(i), start.get(i)) {
-                    *y = f32::from_bits(u32::from_le(*start));
-                }
+    fn scale_by_index(&self, first: usize, sums: &[i32], x_scale: f32, y: &mut [f32]) {
+        let halves = |words| bytemuck::cast_slice::<u32, u16>(words).get(first..first + sums.len());
+        let (Some(scales), Some(index)) = (halves(self.scales), halves(self.index)) else { return };
+        for ((sum, scale), at) in sums.iter().zip(scales).zip(index) {
+            if let Some(y) = y.get_mut(usize::from(u16::from_le(*at))) {
+                *y += *sum as f32 * (bf16(u16::from_le(*scale)) * x_scale);
             }
-        }
-        let mut add = |sum: i32, scale: u32, at: u32| {
-            if let Some(y) = y.get_mut(at as usize) {
-                *y += sum as f32 * (f32::from_bits(scale) * x_scale);
-            }
-        };
-        // Two rows to a word of scales and of indexes.
-        let (pairs, rest) = sums.as_chunks::<2>();
-        let mut words =
-            words(self.scales).iter().zip(words(self.index)).map(|(s, i)| (u32::from_le(*s), u32::from_le(*i)));
-        for ([even, odd], (scales, at)) in pairs.iter().zip(&mut words) {
-            add(*even, scales << 16, at & 0xffff);
-            add(*odd, scales & 0xffff_0000, at >> 16);
-        }
-        if let (Some(sum), Some((scales, at))) = (rest.first(), words.next()) {
-            add(*sum, scales << 16, at & 0xffff);
         }
     }
 }

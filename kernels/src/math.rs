@@ -62,37 +62,65 @@ impl Function {
     /// Applies the function to every element.
     pub fn apply(self, x: &mut [f32]) {
         match self {
-            Self::Relu => each_four(x, relu),
-            Self::Elu => each(x, elu),
+            Self::Relu => in_pairs(x, |pairs| each(pairs, |[a, b]| [relu(a), relu(b)])),
+            Self::Elu => each_ratio(x, &ELU),
             Self::Silu => each(x, silu),
-            Self::Gelu => each_four(x, gelu),
+            Self::Gelu => in_pairs(x, |pairs| each(pairs, |[a, b]| [gelu(a), gelu(b)])),
             Self::GeluTanh => each(x, gelu_tanh),
-            Self::Tanh => each(x, tanh),
-            Self::Sigmoid => each(x, sigmoid),
+            Self::Tanh => each_ratio(x, &TANH),
+            Self::Sigmoid => each_ratio(x, &SIGMOID),
         }
     }
 }
 
 /// One loop for each function, which is not inlined: the functions take most of the executor's code.
 #[inline(never)]
-fn each(x: &mut [f32], function: impl Fn(f32) -> f32) {
+fn each<T: Copy>(x: &mut [T], function: impl Fn(T) -> T) {
     for x in x {
         *x = function(*x);
     }
 }
 
-/// As [`each`], four in a pass, where the instructions of the loop count.
+/// Two elements in a pass, where the instructions of the loop count; `each` is called once more for an odd one.
 #[inline(never)]
-fn each_four(x: &mut [f32], function: impl Fn(f32) -> f32) {
-    let (fours, rest) = x.as_chunks_mut::<4>();
-    for [a, b, c, d] in fours {
-        *a = function(*a);
-        *b = function(*b);
-        *c = function(*c);
-        *d = function(*d);
+fn in_pairs(x: &mut [f32], each: fn(&mut [[f32; 2]])) {
+    let (odd, pairs) = x.as_rchunks_mut::<2>();
+    if let [odd] = odd {
+        let mut pair = [[*odd; 2]];
+        each(&mut pair);
+        *odd = pair[0][0];
     }
-    for x in rest {
-        *x = function(*x);
+    each(pairs);
+}
+
+/// `(n - a d) / (b n + d)` with `n / d = e^x` or another power, and x itself above `end`.
+struct Ratio {
+    factor: f32,
+    a: f32,
+    b: f32,
+    end: f32,
+}
+
+const ELU: Ratio = Ratio { factor: EXP, a: 1.0, b: 0.0, end: 0.0 };
+const TANH: Ratio = Ratio { factor: 2.0 * EXP, a: 1.0, b: 1.0, end: f32::INFINITY };
+const SIGMOID: Ratio = Ratio { factor: EXP, a: 0.0, b: 1.0, end: f32::INFINITY };
+
+impl Ratio {
+    #[inline(always)]
+    fn of(&self, x: f32) -> f32 {
+        if x > self.end {
+            return x;
+        }
+        let (n, d) = exp2(x * self.factor, QUARTER);
+        (n - self.a * d) / (self.b * n + d)
+    }
+}
+
+/// One loop for the functions that are such a ratio.
+#[inline(never)]
+fn each_ratio(x: &mut [f32], ratio: &Ratio) {
+    for x in x {
+        *x = ratio.of(*x);
     }
 }
 
@@ -108,65 +136,74 @@ pub fn clamp(x: f32, low: f32, high: f32) -> f32 {
     }
 }
 
-/// The largest magnitude of an exponent of 2. Beyond, all functions here have come to their limits as far as f32 tells.
-const MAX_EXPONENT: u32 = 32;
-
-/// `2^y` as a fraction of two positive numbers, for a `y` limited to -32 ..= 31. What uses it has to divide anyway.
+/// `2^(y / one)` as a fraction of two positive numbers, for a finite y and a power of two: `one` sets the unit, and changes
+/// nothing else. The exponent stays within -33 ..= 33; there, all functions here have come to their limits as far as f32 tells.
+/// What uses the fraction has to divide anyway.
 ///
-/// `y = n + f` with `|f| <= 1/2`. `2^f = (Q + f P) / (Q - f P)`, where `f P / Q` is `tanh(f ln 2 / 2)` with
+/// In units, `y = n + f` with `|f| <= 1/2`. `2^f = (Q + f P) / (Q - f P)`, where `f P / Q` is `tanh(f ln 2 / 2)` with
 /// `P = p0 + p1 f^2` and `Q = q0 + f^2`, fitted for the smallest relative error, 1e-10. `n` is added to the numerator's
-/// exponent. The numbers are between 17 and 25, times `2^n` in the numerator.
+/// exponent. The numbers are between 17 and 25 times `one^2`, and times `2^n` in the numerator.
 #[inline(always)]
-pub(crate) fn exp2(y: f32) -> (f32, f32) {
-    let mut y = y;
-    let mut shifted = y + ROUND;
-    // As unsigned numbers, both ends in one comparison.
-    if shifted.to_bits().wrapping_sub(ROUND.to_bits() - MAX_EXPONENT) >= 2 * MAX_EXPONENT {
-        y = limit(y);
-        shifted = y + ROUND;
-    }
-    let f = y - (shifted - ROUND);
+fn exp2(y: f32, one: f32) -> (f32, f32) {
+    let [round, p1, p0, q0] = exp2_constants(one);
+    let n = (y + round) - round;
+    let f = y - n;
     let square = f * f;
-    let p = (0.057_690_073 * square + 7.215_289) * f;
-    let q = square + 20.818_924;
-    // The low bits of `shifted` are n; the product with 2^23 drops what stands above them.
-    (f32::from_bits((q + p).to_bits().wrapping_add(shifted.to_bits() << 23)), q - p)
+    let p = (p1 * square + p0) * f;
+    let q = square + q0;
+    // With 26 bits behind the point, 6 are left for n: the conversion limits it. The exponent of an f32 begins at bit 23.
+    let n = (n * (FIXED_ONE / one)) as i32 >> 3;
+    (f32::from_bits((q + p).to_bits().wrapping_add(n as u32)), q - p)
 }
 
-/// Rare, and so a call and not instructions in the way of every element.
-#[cold]
-#[inline(never)]
-fn limit(y: f32) -> f32 {
-    clamp(y, -(MAX_EXPONENT as f32), (MAX_EXPONENT - 1) as f32)
+/// What rounds in these units, p1, p0 and q0.
+const fn exp2_constants(one: f32) -> [f32; 4] {
+    // 2 more than 1.5 * 2^23, which could be half a unit in the last place of a large y: then the sum would be a tie, and f not
+    // small. (A large positive y whose sum needs a bit more has a large f, but next to the numerator the denominator is nothing.)
+    let round = (ROUND + 2.0) * one;
+    [round, 0.057_690_073 / one, 7.215_289 * one, 20.818_924 * one * one]
 }
+
+/// 1 with 26 bits behind the point.
+const FIXED_ONE: f32 = (1 << 26) as f32;
+
+/// Exponents in quarters: no product of an f32 and their factor overflows.
+const QUARTER: f32 = 0.25;
+
+/// The factor of x in the exponent of `e^x`, in quarters.
+const EXP: f32 = core::f32::consts::LOG2_E * QUARTER;
+
+/// What the assembler of recurrent cells takes: the factors of x for `e^x` and `e^(2 x)`, and the constants of [`exp2`].
+#[cfg(actq_fpu)]
+pub(crate) static CELL: [f32; 6] = {
+    let [round, p1, p0, q0] = exp2_constants(QUARTER);
+    [EXP, 2.0 * EXP, round, p1, p0, q0]
+};
 
 /// `e^x` as a fraction.
 #[inline(always)]
 pub(crate) fn exp_fraction(x: f32) -> (f32, f32) {
-    exp2(x * core::f32::consts::LOG2_E)
+    exp2(x * EXP, QUARTER)
 }
 
-/// `e^x`, for an `x` limited to -22.18 ..= 21.48.
+/// `e^x`, for an x limited to -22 ..= 22.
 #[inline(always)]
 pub fn exp(x: f32) -> f32 {
-    let (n, d) = exp_fraction(x);
+    let (n, d) = exp_fraction(clamp(x, -22.0, 22.0));
     n / d
 }
 
-/// `max(x, 0)`
+/// `max(x, 0)`. By the bits, as an unsigned number: what is negative or not a number stands above infinity.
 #[inline(always)]
 pub fn relu(x: f32) -> f32 {
-    if x > 0.0 { x } else { 0.0 }
+    let bits = x.to_bits();
+    f32::from_bits(if bits > f32::INFINITY.to_bits() { 0 } else { bits })
 }
 
 /// `x` where positive, else `exp(x) - 1`
 #[inline(always)]
 pub fn elu(x: f32) -> f32 {
-    if x > 0.0 {
-        return x;
-    }
-    let (n, d) = exp_fraction(x);
-    (n - d) / d
+    ELU.of(x)
 }
 
 /// `1 / (1 + exp(-x))`
@@ -186,7 +223,7 @@ pub fn tanh(x: f32) -> f32 {
 /// `tanh(x)` as a fraction.
 #[inline(always)]
 pub(crate) fn tanh_fraction(x: f32) -> (f32, f32) {
-    let (n, d) = exp2(x * (2.0 * core::f32::consts::LOG2_E));
+    let (n, d) = exp2(x * (2.0 * EXP), QUARTER);
     (n - d, n + d)
 }
 
@@ -197,31 +234,36 @@ pub fn silu(x: f32) -> f32 {
 }
 
 /// `max(x, 0) - a * tail(a)` with `a = |x|`, where `tail = 1 - Phi` is `p^8`, a power of a polynomial that was fitted for the
-/// smallest error of `a * tail / max(1, a)`, 5e-8. From 5.5 on, `a * tail` is below 1.1e-7 and stays what it is there.
+/// smallest error of `a * tail / max(1, a)`, 5e-8. From 5.5 on, `a * tail` is below 1.1e-7 and stays what it is there. The code
+/// takes half of `a`, whose double is in `p^8`.
 #[inline(always)]
 pub fn gelu(x: f32) -> f32 {
-    const END: f32 = 5.5;
-    let a = f32::from_bits(x.to_bits() & 0x7fff_ffff);
+    const END: f32 = 5.5 / 2.0;
+    let half = 0.5 * x;
+    let a = half.abs();
+    // max(x, 0) without a comparison.
+    let positive = half + a;
     let a = if a > END { END } else { a };
-    let p = 3.560_515e-6;
-    let p = p * a - 3.936_551e-5;
-    let p = p * a - 2.359_049_6e-5;
-    let p = p * a + 1.594_202_8e-3;
-    let p = p * a - 7.503_642_6e-4;
-    let p = p * a - 3.189_156e-2;
-    let p = p * a - 9.146_535e-2;
-    let p = p * a + 0.917_004_6;
+    let p = 4.969_945e-4;
+    let p = p * a - 2.747_417_2e-3;
+    let p = p * a - 8.232_198e-4;
+    let p = p * a + 2.781_584_9e-2;
+    let p = p * a - 6.546_224e-3;
+    let p = p * a - 0.139_111_97;
+    let p = p * a - 0.199_487_34;
+    let p = p * a + 1.000_000_6;
     let p = p * p;
     let p = p * p;
-    // max(x, 0) without a comparison: zero where the sign bit is set.
-    f32::from_bits(x.to_bits() & !((x.to_bits() as i32 >> 31) as u32)) - p * p * a
+    positive - p * p * a
 }
 
 /// `x * sigmoid(2 u)` with `u = sqrt(2 / pi) (x + 0.044715 x^3)`, which is `x / 2 * (1 + tanh(u))`.
 #[inline(always)]
 pub fn gelu_tanh(x: f32) -> f32 {
     // The factors of x and x^3 in 2 u log2(e).
-    let (n, d) = exp2(x * (2.302_208_2 + 0.102_943_24 * (x * x)));
+    let y = x * (2.302_208_2 * FIXED_ONE + 0.102_943_24 * FIXED_ONE * (x * x));
+    // As an integer, it is limited to -32 ..= 32: the cube of a large x is not finite.
+    let (n, d) = exp2(y as i32 as f32, FIXED_ONE);
     x * (n / (n + d))
 }
 
@@ -273,6 +315,17 @@ mod tests {
                     assert!((f(x) - x * sign).abs() <= 1f32.max(1e-7 * x.abs()), "{x}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn loops_have_the_bits_of_their_functions() {
+        let functions = [relu, elu, silu, gelu, gelu_tanh, tanh, sigmoid];
+        let x: [f32; 999] = core::array::from_fn(|i| (i as f32 - 499.0) / 31.0);
+        for (function, of) in Function::ALL.into_iter().zip(functions) {
+            let mut y = x;
+            function.apply(&mut y);
+            assert_eq!(y.map(f32::to_bits), x.map(|x| of(x).to_bits()), "{}", function.name());
         }
     }
 

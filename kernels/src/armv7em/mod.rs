@@ -7,6 +7,8 @@
 //! SMLAD sets the Q flag; the procedure call standard lets a call change it.
 
 use core::arch::global_asm;
+#[cfg(actq_fpu)]
+use core::ops::Range;
 
 use crate::activations::Prepared;
 #[cfg(actq_fpu)]
@@ -15,6 +17,8 @@ use crate::activations::{Plan, ROUND};
 use crate::format::XFormat;
 use crate::format::{Block, Format, QUAD, Width};
 use crate::gemv::Mismatch;
+#[cfg(actq_fpu)]
+use crate::math::CELL;
 
 global_asm!(include_str!("single.s"), options(raw));
 global_asm!(include_str!("paired_w2.s"), options(raw));
@@ -24,6 +28,8 @@ global_asm!(include_str!("paired_w8.s"), options(raw));
 global_asm!(include_str!("vector.s"), options(raw));
 #[cfg(actq_fpu)]
 global_asm!(include_str!("vector_fpu.s"), options(raw));
+#[cfg(actq_fpu)]
+global_asm!(include_str!("cells_fpu.s"), options(raw));
 
 /// Reads `strips` strips at `weights` and the prepared vector from `x` up to `x_end`, writes the strips' sums at `acc`. What
 /// `extra` is, the kernel's file says; the first pass through the loop of a kernel for row scales leaves `skip` of the layout's
@@ -203,6 +209,36 @@ pub(crate) fn scale(sums: Option<&[i32]>, start: Option<&[u32]>, scales: &[u32],
     unsafe { actq_scale_add(x_scale, sums, scales.as_ptr(), start, to, len) }
 }
 
+/// Some elements of [`crate::recurrent::lstm_cell`].
+#[cfg(actq_fpu)]
+pub(crate) fn lstm_elements(elements: Range<usize>, gates: &[f32], c: &mut [f32], h: &mut [f32]) {
+    let (Range { start, end }, n) = (elements, h.len());
+    if start >= end || end > n || end > c.len() || gates.len() < 3 * n + end {
+        return;
+    }
+    // SAFETY: of `gates`, the kernel reads the elements of four rows of n values, the last up to `3 n + end`, which is no more
+    // than there are (n values take less than half of the memory: 4 n is no overflow). Of `c` and `h` it reads and writes the
+    // elements, which both have. There is at least one.
+    unsafe {
+        let (c, h) = (c.as_mut_ptr().add(start), h.as_mut_ptr().add(start));
+        actq_lstm(gates.as_ptr().add(start), size_of::<f32>() * n, c, h, end - start, &CELL);
+    }
+}
+
+/// Some elements of [`crate::recurrent::gru_cell`].
+#[cfg(actq_fpu)]
+pub(crate) fn gru_elements(elements: Range<usize>, a: &[f32], b: &[f32], h: &mut [f32]) {
+    let (Range { start, end }, n) = (elements, h.len());
+    if start >= end || end > n || a.len().min(b.len()) < 2 * n + end {
+        return;
+    }
+    // SAFETY: as for [`lstm_elements`], with three rows of `a` and of `b`.
+    unsafe {
+        let (a, b, h) = (a.as_ptr().add(start), b.as_ptr().add(start), h.as_mut_ptr().add(start));
+        actq_gru(a, b, size_of::<f32>() * n, h, end - start, &CELL);
+    }
+}
+
 /// The FPU's square root, which is correctly rounded as IEEE 754 has it.
 #[cfg(actq_fpu)]
 #[inline(always)]
@@ -245,5 +281,7 @@ pub(crate) const fn quantizer<F: Format>() -> Quantize {
 #[cfg(actq_fpu)]
 unsafe extern "C" {
     fn actq_sqrt(x: f32) -> f32;
+    fn actq_lstm(gates: *const f32, row: usize, c: *mut f32, h: *mut f32, len: usize, cell: &[f32; 6]);
+    fn actq_gru(a: *const f32, b: *const f32, row: usize, h: *mut f32, len: usize, cell: &[f32; 6]);
     fn actq_scale_add(x_scale: f32, sums: *const i32, scales: *const u32, start: *const f32, y: *mut f32, len: usize);
 }
