@@ -4,13 +4,12 @@
 //! the sum's low mantissa bits are the rounded value in two's complement. It is one FPU addition, and the same bits everywhere.
 //!
 //! A prepared vector is made for the layout that reads it ([`XFormat`]): for each group of columns (the whole row where the
-//! weights have no group scales) its chunks, and behind them, where the layout asks for it, the sum of the row's values, or, twice, in
-//! both halves of a word, the group's. Where the layout takes groups in pairs, a pair is prepared as a group of two chunks, and the
-//! halves of its word are their sums. A
-//! chunk is its start words and its int16 pairs, column `2j` in the low half. Zeros fill the last group, or, where there are no
-//! groups, a kernel's step ([`PAD_COLS`] with single lanes). A [`Plan`] has all lengths.
+//! weights have no group scales) its chunks, and behind them, where the layout asks for it, the sum of the row's values, or, in
+//! both halves of a word, of the group's. Where the layout takes groups in pairs, a pair is prepared as a group of two chunks,
+//! and the halves of its word are their sums. A chunk is its start words and its int16 pairs, column `2j` in the low half. Zeros
+//! fill the last group (and, in pairs, the place of one that a last group lacks), or, where there are no groups, a kernel's step ([`crate::format::PAD_COLS`] with single lanes). A [`Plan`] has all lengths.
 
-use crate::format::{Block, BlockShape, Lanes, Layout, PAD_COLS, Width, XFormat, div_down, div_up, round_up};
+use crate::format::{Block, BlockShape, Lanes, Layout, Width, XFormat, div_down, div_up, round_up};
 
 /// `1.5 * 2^23`: see the module's rounding rule.
 pub const ROUND: f32 = 12_582_912.0;
@@ -44,12 +43,13 @@ pub struct Plan {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Told {
     /// The words up to where it stops reading. Single lanes read no more than the block's own units; with row scales, the
-    /// vector's sum stands behind the end.
+    /// vector's sum stands behind the end, and behind a last group without a partner the pair's word.
     pub(crate) end: usize,
     /// Where chunks are summed without being taken apart, minus the biases of all of them; for single lanes with row scales 0;
     /// else the bytes of a group's first chunk.
     pub(crate) extra: usize,
-    /// Steps that the first pass through the loop of a kernel for row scales leaves out, or the last pair of groups.
+    /// Steps that the first pass through the loop of a kernel for row scales leaves out, or the last pair of
+    /// groups.
     pub(crate) skip: usize,
 }
 

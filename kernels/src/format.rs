@@ -11,9 +11,9 @@
 //!
 //! With group scales, a word of four u8 for every four rows (the first in the low byte) follows the units of each group. In
 //! strips of eight of [`w2_paired`], the scales of two groups follow the units of both: a word for every two rows, with theirs
-//! in the first group and then theirs in the second; a last group that is left over has its own. Where
-//! at most four rows are left for the last strip of eight, it is a strip of four. Rows beyond the block's last one, up to the
-//! strip's end, and columns beyond the last, up to a multiple of the kernel's step, are padding with code 0.
+//! in the first group and then theirs in the second; a last group that is left over has its own. Where at most four rows are
+//! left for the last strip of eight, it is a strip of four. Rows beyond the block's last one, up to the strip's end, and columns
+//! beyond the last, up to a multiple of the kernel's step, are padding with code 0.
 //!
 //! Every width has two layouts. In **single** lanes, each signed 16-bit lane of an SMLAD operand holds one weight, and the
 //! activations may have 16 bits. In **paired** lanes a lane holds the weights of two rows, one SMLAD makes four MACs, and the
@@ -202,8 +202,8 @@ pub struct XFormat {
     pub start_words: usize,
     /// What they hold.
     pub starts: [Start; 2],
-    /// Whether the row's chunks are followed by the sum of its x; those of a group by the sum of the group's, in both halves of a
-    /// word.
+    /// Whether the row's chunks are followed by the sum of its x, and those of a group by the sum of the group's in both halves of
+    /// a word.
     pub sum: bool,
     /// Whether groups are taken in pairs: two are prepared as one, with their sums in the halves of the word, and the scales of
     /// strips of eight stand behind both groups' units.

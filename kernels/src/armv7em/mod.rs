@@ -100,7 +100,7 @@ pub(crate) fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &
     // SAFETY: the rows from `first_row` on, as many as `acc` has, are rows of the block or of its padding: that is checked before,
     // as is that `first_row` is a multiple of 8, so that a strip begins there. A block has the words of all of its rows
     // (`Block::new`). Each call reads the words of its strips and writes as many sums. It reads the prepared vector from its
-    // begin to `end`, and the sum of x that stands there where the layout has row scales and a sum; both are in the vector,
+    // begin to `end`, and the sums of x that stand behind where the layout has sums; both are in the vector,
     // because it was prepared for a block of this shape (`Plan::of`). The slices are of u32 and i32, so every address is a
     // multiple of 4, as LDM and LDRD demand.
     unsafe {
@@ -268,13 +268,13 @@ macro_rules! quantize_kernels {
 #[cfg(actq_fpu)]
 quantize_kernels!(actq_quantize0 actq_quantize1 actq_quantize2 actq_quantize3);
 
-/// The kernel that writes what the layout asks for: two start words, the second without a bias, at shift 1; sums from 2 on;
-/// chunks of eight at 3.
+/// The kernel that writes what the layout asks for: two start words, the second without a bias, at shift 1; sums from 2 on,
+/// those of pairs at 2; chunks of eight at 3.
 #[cfg(actq_fpu)]
 pub(crate) const fn quantizer<F: Format>() -> Quantize {
-    let XFormat { shift, chunk, start_words, starts: [_, second], sum, .. } = F::X;
+    let XFormat { shift, chunk, start_words, starts: [_, second], sum, pairs, .. } = F::X;
     assert!(shift <= 3 && start_words == if shift == 1 { 2 } else { 1 } && second.bias == 0);
-    assert!(sum == (shift >= 2) && (chunk == 8) == (shift == 3) && chunk % 8 == 0);
+    assert!(sum == (shift >= 2) && (chunk == 8) == (shift == 3) && chunk % 8 == 0 && pairs == (shift == 2));
     [actq_quantize0, actq_quantize1, actq_quantize2, actq_quantize3][shift as usize]
 }
 

@@ -6,8 +6,8 @@
 @ x_end is where the last chunk ends; with row scales, the sum of x stands there.
 @
 @ In the loops: r0 weights, r1 x, r3-r6 activation pairs, r2 and r7-r9 the sums t of row pairs 0 to 3 (r7 and r2 in a strip
-@ of four, and r8 the end of the chunk; r2 is the last to be started, because a chunk's start value comes with its first pairs), r10
-@ and r11 weight words, r12 the mask, lr the extracted codes.
+@ of four, and r8 the end of the chunk; r2 is started last, because a chunk's start value comes with its first pairs), r10 and
+@ r11 weight words, r12 the mask, lr the extracted codes.
 @
 @ Frame: 0-31 sums over chunks, (sum of t, sum of its high half) of each row pair, or sums over groups; 32 mask, 36 x_end, 40 x, 44 minus the biases,
 @ 48 acc, 52 strips, or end of acc, or, where the first pass leaves steps out, acc behind this strip, 56 sum of x, 60 steps left
@@ -230,8 +230,9 @@ actq_w2_paired_row4:
     eor \low, \low, #0x80008000
 .endm
 
-@ Adds what they mean to the sums of the pair's rows. `scales` holds a byte for the even and one for the odd row in the first group, then
-@ two for the second group; lr the two sums of x, |sum(x)| <= 127 * 32 = 4064.
+@ Adds what they mean to the sums of the pair's rows. `scales` holds a byte for the even and one for the odd row in the first
+@ group, then two for the second group; lr the two sums of x, |sum(x)| <= 127 * 32 = 4064. |odd| <= 8128 and the doubled scales,
+@ at most 510, are int16, too.
 .macro d2_scale_two scales, low, high, even, odd, temp
     uxtb16 \temp, \scales
     smlad \even, \low, \temp, \even
@@ -248,9 +249,9 @@ actq_w2_paired_row4:
     .endr
 .endm
 
-@ Groups are taken in pairs: after the first, Z is clear, and its sums t wait on the stack for those of the second, after which Z is set;
-@ nothing between sets flags. Sums over groups: row pairs 2, 3, 0 and 1. Bit 31 of the strips left says that a last group follows
-@ the pairs.
+@ Groups are taken in pairs: after the first, Z is clear, and its sums t wait on the stack for those of the second, after which Z
+@ is set; nothing between sets flags. Sums over groups: row pairs 2, 3, 0 and 1. Bit 31 of the strips left says that a last group
+@ follows the pairs.
     .section .text.actq_w2_paired_group, "ax", %progbits
     .global actq_w2_paired_group
     .type actq_w2_paired_group, %function

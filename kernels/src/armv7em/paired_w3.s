@@ -27,8 +27,8 @@
     smlad \t, \codes, \pair, \from
 .endm
 
-@ A chunk of eight columns; afterwards r9 and r6 hold its sums t. With `sum`, the sum of x behind the chunk, in both halves of a word, goes to lr, which the
-@ second half leaves alone.
+@ A chunk of eight columns; afterwards r9 and r6 hold its sums t. With `sum`, the sum of x behind the chunk, in both halves of a
+@ word, goes to lr, which the second half leaves alone.
 .macro d3_chunk sum=0
     ldmia.w r1!, {r6-r8}
     ldmia.w r0!, {r3-r5}
