@@ -12,7 +12,7 @@
 @
 @ Frame of the row kernel: 0 x, 4 and 8 minus the biases, 12 0, 16-23 sums of the high halves, 24 acc, 28 end of acc, or, where the
 @ first pass leaves steps out, acc behind this strip, 32 x_end, 36 sum of x, 40 end of acc, 44 steps left out; of the group kernel:
-@ 0-15 sums over groups, 16 x, 24 acc, 28 strips, 32 x_end.
+@ 0-15 sums over groups, 16 x, 20 acc, 24 end of acc, 28 x_end.
 
     .syntax unified
     .thumb
@@ -56,26 +56,6 @@
     add r11, r11, r6
     pkhtb r3, r6, r9, asr #16
     sadd16 r12, r12, r3
-.endm
-
-.macro d3_prologue
-    push {r4-r11, lr}
-    sub sp, sp, #44
-    ldrd r4, r5, [sp, #80]
-    strd r1, r5, [sp, #16]
-    strd r2, r3, [sp, #24]
-    movw r2, #0xe007
-    movt r2, #0xe007
-    str r4, [sp, #32]
-.endm
-
-@ r9: where the sums of the next strip go, r10: strips left, this one included
-.macro d3_next_strip
-    subs r10, r10, #1
-    strd r9, r10, [sp, #24]
-    bne.w 1b
-    add sp, sp, #44
-    pop {r4-r11, pc}
 .endm
 
     .section .text.actq_w3_paired_row, "ax", %progbits
@@ -162,7 +142,14 @@ actq_w3_paired_row:
     .thumb_func
     .balign 16
 actq_w3_paired_group:
-    d3_prologue
+    push {r4-r11, lr}
+    sub sp, sp, #36
+    ldr r4, [sp, #72]
+    add r3, r2, r3, lsl #4
+    strd r1, r2, [sp, #16]
+    strd r3, r4, [sp, #24]
+    movw r2, #0xe007
+    movt r2, #0xe007
 1:
     ldr r1, [sp, #16]
     movs r4, #0
@@ -187,7 +174,7 @@ actq_w3_paired_group:
     sadd16 r12, r12, r12
     sadd16 r12, r12, lr
     ldr r9, [r0], #4
-    ldr lr, [sp, #32]
+    ldr lr, [sp, #28]
     uxtb16 r8, r9
     uxtb16 r9, r9, ror #8
     ldmia.w sp, {r3-r6}
@@ -198,8 +185,12 @@ actq_w3_paired_group:
     stmia.w sp, {r3-r6}
     cmp r1, lr
     bne.w 2b
-    ldrd r9, r10, [sp, #24]
+    ldrd r9, r10, [sp, #20]
     stmia.w r9!, {r3-r6}
-    d3_next_strip
+    str r9, [sp, #20]
+    cmp r9, r10
+    bne.w 1b
+    add sp, sp, #36
+    pop {r4-r11, pc}
     .size actq_w3_paired_group, . - actq_w3_paired_group
     .text

@@ -10,7 +10,7 @@
 @ Frame of the row kernel: 0 x behind its first start words, 4-27 r3-r8 as these set them, 28 end of the first chunk, 32 acc,
 @ 36 end of acc, or, where a row has several chunks or its first pass leaves steps out, acc behind this strip, 40 end of this
 @ chunk, 44 x_end, 48 end of acc, 52 steps left out; of the group kernel: 0-31 sums over groups, in the order of the registers
-@ that take them, 32 mask, 36 x_end, 40 acc, 44 strips, 48 x.
+@ that take them, 32 mask, 36 x_end, 40 acc, 44 end of acc, 48 x.
 
     .syntax unified
     .thumb
@@ -278,6 +278,7 @@ actq_w4_paired_row4:
 \name:
     c4_prologue 52
     ldr r4, [sp, #88]
+    add r3, r2, r3, lsl #((\rows + 12) / 4)
     strd r12, r4, [sp, #32]
     strd r2, r3, [sp, #40]
     str r1, [sp, #48]
@@ -347,8 +348,8 @@ actq_w4_paired_row4:
     .endif
     strd r8, r3, [r10], #8
     strd r9, r5, [r10], #8
-    subs lr, lr, #1
-    strd r10, lr, [sp, #40]
+    str r10, [sp, #40]
+    cmp r10, lr
     bne.w 1b
     add sp, sp, #52
     pop {r4-r11, pc}
