@@ -8,9 +8,9 @@ use actq::policy::{Contract, Policy};
 use actq::quantize::{Outcome, Quantized};
 use actq::runtime::{ImageBuffer, with_head};
 use actq_host_tests::root;
-use actq_kernels::activations::max_prepared_words;
+use actq_kernels::activations::{max_prepared_words, prepared_words};
 use actq_kernels::format::{BlockShape, Lanes, Width, pack};
-use actq_kernels::image::{Image, Kind, Op, Region, block_bytes, checksum, header as h};
+use actq_kernels::image::{Image, Kind, OpKind, Region, block_bytes, checksum, header as h};
 use half::bf16;
 
 fn document() -> String {
@@ -378,12 +378,20 @@ fn the_work_area_is_as_long_as_documented() {
             ["32, 64, 128", "ceil(c / group) * (group * 5 / 8 + 1)"],
         ]
     );
+    let most = |cols, group| {
+        let shapes = Width::ALL.into_iter().flat_map(|width| {
+            Lanes::ALL.map(|lanes| prepared_words(BlockShape { width, lanes, rows: 1, cols, group }))
+        });
+        shapes.max()
+    };
     for cols in (1..1200usize).chain([4095, 4096, 65535]) {
         let words = (cols.div_ceil(32) * 16).max(cols.div_ceil(8) * 5) + 1;
         assert_eq!(max_prepared_words(cols, 0), words, "{cols} columns");
+        assert_eq!(most(cols, 0), Some(words), "{cols} columns");
         for group in [32, 64, 128] {
             let words = cols.div_ceil(group) * (group * 5 / 8 + 1);
             assert_eq!(max_prepared_words(cols, group), words, "{cols} columns, groups of {group}");
+            assert_eq!(most(cols, group), Some(words), "{cols} columns, groups of {group}");
         }
     }
 }

@@ -417,20 +417,14 @@ fn chunk<S: Source>(x: &[S::Value], format: &XFormat, out: &mut [u32], source: &
     sum.wrapping_add(rest_sum)
 }
 
-/// Words that suffice for a prepared vector of any layout.
+/// Words that suffice for a prepared vector of any layout: the most that [`prepared_words`] gives. Layouts with chunks of eight
+/// columns and a sum take the most, and those that pad a row to [`PAD_COLS`].
 pub const fn max_prepared_words(cols: usize, group: usize) -> usize {
-    use crate::format::Width;
-    let mut most = 0;
-    let mut i = 0;
-    while i < Width::ALL.len() * Lanes::ALL.len() {
-        let (width, lanes) = (Width::ALL[i / Lanes::ALL.len()], Lanes::ALL[i % Lanes::ALL.len()]);
-        let words = prepared_words(BlockShape { width, lanes, rows: 1, cols, group });
-        if words > most {
-            most = words;
-        }
-        i += 1;
+    if group == 0 {
+        let (padded, chunked) = (div_up(cols, PAD_COLS) * (PAD_COLS / 2), div_up(cols, 8) * 5);
+        return 1 + if padded > chunked { padded } else { chunked };
     }
-    most
+    div_up(cols, group) * (group / 8 * 5 + 1)
 }
 
 /// What the cost of preparing and of reading a vector depends on.
