@@ -108,10 +108,10 @@ fn the_hex_example_reads_as_documented() {
     assert!(contract.scale.is_empty() && contract.offset.is_empty() && contract.max_step.is_empty());
 
     assert_eq!(image.op_count(), 1);
-    let Some(Op::Linear { src, dst, matrix, accumulate: false }) = image.ops().next() else {
-        panic!("the operation is linear")
-    };
-    assert_eq!((src, dst), (image.observation(), image.output()));
+    let op = image.ops().next().expect("there is an operation");
+    assert_eq!(op.kind, OpKind::Linear { accumulate: false });
+    assert_eq!((op.src(), op.dst(), op.third()), (image.observation(), image.output(), image.work()));
+    let matrix = op.matrix().expect("the operation is linear");
     assert_eq!((matrix.rows, matrix.cols, matrix.group, matrix.x_max), (3, 2, 0, 127));
     assert_eq!(matrix.prepared_words(), image.work().len);
     let blocks: Vec<_> = matrix.blocks().collect();

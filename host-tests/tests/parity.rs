@@ -245,13 +245,7 @@ fn dequantization_agrees_over_its_three_types() {
             let image = single_matrix_image(&case);
             let buffer = actq::runtime::ImageBuffer::new(&image);
             let image = actq_kernels::Image::new_checked(buffer.bytes()).expect("the image is valid");
-            let matrix = image
-                .ops()
-                .find_map(|op| match op {
-                    actq_kernels::image::Op::Linear { matrix, .. } => Some(matrix),
-                    _ => None,
-                })
-                .expect("the image has a matrix");
+            let matrix = image.ops().find_map(|op| op.matrix()).expect("the image has a matrix");
             for rows in matrix.blocks() {
                 for i in 0..shape.rows {
                     let (mut f, mut h, mut n) = ([0f32; 70], [f16::ZERO; 70], [0i16; 70]);

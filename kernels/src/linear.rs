@@ -220,6 +220,7 @@ impl Matrix<'_> {
     }
 
     /// As [`Self::apply`], from where `at` stands and as far as the budget reaches; true when all is done.
+    #[inline(never)]
     pub(crate) fn resume(
         &self,
         at: &mut LinearCursor,
@@ -247,7 +248,7 @@ impl Matrix<'_> {
         let mut prepared: Option<Prepared<'_>> = None;
         let mut first_row = 0;
         for (i, record) in self.records.as_chunks::<BLOCK_WORDS>().0.iter().enumerate() {
-            let Some(rows) = row_block(self, record, first_row) else { continue };
+            let Ok(rows) = row_block(self, record, first_row) else { continue };
             first_row += rows.block.shape().rows;
             if i < at.block {
                 continue;
