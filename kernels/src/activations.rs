@@ -232,6 +232,9 @@ pub struct Scale {
 }
 
 impl Scale {
+    /// Takes integers as they are.
+    pub(crate) const ONE: Self = Self { scale: 1.0, inverse: 1.0 };
+
     /// The scale of `x` for integers in `-x_max ..= x_max`. `x_max` is 127 for int8 activations and at most 32767.
     pub fn new(x: &[f32], x_max: u16) -> Result<Self, NotFinite> {
         let bits = magnitude_bits(x);
