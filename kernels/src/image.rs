@@ -202,7 +202,8 @@ pub struct Op<'a> {
     pub(crate) regions: [Region; 3],
     record: &'a [u32; h::OP_WORDS],
     form: &'static Form,
-    image: Image<'a>,
+    /// The image's words.
+    image: &'a [u32],
 }
 
 impl<'a> Op<'a> {
@@ -228,12 +229,12 @@ impl<'a> Op<'a> {
 
     /// As [`Self::matrix`], of a linear operation. (Within a checked image never an error.)
     pub(crate) fn linear_matrix(&self) -> Result<Matrix<'a>, ImageError> {
-        self.image.matrix(self.data())
+        matrix(self.image, self.data())
     }
 
     /// Single constant `i`: see [`OpKind`].
     pub fn constant(&self, i: usize) -> f32 {
-        f32::from_bits(self.image.word(self.data() + i))
+        self.image.get(self.data() + i).map_or(0.0, |word| f32::from_bits(u32::from_le(*word)))
     }
 
     /// Array `i` of f32 bits, of the length of `dst`: see [`OpKind`].
@@ -244,7 +245,7 @@ impl<'a> Op<'a> {
     /// A range of array `i`.
     pub(crate) fn part(&self, i: usize, range: &Range<usize>) -> &'a [u32] {
         let before = usize::from(self.form.constants) + i * self.dst().len + range.start;
-        self.image.section(self.data() + before, range.len())
+        section(self.image, self.data() + before, range.len()).unwrap_or_default()
     }
 
     /// Offset of the constants or of the matrix record.
@@ -336,11 +337,6 @@ impl<'a> Image<'a> {
     /// As [`section`].
     fn checked(&self, offset: usize, len: usize) -> Result<&'a [u32], ImageError> {
         section(self.words, offset, len).ok_or(ImageError::Section)
-    }
-
-    /// The record at `offset`.
-    fn record<const N: usize>(&self, offset: usize) -> Result<&'a [u32; N], ImageError> {
-        behind(self.words, offset).first_chunk().ok_or(ImageError::Section)
     }
 
     /// `len` f32 constants at `offset`, refused where one is not finite.
@@ -513,7 +509,7 @@ impl<'a> Image<'a> {
 
     /// Operation `i`, refused where its record says something impossible. (Within a checked image every record parses.)
     pub(crate) fn op(&self, i: usize) -> Result<Op<'a>, ImageError> {
-        let record = self.record(self.head(h::W_OPS) as usize + i * h::OP_WORDS)?;
+        let record = record(self.words, self.head(h::W_OPS) as usize + i * h::OP_WORDS)?;
         let [head, places, lengths, _] = record.map(u32::from_le);
         let (code, detail, len) = (head as u8, (head >> 8) as u8, high(head));
         let form = FORMS.get(usize::from(code).wrapping_sub(1)).ok_or(ImageError::Op)?;
@@ -529,28 +525,7 @@ impl<'a> Image<'a> {
         };
         let dst = Region { offset: low(places), len };
         let src = Region { offset: high(places), len: src };
-        Ok(Op { kind, regions: [dst, src, third], record, form, image: *self })
-    }
-
-    /// The matrix of the record at `at`, refused where the record says something impossible.
-    fn matrix(&self, at: usize) -> Result<Matrix<'a>, ImageError> {
-        let [size, levels, blocks, bias] = self.record(at)?.map(u32::from_le);
-        let (rows, cols, group, x_max) = (low(size), high(size), low(levels), high(levels) as u16);
-        if rows == 0 || rows > h::MAX_ROWS || cols == 0 {
-            return Err(ImageError::Shape);
-        }
-        if !matches!(group, 0 | 32 | 64 | 128) {
-            return Err(ImageError::Group);
-        }
-        if x_max == 0 || x_max > i16::MAX as u16 {
-            return Err(ImageError::Constant);
-        }
-        if high(blocks) != 0 {
-            return Err(ImageError::Reserved);
-        }
-        let bias = if bias == 0 { &[] } else { self.checked(bias as usize, rows)? };
-        let records = self.checked(at + h::MATRIX_WORDS, blocks as usize * h::BLOCK_WORDS)?;
-        Ok(Matrix { rows, cols, group, x_max, bias, image: self.words, records })
+        Ok(Op { kind, regions: [dst, src, third], record, form, image: self.words })
     }
 
     fn check(&self) -> Result<(), ImageError> {
@@ -662,6 +637,28 @@ impl<'a> Image<'a> {
     }
 }
 
+/// The matrix of the record at `at`, refused where the record says something impossible.
+fn matrix(image: &[u32], at: usize) -> Result<Matrix<'_>, ImageError> {
+    let [size, levels, blocks, bias] = record(image, at)?.map(u32::from_le);
+    let (rows, cols, group, x_max) = (low(size), high(size), low(levels), high(levels) as u16);
+    if rows == 0 || rows > h::MAX_ROWS || cols == 0 {
+        return Err(ImageError::Shape);
+    }
+    if !matches!(group, 0 | 32 | 64 | 128) {
+        return Err(ImageError::Group);
+    }
+    if x_max == 0 || x_max > i16::MAX as u16 {
+        return Err(ImageError::Constant);
+    }
+    if high(blocks) != 0 {
+        return Err(ImageError::Reserved);
+    }
+    let section = |offset, len| section(image, offset, len).ok_or(ImageError::Section);
+    let bias = if bias == 0 { &[] } else { section(bias as usize, rows)? };
+    let records = section(at + h::MATRIX_WORDS, blocks as usize * h::BLOCK_WORDS)?;
+    Ok(Matrix { rows, cols, group, x_max, bias, image, records })
+}
+
 /// The matrix of a linear operation: its lengths, biases, blocks, the places of their rows, and their sums.
 #[inline(never)]
 fn check_linear(op: &Op<'_>) -> Result<(), ImageError> {
@@ -705,6 +702,11 @@ fn check_linear(op: &Op<'_>) -> Result<(), ImageError> {
 #[inline(never)]
 fn section(image: &[u32], offset: usize, len: usize) -> Option<&[u32]> {
     behind(image, offset).get(..len)
+}
+
+/// The record at `offset`.
+fn record<const N: usize>(image: &[u32], offset: usize) -> Result<&[u32; N], ImageError> {
+    behind(image, offset).first_chunk().ok_or(ImageError::Section)
 }
 
 /// What stands in the image from `offset` on, behind its header.
