@@ -255,7 +255,8 @@ impl<'a, 's> Head<'a, 's> {
         Ok(true)
     }
 
-    /// Takes the chunk's current action through the contract.
+    /// Takes the chunk's current action through the contract. Not inlined, so that the operations do not run on top of its stack.
+    #[inline(never)]
     fn act(&mut self) -> Result<(), NotFinite> {
         let (output, action) = (self.image.output(), self.image.action());
         let position = self.played * action.len;
