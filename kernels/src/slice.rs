@@ -7,7 +7,7 @@
 use crate::activations::Scale;
 use crate::cost::{self, Feature};
 use crate::format::Width;
-use crate::image::{Image, Op};
+use crate::image::{Image, Op, OpKind};
 use crate::linear::{Matrix, RowBlock};
 
 /// Budgets are kept in 16ths of an instruction, so that elements of a few instructions are not rounded up by much.
@@ -169,15 +169,15 @@ fn entrance(op: &Op<'_>) -> u32 {
 /// The least budget with which every poll gets on.
 pub(crate) fn least_budget(image: &Image<'_>) -> u32 {
     let of_op = |op: Op<'_>| -> u32 {
-        let piece = match op {
-            Op::Linear { matrix, accumulate, .. } => {
+        let piece = match (op.kind, op.matrix()) {
+            (OpKind::Linear { accumulate }, Some(matrix)) => {
                 let start = matrix.start_values(accumulate).is_some();
                 let blocks = matrix.blocks();
                 let block = blocks.map(|r| Price::prepare(&r).least().max(Price::strips(&r, start).least()));
                 let bias = if start { 0 } else { Price::bias(accumulate).least() };
                 block.fold(bias.max(Price::magnitude(&matrix).least()), u32::max)
             }
-            Op::LayerNorm { .. } | Op::RmsNorm { .. } => Price::whole(&op).least(),
+            (OpKind::LayerNorm | OpKind::RmsNorm, _) => Price::whole(&op).least(),
             _ => Price::elements(&op).least(),
         };
         piece.saturating_add(entrance(&op))
