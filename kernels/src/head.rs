@@ -309,16 +309,16 @@ fn regions<'r>(arena: &'r mut [u32], regions: &[Region; 3]) -> [&'r mut [u32]; 3
 #[inline(never)]
 fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &mut impl Meter) -> Result<bool, NotFinite> {
     let f = bytemuck::cast_slice_mut::<u32, f32>;
-    // Elements that this piece takes: of a norm all. Linear operations have pieces of their own.
-    let (dst, len) = (op.dst(), op.dst().len);
+    // Elements that this piece takes, or units of a norm. Linear operations have pieces of their own.
+    let (dst, len) = (op.dst(), op.units());
     let units = match op.kind {
         OpKind::Linear { .. } => 0,
-        OpKind::LayerNorm | OpKind::RmsNorm if budget.take(1, || Price::whole(op)) == 0 => return Ok(false),
-        OpKind::LayerNorm | OpKind::RmsNorm => len,
-        _ => budget.take(len - cursor.done, || Price::elements(op)),
+        _ => budget.take(len - cursor.done, || Price::units(op)),
     };
-    let range = cursor.done..cursor.done + units;
-    cursor.done = range.end;
+    let units = cursor.done..cursor.done + units;
+    cursor.done = units.end;
+    let norm = matches!(op.kind, OpKind::LayerNorm | OpKind::RmsNorm);
+    let range = if norm { 0..dst.len } else { units.clone() };
     let [mut dst, mut src, third] = match op.src().len {
         0 => [part(arena, &(dst.offset + range.start..dst.offset + range.end)), &mut [], &mut []],
         _ => regions(arena, &op.regions),
@@ -343,14 +343,15 @@ fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &mut impl Me
         kind => {
             // An RMS norm has but one array.
             let (first, second, constant) = (op.part(0, &range), op.part(1, &range), op.constant(0));
+            let (moments, done) = (&mut cursor.moments, units.clone());
             match kind {
-                OpKind::LayerNorm => norm::layer_norm(f(dst), first, second, constant),
-                OpKind::RmsNorm => norm::rms_norm(f(dst), first, constant),
+                OpKind::LayerNorm => norm::layer_norm_units(done, moments, f(dst), first, second, constant),
+                OpKind::RmsNorm => norm::rms_norm_units(done, moments, f(dst), first, constant),
                 _ => norm::normalize(f(src), first, second, constant, op.constant(1), f(dst)),
             }
         }
     }
-    Ok(range.end == len)
+    Ok(units.end == len)
 }
 
 /// Some of a region's words.

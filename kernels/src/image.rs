@@ -242,6 +242,16 @@ impl<'a> Op<'a> {
         self.part(i, &(0..self.dst().len))
     }
 
+    /// What the operation can be cut into: elements, each once for every pass over them.
+    pub(crate) fn units(&self) -> usize {
+        self.dst().len
+            * match self.kind {
+                OpKind::LayerNorm => 3,
+                OpKind::RmsNorm => 2,
+                _ => 1,
+            }
+    }
+
     /// A range of array `i`.
     pub(crate) fn part(&self, i: usize, range: &Range<usize>) -> &'a [u32] {
         let before = usize::from(self.form.constants) + i * self.dst().len + range.start;

@@ -2,13 +2,14 @@
 //!
 //! A piece is a run of units of one kind of work: strips of rows of a matrix, outputs set to their biases, elements of a
 //! function, of a cell, of a copy. Preparing a matrix's input is two pieces, its scale and its integers: neither takes longer
-//! than a strip of the rows that it is prepared for. Norms are whole.
+//! than a strip of the rows that it is prepared for.
 
 use crate::activations::Scale;
 use crate::cost::{self, Feature};
 use crate::format::Width;
 use crate::image::{Image, Op, OpKind};
 use crate::linear::{Matrix, RowBlock};
+use crate::norm::Moments;
 
 /// Budgets are kept in 16ths of an instruction, so that elements of a few instructions are not rounded up by much.
 const PARTS: u32 = 16;
@@ -43,16 +44,11 @@ impl Price {
         self.first.saturating_add(self.each)
     }
 
-    /// Of an operation's elements.
-    pub(crate) fn elements(op: &Op<'_>) -> Self {
-        let (_, value, _) = cost::values(op);
-        Self::new(0, value.most())
-    }
-
-    /// Of an operation that is one piece.
-    pub(crate) fn whole(op: &Op<'_>) -> Self {
-        let (_, value, len) = cost::values(op);
-        Self::new((len as u32).saturating_mul(value.most()), 0)
+    /// Of an operation's units. A unit of a norm takes less than an element in all passes; each of its pieces computes anew what
+    /// the sums give.
+    pub(crate) fn units(op: &Op<'_>) -> Self {
+        let (operation, value, _) = cost::values(op);
+        Self::new(if op.units() == op.dst().len { 0 } else { operation.most() }, value.most())
     }
 
     /// Of finding the scale of a matrix's input.
@@ -177,8 +173,7 @@ pub(crate) fn least_budget(image: &Image<'_>) -> u32 {
                 let bias = if start { 0 } else { Price::bias(accumulate).least() };
                 block.fold(bias.max(Price::magnitude(&matrix).least()), u32::max)
             }
-            (OpKind::LayerNorm | OpKind::RmsNorm, _) => Price::whole(&op).least(),
-            _ => Price::elements(&op).least(),
+            _ => Price::units(&op).least(),
         };
         piece.saturating_add(entrance(&op))
     };
@@ -191,8 +186,10 @@ pub(crate) fn least_budget(image: &Image<'_>) -> u32 {
 pub(crate) struct Cursor {
     /// The operation.
     pub(crate) op: usize,
-    /// Its elements that are done.
+    /// Its elements that are done, or units of a norm.
     pub(crate) done: usize,
+    /// Of a norm.
+    pub(crate) moments: Moments,
     /// Of a linear operation.
     pub(crate) linear: LinearCursor,
 }
