@@ -14,7 +14,6 @@ use actq::runtime::{ImageBuffer, with_head};
 use actq_host_tests::command::{actq, all, failed, run, succeeded};
 use actq_host_tests::golden::Random;
 use actq_kernels::Width;
-use actq_kernels::image::Op;
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array1, Array3};
 use ndarray_npy::{NpzWriter, WriteNpyExt as _};
@@ -368,10 +367,7 @@ fn serve_refuses_what_is_not_the_protocol() -> Result<()> {
 /// The widths of an image's matrices, narrow to wide.
 fn widths(path: &Path) -> Result<Vec<u32>> {
     let buffer = ImageBuffer::read(path)?;
-    let matrices = buffer.image(path)?.ops().filter_map(|op| match op {
-        Op::Linear { matrix, .. } => Some(matrix),
-        _ => None,
-    });
+    let matrices = buffer.image(path)?.ops().filter_map(|op| op.matrix());
     let mut widths: Vec<u32> = matrices.flat_map(|m| m.blocks().map(|rows| rows.block.shape().width.bits())).collect();
     widths.sort_unstable();
     Ok(widths)
@@ -447,8 +443,7 @@ fn groups_and_activations_reach_the_image() -> Result<()> {
     for (group, activations) in [(0, 8), (32, 16), (64, 8), (128, 16)] {
         let path = fixture.image(&format!("--group {group} --activations {activations}"))?;
         let buffer = ImageBuffer::read(&path)?;
-        for op in buffer.image(&path)?.ops() {
-            let Op::Linear { matrix, .. } = op else { continue };
+        for matrix in buffer.image(&path)?.ops().filter_map(|op| op.matrix()) {
             assert_eq!((matrix.group, matrix.x_max > 127), (group, activations == 16));
         }
         fixture.eval(&path)?;

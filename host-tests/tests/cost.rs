@@ -15,7 +15,6 @@ use actq_host_tests::qemu::{self, Counter, Target};
 use actq_host_tests::{root, shared_policies};
 use actq_kernels::Width;
 use actq_kernels::cost::{Cost, of_step};
-use actq_kernels::image::Op;
 use anyhow::{Context, Result, bail, ensure};
 
 /// Steps that each image runs, spread over the held-out recordings.
@@ -208,7 +207,7 @@ fn mixed_widths_cost_little_more_than_their_blocks() -> Result<()> {
         let image = buffer.image(Path::new("mixed"))?;
         let observation = (0..COLS).map(|i| (i as f32).sin()).collect();
         let parts = profile::parts(&elf, &counter, &image, &bytes, &[observation], u32::MAX)?.remove(0);
-        let linear = image.ops().zip(&parts.ops).filter(|(op, _)| matches!(op, Op::Linear { .. }));
+        let linear = image.ops().zip(&parts.ops).filter(|(op, _)| op.matrix().is_some());
         let counts: Vec<u64> = linear.map(|(_, cost)| cost.instructions).collect();
         let [alone @ .., in_order, indexed] = &counts[..] else { bail!("{counts:?}") };
         let alone: u64 = alone.iter().sum();

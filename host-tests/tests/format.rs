@@ -8,9 +8,9 @@ use actq::policy::{Contract, Policy};
 use actq::quantize::{Outcome, Quantized};
 use actq::runtime::{ImageBuffer, with_head};
 use actq_host_tests::root;
-use actq_kernels::activations::max_prepared_words;
+use actq_kernels::activations::{Plan, max_prepared_words};
 use actq_kernels::format::{BlockShape, Lanes, Width, pack};
-use actq_kernels::image::{Image, Kind, Op, Region, block_bytes, checksum, header as h};
+use actq_kernels::image::{Image, Kind, OpKind, Region, block_bytes, checksum, header as h};
 use half::bf16;
 
 fn document() -> String {
@@ -108,10 +108,10 @@ fn the_hex_example_reads_as_documented() {
     assert!(contract.scale.is_empty() && contract.offset.is_empty() && contract.max_step.is_empty());
 
     assert_eq!(image.op_count(), 1);
-    let Some(Op::Linear { src, dst, matrix, accumulate: false }) = image.ops().next() else {
-        panic!("the operation is linear")
-    };
-    assert_eq!((src, dst), (image.observation(), image.output()));
+    let op = image.ops().next().expect("there is an operation");
+    assert_eq!(op.kind, OpKind::Linear { accumulate: false });
+    assert_eq!((op.src(), op.dst(), op.third()), (image.observation(), image.output(), image.work()));
+    let matrix = op.matrix().expect("the operation is linear");
     assert_eq!((matrix.rows, matrix.cols, matrix.group, matrix.x_max), (3, 2, 0, 127));
     assert_eq!(matrix.prepared_words(), image.work().len);
     let blocks: Vec<_> = matrix.blocks().collect();
@@ -405,6 +405,12 @@ fn the_work_area_is_as_long_as_documented() {
             ["64, 128, where it does not divide c", "ceil(c / group) * (group + 1)"],
         ]
     );
+    let most = |cols, group| {
+        let plans = Width::ALL
+            .into_iter()
+            .flat_map(|width| Lanes::ALL.map(|lanes| Plan::new(BlockShape { width, lanes, rows: 1, cols, group })));
+        plans.flatten().map(|plan| plan.room(cols)).max()
+    };
     for cols in (1..1200usize).chain([4095, 4096, 65535]) {
         let thirty_twos = cols.div_ceil(32);
         let words = match (cols % 8, cols % 32) {
@@ -413,6 +419,7 @@ fn the_work_area_is_as_long_as_documented() {
             _ => (thirty_twos * 32).max(cols.div_ceil(8) * 9),
         };
         assert_eq!(max_prepared_words(cols, 0), 1 + words, "{cols} columns");
+        assert_eq!(most(cols, 0), Some(1 + words), "{cols} columns");
         for group in [32, 64, 128] {
             let pairs = if cols.is_multiple_of(64) { 0 } else { cols.div_ceil(64) * 67 };
             let words = match (group, cols.is_multiple_of(group)) {
@@ -422,6 +429,7 @@ fn the_work_area_is_as_long_as_documented() {
                 (_, false) => cols.div_ceil(group) * (group + 1),
             };
             assert_eq!(max_prepared_words(cols, group), words, "{cols} columns, groups of {group}");
+            assert_eq!(most(cols, group), Some(words), "{cols} columns, groups of {group}");
         }
     }
 }

@@ -7,7 +7,6 @@ use actq::writer;
 use actq_host_tests::cycles::Code;
 use actq_host_tests::qemu::{self, Counter, Target};
 use actq_host_tests::{root, shared_policies};
-use actq_kernels::image::Op;
 use actq_kernels::math::Function;
 use actq_kernels::{Width, norm, recurrent};
 use anyhow::{Result, ensure};
@@ -103,8 +102,8 @@ fn a_head_with_an_lstm_stays_within_its_instructions() -> Result<()> {
     let file = tempfile::NamedTempFile::new()?;
     writer::write(file.path(), &bytes)?;
     let buffer = ImageBuffer::new(&bytes);
-    let macs = |op: Op<'_>| if let Op::Linear { matrix, .. } = op { matrix.rows * matrix.cols } else { 0 };
-    let macs = buffer.image(file.path())?.ops().map(macs).sum::<usize>() as f64;
+    let matrices = buffer.image(file.path())?.ops().filter_map(|op| op.matrix());
+    let macs = matrices.map(|matrix| matrix.rows * matrix.cols).sum::<usize>() as f64;
     let elf = qemu::build("actq-firmware-demo", Target::Fpu, file.path())?;
     let counter = Counter::build()?;
     let mut command = qemu::command(&elf, None, "");

@@ -75,6 +75,10 @@ proptest! {
         let block = Block::new(case.shape, &words).expect("the words fit the shape");
         let x_max = case.x.iter().map(|x| x.unsigned_abs()).max().unwrap_or(0);
         let worst = worst_case(&block, x_max);
+        let product = |row, col| i64::from(block.level(row, col).abs()) * i64::from(block.group_scale(row, col));
+        let row_sum = |row| (0..case.shape.cols).map(|col| product(row, col)).sum::<i64>();
+        let largest = (0..case.shape.rows).map(row_sum).max().unwrap_or(0);
+        prop_assert_eq!(worst, largest * i64::from(x_max));
         prop_assert!(worst <= worst_case_bound(&block, x_max));
         if worst <= i64::from(i32::MAX) {
             prop_assert!(case.sums().iter().all(|s| i64::from(s.unsigned_abs()) <= worst));
@@ -250,13 +254,7 @@ fn dequantization_agrees_over_its_three_types() {
             let image = single_matrix_image(&case);
             let buffer = actq::runtime::ImageBuffer::new(&image);
             let image = actq_kernels::Image::new_checked(buffer.bytes()).expect("the image is valid");
-            let matrix = image
-                .ops()
-                .find_map(|op| match op {
-                    actq_kernels::image::Op::Linear { matrix, .. } => Some(matrix),
-                    _ => None,
-                })
-                .expect("the image has a matrix");
+            let matrix = image.ops().find_map(|op| op.matrix()).expect("the image has a matrix");
             for rows in matrix.blocks() {
                 for i in 0..shape.rows {
                     let (mut f, mut h, mut n) = ([0f32; 70], [f16::ZERO; 70], [0i16; 70]);

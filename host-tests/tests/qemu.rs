@@ -15,6 +15,8 @@ use actq::writer;
 use actq_host_tests::qemu::{self, Server, Target};
 use actq_host_tests::{golden, root, shared_policies};
 use actq_kernels::Width;
+use actq_kernels::image::{checksum, header as h};
+use actq_kernels::linear::worst_case;
 use anyhow::{Context, Result, ensure};
 
 /// Steps that each image runs on the host and in QEMU.
@@ -105,6 +107,41 @@ fn the_built_in_image_replays_its_self_test() -> Result<()> {
         let output = qemu::run(qemu::command_on(target, &elf, None, ""), &[])?;
         assert_eq!(String::from_utf8_lossy(&output.stdout), expected, "{target:?}");
         assert!(output.status.success());
+    }
+    Ok(())
+}
+
+/// The proof takes the weights apart by the kernels of the machine that it runs on.
+#[test]
+fn the_target_allows_int32_to_the_last_product_as_the_host_does() -> Result<()> {
+    for group in [32, 128] {
+        let mut bytes = rtn(&Policy::load(&ur3())?, Width::W8, group, Activations::Int16)?;
+        let buffer = ImageBuffer::new(&bytes);
+        let image = buffer.image(Path::new("ur3"))?;
+        let matrices: Vec<_> = image.ops().filter_map(|op| op.matrix()).collect();
+        // Of the matrix with the most columns the shape alone does not prove it; which operation has it, the records say.
+        let widest = (0..matrices.len()).max_by_key(|i| matrices[*i].cols).context("there is a matrix")?;
+        let blocks = matrices[widest].blocks().map(|rows| worst_case(&rows.block, 1));
+        let largest = i64::from(i32::MAX) / blocks.max().context("there is a block")?;
+        ensure!(largest < i64::from(i16::MAX), "scales of {group}: all of int16 is allowed");
+        let words: &[u32] = bytemuck::cast_slice(buffer.bytes());
+        let records = words[h::W_OPS] as usize..;
+        let mut linear = words[records].chunks(h::OP_WORDS).filter(|record| record[0] as u8 == h::op::LINEAR);
+        let record = linear.nth(widest).context("the operation is linear")?[3] as usize;
+        for (x_max, refused) in [(largest, false), (largest + 1, true)] {
+            bytes[4 * record + 6..][..2].copy_from_slice(&u16::try_from(x_max)?.to_le_bytes());
+            let crc = checksum(&bytes);
+            bytes[4 * h::W_CRC..][..4].copy_from_slice(&crc.to_le_bytes());
+            assert_eq!(ImageBuffer::new(&bytes).image(Path::new("ur3")).is_err(), refused, "scales of {group}, host");
+            let slot = tempfile::NamedTempFile::new()?;
+            fs::write(slot.path(), &bytes)?;
+            let elf = firmware("actq-firmware-demo", Target::Fpu)?;
+            let output = qemu::run(qemu::command(&elf, Some(slot.path()), ""), &[])?;
+            // What is allowed comes to its self-test, which may fail, where its actions were computed with another x_max.
+            let text = String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned();
+            let expected = if refused { "can overflow its int32" } else { "self-test" };
+            assert!(text.contains(expected), "scales of {group}, target: {text}");
+        }
     }
     Ok(())
 }

@@ -7,9 +7,10 @@
 //! weights have no group scales) its chunks, and behind them, where the layout asks for it, the sum of the row's values, or, in
 //! both halves of a word, of the group's. Where the layout takes groups in pairs, a pair is prepared as a group of two chunks,
 //! and the halves of its word are their sums. A chunk is its start words and its int16 pairs, column `2j` in the low half. Zeros
-//! fill the last group (and, in pairs, the place of one that a last group lacks), or, where there are no groups, a kernel's step ([`crate::format::PAD_COLS`] with single lanes). A [`Plan`] has all lengths.
+//! fill the last group (and, in pairs, the place of one that a last group lacks), or, where there are no groups, a kernel's step
+//! ([`PAD_COLS`] with single lanes). A [`Plan`] has all lengths.
 
-use crate::format::{Block, BlockShape, Lanes, Layout, Width, XFormat, div_down, div_up, round_up};
+use crate::format::{Block, BlockShape, Layout, PAD_COLS, XFormat, div_down, div_up, round_up};
 
 /// `1.5 * 2^23`: see the module's rounding rule.
 pub const ROUND: f32 = 12_582_912.0;
@@ -237,6 +238,9 @@ pub struct Scale {
 }
 
 impl Scale {
+    /// Takes integers as they are.
+    pub(crate) const ONE: Self = Self { scale: 1.0, inverse: 1.0 };
+
     /// The scale of `x` for integers in `-x_max ..= x_max`. `x_max` is 127 for int8 activations and at most 32767.
     pub fn new(x: &[f32], x_max: u16) -> Result<Self, NotFinite> {
         let bits = magnitude_bits(x);
@@ -329,17 +333,21 @@ fn chunk<V: Copy>(x: &[V], format: &XFormat, out: &mut [u32], integer: &impl Fn(
     sum
 }
 
-/// Words that suffice to prepare a vector for blocks of any layout that has such groups.
+/// Words that suffice to prepare a vector for blocks of any layout that has such groups: the most that [`Plan::room`] gives. That
+/// is with chunks of eight columns and a sum, or where single lanes or pairs of groups need more columns.
 pub const fn max_prepared_words(cols: usize, group: usize) -> usize {
-    let mut most = 0;
-    let mut i = 0;
-    while i < Width::ALL.len() * Lanes::ALL.len() {
-        let (width, lanes) = (Width::ALL[i / Lanes::ALL.len()], Lanes::ALL[i % Lanes::ALL.len()]);
-        if let Some(plan) = Plan::new(BlockShape { width, lanes, rows: 1, cols, group }) {
-            let words = plan.room(cols);
-            most = if words > most { words } else { most };
-        }
-        i += 1;
+    // Pairs of the columns up to a multiple of `unit`, and of a copy, where that has more columns.
+    const fn pairs(cols: usize, unit: usize) -> usize {
+        let padded = round_up(cols, unit);
+        if padded == cols { padded / 2 } else { padded }
     }
-    most
+    if group == 0 {
+        let (single, paired) = (pairs(cols, PAD_COLS), pairs(cols, 8) + div_up(cols, 8));
+        return 1 + if single > paired { single } else { paired };
+    }
+    let others = if group == 32 { 5 } else { 1 };
+    let words = pairs(cols, group) + div_up(cols, group) * others;
+    // Groups of 32 in pairs: two start words and the word of the sums.
+    let in_pairs = if group == 32 { pairs(cols, 2 * group) + div_up(cols, 2 * group) * 3 } else { 0 };
+    if words > in_pairs { words } else { in_pairs }
 }

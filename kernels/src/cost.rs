@@ -16,7 +16,7 @@ use core::fmt;
 
 use crate::activations::{Extent, Plan};
 use crate::format::{BlockShape, Lanes, QUAD, STRIP, Width};
-use crate::image::{Image, Op};
+use crate::image::{Image, Op, OpKind};
 use crate::linear::{Matrix, RUN, RowBlock};
 use crate::math::Function;
 
@@ -243,45 +243,43 @@ pub fn begin(image: &Image<'_>, add: &mut dyn FnMut(Feature, usize)) {
 
 /// The features of the way from the network's output to the action.
 pub fn action(image: &Image<'_>, add: &mut dyn FnMut(Feature, usize)) {
-    let contract = image.contract();
-    let arrays = [contract.scale, contract.offset, contract.low, contract.high, contract.max_step];
     add(Feature::ACTION, 1);
     add(Feature::ACTION_VALUE, image.act_len());
-    add(Feature::CONTRACT, arrays.iter().map(|array| array.len()).sum());
+    add(Feature::CONTRACT, image.contract_arrays().iter().map(|array| array.len()).sum());
 }
 
 /// The features of an operation.
 pub fn features(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
-    match op {
-        Op::Linear { src, matrix, accumulate, .. } => linear(matrix, src.len, *accumulate, add),
-        _ => {
-            let (operation, value, len) = values(op);
-            add(operation, 1);
-            add(value, len);
-        }
+    if let (OpKind::Linear { accumulate }, Some(matrix)) = (op.kind, op.matrix()) {
+        linear(&matrix, accumulate, add);
+    } else {
+        let (operation, value, len) = values(op);
+        add(operation, 1);
+        add(value, len);
     }
 }
 
 /// The features of an operation that is not linear: its own, that of its values, and how many those are.
 pub fn values(op: &Op<'_>) -> (Feature, Feature, usize) {
-    match *op {
-        Op::Normalize { dst, .. } => (Feature::NORMALIZE, Feature::NORMALIZE_VALUE, dst.len),
-        Op::Function { dst, function } => (Feature::FUNCTION, Feature::function(function), dst.len),
-        Op::LayerNorm { dst, .. } => (Feature::LAYER_NORM, Feature::LAYER_NORM_VALUE, dst.len),
-        Op::RmsNorm { dst, .. } => (Feature::RMS_NORM, Feature::RMS_NORM_VALUE, dst.len),
-        Op::Add { dst, .. } => (Feature::ADD, Feature::ADD_VALUE, dst.len),
-        Op::Copy { dst, .. } => (Feature::COPY, Feature::COPY_VALUE, dst.len),
-        Op::LstmCell { dst, .. } => (Feature::LSTM, Feature::LSTM_VALUE, dst.len),
-        Op::GruCell { dst, .. } => (Feature::GRU, Feature::GRU_VALUE, dst.len),
+    let (operation, value) = match op.kind {
+        OpKind::Normalize => (Feature::NORMALIZE, Feature::NORMALIZE_VALUE),
+        OpKind::Function(function) => (Feature::FUNCTION, Feature::function(function)),
+        OpKind::LayerNorm => (Feature::LAYER_NORM, Feature::LAYER_NORM_VALUE),
+        OpKind::RmsNorm => (Feature::RMS_NORM, Feature::RMS_NORM_VALUE),
+        OpKind::Add => (Feature::ADD, Feature::ADD_VALUE),
+        OpKind::Copy => (Feature::COPY, Feature::COPY_VALUE),
+        OpKind::LstmCell => (Feature::LSTM, Feature::LSTM_VALUE),
+        OpKind::GruCell => (Feature::GRU, Feature::GRU_VALUE),
         // Its parts are counted one by one.
-        Op::Linear { .. } => (Feature::LINEAR, Feature::LINEAR, 0),
-    }
+        OpKind::Linear { .. } => return (Feature::LINEAR, Feature::LINEAR, 0),
+    };
+    (operation, value, op.dst().len)
 }
 
-fn linear(matrix: &Matrix<'_>, cols: usize, accumulate: bool, add: &mut dyn FnMut(Feature, usize)) {
+fn linear(matrix: &Matrix<'_>, accumulate: bool, add: &mut dyn FnMut(Feature, usize)) {
     let start = matrix.start_values(accumulate).is_some();
     add(Feature::LINEAR, 1);
-    magnitude(cols, add);
+    magnitude(matrix.cols, add);
     if !(accumulate || matrix.bias.is_empty()) {
         let in_order = matrix.blocks().take_while(|rows| rows.index.is_empty()).count();
         add(Feature::CHECKED, matrix.block_count().min(in_order + 1));
@@ -306,7 +304,7 @@ fn linear(matrix: &Matrix<'_>, cols: usize, accumulate: bool, add: &mut dyn FnMu
 pub(crate) fn enter(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
     add(Feature::ENTERED, 1);
     add(values(op).0, 1);
-    if let Op::Linear { matrix, .. } = op {
+    if let Some(matrix) = op.matrix() {
         add(Feature::RESUMED, matrix.block_count());
     }
 }

@@ -2,6 +2,8 @@
 
 use core::fmt;
 
+use crate::activations::NotFinite;
+
 /// Why [`crate::Image::new_checked`] refused an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -150,6 +152,12 @@ pub enum StepError {
     },
     /// A poll without a step that was begun.
     NotBegun,
+}
+
+impl From<NotFinite> for StepError {
+    fn from(_: NotFinite) -> Self {
+        Self::NotFinite
+    }
 }
 
 impl fmt::Display for StepError {

@@ -55,6 +55,9 @@ pub const STRIP: usize = 8;
 /// Activations are padded with zeros to a multiple of this many columns, which every layout's unit divides.
 pub const PAD_COLS: usize = 32;
 
+/// The most columns that share a group scale.
+pub const MAX_GROUP: usize = 128;
+
 /// Bits of a weight code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -292,6 +295,8 @@ pub(crate) use with_format;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Layout {
     pub(crate) cell: Cell,
+    /// Words of a unit for [`QUAD`] rows.
+    quad_words: usize,
     strip: usize,
     pub(crate) step: usize,
     pub(crate) x: XFormat,
@@ -307,13 +312,13 @@ pub(crate) struct Layout {
     pub(crate) kernels: [crate::armv7em::Kernels; 2],
     #[cfg(actq_fpu)]
     pub(crate) quantize: crate::armv7em::Quantize,
-    extract: fn(&[u32; 3], usize, usize) -> u8,
 }
 
 impl Layout {
     const fn of<F: Format>() -> Self {
         Self {
             cell: F::CELL,
+            quad_words: F::CELL.words * QUAD / F::CELL.rows,
             strip: F::STRIP,
             step: F::STEP,
             x: F::X,
@@ -327,7 +332,6 @@ impl Layout {
             kernels: crate::armv7em::kernels::<F>(),
             #[cfg(actq_fpu)]
             quantize: crate::armv7em::quantizer::<F>(),
-            extract: F::extract,
         }
     }
 }
@@ -382,7 +386,7 @@ impl BlockShape {
     /// Whether the lengths are usable: rows and columns from 1 to 65535 and a group that the lanes know.
     pub const fn is_valid(self) -> bool {
         let group = match self.lanes {
-            Lanes::Single => matches!(self.group, 0 | 32 | 64 | 128),
+            Lanes::Single => matches!(self.group, 0 | 32 | 64 | MAX_GROUP),
             Lanes::Paired => matches!(self.group, 0 | 32),
         };
         self.rows >= 1 && self.rows <= 0xffff && self.cols >= 1 && self.cols <= 0xffff && group
@@ -417,7 +421,6 @@ impl BlockShape {
     }
 
     /// Units in a row.
-    #[inline(never)]
     pub const fn units(self) -> usize {
         div_down(round_up(self.cols, self.step()), self.layout().cell.cols)
     }
@@ -442,7 +445,7 @@ impl BlockShape {
     /// Words of four rows, scales included; a strip of eight has twice as many.
     #[inline(never)]
     pub const fn quad_words(self) -> usize {
-        self.units() * self.layout().cell.words * div_down(QUAD, self.layout().cell.rows) + self.groups()
+        self.units() * self.layout().quad_words + self.groups()
     }
 
     /// Words of the block.
@@ -509,11 +512,18 @@ impl<'a> Block<'a> {
     /// Pairs `words` (little-endian words as they stand in the image) with their shape; `None` where the shape is not
     /// valid or the length differs from [`BlockShape::words`].
     pub fn new(shape: BlockShape, words: &'a [u32]) -> Option<Self> {
-        (shape.is_valid() && words.len() == shape.words()).then(|| Self {
-            shape,
-            quad_words: shape.quad_words(),
-            words,
-        })
+        if !shape.is_valid() {
+            return None;
+        }
+        Self::leading(shape, words).filter(|block| block.words.len() == words.len())
+    }
+
+    /// The block of a valid shape that `words` begins with; `None` where words are missing.
+    #[inline(always)]
+    pub(crate) fn leading(shape: BlockShape, words: &'a [u32]) -> Option<Self> {
+        let quad_words = shape.quad_words();
+        let words = words.get(..div_up(shape.rows, QUAD) * quad_words)?;
+        Some(Self { shape, quad_words, words })
     }
 
     /// The shape.
@@ -542,9 +552,9 @@ impl<'a> Block<'a> {
         if row >= self.shape.rows || col >= self.shape.cols {
             return 0;
         }
-        let layout = self.shape.layout();
-        let Cell { rows, cols, .. } = layout.cell;
-        (layout.extract)(&self.cell(row, div_down(col, cols)), row & (rows - 1), col & (cols - 1))
+        let Cell { rows, cols, .. } = self.shape.layout().cell;
+        let cell = self.cell(row, div_down(col, cols));
+        with_format!(self.shape, extract::<_>(&cell, row & (rows - 1), col & (cols - 1)))
     }
 
     /// The words of the cell that holds `row` in unit `unit`.
@@ -572,6 +582,10 @@ impl<'a> Block<'a> {
             }
         }
     }
+}
+
+fn extract<F: Format>(words: &[u32; 3], row: usize, col: usize) -> u8 {
+    F::extract(words, row, col)
 }
 
 /// Packs a block.

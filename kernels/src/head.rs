@@ -6,7 +6,7 @@ use core::task::Poll;
 
 use crate::activations::NotFinite;
 use crate::error::{HeadError, StepError};
-use crate::image::{Image, Op, Region};
+use crate::image::{Image, Op, OpKind, Region};
 use crate::linear::{copy, copy_le};
 use crate::math::clamp;
 use crate::slice::{Budget, Cursor, Meter, Price, Unlimited};
@@ -38,15 +38,13 @@ enum Phase {
 }
 
 impl<'a, 's> Head<'a, 's> {
-    /// Takes `scratch`, of at least [`Image::scratch_words`] words, and resets.
+    /// Takes `scratch`, of at least [`Image::scratch_words`] words, which it zeroes.
     pub fn new(image: Image<'a>, scratch: &'s mut [u32]) -> Result<Self, HeadError> {
         let (needed, given) = (image.scratch_words(), scratch.len());
         let arena = scratch.get_mut(..needed).ok_or(HeadError::ScratchTooSmall { needed, given })?;
         // Nothing depends on what the memory held.
         arena.fill(0);
-        let mut head = Self { image, arena, least_budget: 0, phase: Phase::Idle, played: 0, started: false };
-        head.reset();
-        Ok(head)
+        Ok(Self { image, arena, least_budget: 0, phase: Phase::Idle, played: 0, started: false })
     }
 
     /// Forgets the recurrent state, the rest of a chunk, the last action and a step that was begun.
@@ -79,6 +77,7 @@ impl<'a, 's> Head<'a, 's> {
     /// [`Self::begin`] and one [`Self::poll`] without a limit.
     ///
     /// On an error the head resets itself, so that no part of a failed evaluation reaches a later action.
+    #[inline(never)]
     pub fn step(&mut self, observation: &[f32]) -> Result<&[f32], StepError> {
         self.take(observation)?;
         self.finish()?;
@@ -105,6 +104,7 @@ impl<'a, 's> Head<'a, 's> {
         self.least_budget
     }
 
+    #[inline(never)]
     fn take(&mut self, observation: &[f32]) -> Result<(), StepError> {
         self.drop_step();
         self.load(observation).inspect_err(|_| self.reset())?;
@@ -136,13 +136,10 @@ impl<'a, 's> Head<'a, 's> {
         if budget < self.least_budget {
             return Err(StepError::Budget { needed: self.least_budget, given: budget });
         }
-        let ready = match self.phase {
-            Phase::Idle => return Err(StepError::NotBegun),
-            Phase::Begun(cursor) => {
-                self.advance(cursor, &mut Budget::of_poll(budget), one_op).inspect_err(|_| self.reset())?
-            }
-            Phase::Ready => true,
-        };
+        if let Phase::Idle = self.phase {
+            return Err(StepError::NotBegun);
+        }
+        let ready = self.advance(&mut Budget::of_poll(budget), one_op)?;
         Ok(if ready { Poll::Ready(self.floats(self.image.action())) } else { Poll::Pending })
     }
 
@@ -162,30 +159,29 @@ impl<'a, 's> Head<'a, 's> {
     }
 
     /// Begins a step with the observation that the arena holds.
+    #[inline(never)]
     fn start(&mut self) {
         self.phase = Phase::Begun(self.fresh());
     }
 
     /// Takes the step that was begun to its end.
-    fn finish(&mut self) -> Result<(), StepError> {
-        if let Phase::Begun(cursor) = self.phase {
-            self.advance(cursor, &mut Unlimited, false).inspect_err(|_| self.reset())?;
-        }
+    fn finish(&mut self) -> Result<(), NotFinite> {
+        self.advance(&mut Unlimited, false)?;
         Ok(())
     }
 
-    /// Goes on from `cursor` as far as the budget reaches; true when the action is ready.
-    fn advance(&mut self, mut cursor: Cursor, budget: &mut impl Meter, one_op: bool) -> Result<bool, StepError> {
-        let done = self.evaluate(&mut cursor, budget, one_op).map_err(|NotFinite| StepError::NotFinite)?;
-        if !done || budget.take(1, || Price::action(&self.image)) == 0 {
-            self.phase = Phase::Begun(cursor);
-            return Ok(false);
-        }
-        self.act()?;
-        self.phase = Phase::Ready;
-        self.played += 1;
-        if self.played == self.image.execute() {
-            self.played = 0;
+    /// Goes on as far as the budget reaches; true when the action is ready. On an error the head resets itself.
+    fn advance(&mut self, budget: &mut impl Meter, one_op: bool) -> Result<bool, NotFinite> {
+        if let Phase::Begun(_) = self.phase {
+            if !self.evaluate(budget, one_op)? || budget.take(1, || Price::action(&self.image)) == 0 {
+                return Ok(false);
+            }
+            self.act().inspect_err(|_| self.reset())?;
+            self.phase = Phase::Ready;
+            self.played += 1;
+            if self.played == self.image.execute() {
+                self.played = 0;
+            }
         }
         Ok(true)
     }
@@ -193,17 +189,17 @@ impl<'a, 's> Head<'a, 's> {
     /// The network's raw output for `observation` (`chunk * act_len` values), before the action contract. Advances the
     /// recurrent state, and drops what was left of a chunk or of a step that was begun.
     pub fn infer(&mut self, observation: &[f32]) -> Result<&[f32], StepError> {
-        self.drop_step();
+        self.take(observation)?;
+        // From the first operation on, whatever is left of a chunk.
         self.played = 0;
-        let outcome = self.load(observation).and_then(|()| {
-            let done = self.evaluate(&mut Cursor::default(), &mut Unlimited, false);
-            done.map_err(|NotFinite| StepError::NotFinite)
-        });
-        outcome.inspect_err(|_| self.reset())?;
+        self.start();
+        self.evaluate(&mut Unlimited, false)?;
+        self.phase = Phase::Idle;
         Ok(self.floats(self.image.output()))
     }
 
     /// Plays the image's self-test vector from a reset and compares every action bit for bit; resets again at the end.
+    #[inline(never)]
     pub fn self_test(&mut self) -> Result<(), StepError> {
         self.reset();
         let outcome = self.play_self_test();
@@ -227,7 +223,6 @@ impl<'a, 's> Head<'a, 's> {
     }
 
     /// Checks the observation and puts it into the arena.
-    #[inline(never)]
     fn load(&mut self, observation: &[f32]) -> Result<(), StepError> {
         let (expected, given) = (self.image.obs_len(), observation.len());
         if expected != given {
@@ -240,16 +235,17 @@ impl<'a, 's> Head<'a, 's> {
         Ok(())
     }
 
-    /// Runs operations from `cursor` on; true behind the last one.
+    /// Runs operations from where the step stands; true behind the last one. On an error the head resets itself.
     #[inline(never)]
-    fn evaluate(&mut self, cursor: &mut Cursor, budget: &mut impl Meter, one_op: bool) -> Result<bool, NotFinite> {
-        let work = self.image.work();
+    fn evaluate(&mut self, budget: &mut impl Meter, one_op: bool) -> Result<bool, NotFinite> {
+        let Phase::Begun(cursor) = &mut self.phase else { return Ok(true) };
         while cursor.op < self.image.op_count() {
             // In a checked image every record parses.
-            if let Some(op) = self.image.op(cursor.op)
-                && !(budget.enter(&op) && run(&op, self.arena, work, cursor, budget)?)
-            {
-                return Ok(false);
+            if let Ok(op) = &self.image.op(cursor.op) {
+                let done = if budget.enter(op) { run(op, self.arena, cursor, budget) } else { Ok(false) };
+                if done != Ok(true) {
+                    return done.inspect_err(|_| self.reset());
+                }
             }
             *cursor = Cursor { op: cursor.op + 1, ..Cursor::default() };
             if one_op {
@@ -259,37 +255,25 @@ impl<'a, 's> Head<'a, 's> {
         Ok(true)
     }
 
-    /// Takes the chunk's current action through the contract.
+    /// Takes the chunk's current action through the contract. Not inlined, so that the operations do not run on top of its stack.
     #[inline(never)]
-    fn act(&mut self) -> Result<(), StepError> {
-        let contract = self.image.contract();
+    fn act(&mut self) -> Result<(), NotFinite> {
         let (output, action) = (self.image.output(), self.image.action());
         let position = self.played * action.len;
-        let step_limits = if self.started { contract.max_step } else { &[] };
-        let Ok([output, action]) = self.arena.get_disjoint_mut([output.range(), action.range()]) else {
-            return Err(StepError::NotFinite);
-        };
-        let at = |array: &[u32], i: usize| array.get(i).map(|w| f32::from_bits(u32::from_le(*w)));
+        let [output, action, _] = regions(self.arena, &[output, action, Region::default()]);
+        if action.is_empty() {
+            return Err(NotFinite);
+        }
         for (i, (action, raw)) in action.iter_mut().zip(output.iter().skip(position)).enumerate() {
-            let mut a = f32::from_bits(*raw);
-            if let Some(scale) = at(contract.scale, i) {
-                a *= scale;
-            }
-            if let Some(offset) = at(contract.offset, i) {
-                a += offset;
-            }
+            let [scale, offset, low, high, max_step] = self.image.contract_of(i);
+            let a = f32::from_bits(*raw) * scale + offset;
             if !a.is_finite() {
-                return Err(StepError::NotFinite);
+                return Err(NotFinite);
             }
-            if let Some(low) = at(contract.low, i) {
-                a = clamp(a, low, f32::MAX);
-            }
-            if let Some(high) = at(contract.high, i) {
-                a = clamp(a, f32::MIN, high);
-            }
-            if let Some(step) = at(step_limits, i) {
+            let mut a = clamp(a, low, high);
+            if self.started {
                 let last = f32::from_bits(*action);
-                a = clamp(a, last - step, last + step);
+                a = clamp(a, last - max_step, last + max_step);
             }
             *action = a.to_bits();
         }
@@ -306,101 +290,68 @@ impl<'a, 's> Head<'a, 's> {
         bytemuck::cast_slice_mut(self.words_mut(region))
     }
 
-    #[inline(never)]
     fn words_mut(&mut self, region: Region) -> &mut [u32] {
         part(self.arena, &region.range())
     }
 }
 
-/// Stands for a region that an operation has not.
-const NONE: Region = Region { offset: 0, len: 0 };
-
-/// The regions of an operation as slices; `None` where they overlap or lie outside, which the image's check has excluded.
+/// Three regions as slices; empty where they overlap or lie outside, which the image's check has excluded.
 #[inline(never)]
-fn regions(arena: &mut [u32], a: Region, b: Region, c: Region) -> Option<(&mut [u32], &mut [u32], &mut [u32])> {
-    match arena.get_disjoint_mut([a.range(), b.range(), c.range()]) {
-        Ok([a, b, c]) => Some((a, b, c)),
-        Err(_) => None,
+fn regions<'r>(arena: &'r mut [u32], regions: &[Region; 3]) -> [&'r mut [u32]; 3] {
+    match arena.get_disjoint_mut(regions.map(Region::range)) {
+        Ok([a, b, c]) => [a, b, c],
+        Err(_) => [&mut [], &mut [], &mut []],
     }
 }
 
 /// Runs an operation from where the cursor stands; true at its end. An operation whose regions do not fit, which the image's
 /// check has excluded, does nothing.
-fn run(
-    op: &Op<'_>,
-    arena: &mut [u32],
-    work: Region,
-    cursor: &mut Cursor,
-    budget: &mut impl Meter,
-) -> Result<bool, NotFinite> {
+#[inline(never)]
+fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &mut impl Meter) -> Result<bool, NotFinite> {
     let f = bytemuck::cast_slice_mut::<u32, f32>;
-    // Elements that this piece takes, and whether it is the last.
-    let mut elements = |len: usize| -> (Range<usize>, bool) {
-        let end = cursor.done + budget.take(len - cursor.done, || Price::elements(op));
-        let range = cursor.done..end;
-        cursor.done = end;
-        (range, end == len)
+    // Elements that this piece takes, or units of a norm. Linear operations have pieces of their own.
+    let (dst, len) = (op.dst(), op.units());
+    let units = match op.kind {
+        OpKind::Linear { .. } => 0,
+        _ => budget.take(len - cursor.done, || Price::units(op)),
     };
-    let done = match *op {
-        Op::Normalize { src, dst, mean, scale, pre_clip, clip } => {
-            let Some((src, dst, _)) = regions(arena, src, dst, NONE) else { return Ok(true) };
-            let (range, done) = elements(dst.len());
-            let of = |constants| <[u32]>::get(constants, range.clone()).unwrap_or(&[]);
-            norm::normalize(f(part(src, &range)), of(mean), of(scale), pre_clip, clip, f(part(dst, &range)));
-            done
-        }
-        Op::Linear { src, dst, matrix, accumulate } => {
-            let Some((src, dst, work)) = regions(arena, src, dst, work) else { return Ok(true) };
-            matrix.resume(&mut cursor.linear, budget, f(src), work, f(dst), accumulate)?
-        }
-        Op::Function { dst, function } => {
-            let Some((dst, ..)) = regions(arena, dst, NONE, NONE) else { return Ok(true) };
-            let (range, done) = elements(dst.len());
-            function.apply(f(part(dst, &range)));
-            done
-        }
-        Op::LayerNorm { dst, weight, bias, eps } => {
-            let Some((dst, ..)) = regions(arena, dst, NONE, NONE) else { return Ok(true) };
-            let all = budget.take(1, || Price::whole(op)) > 0;
-            if all {
-                norm::layer_norm(f(dst), weight, bias, eps);
-            }
-            all
-        }
-        Op::RmsNorm { dst, weight, eps } => {
-            let Some((dst, ..)) = regions(arena, dst, NONE, NONE) else { return Ok(true) };
-            let all = budget.take(1, || Price::whole(op)) > 0;
-            if all {
-                norm::rms_norm(f(dst), weight, eps);
-            }
-            all
-        }
-        Op::Add { src, dst } => {
-            let Some((src, dst, _)) = regions(arena, src, dst, NONE) else { return Ok(true) };
-            let (range, done) = elements(dst.len());
-            norm::add(f(part(src, &range)), f(part(dst, &range)));
-            done
-        }
-        Op::Copy { src, dst } => {
-            let Some((src, dst, _)) = regions(arena, src, dst, NONE) else { return Ok(true) };
-            let (range, done) = elements(dst.len());
-            copy(part(src, &range), part(dst, &range));
-            done
-        }
-        Op::LstmCell { src, dst, cell } => {
-            let Some((src, dst, cell)) = regions(arena, src, dst, cell) else { return Ok(true) };
-            let (range, done) = elements(dst.len());
-            recurrent::lstm_elements(range, f(src), f(cell), f(dst));
-            done
-        }
-        Op::GruCell { src, dst, hidden } => {
-            let Some((src, dst, hidden)) = regions(arena, src, dst, hidden) else { return Ok(true) };
-            let (range, done) = elements(dst.len());
-            recurrent::gru_elements(range, f(src), f(hidden), f(dst));
-            done
-        }
+    let units = cursor.done..cursor.done + units;
+    cursor.done = units.end;
+    let norm = matches!(op.kind, OpKind::LayerNorm | OpKind::RmsNorm);
+    let range = if norm { 0..dst.len } else { units.clone() };
+    let [mut dst, mut src, third] = match op.src().len {
+        0 => [part(arena, &(dst.offset + range.start..dst.offset + range.end)), &mut [], &mut []],
+        _ => regions(arena, &op.regions),
     };
-    Ok(done)
+    if matches!(op.kind, OpKind::Normalize | OpKind::Add | OpKind::Copy) {
+        (dst, src) = (part(dst, &range), part(src, &range));
+    }
+    match op.kind {
+        OpKind::Linear { accumulate } => {
+            let Ok(matrix) = &op.linear_matrix() else { return Ok(true) };
+            return matrix.resume(&mut cursor.linear, budget, f(src), third, f(dst), accumulate);
+        }
+        OpKind::Function(function) => function.apply(f(dst)),
+        OpKind::Add => norm::add(f(src), f(dst)),
+        OpKind::Copy => copy(src, dst),
+        OpKind::LstmCell => {
+            recurrent::lstm_elements(range.clone(), f(src), f(third), f(dst));
+        }
+        OpKind::GruCell => {
+            recurrent::gru_elements(range.clone(), f(src), f(third), f(dst));
+        }
+        kind => {
+            // An RMS norm has but one array.
+            let (first, second, constant) = (op.part(0, &range), op.part(1, &range), op.constant(0));
+            let (moments, done) = (&mut cursor.moments, units.clone());
+            match kind {
+                OpKind::LayerNorm => norm::layer_norm_units(done, moments, f(dst), first, second, constant),
+                OpKind::RmsNorm => norm::rms_norm_units(done, moments, f(dst), first, constant),
+                _ => norm::normalize(f(src), first, second, constant, op.constant(1), f(dst)),
+            }
+        }
+    }
+    Ok(units.end == len)
 }
 
 /// Some of a region's words.

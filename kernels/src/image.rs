@@ -3,8 +3,10 @@
 //! [`Image::new_checked`] verifies everything; afterwards no accessor panics or fails. Offsets in the image count 32-bit words
 //! from its start, offsets in the arena (the scratch memory) count words too.
 
+use core::ops::Range;
+
 use crate::error::ImageError;
-use crate::format::{Block, BlockShape, LAYOUT_STAMP, Lanes, Width};
+use crate::format::{Block, BlockShape, LAYOUT_STAMP, Width};
 use crate::linear::{Matrix, RowBlock, worst_case, worst_case_bound};
 use crate::math::Function;
 
@@ -111,7 +113,7 @@ pub enum Kind {
 }
 
 /// A region of the arena.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Region {
     /// First word.
     pub offset: usize,
@@ -130,94 +132,140 @@ impl Region {
     }
 }
 
-/// An operation with its constants.
-#[derive(Clone, Copy, Debug)]
-pub enum Op<'a> {
-    /// `dst = clamp((clamp(src, ±pre_clip) - mean) * scale, ±clip)`
-    Normalize {
-        /// Input.
-        src: Region,
-        /// Output of the same length.
-        dst: Region,
-        /// Means (f32 bits).
-        mean: &'a [u32],
-        /// Reciprocals of the standard deviation (f32 bits).
-        scale: &'a [u32],
-        /// Limit before; infinite where there is none.
-        pre_clip: f32,
-        /// Limit after; infinite where there is none.
-        clip: f32,
-    },
-    /// `dst = W src + b`, or `dst += W src + b`
+/// What an operation does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OpKind {
+    /// `dst = clamp((clamp(src, ±pre_clip) - mean) * scale, ±clip)`. Constants: `pre_clip`, `clip`, infinite where there is no
+    /// limit; arrays: `mean`, `scale`, the reciprocals of the standard deviation.
+    Normalize,
+    /// `dst = W src + b`
     Linear {
-        /// Input.
-        src: Region,
-        /// Output.
-        dst: Region,
-        /// The weights.
-        matrix: Matrix<'a>,
-        /// Add to what `dst` holds.
+        /// `dst += W src + b` instead.
         accumulate: bool,
     },
     /// `dst = f(dst)`
-    Function {
-        /// In place.
-        dst: Region,
-        /// Which one.
-        function: Function,
-    },
-    /// `dst = layer_norm(dst)`
-    LayerNorm {
-        /// In place.
-        dst: Region,
-        /// Weights (f32 bits).
-        weight: &'a [u32],
-        /// Biases (f32 bits).
-        bias: &'a [u32],
-        /// Added to the variance.
-        eps: f32,
-    },
-    /// `dst = rms_norm(dst)`
-    RmsNorm {
-        /// In place.
-        dst: Region,
-        /// Weights (f32 bits).
-        weight: &'a [u32],
-        /// Added to the mean square.
-        eps: f32,
-    },
+    Function(Function),
+    /// `dst = layer_norm(dst)`. Constant: what is added to the variance; arrays: weights, biases.
+    LayerNorm,
+    /// `dst = rms_norm(dst)`. Constant: what is added to the mean square; array: weights.
+    RmsNorm,
     /// `dst += src`
-    Add {
-        /// Addend.
-        src: Region,
-        /// In place.
-        dst: Region,
-    },
+    Add,
     /// `dst = src`
-    Copy {
-        /// From.
-        src: Region,
-        /// To.
-        dst: Region,
-    },
-    /// An LSTM cell: `src` holds the four gates, `dst` is the hidden state, `cell` the cell state.
-    LstmCell {
-        /// Gates `[i f g o]`.
-        src: Region,
-        /// Hidden state.
-        dst: Region,
-        /// Cell state.
-        cell: Region,
-    },
-    /// A GRU cell: `src` holds `W_ih x + b_ih`, `hidden` holds `W_hh h + b_hh`, `dst` is the state.
-    GruCell {
-        /// Gates `[r z n]` of the input.
-        src: Region,
-        /// State.
-        dst: Region,
-        /// Gates `[r z n]` of the state.
-        hidden: Region,
-    },
+    Copy,
+    /// An LSTM cell: `src` holds the four gates `[i f g o]`, `dst` is the hidden state, `third` the cell state.
+    LstmCell,
+    /// A GRU cell: `src` holds `W_ih x + b_ih`, `third` holds `W_hh h + b_hh`, each of gates `[r z n]`, `dst` is the state.
+    GruCell,
+}
+
+/// What the record of a kind of operation holds.
+#[derive(Debug)]
+struct Form {
+    /// With the detail 0.
+    kind: OpKind,
+    /// Of a function, [`Function::from_code`] decides.
+    max_detail: u8,
+    /// Lengths of `src` and of the third region in lengths of `dst`; 0 where there is none. (Linear has its own length.)
+    src: u8,
+    third: u8,
+    /// Single constants, and arrays of the length of `dst` behind them.
+    constants: u8,
+    arrays: u8,
+}
+
+impl Form {
+    const fn new(kind: OpKind, max_detail: u8, [src, third]: [u8; 2], [constants, arrays]: [u8; 2]) -> Self {
+        Self { kind, max_detail, src, third, constants, arrays }
+    }
+}
+
+/// By operation code, from 1 on.
+static FORMS: [Form; 9] = [
+    Form::new(OpKind::Normalize, 0, [1, 0], [2, 2]),
+    Form::new(OpKind::Linear { accumulate: false }, 1, [1, 0], [0, 0]),
+    Form::new(OpKind::Function(Function::Relu), u8::MAX, [0, 0], [0, 0]),
+    Form::new(OpKind::LayerNorm, 0, [0, 0], [1, 2]),
+    Form::new(OpKind::RmsNorm, 0, [0, 0], [1, 1]),
+    Form::new(OpKind::Add, 0, [1, 0], [0, 0]),
+    Form::new(OpKind::Copy, 0, [1, 0], [0, 0]),
+    Form::new(OpKind::LstmCell, 0, [4, 1], [0, 0]),
+    Form::new(OpKind::GruCell, 0, [3, 3], [0, 0]),
+];
+
+/// An operation of an image.
+#[derive(Clone, Copy, Debug)]
+pub struct Op<'a> {
+    /// What it does.
+    pub kind: OpKind,
+    /// [`Self::dst`], [`Self::src`], [`Self::third`].
+    pub(crate) regions: [Region; 3],
+    record: &'a [u32; h::OP_WORDS],
+    form: &'static Form,
+    /// The image's words.
+    image: &'a [u32],
+}
+
+impl<'a> Op<'a> {
+    /// What it writes. Where there is no [`Self::src`], it works in place.
+    pub fn dst(&self) -> Region {
+        self.regions[0]
+    }
+
+    /// What it reads, or empty.
+    pub fn src(&self) -> Region {
+        self.regions[1]
+    }
+
+    /// The cell's other region, or the work area of a linear operation, or empty.
+    pub fn third(&self) -> Region {
+        self.regions[2]
+    }
+
+    /// The weights of a linear operation.
+    pub fn matrix(&self) -> Option<Matrix<'a>> {
+        if self.is_linear() { self.linear_matrix().ok() } else { None }
+    }
+
+    /// As [`Self::matrix`], of a linear operation. (Within a checked image never an error.)
+    pub(crate) fn linear_matrix(&self) -> Result<Matrix<'a>, ImageError> {
+        matrix(self.image, self.data())
+    }
+
+    /// Single constant `i`: see [`OpKind`].
+    pub fn constant(&self, i: usize) -> f32 {
+        self.image.get(self.data() + i).map_or(0.0, |word| f32::from_bits(u32::from_le(*word)))
+    }
+
+    /// Array `i` of f32 bits, of the length of `dst`: see [`OpKind`].
+    pub fn array(&self, i: usize) -> &'a [u32] {
+        self.part(i, &(0..self.dst().len))
+    }
+
+    /// What the operation can be cut into: elements, each once for every pass over them.
+    pub(crate) fn units(&self) -> usize {
+        self.dst().len
+            * match self.kind {
+                OpKind::LayerNorm => 3,
+                OpKind::RmsNorm => 2,
+                _ => 1,
+            }
+    }
+
+    /// A range of array `i`.
+    pub(crate) fn part(&self, i: usize, range: &Range<usize>) -> &'a [u32] {
+        let before = usize::from(self.form.constants) + i * self.dst().len + range.start;
+        section(self.image, self.data() + before, range.len()).unwrap_or_default()
+    }
+
+    /// Offset of the constants or of the matrix record.
+    fn data(&self) -> usize {
+        u32::from_le(self.record[3]) as usize
+    }
+
+    fn is_linear(&self) -> bool {
+        matches!(self.kind, OpKind::Linear { .. })
+    }
 }
 
 /// What stands between the network's output and the robot. Arrays hold f32 bits, one per action dimension, or are empty.
@@ -236,6 +284,9 @@ pub struct Contract<'a> {
     pub max_step: &'a [u32],
 }
 
+/// Arrays of the action contract.
+const CONTRACT_ARRAYS: usize = 5;
+
 /// A checked image.
 #[derive(Clone, Copy, Debug)]
 pub struct Image<'a> {
@@ -249,6 +300,7 @@ impl<'a> Image<'a> {
     ///
     /// Checks the checksum, every section, every operation, all constants, and that no row can overflow its int32
     /// accumulator for any activations. Time is linear in the image's length.
+    #[inline(never)]
     pub fn new_checked(bytes: &'a [u8]) -> Result<Self, ImageError> {
         if bytes.as_ptr().align_offset(4) != 0 {
             return Err(ImageError::Misaligned);
@@ -287,39 +339,20 @@ impl<'a> Image<'a> {
         u32::from_le(self.header[i])
     }
 
-    fn low(&self, i: usize) -> usize {
-        low(self.word(i))
-    }
-
-    fn high(&self, i: usize) -> usize {
-        high(self.word(i))
-    }
-
-    fn float(&self, i: usize) -> f32 {
-        f32::from_bits(self.word(i))
-    }
-
-    #[inline(never)]
+    /// As [`section`]; empty where that refuses.
     fn section(&self, offset: usize, len: usize) -> &'a [u32] {
-        offset.checked_add(len).and_then(|end| self.words.get(offset..end)).unwrap_or(&[])
+        section(self.words, offset, len).unwrap_or_default()
     }
 
-    /// `len` words at `offset`, refused where they are not all in the image.
-    #[inline(never)]
+    /// As [`section`].
     fn checked(&self, offset: usize, len: usize) -> Result<&'a [u32], ImageError> {
-        let section = self.section(offset, len);
-        if section.len() == len && (len == 0 || offset >= h::WORDS) { Ok(section) } else { Err(ImageError::Section) }
+        section(self.words, offset, len).ok_or(ImageError::Section)
     }
 
     /// `len` f32 constants at `offset`, refused where one is not finite.
     #[inline(never)]
-    fn constants(&self, offset: usize, len: usize) -> Result<&'a [u32], ImageError> {
-        let section = self.checked(offset, len)?;
-        if section.iter().all(|&w| f32::from_bits(u32::from_le(w)).is_finite()) {
-            Ok(section)
-        } else {
-            Err(ImageError::Constant)
-        }
+    fn constants(&self, offset: usize, len: usize) -> Result<(), ImageError> {
+        finite(self.checked(offset, len)?)
     }
 
     /// Length of an observation.
@@ -359,15 +392,19 @@ impl<'a> Image<'a> {
 
     /// The policy's name.
     pub fn name(&self) -> &'a str {
+        self.name_bytes().and_then(|bytes| core::str::from_utf8(bytes).ok()).unwrap_or_default()
+    }
+
+    fn name_bytes(&self) -> Option<&'a [u8]> {
         let len = high(self.head(h::W_STEPS_NAME));
-        let bytes: &[u8] = bytemuck::cast_slice(self.section(self.head(h::W_NAME) as usize, len.div_ceil(4)));
-        core::str::from_utf8(bytes.get(..len).unwrap_or(&[])).unwrap_or("")
+        let words = section(self.words, self.head(h::W_NAME) as usize, len.div_ceil(4))?;
+        bytemuck::cast_slice(words).get(..len)
     }
 
     /// SHA-256 of the source policy (policy.json, then policy.safetensors).
     pub fn digest(&self) -> [u8; 32] {
         let mut digest = [0; 32];
-        for (out, word) in digest.chunks_exact_mut(4).zip(self.section(h::W_DIGEST, 8)) {
+        for (out, word) in digest.chunks_exact_mut(4).zip(self.header.iter().skip(h::W_DIGEST)) {
             out.copy_from_slice(&word.to_ne_bytes());
         }
         digest
@@ -426,20 +463,43 @@ impl<'a> Image<'a> {
     /// The operations in order.
     pub fn ops(&self) -> impl Iterator<Item = Op<'a>> + use<'a> {
         let image = *self;
-        (0..self.op_count()).filter_map(move |i| image.op(i))
+        (0..self.op_count()).filter_map(move |i| image.op(i).ok())
     }
 
     /// The action contract.
     pub fn contract(&self) -> Contract<'a> {
+        let [scale, offset, low, high, max_step] = self.contract_arrays();
+        Contract { scale, offset, low, high, max_step }
+    }
+
+    /// The arrays of the action contract, in the order in which they apply.
+    pub fn contract_arrays(&self) -> [&'a [u32]; CONTRACT_ARRAYS] {
         let mut offset = self.head(h::W_CONTRACT) as usize;
-        let flags = high(self.head(h::W_WORK_FLAGS));
-        let mut array = |bit: usize| {
-            let len = if flags >> bit & 1 == 1 { self.act_len() } else { 0 };
-            let section = self.section(offset, len);
-            offset = offset.saturating_add(len);
-            section
-        };
-        Contract { scale: array(0), offset: array(1), low: array(2), high: array(3), max_step: array(4) }
+        core::array::from_fn(|which| {
+            let len = if self.has_contract(which) { self.act_len() } else { 0 };
+            let array = self.section(offset, len);
+            offset += array.len();
+            array
+        })
+    }
+
+    /// The contract of action `i`; numbers that change nothing stand for the arrays that it has not.
+    pub(crate) fn contract_of(&self, i: usize) -> [f32; CONTRACT_ARRAYS] {
+        let mut numbers = [1.0, -0.0, f32::NEG_INFINITY, f32::INFINITY, f32::INFINITY];
+        let (mut flags, len) = (high(self.head(h::W_WORK_FLAGS)), self.act_len());
+        let mut at = self.head(h::W_CONTRACT) as usize + i;
+        for number in &mut numbers {
+            if flags & 1 == 1 {
+                *number = f32::from_bits(self.word(at));
+                at += len;
+            }
+            flags >>= 1;
+        }
+        numbers
+    }
+
+    fn has_contract(&self, which: usize) -> bool {
+        high(self.head(h::W_WORK_FLAGS)) >> which & 1 == 1
     }
 
     /// Steps of the self-test vector.
@@ -454,64 +514,36 @@ impl<'a> Image<'a> {
         }
         let (obs, act) = (self.obs_len(), self.act_len());
         let offset = self.head(h::W_SELF_TEST) as usize + step * (obs + act);
-        Some((self.section(offset, obs), self.section(offset + obs, act)))
+        self.section(offset, obs + act).split_at_checked(obs)
     }
 
-    /// Operation `i`; `None` past the end. (Within a checked image every record parses.)
-    pub(crate) fn op(&self, i: usize) -> Option<Op<'a>> {
-        let at = self.head(h::W_OPS) as usize + i * h::OP_WORDS;
-        let head = self.word(at);
-        let (kind, detail, len) = (head as u8, (head >> 8) as u8, (head >> 16) as usize);
-        let dst = Region { offset: self.low(at + 1), len };
-        let region = |len| Region { offset: self.high(at + 1), len };
-        let extra = |len| Region { offset: self.high(at + 2), len };
-        let data = self.word(at + 3) as usize;
-        Some(match kind {
-            h::op::NORMALIZE => Op::Normalize {
-                src: region(len),
-                dst,
-                pre_clip: self.float(data),
-                clip: self.float(data + 1),
-                mean: self.section(data + 2, len),
-                scale: self.section(data + 2 + len, len),
-            },
-            h::op::LINEAR => {
-                Op::Linear { src: region(self.low(at + 2)), dst, matrix: self.matrix(data)?, accumulate: detail == 1 }
+    /// Operation `i`, refused where its record says something impossible. (Within a checked image every record parses.)
+    pub(crate) fn op(&self, i: usize) -> Result<Op<'a>, ImageError> {
+        let record = record(self.words, self.head(h::W_OPS) as usize + i * h::OP_WORDS)?;
+        let [head, places, lengths, _] = record.map(u32::from_le);
+        let (code, detail, len) = (head as u8, (head >> 8) as u8, high(head));
+        let form = FORMS.get(usize::from(code).wrapping_sub(1)).ok_or(ImageError::Op)?;
+        let [mut src, third] = [form.src, form.third].map(|times| len * usize::from(times));
+        let mut third = Region { offset: high(lengths), len: third };
+        let kind = match form.kind {
+            OpKind::Linear { .. } => {
+                (src, third) = (low(lengths), self.work());
+                OpKind::Linear { accumulate: detail == 1 }
             }
-            h::op::FUNCTION => Op::Function { dst, function: Function::from_code(detail)? },
-            h::op::LAYER_NORM => Op::LayerNorm {
-                dst,
-                eps: self.float(data),
-                weight: self.section(data + 1, len),
-                bias: self.section(data + 1 + len, len),
-            },
-            h::op::RMS_NORM => Op::RmsNorm { dst, eps: self.float(data), weight: self.section(data + 1, len) },
-            h::op::ADD => Op::Add { src: region(len), dst },
-            h::op::COPY => Op::Copy { src: region(len), dst },
-            h::op::LSTM_CELL => Op::LstmCell { src: region(4 * len), dst, cell: extra(len) },
-            h::op::GRU_CELL => Op::GruCell { src: region(3 * len), dst, hidden: extra(3 * len) },
-            _ => return None,
-        })
-    }
-
-    fn matrix(&self, at: usize) -> Option<Matrix<'a>> {
-        let (rows, cols) = (self.low(at), self.high(at));
-        let blocks = self.low(at + 2);
-        let bias = self.word(at + 3) as usize;
-        Some(Matrix {
-            rows,
-            cols,
-            group: self.low(at + 1),
-            x_max: self.high(at + 1) as u16,
-            bias: if bias == 0 { &[] } else { self.section(bias, rows) },
-            image: self.words,
-            records: self.section(at + h::MATRIX_WORDS, blocks * h::BLOCK_WORDS),
-        })
+            OpKind::Function(_) => OpKind::Function(Function::from_code(detail).ok_or(ImageError::Op)?),
+            kind => kind,
+        };
+        let dst = Region { offset: low(places), len };
+        let src = Region { offset: high(places), len: src };
+        Ok(Op { kind, regions: [dst, src, third], record, form, image: self.words })
     }
 
     fn check(&self) -> Result<(), ImageError> {
         let reserved = self.header[28] | self.header[29] | self.header[30] | self.header[31];
-        if reserved != 0 || (self.head(h::W_KIND) >> 8) as u8 != 0 || high(self.head(h::W_WORK_FLAGS)) >> 5 != 0 {
+        if reserved != 0
+            || (self.head(h::W_KIND) >> 8) as u8 != 0
+            || high(self.head(h::W_WORK_FLAGS)) >> CONTRACT_ARRAYS != 0
+        {
             return Err(ImageError::Reserved);
         }
         match (self.head(h::W_KIND) as u8, self.chunk(), self.execute()) {
@@ -523,23 +555,14 @@ impl<'a> Image<'a> {
         if self.obs_len() == 0 || self.act_len() == 0 || self.op_count() == 0 {
             return Err(ImageError::Shape);
         }
-        let (out, action) = (self.output(), self.action());
-        for region in [self.state(), self.observation(), out, action, self.work()] {
-            self.in_arena(region)?;
-        }
-        // What survives from one step to the next must not be written by anything else.
-        let (obs, work, state) = (self.observation(), self.work(), self.state());
-        let pairs =
-            [(out, action), (out, obs), (action, obs), (work, action), (work, state), (state, obs), (state, action)];
-        if pairs.iter().any(|(a, b)| a.overlaps(*b)) {
-            return Err(ImageError::Overlap);
-        }
-        if !(self.rate_hz().is_finite() && self.rate_hz() > 0.0) {
+        // What survives from one step to the next must not be written by anything else: only neighbours in this list may share
+        // memory, and the action, behind an empty region, has none.
+        let (none, action) = (Region::default(), self.action());
+        self.check_regions(&[self.state(), self.output(), self.work(), self.observation(), none, action], 2)?;
+        if !is_positive(self.rate_hz()) {
             return Err(ImageError::Constant);
         }
-        let name_len = high(self.head(h::W_STEPS_NAME));
-        let name: &[u8] = bytemuck::cast_slice(self.checked(self.head(h::W_NAME) as usize, name_len.div_ceil(4))?);
-        if !is_utf8(name.get(..name_len).unwrap_or(&[])) {
+        if !is_utf8(self.name_bytes().ok_or(ImageError::Section)?) {
             return Err(ImageError::Name);
         }
         // A head that tests nothing would report success.
@@ -556,106 +579,27 @@ impl<'a> Image<'a> {
     }
 
     fn check_contract(&self) -> Result<(), ImageError> {
-        let arrays = (high(self.head(h::W_WORK_FLAGS)) & 0x1f).count_ones() as usize;
+        let arrays = (0..CONTRACT_ARRAYS).filter(|which| self.has_contract(*which)).count();
         self.constants(self.head(h::W_CONTRACT) as usize, arrays * self.act_len())?;
-        let contract = self.contract();
-        let float = |w: &u32| f32::from_bits(u32::from_le(*w));
-        if contract.low.iter().zip(contract.high).any(|(low, high)| float(low) > float(high)) {
-            return Err(ImageError::Limits);
-        }
-        if contract.max_step.iter().any(|step| float(step) < 0.0) {
-            return Err(ImageError::Constant);
+        for i in 0..self.act_len() {
+            let [_, _, low, high, max_step] = self.contract_of(i);
+            if low > high {
+                return Err(ImageError::Limits);
+            }
+            if max_step < 0.0 {
+                return Err(ImageError::Constant);
+            }
         }
         Ok(())
     }
 
-    fn in_arena(&self, region: Region) -> Result<(), ImageError> {
-        if region.offset + region.len <= self.scratch_words() { Ok(()) } else { Err(ImageError::Arena) }
-    }
-
-    #[inline(never)]
-    fn check_op(&self, i: usize) -> Result<(), ImageError> {
-        let at = self.head(h::W_OPS) as usize + i * h::OP_WORDS;
-        let detail = (self.word(at) >> 8) as u8;
-        let data = self.word(at + 3) as usize;
-        // Shapes of the matrix are read before the op is built, so that a bad offset is named as such.
-        match self.word(at) as u8 {
-            h::op::LINEAR => self.checked(data, h::MATRIX_WORDS)?,
-            h::op::NORMALIZE | h::op::LAYER_NORM | h::op::RMS_NORM => self.checked(data, 1)?,
-            _ => &[],
-        };
-        let Some(op) = &self.op(i) else { return Err(ImageError::Op) };
-        let uses_detail = matches!(op, Op::Function { .. } | Op::Linear { .. });
-        if (!uses_detail && detail != 0) || (matches!(op, Op::Linear { .. }) && detail > 1) {
-            return Err(ImageError::Reserved);
-        }
-        // Whether the operation has a source, a source length, a third region, constants; fields that it has not are zero.
-        let has = match op {
-            Op::Linear { .. } => [true, true, false, true],
-            Op::Normalize { .. } => [true, false, false, true],
-            Op::LayerNorm { .. } | Op::RmsNorm { .. } => [false, false, false, true],
-            Op::Function { .. } => [false; 4],
-            Op::Add { .. } | Op::Copy { .. } => [true, false, false, false],
-            Op::LstmCell { .. } | Op::GruCell { .. } => [true, false, true, false],
-        };
-        let fields = [self.high(at + 1), self.low(at + 2), self.high(at + 2), data];
-        if has.iter().zip(fields).any(|(has, field)| !has && field != 0) {
-            return Err(ImageError::Reserved);
-        }
-        let clip = |x: f32| if x > 0.0 { Ok(()) } else { Err(ImageError::Constant) };
-        // In-place operations have no source; the region stands in for itself.
-        let (dst, sources) = match *op {
-            Op::Normalize { src, dst, pre_clip, clip: limit, .. } => {
-                self.checked(data, 2)?;
-                clip(pre_clip)?;
-                clip(limit)?;
-                self.constants(data + 2, 2 * dst.len)?;
-                (dst, [Some(src), None])
+    /// Refuses regions outside the arena, and those that overlap others which are `distance` or more behind them.
+    fn check_regions(&self, regions: &[Region], distance: usize) -> Result<(), ImageError> {
+        for (i, region) in regions.iter().enumerate() {
+            if region.offset + region.len > self.scratch_words() {
+                return Err(ImageError::Arena);
             }
-            Op::Linear { src, dst, ref matrix, .. } => {
-                self.check_matrix(data, matrix)?;
-                if matrix.cols != src.len || matrix.rows != dst.len {
-                    return Err(ImageError::Shape);
-                }
-                if self.work().len < matrix.prepared_words() {
-                    return Err(ImageError::Arena);
-                }
-                if self.work().overlaps(src) || self.work().overlaps(dst) {
-                    return Err(ImageError::Overlap);
-                }
-                (dst, [Some(src), None])
-            }
-            Op::Function { dst, .. } => (dst, [None, None]),
-            Op::LayerNorm { dst, eps, .. } => {
-                self.constants(data, 1 + 2 * dst.len)?;
-                clip(eps)?;
-                (dst, [None, None])
-            }
-            Op::RmsNorm { dst, eps, .. } => {
-                self.constants(data, 1 + dst.len)?;
-                clip(eps)?;
-                (dst, [None, None])
-            }
-            Op::Add { src, dst } | Op::Copy { src, dst } => (dst, [Some(src), None]),
-            Op::LstmCell { src, dst, cell: other } | Op::GruCell { src, dst, hidden: other } => {
-                if src.overlaps(other) {
-                    return Err(ImageError::Overlap);
-                }
-                (dst, [Some(src), Some(other)])
-            }
-        };
-        if dst.len == 0 {
-            return Err(ImageError::Shape);
-        }
-        self.in_arena(dst)?;
-        // The last action carries the step limit; only the contract writes it.
-        let cell_over_action = matches!(op, Op::LstmCell { cell, .. } if cell.overlaps(self.action()));
-        if dst.overlaps(self.action()) || cell_over_action {
-            return Err(ImageError::Overlap);
-        }
-        for src in sources.into_iter().flatten() {
-            self.in_arena(src)?;
-            if src.overlaps(dst) {
+            if regions.iter().skip(i + distance).any(|other| region.overlaps(*other)) {
                 return Err(ImageError::Overlap);
             }
         }
@@ -663,74 +607,133 @@ impl<'a> Image<'a> {
     }
 
     #[inline(never)]
-    fn check_matrix(&self, at: usize, matrix: &Matrix<'a>) -> Result<(), ImageError> {
-        let blocks = self.low(at + 2);
-        if self.high(at + 2) != 0 {
+    fn check_op(&self, i: usize) -> Result<(), ImageError> {
+        let op = self.op(i);
+        let op = op.as_ref().map_err(|e| *e)?;
+        let Form { max_detail, src, third, constants, arrays, .. } = *op.form;
+        // Fields that the operation has not are zero.
+        let [head, places, lengths, data] = op.record.map(u32::from_le);
+        let mut unused = if src == 0 { high(places) } else { 0 };
+        unused |= if third == 0 { high(lengths) } else { 0 };
+        if !op.is_linear() {
+            unused |= low(lengths) | if constants == 0 { data as usize } else { 0 };
+        }
+        if unused != 0 || (head >> 8) as u8 > max_detail {
             return Err(ImageError::Reserved);
         }
-        self.checked(at + h::MATRIX_WORDS, blocks * h::BLOCK_WORDS)?;
-        if matrix.rows == 0 || matrix.rows > h::MAX_ROWS || matrix.cols == 0 {
+        let n = op.dst().len;
+        if n == 0 {
             return Err(ImageError::Shape);
         }
-        if !matches!(matrix.group, 0 | 32 | 64 | 128) {
-            return Err(ImageError::Group);
+        if op.is_linear() {
+            check_linear(op)?;
         }
-        if matrix.x_max == 0 || matrix.x_max > i16::MAX as u16 {
+        let [constants, arrays] = [constants, arrays].map(usize::from);
+        let words = self.checked(op.data(), constants + arrays * n)?;
+        // Limits may be infinite, where there is none.
+        let unlimited = if op.kind == OpKind::Normalize { constants } else { 0 };
+        finite(words.get(unlimited..).unwrap_or_default())?;
+        let constants = words.get(..constants).unwrap_or_default();
+        if !constants.iter().all(|word| f32::from_bits(u32::from_le(*word)) > 0.0) {
             return Err(ImageError::Constant);
         }
-        let bias = self.word(at + 3) as usize;
-        if bias != 0 {
-            self.constants(bias, matrix.rows)?;
-        }
-        let mut seen = [0u32; h::MAX_ROWS / 32];
-        let mut first_row = 0;
-        for i in 0..blocks {
-            let record = at + h::MATRIX_WORDS + i * h::BLOCK_WORDS;
-            self.check_block(matrix, record)?;
-            let record = self.section(record, h::BLOCK_WORDS);
-            let Some(rows) = row_block(matrix, record, first_row) else { return Err(ImageError::Section) };
-            first_row += rows.block.shape().rows;
-            for row in 0..rows.block.shape().rows {
-                let output = rows.output(row);
-                let word = seen.get_mut(output / 32).ok_or(ImageError::Index)?;
-                if output >= matrix.rows || *word >> (output % 32) & 1 == 1 {
-                    return Err(ImageError::Index);
-                }
-                *word |= 1 << (output % 32);
-                let scale = rows.scale(row);
-                if !(scale.is_finite() && scale.is_sign_positive()) {
-                    return Err(ImageError::Constant);
-                }
-            }
-            if worst_case_bound(&rows.block, matrix.x_max) > i64::from(i32::MAX)
-                && worst_case(&rows.block, matrix.x_max) > i64::from(i32::MAX)
-            {
-                return Err(ImageError::Overflow);
-            }
+        self.check_regions(&op.regions, 1)?;
+        // The last action carries the step limit; only the contract writes it.
+        let written = if op.kind == OpKind::LstmCell { op.third() } else { op.dst() };
+        if op.dst().overlaps(self.action()) || written.overlaps(self.action()) {
+            return Err(ImageError::Overlap);
         }
         Ok(())
     }
+}
 
-    #[inline(never)]
-    fn check_block(&self, matrix: &Matrix<'a>, at: usize) -> Result<(), ImageError> {
-        let head = self.word(at);
-        let width = Width::from_bits(head & 0xff).ok_or(ImageError::Width)?;
-        let lanes = Lanes::from_code((head >> 8) as u8).ok_or(ImageError::Lanes)?;
-        if lanes != matrix.lanes() {
-            return Err(ImageError::Lanes);
-        }
-        let rows = (head >> 16) as usize;
-        let shape = BlockShape { width, lanes, rows, cols: matrix.cols, group: matrix.group };
-        if !shape.is_valid() || rows > matrix.rows {
-            return Err(ImageError::Shape);
-        }
-        self.checked(self.word(at + 1) as usize, shape.words())?;
-        self.checked(self.word(at + 2) as usize, rows.div_ceil(2))?;
-        if self.word(at + 3) != 0 {
-            self.checked(self.word(at + 3) as usize, rows.div_ceil(2))?;
-        }
-        Ok(())
+/// The matrix of the record at `at`, refused where the record says something impossible.
+fn matrix(image: &[u32], at: usize) -> Result<Matrix<'_>, ImageError> {
+    let [size, levels, blocks, bias] = record(image, at)?.map(u32::from_le);
+    let (rows, cols, group, x_max) = (low(size), high(size), low(levels), high(levels) as u16);
+    if rows == 0 || rows > h::MAX_ROWS || cols == 0 {
+        return Err(ImageError::Shape);
     }
+    if !matches!(group, 0 | 32 | 64 | 128) {
+        return Err(ImageError::Group);
+    }
+    if x_max == 0 || x_max > i16::MAX as u16 {
+        return Err(ImageError::Constant);
+    }
+    if high(blocks) != 0 {
+        return Err(ImageError::Reserved);
+    }
+    let section = |offset, len| section(image, offset, len).ok_or(ImageError::Section);
+    let bias = if bias == 0 { &[] } else { section(bias as usize, rows)? };
+    let records = section(at + h::MATRIX_WORDS, blocks as usize * h::BLOCK_WORDS)?;
+    Ok(Matrix { rows, cols, group, x_max, bias, image, records })
+}
+
+/// The matrix of a linear operation: its lengths, biases, blocks, the places of their rows, and their sums.
+#[inline(never)]
+fn check_linear(op: &Op<'_>) -> Result<(), ImageError> {
+    let matrix = op.linear_matrix();
+    let matrix = matrix.as_ref().map_err(|e| *e)?;
+    if matrix.cols != op.src().len || matrix.rows != op.dst().len {
+        return Err(ImageError::Shape);
+    }
+    if op.third().len < matrix.prepared_words() {
+        return Err(ImageError::Arena);
+    }
+    finite(matrix.bias)?;
+    let mut seen = [0u32; h::MAX_ROWS / 32];
+    let mut first_row = 0;
+    for record in matrix.records.as_chunks().0 {
+        let rows = row_block(matrix, record, first_row);
+        let rows = rows.as_ref().map_err(|e| *e)?;
+        first_row += rows.block.shape().rows;
+        for row in 0..rows.block.shape().rows {
+            let output = rows.output(row);
+            let word = seen.get_mut(output / 32).ok_or(ImageError::Index)?;
+            if output >= matrix.rows || *word >> (output % 32) & 1 == 1 {
+                return Err(ImageError::Index);
+            }
+            *word |= 1 << (output % 32);
+            // Magnitudes compare as their bits, and a sign is above them all.
+            if rows.scale(row).to_bits() >= f32::INFINITY.to_bits() {
+                return Err(ImageError::Constant);
+            }
+        }
+        if worst_case_bound(&rows.block, matrix.x_max) > i64::from(i32::MAX)
+            && worst_case(&rows.block, matrix.x_max) > i64::from(i32::MAX)
+        {
+            return Err(ImageError::Overflow);
+        }
+    }
+    Ok(())
+}
+
+/// `len` words at `offset`, refused where they are not all in the image and behind its header.
+#[inline(never)]
+fn section(image: &[u32], offset: usize, len: usize) -> Option<&[u32]> {
+    behind(image, offset).get(..len)
+}
+
+/// The record at `offset`.
+fn record<const N: usize>(image: &[u32], offset: usize) -> Result<&[u32; N], ImageError> {
+    behind(image, offset).first_chunk().ok_or(ImageError::Section)
+}
+
+/// What stands in the image from `offset` on, behind its header.
+fn behind(image: &[u32], offset: usize) -> &[u32] {
+    if offset < h::WORDS { &[] } else { image.get(offset..).unwrap_or_default() }
+}
+
+/// Whether a number is above 0 and finite.
+fn is_positive(x: f32) -> bool {
+    (1..f32::INFINITY.to_bits()).contains(&x.to_bits())
+}
+
+/// Refuses f32 bits that are not finite.
+#[inline(never)]
+fn finite(constants: &[u32]) -> Result<(), ImageError> {
+    let finite = constants.iter().all(|&w| f32::from_bits(u32::from_le(w)).is_finite());
+    if finite { Ok(()) } else { Err(ImageError::Constant) }
 }
 
 /// What `core::str::from_utf8` finds, in a quarter of its code.
@@ -760,24 +763,31 @@ fn is_utf8(bytes: &[u8]) -> bool {
     more == 0
 }
 
-/// The block of a record; `None` where its words do not fit its shape.
+/// The block of a record, refused where the record says something impossible.
 #[inline(never)]
-pub(crate) fn row_block<'a>(matrix: &Matrix<'a>, record: &'a [u32], first_row: usize) -> Option<RowBlock<'a>> {
-    let word = |i: usize| record.get(i).map_or(0, |w| u32::from_le(*w));
-    let rows = (word(0) >> 16) as usize;
-    let width = Width::from_bits(word(0) & 0xff)?;
-    let lanes = Lanes::from_code((word(0) >> 8) as u8)?;
+pub(crate) fn row_block<'a>(
+    matrix: &Matrix<'a>,
+    record: &[u32; h::BLOCK_WORDS],
+    first_row: usize,
+) -> Result<RowBlock<'a>, ImageError> {
+    let [head, weights, scales, index] = record.map(u32::from_le);
+    let width = Width::from_bits(head & 0xff).ok_or(ImageError::Width)?;
+    let lanes = matrix.lanes();
+    if (head >> 8) as u8 != lanes.code() {
+        return Err(ImageError::Lanes);
+    }
+    let rows = high(head);
     let shape = BlockShape { width, lanes, rows, cols: matrix.cols, group: matrix.group };
-    let section = |offset: u32, len: usize| {
-        let offset = offset as usize;
-        offset.checked_add(len).and_then(|end| matrix.image.get(offset..end))
-    };
-    Some(RowBlock {
-        block: Block::new(shape, section(word(1), shape.words())?)?,
-        scales: section(word(2), rows.div_ceil(2))?,
-        index: if word(3) == 0 { &[] } else { section(word(3), rows.div_ceil(2))? },
-        first_row,
-    })
+    if !shape.is_valid() || rows > matrix.rows {
+        return Err(ImageError::Shape);
+    }
+    let halves = |offset: u32| section(matrix.image, offset as usize, rows.div_ceil(2)).ok_or(ImageError::Section);
+    let scales = halves(scales)?;
+    let index = if index == 0 { &[] } else { halves(index)? };
+    match Block::leading(shape, behind(matrix.image, weights as usize)) {
+        Some(block) => Ok(RowBlock { block, scales, index, first_row }),
+        None => Err(ImageError::Section),
+    }
 }
 
 impl<'a> Matrix<'a> {
@@ -785,8 +795,8 @@ impl<'a> Matrix<'a> {
     pub fn blocks(&self) -> impl Iterator<Item = RowBlock<'a>> + use<'a> {
         let matrix = *self;
         let mut first_row = 0;
-        self.records.chunks_exact(h::BLOCK_WORDS).filter_map(move |record| {
-            let rows = row_block(&matrix, record, first_row)?;
+        self.records.as_chunks().0.iter().filter_map(move |record| {
+            let rows = row_block(&matrix, record, first_row).ok()?;
             first_row += rows.block.shape().rows;
             Some(rows)
         })

@@ -10,7 +10,7 @@ use core::ops::Range;
 use crate::activations::{NotFinite, Plan, Prepared, Scale, max_prepared_words};
 #[cfg(actq_fpu)]
 use crate::armv7em;
-use crate::format::{Block, Lanes, QUAD, STRIP};
+use crate::format::{Block, BlockShape, Lanes, MAX_GROUP, PAD_COLS, QUAD, STRIP};
 use crate::gemv::gemv;
 use crate::image::{header::BLOCK_WORDS, row_block};
 use crate::slice::{LinearCursor, Meter, Price, Unlimited};
@@ -216,6 +216,7 @@ impl Matrix<'_> {
     }
 
     /// As [`Self::apply`], from where `at` stands and as far as the budget reaches; true when all is done.
+    #[inline(never)]
     pub(crate) fn resume(
         &self,
         at: &mut LinearCursor,
@@ -243,7 +244,7 @@ impl Matrix<'_> {
         let mut plan: Option<Plan> = None;
         let mut first_row = 0;
         for (i, record) in self.records.as_chunks::<BLOCK_WORDS>().0.iter().enumerate() {
-            let Some(rows) = row_block(self, record, first_row) else { continue };
+            let Ok(rows) = row_block(self, record, first_row) else { continue };
             let shape = rows.block.shape();
             first_row += shape.rows;
             if i < at.block {
@@ -313,13 +314,44 @@ impl Matrix<'_> {
 /// The largest magnitude that an int32 sum of the block's rows can reach for activations up to `x_max`: the largest row sum of
 /// `|level| * scale`, times `x_max`. Exact, and so linear in the number of weights.
 pub fn worst_case(block: &Block<'_>, x_max: u16) -> i64 {
-    let shape = block.shape();
-    let row_sum = |row| -> i64 {
-        (0..shape.cols)
-            .map(|col| i64::from(block.level(row, col).unsigned_abs()) * i64::from(block.group_scale(row, col)))
-            .sum()
-    };
-    (0..shape.rows).map(row_sum).max().unwrap_or(0) * i64::from(x_max)
+    // A block of a valid shape always comes apart.
+    largest_sum(block).map_or(i64::MAX, |sum| i64::from(sum) * i64::from(x_max))
+}
+
+/// The largest row sum of `|level| * scale`. It has 31 bits, for there are at most 65535 columns of 128 * 255.
+///
+/// A strip's columns, as many of them as share a scale (or a pair of scales), are a block of their own, and the GEMV of such a block and a unit vector
+/// gives one of its columns. So no other code has to know where the codes stand.
+#[inline(never)]
+fn largest_sum(block: &Block<'_>) -> Option<u32> {
+    let mut work = [0; max_prepared_words(MAX_GROUP - 1, MAX_GROUP)];
+    let mut column = [0; STRIP];
+    let (shape, mut words) = (block.shape(), block.words());
+    let (mut first, mut largest) = (0, 0);
+    while first < shape.rows {
+        let rows = shape.strip_rows().min(shape.rows - first);
+        let (mut sums, mut start) = ([0u32; STRIP], 0);
+        while start < shape.cols {
+            let groups = 1 + usize::from(shape.layout().x.pairs);
+            let cols = (shape.cols - start).min(if shape.group == 0 { PAD_COLS } else { groups * shape.group });
+            let Some(piece) = &Block::leading(BlockShape { rows, cols, ..shape }, words) else { return None };
+            words = words.get(piece.words().len()..)?;
+            let plan = &Plan::of(piece);
+            for col in 0..cols {
+                let mut unit = [0.0; MAX_GROUP];
+                *unit.get_mut(col)? = 1.0;
+                let Some(x) = &Scale::ONE.quantize(&unit, plan, &mut work) else { return None };
+                gemv(piece, x, 0, column.get_mut(..piece.shape().padded_rows())?).ok()?;
+                for (sum, value) in sums.iter_mut().zip(&column).take(rows) {
+                    *sum += value.unsigned_abs();
+                    largest = largest.max(*sum);
+                }
+            }
+            start += cols;
+        }
+        first += rows;
+    }
+    Some(largest)
 }
 
 /// An upper bound of [`worst_case`] from the shape alone.

@@ -1,5 +1,7 @@
 //! Normalizations, and sums of vectors.
 
+use core::ops::Range;
+
 use crate::math::clamp;
 
 /// `y = clamp((clamp(x, ±pre_clip) - mean) * scale, ±clip)`; an infinite clip does nothing. `mean` and `scale` hold f32 bits.
@@ -12,16 +14,38 @@ pub fn normalize(x: &[f32], mean: &[u32], scale: &[u32], pre_clip: f32, clip: f3
     }
 }
 
+/// What a norm has summed so far: a piece of it goes on where the last one ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Moments {
+    sum: f32,
+    /// Of the squares of the differences from the mean.
+    squares: f32,
+}
+
 /// In place `(x - mean) / sqrt(variance + eps) * weight + bias`, mean and biased variance over the vector (torch's LayerNorm).
-/// Sums run in order from the first element.
-#[inline(never)]
+/// Sums run in order from the first element. Nothing is done where weights or biases are too few.
 pub fn layer_norm(x: &mut [f32], weight: &[u32], bias: &[u32], eps: f32) {
-    let mean = sum(x, |v| v) / count(x);
-    let inverse = inverse_deviation(x, mean, eps);
+    layer_norm_units(0..3 * x.len(), &mut Moments::default(), x, weight, bias, eps);
+}
+
+/// As [`layer_norm`], for some of its units: every element once to sum it, once for its square, once to norm it.
+#[inline(never)]
+pub(crate) fn layer_norm_units(
+    units: Range<usize>,
+    moments: &mut Moments,
+    x: &mut [f32],
+    weight: &[u32],
+    bias: &[u32],
+    eps: f32,
+) {
+    let [summed, squared, normed] = [0, 1, 2].map(|pass| elements(&units, pass, x.len()));
+    moments.sum = sum(moments.sum, x.get(summed).unwrap_or(&[]), |v| v);
+    let mean = moments.sum / count(x);
+    let inverse = inverse_deviation(moments, x, squared, mean, eps);
+    let (Some(weight), Some(bias)) = (weight.get(normed.clone()), bias.get(normed.clone())) else { return };
     let apply = |x: &mut f32, weight: u32, bias: u32| *x = (*x - mean) * inverse * constant(weight) + constant(bias);
-    let (Some(weight), Some(bias)) = (weight.get(..x.len()), bias.get(..x.len())) else { return };
     let ((odd, pairs), (weight, weights), (bias, biases)) =
-        (x.as_rchunks_mut::<2>(), weight.as_rchunks::<2>(), bias.as_rchunks::<2>());
+        (x.get_mut(normed).unwrap_or_default().as_rchunks_mut::<2>(), weight.as_rchunks::<2>(), bias.as_rchunks::<2>());
     if let ([x], [weight], [bias]) = (odd, weight, bias) {
         apply(x, *weight, *bias);
     }
@@ -31,20 +55,33 @@ pub fn layer_norm(x: &mut [f32], weight: &[u32], bias: &[u32], eps: f32) {
     }
 }
 
-/// In place `x / sqrt(mean(x^2) + eps) * weight`.
-#[inline(never)]
+/// In place `x / sqrt(mean(x^2) + eps) * weight`. Nothing is done where weights are too few.
 pub fn rms_norm(x: &mut [f32], weight: &[u32], eps: f32) {
-    let inverse = inverse_deviation(x, 0.0, eps);
-    for (x, &weight) in x.iter_mut().zip(weight) {
+    rms_norm_units(0..2 * x.len(), &mut Moments::default(), x, weight, eps);
+}
+
+/// As [`rms_norm`], for some of its units: every element once for its square, once to norm it.
+#[inline(never)]
+pub(crate) fn rms_norm_units(units: Range<usize>, moments: &mut Moments, x: &mut [f32], weight: &[u32], eps: f32) {
+    let [squared, normed] = [0, 1].map(|pass| elements(&units, pass, x.len()));
+    let inverse = inverse_deviation(moments, x, squared, 0.0, eps);
+    let Some(weight) = weight.get(normed.clone()) else { return };
+    for (x, &weight) in x.get_mut(normed).unwrap_or_default().iter_mut().zip(weight) {
         *x = *x * inverse * constant(weight);
     }
 }
 
-/// `1 / sqrt(mean((x - center)^2) + eps)`
+/// The elements of a pass over a vector that are among some units of all its passes.
+fn elements(units: &Range<usize>, pass: usize, len: usize) -> Range<usize> {
+    let of_pass = |unit: usize| unit.saturating_sub(pass * len).min(len);
+    of_pass(units.start)..of_pass(units.end)
+}
+
+/// `1 / sqrt(mean((x - center)^2) + eps)`, once all squares are summed; adds those of some more elements.
 #[inline(never)]
-fn inverse_deviation(x: &[f32], center: f32, eps: f32) -> f32 {
-    let squares = sum(x, |v| (v - center) * (v - center));
-    1.0 / sqrt(squares / count(x) + eps)
+fn inverse_deviation(moments: &mut Moments, x: &[f32], squared: Range<usize>, center: f32, eps: f32) -> f32 {
+    moments.squares = sum(moments.squares, x.get(squared).unwrap_or(&[]), |v| (v - center) * (v - center));
+    1.0 / sqrt(moments.squares / count(x) + eps)
 }
 
 /// `y += x`, as far as both go.
@@ -64,11 +101,11 @@ fn count(x: &[f32]) -> f32 {
     x.len().max(1) as f32
 }
 
-/// The sum in order from the first element, four in a pass.
+/// `start` and then the elements in order from the first, four in a pass.
 #[inline(always)]
-fn sum(x: &[f32], of: impl Fn(f32) -> f32) -> f32 {
+fn sum(start: f32, x: &[f32], of: impl Fn(f32) -> f32) -> f32 {
     let (rest, fours) = x.as_rchunks::<4>();
-    let sum = rest.iter().fold(0.0, |sum, v| sum + of(*v));
+    let sum = rest.iter().fold(start, |sum, v| sum + of(*v));
     fours.iter().fold(sum, |sum, [a, b, c, d]| sum + of(*a) + of(*b) + of(*c) + of(*d))
 }
 

@@ -2,13 +2,14 @@
 //!
 //! A piece is a run of units of one kind of work: strips of rows of a matrix, outputs set to their biases, elements of a
 //! function, of a cell, of a copy. Preparing a matrix's input is two pieces, its scale and its integers: neither takes longer
-//! than a strip of the rows that it is prepared for. Norms are whole.
+//! than a strip of the rows that it is prepared for.
 
 use crate::activations::Scale;
 use crate::cost::{self, Feature};
 use crate::format::Width;
-use crate::image::{Image, Op};
+use crate::image::{Image, Op, OpKind};
 use crate::linear::{Matrix, RowBlock};
+use crate::norm::Moments;
 
 /// Budgets are kept in 16ths of an instruction, so that elements of a few instructions are not rounded up by much.
 const PARTS: u32 = 16;
@@ -43,16 +44,11 @@ impl Price {
         self.first.saturating_add(self.each)
     }
 
-    /// Of an operation's elements.
-    pub(crate) fn elements(op: &Op<'_>) -> Self {
-        let (_, value, _) = cost::values(op);
-        Self::new(0, value.most())
-    }
-
-    /// Of an operation that is one piece.
-    pub(crate) fn whole(op: &Op<'_>) -> Self {
-        let (_, value, len) = cost::values(op);
-        Self::new((len as u32).saturating_mul(value.most()), 0)
+    /// Of an operation's units. A unit of a norm takes less than an element in all passes; each of its pieces computes anew what
+    /// the sums give.
+    pub(crate) fn units(op: &Op<'_>) -> Self {
+        let (operation, value, _) = cost::values(op);
+        Self::new(if op.units() == op.dst().len { 0 } else { operation.most() }, value.most())
     }
 
     /// Of finding the scale of a matrix's input.
@@ -169,16 +165,15 @@ fn entrance(op: &Op<'_>) -> u32 {
 /// The least budget with which every poll gets on.
 pub(crate) fn least_budget(image: &Image<'_>) -> u32 {
     let of_op = |op: Op<'_>| -> u32 {
-        let piece = match op {
-            Op::Linear { matrix, accumulate, .. } => {
+        let piece = match (op.kind, op.matrix()) {
+            (OpKind::Linear { accumulate }, Some(matrix)) => {
                 let start = matrix.start_values(accumulate).is_some();
                 let blocks = matrix.blocks();
                 let block = blocks.map(|r| Price::prepare(&r).least().max(Price::strips(&r, start).least()));
                 let bias = if start { 0 } else { Price::bias(accumulate).least() };
                 block.fold(bias.max(Price::magnitude(&matrix).least()), u32::max)
             }
-            Op::LayerNorm { .. } | Op::RmsNorm { .. } => Price::whole(&op).least(),
-            _ => Price::elements(&op).least(),
+            _ => Price::units(&op).least(),
         };
         piece.saturating_add(entrance(&op))
     };
@@ -191,8 +186,10 @@ pub(crate) fn least_budget(image: &Image<'_>) -> u32 {
 pub(crate) struct Cursor {
     /// The operation.
     pub(crate) op: usize,
-    /// Its elements that are done.
+    /// Its elements that are done, or units of a norm.
     pub(crate) done: usize,
+    /// Of a norm.
+    pub(crate) moments: Moments,
     /// Of a linear operation.
     pub(crate) linear: LinearCursor,
 }

@@ -3,7 +3,6 @@
 use std::fmt;
 use std::path::Path;
 
-use actq_kernels::image::Op;
 use actq_kernels::{Head, Image};
 use anyhow::{Context, Result, ensure};
 use serde::Serialize;
@@ -58,13 +57,7 @@ pub struct ActivationShare {
 /// Runs the image's weights with activations in f32 over `dataset`, where the image itself has the error `nmse`.
 pub fn activation_share(image: Image<'_>, dataset: &Dataset, nmse: f64) -> Result<ActivationShare> {
     let unrounded_nmse = compare(&image, dataset, &mut Unrounded::new(image))?.nmse;
-    let limits: Vec<u16> = image
-        .ops()
-        .filter_map(|op| match op {
-            Op::Linear { matrix, .. } => Some(matrix.x_max),
-            _ => None,
-        })
-        .collect();
+    let limits: Vec<u16> = image.ops().filter_map(|op| op.matrix()).map(|matrix| matrix.x_max).collect();
     let share = if nmse > 0.0 { (nmse - unrounded_nmse) / nmse } else { 0.0 };
     let int16 = (0..limits.len()).filter(|&i| limits[i] > 127).collect();
     Ok(ActivationShare { unrounded_nmse, share, int16, linear: limits.len() })

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use actq_kernels::Image;
-use actq_kernels::image::{Kind, Op, Region};
+use actq_kernels::image::{Kind, Op, OpKind, Region};
 use actq_kernels::linear::Matrix;
 use comfy_table::{CellAlignment, Table, presets};
 
@@ -24,14 +24,7 @@ pub(crate) fn hex(bytes: &[u8]) -> String {
 pub(crate) fn distinct<'a>(image: &Image<'a>) -> Vec<Matrix<'a>> {
     let mut seen = BTreeSet::new();
     let place = |m: &Matrix<'a>| m.blocks().next().map(|rows| rows.block.rows_from(0).as_ptr() as usize);
-    image
-        .ops()
-        .filter_map(|op| match op {
-            Op::Linear { matrix, .. } => Some(matrix),
-            _ => None,
-        })
-        .filter(|m| seen.insert(place(m)))
-        .collect()
+    image.ops().filter_map(|op| op.matrix()).filter(|m| seen.insert(place(m))).collect()
 }
 
 /// A table without lines, numbers to the right.
@@ -82,19 +75,12 @@ pub fn report(image: &Image<'_>) -> String {
         ops.add_row(row(&op));
     }
     let _ = writeln!(text, "{ops}\n");
-    let contract = image.contract();
+    let contract = image.contract_arrays();
     let mut actions = table(&["action", "scale", "offset", "low", "high", "max step"]);
     for i in 0..image.act_len() {
         let cell =
             |array: &[u32]| array.get(i).map_or("-".to_owned(), |w| format!("{}", f32::from_bits(u32::from_le(*w))));
-        actions.add_row([
-            i.to_string(),
-            cell(contract.scale),
-            cell(contract.offset),
-            cell(contract.low),
-            cell(contract.high),
-            cell(contract.max_step),
-        ]);
+        actions.add_row([i.to_string()].into_iter().chain(contract.map(cell)));
     }
     let _ = writeln!(text, "{actions}");
     text
@@ -102,43 +88,40 @@ pub fn report(image: &Image<'_>) -> String {
 
 /// The name of an operation.
 pub fn op_name(op: &Op<'_>) -> &'static str {
-    match op {
-        Op::Normalize { .. } => "normalize",
-        Op::Linear { .. } => "linear",
-        Op::Function { function, .. } => function.name(),
-        Op::LayerNorm { .. } => "layernorm",
-        Op::RmsNorm { .. } => "rmsnorm",
-        Op::Add { .. } => "add",
-        Op::Copy { .. } => "copy",
-        Op::LstmCell { .. } => "lstm cell",
-        Op::GruCell { .. } => "gru cell",
+    match op.kind {
+        OpKind::Normalize => "normalize",
+        OpKind::Linear { .. } => "linear",
+        OpKind::Function(function) => function.name(),
+        OpKind::LayerNorm => "layernorm",
+        OpKind::RmsNorm => "rmsnorm",
+        OpKind::Add => "add",
+        OpKind::Copy => "copy",
+        OpKind::LstmCell => "lstm cell",
+        OpKind::GruCell => "gru cell",
     }
 }
 
 fn row(op: &Op<'_>) -> Vec<String> {
-    let region = |r: &Region| format!("{}+{}", r.offset, r.len);
-    let line = |dst: &Region, src: Option<&Region>, detail: String| {
-        vec![op_name(op).to_owned(), region(dst), src.map_or(String::new(), region), detail]
-    };
-    match op {
-        Op::Normalize { src, dst, pre_clip, clip, .. } => line(dst, Some(src), format!("clip {pre_clip} {clip}")),
-        Op::Linear { src, dst, matrix, accumulate } => {
-            let detail = format!("{}x{}{}", matrix.rows, matrix.cols, if *accumulate { " added" } else { "" });
-            let mut cells = line(dst, Some(src), detail);
-            cells.extend([
-                widths(matrix),
-                group_name(matrix.group),
-                matrix.x_max.to_string(),
-                matrix.weight_bytes().to_string(),
-            ]);
-            cells
+    let region = |r: Region| if r.len > 0 { format!("{}+{}", r.offset, r.len) } else { String::new() };
+    let matrix = op.matrix();
+    let detail = match (op.kind, &matrix) {
+        (OpKind::Linear { accumulate }, Some(matrix)) => {
+            format!("{}x{}{}", matrix.rows, matrix.cols, if accumulate { " added" } else { "" })
         }
-        Op::Function { dst, .. } => line(dst, None, String::new()),
-        Op::LayerNorm { dst, eps, .. } => line(dst, None, format!("eps {eps}")),
-        Op::RmsNorm { dst, eps, .. } => line(dst, None, format!("eps {eps}")),
-        Op::Add { src, dst } => line(dst, Some(src), String::new()),
-        Op::Copy { src, dst } => line(dst, Some(src), String::new()),
-        Op::LstmCell { src, dst, cell } => line(dst, Some(src), format!("cell {}", region(cell))),
-        Op::GruCell { src, dst, hidden } => line(dst, Some(src), format!("gates {}", region(hidden))),
+        (OpKind::Normalize, _) => format!("clip {} {}", op.constant(0), op.constant(1)),
+        (OpKind::LayerNorm | OpKind::RmsNorm, _) => format!("eps {}", op.constant(0)),
+        (OpKind::LstmCell, _) => format!("cell {}", region(op.third())),
+        (OpKind::GruCell, _) => format!("gates {}", region(op.third())),
+        _ => String::new(),
+    };
+    let mut cells = vec![op_name(op).to_owned(), region(op.dst()), region(op.src()), detail];
+    if let Some(matrix) = &matrix {
+        cells.extend([
+            widths(matrix),
+            group_name(matrix.group),
+            matrix.x_max.to_string(),
+            matrix.weight_bytes().to_string(),
+        ]);
     }
+    cells
 }

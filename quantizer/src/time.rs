@@ -77,11 +77,8 @@ impl StepTime {
             microseconds: 1e6 * cost.cycles as f64 / clock_hz,
         };
         let of_op = |op: Op<'_>| {
-            let (output, macs) = match op {
-                Op::Linear { dst, matrix, .. } => (dst.len, matrix.rows * matrix.cols),
-                _ => (cost::values(&op).2, 0),
-            };
-            time(crate::inspect::op_name(&op), output, macs, cost::of_op(&op))
+            let macs = op.matrix().map_or(0, |matrix| matrix.rows * matrix.cols);
+            time(crate::inspect::op_name(&op), op.dst().len, macs, cost::of_op(&op))
         };
         let frame = time("step", image.act_len(), 0, cost::of_frame(image));
         let ops: Vec<OpTime> = image.ops().map(of_op).chain([frame]).collect();

@@ -1,7 +1,7 @@
 //! An image's network with its activations in f32: what is left of the error when only the weights are quantized.
 
 use actq_kernels::dequantize::row_f32;
-use actq_kernels::image::{Op, Region};
+use actq_kernels::image::{Op, OpKind};
 use actq_kernels::linear::Matrix;
 use actq_kernels::{Image, norm, recurrent};
 use ndarray::{Array2, ArrayView1};
@@ -19,10 +19,7 @@ impl<'a> Unrounded<'a> {
     /// Takes the weights out of an image.
     pub fn new(image: Image<'a>) -> Self {
         let ops: Vec<Op<'a>> = image.ops().collect();
-        let weights = ops.iter().map(|op| match op {
-            Op::Linear { matrix, .. } => dequantized(matrix),
-            _ => Array2::default((0, 0)),
-        });
+        let weights = ops.iter().map(|op| op.matrix().map_or(Array2::default((0, 0)), |matrix| dequantized(&matrix)));
         Self { image, weights: weights.collect(), ops, arena: vec![0.0; image.scratch_words()] }
     }
 
@@ -55,39 +52,26 @@ fn dequantized(matrix: &Matrix<'_>) -> Array2<f32> {
 }
 
 fn run(op: &Op<'_>, weights: &Array2<f32>, arena: &mut [f32]) {
-    let copy = |arena: &[f32], region: Region| arena[region.range()].to_vec();
-    match *op {
-        Op::Normalize { src, dst, mean, scale, pre_clip, clip } => {
-            let x = copy(arena, src);
-            norm::normalize(&x, mean, scale, pre_clip, clip, &mut arena[dst.range()]);
-        }
-        Op::Linear { src, dst, matrix, accumulate } => {
-            let product = weights.dot(&ArrayView1::from(&arena[src.range()]));
-            for (row, (y, sum)) in arena[dst.range()].iter_mut().zip(product).enumerate() {
+    // An LSTM cell writes its third region, too.
+    let (x, mut third) = (arena[op.src().range()].to_vec(), arena[op.third().range()].to_vec());
+    let y = &mut arena[op.dst().range()];
+    match op.kind {
+        OpKind::Normalize => norm::normalize(&x, op.array(0), op.array(1), op.constant(0), op.constant(1), y),
+        OpKind::Linear { accumulate } => {
+            let Some(matrix) = op.matrix() else { return };
+            for (row, (y, sum)) in y.iter_mut().zip(weights.dot(&ArrayView1::from(&x))).enumerate() {
                 *y = if accumulate { *y } else { 0.0 } + matrix.bias(row) + sum;
             }
         }
-        Op::Function { dst, function } => function.apply(&mut arena[dst.range()]),
-        Op::LayerNorm { dst, weight, bias, eps } => norm::layer_norm(&mut arena[dst.range()], weight, bias, eps),
-        Op::RmsNorm { dst, weight, eps } => norm::rms_norm(&mut arena[dst.range()], weight, eps),
-        Op::Add { src, dst } => {
-            let x = copy(arena, src);
-            arena[dst.range()].iter_mut().zip(x).for_each(|(y, x)| *y += x);
-        }
-        Op::Copy { src, dst } => {
-            let x = copy(arena, src);
-            arena[dst.range()].copy_from_slice(&x);
-        }
-        Op::LstmCell { src, dst, cell } => {
-            let (gates, mut c) = (copy(arena, src), copy(arena, cell));
-            recurrent::lstm_cell(&gates, &mut c, &mut arena[dst.range()]);
-            arena[cell.range()].copy_from_slice(&c);
-        }
-        Op::GruCell { src, dst, hidden } => {
-            let (a, b) = (copy(arena, src), copy(arena, hidden));
-            recurrent::gru_cell(&a, &b, &mut arena[dst.range()]);
-        }
+        OpKind::Function(function) => function.apply(y),
+        OpKind::LayerNorm => norm::layer_norm(y, op.array(0), op.array(1), op.constant(0)),
+        OpKind::RmsNorm => norm::rms_norm(y, op.array(0), op.constant(0)),
+        OpKind::Add => norm::add(&x, y),
+        OpKind::Copy => y.copy_from_slice(&x),
+        OpKind::LstmCell => recurrent::lstm_cell(&x, &mut third, y),
+        OpKind::GruCell => recurrent::gru_cell(&x, &third, y),
     }
+    arena[op.third().range()].copy_from_slice(&third);
 }
 
 #[cfg(test)]

@@ -19,7 +19,7 @@ use actq_host_tests::profile;
 use actq_host_tests::qemu::{self, Counter, Target};
 use actq_kernels::Width;
 use actq_kernels::cost::{self, Cost, Feature};
-use actq_kernels::image::Op;
+use actq_kernels::image::{Op, OpKind};
 use actq_kernels::math::Function;
 use anyhow::Result;
 
@@ -175,9 +175,9 @@ fn measure(
         sample("begin".to_owned(), parts.begin, 0.0, features(|add| cost::begin(&image, add)));
         sample("action".to_owned(), parts.action, 1.0, features(|add| cost::action(&image, add)));
         for ((cost, of_op), op) in parts.ops.into_iter().zip(&of_ops).zip(&ops) {
-            let what = match op {
-                Op::Linear { matrix, .. } => format!("{}x{}", matrix.rows, matrix.cols),
-                _ => format!("{} of {}", cost::values(op).1, cost::values(op).2),
+            let what = match op.matrix() {
+                Some(matrix) => format!("{}x{}", matrix.rows, matrix.cols),
+                None => format!("{} of {}", cost::values(op).1, cost::values(op).2),
             };
             sample(what, cost, 1.0, of_op.clone());
         }
@@ -197,8 +197,8 @@ fn features(list: impl FnOnce(&mut dyn FnMut(Feature, usize))) -> BTreeMap<Featu
 
 /// Pieces of an operation where the budget is ample.
 fn pieces(op: &Op<'_>) -> usize {
-    let Op::Linear { matrix, accumulate, .. } = op else { return 1 };
-    let bias = matrix.start_values(*accumulate).is_none();
+    let (OpKind::Linear { accumulate }, Some(matrix)) = (op.kind, op.matrix()) else { return 1 };
+    let bias = matrix.start_values(accumulate).is_none();
     let mut widths: Vec<Width> = matrix.blocks().map(|rows| rows.block.shape().width).collect();
     let blocks = widths.len();
     widths.dedup();
