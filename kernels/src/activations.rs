@@ -96,7 +96,7 @@ impl Plan {
                 end: words - (padded - read) / 2 - (format.sum && shape.group == 0) as usize,
                 extra: match shape.lanes {
                     _ if format.sum => 0usize.wrapping_sub(chunks * format.starts[0].bias as usize),
-                    Lanes::Single if shape.group == 0 => 0,
+                    crate::format::Lanes::Single if shape.group == 0 => 0,
                     _ => 4 * starts + 2 * first,
                 },
                 // Passes and steps are powers of two, and chunks that are longer than a pass are whole passes.

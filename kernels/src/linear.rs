@@ -320,8 +320,8 @@ pub fn worst_case(block: &Block<'_>, x_max: u16) -> i64 {
 
 /// The largest row sum of `|level| * scale`. It has 31 bits, for there are at most 65535 columns of 128 * 255.
 ///
-/// A strip's columns, as many of them as share a scale (or a pair of scales), are a block of their own, and the GEMV of such a block and a unit vector
-/// gives one of its columns. So no other code has to know where the codes stand.
+/// A strip's columns, as many of them as share a scale (or two where groups are taken in pairs), are a block of their own, and the
+/// GEMV of such a block and a unit vector gives one of its columns. So no other code has to know where the codes stand.
 #[inline(never)]
 fn largest_sum(block: &Block<'_>) -> Option<u32> {
     let mut work = [0; max_prepared_words(MAX_GROUP - 1, MAX_GROUP)];
