@@ -3,7 +3,7 @@
 use actq_host_tests::golden::{self, Case, Draw, Random};
 use actq_kernels::activations::{NotFinite, Plan, Prepared, Scale, prepare};
 use actq_kernels::dequantize;
-use actq_kernels::format::{Block, BlockShape, Lanes, STRIP, Width, pack};
+use actq_kernels::format::{Block, BlockShape, Lanes, MAX_PAIRED_GROUPED, STRIP, Width, pack};
 use actq_kernels::gemv::{BACKEND, Backend, Mismatch, gemv};
 use actq_kernels::linear::{RowBlock, worst_case, worst_case_bound};
 use actq_kernels::{portable, reference};
@@ -139,6 +139,7 @@ fn shapes_and_lengths_that_do_not_fit_are_refused() {
         BlockShape { cols: 0, ..shape },
         BlockShape { group: 16, ..shape },
         BlockShape { lanes: Lanes::Paired, group: 64, ..shape },
+        BlockShape { lanes: Lanes::Paired, group: 32, cols: MAX_PAIRED_GROUPED + 1, ..shape },
         BlockShape { cols: 1 << 16, ..shape },
     ] {
         assert!(Block::new(bad, &vec![0; bad.words()]).is_none(), "{bad:?}");

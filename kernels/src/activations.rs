@@ -70,14 +70,16 @@ impl Plan {
     const fn of_valid(shape: BlockShape) -> Self {
         let layout = shape.layout();
         let format = &layout.x;
-        let read = round_up(shape.cols, shape.step());
-        // Two groups where they are taken in pairs.
-        let pair_log = if shape.group == 0 { 0 } else { format.pairs as u32 };
-        let group = shape.group << pair_log;
-        let padded = round_up(read, if group > layout.pad { group } else { layout.pad });
-        let (group, groups) = match group {
-            0 => (padded, 1),
-            group => (group, div_down(padded, group)),
+        let (read, padded, group, groups, run) = if shape.group == 0 {
+            let read = round_up(shape.cols, layout.step);
+            let padded = round_up(read, layout.pad);
+            (read, padded, padded, 1, format.run)
+        } else {
+            let read = round_up(shape.cols, shape.step());
+            // Two groups where they are taken in pairs.
+            let group = shape.group << format.pairs as u32;
+            let padded = round_up(read, group);
+            (read, padded, group, div_down(padded, group), format.run << format.pairs as u32)
         };
         let before = (group - 1) >> layout.chunk_log;
         let (chunks, first) = (before + 1, group - (before << layout.chunk_log));
@@ -100,7 +102,7 @@ impl Plan {
                     _ => 4 * starts + 2 * first,
                 },
                 // Passes and steps are powers of two, and chunks that are longer than a pass are whole passes.
-                skip: (0usize.wrapping_sub(read) & ((format.run << pair_log) - 1)) >> layout.step_log,
+                skip: (0usize.wrapping_sub(read) & (run - 1)) >> layout.step_log,
             },
         }
     }

@@ -52,6 +52,10 @@ pub const QUAD: usize = 4;
 /// Rows of the highest strip: runs of rows that are computed together start at multiples of this.
 pub const STRIP: usize = 8;
 
+/// Columns that a block of paired lanes may have with group scales. The 2-bit kernel sums twice a row's products
+/// (`w2_paired`), `2 * 3 * 127 * 255` a column at most, in an int32.
+pub const MAX_PAIRED_GROUPED: usize = 11_052;
+
 /// Activations are padded with zeros to a multiple of this many columns, which every layout's unit divides.
 pub const PAD_COLS: usize = 32;
 
@@ -322,7 +326,7 @@ impl Layout {
             strip: F::STRIP,
             step: F::STEP,
             x: F::X,
-            pad: if F::X.chunk == XFormat::ALL { PAD_COLS } else { 1 },
+            pad: if F::X.chunk == XFormat::ALL { PAD_COLS } else { F::STEP },
             chunk_log: F::X.chunk.trailing_zeros(),
             #[cfg(actq_armv7em)]
             strip_log: F::STRIP.trailing_zeros(),
@@ -383,13 +387,15 @@ pub struct BlockShape {
 }
 
 impl BlockShape {
-    /// Whether the lengths are usable: rows and columns from 1 to 65535 and a group that the lanes know.
+    /// Whether the lengths are usable: rows and columns from 1 to 65535 and a group that the lanes know; with groups in paired
+    /// lanes at most [`MAX_PAIRED_GROUPED`] columns.
     pub const fn is_valid(self) -> bool {
-        let group = match self.lanes {
-            Lanes::Single => matches!(self.group, 0 | 32 | 64 | MAX_GROUP),
-            Lanes::Paired => matches!(self.group, 0 | 32),
+        let (group, cols) = match self.lanes {
+            Lanes::Single => (matches!(self.group, 0 | 32 | 64 | MAX_GROUP), 0xffff),
+            Lanes::Paired => (self.group == 0 || self.group == 32, MAX_PAIRED_GROUPED),
         };
-        self.rows >= 1 && self.rows <= 0xffff && self.cols >= 1 && self.cols <= 0xffff && group
+        let cols = if self.group == 0 { 0xffff } else { cols };
+        self.rows >= 1 && self.rows <= 0xffff && self.cols >= 1 && self.cols <= cols && group
     }
 
     #[inline(always)]

@@ -203,8 +203,9 @@ impl Writer {
             let group_scales: Vec<u8> =
                 rows.iter().flat_map(|r| &matrix.group_scales[r * groups..][..groups]).copied().collect();
             let mut words = vec![0; shape.words()];
-            format::pack(*shape, &codes, &group_scales, &mut words)
-                .context("a matrix has a shape that cannot be packed")?;
+            format::pack(*shape, &codes, &group_scales, &mut words).with_context(|| {
+                format!("{shape:?} cannot be packed; docs/FORMAT.md says how many columns may have group scales")
+            })?;
             let weights = self.push(words.into_iter().map(u32::from_le));
             let scales: Vec<u16> = rows.iter().map(|&r| matrix.scales[r].to_bits()).collect();
             let scales = self.push(half_words(&scales));

@@ -190,8 +190,8 @@ unsafe fn quantize_padded(x: *const f32, inverse: f32, plan: &Plan, out: *mut u3
     // it writes them. It writes as many start words and sums as the format has, which `quantizer` says of every layout, and where
     // it takes eight columns for a chunk, that is the format's limit and so `first` and `chunk`.
     unsafe {
-        let last = if plan.layout.x.sum { plan.shape.group as i32 } else { second.factor };
-        kernel(inverse, ROUND, x, out, plan.groups, plan.chunks, first, chunk, start.bias, start.factor, last);
+        let (groups, chunks, group) = (plan.groups, plan.chunks, plan.shape.group);
+        kernel(inverse, ROUND, x, out, groups, chunks, first, chunk, start.bias, start.factor, second.factor, group);
     }
 }
 
@@ -250,18 +250,18 @@ pub(crate) fn sqrt(x: f32) -> f32 {
 #[cfg(actq_fpu)]
 macro_rules! quantize_kernels {
     ($($name:ident)*) => {
-        /// Writes `groups` groups of `chunks` chunks, the first of `first` times eight values and the others of `eights`. `last` is
-        /// the second start word's factor, or, where sums are written, not 0 where those of groups are.
+        /// Writes `groups` groups of `chunks` chunks, the first of `first` times eight values and the others of `eights`. `group` is 0
+        /// where there is but one, whose sum, if any, has a word of its own.
         pub(crate) type Quantize = unsafe extern "C" fn(
             inverse: f32, round: f32, x: *const f32, out: *mut u32,
-            groups: usize, chunks: usize, first: usize, eights: usize, bias: i32, factor: i32, last: i32,
-        ) -> i32;
+            groups: usize, chunks: usize, first: usize, eights: usize, bias: i32, factor: i32, second_factor: i32, group: usize,
+        );
 
         unsafe extern "C" {
             $(fn $name(
                 inverse: f32, round: f32, x: *const f32, out: *mut u32,
-                groups: usize, chunks: usize, first: usize, eights: usize, bias: i32, factor: i32, last: i32,
-            ) -> i32;)*
+                groups: usize, chunks: usize, first: usize, eights: usize, bias: i32, factor: i32, second_factor: i32, group: usize,
+            );)*
         }
     };
 }

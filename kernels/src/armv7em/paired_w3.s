@@ -29,13 +29,13 @@
 
 @ A chunk of eight columns; afterwards r9 and r6 hold its sums t. With `sum`, the sum of x behind the chunk, in both halves of a
 @ word, goes to lr, which the second half leaves alone.
-.macro d3_chunk sum=0
+.macro d3_chunk sum=0, t0=r9, t1=r6
     ldmia.w r1!, {r6-r8}
     ldmia.w r0!, {r3-r5}
-    d3_set lr, r3, 0, r7, r9, r6
-    d3_set lr, r3, 6, r7, r6, r6
-    d3_set lr, r4, 0, r8, r9, r9
-    d3_set lr, r4, 6, r8, r6, r6
+    d3_set lr, r3, 0, r7, \t0, r6
+    d3_set lr, r3, 6, r7, \t1, r6
+    d3_set lr, r4, 0, r8, \t0, \t0
+    d3_set lr, r4, 6, r8, \t1, \t1
     .if \sum
     ldmia.w r1!, {r7, r8, lr}
     .else
@@ -43,10 +43,10 @@
     .endif
     eor r3, r3, r4, ror #2
     eor r4, r5, r4, ror #4
-    d3_set r3, r3, 10, r8, r9, r9
-    d3_set r3, r5, 0, r7, r9, r9
-    d3_set r5, r5, 6, r7, r6, r6
-    d3_set r4, r4, 10, r8, r6, r6
+    d3_set r3, r3, 10, r8, \t0, \t0
+    d3_set r3, r5, 0, r7, \t0, \t0
+    d3_set r5, r5, 6, r7, \t1, \t1
+    d3_set r4, r4, 10, r8, \t1, \t1
 .endm
 
 @ the same, then its sums are added to those of the chunks before
@@ -157,20 +157,19 @@ actq_w3_paired_group:
     strd r4, r4, [sp, #8]
     .balign 4
 2:
-    @ the first of a group's four chunks takes all four biases away
-    d3_chunk
-    sub r10, r9, #0x20000
-    sub r11, r6, #0x20000
-    pkhtb r12, r6, r9, asr #16
+    d3_chunk 0, r10, r11
+    pkhtb r12, r11, r10, asr #16
     d3_next_chunk
     d3_next_chunk
     d3_next_chunk 1
-    @ The four level sums, at most 7 * 127 * 32 = 28448: r10 and r11 of the even rows, both halves of r12 of the odd ones.
+    @ The four level sums, at most 7 * 127 * 32 = 28448: both halves of r10 of the even rows, of r12 of the odd ones. The four
+    @ chunks' biases are 2^15 in both halves of r10.
     sub r10, r10, r12, lsl #16
-    asr r10, r10, #2
     sub r11, r11, r12
     uxtah r11, r11, r12
-    asr r11, r11, #2
+    asr r10, r10, #2
+    pkhbt r10, r10, r11, lsl #14
+    eor r10, r10, #0x80008000
     sadd16 r12, r12, r12
     sadd16 r12, r12, lr
     ldr r9, [r0], #4
@@ -180,7 +179,7 @@ actq_w3_paired_group:
     ldmia.w sp, {r3-r6}
     smlabb r3, r10, r8, r3
     smlabb r4, r12, r9, r4
-    smlabt r5, r11, r8, r5
+    smlatt r5, r10, r8, r5
     smlatt r6, r12, r9, r6
     stmia.w sp, {r3-r6}
     cmp r1, lr

@@ -28,12 +28,11 @@
 .endm
 
 @ Quantizes r2 groups of r3 chunks of floats at r0; all counts are 1 or more. Writes to r1, for each chunk, its start words and
-@ its pairs, and behind the chunks of a group, where the layout asks for it, the sum of the group's integers. r0: the last of
-@ those sums.
+@ its pairs, and behind the chunks of a group, where the layout asks for it, the sum of the group's integers.
 @
 @ [sp] is how many eights the first chunk of a group has, [sp+4] how many the others; [sp+8] and [sp+12] are the first start
-@ word's bias and factor, [sp+16] the second one's factor, or, where there are sums, not 0 where they are those of
-@ groups: halves of a word, at shift 2 of the two chunks of a pair of groups, at 3 twice the group's.
+@ word's bias and factor, [sp+16] the second one's factor, [sp+20] not 0 where sums are halves of a word, at shift 2 of the two
+@ chunks of a pair of groups, at 3 twice the group's.
 @
 @ r4-r7 pairs, r8 sum of a chunk, r9 where its start words go, r10 sum of a group, both sums times 2^shift, r11 eights left,
 @ r12 a pair of ones. r3 is kept at the frame's begin, so what was at [sp] is 40 bytes further.
@@ -85,7 +84,7 @@ actq_quantize\shift:
     subs r3, r3, #1
     bne.n 2b
     .if \sum
-    ldr r4, [sp, #56]
+    ldr r4, [sp, #60]
     asr r10, r10, #\shift
     cbz r4, 4f
     sub r10, r10, r8
@@ -95,9 +94,6 @@ actq_quantize\shift:
     .endif
     subs r2, r2, #1
     bne.n 3b
-    .if \sum
-    mov r0, r10
-    .endif
     pop {r3-r11, pc}
     .size actq_quantize\shift, . - actq_quantize\shift
 .endm
@@ -133,14 +129,13 @@ actq_quantize3:
     stmia.w r1!, {r3-r7}
     subs r8, r8, #1
     bne.n 1b
-    ldr r4, [sp, #56]
+    ldr r4, [sp, #60]
     cbz r4, 4f
     pkhbt r10, r10, r10, lsl #16
 4:
     str r10, [r1], #4
     subs r2, r2, #1
     bne.n 2b
-    mov r0, r10
     pop {r3-r11, pc}
     .size actq_quantize3, . - actq_quantize3
 

@@ -18,8 +18,8 @@
 //!
 //! With group scales, two groups' low halves without the bias and their high halves, at most `2 * 127 * 32 = 8128`, are pairs
 //! of int16 that one SMLAD each multiplies with both groups' scales (the odd rows' doubled: 510 at most). The sums over groups
-//! are modulo 2^32. The even row's is twice its level sum, which is sure to fit up to 11052 columns: `2 * 3 * 127 * 255` times
-//! as much is less than `2^31`.
+//! are modulo 2^32. The even row's is twice its level sum, at most `2 * 3 * 127 * 255` a column, which fits an int32 up to
+//! [`MAX_PAIRED_GROUPED`](super::MAX_PAIRED_GROUPED) columns, and no block has more.
 
 use super::{Cell, Format, STRIP, Start, Sums, Width, XFormat, smlad};
 
@@ -33,6 +33,7 @@ const MASK: u32 = 0xc003_c003;
 pub struct W2Paired;
 
 const _: () = assert!(W2Paired::CELL.is_full(BITS));
+const _: () = assert!(2 * 3 * 127 * 255 * (super::MAX_PAIRED_GROUPED as i64) < 1 << 31);
 const _: () = assert!(W2Paired::X.starts[0].factor.abs() * 127 * (W2Paired::X.chunk as i32) < 0x8000);
 
 /// Where a code starts in the word's ring of bits, and what makes it signed.
