@@ -70,6 +70,10 @@ impl Plan {
     const fn of_valid(shape: BlockShape) -> Self {
         let layout = shape.layout();
         let format = &layout.x;
+        #[cfg_attr(
+            not(actq_armv7em),
+            expect(unused_variables, reason = "only the assembler is told of reads and runs")
+        )]
         let (read, padded, group, groups, run) = if shape.group == 0 {
             let read = round_up(shape.cols, layout.step);
             let padded = round_up(read, layout.pad);

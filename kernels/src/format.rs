@@ -54,7 +54,7 @@ pub const STRIP: usize = 8;
 
 /// Columns that a block of paired lanes may have with group scales. The 2-bit kernel sums twice a row's products
 /// (`w2_paired`), `2 * 3 * 127 * 255` a column at most, in an int32.
-pub const MAX_PAIRED_GROUPED: usize = 11_052;
+pub const MAX_PAIRED_GROUPED: usize = 11_051;
 
 /// Activations are padded with zeros to a multiple of this many columns, which every layout's unit divides.
 pub const PAD_COLS: usize = 32;
