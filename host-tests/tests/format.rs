@@ -9,7 +9,7 @@ use actq::quantize::{Outcome, Quantized};
 use actq::runtime::{ImageBuffer, with_head};
 use actq_host_tests::root;
 use actq_kernels::activations::{Plan, max_prepared_words};
-use actq_kernels::format::{BlockShape, Lanes, Width, pack};
+use actq_kernels::format::{BlockShape, Lanes, MAX_PAIRED_GROUPED, Width, pack};
 use actq_kernels::image::{Image, Kind, OpKind, Region, block_bytes, checksum, header as h};
 use half::bf16;
 
@@ -429,7 +429,9 @@ fn the_work_area_is_as_long_as_documented() {
                 (_, false) => cols.div_ceil(group) * (group + 1),
             };
             assert_eq!(max_prepared_words(cols, group), words, "{cols} columns, groups of {group}");
-            assert_eq!(most(cols, group), Some(words), "{cols} columns, groups of {group}");
+            if group > 32 || cols <= MAX_PAIRED_GROUPED {
+                assert_eq!(most(cols, group), Some(words), "{cols} columns, groups of {group}");
+            }
         }
     }
 }

@@ -91,7 +91,7 @@
     .global actq_w2_paired_row
     .type actq_w2_paired_row, %function
     .thumb_func
-    .balign 16
+    .balign 4
 actq_w2_paired_row:
     d2_prologue
     ldr r6, [r4]
@@ -170,7 +170,7 @@ actq_w2_paired_row:
     .global actq_w2_paired_row4
     .type actq_w2_paired_row4, %function
     .thumb_func
-    .balign 16
+    .balign 4
 actq_w2_paired_row4:
     d2_prologue
     ldr r9, [sp, #112]
@@ -256,7 +256,7 @@ actq_w2_paired_row4:
     .global actq_w2_paired_group
     .type actq_w2_paired_group, %function
     .thumb_func
-    .balign 16
+    .balign 4
 actq_w2_paired_group:
     d2_prologue
     d2_zero
@@ -367,7 +367,7 @@ actq_w2_paired_group:
     .global actq_w2_paired_group4
     .type actq_w2_paired_group4, %function
     .thumb_func
-    .balign 16
+    .balign 4
 actq_w2_paired_group4:
     d2_prologue
     ldr r5, [sp, #112]

@@ -62,7 +62,7 @@
     .global actq_w3_paired_row
     .type actq_w3_paired_row, %function
     .thumb_func
-    .balign 16
+    .balign 4
 actq_w3_paired_row:
     push {r4-r11, lr}
     sub sp, sp, #52
@@ -140,7 +140,7 @@ actq_w3_paired_row:
     .global actq_w3_paired_group
     .type actq_w3_paired_group, %function
     .thumb_func
-    .balign 16
+    .balign 4
 actq_w3_paired_group:
     push {r4-r11, lr}
     sub sp, sp, #36

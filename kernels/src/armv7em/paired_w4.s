@@ -134,7 +134,7 @@
     .global actq_w4_paired_row
     .type actq_w4_paired_row, %function
     .thumb_func
-    .balign 16
+    .balign 4
 actq_w4_paired_row:
     c4_prologue 60
     ldrd r9, r10, [sp, #96]
@@ -227,7 +227,7 @@ actq_w4_paired_row:
     .global actq_w4_paired_row4
     .type actq_w4_paired_row4, %function
     .thumb_func
-    .balign 16
+    .balign 4
 actq_w4_paired_row4:
     c4_prologue 0
     mov r7, r2
@@ -274,7 +274,7 @@ actq_w4_paired_row4:
     .global \name
     .type \name, %function
     .thumb_func
-    .balign 16
+    .balign 4
 \name:
     c4_prologue 52
     ldr r4, [sp, #88]

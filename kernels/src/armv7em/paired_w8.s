@@ -53,7 +53,7 @@
     .global actq_w8_paired_row
     .type actq_w8_paired_row, %function
     .thumb_func
-    .balign 16
+    .balign 4
 actq_w8_paired_row:
     push {r4-r11, lr}
     sub sp, sp, #52
@@ -143,7 +143,7 @@ actq_w8_paired_row:
     .global actq_w8_paired_group
     .type actq_w8_paired_group, %function
     .thumb_func
-    .balign 16
+    .balign 4
 actq_w8_paired_group:
     push {r4-r11, lr}
     sub sp, sp, #44

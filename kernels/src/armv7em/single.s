@@ -185,7 +185,7 @@
     .global \name
     .type \name, %function
     .thumb_func
-    .balign 16
+    .balign 4
 \name:
     push {r4-r11, lr}
     sub sp, sp, #44
