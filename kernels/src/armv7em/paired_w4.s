@@ -3,9 +3,9 @@
 @ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1; of four rows there is one), [sp] x_end, [sp+4] bytes of the first chunk
 @ in x, [sp+8] steps of 8 columns that the first pass through the row kernel's loop leaves out.
 @
-@ In the loops: r0 weights, r1 x, r2 mask, r11 and r12 activation pairs, r6, r7, r5 the sums p, q, k of the first four rows,
-@ r8, r3, r4 those of the others (or of all in a strip of four; two are low registers, because a chunk's start values come with
-@ its first pairs), r9 and r10 weight words, lr the extracted codes.
+@ In the loops: r0 weights, r1 x, r2 mask, r6, r7, r5 the sums p, q, k of the first four rows, r8, r3, r4 those of the others (or of
+@ all in a strip of four; two are low registers, because a chunk's start values come with its first pairs), r9-r12 activation pairs
+@ and weight words, lr the extracted codes.
 @
 @ Frame of the row kernel: 0 x behind its first start words, 4-27 r3-r8 as these set them, 28 end of the first chunk, 32 acc,
 @ 36 end of acc, or, where a row has several chunks or its first pass leaves steps out, acc behind this strip, 40 end of this
@@ -33,37 +33,24 @@
     c4_word \word, \pair, r8, r3, r4, r8, r3, r4
 .endm
 
-@ Four columns of a strip. The first four of a chunk come with the start values and start all sums from them.
-.macro c4_cols4 rows, first=0
+@ Four columns of a strip of four. The first four of a chunk come with the start values and start all sums from them.
+.macro c4_cols4 first=0
     .if \first
     ldmia.w r1!, {r3, r4, r11, r12}
     .else
     ldmia.w r1!, {r11, r12}
     .endif
     ldrd r9, r10, [r0], #8
-    .if \rows == 8
-    .if \first
-    c4_word r9, r11, r6, r7, r5, r3, r3, r4
-    c4_word r10, r11, r8, r3, r4, r3, r3, r4
-    .else
-    c4_first r9, r11
-    c4_last r10, r11
-    .endif
-    ldrd r9, r10, [r0], #8
-    c4_first r9, r12
-    c4_last r10, r12
-    .else
     .if \first
     c4_word r9, r11, r8, r3, r4, r3, r3, r4
     .else
     c4_last r9, r11
     .endif
     c4_last r10, r12
-    .endif
 .endm
 
 @ Eight columns of a strip of eight, whose first pair is in r10. Loads take words for which there is room and not those of the next
-@ columns alone, so that there are five and not six. After the last eight, r10 holds the scales of the first four rows.
+@ columns alone, so that there are five and not six. After it r10 holds the next pair, unless it is the last before another load.
 .macro c4_cols8 first=0, last=0
     ldmia.w r0!, {r9, r11, r12}
     .if \first
@@ -82,7 +69,6 @@
     c4_last r9, r10
     .if \last
     ldr r9, [r1], #4
-    ldr r10, [r0], #4
     .else
     ldmia.w r1!, {r9, r10}
     .endif
@@ -156,6 +142,7 @@ actq_w4_paired_row:
     beq.n 1f
 9:
     ldmia.w sp, {r1, r3-r8}
+    ldr r10, [r1], #4
     tbh [pc, r11, lsl #1]
 7:
     .irp step, 10f, 11f, 12f, 13f
@@ -168,11 +155,13 @@ actq_w4_paired_row:
 1:
     ldmia.w sp, {r1, r3-r8}
 2:
-    .irp step, 10, 11, 12, 13
+    ldr r10, [r1], #4
+    .irp step, 10, 11, 12
 \step:
-    c4_cols4 8
-    c4_cols4 8
+    c4_cols8
     .endr
+13:
+    c4_cols8 0, 1
     ldr lr, [sp, #40]
     cmp r1, lr
     bne.w 2b
@@ -241,8 +230,8 @@ actq_w4_paired_row4:
     ldmia.w r1!, {r3, r4}
     mov r8, r3
 2:
-    c4_cols4 4
-    c4_cols4 4
+    c4_cols4
+    c4_cols4
     cmp r1, r6
     bne.n 2b
     c4_sums r8, r3, r4, r9, r10, r11, lr
@@ -300,13 +289,14 @@ actq_w4_paired_row4:
     c4_cols8
     c4_cols8
     c4_cols8 0, 1
+    ldr r10, [r0], #4
     .else
-    c4_cols4 4, 1
+    c4_cols4 1
     add r5, r1, #56
-    c4_cols4 4
+    c4_cols4
 3:
-    c4_cols4 4
-    c4_cols4 4
+    c4_cols4
+    c4_cols4
     cmp r1, r5
     bne.n 3b
     .endif
