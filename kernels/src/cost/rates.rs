@@ -2,160 +2,160 @@
 
 #[rustfmt::skip]
 pub(super) const RATES: &[[f64; 3]] = &[
-    [85.706, 150.211, 85.706], // a step, with its operations and its action aside
+    [85.707, 150.211, 85.707], // a step, with its operations and its action aside
     [8.999, 14.498, 8.999], // a value of the observation
-    [249.617, 397.195, 249.617], // an action
-    [96.496, 156.640, 96.496], // a value of the action
+    [249.611, 397.192, 249.611], // an action
+    [96.496, 156.639, 96.496], // a value of the action
     [8.036, 8.026, 8.468], // a value of an array of the action contract
-    [60.348, 101.779, 60.348], // a call that runs one operation
-    [0.000, 0.000, 60.348], // a call that runs pieces
+    [60.357, 101.783, 60.357], // a call that runs one operation
+    [0.000, 0.000, 60.357], // a call that runs pieces
     [0.000, 0.000, 0.000], // an operation that a poll comes to
-    [0.000, 0.000, 388.465], // a piece
-    [512.796, 858.188, 512.796], // a linear operation
-    [0.000, 0.000, 782.390], // a block of rows of a linear operation that a poll comes to
-    [25.960, 38.126, 25.960], // eight values compared by magnitude
-    [8.924, 12.655, 8.924], // a value compared by magnitude
+    [0.000, 0.000, 387.852], // a piece
+    [512.787, 858.197, 512.787], // a linear operation
+    [0.000, 0.000, 804.003], // a block of rows of a linear operation that a poll comes to
+    [25.961, 38.126, 25.961], // eight values compared by magnitude
+    [8.924, 12.656, 8.924], // a value compared by magnitude
     [0.000, 0.000, 0.000], // a block of rows whose order is looked at
-    [105.858, 201.198, 105.858], // a linear operation that sets its output up before the rows are added
+    [105.855, 201.194, 105.855], // a linear operation that sets its output up before the rows are added
     [1.536, 3.220, 1.536], // an output set to 0 before the rows are added
     [0.000, 0.786, 0.000], // an output set to its bias before the rows are added
-    [118.179, 192.072, 118.179], // a block of rows in order, whole strips
-    [75.634, 145.208, 75.634], // a block of rows with sums on the stack
-    [141.135, 233.284, 141.135], // a run of rows with sums on the stack
-    [45.630, 104.241, 45.630], // eight rows scaled by the assembler
-    [10.081, 21.548, 10.081], // a row in order scaled
-    [16.535, 25.607, 16.535], // a row with an index scaled
-    [527.666, 838.237, 527.666], // a normalization
+    [118.173, 192.045, 118.173], // a block of rows in order, whole strips
+    [75.626, 145.154, 75.626], // a block of rows with sums on the stack
+    [141.130, 233.301, 141.130], // a run of rows with sums on the stack
+    [45.577, 104.134, 45.577], // eight rows scaled by the assembler
+    [10.074, 21.535, 10.074], // a row in order scaled
+    [16.529, 25.594, 16.529], // a row with an index scaled
+    [527.657, 838.233, 527.657], // a normalization
     [23.998, 31.998, 24.000], // a value normalized
-    [498.593, 826.179, 498.593], // a layer norm
+    [498.584, 826.174, 498.584], // a layer norm
     [18.005, 26.751, 18.005], // a value of a layer norm
-    [422.476, 717.831, 422.476], // an RMS norm
+    [422.467, 717.827, 422.467], // an RMS norm
     [11.749, 20.499, 11.749], // a value of an RMS norm
-    [394.023, 625.754, 394.023], // an addition
+    [394.014, 625.750, 394.014], // an addition
     [6.002, 7.505, 6.002], // a value added
-    [397.558, 631.682, 397.558], // a copy
+    [397.549, 631.677, 397.549], // a copy
     [1.000, 3.500, 1.000], // a value copied
-    [358.790, 609.512, 358.790], // an LSTM cell
+    [358.782, 609.508, 358.782], // an LSTM cell
     [125.982, 224.962, 125.999], // an element of an LSTM cell
-    [357.892, 607.484, 357.892], // a GRU cell
+    [357.883, 607.479, 357.883], // a GRU cell
     [84.931, 148.942, 84.968], // an element of a GRU cell
-    [225.201, 376.921, 225.201], // a function's operation
+    [225.192, 376.929, 225.192], // a function's operation
     [5.083, 8.248, 5.802], // an element of relu
-    [18.757, 35.282, 28.986], // an element of elu
+    [18.757, 35.812, 28.986], // an element of elu
     [23.834, 48.579, 23.963], // an element of silu
-    [30.039, 51.953, 31.741], // an element of gelu
+    [30.039, 51.952, 31.741], // an element of gelu
     [27.825, 58.551, 27.963], // an element of gelu_tanh
-    [28.933, 54.723, 28.986], // an element of tanh
-    [28.915, 54.663, 28.982], // an element of sigmoid
+    [28.933, 55.721, 28.986], // an element of tanh
+    [28.915, 55.661, 28.982], // an element of sigmoid
     [0.000, 0.000, 0.000], // 2 bits single rows prepared: a vector
     [0.000, 0.000, 0.000], // 2 bits single rows prepared: a group
-    [538.524, 945.348, 538.524], // 2 bits single rows prepared: a chunk
-    [32.175, 45.882, 32.175], // 2 bits single rows prepared: eight values
-    [84.594, 125.102, 84.594], // 2 bits single rows prepared: a vector that zeros fill up
+    [538.515, 945.347, 538.515], // 2 bits single rows prepared: a chunk
+    [32.174, 45.882, 32.174], // 2 bits single rows prepared: eight values
+    [84.593, 125.095, 84.593], // 2 bits single rows prepared: a vector that zeros fill up
     [1.022, 3.534, 1.022], // 2 bits single rows prepared: a value of such a vector
-    [501.277, 847.545, 501.277], // 2 bits single groups prepared: a vector
+    [501.295, 847.558, 501.295], // 2 bits single groups prepared: a vector
     [0.000, 0.000, 0.000], // 2 bits single groups prepared: a group
-    [8.192, 25.329, 8.192], // 2 bits single groups prepared: a chunk
-    [34.071, 44.297, 34.071], // 2 bits single groups prepared: eight values
-    [91.218, 127.520, 91.218], // 2 bits single groups prepared: a vector that zeros fill up
+    [8.189, 25.330, 8.189], // 2 bits single groups prepared: a chunk
+    [34.070, 44.297, 34.070], // 2 bits single groups prepared: eight values
+    [91.224, 127.516, 91.224], // 2 bits single groups prepared: a vector that zeros fill up
     [1.067, 3.407, 1.067], // 2 bits single groups prepared: a value of such a vector
     [0.000, 0.000, 0.000], // 2 bits paired rows prepared: a vector
-    [513.141, 914.833, 513.141], // 2 bits paired rows prepared: a group
+    [513.152, 914.849, 513.152], // 2 bits paired rows prepared: a group
     [0.000, 0.000, 0.000], // 2 bits paired rows prepared: a chunk
-    [40.026, 53.781, 40.026], // 2 bits paired rows prepared: eight values
-    [86.168, 132.379, 86.168], // 2 bits paired rows prepared: a vector that zeros fill up
+    [40.023, 53.782, 40.023], // 2 bits paired rows prepared: eight values
+    [86.163, 132.375, 86.163], // 2 bits paired rows prepared: a vector that zeros fill up
     [1.023, 3.468, 1.023], // 2 bits paired rows prepared: a value of such a vector
-    [512.254, 905.914, 512.254], // 2 bits paired groups prepared: a vector
+    [512.266, 905.929, 512.266], // 2 bits paired groups prepared: a vector
     [0.000, 0.000, 0.000], // 2 bits paired groups prepared: a group
     [0.000, 0.000, 0.000], // 2 bits paired groups prepared: a chunk
-    [41.283, 54.649, 41.283], // 2 bits paired groups prepared: eight values
-    [90.349, 105.865, 90.349], // 2 bits paired groups prepared: a vector that zeros fill up
+    [41.281, 54.649, 41.281], // 2 bits paired groups prepared: eight values
+    [90.354, 105.859, 90.354], // 2 bits paired groups prepared: a vector that zeros fill up
     [1.002, 3.528, 1.002], // 2 bits paired groups prepared: a value of such a vector
     [0.000, 0.000, 0.000], // 3 bits single rows prepared: a vector
     [0.000, 0.000, 0.000], // 3 bits single rows prepared: a group
-    [518.497, 906.596, 518.497], // 3 bits single rows prepared: a chunk
+    [518.490, 906.604, 518.490], // 3 bits single rows prepared: a chunk
     [32.056, 46.121, 32.056], // 3 bits single rows prepared: eight values
-    [86.089, 126.684, 86.089], // 3 bits single rows prepared: a vector that zeros fill up
+    [86.086, 126.670, 86.086], // 3 bits single rows prepared: a vector that zeros fill up
     [0.996, 3.484, 0.996], // 3 bits single rows prepared: a value of such a vector
-    [509.834, 878.131, 509.834], // 3 bits single groups prepared: a vector
+    [509.850, 878.144, 509.850], // 3 bits single groups prepared: a vector
     [0.000, 0.000, 0.000], // 3 bits single groups prepared: a group
-    [7.732, 24.802, 7.732], // 3 bits single groups prepared: a chunk
-    [34.059, 44.060, 34.059], // 3 bits single groups prepared: eight values
-    [89.039, 121.397, 89.039], // 3 bits single groups prepared: a vector that zeros fill up
-    [1.070, 3.405, 1.070], // 3 bits single groups prepared: a value of such a vector
+    [7.728, 24.803, 7.728], // 3 bits single groups prepared: a chunk
+    [34.057, 44.060, 34.057], // 3 bits single groups prepared: eight values
+    [89.045, 121.393, 89.045], // 3 bits single groups prepared: a vector that zeros fill up
+    [1.071, 3.405, 1.071], // 3 bits single groups prepared: a value of such a vector
     [0.000, 0.000, 0.000], // 3 bits paired rows prepared: a vector
-    [486.294, 876.372, 486.294], // 3 bits paired rows prepared: a group
+    [486.318, 876.390, 486.318], // 3 bits paired rows prepared: a group
     [0.000, 0.000, 0.000], // 3 bits paired rows prepared: a chunk
-    [39.749, 55.239, 39.749], // 3 bits paired rows prepared: eight values
-    [88.263, 134.442, 88.263], // 3 bits paired rows prepared: a vector that zeros fill up
+    [39.746, 55.240, 39.746], // 3 bits paired rows prepared: eight values
+    [88.267, 134.442, 88.267], // 3 bits paired rows prepared: a vector that zeros fill up
     [0.981, 3.490, 0.981], // 3 bits paired rows prepared: a value of such a vector
-    [494.872, 884.622, 494.872], // 3 bits paired groups prepared: a vector
+    [494.883, 884.637, 494.883], // 3 bits paired groups prepared: a vector
     [0.000, 0.000, 0.000], // 3 bits paired groups prepared: a group
     [0.000, 0.000, 0.000], // 3 bits paired groups prepared: a chunk
-    [42.051, 56.449, 42.051], // 3 bits paired groups prepared: eight values
-    [85.204, 125.142, 85.204], // 3 bits paired groups prepared: a vector that zeros fill up
+    [42.049, 56.449, 42.049], // 3 bits paired groups prepared: eight values
+    [85.208, 125.139, 85.208], // 3 bits paired groups prepared: a vector that zeros fill up
     [0.998, 3.477, 0.998], // 3 bits paired groups prepared: a value of such a vector
     [0.000, 0.000, 0.000], // 4 bits single rows prepared: a vector
     [0.000, 0.000, 0.000], // 4 bits single rows prepared: a group
-    [514.834, 900.004, 514.834], // 4 bits single rows prepared: a chunk
+    [514.831, 900.006, 514.831], // 4 bits single rows prepared: a chunk
     [32.210, 45.983, 32.210], // 4 bits single rows prepared: eight values
-    [84.833, 126.105, 84.833], // 4 bits single rows prepared: a vector that zeros fill up
+    [84.832, 126.099, 84.832], // 4 bits single rows prepared: a vector that zeros fill up
     [1.005, 3.500, 1.005], // 4 bits single rows prepared: a value of such a vector
-    [497.819, 836.900, 497.819], // 4 bits single groups prepared: a vector
+    [497.837, 836.912, 497.837], // 4 bits single groups prepared: a vector
     [0.000, 0.000, 0.000], // 4 bits single groups prepared: a group
-    [8.022, 25.225, 8.022], // 4 bits single groups prepared: a chunk
-    [34.152, 44.438, 34.152], // 4 bits single groups prepared: eight values
-    [92.026, 131.078, 92.026], // 4 bits single groups prepared: a vector that zeros fill up
+    [8.018, 25.226, 8.018], // 4 bits single groups prepared: a chunk
+    [34.150, 44.438, 34.150], // 4 bits single groups prepared: eight values
+    [92.031, 131.074, 92.031], // 4 bits single groups prepared: a vector that zeros fill up
     [1.066, 3.396, 1.066], // 4 bits single groups prepared: a value of such a vector
     [0.000, 0.000, 0.000], // 4 bits paired rows prepared: a vector
-    [489.790, 849.729, 489.790], // 4 bits paired rows prepared: a group
-    [14.758, 55.937, 14.758], // 4 bits paired rows prepared: a chunk
-    [37.530, 51.138, 37.530], // 4 bits paired rows prepared: eight values
-    [91.349, 137.257, 91.349], // 4 bits paired rows prepared: a vector that zeros fill up
-    [0.971, 3.500, 0.971], // 4 bits paired rows prepared: a value of such a vector
-    [508.520, 909.286, 508.520], // 4 bits paired groups prepared: a vector
+    [489.707, 849.703, 489.707], // 4 bits paired rows prepared: a group
+    [14.813, 55.994, 14.813], // 4 bits paired rows prepared: a chunk
+    [37.535, 51.135, 37.535], // 4 bits paired rows prepared: eight values
+    [91.322, 137.222, 91.322], // 4 bits paired rows prepared: a vector that zeros fill up
+    [0.972, 3.501, 0.972], // 4 bits paired rows prepared: a value of such a vector
+    [508.529, 909.305, 508.529], // 4 bits paired groups prepared: a vector
     [0.000, 0.000, 0.000], // 4 bits paired groups prepared: a group
     [0.000, 0.000, 0.000], // 4 bits paired groups prepared: a chunk
-    [41.225, 55.093, 41.225], // 4 bits paired groups prepared: eight values
-    [85.431, 123.353, 85.431], // 4 bits paired groups prepared: a vector that zeros fill up
+    [41.224, 55.093, 41.224], // 4 bits paired groups prepared: eight values
+    [85.435, 123.354, 85.435], // 4 bits paired groups prepared: a vector that zeros fill up
     [1.003, 3.510, 1.003], // 4 bits paired groups prepared: a value of such a vector
     [0.000, 0.000, 0.000], // 8 bits single rows prepared: a vector
     [0.000, 0.000, 0.000], // 8 bits single rows prepared: a group
-    [521.534, 915.535, 521.534], // 8 bits single rows prepared: a chunk
-    [32.749, 44.613, 32.749], // 8 bits single rows prepared: eight values
-    [78.864, 109.333, 78.864], // 8 bits single rows prepared: a vector that zeros fill up
+    [521.551, 915.563, 521.551], // 8 bits single rows prepared: a chunk
+    [32.747, 44.614, 32.747], // 8 bits single rows prepared: eight values
+    [78.871, 109.338, 78.871], // 8 bits single rows prepared: a vector that zeros fill up
     [1.015, 3.506, 1.015], // 8 bits single rows prepared: a value of such a vector
-    [495.948, 831.252, 495.948], // 8 bits single groups prepared: a vector
+    [495.967, 831.265, 495.967], // 8 bits single groups prepared: a vector
     [0.000, 0.000, 0.000], // 8 bits single groups prepared: a group
-    [7.944, 25.436, 7.944], // 8 bits single groups prepared: a chunk
-    [34.158, 44.364, 34.158], // 8 bits single groups prepared: eight values
-    [92.054, 131.980, 92.054], // 8 bits single groups prepared: a vector that zeros fill up
+    [7.940, 25.438, 7.940], // 8 bits single groups prepared: a chunk
+    [34.157, 44.364, 34.157], // 8 bits single groups prepared: eight values
+    [92.059, 131.976, 92.059], // 8 bits single groups prepared: a vector that zeros fill up
     [1.067, 3.394, 1.067], // 8 bits single groups prepared: a value of such a vector
     [0.000, 0.000, 0.000], // 8 bits paired rows prepared: a vector
-    [495.006, 882.275, 495.006], // 8 bits paired rows prepared: a group
+    [495.048, 882.318, 495.048], // 8 bits paired rows prepared: a group
     [0.000, 0.000, 0.000], // 8 bits paired rows prepared: a chunk
-    [33.463, 45.732, 33.463], // 8 bits paired rows prepared: eight values
-    [84.575, 121.606, 84.575], // 8 bits paired rows prepared: a vector that zeros fill up
+    [33.462, 45.732, 33.462], // 8 bits paired rows prepared: eight values
+    [84.586, 121.620, 84.586], // 8 bits paired rows prepared: a vector that zeros fill up
     [1.022, 3.583, 1.022], // 8 bits paired rows prepared: a value of such a vector
-    [489.841, 879.231, 489.841], // 8 bits paired groups prepared: a vector
+    [489.852, 879.246, 489.852], // 8 bits paired groups prepared: a vector
     [0.000, 0.000, 0.000], // 8 bits paired groups prepared: a group
     [0.000, 0.000, 0.000], // 8 bits paired groups prepared: a chunk
-    [36.554, 49.715, 36.554], // 8 bits paired groups prepared: eight values
-    [85.280, 125.569, 85.280], // 8 bits paired groups prepared: a vector that zeros fill up
+    [36.552, 49.716, 36.552], // 8 bits paired groups prepared: eight values
+    [85.284, 125.567, 85.284], // 8 bits paired groups prepared: a vector that zeros fill up
     [0.998, 3.477, 0.998], // 8 bits paired groups prepared: a value of such a vector
-    [19.574, 44.816, 19.574], // 2 bits single rows, 4 rows: a call
+    [19.583, 44.833, 19.583], // 2 bits single rows, 4 rows: a call
     [0.000, 0.000, 0.000], // 2 bits single rows, 4 rows: a strip
-    [3.054, 3.939, 3.054], // 2 bits single rows, 4 rows: a pass or group of a strip
-    [16.252, 24.118, 16.252], // 2 bits single rows, 4 rows: a chunk of a strip
-    [4.324, 5.143, 4.324], // 2 bits single rows, 4 rows: a column of a strip
+    [3.053, 3.938, 3.053], // 2 bits single rows, 4 rows: a pass or group of a strip
+    [16.280, 24.171, 16.280], // 2 bits single rows, 4 rows: a chunk of a strip
+    [4.325, 5.143, 4.325], // 2 bits single rows, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 2 bits single rows, 8 rows: a call
     [0.000, 0.000, 0.000], // 2 bits single rows, 8 rows: a strip
     [0.000, 0.000, 0.000], // 2 bits single rows, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 2 bits single rows, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 2 bits single rows, 8 rows: a column of a strip
-    [43.859, 128.458, 43.859], // 2 bits single groups, 4 rows: a call
-    [16.592, 20.029, 16.592], // 2 bits single groups, 4 rows: a strip
-    [23.673, 40.618, 23.673], // 2 bits single groups, 4 rows: a pass or group of a strip
+    [43.849, 128.459, 43.849], // 2 bits single groups, 4 rows: a call
+    [16.619, 20.082, 16.619], // 2 bits single groups, 4 rows: a strip
+    [23.674, 40.618, 23.674], // 2 bits single groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 2 bits single groups, 4 rows: a chunk of a strip
     [4.382, 5.283, 4.382], // 2 bits single groups, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 2 bits single groups, 8 rows: a call
@@ -164,37 +164,37 @@ pub(super) const RATES: &[[f64; 3]] = &[
     [0.000, 0.000, 0.000], // 2 bits single groups, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 2 bits single groups, 8 rows: a column of a strip
     [0.000, 0.000, 0.000], // 2 bits paired rows, 4 rows: a call
-    [45.622, 65.528, 45.622], // 2 bits paired rows, 4 rows: a strip
+    [45.661, 65.579, 45.661], // 2 bits paired rows, 4 rows: a strip
     [0.000, 0.000, 0.000], // 2 bits paired rows, 4 rows: a pass or group of a strip
-    [17.183, 40.605, 17.183], // 2 bits paired rows, 4 rows: a chunk of a strip
-    [2.251, 2.904, 2.251], // 2 bits paired rows, 4 rows: a column of a strip
-    [39.297, 85.556, 39.297], // 2 bits paired rows, 8 rows: a call
-    [35.953, 30.674, 35.953], // 2 bits paired rows, 8 rows: a strip
+    [17.150, 40.594, 17.150], // 2 bits paired rows, 4 rows: a chunk of a strip
+    [2.252, 2.904, 2.252], // 2 bits paired rows, 4 rows: a column of a strip
+    [39.299, 85.556, 39.299], // 2 bits paired rows, 8 rows: a call
+    [36.005, 30.780, 36.005], // 2 bits paired rows, 8 rows: a strip
     [0.000, 0.000, 0.000], // 2 bits paired rows, 8 rows: a pass or group of a strip
-    [24.550, 48.136, 24.550], // 2 bits paired rows, 8 rows: a chunk of a strip
+    [24.550, 48.137, 24.550], // 2 bits paired rows, 8 rows: a chunk of a strip
     [3.991, 4.902, 3.991], // 2 bits paired rows, 8 rows: a column of a strip
     [0.000, 0.000, 0.000], // 2 bits paired groups, 4 rows: a call
-    [33.723, 69.598, 33.723], // 2 bits paired groups, 4 rows: a strip
-    [12.378, 0.000, 12.378], // 2 bits paired groups, 4 rows: a pass or group of a strip
+    [33.743, 69.649, 33.743], // 2 bits paired groups, 4 rows: a strip
+    [12.388, 0.000, 12.388], // 2 bits paired groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 2 bits paired groups, 4 rows: a chunk of a strip
     [2.980, 4.364, 2.980], // 2 bits paired groups, 4 rows: a column of a strip
-    [39.020, 83.691, 39.020], // 2 bits paired groups, 8 rows: a call
-    [21.265, 19.483, 21.265], // 2 bits paired groups, 8 rows: a strip
+    [39.019, 83.691, 39.019], // 2 bits paired groups, 8 rows: a call
+    [21.318, 19.589, 21.318], // 2 bits paired groups, 8 rows: a strip
     [45.564, 52.811, 45.564], // 2 bits paired groups, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 2 bits paired groups, 8 rows: a chunk of a strip
     [4.500, 5.961, 4.500], // 2 bits paired groups, 8 rows: a column of a strip
-    [39.610, 81.423, 39.610], // 3 bits single rows, 4 rows: a call
+    [39.618, 81.437, 39.618], // 3 bits single rows, 4 rows: a call
     [0.000, 0.000, 0.000], // 3 bits single rows, 4 rows: a strip
     [0.000, 0.000, 0.000], // 3 bits single rows, 4 rows: a pass or group of a strip
-    [14.945, 21.555, 14.945], // 3 bits single rows, 4 rows: a chunk of a strip
+    [14.974, 21.608, 14.974], // 3 bits single rows, 4 rows: a chunk of a strip
     [5.204, 6.170, 5.204], // 3 bits single rows, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 3 bits single rows, 8 rows: a call
     [0.000, 0.000, 0.000], // 3 bits single rows, 8 rows: a strip
     [0.000, 0.000, 0.000], // 3 bits single rows, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 3 bits single rows, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 3 bits single rows, 8 rows: a column of a strip
-    [39.124, 111.353, 39.124], // 3 bits single groups, 4 rows: a call
-    [14.526, 14.493, 14.526], // 3 bits single groups, 4 rows: a strip
+    [39.115, 111.354, 39.115], // 3 bits single groups, 4 rows: a call
+    [14.552, 14.546, 14.552], // 3 bits single groups, 4 rows: a strip
     [23.709, 40.430, 23.709], // 3 bits single groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 3 bits single groups, 4 rows: a chunk of a strip
     [5.165, 6.204, 5.165], // 3 bits single groups, 4 rows: a column of a strip
@@ -203,9 +203,9 @@ pub(super) const RATES: &[[f64; 3]] = &[
     [0.000, 0.000, 0.000], // 3 bits single groups, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 3 bits single groups, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 3 bits single groups, 8 rows: a column of a strip
-    [57.548, 109.977, 57.548], // 3 bits paired rows, 4 rows: a call
-    [21.763, 23.853, 21.763], // 3 bits paired rows, 4 rows: a strip
-    [15.467, 27.260, 15.467], // 3 bits paired rows, 4 rows: a pass or group of a strip
+    [57.536, 109.972, 57.536], // 3 bits paired rows, 4 rows: a call
+    [21.789, 23.905, 21.789], // 3 bits paired rows, 4 rows: a strip
+    [15.466, 27.261, 15.466], // 3 bits paired rows, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 3 bits paired rows, 4 rows: a chunk of a strip
     [2.958, 3.855, 2.958], // 3 bits paired rows, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 3 bits paired rows, 8 rows: a call
@@ -213,8 +213,8 @@ pub(super) const RATES: &[[f64; 3]] = &[
     [0.000, 0.000, 0.000], // 3 bits paired rows, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 3 bits paired rows, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 3 bits paired rows, 8 rows: a column of a strip
-    [46.724, 93.812, 46.724], // 3 bits paired groups, 4 rows: a call
-    [11.054, 8.084, 11.054], // 3 bits paired groups, 4 rows: a strip
+    [46.720, 93.812, 46.720], // 3 bits paired groups, 4 rows: a call
+    [11.081, 8.137, 11.081], // 3 bits paired groups, 4 rows: a strip
     [0.000, 0.000, 0.000], // 3 bits paired groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 3 bits paired groups, 4 rows: a chunk of a strip
     [3.656, 5.029, 3.656], // 3 bits paired groups, 4 rows: a column of a strip
@@ -223,18 +223,18 @@ pub(super) const RATES: &[[f64; 3]] = &[
     [0.000, 0.000, 0.000], // 3 bits paired groups, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 3 bits paired groups, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 3 bits paired groups, 8 rows: a column of a strip
-    [43.074, 89.382, 43.074], // 4 bits single rows, 4 rows: a call
+    [43.077, 89.394, 43.077], // 4 bits single rows, 4 rows: a call
     [0.000, 0.000, 0.000], // 4 bits single rows, 4 rows: a strip
-    [3.132, 4.422, 3.132], // 4 bits single rows, 4 rows: a pass or group of a strip
-    [16.330, 24.308, 16.330], // 4 bits single rows, 4 rows: a chunk of a strip
+    [3.131, 4.421, 3.131], // 4 bits single rows, 4 rows: a pass or group of a strip
+    [16.358, 24.361, 16.358], // 4 bits single rows, 4 rows: a chunk of a strip
     [4.383, 5.438, 4.383], // 4 bits single rows, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 4 bits single rows, 8 rows: a call
     [0.000, 0.000, 0.000], // 4 bits single rows, 8 rows: a strip
     [0.000, 0.000, 0.000], // 4 bits single rows, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 4 bits single rows, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 4 bits single rows, 8 rows: a column of a strip
-    [45.767, 134.337, 45.767], // 4 bits single groups, 4 rows: a call
-    [17.044, 21.293, 17.044], // 4 bits single groups, 4 rows: a strip
+    [45.756, 134.339, 45.756], // 4 bits single groups, 4 rows: a call
+    [17.071, 21.346, 17.071], // 4 bits single groups, 4 rows: a strip
     [23.755, 40.806, 23.755], // 4 bits single groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 4 bits single groups, 4 rows: a chunk of a strip
     [4.441, 5.588, 4.441], // 4 bits single groups, 4 rows: a column of a strip
@@ -244,57 +244,57 @@ pub(super) const RATES: &[[f64; 3]] = &[
     [0.000, 0.000, 0.000], // 4 bits single groups, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 4 bits single groups, 8 rows: a column of a strip
     [0.000, 0.000, 0.000], // 4 bits paired rows, 4 rows: a call
-    [33.987, 79.982, 33.987], // 4 bits paired rows, 4 rows: a strip
-    [0.000, 12.415, 0.000], // 4 bits paired rows, 4 rows: a pass or group of a strip
-    [29.027, 0.000, 29.027], // 4 bits paired rows, 4 rows: a chunk of a strip
-    [3.583, 4.596, 3.583], // 4 bits paired rows, 4 rows: a column of a strip
-    [46.048, 97.022, 46.048], // 4 bits paired rows, 8 rows: a call
+    [34.089, 80.066, 34.089], // 4 bits paired rows, 4 rows: a strip
+    [0.000, 12.324, 0.000], // 4 bits paired rows, 4 rows: a pass or group of a strip
+    [28.953, 0.000, 28.953], // 4 bits paired rows, 4 rows: a chunk of a strip
+    [3.583, 4.599, 3.583], // 4 bits paired rows, 4 rows: a column of a strip
+    [46.094, 97.064, 46.094], // 4 bits paired rows, 8 rows: a call
     [0.000, 0.000, 0.000], // 4 bits paired rows, 8 rows: a strip
-    [12.882, 23.213, 12.882], // 4 bits paired rows, 8 rows: a pass or group of a strip
-    [37.105, 30.261, 37.105], // 4 bits paired rows, 8 rows: a chunk of a strip
-    [6.414, 7.654, 6.414], // 4 bits paired rows, 8 rows: a column of a strip
+    [13.923, 24.261, 13.923], // 4 bits paired rows, 8 rows: a pass or group of a strip
+    [37.140, 30.335, 37.140], // 4 bits paired rows, 8 rows: a chunk of a strip
+    [6.287, 7.527, 6.287], // 4 bits paired rows, 8 rows: a column of a strip
     [0.000, 0.000, 0.000], // 4 bits paired groups, 4 rows: a call
-    [33.347, 62.945, 33.347], // 4 bits paired groups, 4 rows: a strip
+    [33.371, 62.993, 33.371], // 4 bits paired groups, 4 rows: a strip
     [0.000, 0.000, 0.000], // 4 bits paired groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 4 bits paired groups, 4 rows: a chunk of a strip
     [4.367, 5.910, 4.367], // 4 bits paired groups, 4 rows: a column of a strip
-    [30.948, 68.116, 30.948], // 4 bits paired groups, 8 rows: a call
-    [18.825, 10.400, 18.825], // 4 bits paired groups, 8 rows: a strip
+    [30.947, 68.107, 30.947], // 4 bits paired groups, 8 rows: a call
+    [18.879, 10.507, 18.879], // 4 bits paired groups, 8 rows: a strip
     [0.000, 0.000, 0.000], // 4 bits paired groups, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 4 bits paired groups, 8 rows: a chunk of a strip
-    [7.753, 9.970, 7.753], // 4 bits paired groups, 8 rows: a column of a strip
-    [26.658, 70.901, 26.658], // 8 bits single rows, 4 rows: a call
+    [7.753, 10.001, 7.753], // 4 bits paired groups, 8 rows: a column of a strip
+    [26.642, 70.877, 26.642], // 8 bits single rows, 4 rows: a call
     [0.000, 0.000, 0.000], // 8 bits single rows, 4 rows: a strip
-    [3.370, 6.158, 3.370], // 8 bits single rows, 4 rows: a pass or group of a strip
-    [16.607, 22.480, 16.607], // 8 bits single rows, 4 rows: a chunk of a strip
+    [3.369, 6.156, 3.369], // 8 bits single rows, 4 rows: a pass or group of a strip
+    [16.633, 22.533, 16.633], // 8 bits single rows, 4 rows: a chunk of a strip
     [4.491, 6.027, 4.491], // 8 bits single rows, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 8 bits single rows, 8 rows: a call
     [0.000, 0.000, 0.000], // 8 bits single rows, 8 rows: a strip
     [0.000, 0.000, 0.000], // 8 bits single rows, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 8 bits single rows, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 8 bits single rows, 8 rows: a column of a strip
-    [45.677, 138.339, 45.677], // 8 bits single groups, 4 rows: a call
-    [17.041, 21.219, 17.041], // 8 bits single groups, 4 rows: a strip
+    [45.666, 138.341, 45.666], // 8 bits single groups, 4 rows: a call
+    [17.067, 21.272, 17.067], // 8 bits single groups, 4 rows: a strip
     [23.775, 40.791, 23.775], // 8 bits single groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 8 bits single groups, 4 rows: a chunk of a strip
-    [4.566, 6.215, 4.566], // 8 bits single groups, 4 rows: a column of a strip
+    [4.565, 6.215, 4.565], // 8 bits single groups, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 8 bits single groups, 8 rows: a call
     [0.000, 0.000, 0.000], // 8 bits single groups, 8 rows: a strip
     [0.000, 0.000, 0.000], // 8 bits single groups, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 8 bits single groups, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 8 bits single groups, 8 rows: a column of a strip
-    [43.421, 93.014, 43.421], // 8 bits paired rows, 4 rows: a call
+    [43.383, 92.978, 43.383], // 8 bits paired rows, 4 rows: a call
     [0.000, 0.000, 0.000], // 8 bits paired rows, 4 rows: a strip
-    [14.531, 24.465, 14.531], // 8 bits paired rows, 4 rows: a pass or group of a strip
-    [23.502, 26.343, 23.502], // 8 bits paired rows, 4 rows: a chunk of a strip
+    [14.530, 24.465, 14.530], // 8 bits paired rows, 4 rows: a pass or group of a strip
+    [23.528, 26.395, 23.528], // 8 bits paired rows, 4 rows: a chunk of a strip
     [3.157, 4.526, 3.157], // 8 bits paired rows, 4 rows: a column of a strip
     [0.000, 0.000, 0.000], // 8 bits paired rows, 8 rows: a call
     [0.000, 0.000, 0.000], // 8 bits paired rows, 8 rows: a strip
     [0.000, 0.000, 0.000], // 8 bits paired rows, 8 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 8 bits paired rows, 8 rows: a chunk of a strip
     [0.000, 0.000, 0.000], // 8 bits paired rows, 8 rows: a column of a strip
-    [44.684, 89.632, 44.684], // 8 bits paired groups, 4 rows: a call
-    [11.057, 10.164, 11.057], // 8 bits paired groups, 4 rows: a strip
+    [44.680, 89.631, 44.680], // 8 bits paired groups, 4 rows: a call
+    [11.084, 10.217, 11.084], // 8 bits paired groups, 4 rows: a strip
     [0.000, 0.000, 0.000], // 8 bits paired groups, 4 rows: a pass or group of a strip
     [0.000, 0.000, 0.000], // 8 bits paired groups, 4 rows: a chunk of a strip
     [4.062, 6.091, 4.062], // 8 bits paired groups, 4 rows: a column of a strip
