@@ -50,8 +50,9 @@
 .endm
 
 @ Eight columns of a strip of eight, whose first pair is in r10. Loads take words for which there is room and not those of the next
-@ columns alone, so that there are five and not six. After it r10 holds the next pair, unless it is the last before another load.
-.macro c4_cols8 first=0, last=0
+@ columns alone, so that there are five and not six. After it r10 holds the next pair, after a last one nothing, or the scales of the
+@ first four rows: two single loads take less time side by side.
+.macro c4_cols8 first=0, last=0, scales=0
     ldmia.w r0!, {r9, r11, r12}
     .if \first
     c4_word r9, r10, r6, r7, r5, r3, r3, r4
@@ -69,6 +70,9 @@
     c4_last r9, r10
     .if \last
     ldr r9, [r1], #4
+    .if \scales
+    ldr r10, [r0], #4
+    .endif
     .else
     ldmia.w r1!, {r9, r10}
     .endif
@@ -288,8 +292,7 @@ actq_w4_paired_row4:
     c4_cols8 1
     c4_cols8
     c4_cols8
-    c4_cols8 0, 1
-    ldr r10, [r0], #4
+    c4_cols8 0, 1, 1
     .else
     c4_cols4 1
     add r5, r1, #56
