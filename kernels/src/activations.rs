@@ -49,8 +49,7 @@ pub(crate) struct Told {
     /// Where chunks are summed without being taken apart, minus the biases of all of them; for single lanes with row scales 0;
     /// else the bytes of a group's first chunk.
     pub(crate) extra: usize,
-    /// Steps that the first pass through the loop of a kernel for row scales leaves out, or the last pair of
-    /// groups.
+    /// Steps that the first pass through the loop of a kernel for row scales leaves out, or the last pair of groups.
     pub(crate) skip: usize,
 }
 

@@ -99,7 +99,7 @@ pub(crate) fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &
     let told = x.told();
     // SAFETY: the rows from `first_row` on, as many as `acc` has, are rows of the block or of its padding: that is checked before,
     // as is that `first_row` is a multiple of 8, so that a strip begins there. A block has the words of all of its rows
-    // (`Block::new`). Each call reads the words of its strips and writes as many sums. It reads the prepared vector from its
+    // (`Block::leading`). Each call reads the words of its strips and writes as many sums. It reads the prepared vector from its
     // begin to `end`, and the sums of x that stand behind where the layout has sums; both are in the vector,
     // because it was prepared for a block of this shape (`Plan::of`). The slices are of u32 and i32, so every address is a
     // multiple of 4, as LDM and LDRD demand.

@@ -119,12 +119,8 @@ pub(crate) struct QuantizeArgs {
     /// bits [default: 8000, recurrent policies 1200]
     #[arg(long, value_name = "N")]
     pub(crate) steps: Option<usize>,
-    /// Seed of everything that is drawn
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    pub(crate) seed: u64,
-    /// Threads to use; the image does not depend on it [default: all cores]
-    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
-    pub(crate) threads: usize,
+    #[command(flatten)]
+    pub(crate) run: RunArgs,
     /// Write the statistics and the allocation as JSON, for `actq inspect --stats`
     #[arg(long, value_name = "FILE")]
     pub(crate) save_stats: Option<PathBuf>,
@@ -177,10 +173,17 @@ pub(crate) struct SweepArgs {
     /// Steps of distillation for method best [default: 8000, recurrent policies 1200]
     #[arg(long, value_name = "N")]
     pub(crate) steps: Option<usize>,
+    #[command(flatten)]
+    pub(crate) run: RunArgs,
+}
+
+/// What every quantization is run with.
+#[derive(clap::Args)]
+pub(crate) struct RunArgs {
     /// Seed of everything that is drawn
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(crate) seed: u64,
-    /// Threads to use; no figure depends on it [default: all cores]
+    /// Threads to use; no result depends on it [default: all cores]
     #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
     pub(crate) threads: usize,
 }

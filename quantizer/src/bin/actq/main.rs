@@ -126,7 +126,7 @@ fn run_inspect(args: &InspectArgs) -> Result<()> {
 }
 
 fn run_sweep(args: &SweepArgs) -> Result<()> {
-    start_threads(args.threads)?;
+    start_threads(args.run.threads)?;
     let methods: Vec<Method> = args.methods.iter().map(|&m| m.into()).collect();
     let policies = args.policy_dirs.iter().map(|dir| Policy::load(dir)).collect::<Result<Vec<_>>>()?;
     let named = args.calib.is_some() || args.heldout.is_some();
@@ -146,7 +146,7 @@ fn run_sweep(args: &SweepArgs) -> Result<()> {
             methods: &methods,
             budgets: &args.bpw,
             steps: args.steps,
-            seed: args.seed,
+            seed: args.run.seed,
         };
         sweeps.push(sweep::run(&plan, |work, share| {
             bar.set_message(format!("{}: {work}", policy.name));

@@ -48,12 +48,12 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
             None => Activations::Auto,
         },
         steps: args.steps,
-        seed: args.seed,
+        seed: args.run.seed,
         forced: args.width.iter().cloned().chain(protected).collect(),
         ..Options::new(method, budget)
     };
     let started = Instant::now();
-    start_threads(args.threads)?;
+    start_threads(args.run.threads)?;
     let measure = args.max_nmse.map(|_| Measure::new(&source, calib.as_ref(), heldout.as_ref())).transpose()?;
     let bar = progress_bar()?;
     bar.set_message("calibrating");
