@@ -14,11 +14,11 @@ mod rates;
 
 use core::fmt;
 
-use crate::activations::{Extent, Plan};
-use crate::format::{BlockShape, Lanes, QUAD, STRIP, Width};
 use crate::image::{Image, Op, OpKind};
+use crate::layout::{BlockShape, Lanes, QUAD, STRIP, Width};
 use crate::linear::{Matrix, RUN, RowBlock};
 use crate::math::Function;
+use crate::x::{Extent, Plan};
 
 /// Instructions, and cycles as the project's model of the Cortex-M4 has them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -4,12 +4,12 @@
 use core::ops::Range;
 use core::task::Poll;
 
-use crate::activations::NotFinite;
 use crate::error::{HeadError, StepError};
 use crate::image::{Image, Op, OpKind, Region};
 use crate::linear::{copy, copy_le};
 use crate::math::clamp;
 use crate::slice::{Budget, Cursor, Meter, Price, Unlimited};
+use crate::x::NotFinite;
 use crate::{norm, recurrent};
 
 /// A head: an image and the scratch memory that it runs in.

@@ -6,7 +6,7 @@
 use core::ops::Range;
 
 use crate::error::ImageError;
-use crate::format::{Block, BlockShape, LAYOUT_STAMP, Width};
+use crate::layout::{Block, BlockShape, LAYOUT_STAMP, Width};
 use crate::linear::{Matrix, RowBlock, worst_case, worst_case_bound};
 use crate::math::Function;
 

@@ -7,13 +7,14 @@
 
 use core::ops::Range;
 
-use crate::activations::{NotFinite, Plan, Prepared, Scale, max_prepared_words};
-#[cfg(actq_fpu)]
-use crate::armv7em;
-use crate::format::{Block, BlockShape, Lanes, MAX_GROUP, PAD_COLS, QUAD, STRIP};
-use crate::gemv::gemv;
+use crate::arch;
+use crate::arch::gemv;
+use crate::error::NotFinite;
 use crate::image::{header::BLOCK_WORDS, row_block};
+use crate::layout::half::{bf16, half_word};
+use crate::layout::{Block, BlockShape, Lanes, MAX_GROUP, PAD_COLS, QUAD, STRIP};
 use crate::slice::{LinearCursor, Meter, Price, Unlimited};
+use crate::x::{Plan, Prepared, Scale, max_prepared_words};
 
 /// Rows whose sums stand on the stack at once.
 pub(crate) const RUN: usize = 8 * STRIP;
@@ -50,25 +51,9 @@ pub struct RowBlock<'a> {
     pub first_row: usize,
 }
 
-/// Half `i` of a run of packed u16.
-#[inline(always)]
-pub(crate) fn half_word(words: &[u32], i: usize) -> u16 {
-    let word = words.get(i / 2).copied().unwrap_or(0);
-    (u32::from_le(word) >> (16 * (i % 2))) as u16
-}
-
-/// The value of a bf16, which is the upper half of an f32.
-#[inline(always)]
-fn bf16(bits: u16) -> f32 {
-    f32::from_bits(u32::from(bits) << 16)
-}
-
 /// `to = from`, as far as both go. On the target not by memcpy, which takes as much code as a kernel.
 pub(crate) fn copy(from: &[u32], to: &mut [u32]) {
-    #[cfg(actq_armv7em)]
-    crate::armv7em::copy(from, to);
-    #[cfg(not(actq_armv7em))]
-    to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
+    arch::copy(from, to);
 }
 
 /// As [`copy`], of words as they stand in the image.
@@ -174,14 +159,7 @@ impl RowBlock<'_> {
 
     /// Turns the sums of as many rows as `y` has, from `first` on, into results. What is `None` stands in y itself.
     fn scale_in_order(&self, first: usize, sums: Option<&[i32]>, x_scale: f32, start: Option<&[u32]>, y: &mut [f32]) {
-        #[cfg(actq_fpu)]
-        armv7em::scale(sums, start, self.scales.get(first / 2..).unwrap_or(&[]), x_scale, y);
-        #[cfg(not(actq_fpu))]
-        for (i, y) in y.iter_mut().enumerate() {
-            let start = start.and_then(|s| s.get(i)).map_or(*y, |bits| f32::from_bits(u32::from_le(*bits)));
-            let sum = sums.and_then(|s| s.get(i)).map_or(y.to_bits() as i32, |sum| *sum);
-            *y = start + sum as f32 * (self.scale(first + i) * x_scale);
-        }
+        arch::scale(sums, start, self.scales.get(first / 2..).unwrap_or(&[]), x_scale, y);
     }
 
     /// Adds the sums of the rows from `first` on, scaled, to what stands at the rows' places.

@@ -4,12 +4,12 @@
 //! function, of a cell, of a copy. Preparing a matrix's input is two pieces, its scale and its integers: neither takes longer
 //! than a strip of the rows that it is prepared for.
 
-use crate::activations::Scale;
 use crate::cost::{self, Feature};
-use crate::format::Width;
 use crate::image::{Image, Op, OpKind};
+use crate::layout::Width;
 use crate::linear::{Matrix, RowBlock};
 use crate::norm::Moments;
+use crate::x::Scale;
 
 /// Budgets are kept in 16ths of an instruction, so that elements of a few instructions are not rounded up by much.
 const PARTS: u32 = 16;

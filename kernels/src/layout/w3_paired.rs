@@ -18,10 +18,8 @@
 //! holds `8*sum((code - 3.5) * x) + 0x8000`: at most `8 * 3.5 * 127 * 8 = 28448` away from the middle after a chunk of 8
 //! columns. All else is as in [`super::w2_paired`].
 
-use super::{Cell, Format, QUAD, Start, Sums, Width, XFormat, smlad};
-
-/// Bits of a code.
-pub const BITS: u32 = 3;
+use super::format::{Cell, Format, QUAD, Start, Sums, XLayout, smlad};
+use super::width::Width;
 
 /// The codes of a set.
 const MASK: u32 = 0xe007_e007;
@@ -33,7 +31,7 @@ const SPARE: u32 = 0x1e00_1e00;
 /// The 3-bit layout of paired lanes.
 pub struct W3Paired;
 
-const _: () = assert!(W3Paired::CELL.is_full(BITS));
+const _: () = assert!(W3Paired::CELL.is_full(W3Paired::WIDTH.bits()));
 const _: () = assert!(W3Paired::X.starts[0].factor.abs() * 127 * (W3Paired::X.chunk as i32) < 0x8000);
 
 /// The sets of a cell.
@@ -74,7 +72,7 @@ impl Format for W3Paired {
     const CELL: Cell = Cell { rows: 4, cols: 8, words: 3 };
     const STRIP: usize = QUAD;
     const STEP: usize = 8;
-    const X: XFormat = XFormat {
+    const X: XLayout = XLayout {
         shift: 3,
         run: 64,
         chunk: 8,

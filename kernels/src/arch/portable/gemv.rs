@@ -3,11 +3,12 @@
 //! The loops are written for a compiler that has few registers and knows the layout: a strip's cells are walked side by side,
 //! so that an activation is loaded once for all of them, and lengths are constants wherever the layout gives them.
 
-use crate::activations::Prepared;
-use crate::format::{Block, Format, QUAD, Sums, XFormat, with_format};
+use crate::arch::Product;
+use crate::layout::{Block, Format, QUAD, Sums, XLayout, with_format};
+use crate::x::Prepared;
 
-/// As [`crate::gemv::gemv`], for lengths that were checked there.
-pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i32]) {
+/// As [`crate::arch::gemv`].
+pub fn gemv(Product { block, x, first_row, acc }: Product<'_>) {
     with_format!(block.shape(), strips::<_>(block, x, first_row, acc));
 }
 
@@ -79,7 +80,7 @@ fn strip_of<F: Format, const CELLS: usize>(mut words: &[u32], mut x: &[u32], len
         let (mut group, x_sum) = split(group, group.len().wrapping_sub(usize::from(F::X.sum)));
         let mut sums = [[0i32; QUAD]; CELLS];
         let length = F::X.start_words + F::X.chunk / 2;
-        if F::X.chunk == XFormat::ALL {
+        if F::X.chunk == XLayout::ALL {
             chunk::<F, CELLS>(weights, group, pass, &mut sums);
         } else {
             // All chunks but the first have a length that the compiler knows.

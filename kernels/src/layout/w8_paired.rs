@@ -12,10 +12,8 @@
 //! Both start from `-128 * sum(x)`, and the odd row's sum is their difference over 2^8. It has 24 bits as long as
 //! `128 * 127 * 512 = 8323072` is below `2^23 = 8388608`: a chunk has up to 512 columns.
 
-use super::{Cell, Format, QUAD, Start, Sums, Width, XFormat, smlad};
-
-/// Bits of a code.
-pub const BITS: u32 = 8;
+use super::format::{Cell, Format, QUAD, Start, Sums, XLayout, smlad};
+use super::width::Width;
 
 /// The even row in both lanes: what UXTB16 extracts.
 const EVEN: u32 = 0x00ff_00ff;
@@ -23,7 +21,7 @@ const EVEN: u32 = 0x00ff_00ff;
 /// The 8-bit layout of paired lanes.
 pub struct W8Paired;
 
-const _: () = assert!(W8Paired::CELL.is_full(BITS));
+const _: () = assert!(W8Paired::CELL.is_full(W8Paired::WIDTH.bits()));
 const _: () = assert!(Width::W8.max_level() * 127 * (W8Paired::X.chunk as i32) < 1 << 23);
 
 /// First bit and offset of a code.
@@ -37,7 +35,7 @@ impl Format for W8Paired {
     const CELL: Cell = Cell { rows: 2, cols: 2, words: 1 };
     const STRIP: usize = QUAD;
     const STEP: usize = 8;
-    const X: XFormat = XFormat {
+    const X: XLayout = XLayout {
         shift: 0,
         run: 64,
         chunk: 512,

@@ -8,10 +8,8 @@
 //! pair   3     2     1     0     3     2   1   0  3    (bits 1-16: even columns; bits 17-31 and 0: odd columns)
 //! ```
 
-use super::{Cell, Format, QUAD, Sums, Width, XFormat, smlad};
-
-/// Bits of a code.
-pub const BITS: u32 = 4;
+use super::format::{Cell, Format, QUAD, Sums, XLayout, smlad};
+use super::width::Width;
 
 /// The doubled code of both lanes.
 const MASK: u32 = 0x001e_001e;
@@ -19,7 +17,7 @@ const MASK: u32 = 0x001e_001e;
 /// The 4-bit layout of single lanes.
 pub struct W4;
 
-const _: () = assert!(W4::CELL.is_full(BITS));
+const _: () = assert!(W4::CELL.is_full(W4::WIDTH.bits()));
 
 /// Where a column's code starts in the word's ring of bits.
 const fn bit(col: usize) -> u32 {
@@ -31,7 +29,7 @@ impl Format for W4 {
     const CELL: Cell = Cell { rows: 1, cols: 8, words: 1 };
     const STRIP: usize = QUAD;
     const STEP: usize = 8;
-    const X: XFormat = XFormat::single(-15);
+    const X: XLayout = XLayout::single(-15);
 
     fn insert(words: &mut [u32; 3], _row: usize, col: usize, code: u8) {
         words[0] |= (code as u32 & 15).rotate_left(bit(col));

@@ -19,10 +19,8 @@
 //! `B = (p - A) / 2^12` and `D = (q - C) / 2^12` are exact. That holds while all sums have 20 bits: `15 * 127 * 256 = 487680`
 //! is below `2^19 = 524288`, so a chunk has up to 256 columns.
 
-use super::{Cell, Format, STRIP, Start, Sums, Width, XFormat, smlad};
-
-/// Bits of a code.
-pub const BITS: u32 = 4;
+use super::format::{Cell, Format, STRIP, Start, Sums, XLayout, smlad};
+use super::width::Width;
 
 /// Rows a and b, or, rotated, c and d.
 const MASK: u32 = 0xf00f_f00f;
@@ -32,7 +30,7 @@ const CHECK: u32 = 0x0f0f_0f0f;
 /// The 4-bit layout of paired lanes.
 pub struct W4Paired;
 
-const _: () = assert!(W4Paired::CELL.is_full(BITS));
+const _: () = assert!(W4Paired::CELL.is_full(W4Paired::WIDTH.bits()));
 const _: () = assert!(Width::W4.max_level() * 127 * (W4Paired::X.chunk as i32) < 1 << 19);
 
 /// First bit and sign of a code.
@@ -50,7 +48,7 @@ impl Format for W4Paired {
     const CELL: Cell = Cell { rows: 4, cols: 2, words: 1 };
     const STRIP: usize = STRIP;
     const STEP: usize = 8;
-    const X: XFormat = XFormat {
+    const X: XLayout = XLayout {
         shift: 1,
         run: 32,
         chunk: 256,

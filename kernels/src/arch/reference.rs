@@ -1,7 +1,8 @@
 //! The plain GEMV: decodes one weight at a time by the packer's inverse. Slow, and what the others are compared with.
 
-use crate::activations::Prepared;
-use crate::format::Block;
+use super::Product;
+use crate::layout::Block;
+use crate::x::Prepared;
 
 /// The value that a GEMV computes for `row`: `sum over groups of scale * sum over columns of level * x`, modulo 2^32.
 pub fn dot(block: &Block<'_>, x: &Prepared<'_>, row: usize) -> i32 {
@@ -11,8 +12,8 @@ pub fn dot(block: &Block<'_>, x: &Prepared<'_>, row: usize) -> i32 {
     })
 }
 
-/// As [`crate::gemv::gemv`].
-pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i32]) {
+/// As [`crate::arch::gemv`].
+pub fn gemv(Product { block, x, first_row, acc }: Product<'_>) {
     for (row, sum) in (first_row..).zip(acc) {
         *sum = if row < block.shape().rows { dot(block, x, row) } else { 0 };
     }

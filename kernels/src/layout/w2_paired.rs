@@ -19,12 +19,11 @@
 //! With group scales, two groups' low halves without the bias and their high halves, at most `2 * 127 * 32 = 8128`, are pairs
 //! of int16 that one SMLAD each multiplies with both groups' scales (the odd rows' doubled: 510 at most). The sums over groups
 //! are modulo 2^32. The even row's is twice its level sum, at most `2 * 3 * 127 * 255` a column, which fits an int32 up to
-//! [`MAX_PAIRED_GROUPED`](super::MAX_PAIRED_GROUPED) columns, and no block has more.
+//! [`MAX_PAIRED_GROUPED`] columns, and no block has more.
 
-use super::{Cell, Format, STRIP, Start, Sums, Width, XFormat, smlad};
-
-/// Bits of a code.
-pub const BITS: u32 = 2;
+use super::format::{Cell, Format, STRIP, Start, Sums, XLayout, smlad};
+use super::lanes::MAX_PAIRED_GROUPED;
+use super::width::Width;
 
 /// The codes of both rows in both lanes.
 const MASK: u32 = 0xc003_c003;
@@ -32,8 +31,8 @@ const MASK: u32 = 0xc003_c003;
 /// The 2-bit layout of paired lanes.
 pub struct W2Paired;
 
-const _: () = assert!(W2Paired::CELL.is_full(BITS));
-const _: () = assert!(2 * 3 * 127 * 255 * (super::MAX_PAIRED_GROUPED as i64) < 1 << 31);
+const _: () = assert!(W2Paired::CELL.is_full(W2Paired::WIDTH.bits()));
+const _: () = assert!(2 * 3 * 127 * 255 * (MAX_PAIRED_GROUPED as i64) < 1 << 31);
 const _: () = assert!(W2Paired::X.starts[0].factor.abs() * 127 * (W2Paired::X.chunk as i32) < 0x8000);
 
 /// Where a code starts in the word's ring of bits, and what makes it signed.
@@ -47,7 +46,7 @@ impl Format for W2Paired {
     const CELL: Cell = Cell { rows: 2, cols: 8, words: 1 };
     const STRIP: usize = STRIP;
     const STEP: usize = 8;
-    const X: XFormat = XFormat {
+    const X: XLayout = XLayout {
         shift: 2,
         run: 32,
         chunk: 32,

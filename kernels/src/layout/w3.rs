@@ -12,10 +12,8 @@
 //!
 //! `ror(word, k + 1 + 3f) & 0x000e_000e` is field `f` doubled; `word & (0x0002_0002 << k)` is the share of pair 15.
 
-use super::{Cell, Format, QUAD, Sums, Width, XFormat, smlad};
-
-/// Bits of a code.
-pub const BITS: u32 = 3;
+use super::format::{Cell, Format, QUAD, Sums, XLayout, smlad};
+use super::width::Width;
 
 /// The doubled code of both lanes.
 const MASK: u32 = 0x000e_000e;
@@ -27,7 +25,7 @@ const FIELDS: usize = 5;
 /// The 3-bit layout of single lanes.
 pub struct W3;
 
-const _: () = assert!(W3::CELL.is_full(BITS));
+const _: () = assert!(W3::CELL.is_full(W3::WIDTH.bits()));
 
 /// Word and first bit of a column's code, for the pairs 0 to 14.
 const fn field(col: usize) -> (usize, u32) {
@@ -45,7 +43,7 @@ impl Format for W3 {
     const CELL: Cell = Cell { rows: 1, cols: 32, words: 3 };
     const STRIP: usize = QUAD;
     const STEP: usize = 32;
-    const X: XFormat = XFormat::single(-7);
+    const X: XLayout = XLayout::single(-7);
 
     fn insert(words: &mut [u32; 3], _row: usize, col: usize, code: u8) {
         if col / 2 < FIELDS * W3::CELL.words {

@@ -8,15 +8,13 @@
 //! column  3   1   2   0
 //! ```
 
-use super::{Cell, Format, QUAD, Sums, Width, XFormat, smlad};
-
-/// Bits of a code.
-pub const BITS: u32 = 8;
+use super::format::{Cell, Format, QUAD, Sums, XLayout, smlad};
+use super::width::Width;
 
 /// The 8-bit layout of single lanes.
 pub struct W8;
 
-const _: () = assert!(W8::CELL.is_full(BITS));
+const _: () = assert!(W8::CELL.is_full(W8::WIDTH.bits()));
 
 /// Where a column's code starts in the word.
 const fn bit(col: usize) -> u32 {
@@ -34,7 +32,7 @@ impl Format for W8 {
     const CELL: Cell = Cell { rows: 1, cols: 4, words: 1 };
     const STRIP: usize = QUAD;
     const STEP: usize = 4;
-    const X: XFormat = XFormat::single(0);
+    const X: XLayout = XLayout::single(0);
 
     fn insert(words: &mut [u32; 3], _row: usize, col: usize, code: u8) {
         words[0] |= (code as u32) << bit(col);
