@@ -8,7 +8,9 @@ use crate::error::{HeadError, StepError};
 use crate::image::{Image, Op, OpKind, Region};
 use crate::linear::{copy, copy_le};
 use crate::math::clamp;
-use crate::slice::{Budget, Cursor, Meter, Price, Unlimited};
+use crate::pace::budget::Budget;
+use crate::pace::cursor::Cursor;
+use crate::pace::meter::{Meter, Unlimited, Work};
 use crate::x::NotFinite;
 use crate::{norm, recurrent};
 
@@ -173,7 +175,7 @@ impl<'a, 's> Head<'a, 's> {
     /// Goes on as far as the budget reaches; true when the action is ready. On an error the head resets itself.
     fn advance(&mut self, budget: &mut impl Meter, one_op: bool) -> Result<bool, NotFinite> {
         if let Phase::Begun(_) = self.phase {
-            if !self.evaluate(budget, one_op)? || budget.take(1, || Price::action(&self.image)) == 0 {
+            if !self.evaluate(budget, one_op)? || budget.take(1, Work::Act(&self.image)) == 0 {
                 return Ok(false);
             }
             self.act().inspect_err(|_| self.reset())?;
@@ -242,7 +244,8 @@ impl<'a, 's> Head<'a, 's> {
         while cursor.op < self.image.op_count() {
             // In a checked image every record parses.
             if let Ok(op) = &self.image.op(cursor.op) {
-                let done = if budget.enter(op) { run(op, self.arena, cursor, budget) } else { Ok(false) };
+                let done =
+                    if budget.take(1, Work::Enter(op)) > 0 { run(op, self.arena, cursor, budget) } else { Ok(false) };
                 if done != Ok(true) {
                     return done.inspect_err(|_| self.reset());
                 }
@@ -313,7 +316,7 @@ fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &mut impl Me
     let (dst, len) = (op.dst(), op.units());
     let units = match op.kind {
         OpKind::Linear { .. } => 0,
-        _ => budget.take(len - cursor.done, || Price::units(op)),
+        _ => budget.take(len - cursor.done, Work::Elements(op)),
     };
     let units = cursor.done..cursor.done + units;
     cursor.done = units.end;

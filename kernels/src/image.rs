@@ -450,11 +450,6 @@ impl<'a> Image<'a> {
         Region { offset: high(self.head(h::W_ACTION_WORK)), len: low(self.head(h::W_WORK_FLAGS)) }
     }
 
-    /// The least budget, in modelled instructions, with which [`crate::Head::poll`] runs the image.
-    pub fn least_budget(&self) -> u32 {
-        crate::slice::least_budget(self)
-    }
-
     /// Number of operations.
     pub fn op_count(&self) -> usize {
         high(self.head(h::W_KIND))

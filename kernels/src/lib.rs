@@ -23,7 +23,6 @@
 #![deny(unsafe_code)]
 
 pub mod arch;
-pub mod cost;
 pub mod dequantize;
 mod error;
 pub mod head;
@@ -32,9 +31,9 @@ pub mod layout;
 pub mod linear;
 pub mod math;
 pub mod norm;
+pub mod pace;
 pub mod recurrent;
 pub mod round;
-mod slice;
 pub mod x;
 
 pub use error::{HeadError, ImageError, StepError};
@@ -46,6 +45,7 @@ pub use layout::{Block, BlockShape, Width};
 pub use arch as gemv;
 pub use arch::{portable, reference};
 pub use layout as format;
+pub use pace::cost;
 /// See [`x`].
 pub mod activations {
     pub use crate::round::ROUND;

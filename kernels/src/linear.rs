@@ -13,7 +13,8 @@ use crate::error::NotFinite;
 use crate::image::{header::BLOCK_WORDS, row_block};
 use crate::layout::half::{bf16, half_word};
 use crate::layout::{Block, BlockShape, Lanes, MAX_GROUP, PAD_COLS, QUAD, STRIP};
-use crate::slice::{LinearCursor, Meter, Price, Unlimited};
+use crate::pace::cursor::LinearCursor;
+use crate::pace::meter::{Meter, Start, Work};
 use crate::x::{Plan, Prepared, Scale, max_prepared_words};
 
 /// Rows whose sums stand on the stack at once.
@@ -186,14 +187,9 @@ impl Matrix<'_> {
         max_prepared_words(self.cols, self.group)
     }
 
-    /// `y = W x + b`, or `y = y + b + W x` where `accumulate`. `work` holds at least [`Self::prepared_words`] words; `x` and
-    /// `y` have the matrix's lengths (what is missing is left out).
-    pub fn apply(&self, x: &[f32], work: &mut [u32], y: &mut [f32], accumulate: bool) -> Result<(), NotFinite> {
-        self.resume(&mut LinearCursor::default(), &mut Unlimited, x, work, y, accumulate)?;
-        Ok(())
-    }
-
-    /// As [`Self::apply`], from where `at` stands and as far as the budget reaches; true when all is done.
+    /// `y = W x + b`, or `y = y + b + W x` where `accumulate`, from where `at` stands and as far as the budget reaches; true when
+    /// all is done. `work` holds at least [`Self::prepared_words`] words; `x` and `y` have the matrix's lengths (what is missing is
+    /// left out).
     #[inline(never)]
     pub(crate) fn resume(
         &self,
@@ -206,13 +202,14 @@ impl Matrix<'_> {
     ) -> Result<bool, NotFinite> {
         let x_scale = match at.scale {
             Some(scale) => scale,
-            None if budget.take(1, || Price::magnitude(self)) == 0 => return Ok(false),
+            None if budget.take(1, Work::Magnitude(self.cols)) == 0 => return Ok(false),
             None => *at.scale.insert(Scale::new(x, self.x_max)?),
         };
         // One pass over the output where every row has its bias and is written once, in order.
         let start = self.start_values(accumulate);
         if start.is_none() && at.started < y.len() {
-            let end = at.started + budget.take(y.len() - at.started, || Price::bias(accumulate));
+            let work = Work::Start(Start::of(accumulate, !self.bias.is_empty()));
+            let end = at.started + budget.take(y.len() - at.started, work);
             self.start(at.started..end, y, accumulate);
             at.started = end;
             if end < y.len() {
@@ -232,7 +229,7 @@ impl Matrix<'_> {
             if !plan.as_ref().is_some_and(|plan| plan.fits(shape)) {
                 let plan = plan.insert(Plan::of(&rows.block));
                 if at.prepared != Some(shape.width) {
-                    if budget.take(1, || Price::prepare(&rows)) == 0 {
+                    if budget.take(1, Work::Prepare(shape)) == 0 {
                         return Ok(false);
                     }
                     at.prepared = Some(shape.width);
@@ -240,8 +237,8 @@ impl Matrix<'_> {
                 }
             }
             if let Some(x) = plan.as_ref().and_then(|plan| Prepared::new(work, plan)) {
-                let strips =
-                    budget.take((shape.rows - at.row).div_ceil(STRIP), || Price::strips(&rows, start.is_some()));
+                let work = Work::Strips { shape, in_order: rows.index.is_empty(), start: start.is_some() };
+                let strips = budget.take((shape.rows - at.row).div_ceil(STRIP), work);
                 let end = shape.rows.min(at.row + strips * STRIP);
                 rows.apply_rows(at.row..end, &x, x_scale, start, y);
                 at.row = end;
