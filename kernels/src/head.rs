@@ -233,7 +233,7 @@ impl<'a, 's> Head<'a, 's> {
         if let Some(index) = observation.iter().position(|v| !v.is_finite()) {
             return Err(StepError::ObservationNotFinite { index });
         }
-        copy(bytemuck::cast_slice(observation), self.words_mut(self.image.observation()));
+        copy(bytemuck::must_cast_slice(observation), self.words_mut(self.image.observation()));
         Ok(())
     }
 
@@ -286,11 +286,11 @@ impl<'a, 's> Head<'a, 's> {
 
     #[inline(never)]
     fn floats(&self, region: Region) -> &[f32] {
-        bytemuck::cast_slice(self.arena.get(region.range()).unwrap_or(&[]))
+        bytemuck::must_cast_slice(self.arena.get(region.range()).unwrap_or(&[]))
     }
 
     fn floats_mut(&mut self, region: Region) -> &mut [f32] {
-        bytemuck::cast_slice_mut(self.words_mut(region))
+        bytemuck::must_cast_slice_mut(self.words_mut(region))
     }
 
     fn words_mut(&mut self, region: Region) -> &mut [u32] {
@@ -311,7 +311,7 @@ fn regions<'r>(arena: &'r mut [u32], regions: &[Region; 3]) -> [&'r mut [u32]; 3
 /// check has excluded, does nothing.
 #[inline(never)]
 fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &mut impl Meter) -> Result<bool, NotFinite> {
-    let f = bytemuck::cast_slice_mut::<u32, f32>;
+    let f = bytemuck::must_cast_slice_mut::<u32, f32>;
     // Elements that this piece takes, or units of a norm. Linear operations have pieces of their own.
     let (dst, len) = (op.dst(), op.units());
     let units = match op.kind {

@@ -398,7 +398,7 @@ impl<'a> Image<'a> {
     fn name_bytes(&self) -> Option<&'a [u8]> {
         let len = high(self.head(h::W_STEPS_NAME));
         let words = section(self.words, self.head(h::W_NAME) as usize, len.div_ceil(4))?;
-        bytemuck::cast_slice(words).get(..len)
+        bytemuck::must_cast_slice(words).get(..len)
     }
 
     /// SHA-256 of the source policy (policy.json, then policy.safetensors).

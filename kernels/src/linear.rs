@@ -119,7 +119,7 @@ impl RowBlock<'_> {
         if rows.start < whole {
             let first = self.first_row + rows.start;
             let Some((start, y)) = outputs(first, whole - rows.start, start, y) else { return };
-            if gemv(&self.block, x, rows.start, bytemuck::cast_slice_mut(y)).is_err() {
+            if gemv(&self.block, x, rows.start, bytemuck::must_cast_slice_mut(y)).is_err() {
                 return;
             }
             self.scale_in_order(rows.start, None, x_scale, start, y);
@@ -166,7 +166,7 @@ impl RowBlock<'_> {
     /// Adds the sums of the rows from `first` on, scaled, to what stands at the rows' places.
     #[inline(never)]
     fn scale_by_index(&self, first: usize, sums: &[i32], x_scale: f32, y: &mut [f32]) {
-        let halves = |words| bytemuck::cast_slice::<u32, u16>(words).get(first..first + sums.len());
+        let halves = |words| bytemuck::must_cast_slice::<u32, u16>(words).get(first..first + sums.len());
         let (Some(scales), Some(index)) = (halves(self.scales), halves(self.index)) else { return };
         for ((sum, scale), at) in sums.iter().zip(scales).zip(index) {
             if let Some(y) = y.get_mut(usize::from(u16::from_le(*at))) {
@@ -281,7 +281,7 @@ impl Matrix<'_> {
         } else if bias.is_empty() {
             y.fill(0.0);
         } else {
-            copy_le(bias, bytemuck::cast_slice_mut(y));
+            copy_le(bias, bytemuck::must_cast_slice_mut(y));
         }
     }
 }

@@ -1,4 +1,4 @@
-@ GEMV for 4-bit codes in paired lanes (kernels/src/format/w4_paired.rs): strips of eight rows, or four.
+@ GEMV for 4-bit codes in paired lanes (kernels/src/layout/w4_paired.rs): strips of eight rows, or four.
 @
 @ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1; of four rows there is one), [sp] x_end, [sp+4] bytes of the first chunk
 @ in x, [sp+8] steps of 8 columns that the first pass through the row kernel's loop leaves out.

@@ -1,4 +1,4 @@
-@ GEMV for 8-bit codes in paired lanes (kernels/src/format/w8_paired.rs): strips of four rows.
+@ GEMV for 8-bit codes in paired lanes (kernels/src/layout/w8_paired.rs): strips of four rows.
 @
 @ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1), [sp] x_end, [sp+4] bytes of the first chunk
 @ in x, [sp+8] steps of 8 columns that the first pass through the row kernel's loop leaves out.

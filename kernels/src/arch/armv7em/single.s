@@ -1,4 +1,4 @@
-@ GEMV loop nest for Armv7E-M, stamped over the layouts of single lanes in kernels/src/format: strips of four rows.
+@ GEMV loop nest for Armv7E-M, stamped over the layouts of single lanes in kernels/src/layout: strips of four rows.
 @
 @ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1), [sp] x_end, [sp+4] bytes of a group in x, or 0 with row
 @ scales, [sp+8] units that the loop leaves out in a short pass: with row scales it is the first pass, with group scales the last

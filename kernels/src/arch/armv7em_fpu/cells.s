@@ -1,11 +1,11 @@
-@ The cells of kernels/src/recurrent.rs on the FPU of the hard-float target: the same operations in the same order. What occurs
+@ The cells of kernels/src/ops/cells.rs on the FPU of the hard-float target: the same operations in the same order. What occurs
 @ more than once is a call, because exponentials take the most code.
 
     .syntax unified
     .thumb
     .fpu fpv4-sp-d16
 
-@ Calls within this file leave all registers alone but those that they name. s8-s13 are `CELL` of kernels/src/math.rs: the
+@ Calls within this file leave all registers alone but those that they name. s8-s13 are `CELL` of mod.rs: the
 @ factors of x in the exponents of e^x and e^2x, in quarters, what rounds such an exponent, and p1, p0 and q0.
 
 @ s0, s1: numerator and denominator of 2^(4 s0). Changes s2, s3, r10, r12.
