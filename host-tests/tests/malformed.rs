@@ -229,8 +229,11 @@ fn a_misaligned_start_is_refused() {
     }
 }
 
+/// A change of an image.
+type Change = fn(&mut Draft);
+
 /// What is wrong, the error that must say so, and how the valid image is made so.
-type Case = (&'static str, E, fn(&mut Draft));
+type Case = (&'static str, E, Change);
 
 /// Applies every case to the valid image, makes the checksum fit, and reports all cases that are not refused as expected.
 fn refused(cases: &[Case]) {
@@ -640,7 +643,7 @@ fn a_reset_forgets_everything() {
 /// Flash that decays, or is rewritten behind the head's back: what no longer parses is an error, not a stale action.
 #[test]
 fn damage_after_the_check_is_an_error() {
-    let cases: &[(&str, fn(&mut Draft))] = &[
+    let cases: &[(&str, Change)] = &[
         ("an operation's code", |d| d.set_low(d.op(FUNCTION), 0)),
         ("a function's code", |d| d.set_low(d.op(FUNCTION), u32::from(op::FUNCTION) | 99 << 8)),
         ("a destination", |d| d.set_low(d.op(FUNCTION) + 1, 0xffff)),
