@@ -8,7 +8,7 @@ use actq::quantize::prepared::Prepared;
 use actq::quantize::{Activations, Budget, Method, Options};
 use actq::runtime::{ImageBuffer, with_head};
 use actq::time::{CLOCK, Limit, StepTime};
-use actq::writer;
+use actq::{files, writer};
 use actq_host_tests::networks::Builder;
 use actq_host_tests::profile;
 use actq_host_tests::qemu::{self, Counter, Target};
@@ -31,7 +31,7 @@ fn firmware() -> Result<PathBuf> {
     let path = qemu::target_dir().join("cost-test.actq");
     let policy = Policy::load(&ur3())?;
     let options = Options::new(Method::Rtn, Budget::Width(Width::W2));
-    writer::write(&path, &image(&Prepared::new(&policy, Method::Rtn, |_| {})?, &options)?)?;
+    files::write(&path, &image(&Prepared::new(&policy, Method::Rtn, |_| {})?, &options)?)?;
     qemu::build("actq-firmware-demo", Target::Fpu, &path)
 }
 

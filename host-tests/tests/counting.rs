@@ -6,7 +6,7 @@ use actq::eval;
 use actq::policy::Policy;
 use actq::quantize::{Budget, Method, Options, quantize};
 use actq::runtime::ImageBuffer;
-use actq::writer;
+use actq::{files, writer};
 use actq_host_tests::cycles::Code;
 use actq_host_tests::qemu::{self, Counter, Target};
 use actq_host_tests::{evaluation, root};
@@ -20,7 +20,7 @@ fn a_step_of_a_head_reads_each_weight_once() -> Result<()> {
     let options = Options::new(Method::Rtn, Budget::Width(Width::W8));
     let bytes = writer::image(&policy, &quantize(&policy.graph, &[], &options)?)?;
     let path = qemu::target_dir().join("counting-test.actq");
-    writer::write(&path, &bytes)?;
+    files::write(&path, &bytes)?;
     let buffer = ImageBuffer::new(&bytes);
     let image = buffer.image(&path)?;
     let recorded = eval::heldout(&dir, &image)?;

@@ -11,7 +11,7 @@ use actq::graph::Graph;
 use actq::policy::Policy;
 use actq::quantize::{Activations, Budget, Method, Options, quantize};
 use actq::runtime::{ImageBuffer, with_head};
-use actq::writer;
+use actq::{files, writer};
 use actq_host_tests::qemu::{self, Server, Target};
 use actq_host_tests::{golden, root, shared_policies};
 use actq_kernels::Width;
@@ -37,7 +37,7 @@ fn built_in() -> &'static Path {
     FILE.get_or_init(|| {
         let path = qemu::target_dir().join("qemu-test.actq");
         let bytes = Policy::load(&ur3()).and_then(|policy| rtn(&policy, Width::W3, 32, Activations::Int8));
-        let written = bytes.and_then(|bytes| writer::write(&path, &bytes));
+        let written = bytes.and_then(|bytes| files::write(&path, &bytes));
         written.expect("the UR3 policy quantizes");
         path
     })

@@ -13,7 +13,7 @@ use actq::policy::Policy;
 use actq::quantize::{Activations, Outcome};
 use actq::random::Random;
 use actq::runtime::ImageBuffer;
-use actq::writer;
+use actq::{files, writer};
 use actq_host_tests::networks::Builder;
 use actq_host_tests::profile;
 use actq_host_tests::qemu::{self, Counter, Target};
@@ -114,7 +114,7 @@ pub(crate) fn run() -> Result<()> {
     let resumed = resumed(&elf, &counter, &most)?;
     most.insert(Feature::RESUMED, resumed);
     let path = actq_host_tests::root().join("kernels/src/pace/rates.rs");
-    writer::write(&path, table(&instructions, &cycles, &most).as_bytes())?;
+    files::write(&path, table(&instructions, &cycles, &most).as_bytes())?;
     println!("{}: written", path.display());
     Ok(())
 }
@@ -127,12 +127,13 @@ fn predicted(sample: &Sample, rates: &Rates) -> f64 {
 
 /// The rates as the source of the kernels' table: a feature's debug text is its key.
 fn table(instructions: &Rates, cycles: &Rates, most: &Rates) -> String {
-    let mut text = "//! Written by `cargo xtask fit`: expected instructions, expected cycles, instructions at most.\n\n\
+    let mut text =
+        "//! Written by `cargo xtask fit`: expected instructions, expected cycles, instructions at most.\n\n\
                     use super::feature::{Feature, Gemv, Prepare, Scales::*, Strips::*};\n\
                     use crate::layout::{Lanes::*, Width::*};\n\
                     use crate::math::Function;\n\n\
                     #[rustfmt::skip]\npub(super) const RATES: &[(Feature, [f64; 3])] = &[\n"
-        .to_owned();
+            .to_owned();
     for feature in Feature::all() {
         let rate = |rates: &Rates| rates.get(&feature).copied().unwrap_or(0.0);
         let [a, b, c] = [instructions, cycles, most].map(rate);

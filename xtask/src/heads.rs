@@ -9,7 +9,7 @@ use actq::policy::Policy;
 use actq::quantize::prepared::Prepared;
 use actq::quantize::{Budget, Method, Options};
 use actq::runtime::ImageBuffer;
-use actq::writer;
+use actq::{files, writer};
 use actq_host_tests::cycles::{Code, Cost, Kind};
 use actq_host_tests::qemu::{self, Counter, Target};
 use actq_host_tests::{evaluation, root, shared_policies};
@@ -85,7 +85,7 @@ pub(crate) fn policies() -> Vec<PathBuf> {
 pub(crate) fn write_image(prepared: &Prepared<'_>, options: &Options, path: &Path) -> Result<Vec<u8>> {
     let (policy, matrices) = prepared.quantize(options, |_| {})?;
     let bytes = writer::image(&policy, &matrices)?;
-    writer::write(path, &bytes)?;
+    files::write(path, &bytes)?;
     Ok(bytes)
 }
 
