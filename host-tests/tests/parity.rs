@@ -172,9 +172,9 @@ fn with_lanes(image: &[u8], lanes: u8) -> Vec<u8> {
     use actq_kernels::image::{checksum, header as h};
     let word =
         |bytes: &[u8], at: usize| u32::from_le_bytes(bytes[4 * at..][..4].try_into().expect("four bytes")) as usize;
-    let matrix = word(image, word(image, h::W_OPS) + 3);
+    let block = word(image, word(image, h::W_MATRICES) + 3);
     let mut image = image.to_vec();
-    image[4 * (matrix + h::MATRIX_WORDS) + 1] = lanes;
+    image[4 * block + 1] = lanes;
     let crc = checksum(&image).to_le_bytes();
     image[4 * h::W_CRC..][..4].copy_from_slice(&crc);
     image
