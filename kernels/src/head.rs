@@ -4,14 +4,15 @@
 use core::ops::Range;
 use core::task::Poll;
 
+use crate::arch;
 use crate::error::{Fault, HeadError, StepError};
 use crate::image::{Image, Op, OpKind, Region};
-use crate::linear::{copy, copy_le};
 use crate::math::clamp;
+use crate::ops::elementwise::{self, copy, copy_le};
+use crate::ops::norm;
 use crate::pace::budget::Budget;
 use crate::pace::cursor::Cursor;
 use crate::pace::meter::{Meter, Unlimited, Work};
-use crate::{norm, recurrent};
 
 /// A head: an image and the scratch memory that it runs in.
 #[derive(Debug)]
@@ -359,13 +360,13 @@ fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &mut impl Me
     }
     match op.kind {
         OpKind::Function(function) => function.apply(f(dst)),
-        OpKind::Add => norm::add(f(src), f(dst)),
+        OpKind::Add => elementwise::add(f(src), f(dst)),
         OpKind::Copy => copy(src, dst),
         OpKind::LstmCell => {
-            recurrent::lstm_elements(range.clone(), f(src), f(third), f(dst));
+            arch::lstm_elements(range.clone(), f(src), f(third), f(dst));
         }
         OpKind::GruCell => {
-            recurrent::gru_elements(range.clone(), f(src), f(third), f(dst));
+            arch::gru_elements(range.clone(), f(src), f(third), f(dst));
         }
         kind => {
             let (first, second) = (op.part(0, &range), op.part(1, &range));
@@ -377,7 +378,7 @@ fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &mut impl Me
             match kind {
                 OpKind::LayerNorm => norm::layer_norm_units(done, moments, f(dst), first, second, constant),
                 OpKind::RmsNorm => norm::rms_norm_units(done, moments, f(dst), first, constant),
-                _ => norm::normalize(f(src), first, second, constant, op.constant(1), f(dst)),
+                _ => elementwise::normalize(f(src), first, second, constant, op.constant(1), f(dst)),
             }
         }
     }

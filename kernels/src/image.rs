@@ -7,8 +7,8 @@ use core::ops::Range;
 
 use crate::error::ImageError;
 use crate::layout::{Block, BlockShape, LAYOUT_STAMP, Width};
-use crate::linear::{Matrix, RowBlock, fits_i32};
 use crate::math::Function;
+use crate::ops::linear::{Matrix, RowBlock, fits_i32};
 use crate::x::Plan;
 
 /// Positions and constants of the header; what the writer and the parser share.

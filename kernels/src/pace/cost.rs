@@ -15,7 +15,7 @@ use super::meter::Start;
 use super::rates::RATES;
 use crate::image::{Image, Op, OpKind};
 use crate::layout::{BlockShape, QUAD, STRIP};
-use crate::linear::{Matrix, RUN, RowBlock};
+use crate::ops::linear::{Matrix, RUN, RowBlock};
 use crate::x::{Extent, Plan};
 
 /// Instructions, and cycles as the project's model of the Cortex-M4 has them.

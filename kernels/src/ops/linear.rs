@@ -7,6 +7,7 @@
 
 use core::ops::Range;
 
+use super::elementwise::copy_le;
 use crate::arch;
 use crate::arch::gemv;
 use crate::error::Fault;
@@ -50,19 +51,6 @@ pub struct RowBlock<'a> {
     pub index: &'a [u32],
     /// The output index of the first row, where there is no index.
     pub first_row: usize,
-}
-
-/// `to = from`, as far as both go. On the target not by memcpy, which takes as much code as a kernel.
-pub(crate) fn copy(from: &[u32], to: &mut [u32]) {
-    arch::copy(from, to);
-}
-
-/// As [`copy`], of words as they stand in the image.
-pub(crate) fn copy_le(from: &[u32], to: &mut [u32]) {
-    copy(from, to);
-    if cfg!(target_endian = "big") {
-        to.iter_mut().for_each(|word| *word = u32::from_le(*word));
-    }
 }
 
 /// `len` of the outputs from `first` on, with their biases if there are any; `None` where there are too few.
