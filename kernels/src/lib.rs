@@ -41,7 +41,11 @@ pub use layout::{Block, BlockShape, Width};
 
 // Old paths, until all users have moved.
 pub use arch as gemv;
-pub use ops::{cells as recurrent, linear};
+pub use ops::cells as recurrent;
+/// See [`ops::linear`].
+pub mod linear {
+    pub use crate::image::{Matrix, RowBlock, largest_sum_bound, worst_case};
+}
 /// See [`ops`].
 pub mod norm {
     pub use crate::ops::elementwise::*;

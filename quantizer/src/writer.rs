@@ -2,8 +2,10 @@
 
 use std::path::Path;
 
-use actq_kernels::format::{self, LAYOUT_STAMP};
-use actq_kernels::image::{Kind, Region, checksum, half_words, header as h, header::op};
+use actq_kernels::image::{
+    BlockRecord, Header, MatrixRecord, OpKind, OpRecord, Records, Region, half_words, header as h, seal,
+};
+use actq_kernels::layout::{self, BlockShape};
 use anyhow::{Context, Result, bail, ensure};
 
 use crate::graph::{Graph, NodeKind};
@@ -39,52 +41,45 @@ pub fn image(policy: &Policy, matrices: &[Outcome]) -> Result<Vec<u8>> {
         writer.push_floats(observation);
         writer.push_floats(&vec![0.0; policy.act_len]);
     }
-    let kind = match policy.kind {
-        Kind::Step => 0,
-        Kind::Chunk => 1,
+    let header = Header {
+        kind: policy.kind,
+        obs_len: policy.graph.obs_len,
+        act_len: policy.act_len,
+        chunk: policy.chunk,
+        execute: policy.execute,
+        rate_hz: policy.rate_hz,
+        scratch: program.words,
+        state: program.state,
+        observation: program.observation.offset,
+        output: program.output.offset,
+        action: program.action.offset,
+        work: program.work,
+        matrices: Records { offset: writer.matrices, count: matrices.len() },
+        ops: Records { offset: ops, count: program.steps.len() },
+        contract,
+        contract_flags: flags,
+        name: Records { offset: name, count: policy.name.len() },
+        self_test: Records { offset: self_test, count: steps },
+        weights: policy.weights as u32,
+        digest: policy.digest,
     };
-    let Writer { mut words, matrices: first_matrix } = writer;
-    words[0] = h::MAGIC;
-    words[h::W_VERSION] = halves(h::VERSION.into(), h::WORDS)?;
-    words[h::W_LAYOUT] = LAYOUT_STAMP;
-    words[h::W_KIND] = kind | halves(0, program.steps.len())?;
-    words[h::W_OPS] = ops;
-    words[h::W_SIZES] = halves(policy.graph.obs_len, policy.act_len)?;
-    words[h::W_CHUNK] = halves(policy.chunk, policy.execute)?;
-    words[h::W_SCRATCH] = program.words as u32;
-    words[h::W_STATE] = halves(program.state.offset, program.state.len)?;
-    words[h::W_OBS_OUT] = halves(program.observation.offset, program.output.offset)?;
-    words[h::W_ACTION_WORK] = halves(program.action.offset, program.work.offset)?;
-    words[h::W_WORK_FLAGS] = halves(program.work.len, flags)?;
-    words[h::W_CONTRACT] = contract;
-    words[h::W_RATE] = policy.rate_hz.to_bits();
-    words[h::W_SELF_TEST] = self_test;
-    words[h::W_STEPS_NAME] = halves(steps, policy.name.len())?;
-    words[h::W_NAME] = name;
-    words[h::W_WEIGHTS] = policy.weights as u32;
-    words[h::W_MATRICES] = first_matrix;
-    words[h::W_MATRIX_COUNT] = halves(matrices.len(), 0)?;
-    for (word, bytes) in words[h::W_DIGEST..].iter_mut().zip(policy.digest.chunks_exact(4)) {
-        *word = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
-    }
-    let actions = self_test_actions(&seal(&words), &observations)?;
+    let mut words = writer.words;
+    words[..h::WORDS].copy_from_slice(&header.emit()?);
+    let actions = self_test_actions(&sealed(&words)?, &observations)?;
     for (step, action) in actions.iter().enumerate() {
         let at = self_test as usize + step * (policy.graph.obs_len + policy.act_len) + policy.graph.obs_len;
         for (word, value) in words[at..].iter_mut().zip(action) {
             *word = value.to_bits();
         }
     }
-    Ok(seal(&words))
+    sealed(&words)
 }
 
-/// Fills in length and checksum and gives the bytes.
-fn seal(words: &[u32]) -> Vec<u8> {
+/// The image's bytes, with length and checksum.
+fn sealed(words: &[u32]) -> Result<Vec<u8>> {
     let mut bytes: Vec<u8> = words.iter().flat_map(|w| w.to_le_bytes()).collect();
-    let len = (bytes.len() as u32).to_le_bytes();
-    bytes[4 * h::W_BYTES..][..4].copy_from_slice(&len);
-    let crc = checksum(&bytes).to_le_bytes();
-    bytes[4 * h::W_CRC..][..4].copy_from_slice(&crc);
-    bytes
+    seal(&mut bytes).context("the image has more than 4 GB")?;
+    Ok(bytes)
 }
 
 /// Observations that reach every input: spread over about two standard deviations where the policy normalizes, else over -1
@@ -114,13 +109,6 @@ fn self_test_actions(bytes: &[u8], observations: &[Vec<f32>]) -> Result<Vec<Vec<
     with_head(image, |head| {
         observations.iter().map(|obs| Ok(head.step(obs).context("self-test of the new image")?.to_vec())).collect()
     })
-}
-
-/// Two u16 in a word.
-fn halves(low: usize, high: usize) -> Result<u32> {
-    let fits = low <= 0xffff && high <= 0xffff;
-    ensure!(fits, "a size of the policy ({}) exceeds the format's limit of 65535", low.max(high));
-    Ok(low as u32 | (high as u32) << 16)
 }
 
 struct Writer {
@@ -159,7 +147,7 @@ impl Writer {
             let group_scales: Vec<u8> =
                 rows.iter().flat_map(|r| &matrix.group_scales[r * groups..][..groups]).copied().collect();
             let mut words = vec![0; shape.words()];
-            format::pack(*shape, &codes, &group_scales, &mut words).with_context(|| {
+            layout::pack(*shape, &codes, &group_scales, &mut words).with_context(|| {
                 format!("{shape:?} cannot be packed; docs/FORMAT.md says how many columns may have group scales")
             })?;
             let weights = self.push(words.into_iter().map(u32::from_le));
@@ -171,25 +159,17 @@ impl Writer {
                 let index = rows.iter().map(|&r| u16::try_from(r)).collect::<Result<Vec<_>, _>>()?;
                 self.push(half_words(&index))
             };
-            records.extend([
-                shape.width.bits() | u32::from(shape.lanes.code()) << 8 | halves(0, shape.rows)?,
-                weights,
-                scales,
-                index,
-            ]);
+            let BlockShape { width, lanes, rows, .. } = *shape;
+            records.push(BlockRecord { width, lanes, rows, weights, scales, index }.emit()?);
         }
-        Ok([
-            halves(matrix.rows, matrix.cols)?,
-            halves(matrix.group, outcome.x_max.into())?,
-            halves(blocks.len(), 0)?,
-            self.push(records),
-        ])
+        let Quantized { rows, cols, group, .. } = *matrix;
+        let blocks = Records { count: records.len(), offset: self.push(records.into_iter().flatten()) };
+        Ok(MatrixRecord { rows, cols, group, x_max: outcome.x_max, blocks }.emit()?)
     }
 
     fn op(&mut self, graph: &Graph, step: &Step<Region>) -> Result<[u32; h::OP_WORDS]> {
-        let mut detail = 0u8;
-        let mut bias_at = 0;
-        let (code, data) = match step.kind {
+        let mut bias = 0;
+        let (kind, data) = match step.kind {
             StepKind::Normalize { node } => {
                 let NodeKind::Normalize { mean, scale, pre_clip, clip } = &graph.nodes[node].kind else {
                     bail!("node {node} is no normalize")
@@ -197,18 +177,14 @@ impl Writer {
                 let data = self.push_floats(&[*pre_clip, *clip]);
                 self.push_floats(mean);
                 self.push_floats(scale);
-                (op::NORMALIZE, data)
+                (OpKind::Normalize, data)
             }
             StepKind::Linear { node, product: which, accumulate } => {
-                let (matrix, bias) = product(&graph.nodes[node], which).context("a node without such a product")?;
-                detail = u8::from(accumulate);
-                bias_at = if bias.iter().all(|b| *b == 0.0) { 0 } else { self.push_floats(bias) };
-                (op::LINEAR, self.matrices + (matrix * h::MATRIX_WORDS) as u32)
+                let (matrix, values) = product(&graph.nodes[node], which).context("a node without such a product")?;
+                bias = if values.iter().all(|b| *b == 0.0) { 0 } else { self.push_floats(values) };
+                (OpKind::Linear { accumulate }, self.matrices + (matrix * h::MATRIX_WORDS) as u32)
             }
-            StepKind::Function(function) => {
-                detail = function as u8;
-                (op::FUNCTION, 0)
-            }
+            StepKind::Function(function) => (OpKind::Function(function), 0),
             StepKind::LayerNorm { node } => {
                 let NodeKind::LayerNorm { weight, bias, eps } = &graph.nodes[node].kind else {
                     bail!("node {node} is no layernorm")
@@ -216,7 +192,7 @@ impl Writer {
                 let data = self.push_floats(&[*eps]);
                 self.push_floats(weight);
                 self.push_floats(bias);
-                (op::LAYER_NORM, data)
+                (OpKind::LayerNorm, data)
             }
             StepKind::RmsNorm { node } => {
                 let NodeKind::RmsNorm { weight, eps } = &graph.nodes[node].kind else {
@@ -224,19 +200,15 @@ impl Writer {
                 };
                 let data = self.push_floats(&[*eps]);
                 self.push_floats(weight);
-                (op::RMS_NORM, data)
+                (OpKind::RmsNorm, data)
             }
-            StepKind::Add => (op::ADD, 0),
-            StepKind::Copy => (op::COPY, 0),
-            StepKind::LstmCell => (op::LSTM_CELL, 0),
-            StepKind::GruCell => (op::GRU_CELL, 0),
+            StepKind::Add => (OpKind::Add, 0),
+            StepKind::Copy => (OpKind::Copy, 0),
+            StepKind::LstmCell => (OpKind::LstmCell, 0),
+            StepKind::GruCell => (OpKind::GruCell, 0),
         };
         let offset = |region: Option<Region>| region.map_or(0, |r| r.offset);
-        Ok([
-            u32::from(code) | u32::from(detail) << 8 | halves(0, step.dst.len)?,
-            halves(step.dst.offset, offset(step.src))?,
-            bias_at | halves(0, offset(step.extra))?,
-            data,
-        ])
+        let (src, third) = (offset(step.src), offset(step.extra));
+        Ok(OpRecord { kind, dst: step.dst, src, third, bias, data }.emit()?)
     }
 }
