@@ -20,12 +20,17 @@ pub struct Layout {
     /// Columns that activations are padded to a multiple of, where their group is not longer.
     pub pad: usize,
     /// Binary logarithm of a chunk's columns, because nothing is divided when a GEMV is called.
-    pub chunk_log: u32,
+    pub chunk_log: u8,
+    /// The same of a unit's columns.
+    pub unit_log: u8,
     /// The same of a strip's rows.
-    pub strip_log: u32,
+    pub strip_log: u8,
     /// The same of the step.
-    pub step_log: u32,
+    pub step_log: u8,
 }
+
+// A power of two, by which the table is quick to index.
+const _: () = assert!(size_of::<usize>() != 4 || size_of::<Layout>() == 64);
 
 impl Layout {
     const fn of<F: Format>() -> Self {
@@ -36,9 +41,10 @@ impl Layout {
             step: F::STEP,
             x: F::X,
             pad: if F::X.chunk == XLayout::ALL { PAD_COLS } else { F::STEP },
-            chunk_log: F::X.chunk.trailing_zeros(),
-            strip_log: F::STRIP.trailing_zeros(),
-            step_log: F::STEP.trailing_zeros(),
+            chunk_log: F::X.chunk.trailing_zeros() as u8,
+            unit_log: F::CELL.cols.trailing_zeros() as u8,
+            strip_log: F::STRIP.trailing_zeros() as u8,
+            step_log: F::STEP.trailing_zeros() as u8,
         }
     }
 }
