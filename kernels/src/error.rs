@@ -2,7 +2,9 @@
 
 use core::fmt;
 
-use crate::activations::NotFinite;
+/// A value is NaN or infinite.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NotFinite;
 
 /// Why [`crate::Image::new_checked`] refused an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

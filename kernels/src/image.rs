@@ -6,11 +6,11 @@
 
 use core::ops::Range;
 
-use crate::activations::Plan;
 use crate::error::ImageError;
-use crate::format::{Block, BlockShape, LAYOUT_STAMP, Width};
+use crate::layout::{Block, BlockShape, LAYOUT_STAMP, Width};
 use crate::linear::{Matrix, RowBlock, fits_i32};
 use crate::math::Function;
+use crate::x::Plan;
 
 /// Positions and constants of the header; what the writer and the parser share.
 pub mod header {
@@ -492,11 +492,6 @@ impl<'a> Image<'a> {
     /// Arena region in which activations are prepared.
     pub fn work(&self) -> Region {
         Region { offset: high(self.head(h::W_ACTION_WORK)), len: low(self.head(h::W_WORK_FLAGS)) }
-    }
-
-    /// The least budget, in modelled instructions, with which [`crate::Head::poll`] runs the image.
-    pub fn least_budget(&self) -> u32 {
-        crate::slice::least_budget(self)
     }
 
     /// Number of operations.
