@@ -19,8 +19,8 @@ mod firmware {
     use core::fmt::{Display, Write as _};
     use core::task::Poll;
 
-    use actq_firmware_demo::machine::{entry, semihosting::hio, singleton};
-    use actq_firmware_demo::{count, host, slot};
+    use actq_firmware_support::machine::{entry, semihosting::hio, singleton};
+    use actq_firmware_support::{count, host, slot};
     use actq_kernels::{Head, Image, StepError};
 
     /// Includes a file at an address that is a multiple of 4.

@@ -1,0 +1,16 @@
+//! The tests that take more than one crate: one binary, so that one is linked and what they build is built once.
+
+mod best;
+mod cli;
+mod cost;
+mod counting;
+mod format;
+mod functions;
+mod malformed;
+mod ops;
+mod parity;
+mod portable;
+mod qemu;
+mod recordings;
+mod slices;
+mod stats;
