@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Output, Stdio};
 
 use actq_boards::{Target, version};
+use actq_link::{RESET, STEP};
 use anyhow::{Context, Result, bail, ensure};
 
 use crate::firmware::{cargo_build, symbol, target_dir};
@@ -54,6 +55,11 @@ pub fn run(mut command: Command, input: &[u8]) -> Result<Output> {
     })
 }
 
+/// A request of the pipe protocol for a step.
+pub fn step_request(observation: &[f32]) -> Vec<u8> {
+    std::iter::once(STEP).chain(observation.iter().flat_map(|v| v.to_le_bytes())).collect()
+}
+
 /// A firmware under QEMU that serves as a policy.
 #[derive(Debug)]
 pub struct Server {
@@ -78,14 +84,12 @@ impl Server {
 
     /// Resets the policy.
     pub fn reset(&mut self) -> Result<()> {
-        self.send(b"R")
+        self.send(&[RESET])
     }
 
     /// The action for an observation.
     pub fn step(&mut self, observation: &[f32]) -> Result<Vec<f32>> {
-        let mut frame = vec![b'S'];
-        frame.extend(observation.iter().flat_map(|v| v.to_le_bytes()));
-        self.send(&frame)?;
+        self.send(&step_request(observation))?;
         let mut bytes = vec![0; 4 * self.act_len];
         self.stdout.read_exact(&mut bytes).context("the firmware ended without an action")?;
         Ok(bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())

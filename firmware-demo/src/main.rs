@@ -22,6 +22,7 @@ mod firmware {
     use actq_firmware_support::machine::{entry, semihosting::hio, singleton};
     use actq_firmware_support::{count, host, slot};
     use actq_kernels::{Head, Image, StepError};
+    use actq_link::{RESET, STEP};
 
     /// Includes a file at an address that is a multiple of 4.
     #[repr(C, align(4))]
@@ -123,7 +124,7 @@ mod firmware {
         Ok(())
     }
 
-    /// Answers `R` and `S` from standard input until it ends.
+    /// Answers requests of the pipe protocol from standard input until it ends.
     fn serve(head: &mut Head<'_, '_>, run: Run) -> Result<(), Message> {
         let input = host::File::open(c"/dev/stdin", false).ok_or_else(|| message("input", "cannot be opened"))?;
         let output = host::File::open(c"/dev/stdout", true).ok_or_else(|| message("output", "cannot be opened"))?;
@@ -134,8 +135,8 @@ mod firmware {
         let mut command = [0u8];
         while input.read_exact(&mut command) {
             match command {
-                [b'R'] => head.reset(),
-                [b'S'] => {
+                [RESET] => head.reset(),
+                [STEP] => {
                     if !input.read_exact(bytemuck::cast_slice_mut(observation)) {
                         return Err(message("input", "ended inside an observation"));
                     }

@@ -1,11 +1,9 @@
-//! The pipe protocol: any simulator runs an image as its policy through standard input and output.
-//!
-//! Little-endian. `R` resets and has no reply; `S` and the observation (f32) are answered by the action (f32). Chunks are
-//! queued inside. The firmware demo speaks the same protocol.
+//! The pipe protocol ([`actq_link`]): any simulator runs an image as its policy through standard input and output.
 
 use std::io::{ErrorKind, Read, Write};
 
 use actq_kernels::Image;
+use actq_link::{RESET, STEP};
 use anyhow::{Context, Result, bail};
 
 use crate::runtime::with_head;
@@ -21,8 +19,8 @@ pub fn serve(image: Image<'_>, mut input: impl Read, mut output: impl Write) -> 
                 other => other.context("input cannot be read")?,
             }
             match command[0] {
-                b'R' => head.reset(),
-                b'S' => {
+                RESET => head.reset(),
+                STEP => {
                     input
                         .read_exact(&mut bytes)
                         .with_context(|| format!("the input ended inside an observation of {} bytes", bytes.len()))?;

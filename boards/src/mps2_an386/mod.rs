@@ -9,5 +9,5 @@ pub(crate) const BOARD: Board = Board {
     emulator: "qemu-system-arm",
     machine: &["-M", "mps2-an386"],
     transport: Transport::Semihosting,
-    shows: &["bench", "functions", "golden", "portable", "runtime", "stack"],
+    shows: &["bench", "functions", "golden", "portable", "runtime", "runtime-poll", "stack"],
 };

@@ -1,4 +1,5 @@
-//! The whole runtime and nothing else (no host, no text): `cargo xtask budgets` measures its code. It is not run.
+//! The whole runtime, with steps as wholes, and nothing else (no host, no text): `cargo xtask budgets` measures its code. It is not
+//! run.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
@@ -29,7 +30,7 @@ mod firmware {
         }
     }
 
-    /// All that an application calls.
+    /// All that an application calls that does not cut its steps.
     fn run(image: &[u8], scratch: &mut [u32], observation: &[f32]) -> Option<f32> {
         let mut head = Head::new(Image::new_checked(image).ok()?, scratch).ok()?;
         head.self_test().ok()?;

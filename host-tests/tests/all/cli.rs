@@ -13,7 +13,9 @@ use actq::policy::Policy;
 use actq::runtime::{ImageBuffer, with_head};
 use actq_bench::command::{actq, all, failed, run, succeeded};
 use actq_bench::golden::Random;
+use actq_bench::qemu::step_request;
 use actq_kernels::Width;
+use actq_link::{RESET, STEP};
 use anyhow::{Context, Result, ensure};
 use ndarray::{Array1, Array3};
 use ndarray_npy::{NpzWriter, WriteNpyExt as _};
@@ -283,10 +285,6 @@ fn floats(values: &[f32]) -> Vec<u8> {
     values.iter().flat_map(|v| v.to_le_bytes()).collect()
 }
 
-fn step_frame(obs: &[f32]) -> Vec<u8> {
-    [b"S".to_vec(), floats(obs)].concat()
-}
-
 #[test]
 fn serve_plays_a_chunk_and_plans_again() -> Result<()> {
     let fixture = Fixture::new()?;
@@ -321,10 +319,10 @@ fn serve_plays_a_chunk_and_plans_again() -> Result<()> {
     let mut answers = Vec::new();
     for part in session {
         let Some((seen, plan, position)) = part else {
-            stdin.write_all(b"R")?;
+            stdin.write_all(&[RESET])?;
             continue;
         };
-        stdin.write_all(&step_frame(&obs[seen]))?;
+        stdin.write_all(&step_request(&obs[seen]))?;
         let mut answer = vec![0; 4 * ACT];
         stdout.read_exact(&mut answer)?;
         assert_eq!(answer, floats(&action(&raw[plan], position)), "observation {seen}");
@@ -337,7 +335,7 @@ fn serve_plays_a_chunk_and_plans_again() -> Result<()> {
     ensure!(child.wait()?.code() == Some(0), "the end of the input is no error");
 
     // The same in one go.
-    let requests = session.map(|part| part.map_or(b"R".to_vec(), |(seen, ..)| step_frame(&obs[seen]))).concat();
+    let requests = session.map(|part| part.map_or(vec![RESET], |(seen, ..)| step_request(&obs[seen]))).concat();
     let output = run(actq(&["serve", &text(&path)]), &requests)?;
     assert_eq!((output.status.code(), output.stdout), (Some(0), answers));
     Ok(())
@@ -347,13 +345,13 @@ fn serve_plays_a_chunk_and_plans_again() -> Result<()> {
 fn serve_refuses_what_is_not_the_protocol() -> Result<()> {
     let fixture = Fixture::new()?;
     let path = text(&fixture.image("")?);
-    let good = step_frame(&[0.5; OBS]);
+    let good = step_request(&[0.5; OBS]);
     let cases: [(&str, Vec<u8>, usize, &[&str]); 5] = [
-        ("unknown byte", b"RX".to_vec(), 0, &["0x58"]),
+        ("unknown byte", vec![RESET, b'X'], 0, &["0x58"]),
         ("end inside an observation", good[..good.len() - 1].to_vec(), 0, &["observation"]),
-        ("end behind S", [&good[..], b"S"].concat(), 1, &["observation"]),
+        ("end behind S", [&good[..], &[STEP]].concat(), 1, &["observation"]),
         ("text", [&good[..], &good[..], b"\n"].concat(), 2, &["0x0a"]),
-        ("NaN", step_frame(&[f32::NAN; OBS]), 0, &["observation", "finite"]),
+        ("NaN", step_request(&[f32::NAN; OBS]), 0, &["observation", "finite"]),
     ];
     all(cases.map(|(what, input, answers, words)| {
         let result = run(actq(&["serve", &path]), &input).and_then(|output| {
@@ -694,7 +692,7 @@ fn damaged_images_are_refused_by_every_command() -> Result<()> {
     let refused = |bytes: &[u8]| {
         fs::write(&path, bytes)?;
         commands.iter().try_for_each(|command| {
-            let output = run(actq(command), b"R")?;
+            let output = run(actq(command), &[RESET])?;
             ensure!(output.stdout.is_empty(), "{command:?} prints something");
             failed(&output, 1, &[&image]).with_context(|| format!("{command:?}"))
         })

@@ -63,7 +63,7 @@ pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
             f32_bytes.to_string(),
             "1.0x".into(),
             "-".into(),
-            "0".into(),
+            "-".into(),
             success(&outcomes),
             tracking(&outcomes),
         ],

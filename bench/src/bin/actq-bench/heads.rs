@@ -9,6 +9,7 @@ use actq::policy::Policy;
 use actq::quantize::prepared::Prepared;
 use actq::quantize::{Budget, Method, Options};
 use actq::runtime::ImageBuffer;
+use actq::time::CLOCK;
 use actq::writer;
 use actq_bench::cycles::{Code, Cost, Kind};
 use actq_bench::qemu::Counter;
@@ -22,9 +23,6 @@ use crate::kernels::Cycles;
 /// Steps of distillation: too few for accuracy, but the widths of the rows, which matter here, are chosen before. (Which
 /// matrices take int16 activations is chosen after, and may differ a little.)
 const STEPS: usize = 50;
-
-/// Clock of an STM32F405 in Hz.
-const CLOCK: f64 = 168e6;
 
 /// Functions that the report by function shows of each head.
 const FUNCTIONS: usize = 8;
