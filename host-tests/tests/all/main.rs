@@ -4,6 +4,7 @@ mod best;
 mod cli;
 mod cost;
 mod counting;
+mod digests;
 mod faults;
 mod format;
 mod functions;
