@@ -15,7 +15,7 @@ use crate::quantize::{Activations, Budget, BudgetTooSmall, Options, Outcome};
 use crate::runtime::ImageBuffer;
 use crate::writer;
 
-/// Clock of the processor that is assumed where none is given: 168 MHz, that of an STM32F407.
+/// Clock of the processor that is assumed where none is given: 168 MHz, that of an STM32F405.
 pub const CLOCK: f64 = 168e6;
 
 /// Reads a clock in Hz, as `168M`, `84000K` or `168000000`.

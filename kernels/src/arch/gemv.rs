@@ -1,5 +1,7 @@
 //! The GEMV, whichever backend computes it.
 
+use core::fmt;
+
 use super::integers;
 use crate::layout::{Block, STRIP};
 use crate::x::Prepared;
@@ -7,7 +9,16 @@ use crate::x::Prepared;
 /// The block and the prepared vector do not belong together (other columns, another group size or layout), or the rows are
 /// no whole strips.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Mismatch;
+
+impl fmt::Display for Mismatch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("block and prepared vector do not belong together, or the rows are no whole strips")
+    }
+}
+
+impl core::error::Error for Mismatch {}
 
 /// A run of a block's rows, a vector that was prepared for its shape, and room for the sums. All of it fits, so that no backend
 /// can fail.

@@ -24,11 +24,11 @@ impl<'a> Image<'a> {
     pub(crate) fn contract_of(&self, i: usize) -> [f32; CONTRACT_ARRAYS] {
         let mut numbers = [1.0, -0.0, f32::NEG_INFINITY, f32::INFINITY, f32::INFINITY];
         let (mut flags, len) = (high(self.head(h::W_WORK_FLAGS)), self.act_len());
-        let mut at = self.head(h::W_CONTRACT) as usize + i;
+        let mut at = (self.head(h::W_CONTRACT) as usize).wrapping_add(i);
         for number in &mut numbers {
             if flags & 1 == 1 {
                 *number = f32::from_bits(self.word(at));
-                at += len;
+                at = at.wrapping_add(len);
             }
             flags >>= 1;
         }

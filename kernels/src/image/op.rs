@@ -7,7 +7,7 @@ use super::header::{MATRIX_WORDS, OP_WORDS, W_KIND, W_MATRICES, W_MATRIX_COUNT, 
 use super::matrix::{Matrix, matrix};
 use super::region::Region;
 use super::view::Image;
-use super::words::{TooLarge, halves, high, low, record, section};
+use super::words::{TooLarge, halves, high, low, record, section, word};
 use crate::error::ImageError;
 use crate::math::Function;
 
@@ -206,7 +206,7 @@ impl<'a> Op<'a> {
 
     /// Single constant `i`: see [`OpKind`].
     pub fn constant(&self, i: usize) -> f32 {
-        self.image.get(self.data() + i).map_or(0.0, |word| f32::from_bits(u32::from_le(*word)))
+        f32::from_bits(word(self.image, self.data().wrapping_add(i)))
     }
 
     /// Array `i` of f32 bits, of the length of `dst`: see [`OpKind`].
@@ -227,7 +227,7 @@ impl<'a> Op<'a> {
     /// A range of array `i`; empty where that is not in the image.
     pub(crate) fn part(&self, i: usize, range: &Range<usize>) -> &'a [u32] {
         let before = usize::from(self.form.uses.constants) + i * self.dst().len + range.start;
-        section(self.image, self.data() + before, range.len()).unwrap_or_default()
+        section(self.image, self.data().wrapping_add(before), range.len()).unwrap_or_default()
     }
 
     /// Offset of the constants or of the matrix record.
@@ -259,7 +259,7 @@ impl<'a> Image<'a> {
 
     /// Operation `i`, refused where its record says something impossible. (Within a checked image every record parses.)
     pub(crate) fn op(&self, i: usize) -> Result<Op<'a>, ImageError> {
-        let op = record(self.words, self.head(W_OPS) as usize + i * OP_WORDS)?;
+        let op = record(self.words, (self.head(W_OPS) as usize).wrapping_add(i * OP_WORDS))?;
         let [head, places, lengths, data] = op.map(u32::from_le);
         let (code, detail, len) = (head as u8, (head >> 8) as u8, high(head));
         let form = FORMS.get(usize::from(code).wrapping_sub(1)).ok_or(ImageError::Op)?;
@@ -285,6 +285,6 @@ impl<'a> Image<'a> {
 
     /// Offset of matrix record `i`.
     pub(super) fn matrix_at(&self, i: usize) -> usize {
-        self.head(W_MATRICES) as usize + i * MATRIX_WORDS
+        (self.head(W_MATRICES) as usize).wrapping_add(i * MATRIX_WORDS)
     }
 }

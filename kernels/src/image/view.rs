@@ -144,7 +144,7 @@ impl<'a> Image<'a> {
             return None;
         }
         let (obs, act) = (self.obs_len(), self.act_len());
-        let offset = self.head(h::W_SELF_TEST) as usize + step * (obs + act);
+        let offset = (self.head(h::W_SELF_TEST) as usize).wrapping_add(step * (obs + act));
         self.section(offset, obs + act).split_at_checked(obs)
     }
 }
