@@ -1,6 +1,6 @@
 //! The registered layouts: by type for code that is generic over them, as a table of constants for code that is not.
 
-use super::format::{Cell, Format, PAD_COLS, QUAD, XLayout};
+use super::format::{Cell, Format, PAD_COLS, QUAD, STRIP, XLayout};
 use super::lanes::Lanes;
 use super::width::Width;
 
@@ -24,9 +24,19 @@ pub struct Layout {
     /// The same of a unit's columns.
     pub unit_log: u8,
     /// The same of a strip's rows.
-    pub strip_log: u8,
+    pub strip_log: StripLog,
     /// The same of the step.
     pub step_log: u8,
+}
+
+/// Binary logarithm of a strip's rows: of [`QUAD`] or of [`STRIP`]. Of an enum the compiler knows that it can be shifted by.
+#[derive(Clone, Copy, Debug)]
+#[repr(u8)]
+pub enum StripLog {
+    /// Four rows.
+    Quad = QUAD.trailing_zeros() as u8,
+    /// Eight.
+    Strip = STRIP.trailing_zeros() as u8,
 }
 
 // A power of two, by which the table is quick to index.
@@ -43,7 +53,7 @@ impl Layout {
             pad: if F::X.chunk == XLayout::ALL { PAD_COLS } else { F::STEP },
             chunk_log: F::X.chunk.trailing_zeros() as u8,
             unit_log: F::CELL.cols.trailing_zeros() as u8,
-            strip_log: F::STRIP.trailing_zeros() as u8,
+            strip_log: if F::STRIP == QUAD { StripLog::Quad } else { StripLog::Strip },
             step_log: F::STEP.trailing_zeros() as u8,
         }
     }
