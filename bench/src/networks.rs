@@ -1,15 +1,16 @@
 //! Networks of drawn weights, for measurements and properties.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use actq::graph::{Graph, Matrix, Node, NodeKind, Part};
 use actq::policy::{Contract, Policy};
 use actq::quantize::scale::round_to_nearest;
 use actq::quantize::{Activations, Outcome};
 use actq::random::Random;
+use actq::runtime::{ImageBuffer, with_head};
 use actq_kernels::Width;
-use actq_kernels::image::Kind;
-use anyhow::Result;
+use actq_kernels::image::{Kind, header as h, op, seal};
+use anyhow::{Context, Result, ensure};
 
 /// A network under construction: parts of the observation go through one operation each.
 #[derive(Debug)]
@@ -121,4 +122,44 @@ impl Builder {
         let input = self.part(len);
         self.node(kind, input)
     }
+}
+
+/// The image with every linear operation that has biases, and whose output holds something before it, made to accumulate: the
+/// format has such operations, and no graph lowers to one.
+pub fn accumulating(bytes: &[u8]) -> Result<Vec<u8>> {
+    let name = Path::new("accumulating");
+    let mut bytes = bytes.to_vec();
+    let word = |bytes: &[u8], at: usize| u32::from_le_bytes([0, 1, 2, 3].map(|i| bytes[4 * at + i]));
+    let count = ImageBuffer::new(&bytes).image(name)?.op_count();
+    let first = word(&bytes, h::W_OPS) as usize;
+    let mut changed = 0;
+    for record in (first..).step_by(h::OP_WORDS).take(count) {
+        if word(&bytes, record) as u8 == op::LINEAR && word(&bytes, record + 2) != 0 {
+            let mut with = bytes.clone();
+            with[4 * record + 1] = 1;
+            seal(&mut with).context("the image is too long")?;
+            // Refused where nothing was written there.
+            if ImageBuffer::new(&with).image(name).is_ok() {
+                (bytes, changed) = (with, changed + 1);
+            }
+        }
+    }
+    ensure!(changed > 0, "no operation can accumulate");
+    // Other actions than those that the self-test vector holds.
+    let buffer = ImageBuffer::new(&bytes);
+    let image = buffer.image(name)?;
+    let mut at = 4 * word(&bytes, h::W_SELF_TEST) as usize;
+    with_head(image, |head| {
+        for step in 0..image.self_test_steps() {
+            let (observation, _) = image.self_test(step).context("the self-test has such a step")?;
+            let observation: Vec<f32> = observation.iter().map(|word| f32::from_bits(u32::from_le(*word))).collect();
+            let action: Vec<u8> = head.step(&observation)?.iter().flat_map(|value| value.to_le_bytes()).collect();
+            at += 4 * observation.len();
+            bytes[at..][..action.len()].copy_from_slice(&action);
+            at += action.len();
+        }
+        Ok(())
+    })?;
+    seal(&mut bytes).context("the image is too long")?;
+    Ok(bytes)
 }

@@ -23,12 +23,14 @@
 #![deny(unsafe_code)]
 
 pub mod arch;
+mod cursor;
 pub mod dequantize;
 mod error;
 pub mod head;
 pub mod image;
 pub mod layout;
 pub mod math;
+mod meter;
 pub mod ops;
 pub mod pace;
 pub mod round;

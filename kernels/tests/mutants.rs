@@ -4,7 +4,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use actq_kernels::image::{checksum, header as h, header::op};
+use actq_kernels::image::{checksum, header as h, op};
 use actq_kernels::{Head, Image};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng as _, SeedableRng as _};

@@ -9,10 +9,10 @@ use actq::quantize::{Activations, Budget, Method, Options};
 use actq::runtime::{ImageBuffer, with_head};
 use actq::time::{CLOCK, Limit, StepTime};
 use actq::writer;
-use actq_bench::networks::Builder;
+use actq_bench::networks::{Builder, accumulating};
 use actq_bench::qemu::{self, Counter};
 use actq_bench::{Target, firmware, profile, shared_policies, ur3};
-use actq_kernels::cost::{Cost, of_step};
+use actq_kernels::cost::{Cost, of_op, of_step};
 use actq_kernels::{StepError, Width};
 use anyhow::{Context, Result, bail, ensure};
 
@@ -208,6 +208,42 @@ fn mixed_widths_cost_little_more_than_their_blocks() -> Result<()> {
         println!("{activations:?}: blocks alone {alone}, in order {in_order}, indexed {indexed}");
         ensure!(*in_order as f64 <= 1.03 * alone as f64, "{in_order} in order, {alone} alone");
         ensure!(*indexed as f64 <= 1.03 * alone as f64, "{indexed} with an index, {alone} alone");
+    }
+    Ok(())
+}
+
+/// Biases that are added to what an output holds: no graph lowers to such an operation, but an image may have it.
+#[test]
+fn polls_that_add_biases_stay_within_their_budget() -> Result<()> {
+    const ROWS: usize = 1000;
+    const COLS: usize = 8;
+    let (elf, counter) = (firmware::application(Target::Fpu)?, Counter::build()?);
+    let mut builder = Builder::new(COLS);
+    for _ in 0..2 {
+        builder.linear((ROWS, COLS), Activations::Int8, |_| Some(Width::W2), 0, true)?;
+    }
+    builder.part(2);
+    let (policy, outcomes) = builder.finish("biases".to_owned(), false);
+    let bytes = accumulating(&writer::image(&policy, &outcomes)?)?;
+    let buffer = ImageBuffer::new(&bytes);
+    let image = buffer.image(Path::new("biases"))?;
+    let observations = [(0..COLS).map(|i| (i as f32).sin()).collect::<Vec<_>>()];
+    for budget in [image.least_budget(), 2 * image.least_budget()] {
+        let (costs, _) = profile::regions(&elf, &counter, &bytes, &format!("poll {budget}"), &observations)?;
+        let largest = costs.iter().skip(1).map(|c| c.instructions).max().unwrap_or(0);
+        println!("{} polls of {budget}, the largest {largest}", costs.len() - 1);
+        ensure!(largest <= u64::from(budget), "{largest} instructions in a poll of {budget}");
+    }
+    let parts = profile::parts(&elf, &counter, &image, &bytes, &observations, u32::MAX)?.remove(0);
+    let linear = image.ops().zip(&parts.ops).filter(|(op, _)| op.matrix().is_some());
+    for (op, counted) in linear {
+        let predicted = of_op(&op);
+        println!("{:?}: {predicted:?}, counted {counted:?}", op.kind);
+        for (predicted, counted) in [(predicted.instructions, counted.instructions), (predicted.cycles, counted.cycles)]
+        {
+            let error = predicted as f64 / counted as f64 - 1.0;
+            ensure!(error.abs() < 0.03, "{:?}: {predicted} for {counted}: {:+.2}%", op.kind, 1e2 * error);
+        }
     }
     Ok(())
 }

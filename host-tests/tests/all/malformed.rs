@@ -11,7 +11,7 @@ use actq::runtime::ImageBuffer;
 use actq_bench::golden::Random;
 use actq_bench::root;
 use actq_kernels::format::Width;
-use actq_kernels::image::{Kind, checksum, header as h, header::op};
+use actq_kernels::image::{Kind, checksum, header as h, op};
 use actq_kernels::math::Function;
 use actq_kernels::{Head, Image, ImageError as E, StepError};
 

@@ -15,7 +15,7 @@ use actq_bench::firmware::{self, built_in};
 use actq_bench::qemu::{self, Server};
 use actq_bench::{Target, golden, shared_policies, ur3};
 use actq_kernels::Width;
-use actq_kernels::image::{checksum, header as h};
+use actq_kernels::image::{checksum, header as h, op};
 use actq_kernels::linear::worst_case;
 use anyhow::{Context, Result, ensure};
 
@@ -105,7 +105,7 @@ fn the_target_allows_int32_to_the_last_product_as_the_host_does() -> Result<()> 
         ensure!(largest < i64::from(i16::MAX), "scales of {group}: all of int16 is allowed");
         let words: &[u32] = bytemuck::cast_slice(buffer.bytes());
         let records = words[h::W_OPS] as usize..;
-        let mut linear = words[records].chunks(h::OP_WORDS).filter(|record| record[0] as u8 == h::op::LINEAR);
+        let mut linear = words[records].chunks(h::OP_WORDS).filter(|record| record[0] as u8 == op::LINEAR);
         let record = linear.nth(widest).context("the operation is linear")?[3] as usize;
         for (x_max, refused) in [(largest, false), (largest + 1, true)] {
             bytes[4 * record + 6..][..2].copy_from_slice(&u16::try_from(x_max)?.to_le_bytes());

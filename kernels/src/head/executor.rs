@@ -2,12 +2,12 @@
 
 use super::arena::{part, regions};
 use crate::arch;
+use crate::cursor::Cursor;
 use crate::error::Fault;
 use crate::image::{Op, OpKind};
+use crate::meter::{Meter, Work};
 use crate::ops::elementwise::{self, copy};
 use crate::ops::norm;
-use crate::pace::cursor::Cursor;
-use crate::pace::meter::{Meter, Work};
 
 /// Runs an operation from where the cursor stands; true at its end.
 ///

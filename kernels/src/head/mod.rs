@@ -8,12 +8,12 @@ use core::task::Poll;
 
 use self::arena::{part, regions};
 use self::executor::run;
+use crate::cursor::Cursor;
 use crate::error::{Fault, HeadError, StepError};
 use crate::image::{Image, Region};
+use crate::meter::{Meter, Unlimited, Work};
 use crate::ops::elementwise::{copy, copy_le};
 use crate::pace::budget::Budget;
-use crate::pace::cursor::Cursor;
-use crate::pace::meter::{Meter, Unlimited, Work};
 
 /// A head: an image and the scratch memory that it runs in.
 #[derive(Debug)]

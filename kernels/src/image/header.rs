@@ -152,6 +152,3 @@ impl Header {
         Ok(words)
     }
 }
-
-// Old path, until all users have moved.
-pub use super::op;

@@ -125,6 +125,15 @@ impl RowBlock<'_> {
         bf16(half_word(self.scales, i))
     }
 
+    /// The weights of the block's row `i`: `level * group scale * row scale`, the integers multiplied first. Fills `out` up to the
+    /// number of columns.
+    pub fn dequantize(&self, i: usize, out: &mut [f32]) {
+        let scale = self.scale(i);
+        for (col, out) in out.iter_mut().enumerate().take(self.block.shape().cols) {
+            *out = (self.block.level(i, col) * i32::from(self.block.group_scale(i, col))) as f32 * scale;
+        }
+    }
+
     /// The output index of the block's row `i`.
     #[inline(always)]
     pub fn output(&self, i: usize) -> usize {

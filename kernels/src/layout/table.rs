@@ -60,19 +60,19 @@ impl Layout {
 }
 
 macro_rules! table {
-    (() $($(#[$doc:meta])* $width:ident = $bits:literal, $grid:ident:
-        $single:ident::$Single:ident, $paired:ident::$Paired:ident;)*) => {
+    (() $($(#[$doc:meta])* $width:ident = $bits:literal, $grid:ident: $single:path, $paired:path;)*) => {
         /// By width and lanes. A table in memory takes fewer instructions than a choice for every constant.
         pub static LAYOUTS: [[Layout; Lanes::ALL.len()]; Width::ALL.len()] =
-            [$([Layout::of::<super::$single::$Single>(), Layout::of::<super::$paired::$Paired>()]),*];
+            [$([Layout::of::<$single>(), Layout::of::<$paired>()]),*];
 
         /// Calls a function that is generic over the layout of `$shape`.
         macro_rules! with_format {
             ($shape:expr, $call:ident::<_>$arguments:tt) => {{
-                use $crate::layout::{Lanes, Width};
+                use $crate::layout::lanes::Lanes;
+                use $crate::layout::width::Width;
                 match ($shape.width, $shape.lanes) {
-                    $((Width::$width, Lanes::Single) => $call::<$crate::layout::$single::$Single>$arguments,
-                    (Width::$width, Lanes::Paired) => $call::<$crate::layout::$paired::$Paired>$arguments,)*
+                    $((Width::$width, Lanes::Single) => $call::<$single>$arguments,
+                    (Width::$width, Lanes::Paired) => $call::<$paired>$arguments,)*
                 }
             }};
         }

@@ -10,17 +10,14 @@ use core::ops::Range;
 use super::elementwise::copy_le;
 use crate::arch;
 use crate::arch::gemv;
+use crate::cursor::LinearCursor;
 use crate::error::Fault;
 use crate::image::header::BLOCK_WORDS;
 use crate::image::{Matrix, RowBlock, row_block};
 use crate::layout::half::bf16;
 use crate::layout::{QUAD, STRIP};
-use crate::pace::cursor::LinearCursor;
-use crate::pace::meter::{Meter, Start, Work};
+use crate::meter::{Meter, RUN, Start, Work};
 use crate::x::{Plan, Prepared, Scale};
-
-/// Rows whose sums stand on the stack at once.
-pub(crate) const RUN: usize = 8 * STRIP;
 
 /// `len` of the outputs from `first` on, with their biases if there are any; `None` where there are too few.
 #[inline(always)]

@@ -4,8 +4,8 @@ use core::ops::Range;
 
 use super::elementwise::constant;
 use crate::arch::sqrt;
+use crate::cursor::Moments;
 use crate::math::zero_or_nan;
-use crate::pace::cursor::Moments;
 
 /// In place `(x - mean) / sqrt(variance + eps) * weight + bias`, mean and biased variance over the vector (torch's LayerNorm).
 /// Sums run in order from the first element. Nothing is done where weights or biases are too few.

@@ -11,12 +11,11 @@
 
 pub use super::feature::Feature;
 use super::feature::{Gemv, Prepare, Strips};
-use super::meter::Start;
 use super::rates::RATES;
 use crate::image::op;
 use crate::image::{Image, Matrix, Op, OpKind, RowBlock};
 use crate::layout::{BlockShape, QUAD, STRIP};
-use crate::ops::linear::RUN;
+use crate::meter::{RUN, Start};
 use crate::x::{Extent, Plan};
 
 /// Instructions, and cycles as the project's model of the Cortex-M4 has them.

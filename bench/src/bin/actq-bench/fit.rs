@@ -14,7 +14,7 @@ use actq::quantize::{Activations, Outcome};
 use actq::random::Random;
 use actq::runtime::ImageBuffer;
 use actq::{files, writer};
-use actq_bench::networks::Builder;
+use actq_bench::networks::{Builder, accumulating};
 use actq_bench::qemu::Counter;
 use actq_bench::{Target, firmware, profile, root};
 use actq_kernels::Width;
@@ -81,9 +81,9 @@ pub(crate) fn run() -> Result<()> {
     let counter = Counter::build()?;
     let mut samples = Vec::new();
     let mut polls = Vec::new();
-    for policy in policies()? {
-        println!("measuring {}", policy.0.name);
-        measure(&policy, &elf, &counter, &mut samples, &mut polls)?;
+    for (name, bytes) in images()? {
+        println!("measuring {name}");
+        measure((&name, &bytes), &elf, &counter, &mut samples, &mut polls)?;
     }
     let expected: Vec<&Sample> = samples.iter().filter(|s| s.expected).collect();
     let instructions = solve(&expected, |c| c.instructions);
@@ -143,27 +143,26 @@ fn table(instructions: &Rates, cycles: &Rates, most: &Rates) -> String {
 
 /// Runs an image, in steps and by operations; `polls` gets what a limit adds to an operation, and the pieces of it.
 fn measure(
-    (policy, outcomes): &(Policy, Vec<Outcome>),
+    (name, bytes): (&str, &[u8]),
     elf: &Path,
     counter: &Counter,
     samples: &mut Vec<Sample>,
     polls: &mut Vec<(f64, usize)>,
 ) -> Result<()> {
-    let bytes = writer::image(policy, outcomes)?;
-    let buffer = ImageBuffer::new(&bytes);
-    let image = buffer.image(Path::new(&policy.name))?;
-    let observations = observations(policy.graph.obs_len);
+    let buffer = ImageBuffer::new(bytes);
+    let image = buffer.image(Path::new(name))?;
+    let observations = observations(image.obs_len());
     let frame = features(|add| cost::frame(&image, add));
     let ops: Vec<Op<'_>> = image.ops().collect();
     let of_ops: Vec<_> = ops.iter().map(|op| features(|add| cost::features(op, add))).collect();
-    let steps = profile::steps(elf, counter, &bytes, &observations)?;
+    let steps = profile::steps(elf, counter, bytes, &observations)?;
     for (step, cost) in steps.into_iter().enumerate() {
         let mut all = frame.clone();
         of_ops.iter().flatten().for_each(|(feature, n)| *all.entry(*feature).or_default() += n);
-        samples.push(Sample { name: format!("{}, a step", policy.name), features: all, cost, expected: step < NORMAL });
+        samples.push(Sample { name: format!("{name}, a step"), features: all, cost, expected: step < NORMAL });
     }
-    let single = profile::parts(elf, counter, &image, &bytes, &observations, u32::MAX)?;
-    let limited = profile::parts(elf, counter, &image, &bytes, &observations[..1], AMPLE)?;
+    let single = profile::parts(elf, counter, &image, bytes, &observations, u32::MAX)?;
+    let limited = profile::parts(elf, counter, &image, bytes, &observations[..1], AMPLE)?;
     for ((op, cost), plain) in ops.iter().zip(&limited[0].ops).zip(&single[0].ops) {
         polls.push((cost.instructions as f64 - plain.instructions as f64, pieces(op)));
     }
@@ -172,7 +171,7 @@ fn measure(
             if poll > 0.0 {
                 features.insert(Feature::POLL_OP, poll);
             }
-            samples.push(Sample { name: format!("{}, {what}", policy.name), features, cost, expected: step < NORMAL });
+            samples.push(Sample { name: format!("{name}, {what}"), features, cost, expected: step < NORMAL });
         };
         sample("begin".to_owned(), parts.begin, 0.0, features(|add| cost::begin(&image, add)));
         sample("action".to_owned(), parts.action, 1.0, features(|add| cost::action(&image, add)));
@@ -354,6 +353,23 @@ fn observations(len: usize) -> Vec<Vec<f32>> {
     let normal = (0..NORMAL).map(|_| (0..len).map(|_| random.normal()).collect::<Vec<_>>()).collect::<Vec<_>>();
     let ends = [0.0, 1e-3, 1.0, -1.0, 30.0, -30.0, 1e4, -1e4];
     normal.into_iter().chain(ends.map(|x| vec![x; len])).collect()
+}
+
+/// Images with their names.
+fn images() -> Result<Vec<(String, Vec<u8>)>> {
+    let mut images = Vec::new();
+    for (policy, outcomes) in policies()? {
+        images.push((policy.name.clone(), writer::image(&policy, &outcomes)?));
+    }
+    let mut builder = Builder::new(OBSERVATION);
+    for rows in LENGTHS {
+        for _ in 0..2 {
+            builder.linear((rows, 40), Activations::Int8, |_| Some(Width::W2), 0, true)?;
+        }
+    }
+    let (policy, outcomes) = builder.finish("biases that are added".to_owned(), false);
+    images.push((policy.name.clone(), accumulating(&writer::image(&policy, &outcomes)?)?));
+    Ok(images)
 }
 
 fn policies() -> Result<Vec<(Policy, Vec<Outcome>)>> {

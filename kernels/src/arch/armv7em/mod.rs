@@ -11,7 +11,7 @@ mod table;
 use core::arch::global_asm;
 
 use self::table::kernels;
-use super::Product;
+use super::product::Product;
 use crate::layout::QUAD;
 
 global_asm!(include_str!("single.s"), options(raw));

@@ -9,7 +9,7 @@ use core::ptr::NonNull;
 use core::slice;
 
 use self::table::quantizer;
-use super::integers::copy;
+use super::armv7em::copy;
 use crate::layout::XLayout;
 use crate::math::exp2::{EXP, QUARTER, exp2_constants};
 use crate::round::ROUND;

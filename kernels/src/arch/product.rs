@@ -1,8 +1,7 @@
-//! The GEMV, whichever backend computes it.
+//! What a GEMV is given.
 
 use core::fmt;
 
-use super::integers;
 use crate::layout::{Block, STRIP};
 use crate::x::Prepared;
 
@@ -48,16 +47,4 @@ impl<'a> Product<'a> {
         }
         Ok(Self { block, x, first_row, acc })
     }
-}
-
-/// Multiplies a run of a block's rows ([`Product::new`]) with a prepared vector.
-///
-/// `acc[i]` becomes `sum over groups of scale * sum over columns of level * x`, modulo 2^32, for row `first_row + i`. The sums
-/// of padding rows have no meaning.
-///
-/// The true sum fits an i32 where [`crate::image::worst_case`] says so, which [`crate::Image::new_checked`] has verified.
-#[inline(never)]
-pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i32]) -> Result<(), Mismatch> {
-    integers::gemv(Product::new(block, x, first_row, acc)?);
-    Ok(())
 }

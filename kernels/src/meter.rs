@@ -1,7 +1,10 @@
 //! Leave to go on: what runs an image in pieces asks here how far it may go, and knows no prices.
 
 use crate::image::{Image, Op};
-use crate::layout::BlockShape;
+use crate::layout::{BlockShape, STRIP};
+
+/// Rows whose sums stand on the stack at once.
+pub(crate) const RUN: usize = 8 * STRIP;
 
 /// A kind of work, with all that its price depends on.
 #[derive(Clone, Copy, Debug)]
