@@ -8,7 +8,7 @@ use std::sync::{LazyLock, Mutex};
 
 use actq::policy::Policy;
 use actq::quantize::{Activations, Budget, Method, Options, quantize};
-use actq::writer;
+use actq::{files, writer};
 use actq_boards::{Target, root};
 use actq_kernels::Width;
 use anyhow::{Context, Result, anyhow, ensure};
@@ -119,7 +119,7 @@ fn write_built_in() -> Result<PathBuf> {
     let bytes = writer::image(&policy, &quantize(&policy.graph, &[], &options)?)?;
     // Cargo builds anew what includes a newer file.
     if fs::read(&path).ok().as_ref() != Some(&bytes) {
-        writer::write(&path, &bytes)?;
+        files::write(&path, &bytes)?;
     }
     Ok(path)
 }

@@ -7,13 +7,15 @@
 
 use core::ops::Range;
 
-use crate::activations::{NotFinite, Plan, Prepared, Scale, max_prepared_words};
-#[cfg(actq_fpu)]
-use crate::armv7em;
-use crate::format::{Block, BlockShape, Lanes, MAX_GROUP, PAD_COLS, QUAD, STRIP};
-use crate::gemv::gemv;
+use crate::arch;
+use crate::arch::gemv;
+use crate::error::Fault;
 use crate::image::{header::BLOCK_WORDS, row_block};
-use crate::slice::{LinearCursor, Meter, Price, Unlimited};
+use crate::layout::half::{bf16, half_word};
+use crate::layout::{Block, BlockShape, Lanes, MAX_GROUP, PAD_COLS, QUAD, STRIP};
+use crate::pace::cursor::LinearCursor;
+use crate::pace::meter::{Meter, Start, Work};
+use crate::x::{Plan, Prepared, Scale, max_prepared_words};
 
 /// Rows whose sums stand on the stack at once.
 pub(crate) const RUN: usize = 8 * STRIP;
@@ -50,25 +52,9 @@ pub struct RowBlock<'a> {
     pub first_row: usize,
 }
 
-/// Half `i` of a run of packed u16.
-#[inline(always)]
-pub(crate) fn half_word(words: &[u32], i: usize) -> u16 {
-    let word = words.get(i / 2).copied().unwrap_or(0);
-    (u32::from_le(word) >> (16 * (i % 2))) as u16
-}
-
-/// The value of a bf16, which is the upper half of an f32.
-#[inline(always)]
-fn bf16(bits: u16) -> f32 {
-    f32::from_bits(u32::from(bits) << 16)
-}
-
 /// `to = from`, as far as both go. On the target not by memcpy, which takes as much code as a kernel.
 pub(crate) fn copy(from: &[u32], to: &mut [u32]) {
-    #[cfg(actq_armv7em)]
-    crate::armv7em::copy(from, to);
-    #[cfg(not(actq_armv7em))]
-    to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
+    arch::copy(from, to);
 }
 
 /// As [`copy`], of words as they stand in the image.
@@ -109,9 +95,9 @@ impl RowBlock<'_> {
 
     /// `y = start + acc * (row_scale * x_scale)` for the block's rows and their places in `y`, with a vector that was prepared
     /// for the block. `start` holds the bits of the whole output's biases; without it, and for rows with an index, y itself is
-    /// the start. Nothing is done where `start` or `y` is too short.
-    pub fn apply(&self, x: &Prepared<'_>, x_scale: Scale, start: Option<&[u32]>, y: &mut [f32]) {
-        self.apply_rows(0..self.block.shape().rows, x, x_scale, start, y);
+    /// the start. `None` where `start` or `y` is too short.
+    pub fn apply(&self, x: &Prepared<'_>, x_scale: Scale, start: Option<&[u32]>, y: &mut [f32]) -> Option<()> {
+        self.apply_rows(0..self.block.shape().rows, x, x_scale, start, y)
     }
 
     /// As [`Self::apply`], for a run of the block's rows, which starts at a multiple of [`STRIP`] and ends at another or with
@@ -123,7 +109,7 @@ impl RowBlock<'_> {
         x_scale: Scale,
         start: Option<&[u32]>,
         y: &mut [f32],
-    ) {
+    ) -> Option<()> {
         let x_scale = x_scale.get();
         if start.is_none() || !self.index.is_empty() {
             return self.apply_runs(&mut [0; RUN], rows, x, x_scale, start, y);
@@ -132,18 +118,17 @@ impl RowBlock<'_> {
         let whole = if rows.end.is_multiple_of(QUAD) { rows.end } else { rows.end & !(STRIP - 1) };
         if rows.start < whole {
             let first = self.first_row + rows.start;
-            let Some((start, y)) = outputs(first, whole - rows.start, start, y) else { return };
-            if gemv(&self.block, x, rows.start, bytemuck::cast_slice_mut(y)).is_err() {
-                return;
-            }
+            let (start, y) = outputs(first, whole - rows.start, start, y)?;
+            gemv(&self.block, x, rows.start, bytemuck::must_cast_slice_mut(y)).ok()?;
             self.scale_in_order(rows.start, None, x_scale, start, y);
         }
         if whole < rows.end {
-            self.apply_runs(&mut [0; STRIP], whole..rows.end, x, x_scale, start, y);
+            self.apply_runs(&mut [0; STRIP], whole..rows.end, x, x_scale, start, y)?;
         }
+        Some(())
     }
 
-    /// As [`Self::apply`], for a run of rows as there, as many at once as have room in `sums`.
+    /// As [`Self::apply_rows`], as many rows at once as have room in `sums`.
     #[inline(never)]
     fn apply_runs(
         &self,
@@ -153,47 +138,38 @@ impl RowBlock<'_> {
         x_scale: f32,
         start: Option<&[u32]>,
         y: &mut [f32],
-    ) {
+    ) -> Option<()> {
         let mut first = rows.start;
         while first < rows.end {
             let run = sums.len().min(rows.end.next_multiple_of(QUAD) - first);
-            let Some(sums) = sums.get_mut(..run) else { return };
-            if gemv(&self.block, x, first, sums).is_err() {
-                return;
-            }
+            let sums = sums.get_mut(..run)?;
+            gemv(&self.block, x, first, sums).ok()?;
             let sums = sums.get(..rows.end - first).unwrap_or(sums);
             if self.index.is_empty() {
-                let Some((start, y)) = outputs(self.first_row + first, sums.len(), start, y) else { return };
+                let (start, y) = outputs(self.first_row + first, sums.len(), start, y)?;
                 self.scale_in_order(first, Some(sums), x_scale, start, y);
             } else {
-                self.scale_by_index(first, sums, x_scale, y);
+                self.scale_by_index(first, sums, x_scale, y)?;
             }
             first += sums.len();
         }
+        Some(())
     }
 
     /// Turns the sums of as many rows as `y` has, from `first` on, into results. What is `None` stands in y itself.
     fn scale_in_order(&self, first: usize, sums: Option<&[i32]>, x_scale: f32, start: Option<&[u32]>, y: &mut [f32]) {
-        #[cfg(actq_fpu)]
-        armv7em::scale(sums, start, self.scales.get(first / 2..).unwrap_or(&[]), x_scale, y);
-        #[cfg(not(actq_fpu))]
-        for (i, y) in y.iter_mut().enumerate() {
-            let start = start.and_then(|s| s.get(i)).map_or(*y, |bits| f32::from_bits(u32::from_le(*bits)));
-            let sum = sums.and_then(|s| s.get(i)).map_or(y.to_bits() as i32, |sum| *sum);
-            *y = start + sum as f32 * (self.scale(first + i) * x_scale);
-        }
+        arch::scale(sums, start, self.scales.get(first / 2..).unwrap_or(&[]), x_scale, y);
     }
 
-    /// Adds the sums of the rows from `first` on, scaled, to what stands at the rows' places.
+    /// Adds the sums of the rows from `first` on, scaled, to what stands at the rows' places; `None` where there is no such place.
     #[inline(never)]
-    fn scale_by_index(&self, first: usize, sums: &[i32], x_scale: f32, y: &mut [f32]) {
-        let halves = |words| bytemuck::cast_slice::<u32, u16>(words).get(first..first + sums.len());
-        let (Some(scales), Some(index)) = (halves(self.scales), halves(self.index)) else { return };
+    fn scale_by_index(&self, first: usize, sums: &[i32], x_scale: f32, y: &mut [f32]) -> Option<()> {
+        let halves = |words| bytemuck::must_cast_slice::<u32, u16>(words).get(first..first + sums.len());
+        let (scales, index) = (halves(self.scales)?, halves(self.index)?);
         for ((sum, scale), at) in sums.iter().zip(scales).zip(index) {
-            if let Some(y) = y.get_mut(usize::from(u16::from_le(*at))) {
-                *y += *sum as f32 * (bf16(u16::from_le(*scale)) * x_scale);
-            }
+            *y.get_mut(usize::from(u16::from_le(*at)))? += *sum as f32 * (bf16(u16::from_le(*scale)) * x_scale);
         }
+        Some(())
     }
 }
 
@@ -208,14 +184,8 @@ impl Matrix<'_> {
         max_prepared_words(self.cols, self.group)
     }
 
-    /// `y = W x + b`, or `y = y + b + W x` where `accumulate`. `work` holds at least [`Self::prepared_words`] words; `x` and
-    /// `y` have the matrix's lengths (what is missing is left out).
-    pub fn apply(&self, x: &[f32], work: &mut [u32], y: &mut [f32], accumulate: bool) -> Result<(), NotFinite> {
-        self.resume(&mut LinearCursor::default(), &mut Unlimited, x, work, y, accumulate)?;
-        Ok(())
-    }
-
-    /// As [`Self::apply`], from where `at` stands and as far as the budget reaches; true when all is done.
+    /// `y = W x + b`, or `y = y + b + W x` where `accumulate`, from where `at` stands and as far as the budget reaches; true when
+    /// all is done. `work` holds at least [`Self::prepared_words`] words; `x` and `y` have the matrix's lengths.
     #[inline(never)]
     pub(crate) fn resume(
         &self,
@@ -225,16 +195,20 @@ impl Matrix<'_> {
         work: &mut [u32],
         y: &mut [f32],
         accumulate: bool,
-    ) -> Result<bool, NotFinite> {
+    ) -> Result<bool, Fault> {
+        if x.len() != self.cols || y.len() != self.rows {
+            return Err(Fault::Damaged);
+        }
         let x_scale = match at.scale {
             Some(scale) => scale,
-            None if budget.take(1, || Price::magnitude(self)) == 0 => return Ok(false),
+            None if budget.take(1, Work::Magnitude(self.cols)) == 0 => return Ok(false),
             None => *at.scale.insert(Scale::new(x, self.x_max)?),
         };
         // One pass over the output where every row has its bias and is written once, in order.
         let start = self.start_values(accumulate);
         if start.is_none() && at.started < y.len() {
-            let end = at.started + budget.take(y.len() - at.started, || Price::bias(accumulate));
+            let work = Work::Start(Start::of(accumulate, !self.bias.is_empty()));
+            let end = at.started + budget.take(y.len() - at.started, work);
             self.start(at.started..end, y, accumulate);
             at.started = end;
             if end < y.len() {
@@ -244,7 +218,8 @@ impl Matrix<'_> {
         let mut plan: Option<Plan> = None;
         let mut first_row = 0;
         for (i, record) in self.records.as_chunks::<BLOCK_WORDS>().0.iter().enumerate() {
-            let Ok(rows) = row_block(self, record, first_row) else { continue };
+            let rows = row_block(self, record, first_row);
+            let rows = rows.as_ref().map_err(|_| Fault::Damaged)?;
             let shape = rows.block.shape();
             first_row += shape.rows;
             if i < at.block {
@@ -254,22 +229,21 @@ impl Matrix<'_> {
             if !plan.as_ref().is_some_and(|plan| plan.fits(shape)) {
                 let plan = plan.insert(Plan::of(&rows.block));
                 if at.prepared != Some(shape.width) {
-                    if budget.take(1, || Price::prepare(&rows)) == 0 {
+                    if budget.take(1, Work::Prepare(shape)) == 0 {
                         return Ok(false);
                     }
                     at.prepared = Some(shape.width);
-                    x_scale.quantize(x, plan, work);
+                    x_scale.quantize(x, plan, work).ok_or(Fault::Damaged)?;
                 }
             }
-            if let Some(x) = plan.as_ref().and_then(|plan| Prepared::new(work, plan)) {
-                let strips =
-                    budget.take((shape.rows - at.row).div_ceil(STRIP), || Price::strips(&rows, start.is_some()));
-                let end = shape.rows.min(at.row + strips * STRIP);
-                rows.apply_rows(at.row..end, &x, x_scale, start, y);
-                at.row = end;
-                if end < shape.rows {
-                    return Ok(false);
-                }
+            let x = plan.as_ref().and_then(|plan| Prepared::new(work, plan)).ok_or(Fault::Damaged)?;
+            let work = Work::Strips { shape, in_order: rows.index.is_empty(), start: start.is_some() };
+            let strips = budget.take((shape.rows - at.row).div_ceil(STRIP), work);
+            let end = shape.rows.min(at.row + strips * STRIP);
+            rows.apply_rows(at.row..end, &x, x_scale, start, y).ok_or(Fault::Damaged)?;
+            at.row = end;
+            if end < shape.rows {
+                return Ok(false);
             }
             at.block += 1;
             at.row = 0;
@@ -306,7 +280,7 @@ impl Matrix<'_> {
         } else if bias.is_empty() {
             y.fill(0.0);
         } else {
-            copy_le(bias, bytemuck::cast_slice_mut(y));
+            copy_le(bias, bytemuck::must_cast_slice_mut(y));
         }
     }
 }
@@ -354,9 +328,15 @@ fn largest_sum(block: &Block<'_>) -> Option<u32> {
     Some(largest)
 }
 
-/// An upper bound of [`worst_case`] from the shape alone.
-pub fn worst_case_bound(block: &Block<'_>, x_max: u16) -> i64 {
-    let shape = block.shape();
+/// An upper bound of the rows' sums of `|level| * scale`, from the shape alone. It has 31 bits.
+pub fn largest_sum_bound(shape: BlockShape) -> u32 {
     let scale = if shape.group == 0 { 1 } else { 255 };
-    shape.cols as i64 * i64::from(shape.width.max_level()) * scale * i64::from(x_max)
+    shape.cols as u32 * shape.width.max_level() as u32 * scale
+}
+
+/// Whether no sum of the block's rows can leave int32 for activations up to `x_max`: from the shape alone where that says so, else
+/// by the codes and scales themselves, as [`worst_case`].
+pub(crate) fn fits_i32(block: &Block<'_>, x_max: u16) -> bool {
+    let most = (i32::MAX as u32).checked_div(x_max.into()).unwrap_or(0);
+    largest_sum_bound(block.shape()) <= most || largest_sum(block).is_some_and(|sum| sum <= most)
 }

@@ -12,9 +12,9 @@
 //! | [`silu`], [`gelu_tanh`] | 1.4e-7 * max(1, abs(x)) |
 //! | [`gelu`] | 1.8e-7 * max(1, abs(x)) |
 //!
-//! Where the input is not a number, so is the result, except of [`relu`].
+//! Where the input is not a number, so is the result; no function makes a finite number of an infinite one.
 
-use crate::activations::ROUND;
+use crate::round::ROUND;
 
 /// The elementwise functions of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -136,6 +136,13 @@ pub fn clamp(x: f32, low: f32, high: f32) -> f32 {
     }
 }
 
+/// 0 where `x` is finite, else NaN: added to a result, it shows what would be lost in it.
+#[inline(always)]
+#[expect(clippy::eq_op, reason = "the difference of an infinity and itself is NaN")]
+pub(crate) fn zero_or_nan(x: f32) -> f32 {
+    x - x
+}
+
 /// `2^(y / one)` as a fraction of two positive numbers, for a finite y and a power of two: `one` sets the unit, and changes
 /// nothing else. The exponent stays within -33 ..= 33; there, all functions here have come to their limits as far as f32 tells.
 /// What uses the fraction has to divide anyway.
@@ -157,7 +164,7 @@ fn exp2(y: f32, one: f32) -> (f32, f32) {
 }
 
 /// What rounds in these units, p1, p0 and q0.
-const fn exp2_constants(one: f32) -> [f32; 4] {
+pub(crate) const fn exp2_constants(one: f32) -> [f32; 4] {
     // 2 more than 1.5 * 2^23, which could be half a unit in the last place of a large y: then the sum would be a tie, and f not
     // small. (A large positive y whose sum needs a bit more has a large f, but next to the numerator the denominator is nothing.)
     let round = (ROUND + 2.0) * one;
@@ -168,17 +175,10 @@ const fn exp2_constants(one: f32) -> [f32; 4] {
 const FIXED_ONE: f32 = (1 << 26) as f32;
 
 /// Exponents in quarters: no product of an f32 and their factor overflows.
-const QUARTER: f32 = 0.25;
+pub(crate) const QUARTER: f32 = 0.25;
 
 /// The factor of x in the exponent of `e^x`, in quarters.
-const EXP: f32 = core::f32::consts::LOG2_E * QUARTER;
-
-/// What the assembler of recurrent cells takes: the factors of x for `e^x` and `e^(2 x)`, and the constants of [`exp2`].
-#[cfg(actq_fpu)]
-pub(crate) static CELL: [f32; 6] = {
-    let [round, p1, p0, q0] = exp2_constants(QUARTER);
-    [EXP, 2.0 * EXP, round, p1, p0, q0]
-};
+pub(crate) const EXP: f32 = core::f32::consts::LOG2_E * QUARTER;
 
 /// `e^x` as a fraction.
 #[inline(always)]
@@ -193,11 +193,12 @@ pub fn exp(x: f32) -> f32 {
     n / d
 }
 
-/// `max(x, 0)`. By the bits, as an unsigned number: what is negative or not a number stands above infinity.
+/// `max(x, 0)`; what is not finite stays as it is, so that an overflow is seen behind it. By the bits, as a signed number:
+/// finite negative numbers stand below minus infinity, which stands below all else.
 #[inline(always)]
 pub fn relu(x: f32) -> f32 {
-    let bits = x.to_bits();
-    f32::from_bits(if bits > f32::INFINITY.to_bits() { 0 } else { bits })
+    let bits = x.to_bits() as i32;
+    f32::from_bits(if bits < f32::NEG_INFINITY.to_bits() as i32 { 0 } else { bits as u32 })
 }
 
 /// `x` where positive, else `exp(x) - 1`

@@ -8,6 +8,8 @@ use actq_kernels::image::{Kind, Op, OpKind, Region};
 use actq_kernels::linear::Matrix;
 use comfy_table::{CellAlignment, Table, presets};
 
+use crate::text::printable;
+
 /// Bits per weight of the policy as it was trained: codes, padding, scales, indexes and block records of all matrices over the
 /// number of the source's weights. A matrix that several operations share counts once.
 pub fn bits_per_weight(image: &Image<'_>) -> f64 {
@@ -62,7 +64,7 @@ pub fn report(image: &Image<'_>) -> String {
     };
     let (obs, act) = (image.obs_len(), image.act_len());
     let rate = image.rate_hz();
-    let _ = writeln!(text, "policy        {}", image.name());
+    let _ = writeln!(text, "policy        {}", printable(image.name()));
     let _ = writeln!(text, "source        sha256 {digest}");
     let _ = writeln!(text, "image         {} bytes, crc32 {:08x}", image.bytes(), image.crc());
     let _ = writeln!(text, "kind          {kind}, {obs} observations -> {act} actions at {rate} Hz");

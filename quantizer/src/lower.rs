@@ -1,8 +1,9 @@
 //! From the graph's values to regions of the arena: which operation reads and writes where.
 //!
-//! Every value gets a buffer. Elementwise operations overwrite their input's buffer where nothing needs it any more. What
-//! outlives a step (recurrent state, the last action, the chunk) has a place of its own; the other buffers share memory by
-//! their lifetimes, first fit.
+//! Every value gets a buffer. Elementwise operations overwrite their input's buffer where nothing needs it any more. The arena
+//! holds the recurrent state, the observation, the values, which share memory by their lifetimes, first fit, the last action, and
+//! the work area. Buffers are placed in the order in which they are written, each as low as it fits: so none leaves a gap, and what
+//! a step has written always is the begin of the arena, as the image's check wants it.
 
 use actq_kernels::activations::max_prepared_words;
 use actq_kernels::image::Region;
@@ -115,9 +116,11 @@ struct Slice {
 enum Lifetime {
     /// Between the first and the last operation that names it.
     Step,
-    /// Beyond the step.
-    Kept,
-    /// Beyond the step, and zeroed by a reset.
+    /// From the first operation that names it on: the output, a chunk of which is played over several steps.
+    Output,
+    /// In a place of its own, written before the first operation.
+    Observation,
+    /// In a place of its own, beyond the step, and zeroed by a reset.
     State,
 }
 
@@ -147,16 +150,15 @@ pub fn lower(graph: &Graph, act_len: usize, group: usize) -> Result<Program> {
         }
     }
     let mut lowering = Lowering { graph, steps: Vec::new(), buffers: Vec::new(), place: Vec::new(), readers };
-    let observation = lowering.buffer(graph.obs_len, Lifetime::Kept);
+    let observation = lowering.buffer(graph.obs_len, Lifetime::Observation);
     lowering.place.push(observation);
     for (i, node) in graph.nodes.iter().enumerate() {
         let place = lowering.node(i, node);
         lowering.place.push(place);
     }
     let output = lowering.private(graph.output());
-    lowering.buffers[output].lifetime = Lifetime::Kept;
-    let action = lowering.buffer(act_len, Lifetime::Kept);
-    lowering.assign(observation, output, action, group)
+    lowering.buffers[output].lifetime = Lifetime::Output;
+    lowering.assign(observation, output, act_len, group)
 }
 
 /// The values that a node reads.
@@ -263,11 +265,11 @@ impl Lowering<'_> {
     }
 
     /// Gives every buffer its place.
-    fn assign(self, observation: usize, output: usize, action: usize, group: usize) -> Result<Program> {
+    fn assign(self, observation: usize, output: usize, act_len: usize, group: usize) -> Result<Program> {
         let mut offsets = vec![0; self.buffers.len()];
         let mut top = 0;
         let mut state_len = 0;
-        for lifetime in [Lifetime::State, Lifetime::Kept] {
+        for lifetime in [Lifetime::State, Lifetime::Observation] {
             for (offset, buffer) in offsets.iter_mut().zip(&self.buffers).filter(|(_, b)| b.lifetime == lifetime) {
                 *offset = top;
                 top += buffer.len;
@@ -295,7 +297,8 @@ impl Lowering<'_> {
             ends.push(offset + len);
             placed.push((buffer, life));
         }
-        let work_offset = ends.into_iter().max().unwrap_or(top);
+        let action = Region { offset: ends.into_iter().max().unwrap_or(top), len: act_len };
+        let work_offset = action.offset + action.len;
         let work_len = self.graph.matrices.iter().map(|m| max_prepared_words(m.cols, group)).max().unwrap_or(0);
         let words = work_offset + work_len;
         ensure!(
@@ -315,23 +318,25 @@ impl Lowering<'_> {
             state: Region { offset: 0, len: state_len },
             observation: whole(observation),
             output: whole(output),
-            action: whole(action),
+            action,
             work: Region { offset: work_offset, len: work_len },
             words,
         })
     }
 
-    /// First and last operation that names each buffer of [`Lifetime::Step`], in order of the first.
+    /// First and last operation during which each value's buffer is needed, in order of the first.
     fn lifetimes(&self) -> Vec<(usize, (usize, usize))> {
         let mut lives: Vec<(usize, (usize, usize))> = Vec::new();
         for (at, step) in self.steps.iter().enumerate() {
             for slice in [Some(step.dst), step.src, step.extra].into_iter().flatten() {
-                if self.buffers[slice.buffer].lifetime != Lifetime::Step {
-                    continue;
-                }
+                let last = match self.buffers[slice.buffer].lifetime {
+                    Lifetime::Step => at,
+                    Lifetime::Output => usize::MAX,
+                    Lifetime::Observation | Lifetime::State => continue,
+                };
                 match lives.iter_mut().find(|(buffer, _)| *buffer == slice.buffer) {
-                    Some((_, life)) => life.1 = at,
-                    None => lives.push((slice.buffer, (at, at))),
+                    Some((_, life)) => life.1 = last,
+                    None => lives.push((slice.buffer, (at, last))),
                 }
             }
         }

@@ -3,7 +3,7 @@
 use std::io::{ErrorKind, Read, Write};
 
 use actq_kernels::Image;
-use actq_link::{RESET, STEP};
+use actq_link::{NO_ACTION, RESET, STEP};
 use anyhow::{Context, Result, bail};
 
 use crate::runtime::with_head;
@@ -11,6 +11,7 @@ use crate::runtime::with_head;
 /// Serves until the input ends.
 pub fn serve(image: Image<'_>, mut input: impl Read, mut output: impl Write) -> Result<()> {
     let mut bytes = vec![0u8; 4 * image.obs_len()];
+    let no_action = vec![NO_ACTION; image.act_len()];
     with_head(image, |head| {
         loop {
             let mut command = [0u8];
@@ -26,7 +27,9 @@ pub fn serve(image: Image<'_>, mut input: impl Read, mut output: impl Write) -> 
                         .with_context(|| format!("the input ended inside an observation of {} bytes", bytes.len()))?;
                     let observation: Vec<f32> =
                         bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
-                    let action: Vec<u8> = head.step(&observation)?.iter().flat_map(|a| a.to_le_bytes()).collect();
+                    // After an error the head has reset itself.
+                    let action = head.step(&observation).unwrap_or(&no_action);
+                    let action: Vec<u8> = action.iter().flat_map(|a| a.to_le_bytes()).collect();
                     output.write_all(&action).and_then(|()| output.flush()).context("output cannot be written")?;
                 }
                 other => bail!("unknown command byte 0x{other:02x}; R resets, S steps"),

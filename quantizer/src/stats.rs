@@ -7,10 +7,10 @@ use actq_kernels::{Image, Width};
 use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
 
-use crate::inspect;
 use crate::policy::Policy;
 use crate::quantize::actquant::score::Score;
 use crate::quantize::{Budget, Options, Outcome, Quantized};
+use crate::{inspect, json};
 
 /// The name of the file's form. It changes when a field changes its meaning or disappears, not when one is added.
 pub const SCHEMA: &str = "actq-stats-1";
@@ -185,7 +185,7 @@ impl Stats {
     pub fn read(path: &Path, image: &Image<'_>) -> Result<Self> {
         let read = || -> Result<Self> {
             let text = fs::read(path).context("cannot be read")?;
-            let value: serde_json::Value = serde_json::from_slice(&text).context("not JSON")?;
+            let value: serde_json::Value = json::parse(&text).context("not JSON")?;
             let schema = value.get("schema").and_then(|s| s.as_str()).unwrap_or("none");
             ensure!(schema == SCHEMA, "not statistics of an image: its schema is {schema}, {SCHEMA} is needed");
             let stats: Self = serde_json::from_value(value).with_context(|| format!("does not follow {SCHEMA}"))?;

@@ -1,13 +1,10 @@
-//! Lays an image out and writes it to a file.
+//! Lays an image out.
 
-use std::io::Write as _;
 use std::path::Path;
 
 use actq_kernels::format::{self, LAYOUT_STAMP};
 use actq_kernels::image::{Kind, Region, checksum, half_words, header as h, header::op};
-use actq_kernels::math::Function;
 use anyhow::{Context, Result, bail, ensure};
-use tempfile::NamedTempFile;
 
 use crate::graph::{Graph, NodeKind};
 use crate::lower::{Step, StepKind, lower, product};
@@ -20,13 +17,11 @@ use crate::runtime::{ImageBuffer, with_head};
 pub fn image(policy: &Policy, matrices: &[Outcome]) -> Result<Vec<u8>> {
     let group = matrices.first().map_or(0, |m| m.quantized.group);
     let program = lower(&policy.graph, policy.act_len, group)?;
-    let mut writer = Writer { words: vec![0; h::WORDS], packed: Vec::new() };
-    writer.packed = matrices.iter().map(|m| writer.weights(m)).collect::<Result<_>>()?;
-    let records = program
-        .steps
-        .iter()
-        .map(|step| writer.op(&policy.graph, step, matrices))
-        .collect::<Result<Vec<[u32; h::OP_WORDS]>>>()?;
+    let mut writer = Writer { words: vec![0; h::WORDS], matrices: 0 };
+    let matrix_records = matrices.iter().map(|m| writer.matrix(m)).collect::<Result<Vec<_>>>()?;
+    writer.matrices = writer.push(matrix_records.into_iter().flatten());
+    let records =
+        program.steps.iter().map(|step| writer.op(&policy.graph, step)).collect::<Result<Vec<[u32; h::OP_WORDS]>>>()?;
     let ops = writer.push(records.into_iter().flatten());
     let contract = writer.words.len() as u32;
     let mut flags = 0;
@@ -48,7 +43,7 @@ pub fn image(policy: &Policy, matrices: &[Outcome]) -> Result<Vec<u8>> {
         Kind::Step => 0,
         Kind::Chunk => 1,
     };
-    let words = &mut writer.words;
+    let Writer { mut words, matrices: first_matrix } = writer;
     words[0] = h::MAGIC;
     words[h::W_VERSION] = halves(h::VERSION.into(), h::WORDS)?;
     words[h::W_LAYOUT] = LAYOUT_STAMP;
@@ -67,17 +62,19 @@ pub fn image(policy: &Policy, matrices: &[Outcome]) -> Result<Vec<u8>> {
     words[h::W_STEPS_NAME] = halves(steps, policy.name.len())?;
     words[h::W_NAME] = name;
     words[h::W_WEIGHTS] = policy.weights as u32;
+    words[h::W_MATRICES] = first_matrix;
+    words[h::W_MATRIX_COUNT] = halves(matrices.len(), 0)?;
     for (word, bytes) in words[h::W_DIGEST..].iter_mut().zip(policy.digest.chunks_exact(4)) {
         *word = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
     }
-    let actions = self_test_actions(&seal(words), &observations)?;
+    let actions = self_test_actions(&seal(&words), &observations)?;
     for (step, action) in actions.iter().enumerate() {
         let at = self_test as usize + step * (policy.graph.obs_len + policy.act_len) + policy.graph.obs_len;
         for (word, value) in words[at..].iter_mut().zip(action) {
             *word = value.to_bits();
         }
     }
-    Ok(seal(words))
+    Ok(seal(&words))
 }
 
 /// Fills in length and checksum and gives the bytes.
@@ -119,43 +116,6 @@ fn self_test_actions(bytes: &[u8], observations: &[Vec<f32>]) -> Result<Vec<Vec<
     })
 }
 
-/// Writes `bytes` to `path` so that neither a failure nor an end of the process leaves part of a file there. (A process that is
-/// killed while it writes can leave a hidden file of this name with the ending .part.)
-pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    write_all(&[(path, bytes)])
-}
-
-/// Writes all files, or none where one of them cannot be written.
-pub fn write_all(files: &[(&Path, impl AsRef<[u8]>)]) -> Result<()> {
-    let named = |path: &Path| format!("{}: cannot be written", path.display());
-    // Everything that is likely to fail is done before the first file takes its place.
-    let staged = files.iter().map(|(path, bytes)| stage(path, bytes.as_ref()).with_context(|| named(path)));
-    for (file, (path, _)) in staged.collect::<Result<Vec<_>>>()?.into_iter().zip(files) {
-        file.persist(path).with_context(|| named(path))?;
-    }
-    Ok(())
-}
-
-/// A file beside `path`, ready to take its place.
-fn stage(path: &Path, bytes: &[u8]) -> Result<NamedTempFile> {
-    let dir = match path.parent() {
-        Some(dir) if !dir.as_os_str().is_empty() => dir,
-        _ => Path::new("."),
-    };
-    ensure!(!path.is_dir(), "it is a folder");
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let mut file = tempfile::Builder::new().prefix(&format!(".{name}.")).suffix(".part").tempfile_in(dir)?;
-    file.write_all(bytes)?;
-    #[cfg(unix)]
-    {
-        // A temporary file is private to its owner; an image is as readable as any other output.
-        use std::os::unix::fs::PermissionsExt as _;
-        file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644))?;
-    }
-    file.as_file().sync_all()?;
-    Ok(file)
-}
-
 /// Two u16 in a word.
 fn halves(low: usize, high: usize) -> Result<u32> {
     let fits = low <= 0xffff && high <= 0xffff;
@@ -163,15 +123,10 @@ fn halves(low: usize, high: usize) -> Result<u32> {
     Ok(low as u32 | (high as u32) << 16)
 }
 
-/// Where the parts of a matrix stand.
-struct Packed {
-    /// Block records.
-    records: Vec<u32>,
-}
-
 struct Writer {
     words: Vec<u32>,
-    packed: Vec<Packed>,
+    /// Offset of the matrix records.
+    matrices: u32,
 }
 
 impl Writer {
@@ -190,9 +145,10 @@ impl Writer {
         self.push(bytes.chunks(4).map(|c| c.iter().rev().fold(0, |word, b| word << 8 | u32::from(*b))))
     }
 
-    /// Packs a matrix's blocks.
-    fn weights(&mut self, outcome: &Outcome) -> Result<Packed> {
+    /// Packs a matrix's blocks, and gives its record.
+    fn matrix(&mut self, outcome: &Outcome) -> Result<[u32; h::MATRIX_WORDS]> {
         let matrix = &outcome.quantized;
+        ensure!(matrix.rows <= h::MAX_ROWS, "a matrix has {} rows, {} are supported", matrix.rows, h::MAX_ROWS);
         let blocks = outcome.blocks();
         let in_order = Quantized::in_order(&blocks);
         let mut records = Vec::new();
@@ -222,12 +178,17 @@ impl Writer {
                 index,
             ]);
         }
-        Ok(Packed { records })
+        Ok([
+            halves(matrix.rows, matrix.cols)?,
+            halves(matrix.group, outcome.x_max.into())?,
+            halves(blocks.len(), 0)?,
+            self.push(records),
+        ])
     }
 
-    fn op(&mut self, graph: &Graph, step: &Step<Region>, matrices: &[Outcome]) -> Result<[u32; 4]> {
+    fn op(&mut self, graph: &Graph, step: &Step<Region>) -> Result<[u32; h::OP_WORDS]> {
         let mut detail = 0u8;
-        let mut src_len = 0;
+        let mut bias_at = 0;
         let (code, data) = match step.kind {
             StepKind::Normalize { node } => {
                 let NodeKind::Normalize { mean, scale, pre_clip, clip } = &graph.nodes[node].kind else {
@@ -241,11 +202,11 @@ impl Writer {
             StepKind::Linear { node, product: which, accumulate } => {
                 let (matrix, bias) = product(&graph.nodes[node], which).context("a node without such a product")?;
                 detail = u8::from(accumulate);
-                src_len = graph.matrices[matrix].cols;
-                (op::LINEAR, self.matrix(matrix, &matrices[matrix], bias)?)
+                bias_at = if bias.iter().all(|b| *b == 0.0) { 0 } else { self.push_floats(bias) };
+                (op::LINEAR, self.matrices + (matrix * h::MATRIX_WORDS) as u32)
             }
             StepKind::Function(function) => {
-                detail = Function::ALL.iter().position(|f| *f == function).unwrap_or_default() as u8;
+                detail = function as u8;
                 (op::FUNCTION, 0)
             }
             StepKind::LayerNorm { node } => {
@@ -274,23 +235,8 @@ impl Writer {
         Ok([
             u32::from(code) | u32::from(detail) << 8 | halves(0, step.dst.len)?,
             halves(step.dst.offset, offset(step.src))?,
-            halves(src_len, offset(step.extra))?,
+            bias_at | halves(0, offset(step.extra))?,
             data,
         ])
-    }
-
-    /// The record of a matrix; where several operations share one, each has its own record over the same weights.
-    fn matrix(&mut self, index: usize, outcome: &Outcome, bias: &[f32]) -> Result<u32> {
-        let quantized = &outcome.quantized;
-        ensure!(quantized.rows <= h::MAX_ROWS, "a matrix has {} rows, {} are supported", quantized.rows, h::MAX_ROWS);
-        let bias = if bias.iter().all(|b| *b == 0.0) { 0 } else { self.push_floats(bias) };
-        let records = self.packed[index].records.clone();
-        let record = [
-            halves(quantized.rows, quantized.cols)?,
-            halves(quantized.group, outcome.x_max.into())?,
-            halves(records.len() / h::BLOCK_WORDS, 0)?,
-            bias,
-        ];
-        Ok(self.push(record.into_iter().chain(records)))
     }
 }

@@ -15,10 +15,9 @@ mod firmware {
     use actq_firmware_support::host::{self, File};
     use actq_firmware_support::machine::{entry, semihosting::hio, singleton};
     use actq_kernels::activations::{Plan, Prepared, Scale};
+    use actq_kernels::arch::{BACKEND, Product, gemv, portable};
     use actq_kernels::format::{Block, BlockShape, Lanes, Width};
-    use actq_kernels::gemv::{self, gemv};
     use actq_kernels::linear::RowBlock;
-    use actq_kernels::portable;
 
     /// Of the largest case, weights and activations.
     const WORDS: usize = if cfg!(actq_small) { 1536 } else { 64 * 1024 };
@@ -30,8 +29,8 @@ mod firmware {
         let outcome = run();
         if let Ok(mut out) = hio::hstdout() {
             let _ = match outcome {
-                Ok(cases) => writeln!(out, "{:?}: {cases} cases", gemv::BACKEND),
-                Err((case, why)) => writeln!(out, "{:?}: case {case}: {why}", gemv::BACKEND),
+                Ok(cases) => writeln!(out, "{:?}: {cases} cases", BACKEND),
+                Err((case, why)) => writeln!(out, "{:?}: case {case}: {why}", BACKEND),
             };
         }
         host::exit(outcome.is_ok())
@@ -89,7 +88,7 @@ mod firmware {
             return Err("the compiled backend wrote behind its output");
         }
         sums = [0; ROWS];
-        portable::gemv(&block, &x, 0, &mut sums[..shape.padded_rows()]);
+        portable::gemv(Product::new(&block, &x, 0, &mut sums[..shape.padded_rows()]).map_err(|_| "mismatch")?);
         if !same(&sums) {
             return Err("sums of the portable backend differ");
         }
@@ -120,7 +119,7 @@ mod firmware {
         let rows = RowBlock { block: *block, scales: &scales, index: &[], first_row: 3 };
         for in_y in [false, true] {
             let mut y = start.map(f32::from_bits);
-            rows.apply(x, scale, (!in_y).then_some(&start), &mut y);
+            rows.apply(x, scale, (!in_y).then_some(&start), &mut y).ok_or("the block's rows have no room")?;
             for (i, y) in y.iter().enumerate() {
                 let start = f32::from_bits(start[i]);
                 let sum = i.checked_sub(3).and_then(|row| Some((row, *sums.get(row)?)));

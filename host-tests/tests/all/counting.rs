@@ -6,7 +6,7 @@ use actq::eval;
 use actq::policy::Policy;
 use actq::quantize::{Budget, Method, Options, quantize};
 use actq::runtime::ImageBuffer;
-use actq::writer;
+use actq::{files, writer};
 use actq_bench::cycles::Code;
 use actq_bench::qemu::Counter;
 use actq_bench::{Target, evaluation, firmware, ur3};
@@ -21,7 +21,7 @@ fn a_step_of_a_head_reads_each_weight_once() -> Result<()> {
     let bytes = writer::image(&policy, &quantize(&policy.graph, &[], &options)?)?;
     let file = tempfile::NamedTempFile::new()?;
     let path = file.path();
-    writer::write(path, &bytes)?;
+    files::write(path, &bytes)?;
     let buffer = ImageBuffer::new(&bytes);
     let image = buffer.image(path)?;
     let recorded = eval::heldout(&dir, &image)?;

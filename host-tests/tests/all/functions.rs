@@ -3,7 +3,7 @@
 use actq::policy::Policy;
 use actq::quantize::{Budget, Method, Options, quantize};
 use actq::runtime::ImageBuffer;
-use actq::writer;
+use actq::{files, writer};
 use actq_bench::cycles::Code;
 use actq_bench::qemu::{self, Counter};
 use actq_bench::{Target, firmware, shared_policies};
@@ -99,7 +99,7 @@ fn a_head_with_an_lstm_stays_within_its_instructions() -> Result<()> {
     let options = Options::new(Method::Rtn, Budget::Width(Width::W3));
     let bytes = writer::image(&policy, &quantize(&policy.graph, &[], &options)?)?;
     let file = tempfile::NamedTempFile::new()?;
-    writer::write(file.path(), &bytes)?;
+    files::write(file.path(), &bytes)?;
     let buffer = ImageBuffer::new(&bytes);
     let matrices = buffer.image(file.path())?.ops().filter_map(|op| op.matrix());
     let macs = matrices.map(|matrix| matrix.rows * matrix.cols).sum::<usize>() as f64;

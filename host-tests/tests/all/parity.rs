@@ -2,12 +2,10 @@
 
 use actq_bench::golden::{self, Case, Draw, Random};
 use actq_kernels::activations::{NotFinite, Plan, Prepared, Scale, prepare};
+use actq_kernels::arch::{BACKEND, Backend, Mismatch, Product, gemv, portable, reference};
 use actq_kernels::dequantize;
 use actq_kernels::format::{Block, BlockShape, Lanes, MAX_PAIRED_GROUPED, STRIP, Width, pack};
-use actq_kernels::gemv::{BACKEND, Backend, Mismatch, gemv};
-use actq_kernels::linear::{RowBlock, worst_case, worst_case_bound};
-use actq_kernels::{portable, reference};
-use half::f16;
+use actq_kernels::linear::{RowBlock, largest_sum_bound, worst_case};
 use proptest::prelude::*;
 
 fn shapes() -> impl Strategy<Value = BlockShape> {
@@ -29,8 +27,12 @@ fn cases() -> impl Strategy<Value = Case> {
 
 fn check_backends(case: &Case, start: usize) {
     let sums = case.sums();
-    assert_eq!(case.run(start, |b, x, acc| reference::gemv(b, x, 0, acc)), sums, "reference, {:?}", case.shape);
-    assert_eq!(case.run(start, |b, x, acc| portable::gemv(b, x, 0, acc)), sums, "portable, {:?}", case.shape);
+    for (name, backend) in [("reference", reference::gemv as fn(Product<'_>)), ("portable", portable::gemv)] {
+        let gemv = |b: &Block<'_>, x: &Prepared<'_>, acc: &mut [i32]| {
+            backend(Product::new(b, x, 0, acc).expect("the vector was prepared for the block"));
+        };
+        assert_eq!(case.run(start, gemv), sums, "{name}, {:?}", case.shape);
+    }
 }
 
 proptest! {
@@ -79,7 +81,7 @@ proptest! {
         let row_sum = |row| (0..case.shape.cols).map(|col| product(row, col)).sum::<i64>();
         let largest = (0..case.shape.rows).map(row_sum).max().unwrap_or(0);
         prop_assert_eq!(worst, largest * i64::from(x_max));
-        prop_assert!(worst <= worst_case_bound(&block, x_max));
+        prop_assert!(worst <= i64::from(largest_sum_bound(block.shape())) * i64::from(x_max));
         if worst <= i64::from(i32::MAX) {
             prop_assert!(case.sums().iter().all(|s| i64::from(s.unsigned_abs()) <= worst));
         }
@@ -170,9 +172,9 @@ fn with_lanes(image: &[u8], lanes: u8) -> Vec<u8> {
     use actq_kernels::image::{checksum, header as h};
     let word =
         |bytes: &[u8], at: usize| u32::from_le_bytes(bytes[4 * at..][..4].try_into().expect("four bytes")) as usize;
-    let matrix = word(image, word(image, h::W_OPS) + 3);
+    let block = word(image, word(image, h::W_MATRICES) + 3);
     let mut image = image.to_vec();
-    image[4 * (matrix + h::MATRIX_WORDS) + 1] = lanes;
+    image[4 * block + 1] = lanes;
     let crc = checksum(&image).to_le_bytes();
     image[4 * h::W_CRC..][..4].copy_from_slice(&crc);
     image
@@ -218,10 +220,10 @@ fn scaling_keeps_the_documented_order_of_operations() {
                 })
                 .collect();
             let mut y = vec![0.0; rows];
-            block.apply(&prepared, scale, Some(&bias), &mut y);
+            block.apply(&prepared, scale, Some(&bias), &mut y).expect("the lengths fit");
             assert_eq!(y.iter().map(|y| y.to_bits()).collect::<Vec<_>>(), expected, "{shape:?}");
             let mut y: Vec<f32> = bias.iter().map(|b| f32::from_bits(*b)).collect();
-            block.apply(&prepared, scale, None, &mut y);
+            block.apply(&prepared, scale, None, &mut y).expect("the lengths fit");
             assert_eq!(y.iter().map(|y| y.to_bits()).collect::<Vec<_>>(), expected, "{shape:?}, start in y");
         }
     }
@@ -245,7 +247,7 @@ fn vectors_that_are_not_finite_are_refused_and_tiny_ones_are_zero() {
 }
 
 #[test]
-fn dequantization_agrees_over_its_three_types() {
+fn weights_come_back_from_their_codes() {
     let mut random = Random(5);
     for width in Width::ALL {
         for group in [0, 32] {
@@ -258,17 +260,13 @@ fn dequantization_agrees_over_its_three_types() {
             let matrix = image.ops().find_map(|op| op.matrix()).expect("the image has a matrix");
             for rows in matrix.blocks() {
                 for i in 0..shape.rows {
-                    let (mut f, mut h, mut n) = ([0f32; 70], [f16::ZERO; 70], [0i16; 70]);
-                    dequantize::row_f32(&rows, i, &mut f);
-                    dequantize::row_f16(&rows, i, &mut h);
-                    dequantize::row_i16(&rows, i, &mut n);
-                    for col in 0..shape.cols {
+                    let mut row = [0f32; 70];
+                    dequantize::row_f32(&rows, i, &mut row);
+                    for (col, weight) in row.iter().enumerate() {
                         let at = i * shape.cols + col;
                         let scale = case.scales.get(i * shape.groups() + col / 32).map_or(1, |s| i32::from(*s));
                         let integer = width.level(case.codes[at]) * scale;
-                        assert_eq!(i32::from(n[col]), integer);
-                        assert_eq!(f[col], integer as f32 * rows.scale(i));
-                        assert_eq!(h[col], f16::from_f32(f[col]));
+                        assert_eq!(*weight, integer as f32 * rows.scale(i));
                     }
                 }
             }

@@ -1,4 +1,4 @@
-//! `cargo xtask fit`: the rates of the cost model (`kernels/src/cost.rs`), from counted operations.
+//! `cargo xtask fit`: the rates of the cost model (`kernels/src/pace/`), from counted operations.
 //!
 //! Images with many shapes of every operation run under QEMU; every operation, and every whole step, is a sample: how many of
 //! each feature it has, and what it took. The rates are the least squares of the relative errors. A feature that others
@@ -13,7 +13,7 @@ use actq::policy::Policy;
 use actq::quantize::{Activations, Outcome};
 use actq::random::Random;
 use actq::runtime::ImageBuffer;
-use actq::writer;
+use actq::{files, writer};
 use actq_bench::networks::Builder;
 use actq_bench::qemu::Counter;
 use actq_bench::{Target, firmware, profile, root};
@@ -111,8 +111,8 @@ pub(crate) fn run() -> Result<()> {
     println!("measuring polls");
     let resumed = resumed(&elf, &counter, &most)?;
     most.insert(Feature::RESUMED, resumed);
-    let path = root().join("kernels/src/cost/rates.rs");
-    writer::write(&path, table(&instructions, &cycles, &most).as_bytes())?;
+    let path = root().join("kernels/src/pace/rates.rs");
+    files::write(&path, table(&instructions, &cycles, &most).as_bytes())?;
     println!("{}: written", path.display());
     Ok(())
 }
@@ -123,16 +123,19 @@ fn predicted(sample: &Sample, rates: &Rates) -> f64 {
     sample.features.iter().map(|(feature, n)| n * rates.get(feature).copied().unwrap_or(0.0)).sum()
 }
 
-/// The rates as the source of the kernels' table.
+/// The rates as the source of the kernels' table: a feature's debug text is its key.
 fn table(instructions: &Rates, cycles: &Rates, most: &Rates) -> String {
     let mut text =
         "//! Written by `cargo xtask fit`: expected instructions, expected cycles, instructions at most.\n\n\
-                    #[rustfmt::skip]\npub(super) const RATES: &[[f64; 3]] = &[\n"
+                    use super::feature::{Feature, Gemv, Prepare, Scales::*, Strips::*};\n\
+                    use crate::layout::{Lanes::*, Width::*};\n\
+                    use crate::math::Function;\n\n\
+                    #[rustfmt::skip]\npub(super) const RATES: &[(Feature, [f64; 3])] = &[\n"
             .to_owned();
     for feature in Feature::all() {
         let rate = |rates: &Rates| rates.get(&feature).copied().unwrap_or(0.0);
         let [a, b, c] = [instructions, cycles, most].map(rate);
-        let _ = writeln!(text, "    [{a:.3}, {b:.3}, {c:.3}], // {feature}");
+        let _ = writeln!(text, "    ({feature:?}, [{a:.3}, {b:.3}, {c:.3}]),");
     }
     text + "];\n"
 }

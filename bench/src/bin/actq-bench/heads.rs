@@ -10,7 +10,7 @@ use actq::quantize::prepared::Prepared;
 use actq::quantize::{Budget, Method, Options};
 use actq::runtime::ImageBuffer;
 use actq::time::CLOCK;
-use actq::writer;
+use actq::{files, writer};
 use actq_bench::cycles::{Code, Cost, Kind};
 use actq_bench::qemu::Counter;
 use actq_bench::{Target, evaluation, firmware, shared_policies, ur3};
@@ -78,7 +78,7 @@ pub(crate) fn policies() -> Vec<PathBuf> {
 pub(crate) fn write_image(prepared: &Prepared<'_>, options: &Options, path: &Path) -> Result<Vec<u8>> {
     let (policy, matrices) = prepared.quantize(options, |_| {})?;
     let bytes = writer::image(&policy, &matrices)?;
-    writer::write(path, &bytes)?;
+    files::write(path, &bytes)?;
     Ok(bytes)
 }
 

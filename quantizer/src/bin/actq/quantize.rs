@@ -1,5 +1,6 @@
 //! `actq quantize`
 
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use actq::dataset::Sizes;
@@ -13,18 +14,19 @@ use actq::quantize::{Activations, Budget, Method, Options, Outcome};
 use actq::runtime::ImageBuffer;
 use actq::search::{self, Measure};
 use actq::stats::{Asked, Stats};
-use actq::{check, time, widths, writer};
+use actq::{check, files, policy, time, widths, writer};
 use actq_kernels::Width;
-use anyhow::{Result, ensure};
+use anyhow::Result;
 
 use crate::args::{ActivationArg, QuantizeArgs};
 use crate::{note, print, progress_bar, set_share, start_threads};
 
 /// Quantizes a policy, writes the image and says what became of it.
 pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
+    let outputs: Vec<&Path> = [Some(&args.out), args.save_stats.as_ref()].into_iter().flatten().map(|p| &**p).collect();
+    let inputs: Vec<PathBuf> = policy::files(&args.policy_dir).into_iter().chain(args.calib.clone()).collect();
+    files::check_outputs(&outputs, &inputs)?;
     let source = Policy::load(&args.policy_dir)?;
-    let one_file = args.save_stats.as_ref() == Some(&args.out);
-    ensure!(!one_file, "{}: image and statistics need two files", args.out.display());
     let (dir, sizes) = (Some(args.policy_dir.as_path()), Sizes::of(&source));
     let calib = Recording::Calib.load(dir, args.calib.as_deref(), sizes)?;
     let heldout = Recording::Heldout.load(dir, None, sizes)?;
@@ -93,7 +95,7 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
         let stats = Stats::new(&source, asked, &options, &outcomes, scores, steps, &buffer.image(&args.out)?);
         files.push((path, stats.json()?.into_bytes()));
     }
-    writer::write_all(&files)?;
+    files::write_all(&files)?;
     if let Some(statistics) = &prepared.actquant {
         print(&scores(&policy.graph, statistics, options.budget, &outcomes))?;
     }
