@@ -3,7 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-use actq::graph::{Graph, Matrix, Node, NodeKind};
+use actq::graph::ops::Linear;
+use actq::graph::{Graph, WeightMatrix};
 use actq::policy::{Contract, Policy};
 use actq::quantize::{Outcome, Quantized};
 use actq::runtime::{ImageBuffer, with_head};
@@ -46,8 +47,8 @@ const BIAS: [f32; 3] = [0.5, -0.25, 1.125];
 /// The example's policy, as the quantizer would hand it to the writer.
 fn library_bytes() -> Vec<u8> {
     let mut graph = Graph::new(2);
-    graph.matrices.push(Matrix { name: "w".into(), rows: 3, cols: 2, data: vec![0.0; 6] });
-    graph.nodes.push(Node { kind: NodeKind::Linear { matrix: 0, bias: BIAS.to_vec() }, input: 0, len: 3 });
+    graph.matrices.push(WeightMatrix { name: "w".into(), rows: 3, cols: 2, data: vec![0.0; 6] });
+    graph.add(Linear { matrix: 0, bias: BIAS.to_vec() }, &[0]).expect("it fits");
     let policy = Policy {
         dir: ".".into(),
         name: "tiny".into(),

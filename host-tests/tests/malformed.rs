@@ -4,7 +4,8 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::LazyLock;
 
-use actq::graph::{Graph, Matrix, Node, NodeKind};
+use actq::graph::ops::{LayerNorm, Linear, Lstm, Normalize, Pointwise};
+use actq::graph::{Graph, NodeKind, WeightMatrix};
 use actq::policy::{Contract, Policy};
 use actq::quantize::{Budget, Method, Options, Outcome, quantize};
 use actq_host_tests::golden::Random;
@@ -26,17 +27,19 @@ fn valid_image() -> Vec<u8> {
     let mut graph = Graph::new(OBS);
     for (rows, cols) in [(UNITS, OBS), (4 * UNITS, UNITS), (4 * UNITS, UNITS), (CHUNK * ACT, UNITS)] {
         let name = format!("w{}", graph.matrices.len());
-        graph.matrices.push(Matrix { name, rows, cols, data: values(rows * cols) });
+        graph.matrices.push(WeightMatrix { name, rows, cols, data: values(rows * cols) });
     }
-    let nodes = [
-        (NodeKind::Normalize { mean: values(OBS), scale: vec![0.5; OBS], pre_clip: 20.0, clip: 5.0 }, OBS),
-        (NodeKind::Linear { matrix: 0, bias: values(UNITS) }, UNITS),
-        (NodeKind::Function(Function::Elu), UNITS),
-        (NodeKind::LayerNorm { weight: values(UNITS), bias: values(UNITS), eps: 1e-5 }, UNITS),
-        (NodeKind::Lstm { hidden: UNITS, input: 1, state: 2, bias: values(4 * UNITS) }, UNITS),
-        (NodeKind::Linear { matrix: 3, bias: values(CHUNK * ACT) }, CHUNK * ACT),
+    let nodes: [NodeKind; 6] = [
+        Normalize { mean: values(OBS), scale: vec![0.5; OBS], pre_clip: 20.0, clip: 5.0 }.into(),
+        Linear { matrix: 0, bias: values(UNITS) }.into(),
+        Pointwise(Function::Elu).into(),
+        LayerNorm { weight: values(UNITS), bias: values(UNITS), eps: 1e-5 }.into(),
+        Lstm { hidden: UNITS, input: 1, state: 2, bias: values(4 * UNITS) }.into(),
+        Linear { matrix: 3, bias: values(CHUNK * ACT) }.into(),
     ];
-    graph.nodes = nodes.into_iter().enumerate().map(|(input, (kind, len))| Node { kind, input, len }).collect();
+    for (input, kind) in nodes.into_iter().enumerate() {
+        graph.add(kind, &[input]).expect("it fits");
+    }
     let at_width = |width| {
         let options = Options { group: 32, ..Options::new(Method::Rtn, Budget::Width(width)) };
         quantize(&graph, &[], &options).expect("the graph can be quantized")

@@ -277,13 +277,13 @@ fn dequantization_agrees_over_its_three_types() {
 }
 
 fn single_matrix_image(case: &Case) -> Vec<u8> {
-    use actq::graph::{Graph, Matrix, Node, NodeKind};
+    use actq::graph::ops::Linear;
+    use actq::graph::{Graph, WeightMatrix};
     use actq::quantize::{Outcome, Quantized};
     let BlockShape { width, rows, cols, group, .. } = case.shape;
     let mut graph = Graph::new(cols);
-    graph.matrices.push(Matrix { name: "w".into(), rows, cols, data: vec![0.0; rows * cols] });
-    let kind = NodeKind::Linear { matrix: 0, bias: vec![0.5; rows] };
-    graph.nodes.push(Node { kind, input: 0, len: rows });
+    graph.matrices.push(WeightMatrix { name: "w".into(), rows, cols, data: vec![0.0; rows * cols] });
+    graph.add(Linear { matrix: 0, bias: vec![0.5; rows] }, &[0]).expect("it fits");
     let policy = actq::policy::Policy {
         dir: ".".into(),
         name: "single".into(),

@@ -5,7 +5,6 @@
 //! run the finished image through the same executor that the firmware runs.
 #![deny(unsafe_code)]
 
-pub mod backprop;
 pub mod check;
 pub mod dataset;
 pub mod eval;

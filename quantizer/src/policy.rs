@@ -12,7 +12,8 @@ use serde::Deserialize;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-use crate::graph::{Graph, Matrix, Node, NodeKind, Part, ValueId};
+use crate::graph::ops::{Add, Concat, Gru, LayerNorm, Linear, Lstm, Normalize, Pointwise, RmsNorm, Span};
+use crate::graph::{Graph, NodeKind, ValueId, WeightMatrix};
 
 /// A policy as it was trained.
 #[derive(Clone, Debug)]
@@ -284,7 +285,7 @@ impl Tensors<'_> {
         Ok(data)
     }
 
-    fn matrix(&self, name: &str, rows: Option<usize>, cols: usize) -> Result<Matrix> {
+    fn matrix(&self, name: &str, rows: Option<usize>, cols: usize) -> Result<WeightMatrix> {
         let (shape, data) = self.read(name)?;
         let fits = matches!(shape[..], [r, c] if r > 0 && c == cols && rows.is_none_or(|rows| r == rows));
         ensure!(
@@ -293,7 +294,7 @@ impl Tensors<'_> {
             self.path.display(),
             rows.map_or("out".to_owned(), |r| r.to_string()),
         );
-        Ok(Matrix { name: name.to_owned(), rows: shape[0], cols, data })
+        Ok(WeightMatrix { name: name.to_owned(), rows: shape[0], cols, data })
     }
 }
 
@@ -311,41 +312,38 @@ impl Builder<'_> {
             Some(Input::Many(names)) => self.gather(names)?,
         };
         let len = self.graph.len_of(input);
-        let kind = match op.op.as_str() {
+        let mut inputs = vec![input];
+        let kind: Option<NodeKind> = match op.op.as_str() {
             "identity" => None,
-            "normalize" => Some(NodeKind::Normalize {
+            "normalize" => Some(NodeKind::from(Normalize {
                 mean: self.tensors.vector(need(&op.mean, "mean")?, len)?,
                 scale: self.tensors.vector(need(&op.scale, "scale")?, len)?,
                 pre_clip: clip(op.pre_clip, "pre_clip")?,
                 clip: clip(op.clip, "clip")?,
-            }),
+            })),
             "linear" => {
                 let matrix = self.matrix(need(&op.w, "w")?, None, len)?;
                 let rows = self.graph.matrices[matrix].rows;
-                Some(NodeKind::Linear { matrix, bias: self.bias(&op.b, rows)? })
+                Some(Linear { matrix, bias: self.bias(&op.b, rows)? }.into())
             }
-            "layernorm" => Some(NodeKind::LayerNorm {
+            "layernorm" => Some(NodeKind::from(LayerNorm {
                 weight: self.tensors.vector(need(&op.w_ln, "w_ln")?, len)?,
                 bias: self.bias(&op.b_ln, len)?,
                 eps: eps(op.eps, 1e-5)?,
-            }),
-            "rmsnorm" => Some(NodeKind::RmsNorm {
+            })),
+            "rmsnorm" => Some(NodeKind::from(RmsNorm {
                 weight: self.tensors.vector(need(&op.w_ln, "w_ln")?, len)?,
                 eps: eps(op.eps, 1e-6)?,
-            }),
+            })),
             "add" => {
-                let with = self.slot(need(&op.with, "with")?)?;
-                let other = self.graph.len_of(with);
-                ensure!(other == len, "adds {other} values to {len}");
-                Some(NodeKind::Add { with })
+                inputs.push(self.slot(need(&op.with, "with")?)?);
+                Some(Add.into())
             }
             "lstm" | "gru" => Some(self.recurrent(op, len)?),
-            name => Some(NodeKind::Function(function(name, op.approximate.as_deref())?)),
+            name => Some(Pointwise(function(name, op.approximate.as_deref())?).into()),
         };
         if let Some(kind) = kind {
-            let graph = &mut self.graph;
-            let len = kind.output_len(&graph.matrices, len);
-            graph.nodes.push(Node { kind, input, len });
+            self.graph.add(kind, &inputs)?;
         } else if input != self.graph.output() {
             bail!("identity cannot take another input; name the slot in the op that uses it");
         }
@@ -370,9 +368,9 @@ impl Builder<'_> {
         Ok(if op.op == "lstm" {
             // Both biases only ever occur as their sum.
             let bias = input_bias.iter().zip(&state_bias).map(|(a, b)| a + b).collect();
-            NodeKind::Lstm { hidden, input, state, bias }
+            Lstm { hidden, input, state, bias }.into()
         } else {
-            NodeKind::Gru { hidden, input, state, input_bias, state_bias }
+            Gru { hidden, input, state, input_bias, state_bias }.into()
         })
     }
 
@@ -383,11 +381,7 @@ impl Builder<'_> {
     /// The matrix of a tensor; one that several ops share is read once.
     fn matrix(&mut self, name: &str, rows: Option<usize>, cols: usize) -> Result<usize> {
         let matrix = self.tensors.matrix(name, rows, cols)?;
-        if let Some(known) = self.graph.matrices.iter().position(|m| m.name == name) {
-            return Ok(known);
-        }
-        self.graph.matrices.push(matrix);
-        Ok(self.graph.matrices.len() - 1)
+        self.graph.matrix_named(name).map_or_else(|| self.graph.add_matrix(matrix), Ok)
     }
 
     fn slot(&self, name: &str) -> Result<ValueId> {
@@ -402,17 +396,16 @@ impl Builder<'_> {
     fn gather(&mut self, names: &[String]) -> Result<ValueId> {
         let parts = names.iter().map(|name| self.part(name)).collect::<Result<Vec<_>>>()?;
         ensure!(!parts.is_empty(), "input is an empty list");
-        if let [part] = parts[..]
-            && part.len == self.graph.len_of(part.value)
+        if let [(value, span)] = parts[..]
+            && span.len == self.graph.len_of(value)
         {
-            return Ok(part.value);
+            return Ok(value);
         }
-        let len = parts.iter().map(|p| p.len).sum();
-        self.graph.nodes.push(Node { kind: NodeKind::Concat(parts), input: 0, len });
-        Ok(self.graph.output())
+        let (values, spans): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
+        self.graph.add(Concat(spans), &values)
     }
 
-    fn part(&self, text: &str) -> Result<Part> {
+    fn part(&self, text: &str) -> Result<(ValueId, Span)> {
         let (name, range) = match text.split_once('[') {
             None => (text, None),
             Some((name, range)) => (name, Some(range)),
@@ -430,7 +423,7 @@ impl Builder<'_> {
             }
         };
         ensure!(from < to && to <= whole, "input {text:?} reaches beyond the slot's {whole} values");
-        Ok(Part { value, from, len: to - from })
+        Ok((value, Span { from, len: to - from }))
     }
 }
 

@@ -21,7 +21,7 @@ use actq_kernels::image::block_bytes;
 use anyhow::{Result, bail, ensure};
 use half::bf16;
 
-use crate::graph::{Graph, Matrix};
+use crate::graph::{Graph, WeightMatrix};
 use allocate::Allocation;
 use moments::Moments;
 
@@ -267,7 +267,7 @@ pub struct Outcome {
 impl Outcome {
     /// Measures what became of `matrix`.
     pub fn new(
-        matrix: &Matrix,
+        matrix: &WeightMatrix,
         quantized: Quantized,
         moments: Option<&Moments>,
         activations: Activations,
@@ -313,7 +313,7 @@ impl Outcome {
 pub fn quantize(graph: &Graph, moments: &[Moments], options: &Options) -> Result<Vec<Outcome>> {
     ensure!(matches!(options.group, 0 | 32 | 64 | 128), "group is {}, it must be 0, 32, 64 or 128", options.group);
     let one = |i: usize, width| -> Result<Outcome> {
-        let matrix: &Matrix = &graph.matrices[i];
+        let matrix: &WeightMatrix = &graph.matrices[i];
         let moment = moments.get(i);
         let quantized = match (options.method, moment) {
             (Method::Rtn, _) => scale::round_to_nearest(matrix, width, options.group),

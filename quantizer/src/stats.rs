@@ -220,7 +220,7 @@ fn crc32(image: &Image<'_>) -> String {
     format!("{:08x}", image.crc())
 }
 
-fn matrix(source: &crate::graph::Matrix, outcome: &Outcome, score: Option<&Score>) -> Matrix {
+fn matrix(source: &crate::graph::WeightMatrix, outcome: &Outcome, score: Option<&Score>) -> Matrix {
     let quantized = &outcome.quantized;
     let allocation = outcome.allocation.as_ref();
     let image_rows = allocation.map_or_else(|| (0..source.rows).collect(), |a| a.rows.clone());

@@ -83,7 +83,8 @@ mod tests {
     use actq_kernels::math::Function;
 
     use super::*;
-    use crate::graph::{Evaluator, Graph, Matrix, Node, NodeKind, Part};
+    use crate::graph::ops::{Add, Concat, Gru, LayerNorm, Linear, Lstm, Normalize, Pointwise, RmsNorm, Span};
+    use crate::graph::{Evaluator, Graph, NodeKind, WeightMatrix};
     use crate::policy::{Contract, Policy};
     use crate::quantize::{Activations, Budget, Method, Options, Outcome, quantize};
     use crate::random::Random;
@@ -101,32 +102,34 @@ mod tests {
         let mut graph = Graph::new(OBS);
         let shapes = [(HIDDEN, OBS), (4 * HIDDEN, HIDDEN), (4 * HIDDEN, HIDDEN), (3 * HIDDEN, HIDDEN + 3)];
         for (rows, cols) in shapes.into_iter().chain([(3 * HIDDEN, HIDDEN), (ACT, HIDDEN)]) {
-            graph.matrices.push(Matrix { name: String::new(), rows, cols, data: values(rows * cols) });
+            graph.matrices.push(WeightMatrix { name: String::new(), rows, cols, data: values(rows * cols) });
         }
-        let parts = vec![Part { value: 5, from: 0, len: HIDDEN }, Part { value: 0, from: 1, len: 3 }];
-        let nodes = [
-            (NodeKind::Normalize { mean: values(OBS), scale: vec![1.5; OBS], pre_clip: 9.0, clip: 3.0 }, 0, OBS),
-            (NodeKind::Linear { matrix: 0, bias: values(HIDDEN) }, 1, HIDDEN),
-            (NodeKind::Function(Function::Silu), 2, HIDDEN),
-            (NodeKind::LayerNorm { weight: vec![1.0; HIDDEN], bias: values(HIDDEN), eps: 1e-5 }, 3, HIDDEN),
-            (NodeKind::Lstm { hidden: HIDDEN, input: 1, state: 2, bias: values(4 * HIDDEN) }, 4, HIDDEN),
-            (NodeKind::Concat(parts), 0, HIDDEN + 3),
+        let spans = vec![Span { from: 0, len: HIDDEN }, Span { from: 1, len: 3 }];
+        let nodes: [(NodeKind, &[usize]); 10] = [
+            (Normalize { mean: values(OBS), scale: vec![1.5; OBS], pre_clip: 9.0, clip: 3.0 }.into(), &[0]),
+            (Linear { matrix: 0, bias: values(HIDDEN) }.into(), &[1]),
+            (Pointwise(Function::Silu).into(), &[2]),
+            (LayerNorm { weight: vec![1.0; HIDDEN], bias: values(HIDDEN), eps: 1e-5 }.into(), &[3]),
+            (Lstm { hidden: HIDDEN, input: 1, state: 2, bias: values(4 * HIDDEN) }.into(), &[4]),
+            (Concat(spans).into(), &[5, 0]),
             (
-                NodeKind::Gru {
+                Gru {
                     hidden: HIDDEN,
                     input: 3,
                     state: 4,
                     input_bias: values(3 * HIDDEN),
                     state_bias: values(3 * HIDDEN),
-                },
-                6,
-                HIDDEN,
+                }
+                .into(),
+                &[6],
             ),
-            (NodeKind::Add { with: 5 }, 7, HIDDEN),
-            (NodeKind::RmsNorm { weight: vec![0.5; HIDDEN], eps: 1e-6 }, 8, HIDDEN),
-            (NodeKind::Linear { matrix: 5, bias: values(ACT) }, 9, ACT),
+            (Add.into(), &[7, 5]),
+            (RmsNorm { weight: vec![0.5; HIDDEN], eps: 1e-6 }.into(), &[8]),
+            (Linear { matrix: 5, bias: values(ACT) }.into(), &[9]),
         ];
-        graph.nodes = nodes.into_iter().map(|(kind, input, len)| Node { kind, input, len }).collect();
+        for (kind, inputs) in nodes {
+            graph.add(kind, inputs).expect("it fits");
+        }
         graph
     }
 

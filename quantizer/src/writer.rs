@@ -4,13 +4,14 @@ use std::io::Write as _;
 use std::path::Path;
 
 use actq_kernels::format::{self, LAYOUT_STAMP};
-use actq_kernels::image::{Kind, Region, checksum, half_words, header as h, header::op};
+use actq_kernels::image::{Kind, OpKind, Region, checksum, half_words, header as h, header::op};
 use actq_kernels::math::Function;
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use tempfile::NamedTempFile;
 
+use crate::graph::lowering::{Step, StepData};
 use crate::graph::{Graph, NodeKind};
-use crate::lower::{Step, StepKind, lower, product};
+use crate::lower::lower;
 use crate::policy::Policy;
 use crate::quantize::{Outcome, Quantized};
 use crate::runtime::{ImageBuffer, with_head};
@@ -101,11 +102,11 @@ fn self_test_observations(graph: &Graph, steps: usize) -> Vec<Vec<f32>> {
         state as i32 as f32 / i32::MAX as f32
     };
     let norm = graph.nodes.iter().find_map(|node| match &node.kind {
-        NodeKind::Normalize { mean, scale, .. } if node.input == 0 => Some((mean, scale)),
+        NodeKind::Normalize(norm) if node.inputs == [0] => Some(norm),
         _ => None,
     });
     let mut value = |i: usize| match norm {
-        Some((mean, scale)) if scale[i].abs() > 1e-6 => mean[i] + 2.0 * noise() / scale[i],
+        Some(norm) if norm.scale[i].abs() > 1e-6 => norm.mean[i] + 2.0 * noise() / norm.scale[i],
         _ => noise(),
     };
     (0..steps).map(|_| (0..graph.obs_len).map(&mut value).collect()).collect()
@@ -226,55 +227,31 @@ impl Writer {
     }
 
     fn op(&mut self, graph: &Graph, step: &Step<Region>, matrices: &[Outcome]) -> Result<[u32; 4]> {
-        let mut detail = 0u8;
-        let mut src_len = 0;
-        let (code, data) = match step.kind {
-            StepKind::Normalize { node } => {
-                let NodeKind::Normalize { mean, scale, pre_clip, clip } = &graph.nodes[node].kind else {
-                    bail!("node {node} is no normalize")
-                };
-                let data = self.push_floats(&[*pre_clip, *clip]);
-                self.push_floats(mean);
-                self.push_floats(scale);
-                (op::NORMALIZE, data)
+        let (code, detail) = match step.kind {
+            OpKind::Normalize => (op::NORMALIZE, 0),
+            OpKind::Linear { accumulate } => (op::LINEAR, u8::from(accumulate)),
+            OpKind::Function(function) => {
+                (op::FUNCTION, Function::ALL.iter().position(|f| *f == function).unwrap_or_default() as u8)
             }
-            StepKind::Linear { node, product: which, accumulate } => {
-                let (matrix, bias) = product(&graph.nodes[node], which).context("a node without such a product")?;
-                detail = u8::from(accumulate);
-                src_len = graph.matrices[matrix].cols;
-                (op::LINEAR, self.matrix(matrix, &matrices[matrix], bias)?)
+            OpKind::LayerNorm => (op::LAYER_NORM, 0),
+            OpKind::RmsNorm => (op::RMS_NORM, 0),
+            OpKind::Add => (op::ADD, 0),
+            OpKind::Copy => (op::COPY, 0),
+            OpKind::LstmCell => (op::LSTM_CELL, 0),
+            OpKind::GruCell => (op::GRU_CELL, 0),
+        };
+        let (src_len, data) = match &step.data {
+            StepData::None => (0, 0),
+            StepData::Constants(values) => (0, self.push_floats(values)),
+            StepData::Product { matrix, bias } => {
+                (graph.matrices[*matrix].cols, self.matrix(*matrix, &matrices[*matrix], bias)?)
             }
-            StepKind::Function(function) => {
-                detail = Function::ALL.iter().position(|f| *f == function).unwrap_or_default() as u8;
-                (op::FUNCTION, 0)
-            }
-            StepKind::LayerNorm { node } => {
-                let NodeKind::LayerNorm { weight, bias, eps } = &graph.nodes[node].kind else {
-                    bail!("node {node} is no layernorm")
-                };
-                let data = self.push_floats(&[*eps]);
-                self.push_floats(weight);
-                self.push_floats(bias);
-                (op::LAYER_NORM, data)
-            }
-            StepKind::RmsNorm { node } => {
-                let NodeKind::RmsNorm { weight, eps } = &graph.nodes[node].kind else {
-                    bail!("node {node} is no rmsnorm")
-                };
-                let data = self.push_floats(&[*eps]);
-                self.push_floats(weight);
-                (op::RMS_NORM, data)
-            }
-            StepKind::Add => (op::ADD, 0),
-            StepKind::Copy => (op::COPY, 0),
-            StepKind::LstmCell => (op::LSTM_CELL, 0),
-            StepKind::GruCell => (op::GRU_CELL, 0),
         };
         let offset = |region: Option<Region>| region.map_or(0, |r| r.offset);
         Ok([
             u32::from(code) | u32::from(detail) << 8 | halves(0, step.dst.len)?,
             halves(step.dst.offset, offset(step.src))?,
-            halves(src_len, offset(step.extra))?,
+            halves(src_len, offset(step.third))?,
             data,
         ])
     }

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use actq::graph::NodeKind;
+use actq::graph::ops::{Add, Gru, LayerNorm, Lstm, Normalize, Pointwise, RmsNorm};
 use actq::policy::Policy;
 use actq::quantize::{Activations, Outcome};
 use actq::random::Random;
@@ -384,30 +384,28 @@ fn policies() -> Result<Vec<(Policy, Vec<Outcome>)>> {
         [(8, 8, false), (40, 2, true), (256, 30, false), (256, 30, true), (40, 12, true)]
     {
         let mut builder = Builder::new(observation);
-        builder.part(action);
+        builder.part(action)?;
         policies.push(builder.finish(format!("{observation} to {action}, contract {contract}"), contract));
     }
     for (name, contract) in [("functions", false), ("functions with contract", true)] {
         let mut builder = Builder::new(if contract { OBSERVATION } else { 256 });
         for len in LENGTHS {
             for function in Function::ALL {
-                let input = builder.part(len);
-                builder.node(NodeKind::Function(function), input);
+                let input = builder.part(len)?;
+                builder.node(Pointwise(function), &[input])?;
             }
             let [mean, scale] = [builder.values(len), vec![1.5; len]];
-            builder.node_of_part(
-                len,
-                NodeKind::Normalize { mean: mean.clone(), scale: scale.clone(), pre_clip: 10.0, clip: 5.0 },
-            );
+            builder
+                .node_of_part(len, Normalize { mean: mean.clone(), scale: scale.clone(), pre_clip: 10.0, clip: 5.0 })?;
             let limitless = f32::INFINITY;
             builder.node_of_part(
                 len,
-                NodeKind::Normalize { mean: mean.clone(), scale: scale.clone(), pre_clip: limitless, clip: limitless },
-            );
-            builder.node_of_part(len, NodeKind::LayerNorm { weight: scale.clone(), bias: mean, eps: 1e-5 });
-            builder.node_of_part(len, NodeKind::RmsNorm { weight: scale, eps: 1e-5 });
-            let (a, b) = (builder.part(len), builder.part(len));
-            builder.node(NodeKind::Add { with: b }, a);
+                Normalize { mean: mean.clone(), scale: scale.clone(), pre_clip: limitless, clip: limitless },
+            )?;
+            builder.node_of_part(len, LayerNorm { weight: scale.clone(), bias: mean, eps: 1e-5 })?;
+            builder.node_of_part(len, RmsNorm { weight: scale, eps: 1e-5 })?;
+            let (a, b) = (builder.part(len)?, builder.part(len)?);
+            builder.node(Add, &[a, b])?;
         }
         for hidden in HIDDEN {
             for width in [Width::W2, Width::W4] {
@@ -416,15 +414,15 @@ fn policies() -> Result<Vec<(Policy, Vec<Outcome>)>> {
                 let input = builder.matrix(4 * hidden, cols, Activations::Int8, &all, 0)?;
                 let state = builder.matrix(4 * hidden, hidden, Activations::Int8, &all, 0)?;
                 let bias = builder.values(4 * hidden);
-                builder.node_of_part(cols, NodeKind::Lstm { hidden, input, state, bias });
+                builder.node_of_part(cols, Lstm { hidden, input, state, bias })?;
                 let all = vec![Some(width); 3 * hidden];
                 let input = builder.matrix(3 * hidden, cols, Activations::Int8, &all, 0)?;
                 let state = builder.matrix(3 * hidden, hidden, Activations::Int8, &all, 0)?;
                 let (input_bias, state_bias) = (builder.values(3 * hidden), builder.values(3 * hidden));
-                builder.node_of_part(cols, NodeKind::Gru { hidden, input, state, input_bias, state_bias });
+                builder.node_of_part(cols, Gru { hidden, input, state, input_bias, state_bias })?;
             }
         }
-        builder.part(12);
+        builder.part(12)?;
         policies.push(builder.finish(name.to_owned(), contract));
     }
     Ok(policies)

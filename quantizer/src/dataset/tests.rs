@@ -333,11 +333,11 @@ fn cut(graph: &Graph, whole: &Dataset, window: usize) -> Dataset {
     let mut state = Vec::new();
     for w in 0..windows {
         // The state after all steps before the window.
-        let mut states = crate::backprop::zero_state(graph, 1);
-        let network = crate::backprop::Network { graph, x_max: &[] };
+        let mut states = crate::graph::zero_state(graph, 1);
+        let network = crate::graph::Network::new(graph);
         for obs in whole.episode(0).take(w * window) {
             let obs = Array2::from_shape_vec((1, width), obs).expect("a row");
-            network.forward(&crate::backprop::Weights::of(graph), obs, &mut states);
+            network.forward(&crate::graph::Weights::of(graph), obs, &mut states);
         }
         state.extend(states.iter().flatten().flatten().copied());
     }

@@ -20,7 +20,7 @@ use ndarray::Array2;
 use super::scale::{Scales, round_to};
 use super::{Budget, Options, Outcome, Quantized};
 use crate::dataset::Dataset;
-use crate::graph::{Graph, Matrix};
+use crate::graph::{Graph, WeightMatrix};
 use score::Score;
 
 /// Share of the matrix's mean importance that every weight has at least. It decides where no recorded frame says anything, as
@@ -74,7 +74,7 @@ pub fn quantize(graph: &Graph, statistics: &Statistics, options: &Options) -> Re
 }
 
 /// Rounds to nearest with scales that minimise `sum of importance * error^2` of each group, or of each row.
-fn quantize_matrix(matrix: &Matrix, width: Width, group: usize, importance: &Array2<f32>) -> Quantized {
+fn quantize_matrix(matrix: &WeightMatrix, width: Width, group: usize, importance: &Array2<f32>) -> Quantized {
     let mean = importance.iter().map(|&i| f64::from(i)).sum::<f64>() / importance.len().max(1) as f64;
     let least = if mean > 0.0 { FLOOR * mean } else { 1.0 };
     let importance: Vec<f64> = importance.iter().map(|&i| f64::from(i) + least).collect();
@@ -88,7 +88,8 @@ pub(crate) mod testing {
     use ndarray::Array3;
 
     use super::*;
-    use crate::graph::{Evaluator, Node, NodeKind};
+    use crate::graph::Evaluator;
+    use crate::graph::ops::{Linear, Lstm, Pointwise};
     use actq_kernels::math::Function;
 
     fn noise(seed: &mut u64) -> f32 {
@@ -96,8 +97,8 @@ pub(crate) mod testing {
         (*seed >> 40) as f32 / (1u32 << 23) as f32 - 1.0
     }
 
-    fn matrix(name: &str, rows: usize, cols: usize, seed: &mut u64) -> Matrix {
-        Matrix { name: name.into(), rows, cols, data: (0..rows * cols).map(|_| 0.7 * noise(seed)).collect() }
+    fn matrix(name: &str, rows: usize, cols: usize, seed: &mut u64) -> WeightMatrix {
+        WeightMatrix { name: name.into(), rows, cols, data: (0..rows * cols).map(|_| 0.7 * noise(seed)).collect() }
     }
 
     fn vector(len: usize, seed: &mut u64) -> Vec<f32> {
@@ -109,11 +110,9 @@ pub(crate) mod testing {
         let mut seed = 1;
         let mut graph = Graph::new(3);
         graph.matrices = vec![matrix("a", 4, 3, &mut seed), matrix("b", 2, 4, &mut seed)];
-        graph.nodes = vec![
-            Node { kind: NodeKind::Linear { matrix: 0, bias: vector(4, &mut seed) }, input: 0, len: 4 },
-            Node { kind: NodeKind::Function(Function::Tanh), input: 1, len: 4 },
-            Node { kind: NodeKind::Linear { matrix: 1, bias: vector(2, &mut seed) }, input: 2, len: 2 },
-        ];
+        graph.add(Linear { matrix: 0, bias: vector(4, &mut seed) }, &[0]).expect("it fits");
+        graph.add(Pointwise(Function::Tanh), &[1]).expect("it fits");
+        graph.add(Linear { matrix: 1, bias: vector(2, &mut seed) }, &[2]).expect("it fits");
         graph
     }
 
@@ -123,11 +122,9 @@ pub(crate) mod testing {
         let mut graph = Graph::new(2);
         graph.matrices =
             vec![matrix("w_ih", 12, 2, &mut seed), matrix("w_hh", 12, 3, &mut seed), matrix("out", 2, 3, &mut seed)];
-        let cell = NodeKind::Lstm { hidden: 3, input: 0, state: 1, bias: vector(12, &mut seed) };
-        graph.nodes = vec![
-            Node { kind: cell, input: 0, len: 3 },
-            Node { kind: NodeKind::Linear { matrix: 2, bias: vector(2, &mut seed) }, input: 1, len: 2 },
-        ];
+        let bias = vector(12, &mut seed);
+        graph.add(Lstm { hidden: 3, input: 0, state: 1, bias }, &[0]).expect("it fits");
+        graph.add(Linear { matrix: 2, bias: vector(2, &mut seed) }, &[1]).expect("it fits");
         graph
     }
 
@@ -162,7 +159,7 @@ mod tests {
     #[test]
     fn scales_follow_the_importance() {
         let data: Vec<f32> = (0..64).map(|i| (i as f32 * 0.7).sin()).collect();
-        let matrix = Matrix { name: "w".into(), rows: 2, cols: 32, data };
+        let matrix = WeightMatrix { name: "w".into(), rows: 2, cols: 32, data };
         // Only the even columns of row 0 and the odd ones of row 1 matter.
         let importance = Array2::from_shape_fn((2, 32), |(r, c)| if r == c % 2 { 1.0 } else { 0.0 });
         let error = |quantized: &Quantized| -> f64 {
@@ -181,7 +178,7 @@ mod tests {
     #[test]
     fn equal_importance_is_plain_rounding_and_none_is_too() {
         let data: Vec<f32> = (0..80).map(|i| (i as f32 * 1.3).cos()).collect();
-        let matrix = Matrix { name: "w".into(), rows: 2, cols: 40, data };
+        let matrix = WeightMatrix { name: "w".into(), rows: 2, cols: 40, data };
         let plain = scale::round_to_nearest(&matrix, Width::W3, 32);
         for level in [0.0, 2.0] {
             let found = quantize_matrix(&matrix, Width::W3, 32, &Array2::from_elem((2, 40), level));

@@ -12,7 +12,7 @@ use anyhow::{Result, ensure};
 
 use super::compact::Dimension;
 use super::{BudgetTooSmall, Packing};
-use crate::graph::{Graph, Matrix};
+use crate::graph::{Graph, WeightMatrix};
 
 /// Expected squared error of a row in units of its own energy: that of the mid-rise grid with error feedback. At 8 bits more
 /// than rounding costs (0.00005), so that 8 bits go only where 4 are far from enough: learning mends the difference.
@@ -70,7 +70,7 @@ pub struct Allocation {
 }
 
 /// The energies of a matrix's rows for the importances of its columns (`h`) and rows (`g`).
-pub fn energies(matrix: &Matrix, h: &[f64], g: &[f64]) -> Vec<f64> {
+pub fn energies(matrix: &WeightMatrix, h: &[f64], g: &[f64]) -> Vec<f64> {
     let rows = matrix.data.chunks_exact(matrix.cols).zip(g);
     rows.map(|(row, g)| g * row.iter().zip(h).map(|(w, h)| f64::from(*w).powi(2) * h).sum::<f64>()).collect()
 }

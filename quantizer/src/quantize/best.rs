@@ -13,9 +13,9 @@ use super::moments::Moments;
 use super::sensitivity::{Side, importance, output_moments};
 use super::windows::Windows;
 use super::{Activations, Budget, Options, Outcome, Quantized};
-use crate::backprop::{Network, Weights};
 use crate::dataset::Dataset;
-use crate::graph::{Graph, Matrix};
+use crate::graph::{Graph, WeightMatrix};
+use crate::graph::{Network, Weights};
 use crate::random::Random;
 
 /// Frames that learning needs at least.
@@ -82,7 +82,7 @@ pub fn quantize(
         let names = || graph.matrices.iter().map(|m| m.name.as_str()).collect::<Vec<_>>().join(", ");
         ensure!(graph.matrices.iter().any(|m| m.name == *name), "no matrix is named {name:?}; there are {}", names());
     }
-    let forced = |matrix: &Matrix| match options.budget {
+    let forced = |matrix: &WeightMatrix| match options.budget {
         Budget::Width(width) => Some(width),
         _ => options.forced.iter().find(|(name, _)| *name == matrix.name).map(|(_, width)| *width),
     };
@@ -190,7 +190,7 @@ fn choose_activations(graph: &Graph, quantized: &[Quantized], windows: &Windows<
         weights.iter_mut().zip(quantized.dequantized()).for_each(|(w, q)| *w = q);
     }
     let error = |x_max: &[u16]| -> f32 {
-        let network = Network { graph, x_max };
+        let network = Network::rounded(graph, x_max);
         let samples = (SAMPLES / windows.window).max(8);
         let batches = (0..MEASURED).map(|i| windows.batch(samples, false, &mut Random(seed + i as u64)));
         batches.map(|batch| loss(&network, &weights, windows, batch)).sum()

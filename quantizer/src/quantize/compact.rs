@@ -9,7 +9,8 @@ use nalgebra::{DMatrix, DVector};
 use super::allocate::Widths;
 use super::moments::Moments;
 use super::sensitivity::DAMPING_INPUT;
-use crate::graph::{Graph, Matrix, NodeKind, ValueId};
+use crate::graph::operation::{Operand, Product};
+use crate::graph::{Graph, NodeKind, WeightMatrix};
 
 /// A hidden vector that may be permuted and pruned. Numbers are matrices of the graph.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -45,21 +46,10 @@ impl Dimension {
     }
 }
 
-/// Which nodes read a value.
-fn readers(graph: &Graph, value: ValueId) -> Vec<usize> {
-    let reads = |kind: &NodeKind, input: ValueId| match kind {
-        NodeKind::Concat(parts) => parts.iter().any(|p| p.value == value),
-        NodeKind::Add { with } => input == value || *with == value,
-        _ => input == value,
-    };
-    (0..graph.nodes.len()).filter(|&n| reads(&graph.nodes[n].kind, graph.nodes[n].input)).collect()
-}
-
 /// The dimensions of a graph.
 pub fn dimensions(graph: &Graph) -> Vec<Dimension> {
-    let uses = |m: usize| graph.nodes.iter().filter(|n| matrices_of(&n.kind).contains(&m)).count();
-    let linear = |n: usize| match graph.nodes[n].kind {
-        NodeKind::Linear { matrix, .. } if uses(matrix) == 1 => Some(matrix),
+    let linear = |n: usize| match &graph.nodes[n].kind {
+        NodeKind::Linear(linear) if uses(graph, linear.matrix) == 1 => Some(linear.matrix),
         _ => None,
     };
     (0..graph.nodes.len())
@@ -71,11 +61,12 @@ pub fn dimensions(graph: &Graph) -> Vec<Dimension> {
                 if value == graph.output() {
                     return None;
                 }
-                let next = readers(graph, value);
+                let next = graph.readers(value);
                 match next[..] {
-                    [one] if matches!(graph.nodes[one].kind, NodeKind::Function(_)) => value = one + 1,
+                    [one] if matches!(graph.nodes[one].kind, NodeKind::Pointwise(_)) => value = one + 1,
                     _ => {
-                        let consumers = next.into_iter().map(consumer(graph, &uses)).collect::<Option<Vec<_>>>()?;
+                        let consumers = next.into_iter().map(|n| consumers(graph, n)).collect::<Option<Vec<_>>>()?;
+                        let consumers = consumers.concat();
                         return (!consumers.is_empty()).then_some(Dimension { maker, consumers, node });
                     }
                 }
@@ -84,24 +75,18 @@ pub fn dimensions(graph: &Graph) -> Vec<Dimension> {
         .collect()
 }
 
-/// The matrix through which a node reads its input, where that is all it does with it.
-fn consumer<'a>(graph: &'a Graph, uses: &'a impl Fn(usize) -> usize) -> impl Fn(usize) -> Option<usize> + 'a {
-    move |node| {
-        let matrix = match graph.nodes[node].kind {
-            NodeKind::Linear { matrix, .. } => matrix,
-            NodeKind::Lstm { input, .. } | NodeKind::Gru { input, .. } => input,
-            _ => return None,
-        };
-        (uses(matrix) == 1).then_some(matrix)
-    }
+/// How many nodes use a matrix.
+fn uses(graph: &Graph, matrix: usize) -> usize {
+    graph.nodes.iter().filter(|node| node.kind.products().iter().any(|p| p.matrix == matrix)).count()
 }
 
-fn matrices_of(kind: &NodeKind) -> Vec<usize> {
-    match kind {
-        NodeKind::Linear { matrix, .. } => vec![*matrix],
-        NodeKind::Lstm { input, state, .. } | NodeKind::Gru { input, state, .. } => vec![*input, *state],
-        _ => Vec::new(),
-    }
+/// The matrices through which a node reads its input, where that is all it does with it, and nobody else uses them.
+fn consumers(graph: &Graph, node: usize) -> Option<Vec<usize>> {
+    let of_input = |product: &Product| product.operand == Operand::Input;
+    let products = graph.nodes[node].kind.products().into_iter().filter(of_input);
+    let matrices: Vec<usize> = products.map(|product| product.matrix).collect();
+    let alone = !matrices.is_empty() && matrices.iter().all(|&m| uses(graph, m) == 1);
+    alone.then_some(matrices)
 }
 
 /// A graph whose hidden vectors hold only the elements that have bits.
@@ -139,15 +124,15 @@ pub fn compact(graph: &Graph, dimensions: &[Dimension], widths: &Widths, moments
         let maker = &mut graph.matrices[dimension.maker];
         *maker = rows(maker, &order);
         widths[dimension.maker] = order.iter().map(|&r| widths[dimension.maker][r]).collect();
-        if let NodeKind::Linear { bias, .. } = &mut graph.nodes[dimension.node].kind {
-            *bias = order.iter().map(|&r| bias[r]).collect();
+        if let NodeKind::Linear(linear) = &mut graph.nodes[dimension.node].kind {
+            linear.bias = order.iter().map(|&r| linear.bias[r]).collect();
         }
         // The functions behind it keep the new length.
         let mut value = dimension.node;
         loop {
             graph.nodes[value].len = order.len();
-            match readers(&graph, value + 1)[..] {
-                [next] if matches!(graph.nodes[next].kind, NodeKind::Function(_)) => value = next,
+            match graph.readers(value + 1)[..] {
+                [next] if matches!(graph.nodes[next].kind, NodeKind::Pointwise(_)) => value = next,
                 _ => break,
             }
         }
@@ -157,7 +142,7 @@ pub fn compact(graph: &Graph, dimensions: &[Dimension], widths: &Widths, moments
 
 /// Takes the columns `gone` out of account: the least-squares guess of what they contribute goes to the columns `kept`, and its
 /// constant part is returned, to be added to the biases. Where nothing is correlated, that is the contribution of their means.
-fn absorb(matrix: &mut Matrix, gone: &[usize], kept: &[usize], moments: &Moments) -> Vec<f32> {
+fn absorb(matrix: &mut WeightMatrix, gone: &[usize], kept: &[usize], moments: &Moments) -> Vec<f32> {
     let centred = moments.centred();
     let damping = (DAMPING_INPUT * centred.trace() / matrix.cols.max(1) as f64).max(1e-30);
     let among = |i: usize, j: usize| centred[(kept[i], kept[j])] + if i == j { damping } else { 0.0 };
@@ -179,34 +164,31 @@ fn absorb(matrix: &mut Matrix, gone: &[usize], kept: &[usize], moments: &Moments
     .collect()
 }
 
-fn rows(matrix: &Matrix, order: &[usize]) -> Matrix {
+fn rows(matrix: &WeightMatrix, order: &[usize]) -> WeightMatrix {
     let data = order.iter().flat_map(|&r| &matrix.data[r * matrix.cols..][..matrix.cols]).copied().collect();
-    Matrix { name: matrix.name.clone(), rows: order.len(), cols: matrix.cols, data }
+    WeightMatrix { name: matrix.name.clone(), rows: order.len(), cols: matrix.cols, data }
 }
 
-fn columns(matrix: &Matrix, order: &[usize]) -> Matrix {
+fn columns(matrix: &WeightMatrix, order: &[usize]) -> WeightMatrix {
     let data = matrix.data.chunks_exact(matrix.cols).flat_map(|row| order.iter().map(|&c| row[c])).collect();
-    Matrix { name: matrix.name.clone(), rows: matrix.rows, cols: order.len(), data }
+    WeightMatrix { name: matrix.name.clone(), rows: matrix.rows, cols: order.len(), data }
 }
 
 /// Adds to the biases behind a matrix.
 pub fn add_to_bias(graph: &mut Graph, matrix: usize, values: &[f32]) {
     for node in &mut graph.nodes {
-        let bias = match &mut node.kind {
-            NodeKind::Linear { matrix: m, bias } if *m == matrix => bias,
-            NodeKind::Lstm { input, state, bias, .. } if matrix == *input || matrix == *state => bias,
-            NodeKind::Gru { input, input_bias, .. } if *input == matrix => input_bias,
-            NodeKind::Gru { state, state_bias, .. } if *state == matrix => state_bias,
-            _ => continue,
-        };
-        bias.iter_mut().zip(values).for_each(|(b, v)| *b += v);
+        for product in node.kind.products().iter().filter(|product| product.matrix == matrix) {
+            let bias = &mut node.kind.vectors_mut()[product.bias];
+            bias.iter_mut().zip(values).for_each(|(b, v)| *b += v);
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::graph::{Evaluator, Node};
+    use crate::graph::Evaluator;
+    use crate::graph::ops::{Add, Linear, Pointwise};
     use actq_kernels::math::Function;
 
     /// 3 -> 5 tanh -> [2 and, through a residual sum, 5] with values that differ everywhere.
@@ -214,25 +196,24 @@ mod tests {
         let mut graph = Graph::new(3);
         let mut matrix = |rows: usize, cols: usize| {
             let data = (0..rows * cols).map(|i| ((i * 7 + rows) as f32 * 0.37).sin()).collect();
-            graph.matrices.push(Matrix { name: "m".into(), rows, cols, data });
+            graph.matrices.push(WeightMatrix { name: "m".into(), rows, cols, data });
         };
         matrix(5, 3);
         matrix(4, 5);
         matrix(4, 4);
         let bias = |n: usize| (0..n).map(|i| 0.1 * i as f32 - 0.2).collect();
-        graph.nodes = vec![
-            Node { kind: NodeKind::Linear { matrix: 0, bias: bias(5) }, input: 0, len: 5 },
-            Node { kind: NodeKind::Function(Function::Tanh), input: 1, len: 5 },
-            Node { kind: NodeKind::Linear { matrix: 1, bias: bias(4) }, input: 2, len: 4 },
-            Node { kind: NodeKind::Linear { matrix: 2, bias: bias(4) }, input: 3, len: 4 },
-            Node { kind: NodeKind::Add { with: 3 }, input: 4, len: 4 },
-        ];
+        let mut push = |kind: NodeKind, inputs: &[usize]| graph.add(kind, inputs).expect("it fits");
+        push(Linear { matrix: 0, bias: bias(5) }.into(), &[0]);
+        push(Pointwise(Function::Tanh).into(), &[1]);
+        push(Linear { matrix: 1, bias: bias(4) }.into(), &[2]);
+        push(Linear { matrix: 2, bias: bias(4) }.into(), &[3]);
+        push(Add.into(), &[4, 3]);
         graph
     }
 
     /// Moments of uncorrelated inputs; those of the second matrix have this mean.
     fn moments(graph: &Graph, hidden: &[f32]) -> Vec<Moments> {
-        let of = |(m, matrix): (usize, &Matrix)| {
+        let of = |(m, matrix): (usize, &WeightMatrix)| {
             let mean: Vec<f64> = (0..matrix.cols).map(|c| if m == 1 { f64::from(hidden[c]) } else { 0.0 }).collect();
             let vector = DVector::from_column_slice(&mean);
             let second = DMatrix::identity(matrix.cols, matrix.cols) + &vector * vector.transpose();
@@ -305,7 +286,7 @@ mod tests {
             count: vectors.len(),
         };
         let data = vec![0.5, -1.0, 0.25, 0.75, 1.0, 0.0, -0.5, -2.0];
-        let mut matrix = Matrix { name: "m".into(), rows: 2, cols: 4, data };
+        let mut matrix = WeightMatrix { name: "m".into(), rows: 2, cols: 4, data };
         let bias = absorb(&mut matrix, &[3], &[0, 1, 2], &moments);
         // The damping keeps the guess from being exact.
         let expected = [[2.0, -1.75, 0.25, 3.75], [-3.0, 2.0, -0.5, -10.0]];

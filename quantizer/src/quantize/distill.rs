@@ -14,8 +14,8 @@ use rayon::prelude::*;
 use super::Quantized;
 use super::scale::Scales;
 use super::windows::{Batch, Windows};
-use crate::backprop::{Network, Pass, Weights, zero_state};
-use crate::graph::{Graph, Matrix};
+use crate::graph::{Graph, WeightMatrix};
+use crate::graph::{Network, Pass, Weights, zero_state};
 use crate::random::Random;
 
 /// Learning rates: latent weights in steps, logarithms of the scales, biases and norms.
@@ -56,7 +56,7 @@ fn grid(width: Width) -> (f32, f32, f32, f32) {
 }
 
 impl Latent {
-    fn new(matrix: &Matrix, widths: &[Option<Width>], group: usize, importance: &[f64]) -> Self {
+    fn new(matrix: &WeightMatrix, widths: &[Option<Width>], group: usize, importance: &[f64]) -> Self {
         let fitted = Scales::fit(matrix, widths, group, importance);
         let log_scales: Vec<f32> = fitted.rows.iter().map(|s| s.to_f32().max(SMALLEST).ln()).collect();
         let mut latent =
@@ -194,7 +194,7 @@ pub struct Task<'a> {
 /// Learns codes, scales, biases and norms. Returns the quantized matrices, and puts biases and norms into `graph`. `progress` is
 /// called after each step with its number.
 pub fn distill(task: &Task<'_>, windows: &Windows<'_>, mut progress: impl FnMut(usize)) -> (Vec<Quantized>, Graph) {
-    let network = Network { graph: task.graph, x_max: task.x_max };
+    let network = Network::rounded(task.graph, task.x_max);
     let mut weights = Weights::of(task.graph);
     let matrices = task.graph.matrices.iter().zip(task.widths).zip(task.importance);
     let mut latents: Vec<Latent> =

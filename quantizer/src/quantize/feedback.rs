@@ -15,7 +15,7 @@ use super::Quantized;
 use super::moments::Moments;
 use super::scale::Scales;
 use super::sensitivity::{Side, damped};
-use crate::graph::Matrix;
+use crate::graph::WeightMatrix;
 
 /// Sweeps of coordinate descent.
 const SWEEPS: usize = 3;
@@ -72,7 +72,7 @@ impl Factor {
 /// The mean error is left to the biases, so that `H` is taken about the input's mean: returns the matrix and what is to be added
 /// to the biases behind it.
 pub fn feedback(
-    matrix: &Matrix,
+    matrix: &WeightMatrix,
     widths: &[Option<Width>],
     group: usize,
     importance: &[f64],
@@ -173,7 +173,7 @@ mod tests {
     const COLS: usize = 40;
 
     /// A matrix with the moments of inputs and derivatives that have 8 hidden causes each.
-    fn case() -> (Matrix, Moments, DMatrix<f64>) {
+    fn case() -> (WeightMatrix, Moments, DMatrix<f64>) {
         let mut random = Random(11);
         let data = (0..ROWS * COLS).map(|_| random.unit()).collect();
         let mut second = |n: usize| {
@@ -182,11 +182,11 @@ mod tests {
             &x * x.transpose() / 400.0
         };
         let (input, output) = (second(COLS), second(ROWS));
-        let matrix = Matrix { name: "w".into(), rows: ROWS, cols: COLS, data };
+        let matrix = WeightMatrix { name: "w".into(), rows: ROWS, cols: COLS, data };
         (matrix, Moments { second: input, mean: vec![0.0; COLS], count: 400 }, output)
     }
 
-    fn error(matrix: &Matrix, quantized: &Quantized, input: &DMatrix<f64>, output: &DMatrix<f64>) -> f64 {
+    fn error(matrix: &WeightMatrix, quantized: &Quantized, input: &DMatrix<f64>, output: &DMatrix<f64>) -> f64 {
         let of = |values: &[f32]| DMatrix::from_row_slice(matrix.rows, matrix.cols, values).cast::<f64>();
         let e = of(&quantized.dequantized()) - of(&matrix.data);
         (&e * input * e.transpose() * output).trace()

@@ -8,14 +8,14 @@ use nalgebra::DMatrix;
 use super::Quantized;
 use super::moments::Moments;
 use super::scale::Scales;
-use crate::graph::Matrix;
+use crate::graph::WeightMatrix;
 
 /// Share of the mean diagonal that is added to the diagonal of H (the paper's dampening).
 const DAMPING: f64 = 0.01;
 
 /// Quantizes `matrix` with the second moment `E[x x']` of its input. Columns go in order of falling diagonal ("act-order");
 /// scales are fitted before, weighted with the diagonal.
-pub fn quantize(matrix: &Matrix, width: Width, group: usize, moments: &Moments) -> Result<Quantized> {
+pub fn quantize(matrix: &WeightMatrix, width: Width, group: usize, moments: &Moments) -> Result<Quantized> {
     let (rows, cols) = (matrix.rows, matrix.cols);
     let diagonal: Vec<f64> = moments.second.diagonal().iter().copied().collect();
     let scales = Scales::fit(matrix, &vec![Some(width); matrix.rows], group, &diagonal);
@@ -70,7 +70,7 @@ mod tests {
         let (rows, cols) = (16, 48);
         let mut random = Random(7);
         let data = (0..rows * cols).map(|_| random.unit()).collect();
-        let matrix = Matrix { name: "w".into(), rows, cols, data };
+        let matrix = WeightMatrix { name: "w".into(), rows, cols, data };
         // Inputs of 8 hidden causes.
         let mixing = DMatrix::from_fn(cols, 8, |_, _| f64::from(random.unit()));
         let x = mixing * DMatrix::from_fn(8, 400, |_, _| f64::from(random.unit()));
@@ -88,7 +88,8 @@ mod tests {
     #[test]
     fn uncorrelated_equal_inputs_reduce_to_rounding() {
         let mut random = Random(3);
-        let matrix = Matrix { name: "w".into(), rows: 5, cols: 20, data: (0..100).map(|_| random.unit()).collect() };
+        let matrix =
+            WeightMatrix { name: "w".into(), rows: 5, cols: 20, data: (0..100).map(|_| random.unit()).collect() };
         let moments = Moments { second: DMatrix::identity(20, 20), mean: vec![0.0; 20], count: 1 };
         let gptq = quantize(&matrix, Width::W3, 0, &moments).expect("positive definite");
         assert_eq!(gptq.codes, scale::round_to_nearest(&matrix, Width::W3, 0).codes);

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use crate::dataset::Dataset;
-use crate::graph::{Evaluator, Graph, Matrix};
+use crate::graph::{Evaluator, Graph, WeightMatrix};
 
 /// `E[x x']` of a matrix's input, and how many vectors it was taken over.
 #[derive(Clone, Debug)]
@@ -74,7 +74,7 @@ fn flush(moments: &mut Moments, batch: &mut Vec<f64>) {
 }
 
 /// `E |(W' - W) x|^2 / E |W x|^2`; of white inputs where there are no moments. 0 for a matrix that never gives anything.
-pub fn relative_error(matrix: &Matrix, quantized: &[f32], moments: Option<&Moments>) -> f64 {
+pub fn relative_error(matrix: &WeightMatrix, quantized: &[f32], moments: Option<&Moments>) -> f64 {
     let energy = |rows: &[f64]| -> f64 {
         rows.chunks_exact(matrix.cols)
             .map(|row| {

@@ -4,7 +4,7 @@ use actq_kernels::format::Width;
 use half::bf16;
 
 use super::Quantized;
-use crate::graph::Matrix;
+use crate::graph::WeightMatrix;
 
 /// Steps of the search for a scale, from [`NARROWEST`] to 1 times the scale that just reaches the largest weight.
 const STEPS: usize = 64;
@@ -56,7 +56,7 @@ pub struct Scales {
 impl Scales {
     /// Fits the scales of every row, or of every group of every row; those of rows without a width are 1. `importance` has an entry
     /// per column, or one per weight, or none.
-    pub fn fit(matrix: &Matrix, widths: &[Option<Width>], group: usize, importance: &[f64]) -> Self {
+    pub fn fit(matrix: &WeightMatrix, widths: &[Option<Width>], group: usize, importance: &[f64]) -> Self {
         let mut scales = Self { group, rows: Vec::new(), groups: Vec::new() };
         for (r, (row, width)) in matrix.data.chunks_exact(matrix.cols).zip(widths).enumerate() {
             let importance = if importance.len() > matrix.cols { &importance[r * matrix.cols..] } else { importance };
@@ -103,12 +103,12 @@ impl Scales {
 }
 
 /// Rounds every weight to the nearest level of its scale.
-pub fn round_to_nearest(matrix: &Matrix, width: Width, group: usize) -> Quantized {
+pub fn round_to_nearest(matrix: &WeightMatrix, width: Width, group: usize) -> Quantized {
     round_to(matrix, width, Scales::fit(matrix, &vec![Some(width); matrix.rows], group, &[]))
 }
 
 /// Rounds every weight to the nearest level of these scales.
-pub fn round_to(matrix: &Matrix, width: Width, scales: Scales) -> Quantized {
+pub fn round_to(matrix: &WeightMatrix, width: Width, scales: Scales) -> Quantized {
     let codes =
         matrix.data.iter().enumerate().map(|(i, &w)| scales.code(width, i / matrix.cols, i % matrix.cols, w)).collect();
     Quantized {
@@ -156,7 +156,7 @@ mod tests {
 
     #[test]
     fn a_zero_matrix_stays_zero() {
-        let matrix = Matrix { name: "z".into(), rows: 3, cols: 40, data: vec![0.0; 120] };
+        let matrix = WeightMatrix { name: "z".into(), rows: 3, cols: 40, data: vec![0.0; 120] };
         for width in Width::ALL {
             for group in [0, 32] {
                 assert!(round_to_nearest(&matrix, width, group).dequantized().iter().all(|w| *w == 0.0));

@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 use ndarray::Array2;
 
 use super::windows::Windows;
-use crate::backprop::{Network, zero_state};
+use crate::graph::{Network, zero_state};
 use crate::random::Random;
 
 /// Batches that `G` is averaged over, and samples in each.
@@ -22,7 +22,7 @@ const DAMPING_OUTPUT: f64 = 0.02;
 /// `G` of every matrix, `rows * rows`.
 pub fn output_moments(windows: &Windows<'_>, seed: u64) -> Vec<DMatrix<f64>> {
     let graph = windows.graph;
-    let network = Network { graph, x_max: &[] };
+    let network = Network::new(graph);
     let mut random = Random(seed);
     let mut sums: Vec<Array2<f32>> = graph.matrices.iter().map(|m| Array2::zeros((m.rows, m.rows))).collect();
     let mut counts = vec![0usize; sums.len()];

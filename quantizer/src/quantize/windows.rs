@@ -3,9 +3,9 @@
 
 use ndarray::{Array2, Axis};
 
-use crate::backprop::{Network, State, Weights, start_state, zero_state};
 use crate::dataset::Dataset;
 use crate::graph::Graph;
+use crate::graph::{Network, State, Weights, start_state, zero_state};
 use crate::random::Random;
 
 /// Steps of a window of a recurrent network.
@@ -49,7 +49,7 @@ impl<'a> Windows<'a> {
     /// Runs the f32 network over the recording.
     pub fn new(graph: &'a Graph, dataset: &Dataset) -> Self {
         let weights = Weights::of(graph);
-        let network = Network { graph, x_max: &[] };
+        let network = Network::new(graph);
         let recurrent = graph.state_len() > 0;
         let mut episodes = Vec::new();
         let mut states = Vec::new();
@@ -127,7 +127,7 @@ impl<'a> Windows<'a> {
 
     /// The f32 network's outputs on a batch.
     pub fn teach(&self, batch: &Batch) -> Vec<Array2<f32>> {
-        let network = Network { graph: self.graph, x_max: &[] };
+        let network = Network::new(self.graph);
         let mut state = batch.state.clone();
         batch.steps.iter().map(|obs| network.forward(&self.weights, obs.clone(), &mut state).output().clone()).collect()
     }

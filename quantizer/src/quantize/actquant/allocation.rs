@@ -4,11 +4,11 @@ use actq_kernels::format::Width;
 use actq_kernels::image::block_bytes;
 use anyhow::{Result, ensure};
 
-use crate::graph::{Graph, Matrix, NodeKind};
+use crate::graph::{Graph, WeightMatrix};
 use crate::quantize::{BudgetTooSmall, Packing};
 
 /// Bytes of a matrix at one width: codes, padding, scales and the block record.
-fn bytes(matrix: &Matrix, width: Width, packing: Packing) -> usize {
+fn bytes(matrix: &WeightMatrix, width: Width, packing: Packing) -> usize {
     block_bytes(packing.shape(width, matrix.rows, matrix.cols), false)
 }
 
@@ -21,13 +21,8 @@ fn noise(score: f64, width: Width) -> f64 {
 pub fn layers(graph: &Graph) -> Vec<usize> {
     let mut layers = vec![usize::MAX; graph.matrices.len()];
     for (layer, node) in graph.nodes.iter().enumerate() {
-        let matrices = match node.kind {
-            NodeKind::Linear { matrix, .. } => vec![matrix],
-            NodeKind::Lstm { input, state, .. } | NodeKind::Gru { input, state, .. } => vec![input, state],
-            _ => Vec::new(),
-        };
-        for matrix in matrices {
-            layers[matrix] = layers[matrix].min(layer);
+        for product in node.kind.products() {
+            layers[product.matrix] = layers[product.matrix].min(layer);
         }
     }
     layers
@@ -76,15 +71,20 @@ mod tests {
     use actq_kernels::format::Lanes;
 
     const PACKING: Packing = Packing { lanes: Lanes::Paired, group: 32 };
-    use crate::graph::Node;
+    use crate::graph::ops::Linear;
     use crate::quantize::actquant::testing::lstm;
 
     /// A chain of square matrices, each a layer of its own.
     fn chain(count: usize) -> Graph {
         let mut graph = Graph::new(64);
         for matrix in 0..count {
-            graph.matrices.push(Matrix { name: format!("w{matrix}"), rows: 64, cols: 64, data: vec![0.0; 64 * 64] });
-            graph.nodes.push(Node { kind: NodeKind::Linear { matrix, bias: vec![0.0; 64] }, input: matrix, len: 64 });
+            graph.matrices.push(WeightMatrix {
+                name: format!("w{matrix}"),
+                rows: 64,
+                cols: 64,
+                data: vec![0.0; 64 * 64],
+            });
+            graph.add(Linear { matrix, bias: vec![0.0; 64] }, &[matrix]).expect("it fits");
         }
         graph
     }

@@ -3,9 +3,9 @@
 use anyhow::{Context, Result};
 use ndarray::{Array2, Axis, Zip, linalg::general_mat_mul};
 
-use crate::backprop::{Network, Pass, Weights, start_state, zero_state};
 use crate::dataset::Dataset;
 use crate::graph::Graph;
+use crate::graph::{Network, Pass, Weights, start_state, zero_state};
 
 /// Steps that a recurrent network's gradient runs back.
 const WINDOW: usize = 16;
@@ -29,7 +29,7 @@ const EQUAL: f32 = 1e-3;
 /// `progress` gets the share done.
 pub fn importance(graph: &Graph, dataset: &Dataset, mut progress: impl FnMut(f64)) -> Result<Vec<Array2<f32>>> {
     let weights = Weights::of(graph);
-    let network = Network { graph, x_max: &[] };
+    let network = Network::new(graph);
     let recurrent = graph.state_len() > 0;
     let longest = dataset.length.iter().copied().max().unwrap_or(0);
     let window = if recurrent { WINDOW.min(longest) } else { 1 };
@@ -92,8 +92,8 @@ fn add_squares(
     let mut d_output = Some(d_output);
     for pass in passes.iter().rev() {
         let d_output = d_output.take().unwrap_or_else(|| silent.clone());
-        network.backward(weights, pass, d_output, &mut d_state, unused, &mut |matrix, node, of_state, dy| {
-            if let (true, Some(x)) = (dy.iter().any(|d| *d != 0.0), pass.product_input(node, of_state)) {
+        network.backward(weights, pass, d_output, &mut d_state, unused, &mut |matrix, node, product, dy| {
+            if let (true, Some(x)) = (dy.iter().any(|d| *d != 0.0), pass.operand(node, product)) {
                 uses[matrix].push((dy.clone(), x));
             }
         });
@@ -162,7 +162,7 @@ mod tests {
         episode: usize,
         window: std::ops::Range<usize>,
     ) -> f64 {
-        let network = Network { graph, x_max: &[] };
+        let network = Network::new(graph);
         let mut state = start_state(graph, &[dataset.start(episode)]);
         let mut sum = 0.0;
         for step in 0..window.end {
@@ -218,7 +218,7 @@ mod tests {
         // as a difference: they come from the very pass that they are compared with.
         let mut dataset = dataset(&graph, 1, 1);
         let weights = Weights::of(&graph);
-        let network = Network { graph: &graph, x_max: &[] };
+        let network = Network::new(&graph);
         let pass = network.forward(&weights, rows(&dataset.obs, &[0], 0), &mut zero_state(&graph, 1));
         dataset.action = Some(pass.output().clone().insert_axis(Axis(0)));
         for array in [Some(&mut dataset.obs), dataset.action.as_mut()].into_iter().flatten() {

@@ -5,7 +5,7 @@ use ndarray::Array2;
 use serde::Serialize;
 
 use crate::dataset::Dataset;
-use crate::graph::{Evaluator, Graph, Matrix};
+use crate::graph::{Evaluator, Graph, WeightMatrix};
 use crate::quantize::hsic::{Kernel, hsic};
 
 /// Frames that the kernels are built over, at most: time and memory go with the square.
@@ -63,7 +63,7 @@ pub fn scores(graph: &Graph, dataset: &Dataset) -> Result<Vec<Score>> {
     let actions = Kernel::linear(&standardized(&samples.actions));
     let inputs: Vec<Kernel> = samples.inputs.iter().map(Kernel::gaussian).collect();
     let observation = &inputs[samples.first];
-    let score = |(matrix, (x, input)): (&Matrix, (&Array2<f64>, &Kernel))| {
+    let score = |(matrix, (x, input)): (&WeightMatrix, (&Array2<f64>, &Kernel))| {
         let weights =
             Array2::from_shape_fn((matrix.cols, matrix.rows), |(c, r)| f64::from(matrix.data[r * matrix.cols + c]));
         let output = Kernel::gaussian(&x.dot(&weights));
