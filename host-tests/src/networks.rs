@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use actq::graph::ops::{Concat, Linear, Span};
 use actq::graph::{Graph, NodeKind, ValueId, WeightMatrix};
+use actq::methods::scale::round_to_nearest;
+use actq::methods::{Activations, Outcome};
 use actq::policy::{Contract, Policy};
-use actq::quantize::scale::round_to_nearest;
-use actq::quantize::{Activations, Outcome};
 use actq::random::Random;
 use actq_kernels::Width;
 use actq_kernels::image::Kind;

@@ -2,9 +2,12 @@
 
 use std::collections::BTreeSet;
 
-use actq::eval;
+use actq::budget::Budget;
+use actq::dataset::recording::Recordings;
+use actq::measure::eval;
+use actq::methods::{Method, Options};
+use actq::pipeline::quantize;
 use actq::policy::Policy;
-use actq::quantize::{Budget, Method, Options, quantize};
 use actq::runtime::ImageBuffer;
 use actq::writer;
 use actq_host_tests::cycles::Code;
@@ -18,7 +21,7 @@ fn a_step_of_a_head_reads_each_weight_once() -> Result<()> {
     let dir = root().join("examples/ur3/policy");
     let policy = Policy::load(&dir)?;
     let options = Options::new(Method::Rtn, Budget::Width(Width::W8));
-    let bytes = writer::image(&policy, &quantize(&policy.graph, &[], &options)?)?;
+    let bytes = quantize(&policy, &Recordings::default(), &options, |_, _| {})?.image;
     let path = qemu::target_dir().join("counting-test.actq");
     writer::write(&path, &bytes)?;
     let buffer = ImageBuffer::new(&bytes);

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use actq::graph::ops::Linear;
 use actq::graph::{Graph, WeightMatrix};
+use actq::methods::{Outcome, Quantized};
 use actq::policy::{Contract, Policy};
-use actq::quantize::{Outcome, Quantized};
 use actq::runtime::{ImageBuffer, with_head};
 use actq_host_tests::root;
 use actq_kernels::activations::{Plan, max_prepared_words};

@@ -4,10 +4,11 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::LazyLock;
 
+use actq::budget::{Budget, Rate};
 use actq::graph::ops::{LayerNorm, Linear, Lstm, Normalize, Pointwise};
 use actq::graph::{Graph, NodeKind, WeightMatrix};
+use actq::methods::{Method, Options, Outcome, quantize};
 use actq::policy::{Contract, Policy};
-use actq::quantize::{Budget, Method, Options, Outcome, quantize};
 use actq_host_tests::golden::Random;
 use actq_kernels::format::Width;
 use actq_kernels::image::{Kind, checksum, header as h, header::op};
@@ -42,7 +43,7 @@ fn valid_image() -> Vec<u8> {
     }
     let at_width = |width| {
         let options = Options { group: 32, ..Options::new(Method::Rtn, Budget::Width(width)) };
-        quantize(&graph, &[], &options).expect("the graph can be quantized")
+        quantize(&graph, None, Rate::Width(width), &options).expect("the graph can be quantized").1
     };
     let [w2, w3, w4, w8] = Width::ALL.map(at_width);
     let matrices = [w4[0].clone(), w3[1].clone(), w2[2].clone(), interleaved(&w2[3], &w8[3])];

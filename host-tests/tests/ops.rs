@@ -6,9 +6,10 @@
 use std::collections::BTreeMap;
 use std::fs;
 
+use actq::budget::{Budget, Rate};
 use actq::graph::Evaluator;
+use actq::methods::{Activations, Method, Options, Outcome, quantize};
 use actq::policy::Policy;
-use actq::quantize::{Activations, Budget, Method, Options, Outcome, quantize};
 use actq::runtime::{ImageBuffer, with_head};
 use actq::writer;
 use actq_host_tests::golden::Random;
@@ -253,9 +254,9 @@ fn deviation(
 }
 
 fn rtn(policy: &Policy, group: usize) -> Result<Vec<Outcome>> {
-    let budget = Budget::Width(Width::W8);
+    let (budget, rate) = (Budget::Width(Width::W8), Rate::Width(Width::W8));
     let options = Options { group, activations: Activations::Int16, ..Options::new(Method::Rtn, budget) };
-    quantize(&policy.graph, &[], &options)
+    Ok(quantize(&policy.graph, None, rate, &options)?.1)
 }
 
 /// The largest error that activation rounding explains.

@@ -279,7 +279,7 @@ fn dequantization_agrees_over_its_three_types() {
 fn single_matrix_image(case: &Case) -> Vec<u8> {
     use actq::graph::ops::Linear;
     use actq::graph::{Graph, WeightMatrix};
-    use actq::quantize::{Outcome, Quantized};
+    use actq::methods::{Outcome, Quantized};
     let BlockShape { width, rows, cols, group, .. } = case.shape;
     let mut graph = Graph::new(cols);
     graph.matrices.push(WeightMatrix { name: "w".into(), rows, cols, data: vec![0.0; rows * cols] });

@@ -4,12 +4,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use actq::dataset::recording::Recording;
+use actq::budget::Budget;
+use actq::dataset::recording::{Recording, Recordings};
 use actq::dataset::{Dataset, Sizes};
-use actq::eval;
-use actq::graph::Graph;
+use actq::measure::eval;
+use actq::methods::{Activations, Method, Options};
+use actq::pipeline::quantize;
 use actq::policy::Policy;
-use actq::quantize::{Activations, Budget, Method, Options, quantize};
 use actq::runtime::{ImageBuffer, with_head};
 use actq::writer;
 use actq_host_tests::qemu::{self, Server, Target};
@@ -28,7 +29,7 @@ fn ur3() -> PathBuf {
 
 fn rtn(policy: &Policy, width: Width, group: usize, activations: Activations) -> Result<Vec<u8>> {
     let options = Options { group, activations, ..Options::new(Method::Rtn, Budget::Width(width)) };
-    writer::image(policy, &quantize(&policy.graph, &[], &options)?)
+    Ok(quantize(policy, &Recordings::default(), &options, |_, _| {})?.image)
 }
 
 /// An image file of the UR3 policy to build into the firmware; made once.
@@ -253,15 +254,14 @@ fn eight_bits_stay_close_to_the_recorded_actions() -> Result<()> {
 fn gptq_beats_rounding_at_low_bits() -> Result<()> {
     let dir = ur3();
     let policy = Policy::load(&dir)?;
-    let calib = Recording::Calib.require(Some(&dir), None, Sizes::of(&policy), "gptq")?;
-    let moments = actq::quantize::moments::collect(&policy.graph, &calib, |_| {});
-    let nmse = |graph: &Graph, method| -> Result<f64> {
+    let recordings = Recordings::load(&policy)?;
+    let nmse = |method| -> Result<f64> {
         let options = Options::new(method, Budget::Width(Width::W3));
-        let buffer = ImageBuffer::new(&writer::image(&policy, &quantize(graph, &moments, &options)?)?);
+        let buffer = quantize(&policy, &recordings, &options, |_, _| {})?.buffer();
         let image = buffer.image(&dir)?;
         Ok(eval::evaluate(image, &eval::heldout(&dir, &image)?)?.nmse)
     };
-    let (gptq, plain) = (nmse(&policy.graph, Method::Gptq)?, nmse(&policy.graph, Method::Rtn)?);
+    let (gptq, plain) = (nmse(Method::Gptq)?, nmse(Method::Rtn)?);
     assert!(gptq < plain / 2.0, "{gptq} against {plain}");
     Ok(())
 }

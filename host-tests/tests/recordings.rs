@@ -2,16 +2,17 @@
 
 use std::path::Path;
 
+use actq::budget::Budget;
 use actq::dataset::range::Range;
-use actq::dataset::recording::Recording;
+use actq::dataset::recording::{Recording, Recordings};
 use actq::dataset::{Dataset, Sizes};
-use actq::eval::evaluate;
 use actq::graph::ops::{Linear, Lstm};
 use actq::graph::{Graph, Network, WeightMatrix, Weights, zero_state};
+use actq::measure::eval::evaluate;
+use actq::methods::{Activations, Method, Options};
+use actq::pipeline::quantize;
 use actq::policy::{Contract, Policy};
-use actq::quantize::{Activations, Budget, Method, Options, quantize};
 use actq::runtime::ImageBuffer;
-use actq::writer;
 use actq_host_tests::golden::Random;
 use actq_host_tests::{root, shared_policies};
 use actq_kernels::Width;
@@ -106,7 +107,7 @@ fn windows_are_evaluated_from_their_recorded_state() -> Result<()> {
 
     let options =
         Options { group: 32, activations: Activations::Int16, ..Options::new(Method::Rtn, Budget::Width(Width::W8)) };
-    let buffer = ImageBuffer::new(&writer::image(&policy, &quantize(graph, &[], &options)?)?);
+    let buffer = ImageBuffer::new(&quantize(&policy, &Recordings::default(), &options, |_, _| {})?.image);
     let nmse = |dataset: &Dataset| Ok::<_, anyhow::Error>(evaluate(buffer.image(Path::new("memory"))?, dataset)?.nmse);
     let (whole, cut, from_zero) = (nmse(&whole)?, nmse(&cut)?, nmse(&from_zero)?);
     assert!(cut < 2.0 * whole && from_zero > 100.0 * cut, "{whole}, {cut}, from zero {from_zero}");

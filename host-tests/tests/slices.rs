@@ -4,8 +4,8 @@ use std::path::Path;
 use std::task::Poll;
 
 use actq::graph::ops::{Add, Gru, LayerNorm, Linear, Lstm, Normalize, Pointwise, RmsNorm};
+use actq::methods::{Activations, Outcome};
 use actq::policy::Policy;
-use actq::quantize::{Activations, Outcome};
 use actq::runtime::{ImageBuffer, with_head};
 use actq::writer;
 use actq_host_tests::golden::Random;

@@ -5,24 +5,19 @@
 //! run the finished image through the same executor that the firmware runs.
 #![deny(unsafe_code)]
 
-pub mod check;
+pub mod budget;
+pub mod calibrate;
 pub mod dataset;
-pub mod eval;
 pub mod graph;
-pub mod inspect;
 pub mod lower;
-pub mod plot;
+pub mod measure;
+pub mod methods;
+pub mod pipeline;
 pub mod policy;
-pub mod quantize;
 pub mod random;
+pub mod report;
 pub mod runtime;
-pub mod search;
 pub mod serve;
-pub mod stats;
-pub mod sweep;
-pub mod time;
-pub mod unrounded;
-pub mod widths;
 pub mod writer;
 
 /// The versions that take part in making an image; recorded in reports.

@@ -12,8 +12,8 @@ use tempfile::NamedTempFile;
 use crate::graph::lowering::{Step, StepData};
 use crate::graph::{Graph, NodeKind};
 use crate::lower::lower;
+use crate::methods::{Outcome, Quantized};
 use crate::policy::Policy;
-use crate::quantize::{Outcome, Quantized};
 use crate::runtime::{ImageBuffer, with_head};
 
 /// The image of a policy with its quantized matrices, one per matrix of the graph. The self-test vector is computed by the

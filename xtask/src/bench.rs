@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use actq::inspect::{group_name, table};
+use actq::report::table::{group_name, table};
 use actq_host_tests::cycles::Code;
 use actq_host_tests::qemu::{self, Counter, Target};
 use anyhow::{Context, Result, bail, ensure};

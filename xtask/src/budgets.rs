@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
 
-use actq::inspect::{group_name, table};
+use actq::report::table::{group_name, table};
 use actq_host_tests::cycles::{CODE_LINES, Code};
 use actq_host_tests::qemu::{self, Counter, Target};
 use actq_host_tests::root;

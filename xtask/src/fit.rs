@@ -9,8 +9,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use actq::graph::ops::{Add, Gru, LayerNorm, Lstm, Normalize, Pointwise, RmsNorm};
+use actq::methods::{Activations, Outcome};
 use actq::policy::Policy;
-use actq::quantize::{Activations, Outcome};
 use actq::random::Random;
 use actq::runtime::ImageBuffer;
 use actq::writer;

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 
 use super::{Dataset, Sizes};
+use crate::policy::Policy;
 
 /// The two recordings that a policy's folder may hold. The only place that knows the files' names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,5 +61,22 @@ impl Recording {
             "{who} needs recorded observations: put {npz}, {npy} or {safetensors} beside policy.json, or name a file with \
              --{stem}"
         )
+    }
+}
+
+/// The two recordings of a policy, as far as they are there.
+#[derive(Clone, Debug, Default)]
+pub struct Recordings {
+    /// See [`Recording::Calib`].
+    pub calib: Option<Dataset>,
+    /// See [`Recording::Heldout`].
+    pub heldout: Option<Dataset>,
+}
+
+impl Recordings {
+    /// Reads those in a policy's folder.
+    pub fn load(policy: &Policy) -> Result<Self> {
+        let read = |recording: Recording| recording.load(Some(&policy.dir), None, Sizes::of(policy));
+        Ok(Self { calib: read(Recording::Calib)?, heldout: read(Recording::Heldout)? })
     }
 }

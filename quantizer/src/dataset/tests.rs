@@ -9,9 +9,9 @@ use tempfile::TempDir;
 use super::range::{Outside, Range};
 use super::recording::Recording;
 use super::*;
-use crate::quantize::actquant::testing::{dataset, lstm, mlp};
-use crate::quantize::moments;
-use crate::quantize::windows::Windows;
+use crate::calibrate::moments;
+use crate::calibrate::windows::Windows;
+use crate::methods::actquant::testing::{dataset, lstm, mlp};
 
 const SIZES: Sizes = Sizes { obs: 3, out: 2, state: 0 };
 const RECURRENT: Sizes = Sizes { obs: 3, out: 2, state: 4 };

@@ -9,15 +9,17 @@ use std::process::ExitCode;
 
 use actq::dataset::Sizes;
 use actq::dataset::range::Range;
-use actq::dataset::recording::Recording;
-use actq::inspect::report;
+use actq::dataset::recording::{Recording, Recordings};
+use actq::measure::eval;
+use actq::measure::time::StepTime;
+use actq::methods::Method;
+use actq::pipeline::stats::Stats;
+use actq::pipeline::sweep::{self, SweepPlan};
 use actq::policy::Policy;
-use actq::quantize::Method;
+use actq::report::widths::Widths;
+use actq::report::{inspect, notes, time};
 use actq::runtime::ImageBuffer;
-use actq::stats::Stats;
-use actq::time::StepTime;
-use actq::widths::Widths;
-use actq::{check, eval, serve, sweep, writer};
+use actq::{report, serve, writer};
 use anyhow::{Context, Result, ensure};
 use clap::Parser as _;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -114,7 +116,7 @@ fn run_inspect(args: &InspectArgs) -> Result<()> {
         let step = StepTime::new(&image, args.clock);
         return print(&match args.json {
             true => serde_json::to_string(&step)? + "\n",
-            false => format!("{}\n{}", report(&image), step.report()),
+            false => format!("{}\n{}", inspect::report(&image), time::report(&step)),
         });
     }
     let stats = args.stats.as_deref().map(|path| Stats::read(path, &image)).transpose()?;
@@ -138,11 +140,11 @@ fn run_sweep(args: &SweepArgs) -> Result<()> {
         let calib = Recording::Calib.load(dir, args.calib.as_deref(), sizes)?;
         let mut heldout = Recording::Heldout.require(dir, args.heldout.as_deref(), sizes, "actq sweep")?;
         heldout.fill_actions(&policy.graph);
-        bar.suspend(|| note(check::recording_notes(calib.as_ref(), Some(&heldout))));
-        let plan = sweep::Plan {
+        let recordings = Recordings { calib, heldout: Some(heldout) };
+        bar.suspend(|| note(notes::of_recordings(&recordings)));
+        let plan = SweepPlan {
             policy,
-            calib: calib.as_ref(),
-            heldout: &heldout,
+            recordings: &recordings,
             methods: &methods,
             budgets: &args.bpw,
             steps: args.steps,
@@ -163,8 +165,8 @@ fn run_sweep(args: &SweepArgs) -> Result<()> {
             );
         }
     }
-    print(&format!("{}\n{knees}\n", sweep::table(&sweeps)))?;
-    let (svg, json) = (sweep::svg(&sweeps), serde_json::to_string_pretty(&sweeps)? + "\n");
+    print(&format!("{}\n{knees}\n", report::sweep::table(&sweeps)))?;
+    let (svg, json) = (report::sweep::svg(&sweeps), serde_json::to_string_pretty(&sweeps)? + "\n");
     let files = [(&args.svg, svg), (&args.json, json)];
     let files: Vec<_> = files.iter().filter_map(|(path, text)| Some((path.as_deref()?, text))).collect();
     writer::write_all(&files)
