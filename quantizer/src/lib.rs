@@ -1,8 +1,11 @@
 //! From a PyTorch policy to one flashable image: what the command `actq` is made of.
 //!
-//! [`policy::Policy`] reads `policy.json` and `policy.safetensors` into a [`graph::Graph`]; [`quantize`] turns every weight
-//! matrix into codes and scales; [`lower`] places values in the arena and [`writer`] lays the bytes out. [`eval`] and [`serve`]
-//! run the finished image through the same executor that the firmware runs.
+//! [`policy::Policy`] reads `policy.json` and `policy.safetensors` into a [`graph::Graph`]. [`pipeline`] makes an image of it: a
+//! method of [`methods`] turns every weight matrix into codes and scales, from what [`calibrate`] finds in the recorded
+//! observations, [`lower`] places values in the arena and [`writer`] lays the bytes out. [`measure`] and [`serve`] run the finished
+//! image through the same executor that the firmware runs; [`report`] says it to people.
+//!
+//! Which folder may use which is written in `docs/ARCHITECTURE.md`, and tested.
 #![deny(unsafe_code)]
 
 pub mod budget;
@@ -19,6 +22,3 @@ pub mod report;
 pub mod runtime;
 pub mod serve;
 pub mod writer;
-
-/// The versions that take part in making an image; recorded in reports.
-pub const VERSION: &str = env!("CARGO_PKG_VERSION");

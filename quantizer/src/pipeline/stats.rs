@@ -127,7 +127,7 @@ impl Stats {
         let matrices = source.graph.matrices.iter().zip(&quantized.outcomes).enumerate();
         Ok(Self {
             schema: SCHEMA.to_owned(),
-            actq: crate::VERSION.to_owned(),
+            actq: env!("CARGO_PKG_VERSION").to_owned(),
             policy: source.name.clone(),
             source: hex(&source.digest),
             crc32: crc32(&image),
