@@ -8,7 +8,11 @@ use std::process::{Child, Command, Output, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use actq::budget::Budget;
+use actq::dataset::recording::Recordings;
 use actq::graph::Evaluator;
+use actq::methods::{Method, Options};
+use actq::pipeline;
 use actq::policy::Policy;
 use actq::runtime::{ImageBuffer, with_head};
 use actq_host_tests::command::{actq, all, failed, run, succeeded};
@@ -348,12 +352,11 @@ fn serve_refuses_what_is_not_the_protocol() -> Result<()> {
     let fixture = Fixture::new()?;
     let path = text(&fixture.image("")?);
     let good = step_frame(&[0.5; OBS]);
-    let cases: [(&str, Vec<u8>, usize, &[&str]); 5] = [
+    let cases: [(&str, Vec<u8>, usize, &[&str]); 4] = [
         ("unknown byte", b"RX".to_vec(), 0, &["0x58"]),
         ("end inside an observation", good[..good.len() - 1].to_vec(), 0, &["observation"]),
         ("end behind S", [&good[..], b"S"].concat(), 1, &["observation"]),
         ("text", [&good[..], &good[..], b"\n"].concat(), 2, &["0x0a"]),
-        ("NaN", step_frame(&[f32::NAN; OBS]), 0, &["observation", "finite"]),
     ];
     all(cases.map(|(what, input, answers, words)| {
         let result = run(actq(&["serve", &path]), &input).and_then(|output| {
@@ -362,6 +365,37 @@ fn serve_refuses_what_is_not_the_protocol() -> Result<()> {
         });
         (what.to_owned(), result)
     }))
+}
+
+#[test]
+fn serve_answers_what_is_not_finite_with_no_action_and_goes_on() -> Result<()> {
+    let fixture = Fixture::new()?;
+    // Nothing bounds what the network computes with.
+    edit(&fixture.policy(), "/ops/0/clip", Value::Null)?;
+    let path = text(&fixture.image("--bits 4")?);
+    let serve = |frames: &[&[u8]]| -> Result<Vec<Vec<u8>>> {
+        let output = run(actq(&["serve", &path]), &frames.concat())?;
+        ensure!(output.status.code() == Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        Ok(output.stdout.chunks(4 * ACT).map(<[u8]>::to_vec).collect())
+    };
+    let observations = draw_observations(9, OBS);
+    let rows: Vec<Vec<u8>> = observations.rows().into_iter().take(3).map(|row| step_frame(&row.to_vec())).collect();
+    let mut one_nan = [0.25; OBS];
+    one_nan[OBS - 1] = f32::NAN;
+    // The end of a chunk, and the middle of one.
+    let expected = serve(&[&rows[0], &rows[0], b"R", &rows[1], b"R", &rows[2]])?;
+    let no_action = 0x7fc0_0000u32.to_le_bytes().repeat(ACT);
+    for (what, bad) in [
+        ("NaN", step_frame(&one_nan)),
+        ("infinity", step_frame(&[f32::NEG_INFINITY; OBS])),
+        ("overflow inside", step_frame(&[f32::MAX; OBS])),
+    ] {
+        // Behind it the policy plans anew, as after a reset.
+        let answers = serve(&[&rows[0], &rows[0], &bad, &rows[1], &step_frame(&one_nan), &rows[2]])?;
+        let right = [&expected[0], &expected[1], &no_action, &expected[2], &no_action, &expected[3]];
+        ensure!(answers.iter().eq(right), "{what}: {answers:02x?}");
+    }
+    Ok(())
 }
 
 /// The widths of an image's matrices, narrow to wide.
@@ -481,6 +515,8 @@ fn a_wrong_command_line_has_status_2() -> Result<()> {
         ("--bpw nan", "bpw"),
         ("--bpw inf", "bpw"),
         ("--bpw=-1", "bpw"),
+        ("--threads 257", "0..=256"),
+        ("--threads 5000", "threads"),
         ("--colour", "colour"),
     ];
     let policy = text(&fixture.policy());
@@ -519,6 +555,59 @@ const SPOILT: &[Spoilt] = &[
         |p| edit(p, "/ops/2/clip", json!(5)),
         "",
         &["policy.json: op 2 (tanh) has the key \"clip\"; its keys are op, input, save"],
+    ),
+    (
+        "misspelt key",
+        |p| edit(p, "/actoin", json!({"low": [0, 0, 0]})),
+        "",
+        &["policy.json: the key \"actoin\" is not known; known are name, kind,", "action, ops", "source"],
+    ),
+    ("key of another kind", |p| edit(p, "/euler_steps", json!(10)), "", &["policy.json", "euler_steps"]),
+    (
+        "key twice",
+        |p| twice(p, "\"obs_dim\""),
+        "",
+        &["policy.json: not a policy description: the key \"obs_dim\" is there twice"],
+    ),
+    ("key of an op twice", |p| twice(p, "\"clip\""), "", &["policy.json", "the key \"clip\" is there twice"]),
+    ("limits twice", |p| twice(p, "\"low\""), "", &["policy.json", "the key \"low\" is there twice"]),
+    ("tensor twice", tensor_twice, "", &["policy.safetensors", "the key \"out.weight\" is there twice"]),
+    (
+        "control character in the name",
+        |p| edit(p, "/name", json!("arm\u{1b}[2J")),
+        "",
+        &["policy.json: name \"arm\\u{1b}[2J\" holds the control character U+001B"],
+    ),
+    (
+        "control character in a slot",
+        |p| edit(p, "/ops/2/save", json!("h\n")),
+        "",
+        &["policy.json: ops[2].save \"h\\n\" holds the control character U+000A"],
+    ),
+    ("clip beyond f32", |p| edit(p, "/ops/0/clip", json!(1e39)), "", &["op 0", "clip is 1e39, beyond float32's range"]),
+    ("pre_clip beyond f32", |p| edit(p, "/ops/0/pre_clip", json!(1e39)), "", &["op 0", "pre_clip is 1e39, beyond"]),
+    (
+        "clip below f32",
+        |p| edit(p, "/ops/0/clip", json!(1e-50)),
+        "",
+        &["op 0", "clip is ", "; float32 rounds that to 0, and it must be above 0"],
+    ),
+    ("clip 0", |p| edit(p, "/ops/0/clip", json!(0)), "", &["op 0", "clip is 0.0; it must be above 0"]),
+    ("eps beyond f32", |p| edit(p, "/ops/2", norm(1e39)), "", &["op 2", "eps is 1e39, beyond float32's range"]),
+    ("eps below f32", |p| edit(p, "/ops/2", norm(1e-50)), "", &["op 2", "eps is ", "float32 rounds that to 0"]),
+    ("rate beyond f32", |p| edit(p, "/control_hz", json!(1e39)), "", &["control_hz is 1e39, beyond float32's range"]),
+    ("rate below f32", |p| edit(p, "/control_hz", json!(1e-50)), "", &["control_hz is ", "float32 rounds that to 0"]),
+    (
+        "limit beyond f32",
+        |p| edit(p, "/action/high", json!([1, 1e39, 3])),
+        "",
+        &["policy.json: action.high[1] is 1e39, beyond float32's range"],
+    ),
+    (
+        "weight beyond f32",
+        |p| replace(p, "in.bias", Dtype::F64, &[HIDDEN], [-1e39f64; HIDDEN].map(f64::to_le_bytes).concat()),
+        "",
+        &["policy.safetensors", "op 1", "tensor \"in.bias\" holds -1e39, beyond float32's range, at position 0"],
     ),
     ("no op", |p| edit(p, "/ops", json!([])), "", &["policy.json", "ops"]),
     ("no w", |p| edit(p, "/ops/3", json!({"op": "linear"})), "", &["policy.json", "op 3", "linear"]),
@@ -596,6 +685,26 @@ fn vast_lstm() -> Value {
     json!({"op": "lstm", "hidden": 1u64 << 62, "w_ih": "in.weight", "w_hh": "mid.weight"})
 }
 
+fn norm(eps: f64) -> Value {
+    json!({"op": "rmsnorm", "w_ln": "in.bias", "eps": eps})
+}
+
+/// Writes the key a second time, before its first.
+fn twice(policy: &Path, key: &str) -> Result<()> {
+    let json = description().to_string().replacen(key, &format!("{key}: 1, {key}"), 1);
+    Ok(fs::write(policy.join("policy.json"), json)?)
+}
+
+/// Gives a tensor the name of another, which is as long.
+fn tensor_twice(policy: &Path) -> Result<()> {
+    let path = policy.join("policy.safetensors");
+    let mut bytes = fs::read(&path)?;
+    let (from, to) = (b"mid.weight", b"out.weight");
+    let at = bytes.windows(from.len()).position(|part| part == from).context("no such name")?;
+    bytes[at..at + to.len()].copy_from_slice(to);
+    Ok(fs::write(&path, bytes)?)
+}
+
 fn cut(path: &Path, len: usize) -> Result<()> {
     let bytes = fs::read(path)?;
     Ok(fs::write(path, &bytes[..len])?)
@@ -639,6 +748,53 @@ fn bad_policies_are_named_and_leave_no_file() -> Result<()> {
         };
         ((*what).to_owned(), run())
     }))
+}
+
+/// What an exporter tells people about a policy.
+#[test]
+fn keys_for_people_change_nothing() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let before = fs::read(fixture.image("")?)?;
+    let mut json = description();
+    for (key, value) in [("source", "a\nb"), ("commit", ""), ("source_path", "x.pt"), ("license", "MIT")] {
+        json[key] = value.into();
+    }
+    (json["recurrent"], json["n_params"]) = (json!(false), json!(12345));
+    write_json(&fixture.policy(), &json)?;
+    let after = fs::read(fixture.image("")?)?;
+    // The folder's digest differs, and with it the checksum.
+    assert_eq!(before[128..], after[128..]);
+    Ok(())
+}
+
+#[test]
+fn what_a_file_says_cannot_command_the_terminal() -> Result<()> {
+    let fixture = Fixture::new()?;
+    // An image by another hand.
+    let mut policy = Policy::load(&fixture.policy())?;
+    policy.name = "arm\x1b[2J\nmatrix\u{9b}".to_owned();
+    let options = Options::new(Method::Rtn, Budget::Width(Width::W4));
+    let image = fixture.out("named.actq");
+    fs::write(&image, pipeline::quantize(&policy, &Recordings::default(), &options, |_, _| {})?.image)?;
+    let report = succeeded(&run(actq(&["inspect", &text(&image)]), b"")?)?;
+    ensure!(report.starts_with("policy        arm\\u{1b}[2J\\nmatrix\\u{9b}\n"), "{report:?}");
+    let (svg, widths) = (fixture.out("w.svg"), ["inspect", &text(&image), "--widths"]);
+    succeeded(&run(actq(&[&widths[..], &["--svg", &text(&svg)]].concat()), b"")?)?;
+    ensure!(!fs::read_to_string(&svg)?.contains(['\x1b', '\u{9b}']), "control characters in the picture");
+
+    // The names of tensors in a message, and those of matrices in statistics.
+    let view = TensorView::new(Dtype::F32, vec![1], &[0; 4])?;
+    fs::write(fixture.policy().join("policy.safetensors"), serialize([("w\x1b[2J", view)], None)?)?;
+    let output = fixture.quantize(&fixture.out("other.actq"), "")?;
+    failed(&output, 1, &["the file holds w\\u{1b}[2J"])?;
+    ensure!(!output.stderr.contains(&0x1b), "{:?}", String::from_utf8_lossy(&output.stderr));
+    write_tensors(&fixture.policy(), &tensors())?;
+    let (named, stats) = (fixture.out("stats.actq"), fixture.out("stats.json"));
+    succeeded(&fixture.quantize(&named, &format!("--save-stats {}", text(&stats)))?)?;
+    fs::write(&stats, fs::read_to_string(&stats)?.replace("mid.weight", "mid\\u001b[2J\\n.weight"))?;
+    let report = run(actq(&["inspect", &text(&named), "--widths", "--stats", &text(&stats)]), b"")?;
+    ensure!(succeeded(&report)?.contains("mid\\u{1b}[2J\\n.weight"), "{:?}", String::from_utf8_lossy(&report.stdout));
+    Ok(())
 }
 
 /// As an exporter writes it that puts out every key.

@@ -10,7 +10,7 @@ use actq::methods::{Activations, Method, Options};
 use actq::pipeline::{Quantizer, quantize};
 use actq::policy::Policy;
 use actq::runtime::{ImageBuffer, with_head};
-use actq::writer;
+use actq::{files, writer};
 use actq_host_tests::networks::Builder;
 use actq_host_tests::profile;
 use actq_host_tests::qemu::{self, Counter, Target};
@@ -33,7 +33,7 @@ fn firmware() -> Result<PathBuf> {
     let path = qemu::target_dir().join("cost-test.actq");
     let policy = Policy::load(&ur3())?;
     let options = Options::new(Method::Rtn, Budget::Width(Width::W2));
-    writer::write(&path, &image(&policy, &options)?)?;
+    files::write(&path, &image(&policy, &options)?)?;
     qemu::build("actq-firmware-demo", Target::Fpu, &path)
 }
 

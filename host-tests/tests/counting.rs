@@ -4,12 +4,12 @@ use std::collections::BTreeSet;
 
 use actq::budget::Budget;
 use actq::dataset::recording::Recordings;
+use actq::files;
 use actq::measure::eval;
 use actq::methods::{Method, Options};
 use actq::pipeline::quantize;
 use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
-use actq::writer;
 use actq_host_tests::cycles::Code;
 use actq_host_tests::qemu::{self, Counter, Target};
 use actq_host_tests::{evaluation, root};
@@ -23,7 +23,7 @@ fn a_step_of_a_head_reads_each_weight_once() -> Result<()> {
     let options = Options::new(Method::Rtn, Budget::Width(Width::W8));
     let bytes = quantize(&policy, &Recordings::default(), &options, |_, _| {})?.image;
     let path = qemu::target_dir().join("counting-test.actq");
-    writer::write(&path, &bytes)?;
+    files::write(&path, &bytes)?;
     let buffer = ImageBuffer::new(&bytes);
     let image = buffer.image(&path)?;
     let recorded = eval::heldout(&dir, &image)?;

@@ -2,11 +2,11 @@
 
 use actq::budget::Budget;
 use actq::dataset::recording::Recordings;
+use actq::files;
 use actq::methods::{Method, Options};
 use actq::pipeline::quantize;
 use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
-use actq::writer;
 use actq_host_tests::cycles::Code;
 use actq_host_tests::qemu::{self, Counter, Target};
 use actq_host_tests::{root, shared_policies};
@@ -103,7 +103,7 @@ fn a_head_with_an_lstm_stays_within_its_instructions() -> Result<()> {
     let options = Options::new(Method::Rtn, Budget::Width(Width::W3));
     let bytes = quantize(&policy, &Recordings::default(), &options, |_, _| {})?.image;
     let file = tempfile::NamedTempFile::new()?;
-    writer::write(file.path(), &bytes)?;
+    files::write(file.path(), &bytes)?;
     let buffer = ImageBuffer::new(&bytes);
     let matrices = buffer.image(file.path())?.ops().filter_map(|op| op.matrix());
     let macs = matrices.map(|matrix| matrix.rows * matrix.cols).sum::<usize>() as f64;

@@ -7,12 +7,12 @@ use std::sync::OnceLock;
 use actq::budget::Budget;
 use actq::dataset::recording::{Recording, Recordings};
 use actq::dataset::{Dataset, Sizes};
+use actq::files;
 use actq::measure::eval;
 use actq::methods::{Activations, Method, Options};
 use actq::pipeline::quantize;
 use actq::policy::Policy;
 use actq::runtime::{ImageBuffer, with_head};
-use actq::writer;
 use actq_host_tests::qemu::{self, Server, Target};
 use actq_host_tests::{golden, root, shared_policies};
 use actq_kernels::Width;
@@ -38,7 +38,7 @@ fn built_in() -> &'static Path {
     FILE.get_or_init(|| {
         let path = qemu::target_dir().join("qemu-test.actq");
         let bytes = Policy::load(&ur3()).and_then(|policy| rtn(&policy, Width::W3, 32, Activations::Int8));
-        let written = bytes.and_then(|bytes| writer::write(&path, &bytes));
+        let written = bytes.and_then(|bytes| files::write(&path, &bytes));
         written.expect("the UR3 policy quantizes");
         path
     })

@@ -1,6 +1,10 @@
 //! Recorded observations, for calibration and held out. `docs/QUANTIZER.md`, section Recordings, describes the files.
 
 mod arrays;
+#[cfg(test)]
+mod damaged;
+mod npy;
+mod npz;
 pub mod range;
 pub mod recording;
 #[cfg(test)]

@@ -2,8 +2,8 @@
 //!
 //! [`policy::Policy`] reads `policy.json` and `policy.safetensors` into a [`graph::Graph`]. [`pipeline`] makes an image of it: a
 //! method of [`methods`] turns every weight matrix into codes and scales, from what [`calibrate`] finds in the recorded
-//! observations, [`lower`] places values in the arena and [`writer`] lays the bytes out. [`measure`] and [`serve`] run the finished
-//! image through the same executor that the firmware runs; [`report`] says it to people.
+//! observations, [`lower`] places values in the arena, [`writer`] lays the bytes out and [`files`] puts them in their place.
+//! [`measure`] and [`serve`] run the finished image through the same executor that the firmware runs; [`report`] says it to people.
 //!
 //! Which folder may use which is written in `docs/ARCHITECTURE.md`, and tested.
 #![deny(unsafe_code)]
@@ -11,7 +11,9 @@
 pub mod budget;
 pub mod calibrate;
 pub mod dataset;
+pub mod files;
 pub mod graph;
+mod json;
 pub mod lower;
 pub mod measure;
 pub mod methods;
@@ -21,4 +23,6 @@ pub mod random;
 pub mod report;
 pub mod runtime;
 pub mod serve;
+mod tensor_file;
+pub mod text;
 pub mod writer;

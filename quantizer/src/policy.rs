@@ -1,5 +1,8 @@
 //! Reading a policy folder: `policy.json` (the op list) and `policy.safetensors` (the weights).
 
+mod json;
+mod tensors;
+
 use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,13 +10,22 @@ use std::path::{Path, PathBuf};
 use actq_kernels::image::Kind;
 use actq_kernels::math::Function;
 use anyhow::{Context, Result, bail, ensure};
-use safetensors::{Dtype, SafeTensors};
-use serde::Deserialize;
-use serde_json::Value;
 use sha2::{Digest, Sha256};
 
+use crate::dataset::recording::Recording;
 use crate::graph::ops::{Add, Concat, Gru, LayerNorm, Linear, Lstm, Normalize, Pointwise, RmsNorm, Span};
-use crate::graph::{Graph, NodeKind, ValueId, WeightMatrix};
+use crate::graph::{Graph, NodeKind, ValueId};
+use crate::tensor_file;
+use json::{Input, Json, JsonOp, positive};
+use tensors::Tensors;
+
+const FILES: [&str; 2] = ["policy.json", "policy.safetensors"];
+
+/// All files that a policy's folder may hold, whether they are there or not.
+pub fn files(dir: &Path) -> Vec<PathBuf> {
+    let own = FILES.map(|name| dir.join(name));
+    own.into_iter().chain(Recording::Calib.paths(dir)).chain(Recording::Heldout.paths(dir)).collect()
+}
 
 /// A policy as it was trained.
 #[derive(Clone, Debug)]
@@ -43,8 +55,7 @@ pub struct Policy {
 }
 
 /// The action contract; each array has one value per action dimension, or is absent. In the order in which they apply.
-#[derive(Clone, Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, Default)]
 pub struct Contract {
     /// Factors.
     pub scale: Option<Vec<f32>>,
@@ -71,100 +82,16 @@ impl Contract {
     }
 }
 
-#[derive(Deserialize)]
-struct Json {
-    name: String,
-    kind: Option<String>,
-    chunk: Option<usize>,
-    execute: Option<usize>,
-    obs_dim: usize,
-    act_dim: usize,
-    control_hz: Option<f32>,
-    action: Option<Contract>,
-    ops: Vec<JsonOp>,
-}
-
-/// One op; [`JsonOp::keys`] says which keys it may have.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct JsonOp {
-    op: String,
-    input: Option<Input>,
-    save: Option<String>,
-    with: Option<String>,
-    w: Option<String>,
-    b: Option<String>,
-    mean: Option<String>,
-    scale: Option<String>,
-    pre_clip: Option<f32>,
-    clip: Option<f32>,
-    w_ln: Option<String>,
-    b_ln: Option<String>,
-    eps: Option<f32>,
-    hidden: Option<usize>,
-    gates: Option<String>,
-    w_ih: Option<String>,
-    w_hh: Option<String>,
-    b_ih: Option<String>,
-    b_hh: Option<String>,
-    approximate: Option<String>,
-}
-
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum Input {
-    One(String),
-    Many(Vec<String>),
-}
-
-impl JsonOp {
-    /// Refuses keys that an op does not have: one that is ignored would be another policy. Whatever else is wrong with `json` is
-    /// left to the reader.
-    fn check_keys(json: &Value) -> Result<()> {
-        for (i, op) in json["ops"].as_array().into_iter().flatten().enumerate() {
-            let (Some(op), Some(name)) = (op.as_object(), op["op"].as_str()) else { continue };
-            let Some(own) = Self::keys(name) else { continue };
-            let keys = [&["op", "input", "save"], own].concat();
-            // A key without a value says nothing.
-            let mut given = op.iter().filter(|(_, value)| !value.is_null()).map(|(key, _)| key);
-            if let Some(key) = given.find(|key| !keys.contains(&key.as_str())) {
-                bail!("op {i} ({name}) has the key {key:?}; its keys are {}", keys.join(", "));
-            }
-        }
-        Ok(())
-    }
-
-    /// The keys of an op beside those of every op; `None` for an unknown op.
-    fn keys(op: &str) -> Option<&'static [&'static str]> {
-        Some(match op {
-            "identity" => &[],
-            "normalize" => &["mean", "scale", "pre_clip", "clip"],
-            "linear" => &["w", "b"],
-            "layernorm" => &["w_ln", "b_ln", "eps"],
-            "rmsnorm" => &["w_ln", "eps"],
-            "add" => &["with"],
-            "lstm" | "gru" => &["hidden", "gates", "w_ih", "w_hh", "b_ih", "b_hh"],
-            "gelu" => &["approximate"],
-            name if Function::ALL.iter().any(|f| f.name() == name) => &[],
-            _ => return None,
-        })
-    }
-}
-
 impl Policy {
     /// Reads `policy.json` and `policy.safetensors` from `dir`. Every error names the file and the op or tensor.
     pub fn load(dir: &Path) -> Result<Self> {
         ensure!(dir.is_dir(), "{}: not a folder; give the one that holds policy.json", dir.display());
-        let json_path = dir.join("policy.json");
-        let weights_path = dir.join("policy.safetensors");
+        let [json_path, weights_path] = FILES.map(|name| dir.join(name));
         let json_bytes = fs::read(&json_path).with_context(|| format!("{}: cannot be read", json_path.display()))?;
         let weight_bytes =
             fs::read(&weights_path).with_context(|| format!("{}: cannot be read", weights_path.display()))?;
-        let not_json = || format!("{}: not a policy description", json_path.display());
-        let value: Value = serde_json::from_slice(&json_bytes).with_context(not_json)?;
-        JsonOp::check_keys(&value).with_context(|| json_path.display().to_string())?;
-        let json: Json = serde_json::from_slice(&json_bytes).with_context(not_json)?;
-        let tensors = SafeTensors::deserialize(&weight_bytes)
+        let json = Json::parse(&json_bytes).with_context(|| json_path.display().to_string())?;
+        let tensors = tensor_file::open(&weight_bytes)
             .with_context(|| format!("{}: not a safetensors file", weights_path.display()))?;
         let mut digest = Sha256::new();
         digest.update(&json_bytes);
@@ -184,15 +111,15 @@ impl Policy {
         }
         ensure!(!json.ops.is_empty(), "ops is empty");
         ensure!(json.name.len() <= 200, "name is longer than 200 bytes");
-        let (kind, chunk, execute) = match json.kind.as_deref().unwrap_or("step") {
-            "step" => (Kind::Step, 1, 1),
-            "chunk" => {
+        let kind = json.kind()?;
+        let (chunk, execute) = match kind {
+            Kind::Step => (1, 1),
+            Kind::Chunk => {
                 let chunk = json.chunk.context("kind chunk needs the key chunk")?;
                 let execute = json.execute.unwrap_or(chunk);
                 ensure!((1..=chunk).contains(&execute), "execute is {execute}, it must be 1 to chunk ({chunk})");
-                (Kind::Chunk, chunk, execute)
+                (chunk, execute)
             }
-            other => bail!("kind {other:?} is not supported yet; step and chunk are"),
         };
         for (i, op) in json.ops.iter().enumerate() {
             builder.add(op).with_context(|| format!("op {i} ({})", op.op))?;
@@ -203,31 +130,6 @@ impl Policy {
             "the last op gives {out_len} values, chunk * act_dim is {}",
             chunk * json.act_dim
         );
-        // Without an `action` object a chunk is limited to -1..1, as the reference runtime of the format does.
-        let contract = json.action.clone().unwrap_or_else(|| match kind {
-            Kind::Step => Contract::default(),
-            Kind::Chunk => Contract {
-                low: Some(vec![-1.0; json.act_dim]),
-                high: Some(vec![1.0; json.act_dim]),
-                ..Contract::default()
-            },
-        });
-        for (name, array) in contract.arrays() {
-            let Some(array) = array else { continue };
-            ensure!(
-                array.len() == json.act_dim,
-                "action.{name} has {} values, act_dim is {}",
-                array.len(),
-                json.act_dim
-            );
-            ensure!(array.iter().all(|v| v.is_finite()), "action.{name} holds a value that is not finite");
-        }
-        if let (Some(low), Some(high)) = (&contract.low, &contract.high) {
-            ensure!(low.iter().zip(high).all(|(l, h)| l <= h), "action.low exceeds action.high");
-        }
-        ensure!(contract.max_step.iter().flatten().all(|s| *s >= 0.0), "action.max_step holds a negative value");
-        let rate_hz = json.control_hz.unwrap_or(50.0);
-        ensure!(rate_hz.is_finite() && rate_hz > 0.0, "control_hz must be above 0");
         Ok(Self {
             dir: dir.to_owned(),
             name: json.name.clone(),
@@ -235,66 +137,12 @@ impl Policy {
             chunk,
             execute,
             act_len: json.act_dim,
-            rate_hz,
-            contract,
+            rate_hz: positive(json.control_hz.unwrap_or(50.0), "control_hz")?,
+            contract: json.contract(kind)?,
             weights: builder.graph.weights(),
             graph: std::mem::replace(&mut builder.graph, Graph::new(0)),
             digest,
         })
-    }
-}
-
-struct Tensors<'a> {
-    file: &'a SafeTensors<'a>,
-    path: &'a Path,
-}
-
-impl Tensors<'_> {
-    /// The tensor as f32 with its shape; refuses NaN and infinities.
-    fn read(&self, name: &str) -> Result<(Vec<usize>, Vec<f32>)> {
-        let file = self.path.display();
-        let Ok(view) = self.file.tensor(name) else {
-            let mut names = self.file.names();
-            names.sort_unstable();
-            bail!("{file}: tensor {name:?} is missing; the file holds {}", names.join(", "));
-        };
-        let bytes = view.data();
-        let data: Vec<f32> = match view.dtype() {
-            Dtype::F32 => bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect(),
-            Dtype::F16 => bytes.chunks_exact(2).map(|b| half::f16::from_le_bytes([b[0], b[1]]).to_f32()).collect(),
-            Dtype::BF16 => bytes.chunks_exact(2).map(|b| half::bf16::from_le_bytes([b[0], b[1]]).to_f32()).collect(),
-            Dtype::F64 => bytes
-                .chunks_exact(8)
-                .map(|b| f64::from_le_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]]) as f32)
-                .collect(),
-            other => bail!("{file}: tensor {name:?} is of type {other:?}; export it as float32"),
-        };
-        if let Some(at) = data.iter().position(|v| !v.is_finite()) {
-            bail!("{file}: tensor {name:?} holds {} at position {at}; retrain or repair the checkpoint", data[at]);
-        }
-        Ok((view.shape().to_vec(), data))
-    }
-
-    fn vector(&self, name: &str, len: usize) -> Result<Vec<f32>> {
-        let (shape, data) = self.read(name)?;
-        ensure!(
-            data.len() == len,
-            "{}: tensor {name:?} has the shape {shape:?}, {len} values are needed here",
-            self.path.display()
-        );
-        Ok(data)
-    }
-
-    fn matrix(&self, name: &str, rows: Option<usize>, cols: usize) -> Result<WeightMatrix> {
-        let (shape, data) = self.read(name)?;
-        let fits = matches!(shape[..], [r, c] if r > 0 && c == cols && rows.is_none_or(|rows| r == rows));
-        ensure!(
-            fits,
-            "{}: tensor {name:?} has the shape {shape:?}, [{}, {cols}] is needed here (rows are outputs)",
-            self.path.display(),
-            rows.map_or("out".to_owned(), |r| r.to_string()),
-        );
-        Ok(WeightMatrix { name: name.to_owned(), rows: shape[0], cols, data })
     }
 }
 
@@ -329,11 +177,11 @@ impl Builder<'_> {
             "layernorm" => Some(NodeKind::from(LayerNorm {
                 weight: self.tensors.vector(need(&op.w_ln, "w_ln")?, len)?,
                 bias: self.bias(&op.b_ln, len)?,
-                eps: eps(op.eps, 1e-5)?,
+                eps: positive(op.eps.unwrap_or(1e-5), "eps")?,
             })),
             "rmsnorm" => Some(NodeKind::from(RmsNorm {
                 weight: self.tensors.vector(need(&op.w_ln, "w_ln")?, len)?,
-                eps: eps(op.eps, 1e-6)?,
+                eps: positive(op.eps.unwrap_or(1e-6), "eps")?,
             })),
             "add" => {
                 inputs.push(self.slot(need(&op.with, "with")?)?);
@@ -431,16 +279,8 @@ fn need<'a>(key: &'a Option<String>, name: &str) -> Result<&'a str> {
     key.as_deref().with_context(|| format!("needs the key {name}"))
 }
 
-fn clip(value: Option<f32>, name: &str) -> Result<f32> {
-    let value = value.unwrap_or(f32::INFINITY);
-    ensure!(value > 0.0, "{name} must be above 0");
-    Ok(value)
-}
-
-fn eps(value: Option<f32>, default: f32) -> Result<f32> {
-    let value = value.unwrap_or(default);
-    ensure!(value > 0.0 && value.is_finite(), "eps must be above 0");
-    Ok(value)
+fn clip(value: Option<f64>, name: &str) -> Result<f32> {
+    value.map_or(Ok(f32::INFINITY), |value| positive(value, name))
 }
 
 fn function(name: &str, approximate: Option<&str>) -> Result<Function> {

@@ -1,13 +1,11 @@
-//! Lays an image out and writes it to a file.
+//! Lays an image out.
 
-use std::io::Write as _;
 use std::path::Path;
 
 use actq_kernels::format::{self, LAYOUT_STAMP};
 use actq_kernels::image::{Kind, OpKind, Region, checksum, half_words, header as h, header::op};
 use actq_kernels::math::Function;
 use anyhow::{Context, Result, ensure};
-use tempfile::NamedTempFile;
 
 use crate::graph::lowering::{Step, StepData};
 use crate::graph::{Graph, NodeKind};
@@ -118,43 +116,6 @@ fn self_test_actions(bytes: &[u8], observations: &[Vec<f32>]) -> Result<Vec<Vec<
     with_head(image, |head| {
         observations.iter().map(|obs| Ok(head.step(obs).context("self-test of the new image")?.to_vec())).collect()
     })
-}
-
-/// Writes `bytes` to `path` so that neither a failure nor an end of the process leaves part of a file there. (A process that is
-/// killed while it writes can leave a hidden file of this name with the ending .part.)
-pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    write_all(&[(path, bytes)])
-}
-
-/// Writes all files, or none where one of them cannot be written.
-pub fn write_all(files: &[(&Path, impl AsRef<[u8]>)]) -> Result<()> {
-    let named = |path: &Path| format!("{}: cannot be written", path.display());
-    // Everything that is likely to fail is done before the first file takes its place.
-    let staged = files.iter().map(|(path, bytes)| stage(path, bytes.as_ref()).with_context(|| named(path)));
-    for (file, (path, _)) in staged.collect::<Result<Vec<_>>>()?.into_iter().zip(files) {
-        file.persist(path).with_context(|| named(path))?;
-    }
-    Ok(())
-}
-
-/// A file beside `path`, ready to take its place.
-fn stage(path: &Path, bytes: &[u8]) -> Result<NamedTempFile> {
-    let dir = match path.parent() {
-        Some(dir) if !dir.as_os_str().is_empty() => dir,
-        _ => Path::new("."),
-    };
-    ensure!(!path.is_dir(), "it is a folder");
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let mut file = tempfile::Builder::new().prefix(&format!(".{name}.")).suffix(".part").tempfile_in(dir)?;
-    file.write_all(bytes)?;
-    #[cfg(unix)]
-    {
-        // A temporary file is private to its owner; an image is as readable as any other output.
-        use std::os::unix::fs::PermissionsExt as _;
-        file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644))?;
-    }
-    file.as_file().sync_all()?;
-    Ok(file)
 }
 
 /// Two u16 in a word.

@@ -13,7 +13,7 @@ use actq::methods::{Activations, Outcome};
 use actq::policy::Policy;
 use actq::random::Random;
 use actq::runtime::ImageBuffer;
-use actq::writer;
+use actq::{files, writer};
 use actq_host_tests::networks::Builder;
 use actq_host_tests::profile;
 use actq_host_tests::qemu::{self, Counter, Target};
@@ -114,7 +114,7 @@ pub(crate) fn run() -> Result<()> {
     let resumed = resumed(&elf, &counter, &most)?;
     most.insert(Feature::RESUMED, resumed);
     let path = actq_host_tests::root().join("kernels/src/cost/rates.rs");
-    writer::write(&path, table(&instructions, &cycles, &most).as_bytes())?;
+    files::write(&path, table(&instructions, &cycles, &most).as_bytes())?;
     println!("{}: written", path.display());
     Ok(())
 }

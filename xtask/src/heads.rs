@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 
 use actq::budget::Budget;
 use actq::dataset::recording::Recordings;
+use actq::files;
 use actq::measure::eval;
 use actq::methods::{Method, Options};
 use actq::pipeline::Quantizer;
 use actq::policy::Policy;
 use actq::report::table::table;
 use actq::runtime::ImageBuffer;
-use actq::writer;
 use actq_host_tests::cycles::{Code, Cost, Kind};
 use actq_host_tests::qemu::{self, Counter, Target};
 use actq_host_tests::{evaluation, root, shared_policies};
@@ -86,7 +86,7 @@ pub(crate) fn policies() -> Vec<PathBuf> {
 /// Quantizes to an image file, and gives its bytes.
 pub(crate) fn write_image(quantizer: &Quantizer<'_>, options: &Options, path: &Path) -> Result<Vec<u8>> {
     let bytes = quantizer.quantize(options, |_, _| {})?.image;
-    writer::write(path, &bytes)?;
+    files::write(path, &bytes)?;
     Ok(bytes)
 }
 

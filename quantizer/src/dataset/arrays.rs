@@ -6,9 +6,11 @@ use std::io::BufReader;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
-use ndarray::{ArrayD, IxDyn, OwnedRepr};
-use ndarray_npy::{NpzReader, ReadNpyError, ReadNpyExt as _, ReadNpzError, ReadableElement};
-use safetensors::{Dtype, SafeTensors};
+use safetensors::Dtype;
+
+use super::npy;
+use super::npz::Archive;
+use crate::tensor_file;
 
 /// The names that mean something; other arrays are left alone, whatever their type.
 const NAMES: [&str; 4] = ["obs", "action", "length", "state"];
@@ -91,83 +93,26 @@ impl Values {
 }
 
 fn npz(path: &Path) -> Result<Arrays> {
-    const BROKEN: &str = "not an .npz archive, or one that was cut off";
-    let file = BufReader::new(File::open(path).context("cannot be read")?);
-    let mut npz = NpzReader::new(file).context(BROKEN)?;
-    let mut names = npz.names().context(BROKEN)?;
-    names.sort_unstable();
+    let mut archive = Archive::open(File::open(path).context("cannot be read")?)?;
     let mut known = BTreeMap::new();
-    for name in NAMES.into_iter().filter(|name| names.iter().any(|n| n == name)) {
-        let array = numpy(&mut InArchive(&mut npz, name)).with_context(|| format!("array {name:?} cannot be read"))?;
-        known.insert(name, array);
+    for name in NAMES {
+        let array = archive.read(name).with_context(|| format!("array {name:?} cannot be read"))?;
+        known.extend(array.map(|array| (name, array)));
     }
-    Ok(Arrays { names, known })
+    Ok(Arrays { names: archive.names().map(str::to_owned).collect(), known })
 }
 
 /// One array without a name: the observations.
 fn npy(path: &Path) -> Result<Arrays> {
-    let bytes = fs::read(path).context("cannot be read")?;
-    let obs = numpy(&mut Alone(&bytes)).context("not an .npy array, or one that was cut off")?;
+    let file = File::open(path).context("cannot be read")?;
+    let bytes = file.metadata().context("cannot be read")?.len();
+    let obs = npy::read(&mut BufReader::new(file), bytes).context("not an .npy array, or one that was cut off")?;
     Ok(Arrays { names: vec!["obs".to_owned()], known: BTreeMap::from([("obs", obs)]) })
-}
-
-/// Where an array in numpy's format stands.
-trait Source {
-    fn array<T: ReadableElement>(&mut self) -> Result<ArrayD<T>, ReadNpzError>;
-}
-
-struct InArchive<'a>(&'a mut NpzReader<BufReader<File>>, &'a str);
-
-impl Source for InArchive<'_> {
-    fn array<T: ReadableElement>(&mut self) -> Result<ArrayD<T>, ReadNpzError> {
-        self.0.by_name::<OwnedRepr<T>, IxDyn>(self.1)
-    }
-}
-
-struct Alone<'a>(&'a [u8]);
-
-impl Source for Alone<'_> {
-    fn array<T: ReadableElement>(&mut self) -> Result<ArrayD<T>, ReadNpzError> {
-        Ok(ArrayD::read_npy(self.0)?)
-    }
-}
-
-fn numpy(source: &mut impl Source) -> Result<Stored> {
-    /// `None` where the elements are of another type, whose name is put into `other`.
-    fn typed<T: ReadableElement + Copy>(
-        source: &mut impl Source,
-        wrap: fn(Vec<T>) -> Values,
-        other: &mut String,
-    ) -> Result<Option<Stored>> {
-        match source.array::<T>() {
-            // The iterator is row-major whatever the order in the file.
-            Ok(a) => Ok(Some(Stored { shape: a.shape().to_vec(), values: wrap(a.iter().copied().collect()) })),
-            Err(ReadNpzError::Npy(ReadNpyError::WrongDescriptor(found))) => {
-                *other = found.to_string();
-                Ok(None)
-            }
-            Err(error) => Err(error.into()),
-        }
-    }
-    let mut other = String::new();
-    if let Some(array) = typed(source, Values::F32, &mut other)? {
-        return Ok(array);
-    }
-    if let Some(array) = typed(source, Values::F64, &mut other)? {
-        return Ok(array);
-    }
-    if let Some(array) = typed(source, Values::I64, &mut other)? {
-        return Ok(array);
-    }
-    if let Some(array) = typed(source, Values::I32, &mut other)? {
-        return Ok(array);
-    }
-    Ok(Stored { shape: Vec::new(), values: Values::Other(other) })
 }
 
 fn safetensors(path: &Path) -> Result<Arrays> {
     let bytes = fs::read(path).context("cannot be read")?;
-    let file = SafeTensors::deserialize(&bytes).context("not a .safetensors file, or one that was cut off")?;
+    let file = tensor_file::open(&bytes).context("not a .safetensors file, or one that was cut off")?;
     let mut names: Vec<String> = file.names().into_iter().map(|name| name.to_owned()).collect();
     names.sort_unstable();
     let mut known = BTreeMap::new();

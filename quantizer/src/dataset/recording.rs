@@ -28,6 +28,11 @@ impl Recording {
         ["npz", "npy", "safetensors"].map(|ending| format!("{}.{ending}", self.stem()))
     }
 
+    /// Where it may be in a policy's folder.
+    pub fn paths(self, policy_dir: &Path) -> [PathBuf; 3] {
+        self.names().map(|name| policy_dir.join(name))
+    }
+
     /// The recording in a policy's folder; `None` where there is none. More than one is an error: which of them counts would
     /// be a guess.
     pub fn find(self, policy_dir: &Path) -> Result<Option<PathBuf>> {

@@ -8,6 +8,7 @@ use actq_kernels::linear::Matrix;
 
 use super::table::{group_name, table};
 use crate::measure::size::{bits_per_weight, hex, op_name};
+use crate::text::printable;
 
 /// Widths of a matrix's rows as text: `3`, or `2x200 4x56` where they differ.
 pub fn widths(matrix: &Matrix<'_>) -> String {
@@ -29,7 +30,7 @@ pub fn report(image: &Image<'_>) -> String {
     };
     let (obs, act) = (image.obs_len(), image.act_len());
     let rate = image.rate_hz();
-    let _ = writeln!(text, "policy        {}", image.name());
+    let _ = writeln!(text, "policy        {}", printable(image.name()));
     let _ = writeln!(text, "source        sha256 {digest}");
     let _ = writeln!(text, "image         {} bytes, crc32 {:08x}", image.bytes(), image.crc());
     let _ = writeln!(text, "kind          {kind}, {obs} observations -> {act} actions at {rate} Hz");

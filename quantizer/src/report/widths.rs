@@ -13,6 +13,7 @@ use crate::measure::size::distinct;
 use crate::methods::Outcome;
 use crate::pipeline::stats::{MatrixRecord, Stats};
 use crate::policy::Policy;
+use crate::text::printable;
 
 /// A row of a matrix.
 #[derive(Clone, Debug, PartialEq)]
@@ -101,10 +102,10 @@ impl Widths {
                     .all(|(&row, width)| stats.widths.get(row) == Some(&bits(*width)));
             ensure!(same, "the widths of {:?} are others than those in the image", stats.name);
             let rows = (0..stats.rows).map(|r| row(stats, r)).collect::<Result<_>>()?;
-            Ok(Layer { name: stats.name.clone(), shape: (stats.rows, stats.cols), rows, bytes })
+            Ok(Layer { name: printable(&stats.name).into_owned(), shape: (stats.rows, stats.cols), rows, bytes })
         };
         let layers = matrices.iter().enumerate().map(layer).collect::<Result<_>>()?;
-        Ok(Self { policy: image.name().to_owned(), layers, trained: stats.is_some() })
+        Ok(Self { policy: printable(image.name()).into_owned(), layers, trained: stats.is_some() })
     }
 
     /// Table and strips.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use actq::methods::{GROUPS, Method};
 use actq_kernels::Width;
-use clap::{Parser, Subcommand, ValueEnum};
+use clap::{Parser, Subcommand, ValueEnum, value_parser};
 
 /// Quantizes robot policies to 2, 3, 4 or 8 bits and packs them into one image for a microcontroller.
 ///
@@ -62,7 +62,10 @@ pub(crate) enum Command {
     Sweep(SweepArgs),
     /// Run an image as a policy over standard input and output
     ///
-    /// Little-endian: "R" resets and has no reply; "S" and the observation as f32 are answered by the action as f32.
+    /// Little-endian: "R" resets and has no reply; "S" and the observation as f32 are answered by the action as f32. Where the
+    /// observation, or a value inside the network, is not finite, every value of the answer is a NaN (bits 0x7fc00000): no
+    /// action. The recurrent state and what was left of a chunk are forgotten, the last action is not: the step limit still
+    /// counts from it.
     Serve {
         /// The image
         image: PathBuf,
@@ -182,9 +185,9 @@ pub(crate) struct RunArgs {
     /// Seed of everything that is drawn
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(crate) seed: u64,
-    /// Threads to use; no result depends on it [default: all cores]
-    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
-    pub(crate) threads: usize,
+    /// Threads to use, at most 256; no result depends on it [default: all cores]
+    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true, value_parser = value_parser!(u16).range(..=256))]
+    pub(crate) threads: u16,
 }
 
 #[derive(Clone, Copy, ValueEnum)]

@@ -5,6 +5,7 @@ mod args;
 mod quantize;
 
 use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use actq::dataset::Sizes;
@@ -19,7 +20,8 @@ use actq::policy::Policy;
 use actq::report::widths::Widths;
 use actq::report::{inspect, notes, time};
 use actq::runtime::ImageBuffer;
-use actq::{report, serve, writer};
+use actq::text::printable;
+use actq::{files, policy, report, serve};
 use anyhow::{Context, Result, ensure};
 use clap::Parser as _;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -30,7 +32,7 @@ fn main() -> ExitCode {
     match run(Cli::parse().command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("actq: {error:#}");
+            eprintln!("actq: {}", printable(&format!("{error:#}")));
             ExitCode::FAILURE
         }
     }
@@ -81,12 +83,13 @@ fn run(command: Command) -> Result<()> {
 /// Notes go to standard error, so that the report stays as it is.
 fn note(notes: impl IntoIterator<Item = String>) {
     // That nobody reads them is no error.
-    notes.into_iter().for_each(|note| drop(writeln!(io::stderr(), "note: {note}")));
+    notes.into_iter().for_each(|note| drop(writeln!(io::stderr(), "note: {}", printable(&note))));
 }
 
 /// Prints; that a reader has gone away (as `head` does) is no error.
 fn print(text: &str) -> Result<()> {
-    match io::stdout().write_all(text.as_bytes()) {
+    let lines: Vec<_> = text.split('\n').map(printable).collect();
+    match io::stdout().write_all(lines.join("\n").as_bytes()) {
         Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),
         other => other.context("standard output cannot be written"),
     }
@@ -105,11 +108,13 @@ fn set_share(bar: &ProgressBar, share: f64) {
     bar.set_position((share * PROGRESS as f64) as u64);
 }
 
-fn start_threads(threads: usize) -> Result<()> {
-    rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().context("threads cannot be started")
+fn start_threads(threads: u16) -> Result<()> {
+    rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global().context("threads cannot be started")
 }
 
 fn run_inspect(args: &InspectArgs) -> Result<()> {
+    let inputs = [Some(&args.image), args.stats.as_ref()].into_iter().flatten().cloned().collect::<Vec<_>>();
+    files::check_outputs(args.svg.as_deref().as_slice(), &inputs)?;
     let buffer = ImageBuffer::read(&args.image)?;
     let image = buffer.image(&args.image)?;
     if !args.widths {
@@ -122,12 +127,16 @@ fn run_inspect(args: &InspectArgs) -> Result<()> {
     let stats = args.stats.as_deref().map(|path| Stats::read(path, &image)).transpose()?;
     let widths = Widths::new(&image, stats.as_ref())?;
     if let Some(path) = &args.svg {
-        writer::write(path, widths.svg().as_bytes())?;
+        files::write(path, widths.svg().as_bytes())?;
     }
     print(&widths.report())
 }
 
 fn run_sweep(args: &SweepArgs) -> Result<()> {
+    let folders = args.policy_dirs.iter().flat_map(|dir| policy::files(dir));
+    let inputs: Vec<PathBuf> = folders.chain([&args.calib, &args.heldout].into_iter().flatten().cloned()).collect();
+    let outputs: Vec<&Path> = [&args.svg, &args.json].into_iter().filter_map(|path| path.as_deref()).collect();
+    files::check_outputs(&outputs, &inputs)?;
     start_threads(args.run.threads)?;
     let methods: Vec<Method> = args.methods.iter().map(|&m| m.into()).collect();
     let policies = args.policy_dirs.iter().map(|dir| Policy::load(dir)).collect::<Result<Vec<_>>>()?;
@@ -169,5 +178,5 @@ fn run_sweep(args: &SweepArgs) -> Result<()> {
     let (svg, json) = (report::sweep::svg(&sweeps), serde_json::to_string_pretty(&sweeps)? + "\n");
     let files = [(&args.svg, svg), (&args.json, json)];
     let files: Vec<_> = files.iter().filter_map(|(path, text)| Some((path.as_deref()?, text))).collect();
-    writer::write_all(&files)
+    files::write_all(&files)
 }

@@ -1,5 +1,6 @@
 //! `actq quantize`
 
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use actq::budget::{Budget, TimeLimit};
@@ -11,18 +12,19 @@ use actq::pipeline::Quantizer;
 use actq::pipeline::stats::Stats;
 use actq::policy::Policy;
 use actq::report::{notes, quantized, time};
-use actq::writer;
+use actq::{files, policy};
 use actq_kernels::Width;
-use anyhow::{Result, ensure};
+use anyhow::Result;
 
 use crate::args::{ActivationArg, QuantizeArgs};
 use crate::{note, print, progress_bar, set_share, start_threads};
 
 /// Quantizes a policy, writes the image and says what became of it.
 pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
+    let outputs: Vec<&Path> = [Some(&args.out), args.save_stats.as_ref()].into_iter().flatten().map(|p| &**p).collect();
+    let inputs: Vec<PathBuf> = policy::files(&args.policy_dir).into_iter().chain(args.calib.clone()).collect();
+    files::check_outputs(&outputs, &inputs)?;
     let source = Policy::load(&args.policy_dir)?;
-    let one_file = args.save_stats.as_ref() == Some(&args.out);
-    ensure!(!one_file, "{}: image and statistics need two files", args.out.display());
     let (dir, sizes) = (Some(args.policy_dir.as_path()), Sizes::of(&source));
     let recordings = Recordings {
         calib: Recording::Calib.load(dir, args.calib.as_deref(), sizes)?,
@@ -45,7 +47,7 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
     if let Some(path) = &args.save_stats {
         files.push((path, Stats::new(&quantizer, &options, &found)?.json()?.into_bytes()));
     }
-    writer::write_all(&files)?;
+    files::write_all(&files)?;
     if let Some(statistics) = quantizer.method().action_statistics() {
         print(&quantized::scores(&source.graph, statistics, &found))?;
     }

@@ -1,0 +1,29 @@
+//! Text from files, as it may be shown on a terminal.
+
+use std::borrow::Cow;
+
+/// Whether a character does something to a terminal, or to the order in which the text around it is shown, instead of being
+/// shown itself.
+pub(crate) fn is_control(c: char) -> bool {
+    c.is_control() || matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+/// `text` in one line, with control characters escaped as in Rust: `\u{1b}`.
+pub fn printable(text: &str) -> Cow<'_, str> {
+    if !text.contains(is_control) {
+        return text.into();
+    }
+    let escaped = |c: char| -> String { if is_control(c) { c.escape_default().collect() } else { c.into() } };
+    text.chars().map(escaped).collect::<String>().into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn control_characters_are_escaped_and_nothing_else() {
+        assert_eq!(printable("arm \"ä\" \\ 腕"), "arm \"ä\" \\ 腕");
+        assert_eq!(printable("a\x1b[2Jb\r\n\u{9b}\u{7f}\u{202e}c"), "a\\u{1b}[2Jb\\r\\n\\u{9b}\\u{7f}\\u{202e}c");
+    }
+}
