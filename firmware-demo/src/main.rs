@@ -112,7 +112,7 @@ mod firmware {
         let mut step = 0;
         while let Some((observation, _)) = image.self_test(step) {
             let action =
-                count::region(|| head.step(bytemuck::cast_slice(observation))).map_err(|e| message("step", e))?;
+                count::region(|| head.step(bytemuck::must_cast_slice(observation))).map_err(|e| message("step", e))?;
             let _ = write!(out, "step {step}:");
             for a in action {
                 let _ = write!(out, " {:08x}", a.to_bits());
@@ -123,7 +123,8 @@ mod firmware {
         Ok(())
     }
 
-    /// Answers `R` and `S` from standard input until it ends.
+    /// Answers `R` and `S` from standard input until it ends. A step whose observation or whose network leaves f32's range has no
+    /// action: it is answered by NaNs.
     fn serve(head: &mut Head<'_, '_>, run: Run) -> Result<(), Message> {
         let input = host::File::open(c"/dev/stdin", false).ok_or_else(|| message("input", "cannot be opened"))?;
         let output = host::File::open(c"/dev/stdout", true).ok_or_else(|| message("output", "cannot be opened"))?;
@@ -136,11 +137,18 @@ mod firmware {
             match command {
                 [b'R'] => head.reset(),
                 [b'S'] => {
-                    if !input.read_exact(bytemuck::cast_slice_mut(observation)) {
+                    if !input.read_exact(bytemuck::must_cast_slice_mut(observation)) {
                         return Err(message("input", "ended inside an observation"));
                     }
-                    let action = run.step(head, observation).map_err(|e| message("step", e))?;
-                    if !output.write_all(bytemuck::cast_slice(action)) {
+                    let act_len = head.image().act_len();
+                    let written = match run.step(head, observation) {
+                        Ok(action) => output.write_all(bytemuck::must_cast_slice(action)),
+                        Err(StepError::ObservationNotFinite { .. } | StepError::NotFinite) => {
+                            (0..act_len).all(|_| output.write_all(&f32::NAN.to_le_bytes()))
+                        }
+                        Err(e) => return Err(message("step", e)),
+                    };
+                    if !written {
                         return Err(message("output", "cannot be written"));
                     }
                 }

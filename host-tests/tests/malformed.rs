@@ -3,17 +3,19 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::LazyLock;
+use std::time::Instant;
 
 use actq::budget::{Budget, Rate};
 use actq::graph::ops::{LayerNorm, Linear, Lstm, Normalize, Pointwise};
 use actq::graph::{Graph, NodeKind, WeightMatrix};
 use actq::methods::{Method, Options, Outcome, quantize};
 use actq::policy::{Contract, Policy};
+use actq::runtime::ImageBuffer;
 use actq_host_tests::golden::Random;
 use actq_kernels::format::Width;
 use actq_kernels::image::{Kind, checksum, header as h, header::op};
 use actq_kernels::math::Function;
-use actq_kernels::{Head, Image, ImageError as E};
+use actq_kernels::{Head, Image, ImageError as E, StepError};
 
 const OBS: usize = 10;
 const UNITS: usize = 24;
@@ -95,6 +97,8 @@ static VALID: LazyLock<Draft> = LazyLock::new(|| {
 
 /// Operations of the valid image: linear operations are the first layer, the LSTM's two products and the output layer.
 const FIRST: (u8, usize) = (op::LINEAR, 0);
+const INPUT: (u8, usize) = (op::LINEAR, 1);
+const STATE: (u8, usize) = (op::LINEAR, 2);
 const OUTPUT: (u8, usize) = (op::LINEAR, 3);
 const NORMALIZE: (u8, usize) = (op::NORMALIZE, 0);
 const LAYER_NORM: (u8, usize) = (op::LAYER_NORM, 0);
@@ -160,7 +164,7 @@ impl Draft {
 
     /// Where block record `i` of a linear operation stands.
     fn block(&self, which: (u8, usize), i: usize) -> usize {
-        self.data(which) + h::MATRIX_WORDS + i * h::BLOCK_WORDS
+        self.offset(self.data(which) + 3) + i * h::BLOCK_WORDS
     }
 
     /// Words that steer: header, operation records, matrix and block records.
@@ -168,10 +172,12 @@ impl Draft {
         let ops = self.offset(h::W_OPS);
         let matrix = |nth| {
             let at = self.data((op::LINEAR, nth));
-            at..at + h::MATRIX_WORDS + self.low(at + 2) as usize * h::BLOCK_WORDS
+            let blocks = self.offset(at + 3);
+            (at..at + h::MATRIX_WORDS).chain(blocks..blocks + self.low(at + 2) as usize * h::BLOCK_WORDS)
         };
         let ops = ops..ops + self.high(h::W_KIND) as usize * h::OP_WORDS;
-        (h::W_KIND..h::W_DIGEST).chain(ops).chain((0..4).flat_map(matrix)).collect()
+        let header = (h::W_KIND..h::W_DIGEST).chain(h::W_MATRICES..h::WORDS);
+        header.chain(ops).chain((0..4).flat_map(matrix)).collect()
     }
 }
 
@@ -227,8 +233,11 @@ fn a_misaligned_start_is_refused() {
     }
 }
 
+/// A change of an image.
+type Change = fn(&mut Draft);
+
 /// What is wrong, the error that must say so, and how the valid image is made so.
-type Case = (&'static str, E, fn(&mut Draft));
+type Case = (&'static str, E, Change);
 
 /// Applies every case to the valid image, makes the checksum fit, and reports all cases that are not refused as expected.
 fn refused(cases: &[Case]) {
@@ -251,12 +260,11 @@ const HUGE: u32 = u32::MAX - 1;
 fn headers_that_cannot_be_are_refused() {
     refused(&[
         ("wrong magic", E::Magic, |d| d.set(0, u32::from_le_bytes(*b"ACTP"))),
-        ("a later version", E::Version, |d| d.set_low(h::W_VERSION, 2)),
+        ("a later version", E::Version, |d| d.set_low(h::W_VERSION, 3)),
         ("a longer header", E::Version, |d| d.set_high(h::W_VERSION, 33)),
         ("a length one word off", E::Length, |d| d.set(h::W_BYTES, d.get(h::W_BYTES) + 4)),
         ("another layout stamp", E::Layout, |d| d.set(h::W_LAYOUT, d.get(h::W_LAYOUT) + 1)),
-        ("reserved word 28", E::Reserved, |d| d.set(28, 1)),
-        ("reserved word 29", E::Reserved, |d| d.set(29, 1)),
+        ("reserved half beside the number of matrices", E::Reserved, |d| d.set_high(h::W_MATRIX_COUNT, 1)),
         ("reserved word 30", E::Reserved, |d| d.set(30, 1)),
         ("reserved word 31", E::Reserved, |d| d.set(31, 1 << 31)),
         ("reserved byte beside the kind", E::Reserved, |d| d.set(h::W_KIND, d.get(h::W_KIND) | 1 << 8)),
@@ -271,12 +279,12 @@ fn headers_that_cannot_be_are_refused() {
         ("scratch too small", E::Arena, |d| d.set(h::W_SCRATCH, d.get(h::W_SCRATCH) - 1)),
         ("state outside", E::Arena, |d| d.set_high(h::W_STATE, 0xffff)),
         ("observation outside", E::Arena, |d| d.set_low(h::W_OBS_OUT, 0xffff)),
-        ("output outside", E::Arena, |d| d.set_high(h::W_OBS_OUT, 0xffff)),
+        ("output outside", E::Unwritten, |d| d.set_high(h::W_OBS_OUT, 0xffff)),
         ("action outside", E::Arena, |d| d.set_low(h::W_ACTION_WORK, 0xffff)),
         ("work area outside", E::Arena, |d| d.set_high(h::W_ACTION_WORK, 0xffff)),
-        ("output over action", E::Overlap, |d| d.set_high(h::W_OBS_OUT, d.low(h::W_ACTION_WORK) - 1)),
-        ("output over observation", E::Overlap, |d| d.set_high(h::W_OBS_OUT, d.low(h::W_OBS_OUT))),
-        ("action over observation", E::Overlap, |d| d.set_low(h::W_ACTION_WORK, d.low(h::W_OBS_OUT) + 1)),
+        ("output over action", E::Unwritten, |d| d.set_high(h::W_OBS_OUT, d.low(h::W_ACTION_WORK) - 1)),
+        ("output over observation", E::Arena, |d| d.set_high(h::W_OBS_OUT, d.low(h::W_OBS_OUT))),
+        ("action over observation", E::Arena, |d| d.set_low(h::W_ACTION_WORK, d.low(h::W_OBS_OUT) + 1)),
         ("rate 0", E::Constant, |d| d.set_f32(h::W_RATE, 0.0)),
         ("rate negative", E::Constant, |d| d.set_f32(h::W_RATE, -50.0)),
         ("rate NaN", E::Constant, |d| d.set_f32(h::W_RATE, NAN)),
@@ -294,8 +302,7 @@ fn headers_that_cannot_be_are_refused() {
         ("self-test at a huge offset", E::Section, |d| d.set(h::W_SELF_TEST, HUGE)),
         ("self-test of too many steps", E::Section, |d| d.set_low(h::W_STEPS_NAME, 0xffff)),
         ("self-test NaN", E::Constant, |d| d.set_f32(d.offset(h::W_SELF_TEST) + OBS, NAN)),
-        ("self-test whose length wraps a 32-bit usize", E::Section, |d| {
-            // 43,692 steps of 65,535 + 32,767 values are 43,688 more than 2^32.
+        ("lengths whose product wraps a 32-bit usize", E::Arena, |d| {
             d.set(h::W_SIZES, 0xffff | 32767 << 16);
             d.set(h::W_CHUNK, 1 | 1 << 16);
             d.set(h::W_SCRATCH, 1 << 18);
@@ -305,6 +312,26 @@ fn headers_that_cannot_be_are_refused() {
             d.set(h::W_WORK_FLAGS, 0);
             d.set_low(h::W_STEPS_NAME, 43692);
         }),
+        ("a contract of no arrays at a huge offset", E::Section, |d| {
+            d.set_high(h::W_WORK_FLAGS, 0);
+            d.set(h::W_CONTRACT, HUGE);
+        }),
+        ("a contract of no arrays at the last offset", E::Section, |d| {
+            d.set_high(h::W_WORK_FLAGS, 0);
+            d.set(h::W_CONTRACT, u32::MAX);
+        }),
+        ("more scratch than anything needs", E::Arena, |d| d.set(h::W_SCRATCH, d.get(h::W_SCRATCH) + 1)),
+        ("all the scratch there is", E::Arena, |d| d.set(h::W_SCRATCH, u32::MAX)),
+        ("scratch beyond u16", E::Arena, |d| {
+            d.set_low(h::W_WORK_FLAGS, 0xffff);
+            d.set(h::W_SCRATCH, d.high(h::W_ACTION_WORK) + 0xffff);
+        }),
+        ("a gap before the action", E::Arena, |d| {
+            d.set(h::W_ACTION_WORK, d.get(h::W_ACTION_WORK) + 0x1_0001);
+            d.set(h::W_SCRATCH, d.get(h::W_SCRATCH) + 1);
+        }),
+        ("a name with an escape character", E::Name, |d| d.set_low(d.offset(h::W_NAME), 0x5b1b)),
+        ("a name with a C1 control character", E::Name, |d| d.set_low(d.offset(h::W_NAME), 0x9bc2)),
     ]);
 }
 
@@ -334,30 +361,30 @@ fn operations_that_cannot_be_are_refused() {
         ("operations outside", E::Section, |d| d.set(h::W_OPS, d.0.len() as u32)),
         ("operations in the header", E::Section, |d| d.set(h::W_OPS, 4)),
         ("operations at a huge offset", E::Section, |d| d.set(h::W_OPS, HUGE)),
-        ("too many operations", E::Section, |d| d.set_high(h::W_KIND, 0xffff)),
+        ("too many operations", E::Op, |d| d.set_high(h::W_KIND, 0xffff)),
         ("operation code 0", E::Op, |d| d.set(d.op(FUNCTION), 0)),
         ("operation code 10", E::Op, |d| d.set(d.op(FUNCTION), 10)),
         ("an unknown function", E::Op, |d| d.set_low(d.op(FUNCTION), u32::from(op::FUNCTION) | 7 << 8)),
         ("detail 2 in linear", E::Reserved, |d| d.set_low(d.op(FIRST), u32::from(op::LINEAR) | 2 << 8)),
         ("detail 1 in layer norm", E::Reserved, |d| d.set_low(d.op(LAYER_NORM), u32::from(op::LAYER_NORM) | 1 << 8)),
         ("an operation of no length", E::Shape, |d| d.set_high(d.op(FUNCTION), 0)),
-        ("destination outside", E::Arena, |d| d.set_low(d.op(FUNCTION) + 1, 0xffff)),
-        ("source outside", E::Arena, |d| d.set_high(d.op(NORMALIZE) + 1, 0xffff)),
-        ("cell state outside", E::Arena, |d| d.set_high(d.op(LSTM) + 2, 0xffff)),
+        ("destination outside", E::Unwritten, |d| d.set_low(d.op(FUNCTION) + 1, 0xffff)),
+        ("source outside", E::Unwritten, |d| d.set_high(d.op(NORMALIZE) + 1, 0xffff)),
+        ("cell state outside", E::Unwritten, |d| d.set_high(d.op(LSTM) + 2, 0xffff)),
         ("source over destination", E::Overlap, |d| d.set_low(d.op(NORMALIZE) + 1, d.high(d.op(NORMALIZE) + 1))),
         ("gates over the hidden state", E::Overlap, |d| d.set_low(d.op(LSTM) + 1, d.high(d.op(LSTM) + 1))),
         ("gates over the cell state", E::Overlap, |d| d.set_high(d.op(LSTM) + 2, d.high(d.op(LSTM) + 1) + 1)),
         ("cell state over the hidden state", E::Overlap, |d| d.set_high(d.op(LSTM) + 2, d.low(d.op(LSTM) + 1) + 1)),
         ("work area too small", E::Arena, |d| d.set_low(h::W_WORK_FLAGS, 16)),
-        ("work area over a source", E::Overlap, |d| d.set_high(h::W_ACTION_WORK, d.high(d.op(FIRST) + 1))),
-        ("work area over a destination", E::Overlap, |d| d.set_high(h::W_ACTION_WORK, d.low(d.op(FIRST) + 1) + 23)),
+        ("work area over a source", E::Arena, |d| d.set_high(h::W_ACTION_WORK, d.high(d.op(FIRST) + 1))),
+        ("work area over a destination", E::Arena, |d| d.set_high(h::W_ACTION_WORK, d.low(d.op(FIRST) + 1) + 23)),
         ("normalization outside", E::Section, |d| d.set(d.op(NORMALIZE) + 3, d.0.len() as u32 - 1)),
         ("normalization at a huge offset", E::Section, |d| d.set(d.op(NORMALIZE) + 3, HUGE)),
         ("normalization mean NaN", E::Constant, |d| d.set_f32(d.data(NORMALIZE) + 2, NAN)),
         ("clip 0", E::Constant, |d| d.set_f32(d.data(NORMALIZE) + 1, 0.0)),
         ("clip NaN", E::Constant, |d| d.set_f32(d.data(NORMALIZE) + 1, NAN)),
         ("clip before negative", E::Constant, |d| d.set_f32(d.data(NORMALIZE), -1.0)),
-        ("layer norm outside", E::Section, |d| d.set(d.op(LAYER_NORM) + 3, d.0.len() as u32 - 48)),
+        ("layer norm outside", E::Section, |d| d.set(d.op(LAYER_NORM) + 3, d.0.len() as u32)),
         ("layer norm at a huge offset", E::Section, |d| d.set(d.op(LAYER_NORM) + 3, u32::MAX)),
         ("eps 0", E::Constant, |d| d.set_f32(d.data(LAYER_NORM), 0.0)),
         ("eps infinite", E::Constant, |d| d.set_f32(d.data(LAYER_NORM), f32::INFINITY)),
@@ -375,13 +402,15 @@ fn matrices_that_cannot_be_are_refused() {
         d.offset(d.block(OUTPUT, 1) + 3)
     }
     refused(&[
-        ("matrix record outside", E::Section, |d| d.set(d.op(FIRST) + 3, d.0.len() as u32 - 3)),
-        ("matrix record at a huge offset", E::Section, |d| d.set(d.op(FIRST) + 3, HUGE)),
+        ("matrix record outside", E::Matrix, |d| d.set(d.op(FIRST) + 3, d.0.len() as u32 - 3)),
+        ("matrix record at a huge offset", E::Matrix, |d| d.set(d.op(FIRST) + 3, HUGE)),
         ("rows 0", E::Shape, |d| d.set_low(d.data(FIRST), 0)),
         ("rows 4097", E::Shape, |d| d.set_low(d.data(FIRST), 4097)),
         ("columns 0", E::Shape, |d| d.set_high(d.data(FIRST), 0)),
-        ("more columns than the source", E::Shape, |d| d.set_high(d.data(FIRST), OBS as u32 + 1)),
-        ("a source longer than the columns", E::Shape, |d| d.set_low(d.op(FIRST) + 2, OBS as u32 + 1)),
+        ("matrix record inside another", E::Matrix, |d| d.set(d.op(FIRST) + 3, d.get(d.op(FIRST) + 3) + 1)),
+        ("a matrix behind the last", E::Matrix, |d| d.set_low(h::W_MATRIX_COUNT, 3)),
+        ("matrix records outside", E::Section, |d| d.set(h::W_MATRICES, d.0.len() as u32 - 3)),
+        ("block records outside", E::Section, |d| d.set(d.data(FIRST) + 3, d.0.len() as u32 - 3)),
         ("more rows than the destination", E::Shape, |d| d.set_high(d.op(FIRST), UNITS as u32 - 1)),
         ("group 7", E::Group, |d| d.set_low(d.data(FIRST) + 1, 7)),
         ("group 256", E::Group, |d| d.set_low(d.data(FIRST) + 1, 256)),
@@ -389,10 +418,10 @@ fn matrices_that_cannot_be_are_refused() {
         ("x_max 32768", E::Constant, |d| d.set_high(d.data(FIRST) + 1, 32768)),
         ("reserved half of the matrix record", E::Reserved, |d| d.set_high(d.data(FIRST) + 2, 1)),
         ("too many blocks", E::Section, |d| d.set_low(d.data(FIRST) + 2, 0xffff)),
-        ("bias outside", E::Section, |d| d.set(d.data(FIRST) + 3, d.0.len() as u32)),
-        ("bias in the header", E::Section, |d| d.set(d.data(FIRST) + 3, 1)),
-        ("bias at a huge offset", E::Section, |d| d.set(d.data(FIRST) + 3, HUGE)),
-        ("bias NaN", E::Constant, |d| d.set_f32(d.offset(d.data(FIRST) + 3), NAN)),
+        ("bias outside", E::Section, |d| d.set(d.op(FIRST) + 2, d.0.len() as u32)),
+        ("bias in the header", E::Section, |d| d.set(d.op(FIRST) + 2, 1)),
+        ("bias at a huge offset", E::Section, |d| d.set(d.op(FIRST) + 2, HUGE)),
+        ("bias NaN", E::Constant, |d| d.set_f32(d.offset(d.op(FIRST) + 2), NAN)),
         ("width 5", E::Width, |d| d.set_low(d.block(FIRST, 0), 5)),
         ("width 0", E::Width, |d| d.set_low(d.block(FIRST, 0), 0)),
         ("unknown lanes", E::Lanes, |d| d.set_low(d.block(FIRST, 0), 4 | 2 << 8)),
@@ -417,12 +446,25 @@ fn matrices_that_cannot_be_are_refused() {
         ("index repeated in a block", E::Index, |d| d.set_low(index(d), d.high(index(d)))),
         ("index repeated over blocks", E::Index, |d| d.set_low(index(d), 0)),
         ("blocks with more rows than the matrix", E::Index, |d| {
-            // Four rows each; a fifth in the second has no output left.
+            // Four rows each: one has no output left.
             for i in 0..2 {
                 d.set(d.block(OUTPUT, i) + 3, 0);
             }
-            d.set_high(d.block(OUTPUT, 1), 5);
+            d.set_low(d.data(OUTPUT), 7);
         }),
+        ("row scales away from their weights", E::Section, |d| {
+            d.set(d.block(FIRST, 0) + 2, d.get(d.block(FIRST, 0) + 2) + 1);
+        }),
+        ("index away from its scales", E::Section, |d| {
+            d.set(d.block(OUTPUT, 0) + 3, d.get(d.block(OUTPUT, 1) + 3));
+        }),
+        ("two matrices on the same weights", E::Section, |d| {
+            for word in 1..4 {
+                d.set(d.block(STATE, 0) + word, d.get(d.block(INPUT, 0) + word));
+            }
+        }),
+        ("two operations with the same biases", E::Section, |d| d.set(d.op(INPUT) + 2, d.get(d.op(FIRST) + 2))),
+        ("biases in the weights", E::Section, |d| d.set(d.op(FIRST) + 2, d.get(d.block(FIRST, 0) + 1))),
         ("int32 overflow possible", E::Overflow, |d| {
             // The 8-bit rows have 24 columns; with the largest group scale they exceed 2^31 / 32767.
             let quad = d.offset(d.block(OUTPUT, 1) + 1);
@@ -454,18 +496,38 @@ fn int32_is_allowed_to_the_last_product() {
 fn nothing_but_the_contract_may_write_what_the_step_limit_holds_on_to() {
     // The last action bounds the next one; a stray write there would carry the action out of its limits.
     refused(&[
-        ("work area over the action", E::Overlap, |d| d.set_low(h::W_ACTION_WORK, d.high(h::W_ACTION_WORK) + 1)),
-        ("destination over the action", E::Overlap, |d| d.set_low(d.op(FUNCTION) + 1, d.low(h::W_ACTION_WORK))),
-        ("cell state over the action", E::Overlap, |d| d.set_high(d.op(LSTM) + 2, d.low(h::W_ACTION_WORK))),
+        ("work area over the action", E::Arena, |d| d.set_low(h::W_ACTION_WORK, d.high(h::W_ACTION_WORK) + 1)),
+        ("destination over the action", E::Unwritten, |d| d.set_low(d.op(FUNCTION) + 1, d.low(h::W_ACTION_WORK))),
+        ("cell state over the action", E::Unwritten, |d| d.set_high(d.op(LSTM) + 2, d.low(h::W_ACTION_WORK))),
+    ]);
+}
+
+#[test]
+fn operations_read_nothing_that_their_step_has_not_written() {
+    // Else an action would depend on the step before, or on which backend prepared the activations.
+    refused(&[
+        ("a source in the work area", E::Unwritten, |d| d.set_high(d.op(NORMALIZE) + 1, d.high(h::W_ACTION_WORK))),
+        ("a source in the last action", E::Unwritten, |d| d.set_high(d.op(NORMALIZE) + 1, d.low(h::W_ACTION_WORK))),
+        ("a source that is written later", E::Unwritten, |d| d.set_high(d.op(FIRST) + 1, d.low(d.op(INPUT) + 1))),
+        ("a function of what is written later", E::Unwritten, |d| {
+            d.set_low(d.op(FUNCTION) + 1, d.low(d.op(INPUT) + 1))
+        }),
+        ("a sum with what is written later", E::Unwritten, |d| {
+            d.set_low(d.op(FIRST), u32::from(op::LINEAR) | 1 << 8);
+        }),
+        ("a destination behind a gap", E::Arena, |d| {
+            d.set_low(d.op(NORMALIZE) + 1, d.low(d.op(NORMALIZE) + 1) + 1);
+        }),
+        ("an output that is not written", E::Unwritten, |d| d.set_high(h::W_OBS_OUT, d.low(h::W_ACTION_WORK) - 1)),
     ]);
 }
 
 #[test]
 fn the_state_may_share_memory_with_nothing_that_a_step_writes() {
     refused(&[
-        ("state over the observation", E::Overlap, |d| d.set_low(h::W_STATE, d.low(h::W_OBS_OUT))),
-        ("state over the action", E::Overlap, |d| d.set_low(h::W_STATE, d.low(h::W_ACTION_WORK))),
-        ("state over the work area", E::Overlap, |d| {
+        ("state over the observation", E::Arena, |d| d.set_low(h::W_STATE, d.low(h::W_OBS_OUT))),
+        ("state over the action", E::Arena, |d| d.set_low(h::W_STATE, d.low(h::W_ACTION_WORK))),
+        ("state over the work area", E::Arena, |d| {
             d.set_low(h::W_STATE, d.high(h::W_ACTION_WORK));
             d.set_high(h::W_STATE, 1);
         }),
@@ -485,7 +547,6 @@ fn fields_that_an_operation_does_not_use_are_zero() {
         ("source of a function", E::Reserved, |d| d.set_high(d.op(FUNCTION) + 1, 1)),
         ("constants of a function", E::Reserved, |d| d.set(d.op(FUNCTION) + 3, 32)),
         ("source length of a normalization", E::Reserved, |d| d.set_low(d.op(NORMALIZE) + 2, 1)),
-        ("third region of a linear operation", E::Reserved, |d| d.set_high(d.op(FIRST) + 2, 1)),
         ("source of a layer norm", E::Reserved, |d| d.set_high(d.op(LAYER_NORM) + 1, 1)),
         ("constants of a cell", E::Reserved, |d| d.set(d.op(LSTM) + 3, 32)),
     ]);
@@ -565,6 +626,127 @@ fn what_is_accepted_runs_and_keeps_its_limits() {
         }
     });
     assert!(seen > 1000, "{seen} images were accepted: too few to show anything");
+}
+
+#[test]
+fn a_reset_forgets_everything() {
+    accepted(|image, random| {
+        let mut scratch = vec![0; image.scratch_words()];
+        let mut head = Head::new(image, &mut scratch).expect("the scratch memory has the image's size");
+        let observations: Vec<Vec<f32>> =
+            (0..3).map(|_| (0..image.obs_len()).map(|_| 3.0 * random.unit()).collect()).collect();
+        let mut play = || {
+            head.reset();
+            let step = |o: &Vec<f32>| head.step(o).map(|action| action.iter().map(|a| a.to_bits()).collect::<Vec<_>>());
+            observations.iter().map(step).collect::<Vec<_>>()
+        };
+        assert_eq!(play(), play());
+    });
+}
+
+/// Flash that decays, or is rewritten behind the head's back: what no longer parses is an error, not a stale action.
+#[test]
+fn damage_after_the_check_is_an_error() {
+    let cases: &[(&str, Change)] = &[
+        ("an operation's code", |d| d.set_low(d.op(FUNCTION), 0)),
+        ("a function's code", |d| d.set_low(d.op(FUNCTION), u32::from(op::FUNCTION) | 99 << 8)),
+        ("a destination", |d| d.set_low(d.op(FUNCTION) + 1, 0xffff)),
+        ("a source", |d| d.set_high(d.op(NORMALIZE) + 1, 0xffff)),
+        ("a cell state", |d| d.set_high(d.op(LSTM) + 2, 0xffff)),
+        ("constants", |d| d.set(d.op(NORMALIZE) + 3, HUGE)),
+        ("constants of a norm", |d| d.set(d.op(LAYER_NORM) + 3, d.0.len() as u32)),
+        ("a matrix", |d| d.set(d.op(FIRST) + 3, HUGE)),
+        ("a matrix's rows", |d| d.set_low(d.data(FIRST), UNITS as u32 - 1)),
+        ("a matrix's group", |d| d.set_low(d.data(FIRST) + 1, 7)),
+        ("a matrix's blocks", |d| d.set(d.data(FIRST) + 3, HUGE)),
+        ("biases", |d| d.set(d.op(FIRST) + 2, HUGE)),
+        ("a width", |d| d.set_low(d.block(FIRST, 0), 5)),
+        ("a block's rows", |d| d.set_high(d.block(FIRST, 0), UNITS as u32 + 1)),
+        ("weights", |d| d.set(d.block(FIRST, 0) + 1, HUGE)),
+        ("scales", |d| d.set(d.block(FIRST, 0) + 2, HUGE)),
+        ("an output index", |d| d.set_high(d.offset(d.block(OUTPUT, 1) + 3), 0xffff)),
+        ("the observation's place", |d| d.set_low(h::W_OBS_OUT, 0xffff)),
+        ("the output's place", |d| d.set_high(h::W_OBS_OUT, 0xffff)),
+        ("the action's place", |d| d.set_low(h::W_ACTION_WORK, 0xffff)),
+        ("the work area's place", |d| d.set_high(h::W_ACTION_WORK, 0xffff)),
+    ];
+    for (name, damage) in cases {
+        let mut draft = VALID.clone();
+        damage(&mut draft);
+        let image = Image::unchecked(draft.bytes()).expect("the header is there");
+        let mut scratch = vec![0; image.scratch_words()];
+        let mut head = Head::new(image, &mut scratch).expect("the scratch memory has the image's size");
+        assert_eq!(head.step(&[0.5; OBS]).err(), Some(StepError::Damaged), "{name}");
+        // In pieces, too, and again and again.
+        let in_pieces = head.begin(&[0.5; OBS]).and_then(|()| head.poll(u32::MAX).map(|_| ()));
+        assert_eq!(in_pieces, Err(StepError::Damaged), "{name}");
+    }
+}
+
+#[test]
+fn damage_of_any_kind_does_not_panic() {
+    const CASES: u64 = 20_000;
+    let structure = VALID.structure();
+    let mut outcomes = [0; 2];
+    for case in 0..CASES {
+        let mut random = Random(case);
+        let mut draft = VALID.clone();
+        let scratch = draft.get(h::W_SCRATCH);
+        mutate(&mut random, &mut draft, &structure);
+        // What the head was made with does not change any more.
+        draft.set(h::W_SCRATCH, scratch);
+        let image = Image::unchecked(draft.bytes()).expect("the header is there");
+        let mut scratch = vec![0; image.scratch_words()];
+        let mut head = Head::new(image, &mut scratch).expect("the scratch memory has the image's size");
+        let observation = vec![0.5; image.obs_len()];
+        let outcome = catch_unwind(AssertUnwindSafe(|| (0..3).all(|_| head.step(&observation).is_ok())));
+        outcomes[usize::from(outcome.unwrap_or_else(|_| panic!("case {case}")))] += 1;
+    }
+    assert!(outcomes.iter().all(|n| *n > 1000), "{outcomes:?}: too few to show anything");
+}
+
+/// Else 500 operations could make the check of a small image last for seconds.
+#[test]
+fn a_matrix_is_checked_once_however_many_operations_share_it() {
+    let time = |operations: usize| {
+        // Groups at 8 bits, and so many columns that the bound from the shape does not do.
+        const N: usize = 768;
+        let mut random = Random(3);
+        let mut graph = Graph::new(N);
+        graph.matrices.push(WeightMatrix {
+            name: "w".into(),
+            rows: N,
+            cols: N,
+            data: (0..N * N).map(|_| random.unit()).collect(),
+        });
+        for input in 0..operations {
+            graph.add(Linear { matrix: 0, bias: vec![0.0; N] }, &[input]).expect("it fits");
+        }
+        let options = Options { group: 32, ..Options::new(Method::Rtn, Budget::Width(Width::W8)) };
+        let (_, outcomes) =
+            quantize(&graph, None, Rate::Width(Width::W8), &options).expect("the graph can be quantized");
+        let policy = Policy {
+            dir: ".".into(),
+            name: "shared".into(),
+            kind: Kind::Step,
+            chunk: 1,
+            execute: 1,
+            act_len: N,
+            rate_hz: 50.0,
+            contract: Contract { scale: Some(vec![1e-30; N]), ..Contract::default() },
+            weights: graph.weights(),
+            graph,
+            digest: [0; 32],
+        };
+        let bytes = actq::writer::image(&policy, &outcomes).expect("the policy fits the format");
+        let buffer = ImageBuffer::new(&bytes);
+        let start = Instant::now();
+        let image = Image::new_checked(buffer.bytes()).expect("the image is valid");
+        assert_eq!(image.op_count(), operations);
+        start.elapsed()
+    };
+    let (one, many) = (time(1), time(24));
+    assert!(many < 8 * one, "{many:?} for 24 operations, {one:?} for one");
 }
 
 #[test]

@@ -29,16 +29,21 @@ pub enum ImageError {
     Kind,
     /// Chunk or execute length is zero, or execute exceeds chunk.
     Chunk,
-    /// A section lies outside the image.
+    /// A section lies outside the image, shares words with another, or does not stand in its place in their order.
     Section,
-    /// An arena region lies outside the scratch memory.
+    /// The scratch memory is not state, observation, what operations write, action and work area, one behind the other, in at
+    /// most 65535 words; or the work area is too short.
     Arena,
-    /// An operation's source and destination overlap.
+    /// Regions of an operation overlap.
     Overlap,
+    /// An operation, or the action, reads words that no operation of the step has written.
+    Unwritten,
     /// An operation code is unknown.
     Op,
     /// A length is zero, or two lengths of an operation disagree.
     Shape,
+    /// A linear operation names no matrix of the image.
+    Matrix,
     /// A matrix block's width is not 2, 3, 4 or 8 bits.
     Width,
     /// A block's lanes are not those that follow from its matrix's activations and group.
@@ -53,7 +58,7 @@ pub enum ImageError {
     Overflow,
     /// A lower action limit exceeds the upper one.
     Limits,
-    /// The policy's name is not UTF-8.
+    /// The policy's name is not UTF-8, or holds control characters.
     Name,
     /// The self-test vector has no steps.
     SelfTest,
@@ -72,11 +77,13 @@ impl fmt::Display for ImageError {
             Self::Reserved => "a reserved field is not zero",
             Self::Kind => "unknown policy kind",
             Self::Chunk => "chunk and execute lengths do not fit",
-            Self::Section => "a section lies outside the image",
-            Self::Arena => "a region lies outside the scratch memory",
-            Self::Overlap => "source and destination of an operation overlap",
+            Self::Section => "a section lies outside the image, or overlaps or precedes one that stands before it",
+            Self::Arena => "the scratch memory's regions do not follow each other, or the work area is too short",
+            Self::Overlap => "regions of an operation overlap",
+            Self::Unwritten => "an operation reads memory that nothing has written in its step",
             Self::Op => "unknown operation",
             Self::Shape => "lengths of an operation do not fit",
+            Self::Matrix => "an operation names no matrix of the image",
             Self::Width => "weight width is not 2, 3, 4 or 8 bits",
             Self::Lanes => "lanes of a block do not follow from its matrix's activations and groups",
             Self::Group => "group size is not 0, 32, 64 or 128",
@@ -84,7 +91,7 @@ impl fmt::Display for ImageError {
             Self::Constant => "a constant is not finite or has the wrong sign",
             Self::Overflow => "a row can overflow its int32 accumulator",
             Self::Limits => "action limits are reversed",
-            Self::Name => "policy name is not UTF-8",
+            Self::Name => "policy name is not UTF-8 or holds control characters",
             Self::SelfTest => "the self-test vector has no steps",
         })
     }
@@ -118,8 +125,8 @@ impl fmt::Display for HeadError {
 
 impl core::error::Error for HeadError {}
 
-/// Why a step gave no action. The head's state is as if it had been reset, except after [`StepError::Budget`] and
-/// [`StepError::NotBegun`], which change nothing.
+/// Why a step gave no action. The recurrent state and the chunk are as after a reset; the last action stays, so that the step
+/// limit holds across the error. [`StepError::Budget`] and [`StepError::NotBegun`] change nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -138,6 +145,8 @@ pub enum StepError {
     },
     /// A value inside the network or an action left the range of f32.
     NotFinite,
+    /// The image's memory no longer holds what was checked: flash that decays, or was rewritten.
+    Damaged,
     /// The self-test vector gave other bits than the image records.
     SelfTest {
         /// The step of the vector that differed.
@@ -154,7 +163,25 @@ pub enum StepError {
     NotBegun,
 }
 
-impl From<NotFinite> for StepError {
+impl From<Fault> for StepError {
+    fn from(fault: Fault) -> Self {
+        match fault {
+            Fault::NotFinite => Self::NotFinite,
+            Fault::Damaged => Self::Damaged,
+        }
+    }
+}
+
+/// What goes wrong inside an evaluation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Fault {
+    /// See [`StepError::NotFinite`].
+    NotFinite,
+    /// See [`StepError::Damaged`].
+    Damaged,
+}
+
+impl From<NotFinite> for Fault {
     fn from(_: NotFinite) -> Self {
         Self::NotFinite
     }
@@ -168,6 +195,7 @@ impl fmt::Display for StepError {
             }
             Self::ObservationNotFinite { index } => write!(f, "observation value {index} is not finite"),
             Self::NotFinite => f.write_str("the network produced a value that is not finite"),
+            Self::Damaged => f.write_str("the image's memory has changed since it was checked"),
             Self::SelfTest { step } => write!(f, "self-test step {step} gave other bits than the image records"),
             Self::Budget { needed, given } => {
                 write!(f, "a poll has {given} instructions, the image needs at least {needed}")

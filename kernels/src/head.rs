@@ -4,8 +4,7 @@
 use core::ops::Range;
 use core::task::Poll;
 
-use crate::activations::NotFinite;
-use crate::error::{HeadError, StepError};
+use crate::error::{Fault, HeadError, StepError};
 use crate::image::{Image, Op, OpKind, Region};
 use crate::linear::{copy, copy_le};
 use crate::math::clamp;
@@ -50,10 +49,17 @@ impl<'a, 's> Head<'a, 's> {
     /// Forgets the recurrent state, the rest of a chunk, the last action and a step that was begun.
     #[inline(never)]
     pub fn reset(&mut self) {
+        self.abandon();
+        self.started = false;
+    }
+
+    /// As [`Self::reset`], but the last action stays: after an error the robot is still where that left it, and the step limit
+    /// holds on to it.
+    #[inline(never)]
+    fn abandon(&mut self) {
         self.forget();
         self.phase = Phase::Idle;
         self.played = 0;
-        self.started = false;
     }
 
     /// Zeroes the recurrent state.
@@ -76,7 +82,8 @@ impl<'a, 's> Head<'a, 's> {
     /// The action for `observation`: of the next chunk position where the image is chunked, after the action contract. It is
     /// [`Self::begin`] and one [`Self::poll`] without a limit.
     ///
-    /// On an error the head resets itself, so that no part of a failed evaluation reaches a later action.
+    /// On an error the recurrent state and the chunk are reset, so that no part of a failed evaluation reaches a later action.
+    /// The last action stays: the next one is limited by `max_step` as ever.
     #[inline(never)]
     pub fn step(&mut self, observation: &[f32]) -> Result<&[f32], StepError> {
         self.take(observation)?;
@@ -89,7 +96,7 @@ impl<'a, 's> Head<'a, 's> {
     /// A step that was begun and is not ready is dropped. If a poll has already worked on it, the recurrent state may be partly
     /// that of the dropped step, and is zeroed as by [`Self::reset`]; the last action stays, so that the step limit holds.
     ///
-    /// On an error the head resets itself. The first call takes longer where [`Self::least_budget`] was not called before.
+    /// Errors are those of [`Self::step`]. The first call takes longer where [`Self::least_budget`] was not called before.
     pub fn begin(&mut self, observation: &[f32]) -> Result<(), StepError> {
         self.least_budget();
         self.take(observation)
@@ -107,7 +114,7 @@ impl<'a, 's> Head<'a, 's> {
     #[inline(never)]
     fn take(&mut self, observation: &[f32]) -> Result<(), StepError> {
         self.drop_step();
-        self.load(observation).inspect_err(|_| self.reset())?;
+        self.load(observation).inspect_err(|_| self.abandon())?;
         self.start();
         Ok(())
     }
@@ -121,8 +128,8 @@ impl<'a, 's> Head<'a, 's> {
     ///
     /// # Errors
     ///
-    /// [`StepError::Budget`] where `budget` is below [`Image::least_budget`], and [`StepError::NotBegun`], change nothing. On
-    /// others the head resets itself.
+    /// [`StepError::Budget`] where `budget` is below [`Image::least_budget`], and [`StepError::NotBegun`], change nothing. Others
+    /// are those of [`Self::step`].
     pub fn poll(&mut self, budget: u32) -> Result<Poll<&[f32]>, StepError> {
         self.poll_until(budget, false)
     }
@@ -165,18 +172,22 @@ impl<'a, 's> Head<'a, 's> {
     }
 
     /// Takes the step that was begun to its end.
-    fn finish(&mut self) -> Result<(), NotFinite> {
+    fn finish(&mut self) -> Result<(), Fault> {
         self.advance(&mut Unlimited, false)?;
         Ok(())
     }
 
-    /// Goes on as far as the budget reaches; true when the action is ready. On an error the head resets itself.
-    fn advance(&mut self, budget: &mut impl Meter, one_op: bool) -> Result<bool, NotFinite> {
+    /// Goes on as far as the budget reaches; true when the action is ready. On an error the step is abandoned.
+    fn advance(&mut self, budget: &mut impl Meter, one_op: bool) -> Result<bool, Fault> {
+        self.go_on(budget, one_op).inspect_err(|_| self.abandon())
+    }
+
+    fn go_on(&mut self, budget: &mut impl Meter, one_op: bool) -> Result<bool, Fault> {
         if let Phase::Begun(_) = self.phase {
             if !self.evaluate(budget, one_op)? || budget.take(1, || Price::action(&self.image)) == 0 {
                 return Ok(false);
             }
-            self.act().inspect_err(|_| self.reset())?;
+            self.act()?;
             self.phase = Phase::Ready;
             self.played += 1;
             if self.played == self.image.execute() {
@@ -193,7 +204,7 @@ impl<'a, 's> Head<'a, 's> {
         // From the first operation on, whatever is left of a chunk.
         self.played = 0;
         self.start();
-        self.evaluate(&mut Unlimited, false)?;
+        self.evaluate(&mut Unlimited, false).inspect_err(|_| self.abandon())?;
         self.phase = Phase::Idle;
         Ok(self.floats(self.image.output()))
     }
@@ -231,21 +242,24 @@ impl<'a, 's> Head<'a, 's> {
         if let Some(index) = observation.iter().position(|v| !v.is_finite()) {
             return Err(StepError::ObservationNotFinite { index });
         }
-        copy(bytemuck::cast_slice(observation), self.words_mut(self.image.observation()));
+        let region = self.image.observation();
+        copy(bytemuck::must_cast_slice(observation), self.arena.get_mut(region.range()).ok_or(StepError::Damaged)?);
         Ok(())
     }
 
-    /// Runs operations from where the step stands; true behind the last one. On an error the head resets itself.
+    /// Runs operations from where the step stands; true behind the last one.
     #[inline(never)]
-    fn evaluate(&mut self, budget: &mut impl Meter, one_op: bool) -> Result<bool, NotFinite> {
+    fn evaluate(&mut self, budget: &mut impl Meter, one_op: bool) -> Result<bool, Fault> {
         let Phase::Begun(cursor) = &mut self.phase else { return Ok(true) };
         while cursor.op < self.image.op_count() {
-            // In a checked image every record parses.
-            if let Ok(op) = &self.image.op(cursor.op) {
-                let done = if budget.enter(op) { run(op, self.arena, cursor, budget) } else { Ok(false) };
-                if done != Ok(true) {
-                    return done.inspect_err(|_| self.reset());
-                }
+            let done = match &self.image.op(cursor.op) {
+                Ok(op) if budget.enter(op) => run(op, self.arena, cursor, budget),
+                Ok(_) => Ok(false),
+                // In a checked image every record parses.
+                Err(_) => Err(Fault::Damaged),
+            };
+            if done != Ok(true) {
+                return done;
             }
             *cursor = Cursor { op: cursor.op + 1, ..Cursor::default() };
             if one_op {
@@ -257,37 +271,40 @@ impl<'a, 's> Head<'a, 's> {
 
     /// Takes the chunk's current action through the contract. Not inlined, so that the operations do not run on top of its stack.
     #[inline(never)]
-    fn act(&mut self) -> Result<(), NotFinite> {
+    fn act(&mut self) -> Result<(), Fault> {
         let (output, action) = (self.image.output(), self.image.action());
         let position = self.played * action.len;
         let [output, action, _] = regions(self.arena, &[output, action, Region::default()]);
-        if action.is_empty() {
-            return Err(NotFinite);
+        // In place of the output: an error must not have changed the last action, not even in part.
+        let next = part(output, &(position..position + action.len()));
+        if next.is_empty() {
+            return Err(Fault::Damaged);
         }
-        for (i, (action, raw)) in action.iter_mut().zip(output.iter().skip(position)).enumerate() {
+        for (i, (next, last)) in next.iter_mut().zip(&*action).enumerate() {
             let [scale, offset, low, high, max_step] = self.image.contract_of(i);
-            let a = f32::from_bits(*raw) * scale + offset;
+            let a = f32::from_bits(*next) * scale + offset;
             if !a.is_finite() {
-                return Err(NotFinite);
+                return Err(Fault::NotFinite);
             }
             let mut a = clamp(a, low, high);
             if self.started {
-                let last = f32::from_bits(*action);
+                let last = f32::from_bits(*last);
                 a = clamp(a, last - max_step, last + max_step);
             }
-            *action = a.to_bits();
+            *next = a.to_bits();
         }
+        copy(next, action);
         self.started = true;
         Ok(())
     }
 
     #[inline(never)]
     fn floats(&self, region: Region) -> &[f32] {
-        bytemuck::cast_slice(self.arena.get(region.range()).unwrap_or(&[]))
+        bytemuck::must_cast_slice(self.arena.get(region.range()).unwrap_or(&[]))
     }
 
     fn floats_mut(&mut self, region: Region) -> &mut [f32] {
-        bytemuck::cast_slice_mut(self.words_mut(region))
+        bytemuck::must_cast_slice_mut(self.words_mut(region))
     }
 
     fn words_mut(&mut self, region: Region) -> &mut [u32] {
@@ -304,17 +321,26 @@ fn regions<'r>(arena: &'r mut [u32], regions: &[Region; 3]) -> [&'r mut [u32]; 3
     }
 }
 
-/// Runs an operation from where the cursor stands; true at its end. An operation whose regions do not fit, which the image's
-/// check has excluded, does nothing.
+/// Runs an operation from where the cursor stands; true at its end.
+///
+/// # Errors
+///
+/// [`Fault::Damaged`] where the operation names what is not there, which the image's check has excluded.
 #[inline(never)]
-fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &mut impl Meter) -> Result<bool, NotFinite> {
-    let f = bytemuck::cast_slice_mut::<u32, f32>;
-    // Elements that this piece takes, or units of a norm. Linear operations have pieces of their own.
+fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &mut impl Meter) -> Result<bool, Fault> {
+    let f = bytemuck::must_cast_slice_mut::<u32, f32>;
+    if let OpKind::Linear { accumulate } = op.kind {
+        let matrix = &op.linear_matrix();
+        let matrix = matrix.as_ref().map_err(|_| Fault::Damaged)?;
+        let [dst, src, work] = regions(arena, &op.regions);
+        return matrix.resume(&mut cursor.linear, budget, f(src), work, f(dst), accumulate);
+    }
+    // Elements that this piece takes, or units of a norm.
     let (dst, len) = (op.dst(), op.units());
-    let units = match op.kind {
-        OpKind::Linear { .. } => 0,
-        _ => budget.take(len - cursor.done, || Price::units(op)),
-    };
+    let units = budget.take(len - cursor.done, || Price::units(op));
+    if units == 0 {
+        return Ok(false);
+    }
     let units = cursor.done..cursor.done + units;
     cursor.done = units.end;
     let norm = matches!(op.kind, OpKind::LayerNorm | OpKind::RmsNorm);
@@ -326,11 +352,10 @@ fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &mut impl Me
     if matches!(op.kind, OpKind::Normalize | OpKind::Add | OpKind::Copy) {
         (dst, src) = (part(dst, &range), part(src, &range));
     }
+    if dst.is_empty() {
+        return Err(Fault::Damaged);
+    }
     match op.kind {
-        OpKind::Linear { accumulate } => {
-            let Ok(matrix) = &op.linear_matrix() else { return Ok(true) };
-            return matrix.resume(&mut cursor.linear, budget, f(src), third, f(dst), accumulate);
-        }
         OpKind::Function(function) => function.apply(f(dst)),
         OpKind::Add => norm::add(f(src), f(dst)),
         OpKind::Copy => copy(src, dst),
@@ -341,8 +366,11 @@ fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &mut impl Me
             recurrent::gru_elements(range.clone(), f(src), f(third), f(dst));
         }
         kind => {
-            // An RMS norm has but one array.
-            let (first, second, constant) = (op.part(0, &range), op.part(1, &range), op.constant(0));
+            let (first, second) = (op.part(0, &range), op.part(1, &range));
+            if (if kind == OpKind::RmsNorm { first } else { second }).is_empty() {
+                return Err(Fault::Damaged);
+            }
+            let constant = op.constant(0);
             let (moments, done) = (&mut cursor.moments, units.clone());
             match kind {
                 OpKind::LayerNorm => norm::layer_norm_units(done, moments, f(dst), first, second, constant),
@@ -354,7 +382,7 @@ fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &mut impl Me
     Ok(units.end == len)
 }
 
-/// Some of a region's words.
+/// Some of a region's words; none where they are not all there.
 #[inline(never)]
 fn part<'r>(region: &'r mut [u32], range: &Range<usize>) -> &'r mut [u32] {
     region.get_mut(range.clone()).unwrap_or_default()

@@ -5,9 +5,10 @@
 
 use core::ops::Range;
 
+use crate::activations::Plan;
 use crate::error::ImageError;
 use crate::format::{Block, BlockShape, LAYOUT_STAMP, Width};
-use crate::linear::{Matrix, RowBlock, worst_case, worst_case_bound};
+use crate::linear::{Matrix, RowBlock, fits_i32};
 use crate::math::Function;
 
 /// Positions and constants of the header; what the writer and the parser share.
@@ -15,19 +16,21 @@ pub mod header {
     /// `ACTQ` in the first four bytes.
     pub const MAGIC: u32 = u32::from_le_bytes(*b"ACTQ");
     /// Format version.
-    pub const VERSION: u16 = 1;
+    pub const VERSION: u16 = 2;
     /// Words of the header.
     pub const WORDS: usize = 32;
     /// Words before the checksummed part: magic, version, length, checksum.
     pub const UNCHECKED_WORDS: usize = 4;
     /// Words of an operation record.
     pub const OP_WORDS: usize = 4;
-    /// Words of a matrix record before its block records.
+    /// Words of a matrix record.
     pub const MATRIX_WORDS: usize = 4;
     /// Words of a block record.
     pub const BLOCK_WORDS: usize = 4;
     /// The largest output of a matrix, in rows.
     pub const MAX_ROWS: usize = 4096;
+    /// The most words of an arena: places in it are u16.
+    pub const MAX_SCRATCH: usize = 0xffff;
 
     /// u16 version, u16 header words.
     pub const W_VERSION: usize = 1;
@@ -69,6 +72,10 @@ pub mod header {
     pub const W_WEIGHTS: usize = 19;
     /// SHA-256 of the source policy, 8 words.
     pub const W_DIGEST: usize = 20;
+    /// Offset of the matrix records.
+    pub const W_MATRICES: usize = 28;
+    /// u16 number of matrices, u16 zero.
+    pub const W_MATRIX_COUNT: usize = 29;
 
     /// Operation codes.
     pub mod op {
@@ -94,6 +101,14 @@ pub mod header {
 }
 
 use header as h;
+
+/// The bits of infinity in bf16.
+const BF16_INFINITY: u16 = (f32::INFINITY.to_bits() >> 16) as u16;
+
+/// Word `i`; 0 behind the end.
+fn word(words: &[u32], i: usize) -> u32 {
+    u32::from_le(words.get(i).copied().unwrap_or(0))
+}
 
 fn low(word: u32) -> usize {
     (word & 0xffff) as usize
@@ -124,11 +139,16 @@ pub struct Region {
 impl Region {
     /// The words as an index range.
     pub fn range(self) -> core::ops::Range<usize> {
-        self.offset..self.offset + self.len
+        self.offset..self.end()
+    }
+
+    /// The word behind the last one.
+    pub(crate) fn end(self) -> usize {
+        self.offset + self.len
     }
 
     fn overlaps(self, other: Self) -> bool {
-        self.offset < other.offset + other.len && other.offset < self.offset + self.len
+        self.offset < other.end() && other.offset < self.end()
     }
 }
 
@@ -172,11 +192,25 @@ struct Form {
     /// Single constants, and arrays of the length of `dst` behind them.
     constants: u8,
     arrays: u8,
+    /// Whether it works on what `dst` holds. (Of linear, the detail decides.)
+    reads_dst: bool,
+    /// Bits of the record's words behind the first that the operation does not use.
+    unused: [u32; 3],
 }
 
 impl Form {
     const fn new(kind: OpKind, max_detail: u8, [src, third]: [u8; 2], [constants, arrays]: [u8; 2]) -> Self {
-        Self { kind, max_detail, src, third, constants, arrays }
+        const fn unless(used: bool, bits: u32) -> u32 {
+            if used { 0 } else { bits }
+        }
+        let linear = matches!(kind, OpKind::Linear { .. });
+        let unused = [
+            unless(src > 0, !0xffff),
+            unless(linear, 0xffff) | unless(linear || third > 0, !0xffff),
+            unless(linear || constants > 0, !0),
+        ];
+        let reads_dst = !(linear || matches!(kind, OpKind::Normalize | OpKind::Copy | OpKind::LstmCell));
+        Self { kind, max_detail, src, third, constants, arrays, reads_dst, unused }
     }
 }
 
@@ -229,7 +263,12 @@ impl<'a> Op<'a> {
 
     /// As [`Self::matrix`], of a linear operation. (Within a checked image never an error.)
     pub(crate) fn linear_matrix(&self) -> Result<Matrix<'a>, ImageError> {
-        matrix(self.image, self.data())
+        matrix(self.image, self.data(), self.bias())
+    }
+
+    /// Offset of the biases of a linear operation; 0: none.
+    fn bias(&self) -> usize {
+        u32::from_le(self.record[2]) as usize
     }
 
     /// Single constant `i`: see [`OpKind`].
@@ -252,7 +291,7 @@ impl<'a> Op<'a> {
             }
     }
 
-    /// A range of array `i`.
+    /// A range of array `i`; empty where that is not in the image.
     pub(crate) fn part(&self, i: usize, range: &Range<usize>) -> &'a [u32] {
         let before = usize::from(self.form.constants) + i * self.dst().len + range.start;
         section(self.image, self.data() + before, range.len()).unwrap_or_default()
@@ -261,6 +300,11 @@ impl<'a> Op<'a> {
     /// Offset of the constants or of the matrix record.
     fn data(&self) -> usize {
         u32::from_le(self.record[3]) as usize
+    }
+
+    /// Whether the operation reads what its destination held.
+    fn reads_dst(&self) -> bool {
+        self.form.reads_dst || self.kind == OpKind::Linear { accumulate: true }
     }
 
     fn is_linear(&self) -> bool {
@@ -329,8 +373,17 @@ impl<'a> Image<'a> {
         Ok(image)
     }
 
+    /// An image whose memory may hold anything, as it does where flash has changed since the check: to test what becomes of it. A
+    /// step of it ends with an action that means nothing or with [`crate::StepError::Damaged`]. `None` where the bytes are
+    /// misaligned, no whole words, or shorter than a header.
+    #[doc(hidden)]
+    pub fn unchecked(bytes: &'a [u8]) -> Option<Self> {
+        let words: &[u32] = bytemuck::try_cast_slice(bytes).ok()?;
+        Some(Self { words, header: words.first_chunk()? })
+    }
+
     fn word(&self, i: usize) -> u32 {
-        u32::from_le(self.words.get(i).copied().unwrap_or(0))
+        word(self.words, i)
     }
 
     /// A word of the header.
@@ -342,17 +395,6 @@ impl<'a> Image<'a> {
     /// As [`section`]; empty where that refuses.
     fn section(&self, offset: usize, len: usize) -> &'a [u32] {
         section(self.words, offset, len).unwrap_or_default()
-    }
-
-    /// As [`section`].
-    fn checked(&self, offset: usize, len: usize) -> Result<&'a [u32], ImageError> {
-        section(self.words, offset, len).ok_or(ImageError::Section)
-    }
-
-    /// `len` f32 constants at `offset`, refused where one is not finite.
-    #[inline(never)]
-    fn constants(&self, offset: usize, len: usize) -> Result<(), ImageError> {
-        finite(self.checked(offset, len)?)
     }
 
     /// Length of an observation.
@@ -392,13 +434,14 @@ impl<'a> Image<'a> {
 
     /// The policy's name.
     pub fn name(&self) -> &'a str {
-        self.name_bytes().and_then(|bytes| core::str::from_utf8(bytes).ok()).unwrap_or_default()
+        let words = self.section(self.head(h::W_NAME) as usize, self.name_len().div_ceil(4));
+        let bytes = bytemuck::must_cast_slice(words).get(..self.name_len()).unwrap_or_default();
+        core::str::from_utf8(bytes).unwrap_or_default()
     }
 
-    fn name_bytes(&self) -> Option<&'a [u8]> {
-        let len = high(self.head(h::W_STEPS_NAME));
-        let words = section(self.words, self.head(h::W_NAME) as usize, len.div_ceil(4))?;
-        bytemuck::cast_slice(words).get(..len)
+    /// Bytes of the name.
+    fn name_len(&self) -> usize {
+        high(self.head(h::W_STEPS_NAME))
     }
 
     /// SHA-256 of the source policy (policy.json, then policy.safetensors).
@@ -519,15 +562,15 @@ impl<'a> Image<'a> {
 
     /// Operation `i`, refused where its record says something impossible. (Within a checked image every record parses.)
     pub(crate) fn op(&self, i: usize) -> Result<Op<'a>, ImageError> {
-        let record = record(self.words, self.head(h::W_OPS) as usize + i * h::OP_WORDS)?;
-        let [head, places, lengths, _] = record.map(u32::from_le);
+        let op = record(self.words, self.head(h::W_OPS) as usize + i * h::OP_WORDS)?;
+        let [head, places, lengths, data] = op.map(u32::from_le);
         let (code, detail, len) = (head as u8, (head >> 8) as u8, high(head));
         let form = FORMS.get(usize::from(code).wrapping_sub(1)).ok_or(ImageError::Op)?;
         let [mut src, third] = [form.src, form.third].map(|times| len * usize::from(times));
         let mut third = Region { offset: high(lengths), len: third };
         let kind = match form.kind {
             OpKind::Linear { .. } => {
-                (src, third) = (low(lengths), self.work());
+                (src, third) = (high(self.word(data as usize)), self.work());
                 OpKind::Linear { accumulate: detail == 1 }
             }
             OpKind::Function(_) => OpKind::Function(Function::from_code(detail).ok_or(ImageError::Op)?),
@@ -535,11 +578,21 @@ impl<'a> Image<'a> {
         };
         let dst = Region { offset: low(places), len };
         let src = Region { offset: high(places), len: src };
-        Ok(Op { kind, regions: [dst, src, third], record, form, image: self.words })
+        Ok(Op { kind, regions: [dst, src, third], record: op, form, image: self.words })
+    }
+
+    /// Matrices of the image.
+    fn matrix_count(&self) -> usize {
+        low(self.head(h::W_MATRIX_COUNT))
+    }
+
+    /// Offset of matrix record `i`.
+    fn matrix_at(&self, i: usize) -> usize {
+        self.head(h::W_MATRICES) as usize + i * h::MATRIX_WORDS
     }
 
     fn check(&self) -> Result<(), ImageError> {
-        let reserved = self.header[28] | self.header[29] | self.header[30] | self.header[31];
+        let reserved = high(self.head(h::W_MATRIX_COUNT)) as u32 | self.header[30] | self.header[31];
         if reserved != 0
             || (self.head(h::W_KIND) >> 8) as u8 != 0
             || high(self.head(h::W_WORK_FLAGS)) >> CONTRACT_ARRAYS != 0
@@ -555,32 +608,59 @@ impl<'a> Image<'a> {
         if self.obs_len() == 0 || self.act_len() == 0 || self.op_count() == 0 {
             return Err(ImageError::Shape);
         }
-        // What survives from one step to the next must not be written by anything else: only neighbours in this list may share
-        // memory, and the action, behind an empty region, has none.
-        let (none, action) = (Region::default(), self.action());
-        self.check_regions(&[self.state(), self.output(), self.work(), self.observation(), none, action], 2)?;
+        // State, observation, what operations write, action, work area: in this order and without a gap. (`check_sections` sees
+        // to the middle.)
+        let (action, work) = (self.action(), self.work());
+        if self.state().offset != 0
+            || self.observation().offset != self.state().end()
+            || self.output().offset < self.observation().end()
+            || work.offset != action.end()
+            || work.end() != self.scratch_words()
+            || work.end() > h::MAX_SCRATCH
+        {
+            return Err(ImageError::Arena);
+        }
         if !is_positive(self.rate_hz()) {
             return Err(ImageError::Constant);
-        }
-        if !is_utf8(self.name_bytes().ok_or(ImageError::Section)?) {
-            return Err(ImageError::Name);
         }
         // A head that tests nothing would report success.
         if self.self_test_steps() == 0 {
             return Err(ImageError::SelfTest);
         }
-        self.constants(
-            self.head(h::W_SELF_TEST) as usize,
-            self.self_test_steps().saturating_mul(self.obs_len() + self.act_len()),
-        )?;
-        self.check_contract()?;
-        self.checked(self.head(h::W_OPS) as usize, self.op_count() * h::OP_WORDS)?;
-        (0..self.op_count()).try_for_each(|i| self.check_op(i))
+        self.check_sections()
     }
 
-    fn check_contract(&self) -> Result<(), ImageError> {
+    /// The sections, in the order in which they stand, and what they hold.
+    fn check_sections(&self) -> Result<(), ImageError> {
+        let front = &mut Front { words: self.words, at: h::WORDS };
+        for i in 0..self.matrix_count() {
+            check_matrix(self.matrix_at(i), front, self.work().len)?;
+        }
+        front.take(self.head(h::W_MATRICES) as usize, self.matrix_count() * h::MATRIX_WORDS)?;
+        let mut written = self.observation().end();
+        for i in 0..self.op_count() {
+            written = self.check_op(i, front, written)?;
+        }
+        if self.output().end() > written {
+            return Err(ImageError::Unwritten);
+        }
+        if written != self.action().offset {
+            return Err(ImageError::Arena);
+        }
+        front.take(self.head(h::W_OPS) as usize, self.op_count() * h::OP_WORDS)?;
+        self.check_contract(front)?;
+        let name = front.take(self.head(h::W_NAME) as usize, self.name_len().div_ceil(4))?;
+        if !is_text(bytemuck::must_cast_slice(name).get(..self.name_len()).unwrap_or_default()) {
+            return Err(ImageError::Name);
+        }
+        // The arena holds both lengths, so that the product fits 32 bits.
+        let self_test = self.self_test_steps() * (self.obs_len() + self.act_len());
+        front.take_finite(self.head(h::W_SELF_TEST) as usize, self_test)
+    }
+
+    fn check_contract(&self, front: &mut Front<'a>) -> Result<(), ImageError> {
         let arrays = (0..CONTRACT_ARRAYS).filter(|which| self.has_contract(*which)).count();
-        self.constants(self.head(h::W_CONTRACT) as usize, arrays * self.act_len())?;
+        front.take_finite(self.head(h::W_CONTRACT) as usize, arrays * self.act_len())?;
         for i in 0..self.act_len() {
             let [_, _, low, high, max_step] = self.contract_of(i);
             if low > high {
@@ -593,63 +673,95 @@ impl<'a> Image<'a> {
         Ok(())
     }
 
-    /// Refuses regions outside the arena, and those that overlap others which are `distance` or more behind them.
-    fn check_regions(&self, regions: &[Region], distance: usize) -> Result<(), ImageError> {
-        for (i, region) in regions.iter().enumerate() {
-            if region.offset + region.len > self.scratch_words() {
-                return Err(ImageError::Arena);
-            }
-            if regions.iter().skip(i + distance).any(|other| region.overlaps(*other)) {
-                return Err(ImageError::Overlap);
-            }
-        }
-        Ok(())
-    }
-
+    /// Checks an operation before which the first `written` words of the arena hold something of the step; gives their number
+    /// behind it.
     #[inline(never)]
-    fn check_op(&self, i: usize) -> Result<(), ImageError> {
+    fn check_op(&self, i: usize, front: &mut Front<'a>, written: usize) -> Result<usize, ImageError> {
         let op = self.op(i);
         let op = op.as_ref().map_err(|e| *e)?;
-        let Form { max_detail, src, third, constants, arrays, .. } = *op.form;
-        // Fields that the operation has not are zero.
+        let Form { max_detail, constants, arrays, unused, .. } = op.form;
         let [head, places, lengths, data] = op.record.map(u32::from_le);
-        let mut unused = if src == 0 { high(places) } else { 0 };
-        unused |= if third == 0 { high(lengths) } else { 0 };
-        if !op.is_linear() {
-            unused |= low(lengths) | if constants == 0 { data as usize } else { 0 };
-        }
-        if unused != 0 || (head >> 8) as u8 > max_detail {
+        let n = op.dst().len;
+        if (places & unused[0] | lengths & unused[1] | data & unused[2]) != 0 || (head >> 8) as u8 > *max_detail {
             return Err(ImageError::Reserved);
         }
-        let n = op.dst().len;
         if n == 0 {
             return Err(ImageError::Shape);
         }
         if op.is_linear() {
-            check_linear(op)?;
+            let behind = op.data().wrapping_sub(self.matrix_at(0));
+            if !behind.is_multiple_of(h::MATRIX_WORDS) || behind / h::MATRIX_WORDS >= self.matrix_count() {
+                return Err(ImageError::Matrix);
+            }
+            // The matrix itself was checked with the others.
+            if low(self.word(op.data())) != n {
+                return Err(ImageError::Shape);
+            }
+            if op.bias() != 0 {
+                front.take_finite(op.bias(), n)?;
+            }
+        } else if *constants > 0 {
+            let [constants, arrays] = [*constants, *arrays].map(usize::from);
+            for constant in front.take(op.data(), constants)? {
+                // Above 0, and finite but for limits: positive numbers are in the order of their bits.
+                let infinity = f32::INFINITY.to_bits() + u32::from(op.kind == OpKind::Normalize);
+                if u32::from_le(*constant).wrapping_sub(1) >= infinity - 1 {
+                    return Err(ImageError::Constant);
+                }
+            }
+            front.take_finite(op.data() + constants, arrays * n)?;
         }
-        let [constants, arrays] = [constants, arrays].map(usize::from);
-        let words = self.checked(op.data(), constants + arrays * n)?;
-        // Limits may be infinite, where there is none.
-        let unlimited = if op.kind == OpKind::Normalize { constants } else { 0 };
-        finite(words.get(unlimited..).unwrap_or_default())?;
-        let constants = words.get(..constants).unwrap_or_default();
-        if !constants.iter().all(|word| f32::from_bits(u32::from_le(*word)) > 0.0) {
-            return Err(ImageError::Constant);
-        }
-        self.check_regions(&op.regions, 1)?;
-        // The last action carries the step limit; only the contract writes it.
-        let written = if op.kind == OpKind::LstmCell { op.third() } else { op.dst() };
-        if op.dst().overlaps(self.action()) || written.overlaps(self.action()) {
+        let [dst, src, third] = op.regions;
+        if dst.overlaps(src) || dst.overlaps(third) || src.overlaps(third) {
             return Err(ImageError::Overlap);
         }
-        Ok(())
+        // Nothing is read that no operation of this step has written: what a step before or the caller left there, or the work
+        // area, where backends differ.
+        let third = if op.is_linear() { Region::default() } else { third };
+        let old = if op.reads_dst() { dst.end() } else { 0 };
+        if src.end().max(third.end()).max(old) > written {
+            return Err(ImageError::Unwritten);
+        }
+        if dst.offset > written {
+            return Err(ImageError::Arena);
+        }
+        Ok(written.max(dst.end()))
     }
 }
 
-/// The matrix of the record at `at`, refused where the record says something impossible.
-fn matrix(image: &[u32], at: usize) -> Result<Matrix<'_>, ImageError> {
-    let [size, levels, blocks, bias] = record(image, at)?.map(u32::from_le);
+/// Takes sections in the order in which they stand. None shares a word with another, so that what is checked is no longer than
+/// the image.
+struct Front<'a> {
+    words: &'a [u32],
+    /// The end of the last one.
+    at: usize,
+}
+
+impl<'a> Front<'a> {
+    #[inline(always)]
+    fn take(&mut self, offset: usize, len: usize) -> Result<&'a [u32], ImageError> {
+        self.next(offset, len).ok_or(ImageError::Section)
+    }
+
+    #[inline(never)]
+    fn next(&mut self, offset: usize, len: usize) -> Option<&'a [u32]> {
+        let section = section(self.words, offset, len).filter(|_| offset >= self.at)?;
+        self.at = offset + len;
+        Some(section)
+    }
+
+    /// As [`Self::take`], of f32 constants, refused where one is not finite.
+    #[inline(never)]
+    fn take_finite(&mut self, offset: usize, len: usize) -> Result<(), ImageError> {
+        let constants = self.take(offset, len)?;
+        let finite = constants.iter().all(|&w| f32::from_bits(u32::from_le(w)).is_finite());
+        if finite { Ok(()) } else { Err(ImageError::Constant) }
+    }
+}
+
+/// The matrix of the record at `at` with the biases at `bias` (0: none), refused where the record says something impossible.
+fn matrix(image: &[u32], at: usize, bias: usize) -> Result<Matrix<'_>, ImageError> {
+    let [size, levels, blocks, records] = record(image, at)?.map(u32::from_le);
     let (rows, cols, group, x_max) = (low(size), high(size), low(levels), high(levels) as u16);
     if rows == 0 || rows > h::MAX_ROWS || cols == 0 {
         return Err(ImageError::Shape);
@@ -664,28 +776,34 @@ fn matrix(image: &[u32], at: usize) -> Result<Matrix<'_>, ImageError> {
         return Err(ImageError::Reserved);
     }
     let section = |offset, len| section(image, offset, len).ok_or(ImageError::Section);
-    let bias = if bias == 0 { &[] } else { section(bias as usize, rows)? };
-    let records = section(at + h::MATRIX_WORDS, blocks as usize * h::BLOCK_WORDS)?;
+    let bias = if bias == 0 { &[] } else { section(bias, rows)? };
+    let records = section(records as usize, low(blocks) * h::BLOCK_WORDS)?;
     Ok(Matrix { rows, cols, group, x_max, bias, image, records })
 }
 
-/// The matrix of a linear operation: its lengths, biases, blocks, the places of their rows, and their sums.
+/// The matrix of the record at `at`: its blocks, the places of their rows, their sums, and the words of the `work` area that its
+/// input takes.
 #[inline(never)]
-fn check_linear(op: &Op<'_>) -> Result<(), ImageError> {
-    let matrix = op.linear_matrix();
+fn check_matrix(at: usize, front: &mut Front<'_>, work: usize) -> Result<(), ImageError> {
+    let matrix = &matrix(front.words, at, 0);
     let matrix = matrix.as_ref().map_err(|e| *e)?;
-    if matrix.cols != op.src().len || matrix.rows != op.dst().len {
-        return Err(ImageError::Shape);
-    }
-    if op.third().len < matrix.prepared_words() {
-        return Err(ImageError::Arena);
-    }
-    finite(matrix.bias)?;
     let mut seen = [0u32; h::MAX_ROWS / 32];
     let mut first_row = 0;
     for record in matrix.records.as_chunks().0 {
         let rows = row_block(matrix, record, first_row);
         let rows = rows.as_ref().map_err(|e| *e)?;
+        // Weights, scales and index stand behind each other.
+        let [_, weights, scales, index] = record.map(|word| u32::from_le(word) as usize);
+        let to_scales = rows.block.words().len();
+        let to_index = to_scales + rows.scales.len();
+        if scales != weights + to_scales || index != 0 && index != weights + to_index {
+            return Err(ImageError::Section);
+        }
+        front.take(weights, to_index + rows.index.len())?;
+        // Magnitudes compare as their bits, and a sign is above them all.
+        if bytemuck::must_cast_slice(rows.scales).iter().any(|scale: &u16| u16::from_le(*scale) >= BF16_INFINITY) {
+            return Err(ImageError::Constant);
+        }
         first_row += rows.block.shape().rows;
         for row in 0..rows.block.shape().rows {
             let output = rows.output(row);
@@ -694,18 +812,22 @@ fn check_linear(op: &Op<'_>) -> Result<(), ImageError> {
                 return Err(ImageError::Index);
             }
             *word |= 1 << (output % 32);
-            // Magnitudes compare as their bits, and a sign is above them all.
-            if rows.scale(row).to_bits() >= f32::INFINITY.to_bits() {
-                return Err(ImageError::Constant);
-            }
         }
-        if worst_case_bound(&rows.block, matrix.x_max) > i64::from(i32::MAX)
-            && worst_case(&rows.block, matrix.x_max) > i64::from(i32::MAX)
-        {
+        if room(&rows.block) > work {
+            return Err(ImageError::Arena);
+        }
+        if !fits_i32(&rows.block, matrix.x_max) {
             return Err(ImageError::Overflow);
         }
     }
+    front.take(word(front.words, at + 3) as usize, matrix.records.len())?;
     Ok(())
+}
+
+/// Words that preparing an input for the block takes.
+#[inline(never)]
+fn room(block: &Block<'_>) -> usize {
+    Plan::of(block).room(block.shape().cols)
 }
 
 /// `len` words at `offset`, refused where they are not all in the image and behind its header.
@@ -729,35 +851,30 @@ fn is_positive(x: f32) -> bool {
     (1..f32::INFINITY.to_bits()).contains(&x.to_bits())
 }
 
-/// Refuses f32 bits that are not finite.
-#[inline(never)]
-fn finite(constants: &[u32]) -> Result<(), ImageError> {
-    let finite = constants.iter().all(|&w| f32::from_bits(u32::from_le(w)).is_finite());
-    if finite { Ok(()) } else { Err(ImageError::Constant) }
-}
-
-/// What `core::str::from_utf8` finds, in a quarter of its code.
-fn is_utf8(bytes: &[u8]) -> bool {
-    // Bytes that must follow, the code point so far, and the least one that needs so many bytes.
-    let (mut more, mut point, mut least) = (0, 0, 0);
+/// Whether bytes are UTF-8 without control characters (C0, DEL, C1), which would steer the terminal that a name is printed on.
+/// In a quarter of the code of `core::str::from_utf8`.
+fn is_text(bytes: &[u8]) -> bool {
+    // Bytes that must follow, the code point so far, and the least one that needs so many bytes and is no control character.
+    let (mut more, mut point, mut least) = (0, 0u32, 0);
     for &byte in bytes {
-        let byte = u32::from(byte);
+        // In a lead byte as many as the sequence has bytes, in the others 1; in an ASCII character 0.
+        let ones = byte.leading_ones();
         if more > 0 {
-            if byte & 0xc0 != 0x80 {
+            (more, point) = (more - 1, point << 6 | u32::from(byte & 0x3f));
+            let surrogate = point >> 11 == 0xd800 >> 11;
+            if ones != 1 || more == 0 && (point < least || point > 0x10_ffff || surrogate) {
                 return false;
             }
-            (more, point) = (more - 1, point << 6 | byte & 0x3f);
-            if more == 0 && (point < least || point > 0x10_ffff || (0xd800..0xe000).contains(&point)) {
+        } else if ones == 0 {
+            if !(0x20..0x7f).contains(&byte) {
                 return false;
             }
         } else {
-            (more, point, least) = match byte {
-                0..0x80 => (0, 0, 0),
-                0xc0..0xe0 => (1, byte & 0x1f, 0x80),
-                0xe0..0xf0 => (2, byte & 0x0f, 0x800),
-                0xf0..0xf8 => (3, byte & 0x07, 0x1_0000),
-                _ => return false,
-            };
+            if !(2..=4).contains(&ones) {
+                return false;
+            }
+            (more, point) = (ones - 1, u32::from(byte & 0x7f >> ones));
+            least = (1 << (5 * ones - 4)).max(0xa0);
         }
     }
     more == 0
@@ -833,20 +950,23 @@ pub fn half_words(values: &[u16]) -> impl Iterator<Item = u32> + '_ {
 
 #[cfg(test)]
 mod tests {
-    use super::is_utf8;
+    use super::is_text;
 
     /// All sequences of up to four bytes from those where the rules change.
     #[test]
-    fn utf8_is_what_core_says() {
-        let edges =
-            [0x00, 0x7f, 0x80, 0x8f, 0x90, 0x9f, 0xa0, 0xbf, 0xc0, 0xc1, 0xc2, 0xdf, 0xe0, 0xe1, 0xec, 0xed, 0xee];
+    fn text_is_utf8_without_control_characters() {
+        let edges = [
+            0x00, 0x1f, 0x20, 0x7e, 0x7f, 0x80, 0x8f, 0x90, 0x9f, 0xa0, 0xbf, 0xc0, 0xc1, 0xc2, 0xdf, 0xe0, 0xe1, 0xec,
+            0xed, 0xee,
+        ];
         let edges = [&edges[..], &[0xef, 0xf0, 0xf1, 0xf3, 0xf4, 0xf5, 0xf7, 0xf8, 0xff]].concat();
         let mut sequences = vec![Vec::new()];
         for _ in 0..4 {
             let longer = sequences.iter().flat_map(|s: &Vec<u8>| edges.iter().map(|b| [&s[..], &[*b]].concat()));
             sequences = longer.collect();
             for bytes in &sequences {
-                assert_eq!(is_utf8(bytes), core::str::from_utf8(bytes).is_ok(), "{bytes:x?}");
+                let expected = core::str::from_utf8(bytes).is_ok_and(|text| !text.contains(char::is_control));
+                assert_eq!(is_text(bytes), expected, "{bytes:x?}");
             }
         }
     }

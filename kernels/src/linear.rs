@@ -7,13 +7,14 @@
 
 use core::ops::Range;
 
-use crate::activations::{NotFinite, Plan, Prepared, Scale, max_prepared_words};
+use crate::activations::{Plan, Prepared, Scale, max_prepared_words};
 #[cfg(actq_fpu)]
 use crate::armv7em;
+use crate::error::Fault;
 use crate::format::{Block, BlockShape, Lanes, MAX_GROUP, PAD_COLS, QUAD, STRIP};
 use crate::gemv::gemv;
 use crate::image::{header::BLOCK_WORDS, row_block};
-use crate::slice::{LinearCursor, Meter, Price, Unlimited};
+use crate::slice::{LinearCursor, Meter, Price};
 
 /// Rows whose sums stand on the stack at once.
 pub(crate) const RUN: usize = 8 * STRIP;
@@ -109,9 +110,9 @@ impl RowBlock<'_> {
 
     /// `y = start + acc * (row_scale * x_scale)` for the block's rows and their places in `y`, with a vector that was prepared
     /// for the block. `start` holds the bits of the whole output's biases; without it, and for rows with an index, y itself is
-    /// the start. Nothing is done where `start` or `y` is too short.
-    pub fn apply(&self, x: &Prepared<'_>, x_scale: Scale, start: Option<&[u32]>, y: &mut [f32]) {
-        self.apply_rows(0..self.block.shape().rows, x, x_scale, start, y);
+    /// the start. `None` where `start` or `y` is too short.
+    pub fn apply(&self, x: &Prepared<'_>, x_scale: Scale, start: Option<&[u32]>, y: &mut [f32]) -> Option<()> {
+        self.apply_rows(0..self.block.shape().rows, x, x_scale, start, y)
     }
 
     /// As [`Self::apply`], for a run of the block's rows, which starts at a multiple of [`STRIP`] and ends at another or with
@@ -123,7 +124,7 @@ impl RowBlock<'_> {
         x_scale: Scale,
         start: Option<&[u32]>,
         y: &mut [f32],
-    ) {
+    ) -> Option<()> {
         let x_scale = x_scale.get();
         if start.is_none() || !self.index.is_empty() {
             return self.apply_runs(&mut [0; RUN], rows, x, x_scale, start, y);
@@ -132,18 +133,17 @@ impl RowBlock<'_> {
         let whole = if rows.end.is_multiple_of(QUAD) { rows.end } else { rows.end & !(STRIP - 1) };
         if rows.start < whole {
             let first = self.first_row + rows.start;
-            let Some((start, y)) = outputs(first, whole - rows.start, start, y) else { return };
-            if gemv(&self.block, x, rows.start, bytemuck::cast_slice_mut(y)).is_err() {
-                return;
-            }
+            let (start, y) = outputs(first, whole - rows.start, start, y)?;
+            gemv(&self.block, x, rows.start, bytemuck::must_cast_slice_mut(y)).ok()?;
             self.scale_in_order(rows.start, None, x_scale, start, y);
         }
         if whole < rows.end {
-            self.apply_runs(&mut [0; STRIP], whole..rows.end, x, x_scale, start, y);
+            self.apply_runs(&mut [0; STRIP], whole..rows.end, x, x_scale, start, y)?;
         }
+        Some(())
     }
 
-    /// As [`Self::apply`], for a run of rows as there, as many at once as have room in `sums`.
+    /// As [`Self::apply_rows`], as many rows at once as have room in `sums`.
     #[inline(never)]
     fn apply_runs(
         &self,
@@ -153,23 +153,22 @@ impl RowBlock<'_> {
         x_scale: f32,
         start: Option<&[u32]>,
         y: &mut [f32],
-    ) {
+    ) -> Option<()> {
         let mut first = rows.start;
         while first < rows.end {
             let run = sums.len().min(rows.end.next_multiple_of(QUAD) - first);
-            let Some(sums) = sums.get_mut(..run) else { return };
-            if gemv(&self.block, x, first, sums).is_err() {
-                return;
-            }
+            let sums = sums.get_mut(..run)?;
+            gemv(&self.block, x, first, sums).ok()?;
             let sums = sums.get(..rows.end - first).unwrap_or(sums);
             if self.index.is_empty() {
-                let Some((start, y)) = outputs(self.first_row + first, sums.len(), start, y) else { return };
+                let (start, y) = outputs(self.first_row + first, sums.len(), start, y)?;
                 self.scale_in_order(first, Some(sums), x_scale, start, y);
             } else {
-                self.scale_by_index(first, sums, x_scale, y);
+                self.scale_by_index(first, sums, x_scale, y)?;
             }
             first += sums.len();
         }
+        Some(())
     }
 
     /// Turns the sums of as many rows as `y` has, from `first` on, into results. What is `None` stands in y itself.
@@ -184,16 +183,15 @@ impl RowBlock<'_> {
         }
     }
 
-    /// Adds the sums of the rows from `first` on, scaled, to what stands at the rows' places.
+    /// Adds the sums of the rows from `first` on, scaled, to what stands at the rows' places; `None` where there is no such place.
     #[inline(never)]
-    fn scale_by_index(&self, first: usize, sums: &[i32], x_scale: f32, y: &mut [f32]) {
-        let halves = |words| bytemuck::cast_slice::<u32, u16>(words).get(first..first + sums.len());
-        let (Some(scales), Some(index)) = (halves(self.scales), halves(self.index)) else { return };
+    fn scale_by_index(&self, first: usize, sums: &[i32], x_scale: f32, y: &mut [f32]) -> Option<()> {
+        let halves = |words| bytemuck::must_cast_slice::<u32, u16>(words).get(first..first + sums.len());
+        let (scales, index) = (halves(self.scales)?, halves(self.index)?);
         for ((sum, scale), at) in sums.iter().zip(scales).zip(index) {
-            if let Some(y) = y.get_mut(usize::from(u16::from_le(*at))) {
-                *y += *sum as f32 * (bf16(u16::from_le(*scale)) * x_scale);
-            }
+            *y.get_mut(usize::from(u16::from_le(*at)))? += *sum as f32 * (bf16(u16::from_le(*scale)) * x_scale);
         }
+        Some(())
     }
 }
 
@@ -208,14 +206,8 @@ impl Matrix<'_> {
         max_prepared_words(self.cols, self.group)
     }
 
-    /// `y = W x + b`, or `y = y + b + W x` where `accumulate`. `work` holds at least [`Self::prepared_words`] words; `x` and
-    /// `y` have the matrix's lengths (what is missing is left out).
-    pub fn apply(&self, x: &[f32], work: &mut [u32], y: &mut [f32], accumulate: bool) -> Result<(), NotFinite> {
-        self.resume(&mut LinearCursor::default(), &mut Unlimited, x, work, y, accumulate)?;
-        Ok(())
-    }
-
-    /// As [`Self::apply`], from where `at` stands and as far as the budget reaches; true when all is done.
+    /// `y = W x + b`, or `y = y + b + W x` where `accumulate`, from where `at` stands and as far as the budget reaches; true when
+    /// all is done. `work` holds at least [`Self::prepared_words`] words; `x` and `y` have the matrix's lengths.
     #[inline(never)]
     pub(crate) fn resume(
         &self,
@@ -225,7 +217,10 @@ impl Matrix<'_> {
         work: &mut [u32],
         y: &mut [f32],
         accumulate: bool,
-    ) -> Result<bool, NotFinite> {
+    ) -> Result<bool, Fault> {
+        if x.len() != self.cols || y.len() != self.rows {
+            return Err(Fault::Damaged);
+        }
         let x_scale = match at.scale {
             Some(scale) => scale,
             None if budget.take(1, || Price::magnitude(self)) == 0 => return Ok(false),
@@ -244,7 +239,8 @@ impl Matrix<'_> {
         let mut plan: Option<Plan> = None;
         let mut first_row = 0;
         for (i, record) in self.records.as_chunks::<BLOCK_WORDS>().0.iter().enumerate() {
-            let Ok(rows) = row_block(self, record, first_row) else { continue };
+            let rows = row_block(self, record, first_row);
+            let rows = rows.as_ref().map_err(|_| Fault::Damaged)?;
             let shape = rows.block.shape();
             first_row += shape.rows;
             if i < at.block {
@@ -254,22 +250,20 @@ impl Matrix<'_> {
             if !plan.as_ref().is_some_and(|plan| plan.fits(shape)) {
                 let plan = plan.insert(Plan::of(&rows.block));
                 if at.prepared != Some(shape.width) {
-                    if budget.take(1, || Price::prepare(&rows)) == 0 {
+                    if budget.take(1, || Price::prepare(rows)) == 0 {
                         return Ok(false);
                     }
                     at.prepared = Some(shape.width);
-                    x_scale.quantize(x, plan, work);
+                    x_scale.quantize(x, plan, work).ok_or(Fault::Damaged)?;
                 }
             }
-            if let Some(x) = plan.as_ref().and_then(|plan| Prepared::new(work, plan)) {
-                let strips =
-                    budget.take((shape.rows - at.row).div_ceil(STRIP), || Price::strips(&rows, start.is_some()));
-                let end = shape.rows.min(at.row + strips * STRIP);
-                rows.apply_rows(at.row..end, &x, x_scale, start, y);
-                at.row = end;
-                if end < shape.rows {
-                    return Ok(false);
-                }
+            let x = plan.as_ref().and_then(|plan| Prepared::new(work, plan)).ok_or(Fault::Damaged)?;
+            let strips = budget.take((shape.rows - at.row).div_ceil(STRIP), || Price::strips(rows, start.is_some()));
+            let end = shape.rows.min(at.row + strips * STRIP);
+            rows.apply_rows(at.row..end, &x, x_scale, start, y).ok_or(Fault::Damaged)?;
+            at.row = end;
+            if end < shape.rows {
+                return Ok(false);
             }
             at.block += 1;
             at.row = 0;
@@ -306,7 +300,7 @@ impl Matrix<'_> {
         } else if bias.is_empty() {
             y.fill(0.0);
         } else {
-            copy_le(bias, bytemuck::cast_slice_mut(y));
+            copy_le(bias, bytemuck::must_cast_slice_mut(y));
         }
     }
 }
@@ -354,9 +348,15 @@ fn largest_sum(block: &Block<'_>) -> Option<u32> {
     Some(largest)
 }
 
-/// An upper bound of [`worst_case`] from the shape alone.
-pub fn worst_case_bound(block: &Block<'_>, x_max: u16) -> i64 {
-    let shape = block.shape();
+/// An upper bound of the rows' sums of `|level| * scale`, from the shape alone. It has 31 bits.
+pub fn largest_sum_bound(shape: BlockShape) -> u32 {
     let scale = if shape.group == 0 { 1 } else { 255 };
-    shape.cols as i64 * i64::from(shape.width.max_level()) * scale * i64::from(x_max)
+    shape.cols as u32 * shape.width.max_level() as u32 * scale
+}
+
+/// Whether no sum of the block's rows can leave int32 for activations up to `x_max`: from the shape alone where that says so, else
+/// by the codes and scales themselves, as [`worst_case`].
+pub(crate) fn fits_i32(block: &Block<'_>, x_max: u16) -> bool {
+    let most = (i32::MAX as u32).checked_div(x_max.into()).unwrap_or(0);
+    largest_sum_bound(block.shape()) <= most || largest_sum(block).is_some_and(|sum| sum <= most)
 }

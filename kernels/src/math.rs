@@ -12,7 +12,7 @@
 //! | [`silu`], [`gelu_tanh`] | 1.4e-7 * max(1, abs(x)) |
 //! | [`gelu`] | 1.8e-7 * max(1, abs(x)) |
 //!
-//! Where the input is not a number, so is the result, except of [`relu`].
+//! Where the input is not a number, so is the result; no function makes a finite number of an infinite one.
 
 use crate::activations::ROUND;
 
@@ -136,6 +136,13 @@ pub fn clamp(x: f32, low: f32, high: f32) -> f32 {
     }
 }
 
+/// 0 where `x` is finite, else NaN: added to a result, it shows what would be lost in it.
+#[inline(always)]
+#[expect(clippy::eq_op, reason = "the difference of an infinity and itself is NaN")]
+pub(crate) fn zero_or_nan(x: f32) -> f32 {
+    x - x
+}
+
 /// `2^(y / one)` as a fraction of two positive numbers, for a finite y and a power of two: `one` sets the unit, and changes
 /// nothing else. The exponent stays within -33 ..= 33; there, all functions here have come to their limits as far as f32 tells.
 /// What uses the fraction has to divide anyway.
@@ -193,11 +200,12 @@ pub fn exp(x: f32) -> f32 {
     n / d
 }
 
-/// `max(x, 0)`. By the bits, as an unsigned number: what is negative or not a number stands above infinity.
+/// `max(x, 0)`; what is not finite stays as it is, so that an overflow is seen behind it. By the bits, as a signed number:
+/// finite negative numbers stand below minus infinity, which stands below all else.
 #[inline(always)]
 pub fn relu(x: f32) -> f32 {
-    let bits = x.to_bits();
-    f32::from_bits(if bits > f32::INFINITY.to_bits() { 0 } else { bits })
+    let bits = x.to_bits() as i32;
+    f32::from_bits(if bits < f32::NEG_INFINITY.to_bits() as i32 { 0 } else { bits as u32 })
 }
 
 /// `x` where positive, else `exp(x) - 1`

@@ -2,14 +2,17 @@
 
 use core::ops::Range;
 
-use crate::math::clamp;
+use crate::math::{clamp, zero_or_nan};
 
-/// `y = clamp((clamp(x, ±pre_clip) - mean) * scale, ±clip)`; an infinite clip does nothing. `mean` and `scale` hold f32 bits.
+/// `y = clamp((clamp(x, ±pre_clip) - mean) * scale, ±clip)`; an infinite clip does nothing. `mean` and `scale` hold f32 bits. An
+/// x that is not finite gives NaN.
 #[inline(never)]
 pub fn normalize(x: &[f32], mean: &[u32], scale: &[u32], pre_clip: f32, clip: f32, y: &mut [f32]) {
     for (((y, x), &mean), &scale) in y.iter_mut().zip(x).zip(mean).zip(scale) {
+        // A clip would hide that a value before it has left f32's range.
+        let zero = zero_or_nan(*x);
         let x = clamp(*x, -pre_clip, pre_clip);
-        let z = (x - constant(mean)) * constant(scale);
+        let z = (x - (constant(mean) + zero)) * constant(scale);
         *y = clamp(z, -clip, clip);
     }
 }
@@ -81,7 +84,8 @@ fn elements(units: &Range<usize>, pass: usize, len: usize) -> Range<usize> {
 #[inline(never)]
 fn inverse_deviation(moments: &mut Moments, x: &[f32], squared: Range<usize>, center: f32, eps: f32) -> f32 {
     moments.squares = sum(moments.squares, x.get(squared).unwrap_or(&[]), |v| (v - center) * (v - center));
-    1.0 / sqrt(moments.squares / count(x) + eps)
+    // Divided by an infinite deviation, a vector would be zeros.
+    1.0 / sqrt(moments.squares / count(x) + eps) + zero_or_nan(moments.squares)
 }
 
 /// `y += x`, as far as both go.

@@ -1,7 +1,9 @@
 //! From the graph's values to regions of the arena: which operation reads and writes where.
 //!
-//! The operations say what they become over buffers ([`crate::graph::lowering`]); here the buffers get their places. What outlives a step (recurrent state, the last action, the chunk) has a place of its own; the other buffers share memory by
-//! their lifetimes, first fit.
+//! The operations say what they become over buffers ([`crate::graph::lowering`]); here the buffers get their places. The arena
+//! holds the recurrent state, the observation, the values, which share memory by their lifetimes, first fit, the last action, and
+//! the work area. Buffers are placed in the order in which they are written, each as low as it fits: so none leaves a gap, and what
+//! a step has written always is the begin of the arena, as the image's check wants it.
 
 use actq_kernels::activations::max_prepared_words;
 use actq_kernels::image::Region;
@@ -42,10 +44,9 @@ pub fn lower(graph: &Graph, act_len: usize, group: usize) -> Result<Program> {
         lowering.finish_node(place, &node.inputs);
     }
     let output = lowering.private(graph.output());
-    lowering.buffers[output].lifetime = Lifetime::Kept;
-    let action = lowering.buffer(act_len, Lifetime::Kept);
+    lowering.buffers[output].lifetime = Lifetime::Output;
     let work_len = graph.matrices.iter().map(|m| max_prepared_words(m.cols, group)).max().unwrap_or(0);
-    Arena { lowering, work_len }.assign(OBSERVATION, output, action)
+    Arena { lowering, work_len }.assign(OBSERVATION, output, act_len)
 }
 
 /// The buffer of the observation.
@@ -59,12 +60,12 @@ struct Arena {
 
 impl Arena {
     /// Gives every buffer its place.
-    fn assign(self, observation: BufferId, output: BufferId, action: BufferId) -> Result<Program> {
+    fn assign(self, observation: BufferId, output: BufferId, act_len: usize) -> Result<Program> {
         let Lowering { steps, buffers, .. } = &self.lowering;
         let mut offsets = vec![0; buffers.len()];
         let mut top = 0;
         let mut state_len = 0;
-        for lifetime in [Lifetime::State, Lifetime::Kept] {
+        for lifetime in [Lifetime::State, Lifetime::Observation] {
             for (offset, buffer) in offsets.iter_mut().zip(buffers).filter(|(_, b)| b.lifetime == lifetime) {
                 *offset = top;
                 top += buffer.len;
@@ -92,7 +93,8 @@ impl Arena {
             ends.push(offset + len);
             placed.push((buffer, life));
         }
-        let work_offset = ends.into_iter().max().unwrap_or(top);
+        let action = Region { offset: ends.into_iter().max().unwrap_or(top), len: act_len };
+        let work_offset = action.offset + action.len;
         let words = work_offset + self.work_len;
         ensure!(
             words <= usize::from(u16::MAX),
@@ -112,23 +114,25 @@ impl Arena {
             state: Region { offset: 0, len: state_len },
             observation: whole(observation),
             output: whole(output),
-            action: whole(action),
+            action,
             work: Region { offset: work_offset, len: self.work_len },
             words,
         })
     }
 
-    /// First and last operation that names each buffer of [`Lifetime::Step`], in order of the first.
+    /// First and last operation during which each value's buffer is needed, in order of the first.
     fn lifetimes(&self) -> Vec<(usize, (usize, usize))> {
         let mut lives: Vec<(usize, (usize, usize))> = Vec::new();
         for (at, step) in self.lowering.steps.iter().enumerate() {
             for slice in [Some(step.dst), step.src, step.third].into_iter().flatten() {
-                if self.lowering.buffers[slice.buffer].lifetime != Lifetime::Step {
-                    continue;
-                }
+                let last = match self.lowering.buffers[slice.buffer].lifetime {
+                    Lifetime::Step => at,
+                    Lifetime::Output => usize::MAX,
+                    Lifetime::Observation | Lifetime::State => continue,
+                };
                 match lives.iter_mut().find(|(buffer, _)| *buffer == slice.buffer) {
-                    Some((_, life)) => life.1 = at,
-                    None => lives.push((slice.buffer, (at, at))),
+                    Some((_, life)) => life.1 = last,
+                    None => lives.push((slice.buffer, (at, last))),
                 }
             }
         }

@@ -4,7 +4,6 @@ use std::path::Path;
 
 use actq_kernels::format::{self, LAYOUT_STAMP};
 use actq_kernels::image::{Kind, OpKind, Region, checksum, half_words, header as h, header::op};
-use actq_kernels::math::Function;
 use anyhow::{Context, Result, ensure};
 
 use crate::graph::lowering::{Step, StepData};
@@ -19,13 +18,10 @@ use crate::runtime::{ImageBuffer, with_head};
 pub fn image(policy: &Policy, matrices: &[Outcome]) -> Result<Vec<u8>> {
     let group = matrices.first().map_or(0, |m| m.quantized.group);
     let program = lower(&policy.graph, policy.act_len, group)?;
-    let mut writer = Writer { words: vec![0; h::WORDS], packed: Vec::new() };
-    writer.packed = matrices.iter().map(|m| writer.weights(m)).collect::<Result<_>>()?;
-    let records = program
-        .steps
-        .iter()
-        .map(|step| writer.op(&policy.graph, step, matrices))
-        .collect::<Result<Vec<[u32; h::OP_WORDS]>>>()?;
+    let mut writer = Writer { words: vec![0; h::WORDS], matrices: 0 };
+    let matrix_records = matrices.iter().map(|m| writer.matrix(m)).collect::<Result<Vec<_>>>()?;
+    writer.matrices = writer.push(matrix_records.into_iter().flatten());
+    let records = program.steps.iter().map(|step| writer.op(step)).collect::<Result<Vec<[u32; h::OP_WORDS]>>>()?;
     let ops = writer.push(records.into_iter().flatten());
     let contract = writer.words.len() as u32;
     let mut flags = 0;
@@ -47,7 +43,7 @@ pub fn image(policy: &Policy, matrices: &[Outcome]) -> Result<Vec<u8>> {
         Kind::Step => 0,
         Kind::Chunk => 1,
     };
-    let words = &mut writer.words;
+    let Writer { mut words, matrices: first_matrix } = writer;
     words[0] = h::MAGIC;
     words[h::W_VERSION] = halves(h::VERSION.into(), h::WORDS)?;
     words[h::W_LAYOUT] = LAYOUT_STAMP;
@@ -66,17 +62,19 @@ pub fn image(policy: &Policy, matrices: &[Outcome]) -> Result<Vec<u8>> {
     words[h::W_STEPS_NAME] = halves(steps, policy.name.len())?;
     words[h::W_NAME] = name;
     words[h::W_WEIGHTS] = policy.weights as u32;
+    words[h::W_MATRICES] = first_matrix;
+    words[h::W_MATRIX_COUNT] = halves(matrices.len(), 0)?;
     for (word, bytes) in words[h::W_DIGEST..].iter_mut().zip(policy.digest.chunks_exact(4)) {
         *word = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
     }
-    let actions = self_test_actions(&seal(words), &observations)?;
+    let actions = self_test_actions(&seal(&words), &observations)?;
     for (step, action) in actions.iter().enumerate() {
         let at = self_test as usize + step * (policy.graph.obs_len + policy.act_len) + policy.graph.obs_len;
         for (word, value) in words[at..].iter_mut().zip(action) {
             *word = value.to_bits();
         }
     }
-    Ok(seal(words))
+    Ok(seal(&words))
 }
 
 /// Fills in length and checksum and gives the bytes.
@@ -125,15 +123,10 @@ fn halves(low: usize, high: usize) -> Result<u32> {
     Ok(low as u32 | (high as u32) << 16)
 }
 
-/// Where the parts of a matrix stand.
-struct Packed {
-    /// Block records.
-    records: Vec<u32>,
-}
-
 struct Writer {
     words: Vec<u32>,
-    packed: Vec<Packed>,
+    /// Offset of the matrix records.
+    matrices: u32,
 }
 
 impl Writer {
@@ -152,9 +145,10 @@ impl Writer {
         self.push(bytes.chunks(4).map(|c| c.iter().rev().fold(0, |word, b| word << 8 | u32::from(*b))))
     }
 
-    /// Packs a matrix's blocks.
-    fn weights(&mut self, outcome: &Outcome) -> Result<Packed> {
+    /// Packs a matrix's blocks, and gives its record.
+    fn matrix(&mut self, outcome: &Outcome) -> Result<[u32; h::MATRIX_WORDS]> {
         let matrix = &outcome.quantized;
+        ensure!(matrix.rows <= h::MAX_ROWS, "a matrix has {} rows, {} are supported", matrix.rows, h::MAX_ROWS);
         let blocks = outcome.blocks();
         let in_order = Quantized::in_order(&blocks);
         let mut records = Vec::new();
@@ -184,16 +178,19 @@ impl Writer {
                 index,
             ]);
         }
-        Ok(Packed { records })
+        Ok([
+            halves(matrix.rows, matrix.cols)?,
+            halves(matrix.group, outcome.x_max.into())?,
+            halves(blocks.len(), 0)?,
+            self.push(records),
+        ])
     }
 
-    fn op(&mut self, graph: &Graph, step: &Step<Region>, matrices: &[Outcome]) -> Result<[u32; 4]> {
+    fn op(&mut self, step: &Step<Region>) -> Result<[u32; h::OP_WORDS]> {
         let (code, detail) = match step.kind {
             OpKind::Normalize => (op::NORMALIZE, 0),
             OpKind::Linear { accumulate } => (op::LINEAR, u8::from(accumulate)),
-            OpKind::Function(function) => {
-                (op::FUNCTION, Function::ALL.iter().position(|f| *f == function).unwrap_or_default() as u8)
-            }
+            OpKind::Function(function) => (op::FUNCTION, function as u8),
             OpKind::LayerNorm => (op::LAYER_NORM, 0),
             OpKind::RmsNorm => (op::RMS_NORM, 0),
             OpKind::Add => (op::ADD, 0),
@@ -201,34 +198,20 @@ impl Writer {
             OpKind::LstmCell => (op::LSTM_CELL, 0),
             OpKind::GruCell => (op::GRU_CELL, 0),
         };
-        let (src_len, data) = match &step.data {
+        let (bias, data) = match &step.data {
             StepData::None => (0, 0),
             StepData::Constants(values) => (0, self.push_floats(values)),
             StepData::Product { matrix, bias } => {
-                (graph.matrices[*matrix].cols, self.matrix(*matrix, &matrices[*matrix], bias)?)
+                let bias = if bias.iter().all(|b| *b == 0.0) { 0 } else { self.push_floats(bias) };
+                (bias, self.matrices + (matrix * h::MATRIX_WORDS) as u32)
             }
         };
         let offset = |region: Option<Region>| region.map_or(0, |r| r.offset);
         Ok([
             u32::from(code) | u32::from(detail) << 8 | halves(0, step.dst.len)?,
             halves(step.dst.offset, offset(step.src))?,
-            halves(src_len, offset(step.third))?,
+            bias | halves(0, offset(step.third))?,
             data,
         ])
-    }
-
-    /// The record of a matrix; where several operations share one, each has its own record over the same weights.
-    fn matrix(&mut self, index: usize, outcome: &Outcome, bias: &[f32]) -> Result<u32> {
-        let quantized = &outcome.quantized;
-        ensure!(quantized.rows <= h::MAX_ROWS, "a matrix has {} rows, {} are supported", quantized.rows, h::MAX_ROWS);
-        let bias = if bias.iter().all(|b| *b == 0.0) { 0 } else { self.push_floats(bias) };
-        let records = self.packed[index].records.clone();
-        let record = [
-            halves(quantized.rows, quantized.cols)?,
-            halves(quantized.group, outcome.x_max.into())?,
-            halves(records.len() / h::BLOCK_WORDS, 0)?,
-            bias,
-        ];
-        Ok(self.push(record.into_iter().chain(records)))
     }
 }

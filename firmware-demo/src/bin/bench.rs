@@ -116,8 +116,7 @@ mod firmware {
         y: &mut [f32],
     ) -> Option<()> {
         let scale = Scale::new(x, x_max).ok()?;
-        rows.apply(&scale.quantize(x, &Plan::of(&rows.block), prepared)?, scale, Some(bias), y);
-        Some(())
+        rows.apply(&scale.quantize(x, &Plan::of(&rows.block), prepared)?, scale, Some(bias), y)
     }
 
     #[inline(never)]

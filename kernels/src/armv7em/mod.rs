@@ -165,7 +165,7 @@ pub(crate) fn quantize(x: &[f32], inverse: f32, plan: &Plan, room: &mut [u32]) {
 fn quantize_filled(x: &[f32], inverse: f32, plan: &Plan, room: &mut [u32]) {
     let Some(at) = plan.room(x.len()).checked_sub(plan.padded) else { return };
     let Some(padded) = room.get_mut(at..at + plan.padded) else { return };
-    copy(bytemuck::cast_slice(x), padded);
+    copy(bytemuck::must_cast_slice(x), padded);
     padded.iter_mut().skip(x.len()).for_each(|word| *word = 0);
     let out = room.as_mut_ptr();
     // SAFETY: the room holds the copy from `at` on, and so the plan's words, which are fewer. What is written never reaches what

@@ -56,9 +56,11 @@ pub struct Slice {
 pub enum Lifetime {
     /// Between the first and the last operation that names it.
     Step,
-    /// Beyond the step.
-    Kept,
-    /// Beyond the step, and zeroed by a reset.
+    /// From the first operation that names it on: the output, a chunk of which is played over several steps.
+    Output,
+    /// In a place of its own, written before the first operation.
+    Observation,
+    /// In a place of its own, beyond the step, and zeroed by a reset.
     State,
 }
 
@@ -87,7 +89,7 @@ pub struct Lowering {
 impl Lowering {
     /// Nothing but the observation; `readers` says how many nodes read each value.
     pub fn new(obs_len: usize, readers: Vec<usize>) -> Self {
-        let observation = Buffer { len: obs_len, lifetime: Lifetime::Kept };
+        let observation = Buffer { len: obs_len, lifetime: Lifetime::Observation };
         Self { steps: Vec::new(), buffers: vec![observation], places: vec![0], readers }
     }
 

@@ -1,0 +1,140 @@
+//! What the executor does with numbers that leave the range of f32, and what an error leaves behind.
+
+use std::task::Poll;
+
+use actq::graph::{Graph, Matrix, Node, NodeKind};
+use actq::policy::{Contract, Policy};
+use actq::quantize::{Budget, Method, Options, quantize};
+use actq::runtime::ImageBuffer;
+use actq_kernels::image::Kind;
+use actq_kernels::math::Function;
+use actq_kernels::{Head, StepError, Width};
+
+/// Length of observation, hidden values and action.
+const N: usize = 2;
+const MAX_STEP: f32 = 0.25;
+
+/// An image of a policy that multiplies the observation with `gain`, then with `factor`, and then does `nodes`. (The self-test's
+/// observations are about `1 / gain`.)
+fn image(gain: f32, factor: f32, nodes: Vec<NodeKind>, contract: Contract) -> ImageBuffer {
+    let mut graph = Graph::new(N);
+    graph.matrices.push(Matrix { name: "w".into(), rows: N, cols: N, data: vec![factor, 0.0, 0.0, factor] });
+    let unlimited = f32::INFINITY;
+    let first = [
+        NodeKind::Normalize { mean: vec![0.0; N], scale: vec![gain; N], pre_clip: unlimited, clip: unlimited },
+        NodeKind::Linear { matrix: 0, bias: vec![0.0; N] },
+    ];
+    graph.nodes =
+        first.into_iter().chain(nodes).enumerate().map(|(input, kind)| Node { kind, input, len: N }).collect();
+    let outcomes = quantize(&graph, &[], &Options::new(Method::Rtn, Budget::Width(Width::W8))).expect("it is a graph");
+    let policy = Policy {
+        dir: ".".into(),
+        name: "faults".into(),
+        kind: Kind::Step,
+        chunk: 1,
+        execute: 1,
+        act_len: N,
+        rate_hz: 50.0,
+        contract,
+        weights: graph.weights(),
+        graph,
+        digest: [0; 32],
+    };
+    ImageBuffer::new(&actq::writer::image(&policy, &outcomes).expect("the policy fits the format"))
+}
+
+fn with_head(buffer: &ImageBuffer, work: impl FnOnce(&mut Head<'_, '_>)) {
+    let image = buffer.image("memory".as_ref()).expect("the image is valid");
+    let mut scratch = vec![0; image.scratch_words()];
+    work(&mut Head::new(image, &mut scratch).expect("the scratch memory has the image's size"));
+}
+
+fn step_limit() -> ImageBuffer {
+    image(1.0, 1.0, vec![], Contract { max_step: Some(vec![MAX_STEP; N]), ..Contract::default() })
+}
+
+#[test]
+fn an_error_keeps_the_last_action_for_the_step_limit() {
+    let ends: [fn(&mut Head<'_, '_>) -> StepError; 4] = [
+        |head| head.step(&[f32::NAN, 0.0]).expect_err("the observation is not finite"),
+        |head| head.step(&[0.0]).expect_err("the observation is short"),
+        |head| head.begin(&[0.0, f32::INFINITY]).expect_err("the observation is not finite"),
+        |head| head.infer(&[f32::NEG_INFINITY, 0.0]).expect_err("the observation is not finite"),
+    ];
+    with_head(&step_limit(), |head| {
+        for end in ends {
+            head.reset();
+            // The first action after a reset is not limited.
+            let first = head.step(&[1.0, 1.0]).expect("an action").to_vec();
+            assert!(first.iter().all(|a| (a - 1.0).abs() < 0.01), "{first:?}");
+            let error = end(head);
+            let next = head.step(&[-1.0, -1.0]).expect("an action");
+            for (next, first) in next.iter().zip(&first) {
+                assert_eq!(*next, first - MAX_STEP, "after {error:?}");
+            }
+            end(head);
+            head.begin(&[-1.0, -1.0]).expect("the observation is finite");
+            let Ok(Poll::Ready(next)) = head.poll(u32::MAX) else { panic!("the step has no end") };
+            assert_eq!(next[0], first[0] - 2.0 * MAX_STEP, "after {error:?}");
+        }
+        head.reset();
+        let first = head.step(&[-1.0, -1.0]).expect("an action");
+        assert!((first[0] + 1.0).abs() < 0.01, "a reset lifts the limit: {first:?}");
+    });
+}
+
+#[test]
+fn an_error_in_the_midst_of_an_action_changes_none_of_its_values() {
+    // The second value's scale carries it out of f32's range where the first stays inside.
+    let contract = Contract { scale: Some(vec![1.0, 1e38]), max_step: Some(vec![MAX_STEP; N]), ..Contract::default() };
+    with_head(&image(1.0, 1.0, vec![], contract), |head| {
+        head.reset();
+        let first = head.step(&[1.0, 0.0]).expect("an action").to_vec();
+        assert_eq!(head.step(&[-1.0, 100.0]).err(), Some(StepError::NotFinite));
+        let next = head.step(&[-1.0, 0.0]).expect("an action");
+        assert_eq!(next[0], first[0] - MAX_STEP, "the failed step has moved the first value");
+    });
+}
+
+/// An operation that made something finite of a value beyond f32's range would let a broken network drive the robot.
+#[test]
+fn no_operation_hides_a_value_that_has_left_the_range() {
+    let clip = |limit| NodeKind::Normalize {
+        mean: vec![0.0; N],
+        scale: vec![1.0; N],
+        pre_clip: if limit { 1.0 } else { f32::INFINITY },
+        clip: if limit { f32::INFINITY } else { 1.0 },
+    };
+    let one = || vec![1.0; N];
+    let cases: Vec<(&str, Vec<NodeKind>)> = Function::ALL
+        .into_iter()
+        .map(|function| (function.name(), vec![NodeKind::Function(function)]))
+        .chain([
+            ("clip before", vec![clip(true)]),
+            ("clip", vec![clip(false)]),
+            ("layer norm", vec![NodeKind::LayerNorm { weight: one(), bias: one(), eps: 1e-5 }]),
+            ("RMS norm", vec![NodeKind::RmsNorm { weight: one(), eps: 1e-5 }]),
+            ("linear", vec![NodeKind::Linear { matrix: 0, bias: one() }]),
+        ])
+        .collect();
+    for (name, nodes) in cases {
+        with_head(&image(1e15, 1e10, nodes, Contract::default()), |head| {
+            for observation in [[2e15, 1.0], [-2e15, 1.0], [1.0, -2e15], [1.0, 2e15]] {
+                assert_eq!(head.step(&observation).err(), Some(StepError::NotFinite), "{name} of {observation:?}");
+            }
+        });
+    }
+}
+
+/// The values are finite; their squares are not.
+#[test]
+fn a_norm_whose_squares_leave_the_range_is_an_error() {
+    let one = || vec![1.0; N];
+    for norm in
+        [NodeKind::LayerNorm { weight: one(), bias: one(), eps: 1e-5 }, NodeKind::RmsNorm { weight: one(), eps: 1e-5 }]
+    {
+        with_head(&image(1e15, 1e10, vec![norm], Contract::default()), |head| {
+            assert_eq!(head.step(&[1e5, -1e5]).err(), Some(StepError::NotFinite));
+        });
+    }
+}
