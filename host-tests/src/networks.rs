@@ -2,11 +2,12 @@
 
 use std::path::PathBuf;
 
+use actq::contract::ActionContract;
 use actq::graph::ops::{Concat, Linear, Span};
 use actq::graph::{Graph, NodeKind, ValueId, WeightMatrix};
 use actq::methods::scale::round_to_nearest;
 use actq::methods::{Activations, Outcome};
-use actq::policy::{Contract, Policy};
+use actq::policy::Policy;
 use actq::random::Random;
 use actq_kernels::Width;
 use actq_kernels::image::Kind;
@@ -100,7 +101,7 @@ impl Builder {
             execute: 1,
             act_len,
             rate_hz: 100.0,
-            contract: Contract {
+            contract: ActionContract {
                 scale: array(0.5),
                 offset: array(0.1),
                 low: array(-1.0),

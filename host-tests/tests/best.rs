@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use actq::budget::{Budget, BudgetTooSmall};
-use actq::dataset::recording::Recordings;
+use actq::data::Recordings;
 use actq::measure::eval::{self, ErrorReport};
 use actq::methods::{Method, Options};
 use actq::pipeline::Quantizer;

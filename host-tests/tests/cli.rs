@@ -9,7 +9,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use actq::budget::Budget;
-use actq::dataset::recording::Recordings;
+use actq::data::Recordings;
 use actq::graph::Evaluator;
 use actq::methods::{Method, Options};
 use actq::pipeline;

@@ -3,14 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use actq::budget::{Budget, TimeLimit};
-use actq::dataset::recording::Recordings;
-use actq::dataset::{Dataset, Sizes};
+use actq::data::Recordings;
+use actq::data::{Dataset, Sizes};
+use actq::emit::{self, files};
 use actq::measure::time::{CLOCK, StepTime};
 use actq::methods::{Activations, Method, Options};
 use actq::pipeline::{Quantizer, quantize};
 use actq::policy::Policy;
 use actq::runtime::{ImageBuffer, with_head};
-use actq::{files, writer};
 use actq_host_tests::networks::Builder;
 use actq_host_tests::profile;
 use actq_host_tests::qemu::{self, Counter, Target};
@@ -207,7 +207,7 @@ fn mixed_widths_cost_little_more_than_their_blocks() -> Result<()> {
         linear(&mut builder, 4 * ROWS, &|row| Width::ALL[row / ROWS])?;
         linear(&mut builder, 4 * ROWS, &|row| Width::ALL[row % 4])?;
         let (policy, outcomes) = builder.finish("mixed".to_owned(), false);
-        let bytes = writer::image(&policy, &outcomes)?;
+        let bytes = emit::image(&policy, &outcomes)?;
         let buffer = ImageBuffer::new(&bytes);
         let image = buffer.image(Path::new("mixed"))?;
         let observation = (0..COLS).map(|i| (i as f32).sin()).collect();

@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 
 use actq::budget::Budget;
-use actq::dataset::recording::Recordings;
-use actq::files;
+use actq::data::Recordings;
+use actq::emit::files;
 use actq::measure::eval;
 use actq::methods::{Method, Options};
 use actq::pipeline::quantize;

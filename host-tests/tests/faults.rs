@@ -3,10 +3,11 @@
 use std::task::Poll;
 
 use actq::budget::{Budget, Rate};
+use actq::contract::ActionContract;
 use actq::graph::ops::{LayerNorm, Linear, Normalize, Pointwise, RmsNorm};
 use actq::graph::{Graph, NodeKind, WeightMatrix};
 use actq::methods::{Method, Options, quantize};
-use actq::policy::{Contract, Policy};
+use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
 use actq_kernels::image::Kind;
 use actq_kernels::math::Function;
@@ -18,7 +19,7 @@ const MAX_STEP: f32 = 0.25;
 
 /// An image of a policy that multiplies the observation with `gain`, then with `factor`, and then does `nodes`. (The self-test's
 /// observations are about `1 / gain`.)
-fn image(gain: f32, factor: f32, nodes: Vec<NodeKind>, contract: Contract) -> ImageBuffer {
+fn image(gain: f32, factor: f32, nodes: Vec<NodeKind>, contract: ActionContract) -> ImageBuffer {
     let mut graph = Graph::new(N);
     graph.matrices.push(WeightMatrix { name: "w".into(), rows: N, cols: N, data: vec![factor, 0.0, 0.0, factor] });
     let unlimited = f32::INFINITY;
@@ -42,7 +43,7 @@ fn image(gain: f32, factor: f32, nodes: Vec<NodeKind>, contract: Contract) -> Im
         graph,
         digest: [0; 32],
     };
-    ImageBuffer::new(&actq::writer::image(&policy, &outcomes).expect("the policy fits the format"))
+    ImageBuffer::new(&actq::emit::image(&policy, &outcomes).expect("the policy fits the format"))
 }
 
 fn with_head(buffer: &ImageBuffer, work: impl FnOnce(&mut Head<'_, '_>)) {
@@ -52,7 +53,7 @@ fn with_head(buffer: &ImageBuffer, work: impl FnOnce(&mut Head<'_, '_>)) {
 }
 
 fn step_limit() -> ImageBuffer {
-    image(1.0, 1.0, vec![], Contract { max_step: Some(vec![MAX_STEP; N]), ..Contract::default() })
+    image(1.0, 1.0, vec![], ActionContract { max_step: Some(vec![MAX_STEP; N]), ..ActionContract::default() })
 }
 
 #[test]
@@ -88,7 +89,8 @@ fn an_error_keeps_the_last_action_for_the_step_limit() {
 #[test]
 fn an_error_in_the_midst_of_an_action_changes_none_of_its_values() {
     // The second value's scale carries it out of f32's range where the first stays inside.
-    let contract = Contract { scale: Some(vec![1.0, 1e38]), max_step: Some(vec![MAX_STEP; N]), ..Contract::default() };
+    let contract =
+        ActionContract { scale: Some(vec![1.0, 1e38]), max_step: Some(vec![MAX_STEP; N]), ..ActionContract::default() };
     with_head(&image(1.0, 1.0, vec![], contract), |head| {
         head.reset();
         let first = head.step(&[1.0, 0.0]).expect("an action").to_vec();
@@ -118,7 +120,7 @@ fn no_operation_hides_a_value_that_has_left_the_range() {
         ])
         .collect();
     for (name, nodes) in cases {
-        with_head(&image(1e15, 1e10, nodes, Contract::default()), |head| {
+        with_head(&image(1e15, 1e10, nodes, ActionContract::default()), |head| {
             for observation in [[2e15, 1.0], [-2e15, 1.0], [1.0, -2e15], [1.0, 2e15]] {
                 assert_eq!(head.step(&observation).err(), Some(StepError::NotFinite), "{name} of {observation:?}");
             }
@@ -133,7 +135,7 @@ fn a_norm_whose_squares_leave_the_range_is_an_error() {
     for norm in
         [LayerNorm { weight: one(), bias: one(), eps: 1e-5 }.into(), RmsNorm { weight: one(), eps: 1e-5 }.into()]
     {
-        with_head(&image(1e15, 1e10, vec![norm], Contract::default()), |head| {
+        with_head(&image(1e15, 1e10, vec![norm], ActionContract::default()), |head| {
             assert_eq!(head.step(&[1e5, -1e5]).err(), Some(StepError::NotFinite));
         });
     }

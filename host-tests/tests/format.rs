@@ -3,10 +3,11 @@
 use std::fs;
 use std::path::Path;
 
+use actq::contract::ActionContract;
 use actq::graph::ops::Linear;
 use actq::graph::{Graph, WeightMatrix};
 use actq::methods::{Outcome, Quantized};
-use actq::policy::{Contract, Policy};
+use actq::policy::Policy;
 use actq::runtime::{ImageBuffer, with_head};
 use actq_host_tests::root;
 use actq_kernels::activations::{Plan, max_prepared_words};
@@ -57,7 +58,7 @@ fn library_bytes() -> Vec<u8> {
         execute: 1,
         act_len: 3,
         rate_hz: 50.0,
-        contract: Contract { low: Some(vec![-40.0; 3]), high: Some(vec![40.0; 3]), ..Contract::default() },
+        contract: ActionContract { low: Some(vec![-40.0; 3]), high: Some(vec![40.0; 3]), ..ActionContract::default() },
         graph,
         weights: 6,
         digest: std::array::from_fn(|i| i as u8),
@@ -72,7 +73,7 @@ fn library_bytes() -> Vec<u8> {
         codes: LEVELS.as_flattened().iter().map(|&level| Width::W2.nearest_code(level as f32)).collect(),
     };
     let outcome = Outcome { quantized, error: None, x_max: 127, allocation: None };
-    actq::writer::image(&policy, &[outcome]).expect("the policy fits the format")
+    actq::emit::image(&policy, &[outcome]).expect("the policy fits the format")
 }
 
 fn floats(words: &[u32]) -> Vec<f32> {

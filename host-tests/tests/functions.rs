@@ -1,8 +1,8 @@
 //! The functions on the Cortex-M4's FPU: the host's bits, and what they cost.
 
 use actq::budget::Budget;
-use actq::dataset::recording::Recordings;
-use actq::files;
+use actq::data::Recordings;
+use actq::emit::files;
 use actq::methods::{Method, Options};
 use actq::pipeline::quantize;
 use actq::policy::Policy;

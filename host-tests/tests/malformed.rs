@@ -6,10 +6,11 @@ use std::sync::LazyLock;
 use std::time::Instant;
 
 use actq::budget::{Budget, Rate};
+use actq::contract::ActionContract;
 use actq::graph::ops::{LayerNorm, Linear, Lstm, Normalize, Pointwise};
 use actq::graph::{Graph, NodeKind, WeightMatrix};
 use actq::methods::{Method, Options, Outcome, quantize};
-use actq::policy::{Contract, Policy};
+use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
 use actq_host_tests::golden::Random;
 use actq_kernels::format::Width;
@@ -57,7 +58,7 @@ fn valid_image() -> Vec<u8> {
         execute: CHUNK,
         act_len: ACT,
         rate_hz: 50.0,
-        contract: Contract {
+        contract: ActionContract {
             scale: Some(vec![0.5; ACT]),
             offset: Some(vec![0.1; ACT]),
             low: Some(vec![-1.0; ACT]),
@@ -68,7 +69,7 @@ fn valid_image() -> Vec<u8> {
         graph,
         digest: [7; 32],
     };
-    actq::writer::image(&policy, &matrices).expect("the policy fits the format")
+    actq::emit::image(&policy, &matrices).expect("the policy fits the format")
 }
 
 /// Even rows of `a`, odd rows of `b`, for activations beyond int8, so that they are packed in single lanes.
@@ -733,12 +734,12 @@ fn a_matrix_is_checked_once_however_many_operations_share_it() {
             execute: 1,
             act_len: N,
             rate_hz: 50.0,
-            contract: Contract { scale: Some(vec![1e-30; N]), ..Contract::default() },
+            contract: ActionContract { scale: Some(vec![1e-30; N]), ..ActionContract::default() },
             weights: graph.weights(),
             graph,
             digest: [0; 32],
         };
-        let bytes = actq::writer::image(&policy, &outcomes).expect("the policy fits the format");
+        let bytes = actq::emit::image(&policy, &outcomes).expect("the policy fits the format");
         let buffer = ImageBuffer::new(&bytes);
         let start = Instant::now();
         let image = Image::new_checked(buffer.bytes()).expect("the image is valid");

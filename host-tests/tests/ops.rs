@@ -7,11 +7,11 @@ use std::collections::BTreeMap;
 use std::fs;
 
 use actq::budget::{Budget, Rate};
+use actq::emit;
 use actq::graph::Evaluator;
 use actq::methods::{Activations, Method, Options, Outcome, quantize};
 use actq::policy::Policy;
 use actq::runtime::{ImageBuffer, with_head};
-use actq::writer;
 use actq_host_tests::golden::Random;
 use actq_kernels::{Head, Width};
 use anyhow::{Context, Result, ensure};
@@ -267,7 +267,7 @@ fn bound(outcomes: &[Outcome]) -> f64 {
 
 /// Runs `work` with a head over the quantized policy.
 fn on_head<T>(policy: &Policy, outcomes: &[Outcome], work: impl FnOnce(&mut Head<'_, '_>) -> Result<T>) -> Result<T> {
-    let buffer = ImageBuffer::new(&writer::image(policy, outcomes)?);
+    let buffer = ImageBuffer::new(&emit::image(policy, outcomes)?);
     with_head(buffer.image(&policy.dir)?, work)
 }
 

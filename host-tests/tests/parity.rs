@@ -292,7 +292,7 @@ fn single_matrix_image(case: &Case) -> Vec<u8> {
         execute: 1,
         act_len: rows,
         rate_hz: 50.0,
-        contract: actq::policy::Contract::default(),
+        contract: actq::contract::ActionContract::default(),
         graph,
         weights: rows * cols,
         digest: [0; 32],
@@ -306,6 +306,6 @@ fn single_matrix_image(case: &Case) -> Vec<u8> {
         group_scales: case.scales.clone(),
         codes: case.codes.clone(),
     };
-    actq::writer::image(&policy, &[Outcome { quantized, error: None, x_max: 127, allocation: None }])
+    actq::emit::image(&policy, &[Outcome { quantized, error: None, x_max: 127, allocation: None }])
         .expect("the policy fits the format")
 }

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use actq::budget::Budget;
-use actq::dataset::recording::{Recording, Recordings};
-use actq::dataset::{Dataset, Sizes};
-use actq::files;
+use actq::data::{Dataset, Sizes};
+use actq::data::{Recording, Recordings};
+use actq::emit::files;
 use actq::measure::eval;
 use actq::methods::{Activations, Method, Options};
 use actq::pipeline::quantize;

@@ -3,15 +3,16 @@
 use std::path::Path;
 
 use actq::budget::Budget;
-use actq::dataset::range::Range;
-use actq::dataset::recording::{Recording, Recordings};
-use actq::dataset::{Dataset, Sizes};
+use actq::contract::ActionContract;
+use actq::data::Range;
+use actq::data::{Dataset, Sizes};
+use actq::data::{Recording, Recordings};
 use actq::graph::ops::{Linear, Lstm};
 use actq::graph::{Graph, Network, WeightMatrix, Weights, zero_state};
 use actq::measure::eval::evaluate;
 use actq::methods::{Activations, Method, Options};
 use actq::pipeline::quantize;
-use actq::policy::{Contract, Policy};
+use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
 use actq_host_tests::golden::Random;
 use actq_host_tests::{root, shared_policies};
@@ -68,7 +69,7 @@ fn policy() -> Policy {
         execute: 1,
         act_len: ACT,
         rate_hz: 50.0,
-        contract: Contract::default(),
+        contract: ActionContract::default(),
         weights: graph.weights(),
         graph,
         digest: [0; 32],

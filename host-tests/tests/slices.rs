@@ -3,11 +3,11 @@
 use std::path::Path;
 use std::task::Poll;
 
+use actq::emit;
 use actq::graph::ops::{Add, Gru, LayerNorm, Linear, Lstm, Normalize, Pointwise, RmsNorm};
 use actq::methods::{Activations, Outcome};
 use actq::policy::Policy;
 use actq::runtime::{ImageBuffer, with_head};
-use actq::writer;
 use actq_host_tests::golden::Random;
 use actq_host_tests::networks::Builder;
 use actq_kernels::image::Kind;
@@ -73,7 +73,7 @@ fn network(seed: u64) -> Result<(Policy, Vec<Outcome>)> {
 
 fn on_head<T>(seed: u64, work: impl FnOnce(&mut Head<'_, '_>) -> Result<T>) -> Result<T> {
     let (policy, outcomes) = network(seed)?;
-    let buffer = ImageBuffer::new(&writer::image(&policy, &outcomes)?);
+    let buffer = ImageBuffer::new(&emit::image(&policy, &outcomes)?);
     with_head(buffer.image(Path::new("slices"))?, work)
 }
 
@@ -268,7 +268,7 @@ fn an_error_resets() -> Result<()> {
     let matrix = builder.matrix(3, 64, Activations::Int8, &[Some(Width::W8); 3], 0)?;
     builder.node(Linear { matrix, bias: vec![0.0; 3] }, &[hidden])?;
     let (policy, outcomes) = builder.finish("overflow".to_owned(), false);
-    let buffer = ImageBuffer::new(&writer::image(&policy, &outcomes)?);
+    let buffer = ImageBuffer::new(&emit::image(&policy, &outcomes)?);
     with_head(buffer.image(Path::new("overflow"))?, |head| {
         let observations = observations(1);
         let expected = whole(head, &observations[..1])?;

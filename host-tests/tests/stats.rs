@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Output;
 
 use actq::budget::Budget;
-use actq::dataset::recording::Recordings;
+use actq::data::Recordings;
 use actq::graph::Evaluator;
 use actq::methods::Method;
 use actq::methods::Options;

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use actq::budget::Budget;
-use actq::dataset::recording::Recordings;
+use actq::data::Recordings;
 use actq::measure::eval;
 use actq::measure::size::bits_per_weight;
 use actq::methods::{Method, Options};

@@ -8,12 +8,12 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
+use actq::emit::{self, files};
 use actq::graph::ops::{Add, Gru, LayerNorm, Lstm, Normalize, Pointwise, RmsNorm};
 use actq::methods::{Activations, Outcome};
 use actq::policy::Policy;
 use actq::random::Random;
 use actq::runtime::ImageBuffer;
-use actq::{files, writer};
 use actq_host_tests::networks::Builder;
 use actq_host_tests::profile;
 use actq_host_tests::qemu::{self, Counter, Target};
@@ -147,7 +147,7 @@ fn measure(
     samples: &mut Vec<Sample>,
     polls: &mut Vec<(f64, usize)>,
 ) -> Result<()> {
-    let bytes = writer::image(policy, outcomes)?;
+    let bytes = emit::image(policy, outcomes)?;
     let buffer = ImageBuffer::new(&bytes);
     let image = buffer.image(Path::new(&policy.name))?;
     let observations = observations(policy.graph.obs_len);
@@ -320,7 +320,7 @@ fn resumed(elf: &Path, counter: &Counter, most: &Rates) -> Result<f64> {
                 let mut builder = Builder::new(cols);
                 builder.linear((rows, cols), Activations::Int8, width, 0, true)?;
                 let (policy, outcomes) = builder.finish("polls".to_owned(), false);
-                let bytes = writer::image(&policy, &outcomes)?;
+                let bytes = emit::image(&policy, &outcomes)?;
                 let buffer = ImageBuffer::new(&bytes);
                 let image = buffer.image(Path::new("polls"))?;
                 let observations = &observations(cols)[..1];

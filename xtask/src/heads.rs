@@ -4,8 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use actq::budget::Budget;
-use actq::dataset::recording::Recordings;
-use actq::files;
+use actq::data::Recordings;
+use actq::emit::files;
 use actq::measure::eval;
 use actq::methods::{Method, Options};
 use actq::pipeline::Quantizer;

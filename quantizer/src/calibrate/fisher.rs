@@ -3,7 +3,7 @@
 use anyhow::{Context, Result};
 use ndarray::{Array2, Axis, Zip, linalg::general_mat_mul};
 
-use crate::dataset::Dataset;
+use crate::data::Dataset;
 use crate::graph::Graph;
 use crate::graph::{Network, Pass, Weights, start_state, zero_state};
 

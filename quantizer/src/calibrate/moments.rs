@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::dataset::Dataset;
+use crate::data::Dataset;
 use crate::graph::{Evaluator, Graph, WeightMatrix};
 
 /// `E[x x']` of a matrix's input, and how many vectors it was taken over.

@@ -3,7 +3,7 @@
 
 use ndarray::{Array2, Axis};
 
-use crate::dataset::Dataset;
+use crate::data::Dataset;
 use crate::graph::Graph;
 use crate::graph::{Network, State, Weights, start_state, zero_state};
 use crate::random::Random;

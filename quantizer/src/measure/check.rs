@@ -4,7 +4,7 @@ use actq_kernels::Image;
 use anyhow::Result;
 
 use super::eval::{self, ActivationShare, ErrorReport};
-use crate::dataset::Dataset;
+use crate::data::Dataset;
 
 use crate::policy::Policy;
 

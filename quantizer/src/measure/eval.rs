@@ -8,8 +8,8 @@ use serde::Serialize;
 
 use super::size::bits_per_weight;
 use super::unrounded::Unrounded;
-use crate::dataset::recording::Recording;
-use crate::dataset::{Dataset, Sizes};
+use crate::data::Recording;
+use crate::data::{Dataset, Sizes};
 use crate::policy::Policy;
 use crate::runtime::with_head;
 

@@ -84,13 +84,13 @@ mod tests {
 
     use super::*;
     use crate::budget::{Budget, Rate};
+    use crate::emit;
     use crate::graph::ops::{Add, Concat, Gru, LayerNorm, Linear, Lstm, Normalize, Pointwise, RmsNorm, Span};
     use crate::graph::{Evaluator, Graph, NodeKind, WeightMatrix};
     use crate::methods::{Activations, Method, Options, Outcome, quantize};
-    use crate::policy::{Contract, Policy};
+    use crate::policy::Policy;
     use crate::random::Random;
     use crate::runtime::{ImageBuffer, with_head};
-    use crate::writer;
 
     const OBS: usize = 5;
     const HIDDEN: usize = 8;
@@ -145,12 +145,12 @@ mod tests {
             execute: 1,
             act_len: ACT,
             rate_hz: 50.0,
-            contract: Contract::default(),
+            contract: crate::contract::ActionContract::default(),
             weights: graph.weights(),
             graph: graph.clone(),
             digest: [0; 32],
         };
-        let bytes = writer::image(&policy, &outcomes).expect("an image");
+        let bytes = emit::image(&policy, &outcomes).expect("an image");
         (outcomes, ImageBuffer::new(&bytes))
     }
 

@@ -21,7 +21,7 @@ use super::quantized::{Outcome, Quantized};
 use super::scale::{Scales, round_to};
 use crate::budget::Rate;
 use crate::calibrate::fisher;
-use crate::dataset::Dataset;
+use crate::data::Dataset;
 use crate::graph::{Graph, WeightMatrix};
 use score::Score;
 

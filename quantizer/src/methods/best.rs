@@ -17,7 +17,7 @@ use crate::budget::Rate;
 use crate::calibrate::moments::Moments;
 use crate::calibrate::sensitivity::{Side, importance, output_moments};
 use crate::calibrate::windows::Windows;
-use crate::dataset::Dataset;
+use crate::data::Dataset;
 use crate::graph::{Graph, WeightMatrix};
 use crate::graph::{Network, Weights};
 use crate::random::Random;

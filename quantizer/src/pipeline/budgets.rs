@@ -5,7 +5,7 @@ use anyhow::Result;
 use super::quantizer::{QuantizedPolicy, Quantizer};
 use super::{search, time};
 use crate::budget::{Budget, Rate};
-use crate::dataset::recording::Recordings;
+use crate::data::Recordings;
 use crate::methods::Options;
 use crate::policy::Policy;
 

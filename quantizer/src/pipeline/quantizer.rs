@@ -5,12 +5,12 @@ use anyhow::{Result, ensure};
 
 use super::tries::Search;
 use crate::budget::{Budget, Rate};
-use crate::dataset::recording::Recordings;
+use crate::data::Recordings;
+use crate::emit;
 use crate::measure::time::StepTime;
 use crate::methods::{self, Method, Options, Outcome, PreparedMethod};
 use crate::policy::Policy;
 use crate::runtime::ImageBuffer;
-use crate::writer;
 
 /// A policy and a method made ready once, to make images for any number of budgets.
 #[derive(Debug)]
@@ -60,7 +60,7 @@ impl<'a> Quantizer<'a> {
     pub(super) fn at(&self, rate: Rate, options: &Options, progress: impl FnMut(f64)) -> Result<QuantizedPolicy> {
         let (graph, outcomes) = self.method.quantize(rate, options, progress)?;
         let policy = Policy { graph, ..self.policy.clone() };
-        let image = writer::image(&policy, &outcomes)?;
+        let image = emit::image(&policy, &outcomes)?;
         let steps = self.method.steps(options);
         Ok(QuantizedPolicy { policy, outcomes, image, rate, steps, search: None, time: None })
     }
@@ -71,7 +71,7 @@ impl<'a> Quantizer<'a> {
         let options = Options::new(Method::Rtn, Budget::Width(Width::W2));
         let (_, plain) = methods::quantize(&self.policy.graph, None, rate, &options)?;
         let weights: usize = plain.iter().map(Outcome::bytes).sum();
-        let rest = writer::image(self.policy, &plain)?.len() - weights;
+        let rest = emit::image(self.policy, &plain)?.len() - weights;
         ensure!(bytes > rest, "{bytes} bytes are allowed, but all but the weights already takes {rest}");
         Ok(Rate::BitsPerWeight(8.0 * (bytes - rest) as f64 / self.policy.graph.weights().max(1) as f64))
     }

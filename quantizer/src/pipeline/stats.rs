@@ -10,10 +10,10 @@ use serde::{Deserialize, Serialize};
 use super::quantizer::{QuantizedPolicy, Quantizer};
 use crate::budget::Budget;
 use crate::graph::WeightMatrix;
-use crate::json;
 use crate::measure::size::{bits_per_weight, hex};
 use crate::methods::actquant::score::Score;
 use crate::methods::{Options, Outcome, Quantized};
+use crate::strict_json;
 
 /// The name of the file's form. It changes when a field changes its meaning or disappears, not when one is added.
 pub const SCHEMA: &str = "actq-stats-1";
@@ -151,7 +151,7 @@ impl Stats {
     pub fn read(path: &Path, image: &Image<'_>) -> Result<Self> {
         let read = || -> Result<Self> {
             let text = fs::read(path).context("cannot be read")?;
-            let value: serde_json::Value = json::parse(&text).context("not JSON")?;
+            let value: serde_json::Value = strict_json::parse(&text).context("not JSON")?;
             let schema = value.get("schema").and_then(|s| s.as_str()).unwrap_or("none");
             ensure!(schema == SCHEMA, "not statistics of an image: its schema is {schema}, {SCHEMA} is needed");
             let stats: Self = serde_json::from_value(value).with_context(|| format!("does not follow {SCHEMA}"))?;

@@ -6,9 +6,9 @@ use anyhow::{Context, Result, ensure};
 
 use super::quantizer::{QuantizedPolicy, Quantizer};
 use crate::budget::{BudgetTooSmall, Rate, TimeLimit};
+use crate::emit;
 use crate::measure::time::StepTime;
 use crate::methods::{Activations, Options};
-use crate::writer;
 
 /// More bits than any image takes.
 const MOST_BITS: f64 = 10.0;
@@ -70,7 +70,7 @@ pub(super) fn most_bits(
         let m = wide.pop().context("the step takes longer than was predicted before learning")?;
         let outcome = &mut quantized.outcomes[m];
         outcome.x_max = outcome.quantized.x_max(activations.limit())?;
-        quantized.image = writer::image(&quantized.policy, &quantized.outcomes)?;
+        quantized.image = emit::image(&quantized.policy, &quantized.outcomes)?;
     }
 }
 

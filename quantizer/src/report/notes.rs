@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use crate::dataset::range::{Range, runs};
-use crate::dataset::recording::Recordings;
+use crate::data::Recordings;
+use crate::data::{Range, runs};
 use crate::measure::check::Check;
 use crate::measure::eval::{ActivationShare, ErrorReport};
 

@@ -8,9 +8,9 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use actq::dataset::Sizes;
-use actq::dataset::range::Range;
-use actq::dataset::recording::{Recording, Recordings};
+use actq::data::{Range, Recording, Recordings, Sizes};
+use actq::emit::files;
+use actq::import;
 use actq::measure::eval;
 use actq::measure::time::StepTime;
 use actq::methods::Method;
@@ -21,7 +21,7 @@ use actq::report::widths::Widths;
 use actq::report::{inspect, notes, time};
 use actq::runtime::ImageBuffer;
 use actq::text::printable;
-use actq::{files, policy, report, serve};
+use actq::{report, serve};
 use anyhow::{Context, Result, ensure};
 use clap::Parser as _;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -132,8 +132,14 @@ fn run_inspect(args: &InspectArgs) -> Result<()> {
     print(&widths.report())
 }
 
+/// All files that a policy's folder may hold, whether they are there or not.
+fn policy_files(dir: &Path) -> Vec<PathBuf> {
+    let own = import::FILES.map(|name| dir.join(name));
+    own.into_iter().chain(Recording::Calib.paths(dir)).chain(Recording::Heldout.paths(dir)).collect()
+}
+
 fn run_sweep(args: &SweepArgs) -> Result<()> {
-    let folders = args.policy_dirs.iter().flat_map(|dir| policy::files(dir));
+    let folders = args.policy_dirs.iter().flat_map(|dir| policy_files(dir));
     let inputs: Vec<PathBuf> = folders.chain([&args.calib, &args.heldout].into_iter().flatten().cloned()).collect();
     let outputs: Vec<&Path> = [&args.svg, &args.json].into_iter().filter_map(|path| path.as_deref()).collect();
     files::check_outputs(&outputs, &inputs)?;

@@ -4,25 +4,24 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use actq::budget::{Budget, TimeLimit};
-use actq::dataset::Sizes;
-use actq::dataset::recording::{Recording, Recordings};
+use actq::data::{Recording, Recordings, Sizes};
+use actq::emit::files;
 use actq::measure::check;
 use actq::methods::{Activations, Method, Options};
 use actq::pipeline::Quantizer;
 use actq::pipeline::stats::Stats;
 use actq::policy::Policy;
 use actq::report::{notes, quantized, time};
-use actq::{files, policy};
 use actq_kernels::Width;
 use anyhow::Result;
 
 use crate::args::{ActivationArg, QuantizeArgs};
-use crate::{note, print, progress_bar, set_share, start_threads};
+use crate::{note, policy_files, print, progress_bar, set_share, start_threads};
 
 /// Quantizes a policy, writes the image and says what became of it.
 pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
     let outputs: Vec<&Path> = [Some(&args.out), args.save_stats.as_ref()].into_iter().flatten().map(|p| &**p).collect();
-    let inputs: Vec<PathBuf> = policy::files(&args.policy_dir).into_iter().chain(args.calib.clone()).collect();
+    let inputs: Vec<PathBuf> = policy_files(&args.policy_dir).into_iter().chain(args.calib.clone()).collect();
     files::check_outputs(&outputs, &inputs)?;
     let source = Policy::load(&args.policy_dir)?;
     let (dir, sizes) = (Some(args.policy_dir.as_path()), Sizes::of(&source));

@@ -5,7 +5,7 @@ use ndarray::Array2;
 use serde::Serialize;
 
 use crate::calibrate::hsic::{Kernel, hsic};
-use crate::dataset::Dataset;
+use crate::data::Dataset;
 use crate::graph::{Evaluator, Graph, WeightMatrix};
 
 /// Frames that the kernels are built over, at most: time and memory go with the square.

@@ -1,15 +1,5 @@
 //! Recorded observations, for calibration and held out. `docs/QUANTIZER.md`, section Recordings, describes the files.
 
-mod arrays;
-#[cfg(test)]
-mod damaged;
-mod npy;
-mod npz;
-pub mod range;
-pub mod recording;
-#[cfg(test)]
-mod tests;
-
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
@@ -17,9 +7,10 @@ use actq_kernels::Image;
 use anyhow::{Context, Result, bail, ensure};
 use ndarray::{Array2, Array3, ArrayView1, Axis, s};
 
+use super::arrays::{Arrays, floats};
 use crate::graph::{Evaluator, Graph};
+use crate::import::values::{Tensor, Values};
 use crate::policy::Policy;
-use arrays::{Arrays, Stored, Values};
 
 /// What a recording's arrays must fit.
 #[derive(Clone, Copy, Debug)]
@@ -108,20 +99,20 @@ impl Dataset {
         };
         ensure!(length.iter().any(|n| *n > 0), "it holds no frame: every episode has the length 0");
 
-        let rows = |name: &str, array: &Stored| -> Result<Array3<f32>> {
-            let values = array.floats(name)?;
+        let rows = |name: &str, array: &Tensor| -> Result<Array3<f32>> {
+            let values = floats(array, name)?;
             let shaped = Array3::from_shape_vec((episodes, steps, values.len() / (episodes * steps)), values)?;
             let bad = shaped.indexed_iter().enumerate().find(|(_, ((e, s, _), v))| !v.is_finite() && *s < length[*e]);
             if let Some((i, ((episode, step, value), _))) = bad {
-                bail!("array {name:?} {} at episode {episode}, step {step}, value {value}", array.not_f32(i));
+                bail!("array {name:?} {} at episode {episode}, step {step}, value {value}", array.values.not_f32(i));
             }
             Ok(shaped)
         };
-        let starts = |array: Stored| -> Result<Array2<f32>> {
-            let values = array.floats("state")?;
+        let starts = |array: Tensor| -> Result<Array2<f32>> {
+            let values = floats(&array, "state")?;
             if let Some(i) = values.iter().position(|v| !v.is_finite()) {
                 let (episode, value) = (i / sizes.state, i % sizes.state);
-                bail!("array \"state\" {} at episode {episode}, value {value}", array.not_f32(i));
+                bail!("array \"state\" {} at episode {episode}, value {value}", array.values.not_f32(i));
             }
             Ok(Array2::from_shape_vec((episodes, sizes.state), values)?)
         };
@@ -227,7 +218,7 @@ impl Dataset {
     }
 }
 
-fn lengths(array: &Stored, episodes: usize, steps: usize) -> Result<Vec<usize>> {
+fn lengths(array: &Tensor, episodes: usize, steps: usize) -> Result<Vec<usize>> {
     let numbers: Vec<i64> = match &array.values {
         Values::I32(values) => values.iter().map(|&n| n.into()).collect(),
         Values::I64(values) => values.clone(),

@@ -1,16 +1,16 @@
 use std::fs::{self, File};
+use std::path::{Path, PathBuf};
 
-use ndarray::{Array1, ArrayD, IxDyn, ShapeBuilder as _};
+use ndarray::{Array1, Array2, Array3, ArrayD, IxDyn, ShapeBuilder as _, s};
 use ndarray_npy::{NpzWriter, WriteNpyExt as _};
 use safetensors::Dtype;
 use safetensors::tensor::{TensorView, serialize};
 use tempfile::TempDir;
 
-use super::range::{Outside, Range};
-use super::recording::Recording;
 use super::*;
 use crate::calibrate::moments;
 use crate::calibrate::windows::Windows;
+use crate::graph::Graph;
 use crate::methods::actquant::testing::{dataset, lstm, mlp};
 
 const SIZES: Sizes = Sizes { obs: 3, out: 2, state: 0 };

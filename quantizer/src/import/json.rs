@@ -6,8 +6,8 @@ use anyhow::{Context, Result, bail, ensure};
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::Contract;
-use crate::json;
+use crate::contract::ActionContract;
+use crate::strict_json;
 use crate::text::is_control;
 
 #[derive(Deserialize)]
@@ -75,7 +75,7 @@ impl Json {
     /// Refuses keys that are not known: one that is ignored would be another policy.
     pub(super) fn parse(bytes: &[u8]) -> Result<Self> {
         const WRONG: &str = "not a policy description";
-        let value = json::parse(bytes).context(WRONG)?;
+        let value = strict_json::parse(bytes).context(WRONG)?;
         // What the keys of an unknown kind are is not known either.
         kind(value["kind"].as_str())?;
         if let Some(key) = given(&value).find(|key| !KEYS.contains(key) && !ABOUT.contains(key)) {
@@ -101,10 +101,10 @@ impl Json {
     }
 
     /// The action contract. Without the key `action` a chunk is limited to -1..1, as the reference runtime of the format does.
-    pub(super) fn contract(&self, kind: Kind) -> Result<Contract> {
+    pub(super) fn contract(&self, kind: Kind) -> Result<ActionContract> {
         let Some(json) = &self.action else {
             let limit = |at: f32| (kind == Kind::Chunk).then(|| vec![at; self.act_dim]);
-            return Ok(Contract { low: limit(-1.0), high: limit(1.0), ..Contract::default() });
+            return Ok(ActionContract { low: limit(-1.0), high: limit(1.0), ..ActionContract::default() });
         };
         let array = |name: &str, values: &Option<Vec<f64>>| {
             let Some(values) = values else { return Ok(None) };
@@ -113,18 +113,13 @@ impl Json {
             let one = |(i, v): (usize, &f64)| real(*v, &format!("action.{name}[{i}]"));
             values.iter().enumerate().map(one).collect::<Result<Vec<f32>>>().map(Some)
         };
-        let contract = Contract {
+        Ok(ActionContract {
             scale: array("scale", &json.scale)?,
             offset: array("offset", &json.offset)?,
             low: array("low", &json.low)?,
             high: array("high", &json.high)?,
             max_step: array("max_step", &json.max_step)?,
-        };
-        if let (Some(low), Some(high)) = (&contract.low, &contract.high) {
-            ensure!(low.iter().zip(high).all(|(l, h)| l <= h), "action.low exceeds action.high");
-        }
-        ensure!(contract.max_step.iter().flatten().all(|s| *s >= 0.0), "action.max_step holds a negative value");
-        Ok(contract)
+        })
     }
 }
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 
-use super::{Dataset, Sizes};
+use super::dataset::{Dataset, Sizes};
 use crate::policy::Policy;
 
 /// The two recordings that a policy's folder may hold. The only place that knows the files' names.

@@ -6,7 +6,7 @@ use std::io::{self, Read};
 use anyhow::{Context, Result, bail, ensure};
 use ndarray::{ArrayD, IxDyn, ShapeBuilder as _};
 
-use super::arrays::{Stored, Values};
+use crate::import::values::{Tensor, Values};
 
 const MAGIC: &[u8] = b"\x93NUMPY";
 /// Bytes of a header's text; numpy writes about a hundred, and reads at most 10,000.
@@ -22,7 +22,7 @@ struct Header {
 }
 
 /// Reads an array that takes `bytes` bytes of `source`. Nothing is allocated for elements that are not there.
-pub(super) fn read(source: &mut impl Read, bytes: u64) -> Result<Stored> {
+pub(super) fn read(source: &mut impl Read, bytes: u64) -> Result<Tensor> {
     let mut front = [0; 12];
     source.read_exact(&mut front[..8]).context("cut off in its header")?;
     ensure!(front.starts_with(MAGIC), "it does not begin as numpy's arrays do");
@@ -57,7 +57,7 @@ pub(super) fn read(source: &mut impl Read, bytes: u64) -> Result<Stored> {
             Values::Other(other.to_owned())
         }
     };
-    Ok(Stored { shape: header.shape, values })
+    Ok(Tensor { shape: header.shape, values })
 }
 
 impl Header {

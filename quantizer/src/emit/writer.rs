@@ -6,9 +6,10 @@ use actq_kernels::format::{self, LAYOUT_STAMP};
 use actq_kernels::image::{Kind, OpKind, Region, checksum, half_words, header as h, header::op};
 use anyhow::{Context, Result, ensure};
 
+use super::lower::lower;
 use crate::graph::lowering::{Step, StepData};
 use crate::graph::{Graph, NodeKind};
-use crate::lower::lower;
+
 use crate::methods::{Outcome, Quantized};
 use crate::policy::Policy;
 use crate::runtime::{ImageBuffer, with_head};

@@ -1,6 +1,6 @@
 //! The range that each value of an observation covers in a recording, and what leaves it.
 
-use super::Dataset;
+use super::dataset::Dataset;
 
 /// How far beyond the calibrated range, as a share of its width, a value still counts as inside.
 const MARGIN: f32 = 0.1;
@@ -101,7 +101,7 @@ impl Range {
 }
 
 /// Rising numbers as text: `3, 7-9`.
-pub(crate) fn runs(numbers: &[usize]) -> String {
+pub fn runs(numbers: &[usize]) -> String {
     let chunks = numbers.chunk_by(|a, b| a + 1 == *b);
     let text = chunks.map(|run| match run {
         [first, .., last] => format!("{first}-{last}"),

@@ -11,8 +11,8 @@ use anyhow::{Context, Result, bail, ensure};
 use flate2::CrcReader;
 use flate2::read::DeflateDecoder;
 
-use super::arrays::Stored;
 use super::npy;
+use crate::import::values::Tensor;
 
 /// Bytes that the members of any archive may have, inflated.
 const ROOM: u64 = 64 << 20;
@@ -64,7 +64,7 @@ impl Archive {
     }
 
     /// Reads an array; `None` where there is none of this name.
-    pub(super) fn read(&mut self, name: &str) -> Result<Option<Stored>> {
+    pub(super) fn read(&mut self, name: &str) -> Result<Option<Tensor>> {
         let Some(&Member { encrypted, method, crc, packed, size, at }) = self.members.get(name) else {
             return Ok(None);
         };
