@@ -1,5 +1,5 @@
-//! Chooses the GEMV backend. Stable rustc shows no `target_feature = "dsp"` for thumbv7em, so the target's name decides;
-//! `actq_kernels::gemv::BACKEND` says which one was compiled in. The environment variable `ACTQ_BACKEND=portable` leaves the
+//! Says which backends the target has; `src/arch/mod.rs` chooses. Stable rustc shows no `target_feature = "dsp"` for thumbv7em, so
+//! the target's name decides; `actq_kernels::arch::BACKEND` says which one was compiled in. The environment variable `ACTQ_BACKEND=portable` leaves the
 //! assembler out: to compare, or where assembler is not wanted.
 
 fn main() {

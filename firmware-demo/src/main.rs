@@ -19,9 +19,10 @@ mod firmware {
     use core::fmt::{Display, Write as _};
     use core::task::Poll;
 
-    use actq_firmware_demo::machine::{entry, semihosting::hio, singleton};
-    use actq_firmware_demo::{count, host, slot};
+    use actq_firmware_support::machine::{entry, semihosting::hio, singleton};
+    use actq_firmware_support::{count, host, slot};
     use actq_kernels::{Head, Image, StepError};
+    use actq_link::{NO_ACTION, RESET, STEP};
 
     /// Includes a file at an address that is a multiple of 4.
     #[repr(C, align(4))]
@@ -123,8 +124,8 @@ mod firmware {
         Ok(())
     }
 
-    /// Answers `R` and `S` from standard input until it ends. A step whose observation or whose network leaves f32's range has no
-    /// action: it is answered by NaNs.
+    /// Answers requests of the pipe protocol from standard input until it ends. A step whose observation or whose network leaves
+    /// f32's range has no action: it is answered by NaNs.
     fn serve(head: &mut Head<'_, '_>, run: Run) -> Result<(), Message> {
         let input = host::File::open(c"/dev/stdin", false).ok_or_else(|| message("input", "cannot be opened"))?;
         let output = host::File::open(c"/dev/stdout", true).ok_or_else(|| message("output", "cannot be opened"))?;
@@ -135,8 +136,8 @@ mod firmware {
         let mut command = [0u8];
         while input.read_exact(&mut command) {
             match command {
-                [b'R'] => head.reset(),
-                [b'S'] => {
+                [RESET] => head.reset(),
+                [STEP] => {
                     if !input.read_exact(bytemuck::must_cast_slice_mut(observation)) {
                         return Err(message("input", "ended inside an observation"));
                     }
@@ -144,7 +145,7 @@ mod firmware {
                     let written = match run.step(head, observation) {
                         Ok(action) => output.write_all(bytemuck::must_cast_slice(action)),
                         Err(StepError::ObservationNotFinite { .. } | StepError::NotFinite) => {
-                            (0..act_len).all(|_| output.write_all(&f32::NAN.to_le_bytes()))
+                            (0..act_len).all(|_| output.write_all(&NO_ACTION.to_le_bytes()))
                         }
                         Err(e) => return Err(message("step", e)),
                     };

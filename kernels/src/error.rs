@@ -1,99 +1,107 @@
-//! The errors of parsing, of construction and of a step.
+//! The errors of parsing, of construction and of a step. Their numbers are for what cannot take an enum: C, a frame of a few bytes, a
+//! register that survives a reset. 0 is no error.
 
 use core::fmt;
 
-use crate::activations::NotFinite;
-
-/// Why [`crate::Image::new_checked`] refused an image.
+/// A value is NaN or infinite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum ImageError {
-    /// The bytes do not start at a multiple of 4 in memory.
-    Misaligned,
-    /// Fewer bytes than a header.
-    TooShort,
-    /// The first four bytes are not `ACTQ`.
-    Magic,
-    /// The image's format version is not the one that this crate reads.
-    Version,
-    /// The image was packed for kernels of another layout; quantize the policy again.
-    Layout,
-    /// The header's length differs from the number of bytes given.
-    Length,
-    /// The checksum does not match: the image is damaged.
-    Checksum,
-    /// A field that must be zero is not.
-    Reserved,
-    /// The policy kind is unknown.
-    Kind,
-    /// Chunk or execute length is zero, or execute exceeds chunk.
-    Chunk,
-    /// A section lies outside the image, shares words with another, or does not stand in its place in their order.
-    Section,
-    /// The scratch memory is not state, observation, what operations write, action and work area, one behind the other, in at
-    /// most 65535 words; or the work area is too short.
-    Arena,
-    /// Regions of an operation overlap.
-    Overlap,
-    /// An operation, or the action, reads words that no operation of the step has written.
-    Unwritten,
-    /// An operation code is unknown.
-    Op,
-    /// A length is zero, or two lengths of an operation disagree.
-    Shape,
-    /// A linear operation names no matrix of the image.
-    Matrix,
-    /// A matrix block's width is not 2, 3, 4 or 8 bits.
-    Width,
-    /// A block's lanes are not those that follow from its matrix's activations and group.
-    Lanes,
-    /// A group size is not 0, 32, 64 or 128.
-    Group,
-    /// A row index lies outside the output or occurs twice.
-    Index,
-    /// A constant is NaN, infinite or of the wrong sign.
-    Constant,
-    /// A row's worst case exceeds the int32 accumulator.
-    Overflow,
-    /// A lower action limit exceeds the upper one.
-    Limits,
-    /// The policy's name is not UTF-8, or holds control characters.
-    Name,
-    /// The self-test vector has no steps.
-    SelfTest,
+pub struct NotFinite;
+
+impl fmt::Display for NotFinite {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a value is not finite")
+    }
 }
 
-impl fmt::Display for ImageError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Misaligned => "image is not aligned to 4 bytes",
-            Self::TooShort => "image is shorter than its header",
-            Self::Magic => "not an actq image (magic differs)",
-            Self::Version => "image format version is not supported",
-            Self::Layout => "image was packed for another kernel layout; quantize again",
-            Self::Length => "image length differs from its header",
-            Self::Checksum => "image checksum differs: the image is damaged",
-            Self::Reserved => "a reserved field is not zero",
-            Self::Kind => "unknown policy kind",
-            Self::Chunk => "chunk and execute lengths do not fit",
-            Self::Section => "a section lies outside the image, or overlaps or precedes one that stands before it",
-            Self::Arena => "the scratch memory's regions do not follow each other, or the work area is too short",
-            Self::Overlap => "regions of an operation overlap",
-            Self::Unwritten => "an operation reads memory that nothing has written in its step",
-            Self::Op => "unknown operation",
-            Self::Shape => "lengths of an operation do not fit",
-            Self::Matrix => "an operation names no matrix of the image",
-            Self::Width => "weight width is not 2, 3, 4 or 8 bits",
-            Self::Lanes => "lanes of a block do not follow from its matrix's activations and groups",
-            Self::Group => "group size is not 0, 32, 64 or 128",
-            Self::Index => "output index out of range or repeated",
-            Self::Constant => "a constant is not finite or has the wrong sign",
-            Self::Overflow => "a row can overflow its int32 accumulator",
-            Self::Limits => "action limits are reversed",
-            Self::Name => "policy name is not UTF-8 or holds control characters",
-            Self::SelfTest => "the self-test vector has no steps",
-        })
+impl core::error::Error for NotFinite {}
+
+macro_rules! image_errors {
+    ($($(#[$doc:meta])* $name:ident = $code:literal, $text:literal;)*) => {
+        /// Why [`crate::Image::new_checked`] refused an image.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+        #[non_exhaustive]
+        #[repr(u8)]
+        pub enum ImageError {
+            $($(#[$doc])* $name = $code,)*
+        }
+
+        impl ImageError {
+            /// All of them.
+            pub const ALL: &[Self] = &[$(Self::$name,)*];
+        }
+
+        impl fmt::Display for ImageError {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str(match self {
+                    $(Self::$name => $text,)*
+                })
+            }
+        }
+    };
+}
+
+image_errors! {
+    /// The bytes do not start at a multiple of 4 in memory.
+    Misaligned = 1, "image is not aligned to 4 bytes";
+    /// Fewer bytes than a header.
+    TooShort = 2, "image is shorter than its header";
+    /// The first four bytes are not `ACTQ`.
+    Magic = 3, "not an actq image (magic differs)";
+    /// The image's format version is not the one that this crate reads.
+    Version = 4, "image format version is not supported";
+    /// The image was packed for kernels of another layout; quantize the policy again.
+    Layout = 5, "image was packed for another kernel layout; quantize again";
+    /// The header's length differs from the number of bytes given.
+    Length = 6, "image length differs from its header";
+    /// The checksum does not match: the image is damaged.
+    Checksum = 7, "image checksum differs: the image is damaged";
+    /// A field that must be zero is not.
+    Reserved = 8, "a reserved field is not zero";
+    /// The policy kind is unknown.
+    Kind = 9, "unknown policy kind";
+    /// Chunk or execute length is zero, or execute exceeds chunk.
+    Chunk = 10, "chunk and execute lengths do not fit";
+    /// A section lies outside the image, shares words with another, or does not stand in its place in their order.
+    Section = 11, "a section lies outside the image, or overlaps or precedes one that stands before it";
+    /// The scratch memory is not state, observation, what operations write, action and work area, one behind the other, in at
+    /// most 65535 words; or the work area is too short.
+    Arena = 12, "the scratch memory's regions do not follow each other, or the work area is too short";
+    /// Regions of an operation overlap.
+    Overlap = 13, "regions of an operation overlap";
+    /// An operation, or the action, reads words that no operation of the step has written.
+    Unwritten = 14, "an operation reads memory that nothing has written in its step";
+    /// An operation code is unknown.
+    Op = 15, "unknown operation";
+    /// A length is zero, or two lengths of an operation disagree.
+    Shape = 16, "lengths of an operation do not fit";
+    /// A linear operation names no matrix of the image.
+    Matrix = 17, "an operation names no matrix of the image";
+    /// A matrix block's width is not 2, 3, 4 or 8 bits.
+    Width = 18, "weight width is not 2, 3, 4 or 8 bits";
+    /// A block's lanes are not those that follow from its matrix's activations and group.
+    Lanes = 19, "lanes of a block do not follow from its matrix's activations and groups";
+    /// A group size is not 0, 32, 64 or 128.
+    Group = 20, "group size is not 0, 32, 64 or 128";
+    /// A row index lies outside the output or occurs twice.
+    Index = 21, "output index out of range or repeated";
+    /// A constant is NaN, infinite or of the wrong sign.
+    Constant = 22, "a constant is not finite or has the wrong sign";
+    /// A row's worst case exceeds the int32 accumulator.
+    Overflow = 23, "a row can overflow its int32 accumulator";
+    /// A lower action limit exceeds the upper one.
+    Limits = 24, "action limits are reversed";
+    /// The policy's name is not UTF-8, or holds control characters.
+    Name = 25, "policy name is not UTF-8 or holds control characters";
+    /// The self-test vector has no steps.
+    SelfTest = 26, "the self-test vector has no steps";
+}
+
+impl ImageError {
+    /// The error's number, which stays the same in all versions: 1 to 63.
+    pub const fn code(self) -> u8 {
+        self as u8
     }
 }
 
@@ -111,6 +119,15 @@ pub enum HeadError {
         /// Words given.
         given: usize,
     },
+}
+
+impl HeadError {
+    /// The error's number, which stays the same in all versions: 64 to 79.
+    pub const fn code(self) -> u8 {
+        match self {
+            Self::ScratchTooSmall { .. } => 64,
+        }
+    }
 }
 
 impl fmt::Display for HeadError {
@@ -163,6 +180,21 @@ pub enum StepError {
     NotBegun,
 }
 
+impl StepError {
+    /// The error's number, which stays the same in all versions: 80 to 127.
+    pub const fn code(self) -> u8 {
+        match self {
+            Self::ObservationLength { .. } => 80,
+            Self::ObservationNotFinite { .. } => 81,
+            Self::NotFinite => 82,
+            Self::Damaged => 83,
+            Self::SelfTest { .. } => 84,
+            Self::Budget { .. } => 85,
+            Self::NotBegun => 86,
+        }
+    }
+}
+
 impl From<Fault> for StepError {
     fn from(fault: Fault) -> Self {
         match fault {
@@ -206,3 +238,56 @@ impl fmt::Display for StepError {
 }
 
 impl core::error::Error for StepError {}
+
+#[cfg(test)]
+mod tests {
+    use std::format;
+
+    use super::*;
+
+    /// Other programs hold on to the numbers.
+    #[test]
+    fn codes_stay_what_they_are() {
+        let codes: std::vec::Vec<_> = ImageError::ALL.iter().map(|e| (e.code(), format!("{e:?}"))).collect();
+        let expected = [
+            "Misaligned",
+            "TooShort",
+            "Magic",
+            "Version",
+            "Layout",
+            "Length",
+            "Checksum",
+            "Reserved",
+            "Kind",
+            "Chunk",
+            "Section",
+            "Arena",
+            "Overlap",
+            "Unwritten",
+            "Op",
+            "Shape",
+            "Matrix",
+            "Width",
+            "Lanes",
+            "Group",
+            "Index",
+            "Constant",
+            "Overflow",
+            "Limits",
+            "Name",
+            "SelfTest",
+        ];
+        assert_eq!(codes, (1..).zip(expected.map(Into::into)).collect::<std::vec::Vec<_>>());
+        assert_eq!(HeadError::ScratchTooSmall { needed: 1, given: 0 }.code(), 64);
+        let steps = [
+            StepError::ObservationLength { expected: 1, given: 0 },
+            StepError::ObservationNotFinite { index: 0 },
+            StepError::NotFinite,
+            StepError::Damaged,
+            StepError::SelfTest { step: 0 },
+            StepError::Budget { needed: 1, given: 0 },
+            StepError::NotBegun,
+        ];
+        assert_eq!(steps.map(StepError::code), [80, 81, 82, 83, 84, 85, 86]);
+    }
+}

@@ -8,7 +8,9 @@ use crate::error::{Fault, HeadError, StepError};
 use crate::image::{Image, Op, OpKind, Region};
 use crate::linear::{copy, copy_le};
 use crate::math::clamp;
-use crate::slice::{Budget, Cursor, Meter, Price, Unlimited};
+use crate::pace::budget::Budget;
+use crate::pace::cursor::Cursor;
+use crate::pace::meter::{Meter, Unlimited, Work};
 use crate::{norm, recurrent};
 
 /// A head: an image and the scratch memory that it runs in.
@@ -184,7 +186,7 @@ impl<'a, 's> Head<'a, 's> {
 
     fn go_on(&mut self, budget: &mut impl Meter, one_op: bool) -> Result<bool, Fault> {
         if let Phase::Begun(_) = self.phase {
-            if !self.evaluate(budget, one_op)? || budget.take(1, || Price::action(&self.image)) == 0 {
+            if !self.evaluate(budget, one_op)? || budget.take(1, Work::Act(&self.image)) == 0 {
                 return Ok(false);
             }
             self.act()?;
@@ -253,7 +255,7 @@ impl<'a, 's> Head<'a, 's> {
         let Phase::Begun(cursor) = &mut self.phase else { return Ok(true) };
         while cursor.op < self.image.op_count() {
             let done = match &self.image.op(cursor.op) {
-                Ok(op) if budget.enter(op) => run(op, self.arena, cursor, budget),
+                Ok(op) if budget.take(1, Work::Enter(op)) > 0 => run(op, self.arena, cursor, budget),
                 Ok(_) => Ok(false),
                 // In a checked image every record parses.
                 Err(_) => Err(Fault::Damaged),
@@ -337,7 +339,7 @@ fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &mut impl Me
     }
     // Elements that this piece takes, or units of a norm.
     let (dst, len) = (op.dst(), op.units());
-    let units = budget.take(len - cursor.done, || Price::units(op));
+    let units = budget.take(len - cursor.done, Work::Elements(op));
     if units == 0 {
         return Ok(false);
     }

@@ -1,15 +1,16 @@
 //! The image: one run of little-endian words, parsed once. `docs/FORMAT.md` has the byte tables.
 //!
 //! [`Image::new_checked`] verifies everything; afterwards no accessor panics or fails. Offsets in the image count 32-bit words
-//! from its start, offsets in the arena (the scratch memory) count words too.
+//! from its start, offsets in the arena (the scratch memory) count words too. Sums of offsets wrap: where flash has changed since
+//! the check, an offset may be any word, and what is not there is refused where it is read.
 
 use core::ops::Range;
 
-use crate::activations::Plan;
 use crate::error::ImageError;
-use crate::format::{Block, BlockShape, LAYOUT_STAMP, Width};
+use crate::layout::{Block, BlockShape, LAYOUT_STAMP, Width};
 use crate::linear::{Matrix, RowBlock, fits_i32};
 use crate::math::Function;
+use crate::x::Plan;
 
 /// Positions and constants of the header; what the writer and the parser share.
 pub mod header {
@@ -273,7 +274,7 @@ impl<'a> Op<'a> {
 
     /// Single constant `i`: see [`OpKind`].
     pub fn constant(&self, i: usize) -> f32 {
-        self.image.get(self.data() + i).map_or(0.0, |word| f32::from_bits(u32::from_le(*word)))
+        f32::from_bits(word(self.image, self.data().wrapping_add(i)))
     }
 
     /// Array `i` of f32 bits, of the length of `dst`: see [`OpKind`].
@@ -294,7 +295,7 @@ impl<'a> Op<'a> {
     /// A range of array `i`; empty where that is not in the image.
     pub(crate) fn part(&self, i: usize, range: &Range<usize>) -> &'a [u32] {
         let before = usize::from(self.form.constants) + i * self.dst().len + range.start;
-        section(self.image, self.data() + before, range.len()).unwrap_or_default()
+        section(self.image, self.data().wrapping_add(before), range.len()).unwrap_or_default()
     }
 
     /// Offset of the constants or of the matrix record.
@@ -493,11 +494,6 @@ impl<'a> Image<'a> {
         Region { offset: high(self.head(h::W_ACTION_WORK)), len: low(self.head(h::W_WORK_FLAGS)) }
     }
 
-    /// The least budget, in modelled instructions, with which [`crate::Head::poll`] runs the image.
-    pub fn least_budget(&self) -> u32 {
-        crate::slice::least_budget(self)
-    }
-
     /// Number of operations.
     pub fn op_count(&self) -> usize {
         high(self.head(h::W_KIND))
@@ -530,11 +526,11 @@ impl<'a> Image<'a> {
     pub(crate) fn contract_of(&self, i: usize) -> [f32; CONTRACT_ARRAYS] {
         let mut numbers = [1.0, -0.0, f32::NEG_INFINITY, f32::INFINITY, f32::INFINITY];
         let (mut flags, len) = (high(self.head(h::W_WORK_FLAGS)), self.act_len());
-        let mut at = self.head(h::W_CONTRACT) as usize + i;
+        let mut at = (self.head(h::W_CONTRACT) as usize).wrapping_add(i);
         for number in &mut numbers {
             if flags & 1 == 1 {
                 *number = f32::from_bits(self.word(at));
-                at += len;
+                at = at.wrapping_add(len);
             }
             flags >>= 1;
         }
@@ -556,13 +552,13 @@ impl<'a> Image<'a> {
             return None;
         }
         let (obs, act) = (self.obs_len(), self.act_len());
-        let offset = self.head(h::W_SELF_TEST) as usize + step * (obs + act);
+        let offset = (self.head(h::W_SELF_TEST) as usize).wrapping_add(step * (obs + act));
         self.section(offset, obs + act).split_at_checked(obs)
     }
 
     /// Operation `i`, refused where its record says something impossible. (Within a checked image every record parses.)
     pub(crate) fn op(&self, i: usize) -> Result<Op<'a>, ImageError> {
-        let op = record(self.words, self.head(h::W_OPS) as usize + i * h::OP_WORDS)?;
+        let op = record(self.words, (self.head(h::W_OPS) as usize).wrapping_add(i * h::OP_WORDS))?;
         let [head, places, lengths, data] = op.map(u32::from_le);
         let (code, detail, len) = (head as u8, (head >> 8) as u8, high(head));
         let form = FORMS.get(usize::from(code).wrapping_sub(1)).ok_or(ImageError::Op)?;
@@ -588,7 +584,7 @@ impl<'a> Image<'a> {
 
     /// Offset of matrix record `i`.
     fn matrix_at(&self, i: usize) -> usize {
-        self.head(h::W_MATRICES) as usize + i * h::MATRIX_WORDS
+        (self.head(h::W_MATRICES) as usize).wrapping_add(i * h::MATRIX_WORDS)
     }
 
     fn check(&self) -> Result<(), ImageError> {

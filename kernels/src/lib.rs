@@ -16,32 +16,38 @@
 //! # }
 //! ```
 //!
-//! The arithmetic, in the order in which it happens, is documented in [`linear`]; the packed layouts in [`format`]; the image
+//! The arithmetic, in the order in which it happens, is documented in [`linear`]; the packed layouts in [`layout`]; the image
 //! in `docs/FORMAT.md`. Everything outside the integer GEMV is IEEE 754 binary32 in a fixed order, without fused
 //! multiply-add, so that a host, QEMU and a board give identical bits.
 #![cfg_attr(not(test), no_std)]
 #![deny(unsafe_code)]
 
-pub mod activations;
-#[cfg(actq_armv7em)]
-#[allow(unsafe_code, reason = "the assembler backend; every block carries its proof")]
-pub mod armv7em;
-pub mod cost;
+pub mod arch;
 pub mod dequantize;
 mod error;
-pub mod format;
-pub mod gemv;
 pub mod head;
 pub mod image;
+pub mod layout;
 pub mod linear;
 pub mod math;
 pub mod norm;
-pub mod portable;
+pub mod pace;
 pub mod recurrent;
-pub mod reference;
-mod slice;
+pub mod round;
+pub mod x;
 
 pub use error::{HeadError, ImageError, StepError};
-pub use format::{Block, BlockShape, Width};
 pub use head::Head;
 pub use image::Image;
+pub use layout::{Block, BlockShape, Width};
+
+// Old paths, until all users have moved.
+pub use arch as gemv;
+pub use arch::{portable, reference};
+pub use layout as format;
+pub use pace::cost;
+/// See [`x`].
+pub mod activations {
+    pub use crate::round::ROUND;
+    pub use crate::x::*;
+}

@@ -7,14 +7,15 @@
 
 use core::ops::Range;
 
-use crate::activations::{Plan, Prepared, Scale, max_prepared_words};
-#[cfg(actq_fpu)]
-use crate::armv7em;
+use crate::arch;
+use crate::arch::gemv;
 use crate::error::Fault;
-use crate::format::{Block, BlockShape, Lanes, MAX_GROUP, PAD_COLS, QUAD, STRIP};
-use crate::gemv::gemv;
 use crate::image::{header::BLOCK_WORDS, row_block};
-use crate::slice::{LinearCursor, Meter, Price};
+use crate::layout::half::{bf16, half_word};
+use crate::layout::{Block, BlockShape, Lanes, MAX_GROUP, PAD_COLS, QUAD, STRIP};
+use crate::pace::cursor::LinearCursor;
+use crate::pace::meter::{Meter, Start, Work};
+use crate::x::{Plan, Prepared, Scale, max_prepared_words};
 
 /// Rows whose sums stand on the stack at once.
 pub(crate) const RUN: usize = 8 * STRIP;
@@ -51,25 +52,9 @@ pub struct RowBlock<'a> {
     pub first_row: usize,
 }
 
-/// Half `i` of a run of packed u16.
-#[inline(always)]
-pub(crate) fn half_word(words: &[u32], i: usize) -> u16 {
-    let word = words.get(i / 2).copied().unwrap_or(0);
-    (u32::from_le(word) >> (16 * (i % 2))) as u16
-}
-
-/// The value of a bf16, which is the upper half of an f32.
-#[inline(always)]
-fn bf16(bits: u16) -> f32 {
-    f32::from_bits(u32::from(bits) << 16)
-}
-
 /// `to = from`, as far as both go. On the target not by memcpy, which takes as much code as a kernel.
 pub(crate) fn copy(from: &[u32], to: &mut [u32]) {
-    #[cfg(actq_armv7em)]
-    crate::armv7em::copy(from, to);
-    #[cfg(not(actq_armv7em))]
-    to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
+    arch::copy(from, to);
 }
 
 /// As [`copy`], of words as they stand in the image.
@@ -173,14 +158,7 @@ impl RowBlock<'_> {
 
     /// Turns the sums of as many rows as `y` has, from `first` on, into results. What is `None` stands in y itself.
     fn scale_in_order(&self, first: usize, sums: Option<&[i32]>, x_scale: f32, start: Option<&[u32]>, y: &mut [f32]) {
-        #[cfg(actq_fpu)]
-        armv7em::scale(sums, start, self.scales.get(first / 2..).unwrap_or(&[]), x_scale, y);
-        #[cfg(not(actq_fpu))]
-        for (i, y) in y.iter_mut().enumerate() {
-            let start = start.and_then(|s| s.get(i)).map_or(*y, |bits| f32::from_bits(u32::from_le(*bits)));
-            let sum = sums.and_then(|s| s.get(i)).map_or(y.to_bits() as i32, |sum| *sum);
-            *y = start + sum as f32 * (self.scale(first + i) * x_scale);
-        }
+        arch::scale(sums, start, self.scales.get(first / 2..).unwrap_or(&[]), x_scale, y);
     }
 
     /// Adds the sums of the rows from `first` on, scaled, to what stands at the rows' places; `None` where there is no such place.
@@ -223,13 +201,14 @@ impl Matrix<'_> {
         }
         let x_scale = match at.scale {
             Some(scale) => scale,
-            None if budget.take(1, || Price::magnitude(self)) == 0 => return Ok(false),
+            None if budget.take(1, Work::Magnitude(self.cols)) == 0 => return Ok(false),
             None => *at.scale.insert(Scale::new(x, self.x_max)?),
         };
         // One pass over the output where every row has its bias and is written once, in order.
         let start = self.start_values(accumulate);
         if start.is_none() && at.started < y.len() {
-            let end = at.started + budget.take(y.len() - at.started, || Price::bias(accumulate));
+            let work = Work::Start(Start::of(accumulate, !self.bias.is_empty()));
+            let end = at.started + budget.take(y.len() - at.started, work);
             self.start(at.started..end, y, accumulate);
             at.started = end;
             if end < y.len() {
@@ -250,7 +229,7 @@ impl Matrix<'_> {
             if !plan.as_ref().is_some_and(|plan| plan.fits(shape)) {
                 let plan = plan.insert(Plan::of(&rows.block));
                 if at.prepared != Some(shape.width) {
-                    if budget.take(1, || Price::prepare(rows)) == 0 {
+                    if budget.take(1, Work::Prepare(shape)) == 0 {
                         return Ok(false);
                     }
                     at.prepared = Some(shape.width);
@@ -258,7 +237,8 @@ impl Matrix<'_> {
                 }
             }
             let x = plan.as_ref().and_then(|plan| Prepared::new(work, plan)).ok_or(Fault::Damaged)?;
-            let strips = budget.take((shape.rows - at.row).div_ceil(STRIP), || Price::strips(rows, start.is_some()));
+            let work = Work::Strips { shape, in_order: rows.index.is_empty(), start: start.is_some() };
+            let strips = budget.take((shape.rows - at.row).div_ceil(STRIP), work);
             let end = shape.rows.min(at.row + strips * STRIP);
             rows.apply_rows(at.row..end, &x, x_scale, start, y).ok_or(Fault::Damaged)?;
             at.row = end;

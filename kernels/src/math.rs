@@ -1,7 +1,7 @@
 //! Elementary functions in f32 by additions, multiplications and at most one division: no tables, no calls into a system
 //! library, so the same bits on every machine. The error bounds are asserted over dense sweeps of the inputs, small and huge,
 //! in the crate's tests; that each function takes at most 30 instructions per element on the Cortex-M4's FPU, by
-//! `host-tests/tests/functions.rs`.
+//! `host-tests/tests/all/functions.rs`.
 //!
 //! | function | error bound, against the exact value |
 //! |---|---|
@@ -14,7 +14,7 @@
 //!
 //! Where the input is not a number, so is the result; no function makes a finite number of an infinite one.
 
-use crate::activations::ROUND;
+use crate::round::ROUND;
 
 /// The elementwise functions of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -164,7 +164,7 @@ fn exp2(y: f32, one: f32) -> (f32, f32) {
 }
 
 /// What rounds in these units, p1, p0 and q0.
-const fn exp2_constants(one: f32) -> [f32; 4] {
+pub(crate) const fn exp2_constants(one: f32) -> [f32; 4] {
     // 2 more than 1.5 * 2^23, which could be half a unit in the last place of a large y: then the sum would be a tie, and f not
     // small. (A large positive y whose sum needs a bit more has a large f, but next to the numerator the denominator is nothing.)
     let round = (ROUND + 2.0) * one;
@@ -175,17 +175,10 @@ const fn exp2_constants(one: f32) -> [f32; 4] {
 const FIXED_ONE: f32 = (1 << 26) as f32;
 
 /// Exponents in quarters: no product of an f32 and their factor overflows.
-const QUARTER: f32 = 0.25;
+pub(crate) const QUARTER: f32 = 0.25;
 
 /// The factor of x in the exponent of `e^x`, in quarters.
-const EXP: f32 = core::f32::consts::LOG2_E * QUARTER;
-
-/// What the assembler of recurrent cells takes: the factors of x for `e^x` and `e^(2 x)`, and the constants of [`exp2`].
-#[cfg(actq_fpu)]
-pub(crate) static CELL: [f32; 6] = {
-    let [round, p1, p0, q0] = exp2_constants(QUARTER);
-    [EXP, 2.0 * EXP, round, p1, p0, q0]
-};
+pub(crate) const EXP: f32 = core::f32::consts::LOG2_E * QUARTER;
 
 /// `e^x` as a fraction.
 #[inline(always)]

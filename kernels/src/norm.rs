@@ -2,6 +2,7 @@
 
 use core::ops::Range;
 
+use crate::arch::sqrt;
 use crate::math::{clamp, zero_or_nan};
 
 /// `y = clamp((clamp(x, ±pre_clip) - mean) * scale, ±clip)`; an infinite clip does nothing. `mean` and `scale` hold f32 bits. An
@@ -111,15 +112,6 @@ fn sum(start: f32, x: &[f32], of: impl Fn(f32) -> f32) -> f32 {
     let (rest, fours) = x.as_rchunks::<4>();
     let sum = rest.iter().fold(start, |sum, v| sum + of(*v));
     fours.iter().fold(sum, |sum, [a, b, c, d]| sum + of(*a) + of(*b) + of(*c) + of(*d))
-}
-
-/// The square root, correctly rounded on every machine.
-#[inline(always)]
-fn sqrt(x: f32) -> f32 {
-    #[cfg(actq_fpu)]
-    return crate::armv7em::sqrt(x);
-    #[cfg(not(actq_fpu))]
-    libm::sqrtf(x)
 }
 
 /// An f32 constant as it stands in the image.

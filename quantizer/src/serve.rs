@@ -1,19 +1,12 @@
-//! The pipe protocol: any simulator runs an image as its policy through standard input and output.
-//!
-//! Little-endian. `R` resets and has no reply; `S` and the observation (f32) are answered by the action (f32). Chunks are
-//! queued inside. Where the observation or a value inside the network is not finite, the answer is [`NO_ACTION`] for every
-//! value: there is no action. The recurrent state and what was left of a chunk are forgotten; the last action is kept, so that
-//! the step limit still counts from it. Serving goes on. The firmware demo speaks the same protocol.
+//! The pipe protocol ([`actq_link`]): any simulator runs an image as its policy through standard input and output.
 
 use std::io::{ErrorKind, Read, Write};
 
 use actq_kernels::Image;
+use actq_link::{NO_ACTION, RESET, STEP};
 use anyhow::{Context, Result, bail};
 
 use crate::runtime::with_head;
-
-/// The value of an answer without an action: a quiet NaN.
-pub const NO_ACTION: f32 = f32::from_bits(0x7fc0_0000);
 
 /// Serves until the input ends.
 pub fn serve(image: Image<'_>, mut input: impl Read, mut output: impl Write) -> Result<()> {
@@ -27,8 +20,8 @@ pub fn serve(image: Image<'_>, mut input: impl Read, mut output: impl Write) -> 
                 other => other.context("input cannot be read")?,
             }
             match command[0] {
-                b'R' => head.reset(),
-                b'S' => {
+                RESET => head.reset(),
+                STEP => {
                     input
                         .read_exact(&mut bytes)
                         .with_context(|| format!("the input ended inside an observation of {} bytes", bytes.len()))?;

@@ -1,79 +1,45 @@
 //! What people and CI type: `cargo demo`, `cargo verify`, `cargo xtask bench`, `cargo xtask budgets`, `cargo xtask fit`,
 //! `cargo xtask doctor`.
+//!
+//! This crate depends on next to nothing, so that it is built and speaks at once. What measures is the binary of `actq-bench`.
 #![forbid(unsafe_code)]
 
-mod bench;
-mod budgets;
-mod demo;
-mod fit;
-mod heads;
+mod cpu;
 mod setup;
 mod verify;
 
-use std::path::PathBuf;
-use std::process::ExitCode;
+use std::process::{Command, ExitCode};
 
-use actq_host_tests::qemu::Target;
-use clap::{Parser, Subcommand};
+use actq_boards::{Target, root};
+use anyhow::{Context as _, Result, ensure};
 
-/// Commands of the actq workspace.
-#[derive(Parser)]
-#[command(name = "xtask", max_term_width = 100)]
-struct Cli {
-    #[command(subcommand)]
-    command: Command,
-}
+const USAGE: &str = "\
+Commands of the actq workspace. Usage: cargo xtask COMMAND
 
-#[derive(Subcommand)]
-enum Command {
-    /// Quantize the UR3 policy, run it on a Cortex-M4 in QEMU in closed loop, and show what it costs and gives
-    Demo {
-        /// Closed-loop episodes of each policy on the host
-        #[arg(long, default_value_t = 100)]
-        episodes: u64,
-        /// Closed-loop episodes with the firmware in QEMU as the policy
-        #[arg(long, default_value_t = 20)]
-        qemu_episodes: u64,
-    },
-    /// Count the instructions of kernels and whole heads on a Cortex-M4 in QEMU and model their cycles
-    ///
-    /// The heads are that of the UR3 policy and, where ACTQ_SHARED names their folder, those of the shared policies.
-    Bench {
-        /// Write the figures as JSON, too
-        #[arg(long)]
-        json: Option<PathBuf>,
-        /// Also model a flash with so many wait states behind the caches of an STM32F4; an STM32F405 at 168 MHz has 5
-        #[arg(long, value_name = "N", default_value_t = 0)]
-        wait_states: u64,
-        /// Show in which functions the heads spend their instructions
-        #[arg(long)]
-        by_function: bool,
-    },
-    /// Measure instructions, code, scratch and stack, and compare them with budgets.json
-    Budgets {
-        /// Write what was measured to budgets.json
-        #[arg(long)]
-        update: bool,
-    },
-    /// Measure the cost model's rates anew (after every change of the kernels)
-    Fit,
-    /// Everything that CI checks: format, lints, documentation, tests on the host and under QEMU
-    Verify,
-    /// Check and install what the other commands need: Rust targets and QEMU
-    Doctor,
-}
+  demo     Quantize the UR3 policy, run it on a Cortex-M4 in QEMU in closed loop, and show what it costs and gives
+  bench    Count the instructions of kernels and whole heads on a Cortex-M4 in QEMU and model their cycles
+  budgets  Measure instructions, code, scratch and stack, and compare them with budgets.json
+  fit      Measure the cost model's rates anew (after every change of the kernels)
+  verify   Everything that CI checks: format, lints, documentation, tests on the host and under QEMU, budgets
+  doctor   Check and install what the other commands need: Rust targets and QEMU
+
+The first four show their options with --help.";
 
 fn main() -> ExitCode {
-    let cortex_m4 = || setup::ensure(&[Target::Fpu]);
-    let outcome = match Cli::parse().command {
-        Command::Demo { episodes, qemu_episodes } => cortex_m4().and_then(|()| demo::run(episodes, qemu_episodes)),
-        Command::Bench { json, wait_states, by_function } => {
-            cortex_m4().and_then(|()| bench::run(json.as_deref(), wait_states, by_function))
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let outcome = match &words[..] {
+        ["verify"] => verify::run(),
+        ["doctor"] => setup::ensure(&Target::ALL).map(|()| println!("all there")),
+        ["demo" | "bench" | "budgets" | "fit", ..] => measure(&words),
+        ["help" | "-h" | "--help"] => {
+            println!("{USAGE}");
+            Ok(())
         }
-        Command::Budgets { update } => cortex_m4().and_then(|()| budgets::run(update)),
-        Command::Fit => cortex_m4().and_then(|()| fit::run()),
-        Command::Verify => setup::ensure(&Target::ALL).and_then(|()| verify::run()),
-        Command::Doctor => setup::ensure(&Target::ALL).map(|()| println!("all there")),
+        _ => {
+            eprintln!("{USAGE}");
+            return ExitCode::from(2);
+        }
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
@@ -82,4 +48,22 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// A command of `actq-bench`.
+fn measure(arguments: &[&str]) -> Result<()> {
+    println!("{}: on the Cortex-M4 in QEMU", arguments[0]);
+    setup::ensure(&[Target::Fpu])?;
+    let mut command = cargo();
+    command.args(["run", "--profile", "host", "--package", "actq-bench", "--"]).args(arguments);
+    println!("building what quantizes and measures");
+    ensure!(command.status().context("cargo cannot be started")?.success(), "{} failed", arguments[0]);
+    Ok(())
+}
+
+/// The cargo that runs this, in the workspace.
+fn cargo() -> Command {
+    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    command.current_dir(root());
+    command
 }

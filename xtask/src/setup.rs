@@ -1,9 +1,9 @@
-//! What must be installed: the Rust targets and QEMU.
+//! What must be installed: the Rust targets, QEMU, and for `cargo verify` the toolchain's tools and the oldest compiler.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use actq_host_tests::qemu::{self, Target};
+use actq_boards::{Target, version};
 use anyhow::{Context, Result, bail, ensure};
 
 /// Installs what these targets need and is missing, where that can be done without asking.
@@ -11,19 +11,40 @@ pub(crate) fn ensure(targets: &[Target]) -> Result<()> {
     for target in targets {
         rust_target(target.triple())?;
     }
-    let mut emulators: Vec<_> = targets.iter().map(|target| target.emulator()).collect();
+    let mut emulators: Vec<_> = targets.iter().map(|target| target.board().emulator).collect();
     emulators.dedup();
     for emulator in emulators {
-        if qemu::version(emulator).is_err() {
+        if version(emulator).is_err() {
             install(emulator)?;
         }
-        println!("{emulator}: {}", qemu::version(emulator)?);
+        println!("{emulator}: {}", version(emulator).with_context(|| format!("{emulator} is not installed"))?);
     }
     Ok(())
 }
 
+/// Installs cargo's tools that a toolchain may lack.
+pub(crate) fn components() -> Result<()> {
+    for (component, subcommand) in [("rustfmt", "fmt"), ("clippy", "clippy")] {
+        if output("cargo", &[subcommand, "--version"]).is_err() {
+            run("rustup", &["component", "add", component])
+                .with_context(|| format!("{component} is missing; `rustup component add {component}` adds it"))?;
+        }
+    }
+    Ok(())
+}
+
+/// Installs a toolchain beside the one in use; gives why that cannot be.
+pub(crate) fn toolchain(release: &str) -> Result<(), String> {
+    let installed = output("rustup", &["toolchain", "list"]).map_err(|error| format!("{error:#}"))?;
+    if installed.lines().any(|line| line.starts_with(release)) {
+        return Ok(());
+    }
+    let arguments = ["toolchain", "install", release, "--profile", "minimal", "--no-self-update"];
+    run("rustup", &arguments).map_err(|_| format!("rustup cannot install {release}"))
+}
+
 /// The text that a program prints.
-pub(crate) fn output(program: &str, arguments: &[&str]) -> Result<String> {
+fn output(program: &str, arguments: &[&str]) -> Result<String> {
     let output =
         Command::new(program).args(arguments).output().with_context(|| format!("{program} is not installed"))?;
     ensure!(output.status.success(), "{program}: {}", String::from_utf8_lossy(&output.stderr).trim());
@@ -49,7 +70,7 @@ fn rust_target(triple: &str) -> Result<()> {
 fn install(emulator: &str) -> Result<()> {
     let exists = |program: &str| Command::new(program).arg("--version").output().is_ok();
     let root = output("id", &["-u"]).is_ok_and(|id| id.trim() == "0");
-    let riscv = emulator == Target::Riscv.emulator();
+    let riscv = emulator == Target::Riscv.board().emulator;
     if exists("apt-get") {
         // A package has the emulator's name, or provides it: RISC-V's is qemu-system-misc in Debian 12.
         if root {

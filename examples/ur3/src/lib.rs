@@ -19,6 +19,13 @@ pub mod random;
 pub mod servo;
 pub mod task;
 
+use std::path::Path;
+
+/// The folder of the trained policy and its recordings.
+pub fn policy_folder() -> &'static Path {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/policy"))
+}
+
 /// Number of values in one observation; [`task::Task::observe`] gives their order.
 pub const OBS_DIM: usize = 18;
 

@@ -1,21 +1,16 @@
 //! The shipped policy: closed-loop success, and the recorded outputs that a quantizer relies on.
 
 use std::fs::File;
-use std::path::PathBuf;
 
-use actq_ur3::OBS_DIM;
 use actq_ur3::policy_f32::PolicyF32;
 use actq_ur3::task::run_episode;
+use actq_ur3::{OBS_DIM, policy_folder};
 use ndarray::{Array1, Array3, Axis};
 use ndarray_npy::NpzReader;
 
-fn folder() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("policy")
-}
-
 #[test]
 fn shipped_policy_solves_the_task() {
-    let mut policy = PolicyF32::load(&folder()).unwrap();
+    let mut policy = PolicyF32::load(policy_folder()).unwrap();
     let solved = (1000..1100)
         .filter(|&seed| {
             policy.reset();
@@ -27,9 +22,9 @@ fn shipped_policy_solves_the_task() {
 
 #[test]
 fn recorded_outputs_are_those_of_the_policy() {
-    let policy = PolicyF32::load(&folder()).unwrap();
+    let policy = PolicyF32::load(policy_folder()).unwrap();
     for name in ["calib.npz", "heldout.npz"] {
-        let mut npz = NpzReader::new(File::open(folder().join(name)).unwrap()).unwrap();
+        let mut npz = NpzReader::new(File::open(policy_folder().join(name)).unwrap()).unwrap();
         let obs: Array3<f32> = npz.by_name("obs").unwrap();
         let action: Array3<f32> = npz.by_name("action").unwrap();
         let length: Array1<i64> = npz.by_name("length").unwrap();

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::size::op_name;
 
-/// Clock of the processor that is assumed where none is given: 168 MHz, that of an STM32F407.
+/// Clock of the processor that is assumed where none is given: 168 MHz, that of an STM32F405.
 pub const CLOCK: f64 = 168e6;
 
 /// An operation's cost.

@@ -1,0 +1,216 @@
+//! `cargo xtask budgets`: what the runtime may cost, in `budgets.json`, against what it costs.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::PathBuf;
+
+use actq::report::table::{group_name, table};
+use actq_bench::cycles::{CODE_LINES, Code};
+use actq_bench::qemu::{self, Counter};
+use actq_bench::{Target, firmware, root, ur3};
+use anyhow::{Context, Result, bail, ensure};
+use serde::{Deserialize, Serialize};
+
+use crate::{heads, kernels};
+
+/// How far a figure may lie above its budget, in percent, where another rustc made it (the compiler is not pinned), or, of a
+/// head, another processor: widths and activations follow from sums that it may round otherwise.
+const SLACK: u64 = 2;
+
+/// Bytes of code that the runtime may take at most, where steps are not cut.
+const RUNTIME_MOST: u64 = 24 * 1024;
+
+/// Functions that are shown where the runtime is above its budget.
+const SHOWN: usize = 20;
+
+const HEAD: &str = "instructions of a step, ";
+
+const RUNTIME: &str = "bytes of code, whole runtime";
+const RUNTIME_WITH_POLLS: &str = "bytes of code, whole runtime with begin and poll";
+const LOOP: &str = "lines of inner loop, ";
+
+type Figures = BTreeMap<String, u64>;
+
+/// `budgets.json`.
+#[derive(Debug, Serialize, Deserialize)]
+struct Budgets {
+    /// The compiler that made the code that was measured.
+    rustc: String,
+    /// What is allowed, by name.
+    figures: Figures,
+}
+
+/// A figure above what is allowed.
+#[derive(Debug, PartialEq, Eq)]
+struct Excess {
+    name: String,
+    allowed: u64,
+    measured: u64,
+}
+
+pub(crate) fn run(update: bool) -> Result<()> {
+    let path = path();
+    let measured = measure()?;
+    let rustc = actq_boards::version("rustc").context("rustc is not installed")?;
+    if update {
+        let budgets = Budgets { rustc: rustc.clone(), figures: measured.clone() };
+        fs::write(&path, serde_json::to_string_pretty(&budgets)? + "\n")
+            .with_context(|| format!("{}: cannot be written", path.display()))?;
+        println!("{} written; `git diff` shows what has changed", path.display());
+    }
+    let text = fs::read_to_string(&path)
+        .with_context(|| format!("{}: cannot be read; `cargo xtask budgets --update` makes it", path.display()))?;
+    let budgets: Budgets = serde_json::from_str(&text).with_context(|| path.display().to_string())?;
+    let stale = difference(&budgets.figures, &measured);
+    ensure!(
+        stale.is_empty(),
+        "budgets.json is not about what was measured; `cargo xtask budgets --update` renews it:\n  {}",
+        stale.join("\n  ")
+    );
+    let excess = compare(&budgets, &measured, &rustc);
+    if excess.is_empty() {
+        let lower = measured.iter().filter(|(name, figure)| budgets.figures.get(*name).is_some_and(|b| b > figure));
+        println!("{} figures are within their budgets, {} below", measured.len(), lower.count());
+        return Ok(());
+    }
+    let mut rows = table(&["over budget", "allowed", "measured", "difference", "percent"]);
+    for Excess { name, allowed, measured } in &excess {
+        let difference = measured - allowed;
+        let percent = format!("{:+.2}", 100.0 * difference as f64 / (*allowed).max(1) as f64);
+        rows.add_row([name.clone(), allowed.to_string(), measured.to_string(), format!("+{difference}"), percent]);
+    }
+    println!("\n{rows}\n");
+    if excess.iter().any(|excess| excess.name == RUNTIME) {
+        println!("The runtime's largest functions\n\n{}\n", largest_functions(&runtime()?));
+    }
+    bail!("{} of {} figures are above their budgets", excess.len(), measured.len())
+}
+
+fn path() -> PathBuf {
+    root().join("budgets.json")
+}
+
+/// Names that only one of the two has.
+fn difference(budgets: &Figures, measured: &Figures) -> Vec<String> {
+    let missing =
+        measured.keys().filter(|name| !budgets.contains_key(*name)).map(|name| format!("no budget for {name}"));
+    let gone = budgets.keys().filter(|name| !measured.contains_key(*name)).map(|name| format!("not measured: {name}"));
+    missing.chain(gone).collect()
+}
+
+/// The figures above their budgets, or above the limits of an inner loop and of the runtime, which no budget raises.
+fn compare(budgets: &Budgets, measured: &Figures, rustc: &str) -> Vec<Excess> {
+    let allowed = |name: &str| {
+        let slack = if budgets.rustc == rustc && !name.starts_with(HEAD) { 0 } else { SLACK };
+        let most = match name {
+            RUNTIME => RUNTIME_MOST,
+            _ if name.starts_with(LOOP) => CODE_LINES,
+            _ => u64::MAX,
+        };
+        let budget = budgets.figures.get(name).map_or(0, |budget| *budget.min(&most));
+        let allowed = budget + budget * slack / 100;
+        // Loops are in assembler, the same with every compiler.
+        if most == CODE_LINES { allowed.min(most) } else { allowed }
+    };
+    measured
+        .iter()
+        .map(|(name, &measured)| Excess { name: name.clone(), allowed: allowed(name), measured })
+        .filter(|excess| excess.measured > excess.allowed)
+        .collect()
+}
+
+/// All figures.
+fn measure() -> Result<Figures> {
+    let counter = Counter::build()?;
+    let mut figures = code()?;
+    for record in kernels::measure(&counter, 0)?.into_iter().filter(kernels::Record::is_kernel) {
+        let kernels::Record { name, bits, group, rows, cols, instructions, .. } = record;
+        let scales = group_name(group);
+        figures.insert(format!("instructions, {name} {bits} bits, scales {scales}, {rows}x{cols}"), instructions);
+    }
+    let stack = firmware::bench("stack", Target::Fpu)?;
+    for head in heads::measure(&[ur3()], &counter, 0)? {
+        let name = head.record.name();
+        figures.insert(format!("{HEAD}{name}"), head.record.instructions);
+        figures.insert(format!("bytes of scratch, {name}"), head.scratch_bytes as u64);
+        let output = qemu::run(qemu::command(&stack, Some(&head.path), "")?, &[])?;
+        let text = String::from_utf8_lossy(&output.stdout);
+        let fields: Vec<&str> = text.split_whitespace().collect();
+        let [check, self_test, step] = fields[..] else { bail!("the stack firmware failed on {name}: {output:?}") };
+        for (what, bytes) in [("check", check), ("self-test", self_test), ("step", step)] {
+            figures.insert(format!("bytes of stack, {what} of {name}"), bytes.parse()?);
+        }
+    }
+    Ok(figures)
+}
+
+/// Bytes of code of the whole runtime and of every function in assembler, and the lines of its longest inner loop, which the
+/// instruction cache must hold.
+fn code() -> Result<Figures> {
+    let code = runtime()?;
+    let with_polls = Code::read(&firmware::bench("runtime-poll", Target::Fpu)?)?;
+    let mut figures =
+        Figures::from([(RUNTIME.to_owned(), code.bytes()), (RUNTIME_WITH_POLLS.to_owned(), with_polls.bytes())]);
+    for function in code.functions().iter().filter(|f| f.name.starts_with("actq_") && !f.name.contains("::")) {
+        figures.insert(format!("bytes of code, {}", function.name), function.size);
+        figures.insert(format!("{LOOP}{}", function.name), code.longest_inner_loop(function)?);
+    }
+    Ok(figures)
+}
+
+/// The code of everything that an application calls that does not cut its steps.
+fn runtime() -> Result<Code> {
+    Code::read(&firmware::bench("runtime", Target::Fpu)?)
+}
+
+fn largest_functions(code: &Code) -> String {
+    let mut functions: Vec<_> = code.functions().iter().collect();
+    functions.sort_by_key(|function| std::cmp::Reverse(function.size));
+    let mut rows = table(&["bytes", "function"]);
+    for function in functions.iter().take(SHOWN) {
+        rows.add_row([function.size.to_string(), function.name.clone()]);
+    }
+    rows.to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn figures(entries: &[(&str, u64)]) -> Figures {
+        entries.iter().map(|(name, figure)| ((*name).to_owned(), *figure)).collect()
+    }
+
+    fn excess(budget: (&str, u64), measured: u64, rustc: &str) -> Option<(u64, u64)> {
+        let budgets = Budgets { rustc: "rustc 1".into(), figures: figures(&[budget]) };
+        let excess = compare(&budgets, &figures(&[(budget.0, measured)]), rustc);
+        excess.first().map(|excess| (excess.allowed, excess.measured))
+    }
+
+    #[test]
+    fn a_figure_above_its_budget_fails() {
+        assert_eq!(excess(("x", 1000), 1000, "rustc 1"), None);
+        assert_eq!(excess(("x", 1000), 1001, "rustc 1"), Some((1000, 1001)));
+    }
+
+    #[test]
+    fn another_compiler_has_some_slack_and_so_has_a_head() {
+        assert_eq!(excess(("x", 1000), 1020, "rustc 2"), None);
+        assert_eq!(excess(("x", 1000), 1021, "rustc 2"), Some((1020, 1021)));
+        let head = format!("{HEAD}x");
+        assert_eq!(excess((&head, 1000), 1020, "rustc 1"), None);
+        assert_eq!(excess((&head, 1000), 1021, "rustc 1"), Some((1020, 1021)));
+    }
+
+    #[test]
+    fn no_budget_raises_a_limit() {
+        assert_eq!(excess((&format!("{LOOP}f"), 70), 65, "rustc 2"), Some((64, 65)));
+        assert_eq!(excess((RUNTIME, 30_000), 24_577, "rustc 1"), Some((24_576, 24_577)));
+    }
+
+    #[test]
+    fn names_must_agree() {
+        let differing = difference(&figures(&[("a", 1), ("b", 1)]), &figures(&[("b", 1), ("c", 1)]));
+        assert_eq!(differing, ["no budget for c", "not measured: a"]);
+    }
+}

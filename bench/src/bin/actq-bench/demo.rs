@@ -1,0 +1,195 @@
+//! `cargo demo`: the UR3 policy from its PyTorch weights to a Cortex-M4, in closed loop.
+
+use std::fs;
+use std::path::Path;
+
+use actq::budget::Budget;
+use actq::data::Recordings;
+use actq::measure::eval;
+use actq::measure::size::bits_per_weight;
+use actq::methods::{Method, Options};
+use actq::pipeline::Quantizer;
+use actq::policy::Policy;
+use actq::report::table::table;
+use actq::runtime::{ImageBuffer, with_head};
+use actq_bench::qemu::{self, Counter, Server};
+use actq_bench::{Target, evaluation, firmware, ur3};
+use actq_kernels::{Head, Image, Width};
+use actq_ur3::policy_f32::PolicyF32;
+use actq_ur3::task::{Outcome, run_episode};
+use anyhow::{Context, Result, ensure};
+
+use crate::{heads, kernels};
+
+/// First seed of the closed-loop episodes; the policy was trained and calibrated on others.
+const FIRST_SEED: u64 = 1000;
+
+/// Steps of distillation: a quarter of what `actq quantize` takes by default, for an answer within a minute.
+const STEPS: usize = 2000;
+
+/// A policy's column in the table.
+struct Column {
+    name: String,
+    cells: Vec<String>,
+}
+
+const ROWS: [&str; 9] = [
+    "bits per weight",
+    "image bytes",
+    "against f32",
+    "scratch RAM bytes",
+    "held-out NMSE",
+    "closed-loop success",
+    "tracking error",
+    "instructions per evaluation",
+    "instructions per MAC",
+];
+
+pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
+    let policy_dir = ur3();
+    let work = firmware::target_dir().join("demo");
+    fs::create_dir_all(&work)?;
+    let policy = Policy::load(&policy_dir)?;
+    let f32_bytes = 4 * policy.graph.parameters();
+    println!("\nQuantizing {} ({} parameters, {f32_bytes} bytes in f32)", policy.name, policy.graph.parameters());
+
+    println!("Closed loop in f32, {episodes} episodes");
+    let mut reference = PolicyF32::load(&policy_dir)?;
+    let outcomes = closed_loop(episodes, |seed| {
+        reference.reset();
+        Ok(run_episode(seed, |obs| reference.act(obs)))
+    })?;
+    let mut columns = vec![Column {
+        name: "f32".into(),
+        cells: vec![
+            "32".into(),
+            f32_bytes.to_string(),
+            "1.0x".into(),
+            "-".into(),
+            "-".into(),
+            success(&outcomes),
+            tracking(&outcomes),
+        ],
+    }];
+
+    let counter = Counter::build()?;
+    let mut report = Vec::new();
+    let recordings = Recordings::load(&policy)?;
+    let eight = Options::new(Method::Gptq, Budget::Width(Width::W8));
+    let best = |bits| Options { steps: Some(STEPS), ..Options::new(Method::Best, Budget::BitsPerWeight(bits)) };
+    for (name, options) in [("8 bits", eight), ("3.0 bits", best(3.0)), ("2.0 bits", best(2.0))] {
+        println!("Quantizing to {name} by {}", options.method);
+        let quantizer = Quantizer::new(&policy, &recordings, options.method, |_| {})?;
+        let path = work.join(format!("ur3 {name}.actq").replace(' ', "-"));
+        let bytes = heads::write_image(&quantizer, &options, &path)?;
+        let buffer = ImageBuffer::new(&bytes);
+        let image = buffer.image(&path)?;
+        println!("Closed loop at {name}, {episodes} episodes on the host");
+        let outcomes = with_head(image, |head| closed_loop(episodes, |seed| episode_on_host(head, seed)))?;
+        println!("Closed loop at {name}, {qemu_episodes} episodes with the firmware in QEMU as the policy");
+        let elf = firmware::application_with(Target::Fpu, &path)?;
+        let firmware = Firmware::run(&elf, image, qemu_episodes)?;
+        let heldout = eval::heldout(&policy_dir, &image)?;
+        let instructions = evaluation::count(&counter, &elf, None, &image, heldout.episode(0))?.instructions;
+        let nmse = eval::evaluate(image, &heldout)?.nmse;
+        columns.push(Column {
+            name: name.into(),
+            cells: vec![
+                format!("{:.2}", bits_per_weight(&image)),
+                bytes.len().to_string(),
+                format!("{:.1}x", f32_bytes as f64 / bytes.len() as f64),
+                (4 * image.scratch_words()).to_string(),
+                format!("{nmse:.1e}"),
+                success(&outcomes),
+                tracking(&outcomes),
+                instructions.to_string(),
+                format!("{:.2}", instructions as f64 / policy.graph.weights() as f64),
+            ],
+        });
+        report.push(format!(
+            "{name}, firmware in QEMU: success {}, identical bits: {} of {} actions, {} bytes of code beside the image",
+            success(&firmware.outcomes),
+            firmware.identical,
+            firmware.actions,
+            firmware::flash_bytes(&elf)? - image.bytes() as u64,
+        ));
+        ensure!(firmware.identical == firmware.actions, "the firmware's actions differ from the host's");
+    }
+
+    let names: Vec<&str> = std::iter::once("UR3 reach").chain(columns.iter().map(|c| c.name.as_str())).collect();
+    let mut summary = table(&names);
+    for (i, row) in ROWS.iter().enumerate() {
+        let cells = columns.iter().map(|c| c.cells.get(i).cloned().unwrap_or_else(|| "-".into()));
+        summary.add_row(std::iter::once((*row).to_owned()).chain(cells));
+    }
+    println!("\n{summary}\n\n{}\n", report.join("\n"));
+    let records = kernels::measure(&counter, 0)?;
+    println!(
+        "A whole call each on the Cortex-M4, instructions counted, cycles modelled:\n\n{}",
+        kernels::report(&records, Some((256, 256)))
+    );
+    Ok(())
+}
+
+fn closed_loop(episodes: u64, mut episode: impl FnMut(u64) -> Result<Outcome>) -> Result<Vec<Outcome>> {
+    (FIRST_SEED..FIRST_SEED + episodes).map(&mut episode).collect()
+}
+
+/// One episode with a fallible policy; its first error ends up here.
+fn episode(seed: u64, mut step: impl FnMut(&[f32]) -> Result<[f32; 6]>) -> Result<Outcome> {
+    let mut failure = None;
+    let outcome = run_episode(seed, |obs| {
+        if failure.is_some() {
+            return [0.0; 6];
+        }
+        step(obs).unwrap_or_else(|error| {
+            failure = Some(error);
+            [0.0; 6]
+        })
+    });
+    failure.map_or(Ok(outcome), Err)
+}
+
+fn episode_on_host(head: &mut Head<'_, '_>, seed: u64) -> Result<Outcome> {
+    head.reset();
+    episode(seed, |obs| Ok(head.step(obs)?.try_into()?))
+}
+
+fn success(outcomes: &[Outcome]) -> String {
+    format!("{} of {}", outcomes.iter().filter(|o| o.success).count(), outcomes.len())
+}
+
+fn tracking(outcomes: &[Outcome]) -> String {
+    let mean = outcomes.iter().map(|o| o.tracking_error_m).sum::<f64>() / outcomes.len().max(1) as f64;
+    format!("{:.2} mm", 1e3 * mean)
+}
+
+/// What a run of the firmware as the policy gave.
+struct Firmware {
+    outcomes: Vec<Outcome>,
+    actions: usize,
+    /// Actions whose bits are those of the host executor on the same observations.
+    identical: usize,
+}
+
+impl Firmware {
+    fn run(elf: &Path, image: Image<'_>, episodes: u64) -> Result<Self> {
+        let mut server = Server::start(qemu::command(elf, None, "serve")?, image.act_len())?;
+        let (mut actions, mut identical) = (0, 0);
+        let outcomes = with_head(image, |head| {
+            closed_loop(episodes, |seed| {
+                head.reset();
+                server.reset()?;
+                episode(seed, |obs| {
+                    let action = server.step(obs)?;
+                    let same = action.iter().zip(head.step(obs)?).all(|(a, b)| a.to_bits() == b.to_bits());
+                    actions += 1;
+                    identical += usize::from(same);
+                    action.as_slice().try_into().context("an action has not six values")
+                })
+            })
+        })?;
+        server.finish()?;
+        Ok(Self { outcomes, actions, identical })
+    }
+}

@@ -1,0 +1,74 @@
+//! The commands that measure: `cargo demo`, `cargo xtask bench`, `cargo xtask budgets`, `cargo xtask fit`. xtask installs what they
+//! need, builds this binary and runs it.
+#![forbid(unsafe_code)]
+
+mod bench;
+mod budgets;
+mod demo;
+mod fit;
+mod heads;
+mod kernels;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// What the runtime costs on a Cortex-M4 in QEMU.
+#[derive(Parser)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask", max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Quantize the UR3 policy, run it on a Cortex-M4 in QEMU in closed loop, and show what it costs and gives
+    Demo {
+        /// Closed-loop episodes of each policy on the host
+        #[arg(long, default_value_t = 100)]
+        episodes: u64,
+        /// Closed-loop episodes with the firmware in QEMU as the policy
+        #[arg(long, default_value_t = 20)]
+        qemu_episodes: u64,
+    },
+    /// Count the instructions of kernels and whole heads on a Cortex-M4 in QEMU and model their cycles
+    ///
+    /// The heads are that of the UR3 policy and, where ACTQ_SHARED names their folder, those of the shared policies.
+    Bench {
+        /// Write the figures as JSON, too
+        #[arg(long)]
+        json: Option<PathBuf>,
+        /// Also model a flash with so many wait states behind the caches of an STM32F4; an STM32F405 at 168 MHz has 5
+        #[arg(long, value_name = "N", default_value_t = 0)]
+        wait_states: u64,
+        /// Show in which functions the heads spend their instructions
+        #[arg(long)]
+        by_function: bool,
+    },
+    /// Measure instructions, code, scratch and stack, and compare them with budgets.json
+    Budgets {
+        /// Write what was measured to budgets.json
+        #[arg(long)]
+        update: bool,
+    },
+    /// Measure the cost model's rates anew (after every change of the kernels)
+    Fit,
+}
+
+fn main() -> ExitCode {
+    let outcome = match Cli::parse().command {
+        Command::Demo { episodes, qemu_episodes } => demo::run(episodes, qemu_episodes),
+        Command::Bench { json, wait_states, by_function } => bench::run(json.as_deref(), wait_states, by_function),
+        Command::Budgets { update } => budgets::run(update),
+        Command::Fit => fit::run(),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("\nerror: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

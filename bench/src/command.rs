@@ -1,0 +1,66 @@
+//! The command `actq` as tests call it.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::sync::OnceLock;
+
+use anyhow::{Context, Result, ensure};
+
+use crate::firmware::cargo_build;
+
+/// The command `actq`; built once, since cargo does not build the binaries of a dependency, in the profile of this build and
+/// beside it.
+fn binary() -> &'static Path {
+    static BINARY: OnceLock<PathBuf> = OnceLock::new();
+    BINARY.get_or_init(|| {
+        // A test is in the folder deps of the profile's.
+        let test = std::env::current_exe().expect("the test has a path");
+        let folder = test.ancestors().nth(2).expect("the test is in a folder of its profile");
+        let profile = folder.file_name().and_then(|name| name.to_str()).expect("a profile's name is text");
+        let profile = if profile == "debug" { "dev" } else { profile };
+        cargo_build("actq", &["--package", "actq", "--bin", "actq", "--profile", profile], &[]).expect("actq builds");
+        folder.join(format!("actq{}", std::env::consts::EXE_SUFFIX))
+    })
+}
+
+/// The actq command with arguments.
+pub fn actq(arguments: &[&str]) -> Command {
+    let mut command = Command::new(binary());
+    command.args(arguments);
+    command
+}
+
+/// Runs a command with this standard input.
+pub fn run(mut command: Command, input: &[u8]) -> Result<Output> {
+    let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn()?;
+    let mut stdin = child.stdin.take().context("no standard input")?;
+    // A command that stops early closes the pipe; its exit status tells why.
+    drop(stdin.write_all(input));
+    drop(stdin);
+    Ok(child.wait_with_output()?)
+}
+
+/// Standard output of a run that must have ended well.
+pub fn succeeded(output: &Output) -> Result<String> {
+    ensure!(output.status.code() == Some(0), "{}: {}", output.status, String::from_utf8_lossy(&output.stderr));
+    Ok(String::from_utf8(output.stdout.clone())?)
+}
+
+/// Requires an exit status and a message that holds `words`, and no panic.
+pub fn failed(output: &Output, status: i32, words: &[&str]) -> Result<()> {
+    let message = String::from_utf8_lossy(&output.stderr);
+    ensure!(output.status.code() == Some(status), "{} instead of {status}: {message}", output.status);
+    ensure!(!message.trim().is_empty() && !message.contains("panicked"), "no message but {message:?}");
+    let missing: Vec<_> = words.iter().filter(|word| !message.contains(**word)).collect();
+    ensure!(missing.is_empty(), "{missing:?} not in the message: {message}");
+    Ok(())
+}
+
+/// Fails with all errors of `results`, so that one wrong message does not hide the others.
+pub fn all(results: impl IntoIterator<Item = (String, Result<()>)>) -> Result<()> {
+    let wrong: Vec<String> =
+        results.into_iter().filter_map(|(what, result)| Some(format!("{what}: {:#}", result.err()?))).collect();
+    ensure!(wrong.is_empty(), "\n{}", wrong.join("\n"));
+    Ok(())
+}

@@ -1,0 +1,23 @@
+//! What the tests and the measuring commands share: the firmware, built and under QEMU, counted instructions and modelled cycles,
+//! golden kernel cases, drawn networks, the command `actq`.
+#![forbid(unsafe_code)]
+
+pub mod command;
+pub mod cycles;
+pub mod evaluation;
+pub mod firmware;
+pub mod golden;
+pub mod networks;
+pub mod profile;
+pub mod qemu;
+mod shared;
+
+use std::path::PathBuf;
+
+pub use actq_boards::{Target, root};
+pub use shared::shared_policies;
+
+/// The project's own policy.
+pub fn ur3() -> PathBuf {
+    actq_ur3::policy_folder().to_owned()
+}

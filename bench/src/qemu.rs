@@ -1,0 +1,208 @@
+//! Running the firmware under QEMU, and counting what it executes.
+
+use std::fs;
+use std::io::{Read as _, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Output, Stdio};
+
+use actq_boards::{Target, version};
+use actq_link::{RESET, STEP};
+use anyhow::{Context, Result, bail, ensure};
+
+use crate::firmware::{cargo_build, symbol, target_dir};
+
+/// QEMU with `elf`, an image in the slot if one is given, and arguments for the firmware.
+pub fn command(elf: &Path, slot: Option<&Path>, arguments: &str) -> Result<Command> {
+    command_on(Target::Fpu, elf, slot, arguments)
+}
+
+/// As [`command`], on the board of a target.
+pub fn command_on(target: Target, elf: &Path, slot: Option<&Path>, arguments: &str) -> Result<Command> {
+    let mut command = target.run(elf);
+    if !arguments.is_empty() {
+        command.arg("-append").arg(arguments);
+    }
+    if let Some(image) = slot {
+        let address = slot_address(elf)?;
+        command.arg("-device").arg(format!("loader,file={},addr={address:#x},force-raw=on", image.display()));
+    }
+    Ok(command)
+}
+
+/// Where the image slot begins that the firmware was linked with.
+fn slot_address(elf: &Path) -> Result<u64> {
+    match (symbol(elf, "_image_slot_start")?, symbol(elf, "_image_slot_end")?) {
+        (Some((start, _)), Some((end, _))) if start < end => Ok(start),
+        _ => bail!("{}: this firmware has no image slot", elf.display()),
+    }
+}
+
+fn spawn(command: &mut Command) -> Result<Child> {
+    let emulator = command.get_program().to_string_lossy().into_owned();
+    command
+        .spawn()
+        .with_context(|| format!("{emulator} cannot be started; `cargo xtask doctor` says how to install it"))
+}
+
+/// Runs a firmware that ends by itself; `input` is its standard input.
+pub fn run(mut command: Command, input: &[u8]) -> Result<Output> {
+    let mut child = spawn(command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()))?;
+    let mut stdin = child.stdin.take().context("no standard input")?;
+    std::thread::scope(|scope| {
+        // A firmware that stops early closes the pipe; its exit status tells why.
+        scope.spawn(move || drop(stdin.write_all(input)));
+        child.wait_with_output().context("QEMU does not end")
+    })
+}
+
+/// A request of the pipe protocol for a step.
+pub fn step_request(observation: &[f32]) -> Vec<u8> {
+    std::iter::once(STEP).chain(observation.iter().flat_map(|v| v.to_le_bytes())).collect()
+}
+
+/// A firmware under QEMU that serves as a policy.
+#[derive(Debug)]
+pub struct Server {
+    child: Child,
+    stdin: Option<ChildStdin>,
+    stdout: ChildStdout,
+    act_len: usize,
+}
+
+impl Server {
+    /// Starts `command` (made by [`command`] with the argument `serve`) for actions of `act_len` values.
+    pub fn start(mut command: Command, act_len: usize) -> Result<Self> {
+        let mut child = spawn(command.stdin(Stdio::piped()).stdout(Stdio::piped()))?;
+        let stdin = child.stdin.take();
+        let stdout = child.stdout.take().context("no standard output")?;
+        Ok(Self { child, stdin, stdout, act_len })
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> Result<()> {
+        self.stdin.as_mut().context("the firmware has ended")?.write_all(bytes).context("the firmware has ended")
+    }
+
+    /// Resets the policy.
+    pub fn reset(&mut self) -> Result<()> {
+        self.send(&[RESET])
+    }
+
+    /// The action for an observation.
+    pub fn step(&mut self, observation: &[f32]) -> Result<Vec<f32>> {
+        self.send(&step_request(observation))?;
+        let mut bytes = vec![0; 4 * self.act_len];
+        self.stdout.read_exact(&mut bytes).context("the firmware ended without an action")?;
+        Ok(bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
+    }
+
+    /// Ends the firmware, which must do so with success.
+    pub fn finish(mut self) -> Result<()> {
+        self.stdin = None;
+        let status = self.child.wait().context("QEMU does not end")?;
+        ensure!(status.success(), "the firmware ended with a failure");
+        Ok(())
+    }
+}
+
+/// The profile of the plugin (`Cargo.toml`).
+const PROFILE: &str = "host";
+
+/// Counts instructions in the regions that a firmware marks.
+#[derive(Debug)]
+pub struct Counter {
+    plugin: PathBuf,
+    out: tempfile::NamedTempFile,
+}
+
+impl Counter {
+    /// Builds the plugin for the QEMU that is installed.
+    pub fn build() -> Result<Self> {
+        let api = plugin_api()?;
+        cargo_build(
+            "the counting plugin",
+            &["--profile", PROFILE, "--package", "insn-count"],
+            &[("ACTQ_QEMU_API", &api.to_string())],
+        )?;
+        let name = format!("{}insn_count{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
+        Ok(Self { plugin: target_dir().join(PROFILE).join(name), out: tempfile::NamedTempFile::new()? })
+    }
+
+    /// Adds the plugin to a command that runs `elf`.
+    pub fn attach(&self, command: &mut Command, elf: &Path) -> Result<()> {
+        let mark = |name| symbol(elf, name)?.with_context(|| format!("{}: symbol {name} is missing", elf.display()));
+        let ((begin, begin_len), (end, _)) = (mark("actq_count_begin")?, mark("actq_count_end")?);
+        command.arg("-plugin").arg(format!(
+            "{},out={},begin={begin:x},begin_end={:x},end={end:x}",
+            self.plugin.display(),
+            self.out.path().display(),
+            begin + begin_len,
+        ));
+        Ok(())
+    }
+
+    /// The regions of the run that has ended, in order.
+    pub fn regions(&self) -> Result<Vec<Region>> {
+        let text = fs::read_to_string(self.out.path())?;
+        let mut regions: Vec<Region> = Vec::new();
+        for line in text.lines() {
+            let fields: Vec<&str> = line.split(' ').collect();
+            match (&fields[..], regions.last_mut()) {
+                (["region", instructions, data_lines, code_lines, next @ ..], _) => regions.push(Region {
+                    instructions: instructions.parse()?,
+                    data_lines: data_lines.parse()?,
+                    code_lines: code_lines.parse()?,
+                    next_lines: next.iter().map(|count| Ok(count.parse()?)).collect::<Result<_>>()?,
+                    executed: Vec::new(),
+                }),
+                ([address, count, jumps], Some(region)) => region.executed.push(Executed {
+                    address: u64::from_str_radix(address, 16)?,
+                    count: count.parse()?,
+                    jumps: jumps.parse()?,
+                }),
+                _ => bail!("the counter wrote {line:?}"),
+            }
+        }
+        Ok(regions)
+    }
+}
+
+/// What was executed between two marks.
+#[derive(Clone, Debug)]
+pub struct Region {
+    /// Instructions.
+    pub instructions: u64,
+    /// Lines of data fetched from flash into a cache of 8 lines of 16 bytes, empty at first.
+    pub data_lines: u64,
+    /// Lines of code fetched from flash after a jump into a cache of 64 lines of 16 bytes, empty at first.
+    pub code_lines: u64,
+    /// Lines of code fetched into it behind the line before, by how many instructions, from one on, were executed there.
+    pub next_lines: Vec<u64>,
+    /// Each instruction that was executed, by address.
+    pub executed: Vec<Executed>,
+}
+
+/// How often an instruction was executed.
+#[derive(Clone, Copy, Debug)]
+pub struct Executed {
+    /// Address.
+    pub address: u64,
+    /// Executions.
+    pub count: u64,
+    /// How many of them did not go on at the next instruction.
+    pub jumps: u64,
+}
+
+/// The plugin API of the installed QEMU: 1 up to 9.0, 2 from 9.1 on (QEMU's docs/devel/tcg-plugins). The emulators of all targets
+/// are taken to be of one release; QEMU refuses a plugin of another API.
+fn plugin_api() -> Result<u32> {
+    let emulator = Target::Fpu.board().emulator;
+    let version = version(emulator).with_context(|| format!("{emulator} is not installed"))?;
+    let number = version.split_whitespace().find(|w| w.starts_with(|c: char| c.is_ascii_digit()));
+    let mut parts = number.unwrap_or("").split('.').map(|p| p.parse::<u32>().unwrap_or(0));
+    let (major, minor) = (parts.next().unwrap_or(0), parts.next().unwrap_or(0));
+    match (major, minor) {
+        (..7, _) => bail!("{version} is too old, 7.0 is needed"),
+        (7 | 8, _) | (9, 0) => Ok(1),
+        _ => Ok(2),
+    }
+}

@@ -1,0 +1,36 @@
+//! `actq-boards TARGET ELF [ARGUMENT ...]`: runs a firmware on the emulated board of a target. It is cargo's runner, so
+//! `cargo run --package actq-firmware-demo --target thumbv7em-none-eabihf -- serve` serves.
+#![forbid(unsafe_code)]
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use actq_boards::Target;
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [triple, elf, firmware @ ..] = &arguments[..] else {
+        eprintln!("usage: actq-boards TARGET ELF [ARGUMENT ...]");
+        return ExitCode::from(2);
+    };
+    let Some(target) = Target::of(triple) else {
+        let known = Target::ALL.map(Target::triple).join(", ");
+        eprintln!("error: there is no board for {triple}; there are some for {known}");
+        return ExitCode::from(2);
+    };
+    let mut command = target.run(Path::new(elf));
+    if !firmware.is_empty() {
+        command.arg("-append").arg(firmware.join(" "));
+    }
+    match command.status() {
+        Ok(status) if status.success() => ExitCode::SUCCESS,
+        Ok(_) => ExitCode::FAILURE,
+        Err(error) => {
+            eprintln!(
+                "error: {} cannot be started ({error}); `cargo xtask doctor` says how to install it",
+                target.board().emulator
+            );
+            ExitCode::FAILURE
+        }
+    }
+}

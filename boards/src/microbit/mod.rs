@@ -1,0 +1,13 @@
+//! The BBC micro:bit: a Cortex-M0 (nRF51822) with 256 KB of flash and 16 KB of RAM. Of the golden cases it runs those that fit.
+
+use crate::{Board, Transport};
+
+pub(crate) const BOARD: Board = Board {
+    name: "microbit",
+    memory: "boards/src/microbit/memory.x",
+    small: true,
+    emulator: "qemu-system-arm",
+    machine: &["-M", "microbit"],
+    transport: Transport::Semihosting,
+    shows: &["golden"],
+};

@@ -1,0 +1,13 @@
+//! QEMU's virt with a SiFive E31, which has RV32IMAC and nothing else: what it lacks is an illegal instruction.
+
+use crate::{Board, Transport};
+
+pub(crate) const BOARD: Board = Board {
+    name: "virt",
+    memory: "boards/src/virt/memory.x",
+    small: false,
+    emulator: "qemu-system-riscv32",
+    machine: &["-M", "virt", "-cpu", "sifive-e31", "-bios", "none"],
+    transport: Transport::Semihosting,
+    shows: &["golden", "portable"],
+};

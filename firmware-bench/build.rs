@@ -1,0 +1,5 @@
+//! Links for the board of the target.
+
+fn main() {
+    actq_boards::link();
+}

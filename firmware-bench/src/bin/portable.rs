@@ -1,0 +1,101 @@
+//! Counted products of 256 x 256 weights by the backend that was compiled in: each prints a line
+//! `backend bits lanes group`, in the order of the counted regions.
+//!
+//! A region is a whole call: activations from f32, the product, and the results back in f32 with row scales and biases. The
+//! results are compared with those of the plain reference, bit for bit.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[cfg(not(target_os = "none"))]
+fn main() {
+    eprintln!("this is firmware: build it with --target thumbv7em-none-eabihf");
+    std::process::exit(1);
+}
+
+#[cfg(target_os = "none")]
+mod firmware {
+    use core::fmt::Write as _;
+    use core::hint::black_box;
+
+    use actq_firmware_support::machine::{entry, semihosting::hio, singleton};
+    use actq_firmware_support::{count, host};
+    use actq_kernels::activations::{Plan, Prepared, Scale};
+    use actq_kernels::format::{Block, BlockShape, Lanes, Width, pack};
+    use actq_kernels::linear::RowBlock;
+    use actq_kernels::{gemv, reference};
+
+    const ROWS: usize = 256;
+    const COLS: usize = 256;
+
+    struct Buffers {
+        codes: [u8; ROWS * COLS],
+        scales: [u8; ROWS * COLS / 32],
+        words: [u32; ROWS * COLS / 4 + ROWS * COLS / 128],
+        prepared: [u32; 2 * COLS],
+    }
+
+    #[entry]
+    fn main() -> ! {
+        let buffers = singleton!(: Buffers = Buffers {
+            codes: [0; ROWS * COLS],
+            scales: [0; ROWS * COLS / 32],
+            words: [0; ROWS * COLS / 4 + ROWS * COLS / 128],
+            prepared: [0; 2 * COLS],
+        });
+        host::exit(buffers.is_some_and(|buffers| run(buffers).is_some()))
+    }
+
+    fn run(b: &mut Buffers) -> Option<()> {
+        let mut out = hio::hstdout().ok()?;
+        let mut seed = 0x1234_5678u32;
+        let mut random = move || {
+            seed ^= seed << 13;
+            seed ^= seed >> 17;
+            seed ^= seed << 5;
+            seed
+        };
+        b.codes.iter_mut().for_each(|c| *c = random() as u8);
+        b.scales.iter_mut().for_each(|s| *s = random() as u8);
+        let x: [f32; COLS] = core::array::from_fn(|_| random() as i32 as f32);
+        let bias: [u32; ROWS] = core::array::from_fn(|_| (random() as i32 as f32).to_bits());
+        let row_scales: [u32; ROWS / 2] = core::array::from_fn(|_| 0x3c00_3c00 | random() & 0x7f_007f);
+        for (lanes, x_max) in [(Lanes::Paired, 127), (Lanes::Single, 2047)] {
+            for width in Width::ALL {
+                for group in [0, 32] {
+                    let shape = BlockShape { width, lanes, rows: ROWS, cols: COLS, group };
+                    let words = b.words.get_mut(..shape.words())?;
+                    pack(shape, &b.codes, b.scales.get(..ROWS * shape.groups())?, words)?;
+                    let block = Block::new(shape, words)?;
+                    let rows = RowBlock { block, scales: &row_scales, index: &[], first_row: 0 };
+                    let (plan, prepared) = (Plan::of(&block), &mut b.prepared);
+                    let mut y = [0.0; ROWS];
+                    let scale = count::region(|| product(&rows, black_box(&x), x_max, &bias, prepared, &mut y))?;
+                    let prepared = Prepared::new(prepared, &plan)?;
+                    for (i, (y, bias)) in y.iter().zip(&bias).enumerate() {
+                        let acc = reference::dot(&rows.block, &prepared, i) as f32;
+                        let expected = f32::from_bits(*bias) + acc * (rows.scale(i) * scale.get());
+                        if y.to_bits() != expected.to_bits() {
+                            writeln!(out, "{shape:?}: row {i} is {y}, not {expected}").ok()?;
+                            return None;
+                        }
+                    }
+                    writeln!(out, "{:?} {} {lanes:?} {group}", gemv::BACKEND, width.bits()).ok()?;
+                }
+            }
+        }
+        Some(())
+    }
+
+    #[inline(never)]
+    fn product(
+        rows: &RowBlock<'_>,
+        x: &[f32],
+        x_max: u16,
+        bias: &[u32],
+        prepared: &mut [u32],
+        y: &mut [f32],
+    ) -> Option<Scale> {
+        let scale = Scale::new(x, x_max).ok()?;
+        rows.apply(&scale.quantize(x, &Plan::of(&rows.block), prepared)?, scale, Some(bias), y)?;
+        Some(scale)
+    }
+}

@@ -1,0 +1,218 @@
+//! The cost model's predictions against what QEMU counts, and the pieces of a step against their budget.
+
+use std::path::Path;
+
+use actq::budget::{Budget, TimeLimit};
+use actq::data::Recordings;
+use actq::data::{Dataset, Sizes};
+use actq::emit;
+use actq::measure::time::{CLOCK, StepTime};
+use actq::methods::{Activations, Method, Options};
+use actq::pipeline::{Quantizer, quantize};
+use actq::policy::Policy;
+use actq::runtime::{ImageBuffer, with_head};
+use actq_bench::networks::Builder;
+use actq_bench::qemu::{self, Counter};
+use actq_bench::{Target, firmware, profile, shared_policies, ur3};
+use actq_kernels::cost::{Cost, of_step};
+use actq_kernels::{StepError, Width};
+use anyhow::{Context, Result, bail, ensure};
+
+/// Steps that each image runs, spread over the held-out recordings.
+const STEPS: usize = 24;
+/// Largest error of a predicted step.
+const ERROR: f64 = 0.01;
+
+fn image(policy: &Policy, options: &Options) -> Result<Vec<u8>> {
+    Ok(quantize(policy, &Recordings::load(policy)?, options, |_, _| {})?.image)
+}
+
+fn best(bits: f64) -> Options {
+    // Steps of learning change the weights' values, on which no time depends.
+    Options { steps: Some(2), ..Options::new(Method::Best, Budget::BitsPerWeight(bits)) }
+}
+
+fn rtn(width: Width, group: usize, activations: Activations) -> Options {
+    Options { group, activations, ..Options::new(Method::Rtn, Budget::Width(width)) }
+}
+
+fn observations(dir: &Path, policy: &Policy) -> Result<Vec<Vec<f32>>> {
+    let dataset = Dataset::load(&dir.join("heldout.npz"), Sizes::of(policy))?;
+    let all: Vec<Vec<f32>> = (0..dataset.length.len()).flat_map(|e| dataset.episode(e)).collect();
+    ensure!(all.len() >= STEPS, "too few recorded observations");
+    Ok(all.iter().step_by(all.len() / STEPS).take(STEPS).cloned().collect())
+}
+
+/// Predicts the step of every image, and compares with the mean over recorded observations. Gives the counted instructions per
+/// weight of the f32 policy.
+fn predictions_hold(dir: &Path, images: &[Options]) -> Result<Vec<f64>> {
+    let (elf, counter) = (firmware::application(Target::Fpu)?, Counter::build()?);
+    let policy = Policy::load(dir)?;
+    let observations = observations(dir, &policy)?;
+    let mut per_mac = Vec::new();
+    for options in images {
+        let bytes = image(&policy, options)?;
+        let buffer = ImageBuffer::new(&bytes);
+        let image = buffer.image(dir)?;
+        let counted: Vec<Cost> = profile::steps(&elf, &counter, &bytes, &observations)?;
+        let evaluated: Vec<Cost> = counted.iter().step_by(image.execute()).copied().collect();
+        let mean = |of: fn(&Cost) -> u64| evaluated.iter().map(of).sum::<u64>() as f64 / evaluated.len() as f64;
+        let predicted = of_step(&image);
+        for (what, predicted, counted) in [
+            ("instructions", predicted.instructions, mean(|c| c.instructions)),
+            ("cycles", predicted.cycles, mean(|c| c.cycles)),
+        ] {
+            let error = predicted as f64 / counted - 1.0;
+            let at =
+                format!("{}, {options:?}: {predicted} {what}, {counted:.0} counted: {:+.2}%", policy.name, 1e2 * error);
+            println!("{at}");
+            ensure!(error.abs() < ERROR, "{at}");
+        }
+        let time = StepTime::new(&image, CLOCK);
+        ensure!(time.cycles == predicted.cycles && time.instructions == predicted.instructions, "{time:?}");
+        per_mac.push(mean(|c| c.instructions) / policy.weights as f64);
+    }
+    Ok(per_mac)
+}
+
+/// Whole steps of rtn images, with groups and without, and of the method best.
+fn images() -> Vec<Options> {
+    vec![
+        best(2.0),
+        best(3.0),
+        rtn(Width::W4, 32, Activations::Int8),
+        rtn(Width::W8, 32, Activations::Int8),
+        rtn(Width::W4, 64, Activations::Int16),
+        rtn(Width::W8, 0, Activations::Int16),
+    ]
+}
+
+#[test]
+fn ur3_steps_take_what_was_predicted() -> Result<()> {
+    predictions_hold(&ur3(), &images()).map(drop)
+}
+
+#[test]
+fn steps_of_shared_policies_take_what_was_predicted() -> Result<()> {
+    let Some(policies) = shared_policies() else { return Ok(()) };
+    // Instructions per MAC of the whole head at 3 bits, at most.
+    for (name, limit) in [("go1_mlp", 1.25), ("g1_lstm256", 1.30), ("fetch_pickplace", 1.25)] {
+        let others = [best(2.0), rtn(Width::W3, 32, Activations::Int8), rtn(Width::W8, 0, Activations::Int16)];
+        let per_mac = predictions_hold(&policies.join(name), &[&[best(3.0)], &others[..]].concat())?;
+        ensure!(per_mac[0] <= limit, "{name}: {:.3} instructions per MAC, {limit} are allowed", per_mac[0]);
+    }
+    Ok(())
+}
+
+/// Runs every image in polls of several budgets: each stays within its budget, and the actions have the same bits as on the
+/// host. Gives how many budgets were not below the least.
+fn polls_keep_their_budget(dir: &Path, images: &[Options]) -> Result<usize> {
+    let (elf, counter) = (firmware::application(Target::Fpu)?, Counter::build()?);
+    let policy = Policy::load(dir)?;
+    let observations = observations(dir, &policy)?;
+    let mut tried = 0;
+    for options in images {
+        let bytes = image(&policy, options)?;
+        let buffer = ImageBuffer::new(&bytes);
+        let image = buffer.image(dir)?;
+        let expected = with_head(image, |head| {
+            observations[..4].iter().map(|obs| Ok(head.step(obs)?.to_vec())).collect::<Result<Vec<_>>>()
+        })?;
+        for budget in [2_000, 5_000, 20_000, image.least_budget()] {
+            let at = || format!("{}, {options:?} in polls of {budget}", policy.name);
+            let arguments = format!("poll {budget}");
+            if budget < image.least_budget() {
+                let slot = tempfile::NamedTempFile::new()?;
+                std::fs::write(slot.path(), &bytes)?;
+                let command = qemu::command(&elf, Some(slot.path()), &arguments)?;
+                let output = qemu::run(command, &qemu::step_request(&observations[0]))?;
+                let refusal = StepError::Budget { needed: image.least_budget(), given: budget };
+                let said = String::from_utf8_lossy(&output.stderr);
+                ensure!(!output.status.success() && output.stdout.is_empty(), "{}: {output:?}", at());
+                ensure!(said.trim_end() == format!("firmware: step: {refusal}"), "{}: {said}", at());
+                continue;
+            }
+            let run = profile::regions(&elf, &counter, &bytes, &arguments, &observations[..4]);
+            let (costs, actions) = run.with_context(at)?;
+            let bits = |actions: &[Vec<f32>]| actions.iter().flatten().map(|a| a.to_bits()).collect::<Vec<_>>();
+            ensure!(bits(&actions) == bits(&expected), "{}: other bits", at());
+            let largest = costs.iter().map(|c| c.instructions).max().unwrap_or(0);
+            let all: u64 = costs.iter().map(|c| c.instructions).sum();
+            println!("{}: {} polls, the largest {largest}, in all {all}", at(), costs.len());
+            ensure!(largest <= u64::from(budget), "{}: {largest} instructions", at());
+            tried += 1;
+        }
+    }
+    Ok(tried)
+}
+
+#[test]
+fn polls_stay_within_their_budget() -> Result<()> {
+    let tried = polls_keep_their_budget(&ur3(), &images())?;
+    ensure!(tried >= 10, "only {tried} budgets were not below the least");
+    Ok(())
+}
+
+#[test]
+fn polls_of_shared_policies_stay_within_their_budget() -> Result<()> {
+    let Some(policies) = shared_policies() else { return Ok(()) };
+    for name in ["go1_mlp", "g1_lstm256", "fetch_pickplace"] {
+        polls_keep_their_budget(&policies.join(name), &[best(2.0), rtn(Width::W4, 32, Activations::Int8)])?;
+    }
+    Ok(())
+}
+
+#[test]
+fn a_budget_of_time_is_kept_and_used() -> Result<()> {
+    let policy = Policy::load(&ur3())?;
+    let recordings = Recordings::load(&policy)?;
+    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, |_| {})?;
+    let within = |milliseconds| {
+        let budget = Budget::Time(TimeLimit { milliseconds, clock_hz: CLOCK });
+        quantizer.quantize(&Options { budget, ..best(1.0) }, |_, _| {})
+    };
+    for milliseconds in [1.6, 2.4] {
+        let found = within(milliseconds)?;
+        let step = StepTime::new(&found.buffer().image(Path::new("memory"))?, CLOCK);
+        assert_eq!(found.time.map(|time| time.cycles), Some(step.cycles));
+        assert!(step.milliseconds <= milliseconds, "{} ms for {milliseconds}", step.milliseconds);
+        assert!(step.milliseconds > 0.97 * milliseconds, "{} ms for {milliseconds}", step.milliseconds);
+    }
+    let refused = within(0.01).map(|_| ()).expect_err("nothing is so fast");
+    assert!(refused.to_string().contains("the fastest is"), "{refused}");
+    Ok(())
+}
+
+/// A matrix of rows of all widths against matrices of its blocks alone, counted; with the rows of a width behind each other, and
+/// scattered, so that they need an index.
+#[test]
+fn mixed_widths_cost_little_more_than_their_blocks() -> Result<()> {
+    const ROWS: usize = 64;
+    const COLS: usize = 256;
+    let (elf, counter) = (firmware::application(Target::Fpu)?, Counter::build()?);
+    for activations in [Activations::Int8, Activations::Int16] {
+        let mut builder = Builder::new(COLS);
+        let linear = |builder: &mut Builder, rows, widths: &dyn Fn(usize) -> Width| {
+            builder.linear((rows, COLS), activations, |row| Some(widths(row)), 0, true)
+        };
+        for width in Width::ALL {
+            linear(&mut builder, ROWS, &|_| width)?;
+        }
+        linear(&mut builder, 4 * ROWS, &|row| Width::ALL[row / ROWS])?;
+        linear(&mut builder, 4 * ROWS, &|row| Width::ALL[row % 4])?;
+        let (policy, outcomes) = builder.finish("mixed".to_owned(), false);
+        let bytes = emit::image(&policy, &outcomes)?;
+        let buffer = ImageBuffer::new(&bytes);
+        let image = buffer.image(Path::new("mixed"))?;
+        let observation = (0..COLS).map(|i| (i as f32).sin()).collect();
+        let parts = profile::parts(&elf, &counter, &image, &bytes, &[observation], u32::MAX)?.remove(0);
+        let linear = image.ops().zip(&parts.ops).filter(|(op, _)| op.matrix().is_some());
+        let counts: Vec<u64> = linear.map(|(_, cost)| cost.instructions).collect();
+        let [alone @ .., in_order, indexed] = &counts[..] else { bail!("{counts:?}") };
+        let alone: u64 = alone.iter().sum();
+        println!("{activations:?}: blocks alone {alone}, in order {in_order}, indexed {indexed}");
+        ensure!(*in_order as f64 <= 1.03 * alone as f64, "{in_order} in order, {alone} alone");
+        ensure!(*indexed as f64 <= 1.03 * alone as f64, "{indexed} with an index, {alone} alone");
+    }
+    Ok(())
+}

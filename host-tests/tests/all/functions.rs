@@ -1,0 +1,121 @@
+//! The functions on the Cortex-M4's FPU: the host's bits, and what they cost.
+
+use actq::budget::Budget;
+use actq::data::Recordings;
+use actq::emit::files;
+use actq::methods::{Method, Options};
+use actq::pipeline::quantize;
+use actq::policy::Policy;
+use actq::runtime::ImageBuffer;
+use actq_bench::cycles::Code;
+use actq_bench::qemu::{self, Counter};
+use actq_bench::{Target, firmware, shared_policies};
+use actq_kernels::math::Function;
+use actq_kernels::{Width, norm, recurrent};
+use anyhow::{Result, ensure};
+
+/// Elements.
+const LEN: usize = 256;
+
+/// Instructions per element of one function.
+const LIMIT: u64 = 30;
+
+/// Functions of an element: an LSTM cell has three gates by sigmoid and two hyperbolic tangents, a GRU cell two gates and one.
+fn functions(name: &str) -> u64 {
+    match name {
+        "lstm" => 5,
+        "gru" => 3,
+        _ => 1,
+    }
+}
+
+/// What `firmware-bench/src/bin/functions.rs` computes: names and hashes of the results, in its order.
+fn expected() -> Vec<(&'static str, u32)> {
+    fn values(n: usize) -> Vec<f32> {
+        (0..n).map(|i| i as f32 * (6.0 / n as f32) - 6.0).collect()
+    }
+    fn magnitudes(n: usize) -> Vec<f32> {
+        (0..n as u32).map(|i| f32::from_bits((i << 31) | (i * (0x7f80_0000 / n as u32)))).collect()
+    }
+    let bits = |v: &f32| if v.is_nan() { f32::NAN.to_bits() } else { v.to_bits() };
+    let hash = |results: &[&[f32]]| {
+        results.iter().copied().flatten().map(bits).fold(0u32, |hash, bits| hash.rotate_left(5) ^ bits)
+    };
+    let mut all = Vec::new();
+    let constants: Vec<u32> = values(LEN).into_iter().map(f32::to_bits).collect();
+    for function in Function::ALL {
+        let (mut x, mut y) = (values(LEN), magnitudes(LEN));
+        function.apply(&mut x);
+        function.apply(&mut y);
+        all.push((function.name(), hash(&[&x, &y])));
+    }
+    let mut add = |name, run: &dyn Fn(&mut [f32])| {
+        let mut x = values(LEN);
+        run(&mut x);
+        all.push((name, hash(&[&x])));
+    };
+    add("layernorm", &|x| norm::layer_norm(x, &constants, &constants, 1e-5));
+    add("rmsnorm", &|x| norm::rms_norm(x, &constants, 1e-5));
+    add("normalize", &|y| norm::normalize(&values(LEN), &constants, &constants, 1.0, 5.0, y));
+    let lstm = |gates: &[f32]| {
+        let (mut c, mut h) = (values(LEN), vec![0.0; LEN]);
+        recurrent::lstm_cell(gates, &mut c, &mut h);
+        [h, c].concat()
+    };
+    all.push(("lstm", hash(&[&lstm(&values(4 * LEN)), &lstm(&magnitudes(4 * LEN))])));
+    let gru = |a: &[f32]| {
+        let mut h = values(LEN);
+        recurrent::gru_cell(a, &values(3 * LEN), &mut h);
+        h
+    };
+    all.push(("gru", hash(&[&gru(&values(3 * LEN)), &gru(&magnitudes(3 * LEN))])));
+    all
+}
+
+#[test]
+fn every_function_has_the_same_bits_and_stays_within_its_instructions() -> Result<()> {
+    let elf = firmware::bench("functions", Target::Fpu)?;
+    let counter = Counter::build()?;
+    let mut command = qemu::command(&elf, None, "")?;
+    counter.attach(&mut command, &elf)?;
+    let output = qemu::run(command, &[])?;
+    ensure!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let (text, regions, code) = (String::from_utf8(output.stdout)?, counter.regions()?, Code::read(&elf)?);
+    let expected = expected();
+    ensure!(text.lines().count() == expected.len() && regions.len() == expected.len(), "{text}");
+    for ((line, region), (name, hash)) in text.lines().zip(regions).zip(expected) {
+        assert_eq!(line, format!("{name} {LEN} {hash:08x}"));
+        let per_element = |count: u64| count as f64 / LEN as f64;
+        let (instructions, cycles) = (per_element(region.instructions), per_element(code.cycles(&region, 0)?));
+        println!("{name:10} {instructions:7.2} instructions {cycles:7.2} cycles");
+        let limit = LIMIT * functions(name);
+        assert!(instructions > 1.0 && instructions <= limit as f64, "{name}: {instructions} instructions an element");
+    }
+    Ok(())
+}
+
+/// The gates of an LSTM are a small part of its head.
+#[test]
+fn a_head_with_an_lstm_stays_within_its_instructions() -> Result<()> {
+    let Some(policies) = shared_policies() else { return Ok(()) };
+    let policy = Policy::load(&policies.join("g1_lstm256"))?;
+    let options = Options::new(Method::Rtn, Budget::Width(Width::W3));
+    let bytes = quantize(&policy, &Recordings::default(), &options, |_, _| {})?.image;
+    let file = tempfile::NamedTempFile::new()?;
+    files::write(file.path(), &bytes)?;
+    let buffer = ImageBuffer::new(&bytes);
+    let matrices = buffer.image(file.path())?.ops().filter_map(|op| op.matrix());
+    let macs = matrices.map(|matrix| matrix.rows * matrix.cols).sum::<usize>() as f64;
+    let elf = firmware::application(Target::Fpu)?;
+    let counter = Counter::build()?;
+    let mut command = qemu::command(&elf, Some(file.path()), "")?;
+    counter.attach(&mut command, &elf)?;
+    ensure!(qemu::run(command, &[])?.status.success(), "the firmware failed");
+    let regions = counter.regions()?;
+    ensure!(!regions.is_empty(), "no step was counted");
+    for count in regions.into_iter().map(|region| region.instructions) {
+        println!("g1_lstm256 at 3 bits: {:.3} instructions per MAC", count as f64 / macs);
+        assert!(count as f64 <= 1.30 * macs, "{count} instructions for {macs} MACs");
+    }
+    Ok(())
+}

@@ -1,0 +1,20 @@
+//! The tests that take more than one crate: one binary, so that one is linked and what they build is built once.
+
+mod arrows;
+mod best;
+mod cli;
+mod cost;
+mod counting;
+mod digests;
+mod faults;
+mod format;
+mod functions;
+mod malformed;
+mod ops;
+mod outputs;
+mod parity;
+mod portable;
+mod qemu;
+mod recordings;
+mod slices;
+mod stats;

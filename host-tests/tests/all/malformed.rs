@@ -1,0 +1,635 @@
+//! Damaged images, and images with a correct checksum that say something impossible: none may pass `Image::new_checked`. (That
+//! whatever passes runs without a panic, `kernels/tests/mutants.rs` shows.)
+
+use std::sync::LazyLock;
+use std::time::Instant;
+
+use actq::budget::{Budget, Rate};
+use actq::contract::ActionContract;
+use actq::graph::ops::{LayerNorm, Linear, Lstm, Normalize, Pointwise};
+use actq::graph::{Graph, NodeKind, WeightMatrix};
+use actq::methods::{Method, Options, Outcome, quantize};
+use actq::policy::Policy;
+use actq::runtime::ImageBuffer;
+use actq_bench::golden::Random;
+use actq_bench::root;
+use actq_kernels::format::Width;
+use actq_kernels::image::{Kind, checksum, header as h, header::op};
+use actq_kernels::math::Function;
+use actq_kernels::{Head, Image, ImageError as E, StepError};
+
+const OBS: usize = 10;
+const UNITS: usize = 24;
+const ACT: usize = 4;
+const CHUNK: usize = 2;
+
+/// A policy with every kind of section: normalization, matrices of all widths with group scales, an LSTM, a matrix of mixed
+/// widths with its output index, a chunk and the whole contract.
+fn valid_image() -> Vec<u8> {
+    let mut random = Random(7);
+    let mut values = |n: usize| (0..n).map(|_| random.unit()).collect::<Vec<f32>>();
+    let mut graph = Graph::new(OBS);
+    for (rows, cols) in [(UNITS, OBS), (4 * UNITS, UNITS), (4 * UNITS, UNITS), (CHUNK * ACT, UNITS)] {
+        let name = format!("w{}", graph.matrices.len());
+        graph.matrices.push(WeightMatrix { name, rows, cols, data: values(rows * cols) });
+    }
+    let nodes: [NodeKind; 6] = [
+        Normalize { mean: values(OBS), scale: vec![0.5; OBS], pre_clip: 20.0, clip: 5.0 }.into(),
+        Linear { matrix: 0, bias: values(UNITS) }.into(),
+        Pointwise(Function::Elu).into(),
+        LayerNorm { weight: values(UNITS), bias: values(UNITS), eps: 1e-5 }.into(),
+        Lstm { hidden: UNITS, input: 1, state: 2, bias: values(4 * UNITS) }.into(),
+        Linear { matrix: 3, bias: values(CHUNK * ACT) }.into(),
+    ];
+    for (input, kind) in nodes.into_iter().enumerate() {
+        graph.add(kind, &[input]).expect("it fits");
+    }
+    let at_width = |width| {
+        let options = Options { group: 32, ..Options::new(Method::Rtn, Budget::Width(width)) };
+        quantize(&graph, None, Rate::Width(width), &options).expect("the graph can be quantized").1
+    };
+    let [w2, w3, w4, w8] = Width::ALL.map(at_width);
+    let matrices = [w4[0].clone(), w3[1].clone(), w2[2].clone(), interleaved(&w2[3], &w8[3])];
+    let policy = Policy {
+        dir: ".".into(),
+        name: "malformed".into(),
+        kind: Kind::Chunk,
+        chunk: CHUNK,
+        execute: CHUNK,
+        act_len: ACT,
+        rate_hz: 50.0,
+        contract: ActionContract {
+            scale: Some(vec![0.5; ACT]),
+            offset: Some(vec![0.1; ACT]),
+            low: Some(vec![-1.0; ACT]),
+            high: Some(vec![1.0; ACT]),
+            max_step: Some(vec![0.25; ACT]),
+        },
+        weights: graph.weights(),
+        graph,
+        digest: [7; 32],
+    };
+    actq::emit::image(&policy, &matrices).expect("the policy fits the format")
+}
+
+/// Even rows of `a`, odd rows of `b`, for activations beyond int8, so that they are packed in single lanes.
+fn interleaved(a: &Outcome, b: &Outcome) -> Outcome {
+    let (mut out, other) = (a.clone(), &b.quantized);
+    out.x_max = 255;
+    let mixed = &mut out.quantized;
+    let (cols, groups) = (mixed.cols, mixed.groups());
+    for row in (1..mixed.rows).step_by(2) {
+        mixed.widths[row] = other.widths[row];
+        mixed.scales[row] = other.scales[row];
+        mixed.codes[row * cols..][..cols].copy_from_slice(&other.codes[row * cols..][..cols]);
+        mixed.group_scales[row * groups..][..groups].copy_from_slice(&other.group_scales[row * groups..][..groups]);
+    }
+    out
+}
+
+/// An image whose words can be changed.
+#[derive(Clone)]
+struct Draft(Vec<u32>);
+
+static VALID: LazyLock<Draft> = LazyLock::new(|| {
+    let bytes = valid_image();
+    Draft(bytes.chunks_exact(4).map(|w| u32::from_ne_bytes([w[0], w[1], w[2], w[3]])).collect())
+});
+
+/// Operations of the valid image: linear operations are the first layer, the LSTM's two products and the output layer.
+const FIRST: (u8, usize) = (op::LINEAR, 0);
+const INPUT: (u8, usize) = (op::LINEAR, 1);
+const STATE: (u8, usize) = (op::LINEAR, 2);
+const OUTPUT: (u8, usize) = (op::LINEAR, 3);
+const NORMALIZE: (u8, usize) = (op::NORMALIZE, 0);
+const LAYER_NORM: (u8, usize) = (op::LAYER_NORM, 0);
+const FUNCTION: (u8, usize) = (op::FUNCTION, 0);
+const LSTM: (u8, usize) = (op::LSTM_CELL, 0);
+
+impl Draft {
+    fn bytes(&self) -> &[u8] {
+        bytemuck::cast_slice(&self.0)
+    }
+
+    fn check(&self) -> Result<Image<'_>, E> {
+        Image::new_checked(self.bytes())
+    }
+
+    fn get(&self, at: usize) -> u32 {
+        u32::from_le(self.0[at])
+    }
+
+    fn offset(&self, at: usize) -> usize {
+        self.get(at) as usize
+    }
+
+    fn low(&self, at: usize) -> u32 {
+        self.get(at) & 0xffff
+    }
+
+    fn high(&self, at: usize) -> u32 {
+        self.get(at) >> 16
+    }
+
+    fn set(&mut self, at: usize, value: u32) {
+        self.0[at] = value.to_le();
+    }
+
+    fn set_f32(&mut self, at: usize, value: f32) {
+        self.set(at, value.to_bits());
+    }
+
+    fn set_low(&mut self, at: usize, value: u32) {
+        self.set(at, (self.get(at) & 0xffff_0000) | value);
+    }
+
+    fn set_high(&mut self, at: usize, value: u32) {
+        self.set(at, self.low(at) | value << 16);
+    }
+
+    /// Makes the checksum fit.
+    fn seal(&mut self) {
+        self.set(h::W_CRC, checksum(self.bytes()));
+    }
+
+    /// Where the record of the `nth` operation with this code stands.
+    fn op(&self, (code, nth): (u8, usize)) -> usize {
+        let records = (0..self.high(h::W_KIND) as usize).map(|i| self.offset(h::W_OPS) + i * h::OP_WORDS);
+        records.filter(|&at| self.get(at) as u8 == code).nth(nth).expect("the image has the operation")
+    }
+
+    /// Where the constants or the matrix record of an operation stand.
+    fn data(&self, which: (u8, usize)) -> usize {
+        self.offset(self.op(which) + 3)
+    }
+
+    /// Where block record `i` of a linear operation stands.
+    fn block(&self, which: (u8, usize), i: usize) -> usize {
+        self.offset(self.data(which) + 3) + i * h::BLOCK_WORDS
+    }
+}
+
+#[test]
+fn the_starting_point_is_valid_and_about_four_kib() {
+    let image = VALID.check().expect("the image is valid");
+    assert!((4096..5120).contains(&image.bytes()), "{} bytes", image.bytes());
+    let mut scratch = vec![!0; image.scratch_words()];
+    let mut head = Head::new(image, &mut scratch).expect("the scratch memory has the image's size");
+    head.self_test().expect("the self-test passes");
+}
+
+/// The kernels' own tests change it at random. `ACTQ_BLESS=1` writes it anew.
+#[test]
+fn the_kernels_tests_have_this_image() {
+    let path = root().join("kernels/tests/valid.actq");
+    if std::env::var_os("ACTQ_BLESS").is_some() {
+        std::fs::write(&path, VALID.bytes()).expect("the file can be written");
+    }
+    let there = std::fs::read(&path).expect("the file can be read");
+    assert!(there == VALID.bytes(), "{} is of another format: run the test with ACTQ_BLESS=1", path.display());
+}
+
+#[test]
+fn every_single_bit_flip_is_refused() {
+    let mut draft = VALID.clone();
+    for at in 0..draft.0.len() {
+        for bit in 0..32 {
+            draft.0[at] ^= 1 << bit;
+            assert!(draft.check().is_err(), "bit {bit} of word {at}");
+            draft.0[at] ^= 1 << bit;
+        }
+    }
+    assert!(draft.check().is_ok());
+}
+
+#[test]
+fn every_truncation_and_every_extension_up_to_64_bytes_is_refused() {
+    let len = VALID.bytes().len();
+    for fill in [0, !0, 0x5a5a_5a5a] {
+        let mut draft = VALID.clone();
+        draft.0.extend([fill; 16]);
+        for n in (0..=len + 64).filter(|n| *n != len) {
+            let expected = if n < 4 * h::WORDS { E::TooShort } else { E::Length };
+            assert_eq!(Image::new_checked(&draft.bytes()[..n]).err(), Some(expected), "{n} bytes");
+        }
+        // A header that claims the other length has no checksum to go with it.
+        for words in (h::WORDS..draft.0.len()).filter(|n| *n != len / 4) {
+            let mut other = Draft(draft.0[..words].to_vec());
+            other.set(h::W_BYTES, 4 * words as u32);
+            assert_eq!(other.check().err(), Some(E::Checksum), "{words} words");
+        }
+    }
+}
+
+#[test]
+fn a_misaligned_start_is_refused() {
+    let len = VALID.bytes().len();
+    let mut memory = Draft(vec![0; len / 4 + 1]);
+    for shift in 1..4 {
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut memory.0);
+        bytes[shift..shift + len].copy_from_slice(VALID.bytes());
+        assert_eq!(Image::new_checked(&memory.bytes()[shift..shift + len]).err(), Some(E::Misaligned), "{shift}");
+    }
+}
+
+/// A change of an image.
+type Change = fn(&mut Draft);
+
+/// What is wrong, the error that must say so, and how the valid image is made so.
+type Case = (&'static str, E, Change);
+
+/// Applies every case to the valid image, makes the checksum fit, and reports all cases that are not refused as expected.
+fn refused(cases: &[Case]) {
+    let wrong = cases.iter().filter_map(|(name, expected, change)| {
+        let mut draft = VALID.clone();
+        change(&mut draft);
+        draft.seal();
+        let got = draft.check().err();
+        (got != Some(*expected)).then(|| format!("{name}: expected {expected:?}, got {got:?}"))
+    });
+    let wrong: Vec<_> = wrong.collect();
+    assert!(wrong.is_empty(), "{} of {}:\n{}", wrong.len(), cases.len(), wrong.join("\n"));
+}
+
+const NAN: f32 = f32::NAN;
+/// Offsets whose sum with a length does not fit 32 bits.
+const HUGE: u32 = u32::MAX - 1;
+
+#[test]
+fn headers_that_cannot_be_are_refused() {
+    refused(&[
+        ("wrong magic", E::Magic, |d| d.set(0, u32::from_le_bytes(*b"ACTP"))),
+        ("a later version", E::Version, |d| d.set_low(h::W_VERSION, 3)),
+        ("a longer header", E::Version, |d| d.set_high(h::W_VERSION, 33)),
+        ("a length one word off", E::Length, |d| d.set(h::W_BYTES, d.get(h::W_BYTES) + 4)),
+        ("another layout stamp", E::Layout, |d| d.set(h::W_LAYOUT, d.get(h::W_LAYOUT) + 1)),
+        ("reserved half beside the number of matrices", E::Reserved, |d| d.set_high(h::W_MATRIX_COUNT, 1)),
+        ("reserved word 30", E::Reserved, |d| d.set(30, 1)),
+        ("reserved word 31", E::Reserved, |d| d.set(31, 1 << 31)),
+        ("reserved byte beside the kind", E::Reserved, |d| d.set(h::W_KIND, d.get(h::W_KIND) | 1 << 8)),
+        ("an unknown contract flag", E::Reserved, |d| d.set_high(h::W_WORK_FLAGS, 0x3f)),
+        ("an unknown kind", E::Kind, |d| d.set(h::W_KIND, d.get(h::W_KIND) + 1)),
+        ("execute above chunk", E::Chunk, |d| d.set_high(h::W_CHUNK, CHUNK as u32 + 1)),
+        ("execute 0", E::Chunk, |d| d.set_high(h::W_CHUNK, 0)),
+        ("chunk 0", E::Chunk, |d| d.set(h::W_CHUNK, 0)),
+        ("a chunk in kind step", E::Chunk, |d| d.set(h::W_KIND, d.get(h::W_KIND) - 1)),
+        ("no observation", E::Shape, |d| d.set_low(h::W_SIZES, 0)),
+        ("no action", E::Shape, |d| d.set_high(h::W_SIZES, 0)),
+        ("scratch too small", E::Arena, |d| d.set(h::W_SCRATCH, d.get(h::W_SCRATCH) - 1)),
+        ("state outside", E::Arena, |d| d.set_high(h::W_STATE, 0xffff)),
+        ("observation outside", E::Arena, |d| d.set_low(h::W_OBS_OUT, 0xffff)),
+        ("output outside", E::Unwritten, |d| d.set_high(h::W_OBS_OUT, 0xffff)),
+        ("action outside", E::Arena, |d| d.set_low(h::W_ACTION_WORK, 0xffff)),
+        ("work area outside", E::Arena, |d| d.set_high(h::W_ACTION_WORK, 0xffff)),
+        ("output over action", E::Unwritten, |d| d.set_high(h::W_OBS_OUT, d.low(h::W_ACTION_WORK) - 1)),
+        ("output over observation", E::Arena, |d| d.set_high(h::W_OBS_OUT, d.low(h::W_OBS_OUT))),
+        ("action over observation", E::Arena, |d| d.set_low(h::W_ACTION_WORK, d.low(h::W_OBS_OUT) + 1)),
+        ("rate 0", E::Constant, |d| d.set_f32(h::W_RATE, 0.0)),
+        ("rate negative", E::Constant, |d| d.set_f32(h::W_RATE, -50.0)),
+        ("rate NaN", E::Constant, |d| d.set_f32(h::W_RATE, NAN)),
+        ("rate infinite", E::Constant, |d| d.set_f32(h::W_RATE, f32::INFINITY)),
+        ("name outside", E::Section, |d| d.set(h::W_NAME, d.0.len() as u32)),
+        ("name in the header", E::Section, |d| d.set(h::W_NAME, 20)),
+        ("name at a huge offset", E::Section, |d| d.set(h::W_NAME, HUGE)),
+        ("name not UTF-8", E::Name, |d| d.set(d.offset(h::W_NAME), 0xc3c3_c3c3)),
+        ("name cut inside a character", E::Name, |d| {
+            // 9 bytes are named; the ninth is the first of a character's two.
+            d.set(d.offset(h::W_NAME) + 2, 0xa4c3);
+        }),
+        ("self-test of no steps", E::SelfTest, |d| d.set_low(h::W_STEPS_NAME, 0)),
+        ("self-test outside", E::Section, |d| d.set(h::W_SELF_TEST, d.0.len() as u32 - 1)),
+        ("self-test at a huge offset", E::Section, |d| d.set(h::W_SELF_TEST, HUGE)),
+        ("self-test of too many steps", E::Section, |d| d.set_low(h::W_STEPS_NAME, 0xffff)),
+        ("self-test NaN", E::Constant, |d| d.set_f32(d.offset(h::W_SELF_TEST) + OBS, NAN)),
+        ("lengths whose product wraps a 32-bit usize", E::Arena, |d| {
+            d.set(h::W_SIZES, 0xffff | 32767 << 16);
+            d.set(h::W_CHUNK, 1 | 1 << 16);
+            d.set(h::W_SCRATCH, 1 << 18);
+            d.set(h::W_STATE, 0);
+            d.set(h::W_OBS_OUT, 2 * 32767);
+            d.set(h::W_ACTION_WORK, 32767 | d.high(h::W_ACTION_WORK) << 16);
+            d.set(h::W_WORK_FLAGS, 0);
+            d.set_low(h::W_STEPS_NAME, 43692);
+        }),
+        ("a contract of no arrays at a huge offset", E::Section, |d| {
+            d.set_high(h::W_WORK_FLAGS, 0);
+            d.set(h::W_CONTRACT, HUGE);
+        }),
+        ("a contract of no arrays at the last offset", E::Section, |d| {
+            d.set_high(h::W_WORK_FLAGS, 0);
+            d.set(h::W_CONTRACT, u32::MAX);
+        }),
+        ("more scratch than anything needs", E::Arena, |d| d.set(h::W_SCRATCH, d.get(h::W_SCRATCH) + 1)),
+        ("all the scratch there is", E::Arena, |d| d.set(h::W_SCRATCH, u32::MAX)),
+        ("scratch beyond u16", E::Arena, |d| {
+            d.set_low(h::W_WORK_FLAGS, 0xffff);
+            d.set(h::W_SCRATCH, d.high(h::W_ACTION_WORK) + 0xffff);
+        }),
+        ("a gap before the action", E::Arena, |d| {
+            d.set(h::W_ACTION_WORK, d.get(h::W_ACTION_WORK) + 0x1_0001);
+            d.set(h::W_SCRATCH, d.get(h::W_SCRATCH) + 1);
+        }),
+        ("a name with an escape character", E::Name, |d| d.set_low(d.offset(h::W_NAME), 0x5b1b)),
+        ("a name with a C1 control character", E::Name, |d| d.set_low(d.offset(h::W_NAME), 0x9bc2)),
+    ]);
+}
+
+#[test]
+fn contracts_that_cannot_be_are_refused() {
+    // Arrays stand in the order of their flags: scale, offset, low, high, max_step.
+    fn array(d: &Draft, which: usize) -> usize {
+        d.offset(h::W_CONTRACT) + which * ACT
+    }
+    refused(&[
+        ("contract outside", E::Section, |d| d.set(h::W_CONTRACT, d.0.len() as u32)),
+        ("contract in the header", E::Section, |d| d.set(h::W_CONTRACT, 0)),
+        ("contract at a huge offset", E::Section, |d| d.set(h::W_CONTRACT, HUGE)),
+        ("scale NaN", E::Constant, |d| d.set_f32(array(d, 0), NAN)),
+        ("offset infinite", E::Constant, |d| d.set_f32(array(d, 1) + 1, f32::INFINITY)),
+        ("low NaN", E::Constant, |d| d.set_f32(array(d, 2) + 3, NAN)),
+        ("high infinite", E::Constant, |d| d.set_f32(array(d, 3), f32::INFINITY)),
+        ("limits reversed", E::Limits, |d| d.set_f32(array(d, 3) + 3, -1.5)),
+        ("max_step negative", E::Constant, |d| d.set_f32(array(d, 4) + 3, -0.25)),
+        ("max_step NaN", E::Constant, |d| d.set_f32(array(d, 4), NAN)),
+    ]);
+}
+
+#[test]
+fn operations_that_cannot_be_are_refused() {
+    refused(&[
+        ("operations outside", E::Section, |d| d.set(h::W_OPS, d.0.len() as u32)),
+        ("operations in the header", E::Section, |d| d.set(h::W_OPS, 4)),
+        ("operations at a huge offset", E::Section, |d| d.set(h::W_OPS, HUGE)),
+        ("too many operations", E::Op, |d| d.set_high(h::W_KIND, 0xffff)),
+        ("operation code 0", E::Op, |d| d.set(d.op(FUNCTION), 0)),
+        ("operation code 10", E::Op, |d| d.set(d.op(FUNCTION), 10)),
+        ("an unknown function", E::Op, |d| d.set_low(d.op(FUNCTION), u32::from(op::FUNCTION) | 7 << 8)),
+        ("detail 2 in linear", E::Reserved, |d| d.set_low(d.op(FIRST), u32::from(op::LINEAR) | 2 << 8)),
+        ("detail 1 in layer norm", E::Reserved, |d| d.set_low(d.op(LAYER_NORM), u32::from(op::LAYER_NORM) | 1 << 8)),
+        ("an operation of no length", E::Shape, |d| d.set_high(d.op(FUNCTION), 0)),
+        ("destination outside", E::Unwritten, |d| d.set_low(d.op(FUNCTION) + 1, 0xffff)),
+        ("source outside", E::Unwritten, |d| d.set_high(d.op(NORMALIZE) + 1, 0xffff)),
+        ("cell state outside", E::Unwritten, |d| d.set_high(d.op(LSTM) + 2, 0xffff)),
+        ("source over destination", E::Overlap, |d| d.set_low(d.op(NORMALIZE) + 1, d.high(d.op(NORMALIZE) + 1))),
+        ("gates over the hidden state", E::Overlap, |d| d.set_low(d.op(LSTM) + 1, d.high(d.op(LSTM) + 1))),
+        ("gates over the cell state", E::Overlap, |d| d.set_high(d.op(LSTM) + 2, d.high(d.op(LSTM) + 1) + 1)),
+        ("cell state over the hidden state", E::Overlap, |d| d.set_high(d.op(LSTM) + 2, d.low(d.op(LSTM) + 1) + 1)),
+        ("work area too small", E::Arena, |d| d.set_low(h::W_WORK_FLAGS, 16)),
+        ("work area over a source", E::Arena, |d| d.set_high(h::W_ACTION_WORK, d.high(d.op(FIRST) + 1))),
+        ("work area over a destination", E::Arena, |d| d.set_high(h::W_ACTION_WORK, d.low(d.op(FIRST) + 1) + 23)),
+        ("normalization outside", E::Section, |d| d.set(d.op(NORMALIZE) + 3, d.0.len() as u32 - 1)),
+        ("normalization at a huge offset", E::Section, |d| d.set(d.op(NORMALIZE) + 3, HUGE)),
+        ("normalization mean NaN", E::Constant, |d| d.set_f32(d.data(NORMALIZE) + 2, NAN)),
+        ("clip 0", E::Constant, |d| d.set_f32(d.data(NORMALIZE) + 1, 0.0)),
+        ("clip NaN", E::Constant, |d| d.set_f32(d.data(NORMALIZE) + 1, NAN)),
+        ("clip before negative", E::Constant, |d| d.set_f32(d.data(NORMALIZE), -1.0)),
+        ("layer norm outside", E::Section, |d| d.set(d.op(LAYER_NORM) + 3, d.0.len() as u32)),
+        ("layer norm at a huge offset", E::Section, |d| d.set(d.op(LAYER_NORM) + 3, u32::MAX)),
+        ("eps 0", E::Constant, |d| d.set_f32(d.data(LAYER_NORM), 0.0)),
+        ("eps infinite", E::Constant, |d| d.set_f32(d.data(LAYER_NORM), f32::INFINITY)),
+        ("layer norm weight NaN", E::Constant, |d| d.set_f32(d.data(LAYER_NORM) + 1, NAN)),
+        ("layer norm bias infinite", E::Constant, |d| d.set_f32(d.data(LAYER_NORM) + 48, f32::INFINITY)),
+    ]);
+}
+
+#[test]
+fn matrices_that_cannot_be_are_refused() {
+    fn scales(d: &Draft) -> usize {
+        d.offset(d.block(OUTPUT, 0) + 2)
+    }
+    fn index(d: &Draft) -> usize {
+        d.offset(d.block(OUTPUT, 1) + 3)
+    }
+    refused(&[
+        ("matrix record outside", E::Matrix, |d| d.set(d.op(FIRST) + 3, d.0.len() as u32 - 3)),
+        ("matrix record at a huge offset", E::Matrix, |d| d.set(d.op(FIRST) + 3, HUGE)),
+        ("rows 0", E::Shape, |d| d.set_low(d.data(FIRST), 0)),
+        ("rows 4097", E::Shape, |d| d.set_low(d.data(FIRST), 4097)),
+        ("columns 0", E::Shape, |d| d.set_high(d.data(FIRST), 0)),
+        ("matrix record inside another", E::Matrix, |d| d.set(d.op(FIRST) + 3, d.get(d.op(FIRST) + 3) + 1)),
+        ("a matrix behind the last", E::Matrix, |d| d.set_low(h::W_MATRIX_COUNT, 3)),
+        ("matrix records outside", E::Section, |d| d.set(h::W_MATRICES, d.0.len() as u32 - 3)),
+        ("block records outside", E::Section, |d| d.set(d.data(FIRST) + 3, d.0.len() as u32 - 3)),
+        ("more rows than the destination", E::Shape, |d| d.set_high(d.op(FIRST), UNITS as u32 - 1)),
+        ("group 7", E::Group, |d| d.set_low(d.data(FIRST) + 1, 7)),
+        ("group 256", E::Group, |d| d.set_low(d.data(FIRST) + 1, 256)),
+        ("x_max 0", E::Constant, |d| d.set_high(d.data(FIRST) + 1, 0)),
+        ("x_max 32768", E::Constant, |d| d.set_high(d.data(FIRST) + 1, 32768)),
+        ("reserved half of the matrix record", E::Reserved, |d| d.set_high(d.data(FIRST) + 2, 1)),
+        ("too many blocks", E::Section, |d| d.set_low(d.data(FIRST) + 2, 0xffff)),
+        ("bias outside", E::Section, |d| d.set(d.op(FIRST) + 2, d.0.len() as u32)),
+        ("bias in the header", E::Section, |d| d.set(d.op(FIRST) + 2, 1)),
+        ("bias at a huge offset", E::Section, |d| d.set(d.op(FIRST) + 2, HUGE)),
+        ("bias NaN", E::Constant, |d| d.set_f32(d.offset(d.op(FIRST) + 2), NAN)),
+        ("width 5", E::Width, |d| d.set_low(d.block(FIRST, 0), 5)),
+        ("width 0", E::Width, |d| d.set_low(d.block(FIRST, 0), 0)),
+        ("unknown lanes", E::Lanes, |d| d.set_low(d.block(FIRST, 0), 4 | 2 << 8)),
+        ("single lanes for int8 activations", E::Lanes, |d| d.set_low(d.block(FIRST, 0), 4)),
+        ("paired lanes for int16 activations", E::Lanes, |d| d.set_low(d.block(OUTPUT, 0), 2 | 1 << 8)),
+        ("a block of no rows", E::Shape, |d| d.set_high(d.block(FIRST, 0), 0)),
+        ("a block with more rows than the matrix", E::Shape, |d| d.set_high(d.block(FIRST, 0), UNITS as u32 + 1)),
+        ("weights outside", E::Section, |d| d.set(d.block(FIRST, 0) + 1, d.0.len() as u32 - 1)),
+        ("weights in the header", E::Section, |d| d.set(d.block(FIRST, 0) + 1, 31)),
+        ("weights at a huge offset", E::Section, |d| d.set(d.block(FIRST, 0) + 1, HUGE)),
+        ("row scales outside", E::Section, |d| d.set(d.block(FIRST, 0) + 2, d.0.len() as u32)),
+        ("row scales at a huge offset", E::Section, |d| d.set(d.block(FIRST, 0) + 2, HUGE)),
+        ("row scale negative", E::Constant, |d| d.set_low(scales(d), 0xbf80)),
+        ("row scale minus 0", E::Constant, |d| d.set_low(scales(d), 0x8000)),
+        ("row scale NaN", E::Constant, |d| d.set_high(scales(d), 0x7fc0)),
+        ("row scale infinite", E::Constant, |d| d.set_high(scales(d) + 1, 0x7f80)),
+        ("index outside the image", E::Section, |d| d.set(d.block(OUTPUT, 1) + 3, d.0.len() as u32 - 1)),
+        ("index in the header", E::Section, |d| d.set(d.block(OUTPUT, 1) + 3, 8)),
+        ("index at a huge offset", E::Section, |d| d.set(d.block(OUTPUT, 1) + 3, HUGE)),
+        ("index beyond the rows", E::Index, |d| d.set_low(index(d), (CHUNK * ACT) as u32)),
+        ("index beyond all rows", E::Index, |d| d.set_high(index(d), 0xffff)),
+        ("index repeated in a block", E::Index, |d| d.set_low(index(d), d.high(index(d)))),
+        ("index repeated over blocks", E::Index, |d| d.set_low(index(d), 0)),
+        ("blocks with more rows than the matrix", E::Index, |d| {
+            // Four rows each: one has no output left.
+            for i in 0..2 {
+                d.set(d.block(OUTPUT, i) + 3, 0);
+            }
+            d.set_low(d.data(OUTPUT), 7);
+        }),
+        ("row scales away from their weights", E::Section, |d| {
+            d.set(d.block(FIRST, 0) + 2, d.get(d.block(FIRST, 0) + 2) + 1);
+        }),
+        ("index away from its scales", E::Section, |d| {
+            d.set(d.block(OUTPUT, 0) + 3, d.get(d.block(OUTPUT, 1) + 3));
+        }),
+        ("two matrices on the same weights", E::Section, |d| {
+            for word in 1..4 {
+                d.set(d.block(STATE, 0) + word, d.get(d.block(INPUT, 0) + word));
+            }
+        }),
+        ("two operations with the same biases", E::Section, |d| d.set(d.op(INPUT) + 2, d.get(d.op(FIRST) + 2))),
+        ("biases in the weights", E::Section, |d| d.set(d.op(FIRST) + 2, d.get(d.block(FIRST, 0) + 1))),
+        ("int32 overflow possible", E::Overflow, |d| {
+            // The 8-bit rows have 24 columns; with the largest group scale they exceed 2^31 / 32767.
+            let quad = d.offset(d.block(OUTPUT, 1) + 1);
+            d.set(quad + 4 * UNITS / 4, u32::MAX);
+            d.set_high(d.data(OUTPUT) + 1, 32767);
+        }),
+    ]);
+}
+
+#[test]
+fn int32_is_allowed_to_the_last_product() {
+    // One row of the 8-bit block decides; x_max may be as large as its sum allows, and no larger.
+    let mut draft = VALID.clone();
+    let x_max = draft.data(OUTPUT) + 1;
+    let quad = draft.offset(draft.block(OUTPUT, 1) + 1);
+    for at in 0..UNITS {
+        draft.set(quad + at, 0x7f7f_7f7f);
+    }
+    draft.set(quad + UNITS, u32::MAX);
+    let largest = i32::MAX as u32 / (24 * 127 * 255);
+    for (value, expected) in [(largest, None), (largest + 1, Some(E::Overflow))] {
+        draft.set_high(x_max, value);
+        draft.seal();
+        assert_eq!(draft.check().err(), expected, "x_max {value}");
+    }
+}
+
+#[test]
+fn nothing_but_the_contract_may_write_what_the_step_limit_holds_on_to() {
+    // The last action bounds the next one; a stray write there would carry the action out of its limits.
+    refused(&[
+        ("work area over the action", E::Arena, |d| d.set_low(h::W_ACTION_WORK, d.high(h::W_ACTION_WORK) + 1)),
+        ("destination over the action", E::Unwritten, |d| d.set_low(d.op(FUNCTION) + 1, d.low(h::W_ACTION_WORK))),
+        ("cell state over the action", E::Unwritten, |d| d.set_high(d.op(LSTM) + 2, d.low(h::W_ACTION_WORK))),
+    ]);
+}
+
+#[test]
+fn operations_read_nothing_that_their_step_has_not_written() {
+    // Else an action would depend on the step before, or on which backend prepared the activations.
+    refused(&[
+        ("a source in the work area", E::Unwritten, |d| d.set_high(d.op(NORMALIZE) + 1, d.high(h::W_ACTION_WORK))),
+        ("a source in the last action", E::Unwritten, |d| d.set_high(d.op(NORMALIZE) + 1, d.low(h::W_ACTION_WORK))),
+        ("a source that is written later", E::Unwritten, |d| d.set_high(d.op(FIRST) + 1, d.low(d.op(INPUT) + 1))),
+        ("a function of what is written later", E::Unwritten, |d| {
+            d.set_low(d.op(FUNCTION) + 1, d.low(d.op(INPUT) + 1))
+        }),
+        ("a sum with what is written later", E::Unwritten, |d| {
+            d.set_low(d.op(FIRST), u32::from(op::LINEAR) | 1 << 8);
+        }),
+        ("a destination behind a gap", E::Arena, |d| {
+            d.set_low(d.op(NORMALIZE) + 1, d.low(d.op(NORMALIZE) + 1) + 1);
+        }),
+        ("an output that is not written", E::Unwritten, |d| d.set_high(h::W_OBS_OUT, d.low(h::W_ACTION_WORK) - 1)),
+    ]);
+}
+
+#[test]
+fn the_state_may_share_memory_with_nothing_that_a_step_writes() {
+    refused(&[
+        ("state over the observation", E::Arena, |d| d.set_low(h::W_STATE, d.low(h::W_OBS_OUT))),
+        ("state over the action", E::Arena, |d| d.set_low(h::W_STATE, d.low(h::W_ACTION_WORK))),
+        ("state over the work area", E::Arena, |d| {
+            d.set_low(h::W_STATE, d.high(h::W_ACTION_WORK));
+            d.set_high(h::W_STATE, 1);
+        }),
+    ]);
+}
+
+#[test]
+fn a_network_without_operations_is_refused() {
+    // Its output would be whatever the scratch memory held.
+    refused(&[("no operations", E::Shape, |d| d.set_high(h::W_KIND, 0))]);
+}
+
+#[test]
+fn fields_that_an_operation_does_not_use_are_zero() {
+    // Else a later version could not give them a meaning.
+    refused(&[
+        ("source of a function", E::Reserved, |d| d.set_high(d.op(FUNCTION) + 1, 1)),
+        ("constants of a function", E::Reserved, |d| d.set(d.op(FUNCTION) + 3, 32)),
+        ("source length of a normalization", E::Reserved, |d| d.set_low(d.op(NORMALIZE) + 2, 1)),
+        ("source of a layer norm", E::Reserved, |d| d.set_high(d.op(LAYER_NORM) + 1, 1)),
+        ("constants of a cell", E::Reserved, |d| d.set(d.op(LSTM) + 3, 32)),
+    ]);
+}
+
+/// Flash that decays, or is rewritten behind the head's back: what no longer parses is an error, not a stale action.
+#[test]
+fn damage_after_the_check_is_an_error() {
+    let cases: &[(&str, Change)] = &[
+        ("an operation's code", |d| d.set_low(d.op(FUNCTION), 0)),
+        ("a function's code", |d| d.set_low(d.op(FUNCTION), u32::from(op::FUNCTION) | 99 << 8)),
+        ("a destination", |d| d.set_low(d.op(FUNCTION) + 1, 0xffff)),
+        ("a source", |d| d.set_high(d.op(NORMALIZE) + 1, 0xffff)),
+        ("a cell state", |d| d.set_high(d.op(LSTM) + 2, 0xffff)),
+        ("constants", |d| d.set(d.op(NORMALIZE) + 3, HUGE)),
+        ("constants of a norm", |d| d.set(d.op(LAYER_NORM) + 3, d.0.len() as u32)),
+        ("a matrix", |d| d.set(d.op(FIRST) + 3, HUGE)),
+        ("a matrix's rows", |d| d.set_low(d.data(FIRST), UNITS as u32 - 1)),
+        ("a matrix's group", |d| d.set_low(d.data(FIRST) + 1, 7)),
+        ("a matrix's blocks", |d| d.set(d.data(FIRST) + 3, HUGE)),
+        ("biases", |d| d.set(d.op(FIRST) + 2, HUGE)),
+        ("a width", |d| d.set_low(d.block(FIRST, 0), 5)),
+        ("a block's rows", |d| d.set_high(d.block(FIRST, 0), UNITS as u32 + 1)),
+        ("weights", |d| d.set(d.block(FIRST, 0) + 1, HUGE)),
+        ("scales", |d| d.set(d.block(FIRST, 0) + 2, HUGE)),
+        ("an output index", |d| d.set_high(d.offset(d.block(OUTPUT, 1) + 3), 0xffff)),
+        ("the observation's place", |d| d.set_low(h::W_OBS_OUT, 0xffff)),
+        ("the output's place", |d| d.set_high(h::W_OBS_OUT, 0xffff)),
+        ("the action's place", |d| d.set_low(h::W_ACTION_WORK, 0xffff)),
+        ("the work area's place", |d| d.set_high(h::W_ACTION_WORK, 0xffff)),
+    ];
+    for (name, damage) in cases {
+        let mut draft = VALID.clone();
+        damage(&mut draft);
+        let image = Image::unchecked(draft.bytes()).expect("the header is there");
+        let mut scratch = vec![0; image.scratch_words()];
+        let mut head = Head::new(image, &mut scratch).expect("the scratch memory has the image's size");
+        assert_eq!(head.step(&[0.5; OBS]).err(), Some(StepError::Damaged), "{name}");
+        // In pieces, too, and again and again.
+        let in_pieces = head.begin(&[0.5; OBS]).and_then(|()| head.poll(u32::MAX).map(|_| ()));
+        assert_eq!(in_pieces, Err(StepError::Damaged), "{name}");
+    }
+}
+
+/// Else 500 operations could make the check of a small image last for seconds.
+#[test]
+fn a_matrix_is_checked_once_however_many_operations_share_it() {
+    let time = |operations: usize| {
+        // Groups at 8 bits, and so many columns that the bound from the shape does not do.
+        const N: usize = 768;
+        let mut random = Random(3);
+        let mut graph = Graph::new(N);
+        graph.matrices.push(WeightMatrix {
+            name: "w".into(),
+            rows: N,
+            cols: N,
+            data: (0..N * N).map(|_| random.unit()).collect(),
+        });
+        for input in 0..operations {
+            graph.add(Linear { matrix: 0, bias: vec![0.0; N] }, &[input]).expect("it fits");
+        }
+        let options = Options { group: 32, ..Options::new(Method::Rtn, Budget::Width(Width::W8)) };
+        let (_, outcomes) =
+            quantize(&graph, None, Rate::Width(Width::W8), &options).expect("the graph can be quantized");
+        let policy = Policy {
+            dir: ".".into(),
+            name: "shared".into(),
+            kind: Kind::Step,
+            chunk: 1,
+            execute: 1,
+            act_len: N,
+            rate_hz: 50.0,
+            contract: ActionContract { scale: Some(vec![1e-30; N]), ..ActionContract::default() },
+            weights: graph.weights(),
+            graph,
+            digest: [0; 32],
+        };
+        let bytes = actq::emit::image(&policy, &outcomes).expect("the policy fits the format");
+        let buffer = ImageBuffer::new(&bytes);
+        let start = Instant::now();
+        let image = Image::new_checked(buffer.bytes()).expect("the image is valid");
+        assert_eq!(image.op_count(), operations);
+        start.elapsed()
+    };
+    let (one, many) = (time(1), time(24));
+    assert!(many < 8 * one, "{many:?} for 24 operations, {one:?} for one");
+}

@@ -1,0 +1,258 @@
+//! Where the command's outputs go: never over its inputs, through links, into devices and pipes, whole or not at all.
+#![cfg(unix)]
+
+use std::collections::BTreeMap;
+use std::fs::{self, File, OpenOptions, Permissions};
+use std::io::Read as _;
+use std::os::unix::fs::{FileTypeExt as _, PermissionsExt as _, symlink};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+use actq_bench::command::{actq, all, failed, run, succeeded};
+use actq_bench::golden::Random;
+use anyhow::{Result, ensure};
+use ndarray::Array2;
+use ndarray_npy::NpzWriter;
+use safetensors::Dtype;
+use safetensors::tensor::{TensorView, serialize};
+use serde_json::json;
+use tempfile::TempDir;
+
+const OBS: usize = 8;
+const ACT: usize = 2;
+
+/// A folder with a policy in `policy`, recordings `policy/calib.npz`, `policy/heldout.npz` and `drive.npz`, the image
+/// `old.actq` and its statistics `old.json`; commands run in it.
+struct Fixture(TempDir);
+
+impl Fixture {
+    fn new() -> Result<Self> {
+        let fixture = Self(TempDir::new()?);
+        fs::create_dir(fixture.path("policy"))?;
+        let ops = [json!({"op": "linear", "w": "w"})];
+        let json = json!({"name": "leg", "obs_dim": OBS, "act_dim": ACT, "ops": ops});
+        fs::write(fixture.path("policy/policy.json"), json.to_string())?;
+        let mut random = Random(3);
+        let weights: Vec<u8> = (0..ACT * OBS).flat_map(|_| random.unit().to_le_bytes()).collect();
+        let view = TensorView::new(Dtype::F32, vec![ACT, OBS], &weights)?;
+        fs::write(fixture.path("policy/policy.safetensors"), serialize([("w", view)], None)?)?;
+        for name in ["policy/calib.npz", "policy/heldout.npz", "drive.npz"] {
+            let mut npz = NpzWriter::new(File::create(fixture.path(name))?);
+            npz.add_array("obs", &Array2::from_shape_simple_fn((32, OBS), || random.unit()))?;
+            npz.finish()?;
+        }
+        succeeded(&fixture.quantize("--out old.actq --save-stats old.json")?)?;
+        Ok(fixture)
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn command(&self, line: &str) -> Command {
+        let mut command = actq(&line.split_whitespace().collect::<Vec<_>>());
+        command.current_dir(self.0.path());
+        command
+    }
+
+    fn run(&self, line: &str) -> Result<Output> {
+        run(self.command(line), b"")
+    }
+
+    fn quantize(&self, options: &str) -> Result<Output> {
+        self.run(&format!("quantize policy --method rtn {options}"))
+    }
+
+    /// What every name stands for: a link's target or a file's content.
+    fn snapshot(&self) -> Result<BTreeMap<PathBuf, Vec<u8>>> {
+        let mut found = BTreeMap::new();
+        let mut folders = vec![self.0.path().to_owned()];
+        while let Some(folder) = folders.pop() {
+            for entry in fs::read_dir(&folder)? {
+                let (path, kind) = entry.and_then(|entry| Ok((entry.path(), entry.file_type()?)))?;
+                if kind.is_dir() {
+                    folders.push(path);
+                } else if kind.is_symlink() {
+                    let target = fs::read_link(&path)?;
+                    found.insert(path, target.into_os_string().into_encoded_bytes());
+                } else if kind.is_file() {
+                    let content = fs::read(&path)?;
+                    found.insert(path, content);
+                }
+            }
+        }
+        Ok(found)
+    }
+
+    /// A new image, by another way than the one that is tested.
+    fn image(&self) -> Result<Vec<u8>> {
+        Ok(fs::read(self.path("old.actq"))?)
+    }
+}
+
+/// Names that are put into the folder before: a link to a path, or another name of a file.
+enum Name {
+    Link(&'static str, &'static str),
+    Hard(&'static str, &'static str),
+    None,
+}
+
+/// The command, the name that is put there, and what the message says.
+const OVERWRITING: &[(&str, Name, &str)] = &[
+    (
+        "quantize policy --out policy/policy.safetensors",
+        Name::None,
+        "policy/policy.safetensors: is the same file as policy/policy.safetensors, which the command reads",
+    ),
+    ("quantize policy --out policy/policy.json", Name::None, "the same file as policy/policy.json"),
+    ("quantize policy --out policy/calib.npz", Name::None, "the same file as policy/calib.npz"),
+    ("quantize policy --out policy/heldout.npz", Name::None, "the same file as policy/heldout.npz"),
+    // A recording's name, though none is there.
+    ("quantize policy --out policy/heldout.safetensors", Name::None, "the same file as policy/heldout.safetensors"),
+    ("quantize policy --calib drive.npz --out drive.npz", Name::None, "the same file as drive.npz"),
+    ("quantize policy --out x.actq --save-stats policy/policy.json", Name::None, "the same file as policy/policy.json"),
+    ("quantize policy --out policy/../policy/calib.npz", Name::None, "the same file as policy/calib.npz"),
+    (
+        "quantize policy --out x.actq",
+        Name::Link("x.actq", "policy/policy.safetensors"),
+        "x.actq: is the same file as policy/policy.safetensors, which the command reads",
+    ),
+    (
+        "quantize policy --out x.actq",
+        Name::Hard("x.actq", "policy/policy.safetensors"),
+        "x.actq: is the same file as policy/policy.safetensors, which the command reads",
+    ),
+    ("quantize policy --out other/policy.json", Name::Link("other", "policy"), "the same file as policy/policy.json"),
+    ("quantize other --out policy/calib.npz", Name::Link("other", "policy"), "the same file as other/calib.npz"),
+    (
+        "quantize policy --out x.actq --save-stats ./x.actq",
+        Name::None,
+        "./x.actq: is the same file as x.actq; every output needs its own",
+    ),
+    ("quantize policy --out old.actq --save-stats policy/../old.actq", Name::None, "is the same file as old.actq"),
+    ("quantize policy --out x --save-stats y", Name::Link("y", "x"), "y: is the same file as x"),
+    ("quantize policy --out x --save-stats here/x", Name::Link("here", "."), "here/x: is the same file as x"),
+    ("quantize policy --out old.actq --save-stats y", Name::Hard("y", "old.actq"), "y: is the same file as old.actq"),
+    (
+        "inspect old.actq --widths --svg old.actq",
+        Name::None,
+        "old.actq: is the same file as old.actq, which the command reads",
+    ),
+    ("inspect old.actq --widths --stats old.json --svg old.json", Name::None, "is the same file as old.json"),
+    ("inspect old.actq --widths --svg y", Name::Link("y", "old.actq"), "y: is the same file as old.actq"),
+    ("sweep policy --methods rtn --svg z --json z", Name::None, "z: is the same file as z; every output needs its own"),
+    ("sweep policy --methods rtn --svg z --json ./z", Name::None, "./z: is the same file as z"),
+    ("sweep policy --methods rtn --svg policy/heldout.npz", Name::None, "the same file as policy/heldout.npz"),
+    ("sweep policy --methods rtn --json policy/policy.json", Name::None, "the same file as policy/policy.json"),
+    (
+        "sweep policy --methods rtn --heldout drive.npz --json y",
+        Name::Hard("y", "drive.npz"),
+        "y: is the same file as drive.npz",
+    ),
+];
+
+#[test]
+fn no_output_takes_the_place_of_an_input_or_of_another() -> Result<()> {
+    all(OVERWRITING.iter().map(|(line, name, words)| {
+        let run = || {
+            let fixture = Fixture::new()?;
+            match name {
+                Name::Link(name, to) => symlink(to, fixture.path(name))?,
+                Name::Hard(name, to) => fs::hard_link(fixture.path(to), fixture.path(name))?,
+                Name::None => {}
+            }
+            let before = fixture.snapshot()?;
+            // The method that takes any recording, so that nothing else keeps the command from writing.
+            let method = if line.starts_with("quantize") { "--method rtn" } else { "" };
+            let output = fixture.run(&format!("{line} {method}"))?;
+            ensure!(output.stdout.is_empty(), "work was done");
+            failed(&output, 1, &[words])?;
+            ensure!(fixture.snapshot()? == before, "files have changed");
+            Ok(())
+        };
+        ((*line).to_owned(), run())
+    }))
+}
+
+#[test]
+fn a_link_stays_and_its_target_is_written() -> Result<()> {
+    let fixture = Fixture::new()?;
+    fs::create_dir(fixture.path("images"))?;
+    fs::write(fixture.path("images/there.actq"), "old")?;
+    // To a file, to none, and by way of another link.
+    for (link, to) in [("a", "images/there.actq"), ("b", "images/new.actq"), ("c", "b2"), ("b2", "images/third.actq")] {
+        symlink(to, fixture.path(link))?;
+    }
+    for (out, target) in [("a", "there"), ("b", "new"), ("c", "third")] {
+        succeeded(&fixture.quantize(&format!("--out {out}"))?)?;
+        ensure!(fs::symlink_metadata(fixture.path(out))?.is_symlink(), "{out} is a link no more");
+        ensure!(fs::read(fixture.path(&format!("images/{target}.actq")))? == fixture.image()?, "{target}");
+    }
+    ensure!(fs::symlink_metadata(fixture.path("b2"))?.is_symlink(), "b2 is a link no more");
+    symlink("round", fixture.path("round"))?;
+    failed(&fixture.quantize("--out round")?, 1, &["round: cannot be written"])?;
+    symlink("none/image.actq", fixture.path("lost"))?;
+    failed(&fixture.quantize("--out lost")?, 1, &["lost: cannot be written", "none"])
+}
+
+#[test]
+fn a_pipe_is_written_to() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let pipe = fixture.path("pipe");
+    ensure!(Command::new("mkfifo").arg(&pipe).status()?.success(), "no pipe");
+    // Open for both, so that neither side waits for the other; the image is smaller than the pipe's buffer.
+    let mut reader = OpenOptions::new().read(true).write(true).open(&pipe)?;
+    succeeded(&fixture.quantize("--out pipe --save-stats stats.json")?)?;
+    ensure!(fs::symlink_metadata(&pipe)?.file_type().is_fifo(), "the pipe was replaced");
+    let mut image = vec![0; fixture.image()?.len()];
+    reader.read_exact(&mut image)?;
+    ensure!(image == fixture.image()? && fixture.path("stats.json").exists(), "another image");
+    Ok(())
+}
+
+#[test]
+fn a_device_is_written_to() -> Result<()> {
+    let fixture = Fixture::new()?;
+    // By way of links: whoever may replace a device would lose it to the mistake that this test is for.
+    symlink("/dev/null", fixture.path("null"))?;
+    symlink("/dev/stdout", fixture.path("stdout"))?;
+    succeeded(&fixture.quantize("--out null")?)?;
+    ensure!(fs::metadata(fixture.path("null"))?.file_type().is_char_device(), "the device was replaced");
+    let output = fixture.quantize("--out stdout")?;
+    let image = fixture.image()?;
+    ensure!(output.status.success() && output.stdout.starts_with(&image), "the image is not on standard output");
+    ensure!(String::from_utf8(output.stdout[image.len()..].to_vec())?.contains("weights"), "no report behind it");
+    // A file that is open already has a place at which others write.
+    let log = fixture.path("log");
+    fs::write(&log, "lines\n")?;
+    let mut command = fixture.command("quantize policy --method rtn --out stdout");
+    command.stdout(OpenOptions::new().append(true).open(&log)?).stderr(Stdio::piped());
+    failed(&command.output()?, 1, &["stdout: cannot be written", "it stands for a file that is open already"])?;
+    ensure!(fs::read(&log)? == b"lines\n", "the file has changed");
+    Ok(())
+}
+
+fn mode(path: &Path) -> Result<u32> {
+    Ok(fs::metadata(path)?.permissions().mode() & 0o7777)
+}
+
+#[test]
+fn permissions_are_those_of_the_file_before() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let out = fixture.path("image.actq");
+    succeeded(&fixture.quantize("--out image.actq")?)?;
+    File::create(fixture.path("new"))?;
+    ensure!(mode(&out)? == mode(&fixture.path("new"))?, "{:o}: not as any new file", mode(&out)?);
+    for permissions in [0o600, 0o664, 0o4755] {
+        fs::write(&out, "old")?;
+        fs::set_permissions(&out, Permissions::from_mode(permissions))?;
+        succeeded(&fixture.quantize("--out image.actq")?)?;
+        ensure!(mode(&out)? == permissions & 0o777, "{permissions:o} became {:o}", mode(&out)?);
+        ensure!(fs::read(&out)? == fixture.image()?, "another image");
+    }
+    fs::write(&out, "old")?;
+    fs::set_permissions(&out, Permissions::from_mode(0o444))?;
+    failed(&fixture.quantize("--out image.actq")?, 1, &["image.actq: cannot be written: it is read-only"])?;
+    ensure!(fs::read(&out)? == b"old", "a read-only file was replaced");
+    Ok(())
+}

@@ -1,0 +1,309 @@
+//! Packing, the reference and the portable kernels against the definition, by property and on the golden cases.
+
+use actq_bench::golden::{self, Case, Draw, Random};
+use actq_kernels::activations::{NotFinite, Plan, Prepared, Scale, prepare};
+use actq_kernels::arch::{BACKEND, Backend, Mismatch, Product, gemv, portable, reference};
+use actq_kernels::dequantize;
+use actq_kernels::format::{Block, BlockShape, Lanes, MAX_PAIRED_GROUPED, STRIP, Width, pack};
+use actq_kernels::linear::{RowBlock, largest_sum_bound, worst_case};
+use proptest::prelude::*;
+
+fn shapes() -> impl Strategy<Value = BlockShape> {
+    let layout = prop::sample::select(golden::layouts().collect::<Vec<_>>());
+    (layout, 1..18usize, prop_oneof![9 => 1..140usize, 1 => 140..700usize])
+        .prop_map(|((width, lanes, group), rows, cols)| BlockShape { width, lanes, rows, cols, group })
+}
+
+fn cases() -> impl Strategy<Value = Case> {
+    let draw = prop::sample::select(vec![Draw::Uniform, Draw::Ends, Draw::Worst, Draw::Aligned]);
+    (shapes(), any::<u64>(), 1..=i16::MAX, draw).prop_map(|(shape, seed, x_max, draw)| {
+        let x_max = match shape.lanes {
+            Lanes::Single => x_max,
+            Lanes::Paired => 1 + x_max % 127,
+        };
+        Case::draw(&mut Random(seed), shape, x_max, draw)
+    })
+}
+
+fn check_backends(case: &Case, start: usize) {
+    let sums = case.sums();
+    for (name, backend) in [("reference", reference::gemv as fn(Product<'_>)), ("portable", portable::gemv)] {
+        let gemv = |b: &Block<'_>, x: &Prepared<'_>, acc: &mut [i32]| {
+            backend(Product::new(b, x, 0, acc).expect("the vector was prepared for the block"));
+        };
+        assert_eq!(case.run(start, gemv), sums, "{name}, {:?}", case.shape);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(4096))]
+
+    #[test]
+    fn backends_compute_the_definition(case in cases(), start in 0..4usize) {
+        check_backends(&case, start);
+    }
+
+    #[test]
+    fn unpacking_gives_back_what_was_packed(case in cases()) {
+        let words = case.words();
+        let block = Block::new(case.shape, &words).expect("the words fit the shape");
+        let mask = ((1u32 << case.shape.width.bits()) - 1) as u8;
+        for row in 0..case.shape.rows {
+            for col in 0..case.shape.cols {
+                prop_assert_eq!(block.code(row, col), case.codes[row * case.shape.cols + col] & mask);
+                let scale = match case.shape.group {
+                    0 => 1,
+                    group => case.scales[row * case.shape.groups() + col / group],
+                };
+                prop_assert_eq!(block.group_scale(row, col), scale);
+            }
+        }
+    }
+
+    #[test]
+    fn any_run_of_strips_gives_the_same_sums(case in cases(), first in 0..3usize, strips in 1..3usize) {
+        let all = case.sums();
+        let first = STRIP * first.min((all.len() - 1) / STRIP);
+        let last = (first + STRIP * strips).min(all.len());
+        let part = case.run(0, |b, x, acc| {
+            gemv(b, x, first, &mut acc[first..last]).expect("the activations belong to the block, the rows to strips");
+        });
+        prop_assert_eq!(&part[first..last], &all[first..last]);
+    }
+
+    #[test]
+    fn sums_stay_within_the_proven_worst_case(case in cases()) {
+        let words = case.words();
+        let block = Block::new(case.shape, &words).expect("the words fit the shape");
+        let x_max = case.x.iter().map(|x| x.unsigned_abs()).max().unwrap_or(0);
+        let worst = worst_case(&block, x_max);
+        let product = |row, col| i64::from(block.level(row, col).abs()) * i64::from(block.group_scale(row, col));
+        let row_sum = |row| (0..case.shape.cols).map(|col| product(row, col)).sum::<i64>();
+        let largest = (0..case.shape.rows).map(row_sum).max().unwrap_or(0);
+        prop_assert_eq!(worst, largest * i64::from(x_max));
+        prop_assert!(worst <= i64::from(largest_sum_bound(block.shape())) * i64::from(x_max));
+        if worst <= i64::from(i32::MAX) {
+            prop_assert!(case.sums().iter().all(|s| i64::from(s.unsigned_abs()) <= worst));
+        }
+    }
+
+    #[test]
+    fn quantized_activations_round_to_half_a_step(
+        x in prop::collection::vec(-1e6f32..1e6, 1..200),
+        x_max in prop::sample::select(vec![127u16, 2047, 32767]),
+        shape in shapes(),
+    ) {
+        let shape = BlockShape { cols: x.len(), ..shape };
+        let x_max = if shape.lanes == Lanes::Paired { 127 } else { x_max };
+        let plan = Plan::new(shape).expect("the shape is valid");
+        let mut words = vec![!0; plan.room(x.len())];
+        let scale = Scale::new(&x, x_max).expect("all values are finite");
+        let prepared = scale.quantize(&x, &plan, &mut words).expect("there is room");
+        let scale = scale.get();
+        // What integers give, word for word: start words, sums and padding, too.
+        let integers: Vec<i16> = (0..x.len()).map(|col| prepared.value(col)).collect();
+        let mut expected = vec![!0; plan.words() + 1];
+        prop_assert_eq!(prepare(&integers, &plan, &mut expected).map(|x| x.words()), Some(prepared.words()));
+        prop_assert_eq!(expected.last(), Some(&!0));
+        for (i, x) in x.iter().enumerate() {
+            let q = prepared.value(i);
+            prop_assert!(q.unsigned_abs() <= x_max);
+            // Half a step, and the rounding of the f32 product before it.
+            let error = (f64::from(*x) - f64::from(scale) * f64::from(q)).abs();
+            prop_assert!(error <= f64::from(scale) * (0.5 + f64::from(x_max) * 2e-7), "{x} became {q}");
+        }
+    }
+}
+
+#[test]
+fn golden_cases_hold_on_the_host() {
+    for (i, case) in golden::cases(1).iter().enumerate() {
+        check_backends(case, i % 4);
+    }
+}
+
+#[test]
+fn this_build_uses_the_portable_backend() {
+    // The firmware's golden run asserts the other one.
+    assert_eq!(BACKEND, Backend::Portable);
+}
+
+#[test]
+fn shapes_and_lengths_that_do_not_fit_are_refused() {
+    let shape = BlockShape { width: Width::W3, lanes: Lanes::Single, rows: 5, cols: 33, group: 0 };
+    let mut words = vec![0; shape.words()];
+    assert!(pack(shape, &[0; 5 * 33], &[], &mut words).is_some());
+    assert!(pack(shape, &[0; 5 * 33 - 1], &[], &mut words).is_none(), "too few codes");
+    assert!(pack(shape, &[0; 5 * 33], &[1], &mut words).is_none(), "scales without groups");
+    assert!(pack(shape, &[0; 5 * 33], &[], &mut words[1..]).is_none(), "too few words");
+    for bad in [
+        BlockShape { rows: 0, ..shape },
+        BlockShape { cols: 0, ..shape },
+        BlockShape { group: 16, ..shape },
+        BlockShape { lanes: Lanes::Paired, group: 64, ..shape },
+        BlockShape { lanes: Lanes::Paired, group: 32, cols: MAX_PAIRED_GROUPED + 1, ..shape },
+        BlockShape { cols: 1 << 16, ..shape },
+    ] {
+        assert!(Block::new(bad, &vec![0; bad.words()]).is_none(), "{bad:?}");
+    }
+    let block = Block::new(shape, &words).expect("the words fit the shape");
+    let plan = Plan::of(&block);
+    assert!(prepare(&[1; 33], &plan, &mut vec![0; plan.words() - 1]).is_none(), "too few words");
+    let scale = Scale::new(&[1.0; 33], 127).expect("all values are finite");
+    assert!(scale.quantize(&[1.0; 33], &plan, &mut vec![0; plan.room(33) - 1]).is_none(), "too little room");
+    assert!(Plan::new(BlockShape { cols: 0, ..shape }).is_none(), "no columns");
+    let prepared = vec![0; plan.words()];
+    assert!(Prepared::new(&prepared[1..], &plan).is_none(), "too few words");
+    let x = Prepared::new(&prepared, &plan).expect("the length is right");
+    assert_eq!(gemv(&block, &x, 0, &mut [0; 8]), Ok(()));
+    assert_eq!(gemv(&block, &x, 0, &mut [0; 4]), Err(Mismatch), "half a strip");
+    assert_eq!(gemv(&block, &x, 4, &mut [0; 4]), Err(Mismatch), "from the middle of a strip");
+    assert_eq!(gemv(&block, &x, 0, &mut [0; 16]), Err(Mismatch), "more rows than the block has");
+    for other in [BlockShape { group: 32, ..shape }, BlockShape { lanes: Lanes::Paired, ..shape }] {
+        let plan = Plan::new(other).expect("the shape is valid");
+        let prepared = vec![0; plan.words()];
+        let x = Prepared::new(&prepared, &plan).expect("the length is right");
+        assert_eq!(gemv(&block, &x, 0, &mut [0; 8]), Err(Mismatch), "{other:?}");
+    }
+}
+
+/// An image's block record with another byte for the lanes, under a valid checksum.
+fn with_lanes(image: &[u8], lanes: u8) -> Vec<u8> {
+    use actq_kernels::image::{checksum, header as h};
+    let word =
+        |bytes: &[u8], at: usize| u32::from_le_bytes(bytes[4 * at..][..4].try_into().expect("four bytes")) as usize;
+    let block = word(image, word(image, h::W_MATRICES) + 3);
+    let mut image = image.to_vec();
+    image[4 * block + 1] = lanes;
+    let crc = checksum(&image).to_le_bytes();
+    image[4 * h::W_CRC..][..4].copy_from_slice(&crc);
+    image
+}
+
+#[test]
+fn an_image_states_the_lanes_that_follow_from_its_activations() {
+    let shape = BlockShape { width: Width::W2, lanes: Lanes::Paired, rows: 9, cols: 40, group: 0 };
+    let image = single_matrix_image(&Case::draw(&mut Random(7), shape, 1, Draw::Uniform));
+    let check = |bytes: &[u8]| {
+        let buffer = actq::runtime::ImageBuffer::new(bytes);
+        actq_kernels::Image::new_checked(buffer.bytes()).map(|_| ())
+    };
+    assert_eq!(check(&with_lanes(&image, 1)), Ok(()));
+    for lanes in [0, 2, 255] {
+        assert_eq!(check(&with_lanes(&image, lanes)), Err(actq_kernels::ImageError::Lanes), "{lanes}");
+    }
+}
+
+/// Row blocks compute `start + acc * (row_scale * x_scale)` in this order, with biases in one pass or in y before.
+#[test]
+fn scaling_keeps_the_documented_order_of_operations() {
+    let mut random = Random(11);
+    for (width, lanes, group) in golden::layouts() {
+        for rows in [1, 3, 8, 13, 17, 72] {
+            let shape = BlockShape { width, lanes, rows, cols: 45, group };
+            let case = Case::draw(&mut random, shape, 127, Draw::Uniform);
+            let words = case.words();
+            let scales: Vec<u32> =
+                (0..rows.div_ceil(2)).map(|_| 0x3c00_3c00 | random.bits() as u32 & 0x7f_007f).collect();
+            let bias: Vec<u32> = (0..rows).map(|_| random.unit().to_bits()).collect();
+            let x: Vec<f32> = (0..45).map(|_| random.unit()).collect();
+            let block = Block::new(shape, &words).expect("the words fit the shape");
+            let block = RowBlock { block, scales: &scales, index: &[], first_row: 0 };
+            let scale = Scale::new(&x, 127).expect("all values are finite");
+            let plan = Plan::of(&block.block);
+            let mut prepared = vec![0; plan.room(x.len())];
+            let prepared = scale.quantize(&x, &plan, &mut prepared).expect("there is room");
+            let expected: Vec<u32> = (0..rows)
+                .map(|i| {
+                    let acc = reference::dot(&block.block, &prepared, i) as f32;
+                    (f32::from_bits(bias[i]) + acc * (block.scale(i) * scale.get())).to_bits()
+                })
+                .collect();
+            let mut y = vec![0.0; rows];
+            block.apply(&prepared, scale, Some(&bias), &mut y).expect("the lengths fit");
+            assert_eq!(y.iter().map(|y| y.to_bits()).collect::<Vec<_>>(), expected, "{shape:?}");
+            let mut y: Vec<f32> = bias.iter().map(|b| f32::from_bits(*b)).collect();
+            block.apply(&prepared, scale, None, &mut y).expect("the lengths fit");
+            assert_eq!(y.iter().map(|y| y.to_bits()).collect::<Vec<_>>(), expected, "{shape:?}, start in y");
+        }
+    }
+}
+
+#[test]
+fn vectors_that_are_not_finite_are_refused_and_tiny_ones_are_zero() {
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        assert_eq!(Scale::new(&[1.0, bad], 127), Err(NotFinite));
+    }
+    let tiny = [1e-35, -1e-40, 0.0];
+    let scale = Scale::new(&tiny, 127).expect("all values are finite");
+    assert_eq!(scale.get(), 0.0);
+    for (width, lanes, group) in golden::layouts() {
+        let shape = BlockShape { width, lanes, rows: 1, cols: 3, group };
+        let plan = Plan::new(shape).expect("the shape is valid");
+        let mut words = vec![!0; plan.room(tiny.len())];
+        let x = scale.quantize(&tiny, &plan, &mut words).expect("there is room");
+        assert!((0..3).all(|col| x.value(col) == 0));
+    }
+}
+
+#[test]
+fn weights_come_back_from_their_codes() {
+    let mut random = Random(5);
+    for width in Width::ALL {
+        for group in [0, 32] {
+            let shape = BlockShape { width, lanes: Lanes::Paired, rows: 6, cols: 70, group };
+            let case = Case::draw(&mut random, shape, 1, Draw::Uniform);
+            // The image is the only source of row blocks; one with a single matrix holds the case.
+            let image = single_matrix_image(&case);
+            let buffer = actq::runtime::ImageBuffer::new(&image);
+            let image = actq_kernels::Image::new_checked(buffer.bytes()).expect("the image is valid");
+            let matrix = image.ops().find_map(|op| op.matrix()).expect("the image has a matrix");
+            for rows in matrix.blocks() {
+                for i in 0..shape.rows {
+                    let mut row = [0f32; 70];
+                    dequantize::row_f32(&rows, i, &mut row);
+                    for (col, weight) in row.iter().enumerate() {
+                        let at = i * shape.cols + col;
+                        let scale = case.scales.get(i * shape.groups() + col / 32).map_or(1, |s| i32::from(*s));
+                        let integer = width.level(case.codes[at]) * scale;
+                        assert_eq!(*weight, integer as f32 * rows.scale(i));
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn single_matrix_image(case: &Case) -> Vec<u8> {
+    use actq::graph::ops::Linear;
+    use actq::graph::{Graph, WeightMatrix};
+    use actq::methods::{Outcome, Quantized};
+    let BlockShape { width, rows, cols, group, .. } = case.shape;
+    let mut graph = Graph::new(cols);
+    graph.matrices.push(WeightMatrix { name: "w".into(), rows, cols, data: vec![0.0; rows * cols] });
+    graph.add(Linear { matrix: 0, bias: vec![0.5; rows] }, &[0]).expect("it fits");
+    let policy = actq::policy::Policy {
+        dir: ".".into(),
+        name: "single".into(),
+        kind: actq_kernels::image::Kind::Step,
+        chunk: 1,
+        execute: 1,
+        act_len: rows,
+        rate_hz: 50.0,
+        contract: actq::contract::ActionContract::default(),
+        graph,
+        weights: rows * cols,
+        digest: [0; 32],
+    };
+    let quantized = Quantized {
+        rows,
+        cols,
+        group,
+        widths: vec![Some(width); rows],
+        scales: (0..rows).map(|r| half::bf16::from_f32(0.01 * (r + 1) as f32)).collect(),
+        group_scales: case.scales.clone(),
+        codes: case.codes.clone(),
+    };
+    actq::emit::image(&policy, &[Outcome { quantized, error: None, x_max: 127, allocation: None }])
+        .expect("the policy fits the format")
+}

@@ -1,0 +1,49 @@
+//! What the portable kernels cost where they run alone.
+
+use actq_bench::qemu::{self, Counter, Region};
+use actq_bench::{Target, firmware, golden};
+use anyhow::{Result, ensure};
+
+/// Instructions of a whole call of 256 x 256 weights by width, lanes and group. The firmware compares the results with the
+/// reference's, bit for bit.
+fn counts(target: Target) -> Result<Vec<(String, f64)>> {
+    let elf = firmware::bench_portable("portable", target)?;
+    let counter = Counter::build()?;
+    let mut command = qemu::command_on(target, &elf, None, "")?;
+    counter.attach(&mut command, &elf)?;
+    let output = qemu::run(command, &[])?;
+    let text = String::from_utf8(output.stdout)?;
+    ensure!(output.status.success(), "{text}");
+    let regions = counter.regions()?;
+    // The firmware measures every layout with row scales and with groups of 32.
+    let layouts = golden::layouts().filter(|(_, _, group)| [0, 32].contains(group)).count();
+    ensure!(text.lines().count() == layouts && regions.len() == layouts, "{} regions: {text}", regions.len());
+    let per_mac = |region: Region| region.instructions as f64 / (256.0 * 256.0);
+    Ok(text.lines().zip(regions).map(|(line, region)| (line.to_owned(), per_mac(region))).collect())
+}
+
+fn stay_within(target: Target, limit: f64) -> Result<()> {
+    for (line, per_mac) in counts(target)? {
+        println!("{target:?} {line}: {per_mac:.3}");
+        assert!(line.starts_with("Portable "), "{line}");
+        assert!(per_mac > 1.0 && per_mac <= limit, "{target:?}, {line}: {per_mac:.3} instructions per MAC");
+    }
+    Ok(())
+}
+
+#[test]
+fn without_assembler_a_mac_takes_few_instructions() -> Result<()> {
+    stay_within(Target::Fpu, 3.5)
+}
+
+/// Without the DSP extension, a product takes more instructions, and the conversions from and to f32 are in software.
+#[test]
+fn without_dsp_and_fpu_a_mac_takes_few_instructions() -> Result<()> {
+    stay_within(Target::NoDsp, 6.5)
+}
+
+/// RV32IMAC has no instruction that multiplies and adds, and none that extracts bits: a weight takes two of both.
+#[test]
+fn on_riscv_a_mac_takes_few_instructions() -> Result<()> {
+    stay_within(Target::Riscv, 9.0)
+}

@@ -1,0 +1,245 @@
+//! The firmware under QEMU: the assembler on the golden cases, and whole policies, bit for bit as on the host.
+
+use std::fs;
+use std::path::Path;
+
+use actq::budget::Budget;
+use actq::data::{Dataset, Sizes};
+use actq::data::{Recording, Recordings};
+use actq::measure::eval;
+use actq::methods::{Activations, Method, Options};
+use actq::pipeline::quantize;
+use actq::policy::Policy;
+use actq::runtime::{ImageBuffer, with_head};
+use actq_bench::firmware::{self, built_in};
+use actq_bench::qemu::{self, Server};
+use actq_bench::{Target, golden, shared_policies, ur3};
+use actq_kernels::Width;
+use actq_kernels::image::{checksum, header as h};
+use actq_kernels::linear::worst_case;
+use anyhow::{Context, Result, ensure};
+
+/// Steps that each image runs on the host and in QEMU.
+const STEPS: usize = 208;
+
+fn rtn(policy: &Policy, width: Width, group: usize, activations: Activations) -> Result<Vec<u8>> {
+    let options = Options { group, activations, ..Options::new(Method::Rtn, Budget::Width(width)) };
+    Ok(quantize(policy, &Recordings::default(), &options, |_, _| {})?.image)
+}
+
+#[test]
+fn kernels_give_the_golden_sums_on_the_target() -> Result<()> {
+    let cases = golden::cases(1);
+    for target in [Target::Fpu, Target::NoFpu] {
+        let elf = firmware::bench("golden", target)?;
+        let output = qemu::run(qemu::command(&elf, None, "")?, &golden::stream(&cases))?;
+        let text = String::from_utf8_lossy(&output.stdout);
+        ensure!(output.status.success(), "{target:?}: {text}");
+        assert_eq!(text.trim(), format!("Armv7em: {} cases", cases.len()));
+    }
+    Ok(())
+}
+
+#[test]
+fn portable_kernels_give_the_golden_sums_on_the_targets_without_assembler() -> Result<()> {
+    let cases = golden::cases(1);
+    // What fits the memory of the small one.
+    let fits = |c: &&golden::Case| c.shape.cols <= 256 && c.words().len() + c.prepared().len() < 1500;
+    let short: Vec<_> = cases.iter().filter(fits).cloned().collect();
+    ensure!(short.len() > cases.len() / 2, "too few cases are short");
+    for (target, cases) in [(Target::NoDsp, &cases), (Target::Small, &short), (Target::Riscv, &cases)] {
+        let elf = firmware::bench("golden", target)?;
+        let output = qemu::run(qemu::command_on(target, &elf, None, "")?, &golden::stream(cases))?;
+        let text = String::from_utf8_lossy(&output.stdout);
+        ensure!(output.status.success(), "{target:?}: {text}");
+        assert_eq!(text.trim(), format!("Portable: {} cases", cases.len()));
+    }
+    Ok(())
+}
+
+#[test]
+fn a_wrong_sum_fails_the_golden_run() -> Result<()> {
+    let mut stream = golden::stream(&golden::cases(1)[..3]);
+    let last_sum = stream.len() - 8;
+    // The last case may end in padding rows, whose sums are not compared: all four of its last quad's are changed.
+    stream[last_sum - 12..last_sum + 4].iter_mut().for_each(|byte| *byte ^= 1);
+    for target in [Target::Fpu, Target::Riscv] {
+        let output = qemu::run(qemu::command_on(target, &firmware::bench("golden", target)?, None, "")?, &stream)?;
+        let text = String::from_utf8_lossy(&output.stdout);
+        assert!(!output.status.success() && text.contains("case 2: sums"), "{target:?}: {text}");
+    }
+    Ok(())
+}
+
+#[test]
+fn the_built_in_image_replays_its_self_test() -> Result<()> {
+    let buffer = ImageBuffer::read(built_in()?)?;
+    let image = buffer.image(built_in()?)?;
+    let mut expected = format!("{}: crc32 {:08x}, self-test passed\n", image.name(), image.crc());
+    for step in 0..image.self_test_steps() {
+        let (_, action) = image.self_test(step).context("a self-test step is missing")?;
+        let bits: String = action.iter().map(|w| format!(" {:08x}", u32::from_le(*w))).collect();
+        expected += &format!("step {step}:{bits}\n");
+    }
+    for target in Target::ALL {
+        let elf = firmware::application(target)?;
+        let output = qemu::run(qemu::command_on(target, &elf, None, "")?, &[])?;
+        assert_eq!(String::from_utf8_lossy(&output.stdout), expected, "{target:?}");
+        assert!(output.status.success());
+    }
+    Ok(())
+}
+
+/// The proof takes the weights apart by the kernels of the machine that it runs on.
+#[test]
+fn the_target_allows_int32_to_the_last_product_as_the_host_does() -> Result<()> {
+    for group in [32, 128] {
+        let mut bytes = rtn(&Policy::load(&ur3())?, Width::W8, group, Activations::Int16)?;
+        let buffer = ImageBuffer::new(&bytes);
+        let image = buffer.image(Path::new("ur3"))?;
+        let matrices: Vec<_> = image.ops().filter_map(|op| op.matrix()).collect();
+        // Of the matrix with the most columns the shape alone does not prove it; which operation has it, the records say.
+        let widest = (0..matrices.len()).max_by_key(|i| matrices[*i].cols).context("there is a matrix")?;
+        let blocks = matrices[widest].blocks().map(|rows| worst_case(&rows.block, 1));
+        let largest = i64::from(i32::MAX) / blocks.max().context("there is a block")?;
+        ensure!(largest < i64::from(i16::MAX), "scales of {group}: all of int16 is allowed");
+        let words: &[u32] = bytemuck::cast_slice(buffer.bytes());
+        let records = words[h::W_OPS] as usize..;
+        let mut linear = words[records].chunks(h::OP_WORDS).filter(|record| record[0] as u8 == h::op::LINEAR);
+        let record = linear.nth(widest).context("the operation is linear")?[3] as usize;
+        for (x_max, refused) in [(largest, false), (largest + 1, true)] {
+            bytes[4 * record + 6..][..2].copy_from_slice(&u16::try_from(x_max)?.to_le_bytes());
+            let crc = checksum(&bytes);
+            bytes[4 * h::W_CRC..][..4].copy_from_slice(&crc.to_le_bytes());
+            assert_eq!(ImageBuffer::new(&bytes).image(Path::new("ur3")).is_err(), refused, "scales of {group}, host");
+            let slot = tempfile::NamedTempFile::new()?;
+            fs::write(slot.path(), &bytes)?;
+            let elf = firmware::application(Target::Fpu)?;
+            let output = qemu::run(qemu::command(&elf, Some(slot.path()), "")?, &[])?;
+            // What is allowed comes to its self-test, which may fail, where its actions were computed with another x_max.
+            let text = String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned();
+            let expected = if refused { "can overflow its int32" } else { "self-test" };
+            assert!(text.contains(expected), "scales of {group}, target: {text}");
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn a_damaged_image_in_the_slot_is_refused() -> Result<()> {
+    let mut bytes = fs::read(built_in()?)?;
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 4;
+    let slot = tempfile::NamedTempFile::new()?;
+    fs::write(slot.path(), bytes)?;
+    let elf = firmware::application(Target::Fpu)?;
+    let output = qemu::run(qemu::command(&elf, Some(slot.path()), "")?, &[])?;
+    assert!(!output.status.success());
+    assert!(String::from_utf8_lossy(&output.stderr).contains("checksum"), "{output:?}");
+    Ok(())
+}
+
+#[test]
+fn an_unknown_argument_is_refused() -> Result<()> {
+    for target in [Target::Fpu, Target::Riscv] {
+        let elf = firmware::application(target)?;
+        let output = qemu::run(qemu::command_on(target, &elf, None, "fly")?, &[])?;
+        assert!(!output.status.success());
+        assert!(String::from_utf8_lossy(&output.stderr).contains("unknown argument: fly"), "{target:?}: {output:?}");
+    }
+    Ok(())
+}
+
+/// Runs an image from the slot on recorded observations, in QEMU and on the host, with a reset in the middle; every action must
+/// have the same bits.
+fn same_bits(elf: &Path, bytes: &[u8], dataset: &Dataset) -> Result<()> {
+    let slot = tempfile::NamedTempFile::new()?;
+    fs::write(slot.path(), bytes)?;
+    let buffer = ImageBuffer::new(bytes);
+    let image = buffer.image(slot.path())?;
+    let mut server = Server::start(qemu::command(elf, Some(slot.path()), "serve")?, image.act_len())?;
+    let observations: Vec<Vec<f32>> = (0..dataset.length.len()).flat_map(|e| dataset.episode(e)).take(STEPS).collect();
+    ensure!(observations.len() == STEPS, "too few recorded observations");
+    with_head(image, |head| {
+        for (step, observation) in observations.iter().enumerate() {
+            if step == STEPS / 2 {
+                head.reset();
+                server.reset()?;
+            }
+            let expected = head.step(observation)?;
+            let action = server.step(observation)?;
+            let same = action.iter().zip(expected).all(|(a, b)| a.to_bits() == b.to_bits());
+            ensure!(same, "step {step}: {action:?} in QEMU, {expected:?} on the host");
+        }
+        Ok(())
+    })?;
+    server.finish()
+}
+
+/// All widths with int8 and int16 activations; the build without FPU, which is slower, runs one image.
+fn policy_has_the_same_bits(dir: &Path) -> Result<()> {
+    let policy = Policy::load(dir)?;
+    let dataset = Recording::Heldout.require(Some(dir), None, Sizes::of(&policy), "this test")?;
+    let elf = firmware::application(Target::Fpu)?;
+    for activations in [Activations::Int8, Activations::Int16] {
+        for width in Width::ALL {
+            for group in [0, 32] {
+                let at = || format!("{}: {width:?}, group {group}, {activations:?}", policy.name);
+                same_bits(&elf, &rtn(&policy, width, group, activations)?, &dataset).with_context(at)?;
+            }
+        }
+    }
+    let elf = firmware::application(Target::NoFpu)?;
+    same_bits(&elf, &rtn(&policy, Width::W3, 0, Activations::Int8)?, &dataset).context("without FPU")
+}
+
+#[test]
+fn the_ur3_policy_has_the_same_bits() -> Result<()> {
+    policy_has_the_same_bits(&ur3())
+}
+
+#[test]
+fn shared_policies_have_the_same_bits() -> Result<()> {
+    let Some(policies) = shared_policies() else { return Ok(()) };
+    for name in ["go1_mlp", "g1_lstm256", "fetch_pickplace"] {
+        policy_has_the_same_bits(&policies.join(name))?;
+    }
+    Ok(())
+}
+
+/// Held-out NMSE at 8 bits, round to nearest, as the command quantizes by default.
+#[test]
+fn eight_bits_stay_close_to_the_recorded_actions() -> Result<()> {
+    let mut limits = vec![(ur3(), 1e-3, 2e-3)];
+    if let Some(policies) = shared_policies() {
+        limits.push((policies.join("go1_mlp"), 1e-3, 2e-3));
+        limits.push((policies.join("g1_lstm256"), 1e-3, 3e-3));
+        limits.push((policies.join("fetch_pickplace"), 5e-3, 8e-3));
+    }
+    for (dir, int16, int8) in limits {
+        let policy = Policy::load(&dir)?;
+        for (activations, limit) in [(Activations::Int16, int16), (Activations::Int8, int8)] {
+            let buffer = ImageBuffer::new(&rtn(&policy, Width::W8, 32, activations)?);
+            let image = buffer.image(&dir)?;
+            let report = eval::evaluate(image, &eval::heldout(&dir, &image)?)?;
+            assert!(report.nmse < limit, "{}, {activations:?}: {} against {limit}", policy.name, report.nmse);
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn gptq_beats_rounding_at_low_bits() -> Result<()> {
+    let dir = ur3();
+    let policy = Policy::load(&dir)?;
+    let recordings = Recordings::load(&policy)?;
+    let nmse = |method| -> Result<f64> {
+        let options = Options::new(method, Budget::Width(Width::W3));
+        let buffer = quantize(&policy, &recordings, &options, |_, _| {})?.buffer();
+        let image = buffer.image(&dir)?;
+        Ok(eval::evaluate(image, &eval::heldout(&dir, &image)?)?.nmse)
+    };
+    let (gptq, plain) = (nmse(Method::Gptq)?, nmse(Method::Rtn)?);
+    assert!(gptq < plain / 2.0, "{gptq} against {plain}");
+    Ok(())
+}

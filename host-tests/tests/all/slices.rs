@@ -1,0 +1,301 @@
+//! Steps in pieces on the host: the same bits however they are cut, and what begin, step, poll and reset do to each other.
+
+use std::path::Path;
+use std::task::Poll;
+
+use actq::emit;
+use actq::graph::ops::{Add, Gru, LayerNorm, Linear, Lstm, Normalize, Pointwise, RmsNorm};
+use actq::methods::{Activations, Outcome};
+use actq::policy::Policy;
+use actq::runtime::{ImageBuffer, with_head};
+use actq_bench::golden::Random;
+use actq_bench::networks::Builder;
+use actq_kernels::image::Kind;
+use actq_kernels::math::Function;
+use actq_kernels::{Head, StepError, Width};
+use anyhow::{Context, Result, ensure};
+use proptest::prelude::*;
+
+/// Length of the observations.
+const OBSERVATION: usize = 37;
+/// Steps of a run.
+const STEPS: usize = 7;
+
+/// A network of all operations, with drawn lengths: products with all widths in order and by index, cells, norms, functions.
+fn network(seed: u64) -> Result<(Policy, Vec<Outcome>)> {
+    let mut random = Random(seed);
+    let mut length = |most: usize| 1 + random.below(most);
+    let (rows, hidden, out) = (length(90), length(30), length(5));
+    let (indexed, recurrent, group) = (length(2) == 1, length(3), [0, 32][length(2) - 1]);
+    let activations = [Activations::Int8, Activations::Int16][length(2) - 1];
+    let chunk = length(4);
+    let execute = length(chunk);
+    let mut builder = Builder::new(OBSERVATION);
+    let width = |row: usize| {
+        let which = if indexed { row * 7 % 5 } else { 4 * row / rows };
+        Width::ALL.get(which).copied().or((row == 0).then_some(Width::W2))
+    };
+    let mut last = builder.linear((rows, OBSERVATION), activations, width, group, seed.is_multiple_of(2))?;
+    let [mean, scale] = [builder.values(rows), builder.values(rows)];
+    last = builder.node(Normalize { mean, scale, pre_clip: 4.0, clip: 2.0 }, &[last])?;
+    let kept = last;
+    last = builder.node(Pointwise(Function::ALL[seed as usize % Function::ALL.len()]), &[last])?;
+    last = builder.node(Add, &[last, kept])?;
+    let [weight, bias] = [builder.values(rows), builder.values(rows)];
+    last = builder.node(LayerNorm { weight: weight.clone(), bias, eps: 1e-3 }, &[last])?;
+    last = builder.node(RmsNorm { weight, eps: 1e-3 }, &[last])?;
+    let mut len = rows;
+    let all = |rows: usize| vec![Some(Width::W4); rows];
+    if recurrent == 1 {
+        let input = builder.matrix(4 * hidden, rows, activations, &all(4 * hidden), group)?;
+        let state = builder.matrix(4 * hidden, hidden, activations, &all(4 * hidden), group)?;
+        let bias = builder.values(4 * hidden);
+        last = builder.node(Lstm { hidden, input, state, bias }, &[last])?;
+        len = hidden;
+    } else if recurrent == 2 {
+        let input = builder.matrix(3 * hidden, rows, activations, &all(3 * hidden), group)?;
+        let state = builder.matrix(3 * hidden, hidden, activations, &all(3 * hidden), group)?;
+        let (input_bias, state_bias) = (builder.values(3 * hidden), builder.values(3 * hidden));
+        last = builder.node(Gru { hidden, input, state, input_bias, state_bias }, &[last])?;
+        len = hidden;
+    }
+    let matrix = builder.matrix(chunk * out, len, activations, &all(chunk * out), group)?;
+    let bias = builder.values(chunk * out);
+    builder.node(Linear { matrix, bias }, &[last])?;
+    let (mut policy, outcomes) = builder.finish("slices".to_owned(), false);
+    policy.act_len = out;
+    policy.chunk = chunk;
+    policy.execute = execute;
+    policy.kind = if chunk > 1 { Kind::Chunk } else { Kind::Step };
+    policy.contract.max_step = Some(vec![0.3; out]);
+    Ok((policy, outcomes))
+}
+
+fn on_head<T>(seed: u64, work: impl FnOnce(&mut Head<'_, '_>) -> Result<T>) -> Result<T> {
+    let (policy, outcomes) = network(seed)?;
+    let buffer = ImageBuffer::new(&emit::image(&policy, &outcomes)?);
+    with_head(buffer.image(Path::new("slices"))?, work)
+}
+
+fn observations(seed: u64) -> Vec<Vec<f32>> {
+    let mut random = Random(seed);
+    (0..STEPS).map(|_| (0..OBSERVATION).map(|_| random.normal()).collect()).collect()
+}
+
+fn bits(action: &[f32]) -> Vec<u32> {
+    action.iter().map(|a| a.to_bits()).collect()
+}
+
+fn whole(head: &mut Head<'_, '_>, observations: &[Vec<f32>]) -> Result<Vec<Vec<u32>>> {
+    observations.iter().map(|obs| Ok(bits(head.step(obs)?))).collect()
+}
+
+/// The action in polls whose budgets `budget` gives; and how many those were.
+fn in_polls(head: &mut Head<'_, '_>, obs: &[f32], mut budget: impl FnMut() -> u32) -> Result<(Vec<u32>, usize)> {
+    head.begin(obs)?;
+    for polls in 1..100_000 {
+        if let Poll::Ready(action) = head.poll(budget())? {
+            return Ok((bits(action), polls));
+        }
+    }
+    anyhow::bail!("no action after all these polls")
+}
+
+/// Some polls of a step, which is not finished by them.
+fn part_of_a_step(head: &mut Head<'_, '_>, obs: &[f32], polls: usize) -> Result<()> {
+    let budget = head.image().least_budget();
+    head.begin(obs)?;
+    for _ in 0..polls {
+        ensure!(head.poll(budget)?.is_pending(), "the step is too short for this test");
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    #[test]
+    fn however_a_step_is_cut_its_bits_are_the_same(seed in any::<u64>(), spread in 1u32..20_000) {
+        let observations = observations(seed);
+        let outcome = on_head(seed, |head| {
+            let expected = whole(head, &observations)?;
+            head.reset();
+            let least = head.image().least_budget();
+            let mut random = Random(seed);
+            let mut cut = 0;
+            for (obs, expected) in observations.iter().zip(&expected) {
+                let (action, polls) = in_polls(head, obs, || least + random.below(spread as usize) as u32)?;
+                ensure!(action == *expected, "other bits in polls of {least} and up to {spread} more");
+                cut = cut.max(polls);
+            }
+            // The least budget cuts finest, between operations too.
+            head.reset();
+            for (obs, expected) in observations.iter().zip(&expected) {
+                let (action, polls) = in_polls(head, obs, || least)?;
+                ensure!(action == *expected, "other bits in polls of the least budget, {least}");
+                cut = cut.max(polls);
+            }
+            ensure!(cut > 1, "nothing was cut");
+            Ok(())
+        });
+        prop_assert!(outcome.is_ok(), "{outcome:?}");
+    }
+}
+
+/// A seed whose network has a cell, no chunks, and work for a dozen polls of the least budget; or one without a cell.
+fn seed(recurrent: bool) -> Result<u64> {
+    let suits = |seed: &u64| {
+        on_head(*seed, |head| {
+            let fits = head.image().execute() == 1 && (head.image().state().len > 0) == recurrent;
+            let least = head.image().least_budget();
+            Ok(fits && in_polls(head, &observations(*seed)[0], || least)?.1 > 6)
+        })
+        .unwrap_or(false)
+    };
+    (0..400).find(suits).context("no network suits")
+}
+
+#[test]
+fn ready_stays_ready_until_the_next_begin() -> Result<()> {
+    let seed = seed(true)?;
+    on_head(seed, |head| {
+        let observations = observations(seed);
+        let (action, _) = in_polls(head, &observations[0], || u32::MAX)?;
+        for _ in 0..3 {
+            let Poll::Ready(again) = head.poll(head.image().least_budget())? else { anyhow::bail!("pending") };
+            ensure!(bits(again) == action, "another action without a step");
+        }
+        // The polls in between were no steps.
+        let second = bits(head.step(&observations[1])?);
+        head.reset();
+        ensure!(whole(head, &observations[..2])? == [action, second]);
+        Ok(())
+    })
+}
+
+#[test]
+fn a_poll_without_a_step_is_an_error() -> Result<()> {
+    let seed = seed(true)?;
+    on_head(seed, |head| {
+        assert_eq!(head.poll(u32::MAX), Err(StepError::NotBegun));
+        part_of_a_step(head, &observations(seed)[0], 2)?;
+        head.reset();
+        assert_eq!(head.poll(u32::MAX), Err(StepError::NotBegun), "a reset drops the step");
+        head.infer(&observations(seed)[0])?;
+        assert_eq!(head.poll(u32::MAX), Err(StepError::NotBegun), "infer gives no action");
+        Ok(())
+    })
+}
+
+#[test]
+fn a_budget_below_the_least_changes_nothing() -> Result<()> {
+    let seed = seed(true)?;
+    on_head(seed, |head| {
+        let observations = observations(seed);
+        let expected = whole(head, &observations[..2])?;
+        head.reset();
+        head.step(&observations[0])?;
+        part_of_a_step(head, &observations[1], 2)?;
+        let needed = head.image().least_budget();
+        for given in [0, 1, needed - 1] {
+            assert_eq!(head.poll(given), Err(StepError::Budget { needed, given }));
+        }
+        let Poll::Ready(action) = head.poll(u32::MAX)? else { anyhow::bail!("pending") };
+        ensure!(bits(action) == expected[1], "the refused polls left something behind");
+        Ok(())
+    })
+}
+
+#[test]
+fn a_dropped_step_leaves_nothing_behind() -> Result<()> {
+    // Without a recurrent state, the next action is that of a step that was never begun, step limit and all.
+    let plain = seed(false)?;
+    on_head(plain, |head| {
+        let observations = observations(plain);
+        let expected = whole(head, &observations[..2])?;
+        for polls in 0..5 {
+            head.reset();
+            head.step(&observations[0])?;
+            part_of_a_step(head, &observations[3], polls)?;
+            ensure!(bits(head.step(&observations[1])?) == expected[1], "dropped after {polls} polls");
+        }
+        Ok(())
+    })?;
+    // With one, the state begins anew, where a poll has worked on it.
+    let recurrent = seed(true)?;
+    on_head(recurrent, |head| {
+        let observations = observations(recurrent);
+        let expected = whole(head, &observations[..2])?;
+        head.reset();
+        let fresh = bits(head.infer(&observations[1])?);
+        head.reset();
+        head.step(&observations[0])?;
+        let carried = bits(head.infer(&observations[1])?);
+        ensure!(fresh != carried, "the state does not matter here");
+        for polls in 0..5 {
+            head.reset();
+            head.step(&observations[0])?;
+            part_of_a_step(head, &observations[3], polls)?;
+            if polls == 0 {
+                head.begin(&observations[1])?;
+                let Poll::Ready(action) = head.poll(u32::MAX)? else { anyhow::bail!("pending") };
+                ensure!(bits(action) == expected[1], "a step that nothing was done for took the state");
+            } else {
+                ensure!(bits(head.infer(&observations[1])?) == fresh, "dropped after {polls} polls");
+            }
+        }
+        Ok(())
+    })
+}
+
+#[test]
+fn an_error_resets() -> Result<()> {
+    let seed = seed(true)?;
+    on_head(seed, |head| {
+        let observations = observations(seed);
+        let expected = whole(head, &observations[..1])?;
+        part_of_a_step(head, &observations[2], 3)?;
+        let bad = vec![f32::NAN; OBSERVATION];
+        assert_eq!(head.begin(&bad), Err(StepError::ObservationNotFinite { index: 0 }));
+        assert_eq!(head.poll(u32::MAX), Err(StepError::NotBegun));
+        ensure!(whole(head, &observations[..1])? == expected, "the head was not reset");
+        Ok(())
+    })?;
+    // Finite, and too large for two products: the error comes from a poll.
+    let mut builder = Builder::new(OBSERVATION);
+    let width = |_| Some(Width::W8);
+    let hidden = builder.linear((64, OBSERVATION), Activations::Int8, width, 0, true)?;
+    let matrix = builder.matrix(3, 64, Activations::Int8, &[Some(Width::W8); 3], 0)?;
+    builder.node(Linear { matrix, bias: vec![0.0; 3] }, &[hidden])?;
+    let (policy, outcomes) = builder.finish("overflow".to_owned(), false);
+    let buffer = ImageBuffer::new(&emit::image(&policy, &outcomes)?);
+    with_head(buffer.image(Path::new("overflow"))?, |head| {
+        let observations = observations(1);
+        let expected = whole(head, &observations[..1])?;
+        head.begin(&[f32::MAX; OBSERVATION])?;
+        let least = head.image().least_budget();
+        let error = loop {
+            match head.poll(least) {
+                Ok(Poll::Pending) => {}
+                other => break other.map(|_| ()),
+            }
+        };
+        assert_eq!(error, Err(StepError::NotFinite));
+        assert_eq!(head.poll(u32::MAX), Err(StepError::NotBegun));
+        ensure!(whole(head, &observations[..1])? == expected, "the head was not reset");
+        Ok(())
+    })
+}
+
+#[test]
+fn polls_of_one_operation_end_behind_each() -> Result<()> {
+    let seed = seed(true)?;
+    on_head(seed, |head| {
+        head.begin(&observations(seed)[0])?;
+        for op in 0..head.image().op_count() {
+            ensure!(head.poll_op(u32::MAX)?.is_pending(), "ready before operation {op}");
+        }
+        ensure!(head.poll_op(u32::MAX)?.is_ready(), "not ready behind the last operation");
+        Ok(())
+    })
+}

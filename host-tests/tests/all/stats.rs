@@ -1,0 +1,455 @@
+//! Statistics of an image, the widths that `actq inspect` shows, the search for the fewest bits, and the sweep's files.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::Output;
+
+use actq::budget::Budget;
+use actq::data::Recordings;
+use actq::graph::Evaluator;
+use actq::methods::Method;
+use actq::methods::Options;
+use actq::pipeline::quantize;
+use actq::pipeline::stats::{AllocationRecord, MatrixRecord, Stats};
+use actq::policy::Policy;
+use actq_bench::command::{actq, all, failed, run, succeeded};
+use actq_bench::golden::Random;
+use actq_bench::{root, ur3};
+use anyhow::{Context, Result, ensure};
+use ndarray::Array3;
+use ndarray_npy::NpzWriter;
+use safetensors::Dtype;
+use safetensors::tensor::{TensorView, serialize};
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+const OBS: usize = 16;
+const HIDDEN: usize = 40;
+const ACT: usize = 3;
+/// Rows of the first matrix that give next to nothing.
+const IDLE: [usize; 3] = [3, 11, 30];
+
+/// A policy 16 -> 40 tanh -> 40 tanh -> 3 with recordings, and a place for files.
+struct Fixture(TempDir);
+
+impl Fixture {
+    fn new() -> Result<Self> {
+        let fixture = Self(TempDir::new()?);
+        let dir = fixture.policy();
+        fs::create_dir(&dir)?;
+        let linear = |name| json!({"op": "linear", "w": name});
+        let ops = [linear("first"), json!({"op": "tanh"}), linear("second"), json!({"op": "tanh"}), linear("last")];
+        let json = json!({
+            "name": "small leg", "kind": "step", "obs_dim": OBS, "act_dim": ACT, "control_hz": 50, "ops": ops,
+        });
+        fs::write(dir.join("policy.json"), json.to_string())?;
+        let mut random = Random(4);
+        let mut matrix = |rows: usize, cols: usize| -> Vec<f32> {
+            (0..rows * cols).map(|_| random.unit() * (3.0 / cols as f32).sqrt()).collect()
+        };
+        let (mut first, second, last) = (matrix(HIDDEN, OBS), matrix(HIDDEN, HIDDEN), matrix(ACT, HIDDEN));
+        for row in IDLE {
+            first[row * OBS..][..OBS].iter_mut().for_each(|w| *w *= 1e-3);
+        }
+        let bytes = |data: Vec<f32>| data.into_iter().flat_map(f32::to_le_bytes).collect::<Vec<u8>>();
+        let tensors = [("first", HIDDEN, OBS, first), ("second", HIDDEN, HIDDEN, second), ("last", ACT, HIDDEN, last)]
+            .map(|(name, rows, cols, data)| (name, vec![rows, cols], bytes(data)));
+        let views =
+            tensors.iter().map(|(name, shape, data)| Ok((*name, TensorView::new(Dtype::F32, shape.clone(), data)?)));
+        fs::write(dir.join("policy.safetensors"), serialize(views.collect::<Result<Vec<_>>>()?, None)?)?;
+        let policy = Policy::load(&dir)?;
+        for (name, seed) in [("calib.npz", 5), ("heldout.npz", 6)] {
+            let mut random = Random(seed);
+            let obs = Array3::from_shape_simple_fn((2, 150, OBS), || 2.0 * random.unit());
+            let mut evaluator = Evaluator::new(&policy.graph);
+            let actions = obs.rows().into_iter().flat_map(|row| evaluator.step(&row.to_vec(), &mut |_, _| {}));
+            let action = Array3::from_shape_vec((2, 150, ACT), actions.collect())?;
+            let mut npz = NpzWriter::new(File::create(dir.join(name))?);
+            npz.add_array("obs", &obs)?;
+            npz.add_array("action", &action)?;
+            npz.finish()?;
+        }
+        Ok(fixture)
+    }
+
+    fn policy(&self) -> PathBuf {
+        self.path("policy")
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// Runs a command, its arguments separated by spaces, in the fixture's folder.
+    fn actq(&self, line: &str) -> Result<Output> {
+        let mut command = actq(&[]);
+        command.current_dir(self.0.path()).args(line.split_whitespace());
+        run(command, b"")
+    }
+
+    fn quantize(&self, options: &str) -> Result<Output> {
+        self.actq(&format!("quantize policy {options}"))
+    }
+
+    /// An image `NAME.actq` and its statistics `NAME.json`.
+    fn image(&self, name: &str, options: &str) -> Result<Value> {
+        succeeded(&self.quantize(&format!("--out {name}.actq --save-stats {name}.json {options}"))?)?;
+        Ok(serde_json::from_slice(&fs::read(self.path(&format!("{name}.json")))?)?)
+    }
+
+    fn nmse(&self, image: &str) -> Result<f64> {
+        let report: Value =
+            serde_json::from_str(&succeeded(&self.actq(&format!("eval {image} --policy policy --json"))?)?)?;
+        report["nmse"].as_f64().context("nmse")
+    }
+
+    fn files(&self) -> Result<Vec<PathBuf>> {
+        let mut files = fs::read_dir(self.0.path())?.map(|e| Ok(e?.path())).collect::<Result<Vec<_>>>()?;
+        files.sort();
+        Ok(files)
+    }
+}
+
+fn parsed(value: &Value) -> Result<Stats> {
+    Ok(serde_json::from_value(value.clone())?)
+}
+
+fn allocation(matrix: &MatrixRecord) -> Result<&AllocationRecord> {
+    matrix.allocation.as_ref().with_context(|| format!("{} has no allocation", matrix.name))
+}
+
+#[test]
+fn statistics_add_up_to_the_image_and_explain_its_widths() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let image = fixture.path("ur3.actq");
+    let (image, file) = (image.display().to_string(), fixture.path("ur3.json"));
+    let policy = ur3().display().to_string();
+    let options = ["--bpw", "2", "--steps", "2", "--seed", "7"];
+    let mut command = actq(&["quantize", &policy, "--out", &image, "--save-stats", &file.display().to_string()]);
+    command.args(options);
+    let said = succeeded(&run(command, b"")?)?;
+    let stats = parsed(&serde_json::from_slice(&fs::read(&file)?)?)?;
+    assert_eq!((stats.policy.as_str(), stats.method.as_str()), ("ur3_reach", "best"));
+    assert_eq!((stats.seed, stats.steps, stats.bytes as u64), (7, 2, fs::metadata(&image)?.len()));
+    let weights: usize = stats.matrices.iter().map(|m| m.rows * m.cols).sum();
+    let bytes: usize = stats.matrices.iter().map(|m| m.bytes).sum();
+    assert!((stats.bpw - 8.0 * bytes as f64 / weights as f64).abs() < 1e-9);
+    for matrix in &stats.matrices {
+        // Padding and block records are all that bits leave out; most where there are 18 columns.
+        let (bits, least) = (matrix.bits.iter().sum::<usize>(), if matrix.cols == 18 { 0.7 } else { 0.9 });
+        let share = bits as f64 / (8.0 * matrix.bytes as f64);
+        ensure!(share > least && share < 1.0, "{bits} bits in {} bytes", matrix.bytes);
+        let allocation = allocation(matrix)?;
+        // A width costs the same share of every row's energy, and wider ones less.
+        let mut shares: BTreeMap<u32, f64> = BTreeMap::new();
+        for (r, &width) in matrix.widths.iter().enumerate() {
+            let expected = allocation.expected[r];
+            if width == 0 {
+                assert_eq!((expected, matrix.bits[r]), (allocation.removal[r], 0));
+                continue;
+            }
+            let share = expected / allocation.energy[r];
+            let known = *shares.entry(width).or_insert(share);
+            ensure!((share / known - 1.0).abs() < 1e-9, "{share} and {known} at {width} bits");
+        }
+        ensure!(shares.values().is_sorted_by(|a, b| a > b), "{shares:?}");
+        ensure!(allocation.importance.iter().all(|h| *h > 0.0));
+    }
+    // No hidden vector of this policy may be permuted, so rows are where they were; without bits is not removed.
+    let without: usize = stats.matrices.iter().flat_map(|m| &m.widths).filter(|w| **w == 0).count();
+    ensure!(stats.matrices.iter().all(|m| m.image_rows.iter().copied().eq(0..m.rows)));
+    ensure!(without > 0 && said.contains(&format!("rows: {without} without bits (block.0.fc.weight")), "{said}");
+    ensure!(!said.contains("removed") && said.contains("\nTook "), "{said}");
+    Ok(())
+}
+
+#[test]
+fn image_rows_are_the_policys_rows() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let policy = Policy::load(&fixture.policy())?;
+    let options = Options { steps: Some(2), ..Options::new(Method::Best, Budget::BitsPerWeight(4.0)) };
+    let outcomes = quantize(&policy, &Recordings::load(&policy)?, &options, |_, _| {})?.outcomes;
+    let mut removed = Vec::new();
+    for (source, outcome) in policy.graph.matrices.iter().zip(&outcomes) {
+        let allocation = outcome.allocation.as_ref().context("an allocation")?;
+        let values = outcome.quantized.dequantized();
+        for (row, &from) in values.chunks_exact(outcome.quantized.cols).zip(&allocation.rows) {
+            let trained: Vec<f32> = allocation.columns.iter().map(|&c| source.data[from * source.cols + c]).collect();
+            let dot = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>();
+            let cosine = dot(row, &trained) / (dot(row, row) * dot(&trained, &trained)).sqrt();
+            ensure!(cosine > 0.8, "{}: row {from} is another one, cosine {cosine}", source.name);
+        }
+        removed.push((0..source.rows).filter(|r| !allocation.rows.contains(r)).collect::<Vec<_>>());
+    }
+    ensure!(IDLE.iter().all(|r| removed[0].contains(r)), "{removed:?} are gone");
+    ensure!(removed[2].is_empty() && outcomes[0].quantized.rows == HIDDEN - removed[0].len());
+    Ok(())
+}
+
+#[test]
+fn every_method_saves_what_it_knows() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let same = |a: f64, b: f64| (a - b).abs() <= 1e-9 * a.abs().max(1.0);
+    for method in ["rtn", "gptq", "actquant"] {
+        let value = fixture.image(method, &format!("--method {method} --bpw 6"))?;
+        assert_eq!(value["budget"], json!({"bits_per_weight": 6.0}));
+        let stats = parsed(&value)?;
+        assert_eq!((stats.method.as_str(), stats.steps), (method, 0));
+        for matrix in &stats.matrices {
+            ensure!(matrix.error.is_some_and(|e| e > 0.0 && e < 0.2) && matrix.allocation.is_none());
+            ensure!(matrix.widths.iter().all(|w| *w == matrix.widths[0]) && matrix.widths.len() == matrix.rows);
+            assert_eq!(matrix.score.is_some(), method == "actquant");
+            if let Some(s) = matrix.score {
+                ensure!(same(s.sens, s.f_output - s.f_input) && same(s.f_input, s.y_input - s.x_input), "{s:?}");
+            }
+        }
+    }
+    assert_eq!(fixture.image("width", "--method gptq --bits 3")?["budget"], json!({"width": 3}));
+    assert_eq!(fixture.image("flash", "--method gptq --flash 4K")?["budget"], json!({"image_bytes": 4096}));
+    Ok(())
+}
+
+#[test]
+fn inspect_shows_a_character_and_a_colour_for_every_row() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let stats = parsed(&fixture.image("leg", "--bpw 4 --steps 2")?)?;
+    let plain = succeeded(&fixture.actq("inspect leg.actq --widths --svg plain.svg")?)?;
+    let full = succeeded(&fixture.actq("inspect leg.actq --widths --stats leg.json --svg full.svg")?)?;
+    let strips = |text: &str| -> Vec<String> {
+        let strip = |line: &&str| line.starts_with("  ") && !line.trim().contains(|c: char| !".2348".contains(c));
+        text.lines().filter(strip).map(|line| line.trim().to_owned()).collect()
+    };
+    let letter = |width: &u32| if *width == 0 { '.' } else { char::from_digit(*width, 10).unwrap_or('?') };
+    let trained: Vec<String> = stats.matrices.iter().map(|m| m.widths.iter().map(letter).collect()).collect();
+    assert_eq!(strips(&full), trained);
+    ensure!(IDLE.iter().all(|r| trained[0].as_bytes()[*r] == b'.'), "{trained:?}");
+    let in_image =
+        stats.matrices.iter().map(|m| m.image_rows.iter().map(|r| letter(&m.widths[*r])).collect::<String>());
+    assert_eq!(strips(&plain), in_image.collect::<Vec<_>>());
+    ensure!(
+        plain.contains("matrix 0") && !plain.contains("energy") && full.contains("first") && full.contains("energy")
+    );
+    // Shares are of the whole, so they add up.
+    let shares = |text: &str, column: usize| -> f64 {
+        let cells = text.lines().filter_map(|line| line.split_whitespace().filter(|c| c.ends_with('%')).nth(column));
+        cells.filter_map(|c| c.trim_end_matches('%').parse::<f64>().ok()).sum()
+    };
+    for (text, column) in [(&plain, 0), (&full, 0), (&full, 1)] {
+        ensure!((shares(text, column) - 100.0).abs() < 1.0, "{} in\n{text}", shares(text, column));
+    }
+    for (name, lines) in [("plain.svg", 0), ("full.svg", 3)] {
+        let svg = fs::read_to_string(fixture.path(name))?;
+        ensure!(svg.ends_with("</svg>\n") && !svg.contains("NaN") && !svg.contains("inf"), "{svg}");
+        assert_eq!(svg.matches("<polyline").count(), lines);
+        // What a strip's colours cover is its whole width.
+        let width = |line: &str| line.split("width=\"").nth(1)?.split('"').next()?.parse::<f64>().ok();
+        let coloured = svg.lines().filter(|l| l.contains("height=\"22.0\" fill=\"#")).filter_map(width).sum::<f64>();
+        ensure!((coloured - 3.0 * 648.0).abs() < 1.0, "{coloured} in {name}");
+    }
+    Ok(())
+}
+
+#[test]
+fn statistics_of_another_image_are_refused() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let good = fixture.image("one", "--bits 3 --method gptq")?;
+    fixture.image("two", "--bits 4 --method gptq")?;
+    let write = |name: &str, value: &Value| fs::write(fixture.path(name), value.to_string());
+    let edited = |pointer: &str, to: Value| {
+        let mut value = good.clone();
+        value.pointer_mut(pointer).map(|place| *place = to).with_context(|| pointer.to_owned())?;
+        Ok::<_, anyhow::Error>(value)
+    };
+    write("schema.json", &edited("/schema", json!("actq-stats-0"))?)?;
+    write("none.json", &json!([1, 2]))?;
+    write("short.json", &edited("/matrices/1/widths", json!([3, 3]))?)?;
+    write("widths.json", &edited("/matrices/1/widths/5", json!(8))?)?;
+    write("rows.json", &edited("/matrices/1/image_rows/0", json!(1000))?)?;
+    write("fewer.json", &edited("/matrices", json!([good["matrices"][0]]))?)?;
+    write("text.json", &edited("/matrices/0/bytes", json!("many"))?)?;
+    fs::write(fixture.path("cut.json"), &good.to_string()[..300])?;
+    let before = fixture.files()?;
+    let cases: [(&str, &[&str]); 10] = [
+        ("two", &["two.json", "another image", "crc32"]),
+        ("gone", &["gone.json", "cannot be read"]),
+        ("schema", &["schema.json", "actq-stats-0", "actq-stats-1"]),
+        ("none", &["none.json", "schema"]),
+        ("short", &["short.json", "second"]),
+        ("widths", &["second", "widths"]),
+        ("rows", &["rows.json", "second"]),
+        ("fewer", &["1 matrices", "3"]),
+        ("text", &["text.json", "actq-stats-1"]),
+        ("cut", &["cut.json", "JSON"]),
+    ];
+    all(cases.map(|(name, words)| {
+        let line = format!("inspect one.actq --widths --stats {name}.json --svg {name}.svg");
+        let refused = fixture.actq(&line).and_then(|output| {
+            ensure!(output.stdout.is_empty(), "something is printed");
+            failed(&output, 1, words)
+        });
+        (name.to_owned(), refused)
+    }))?;
+    assert_eq!(fixture.files()?, before);
+    failed(&fixture.actq("inspect one.actq --stats one.json")?, 2, &["widths"])?;
+    failed(&fixture.actq("inspect one.actq --widths --svg none/one.svg")?, 1, &["none/one.svg"])
+}
+
+#[test]
+fn image_and_statistics_are_written_both_or_not_at_all() -> Result<()> {
+    let fixture = Fixture::new()?;
+    fs::create_dir(fixture.path("folder"))?;
+    let before = fixture.files()?;
+    let cases = [("x.actq", "none/x.json"), ("x.actq", "folder"), ("none/x.actq", "x.json"), ("folder", "x.json")];
+    all(cases.map(|(image, stats)| {
+        let wrong = if image == "x.actq" { stats } else { image };
+        let output = fixture.quantize(&format!("--bits 3 --method rtn --out {image} --save-stats {stats}"));
+        (format!("{image} {stats}"), output.and_then(|output| failed(&output, 1, &[wrong, "cannot be written"])))
+    }))?;
+    failed(&fixture.quantize("--bits 3 --method rtn --out x.actq --save-stats x.actq")?, 1, &["x.actq"])?;
+    assert_eq!(fixture.files()?, before);
+    Ok(())
+}
+
+#[test]
+fn the_fewest_bits_keep_the_error() -> Result<()> {
+    let fixture = Fixture::new()?;
+    for method in ["rtn", "gptq", "actquant"] {
+        let value = fixture.image("fewest", &format!("--method {method} --max-nmse 0.02"))?;
+        assert_eq!(value["budget"], json!({"max_nmse": 0.02}));
+        let nmse = fixture.nmse("fewest.actq")?;
+        ensure!(nmse <= 0.02, "{method}: {nmse}");
+        // The same bytes as with the budget itself; a tenth of a bit less is too few.
+        let said = succeeded(&fixture.quantize(&format!("--out again.actq --method {method} --max-nmse 0.02"))?)?;
+        let line = said.lines().find(|l| l.contains("keep the error within 0.02")).context("no result")?;
+        let budget: f64 = line.split_whitespace().next().context("no budget")?.parse()?;
+        let less = budget - 0.1;
+        ensure!(line.contains(&format!("{less:.1} is too few")), "{line}");
+        fixture.image("same", &format!("--method {method} --bpw {budget:.1}"))?;
+        let image = fs::read(fixture.path("fewest.actq"))?;
+        ensure!(image == fs::read(fixture.path("again.actq"))? && image == fs::read(fixture.path("same.actq"))?);
+        fixture.image("less", &format!("--method {method} --bpw {less:.1}"))?;
+        ensure!(fixture.nmse("less.actq")? > 0.02, "{method}: {less} bits are enough");
+    }
+    Ok(())
+}
+
+/// The steps of every try, from the table of tries.
+fn steps_tried(said: &str) -> Vec<&str> {
+    let cells = said.lines().skip(1).map(|line| line.split_whitespace().nth(1));
+    cells.map_while(|steps| steps).collect()
+}
+
+#[test]
+fn a_method_that_learns_looks_with_few_steps_and_ends_with_all() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let options = "--method best --steps 40 --max-nmse 0.05";
+    let said = succeeded(&fixture.quantize(&format!("--out a.actq {options}"))?)?;
+    let steps = steps_tried(&said);
+    let looks = steps.iter().take_while(|s| **s == "5").count();
+    ensure!((1..=6).contains(&looks) && (1..=5).contains(&(steps.len() - looks)), "{said}");
+    ensure!(steps[looks..].iter().all(|s| *s == "40"), "{said}");
+    ensure!(fixture.nmse("a.actq")? <= 0.05, "{said}");
+    succeeded(&fixture.quantize(&format!("--out b.actq {options} --threads 1"))?)?;
+    ensure!(fs::read(fixture.path("a.actq"))? == fs::read(fixture.path("b.actq"))?, "two runs differ");
+    // Without steps there is nothing to take an eighth of.
+    let said = succeeded(&fixture.quantize("--out c.actq --method best --steps 0 --max-nmse 0.3")?)?;
+    let steps = steps_tried(&said);
+    ensure!(!steps.is_empty() && steps.iter().all(|s| *s == "0"), "{said}");
+    ensure!(fixture.nmse("c.actq")? <= 0.3, "{said}");
+    Ok(())
+}
+
+#[test]
+fn an_error_that_eight_bits_do_not_reach_is_an_error() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let before = fixture.files()?;
+    for method in ["gptq", "best --steps 2"] {
+        let output =
+            fixture.quantize(&format!("--out x.actq --save-stats x.json --method {method} --max-nmse 1e-12"))?;
+        failed(&output, 1, &["8 bits", "0.000000000001", "lowest", "NMSE"])?;
+    }
+    for other in ["--bits 3", "--bpw 3", "--flash 20K"] {
+        failed(&fixture.quantize(&format!("--out x.actq --max-nmse 0.1 {other}"))?, 2, &["--max-nmse"])?;
+    }
+    for wrong in ["0", "-1", "nan", "few"] {
+        failed(&fixture.quantize(&format!("--out x.actq --max-nmse={wrong}"))?, 2, &["max-nmse"])?;
+    }
+    assert_eq!(fixture.files()?, before);
+    Ok(())
+}
+
+#[test]
+fn without_a_held_out_recording_the_error_is_that_of_calibration() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let options = "--out x.actq --method rtn --max-nmse 0.02";
+    ensure!(succeeded(&fixture.quantize(options)?)?.contains("Measured on heldout.npz."));
+    fs::remove_file(fixture.policy().join("heldout.npz"))?;
+    ensure!(succeeded(&fixture.quantize(options)?)?.contains("Measured on calib.npz"));
+    // It is what eval says of that recording.
+    fs::rename(fixture.policy().join("calib.npz"), fixture.policy().join("heldout.npz"))?;
+    let nmse = fixture.nmse("x.actq")?;
+    ensure!(nmse <= 0.02, "{nmse}");
+    fs::remove_file(fixture.policy().join("heldout.npz"))?;
+    failed(&fixture.quantize(options)?, 1, &["recorded observations", "heldout.npz"])
+}
+
+#[test]
+fn a_sweep_of_two_policies_keeps_allocations_and_scores() -> Result<()> {
+    let (fixture, other) = (Fixture::new()?, Fixture::new()?);
+    fs::rename(other.policy(), fixture.path("other"))?;
+    let line =
+        "sweep policy other --bpw 2.5,3.5,5 --methods actquant,best --steps 3 --threads 2 --json s.json --svg s.svg";
+    let said = succeeded(&fixture.actq(line)?)?;
+    let value: Value = serde_json::from_slice(&fs::read(fixture.path("s.json"))?)?;
+    assert_eq!(value.as_array().map(Vec::len), Some(2));
+    let stars = |v: &Value| usize::from(!v["knee"].is_null());
+    let rows = [HIDDEN, HIDDEN, ACT];
+    for sweep in value.as_array().context("no array")? {
+        for curve in sweep["curves"].as_array().context("curves")? {
+            assert_eq!(curve["scores"].as_array().map(Vec::len), (curve["method"] == "actquant").then_some(3));
+            for point in curve["points"].as_array().context("points")?.iter().filter(|p| !p.is_null()) {
+                let counts: Vec<BTreeMap<u32, usize>> = serde_json::from_value(point["rows"].clone())?;
+                assert_eq!(counts.iter().map(|c| c.values().sum::<usize>()).collect::<Vec<_>>(), rows);
+            }
+        }
+    }
+    assert_eq!(value[0], value[1], "the same policy in two folders");
+    let marked = said.lines().filter(|l| !l.starts_with('*')).map(|l| l.matches('*').count()).sum::<usize>();
+    assert_eq!(marked, stars(&value[0]) + stars(&value[1]), "{said}");
+    assert_eq!(fs::read_to_string(fixture.path("s.svg"))?.matches("<polyline").count(), 4);
+    let seed = |n: u32| -> Result<Value> {
+        succeeded(&fixture.actq(&format!("sweep policy --bpw 4 --methods best --steps 3 --seed {n} --json t.json"))?)?;
+        Ok(serde_json::from_slice(&fs::read(fixture.path("t.json"))?)?)
+    };
+    let (one, again, two) = (seed(1)?, seed(1)?, seed(2)?);
+    ensure!(one == again && one != two, "the seed does not reach the images");
+    Ok(())
+}
+
+/// The words of the documented schema, so that the two cannot drift apart.
+#[test]
+fn every_field_is_documented() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let text = fs::read_to_string(Path::new(root()).join("docs/QUANTIZER.md"))?;
+    let mut values = vec![
+        fixture.image("best", "--bpw 4 --steps 2")?,
+        fixture.image("actquant", "--bpw 6 --method actquant")?,
+        fixture.image("width", "--bits 3 --method rtn")?,
+        fixture.image("bytes", "--flash 4K --method rtn")?,
+        fixture.image("error", "--max-nmse 0.1 --method rtn")?,
+    ];
+    let mut missing = Vec::new();
+    while let Some(value) = values.pop() {
+        match value {
+            Value::Object(map) => {
+                missing.extend(map.keys().filter(|key| !text.contains(&format!("`{key}`"))).cloned());
+                values.extend(map.into_iter().map(|(_, v)| v));
+            }
+            Value::Array(array) if array.first().is_some_and(Value::is_object) => values.extend(array),
+            _ => {}
+        }
+    }
+    ensure!(missing.is_empty(), "not in docs/QUANTIZER.md: {missing:?}");
+    Ok(())
+}

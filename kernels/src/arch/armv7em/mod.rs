@@ -1,0 +1,78 @@
+//! The GEMV in Armv7E-M assembler (Cortex-M4 and M7): SMLAD makes two MACs a cycle, four with paired lanes.
+//!
+//! `single.s` holds one loop nest, stamped over the four layouts of single lanes; the layouts of paired lanes have a file
+//! each, with a kernel for row scales and one for group scales. All compute exactly what [`super::portable`] computes; the tests
+//! run both on the same data.
+//!
+//! SMLAD sets the Q flag; the procedure call standard lets a call change it.
+
+mod table;
+
+use core::arch::global_asm;
+
+use self::table::kernels;
+use super::Product;
+use crate::layout::QUAD;
+
+global_asm!(include_str!("single.s"), options(raw));
+global_asm!(include_str!("paired_w2.s"), options(raw));
+global_asm!(include_str!("paired_w3.s"), options(raw));
+global_asm!(include_str!("paired_w4.s"), options(raw));
+global_asm!(include_str!("paired_w8.s"), options(raw));
+global_asm!(include_str!("vector.s"), options(raw));
+
+/// As [`crate::arch::gemv`].
+#[inline(always)]
+pub fn gemv(Product { block, x, first_row, acc }: Product<'_>) {
+    let [kernel, four] = kernels(block.shape());
+    let layout = x.plan().layout;
+    let strips = acc.len() >> layout.strip_log;
+    let rows = strips << layout.strip_log;
+    let rest = acc.len() - rows;
+    let told = x.plan().told();
+    // SAFETY: the rows from `first_row` on, as many as `acc` has, are rows of the block or of its padding: that is what `Product::new` checks,
+    // as is that `first_row` is a multiple of 8, so that a strip begins there. A block has the words of all of its rows
+    // (`Block::leading`). Each call reads the words of its strips and writes as many sums. It reads the prepared vector from its
+    // begin to `end`, and the sums of x that stand behind where the layout has sums; both are in the vector,
+    // because it was prepared for a block of this shape (`Plan::of`). The slices are of u32 and i32, so every address is a
+    // multiple of 4, as LDM and LDRD demand.
+    unsafe {
+        let weights = block.words().as_ptr().add(first_row / QUAD * block.quad_words());
+        let (x, acc) = (x.words().as_ptr(), acc.as_mut_ptr());
+        let end = x.add(told.end);
+        if strips > 0 {
+            kernel(weights, x, acc, strips, end, told.extra, told.skip);
+        }
+        if rest > 0 {
+            let weights = weights.add(rows / QUAD * block.quad_words());
+            four(weights, x, acc.add(rows), 1, end, told.extra, told.skip);
+        }
+    }
+}
+
+unsafe extern "C" {
+    fn actq_magnitude(x: *const f32, len: usize) -> u32;
+    fn actq_copy(from: *const u32, to: *mut u32, len: usize);
+}
+
+/// `to = from`, as far as both go.
+#[inline(always)]
+pub fn copy(from: &[u32], to: &mut [u32]) {
+    let len = from.len().min(to.len());
+    if len > 0 {
+        // SAFETY: both hold at least `len` words, and do not overlap, because one of them is borrowed mutably.
+        unsafe { actq_copy(from.as_ptr(), to.as_mut_ptr(), len) }
+    }
+}
+
+/// The bits of the largest magnitude.
+pub fn magnitude(x: &[f32]) -> u32 {
+    let (eights, rest) = x.split_at(x.len() & !7);
+    let largest = if eights.is_empty() {
+        0
+    } else {
+        // SAFETY: the length is that of the slice, a multiple of 8 and not 0.
+        unsafe { actq_magnitude(eights.as_ptr(), eights.len()) >> 1 }
+    };
+    rest.iter().fold(largest, |m, v| m.max(v.to_bits() & 0x7fff_ffff))
+}

@@ -1,0 +1,128 @@
+//! What converts from and to f32, in assembler for the FPU of a Cortex-M4 or M7: the arithmetic of [`super::portable`], operation for
+//! operation.
+
+mod table;
+
+use core::arch::global_asm;
+use core::ops::Range;
+use core::ptr::NonNull;
+use core::slice;
+
+use self::table::quantizer;
+use super::integers::copy;
+use crate::layout::XLayout;
+use crate::math::{EXP, QUARTER, exp2_constants};
+use crate::round::ROUND;
+use crate::x::Plan;
+
+global_asm!(include_str!("vector.s"), options(raw));
+global_asm!(include_str!("cells.s"), options(raw));
+
+unsafe extern "C" {
+    fn actq_sqrt(x: f32) -> f32;
+    fn actq_lstm(gates: *const f32, row: usize, c: *mut f32, h: *mut f32, len: usize, cell: &[f32; 6]);
+    fn actq_gru(a: *const f32, b: *const f32, row: usize, h: *mut f32, len: usize, cell: &[f32; 6]);
+    fn actq_scale_add(x_scale: f32, sums: *const i32, scales: *const u32, start: *const f32, y: *mut f32, len: usize);
+}
+
+/// Quantizes `x` by the plan to the first words of `out`; `None`, with nothing done, where that is shorter than
+/// [`Plan::room`].
+#[inline(always)]
+pub fn quantize(x: &[f32], inverse: f32, plan: &Plan, out: &mut [u32]) -> Option<()> {
+    let room = out.get_mut(..plan.room(x.len()))?;
+    let (out, words) = (room.as_mut_ptr(), room.len());
+    let (x, inverse) = if x.len() == plan.padded {
+        (NonNull::from(x).cast(), inverse)
+    } else {
+        // SAFETY: the room has so many words.
+        unsafe { filled(x, inverse, plan, out, words)? }
+    };
+    let XLayout { shift, chunk, starts: [start, second], .. } = plan.layout.x;
+    let (kernel, first, eights) = (quantizer(shift), plan.first / 8, chunk / 8);
+    let (x, bias, factor, second) = (x.as_ptr(), start.bias, start.factor, second.factor);
+    // SAFETY: x is the plan's padded columns, the caller's or a copy at the end of the room, and the room has at least the plan's
+    // words. What is written never reaches what is still to be read of the copy: behind `n` of its columns those are `n / 2` words
+    // and start words and sums, of which there are as many in all as words before the copy. `of_valid` makes all counts 1 or more
+    // and all lengths multiples of 8 columns. The kernel reads eight columns before it writes them. It writes as many start words
+    // and sums as the layout has, which `table` asserts, and where it takes eight columns for a chunk, that is the layout's limit
+    // and so `first` and `eights`.
+    unsafe {
+        let (groups, chunks, group) = (plan.groups, plan.chunks, plan.shape.group);
+        kernel(inverse, ROUND, x, out, groups, chunks, first, eights, bias, factor, second, group);
+    }
+    Some(())
+}
+
+/// A copy, at the end of the room, of a vector that does not fill its groups, with zeros that do. (And `inverse` as it is, so that
+/// no register has to hold it meanwhile.)
+///
+/// # Safety
+///
+/// The room has so many words.
+#[cold]
+#[inline(never)]
+unsafe fn filled(x: &[f32], inverse: f32, plan: &Plan, room: *mut u32, words: usize) -> Option<(NonNull<f32>, f32)> {
+    let at = words.checked_sub(plan.padded)?;
+    // SAFETY: these are the last of the room's words.
+    let (copied, padded) = unsafe {
+        let copied = room.add(at);
+        (copied, slice::from_raw_parts_mut(copied, plan.padded))
+    };
+    copy(bytemuck::must_cast_slice(x), padded);
+    padded.iter_mut().skip(x.len()).for_each(|word| *word = 0);
+    Some((NonNull::new(copied)?.cast(), inverse))
+}
+
+/// `y[i] = start[i] + sum[i] * (scale[i] * x_scale)`, with two bf16 scales a word; what is `None` stands in y, the sums with
+/// their bits. As far as the shortest goes.
+#[inline(never)]
+pub fn scale(sums: Option<&[i32]>, start: Option<&[u32]>, scales: &[u32], x_scale: f32, y: &mut [f32]) {
+    let len = y.len().min(2 * scales.len());
+    let len = len.min(sums.map_or(len, <[_]>::len)).min(start.map_or(len, <[_]>::len));
+    let to = y.as_mut_ptr();
+    let sums = sums.map_or(to.cast_const().cast(), <[_]>::as_ptr);
+    let start = start.map_or(to.cast_const(), |start| start.as_ptr().cast());
+    // SAFETY: all operands hold at least `len` values; no place in `y` is written before what stands there was read.
+    unsafe { actq_scale_add(x_scale, sums, scales.as_ptr(), start, to, len) }
+}
+
+/// What the cells take: the factors of x for `e^x` and `e^(2 x)`, and what rounds in these units, p1, p0 and q0.
+static CELL: [f32; 6] = {
+    let [round, p1, p0, q0] = exp2_constants(QUARTER);
+    [EXP, 2.0 * EXP, round, p1, p0, q0]
+};
+
+/// Some elements of [`crate::recurrent::lstm_cell`].
+pub fn lstm_elements(elements: Range<usize>, gates: &[f32], c: &mut [f32], h: &mut [f32]) {
+    let (Range { start, end }, n) = (elements, h.len());
+    if start >= end || end > n || end > c.len() || gates.len() < 3 * n + end {
+        return;
+    }
+    // SAFETY: of `gates`, the kernel reads the elements of four rows of n values, the last up to `3 n + end`, which is no more
+    // than there are (n values take less than half of the memory: 4 n is no overflow). Of `c` and `h` it reads and writes the
+    // elements, which both have. There is at least one.
+    unsafe {
+        let (c, h) = (c.as_mut_ptr().add(start), h.as_mut_ptr().add(start));
+        actq_lstm(gates.as_ptr().add(start), size_of::<f32>() * n, c, h, end - start, &CELL);
+    }
+}
+
+/// Some elements of [`crate::recurrent::gru_cell`].
+pub fn gru_elements(elements: Range<usize>, a: &[f32], b: &[f32], h: &mut [f32]) {
+    let (Range { start, end }, n) = (elements, h.len());
+    if start >= end || end > n || a.len().min(b.len()) < 2 * n + end {
+        return;
+    }
+    // SAFETY: as for [`lstm_elements`], with three rows of `a` and of `b`.
+    unsafe {
+        let (a, b, h) = (a.as_ptr().add(start), b.as_ptr().add(start), h.as_mut_ptr().add(start));
+        actq_gru(a, b, size_of::<f32>() * n, h, end - start, &CELL);
+    }
+}
+
+/// The FPU's square root, which is correctly rounded as IEEE 754 has it.
+#[inline(always)]
+pub fn sqrt(x: f32) -> f32 {
+    // SAFETY: a function of one register.
+    unsafe { actq_sqrt(x) }
+}

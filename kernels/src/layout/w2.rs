@@ -1,0 +1,52 @@
+//! 2-bit codes, single lanes: one word holds 16 columns of a row, exactly 2 bits a weight.
+//!
+//! Columns pair up for SMLAD: pair `j` is columns `2j` (low lane) and `2j + 1` (high lane). Its codes stand at bits
+//! `2j + 1` and `2j + 17` of a 32-bit ring, so that `ror(word, 2j) & 0x0006_0006` is both **doubled** codes, each in its lane:
+//!
+//! ```text
+//! bit  31 30 29 .. 19 18 17 16 15 14 .. 4 3 2 1  0
+//! pair  7  6  6 ..  1  0  0  7  7  6 .. 1 1 0 0  7    (bits 1-16: even columns; bits 17-31 and 0: odd columns)
+//! ```
+
+use super::format::{Cell, Format, QUAD, Sums, XLayout, smlad};
+use super::width::Width;
+
+/// The doubled code of both lanes.
+const MASK: u32 = 0x0006_0006;
+
+/// The 2-bit layout of single lanes.
+pub struct W2;
+
+const _: () = assert!(W2::CELL.is_full(W2::WIDTH.bits()));
+
+/// Where a column's code starts in the word's ring of bits.
+const fn bit(col: usize) -> u32 {
+    (1 + 2 * (col as u32 / 2) + 16 * (col as u32 % 2)) % 32
+}
+
+impl Format for W2 {
+    const WIDTH: Width = Width::W2;
+    const CELL: Cell = Cell { rows: 1, cols: 16, words: 1 };
+    const STRIP: usize = QUAD;
+    const STEP: usize = 16;
+    const X: XLayout = XLayout::single(-3);
+
+    fn insert(words: &mut [u32; 3], _row: usize, col: usize, code: u8) {
+        words[0] |= (code as u32 & 3).rotate_left(bit(col));
+    }
+
+    fn extract(words: &[u32; 3], _row: usize, col: usize) -> u8 {
+        (words[0].rotate_right(bit(col)) & 3) as u8
+    }
+
+    #[inline(always)]
+    fn mac(words: &[u32; 3], x: &[u32], t: &mut Sums) {
+        for (j, &x) in x.iter().enumerate() {
+            t[0] = smlad(words[0].rotate_right(2 * j as u32) & MASK, x, t[0]);
+        }
+    }
+
+    fn finish(t: &Sums, rows: &mut [i32]) {
+        rows[0] = rows[0].wrapping_add(t[0]);
+    }
+}

@@ -1,0 +1,82 @@
+//! 3-bit codes, single lanes: three words hold 32 columns of a row, exactly 3 bits a weight.
+//!
+//! Pair `j` is columns `2j` (low lane) and `2j + 1` (high lane). A 16-bit lane holds five 3-bit fields and one spare bit.
+//! Word `k` holds pairs `5k` to `5k + 4`; the three words' spare bits hold pair 15, bit `k` of its code in word `k`. In word
+//! `k` the spare bit stands at bit `k + 1`, where it already has the weight of bit `k` of a **doubled** code, so one AND
+//! with an immediate extracts it; the five fields follow it around the 32-bit ring:
+//!
+//! ```text
+//! word k, low lane:   bit k+1: spare    bits k+2 .. k+4: pair 5k    k+5 .. k+7: pair 5k+1   ..   k+14 .. k+16: pair 5k+4
+//!         high lane:  the same, 16 bits further (modulo 32)
+//! ```
+//!
+//! `ror(word, k + 1 + 3f) & 0x000e_000e` is field `f` doubled; `word & (0x0002_0002 << k)` is the share of pair 15.
+
+use super::format::{Cell, Format, QUAD, Sums, XLayout, smlad};
+use super::width::Width;
+
+/// The doubled code of both lanes.
+const MASK: u32 = 0x000e_000e;
+/// The spare bit of word 0, both lanes.
+const SPARE: u32 = 0x0002_0002;
+/// Whole fields in a lane.
+const FIELDS: usize = 5;
+
+/// The 3-bit layout of single lanes.
+pub struct W3;
+
+const _: () = assert!(W3::CELL.is_full(W3::WIDTH.bits()));
+
+/// Word and first bit of a column's code, for the pairs 0 to 14.
+const fn field(col: usize) -> (usize, u32) {
+    let (word, field) = (col / 2 / FIELDS, col / 2 % FIELDS);
+    (word, (word as u32 + 2 + 3 * field as u32 + 16 * (col as u32 % 2)) % 32)
+}
+
+/// The spare bit of word `k` in the lane of `col`.
+const fn spare(k: usize, col: usize) -> u32 {
+    k as u32 + 1 + 16 * (col as u32 % 2)
+}
+
+impl Format for W3 {
+    const WIDTH: Width = Width::W3;
+    const CELL: Cell = Cell { rows: 1, cols: 32, words: 3 };
+    const STRIP: usize = QUAD;
+    const STEP: usize = 32;
+    const X: XLayout = XLayout::single(-7);
+
+    fn insert(words: &mut [u32; 3], _row: usize, col: usize, code: u8) {
+        if col / 2 < FIELDS * W3::CELL.words {
+            let (word, bit) = field(col);
+            words[word] |= (code as u32 & 7).rotate_left(bit);
+        } else {
+            for (k, word) in words.iter_mut().enumerate().take(W3::CELL.words) {
+                *word |= (code as u32 >> k & 1) << spare(k, col);
+            }
+        }
+    }
+
+    fn extract(words: &[u32; 3], _row: usize, col: usize) -> u8 {
+        if col / 2 < FIELDS * W3::CELL.words {
+            let (word, bit) = field(col);
+            (words[word].rotate_right(bit) & 7) as u8
+        } else {
+            (0..W3::CELL.words).map(|k| ((words[k] >> spare(k, col) & 1) << k) as u8).sum()
+        }
+    }
+
+    #[inline(always)]
+    fn mac(words: &[u32; 3], x: &[u32], t: &mut Sums) {
+        let last = x.last().copied().unwrap_or(0);
+        for (k, (&word, x)) in words.iter().zip(x.chunks_exact(FIELDS)).enumerate() {
+            for (f, &x) in x.iter().enumerate() {
+                t[0] = smlad(word.rotate_right((k + 1 + 3 * f) as u32) & MASK, x, t[0]);
+            }
+            t[0] = smlad(word & (SPARE << k), last, t[0]);
+        }
+    }
+
+    fn finish(t: &Sums, rows: &mut [i32]) {
+        rows[0] = rows[0].wrapping_add(t[0]);
+    }
+}

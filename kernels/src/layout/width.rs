@@ -1,0 +1,81 @@
+//! Code widths, and the levels that codes stand for.
+
+macro_rules! widths {
+    (() $($(#[$doc:meta])* $width:ident = $bits:literal, $grid:ident: $($layouts:path),*;)*) => {
+        /// Bits of a weight code.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+        pub enum Width {
+            $($(#[$doc])* $width,)*
+        }
+
+        impl Width {
+            /// All widths, narrow to wide.
+            pub const ALL: [Self; [$($bits),*].len()] = [$(Self::$width),*];
+
+            /// The width of `bits`, if there is one.
+            pub const fn from_bits(bits: u32) -> Option<Self> {
+                Some(match bits {
+                    $($bits => Self::$width,)*
+                    _ => return None,
+                })
+            }
+
+            /// Bits of a code.
+            pub const fn bits(self) -> u32 {
+                match self {
+                    $(Self::$width => $bits,)*
+                }
+            }
+
+            const fn grid(self) -> Grid {
+                match self {
+                    $(Self::$width => Grid::$grid,)*
+                }
+            }
+        }
+    };
+}
+registry!(widths());
+
+/// What codes stand for.
+#[derive(Clone, Copy)]
+enum Grid {
+    /// Odd levels, as many below 0 as above: `2*code - (2^b - 1)`.
+    Odd,
+    /// The code itself, as two's complement of 8 bits.
+    Whole,
+}
+
+impl Width {
+    /// The level (weight divided by its scale) that `code` stands for. Bits of `code` above the width are ignored.
+    pub const fn level(self, code: u8) -> i32 {
+        match self.grid() {
+            Grid::Whole => code as i8 as i32,
+            Grid::Odd => {
+                let top = (1 << self.bits()) - 1;
+                2 * (code as i32 & top) - top
+            }
+        }
+    }
+
+    /// The largest magnitude of a level.
+    pub const fn max_level(self) -> i32 {
+        match self.grid() {
+            Grid::Whole => 128,
+            Grid::Odd => (1 << self.bits()) - 1,
+        }
+    }
+
+    /// The code whose level is nearest to `x` (a weight divided by its scale); ties go to the even code. At 8 bits the result
+    /// is symmetric: -128 is not used. NaN gives the lowest code.
+    pub fn nearest_code(self, x: f32) -> u8 {
+        match self.grid() {
+            Grid::Whole => libm::rintf(x.clamp(-127.0, 127.0)) as i32 as u8,
+            Grid::Odd => {
+                let top = (1u32 << self.bits()) - 1;
+                libm::rintf((x + top as f32) * 0.5).clamp(0.0, top as f32) as u8
+            }
+        }
+    }
+}

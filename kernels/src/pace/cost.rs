@@ -1,0 +1,305 @@
+//! What a step costs on a Cortex-M4 with FPU (thumbv7em-none-eabihf, zero-wait memory), from the image alone.
+//!
+//! An operation is described by [`Feature`]s that follow the loops of its code: how often a GEMV is called, strips, passes
+//! through a kernel's loop, columns, values prepared, rows scaled, elements of a function. A feature's **rate** says what one of
+//! it takes. Rates come from measurements alone: `cargo xtask fit` counts many operations under QEMU, solves for the rates, and
+//! writes `rates.rs`.
+//!
+//! Most code takes the same instructions whatever the values. Where it branches on values (elu, normalize and the action's
+//! limits) the expected cost is that of standard normal values, and a third rate says what one element takes at most; pieces of
+//! a step ([`crate::Head::poll`]) are measured by that.
+
+pub use super::feature::Feature;
+use super::feature::{Gemv, Prepare, Strips};
+use super::meter::Start;
+use super::rates::RATES;
+use crate::image::{Image, Op, OpKind};
+use crate::layout::{BlockShape, QUAD, STRIP};
+use crate::linear::{Matrix, RUN, RowBlock};
+use crate::x::{Extent, Plan};
+
+/// Instructions, and cycles as the project's model of the Cortex-M4 has them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Cost {
+    /// Instructions.
+    pub instructions: u64,
+    /// Cycles.
+    pub cycles: u64,
+}
+
+impl core::ops::Add for Cost {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self { instructions: self.instructions + other.instructions, cycles: self.cycles + other.cycles }
+    }
+}
+
+impl core::iter::Sum for Cost {
+    fn sum<I: Iterator<Item = Self>>(costs: I) -> Self {
+        costs.fold(Self::default(), |sum, cost| sum + cost)
+    }
+}
+
+/// 1024ths of an instruction or a cycle.
+const ONE: f64 = 1024.0;
+
+/// A column of the measured rates, in 1024ths. Features that were added since the last fit count nothing until the next.
+const fn column(which: usize) -> [u32; Feature::COUNT] {
+    let (mut column, mut rated) = ([0; Feature::COUNT], [false; Feature::COUNT]);
+    let mut i = 0;
+    while i < RATES.len() {
+        let (feature, rates) = RATES[i];
+        assert!(!rated[feature.index()], "rates.rs has a feature twice");
+        rated[feature.index()] = true;
+        let rate = rates[which] * ONE;
+        column[feature.index()] = if rate < 0.0 { 0 } else { (rate + 0.5) as u32 };
+        i += 1;
+    }
+    column
+}
+
+/// Expected instructions, expected cycles, instructions at most.
+static INSTRUCTIONS: [u32; Feature::COUNT] = column(0);
+static CYCLES: [u32; Feature::COUNT] = column(1);
+static MOST: [u32; Feature::COUNT] = column(2);
+
+impl Feature {
+    /// Instructions that one of it takes at most, in 1024ths.
+    pub(super) fn most(self) -> u32 {
+        MOST.get(self.index()).copied().unwrap_or(0)
+    }
+}
+
+/// The cost of features, which `list` counts.
+fn total(list: impl FnOnce(&mut dyn FnMut(Feature, usize))) -> Cost {
+    let mut sums = [0u64; 2];
+    list(&mut |feature, count| {
+        for (sum, rates) in sums.iter_mut().zip([&INSTRUCTIONS, &CYCLES]) {
+            *sum += count as u64 * u64::from(rates.get(feature.index()).copied().unwrap_or(0));
+        }
+    });
+    let [instructions, cycles] = sums.map(|sum| (sum + ONE as u64 / 2) / ONE as u64);
+    Cost { instructions, cycles }
+}
+
+/// What the features of `list` take at most, in 1024ths of an instruction.
+pub(super) fn most(list: impl FnOnce(&mut dyn FnMut(Feature, usize))) -> u32 {
+    let mut sum = 0u32;
+    list(&mut |feature, count| sum = sum.saturating_add((count as u32).saturating_mul(feature.most())));
+    sum
+}
+
+/// The cost of an operation within a step.
+pub fn of_op(op: &Op<'_>) -> Cost {
+    total(|add| features(op, add))
+}
+
+/// The cost of a step that evaluates the network; steps that play on from a chunk cost the same without the operations.
+pub fn of_step(image: &Image<'_>) -> Cost {
+    of_frame(image) + image.ops().map(|op| of_op(&op)).sum()
+}
+
+/// The cost of a step without the network's operations.
+pub fn of_frame(image: &Image<'_>) -> Cost {
+    total(|add| frame(image, add))
+}
+
+/// The features of a step without the network's operations.
+pub fn frame(image: &Image<'_>, add: &mut dyn FnMut(Feature, usize)) {
+    begin(image, add);
+    action(image, add);
+}
+
+/// The features of taking the observation.
+pub fn begin(image: &Image<'_>, add: &mut dyn FnMut(Feature, usize)) {
+    add(Feature::STEP, 1);
+    add(Feature::OBSERVATION, image.obs_len());
+}
+
+/// The features of the way from the network's output to the action.
+pub fn action(image: &Image<'_>, add: &mut dyn FnMut(Feature, usize)) {
+    add(Feature::ACTION, 1);
+    add(Feature::ACTION_VALUE, image.act_len());
+    add(Feature::CONTRACT, image.contract_arrays().iter().map(|array| array.len()).sum());
+}
+
+/// The features of an operation.
+pub fn features(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
+    if let (OpKind::Linear { accumulate }, Some(matrix)) = (op.kind, op.matrix()) {
+        linear(&matrix, accumulate, add);
+    } else {
+        let (operation, value, len) = values(op);
+        add(operation, 1);
+        add(value, len);
+    }
+}
+
+/// The features of an operation that is not linear: its own, that of its values, and how many those are.
+pub fn values(op: &Op<'_>) -> (Feature, Feature, usize) {
+    let (operation, value) = match op.kind {
+        OpKind::Normalize => (Feature::NORMALIZE, Feature::NORMALIZE_VALUE),
+        OpKind::Function(function) => (Feature::FUNCTION, Feature::function(function)),
+        OpKind::LayerNorm => (Feature::LAYER_NORM, Feature::LAYER_NORM_VALUE),
+        OpKind::RmsNorm => (Feature::RMS_NORM, Feature::RMS_NORM_VALUE),
+        OpKind::Add => (Feature::ADD, Feature::ADD_VALUE),
+        OpKind::Copy => (Feature::COPY, Feature::COPY_VALUE),
+        OpKind::LstmCell => (Feature::LSTM, Feature::LSTM_VALUE),
+        OpKind::GruCell => (Feature::GRU, Feature::GRU_VALUE),
+        // Its parts are counted one by one.
+        OpKind::Linear { .. } => return (Feature::LINEAR, Feature::LINEAR, 0),
+    };
+    (operation, value, op.dst().len)
+}
+
+fn linear(matrix: &Matrix<'_>, accumulate: bool, add: &mut dyn FnMut(Feature, usize)) {
+    let in_place = matrix.start_values(accumulate).is_some();
+    add(Feature::LINEAR, 1);
+    magnitude(matrix.cols, add);
+    if !in_place {
+        add(Feature::BIASED, 1);
+        start(Start::of(accumulate, !matrix.bias.is_empty()), matrix.rows, add);
+    }
+    let mut last = None;
+    for rows in matrix.blocks() {
+        let shape = rows.block.shape();
+        if last != Some(shape.width) {
+            prepare(shape, add);
+            last = Some(shape.width);
+        }
+        block(&rows, in_place, add);
+    }
+}
+
+/// Coming to an operation, at its start or in its midst.
+pub(super) fn enter(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
+    add(Feature::ENTERED, 1);
+    add(values(op).0, 1);
+    if let Some(matrix) = op.matrix() {
+        add(Feature::RESUMED, matrix.block_count());
+    }
+}
+
+/// Setting outputs up before rows are added to them.
+pub(super) fn start(start: Start, outputs: usize, add: &mut dyn FnMut(Feature, usize)) {
+    match start {
+        Start::Zero => add(Feature::ZEROED, outputs),
+        Start::Bias => add(Feature::BIAS, outputs),
+        Start::Added => add(Feature::ADDED, outputs),
+        Start::Kept => {}
+    }
+}
+
+/// Finding the scale of an input.
+pub(super) fn magnitude(cols: usize, add: &mut dyn FnMut(Feature, usize)) {
+    add(Feature::MAGNITUDE_EIGHT, cols / 8);
+    add(Feature::MAGNITUDE_REST, cols % 8);
+}
+
+/// Blocks in an image have valid shapes.
+fn extent(shape: BlockShape) -> Extent {
+    Plan::new(shape).map(|plan| plan.extent()).unwrap_or_default()
+}
+
+/// Preparing an input for blocks of this shape.
+pub(super) fn prepare(shape: BlockShape, add: &mut dyn FnMut(Feature, usize)) {
+    let Extent { columns, groups, chunks, .. } = extent(shape);
+    let filled = columns != shape.cols;
+    for (which, count) in [
+        (Prepare::Vector, 1),
+        (Prepare::Group, groups),
+        (Prepare::Chunk, chunks),
+        (Prepare::Eight, columns / 8),
+        (Prepare::Filled, usize::from(filled)),
+        (Prepare::FilledValue, if filled { columns } else { 0 }),
+    ] {
+        add(Feature::prepare_of(shape, which), count);
+    }
+}
+
+/// The products of a block's rows, and their scaling. `start`: whether the output starts from the biases.
+fn block(rows: &RowBlock<'_>, start: bool, add: &mut dyn FnMut(Feature, usize)) {
+    let shape = rows.block.shape();
+    let in_order = rows.index.is_empty();
+    let whole = match (in_order && start, shape.rows.is_multiple_of(QUAD)) {
+        (false, _) => 0,
+        (true, true) => shape.rows,
+        (true, false) => shape.rows & !(STRIP - 1),
+    };
+    if whole > 0 {
+        add(Feature::IN_PLACE, 1);
+        add(Feature::SCALED_EIGHT, whole / STRIP);
+        add(Feature::SCALED_REST, whole % STRIP);
+        products(shape, whole, 1, add);
+    }
+    let left = shape.rows - whole;
+    if left > 0 {
+        let runs = left.div_ceil(RUN);
+        add(Feature::STACK, 1);
+        add(Feature::RUN, runs);
+        products(shape, left, runs, add);
+        if in_order {
+            add(Feature::SCALED_EIGHT, left / STRIP);
+            add(Feature::SCALED_REST, left % STRIP);
+        } else {
+            add(Feature::SCALED_INDEXED, left);
+        }
+    }
+}
+
+/// GEMVs of so many rows in so many calls.
+pub(super) fn products(shape: BlockShape, rows: usize, calls: usize, add: &mut dyn FnMut(Feature, usize)) {
+    let quads = rows.div_ceil(QUAD);
+    let eights = if shape.strip_rows() == STRIP { quads / 2 } else { 0 };
+    let extent = extent(shape);
+    for (height, strips) in [(Strips::Eight, eights), (Strips::Four, quads - 2 * eights)] {
+        if strips > 0 {
+            // In a strip of four at the end of strips of eight, only the last call is one of its kind.
+            let last_alone = matches!(height, Strips::Four) && eights > 0;
+            let chunks = if shape.group == 0 { extent.chunks } else { 0 };
+            let columns = shape.units() * shape.cell_cols();
+            for (which, count) in [
+                (Gemv::Call, if last_alone { 1 } else { calls }),
+                (Gemv::Strip, strips),
+                (Gemv::Pass, strips * extent.passes),
+                (Gemv::Chunk, strips * chunks),
+                (Gemv::Column, strips * columns),
+            ] {
+                add(Feature::gemv_of(shape, height, which), count);
+            }
+        }
+    }
+}
+
+/// What a strip's worth of a block's rows ([`STRIP`]) takes at most, and what its rows take once in every piece, in 1024ths of
+/// an instruction.
+pub(super) fn strips(shape: BlockShape, in_order: bool, start: bool) -> (u32, u32) {
+    let row = if in_order { Feature::SCALED_REST } else { Feature::SCALED_INDEXED };
+    let first = most(|add| {
+        // The last piece may end with a run of its own for the rest of the rows.
+        add(Feature::IN_PLACE, 1);
+        add(Feature::STACK, 1);
+        add(Feature::RUN, 1);
+        for height in [Strips::Eight, Strips::Four] {
+            add(Feature::gemv_of(shape, height, Gemv::Call), 1);
+        }
+        if in_order {
+            add(row, STRIP - 1);
+        }
+    });
+    let each = most(|add| {
+        products(shape, STRIP, 0, add);
+        match (in_order, start) {
+            (true, true) => add(Feature::SCALED_EIGHT, 1),
+            (true, false) => {
+                add(Feature::SCALED_EIGHT, 1);
+                add(Feature::RUN, 1);
+            }
+            (false, _) => {
+                add(row, STRIP);
+                add(Feature::RUN, 1);
+            }
+        }
+    });
+    (first, each)
+}

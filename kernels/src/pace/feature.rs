@@ -1,0 +1,260 @@
+//! What the cost model counts.
+
+use core::fmt;
+
+use crate::layout::{BlockShape, Lanes, QUAD, STRIP, Width};
+use crate::math::Function;
+
+/// Something that an operation has a number of. Its debug text is its source, as in `rates.rs`.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Feature(u16);
+
+macro_rules! singles {
+    ($($name:ident $text:literal)*) => {
+        #[allow(non_camel_case_types, clippy::upper_case_acronyms, reason = "only counts the constants")]
+        enum Order { $($name,)* END }
+        /// The features that exist once.
+        impl Feature {
+            $(#[doc = $text] pub const $name: Self = Self(Order::$name as u16);)*
+        }
+        /// Their names, and what they are.
+        const SINGLES: [(&str, &str); Order::END as usize] = [$((stringify!($name), $text),)*];
+    };
+}
+singles! {
+    STEP "a step, with its operations and its action aside"
+    OBSERVATION "a value of the observation"
+    ACTION "an action"
+    ACTION_VALUE "a value of the action"
+    CONTRACT "a value of an array of the action contract"
+    POLL_OP "a call that runs one operation"
+    POLL "a call that runs pieces"
+    ENTERED "an operation that a poll comes to"
+    PIECE "a piece"
+    LINEAR "a linear operation"
+    RESUMED "a block of rows of a linear operation that a poll comes to"
+    MAGNITUDE_EIGHT "eight values compared by magnitude"
+    MAGNITUDE_REST "a value compared by magnitude"
+    BIASED "a linear operation that sets its output up before the rows are added"
+    ZEROED "an output set to 0 before the rows are added"
+    BIAS "an output set to its bias before the rows are added"
+    ADDED "an output that its bias is added to before the rows are"
+    IN_PLACE "a block of rows in order, whole strips"
+    STACK "a block of rows with sums on the stack"
+    RUN "a run of rows with sums on the stack"
+    SCALED_EIGHT "eight rows scaled by the assembler"
+    SCALED_REST "a row in order scaled"
+    SCALED_INDEXED "a row with an index scaled"
+    NORMALIZE "a normalization"
+    NORMALIZE_VALUE "a value normalized"
+    LAYER_NORM "a layer norm"
+    LAYER_NORM_VALUE "a value of a layer norm"
+    RMS_NORM "an RMS norm"
+    RMS_NORM_VALUE "a value of an RMS norm"
+    ADD "an addition"
+    ADD_VALUE "a value added"
+    COPY "a copy"
+    COPY_VALUE "a value copied"
+    LSTM "an LSTM cell"
+    LSTM_VALUE "an element of an LSTM cell"
+    GRU "a GRU cell"
+    GRU_VALUE "an element of a GRU cell"
+    FUNCTION "a function's operation"
+}
+
+macro_rules! kinds {
+    ($(#[$doc:meta])* $kind:ident { $($name:ident $text:literal)* }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug)]
+        pub(super) enum $kind { $(#[doc = $text] $name,)* }
+
+        impl $kind {
+            const ALL: &'static [(Self, &'static str)] = &[$((Self::$name, $text),)*];
+        }
+    };
+}
+kinds! {
+    /// Features of preparing a vector, for each layout.
+    Prepare {
+        Vector "a vector"
+        Group "a group"
+        Chunk "a chunk"
+        Eight "eight values"
+        Filled "a vector that zeros fill up"
+        FilledValue "a value of such a vector"
+    }
+}
+kinds! {
+    /// Features of a GEMV, for each layout with strips of four and of eight rows.
+    Gemv {
+        Call "a call"
+        Strip "a strip"
+        Pass "a pass or group of a strip"
+        Chunk "a chunk of a strip"
+        Column "a column of a strip"
+    }
+}
+kinds! {
+    /// Whether columns share scales.
+    Scales {
+        Rows "rows"
+        Groups "groups"
+    }
+}
+kinds! {
+    /// Rows of a strip.
+    Strips {
+        Four "4 rows"
+        Eight "8 rows"
+    }
+}
+
+const _: () = assert!(QUAD == 4 && STRIP == 8);
+
+const FUNCTIONS: usize = SINGLES.len();
+const PREPARES: usize = FUNCTIONS + Function::ALL.len();
+const GEMVS: usize = PREPARES + LAYOUTS * Prepare::ALL.len();
+/// Layouts, each with row scales and with group scales.
+const LAYOUTS: usize = Width::ALL.len() * Lanes::ALL.len() * Scales::ALL.len();
+
+impl Feature {
+    /// How many there are.
+    pub const COUNT: usize = GEMVS + LAYOUTS * Strips::ALL.len() * Gemv::ALL.len();
+
+    /// All of them.
+    pub fn all() -> impl Iterator<Item = Self> {
+        (0..Self::COUNT as u16).map(Self)
+    }
+
+    /// An element of a function.
+    pub const fn function(function: Function) -> Self {
+        Self((FUNCTIONS + function as usize) as u16)
+    }
+
+    const fn layout(width: Width, lanes: Lanes, scales: Scales) -> usize {
+        (width as usize * Lanes::ALL.len() + lanes as usize) * Scales::ALL.len() + scales as usize
+    }
+
+    pub(super) const fn prepare(width: Width, lanes: Lanes, scales: Scales, which: Prepare) -> Self {
+        Self((PREPARES + Self::layout(width, lanes, scales) * Prepare::ALL.len() + which as usize) as u16)
+    }
+
+    pub(super) const fn gemv(width: Width, lanes: Lanes, scales: Scales, strips: Strips, which: Gemv) -> Self {
+        let set = Self::layout(width, lanes, scales) * Strips::ALL.len() + strips as usize;
+        Self((GEMVS + set * Gemv::ALL.len() + which as usize) as u16)
+    }
+
+    pub(super) const fn prepare_of(shape: BlockShape, which: Prepare) -> Self {
+        Self::prepare(shape.width, shape.lanes, Scales::of(shape), which)
+    }
+
+    pub(super) const fn gemv_of(shape: BlockShape, strips: Strips, which: Gemv) -> Self {
+        Self::gemv(shape.width, shape.lanes, Scales::of(shape), strips, which)
+    }
+
+    /// Its place among the rates.
+    pub const fn index(self) -> usize {
+        self.0 as usize
+    }
+
+    /// What it is.
+    fn kind(self) -> Option<Kind> {
+        let i = self.index();
+        let layout = |i: usize| {
+            let (lanes, scales) = (i / Scales::ALL.len(), i % Scales::ALL.len());
+            let width = *Width::ALL.get(lanes / Lanes::ALL.len())?;
+            Some((width, *Lanes::ALL.get(lanes % Lanes::ALL.len())?, Scales::ALL.get(scales)?))
+        };
+        Some(if let Some(single) = SINGLES.get(i) {
+            Kind::Single(single)
+        } else if let Some(function) = Function::ALL.get(i - FUNCTIONS) {
+            Kind::Function(*function)
+        } else if i < GEMVS {
+            let i = i - PREPARES;
+            Kind::Prepare(layout(i / Prepare::ALL.len())?, Prepare::ALL.get(i % Prepare::ALL.len())?)
+        } else {
+            let (set, which) = ((i - GEMVS) / Gemv::ALL.len(), (i - GEMVS) % Gemv::ALL.len());
+            let strips = Strips::ALL.get(set % Strips::ALL.len())?;
+            Kind::Gemv(layout(set / Strips::ALL.len())?, strips, Gemv::ALL.get(which)?)
+        })
+    }
+}
+
+impl Scales {
+    const fn of(shape: BlockShape) -> Self {
+        if shape.group == 0 { Self::Rows } else { Self::Groups }
+    }
+}
+
+/// Width, lanes and scales, these with their text.
+type Layout = (Width, Lanes, &'static (Scales, &'static str));
+
+/// See [`Feature::kind`]; everything with its text.
+enum Kind {
+    Single(&'static (&'static str, &'static str)),
+    Function(Function),
+    Prepare(Layout, &'static (Prepare, &'static str)),
+    Gemv(Layout, &'static (Strips, &'static str), &'static (Gemv, &'static str)),
+}
+
+impl fmt::Debug for Feature {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.kind() {
+            Some(Kind::Single((name, _))) => write!(f, "Feature::{name}"),
+            Some(Kind::Function(function)) => write!(f, "Feature::function(Function::{function:?})"),
+            Some(Kind::Prepare((width, lanes, (scales, _)), (which, _))) => {
+                write!(f, "Feature::prepare({width:?}, {lanes:?}, {scales:?}, Prepare::{which:?})")
+            }
+            Some(Kind::Gemv((width, lanes, (scales, _)), (strips, _), (which, _))) => {
+                write!(f, "Feature::gemv({width:?}, {lanes:?}, {scales:?}, {strips:?}, Gemv::{which:?})")
+            }
+            None => write!(f, "Feature({})", self.0),
+        }
+    }
+}
+
+impl fmt::Display for Feature {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let layout = |f: &mut fmt::Formatter<'_>, (width, lanes, (_, scales)): Layout| {
+            let lanes = if lanes == Lanes::Paired { "paired" } else { "single" };
+            write!(f, "{} bits {lanes} {scales}", width.bits())
+        };
+        match self.kind() {
+            Some(Kind::Single((_, text))) => f.write_str(text),
+            Some(Kind::Function(function)) => write!(f, "an element of {}", function.name()),
+            Some(Kind::Prepare(of, (_, which))) => {
+                layout(f, of)?;
+                write!(f, " prepared: {which}")
+            }
+            Some(Kind::Gemv(of, (_, strips), (_, which))) => {
+                layout(f, of)?;
+                write!(f, ", {strips}: {which}")
+            }
+            None => write!(f, "{self:?}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use super::*;
+    use crate::pace::rates::RATES;
+
+    /// Without a rate, an operation would be too cheap, and its polls too long.
+    #[test]
+    fn every_feature_has_a_rate() {
+        let rated: HashSet<Feature> = RATES.iter().map(|(feature, _)| *feature).collect();
+        let missing: Vec<Feature> = Feature::all().filter(|feature| !rated.contains(feature)).collect();
+        assert!(missing.is_empty(), "`cargo xtask fit` measures {missing:?}");
+    }
+
+    #[test]
+    fn names_are_keys_of_the_rates() {
+        let text = include_str!("rates.rs");
+        for feature in Feature::all() {
+            assert_eq!(text.matches(&format!("({feature:?}, [")).count(), 1, "{feature:?}, {feature}");
+        }
+    }
+}

@@ -1,0 +1,201 @@
+//! Images changed at random, with a correct checksum: what passes `Image::new_checked` runs without a panic, keeps its limits, and
+//! sees nothing but its observations; and what changes behind the check's back does not panic either. These tests need nothing but
+//! this crate, so that they run where a word has 32 bits, and under Miri, too.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use actq_kernels::image::{checksum, header as h, header::op};
+use actq_kernels::{Head, Image};
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::{Rng as _, SeedableRng as _};
+
+/// Mutations of a test.
+const CASES: u64 = if cfg!(miri) { 20 } else { 20_000 };
+
+/// An image with every kind of section, which `host-tests/tests` make and compare.
+const VALID: &[u8] = include_bytes!("valid.actq");
+
+#[derive(Clone)]
+struct Random(Pcg64);
+
+impl Random {
+    fn new(seed: u64) -> Self {
+        Self(Pcg64::seed_from_u64(seed))
+    }
+
+    fn bits(&mut self) -> u64 {
+        self.0.next_u64()
+    }
+
+    fn below(&mut self, n: usize) -> usize {
+        (self.bits() % n as u64) as usize
+    }
+
+    /// Uniform in -1..1.
+    fn unit(&mut self) -> f32 {
+        (self.bits() >> 40) as f32 / (1u32 << 23) as f32 - 1.0
+    }
+}
+
+/// An image whose words can be changed.
+struct Draft(Vec<u32>);
+
+impl Draft {
+    fn valid() -> Self {
+        Self(VALID.as_chunks().0.iter().map(|word| u32::from_ne_bytes(*word)).collect())
+    }
+
+    fn bytes(&self) -> &[u8] {
+        bytemuck::cast_slice(&self.0)
+    }
+
+    fn get(&self, at: usize) -> u32 {
+        u32::from_le(self.0[at])
+    }
+
+    fn set(&mut self, at: usize, value: u32) {
+        self.0[at] = value.to_le();
+    }
+
+    fn offset(&self, at: usize) -> usize {
+        self.get(at) as usize
+    }
+
+    /// Makes the checksum fit.
+    fn seal(&mut self) {
+        self.set(h::W_CRC, checksum(self.bytes()));
+    }
+
+    /// Words that steer: header, operation records, matrix and block records.
+    fn structure(&self) -> Vec<usize> {
+        let (first, count) = (self.offset(h::W_OPS), (self.get(h::W_KIND) >> 16) as usize);
+        let ops = first..first + count * h::OP_WORDS;
+        let linear = ops.clone().step_by(h::OP_WORDS).filter(|at| self.get(*at) as u8 == op::LINEAR);
+        let matrix = |op: usize| {
+            let at = self.offset(op + 3);
+            let blocks = self.offset(at + 3);
+            let count = (self.get(at + 2) & 0xffff) as usize;
+            (at..at + h::MATRIX_WORDS).chain(blocks..blocks + count * h::BLOCK_WORDS)
+        };
+        let header = (h::W_KIND..h::W_DIGEST).chain(h::W_MATRICES..h::WORDS);
+        header.chain(ops).chain(linear.flat_map(matrix)).collect()
+    }
+}
+
+/// A random change of up to three words, mostly of those that steer.
+fn mutate(random: &mut Random, draft: &mut Draft, structure: &[usize]) {
+    for _ in 0..1 + random.below(3) {
+        let at = match random.below(4) {
+            0 => h::W_KIND + random.below(draft.0.len() - h::W_KIND),
+            _ => structure[random.below(structure.len())],
+        };
+        let (old, bits) = (draft.get(at), random.bits());
+        let new = match random.below(6) {
+            0 => bits as u32,
+            1 => old ^ 1 << (bits % 32),
+            2 => old.wrapping_add((bits as u32 % 65).wrapping_sub(32)) ^ (bits as u32 & 0x1_0000),
+            3 => draft.get(random.below(draft.0.len())),
+            4 => old & !(0xffff << (bits % 2 * 16)) | ((bits >> 8) as u32 % 256) << (bits % 2 * 16),
+            _ => [0, 1, u32::MAX, 0x7f80_0000, 0xff80_0000, 0x7fc0_0000, 0x7f7f_ffff, 0x0000_0001][bits as usize % 8],
+        };
+        draft.set(at, new);
+    }
+    draft.seal();
+}
+
+/// Hands the images of the mutations that are accepted to `see`; gives their number. A panic in `see` fails with the numbers of all such cases.
+fn accepted(see: impl Fn(Image<'_>, &mut Random)) -> u64 {
+    let structure = Draft::valid().structure();
+    let (mut seen, mut failed) = (0, Vec::new());
+    for case in 0..CASES {
+        let mut random = Random::new(case);
+        let mut draft = Draft::valid();
+        mutate(&mut random, &mut draft, &structure);
+        let outcome = catch_unwind(AssertUnwindSafe(|| {
+            let image = Image::new_checked(draft.bytes()).ok();
+            image.map(|image| see(image, &mut random)).is_some()
+        }));
+        match outcome {
+            Ok(accepted) => seen += u64::from(accepted),
+            Err(_) => failed.push(case),
+        }
+    }
+    assert!(failed.is_empty(), "cases {failed:?}");
+    seen
+}
+
+/// Three steps and the self-test in memory of exactly the size that the image asks for, filled with `fill`: the bits of the
+/// actions that it gives.
+fn play(image: Image<'_>, fill: u32, random: &mut Random) -> Vec<Option<Vec<u32>>> {
+    let mut scratch = vec![fill; image.scratch_words()];
+    let mut head = Head::new(image, &mut scratch).expect("the scratch memory has the image's size");
+    let mut step = || {
+        let observation: Vec<f32> = (0..image.obs_len()).map(|_| 3.0 * random.unit()).collect();
+        head.step(&observation).ok().map(|action| action.iter().map(|a| a.to_bits()).collect())
+    };
+    let actions = vec![step(), step(), step()];
+    let _ = head.self_test();
+    actions
+}
+
+#[test]
+fn what_is_accepted_runs_and_keeps_its_limits() {
+    let seen = accepted(|image, random| {
+        let contract = image.contract();
+        let limit = |array: &[u32], i: usize| array.get(i).map(|w| f32::from_bits(u32::from_le(*w)));
+        let fill = random.bits() as u32;
+        for action in play(image, fill, random).into_iter().flatten() {
+            for (i, a) in action.into_iter().map(f32::from_bits).enumerate() {
+                assert!(a.is_finite(), "action {i} is {a}");
+                assert!(limit(contract.low, i).is_none_or(|low| a >= low), "action {i} is {a}, below its limit");
+                assert!(limit(contract.high, i).is_none_or(|high| a <= high), "action {i} is {a}, above its limit");
+            }
+        }
+    });
+    assert!(seen > CASES / 20, "{seen} images were accepted: too few to show anything");
+}
+
+#[test]
+fn what_is_accepted_does_not_see_what_its_memory_held() {
+    accepted(|image, random| {
+        let other = play(image, 0x3f80_0000, &mut random.clone());
+        assert_eq!(play(image, 0, random), other);
+    });
+}
+
+#[test]
+fn a_reset_forgets_everything() {
+    accepted(|image, random| {
+        let mut scratch = vec![0; image.scratch_words()];
+        let mut head = Head::new(image, &mut scratch).expect("the scratch memory has the image's size");
+        let observations: Vec<Vec<f32>> =
+            (0..3).map(|_| (0..image.obs_len()).map(|_| 3.0 * random.unit()).collect()).collect();
+        let mut play = || {
+            head.reset();
+            let step = |o: &Vec<f32>| head.step(o).map(|action| action.iter().map(|a| a.to_bits()).collect::<Vec<_>>());
+            observations.iter().map(step).collect::<Vec<_>>()
+        };
+        assert_eq!(play(), play());
+    });
+}
+
+#[test]
+fn damage_of_any_kind_does_not_panic() {
+    let structure = Draft::valid().structure();
+    let mut outcomes = [0; 2];
+    for case in 0..CASES {
+        let mut random = Random::new(case);
+        let mut draft = Draft::valid();
+        let scratch = draft.get(h::W_SCRATCH);
+        mutate(&mut random, &mut draft, &structure);
+        // What the head was made with does not change any more.
+        draft.set(h::W_SCRATCH, scratch);
+        let image = Image::unchecked(draft.bytes()).expect("the header is there");
+        let mut scratch = vec![0; image.scratch_words()];
+        let mut head = Head::new(image, &mut scratch).expect("the scratch memory has the image's size");
+        let observation = vec![0.5; image.obs_len()];
+        let outcome = catch_unwind(AssertUnwindSafe(|| (0..3).all(|_| head.step(&observation).is_ok())));
+        outcomes[usize::from(outcome.unwrap_or_else(|_| panic!("case {case}")))] += 1;
+    }
+    assert!(outcomes.iter().all(|n| *n > CASES / 20), "{outcomes:?}: too few to show anything");
+}
