@@ -9,6 +9,6 @@ mod prepared;
 mod quantized;
 pub mod scale;
 
-pub use options::{Activations, GROUPS, Method, Options, Packing};
+pub use options::{Activations, Method, Options, Packing};
 pub use prepared::{PreparedMethod, quantize};
 pub use quantized::{Outcome, Quantized, RowAllocation};

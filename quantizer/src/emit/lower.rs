@@ -5,8 +5,8 @@
 //! the work area. Buffers are placed in the order in which they are written, each as low as it fits: so none leaves a gap, and what
 //! a step has written always is the begin of the arena, as the image's check wants it.
 
-use actq_kernels::activations::max_prepared_words;
 use actq_kernels::image::Region;
+use actq_kernels::x::max_prepared_words;
 use anyhow::{Result, ensure};
 
 use crate::graph::Graph;

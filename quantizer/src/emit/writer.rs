@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use actq_kernels::format::{self, LAYOUT_STAMP};
 use actq_kernels::image::{Kind, OpKind, Region, checksum, half_words, header as h, header::op};
+use actq_kernels::layout::{self, LAYOUT_STAMP};
 use anyhow::{Context, Result, ensure};
 
 use super::lower::lower;
@@ -160,7 +160,7 @@ impl Writer {
             let group_scales: Vec<u8> =
                 rows.iter().flat_map(|r| &matrix.group_scales[r * groups..][..groups]).copied().collect();
             let mut words = vec![0; shape.words()];
-            format::pack(*shape, &codes, &group_scales, &mut words).with_context(|| {
+            layout::pack(*shape, &codes, &group_scales, &mut words).with_context(|| {
                 format!("{shape:?} cannot be packed; docs/FORMAT.md says how many columns may have group scales")
             })?;
             let weights = self.push(words.into_iter().map(u32::from_le));

@@ -1,7 +1,8 @@
 //! Arrays `[sample, element]` and what operations do with them: products in either order of summing, rounding as the kernels
 //! round.
 
-use actq_kernels::activations::{ROUND, TINY};
+use actq_kernels::round::ROUND;
+use actq_kernels::x::TINY;
 use ndarray::{Array2, ArrayView1, ArrayViewMut1, linalg::general_mat_mul};
 
 /// The order in which a sum over a row is taken. The results differ in their last bits, and images are made from both.

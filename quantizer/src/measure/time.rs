@@ -1,8 +1,8 @@
-//! Time on the target: what the cost model (`actq_kernels::cost`) says of an image at a clock.
+//! Time on the target: what the cost model (`actq_kernels::pace::cost`) says of an image at a clock.
 
 use actq_kernels::Image;
-use actq_kernels::cost::{self, Cost};
 use actq_kernels::image::Op;
+use actq_kernels::pace::cost::{self, Cost};
 use serde::Serialize;
 
 use super::size::op_name;

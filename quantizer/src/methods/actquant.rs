@@ -12,7 +12,7 @@
 pub mod allocation;
 pub mod score;
 
-use actq_kernels::format::Width;
+use actq_kernels::layout::Width;
 use anyhow::{Result, ensure};
 use ndarray::Array2;
 

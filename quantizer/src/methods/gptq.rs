@@ -1,7 +1,7 @@
 //! GPTQ (Frantar et al., arXiv 2210.17323, algorithm 1): columns are quantized one after the other, and each column's error is
 //! spread over the columns still to come so that the output changes least.
 
-use actq_kernels::format::Width;
+use actq_kernels::layout::Width;
 use anyhow::{Context, Result};
 use nalgebra::DMatrix;
 

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use actq_kernels::Width;
-use actq_kernels::format::{BlockShape, Lanes};
+use actq_kernels::layout::{BlockShape, GROUPS, Lanes, is_group};
 use anyhow::{Result, ensure};
 
 use crate::budget::Budget;
@@ -84,9 +84,6 @@ pub struct Options {
     pub forced: Vec<(String, Width)>,
 }
 
-/// Columns that may share a u8 scale; 0: one scale a row.
-pub const GROUPS: [usize; 4] = [0, 32, 64, 128];
-
 /// How rows are packed, beside their widths.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Packing {
@@ -106,8 +103,7 @@ impl Packing {
 impl Options {
     /// Refuses groups that no kernel has.
     pub fn check(&self) -> Result<()> {
-        let known = GROUPS.contains(&self.group);
-        ensure!(known, "group is {}, it must be 0, 32, 64 or 128", self.group);
+        ensure!(is_group(self.group), "group is {}, it must be 0 or one of {GROUPS:?}", self.group);
         Ok(())
     }
 

@@ -1,7 +1,7 @@
 //! What a weight matrix becomes.
 
-use actq_kernels::format::{BlockShape, Lanes, Width};
 use actq_kernels::image::block_bytes;
+use actq_kernels::layout::{BlockShape, Lanes, Width};
 use anyhow::{Result, ensure};
 use half::bf16;
 

@@ -1,6 +1,6 @@
 //! Scales, and rounding to nearest.
 
-use actq_kernels::format::Width;
+use actq_kernels::layout::Width;
 use half::bf16;
 
 use super::quantized::Quantized;

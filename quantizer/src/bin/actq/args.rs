@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
-use actq::methods::{GROUPS, Method};
+use actq::methods::Method;
 use actq_kernels::Width;
+use actq_kernels::layout::is_group;
 use clap::{Parser, Subcommand, ValueEnum, value_parser};
 
 /// Quantizes robot policies to 2, 3, 4 or 8 bits and packs them into one image for a microcontroller.
@@ -243,7 +244,7 @@ fn size(text: &str) -> Result<usize, String> {
 }
 
 fn group(text: &str) -> Result<usize, String> {
-    let known = text.parse().ok().filter(|group| GROUPS.contains(group));
+    let known = text.parse().ok().filter(|group| is_group(*group));
     known.ok_or_else(|| "groups have 32, 64 or 128 columns, or 0 for none".to_owned())
 }
 

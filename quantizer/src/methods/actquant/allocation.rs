@@ -1,7 +1,7 @@
 //! Stage 1 of ActQuant, second half: a width for every matrix from the scores.
 
-use actq_kernels::format::Width;
 use actq_kernels::image::block_bytes;
+use actq_kernels::layout::Width;
 use anyhow::{Result, ensure};
 
 use crate::budget::BudgetTooSmall;
@@ -69,7 +69,7 @@ pub fn allocate(graph: &Graph, scores: &[f64], packing: Packing, limit: f64) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use actq_kernels::format::Lanes;
+    use actq_kernels::layout::Lanes;
 
     const PACKING: Packing = Packing { lanes: Lanes::Paired, group: 32 };
     use crate::graph::ops::Linear;
