@@ -3,14 +3,14 @@
 use std::fs;
 use std::path::Path;
 
-use actq::dataset::recording::Recording;
-use actq::dataset::{Dataset, Sizes};
-use actq::eval;
-use actq::graph::Graph;
+use actq::budget::Budget;
+use actq::data::{Dataset, Sizes};
+use actq::data::{Recording, Recordings};
+use actq::measure::eval;
+use actq::methods::{Activations, Method, Options};
+use actq::pipeline::quantize;
 use actq::policy::Policy;
-use actq::quantize::{Activations, Budget, Method, Options, quantize};
 use actq::runtime::{ImageBuffer, with_head};
-use actq::writer;
 use actq_bench::firmware::{self, built_in};
 use actq_bench::qemu::{self, Server};
 use actq_bench::{Target, golden, shared_policies, ur3};
@@ -24,7 +24,7 @@ const STEPS: usize = 208;
 
 fn rtn(policy: &Policy, width: Width, group: usize, activations: Activations) -> Result<Vec<u8>> {
     let options = Options { group, activations, ..Options::new(Method::Rtn, Budget::Width(width)) };
-    writer::image(policy, &quantize(&policy.graph, &[], &options)?)
+    Ok(quantize(policy, &Recordings::default(), &options, |_, _| {})?.image)
 }
 
 #[test]
@@ -232,15 +232,14 @@ fn eight_bits_stay_close_to_the_recorded_actions() -> Result<()> {
 fn gptq_beats_rounding_at_low_bits() -> Result<()> {
     let dir = ur3();
     let policy = Policy::load(&dir)?;
-    let calib = Recording::Calib.require(Some(&dir), None, Sizes::of(&policy), "gptq")?;
-    let moments = actq::quantize::moments::collect(&policy.graph, &calib, |_| {});
-    let nmse = |graph: &Graph, method| -> Result<f64> {
+    let recordings = Recordings::load(&policy)?;
+    let nmse = |method| -> Result<f64> {
         let options = Options::new(method, Budget::Width(Width::W3));
-        let buffer = ImageBuffer::new(&writer::image(&policy, &quantize(graph, &moments, &options)?)?);
+        let buffer = quantize(&policy, &recordings, &options, |_, _| {})?.buffer();
         let image = buffer.image(&dir)?;
         Ok(eval::evaluate(image, &eval::heldout(&dir, &image)?)?.nmse)
     };
-    let (gptq, plain) = (nmse(&policy.graph, Method::Gptq)?, nmse(&policy.graph, Method::Rtn)?);
+    let (gptq, plain) = (nmse(Method::Gptq)?, nmse(Method::Rtn)?);
     assert!(gptq < plain / 2.0, "{gptq} against {plain}");
     Ok(())
 }
