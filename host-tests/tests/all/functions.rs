@@ -74,7 +74,7 @@ fn expected() -> Vec<(&'static str, u32)> {
 
 #[test]
 fn every_function_has_the_same_bits_and_stays_within_its_instructions() -> Result<()> {
-    let elf = firmware::bench("functions", Target::Fpu)?;
+    let elf = firmware::binary("functions", Target::Fpu)?;
     let counter = Counter::build()?;
     let mut command = qemu::command(&elf, None, "")?;
     counter.attach(&mut command, &elf)?;

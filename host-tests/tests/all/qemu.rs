@@ -30,7 +30,7 @@ fn rtn(policy: &Policy, width: Width, group: usize, activations: Activations) ->
 fn kernels_give_the_golden_sums_on_the_target() -> Result<()> {
     let cases = golden::cases(1);
     for target in [Target::Fpu, Target::NoFpu] {
-        let elf = firmware::bench("golden", target)?;
+        let elf = firmware::binary("golden", target)?;
         let output = qemu::run(qemu::command(&elf, None, "")?, &golden::stream(&cases))?;
         let text = String::from_utf8_lossy(&output.stdout);
         ensure!(output.status.success(), "{target:?}: {text}");
@@ -47,7 +47,7 @@ fn portable_kernels_give_the_golden_sums_on_the_targets_without_assembler() -> R
     let short: Vec<_> = cases.iter().filter(fits).cloned().collect();
     ensure!(short.len() > cases.len() / 2, "too few cases are short");
     for (target, cases) in [(Target::NoDsp, &cases), (Target::Small, &short), (Target::Riscv, &cases)] {
-        let elf = firmware::bench("golden", target)?;
+        let elf = firmware::binary("golden", target)?;
         let output = qemu::run(qemu::command_on(target, &elf, None, "")?, &golden::stream(cases))?;
         let text = String::from_utf8_lossy(&output.stdout);
         ensure!(output.status.success(), "{target:?}: {text}");
@@ -63,7 +63,7 @@ fn a_wrong_sum_fails_the_golden_run() -> Result<()> {
     // The last case may end in padding rows, whose sums are not compared: all four of its last quad's are changed.
     stream[last_sum - 12..last_sum + 4].iter_mut().for_each(|byte| *byte ^= 1);
     for target in [Target::Fpu, Target::Riscv] {
-        let output = qemu::run(qemu::command_on(target, &firmware::bench("golden", target)?, None, "")?, &stream)?;
+        let output = qemu::run(qemu::command_on(target, &firmware::binary("golden", target)?, None, "")?, &stream)?;
         let text = String::from_utf8_lossy(&output.stdout);
         assert!(!output.status.success() && text.contains("case 2: sums"), "{target:?}: {text}");
     }

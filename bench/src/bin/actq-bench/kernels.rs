@@ -57,7 +57,7 @@ impl Record {
 
 /// Runs the bench firmware.
 pub(crate) fn measure(counter: &Counter, wait_states: u64) -> Result<Vec<Record>> {
-    let elf = firmware::bench("bench", Target::Fpu)?;
+    let elf = firmware::binary("bench", Target::Fpu)?;
     let mut command = qemu::command(&elf, None, "")?;
     counter.attach(&mut command, &elf)?;
     let output = qemu::run(command, &[])?;
