@@ -3,8 +3,7 @@
 use std::path::Path;
 
 use actq::budget::{Budget, TimeLimit};
-use actq::data::Recordings;
-use actq::data::{Dataset, Sizes};
+use actq::data::{Dataset, Recordings, Sizes};
 use actq::emit;
 use actq::measure::time::{CLOCK, StepTime};
 use actq::methods::{Activations, Method, Options};

@@ -4,8 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use actq::budget::Budget;
-use actq::data::{Dataset, Sizes};
-use actq::data::{Recording, Recordings};
+use actq::data::{Dataset, Recording, Recordings, Sizes};
 use actq::measure::eval;
 use actq::methods::{Activations, Method, Options};
 use actq::pipeline::quantize;

@@ -4,9 +4,7 @@ use std::path::Path;
 
 use actq::budget::Budget;
 use actq::contract::ActionContract;
-use actq::data::Range;
-use actq::data::{Dataset, Sizes};
-use actq::data::{Recording, Recordings};
+use actq::data::{Dataset, Range, Recording, Recordings, Sizes};
 use actq::graph::ops::{Linear, Lstm};
 use actq::graph::{Graph, Network, WeightMatrix, Weights, zero_state};
 use actq::measure::eval::evaluate;

@@ -4,8 +4,8 @@ use anyhow::{Context, Result};
 use ndarray::{Array2, Axis, Zip, linalg::general_mat_mul};
 
 use crate::data::Dataset;
-use crate::graph::Graph;
-use crate::graph::{Network, Pass, Weights, start_state, zero_state};
+use crate::graph::{Graph, Network, Pass, Weights, start_state, zero_state};
+use crate::random::Random;
 
 /// Steps that a recurrent network's gradient runs back.
 const WINDOW: usize = 16;
@@ -42,7 +42,7 @@ pub fn importance(graph: &Graph, dataset: &Dataset, mut progress: impl FnMut(f64
     let mut fisher = weights.zeros_like().matrices;
     // The gradients themselves are not asked for, but the backward pass adds to them.
     let mut unused = weights.zeros_like();
-    let mut signs = Signs(0);
+    let mut random = Random(0);
     let mut samples = 0;
     for (index, start) in (0..longest).step_by(window.max(1)).enumerate() {
         let staying: Vec<usize> = (0..alive.len()).filter(|&i| dataset.length[alive[i]] >= start + window).collect();
@@ -62,7 +62,7 @@ pub fn importance(graph: &Graph, dataset: &Dataset, mut progress: impl FnMut(f64
                 rows(dataset.action.as_ref().context("array \"action\" is missing")?, &alive, start + window - 1);
             let sign = Array2::from_shape_fn(output.raw_dim(), |at| {
                 let difference = output[at] - recorded[at];
-                if difference.abs() > equal[at.1] { difference.signum() } else { signs.next() }
+                if difference.abs() > equal[at.1] { difference.signum() } else { random.sign() }
             });
             add_squares(&network, &weights, &passes, sign, &mut unused, &mut fisher);
             samples += alive.len();
@@ -134,19 +134,6 @@ fn deviations(dataset: &Dataset) -> Option<ndarray::Array1<f32>> {
     }
     let n = dataset.frames().max(1) as f64;
     Some(sums.iter().map(|(sum, square)| (square / n - (sum / n).powi(2)).max(0.0).sqrt() as f32).collect())
-}
-
-/// Fair signs (splitmix64).
-struct Signs(u64);
-
-impl Signs {
-    fn next(&mut self) -> f32 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        if z >> 63 == 0 { 1.0 } else { -1.0 }
-    }
 }
 
 #[cfg(test)]

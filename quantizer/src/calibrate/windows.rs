@@ -4,8 +4,7 @@
 use ndarray::{Array2, Axis};
 
 use crate::data::Dataset;
-use crate::graph::Graph;
-use crate::graph::{Network, State, Weights, start_state, zero_state};
+use crate::graph::{Graph, Network, State, Weights, start_state, zero_state};
 use crate::random::Random;
 
 /// Steps of a window of a recurrent network.

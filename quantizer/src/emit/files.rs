@@ -19,7 +19,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     write_all(&[(path, bytes)])
 }
 
-/// Writes all files, each as [`write`] does, or none where one of them cannot be written. What a device or pipe was given is
+/// Writes all files, each as [`write()`] does, or none where one of them cannot be written. What a device or pipe was given is
 /// given.
 pub fn write_all(files: &[(&Path, impl AsRef<[u8]>)]) -> Result<()> {
     // Everything that is likely to fail is done before the first file takes its place.

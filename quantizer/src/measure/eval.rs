@@ -8,8 +8,7 @@ use serde::Serialize;
 
 use super::size::bits_per_weight;
 use super::unrounded::Unrounded;
-use crate::data::Recording;
-use crate::data::{Dataset, Sizes};
+use crate::data::{Dataset, Recording, Sizes};
 use crate::policy::Policy;
 use crate::runtime::with_head;
 

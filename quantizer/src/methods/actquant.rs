@@ -92,48 +92,47 @@ pub(crate) mod testing {
     use super::*;
     use crate::graph::Evaluator;
     use crate::graph::ops::{Linear, Lstm, Pointwise};
+    use crate::random::Random;
     use actq_kernels::math::Function;
 
-    fn noise(seed: &mut u64) -> f32 {
-        *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (*seed >> 40) as f32 / (1u32 << 23) as f32 - 1.0
+    fn matrix(name: &str, rows: usize, cols: usize, random: &mut Random) -> WeightMatrix {
+        WeightMatrix { name: name.into(), rows, cols, data: (0..rows * cols).map(|_| 0.7 * random.unit()).collect() }
     }
 
-    fn matrix(name: &str, rows: usize, cols: usize, seed: &mut u64) -> WeightMatrix {
-        WeightMatrix { name: name.into(), rows, cols, data: (0..rows * cols).map(|_| 0.7 * noise(seed)).collect() }
-    }
-
-    fn vector(len: usize, seed: &mut u64) -> Vec<f32> {
-        (0..len).map(|_| 0.3 * noise(seed)).collect()
+    fn vector(len: usize, random: &mut Random) -> Vec<f32> {
+        (0..len).map(|_| 0.3 * random.unit()).collect()
     }
 
     /// 3 -> 4 tanh -> 2
     pub(crate) fn mlp() -> Graph {
-        let mut seed = 1;
+        let mut random = Random(1);
         let mut graph = Graph::new(3);
-        graph.matrices = vec![matrix("a", 4, 3, &mut seed), matrix("b", 2, 4, &mut seed)];
-        graph.add(Linear { matrix: 0, bias: vector(4, &mut seed) }, &[0]).expect("it fits");
+        graph.matrices = vec![matrix("a", 4, 3, &mut random), matrix("b", 2, 4, &mut random)];
+        graph.add(Linear { matrix: 0, bias: vector(4, &mut random) }, &[0]).expect("it fits");
         graph.add(Pointwise(Function::Tanh), &[1]).expect("it fits");
-        graph.add(Linear { matrix: 1, bias: vector(2, &mut seed) }, &[2]).expect("it fits");
+        graph.add(Linear { matrix: 1, bias: vector(2, &mut random) }, &[2]).expect("it fits");
         graph
     }
 
     /// LSTM 2 -> 3, then 3 -> 2
     pub(crate) fn lstm() -> Graph {
-        let mut seed = 2;
+        let mut random = Random(2);
         let mut graph = Graph::new(2);
-        graph.matrices =
-            vec![matrix("w_ih", 12, 2, &mut seed), matrix("w_hh", 12, 3, &mut seed), matrix("out", 2, 3, &mut seed)];
-        let bias = vector(12, &mut seed);
+        graph.matrices = vec![
+            matrix("w_ih", 12, 2, &mut random),
+            matrix("w_hh", 12, 3, &mut random),
+            matrix("out", 2, 3, &mut random),
+        ];
+        let bias = vector(12, &mut random);
         graph.add(Lstm { hidden: 3, input: 0, state: 1, bias }, &[0]).expect("it fits");
-        graph.add(Linear { matrix: 2, bias: vector(2, &mut seed) }, &[1]).expect("it fits");
+        graph.add(Linear { matrix: 2, bias: vector(2, &mut random) }, &[1]).expect("it fits");
         graph
     }
 
     /// Random observations with the network's own actions.
     pub(crate) fn dataset(graph: &Graph, episodes: usize, steps: usize) -> Dataset {
-        let mut seed = 3;
-        let obs = Array3::from_shape_fn((episodes, steps, graph.obs_len), |_| noise(&mut seed));
+        let mut random = Random(3);
+        let obs = Array3::from_shape_fn((episodes, steps, graph.obs_len), |_| random.unit());
         let mut action = Array3::zeros((episodes, steps, graph.len_of(graph.output())));
         let mut evaluator = Evaluator::new(graph);
         for episode in 0..episodes {

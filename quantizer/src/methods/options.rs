@@ -18,7 +18,7 @@ pub enum Method {
     /// Round to nearest, widths by HSIC scores, scales by the Fisher information of the action loss (ActQuant, arXiv
     /// 2605.24011).
     ActQuant,
-    /// Widths by rows, pruning and distillation ([`best`]).
+    /// Widths by rows, pruning and distillation ([`super::best`]).
     Best,
 }
 

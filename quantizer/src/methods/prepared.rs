@@ -10,8 +10,7 @@ use super::options::{Method, Options};
 use super::quantized::Outcome;
 use crate::budget::Rate;
 use crate::calibrate::moments::{Moments, collect};
-use crate::data::Dataset;
-use crate::data::Recording;
+use crate::data::{Dataset, Recording};
 use crate::graph::Graph;
 
 /// Frames that every method with a recording needs at least; best needs more.

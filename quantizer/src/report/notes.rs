@@ -2,8 +2,7 @@
 
 use std::fmt;
 
-use crate::data::Recordings;
-use crate::data::{Range, runs};
+use crate::data::{Range, Recordings, runs};
 use crate::measure::check::Check;
 use crate::measure::eval::{ActivationShare, ErrorReport};
 

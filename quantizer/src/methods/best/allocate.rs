@@ -3,7 +3,7 @@
 //! Rows (output neurons) differ far more in what they do to the actions than columns do. Row `r` at width `b` is expected to
 //! cost `eps_b * g_r * sum_c w_rc^2 h_c` of squared action error; one Lagrange multiplier, found by bisection, weighs that
 //! against bits. A row of 0 bits gives its bias alone; where its output only feeds matrices through elementwise functions, it
-//! disappears with the columns that it fed (see [`super::compact`]): what those columns carried is its error, and their bits
+//! disappears with the columns that it fed (see [`mod@super::compact`]): what those columns carried is its error, and their bits
 //! count as its saving.
 
 use actq_kernels::Width;
