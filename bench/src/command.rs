@@ -19,7 +19,10 @@ fn binary() -> &'static Path {
         let folder = test.ancestors().nth(2).expect("the test is in a folder of its profile");
         let profile = folder.file_name().and_then(|name| name.to_str()).expect("a profile's name is text");
         let profile = if profile == "debug" { "dev" } else { profile };
-        cargo_build("actq", &["--package", "actq", "--bin", "actq", "--profile", profile], &[]).expect("actq builds");
+        // With this package, for the features that the tests were built with: else cargo would build the quantizer once more.
+        let packages = ["--package", "actq", "--package", env!("CARGO_PKG_NAME")];
+        let command = [&packages[..], &["--bin", "actq", "--profile", profile]].concat();
+        cargo_build("actq", &command, &[]).expect("actq builds");
         folder.join(format!("actq{}", std::env::consts::EXE_SUFFIX))
     })
 }

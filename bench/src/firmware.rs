@@ -6,9 +6,12 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{LazyLock, Mutex};
 
+use actq::budget::Budget;
+use actq::data::Recordings;
+use actq::emit::files;
+use actq::methods::{Activations, Method, Options};
+use actq::pipeline::quantize;
 use actq::policy::Policy;
-use actq::quantize::{Activations, Budget, Method, Options, quantize};
-use actq::{files, writer};
 use actq_boards::{Target, root};
 use actq_kernels::Width;
 use anyhow::{Context, Result, anyhow, ensure};
@@ -33,86 +36,76 @@ pub(crate) fn cargo_build(what: &str, arguments: &[&str], environment: &[(&str, 
     Ok(())
 }
 
-/// What this process has built: the ELF file by package, binary and folder. Even where nothing is to be built, cargo takes a while
-/// to find out, and runs one build at a time.
-static BUILT: Mutex<BTreeMap<(&str, String, PathBuf), PathBuf>> = Mutex::new(BTreeMap::new());
-
 const APPLICATION: &str = "actq-firmware-demo";
 const BENCH: &str = "actq-firmware-bench";
+
+/// The folders of the ELF files that this process has built, by package and target. Even where nothing is to be built, cargo takes
+/// a while to find out.
+static BUILT: Mutex<BTreeMap<(&str, Target), PathBuf>> = Mutex::new(BTreeMap::new());
+
+/// Builds a package once.
+fn once(package: &'static str, target: Target, build: impl FnOnce() -> Result<PathBuf>) -> Result<PathBuf> {
+    // A build that panicked has left nothing in the map.
+    let mut built = BUILT.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    if let Some(folder) = built.get(&(package, target)) {
+        return Ok(folder.clone());
+    }
+    let folder = build()?;
+    built.insert((package, target), folder.clone());
+    Ok(folder)
+}
 
 /// Builds the application with an image built in that is the same in all runs, and gives the path of the ELF file. Other images
 /// are run from the slot.
 pub fn application(target: Target) -> Result<PathBuf> {
-    once(APPLICATION, APPLICATION, target_dir(), target, target.profile(), &[])
+    let build = || application_in_folder(target, built_in()?);
+    Ok(once(APPLICATION, target, build)?.join(APPLICATION))
 }
 
 /// Builds the application with `image` built in.
 pub fn application_with(target: Target, image: &Path) -> Result<PathBuf> {
-    build(APPLICATION, APPLICATION, &target_dir(), target, target.profile(), &[("ACTQ_IMAGE", &absolute(image)?)])
+    Ok(application_in_folder(target, image)?.join(APPLICATION))
 }
 
-/// Builds a binary of `firmware-bench`.
-pub fn bench(binary: &str, target: Target) -> Result<PathBuf> {
+fn application_in_folder(target: Target, image: &Path) -> Result<PathBuf> {
+    let image = fs::canonicalize(image).with_context(|| format!("{}: cannot be read", image.display()))?;
+    let image = ("ACTQ_IMAGE", &*image.to_string_lossy());
+    build(APPLICATION, &[APPLICATION], &target_dir(), target, target.profile(), &[image])
+}
+
+/// Builds the binaries of `firmware-bench` that run on a target's board, and gives the path of one's ELF file.
+pub fn binary(name: &str, target: Target) -> Result<PathBuf> {
     let board = target.board();
-    ensure!(board.shows.contains(&binary), "firmware {binary} does not run on {}", board.name);
-    once(BENCH, binary, target_dir(), target, target.profile(), &[])
+    ensure!(board.shows.contains(&name), "firmware {name} does not run on {}", board.name);
+    let build = || build(BENCH, board.shows, &target_dir(), target, target.profile(), &[]);
+    Ok(once(BENCH, target, build)?.join(name))
 }
 
-/// As [`bench`], without the assembler (`ACTQ_BACKEND=portable`).
-pub fn bench_portable(binary: &str, target: Target) -> Result<PathBuf> {
+/// As [`binary`], without the assembler (`ACTQ_BACKEND=portable`).
+pub fn portable_binary(name: &str, target: Target) -> Result<PathBuf> {
     if !target.has_assembler() {
-        return bench(binary, target);
+        return binary(name, target);
     }
     // In a folder of its own, so that builds of both kinds stay.
-    once(BENCH, binary, target_dir().join("portable"), target, "release", &[("ACTQ_BACKEND", "portable")])
+    let folder = target_dir().join("portable");
+    Ok(build(BENCH, &[name], &folder, target, "release", &[("ACTQ_BACKEND", "portable")])?.join(name))
 }
 
-fn once(
-    package: &'static str,
-    binary: &str,
-    dir: PathBuf,
-    target: Target,
-    profile: &str,
-    environment: &[(&str, &str)],
-) -> Result<PathBuf> {
-    let key = (package, format!("{binary} {}", target.triple()), dir.clone());
-    // A build that panicked has left nothing in the map.
-    let mut built = BUILT.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-    if let Some(elf) = built.get(&key) {
-        return Ok(elf.clone());
-    }
-    let image = if package == APPLICATION { Some(absolute(built_in()?)?) } else { None };
-    let image = image.as_deref().map(|image| ("ACTQ_IMAGE", image));
-    let environment: Vec<_> = environment.iter().copied().chain(image).collect();
-    let elf = build(package, binary, &dir, target, profile, &environment)?;
-    built.insert(key, elf.clone());
-    Ok(elf)
-}
-
+/// Builds binaries of a package and gives the folder of their ELF files.
 fn build(
     package: &str,
-    binary: &str,
+    binaries: &[&str],
     dir: &Path,
     target: Target,
     profile: &str,
     environment: &[(&str, &str)],
 ) -> Result<PathBuf> {
     let folder = dir.to_string_lossy();
-    cargo_build(
-        &format!("firmware {binary} for {}", target.triple()),
-        &[
-            &["--package", package, "--bin", binary, "--target", target.triple()][..],
-            &["--profile", profile, "--target-dir", &folder],
-        ]
-        .concat(),
-        environment,
-    )?;
-    Ok(dir.join(target.triple()).join(profile).join(binary))
-}
-
-fn absolute(image: &Path) -> Result<String> {
-    let image = fs::canonicalize(image).with_context(|| format!("{}: cannot be read", image.display()))?;
-    Ok(image.to_string_lossy().into_owned())
+    let mut arguments = vec!["--package", package, "--target", target.triple(), "--profile", profile];
+    arguments.extend(["--target-dir", &folder]);
+    arguments.extend(binaries.iter().flat_map(|binary| ["--bin", binary]));
+    cargo_build(&format!("{package} for {}", target.triple()), &arguments, environment)?;
+    Ok(dir.join(target.triple()).join(profile))
 }
 
 /// The image that [`application`] carries: the UR3 policy at 3 bits, rounded.
@@ -126,7 +119,7 @@ fn write_built_in() -> Result<PathBuf> {
     let policy = Policy::load(&ur3())?;
     let options =
         Options { group: 32, activations: Activations::Int8, ..Options::new(Method::Rtn, Budget::Width(Width::W3)) };
-    let bytes = writer::image(&policy, &quantize(&policy.graph, &[], &options)?)?;
+    let bytes = quantize(&policy, &Recordings::default(), &options, |_, _| {})?.image;
     // Cargo builds anew what includes a newer file.
     if fs::read(&path).ok().as_ref() != Some(&bytes) {
         files::write(&path, &bytes)?;

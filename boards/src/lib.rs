@@ -57,7 +57,7 @@ impl Transport {
 macro_rules! targets {
     ($($(#[doc = $doc:literal])* $target:ident: $triple:literal on $board:ident;)*) => {
         /// What the firmware is built for: a board and rustc's target.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
         pub enum Target {
             $($(#[doc = $doc])* $target,)*
         }

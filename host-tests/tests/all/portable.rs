@@ -7,7 +7,7 @@ use anyhow::{Result, ensure};
 /// Instructions of a whole call of 256 x 256 weights by width, lanes and group. The firmware compares the results with the
 /// reference's, bit for bit.
 fn counts(target: Target) -> Result<Vec<(String, f64)>> {
-    let elf = firmware::bench_portable("portable", target)?;
+    let elf = firmware::portable_binary("portable", target)?;
     let counter = Counter::build()?;
     let mut command = qemu::command_on(target, &elf, None, "")?;
     counter.attach(&mut command, &elf)?;

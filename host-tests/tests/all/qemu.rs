@@ -3,14 +3,13 @@
 use std::fs;
 use std::path::Path;
 
-use actq::dataset::recording::Recording;
-use actq::dataset::{Dataset, Sizes};
-use actq::eval;
-use actq::graph::Graph;
+use actq::budget::Budget;
+use actq::data::{Dataset, Recording, Recordings, Sizes};
+use actq::measure::eval;
+use actq::methods::{Activations, Method, Options};
+use actq::pipeline::quantize;
 use actq::policy::Policy;
-use actq::quantize::{Activations, Budget, Method, Options, quantize};
 use actq::runtime::{ImageBuffer, with_head};
-use actq::writer;
 use actq_bench::firmware::{self, built_in};
 use actq_bench::qemu::{self, Server};
 use actq_bench::{Target, golden, shared_policies, ur3};
@@ -24,14 +23,14 @@ const STEPS: usize = 208;
 
 fn rtn(policy: &Policy, width: Width, group: usize, activations: Activations) -> Result<Vec<u8>> {
     let options = Options { group, activations, ..Options::new(Method::Rtn, Budget::Width(width)) };
-    writer::image(policy, &quantize(&policy.graph, &[], &options)?)
+    Ok(quantize(policy, &Recordings::default(), &options, |_, _| {})?.image)
 }
 
 #[test]
 fn kernels_give_the_golden_sums_on_the_target() -> Result<()> {
     let cases = golden::cases(1);
     for target in [Target::Fpu, Target::NoFpu] {
-        let elf = firmware::bench("golden", target)?;
+        let elf = firmware::binary("golden", target)?;
         let output = qemu::run(qemu::command(&elf, None, "")?, &golden::stream(&cases))?;
         let text = String::from_utf8_lossy(&output.stdout);
         ensure!(output.status.success(), "{target:?}: {text}");
@@ -48,7 +47,7 @@ fn portable_kernels_give_the_golden_sums_on_the_targets_without_assembler() -> R
     let short: Vec<_> = cases.iter().filter(fits).cloned().collect();
     ensure!(short.len() > cases.len() / 2, "too few cases are short");
     for (target, cases) in [(Target::NoDsp, &cases), (Target::Small, &short), (Target::Riscv, &cases)] {
-        let elf = firmware::bench("golden", target)?;
+        let elf = firmware::binary("golden", target)?;
         let output = qemu::run(qemu::command_on(target, &elf, None, "")?, &golden::stream(cases))?;
         let text = String::from_utf8_lossy(&output.stdout);
         ensure!(output.status.success(), "{target:?}: {text}");
@@ -64,7 +63,7 @@ fn a_wrong_sum_fails_the_golden_run() -> Result<()> {
     // The last case may end in padding rows, whose sums are not compared: all four of its last quad's are changed.
     stream[last_sum - 12..last_sum + 4].iter_mut().for_each(|byte| *byte ^= 1);
     for target in [Target::Fpu, Target::Riscv] {
-        let output = qemu::run(qemu::command_on(target, &firmware::bench("golden", target)?, None, "")?, &stream)?;
+        let output = qemu::run(qemu::command_on(target, &firmware::binary("golden", target)?, None, "")?, &stream)?;
         let text = String::from_utf8_lossy(&output.stdout);
         assert!(!output.status.success() && text.contains("case 2: sums"), "{target:?}: {text}");
     }
@@ -232,15 +231,14 @@ fn eight_bits_stay_close_to_the_recorded_actions() -> Result<()> {
 fn gptq_beats_rounding_at_low_bits() -> Result<()> {
     let dir = ur3();
     let policy = Policy::load(&dir)?;
-    let calib = Recording::Calib.require(Some(&dir), None, Sizes::of(&policy), "gptq")?;
-    let moments = actq::quantize::moments::collect(&policy.graph, &calib, |_| {});
-    let nmse = |graph: &Graph, method| -> Result<f64> {
+    let recordings = Recordings::load(&policy)?;
+    let nmse = |method| -> Result<f64> {
         let options = Options::new(method, Budget::Width(Width::W3));
-        let buffer = ImageBuffer::new(&writer::image(&policy, &quantize(graph, &moments, &options)?)?);
+        let buffer = quantize(&policy, &recordings, &options, |_, _| {})?.buffer();
         let image = buffer.image(&dir)?;
         Ok(eval::evaluate(image, &eval::heldout(&dir, &image)?)?.nmse)
     };
-    let (gptq, plain) = (nmse(&policy.graph, Method::Gptq)?, nmse(&policy.graph, Method::Rtn)?);
+    let (gptq, plain) = (nmse(Method::Gptq)?, nmse(Method::Rtn)?);
     assert!(gptq < plain / 2.0, "{gptq} against {plain}");
     Ok(())
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
 
-use actq::inspect::{group_name, table};
+use actq::report::table::{group_name, table};
 use actq_bench::cycles::{CODE_LINES, Code};
 use actq_bench::qemu::{self, Counter};
 use actq_bench::{Target, firmware, root, ur3};
@@ -128,7 +128,7 @@ fn measure() -> Result<Figures> {
         let scales = group_name(group);
         figures.insert(format!("instructions, {name} {bits} bits, scales {scales}, {rows}x{cols}"), instructions);
     }
-    let stack = firmware::bench("stack", Target::Fpu)?;
+    let stack = firmware::binary("stack", Target::Fpu)?;
     for head in heads::measure(&[ur3()], &counter, 0)? {
         let name = head.record.name();
         figures.insert(format!("{HEAD}{name}"), head.record.instructions);
@@ -148,7 +148,7 @@ fn measure() -> Result<Figures> {
 /// instruction cache must hold.
 fn code() -> Result<Figures> {
     let code = runtime()?;
-    let with_polls = Code::read(&firmware::bench("runtime-poll", Target::Fpu)?)?;
+    let with_polls = Code::read(&firmware::binary("runtime-poll", Target::Fpu)?)?;
     let mut figures =
         Figures::from([(RUNTIME.to_owned(), code.bytes()), (RUNTIME_WITH_POLLS.to_owned(), with_polls.bytes())]);
     for function in code.functions().iter().filter(|f| f.name.starts_with("actq_") && !f.name.contains("::")) {
@@ -160,7 +160,7 @@ fn code() -> Result<Figures> {
 
 /// The code of everything that an application calls that does not cut its steps.
 fn runtime() -> Result<Code> {
-    Code::read(&firmware::bench("runtime", Target::Fpu)?)
+    Code::read(&firmware::binary("runtime", Target::Fpu)?)
 }
 
 fn largest_functions(code: &Code) -> String {

@@ -8,12 +8,12 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use actq::graph::NodeKind;
+use actq::emit::{self, files};
+use actq::graph::ops::{Add, Gru, LayerNorm, Lstm, Normalize, Pointwise, RmsNorm};
+use actq::methods::{Activations, Outcome};
 use actq::policy::Policy;
-use actq::quantize::{Activations, Outcome};
 use actq::random::Random;
 use actq::runtime::ImageBuffer;
-use actq::{files, writer};
 use actq_bench::networks::{Builder, accumulating};
 use actq_bench::qemu::Counter;
 use actq_bench::{Target, firmware, profile, root};
@@ -329,7 +329,7 @@ fn resumed(elf: &Path, counter: &Counter, most: &Rates) -> Result<f64> {
                 let mut builder = Builder::new(cols);
                 builder.linear((rows, cols), Activations::Int8, width, 0, true)?;
                 let (policy, outcomes) = builder.finish("polls".to_owned(), false);
-                let bytes = writer::image(&policy, &outcomes)?;
+                let bytes = emit::image(&policy, &outcomes)?;
                 let buffer = ImageBuffer::new(&bytes);
                 let image = buffer.image(Path::new("polls"))?;
                 let observations = &observations(cols)[..1];
@@ -359,7 +359,7 @@ fn observations(len: usize) -> Vec<Vec<f32>> {
 fn images() -> Result<Vec<(String, Vec<u8>)>> {
     let mut images = Vec::new();
     for (policy, outcomes) in policies()? {
-        images.push((policy.name.clone(), writer::image(&policy, &outcomes)?));
+        images.push((policy.name.clone(), emit::image(&policy, &outcomes)?));
     }
     let mut builder = Builder::new(OBSERVATION);
     for rows in LENGTHS {
@@ -368,7 +368,7 @@ fn images() -> Result<Vec<(String, Vec<u8>)>> {
         }
     }
     let (policy, outcomes) = builder.finish("biases that are added".to_owned(), false);
-    images.push((policy.name.clone(), accumulating(&writer::image(&policy, &outcomes)?)?));
+    images.push((policy.name.clone(), accumulating(&emit::image(&policy, &outcomes)?)?));
     Ok(images)
 }
 
@@ -410,30 +410,28 @@ fn policies() -> Result<Vec<(Policy, Vec<Outcome>)>> {
         [(8, 8, false), (40, 2, true), (256, 30, false), (256, 30, true), (40, 12, true)]
     {
         let mut builder = Builder::new(observation);
-        builder.part(action);
+        builder.part(action)?;
         policies.push(builder.finish(format!("{observation} to {action}, contract {contract}"), contract));
     }
     for (name, contract) in [("functions", false), ("functions with contract", true)] {
         let mut builder = Builder::new(if contract { OBSERVATION } else { 256 });
         for len in LENGTHS {
             for function in Function::ALL {
-                let input = builder.part(len);
-                builder.node(NodeKind::Function(function), input);
+                let input = builder.part(len)?;
+                builder.node(Pointwise(function), &[input])?;
             }
             let [mean, scale] = [builder.values(len), vec![1.5; len]];
-            builder.node_of_part(
-                len,
-                NodeKind::Normalize { mean: mean.clone(), scale: scale.clone(), pre_clip: 10.0, clip: 5.0 },
-            );
+            builder
+                .node_of_part(len, Normalize { mean: mean.clone(), scale: scale.clone(), pre_clip: 10.0, clip: 5.0 })?;
             let limitless = f32::INFINITY;
             builder.node_of_part(
                 len,
-                NodeKind::Normalize { mean: mean.clone(), scale: scale.clone(), pre_clip: limitless, clip: limitless },
-            );
-            builder.node_of_part(len, NodeKind::LayerNorm { weight: scale.clone(), bias: mean, eps: 1e-5 });
-            builder.node_of_part(len, NodeKind::RmsNorm { weight: scale, eps: 1e-5 });
-            let (a, b) = (builder.part(len), builder.part(len));
-            builder.node(NodeKind::Add { with: b }, a);
+                Normalize { mean: mean.clone(), scale: scale.clone(), pre_clip: limitless, clip: limitless },
+            )?;
+            builder.node_of_part(len, LayerNorm { weight: scale.clone(), bias: mean, eps: 1e-5 })?;
+            builder.node_of_part(len, RmsNorm { weight: scale, eps: 1e-5 })?;
+            let (a, b) = (builder.part(len)?, builder.part(len)?);
+            builder.node(Add, &[a, b])?;
         }
         for hidden in HIDDEN {
             for width in [Width::W2, Width::W4] {
@@ -442,15 +440,15 @@ fn policies() -> Result<Vec<(Policy, Vec<Outcome>)>> {
                 let input = builder.matrix(4 * hidden, cols, Activations::Int8, &all, 0)?;
                 let state = builder.matrix(4 * hidden, hidden, Activations::Int8, &all, 0)?;
                 let bias = builder.values(4 * hidden);
-                builder.node_of_part(cols, NodeKind::Lstm { hidden, input, state, bias });
+                builder.node_of_part(cols, Lstm { hidden, input, state, bias })?;
                 let all = vec![Some(width); 3 * hidden];
                 let input = builder.matrix(3 * hidden, cols, Activations::Int8, &all, 0)?;
                 let state = builder.matrix(3 * hidden, hidden, Activations::Int8, &all, 0)?;
                 let (input_bias, state_bias) = (builder.values(3 * hidden), builder.values(3 * hidden));
-                builder.node_of_part(cols, NodeKind::Gru { hidden, input, state, input_bias, state_bias });
+                builder.node_of_part(cols, Gru { hidden, input, state, input_bias, state_bias })?;
             }
         }
-        builder.part(12);
+        builder.part(12)?;
         policies.push(builder.finish(name.to_owned(), contract));
     }
     Ok(policies)

@@ -1,6 +1,6 @@
 //! Whole calls of the kernels on the Cortex-M4, counted and modelled.
 
-use actq::inspect::{group_name, table};
+use actq::report::table::{group_name, table};
 use actq_bench::cycles::Code;
 use actq_bench::qemu::{self, Counter};
 use actq_bench::{Target, firmware};
@@ -57,7 +57,7 @@ impl Record {
 
 /// Runs the bench firmware.
 pub(crate) fn measure(counter: &Counter, wait_states: u64) -> Result<Vec<Record>> {
-    let elf = firmware::bench("bench", Target::Fpu)?;
+    let elf = firmware::binary("bench", Target::Fpu)?;
     let mut command = qemu::command(&elf, None, "")?;
     counter.attach(&mut command, &elf)?;
     let output = qemu::run(command, &[])?;
