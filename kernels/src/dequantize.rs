@@ -1,6 +1,6 @@
 //! Weights back from their codes, for hosts.
 
-use crate::linear::RowBlock;
+use crate::image::RowBlock;
 
 /// Row `i` of the block as f32: `level * group scale * row scale`, the integers multiplied first. Fills `out` up to the
 /// number of columns.

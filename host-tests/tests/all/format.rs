@@ -105,9 +105,9 @@ fn the_hex_example_reads_as_documented() {
     assert_eq!((image.rate_hz(), image.name()), (50.0, "tiny"));
     assert_eq!(image.digest(), std::array::from_fn(|i| i as u8));
 
-    let contract = image.contract();
-    assert_eq!((floats(contract.low), floats(contract.high)), (vec![-40.0; 3], vec![40.0; 3]));
-    assert!(contract.scale.is_empty() && contract.offset.is_empty() && contract.max_step.is_empty());
+    let [scale, offset, low, high, max_step] = image.contract_arrays();
+    assert_eq!((floats(low), floats(high)), (vec![-40.0; 3], vec![40.0; 3]));
+    assert!(scale.is_empty() && offset.is_empty() && max_step.is_empty());
 
     assert_eq!(image.op_count(), 1);
     let op = image.ops().next().expect("there is an operation");

@@ -55,7 +55,7 @@ impl<'a> Product<'a> {
 /// `acc[i]` becomes `sum over groups of scale * sum over columns of level * x`, modulo 2^32, for row `first_row + i`. The sums
 /// of padding rows have no meaning.
 ///
-/// The true sum fits an i32 where [`crate::linear::worst_case`] says so, which [`crate::Image::new_checked`] has verified.
+/// The true sum fits an i32 where [`crate::image::worst_case`] says so, which [`crate::Image::new_checked`] has verified.
 #[inline(never)]
 pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i32]) -> Result<(), Mismatch> {
     integers::gemv(Product::new(block, x, first_row, acc)?);

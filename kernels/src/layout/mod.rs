@@ -79,7 +79,7 @@ pub use lanes::{GROUPS, Lanes, MAX_GROUP, MAX_PAIRED_GROUPED, is_group};
 pub use pack::pack;
 pub(crate) use pow2::{div_down, div_up, round_up};
 pub(crate) use table::with_format;
-pub use table::{LAYOUTS, Layout};
+pub use table::{LAYOUTS, Layout, StripLog};
 pub use width::Width;
 
 /// Changes whenever a packed layout changes meaning; stamped into every image.

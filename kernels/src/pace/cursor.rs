@@ -1,7 +1,6 @@
 //! Where a step in pieces stands.
 
 use crate::layout::Width;
-use crate::norm::Moments;
 use crate::x::Scale;
 
 /// Where an evaluation stands.
@@ -38,4 +37,12 @@ pub(crate) struct LinearCursor {
     pub(crate) prepared: Option<Width>,
     /// Rows of the block that are done.
     pub(crate) row: usize,
+}
+
+/// What a norm has summed so far: a piece of it goes on where the last one ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Moments {
+    pub(crate) sum: f32,
+    /// Of the squares of the differences from the mean.
+    pub(crate) squares: f32,
 }

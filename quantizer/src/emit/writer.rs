@@ -2,8 +2,10 @@
 
 use std::path::Path;
 
-use actq_kernels::image::{Kind, OpKind, Region, checksum, half_words, header as h, header::op};
-use actq_kernels::layout::{self, LAYOUT_STAMP};
+use actq_kernels::image::{
+    BlockRecord, Header, MatrixRecord, OpRecord, Records, Region, half_words, header as h, seal,
+};
+use actq_kernels::layout::{self, BlockShape};
 use anyhow::{Context, Result, ensure};
 
 use super::lower::lower;
@@ -40,52 +42,45 @@ pub fn image(policy: &Policy, matrices: &[Outcome]) -> Result<Vec<u8>> {
         writer.push_floats(observation);
         writer.push_floats(&vec![0.0; policy.act_len]);
     }
-    let kind = match policy.kind {
-        Kind::Step => 0,
-        Kind::Chunk => 1,
+    let header = Header {
+        kind: policy.kind,
+        obs_len: policy.graph.obs_len,
+        act_len: policy.act_len,
+        chunk: policy.chunk,
+        execute: policy.execute,
+        rate_hz: policy.rate_hz,
+        scratch: program.words,
+        state: program.state,
+        observation: program.observation.offset,
+        output: program.output.offset,
+        action: program.action.offset,
+        work: program.work,
+        matrices: Records { offset: writer.matrices, count: matrices.len() },
+        ops: Records { offset: ops, count: program.steps.len() },
+        contract,
+        contract_flags: flags,
+        name: Records { offset: name, count: policy.name.len() },
+        self_test: Records { offset: self_test, count: steps },
+        weights: policy.weights as u32,
+        digest: policy.digest,
     };
-    let Writer { mut words, matrices: first_matrix } = writer;
-    words[0] = h::MAGIC;
-    words[h::W_VERSION] = halves(h::VERSION.into(), h::WORDS)?;
-    words[h::W_LAYOUT] = LAYOUT_STAMP;
-    words[h::W_KIND] = kind | halves(0, program.steps.len())?;
-    words[h::W_OPS] = ops;
-    words[h::W_SIZES] = halves(policy.graph.obs_len, policy.act_len)?;
-    words[h::W_CHUNK] = halves(policy.chunk, policy.execute)?;
-    words[h::W_SCRATCH] = program.words as u32;
-    words[h::W_STATE] = halves(program.state.offset, program.state.len)?;
-    words[h::W_OBS_OUT] = halves(program.observation.offset, program.output.offset)?;
-    words[h::W_ACTION_WORK] = halves(program.action.offset, program.work.offset)?;
-    words[h::W_WORK_FLAGS] = halves(program.work.len, flags)?;
-    words[h::W_CONTRACT] = contract;
-    words[h::W_RATE] = policy.rate_hz.to_bits();
-    words[h::W_SELF_TEST] = self_test;
-    words[h::W_STEPS_NAME] = halves(steps, policy.name.len())?;
-    words[h::W_NAME] = name;
-    words[h::W_WEIGHTS] = policy.weights as u32;
-    words[h::W_MATRICES] = first_matrix;
-    words[h::W_MATRIX_COUNT] = halves(matrices.len(), 0)?;
-    for (word, bytes) in words[h::W_DIGEST..].iter_mut().zip(policy.digest.chunks_exact(4)) {
-        *word = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
-    }
-    let actions = self_test_actions(&seal(&words), &observations)?;
+    let mut words = writer.words;
+    words[..h::WORDS].copy_from_slice(&header.emit()?);
+    let actions = self_test_actions(&sealed(&words)?, &observations)?;
     for (step, action) in actions.iter().enumerate() {
         let at = self_test as usize + step * (policy.graph.obs_len + policy.act_len) + policy.graph.obs_len;
         for (word, value) in words[at..].iter_mut().zip(action) {
             *word = value.to_bits();
         }
     }
-    Ok(seal(&words))
+    sealed(&words)
 }
 
-/// Fills in length and checksum and gives the bytes.
-fn seal(words: &[u32]) -> Vec<u8> {
+/// The image's bytes, with length and checksum.
+fn sealed(words: &[u32]) -> Result<Vec<u8>> {
     let mut bytes: Vec<u8> = words.iter().flat_map(|w| w.to_le_bytes()).collect();
-    let len = (bytes.len() as u32).to_le_bytes();
-    bytes[4 * h::W_BYTES..][..4].copy_from_slice(&len);
-    let crc = checksum(&bytes).to_le_bytes();
-    bytes[4 * h::W_CRC..][..4].copy_from_slice(&crc);
-    bytes
+    seal(&mut bytes).context("the image has more than 4 GB")?;
+    Ok(bytes)
 }
 
 /// Observations that reach every input: spread over about two standard deviations where the policy normalizes, else over -1
@@ -115,13 +110,6 @@ fn self_test_actions(bytes: &[u8], observations: &[Vec<f32>]) -> Result<Vec<Vec<
     with_head(image, |head| {
         observations.iter().map(|obs| Ok(head.step(obs).context("self-test of the new image")?.to_vec())).collect()
     })
-}
-
-/// Two u16 in a word.
-fn halves(low: usize, high: usize) -> Result<u32> {
-    let fits = low <= 0xffff && high <= 0xffff;
-    ensure!(fits, "a size of the policy ({}) exceeds the format's limit of 65535", low.max(high));
-    Ok(low as u32 | (high as u32) << 16)
 }
 
 struct Writer {
@@ -172,33 +160,15 @@ impl Writer {
                 let index = rows.iter().map(|&r| u16::try_from(r)).collect::<Result<Vec<_>, _>>()?;
                 self.push(half_words(&index))
             };
-            records.extend([
-                shape.width.bits() | u32::from(shape.lanes.code()) << 8 | halves(0, shape.rows)?,
-                weights,
-                scales,
-                index,
-            ]);
+            let BlockShape { width, lanes, rows, .. } = *shape;
+            records.push(BlockRecord { width, lanes, rows, weights, scales, index }.emit()?);
         }
-        Ok([
-            halves(matrix.rows, matrix.cols)?,
-            halves(matrix.group, outcome.x_max.into())?,
-            halves(blocks.len(), 0)?,
-            self.push(records),
-        ])
+        let Quantized { rows, cols, group, .. } = *matrix;
+        let blocks = Records { count: records.len(), offset: self.push(records.into_iter().flatten()) };
+        Ok(MatrixRecord { rows, cols, group, x_max: outcome.x_max, blocks }.emit()?)
     }
 
     fn op(&mut self, step: &Step<Region>) -> Result<[u32; h::OP_WORDS]> {
-        let (code, detail) = match step.kind {
-            OpKind::Normalize => (op::NORMALIZE, 0),
-            OpKind::Linear { accumulate } => (op::LINEAR, u8::from(accumulate)),
-            OpKind::Function(function) => (op::FUNCTION, function as u8),
-            OpKind::LayerNorm => (op::LAYER_NORM, 0),
-            OpKind::RmsNorm => (op::RMS_NORM, 0),
-            OpKind::Add => (op::ADD, 0),
-            OpKind::Copy => (op::COPY, 0),
-            OpKind::LstmCell => (op::LSTM_CELL, 0),
-            OpKind::GruCell => (op::GRU_CELL, 0),
-        };
         let (bias, data) = match &step.data {
             StepData::None => (0, 0),
             StepData::Constants(values) => (0, self.push_floats(values)),
@@ -208,11 +178,7 @@ impl Writer {
             }
         };
         let offset = |region: Option<Region>| region.map_or(0, |r| r.offset);
-        Ok([
-            u32::from(code) | u32::from(detail) << 8 | halves(0, step.dst.len)?,
-            halves(step.dst.offset, offset(step.src))?,
-            bias | halves(0, offset(step.third))?,
-            data,
-        ])
+        let (src, third) = (offset(step.src), offset(step.third));
+        Ok(OpRecord { kind: step.kind, dst: step.dst, src, third, bias, data }.emit()?)
     }
 }

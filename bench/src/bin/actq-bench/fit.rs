@@ -19,7 +19,7 @@ use actq_bench::qemu::Counter;
 use actq_bench::{Target, firmware, profile, root};
 use actq_kernels::Width;
 use actq_kernels::cost::{self, Cost, Feature};
-use actq_kernels::image::{Op, OpKind};
+use actq_kernels::image::{Op, OpKind, op};
 use actq_kernels::math::Function;
 use anyhow::Result;
 
@@ -128,6 +128,7 @@ fn table(instructions: &Rates, cycles: &Rates, most: &Rates) -> String {
     let mut text =
         "//! Written by `cargo xtask fit`: expected instructions, expected cycles, instructions at most.\n\n\
                     use super::feature::{Feature, Gemv, Prepare, Scales::*, Strips::*};\n\
+                    use crate::image::op;\n\
                     use crate::layout::{Lanes::*, Width::*};\n\
                     use crate::math::Function;\n\n\
                     #[rustfmt::skip]\npub(super) const RATES: &[(Feature, [f64; 3])] = &[\n"
@@ -287,7 +288,12 @@ fn most(samples: &[Sample], polls: &[(f64, usize)], rates: &Rates) -> Rates {
     let varying: Vec<Feature> = Function::ALL
         .into_iter()
         .map(Feature::function)
-        .chain([Feature::NORMALIZE_VALUE, Feature::LSTM_VALUE, Feature::GRU_VALUE, Feature::CONTRACT])
+        .chain([
+            Feature::value(op::NORMALIZE),
+            Feature::value(op::LSTM_CELL),
+            Feature::value(op::GRU_CELL),
+            Feature::CONTRACT,
+        ])
         .collect();
     // Whole steps differ in much; only parts of them by themselves say what a value takes.
     for sample in samples.iter().filter(|s| s.features.contains_key(&Feature::POLL_OP)) {
@@ -312,7 +318,10 @@ fn most(samples: &[Sample], polls: &[(f64, usize)], rates: &Rates) -> Rates {
 /// What coming back to a linear operation takes for each of its blocks: from steps in short polls, whose number tells how often
 /// that was. The image's least budget is that of the rates before, which need not be exact here.
 fn resumed(elf: &Path, counter: &Counter, most: &Rates) -> Result<f64> {
-    let known: f64 = [Feature::POLL, Feature::ENTERED, Feature::LINEAR, Feature::PIECE].map(|f| most[&f]).iter().sum();
+    let known: f64 = [Feature::POLL, Feature::ENTERED, Feature::operation(op::LINEAR), Feature::PIECE]
+        .map(|f| most[&f])
+        .iter()
+        .sum();
     let mut resumed = 0.0f64;
     for (rows, cols) in [(128, 256), (96, 100), (64, 30)] {
         for blocks in [1, 4] {

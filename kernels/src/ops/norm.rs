@@ -1,30 +1,11 @@
-//! Normalizations, and sums of vectors.
+//! Norms over a vector.
 
 use core::ops::Range;
 
+use super::elementwise::constant;
 use crate::arch::sqrt;
-use crate::math::{clamp, zero_or_nan};
-
-/// `y = clamp((clamp(x, ±pre_clip) - mean) * scale, ±clip)`; an infinite clip does nothing. `mean` and `scale` hold f32 bits. An
-/// x that is not finite gives NaN.
-#[inline(never)]
-pub fn normalize(x: &[f32], mean: &[u32], scale: &[u32], pre_clip: f32, clip: f32, y: &mut [f32]) {
-    for (((y, x), &mean), &scale) in y.iter_mut().zip(x).zip(mean).zip(scale) {
-        // A clip would hide that a value before it has left f32's range.
-        let zero = zero_or_nan(*x);
-        let x = clamp(*x, -pre_clip, pre_clip);
-        let z = (x - (constant(mean) + zero)) * constant(scale);
-        *y = clamp(z, -clip, clip);
-    }
-}
-
-/// What a norm has summed so far: a piece of it goes on where the last one ended.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Moments {
-    sum: f32,
-    /// Of the squares of the differences from the mean.
-    squares: f32,
-}
+use crate::math::zero_or_nan;
+use crate::pace::cursor::Moments;
 
 /// In place `(x - mean) / sqrt(variance + eps) * weight + bias`, mean and biased variance over the vector (torch's LayerNorm).
 /// Sums run in order from the first element. Nothing is done where weights or biases are too few.
@@ -89,19 +70,6 @@ fn inverse_deviation(moments: &mut Moments, x: &[f32], squared: Range<usize>, ce
     1.0 / sqrt(moments.squares / count(x) + eps) + zero_or_nan(moments.squares)
 }
 
-/// `y += x`, as far as both go.
-#[inline(never)]
-pub fn add(x: &[f32], y: &mut [f32]) {
-    let len = x.len().min(y.len());
-    let ((x, xs), (y, ys)) = (x[..len].as_rchunks::<2>(), y[..len].as_rchunks_mut::<2>());
-    if let ([y], [x]) = (y, x) {
-        *y += *x;
-    }
-    for (y, x) in ys.iter_mut().zip(xs) {
-        *y = [y[0] + x[0], y[1] + x[1]];
-    }
-}
-
 fn count(x: &[f32]) -> f32 {
     x.len().max(1) as f32
 }
@@ -112,10 +80,4 @@ fn sum(start: f32, x: &[f32], of: impl Fn(f32) -> f32) -> f32 {
     let (rest, fours) = x.as_rchunks::<4>();
     let sum = rest.iter().fold(start, |sum, v| sum + of(*v));
     fours.iter().fold(sum, |sum, [a, b, c, d]| sum + of(*a) + of(*b) + of(*c) + of(*d))
-}
-
-/// An f32 constant as it stands in the image.
-#[inline(always)]
-fn constant(bits: u32) -> f32 {
-    f32::from_bits(u32::from_le(bits))
 }

@@ -1,69 +1,26 @@
 //! A quantized matrix times a vector, from f32 to f32: the order of operations that every machine follows.
 //!
-//! 1. `x` is quantized to integers `q` with one scale ([`crate::activations::Scale`]).
-//! 2. Per row, the integer sum `acc = sum_g s_g * sum_c level * q` in int32 ([`crate::gemv`]).
+//! 1. `x` is quantized to integers `q` with one scale ([`crate::x::Scale`]).
+//! 2. Per row, the integer sum `acc = sum_g s_g * sum_c level * q` in int32 ([`crate::arch::gemv`]).
 //! 3. `y = start + acc * (row_scale * x_scale)`, each operation rounded to f32, where `start` is the bias, or, where the
 //!    operation accumulates, the sum of the old `y` and the bias. Rows that no block holds (0 bits) keep `start`.
 
 use core::ops::Range;
 
+use super::elementwise::copy_le;
 use crate::arch;
 use crate::arch::gemv;
 use crate::error::Fault;
-use crate::image::{header::BLOCK_WORDS, row_block};
-use crate::layout::half::{bf16, half_word};
-use crate::layout::{Block, BlockShape, Lanes, MAX_GROUP, PAD_COLS, QUAD, STRIP};
+use crate::image::header::BLOCK_WORDS;
+use crate::image::{Matrix, RowBlock, row_block};
+use crate::layout::half::bf16;
+use crate::layout::{QUAD, STRIP};
 use crate::pace::cursor::LinearCursor;
 use crate::pace::meter::{Meter, Start, Work};
-use crate::x::{Plan, Prepared, Scale, max_prepared_words};
+use crate::x::{Plan, Prepared, Scale};
 
 /// Rows whose sums stand on the stack at once.
 pub(crate) const RUN: usize = 8 * STRIP;
-
-/// A matrix in an image: blocks of rows and a bias.
-#[derive(Clone, Copy, Debug)]
-pub struct Matrix<'a> {
-    /// Length of the output.
-    pub rows: usize,
-    /// Length of the input.
-    pub cols: usize,
-    /// Columns per u8 scale; 0 = row scales only.
-    pub group: usize,
-    /// Magnitude that the activations are quantized to: 127 for int8, up to 32767 for int16.
-    pub x_max: u16,
-    /// Bits of the f32 biases in the order of the output, or empty.
-    pub(crate) bias: &'a [u32],
-    /// The image's words, which the block records point into.
-    pub(crate) image: &'a [u32],
-    /// The block records.
-    pub(crate) records: &'a [u32],
-}
-
-/// Rows of one width with their scales and places in the output.
-#[derive(Clone, Copy, Debug)]
-pub struct RowBlock<'a> {
-    /// The packed codes.
-    pub block: Block<'a>,
-    /// bf16 row scales, two a word.
-    pub scales: &'a [u32],
-    /// u16 output indexes, two a word; empty where the rows follow each other from `first_row` on.
-    pub index: &'a [u32],
-    /// The output index of the first row, where there is no index.
-    pub first_row: usize,
-}
-
-/// `to = from`, as far as both go. On the target not by memcpy, which takes as much code as a kernel.
-pub(crate) fn copy(from: &[u32], to: &mut [u32]) {
-    arch::copy(from, to);
-}
-
-/// As [`copy`], of words as they stand in the image.
-pub(crate) fn copy_le(from: &[u32], to: &mut [u32]) {
-    copy(from, to);
-    if cfg!(target_endian = "big") {
-        to.iter_mut().for_each(|word| *word = u32::from_le(*word));
-    }
-}
 
 /// `len` of the outputs from `first` on, with their biases if there are any; `None` where there are too few.
 #[inline(always)]
@@ -81,18 +38,6 @@ fn outputs<'y>(
 }
 
 impl RowBlock<'_> {
-    /// The scale of the block's row `i`.
-    #[inline(always)]
-    pub fn scale(&self, i: usize) -> f32 {
-        bf16(half_word(self.scales, i))
-    }
-
-    /// The output index of the block's row `i`.
-    #[inline(always)]
-    pub fn output(&self, i: usize) -> usize {
-        if self.index.is_empty() { self.first_row + i } else { half_word(self.index, i) as usize }
-    }
-
     /// `y = start + acc * (row_scale * x_scale)` for the block's rows and their places in `y`, with a vector that was prepared
     /// for the block. `start` holds the bits of the whole output's biases; without it, and for rows with an index, y itself is
     /// the start. `None` where `start` or `y` is too short.
@@ -174,16 +119,6 @@ impl RowBlock<'_> {
 }
 
 impl Matrix<'_> {
-    /// The lanes of the matrix's blocks.
-    pub const fn lanes(&self) -> Lanes {
-        Lanes::of(self.x_max, self.group)
-    }
-
-    /// Words that the prepared activations take at most.
-    pub fn prepared_words(&self) -> usize {
-        max_prepared_words(self.cols, self.group)
-    }
-
     /// `y = W x + b`, or `y = y + b + W x` where `accumulate`, from where `at` stands and as far as the budget reaches; true when
     /// all is done. `work` holds at least [`Self::prepared_words`] words; `x` and `y` have the matrix's lengths.
     #[inline(never)]
@@ -251,26 +186,6 @@ impl Matrix<'_> {
         Ok(true)
     }
 
-    /// The bits of the values that the output starts from, where these are the biases and every row is written once, in order.
-    pub fn start_values(&self, accumulate: bool) -> Option<&[u32]> {
-        if accumulate || self.bias.is_empty() || !self.is_whole() { None } else { Some(self.bias) }
-    }
-
-    /// Blocks of rows.
-    pub(crate) fn block_count(&self) -> usize {
-        self.records.len() / BLOCK_WORDS
-    }
-
-    /// Whether the blocks hold all rows in the order of the output.
-    fn is_whole(&self) -> bool {
-        let mut rows = 0;
-        let (records, _) = self.records.as_chunks::<BLOCK_WORDS>();
-        records.iter().all(|[head, _, _, index]| {
-            rows += (u32::from_le(*head) >> 16) as usize;
-            *index == 0
-        }) && rows == self.rows
-    }
-
     /// Sets outputs to their biases, or adds these.
     fn start(&self, outputs: Range<usize>, y: &mut [f32], accumulate: bool) {
         let bias = self.bias.get(outputs.clone()).unwrap_or(&[]);
@@ -283,60 +198,4 @@ impl Matrix<'_> {
             copy_le(bias, bytemuck::must_cast_slice_mut(y));
         }
     }
-}
-
-/// The largest magnitude that an int32 sum of the block's rows can reach for activations up to `x_max`: the largest row sum of
-/// `|level| * scale`, times `x_max`. Exact, and so linear in the number of weights.
-pub fn worst_case(block: &Block<'_>, x_max: u16) -> i64 {
-    // A block of a valid shape always comes apart.
-    largest_sum(block).map_or(i64::MAX, |sum| i64::from(sum) * i64::from(x_max))
-}
-
-/// The largest row sum of `|level| * scale`. It has 31 bits, for there are at most 65535 columns of 128 * 255.
-///
-/// A strip's columns, as many of them as share a scale (or two where groups are taken in pairs), are a block of their own, and the
-/// GEMV of such a block and a unit vector gives one of its columns. So no other code has to know where the codes stand.
-#[inline(never)]
-fn largest_sum(block: &Block<'_>) -> Option<u32> {
-    let mut work = [0; max_prepared_words(MAX_GROUP - 1, MAX_GROUP)];
-    let mut column = [0; STRIP];
-    let (shape, mut words) = (block.shape(), block.words());
-    let (mut first, mut largest) = (0, 0);
-    while first < shape.rows {
-        let rows = shape.strip_rows().min(shape.rows - first);
-        let (mut sums, mut start) = ([0u32; STRIP], 0);
-        while start < shape.cols {
-            let groups = 1 + usize::from(shape.layout().x.pairs);
-            let cols = (shape.cols - start).min(if shape.group == 0 { PAD_COLS } else { groups * shape.group });
-            let Some(piece) = &Block::leading(BlockShape { rows, cols, ..shape }, words) else { return None };
-            words = words.get(piece.words().len()..)?;
-            let plan = &Plan::of(piece);
-            for col in 0..cols {
-                let mut unit = [0.0; MAX_GROUP];
-                *unit.get_mut(col)? = 1.0;
-                let Some(x) = &Scale::ONE.quantize(&unit, plan, &mut work) else { return None };
-                gemv(piece, x, 0, column.get_mut(..piece.shape().padded_rows())?).ok()?;
-                for (sum, value) in sums.iter_mut().zip(&column).take(rows) {
-                    *sum += value.unsigned_abs();
-                    largest = largest.max(*sum);
-                }
-            }
-            start += cols;
-        }
-        first += rows;
-    }
-    Some(largest)
-}
-
-/// An upper bound of the rows' sums of `|level| * scale`, from the shape alone. It has 31 bits.
-pub fn largest_sum_bound(shape: BlockShape) -> u32 {
-    let scale = if shape.group == 0 { 1 } else { 255 };
-    shape.cols as u32 * shape.width.max_level() as u32 * scale
-}
-
-/// Whether no sum of the block's rows can leave int32 for activations up to `x_max`: from the shape alone where that says so, else
-/// by the codes and scales themselves, as [`worst_case`].
-pub(crate) fn fits_i32(block: &Block<'_>, x_max: u16) -> bool {
-    let most = (i32::MAX as u32).checked_div(x_max.into()).unwrap_or(0);
-    largest_sum_bound(block.shape()) <= most || largest_sum(block).is_some_and(|sum| sum <= most)
 }

@@ -1,6 +1,6 @@
 //! The elementwise parts of recurrent cells. The matrix products are ordinary linear operations of the image.
 
-pub(crate) use crate::arch::{gru_elements, lstm_elements};
+use crate::arch::{gru_elements, lstm_elements};
 
 /// One LSTM cell in torch's gate order: `gates = [i | f | g | o]`, each of the length of `h` and `c`.
 /// `c = sigmoid(f) * c + sigmoid(i) * tanh(g)`, `h = sigmoid(o) * tanh(c)`. Nothing is done where a length does not fit.

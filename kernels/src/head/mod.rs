@@ -1,17 +1,20 @@
-//! The executor: runs an image's operations on an observation, at once or in pieces, keeps the recurrent state and the chunk
-//! queue, and applies the action contract.
+//! A head: runs an image on observations, a step at once or in pieces, and keeps the recurrent state and the chunk queue.
 
-use core::ops::Range;
+mod arena;
+mod contract;
+mod executor;
+
 use core::task::Poll;
 
+use self::arena::{part, regions};
+use self::executor::run;
+pub use self::executor::run_whole;
 use crate::error::{Fault, HeadError, StepError};
-use crate::image::{Image, Op, OpKind, Region};
-use crate::linear::{copy, copy_le};
-use crate::math::clamp;
+use crate::image::{Image, Region};
+use crate::ops::elementwise::{copy, copy_le};
 use crate::pace::budget::Budget;
 use crate::pace::cursor::Cursor;
 use crate::pace::meter::{Meter, Unlimited, Work};
-use crate::{norm, recurrent};
 
 /// A head: an image and the scratch memory that it runs in.
 #[derive(Debug)]
@@ -282,19 +285,7 @@ impl<'a, 's> Head<'a, 's> {
         if next.is_empty() {
             return Err(Fault::Damaged);
         }
-        for (i, (next, last)) in next.iter_mut().zip(&*action).enumerate() {
-            let [scale, offset, low, high, max_step] = self.image.contract_of(i);
-            let a = f32::from_bits(*next) * scale + offset;
-            if !a.is_finite() {
-                return Err(Fault::NotFinite);
-            }
-            let mut a = clamp(a, low, high);
-            if self.started {
-                let last = f32::from_bits(*last);
-                a = clamp(a, last - max_step, last + max_step);
-            }
-            *next = a.to_bits();
-        }
+        contract::apply(&self.image, next, action, self.started)?;
         copy(next, action);
         self.started = true;
         Ok(())
@@ -312,80 +303,4 @@ impl<'a, 's> Head<'a, 's> {
     fn words_mut(&mut self, region: Region) -> &mut [u32] {
         part(self.arena, &region.range())
     }
-}
-
-/// Three regions as slices; empty where they overlap or lie outside, which the image's check has excluded.
-#[inline(never)]
-fn regions<'r>(arena: &'r mut [u32], regions: &[Region; 3]) -> [&'r mut [u32]; 3] {
-    match arena.get_disjoint_mut(regions.map(Region::range)) {
-        Ok([a, b, c]) => [a, b, c],
-        Err(_) => [&mut [], &mut [], &mut []],
-    }
-}
-
-/// Runs an operation from where the cursor stands; true at its end.
-///
-/// # Errors
-///
-/// [`Fault::Damaged`] where the operation names what is not there, which the image's check has excluded.
-#[inline(never)]
-fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &mut impl Meter) -> Result<bool, Fault> {
-    let f = bytemuck::must_cast_slice_mut::<u32, f32>;
-    if let OpKind::Linear { accumulate } = op.kind {
-        let matrix = &op.linear_matrix();
-        let matrix = matrix.as_ref().map_err(|_| Fault::Damaged)?;
-        let [dst, src, work] = regions(arena, &op.regions);
-        return matrix.resume(&mut cursor.linear, budget, f(src), work, f(dst), accumulate);
-    }
-    // Elements that this piece takes, or units of a norm.
-    let (dst, len) = (op.dst(), op.units());
-    let units = budget.take(len - cursor.done, Work::Elements(op));
-    if units == 0 {
-        return Ok(false);
-    }
-    let units = cursor.done..cursor.done + units;
-    cursor.done = units.end;
-    let norm = matches!(op.kind, OpKind::LayerNorm | OpKind::RmsNorm);
-    let range = if norm { 0..dst.len } else { units.clone() };
-    let [mut dst, mut src, third] = match op.src().len {
-        0 => [part(arena, &(dst.offset + range.start..dst.offset + range.end)), &mut [], &mut []],
-        _ => regions(arena, &op.regions),
-    };
-    if matches!(op.kind, OpKind::Normalize | OpKind::Add | OpKind::Copy) {
-        (dst, src) = (part(dst, &range), part(src, &range));
-    }
-    if dst.is_empty() {
-        return Err(Fault::Damaged);
-    }
-    match op.kind {
-        OpKind::Function(function) => function.apply(f(dst)),
-        OpKind::Add => norm::add(f(src), f(dst)),
-        OpKind::Copy => copy(src, dst),
-        OpKind::LstmCell => {
-            recurrent::lstm_elements(range.clone(), f(src), f(third), f(dst));
-        }
-        OpKind::GruCell => {
-            recurrent::gru_elements(range.clone(), f(src), f(third), f(dst));
-        }
-        kind => {
-            let (first, second) = (op.part(0, &range), op.part(1, &range));
-            if (if kind == OpKind::RmsNorm { first } else { second }).is_empty() {
-                return Err(Fault::Damaged);
-            }
-            let constant = op.constant(0);
-            let (moments, done) = (&mut cursor.moments, units.clone());
-            match kind {
-                OpKind::LayerNorm => norm::layer_norm_units(done, moments, f(dst), first, second, constant),
-                OpKind::RmsNorm => norm::rms_norm_units(done, moments, f(dst), first, constant),
-                _ => norm::normalize(f(src), first, second, constant, op.constant(1), f(dst)),
-            }
-        }
-    }
-    Ok(units.end == len)
-}
-
-/// Some of a region's words; none where they are not all there.
-#[inline(never)]
-fn part<'r>(region: &'r mut [u32], range: &Range<usize>) -> &'r mut [u32] {
-    region.get_mut(range.clone()).unwrap_or_default()
 }
