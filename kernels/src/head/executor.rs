@@ -3,11 +3,21 @@
 use super::arena::{part, regions};
 use crate::arch;
 use crate::cursor::Cursor;
-use crate::error::Fault;
+use crate::error::{Fault, StepError};
 use crate::image::{Op, OpKind};
-use crate::meter::{Meter, Work};
+use crate::meter::{Meter, Unlimited, Work};
 use crate::ops::elementwise::{self, copy};
 use crate::ops::norm;
+
+/// Runs a whole operation over an arena, as a head does: for whoever runs a network's operations one by one.
+///
+/// # Errors
+///
+/// As [`Head::step`](super::Head::step).
+pub fn run_whole(op: &Op<'_>, arena: &mut [u32]) -> Result<(), StepError> {
+    run(op, arena, &mut Cursor::default(), &mut Unlimited)?;
+    Ok(())
+}
 
 /// Runs an operation from where the cursor stands; true at its end.
 ///

@@ -8,6 +8,7 @@ use core::task::Poll;
 
 use self::arena::{part, regions};
 use self::executor::run;
+pub use self::executor::run_whole;
 use crate::cursor::Cursor;
 use crate::error::{Fault, HeadError, StepError};
 use crate::image::{Image, Region};

@@ -38,6 +38,23 @@ pub enum OpKind {
     GruCell,
 }
 
+impl OpKind {
+    /// Its name, for people; a function has its own.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Normalize => "normalize",
+            Self::Linear { .. } => "linear",
+            Self::Function(function) => function.name(),
+            Self::LayerNorm => "layernorm",
+            Self::RmsNorm => "rmsnorm",
+            Self::Add => "add",
+            Self::Copy => "copy",
+            Self::LstmCell => "lstm cell",
+            Self::GruCell => "gru cell",
+        }
+    }
+}
+
 /// What the record of an operation holds.
 #[derive(Debug)]
 pub(super) struct Form {

@@ -92,7 +92,7 @@ impl Runner for Unrounded<'_> {
     }
 
     fn infer(&mut self, observation: &[f32]) -> Result<&[f32]> {
-        Ok(Unrounded::infer(self, observation))
+        Unrounded::infer(self, observation)
     }
 }
 

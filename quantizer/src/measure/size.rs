@@ -3,8 +3,7 @@
 use std::collections::BTreeSet;
 
 use actq_kernels::Image;
-use actq_kernels::image::{Op, OpKind};
-use actq_kernels::linear::Matrix;
+use actq_kernels::image::Matrix;
 
 /// Bits per weight of the policy as it was trained: codes, padding, scales, indexes and block records of all matrices over the
 /// number of the source's weights. A matrix that several operations share counts once.
@@ -23,19 +22,4 @@ pub fn distinct<'a>(image: &Image<'a>) -> Vec<Matrix<'a>> {
     let mut seen = BTreeSet::new();
     let place = |m: &Matrix<'a>| m.blocks().next().map(|rows| rows.block.rows_from(0).as_ptr() as usize);
     image.ops().filter_map(|op| op.matrix()).filter(|m| seen.insert(place(m))).collect()
-}
-
-/// The name of an operation.
-pub fn op_name(op: &Op<'_>) -> &'static str {
-    match op.kind {
-        OpKind::Normalize => "normalize",
-        OpKind::Linear { .. } => "linear",
-        OpKind::Function(function) => function.name(),
-        OpKind::LayerNorm => "layernorm",
-        OpKind::RmsNorm => "rmsnorm",
-        OpKind::Add => "add",
-        OpKind::Copy => "copy",
-        OpKind::LstmCell => "lstm cell",
-        OpKind::GruCell => "gru cell",
-    }
 }

@@ -5,8 +5,6 @@ use actq_kernels::image::Op;
 use actq_kernels::pace::cost::{self, Cost};
 use serde::Serialize;
 
-use super::size::op_name;
-
 /// Clock of the processor that is assumed where none is given: 168 MHz, that of an STM32F405.
 pub const CLOCK: f64 = 168e6;
 
@@ -59,7 +57,7 @@ impl StepTime {
         };
         let of_op = |op: Op<'_>| {
             let macs = op.matrix().map_or(0, |matrix| matrix.rows * matrix.cols);
-            time(op_name(&op), op.dst().len, macs, cost::of_op(&op))
+            time(op.kind.name(), op.dst().len, macs, cost::of_op(&op))
         };
         let frame = time("step", image.act_len(), 0, cost::of_frame(image));
         let ops: Vec<OpTime> = image.ops().map(of_op).chain([frame]).collect();

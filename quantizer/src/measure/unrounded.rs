@@ -1,18 +1,19 @@
 //! An image's network with its activations in f32: what is left of the error when only the weights are quantized.
 
+use actq_kernels::Image;
 use actq_kernels::dequantize::row_f32;
-use actq_kernels::image::{Op, OpKind};
-use actq_kernels::linear::Matrix;
-use actq_kernels::{Image, norm, recurrent};
+use actq_kernels::head::run_whole;
+use actq_kernels::image::{Matrix, Op, OpKind};
+use anyhow::Result;
 use ndarray::{Array2, ArrayView1};
 
-/// Runs the operations of an image over an arena of f32; only linear operations differ from the executor's.
+/// Runs the operations of an image as the executor does, but for the linear ones.
 pub struct Unrounded<'a> {
     image: Image<'a>,
     ops: Vec<Op<'a>>,
     /// The weights of each operation; empty where it has none.
     weights: Vec<Array2<f32>>,
-    arena: Vec<f32>,
+    arena: Vec<u32>,
 }
 
 impl<'a> Unrounded<'a> {
@@ -20,22 +21,25 @@ impl<'a> Unrounded<'a> {
     pub fn new(image: Image<'a>) -> Self {
         let ops: Vec<Op<'a>> = image.ops().collect();
         let weights = ops.iter().map(|op| op.matrix().map_or(Array2::default((0, 0)), |matrix| dequantized(&matrix)));
-        Self { image, weights: weights.collect(), ops, arena: vec![0.0; image.scratch_words()] }
+        Self { image, weights: weights.collect(), ops, arena: vec![0; image.scratch_words()] }
     }
 
     /// The recurrent state.
     pub fn state_mut(&mut self) -> &mut [f32] {
-        &mut self.arena[self.image.state().range()]
+        bytemuck::cast_slice_mut(&mut self.arena[self.image.state().range()])
     }
 
     /// The network's raw output for an observation of the image's length.
-    pub fn infer(&mut self, observation: &[f32]) -> &[f32] {
+    pub fn infer(&mut self, observation: &[f32]) -> Result<&[f32]> {
         let arena = &mut self.arena;
-        arena[self.image.observation().range()].copy_from_slice(observation);
+        arena[self.image.observation().range()].copy_from_slice(bytemuck::cast_slice(observation));
         for (op, weights) in self.ops.iter().zip(&self.weights) {
-            run(op, weights, arena);
+            match (op.kind, op.matrix()) {
+                (OpKind::Linear { accumulate }, Some(matrix)) => multiply(op, &matrix, weights, accumulate, arena),
+                _ => run_whole(op, arena)?,
+            }
         }
-        &arena[self.image.output().range()]
+        Ok(floats(&arena[self.image.output().range()]))
     }
 }
 
@@ -51,27 +55,17 @@ fn dequantized(matrix: &Matrix<'_>) -> Array2<f32> {
     weights
 }
 
-fn run(op: &Op<'_>, weights: &Array2<f32>, arena: &mut [f32]) {
-    // An LSTM cell writes its third region, too.
-    let (x, mut third) = (arena[op.src().range()].to_vec(), arena[op.third().range()].to_vec());
-    let y = &mut arena[op.dst().range()];
-    match op.kind {
-        OpKind::Normalize => norm::normalize(&x, op.array(0), op.array(1), op.constant(0), op.constant(1), y),
-        OpKind::Linear { accumulate } => {
-            let Some(matrix) = op.matrix() else { return };
-            for (row, (y, sum)) in y.iter_mut().zip(weights.dot(&ArrayView1::from(&x))).enumerate() {
-                *y = if accumulate { *y } else { 0.0 } + matrix.bias(row) + sum;
-            }
-        }
-        OpKind::Function(function) => function.apply(y),
-        OpKind::LayerNorm => norm::layer_norm(y, op.array(0), op.array(1), op.constant(0)),
-        OpKind::RmsNorm => norm::rms_norm(y, op.array(0), op.constant(0)),
-        OpKind::Add => norm::add(&x, y),
-        OpKind::Copy => y.copy_from_slice(&x),
-        OpKind::LstmCell => recurrent::lstm_cell(&x, &mut third, y),
-        OpKind::GruCell => recurrent::gru_cell(&x, &third, y),
+/// `dst = W src + b`, or added to `dst`, in f32.
+fn multiply(op: &Op<'_>, matrix: &Matrix<'_>, weights: &Array2<f32>, accumulate: bool, arena: &mut [u32]) {
+    let x: Vec<f32> = floats(&arena[op.src().range()]).to_vec();
+    let y = bytemuck::cast_slice_mut::<u32, f32>(&mut arena[op.dst().range()]);
+    for (row, (y, sum)) in y.iter_mut().zip(weights.dot(&ArrayView1::from(&x))).enumerate() {
+        *y = if accumulate { *y } else { 0.0 } + matrix.bias(row) + sum;
     }
-    arena[op.third().range()].copy_from_slice(&third);
+}
+
+fn floats(words: &[u32]) -> &[f32] {
+    bytemuck::cast_slice(words)
 }
 
 #[cfg(test)]
@@ -175,7 +169,7 @@ mod tests {
             for _ in 0..20 {
                 let obs: Vec<f32> = (0..OBS).map(|_| 2.0 * random.unit()).collect();
                 let expected = evaluator.step(&obs, &mut |_, _| {});
-                let off = distance(unrounded.infer(&obs), &expected);
+                let off = distance(unrounded.infer(&obs).expect("it runs"), &expected);
                 assert!(off < 1e-5, "{off}");
                 rounded = rounded.max(distance(head.infer(&obs)?, &expected));
             }
@@ -201,7 +195,7 @@ mod tests {
         let expected = evaluator.step(&obs, &mut |_, _| {});
         let mut unrounded = Unrounded::new(image);
         unrounded.state_mut().copy_from_slice(&state);
-        let ours = unrounded.infer(&obs).to_vec();
+        let ours = unrounded.infer(&obs).expect("it runs").to_vec();
         let executed = with_head(image, |head| {
             head.state_mut().copy_from_slice(&state);
             Ok(head.infer(&obs)?.to_vec())

@@ -3,11 +3,11 @@
 use std::fmt::Write as _;
 
 use actq_kernels::Image;
+use actq_kernels::image::Matrix;
 use actq_kernels::image::{Kind, Op, OpKind, Region};
-use actq_kernels::linear::Matrix;
 
 use super::table::{group_name, table};
-use crate::measure::size::{bits_per_weight, hex, op_name};
+use crate::measure::size::{bits_per_weight, hex};
 use crate::text::printable;
 
 /// Widths of a matrix's rows as text: `3`, or `2x200 4x56` where they differ.
@@ -67,7 +67,7 @@ fn row(op: &Op<'_>) -> Vec<String> {
         (OpKind::GruCell, _) => format!("gates {}", region(op.third())),
         _ => String::new(),
     };
-    let mut cells = vec![op_name(op).to_owned(), region(op.dst()), region(op.src()), detail];
+    let mut cells = vec![op.kind.name().to_owned(), region(op.dst()), region(op.src()), detail];
     if let Some(matrix) = &matrix {
         cells.extend([
             widths(matrix),

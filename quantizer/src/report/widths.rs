@@ -79,7 +79,7 @@ impl Widths {
             let (here, there) = (matrices.len(), stats.matrices.len());
             ensure!(here == there, "the statistics describe {there} matrices, the image has {here}");
         }
-        let layer = |(m, matrix): (usize, &actq_kernels::linear::Matrix<'_>)| -> Result<Layer> {
+        let layer = |(m, matrix): (usize, &actq_kernels::image::Matrix<'_>)| -> Result<Layer> {
             let mut widths = vec![None; matrix.rows];
             let mut bytes = Vec::new();
             for rows in matrix.blocks() {

@@ -1,6 +1,6 @@
 use actq_kernels::image::OpKind;
 use actq_kernels::math;
-use actq_kernels::recurrent::lstm_cell;
+use actq_kernels::ops::cells::lstm_cell;
 use anyhow::Result;
 use ndarray::Array2;
 
