@@ -81,6 +81,11 @@ pub fn binary(name: &str, target: Target) -> Result<PathBuf> {
     Ok(once(BENCH, target, build)?.join(name))
 }
 
+/// As [`binary`], with a profile of `Cargo.toml` that is not the target's own.
+pub fn binary_in(profile: &str, name: &str, target: Target) -> Result<PathBuf> {
+    Ok(build(BENCH, &[name], &target_dir(), target, profile, &[])?.join(name))
+}
+
 /// As [`binary`], without the assembler (`ACTQ_BACKEND=portable`).
 pub fn portable_binary(name: &str, target: Target) -> Result<PathBuf> {
     if !target.has_assembler() {

@@ -10,6 +10,7 @@ use actq::methods::{Activations, Method, Options};
 use actq::pipeline::quantize;
 use actq::policy::Policy;
 use actq::runtime::{ImageBuffer, with_head};
+use actq_bench::cycles::Code;
 use actq_bench::firmware::{self, built_in};
 use actq_bench::qemu::{self, Server};
 use actq_bench::{Target, golden, shared_policies, ur3};
@@ -240,5 +241,22 @@ fn gptq_beats_rounding_at_low_bits() -> Result<()> {
     };
     let (gptq, plain) = (nmse(Method::Gptq)?, nmse(Method::Rtn)?);
     assert!(gptq < plain / 2.0, "{gptq} against {plain}");
+    Ok(())
+}
+
+/// Whatever an image or an observation holds, there is nothing in the runtime that panics, nor the text of a panic: also with the
+/// profile of an application that has not set one for the kernels.
+#[test]
+fn no_panic_is_in_the_runtime() -> Result<()> {
+    for profile in ["firmware", "release"] {
+        for binary in ["runtime", "runtime-poll"] {
+            let code = Code::read(&firmware::binary_in(profile, binary, Target::Fpu)?)?;
+            let names = || code.functions().iter().map(|function| function.name.as_str());
+            let telling = ["panicking", "core::fmt", "unwind", "bytemuck::"];
+            let found: Vec<&str> = names().filter(|name| telling.iter().any(|part| name.contains(part))).collect();
+            assert!(found.is_empty(), "{binary}, {profile}: {found:?}");
+            assert!(names().any(|name| name.contains("Head")), "{binary}, {profile}: nothing is in it");
+        }
+    }
     Ok(())
 }

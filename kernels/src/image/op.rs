@@ -39,23 +39,20 @@ pub enum OpKind {
 }
 
 impl OpKind {
+    fn form(self) -> Option<&'static Form> {
+        FORMS.iter().find(|form| discriminant(&form.kind) == discriminant(&self))
+    }
+
     /// Its name, for people; a function has its own.
-    pub const fn name(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
-            Self::Normalize => "normalize",
-            Self::Linear { .. } => "linear",
             Self::Function(function) => function.name(),
-            Self::LayerNorm => "layernorm",
-            Self::RmsNorm => "rmsnorm",
-            Self::Add => "add",
-            Self::Copy => "copy",
-            Self::LstmCell => "lstm cell",
-            Self::GruCell => "gru cell",
+            kind => kind.form().and_then(|form| TEXTS.get(usize::from(form.code) - 1)).copied().unwrap_or_default(),
         }
     }
 }
 
-/// What the record of an operation holds.
+/// What stands in the table of an operation.
 #[derive(Debug)]
 pub(super) struct Form {
     /// Operation code.
@@ -105,11 +102,14 @@ impl Form {
 }
 
 macro_rules! operations {
-    ($($(#[$doc:meta])* $NAME:ident = $code:literal: $kind:expr, $uses:expr;)*) => {
+    ($($(#[$doc:meta])* $NAME:ident = $code:literal $text:literal: $kind:expr, $uses:expr;)*) => {
         $($(#[$doc])* pub const $NAME: u8 = $code;)*
 
         /// The names of the codes above, from code 1 on.
         pub(crate) const NAMES: &[&str] = &[$(stringify!($NAME)),*];
+
+        /// What people call them.
+        static TEXTS: [&str; NAMES.len()] = [$($text),*];
 
         /// By operation code, from 1 on.
         static FORMS: [Form; NAMES.len()] = [$(Form::new($NAME, $kind, $uses)),*];
@@ -126,23 +126,23 @@ macro_rules! operations {
 }
 operations! {
     /// [`OpKind::Normalize`]
-    NORMALIZE = 1: OpKind::Normalize, Uses { src: 1, constants: 2, arrays: 2, ..Uses::NONE };
+    NORMALIZE = 1 "normalize": OpKind::Normalize, Uses { src: 1, constants: 2, arrays: 2, ..Uses::NONE };
     /// [`OpKind::Linear`]
-    LINEAR = 2: OpKind::Linear { accumulate: false }, Uses { max_detail: 1, src: 1, ..Uses::NONE };
+    LINEAR = 2 "linear": OpKind::Linear { accumulate: false }, Uses { max_detail: 1, src: 1, ..Uses::NONE };
     /// [`OpKind::Function`]
-    FUNCTION = 3: OpKind::Function(Function::Relu), Uses { max_detail: u8::MAX, reads_dst: true, ..Uses::NONE };
+    FUNCTION = 3 "function": OpKind::Function(Function::Relu), Uses { max_detail: u8::MAX, reads_dst: true, ..Uses::NONE };
     /// [`OpKind::LayerNorm`]
-    LAYER_NORM = 4: OpKind::LayerNorm, Uses { constants: 1, arrays: 2, passes: 3, reads_dst: true, ..Uses::NONE };
+    LAYER_NORM = 4 "layernorm": OpKind::LayerNorm, Uses { constants: 1, arrays: 2, passes: 3, reads_dst: true, ..Uses::NONE };
     /// [`OpKind::RmsNorm`]
-    RMS_NORM = 5: OpKind::RmsNorm, Uses { constants: 1, arrays: 1, passes: 2, reads_dst: true, ..Uses::NONE };
+    RMS_NORM = 5 "rmsnorm": OpKind::RmsNorm, Uses { constants: 1, arrays: 1, passes: 2, reads_dst: true, ..Uses::NONE };
     /// [`OpKind::Add`]
-    ADD = 6: OpKind::Add, Uses { src: 1, reads_dst: true, ..Uses::NONE };
+    ADD = 6 "add": OpKind::Add, Uses { src: 1, reads_dst: true, ..Uses::NONE };
     /// [`OpKind::Copy`]
-    COPY = 7: OpKind::Copy, Uses { src: 1, ..Uses::NONE };
+    COPY = 7 "copy": OpKind::Copy, Uses { src: 1, ..Uses::NONE };
     /// [`OpKind::LstmCell`]
-    LSTM_CELL = 8: OpKind::LstmCell, Uses { src: 4, third: 1, ..Uses::NONE };
+    LSTM_CELL = 8 "lstm cell": OpKind::LstmCell, Uses { src: 4, third: 1, ..Uses::NONE };
     /// [`OpKind::GruCell`]
-    GRU_CELL = 9: OpKind::GruCell, Uses { src: 3, third: 3, reads_dst: true, ..Uses::NONE };
+    GRU_CELL = 9 "gru cell": OpKind::GruCell, Uses { src: 3, third: 3, reads_dst: true, ..Uses::NONE };
 }
 
 /// What a writer says in an operation's record.
@@ -165,8 +165,7 @@ pub struct OpRecord {
 impl OpRecord {
     /// The record's words, which [`Image::ops`] reads.
     pub fn emit(&self) -> Result<[u32; OP_WORDS], TooLarge> {
-        let form = FORMS.iter().find(|form| discriminant(&form.kind) == discriminant(&self.kind));
-        let code = form.map_or(0, |form| form.code);
+        let code = self.kind.form().map_or(0, |form| form.code);
         let detail = match self.kind {
             OpKind::Linear { accumulate } => accumulate.into(),
             OpKind::Function(function) => function as u8,
