@@ -6,9 +6,12 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{LazyLock, Mutex};
 
+use actq::budget::Budget;
+use actq::data::Recordings;
+use actq::emit::files;
+use actq::methods::{Activations, Method, Options};
+use actq::pipeline::quantize;
 use actq::policy::Policy;
-use actq::quantize::{Activations, Budget, Method, Options, quantize};
-use actq::{files, writer};
 use actq_boards::{Target, root};
 use actq_kernels::Width;
 use anyhow::{Context, Result, anyhow, ensure};
@@ -116,7 +119,7 @@ fn write_built_in() -> Result<PathBuf> {
     let policy = Policy::load(&ur3())?;
     let options =
         Options { group: 32, activations: Activations::Int8, ..Options::new(Method::Rtn, Budget::Width(Width::W3)) };
-    let bytes = writer::image(&policy, &quantize(&policy.graph, &[], &options)?)?;
+    let bytes = quantize(&policy, &Recordings::default(), &options, |_, _| {})?.image;
     // Cargo builds anew what includes a newer file.
     if fs::read(&path).ok().as_ref() != Some(&bytes) {
         files::write(&path, &bytes)?;

@@ -1,15 +1,18 @@
 //! Networks of drawn weights, for measurements and properties.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use actq::graph::{Graph, Matrix, Node, NodeKind, Part};
-use actq::policy::{Contract, Policy};
-use actq::quantize::scale::round_to_nearest;
-use actq::quantize::{Activations, Outcome};
+use actq::contract::ActionContract;
+use actq::graph::ops::{Concat, Linear, Span};
+use actq::graph::{Graph, NodeKind, ValueId, WeightMatrix};
+use actq::methods::scale::round_to_nearest;
+use actq::methods::{Activations, Outcome};
+use actq::policy::Policy;
 use actq::random::Random;
+use actq::runtime::{ImageBuffer, with_head};
 use actq_kernels::Width;
-use actq_kernels::image::Kind;
-use anyhow::Result;
+use actq_kernels::image::{Kind, header as h, op, seal};
+use anyhow::{Context, Result, ensure};
 
 /// A network under construction: parts of the observation go through one operation each.
 #[derive(Debug)]
@@ -26,16 +29,14 @@ impl Builder {
         Self { graph: Graph::new(observation), outcomes: Vec::new(), random: Random(2) }
     }
 
-    /// An operation on a value; gives its output.
-    pub fn node(&mut self, kind: NodeKind, input: usize) -> usize {
-        let len = kind.output_len(&self.graph.matrices, self.graph.len_of(input));
-        self.graph.nodes.push(Node { kind, input, len });
-        self.graph.output()
+    /// An operation on values; gives its output.
+    pub fn node(&mut self, kind: impl Into<NodeKind>, inputs: &[ValueId]) -> Result<ValueId> {
+        self.graph.add(kind, inputs)
     }
 
     /// The first values of the observation.
-    pub fn part(&mut self, len: usize) -> usize {
-        self.node(NodeKind::Concat(vec![Part { value: 0, from: 0, len }]), 0)
+    pub fn part(&mut self, len: usize) -> Result<ValueId> {
+        self.node(Concat(vec![Span { from: 0, len }]), &[0])
     }
 
     /// Values between -1 and 1.
@@ -53,7 +54,7 @@ impl Builder {
         group: usize,
     ) -> Result<usize> {
         let data = self.values(rows * cols).iter().map(|w| w * (3.0 / cols as f32).sqrt()).collect();
-        let matrix = Matrix { name: format!("{rows}x{cols}"), rows, cols, data };
+        let matrix = WeightMatrix { name: format!("{rows}x{cols}"), rows, cols, data };
         let mut used: Vec<Width> = widths.iter().copied().flatten().collect();
         used.sort();
         used.dedup();
@@ -70,8 +71,7 @@ impl Builder {
             }
         }
         self.outcomes.push(Outcome::new(&matrix, quantized, None, activations)?);
-        self.graph.matrices.push(matrix);
-        Ok(self.graph.matrices.len() - 1)
+        self.graph.add_matrix(matrix)
     }
 
     /// A product with a part of the observation, with drawn biases or none.
@@ -82,12 +82,12 @@ impl Builder {
         widths: impl Fn(usize) -> Option<Width>,
         group: usize,
         bias: bool,
-    ) -> Result<usize> {
+    ) -> Result<ValueId> {
         let (rows, cols) = shape;
-        let input = self.part(cols);
+        let input = self.part(cols)?;
         let matrix = self.matrix(rows, cols, activations, &(0..rows).map(widths).collect::<Vec<_>>(), group)?;
         let bias = if bias { self.values(rows) } else { vec![0.0; rows] };
-        Ok(self.node(NodeKind::Linear { matrix, bias }, input))
+        self.node(Linear { matrix, bias }, &[input])
     }
 
     /// The policy, whose action is the last node's output.
@@ -102,7 +102,7 @@ impl Builder {
             execute: 1,
             act_len,
             rate_hz: 100.0,
-            contract: Contract {
+            contract: ActionContract {
                 scale: array(0.5),
                 offset: array(0.1),
                 low: array(-1.0),
@@ -117,8 +117,48 @@ impl Builder {
     }
 
     /// A node of its own part of the observation.
-    pub fn node_of_part(&mut self, len: usize, kind: NodeKind) -> usize {
-        let input = self.part(len);
-        self.node(kind, input)
+    pub fn node_of_part(&mut self, len: usize, kind: impl Into<NodeKind>) -> Result<ValueId> {
+        let input = self.part(len)?;
+        self.node(kind, &[input])
     }
+}
+
+/// The image with every linear operation that has biases, and whose output holds something before it, made to accumulate: the
+/// format has such operations, and no graph lowers to one.
+pub fn accumulating(bytes: &[u8]) -> Result<Vec<u8>> {
+    let name = Path::new("accumulating");
+    let mut bytes = bytes.to_vec();
+    let word = |bytes: &[u8], at: usize| u32::from_le_bytes([0, 1, 2, 3].map(|i| bytes[4 * at + i]));
+    let count = ImageBuffer::new(&bytes).image(name)?.op_count();
+    let first = word(&bytes, h::W_OPS) as usize;
+    let mut changed = 0;
+    for record in (first..).step_by(h::OP_WORDS).take(count) {
+        if word(&bytes, record) as u8 == op::LINEAR && word(&bytes, record + 2) != 0 {
+            let mut with = bytes.clone();
+            with[4 * record + 1] = 1;
+            seal(&mut with).context("the image is too long")?;
+            // Refused where nothing was written there.
+            if ImageBuffer::new(&with).image(name).is_ok() {
+                (bytes, changed) = (with, changed + 1);
+            }
+        }
+    }
+    ensure!(changed > 0, "no operation can accumulate");
+    // Other actions than those that the self-test vector holds.
+    let buffer = ImageBuffer::new(&bytes);
+    let image = buffer.image(name)?;
+    let mut at = 4 * word(&bytes, h::W_SELF_TEST) as usize;
+    with_head(image, |head| {
+        for step in 0..image.self_test_steps() {
+            let (observation, _) = image.self_test(step).context("the self-test has such a step")?;
+            let observation: Vec<f32> = observation.iter().map(|word| f32::from_bits(u32::from_le(*word))).collect();
+            let action: Vec<u8> = head.step(&observation)?.iter().flat_map(|value| value.to_le_bytes()).collect();
+            at += 4 * observation.len();
+            bytes[at..][..action.len()].copy_from_slice(&action);
+            at += action.len();
+        }
+        Ok(())
+    })?;
+    seal(&mut bytes).context("the image is too long")?;
+    Ok(bytes)
 }

@@ -16,23 +16,23 @@
 //! # }
 //! ```
 //!
-//! The arithmetic, in the order in which it happens, is documented in [`linear`]; the packed layouts in [`layout`]; the image
+//! The arithmetic, in the order in which it happens, is documented in [`ops::linear`]; the packed layouts in [`layout`]; the image
 //! in `docs/FORMAT.md`. Everything outside the integer GEMV is IEEE 754 binary32 in a fixed order, without fused
 //! multiply-add, so that a host, QEMU and a board give identical bits.
 #![cfg_attr(not(test), no_std)]
 #![deny(unsafe_code)]
 
 pub mod arch;
+mod cursor;
 pub mod dequantize;
 mod error;
 pub mod head;
 pub mod image;
 pub mod layout;
-pub mod linear;
 pub mod math;
-pub mod norm;
+mod meter;
+pub mod ops;
 pub mod pace;
-pub mod recurrent;
 pub mod round;
 pub mod x;
 
@@ -43,6 +43,16 @@ pub use layout::{Block, BlockShape, Width};
 
 // Old paths, until all users have moved.
 pub use arch as gemv;
+pub use ops::cells as recurrent;
+/// See [`ops::linear`].
+pub mod linear {
+    pub use crate::image::{Matrix, RowBlock, largest_sum_bound, worst_case};
+}
+/// See [`ops`].
+pub mod norm {
+    pub use crate::ops::elementwise::*;
+    pub use crate::ops::norm::*;
+}
 pub use arch::{portable, reference};
 pub use layout as format;
 pub use pace::cost;

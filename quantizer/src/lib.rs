@@ -1,34 +1,27 @@
 //! From a PyTorch policy to one flashable image: what the command `actq` is made of.
 //!
-//! [`policy::Policy`] reads `policy.json` and `policy.safetensors` into a [`graph::Graph`]; [`quantize`] turns every weight
-//! matrix into codes and scales; [`lower`] places values in the arena, [`writer`] lays the bytes out and [`files`] puts them in
-//! their place. [`eval`] and [`serve`] run the finished image through the same executor that the firmware runs.
+//! [`import`] reads a [`policy::Policy`] with its network, a [`graph::Graph`], and [`data`] the recorded observations.
+//! [`pipeline`] makes an image of them: a method of [`methods`] turns every weight matrix into codes and scales, from what
+//! [`calibrate`] finds in the recordings, and [`emit`] lays the bytes out. [`measure`] and [`serve`] run the finished image through
+//! the same executor that the firmware runs; [`report`] says it to people.
+//!
+//! Which folder may use which is written in `docs/ARCHITECTURE.md`, and tested.
 #![deny(unsafe_code)]
 
-pub mod backprop;
-pub mod check;
-pub mod dataset;
-pub mod eval;
-pub mod files;
+pub mod budget;
+pub mod calibrate;
+pub mod contract;
+pub mod data;
+pub mod emit;
 pub mod graph;
-pub mod inspect;
-mod json;
-pub mod lower;
-pub mod plot;
+pub mod import;
+pub mod measure;
+pub mod methods;
+pub mod pipeline;
 pub mod policy;
-pub mod quantize;
 pub mod random;
+pub mod report;
 pub mod runtime;
-pub mod search;
 pub mod serve;
-pub mod stats;
-pub mod sweep;
-mod tensor_file;
+mod strict_json;
 pub mod text;
-pub mod time;
-pub mod unrounded;
-pub mod widths;
-pub mod writer;
-
-/// The versions that take part in making an image; recorded in reports.
-pub const VERSION: &str = env!("CARGO_PKG_VERSION");

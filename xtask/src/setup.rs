@@ -58,7 +58,8 @@ fn run(program: &str, arguments: &[&str]) -> Result<()> {
     Ok(())
 }
 
-fn rust_target(triple: &str) -> Result<()> {
+/// Installs a Rust target.
+pub(crate) fn rust_target(triple: &str) -> Result<()> {
     let root = output("rustc", &["--print", "sysroot"])?;
     if Path::new(root.trim()).join("lib/rustlib").join(triple).join("lib").is_dir() {
         return Ok(());

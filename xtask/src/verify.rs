@@ -19,6 +19,9 @@ const MINUTES: f64 = 8.0;
 /// The oldest compiler.
 const OLDEST: &str = concat!(env!("CARGO_PKG_RUST_VERSION"), ".0");
 
+/// A host whose words have 32 bits, and that runs where the other one does. `.cargo/config.toml` has its linker.
+const NARROW: &str = "i686-unknown-linux-musl";
+
 /// The packages that are built for boards only.
 const FIRMWARE: [&str; 3] = ["actq-firmware-support", "actq-firmware-demo", "actq-firmware-bench"];
 
@@ -70,9 +73,13 @@ pub(crate) fn run() -> Result<()> {
     setup::components()?;
     setup::ensure(&Target::ALL)?;
     let oldest = setup::toolchain(OLDEST);
+    let narrow = match cfg!(all(target_arch = "x86_64", target_os = "linux")) {
+        true => setup::rust_target(NARROW).map_err(|error| format!("{error:#}")),
+        false => Err(format!("this machine does not run {NARROW}")),
+    };
     // Where tests write what they skip.
     let skipped = std::env::temp_dir().join(format!("actq-skipped-{}", std::process::id()));
-    let steps = steps(oldest, &skipped.to_string_lossy());
+    let steps = steps(oldest, narrow, &skipped.to_string_lossy());
     let count = steps.len();
     let clock = Clock::start();
     let mut all = Vec::new();
@@ -110,7 +117,7 @@ fn text(command: &Command) -> String {
     format!("{name} {}", arguments.join(" "))
 }
 
-fn steps(oldest: Result<(), String>, skipped: &str) -> Vec<Step> {
+fn steps(oldest: Result<(), String>, narrow: Result<(), String>, skipped: &str) -> Vec<Step> {
     let mut steps = Vec::new();
     let mut add = |name: &str, arguments: &[&str], environment: &[(&str, &str)]| {
         let mut command = cargo();
@@ -147,6 +154,12 @@ fn steps(oldest: Result<(), String>, skipped: &str) -> Vec<Step> {
     add("tests", &[&["test"], &host[..]].concat(), &[("ACTQ_SKIPPED", skipped)]);
     add("budgets", &[&["run"], &host[..], &["--package", "actq-bench", "--", "budgets"]].concat(), &[]);
 
+    let command = narrow.map(|()| {
+        let mut command = cargo();
+        command.current_dir(root()).args(["test", "--package", "actq-kernels", "--target", NARROW]).args(host);
+        command
+    });
+    steps.push(Step { name: "kernels' tests with words of 32 bits".to_owned(), command });
     let command = oldest.map(|()| {
         let mut command = Command::new("rustup");
         command.current_dir(root()).args(["run", OLDEST, "cargo", "check"]).args(host).args(&all_but_firmware);

@@ -2,22 +2,22 @@
 
 use std::path::Path;
 
-use actq::eval::{self, Report};
+use actq::budget::{Budget, BudgetTooSmall};
+use actq::data::Recordings;
+use actq::measure::eval::{self, ErrorReport};
+use actq::methods::{Method, Options};
+use actq::pipeline::Quantizer;
 use actq::policy::Policy;
-use actq::quantize::prepared::Prepared;
-use actq::quantize::{Budget, BudgetTooSmall, Method, Options};
 use actq::runtime::ImageBuffer;
-use actq::writer;
 use actq_bench::{shared_policies, ur3};
 use actq_kernels::Width;
 use anyhow::Result;
 
-fn image(prepared: &Prepared<'_>, options: &Options) -> Result<Vec<u8>> {
-    let (policy, outcomes) = prepared.quantize(options, |_| {})?;
-    writer::image(&policy, &outcomes)
+fn image(quantizer: &Quantizer<'_>, options: &Options) -> Result<Vec<u8>> {
+    Ok(quantizer.quantize(options, |_, _| {})?.image)
 }
 
-fn report(dir: &Path, bytes: &[u8]) -> Result<Report> {
+fn report(dir: &Path, bytes: &[u8]) -> Result<ErrorReport> {
     let buffer = ImageBuffer::new(bytes);
     let image = buffer.image(dir)?;
     eval::evaluate(image, &eval::heldout(dir, &image)?)
@@ -30,12 +30,13 @@ fn best(bits: f64, steps: usize) -> Options {
 #[test]
 fn budgets_are_kept_and_used() -> Result<()> {
     let policy = Policy::load(&ur3())?;
-    let prepared = Prepared::new(&policy, Method::Best, |_| {})?;
+    let recordings = Recordings::load(&policy)?;
+    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, |_| {})?;
     for bits in [1.0, 1.5, 2.0, 2.5, 3.0, 4.0] {
-        let bpw = report(&ur3(), &image(&prepared, &best(bits, 2))?)?.bpw;
+        let bpw = report(&ur3(), &image(&quantizer, &best(bits, 2))?)?.bpw;
         assert!(bpw <= bits && bpw > bits - 0.1, "{bpw} for {bits}");
     }
-    let error = image(&prepared, &best(1e-6, 2)).expect_err("nothing fits into so few bits");
+    let error = image(&quantizer, &best(1e-6, 2)).expect_err("nothing fits into so few bits");
     assert!(error.is::<BudgetTooSmall>(), "{error}");
     Ok(())
 }
@@ -46,7 +47,7 @@ fn the_image_does_not_depend_on_the_number_of_threads() -> Result<()> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
         pool.install(|| {
             let policy = Policy::load(&ur3())?;
-            image(&Prepared::new(&policy, Method::Best, |_| {})?, &best(2.0, 20))
+            image(&Quantizer::new(&policy, &Recordings::load(&policy)?, Method::Best, |_| {})?, &best(2.0, 20))
         })
     };
     let one = on(1)?;
@@ -59,35 +60,38 @@ fn the_image_does_not_depend_on_the_number_of_threads() -> Result<()> {
 #[test]
 fn an_image_fits_the_flash_that_it_is_given() -> Result<()> {
     let policy = Policy::load(&ur3())?;
-    let prepared = Prepared::new(&policy, Method::Best, |_| {})?;
+    let recordings = Recordings::load(&policy)?;
+    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, |_| {})?;
     for bytes in [64 << 10, 96 << 10, 200 << 10] {
         let options = Options { budget: Budget::ImageBytes(bytes), ..best(1.0, 2) };
-        let len = image(&prepared, &options)?.len();
+        let len = image(&quantizer, &options)?.len();
         assert!(len <= bytes && len > bytes - bytes / 10, "{len} for {bytes}");
     }
     let tiny = Options { budget: Budget::ImageBytes(1000), ..best(1.0, 2) };
-    assert!(image(&prepared, &tiny).is_err());
+    assert!(image(&quantizer, &tiny).is_err());
     Ok(())
 }
 
 #[test]
 fn a_forced_width_reaches_every_row() -> Result<()> {
     let policy = Policy::load(&ur3())?;
-    let prepared = Prepared::new(&policy, Method::Best, |_| {})?;
+    let recordings = Recordings::load(&policy)?;
+    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, |_| {})?;
     let forced = |name: &str| Options { forced: vec![(name.into(), Width::W4)], ..best(2.0, 2) };
-    let (_, outcomes) = prepared.quantize(&forced("out.weight"), |_| {})?;
+    let outcomes = quantizer.quantize(&forced("out.weight"), |_, _| {})?.outcomes;
     let out = policy.graph.matrices.iter().position(|m| m.name == "out.weight");
     assert!(out.is_some_and(|m| outcomes[m].quantized.widths.iter().all(|w| *w == Some(Width::W4))));
-    assert!(prepared.quantize(&forced("no.such"), |_| {}).is_err());
+    assert!(quantizer.quantize(&forced("no.such"), |_, _| {}).is_err());
     Ok(())
 }
 
 #[test]
 fn another_seed_gives_another_image() -> Result<()> {
     let policy = Policy::load(&ur3())?;
-    let prepared = Prepared::new(&policy, Method::Best, |_| {})?;
+    let recordings = Recordings::load(&policy)?;
+    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, |_| {})?;
     let options = best(2.0, 5);
-    assert_ne!(image(&prepared, &options)?, image(&prepared, &Options { seed: 2, ..options.clone() })?);
+    assert_ne!(image(&quantizer, &options)?, image(&quantizer, &Options { seed: 2, ..options.clone() })?);
     Ok(())
 }
 
@@ -95,10 +99,11 @@ fn another_seed_gives_another_image() -> Result<()> {
 /// a share of the default steps.
 fn halves_gptq(dir: &Path, steps: usize) -> Result<()> {
     let policy = Policy::load(dir)?;
-    let prepared = Prepared::new(&policy, Method::Best, |_| {})?;
-    let gptq = Prepared::new(&policy, Method::Gptq, |_| {})?;
+    let recordings = Recordings::load(&policy)?;
+    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, |_| {})?;
+    let gptq = Quantizer::new(&policy, &recordings, Method::Gptq, |_| {})?;
     for (bits, width) in [(3.0, Width::W3), (2.0, Width::W2)] {
-        let ours = report(dir, &image(&prepared, &best(bits, steps))?)?;
+        let ours = report(dir, &image(&quantizer, &best(bits, steps))?)?;
         let theirs = report(dir, &image(&gptq, &Options::new(Method::Gptq, Budget::Width(width)))?)?;
         assert!(ours.bpw < theirs.bpw);
         assert!(ours.nmse < 0.5 * theirs.nmse, "{}: {} against {}", policy.name, ours.nmse, theirs.nmse);
@@ -126,10 +131,11 @@ fn shared_policies_stay_below_their_errors() -> Result<()> {
     {
         let dir = policies.join(name);
         let policy = Policy::load(&dir)?;
-        let prepared = Prepared::new(&policy, Method::Best, |_| {})?;
+        let recordings = Recordings::load(&policy)?;
+        let quantizer = Quantizer::new(&policy, &recordings, Method::Best, |_| {})?;
         for (bits, limit) in limits {
             let options = Options::new(Method::Best, Budget::BitsPerWeight(bits));
-            let found = report(&dir, &image(&prepared, &options)?)?;
+            let found = report(&dir, &image(&quantizer, &options)?)?;
             assert!(found.nmse < limit, "{name} at {bits} bits: {}, allowed {limit}", found.nmse);
             assert!(found.bpw <= bits);
         }

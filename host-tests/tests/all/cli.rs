@@ -8,11 +8,13 @@ use std::process::{Child, Command, Output, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use actq::budget::Budget;
+use actq::data::Recordings;
 use actq::graph::Evaluator;
+use actq::methods::{Method, Options};
+use actq::pipeline;
 use actq::policy::Policy;
-use actq::quantize::{Budget, Method, Options, quantize};
 use actq::runtime::{ImageBuffer, with_head};
-use actq::writer;
 use actq_bench::command::{actq, all, failed, run, succeeded};
 use actq_bench::golden::Random;
 use actq_bench::qemu::step_request;
@@ -770,7 +772,7 @@ fn what_a_file_says_cannot_command_the_terminal() -> Result<()> {
     let mut policy = Policy::load(&fixture.policy())?;
     policy.name = "arm\x1b[2J\nmatrix\u{9b}".to_owned();
     let options = Options::new(Method::Rtn, Budget::Width(Width::W4));
-    let refused = writer::image(&policy, &quantize(&policy.graph, &[], &options)?);
+    let refused = pipeline::quantize(&policy, &Recordings::default(), &options, |_, _| {}).map(|_| ());
     ensure!(format!("{:#}", refused.expect_err("a name")).contains("control characters"));
 
     // The names of tensors in a message, and those of matrices in statistics.

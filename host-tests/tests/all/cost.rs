@@ -2,17 +2,18 @@
 
 use std::path::Path;
 
-use actq::dataset::{Dataset, Sizes};
+use actq::budget::{Budget, TimeLimit};
+use actq::data::{Dataset, Recordings, Sizes};
+use actq::emit;
+use actq::measure::time::{CLOCK, StepTime};
+use actq::methods::{Activations, Method, Options};
+use actq::pipeline::{Quantizer, quantize};
 use actq::policy::Policy;
-use actq::quantize::prepared::Prepared;
-use actq::quantize::{Activations, Budget, Method, Options};
 use actq::runtime::{ImageBuffer, with_head};
-use actq::time::{CLOCK, Limit, StepTime};
-use actq::writer;
-use actq_bench::networks::Builder;
+use actq_bench::networks::{Builder, accumulating};
 use actq_bench::qemu::{self, Counter};
 use actq_bench::{Target, firmware, profile, shared_policies, ur3};
-use actq_kernels::cost::{Cost, of_step};
+use actq_kernels::cost::{Cost, of_op, of_step};
 use actq_kernels::{StepError, Width};
 use anyhow::{Context, Result, bail, ensure};
 
@@ -21,9 +22,8 @@ const STEPS: usize = 24;
 /// Largest error of a predicted step.
 const ERROR: f64 = 0.01;
 
-fn image(prepared: &Prepared<'_>, options: &Options) -> Result<Vec<u8>> {
-    let (policy, outcomes) = prepared.quantize(options, |_| {})?;
-    writer::image(&policy, &outcomes)
+fn image(policy: &Policy, options: &Options) -> Result<Vec<u8>> {
+    Ok(quantize(policy, &Recordings::load(policy)?, options, |_, _| {})?.image)
 }
 
 fn best(bits: f64) -> Options {
@@ -50,7 +50,7 @@ fn predictions_hold(dir: &Path, images: &[Options]) -> Result<Vec<f64>> {
     let observations = observations(dir, &policy)?;
     let mut per_mac = Vec::new();
     for options in images {
-        let bytes = image(&Prepared::new(&policy, options.method, |_| {})?, options)?;
+        let bytes = image(&policy, options)?;
         let buffer = ImageBuffer::new(&bytes);
         let image = buffer.image(dir)?;
         let counted: Vec<Cost> = profile::steps(&elf, &counter, &bytes, &observations)?;
@@ -111,7 +111,7 @@ fn polls_keep_their_budget(dir: &Path, images: &[Options]) -> Result<usize> {
     let observations = observations(dir, &policy)?;
     let mut tried = 0;
     for options in images {
-        let bytes = image(&Prepared::new(&policy, options.method, |_| {})?, options)?;
+        let bytes = image(&policy, options)?;
         let buffer = ImageBuffer::new(&bytes);
         let image = buffer.image(dir)?;
         let expected = with_head(image, |head| {
@@ -164,16 +164,20 @@ fn polls_of_shared_policies_stay_within_their_budget() -> Result<()> {
 #[test]
 fn a_budget_of_time_is_kept_and_used() -> Result<()> {
     let policy = Policy::load(&ur3())?;
-    let prepared = Prepared::new(&policy, Method::Best, |_| {})?;
+    let recordings = Recordings::load(&policy)?;
+    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, |_| {})?;
+    let within = |milliseconds| {
+        let budget = Budget::Time(TimeLimit { milliseconds, clock_hz: CLOCK });
+        quantizer.quantize(&Options { budget, ..best(1.0) }, |_, _| {})
+    };
     for milliseconds in [1.6, 2.4] {
-        let limit = Limit { milliseconds, clock_hz: CLOCK };
-        let (policy, outcomes, _) = limit.quantize(&prepared, &best(1.0), |_| {})?;
-        let step = limit.predict(&writer::image(&policy, &outcomes)?)?;
+        let found = within(milliseconds)?;
+        let step = StepTime::new(&found.buffer().image(Path::new("memory"))?, CLOCK);
+        assert_eq!(found.time.map(|time| time.cycles), Some(step.cycles));
         assert!(step.milliseconds <= milliseconds, "{} ms for {milliseconds}", step.milliseconds);
         assert!(step.milliseconds > 0.97 * milliseconds, "{} ms for {milliseconds}", step.milliseconds);
     }
-    let limit = Limit { milliseconds: 0.01, clock_hz: CLOCK };
-    let refused = limit.quantize(&prepared, &best(1.0), |_| {}).map(|_| ()).expect_err("nothing is so fast");
+    let refused = within(0.01).map(|_| ()).expect_err("nothing is so fast");
     assert!(refused.to_string().contains("the fastest is"), "{refused}");
     Ok(())
 }
@@ -196,7 +200,7 @@ fn mixed_widths_cost_little_more_than_their_blocks() -> Result<()> {
         linear(&mut builder, 4 * ROWS, &|row| Width::ALL[row / ROWS])?;
         linear(&mut builder, 4 * ROWS, &|row| Width::ALL[row % 4])?;
         let (policy, outcomes) = builder.finish("mixed".to_owned(), false);
-        let bytes = writer::image(&policy, &outcomes)?;
+        let bytes = emit::image(&policy, &outcomes)?;
         let buffer = ImageBuffer::new(&bytes);
         let image = buffer.image(Path::new("mixed"))?;
         let observation = (0..COLS).map(|i| (i as f32).sin()).collect();
@@ -208,6 +212,42 @@ fn mixed_widths_cost_little_more_than_their_blocks() -> Result<()> {
         println!("{activations:?}: blocks alone {alone}, in order {in_order}, indexed {indexed}");
         ensure!(*in_order as f64 <= 1.03 * alone as f64, "{in_order} in order, {alone} alone");
         ensure!(*indexed as f64 <= 1.03 * alone as f64, "{indexed} with an index, {alone} alone");
+    }
+    Ok(())
+}
+
+/// Biases that are added to what an output holds: no graph lowers to such an operation, but an image may have it.
+#[test]
+fn polls_that_add_biases_stay_within_their_budget() -> Result<()> {
+    const ROWS: usize = 1000;
+    const COLS: usize = 8;
+    let (elf, counter) = (firmware::application(Target::Fpu)?, Counter::build()?);
+    let mut builder = Builder::new(COLS);
+    for _ in 0..2 {
+        builder.linear((ROWS, COLS), Activations::Int8, |_| Some(Width::W2), 0, true)?;
+    }
+    builder.part(2)?;
+    let (policy, outcomes) = builder.finish("biases".to_owned(), false);
+    let bytes = accumulating(&emit::image(&policy, &outcomes)?)?;
+    let buffer = ImageBuffer::new(&bytes);
+    let image = buffer.image(Path::new("biases"))?;
+    let observations = [(0..COLS).map(|i| (i as f32).sin()).collect::<Vec<_>>()];
+    for budget in [image.least_budget(), 2 * image.least_budget()] {
+        let (costs, _) = profile::regions(&elf, &counter, &bytes, &format!("poll {budget}"), &observations)?;
+        let largest = costs.iter().skip(1).map(|c| c.instructions).max().unwrap_or(0);
+        println!("{} polls of {budget}, the largest {largest}", costs.len() - 1);
+        ensure!(largest <= u64::from(budget), "{largest} instructions in a poll of {budget}");
+    }
+    let parts = profile::parts(&elf, &counter, &image, &bytes, &observations, u32::MAX)?.remove(0);
+    let linear = image.ops().zip(&parts.ops).filter(|(op, _)| op.matrix().is_some());
+    for (op, counted) in linear {
+        let predicted = of_op(&op);
+        println!("{:?}: {predicted:?}, counted {counted:?}", op.kind);
+        for (predicted, counted) in [(predicted.instructions, counted.instructions), (predicted.cycles, counted.cycles)]
+        {
+            let error = predicted as f64 / counted as f64 - 1.0;
+            ensure!(error.abs() < 0.03, "{:?}: {predicted} for {counted}: {:+.2}%", op.kind, 1e2 * error);
+        }
     }
     Ok(())
 }

@@ -2,11 +2,14 @@
 
 use std::collections::BTreeSet;
 
-use actq::eval;
+use actq::budget::Budget;
+use actq::data::Recordings;
+use actq::emit::files;
+use actq::measure::eval;
+use actq::methods::{Method, Options};
+use actq::pipeline::quantize;
 use actq::policy::Policy;
-use actq::quantize::{Budget, Method, Options, quantize};
 use actq::runtime::ImageBuffer;
-use actq::{files, writer};
 use actq_bench::cycles::Code;
 use actq_bench::qemu::Counter;
 use actq_bench::{Target, evaluation, firmware, ur3};
@@ -18,7 +21,7 @@ fn a_step_of_a_head_reads_each_weight_once() -> Result<()> {
     let dir = ur3();
     let policy = Policy::load(&dir)?;
     let options = Options::new(Method::Rtn, Budget::Width(Width::W8));
-    let bytes = writer::image(&policy, &quantize(&policy.graph, &[], &options)?)?;
+    let bytes = quantize(&policy, &Recordings::default(), &options, |_, _| {})?.image;
     let file = tempfile::NamedTempFile::new()?;
     let path = file.path();
     files::write(path, &bytes)?;

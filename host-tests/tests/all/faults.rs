@@ -2,9 +2,12 @@
 
 use std::task::Poll;
 
-use actq::graph::{Graph, Matrix, Node, NodeKind};
-use actq::policy::{Contract, Policy};
-use actq::quantize::{Budget, Method, Options, quantize};
+use actq::budget::{Budget, Rate};
+use actq::contract::ActionContract;
+use actq::graph::ops::{LayerNorm, Linear, Normalize, Pointwise, RmsNorm};
+use actq::graph::{Graph, NodeKind, WeightMatrix};
+use actq::methods::{Method, Options, quantize};
+use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
 use actq_kernels::image::Kind;
 use actq_kernels::math::Function;
@@ -16,17 +19,17 @@ const MAX_STEP: f32 = 0.25;
 
 /// An image of a policy that multiplies the observation with `gain`, then with `factor`, and then does `nodes`. (The self-test's
 /// observations are about `1 / gain`.)
-fn image(gain: f32, factor: f32, nodes: Vec<NodeKind>, contract: Contract) -> ImageBuffer {
+fn image(gain: f32, factor: f32, nodes: Vec<NodeKind>, contract: ActionContract) -> ImageBuffer {
     let mut graph = Graph::new(N);
-    graph.matrices.push(Matrix { name: "w".into(), rows: N, cols: N, data: vec![factor, 0.0, 0.0, factor] });
+    graph.matrices.push(WeightMatrix { name: "w".into(), rows: N, cols: N, data: vec![factor, 0.0, 0.0, factor] });
     let unlimited = f32::INFINITY;
-    let first = [
-        NodeKind::Normalize { mean: vec![0.0; N], scale: vec![gain; N], pre_clip: unlimited, clip: unlimited },
-        NodeKind::Linear { matrix: 0, bias: vec![0.0; N] },
-    ];
-    graph.nodes =
-        first.into_iter().chain(nodes).enumerate().map(|(input, kind)| Node { kind, input, len: N }).collect();
-    let outcomes = quantize(&graph, &[], &Options::new(Method::Rtn, Budget::Width(Width::W8))).expect("it is a graph");
+    let normalize = Normalize { mean: vec![0.0; N], scale: vec![gain; N], pre_clip: unlimited, clip: unlimited };
+    let first = [normalize.into(), Linear { matrix: 0, bias: vec![0.0; N] }.into()];
+    for (input, kind) in first.into_iter().chain(nodes).enumerate() {
+        graph.add(kind, &[input]).expect("it fits");
+    }
+    let options = Options::new(Method::Rtn, Budget::Width(Width::W8));
+    let (_, outcomes) = quantize(&graph, None, Rate::Width(Width::W8), &options).expect("it is a graph");
     let policy = Policy {
         dir: ".".into(),
         name: "faults".into(),
@@ -40,7 +43,7 @@ fn image(gain: f32, factor: f32, nodes: Vec<NodeKind>, contract: Contract) -> Im
         graph,
         digest: [0; 32],
     };
-    ImageBuffer::new(&actq::writer::image(&policy, &outcomes).expect("the policy fits the format"))
+    ImageBuffer::new(&actq::emit::image(&policy, &outcomes).expect("the policy fits the format"))
 }
 
 fn with_head(buffer: &ImageBuffer, work: impl FnOnce(&mut Head<'_, '_>)) {
@@ -50,7 +53,7 @@ fn with_head(buffer: &ImageBuffer, work: impl FnOnce(&mut Head<'_, '_>)) {
 }
 
 fn step_limit() -> ImageBuffer {
-    image(1.0, 1.0, vec![], Contract { max_step: Some(vec![MAX_STEP; N]), ..Contract::default() })
+    image(1.0, 1.0, vec![], ActionContract { max_step: Some(vec![MAX_STEP; N]), ..ActionContract::default() })
 }
 
 #[test]
@@ -86,7 +89,8 @@ fn an_error_keeps_the_last_action_for_the_step_limit() {
 #[test]
 fn an_error_in_the_midst_of_an_action_changes_none_of_its_values() {
     // The second value's scale carries it out of f32's range where the first stays inside.
-    let contract = Contract { scale: Some(vec![1.0, 1e38]), max_step: Some(vec![MAX_STEP; N]), ..Contract::default() };
+    let contract =
+        ActionContract { scale: Some(vec![1.0, 1e38]), max_step: Some(vec![MAX_STEP; N]), ..ActionContract::default() };
     with_head(&image(1.0, 1.0, vec![], contract), |head| {
         head.reset();
         let first = head.step(&[1.0, 0.0]).expect("an action").to_vec();
@@ -99,26 +103,24 @@ fn an_error_in_the_midst_of_an_action_changes_none_of_its_values() {
 /// An operation that made something finite of a value beyond f32's range would let a broken network drive the robot.
 #[test]
 fn no_operation_hides_a_value_that_has_left_the_range() {
-    let clip = |limit| NodeKind::Normalize {
-        mean: vec![0.0; N],
-        scale: vec![1.0; N],
-        pre_clip: if limit { 1.0 } else { f32::INFINITY },
-        clip: if limit { f32::INFINITY } else { 1.0 },
+    let clip = |limit| {
+        let (pre_clip, clip) = if limit { (1.0, f32::INFINITY) } else { (f32::INFINITY, 1.0) };
+        NodeKind::from(Normalize { mean: vec![0.0; N], scale: vec![1.0; N], pre_clip, clip })
     };
     let one = || vec![1.0; N];
     let cases: Vec<(&str, Vec<NodeKind>)> = Function::ALL
         .into_iter()
-        .map(|function| (function.name(), vec![NodeKind::Function(function)]))
+        .map(|function| (function.name(), vec![Pointwise(function).into()]))
         .chain([
             ("clip before", vec![clip(true)]),
             ("clip", vec![clip(false)]),
-            ("layer norm", vec![NodeKind::LayerNorm { weight: one(), bias: one(), eps: 1e-5 }]),
-            ("RMS norm", vec![NodeKind::RmsNorm { weight: one(), eps: 1e-5 }]),
-            ("linear", vec![NodeKind::Linear { matrix: 0, bias: one() }]),
+            ("layer norm", vec![LayerNorm { weight: one(), bias: one(), eps: 1e-5 }.into()]),
+            ("RMS norm", vec![RmsNorm { weight: one(), eps: 1e-5 }.into()]),
+            ("linear", vec![Linear { matrix: 0, bias: one() }.into()]),
         ])
         .collect();
     for (name, nodes) in cases {
-        with_head(&image(1e15, 1e10, nodes, Contract::default()), |head| {
+        with_head(&image(1e15, 1e10, nodes, ActionContract::default()), |head| {
             for observation in [[2e15, 1.0], [-2e15, 1.0], [1.0, -2e15], [1.0, 2e15]] {
                 assert_eq!(head.step(&observation).err(), Some(StepError::NotFinite), "{name} of {observation:?}");
             }
@@ -131,9 +133,9 @@ fn no_operation_hides_a_value_that_has_left_the_range() {
 fn a_norm_whose_squares_leave_the_range_is_an_error() {
     let one = || vec![1.0; N];
     for norm in
-        [NodeKind::LayerNorm { weight: one(), bias: one(), eps: 1e-5 }, NodeKind::RmsNorm { weight: one(), eps: 1e-5 }]
+        [LayerNorm { weight: one(), bias: one(), eps: 1e-5 }.into(), RmsNorm { weight: one(), eps: 1e-5 }.into()]
     {
-        with_head(&image(1e15, 1e10, vec![norm], Contract::default()), |head| {
+        with_head(&image(1e15, 1e10, vec![norm], ActionContract::default()), |head| {
             assert_eq!(head.step(&[1e5, -1e5]).err(), Some(StepError::NotFinite));
         });
     }

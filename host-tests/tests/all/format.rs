@@ -3,9 +3,11 @@
 use std::fs;
 use std::path::Path;
 
-use actq::graph::{Graph, Matrix, Node, NodeKind};
-use actq::policy::{Contract, Policy};
-use actq::quantize::{Outcome, Quantized};
+use actq::contract::ActionContract;
+use actq::graph::ops::Linear;
+use actq::graph::{Graph, WeightMatrix};
+use actq::methods::{Outcome, Quantized};
+use actq::policy::Policy;
 use actq::runtime::{ImageBuffer, with_head};
 use actq_bench::root;
 use actq_kernels::activations::{Plan, max_prepared_words};
@@ -46,8 +48,8 @@ const BIAS: [f32; 3] = [0.5, -0.25, 1.125];
 /// The example's policy, as the quantizer would hand it to the writer.
 fn library_bytes() -> Vec<u8> {
     let mut graph = Graph::new(2);
-    graph.matrices.push(Matrix { name: "w".into(), rows: 3, cols: 2, data: vec![0.0; 6] });
-    graph.nodes.push(Node { kind: NodeKind::Linear { matrix: 0, bias: BIAS.to_vec() }, input: 0, len: 3 });
+    graph.matrices.push(WeightMatrix { name: "w".into(), rows: 3, cols: 2, data: vec![0.0; 6] });
+    graph.add(Linear { matrix: 0, bias: BIAS.to_vec() }, &[0]).expect("it fits");
     let policy = Policy {
         dir: ".".into(),
         name: "tiny".into(),
@@ -56,7 +58,7 @@ fn library_bytes() -> Vec<u8> {
         execute: 1,
         act_len: 3,
         rate_hz: 50.0,
-        contract: Contract { low: Some(vec![-40.0; 3]), high: Some(vec![40.0; 3]), ..Contract::default() },
+        contract: ActionContract { low: Some(vec![-40.0; 3]), high: Some(vec![40.0; 3]), ..ActionContract::default() },
         graph,
         weights: 6,
         digest: std::array::from_fn(|i| i as u8),
@@ -71,7 +73,7 @@ fn library_bytes() -> Vec<u8> {
         codes: LEVELS.as_flattened().iter().map(|&level| Width::W2.nearest_code(level as f32)).collect(),
     };
     let outcome = Outcome { quantized, error: None, x_max: 127, allocation: None };
-    actq::writer::image(&policy, &[outcome]).expect("the policy fits the format")
+    actq::emit::image(&policy, &[outcome]).expect("the policy fits the format")
 }
 
 fn floats(words: &[u32]) -> Vec<f32> {
@@ -103,9 +105,9 @@ fn the_hex_example_reads_as_documented() {
     assert_eq!((image.rate_hz(), image.name()), (50.0, "tiny"));
     assert_eq!(image.digest(), std::array::from_fn(|i| i as u8));
 
-    let contract = image.contract();
-    assert_eq!((floats(contract.low), floats(contract.high)), (vec![-40.0; 3], vec![40.0; 3]));
-    assert!(contract.scale.is_empty() && contract.offset.is_empty() && contract.max_step.is_empty());
+    let [scale, offset, low, high, max_step] = image.contract_arrays();
+    assert_eq!((floats(low), floats(high)), (vec![-40.0; 3], vec![40.0; 3]));
+    assert!(scale.is_empty() && offset.is_empty() && max_step.is_empty());
 
     assert_eq!(image.op_count(), 1);
     let op = image.ops().next().expect("there is an operation");

@@ -1,9 +1,12 @@
 //! The functions on the Cortex-M4's FPU: the host's bits, and what they cost.
 
+use actq::budget::Budget;
+use actq::data::Recordings;
+use actq::emit::files;
+use actq::methods::{Method, Options};
+use actq::pipeline::quantize;
 use actq::policy::Policy;
-use actq::quantize::{Budget, Method, Options, quantize};
 use actq::runtime::ImageBuffer;
-use actq::{files, writer};
 use actq_bench::cycles::Code;
 use actq_bench::qemu::{self, Counter};
 use actq_bench::{Target, firmware, shared_policies};
@@ -97,7 +100,7 @@ fn a_head_with_an_lstm_stays_within_its_instructions() -> Result<()> {
     let Some(policies) = shared_policies() else { return Ok(()) };
     let policy = Policy::load(&policies.join("g1_lstm256"))?;
     let options = Options::new(Method::Rtn, Budget::Width(Width::W3));
-    let bytes = writer::image(&policy, &quantize(&policy.graph, &[], &options)?)?;
+    let bytes = quantize(&policy, &Recordings::default(), &options, |_, _| {})?.image;
     let file = tempfile::NamedTempFile::new()?;
     files::write(file.path(), &bytes)?;
     let buffer = ImageBuffer::new(&bytes);

@@ -4,14 +4,17 @@
 use std::sync::LazyLock;
 use std::time::Instant;
 
-use actq::graph::{Graph, Matrix, Node, NodeKind};
-use actq::policy::{Contract, Policy};
-use actq::quantize::{Budget, Method, Options, Outcome, quantize};
+use actq::budget::{Budget, Rate};
+use actq::contract::ActionContract;
+use actq::graph::ops::{LayerNorm, Linear, Lstm, Normalize, Pointwise};
+use actq::graph::{Graph, NodeKind, WeightMatrix};
+use actq::methods::{Method, Options, Outcome, quantize};
+use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
 use actq_bench::golden::Random;
 use actq_bench::root;
 use actq_kernels::format::Width;
-use actq_kernels::image::{Kind, checksum, header as h, header::op};
+use actq_kernels::image::{Kind, checksum, header as h, op};
 use actq_kernels::math::Function;
 use actq_kernels::{Head, Image, ImageError as E, StepError};
 
@@ -28,20 +31,22 @@ fn valid_image() -> Vec<u8> {
     let mut graph = Graph::new(OBS);
     for (rows, cols) in [(UNITS, OBS), (4 * UNITS, UNITS), (4 * UNITS, UNITS), (CHUNK * ACT, UNITS)] {
         let name = format!("w{}", graph.matrices.len());
-        graph.matrices.push(Matrix { name, rows, cols, data: values(rows * cols) });
+        graph.matrices.push(WeightMatrix { name, rows, cols, data: values(rows * cols) });
     }
-    let nodes = [
-        (NodeKind::Normalize { mean: values(OBS), scale: vec![0.5; OBS], pre_clip: 20.0, clip: 5.0 }, OBS),
-        (NodeKind::Linear { matrix: 0, bias: values(UNITS) }, UNITS),
-        (NodeKind::Function(Function::Elu), UNITS),
-        (NodeKind::LayerNorm { weight: values(UNITS), bias: values(UNITS), eps: 1e-5 }, UNITS),
-        (NodeKind::Lstm { hidden: UNITS, input: 1, state: 2, bias: values(4 * UNITS) }, UNITS),
-        (NodeKind::Linear { matrix: 3, bias: values(CHUNK * ACT) }, CHUNK * ACT),
+    let nodes: [NodeKind; 6] = [
+        Normalize { mean: values(OBS), scale: vec![0.5; OBS], pre_clip: 20.0, clip: 5.0 }.into(),
+        Linear { matrix: 0, bias: values(UNITS) }.into(),
+        Pointwise(Function::Elu).into(),
+        LayerNorm { weight: values(UNITS), bias: values(UNITS), eps: 1e-5 }.into(),
+        Lstm { hidden: UNITS, input: 1, state: 2, bias: values(4 * UNITS) }.into(),
+        Linear { matrix: 3, bias: values(CHUNK * ACT) }.into(),
     ];
-    graph.nodes = nodes.into_iter().enumerate().map(|(input, (kind, len))| Node { kind, input, len }).collect();
+    for (input, kind) in nodes.into_iter().enumerate() {
+        graph.add(kind, &[input]).expect("it fits");
+    }
     let at_width = |width| {
         let options = Options { group: 32, ..Options::new(Method::Rtn, Budget::Width(width)) };
-        quantize(&graph, &[], &options).expect("the graph can be quantized")
+        quantize(&graph, None, Rate::Width(width), &options).expect("the graph can be quantized").1
     };
     let [w2, w3, w4, w8] = Width::ALL.map(at_width);
     let matrices = [w4[0].clone(), w3[1].clone(), w2[2].clone(), interleaved(&w2[3], &w8[3])];
@@ -53,7 +58,7 @@ fn valid_image() -> Vec<u8> {
         execute: CHUNK,
         act_len: ACT,
         rate_hz: 50.0,
-        contract: Contract {
+        contract: ActionContract {
             scale: Some(vec![0.5; ACT]),
             offset: Some(vec![0.1; ACT]),
             low: Some(vec![-1.0; ACT]),
@@ -64,7 +69,7 @@ fn valid_image() -> Vec<u8> {
         graph,
         digest: [7; 32],
     };
-    actq::writer::image(&policy, &matrices).expect("the policy fits the format")
+    actq::emit::image(&policy, &matrices).expect("the policy fits the format")
 }
 
 /// Even rows of `a`, odd rows of `b`, for activations beyond int8, so that they are packed in single lanes.
@@ -593,16 +598,18 @@ fn a_matrix_is_checked_once_however_many_operations_share_it() {
         const N: usize = 768;
         let mut random = Random(3);
         let mut graph = Graph::new(N);
-        graph.matrices.push(Matrix {
+        graph.matrices.push(WeightMatrix {
             name: "w".into(),
             rows: N,
             cols: N,
             data: (0..N * N).map(|_| random.unit()).collect(),
         });
-        let kind = || NodeKind::Linear { matrix: 0, bias: vec![0.0; N] };
-        graph.nodes = (0..operations).map(|input| Node { kind: kind(), input, len: N }).collect();
+        for input in 0..operations {
+            graph.add(Linear { matrix: 0, bias: vec![0.0; N] }, &[input]).expect("it fits");
+        }
         let options = Options { group: 32, ..Options::new(Method::Rtn, Budget::Width(Width::W8)) };
-        let outcomes = quantize(&graph, &[], &options).expect("the graph can be quantized");
+        let (_, outcomes) =
+            quantize(&graph, None, Rate::Width(Width::W8), &options).expect("the graph can be quantized");
         let policy = Policy {
             dir: ".".into(),
             name: "shared".into(),
@@ -611,12 +618,12 @@ fn a_matrix_is_checked_once_however_many_operations_share_it() {
             execute: 1,
             act_len: N,
             rate_hz: 50.0,
-            contract: Contract { scale: Some(vec![1e-30; N]), ..Contract::default() },
+            contract: ActionContract { scale: Some(vec![1e-30; N]), ..ActionContract::default() },
             weights: graph.weights(),
             graph,
             digest: [0; 32],
         };
-        let bytes = actq::writer::image(&policy, &outcomes).expect("the policy fits the format");
+        let bytes = actq::emit::image(&policy, &outcomes).expect("the policy fits the format");
         let buffer = ImageBuffer::new(&bytes);
         let start = Instant::now();
         let image = Image::new_checked(buffer.bytes()).expect("the image is valid");

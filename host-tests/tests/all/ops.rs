@@ -6,11 +6,12 @@
 use std::collections::BTreeMap;
 use std::fs;
 
+use actq::budget::{Budget, Rate};
+use actq::emit;
 use actq::graph::Evaluator;
+use actq::methods::{Activations, Method, Options, Outcome, quantize};
 use actq::policy::Policy;
-use actq::quantize::{Activations, Budget, Method, Options, Outcome, quantize};
 use actq::runtime::{ImageBuffer, with_head};
-use actq::writer;
 use actq_bench::golden::Random;
 use actq_kernels::{Head, Width};
 use anyhow::{Context, Result, ensure};
@@ -253,9 +254,9 @@ fn deviation(
 }
 
 fn rtn(policy: &Policy, group: usize) -> Result<Vec<Outcome>> {
-    let budget = Budget::Width(Width::W8);
+    let (budget, rate) = (Budget::Width(Width::W8), Rate::Width(Width::W8));
     let options = Options { group, activations: Activations::Int16, ..Options::new(Method::Rtn, budget) };
-    quantize(&policy.graph, &[], &options)
+    Ok(quantize(&policy.graph, None, rate, &options)?.1)
 }
 
 /// The largest error that activation rounding explains.
@@ -266,7 +267,7 @@ fn bound(outcomes: &[Outcome]) -> f64 {
 
 /// Runs `work` with a head over the quantized policy.
 fn on_head<T>(policy: &Policy, outcomes: &[Outcome], work: impl FnOnce(&mut Head<'_, '_>) -> Result<T>) -> Result<T> {
-    let buffer = ImageBuffer::new(&writer::image(policy, outcomes)?);
+    let buffer = ImageBuffer::new(&emit::image(policy, outcomes)?);
     with_head(buffer.image(&policy.dir)?, work)
 }
 

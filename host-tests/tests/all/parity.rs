@@ -275,13 +275,13 @@ fn weights_come_back_from_their_codes() {
 }
 
 fn single_matrix_image(case: &Case) -> Vec<u8> {
-    use actq::graph::{Graph, Matrix, Node, NodeKind};
-    use actq::quantize::{Outcome, Quantized};
+    use actq::graph::ops::Linear;
+    use actq::graph::{Graph, WeightMatrix};
+    use actq::methods::{Outcome, Quantized};
     let BlockShape { width, rows, cols, group, .. } = case.shape;
     let mut graph = Graph::new(cols);
-    graph.matrices.push(Matrix { name: "w".into(), rows, cols, data: vec![0.0; rows * cols] });
-    let kind = NodeKind::Linear { matrix: 0, bias: vec![0.5; rows] };
-    graph.nodes.push(Node { kind, input: 0, len: rows });
+    graph.matrices.push(WeightMatrix { name: "w".into(), rows, cols, data: vec![0.0; rows * cols] });
+    graph.add(Linear { matrix: 0, bias: vec![0.5; rows] }, &[0]).expect("it fits");
     let policy = actq::policy::Policy {
         dir: ".".into(),
         name: "single".into(),
@@ -290,7 +290,7 @@ fn single_matrix_image(case: &Case) -> Vec<u8> {
         execute: 1,
         act_len: rows,
         rate_hz: 50.0,
-        contract: actq::policy::Contract::default(),
+        contract: actq::contract::ActionContract::default(),
         graph,
         weights: rows * cols,
         digest: [0; 32],
@@ -304,6 +304,6 @@ fn single_matrix_image(case: &Case) -> Vec<u8> {
         group_scales: case.scales.clone(),
         codes: case.codes.clone(),
     };
-    actq::writer::image(&policy, &[Outcome { quantized, error: None, x_max: 127, allocation: None }])
+    actq::emit::image(&policy, &[Outcome { quantized, error: None, x_max: 127, allocation: None }])
         .expect("the policy fits the format")
 }

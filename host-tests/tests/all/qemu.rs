@@ -3,19 +3,18 @@
 use std::fs;
 use std::path::Path;
 
-use actq::dataset::recording::Recording;
-use actq::dataset::{Dataset, Sizes};
-use actq::eval;
-use actq::graph::Graph;
+use actq::budget::Budget;
+use actq::data::{Dataset, Recording, Recordings, Sizes};
+use actq::measure::eval;
+use actq::methods::{Activations, Method, Options};
+use actq::pipeline::quantize;
 use actq::policy::Policy;
-use actq::quantize::{Activations, Budget, Method, Options, quantize};
 use actq::runtime::{ImageBuffer, with_head};
-use actq::writer;
 use actq_bench::firmware::{self, built_in};
 use actq_bench::qemu::{self, Server};
 use actq_bench::{Target, golden, shared_policies, ur3};
 use actq_kernels::Width;
-use actq_kernels::image::{checksum, header as h};
+use actq_kernels::image::{checksum, header as h, op};
 use actq_kernels::linear::worst_case;
 use anyhow::{Context, Result, ensure};
 
@@ -24,7 +23,7 @@ const STEPS: usize = 208;
 
 fn rtn(policy: &Policy, width: Width, group: usize, activations: Activations) -> Result<Vec<u8>> {
     let options = Options { group, activations, ..Options::new(Method::Rtn, Budget::Width(width)) };
-    writer::image(policy, &quantize(&policy.graph, &[], &options)?)
+    Ok(quantize(policy, &Recordings::default(), &options, |_, _| {})?.image)
 }
 
 #[test]
@@ -105,7 +104,7 @@ fn the_target_allows_int32_to_the_last_product_as_the_host_does() -> Result<()> 
         ensure!(largest < i64::from(i16::MAX), "scales of {group}: all of int16 is allowed");
         let words: &[u32] = bytemuck::cast_slice(buffer.bytes());
         let records = words[h::W_OPS] as usize..;
-        let mut linear = words[records].chunks(h::OP_WORDS).filter(|record| record[0] as u8 == h::op::LINEAR);
+        let mut linear = words[records].chunks(h::OP_WORDS).filter(|record| record[0] as u8 == op::LINEAR);
         let record = linear.nth(widest).context("the operation is linear")?[3] as usize;
         for (x_max, refused) in [(largest, false), (largest + 1, true)] {
             bytes[4 * record + 6..][..2].copy_from_slice(&u16::try_from(x_max)?.to_le_bytes());
@@ -232,15 +231,14 @@ fn eight_bits_stay_close_to_the_recorded_actions() -> Result<()> {
 fn gptq_beats_rounding_at_low_bits() -> Result<()> {
     let dir = ur3();
     let policy = Policy::load(&dir)?;
-    let calib = Recording::Calib.require(Some(&dir), None, Sizes::of(&policy), "gptq")?;
-    let moments = actq::quantize::moments::collect(&policy.graph, &calib, |_| {});
-    let nmse = |graph: &Graph, method| -> Result<f64> {
+    let recordings = Recordings::load(&policy)?;
+    let nmse = |method| -> Result<f64> {
         let options = Options::new(method, Budget::Width(Width::W3));
-        let buffer = ImageBuffer::new(&writer::image(&policy, &quantize(graph, &moments, &options)?)?);
+        let buffer = quantize(&policy, &recordings, &options, |_, _| {})?.buffer();
         let image = buffer.image(&dir)?;
         Ok(eval::evaluate(image, &eval::heldout(&dir, &image)?)?.nmse)
     };
-    let (gptq, plain) = (nmse(&policy.graph, Method::Gptq)?, nmse(&policy.graph, Method::Rtn)?);
+    let (gptq, plain) = (nmse(Method::Gptq)?, nmse(Method::Rtn)?);
     assert!(gptq < plain / 2.0, "{gptq} against {plain}");
     Ok(())
 }

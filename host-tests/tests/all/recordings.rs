@@ -2,16 +2,16 @@
 
 use std::path::Path;
 
-use actq::backprop::{Network, Weights, zero_state};
-use actq::dataset::range::Range;
-use actq::dataset::recording::Recording;
-use actq::dataset::{Dataset, Sizes};
-use actq::eval::evaluate;
-use actq::graph::{Graph, Matrix, Node, NodeKind};
-use actq::policy::{Contract, Policy};
-use actq::quantize::{Activations, Budget, Method, Options, quantize};
+use actq::budget::Budget;
+use actq::contract::ActionContract;
+use actq::data::{Dataset, Range, Recording, Recordings, Sizes};
+use actq::graph::ops::{Linear, Lstm};
+use actq::graph::{Graph, Network, WeightMatrix, Weights, zero_state};
+use actq::measure::eval::evaluate;
+use actq::methods::{Activations, Method, Options};
+use actq::pipeline::quantize;
+use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
-use actq::writer;
 use actq_bench::golden::Random;
 use actq_bench::{shared_policies, ur3};
 use actq_kernels::Width;
@@ -52,15 +52,13 @@ fn policy() -> Policy {
     let mut values = |n: usize| -> Vec<f32> { (0..n).map(|_| 0.4 * random.unit()).collect() };
     let mut graph = Graph::new(OBS);
     for (name, rows, cols) in [("ih", 4 * HIDDEN, OBS), ("hh", 4 * HIDDEN, HIDDEN), ("out", ACT, HIDDEN)] {
-        graph.matrices.push(Matrix { name: name.into(), rows, cols, data: values(rows * cols) });
+        graph.matrices.push(WeightMatrix { name: name.into(), rows, cols, data: values(rows * cols) });
     }
     let mut bias = values(4 * HIDDEN);
     // The forget gate stands open.
     bias[HIDDEN..2 * HIDDEN].iter_mut().for_each(|b| *b += 3.0);
-    graph.nodes = vec![
-        Node { kind: NodeKind::Lstm { hidden: HIDDEN, input: 0, state: 1, bias }, input: 0, len: HIDDEN },
-        Node { kind: NodeKind::Linear { matrix: 2, bias: values(ACT) }, input: 1, len: ACT },
-    ];
+    graph.add(Lstm { hidden: HIDDEN, input: 0, state: 1, bias }, &[0]).expect("it fits");
+    graph.add(Linear { matrix: 2, bias: values(ACT) }, &[1]).expect("it fits");
     Policy {
         dir: ".".into(),
         name: "lstm".into(),
@@ -69,7 +67,7 @@ fn policy() -> Policy {
         execute: 1,
         act_len: ACT,
         rate_hz: 50.0,
-        contract: Contract::default(),
+        contract: ActionContract::default(),
         weights: graph.weights(),
         graph,
         digest: [0; 32],
@@ -86,7 +84,7 @@ fn windows_are_evaluated_from_their_recorded_state() -> Result<()> {
     whole.fill_actions(graph);
 
     // The f32 network's state before each window.
-    let (network, weights, mut state) = (Network { graph, x_max: &[] }, Weights::of(graph), zero_state(graph, 1));
+    let (network, weights, mut state) = (Network::new(graph), Weights::of(graph), zero_state(graph, 1));
     let mut states = Vec::new();
     for (step, row) in whole.episode(0).enumerate() {
         if step % WINDOW == 0 {
@@ -108,7 +106,7 @@ fn windows_are_evaluated_from_their_recorded_state() -> Result<()> {
 
     let options =
         Options { group: 32, activations: Activations::Int16, ..Options::new(Method::Rtn, Budget::Width(Width::W8)) };
-    let buffer = ImageBuffer::new(&writer::image(&policy, &quantize(graph, &[], &options)?)?);
+    let buffer = ImageBuffer::new(&quantize(&policy, &Recordings::default(), &options, |_, _| {})?.image);
     let nmse = |dataset: &Dataset| Ok::<_, anyhow::Error>(evaluate(buffer.image(Path::new("memory"))?, dataset)?.nmse);
     let (whole, cut, from_zero) = (nmse(&whole)?, nmse(&cut)?, nmse(&from_zero)?);
     assert!(cut < 2.0 * whole && from_zero > 100.0 * cut, "{whole}, {cut}, from zero {from_zero}");

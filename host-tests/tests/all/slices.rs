@@ -3,11 +3,11 @@
 use std::path::Path;
 use std::task::Poll;
 
-use actq::graph::NodeKind;
+use actq::emit;
+use actq::graph::ops::{Add, Gru, LayerNorm, Linear, Lstm, Normalize, Pointwise, RmsNorm};
+use actq::methods::{Activations, Outcome};
 use actq::policy::Policy;
-use actq::quantize::{Activations, Outcome};
 use actq::runtime::{ImageBuffer, with_head};
-use actq::writer;
 use actq_bench::golden::Random;
 use actq_bench::networks::Builder;
 use actq_kernels::image::Kind;
@@ -37,31 +37,31 @@ fn network(seed: u64) -> Result<(Policy, Vec<Outcome>)> {
     };
     let mut last = builder.linear((rows, OBSERVATION), activations, width, group, seed.is_multiple_of(2))?;
     let [mean, scale] = [builder.values(rows), builder.values(rows)];
-    last = builder.node(NodeKind::Normalize { mean, scale, pre_clip: 4.0, clip: 2.0 }, last);
+    last = builder.node(Normalize { mean, scale, pre_clip: 4.0, clip: 2.0 }, &[last])?;
     let kept = last;
-    last = builder.node(NodeKind::Function(Function::ALL[seed as usize % Function::ALL.len()]), last);
-    last = builder.node(NodeKind::Add { with: kept }, last);
+    last = builder.node(Pointwise(Function::ALL[seed as usize % Function::ALL.len()]), &[last])?;
+    last = builder.node(Add, &[last, kept])?;
     let [weight, bias] = [builder.values(rows), builder.values(rows)];
-    last = builder.node(NodeKind::LayerNorm { weight: weight.clone(), bias, eps: 1e-3 }, last);
-    last = builder.node(NodeKind::RmsNorm { weight, eps: 1e-3 }, last);
+    last = builder.node(LayerNorm { weight: weight.clone(), bias, eps: 1e-3 }, &[last])?;
+    last = builder.node(RmsNorm { weight, eps: 1e-3 }, &[last])?;
     let mut len = rows;
     let all = |rows: usize| vec![Some(Width::W4); rows];
     if recurrent == 1 {
         let input = builder.matrix(4 * hidden, rows, activations, &all(4 * hidden), group)?;
         let state = builder.matrix(4 * hidden, hidden, activations, &all(4 * hidden), group)?;
         let bias = builder.values(4 * hidden);
-        last = builder.node(NodeKind::Lstm { hidden, input, state, bias }, last);
+        last = builder.node(Lstm { hidden, input, state, bias }, &[last])?;
         len = hidden;
     } else if recurrent == 2 {
         let input = builder.matrix(3 * hidden, rows, activations, &all(3 * hidden), group)?;
         let state = builder.matrix(3 * hidden, hidden, activations, &all(3 * hidden), group)?;
         let (input_bias, state_bias) = (builder.values(3 * hidden), builder.values(3 * hidden));
-        last = builder.node(NodeKind::Gru { hidden, input, state, input_bias, state_bias }, last);
+        last = builder.node(Gru { hidden, input, state, input_bias, state_bias }, &[last])?;
         len = hidden;
     }
     let matrix = builder.matrix(chunk * out, len, activations, &all(chunk * out), group)?;
     let bias = builder.values(chunk * out);
-    builder.node(NodeKind::Linear { matrix, bias }, last);
+    builder.node(Linear { matrix, bias }, &[last])?;
     let (mut policy, outcomes) = builder.finish("slices".to_owned(), false);
     policy.act_len = out;
     policy.chunk = chunk;
@@ -73,7 +73,7 @@ fn network(seed: u64) -> Result<(Policy, Vec<Outcome>)> {
 
 fn on_head<T>(seed: u64, work: impl FnOnce(&mut Head<'_, '_>) -> Result<T>) -> Result<T> {
     let (policy, outcomes) = network(seed)?;
-    let buffer = ImageBuffer::new(&writer::image(&policy, &outcomes)?);
+    let buffer = ImageBuffer::new(&emit::image(&policy, &outcomes)?);
     with_head(buffer.image(Path::new("slices"))?, work)
 }
 
@@ -266,9 +266,9 @@ fn an_error_resets() -> Result<()> {
     let width = |_| Some(Width::W8);
     let hidden = builder.linear((64, OBSERVATION), Activations::Int8, width, 0, true)?;
     let matrix = builder.matrix(3, 64, Activations::Int8, &[Some(Width::W8); 3], 0)?;
-    builder.node(NodeKind::Linear { matrix, bias: vec![0.0; 3] }, hidden);
+    builder.node(Linear { matrix, bias: vec![0.0; 3] }, &[hidden])?;
     let (policy, outcomes) = builder.finish("overflow".to_owned(), false);
-    let buffer = ImageBuffer::new(&writer::image(&policy, &outcomes)?);
+    let buffer = ImageBuffer::new(&emit::image(&policy, &outcomes)?);
     with_head(buffer.image(Path::new("overflow"))?, |head| {
         let observations = observations(1);
         let expected = whole(head, &observations[..1])?;

@@ -5,12 +5,13 @@ use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
+use actq::budget::Budget;
+use actq::data::Recordings;
 use actq::graph::Evaluator;
+use actq::methods::{Method, Options};
+use actq::pipeline::quantize;
+use actq::pipeline::stats::{AllocationRecord, MatrixRecord, Stats};
 use actq::policy::Policy;
-use actq::quantize::Method;
-use actq::quantize::prepared::Prepared;
-use actq::quantize::{Budget, Options};
-use actq::stats::{Allocation, Stats};
 use actq_bench::command::{actq, all, failed, run, succeeded};
 use actq_bench::golden::Random;
 use actq_bench::{root, ur3};
@@ -113,7 +114,7 @@ fn parsed(value: &Value) -> Result<Stats> {
     Ok(serde_json::from_value(value.clone())?)
 }
 
-fn allocation(matrix: &actq::stats::Matrix) -> Result<&Allocation> {
+fn allocation(matrix: &MatrixRecord) -> Result<&AllocationRecord> {
     matrix.allocation.as_ref().with_context(|| format!("{} has no allocation", matrix.name))
 }
 
@@ -166,9 +167,8 @@ fn statistics_add_up_to_the_image_and_explain_its_widths() -> Result<()> {
 fn image_rows_are_the_policys_rows() -> Result<()> {
     let fixture = Fixture::new()?;
     let policy = Policy::load(&fixture.policy())?;
-    let prepared = Prepared::new(&policy, Method::Best, |_| {})?;
     let options = Options { steps: Some(2), ..Options::new(Method::Best, Budget::BitsPerWeight(4.0)) };
-    let (_, outcomes) = prepared.quantize(&options, |_| {})?;
+    let outcomes = quantize(&policy, &Recordings::load(&policy)?, &options, |_, _| {})?.outcomes;
     let mut removed = Vec::new();
     for (source, outcome) in policy.graph.matrices.iter().zip(&outcomes) {
         let allocation = outcome.allocation.as_ref().context("an allocation")?;

@@ -10,9 +10,8 @@ pub mod armv7em;
 #[cfg(actq_fpu)]
 #[allow(unsafe_code, reason = "the assembler backend; every block carries its proof")]
 pub mod armv7em_fpu;
-mod gemv;
 pub mod portable;
-mod quantize;
+mod product;
 pub mod reference;
 
 #[cfg(actq_armv7em)]
@@ -25,8 +24,12 @@ use portable as floats;
 use portable as integers;
 
 pub(crate) use floats::{gru_elements, lstm_elements, scale, sqrt};
-pub use gemv::{Mismatch, Product, gemv};
 pub(crate) use integers::copy;
+pub use product::{Mismatch, Product};
+
+use crate::error::NotFinite;
+use crate::layout::Block;
+use crate::x::{Plan, Prepared, Scale};
 
 /// A backend that can be compiled in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,3 +42,32 @@ pub enum Backend {
 
 /// The backend that [`gemv`] has in this build.
 pub const BACKEND: Backend = if cfg!(actq_armv7em) { Backend::Armv7em } else { Backend::Portable };
+
+/// Multiplies a run of a block's rows ([`Product::new`]) with a prepared vector.
+///
+/// `acc[i]` becomes `sum over groups of scale * sum over columns of level * x`, modulo 2^32, for row `first_row + i`. The sums
+/// of padding rows have no meaning.
+///
+/// The true sum fits an i32 where [`crate::image::worst_case`] says so, which [`crate::Image::new_checked`] has verified.
+#[inline(never)]
+pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i32]) -> Result<(), Mismatch> {
+    integers::gemv(Product::new(block, x, first_row, acc)?);
+    Ok(())
+}
+
+impl Scale {
+    /// The scale of `x` for integers in `-x_max ..= x_max`. `x_max` is 127 for int8 activations and at most 32767.
+    pub fn new(x: &[f32], x_max: u16) -> Result<Self, NotFinite> {
+        Self::of_magnitude(integers::magnitude(x), x_max)
+    }
+
+    /// Writes the integers of `x` as `plan` has it to the first [`Plan::words`] words of `out`, and names them. Missing values of
+    /// `x` count as zeros. `None`, with nothing written, where `out` is shorter than [`Plan::room`]; all of that may be
+    /// overwritten.
+    #[inline(never)]
+    pub fn quantize<'w>(self, x: &[f32], plan: &'w Plan, out: &'w mut [u32]) -> Option<Prepared<'w>> {
+        let x = x.get(..plan.shape.cols).unwrap_or(x);
+        floats::quantize(x, self.inverse(), plan, out)?;
+        Prepared::new(out, plan)
+    }
+}

@@ -1,6 +1,6 @@
 //! The plain GEMV: decodes one weight at a time by the packer's inverse. Slow, and what the others are compared with.
 
-use super::Product;
+use super::product::Product;
 use crate::layout::Block;
 use crate::x::Prepared;
 

@@ -54,16 +54,22 @@ impl BlockShape {
     }
 
     /// Columns that the weights are padded to a multiple of. With paired lanes, all groups are whole.
-    pub(crate) const fn step(self) -> usize {
+    #[inline(always)]
+    pub(crate) const fn step(self, layout: &Layout) -> usize {
         match (self.lanes, self.group) {
             (Lanes::Paired, 1..) => self.group,
-            _ => self.layout().step,
+            _ => layout.step,
         }
     }
 
     /// Units in a row.
     pub const fn units(self) -> usize {
-        div_down(round_up(self.cols, self.step()), self.layout().cell.cols)
+        self.units_in(self.layout())
+    }
+
+    #[inline(always)]
+    const fn units_in(self, layout: &Layout) -> usize {
+        round_up(self.cols, self.step(layout)) >> layout.unit_log
     }
 
     /// Units in a full group; all units of a row where there are no group scales.
@@ -86,7 +92,8 @@ impl BlockShape {
     /// Words of four rows, scales included; a strip of eight has twice as many.
     #[inline(never)]
     pub const fn quad_words(self) -> usize {
-        self.units() * self.layout().quad_words + self.groups()
+        let layout = self.layout();
+        self.units_in(layout) * layout.quad_words + self.groups()
     }
 
     /// Words of the block.

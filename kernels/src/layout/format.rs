@@ -36,7 +36,7 @@ impl Cell {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct XLayout {
     /// The int16 pairs hold `x << shift`.
-    pub shift: u32,
+    pub shift: u8,
     /// Columns of a chunk, a power of two; a chunk ends with its scale group, too. Where a row's chunks are not all full, the
     /// first is short.
     pub chunk: usize,

@@ -44,13 +44,13 @@ macro_rules! registry {
         $for_all! {
             $first
             /// 2 bits: levels -3, -1, 1, 3.
-            W2 = 2, Odd: w2::W2, w2_paired::W2Paired;
+            W2 = 2, Odd: crate::layout::w2::W2, crate::layout::w2_paired::W2Paired;
             /// 3 bits: odd levels -7 to 7.
-            W3 = 3, Odd: w3::W3, w3_paired::W3Paired;
+            W3 = 3, Odd: crate::layout::w3::W3, crate::layout::w3_paired::W3Paired;
             /// 4 bits: odd levels -15 to 15.
-            W4 = 4, Odd: w4::W4, w4_paired::W4Paired;
+            W4 = 4, Odd: crate::layout::w4::W4, crate::layout::w4_paired::W4Paired;
             /// 8 bits: levels -128 to 127.
-            W8 = 8, Whole: w8::W8, w8_paired::W8Paired;
+            W8 = 8, Whole: crate::layout::w8::W8, crate::layout::w8_paired::W8Paired;
         }
     };
 }
@@ -58,7 +58,7 @@ macro_rules! registry {
 mod block;
 mod format;
 pub(crate) mod half;
-mod lanes;
+pub(crate) mod lanes;
 mod pack;
 mod pow2;
 mod table;
@@ -70,7 +70,7 @@ pub mod w4;
 pub mod w4_paired;
 pub mod w8;
 pub mod w8_paired;
-mod width;
+pub(crate) mod width;
 
 pub use block::{Block, BlockShape};
 pub use format::{Cell, Format, PAD_COLS, QUAD, STRIP, Start, Sums, XLayout};
@@ -79,7 +79,7 @@ pub use lanes::{GROUPS, Lanes, MAX_GROUP, MAX_PAIRED_GROUPED, is_group};
 pub use pack::pack;
 pub(crate) use pow2::{div_down, div_up, round_up};
 pub(crate) use table::with_format;
-pub use table::{LAYOUTS, Layout};
+pub use table::{LAYOUTS, Layout, StripLog};
 pub use width::Width;
 
 /// Changes whenever a packed layout changes meaning; stamped into every image.

@@ -1,6 +1,6 @@
 //! The registered layouts: by type for code that is generic over them, as a table of constants for code that is not.
 
-use super::format::{Cell, Format, PAD_COLS, QUAD, XLayout};
+use super::format::{Cell, Format, PAD_COLS, QUAD, STRIP, XLayout};
 use super::lanes::Lanes;
 use super::width::Width;
 
@@ -20,12 +20,27 @@ pub struct Layout {
     /// Columns that activations are padded to a multiple of, where their group is not longer.
     pub pad: usize,
     /// Binary logarithm of a chunk's columns, because nothing is divided when a GEMV is called.
-    pub chunk_log: u32,
+    pub chunk_log: u8,
+    /// The same of a unit's columns.
+    pub unit_log: u8,
     /// The same of a strip's rows.
-    pub strip_log: u32,
+    pub strip_log: StripLog,
     /// The same of the step.
-    pub step_log: u32,
+    pub step_log: u8,
 }
+
+/// Binary logarithm of a strip's rows: of [`QUAD`] or of [`STRIP`]. Of an enum the compiler knows that it can be shifted by.
+#[derive(Clone, Copy, Debug)]
+#[repr(u8)]
+pub enum StripLog {
+    /// Four rows.
+    Quad = QUAD.trailing_zeros() as u8,
+    /// Eight.
+    Strip = STRIP.trailing_zeros() as u8,
+}
+
+// A power of two, by which the table is quick to index.
+const _: () = assert!(size_of::<usize>() != 4 || size_of::<Layout>() == 64);
 
 impl Layout {
     const fn of<F: Format>() -> Self {
@@ -36,27 +51,28 @@ impl Layout {
             step: F::STEP,
             x: F::X,
             pad: if F::X.chunk == XLayout::ALL { PAD_COLS } else { F::STEP },
-            chunk_log: F::X.chunk.trailing_zeros(),
-            strip_log: F::STRIP.trailing_zeros(),
-            step_log: F::STEP.trailing_zeros(),
+            chunk_log: F::X.chunk.trailing_zeros() as u8,
+            unit_log: F::CELL.cols.trailing_zeros() as u8,
+            strip_log: if F::STRIP == QUAD { StripLog::Quad } else { StripLog::Strip },
+            step_log: F::STEP.trailing_zeros() as u8,
         }
     }
 }
 
 macro_rules! table {
-    (() $($(#[$doc:meta])* $width:ident = $bits:literal, $grid:ident:
-        $single:ident::$Single:ident, $paired:ident::$Paired:ident;)*) => {
+    (() $($(#[$doc:meta])* $width:ident = $bits:literal, $grid:ident: $single:path, $paired:path;)*) => {
         /// By width and lanes. A table in memory takes fewer instructions than a choice for every constant.
         pub static LAYOUTS: [[Layout; Lanes::ALL.len()]; Width::ALL.len()] =
-            [$([Layout::of::<super::$single::$Single>(), Layout::of::<super::$paired::$Paired>()]),*];
+            [$([Layout::of::<$single>(), Layout::of::<$paired>()]),*];
 
         /// Calls a function that is generic over the layout of `$shape`.
         macro_rules! with_format {
             ($shape:expr, $call:ident::<_>$arguments:tt) => {{
-                use $crate::layout::{Lanes, Width};
+                use $crate::layout::lanes::Lanes;
+                use $crate::layout::width::Width;
                 match ($shape.width, $shape.lanes) {
-                    $((Width::$width, Lanes::Single) => $call::<$crate::layout::$single::$Single>$arguments,
-                    (Width::$width, Lanes::Paired) => $call::<$crate::layout::$paired::$Paired>$arguments,)*
+                    $((Width::$width, Lanes::Single) => $call::<$single>$arguments,
+                    (Width::$width, Lanes::Paired) => $call::<$paired>$arguments,)*
                 }
             }};
         }

@@ -5,9 +5,8 @@
 //! than a strip of the rows that it is prepared for.
 
 use super::cost::{self, Feature};
-use super::meter::{Meter, Start, Work};
-use crate::image::{Image, Op, OpKind};
-use crate::linear::RowBlock;
+use crate::image::{Image, Op, OpKind, RowBlock};
+use crate::meter::{Meter, Start, Work};
 
 /// Budgets are kept in 16ths of an instruction, so that elements of a few instructions are not rounded up by much.
 const PARTS: u32 = 16;

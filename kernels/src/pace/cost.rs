@@ -11,11 +11,11 @@
 
 pub use super::feature::Feature;
 use super::feature::{Gemv, Prepare, Strips};
-use super::meter::Start;
 use super::rates::RATES;
-use crate::image::{Image, Op, OpKind};
+use crate::image::op;
+use crate::image::{Image, Matrix, Op, OpKind, RowBlock};
 use crate::layout::{BlockShape, QUAD, STRIP};
-use crate::linear::{Matrix, RUN, RowBlock};
+use crate::meter::{RUN, Start};
 use crate::x::{Extent, Plan};
 
 /// Instructions, and cycles as the project's model of the Cortex-M4 has them.
@@ -135,26 +135,20 @@ pub fn features(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
     }
 }
 
-/// The features of an operation that is not linear: its own, that of its values, and how many those are.
+/// The features of an operation: its own, that of its values, and how many those are. (Of a linear one, its parts are counted one
+/// by one.)
 pub fn values(op: &Op<'_>) -> (Feature, Feature, usize) {
-    let (operation, value) = match op.kind {
-        OpKind::Normalize => (Feature::NORMALIZE, Feature::NORMALIZE_VALUE),
-        OpKind::Function(function) => (Feature::FUNCTION, Feature::function(function)),
-        OpKind::LayerNorm => (Feature::LAYER_NORM, Feature::LAYER_NORM_VALUE),
-        OpKind::RmsNorm => (Feature::RMS_NORM, Feature::RMS_NORM_VALUE),
-        OpKind::Add => (Feature::ADD, Feature::ADD_VALUE),
-        OpKind::Copy => (Feature::COPY, Feature::COPY_VALUE),
-        OpKind::LstmCell => (Feature::LSTM, Feature::LSTM_VALUE),
-        OpKind::GruCell => (Feature::GRU, Feature::GRU_VALUE),
-        // Its parts are counted one by one.
-        OpKind::Linear { .. } => return (Feature::LINEAR, Feature::LINEAR, 0),
+    let value = match op.kind {
+        OpKind::Function(function) => Feature::function(function),
+        _ => Feature::value(op.code()),
     };
-    (operation, value, op.dst().len)
+    let values = if let OpKind::Linear { .. } = op.kind { 0 } else { op.dst().len };
+    (Feature::operation(op.code()), value, values)
 }
 
 fn linear(matrix: &Matrix<'_>, accumulate: bool, add: &mut dyn FnMut(Feature, usize)) {
     let in_place = matrix.start_values(accumulate).is_some();
-    add(Feature::LINEAR, 1);
+    add(Feature::operation(op::LINEAR), 1);
     magnitude(matrix.cols, add);
     if !in_place {
         add(Feature::BIASED, 1);

@@ -2,6 +2,7 @@
 
 use core::fmt;
 
+use crate::image::op;
 use crate::layout::{BlockShape, Lanes, QUAD, STRIP, Width};
 use crate::math::Function;
 
@@ -31,7 +32,6 @@ singles! {
     POLL "a call that runs pieces"
     ENTERED "an operation that a poll comes to"
     PIECE "a piece"
-    LINEAR "a linear operation"
     RESUMED "a block of rows of a linear operation that a poll comes to"
     MAGNITUDE_EIGHT "eight values compared by magnitude"
     MAGNITUDE_REST "a value compared by magnitude"
@@ -45,21 +45,6 @@ singles! {
     SCALED_EIGHT "eight rows scaled by the assembler"
     SCALED_REST "a row in order scaled"
     SCALED_INDEXED "a row with an index scaled"
-    NORMALIZE "a normalization"
-    NORMALIZE_VALUE "a value normalized"
-    LAYER_NORM "a layer norm"
-    LAYER_NORM_VALUE "a value of a layer norm"
-    RMS_NORM "an RMS norm"
-    RMS_NORM_VALUE "a value of an RMS norm"
-    ADD "an addition"
-    ADD_VALUE "a value added"
-    COPY "a copy"
-    COPY_VALUE "a value copied"
-    LSTM "an LSTM cell"
-    LSTM_VALUE "an element of an LSTM cell"
-    GRU "a GRU cell"
-    GRU_VALUE "an element of a GRU cell"
-    FUNCTION "a function's operation"
 }
 
 macro_rules! kinds {
@@ -72,6 +57,13 @@ macro_rules! kinds {
             const ALL: &'static [(Self, &'static str)] = &[$((Self::$name, $text),)*];
         }
     };
+}
+kinds! {
+    /// Features of an operation of each code. Those of linear are many, and all others; a function's values are its own.
+    Operation {
+        Once "once"
+        Value "a value"
+    }
 }
 kinds! {
     /// Features of preparing a vector, for each layout.
@@ -111,7 +103,8 @@ kinds! {
 
 const _: () = assert!(QUAD == 4 && STRIP == 8);
 
-const FUNCTIONS: usize = SINGLES.len();
+const OPERATIONS: usize = SINGLES.len();
+const FUNCTIONS: usize = OPERATIONS + op::NAMES.len() * Operation::ALL.len();
 const PREPARES: usize = FUNCTIONS + Function::ALL.len();
 const GEMVS: usize = PREPARES + LAYOUTS * Prepare::ALL.len();
 /// Layouts, each with row scales and with group scales.
@@ -124,6 +117,20 @@ impl Feature {
     /// All of them.
     pub fn all() -> impl Iterator<Item = Self> {
         (0..Self::COUNT as u16).map(Self)
+    }
+
+    /// An operation of this code.
+    pub const fn operation(code: u8) -> Self {
+        Self::of_code(code, Operation::Once)
+    }
+
+    /// A value of an operation of this code.
+    pub const fn value(code: u8) -> Self {
+        Self::of_code(code, Operation::Value)
+    }
+
+    const fn of_code(code: u8, which: Operation) -> Self {
+        Self((OPERATIONS + (code as usize).saturating_sub(1) * Operation::ALL.len() + which as usize) as u16)
     }
 
     /// An element of a function.
@@ -167,6 +174,9 @@ impl Feature {
         };
         Some(if let Some(single) = SINGLES.get(i) {
             Kind::Single(single)
+        } else if i < FUNCTIONS {
+            let (code, which) = ((i - OPERATIONS) / Operation::ALL.len(), (i - OPERATIONS) % Operation::ALL.len());
+            Kind::Operation(op::NAMES.get(code)?, Operation::ALL.get(which)?)
         } else if let Some(function) = Function::ALL.get(i - FUNCTIONS) {
             Kind::Function(*function)
         } else if i < GEMVS {
@@ -192,6 +202,7 @@ type Layout = (Width, Lanes, &'static (Scales, &'static str));
 /// See [`Feature::kind`]; everything with its text.
 enum Kind {
     Single(&'static (&'static str, &'static str)),
+    Operation(&'static str, &'static (Operation, &'static str)),
     Function(Function),
     Prepare(Layout, &'static (Prepare, &'static str)),
     Gemv(Layout, &'static (Strips, &'static str), &'static (Gemv, &'static str)),
@@ -201,6 +212,8 @@ impl fmt::Debug for Feature {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.kind() {
             Some(Kind::Single((name, _))) => write!(f, "Feature::{name}"),
+            Some(Kind::Operation(name, (Operation::Once, _))) => write!(f, "Feature::operation(op::{name})"),
+            Some(Kind::Operation(name, (Operation::Value, _))) => write!(f, "Feature::value(op::{name})"),
             Some(Kind::Function(function)) => write!(f, "Feature::function(Function::{function:?})"),
             Some(Kind::Prepare((width, lanes, (scales, _)), (which, _))) => {
                 write!(f, "Feature::prepare({width:?}, {lanes:?}, {scales:?}, Prepare::{which:?})")
@@ -221,6 +234,7 @@ impl fmt::Display for Feature {
         };
         match self.kind() {
             Some(Kind::Single((_, text))) => f.write_str(text),
+            Some(Kind::Operation(name, (_, which))) => write!(f, "{name}: {which}"),
             Some(Kind::Function(function)) => write!(f, "an element of {}", function.name()),
             Some(Kind::Prepare(of, (_, which))) => {
                 layout(f, of)?;

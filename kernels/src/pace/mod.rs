@@ -1,10 +1,8 @@
-//! A step in pieces: leave to go on ([`meter`]), where a step stands ([`cursor`]), what its pieces cost ([`cost`]) and what a poll
-//! may spend ([`budget`]). The prices are here alone; a program whose steps are not cut has none of them.
+//! What operations and pieces of a step cost, and what a poll may spend. The prices are here alone: what runs an image asks a
+//! [`Meter`](crate::meter::Meter), and a program whose steps are not cut has none of them.
 
 pub(crate) mod budget;
 pub mod cost;
-pub(crate) mod cursor;
 mod feature;
-pub(crate) mod meter;
 #[allow(clippy::approx_constant, reason = "measured values, some of which happen to be near a constant")]
 mod rates;

@@ -56,7 +56,7 @@ impl Plan {
             let padded = round_up(read, layout.pad);
             (read, padded, padded, 1, format.run)
         } else {
-            let read = round_up(shape.cols, shape.step());
+            let read = round_up(shape.cols, shape.step(layout));
             // Two groups where they are taken in pairs.
             let group = shape.group << format.pairs as u32;
             let padded = round_up(read, group);

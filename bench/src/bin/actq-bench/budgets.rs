@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
 
-use actq::inspect::{group_name, table};
+use actq::report::table::{group_name, table};
 use actq_bench::cycles::{CODE_LINES, Code};
 use actq_bench::qemu::{self, Counter};
 use actq_bench::{Target, firmware, root, ur3};

@@ -3,11 +3,14 @@
 use std::fs;
 use std::path::Path;
 
-use actq::eval;
-use actq::inspect::{bits_per_weight, table};
+use actq::budget::Budget;
+use actq::data::Recordings;
+use actq::measure::eval;
+use actq::measure::size::bits_per_weight;
+use actq::methods::{Method, Options};
+use actq::pipeline::Quantizer;
 use actq::policy::Policy;
-use actq::quantize::prepared::Prepared;
-use actq::quantize::{Budget, Method, Options};
+use actq::report::table::table;
 use actq::runtime::{ImageBuffer, with_head};
 use actq_bench::qemu::{self, Counter, Server};
 use actq_bench::{Target, evaluation, firmware, ur3};
@@ -71,13 +74,14 @@ pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
 
     let counter = Counter::build()?;
     let mut report = Vec::new();
+    let recordings = Recordings::load(&policy)?;
     let eight = Options::new(Method::Gptq, Budget::Width(Width::W8));
     let best = |bits| Options { steps: Some(STEPS), ..Options::new(Method::Best, Budget::BitsPerWeight(bits)) };
     for (name, options) in [("8 bits", eight), ("3.0 bits", best(3.0)), ("2.0 bits", best(2.0))] {
         println!("Quantizing to {name} by {}", options.method);
-        let prepared = Prepared::new(&policy, options.method, |_| {})?;
+        let quantizer = Quantizer::new(&policy, &recordings, options.method, |_| {})?;
         let path = work.join(format!("ur3 {name}.actq").replace(' ', "-"));
-        let bytes = heads::write_image(&prepared, &options, &path)?;
+        let bytes = heads::write_image(&quantizer, &options, &path)?;
         let buffer = ImageBuffer::new(&bytes);
         let image = buffer.image(&path)?;
         println!("Closed loop at {name}, {episodes} episodes on the host");

@@ -8,18 +8,18 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use actq::graph::NodeKind;
+use actq::emit::{self, files};
+use actq::graph::ops::{Add, Gru, LayerNorm, Lstm, Normalize, Pointwise, RmsNorm};
+use actq::methods::{Activations, Outcome};
 use actq::policy::Policy;
-use actq::quantize::{Activations, Outcome};
 use actq::random::Random;
 use actq::runtime::ImageBuffer;
-use actq::{files, writer};
-use actq_bench::networks::Builder;
+use actq_bench::networks::{Builder, accumulating};
 use actq_bench::qemu::Counter;
 use actq_bench::{Target, firmware, profile, root};
 use actq_kernels::Width;
 use actq_kernels::cost::{self, Cost, Feature};
-use actq_kernels::image::{Op, OpKind};
+use actq_kernels::image::{Op, OpKind, op};
 use actq_kernels::math::Function;
 use anyhow::Result;
 
@@ -81,9 +81,9 @@ pub(crate) fn run() -> Result<()> {
     let counter = Counter::build()?;
     let mut samples = Vec::new();
     let mut polls = Vec::new();
-    for policy in policies()? {
-        println!("measuring {}", policy.0.name);
-        measure(&policy, &elf, &counter, &mut samples, &mut polls)?;
+    for (name, bytes) in images()? {
+        println!("measuring {name}");
+        measure((&name, &bytes), &elf, &counter, &mut samples, &mut polls)?;
     }
     let expected: Vec<&Sample> = samples.iter().filter(|s| s.expected).collect();
     let instructions = solve(&expected, |c| c.instructions);
@@ -128,6 +128,7 @@ fn table(instructions: &Rates, cycles: &Rates, most: &Rates) -> String {
     let mut text =
         "//! Written by `cargo xtask fit`: expected instructions, expected cycles, instructions at most.\n\n\
                     use super::feature::{Feature, Gemv, Prepare, Scales::*, Strips::*};\n\
+                    use crate::image::op;\n\
                     use crate::layout::{Lanes::*, Width::*};\n\
                     use crate::math::Function;\n\n\
                     #[rustfmt::skip]\npub(super) const RATES: &[(Feature, [f64; 3])] = &[\n"
@@ -142,27 +143,26 @@ fn table(instructions: &Rates, cycles: &Rates, most: &Rates) -> String {
 
 /// Runs an image, in steps and by operations; `polls` gets what a limit adds to an operation, and the pieces of it.
 fn measure(
-    (policy, outcomes): &(Policy, Vec<Outcome>),
+    (name, bytes): (&str, &[u8]),
     elf: &Path,
     counter: &Counter,
     samples: &mut Vec<Sample>,
     polls: &mut Vec<(f64, usize)>,
 ) -> Result<()> {
-    let bytes = writer::image(policy, outcomes)?;
-    let buffer = ImageBuffer::new(&bytes);
-    let image = buffer.image(Path::new(&policy.name))?;
-    let observations = observations(policy.graph.obs_len);
+    let buffer = ImageBuffer::new(bytes);
+    let image = buffer.image(Path::new(name))?;
+    let observations = observations(image.obs_len());
     let frame = features(|add| cost::frame(&image, add));
     let ops: Vec<Op<'_>> = image.ops().collect();
     let of_ops: Vec<_> = ops.iter().map(|op| features(|add| cost::features(op, add))).collect();
-    let steps = profile::steps(elf, counter, &bytes, &observations)?;
+    let steps = profile::steps(elf, counter, bytes, &observations)?;
     for (step, cost) in steps.into_iter().enumerate() {
         let mut all = frame.clone();
         of_ops.iter().flatten().for_each(|(feature, n)| *all.entry(*feature).or_default() += n);
-        samples.push(Sample { name: format!("{}, a step", policy.name), features: all, cost, expected: step < NORMAL });
+        samples.push(Sample { name: format!("{name}, a step"), features: all, cost, expected: step < NORMAL });
     }
-    let single = profile::parts(elf, counter, &image, &bytes, &observations, u32::MAX)?;
-    let limited = profile::parts(elf, counter, &image, &bytes, &observations[..1], AMPLE)?;
+    let single = profile::parts(elf, counter, &image, bytes, &observations, u32::MAX)?;
+    let limited = profile::parts(elf, counter, &image, bytes, &observations[..1], AMPLE)?;
     for ((op, cost), plain) in ops.iter().zip(&limited[0].ops).zip(&single[0].ops) {
         polls.push((cost.instructions as f64 - plain.instructions as f64, pieces(op)));
     }
@@ -171,7 +171,7 @@ fn measure(
             if poll > 0.0 {
                 features.insert(Feature::POLL_OP, poll);
             }
-            samples.push(Sample { name: format!("{}, {what}", policy.name), features, cost, expected: step < NORMAL });
+            samples.push(Sample { name: format!("{name}, {what}"), features, cost, expected: step < NORMAL });
         };
         sample("begin".to_owned(), parts.begin, 0.0, features(|add| cost::begin(&image, add)));
         sample("action".to_owned(), parts.action, 1.0, features(|add| cost::action(&image, add)));
@@ -287,7 +287,12 @@ fn most(samples: &[Sample], polls: &[(f64, usize)], rates: &Rates) -> Rates {
     let varying: Vec<Feature> = Function::ALL
         .into_iter()
         .map(Feature::function)
-        .chain([Feature::NORMALIZE_VALUE, Feature::LSTM_VALUE, Feature::GRU_VALUE, Feature::CONTRACT])
+        .chain([
+            Feature::value(op::NORMALIZE),
+            Feature::value(op::LSTM_CELL),
+            Feature::value(op::GRU_CELL),
+            Feature::CONTRACT,
+        ])
         .collect();
     // Whole steps differ in much; only parts of them by themselves say what a value takes.
     for sample in samples.iter().filter(|s| s.features.contains_key(&Feature::POLL_OP)) {
@@ -312,7 +317,10 @@ fn most(samples: &[Sample], polls: &[(f64, usize)], rates: &Rates) -> Rates {
 /// What coming back to a linear operation takes for each of its blocks: from steps in short polls, whose number tells how often
 /// that was. The image's least budget is that of the rates before, which need not be exact here.
 fn resumed(elf: &Path, counter: &Counter, most: &Rates) -> Result<f64> {
-    let known: f64 = [Feature::POLL, Feature::ENTERED, Feature::LINEAR, Feature::PIECE].map(|f| most[&f]).iter().sum();
+    let known: f64 = [Feature::POLL, Feature::ENTERED, Feature::operation(op::LINEAR), Feature::PIECE]
+        .map(|f| most[&f])
+        .iter()
+        .sum();
     let mut resumed = 0.0f64;
     for (rows, cols) in [(128, 256), (96, 100), (64, 30)] {
         for blocks in [1, 4] {
@@ -321,7 +329,7 @@ fn resumed(elf: &Path, counter: &Counter, most: &Rates) -> Result<f64> {
                 let mut builder = Builder::new(cols);
                 builder.linear((rows, cols), Activations::Int8, width, 0, true)?;
                 let (policy, outcomes) = builder.finish("polls".to_owned(), false);
-                let bytes = writer::image(&policy, &outcomes)?;
+                let bytes = emit::image(&policy, &outcomes)?;
                 let buffer = ImageBuffer::new(&bytes);
                 let image = buffer.image(Path::new("polls"))?;
                 let observations = &observations(cols)[..1];
@@ -345,6 +353,23 @@ fn observations(len: usize) -> Vec<Vec<f32>> {
     let normal = (0..NORMAL).map(|_| (0..len).map(|_| random.normal()).collect::<Vec<_>>()).collect::<Vec<_>>();
     let ends = [0.0, 1e-3, 1.0, -1.0, 30.0, -30.0, 1e4, -1e4];
     normal.into_iter().chain(ends.map(|x| vec![x; len])).collect()
+}
+
+/// Images with their names.
+fn images() -> Result<Vec<(String, Vec<u8>)>> {
+    let mut images = Vec::new();
+    for (policy, outcomes) in policies()? {
+        images.push((policy.name.clone(), emit::image(&policy, &outcomes)?));
+    }
+    let mut builder = Builder::new(OBSERVATION);
+    for rows in LENGTHS {
+        for _ in 0..2 {
+            builder.linear((rows, 40), Activations::Int8, |_| Some(Width::W2), 0, true)?;
+        }
+    }
+    let (policy, outcomes) = builder.finish("biases that are added".to_owned(), false);
+    images.push((policy.name.clone(), accumulating(&emit::image(&policy, &outcomes)?)?));
+    Ok(images)
 }
 
 fn policies() -> Result<Vec<(Policy, Vec<Outcome>)>> {
@@ -385,30 +410,28 @@ fn policies() -> Result<Vec<(Policy, Vec<Outcome>)>> {
         [(8, 8, false), (40, 2, true), (256, 30, false), (256, 30, true), (40, 12, true)]
     {
         let mut builder = Builder::new(observation);
-        builder.part(action);
+        builder.part(action)?;
         policies.push(builder.finish(format!("{observation} to {action}, contract {contract}"), contract));
     }
     for (name, contract) in [("functions", false), ("functions with contract", true)] {
         let mut builder = Builder::new(if contract { OBSERVATION } else { 256 });
         for len in LENGTHS {
             for function in Function::ALL {
-                let input = builder.part(len);
-                builder.node(NodeKind::Function(function), input);
+                let input = builder.part(len)?;
+                builder.node(Pointwise(function), &[input])?;
             }
             let [mean, scale] = [builder.values(len), vec![1.5; len]];
-            builder.node_of_part(
-                len,
-                NodeKind::Normalize { mean: mean.clone(), scale: scale.clone(), pre_clip: 10.0, clip: 5.0 },
-            );
+            builder
+                .node_of_part(len, Normalize { mean: mean.clone(), scale: scale.clone(), pre_clip: 10.0, clip: 5.0 })?;
             let limitless = f32::INFINITY;
             builder.node_of_part(
                 len,
-                NodeKind::Normalize { mean: mean.clone(), scale: scale.clone(), pre_clip: limitless, clip: limitless },
-            );
-            builder.node_of_part(len, NodeKind::LayerNorm { weight: scale.clone(), bias: mean, eps: 1e-5 });
-            builder.node_of_part(len, NodeKind::RmsNorm { weight: scale, eps: 1e-5 });
-            let (a, b) = (builder.part(len), builder.part(len));
-            builder.node(NodeKind::Add { with: b }, a);
+                Normalize { mean: mean.clone(), scale: scale.clone(), pre_clip: limitless, clip: limitless },
+            )?;
+            builder.node_of_part(len, LayerNorm { weight: scale.clone(), bias: mean, eps: 1e-5 })?;
+            builder.node_of_part(len, RmsNorm { weight: scale, eps: 1e-5 })?;
+            let (a, b) = (builder.part(len)?, builder.part(len)?);
+            builder.node(Add, &[a, b])?;
         }
         for hidden in HIDDEN {
             for width in [Width::W2, Width::W4] {
@@ -417,15 +440,15 @@ fn policies() -> Result<Vec<(Policy, Vec<Outcome>)>> {
                 let input = builder.matrix(4 * hidden, cols, Activations::Int8, &all, 0)?;
                 let state = builder.matrix(4 * hidden, hidden, Activations::Int8, &all, 0)?;
                 let bias = builder.values(4 * hidden);
-                builder.node_of_part(cols, NodeKind::Lstm { hidden, input, state, bias });
+                builder.node_of_part(cols, Lstm { hidden, input, state, bias })?;
                 let all = vec![Some(width); 3 * hidden];
                 let input = builder.matrix(3 * hidden, cols, Activations::Int8, &all, 0)?;
                 let state = builder.matrix(3 * hidden, hidden, Activations::Int8, &all, 0)?;
                 let (input_bias, state_bias) = (builder.values(3 * hidden), builder.values(3 * hidden));
-                builder.node_of_part(cols, NodeKind::Gru { hidden, input, state, input_bias, state_bias });
+                builder.node_of_part(cols, Gru { hidden, input, state, input_bias, state_bias })?;
             }
         }
-        builder.part(12);
+        builder.part(12)?;
         policies.push(builder.finish(name.to_owned(), contract));
     }
     Ok(policies)

@@ -3,14 +3,16 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use actq::eval;
-use actq::inspect::table;
+use actq::budget::Budget;
+use actq::data::Recordings;
+use actq::emit::files;
+use actq::measure::eval;
+use actq::measure::time::CLOCK;
+use actq::methods::{Method, Options};
+use actq::pipeline::Quantizer;
 use actq::policy::Policy;
-use actq::quantize::prepared::Prepared;
-use actq::quantize::{Budget, Method, Options};
+use actq::report::table::table;
 use actq::runtime::ImageBuffer;
-use actq::time::CLOCK;
-use actq::{files, writer};
 use actq_bench::cycles::{Code, Cost, Kind};
 use actq_bench::qemu::Counter;
 use actq_bench::{Target, evaluation, firmware, shared_policies, ur3};
@@ -75,9 +77,8 @@ pub(crate) fn policies() -> Vec<PathBuf> {
 }
 
 /// Quantizes to an image file, and gives its bytes.
-pub(crate) fn write_image(prepared: &Prepared<'_>, options: &Options, path: &Path) -> Result<Vec<u8>> {
-    let (policy, matrices) = prepared.quantize(options, |_| {})?;
-    let bytes = writer::image(&policy, &matrices)?;
+pub(crate) fn write_image(quantizer: &Quantizer<'_>, options: &Options, path: &Path) -> Result<Vec<u8>> {
+    let bytes = quantizer.quantize(options, |_, _| {})?.image;
     files::write(path, &bytes)?;
     Ok(bytes)
 }
@@ -92,15 +93,16 @@ pub(crate) fn measure(policies: &[PathBuf], counter: &Counter, wait_states: u64)
     let mut heads = Vec::new();
     for dir in policies {
         let policy = Policy::load(dir)?;
-        let rounded = Prepared::new(&policy, Method::Rtn, |_| {})?;
-        let learned = Prepared::new(&policy, Method::Best, |_| {})?;
-        for (prepared, bits, options) in [
+        let recordings = Recordings::load(&policy)?;
+        let rounded = Quantizer::new(&policy, &recordings, Method::Rtn, |_| {})?;
+        let learned = Quantizer::new(&policy, &recordings, Method::Best, |_| {})?;
+        for (quantizer, bits, options) in [
             (&rounded, 8.0, Options::new(Method::Rtn, Budget::Width(Width::W8))),
             (&learned, 3.0, best(3.0)),
             (&learned, 2.0, best(2.0)),
         ] {
             let path = folder.join(format!("{}-{bits}.actq", policy.name));
-            let buffer = ImageBuffer::new(&write_image(prepared, &options, &path)?);
+            let buffer = ImageBuffer::new(&write_image(quantizer, &options, &path)?);
             let image = buffer.image(&path)?;
             let recorded = eval::heldout(dir, &image)?;
             let region = evaluation::count(counter, &elf, Some(&path), &image, recorded.episode(0))?;

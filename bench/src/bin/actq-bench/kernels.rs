@@ -1,6 +1,6 @@
 //! Whole calls of the kernels on the Cortex-M4, counted and modelled.
 
-use actq::inspect::{group_name, table};
+use actq::report::table::{group_name, table};
 use actq_bench::cycles::Code;
 use actq_bench::qemu::{self, Counter};
 use actq_bench::{Target, firmware};

@@ -11,7 +11,7 @@ mod table;
 use core::arch::global_asm;
 
 use self::table::kernels;
-use super::Product;
+use super::product::Product;
 use crate::layout::QUAD;
 
 global_asm!(include_str!("single.s"), options(raw));
@@ -26,8 +26,9 @@ global_asm!(include_str!("vector.s"), options(raw));
 pub fn gemv(Product { block, x, first_row, acc }: Product<'_>) {
     let [kernel, four] = kernels(block.shape());
     let layout = x.plan().layout;
-    let strips = acc.len() >> layout.strip_log;
-    let rows = strips << layout.strip_log;
+    let strip_log = layout.strip_log as u8;
+    let strips = acc.len() >> strip_log;
+    let rows = strips << strip_log;
     let rest = acc.len() - rows;
     let told = x.plan().told();
     // SAFETY: the rows from `first_row` on, as many as `acc` has, are rows of the block or of its padding: that is what `Product::new` checks,

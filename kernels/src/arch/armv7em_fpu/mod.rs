@@ -9,9 +9,9 @@ use core::ptr::NonNull;
 use core::slice;
 
 use self::table::quantizer;
-use super::integers::copy;
+use super::armv7em::copy;
 use crate::layout::XLayout;
-use crate::math::{EXP, QUARTER, exp2_constants};
+use crate::math::exp2::{EXP, QUARTER, exp2_constants};
 use crate::round::ROUND;
 use crate::x::Plan;
 
@@ -92,7 +92,7 @@ static CELL: [f32; 6] = {
     [EXP, 2.0 * EXP, round, p1, p0, q0]
 };
 
-/// Some elements of [`crate::recurrent::lstm_cell`].
+/// Some elements of [`crate::ops::cells::lstm_cell`].
 pub fn lstm_elements(elements: Range<usize>, gates: &[f32], c: &mut [f32], h: &mut [f32]) {
     let (Range { start, end }, n) = (elements, h.len());
     if start >= end || end > n || end > c.len() || gates.len() < 3 * n + end {
@@ -107,7 +107,7 @@ pub fn lstm_elements(elements: Range<usize>, gates: &[f32], c: &mut [f32], h: &m
     }
 }
 
-/// Some elements of [`crate::recurrent::gru_cell`].
+/// Some elements of [`crate::ops::cells::gru_cell`].
 pub fn gru_elements(elements: Range<usize>, a: &[f32], b: &[f32], h: &mut [f32]) {
     let (Range { start, end }, n) = (elements, h.len());
     if start >= end || end > n || a.len().min(b.len()) < 2 * n + end {

@@ -26,7 +26,7 @@ static QUANTIZERS: [Quantize; 4] = [actq_quantize0, actq_quantize1, actq_quantiz
 
 /// The kernel that writes what a layout with this shift asks for.
 #[inline(always)]
-pub(super) fn quantizer(shift: u32) -> Quantize {
+pub(super) fn quantizer(shift: u8) -> Quantize {
     QUANTIZERS[shift as usize % QUANTIZERS.len()]
 }
 

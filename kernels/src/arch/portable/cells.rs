@@ -1,8 +1,9 @@
-//! The cells of [`crate::recurrent`].
+//! The cells of [`crate::ops::cells`].
 
 use core::ops::Range;
 
-use crate::math::{exp_fraction, sigmoid, tanh_fraction};
+use crate::math::exp2::{exp_fraction, tanh_fraction};
+use crate::math::sigmoid;
 
 /// `sigmoid(gate) * tanh(x)`, by one division.
 #[inline(always)]
@@ -12,7 +13,7 @@ fn gated(gate: f32, x: f32) -> f32 {
     (on * n) / ((on + off) * d)
 }
 
-/// Some elements of [`crate::recurrent::lstm_cell`]. Nothing is done where a length does not fit.
+/// Some elements of [`crate::ops::cells::lstm_cell`]. Nothing is done where a length does not fit.
 #[inline(never)]
 pub fn lstm_elements(elements: Range<usize>, gates: &[f32], c: &mut [f32], h: &mut [f32]) {
     let _ = lstm(elements, gates, c, h);
@@ -32,7 +33,7 @@ fn lstm(elements: Range<usize>, gates: &[f32], c: &mut [f32], h: &mut [f32]) -> 
     Some(())
 }
 
-/// Some elements of [`crate::recurrent::gru_cell`]. Nothing is done where a length does not fit.
+/// Some elements of [`crate::ops::cells::gru_cell`]. Nothing is done where a length does not fit.
 #[inline(never)]
 pub fn gru_elements(elements: Range<usize>, a: &[f32], b: &[f32], h: &mut [f32]) {
     let _ = gru(elements, a, b, h);

@@ -3,7 +3,7 @@
 //! The loops are written for a compiler that has few registers and knows the layout: a strip's cells are walked side by side,
 //! so that an activation is loaded once for all of them, and lengths are constants wherever the layout gives them.
 
-use crate::arch::Product;
+use crate::arch::product::Product;
 use crate::layout::{Block, Format, QUAD, Sums, XLayout, with_format};
 use crate::x::Prepared;
 

@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use actq::quantize::Method;
-use actq::time;
+use actq::methods::Method;
 use actq_kernels::Width;
+use actq_kernels::layout::is_group;
 use clap::{Parser, Subcommand, ValueEnum, value_parser};
 
 /// Quantizes robot policies to 2, 3, 4 or 8 bits and packs them into one image for a microcontroller.
@@ -100,7 +100,7 @@ pub(crate) struct QuantizeArgs {
     #[arg(long, value_name = "X", conflicts_with_all = ["bits", "bpw", "flash", "max_nmse"], value_parser = positive)]
     pub(crate) ms: Option<f64>,
     /// The processor's clock for --ms, in Hz or as 168M
-    #[arg(long, value_name = "HZ", requires = "ms", default_value = "168M", value_parser = time::clock)]
+    #[arg(long, value_name = "HZ", requires = "ms", default_value = "168M", value_parser = clock)]
     pub(crate) clock: f64,
     /// Force the width of a matrix, by its tensor's name (method best); may be repeated
     #[arg(long, value_name = "NAME=BITS", value_parser = forced)]
@@ -134,7 +134,7 @@ pub(crate) struct InspectArgs {
     /// The image
     pub(crate) image: PathBuf,
     /// The processor's clock, in Hz or as 168M
-    #[arg(long, value_name = "HZ", default_value = "168M", value_parser = time::clock)]
+    #[arg(long, value_name = "HZ", default_value = "168M", value_parser = clock)]
     pub(crate) clock: f64,
     /// Print the predicted time of every operation and of the step as one JSON object
     #[arg(long, conflicts_with = "widths")]
@@ -244,11 +244,22 @@ fn size(text: &str) -> Result<usize, String> {
 }
 
 fn group(text: &str) -> Result<usize, String> {
-    let known = text.parse().ok().filter(|g| matches!(g, 0 | 32 | 64 | 128));
+    let known = text.parse().ok().filter(|group| is_group(*group));
     known.ok_or_else(|| "groups have 32, 64 or 128 columns, or 0 for none".to_owned())
 }
 
 fn positive(text: &str) -> Result<f64, String> {
     let number = text.parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0);
     number.ok_or_else(|| "a number above 0 is needed".to_owned())
+}
+
+/// Reads a clock in Hz, as `168M`, `84000K` or `168000000`.
+fn clock(text: &str) -> Result<f64, String> {
+    let (digits, unit) = match text.char_indices().next_back() {
+        Some((at, 'M' | 'm')) => (&text[..at], 1e6),
+        Some((at, 'K' | 'k')) => (&text[..at], 1e3),
+        _ => (text, 1.0),
+    };
+    let hertz = digits.parse().ok().map(|n: f64| n * unit).filter(|n| n.is_finite() && *n >= 1.0);
+    hertz.ok_or_else(|| "a clock is a number of Hz, or of MHz with an M behind it".to_owned())
 }

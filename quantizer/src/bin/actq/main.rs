@@ -8,18 +8,20 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use actq::dataset::Sizes;
-use actq::dataset::range::Range;
-use actq::dataset::recording::Recording;
-use actq::inspect::report;
+use actq::data::{Range, Recording, Recordings, Sizes};
+use actq::emit::files;
+use actq::import;
+use actq::measure::eval;
+use actq::measure::time::StepTime;
+use actq::methods::Method;
+use actq::pipeline::stats::Stats;
+use actq::pipeline::sweep::{self, SweepPlan};
 use actq::policy::Policy;
-use actq::quantize::Method;
+use actq::report::widths::Widths;
+use actq::report::{inspect, notes, time};
 use actq::runtime::ImageBuffer;
-use actq::stats::Stats;
 use actq::text::printable;
-use actq::time::StepTime;
-use actq::widths::Widths;
-use actq::{check, eval, files, policy, serve, sweep};
+use actq::{report, serve};
 use anyhow::{Context, Result, ensure};
 use clap::Parser as _;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -119,7 +121,7 @@ fn run_inspect(args: &InspectArgs) -> Result<()> {
         let step = StepTime::new(&image, args.clock);
         return print(&match args.json {
             true => serde_json::to_string(&step)? + "\n",
-            false => format!("{}\n{}", report(&image), step.report()),
+            false => format!("{}\n{}", inspect::report(&image), time::report(&step)),
         });
     }
     let stats = args.stats.as_deref().map(|path| Stats::read(path, &image)).transpose()?;
@@ -130,8 +132,14 @@ fn run_inspect(args: &InspectArgs) -> Result<()> {
     print(&widths.report())
 }
 
+/// All files that a policy's folder may hold, whether they are there or not.
+fn policy_files(dir: &Path) -> Vec<PathBuf> {
+    let own = import::FILES.map(|name| dir.join(name));
+    own.into_iter().chain(Recording::Calib.paths(dir)).chain(Recording::Heldout.paths(dir)).collect()
+}
+
 fn run_sweep(args: &SweepArgs) -> Result<()> {
-    let folders = args.policy_dirs.iter().flat_map(|dir| policy::files(dir));
+    let folders = args.policy_dirs.iter().flat_map(|dir| policy_files(dir));
     let inputs: Vec<PathBuf> = folders.chain([&args.calib, &args.heldout].into_iter().flatten().cloned()).collect();
     let outputs: Vec<&Path> = [&args.svg, &args.json].into_iter().filter_map(|path| path.as_deref()).collect();
     files::check_outputs(&outputs, &inputs)?;
@@ -147,11 +155,11 @@ fn run_sweep(args: &SweepArgs) -> Result<()> {
         let calib = Recording::Calib.load(dir, args.calib.as_deref(), sizes)?;
         let mut heldout = Recording::Heldout.require(dir, args.heldout.as_deref(), sizes, "actq sweep")?;
         heldout.fill_actions(&policy.graph);
-        bar.suspend(|| note(check::recording_notes(calib.as_ref(), Some(&heldout))));
-        let plan = sweep::Plan {
+        let recordings = Recordings { calib, heldout: Some(heldout) };
+        bar.suspend(|| note(notes::of_recordings(&recordings)));
+        let plan = SweepPlan {
             policy,
-            calib: calib.as_ref(),
-            heldout: &heldout,
+            recordings: &recordings,
             methods: &methods,
             budgets: &args.bpw,
             steps: args.steps,
@@ -172,8 +180,8 @@ fn run_sweep(args: &SweepArgs) -> Result<()> {
             );
         }
     }
-    print(&format!("{}\n{knees}\n", sweep::table(&sweeps)))?;
-    let (svg, json) = (sweep::svg(&sweeps), serde_json::to_string_pretty(&sweeps)? + "\n");
+    print(&format!("{}\n{knees}\n", report::sweep::table(&sweeps)))?;
+    let (svg, json) = (report::sweep::svg(&sweeps), serde_json::to_string_pretty(&sweeps)? + "\n");
     let files = [(&args.svg, svg), (&args.json, json)];
     let files: Vec<_> = files.iter().filter_map(|(path, text)| Some((path.as_deref()?, text))).collect();
     files::write_all(&files)

@@ -1,0 +1,81 @@
+//! Runs an operation of an image.
+
+use super::arena::{part, regions};
+use crate::arch;
+use crate::cursor::Cursor;
+use crate::error::{Fault, StepError};
+use crate::image::{Op, OpKind};
+use crate::meter::{Meter, Unlimited, Work};
+use crate::ops::elementwise::{self, copy};
+use crate::ops::norm;
+
+/// Runs a whole operation over an arena, as a head does: for whoever runs a network's operations one by one.
+///
+/// # Errors
+///
+/// As [`Head::step`](super::Head::step).
+pub fn run_whole(op: &Op<'_>, arena: &mut [u32]) -> Result<(), StepError> {
+    run(op, arena, &mut Cursor::default(), &mut Unlimited)?;
+    Ok(())
+}
+
+/// Runs an operation from where the cursor stands; true at its end.
+///
+/// # Errors
+///
+/// [`Fault::Damaged`] where the operation names what is not there, which the image's check has excluded.
+#[inline(never)]
+pub(super) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &mut impl Meter) -> Result<bool, Fault> {
+    let f = bytemuck::must_cast_slice_mut::<u32, f32>;
+    if let OpKind::Linear { accumulate } = op.kind {
+        let matrix = &op.linear_matrix();
+        let matrix = matrix.as_ref().map_err(|_| Fault::Damaged)?;
+        let [dst, src, work] = regions(arena, &op.regions);
+        return matrix.resume(&mut cursor.linear, budget, f(src), work, f(dst), accumulate);
+    }
+    // Elements that this piece takes, or units of a norm.
+    let (dst, len) = (op.dst(), op.units());
+    let units = budget.take(len - cursor.done, Work::Elements(op));
+    if units == 0 {
+        return Ok(false);
+    }
+    let units = cursor.done..cursor.done + units;
+    cursor.done = units.end;
+    let norm = matches!(op.kind, OpKind::LayerNorm | OpKind::RmsNorm);
+    let range = if norm { 0..dst.len } else { units.clone() };
+    let [mut dst, mut src, third] = match op.src().len {
+        0 => [part(arena, &(dst.offset + range.start..dst.offset + range.end)), &mut [], &mut []],
+        _ => regions(arena, &op.regions),
+    };
+    if matches!(op.kind, OpKind::Normalize | OpKind::Add | OpKind::Copy) {
+        (dst, src) = (part(dst, &range), part(src, &range));
+    }
+    if dst.is_empty() {
+        return Err(Fault::Damaged);
+    }
+    match op.kind {
+        OpKind::Function(function) => function.apply(f(dst)),
+        OpKind::Add => elementwise::add(f(src), f(dst)),
+        OpKind::Copy => copy(src, dst),
+        OpKind::LstmCell => {
+            arch::lstm_elements(range.clone(), f(src), f(third), f(dst));
+        }
+        OpKind::GruCell => {
+            arch::gru_elements(range.clone(), f(src), f(third), f(dst));
+        }
+        kind => {
+            let (first, second) = (op.part(0, &range), op.part(1, &range));
+            if (if kind == OpKind::RmsNorm { first } else { second }).is_empty() {
+                return Err(Fault::Damaged);
+            }
+            let constant = op.constant(0);
+            let (moments, done) = (&mut cursor.moments, units.clone());
+            match kind {
+                OpKind::LayerNorm => norm::layer_norm_units(done, moments, f(dst), first, second, constant),
+                OpKind::RmsNorm => norm::rms_norm_units(done, moments, f(dst), first, constant),
+                _ => elementwise::normalize(f(src), first, second, constant, op.constant(1), f(dst)),
+            }
+        }
+    }
+    Ok(units.end == len)
+}

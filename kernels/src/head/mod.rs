@@ -1,0 +1,306 @@
+//! A head: runs an image on observations, a step at once or in pieces, and keeps the recurrent state and the chunk queue.
+
+mod arena;
+mod contract;
+mod executor;
+
+use core::task::Poll;
+
+use self::arena::{part, regions};
+use self::executor::run;
+pub use self::executor::run_whole;
+use crate::cursor::Cursor;
+use crate::error::{Fault, HeadError, StepError};
+use crate::image::{Image, Region};
+use crate::meter::{Meter, Unlimited, Work};
+use crate::ops::elementwise::{copy, copy_le};
+use crate::pace::budget::Budget;
+
+/// A head: an image and the scratch memory that it runs in.
+#[derive(Debug)]
+pub struct Head<'a, 's> {
+    image: Image<'a>,
+    arena: &'s mut [u32],
+    /// [`Self::least_budget`], once it was computed; 0 before.
+    least_budget: u32,
+    phase: Phase,
+    /// Actions of the current chunk that have been played; 0 = the network must run.
+    played: usize,
+    /// Whether an action has been given since the reset, so that the step limit has something to hold on to.
+    started: bool,
+}
+
+/// What the arena holds of a step.
+#[derive(Clone, Copy, Debug)]
+enum Phase {
+    /// Nothing.
+    Idle,
+    /// An observation, and what has been done with it.
+    Begun(Cursor),
+    /// The action.
+    Ready,
+}
+
+impl<'a, 's> Head<'a, 's> {
+    /// Takes `scratch`, of at least [`Image::scratch_words`] words, which it zeroes.
+    pub fn new(image: Image<'a>, scratch: &'s mut [u32]) -> Result<Self, HeadError> {
+        let (needed, given) = (image.scratch_words(), scratch.len());
+        let arena = scratch.get_mut(..needed).ok_or(HeadError::ScratchTooSmall { needed, given })?;
+        // Nothing depends on what the memory held.
+        arena.fill(0);
+        Ok(Self { image, arena, least_budget: 0, phase: Phase::Idle, played: 0, started: false })
+    }
+
+    /// Forgets the recurrent state, the rest of a chunk, the last action and a step that was begun.
+    #[inline(never)]
+    pub fn reset(&mut self) {
+        self.abandon();
+        self.started = false;
+    }
+
+    /// As [`Self::reset`], but the last action stays: after an error the robot is still where that left it, and the step limit
+    /// holds on to it.
+    #[inline(never)]
+    fn abandon(&mut self) {
+        self.forget();
+        self.phase = Phase::Idle;
+        self.played = 0;
+    }
+
+    /// Zeroes the recurrent state.
+    #[inline(never)]
+    fn forget(&mut self) {
+        self.words_mut(self.image.state()).fill(0);
+    }
+
+    /// The recurrent state, to read or to set: of each operation in order an LSTM's hidden, then cell state, or a GRU's state.
+    /// A reset zeroes it.
+    pub fn state_mut(&mut self) -> &mut [f32] {
+        self.floats_mut(self.image.state())
+    }
+
+    /// The image.
+    pub fn image(&self) -> &Image<'a> {
+        &self.image
+    }
+
+    /// The action for `observation`: of the next chunk position where the image is chunked, after the action contract. It is
+    /// [`Self::begin`] and one [`Self::poll`] without a limit.
+    ///
+    /// On an error the recurrent state and the chunk are reset, so that no part of a failed evaluation reaches a later action.
+    /// The last action stays: the next one is limited by `max_step` as ever.
+    #[inline(never)]
+    pub fn step(&mut self, observation: &[f32]) -> Result<&[f32], StepError> {
+        self.take(observation)?;
+        self.finish()?;
+        Ok(self.floats(self.image.action()))
+    }
+
+    /// Begins a step: takes the observation. The work itself is done by [`Self::poll`].
+    ///
+    /// A step that was begun and is not ready is dropped. If a poll has already worked on it, the recurrent state may be partly
+    /// that of the dropped step, and is zeroed as by [`Self::reset`]; the last action stays, so that the step limit holds.
+    ///
+    /// Errors are those of [`Self::step`]. The first call takes longer where [`Self::least_budget`] was not called before.
+    pub fn begin(&mut self, observation: &[f32]) -> Result<(), StepError> {
+        self.least_budget();
+        self.take(observation)
+    }
+
+    /// [`Image::least_budget`], computed once, which takes about as long as a short step. (Not by [`Self::new`]: where steps are
+    /// not cut, the cost model is not in the program.)
+    pub fn least_budget(&mut self) -> u32 {
+        if self.least_budget == 0 {
+            self.least_budget = self.image.least_budget();
+        }
+        self.least_budget
+    }
+
+    #[inline(never)]
+    fn take(&mut self, observation: &[f32]) -> Result<(), StepError> {
+        self.drop_step();
+        self.load(observation).inspect_err(|_| self.abandon())?;
+        self.start();
+        Ok(())
+    }
+
+    /// Runs at most `budget` instructions of the step that was begun, by the cost model ([`crate::cost`]), and gives the action
+    /// once it is ready; then, again and again until the next [`Self::begin`]. Steps that play on from a chunk have little to
+    /// do, and are ready at the first poll. A budget of 2^28 or more is no limit.
+    ///
+    /// The cost model is that of the build for thumbv7em-none-eabihf; elsewhere pieces are cut in the same places. However a
+    /// step is cut, its bits are the same.
+    ///
+    /// # Errors
+    ///
+    /// [`StepError::Budget`] where `budget` is below [`Image::least_budget`], and [`StepError::NotBegun`], change nothing. Others
+    /// are those of [`Self::step`].
+    pub fn poll(&mut self, budget: u32) -> Result<Poll<&[f32]>, StepError> {
+        self.poll_until(budget, false)
+    }
+
+    /// As [`Self::poll`], but also stops behind each of the image's operations: to measure them one by one.
+    pub fn poll_op(&mut self, budget: u32) -> Result<Poll<&[f32]>, StepError> {
+        self.poll_until(budget, true)
+    }
+
+    fn poll_until(&mut self, budget: u32, one_op: bool) -> Result<Poll<&[f32]>, StepError> {
+        if budget < self.least_budget {
+            return Err(StepError::Budget { needed: self.least_budget, given: budget });
+        }
+        if let Phase::Idle = self.phase {
+            return Err(StepError::NotBegun);
+        }
+        let ready = self.advance(&mut Budget::of_poll(budget), one_op)?;
+        Ok(if ready { Poll::Ready(self.floats(self.image.action())) } else { Poll::Pending })
+    }
+
+    /// See [`Self::begin`].
+    fn drop_step(&mut self) {
+        if let Phase::Begun(cursor) = self.phase
+            && cursor.has_left(self.fresh())
+        {
+            self.forget();
+        }
+        self.phase = Phase::Idle;
+    }
+
+    /// Where a step begins: before the first operation, or, within a chunk, behind the last.
+    fn fresh(&self) -> Cursor {
+        Cursor { op: if self.played == 0 { 0 } else { self.image.op_count() }, ..Cursor::default() }
+    }
+
+    /// Begins a step with the observation that the arena holds.
+    #[inline(never)]
+    fn start(&mut self) {
+        self.phase = Phase::Begun(self.fresh());
+    }
+
+    /// Takes the step that was begun to its end.
+    fn finish(&mut self) -> Result<(), Fault> {
+        self.advance(&mut Unlimited, false)?;
+        Ok(())
+    }
+
+    /// Goes on as far as the budget reaches; true when the action is ready. On an error the step is abandoned.
+    fn advance(&mut self, budget: &mut impl Meter, one_op: bool) -> Result<bool, Fault> {
+        self.go_on(budget, one_op).inspect_err(|_| self.abandon())
+    }
+
+    fn go_on(&mut self, budget: &mut impl Meter, one_op: bool) -> Result<bool, Fault> {
+        if let Phase::Begun(_) = self.phase {
+            if !self.evaluate(budget, one_op)? || budget.take(1, Work::Act(&self.image)) == 0 {
+                return Ok(false);
+            }
+            self.act()?;
+            self.phase = Phase::Ready;
+            self.played += 1;
+            if self.played == self.image.execute() {
+                self.played = 0;
+            }
+        }
+        Ok(true)
+    }
+
+    /// The network's raw output for `observation` (`chunk * act_len` values), before the action contract. Advances the
+    /// recurrent state, and drops what was left of a chunk or of a step that was begun.
+    pub fn infer(&mut self, observation: &[f32]) -> Result<&[f32], StepError> {
+        self.take(observation)?;
+        // From the first operation on, whatever is left of a chunk.
+        self.played = 0;
+        self.start();
+        self.evaluate(&mut Unlimited, false).inspect_err(|_| self.abandon())?;
+        self.phase = Phase::Idle;
+        Ok(self.floats(self.image.output()))
+    }
+
+    /// Plays the image's self-test vector from a reset and compares every action bit for bit; resets again at the end.
+    #[inline(never)]
+    pub fn self_test(&mut self) -> Result<(), StepError> {
+        self.reset();
+        let outcome = self.play_self_test();
+        self.reset();
+        outcome
+    }
+
+    fn play_self_test(&mut self) -> Result<(), StepError> {
+        let mut step = 0;
+        while let Some((observation, expected)) = self.image.self_test(step) {
+            copy_le(observation, self.words_mut(self.image.observation()));
+            self.start();
+            self.finish()?;
+            let action = self.floats(self.image.action());
+            if action.iter().zip(expected).any(|(a, w)| a.to_bits() != u32::from_le(*w)) {
+                return Err(StepError::SelfTest { step });
+            }
+            step += 1;
+        }
+        Ok(())
+    }
+
+    /// Checks the observation and puts it into the arena.
+    fn load(&mut self, observation: &[f32]) -> Result<(), StepError> {
+        let (expected, given) = (self.image.obs_len(), observation.len());
+        if expected != given {
+            return Err(StepError::ObservationLength { expected, given });
+        }
+        if let Some(index) = observation.iter().position(|v| !v.is_finite()) {
+            return Err(StepError::ObservationNotFinite { index });
+        }
+        let region = self.image.observation();
+        copy(bytemuck::must_cast_slice(observation), self.arena.get_mut(region.range()).ok_or(StepError::Damaged)?);
+        Ok(())
+    }
+
+    /// Runs operations from where the step stands; true behind the last one.
+    #[inline(never)]
+    fn evaluate(&mut self, budget: &mut impl Meter, one_op: bool) -> Result<bool, Fault> {
+        let Phase::Begun(cursor) = &mut self.phase else { return Ok(true) };
+        while cursor.op < self.image.op_count() {
+            let done = match &self.image.op(cursor.op) {
+                Ok(op) if budget.take(1, Work::Enter(op)) > 0 => run(op, self.arena, cursor, budget),
+                Ok(_) => Ok(false),
+                // In a checked image every record parses.
+                Err(_) => Err(Fault::Damaged),
+            };
+            if done != Ok(true) {
+                return done;
+            }
+            *cursor = Cursor { op: cursor.op + 1, ..Cursor::default() };
+            if one_op {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Takes the chunk's current action through the contract. Not inlined, so that the operations do not run on top of its stack.
+    #[inline(never)]
+    fn act(&mut self) -> Result<(), Fault> {
+        let (output, action) = (self.image.output(), self.image.action());
+        let position = self.played * action.len;
+        let [output, action, _] = regions(self.arena, &[output, action, Region::default()]);
+        // In place of the output: an error must not have changed the last action, not even in part.
+        let next = part(output, &(position..position + action.len()));
+        if next.is_empty() {
+            return Err(Fault::Damaged);
+        }
+        contract::apply(&self.image, next, action, self.started)?;
+        copy(next, action);
+        self.started = true;
+        Ok(())
+    }
+
+    #[inline(never)]
+    fn floats(&self, region: Region) -> &[f32] {
+        bytemuck::must_cast_slice(self.arena.get(region.range()).unwrap_or(&[]))
+    }
+
+    fn floats_mut(&mut self, region: Region) -> &mut [f32] {
+        bytemuck::must_cast_slice_mut(self.words_mut(region))
+    }
+
+    fn words_mut(&mut self, region: Region) -> &mut [u32] {
+        part(self.arena, &region.range())
+    }
+}

@@ -1,0 +1,274 @@
+//! The check of an image: everything that an image says, once. `docs/FORMAT.md` has the list.
+
+use super::contract::CONTRACT_ARRAYS;
+use super::crc::checksum;
+use super::header as h;
+use super::matrix::{matrix, row_block};
+use super::op::{Form, OpKind, Uses};
+use super::proof::fits_i32;
+use super::region::Region;
+use super::text::is_text;
+use super::view::Image;
+use super::words::{high, low, section, word};
+use crate::error::ImageError;
+use crate::layout::{Block, LAYOUT_STAMP};
+use crate::x::Plan;
+
+/// The bits of infinity in bf16.
+const BF16_INFINITY: u16 = (f32::INFINITY.to_bits() >> 16) as u16;
+
+impl<'a> Image<'a> {
+    /// Parses `bytes`, which must start at a multiple of 4 in memory and hold exactly the image.
+    ///
+    /// Checks the checksum, every section, every operation, all constants, and that no row can overflow its int32
+    /// accumulator for any activations. Time is linear in the image's length.
+    #[inline(never)]
+    pub fn new_checked(bytes: &'a [u8]) -> Result<Self, ImageError> {
+        if bytes.as_ptr().align_offset(4) != 0 {
+            return Err(ImageError::Misaligned);
+        }
+        if bytes.len() < h::WORDS * 4 {
+            return Err(ImageError::TooShort);
+        }
+        let words: &[u32] = bytemuck::try_cast_slice(bytes).map_err(|_| ImageError::Length)?;
+        let image = Self { words, header: words.first_chunk().ok_or(ImageError::TooShort)? };
+        if image.head(0) != h::MAGIC {
+            return Err(ImageError::Magic);
+        }
+        if low(image.head(h::W_VERSION)) != h::VERSION as usize || high(image.head(h::W_VERSION)) != h::WORDS {
+            return Err(ImageError::Version);
+        }
+        if image.head(h::W_BYTES) as usize != bytes.len() {
+            return Err(ImageError::Length);
+        }
+        if image.head(h::W_CRC) != checksum(bytes) {
+            return Err(ImageError::Checksum);
+        }
+        if image.head(h::W_LAYOUT) != LAYOUT_STAMP {
+            return Err(ImageError::Layout);
+        }
+        image.check()?;
+        Ok(image)
+    }
+
+    fn check(&self) -> Result<(), ImageError> {
+        let reserved = high(self.head(h::W_MATRIX_COUNT)) as u32 | self.header[30] | self.header[31];
+        if reserved != 0
+            || (self.head(h::W_KIND) >> 8) as u8 != 0
+            || high(self.head(h::W_WORK_FLAGS)) >> CONTRACT_ARRAYS != 0
+        {
+            return Err(ImageError::Reserved);
+        }
+        match (self.head(h::W_KIND) as u8, self.chunk(), self.execute()) {
+            (0, 1, 1) => {}
+            (1, chunk, execute) if (1..=chunk).contains(&execute) => {}
+            (0 | 1, ..) => return Err(ImageError::Chunk),
+            _ => return Err(ImageError::Kind),
+        }
+        if self.obs_len() == 0 || self.act_len() == 0 || self.op_count() == 0 {
+            return Err(ImageError::Shape);
+        }
+        // State, observation, what operations write, action, work area: in this order and without a gap. (`check_sections` sees
+        // to the middle.)
+        let (action, work) = (self.action(), self.work());
+        if self.state().offset != 0
+            || self.observation().offset != self.state().end()
+            || self.output().offset < self.observation().end()
+            || work.offset != action.end()
+            || work.end() != self.scratch_words()
+            || work.end() > h::MAX_SCRATCH
+        {
+            return Err(ImageError::Arena);
+        }
+        if !is_positive(self.rate_hz()) {
+            return Err(ImageError::Constant);
+        }
+        // A head that tests nothing would report success.
+        if self.self_test_steps() == 0 {
+            return Err(ImageError::SelfTest);
+        }
+        self.check_sections()
+    }
+
+    /// The sections, in the order in which they stand, and what they hold.
+    fn check_sections(&self) -> Result<(), ImageError> {
+        let front = &mut Front { words: self.words, at: h::WORDS };
+        for i in 0..self.matrix_count() {
+            check_matrix(self.matrix_at(i), front, self.work().len)?;
+        }
+        front.take(self.head(h::W_MATRICES) as usize, self.matrix_count() * h::MATRIX_WORDS)?;
+        let mut written = self.observation().end();
+        for i in 0..self.op_count() {
+            written = self.check_op(i, front, written)?;
+        }
+        if self.output().end() > written {
+            return Err(ImageError::Unwritten);
+        }
+        if written != self.action().offset {
+            return Err(ImageError::Arena);
+        }
+        front.take(self.head(h::W_OPS) as usize, self.op_count() * h::OP_WORDS)?;
+        self.check_contract(front)?;
+        let name = front.take(self.head(h::W_NAME) as usize, self.name_len().div_ceil(4))?;
+        if !is_text(bytemuck::must_cast_slice(name).get(..self.name_len()).unwrap_or_default()) {
+            return Err(ImageError::Name);
+        }
+        // The arena holds both lengths, so that the product fits 32 bits.
+        let self_test = self.self_test_steps() * (self.obs_len() + self.act_len());
+        front.take_finite(self.head(h::W_SELF_TEST) as usize, self_test)
+    }
+
+    fn check_contract(&self, front: &mut Front<'a>) -> Result<(), ImageError> {
+        let arrays = (0..CONTRACT_ARRAYS).filter(|which| self.has_contract(*which)).count();
+        front.take_finite(self.head(h::W_CONTRACT) as usize, arrays * self.act_len())?;
+        for i in 0..self.act_len() {
+            let [_, _, low, high, max_step] = self.contract_of(i);
+            if low > high {
+                return Err(ImageError::Limits);
+            }
+            if max_step < 0.0 {
+                return Err(ImageError::Constant);
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks an operation before which the first `written` words of the arena hold something of the step; gives their number
+    /// behind it.
+    #[inline(never)]
+    fn check_op(&self, i: usize, front: &mut Front<'a>, written: usize) -> Result<usize, ImageError> {
+        let op = self.op(i);
+        let op = op.as_ref().map_err(|e| *e)?;
+        let Form { uses: Uses { max_detail, constants, arrays, .. }, unused, .. } = op.form;
+        let [head, places, lengths, data] = op.record.map(u32::from_le);
+        let n = op.dst().len;
+        if (places & unused[0] | lengths & unused[1] | data & unused[2]) != 0 || (head >> 8) as u8 > *max_detail {
+            return Err(ImageError::Reserved);
+        }
+        if n == 0 {
+            return Err(ImageError::Shape);
+        }
+        if op.is_linear() {
+            let behind = op.data().wrapping_sub(self.matrix_at(0));
+            if !behind.is_multiple_of(h::MATRIX_WORDS) || behind / h::MATRIX_WORDS >= self.matrix_count() {
+                return Err(ImageError::Matrix);
+            }
+            // The matrix itself was checked with the others.
+            if low(self.word(op.data())) != n {
+                return Err(ImageError::Shape);
+            }
+            if op.bias() != 0 {
+                front.take_finite(op.bias(), n)?;
+            }
+        } else if *constants > 0 {
+            let [constants, arrays] = [*constants, *arrays].map(usize::from);
+            for constant in front.take(op.data(), constants)? {
+                // Above 0, and finite but for limits: positive numbers are in the order of their bits.
+                let infinity = f32::INFINITY.to_bits() + u32::from(op.kind == OpKind::Normalize);
+                if u32::from_le(*constant).wrapping_sub(1) >= infinity - 1 {
+                    return Err(ImageError::Constant);
+                }
+            }
+            front.take_finite(op.data() + constants, arrays * n)?;
+        }
+        let [dst, src, third] = op.regions;
+        if dst.overlaps(src) || dst.overlaps(third) || src.overlaps(third) {
+            return Err(ImageError::Overlap);
+        }
+        // Nothing is read that no operation of this step has written: what a step before or the caller left there, or the work
+        // area, where backends differ.
+        let third = if op.is_linear() { Region::default() } else { third };
+        let old = if op.reads_dst() { dst.end() } else { 0 };
+        if src.end().max(third.end()).max(old) > written {
+            return Err(ImageError::Unwritten);
+        }
+        if dst.offset > written {
+            return Err(ImageError::Arena);
+        }
+        Ok(written.max(dst.end()))
+    }
+}
+
+/// Takes sections in the order in which they stand. None shares a word with another, so that what is checked is no longer than
+/// the image.
+struct Front<'a> {
+    words: &'a [u32],
+    /// The end of the last one.
+    at: usize,
+}
+
+impl<'a> Front<'a> {
+    #[inline(always)]
+    fn take(&mut self, offset: usize, len: usize) -> Result<&'a [u32], ImageError> {
+        self.next(offset, len).ok_or(ImageError::Section)
+    }
+
+    #[inline(never)]
+    fn next(&mut self, offset: usize, len: usize) -> Option<&'a [u32]> {
+        let section = section(self.words, offset, len).filter(|_| offset >= self.at)?;
+        self.at = offset + len;
+        Some(section)
+    }
+
+    /// As [`Self::take`], of f32 constants, refused where one is not finite.
+    #[inline(never)]
+    fn take_finite(&mut self, offset: usize, len: usize) -> Result<(), ImageError> {
+        let constants = self.take(offset, len)?;
+        let finite = constants.iter().all(|&w| f32::from_bits(u32::from_le(w)).is_finite());
+        if finite { Ok(()) } else { Err(ImageError::Constant) }
+    }
+}
+
+/// The matrix of the record at `at`: its blocks, the places of their rows, their sums, and the words of the `work` area that its
+/// input takes.
+#[inline(never)]
+fn check_matrix(at: usize, front: &mut Front<'_>, work: usize) -> Result<(), ImageError> {
+    let matrix = &matrix(front.words, at, 0);
+    let matrix = matrix.as_ref().map_err(|e| *e)?;
+    let mut seen = [0u32; h::MAX_ROWS / 32];
+    let mut first_row = 0;
+    for record in matrix.records.as_chunks().0 {
+        let rows = row_block(matrix, record, first_row);
+        let rows = rows.as_ref().map_err(|e| *e)?;
+        // Weights, scales and index stand behind each other.
+        let [_, weights, scales, index] = record.map(|word| u32::from_le(word) as usize);
+        let to_scales = rows.block.words().len();
+        let to_index = to_scales + rows.scales.len();
+        if scales != weights + to_scales || index != 0 && index != weights + to_index {
+            return Err(ImageError::Section);
+        }
+        front.take(weights, to_index + rows.index.len())?;
+        // Magnitudes compare as their bits, and a sign is above them all.
+        if bytemuck::must_cast_slice(rows.scales).iter().any(|scale: &u16| u16::from_le(*scale) >= BF16_INFINITY) {
+            return Err(ImageError::Constant);
+        }
+        first_row += rows.block.shape().rows;
+        for row in 0..rows.block.shape().rows {
+            let output = rows.output(row);
+            let word = seen.get_mut(output / 32).ok_or(ImageError::Index)?;
+            if output >= matrix.rows || *word >> (output % 32) & 1 == 1 {
+                return Err(ImageError::Index);
+            }
+            *word |= 1 << (output % 32);
+        }
+        if room(&rows.block) > work {
+            return Err(ImageError::Arena);
+        }
+        if !fits_i32(&rows.block, matrix.x_max) {
+            return Err(ImageError::Overflow);
+        }
+    }
+    front.take(word(front.words, at + 3) as usize, matrix.records.len())?;
+    Ok(())
+}
+
+/// Words that preparing an input for the block takes.
+#[inline(never)]
+fn room(block: &Block<'_>) -> usize {
+    Plan::of(block).room(block.shape().cols)
+}
+
+/// Whether a number is above 0 and finite.
+fn is_positive(x: f32) -> bool {
+    (1..f32::INFINITY.to_bits()).contains(&x.to_bits())
+}

@@ -1,0 +1,41 @@
+//! The action contract: arrays of f32 bits, one per action dimension, in the order in which they apply: `a = out * scale + offset`,
+//! then the limits `low` and `high`, then the step limit `max_step` against the last action.
+
+use super::header as h;
+use super::view::Image;
+use super::words::high;
+
+/// Arrays of the action contract.
+pub const CONTRACT_ARRAYS: usize = 5;
+
+impl<'a> Image<'a> {
+    /// The arrays, in their order: scale, offset, low, high, max_step. Those that the contract has not are empty.
+    pub fn contract_arrays(&self) -> [&'a [u32]; CONTRACT_ARRAYS] {
+        let mut offset = self.head(h::W_CONTRACT) as usize;
+        core::array::from_fn(|which| {
+            let len = if self.has_contract(which) { self.act_len() } else { 0 };
+            let array = self.section(offset, len);
+            offset += array.len();
+            array
+        })
+    }
+
+    /// The contract of action `i`; numbers that change nothing stand for the arrays that it has not.
+    pub(crate) fn contract_of(&self, i: usize) -> [f32; CONTRACT_ARRAYS] {
+        let mut numbers = [1.0, -0.0, f32::NEG_INFINITY, f32::INFINITY, f32::INFINITY];
+        let (mut flags, len) = (high(self.head(h::W_WORK_FLAGS)), self.act_len());
+        let mut at = (self.head(h::W_CONTRACT) as usize).wrapping_add(i);
+        for number in &mut numbers {
+            if flags & 1 == 1 {
+                *number = f32::from_bits(self.word(at));
+                at = at.wrapping_add(len);
+            }
+            flags >>= 1;
+        }
+        numbers
+    }
+
+    pub(super) fn has_contract(&self, which: usize) -> bool {
+        high(self.head(h::W_WORK_FLAGS)) >> which & 1 == 1
+    }
+}

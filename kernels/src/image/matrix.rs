@@ -1,0 +1,238 @@
+//! Matrices: their records and those of their blocks, to read and to write, and what these name.
+
+use super::header::{BLOCK_WORDS, MATRIX_WORDS, MAX_ROWS};
+use super::words::{Records, TooLarge, behind, halves, high, low, record, section};
+use crate::error::ImageError;
+use crate::layout::half::{bf16, half_word};
+use crate::layout::{Block, BlockShape, Lanes, Width, is_group};
+use crate::x::max_prepared_words;
+
+/// The record of a matrix.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MatrixRecord {
+    /// Length of the output.
+    pub rows: usize,
+    /// Length of the input.
+    pub cols: usize,
+    /// Columns per u8 scale; 0 = row scales only.
+    pub group: usize,
+    /// Magnitude that the activations are quantized to.
+    pub x_max: u16,
+    /// The block records.
+    pub blocks: Records,
+}
+
+impl MatrixRecord {
+    /// Refuses what no matrix has.
+    #[inline(always)]
+    pub fn parse(record: &[u32; MATRIX_WORDS]) -> Result<Self, ImageError> {
+        let [size, levels, blocks, offset] = record.map(u32::from_le);
+        let (rows, cols, group, x_max) = (low(size), high(size), low(levels), high(levels) as u16);
+        if rows == 0 || rows > MAX_ROWS || cols == 0 {
+            return Err(ImageError::Shape);
+        }
+        if !is_group(group) {
+            return Err(ImageError::Group);
+        }
+        if x_max == 0 || x_max > i16::MAX as u16 {
+            return Err(ImageError::Constant);
+        }
+        if high(blocks) != 0 {
+            return Err(ImageError::Reserved);
+        }
+        Ok(Self { rows, cols, group, x_max, blocks: Records { offset, count: low(blocks) } })
+    }
+
+    /// The record's words.
+    pub fn emit(&self) -> Result<[u32; MATRIX_WORDS], TooLarge> {
+        let Self { rows, cols, group, x_max, blocks } = *self;
+        Ok([halves(rows, cols)?, halves(group, x_max.into())?, halves(blocks.count, 0)?, blocks.offset])
+    }
+}
+
+/// The record of a block.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BlockRecord {
+    /// Code width.
+    pub width: Width,
+    /// Weights in a lane.
+    pub lanes: Lanes,
+    /// Rows.
+    pub rows: usize,
+    /// Offset of the packed weights.
+    pub weights: u32,
+    /// Offset of the row scales.
+    pub scales: u32,
+    /// Offset of the output index, or 0.
+    pub index: u32,
+}
+
+impl BlockRecord {
+    /// Refuses what no block of a matrix with these lanes has.
+    #[inline(always)]
+    pub fn parse(record: &[u32; BLOCK_WORDS], lanes: Lanes) -> Result<Self, ImageError> {
+        let [head, weights, scales, index] = record.map(u32::from_le);
+        let width = Width::from_bits(head & 0xff).ok_or(ImageError::Width)?;
+        if (head >> 8) as u8 != lanes.code() {
+            return Err(ImageError::Lanes);
+        }
+        Ok(Self { width, lanes, rows: high(head), weights, scales, index })
+    }
+
+    /// The record's words.
+    pub fn emit(&self) -> Result<[u32; BLOCK_WORDS], TooLarge> {
+        let head = self.width.bits() | u32::from(self.lanes.code()) << 8;
+        Ok([halves(head as usize, self.rows)?, self.weights, self.scales, self.index])
+    }
+}
+
+/// A matrix in an image: blocks of rows and a bias.
+#[derive(Clone, Copy, Debug)]
+pub struct Matrix<'a> {
+    /// Length of the output.
+    pub rows: usize,
+    /// Length of the input.
+    pub cols: usize,
+    /// Columns per u8 scale; 0 = row scales only.
+    pub group: usize,
+    /// Magnitude that the activations are quantized to: 127 for int8, up to 32767 for int16.
+    pub x_max: u16,
+    /// Bits of the f32 biases in the order of the output, or empty.
+    pub(crate) bias: &'a [u32],
+    /// The image's words, which the block records point into.
+    pub(super) image: &'a [u32],
+    /// The block records.
+    pub(crate) records: &'a [u32],
+}
+
+/// Rows of one width with their scales and places in the output.
+#[derive(Clone, Copy, Debug)]
+pub struct RowBlock<'a> {
+    /// The packed codes.
+    pub block: Block<'a>,
+    /// bf16 row scales, two a word.
+    pub scales: &'a [u32],
+    /// u16 output indexes, two a word; empty where the rows follow each other from `first_row` on.
+    pub index: &'a [u32],
+    /// The output index of the first row, where there is no index.
+    pub first_row: usize,
+}
+
+impl RowBlock<'_> {
+    /// The scale of the block's row `i`.
+    #[inline(always)]
+    pub fn scale(&self, i: usize) -> f32 {
+        bf16(half_word(self.scales, i))
+    }
+
+    /// The weights of the block's row `i`: `level * group scale * row scale`, the integers multiplied first. Fills `out` up to the
+    /// number of columns.
+    pub fn dequantize(&self, i: usize, out: &mut [f32]) {
+        let scale = self.scale(i);
+        for (col, out) in out.iter_mut().enumerate().take(self.block.shape().cols) {
+            *out = (self.block.level(i, col) * i32::from(self.block.group_scale(i, col))) as f32 * scale;
+        }
+    }
+
+    /// The output index of the block's row `i`.
+    #[inline(always)]
+    pub fn output(&self, i: usize) -> usize {
+        if self.index.is_empty() { self.first_row + i } else { half_word(self.index, i) as usize }
+    }
+}
+
+impl<'a> Matrix<'a> {
+    /// The lanes of the matrix's blocks.
+    pub const fn lanes(&self) -> Lanes {
+        Lanes::of(self.x_max, self.group)
+    }
+
+    /// Words that the prepared activations take at most.
+    pub fn prepared_words(&self) -> usize {
+        max_prepared_words(self.cols, self.group)
+    }
+
+    /// The blocks in the order of the image.
+    pub fn blocks(&self) -> impl Iterator<Item = RowBlock<'a>> + use<'a> {
+        let matrix = *self;
+        let mut first_row = 0;
+        self.records.as_chunks().0.iter().filter_map(move |record| {
+            let rows = row_block(&matrix, record, first_row).ok()?;
+            first_row += rows.block.shape().rows;
+            Some(rows)
+        })
+    }
+
+    /// Bytes of everything that describes the weights ([`block_bytes`]). Biases and the matrix record are not counted.
+    pub fn weight_bytes(&self) -> usize {
+        self.blocks().map(|rows| block_bytes(rows.block.shape(), !rows.index.is_empty())).sum()
+    }
+
+    /// Bias of output `row`; 0 where the matrix has none.
+    pub fn bias(&self, row: usize) -> f32 {
+        self.bias.get(row).map_or(0.0, |w| f32::from_bits(u32::from_le(*w)))
+    }
+
+    /// The bits of the values that the output starts from, where these are the biases and every row is written once, in order.
+    pub fn start_values(&self, accumulate: bool) -> Option<&[u32]> {
+        if accumulate || self.bias.is_empty() || !self.is_whole() { None } else { Some(self.bias) }
+    }
+
+    /// Blocks of rows.
+    pub(crate) fn block_count(&self) -> usize {
+        self.records.len() / BLOCK_WORDS
+    }
+
+    /// Whether the blocks hold all rows in the order of the output.
+    fn is_whole(&self) -> bool {
+        let mut rows = 0;
+        let (records, _) = self.records.as_chunks::<BLOCK_WORDS>();
+        records.iter().all(|[head, _, _, index]| {
+            rows += (u32::from_le(*head) >> 16) as usize;
+            *index == 0
+        }) && rows == self.rows
+    }
+}
+
+/// The matrix of the record at `at` with the biases at `bias` (0: none), refused where the record says something impossible.
+pub(super) fn matrix(image: &[u32], at: usize, bias: usize) -> Result<Matrix<'_>, ImageError> {
+    let MatrixRecord { rows, cols, group, x_max, blocks } = MatrixRecord::parse(record(image, at)?)?;
+    let section = |offset, len| section(image, offset, len).ok_or(ImageError::Section);
+    let bias = if bias == 0 { &[] } else { section(bias, rows)? };
+    let records = section(blocks.offset as usize, blocks.count * BLOCK_WORDS)?;
+    Ok(Matrix { rows, cols, group, x_max, bias, image, records })
+}
+
+/// The block of a record, refused where the record says something impossible.
+#[inline(never)]
+pub(crate) fn row_block<'a>(
+    matrix: &Matrix<'a>,
+    record: &[u32; BLOCK_WORDS],
+    first_row: usize,
+) -> Result<RowBlock<'a>, ImageError> {
+    let record = BlockRecord::parse(record, matrix.lanes())?;
+    let BlockRecord { width, lanes, rows, weights, scales, index } = record;
+    let shape = BlockShape { width, lanes, rows, cols: matrix.cols, group: matrix.group };
+    if !shape.is_valid() || rows > matrix.rows {
+        return Err(ImageError::Shape);
+    }
+    let halves = |offset: u32| section(matrix.image, offset as usize, rows.div_ceil(2)).ok_or(ImageError::Section);
+    let scales = halves(scales)?;
+    let index = if index == 0 { &[] } else { halves(index)? };
+    match Block::leading(shape, behind(matrix.image, weights as usize)) {
+        Some(block) => Ok(RowBlock { block, scales, index, first_row }),
+        None => Err(ImageError::Section),
+    }
+}
+
+/// Bytes that a block takes: packed words with their padding and group scales, row scales, output indexes where the block is
+/// `indexed`, and the block record.
+pub const fn block_bytes(shape: BlockShape, indexed: bool) -> usize {
+    let halves = shape.rows.div_ceil(2) * if indexed { 2 } else { 1 };
+    4 * (shape.words() + halves + BLOCK_WORDS)
+}
+
+/// Packs u16 values two a word, as scales and indexes stand in the image.
+pub fn half_words(values: &[u16]) -> impl Iterator<Item = u32> + '_ {
+    values.chunks(2).map(|pair| pair.iter().rev().fold(0u32, |word, v| word << 16 | u32::from(*v)))
+}

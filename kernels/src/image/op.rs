@@ -1,0 +1,307 @@
+//! Operations: a table of all of them, their records to read and to write, and what these name.
+
+use core::mem::discriminant;
+use core::ops::Range;
+
+use super::header::{MATRIX_WORDS, OP_WORDS, W_KIND, W_MATRICES, W_MATRIX_COUNT, W_OPS};
+use super::matrix::{Matrix, matrix};
+use super::region::Region;
+use super::view::Image;
+use super::words::{TooLarge, halves, high, low, record, section, word};
+use crate::error::ImageError;
+use crate::math::Function;
+
+/// What an operation does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OpKind {
+    /// `dst = clamp((clamp(src, ±pre_clip) - mean) * scale, ±clip)`. Constants: `pre_clip`, `clip`, infinite where there is no
+    /// limit; arrays: `mean`, `scale`, the reciprocals of the standard deviation.
+    Normalize,
+    /// `dst = W src + b`
+    Linear {
+        /// `dst += W src + b` instead.
+        accumulate: bool,
+    },
+    /// `dst = f(dst)`
+    Function(Function),
+    /// `dst = layer_norm(dst)`. Constant: what is added to the variance; arrays: weights, biases.
+    LayerNorm,
+    /// `dst = rms_norm(dst)`. Constant: what is added to the mean square; array: weights.
+    RmsNorm,
+    /// `dst += src`
+    Add,
+    /// `dst = src`
+    Copy,
+    /// An LSTM cell: `src` holds the four gates `[i f g o]`, `dst` is the hidden state, `third` the cell state.
+    LstmCell,
+    /// A GRU cell: `src` holds `W_ih x + b_ih`, `third` holds `W_hh h + b_hh`, each of gates `[r z n]`, `dst` is the state.
+    GruCell,
+}
+
+impl OpKind {
+    /// Its name, for people; a function has its own.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Normalize => "normalize",
+            Self::Linear { .. } => "linear",
+            Self::Function(function) => function.name(),
+            Self::LayerNorm => "layernorm",
+            Self::RmsNorm => "rmsnorm",
+            Self::Add => "add",
+            Self::Copy => "copy",
+            Self::LstmCell => "lstm cell",
+            Self::GruCell => "gru cell",
+        }
+    }
+}
+
+/// What the record of an operation holds.
+#[derive(Debug)]
+pub(super) struct Form {
+    /// Operation code.
+    code: u8,
+    /// With the detail 0.
+    kind: OpKind,
+    pub(super) uses: Uses,
+    /// Bits of the record's words behind the first that the operation does not use.
+    pub(super) unused: [u32; 3],
+}
+
+/// What an operation uses, in lengths of `dst`.
+#[derive(Debug)]
+pub(super) struct Uses {
+    /// The highest detail. (Of a function, [`Function::from_code`] decides.)
+    pub(super) max_detail: u8,
+    /// Lengths of `src` and of the third region; 0 where there is none. (Linear has its own length.)
+    src: u8,
+    third: u8,
+    /// Single constants, and arrays behind them.
+    pub(super) constants: u8,
+    pub(super) arrays: u8,
+    /// Passes over the elements, each of which a step in pieces may stop in.
+    passes: u8,
+    /// Whether it works on what `dst` holds. (Of linear, the detail decides.)
+    reads_dst: bool,
+}
+
+impl Uses {
+    /// Nothing but its destination, once.
+    const NONE: Self = Self { max_detail: 0, src: 0, third: 0, constants: 0, arrays: 0, passes: 1, reads_dst: false };
+}
+
+impl Form {
+    const fn new(code: u8, kind: OpKind, uses: Uses) -> Self {
+        const fn unless(used: bool, bits: u32) -> u32 {
+            if used { 0 } else { bits }
+        }
+        let linear = matches!(kind, OpKind::Linear { .. });
+        let unused = [
+            unless(uses.src > 0, !0xffff),
+            unless(linear, 0xffff) | unless(linear || uses.third > 0, !0xffff),
+            unless(linear || uses.constants > 0, !0),
+        ];
+        Self { code, kind, uses, unused }
+    }
+}
+
+macro_rules! operations {
+    ($($(#[$doc:meta])* $NAME:ident = $code:literal: $kind:expr, $uses:expr;)*) => {
+        $($(#[$doc])* pub const $NAME: u8 = $code;)*
+
+        /// The names of the codes above, from code 1 on.
+        pub(crate) const NAMES: &[&str] = &[$(stringify!($NAME)),*];
+
+        /// By operation code, from 1 on.
+        static FORMS: [Form; NAMES.len()] = [$(Form::new($NAME, $kind, $uses)),*];
+
+        const _: () = {
+            let codes = [$($NAME),*];
+            let mut i = 0;
+            while i < codes.len() {
+                assert!(codes[i] as usize == i + 1);
+                i += 1;
+            }
+        };
+    };
+}
+operations! {
+    /// [`OpKind::Normalize`]
+    NORMALIZE = 1: OpKind::Normalize, Uses { src: 1, constants: 2, arrays: 2, ..Uses::NONE };
+    /// [`OpKind::Linear`]
+    LINEAR = 2: OpKind::Linear { accumulate: false }, Uses { max_detail: 1, src: 1, ..Uses::NONE };
+    /// [`OpKind::Function`]
+    FUNCTION = 3: OpKind::Function(Function::Relu), Uses { max_detail: u8::MAX, reads_dst: true, ..Uses::NONE };
+    /// [`OpKind::LayerNorm`]
+    LAYER_NORM = 4: OpKind::LayerNorm, Uses { constants: 1, arrays: 2, passes: 3, reads_dst: true, ..Uses::NONE };
+    /// [`OpKind::RmsNorm`]
+    RMS_NORM = 5: OpKind::RmsNorm, Uses { constants: 1, arrays: 1, passes: 2, reads_dst: true, ..Uses::NONE };
+    /// [`OpKind::Add`]
+    ADD = 6: OpKind::Add, Uses { src: 1, reads_dst: true, ..Uses::NONE };
+    /// [`OpKind::Copy`]
+    COPY = 7: OpKind::Copy, Uses { src: 1, ..Uses::NONE };
+    /// [`OpKind::LstmCell`]
+    LSTM_CELL = 8: OpKind::LstmCell, Uses { src: 4, third: 1, ..Uses::NONE };
+    /// [`OpKind::GruCell`]
+    GRU_CELL = 9: OpKind::GruCell, Uses { src: 3, third: 3, reads_dst: true, ..Uses::NONE };
+}
+
+/// What a writer says in an operation's record.
+#[derive(Clone, Copy, Debug)]
+pub struct OpRecord {
+    /// What it does.
+    pub kind: OpKind,
+    /// What it writes.
+    pub dst: Region,
+    /// Arena offset of what it reads; 0 where the operation has none.
+    pub src: usize,
+    /// Arena offset of its third region; 0 where the operation has none, and of a linear one.
+    pub third: usize,
+    /// Offset of the biases of a linear operation; 0: none.
+    pub bias: u32,
+    /// Offset of the constants or of the matrix record; 0 where the operation has none.
+    pub data: u32,
+}
+
+impl OpRecord {
+    /// The record's words, which [`Image::ops`] reads.
+    pub fn emit(&self) -> Result<[u32; OP_WORDS], TooLarge> {
+        let form = FORMS.iter().find(|form| discriminant(&form.kind) == discriminant(&self.kind));
+        let code = form.map_or(0, |form| form.code);
+        let detail = match self.kind {
+            OpKind::Linear { accumulate } => accumulate.into(),
+            OpKind::Function(function) => function as u8,
+            _ => 0,
+        };
+        let head = halves(usize::from(code) | usize::from(detail) << 8, self.dst.len)?;
+        Ok([head, halves(self.dst.offset, self.src)?, self.bias | halves(0, self.third)?, self.data])
+    }
+}
+
+/// An operation of an image.
+#[derive(Clone, Copy, Debug)]
+pub struct Op<'a> {
+    /// What it does.
+    pub kind: OpKind,
+    /// [`Self::dst`], [`Self::src`], [`Self::third`].
+    pub(crate) regions: [Region; 3],
+    pub(super) record: &'a [u32; OP_WORDS],
+    pub(super) form: &'static Form,
+    /// The image's words.
+    image: &'a [u32],
+}
+
+impl<'a> Op<'a> {
+    /// What it writes. Where there is no [`Self::src`], it works in place.
+    pub fn dst(&self) -> Region {
+        self.regions[0]
+    }
+
+    /// What it reads, or empty.
+    pub fn src(&self) -> Region {
+        self.regions[1]
+    }
+
+    /// The cell's other region, or the work area of a linear operation, or empty.
+    pub fn third(&self) -> Region {
+        self.regions[2]
+    }
+
+    /// The weights of a linear operation.
+    pub fn matrix(&self) -> Option<Matrix<'a>> {
+        if self.is_linear() { self.linear_matrix().ok() } else { None }
+    }
+
+    /// As [`Self::matrix`], of a linear operation. (Within a checked image never an error.)
+    pub(crate) fn linear_matrix(&self) -> Result<Matrix<'a>, ImageError> {
+        matrix(self.image, self.data(), self.bias())
+    }
+
+    /// Offset of the biases of a linear operation; 0: none.
+    pub(super) fn bias(&self) -> usize {
+        u32::from_le(self.record[2]) as usize
+    }
+
+    /// Single constant `i`: see [`OpKind`].
+    pub fn constant(&self, i: usize) -> f32 {
+        f32::from_bits(word(self.image, self.data().wrapping_add(i)))
+    }
+
+    /// Array `i` of f32 bits, of the length of `dst`: see [`OpKind`].
+    pub fn array(&self, i: usize) -> &'a [u32] {
+        self.part(i, &(0..self.dst().len))
+    }
+
+    /// Its operation code.
+    pub(crate) fn code(&self) -> u8 {
+        self.form.code
+    }
+
+    /// What the operation can be cut into: elements, each once for every pass over them.
+    pub(crate) fn units(&self) -> usize {
+        self.dst().len * usize::from(self.form.uses.passes)
+    }
+
+    /// A range of array `i`; empty where that is not in the image.
+    pub(crate) fn part(&self, i: usize, range: &Range<usize>) -> &'a [u32] {
+        let before = usize::from(self.form.uses.constants) + i * self.dst().len + range.start;
+        section(self.image, self.data().wrapping_add(before), range.len()).unwrap_or_default()
+    }
+
+    /// Offset of the constants or of the matrix record.
+    pub(super) fn data(&self) -> usize {
+        u32::from_le(self.record[3]) as usize
+    }
+
+    /// Whether the operation reads what its destination held.
+    pub(super) fn reads_dst(&self) -> bool {
+        self.form.uses.reads_dst || self.kind == OpKind::Linear { accumulate: true }
+    }
+
+    pub(super) fn is_linear(&self) -> bool {
+        matches!(self.kind, OpKind::Linear { .. })
+    }
+}
+
+impl<'a> Image<'a> {
+    /// Number of operations.
+    pub fn op_count(&self) -> usize {
+        high(self.head(W_KIND))
+    }
+
+    /// The operations in order.
+    pub fn ops(&self) -> impl Iterator<Item = Op<'a>> + use<'a> {
+        let image = *self;
+        (0..self.op_count()).filter_map(move |i| image.op(i).ok())
+    }
+
+    /// Operation `i`, refused where its record says something impossible. (Within a checked image every record parses.)
+    pub(crate) fn op(&self, i: usize) -> Result<Op<'a>, ImageError> {
+        let op = record(self.words, (self.head(W_OPS) as usize).wrapping_add(i * OP_WORDS))?;
+        let [head, places, lengths, data] = op.map(u32::from_le);
+        let (code, detail, len) = (head as u8, (head >> 8) as u8, high(head));
+        let form = FORMS.get(usize::from(code).wrapping_sub(1)).ok_or(ImageError::Op)?;
+        let [mut src, third] = [form.uses.src, form.uses.third].map(|times| len * usize::from(times));
+        let mut third = Region { offset: high(lengths), len: third };
+        let kind = match form.kind {
+            OpKind::Linear { .. } => {
+                (src, third) = (high(self.word(data as usize)), self.work());
+                OpKind::Linear { accumulate: detail == 1 }
+            }
+            OpKind::Function(_) => OpKind::Function(Function::from_code(detail).ok_or(ImageError::Op)?),
+            kind => kind,
+        };
+        let dst = Region { offset: low(places), len };
+        let src = Region { offset: high(places), len: src };
+        Ok(Op { kind, regions: [dst, src, third], record: op, form, image: self.words })
+    }
+
+    /// Matrices of the image.
+    pub(super) fn matrix_count(&self) -> usize {
+        low(self.head(W_MATRIX_COUNT))
+    }
+
+    /// Offset of matrix record `i`.
+    pub(super) fn matrix_at(&self, i: usize) -> usize {
+        (self.head(W_MATRICES) as usize).wrapping_add(i * MATRIX_WORDS)
+    }
+}

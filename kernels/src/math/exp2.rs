@@ -1,0 +1,53 @@
+//! Powers of two, and of others, as fractions.
+
+use crate::round::ROUND;
+
+/// `2^(y / one)` as a fraction of two positive numbers, for a finite y and a power of two: `one` sets the unit, and changes
+/// nothing else. The exponent stays within -33 ..= 33; there, all functions here have come to their limits as far as f32 tells.
+/// What uses the fraction has to divide anyway.
+///
+/// In units, `y = n + f` with `|f| <= 1/2`. `2^f = (Q + f P) / (Q - f P)`, where `f P / Q` is `tanh(f ln 2 / 2)` with
+/// `P = p0 + p1 f^2` and `Q = q0 + f^2`, fitted for the smallest relative error, 1e-10. `n` is added to the numerator's
+/// exponent. The numbers are between 17 and 25 times `one^2`, and times `2^n` in the numerator.
+#[inline(always)]
+pub(super) fn exp2(y: f32, one: f32) -> (f32, f32) {
+    let [round, p1, p0, q0] = exp2_constants(one);
+    let n = (y + round) - round;
+    let f = y - n;
+    let square = f * f;
+    let p = (p1 * square + p0) * f;
+    let q = square + q0;
+    // With 26 bits behind the point, 6 are left for n: the conversion limits it. The exponent of an f32 begins at bit 23.
+    let n = (n * (FIXED_ONE / one)) as i32 >> 3;
+    (f32::from_bits((q + p).to_bits().wrapping_add(n as u32)), q - p)
+}
+
+/// What rounds in these units, p1, p0 and q0.
+pub(crate) const fn exp2_constants(one: f32) -> [f32; 4] {
+    // 2 more than 1.5 * 2^23, which could be half a unit in the last place of a large y: then the sum would be a tie, and f not
+    // small. (A large positive y whose sum needs a bit more has a large f, but next to the numerator the denominator is nothing.)
+    let round = (ROUND + 2.0) * one;
+    [round, 0.057_690_073 / one, 7.215_289 * one, 20.818_924 * one * one]
+}
+
+/// 1 with 26 bits behind the point.
+pub(super) const FIXED_ONE: f32 = (1 << 26) as f32;
+
+/// Exponents in quarters: no product of an f32 and their factor overflows.
+pub(crate) const QUARTER: f32 = 0.25;
+
+/// The factor of x in the exponent of `e^x`, in quarters.
+pub(crate) const EXP: f32 = core::f32::consts::LOG2_E * QUARTER;
+
+/// `e^x` as a fraction.
+#[inline(always)]
+pub(crate) fn exp_fraction(x: f32) -> (f32, f32) {
+    exp2(x * EXP, QUARTER)
+}
+
+/// `tanh(x)` as a fraction.
+#[inline(always)]
+pub(crate) fn tanh_fraction(x: f32) -> (f32, f32) {
+    let (n, d) = exp2(x * (2.0 * EXP), QUARTER);
+    (n - d, n + d)
+}

@@ -1,0 +1,266 @@
+//! The elementwise functions.
+
+use super::exp2::{EXP, FIXED_ONE, QUARTER, exp_fraction, exp2, tanh_fraction};
+use super::limits::clamp;
+
+/// The elementwise functions of an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Function {
+    /// `max(x, 0)`
+    Relu = 0,
+    /// `x` where positive, else `exp(x) - 1`
+    Elu = 1,
+    /// `x * sigmoid(x)`
+    Silu = 2,
+    /// `x * Phi(x)` with the exact normal distribution
+    Gelu = 3,
+    /// GELU by its tanh approximation, as torch's `approximate="tanh"`
+    GeluTanh = 4,
+    /// Hyperbolic tangent
+    Tanh = 5,
+    /// `1 / (1 + exp(-x))`
+    Sigmoid = 6,
+}
+
+impl Function {
+    /// All functions, in the order of their codes.
+    pub const ALL: [Self; 7] =
+        [Self::Relu, Self::Elu, Self::Silu, Self::Gelu, Self::GeluTanh, Self::Tanh, Self::Sigmoid];
+
+    /// The function of a code in an image.
+    pub fn from_code(code: u8) -> Option<Self> {
+        Self::ALL.get(usize::from(code)).copied()
+    }
+
+    /// The name, as in policy.json.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Relu => "relu",
+            Self::Elu => "elu",
+            Self::Silu => "silu",
+            Self::Gelu => "gelu",
+            Self::GeluTanh => "gelu_tanh",
+            Self::Tanh => "tanh",
+            Self::Sigmoid => "sigmoid",
+        }
+    }
+
+    /// Applies the function to every element.
+    pub fn apply(self, x: &mut [f32]) {
+        match self {
+            Self::Relu => in_pairs(x, |pairs| each(pairs, |[a, b]| [relu(a), relu(b)])),
+            Self::Elu => each_ratio(x, &ELU),
+            Self::Silu => each(x, silu),
+            Self::Gelu => in_pairs(x, |pairs| each(pairs, |[a, b]| [gelu(a), gelu(b)])),
+            Self::GeluTanh => each(x, gelu_tanh),
+            Self::Tanh => each_ratio(x, &TANH),
+            Self::Sigmoid => each_ratio(x, &SIGMOID),
+        }
+    }
+}
+
+/// One loop for each function, which is not inlined: the functions take most of the executor's code.
+#[inline(never)]
+fn each<T: Copy>(x: &mut [T], function: impl Fn(T) -> T) {
+    for x in x {
+        *x = function(*x);
+    }
+}
+
+/// Two elements in a pass, where the instructions of the loop count; `each` is called once more for an odd one.
+#[inline(never)]
+fn in_pairs(x: &mut [f32], each: fn(&mut [[f32; 2]])) {
+    let (odd, pairs) = x.as_rchunks_mut::<2>();
+    if let [odd] = odd {
+        let mut pair = [[*odd; 2]];
+        each(&mut pair);
+        *odd = pair[0][0];
+    }
+    each(pairs);
+}
+
+/// `(n - a d) / (b n + d)` with `n / d = e^x` or another power, and x itself above `end`.
+struct Ratio {
+    factor: f32,
+    a: f32,
+    b: f32,
+    end: f32,
+}
+
+const ELU: Ratio = Ratio { factor: EXP, a: 1.0, b: 0.0, end: 0.0 };
+const TANH: Ratio = Ratio { factor: 2.0 * EXP, a: 1.0, b: 1.0, end: f32::INFINITY };
+const SIGMOID: Ratio = Ratio { factor: EXP, a: 0.0, b: 1.0, end: f32::INFINITY };
+
+impl Ratio {
+    #[inline(always)]
+    fn of(&self, x: f32) -> f32 {
+        if x > self.end {
+            return x;
+        }
+        let (n, d) = exp2(x * self.factor, QUARTER);
+        (n - self.a * d) / (self.b * n + d)
+    }
+}
+
+/// One loop for the functions that are such a ratio.
+#[inline(never)]
+fn each_ratio(x: &mut [f32], ratio: &Ratio) {
+    for x in x {
+        *x = ratio.of(*x);
+    }
+}
+
+/// `e^x`, for an x limited to -22 ..= 22.
+#[inline(always)]
+pub fn exp(x: f32) -> f32 {
+    let (n, d) = exp_fraction(clamp(x, -22.0, 22.0));
+    n / d
+}
+
+/// `max(x, 0)`; what is not finite stays as it is, so that an overflow is seen behind it. By the bits, as a signed number:
+/// finite negative numbers stand below minus infinity, which stands below all else.
+#[inline(always)]
+pub fn relu(x: f32) -> f32 {
+    let bits = x.to_bits() as i32;
+    f32::from_bits(if bits < f32::NEG_INFINITY.to_bits() as i32 { 0 } else { bits as u32 })
+}
+
+/// `x` where positive, else `exp(x) - 1`
+#[inline(always)]
+pub fn elu(x: f32) -> f32 {
+    ELU.of(x)
+}
+
+/// `1 / (1 + exp(-x))`
+#[inline(always)]
+pub fn sigmoid(x: f32) -> f32 {
+    let (n, d) = exp_fraction(x);
+    n / (n + d)
+}
+
+/// `(e - 1) / (e + 1)` with `e = exp(2 x)`
+#[inline(always)]
+pub fn tanh(x: f32) -> f32 {
+    let (n, d) = tanh_fraction(x);
+    n / d
+}
+
+/// `x * sigmoid(x)`
+#[inline(always)]
+pub fn silu(x: f32) -> f32 {
+    x * sigmoid(x)
+}
+
+/// `max(x, 0) - a * tail(a)` with `a = |x|`, where `tail = 1 - Phi` is `p^8`, a power of a polynomial that was fitted for the
+/// smallest error of `a * tail / max(1, a)`, 5e-8. From 5.5 on, `a * tail` is below 1.1e-7 and stays what it is there. The code
+/// takes half of `a`, whose double is in `p^8`.
+#[inline(always)]
+pub fn gelu(x: f32) -> f32 {
+    const END: f32 = 5.5 / 2.0;
+    let half = 0.5 * x;
+    let a = half.abs();
+    // max(x, 0) without a comparison.
+    let positive = half + a;
+    let a = if a > END { END } else { a };
+    let p = 4.969_945e-4;
+    let p = p * a - 2.747_417_2e-3;
+    let p = p * a - 8.232_198e-4;
+    let p = p * a + 2.781_584_9e-2;
+    let p = p * a - 6.546_224e-3;
+    let p = p * a - 0.139_111_97;
+    let p = p * a - 0.199_487_34;
+    let p = p * a + 1.000_000_6;
+    let p = p * p;
+    let p = p * p;
+    positive - p * p * a
+}
+
+/// `x * sigmoid(2 u)` with `u = sqrt(2 / pi) (x + 0.044715 x^3)`, which is `x / 2 * (1 + tanh(u))`.
+#[inline(always)]
+pub fn gelu_tanh(x: f32) -> f32 {
+    // The factors of x and x^3 in 2 u log2(e).
+    let y = x * (2.302_208_2 * FIXED_ONE + 0.102_943_24 * FIXED_ONE * (x * x));
+    // As an integer, it is limited to -32 ..= 32: the cube of a large x is not finite.
+    let (n, d) = exp2(y as i32 as f32, FIXED_ONE);
+    x * (n / (n + d))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn worst(range: f64, f: fn(f32) -> f32, exact: impl Fn(f64) -> f64, scale: impl Fn(f64) -> f64) -> f64 {
+        let n = 1 << 20;
+        (0..=n)
+            .map(|i| ((i as f64 / n as f64 * 2.0 - 1.0) * range) as f32)
+            .map(|x| (f64::from(f(x)) - exact(f64::from(x))).abs() / scale(f64::from(x)))
+            .fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn errors_stay_within_the_stated_bounds() {
+        let sig = |x: f64| 1.0 / (1.0 + (-x).exp());
+        let size = |x: f64| x.abs().max(1.0);
+        let one = |_: f64| 1.0;
+        // 2 sqrt(2 / pi)
+        let u = |x: f64| 1.595_769_121_605_731 * (x + 0.044715 * x.powi(3));
+        assert!(worst(21.0, exp, f64::exp, |x| x.exp() * size(x)) < 2.2e-7);
+        // Near zero, where the functions bend, beyond their limits, and far beyond.
+        for range in [1.0, 8.0, 40.0, 1e4, 1e30] {
+            assert!(worst(range, sigmoid, sig, one) < 1.1e-7);
+            assert!(worst(range, tanh, f64::tanh, one) < 1.5e-7);
+            assert!(worst(range, elu, |x| if x > 0.0 { x } else { x.exp_m1() }, one) < 1.2e-7);
+            assert!(worst(range, silu, |x| x * sig(x), size) < 1.4e-7);
+            assert!(worst(range, gelu_tanh, |x| x * sig(u(x)), size) < 1.4e-7);
+            // 0.5 erfc(-x / sqrt 2) by libm in f64, which is exact at this scale.
+            assert!(worst(range, gelu, |x| x * 0.5 * libm::erfc(-x / 2f64.sqrt()), size) < 1.8e-7);
+        }
+    }
+
+    /// Without the limit of the exponent, huge inputs would go wrong in many ways.
+    #[test]
+    fn every_magnitude_has_a_sensible_value() {
+        for bits in (0..0x7f80_0000u32).step_by(4001) {
+            let x = f32::from_bits(bits);
+            for x in [x, -x] {
+                let sign = if x > 0.0 { 1.0 } else { 0.0 };
+                assert!((0.0..=1.0).contains(&sigmoid(x)) && (-1.0..=1.0).contains(&tanh(x)), "{x}");
+                assert!(
+                    x.abs() < 50.0 || (sigmoid(x) - sign).abs() < 1e-9 && (tanh(x) + 1.0 - 2.0 * sign) == 0.0,
+                    "{x}"
+                );
+                for f in [elu, silu, gelu, gelu_tanh] {
+                    assert!((f(x) - x * sign).abs() <= 1f32.max(1e-7 * x.abs()), "{x}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn loops_have_the_bits_of_their_functions() {
+        let functions = [relu, elu, silu, gelu, gelu_tanh, tanh, sigmoid];
+        let x: [f32; 999] = core::array::from_fn(|i| (i as f32 - 499.0) / 31.0);
+        for (function, of) in Function::ALL.into_iter().zip(functions) {
+            let mut y = x;
+            function.apply(&mut y);
+            assert_eq!(y.map(f32::to_bits), x.map(|x| of(x).to_bits()), "{}", function.name());
+        }
+    }
+
+    #[test]
+    fn not_a_number_stays_so() {
+        for f in [exp, elu, sigmoid, tanh, silu, gelu, gelu_tanh] {
+            assert!(f(f32::NAN).is_nan() && f(-f32::NAN).is_nan());
+        }
+    }
+
+    #[test]
+    fn extremes_are_finite() {
+        for x in [f32::MAX, f32::MIN, 1e-40, -0.0, 0.0] {
+            for f in [exp, relu, elu, sigmoid, tanh, silu, gelu, gelu_tanh] {
+                assert!(f(x).is_finite(), "{x}");
+            }
+        }
+    }
+}

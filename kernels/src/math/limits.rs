@@ -1,0 +1,20 @@
+//! Limits, and what lies beyond them.
+
+/// `x` limited to `low ..= high`; without the panic of `f32::clamp`.
+#[inline(always)]
+pub fn clamp(x: f32, low: f32, high: f32) -> f32 {
+    if x < low {
+        low
+    } else if x > high {
+        high
+    } else {
+        x
+    }
+}
+
+/// 0 where `x` is finite, else NaN: added to a result, it shows what would be lost in it.
+#[inline(always)]
+#[expect(clippy::eq_op, reason = "the difference of an infinity and itself is NaN")]
+pub(crate) fn zero_or_nan(x: f32) -> f32 {
+    x - x
+}

@@ -1,0 +1,49 @@
+//! Operations on the elements of vectors.
+
+use crate::arch;
+use crate::math::{clamp, zero_or_nan};
+
+/// `y = clamp((clamp(x, ±pre_clip) - mean) * scale, ±clip)`; an infinite clip does nothing. `mean` and `scale` hold f32 bits. An
+/// x that is not finite gives NaN.
+#[inline(never)]
+pub fn normalize(x: &[f32], mean: &[u32], scale: &[u32], pre_clip: f32, clip: f32, y: &mut [f32]) {
+    for (((y, x), &mean), &scale) in y.iter_mut().zip(x).zip(mean).zip(scale) {
+        // A clip would hide that a value before it has left f32's range.
+        let zero = zero_or_nan(*x);
+        let x = clamp(*x, -pre_clip, pre_clip);
+        let z = (x - (constant(mean) + zero)) * constant(scale);
+        *y = clamp(z, -clip, clip);
+    }
+}
+
+/// `y += x`, as far as both go.
+#[inline(never)]
+pub fn add(x: &[f32], y: &mut [f32]) {
+    let len = x.len().min(y.len());
+    let ((x, xs), (y, ys)) = (x[..len].as_rchunks::<2>(), y[..len].as_rchunks_mut::<2>());
+    if let ([y], [x]) = (y, x) {
+        *y += *x;
+    }
+    for (y, x) in ys.iter_mut().zip(xs) {
+        *y = [y[0] + x[0], y[1] + x[1]];
+    }
+}
+
+/// `to = from`, as far as both go. On the target not by memcpy, which takes as much code as a kernel.
+pub(crate) fn copy(from: &[u32], to: &mut [u32]) {
+    arch::copy(from, to);
+}
+
+/// As [`copy`], of words as they stand in the image.
+pub(crate) fn copy_le(from: &[u32], to: &mut [u32]) {
+    copy(from, to);
+    if cfg!(target_endian = "big") {
+        to.iter_mut().for_each(|word| *word = u32::from_le(*word));
+    }
+}
+
+/// An f32 constant as it stands in the image.
+#[inline(always)]
+pub(super) fn constant(bits: u32) -> f32 {
+    f32::from_bits(u32::from_le(bits))
+}

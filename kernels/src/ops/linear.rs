@@ -1,0 +1,198 @@
+//! A quantized matrix times a vector, from f32 to f32: the order of operations that every machine follows.
+//!
+//! 1. `x` is quantized to integers `q` with one scale ([`crate::x::Scale`]).
+//! 2. Per row, the integer sum `acc = sum_g s_g * sum_c level * q` in int32 ([`crate::arch::gemv`]).
+//! 3. `y = start + acc * (row_scale * x_scale)`, each operation rounded to f32, where `start` is the bias, or, where the
+//!    operation accumulates, the sum of the old `y` and the bias. Rows that no block holds (0 bits) keep `start`.
+
+use core::ops::Range;
+
+use super::elementwise::copy_le;
+use crate::arch;
+use crate::arch::gemv;
+use crate::cursor::LinearCursor;
+use crate::error::Fault;
+use crate::image::header::BLOCK_WORDS;
+use crate::image::{Matrix, RowBlock, row_block};
+use crate::layout::half::bf16;
+use crate::layout::{QUAD, STRIP};
+use crate::meter::{Meter, RUN, Start, Work};
+use crate::x::{Plan, Prepared, Scale};
+
+/// `len` of the outputs from `first` on, with their biases if there are any; `None` where there are too few.
+#[inline(always)]
+fn outputs<'y>(
+    first: usize,
+    len: usize,
+    start: Option<&'y [u32]>,
+    y: &'y mut [f32],
+) -> Option<(Option<&'y [u32]>, &'y mut [f32])> {
+    let start = match start {
+        Some(start) => Some(start.get(first..)?.get(..len)?),
+        None => None,
+    };
+    Some((start, y.get_mut(first..)?.get_mut(..len)?))
+}
+
+impl RowBlock<'_> {
+    /// `y = start + acc * (row_scale * x_scale)` for the block's rows and their places in `y`, with a vector that was prepared
+    /// for the block. `start` holds the bits of the whole output's biases; without it, and for rows with an index, y itself is
+    /// the start. `None` where `start` or `y` is too short.
+    pub fn apply(&self, x: &Prepared<'_>, x_scale: Scale, start: Option<&[u32]>, y: &mut [f32]) -> Option<()> {
+        self.apply_rows(0..self.block.shape().rows, x, x_scale, start, y)
+    }
+
+    /// As [`Self::apply`], for a run of the block's rows, which starts at a multiple of [`STRIP`] and ends at another or with
+    /// the block.
+    pub(crate) fn apply_rows(
+        &self,
+        rows: Range<usize>,
+        x: &Prepared<'_>,
+        x_scale: Scale,
+        start: Option<&[u32]>,
+        y: &mut [f32],
+    ) -> Option<()> {
+        let x_scale = x_scale.get();
+        if start.is_none() || !self.index.is_empty() {
+            return self.apply_runs(&mut [0; RUN], rows, x, x_scale, start, y);
+        }
+        // Rows in order have room for their sums in y itself, except those of a last strip that padding fills.
+        let whole = if rows.end.is_multiple_of(QUAD) { rows.end } else { rows.end & !(STRIP - 1) };
+        if rows.start < whole {
+            let first = self.first_row + rows.start;
+            let (start, y) = outputs(first, whole - rows.start, start, y)?;
+            gemv(&self.block, x, rows.start, bytemuck::must_cast_slice_mut(y)).ok()?;
+            self.scale_in_order(rows.start, None, x_scale, start, y);
+        }
+        if whole < rows.end {
+            self.apply_runs(&mut [0; STRIP], whole..rows.end, x, x_scale, start, y)?;
+        }
+        Some(())
+    }
+
+    /// As [`Self::apply_rows`], as many rows at once as have room in `sums`.
+    #[inline(never)]
+    fn apply_runs(
+        &self,
+        sums: &mut [i32],
+        rows: Range<usize>,
+        x: &Prepared<'_>,
+        x_scale: f32,
+        start: Option<&[u32]>,
+        y: &mut [f32],
+    ) -> Option<()> {
+        let mut first = rows.start;
+        while first < rows.end {
+            let run = sums.len().min(rows.end.next_multiple_of(QUAD) - first);
+            let sums = sums.get_mut(..run)?;
+            gemv(&self.block, x, first, sums).ok()?;
+            let sums = sums.get(..rows.end - first).unwrap_or(sums);
+            if self.index.is_empty() {
+                let (start, y) = outputs(self.first_row + first, sums.len(), start, y)?;
+                self.scale_in_order(first, Some(sums), x_scale, start, y);
+            } else {
+                self.scale_by_index(first, sums, x_scale, y)?;
+            }
+            first += sums.len();
+        }
+        Some(())
+    }
+
+    /// Turns the sums of as many rows as `y` has, from `first` on, into results. What is `None` stands in y itself.
+    fn scale_in_order(&self, first: usize, sums: Option<&[i32]>, x_scale: f32, start: Option<&[u32]>, y: &mut [f32]) {
+        arch::scale(sums, start, self.scales.get(first / 2..).unwrap_or(&[]), x_scale, y);
+    }
+
+    /// Adds the sums of the rows from `first` on, scaled, to what stands at the rows' places; `None` where there is no such place.
+    #[inline(never)]
+    fn scale_by_index(&self, first: usize, sums: &[i32], x_scale: f32, y: &mut [f32]) -> Option<()> {
+        let halves = |words| bytemuck::must_cast_slice::<u32, u16>(words).get(first..first + sums.len());
+        let (scales, index) = (halves(self.scales)?, halves(self.index)?);
+        for ((sum, scale), at) in sums.iter().zip(scales).zip(index) {
+            *y.get_mut(usize::from(u16::from_le(*at)))? += *sum as f32 * (bf16(u16::from_le(*scale)) * x_scale);
+        }
+        Some(())
+    }
+}
+
+impl Matrix<'_> {
+    /// `y = W x + b`, or `y = y + b + W x` where `accumulate`, from where `at` stands and as far as the budget reaches; true when
+    /// all is done. `work` holds at least [`Self::prepared_words`] words; `x` and `y` have the matrix's lengths.
+    #[inline(never)]
+    pub(crate) fn resume(
+        &self,
+        at: &mut LinearCursor,
+        budget: &mut impl Meter,
+        x: &[f32],
+        work: &mut [u32],
+        y: &mut [f32],
+        accumulate: bool,
+    ) -> Result<bool, Fault> {
+        if x.len() != self.cols || y.len() != self.rows {
+            return Err(Fault::Damaged);
+        }
+        let x_scale = match at.scale {
+            Some(scale) => scale,
+            None if budget.take(1, Work::Magnitude(self.cols)) == 0 => return Ok(false),
+            None => *at.scale.insert(Scale::new(x, self.x_max)?),
+        };
+        // One pass over the output where every row has its bias and is written once, in order.
+        let start = self.start_values(accumulate);
+        if start.is_none() && at.started < y.len() {
+            let work = Work::Start(Start::of(accumulate, !self.bias.is_empty()));
+            let end = at.started + budget.take(y.len() - at.started, work);
+            self.start(at.started..end, y, accumulate);
+            at.started = end;
+            if end < y.len() {
+                return Ok(false);
+            }
+        }
+        let mut plan: Option<Plan> = None;
+        let mut first_row = 0;
+        for (i, record) in self.records.as_chunks::<BLOCK_WORDS>().0.iter().enumerate() {
+            let rows = row_block(self, record, first_row);
+            let rows = rows.as_ref().map_err(|_| Fault::Damaged)?;
+            let shape = rows.block.shape();
+            first_row += shape.rows;
+            if i < at.block {
+                continue;
+            }
+            // Layouts prepare the activations differently; the blocks of one width share them.
+            if !plan.as_ref().is_some_and(|plan| plan.fits(shape)) {
+                let plan = plan.insert(Plan::of(&rows.block));
+                if at.prepared != Some(shape.width) {
+                    if budget.take(1, Work::Prepare(shape)) == 0 {
+                        return Ok(false);
+                    }
+                    at.prepared = Some(shape.width);
+                    x_scale.quantize(x, plan, work).ok_or(Fault::Damaged)?;
+                }
+            }
+            let x = plan.as_ref().and_then(|plan| Prepared::new(work, plan)).ok_or(Fault::Damaged)?;
+            let work = Work::Strips { shape, in_order: rows.index.is_empty(), start: start.is_some() };
+            let strips = budget.take((shape.rows - at.row).div_ceil(STRIP), work);
+            let end = shape.rows.min(at.row + strips * STRIP);
+            rows.apply_rows(at.row..end, &x, x_scale, start, y).ok_or(Fault::Damaged)?;
+            at.row = end;
+            if end < shape.rows {
+                return Ok(false);
+            }
+            at.block += 1;
+            at.row = 0;
+        }
+        Ok(true)
+    }
+
+    /// Sets outputs to their biases, or adds these.
+    fn start(&self, outputs: Range<usize>, y: &mut [f32], accumulate: bool) {
+        let bias = self.bias.get(outputs.clone()).unwrap_or(&[]);
+        let Some(y) = y.get_mut(outputs) else { return };
+        if accumulate {
+            y.iter_mut().zip(bias).for_each(|(y, bias)| *y += f32::from_bits(u32::from_le(*bias)));
+        } else if bias.is_empty() {
+            y.fill(0.0);
+        } else {
+            copy_le(bias, bytemuck::must_cast_slice_mut(y));
+        }
+    }
+}

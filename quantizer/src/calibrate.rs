@@ -1,0 +1,7 @@
+//! What is learned of a network from recorded observations, before anything is quantized.
+
+pub mod fisher;
+pub mod hsic;
+pub mod moments;
+pub mod sensitivity;
+pub mod windows;

@@ -1,0 +1,237 @@
+//! Stage 2 of ActQuant: the importance of every weight, by the Fisher information of the action loss.
+
+use anyhow::{Context, Result};
+use ndarray::{Array2, Axis, Zip, linalg::general_mat_mul};
+
+use crate::data::Dataset;
+use crate::graph::{Graph, Network, Pass, Weights, start_state, zero_state};
+use crate::random::Random;
+
+/// Steps that a recurrent network's gradient runs back.
+const WINDOW: usize = 16;
+
+/// Frames whose gradient is taken, at most; evenly spaced.
+const SAMPLES: usize = 4096;
+
+/// An output that is off its record by less than this share of the dimension's standard deviation counts as equal.
+const EQUAL: f32 = 1e-3;
+
+/// The mean over frames of `(dL/dw)^2` for every weight, `L = sum over d of |y_d - t_d|`, as `[rows, cols]` per matrix: the
+/// action-mixed Fisher information of ActQuant (arXiv 2605.24011) at alpha = 1, that is, without a token loss.
+///
+/// `dL/dy_d` is the sign of `y_d - t_d`. Recorded actions are mostly the policy's own, where `L` has its kink: there the sign is
+/// random, both with equal probability (of a fixed seed), whose square has the expectation `sum over d of (dy_d/dw)^2`.
+///
+/// A recurrent network's gradient is truncated: episodes are run from their starting state, cut into windows of 16 steps, and
+/// each window's last frame is one sample whose gradient runs back to the start of the window. Shorter rests are left out. All
+/// else is exact: contributions of several steps or uses are summed before they are squared.
+///
+/// `progress` gets the share done.
+pub fn importance(graph: &Graph, dataset: &Dataset, mut progress: impl FnMut(f64)) -> Result<Vec<Array2<f32>>> {
+    let weights = Weights::of(graph);
+    let network = Network::new(graph);
+    let recurrent = graph.state_len() > 0;
+    let longest = dataset.length.iter().copied().max().unwrap_or(0);
+    let window = if recurrent { WINDOW.min(longest) } else { 1 };
+    let every = (dataset.frames() / window.max(1)).div_ceil(SAMPLES).max(1);
+    let equal = deviations(dataset).context("array \"action\" is missing")?.map(|d| EQUAL * d);
+
+    let mut alive: Vec<usize> = (0..dataset.length.len()).collect();
+    let starts: Vec<_> = alive.iter().map(|&episode| dataset.start(episode)).collect();
+    let mut state = start_state(graph, &starts);
+    let mut fisher = weights.zeros_like().matrices;
+    // The gradients themselves are not asked for, but the backward pass adds to them.
+    let mut unused = weights.zeros_like();
+    let mut random = Random(0);
+    let mut samples = 0;
+    for (index, start) in (0..longest).step_by(window.max(1)).enumerate() {
+        let staying: Vec<usize> = (0..alive.len()).filter(|&i| dataset.length[alive[i]] >= start + window).collect();
+        if staying.is_empty() {
+            break;
+        }
+        alive = staying.iter().map(|&i| alive[i]).collect();
+        for array in state.iter_mut().flatten() {
+            *array = array.select(Axis(0), &staying);
+        }
+        let passes: Vec<Pass> = (start..start + window)
+            .map(|step| network.forward(&weights, rows(&dataset.obs, &alive, step), &mut state))
+            .collect();
+        if index % every == 0 {
+            let output = passes[passes.len() - 1].output();
+            let recorded =
+                rows(dataset.action.as_ref().context("array \"action\" is missing")?, &alive, start + window - 1);
+            let sign = Array2::from_shape_fn(output.raw_dim(), |at| {
+                let difference = output[at] - recorded[at];
+                if difference.abs() > equal[at.1] { difference.signum() } else { random.sign() }
+            });
+            add_squares(&network, &weights, &passes, sign, &mut unused, &mut fisher);
+            samples += alive.len();
+        }
+        progress((start + window) as f64 / longest as f64);
+    }
+    for matrix in &mut fisher {
+        *matrix /= samples.max(1) as f32;
+    }
+    Ok(fisher)
+}
+
+/// Runs back from the last of `passes` and adds each sample's squared gradient to `fisher`.
+fn add_squares(
+    network: &Network<'_>,
+    weights: &Weights,
+    passes: &[Pass],
+    d_output: Array2<f32>,
+    unused: &mut Weights,
+    fisher: &mut [Array2<f32>],
+) {
+    let batch = d_output.nrows();
+    let mut d_state = zero_state(network.graph, batch);
+    // Per matrix: the gradient at the output and the input of each use.
+    let mut uses: Vec<Vec<(Array2<f32>, &Array2<f32>)>> = vec![Vec::new(); fisher.len()];
+    let silent = Array2::zeros(d_output.raw_dim());
+    let mut d_output = Some(d_output);
+    for pass in passes.iter().rev() {
+        let d_output = d_output.take().unwrap_or_else(|| silent.clone());
+        network.backward(weights, pass, d_output, &mut d_state, unused, &mut |matrix, node, product, dy| {
+            if let (true, Some(x)) = (dy.iter().any(|d| *d != 0.0), pass.operand(node, product)) {
+                uses[matrix].push((dy.clone(), x));
+            }
+        });
+    }
+    for (uses, fisher) in uses.iter().zip(fisher) {
+        match &uses[..] {
+            [] => {}
+            // The square of an outer product is the outer product of the squares.
+            [(dy, x)] => general_mat_mul(1.0, &dy.mapv(|d| d * d).t(), &x.mapv(|x| x * x), 1.0, fisher),
+            many => {
+                for sample in 0..batch {
+                    let steps: Vec<_> = many.iter().map(|(dy, x)| (dy.row(sample), x.row(sample))).collect();
+                    let dy = Array2::from_shape_fn((steps.len(), fisher.nrows()), |(t, r)| steps[t].0[r]);
+                    let x = Array2::from_shape_fn((steps.len(), fisher.ncols()), |(t, c)| steps[t].1[c]);
+                    Zip::from(&mut *fisher).and(&dy.t().dot(&x)).for_each(|sum, d| *sum += d * d);
+                }
+            }
+        }
+    }
+}
+
+/// One step of the chosen episodes, `[episode, value]`.
+fn rows(array: &ndarray::Array3<f32>, episodes: &[usize], step: usize) -> Array2<f32> {
+    array.index_axis(Axis(1), step).select(Axis(0), episodes).as_standard_layout().into_owned()
+}
+
+/// The standard deviation of every dimension of the recorded actions.
+fn deviations(dataset: &Dataset) -> Option<ndarray::Array1<f32>> {
+    let width = dataset.action.as_ref()?.dim().2;
+    let mut sums = vec![(0f64, 0f64); width];
+    for (episode, &length) in dataset.length.iter().enumerate() {
+        for step in 0..length {
+            for ((sum, square), a) in sums.iter_mut().zip(dataset.action_at(episode, step)?) {
+                *sum += f64::from(a);
+                *square += f64::from(a).powi(2);
+            }
+        }
+    }
+    let n = dataset.frames().max(1) as f64;
+    Some(sums.iter().map(|(sum, square)| (square / n - (sum / n).powi(2)).max(0.0).sqrt() as f32).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::methods::actquant::testing::{dataset, lstm, mlp};
+
+    /// The sum over the recorded dimensions of the action error's magnitude at the last frame of a window.
+    fn loss(
+        graph: &Graph,
+        weights: &Weights,
+        dataset: &Dataset,
+        episode: usize,
+        window: std::ops::Range<usize>,
+    ) -> f64 {
+        let network = Network::new(graph);
+        let mut state = start_state(graph, &[dataset.start(episode)]);
+        let mut sum = 0.0;
+        for step in 0..window.end {
+            let pass = network.forward(weights, rows(&dataset.obs, &[episode], step), &mut state);
+            let recorded = dataset.action_at(episode, step).expect("actions");
+            sum = pass.output().iter().zip(recorded).map(|(y, t)| f64::from((y - t).abs())).sum();
+        }
+        sum
+    }
+
+    fn compare(graph: &Graph, steps: usize, window: usize, state: Option<Array2<f32>>) {
+        // Recorded actions far from the policy's own: no kink nearby, no random signs.
+        let mut dataset = Dataset { state, ..dataset(graph, 2, steps) };
+        let action = dataset.action.as_mut().expect("actions");
+        action.indexed_iter_mut().for_each(|((e, s, d), a)| *a += if (e + s + d) % 3 == 0 { 3.0 } else { -4.0 });
+        let found = importance(graph, &dataset, |_| {}).expect("importance");
+        let weights = Weights::of(graph);
+        let step = 4e-3;
+        for (m, found) in found.iter().enumerate() {
+            for (at, exact) in found.indexed_iter().map(|(at, v)| (at, f64::from(*v))) {
+                let mut expected = 0.0;
+                let mut samples = 0.0;
+                for episode in 0..2 {
+                    for start in (0..=steps - window).step_by(window) {
+                        let moved = |d: f32| {
+                            let mut moved = weights.clone();
+                            moved.matrices[m][at] += d;
+                            loss(graph, &moved, &dataset, episode, start..start + window)
+                        };
+                        expected += ((moved(step) - moved(-step)) / (2.0 * f64::from(step))).powi(2);
+                        samples += 1.0;
+                    }
+                }
+                expected /= samples;
+                assert!((exact - expected).abs() < 2e-3 + 0.02 * expected, "{m} {at:?}: {exact} against {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn agrees_with_finite_differences() {
+        compare(&mlp(), 3, 1, None);
+        // One window from the start, which is zero or recorded: nothing is truncated.
+        compare(&lstm(), 5, 5, None);
+        let state = Array2::from_shape_fn((2, 6), |(e, v)| 0.8 - 0.25 * (v + e) as f32);
+        compare(&lstm(), 5, 5, Some(state));
+    }
+
+    #[test]
+    fn random_signs_give_the_sum_of_the_outputs_squares() {
+        let graph = mlp();
+        // Many times the same observation, actions equal to the policy's own. They do not deviate, so even a last bit would count
+        // as a difference: they come from the very pass that they are compared with.
+        let mut dataset = dataset(&graph, 1, 1);
+        let weights = Weights::of(&graph);
+        let network = Network::new(&graph);
+        let pass = network.forward(&weights, rows(&dataset.obs, &[0], 0), &mut zero_state(&graph, 1));
+        dataset.action = Some(pass.output().clone().insert_axis(Axis(0)));
+        for array in [Some(&mut dataset.obs), dataset.action.as_mut()].into_iter().flatten() {
+            *array = ndarray::concatenate(Axis(1), &vec![array.view(); 4000]).expect("same shapes");
+        }
+        dataset.length = vec![4000];
+        let found = importance(&graph, &dataset, |_| {}).expect("importance");
+        let mut expected = Array2::<f32>::zeros(found[0].raw_dim());
+        for d in 0..2 {
+            let mut grads = weights.zeros_like();
+            let unit = Array2::from_shape_fn((1, 2), |(_, k)| if k == d { 1.0 } else { 0.0 });
+            network.backward(&weights, &pass, unit, &mut zero_state(&graph, 1), &mut grads, &mut |_, _, _, _| {});
+            expected += &grads.matrices[0].mapv(|g| g * g);
+        }
+        let largest = expected.iter().copied().fold(0.0, f32::max);
+        for (found, expected) in found[0].iter().zip(&expected) {
+            assert!((found - expected).abs() < 0.05 * largest, "{found} against {expected}");
+        }
+    }
+
+    #[test]
+    fn episodes_of_different_lengths_are_taken_as_far_as_they_go() {
+        let graph = lstm();
+        let mut dataset = dataset(&graph, 3, 40);
+        dataset.length = vec![40, 7, 20];
+        let found = importance(&graph, &dataset, |_| {}).expect("importance");
+        assert!(found.iter().all(|m| m.iter().all(|v| v.is_finite()) && m.sum() > 0.0));
+    }
+}

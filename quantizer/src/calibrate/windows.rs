@@ -1,0 +1,148 @@
+//! Batches of recorded observations: single frames for a feed-forward network, windows with the f32 network's own state at
+//! their start for a recurrent one.
+
+use ndarray::{Array2, Axis};
+
+use crate::data::Dataset;
+use crate::graph::{Graph, Network, State, Weights, start_state, zero_state};
+use crate::random::Random;
+
+/// Steps of a window of a recurrent network.
+const WINDOW: usize = 64;
+/// Share of the windows that start from the zero state wherever they stand.
+const FROM_ZERO: f32 = 0.15;
+/// Standard deviation of the noise on the inputs, in units of each input's own.
+const NOISE: f32 = 0.05;
+/// Largest share of the difference of two random observations that is added to an input.
+const MIX: f32 = 0.5;
+
+/// A batch: observations of each step, and the state before the first.
+#[derive(Debug)]
+pub struct Batch {
+    /// `[sample, element]` for each step.
+    pub steps: Vec<Array2<f32>>,
+    /// State before the first step.
+    pub state: State,
+}
+
+/// The f32 network and its recorded observations.
+#[derive(Debug)]
+pub struct Windows<'a> {
+    /// The f32 network.
+    pub graph: &'a Graph,
+    /// Its weights.
+    pub weights: Weights,
+    /// Valid observations of each episode, `[step, element]`.
+    episodes: Vec<Array2<f32>>,
+    /// State before each step of each episode, one row a step; empty for a feed-forward network.
+    states: Vec<State>,
+    /// Standard deviation of each observation value.
+    deviation: Vec<f32>,
+    /// Variance of each output of the f32 network over the recording.
+    pub output_variance: Vec<f32>,
+    /// Steps of a window.
+    pub window: usize,
+}
+
+impl<'a> Windows<'a> {
+    /// Runs the f32 network over the recording.
+    pub fn new(graph: &'a Graph, dataset: &Dataset) -> Self {
+        let weights = Weights::of(graph);
+        let network = Network::new(graph);
+        let recurrent = graph.state_len() > 0;
+        let mut episodes = Vec::new();
+        let mut states = Vec::new();
+        let mut outputs = Vec::new();
+        for (e, &length) in dataset.length.iter().enumerate().filter(|(_, n)| **n > 0) {
+            let rows: Vec<f32> = dataset.episode(e).flatten().collect();
+            let episode = Array2::from_shape_vec((length, graph.obs_len), rows).unwrap_or_default();
+            if recurrent {
+                let mut state = start_state(graph, &[dataset.start(e)]);
+                let mut kept = zero_state(graph, length);
+                for (t, obs) in episode.axis_chunks_iter(Axis(0), 1).enumerate() {
+                    for (kept, now) in kept.iter_mut().flatten().zip(state.iter().flatten()) {
+                        if now.ncols() > 0 {
+                            kept.row_mut(t).assign(&now.row(0));
+                        }
+                    }
+                    outputs.push(network.forward(&weights, obs.to_owned(), &mut state).output().clone());
+                }
+                states.push(kept);
+            } else {
+                let mut state = zero_state(graph, length);
+                outputs.push(network.forward(&weights, episode.clone(), &mut state).output().clone());
+            }
+            episodes.push(episode);
+        }
+        let deviation = column_variances(&episodes).into_iter().map(f32::sqrt).collect();
+        let shortest = episodes.iter().map(Array2::nrows).min().unwrap_or(1);
+        let window = if recurrent { WINDOW.min(shortest) } else { 1 };
+        Self { graph, weights, states, deviation, output_variance: column_variances(&outputs), episodes, window }
+    }
+
+    /// Whether steps depend on each other.
+    pub fn recurrent(&self) -> bool {
+        !self.states.is_empty()
+    }
+
+    fn row(&self, random: &mut Random) -> ndarray::ArrayView1<'_, f32> {
+        let episode = &self.episodes[random.below(self.episodes.len())];
+        episode.row(random.below(episode.nrows()))
+    }
+
+    /// A batch of `size` windows. Where `widened`, noise and differences of observations take the inputs off the recorded
+    /// ones.
+    pub fn batch(&self, size: usize, widened: bool, random: &mut Random) -> Batch {
+        let mut steps = vec![Array2::zeros((size, self.graph.obs_len)); self.window];
+        let mut state = zero_state(self.graph, size);
+        for sample in 0..size {
+            let e = random.below(self.episodes.len());
+            let start = random.below(self.episodes[e].nrows() + 1 - self.window);
+            let mut shift = vec![0.0; self.graph.obs_len];
+            // Half of the samples keep their place.
+            let share = MIX * random.unit().max(0.0);
+            if widened && share > 0.0 {
+                let (a, b) = (self.row(random), self.row(random));
+                shift.iter_mut().zip(a.iter().zip(b)).for_each(|(s, (a, b))| *s = share * (a - b));
+            }
+            for (t, step) in steps.iter_mut().enumerate() {
+                let recorded = self.episodes[e].row(start + t);
+                for (i, (x, recorded)) in step.row_mut(sample).iter_mut().zip(recorded).enumerate() {
+                    let noise = if widened { NOISE * self.deviation[i] * random.normal() } else { 0.0 };
+                    *x = recorded + shift[i] + noise;
+                }
+            }
+            let from_zero = widened && random.unit() * 0.5 + 0.5 < FROM_ZERO;
+            if let (Some(states), false) = (self.states.get(e), from_zero) {
+                for (to, from) in state.iter_mut().flatten().zip(states.iter().flatten()) {
+                    if from.ncols() > 0 {
+                        to.row_mut(sample).assign(&from.row(start));
+                    }
+                }
+            }
+        }
+        Batch { steps, state }
+    }
+
+    /// The f32 network's outputs on a batch.
+    pub fn teach(&self, batch: &Batch) -> Vec<Array2<f32>> {
+        let network = Network::new(self.graph);
+        let mut state = batch.state.clone();
+        batch.steps.iter().map(|obs| network.forward(&self.weights, obs.clone(), &mut state).output().clone()).collect()
+    }
+}
+
+/// Variance of every column over all rows of all arrays.
+fn column_variances(arrays: &[Array2<f32>]) -> Vec<f32> {
+    let cols = arrays.first().map_or(0, Array2::ncols);
+    let rows = arrays.iter().map(Array2::nrows).sum::<usize>().max(1) as f64;
+    let mean = |f: &dyn Fn(usize, f64) -> f64| -> Vec<f64> {
+        let mut sums = vec![0f64; cols];
+        for row in arrays.iter().flat_map(|a| a.rows()) {
+            sums.iter_mut().zip(row).enumerate().for_each(|(i, (sum, v))| *sum += f(i, f64::from(*v)));
+        }
+        sums.iter().map(|s| s / rows).collect()
+    };
+    let means = mean(&|_, v| v);
+    mean(&|i, v| (v - means[i]).powi(2)).into_iter().map(|v| v as f32).collect()
+}

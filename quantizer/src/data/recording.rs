@@ -1,0 +1,87 @@
+//! Where a policy's recordings are.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+
+use super::dataset::{Dataset, Sizes};
+use crate::policy::Policy;
+
+/// The two recordings that a policy's folder may hold. The only place that knows the files' names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Recording {
+    /// What the quantizer learns from.
+    Calib,
+    /// What nothing learns from, to measure errors on.
+    Heldout,
+}
+
+impl Recording {
+    const fn stem(self) -> &'static str {
+        match self {
+            Self::Calib => "calib",
+            Self::Heldout => "heldout",
+        }
+    }
+
+    fn names(self) -> [String; 3] {
+        ["npz", "npy", "safetensors"].map(|ending| format!("{}.{ending}", self.stem()))
+    }
+
+    /// Where it may be in a policy's folder.
+    pub fn paths(self, policy_dir: &Path) -> [PathBuf; 3] {
+        self.names().map(|name| policy_dir.join(name))
+    }
+
+    /// The recording in a policy's folder; `None` where there is none. More than one is an error: which of them counts would
+    /// be a guess.
+    pub fn find(self, policy_dir: &Path) -> Result<Option<PathBuf>> {
+        let mut there: Vec<String> = self.names().into_iter().filter(|n| policy_dir.join(n).exists()).collect();
+        if there.len() > 1 {
+            bail!("{}: {} are there; leave one of them", policy_dir.display(), there.join(" and "));
+        }
+        Ok(there.pop().map(|name| policy_dir.join(name)))
+    }
+
+    /// Reads `file`, or where none is given the one in the policy's folder; `None` where there is none.
+    pub fn load(self, policy_dir: Option<&Path>, file: Option<&Path>, sizes: Sizes) -> Result<Option<Dataset>> {
+        let path = match (file, policy_dir) {
+            (Some(file), _) => Some(file.to_owned()),
+            (None, Some(dir)) => self.find(dir)?,
+            (None, None) => None,
+        };
+        path.map(|path| Dataset::load(&path, sizes)).transpose()
+    }
+
+    /// As [`Self::load`], for `who` can do nothing without.
+    pub fn require(self, policy_dir: Option<&Path>, file: Option<&Path>, sizes: Sizes, who: &str) -> Result<Dataset> {
+        self.load(policy_dir, file, sizes)?.with_context(|| self.missing(who))
+    }
+
+    /// The message where `who` needs the recording and it is not there.
+    pub fn missing(self, who: &str) -> String {
+        let stem = self.stem();
+        let [npz, npy, safetensors] = self.names();
+        format!(
+            "{who} needs recorded observations: put {npz}, {npy} or {safetensors} beside policy.json, or name a file with \
+             --{stem}"
+        )
+    }
+}
+
+/// The two recordings of a policy, as far as they are there.
+#[derive(Clone, Debug, Default)]
+pub struct Recordings {
+    /// See [`Recording::Calib`].
+    pub calib: Option<Dataset>,
+    /// See [`Recording::Heldout`].
+    pub heldout: Option<Dataset>,
+}
+
+impl Recordings {
+    /// Reads those in a policy's folder.
+    pub fn load(policy: &Policy) -> Result<Self> {
+        let read = |recording: Recording| recording.load(Some(&policy.dir), None, Sizes::of(policy));
+        Ok(Self { calib: read(Recording::Calib)?, heldout: read(Recording::Heldout)? })
+    }
+}

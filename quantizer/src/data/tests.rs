@@ -1,0 +1,464 @@
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+
+use ndarray::{Array1, Array2, Array3, ArrayD, IxDyn, ShapeBuilder as _, s};
+use ndarray_npy::{NpzWriter, WriteNpyExt as _};
+use safetensors::Dtype;
+use safetensors::tensor::{TensorView, serialize};
+use tempfile::TempDir;
+
+use super::*;
+use crate::calibrate::moments;
+use crate::calibrate::windows::Windows;
+use crate::graph::Graph;
+use crate::methods::actquant::testing::{dataset, lstm, mlp};
+
+const SIZES: Sizes = Sizes { obs: 3, out: 2, state: 0 };
+const RECURRENT: Sizes = Sizes { obs: 3, out: 2, state: 4 };
+
+/// An array of a file that is to be written.
+enum Array {
+    F32(ArrayD<f32>),
+    F64(ArrayD<f64>),
+    I32(ArrayD<i32>),
+    I64(ArrayD<i64>),
+}
+
+/// 0, 1, 2, ... in the given shape.
+fn count(shape: &[usize]) -> ArrayD<f32> {
+    let len = shape.iter().product::<usize>();
+    ArrayD::from_shape_vec(IxDyn(shape), (0..len).map(|i| i as f32).collect()).expect("a shape")
+}
+
+fn ints(values: &[i64]) -> Array {
+    Array::I64(Array1::from(values.to_vec()).into_dyn())
+}
+
+fn obs() -> Array {
+    Array::F32(count(&[2, 5, 3]))
+}
+
+type Named = (&'static str, Array);
+
+/// A file of the format that its name says.
+fn write(dir: &TempDir, name: &str, arrays: &[Named]) -> PathBuf {
+    let path = dir.path().join(name);
+    if name.ends_with(".npz") {
+        let mut npz = NpzWriter::new(File::create(&path).expect("a file"));
+        for (name, array) in arrays {
+            match array {
+                Array::F32(a) => npz.add_array(*name, a),
+                Array::F64(a) => npz.add_array(*name, a),
+                Array::I32(a) => npz.add_array(*name, a),
+                Array::I64(a) => npz.add_array(*name, a),
+            }
+            .expect("an array");
+        }
+        npz.finish().expect("an archive");
+    } else if name.ends_with(".npy") {
+        let file = File::create(&path).expect("a file");
+        match &arrays[0].1 {
+            Array::F32(a) => a.write_npy(file),
+            Array::F64(a) => a.write_npy(file),
+            Array::I32(a) => a.write_npy(file),
+            Array::I64(a) => a.write_npy(file),
+        }
+        .expect("an array");
+    } else {
+        let bytes = |array: &Array| -> (Dtype, Vec<usize>, Vec<u8>) {
+            match array {
+                Array::F32(a) => (Dtype::F32, a.shape().into(), a.iter().flat_map(|v| v.to_le_bytes()).collect()),
+                Array::F64(a) => (Dtype::F64, a.shape().into(), a.iter().flat_map(|v| v.to_le_bytes()).collect()),
+                Array::I32(a) => (Dtype::I32, a.shape().into(), a.iter().flat_map(|v| v.to_le_bytes()).collect()),
+                Array::I64(a) => (Dtype::I64, a.shape().into(), a.iter().flat_map(|v| v.to_le_bytes()).collect()),
+            }
+        };
+        let tensors: Vec<_> = arrays.iter().map(|(name, array)| (*name, bytes(array))).collect();
+        let views = tensors.iter().map(|(name, (dtype, shape, bytes))| {
+            (*name, TensorView::new(*dtype, shape.clone(), bytes).expect("a tensor"))
+        });
+        fs::write(&path, serialize(views, None).expect("a file")).expect("a file");
+    }
+    path
+}
+
+fn folder() -> TempDir {
+    TempDir::new().expect("a folder")
+}
+
+#[test]
+fn every_format_and_type_gives_the_same() {
+    let dir = folder();
+    let wide = |a: ArrayD<f32>| Array::F64(a.mapv(f64::from));
+    let long = |values: &[i32]| Array::I32(Array1::from(values.to_vec()).into_dyn());
+    let narrow = || vec![("obs", obs()), ("action", Array::F32(count(&[2, 5, 2]))), ("length", ints(&[5, 2]))];
+    let doubles =
+        || vec![("obs", wide(count(&[2, 5, 3]))), ("action", wide(count(&[2, 5, 2]))), ("length", long(&[5, 2]))];
+    let mut fortran = ArrayD::zeros(IxDyn(&[2, 5, 3]).f());
+    fortran.assign(&count(&[2, 5, 3]));
+    let mut loaded = Vec::new();
+    for (name, arrays) in [
+        ("a.npz", narrow()),
+        ("b.npz", doubles()),
+        ("c.safetensors", narrow()),
+        ("d.safetensors", doubles()),
+        (
+            "e.npz",
+            vec![("obs", Array::F32(fortran.clone())), ("action", wide(count(&[2, 5, 2]))), ("length", ints(&[5, 2]))],
+        ),
+    ] {
+        // An array of no meaning here may have any name and type.
+        let arrays: Vec<Named> = arrays.into_iter().chain([("seed", ints(&[1]))]).collect();
+        let dataset = Dataset::load(&write(&dir, name, &arrays), SIZES).expect(name);
+        assert_eq!(dataset.name(), name);
+        loaded.push((dataset.obs, dataset.action, dataset.length, dataset.state));
+    }
+    assert!(loaded.iter().all(|one| *one == loaded[0]));
+    let (obs_read, action, length, state) = &loaded[0];
+    assert_eq!(obs_read.clone().into_dyn(), count(&[2, 5, 3]));
+    assert_eq!(action.clone().map(|a| a.into_dyn()), Some(count(&[2, 5, 2])));
+    assert_eq!((&length[..], state), (&[5, 2][..], &None));
+
+    for array in [obs(), wide(count(&[2, 5, 3])), Array::F32(fortran)] {
+        let alone = Dataset::load(&write(&dir, "f.npy", &[("", array)]), SIZES).expect("npy");
+        assert_eq!((&alone.obs, alone.action, &alone.length[..]), (obs_read, None, &[5, 5][..]));
+    }
+}
+
+#[test]
+fn two_axes_are_one_episode() {
+    let dir = folder();
+    for name in ["a.npy", "a.npz", "a.safetensors"] {
+        let path = write(&dir, name, &[("obs", Array::F32(count(&[7, 3])))]);
+        let dataset = Dataset::load(&path, SIZES).expect(name);
+        assert_eq!((dataset.obs.dim(), &dataset.length[..]), ((1, 7, 3), &[7][..]));
+    }
+    let arrays = [("obs", Array::F32(count(&[7, 3]))), ("action", Array::F32(count(&[7, 2]))), ("length", ints(&[4]))];
+    let dataset = Dataset::load(&write(&dir, "b.npz", &arrays), SIZES).expect("actions with two axes");
+    assert_eq!((dataset.frames(), dataset.action_at(0, 3)), (4, Some(vec![6.0, 7.0])));
+}
+
+fn with(place: [usize; 3], value: f64) -> Array {
+    let mut array = count(&[2, 5, 3]).mapv(f64::from);
+    array[&place[..]] = value;
+    Array::F64(array)
+}
+
+fn with_f32(place: [usize; 3], value: f32) -> Array {
+    let mut array = count(&[2, 5, 3]);
+    array[&place[..]] = value;
+    Array::F32(array)
+}
+
+/// What is wrong with the arrays, the sizes to fit, and the whole message behind the file's name.
+fn spoilt() -> Vec<(Vec<Named>, Sizes, &'static str)> {
+    let floats = |shape: &[usize]| Array::F32(count(shape));
+    let mut infinite = count(&[2, 4]);
+    infinite[[1, 2]] = f32::NEG_INFINITY;
+    vec![
+        (vec![("seed", ints(&[1])), ("act", obs())], SIZES, "array \"obs\" is missing; the file holds act, seed"),
+        (
+            vec![("obs", floats(&[5]))],
+            SIZES,
+            "array \"obs\" is [5]; [episode, step, value], or [frame, value] for one episode, is needed",
+        ),
+        (
+            vec![("obs", floats(&[1, 2, 5, 3]))],
+            SIZES,
+            "array \"obs\" is [1, 2, 5, 3]; [episode, step, value], or [frame, value] for one episode, is needed",
+        ),
+        (vec![("obs", floats(&[0, 5, 3]))], SIZES, "array \"obs\" is empty: [0, 5, 3]"),
+        (vec![("obs", floats(&[2, 0, 3]))], SIZES, "array \"obs\" is empty: [2, 0, 3]"),
+        (vec![("obs", floats(&[2, 5, 4]))], SIZES, "array \"obs\" has 4 values a step, the policy takes 3"),
+        (
+            vec![("obs", ints(&[1]))],
+            SIZES,
+            "array \"obs\" is [1]; [episode, step, value], or [frame, value] for one episode, is needed",
+        ),
+        (
+            vec![("obs", Array::I32(count(&[2, 5, 3]).mapv(|v| v as i32)))],
+            SIZES,
+            "array \"obs\" is of type int32, float32 or float64 is needed",
+        ),
+        (vec![("obs", with_f32([1, 4, 2], f32::NAN))], SIZES, "array \"obs\" holds NaN at episode 1, step 4, value 2"),
+        (
+            vec![("obs", with([0, 2, 1], f64::NEG_INFINITY))],
+            SIZES,
+            "array \"obs\" holds -inf at episode 0, step 2, value 1",
+        ),
+        (
+            vec![("obs", with([0, 0, 0], -1e39))],
+            SIZES,
+            "array \"obs\" holds -1e39, beyond float32's range, at episode 0, step 0, value 0",
+        ),
+        (
+            vec![("obs", obs()), ("action", floats(&[2, 5, 3]))],
+            SIZES,
+            "array \"action\" is [2, 5, 3], [2, 5, 2] is needed: the network's raw output at every observation",
+        ),
+        (
+            vec![("obs", floats(&[5, 3])), ("action", floats(&[1, 5, 2]))],
+            SIZES,
+            "array \"action\" is [1, 5, 2], [5, 2] is needed: the network's raw output at every observation",
+        ),
+        (
+            vec![("obs", obs()), ("length", ints(&[5, 6]))],
+            SIZES,
+            "episode 1 has the length 6, but the array \"obs\" holds 5 steps",
+        ),
+        (vec![("obs", obs()), ("length", ints(&[-1, 5]))], SIZES, "array \"length\" holds -1 for episode 0"),
+        (
+            vec![("obs", obs()), ("length", ints(&[5]))],
+            SIZES,
+            "array \"length\" is [1], [2] is needed: the valid steps of each episode",
+        ),
+        (
+            vec![("obs", obs()), ("length", floats(&[2]))],
+            SIZES,
+            "array \"length\" is of type float32, int32 or int64 is needed",
+        ),
+        (vec![("obs", obs()), ("length", ints(&[0, 0]))], SIZES, "it holds no frame: every episode has the length 0"),
+        (
+            vec![("obs", obs()), ("state", floats(&[2, 4]))],
+            SIZES,
+            "array \"state\" is there, but the policy has no recurrent state",
+        ),
+        (
+            vec![("obs", obs()), ("state", floats(&[2, 3]))],
+            RECURRENT,
+            "array \"state\" is [2, 3], [2, 4] is needed: the recurrent state before each episode's first step, hidden then cell state of each lstm, the state of each gru, in the order of the ops",
+        ),
+        (
+            vec![("obs", obs()), ("state", floats(&[4]))],
+            RECURRENT,
+            "array \"state\" is [4], [2, 4] is needed: the recurrent state before each episode's first step, hidden then cell state of each lstm, the state of each gru, in the order of the ops",
+        ),
+        (
+            vec![("obs", obs()), ("state", Array::F32(infinite))],
+            RECURRENT,
+            "array \"state\" holds -inf at episode 1, value 2",
+        ),
+    ]
+}
+
+#[test]
+fn what_is_wrong_is_named() {
+    let dir = folder();
+    for ending in ["npz", "safetensors"] {
+        for (arrays, sizes, expected) in spoilt() {
+            let path = write(&dir, &format!("r.{ending}"), &arrays);
+            let error = format!("{:#}", Dataset::load(&path, sizes).expect_err(expected));
+            assert_eq!(error, format!("{}: {expected}", path.display()));
+        }
+    }
+}
+
+#[test]
+fn what_stands_behind_an_episodes_end_does_not_matter() {
+    let dir = folder();
+    let arrays = [("obs", with([1, 4, 2], f64::NAN)), ("length", ints(&[5, 4]))];
+    let dataset = Dataset::load(&write(&dir, "a.npz", &arrays), SIZES).expect("padding");
+    assert_eq!((dataset.frames(), dataset.observations().count()), (9, 9));
+    assert!(dataset.observations().flatten().all(|v| v.is_finite()));
+}
+
+#[test]
+fn a_file_that_is_no_recording_is_named() {
+    let dir = folder();
+    let error = |path: &Path| {
+        let error = format!("{:#}", Dataset::load(path, SIZES).expect_err("no recording"));
+        error.strip_prefix(&format!("{}: ", path.display())).expect("the file's name").to_owned()
+    };
+    for (ending, is) in [("npz", "an .npz archive"), ("npy", "an .npy array"), ("safetensors", "a .safetensors file")] {
+        let path = write(&dir, &format!("a.{ending}"), &[("obs", obs())]);
+        let whole = fs::read(&path).expect("the file");
+        for len in [1, 20, whole.len() / 2, whole.len() - 1] {
+            fs::write(&path, &whole[..len]).expect("a file");
+            let error = error(&path);
+            assert!(error.starts_with(&format!("not {is}, or one that was cut off")), "{len} bytes: {error}");
+        }
+        fs::write(&path, "observations: 1, 2, 3\n".repeat(20)).expect("a file");
+        let text = error(&path);
+        assert!(text.starts_with(&format!("not {is}, or one that was cut off")), "{text}");
+        fs::write(&path, "").expect("a file");
+        assert_eq!(error(&path), "the file is empty");
+        fs::remove_file(&path).expect("the file");
+        assert!(error(&path).starts_with("cannot be read"));
+    }
+    let half = write(&dir, "half.npz", &[("obs", obs())]);
+    let other = dir.path().join("half.csv");
+    fs::rename(half, &other).expect("a file");
+    assert_eq!(error(&other), "a recording's name ends in .npz, .npy or .safetensors");
+}
+
+#[test]
+fn one_recording_is_found_and_two_are_refused() {
+    let dir = folder();
+    let at = Some(dir.path());
+    assert!(Recording::Calib.load(at, None, SIZES).expect("none").is_none());
+    let missing = Recording::Heldout.require(at, None, SIZES, "this").expect_err("none").to_string();
+    assert_eq!(
+        missing,
+        "this needs recorded observations: put heldout.npz, heldout.npy or heldout.safetensors beside policy.json, or name \
+         a file with --heldout"
+    );
+    write(&dir, "heldout.npy", &[("", obs())]);
+    for name in ["calib.npz", "calib.npy", "calib.safetensors"] {
+        let path = write(&dir, name, &[("obs", obs())]);
+        let found = Recording::Calib.load(at, None, SIZES).expect("one").expect("one");
+        assert_eq!(found.path, path);
+        fs::remove_file(path).expect("the file");
+    }
+    let (npy, _) = (write(&dir, "calib.npy", &[("", obs())]), write(&dir, "calib.npz", &[("obs", obs())]));
+    let error = Recording::Calib.find(dir.path()).expect_err("two").to_string();
+    assert_eq!(error, format!("{}: calib.npz and calib.npy are there; leave one of them", dir.path().display()));
+    // A file that is named needs no guess.
+    let named = Recording::Calib.load(at, Some(&npy), SIZES).expect("named").expect("named");
+    assert_eq!(named.path, npy);
+}
+
+#[test]
+fn too_few_frames_are_named() {
+    let dir = folder();
+    let dataset = Dataset::load(&write(&dir, "calib.npz", &[("obs", obs())]), SIZES).expect("ten frames");
+    assert!(dataset.require_frames(10, "this").is_ok());
+    let error = dataset.require_frames(11, "fewer repeat themselves").expect_err("ten").to_string();
+    assert!(error.ends_with("calib.npz: 10 frames are recorded, 11 are needed: fewer repeat themselves"), "{error}");
+}
+
+/// The same steps, cut into windows with the state at the start of each.
+fn cut(graph: &Graph, whole: &Dataset, window: usize) -> Dataset {
+    let (_, steps, width) = whole.obs.dim();
+    let windows = steps / window;
+    let mut state = Vec::new();
+    for w in 0..windows {
+        // The state after all steps before the window.
+        let mut states = crate::graph::zero_state(graph, 1);
+        let network = crate::graph::Network::new(graph);
+        for obs in whole.episode(0).take(w * window) {
+            let obs = Array2::from_shape_vec((1, width), obs).expect("a row");
+            network.forward(&crate::graph::Weights::of(graph), obs, &mut states);
+        }
+        state.extend(states.iter().flatten().flatten().copied());
+    }
+    let shaped = |array: &Array3<f32>| {
+        let values = array.iter().copied().collect();
+        Array3::from_shape_vec((windows, window, array.dim().2), values).expect("windows")
+    };
+    Dataset {
+        path: "cut".into(),
+        obs: shaped(&whole.obs),
+        action: whole.action.as_ref().map(shaped),
+        length: vec![window; windows],
+        state: Some(Array2::from_shape_vec((windows, graph.state_len()), state).expect("states")),
+    }
+}
+
+#[test]
+fn windows_with_their_state_are_as_good_as_the_whole_episode() {
+    let graph = lstm();
+    assert_eq!(graph.state_len(), 6);
+    let whole = dataset(&graph, 1, 20);
+    let cut = cut(&graph, &whole, 5);
+    let zero = Dataset { state: None, ..cut.clone() };
+
+    // The f32 network's own actions and all that the methods collect.
+    let actions = |dataset: &Dataset| {
+        let mut dataset = Dataset { action: None, ..dataset.clone() };
+        dataset.fill_actions(&graph);
+        dataset.action.expect("actions").into_raw_vec_and_offset().0
+    };
+    let near = |a: &[f32], b: &[f32]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-5);
+    let recorded: Vec<f32> = whole.action.iter().flatten().copied().collect();
+    assert!(near(&actions(&whole), &recorded) && near(&actions(&cut), &recorded));
+    assert!(!near(&actions(&zero), &recorded));
+
+    let moments = |dataset: &Dataset| {
+        let all = moments::collect(&graph, dataset, |_| {});
+        all.iter().flat_map(|m| m.second.iter().map(|v| *v as f32).collect::<Vec<_>>()).collect::<Vec<f32>>()
+    };
+    assert!(near(&moments(&cut), &moments(&whole)) && !near(&moments(&zero), &moments(&whole)));
+
+    let variance = |dataset: &Dataset| Windows::new(&graph, dataset).output_variance;
+    assert!(near(&variance(&cut), &variance(&whole)) && !near(&variance(&zero), &variance(&whole)));
+}
+
+#[test]
+fn missing_actions_are_the_networks_own() {
+    let graph = mlp();
+    let whole = dataset(&graph, 2, 6);
+    let mut filled = Dataset { action: None, length: vec![6, 4], ..whole.clone() };
+    filled.fill_actions(&graph);
+    for (episode, step) in [(0, 0), (0, 5), (1, 3)] {
+        assert_eq!(filled.action_at(episode, step), whole.action_at(episode, step));
+    }
+}
+
+#[test]
+fn a_long_recording_is_thinned() {
+    let whole = dataset(&mlp(), 10, 200);
+    assert_eq!(whole.thinned(2000, false).frames(), 2000);
+    let thin = whole.thinned(100, false);
+    assert_eq!((thin.frames(), thin.obs.dim().0), (100, 1));
+    // The 35th of 100 evenly spaced frames of 2000 is the 700th: episode 3, step 100.
+    assert_eq!(thin.obs.slice(s![0, 35, ..]), whole.obs.slice(s![3, 100, ..]));
+    assert_eq!(thin.action_at(0, 35), whole.action_at(3, 100));
+
+    let graph = lstm();
+    let mut whole = dataset(&graph, 10, 200);
+    whole.length[5] = 10;
+    whole.state = Some(Array2::from_shape_fn((10, 6), |(e, _)| e as f32));
+    let thin = whole.thinned(128, true);
+    assert_eq!((&thin.length[..], thin.obs.dim()), (&[64, 10][..], (2, 64, 2)));
+    assert_eq!(thin.obs.slice(s![0, 63, ..]), whole.obs.slice(s![0, 63, ..]));
+    assert_eq!(thin.start(1), Some(vec![5.0; 6]));
+    assert_eq!(whole.thinned(1000, true).length, [100, 100, 100, 100, 100, 10, 100, 100, 100, 100]);
+}
+
+fn recorded(name: &str, obs: Array3<f32>) -> Dataset {
+    let length = vec![obs.dim().1; obs.dim().0];
+    Dataset { path: format!("folder/{name}").into(), obs, action: None, length, state: None }
+}
+
+#[test]
+fn what_leaves_the_calibrated_range_is_named() {
+    // Dimension v covers 0 to 9 v.
+    let calib = recorded("calib.npz", Array3::from_shape_fn((2, 10, 4), |(_, s, v)| (s * v) as f32));
+    let range = Range::of(&calib);
+    let constant = range.constant_note().expect("dimension 0 is constant");
+    assert_eq!(
+        constant,
+        "observation dimension 0 never changes in calib.npz: nothing is known about what the policy does when it moves; if \
+         the robot can change it at run time, record episodes in which it does"
+    );
+    let same = range.outside(&calib);
+    assert_eq!(same, Outside { frames: 20, outside: 0, dimensions: Vec::new() });
+
+    let mut obs = calib.obs.clone();
+    // Within a tenth of the range, and beyond.
+    (obs[[0, 0, 1]], obs[[0, 1, 1]]) = (9.89, -0.89);
+    (obs[[0, 2, 2]], obs[[0, 2, 3]], obs[[0, 3, 3]]) = (-1.9, 30.0, 29.8);
+    let heldout = recorded("heldout.npz", obs.clone());
+    let outside = range.outside(&heldout);
+    assert_eq!(outside, Outside { frames: 20, outside: 2, dimensions: vec![(3, 2), (2, 1)] });
+    assert_eq!(
+        range.warning(&heldout).expect("a tenth is outside"),
+        "10.0% of the observations in heldout.npz leave the range of calib.npz by more than 10% of it, in dimensions 3 \
+         (10.0%), 2 (5.0%): nothing saturates there, but nothing was fitted there either; record what the robot will see"
+    );
+    // One of twenty is not worth a warning; a dimension that never moved has no room at all.
+    obs[[0, 2, 2]] = 0.0;
+    obs[[0, 2, 3]] = 0.0;
+    assert_eq!(range.warning(&recorded("heldout.npz", obs.clone())), None);
+    obs[[0, 2, 0]] = 1e-6;
+    assert!(range.warning(&recorded("heldout.npz", obs)).is_some_and(|text| text.contains("dimensions 0 (5.0%), 3")));
+
+    let constant = recorded(
+        "calib.npz",
+        Array3::from_shape_fn((1, 9, 12), |(_, s, v)| if [3, 7, 8, 9].contains(&v) { 1.5 } else { s as f32 }),
+    );
+    let note = Range::of(&constant).constant_note().expect("constant dimensions");
+    assert!(note.starts_with("observation dimensions 3, 7-9 never change in calib.npz: "), "{note}");
+    let moving = recorded("calib.npz", Array3::from_shape_fn((1, 9, 2), |(_, s, _)| s as f32));
+    assert_eq!(Range::of(&moving).constant_note(), None);
+}

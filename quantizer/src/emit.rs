@@ -1,0 +1,8 @@
+//! From a quantized network to the bytes of an image, and into files.
+
+pub mod files;
+mod lower;
+mod writer;
+
+pub use lower::{Program, lower};
+pub use writer::image;

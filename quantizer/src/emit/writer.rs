@@ -1,0 +1,183 @@
+//! Lays an image out.
+
+use std::path::Path;
+
+use actq_kernels::image::{
+    BlockRecord, Header, MatrixRecord, OpRecord, Records, Region, half_words, header as h, seal,
+};
+use actq_kernels::layout::{self, BlockShape};
+use anyhow::{Context, Result, ensure};
+
+use super::lower::lower;
+use crate::graph::lowering::{Step, StepData};
+use crate::graph::{Graph, NodeKind};
+use crate::methods::{Outcome, Quantized};
+use crate::policy::Policy;
+use crate::runtime::{ImageBuffer, with_head};
+
+/// The image of a policy with its quantized matrices, one per matrix of the graph. The self-test vector is computed by the
+/// executor itself.
+pub fn image(policy: &Policy, matrices: &[Outcome]) -> Result<Vec<u8>> {
+    let group = matrices.first().map_or(0, |m| m.quantized.group);
+    let program = lower(&policy.graph, policy.act_len, group)?;
+    let mut writer = Writer { words: vec![0; h::WORDS], matrices: 0 };
+    let matrix_records = matrices.iter().map(|m| writer.matrix(m)).collect::<Result<Vec<_>>>()?;
+    writer.matrices = writer.push(matrix_records.into_iter().flatten());
+    let records = program.steps.iter().map(|step| writer.op(step)).collect::<Result<Vec<[u32; h::OP_WORDS]>>>()?;
+    let ops = writer.push(records.into_iter().flatten());
+    let contract = writer.words.len() as u32;
+    let mut flags = 0;
+    for (bit, (_, array)) in policy.contract.arrays().into_iter().enumerate() {
+        if let Some(array) = array {
+            flags |= 1 << bit;
+            writer.push_floats(array);
+        }
+    }
+    let name = writer.push_bytes(policy.name.as_bytes());
+    let steps = policy.execute + 2;
+    let observations = self_test_observations(&policy.graph, steps);
+    let self_test = writer.words.len() as u32;
+    for observation in &observations {
+        writer.push_floats(observation);
+        writer.push_floats(&vec![0.0; policy.act_len]);
+    }
+    let header = Header {
+        kind: policy.kind,
+        obs_len: policy.graph.obs_len,
+        act_len: policy.act_len,
+        chunk: policy.chunk,
+        execute: policy.execute,
+        rate_hz: policy.rate_hz,
+        scratch: program.words,
+        state: program.state,
+        observation: program.observation.offset,
+        output: program.output.offset,
+        action: program.action.offset,
+        work: program.work,
+        matrices: Records { offset: writer.matrices, count: matrices.len() },
+        ops: Records { offset: ops, count: program.steps.len() },
+        contract,
+        contract_flags: flags,
+        name: Records { offset: name, count: policy.name.len() },
+        self_test: Records { offset: self_test, count: steps },
+        weights: policy.weights as u32,
+        digest: policy.digest,
+    };
+    let mut words = writer.words;
+    words[..h::WORDS].copy_from_slice(&header.emit()?);
+    let actions = self_test_actions(&sealed(&words)?, &observations)?;
+    for (step, action) in actions.iter().enumerate() {
+        let at = self_test as usize + step * (policy.graph.obs_len + policy.act_len) + policy.graph.obs_len;
+        for (word, value) in words[at..].iter_mut().zip(action) {
+            *word = value.to_bits();
+        }
+    }
+    sealed(&words)
+}
+
+/// The image's bytes, with length and checksum.
+fn sealed(words: &[u32]) -> Result<Vec<u8>> {
+    let mut bytes: Vec<u8> = words.iter().flat_map(|w| w.to_le_bytes()).collect();
+    seal(&mut bytes).context("the image has more than 4 GB")?;
+    Ok(bytes)
+}
+
+/// Observations that reach every input: spread over about two standard deviations where the policy normalizes, else over -1
+/// to 1, from a fixed generator.
+fn self_test_observations(graph: &Graph, steps: usize) -> Vec<Vec<f32>> {
+    let mut state = 0x2545_f491u32;
+    let mut noise = move || {
+        state ^= state << 13;
+        state ^= state >> 17;
+        state ^= state << 5;
+        state as i32 as f32 / i32::MAX as f32
+    };
+    let norm = graph.nodes.iter().find_map(|node| match &node.kind {
+        NodeKind::Normalize(norm) if node.inputs == [0] => Some(norm),
+        _ => None,
+    });
+    let mut value = |i: usize| match norm {
+        Some(norm) if norm.scale[i].abs() > 1e-6 => norm.mean[i] + 2.0 * noise() / norm.scale[i],
+        _ => noise(),
+    };
+    (0..steps).map(|_| (0..graph.obs_len).map(&mut value).collect()).collect()
+}
+
+fn self_test_actions(bytes: &[u8], observations: &[Vec<f32>]) -> Result<Vec<Vec<f32>>> {
+    let buffer = ImageBuffer::new(bytes);
+    let image = buffer.image(Path::new("the new image"))?;
+    with_head(image, |head| {
+        observations.iter().map(|obs| Ok(head.step(obs).context("self-test of the new image")?.to_vec())).collect()
+    })
+}
+
+struct Writer {
+    words: Vec<u32>,
+    /// Offset of the matrix records.
+    matrices: u32,
+}
+
+impl Writer {
+    /// Appends words and gives their offset.
+    fn push(&mut self, words: impl IntoIterator<Item = u32>) -> u32 {
+        let offset = self.words.len() as u32;
+        self.words.extend(words);
+        offset
+    }
+
+    fn push_floats(&mut self, values: &[f32]) -> u32 {
+        self.push(values.iter().map(|v| v.to_bits()))
+    }
+
+    fn push_bytes(&mut self, bytes: &[u8]) -> u32 {
+        self.push(bytes.chunks(4).map(|c| c.iter().rev().fold(0, |word, b| word << 8 | u32::from(*b))))
+    }
+
+    /// Packs a matrix's blocks, and gives its record.
+    fn matrix(&mut self, outcome: &Outcome) -> Result<[u32; h::MATRIX_WORDS]> {
+        let matrix = &outcome.quantized;
+        ensure!(matrix.rows <= h::MAX_ROWS, "a matrix has {} rows, {} are supported", matrix.rows, h::MAX_ROWS);
+        let blocks = outcome.blocks();
+        let in_order = Quantized::in_order(&blocks);
+        let mut records = Vec::new();
+        for (shape, rows) in &blocks {
+            let codes: Vec<u8> =
+                rows.iter().flat_map(|r| &matrix.codes[r * matrix.cols..][..matrix.cols]).copied().collect();
+            let groups = matrix.groups();
+            let group_scales: Vec<u8> =
+                rows.iter().flat_map(|r| &matrix.group_scales[r * groups..][..groups]).copied().collect();
+            let mut words = vec![0; shape.words()];
+            layout::pack(*shape, &codes, &group_scales, &mut words).with_context(|| {
+                format!("{shape:?} cannot be packed; docs/FORMAT.md says how many columns may have group scales")
+            })?;
+            let weights = self.push(words.into_iter().map(u32::from_le));
+            let scales: Vec<u16> = rows.iter().map(|&r| matrix.scales[r].to_bits()).collect();
+            let scales = self.push(half_words(&scales));
+            let index = if in_order {
+                0
+            } else {
+                let index = rows.iter().map(|&r| u16::try_from(r)).collect::<Result<Vec<_>, _>>()?;
+                self.push(half_words(&index))
+            };
+            let BlockShape { width, lanes, rows, .. } = *shape;
+            records.push(BlockRecord { width, lanes, rows, weights, scales, index }.emit()?);
+        }
+        let Quantized { rows, cols, group, .. } = *matrix;
+        let blocks = Records { count: records.len(), offset: self.push(records.into_iter().flatten()) };
+        Ok(MatrixRecord { rows, cols, group, x_max: outcome.x_max, blocks }.emit()?)
+    }
+
+    fn op(&mut self, step: &Step<Region>) -> Result<[u32; h::OP_WORDS]> {
+        let (bias, data) = match &step.data {
+            StepData::None => (0, 0),
+            StepData::Constants(values) => (0, self.push_floats(values)),
+            StepData::Product { matrix, bias } => {
+                let bias = if bias.iter().all(|b| *b == 0.0) { 0 } else { self.push_floats(bias) };
+                (bias, self.matrices + (matrix * h::MATRIX_WORDS) as u32)
+            }
+        };
+        let offset = |region: Option<Region>| region.map_or(0, |r| r.offset);
+        let (src, third) = (offset(step.src), offset(step.third));
+        Ok(OpRecord { kind: step.kind, dst: step.dst, src, third, bias, data }.emit()?)
+    }
+}

@@ -1,0 +1,44 @@
+//! Evaluation of single frames in f32.
+
+use ndarray::Array2;
+
+use super::arrays::contiguous;
+use super::nodes::Graph;
+use super::run::Network;
+use super::weights::{State, Weights, start_state};
+
+/// Evaluates a graph in f32, step by step, with its recurrent state. Sums run in order: the same bits on every machine.
+#[derive(Debug)]
+pub struct Evaluator<'g> {
+    network: Network<'g>,
+    weights: Weights,
+    state: State,
+}
+
+impl<'g> Evaluator<'g> {
+    /// Starts from the zero state.
+    pub fn new(graph: &'g Graph) -> Self {
+        let state = start_state(graph, &[None]);
+        Self { network: Network::in_order(graph), weights: Weights::of(graph), state }
+    }
+
+    /// Zeroes the recurrent state.
+    pub fn reset(&mut self) {
+        self.start(None);
+    }
+
+    /// Sets the recurrent state, in the order of [`Graph::state_len`]; `None`: zero.
+    pub fn start(&mut self, state: Option<&[f32]>) {
+        self.state = start_state(self.network.graph, &[state.map(<[f32]>::to_vec)]);
+    }
+
+    /// The network's output for one observation of the graph's length. `tap` sees every matrix's index and input vector.
+    pub fn step(&mut self, obs: &[f32], tap: &mut dyn FnMut(usize, &[f32])) -> Vec<f32> {
+        let obs = Array2::from_shape_fn((1, obs.len()), |(_, i)| obs[i]);
+        let pass = self.network.forward(&self.weights, obs, &mut self.state);
+        for (matrix, operand) in self.network.operands(&pass) {
+            operand.rows().into_iter().for_each(|row| tap(matrix, contiguous(&row)));
+        }
+        pass.output().iter().copied().collect()
+    }
+}

@@ -1,0 +1,64 @@
+//! The network as a list of nodes over values.
+
+use super::ops::NodeKind;
+use super::values::{ValueId, WeightMatrix};
+
+/// A node: what it computes, from which values, and how long its output is.
+#[derive(Clone, Debug)]
+pub struct Node {
+    /// The operation.
+    pub kind: NodeKind,
+    /// What it reads.
+    pub inputs: Vec<ValueId>,
+    /// Length of its output.
+    pub len: usize,
+}
+
+/// A network.
+#[derive(Clone, Debug)]
+pub struct Graph {
+    /// Length of an observation.
+    pub obs_len: usize,
+    /// The weight matrices; each is quantized once, however many nodes use it.
+    pub matrices: Vec<WeightMatrix>,
+    /// The nodes in the order of evaluation; the last one's output is the network's.
+    pub nodes: Vec<Node>,
+}
+
+impl Graph {
+    /// A network without nodes.
+    pub fn new(obs_len: usize) -> Self {
+        Self { obs_len, matrices: Vec::new(), nodes: Vec::new() }
+    }
+
+    /// The value that the last node gives.
+    pub fn output(&self) -> ValueId {
+        self.nodes.len()
+    }
+
+    /// Length of a value.
+    pub fn len_of(&self, value: ValueId) -> usize {
+        if value == 0 { self.obs_len } else { self.nodes[value - 1].len }
+    }
+
+    /// The nodes that read a value.
+    pub fn readers(&self, value: ValueId) -> Vec<usize> {
+        (0..self.nodes.len()).filter(|&n| self.nodes[n].inputs.contains(&value)).collect()
+    }
+
+    /// Values of the recurrent state: of each node in order its hidden state, then its cell state. An image keeps them in the
+    /// same order.
+    pub fn state_len(&self) -> usize {
+        self.nodes.iter().flat_map(|node| node.kind.state_lens()).sum()
+    }
+
+    /// Weights and biases and all other constants, counted as the f32 policy stores them.
+    pub fn parameters(&self) -> usize {
+        self.nodes.iter().map(|node| node.kind.constants()).sum::<usize>() + self.weights()
+    }
+
+    /// Elements of all weight matrices.
+    pub fn weights(&self) -> usize {
+        self.matrices.iter().map(|m| m.data.len()).sum()
+    }
+}

@@ -1,0 +1,78 @@
+//! The operations. A new one needs its file and its line in the list below.
+
+mod add;
+mod concat;
+mod function;
+mod gru;
+mod linear;
+mod lstm;
+mod norm;
+mod normalize;
+
+use std::ops::{Deref, DerefMut};
+
+pub use add::Add;
+pub use concat::{Concat, Span};
+pub use function::Pointwise;
+pub use gru::Gru;
+pub use linear::Linear;
+pub use lstm::Lstm;
+pub use norm::{LayerNorm, RmsNorm};
+pub use normalize::Normalize;
+
+use super::operation::Operation;
+
+macro_rules! operations {
+    ($($(#[$doc:meta])* $name:ident),* $(,)?) => {
+        /// What a node computes. It dereferences to its [`Operation`].
+        #[derive(Clone, Debug)]
+        pub enum NodeKind {
+            $($(#[$doc])* $name($name),)*
+        }
+
+        impl Deref for NodeKind {
+            type Target = dyn Operation;
+
+            fn deref(&self) -> &Self::Target {
+                match self {
+                    $(Self::$name(operation) => operation,)*
+                }
+            }
+        }
+
+        impl DerefMut for NodeKind {
+            fn deref_mut(&mut self) -> &mut Self::Target {
+                match self {
+                    $(Self::$name(operation) => operation,)*
+                }
+            }
+        }
+
+        $(impl From<$name> for NodeKind {
+            fn from(operation: $name) -> Self {
+                Self::$name(operation)
+            }
+        })*
+    };
+}
+
+operations! {
+    /// Mean, scale and clips of observations.
+    Normalize,
+    /// A matrix product.
+    Linear,
+    /// A function of every element.
+    Pointwise,
+    /// torch's LayerNorm.
+    LayerNorm,
+    /// A norm without a mean.
+    RmsNorm,
+    /// Sum of two values.
+    Add,
+    /// Parts of values behind each other.
+    Concat,
+    /// A recurrent cell with a cell state.
+    Lstm,
+    /// A recurrent cell.
+    Gru,
+}

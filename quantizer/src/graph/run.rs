@@ -1,0 +1,251 @@
+//! The network on batches, forwards and backwards: the one interpreter of a graph in f32.
+//!
+//! Values are matrices `[sample, element]`. A recurrent network runs over several steps; its gradient runs back through all of
+//! them. The derivatives are checked against finite differences in the tests.
+
+use ndarray::Array2;
+
+use super::arrays::Sums;
+use super::nodes::Graph;
+use super::operation::{Backward, Forward, Saved, See};
+use super::weights::{State, Weights};
+
+/// One step's forward pass.
+#[derive(Debug)]
+pub struct Pass {
+    /// The observation, then every node's output.
+    pub values: Vec<Array2<f32>>,
+    saved: Vec<Saved>,
+}
+
+impl Pass {
+    /// The network's output.
+    pub fn output(&self) -> &Array2<f32> {
+        &self.values[self.values.len() - 1]
+    }
+
+    /// What the matrix of a node's product was multiplied with.
+    pub fn operand(&self, node: usize, product: usize) -> Option<&Array2<f32>> {
+        self.saved[node].operands.get(product)
+    }
+}
+
+/// A network to run: its structure and how it is computed.
+#[derive(Clone, Copy, Debug)]
+pub struct Network<'a> {
+    /// The structure.
+    pub graph: &'a Graph,
+    /// Activation magnitude that each matrix's input is rounded to (0 = not at all), or empty.
+    x_max: &'a [u16],
+    sums: Sums,
+}
+
+impl<'a> Network<'a> {
+    /// For batches: with sums in blocks and no rounding.
+    pub fn new(graph: &'a Graph) -> Self {
+        Self { graph, x_max: &[], sums: Sums::Blocked }
+    }
+
+    /// As [`Self::new`], with each matrix's input rounded to this activation magnitude.
+    pub fn rounded(graph: &'a Graph, x_max: &'a [u16]) -> Self {
+        Self { x_max, ..Self::new(graph) }
+    }
+
+    /// As [`Self::new`], with sums in order.
+    pub fn in_order(graph: &'a Graph) -> Self {
+        Self { sums: Sums::InOrder, ..Self::new(graph) }
+    }
+
+    /// One step for a batch of observations; `state` advances.
+    pub fn forward(&self, weights: &Weights, obs: Array2<f32>, state: &mut State) -> Pass {
+        let mut values = vec![obs];
+        let mut saved = Vec::with_capacity(self.graph.nodes.len());
+        for (i, node) in self.graph.nodes.iter().enumerate() {
+            let run = Forward {
+                values: &values,
+                inputs: &node.inputs,
+                matrices: &weights.matrices,
+                vectors: &weights.vectors[i],
+                x_max: self.x_max,
+                sums: self.sums,
+            };
+            let (y, keep) = node.kind.forward(&run, &mut state[i]);
+            values.push(y);
+            saved.push(keep);
+        }
+        Pass { values, saved }
+    }
+
+    /// Every matrix with what it was multiplied with, in the order of evaluation.
+    pub fn operands<'p>(&self, pass: &'p Pass) -> impl Iterator<Item = (usize, &'p Array2<f32>)> {
+        let of_node = |(node, saved): (&'a super::nodes::Node, &'p Saved)| {
+            node.kind.products().into_iter().map(|product| product.matrix).zip(&saved.operands)
+        };
+        self.graph.nodes.iter().zip(&pass.saved).flat_map(of_node)
+    }
+
+    /// Steps back through one pass. `d_output` is the loss's derivative by the network's output; `d_state`, by the state after
+    /// the step, becomes that by the state before it. `grads` gets the derivatives by the weights added. `see` is shown
+    /// every matrix product.
+    pub fn backward(
+        &self,
+        weights: &Weights,
+        pass: &Pass,
+        d_output: Array2<f32>,
+        d_state: &mut State,
+        grads: &mut Weights,
+        see: &mut See<'_>,
+    ) {
+        let mut d_values: Vec<Option<Array2<f32>>> = vec![None; pass.values.len()];
+        d_values[pass.values.len() - 1] = Some(d_output);
+        for (i, node) in self.graph.nodes.iter().enumerate().rev() {
+            let dy = match d_values[i + 1].take() {
+                Some(dy) => dy,
+                // What a later step does with the state still counts.
+                None if node.kind.state_lens() != [0, 0] => Array2::zeros(pass.values[i + 1].raw_dim()),
+                None => continue,
+            };
+            let mut run = Backward {
+                node: i,
+                values: &pass.values,
+                inputs: &node.inputs,
+                matrices: &weights.matrices,
+                vectors: &weights.vectors[i],
+                d_values: &mut d_values,
+                d_matrices: &mut grads.matrices,
+                d_vectors: &mut grads.vectors[i],
+                see,
+            };
+            node.kind.backward(&mut run, &pass.saved[i], dy, &mut d_state[i]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use actq_kernels::math::Function;
+
+    use super::*;
+    use crate::graph::ops::{Add, Concat, Gru, LayerNorm, Linear, Lstm, NodeKind, Normalize, Pointwise, RmsNorm, Span};
+    use crate::graph::values::{ValueId, WeightMatrix};
+    use crate::graph::weights::zero_state;
+    use crate::random::Random;
+
+    fn random(len: usize, seed: &mut Random) -> Vec<f32> {
+        (0..len).map(|_| seed.unit()).collect()
+    }
+
+    /// A graph with every kind of node.
+    fn graph() -> Graph {
+        let mut seed = Random(11);
+        let mut graph = Graph::new(5);
+        for (rows, cols) in [(6, 5)].into_iter().chain([(6, 6); 7]).chain([(16, 7), (16, 4), (9, 4), (9, 3), (2, 3)]) {
+            let data = random(rows * cols, &mut seed).iter().map(|w| 0.6 * w).collect();
+            graph.matrices.push(WeightMatrix { name: "m".into(), rows, cols, data });
+        }
+        let mut push = |kind: NodeKind, inputs: &[ValueId]| graph.add(kind, inputs).expect("it fits");
+        let vector = |n: usize, seed: u64| random(n, &mut Random(seed));
+        let weight = |n: usize, seed: u64| vector(n, seed).iter().map(|v| 1.0 + 0.3 * v).collect::<Vec<_>>();
+        let normalize = Normalize { mean: vector(5, 1), scale: weight(5, 2), pre_clip: 10.0, clip: 3.0 };
+        let normal = push(normalize.into(), &[0]);
+        let mut last = push(Linear { matrix: 0, bias: vector(6, 3) }.into(), &[normal]);
+        let kept = last;
+        for (i, function) in Function::ALL.into_iter().enumerate() {
+            last = push(Linear { matrix: 1 + i, bias: vector(6, 4) }.into(), &[last]);
+            last = push(Pointwise(function).into(), &[last]);
+            last = push(Add.into(), &[last, kept]);
+        }
+        last = push(LayerNorm { weight: weight(6, 5), bias: vector(6, 6), eps: 1e-3 }.into(), &[last]);
+        let spans = vec![Span { from: 1, len: 4 }, Span { from: 0, len: 3 }];
+        last = push(Concat(spans).into(), &[last, normal]);
+        last = push(RmsNorm { weight: weight(7, 7), eps: 1e-3 }.into(), &[last]);
+        last = push(Lstm { hidden: 4, input: 8, state: 9, bias: vector(16, 8) }.into(), &[last]);
+        let (input_bias, state_bias) = (vector(9, 9), vector(9, 10));
+        last = push(Gru { hidden: 3, input: 10, state: 11, input_bias, state_bias }.into(), &[last]);
+        push(Linear { matrix: 12, bias: vector(2, 11) }.into(), &[last]);
+        graph
+    }
+
+    const STEPS: usize = 3;
+
+    fn observations() -> Vec<Array2<f32>> {
+        let mut seed = Random(5);
+        (0..STEPS).map(|_| Array2::from_shape_fn((2, 5), |_| seed.unit())).collect()
+    }
+
+    /// A loss over all steps with different weights on each output.
+    fn loss(graph: &Graph, weights: &Weights) -> f64 {
+        let network = Network::new(graph);
+        let mut state = zero_state(graph, 2);
+        let mut sum = 0.0;
+        for (t, obs) in observations().into_iter().enumerate() {
+            let pass = network.forward(weights, obs, &mut state);
+            sum += pass.output().iter().enumerate().map(|(i, y)| f64::from(*y) * (1 + i + t) as f64).sum::<f64>();
+        }
+        sum
+    }
+
+    fn gradient(graph: &Graph, weights: &Weights) -> Weights {
+        let network = Network::new(graph);
+        let mut state = zero_state(graph, 2);
+        let passes: Vec<Pass> =
+            observations().into_iter().map(|obs| network.forward(weights, obs, &mut state)).collect();
+        let mut grads = weights.zeros_like();
+        let mut d_state = zero_state(graph, 2);
+        for (t, pass) in passes.iter().enumerate().rev() {
+            let cols = pass.output().ncols();
+            let d = Array2::from_shape_fn(pass.output().raw_dim(), |(r, c)| (1 + r * cols + c + t) as f32);
+            network.backward(weights, pass, d, &mut d_state, &mut grads, &mut |_, _, _, _| {});
+        }
+        grads
+    }
+
+    #[test]
+    fn gradients_agree_with_finite_differences() {
+        let graph = graph();
+        let weights = Weights::of(&graph);
+        let grads = gradient(&graph, &weights);
+        let step = 2e-3;
+        let compare = |exact: f32, change: &dyn Fn(&mut Weights, f32)| {
+            let at = |d: f32| {
+                let mut moved = weights.clone();
+                change(&mut moved, d);
+                loss(&graph, &moved)
+            };
+            let numeric = (at(step) - at(-step)) / (2.0 * f64::from(step));
+            let error = (numeric - f64::from(exact)).abs();
+            assert!(error < 0.02 + 0.02 * numeric.abs(), "{numeric} against {exact}");
+        };
+        for m in 0..weights.matrices.len() {
+            for i in 0..weights.matrices[m].len() {
+                let at = (i / weights.matrices[m].ncols(), i % weights.matrices[m].ncols());
+                compare(grads.matrices[m][at], &|w, d| w.matrices[m][at] += d);
+            }
+        }
+        for v in 0..weights.vectors.len() {
+            for k in 0..weights.vectors[v].len() {
+                for i in 0..weights.vectors[v][k].len() {
+                    compare(grads.vectors[v][k][i], &|w, d| w.vectors[v][k][i] += d);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_batch_gives_what_the_evaluator_gives() {
+        let graph = graph();
+        let weights = Weights::of(&graph);
+        let network = Network::new(&graph);
+        let mut state = zero_state(&graph, 2);
+        let mut evaluators = [crate::graph::Evaluator::new(&graph), crate::graph::Evaluator::new(&graph)];
+        for obs in observations() {
+            let pass = network.forward(&weights, obs.clone(), &mut state);
+            for (sample, evaluator) in evaluators.iter_mut().enumerate() {
+                let y = evaluator.step(&obs.row(sample).to_vec(), &mut |_, _| {});
+                for (a, b) in pass.output().row(sample).iter().zip(y) {
+                    assert!((a - b).abs() < 1e-4, "{a} against {b}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,17 @@
+//! What a network is made of beside its operations: values, weight matrices.
+
+/// A value: 0 is the observation; `i + 1` is the output of node `i`.
+pub type ValueId = usize;
+
+/// A weight matrix, row-major, rows are outputs.
+#[derive(Clone, Debug)]
+pub struct WeightMatrix {
+    /// The tensor's name.
+    pub name: String,
+    /// Outputs.
+    pub rows: usize,
+    /// Inputs.
+    pub cols: usize,
+    /// `rows * cols` weights.
+    pub data: Vec<f32>,
+}

@@ -1,0 +1,186 @@
+//! `policy.json`: which keys it may have, and their values as f32.
+
+use actq_kernels::image::Kind;
+use actq_kernels::math::Function;
+use anyhow::{Context, Result, bail, ensure};
+use serde::Deserialize;
+use serde_json::Value;
+
+use crate::contract::ActionContract;
+use crate::strict_json;
+use crate::text::is_control;
+
+#[derive(Deserialize)]
+pub(super) struct Json {
+    pub(super) name: String,
+    kind: Option<String>,
+    pub(super) chunk: Option<usize>,
+    pub(super) execute: Option<usize>,
+    pub(super) obs_dim: usize,
+    pub(super) act_dim: usize,
+    pub(super) control_hz: Option<f64>,
+    action: Option<JsonContract>,
+    pub(super) ops: Vec<JsonOp>,
+}
+
+/// Keys of [`Json`].
+const KEYS: [&str; 9] = ["name", "kind", "chunk", "execute", "obs_dim", "act_dim", "control_hz", "action", "ops"];
+/// Keys that tell people where a policy is from. Their values are not read.
+const ABOUT: [&str; 6] = ["source", "commit", "source_path", "license", "recurrent", "n_params"];
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct JsonContract {
+    scale: Option<Vec<f64>>,
+    offset: Option<Vec<f64>>,
+    low: Option<Vec<f64>>,
+    high: Option<Vec<f64>>,
+    max_step: Option<Vec<f64>>,
+}
+
+/// One op; [`op_keys`] says which keys it may have.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct JsonOp {
+    pub(super) op: String,
+    pub(super) input: Option<Input>,
+    pub(super) save: Option<String>,
+    pub(super) with: Option<String>,
+    pub(super) w: Option<String>,
+    pub(super) b: Option<String>,
+    pub(super) mean: Option<String>,
+    pub(super) scale: Option<String>,
+    pub(super) pre_clip: Option<f64>,
+    pub(super) clip: Option<f64>,
+    pub(super) w_ln: Option<String>,
+    pub(super) b_ln: Option<String>,
+    pub(super) eps: Option<f64>,
+    pub(super) hidden: Option<usize>,
+    pub(super) gates: Option<String>,
+    pub(super) w_ih: Option<String>,
+    pub(super) w_hh: Option<String>,
+    pub(super) b_ih: Option<String>,
+    pub(super) b_hh: Option<String>,
+    pub(super) approximate: Option<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+pub(super) enum Input {
+    One(String),
+    Many(Vec<String>),
+}
+
+impl Json {
+    /// Refuses keys that are not known: one that is ignored would be another policy.
+    pub(super) fn parse(bytes: &[u8]) -> Result<Self> {
+        const WRONG: &str = "not a policy description";
+        let value = strict_json::parse(bytes).context(WRONG)?;
+        // What the keys of an unknown kind are is not known either.
+        kind(value["kind"].as_str())?;
+        if let Some(key) = given(&value).find(|key| !KEYS.contains(key) && !ABOUT.contains(key)) {
+            let (keys, about) = (KEYS.join(", "), ABOUT.join(", "));
+            bail!("the key {key:?} is not known; known are {keys} and, for people alone, {about}");
+        }
+        for (i, op) in value["ops"].as_array().into_iter().flatten().enumerate() {
+            let Some(name) = op["op"].as_str() else { continue };
+            let Some(own) = op_keys(name) else { continue };
+            let keys = [&["op", "input", "save"], own].concat();
+            if let Some(key) = given(op).find(|key| !keys.contains(key)) {
+                bail!("op {i} ({name}) has the key {key:?}; its keys are {}", keys.join(", "));
+            }
+        }
+        for (place, value) in [("name", &value["name"]), ("ops", &value["ops"])] {
+            check_text(place, value)?;
+        }
+        serde_json::from_slice(bytes).context(WRONG)
+    }
+
+    pub(super) fn kind(&self) -> Result<Kind> {
+        kind(self.kind.as_deref())
+    }
+
+    /// The action contract. Without the key `action` a chunk is limited to -1..1, as the reference runtime of the format does.
+    pub(super) fn contract(&self, kind: Kind) -> Result<ActionContract> {
+        let Some(json) = &self.action else {
+            let limit = |at: f32| (kind == Kind::Chunk).then(|| vec![at; self.act_dim]);
+            return Ok(ActionContract { low: limit(-1.0), high: limit(1.0), ..ActionContract::default() });
+        };
+        let array = |name: &str, values: &Option<Vec<f64>>| {
+            let Some(values) = values else { return Ok(None) };
+            let (len, act_dim) = (values.len(), self.act_dim);
+            ensure!(len == act_dim, "action.{name} has {len} values, act_dim is {act_dim}");
+            let one = |(i, v): (usize, &f64)| real(*v, &format!("action.{name}[{i}]"));
+            values.iter().enumerate().map(one).collect::<Result<Vec<f32>>>().map(Some)
+        };
+        Ok(ActionContract {
+            scale: array("scale", &json.scale)?,
+            offset: array("offset", &json.offset)?,
+            low: array("low", &json.low)?,
+            high: array("high", &json.high)?,
+            max_step: array("max_step", &json.max_step)?,
+        })
+    }
+}
+
+/// The keys of an object that have a value; one without says nothing.
+fn given(object: &Value) -> impl Iterator<Item = &str> {
+    object.as_object().into_iter().flatten().filter(|(_, value)| !value.is_null()).map(|(key, _)| key.as_str())
+}
+
+fn kind(name: Option<&str>) -> Result<Kind> {
+    match name {
+        None | Some("step") => Ok(Kind::Step),
+        Some("chunk") => Ok(Kind::Chunk),
+        Some(other) => bail!("kind {other:?} is not supported yet; step and chunk are"),
+    }
+}
+
+/// The keys of an op beside those of every op; `None` for an unknown op.
+fn op_keys(op: &str) -> Option<&'static [&'static str]> {
+    Some(match op {
+        "identity" => &[],
+        "normalize" => &["mean", "scale", "pre_clip", "clip"],
+        "linear" => &["w", "b"],
+        "layernorm" => &["w_ln", "b_ln", "eps"],
+        "rmsnorm" => &["w_ln", "eps"],
+        "add" => &["with"],
+        "lstm" | "gru" => &["hidden", "gates", "w_ih", "w_hh", "b_ih", "b_hh"],
+        "gelu" => &["approximate"],
+        name if Function::ALL.iter().any(|f| f.name() == name) => &[],
+        _ => return None,
+    })
+}
+
+/// Refuses control characters in the text within `value`: names are printed.
+fn check_text(place: &str, value: &Value) -> Result<()> {
+    match value {
+        Value::String(text) => {
+            let control = text.chars().find(|c| is_control(*c));
+            let Some(c) = control else { return Ok(()) };
+            bail!("{place} {text:?} holds the control character U+{:04X}", u32::from(c));
+        }
+        Value::Array(items) => {
+            items.iter().enumerate().try_for_each(|(i, item)| check_text(&format!("{place}[{i}]"), item))
+        }
+        Value::Object(entries) => {
+            entries.iter().try_for_each(|(key, value)| check_text(&format!("{place}.{}", key.escape_debug()), value))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// A number as f32, rounded; refuses what f32 cannot hold.
+pub(super) fn real(value: f64, name: &str) -> Result<f32> {
+    let real = value as f32;
+    ensure!(real.is_finite(), "{name} is {value:?}, beyond float32's range");
+    Ok(real)
+}
+
+/// As [`real`], above 0.
+pub(super) fn positive(value: f64, name: &str) -> Result<f32> {
+    let real = real(value, name)?;
+    let rounded = if value > 0.0 { "float32 rounds that to 0, and " } else { "" };
+    ensure!(real > 0.0, "{name} is {value:?}; {rounded}it must be above 0");
+    Ok(real)
+}

@@ -1,0 +1,65 @@
+//! Arrays as files hold them.
+
+use half::{bf16, f16};
+
+/// An array as it was stored, row-major.
+#[derive(Clone, Debug)]
+pub struct Tensor {
+    /// Length of each axis.
+    pub shape: Vec<usize>,
+    /// The elements.
+    pub values: Values,
+}
+
+/// Elements by type.
+#[derive(Clone, Debug)]
+pub enum Values {
+    /// float32
+    F32(Vec<f32>),
+    /// float64
+    F64(Vec<f64>),
+    /// float16
+    F16(Vec<f16>),
+    /// bfloat16
+    BF16(Vec<bf16>),
+    /// int32
+    I32(Vec<i32>),
+    /// int64
+    I64(Vec<i64>),
+    /// Of a type that neither a policy nor a recording has.
+    Other(String),
+}
+
+impl Values {
+    /// The values as f32, what f32 cannot hold as infinite; `None` where they are of no type of real numbers.
+    pub fn to_f32(&self) -> Option<Vec<f32>> {
+        Some(match self {
+            Self::F32(values) => values.clone(),
+            Self::F64(values) => values.iter().map(|&v| v as f32).collect(),
+            Self::F16(values) => values.iter().map(|v| v.to_f32()).collect(),
+            Self::BF16(values) => values.iter().map(|v| v.to_f32()).collect(),
+            Self::I32(_) | Self::I64(_) | Self::Other(_) => return None,
+        })
+    }
+
+    /// What is wrong with value `i`, which is not a finite f32.
+    pub fn not_f32(&self, i: usize) -> String {
+        match self {
+            Self::F64(values) if values[i].is_finite() => format!("holds {:e}, beyond float32's range,", values[i]),
+            _ => self.to_f32().map_or(String::new(), |values| format!("holds {}", values[i])),
+        }
+    }
+
+    /// The type's name.
+    pub fn type_name(&self) -> &str {
+        match self {
+            Self::F32(_) => "float32",
+            Self::F64(_) => "float64",
+            Self::F16(_) => "float16",
+            Self::BF16(_) => "bfloat16",
+            Self::I32(_) => "int32",
+            Self::I64(_) => "int64",
+            Self::Other(name) => name,
+        }
+    }
+}

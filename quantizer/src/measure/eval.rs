@@ -1,0 +1,183 @@
+//! How far an image's actions are from the f32 policy's.
+
+use std::path::Path;
+
+use actq_kernels::{Head, Image};
+use anyhow::{Context, Result, ensure};
+use serde::Serialize;
+
+use super::size::bits_per_weight;
+use super::unrounded::Unrounded;
+use crate::data::{Dataset, Recording, Sizes};
+use crate::policy::Policy;
+use crate::runtime::with_head;
+
+/// Errors of the raw network output against recorded f32 actions.
+#[derive(Clone, Debug, Serialize)]
+pub struct ErrorReport {
+    /// Mean over the output's dimensions of (mean squared error / variance of the recorded values).
+    pub nmse: f64,
+    /// The largest of these ratios.
+    pub worst_nmse: f64,
+    /// The largest absolute error, in units of the raw output.
+    pub max_abs: f64,
+    /// Observations compared.
+    pub steps: usize,
+    /// Bits per weight, everything counted.
+    pub bpw: f64,
+    /// Bytes of the image.
+    pub bytes: usize,
+    /// Output dimension of `worst_nmse`.
+    #[serde(skip)]
+    pub worst_dimension: usize,
+}
+
+/// Runs `image` over the valid steps of `dataset`, each episode from its starting state, and compares its raw output with the
+/// recorded actions. Dimensions that never vary in the record are left out of the ratios.
+pub fn evaluate(image: Image<'_>, dataset: &Dataset) -> Result<ErrorReport> {
+    with_head(image, |head| compare(&image, dataset, head))
+}
+
+/// What rounding the activations adds to an image's error.
+#[derive(Clone, Debug)]
+pub struct ActivationShare {
+    /// Error of the image's weights with activations in f32.
+    pub unrounded_nmse: f64,
+    /// What is gone then, as a share of the image's error. Below 0 where rounding the activations happens to help.
+    pub share: f64,
+    /// Linear operations, counted from 0, whose input is rounded to more than int8.
+    pub int16: Vec<usize>,
+    /// Number of linear operations.
+    pub linear: usize,
+}
+
+/// Runs the image's weights with activations in f32 over `dataset`, where the image itself has the error `nmse`.
+pub fn activation_share(image: Image<'_>, dataset: &Dataset, nmse: f64) -> Result<ActivationShare> {
+    let unrounded_nmse = compare(&image, dataset, &mut Unrounded::new(image))?.nmse;
+    let limits: Vec<u16> = image.ops().filter_map(|op| op.matrix()).map(|matrix| matrix.x_max).collect();
+    let share = if nmse > 0.0 { (nmse - unrounded_nmse) / nmse } else { 0.0 };
+    let int16 = (0..limits.len()).filter(|&i| limits[i] > 127).collect();
+    Ok(ActivationShare { unrounded_nmse, share, int16, linear: limits.len() })
+}
+
+/// What gives raw outputs, step by step.
+trait Runner {
+    /// Starts an episode from the zero state.
+    fn reset(&mut self);
+    fn state_mut(&mut self) -> &mut [f32];
+    fn infer(&mut self, observation: &[f32]) -> Result<&[f32]>;
+}
+
+impl Runner for Head<'_, '_> {
+    fn reset(&mut self) {
+        Head::reset(self);
+    }
+
+    fn state_mut(&mut self) -> &mut [f32] {
+        Head::state_mut(self)
+    }
+
+    fn infer(&mut self, observation: &[f32]) -> Result<&[f32]> {
+        Ok(Head::infer(self, observation)?)
+    }
+}
+
+impl Runner for Unrounded<'_> {
+    fn reset(&mut self) {
+        Unrounded::state_mut(self).fill(0.0);
+    }
+
+    fn state_mut(&mut self) -> &mut [f32] {
+        Unrounded::state_mut(self)
+    }
+
+    fn infer(&mut self, observation: &[f32]) -> Result<&[f32]> {
+        Unrounded::infer(self, observation)
+    }
+}
+
+fn compare(image: &Image<'_>, dataset: &Dataset, network: &mut impl Runner) -> Result<ErrorReport> {
+    let out_len = image.output().len;
+    let mut error = vec![Moment::default(); out_len];
+    let mut signal = vec![Moment::default(); out_len];
+    let mut max_abs = 0f64;
+    for episode in 0..dataset.length.len() {
+        network.reset();
+        let start = dataset.start(episode).unwrap_or_default();
+        network.state_mut().iter_mut().zip(start).for_each(|(to, from)| *to = from);
+        for (step, obs) in dataset.episode(episode).enumerate() {
+            let at = || format!("{}: episode {episode}, step {step}", dataset.path.display());
+            let out = network.infer(&obs).with_context(at)?;
+            let recorded = dataset.action_at(episode, step).context("array \"action\" is missing")?;
+            for (i, (&y, &r)) in out.iter().zip(&recorded).enumerate() {
+                let difference = f64::from(y) - f64::from(r);
+                error[i].add(difference);
+                signal[i].add(f64::from(r));
+                max_abs = max_abs.max(difference.abs());
+            }
+        }
+    }
+    let ratios: Vec<(usize, f64)> = (0..out_len)
+        .filter(|&i| signal[i].variance() > 0.0)
+        .map(|i| (i, error[i].mean_square() / signal[i].variance()))
+        .collect();
+    ensure!(!ratios.is_empty(), "{}: the recorded actions never vary", dataset.path.display());
+    let (worst_dimension, worst_nmse) = ratios.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default();
+    Ok(ErrorReport {
+        nmse: ratios.iter().map(|r| r.1).sum::<f64>() / ratios.len() as f64,
+        worst_nmse,
+        max_abs,
+        steps: dataset.frames(),
+        bpw: bits_per_weight(image),
+        bytes: image.bytes(),
+        worst_dimension,
+    })
+}
+
+/// The held-out recording of a policy folder, which must belong to `image`.
+pub fn heldout(policy_dir: &Path, image: &Image<'_>) -> Result<Dataset> {
+    heldout_from(Some(policy_dir), None, image)
+}
+
+/// The held-out recording in `file`, or where none is given in the policy's folder. Where it holds no actions, and the folder
+/// holds the policy that the image was made from, that policy gives them.
+pub fn heldout_from(policy_dir: Option<&Path>, file: Option<&Path>, image: &Image<'_>) -> Result<Dataset> {
+    let mut dataset = Recording::Heldout.require(policy_dir, file, Sizes::of_image(image), "actq eval")?;
+    if dataset.action.is_none() {
+        let source = policy_dir.and_then(|dir| Policy::load(dir).ok()).filter(|p| p.digest == image.digest());
+        let source = source.with_context(|| {
+            format!(
+                "{}: array \"action\" is missing, and so is the policy that the image was made from, which could give it: \
+                 name its folder with --policy",
+                dataset.path.display()
+            )
+        })?;
+        dataset.fill_actions(&source.graph);
+    }
+    Ok(dataset)
+}
+
+#[derive(Clone, Default)]
+struct Moment {
+    n: f64,
+    sum: f64,
+    square: f64,
+}
+
+impl Moment {
+    fn add(&mut self, x: f64) {
+        self.n += 1.0;
+        self.sum += x;
+        self.square += x * x;
+    }
+
+    fn mean_square(&self) -> f64 {
+        self.square / self.n
+    }
+
+    fn variance(&self) -> f64 {
+        // A constant sequence leaves rounding noise of either sign.
+        let variance = self.mean_square() - (self.sum / self.n).powi(2);
+        if variance > 1e-12 * self.mean_square() { variance } else { 0.0 }
+    }
+}

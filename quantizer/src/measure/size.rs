@@ -1,0 +1,25 @@
+//! How large an image is, and what its parts are called.
+
+use std::collections::BTreeSet;
+
+use actq_kernels::Image;
+use actq_kernels::image::Matrix;
+
+/// Bits per weight of the policy as it was trained: codes, padding, scales, indexes and block records of all matrices over the
+/// number of the source's weights. A matrix that several operations share counts once.
+pub fn bits_per_weight(image: &Image<'_>) -> f64 {
+    let bytes: usize = distinct(image).iter().map(Matrix::weight_bytes).sum();
+    8.0 * bytes as f64 / image.source_weights().max(1) as f64
+}
+
+/// Bytes as hexadecimal digits.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// The matrices, each once, in the order of the operations that use them first.
+pub fn distinct<'a>(image: &Image<'a>) -> Vec<Matrix<'a>> {
+    let mut seen = BTreeSet::new();
+    let place = |m: &Matrix<'a>| m.blocks().next().map(|rows| rows.block.rows_from(0).as_ptr() as usize);
+    image.ops().filter_map(|op| op.matrix()).filter(|m| seen.insert(place(m))).collect()
+}

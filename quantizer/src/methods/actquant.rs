@@ -1,0 +1,219 @@
+//! ActQuant (Akbari et al., "Sub-4-bit Action-Guided Quantization for Vision-Language-Action Models", arXiv 2605.24011).
+//!
+//! Stage 1 gives each matrix a width: [`score`] measures by HSIC how much it adds to what its values say about the actions,
+//! [`allocation`] spends the budget on these scores. Stage 2 fits the scales inside a matrix: they minimise the rounding error
+//! weighted by the [Fisher](fisher) information of the action loss, by the same search that plain rounding uses. Where the budget is
+//! one width for all, stage 1 is skipped.
+//!
+//! The paper leaves the action head at 16 bits; here it is quantized like everything else. Its blocks are those of llama.cpp, whose
+//! search also multiplies the importance by `sqrt(mean of the row's w^2 + w^2)`; here the importance stands alone, as in the
+//! paper's objective.
+
+pub mod allocation;
+pub mod score;
+
+use actq_kernels::layout::Width;
+use anyhow::{Result, ensure};
+use ndarray::Array2;
+
+use super::options::Options;
+use super::quantized::{Outcome, Quantized};
+use super::scale::{Scales, round_to};
+use crate::budget::Rate;
+use crate::calibrate::fisher;
+use crate::data::Dataset;
+use crate::graph::{Graph, WeightMatrix};
+use score::Score;
+
+/// Share of the matrix's mean importance that every weight has at least. It decides where no recorded frame says anything, as
+/// in rows behind a ReLU that never fires.
+const FLOOR: f64 = 1e-6;
+
+/// What ActQuant takes from the recorded observations, for any number of budgets.
+#[derive(Clone, Debug)]
+pub struct ActionStatistics {
+    /// Stage 1, per matrix.
+    pub scores: Vec<Score>,
+    /// Stage 2, per matrix `[rows, cols]`.
+    pub importance: Vec<Array2<f32>>,
+}
+
+impl ActionStatistics {
+    /// Runs the f32 network over `dataset`, which must hold actions. `progress` gets the share done.
+    pub fn collect(graph: &Graph, dataset: &Dataset, progress: impl FnMut(f64)) -> Result<Self> {
+        let path = dataset.path.display();
+        ensure!(
+            dataset.action.is_some(),
+            "{path}: array \"action\" is missing; actquant weighs weights by the actions"
+        );
+        Ok(Self { scores: score::scores(graph, dataset)?, importance: fisher::importance(graph, dataset, progress)? })
+    }
+
+    /// What the allocation works with: `sens`, negative scores as 0, or 1 for every matrix where none is above 0 (and then
+    /// `true`): scores that tell nothing apart give every layer the same claim.
+    pub fn effective_scores(&self) -> (Vec<f64>, bool) {
+        let scores: Vec<f64> = self.scores.iter().map(|s| s.sens().max(0.0)).collect();
+        if scores.iter().all(|s| *s == 0.0) { (vec![1.0; scores.len()], true) } else { (scores, false) }
+    }
+}
+
+/// Quantizes every matrix of `graph`.
+pub fn quantize(graph: &Graph, statistics: &ActionStatistics, rate: Rate, options: &Options) -> Result<Vec<Outcome>> {
+    let widths = match rate {
+        Rate::Width(width) => vec![width; graph.matrices.len()],
+        Rate::BitsPerWeight(_) => {
+            let scores = statistics.effective_scores().0;
+            allocation::allocate(graph, &scores, options.packing(), rate.bytes(graph.weights()))?
+        }
+    };
+    let matrices = graph.matrices.iter().zip(widths).zip(&statistics.importance);
+    matrices
+        .map(|((matrix, width), importance)| {
+            let quantized = quantize_matrix(matrix, width, options.group, importance);
+            Outcome::new(matrix, quantized, None, options.activations)
+        })
+        .collect()
+}
+
+/// Rounds to nearest with scales that minimise `sum of importance * error^2` of each group, or of each row.
+fn quantize_matrix(matrix: &WeightMatrix, width: Width, group: usize, importance: &Array2<f32>) -> Quantized {
+    let mean = importance.iter().map(|&i| f64::from(i)).sum::<f64>() / importance.len().max(1) as f64;
+    let least = if mean > 0.0 { FLOOR * mean } else { 1.0 };
+    let importance: Vec<f64> = importance.iter().map(|&i| f64::from(i) + least).collect();
+    round_to(matrix, width, Scales::fit(matrix, &vec![Some(width); matrix.rows], group, &importance))
+}
+
+#[cfg(test)]
+pub(crate) mod testing {
+    //! Small networks, and recordings of them.
+
+    use ndarray::Array3;
+
+    use super::*;
+    use crate::graph::Evaluator;
+    use crate::graph::ops::{Linear, Lstm, Pointwise};
+    use crate::random::Random;
+    use actq_kernels::math::Function;
+
+    fn matrix(name: &str, rows: usize, cols: usize, random: &mut Random) -> WeightMatrix {
+        WeightMatrix { name: name.into(), rows, cols, data: (0..rows * cols).map(|_| 0.7 * random.unit()).collect() }
+    }
+
+    fn vector(len: usize, random: &mut Random) -> Vec<f32> {
+        (0..len).map(|_| 0.3 * random.unit()).collect()
+    }
+
+    /// 3 -> 4 tanh -> 2
+    pub(crate) fn mlp() -> Graph {
+        let mut random = Random(1);
+        let mut graph = Graph::new(3);
+        graph.matrices = vec![matrix("a", 4, 3, &mut random), matrix("b", 2, 4, &mut random)];
+        graph.add(Linear { matrix: 0, bias: vector(4, &mut random) }, &[0]).expect("it fits");
+        graph.add(Pointwise(Function::Tanh), &[1]).expect("it fits");
+        graph.add(Linear { matrix: 1, bias: vector(2, &mut random) }, &[2]).expect("it fits");
+        graph
+    }
+
+    /// LSTM 2 -> 3, then 3 -> 2
+    pub(crate) fn lstm() -> Graph {
+        let mut random = Random(2);
+        let mut graph = Graph::new(2);
+        graph.matrices = vec![
+            matrix("w_ih", 12, 2, &mut random),
+            matrix("w_hh", 12, 3, &mut random),
+            matrix("out", 2, 3, &mut random),
+        ];
+        let bias = vector(12, &mut random);
+        graph.add(Lstm { hidden: 3, input: 0, state: 1, bias }, &[0]).expect("it fits");
+        graph.add(Linear { matrix: 2, bias: vector(2, &mut random) }, &[1]).expect("it fits");
+        graph
+    }
+
+    /// Random observations with the network's own actions.
+    pub(crate) fn dataset(graph: &Graph, episodes: usize, steps: usize) -> Dataset {
+        let mut random = Random(3);
+        let obs = Array3::from_shape_fn((episodes, steps, graph.obs_len), |_| random.unit());
+        let mut action = Array3::zeros((episodes, steps, graph.len_of(graph.output())));
+        let mut evaluator = Evaluator::new(graph);
+        for episode in 0..episodes {
+            evaluator.reset();
+            for step in 0..steps {
+                let x: Vec<f32> = (0..graph.obs_len).map(|i| obs[(episode, step, i)]).collect();
+                for (i, y) in evaluator.step(&x, &mut |_, _| {}).into_iter().enumerate() {
+                    action[(episode, step, i)] = y;
+                }
+            }
+        }
+        Dataset { path: "test".into(), obs, action: Some(action), length: vec![steps; episodes], state: None }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::budget::{Budget, BudgetTooSmall};
+    use crate::methods::options::Method;
+    use crate::methods::scale;
+
+    fn quantize_at(graph: &Graph, statistics: &ActionStatistics, rate: Rate) -> Result<Vec<Outcome>> {
+        let options = Options { group: 32, ..Options::new(Method::ActQuant, Budget::BitsPerWeight(3.0)) };
+        quantize(graph, statistics, rate, &options)
+    }
+
+    #[test]
+    fn scales_follow_the_importance() {
+        let data: Vec<f32> = (0..64).map(|i| (i as f32 * 0.7).sin()).collect();
+        let matrix = WeightMatrix { name: "w".into(), rows: 2, cols: 32, data };
+        // Only the even columns of row 0 and the odd ones of row 1 matter.
+        let importance = Array2::from_shape_fn((2, 32), |(r, c)| if r == c % 2 { 1.0 } else { 0.0 });
+        let error = |quantized: &Quantized| -> f64 {
+            let values = quantized.dequantized();
+            (0..64).map(|i| f64::from(importance[(i / 32, i % 32)] * (values[i] - matrix.data[i]).powi(2))).sum()
+        };
+        for width in [Width::W2, Width::W3] {
+            for group in [0, 32] {
+                let weighted = error(&quantize_matrix(&matrix, width, group, &importance));
+                let plain = error(&scale::round_to_nearest(&matrix, width, group));
+                assert!(weighted < plain, "{width:?} group {group}: {weighted} against {plain}");
+            }
+        }
+    }
+
+    #[test]
+    fn equal_importance_is_plain_rounding_and_none_is_too() {
+        let data: Vec<f32> = (0..80).map(|i| (i as f32 * 1.3).cos()).collect();
+        let matrix = WeightMatrix { name: "w".into(), rows: 2, cols: 40, data };
+        let plain = scale::round_to_nearest(&matrix, Width::W3, 32);
+        for level in [0.0, 2.0] {
+            let found = quantize_matrix(&matrix, Width::W3, 32, &Array2::from_elem((2, 40), level));
+            assert_eq!((found.codes, found.scales), (plain.codes.clone(), plain.scales.clone()));
+        }
+    }
+
+    #[test]
+    fn a_budget_is_kept_and_a_width_is_taken_as_it_is() {
+        let graph = testing::lstm();
+        let dataset = testing::dataset(&graph, 2, 24);
+        let statistics = ActionStatistics::collect(&graph, &dataset, |_| {}).expect("statistics");
+        let uniform = quantize_at(&graph, &statistics, Rate::Width(Width::W3)).expect("quantized");
+        assert!(uniform.iter().all(|o| o.quantized.widths.iter().all(|w| *w == Some(Width::W3))));
+        let bytes = |outcomes: &[Outcome]| -> usize { outcomes.iter().map(|o| o.bytes()).sum() };
+        let limit = 8.0 * (bytes(&uniform) + 40) as f64 / graph.weights() as f64;
+        let mixed = quantize_at(&graph, &statistics, Rate::BitsPerWeight(limit)).expect("quantized");
+        assert!(8.0 * bytes(&mixed) as f64 / graph.weights() as f64 <= limit);
+        let error = quantize_at(&graph, &statistics, Rate::BitsPerWeight(0.5)).expect_err("too small");
+        assert!(error.downcast_ref::<BudgetTooSmall>().is_some());
+    }
+
+    #[test]
+    fn actions_are_needed_and_scores_without_a_positive_one_count_as_equal() {
+        let graph = testing::mlp();
+        let mut dataset = testing::dataset(&graph, 1, 8);
+        dataset.action = None;
+        let error = ActionStatistics::collect(&graph, &dataset, |_| {}).expect_err("no actions");
+        assert!(error.to_string().contains("\"action\" is missing"), "{error}");
+        let zero = Score { x_input: 0.0, y_input: 1.0, x_output: 0.0, y_output: 0.5 };
+        let statistics = ActionStatistics { scores: vec![zero; 2], importance: Vec::new() };
+        assert_eq!(statistics.effective_scores(), (vec![1.0; 2], true));
+    }
+}

@@ -1,0 +1,219 @@
+//! The pipeline: how much every row matters, a width for each to the budget, removal of what has none, and distillation, or, with
+//! 0 steps of it, two-sided error feedback.
+
+pub mod allocate;
+pub mod compact;
+pub mod dimension;
+pub mod distill;
+pub mod feedback;
+
+use anyhow::{Result, ensure};
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+use super::options::{Activations, Options};
+use super::quantized::{Outcome, Quantized, RowAllocation};
+use crate::budget::Rate;
+use crate::calibrate::moments::Moments;
+use crate::calibrate::sensitivity::{Side, importance, output_moments};
+use crate::calibrate::windows::Windows;
+use crate::data::Dataset;
+use crate::graph::{Graph, Network, WeightMatrix, Weights};
+use crate::random::Random;
+use allocate::{Rows, allocate, energies, removals};
+use compact::{Compacted, add_to_bias, compact};
+use dimension::{Dimension, dimensions};
+use distill::{Task, distill, loss};
+use feedback::feedback;
+
+/// Frames that learning needs at least.
+const LEAST_FRAMES: usize = 200;
+/// Steps of distillation: of feed-forward and of recurrent networks.
+const STEPS: usize = 8000;
+const WINDOW_STEPS: usize = 1200;
+
+/// The seed of the statistics, which are the same for every budget.
+const SEED: u64 = 1;
+
+/// What the pipeline takes from the recorded observations, for any number of budgets.
+#[derive(Debug)]
+pub struct RowStatistics<'a> {
+    windows: Windows<'a>,
+    /// Importance of every matrix's columns; of its columns about their means; of its rows.
+    inputs: Vec<Vec<f64>>,
+    centred: Vec<Vec<f64>>,
+    outputs: Vec<Vec<f64>>,
+    /// Of every matrix's input.
+    moments: Vec<Moments>,
+    /// `G` of every matrix.
+    output_moments: Vec<DMatrix<f64>>,
+}
+
+impl<'a> RowStatistics<'a> {
+    /// Runs the f32 network over `dataset`, forwards and backwards. `moments` are those of the matrices' inputs.
+    pub fn collect(graph: &'a Graph, dataset: &Dataset, moments: Vec<Moments>) -> Result<Self> {
+        dataset.require_frames(LEAST_FRAMES, "learning from fewer repeats them by heart")?;
+        let windows = Windows::new(graph, dataset);
+        ensure!(
+            windows.output_variance.iter().any(|v| *v > 0.0),
+            "{}: the policy gives the same action at every observation",
+            dataset.path.display()
+        );
+        let output_moments = output_moments(&windows, SEED);
+        Ok(Self {
+            windows,
+            inputs: moments.iter().map(|m| importance(&m.second, Side::Input)).collect(),
+            centred: moments.iter().map(|m| importance(&m.centred(), Side::Input)).collect(),
+            outputs: output_moments.iter().map(|g| importance(g, Side::Output)).collect(),
+            moments,
+            output_moments,
+        })
+    }
+
+    /// Steps of distillation where none are asked for.
+    pub fn default_steps(&self) -> usize {
+        if self.windows.recurrent() { WINDOW_STEPS } else { STEPS }
+    }
+}
+
+/// Quantizes a network. Returns it as it became (hidden elements without bits are gone, biases and norms have learned) and its
+/// quantized matrices. `progress` gets the share done.
+pub fn quantize(
+    graph: &Graph,
+    statistics: &RowStatistics<'_>,
+    rate: Rate,
+    options: &Options,
+    mut progress: impl FnMut(f64),
+) -> Result<(Graph, Vec<Outcome>)> {
+    let RowStatistics { windows, inputs, centred, outputs, moments, .. } = statistics;
+    for (name, _) in &options.forced {
+        let names = || graph.matrices.iter().map(|m| m.name.as_str()).collect::<Vec<_>>().join(", ");
+        ensure!(graph.matrices.iter().any(|m| m.name == *name), "no matrix is named {name:?}; there are {}", names());
+    }
+    let allowed = rate.bytes(graph.weights());
+    let forced = |matrix: &WeightMatrix| match rate {
+        Rate::Width(width) => Some(width),
+        Rate::BitsPerWeight(_) => options.forced.iter().find(|(name, _)| *name == matrix.name).map(|(_, width)| *width),
+    };
+    let dimensions = dimensions(graph);
+    let rows: Vec<Rows> = graph
+        .matrices
+        .iter()
+        .enumerate()
+        .map(|(m, matrix)| {
+            let energy = energies(matrix, &inputs[m], &outputs[m]);
+            let made = Dimension::made_by(&dimensions, m);
+            let removal = made.map_or_else(|| energy.clone(), |d| removals(graph, d, centred, outputs));
+            Rows { energy, removal, forced: forced(matrix) }
+        })
+        .collect();
+    let widths = allocate(graph, &dimensions, &rows, options.packing(), allowed)?;
+    let compacted = compact(graph, &dimensions, &widths, moments);
+    let importance: Vec<Vec<f64>> = compacted
+        .columns
+        .iter()
+        .zip(inputs)
+        .map(|(columns, importance)| columns.iter().map(|&c| importance[c]).collect())
+        .collect();
+    let learned_with = vec![options.activations.limit(); graph.matrices.len()];
+    let steps = options.steps.unwrap_or(statistics.default_steps());
+    let task = Task {
+        graph: &compacted.graph,
+        widths: &compacted.widths,
+        group: options.group,
+        importance: &importance,
+        x_max: &learned_with,
+        steps,
+        seed: options.seed,
+    };
+    let (quantized, learned) = match steps {
+        0 => feed_back(&compacted, options.group, &importance, statistics),
+        _ => distill(&task, windows, |step| progress(step as f64 / steps as f64)),
+    };
+    let wanted = match options.activations {
+        Activations::Auto => choose_activations(&learned, &quantized, windows, options.seed),
+        Activations::Int8 | Activations::Int16 => learned_with.clone(),
+    };
+    let outcome = |quantized: &Quantized, limit: u16| -> Result<Outcome> {
+        Ok(Outcome { x_max: quantized.x_max(limit)?, quantized: quantized.clone(), error: None, allocation: None })
+    };
+    let mut outcomes: Vec<Outcome> =
+        quantized.iter().zip(learned_with).map(|(q, limit)| outcome(q, limit)).collect::<Result<_>>()?;
+    // int16 is packed in another layout, which may pad more; it is taken where it still fits.
+    for (m, &limit) in wanted.iter().enumerate() {
+        let other = outcome(&quantized[m], limit)?;
+        let total = outcomes.iter().map(Outcome::bytes).sum::<usize>() - outcomes[m].bytes() + other.bytes();
+        if total as f64 <= allowed {
+            outcomes[m] = other;
+        }
+    }
+    for (m, ((outcome, rows), widths)) in outcomes.iter_mut().zip(rows).zip(widths).enumerate() {
+        let expected = widths.iter().enumerate().map(|(r, width)| rows.expected(r, *width)).collect();
+        let Rows { energy, removal, .. } = rows;
+        let (rows, columns) = (compacted.rows[m].clone(), compacted.columns[m].clone());
+        let allocation = RowAllocation { widths, energy, removal, expected, inputs: inputs[m].clone(), rows, columns };
+        outcome.allocation = Some(allocation);
+    }
+    Ok((learned, outcomes))
+}
+
+/// Quantizes without learning: every matrix by two-sided error feedback, the mean error into the biases.
+fn feed_back(
+    compacted: &Compacted,
+    group: usize,
+    importance: &[Vec<f64>],
+    statistics: &RowStatistics<'_>,
+) -> (Vec<Quantized>, Graph) {
+    let part = |second: &DMatrix<f64>, of: &[usize]| second.select_rows(of).select_columns(of);
+    let mut graph = compacted.graph.clone();
+    let one = |m: usize| {
+        let (columns, moments) = (&compacted.columns[m], &statistics.moments[m]);
+        let input = Moments {
+            second: part(&moments.second, columns),
+            mean: columns.iter().map(|&c| moments.mean[c]).collect(),
+            count: moments.count,
+        };
+        let output = part(&statistics.output_moments[m], &compacted.rows[m]);
+        feedback(&compacted.graph.matrices[m], &compacted.widths[m], group, &importance[m], &input, &output)
+    };
+    let found: Vec<(Quantized, Vec<f32>)> = (0..graph.matrices.len()).into_par_iter().map(one).collect();
+    let quantized = found.into_iter().enumerate().map(|(m, (quantized, shift))| {
+        add_to_bias(&mut graph, m, &shift);
+        quantized
+    });
+    (quantized.collect(), graph)
+}
+
+/// An int16 input must lower the error by this share of it, and by more the more of the weights are behind it: its kernel takes
+/// 1.3 to 1.7 times as long.
+const WORTH: f32 = 0.03;
+const WORTH_OF_ALL: f32 = 0.12;
+/// Batches that the choice is measured on, and samples in each.
+const MEASURED: usize = 8;
+const SAMPLES: usize = 256;
+
+/// int16 for each matrix whose input, rounded to int8, adds more to the error than int16 costs in time; int8 for the others.
+fn choose_activations(graph: &Graph, quantized: &[Quantized], windows: &Windows<'_>, seed: u64) -> Vec<u16> {
+    let mut weights = Weights::of(graph);
+    for (weights, quantized) in weights.matrices.iter_mut().zip(quantized) {
+        weights.iter_mut().zip(quantized.dequantized()).for_each(|(w, q)| *w = q);
+    }
+    let error = |x_max: &[u16]| -> f32 {
+        let network = Network::rounded(graph, x_max);
+        let samples = (SAMPLES / windows.window).max(8);
+        let batches = (0..MEASURED).map(|i| windows.batch(samples, false, &mut Random(seed + i as u64)));
+        batches.map(|batch| loss(&network, &weights, windows, batch)).sum()
+    };
+    let int8 = vec![127; quantized.len()];
+    let with_int8 = error(&int8);
+    let weights_of = |q: &Quantized| (q.rows * q.cols) as f32;
+    let all: f32 = quantized.iter().map(weights_of).sum();
+    (0..quantized.len())
+        .map(|m| {
+            let mut x_max = int8.clone();
+            x_max[m] = i16::MAX as u16;
+            let worth = WORTH + WORTH_OF_ALL * weights_of(&quantized[m]) / all;
+            if with_int8 - error(&x_max) > worth * with_int8 { i16::MAX as u16 } else { 127 }
+        })
+        .collect()
+}

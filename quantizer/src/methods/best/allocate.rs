@@ -1,0 +1,150 @@
+//! A width for every row, to a budget.
+//!
+//! Rows (output neurons) differ far more in what they do to the actions than columns do. Row `r` at width `b` is expected to
+//! cost `eps_b * g_r * sum_c w_rc^2 h_c` of squared action error; one Lagrange multiplier, found by bisection, weighs that
+//! against bits. A row of 0 bits gives its bias alone; where its output only feeds matrices through elementwise functions, it
+//! disappears with the columns that it fed (see [`mod@super::compact`]): what those columns carried is its error, and their bits
+//! count as its saving.
+
+use actq_kernels::Width;
+use actq_kernels::image::block_bytes;
+use anyhow::{Result, ensure};
+
+use super::dimension::{Dimension, Widths};
+use crate::budget::BudgetTooSmall;
+use crate::graph::{Graph, WeightMatrix};
+use crate::methods::options::Packing;
+
+/// Expected squared error of a row in units of its own energy: that of the mid-rise grid with error feedback. At 8 bits more
+/// than rounding costs (0.00005), so that 8 bits go only where 4 are far from enough: learning mends the difference.
+fn epsilon(width: Width) -> f64 {
+    match width {
+        Width::W2 => 0.125,
+        Width::W3 => 0.036,
+        Width::W4 => 0.0102,
+        Width::W8 => 0.0003,
+    }
+}
+
+/// Widths that a row may have.
+const CHOICES: [Option<Width>; 5] = [None, Some(Width::W2), Some(Width::W3), Some(Width::W4), Some(Width::W8)];
+
+/// What the allocation needs to know of a matrix.
+#[derive(Clone, Debug)]
+pub struct Rows {
+    /// `g_r * sum_c w_rc^2 h_c` of each row.
+    pub energy: Vec<f64>,
+    /// Error of leaving each row without bits.
+    pub removal: Vec<f64>,
+    /// The width that is forced, for all rows.
+    pub forced: Option<Width>,
+}
+
+impl Rows {
+    /// The expected error of row `r` at a width.
+    pub fn expected(&self, r: usize, width: Option<Width>) -> f64 {
+        width.map_or(self.removal[r], |width| epsilon(width) * self.energy[r])
+    }
+}
+
+/// The energies of a matrix's rows for the importances of its columns (`h`) and rows (`g`).
+pub fn energies(matrix: &WeightMatrix, h: &[f64], g: &[f64]) -> Vec<f64> {
+    let rows = matrix.data.chunks_exact(matrix.cols).zip(g);
+    rows.map(|(row, g)| g * row.iter().zip(h).map(|(w, h)| f64::from(*w).powi(2) * h).sum::<f64>()).collect()
+}
+
+/// The error of removing each element of `dimension`: the energies of the columns that it feeds, for the importances `h` of
+/// those columns about their means (which go into the biases) and `g` of the rows that they reach, by matrix.
+pub fn removals(graph: &Graph, dimension: &Dimension, h: &[Vec<f64>], g: &[Vec<f64>]) -> Vec<f64> {
+    let mut removals = vec![0.0; graph.matrices[dimension.maker].rows];
+    for &consumer in &dimension.consumers {
+        let matrix = &graph.matrices[consumer];
+        for (row, g) in matrix.data.chunks_exact(matrix.cols).zip(&g[consumer]) {
+            for (c, (removal, w)) in removals.iter_mut().zip(row).enumerate() {
+                *removal += g * f64::from(*w).powi(2) * h[consumer][c];
+            }
+        }
+    }
+    removals
+}
+
+/// Bytes of all matrices with these widths: rows without bits and the columns that compaction removes are gone, everything
+/// else is counted. Rows of a `dimension` are sorted by width, others are indexed where widths are mixed.
+pub fn bytes(graph: &Graph, dimensions: &[Dimension], widths: &Widths, packing: Packing) -> usize {
+    (0..graph.matrices.len())
+        .map(|m| {
+            let kept_cols = Dimension::feeding(dimensions, m).map_or(graph.matrices[m].cols, |d| d.kept(widths).max(1));
+            let sorted = Dimension::made_by(dimensions, m).is_some();
+            let used: Vec<(Width, usize)> = Width::ALL
+                .into_iter()
+                .map(|w| (w, widths[m].iter().filter(|b| **b == Some(w)).count()))
+                .filter(|(_, n)| *n > 0)
+                .collect();
+            let all_rows = used.iter().map(|(_, n)| n).sum::<usize>() == widths[m].len();
+            let one_width = used.len() == 1 && all_rows;
+            let indexed = !(sorted || one_width);
+            used.iter().map(|&(width, rows)| block_bytes(packing.shape(width, rows, kept_cols), indexed)).sum::<usize>()
+        })
+        .sum()
+}
+
+/// Chooses the widths so that [`bytes`] stays within `limit`.
+pub fn allocate(
+    graph: &Graph,
+    dimensions: &[Dimension],
+    rows: &[Rows],
+    packing: Packing,
+    limit: f64,
+) -> Result<Widths> {
+    let at = |multiplier: f64| choose(graph, dimensions, rows, multiplier);
+    // Multipliers in units of error per bit; the range covers everything from 8 bits to none for any scale of energies.
+    let largest = rows.iter().flat_map(|r| &r.energy).fold(1e-300f64, |m, e| m.max(*e));
+    let (mut low, mut high) = ((largest * 1e-18).ln(), (largest * 10.0).ln());
+    let least = bytes(graph, dimensions, &at(high.exp()), packing);
+    ensure!(least as f64 <= limit, BudgetTooSmall { bytes: least, limit, weights: graph.weights() });
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if bytes(graph, dimensions, &at(middle.exp()), packing) as f64 <= limit {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    Ok(at(high.exp()))
+}
+
+/// The widths that minimise error plus `multiplier` times bits. What a removed row saves elsewhere depends on the other rows'
+/// widths, so the choice is repeated until it settles.
+fn choose(graph: &Graph, dimensions: &[Dimension], rows: &[Rows], multiplier: f64) -> Widths {
+    let mut widths: Widths = graph.matrices.iter().map(|m| vec![Some(Width::W2); m.rows]).collect();
+    for _ in 0..4 {
+        let bits_of = |m: usize| -> f64 { widths[m].iter().flatten().map(|w| f64::from(w.bits())).sum() };
+        let next: Widths = (0..graph.matrices.len())
+            .map(|m| {
+                let cols = Dimension::feeding(dimensions, m).map_or(graph.matrices[m].cols, |d| d.kept(&widths)) as f64;
+                let made = Dimension::made_by(dimensions, m);
+                // One bit per bit of each row that a column crosses.
+                let saving: f64 = made.map_or(0.0, |d| d.consumers.iter().map(|&c| bits_of(c)).sum());
+                let overhead = if made.is_some() { 16.0 } else { 32.0 };
+                let cost = |r: usize, width: Option<Width>| {
+                    let bits = width.map_or(-saving, |width| cols * f64::from(width.bits()) + overhead);
+                    rows[m].expected(r, width) + multiplier * bits
+                };
+                let best = |r: usize| {
+                    let order = |a: &&Option<Width>, b: &&Option<Width>| cost(r, **a).total_cmp(&cost(r, **b));
+                    rows[m].forced.or_else(|| CHOICES.iter().min_by(order).copied().flatten())
+                };
+                (0..rows[m].energy.len()).map(best).collect()
+            })
+            .collect();
+        widths = next;
+        // A matrix without any rows would cut the actions off from the observations.
+        for (widths, rows) in widths.iter_mut().zip(rows) {
+            if widths.iter().all(Option::is_none) {
+                let most = (0..rows.energy.len()).max_by(|&a, &b| rows.energy[a].total_cmp(&rows.energy[b]));
+                widths[most.unwrap_or(0)] = Some(Width::W2);
+            }
+        }
+    }
+    widths
+}

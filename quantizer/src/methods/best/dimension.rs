@@ -1,0 +1,129 @@
+//! Hidden vectors whose elements may be permuted, and folded into biases where they are constant: those that one matrix makes
+//! and that reach only matrices, through elementwise functions.
+
+use actq_kernels::Width;
+
+use crate::graph::operation::{Operand, Product};
+use crate::graph::{Graph, NodeKind};
+
+/// Per matrix the width of every row; `None` for rows without bits.
+pub type Widths = Vec<Vec<Option<Width>>>;
+
+/// A hidden vector that may be permuted and pruned. Numbers are matrices of the graph.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Dimension {
+    /// The matrix whose rows make it.
+    pub maker: usize,
+    /// The matrices whose columns it feeds.
+    pub consumers: Vec<usize>,
+    /// The linear node that makes it.
+    pub node: usize,
+}
+
+impl Dimension {
+    /// The dimension that feeds matrix `m`.
+    pub fn feeding(dimensions: &[Self], m: usize) -> Option<&Self> {
+        dimensions.iter().find(|d| d.consumers.contains(&m))
+    }
+
+    /// The dimension that matrix `m` makes.
+    pub fn made_by(dimensions: &[Self], m: usize) -> Option<&Self> {
+        dimensions.iter().find(|d| d.maker == m)
+    }
+
+    /// How many of its elements have bits.
+    pub fn kept(&self, widths: &Widths) -> usize {
+        widths[self.maker].iter().flatten().count()
+    }
+
+    /// The kept elements, narrow to wide.
+    pub fn order(&self, widths: &Widths) -> Vec<usize> {
+        let of = |width: Width| (0..widths[self.maker].len()).filter(move |&r| widths[self.maker][r] == Some(width));
+        Width::ALL.into_iter().flat_map(of).collect()
+    }
+}
+
+/// The dimensions of a graph.
+pub fn dimensions(graph: &Graph) -> Vec<Dimension> {
+    let linear = |n: usize| match &graph.nodes[n].kind {
+        NodeKind::Linear(linear) if uses(graph, linear.matrix) == 1 => Some(linear.matrix),
+        _ => None,
+    };
+    (0..graph.nodes.len())
+        .filter_map(|node| {
+            let maker = linear(node)?;
+            let mut value = node + 1;
+            // Follow the elementwise functions as long as the value has no other reader.
+            loop {
+                if value == graph.output() {
+                    return None;
+                }
+                let next = graph.readers(value);
+                match next[..] {
+                    [one] if matches!(graph.nodes[one].kind, NodeKind::Pointwise(_)) => value = one + 1,
+                    _ => {
+                        let consumers = next.into_iter().map(|n| consumers(graph, n)).collect::<Option<Vec<_>>>()?;
+                        let consumers = consumers.concat();
+                        return (!consumers.is_empty()).then_some(Dimension { maker, consumers, node });
+                    }
+                }
+            }
+        })
+        .collect()
+}
+
+/// How many nodes use a matrix.
+fn uses(graph: &Graph, matrix: usize) -> usize {
+    graph.nodes.iter().filter(|node| node.kind.products().iter().any(|p| p.matrix == matrix)).count()
+}
+
+/// The matrices through which a node reads its input, where that is all it does with it, and nobody else uses them.
+fn consumers(graph: &Graph, node: usize) -> Option<Vec<usize>> {
+    let of_input = |product: &Product| product.operand == Operand::Input;
+    let products = graph.nodes[node].kind.products().into_iter().filter(of_input);
+    let matrices: Vec<usize> = products.map(|product| product.matrix).collect();
+    let alone = !matrices.is_empty() && matrices.iter().all(|&m| uses(graph, m) == 1);
+    alone.then_some(matrices)
+}
+
+#[cfg(test)]
+pub(super) mod testing {
+    use actq_kernels::math::Function;
+
+    use super::*;
+    use crate::graph::WeightMatrix;
+    use crate::graph::ops::{Add, Linear, Pointwise};
+
+    /// 3 -> 5 tanh -> [2 and, through a residual sum, 5] with values that differ everywhere.
+    pub(in crate::methods::best) fn graph() -> Graph {
+        let mut graph = Graph::new(3);
+        let mut matrix = |rows: usize, cols: usize| {
+            let data = (0..rows * cols).map(|i| ((i * 7 + rows) as f32 * 0.37).sin()).collect();
+            graph.matrices.push(WeightMatrix { name: "m".into(), rows, cols, data });
+        };
+        matrix(5, 3);
+        matrix(4, 5);
+        matrix(4, 4);
+        let bias = |n: usize| (0..n).map(|i| 0.1 * i as f32 - 0.2).collect();
+        let mut push = |kind: NodeKind, inputs: &[usize]| graph.add(kind, inputs).expect("it fits");
+        push(Linear { matrix: 0, bias: bias(5) }.into(), &[0]);
+        push(Pointwise(Function::Tanh).into(), &[1]);
+        push(Linear { matrix: 1, bias: bias(4) }.into(), &[2]);
+        push(Linear { matrix: 2, bias: bias(4) }.into(), &[3]);
+        push(Add.into(), &[4, 3]);
+        graph
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::testing::graph;
+    use super::*;
+
+    #[test]
+    fn only_what_feeds_matrices_alone_is_a_dimension() {
+        // The second matrix's output is also summed, the third's is the network's output.
+        let expected = Dimension { maker: 0, consumers: vec![1], node: 0 };
+        assert_eq!(dimensions(&graph()), vec![expected]);
+    }
+}

@@ -1,0 +1,119 @@
+//! What to quantize to.
+
+use std::fmt;
+
+use actq_kernels::Width;
+use actq_kernels::layout::{BlockShape, GROUPS, Lanes, is_group};
+use anyhow::{Result, ensure};
+
+use crate::budget::Budget;
+
+/// How codes are chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Round to nearest, scales by least squared weight error.
+    Rtn,
+    /// Column-wise error feedback with the second moment of the matrix's input (GPTQ, arXiv 2210.17323).
+    Gptq,
+    /// Round to nearest, widths by HSIC scores, scales by the Fisher information of the action loss (ActQuant, arXiv
+    /// 2605.24011).
+    ActQuant,
+    /// Widths by rows, pruning and distillation ([`super::best`]).
+    Best,
+}
+
+impl Method {
+    /// Columns per u8 scale where the user asks for none in particular. Error feedback and learning make good what one scale
+    /// a row loses; rounding has only its scales.
+    pub fn default_group(self) -> usize {
+        match self {
+            Self::Rtn | Self::ActQuant => 32,
+            Self::Gptq | Self::Best => 0,
+        }
+    }
+}
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Rtn => "rtn",
+            Self::Gptq => "gptq",
+            Self::ActQuant => "actquant",
+            Self::Best => "best",
+        })
+    }
+}
+
+/// Bits of the activations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Activations {
+    /// -127 to 127
+    Int8,
+    /// Up to -32767 to 32767, as far as the int32 accumulator allows.
+    Int16,
+    /// int16 where it lowers the error noticeably, int8 elsewhere; methods that do not measure take int8.
+    Auto,
+}
+
+impl Activations {
+    /// The largest magnitude.
+    pub fn limit(self) -> u16 {
+        match self {
+            Self::Int8 | Self::Auto => 127,
+            Self::Int16 => i16::MAX as u16,
+        }
+    }
+}
+
+/// What to quantize to.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// How codes are chosen.
+    pub method: Method,
+    /// What the image may cost.
+    pub budget: Budget,
+    /// Columns per u8 scale; 0 = one scale a row.
+    pub group: usize,
+    /// Bits of the activations.
+    pub activations: Activations,
+    /// Steps of distillation; None: as many as suit the network.
+    pub steps: Option<usize>,
+    /// Seed of everything that is drawn.
+    pub seed: u64,
+    /// Matrices, by their tensors' names, whose rows all get a certain width (method best).
+    pub forced: Vec<(String, Width)>,
+}
+
+/// How rows are packed, beside their widths.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Packing {
+    /// Lanes of the activations.
+    pub lanes: Lanes,
+    /// Columns per u8 scale; 0 = none.
+    pub group: usize,
+}
+
+impl Packing {
+    /// The shape of a block of rows.
+    pub fn shape(self, width: Width, rows: usize, cols: usize) -> BlockShape {
+        BlockShape { width, lanes: self.lanes, rows, cols, group: self.group }
+    }
+}
+
+impl Options {
+    /// Refuses groups that no kernel has.
+    pub fn check(&self) -> Result<()> {
+        ensure!(is_group(self.group), "group is {}, it must be 0 or one of {GROUPS:?}", self.group);
+        Ok(())
+    }
+
+    /// How matrices are packed before any of them is found to need int16 activations.
+    pub fn packing(&self) -> Packing {
+        Packing { lanes: Lanes::of(self.activations.limit(), self.group), group: self.group }
+    }
+
+    /// A method and a budget, one scale a row, everything else as it suits the method.
+    pub fn new(method: Method, budget: Budget) -> Self {
+        Self { method, budget, group: 0, activations: Activations::Auto, steps: None, seed: 1, forced: Vec::new() }
+    }
+}

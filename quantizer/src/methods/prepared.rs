@@ -1,0 +1,124 @@
+//! A method with all that it needs to know about the recorded observations.
+
+use anyhow::{Context as _, Result, ensure};
+
+use super::actquant::score::Score;
+use super::actquant::{self, ActionStatistics};
+use super::best::{self, RowStatistics};
+use super::matrixwise;
+use super::options::{Method, Options};
+use super::quantized::Outcome;
+use crate::budget::Rate;
+use crate::calibrate::moments::{Moments, collect};
+use crate::data::{Dataset, Recording};
+use crate::graph::Graph;
+
+/// Frames that every method with a recording needs at least; best needs more.
+const LEAST_FRAMES: usize = 16;
+
+/// A method made ready once, to quantize a network at any number of rates.
+#[derive(Debug)]
+pub struct PreparedMethod<'a> {
+    graph: &'a Graph,
+    statistics: Statistics<'a>,
+}
+
+/// What a method takes from the recorded observations.
+#[derive(Debug)]
+enum Statistics<'a> {
+    Rtn,
+    Gptq(Vec<Moments>),
+    ActQuant(ActionStatistics),
+    Best(Box<RowStatistics<'a>>),
+}
+
+impl<'a> PreparedMethod<'a> {
+    /// Collects what the method needs from `calib`, a recording that fits the network. `progress` gets the share done.
+    pub fn new(
+        graph: &'a Graph,
+        method: Method,
+        calib: Option<&Dataset>,
+        mut progress: impl FnMut(f64),
+    ) -> Result<Self> {
+        let calib = || -> Result<&Dataset> {
+            let calib = calib.with_context(|| Recording::Calib.missing(&method.to_string()))?;
+            calib.require_frames(LEAST_FRAMES, "statistics of fewer are those of a few chance observations")?;
+            Ok(calib)
+        };
+        let mut moments = |dataset: &Dataset| {
+            let all = dataset.frames().max(1) as f64;
+            collect(graph, dataset, |frames| progress(frames as f64 / all))
+        };
+        let statistics = match method {
+            Method::Rtn => Statistics::Rtn,
+            Method::Gptq => Statistics::Gptq(moments(calib()?)),
+            Method::ActQuant => Statistics::ActQuant(ActionStatistics::collect(graph, calib()?, progress)?),
+            Method::Best => {
+                let dataset = calib()?;
+                let moments = moments(dataset);
+                Statistics::Best(Box::new(RowStatistics::collect(graph, dataset, moments)?))
+            }
+        };
+        Ok(Self { graph, statistics })
+    }
+
+    /// The method.
+    pub fn method(&self) -> Method {
+        match self.statistics {
+            Statistics::Rtn => Method::Rtn,
+            Statistics::Gptq(_) => Method::Gptq,
+            Statistics::ActQuant(_) => Method::ActQuant,
+            Statistics::Best(_) => Method::Best,
+        }
+    }
+
+    /// Quantizes the network: as it became (it may have lost elements, its biases may have learned), and its matrices.
+    /// `options.method` is the one that was prepared; not `options.budget` counts, but `rate`. `progress` gets the share done.
+    pub fn quantize(&self, rate: Rate, options: &Options, progress: impl FnMut(f64)) -> Result<(Graph, Vec<Outcome>)> {
+        let (graph, method) = (self.graph, self.method());
+        ensure!(options.method == method, "prepared for {method}, not for {}", options.method);
+        ensure!(
+            options.forced.is_empty() || method == Method::Best,
+            "widths of single matrices go with method best, not with {method}"
+        );
+        options.check()?;
+        let outcomes = match &self.statistics {
+            Statistics::Rtn => matrixwise::quantize(graph, None, rate, options)?,
+            Statistics::Gptq(moments) => matrixwise::quantize(graph, Some(moments), rate, options)?,
+            Statistics::ActQuant(statistics) => actquant::quantize(graph, statistics, rate, options)?,
+            Statistics::Best(statistics) => return best::quantize(graph, statistics, rate, options, progress),
+        };
+        Ok((graph.clone(), outcomes))
+    }
+
+    /// Steps of distillation with these options; 0 for methods that do not learn.
+    pub fn steps(&self, options: &Options) -> usize {
+        match &self.statistics {
+            Statistics::Best(statistics) => options.steps.unwrap_or(statistics.default_steps()),
+            _ => 0,
+        }
+    }
+
+    /// ActQuant's statistics; other methods have none.
+    pub fn action_statistics(&self) -> Option<&ActionStatistics> {
+        match &self.statistics {
+            Statistics::ActQuant(statistics) => Some(statistics),
+            _ => None,
+        }
+    }
+
+    /// ActQuant's scores, per matrix; empty for other methods.
+    pub fn scores(&self) -> &[Score] {
+        self.action_statistics().map_or(&[], |statistics| &statistics.scores)
+    }
+}
+
+/// Quantizes a network once, by any method: see [`PreparedMethod::quantize`].
+pub fn quantize(
+    graph: &Graph,
+    calib: Option<&Dataset>,
+    rate: Rate,
+    options: &Options,
+) -> Result<(Graph, Vec<Outcome>)> {
+    PreparedMethod::new(graph, options.method, calib, |_| {})?.quantize(rate, options, |_| {})
+}

@@ -1,0 +1,14 @@
+//! From a policy and its recordings to an image: what the command calls, and whoever else wants images. Nothing here prints or
+//! writes files.
+
+mod budgets;
+mod quantizer;
+mod search;
+pub mod stats;
+pub mod sweep;
+mod time;
+mod tries;
+
+pub use budgets::quantize;
+pub use quantizer::{QuantizedPolicy, Quantizer};
+pub use tries::{Search, Try};

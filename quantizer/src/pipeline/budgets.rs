@@ -1,0 +1,41 @@
+//! Every budget comes down to a rate.
+
+use anyhow::Result;
+
+use super::quantizer::{QuantizedPolicy, Quantizer};
+use super::{search, time};
+use crate::budget::{Budget, Rate};
+use crate::data::Recordings;
+use crate::methods::Options;
+use crate::policy::Policy;
+
+/// Makes one image: [`Quantizer::new`] and [`Quantizer::quantize`]. `progress` gets what is being done and the share of it that
+/// is done.
+pub fn quantize(
+    policy: &Policy,
+    recordings: &Recordings,
+    options: &Options,
+    mut progress: impl FnMut(&str, f64),
+) -> Result<QuantizedPolicy> {
+    let quantizer = Quantizer::new(policy, recordings, options.method, |share| progress("calibrating", share))?;
+    quantizer.quantize(options, progress)
+}
+
+impl Quantizer<'_> {
+    /// Makes an image within `options.budget`. `progress` gets what is being done and the share of it that is done.
+    ///
+    /// # Errors
+    ///
+    /// [`crate::budget::BudgetTooSmall`] where not even the fewest bits keep a budget of bits or bytes. The words of the others
+    /// say what can be had.
+    pub fn quantize(&self, options: &Options, mut progress: impl FnMut(&str, f64)) -> Result<QuantizedPolicy> {
+        let rate = match options.budget {
+            Budget::Width(width) => Rate::Width(width),
+            Budget::BitsPerWeight(bits) => Rate::BitsPerWeight(bits),
+            Budget::ImageBytes(bytes) => self.within_image(bytes)?,
+            Budget::MaxNmse(limit) => return search::smallest(self, options, limit, progress),
+            Budget::Time(limit) => return time::most_bits(self, options, limit, |share| progress("quantizing", share)),
+        };
+        self.at(rate, options, |share| progress("quantizing", share))
+    }
+}

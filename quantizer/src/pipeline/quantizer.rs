@@ -1,0 +1,85 @@
+//! A policy and a method made ready, and the images that they give.
+
+use actq_kernels::Width;
+use anyhow::{Result, ensure};
+
+use super::tries::Search;
+use crate::budget::{Budget, Rate};
+use crate::data::Recordings;
+use crate::emit;
+use crate::measure::time::StepTime;
+use crate::methods::{self, Method, Options, Outcome, PreparedMethod};
+use crate::policy::Policy;
+use crate::runtime::ImageBuffer;
+
+/// A policy and a method made ready once, to make images for any number of budgets.
+#[derive(Debug)]
+pub struct Quantizer<'a> {
+    pub(super) policy: &'a Policy,
+    pub(super) recordings: &'a Recordings,
+    pub(super) method: PreparedMethod<'a>,
+}
+
+/// What became of a policy.
+#[derive(Debug)]
+pub struct QuantizedPolicy {
+    /// The policy as it became: its graph may have lost elements, its biases may have learned.
+    pub policy: Policy,
+    /// Its matrices.
+    pub outcomes: Vec<Outcome>,
+    /// The image.
+    pub image: Vec<u8>,
+    /// What the weights were quantized to.
+    pub rate: Rate,
+    /// Steps of distillation; 0 for methods that do not learn.
+    pub steps: usize,
+    /// What was tried, where the budget is an error.
+    pub search: Option<Search>,
+    /// The predicted step, where the budget is a time.
+    pub time: Option<StepTime>,
+}
+
+impl<'a> Quantizer<'a> {
+    /// Collects what the method needs from the calibration recording. `progress` gets the share done.
+    pub fn new(
+        policy: &'a Policy,
+        recordings: &'a Recordings,
+        method: Method,
+        progress: impl FnMut(f64),
+    ) -> Result<Self> {
+        let method = PreparedMethod::new(&policy.graph, method, recordings.calib.as_ref(), progress)?;
+        Ok(Self { policy, recordings, method })
+    }
+
+    /// The method with its statistics.
+    pub fn method(&self) -> &PreparedMethod<'a> {
+        &self.method
+    }
+
+    /// Makes an image at a rate; `options.budget` does not count.
+    pub(super) fn at(&self, rate: Rate, options: &Options, progress: impl FnMut(f64)) -> Result<QuantizedPolicy> {
+        let (graph, outcomes) = self.method.quantize(rate, options, progress)?;
+        let policy = Policy { graph, ..self.policy.clone() };
+        let image = emit::image(&policy, &outcomes)?;
+        let steps = self.method.steps(options);
+        Ok(QuantizedPolicy { policy, outcomes, image, rate, steps, search: None, time: None })
+    }
+
+    /// The rate that leaves room for everything else in an image of `bytes` bytes.
+    pub(super) fn within_image(&self, bytes: usize) -> Result<Rate> {
+        let rate = Rate::Width(Width::W2);
+        let options = Options::new(Method::Rtn, Budget::Width(Width::W2));
+        let (_, plain) = methods::quantize(&self.policy.graph, None, rate, &options)?;
+        let weights: usize = plain.iter().map(Outcome::bytes).sum();
+        let rest = emit::image(self.policy, &plain)?.len() - weights;
+        ensure!(bytes > rest, "{bytes} bytes are allowed, but all but the weights already takes {rest}");
+        Ok(Rate::BitsPerWeight(8.0 * (bytes - rest) as f64 / self.policy.graph.weights().max(1) as f64))
+    }
+}
+
+impl QuantizedPolicy {
+    /// The image where the executor can run it.
+    pub fn buffer(&self) -> ImageBuffer {
+        ImageBuffer::new(&self.image)
+    }
+}

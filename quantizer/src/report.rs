@@ -1,0 +1,10 @@
+//! Tables, notes and pictures for people.
+
+pub mod inspect;
+pub mod notes;
+pub mod plot;
+pub mod quantized;
+pub mod sweep;
+pub mod table;
+pub mod time;
+pub mod widths;

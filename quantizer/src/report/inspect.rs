@@ -1,0 +1,80 @@
+//! What is in an image, for people.
+
+use std::fmt::Write as _;
+
+use actq_kernels::Image;
+use actq_kernels::image::Matrix;
+use actq_kernels::image::{Kind, Op, OpKind, Region};
+
+use super::table::{group_name, table};
+use crate::measure::size::{bits_per_weight, hex};
+use crate::text::printable;
+
+/// Widths of a matrix's rows as text: `3`, or `2x200 4x56` where they differ.
+pub fn widths(matrix: &Matrix<'_>) -> String {
+    let blocks: Vec<_> = matrix.blocks().map(|rows| rows.block.shape()).collect();
+    match &blocks[..] {
+        [] => "0".to_owned(),
+        [one] if one.rows == matrix.rows => one.width.bits().to_string(),
+        many => many.iter().map(|s| format!("{}x{}", s.width.bits(), s.rows)).collect::<Vec<_>>().join(" "),
+    }
+}
+
+/// The report that `actq inspect` prints.
+pub fn report(image: &Image<'_>) -> String {
+    let mut text = String::new();
+    let digest = hex(&image.digest());
+    let kind = match image.kind() {
+        Kind::Step => "step".to_owned(),
+        Kind::Chunk => format!("chunk of {}, {} executed", image.chunk(), image.execute()),
+    };
+    let (obs, act) = (image.obs_len(), image.act_len());
+    let rate = image.rate_hz();
+    let _ = writeln!(text, "policy        {}", printable(image.name()));
+    let _ = writeln!(text, "source        sha256 {digest}");
+    let _ = writeln!(text, "image         {} bytes, crc32 {:08x}", image.bytes(), image.crc());
+    let _ = writeln!(text, "kind          {kind}, {obs} observations -> {act} actions at {rate} Hz");
+    let _ = writeln!(text, "weights       {:.3} bits each, everything counted", bits_per_weight(image));
+    let _ =
+        writeln!(text, "scratch       {} bytes, {} of them state", 4 * image.scratch_words(), 4 * image.state().len);
+    let _ = writeln!(text, "self-test     {} steps\n", image.self_test_steps());
+    let mut ops = table(&["op", "output", "input", "detail", "bits", "group", "x max", "bytes"]);
+    for op in image.ops() {
+        ops.add_row(row(&op));
+    }
+    let _ = writeln!(text, "{ops}\n");
+    let contract = image.contract_arrays();
+    let mut actions = table(&["action", "scale", "offset", "low", "high", "max step"]);
+    for i in 0..image.act_len() {
+        let cell =
+            |array: &[u32]| array.get(i).map_or("-".to_owned(), |w| format!("{}", f32::from_bits(u32::from_le(*w))));
+        actions.add_row([i.to_string()].into_iter().chain(contract.map(cell)));
+    }
+    let _ = writeln!(text, "{actions}");
+    text
+}
+
+fn row(op: &Op<'_>) -> Vec<String> {
+    let region = |r: Region| if r.len > 0 { format!("{}+{}", r.offset, r.len) } else { String::new() };
+    let matrix = op.matrix();
+    let detail = match (op.kind, &matrix) {
+        (OpKind::Linear { accumulate }, Some(matrix)) => {
+            format!("{}x{}{}", matrix.rows, matrix.cols, if accumulate { " added" } else { "" })
+        }
+        (OpKind::Normalize, _) => format!("clip {} {}", op.constant(0), op.constant(1)),
+        (OpKind::LayerNorm | OpKind::RmsNorm, _) => format!("eps {}", op.constant(0)),
+        (OpKind::LstmCell, _) => format!("cell {}", region(op.third())),
+        (OpKind::GruCell, _) => format!("gates {}", region(op.third())),
+        _ => String::new(),
+    };
+    let mut cells = vec![op.kind.name().to_owned(), region(op.dst()), region(op.src()), detail];
+    if let Some(matrix) = &matrix {
+        cells.extend([
+            widths(matrix),
+            group_name(matrix.group),
+            matrix.x_max.to_string(),
+            matrix.weight_bytes().to_string(),
+        ]);
+    }
+    cells
+}

@@ -1,0 +1,92 @@
+//! Errors in a few lines, and what is worth a warning.
+
+use std::fmt;
+
+use crate::data::{Range, Recordings, runs};
+use crate::measure::check::Check;
+use crate::measure::eval::{ActivationShare, ErrorReport};
+
+/// Held-out errors beyond this multiple of the calibration error, and this much above it, are worth a warning.
+const TIMES: f64 = 3.0;
+const ABOVE: f64 = 0.002;
+
+impl fmt::Display for ActivationShare {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let types = match self.int16.len() {
+            0 => "int8".to_owned(),
+            n if n == self.linear => "int16".to_owned(),
+            _ => format!("int8; linear operations in int16: {}", runs(&self.int16)),
+        };
+        write!(f, "{:.0}% of the error ({types})", 100.0 * self.share)
+    }
+}
+
+/// The errors in a few lines.
+pub fn errors(check: &Check) -> String {
+    let line = |name: &str, report: &ErrorReport| {
+        format!("{name:<17} {:.3e}   ({} observations)\n", report.nmse, report.steps)
+    };
+    let calib = check.calib.as_ref().map_or(String::new(), |report| line("calibration nmse", report));
+    format!("{calib}{}{:<17} {}\n", line("held-out nmse", &check.heldout), "activations", check.activations)
+}
+
+/// A warning where the held-out error is far above the calibration error.
+pub fn overfit_warning(check: &Check) -> Option<String> {
+    let (heldout, calib) = (check.heldout.nmse, check.calib.as_ref()?.nmse);
+    (heldout > TIMES * calib && heldout > calib + ABOVE).then(|| {
+        format!(
+            "the held-out error is {:.1} times the calibration error: the image fits what was recorded for it better \
+             than what it will see; record more episodes, and more varied ones",
+            heldout / calib
+        )
+    })
+}
+
+/// All warnings about the recordings themselves, before anything is quantized.
+pub fn of_recordings(recordings: &Recordings) -> Vec<String> {
+    let Some(range) = recordings.calib.as_ref().map(Range::of) else { return Vec::new() };
+    let outside = recordings.heldout.as_ref().and_then(|heldout| range.warning(heldout));
+    [range.constant_note(), outside].into_iter().flatten().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn report(nmse: f64) -> ErrorReport {
+        ErrorReport { nmse, worst_nmse: nmse, max_abs: 0.0, steps: 7, bpw: 3.0, bytes: 100, worst_dimension: 0 }
+    }
+
+    fn check(calib: Option<f64>, heldout: f64) -> Check {
+        let activations = ActivationShare { unrounded_nmse: 0.0, share: 0.125, int16: vec![0, 4], linear: 5 };
+        Check { heldout: report(heldout), calib: calib.map(report), activations }
+    }
+
+    #[test]
+    fn a_held_out_error_far_above_the_calibration_error_is_worth_a_warning() {
+        let warning = overfit_warning(&check(Some(0.002), 0.0084)).expect("a warning");
+        assert!(warning.starts_with("the held-out error is 4.2 times the calibration error: "), "{warning}");
+        // Less than three times; less than 0.002 above; no calibration recording.
+        for (calib, heldout) in [(Some(0.01), 0.029), (Some(1e-5), 0.002), (None, 0.5)] {
+            assert_eq!(overfit_warning(&check(calib, heldout)), None, "{calib:?} {heldout}");
+        }
+    }
+
+    #[test]
+    fn the_summary_has_a_line_for_each_error() {
+        assert_eq!(
+            errors(&check(Some(0.002), 0.0084)),
+            "calibration nmse  2.000e-3   (7 observations)\n\
+             held-out nmse     8.400e-3   (7 observations)\n\
+             activations       12% of the error (int8; linear operations in int16: 0, 4)\n"
+        );
+        let mut one = check(None, 0.5);
+        one.activations = ActivationShare { int16: Vec::new(), share: -0.01, ..one.activations };
+        assert_eq!(
+            errors(&one),
+            "held-out nmse     5.000e-1   (7 observations)\nactivations       -1% of the error (int8)\n"
+        );
+        one.activations.int16 = vec![0, 1, 2, 3, 4];
+        assert_eq!(one.activations.to_string(), "-1% of the error (int16)");
+    }
+}

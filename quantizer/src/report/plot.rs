@@ -1,0 +1,292 @@
+//! Pictures as SVG: the parts that all of them share, and a line plot with a logarithmic vertical axis.
+//!
+//! They are drawn by hand after a trial of plotters 0.3.7 with its SVG backend alone. Its three crates would be no burden, but its
+//! backends take whole pixels: a layer of 1,024 rows leaves 0.6 of one for each in the strip of [`super::widths`], so that rows
+//! would merge or vanish, and points of a plot would stand up to half a pixel off.
+
+use std::fmt::Write as _;
+
+/// Size of the picture and of the margins around the axes, in SVG's units (pixels at 96 dpi).
+const WIDTH: f64 = 980.0;
+const HEIGHT: f64 = 480.0;
+const LEFT: f64 = 84.0;
+/// Holds the legend, which covers nothing there.
+const RIGHT: f64 = 264.0;
+const TOP: f64 = 56.0;
+const BOTTOM: f64 = 64.0;
+
+/// Okabe and Ito's palette, which colour-blind readers can tell apart, in an order of strong contrast on white.
+const COLOURS: [&str; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
+
+/// An SVG document of this size with a white ground, filled by `draw`.
+pub(crate) fn document(
+    width: f64,
+    height: f64,
+    draw: impl FnOnce(&mut String) -> std::fmt::Result,
+) -> Result<String, std::fmt::Error> {
+    let mut svg = String::new();
+    writeln!(
+        svg,
+        r##"<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}" font-family="Helvetica, Arial, 'Liberation Sans', sans-serif" font-size="13" fill="#333">"##
+    )?;
+    writeln!(svg, r##"<rect width="100%" height="100%" fill="#fff"/>"##)?;
+    draw(&mut svg)?;
+    writeln!(svg, "</svg>")?;
+    Ok(svg)
+}
+
+/// Text, escaped.
+pub(crate) fn text(svg: &mut String, x: f64, y: f64, attributes: &str, content: &str) -> std::fmt::Result {
+    let content = content.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+    writeln!(svg, r#"<text x="{x:.1}" y="{y:.1}" {attributes}>{content}</text>"#)
+}
+
+/// A power of ten as a label.
+pub(crate) fn decade_label(decade: i32) -> String {
+    match decade {
+        -3..=3 => format!("{}", 10f64.powi(decade)),
+        _ => format!("1e{decade}"),
+    }
+}
+
+/// One line with a marker at every point.
+#[derive(Clone, Debug)]
+pub struct Series {
+    /// Its name in the legend.
+    pub name: String,
+    /// Points (x, y) in the order in which they are joined; y above 0.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// A point to be pointed out.
+#[derive(Clone, Debug)]
+pub struct Mark {
+    /// Where.
+    pub at: (f64, f64),
+    /// What the legend says of it.
+    pub label: String,
+}
+
+/// What is drawn.
+#[derive(Clone, Debug)]
+pub struct Plot {
+    /// Above the axes.
+    pub title: String,
+    /// Below the horizontal axis.
+    pub x_label: String,
+    /// Beside the vertical axis.
+    pub y_label: String,
+    /// The lines.
+    pub series: Vec<Series>,
+    /// A point to be ringed.
+    pub mark: Option<Mark>,
+}
+
+/// The ranges of both axes.
+struct Axes {
+    x: (f64, f64),
+    /// Decades.
+    y: (i32, i32),
+}
+
+impl Axes {
+    fn around(series: &[Series]) -> Self {
+        let points = || series.iter().flat_map(|s| &s.points);
+        let range = |values: &mut dyn Iterator<Item = f64>| {
+            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
+        };
+        let (mut x, mut y) = (range(&mut points().map(|p| p.0)), range(&mut points().map(|p| p.1.log10())));
+        if x.0 > x.1 {
+            (x, y) = ((0.0, 1.0), (0.0, 1.0));
+        }
+        let step = tick_step(x.1 - x.0);
+        // Some air, or the outermost markers would sit on the frame.
+        let y = ((y.0 - 0.08).floor() as i32, (y.1 + 0.08).ceil() as i32);
+        Self { x: (x.0 - 0.5 * step, x.1 + 0.5 * step), y: (y.0, y.1.max(y.0 + 1)) }
+    }
+
+    fn x(&self, value: f64) -> f64 {
+        LEFT + (WIDTH - LEFT - RIGHT) * (value - self.x.0) / (self.x.1 - self.x.0)
+    }
+
+    fn y(&self, value: f64) -> f64 {
+        let share = (value.log10() - f64::from(self.y.0)) / f64::from(self.y.1 - self.y.0);
+        HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * share
+    }
+}
+
+/// 1, 2 or 5 times a power of ten, so that a range of this length has 4 to 10 steps.
+fn tick_step(length: f64) -> f64 {
+    if length <= 0.0 {
+        return 1.0;
+    }
+    let power = 10f64.powf((length / 4.0).log10().floor());
+    [5.0, 2.0, 1.0].into_iter().map(|m| m * power).find(|step| length / step >= 4.0).unwrap_or(power)
+}
+
+/// Plots below each other in one SVG document.
+pub fn stacked(plots: &[Plot]) -> String {
+    // Writing to a string can't fail.
+    document(WIDTH, HEIGHT * plots.len() as f64, |svg| {
+        for (i, plot) in plots.iter().enumerate() {
+            writeln!(svg, r#"<g transform="translate(0 {})">"#, HEIGHT * i as f64)?;
+            plot.write(svg)?;
+            writeln!(svg, "</g>")?;
+        }
+        Ok(())
+    })
+    .unwrap_or_default()
+}
+
+impl Plot {
+    /// The picture as an SVG document.
+    pub fn svg(&self) -> String {
+        stacked(std::slice::from_ref(self))
+    }
+
+    fn write(&self, svg: &mut String) -> std::fmt::Result {
+        let axes = &Axes::around(&self.series);
+        let middle = 0.5 * (LEFT + WIDTH - RIGHT);
+        text(svg, middle, 30.0, r#"text-anchor="middle" font-size="17" font-weight="bold""#, &self.title)?;
+        text(svg, middle, HEIGHT - 18.0, r#"text-anchor="middle" font-size="14""#, &self.x_label)?;
+        let beside = 0.5 * (TOP + HEIGHT - BOTTOM);
+        let turned = format!(r#"text-anchor="middle" font-size="14" transform="rotate(-90 24 {beside})""#);
+        text(svg, 24.0, beside, &turned, &self.y_label)?;
+        grid(svg, axes)?;
+        for (index, series) in self.series.iter().enumerate() {
+            line(svg, axes, index, series)?;
+        }
+        if let Some(mark) = &self.mark {
+            writeln!(svg, "{}", ring(axes.x(mark.at.0), axes.y(mark.at.1), 10.0))?;
+        }
+        self.legend(svg)
+    }
+
+    fn legend(&self, svg: &mut String) -> std::fmt::Result {
+        let names: Vec<&str> =
+            self.series.iter().map(|s| s.name.as_str()).chain(self.mark.iter().map(|m| m.label.as_str())).collect();
+        let longest = names.iter().map(|name| name.chars().count()).max().unwrap_or(0) as f64;
+        let (width, height) = (62.0 + 7.0 * longest, 12.0 + 20.0 * names.len() as f64);
+        let (left, top) = (WIDTH - RIGHT + 14.0, TOP);
+        writeln!(
+            svg,
+            r##"<rect x="{left:.1}" y="{top:.1}" width="{width:.1}" height="{height:.1}" rx="3" fill="#fff" fill-opacity="0.9" stroke="#ccc"/>"##
+        )?;
+        let (from, to) = (left + 10.0, left + 42.0);
+        for (index, name) in names.iter().enumerate() {
+            let y = top + 16.0 + 20.0 * index as f64;
+            if index < self.series.len() {
+                let colour = COLOURS[index % COLOURS.len()];
+                writeln!(svg, r#"<path d="M{from:.1} {y:.1}H{to:.1}" stroke="{colour}" stroke-width="2"/>"#)?;
+                writeln!(svg, "{}", marker(index, 0.5 * (from + to), y))?;
+            } else {
+                writeln!(svg, "{}", ring(0.5 * (from + to), y, 7.0))?;
+            }
+            text(svg, left + 50.0, y + 4.5, "", name)?;
+        }
+        Ok(())
+    }
+}
+
+fn grid(svg: &mut String, axes: &Axes) -> std::fmt::Result {
+    let (right, bottom) = (WIDTH - RIGHT, HEIGHT - BOTTOM);
+    for decade in axes.y.0..=axes.y.1 {
+        let y = axes.y(10f64.powi(decade));
+        writeln!(svg, r##"<path d="M{LEFT} {y:.1}H{right}" stroke="#d0d0d0"/>"##)?;
+        text(svg, LEFT - 10.0, y + 4.5, r#"text-anchor="end""#, &decade_label(decade))?;
+        if decade < axes.y.1 {
+            for digit in 2..10 {
+                let y = axes.y(f64::from(digit) * 10f64.powi(decade));
+                writeln!(svg, r##"<path d="M{LEFT} {y:.1}H{right}" stroke="#f0f0f0"/>"##)?;
+            }
+        }
+    }
+    let step = tick_step(axes.x.1 - axes.x.0);
+    let decimals = (-step.log10().floor()).max(0.0) as usize;
+    for tick in (axes.x.0 / step).ceil() as i64..=(axes.x.1 / step).floor() as i64 {
+        let value = tick as f64 * step;
+        let x = axes.x(value);
+        writeln!(svg, r##"<path d="M{x:.1} {TOP}V{bottom}" stroke="#e4e4e4"/>"##)?;
+        text(svg, x, bottom + 20.0, r#"text-anchor="middle""#, &format!("{value:.decimals$}"))?;
+    }
+    writeln!(
+        svg,
+        r##"<rect x="{LEFT}" y="{TOP}" width="{}" height="{}" fill="none" stroke="#888"/>"##,
+        right - LEFT,
+        bottom - TOP
+    )
+}
+
+fn line(svg: &mut String, axes: &Axes, index: usize, series: &Series) -> std::fmt::Result {
+    let colour = COLOURS[index % COLOURS.len()];
+    let at: Vec<(f64, f64)> = series.points.iter().map(|p| (axes.x(p.0), axes.y(p.1))).collect();
+    let path: Vec<String> = at.iter().map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
+    writeln!(
+        svg,
+        r#"<polyline points="{}" fill="none" stroke="{colour}" stroke-width="2" stroke-linejoin="round"/>"#,
+        path.join(" ")
+    )?;
+    for (x, y) in at {
+        writeln!(svg, "{}", marker(index, x, y))?;
+    }
+    Ok(())
+}
+
+fn ring(x: f64, y: f64, radius: f64) -> String {
+    format!(r##"<circle cx="{x:.1}" cy="{y:.1}" r="{radius}" fill="none" stroke="#333" stroke-width="1.5"/>"##)
+}
+
+/// Every series has its own shape as well as its own colour.
+fn marker(index: usize, x: f64, y: f64) -> String {
+    let style = format!(r##"fill="{}" stroke="#fff" stroke-width="1.2""##, COLOURS[index % COLOURS.len()]);
+    let polygon = |corners: &[(f64, f64)]| {
+        let points: Vec<String> = corners.iter().map(|(dx, dy)| format!("{:.1},{:.1}", x + dx, y + dy)).collect();
+        format!(r#"<polygon points="{}" {style}/>"#, points.join(" "))
+    };
+    match index % 4 {
+        0 => format!(r#"<circle cx="{x:.1}" cy="{y:.1}" r="5" {style}/>"#),
+        1 => polygon(&[(-4.6, -4.6), (4.6, -4.6), (4.6, 4.6), (-4.6, 4.6)]),
+        2 => polygon(&[(0.0, -6.2), (5.8, 4.4), (-5.8, 4.4)]),
+        _ => polygon(&[(0.0, -6.2), (6.2, 0.0), (0.0, 6.2), (-6.2, 0.0)]),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plot(series: Vec<Series>) -> Plot {
+        Plot { title: "a < b & c".into(), x_label: "x".into(), y_label: "y".into(), series, mark: None }
+    }
+
+    #[test]
+    fn every_point_has_a_marker_inside_the_frame_and_text_is_escaped() {
+        let points = vec![(2.0, 0.7), (2.5, 0.05), (4.0, 3e-4)];
+        let mut plot = plot(vec![Series { name: "one".into(), points: points.clone() }]);
+        plot.mark = Some(Mark { at: points[1], label: "knee".into() });
+        let svg = plot.svg();
+        assert!(svg.contains("a &lt; b &amp; c"));
+        // Three points and a ring, and both in the legend.
+        assert_eq!(svg.matches("<circle").count(), 6);
+        let axes = Axes::around(&plot.series);
+        for (x, y) in points {
+            assert!((LEFT..WIDTH - RIGHT).contains(&axes.x(x)) && (TOP..=HEIGHT - BOTTOM).contains(&axes.y(y)));
+        }
+        assert!(axes.y(0.7) < axes.y(0.05), "larger values stand higher");
+    }
+
+    #[test]
+    fn no_points_and_one_point_are_drawn_too() {
+        for points in [vec![], vec![(3.0, 1.0)]] {
+            let svg = plot(vec![Series { name: "s".into(), points }]).svg();
+            assert!(svg.ends_with("</svg>\n") && !svg.contains("NaN") && !svg.contains("inf"), "{svg}");
+        }
+    }
+
+    #[test]
+    fn ticks_are_round() {
+        for (length, step) in [(2.0, 0.5), (1.0, 0.2), (6.0, 1.0), (10.0, 2.0), (0.0, 1.0)] {
+            assert!((tick_step(length) - step).abs() < 1e-12, "{length}: {}", tick_step(length));
+        }
+    }
+}

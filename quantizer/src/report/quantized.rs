@@ -1,0 +1,90 @@
+//! What became of a policy.
+
+use comfy_table::Table;
+
+use super::table::{group_name, table};
+use super::widths;
+use crate::budget::Rate;
+use crate::graph::Graph;
+use crate::measure::eval::ErrorReport;
+use crate::methods::actquant::ActionStatistics;
+use crate::pipeline::{QuantizedPolicy, Search, Try};
+
+/// ActQuant's scores, and the bits that they led to.
+pub fn scores(graph: &Graph, statistics: &ActionStatistics, quantized: &QuantizedPolicy) -> String {
+    let (_, equal) = statistics.effective_scores();
+    let mut rows = table(&["matrix", "HSIC score", "bits"]);
+    for ((matrix, score), outcome) in graph.matrices.iter().zip(&statistics.scores).zip(&quantized.outcomes) {
+        let bits = outcome.quantized.width_counts();
+        rows.add_row([matrix.name.clone(), format!("{:.4}", score.sens()), bits]);
+    }
+    let note = match quantized.rate {
+        Rate::Width(_) => "One width for all: the scores are not used.",
+        _ if equal => "No score is above 0: every matrix counts the same.",
+        _ => "Scores below 0 count as 0.",
+    };
+    format!("{rows}\n{note}\n\n")
+}
+
+/// Every matrix, and what all of them take.
+pub fn matrices(quantized: &QuantizedPolicy) -> String {
+    let QuantizedPolicy { policy, outcomes, .. } = quantized;
+    let mut rows = table(&["matrix", "shape", "bits", "group", "bytes", "x max", "error"]);
+    let mut total = 0;
+    for (matrix, outcome) in policy.graph.matrices.iter().zip(outcomes) {
+        let quantized = &outcome.quantized;
+        let bytes = outcome.bytes();
+        total += bytes;
+        rows.add_row([
+            matrix.name.clone(),
+            format!("{}x{}", matrix.rows, matrix.cols),
+            quantized.width_counts(),
+            group_name(quantized.group),
+            bytes.to_string(),
+            outcome.x_max.to_string(),
+            outcome.error.map_or("-".to_owned(), |e| format!("{e:.2e}")),
+        ]);
+    }
+    let bits = 8.0 * total as f64 / policy.weights.max(1) as f64;
+    let by_row = outcomes.iter().any(|outcome| outcome.allocation.is_some());
+    let widths = if by_row { widths::line(policy, outcomes) + "\n" } else { String::new() };
+    format!("{rows}\n\n{total} bytes of weights, {bits:.3} bits each, everything counted\n{widths}")
+}
+
+/// The tries, and what follows from them, for people.
+pub fn search(search: &Search) -> String {
+    let Search { limit, nmse, budget, step, fails, measured_on: file, .. } = search;
+    let cells = ((budget - fails) / step).round();
+    let below = if cells <= 1.0 && *fails > 0.0 {
+        format!("{fails:.1} is too few")
+    } else if *fails > 0.0 {
+        format!("{fails:.1} is too few, what lies between was not tried")
+    } else if cells <= 1.0 {
+        "there is none below".to_owned()
+    } else {
+        "none below was tried".to_owned()
+    };
+    let on = match search.held_out {
+        true => file.clone(),
+        false => format!("{file}, as there is no held-out recording: on new observations the error may be larger"),
+    };
+    format!(
+        "{}\n\n{budget:.1} bits per weight keep the error within {limit}: NMSE {nmse:.2e}; {below}.\nMeasured on {on}.\n",
+        tries(&search.tries)
+    )
+}
+
+/// One try a row.
+fn tries(tries: &[Try]) -> Table {
+    let mut table = table(&["budget", "steps", "bits per weight", "NMSE"]);
+    for t in tries {
+        let cell = |text: &dyn Fn(&ErrorReport) -> String| t.report.as_ref().map_or("-".to_owned(), text);
+        table.add_row([
+            format!("{:.1}", t.budget),
+            t.steps.to_string(),
+            cell(&|r| format!("{:.3}", r.bpw)),
+            cell(&|r| format!("{:.2e}", r.nmse)),
+        ]);
+    }
+    table
+}
