@@ -10,7 +10,7 @@ mod verify;
 
 use std::process::{Command, ExitCode};
 
-use actq_boards::{Target, root};
+use actq_boards::Target;
 use anyhow::{Context as _, Result, ensure};
 
 const USAGE: &str = "\
@@ -61,9 +61,7 @@ fn measure(arguments: &[&str]) -> Result<()> {
     Ok(())
 }
 
-/// The cargo that runs this, in the workspace.
+/// The cargo that runs this.
 fn cargo() -> Command {
-    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    command.current_dir(root());
-    command
+    Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }

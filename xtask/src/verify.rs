@@ -121,7 +121,7 @@ fn steps(oldest: Result<(), String>, narrow: Result<(), String>, skipped: &str) 
     let mut steps = Vec::new();
     let mut add = |name: &str, arguments: &[&str], environment: &[(&str, &str)]| {
         let mut command = cargo();
-        command.args(arguments).envs(environment.iter().copied());
+        command.current_dir(root()).args(arguments).envs(environment.iter().copied());
         steps.push(Step { name: name.to_owned(), command: Ok(command) });
     };
     // One profile for all that is built for the host.
