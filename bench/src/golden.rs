@@ -4,8 +4,8 @@
 //! packed words, the prepared activations, and the sums with those of padding rows. The stream ends with a width of 0.
 
 pub use actq::random::Random;
-use actq_kernels::activations::{Plan, Prepared, prepare};
-use actq_kernels::format::{Block, BlockShape, Lanes, Width, pack};
+use actq_kernels::layout::{Block, BlockShape, Lanes, Width, pack};
+use actq_kernels::x::{Plan, Prepared, prepare};
 
 /// How a case's numbers are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -22,9 +22,9 @@
 #![cfg_attr(not(test), no_std)]
 #![deny(unsafe_code)]
 
+// Which of these may use which: the table in docs/ARCHITECTURE.md, which a test reads.
 pub mod arch;
 mod cursor;
-pub mod dequantize;
 mod error;
 pub mod head;
 pub mod image;
@@ -40,24 +40,3 @@ pub use error::{HeadError, ImageError, StepError};
 pub use head::Head;
 pub use image::Image;
 pub use layout::{Block, BlockShape, Width};
-
-// Old paths, until all users have moved.
-pub use arch as gemv;
-pub use ops::cells as recurrent;
-/// See [`ops::linear`].
-pub mod linear {
-    pub use crate::image::{Matrix, RowBlock, largest_sum_bound, worst_case};
-}
-/// See [`ops`].
-pub mod norm {
-    pub use crate::ops::elementwise::*;
-    pub use crate::ops::norm::*;
-}
-pub use arch::{portable, reference};
-pub use layout as format;
-pub use pace::cost;
-/// See [`x`].
-pub mod activations {
-    pub use crate::round::ROUND;
-    pub use crate::x::*;
-}

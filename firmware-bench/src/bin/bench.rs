@@ -18,9 +18,9 @@ mod firmware {
     use core::hint::black_box;
 
     use actq_firmware_support::{count, host};
-    use actq_kernels::activations::{Plan, Scale};
-    use actq_kernels::format::{Block, BlockShape, Lanes, Width, pack};
-    use actq_kernels::linear::RowBlock;
+    use actq_kernels::image::RowBlock;
+    use actq_kernels::layout::{Block, BlockShape, Lanes, Width, pack};
+    use actq_kernels::x::{Plan, Scale};
     use cortex_m::singleton;
     use cortex_m_semihosting::hio;
 
@@ -165,7 +165,7 @@ mod firmware {
         let scale = Scale::new(x, 127).ok()?;
         let inverse = 1.0 / scale.get();
         for (x, pair) in x.chunks_exact(4).zip(pairs.chunks_exact_mut(2)) {
-            let q = |i: usize| u32::from((x[i] * inverse + actq_kernels::activations::ROUND).to_bits() as u16);
+            let q = |i: usize| u32::from((x[i] * inverse + actq_kernels::round::ROUND).to_bits() as u16);
             pair[0] = q(0) | q(2) << 16;
             pair[1] = q(1) | q(3) << 16;
         }

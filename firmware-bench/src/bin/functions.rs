@@ -16,7 +16,7 @@ mod firmware {
 
     use actq_firmware_support::{count, host};
     use actq_kernels::math::Function;
-    use actq_kernels::{norm, recurrent};
+    use actq_kernels::ops::{cells, elementwise, norm};
     use cortex_m_semihosting::hio;
 
     const LEN: usize = 256;
@@ -57,17 +57,17 @@ mod firmware {
         count::region(|| norm::rms_norm(black_box(&mut x), &constants, 1e-5));
         line("rmsnorm", &[&x])?;
         let (x, mut y) = (values::<LEN>(), [0.0; LEN]);
-        count::region(|| norm::normalize(black_box(&x), &constants, &constants, 1.0, 5.0, black_box(&mut y)));
+        count::region(|| elementwise::normalize(black_box(&x), &constants, &constants, 1.0, 5.0, black_box(&mut y)));
         line("normalize", &[&y])?;
         let (gates, mut c, mut h) = (values::<{ 4 * LEN }>(), values::<LEN>(), [0.0; LEN]);
-        count::region(|| recurrent::lstm_cell(black_box(&gates), &mut c, black_box(&mut h)));
+        count::region(|| cells::lstm_cell(black_box(&gates), &mut c, black_box(&mut h)));
         let (mut all_c, mut all_h) = (values::<LEN>(), [0.0; LEN]);
-        recurrent::lstm_cell(&magnitudes::<{ 4 * LEN }>(), &mut all_c, &mut all_h);
+        cells::lstm_cell(&magnitudes::<{ 4 * LEN }>(), &mut all_c, &mut all_h);
         line("lstm", &[&h, &c, &all_h, &all_c])?;
         let (a, b, mut h) = (values::<{ 3 * LEN }>(), values::<{ 3 * LEN }>(), values::<LEN>());
-        count::region(|| recurrent::gru_cell(black_box(&a), &b, black_box(&mut h)));
+        count::region(|| cells::gru_cell(black_box(&a), &b, black_box(&mut h)));
         let mut all = values::<LEN>();
-        recurrent::gru_cell(&magnitudes::<{ 3 * LEN }>(), &b, &mut all);
+        cells::gru_cell(&magnitudes::<{ 3 * LEN }>(), &b, &mut all);
         line("gru", &[&h, &all])
     }
 }

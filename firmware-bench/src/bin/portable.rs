@@ -18,10 +18,10 @@ mod firmware {
 
     use actq_firmware_support::machine::{entry, semihosting::hio, singleton};
     use actq_firmware_support::{count, host};
-    use actq_kernels::activations::{Plan, Prepared, Scale};
-    use actq_kernels::format::{Block, BlockShape, Lanes, Width, pack};
-    use actq_kernels::linear::RowBlock;
-    use actq_kernels::{gemv, reference};
+    use actq_kernels::arch::{BACKEND, reference};
+    use actq_kernels::image::RowBlock;
+    use actq_kernels::layout::{Block, BlockShape, Lanes, Width, pack};
+    use actq_kernels::x::{Plan, Prepared, Scale};
 
     const ROWS: usize = 256;
     const COLS: usize = 256;
@@ -78,7 +78,7 @@ mod firmware {
                             return None;
                         }
                     }
-                    writeln!(out, "{:?} {} {lanes:?} {group}", gemv::BACKEND, width.bits()).ok()?;
+                    writeln!(out, "{:?} {} {lanes:?} {group}", BACKEND, width.bits()).ok()?;
                 }
             }
         }

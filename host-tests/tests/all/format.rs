@@ -10,9 +10,9 @@ use actq::methods::{Outcome, Quantized};
 use actq::policy::Policy;
 use actq::runtime::{ImageBuffer, with_head};
 use actq_bench::root;
-use actq_kernels::activations::{Plan, max_prepared_words};
-use actq_kernels::format::{BlockShape, Lanes, MAX_PAIRED_GROUPED, Width, pack};
 use actq_kernels::image::{Image, Kind, OpKind, Region, block_bytes, checksum, header as h};
+use actq_kernels::layout::{BlockShape, Lanes, MAX_PAIRED_GROUPED, Width, pack};
+use actq_kernels::x::{Plan, max_prepared_words};
 use half::bf16;
 
 fn document() -> String {
@@ -442,6 +442,6 @@ fn the_work_area_is_as_long_as_documented() {
 fn versions_in_the_text_are_those_of_the_library() {
     let document = document();
     assert!(document.contains(&format!("This document describes version {}.", h::VERSION)));
-    let layout = actq_kernels::format::LAYOUT_STAMP;
+    let layout = actq_kernels::layout::LAYOUT_STAMP;
     assert!(document.contains(&format!("| 4 | 16 | u32 layout stamp: {layout} |")));
 }

@@ -10,8 +10,9 @@ use actq::runtime::ImageBuffer;
 use actq_bench::cycles::Code;
 use actq_bench::qemu::{self, Counter};
 use actq_bench::{Target, firmware, shared_policies};
+use actq_kernels::Width;
 use actq_kernels::math::Function;
-use actq_kernels::{Width, norm, recurrent};
+use actq_kernels::ops::{cells, elementwise, norm};
 use anyhow::{Result, ensure};
 
 /// Elements.
@@ -56,16 +57,16 @@ fn expected() -> Vec<(&'static str, u32)> {
     };
     add("layernorm", &|x| norm::layer_norm(x, &constants, &constants, 1e-5));
     add("rmsnorm", &|x| norm::rms_norm(x, &constants, 1e-5));
-    add("normalize", &|y| norm::normalize(&values(LEN), &constants, &constants, 1.0, 5.0, y));
+    add("normalize", &|y| elementwise::normalize(&values(LEN), &constants, &constants, 1.0, 5.0, y));
     let lstm = |gates: &[f32]| {
         let (mut c, mut h) = (values(LEN), vec![0.0; LEN]);
-        recurrent::lstm_cell(gates, &mut c, &mut h);
+        cells::lstm_cell(gates, &mut c, &mut h);
         [h, c].concat()
     };
     all.push(("lstm", hash(&[&lstm(&values(4 * LEN)), &lstm(&magnitudes(4 * LEN))])));
     let gru = |a: &[f32]| {
         let mut h = values(LEN);
-        recurrent::gru_cell(a, &values(3 * LEN), &mut h);
+        cells::gru_cell(a, &values(3 * LEN), &mut h);
         h
     };
     all.push(("gru", hash(&[&gru(&values(3 * LEN)), &gru(&magnitudes(3 * LEN))])));

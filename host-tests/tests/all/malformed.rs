@@ -13,8 +13,8 @@ use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
 use actq_bench::golden::Random;
 use actq_bench::root;
-use actq_kernels::format::Width;
 use actq_kernels::image::{Kind, checksum, header as h, op};
+use actq_kernels::layout::Width;
 use actq_kernels::math::Function;
 use actq_kernels::{Head, Image, ImageError as E, StepError};
 

@@ -1,11 +1,10 @@
 //! Packing, the reference and the portable kernels against the definition, by property and on the golden cases.
 
 use actq_bench::golden::{self, Case, Draw, Random};
-use actq_kernels::activations::{NotFinite, Plan, Prepared, Scale, prepare};
 use actq_kernels::arch::{BACKEND, Backend, Mismatch, Product, gemv, portable, reference};
-use actq_kernels::dequantize;
-use actq_kernels::format::{Block, BlockShape, Lanes, MAX_PAIRED_GROUPED, STRIP, Width, pack};
-use actq_kernels::linear::{RowBlock, largest_sum_bound, worst_case};
+use actq_kernels::image::{RowBlock, largest_sum_bound, worst_case};
+use actq_kernels::layout::{Block, BlockShape, Lanes, MAX_PAIRED_GROUPED, STRIP, Width, pack};
+use actq_kernels::x::{NotFinite, Plan, Prepared, Scale, prepare};
 use proptest::prelude::*;
 
 fn shapes() -> impl Strategy<Value = BlockShape> {
@@ -261,7 +260,7 @@ fn weights_come_back_from_their_codes() {
             for rows in matrix.blocks() {
                 for i in 0..shape.rows {
                     let mut row = [0f32; 70];
-                    dequantize::row_f32(&rows, i, &mut row);
+                    rows.dequantize(i, &mut row);
                     for (col, weight) in row.iter().enumerate() {
                         let at = i * shape.cols + col;
                         let scale = case.scales.get(i * shape.groups() + col / 32).map_or(1, |s| i32::from(*s));

@@ -15,8 +15,7 @@ use actq_bench::firmware::{self, built_in};
 use actq_bench::qemu::{self, Server};
 use actq_bench::{Target, golden, shared_policies, ur3};
 use actq_kernels::Width;
-use actq_kernels::image::{checksum, header as h, op};
-use actq_kernels::linear::worst_case;
+use actq_kernels::image::{checksum, header as h, op, worst_case};
 use anyhow::{Context, Result, ensure};
 
 /// Steps that each image runs on the host and in QEMU.

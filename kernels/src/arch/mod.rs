@@ -1,8 +1,8 @@
 //! What has more than one backend, and the one place that chooses.
 //!
-//! [`reference`] is what all others are compared with, [`portable`] plain Rust for every target, `armv7em` assembler for Cortex-M4 and
-//! M7, `armv7em_fpu` what needs their FPU's registers as well. All of them compute the same bits; the tests run them on the same
-//! data. The build script says what a target has.
+//! [`mod@reference`] is what all others are compared with, [`portable`] plain Rust for every target, `armv7em` assembler for
+//! Cortex-M4 and M7, `armv7em_fpu` what needs their FPU's registers as well. All of them compute the same bits; the tests run them
+//! on the same data. The build script says what a target has.
 
 #[cfg(actq_armv7em)]
 #[allow(unsafe_code, reason = "the assembler backend; every block carries its proof")]

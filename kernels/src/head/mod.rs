@@ -124,7 +124,7 @@ impl<'a, 's> Head<'a, 's> {
         Ok(())
     }
 
-    /// Runs at most `budget` instructions of the step that was begun, by the cost model ([`crate::cost`]), and gives the action
+    /// Runs at most `budget` instructions of the step that was begun, by the cost model ([`crate::pace::cost`]), and gives the action
     /// once it is ready; then, again and again until the next [`Self::begin`]. Steps that play on from a chunk have little to
     /// do, and are ready at the first poll. A budget of 2^28 or more is no limit.
     ///

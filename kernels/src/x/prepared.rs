@@ -11,7 +11,7 @@ pub struct Prepared<'a> {
 }
 
 impl<'a> Prepared<'a> {
-    /// Names a vector that [`Scale::quantize`] or [`prepare`] wrote by this plan to the first of `words`; `None` where they are
+    /// Names a vector that [`Scale::quantize`](super::Scale::quantize) or [`prepare`] wrote by this plan to the first of `words`; `None` where they are
     /// fewer than [`Plan::words`].
     #[inline(always)]
     pub fn new(words: &'a [u32], plan: &'a Plan) -> Option<Self> {
@@ -51,7 +51,7 @@ impl<'a> Prepared<'a> {
     }
 }
 
-/// As [`Scale::quantize`], of integers.
+/// As [`Scale::quantize`](super::Scale::quantize), of integers.
 pub fn prepare<'w>(x: &[i16], plan: &'w Plan, out: &'w mut [u32]) -> Option<Prepared<'w>> {
     let x = x.get(..plan.shape.cols).unwrap_or(x);
     lay_out(x, plan, out.get_mut(..plan.words)?, |value| value as u16 as u32);

@@ -1,7 +1,6 @@
 //! An image's network with its activations in f32: what is left of the error when only the weights are quantized.
 
 use actq_kernels::Image;
-use actq_kernels::dequantize::row_f32;
 use actq_kernels::head::run_whole;
 use actq_kernels::image::{Matrix, Op, OpKind};
 use anyhow::Result;
@@ -48,7 +47,7 @@ fn dequantized(matrix: &Matrix<'_>) -> Array2<f32> {
     let mut row = vec![0.0; matrix.cols];
     for rows in matrix.blocks() {
         for i in 0..rows.block.shape().rows {
-            row_f32(&rows, i, &mut row);
+            rows.dequantize(i, &mut row);
             weights.row_mut(rows.output(i)).assign(&ArrayView1::from(&row));
         }
     }

@@ -18,9 +18,9 @@ use actq_bench::networks::{Builder, accumulating};
 use actq_bench::qemu::Counter;
 use actq_bench::{Target, firmware, profile, root};
 use actq_kernels::Width;
-use actq_kernels::cost::{self, Cost, Feature};
 use actq_kernels::image::{Op, OpKind, op};
 use actq_kernels::math::Function;
+use actq_kernels::pace::cost::{self, Cost, Feature};
 use anyhow::Result;
 
 /// Rows and columns of the matrices: strips of all heights, runs of more than one, columns with and without a rest.
