@@ -130,7 +130,7 @@ impl Case {
 /// All layouts and groups over all lengths from 1 to 67 and larger ones, with 1 to 17 rows, random and extreme values, and
 /// activations up to the layout's limit.
 pub fn cases(seed: u64) -> Vec<Case> {
-    let mut random = Random(seed);
+    let mut random = Random::new(seed);
     let mut cases = Vec::new();
     for (width, lanes, group) in layouts() {
         for cols in (1..=67).chain([96, 127, 128, 129, 160, 255, 256, 257, 300, 512, 515, 1024, 2048]) {

@@ -26,7 +26,7 @@ pub struct Builder {
 impl Builder {
     /// A network without operations.
     pub fn new(observation: usize) -> Self {
-        Self { graph: Graph::new(observation), outcomes: Vec::new(), random: Random(2) }
+        Self { graph: Graph::new(observation), outcomes: Vec::new(), random: Random::new(2) }
     }
 
     /// An operation on values; gives its output.

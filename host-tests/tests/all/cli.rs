@@ -134,7 +134,7 @@ type Tensors = BTreeMap<&'static str, (Dtype, Vec<usize>, Vec<u8>)>;
 
 /// Drawn weights; matrices keep the variance of their input.
 fn tensors() -> Tensors {
-    let mut random = Random(4);
+    let mut random = Random::new(4);
     let mut tensor = |name, shape: &[usize]| {
         let reach = if let [_, cols] = *shape { (3.0 / cols as f32).sqrt() } else { 1.0 };
         let bytes = (0..shape.iter().product()).flat_map(|_| (reach * random.unit()).to_le_bytes()).collect();
@@ -162,7 +162,7 @@ fn write_tensors(policy: &Path, tensors: &Tensors) -> Result<()> {
 }
 
 fn draw_observations(seed: u64, width: usize) -> Array3<f32> {
-    let mut random = Random(seed);
+    let mut random = Random::new(seed);
     Array3::from_shape_simple_fn((EPISODES, STEPS, width), || 2.0 * random.unit())
 }
 
@@ -1041,7 +1041,7 @@ fn an_image_that_fits_its_calibration_alone_is_warned_of() -> Result<()> {
 fn an_interrupt_leaves_no_file() -> Result<()> {
     use std::os::unix::process::ExitStatusExt as _;
     let fixture = Fixture::new()?;
-    let random = &mut Random(8);
+    let random = &mut Random::new(8);
     let obs = Array3::from_shape_simple_fn((1, 300, OBS), || 2.0 * random.unit());
     fs::remove_file(fixture.policy().join("calib.npz"))?;
     write_npy(&fixture.policy().join("calib.npy"), &obs)?;

@@ -26,7 +26,7 @@ const CHUNK: usize = 2;
 /// A policy with every kind of section: normalization, matrices of all widths with group scales, an LSTM, a matrix of mixed
 /// widths with its output index, a chunk and the whole contract.
 fn valid_image() -> Vec<u8> {
-    let mut random = Random(7);
+    let mut random = Random::new(7);
     let mut values = |n: usize| (0..n).map(|_| random.unit()).collect::<Vec<f32>>();
     let mut graph = Graph::new(OBS);
     for (rows, cols) in [(UNITS, OBS), (4 * UNITS, UNITS), (4 * UNITS, UNITS), (CHUNK * ACT, UNITS)] {
@@ -596,7 +596,7 @@ fn a_matrix_is_checked_once_however_many_operations_share_it() {
     let time = |operations: usize| {
         // Groups at 8 bits, and so many columns that the bound from the shape does not do.
         const N: usize = 768;
-        let mut random = Random(3);
+        let mut random = Random::new(3);
         let mut graph = Graph::new(N);
         graph.matrices.push(WeightMatrix {
             name: "w".into(),

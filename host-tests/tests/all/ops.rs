@@ -52,7 +52,7 @@ impl Case {
     /// Writes the policy with drawn tensors: matrices that keep the variance of their input, vectors within -1 to 1.
     fn new(json: Value) -> Result<Self> {
         let keys = ["w", "b", "mean", "scale", "w_ln", "b_ln", "w_ih", "w_hh", "b_ih", "b_hh"];
-        let mut random = Random(1);
+        let mut random = Random::new(1);
         let mut tensors = Tensors::new();
         for name in ops(&json).iter().flat_map(|op| keys.iter().filter_map(|key| op.get(key)?.as_str())) {
             let shape =
@@ -89,7 +89,7 @@ impl Case {
     }
 
     fn observations(&self) -> Vec<Vec<f32>> {
-        let mut random = Random(2);
+        let mut random = Random::new(2);
         let len = self.json["obs_dim"].as_u64().unwrap_or(0);
         (0..STEPS).map(|_| (0..len).map(|_| REACH * random.unit()).collect()).collect()
     }
@@ -535,7 +535,7 @@ fn drawn_ops(random: &mut Random, obs: usize, act: usize) -> Value {
 
 #[test]
 fn drawn_graphs() -> Result<()> {
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     for _ in 0..400 {
         let ops = drawn_ops(&mut random, 9, 4);
         check(9, 4, ops.clone()).with_context(|| format!("{ops:#}"))?;

@@ -32,7 +32,7 @@ impl Fixture {
         let ops = [json!({"op": "linear", "w": "w"})];
         let json = json!({"name": "leg", "obs_dim": OBS, "act_dim": ACT, "ops": ops});
         fs::write(fixture.path("policy/policy.json"), json.to_string())?;
-        let mut random = Random(3);
+        let mut random = Random::new(3);
         let weights: Vec<u8> = (0..ACT * OBS).flat_map(|_| random.unit().to_le_bytes()).collect();
         let view = TensorView::new(Dtype::F32, vec![ACT, OBS], &weights)?;
         fs::write(fixture.path("policy/policy.safetensors"), serialize([("w", view)], None)?)?;

@@ -20,7 +20,7 @@ fn cases() -> impl Strategy<Value = Case> {
             Lanes::Single => x_max,
             Lanes::Paired => 1 + x_max % 127,
         };
-        Case::draw(&mut Random(seed), shape, x_max, draw)
+        Case::draw(&mut Random::new(seed), shape, x_max, draw)
     })
 }
 
@@ -182,7 +182,7 @@ fn with_lanes(image: &[u8], lanes: u8) -> Vec<u8> {
 #[test]
 fn an_image_states_the_lanes_that_follow_from_its_activations() {
     let shape = BlockShape { width: Width::W2, lanes: Lanes::Paired, rows: 9, cols: 40, group: 0 };
-    let image = single_matrix_image(&Case::draw(&mut Random(7), shape, 1, Draw::Uniform));
+    let image = single_matrix_image(&Case::draw(&mut Random::new(7), shape, 1, Draw::Uniform));
     let check = |bytes: &[u8]| {
         let buffer = actq::runtime::ImageBuffer::new(bytes);
         actq_kernels::Image::new_checked(buffer.bytes()).map(|_| ())
@@ -196,7 +196,7 @@ fn an_image_states_the_lanes_that_follow_from_its_activations() {
 /// Row blocks compute `start + acc * (row_scale * x_scale)` in this order, with biases in one pass or in y before.
 #[test]
 fn scaling_keeps_the_documented_order_of_operations() {
-    let mut random = Random(11);
+    let mut random = Random::new(11);
     for (width, lanes, group) in golden::layouts() {
         for rows in [1, 3, 8, 13, 17, 72] {
             let shape = BlockShape { width, lanes, rows, cols: 45, group };
@@ -247,7 +247,7 @@ fn vectors_that_are_not_finite_are_refused_and_tiny_ones_are_zero() {
 
 #[test]
 fn weights_come_back_from_their_codes() {
-    let mut random = Random(5);
+    let mut random = Random::new(5);
     for width in Width::ALL {
         for group in [0, 32] {
             let shape = BlockShape { width, lanes: Lanes::Paired, rows: 6, cols: 70, group };

@@ -48,7 +48,7 @@ const WINDOW: usize = 5;
 
 /// An LSTM whose state lasts.
 fn policy() -> Policy {
-    let mut random = Random(11);
+    let mut random = Random::new(11);
     let mut values = |n: usize| -> Vec<f32> { (0..n).map(|_| 0.4 * random.unit()).collect() };
     let mut graph = Graph::new(OBS);
     for (name, rows, cols) in [("ih", 4 * HIDDEN, OBS), ("hh", 4 * HIDDEN, HIDDEN), ("out", ACT, HIDDEN)] {
@@ -78,7 +78,7 @@ fn policy() -> Policy {
 fn windows_are_evaluated_from_their_recorded_state() -> Result<()> {
     let policy = policy();
     let graph = &policy.graph;
-    let mut random = Random(12);
+    let mut random = Random::new(12);
     let obs = Array3::from_shape_simple_fn((1, STEPS, OBS), || random.unit());
     let mut whole = Dataset { path: "whole".into(), obs: obs.clone(), action: None, length: vec![STEPS], state: None };
     whole.fill_actions(graph);

@@ -23,7 +23,7 @@ const STEPS: usize = 7;
 
 /// A network of all operations, with drawn lengths: products with all widths in order and by index, cells, norms, functions.
 fn network(seed: u64) -> Result<(Policy, Vec<Outcome>)> {
-    let mut random = Random(seed);
+    let mut random = Random::new(seed);
     let mut length = |most: usize| 1 + random.below(most);
     let (rows, hidden, out) = (length(90), length(30), length(5));
     let (indexed, recurrent, group) = (length(2) == 1, length(3), [0, 32][length(2) - 1]);
@@ -78,7 +78,7 @@ fn on_head<T>(seed: u64, work: impl FnOnce(&mut Head<'_, '_>) -> Result<T>) -> R
 }
 
 fn observations(seed: u64) -> Vec<Vec<f32>> {
-    let mut random = Random(seed);
+    let mut random = Random::new(seed);
     (0..STEPS).map(|_| (0..OBSERVATION).map(|_| random.normal()).collect()).collect()
 }
 
@@ -121,7 +121,7 @@ proptest! {
             let expected = whole(head, &observations)?;
             head.reset();
             let least = head.image().least_budget();
-            let mut random = Random(seed);
+            let mut random = Random::new(seed);
             let mut cut = 0;
             for (obs, expected) in observations.iter().zip(&expected) {
                 let (action, polls) = in_polls(head, obs, || least + random.below(spread as usize) as u32)?;

@@ -43,7 +43,7 @@ impl Fixture {
             "name": "small leg", "kind": "step", "obs_dim": OBS, "act_dim": ACT, "control_hz": 50, "ops": ops,
         });
         fs::write(dir.join("policy.json"), json.to_string())?;
-        let mut random = Random(4);
+        let mut random = Random::new(4);
         let mut matrix = |rows: usize, cols: usize| -> Vec<f32> {
             (0..rows * cols).map(|_| random.unit() * (3.0 / cols as f32).sqrt()).collect()
         };
@@ -59,7 +59,7 @@ impl Fixture {
         fs::write(dir.join("policy.safetensors"), serialize(views.collect::<Result<Vec<_>>>()?, None)?)?;
         let policy = Policy::load(&dir)?;
         for (name, seed) in [("calib.npz", 5), ("heldout.npz", 6)] {
-            let mut random = Random(seed);
+            let mut random = Random::new(seed);
             let obs = Array3::from_shape_simple_fn((2, 150, OBS), || 2.0 * random.unit());
             let mut evaluator = Evaluator::new(&policy.graph);
             let actions = obs.rows().into_iter().flat_map(|row| evaluator.step(&row.to_vec(), &mut |_, _| {}));

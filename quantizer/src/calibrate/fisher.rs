@@ -42,7 +42,7 @@ pub fn importance(graph: &Graph, dataset: &Dataset, mut progress: impl FnMut(f64
     let mut fisher = weights.zeros_like().matrices;
     // The gradients themselves are not asked for, but the backward pass adds to them.
     let mut unused = weights.zeros_like();
-    let mut random = Random(0);
+    let mut random = Random::new(0);
     let mut samples = 0;
     for (index, start) in (0..longest).step_by(window.max(1)).enumerate() {
         let staying: Vec<usize> = (0..alive.len()).filter(|&i| dataset.length[alive[i]] >= start + window).collect();

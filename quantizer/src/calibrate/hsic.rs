@@ -87,7 +87,7 @@ mod tests {
 
     /// A small deterministic generator, uniform in -1..1.
     fn samples(n: usize, len: usize, seed: u64) -> Array2<f64> {
-        let mut random = Random(seed);
+        let mut random = Random::new(seed);
         Array2::from_shape_fn((n, len), |_| f64::from(random.unit()))
     }
 

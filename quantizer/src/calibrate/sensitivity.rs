@@ -23,7 +23,7 @@ const DAMPING_OUTPUT: f64 = 0.02;
 pub fn output_moments(windows: &Windows<'_>, seed: u64) -> Vec<DMatrix<f64>> {
     let graph = windows.graph;
     let network = Network::new(graph);
-    let mut random = Random(seed);
+    let mut random = Random::new(seed);
     let mut sums: Vec<Array2<f32>> = graph.matrices.iter().map(|m| Array2::zeros((m.rows, m.rows))).collect();
     let mut counts = vec![0usize; sums.len()];
     let mut grads = windows.weights.zeros_like();

@@ -13,6 +13,7 @@ use crate::graph::lowering::{Step, StepData};
 use crate::graph::{Graph, NodeKind};
 use crate::methods::{Outcome, Quantized};
 use crate::policy::Policy;
+use crate::random::Random;
 use crate::runtime::{ImageBuffer, with_head};
 
 /// The image of a policy with its quantized matrices, one per matrix of the graph. The self-test vector is computed by the
@@ -85,20 +86,14 @@ fn sealed(words: &[u32]) -> Result<Vec<u8>> {
 /// Observations that reach every input: spread over about two standard deviations where the policy normalizes, else over -1
 /// to 1, from a fixed generator.
 fn self_test_observations(graph: &Graph, steps: usize) -> Vec<Vec<f32>> {
-    let mut state = 0x2545_f491u32;
-    let mut noise = move || {
-        state ^= state << 13;
-        state ^= state >> 17;
-        state ^= state << 5;
-        state as i32 as f32 / i32::MAX as f32
-    };
+    let mut random = Random::new(0);
     let norm = graph.nodes.iter().find_map(|node| match &node.kind {
         NodeKind::Normalize(norm) if node.inputs == [0] => Some(norm),
         _ => None,
     });
     let mut value = |i: usize| match norm {
-        Some(norm) if norm.scale[i].abs() > 1e-6 => norm.mean[i] + 2.0 * noise() / norm.scale[i],
-        _ => noise(),
+        Some(norm) if norm.scale[i].abs() > 1e-6 => norm.mean[i] + 2.0 * random.unit() / norm.scale[i],
+        _ => random.unit(),
     };
     (0..steps).map(|_| (0..graph.obs_len).map(&mut value).collect()).collect()
 }

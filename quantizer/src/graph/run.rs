@@ -137,14 +137,14 @@ mod tests {
 
     /// A graph with every kind of node.
     fn graph() -> Graph {
-        let mut seed = Random(11);
+        let mut seed = Random::new(11);
         let mut graph = Graph::new(5);
         for (rows, cols) in [(6, 5)].into_iter().chain([(6, 6); 7]).chain([(16, 7), (16, 4), (9, 4), (9, 3), (2, 3)]) {
             let data = random(rows * cols, &mut seed).iter().map(|w| 0.6 * w).collect();
             graph.matrices.push(WeightMatrix { name: "m".into(), rows, cols, data });
         }
         let mut push = |kind: NodeKind, inputs: &[ValueId]| graph.add(kind, inputs).expect("it fits");
-        let vector = |n: usize, seed: u64| random(n, &mut Random(seed));
+        let vector = |n: usize, seed: u64| random(n, &mut Random::new(seed));
         let weight = |n: usize, seed: u64| vector(n, seed).iter().map(|v| 1.0 + 0.3 * v).collect::<Vec<_>>();
         let normalize = Normalize { mean: vector(5, 1), scale: weight(5, 2), pre_clip: 10.0, clip: 3.0 };
         let normal = push(normalize.into(), &[0]);
@@ -169,7 +169,7 @@ mod tests {
     const STEPS: usize = 3;
 
     fn observations() -> Vec<Array2<f32>> {
-        let mut seed = Random(5);
+        let mut seed = Random::new(5);
         (0..STEPS).map(|_| Array2::from_shape_fn((2, 5), |_| seed.unit())).collect()
     }
 

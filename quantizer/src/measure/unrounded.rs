@@ -91,7 +91,7 @@ mod tests {
 
     /// A network with every operation.
     fn graph() -> Graph {
-        let mut random = Random(3);
+        let mut random = Random::new(3);
         let mut values = |n: usize| -> Vec<f32> { (0..n).map(|_| 0.5 * random.unit()).collect() };
         let mut graph = Graph::new(OBS);
         let shapes = [(HIDDEN, OBS), (4 * HIDDEN, HIDDEN), (4 * HIDDEN, HIDDEN), (3 * HIDDEN, HIDDEN + 3)];
@@ -162,7 +162,7 @@ mod tests {
         }
         let mut evaluator = Evaluator::new(&dequantized);
         let mut unrounded = Unrounded::new(image);
-        let mut random = Random(4);
+        let mut random = Random::new(4);
         let mut rounded: f32 = 0.0;
         with_head(image, |head| {
             for _ in 0..20 {
@@ -185,7 +185,7 @@ mod tests {
         assert_eq!(graph.state_len(), 3 * HIDDEN);
         let (_, buffer) = image(&graph, Width::W8, Activations::Int16);
         let image = buffer.image(Path::new("memory")).expect("an image");
-        let mut random = Random(5);
+        let mut random = Random::new(5);
         let state: Vec<f32> = (0..3 * HIDDEN).map(|_| random.unit()).collect();
         let obs = [0.5; OBS];
         let mut evaluator = Evaluator::new(&graph);

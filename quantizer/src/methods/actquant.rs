@@ -105,7 +105,7 @@ pub(crate) mod testing {
 
     /// 3 -> 4 tanh -> 2
     pub(crate) fn mlp() -> Graph {
-        let mut random = Random(1);
+        let mut random = Random::new(1);
         let mut graph = Graph::new(3);
         graph.matrices = vec![matrix("a", 4, 3, &mut random), matrix("b", 2, 4, &mut random)];
         graph.add(Linear { matrix: 0, bias: vector(4, &mut random) }, &[0]).expect("it fits");
@@ -116,7 +116,7 @@ pub(crate) mod testing {
 
     /// LSTM 2 -> 3, then 3 -> 2
     pub(crate) fn lstm() -> Graph {
-        let mut random = Random(2);
+        let mut random = Random::new(2);
         let mut graph = Graph::new(2);
         graph.matrices = vec![
             matrix("w_ih", 12, 2, &mut random),
@@ -131,7 +131,7 @@ pub(crate) mod testing {
 
     /// Random observations with the network's own actions.
     pub(crate) fn dataset(graph: &Graph, episodes: usize, steps: usize) -> Dataset {
-        let mut random = Random(3);
+        let mut random = Random::new(3);
         let obs = Array3::from_shape_fn((episodes, steps, graph.obs_len), |_| random.unit());
         let mut action = Array3::zeros((episodes, steps, graph.len_of(graph.output())));
         let mut evaluator = Evaluator::new(graph);

@@ -201,7 +201,7 @@ fn choose_activations(graph: &Graph, quantized: &[Quantized], windows: &Windows<
     let error = |x_max: &[u16]| -> f32 {
         let network = Network::rounded(graph, x_max);
         let samples = (SAMPLES / windows.window).max(8);
-        let batches = (0..MEASURED).map(|i| windows.batch(samples, false, &mut Random(seed + i as u64)));
+        let batches = (0..MEASURED).map(|i| windows.batch(samples, false, &mut Random::new(seed + i as u64)));
         batches.map(|batch| loss(&network, &weights, windows, batch)).sum()
     };
     let int8 = vec![127; quantized.len()];

@@ -69,7 +69,7 @@ mod tests {
     #[test]
     fn feedback_lowers_the_output_error_for_correlated_inputs() {
         let (rows, cols) = (16, 48);
-        let mut random = Random(7);
+        let mut random = Random::new(7);
         let data = (0..rows * cols).map(|_| random.unit()).collect();
         let matrix = WeightMatrix { name: "w".into(), rows, cols, data };
         // Inputs of 8 hidden causes.
@@ -88,7 +88,7 @@ mod tests {
 
     #[test]
     fn uncorrelated_equal_inputs_reduce_to_rounding() {
-        let mut random = Random(3);
+        let mut random = Random::new(3);
         let matrix =
             WeightMatrix { name: "w".into(), rows: 5, cols: 20, data: (0..100).map(|_| random.unit()).collect() };
         let moments = Moments { second: DMatrix::identity(20, 20), mean: vec![0.0; 20], count: 1 };

@@ -349,7 +349,7 @@ fn resumed(elf: &Path, counter: &Counter, most: &Rates) -> Result<f64> {
 
 /// Standard normal observations, and such as reach the ends of every branch.
 fn observations(len: usize) -> Vec<Vec<f32>> {
-    let mut random = Random(1);
+    let mut random = Random::new(1);
     let normal = (0..NORMAL).map(|_| (0..len).map(|_| random.normal()).collect::<Vec<_>>()).collect::<Vec<_>>();
     let ends = [0.0, 1e-3, 1.0, -1.0, 30.0, -30.0, 1e4, -1e4];
     normal.into_iter().chain(ends.map(|x| vec![x; len])).collect()

@@ -163,7 +163,7 @@ mod tests {
     #[test]
     fn what_follows_from_the_others_is_not_lost() {
         // Column 3 is always 2 * column 0 - column 1 + 5.
-        let mut random = crate::random::Random(5);
+        let mut random = crate::random::Random::new(5);
         let vectors: Vec<[f64; 4]> = (0..300)
             .map(|_| {
                 let x: [f64; 3] = [(); 3].map(|()| f64::from(random.unit()));

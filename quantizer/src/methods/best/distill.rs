@@ -201,7 +201,7 @@ pub fn distill(task: &Task<'_>, windows: &Windows<'_>, mut progress: impl FnMut(
     let mut adam_codes: Vec<Adam> = latents.iter().map(|_| Adam::default()).collect();
     let mut adam_scales: Vec<Adam> = latents.iter().map(|_| Adam::default()).collect();
     let mut adam_vectors = Adam::default();
-    let mut random = Random(task.seed);
+    let mut random = Random::new(task.seed);
     let size = if windows.recurrent() { WINDOWS } else { FRAMES };
     for step in 0..task.steps {
         for (latent, weights) in latents.iter().zip(&mut weights.matrices) {
@@ -211,7 +211,7 @@ pub fn distill(task: &Task<'_>, windows: &Windows<'_>, mut progress: impl FnMut(
         let shards: Vec<Weights> = seeds
             .into_par_iter()
             .map(|seed| {
-                let batch = windows.batch(size / SHARDS, true, &mut Random(seed));
+                let batch = windows.batch(size / SHARDS, true, &mut Random::new(seed));
                 gradient(&network, &weights, windows, batch)
             })
             .collect();

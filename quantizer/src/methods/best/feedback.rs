@@ -174,7 +174,7 @@ mod tests {
 
     /// A matrix with the moments of inputs and derivatives that have 8 hidden causes each.
     fn case() -> (WeightMatrix, Moments, DMatrix<f64>) {
-        let mut random = Random(11);
+        let mut random = Random::new(11);
         let data = (0..ROWS * COLS).map(|_| random.unit()).collect();
         let mut second = |n: usize| {
             let mixing = DMatrix::from_fn(n, 8, |_, _| f64::from(random.unit()));
