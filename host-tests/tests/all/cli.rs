@@ -619,7 +619,7 @@ const SPOILT: &[Spoilt] = &[
         "integer tensor",
         |p| replace(p, "in.bias", Dtype::I64, &[HIDDEN], vec![0; 8 * HIDDEN]),
         "",
-        &["policy.safetensors", "op 1", "in.bias", "I64"],
+        &["policy.safetensors", "op 1", "in.bias", "int64"],
     ),
     ("slot not saved", |p| edit(p, "/ops/4/with", json!("skip")), "", &["policy.json", "op 4", "skip"]),
     ("slot saved later", |p| edit(p, "/ops/1/input", json!("h")), "", &["policy.json", "op 1", "\"h\""]),
