@@ -214,8 +214,9 @@ fn chunk<F: Format, const CELLS: usize>(weights: &[u32], x: &[u32], pass: usize,
     // Long cells leave registers for no more than two.
     if F::CELL.cols == 32 {
         if let [a, b] = t.as_chunks_mut::<2>().0 {
-            cells::<F, CELLS, 2>(weights, x, pass, 0, a);
+            // In this order the compiler spills less.
             cells::<F, CELLS, 2>(weights, x, pass, 2, b);
+            cells::<F, CELLS, 2>(weights, x, pass, 0, a);
         }
     } else {
         cells::<F, CELLS, CELLS>(weights, x, pass, 0, &mut t);
