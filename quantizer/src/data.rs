@@ -4,13 +4,16 @@ mod arrays;
 #[cfg(test)]
 mod damaged;
 mod dataset;
+mod joined;
 mod npy;
 mod npz;
 mod range;
 mod recording;
 #[cfg(test)]
 mod tests;
+mod thinning;
 
 pub use dataset::{Dataset, Sizes};
+pub use joined::{Learned, MOST_FRAMES, Share, longest_piece};
 pub use range::{Outside, Range, runs};
-pub use recording::{Recording, Recordings};
+pub use recording::{Recording, Recordings, files_of};

@@ -1,6 +1,7 @@
 //! Tables, notes and pictures for people.
 
 pub mod inspect;
+pub mod learned;
 pub mod notes;
 pub mod plot;
 pub mod quantized;

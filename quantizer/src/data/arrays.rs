@@ -15,6 +15,9 @@ use crate::import::values::{Tensor, Values};
 /// The names that mean something; other arrays are left alone, whatever their type.
 const NAMES: [&str; 4] = ["obs", "action", "length", "state"];
 
+/// The endings of recordings' names.
+pub(super) const ENDINGS: [&str; 3] = ["npz", "npy", "safetensors"];
+
 /// The named arrays of a file.
 pub(super) struct Arrays {
     /// All names in the file.

@@ -1,9 +1,11 @@
 //! Where a policy's recordings are.
 
+use std::fs;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 
+use super::arrays::ENDINGS;
 use super::dataset::{Dataset, Sizes};
 use crate::policy::Policy;
 
@@ -25,7 +27,7 @@ impl Recording {
     }
 
     fn names(self) -> [String; 3] {
-        ["npz", "npy", "safetensors"].map(|ending| format!("{}.{ending}", self.stem()))
+        ENDINGS.map(|ending| format!("{}.{ending}", self.stem()))
     }
 
     /// Where it may be in a policy's folder.
@@ -67,6 +69,29 @@ impl Recording {
              --{stem}"
         )
     }
+}
+
+/// The recordings that are `named`: files, and of folders every .npz, .npy and .safetensors in them, by name.
+pub fn files_of(named: &[PathBuf]) -> Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    for path in named {
+        if !path.is_dir() {
+            files.push(path.clone());
+            continue;
+        }
+        let read = || fs::read_dir(path)?.map(|entry| Ok(entry?.path())).collect::<Result<Vec<PathBuf>>>();
+        let mut found = read().with_context(|| format!("{}: cannot be read", path.display()))?;
+        let is_recording = |ending: &str| ENDINGS.contains(&ending);
+        found.retain(|f| f.is_file() && f.extension().and_then(|e| e.to_str()).is_some_and(is_recording));
+        ensure!(
+            !found.is_empty(),
+            "{}: the folder holds no recording; their names end in .npz, .npy or .safetensors",
+            path.display()
+        );
+        found.sort();
+        files.append(&mut found);
+    }
+    Ok(files)
 }
 
 /// The two recordings of a policy, as far as they are there.

@@ -318,6 +318,24 @@ fn one_recording_is_found_and_two_are_refused() {
 }
 
 #[test]
+fn a_folder_stands_for_the_recordings_in_it() {
+    let dir = folder();
+    fs::create_dir(dir.path().join("drives")).expect("a folder");
+    let drives = dir.path().join("drives");
+    let error = files_of(std::slice::from_ref(&drives)).expect_err("none").to_string();
+    let words = "the folder holds no recording; their names end in .npz, .npy or .safetensors";
+    assert_eq!(error, format!("{}: {words}", drives.display()));
+    let other = write(&dir, "b.npz", &[("obs", obs())]);
+    let expected: Vec<PathBuf> = ["drives/1.npy", "drives/2.npz", "drives/3.safetensors"]
+        .map(|name| write(&dir, name, &[("obs", obs())]))
+        .into();
+    fs::write(drives.join("notes.txt"), "").expect("a file");
+    fs::create_dir(drives.join("old.npz")).expect("a folder");
+    let found = files_of(&[other.clone(), drives]).expect("four");
+    assert_eq!(found, [vec![other], expected].concat());
+}
+
+#[test]
 fn too_few_frames_are_named() {
     let dir = folder();
     let dataset = Dataset::load(&write(&dir, "calib.npz", &[("obs", obs())]), SIZES).expect("ten frames");

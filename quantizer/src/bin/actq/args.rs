@@ -80,9 +80,10 @@ pub(crate) struct QuantizeArgs {
     /// The image to write
     #[arg(long, value_name = "FILE")]
     pub(crate) out: PathBuf,
-    /// The recording to learn from: .npz, .npy or .safetensors [default: calib.* in POLICY_DIR]
-    #[arg(long, value_name = "FILE")]
-    pub(crate) calib: Option<PathBuf>,
+    /// A recording to learn from: .npz, .npy or .safetensors, or a folder of them; may be repeated [default: calib.* in
+    /// POLICY_DIR]
+    #[arg(long, value_name = "FILE|DIR")]
+    pub(crate) calib: Vec<PathBuf>,
     /// Bits of every weight: 2, 3, 4 or 8 [default: 3]
     #[arg(long, value_name = "N", conflicts_with = "bpw", value_parser = width)]
     pub(crate) bits: Option<Width>,
@@ -161,9 +162,10 @@ pub(crate) struct SweepArgs {
     /// Bits per weight of the whole that are allowed
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "2,2.5,3,4", value_parser = positive)]
     pub(crate) bpw: Vec<f64>,
-    /// The recording to learn from: .npz, .npy or .safetensors [default: calib.* in POLICY_DIR]
-    #[arg(long, value_name = "FILE")]
-    pub(crate) calib: Option<PathBuf>,
+    /// A recording to learn from: .npz, .npy or .safetensors, or a folder of them; may be repeated [default: calib.* in
+    /// POLICY_DIR]
+    #[arg(long, value_name = "FILE|DIR")]
+    pub(crate) calib: Vec<PathBuf>,
     /// The held-out recording to measure on [default: heldout.* in POLICY_DIR]
     #[arg(long, value_name = "FILE")]
     pub(crate) heldout: Option<PathBuf>,

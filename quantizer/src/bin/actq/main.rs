@@ -8,7 +8,7 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use actq::data::{Range, Recording, Recordings, Sizes};
+use actq::data::{Learned, Range, Recording, Recordings, Sizes, files_of};
 use actq::emit::files;
 use actq::import;
 use actq::measure::eval;
@@ -140,19 +140,20 @@ fn policy_files(dir: &Path) -> Vec<PathBuf> {
 
 fn run_sweep(args: &SweepArgs) -> Result<()> {
     let folders = args.policy_dirs.iter().flat_map(|dir| policy_files(dir));
-    let inputs: Vec<PathBuf> = folders.chain([&args.calib, &args.heldout].into_iter().flatten().cloned()).collect();
+    let calib = files_of(&args.calib)?;
+    let inputs: Vec<PathBuf> = folders.chain(calib.iter().chain(&args.heldout).cloned()).collect();
     let outputs: Vec<&Path> = [&args.svg, &args.json].into_iter().filter_map(|path| path.as_deref()).collect();
     files::check_outputs(&outputs, &inputs)?;
     start_threads(args.run.threads)?;
     let methods: Vec<Method> = args.methods.iter().map(|&m| m.into()).collect();
     let policies = args.policy_dirs.iter().map(|dir| Policy::load(dir)).collect::<Result<Vec<_>>>()?;
-    let named = args.calib.is_some() || args.heldout.is_some();
+    let named = !calib.is_empty() || args.heldout.is_some();
     ensure!(policies.len() == 1 || !named, "--calib and --heldout go with one policy");
     let bar = progress_bar()?;
     let mut sweeps = Vec::new();
     for (p, policy) in policies.iter().enumerate() {
         let (dir, sizes) = (Some(policy.dir.as_path()), Sizes::of(policy));
-        let calib = Recording::Calib.load(dir, args.calib.as_deref(), sizes)?;
+        let calib = Learned::load(policy, &calib)?.map(|learned| learned.dataset);
         let mut heldout = Recording::Heldout.require(dir, args.heldout.as_deref(), sizes, "actq sweep")?;
         heldout.fill_actions(&policy.graph);
         let recordings = Recordings { calib, heldout: Some(heldout) };

@@ -4,13 +4,14 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use actq::budget::{Budget, TimeLimit};
-use actq::data::{Recording, Recordings, Sizes};
+use actq::data::{Learned, Recording, Recordings, Sizes, files_of};
 use actq::emit::files;
 use actq::measure::check;
 use actq::methods::{Activations, Method, Options};
 use actq::pipeline::Quantizer;
 use actq::pipeline::stats::Stats;
 use actq::policy::Policy;
+use actq::report::learned::learned;
 use actq::report::{notes, quantized, time};
 use actq_kernels::Width;
 use anyhow::Result;
@@ -21,14 +22,13 @@ use crate::{note, policy_files, print, progress_bar, set_share, start_threads};
 /// Quantizes a policy, writes the image and says what became of it.
 pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
     let outputs: Vec<&Path> = [Some(&args.out), args.save_stats.as_ref()].into_iter().flatten().map(|p| &**p).collect();
-    let inputs: Vec<PathBuf> = policy_files(&args.policy_dir).into_iter().chain(args.calib.clone()).collect();
+    let calib = files_of(&args.calib)?;
+    let inputs: Vec<PathBuf> = policy_files(&args.policy_dir).into_iter().chain(calib.iter().cloned()).collect();
     files::check_outputs(&outputs, &inputs)?;
     let source = Policy::load(&args.policy_dir)?;
-    let (dir, sizes) = (Some(args.policy_dir.as_path()), Sizes::of(&source));
-    let recordings = Recordings {
-        calib: Recording::Calib.load(dir, args.calib.as_deref(), sizes)?,
-        heldout: Recording::Heldout.load(dir, None, sizes)?,
-    };
+    let (calib, shares) = Learned::load(&source, &calib)?.map(|l| (l.dataset, l.shares)).unzip();
+    let heldout = Recording::Heldout.load(Some(&args.policy_dir), None, Sizes::of(&source))?;
+    let recordings = Recordings { calib, heldout };
     note(notes::of_recordings(&recordings));
     let options = options(args, &recordings);
     let started = Instant::now();
@@ -47,6 +47,7 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
         files.push((path, Stats::new(&quantizer, &options, &found)?.json()?.into_bytes()));
     }
     files::write_all(&files)?;
+    print(&learned(&shares.unwrap_or_default()))?;
     if let Some(statistics) = quantizer.method().action_statistics() {
         print(&quantized::scores(&source.graph, statistics, &found))?;
     }

@@ -1,0 +1,228 @@
+//! What of a long recording is kept: what adds to the rest, where blind thinning would keep a thousand frames of a robot that
+//! stands still and lose the one in which it stumbles.
+//!
+//! Observations are standardized and counted by the cells of a grid. One frame of a cell is kept; the cells are made as wide as
+//! it takes for all of them to have room.
+
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, HashSet};
+
+use ndarray::ArrayView1;
+
+use super::dataset::Dataset;
+
+/// A frame of one of several recordings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Place {
+    /// The recording.
+    pub(super) part: usize,
+    /// The episode in it.
+    pub(super) episode: usize,
+    /// The step of the episode.
+    pub(super) step: usize,
+}
+
+/// All valid frames, episode after episode; the order of [`observations`].
+pub(super) fn places(parts: &[Dataset]) -> Vec<Vec<Place>> {
+    let steps = |part: usize, episode: usize, length: usize| -> Vec<Place> {
+        (0..length).map(|step| Place { part, episode, step }).collect()
+    };
+    let of_part = |(part, dataset): (usize, &Dataset)| -> Vec<Vec<Place>> {
+        dataset.length.iter().enumerate().map(|(episode, &length)| steps(part, episode, length)).collect()
+    };
+    parts.iter().enumerate().flat_map(of_part).filter(|episode| !episode.is_empty()).collect()
+}
+
+/// At most `most` frames, the first of every cell, in the order of recording.
+pub(super) fn frames(parts: &[Dataset], most: usize) -> Vec<Place> {
+    let grid = Grid::fitting(parts, most);
+    let mut visited = HashSet::new();
+    let all = places(parts).into_iter().flatten().zip(observations(parts));
+    all.filter(|(_, observation)| visited.insert(grid.cell(observation))).map(|(place, _)| place).collect()
+}
+
+/// Whole episodes of at most `most` frames together, in the order of recording: again and again the one that visits most cells
+/// which none before it has visited. Of an episode that is longer than that, its beginning counts.
+pub(super) fn episodes(parts: &[Dataset], most: usize) -> Vec<Vec<Place>> {
+    let grid = Grid::fitting(parts, most);
+    let mut observations = observations(parts);
+    let mut candidates = places(parts);
+    let mut cells: Vec<HashSet<u64>> = Vec::new();
+    for episode in &mut candidates {
+        let own: Vec<u64> = observations.by_ref().take(episode.len()).map(|o| grid.cell(&o)).collect();
+        episode.truncate(most);
+        cells.push(own.into_iter().take(most).collect());
+    }
+    // What an episode adds only falls while others are chosen, so that most need not be counted again.
+    let mut queue: BinaryHeap<(usize, Reverse<usize>)> =
+        cells.iter().enumerate().map(|(e, cells)| (cells.len(), Reverse(e))).collect();
+    let (mut visited, mut chosen, mut room) = (HashSet::new(), Vec::new(), most);
+    while let Some((_, Reverse(e))) = queue.pop() {
+        let added = cells[e].difference(&visited).count();
+        if candidates[e].len() > room || added == 0 {
+            continue;
+        }
+        let entry = (added, Reverse(e));
+        if queue.peek().is_some_and(|next| *next > entry) {
+            queue.push(entry);
+            continue;
+        }
+        visited.extend(&cells[e]);
+        room -= candidates[e].len();
+        chosen.push(e);
+    }
+    chosen.sort_unstable();
+    chosen.into_iter().map(|e| std::mem::take(&mut candidates[e])).collect()
+}
+
+fn observations(parts: &[Dataset]) -> impl Iterator<Item = ArrayView1<'_, f32>> {
+    parts.iter().flat_map(Dataset::observations)
+}
+
+/// Cells of equal width over standardized observations; the middle of one is at their mean.
+struct Grid {
+    mean: Vec<f64>,
+    /// 1 over the width of a cell, in units of each value; 0 for a value that never changes.
+    cells: Vec<f64>,
+}
+
+impl Grid {
+    /// The finest that is looked for, in standard deviations: frames nearer to each other say the same.
+    const FINEST: f64 = 1.0 / 1024.0;
+    /// Halvings of the range in which the width lies, at most.
+    const HALVINGS: usize = 12;
+
+    /// Of about the smallest cells of which no more than `most` are visited.
+    fn fitting(parts: &[Dataset], most: usize) -> Self {
+        let unit = Self::of(parts);
+        // Widths are searched by their ratio.
+        let fits = |width: f64| unit.with_width(width).visited(parts, most);
+        let (mut narrow, mut wide) = (Self::FINEST, Self::FINEST);
+        let mut visited = fits(wide);
+        // No observation is further from the mean than the root of their number, so that one cell holds all in the end.
+        while visited.is_none() {
+            (narrow, wide) = (wide, 4.0 * wide);
+            visited = fits(wide);
+        }
+        for _ in 0..Self::HALVINGS {
+            // Nineteen twentieths of the room are used well enough.
+            if narrow == wide || visited.is_some_and(|n| n >= most - most / 20) {
+                break;
+            }
+            let middle = (narrow * wide).sqrt();
+            match fits(middle) {
+                None => narrow = middle,
+                found => (wide, visited) = (middle, found),
+            }
+        }
+        unit.with_width(wide)
+    }
+
+    /// With cells one standard deviation wide.
+    fn of(parts: &[Dataset]) -> Self {
+        let values = parts.first().map_or(0, |part| part.obs.dim().2);
+        let frames = parts.iter().map(Dataset::frames).sum::<usize>().max(1) as f64;
+        let mean_of = |f: &dyn Fn(usize, f64) -> f64| -> Vec<f64> {
+            let mut sums = vec![0.0; values];
+            for observation in observations(parts) {
+                sums.iter_mut().zip(observation).enumerate().for_each(|(i, (sum, v))| *sum += f(i, f64::from(*v)));
+            }
+            sums.into_iter().map(|sum| sum / frames).collect()
+        };
+        let mean = mean_of(&|_, v| v);
+        let variance = mean_of(&|i, v| (v - mean[i]).powi(2));
+        Self { cells: variance.into_iter().map(|v| if v > 0.0 { v.sqrt().recip() } else { 0.0 }).collect(), mean }
+    }
+
+    fn with_width(&self, width: f64) -> Self {
+        Self { mean: self.mean.clone(), cells: self.cells.iter().map(|n| n / width).collect() }
+    }
+
+    /// How many cells are visited; `None` where they are more than `most`.
+    fn visited(&self, parts: &[Dataset], most: usize) -> Option<usize> {
+        let mut visited = HashSet::new();
+        for observation in observations(parts) {
+            visited.insert(self.cell(&observation));
+            if visited.len() > most {
+                return None;
+            }
+        }
+        Some(visited.len())
+    }
+
+    /// A number for the cell. That two of a million cells share theirs is unlikely, and would cost one frame.
+    fn cell(&self, observation: &ArrayView1<'_, f32>) -> u64 {
+        let mut number = 0u64;
+        for ((v, mean), cells) in observation.iter().zip(&self.mean).zip(&self.cells) {
+            let at = ((f64::from(*v) - mean) * cells).round() as i64;
+            // SplitMix64's steps (Steele, Lea, Flood: Fast splittable pseudorandom number generators, 2014).
+            number = (number ^ at as u64).wrapping_add(0x9e37_79b9_7f4a_7c15);
+            number = (number ^ (number >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            number = (number ^ (number >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            number ^= number >> 31;
+        }
+        number
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ndarray::Array3;
+
+    use super::*;
+
+    /// One value a step: every episode's.
+    fn recorded(episodes: &[&[f32]]) -> Dataset {
+        let longest = episodes.iter().map(|e| e.len()).max().unwrap_or(0);
+        let value = |(e, s, _): (usize, usize, usize)| episodes[e].get(s).copied().unwrap_or(f32::NAN);
+        Dataset {
+            path: "drive.npz".into(),
+            obs: Array3::from_shape_fn((episodes.len(), longest, 1), value),
+            action: None,
+            length: episodes.iter().map(|e| e.len()).collect(),
+            state: None,
+        }
+    }
+
+    #[test]
+    fn a_frame_that_nothing_is_like_stays() {
+        // A robot that stands, and stumbles once in the second file.
+        let standing: Vec<f32> = (0..1000).map(|i| 1e-3 * (i % 7) as f32).collect();
+        let mut stumbles = standing.clone();
+        stumbles[700] = 4.0;
+        let parts = [recorded(&[&standing]), recorded(&[&standing[..5], &stumbles])];
+        let kept = frames(&parts, 20);
+        assert!(kept.len() <= 20, "{}", kept.len());
+        assert!(kept.contains(&Place { part: 1, episode: 1, step: 700 }), "{kept:?}");
+        assert_eq!(kept[0], Place { part: 0, episode: 0, step: 0 }, "of equal frames the first stays");
+    }
+
+    #[test]
+    fn the_room_is_used() {
+        let spread: Vec<f32> = (0..5000).map(|i| (i as f32 * 0.37).sin() + 1e-3 * i as f32).collect();
+        let parts = [recorded(&[&spread])];
+        for most in [1, 10, 100, 1000] {
+            let kept = frames(&parts, most).len();
+            assert!(kept <= most && kept >= most * 3 / 4, "{kept} of {most}");
+        }
+        // A value that never changes has one cell, however much room there is.
+        assert_eq!(frames(&[recorded(&[&[2.5; 50]])], 10).len(), 1);
+    }
+
+    #[test]
+    fn episodes_are_chosen_by_what_they_add() {
+        let walk = |from: f32, n: usize| -> Vec<f32> { (0..n).map(|i| from + i as f32).collect() };
+        let (near, far, again, short) = (walk(0.0, 40), walk(100.0, 30), walk(0.0, 39), walk(200.0, 10));
+        let parts = [recorded(&[&near, &again]), recorded(&[&far, &short])];
+        let chosen = |most: usize| -> Vec<(usize, usize, usize)> {
+            episodes(&parts, most).iter().map(|e| (e[0].part, e[0].episode, e.len())).collect()
+        };
+        // The repetition adds nothing, though there would be room for it.
+        assert_eq!(chosen(119), [(0, 0, 40), (1, 0, 30), (1, 1, 10)]);
+        assert_eq!(chosen(70), [(0, 0, 40), (1, 0, 30)]);
+        // Too long for what is left; the next one fits.
+        assert_eq!(chosen(55), [(0, 0, 40), (1, 1, 10)]);
+        // None fits: the beginning of one is better than nothing.
+        assert_eq!(chosen(8).iter().map(|e| e.2).collect::<Vec<_>>(), [8]);
+    }
+}
