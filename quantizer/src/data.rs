@@ -7,6 +7,7 @@ mod dataset;
 mod joined;
 mod npy;
 mod npz;
+mod origin;
 mod range;
 mod recording;
 #[cfg(test)]
@@ -14,6 +15,7 @@ mod tests;
 mod thinning;
 
 pub use dataset::{Dataset, Sizes};
-pub use joined::{Learned, MOST_FRAMES, Share, longest_piece};
+pub use joined::{Learned, MOST_FRAMES, Share, joined, longest_piece};
+pub use origin::{CRC32, driven_by};
 pub use range::{Outside, Range, runs};
 pub use recording::{Recording, Recordings, files_of};

@@ -2,6 +2,7 @@
 
 pub mod check;
 pub mod eval;
+pub mod own;
 pub mod size;
 pub mod time;
 pub mod unrounded;

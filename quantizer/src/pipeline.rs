@@ -2,12 +2,14 @@
 //! writes files.
 
 mod budgets;
+pub mod driven;
 mod quantizer;
 mod search;
 pub mod stats;
 pub mod sweep;
 mod time;
 mod tries;
+pub mod tune;
 
 pub use budgets::quantize;
 pub use quantizer::{QuantizedPolicy, Quantizer};

@@ -8,4 +8,5 @@ pub mod quantized;
 pub mod sweep;
 pub mod table;
 pub mod time;
+pub mod tuned;
 pub mod widths;

@@ -1,39 +1,10 @@
-//! The pipe protocol ([`actq_link`]): any simulator runs an image as its policy through standard input and output.
+//! An image as the policy of a simulator or robot, and recordings of what it was shown.
 
-use std::io::{ErrorKind, Read, Write};
+mod episodes;
+mod protocol;
+mod recorder;
+mod recorders;
 
-use actq_kernels::Image;
-use actq_link::{NO_ACTION, RESET, STEP};
-use anyhow::{Context, Result, bail};
-
-use crate::runtime::with_head;
-
-/// Serves until the input ends.
-pub fn serve(image: Image<'_>, mut input: impl Read, mut output: impl Write) -> Result<()> {
-    let mut bytes = vec![0u8; 4 * image.obs_len()];
-    let no_action = vec![NO_ACTION; image.act_len()];
-    with_head(image, |head| {
-        loop {
-            let mut command = [0u8];
-            match input.read_exact(&mut command) {
-                Err(e) if e.kind() == ErrorKind::UnexpectedEof => return Ok(()),
-                other => other.context("input cannot be read")?,
-            }
-            match command[0] {
-                RESET => head.reset(),
-                STEP => {
-                    input
-                        .read_exact(&mut bytes)
-                        .with_context(|| format!("the input ended inside an observation of {} bytes", bytes.len()))?;
-                    let observation: Vec<f32> =
-                        bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
-                    // After an error the head has reset itself.
-                    let action = head.step(&observation).unwrap_or(&no_action);
-                    let action: Vec<u8> = action.iter().flat_map(|a| a.to_le_bytes()).collect();
-                    output.write_all(&action).and_then(|()| output.flush()).context("output cannot be written")?;
-                }
-                other => bail!("unknown command byte 0x{other:02x}; R resets, S steps"),
-            }
-        }
-    })
-}
+pub use protocol::{Seen, serve};
+pub use recorder::{Recording, serve_recorded};
+pub use recorders::wait_for_recorders;

@@ -47,6 +47,15 @@ impl Arrays {
     }
 }
 
+/// One array of a file, without the others; `None` where there is none of this name.
+pub(super) fn one(path: &Path, name: &str) -> Result<Option<Tensor>> {
+    match path.extension().and_then(|e| e.to_str()) {
+        Some("npz") => Archive::open(File::open(path).context("cannot be read")?)?.read(name),
+        Some("safetensors") => Ok(TensorFile::new(&fs::read(path).context("cannot be read")?)?.get(name)),
+        _ => Ok(None),
+    }
+}
+
 /// The values of an array as f32; what f32 cannot hold becomes infinite.
 pub(super) fn floats(array: &Tensor, name: &str) -> Result<Vec<f32>> {
     let of_recordings = matches!(array.values, Values::F32(_) | Values::F64(_));

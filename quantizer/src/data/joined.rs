@@ -48,17 +48,16 @@ impl Learned {
         if files.is_empty() {
             parts.extend(Recording::Calib.load(Some(&policy.dir), None, sizes)?);
         }
-        if parts.is_empty() { Ok(None) } else { Self::join(parts, &policy.graph).map(Some) }
+        if parts.is_empty() { Ok(None) } else { Self::join(&mut parts, &policy.graph).map(Some) }
     }
 
     /// Joins recordings that fit the network. Episodes are padded to the longest. Where one has actions and another none, those of
-    /// the f32 network are put there; where one has states and another none, they are zero.
-    pub fn join(parts: Vec<Dataset>, graph: &Graph) -> Result<Self> {
+    /// the f32 network are put there (into `parts` as well); where one has states and another none, they are zero.
+    pub fn join(parts: &mut [Dataset], graph: &Graph) -> Result<Self> {
         Self::at_most(MOST_FRAMES, parts, graph)
     }
 
-    fn at_most(most: usize, mut parts: Vec<Dataset>, graph: &Graph) -> Result<Self> {
-        let frames_of = |parts: &[Dataset]| parts.iter().map(Dataset::frames).sum::<usize>();
+    fn at_most(most: usize, parts: &mut [Dataset], graph: &Graph) -> Result<Self> {
         let share = |part: &Dataset| Share {
             path: part.path.clone(),
             episodes: part.length.iter().filter(|n| **n > 0).count(),
@@ -66,25 +65,28 @@ impl Learned {
             kept: part.frames(),
         };
         let mut shares: Vec<Share> = parts.iter().map(share).collect();
-        let whole = frames_of(&parts) <= most;
-        if whole && parts.len() == 1 {
-            return Ok(Self { dataset: parts.remove(0), shares });
+        let whole = shares.iter().map(|share| share.frames).sum::<usize>() <= most;
+        if let ([one], true) = (&*parts, whole) {
+            return Ok(Self { dataset: one.clone(), shares });
         }
         if parts.iter().any(|part| part.action.is_some()) {
             parts.iter_mut().for_each(|part| part.fill_actions(graph));
         }
-        let recurrent = graph.state_len() > 0;
-        let chosen = match (whole, recurrent) {
-            (true, true) => places(&parts),
-            (true, false) => cut(places(&parts)),
-            (false, true) => episodes(&parts, most),
-            (false, false) => vec![frames(&parts, most)],
-        };
+        if whole {
+            return Ok(Self { dataset: joined(parts, graph.state_len())?, shares });
+        }
+        let chosen = if graph.state_len() > 0 { episodes(parts, most) } else { vec![frames(parts, most)] };
         let mut kept = vec![0; parts.len()];
         chosen.iter().flatten().for_each(|place| kept[place.part] += 1);
         shares.iter_mut().zip(kept).for_each(|(share, kept)| share.kept = kept);
-        Ok(Self { dataset: gather(&parts, &chosen, graph.state_len())?, shares })
+        Ok(Self { dataset: gather(parts, &chosen, graph.state_len())?, shares })
     }
+}
+
+/// All of several recordings as one, without actions where one has none; `state_len` is that of their policy.
+pub fn joined(parts: &[Dataset], state_len: usize) -> Result<Dataset> {
+    let episodes = places(parts);
+    gather(parts, &if state_len > 0 { episodes } else { cut(episodes) }, state_len)
 }
 
 /// The steps after which episodes of a feed-forward policy are cut, so that however long the longest is, no more than twice as
@@ -166,7 +168,7 @@ mod tests {
     fn one_short_recording_stays_as_it_is() {
         let graph = mlp();
         let whole = named("calib.npz", dataset(&graph, 3, 10));
-        let joined = Learned::join(vec![whole.clone()], &graph).expect("joined");
+        let joined = Learned::join(&mut [whole.clone()], &graph).expect("joined");
         assert_eq!((&joined.dataset.obs, &joined.dataset.path), (&whole.obs, &whole.path));
         let share = Share { path: whole.path, episodes: 3, frames: 30, kept: 30 };
         assert_eq!(joined.shares, [share]);
@@ -179,7 +181,7 @@ mod tests {
         let labels = second.action.take();
         second.length = vec![5, 0];
         first.state = Some(Array2::ones((2, 6)));
-        let joined = Learned::join(vec![first.clone(), second.clone()], &graph).expect("joined");
+        let joined = Learned::join(&mut [first.clone(), second.clone()], &graph).expect("joined");
         let all = &joined.dataset;
         assert_eq!((all.obs.dim(), &all.length[..]), ((3, 8, 2), &[8, 8, 5][..]), "an empty episode is left out");
         assert_eq!(all.path.to_str(), Some("folder/a.npz and 1 more"));
@@ -198,8 +200,8 @@ mod tests {
     #[test]
     fn long_recordings_are_thinned_and_their_labels_stay_theirs() {
         for graph in [mlp(), lstm()] {
-            let parts = vec![named("a.npz", dataset(&graph, 6, 20)), named("b.npz", dataset(&graph, 4, 30))];
-            let joined = Learned::at_most(100, parts.clone(), &graph).expect("joined");
+            let mut parts = [named("a.npz", dataset(&graph, 6, 20)), named("b.npz", dataset(&graph, 4, 30))];
+            let joined = Learned::at_most(100, &mut parts, &graph).expect("joined");
             let all = &joined.dataset;
             assert!(all.frames() <= 100 && all.frames() > 60, "{}", all.frames());
             assert_eq!(joined.shares.iter().map(|s| s.kept).sum::<usize>(), all.frames());
@@ -214,7 +216,7 @@ mod tests {
                     assert!(recorded.contains(&pair), "episode {e}, step {step}");
                 }
             }
-            let again = Learned::at_most(100, parts, &graph).expect("joined");
+            let again = Learned::at_most(100, &mut parts, &graph).expect("joined");
             assert_eq!((again.dataset.obs, again.shares), (joined.dataset.obs, joined.shares));
         }
     }
@@ -222,8 +224,8 @@ mod tests {
     #[test]
     fn one_long_episode_does_not_pad_all_others() {
         let graph = mlp();
-        let parts = vec![named("a.npz", dataset(&graph, 1, 1000)), named("b.npz", dataset(&graph, 100, 2))];
-        let joined = Learned::join(parts.clone(), &graph).expect("joined").dataset;
+        let mut parts = [named("a.npz", dataset(&graph, 1, 1000)), named("b.npz", dataset(&graph, 100, 2))];
+        let joined = Learned::join(&mut parts, &graph).expect("joined").dataset;
         let (episodes, steps, _) = joined.obs.dim();
         assert!(episodes * steps <= 3 * 1200, "{episodes} x {steps}");
         assert_eq!(rows(&joined), [rows(&parts[0]), rows(&parts[1])].concat());

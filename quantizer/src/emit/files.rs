@@ -1,5 +1,6 @@
 //! Writing files: each whole or not at all, all or none, and never over what the command reads.
 
+use std::ffi::OsStr;
 use std::fs::{self, File, Metadata, OpenOptions, Permissions};
 use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
@@ -9,6 +10,8 @@ use tempfile::NamedTempFile;
 
 /// Links from one to the next that are followed; as many as Linux follows.
 const MOST_LINKS: usize = 40;
+/// Numbers that are tried behind a name that is taken.
+const MOST_NUMBERS: usize = 9999;
 
 /// Writes `bytes` to `path` so that neither a failure nor an end of the process leaves part of a file there. (A process that is
 /// killed while it writes can leave a hidden file of this name with the ending .part.)
@@ -32,6 +35,54 @@ pub fn write_all(files: &[(&Path, impl AsRef<[u8]>)]) -> Result<()> {
         .with_context(|| named(path))?;
     }
     Ok(())
+}
+
+/// Writes a new file, as [`write()`] does, and gives its name: `path`, or, where something is there already, `path` with the
+/// first number from 2 on behind its stem that is free. Nothing is ever replaced, whoever else is looking for a name.
+pub fn write_new(path: &Path, bytes: &[u8]) -> Result<PathBuf> {
+    let create = || -> Result<PathBuf> {
+        let (folder, name) = folder_and_name(path)?;
+        let mut file = part(folder, name)?;
+        file.write_all(bytes)?;
+        file.as_file().sync_all()?;
+        for number in 1..=MOST_NUMBERS {
+            let place = numbered(path, number);
+            match file.persist_noclobber(&place) {
+                Ok(_) => return Ok(place),
+                Err(error) if error.error.kind() == ErrorKind::AlreadyExists => file = error.file,
+                Err(error) => return Err(error.error.into()),
+            }
+        }
+        bail!("all names up to {} are taken", numbered(path, MOST_NUMBERS).display())
+    };
+    create().with_context(|| named(path))
+}
+
+/// Refuses, before any work is done, a name for [`write_new`] in whose folder no file can be made.
+pub fn check_new(path: &Path) -> Result<()> {
+    folder_and_name(path).and_then(|(folder, name)| part(folder, name)).with_context(|| named(path)).map(drop)
+}
+
+/// `path` itself as number 1, then `stem-2.ending`, `stem-3.ending` and so on.
+fn numbered(path: &Path, number: usize) -> PathBuf {
+    if number == 1 {
+        return path.to_owned();
+    }
+    let mut name = path.file_stem().unwrap_or_default().to_owned();
+    name.push(format!("-{number}"));
+    if let Some(ending) = path.extension() {
+        name.push(".");
+        name.push(ending);
+    }
+    path.with_file_name(name)
+}
+
+/// Where a file's temporary neighbour can be.
+fn folder_and_name(path: &Path) -> Result<(&Path, &OsStr)> {
+    let name = path.file_name().context("it names no file")?;
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    ensure!(folder.is_dir(), "there is no folder {}", folder.display());
+    Ok((folder, name))
 }
 
 /// Refuses, before any work is done, outputs that are one of the command's `inputs` or each other, under whatever names, and
@@ -140,6 +191,17 @@ fn stage(path: &Path, bytes: &[u8]) -> Result<Staged> {
         Place::Stream(place) => return Ok(Staged::Stream(OpenOptions::new().write(true).open(place)?)),
     };
     let (Some(folder), Some(name)) = (place.parent(), place.file_name()) else { bail!("it names no file") };
+    let mut file = part(folder, name)?;
+    file.write_all(bytes)?;
+    if let Some(old) = old {
+        file.as_file().set_permissions(kept(&old))?;
+    }
+    file.as_file().sync_all()?;
+    Ok(Staged::File(file, place))
+}
+
+/// An empty file in `folder`, to become the one of this name.
+fn part(folder: &Path, name: &OsStr) -> Result<NamedTempFile> {
     let prefix = format!(".{}.", name.to_string_lossy());
     let mut builder = tempfile::Builder::new();
     builder.prefix(&prefix).suffix(".part");
@@ -149,13 +211,7 @@ fn stage(path: &Path, bytes: &[u8]) -> Result<Staged> {
         use std::os::unix::fs::PermissionsExt as _;
         builder.permissions(Permissions::from_mode(0o666));
     }
-    let mut file = builder.tempfile_in(folder)?;
-    file.write_all(bytes)?;
-    if let Some(old) = old {
-        file.as_file().set_permissions(kept(&old))?;
-    }
-    file.as_file().sync_all()?;
-    Ok(Staged::File(file, place))
+    Ok(builder.tempfile_in(folder)?)
 }
 
 /// The permissions of a file that is replaced, without those that would be another owner's.
@@ -167,4 +223,30 @@ fn kept(old: &Metadata) -> Permissions {
     }
     #[cfg(not(unix))]
     old.permissions()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::thread;
+
+    use super::*;
+
+    #[test]
+    fn new_files_find_a_free_name() {
+        let dir = tempfile::TempDir::new().expect("a folder");
+        let path = dir.path().join("drive.npz");
+        let name = |path: PathBuf| path.file_name().expect("a name").to_string_lossy().into_owned();
+        assert_eq!(name(write_new(&path, b"1").expect("written")), "drive.npz");
+        fs::write(dir.path().join("drive-2.npz"), "mine").expect("a file");
+        assert_eq!(name(write_new(&path, b"3").expect("written")), "drive-3.npz");
+        let (one, two) = (fs::read(&path).expect("1"), fs::read(dir.path().join("drive-2.npz")).expect("2"));
+        assert_eq!((&one[..], &two[..]), (&b"1"[..], &b"mine"[..]));
+        // At once, everyone gets a name of their own, and nothing else is left.
+        let write = |i: u8| write_new(&path, &[i]).expect("written");
+        thread::scope(|scope| (0..8).for_each(|i| drop(scope.spawn(move || write(i)))));
+        assert_eq!(fs::read_dir(dir.path()).expect("a folder").count(), 3 + 8);
+        let missing = dir.path().join("no").join("drive.npz");
+        assert!(check_new(&path).is_ok() && check_new(&missing).is_err() && write_new(&missing, b"").is_err());
+        assert_eq!(numbered(Path::new("a/b"), 12), Path::new("a/b-12"));
+    }
 }

@@ -23,11 +23,17 @@ impl fmt::Display for ActivationShare {
 
 /// The errors in a few lines.
 pub fn errors(check: &Check) -> String {
-    let line = |name: &str, report: &ErrorReport| {
-        format!("{name:<17} {:.3e}   ({} observations)\n", report.nmse, report.steps)
-    };
     let calib = check.calib.as_ref().map_or(String::new(), |report| line("calibration nmse", report));
     format!("{calib}{}{:<17} {}\n", line("held-out nmse", &check.heldout), "activations", check.activations)
+}
+
+/// The error where the image itself has led.
+pub fn own_path(report: &ErrorReport) -> String {
+    line("own-path nmse", report)
+}
+
+fn line(name: &str, report: &ErrorReport) -> String {
+    format!("{name:<17} {:.3e}   ({} observations)\n", report.nmse, report.steps)
 }
 
 /// A warning where the held-out error is far above the calibration error.

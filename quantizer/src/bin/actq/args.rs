@@ -37,22 +37,25 @@ pub(crate) enum Command {
     ///
     /// The recording is heldout.npz, .npy or .safetensors in POLICY_DIR, or the file named. It holds "obs" and "action"; without
     /// "action", the policy in POLICY_DIR gives the actions. Also printed: how much of the error comes from rounding the
-    /// activations, and, where calib.npz, .npy or .safetensors is there, a warning if the observations leave its range.
+    /// activations, and, where calib.npz, .npy or .safetensors is there, a warning if the observations leave its range. With
+    /// --driven, the error on the image's own path: where it has led a robot itself, which need not be where f32 leads.
     ///
     /// Example: actq eval ur3.actq --policy policies/ur3
-    Eval {
-        /// The image
-        image: PathBuf,
-        /// The policy's folder, with the recordings
-        #[arg(long, value_name = "POLICY_DIR", required_unless_present = "heldout")]
-        policy: Option<PathBuf>,
-        /// The held-out recording: .npz, .npy or .safetensors [default: the one in POLICY_DIR]
-        #[arg(long, value_name = "FILE")]
-        heldout: Option<PathBuf>,
-        /// Print one JSON object: nmse, worst_nmse, max_abs, steps, bpw, bytes
-        #[arg(long)]
-        json: bool,
-    },
+    Eval(EvalArgs),
+    /// Drive an image, record, and learn again
+    ///
+    /// Quantizes by method best from the f32 policy's recordings. Then, every round, a command drives the newest image: a
+    /// simulator or a robot that runs what the environment variable POLICY_CMD holds as its policy (actq serve IMAGE --record
+    /// FILE, to be split as a shell does). The f32 policy labels what the image was shown, and the next image learns from all
+    /// recordings together. The last image is driven, too. At the end: one image a row, with its error on the f32 policy's
+    /// path, on its own, and how it drove.
+    ///
+    /// The command is run by sh -c, with ACTQ_ROUND = 1, 2, ... N + 1 (to drive other episodes each time) and ACTQ_POLICY (the
+    /// policy's folder). What it prints goes to standard error; the last line that is one JSON object says how it went: success
+    /// (a share), ci (its interval), episodes, and any other numbers.
+    ///
+    /// Example: actq tune policies/ur3 --bpw 1.5 --drive "ur3-drive --episodes 50" --rounds 3 --out ur3.actq
+    Tune(TuneArgs),
     /// Compare methods at several budgets on held-out observations
     ///
     /// A cell of the table is the error (mean squared error / variance of the actions, mean over dimensions) and the true bits
@@ -67,10 +70,27 @@ pub(crate) enum Command {
     /// observation, or a value inside the network, is not finite, every value of the answer is a NaN (bits 0x7fc00000): no
     /// action. The recurrent state and what was left of a chunk are forgotten, the last action is not: the step limit still
     /// counts from it.
-    Serve {
-        /// The image
-        image: PathBuf,
-    },
+    ///
+    /// With --record, the observations go into a recording that `actq quantize --calib` learns from and `actq eval --driven`
+    /// measures on, labelled by the f32 policy. "R" begins an episode, and so does what follows an answer without an action.
+    /// The file is replaced as a whole while the policy runs: whenever the process ends, all but about the last twentieth is
+    /// there. No file is ever overwritten.
+    ///
+    /// Example: actq serve ur3.actq --record drive.npz --policy policies/ur3
+    Serve(ServeArgs),
+}
+
+#[derive(clap::Args)]
+pub(crate) struct ServeArgs {
+    /// The image
+    pub(crate) image: PathBuf,
+    /// Record what the policy is shown; where the file is there, FILE-2.npz and so on is taken
+    #[arg(long, value_name = "FILE.npz", value_parser = npz)]
+    pub(crate) record: Option<PathBuf>,
+    /// The folder of the policy that the image was made from, which labels what is recorded [default: the image's folder, if
+    /// that policy is there; else nothing is labelled]
+    #[arg(long, value_name = "POLICY_DIR", env = "ACTQ_POLICY")]
+    pub(crate) policy: Option<PathBuf>,
 }
 
 #[derive(clap::Args)]
@@ -152,6 +172,61 @@ pub(crate) struct InspectArgs {
 }
 
 #[derive(clap::Args)]
+pub(crate) struct EvalArgs {
+    /// The image
+    pub(crate) image: PathBuf,
+    /// The policy's folder, with the recordings
+    #[arg(long, value_name = "POLICY_DIR", required_unless_present = "heldout")]
+    pub(crate) policy: Option<PathBuf>,
+    /// The held-out recording: .npz, .npy or .safetensors [default: the one in POLICY_DIR]
+    #[arg(long, value_name = "FILE")]
+    pub(crate) heldout: Option<PathBuf>,
+    /// What this image was shown, as actq serve --record has recorded it, or a folder of that; may be repeated
+    #[arg(long, value_name = "FILE|DIR")]
+    pub(crate) driven: Vec<PathBuf>,
+    /// Print one JSON object: nmse, worst_nmse, max_abs, steps, bpw, bytes; with --driven also own_nmse
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(clap::Args)]
+pub(crate) struct TuneArgs {
+    /// The policy's folder
+    pub(crate) policy_dir: PathBuf,
+    /// The last round's image
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: PathBuf,
+    /// The command that drives an image
+    #[arg(long, value_name = "COMMAND")]
+    pub(crate) drive: String,
+    /// How often is learned again
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = rounds)]
+    pub(crate) rounds: usize,
+    /// Bits per weight of the whole, scales and padding counted
+    #[arg(long, value_name = "X", value_parser = positive)]
+    pub(crate) bpw: Option<f64>,
+    /// Bits of every weight: 2, 3, 4 or 8 [default: 3]
+    #[arg(long, value_name = "N", conflicts_with = "bpw", value_parser = width)]
+    pub(crate) bits: Option<Width>,
+    /// A recording of the f32 policy: .npz, .npy or .safetensors, or a folder of them; may be repeated [default: calib.* in
+    /// POLICY_DIR]
+    #[arg(long, value_name = "FILE|DIR")]
+    pub(crate) calib: Vec<PathBuf>,
+    /// Steps of distillation, every round [default: 8000, recurrent policies 1200]
+    #[arg(long, value_name = "N")]
+    pub(crate) steps: Option<usize>,
+    /// Keep the images (round-0.actq, ...) and what each of them drove (round-0/drive.npz, ...) in this folder, which is made or
+    /// empty
+    #[arg(long, value_name = "DIR")]
+    pub(crate) keep: Option<PathBuf>,
+    /// Write the table, and all numbers that the command said
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) run: RunArgs,
+}
+
+#[derive(clap::Args)]
 pub(crate) struct SweepArgs {
     /// The policies' folders
     #[arg(required = true)]
@@ -229,6 +304,17 @@ impl From<MethodArg> for Method {
 fn width(text: &str) -> Result<Width, String> {
     let known = text.parse().ok().and_then(Width::from_bits);
     known.ok_or_else(|| "weights have 2, 3, 4 or 8 bits".to_owned())
+}
+
+fn rounds(text: &str) -> Result<usize, String> {
+    let known = text.parse().ok().filter(|n| (1..=100).contains(n));
+    known.ok_or_else(|| "1 to 100 rounds can be learned".to_owned())
+}
+
+fn npz(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    let is_npz = path.extension().is_some_and(|ending| ending == "npz");
+    is_npz.then_some(path).ok_or_else(|| "a recording is written as .npz, and its name ends so".to_owned())
 }
 
 fn forced(text: &str) -> Result<(String, Width), String> {

@@ -2,26 +2,28 @@
 #![forbid(unsafe_code)]
 
 mod args;
+mod drive;
+mod eval;
 mod quantize;
+mod serve;
+mod tune;
 
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use actq::data::{Learned, Range, Recording, Recordings, Sizes, files_of};
+use actq::data::{Learned, Recording, Recordings, Sizes, files_of};
 use actq::emit::files;
 use actq::import;
-use actq::measure::eval;
 use actq::measure::time::StepTime;
 use actq::methods::Method;
 use actq::pipeline::stats::Stats;
 use actq::pipeline::sweep::{self, SweepPlan};
 use actq::policy::Policy;
 use actq::report::widths::Widths;
-use actq::report::{inspect, notes, time};
+use actq::report::{self, inspect, notes, time};
 use actq::runtime::ImageBuffer;
 use actq::text::printable;
-use actq::{report, serve};
 use anyhow::{Context, Result, ensure};
 use clap::Parser as _;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -42,41 +44,10 @@ fn run(command: Command) -> Result<()> {
     match command {
         Command::Quantize(args) => quantize::run(&args),
         Command::Inspect(args) => run_inspect(&args),
-        Command::Eval { image, policy, heldout, json } => {
-            let buffer = ImageBuffer::read(&image)?;
-            let image = buffer.image(&image)?;
-            let dataset = eval::heldout_from(policy.as_deref(), heldout.as_deref(), &image)?;
-            let report = eval::evaluate(image, &dataset)?;
-            match Recording::Calib.load(policy.as_deref(), None, Sizes::of_image(&image)) {
-                Ok(calib) => note(calib.and_then(|calib| Range::of(&calib).warning(&dataset))),
-                Err(error) => note([format!("the calibrated range is not known: {error:#}")]),
-            }
-            if json {
-                return print(&(serde_json::to_string(&report)? + "\n"));
-            }
-            print(&format!(
-                "observations   {}\n\
-                 nmse           {:.3e}   (mean squared error / variance, mean over dimensions)\n\
-                 worst nmse     {:.3e}   (dimension {})\n\
-                 largest error  {:.4}\n\
-                 activations    {}\n\
-                 bits/weight    {:.3}\n\
-                 image          {} bytes\n",
-                report.steps,
-                report.nmse,
-                report.worst_nmse,
-                report.worst_dimension,
-                report.max_abs,
-                eval::activation_share(image, &dataset, report.nmse)?,
-                report.bpw,
-                report.bytes,
-            ))
-        }
+        Command::Eval(args) => eval::run(&args),
+        Command::Tune(args) => tune::run(&args),
         Command::Sweep(args) => run_sweep(&args),
-        Command::Serve { image } => {
-            let buffer = ImageBuffer::read(&image)?;
-            serve::serve(buffer.image(&image)?, io::stdin().lock(), io::stdout().lock())
-        }
+        Command::Serve(args) => serve::run(&args),
     }
 }
 

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use actq::budget::{Budget, TimeLimit};
-use actq::data::{Learned, Recording, Recordings, Sizes, files_of};
+use actq::data::{Learned, Recording, Recordings, Sizes, driven_by, files_of};
 use actq::emit::files;
-use actq::measure::check;
+use actq::measure::{check, own};
 use actq::methods::{Activations, Method, Options};
 use actq::pipeline::Quantizer;
 use actq::pipeline::stats::Stats;
@@ -27,6 +27,7 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
     files::check_outputs(&outputs, &inputs)?;
     let source = Policy::load(&args.policy_dir)?;
     let (calib, shares) = Learned::load(&source, &calib)?.map(|l| (l.dataset, l.shares)).unzip();
+    let shares = shares.unwrap_or_default();
     let heldout = Recording::Heldout.load(Some(&args.policy_dir), None, Sizes::of(&source))?;
     let recordings = Recordings { calib, heldout };
     note(notes::of_recordings(&recordings));
@@ -47,7 +48,7 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
         files.push((path, Stats::new(&quantizer, &options, &found)?.json()?.into_bytes()));
     }
     files::write_all(&files)?;
-    print(&learned(&shares.unwrap_or_default()))?;
+    print(&learned(&shares))?;
     if let Some(statistics) = quantizer.method().action_statistics() {
         print(&quantized::scores(&source.graph, statistics, &found))?;
     }
@@ -65,14 +66,22 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
         f32_bytes as f64 / 2.0 / bytes as f64,
         started.elapsed().as_secs_f64(),
     ))?;
-    let Some(heldout) = &recordings.heldout else { return Ok(()) };
-    match check::check(&source, found.buffer().image(&args.out)?, recordings.calib.as_ref(), heldout) {
-        Ok(check) => {
-            print(&format!("\n{}", notes::errors(&check)))?;
-            note(notes::overfit_warning(&check));
+    let buffer = found.buffer();
+    let image = buffer.image(&args.out)?;
+    if let Some(heldout) = &recordings.heldout {
+        match check::check(&source, image, recordings.calib.as_ref(), heldout) {
+            Ok(check) => {
+                print(&format!("\n{}", notes::errors(&check)))?;
+                note(notes::overfit_warning(&check));
+            }
+            // The image is written, and nothing is wrong with it.
+            Err(error) => note([format!("the held-out error is not known: {error:#}")]),
         }
-        // The image is written, and nothing is wrong with it.
-        Err(error) => note([format!("the held-out error is not known: {error:#}")]),
+    }
+    let of_image = |path: &PathBuf| driven_by(path).is_ok_and(|crc| crc == Some(image.crc()));
+    let driven: Vec<PathBuf> = shares.into_iter().map(|share| share.path).filter(of_image).collect();
+    if !driven.is_empty() {
+        print(&notes::own_path(&own::own_path(image, &driven, Some(&source))?))?;
     }
     Ok(())
 }

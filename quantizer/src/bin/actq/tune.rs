@@ -1,0 +1,101 @@
+//! `actq tune`
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use actq::budget::Budget;
+use actq::data::{Dataset, Recording, Sizes, files_of};
+use actq::emit::files;
+use actq::methods::{Method, Options};
+use actq::pipeline::tune::{self, TunePlan};
+use actq::policy::Policy;
+use actq::report;
+use actq_kernels::Width;
+use anyhow::{Context as _, Result, ensure};
+use tempfile::TempDir;
+
+use crate::args::TuneArgs;
+use crate::drive::Drive;
+use crate::{note, policy_files, print, progress_bar, set_share, start_threads};
+
+/// Quantizes, drives, and learns again from what was driven.
+pub(crate) fn run(args: &TuneArgs) -> Result<()> {
+    let outputs: Vec<&Path> = [Some(&args.out), args.json.as_ref()].into_iter().flatten().map(|p| &**p).collect();
+    let mut calib = files_of(&args.calib)?;
+    let inputs: Vec<PathBuf> = policy_files(&args.policy_dir).into_iter().chain(calib.iter().cloned()).collect();
+    files::check_outputs(&outputs, &inputs)?;
+    let policy = Policy::load(&args.policy_dir)?;
+    let sizes = Sizes::of(&policy);
+    if calib.is_empty() {
+        calib.extend(Recording::Calib.find(&args.policy_dir)?);
+    }
+    let load = |file: &PathBuf| Dataset::load(file, sizes);
+    let calib = calib.iter().map(load).collect::<Result<Vec<_>>>()?;
+    let heldout = Recording::Heldout.load(Some(&args.policy_dir), None, sizes)?;
+    let folder = Folder::new(args.keep.as_deref())?;
+    let drive = Drive::new(&args.drive, &policy, folder.path())?;
+    start_threads(args.run.threads)?;
+    let budget = match args.bpw {
+        Some(bits) => Budget::BitsPerWeight(bits),
+        None => Budget::Width(args.bits.unwrap_or(Width::W3)),
+    };
+    let options = Options { steps: args.steps, seed: args.run.seed, ..Options::new(Method::Best, budget) };
+    let plan = TunePlan { policy: &policy, calib, heldout, options: &options, rounds: args.rounds };
+    let bar = progress_bar()?;
+    let tuned = tune::run(
+        plan,
+        // The command prints while it drives.
+        |round, image| bar.suspend(|| drive.run(round, image)),
+        |work, share| {
+            bar.set_message(work.to_owned());
+            set_share(&bar, share);
+        },
+    );
+    bar.finish_and_clear();
+    let tuned = tuned.with_context(|| match &args.keep {
+        Some(dir) => format!("nothing is written but what {} holds", dir.display()),
+        None => "nothing is written (--keep DIR keeps the images and what they drove)".to_owned(),
+    })?;
+    let json = serde_json::to_string_pretty(&report::tuned::json(&tuned, &policy.name, &args.drive))? + "\n";
+    let image = Some((args.out.as_path(), &tuned.quantized.image[..]));
+    let table = args.json.as_deref().map(|path| (path, json.as_bytes()));
+    files::write_all(&image.into_iter().chain(table).collect::<Vec<_>>())?;
+    print(&format!(
+        "{}\n{}: {} bytes, the image of round {}\n",
+        report::tuned::table(&tuned),
+        args.out.display(),
+        tuned.quantized.image.len(),
+        args.rounds
+    ))?;
+    note(report::tuned::better(&tuned, args.keep.as_deref()));
+    Ok(())
+}
+
+/// Where images and recordings are while rounds are run.
+enum Folder {
+    Kept(PathBuf),
+    Gone(TempDir),
+}
+
+impl Folder {
+    /// The folder to keep, which is made or is empty, so that no recording of another time is among them; else one that goes.
+    fn new(keep: Option<&Path>) -> Result<Self> {
+        let Some(dir) = keep else {
+            return Ok(Self::Gone(TempDir::with_prefix("actq-").context("no folder for recordings")?));
+        };
+        let name = dir.display();
+        if !dir.exists() {
+            fs::create_dir(dir).with_context(|| format!("{name}: cannot be made"))?;
+        }
+        let mut entries = fs::read_dir(dir).with_context(|| format!("{name}: cannot be read"))?;
+        ensure!(entries.next().is_none(), "{name}: is not empty; --keep needs a folder of its own");
+        Ok(Self::Kept(dir.to_owned()))
+    }
+
+    fn path(&self) -> &Path {
+        match self {
+            Self::Kept(path) => path,
+            Self::Gone(folder) => folder.path(),
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! What comes back when a robot or simulator has driven an image.
+
+use serde::Serialize;
+use serde_json::{Map, Value};
+
+use crate::data::Dataset;
+
+/// A drive: what the image was shown, and what was said about it.
+#[derive(Clone, Debug)]
+pub struct Driven {
+    /// Everything that the image was shown, with the f32 policy's actions or without.
+    pub recordings: Vec<Dataset>,
+    /// How well it went.
+    pub outcome: Outcome,
+}
+
+/// How well a drive went, as far as it was said: `success` (a share), its interval `ci`, and any other numbers.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[serde(transparent)]
+pub struct Outcome(Map<String, Value>);
+
+impl Outcome {
+    /// Of a line that is one JSON object; its numbers are kept, and `ci`. `None` for any other line.
+    pub fn parse(line: &str) -> Option<Self> {
+        let Ok(Value::Object(mut object)) = serde_json::from_str(line) else { return None };
+        object.retain(|key, value| value.is_number() || key == "ci" && interval(value).is_some());
+        Some(Self(object))
+    }
+
+    /// A number that was said.
+    pub fn number(&self, key: &str) -> Option<f64> {
+        self.0.get(key)?.as_f64()
+    }
+
+    /// The share of episodes that went well.
+    pub fn success(&self) -> Option<f64> {
+        self.number("success")
+    }
+
+    /// The interval of [`Self::success`].
+    pub fn interval(&self) -> Option<[f64; 2]> {
+        interval(self.0.get("ci")?)
+    }
+
+    /// The names of all numbers.
+    pub fn keys(&self) -> impl Iterator<Item = &str> {
+        self.0.iter().filter(|(_, value)| value.is_number()).map(|(key, _)| key.as_str())
+    }
+}
+
+fn interval(value: &Value) -> Option<[f64; 2]> {
+    let [low, high] = &value.as_array()?[..] else { return None };
+    Some([low.as_f64()?, high.as_f64()?])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_of_json_is_taken_for_its_numbers() {
+        let outcome = Outcome::parse(
+            r#" {"success": 0.92, "ci": [0.85, 0.96], "episodes": 100, "task": "reach", "tracking_error_mm": 1.5} "#,
+        );
+        let outcome = outcome.expect("an object");
+        assert_eq!((outcome.success(), outcome.interval()), (Some(0.92), Some([0.85, 0.96])));
+        assert_eq!(outcome.keys().collect::<Vec<_>>(), ["episodes", "success", "tracking_error_mm"]);
+        assert_eq!(outcome.number("task"), None);
+        for other in ["", "3 of 4", "[1]", "1", "{\"success\": }", "{\"success\": 1} {}", "{\"success\": NaN}"] {
+            assert_eq!(Outcome::parse(other), None, "{other}");
+        }
+        let odd = Outcome::parse(r#"{"success": "all", "ci": [1]}"#).expect("an object");
+        assert_eq!((odd.success(), odd.interval()), (None, None));
+    }
+}

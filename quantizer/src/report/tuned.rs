@@ -1,0 +1,73 @@
+//! What became of an image that was driven and learned again.
+
+use std::path::Path;
+
+use comfy_table::Table;
+use serde_json::{Value, json};
+
+use super::table;
+use crate::pipeline::tune::{Round, Tuned};
+
+/// What every table shows, from left to right.
+const HEADER: [&str; 7] = ["round", "episodes", "frames", "f32 path", "own path", "success", "seconds"];
+
+/// One image a row: what it learned from, its errors, how it drove. Tracking errors stand in columns of their own, if any were
+/// said.
+pub fn table(tuned: &Tuned) -> String {
+    let mut tracking: Vec<&str> = tuned.rounds.iter().flat_map(|round| round.driven.keys()).collect();
+    tracking.retain(|key| key.starts_with("tracking_error"));
+    tracking.sort_unstable();
+    tracking.dedup();
+    let names: Vec<String> = tracking.iter().map(|key| key.replace('_', " ")).collect();
+    let mut header = HEADER.to_vec();
+    header.splice(6..6, names.iter().map(String::as_str));
+    let mut rows: Table = table::table(&header);
+    for round in &tuned.rounds {
+        let said = tracking.iter().map(|key| round.driven.number(key).map_or("-".to_owned(), |v| format!("{v:.3}")));
+        let front = [
+            round.round.to_string(),
+            round.episodes.to_string(),
+            round.frames.to_string(),
+            format!("{:.3e}", round.nmse),
+            round.own_nmse.map_or("-".to_owned(), |nmse| format!("{nmse:.3e}")),
+            success(round),
+        ];
+        rows.add_row(front.into_iter().chain(said).chain([format!("{:.1}", round.seconds)]));
+    }
+    format!(
+        "{rows}\n\nEpisodes and frames: learned from. Paths: NMSE on {}, and where the image itself has led.\n",
+        tuned.measured_on
+    )
+}
+
+/// The same as a JSON object.
+pub fn json(tuned: &Tuned, policy: &str, command: &str) -> Value {
+    json!({
+        "policy": policy,
+        "drive": command,
+        "measured_on": tuned.measured_on,
+        "rounds": tuned.rounds,
+    })
+}
+
+/// A note where an earlier image drove better than the last; `kept` is where it is.
+pub fn better(tuned: &Tuned, kept: Option<&Path>) -> Option<String> {
+    let (better, last) = (tuned.better()?, tuned.rounds.last()?);
+    let place = match kept {
+        Some(dir) => format!("it is {}", dir.join(format!("round-{}.actq", better.round)).display()),
+        None => "--keep DIR keeps it".to_owned(),
+    };
+    Some(format!(
+        "the image of round {} drove better (success {}) than the last one (success {}), which was written; {place}. Where the \
+         intervals overlap, more episodes would tell",
+        better.round,
+        success(better),
+        success(last)
+    ))
+}
+
+fn success(round: &Round) -> String {
+    let Some(success) = round.driven.success() else { return "-".to_owned() };
+    let interval = round.driven.interval().map_or(String::new(), |[low, high]| format!(" ({low:.3}-{high:.3})"));
+    format!("{success:.3}{interval}")
+}
