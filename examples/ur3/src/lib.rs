@@ -14,6 +14,7 @@
 
 pub mod expert;
 pub mod kinematics;
+pub mod pipe;
 pub mod policy_f32;
 pub mod random;
 pub mod servo;
