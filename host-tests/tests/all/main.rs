@@ -6,6 +6,7 @@ mod cli;
 mod cost;
 mod counting;
 mod digests;
+mod drive;
 mod faults;
 mod format;
 mod functions;
