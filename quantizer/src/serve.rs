@@ -6,5 +6,5 @@ mod recorder;
 mod recorders;
 
 pub use protocol::{Seen, serve};
-pub use recorder::{Recording, serve_recorded};
+pub use recorder::{RecordPlan, serve_recorded};
 pub use recorders::wait_for_recorders;

@@ -11,15 +11,15 @@ pub struct Driven {
     /// Everything that the image was shown, with the f32 policy's actions or without.
     pub recordings: Vec<Dataset>,
     /// How well it went.
-    pub outcome: Outcome,
+    pub outcome: DriveOutcome,
 }
 
 /// How well a drive went, as far as it was said: `success` (a share), its interval `ci`, and any other numbers.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[serde(transparent)]
-pub struct Outcome(Map<String, Value>);
+pub struct DriveOutcome(Map<String, Value>);
 
-impl Outcome {
+impl DriveOutcome {
     /// Of a line that is one JSON object; its numbers are kept, and `ci`. `None` for any other line.
     pub fn parse(line: &str) -> Option<Self> {
         let Ok(Value::Object(mut object)) = serde_json::from_str(line) else { return None };
@@ -59,7 +59,7 @@ mod tests {
 
     #[test]
     fn a_line_of_json_is_taken_for_its_numbers() {
-        let outcome = Outcome::parse(
+        let outcome = DriveOutcome::parse(
             r#" {"success": 0.92, "ci": [0.85, 0.96], "episodes": 100, "task": "reach", "tracking_error_mm": 1.5} "#,
         );
         let outcome = outcome.expect("an object");
@@ -67,9 +67,9 @@ mod tests {
         assert_eq!(outcome.keys().collect::<Vec<_>>(), ["episodes", "success", "tracking_error_mm"]);
         assert_eq!(outcome.number("task"), None);
         for other in ["", "3 of 4", "[1]", "1", "{\"success\": }", "{\"success\": 1} {}", "{\"success\": NaN}"] {
-            assert_eq!(Outcome::parse(other), None, "{other}");
+            assert_eq!(DriveOutcome::parse(other), None, "{other}");
         }
-        let odd = Outcome::parse(r#"{"success": "all", "ci": [1]}"#).expect("an object");
+        let odd = DriveOutcome::parse(r#"{"success": "all", "ci": [1]}"#).expect("an object");
         assert_eq!((odd.success(), odd.interval()), (None, None));
     }
 }

@@ -7,7 +7,7 @@ use std::time::Instant;
 use anyhow::{Context as _, Result, ensure};
 use serde::Serialize;
 
-use super::driven::{Driven, Outcome};
+use super::driven::{DriveOutcome, Driven};
 use super::quantizer::{QuantizedPolicy, Quantizer};
 use crate::data::{Dataset, Learned, Recording, Recordings, Share};
 use crate::measure::eval;
@@ -47,10 +47,10 @@ pub struct Round {
     /// Error (NMSE) on the f32 policy's path.
     pub nmse: f64,
     /// Error (NMSE) on the path on which the image itself has led the robot; `None` where the f32 policy's actions never vary
-    /// there.
+    /// there, or the image has none at an observation that it did not plan at.
     pub own_nmse: Option<f64>,
     /// How it drove.
-    pub driven: Outcome,
+    pub driven: DriveOutcome,
     /// Seconds that learning and driving took.
     pub seconds: f64,
 }
@@ -165,8 +165,8 @@ mod tests {
         }
     }
 
-    fn said(success: f64) -> Outcome {
-        Outcome::parse(&format!("{{\"success\": {success}}}")).expect("an object")
+    fn said(success: f64) -> DriveOutcome {
+        DriveOutcome::parse(&format!("{{\"success\": {success}}}")).expect("an object")
     }
 
     /// Observations that no recording before has shown.
@@ -208,7 +208,7 @@ mod tests {
 
         let broken = |round: usize, _: &[u8]| -> Result<Driven> {
             ensure!(round == 0, "the robot fell over");
-            Ok(Driven { recordings: vec![elsewhere(0)], outcome: Outcome::default() })
+            Ok(Driven { recordings: vec![elsewhere(0)], outcome: DriveOutcome::default() })
         };
         let error = run(plan(), broken, |_, _| {}).expect_err("it fell");
         assert_eq!(format!("{error:#}"), "round 1: the robot fell over");

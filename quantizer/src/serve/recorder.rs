@@ -28,7 +28,7 @@ const MOST_BYTES: usize = 1 << 30;
 
 /// Where to record to, and who labels.
 #[derive(Clone, Copy, Debug)]
-pub struct Recording<'a> {
+pub struct RecordPlan<'a> {
     /// The file, which must not exist; where it does, a number is put behind its stem.
     pub path: &'a Path,
     /// The policy that the image was made from, whose output becomes the array "action"; without it there is none.
@@ -47,13 +47,16 @@ enum Event {
 /// more, serving goes on, and the error is returned at the end.
 pub fn serve_recorded(
     image: Image<'_>,
-    recording: Recording<'_>,
+    plan: RecordPlan<'_>,
     input: impl Read,
     output: impl Write,
     note: impl Fn(String) + Sync,
 ) -> Result<()> {
-    files::check_new(recording.path)?;
-    let recorder = Recorder::new(&image, recording, &note);
+    files::check_new(plan.path)?;
+    let folder = plan.path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    // Before the first answer: who has got one can wait for the recording.
+    let _recording = recorders::share(folder.unwrap_or(Path::new(".")));
+    let recorder = Recorder::new(&image, plan, &note);
     let (sender, receiver) = sync_channel(QUEUE);
     thread::scope(|scope| {
         let recorder = scope.spawn(|| recorder.run(receiver));
@@ -73,7 +76,7 @@ pub fn serve_recorded(
 
 /// What has been recorded so far.
 struct Recorder<'a, F> {
-    recording: Recording<'a>,
+    plan: RecordPlan<'a>,
     crc: u32,
     /// The f32 policy, its recurrent state run along.
     labels: Option<Evaluator<'a>>,
@@ -89,13 +92,13 @@ struct Recorder<'a, F> {
 }
 
 impl<'a, F: Fn(String)> Recorder<'a, F> {
-    fn new(image: &Image<'_>, recording: Recording<'a>, note: &'a F) -> Self {
+    fn new(image: &Image<'_>, plan: RecordPlan<'a>, note: &'a F) -> Self {
         let recurrent = image.state().len > 0;
-        let action = if recording.source.is_some() { image.output().len } else { 0 };
+        let action = if plan.source.is_some() { image.output().len } else { 0 };
         Self {
-            recording,
+            plan,
             crc: image.crc(),
-            labels: recording.source.map(|source| Evaluator::new(&source.graph)),
+            labels: plan.source.map(|source| Evaluator::new(&source.graph)),
             episodes: Episodes::new(image.obs_len(), action, recurrent),
             step: 0,
             every: if recurrent { image.execute().max(1) } else { 1 },
@@ -107,9 +110,7 @@ impl<'a, F: Fn(String)> Recorder<'a, F> {
 
     /// Records until no more events can come.
     fn run(mut self, events: Receiver<Event>) -> Result<()> {
-        let folder = self.recording.path.parent().filter(|p| !p.as_os_str().is_empty());
-        let _recording = recorders::share(folder.unwrap_or(Path::new(".")));
-        let name = self.recording.path.display();
+        let name = self.plan.path.display();
         self.record(events).with_context(|| format!("{name}: the recording is not complete")).inspect_err(|error| {
             (self.note)(format!("{error:#}; the policy is served further"));
         })
@@ -126,7 +127,7 @@ impl<'a, F: Fn(String)> Recorder<'a, F> {
                     if self.episodes.bytes_with_next() > MOST_BYTES {
                         self.save()?;
                         let mib = MOST_BYTES >> 20;
-                        let name = self.recording.path.display();
+                        let name = self.plan.path.display();
                         (self.note)(format!("{name}: {mib} MiB are recorded, and no more than that will be"));
                         return Ok(());
                     }
@@ -167,9 +168,9 @@ impl<'a, F: Fn(String)> Recorder<'a, F> {
         match &self.file {
             Some(file) => files::write(file, &bytes)?,
             None => {
-                let file = files::write_new(self.recording.path, &bytes)?;
-                if file != self.recording.path {
-                    let (taken, file) = (self.recording.path.display(), file.display());
+                let file = files::write_new(self.plan.path, &bytes)?;
+                if file != self.plan.path {
+                    let (taken, file) = (self.plan.path.display(), file.display());
                     (self.note)(format!("{taken} is there already; recording into {file}"));
                 }
                 self.file = Some(file);

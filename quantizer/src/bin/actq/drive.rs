@@ -9,7 +9,7 @@ use std::{env, fs};
 
 use actq::data::{Dataset, Sizes, files_of};
 use actq::emit::files;
-use actq::pipeline::driven::{Driven, Outcome};
+use actq::pipeline::driven::{DriveOutcome, Driven};
 use actq::policy::Policy;
 use actq::serve::wait_for_recorders;
 use anyhow::{Context as _, Result, ensure};
@@ -67,7 +67,7 @@ impl<'a> Drive<'a> {
             while lines.read_until(b'\n', &mut line).context("the command's output cannot be read")? > 0 {
                 // That nobody reads it is no error.
                 drop(io::stderr().write_all(&line));
-                outcome = Outcome::parse(&String::from_utf8_lossy(&line)).or(outcome);
+                outcome = DriveOutcome::parse(&String::from_utf8_lossy(&line)).or(outcome);
                 line.clear();
             }
         }
@@ -86,7 +86,7 @@ impl<'a> Drive<'a> {
              policy, over standard input and output (actq serve --help has the protocol)",
         )?;
         let recordings = files.iter().map(|file| Dataset::load(file, self.sizes)).collect::<Result<Vec<_>>>()?;
-        if outcome.as_ref().and_then(Outcome::success).is_none() {
+        if outcome.as_ref().and_then(DriveOutcome::success).is_none() {
             note(["the command has printed no JSON object with a number \"success\" in a line of its own".to_owned()]);
         }
         Ok(Driven { recordings, outcome: outcome.unwrap_or_default() })

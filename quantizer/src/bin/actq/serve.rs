@@ -5,7 +5,7 @@ use std::path::Path;
 
 use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
-use actq::serve::{Recording, serve, serve_recorded};
+use actq::serve::{RecordPlan, serve, serve_recorded};
 use actq_kernels::Image;
 use anyhow::{Result, ensure};
 
@@ -24,8 +24,8 @@ pub(crate) fn run(args: &ServeArgs) -> Result<()> {
                \"action\" (quantize and eval let the policy give it); --policy names its folder"
             .to_owned()]);
     }
-    let recording = Recording { path, source: source.as_ref() };
-    serve_recorded(image, recording, input, output, |text| note([text]))
+    let plan = RecordPlan { path, source: source.as_ref() };
+    serve_recorded(image, plan, input, output, |text| note([text]))
 }
 
 /// The policy that the image was made from.
