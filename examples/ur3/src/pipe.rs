@@ -56,8 +56,8 @@ impl PolicyPipe {
     /// # Errors
     /// If it has failed.
     pub fn finish(self) -> Result<()> {
-        let Self { mut child, requests, .. } = self;
-        drop(requests);
+        let Self { mut child, requests, answers } = self;
+        drop((requests, answers));
         let status = child.wait().context("wait for the policy")?;
         ensure!(status.success(), "the policy has failed: {status}");
         Ok(())
