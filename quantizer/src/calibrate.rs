@@ -4,4 +4,5 @@ pub mod fisher;
 pub mod hsic;
 pub mod moments;
 pub mod sensitivity;
+pub mod widening;
 pub mod windows;

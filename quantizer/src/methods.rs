@@ -6,9 +6,11 @@ pub mod gptq;
 pub mod matrixwise;
 mod options;
 mod prepared;
+mod progress;
 mod quantized;
 pub mod scale;
 
 pub use options::{Activations, Method, Options, Packing};
 pub use prepared::{PreparedMethod, quantize};
-pub use quantized::{Outcome, Quantized, RowAllocation};
+pub use progress::Progress;
+pub use quantized::{Outcome, Quantized, QuantizedNetwork, RowAllocation};

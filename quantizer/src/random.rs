@@ -31,6 +31,11 @@ impl Random {
         (self.bits() >> 40) as f32 / (1u32 << 23) as f32 - 1.0
     }
 
+    /// Uniform in 0..1, in steps of 2^-24.
+    pub fn share(&mut self) -> f32 {
+        (self.bits() >> 40) as f32 / (1u32 << 24) as f32
+    }
+
     /// Standard normal.
     pub fn normal(&mut self) -> f32 {
         StandardNormal.sample(&mut self.0)

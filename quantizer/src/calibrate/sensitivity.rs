@@ -29,21 +29,18 @@ pub fn output_moments(windows: &Windows<'_>, seed: u64) -> Vec<DMatrix<f64>> {
     let mut grads = windows.weights.zeros_like();
     let samples = (SAMPLES / windows.window.min(16)).max(4);
     for _ in 0..BATCHES {
-        let batch = windows.batch(samples, false, &mut random);
+        let batch = windows.batch(samples, None, &mut random);
         let mut state = batch.state;
-        let passes: Vec<_> =
-            batch.steps.into_iter().map(|obs| network.forward(&windows.weights, obs, &mut state)).collect();
+        let pass = network.forward(&windows.weights, batch.frames, &mut state);
+        let probe = Array2::from_shape_fn(pass.output().raw_dim(), |(_, d)| {
+            let variance = windows.output_variance[d];
+            if variance > 0.0 { random.sign() / variance.sqrt() } else { 0.0 }
+        });
         let mut d_state = zero_state(graph, samples);
-        for pass in passes.iter().rev() {
-            let probe = Array2::from_shape_fn(pass.output().raw_dim(), |(_, d)| {
-                let variance = windows.output_variance[d];
-                if variance > 0.0 { random.sign() / variance.sqrt() } else { 0.0 }
-            });
-            network.backward(&windows.weights, pass, probe, &mut d_state, &mut grads, &mut |m, _, _, dy| {
-                ndarray::linalg::general_mat_mul(1.0, &dy.t(), dy, 1.0, &mut sums[m]);
-                counts[m] += dy.nrows();
-            });
-        }
+        network.backward(&windows.weights, &pass, probe, &mut d_state, &mut grads, &mut |m, _, _, dy| {
+            ndarray::linalg::general_mat_mul(1.0, &dy.t(), dy, 1.0, &mut sums[m]);
+            counts[m] += dy.nrows();
+        });
     }
     let mean = |(sum, count): (Array2<f32>, usize)| {
         DMatrix::from_fn(sum.nrows(), sum.ncols(), |r, c| f64::from(sum[[r, c]]) / count.max(1) as f64)

@@ -3,6 +3,7 @@
 
 use ndarray::{Array2, Axis};
 
+use super::widening::{MEMORY, Widening};
 use crate::data::Dataset;
 use crate::graph::{Graph, Network, State, Weights, start_state, zero_state};
 use crate::random::Random;
@@ -11,16 +12,14 @@ use crate::random::Random;
 const WINDOW: usize = 64;
 /// Share of the windows that start from the zero state wherever they stand.
 const FROM_ZERO: f32 = 0.15;
-/// Standard deviation of the noise on the inputs, in units of each input's own.
-const NOISE: f32 = 0.05;
-/// Largest share of the difference of two random observations that is added to an input.
-const MIX: f32 = 0.5;
+/// One in so many episodes is left out where others are to be measured on it.
+const LEFT_OUT: usize = 4;
 
-/// A batch: observations of each step, and the state before the first.
-#[derive(Debug)]
+/// A batch of windows: observations, and the state before the first step.
+#[derive(Clone, Debug)]
 pub struct Batch {
-    /// `[sample, element]` for each step.
-    pub steps: Vec<Array2<f32>>,
+    /// `[frame, element]`: the first step of every window, then the second step of every window, and so on.
+    pub frames: Array2<f32>,
     /// State before the first step.
     pub state: State,
 }
@@ -90,29 +89,21 @@ impl<'a> Windows<'a> {
         episode.row(random.below(episode.nrows()))
     }
 
-    /// A batch of `size` windows. Where `widened`, noise and differences of observations take the inputs off the recorded
-    /// ones.
-    pub fn batch(&self, size: usize, widened: bool, random: &mut Random) -> Batch {
-        let mut steps = vec![Array2::zeros((size, self.graph.obs_len)); self.window];
+    /// A batch of `size` windows, at the recorded observations or widened.
+    pub fn batch(&self, size: usize, widening: Option<Widening>, random: &mut Random) -> Batch {
+        let mut frames = Array2::zeros((size * self.window, self.graph.obs_len));
         let mut state = zero_state(self.graph, size);
         for sample in 0..size {
             let e = random.below(self.episodes.len());
             let start = random.below(self.episodes[e].nrows() + 1 - self.window);
-            let mut shift = vec![0.0; self.graph.obs_len];
-            // Half of the samples keep their place.
-            let share = MIX * random.unit().max(0.0);
-            if widened && share > 0.0 {
-                let (a, b) = (self.row(random), self.row(random));
-                shift.iter_mut().zip(a.iter().zip(b)).for_each(|(s, (a, b))| *s = share * (a - b));
+            for t in 0..self.window {
+                frames.row_mut(t * size + sample).assign(&self.episodes[e].row(start + t));
             }
-            for (t, step) in steps.iter_mut().enumerate() {
-                let recorded = self.episodes[e].row(start + t);
-                for (i, (x, recorded)) in step.row_mut(sample).iter_mut().zip(recorded).enumerate() {
-                    let noise = if widened { NOISE * self.deviation[i] * random.normal() } else { 0.0 };
-                    *x = recorded + shift[i] + noise;
-                }
+            let mut from_zero = false;
+            if let Some(widening) = widening {
+                self.widen(widening, (0..self.window).map(|t| t * size + sample), &mut frames, random);
+                from_zero = random.share() < FROM_ZERO;
             }
-            let from_zero = widened && random.unit() * 0.5 + 0.5 < FROM_ZERO;
             if let (Some(states), false) = (self.states.get(e), from_zero) {
                 for (to, from) in state.iter_mut().flatten().zip(states.iter().flatten()) {
                     if from.ncols() > 0 {
@@ -121,14 +112,58 @@ impl<'a> Windows<'a> {
                 }
             }
         }
-        Batch { steps, state }
+        Batch { frames, state }
     }
 
-    /// The f32 network's outputs on a batch.
-    pub fn teach(&self, batch: &Batch) -> Vec<Array2<f32>> {
-        let network = Network::new(self.graph);
+    /// Takes the window in these rows of `frames` off its recorded observations.
+    fn widen(
+        &self,
+        widening: Widening,
+        rows: impl Iterator<Item = usize>,
+        frames: &mut Array2<f32>,
+        random: &mut Random,
+    ) {
+        let mut shift = vec![0.0; self.graph.obs_len];
+        // Half of the windows keep their place.
+        let share = widening.mix * random.unit().max(0.0);
+        if share > 0.0 {
+            let (a, b) = (self.row(random), self.row(random));
+            shift.iter_mut().zip(a.iter().zip(b)).for_each(|(s, (a, b))| *s = share * (a - b));
+        }
+        let amplitude = widening.noise * random.share();
+        let fresh = (1.0 - MEMORY * MEMORY).sqrt();
+        let mut noise: Vec<f32> = (0..self.graph.obs_len).map(|_| random.normal()).collect();
+        for row in rows {
+            let values = frames.row_mut(row).into_iter().zip(&self.deviation).zip(shift.iter().zip(&mut noise));
+            for ((x, deviation), (shift, noise)) in values {
+                *x += shift + amplitude * deviation * *noise;
+                *noise = MEMORY * *noise + fresh * random.normal();
+            }
+        }
+    }
+
+    /// The windows of three in four episodes, and of the others; `None` where there are not that many.
+    pub fn split(&self) -> Option<(Self, Self)> {
+        let part = |left_out: bool| {
+            let of = |e: &usize| (e % LEFT_OUT == LEFT_OUT - 1) == left_out;
+            let chosen: Vec<usize> = (0..self.episodes.len()).filter(of).collect();
+            (!chosen.is_empty()).then(|| Self {
+                graph: self.graph,
+                weights: self.weights.clone(),
+                episodes: chosen.iter().map(|&e| self.episodes[e].clone()).collect(),
+                states: chosen.iter().filter_map(|&e| self.states.get(e).cloned()).collect(),
+                deviation: self.deviation.clone(),
+                output_variance: self.output_variance.clone(),
+                window: self.window,
+            })
+        };
+        Some((part(false)?, part(true)?))
+    }
+
+    /// The f32 network's outputs on a batch, `[frame, element]`.
+    pub fn teach(&self, batch: &Batch) -> Array2<f32> {
         let mut state = batch.state.clone();
-        batch.steps.iter().map(|obs| network.forward(&self.weights, obs.clone(), &mut state).output().clone()).collect()
+        Network::new(self.graph).forward(&self.weights, batch.frames.clone(), &mut state).into_output()
     }
 }
 

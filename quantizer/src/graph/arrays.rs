@@ -3,7 +3,9 @@
 
 use actq_kernels::round::ROUND;
 use actq_kernels::x::TINY;
-use ndarray::{Array2, ArrayView1, ArrayViewMut1, linalg::general_mat_mul};
+use std::ops::Range;
+
+use ndarray::{Array2, ArrayView1, ArrayView2, ArrayViewMut1, ArrayViewMut2, Axis, linalg::general_mat_mul, s};
 
 /// The order in which a sum over a row is taken. The results differ in their last bits, and images are made from both.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -25,41 +27,83 @@ impl Sums {
         }
     }
 
-    /// `sum of x W' + bias` over the terms `(x, W)`: `[sample, row]`, rows contiguous.
-    pub fn affine(self, terms: &[(&Array2<f32>, &Array2<f32>)], bias: &[f32]) -> Array2<f32> {
-        let samples = terms.first().map_or(0, |(x, _)| x.nrows());
-        let mut y = Array2::zeros((samples, bias.len()));
+    /// `x W' + bias`: `[sample, row]`, rows contiguous.
+    pub fn affine(self, x: &Array2<f32>, w: &Array2<f32>, bias: &[f32]) -> Array2<f32> {
+        let mut y = Array2::from_shape_fn((x.nrows(), bias.len()), |(_, row)| bias[row]);
         match self {
-            Self::InOrder => {
-                add_rows(&mut y, bias);
-                for (x, w) in terms {
-                    for (mut y, x) in y.rows_mut().into_iter().zip(x.rows()) {
-                        for (y, w) in y.iter_mut().zip(w.rows()) {
-                            *y += contiguous(&w).iter().zip(contiguous(&x)).map(|(w, x)| w * x).sum::<f32>();
-                        }
-                    }
-                }
-            }
-            Self::Blocked => {
-                for (i, (x, w)) in terms.iter().enumerate() {
-                    general_mat_mul(1.0, x, &w.t(), if i == 0 { 0.0 } else { 1.0 }, &mut y);
-                }
-                add_rows(&mut y, bias);
-            }
+            Self::InOrder => add_in_order(x, w, y.view_mut()),
+            Self::Blocked => general_mat_mul(1.0, x, &w.t(), 1.0, &mut y),
         }
         y
     }
-}
 
-fn add_rows(y: &mut Array2<f32>, bias: &[f32]) {
-    for mut row in y.rows_mut() {
-        row.iter_mut().zip(bias).for_each(|(y, b)| *y += b);
+    /// `w` made ready for many products with few rows each.
+    pub fn repeated(self, w: &Array2<f32>) -> Repeated<'_> {
+        match self {
+            Self::InOrder => Repeated::InOrder(w),
+            Self::Blocked => Repeated::Blocked(transposed(w)),
+        }
     }
 }
 
+/// A matrix that few rows are multiplied with, many times.
+#[derive(Debug)]
+pub enum Repeated<'a> {
+    /// As it is, `[row, col]`.
+    InOrder(&'a Array2<f32>),
+    /// `[col, row]`: a product with few rows is then bound by the arithmetic; otherwise by gathering the columns, three times
+    /// as long with 8 rows.
+    Blocked(Array2<f32>),
+}
+
+impl Repeated<'_> {
+    /// `y += x W'`
+    pub fn add_product(&self, x: &Array2<f32>, mut y: ArrayViewMut2<'_, f32>) {
+        match self {
+            Self::InOrder(w) => add_in_order(x, w, y),
+            Self::Blocked(transposed) => general_mat_mul(1.0, x, transposed, 1.0, &mut y),
+        }
+    }
+}
+
+/// `w'` with its own rows contiguous, tile by tile: column by column, every value would be a cache miss.
+fn transposed(w: &Array2<f32>) -> Array2<f32> {
+    const TILE: usize = 16;
+    let mut transposed = Array2::zeros((w.ncols(), w.nrows()));
+    for (strip, mut to) in w.axis_chunks_iter(Axis(0), TILE).zip(transposed.axis_chunks_iter_mut(Axis(1), TILE)) {
+        for (tile, mut to) in strip.axis_chunks_iter(Axis(1), TILE).zip(to.axis_chunks_iter_mut(Axis(0), TILE)) {
+            to.assign(&tile.t());
+        }
+    }
+    transposed
+}
+
+fn add_in_order(x: &Array2<f32>, w: &Array2<f32>, mut y: ArrayViewMut2<'_, f32>) {
+    for (mut y, x) in y.rows_mut().into_iter().zip(x.rows()) {
+        for (y, w) in y.iter_mut().zip(w.rows()) {
+            *y += contiguous(&w).iter().zip(contiguous(&x)).map(|(w, x)| w * x).sum::<f32>();
+        }
+    }
+}
+
+/// The rows of one step of a sequence whose steps have `batch` rows each.
+pub fn step_rows(step: usize, batch: usize) -> Range<usize> {
+    step * batch..(step + 1) * batch
+}
+
+/// Some rows.
+pub fn rows(array: &Array2<f32>, range: Range<usize>) -> ArrayView2<'_, f32> {
+    array.slice(s![range, ..])
+}
+
+/// As [`rows`].
+pub fn rows_mut(array: &mut Array2<f32>, range: Range<usize>) -> ArrayViewMut2<'_, f32> {
+    array.slice_mut(s![range, ..])
+}
+
 /// Rounds every row to integers of its own scale up to `x_max`, as the kernels do; 0 = not at all.
-pub fn round_rows(x: &Array2<f32>, x_max: u16) -> Array2<f32> {
-    let mut y = x.clone();
+pub fn round_rows(x: ArrayView2<'_, f32>, x_max: u16) -> Array2<f32> {
+    let mut y = x.to_owned();
     if x_max > 0 {
         let top = f32::from(x_max);
         for mut row in y.rows_mut() {

@@ -1,9 +1,9 @@
 //! What a network needs to know of an operation. Each operation says it once, in its own file in [`super::ops`].
 
 use anyhow::{Result, ensure};
-use ndarray::{Array2, linalg::general_mat_mul};
+use ndarray::{Array2, ArrayBase, ArrayView2, Data, Ix2, linalg::general_mat_mul};
 
-use super::arrays::{Sums, round_rows};
+use super::arrays::{Repeated, Sums, round_rows};
 use super::lowering::{BufferId, Lowering};
 use super::values::{ValueId, WeightMatrix};
 
@@ -69,7 +69,8 @@ pub trait Operation {
         [0, 0]
     }
 
-    /// The output for a batch; `state` advances.
+    /// The output for a batch, or for a sequence of batches behind each other: a node with a state has one row of it for each row
+    /// of a batch, and `state` advances through the sequence.
     fn forward(&self, run: &Forward<'_>, state: &mut NodeState) -> (Array2<f32>, Saved);
 
     /// From the derivative `dy` of the loss by the output to those by the inputs and weights, which `run` takes. `d_state`, the
@@ -131,14 +132,18 @@ impl<'a> Forward<'a> {
     }
 
     /// `x` as it enters the product with a matrix: rounded where the image's activations are.
-    pub fn operand(&self, matrix: usize, x: &Array2<f32>) -> Array2<f32> {
+    pub fn operand(&self, matrix: usize, x: ArrayView2<'_, f32>) -> Array2<f32> {
         round_rows(x, self.x_max.get(matrix).copied().unwrap_or(0))
     }
 
-    /// The sum of `W x` over the terms (matrix, x), and of the vector.
-    pub fn affine(&self, terms: &[(usize, &Array2<f32>)], vector: usize) -> Array2<f32> {
-        let terms: Vec<_> = terms.iter().map(|&(matrix, x)| (x, &self.matrices[matrix])).collect();
-        self.sums.affine(&terms, &self.vectors[vector])
+    /// `W x` and the vector.
+    pub fn affine(&self, matrix: usize, x: &Array2<f32>, vector: usize) -> Array2<f32> {
+        self.sums.affine(x, &self.matrices[matrix], &self.vectors[vector])
+    }
+
+    /// A matrix that few rows are multiplied with, many times.
+    pub fn repeated(&self, matrix: usize) -> Repeated<'a> {
+        self.sums.repeated(&self.matrices[matrix])
     }
 }
 
@@ -193,7 +198,7 @@ impl<'a> Backward<'a> {
     }
 
     /// From the derivative by the output of a matrix to that by its operand.
-    pub fn through(&self, matrix: usize, dy: &Array2<f32>) -> Array2<f32> {
+    pub fn through<S: Data<Elem = f32>>(&self, matrix: usize, dy: &ArrayBase<S, Ix2>) -> Array2<f32> {
         dy.dot(&self.matrices[matrix])
     }
 

@@ -1,7 +1,8 @@
 //! The network on batches, forwards and backwards: the one interpreter of a graph in f32.
 //!
-//! Values are matrices `[sample, element]`. A recurrent network runs over several steps; its gradient runs back through all of
-//! them. The derivatives are checked against finite differences in the tests.
+//! Values are matrices `[sample, element]`, or, where several steps run at once, `[frame, element]`: all samples of the first step,
+//! then all of the second. Only nodes with a state see the difference; for all others a sequence is a larger batch. The gradient
+//! runs back through all steps. The derivatives are checked against finite differences in the tests.
 
 use ndarray::Array2;
 
@@ -10,7 +11,7 @@ use super::nodes::Graph;
 use super::operation::{Backward, Forward, Saved, See};
 use super::weights::{State, Weights};
 
-/// One step's forward pass.
+/// A forward pass.
 #[derive(Debug)]
 pub struct Pass {
     /// The observation, then every node's output.
@@ -22,6 +23,11 @@ impl Pass {
     /// The network's output.
     pub fn output(&self) -> &Array2<f32> {
         &self.values[self.values.len() - 1]
+    }
+
+    /// As [`Self::output`], without the rest.
+    pub fn into_output(mut self) -> Array2<f32> {
+        self.values.pop().unwrap_or_default()
     }
 
     /// What the matrix of a node's product was multiplied with.
@@ -56,7 +62,7 @@ impl<'a> Network<'a> {
         Self { sums: Sums::InOrder, ..Self::new(graph) }
     }
 
-    /// One step for a batch of observations; `state` advances.
+    /// One or more steps for a batch of observations, whose size is that of `state`, which advances.
     pub fn forward(&self, weights: &Weights, obs: Array2<f32>, state: &mut State) -> Pass {
         let mut values = vec![obs];
         let mut saved = Vec::with_capacity(self.graph.nodes.len());
@@ -84,8 +90,8 @@ impl<'a> Network<'a> {
         self.graph.nodes.iter().zip(&pass.saved).flat_map(of_node)
     }
 
-    /// Steps back through one pass. `d_output` is the loss's derivative by the network's output; `d_state`, by the state after
-    /// the step, becomes that by the state before it. `grads` gets the derivatives by the weights added. `see` is shown
+    /// Goes back through a pass. `d_output` is the loss's derivative by the network's output; `d_state`, by the state after
+    /// the pass, becomes that by the state before it. `grads` gets the derivatives by the weights added. `see` is shown
     /// every matrix product.
     pub fn backward(
         &self,

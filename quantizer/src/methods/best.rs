@@ -1,37 +1,43 @@
 //! The pipeline: how much every row matters, a width for each to the budget, removal of what has none, and distillation, or, with
 //! 0 steps of it, two-sided error feedback.
 
+mod adam;
 pub mod allocate;
+pub mod choose;
 pub mod compact;
 pub mod dimension;
 pub mod distill;
 pub mod feedback;
+mod latent;
+pub mod schedule;
+
+use std::time::Duration;
 
 use anyhow::{Result, ensure};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::options::{Activations, Options};
-use super::quantized::{Outcome, Quantized, RowAllocation};
+use super::progress::Progress;
+use super::quantized::{Outcome, Quantized, QuantizedNetwork, RowAllocation, dequantized};
 use crate::budget::Rate;
 use crate::calibrate::moments::Moments;
 use crate::calibrate::sensitivity::{Side, importance, output_moments};
+use crate::calibrate::widening::Widening;
 use crate::calibrate::windows::Windows;
 use crate::data::Dataset;
-use crate::graph::{Graph, Network, WeightMatrix, Weights};
+use crate::graph::{Graph, Network, WeightMatrix};
 use crate::random::Random;
 use allocate::{Rows, allocate, energies, removals};
+use choose::{CHOOSING, Tried, choose};
 use compact::{Compacted, add_to_bias, compact};
 use dimension::{Dimension, dimensions};
-use distill::{Task, distill, loss};
+use distill::{Learned, Task, distill, loss};
 use feedback::feedback;
+use schedule::{Bounds, most_steps};
 
 /// Frames that learning needs at least.
 const LEAST_FRAMES: usize = 200;
-/// Steps of distillation: of feed-forward and of recurrent networks.
-const STEPS: usize = 8000;
-const WINDOW_STEPS: usize = 1200;
-
 /// The seed of the statistics, which are the same for every budget.
 const SEED: u64 = 1;
 
@@ -70,21 +76,38 @@ impl<'a> RowStatistics<'a> {
         })
     }
 
-    /// Steps of distillation where none are asked for.
-    pub fn default_steps(&self) -> usize {
-        if self.windows.recurrent() { WINDOW_STEPS } else { STEPS }
+    /// The most steps of distillation with these options.
+    pub fn most_steps(&self, options: &Options) -> usize {
+        options.steps.unwrap_or_else(|| most_steps(self.windows.graph.weights(), self.windows.recurrent()))
+    }
+
+    /// Where learning ends at the latest.
+    fn bounds(&self, options: &Options) -> Bounds {
+        let most = self.most_steps(options);
+        let steps = (options.steps.is_some() || options.minutes.is_none()).then_some(most);
+        Bounds { steps, time: options.minutes.map(|minutes| Duration::from_secs_f64(60.0 * minutes)) }
     }
 }
 
-/// Quantizes a network. Returns it as it became (hidden elements without bits are gone, biases and norms have learned) and its
-/// quantized matrices. `progress` gets the share done.
+/// What was learned of a network beside its weights.
+#[derive(Clone, Debug)]
+pub struct Learning {
+    /// Steps taken.
+    pub steps: usize,
+    /// How far the inputs were widened.
+    pub widening: Widening,
+    /// What was tried to choose that.
+    pub tried: Vec<Tried>,
+}
+
+/// Quantizes a network. Hidden elements without bits are gone from it, biases and norms have learned.
 pub fn quantize(
     graph: &Graph,
     statistics: &RowStatistics<'_>,
     rate: Rate,
     options: &Options,
-    mut progress: impl FnMut(f64),
-) -> Result<(Graph, Vec<Outcome>)> {
+    mut progress: impl FnMut(Progress),
+) -> Result<QuantizedNetwork> {
     let RowStatistics { windows, inputs, centred, outputs, moments, .. } = statistics;
     for (name, _) in &options.forced {
         let names = || graph.matrices.iter().map(|m| m.name.as_str()).collect::<Vec<_>>().join(", ");
@@ -116,19 +139,30 @@ pub fn quantize(
         .map(|(columns, importance)| columns.iter().map(|&c| importance[c]).collect())
         .collect();
     let learned_with = vec![options.activations.limit(); graph.matrices.len()];
-    let steps = options.steps.unwrap_or(statistics.default_steps());
+    let bounds = statistics.bounds(options);
     let task = Task {
         graph: &compacted.graph,
         widths: &compacted.widths,
         group: options.group,
         importance: &importance,
         x_max: &learned_with,
-        steps,
+        widening: Widening::WIDE,
+        bounds,
         seed: options.seed,
     };
-    let (quantized, learned) = match steps {
-        0 => feed_back(&compacted, options.group, &importance, statistics),
-        _ => distill(&task, windows, |step| progress(step as f64 / steps as f64)),
+    let (quantized, learned, learning) = if bounds.steps == Some(0) {
+        let (quantized, graph) = feed_back(&compacted, options.group, &importance, statistics);
+        (quantized, graph, None)
+    } else {
+        let of_choosing = |share: f64| share * CHOOSING;
+        let (task, tried) =
+            choose(&task, windows, |share, error| progress(Progress::Choosing { share: of_choosing(share), error }));
+        let from = if tried.is_empty() { 0.0 } else { CHOOSING };
+        let learned = distill(&task, windows, |share, error| {
+            progress(Progress::Learning { share: from + (1.0 - from) * share, error });
+        });
+        let Learned { quantized, graph, steps } = learned;
+        (quantized, graph, Some(Learning { steps, widening: task.widening, tried }))
     };
     let wanted = match options.activations {
         Activations::Auto => choose_activations(&learned, &quantized, windows, options.seed),
@@ -154,7 +188,7 @@ pub fn quantize(
         let allocation = RowAllocation { widths, energy, removal, expected, inputs: inputs[m].clone(), rows, columns };
         outcome.allocation = Some(allocation);
     }
-    Ok((learned, outcomes))
+    Ok(QuantizedNetwork { graph: learned, outcomes, learning })
 }
 
 /// Quantizes without learning: every matrix by two-sided error feedback, the mean error into the biases.
@@ -194,14 +228,11 @@ const SAMPLES: usize = 256;
 
 /// int16 for each matrix whose input, rounded to int8, adds more to the error than int16 costs in time; int8 for the others.
 fn choose_activations(graph: &Graph, quantized: &[Quantized], windows: &Windows<'_>, seed: u64) -> Vec<u16> {
-    let mut weights = Weights::of(graph);
-    for (weights, quantized) in weights.matrices.iter_mut().zip(quantized) {
-        weights.iter_mut().zip(quantized.dequantized()).for_each(|(w, q)| *w = q);
-    }
+    let weights = dequantized(graph, quantized);
     let error = |x_max: &[u16]| -> f32 {
         let network = Network::rounded(graph, x_max);
         let samples = (SAMPLES / windows.window).max(8);
-        let batches = (0..MEASURED).map(|i| windows.batch(samples, false, &mut Random::new(seed + i as u64)));
+        let batches = (0..MEASURED).map(|i| windows.batch(samples, None, &mut Random::new(seed + i as u64)));
         batches.map(|batch| loss(&network, &weights, windows, batch)).sum()
     };
     let int8 = vec![127; quantized.len()];

@@ -76,8 +76,10 @@ pub struct Options {
     pub group: usize,
     /// Bits of the activations.
     pub activations: Activations,
-    /// Steps of distillation; None: as many as suit the network.
+    /// The most steps of distillation; None: as many as suit the network.
     pub steps: Option<usize>,
+    /// The most minutes of distillation; None: only the steps bound it.
+    pub minutes: Option<f64>,
     /// Seed of everything that is drawn.
     pub seed: u64,
     /// Matrices, by their tensors' names, whose rows all get a certain width (method best).
@@ -114,6 +116,15 @@ impl Options {
 
     /// A method and a budget, one scale a row, everything else as it suits the method.
     pub fn new(method: Method, budget: Budget) -> Self {
-        Self { method, budget, group: 0, activations: Activations::Auto, steps: None, seed: 1, forced: Vec::new() }
+        Self {
+            method,
+            budget,
+            group: 0,
+            activations: Activations::Auto,
+            steps: None,
+            minutes: None,
+            seed: 1,
+            forced: Vec::new(),
+        }
     }
 }

@@ -7,7 +7,8 @@ use super::actquant::{self, ActionStatistics};
 use super::best::{self, RowStatistics};
 use super::matrixwise;
 use super::options::{Method, Options};
-use super::quantized::Outcome;
+use super::progress::Progress;
+use super::quantized::{Outcome, QuantizedNetwork};
 use crate::budget::Rate;
 use crate::calibrate::moments::{Moments, collect};
 use crate::data::{Dataset, Recording};
@@ -72,9 +73,9 @@ impl<'a> PreparedMethod<'a> {
         }
     }
 
-    /// Quantizes the network: as it became (it may have lost elements, its biases may have learned), and its matrices.
-    /// `options.method` is the one that was prepared; not `options.budget` counts, but `rate`. `progress` gets the share done.
-    pub fn quantize(&self, rate: Rate, options: &Options, progress: impl FnMut(f64)) -> Result<(Graph, Vec<Outcome>)> {
+    /// Quantizes the network. `options.method` is the one that was prepared; not `options.budget` counts, but `rate`. `progress` is
+    /// called by what learns.
+    pub fn quantize(&self, rate: Rate, options: &Options, progress: impl FnMut(Progress)) -> Result<QuantizedNetwork> {
         let (graph, method) = (self.graph, self.method());
         ensure!(options.method == method, "prepared for {method}, not for {}", options.method);
         ensure!(
@@ -88,13 +89,13 @@ impl<'a> PreparedMethod<'a> {
             Statistics::ActQuant(statistics) => actquant::quantize(graph, statistics, rate, options)?,
             Statistics::Best(statistics) => return best::quantize(graph, statistics, rate, options, progress),
         };
-        Ok((graph.clone(), outcomes))
+        Ok(QuantizedNetwork { graph: graph.clone(), outcomes, learning: None })
     }
 
-    /// Steps of distillation with these options; 0 for methods that do not learn.
-    pub fn steps(&self, options: &Options) -> usize {
+    /// The most steps of distillation with these options; 0 for methods that do not learn.
+    pub fn most_steps(&self, options: &Options) -> usize {
         match &self.statistics {
-            Statistics::Best(statistics) => options.steps.unwrap_or(statistics.default_steps()),
+            Statistics::Best(statistics) => statistics.most_steps(options),
             _ => 0,
         }
     }
@@ -120,5 +121,6 @@ pub fn quantize(
     rate: Rate,
     options: &Options,
 ) -> Result<(Graph, Vec<Outcome>)> {
-    PreparedMethod::new(graph, options.method, calib, |_| {})?.quantize(rate, options, |_| {})
+    let quantized = PreparedMethod::new(graph, options.method, calib, |_| {})?.quantize(rate, options, |_| {})?;
+    Ok((quantized.graph, quantized.outcomes))
 }

@@ -5,9 +5,10 @@ use actq_kernels::layout::{BlockShape, Lanes, Width};
 use anyhow::{Result, ensure};
 use half::bf16;
 
+use super::best::Learning;
 use super::options::Activations;
 use crate::calibrate::moments::{self, Moments};
-use crate::graph::WeightMatrix;
+use crate::graph::{Graph, WeightMatrix, Weights};
 
 /// A quantized matrix.
 #[derive(Clone, Debug)]
@@ -82,6 +83,15 @@ impl Quantized {
     }
 }
 
+/// The weights of a network whose matrices are `quantized`.
+pub(super) fn dequantized(graph: &Graph, quantized: &[Quantized]) -> Weights {
+    let mut weights = Weights::of(graph);
+    for (weights, quantized) in weights.matrices.iter_mut().zip(quantized) {
+        weights.iter_mut().zip(quantized.dequantized()).for_each(|(w, q)| *w = q);
+    }
+    weights
+}
+
 /// What became of the rows and columns of a matrix as it was trained, and why. Errors are squared differences of the actions over
 /// their variances, summed over the network's outputs.
 #[derive(Clone, Debug)]
@@ -100,6 +110,17 @@ pub struct RowAllocation {
     pub rows: Vec<usize>,
     /// Its column behind each column that is left.
     pub columns: Vec<usize>,
+}
+
+/// What a network became.
+#[derive(Clone, Debug)]
+pub struct QuantizedNetwork {
+    /// Its structure: it may have lost elements, its biases may have learned.
+    pub graph: Graph,
+    /// Its matrices.
+    pub outcomes: Vec<Outcome>,
+    /// What was learned, where something was.
+    pub learning: Option<Learning>,
 }
 
 /// The result for one matrix.

@@ -6,7 +6,7 @@ use super::quantizer::{QuantizedPolicy, Quantizer};
 use super::{search, time};
 use crate::budget::{Budget, Rate};
 use crate::data::Recordings;
-use crate::methods::Options;
+use crate::methods::{Options, Progress};
 use crate::policy::Policy;
 
 /// Makes one image: [`Quantizer::new`] and [`Quantizer::quantize`]. `progress` gets what is being done and the share of it that
@@ -28,14 +28,19 @@ impl Quantizer<'_> {
     ///
     /// [`crate::budget::BudgetTooSmall`] where not even the fewest bits keep a budget of bits or bytes. The words of the others
     /// say what can be had.
-    pub fn quantize(&self, options: &Options, mut progress: impl FnMut(&str, f64)) -> Result<QuantizedPolicy> {
+    pub fn quantize(&self, options: &Options, progress: impl FnMut(&str, f64)) -> Result<QuantizedPolicy> {
         let rate = match options.budget {
             Budget::Width(width) => Rate::Width(width),
             Budget::BitsPerWeight(bits) => Rate::BitsPerWeight(bits),
             Budget::ImageBytes(bytes) => self.within_image(bytes)?,
             Budget::MaxNmse(limit) => return search::smallest(self, options, limit, progress),
-            Budget::Time(limit) => return time::most_bits(self, options, limit, |share| progress("quantizing", share)),
+            Budget::Time(limit) => return time::most_bits(self, options, limit, shown(progress)),
         };
-        self.at(rate, options, |share| progress("quantizing", share))
+        self.at(rate, options, shown(progress))
     }
+}
+
+/// As work and the share of it that is done.
+pub(super) fn shown(mut progress: impl FnMut(&str, f64)) -> impl FnMut(Progress) {
+    move |state| progress(&state.to_string(), state.share())
 }

@@ -8,7 +8,8 @@ use crate::budget::{Budget, Rate};
 use crate::data::Recordings;
 use crate::emit;
 use crate::measure::time::StepTime;
-use crate::methods::{self, Method, Options, Outcome, PreparedMethod};
+use crate::methods::best::Learning;
+use crate::methods::{self, Method, Options, Outcome, PreparedMethod, Progress, QuantizedNetwork};
 use crate::policy::Policy;
 use crate::runtime::ImageBuffer;
 
@@ -31,8 +32,8 @@ pub struct QuantizedPolicy {
     pub image: Vec<u8>,
     /// What the weights were quantized to.
     pub rate: Rate,
-    /// Steps of distillation; 0 for methods that do not learn.
-    pub steps: usize,
+    /// What was learned, where something was.
+    pub learning: Option<Learning>,
     /// What was tried, where the budget is an error.
     pub search: Option<Search>,
     /// The predicted step, where the budget is a time.
@@ -57,12 +58,11 @@ impl<'a> Quantizer<'a> {
     }
 
     /// Makes an image at a rate; `options.budget` does not count.
-    pub(super) fn at(&self, rate: Rate, options: &Options, progress: impl FnMut(f64)) -> Result<QuantizedPolicy> {
-        let (graph, outcomes) = self.method.quantize(rate, options, progress)?;
+    pub(super) fn at(&self, rate: Rate, options: &Options, progress: impl FnMut(Progress)) -> Result<QuantizedPolicy> {
+        let QuantizedNetwork { graph, outcomes, learning } = self.method.quantize(rate, options, progress)?;
         let policy = Policy { graph, ..self.policy.clone() };
         let image = emit::image(&policy, &outcomes)?;
-        let steps = self.method.steps(options);
-        Ok(QuantizedPolicy { policy, outcomes, image, rate, steps, search: None, time: None })
+        Ok(QuantizedPolicy { policy, outcomes, image, rate, learning, search: None, time: None })
     }
 
     /// The rate that leaves room for everything else in an image of `bytes` bytes.
@@ -78,6 +78,11 @@ impl<'a> Quantizer<'a> {
 }
 
 impl QuantizedPolicy {
+    /// Steps of distillation; 0 for methods that do not learn.
+    pub fn steps(&self) -> usize {
+        self.learning.as_ref().map_or(0, |learning| learning.steps)
+    }
+
     /// The image where the executor can run it.
     pub fn buffer(&self) -> ImageBuffer {
         ImageBuffer::new(&self.image)

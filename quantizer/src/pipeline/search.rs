@@ -56,14 +56,14 @@ pub(super) fn smallest(
     let policy = quantizer.policy;
     let dataset = measured(policy, quantizer.recordings)?;
     let top = top(policy, options)?;
-    let all_steps = quantizer.method.steps(options);
+    let all_steps = quantizer.method.most_steps(options);
     let mut tries: Vec<Try> = Vec::new();
     let mut found = None;
     let mut run = |cell: usize, steps: usize| -> Result<f64> {
         let budget = cell as f64 / PER_BIT as f64;
         let options = Options { steps: Some(steps), ..options.clone() };
         let work = format!("try {}: {budget} bits per weight", tries.len() + 1);
-        let report = match quantizer.at(Rate::BitsPerWeight(budget), &options, |share| progress(&work, share)) {
+        let report = match quantizer.at(Rate::BitsPerWeight(budget), &options, |state| progress(&work, state.share())) {
             Err(error) if error.is::<BudgetTooSmall>() => None,
             Err(error) => return Err(error),
             Ok(quantized) => {

@@ -137,7 +137,7 @@ impl Stats {
             method: options.method.to_string(),
             budget: options.budget,
             seed: options.seed,
-            steps: quantized.steps,
+            steps: quantized.steps(),
             matrices: matrices.map(|(m, (source, outcome))| matrix(source, outcome, scores.get(m))).collect(),
         })
     }

@@ -8,7 +8,7 @@ use super::quantizer::{QuantizedPolicy, Quantizer};
 use crate::budget::{BudgetTooSmall, Rate, TimeLimit};
 use crate::emit;
 use crate::measure::time::StepTime;
-use crate::methods::{Activations, Options};
+use crate::methods::{Activations, Options, Progress};
 
 /// More bits than any image takes.
 const MOST_BITS: f64 = 10.0;
@@ -29,7 +29,7 @@ pub(super) fn most_bits(
     quantizer: &Quantizer<'_>,
     options: &Options,
     limit: TimeLimit,
-    progress: impl FnMut(f64),
+    progress: impl FnMut(Progress),
 ) -> Result<QuantizedPolicy> {
     let allowed = limit.milliseconds;
     let activations = match options.activations {

@@ -5,9 +5,11 @@ use comfy_table::Table;
 use super::table::{group_name, table};
 use super::widths;
 use crate::budget::Rate;
+use crate::calibrate::widening::Widening;
 use crate::graph::Graph;
 use crate::measure::eval::ErrorReport;
 use crate::methods::actquant::ActionStatistics;
+use crate::methods::best::Learning;
 use crate::pipeline::{QuantizedPolicy, Search, Try};
 
 /// ActQuant's scores, and the bits that they led to.
@@ -49,6 +51,21 @@ pub fn matrices(quantized: &QuantizedPolicy) -> String {
     let by_row = outcomes.iter().any(|outcome| outcome.allocation.is_some());
     let widths = if by_row { widths::line(policy, outcomes) + "\n" } else { String::new() };
     format!("{rows}\n\n{total} bytes of weights, {bits:.3} bits each, everything counted\n{widths}")
+}
+
+/// How long was learned, and what was chosen for it.
+pub fn learning(learning: &Learning) -> String {
+    let Learning { steps, widening, tried } = learning;
+    let words = |w: &Widening| match w.mix {
+        0.0 => format!("noise up to {} deviations", w.noise),
+        mix => format!("noise up to {} deviations, mixing up to {mix}", w.noise),
+    };
+    let mut text = format!("learned {steps} steps with {}", words(widening));
+    if !tried.is_empty() {
+        let others = tried.iter().filter(|t| t.widening != *widening).map(|t| words(&t.widening)).collect::<Vec<_>>();
+        text += &format!(", chosen on episodes left out (others: {})", others.join("; "));
+    }
+    text + "\n"
 }
 
 /// The tries, and what follows from them, for people.

@@ -8,13 +8,15 @@ use actq_ur3::policy_f32::PolicyF32;
 use actq_ur3::random::Random;
 use actq_ur3::task::{EPISODE_STEPS, Task};
 use actq_ur3::{ACT_DIM, CHUNK, OBS_DIM};
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use clap::Parser;
 use ndarray::{Array1, Array2, Array3};
 use ndarray_npy::NpzWriter;
 
-/// Seeds of the policy's episodes in calib.npz.
-const CALIB_SEEDS: std::ops::Range<u64> = 0..12;
+/// The policy's episodes in the calib.npz that is shipped. Seeds count from 0.
+const SHIPPED_EPISODES: u32 = 12;
+/// Of demonstrations, where no number is given.
+const DEMONSTRATIONS: u32 = 5000;
 /// Seeds of the policy's episodes in heldout.npz.
 const HELDOUT_SEEDS: std::ops::Range<u64> = 500..508;
 /// Demonstrations start from this seed, above those of every other use.
@@ -31,14 +33,14 @@ struct Options {
     /// Folder for the files; created if it does not exist.
     #[arg(long)]
     out: PathBuf,
-    /// Number of demonstrations.
-    #[arg(long, default_value_t = 5000, value_parser = clap::value_parser!(u32).range(1..=20_000))]
-    episodes: u32,
+    /// Number of demonstrations, or of the policy's episodes in calib.npz, at most 500 [default: 5000, of the policy 12].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=20_000))]
+    episodes: Option<u32>,
     /// Seed of the first demonstration, from 100000 on.
     #[arg(long, default_value_t = FIRST_TRAINING_SEED)]
     seed: u64,
     /// Folder with policy.json and policy.safetensors: record this policy's episodes instead of demonstrations.
-    #[arg(long, conflicts_with_all = ["episodes", "seed"])]
+    #[arg(long, conflicts_with = "seed")]
     policy: Option<PathBuf>,
 }
 
@@ -47,10 +49,17 @@ fn main() -> Result<()> {
     fs::create_dir_all(&options.out).with_context(|| format!("create {}", options.out.display()))?;
     if let Some(dir) = &options.policy {
         let mut policy = PolicyF32::load(dir)?;
-        record_policy(&mut policy, CALIB_SEEDS, &options.out.join("calib.npz"))?;
+        let calib = 0..u64::from(options.episodes.unwrap_or(SHIPPED_EPISODES));
+        ensure!(
+            calib.end <= HELDOUT_SEEDS.start,
+            "--episodes {} would take the seeds of the held-out episodes, from {} on",
+            calib.end,
+            HELDOUT_SEEDS.start
+        );
+        record_policy(&mut policy, calib, &options.out.join("calib.npz"))?;
         return record_policy(&mut policy, HELDOUT_SEEDS, &options.out.join("heldout.npz"));
     }
-    let last = options.seed.checked_add(u64::from(options.episodes));
+    let last = options.seed.checked_add(u64::from(options.episodes.unwrap_or(DEMONSTRATIONS)));
     match last {
         Some(last) if options.seed >= FIRST_TRAINING_SEED => {
             record_expert(options.seed..last, &options.out.join("demonstrations.npz"))

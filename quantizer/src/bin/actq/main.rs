@@ -134,7 +134,8 @@ fn run_sweep(args: &SweepArgs) -> Result<()> {
             recordings: &recordings,
             methods: &methods,
             budgets: &args.bpw,
-            steps: args.steps,
+            steps: args.learn.steps,
+            minutes: args.learn.minutes,
             seed: args.run.seed,
         };
         sweeps.push(sweep::run(&plan, |work, share| {

@@ -53,11 +53,12 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
         print(&quantized::scores(&source.graph, statistics, &found))?;
     }
     let search = found.search.as_ref().map_or(String::new(), |search| quantized::search(search) + "\n");
+    let learned = found.learning.as_ref().map_or(String::new(), quantized::learning);
     let time = found.time.as_ref().map_or(String::new(), time::sentence);
     let (parameters, bytes) = (source.graph.parameters(), found.image.len());
     let f32_bytes = 4 * parameters;
     print(&format!(
-        "{search}{}\n{}: {bytes} bytes. The policy's {parameters} parameters take {f32_bytes} bytes in f32 ({:.1}x) and {} in \
+        "{search}{}{learned}\n{}: {bytes} bytes. The policy's {parameters} parameters take {f32_bytes} bytes in f32 ({:.1}x) and {} in \
          bf16 ({:.1}x).\n{time}Took {:.1} s.\n",
         quantized::matrices(&found),
         args.out.display(),
@@ -108,7 +109,8 @@ fn options(args: &QuantizeArgs, recordings: &Recordings) -> Options {
             Some(ActivationArg::Int16) => Activations::Int16,
             None => Activations::Auto,
         },
-        steps: args.steps,
+        steps: args.learn.steps,
+        minutes: args.learn.minutes,
         seed: args.run.seed,
         forced: args.width.iter().cloned().chain(protected).collect(),
         ..Options::new(method, limits.into_iter().flatten().next().unwrap_or(Budget::Width(width)))

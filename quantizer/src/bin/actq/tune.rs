@@ -14,7 +14,7 @@ use actq_kernels::Width;
 use anyhow::{Context as _, Result, ensure};
 use tempfile::TempDir;
 
-use crate::args::TuneArgs;
+use crate::args::{LearnArgs, TuneArgs};
 use crate::drive::Drive;
 use crate::{note, policy_files, print, progress_bar, set_share, start_threads};
 
@@ -39,7 +39,8 @@ pub(crate) fn run(args: &TuneArgs) -> Result<()> {
         Some(bits) => Budget::BitsPerWeight(bits),
         None => Budget::Width(args.bits.unwrap_or(Width::W3)),
     };
-    let options = Options { steps: args.steps, seed: args.run.seed, ..Options::new(Method::Best, budget) };
+    let LearnArgs { steps, minutes } = args.learn;
+    let options = Options { steps, minutes, seed: args.run.seed, ..Options::new(Method::Best, budget) };
     let plan = TunePlan { policy: &policy, calib, heldout, options: &options, rounds: args.rounds };
     let bar = progress_bar()?;
     let tuned = tune::run(

@@ -4,7 +4,7 @@ use actq_kernels::ops::cells::gru_cell;
 use anyhow::Result;
 use ndarray::Array2;
 
-use crate::graph::arrays::{contiguous, contiguous_mut, sum_rows};
+use crate::graph::arrays::{contiguous, contiguous_mut, rows, rows_mut, step_rows, sum_rows};
 use crate::graph::lowering::{BufferId, Lifetime, Lowering, StepData};
 use crate::graph::operation::{
     Backward, Forward, NodeState, Operand, Operation, Product, Saved, expect_len, expect_shape, only,
@@ -56,42 +56,56 @@ impl Operation for Gru {
     }
 
     fn forward(&self, run: &Forward<'_>, [h, _]: &mut NodeState) -> (Array2<f32>, Saved) {
-        let (x, before) = (run.operand(self.input, run.input(0)), run.operand(self.state, h));
-        let a = run.affine(&[(self.input, &x)], 0);
-        let b = run.affine(&[(self.state, &before)], 1);
-        let h_before = h.clone();
-        for ((a, b), mut h) in a.rows().into_iter().zip(b.rows()).zip(h.rows_mut()) {
-            gru_cell(contiguous(&a), contiguous(&b), contiguous_mut(&mut h));
+        let batch = h.nrows();
+        let x = run.operand(self.input, run.input(0).view());
+        let a = run.affine(self.input, &x, 0);
+        let state = run.repeated(self.state);
+        let mut b = Array2::from_shape_fn(a.raw_dim(), |(_, row)| run.vectors[1][row]);
+        let before = Array2::zeros((x.nrows(), self.hidden));
+        let [mut before, mut h_before, mut y] = [before.clone(), before.clone(), before];
+        for step in 0..x.nrows() / batch {
+            let of_step = step_rows(step, batch);
+            let operand = run.operand(self.state, h.view());
+            state.add_product(&operand, rows_mut(&mut b, of_step.clone()));
+            rows_mut(&mut before, of_step.clone()).assign(&operand);
+            rows_mut(&mut h_before, of_step.clone()).assign(h);
+            let (of_input, of_state) = (rows(&a, of_step.clone()), rows(&b, of_step.clone()));
+            for ((a, b), mut h) in of_input.rows().into_iter().zip(of_state.rows()).zip(h.rows_mut()) {
+                gru_cell(contiguous(&a), contiguous(&b), contiguous_mut(&mut h));
+            }
+            rows_mut(&mut y, of_step).assign(h);
         }
-        (h.clone(), Saved { operands: vec![x, before], inner: vec![h_before, a, b] })
+        (y, Saved { operands: vec![x, before], inner: vec![h_before, a, b] })
     }
 
-    fn backward(&self, run: &mut Backward<'_>, saved: &Saved, mut dy: Array2<f32>, [d_h, _]: &mut NodeState) {
+    fn backward(&self, run: &mut Backward<'_>, saved: &Saved, dy: Array2<f32>, [d_h, _]: &mut NodeState) {
         let [h_before, a, b] = &saved.inner[..] else { return };
-        dy += &*d_h;
+        let batch = d_h.nrows();
         let (mut d_a, mut d_b) = (Array2::zeros(a.raw_dim()), Array2::zeros(b.raw_dim()));
-        for sample in 0..dy.nrows() {
-            for k in 0..self.hidden {
-                let at = |g: usize| [sample, g * self.hidden + k];
-                let r = math::sigmoid(a[at(0)] + b[at(0)]);
-                let z = math::sigmoid(a[at(1)] + b[at(1)]);
-                let n = math::tanh(a[at(2)] + r * b[at(2)]);
-                let dh = dy[[sample, k]];
-                let dn = dh * (1.0 - z) * (1.0 - n * n);
-                let dz = dh * (h_before[[sample, k]] - n) * z * (1.0 - z);
-                let dr = dn * b[at(2)] * r * (1.0 - r);
-                for (g, da, db) in [(0, dr, dr), (1, dz, dz), (2, dn, dn * r)] {
-                    d_a[at(g)] = da;
-                    d_b[at(g)] = db;
+        for step in (0..dy.nrows() / batch).rev() {
+            for (sample, row) in step_rows(step, batch).enumerate() {
+                for k in 0..self.hidden {
+                    let at = |g: usize| [row, g * self.hidden + k];
+                    let r = math::sigmoid(a[at(0)] + b[at(0)]);
+                    let z = math::sigmoid(a[at(1)] + b[at(1)]);
+                    let n = math::tanh(a[at(2)] + r * b[at(2)]);
+                    let dh = dy[[row, k]] + d_h[[sample, k]];
+                    let dn = dh * (1.0 - z) * (1.0 - n * n);
+                    let dz = dh * (h_before[[row, k]] - n) * z * (1.0 - z);
+                    let dr = dn * b[at(2)] * r * (1.0 - r);
+                    for (g, da, db) in [(0, dr, dr), (1, dz, dz), (2, dn, dn * r)] {
+                        d_a[at(g)] = da;
+                        d_b[at(g)] = db;
+                    }
+                    d_h[[sample, k]] = dh * z;
                 }
-                d_h[[sample, k]] = dh * z;
             }
+            *d_h += &run.through(self.state, &rows(&d_b, step_rows(step, batch)));
         }
         run.product(0, self.input, &saved.operands[0], &d_a);
         run.product(1, self.state, &saved.operands[1], &d_b);
         sum_rows(&d_a, &mut run.d_vectors[0]);
         sum_rows(&d_b, &mut run.d_vectors[1]);
-        *d_h += &run.through(self.state, &d_b);
         run.give_through(0, self.input, &d_a);
     }
 

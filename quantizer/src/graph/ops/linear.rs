@@ -37,8 +37,8 @@ impl Operation for Linear {
     }
 
     fn forward(&self, run: &Forward<'_>, _: &mut NodeState) -> (Array2<f32>, Saved) {
-        let x = run.operand(self.matrix, run.input(0));
-        let y = run.affine(&[(self.matrix, &x)], 0);
+        let x = run.operand(self.matrix, run.input(0).view());
+        let y = run.affine(self.matrix, &x, 0);
         (y, Saved { operands: vec![x], ..Saved::default() })
     }
 

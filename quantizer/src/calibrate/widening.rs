@@ -1,0 +1,27 @@
+//! How far learning takes the inputs off the recorded ones.
+
+/// Noise on a window of observations. Its standard deviation is drawn for every window, evenly between 0 and `noise`, in units of
+/// each value's own deviation over the recording; from step to step it keeps [`MEMORY`]. Where a policy drives, its own errors
+/// have taken it off the recorded path, slowly and for a while: that is what such noise stands for. Noise that is fresh in every
+/// step averages out and teaches a recurrent policy to ignore it (docs/QUANTIZER.md has the figures).
+///
+/// Half of the windows can also be moved as a whole, by up to `mix` times the difference of two recorded observations, which
+/// keeps the values together that move together.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Widening {
+    /// The largest standard deviation of the noise, in units of each value's own.
+    pub noise: f32,
+    /// The largest share of the difference of two recorded observations.
+    pub mix: f32,
+}
+
+/// What remains of the noise from one step to the next: at 50 steps a second it lasts for about 0.7 s.
+pub const MEMORY: f32 = 0.97;
+
+impl Widening {
+    /// What is taken where nothing can be left out to choose by.
+    pub const WIDE: Self = Self { noise: 0.8, mix: 0.0 };
+
+    /// What can be chosen from.
+    pub const CHOICES: [Self; 3] = [Self::WIDE, Self { noise: 0.1, mix: 0.5 }, Self { noise: 0.1, mix: 1.0 }];
+}

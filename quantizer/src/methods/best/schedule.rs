@@ -1,0 +1,175 @@
+//! How long learning takes, and at what rate.
+//!
+//! The rate is held as long as the error falls, and then falls to zero itself, along a cosine, over 3 in 10 of all steps. So learning
+//! ends when it is done, or where it is bound, and is as good at either end as one that had been planned so long: at equal steps,
+//! no worse than a cosine from the first step on (docs/QUANTIZER.md).
+
+use std::time::{Duration, Instant};
+
+/// Share of the steps at the full rate.
+const HELD: f64 = 0.7;
+/// Steps of a network of [`USUAL`] weights; others take as many as its square root of their size allows: a small network learns
+/// longer, a large one keeps its time. A recurrent network's step is a batch of windows, which costs four times as much.
+const STEPS: f64 = 16_000.0;
+const WINDOW_STEPS: f64 = 6_400.0;
+const USUAL: f64 = 200_000.0;
+/// At most.
+const MOST: f64 = 20_000.0;
+/// The error's course is its means over so many parts of the most steps, of so many steps at least.
+const PARTS: usize = 16;
+const LEAST_PART: usize = 100;
+/// A part that is not lower than the lowest before it by this share has not fallen; after so many in a row learning is done.
+const FALLEN: f64 = 0.01;
+const FLAT: usize = 2;
+
+/// The most steps of a network with so many weights, where nothing else is asked for.
+pub fn most_steps(weights: usize, recurrent: bool) -> usize {
+    let usual = if recurrent { WINDOW_STEPS } else { STEPS };
+    (usual * (USUAL / weights.max(1) as f64).sqrt()).min(MOST) as usize
+}
+
+/// Where learning ends at the latest.
+#[derive(Clone, Copy, Debug)]
+pub struct Bounds {
+    /// Steps; without it, what [`Self::time`] allows.
+    pub steps: Option<usize>,
+    /// Time on the clock. What is learned then depends on the machine.
+    pub time: Option<Duration>,
+}
+
+/// Where learning is.
+#[derive(Debug)]
+pub struct Schedule {
+    bounds: Bounds,
+    started: Instant,
+    /// Steps in a part of the error's course.
+    part: usize,
+    step: usize,
+    /// Steps that were held, once the rate falls.
+    held: Option<usize>,
+    /// The sum of the present part's errors, the mean of the last part, the lowest mean, and how many since were not lower.
+    sum: f64,
+    last: Option<f64>,
+    lowest: f64,
+    flat: usize,
+}
+
+impl Schedule {
+    /// From the first step; `usual` steps are what the size of the network suggests.
+    pub fn new(bounds: Bounds, usual: usize) -> Self {
+        let part = (bounds.steps.unwrap_or(usual) / PARTS).max(LEAST_PART);
+        Self {
+            bounds,
+            started: Instant::now(),
+            part,
+            step: 0,
+            held: None,
+            sum: 0.0,
+            last: None,
+            lowest: f64::INFINITY,
+            flat: 0,
+        }
+    }
+
+    /// Steps taken.
+    pub fn steps(&self) -> usize {
+        self.step
+    }
+
+    /// The mean error of the last whole part, or of the first so far.
+    pub fn error(&self) -> Option<f64> {
+        self.last.or_else(|| (self.step > 0).then(|| self.sum / self.step as f64))
+    }
+
+    /// The share of the rates that the next step has; `None`: learning is done.
+    pub fn rate(&mut self) -> Option<f32> {
+        if self.held.is_none() && (self.flat >= FLAT || self.share() >= HELD) {
+            self.held = Some(self.step);
+        }
+        let Some(held) = self.held else { return Some(1.0) };
+        let falls = ((held as f64 * (1.0 - HELD) / HELD).round() as usize).max(1);
+        let fallen = self.step - held;
+        let most = self.bounds.steps.unwrap_or(usize::MAX);
+        if fallen >= falls || self.step >= most {
+            return None;
+        }
+        Some(0.5 * (1.0 + (std::f32::consts::PI * fallen as f32 / falls as f32).cos()))
+    }
+
+    /// A step was taken, with this error.
+    pub fn took(&mut self, error: f32) {
+        self.step += 1;
+        self.sum += f64::from(error);
+        if self.step.is_multiple_of(self.part) {
+            let mean = self.sum / self.part as f64;
+            (self.sum, self.last) = (0.0, Some(mean));
+            self.flat = if mean < (1.0 - FALLEN) * self.lowest { 0 } else { self.flat + 1 };
+            self.lowest = self.lowest.min(mean);
+        }
+    }
+
+    /// The share that is done, of what is bound while the rate is held, of what is left when it falls.
+    pub fn share(&self) -> f64 {
+        if let Some(held) = self.held {
+            return (self.step as f64 * HELD / held.max(1) as f64).min(1.0);
+        }
+        let of_steps = self.bounds.steps.map_or(0.0, |most| self.step as f64 / most.max(1) as f64);
+        let of_time = self.bounds.time.map_or(0.0, |time| self.started.elapsed().as_secs_f64() / time.as_secs_f64());
+        of_steps.max(of_time).min(1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn learn(steps: usize, error: impl Fn(usize) -> f32) -> Vec<f32> {
+        let mut schedule = Schedule::new(Bounds { steps: Some(steps), time: None }, steps);
+        let mut rates = Vec::new();
+        while let Some(rate) = schedule.rate() {
+            rates.push(rate);
+            schedule.took(error(rates.len()));
+        }
+        assert_eq!(schedule.steps(), rates.len());
+        rates
+    }
+
+    #[test]
+    fn all_steps_are_taken_while_the_error_falls() {
+        for steps in [1, 2, 10, 999, 16_000] {
+            let rates = learn(steps, |step| 1.0 / step as f32);
+            assert_eq!(rates.len(), steps);
+            assert!(rates.is_sorted_by(|a, b| a >= b) && rates[0] == 1.0);
+        }
+        assert!(learn(16_000, |step| 1.0 / step as f32)[15_999] < 1e-5);
+    }
+
+    #[test]
+    fn learning_ends_when_the_error_no_longer_falls() {
+        let rates = learn(16_000, |step| if step < 4000 { 1.0 / step as f32 } else { 1.0 });
+        // Two parts of 1,000 steps without a fall, then the fall of the rate.
+        let held = rates.iter().filter(|rate| **rate == 1.0).count();
+        assert!((6000..=6002).contains(&held), "{held}");
+        assert_eq!(rates.len(), 6000 + 2571);
+    }
+
+    #[test]
+    fn time_bounds_it() {
+        let bounds = Bounds { steps: None, time: Some(Duration::from_millis(50)) };
+        let mut schedule = Schedule::new(bounds, 1000);
+        while schedule.rate().is_some() {
+            std::thread::sleep(Duration::from_millis(1));
+            schedule.took(1.0 / (schedule.steps() + 1) as f32);
+        }
+        assert!((10..=50).contains(&schedule.steps()), "{}", schedule.steps());
+    }
+
+    #[test]
+    fn small_networks_take_more_steps() {
+        assert_eq!(most_steps(31_000, true), 16_255);
+        assert_eq!(
+            (most_steps(200_000, false), most_steps(800_000, false), most_steps(10, true)),
+            (16_000, 8_000, 20_000)
+        );
+    }
+}
