@@ -3,6 +3,7 @@
 pub mod actquant;
 pub mod best;
 pub mod gptq;
+mod learning;
 pub mod matrixwise;
 mod options;
 mod prepared;
@@ -10,6 +11,7 @@ mod progress;
 mod quantized;
 pub mod scale;
 
+pub use learning::{Learning, Tried};
 pub use options::{Activations, Method, Options, Packing};
 pub use prepared::{PreparedMethod, quantize};
 pub use progress::Progress;

@@ -1,5 +1,7 @@
 //! How far learning takes the inputs off the recorded ones.
 
+use std::fmt;
+
 /// Noise on a window of observations. Its standard deviation is drawn for every window, evenly between 0 and `noise`, in units of
 /// each value's own deviation over the recording; from step to step it keeps [`MEMORY`]. Where a policy drives, its own errors
 /// have taken it off the recorded path, slowly and for a while: that is what such noise stands for. Noise that is fresh in every
@@ -24,4 +26,11 @@ impl Widening {
 
     /// What can be chosen from.
     pub const CHOICES: [Self; 3] = [Self::WIDE, Self { noise: 0.1, mix: 0.5 }, Self { noise: 0.1, mix: 1.0 }];
+}
+
+impl fmt::Display for Widening {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "noise up to {} deviations", self.noise)?;
+        if self.mix > 0.0 { write!(f, " and mixing up to {}", self.mix) } else { Ok(()) }
+    }
 }

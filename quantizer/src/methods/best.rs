@@ -17,6 +17,7 @@ use anyhow::{Result, ensure};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
+use super::learning::Learning;
 use super::options::{Activations, Options};
 use super::progress::Progress;
 use super::quantized::{Outcome, Quantized, QuantizedNetwork, RowAllocation, dequantized};
@@ -29,7 +30,7 @@ use crate::data::Dataset;
 use crate::graph::{Graph, Network, WeightMatrix};
 use crate::random::Random;
 use allocate::{Rows, allocate, energies, removals};
-use choose::{CHOOSING, Tried, choose};
+use choose::{CHOOSING, choose};
 use compact::{Compacted, add_to_bias, compact};
 use dimension::{Dimension, dimensions};
 use distill::{Learned, Task, distill, loss};
@@ -87,17 +88,6 @@ impl<'a> RowStatistics<'a> {
         let steps = (options.steps.is_some() || options.minutes.is_none()).then_some(most);
         Bounds { steps, time: options.minutes.map(|minutes| Duration::from_secs_f64(60.0 * minutes)) }
     }
-}
-
-/// What was learned of a network beside its weights.
-#[derive(Clone, Debug)]
-pub struct Learning {
-    /// Steps taken.
-    pub steps: usize,
-    /// How far the inputs were widened.
-    pub widening: Widening,
-    /// What was tried to choose that.
-    pub tried: Vec<Tried>,
 }
 
 /// Quantizes a network. Hidden elements without bits are gone from it, biases and norms have learned.

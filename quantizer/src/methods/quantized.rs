@@ -5,7 +5,7 @@ use actq_kernels::layout::{BlockShape, Lanes, Width};
 use anyhow::{Result, ensure};
 use half::bf16;
 
-use super::best::Learning;
+use super::learning::Learning;
 use super::options::Activations;
 use crate::calibrate::moments::{self, Moments};
 use crate::graph::{Graph, WeightMatrix, Weights};

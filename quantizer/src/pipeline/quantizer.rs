@@ -8,8 +8,7 @@ use crate::budget::{Budget, Rate};
 use crate::data::Recordings;
 use crate::emit;
 use crate::measure::time::StepTime;
-use crate::methods::best::Learning;
-use crate::methods::{self, Method, Options, Outcome, PreparedMethod, Progress, QuantizedNetwork};
+use crate::methods::{self, Learning, Method, Options, Outcome, PreparedMethod, Progress, QuantizedNetwork};
 use crate::policy::Policy;
 use crate::runtime::ImageBuffer;
 

@@ -5,11 +5,10 @@ use comfy_table::Table;
 use super::table::{group_name, table};
 use super::widths;
 use crate::budget::Rate;
-use crate::calibrate::widening::Widening;
 use crate::graph::Graph;
 use crate::measure::eval::ErrorReport;
 use crate::methods::actquant::ActionStatistics;
-use crate::methods::best::Learning;
+use crate::methods::{Learning, Tried};
 use crate::pipeline::{QuantizedPolicy, Search, Try};
 
 /// ActQuant's scores, and the bits that they led to.
@@ -56,16 +55,15 @@ pub fn matrices(quantized: &QuantizedPolicy) -> String {
 /// How long was learned, and what was chosen for it.
 pub fn learning(learning: &Learning) -> String {
     let Learning { steps, widening, tried } = learning;
-    let words = |w: &Widening| match w.mix {
-        0.0 => format!("noise up to {} deviations", w.noise),
-        mix => format!("noise up to {} deviations, mixing up to {mix}", w.noise),
-    };
-    let mut text = format!("learned {steps} steps with {}", words(widening));
+    let mut text = format!("learned {steps} steps with {widening}\n");
     if !tried.is_empty() {
-        let others = tried.iter().filter(|t| t.widening != *widening).map(|t| words(&t.widening)).collect::<Vec<_>>();
-        text += &format!(", chosen on episodes left out (others: {})", others.join("; "));
+        let mut rows = table(&["tried", "error, episodes left out", "there, off the path"]);
+        for Tried { widening, recorded, widened } in tried {
+            rows.add_row([widening.to_string(), format!("{recorded:.2e}"), format!("{widened:.2e}")]);
+        }
+        text += &format!("\n{rows}\n");
     }
-    text + "\n"
+    text
 }
 
 /// The tries, and what follows from them, for people.

@@ -1,8 +1,9 @@
 //! How far the inputs are widened, chosen by leaving whole episodes out.
 //!
 //! Each choice learns for an eighth of the steps from three quarters of the episodes. On the others its error is measured twice, at
-//! the recorded observations and at widened ones, and the geometric mean of both decides: the error on the recorded path alone would
-//! always take the least noise, with which a recurrent policy that balances falls (docs/QUANTIZER.md).
+//! the recorded observations and at widened ones. A feed-forward network takes the choice with the lowest error at the recorded
+//! observations, a recurrent one that with the lowest geometric mean of both: the error on the recorded path alone would always
+//! take the least noise, with which a recurrent policy that balances falls (docs/QUANTIZER.md).
 
 use std::time::Duration;
 
@@ -11,6 +12,7 @@ use super::schedule::Bounds;
 use crate::calibrate::widening::Widening;
 use crate::calibrate::windows::Windows;
 use crate::graph::Network;
+use crate::methods::learning::Tried;
 use crate::methods::quantized::dequantized;
 use crate::random::Random;
 
@@ -26,24 +28,6 @@ pub const CHOOSING: f64 = 0.27;
 /// Batches that an error is measured on, and frames in each.
 const BATCHES: usize = 16;
 const FRAMES: usize = 512;
-
-/// A choice and its error on the episodes that were left out.
-#[derive(Clone, Copy, Debug)]
-pub struct Tried {
-    /// The choice.
-    pub widening: Widening,
-    /// At the recorded observations: the mean over samples and outputs of squared error over variance.
-    pub recorded: f64,
-    /// The same at observations widened by [`Widening::WIDE`].
-    pub widened: f64,
-}
-
-impl Tried {
-    /// What the choice is made by.
-    fn error(&self) -> f64 {
-        self.recorded * self.widened
-    }
-}
 
 /// Tries all choices and gives the best in `task`, with what is left of the time. With few steps, or where no episode can be left
 /// out, nothing is tried.
@@ -66,7 +50,11 @@ pub fn choose<'a>(
         Tried { widening, recorded, widened }
     };
     let tried: Vec<Tried> = choices.iter().enumerate().map(of).collect();
-    let best = tried.iter().min_by(|a, b| a.error().total_cmp(&b.error()));
+    let decides = |tried: &Tried| match windows.recurrent() {
+        true => (tried.recorded * tried.widened).sqrt(),
+        false => tried.recorded,
+    };
+    let best = tried.iter().min_by(|a, b| decides(a).total_cmp(&decides(b)));
     let widening = best.map_or(task.widening, |best| best.widening);
     let left = time.map(|time| Duration::from_secs_f64(time.as_secs_f64() * TIME_LEFT));
     (Task { widening, bounds: Bounds { steps, time: left }, ..task.clone() }, tried)
