@@ -1,8 +1,10 @@
 //! What the tests and the measuring commands share: the firmware, built and under QEMU, counted instructions and modelled cycles,
-//! golden kernel cases, drawn networks, the command `actq`.
+//! golden kernel cases, drawn networks, the command `actq`, closed loops, the comparison of methods.
 #![forbid(unsafe_code)]
 
+pub mod closed_loop;
 pub mod command;
+pub mod compare;
 pub mod cycles;
 pub mod evaluation;
 pub mod firmware;
