@@ -2,6 +2,7 @@
 //!
 //! One thread quantizes, as learning uses all cores; another drives what was made before, and appends it to the journal.
 
+mod actquant_k;
 mod cell;
 mod journal;
 mod making;
@@ -182,6 +183,12 @@ fn make(key: &CellKey, entrant: &Entrant, maker: &mut Maker<'_>, images: &Path) 
             files::write(&path, &image)?;
             cell.made = Some(made);
             Some(Driver::Image(path))
+        }
+        Attempt::Simulated(graph, made) => {
+            let folder = images.join(format!("{}-{}-{budget}", key.policy, method.name()));
+            actquant_k::write_policy(maker.policy(), &graph, &folder)?;
+            cell.made = Some(made);
+            Some(Driver::Folder(folder))
         }
         Attempt::Impossible(why) => {
             cell.why = Some(why);

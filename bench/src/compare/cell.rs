@@ -39,9 +39,9 @@ pub struct Made {
     pub bytes: usize,
     /// The image's bytes over the parameters of the policy as it was trained.
     pub bytes_per_parameter: f64,
-    /// Columns per scale (0: a scale a row); `None` where the format says it.
-    pub group: Option<usize>,
-    /// Whether this is the method's default group.
+    /// What has a scale: `row`, or so many columns; of K-quants the format of each matrix.
+    pub format: String,
+    /// Whether the group is the method's default one.
     pub default_group: bool,
     /// Statistics and quantization; the simulator runs at the same time.
     pub seconds: f64,

@@ -106,19 +106,18 @@ impl Journal {
             journal.header.options
         );
         // A line that was cut short when the run was ended would swallow the next one.
-        let mut text = line(&journal.header)?;
-        for cell in &journal.cells {
-            text += &line(cell)?;
-        }
-        fs::write(&journal.path, text).with_context(|| journal.failed("written"))?;
+        let whole = fs::read(&journal.path)?.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
+        let cut = || File::options().write(true).open(&journal.path)?.set_len(whole as u64);
+        cut().with_context(|| journal.failed("written"))?;
         Ok(journal)
     }
 
     /// Reads what a run has left.
     pub fn read(folder: &Path) -> Result<Self> {
         let path = Self::path(folder);
-        let text = fs::read_to_string(&path)
+        let bytes = fs::read(&path)
             .with_context(|| format!("{}: cannot be read; has a comparison begun there?", path.display()))?;
+        let text = String::from_utf8_lossy(&bytes);
         let whole = text.rfind('\n').map_or("", |end| &text[..end]);
         let mut lines = whole.lines().enumerate();
         let wrong = |number: usize| format!("{}, line {}: not a line of a comparison", path.display(), number + 1);

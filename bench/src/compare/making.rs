@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use actq::budget::{Budget, BudgetTooSmall};
 use actq::data::{Dataset, Recording, Recordings};
+use actq::graph::Graph;
 use actq::measure::eval;
 use actq::methods::{Method, Options};
 use actq::pipeline::Quantizer;
@@ -13,12 +14,14 @@ use actq::policy::Policy;
 use actq_kernels::layout::GROUPS;
 use anyhow::{Context as _, Result};
 
+use super::actquant_k;
 use super::cell::Made;
 use super::plan::{Contender, Plan};
+use crate::kquants::Format;
 
 /// A policy as the methods take it.
 pub(super) struct Subject {
-    pub(super) policy: Policy,
+    policy: Policy,
     recordings: Recordings,
 }
 
@@ -26,6 +29,8 @@ pub(super) struct Subject {
 pub(super) enum Attempt {
     /// An image, and its figures.
     Made(Vec<u8>, Made),
+    /// A network without an image, and its figures.
+    Simulated(Graph, Made),
     /// None, and why.
     Impossible(String),
 }
@@ -58,6 +63,11 @@ impl<'a> Maker<'a> {
         Self { subject, plan, ready: BTreeMap::new() }
     }
 
+    /// The policy.
+    pub(super) fn policy(&self) -> &Policy {
+        &self.subject.policy
+    }
+
     /// Makes the image of a cell. `progress` gets what is being done and the share of it that is done.
     ///
     /// The method's default group counts. Only where it does not fit the budget, the others are tried, and of those that fit the one
@@ -70,13 +80,16 @@ impl<'a> Maker<'a> {
     ) -> Result<Attempt> {
         let method = contender.method();
         let preparing = self.prepare(method, &mut progress)?;
+        if contender == Contender::ActQuantK {
+            return self.simulate(budget, preparing);
+        }
         let default = method.default_group();
         let first = self.with_group(contender, budget, default, preparing, &mut progress)?;
         let too_small = match first {
             Ok(made) => return Ok(made),
             Err(too_small) => too_small,
         };
-        let mut least = (too_small, default);
+        let mut least_of_all = (too_small, default);
         let mut best: Option<(Vec<u8>, Made)> = None;
         for group in GROUPS.into_iter().chain([0]).filter(|group| *group != default) {
             match self.with_group(contender, budget, group, preparing, &mut progress)? {
@@ -84,21 +97,46 @@ impl<'a> Maker<'a> {
                     best = Some((image, made));
                 }
                 Ok(_) => {}
-                Err(too_small) if too_small.bytes < least.0.bytes => least = (too_small, group),
+                Err(too_small) if too_small.bytes < least_of_all.0.bytes => least_of_all = (too_small, group),
                 Err(_) => {}
             }
         }
         Ok(match best {
             Some((image, made)) => Attempt::Made(image, made),
             None => {
-                let (BudgetTooSmall { bytes, weights, .. }, group) = least;
-                Attempt::Impossible(format!(
-                    "the least is {:.3} bits per weight, {}",
-                    8.0 * bytes as f64 / weights.max(1) as f64,
-                    scales(group)
-                ))
+                let (too_small, group) = least_of_all;
+                Attempt::Impossible(least(&too_small, &scales(group)))
             }
         })
+    }
+
+    /// ActQuant in K-quants.
+    fn simulate(&self, budget: f64, preparing: f64) -> Result<Attempt> {
+        let begun = Instant::now();
+        let (quantizer, _) = self.ready.get(&Method::ActQuant.to_string()).context("the method was not made ready")?;
+        let statistics = quantizer.method().action_statistics().context("the method has no statistics")?;
+        let policy = &self.subject.policy;
+        let simulated = match actquant_k::quantize(&policy.graph, statistics, budget, self.subject.heldout()?) {
+            Ok(simulated) => simulated,
+            Err(error) => {
+                let too_small = error.downcast::<BudgetTooSmall>()?;
+                return Ok(Attempt::Impossible(least(&too_small, &format!("all matrices in {}", Format::ALL[0]))));
+            }
+        };
+        let seconds = preparing + begun.elapsed().as_secs_f64();
+        let (weights, parameters) = (policy.graph.weights(), policy.graph.parameters());
+        // Everything but the matrices stays in f32.
+        let bytes = simulated.bytes + 4 * (parameters - weights);
+        let made = Made {
+            nmse: simulated.nmse,
+            bpw: 8.0 * simulated.bytes as f64 / weights.max(1) as f64,
+            bytes,
+            bytes_per_parameter: bytes as f64 / parameters.max(1) as f64,
+            format: simulated.formats.iter().map(Format::to_string).collect::<Vec<_>>().join(" "),
+            default_group: true,
+            seconds,
+        };
+        Ok(Attempt::Simulated(simulated.graph, made))
     }
 
     /// Seconds that the statistics of a method take, which are collected once.
@@ -139,7 +177,7 @@ impl<'a> Maker<'a> {
             bpw: report.bpw,
             bytes: report.bytes,
             bytes_per_parameter: report.bytes as f64 / self.subject.policy.graph.parameters().max(1) as f64,
-            group: Some(group),
+            format: if group == 0 { "row".to_owned() } else { group.to_string() },
             default_group: group == method.default_group(),
             seconds,
         };
@@ -147,10 +185,12 @@ impl<'a> Maker<'a> {
     }
 }
 
+/// Why a budget is too small.
+fn least(BudgetTooSmall { bytes, weights, .. }: &BudgetTooSmall, with: &str) -> String {
+    format!("the least is {:.3} bits per weight, {with}", 8.0 * *bytes as f64 / (*weights).max(1) as f64)
+}
+
 /// A group for people.
 fn scales(group: usize) -> String {
-    match group {
-        0 => "with one scale a row".to_owned(),
-        _ => format!("with groups of {group}"),
-    }
+    if group == 0 { "with one scale a row".to_owned() } else { format!("with groups of {group}") }
 }

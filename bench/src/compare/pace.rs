@@ -20,7 +20,8 @@ pub(super) fn seconds_left(done: &[Cell], missing: &[CellKey]) -> Option<f64> {
     // How long driving takes depends on the policy, not on the method.
     let drives = |key: &CellKey| mean(&driving, &|k| k.policy == key.policy).or_else(|| mean(&driving, &|_| true));
     let driven: f64 = missing.iter().filter_map(drives).sum();
-    (!done.is_empty()).then(|| made.max(driven))
+    // A sum of nothing is -0.
+    (!done.is_empty()).then(|| made.max(driven) + 0.0)
 }
 
 /// A duration for people.

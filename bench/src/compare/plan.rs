@@ -21,6 +21,10 @@ pub enum Contender {
     #[value(name = "actquant")]
     #[serde(rename = "actquant")]
     ActQuant,
+    /// ActQuant in llama.cpp's K-quants, as in its paper, simulated
+    #[value(name = "actquant-k")]
+    #[serde(rename = "actquant-k")]
+    ActQuantK,
     /// best with --steps 0: not learned
     #[value(name = "best-0")]
     #[serde(rename = "best-0")]
@@ -30,12 +34,12 @@ pub enum Contender {
 }
 
 impl Contender {
-    /// The method of the quantizer behind it.
+    /// The method of the quantizer behind it, or whose statistics it takes.
     pub fn method(self) -> Method {
         match self {
             Self::Rtn => Method::Rtn,
             Self::Gptq => Method::Gptq,
-            Self::ActQuant => Method::ActQuant,
+            Self::ActQuant | Self::ActQuantK => Method::ActQuant,
             Self::BestNotLearned | Self::Best => Method::Best,
         }
     }
@@ -51,6 +55,7 @@ impl Contender {
             Self::Rtn => "rtn",
             Self::Gptq => "gptq",
             Self::ActQuant => "actquant",
+            Self::ActQuantK => "actquant, K-quants",
             Self::BestNotLearned => "best, not learned",
             Self::Best => "best",
         }
@@ -69,7 +74,12 @@ pub struct Plan {
     )]
     pub policies: Vec<String>,
     /// Methods; best-0 is best with --steps 0, not learned
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "rtn,gptq,actquant,best-0,best")]
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        default_value = "rtn,gptq,actquant,actquant-k,best-0,best"
+    )]
     pub methods: Vec<Contender>,
     /// Bits per weight that are allowed, everything counted
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = bits, default_value = "1.5,2,2.3,2.5,3,4")]
