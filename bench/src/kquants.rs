@@ -254,10 +254,10 @@ mod tests {
             let rounded = format.rounded(&weights, 256, &[1.0; 256]);
             let energy = error(&weights, &[0.0; 256], &[1.0; 256]);
             let off = error(&weights, &rounded, &[1.0; 256]) / energy;
-            assert!(off < 1e-5, "{format}: {off:e}");
+            assert!(off < 5e-5, "{format}: {off:e}");
             // Nothing is lost the second time.
             let again = error(&rounded, &format.rounded(&rounded, 256, &[1.0; 256]), &[1.0; 256]) / energy;
-            assert!(again < 1e-5, "{format}: {again:e}");
+            assert!(again < 5e-5, "{format}: {again:e}");
         }
     }
 

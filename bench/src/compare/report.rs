@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use actq::emit::files;
 use actq::pipeline::driven::DriveOutcome;
+use actq::report::plot::{Plot, Series, Vertical, stacked};
 use anyhow::Result;
 use serde_json::Value;
 
@@ -14,6 +15,9 @@ use super::plan::Contender;
 
 /// How far the robot is from where it should be, by the name that the simulator gives it, with its unit.
 const TRACKING: [(&str, &str); 3] = [("tracking_error_mm", "mm"), ("err_lin", "m/s"), ("dist", "m")];
+
+/// The plots beside the report.
+const PICTURE: &str = "compare.svg";
 
 const READING: &str = "\
 Cells: error on the held-out recording (NMSE, mean over the outputs) · closed-loop success in percent of the episodes (95% interval, \
@@ -32,8 +36,10 @@ held-out error was taken. Its image bytes are those of its blocks and everything
 
 /// Writes the report beside the journal, and gives its path.
 pub(super) fn write(journal: &Journal, folder: &Path) -> Result<PathBuf> {
+    let asked = Asked::of(&journal.header)?;
     let path = folder.join("compare.md");
-    files::write(&path, markdown(journal)?.as_bytes())?;
+    files::write(&folder.join(PICTURE), stacked(&plots(journal, &asked)).as_bytes())?;
+    files::write(&path, markdown(journal, &asked)?.as_bytes())?;
     Ok(path)
 }
 
@@ -67,14 +73,39 @@ impl Asked {
     }
 }
 
-fn markdown(journal: &Journal) -> Result<String> {
-    let asked = Asked::of(&journal.header)?;
+/// Success over true bits per weight: a plot of each policy that was driven, a line of each method.
+fn plots(journal: &Journal, asked: &Asked) -> Vec<Plot> {
+    let percent = |cell: &Cell| cell.outcome()?.success().map(|success| 100.0 * success);
+    let find = |policy: &str, method, budget| journal.find(&CellKey { policy: policy.to_owned(), method, budget });
+    let line = |policy: &str, method: Contender| -> Series {
+        let cells = asked.budgets.iter().filter_map(|&budget| find(policy, Some(method), Some(budget)));
+        let mut points: Vec<(f64, f64)> =
+            cells.filter_map(|cell| Some((cell.made.as_ref()?.bpw, percent(cell)?))).collect();
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        Series { name: method.title().to_owned(), points }
+    };
+    let plot = |policy: &String| -> Option<Plot> {
+        let f32_success = percent(find(policy, None, None)?)?;
+        Some(Plot {
+            title: format!("{policy}: success over bits per weight (f32: {f32_success:.0}%)"),
+            x_label: "bits per weight, everything counted".to_owned(),
+            y_label: "closed-loop success, %".to_owned(),
+            vertical: Vertical::Percent,
+            series: asked.methods.iter().map(|&method| line(policy, method)).collect(),
+            mark: None,
+        })
+    };
+    asked.policies.iter().filter_map(plot).collect()
+}
+
+fn markdown(journal: &Journal, asked: &Asked) -> Result<String> {
     let mut text = head(&journal.header)?;
+    writeln!(text, "\n![Success over bits per weight, a plot a policy]({PICTURE})")?;
     if asked.methods.contains(&Contender::ActQuantK) {
         writeln!(text, "\n{K_QUANTS}")?;
     }
     for policy in &asked.policies {
-        section(&mut text, journal, &asked, policy)?;
+        section(&mut text, journal, asked, policy)?;
     }
     Ok(text)
 }

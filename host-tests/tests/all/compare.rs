@@ -57,6 +57,9 @@ fn a_comparison_is_made_once_and_says_what_cannot_be_made() -> Result<()> {
         ensure!(report.contains(words), "{words:?} is not in\n{report}");
     }
 
+    let picture = fs::read_to_string(folder.join("compare.svg"))?;
+    ensure!(picture.contains("ur3: success over bits per weight (f32: 100%)"), "{picture}");
+
     // The seconds in it would be others.
     let journal = fs::read_to_string(folder.join("compare.jsonl"))?;
     run(&plan)?;
