@@ -53,7 +53,7 @@ impl Simulator {
                 Self::Missing(format!("{} is missing", folder.join("evaluate.py").display()))
             }
             None => Self::Missing(format!("{variable} is not set, which names the Python with its simulator")),
-            Some(python) => Self::MuJoCo { python: python.into(), folder, task: policy.to_owned() },
+            Some(python) => Self::MuJoCo { python: program(python.into()), folder, task: policy.to_owned() },
         }
     }
 
@@ -82,6 +82,12 @@ impl Simulator {
             Self::Missing(_) => Ok(None),
         }
     }
+}
+
+/// A program as it is called from another folder: a path is made absolute, a name is looked for as a shell does. Links stay, by which
+/// the Python of a virtual environment knows where it is.
+fn program(name: PathBuf) -> PathBuf {
+    if name.components().count() > 1 { std::path::absolute(&name).unwrap_or(name) } else { name }
 }
 
 fn ur3(driver: &Driver, episodes: Episodes) -> Result<DriveOutcome> {
