@@ -1,4 +1,4 @@
-//! The command `actq` as tests call it.
+//! The command `actq` as tests and measurements call it.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -11,25 +11,27 @@ use crate::firmware::cargo_build;
 
 /// The command `actq`; built once, since cargo does not build the binaries of a dependency, in the profile of this build and
 /// beside it.
-fn binary() -> &'static Path {
+pub fn binary() -> Result<&'static Path> {
     static BINARY: OnceLock<PathBuf> = OnceLock::new();
-    BINARY.get_or_init(|| {
-        // A test is in the folder deps of the profile's.
-        let test = std::env::current_exe().expect("the test has a path");
-        let folder = test.ancestors().nth(2).expect("the test is in a folder of its profile");
-        let profile = folder.file_name().and_then(|name| name.to_str()).expect("a profile's name is text");
-        let profile = if profile == "debug" { "dev" } else { profile };
-        // With this package, for the features that the tests were built with: else cargo would build the quantizer once more.
-        let packages = ["--package", "actq", "--package", env!("CARGO_PKG_NAME")];
-        let command = [&packages[..], &["--bin", "actq", "--profile", profile]].concat();
-        cargo_build("actq", &command, &[]).expect("actq builds");
-        folder.join(format!("actq{}", std::env::consts::EXE_SUFFIX))
-    })
+    if let Some(path) = BINARY.get() {
+        return Ok(path);
+    }
+    let program = std::env::current_exe().context("the path of this program is not known")?;
+    let folder = program.parent().context("this program is in no folder")?;
+    // A test is in the folder deps of its profile's.
+    let folder = if folder.ends_with("deps") { folder.parent().unwrap_or(folder) } else { folder };
+    let profile = folder.file_name().and_then(|name| name.to_str()).context("a profile's name is text")?;
+    let profile = if profile == "debug" { "dev" } else { profile };
+    // With this package, for the features that the tests were built with: else cargo would build the quantizer once more.
+    let packages = ["--package", "actq", "--package", env!("CARGO_PKG_NAME")];
+    let command = [&packages[..], &["--bin", "actq", "--profile", profile]].concat();
+    cargo_build("actq", &command, &[])?;
+    Ok(BINARY.get_or_init(|| folder.join(format!("actq{}", std::env::consts::EXE_SUFFIX))))
 }
 
 /// The actq command with arguments.
 pub fn actq(arguments: &[&str]) -> Command {
-    let mut command = Command::new(binary());
+    let mut command = Command::new(binary().expect("actq builds"));
     command.args(arguments);
     command
 }

@@ -1,12 +1,15 @@
 //! What the tests and the measuring commands share: the firmware, built and under QEMU, counted instructions and modelled cycles,
-//! golden kernel cases, drawn networks, the command `actq`.
+//! golden kernel cases, drawn networks, the command `actq`, closed loops, the comparison of methods, llama.cpp's K-quants.
 #![forbid(unsafe_code)]
 
+pub mod closed_loop;
 pub mod command;
+pub mod compare;
 pub mod cycles;
 pub mod evaluation;
 pub mod firmware;
 pub mod golden;
+pub mod kquants;
 pub mod networks;
 pub mod profile;
 pub mod qemu;

@@ -1,6 +1,9 @@
-//! Text from files, as it may be shown on a terminal.
+//! Text from files, as it may be shown on a terminal, and as a shell reads it.
 
 use std::borrow::Cow;
+use std::ffi::OsStr;
+
+use anyhow::{Context as _, Result};
 
 /// Whether a character does something to a terminal, or to the order in which the text around it is shown, instead of being
 /// shown itself.
@@ -15,6 +18,16 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     }
     let escaped = |c: char| -> String { if is_control(c) { c.escape_default().collect() } else { c.into() } };
     text.chars().map(escaped).collect::<String>().into()
+}
+
+/// A word as a POSIX shell and Python's `shlex.split` read it.
+pub fn quoted(word: &OsStr) -> Result<String> {
+    let text = word.to_str().with_context(|| format!("{}: the path is not UTF-8", word.to_string_lossy()))?;
+    let plain = |c: char| c.is_ascii_alphanumeric() || "@%+=:,./_-".contains(c);
+    if !text.is_empty() && text.chars().all(plain) {
+        return Ok(text.to_owned());
+    }
+    Ok(format!("'{}'", text.replace('\'', "'\"'\"'")))
 }
 
 #[cfg(test)]

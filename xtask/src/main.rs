@@ -1,5 +1,5 @@
 //! What people and CI type: `cargo demo`, `cargo verify`, `cargo xtask bench`, `cargo xtask budgets`, `cargo xtask fit`,
-//! `cargo xtask doctor`.
+//! `cargo xtask compare`, `cargo xtask doctor`.
 //!
 //! This crate depends on next to nothing, so that it is built and speaks at once. What measures is the binary of `actq-bench`.
 #![forbid(unsafe_code)]
@@ -19,11 +19,12 @@ Commands of the actq workspace. Usage: cargo xtask COMMAND
   demo     Quantize the UR3 policy, run it on a Cortex-M4 in QEMU in closed loop, and show what it costs and gives
   bench    Count the instructions of kernels and whole heads on a Cortex-M4 in QEMU and model their cycles
   budgets  Measure instructions, code, scratch and stack, and compare them with budgets.json
+  compare  Compare the quantizer's methods: held-out error, true bits, closed-loop success
   fit      Measure the cost model's rates anew (after every change of the kernels)
   verify   Everything that CI checks: format, lints, documentation, tests on the host and under QEMU, budgets
   doctor   Check and install what the other commands need: Rust targets and QEMU
 
-The first four show their options with --help.";
+The first five show their options with --help.";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -31,6 +32,7 @@ fn main() -> ExitCode {
     let outcome = match &words[..] {
         ["verify"] => verify::run(),
         ["doctor"] => setup::ensure(&Target::ALL).map(|()| println!("all there")),
+        ["compare", ..] => measuring(&words),
         ["demo" | "bench" | "budgets" | "fit", ..] => measure(&words),
         ["help" | "-h" | "--help"] => {
             println!("{USAGE}");
@@ -50,10 +52,15 @@ fn main() -> ExitCode {
     }
 }
 
-/// A command of `actq-bench`.
+/// A command of `actq-bench` that needs QEMU.
 fn measure(arguments: &[&str]) -> Result<()> {
     println!("{}: on the Cortex-M4 in QEMU", arguments[0]);
     setup::ensure(&[Target::Fpu])?;
+    measuring(arguments)
+}
+
+/// A command of `actq-bench`.
+fn measuring(arguments: &[&str]) -> Result<()> {
     let mut command = cargo();
     command.args(["run", "--profile", "host", "--package", "actq-bench", "--"]).args(arguments);
     println!("building what quantizes and measures");

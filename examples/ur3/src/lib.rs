@@ -18,6 +18,7 @@ pub mod pipe;
 pub mod policy_f32;
 pub mod random;
 pub mod servo;
+pub mod summary;
 pub mod task;
 
 use std::path::Path;

@@ -3,6 +3,7 @@
 mod arrows;
 mod best;
 mod cli;
+mod compare;
 mod cost;
 mod counting;
 mod digests;

@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::size::bits_per_weight;
 use super::unrounded::Unrounded;
 use crate::data::{Dataset, Recording, Sizes};
+use crate::graph::{Evaluator, Graph};
 use crate::policy::Policy;
 use crate::runtime::with_head;
 
@@ -38,6 +39,12 @@ pub fn evaluate(image: Image<'_>, dataset: &Dataset) -> Result<ErrorReport> {
     with_head(image, |head| compare(&image, dataset, head))
 }
 
+/// The NMSE of a network in f32 over `dataset`, as [`ErrorReport::nmse`] is that of an image.
+pub fn network_nmse(graph: &Graph, dataset: &Dataset) -> Result<f64> {
+    let mut network = Plain { evaluator: Evaluator::new(graph), output: Vec::new() };
+    Ok(differences(graph.len_of(graph.output()), dataset, &mut network)?.nmse)
+}
+
 /// What rounding the activations adds to an image's error.
 #[derive(Clone, Debug)]
 pub struct ActivationShare {
@@ -62,19 +69,15 @@ pub fn activation_share(image: Image<'_>, dataset: &Dataset, nmse: f64) -> Resul
 
 /// What gives raw outputs, step by step.
 trait Runner {
-    /// Starts an episode from the zero state.
-    fn reset(&mut self);
-    fn state_mut(&mut self) -> &mut [f32];
+    /// Starts an episode from a state, or from the zero state.
+    fn start(&mut self, state: Option<&[f32]>);
     fn infer(&mut self, observation: &[f32]) -> Result<&[f32]>;
 }
 
 impl Runner for Head<'_, '_> {
-    fn reset(&mut self) {
-        Head::reset(self);
-    }
-
-    fn state_mut(&mut self) -> &mut [f32] {
-        Head::state_mut(self)
+    fn start(&mut self, state: Option<&[f32]>) {
+        self.reset();
+        self.state_mut().iter_mut().zip(state.unwrap_or_default()).for_each(|(to, from)| *to = *from);
     }
 
     fn infer(&mut self, observation: &[f32]) -> Result<&[f32]> {
@@ -83,12 +86,9 @@ impl Runner for Head<'_, '_> {
 }
 
 impl Runner for Unrounded<'_> {
-    fn reset(&mut self) {
-        Unrounded::state_mut(self).fill(0.0);
-    }
-
-    fn state_mut(&mut self) -> &mut [f32] {
-        Unrounded::state_mut(self)
+    fn start(&mut self, state: Option<&[f32]>) {
+        self.state_mut().fill(0.0);
+        self.state_mut().iter_mut().zip(state.unwrap_or_default()).for_each(|(to, from)| *to = *from);
     }
 
     fn infer(&mut self, observation: &[f32]) -> Result<&[f32]> {
@@ -96,15 +96,43 @@ impl Runner for Unrounded<'_> {
     }
 }
 
+/// A network in f32.
+struct Plain<'g> {
+    evaluator: Evaluator<'g>,
+    output: Vec<f32>,
+}
+
+impl Runner for Plain<'_> {
+    fn start(&mut self, state: Option<&[f32]>) {
+        self.evaluator.start(state);
+    }
+
+    fn infer(&mut self, observation: &[f32]) -> Result<&[f32]> {
+        self.output = self.evaluator.step(observation, &mut |_, _| {});
+        Ok(&self.output)
+    }
+}
+
 fn compare(image: &Image<'_>, dataset: &Dataset, network: &mut impl Runner) -> Result<ErrorReport> {
-    let out_len = image.output().len;
+    let Differences { nmse, worst_nmse, worst_dimension, max_abs } = differences(image.output().len, dataset, network)?;
+    let (steps, bpw, bytes) = (dataset.frames(), bits_per_weight(image), image.bytes());
+    Ok(ErrorReport { nmse, worst_nmse, max_abs, steps, bpw, bytes, worst_dimension })
+}
+
+/// Of a network's outputs to the recorded ones; see [`ErrorReport`].
+struct Differences {
+    nmse: f64,
+    worst_nmse: f64,
+    worst_dimension: usize,
+    max_abs: f64,
+}
+
+fn differences(out_len: usize, dataset: &Dataset, network: &mut impl Runner) -> Result<Differences> {
     let mut error = vec![Moment::default(); out_len];
     let mut signal = vec![Moment::default(); out_len];
     let mut max_abs = 0f64;
     for episode in 0..dataset.length.len() {
-        network.reset();
-        let start = dataset.start(episode).unwrap_or_default();
-        network.state_mut().iter_mut().zip(start).for_each(|(to, from)| *to = from);
+        network.start(dataset.start(episode).as_deref());
         for (step, obs) in dataset.episode(episode).enumerate() {
             let at = || format!("{}: episode {episode}, step {step}", dataset.path.display());
             let out = network.infer(&obs).with_context(at)?;
@@ -123,15 +151,8 @@ fn compare(image: &Image<'_>, dataset: &Dataset, network: &mut impl Runner) -> R
         .collect();
     ensure!(!ratios.is_empty(), "{}: the recorded actions never vary", dataset.path.display());
     let (worst_dimension, worst_nmse) = ratios.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default();
-    Ok(ErrorReport {
-        nmse: ratios.iter().map(|r| r.1).sum::<f64>() / ratios.len() as f64,
-        worst_nmse,
-        max_abs,
-        steps: dataset.frames(),
-        bpw: bits_per_weight(image),
-        bytes: image.bytes(),
-        worst_dimension,
-    })
+    let nmse = ratios.iter().map(|r| r.1).sum::<f64>() / ratios.len() as f64;
+    Ok(Differences { nmse, worst_nmse, worst_dimension, max_abs })
 }
 
 /// The held-out recording of a policy folder, which must belong to `image`.

@@ -55,6 +55,11 @@ impl ActionStatistics {
         let scores: Vec<f64> = self.scores.iter().map(|s| s.sens().max(0.0)).collect();
         if scores.iter().all(|s| *s == 0.0) { (vec![1.0; scores.len()], true) } else { (scores, false) }
     }
+
+    /// What the fits of scales weigh every weight by, per matrix: its importance and a little more.
+    pub fn weight_importance(&self) -> Vec<Vec<f64>> {
+        self.importance.iter().map(weight_importance).collect()
+    }
 }
 
 /// Quantizes every matrix of `graph`.
@@ -77,10 +82,14 @@ pub fn quantize(graph: &Graph, statistics: &ActionStatistics, rate: Rate, option
 
 /// Rounds to nearest with scales that minimise `sum of importance * error^2` of each group, or of each row.
 fn quantize_matrix(matrix: &WeightMatrix, width: Width, group: usize, importance: &Array2<f32>) -> Quantized {
+    let importance = weight_importance(importance);
+    round_to(matrix, width, Scales::fit(matrix, &vec![Some(width); matrix.rows], group, &importance))
+}
+
+fn weight_importance(importance: &Array2<f32>) -> Vec<f64> {
     let mean = importance.iter().map(|&i| f64::from(i)).sum::<f64>() / importance.len().max(1) as f64;
     let least = if mean > 0.0 { FLOOR * mean } else { 1.0 };
-    let importance: Vec<f64> = importance.iter().map(|&i| f64::from(i) + least).collect();
-    round_to(matrix, width, Scales::fit(matrix, &vec![Some(width); matrix.rows], group, &importance))
+    importance.iter().map(|&i| f64::from(i) + least).collect()
 }
 
 #[cfg(test)]

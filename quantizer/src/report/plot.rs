@@ -1,4 +1,5 @@
-//! Pictures as SVG: the parts that all of them share, and a line plot with a logarithmic vertical axis.
+//! Pictures as SVG: the parts that all of them share, and a line plot whose vertical axis is
+//! logarithmic or in percent.
 //!
 //! They are drawn by hand after a trial of plotters 0.3.7 with its SVG backend alone. Its three crates would be no burden, but its
 //! backends take whole pixels: a layer of 1,024 rows leaves 0.6 of one for each in the strip of [`super::widths`], so that rows
@@ -54,7 +55,7 @@ pub(crate) fn decade_label(decade: i32) -> String {
 pub struct Series {
     /// Its name in the legend.
     pub name: String,
-    /// Points (x, y) in the order in which they are joined; y above 0.
+    /// Points (x, y) in the order in which they are joined.
     pub points: Vec<(f64, f64)>,
 }
 
@@ -67,6 +68,15 @@ pub struct Mark {
     pub label: String,
 }
 
+/// What the vertical axis is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Vertical {
+    /// Decades around the points, which are above 0.
+    Decades,
+    /// From 0 to 100.
+    Percent,
+}
+
 /// What is drawn.
 #[derive(Clone, Debug)]
 pub struct Plot {
@@ -76,6 +86,8 @@ pub struct Plot {
     pub x_label: String,
     /// Beside the vertical axis.
     pub y_label: String,
+    /// What the vertical axis is.
+    pub vertical: Vertical,
     /// The lines.
     pub series: Vec<Series>,
     /// A point to be ringed.
@@ -85,12 +97,13 @@ pub struct Plot {
 /// The ranges of both axes.
 struct Axes {
     x: (f64, f64),
-    /// Decades.
+    /// Decades, or percent.
     y: (i32, i32),
+    vertical: Vertical,
 }
 
 impl Axes {
-    fn around(series: &[Series]) -> Self {
+    fn around(series: &[Series], vertical: Vertical) -> Self {
         let points = || series.iter().flat_map(|s| &s.points);
         let range = |values: &mut dyn Iterator<Item = f64>| {
             values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
@@ -101,8 +114,13 @@ impl Axes {
         }
         let step = tick_step(x.1 - x.0);
         // Some air, or the outermost markers would sit on the frame.
+        let x = (x.0 - 0.5 * step, x.1 + 0.5 * step);
         let y = ((y.0 - 0.08).floor() as i32, (y.1 + 0.08).ceil() as i32);
-        Self { x: (x.0 - 0.5 * step, x.1 + 0.5 * step), y: (y.0, y.1.max(y.0 + 1)) }
+        let y = match vertical {
+            Vertical::Decades => (y.0, y.1.max(y.0 + 1)),
+            Vertical::Percent => (0, 100),
+        };
+        Self { x, y, vertical }
     }
 
     fn x(&self, value: f64) -> f64 {
@@ -110,7 +128,11 @@ impl Axes {
     }
 
     fn y(&self, value: f64) -> f64 {
-        let share = (value.log10() - f64::from(self.y.0)) / f64::from(self.y.1 - self.y.0);
+        let value = match self.vertical {
+            Vertical::Decades => value.log10(),
+            Vertical::Percent => value,
+        };
+        let share = (value - f64::from(self.y.0)) / f64::from(self.y.1 - self.y.0);
         HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * share
     }
 }
@@ -145,7 +167,7 @@ impl Plot {
     }
 
     fn write(&self, svg: &mut String) -> std::fmt::Result {
-        let axes = &Axes::around(&self.series);
+        let axes = &Axes::around(&self.series, self.vertical);
         let middle = 0.5 * (LEFT + WIDTH - RIGHT);
         text(svg, middle, 30.0, r#"text-anchor="middle" font-size="17" font-weight="bold""#, &self.title)?;
         text(svg, middle, HEIGHT - 18.0, r#"text-anchor="middle" font-size="14""#, &self.x_label)?;
@@ -190,14 +212,23 @@ impl Plot {
 
 fn grid(svg: &mut String, axes: &Axes) -> std::fmt::Result {
     let (right, bottom) = (WIDTH - RIGHT, HEIGHT - BOTTOM);
-    for decade in axes.y.0..=axes.y.1 {
-        let y = axes.y(10f64.powi(decade));
+    let strong = |svg: &mut String, y: f64, label: &str| {
         writeln!(svg, r##"<path d="M{LEFT} {y:.1}H{right}" stroke="#d0d0d0"/>"##)?;
-        text(svg, LEFT - 10.0, y + 4.5, r#"text-anchor="end""#, &decade_label(decade))?;
-        if decade < axes.y.1 {
-            for digit in 2..10 {
-                let y = axes.y(f64::from(digit) * 10f64.powi(decade));
-                writeln!(svg, r##"<path d="M{LEFT} {y:.1}H{right}" stroke="#f0f0f0"/>"##)?;
+        text(svg, LEFT - 10.0, y + 4.5, r#"text-anchor="end""#, label)
+    };
+    match axes.vertical {
+        Vertical::Percent => {
+            for percent in (axes.y.0..=axes.y.1).step_by(20) {
+                strong(svg, axes.y(f64::from(percent)), &percent.to_string())?;
+            }
+        }
+        Vertical::Decades => {
+            for decade in axes.y.0..=axes.y.1 {
+                strong(svg, axes.y(10f64.powi(decade)), &decade_label(decade))?;
+                for digit in (2..10).filter(|_| decade < axes.y.1) {
+                    let y = axes.y(f64::from(digit) * 10f64.powi(decade));
+                    writeln!(svg, r##"<path d="M{LEFT} {y:.1}H{right}" stroke="#f0f0f0"/>"##)?;
+                }
             }
         }
     }
@@ -256,7 +287,14 @@ mod tests {
     use super::*;
 
     fn plot(series: Vec<Series>) -> Plot {
-        Plot { title: "a < b & c".into(), x_label: "x".into(), y_label: "y".into(), series, mark: None }
+        Plot {
+            title: "a < b & c".into(),
+            x_label: "x".into(),
+            y_label: "y".into(),
+            vertical: Vertical::Decades,
+            series,
+            mark: None,
+        }
     }
 
     #[test]
@@ -268,7 +306,7 @@ mod tests {
         assert!(svg.contains("a &lt; b &amp; c"));
         // Three points and a ring, and both in the legend.
         assert_eq!(svg.matches("<circle").count(), 6);
-        let axes = Axes::around(&plot.series);
+        let axes = Axes::around(&plot.series, plot.vertical);
         for (x, y) in points {
             assert!((LEFT..WIDTH - RIGHT).contains(&axes.x(x)) && (TOP..=HEIGHT - BOTTOM).contains(&axes.y(y)));
         }
@@ -281,6 +319,18 @@ mod tests {
             let svg = plot(vec![Series { name: "s".into(), points }]).svg();
             assert!(svg.ends_with("</svg>\n") && !svg.contains("NaN") && !svg.contains("inf"), "{svg}");
         }
+    }
+
+    #[test]
+    fn percent_go_from_0_to_100() {
+        let plot = Plot {
+            vertical: Vertical::Percent,
+            ..plot(vec![Series { name: "s".into(), points: vec![(2.0, 0.0), (3.0, 100.0)] }])
+        };
+        let axes = Axes::around(&plot.series, plot.vertical);
+        assert_eq!((axes.y(0.0), axes.y(100.0)), (HEIGHT - BOTTOM, TOP));
+        let svg = plot.svg();
+        assert!(svg.contains(">20</text>") && svg.contains(">100</text>") && !svg.contains("NaN"), "{svg}");
     }
 
     #[test]

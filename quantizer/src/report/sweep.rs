@@ -2,7 +2,7 @@
 
 use comfy_table::Table;
 
-use super::plot::{Mark, Plot, Series, stacked};
+use super::plot::{Mark, Plot, Series, Vertical, stacked};
 use super::table;
 use crate::pipeline::sweep::{Curve, Point, Sweep, line};
 
@@ -12,6 +12,7 @@ fn plot(sweep: &Sweep) -> Plot {
         title: format!("{}: action error over bits per weight", sweep.policy),
         x_label: "bits per weight, everything counted".to_owned(),
         y_label: "NMSE of the actions, held-out observations".to_owned(),
+        vertical: Vertical::Decades,
         series: sweep.curves.iter().map(series).collect(),
         mark: sweep.knee.as_ref().map(|knee| Mark {
             at: (knee.bpw, knee.nmse),

@@ -12,9 +12,10 @@ use actq::pipeline::Quantizer;
 use actq::policy::Policy;
 use actq::report::table::table;
 use actq::runtime::{ImageBuffer, with_head};
+use actq_bench::closed_loop::{episode, episode_on_host};
 use actq_bench::qemu::{self, Counter, Server};
 use actq_bench::{Target, evaluation, firmware, ur3};
-use actq_kernels::{Head, Image, Width};
+use actq_kernels::{Image, Width};
 use actq_ur3::policy_f32::PolicyF32;
 use actq_ur3::task::{Outcome, run_episode};
 use anyhow::{Context, Result, ensure};
@@ -133,26 +134,6 @@ pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
 
 fn closed_loop(episodes: u64, mut episode: impl FnMut(u64) -> Result<Outcome>) -> Result<Vec<Outcome>> {
     (FIRST_SEED..FIRST_SEED + episodes).map(&mut episode).collect()
-}
-
-/// One episode with a fallible policy; its first error ends up here.
-fn episode(seed: u64, mut step: impl FnMut(&[f32]) -> Result<[f32; 6]>) -> Result<Outcome> {
-    let mut failure = None;
-    let outcome = run_episode(seed, |obs| {
-        if failure.is_some() {
-            return [0.0; 6];
-        }
-        step(obs).unwrap_or_else(|error| {
-            failure = Some(error);
-            [0.0; 6]
-        })
-    });
-    failure.map_or(Ok(outcome), Err)
-}
-
-fn episode_on_host(head: &mut Head<'_, '_>, seed: u64) -> Result<Outcome> {
-    head.reset();
-    episode(seed, |obs| Ok(head.step(obs)?.try_into()?))
 }
 
 fn success(outcomes: &[Outcome]) -> String {

@@ -1,5 +1,5 @@
-//! The commands that measure: `cargo demo`, `cargo xtask bench`, `cargo xtask budgets`, `cargo xtask fit`. xtask installs what they
-//! need, builds this binary and runs it.
+//! The commands that measure: `cargo demo`, `cargo xtask bench`, `cargo xtask budgets`, `cargo xtask fit`,
+//! `cargo xtask compare`. xtask installs what they need, builds this binary and runs it.
 #![forbid(unsafe_code)]
 
 mod bench;
@@ -12,9 +12,10 @@ mod kernels;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use actq_bench::compare::{self, Plan};
 use clap::{Parser, Subcommand};
 
-/// What the runtime costs on a Cortex-M4 in QEMU.
+/// What the runtime costs on a Cortex-M4 in QEMU, and what the quantizer gives.
 #[derive(Parser)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask", max_term_width = 100)]
 struct Cli {
@@ -55,6 +56,12 @@ enum Command {
     },
     /// Measure the cost model's rates anew (after every change of the kernels)
     Fit,
+    /// Compare the methods at equal budgets: held-out error, true bits, closed-loop success
+    ///
+    /// The policies are that of the UR3 and, where ACTQ_SHARED names their folder, the shared ones. Their tasks run in MuJoCo with
+    /// the Python of ACTQ_MUJOCO_PYTHON (go1_*, g1_*) and ACTQ_GYMNASIUM_PYTHON (fetch_*). Every result stands in DIR/compare.jsonl
+    /// at once: the same command goes on where it was ended. The report is DIR/compare.md.
+    Compare(Plan),
 }
 
 fn main() -> ExitCode {
@@ -63,6 +70,7 @@ fn main() -> ExitCode {
         Command::Bench { json, wait_states, by_function } => bench::run(json.as_deref(), wait_states, by_function),
         Command::Budgets { update } => budgets::run(update),
         Command::Fit => fit::run(),
+        Command::Compare(plan) => compare::run(&plan),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,6 +1,5 @@
 //! A command that drives an image: a simulator or a robot that takes its actions from `actq serve`.
 
-use std::ffi::OsStr;
 use std::io::{self, BufRead as _, BufReader, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -12,6 +11,7 @@ use actq::emit::files;
 use actq::pipeline::driven::{DriveOutcome, Driven};
 use actq::policy::Policy;
 use actq::serve::wait_for_recorders;
+use actq::text::quoted;
 use anyhow::{Context as _, Result, ensure};
 
 use crate::note;
@@ -91,14 +91,4 @@ impl<'a> Drive<'a> {
         }
         Ok(Driven { recordings, outcome: outcome.unwrap_or_default() })
     }
-}
-
-/// A word as a POSIX shell and Python's `shlex.split` read it.
-fn quoted(word: &OsStr) -> Result<String> {
-    let text = word.to_str().with_context(|| format!("{}: the path is not UTF-8", word.to_string_lossy()))?;
-    let plain = |c: char| c.is_ascii_alphanumeric() || "@%+=:,./_-".contains(c);
-    if !text.is_empty() && text.chars().all(plain) {
-        return Ok(text.to_owned());
-    }
-    Ok(format!("'{}'", text.replace('\'', "'\"'\"'")))
 }

@@ -13,9 +13,9 @@ fn bytes(matrix: &WeightMatrix, width: Width, packing: Packing) -> usize {
     block_bytes(packing.shape(width, matrix.rows, matrix.cols), false)
 }
 
-/// The error that a matrix of this score is taken to make at this width: `score * 2^(-2 bits)`.
-fn noise(score: f64, width: Width) -> f64 {
-    score * (-2.0 * f64::from(width.bits())).exp2()
+/// The error that a matrix of this score is taken to make with codes of so many bits: `score * 2^(-2 bits)`.
+fn noise(score: f64, bits: u32) -> f64 {
+    score * (-2.0 * f64::from(bits)).exp2()
 }
 
 /// The layer of every matrix: the node that uses it first, so that both matrices of an LSTM or GRU are one layer.
@@ -29,27 +29,44 @@ pub fn layers(graph: &Graph) -> Vec<usize> {
     layers
 }
 
-/// A width per matrix that keeps the sum over layers of `E_l^2` low, `E_l` being the sum over the layer's matrices of
-/// `score * 2^(-2 bits)`, within `limit` bytes.
-///
-/// Greedy, as in the paper: from the narrowest width on, always the upgrade with the largest fall of `E_l^2` per byte among
-/// those that fit. Among equals the narrowest matrix goes first, so that what the scores leave over is spread.
+/// A width per matrix within `limit` bytes: see [`spend`].
 ///
 /// # Errors
 ///
 /// [`BudgetTooSmall`] if the narrowest widths take more.
 pub fn allocate(graph: &Graph, scores: &[f64], packing: Packing, limit: f64) -> Result<Vec<Width>> {
+    let size = |m: usize, choice: usize| bytes(&graph.matrices[m], Width::ALL[choice], packing);
+    let chosen = spend(graph, scores, &Width::ALL.map(Width::bits), size, limit)?;
+    Ok(chosen.into_iter().map(|choice| Width::ALL[choice]).collect())
+}
+
+/// A format per matrix that keeps the sum over layers of `E_l^2` low, `E_l` being the sum over the layer's matrices of
+/// `score * 2^(-2 bits)`, within `limit` bytes. The formats have codes of `bits` bits, from few to many; `size` gives the bytes of a
+/// matrix in one of them.
+///
+/// Greedy, as in the paper: from the narrowest format on, always the upgrade with the largest fall of `E_l^2` per byte among
+/// those that fit. Among equals the narrowest matrix goes first, so that what the scores leave over is spread.
+///
+/// # Errors
+///
+/// [`BudgetTooSmall`] if the narrowest formats take more.
+pub fn spend(
+    graph: &Graph,
+    scores: &[f64],
+    bits: &[u32],
+    size: impl Fn(usize, usize) -> usize,
+    limit: f64,
+) -> Result<Vec<usize>> {
     let layers = layers(graph);
     let mut chosen = vec![0; graph.matrices.len()];
-    let size = |m: usize, choice: usize| bytes(&graph.matrices[m], Width::ALL[choice], packing);
     let mut used: usize = (0..chosen.len()).map(|m| size(m, 0)).sum();
     ensure!(used as f64 <= limit, BudgetTooSmall { bytes: used, limit, weights: graph.weights() });
     loop {
         let layer_error = |layer: usize| -> f64 {
-            (0..chosen.len()).filter(|&m| layers[m] == layer).map(|m| noise(scores[m], Width::ALL[chosen[m]])).sum()
+            (0..chosen.len()).filter(|&m| layers[m] == layer).map(|m| noise(scores[m], bits[chosen[m]])).sum()
         };
         let upgrade = |m: usize| {
-            let (now, next) = (Width::ALL[chosen[m]], *Width::ALL.get(chosen[m] + 1)?);
+            let (now, next) = (bits[chosen[m]], *bits.get(chosen[m] + 1)?);
             let more = size(m, chosen[m] + 1) - size(m, chosen[m]);
             let before = layer_error(layers[m]);
             let after = before - noise(scores[m], now) + noise(scores[m], next);
@@ -63,7 +80,7 @@ pub fn allocate(graph: &Graph, scores: &[f64], packing: Packing, limit: f64) -> 
         chosen[m] += 1;
         used += more;
     }
-    Ok(chosen.into_iter().map(|choice| Width::ALL[choice]).collect())
+    Ok(chosen)
 }
 
 #[cfg(test)]
@@ -100,7 +117,7 @@ mod tests {
     fn greedy_is_the_best_for_separate_layers_of_equal_size() {
         let graph = chain(4);
         let error = |scores: &[f64], widths: &[Width]| -> f64 {
-            scores.iter().zip(widths).map(|(s, w)| noise(*s, *w).powi(2)).sum()
+            scores.iter().zip(widths).map(|(s, w)| noise(*s, w.bits()).powi(2)).sum()
         };
         for scores in [[1.0, 0.5, 0.25, 0.1], [3.0, 3.0, 1e-3, 0.0], [1.0, 1.1, 1.2, 40.0]] {
             for bpw in [2.6, 2.9, 3.1, 3.4, 3.9, 5.0, 9.0] {

@@ -1,0 +1,196 @@
+//! Making the image of a cell.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::Instant;
+
+use actq::budget::{Budget, BudgetTooSmall};
+use actq::data::{Dataset, Recording, Recordings};
+use actq::graph::Graph;
+use actq::measure::eval;
+use actq::methods::{Method, Options};
+use actq::pipeline::Quantizer;
+use actq::policy::Policy;
+use actq_kernels::layout::GROUPS;
+use anyhow::{Context as _, Result};
+
+use super::actquant_k;
+use super::cell::Made;
+use super::plan::{Contender, Plan};
+use crate::kquants::Format;
+
+/// A policy as the methods take it.
+pub(super) struct Subject {
+    policy: Policy,
+    recordings: Recordings,
+}
+
+/// What became of a cell.
+pub(super) enum Attempt {
+    /// An image, and its figures.
+    Made(Vec<u8>, Made),
+    /// A network without an image, and its figures.
+    Simulated(Graph, Made),
+    /// None, and why.
+    Impossible(String),
+}
+
+impl Subject {
+    pub(super) fn load(folder: &Path) -> Result<Self> {
+        let policy = Policy::load(folder)?;
+        let mut recordings = Recordings::load(&policy)?;
+        let heldout = recordings.heldout.as_mut().with_context(|| Recording::Heldout.missing("a comparison"))?;
+        if heldout.action.is_none() {
+            heldout.fill_actions(&policy.graph);
+        }
+        Ok(Self { policy, recordings })
+    }
+
+    fn heldout(&self) -> Result<&Dataset> {
+        self.recordings.heldout.as_ref().with_context(|| Recording::Heldout.missing("a comparison"))
+    }
+}
+
+/// The methods made ready for a policy, each when it is first asked for.
+pub(super) struct Maker<'a> {
+    subject: &'a Subject,
+    plan: &'a Plan,
+    ready: BTreeMap<String, (Quantizer<'a>, f64)>,
+}
+
+impl<'a> Maker<'a> {
+    pub(super) fn new(subject: &'a Subject, plan: &'a Plan) -> Self {
+        Self { subject, plan, ready: BTreeMap::new() }
+    }
+
+    /// The policy.
+    pub(super) fn policy(&self) -> &Policy {
+        &self.subject.policy
+    }
+
+    /// Makes the image of a cell. `progress` gets what is being done and the share of it that is done.
+    ///
+    /// The method's default group counts. Only where it does not fit the budget, the others are tried, and of those that fit the one
+    /// with the lowest held-out error is taken: the choice on what errors are measured on is in the method's favour.
+    pub(super) fn make(
+        &mut self,
+        contender: Contender,
+        budget: f64,
+        mut progress: impl FnMut(&str, f64),
+    ) -> Result<Attempt> {
+        let method = contender.method();
+        let preparing = self.prepare(method, &mut progress)?;
+        if contender == Contender::ActQuantK {
+            return self.simulate(budget, preparing);
+        }
+        let default = method.default_group();
+        let first = self.with_group(contender, budget, default, preparing, &mut progress)?;
+        let too_small = match first {
+            Ok(made) => return Ok(made),
+            Err(too_small) => too_small,
+        };
+        let mut least_of_all = (too_small, default);
+        let mut best: Option<(Vec<u8>, Made)> = None;
+        for group in GROUPS.into_iter().chain([0]).filter(|group| *group != default) {
+            match self.with_group(contender, budget, group, preparing, &mut progress)? {
+                Ok(Attempt::Made(image, made)) if best.as_ref().is_none_or(|(_, best)| made.nmse < best.nmse) => {
+                    best = Some((image, made));
+                }
+                Ok(_) => {}
+                Err(too_small) if too_small.bytes < least_of_all.0.bytes => least_of_all = (too_small, group),
+                Err(_) => {}
+            }
+        }
+        Ok(match best {
+            Some((image, made)) => Attempt::Made(image, made),
+            None => {
+                let (too_small, group) = least_of_all;
+                Attempt::Impossible(least(&too_small, &scales(group)))
+            }
+        })
+    }
+
+    /// ActQuant in K-quants.
+    fn simulate(&self, budget: f64, preparing: f64) -> Result<Attempt> {
+        let begun = Instant::now();
+        let (quantizer, _) = self.ready.get(&Method::ActQuant.to_string()).context("the method was not made ready")?;
+        let statistics = quantizer.method().action_statistics().context("the method has no statistics")?;
+        let policy = &self.subject.policy;
+        let simulated = match actquant_k::quantize(&policy.graph, statistics, budget, self.subject.heldout()?) {
+            Ok(simulated) => simulated,
+            Err(error) => {
+                let too_small = error.downcast::<BudgetTooSmall>()?;
+                return Ok(Attempt::Impossible(least(&too_small, &format!("all matrices in {}", Format::ALL[0]))));
+            }
+        };
+        let seconds = preparing + begun.elapsed().as_secs_f64();
+        let (weights, parameters) = (policy.graph.weights(), policy.graph.parameters());
+        // Everything but the matrices stays in f32.
+        let bytes = simulated.bytes + 4 * (parameters - weights);
+        let made = Made {
+            nmse: simulated.nmse,
+            bpw: 8.0 * simulated.bytes as f64 / weights.max(1) as f64,
+            bytes,
+            bytes_per_parameter: bytes as f64 / parameters.max(1) as f64,
+            format: simulated.formats.iter().map(Format::to_string).collect::<Vec<_>>().join(" "),
+            default_group: true,
+            seconds,
+        };
+        Ok(Attempt::Simulated(simulated.graph, made))
+    }
+
+    /// Seconds that the statistics of a method take, which are collected once.
+    fn prepare(&mut self, method: Method, progress: &mut impl FnMut(&str, f64)) -> Result<f64> {
+        if let Some((_, seconds)) = self.ready.get(&method.to_string()) {
+            return Ok(*seconds);
+        }
+        let begun = Instant::now();
+        let Subject { policy, recordings } = self.subject;
+        let quantizer = Quantizer::new(policy, recordings, method, |share| progress("calibrating", share))?;
+        let seconds = begun.elapsed().as_secs_f64();
+        self.ready.insert(method.to_string(), (quantizer, seconds));
+        Ok(seconds)
+    }
+
+    fn with_group(
+        &self,
+        contender: Contender,
+        budget: f64,
+        group: usize,
+        preparing: f64,
+        progress: &mut impl FnMut(&str, f64),
+    ) -> Result<Result<Attempt, BudgetTooSmall>> {
+        let method = contender.method();
+        let steps = if contender == Contender::BestNotLearned { Some(0) } else { self.plan.steps };
+        let plain = Options::new(method, Budget::BitsPerWeight(budget));
+        let options = Options { group, steps, seed: self.plan.seed, ..plain };
+        let begun = Instant::now();
+        let (quantizer, _) = self.ready.get(&method.to_string()).context("the method was not made ready")?;
+        let quantized = match quantizer.quantize(&options, progress) {
+            Ok(quantized) => quantized,
+            Err(error) => return error.downcast::<BudgetTooSmall>().map(Err),
+        };
+        let seconds = preparing + begun.elapsed().as_secs_f64();
+        let report = eval::evaluate(quantized.buffer().image(Path::new("image in memory"))?, self.subject.heldout()?)?;
+        let made = Made {
+            nmse: report.nmse,
+            bpw: report.bpw,
+            bytes: report.bytes,
+            bytes_per_parameter: report.bytes as f64 / self.subject.policy.graph.parameters().max(1) as f64,
+            format: if group == 0 { "row".to_owned() } else { group.to_string() },
+            default_group: group == method.default_group(),
+            seconds,
+        };
+        Ok(Ok(Attempt::Made(quantized.image, made)))
+    }
+}
+
+/// Why a budget is too small.
+fn least(BudgetTooSmall { bytes, weights, .. }: &BudgetTooSmall, with: &str) -> String {
+    format!("the least is {:.3} bits per weight, {with}", 8.0 * *bytes as f64 / (*weights).max(1) as f64)
+}
+
+/// A group for people.
+fn scales(group: usize) -> String {
+    if group == 0 { "with one scale a row".to_owned() } else { format!("with groups of {group}") }
+}

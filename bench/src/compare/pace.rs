@@ -1,0 +1,54 @@
+//! How long is left.
+
+use super::cell::{Cell, CellKey};
+
+/// Seconds that `missing` cells take, as far as those that are done tell: each as long as its method took on its policy, or else
+/// on any, or else as the mean of all. Making and driving go on at the same time. `None` where nothing is done yet.
+pub(super) fn seconds_left(done: &[Cell], missing: &[CellKey]) -> Option<f64> {
+    let mean = |part: &dyn Fn(&Cell) -> Option<f64>, is_like: &dyn Fn(&CellKey) -> bool| -> Option<f64> {
+        let values: Vec<f64> = done.iter().filter(|cell| is_like(&cell.key)).filter_map(part).collect();
+        (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+    };
+    let expected = |part: &dyn Fn(&Cell) -> Option<f64>, key: &CellKey| {
+        mean(part, &|k| k.policy == key.policy && k.method == key.method)
+            .or_else(|| mean(part, &|k| k.method == key.method))
+            .or_else(|| mean(part, &|_| true))
+    };
+    let making = |cell: &Cell| Some(cell.made.as_ref().map_or(0.0, |made| made.seconds));
+    let driving = |cell: &Cell| cell.driven.as_ref().map(|_| cell.drive_seconds);
+    let made: f64 = missing.iter().filter_map(|key| expected(&making, key)).sum();
+    // How long driving takes depends on the policy, not on the method.
+    let drives = |key: &CellKey| mean(&driving, &|k| k.policy == key.policy).or_else(|| mean(&driving, &|_| true));
+    let driven: f64 = missing.iter().filter_map(drives).sum();
+    // A sum of nothing is -0.
+    (!done.is_empty()).then(|| made.max(driven) + 0.0)
+}
+
+/// A duration for people.
+pub(super) fn duration(seconds: f64) -> String {
+    match seconds {
+        ..90.0 => format!("{seconds:.0} s"),
+        ..5400.0 => format!("{:.0} min", seconds / 60.0),
+        _ => format!("{:.1} h", seconds / 3600.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::compare::plan::Contender;
+
+    #[test]
+    fn what_is_left_is_estimated_from_what_is_like_it() {
+        let key = |policy: &str, method| CellKey { policy: policy.into(), method: Some(method), budget: Some(2.0) };
+        let cell =
+            |key: CellKey, seconds| Cell { key, made: None, why: None, driven: Some(1.into()), drive_seconds: seconds };
+        assert!(seconds_left(&[], &[key("a", Contender::Rtn)]).is_none());
+        let done = [cell(key("a", Contender::Rtn), 10.0), cell(key("b", Contender::Rtn), 30.0)];
+        let left = |missing: &[CellKey]| seconds_left(&done, missing).expect("something is done");
+        assert_eq!(left(&[key("b", Contender::Best)]), 30.0);
+        assert_eq!(left(&[key("c", Contender::Best), key("a", Contender::Gptq)]), 30.0);
+        assert_eq!(left(&[]), 0.0);
+        assert_eq!([80.0, 600.0, 9000.0].map(duration), ["80 s", "10 min", "2.5 h"]);
+    }
+}

@@ -1,0 +1,112 @@
+//! What is compared.
+
+use std::path::PathBuf;
+
+use actq::methods::Method;
+use clap::{Args, ValueEnum};
+use serde::{Deserialize, Serialize};
+
+/// The name of the project's own policy.
+pub(super) const UR3: &str = "ur3";
+
+/// Every row but the f32 policy's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Contender {
+    /// Round to nearest
+    Rtn,
+    /// GPTQ: column-wise error feedback
+    Gptq,
+    /// ActQuant in the formats of this project
+    #[value(name = "actquant")]
+    #[serde(rename = "actquant")]
+    ActQuant,
+    /// ActQuant in llama.cpp's K-quants, as in its paper, simulated
+    #[value(name = "actquant-k")]
+    #[serde(rename = "actquant-k")]
+    ActQuantK,
+    /// best with --steps 0: not learned
+    #[value(name = "best-0")]
+    #[serde(rename = "best-0")]
+    BestNotLearned,
+    /// best
+    Best,
+}
+
+impl Contender {
+    /// The method of the quantizer behind it, or whose statistics it takes.
+    pub fn method(self) -> Method {
+        match self {
+            Self::Rtn => Method::Rtn,
+            Self::Gptq => Method::Gptq,
+            Self::ActQuant | Self::ActQuantK => Method::ActQuant,
+            Self::BestNotLearned | Self::Best => Method::Best,
+        }
+    }
+
+    /// As it stands on the command line.
+    pub fn name(self) -> String {
+        self.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
+    }
+
+    /// As it stands in the report.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Rtn => "rtn",
+            Self::Gptq => "gptq",
+            Self::ActQuant => "actquant",
+            Self::ActQuantK => "actquant, K-quants",
+            Self::BestNotLearned => "best, not learned",
+            Self::Best => "best",
+        }
+    }
+}
+
+/// Policies, methods, budgets, and on what they are measured.
+#[derive(Clone, Debug, Args, Serialize)]
+pub struct Plan {
+    /// Folders of policies under $ACTQ_SHARED/policies; ur3 is the project's own
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        default_value = "go1_mlp,g1_lstm256,g1_lstm64,fetch_pickplace,ur3"
+    )]
+    pub policies: Vec<String>,
+    /// Methods; best-0 is best with --steps 0, not learned
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        default_value = "rtn,gptq,actquant,actquant-k,best-0,best"
+    )]
+    pub methods: Vec<Contender>,
+    /// Bits per weight that are allowed, everything counted
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = bits, default_value = "1.5,2,2.3,2.5,3,4")]
+    pub budgets: Vec<f64>,
+    /// Closed-loop episodes of each cell
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000), default_value_t = 100)]
+    pub episodes: u64,
+    /// Seed of the first episode; those from 5000 on were never used while developing
+    #[arg(long, value_name = "S", value_parser = clap::value_parser!(u64).range(..=u64::from(u32::MAX)), default_value_t = 5000)]
+    pub seed0: u64,
+    /// Seed of the quantizer
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// The most steps of learning; as many as suit the network, if not given
+    #[arg(long, value_name = "N")]
+    pub steps: Option<usize>,
+    /// Folder of compare.jsonl, compare.md and the images; made where it is missing
+    #[arg(long, value_name = "DIR")]
+    #[serde(skip)]
+    pub out: PathBuf,
+    /// Run nothing: write compare.md anew from compare.jsonl
+    #[arg(long)]
+    #[serde(skip)]
+    pub report: bool,
+}
+
+fn bits(text: &str) -> Result<f64, String> {
+    let bits = text.trim().parse::<f64>().ok().filter(|bits| (0.1..=16.0).contains(bits));
+    bits.ok_or_else(|| format!("{text:?} is not a number of bits per weight from 0.1 to 16"))
+}

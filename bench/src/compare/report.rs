@@ -1,0 +1,288 @@
+//! The results for people.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use actq::emit::files;
+use actq::pipeline::driven::DriveOutcome;
+use actq::report::plot::{Plot, Series, Vertical, stacked};
+use anyhow::Result;
+use serde_json::Value;
+
+use super::cell::{Cell, CellKey, Made};
+use super::journal::{Header, Journal};
+use super::plan::Contender;
+
+/// How far the robot is from where it should be, by the name that the simulator gives it, with its unit.
+const TRACKING: [(&str, &str); 3] = [("tracking_error_mm", "mm"), ("err_lin", "m/s"), ("dist", "m")];
+
+/// The plots beside the report.
+const PICTURE: &str = "compare.svg";
+
+const READING: &str = "\
+Cells: error on the held-out recording (NMSE, mean over the outputs) · closed-loop success in percent of the episodes (95% interval, \
+Wilson). Every cell of a policy is driven over the same seeds. A column is a budget in bits per weight, scales, indexes and padding \
+counted; what each image really takes stands in the second table. `-`: not made, or not driven, and below why.";
+
+const STARRED: &str = "\
+`*`: the method's default group does not fit the budget; of those that do, the one with the lowest held-out error was taken, which is \
+in the method's favour.";
+
+const K_QUANTS: &str = "\
+actquant, K-quants: ActQuant in the block formats of its paper (llama.cpp's Q2_K, Q3_K, Q4_K and Q6_K at 2.625, 3.4375, 4.5 and 6.5625 \
+bits per weight), a format a matrix by its scores and allocation. Simulated in f32, in its favour: activations are not rounded, padding of \
+rows to 256 is not counted, and of its importance with and without llama.cpp's factor of the weights' magnitude the one with the lower \
+held-out error was taken. Its image bytes are those of its blocks and everything else in f32.";
+
+/// Writes the report beside the journal, and gives its path.
+pub(super) fn write(journal: &Journal, folder: &Path) -> Result<PathBuf> {
+    let asked = Asked::of(&journal.header)?;
+    let path = folder.join("compare.md");
+    files::write(&folder.join(PICTURE), stacked(&plots(journal, &asked)).as_bytes())?;
+    files::write(&path, markdown(journal, &asked)?.as_bytes())?;
+    Ok(path)
+}
+
+/// A cell in a line of progress.
+pub(super) fn sentence(cell: &Cell) -> String {
+    let made = cell
+        .made
+        .as_ref()
+        .map(|made| format!("NMSE {:.1e} at {:.3} bits per weight in {:.0} s", made.nmse, made.bpw, made.seconds));
+    let driven = cell.outcome().and_then(|outcome| success(&outcome)).map(|success| format!("success {success}"));
+    let why = cell.why.as_ref().map(|why| format!("not made: {why}"));
+    let parts: Vec<String> = [made, driven, why].into_iter().flatten().collect();
+    if parts.is_empty() { "not driven".to_owned() } else { parts.join(", ") }
+}
+
+/// What the plan asked for, in its order.
+struct Asked {
+    policies: Vec<String>,
+    methods: Vec<Contender>,
+    budgets: Vec<f64>,
+}
+
+impl Asked {
+    fn of(header: &Header) -> Result<Self> {
+        let read = |key: &str| header.options[key].clone();
+        Ok(Self {
+            policies: serde_json::from_value(read("policies"))?,
+            methods: serde_json::from_value(read("methods"))?,
+            budgets: serde_json::from_value(read("budgets"))?,
+        })
+    }
+}
+
+/// Success over true bits per weight: a plot of each policy that was driven, a line of each method.
+fn plots(journal: &Journal, asked: &Asked) -> Vec<Plot> {
+    let percent = |cell: &Cell| cell.outcome()?.success().map(|success| 100.0 * success);
+    let find = |policy: &str, method, budget| journal.find(&CellKey { policy: policy.to_owned(), method, budget });
+    let line = |policy: &str, method: Contender| -> Series {
+        let cells = asked.budgets.iter().filter_map(|&budget| find(policy, Some(method), Some(budget)));
+        let mut points: Vec<(f64, f64)> =
+            cells.filter_map(|cell| Some((cell.made.as_ref()?.bpw, percent(cell)?))).collect();
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        Series { name: method.title().to_owned(), points }
+    };
+    let plot = |policy: &String| -> Option<Plot> {
+        let f32_success = percent(find(policy, None, None)?)?;
+        Some(Plot {
+            title: format!("{policy}: success over bits per weight (f32: {f32_success:.0}%)"),
+            x_label: "bits per weight, everything counted".to_owned(),
+            y_label: "closed-loop success, %".to_owned(),
+            vertical: Vertical::Percent,
+            series: asked.methods.iter().map(|&method| line(policy, method)).collect(),
+            mark: None,
+        })
+    };
+    asked.policies.iter().filter_map(plot).collect()
+}
+
+fn markdown(journal: &Journal, asked: &Asked) -> Result<String> {
+    let mut text = head(&journal.header)?;
+    writeln!(text, "\n![Success over bits per weight, a plot a policy]({PICTURE})")?;
+    if asked.methods.contains(&Contender::ActQuantK) {
+        writeln!(text, "\n{K_QUANTS}")?;
+    }
+    for policy in &asked.policies {
+        section(&mut text, journal, asked, policy)?;
+    }
+    Ok(text)
+}
+
+/// Date, sources, command, seeds.
+fn head(header: &Header) -> Result<String> {
+    let Header { commit, dirty, date, options, .. } = header;
+    let mut text = String::new();
+    let changes = if *dirty { ", with changes that are not in it" } else { "" };
+    writeln!(text, "# Comparison of the methods, {}\n", date.split(' ').next().unwrap_or(date))?;
+    writeln!(text, "- begun {date} UTC, commit `{commit}`{changes}")?;
+    writeln!(text, "- `{}`", command(options))?;
+    let (seed0, episodes) = (options["seed0"].as_u64().unwrap_or_default(), options["episodes"].as_u64().unwrap_or(1));
+    writeln!(
+        text,
+        "- {episodes} episodes with the seeds {seed0} to {}, seed {} of the quantizer\n\n{READING}",
+        seed0 + episodes.saturating_sub(1),
+        options["seed"]
+    )?;
+    Ok(text)
+}
+
+/// The command that has given these results.
+fn command(options: &Value) -> String {
+    let list = |value: &Value| -> String {
+        let plain = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+        value.as_array().map_or_else(|| plain(value), |items| items.iter().map(plain).collect::<Vec<_>>().join(","))
+    };
+    let mut words = vec!["cargo xtask compare".to_owned()];
+    for key in ["policies", "methods", "budgets", "episodes", "seed0", "seed", "steps"] {
+        if !options[key].is_null() {
+            words.push(format!("--{key} {}", list(&options[key])));
+        }
+    }
+    words.join(" ")
+}
+
+fn section(text: &mut String, journal: &Journal, asked: &Asked, policy: &str) -> Result<()> {
+    let find = |method: Option<Contender>, budget: Option<f64>| {
+        journal.find(&CellKey { policy: policy.to_owned(), method, budget })
+    };
+    let f32_cell = find(None, None);
+    let cells: Vec<(Contender, f64, Option<&Cell>)> = asked
+        .methods
+        .iter()
+        .flat_map(|&method| asked.budgets.iter().map(move |&budget| (method, budget)))
+        .map(|(method, budget)| (method, budget, find(Some(method), Some(budget))))
+        .collect();
+    writeln!(text, "\n## {policy}\n")?;
+    if f32_cell.is_none() && cells.iter().all(|(.., cell)| cell.is_none()) {
+        writeln!(text, "No results.")?;
+        return Ok(());
+    }
+
+    let budgets: Vec<String> = asked.budgets.iter().map(|budget| format!("{budget} bits")).collect();
+    header_row(text, "method", &budgets)?;
+    let alone = f32_cell.map_or_else(String::new, |cell| driven(cell).unwrap_or_else(|| "-".to_owned()));
+    row(text, "f32", asked.budgets.iter().map(|_| alone.clone()))?;
+    for method in &asked.methods {
+        let of_method = cells.iter().filter(|(m, ..)| m == method);
+        row(text, method.title(), of_method.map(|(.., cell)| short(*cell)))?;
+    }
+    writeln!(text)?;
+
+    let unit = unit(f32_cell.into_iter().chain(cells.iter().filter_map(|(.., cell)| *cell)));
+    let tracking = unit.map_or_else(|| "tracking error".to_owned(), |(_, unit)| format!("tracking error, {unit}"));
+    let columns =
+        ["budget", "bits per weight", "bytes per parameter", "image bytes", "scale per", "seconds", &tracking];
+    header_row(text, "method", &columns.map(str::to_owned))?;
+    let error_of = |cell: &Cell| {
+        let error = unit.and_then(|(key, _)| cell.outcome()?.number(key));
+        error.map_or_else(|| "-".to_owned(), |error| format!("{error:.3}"))
+    };
+    if let Some(cell) = f32_cell {
+        let sizes = ["-", "32", "4", "-", "-", "-"].map(str::to_owned);
+        row(text, "f32", sizes.into_iter().chain([error_of(cell)]))?;
+    }
+    let mut starred = false;
+    for (method, budget, cell) in &cells {
+        let Some((cell, made)) = cell.and_then(|cell| Some((cell, cell.made.as_ref()?))) else { continue };
+        starred |= !made.default_group;
+        let figures = [
+            format!("{budget}"),
+            format!("{:.3}", made.bpw),
+            format!("{:.3}", made.bytes_per_parameter),
+            made.bytes.to_string(),
+            format(made),
+            format!("{:.1}", made.seconds),
+            error_of(cell),
+        ];
+        row(text, method.title(), figures)?;
+    }
+    writeln!(text)?;
+    if starred {
+        writeln!(text, "{STARRED}\n")?;
+    }
+    reasons(text, &cells)?;
+    not_driven(text, f32_cell, &cells)
+}
+
+/// Which cells could not be made and why, those of one method and one reason together.
+fn reasons(text: &mut String, cells: &[(Contender, f64, Option<&Cell>)]) -> Result<()> {
+    let mut reasons: Vec<(Contender, &str, Vec<String>)> = Vec::new();
+    let mut open = Vec::new();
+    for (method, budget, cell) in cells {
+        let Some(cell) = cell else {
+            open.push(format!("{} at {budget}", method.title()));
+            continue;
+        };
+        let Some(why) = &cell.why else { continue };
+        match reasons.iter_mut().find(|(m, known, _)| m == method && known == why) {
+            Some((.., budgets)) => budgets.push(budget.to_string()),
+            None => reasons.push((*method, why, vec![budget.to_string()])),
+        }
+    }
+    for (method, why, budgets) in reasons {
+        writeln!(text, "- {} at {} is not made: {why}.", method.title(), budgets.join(", "))?;
+    }
+    if !open.is_empty() {
+        writeln!(text, "- Not run yet, or failed: {}.", open.join("; "))?;
+    }
+    Ok(())
+}
+
+fn not_driven(text: &mut String, f32_cell: Option<&Cell>, cells: &[(Contender, f64, Option<&Cell>)]) -> Result<()> {
+    let made = cells.iter().filter_map(|(.., cell)| cell.filter(|cell| cell.made.is_some()));
+    if f32_cell.into_iter().chain(made).any(|cell| cell.driven.is_none()) {
+        writeln!(
+            text,
+            "- Where success is `-`, there was no simulator: ACTQ_MUJOCO_PYTHON (go1_*, g1_*) and ACTQ_GYMNASIUM_PYTHON (fetch_*) \
+             name the Python that has it."
+        )?;
+    }
+    Ok(())
+}
+
+fn short(cell: Option<&Cell>) -> String {
+    let Some(made) = cell.and_then(|cell| cell.made.as_ref()) else { return "-".to_owned() };
+    let success = cell.and_then(driven).unwrap_or_else(|| "-".to_owned());
+    format!("{:.1e} · {success}", made.nmse)
+}
+
+fn driven(cell: &Cell) -> Option<String> {
+    success(&cell.outcome()?)
+}
+
+/// `97 (92-99)`, in percent.
+fn success(outcome: &DriveOutcome) -> Option<String> {
+    let percent = |share: f64| format!("{:.0}", 100.0 * share);
+    let success = percent(outcome.success()?);
+    Some(match outcome.interval() {
+        Some([low, high]) => format!("{success} ({}-{})", percent(low.max(0.0)), percent(high)),
+        None => success,
+    })
+}
+
+/// The first of the tracking errors that any of these cells has.
+fn unit<'a>(mut cells: impl Iterator<Item = &'a Cell>) -> Option<(&'static str, &'static str)> {
+    cells.find_map(|cell| {
+        let outcome = cell.outcome()?;
+        TRACKING.into_iter().find(|(key, _)| outcome.number(key).is_some())
+    })
+}
+
+fn format(made: &Made) -> String {
+    let star = if made.default_group { "" } else { "*" };
+    format!("{}{star}", made.format)
+}
+
+fn header_row(text: &mut String, first: &str, names: &[String]) -> Result<()> {
+    row(text, first, names.iter().cloned())?;
+    writeln!(text, "|---|{}", "---:|".repeat(names.len()))?;
+    Ok(())
+}
+
+fn row(text: &mut String, first: &str, values: impl IntoIterator<Item = String>) -> Result<()> {
+    let values: Vec<String> = values.into_iter().collect();
+    writeln!(text, "| {first} | {} |", values.join(" | "))?;
+    Ok(())
+}

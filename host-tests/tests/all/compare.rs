@@ -1,0 +1,93 @@
+//! The comparison, in little.
+
+use std::fs;
+use std::path::Path;
+
+use actq_bench::compare::{Cell, Contender, Journal, Plan, run};
+use anyhow::{Context as _, Result, ensure};
+
+fn plan(folder: &Path) -> Plan {
+    Plan {
+        policies: vec!["ur3".to_owned()],
+        methods: vec![Contender::Rtn, Contender::Best],
+        budgets: vec![1.5, 3.0],
+        episodes: 2,
+        seed0: 1000,
+        seed: 1,
+        steps: Some(20),
+        out: folder.to_owned(),
+        report: false,
+    }
+}
+
+#[test]
+fn a_comparison_is_made_once_and_says_what_cannot_be_made() -> Result<()> {
+    let folder = tempfile::tempdir()?;
+    let folder = folder.path().join("results");
+    let plan = plan(&folder);
+    run(&plan)?;
+
+    let Journal { cells, header, .. } = Journal::read(&folder)?;
+    ensure!(header.options["episodes"] == 2, "{header:?}");
+    let found: Vec<_> = cells.iter().map(|cell| (cell.key.method, cell.key.budget)).collect();
+    let methods = [Contender::Rtn, Contender::Best].map(Some);
+    let [few, many] = [1.5, 3.0].map(Some);
+    let expected = [(methods[0], few), (methods[0], many), (methods[1], few), (methods[1], many)];
+    ensure!(found[0] == (None, None) && found[1..] == expected, "{found:?}");
+    let success = |cell: &Cell| cell.driven.as_ref().and_then(|driven| driven["success"].as_f64());
+    ensure!(success(&cells[0]) == Some(1.0), "{:?}", cells[0]);
+    let why = cells[1].why.as_deref().context("rtn has no 1.5 bits")?;
+    ensure!(why.contains("the least is 2.078 bits per weight, with one scale a row"), "{why}");
+    ensure!(cells[1].made.is_none() && cells[1].driven.is_none(), "{:?}", cells[1]);
+    for cell in &cells[2..] {
+        let made = cell.made.as_ref().context("an image")?;
+        ensure!(made.nmse > 0.0 && Some(made.bpw) <= cell.key.budget && success(cell).is_some(), "{cell:?}");
+        ensure!(made.default_group && made.bytes_per_parameter < 1.0, "{made:?}");
+    }
+
+    let report = fs::read_to_string(folder.join("compare.md"))?;
+    for words in [
+        "| method | 1.5 bits | 3 bits |",
+        "| f32 | 100 (34-100) | 100 (34-100) |",
+        "| rtn | - | ",
+        "- rtn at 1.5 is not made: the least is 2.078",
+        "--methods rtn,best --budgets 1.5,3.0 --episodes 2 --seed0 1000 --seed 1 --steps 20",
+        "tracking error, mm",
+    ] {
+        ensure!(report.contains(words), "{words:?} is not in\n{report}");
+    }
+
+    let picture = fs::read_to_string(folder.join("compare.svg"))?;
+    ensure!(picture.contains("ur3: success over bits per weight (f32: 100%)"), "{picture}");
+
+    // The seconds in it would be others.
+    let journal = fs::read_to_string(folder.join("compare.jsonl"))?;
+    run(&plan)?;
+    ensure!(fs::read_to_string(folder.join("compare.jsonl"))? == journal, "something was run again");
+    // A run that was ended within a line goes on behind the line before.
+    let cut = journal.trim_end().rfind('\n').context("lines")? + 20;
+    fs::write(folder.join("compare.jsonl"), &journal[..cut])?;
+    run(&plan)?;
+    let again = fs::read_to_string(folder.join("compare.jsonl"))?;
+    ensure!(again[..cut] == journal[..cut] && again.lines().count() == journal.lines().count(), "{again}");
+
+    let error = run(&Plan { episodes: 3, ..plan.clone() }).err().context("other options")?.to_string();
+    ensure!(
+        error.contains("compare.jsonl: holds results of other sources or options") && error.contains("--out"),
+        "{error}"
+    );
+    fs::remove_file(folder.join("compare.md"))?;
+    run(&Plan { report: true, ..plan })?;
+    ensure!(fs::read_to_string(folder.join("compare.md"))?.lines().count() == report.lines().count(), "another report");
+    Ok(())
+}
+
+#[test]
+fn a_policy_that_is_not_there_is_named() -> Result<()> {
+    let folder = tempfile::tempdir()?;
+    let plan = Plan { policies: vec!["no_such_policy".to_owned()], ..plan(folder.path()) };
+    let error = run(&plan).err().context("no such policy")?.to_string();
+    // With the shared policies the folder is looked for, without them nothing is left.
+    ensure!(error.contains("no_such_policy: holds no policy.json") || error.contains("no policy is left"), "{error}");
+    Ok(())
+}
