@@ -17,6 +17,7 @@ mod outputs;
 mod parity;
 mod portable;
 mod qemu;
+mod recorded;
 mod recordings;
 mod slices;
 mod stats;

@@ -1,0 +1,57 @@
+//! What methods give on the UR3 policy, held to what was recorded: errors, and success in closed loop.
+
+use actq::budget::Budget;
+use actq::data::Recordings;
+use actq::measure::eval;
+use actq::methods::{Method, Options};
+use actq::pipeline;
+use actq::policy::Policy;
+use actq::runtime::with_head;
+use actq_bench::closed_loop::episode_on_host;
+use actq_bench::ur3;
+use anyhow::Result;
+
+/// A figure may be larger than recorded by this: other processors round matrix products differently.
+const ROOM: f64 = 1.5;
+
+/// Episodes, from a seed that nothing was recorded or trained with.
+const EPISODES: u64 = 40;
+const FIRST_SEED: u64 = 1000;
+
+/// Held-out NMSE, and the closed loop's success and mean tracking error in mm.
+fn figures(options: &Options) -> Result<(f64, usize, f64)> {
+    let policy = Policy::load(&ur3())?;
+    let recordings = Recordings::load(&policy)?;
+    let quantized = pipeline::quantize(&policy, &recordings, options, |_, _| {})?;
+    let buffer = quantized.buffer();
+    let image = buffer.image("image in memory".as_ref())?;
+    let nmse = eval::evaluate(image, &eval::heldout(&ur3(), &image)?)?.nmse;
+    let run = |seed| with_head(image, |head| episode_on_host(head, seed));
+    let outcomes = (FIRST_SEED..FIRST_SEED + EPISODES).map(run).collect::<Result<Vec<_>>>()?;
+    let success = outcomes.iter().filter(|o| o.success).count();
+    let tracking = outcomes.iter().map(|o| 1e3 * o.tracking_error_m).sum::<f64>() / EPISODES as f64;
+    Ok((nmse, success, tracking))
+}
+
+fn hold(method: Method, bits: f64, nmse: f64, tracking: f64) -> Result<()> {
+    let plain = Options::new(method, Budget::BitsPerWeight(bits));
+    let options = Options { group: method.default_group(), steps: Some(1000), ..plain };
+    let found = figures(&options)?;
+    let text = format!("{method} at {bits} bits: NMSE, successes and tracking error are {found:?}");
+    assert!(found.0 < ROOM * nmse && found.1 as u64 == EPISODES && found.2 < ROOM * tracking, "{text}");
+    // A record that is far behind holds nothing.
+    assert!(found.0 > nmse / ROOM, "{text}; record the smaller error");
+    Ok(())
+}
+
+#[test]
+fn best_keeps_its_error_and_every_episode() -> Result<()> {
+    hold(Method::Best, 3.0, 1.0, 1.0)?;
+    hold(Method::Best, 2.0, 1.0, 1.0)
+}
+
+#[test]
+fn rivals_keep_their_errors() -> Result<()> {
+    hold(Method::Gptq, 3.0, 1.0, 1.0)?;
+    hold(Method::ActQuant, 4.0, 1.0, 1.0)
+}
