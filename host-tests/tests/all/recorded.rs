@@ -46,12 +46,12 @@ fn hold(method: Method, bits: f64, nmse: f64, tracking: f64) -> Result<()> {
 
 #[test]
 fn best_keeps_its_error_and_every_episode() -> Result<()> {
-    hold(Method::Best, 3.0, 1.0, 1.0)?;
-    hold(Method::Best, 2.0, 1.0, 1.0)
+    hold(Method::Best, 3.0, 1.4e-3, 1.0)?;
+    hold(Method::Best, 2.0, 6.7e-3, 1.45)
 }
 
 #[test]
 fn rivals_keep_their_errors() -> Result<()> {
-    hold(Method::Gptq, 3.0, 1.0, 1.0)?;
-    hold(Method::ActQuant, 4.0, 1.0, 1.0)
+    hold(Method::Gptq, 3.0, 8.4e-3, 1.25)?;
+    hold(Method::ActQuant, 4.0, 1.56e-2, 2.6)
 }
