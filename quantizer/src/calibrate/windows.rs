@@ -31,7 +31,7 @@ pub struct Windows<'a> {
     pub graph: &'a Graph,
     /// Its weights.
     pub weights: Weights,
-    /// Valid observations of each episode, `[step, element]`.
+    /// Valid observations of each episode, `[step, element]`, at least as many as a window has.
     episodes: Vec<Array2<f32>>,
     /// State before each step of each episode, one row a step; empty for a feed-forward network.
     states: Vec<State>,
@@ -74,8 +74,11 @@ impl<'a> Windows<'a> {
             episodes.push(episode);
         }
         let deviation = column_variances(&episodes).into_iter().map(f32::sqrt).collect();
-        let shortest = episodes.iter().map(Array2::nrows).min().unwrap_or(1);
-        let window = if recurrent { WINDOW.min(shortest) } else { 1 };
+        let longest = episodes.iter().map(Array2::nrows).max().unwrap_or(1);
+        let window = if recurrent { WINDOW.min(longest) } else { 1 };
+        for episode in &mut episodes {
+            last(episode, window);
+        }
         Self { graph, weights, states, deviation, output_variance: column_variances(&outputs), episodes, window }
     }
 
@@ -167,6 +170,15 @@ impl<'a> Windows<'a> {
     }
 }
 
+/// Holds the last observation until the episode has `steps`: so windows need not be as short as the shortest episode, at whose end
+/// a robot may have fallen. The f32 network is asked there as everywhere.
+fn last(episode: &mut Array2<f32>, steps: usize) {
+    let there = episode.nrows();
+    if there < steps {
+        *episode = Array2::from_shape_fn((steps, episode.ncols()), |(t, i)| episode[[t.min(there - 1), i]]);
+    }
+}
+
 /// Variance of every column over all rows of all arrays.
 fn column_variances(arrays: &[Array2<f32>]) -> Vec<f32> {
     let cols = arrays.first().map_or(0, Array2::ncols);
@@ -180,4 +192,23 @@ fn column_variances(arrays: &[Array2<f32>]) -> Vec<f32> {
     };
     let means = mean(&|_, v| v);
     mean(&|i, v| (v - means[i]).powi(2)).into_iter().map(|v| v as f32).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::methods::actquant::testing::{dataset, lstm};
+
+    #[test]
+    fn a_short_episode_does_not_shorten_the_windows() {
+        let graph = lstm();
+        let mut dataset = dataset(&graph, 2, 80);
+        dataset.length[1] = 5;
+        let windows = Windows::new(&graph, &dataset);
+        assert_eq!((windows.window, windows.episodes[0].nrows(), windows.episodes[1].nrows()), (WINDOW, 80, WINDOW));
+        assert_eq!(windows.episodes[1].row(4), windows.episodes[1].row(63));
+        assert_ne!(windows.episodes[1].row(3), windows.episodes[1].row(4));
+        let batch = windows.batch(8, None, &mut Random::new(1));
+        assert_eq!(windows.teach(&batch).nrows(), 8 * WINDOW);
+    }
 }

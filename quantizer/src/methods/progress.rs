@@ -33,8 +33,8 @@ impl Progress {
 impl fmt::Display for Progress {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Choosing { error, .. } => write!(f, "choosing noise, error {error:.2e}"),
-            Self::Learning { error, .. } => write!(f, "learning, error {error:.2e}"),
+            Self::Choosing { error, .. } => write!(f, "choosing, error {error:.1e}"),
+            Self::Learning { error, .. } => write!(f, "learning, error {error:.1e}"),
         }
     }
 }
