@@ -1,10 +1,10 @@
 //! Arrays `[sample, element]` and what operations do with them: products in either order of summing, rounding as the kernels
 //! round.
 
-use actq_kernels::round::ROUND;
-use actq_kernels::x::TINY;
 use std::ops::Range;
 
+use actq_kernels::round::ROUND;
+use actq_kernels::x::TINY;
 use ndarray::{Array2, ArrayView1, ArrayView2, ArrayViewMut1, ArrayViewMut2, Axis, linalg::general_mat_mul, s};
 
 /// The order in which a sum over a row is taken. The results differ in their last bits, and images are made from both.
@@ -51,8 +51,7 @@ impl Sums {
 pub enum Repeated<'a> {
     /// As it is, `[row, col]`.
     InOrder(&'a Array2<f32>),
-    /// `[col, row]`: a product with few rows is then bound by the arithmetic; otherwise by gathering the columns, three times
-    /// as long with 8 rows.
+    /// `[col, row]`: a product with few rows takes half as long, which otherwise goes into gathering the columns.
     Blocked(Array2<f32>),
 }
 
