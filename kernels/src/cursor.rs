@@ -37,6 +37,8 @@ pub(crate) struct LinearCursor {
     pub(crate) prepared: Option<Width>,
     /// Rows of the block that are done.
     pub(crate) row: usize,
+    /// The output of the last of them, where the block's rows have steps.
+    pub(crate) output: usize,
 }
 
 /// What a norm has summed so far: a piece of it goes on where the last one ended.

@@ -84,8 +84,8 @@ image_errors! {
     Lanes = 19, "lanes of a block do not follow from its matrix's activations and groups";
     /// A group size is not 0, 32, 64 or 128.
     Group = 20, "group size is not 0, 32, 64 or 128";
-    /// A row index lies outside the output or occurs twice.
-    Index = 21, "output index out of range or repeated";
+    /// A row's output lies outside the matrix's or has another row.
+    Index = 21, "a row's output is out of range or has another row";
     /// A constant is NaN, infinite or of the wrong sign.
     Constant = 22, "a constant is not finite or has the wrong sign";
     /// A row's worst case exceeds the int32 accumulator.

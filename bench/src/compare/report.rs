@@ -21,7 +21,7 @@ const PICTURE: &str = "compare.svg";
 
 const READING: &str = "\
 Cells: error on the held-out recording (NMSE, mean over the outputs) · closed-loop success in percent of the episodes (95% interval, \
-Wilson). Every cell of a policy is driven over the same seeds. A column is a budget in bits per weight, scales, indexes and padding \
+Wilson). Every cell of a policy is driven over the same seeds. A column is a budget in bits per weight, scales, steps and padding \
 counted; what each image really takes stands in the second table. `-`: not made, or not driven, and below why.";
 
 const STARRED: &str = "\

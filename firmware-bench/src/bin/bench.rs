@@ -95,7 +95,7 @@ mod firmware {
                         pack(shape, codes, b.scales.get(..rows * shape.groups())?, words)?;
                         let block = Block::new(shape, words)?;
                         let scales = b.row_scales.get(..rows.div_ceil(2))?;
-                        let block = RowBlock { block, scales, index: &[], first_row: 0 };
+                        let block = RowBlock { block, scales, steps: &[], first_row: 0 };
                         count::region(|| product(&block, black_box(x), x_max, bias, &mut ram.prepared, y))?;
                         black_box(&y);
                         writeln!(out, "{name} {} {group} {rows} {cols}", width.bits()).ok()?;

@@ -116,7 +116,7 @@ mod firmware {
         }
         let scales: [u32; ROWS / 2] = core::array::from_fn(|i| 0x3c80_3f00 + 0x0001_0003 * i as u32);
         let start: [u32; ROWS] = core::array::from_fn(|i| (i as f32 - 7.5).to_bits());
-        let rows = RowBlock { block: *block, scales: &scales, index: &[], first_row: 3 };
+        let rows = RowBlock { block: *block, scales: &scales, steps: &[], first_row: 3 };
         for in_y in [false, true] {
             let mut y = start.map(f32::from_bits);
             rows.apply(x, scale, (!in_y).then_some(&start), &mut y).ok_or("the block's rows have no room")?;

@@ -65,7 +65,7 @@ mod firmware {
                     let words = b.words.get_mut(..shape.words())?;
                     pack(shape, &b.codes, b.scales.get(..ROWS * shape.groups())?, words)?;
                     let block = Block::new(shape, words)?;
-                    let rows = RowBlock { block, scales: &row_scales, index: &[], first_row: 0 };
+                    let rows = RowBlock { block, scales: &row_scales, steps: &[], first_row: 0 };
                     let (plan, prepared) = (Plan::of(&block), &mut b.prepared);
                     let mut y = [0.0; ROWS];
                     let scale = count::region(|| product(&rows, black_box(&x), x_max, &bias, prepared, &mut y))?;

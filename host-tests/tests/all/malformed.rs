@@ -24,7 +24,7 @@ const ACT: usize = 4;
 const CHUNK: usize = 2;
 
 /// A policy with every kind of section: normalization, matrices of all widths with group scales, an LSTM, a matrix of mixed
-/// widths with its output index, a chunk and the whole contract.
+/// widths with its output steps, a chunk and the whole contract.
 fn valid_image() -> Vec<u8> {
     let mut random = Random::new(7);
     let mut values = |n: usize| (0..n).map(|_| random.unit()).collect::<Vec<f32>>();
@@ -259,7 +259,7 @@ const HUGE: u32 = u32::MAX - 1;
 fn headers_that_cannot_be_are_refused() {
     refused(&[
         ("wrong magic", E::Magic, |d| d.set(0, u32::from_le_bytes(*b"ACTP"))),
-        ("a later version", E::Version, |d| d.set_low(h::W_VERSION, 3)),
+        ("a later version", E::Version, |d| d.set_low(h::W_VERSION, u32::from(h::VERSION) + 1)),
         ("a longer header", E::Version, |d| d.set_high(h::W_VERSION, 33)),
         ("a length one word off", E::Length, |d| d.set(h::W_BYTES, d.get(h::W_BYTES) + 4)),
         ("another layout stamp", E::Layout, |d| d.set(h::W_LAYOUT, d.get(h::W_LAYOUT) + 1)),
@@ -397,7 +397,7 @@ fn matrices_that_cannot_be_are_refused() {
     fn scales(d: &Draft) -> usize {
         d.offset(d.block(OUTPUT, 0) + 2)
     }
-    fn index(d: &Draft) -> usize {
+    fn steps(d: &Draft) -> usize {
         d.offset(d.block(OUTPUT, 1) + 3)
     }
     refused(&[
@@ -437,13 +437,13 @@ fn matrices_that_cannot_be_are_refused() {
         ("row scale minus 0", E::Constant, |d| d.set_low(scales(d), 0x8000)),
         ("row scale NaN", E::Constant, |d| d.set_high(scales(d), 0x7fc0)),
         ("row scale infinite", E::Constant, |d| d.set_high(scales(d) + 1, 0x7f80)),
-        ("index outside the image", E::Section, |d| d.set(d.block(OUTPUT, 1) + 3, d.0.len() as u32 - 1)),
-        ("index in the header", E::Section, |d| d.set(d.block(OUTPUT, 1) + 3, 8)),
-        ("index at a huge offset", E::Section, |d| d.set(d.block(OUTPUT, 1) + 3, HUGE)),
-        ("index beyond the rows", E::Index, |d| d.set_low(index(d), (CHUNK * ACT) as u32)),
-        ("index beyond all rows", E::Index, |d| d.set_high(index(d), 0xffff)),
-        ("index repeated in a block", E::Index, |d| d.set_low(index(d), d.high(index(d)))),
-        ("index repeated over blocks", E::Index, |d| d.set_low(index(d), 0)),
+        ("steps outside the image", E::Section, |d| d.set(d.block(OUTPUT, 1) + 3, d.0.len() as u32 - 1)),
+        ("steps in the header", E::Section, |d| d.set(d.block(OUTPUT, 1) + 3, 8)),
+        ("steps at a huge offset", E::Section, |d| d.set(d.block(OUTPUT, 1) + 3, HUGE)),
+        ("steps beyond the rows", E::Index, |d| d.set_low(steps(d), (CHUNK * ACT) as u32)),
+        ("steps beyond all rows", E::Index, |d| d.set(steps(d), u32::MAX)),
+        ("a step of 0", E::Index, |d| d.set(steps(d), d.get(steps(d)) & 0xff)),
+        ("steps to the outputs of another block", E::Index, |d| d.set_low(steps(d), 0)),
         ("blocks with more rows than the matrix", E::Index, |d| {
             // Four rows each: one has no output left.
             for i in 0..2 {
@@ -454,7 +454,7 @@ fn matrices_that_cannot_be_are_refused() {
         ("row scales away from their weights", E::Section, |d| {
             d.set(d.block(FIRST, 0) + 2, d.get(d.block(FIRST, 0) + 2) + 1);
         }),
-        ("index away from its scales", E::Section, |d| {
+        ("steps away from its scales", E::Section, |d| {
             d.set(d.block(OUTPUT, 0) + 3, d.get(d.block(OUTPUT, 1) + 3));
         }),
         ("two matrices on the same weights", E::Section, |d| {
@@ -571,7 +571,7 @@ fn damage_after_the_check_is_an_error() {
         ("a block's rows", |d| d.set_high(d.block(FIRST, 0), UNITS as u32 + 1)),
         ("weights", |d| d.set(d.block(FIRST, 0) + 1, HUGE)),
         ("scales", |d| d.set(d.block(FIRST, 0) + 2, HUGE)),
-        ("an output index", |d| d.set_high(d.offset(d.block(OUTPUT, 1) + 3), 0xffff)),
+        ("output steps", |d| d.set(d.offset(d.block(OUTPUT, 1) + 3), u32::MAX)),
         ("the observation's place", |d| d.set_low(h::W_OBS_OUT, 0xffff)),
         ("the output's place", |d| d.set_high(h::W_OBS_OUT, 0xffff)),
         ("the action's place", |d| d.set_low(h::W_ACTION_WORK, 0xffff)),

@@ -207,7 +207,7 @@ fn scaling_keeps_the_documented_order_of_operations() {
             let bias: Vec<u32> = (0..rows).map(|_| random.unit().to_bits()).collect();
             let x: Vec<f32> = (0..45).map(|_| random.unit()).collect();
             let block = Block::new(shape, &words).expect("the words fit the shape");
-            let block = RowBlock { block, scales: &scales, index: &[], first_row: 0 };
+            let block = RowBlock { block, scales: &scales, steps: &[], first_row: 0 };
             let scale = Scale::new(&x, 127).expect("all values are finite");
             let plan = Plan::of(&block.block);
             let mut prepared = vec![0; plan.room(x.len())];

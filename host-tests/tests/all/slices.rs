@@ -26,13 +26,13 @@ fn network(seed: u64) -> Result<(Policy, Vec<Outcome>)> {
     let mut random = Random::new(seed);
     let mut length = |most: usize| 1 + random.below(most);
     let (rows, hidden, out) = (length(90), length(30), length(5));
-    let (indexed, recurrent, group) = (length(2) == 1, length(3), [0, 32][length(2) - 1]);
+    let (mixed, recurrent, group) = (length(2) == 1, length(3), [0, 32][length(2) - 1]);
     let activations = [Activations::Int8, Activations::Int16][length(2) - 1];
     let chunk = length(4);
     let execute = length(chunk);
     let mut builder = Builder::new(OBSERVATION);
     let width = |row: usize| {
-        let which = if indexed { row * 7 % 5 } else { 4 * row / rows };
+        let which = if mixed { row * 7 % 5 } else { 4 * row / rows };
         Width::ALL.get(which).copied().or((row == 0).then_some(Width::W2))
     };
     let mut last = builder.linear((rows, OBSERVATION), activations, width, group, seed.is_multiple_of(2))?;

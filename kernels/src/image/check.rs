@@ -230,21 +230,20 @@ fn check_matrix(at: usize, front: &mut Front<'_>, work: usize) -> Result<(), Ima
     for record in matrix.records.as_chunks().0 {
         let rows = row_block(matrix, record, first_row);
         let rows = rows.as_ref().map_err(|e| *e)?;
-        // Weights, scales and index stand behind each other.
-        let [_, weights, scales, index] = record.map(|word| u32::from_le(word) as usize);
+        // Weights, scales and steps stand behind each other.
+        let [_, weights, scales, steps] = record.map(|word| u32::from_le(word) as usize);
         let to_scales = rows.block.words().len();
-        let to_index = to_scales + rows.scales.len();
-        if scales != weights + to_scales || index != 0 && index != weights + to_index {
+        let to_steps = to_scales + rows.scales.len();
+        if scales != weights + to_scales || steps != 0 && steps != weights + to_steps {
             return Err(ImageError::Section);
         }
-        front.take(weights, to_index + rows.index.len())?;
+        front.take(weights, to_steps + rows.steps.len())?;
         // Magnitudes compare as their bits, and a sign is above them all.
         if bytemuck::must_cast_slice(rows.scales).iter().any(|scale: &u16| u16::from_le(*scale) >= BF16_INFINITY) {
             return Err(ImageError::Constant);
         }
         first_row += rows.block.shape().rows;
-        for row in 0..rows.block.shape().rows {
-            let output = rows.output(row);
+        for output in rows.outputs() {
             let word = seen.get_mut(output / 32).ok_or(ImageError::Index)?;
             if output >= matrix.rows || *word >> (output % 32) & 1 == 1 {
                 return Err(ImageError::Index);

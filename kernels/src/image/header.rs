@@ -7,7 +7,7 @@ use crate::layout::LAYOUT_STAMP;
 /// `ACTQ` in the first four bytes.
 pub const MAGIC: u32 = u32::from_le_bytes(*b"ACTQ");
 /// Format version.
-pub const VERSION: u16 = 2;
+pub const VERSION: u16 = 3;
 /// Words of the header.
 pub const WORDS: usize = HEADER_WORDS;
 /// Words before the checksummed part: magic, version, length, checksum.

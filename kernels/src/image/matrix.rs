@@ -63,26 +63,26 @@ pub struct BlockRecord {
     pub weights: u32,
     /// Offset of the row scales.
     pub scales: u32,
-    /// Offset of the output index, or 0.
-    pub index: u32,
+    /// Offset of the output steps, or 0.
+    pub steps: u32,
 }
 
 impl BlockRecord {
     /// Refuses what no block of a matrix with these lanes has.
     #[inline(always)]
     pub fn parse(record: &[u32; BLOCK_WORDS], lanes: Lanes) -> Result<Self, ImageError> {
-        let [head, weights, scales, index] = record.map(u32::from_le);
+        let [head, weights, scales, steps] = record.map(u32::from_le);
         let width = Width::from_bits(head & 0xff).ok_or(ImageError::Width)?;
         if (head >> 8) as u8 != lanes.code() {
             return Err(ImageError::Lanes);
         }
-        Ok(Self { width, lanes, rows: high(head), weights, scales, index })
+        Ok(Self { width, lanes, rows: high(head), weights, scales, steps })
     }
 
     /// The record's words.
     pub fn emit(&self) -> Result<[u32; BLOCK_WORDS], TooLarge> {
         let head = self.width.bits() | u32::from(self.lanes.code()) << 8;
-        Ok([halves(head as usize, self.rows)?, self.weights, self.scales, self.index])
+        Ok([halves(head as usize, self.rows)?, self.weights, self.scales, self.steps])
     }
 }
 
@@ -112,13 +112,14 @@ pub struct RowBlock<'a> {
     pub block: Block<'a>,
     /// bf16 row scales, two a word.
     pub scales: &'a [u32],
-    /// u16 output indexes, two a word; empty where the rows follow each other from `first_row` on.
-    pub index: &'a [u32],
-    /// The output index of the first row, where there is no index.
+    /// Four u8 a word: the steps from the output of the row before (from output 0, the first) to each row's own; empty where the
+    /// rows follow each other from `first_row` on.
+    pub steps: &'a [u32],
+    /// The output of the first row, or, where there are steps, 0, which they start from.
     pub first_row: usize,
 }
 
-impl RowBlock<'_> {
+impl<'a> RowBlock<'a> {
     /// The scale of the block's row `i`.
     #[inline(always)]
     pub fn scale(&self, i: usize) -> f32 {
@@ -134,10 +135,15 @@ impl RowBlock<'_> {
         }
     }
 
-    /// The output index of the block's row `i`.
-    #[inline(always)]
-    pub fn output(&self, i: usize) -> usize {
-        if self.index.is_empty() { self.first_row + i } else { half_word(self.index, i) as usize }
+    /// The outputs of the block's rows, in order.
+    pub fn outputs(&self) -> impl Iterator<Item = usize> + use<'a> {
+        let steps = bytemuck::must_cast_slice::<u32, u8>(self.steps);
+        let mut next = self.first_row;
+        (0..self.block.shape().rows).map(move |i| {
+            let output = next + steps.get(i).map_or(0, |step| usize::from(*step));
+            next = output + usize::from(steps.is_empty());
+            output
+        })
     }
 }
 
@@ -165,7 +171,7 @@ impl<'a> Matrix<'a> {
 
     /// Bytes of everything that describes the weights ([`block_bytes`]). Biases and the matrix record are not counted.
     pub fn weight_bytes(&self) -> usize {
-        self.blocks().map(|rows| block_bytes(rows.block.shape(), !rows.index.is_empty())).sum()
+        self.blocks().map(|rows| block_bytes(rows.block.shape(), !rows.steps.is_empty())).sum()
     }
 
     /// Bias of output `row`; 0 where the matrix has none.
@@ -187,9 +193,9 @@ impl<'a> Matrix<'a> {
     fn is_whole(&self) -> bool {
         let mut rows = 0;
         let (records, _) = self.records.as_chunks::<BLOCK_WORDS>();
-        records.iter().all(|[head, _, _, index]| {
+        records.iter().all(|[head, _, _, steps]| {
             rows += (u32::from_le(*head) >> 16) as usize;
-            *index == 0
+            *steps == 0
         }) && rows == self.rows
     }
 }
@@ -211,28 +217,33 @@ pub(crate) fn row_block<'a>(
     first_row: usize,
 ) -> Result<RowBlock<'a>, ImageError> {
     let record = BlockRecord::parse(record, matrix.lanes())?;
-    let BlockRecord { width, lanes, rows, weights, scales, index } = record;
+    let BlockRecord { width, lanes, rows, weights, scales, steps } = record;
     let shape = BlockShape { width, lanes, rows, cols: matrix.cols, group: matrix.group };
     if !shape.is_valid() || rows > matrix.rows {
         return Err(ImageError::Shape);
     }
-    let halves = |offset: u32| section(matrix.image, offset as usize, rows.div_ceil(2)).ok_or(ImageError::Section);
-    let scales = halves(scales)?;
-    let index = if index == 0 { &[] } else { halves(index)? };
+    let words = |offset: u32, len| section(matrix.image, offset as usize, len).ok_or(ImageError::Section);
+    let scales = words(scales, rows.div_ceil(2))?;
+    let (steps, first_row) = if steps == 0 { (&[][..], first_row) } else { (words(steps, rows.div_ceil(4))?, 0) };
     match Block::leading(shape, behind(matrix.image, weights as usize)) {
-        Some(block) => Ok(RowBlock { block, scales, index, first_row }),
+        Some(block) => Ok(RowBlock { block, scales, steps, first_row }),
         None => Err(ImageError::Section),
     }
 }
 
-/// Bytes that a block takes: packed words with their padding and group scales, row scales, output indexes where the block is
-/// `indexed`, and the block record.
-pub const fn block_bytes(shape: BlockShape, indexed: bool) -> usize {
-    let halves = shape.rows.div_ceil(2) * if indexed { 2 } else { 1 };
-    4 * (shape.words() + halves + BLOCK_WORDS)
+/// Bytes that a block takes: packed words with their padding and group scales, row scales, output steps where the block is
+/// `stepped`, and the block record.
+pub const fn block_bytes(shape: BlockShape, stepped: bool) -> usize {
+    let steps = if stepped { shape.rows.div_ceil(4) } else { 0 };
+    4 * (shape.words() + shape.rows.div_ceil(2) + steps + BLOCK_WORDS)
 }
 
-/// Packs u16 values two a word, as scales and indexes stand in the image.
+/// Packs u16 values two a word, as scales stand in the image.
 pub fn half_words(values: &[u16]) -> impl Iterator<Item = u32> + '_ {
     values.chunks(2).map(|pair| pair.iter().rev().fold(0u32, |word, v| word << 16 | u32::from(*v)))
+}
+
+/// Packs u8 values four a word, as steps stand in the image.
+pub fn quarter_words(values: &[u8]) -> impl Iterator<Item = u32> + '_ {
+    values.chunks(4).map(|four| four.iter().rev().fold(0u32, |word, v| word << 8 | u32::from(*v)))
 }

@@ -21,7 +21,7 @@ pub use contract::CONTRACT_ARRAYS;
 pub use crc::{checksum, seal};
 pub use header::{Header, Kind};
 pub(crate) use matrix::row_block;
-pub use matrix::{BlockRecord, Matrix, MatrixRecord, RowBlock, block_bytes, half_words};
+pub use matrix::{BlockRecord, Matrix, MatrixRecord, RowBlock, block_bytes, half_words, quarter_words};
 pub use op::{Op, OpKind, OpRecord};
 pub use proof::{largest_sum_bound, worst_case};
 pub use region::Region;

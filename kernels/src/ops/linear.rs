@@ -36,25 +36,27 @@ fn outputs<'y>(
 
 impl RowBlock<'_> {
     /// `y = start + acc * (row_scale * x_scale)` for the block's rows and their places in `y`, with a vector that was prepared
-    /// for the block. `start` holds the bits of the whole output's biases; without it, and for rows with an index, y itself is
+    /// for the block. `start` holds the bits of the whole output's biases; without it, and for rows with steps, y itself is
     /// the start. `None` where `start` or `y` is too short.
     pub fn apply(&self, x: &Prepared<'_>, x_scale: Scale, start: Option<&[u32]>, y: &mut [f32]) -> Option<()> {
-        self.apply_rows(0..self.block.shape().rows, x, x_scale, start, y)
+        self.apply_rows(0..self.block.shape().rows, &mut 0, x, x_scale, start, y)
     }
 
     /// As [`Self::apply`], for a run of the block's rows, which starts at a multiple of [`STRIP`] and ends at another or with
-    /// the block.
+    /// the block. Where rows have steps,
+    /// `output` is that of the row before (0 before the first); becomes that of the last.
     pub(crate) fn apply_rows(
         &self,
         rows: Range<usize>,
+        output: &mut usize,
         x: &Prepared<'_>,
         x_scale: Scale,
         start: Option<&[u32]>,
         y: &mut [f32],
     ) -> Option<()> {
         let x_scale = x_scale.get();
-        if start.is_none() || !self.index.is_empty() {
-            return self.apply_runs(&mut [0; RUN], rows, x, x_scale, start, y);
+        if start.is_none() || !self.steps.is_empty() {
+            return self.apply_runs(&mut [0; RUN], rows, output, x, x_scale, start, y);
         }
         // Rows in order have room for their sums in y itself, except those of a last strip that padding fills.
         let whole = if rows.end.is_multiple_of(QUAD) { rows.end } else { rows.end & !(STRIP - 1) };
@@ -65,17 +67,19 @@ impl RowBlock<'_> {
             self.scale_in_order(rows.start, None, x_scale, start, y);
         }
         if whole < rows.end {
-            self.apply_runs(&mut [0; STRIP], whole..rows.end, x, x_scale, start, y)?;
+            self.apply_runs(&mut [0; STRIP], whole..rows.end, output, x, x_scale, start, y)?;
         }
         Some(())
     }
 
     /// As [`Self::apply_rows`], as many rows at once as have room in `sums`.
     #[inline(never)]
+    #[expect(clippy::too_many_arguments, reason = "as few as a piece of a product has")]
     fn apply_runs(
         &self,
         sums: &mut [i32],
         rows: Range<usize>,
+        output: &mut usize,
         x: &Prepared<'_>,
         x_scale: f32,
         start: Option<&[u32]>,
@@ -87,11 +91,11 @@ impl RowBlock<'_> {
             let sums = sums.get_mut(..run)?;
             gemv(&self.block, x, first, sums).ok()?;
             let sums = sums.get(..rows.end - first).unwrap_or(sums);
-            if self.index.is_empty() {
+            if self.steps.is_empty() {
                 let (start, y) = outputs(self.first_row + first, sums.len(), start, y)?;
                 self.scale_in_order(first, Some(sums), x_scale, start, y);
             } else {
-                self.scale_by_index(first, sums, x_scale, y)?;
+                self.scale_in_steps(first, sums, output, x_scale, y)?;
             }
             first += sums.len();
         }
@@ -105,11 +109,20 @@ impl RowBlock<'_> {
 
     /// Adds the sums of the rows from `first` on, scaled, to what stands at the rows' places; `None` where there is no such place.
     #[inline(never)]
-    fn scale_by_index(&self, first: usize, sums: &[i32], x_scale: f32, y: &mut [f32]) -> Option<()> {
-        let halves = |words| bytemuck::must_cast_slice::<u32, u16>(words).get(first..first + sums.len());
-        let (scales, index) = (halves(self.scales)?, halves(self.index)?);
-        for ((sum, scale), at) in sums.iter().zip(scales).zip(index) {
-            *y.get_mut(usize::from(u16::from_le(*at)))? += *sum as f32 * (bf16(u16::from_le(*scale)) * x_scale);
+    fn scale_in_steps(
+        &self,
+        first: usize,
+        sums: &[i32],
+        output: &mut usize,
+        x_scale: f32,
+        y: &mut [f32],
+    ) -> Option<()> {
+        // Sections of a block are as long as its rows are many.
+        let scales = bytemuck::must_cast_slice::<u32, u16>(self.scales).get(first..)?;
+        let steps = bytemuck::must_cast_slice::<u32, u8>(self.steps).get(first..)?;
+        for ((sum, scale), step) in sums.iter().zip(scales).zip(steps) {
+            *output += usize::from(*step);
+            *y.get_mut(*output)? += *sum as f32 * (bf16(u16::from_le(*scale)) * x_scale);
         }
         Some(())
     }
@@ -169,16 +182,16 @@ impl Matrix<'_> {
                 }
             }
             let x = plan.as_ref().and_then(|plan| Prepared::new(work, plan)).ok_or(Fault::Damaged)?;
-            let work = Work::Strips { shape, in_order: rows.index.is_empty(), start: start.is_some() };
+            let work = Work::Strips { shape, in_order: rows.steps.is_empty(), start: start.is_some() };
             let strips = budget.take((shape.rows - at.row).div_ceil(STRIP), work);
             let end = shape.rows.min(at.row + strips * STRIP);
-            rows.apply_rows(at.row..end, &x, x_scale, start, y).ok_or(Fault::Damaged)?;
+            rows.apply_rows(at.row..end, &mut at.output, &x, x_scale, start, y).ok_or(Fault::Damaged)?;
             at.row = end;
             if end < shape.rows {
                 return Ok(false);
             }
             at.block += 1;
-            at.row = 0;
+            (at.row, at.output) = (0, 0);
         }
         Ok(true)
     }

@@ -112,7 +112,7 @@ impl Image<'_> {
                 (OpKind::Linear { accumulate }, Some(matrix)) => {
                     let start = matrix.start_values(accumulate).is_some();
                     let of_block = |rows: RowBlock<'_>| {
-                        let (shape, in_order) = (rows.block.shape(), rows.index.is_empty());
+                        let (shape, in_order) = (rows.block.shape(), rows.steps.is_empty());
                         least(Work::Prepare(shape)).max(least(Work::Strips { shape, in_order, start }))
                     };
                     let bias = Work::Start(Start::of(accumulate, !matrix.bias.is_empty()));

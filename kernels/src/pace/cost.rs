@@ -214,7 +214,7 @@ pub(super) fn prepare(shape: BlockShape, add: &mut dyn FnMut(Feature, usize)) {
 /// The products of a block's rows, and their scaling. `start`: whether the output starts from the biases.
 fn block(rows: &RowBlock<'_>, start: bool, add: &mut dyn FnMut(Feature, usize)) {
     let shape = rows.block.shape();
-    let in_order = rows.index.is_empty();
+    let in_order = rows.steps.is_empty();
     let whole = match (in_order && start, shape.rows.is_multiple_of(QUAD)) {
         (false, _) => 0,
         (true, true) => shape.rows,
@@ -236,7 +236,7 @@ fn block(rows: &RowBlock<'_>, start: bool, add: &mut dyn FnMut(Feature, usize)) 
             add(Feature::SCALED_EIGHT, left / STRIP);
             add(Feature::SCALED_REST, left % STRIP);
         } else {
-            add(Feature::SCALED_INDEXED, left);
+            add(Feature::SCALED_STEPPED, left);
         }
     }
 }
@@ -268,7 +268,7 @@ pub(super) fn products(shape: BlockShape, rows: usize, calls: usize, add: &mut d
 /// What a strip's worth of a block's rows ([`STRIP`]) takes at most, and what its rows take once in every piece, in 1024ths of
 /// an instruction.
 pub(super) fn strips(shape: BlockShape, in_order: bool, start: bool) -> (u32, u32) {
-    let row = if in_order { Feature::SCALED_REST } else { Feature::SCALED_INDEXED };
+    let row = if in_order { Feature::SCALED_REST } else { Feature::SCALED_STEPPED };
     let first = most(|add| {
         // The last piece may end with a run of its own for the rest of the rows.
         add(Feature::IN_PLACE, 1);

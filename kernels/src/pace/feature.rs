@@ -44,7 +44,7 @@ singles! {
     RUN "a run of rows with sums on the stack"
     SCALED_EIGHT "eight rows scaled by the assembler"
     SCALED_REST "a row in order scaled"
-    SCALED_INDEXED "a row with an index scaled"
+    SCALED_STEPPED "a row with a step scaled"
 }
 
 macro_rules! kinds {

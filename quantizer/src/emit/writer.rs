@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use actq_kernels::image::{
-    BlockRecord, Header, MatrixRecord, OpRecord, Records, Region, half_words, header as h, seal,
+    BlockRecord, Header, MatrixRecord, OpRecord, Records, Region, half_words, header as h, quarter_words, seal,
 };
 use actq_kernels::layout::{self, BlockShape};
 use anyhow::{Context, Result, ensure};
@@ -148,14 +148,9 @@ impl Writer {
             let weights = self.push(words.into_iter().map(u32::from_le));
             let scales: Vec<u16> = rows.iter().map(|&r| matrix.scales[r].to_bits()).collect();
             let scales = self.push(half_words(&scales));
-            let index = if in_order {
-                0
-            } else {
-                let index = rows.iter().map(|&r| u16::try_from(r)).collect::<Result<Vec<_>, _>>()?;
-                self.push(half_words(&index))
-            };
+            let steps = if in_order { 0 } else { self.push(quarter_words(&steps(rows)?)) };
             let BlockShape { width, lanes, rows, .. } = *shape;
-            records.push(BlockRecord { width, lanes, rows, weights, scales, index }.emit()?);
+            records.push(BlockRecord { width, lanes, rows, weights, scales, steps }.emit()?);
         }
         let Quantized { rows, cols, group, .. } = *matrix;
         let blocks = Records { count: records.len(), offset: self.push(records.into_iter().flatten()) };
@@ -175,4 +170,11 @@ impl Writer {
         let (src, third) = (offset(step.src), offset(step.third));
         Ok(OpRecord { kind: step.kind, dst: step.dst, src, third, bias, data }.emit()?)
     }
+}
+
+/// From the output of each row to that of the next, and from output 0 to the first.
+fn steps(rows: &[usize]) -> Result<Vec<u8>> {
+    let before = std::iter::once(&0).chain(rows);
+    let steps = before.zip(rows).map(|(before, row)| u8::try_from(row - before));
+    steps.collect::<Result<_, _>>().context("rows of one width stand more than 255 apart")
 }

@@ -46,9 +46,9 @@ fn dequantized(matrix: &Matrix<'_>) -> Array2<f32> {
     let mut weights = Array2::zeros((matrix.rows, matrix.cols));
     let mut row = vec![0.0; matrix.cols];
     for rows in matrix.blocks() {
-        for i in 0..rows.block.shape().rows {
+        for (i, output) in rows.outputs().enumerate() {
             rows.dequantize(i, &mut row);
-            weights.row_mut(rows.output(i)).assign(&ArrayView1::from(&row));
+            weights.row_mut(output).assign(&ArrayView1::from(&row));
         }
     }
     weights

@@ -174,10 +174,10 @@ impl Outcome {
             .collect()
     }
 
-    /// Bytes of codes, padding, scales, indexes and block records.
+    /// Bytes of codes, padding, scales, steps and block records.
     pub fn bytes(&self) -> usize {
         let blocks = self.blocks();
-        let indexed = !Quantized::in_order(&blocks);
-        blocks.iter().map(|(shape, _)| block_bytes(*shape, indexed)).sum()
+        let stepped = !Quantized::in_order(&blocks);
+        blocks.iter().map(|(shape, _)| block_bytes(*shape, stepped)).sum()
     }
 }

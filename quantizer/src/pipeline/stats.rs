@@ -60,11 +60,12 @@ pub struct MatrixRecord {
     pub group: usize,
     /// Magnitude that activations are quantized to.
     pub x_max: u16,
-    /// Bytes in the image: codes, padding, scales, indexes, block records.
+    /// Bytes in the image: codes, padding, scales, steps, block records.
     pub bytes: usize,
     /// Bits of each row's codes; 0 for a row without bits.
     pub widths: Vec<u32>,
-    /// Bits that each row takes: codes, scales and, where rows are indexed, its index; without padding and block records.
+    /// Bits that each row takes: codes, scales and, where widths are mixed, its step; without padding and block
+    /// records.
     pub bits: Vec<usize>,
     /// The row behind each row of the image's matrix, in the order of its output.
     pub image_rows: Vec<usize>,
@@ -191,8 +192,8 @@ fn matrix(source: &WeightMatrix, outcome: &Outcome, score: Option<&Score>) -> Ma
     let allocation = outcome.allocation.as_ref();
     let image_rows = allocation.map_or_else(|| (0..source.rows).collect(), |a| a.rows.clone());
     let image_cols = allocation.map_or_else(|| (0..source.cols).collect(), |a| a.columns.clone());
-    let indexed = !Quantized::in_order(&outcome.blocks());
-    let overhead = 16 + 8 * quantized.groups() + if indexed { 16 } else { 0 };
+    let stepped = !Quantized::in_order(&outcome.blocks());
+    let overhead = 16 + 8 * quantized.groups() + if stepped { 8 } else { 0 };
     let bits_of = |width: Width| width.bits() as usize * quantized.cols + overhead;
     let widths = outcome.trained_widths();
     MatrixRecord {

@@ -84,10 +84,10 @@ impl Widths {
             let mut bytes = Vec::new();
             for rows in matrix.blocks() {
                 let shape = rows.block.shape();
-                for row in 0..shape.rows {
-                    *widths.get_mut(rows.output(row)).context("a row has no place in the output")? = Some(shape.width);
+                for output in rows.outputs() {
+                    *widths.get_mut(output).context("a row has no place in the output")? = Some(shape.width);
                 }
-                bytes.push((shape.width, block_bytes(shape, !rows.index.is_empty())));
+                bytes.push((shape.width, block_bytes(shape, !rows.steps.is_empty())));
             }
             let Some(stats) = stats.and_then(|s| s.matrices.get(m)) else {
                 let rows = widths.into_iter().map(|width| Row { width, reasons: None }).collect();

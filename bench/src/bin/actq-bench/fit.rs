@@ -324,8 +324,8 @@ fn resumed(elf: &Path, counter: &Counter, most: &Rates) -> Result<f64> {
     let mut resumed = 0.0f64;
     for (rows, cols) in [(128, 256), (96, 100), (64, 30)] {
         for blocks in [1, 4] {
-            for indexed in [false, true] {
-                let width = |row: usize| Some(Width::ALL[if indexed { row % blocks } else { blocks * row / rows }]);
+            for mixed in [false, true] {
+                let width = |row: usize| Some(Width::ALL[if mixed { row % blocks } else { blocks * row / rows }]);
                 let mut builder = Builder::new(cols);
                 builder.linear((rows, cols), Activations::Int8, width, 0, true)?;
                 let (policy, outcomes) = builder.finish("polls".to_owned(), false);
@@ -387,13 +387,13 @@ fn policies() -> Result<Vec<(Policy, Vec<Outcome>)>> {
         // Blocks of several widths in order, by index, and outputs without biases.
         type Widths = fn(usize, usize) -> usize;
         let in_order: Widths = |row, rows| 4 * row / rows;
-        let indexed: Widths = |row, _| row * 7 % 4;
+        let mixed: Widths = |row, _| row * 7 % 4;
         // Two of three rows have no bits.
         let pruned: Widths = |row, _| [3, 4, 4][row % 3];
         for (name, which, bias) in [
             ("in order", in_order, true),
             ("in order, no bias", in_order, false),
-            ("indexed", indexed, true),
+            ("mixed", mixed, true),
             ("pruned", pruned, true),
             ("pruned, no bias", pruned, false),
         ] {

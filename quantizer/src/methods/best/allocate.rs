@@ -69,7 +69,7 @@ pub fn removals(graph: &Graph, dimension: &Dimension, h: &[Vec<f64>], g: &[Vec<f
 }
 
 /// Bytes of all matrices with these widths: rows without bits and the columns that compaction removes are gone, everything
-/// else is counted. Rows of a `dimension` are sorted by width, others are indexed where widths are mixed.
+/// else is counted. Rows of a `dimension` are sorted by width, others have steps where widths are mixed.
 pub fn bytes(graph: &Graph, dimensions: &[Dimension], widths: &Widths, packing: Packing) -> usize {
     (0..graph.matrices.len())
         .map(|m| {
@@ -82,8 +82,8 @@ pub fn bytes(graph: &Graph, dimensions: &[Dimension], widths: &Widths, packing: 
                 .collect();
             let all_rows = used.iter().map(|(_, n)| n).sum::<usize>() == widths[m].len();
             let one_width = used.len() == 1 && all_rows;
-            let indexed = !(sorted || one_width);
-            used.iter().map(|&(width, rows)| block_bytes(packing.shape(width, rows, kept_cols), indexed)).sum::<usize>()
+            let stepped = !(sorted || one_width);
+            used.iter().map(|&(width, rows)| block_bytes(packing.shape(width, rows, kept_cols), stepped)).sum::<usize>()
         })
         .sum()
 }
@@ -125,7 +125,7 @@ fn choose(graph: &Graph, dimensions: &[Dimension], rows: &[Rows], multiplier: f6
                 let made = Dimension::made_by(dimensions, m);
                 // One bit per bit of each row that a column crosses.
                 let saving: f64 = made.map_or(0.0, |d| d.consumers.iter().map(|&c| bits_of(c)).sum());
-                let overhead = if made.is_some() { 16.0 } else { 32.0 };
+                let overhead = if made.is_some() { 16.0 } else { 24.0 };
                 let cost = |r: usize, width: Option<Width>| {
                     let bits = width.map_or(-saving, |width| cols * f64::from(width.bits()) + overhead);
                     rows[m].expected(r, width) + multiplier * bits
@@ -146,5 +146,59 @@ fn choose(graph: &Graph, dimensions: &[Dimension], rows: &[Rows], multiplier: f6
             }
         }
     }
+    for (m, widths) in widths.iter_mut().enumerate() {
+        if Dimension::made_by(dimensions, m).is_none() {
+            within_steps(widths);
+        }
+    }
     widths
+}
+
+/// Widens rows until those of every width stand at most as far apart as the image's steps reach.
+fn within_steps(widths: &mut [Option<Width>]) {
+    // A row that is widened may part those of its former width.
+    while let Some((row, width)) = Width::ALL.into_iter().find_map(|width| out_of_reach(widths, width)) {
+        widths[row] = width;
+    }
+}
+
+/// Where a row of this width is too far from the one before: a row to widen, and to which width.
+fn out_of_reach(widths: &[Option<Width>], width: Width) -> Option<(usize, Option<Width>)> {
+    const REACH: usize = u8::MAX as usize;
+    let mut last = 0;
+    for row in (0..widths.len()).filter(|&row| widths[row] == Some(width)) {
+        if row - last > REACH {
+            let between = (last..=last + REACH).rev().find(|&row| widths[row] < Some(width));
+            // Among wider rows alone, it goes with them.
+            return Some(between.map_or((row, widths[last + REACH]), |between| (between, Some(width))));
+        }
+        last = row;
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    #[test]
+    fn rows_are_only_widened_until_steps_reach() {
+        let mut random = Random::new(1);
+        for case in 0..200 {
+            // Mostly one width, so that the others are far apart.
+            let most = [None, Some(Width::W2), Some(Width::W4)][case % 3];
+            let others = [None, Some(Width::W2), Some(Width::W3), Some(Width::W8)];
+            let row = |_| if random.below(300) < case { others[random.below(4)] } else { most };
+            let before: Widths = vec![(0..100 * case % 4097 + 1).map(row).collect()];
+            let mut after = before[0].clone();
+            within_steps(&mut after);
+            assert!(before[0].iter().zip(&after).all(|(before, after)| before <= after), "case {case}");
+            for width in Width::ALL {
+                let rows: Vec<usize> = (0..after.len()).filter(|&r| after[r] == Some(width)).collect();
+                let apart = rows.iter().scan(0, |last, &row| Some(row - std::mem::replace(last, row)));
+                assert!(apart.max().unwrap_or(0) <= 255, "case {case}");
+            }
+        }
+    }
 }
