@@ -8,6 +8,10 @@ use crate::x::Scale;
 pub(crate) struct Cursor {
     /// The operation.
     pub(crate) op: usize,
+    /// The denoising step that it belongs to.
+    pub(crate) step: usize,
+    /// Seed and draw of the noise; `None` where the caller has given it.
+    pub(crate) draw: Option<[u32; 2]>,
     /// Its elements that are done, or units of a norm.
     pub(crate) done: usize,
     /// Of a norm.
@@ -20,7 +24,7 @@ impl Cursor {
     /// Whether work has been done since `begin`, the start of an operation.
     pub(crate) fn has_left(&self, begin: Self) -> bool {
         // A linear operation begins with its scale.
-        self.op != begin.op || self.done > 0 || self.linear.scale.is_some()
+        self.op != begin.op || self.step > 0 || self.done > 0 || self.linear.scale.is_some()
     }
 }
 

@@ -96,6 +96,8 @@ image_errors! {
     Name = 25, "policy name is not UTF-8 or holds control characters";
     /// The self-test vector has no steps.
     SelfTest = 26, "the self-test vector has no steps";
+    /// Denoising steps without operations or of a policy that has none, or noise where none is.
+    Denoising = 27, "denoising steps, their operations and their noise do not fit";
 }
 
 impl ImageError {
@@ -178,6 +180,18 @@ pub enum StepError {
     },
     /// A poll without a step that was begun.
     NotBegun,
+    /// The noise's length differs from the image's.
+    NoiseLength {
+        /// Values expected: [`crate::Image::noise_len`].
+        expected: usize,
+        /// Values given.
+        given: usize,
+    },
+    /// A value of the noise is NaN or infinite.
+    NoiseNotFinite {
+        /// Its position.
+        index: usize,
+    },
 }
 
 impl StepError {
@@ -191,6 +205,8 @@ impl StepError {
             Self::SelfTest { .. } => 84,
             Self::Budget { .. } => 85,
             Self::NotBegun => 86,
+            Self::NoiseLength { .. } => 87,
+            Self::NoiseNotFinite { .. } => 88,
         }
     }
 }
@@ -233,6 +249,8 @@ impl fmt::Display for StepError {
                 write!(f, "a poll has {given} instructions, the image needs at least {needed}")
             }
             Self::NotBegun => f.write_str("no step was begun: begin takes the observation, then poll"),
+            Self::NoiseLength { expected, given } => write!(f, "noise has {given} values, the policy takes {expected}"),
+            Self::NoiseNotFinite { index } => write!(f, "noise value {index} is not finite"),
         }
     }
 }
@@ -276,6 +294,7 @@ mod tests {
             "Limits",
             "Name",
             "SelfTest",
+            "Denoising",
         ];
         assert_eq!(codes, (1..).zip(expected.map(Into::into)).collect::<std::vec::Vec<_>>());
         assert_eq!(HeadError::ScratchTooSmall { needed: 1, given: 0 }.code(), 64);
@@ -287,7 +306,9 @@ mod tests {
             StepError::SelfTest { step: 0 },
             StepError::Budget { needed: 1, given: 0 },
             StepError::NotBegun,
+            StepError::NoiseLength { expected: 1, given: 0 },
+            StepError::NoiseNotFinite { index: 0 },
         ];
-        assert_eq!(steps.map(StepError::code), [80, 81, 82, 83, 84, 85, 86]);
+        assert_eq!(steps.map(StepError::code), [80, 81, 82, 83, 84, 85, 86, 87, 88]);
     }
 }

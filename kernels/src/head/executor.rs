@@ -4,9 +4,11 @@ use super::arena::{part, regions};
 use crate::arch;
 use crate::cursor::Cursor;
 use crate::error::{Fault, StepError};
-use crate::image::{Op, OpKind};
+use crate::image::{Op, OpKind, Region};
 use crate::meter::{Meter, Unlimited, Work};
-use crate::ops::elementwise::{self, copy};
+use crate::ops::denoise::{Coefficients, add_noise, denoise};
+use crate::ops::elementwise::{self, copy, copy_le};
+use crate::ops::noise::normal;
 use crate::ops::norm;
 
 /// Runs a whole operation over an arena, as a head does: for whoever runs a network's operations one by one.
@@ -47,7 +49,7 @@ pub(super) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
         0 => [part(arena, &(dst.offset + range.start..dst.offset + range.end)), &mut [], &mut []],
         _ => regions(arena, &op.regions),
     };
-    if matches!(op.kind, OpKind::Normalize | OpKind::Add | OpKind::Copy) {
+    if matches!(op.kind, OpKind::Normalize | OpKind::Add | OpKind::Copy | OpKind::Denoise) {
         (dst, src) = (part(dst, &range), part(src, &range));
     }
     if dst.is_empty() {
@@ -57,6 +59,22 @@ pub(super) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
         OpKind::Function(function) => function.apply(f(dst)),
         OpKind::Add => elementwise::add(f(src), f(dst)),
         OpKind::Copy => copy(src, dst),
+        OpKind::Noise => {
+            if let Some([seed, draw]) = cursor.draw {
+                f(dst).iter_mut().zip(range.start as u32..).for_each(|(x, index)| *x = normal(seed, draw, index));
+            }
+        }
+        OpKind::Table => copy_le(op.row(cursor.step, &range), dst),
+        OpKind::Denoise => {
+            let (by, noise) = op.coefficients(cursor.step);
+            let by = Coefficients::from_array(by);
+            denoise(&by, op.constant(0), f(src), f(dst), f(part(third, &range)));
+            if by.sigma != 0.0 {
+                let places = [op.dst(), Region { offset: noise, len: dst.len() }, op.third()];
+                let [x, z, y] = regions(arena, &places).map(|all| f(part(all, &range)));
+                add_noise(by.sigma, z, x, y);
+            }
+        }
         OpKind::LstmCell => {
             arch::lstm_elements(range.clone(), f(src), f(third), f(dst));
         }

@@ -28,6 +28,10 @@ pub struct Head<'a, 's> {
     played: usize,
     /// Whether an action has been given since the reset, so that the step limit has something to hold on to.
     started: bool,
+    /// Of the noise.
+    seed: u32,
+    /// Evaluations since the reset that drew noise.
+    draws: u32,
 }
 
 /// What the arena holds of a step.
@@ -48,14 +52,22 @@ impl<'a, 's> Head<'a, 's> {
         let arena = scratch.get_mut(..needed).ok_or(HeadError::ScratchTooSmall { needed, given })?;
         // Nothing depends on what the memory held.
         arena.fill(0);
-        Ok(Self { image, arena, least_budget: 0, phase: Phase::Idle, played: 0, started: false })
+        Ok(Self { image, arena, least_budget: 0, phase: Phase::Idle, played: 0, started: false, seed: 0, draws: 0 })
     }
 
-    /// Forgets the recurrent state, the rest of a chunk, the last action and a step that was begun.
+    /// Forgets the recurrent state, the rest of a chunk, the last action and a step that was begun. The noise of an iterative head
+    /// begins anew: after a reset the same observations give the same actions.
     #[inline(never)]
     pub fn reset(&mut self) {
         self.abandon();
         self.started = false;
+        self.draws = 0;
+    }
+
+    /// The seed of an iterative head's noise, 0 until it is set, and a reset.
+    pub fn seed(&mut self, seed: u32) {
+        self.seed = seed;
+        self.reset();
     }
 
     /// As [`Self::reset`], but the last action stays: after an error the robot is still where that left it, and the step limit
@@ -91,7 +103,7 @@ impl<'a, 's> Head<'a, 's> {
     /// The last action stays: the next one is limited by `max_step` as ever.
     #[inline(never)]
     pub fn step(&mut self, observation: &[f32]) -> Result<&[f32], StepError> {
-        self.take(observation)?;
+        self.take(observation, None)?;
         self.finish()?;
         Ok(self.floats(self.image.action()))
     }
@@ -104,7 +116,14 @@ impl<'a, 's> Head<'a, 's> {
     /// Errors are those of [`Self::step`]. The first call takes longer where [`Self::least_budget`] was not called before.
     pub fn begin(&mut self, observation: &[f32]) -> Result<(), StepError> {
         self.least_budget();
-        self.take(observation)
+        self.take(observation, None)
+    }
+
+    /// As [`Self::begin`], with the noise of an iterative head: [`Image::noise_len`] values, the first iterate and behind it, where
+    /// denoising steps add noise, that of each. Within a chunk it is not used.
+    pub fn begin_with_noise(&mut self, observation: &[f32], noise: &[f32]) -> Result<(), StepError> {
+        self.least_budget();
+        self.take(observation, Some(noise))
     }
 
     /// [`Image::least_budget`], computed once, which takes about as long as a short step. (Not by [`Self::new`]: where steps are
@@ -117,10 +136,13 @@ impl<'a, 's> Head<'a, 's> {
     }
 
     #[inline(never)]
-    fn take(&mut self, observation: &[f32]) -> Result<(), StepError> {
+    fn take(&mut self, observation: &[f32], noise: Option<&[f32]>) -> Result<(), StepError> {
         self.drop_step();
         self.load(observation).inspect_err(|_| self.abandon())?;
-        self.start();
+        if let Some(noise) = noise {
+            self.load_noise(noise).inspect_err(|_| self.abandon())?;
+        }
+        self.start(noise.is_none());
         Ok(())
     }
 
@@ -170,10 +192,14 @@ impl<'a, 's> Head<'a, 's> {
         Cursor { op: if self.played == 0 { 0 } else { self.image.op_count() }, ..Cursor::default() }
     }
 
-    /// Begins a step with the observation that the arena holds.
+    /// Begins a step with the observation that the arena holds, and with noise of the generator or with that of the arena.
     #[inline(never)]
-    fn start(&mut self) {
-        self.phase = Phase::Begun(self.fresh());
+    fn start(&mut self, draw: bool) {
+        let draw = draw.then_some([self.seed, self.draws]);
+        if self.played == 0 && draw.is_some() {
+            self.draws = self.draws.wrapping_add(1);
+        }
+        self.phase = Phase::Begun(Cursor { draw, ..self.fresh() });
     }
 
     /// Takes the step that was begun to its end.
@@ -205,10 +231,20 @@ impl<'a, 's> Head<'a, 's> {
     /// The network's raw output for `observation` (`chunk * act_len` values), before the action contract. Advances the
     /// recurrent state, and drops what was left of a chunk or of a step that was begun.
     pub fn infer(&mut self, observation: &[f32]) -> Result<&[f32], StepError> {
-        self.take(observation)?;
+        self.infer_from(observation, None)
+    }
+
+    /// As [`Self::infer`], with the noise of [`Self::begin_with_noise`].
+    pub fn infer_with_noise(&mut self, observation: &[f32], noise: &[f32]) -> Result<&[f32], StepError> {
+        self.infer_from(observation, Some(noise))
+    }
+
+    #[inline(never)]
+    fn infer_from(&mut self, observation: &[f32], noise: Option<&[f32]>) -> Result<&[f32], StepError> {
+        self.drop_step();
         // From the first operation on, whatever is left of a chunk.
         self.played = 0;
-        self.start();
+        self.take(observation, noise)?;
         self.evaluate(&mut Unlimited, false).inspect_err(|_| self.abandon())?;
         self.phase = Phase::Idle;
         Ok(self.floats(self.image.output()))
@@ -217,9 +253,10 @@ impl<'a, 's> Head<'a, 's> {
     /// Plays the image's self-test vector from a reset and compares every action bit for bit; resets again at the end.
     #[inline(never)]
     pub fn self_test(&mut self) -> Result<(), StepError> {
+        let seed = core::mem::take(&mut self.seed);
         self.reset();
         let outcome = self.play_self_test();
-        self.reset();
+        self.seed(seed);
         outcome
     }
 
@@ -227,7 +264,7 @@ impl<'a, 's> Head<'a, 's> {
         let mut step = 0;
         while let Some((observation, expected)) = self.image.self_test(step) {
             copy_le(observation, self.words_mut(self.image.observation()));
-            self.start();
+            self.start(true);
             self.finish()?;
             let action = self.floats(self.image.action());
             if action.iter().zip(expected).any(|(a, w)| a.to_bits() != u32::from_le(*w)) {
@@ -252,6 +289,22 @@ impl<'a, 's> Head<'a, 's> {
         Ok(())
     }
 
+    /// Checks the noise and puts it into the arena; within a chunk, whose values may stand there, only checks it.
+    #[inline(never)]
+    fn load_noise(&mut self, noise: &[f32]) -> Result<(), StepError> {
+        let region = self.image.noise();
+        if region.len != noise.len() {
+            return Err(StepError::NoiseLength { expected: region.len, given: noise.len() });
+        }
+        if let Some(index) = noise.iter().position(|v| !v.is_finite()) {
+            return Err(StepError::NoiseNotFinite { index });
+        }
+        if self.played == 0 {
+            copy(bytemuck::must_cast_slice(noise), self.words_mut(region));
+        }
+        Ok(())
+    }
+
     /// Runs operations from where the step stands; true behind the last one.
     #[inline(never)]
     fn evaluate(&mut self, budget: &mut impl Meter, one_op: bool) -> Result<bool, Fault> {
@@ -266,7 +319,12 @@ impl<'a, 's> Head<'a, 's> {
             if done != Ok(true) {
                 return done;
             }
-            *cursor = Cursor { op: cursor.op + 1, ..Cursor::default() };
+            let Cursor { mut op, mut step, draw, .. } = *cursor;
+            op += 1;
+            if op == self.image.op_count() && step + 1 < self.image.denoising_steps() {
+                (op, step) = (self.image.once(), step + 1);
+            }
+            *cursor = Cursor { op, step, draw, ..Cursor::default() };
             if one_op {
                 return Ok(false);
             }

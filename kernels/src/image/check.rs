@@ -4,7 +4,7 @@ use super::contract::CONTRACT_ARRAYS;
 use super::crc::checksum;
 use super::header as h;
 use super::matrix::{matrix, row_block};
-use super::op::{Form, OpKind, Uses};
+use super::op::{Form, Op, OpKind, Uses};
 use super::proof::fits_i32;
 use super::region::Region;
 use super::text::is_text;
@@ -52,7 +52,7 @@ impl<'a> Image<'a> {
     }
 
     fn check(&self) -> Result<(), ImageError> {
-        let reserved = high(self.head(h::W_MATRIX_COUNT)) as u32 | self.header[30] | self.header[31];
+        let reserved = high(self.head(h::W_MATRIX_COUNT)) as u32 | self.header[31];
         if reserved != 0
             || (self.head(h::W_KIND) >> 8) as u8 != 0
             || high(self.head(h::W_WORK_FLAGS)) >> CONTRACT_ARRAYS != 0
@@ -61,9 +61,16 @@ impl<'a> Image<'a> {
         }
         match (self.head(h::W_KIND) as u8, self.chunk(), self.execute()) {
             (0, 1, 1) => {}
-            (1, chunk, execute) if (1..=chunk).contains(&execute) => {}
-            (0 | 1, ..) => return Err(ImageError::Chunk),
+            (1..=3, chunk, execute) if (1..=chunk).contains(&execute) => {}
+            (0..=3, ..) => return Err(ImageError::Chunk),
             _ => return Err(ImageError::Kind),
+        }
+        // Denoising steps have operations, and only an iterative head has them.
+        let (once, steps) = (self.once(), high(self.head(h::W_DENOISING)));
+        let denoising =
+            if self.kind().is_iterative() { steps > 0 && once < self.op_count() } else { once | steps == 0 };
+        if !denoising {
+            return Err(ImageError::Denoising);
         }
         if self.obs_len() == 0 || self.act_len() == 0 || self.op_count() == 0 {
             return Err(ImageError::Shape);
@@ -160,6 +167,13 @@ impl<'a> Image<'a> {
             if op.bias() != 0 {
                 front.take_finite(op.bias(), n)?;
             }
+        } else if op.kind.is_of_step() {
+            self.check_denoising(i, op, front)?;
+        } else if op.kind == OpKind::Noise {
+            // A head's caller may have filled it before the first operation.
+            if i != 0 {
+                return Err(ImageError::Denoising);
+            }
         } else if *constants > 0 {
             let [constants, arrays] = [*constants, *arrays].map(usize::from);
             for constant in front.take(op.data(), constants)? {
@@ -186,6 +200,32 @@ impl<'a> Image<'a> {
             return Err(ImageError::Arena);
         }
         Ok(written.max(dst.end()))
+    }
+
+    /// What differs between denoising steps: only in operations that these run, with constants for each.
+    #[inline(never)]
+    fn check_denoising(&self, i: usize, op: &Op<'_>, front: &mut Front<'a>) -> Result<(), ImageError> {
+        let (n, steps) = (op.dst().len, self.denoising_steps());
+        if i < self.once() || !self.kind().is_iterative() {
+            return Err(ImageError::Denoising);
+        }
+        if op.kind == OpKind::Table {
+            return front.take_finite(op.data(), steps * n);
+        }
+        let [limit, noise] = *front.take(op.data(), h::DENOISE_WORDS)? else { return Err(ImageError::Section) };
+        let limit = f32::from_bits(u32::from_le(limit));
+        if limit != f32::INFINITY && !is_positive(limit) {
+            return Err(ImageError::Constant);
+        }
+        // Noise of every step, behind what the first began from.
+        let noise = Region { offset: u32::from_le(noise) as usize, len: steps * n };
+        let all = self.noise();
+        if noise.offset != 0
+            && (noise.offset < all.offset || noise.offset > all.end() || all.end() - noise.offset < noise.len)
+        {
+            return Err(ImageError::Denoising);
+        }
+        front.take_finite(op.data() + h::DENOISE_WORDS, steps * h::COEFFICIENTS)
     }
 }
 

@@ -18,6 +18,10 @@ pub const OP_WORDS: usize = 4;
 pub const MATRIX_WORDS: usize = 4;
 /// Words of a block record.
 pub const BLOCK_WORDS: usize = 4;
+/// Words of the constants of a denoise operation before the coefficients of its steps.
+pub const DENOISE_WORDS: usize = 2;
+/// Coefficients of a denoising step.
+pub const COEFFICIENTS: usize = 7;
 /// The largest output of a matrix, in rows.
 pub const MAX_ROWS: usize = 4096;
 /// The most words of an arena: places in it are u16.
@@ -68,6 +72,9 @@ pub const W_MATRICES: usize = 28;
 /// u16 number of matrices, u16 zero.
 pub const W_MATRIX_COUNT: usize = 29;
 
+/// u16 first operation of those that every denoising step runs, u16 denoising steps; 0 where the network runs once.
+pub const W_DENOISING: usize = 30;
+
 /// What a policy's output means.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
@@ -75,6 +82,20 @@ pub enum Kind {
     Step = 0,
     /// Several future actions per evaluation, of which the first few are executed.
     Chunk = 1,
+    /// A chunk, made from noise by a flow.
+    Flow = 2,
+    /// A chunk, made from noise by a diffusion process backwards.
+    Diffusion = 3,
+}
+
+impl Kind {
+    /// All of them, by number.
+    pub const ALL: [Self; 4] = [Self::Step, Self::Chunk, Self::Flow, Self::Diffusion];
+
+    /// Whether the network runs several times for an output.
+    pub const fn is_iterative(self) -> bool {
+        matches!(self, Self::Flow | Self::Diffusion)
+    }
 }
 
 /// What a writer says in a header.
@@ -108,6 +129,10 @@ pub struct Header {
     pub matrices: Records,
     /// The operation records.
     pub ops: Records,
+    /// How many of the operations run once, before those of the denoising steps; 0 where all do.
+    pub once: usize,
+    /// Denoising steps; 0 where the network runs once.
+    pub denoising_steps: usize,
     /// Offset of the action contract's arrays.
     pub contract: u32,
     /// Which of them there are, from bit 0 on.
@@ -149,6 +174,7 @@ impl Header {
         }
         words[W_MATRICES] = self.matrices.offset;
         words[W_MATRIX_COUNT] = halves(self.matrices.count, 0)?;
+        words[W_DENOISING] = halves(self.once, self.denoising_steps)?;
         Ok(words)
     }
 }

@@ -3,7 +3,7 @@
 use core::mem::discriminant;
 use core::ops::Range;
 
-use super::header::{MATRIX_WORDS, OP_WORDS, W_KIND, W_MATRICES, W_MATRIX_COUNT, W_OPS};
+use super::header::{self as h, MATRIX_WORDS, OP_WORDS, W_KIND, W_MATRICES, W_MATRIX_COUNT, W_OPS};
 use super::matrix::{Matrix, matrix};
 use super::region::Region;
 use super::view::Image;
@@ -36,9 +36,22 @@ pub enum OpKind {
     LstmCell,
     /// A GRU cell: `src` holds `W_ih x + b_ih`, `third` holds `W_hh h + b_hh`, each of gates `[r z n]`, `dst` is the state.
     GruCell,
+    /// `dst` = noise: of the caller, or of the head's generator.
+    Noise,
+    /// `dst` = the row of the array for this denoising step. Arrays: one for each.
+    Table,
+    /// A denoising step ([`crate::ops::denoise`]) of the iterate `dst` by the network's output `src`; `third` is what the network reads
+    /// next. Constants: the limit of the predicted sample, infinite where there is none; the arena offset of the first step's noise,
+    /// or 0; the coefficients of each step.
+    Denoise,
 }
 
 impl OpKind {
+    /// Whether what it does differs between denoising steps.
+    pub(super) fn is_of_step(self) -> bool {
+        matches!(self, Self::Table | Self::Denoise)
+    }
+
     fn form(self) -> Option<&'static Form> {
         FORMS.iter().find(|form| discriminant(&form.kind) == discriminant(&self))
     }
@@ -80,6 +93,9 @@ pub(super) struct Uses {
     /// Whether it works on what `dst` holds. (Of linear, the detail decides.)
     reads_dst: bool,
 }
+
+/// In place of the number of constants, where that depends on the denoising steps.
+const NAMED: u8 = u8::MAX;
 
 impl Uses {
     /// Nothing but its destination, once.
@@ -143,6 +159,12 @@ operations! {
     LSTM_CELL = 8 "lstm cell": OpKind::LstmCell, Uses { src: 4, third: 1, ..Uses::NONE };
     /// [`OpKind::GruCell`]
     GRU_CELL = 9 "gru cell": OpKind::GruCell, Uses { src: 3, third: 3, reads_dst: true, ..Uses::NONE };
+    /// [`OpKind::Noise`]
+    NOISE = 10 "noise": OpKind::Noise, Uses::NONE;
+    /// [`OpKind::Table`]
+    TABLE = 11 "table": OpKind::Table, Uses { constants: NAMED, ..Uses::NONE };
+    /// [`OpKind::Denoise`]
+    DENOISE = 12 "denoise": OpKind::Denoise, Uses { src: 1, third: 1, constants: NAMED, reads_dst: true, ..Uses::NONE };
 }
 
 /// What a writer says in an operation's record.
@@ -223,6 +245,19 @@ impl<'a> Op<'a> {
     /// Single constant `i`: see [`OpKind`].
     pub fn constant(&self, i: usize) -> f32 {
         f32::from_bits(word(self.image, self.data().wrapping_add(i)))
+    }
+
+    /// Row `step` of a table, as far as `range` says; empty where that is not in the image.
+    pub(crate) fn row(&self, step: usize, range: &Range<usize>) -> &'a [u32] {
+        let before = step.wrapping_mul(self.dst().len).wrapping_add(range.start);
+        section(self.image, self.data().wrapping_add(before), range.len()).unwrap_or_default()
+    }
+
+    /// The coefficients of denoising step `step`, and the arena offset of its noise.
+    pub(crate) fn coefficients(&self, step: usize) -> ([f32; h::COEFFICIENTS], usize) {
+        let first = h::DENOISE_WORDS + step * h::COEFFICIENTS;
+        let noise = word(self.image, self.data().wrapping_add(1)) as usize;
+        (core::array::from_fn(|i| self.constant(first + i)), noise.wrapping_add(step * self.dst().len))
     }
 
     /// Array `i` of f32 bits, of the length of `dst`: see [`OpKind`].

@@ -1,6 +1,7 @@
 //! A parsed image, and what its header says.
 
 use super::header::{self as h, Kind};
+use super::op::OpKind;
 use super::region::Region;
 use super::words::{high, low, section, word};
 
@@ -49,7 +50,7 @@ impl<'a> Image<'a> {
 
     /// What the output means.
     pub fn kind(&self) -> Kind {
-        if self.head(h::W_KIND) as u8 == 1 { Kind::Chunk } else { Kind::Step }
+        Kind::ALL.get(usize::from(self.head(h::W_KIND) as u8)).copied().unwrap_or(Kind::Step)
     }
 
     /// Actions in the network's output.
@@ -60,6 +61,26 @@ impl<'a> Image<'a> {
     /// How many of a chunk's actions are executed before the network runs again.
     pub fn execute(&self) -> usize {
         high(self.head(h::W_CHUNK))
+    }
+
+    /// The first of the operations that every denoising step runs; 0 where the network runs once.
+    pub fn once(&self) -> usize {
+        low(self.head(h::W_DENOISING))
+    }
+
+    /// How often these run: the denoising steps, or 1.
+    pub fn denoising_steps(&self) -> usize {
+        high(self.head(h::W_DENOISING)).max(1)
+    }
+
+    /// Values of noise that an evaluation takes; 0 where it takes none.
+    pub fn noise_len(&self) -> usize {
+        self.noise().len
+    }
+
+    /// Arena region of the noise, which the first operation fills; empty where there is none.
+    pub(crate) fn noise(&self) -> Region {
+        self.op(0).ok().filter(|op| op.kind == OpKind::Noise).map_or(Region::default(), |op| op.dst())
     }
 
     /// Words of scratch memory that a head needs.

@@ -1,6 +1,8 @@
 //! The operations of an image.
 
 pub mod cells;
+pub mod denoise;
 pub mod elementwise;
 pub mod linear;
+pub mod noise;
 pub mod norm;

@@ -35,6 +35,14 @@ impl core::ops::Add for Cost {
     }
 }
 
+impl core::ops::Mul<u64> for Cost {
+    type Output = Self;
+
+    fn mul(self, times: u64) -> Self {
+        Self { instructions: self.instructions * times, cycles: self.cycles * times }
+    }
+}
+
 impl core::iter::Sum for Cost {
     fn sum<I: Iterator<Item = Self>>(costs: I) -> Self {
         costs.fold(Self::default(), |sum, cost| sum + cost)
@@ -97,7 +105,8 @@ pub fn of_op(op: &Op<'_>) -> Cost {
 
 /// The cost of a step that evaluates the network; steps that play on from a chunk cost the same without the operations.
 pub fn of_step(image: &Image<'_>) -> Cost {
-    of_frame(image) + image.ops().map(|op| of_op(&op)).sum()
+    let times = |i: usize| if i < image.once() { 1 } else { image.denoising_steps() as u64 };
+    of_frame(image) + image.ops().enumerate().map(|(i, op)| of_op(&op) * times(i)).sum()
 }
 
 /// The cost of a step without the network's operations.
