@@ -4,7 +4,9 @@
 
 pub mod arrays;
 mod builder;
+mod denoising;
 mod evaluate;
+pub mod hoist;
 pub mod lowering;
 mod nodes;
 pub mod operation;
@@ -13,6 +15,7 @@ mod run;
 mod values;
 mod weights;
 
+pub use denoising::Denoising;
 pub use evaluate::Evaluator;
 pub use nodes::{Graph, Node};
 pub use ops::NodeKind;

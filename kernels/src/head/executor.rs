@@ -11,13 +11,14 @@ use crate::ops::elementwise::{self, copy, copy_le};
 use crate::ops::noise::normal;
 use crate::ops::norm;
 
-/// Runs a whole operation over an arena, as a head does: for whoever runs a network's operations one by one.
+/// Runs a whole operation over an arena, as a head does in a denoising step: for whoever runs a network's operations one by one. Noise
+/// is that of the arena.
 ///
 /// # Errors
 ///
 /// As [`Head::step`](super::Head::step).
-pub fn run_whole(op: &Op<'_>, arena: &mut [u32]) -> Result<(), StepError> {
-    run(op, arena, &mut Cursor::default(), &mut Unlimited)?;
+pub fn run_whole(op: &Op<'_>, step: usize, arena: &mut [u32]) -> Result<(), StepError> {
+    run(op, arena, &mut Cursor { step, ..Cursor::default() }, &mut Unlimited)?;
     Ok(())
 }
 

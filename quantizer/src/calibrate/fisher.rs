@@ -87,14 +87,14 @@ fn add_squares(
     let batch = d_output.nrows();
     let mut d_state = zero_state(network.graph, batch);
     // Per matrix: the gradient at the output and the input of each use.
-    let mut uses: Vec<Vec<(Array2<f32>, &Array2<f32>)>> = vec![Vec::new(); fisher.len()];
+    let mut uses: Vec<Vec<(Array2<f32>, Array2<f32>)>> = vec![Vec::new(); fisher.len()];
     let silent = Array2::zeros(d_output.raw_dim());
     let mut d_output = Some(d_output);
     for pass in passes.iter().rev() {
         let d_output = d_output.take().unwrap_or_else(|| silent.clone());
-        network.backward(weights, pass, d_output, &mut d_state, unused, &mut |matrix, node, product, dy| {
-            if let (true, Some(x)) = (dy.iter().any(|d| *d != 0.0), pass.operand(node, product)) {
-                uses[matrix].push((dy.clone(), x));
+        network.backward(weights, pass, d_output, &mut d_state, unused, &mut |matrix, x, dy| {
+            if dy.iter().any(|d| *d != 0.0) {
+                uses[matrix].push((dy.clone(), x.clone()));
             }
         });
     }

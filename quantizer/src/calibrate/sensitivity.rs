@@ -37,7 +37,7 @@ pub fn output_moments(windows: &Windows<'_>, seed: u64) -> Vec<DMatrix<f64>> {
             if variance > 0.0 { random.sign() / variance.sqrt() } else { 0.0 }
         });
         let mut d_state = zero_state(graph, samples);
-        network.backward(&windows.weights, &pass, probe, &mut d_state, &mut grads, &mut |m, _, _, dy| {
+        network.backward(&windows.weights, &pass, probe, &mut d_state, &mut grads, &mut |m, _, dy| {
             ndarray::linalg::general_mat_mul(1.0, &dy.t(), dy, 1.0, &mut sums[m]);
             counts[m] += dy.nrows();
         });

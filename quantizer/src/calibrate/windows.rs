@@ -1,7 +1,7 @@
 //! Batches of recorded observations: single frames for a feed-forward network, windows with the f32 network's own state at
 //! their start for a recurrent one.
 
-use ndarray::{Array2, Axis};
+use ndarray::{Array2, Axis, s};
 
 use super::widening::{MEMORY, Widening};
 use crate::data::Dataset;
@@ -54,7 +54,7 @@ impl<'a> Windows<'a> {
         let mut outputs = Vec::new();
         for (e, &length) in dataset.length.iter().enumerate().filter(|(_, n)| **n > 0) {
             let rows: Vec<f32> = dataset.episode(e).flatten().collect();
-            let episode = Array2::from_shape_vec((length, graph.obs_len), rows).unwrap_or_default();
+            let episode = Array2::from_shape_vec((length, graph.input_len()), rows).unwrap_or_default();
             if recurrent {
                 let mut state = start_state(graph, &[dataset.start(e)]);
                 let mut kept = zero_state(graph, length);
@@ -94,7 +94,7 @@ impl<'a> Windows<'a> {
 
     /// A batch of `size` windows, at the recorded observations or widened.
     pub fn batch(&self, size: usize, widening: Option<Widening>, random: &mut Random) -> Batch {
-        let mut frames = Array2::zeros((size * self.window, self.graph.obs_len));
+        let mut frames = Array2::zeros((size * self.window, self.graph.input_len()));
         let mut state = zero_state(self.graph, size);
         for sample in 0..size {
             let e = random.below(self.episodes.len());
@@ -142,6 +142,8 @@ impl<'a> Windows<'a> {
                 *x += shift + amplitude * deviation * *noise;
                 *noise = MEMORY * *noise + fresh * random.normal();
             }
+            // Of a new draw the policy may begin from anything.
+            frames.slice_mut(s![row, self.graph.obs_len..]).iter_mut().for_each(|noise| *noise = random.normal());
         }
     }
 

@@ -10,7 +10,7 @@ use tempfile::TempDir;
 
 use super::{Dataset, Sizes};
 
-const SIZES: Sizes = Sizes { obs: 3, out: 2, state: 0 };
+const SIZES: Sizes = Sizes { obs: 3, noise: 0, out: 2, state: 0 };
 
 /// An array's bytes: `header` in numpy's format of a major version, then the elements.
 fn npy(version: u8, header: &str, elements: &[u8]) -> Vec<u8> {

@@ -4,8 +4,9 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use actq_kernels::Image;
+use actq_kernels::ops::noise::normal;
 use anyhow::{Context, Result, bail, ensure};
-use ndarray::{Array2, Array3, ArrayView1, Axis, s};
+use ndarray::{Array2, Array3, ArrayView1, Axis, concatenate, s};
 
 use super::arrays::{Arrays, floats};
 use crate::graph::{Evaluator, Graph};
@@ -17,6 +18,8 @@ use crate::policy::Policy;
 pub struct Sizes {
     /// Values of an observation.
     pub obs: usize,
+    /// Values of noise that an evaluation takes ([`Graph::noise_len`]).
+    pub noise: usize,
     /// Values of the network's raw output.
     pub out: usize,
     /// Values of the recurrent state ([`Graph::state_len`]).
@@ -26,12 +29,18 @@ pub struct Sizes {
 impl Sizes {
     /// Those of a policy.
     pub fn of(policy: &Policy) -> Self {
-        Self { obs: policy.graph.obs_len, out: policy.chunk * policy.act_len, state: policy.graph.state_len() }
+        let graph = &policy.graph;
+        Self {
+            obs: graph.obs_len,
+            noise: graph.noise_len(),
+            out: policy.chunk * policy.act_len,
+            state: graph.state_len(),
+        }
     }
 
     /// Those of an image.
     pub fn of_image(image: &Image<'_>) -> Self {
-        Self { obs: image.obs_len(), out: image.output().len, state: image.state().len }
+        Self { obs: image.obs_len(), noise: image.noise_len(), out: image.output().len, state: image.state().len }
     }
 }
 
@@ -40,7 +49,7 @@ impl Sizes {
 pub struct Dataset {
     /// The file, for messages.
     pub path: PathBuf,
-    /// `[episode, step, value]`
+    /// `[episode, step, value]`; behind the values of an observation stands the noise of an iterative head.
     pub obs: Array3<f32>,
     /// `[episode, step, value]`: the network's raw output at that observation.
     pub action: Option<Array3<f32>>,
@@ -72,7 +81,18 @@ impl Dataset {
         };
         ensure!(episodes > 0 && steps > 0, "array \"obs\" is empty: {:?}", obs.shape);
         ensure!(width == sizes.obs, "array \"obs\" has {width} values a step, the policy takes {}", sizes.obs);
-        let action = arrays.take("action");
+        let noise = arrays.take("noise").filter(|_| sizes.noise > 0);
+        if let Some(noise) = &noise {
+            let mut expected = obs.shape.clone();
+            *expected.last_mut().unwrap_or(&mut 0) = sizes.noise;
+            ensure!(
+                noise.shape == expected,
+                "array \"noise\" is {:?}, {expected:?} is needed: what the policy began from at every observation",
+                noise.shape
+            );
+        }
+        // Actions from noise that nobody knows say nothing.
+        let action = arrays.take("action").filter(|_| sizes.noise == 0 || noise.is_some());
         if let Some(action) = &action {
             let mut expected = obs.shape.clone();
             *expected.last_mut().unwrap_or(&mut 0) = sizes.out;
@@ -116,9 +136,19 @@ impl Dataset {
             }
             Ok(Array2::from_shape_vec((episodes, sizes.state), values)?)
         };
+        let mut obs = rows("obs", &obs)?;
+        if sizes.noise > 0 {
+            let noise = match noise {
+                Some(noise) => rows("noise", &noise)?,
+                None => Array3::from_shape_fn((episodes, steps, sizes.noise), |(e, s, i)| {
+                    normal(0, (e * steps + s) as u32, i as u32)
+                }),
+            };
+            obs = concatenate(Axis(2), &[obs.view(), noise.view()])?.as_standard_layout().into_owned();
+        }
         Ok(Self {
             path: path.to_owned(),
-            obs: rows("obs", &obs)?,
+            obs,
             action: action.map(|action| rows("action", &action)).transpose()?,
             state: state.map(starts).transpose()?,
             length,

@@ -13,8 +13,8 @@ use crate::calibrate::windows::Windows;
 use crate::graph::Graph;
 use crate::methods::actquant::testing::{dataset, lstm, mlp};
 
-const SIZES: Sizes = Sizes { obs: 3, out: 2, state: 0 };
-const RECURRENT: Sizes = Sizes { obs: 3, out: 2, state: 4 };
+const SIZES: Sizes = Sizes { obs: 3, noise: 0, out: 2, state: 0 };
+const RECURRENT: Sizes = Sizes { obs: 3, noise: 0, out: 2, state: 4 };
 
 /// An array of a file that is to be written.
 enum Array {

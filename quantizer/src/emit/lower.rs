@@ -5,12 +5,12 @@
 //! the work area. Buffers are placed in the order in which they are written, each as low as it fits: so none leaves a gap, and what
 //! a step has written always is the begin of the arena, as the image's check wants it.
 
-use actq_kernels::image::Region;
+use actq_kernels::image::{OpKind, Region};
 use actq_kernels::x::max_prepared_words;
 use anyhow::{Result, ensure};
 
-use crate::graph::Graph;
-use crate::graph::lowering::{BufferId, Lifetime, Lowering, Slice, Step};
+use crate::graph::lowering::{BufferId, Lifetime, Lowering, Slice, Step, StepData};
+use crate::graph::{Graph, Node, ValueId};
 
 /// The arena and the operations in it.
 #[derive(Debug)]
@@ -21,6 +21,8 @@ pub struct Program {
     pub state: Region,
     /// The observation.
     pub observation: Region,
+    /// How many operations run once, before those of the denoising steps; 0 where all do.
+    pub once: usize,
     /// The network's output.
     pub output: Region,
     /// The action.
@@ -39,14 +41,36 @@ pub fn lower(graph: &Graph, act_len: usize, group: usize) -> Result<Program> {
         readers[value] += 1;
     }
     let mut lowering = Lowering::new(graph.obs_len, readers);
-    for node in &graph.nodes {
-        let place = node.kind.lower(&mut lowering, &node.inputs, node.len);
+    let work_len = graph.matrices.iter().map(|m| max_prepared_words(m.cols, group)).max().unwrap_or(0);
+    let Some(denoising) = &graph.denoising else {
+        nodes(&graph.nodes, &mut lowering);
+        let output = lowering.private(graph.output());
+        lowering.buffers[output].lifetime = Lifetime::Output;
+        let output = lowering.whole(output);
+        return Arena { lowering, work_len }.assign(OBSERVATION, 0, output, act_len);
+    };
+    let iterate = lowering.noise(graph.noise_len(), denoising.len);
+    let (before, of_step) = graph.nodes.split_at(denoising.first);
+    nodes(before, &mut lowering);
+    let read: Vec<ValueId> =
+        of_step.iter().flat_map(|node| node.inputs.iter().copied()).filter(|value| *value <= denoising.first).collect();
+    let once = lowering.begin_steps(iterate, &read);
+    nodes(of_step, &mut lowering);
+    let mut constants = vec![denoising.limit, f32::from_bits(0)];
+    constants.extend(denoising.steps.iter().flat_map(|step| step.to_array()));
+    let (velocity, read_next) = (lowering.place(graph.output()), lowering.whole(lowering.iterate()));
+    let data =
+        StepData::Denoise { constants, noise: denoising.draws().then_some(Slice { offset: denoising.len, ..iterate }) };
+    lowering.emit(OpKind::Denoise, iterate, Some(velocity), Some(read_next), data);
+    Arena { lowering, work_len }.assign(OBSERVATION, once, iterate, act_len)
+}
+
+/// Lowers nodes, one after the other.
+fn nodes(nodes: &[Node], lowering: &mut Lowering) {
+    for node in nodes {
+        let place = node.kind.lower(lowering, &node.inputs, node.len);
         lowering.finish_node(place, &node.inputs);
     }
-    let output = lowering.private(graph.output());
-    lowering.buffers[output].lifetime = Lifetime::Output;
-    let work_len = graph.matrices.iter().map(|m| max_prepared_words(m.cols, group)).max().unwrap_or(0);
-    Arena { lowering, work_len }.assign(OBSERVATION, output, act_len)
 }
 
 /// The buffer of the observation.
@@ -60,7 +84,7 @@ struct Arena {
 
 impl Arena {
     /// Gives every buffer its place.
-    fn assign(self, observation: BufferId, output: BufferId, act_len: usize) -> Result<Program> {
+    fn assign(self, observation: BufferId, once: usize, output: Slice, act_len: usize) -> Result<Program> {
         let Lowering { steps, buffers, .. } = &self.lowering;
         let mut offsets = vec![0; buffers.len()];
         let mut top = 0;
@@ -107,13 +131,22 @@ impl Arena {
             dst: region(step.dst),
             src: step.src.map(region),
             third: step.third.map(region),
-            data: step.data.clone(),
+            data: match &step.data {
+                StepData::Denoise { constants, noise: Some(noise) } => {
+                    let mut constants = constants.clone();
+                    constants[1] = f32::from_bits(region(*noise).offset as u32);
+                    StepData::Constants(constants)
+                }
+                StepData::Denoise { constants, noise: None } => StepData::Constants(constants.clone()),
+                data => data.clone(),
+            },
         });
         Ok(Program {
             steps: steps.collect(),
             state: Region { offset: 0, len: state_len },
             observation: whole(observation),
-            output: whole(output),
+            once,
+            output: region(output),
             action,
             work: Region { offset: work_offset, len: self.work_len },
             words,

@@ -57,6 +57,8 @@ pub fn image(policy: &Policy, matrices: &[Outcome]) -> Result<Vec<u8>> {
         work: program.work,
         matrices: Records { offset: writer.matrices, count: matrices.len() },
         ops: Records { offset: ops, count: program.steps.len() },
+        once: program.once,
+        denoising_steps: policy.graph.denoising.as_ref().map_or(0, |denoising| denoising.steps.len()),
         contract,
         contract_flags: flags,
         name: Records { offset: name, count: policy.name.len() },
@@ -160,7 +162,7 @@ impl Writer {
     fn op(&mut self, step: &Step<Region>) -> Result<[u32; h::OP_WORDS]> {
         let (bias, data) = match &step.data {
             StepData::None => (0, 0),
-            StepData::Constants(values) => (0, self.push_floats(values)),
+            StepData::Constants(values) | StepData::Denoise { constants: values, .. } => (0, self.push_floats(values)),
             StepData::Product { matrix, bias } => {
                 let bias = if bias.iter().all(|b| *b == 0.0) { 0 } else { self.push_floats(bias) };
                 (bias, self.matrices + (matrix * h::MATRIX_WORDS) as u32)

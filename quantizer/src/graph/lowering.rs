@@ -31,6 +31,13 @@ pub enum StepData {
     None,
     /// Single constants, then arrays, in the order of [`OpKind`]'s description.
     Constants(Vec<f32>),
+    /// Those of a denoising step, where the second becomes the arena offset of its noise.
+    Denoise {
+        /// See [`OpKind::Denoise`].
+        constants: Vec<f32>,
+        /// The first step's noise.
+        noise: Option<Slice>,
+    },
     /// A matrix of the graph, and its bias; empty: none.
     Product {
         /// Index.
@@ -56,7 +63,8 @@ pub struct Slice {
 pub enum Lifetime {
     /// Between the first and the last operation that names it.
     Step,
-    /// From the first operation that names it on: the output, a chunk of which is played over several steps.
+    /// From the first operation that names it on: the output, a chunk of which is played over several steps, and what every
+    /// denoising step reads.
     Output,
     /// In a place of its own, written before the first operation.
     Observation,
@@ -84,13 +92,15 @@ pub struct Lowering {
     places: Vec<BufferId>,
     /// How many nodes still read each value; the network's output counts as one more.
     readers: Vec<usize>,
+    /// What the network reads of the iterate.
+    iterate: BufferId,
 }
 
 impl Lowering {
     /// Nothing but the observation; `readers` says how many nodes read each value.
     pub fn new(obs_len: usize, readers: Vec<usize>) -> Self {
         let observation = Buffer { len: obs_len, lifetime: Lifetime::Observation };
-        Self { steps: Vec::new(), buffers: vec![observation], places: vec![0], readers }
+        Self { steps: Vec::new(), buffers: vec![observation], places: vec![0], readers, iterate: 0 }
     }
 
     /// A new buffer.
@@ -102,6 +112,32 @@ impl Lowering {
     /// All of a buffer.
     pub fn whole(&self, buffer: BufferId) -> Slice {
         Slice { buffer, offset: 0, len: self.buffers[buffer].len }
+    }
+
+    /// Noise, whose first values become the iterate, which is given; to be emitted first.
+    pub fn noise(&mut self, noise_len: usize, len: usize) -> Slice {
+        let noise = self.buffer(noise_len, Lifetime::Output);
+        self.emit(OpKind::Noise, self.whole(noise), None, None, StepData::None);
+        let iterate = Slice { len, ..self.whole(noise) };
+        self.iterate = self.buffer(len, Lifetime::Output);
+        iterate
+    }
+
+    /// The denoising steps begin with the next operation: what these values hold stays. Gives the number of operations before.
+    pub fn begin_steps(&mut self, iterate: Slice, read: &[ValueId]) -> usize {
+        self.emit(OpKind::Copy, self.whole(self.iterate), Some(iterate), None, StepData::None);
+        for &value in read {
+            let buffer = &mut self.buffers[self.places[value]];
+            if buffer.lifetime == Lifetime::Step {
+                buffer.lifetime = Lifetime::Output;
+            }
+        }
+        self.steps.len()
+    }
+
+    /// What the network reads of the iterate.
+    pub fn iterate(&self) -> BufferId {
+        self.iterate
     }
 
     /// Where a value is, to be read.

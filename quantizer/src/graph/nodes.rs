@@ -1,5 +1,6 @@
 //! The network as a list of nodes over values.
 
+use super::denoising::Denoising;
 use super::ops::NodeKind;
 use super::values::{ValueId, WeightMatrix};
 
@@ -23,12 +24,29 @@ pub struct Graph {
     pub matrices: Vec<WeightMatrix>,
     /// The nodes in the order of evaluation; the last one's output is the network's.
     pub nodes: Vec<Node>,
+    /// The denoising steps, where the network is the head of a flow or a diffusion policy.
+    pub denoising: Option<Denoising>,
 }
 
 impl Graph {
     /// A network without nodes.
     pub fn new(obs_len: usize) -> Self {
-        Self { obs_len, matrices: Vec::new(), nodes: Vec::new() }
+        Self { obs_len, matrices: Vec::new(), nodes: Vec::new(), denoising: None }
+    }
+
+    /// Values of noise behind an observation, which an evaluation takes.
+    pub fn noise_len(&self) -> usize {
+        self.denoising.as_ref().map_or(0, Denoising::noise_len)
+    }
+
+    /// Length of an observation with its noise.
+    pub fn input_len(&self) -> usize {
+        self.obs_len + self.noise_len()
+    }
+
+    /// How often a step runs its network.
+    pub fn denoising_steps(&self) -> usize {
+        self.denoising.as_ref().map_or(1, |denoising| denoising.steps.len())
     }
 
     /// The value that the last node gives.

@@ -103,17 +103,34 @@ pub fn expect_shape(matrices: &[WeightMatrix], index: usize, rows: Option<usize>
     Ok(*r)
 }
 
+/// Values of a pass: those of the nodes that run once, then those of a denoising step.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Values<'a> {
+    pub(super) once: &'a [Array2<f32>],
+    pub(super) of_step: &'a [Array2<f32>],
+}
+
+impl<'a> Values<'a> {
+    pub(super) fn of(&self, value: ValueId) -> &'a Array2<f32> {
+        self.once.get(value).unwrap_or_else(|| &self.of_step[value - self.once.len()])
+    }
+}
+
 /// What a node sees in a forward pass.
 #[derive(Debug)]
 pub struct Forward<'a> {
     /// Every value so far.
-    pub(super) values: &'a [Array2<f32>],
+    pub(super) values: Values<'a>,
     /// The node's inputs among them.
     pub(super) inputs: &'a [ValueId],
     /// The graph's matrices.
     pub(super) matrices: &'a [Array2<f32>],
     /// As [`Operation::vectors`].
     pub vectors: &'a [Vec<f32>],
+    /// What the network reads of the iterate; `None` outside of denoising steps.
+    pub(super) iterate: Option<&'a Array2<f32>>,
+    /// Which denoising step it is; 0 outside of them.
+    pub step: usize,
     /// Activation magnitude of every matrix; empty: activations are not rounded.
     pub(super) x_max: &'a [u16],
     /// Order of sums.
@@ -123,12 +140,23 @@ pub struct Forward<'a> {
 impl<'a> Forward<'a> {
     /// An input, `[sample, element]`.
     pub fn input(&self, i: usize) -> &'a Array2<f32> {
-        &self.values[self.inputs[i]]
+        self.values.of(self.inputs[i])
     }
 
     /// All inputs.
     pub fn inputs(&self) -> impl Iterator<Item = &'a Array2<f32>> {
-        self.inputs.iter().map(|&value| &self.values[value])
+        let values = self.values;
+        self.inputs.iter().map(move |&value| values.of(value))
+    }
+
+    /// Rows of every value.
+    pub fn samples(&self) -> usize {
+        self.values.of(0).nrows()
+    }
+
+    /// What the network reads of the iterate.
+    pub fn iterate(&self) -> &'a Array2<f32> {
+        self.iterate.unwrap_or(self.values.of(0))
     }
 
     /// `x` as it enters the product with a matrix: rounded where the image's activations are.
@@ -147,21 +175,25 @@ impl<'a> Forward<'a> {
     }
 }
 
-/// Is shown the derivative by the output of a matrix product: matrix, node, which of the node's products, derivative.
-pub type See<'a> = dyn FnMut(usize, usize, usize, &Array2<f32>) + 'a;
+/// Is shown a matrix product: matrix, operand, derivative by the output.
+pub type See<'a> = dyn FnMut(usize, &Array2<f32>, &Array2<f32>) + 'a;
 
 /// What a node sees, and where derivatives go, in a backward pass.
 pub struct Backward<'a> {
     /// The node.
     pub(super) node: usize,
     /// Every value of the forward pass.
-    pub(super) values: &'a [Array2<f32>],
+    pub(super) values: Values<'a>,
     /// The node's inputs among them.
     pub(super) inputs: &'a [ValueId],
     /// The graph's matrices.
     pub(super) matrices: &'a [Array2<f32>],
     /// As [`Operation::vectors`].
     pub vectors: &'a [Vec<f32>],
+    /// Which denoising step it is.
+    pub step: usize,
+    /// Derivative by what the network reads of the iterate.
+    pub(super) d_iterate: &'a mut Option<Array2<f32>>,
     /// Derivatives by all values, as far as they are known.
     pub(super) d_values: &'a mut [Option<Array2<f32>>],
     /// Derivatives by the matrices.
@@ -175,12 +207,20 @@ pub struct Backward<'a> {
 impl<'a> Backward<'a> {
     /// An input, `[sample, element]`.
     pub fn input(&self, i: usize) -> &'a Array2<f32> {
-        &self.values[self.inputs[i]]
+        self.values.of(self.inputs[i])
     }
 
     /// The node's output.
     pub fn output(&self) -> &'a Array2<f32> {
-        &self.values[self.node + 1]
+        self.values.of(self.node + 1)
+    }
+
+    /// Adds the derivative by what the network reads of the iterate.
+    pub fn give_iterate(&mut self, d: Array2<f32>) {
+        match &mut *self.d_iterate {
+            Some(sum) => *sum += &d,
+            none => *none = Some(d),
+        }
     }
 
     /// Adds the derivative by an input.
@@ -192,8 +232,8 @@ impl<'a> Backward<'a> {
     }
 
     /// Takes the derivative `dy` by the output of a product: adds that by its matrix, whose operand was `x`.
-    pub fn product(&mut self, product: usize, matrix: usize, x: &Array2<f32>, dy: &Array2<f32>) {
-        (self.see)(matrix, self.node, product, dy);
+    pub fn product(&mut self, matrix: usize, x: &Array2<f32>, dy: &Array2<f32>) {
+        (self.see)(matrix, x, dy);
         general_mat_mul(1.0, &dy.t(), x, 1.0, &mut self.d_matrices[matrix]);
     }
 

@@ -4,10 +4,12 @@ mod add;
 mod concat;
 mod function;
 mod gru;
+mod iterate;
 mod linear;
 mod lstm;
 mod norm;
 mod normalize;
+mod table;
 
 use std::ops::{Deref, DerefMut};
 
@@ -15,10 +17,12 @@ pub use add::Add;
 pub use concat::{Concat, Span};
 pub use function::Pointwise;
 pub use gru::Gru;
+pub use iterate::Iterate;
 pub use linear::Linear;
 pub use lstm::Lstm;
 pub use norm::{LayerNorm, RmsNorm};
 pub use normalize::Normalize;
+pub use table::Table;
 
 use super::operation::Operation;
 
@@ -75,4 +79,8 @@ operations! {
     Lstm,
     /// A recurrent cell.
     Gru,
+    /// What an iterative head has made of its noise so far.
+    Iterate,
+    /// Constants of each denoising step.
+    Table,
 }

@@ -4,35 +4,46 @@
 //! then all of the second. Only nodes with a state see the difference; for all others a sequence is a larger batch. The gradient
 //! runs back through all steps. The derivatives are checked against finite differences in the tests.
 
-use ndarray::Array2;
+use std::ops::Range;
+
+use ndarray::{Array2, s};
 
 use super::arrays::Sums;
+use super::denoising::Iterates;
 use super::nodes::Graph;
-use super::operation::{Backward, Forward, Saved, See};
+use super::operation::{Backward, Forward, Saved, See, Values};
 use super::weights::{State, Weights};
 
 /// A forward pass.
 #[derive(Debug)]
 pub struct Pass {
-    /// The observation, then every node's output.
+    /// The observation, then every node's output; of an iterative head, of the nodes that run once.
     pub values: Vec<Array2<f32>>,
+    saved: Vec<Saved>,
+    /// Of each denoising step.
+    steps: Vec<StepPass>,
+    /// What the last denoising step has made.
+    denoised: Option<Array2<f32>>,
+}
+
+/// What a denoising step leaves.
+#[derive(Debug)]
+struct StepPass {
+    /// Before it.
+    at: Iterates,
+    values: Vec<Array2<f32>>,
     saved: Vec<Saved>,
 }
 
 impl Pass {
     /// The network's output.
     pub fn output(&self) -> &Array2<f32> {
-        &self.values[self.values.len() - 1]
+        self.denoised.as_ref().unwrap_or_else(|| &self.values[self.values.len() - 1])
     }
 
     /// As [`Self::output`], without the rest.
     pub fn into_output(mut self) -> Array2<f32> {
-        self.values.pop().unwrap_or_default()
-    }
-
-    /// What the matrix of a node's product was multiplied with.
-    pub fn operand(&self, node: usize, product: usize) -> Option<&Array2<f32>> {
-        self.saved[node].operands.get(product)
+        self.denoised.or_else(|| self.values.pop()).unwrap_or_default()
     }
 }
 
@@ -62,16 +73,52 @@ impl<'a> Network<'a> {
         Self { sums: Sums::InOrder, ..Self::new(graph) }
     }
 
-    /// One or more steps for a batch of observations, whose size is that of `state`, which advances.
+    /// One or more steps for a batch of observations, whose size is that of `state`, which advances. Behind an observation stands the
+    /// noise of an iterative head.
     pub fn forward(&self, weights: &Weights, obs: Array2<f32>, state: &mut State) -> Pass {
-        let mut values = vec![obs];
-        let mut saved = Vec::with_capacity(self.graph.nodes.len());
-        for (i, node) in self.graph.nodes.iter().enumerate() {
+        let Some(denoising) = &self.graph.denoising else {
+            let (mut values, mut saved) = (vec![obs], Vec::with_capacity(self.graph.nodes.len()));
+            self.run(weights, 0..self.graph.nodes.len(), None, &mut values, &mut saved, state);
+            return Pass { values, saved, steps: Vec::new(), denoised: None };
+        };
+        let (first, end) = (denoising.first, self.graph.nodes.len());
+        let noise = obs.slice(s![.., self.graph.obs_len..]).to_owned();
+        let (mut values, mut saved) = (vec![obs.slice(s![.., ..self.graph.obs_len]).to_owned()], Vec::new());
+        self.run(weights, 0..first, None, &mut values, &mut saved, state);
+        let mut at = denoising.start(noise.view());
+        let mut steps = Vec::with_capacity(denoising.steps.len());
+        for step in 0..denoising.steps.len() {
+            let mut of_step = (Vec::with_capacity(end - first), Vec::with_capacity(end - first));
+            self.run(weights, first..end, Some((step, &at.y, &values)), &mut of_step.0, &mut of_step.1, state);
+            let next = denoising.next(step, &at, &of_step.0[end - first - 1], noise.view());
+            steps.push(StepPass { at, values: of_step.0, saved: of_step.1 });
+            at = next;
+        }
+        Pass { values, saved, steps, denoised: Some(at.x) }
+    }
+
+    /// Runs nodes; within a denoising step, with its number, what the network reads of the iterate, and the values that stay.
+    fn run(
+        &self,
+        weights: &Weights,
+        nodes: Range<usize>,
+        step: Option<(usize, &Array2<f32>, &[Array2<f32>])>,
+        values: &mut Vec<Array2<f32>>,
+        saved: &mut Vec<Saved>,
+        state: &mut State,
+    ) {
+        for i in nodes {
+            let node = &self.graph.nodes[i];
             let run = Forward {
-                values: &values,
+                values: match step {
+                    Some((_, _, once)) => Values { once, of_step: values },
+                    None => Values { once: values, of_step: &[] },
+                },
                 inputs: &node.inputs,
                 matrices: &weights.matrices,
                 vectors: &weights.vectors[i],
+                iterate: step.map(|(_, iterate, _)| iterate),
+                step: step.map_or(0, |(step, ..)| step),
                 x_max: self.x_max,
                 sums: self.sums,
             };
@@ -79,15 +126,17 @@ impl<'a> Network<'a> {
             values.push(y);
             saved.push(keep);
         }
-        Pass { values, saved }
     }
 
     /// Every matrix with what it was multiplied with, in the order of evaluation.
     pub fn operands<'p>(&self, pass: &'p Pass) -> impl Iterator<Item = (usize, &'p Array2<f32>)> {
+        let nodes = self.graph.nodes.as_slice();
         let of_node = |(node, saved): (&'a super::nodes::Node, &'p Saved)| {
             node.kind.products().into_iter().map(|product| product.matrix).zip(&saved.operands)
         };
-        self.graph.nodes.iter().zip(&pass.saved).flat_map(of_node)
+        let of_steps =
+            pass.steps.iter().flat_map(move |step| nodes[nodes.len() - step.saved.len()..].iter().zip(&step.saved));
+        nodes.iter().zip(&pass.saved).chain(of_steps).flat_map(of_node)
     }
 
     /// Goes back through a pass. `d_output` is the loss's derivative by the network's output; `d_state`, by the state after
@@ -102,28 +151,68 @@ impl<'a> Network<'a> {
         grads: &mut Weights,
         see: &mut See<'_>,
     ) {
-        let mut d_values: Vec<Option<Array2<f32>>> = vec![None; pass.values.len()];
-        d_values[pass.values.len() - 1] = Some(d_output);
-        for (i, node) in self.graph.nodes.iter().enumerate().rev() {
+        let nodes = self.graph.nodes.len();
+        let mut d_values: Vec<Option<Array2<f32>>> = vec![None; nodes + 1];
+        let Some(denoising) = &self.graph.denoising else {
+            d_values[nodes] = Some(d_output);
+            self.back(weights, pass, None, &mut d_values, d_state, grads, see);
+            return;
+        };
+        let mut d = Iterates { y: Array2::zeros(d_output.raw_dim()), x: d_output };
+        for (step, of_step) in pass.steps.iter().enumerate().rev() {
+            let v = &of_step.values[of_step.values.len() - 1];
+            let (dx, dv) = denoising.back(step, &of_step.at, v, d);
+            d_values[nodes] = Some(dv);
+            let dy = self.back(weights, pass, Some(step), &mut d_values, d_state, grads, see);
+            d = Iterates { y: dy.unwrap_or_else(|| Array2::zeros(dx.raw_dim())), x: dx };
+        }
+        self.back(weights, pass, None, &mut d_values, d_state, grads, see);
+    }
+
+    /// Goes back through the nodes of a denoising step, or those that run once; gives the derivative by what the network reads of
+    /// the iterate.
+    #[expect(clippy::too_many_arguments, reason = "those of `backward`")]
+    fn back(
+        &self,
+        weights: &Weights,
+        pass: &Pass,
+        step: Option<usize>,
+        d_values: &mut [Option<Array2<f32>>],
+        d_state: &mut State,
+        grads: &mut Weights,
+        see: &mut See<'_>,
+    ) -> Option<Array2<f32>> {
+        let first = self.graph.denoising.as_ref().map_or(self.graph.nodes.len(), |denoising| denoising.first);
+        let (nodes, of_step, saved) = match step.map(|step| &pass.steps[step]) {
+            Some(of_step) => (first..self.graph.nodes.len(), &of_step.values[..], &of_step.saved),
+            None => (0..first, &[][..], &pass.saved),
+        };
+        let values = Values { once: &pass.values, of_step };
+        let mut d_iterate = None;
+        for (i, saved) in nodes.zip(saved).rev() {
+            let node = &self.graph.nodes[i];
             let dy = match d_values[i + 1].take() {
                 Some(dy) => dy,
                 // What a later step does with the state still counts.
-                None if node.kind.state_lens() != [0, 0] => Array2::zeros(pass.values[i + 1].raw_dim()),
+                None if node.kind.state_lens() != [0, 0] => Array2::zeros(values.of(i + 1).raw_dim()),
                 None => continue,
             };
             let mut run = Backward {
                 node: i,
-                values: &pass.values,
+                values,
                 inputs: &node.inputs,
                 matrices: &weights.matrices,
                 vectors: &weights.vectors[i],
-                d_values: &mut d_values,
+                step: step.unwrap_or(0),
+                d_iterate: &mut d_iterate,
+                d_values,
                 d_matrices: &mut grads.matrices,
                 d_vectors: &mut grads.vectors[i],
                 see,
             };
-            node.kind.backward(&mut run, &pass.saved[i], dy, &mut d_state[i]);
+            node.kind.backward(&mut run, saved, dy, &mut d_state[i]);
         }
+        d_iterate
     }
 }
 

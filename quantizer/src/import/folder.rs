@@ -10,6 +10,7 @@ use sha2::{Digest, Sha256};
 use super::json::{Json, positive};
 use super::ops::{Builder, Weights};
 use super::tensors::TensorFile;
+use crate::graph::hoist;
 use crate::policy::Policy;
 
 /// The files that make a policy, in its folder.
@@ -29,12 +30,12 @@ impl Policy {
         let mut digest = Sha256::new();
         digest.update(&json_bytes);
         digest.update(&weight_bytes);
-        let builder = Builder::new(json.obs_dim, Weights { file, path: &weights_path });
-        build(dir, &json, builder, digest.finalize().into()).with_context(|| json_path.display().to_string())
+        let weights = Weights { file, path: &weights_path };
+        build(dir, &json, weights, digest.finalize().into()).with_context(|| json_path.display().to_string())
     }
 }
 
-fn build(dir: &Path, json: &Json, mut builder: Builder<'_>, digest: [u8; 32]) -> Result<Policy> {
+fn build(dir: &Path, json: &Json, weights: Weights<'_>, digest: [u8; 32]) -> Result<Policy> {
     ensure!(json.obs_dim > 0 && json.act_dim > 0, "obs_dim and act_dim must be at least 1");
     for (name, n) in [("obs_dim", json.obs_dim), ("act_dim", json.act_dim), ("chunk", json.chunk.unwrap_or(1))] {
         ensure!(n <= usize::from(u16::MAX), "{name} is {n}, 65535 is the most");
@@ -44,16 +45,33 @@ fn build(dir: &Path, json: &Json, mut builder: Builder<'_>, digest: [u8; 32]) ->
     let kind = json.kind()?;
     let (chunk, execute) = match kind {
         Kind::Step => (1, 1),
-        Kind::Chunk => {
-            let chunk = json.chunk.context("kind chunk needs the key chunk")?;
+        Kind::Chunk | Kind::Flow | Kind::Diffusion => {
+            let chunk = json.chunk.context("a policy of several actions needs the key chunk")?;
             let execute = json.execute.unwrap_or(chunk);
             ensure!((1..=chunk).contains(&execute), "execute is {execute}, it must be 1 to chunk ({chunk})");
             (chunk, execute)
         }
     };
-    for (i, op) in json.ops.iter().enumerate() {
-        builder.add(op).with_context(|| format!("op {i} ({})", op.op))?;
-    }
+    let add = |builder: &mut Builder<'_>| -> Result<()> {
+        for (i, op) in json.ops.iter().enumerate() {
+            builder.add(op).with_context(|| format!("op {i} ({})", op.op))?;
+        }
+        Ok(())
+    };
+    let (graph, weights) = if kind.is_iterative() {
+        let len = chunk * json.act_dim;
+        let by = &json.denoising;
+        let schedule = if kind == Kind::Flow { by.flow(len)? } else { by.diffusion(len)? };
+        let (mut builder, times) = Builder::iterative(json.obs_dim, by, &schedule, weights)?;
+        add(&mut builder)?;
+        let trained = builder.graph.weights();
+        (hoist::iterative(&builder.graph, json.obs_dim, &times, schedule.denoising)?, trained)
+    } else {
+        let mut builder = Builder::new(json.obs_dim, weights);
+        add(&mut builder)?;
+        let trained = builder.graph.weights();
+        (builder.graph, trained)
+    };
     let policy = Policy {
         dir: dir.to_owned(),
         name: json.name.clone(),
@@ -63,8 +81,8 @@ fn build(dir: &Path, json: &Json, mut builder: Builder<'_>, digest: [u8; 32]) ->
         act_len: json.act_dim,
         rate_hz: positive(json.control_hz.unwrap_or(50.0), "control_hz")?,
         contract: json.contract(kind)?,
-        weights: builder.graph.weights(),
-        graph: builder.graph,
+        weights,
+        graph,
         digest,
     };
     policy.check()?;

@@ -6,6 +6,7 @@ use anyhow::{Context, Result, bail, ensure};
 use serde::Deserialize;
 use serde_json::Value;
 
+use super::denoising::{self, JsonDenoising};
 use crate::contract::ActionContract;
 use crate::strict_json;
 use crate::text::is_control;
@@ -20,6 +21,8 @@ pub(super) struct Json {
     pub(super) act_dim: usize,
     pub(super) control_hz: Option<f64>,
     action: Option<JsonContract>,
+    #[serde(flatten)]
+    pub(super) denoising: JsonDenoising,
     pub(super) ops: Vec<JsonOp>,
 }
 
@@ -77,9 +80,10 @@ impl Json {
         const WRONG: &str = "not a policy description";
         let value = strict_json::parse(bytes).context(WRONG)?;
         // What the keys of an unknown kind are is not known either.
-        kind(value["kind"].as_str())?;
-        if let Some(key) = given(&value).find(|key| !KEYS.contains(key) && !ABOUT.contains(key)) {
-            let (keys, about) = (KEYS.join(", "), ABOUT.join(", "));
+        let iterative = kind(value["kind"].as_str())?.is_iterative();
+        let keys = [&KEYS[..], if iterative { &denoising::KEYS } else { &[] }].concat();
+        if let Some(key) = given(&value).find(|key| !keys.contains(key) && !ABOUT.contains(key)) {
+            let (keys, about) = (keys.join(", "), ABOUT.join(", "));
             bail!("the key {key:?} is not known; known are {keys} and, for people alone, {about}");
         }
         for (i, op) in value["ops"].as_array().into_iter().flatten().enumerate() {
@@ -100,10 +104,10 @@ impl Json {
         kind(self.kind.as_deref())
     }
 
-    /// The action contract. Without the key `action` a chunk is limited to -1..1, as the reference runtime of the format does.
+    /// The action contract. Without the key `action` whatever is chunked is limited to -1..1, as the reference runtime of the format does.
     pub(super) fn contract(&self, kind: Kind) -> Result<ActionContract> {
         let Some(json) = &self.action else {
-            let limit = |at: f32| (kind == Kind::Chunk).then(|| vec![at; self.act_dim]);
+            let limit = |at: f32| (kind != Kind::Step).then(|| vec![at; self.act_dim]);
             return Ok(ActionContract { low: limit(-1.0), high: limit(1.0), ..ActionContract::default() });
         };
         let array = |name: &str, values: &Option<Vec<f64>>| {
@@ -132,7 +136,9 @@ fn kind(name: Option<&str>) -> Result<Kind> {
     match name {
         None | Some("step") => Ok(Kind::Step),
         Some("chunk") => Ok(Kind::Chunk),
-        Some(other) => bail!("kind {other:?} is not supported yet; step and chunk are"),
+        Some("flow") => Ok(Kind::Flow),
+        Some("diffusion") => Ok(Kind::Diffusion),
+        Some(other) => bail!("kind {other:?} is not known; step, chunk, flow and diffusion are"),
     }
 }
 

@@ -6,6 +6,7 @@ use std::path::Path;
 use actq_kernels::math::Function;
 use anyhow::{Context, Result, bail, ensure};
 
+use super::denoising::{JsonDenoising, JsonNorm, JsonTime, Schedule};
 use super::json::{Input, JsonOp, positive};
 use super::tensors::TensorFile;
 use crate::graph::ops::{Add, Concat, Gru, LayerNorm, Linear, Lstm, Normalize, Pointwise, RmsNorm, Span};
@@ -69,6 +70,43 @@ impl<'a> Builder<'a> {
     /// Nothing but the observation.
     pub(super) fn new(obs_len: usize, weights: Weights<'a>) -> Self {
         Self { weights, graph: Graph::new(obs_len), slots: HashMap::from([("obs".to_owned(), 0)]) }
+    }
+
+    /// The network of observation, time and iterate of a flow or a diffusion policy (slots `obs`, `tfeat` and `x`), and what it reads
+    /// as the time in each step.
+    pub(super) fn iterative(
+        obs_len: usize,
+        by: &JsonDenoising,
+        schedule: &Schedule,
+        weights: Weights<'a>,
+    ) -> Result<(Self, Vec<Vec<f32>>)> {
+        let time = by.time.as_ref();
+        let default = JsonTime::default();
+        let time = time.unwrap_or(&default);
+        let (_, freq) = weights.read(time.freq())?;
+        let times = schedule.times.iter().map(|t| time.features(*t, &freq)).collect::<Result<Vec<_>>>()?;
+        let lens = [obs_len, 2 * freq.len(), schedule.denoising.len];
+        let mut graph = Graph::new(lens.iter().sum());
+        let mut slots = HashMap::new();
+        let mut from = 0;
+        for (name, len) in ["obs", "tfeat", "x"].into_iter().zip(lens) {
+            slots.insert(name.to_owned(), graph.add(Concat(vec![Span { from, len }]), &[0])?);
+            from += len;
+        }
+        // Files of the format's first exporter name the tensors and no key.
+        let file = JsonNorm { mean: "obs_norm.mean".to_owned(), scale: "obs_norm.scale".to_owned(), clip: Some(5.0) };
+        let implied = weights.file.get(&file.mean).is_some().then_some(&file);
+        if let Some(norm) = by.obs_norm.as_ref().or(implied) {
+            let normalize = Normalize {
+                mean: weights.vector(&norm.mean, obs_len)?,
+                scale: weights.vector(&norm.scale, obs_len)?,
+                pre_clip: f32::INFINITY,
+                clip: clip(norm.clip, "obs_norm.clip")?,
+            };
+            let normal = graph.add(normalize, &[slots["obs"]])?;
+            slots.insert("obs".to_owned(), normal);
+        }
+        Ok((Self { weights, graph, slots }, times))
     }
 
     /// Appends an op.

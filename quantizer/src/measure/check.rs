@@ -12,6 +12,9 @@ use crate::policy::Policy;
 /// is thinned.
 const MOST_MACS: usize = 600_000_000;
 
+/// Frames that are kept in any case: an iterative head runs its network many times for each.
+const LEAST_FRAMES: usize = 200;
+
 /// Errors of an image on its policy's recordings.
 #[derive(Clone, Debug)]
 pub struct Check {
@@ -26,8 +29,9 @@ pub struct Check {
 /// Runs `image`, made from `source`, over both recordings. Where one holds no actions, the f32 policy gives them.
 pub fn check(source: &Policy, image: Image<'_>, calib: Option<&Dataset>, heldout: &Dataset) -> Result<Check> {
     let with_actions = |dataset: &Dataset| -> Dataset {
-        let most = MOST_MACS / source.graph.weights().max(1);
-        let mut dataset = dataset.thinned(most.max(1), source.graph.state_len() > 0).into_owned();
+        let macs = source.graph.weights().max(1) * source.graph.denoising_steps();
+        let mut dataset =
+            dataset.thinned((MOST_MACS / macs).max(LEAST_FRAMES), source.graph.state_len() > 0).into_owned();
         dataset.fill_actions(&source.graph);
         dataset
     };

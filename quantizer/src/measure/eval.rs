@@ -81,7 +81,13 @@ impl Runner for Head<'_, '_> {
     }
 
     fn infer(&mut self, observation: &[f32]) -> Result<&[f32]> {
-        Ok(Head::infer(self, observation)?)
+        let image = *self.image();
+        if image.noise_len() == 0 {
+            return Ok(Head::infer(self, observation)?);
+        }
+        let (observation, noise) =
+            observation.split_at_checked(image.obs_len()).context("an observation without noise")?;
+        Ok(self.infer_with_noise(observation, noise)?)
     }
 }
 

@@ -28,14 +28,21 @@ impl<'a> Unrounded<'a> {
         bytemuck::cast_slice_mut(&mut self.arena[self.image.state().range()])
     }
 
-    /// The network's raw output for an observation of the image's length.
+    /// The network's raw output for an observation of the image's length, with its noise.
     pub fn infer(&mut self, observation: &[f32]) -> Result<&[f32]> {
         let arena = &mut self.arena;
+        let (observation, noise) = observation.split_at(self.image.obs_len());
         arena[self.image.observation().range()].copy_from_slice(bytemuck::cast_slice(observation));
-        for (op, weights) in self.ops.iter().zip(&self.weights) {
-            match (op.kind, op.matrix()) {
-                (OpKind::Linear { accumulate }, Some(matrix)) => multiply(op, &matrix, weights, accumulate, arena),
-                _ => run_whole(op, arena)?,
+        if let [Op { kind: OpKind::Noise, .. }, ..] = &self.ops[..] {
+            arena[self.ops[0].dst().range()].copy_from_slice(bytemuck::cast_slice(noise));
+        }
+        for step in 0..self.image.denoising_steps() {
+            let first = if step == 0 { 0 } else { self.image.once() };
+            for (op, weights) in self.ops[first..].iter().zip(&self.weights[first..]) {
+                match (op.kind, op.matrix()) {
+                    (OpKind::Linear { accumulate }, Some(matrix)) => multiply(op, &matrix, weights, accumulate, arena),
+                    _ => run_whole(op, step, arena)?,
+                }
             }
         }
         Ok(floats(&arena[self.image.output().range()]))

@@ -1,5 +1,7 @@
 //! A method with all that it needs to know about the recorded observations.
 
+use std::borrow::Cow;
+
 use anyhow::{Context as _, Result, ensure};
 
 use super::actquant::score::Score;
@@ -16,6 +18,9 @@ use crate::graph::Graph;
 
 /// Frames that every method with a recording needs at least; best needs more.
 const LEAST_FRAMES: usize = 16;
+
+/// Vectors of an iterative head's matrices that statistics are taken of; every frame gives one for each denoising step.
+const MOST_VECTORS: usize = 8192;
 
 /// A method made ready once, to quantize a network at any number of rates.
 #[derive(Debug)]
@@ -47,8 +52,10 @@ impl<'a> PreparedMethod<'a> {
             Ok(calib)
         };
         let mut moments = |dataset: &Dataset| {
+            let steps = graph.denoising_steps();
+            let dataset = if steps > 1 { dataset.thinned(MOST_VECTORS / steps, false) } else { Cow::Borrowed(dataset) };
             let all = dataset.frames().max(1) as f64;
-            collect(graph, dataset, |frames| progress(frames as f64 / all))
+            collect(graph, &dataset, |frames| progress(frames as f64 / all))
         };
         let statistics = match method {
             Method::Rtn => Statistics::Rtn,

@@ -27,6 +27,11 @@ pub fn report(image: &Image<'_>) -> String {
     let kind = match image.kind() {
         Kind::Step => "step".to_owned(),
         Kind::Chunk => format!("chunk of {}, {} executed", image.chunk(), image.execute()),
+        Kind::Flow | Kind::Diffusion => {
+            let kind = if image.kind() == Kind::Flow { "flow" } else { "diffusion" };
+            let (steps, chunk, execute) = (image.denoising_steps(), image.chunk(), image.execute());
+            format!("{kind} in {steps} steps, chunk of {chunk}, {execute} executed")
+        }
     };
     let (obs, act) = (image.obs_len(), image.act_len());
     let rate = image.rate_hz();

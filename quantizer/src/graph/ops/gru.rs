@@ -102,8 +102,8 @@ impl Operation for Gru {
             }
             *d_h += &run.through(self.state, &rows(&d_b, step_rows(step, batch)));
         }
-        run.product(0, self.input, &saved.operands[0], &d_a);
-        run.product(1, self.state, &saved.operands[1], &d_b);
+        run.product(self.input, &saved.operands[0], &d_a);
+        run.product(self.state, &saved.operands[1], &d_b);
         sum_rows(&d_a, &mut run.d_vectors[0]);
         sum_rows(&d_b, &mut run.d_vectors[1]);
         run.give_through(0, self.input, &d_a);

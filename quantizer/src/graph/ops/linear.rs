@@ -43,7 +43,7 @@ impl Operation for Linear {
     }
 
     fn backward(&self, run: &mut Backward<'_>, saved: &Saved, dy: Array2<f32>, _: &mut NodeState) {
-        run.product(0, self.matrix, &saved.operands[0], &dy);
+        run.product(self.matrix, &saved.operands[0], &dy);
         sum_rows(&dy, &mut run.d_vectors[0]);
         run.give_through(0, self.matrix, &dy);
     }

@@ -100,8 +100,8 @@ impl Operation for Lstm {
             }
             *d_h = run.through(self.state, &rows(&d_gates, step_rows(step, batch)));
         }
-        run.product(0, self.input, &saved.operands[0], &d_gates);
-        run.product(1, self.state, &saved.operands[1], &d_gates);
+        run.product(self.input, &saved.operands[0], &d_gates);
+        run.product(self.state, &saved.operands[1], &d_gates);
         sum_rows(&d_gates, &mut run.d_vectors[0]);
         run.give_through(0, self.input, &d_gates);
     }

@@ -89,7 +89,8 @@ pub fn distill(task: &Task<'_>, windows: &Windows<'_>, mut progress: impl FnMut(
     let mut random = Random::new(task.seed);
     let (size, shards, rates) = match windows.recurrent() {
         true => (WINDOWS, WINDOW_SHARDS, OF_WINDOWS),
-        false => (FRAMES, FRAME_SHARDS, OF_FRAMES),
+        // A frame of an iterative head is one of every denoising step.
+        false => ((FRAMES / task.graph.denoising_steps().isqrt()).max(4 * FRAME_SHARDS), FRAME_SHARDS, OF_FRAMES),
     };
     let mut schedule = Schedule::new(task.bounds, most_steps(task.graph.weights(), windows.recurrent()));
     while let Some(rate) = schedule.rate() {
@@ -136,7 +137,7 @@ fn gradient(network: &Network<'_>, weights: &Weights, windows: &Windows<'_>, bat
     let mut d_state: State = batch.state.iter().map(zeros).collect();
     let (pass, error, loss) = run(network, weights, windows, batch);
     let mut grads = weights.zeros_like();
-    network.backward(weights, &pass, error, &mut d_state, &mut grads, &mut |_, _, _, _| {});
+    network.backward(weights, &pass, error, &mut d_state, &mut grads, &mut |_, _, _| {});
     (loss, grads)
 }
 

@@ -1,0 +1,76 @@
+//! What makes a network an iterative head: the steps from noise to its output.
+
+use actq_kernels::ops::denoise::Coefficients;
+use ndarray::{Array2, ArrayView2, s};
+
+/// The denoising steps of a flow or a diffusion policy. The network reads the iterate by a node
+/// [`Iterate`](super::ops::Iterate); its last value is what a step makes the next iterate of.
+#[derive(Clone, Debug)]
+pub struct Denoising {
+    /// The first node that every step runs; those before it depend on the observation alone.
+    pub first: usize,
+    /// Values of the iterate.
+    pub len: usize,
+    /// Limit of the predicted sample's magnitude, or infinite.
+    pub limit: f32,
+    /// What each step does.
+    pub steps: Vec<Coefficients>,
+}
+
+/// The iterate, and what the network reads of it.
+#[derive(Clone, Debug)]
+pub(super) struct Iterates {
+    pub(super) x: Array2<f32>,
+    pub(super) y: Array2<f32>,
+}
+
+impl Denoising {
+    /// Values of noise that an evaluation takes: the first iterate, and behind it, where steps add noise, that of each.
+    pub fn noise_len(&self) -> usize {
+        let draws = if self.draws() { 1 + self.steps.len() } else { 1 };
+        self.len * draws
+    }
+
+    /// Whether steps add noise.
+    pub fn draws(&self) -> bool {
+        self.steps.iter().any(|by| by.sigma != 0.0)
+    }
+
+    /// Before the first step.
+    pub(super) fn start(&self, noise: ArrayView2<'_, f32>) -> Iterates {
+        let x = noise.slice(s![.., ..self.len]).to_owned();
+        Iterates { y: x.clone(), x }
+    }
+
+    /// After `step`, in which the network gave `v`: as [`actq_kernels::ops::denoise`].
+    pub(super) fn next(&self, step: usize, at: &Iterates, v: &Array2<f32>, noise: ArrayView2<'_, f32>) -> Iterates {
+        let by = &self.steps[step];
+        let (mut x, mut y) = (at.x.clone(), at.y.clone());
+        for (i, v) in v.rows().into_iter().enumerate() {
+            let v: Vec<f32> = v.to_vec();
+            let (mut x, mut y) = (x.row_mut(i), y.row_mut(i));
+            let (Some(x), Some(y)) = (x.as_slice_mut(), y.as_slice_mut()) else { continue };
+            actq_kernels::ops::denoise::denoise(by, self.limit, &v, x, y);
+            if by.sigma != 0.0 {
+                let z = noise.slice(s![i, (1 + step) * self.len..(2 + step) * self.len]).to_vec();
+                actq_kernels::ops::denoise::add_noise(by.sigma, &z, x, y);
+            }
+        }
+        Iterates { x, y }
+    }
+
+    /// From the derivatives by the iterate and the network's input after a step to those by the iterate before it and by the
+    /// network's output.
+    pub(super) fn back(&self, step: usize, at: &Iterates, v: &Array2<f32>, d: Iterates) -> (Array2<f32>, Array2<f32>) {
+        let by = &self.steps[step];
+        let mut dx = d.x + &d.y;
+        let mut dv = d.y * by.ahead;
+        for ((dx, dv), (x, v)) in dx.iter_mut().zip(&mut dv).zip(at.x.iter().zip(v)) {
+            let within = (by.sample_x * x + by.sample_v * v).abs() <= self.limit;
+            let by_sample = if within { by.sample * *dx } else { 0.0 };
+            *dv += by.direct * *dx + by.sample_v * by_sample;
+            *dx = by.keep * *dx + by.sample_x * by_sample;
+        }
+        (dx, dv)
+    }
+}
