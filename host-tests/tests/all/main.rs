@@ -6,6 +6,7 @@ mod cli;
 mod compare;
 mod cost;
 mod counting;
+mod denoising;
 mod digests;
 mod drive;
 mod faults;

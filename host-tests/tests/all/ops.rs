@@ -42,19 +42,20 @@ const F32_DEEP: f64 = 2e-5;
 type Tensors = BTreeMap<String, (Vec<usize>, Vec<f32>)>;
 
 /// A policy on disk and in its parts.
-struct Case {
-    dir: TempDir,
+pub(crate) struct Case {
+    pub(crate) dir: TempDir,
     json: Value,
     tensors: Tensors,
 }
 
 impl Case {
     /// Writes the policy with drawn tensors: matrices that keep the variance of their input, vectors within -1 to 1.
-    fn new(json: Value) -> Result<Self> {
+    pub(crate) fn new(json: Value) -> Result<Self> {
         let keys = ["w", "b", "mean", "scale", "w_ln", "b_ln", "w_ih", "w_hh", "b_ih", "b_hh"];
         let mut random = Random::new(1);
         let mut tensors = Tensors::new();
-        for name in ops(&json).iter().flat_map(|op| keys.iter().filter_map(|key| op.get(key)?.as_str())) {
+        let of_ops = ops(&json).iter().flat_map(|op| keys.iter().filter_map(|key| op.get(key)?.as_str()));
+        for name in of_ops.chain(json["time"]["freq"].as_str()) {
             let shape =
                 name.split(' ').next_back().unwrap_or("").split('x').map(str::parse).collect::<Result<Vec<_>, _>>();
             let shape: Vec<usize> = shape.with_context(|| format!("{name}: no shape"))?;
@@ -74,7 +75,7 @@ impl Case {
         Ok(Self { dir, json, tensors })
     }
 
-    fn reference(&self) -> Reference<'_> {
+    pub(crate) fn reference(&self) -> Reference<'_> {
         let values = |(name, (_, v)): (&'_ String, &(Vec<usize>, Vec<f32>))| (name.clone(), wide(v));
         Reference { ops: ops(&self.json), tensors: self.tensors.iter().map(values).collect(), state: BTreeMap::new() }
     }
@@ -99,22 +100,26 @@ fn ops(json: &Value) -> &[Value] {
     json["ops"].as_array().map_or(&[], |ops| ops)
 }
 
-fn wide(values: &[f32]) -> Vec<f64> {
+pub(crate) fn wide(values: &[f32]) -> Vec<f64> {
     values.iter().map(|&v| f64::from(v)).collect()
 }
 
 /// policy.json, interpreted.
-struct Reference<'a> {
+pub(crate) struct Reference<'a> {
     ops: &'a [Value],
-    tensors: BTreeMap<String, Vec<f64>>,
+    pub(crate) tensors: BTreeMap<String, Vec<f64>>,
     /// Hidden and cell state by the op's position.
     state: BTreeMap<usize, [Vec<f64>; 2]>,
 }
 
 impl Reference<'_> {
     fn step(&mut self, obs: &[f64]) -> Vec<f64> {
-        let mut slots = BTreeMap::from([("obs", obs.to_vec())]);
-        let mut x = obs.to_vec();
+        self.run(BTreeMap::from([("obs", obs.to_vec())]))
+    }
+
+    /// The ops over these slots; the first op takes the slot `obs` where it names none.
+    pub(crate) fn run<'s>(&'s mut self, mut slots: BTreeMap<&'s str, Vec<f64>>) -> Vec<f64> {
+        let mut x = slots["obs"].clone();
         for (i, op) in self.ops.iter().enumerate() {
             x = match &op["input"] {
                 Value::String(text) => part(&slots, text),

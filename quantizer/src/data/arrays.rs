@@ -13,7 +13,7 @@ use crate::import::tensors::TensorFile;
 use crate::import::values::{Tensor, Values};
 
 /// The names that mean something; other arrays are left alone, whatever their type.
-const NAMES: [&str; 4] = ["obs", "action", "length", "state"];
+const NAMES: [&str; 5] = ["obs", "action", "length", "state", "noise"];
 
 /// The endings of recordings' names.
 pub(super) const ENDINGS: [&str; 3] = ["npz", "npy", "safetensors"];

@@ -130,7 +130,9 @@ impl Hoist<'_> {
             if self.needs[i + 1] == Needs::Observation {
                 self.copy(i)?;
             } else if let Some((linear, parts)) = self.cut(node) {
-                self.condition[i + 1] = self.columns(linear, &parts, Needs::Observation, true)?;
+                // The biases stand in the table, where there is one, else here.
+                let biased = parts.iter().all(|(.., needs)| *needs != Needs::Time);
+                self.condition[i + 1] = self.columns(linear, &parts, Needs::Observation, biased)?;
             }
         }
         Ok(())
@@ -148,7 +150,6 @@ impl Hoist<'_> {
                 self.copy(i)?;
                 continue;
             };
-            // The biases stand in the table, where there is one, else with the observation's part.
             let table = self.table_of(linear, &parts);
             let biased = table.is_none() && self.condition[i + 1].is_none();
             let mut sum = self.columns(linear, &parts, Needs::Step, biased)?;

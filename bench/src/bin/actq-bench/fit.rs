@@ -9,7 +9,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use actq::emit::{self, files};
-use actq::graph::ops::{Add, Gru, LayerNorm, Lstm, Normalize, Pointwise, RmsNorm};
+use actq::graph::Denoising;
+use actq::graph::ops::{Add, Gru, Iterate, LayerNorm, Lstm, Normalize, Pointwise, RmsNorm, Table};
 use actq::methods::{Activations, Outcome};
 use actq::policy::Policy;
 use actq::random::Random;
@@ -18,8 +19,9 @@ use actq_bench::networks::{Builder, accumulating};
 use actq_bench::qemu::Counter;
 use actq_bench::{Target, firmware, profile, root};
 use actq_kernels::Width;
-use actq_kernels::image::{Op, OpKind, op};
+use actq_kernels::image::{Kind, Op, OpKind, op};
 use actq_kernels::math::Function;
+use actq_kernels::ops::denoise::Coefficients;
 use actq_kernels::pace::cost::{self, Cost, Feature};
 use anyhow::Result;
 
@@ -291,6 +293,7 @@ fn most(samples: &[Sample], polls: &[(f64, usize)], rates: &Rates) -> Rates {
             Feature::value(op::NORMALIZE),
             Feature::value(op::LSTM_CELL),
             Feature::value(op::GRU_CELL),
+            Feature::value(op::DENOISE),
             Feature::CONTRACT,
         ])
         .collect();
@@ -450,6 +453,19 @@ fn policies() -> Result<Vec<(Policy, Vec<Outcome>)>> {
         }
         builder.part(12)?;
         policies.push(builder.finish(name.to_owned(), contract));
+    }
+    // A denoising step, without noise and with it.
+    for (sigma, len) in [0.0, 0.1].into_iter().flat_map(|sigma| LENGTHS.map(|len| (sigma, len))) {
+        let mut builder = Builder::new(8);
+        let rows = builder.values(len);
+        let (iterate, table) = (builder.node(Iterate { len }, &[])?, builder.node(Table { rows, len }, &[])?);
+        builder.node(Add, &[iterate, table])?;
+        let numbers = [1.0, -0.5, 0.5, 0.1, 0.3, sigma, 0.0];
+        let steps = vec![Coefficients::from_array(numbers)];
+        builder.graph.denoising = Some(Denoising { first: 0, len, limit: 1.0, steps });
+        let (mut policy, outcomes) = builder.finish(format!("a denoising step, sigma {sigma}"), false);
+        policy.kind = Kind::Flow;
+        policies.push((policy, outcomes));
     }
     Ok(policies)
 }

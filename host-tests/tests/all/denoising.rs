@@ -1,0 +1,466 @@
+//! Flow and diffusion policies: their steps against the textbooks' formulas in f64, with weights that are hoisted and tables that are
+//! computed when the image is built; noise; and the same bits however a step is cut, on the host and on the target.
+
+use std::collections::BTreeMap;
+use std::f64::consts::{FRAC_PI_2, TAU};
+use std::fs;
+
+use actq::budget::Budget;
+use actq::data::{Dataset, Recordings, Sizes};
+use actq::graph::Evaluator;
+use actq::measure::eval;
+use actq::methods::{Activations, Method, Options};
+use actq::pipeline::quantize;
+use actq::policy::Policy;
+use actq::random::Random;
+use actq::runtime::{ImageBuffer, with_head};
+use actq_bench::qemu::Server;
+use actq_bench::{firmware, qemu, shared_policies};
+use actq_kernels::ops::noise::normal;
+use actq_kernels::pace::cost;
+use actq_kernels::{Head, ImageError, StepError, Width};
+use anyhow::{Context, Result, ensure};
+use serde_json::{Value, json};
+
+use super::ops::{Case, wide};
+
+const OBS: usize = 5;
+const CHUNK: usize = 3;
+const ACT: usize = 2;
+const LEN: usize = CHUNK * ACT;
+const FREQUENCIES: usize = 3;
+
+/// A residual network of time, observation and iterate, whose first layer reads all three and whose second norm reads a time code.
+fn policy(kind: &str, more: Value) -> Value {
+    let mut json = json!({
+        "name": "denoiser", "kind": kind, "chunk": CHUNK, "execute": 2, "obs_dim": OBS, "act_dim": ACT,
+        "time": {"freq": format!("freq {FREQUENCIES}")},
+        "action": {},
+        "ops": [
+            {"op": "linear", "w": "t 8x6", "b": "tb 8", "input": "tfeat"},
+            {"op": "silu", "save": "code"},
+            {"op": "linear", "w": "c 7x5", "b": "cb 7", "input": "obs"},
+            {"op": "tanh", "save": "condition"},
+            {"op": "linear", "w": "in 12x21", "b": "inb 12", "input": ["code", "x", "condition"], "save": "h"},
+            {"op": "layernorm", "w_ln": "g 12", "b_ln": "gb 12"},
+            {"op": "identity", "save": "n"},
+            {"op": "linear", "w": "up 16x20", "b": "ub 16", "input": ["n", "code"]},
+            {"op": "gelu"},
+            {"op": "linear", "w": "down 12x16", "b": "db 12"},
+            {"op": "add", "with": "h"},
+            {"op": "linear", "w": "out 6x12", "b": "ob 6"},
+        ],
+    });
+    if let (Some(json), Value::Object(more)) = (json.as_object_mut(), more) {
+        for (key, value) in more {
+            match (json.get_mut(&key), value) {
+                (Some(Value::Object(old)), Value::Object(new)) => old.extend(new),
+                (_, value) => drop(json.insert(key, value)),
+            }
+        }
+    }
+    json
+}
+
+/// The policies of these tests, and what a step of theirs is.
+fn policies() -> Vec<(Value, Solver)> {
+    let diffusion = |schedule: &str, more: Value| {
+        let mut all = json!({"train_steps": 12, "schedule": schedule, "time": {"turns": false, "order": "sin,cos"}});
+        if let (Some(all), Value::Object(more)) = (all.as_object_mut(), more) {
+            all.extend(more);
+        }
+        policy("diffusion", all)
+    };
+    let ddpm = |prediction, clip, large| Solver::Ddpm { prediction, clip, large };
+    vec![
+        (policy("flow", json!({"euler_steps": 5})), Solver::Euler { from: 0.0, to: 1.0 }),
+        (policy("flow", json!({"steps": 4, "time": {"from": 1.0, "to": 0.0}})), Solver::Euler { from: 1.0, to: 0.0 }),
+        (policy("flow", json!({"steps": 3, "solver": "midpoint"})), Solver::Midpoint),
+        (diffusion("cosine", json!({"prediction": "epsilon", "clip_sample": 1.5})), ddpm("epsilon", 1.5, false)),
+        (
+            diffusion("linear", json!({"prediction": "sample", "beta": [0.01, 0.4]})),
+            ddpm("sample", f64::INFINITY, false),
+        ),
+        (
+            diffusion("cosine", json!({"prediction": "v", "steps": 4, "variance": "large"})),
+            ddpm("v", f64::INFINITY, true),
+        ),
+        (
+            diffusion("cosine", json!({"prediction": "epsilon", "clip_sample": 2.0, "solver": "ddim", "steps": 6})),
+            Solver::Ddim { prediction: "epsilon", clip: 2.0 },
+        ),
+        (
+            diffusion("cosine", json!({"prediction": "sample", "solver": "ddim", "steps": 3})),
+            Solver::Ddim { prediction: "sample", clip: f64::INFINITY },
+        ),
+        (
+            diffusion("linear", json!({"prediction": "v", "solver": "ddim", "beta": [0.02, 0.3], "clip_sample": 1.0})),
+            Solver::Ddim { prediction: "v", clip: 1.0 },
+        ),
+    ]
+}
+
+enum Solver {
+    Euler { from: f64, to: f64 },
+    Midpoint,
+    Ddpm { prediction: &'static str, clip: f64, large: bool },
+    Ddim { prediction: &'static str, clip: f64 },
+}
+
+/// The output for an observation and noise, by the formulas of the papers in f64.
+fn reference(case: &Case, json: &Value, solver: &Solver, obs: &[f64], noise: &[f64]) -> Vec<f64> {
+    let mut network = case.reference();
+    let freq = network.tensors[json["time"]["freq"].as_str().unwrap_or("")].clone();
+    let diffusion = json["kind"] == "diffusion";
+    let mut at = |x: &[f64], time: f64| {
+        let angle = |f: &f64| if diffusion { time * f } else { TAU * time * f };
+        let (sin, cos) = (freq.iter().map(|f| angle(f).sin()), freq.iter().map(|f| angle(f).cos()));
+        let tfeat = if diffusion { sin.chain(cos).collect() } else { cos.chain(sin).collect() };
+        network.run(BTreeMap::from([("obs", obs.to_vec()), ("tfeat", tfeat), ("x", x.to_vec())]))
+    };
+    let along = |x: &[f64], v: &[f64], h: f64| -> Vec<f64> { x.iter().zip(v).map(|(x, v)| x + h * v).collect() };
+    let mut x = noise[..LEN].to_vec();
+    let steps = json["steps"].as_u64().or(json["euler_steps"].as_u64()).or(json["train_steps"].as_u64()).unwrap_or(0);
+    let (prediction, clip) = match solver {
+        Solver::Euler { from, to } => {
+            let h = (to - from) / steps as f64;
+            for k in 0..steps {
+                let v = at(&x, from + h * k as f64);
+                x = along(&x, &v, h);
+            }
+            return x;
+        }
+        Solver::Midpoint => {
+            let h = 1.0 / steps as f64;
+            for k in 0..steps {
+                let half = along(&x, &at(&x, h * k as f64), 0.5 * h);
+                x = along(&x, &at(&half, h * (k as f64 + 0.5)), h);
+            }
+            return x;
+        }
+        Solver::Ddpm { prediction, clip, .. } | Solver::Ddim { prediction, clip } => (*prediction, *clip),
+    };
+    let train = json["train_steps"].as_u64().unwrap_or(0);
+    let bar = |i: u64| ((i as f64 / train as f64 + 0.008) / 1.008 * FRAC_PI_2).cos().powi(2);
+    let beta = |i: u64| match json["beta"].as_array() {
+        Some(ends) => {
+            let [first, last] = [0, 1].map(|i: usize| ends[i].as_f64().unwrap_or(0.0));
+            first + (last - first) * i as f64 / (train - 1) as f64
+        }
+        None => (1.0 - bar(i + 1) / bar(i)).min(0.999),
+    };
+    let signal = |i: u64| (0..=i).map(|i| 1.0 - beta(i)).product::<f64>();
+    for k in (0..steps).rev() {
+        let t = k * (train / steps);
+        let (now, before) = (signal(t), if k > 0 { signal((k - 1) * (train / steps)) } else { 1.0 });
+        let out = at(&x, t as f64);
+        let draw = (1 + steps - 1 - k) as usize * LEN;
+        for i in 0..LEN {
+            let (sample, eps) = match prediction {
+                "epsilon" => ((x[i] - (1.0 - now).sqrt() * out[i]) / now.sqrt(), out[i]),
+                "sample" => (out[i], (x[i] - now.sqrt() * out[i]) / (1.0 - now).sqrt()),
+                _ => (now.sqrt() * x[i] - (1.0 - now).sqrt() * out[i], now.sqrt() * out[i] + (1.0 - now).sqrt() * x[i]),
+            };
+            let sample = sample.clamp(-clip, clip);
+            x[i] = if let Solver::Ddpm { large, .. } = solver {
+                // Equation 7 of the paper: the mean and the variance of what was before, given the sample.
+                let alpha = now / before;
+                let mean = before.sqrt() * (1.0 - alpha) / (1.0 - now) * sample
+                    + alpha.sqrt() * (1.0 - before) / (1.0 - now) * x[i];
+                let variance = if *large { 1.0 - alpha } else { (1.0 - before) / (1.0 - now) * (1.0 - alpha) };
+                mean + if k > 0 { variance.sqrt() * noise[draw + i] } else { 0.0 }
+            } else {
+                before.sqrt() * sample + (1.0 - before).sqrt() * eps
+            };
+        }
+    }
+    x
+}
+
+fn drawn(random: &mut Random, len: usize, reach: f32) -> Vec<f32> {
+    (0..len).map(|_| reach * random.unit()).collect()
+}
+
+#[test]
+fn steps_are_those_of_the_textbooks() -> Result<()> {
+    for (json, solver) in policies() {
+        let case = Case::new(json.clone())?;
+        let policy = Policy::load(case.dir.path())?;
+        let graph = &policy.graph;
+        let mut evaluator = Evaluator::new(graph);
+        let mut random = Random::new(3);
+        // What the time makes is a table, what the observation makes runs once.
+        ensure!(graph.matrices.iter().all(|m| !m.name.starts_with("t ") && m.name != "in 12x21"), "{json}");
+        ensure!(graph.denoising.as_ref().is_some_and(|d| d.first >= 3), "{json}");
+        let (outcomes, quantized) = {
+            let options =
+                Options { activations: Activations::Int16, ..Options::new(Method::Rtn, Budget::Width(Width::W8)) };
+            let quantized = quantize(&policy, &Recordings::default(), &options, |_, _| {})?;
+            (quantized.outcomes.len(), quantized.image)
+        };
+        assert_eq!(outcomes, graph.matrices.len());
+        let buffer = ImageBuffer::new(&quantized);
+        let image = buffer.image(case.dir.path())?;
+        assert_eq!((image.noise_len(), image.obs_len()), (graph.noise_len(), OBS), "{json}");
+        with_head(image, |head| {
+            for _ in 0..20 {
+                let (obs, noise) = (drawn(&mut random, OBS, 2.0), drawn(&mut random, graph.noise_len(), 2.0));
+                let expected = reference(&case, &json, &solver, &wide(&obs), &wide(&noise));
+                let rms = (expected.iter().map(|v| v * v).sum::<f64>() / LEN as f64).sqrt();
+                let off = |given: &[f32]| {
+                    let errors = given.iter().zip(&expected).map(|(a, b)| (f64::from(*a) - b).abs());
+                    errors.fold(0.0, f64::max) / rms
+                };
+                let of_f32 = off(&evaluator.step(&[obs.clone(), noise.clone()].concat(), &mut |_, _| {}));
+                assert!(of_f32 < 1e-4, "f32 is off by {of_f32:.1e}: {json}");
+                let of_image = off(head.infer_with_noise(&obs, &noise)?);
+                // 8-bit weights over many steps that build on each other; a wrong coefficient is off by tens of percent.
+                assert!(of_image < 0.08, "the image is off by {of_image:.1e}: {json}");
+            }
+            Ok(())
+        })?;
+    }
+    Ok(())
+}
+
+fn quantized(json: Value) -> Result<ImageBuffer> {
+    let case = Case::new(json)?;
+    let policy = Policy::load(case.dir.path())?;
+    let options = Options::new(Method::Rtn, Budget::Width(Width::W3));
+    Ok(ImageBuffer::new(&quantize(&policy, &Recordings::default(), &options, |_, _| {})?.image))
+}
+
+fn bits(values: &[f32]) -> Vec<u32> {
+    values.iter().map(|v| v.to_bits()).collect()
+}
+
+#[test]
+fn noise_is_the_generators_or_the_callers_and_a_reset_begins_it_anew() -> Result<()> {
+    for (json, _) in policies() {
+        let buffer = quantized(json.clone())?;
+        let image = buffer.image("memory".as_ref())?;
+        with_head(image, |head| {
+            let obs = [0.3; OBS];
+            let play = |head: &mut Head<'_, '_>| -> Result<Vec<Vec<u32>>> {
+                (0..6).map(|_| Ok(bits(head.step(&obs)?))).collect()
+            };
+            let first = play(head)?;
+            // Two actions of a chunk, then new noise.
+            assert_ne!(first[0], first[2], "{json}");
+            head.reset();
+            assert_eq!(play(head)?, first, "{json}");
+            head.seed(7);
+            let other = play(head)?;
+            assert_ne!(other, first, "{json}");
+            head.self_test()?;
+            assert_eq!(play(head)?, other, "the self-test changes the seed: {json}");
+            // The same noise, given.
+            head.seed(7);
+            let noise: Vec<f32> = (0..image.noise_len() as u32).map(|i| normal(7, 0, i)).collect();
+            let drawn = bits(head.infer(&obs)?);
+            assert_eq!(bits(head.infer_with_noise(&obs, &noise)?), drawn, "{json}");
+            let short = head.infer_with_noise(&obs, &noise[1..]).map(|_| ());
+            assert_eq!(short, Err(StepError::NoiseLength { expected: noise.len(), given: noise.len() - 1 }));
+            let mut nan = noise.clone();
+            nan[1] = f32::NAN;
+            assert_eq!(head.infer_with_noise(&obs, &nan).map(|_| ()), Err(StepError::NoiseNotFinite { index: 1 }));
+            Ok(())
+        })?;
+    }
+    Ok(())
+}
+
+#[test]
+fn however_a_step_is_cut_its_bits_are_the_same() -> Result<()> {
+    for (json, _) in policies() {
+        let buffer = quantized(json.clone())?;
+        let image = buffer.image("memory".as_ref())?;
+        let mut random = Random::new(5);
+        let observations: Vec<Vec<f32>> = (0..6).map(|_| drawn(&mut random, OBS, 2.0)).collect();
+        let whole = with_head(image, |head| {
+            observations.iter().map(|obs| Ok(bits(head.step(obs)?))).collect::<Result<Vec<_>>>()
+        })?;
+        let (cut, polls) = with_head(image, |head| {
+            let least = head.least_budget();
+            let mut polls = 0;
+            let step = |obs: &Vec<f32>| -> Result<Vec<u32>> {
+                head.begin(obs)?;
+                loop {
+                    polls += 1;
+                    if let core::task::Poll::Ready(action) = head.poll(least)? {
+                        return Ok(bits(action));
+                    }
+                }
+            };
+            let cut = observations.iter().map(step).collect::<Result<Vec<_>>>()?;
+            Ok((cut, polls))
+        })?;
+        assert_eq!(cut, whole, "{json}");
+        assert!(polls > 3 * 3 * 3, "{polls} polls: {json}");
+    }
+    Ok(())
+}
+
+#[test]
+fn the_target_gives_the_hosts_bits() -> Result<()> {
+    let elf = firmware::application(actq_bench::Target::Fpu)?;
+    for (json, _) in policies() {
+        let buffer = quantized(json.clone())?;
+        same_bits(&elf, &buffer, 12)?;
+    }
+    Ok(())
+}
+
+fn same_bits(elf: &std::path::Path, buffer: &ImageBuffer, steps: usize) -> Result<()> {
+    let slot = tempfile::NamedTempFile::new()?;
+    fs::write(slot.path(), buffer.bytes())?;
+    let image = buffer.image(slot.path())?;
+    let mut server = Server::start(qemu::command(elf, Some(slot.path()), "serve")?, image.act_len())?;
+    let mut random = Random::new(9);
+    with_head(image, |head| {
+        for step in 0..steps {
+            let obs = drawn(&mut random, image.obs_len(), 1.0);
+            ensure!(bits(&server.step(&obs)?) == bits(head.step(&obs)?), "{}, step {step}", image.name());
+        }
+        Ok(())
+    })?;
+    server.finish()
+}
+
+#[test]
+fn policies_that_cannot_be_are_refused() -> Result<()> {
+    let flow = |more: Value| policy("flow", more);
+    let diffusion = |more: Value| policy("diffusion", more);
+    for (json, expected) in [
+        (flow(json!({})), "needs the key steps"),
+        (flow(json!({"steps": 0})), "steps is 0"),
+        (flow(json!({"steps": 1001})), "steps is 1001"),
+        (flow(json!({"steps": 2, "euler_steps": 2})), "are the same"),
+        (flow(json!({"steps": 2, "solver": "ddim"})), "solver is \"ddim\""),
+        (flow(json!({"steps": 2, "schedule": "cosine"})), "belongs to kind diffusion"),
+        (flow(json!({"steps": 2, "time": {"from": 1.0}})), "time runs from 1 to 1"),
+        (flow(json!({"steps": 2, "time": {"order": "tan"}})), "time.order is \"tan\""),
+        (
+            flow(json!({"steps": 2, "ops": [{"op": "linear", "w": "a 4x6", "input": "x"}]})),
+            "the last op gives 4 values",
+        ),
+        (
+            flow(json!({"steps": 2, "ops": [{"op": "linear", "w": "a 6x5", "input": "obs"}]})),
+            "does not depend on the iterate",
+        ),
+        (
+            flow(
+                json!({"steps": 2, "ops": [{"op": "lstm", "hidden": 6, "w_ih": "a 24x6", "w_hh": "b 24x6", "input": "x"}]}),
+            ),
+            "a recurrent network",
+        ),
+        (diffusion(json!({"schedule": "cosine"})), "needs the key train_steps"),
+        (diffusion(json!({"train_steps": 4})), "needs the key schedule"),
+        (diffusion(json!({"train_steps": 4, "schedule": "square"})), "schedule is \"square\""),
+        (diffusion(json!({"train_steps": 4, "schedule": "cosine", "steps": 5})), "steps is 5, train_steps only 4"),
+        (
+            diffusion(json!({"train_steps": 4, "schedule": "linear", "beta": [0.1, 1.5]})),
+            "betas must lie between 0 and 1",
+        ),
+        (
+            diffusion(json!({"train_steps": 4, "schedule": "linear", "beta": [-0.1, 0.5]})),
+            "betas must lie between 0 and 1",
+        ),
+        (diffusion(json!({"train_steps": 4, "schedule": "cosine", "prediction": "mean"})), "prediction is \"mean\""),
+        (diffusion(json!({"train_steps": 4, "schedule": "cosine", "solver": "euler"})), "solver is \"euler\""),
+        (diffusion(json!({"train_steps": 4, "schedule": "cosine", "clip_sample": 0.0})), "clip_sample is 0.0"),
+        (diffusion(json!({"train_steps": 4, "schedule": "cosine", "variance": "none"})), "variance is \"none\""),
+    ] {
+        let case = Case::new(json.clone())?;
+        let error = Policy::load(case.dir.path()).err().with_context(|| format!("accepted: {json}"))?;
+        let text = format!("{error:#}");
+        assert!(text.contains(expected), "{text:?} for {expected:?}");
+    }
+    Ok(())
+}
+
+#[test]
+fn images_that_cannot_be_are_refused() -> Result<()> {
+    use actq_kernels::image::{header as h, op, seal};
+    let buffer = quantized(policies().swap_remove(3).0)?;
+    let image = buffer.image("memory".as_ref())?;
+    let words: Vec<u32> = bytemuck::cast_slice(buffer.bytes()).to_vec();
+    let record = |code: u8| -> Result<usize> {
+        let first = words[h::W_OPS] as usize;
+        (0..image.op_count()).map(|i| first + i * h::OP_WORDS).find(|at| words[*at] as u8 == code).context("no such op")
+    };
+    let (table, denoise) = (record(op::TABLE)?, record(op::DENOISE)?);
+    let constants = words[denoise + 3] as usize;
+    let first = words[h::W_OPS] as usize;
+    let (nan, huge) = (f32::NAN.to_bits(), 1 << 20);
+    let half = |word: u32, high: u32| word & 0xffff | high << 16;
+    let cases: [(&str, usize, u32, ImageError); 14] = [
+        ("no steps", h::W_DENOISING, half(words[h::W_DENOISING], 0), ImageError::Denoising),
+        ("more steps than tables", h::W_DENOISING, half(words[h::W_DENOISING], 0xffff), ImageError::Section),
+        (
+            "nothing to repeat",
+            h::W_DENOISING,
+            words[h::W_DENOISING] & !0xffff | image.op_count() as u32,
+            ImageError::Denoising,
+        ),
+        ("a table before the steps", h::W_DENOISING, words[h::W_DENOISING] + 20, ImageError::Denoising),
+        ("a chunk with steps", h::W_KIND, words[h::W_KIND] & !0xff | 1, ImageError::Denoising),
+        ("a kind beyond", h::W_KIND, words[h::W_KIND] & !0xff | 4, ImageError::Kind),
+        (
+            "noise after the first operation",
+            first + h::OP_WORDS,
+            words[first + h::OP_WORDS] & !0xff | u32::from(op::NOISE),
+            ImageError::Reserved,
+        ),
+        ("a limit of 0", constants, 0, ImageError::Constant),
+        ("a limit NaN", constants, nan, ImageError::Constant),
+        ("a coefficient NaN", constants + h::DENOISE_WORDS + 5, nan, ImageError::Constant),
+        ("noise outside", constants + 1, huge, ImageError::Denoising),
+        ("noise cut off", constants + 1, words[constants + 1] + 1, ImageError::Denoising),
+        ("a table NaN", words[table + 3] as usize, nan, ImageError::Constant),
+        ("coefficients outside", denoise + 3, words.len() as u32 - 1, ImageError::Section),
+    ];
+    for (name, at, word, expected) in cases {
+        let mut changed = words.clone();
+        changed[at] = word;
+        let mut bytes: Vec<u8> = bytemuck::cast_slice(&changed).to_vec();
+        seal(&mut bytes).context("too long")?;
+        let found = actq_kernels::Image::new_checked(ImageBuffer::new(&bytes).bytes()).err();
+        assert_eq!(found, Some(expected), "{name}");
+    }
+    Ok(())
+}
+
+/// A flow of K steps costs K times its per-step part and once the rest.
+#[test]
+fn steps_cost_what_they_repeat() -> Result<()> {
+    let of = |steps: usize| -> Result<u64> {
+        let buffer = quantized(policy("flow", json!({"steps": steps})))?;
+        Ok(cost::of_step(&buffer.image("memory".as_ref())?).instructions)
+    };
+    let [one, two, ten] = [of(1)?, of(2)?, of(10)?];
+    assert!(ten.abs_diff(one + 9 * (two - one)) <= 9, "{one}, {two}, {ten}");
+    Ok(())
+}
+
+#[test]
+fn the_shared_flow_policy_runs_on_the_target() -> Result<()> {
+    let Some(dir) = shared_policies().map(|policies| policies.join("fetch_flow")) else { return Ok(()) };
+    let policy = Policy::load(&dir)?;
+    let heldout = Dataset::load(&dir.join("heldout.npz"), Sizes::of(&policy))?;
+    let heldout = heldout.thinned(60, false);
+    let elf = firmware::application(actq_bench::Target::Fpu)?;
+    for (width, limit) in [(Width::W8, 5.1e-4), (Width::W3, 0.33), (Width::W2, 3.0)] {
+        let options = Options { group: 32, ..Options::new(Method::Rtn, Budget::Width(width)) };
+        let bytes = quantize(&policy, &Recordings::default(), &options, |_, _| {})?.image;
+        let buffer = ImageBuffer::new(&bytes);
+        let report = eval::evaluate(buffer.image(&dir)?, &heldout)?;
+        println!("fetch_flow, {} bits: NMSE {:.2e}, {} bytes", width.bits(), report.nmse, report.bytes);
+        ensure!(report.nmse < limit, "{width:?}: NMSE {}", report.nmse);
+        if width != Width::W8 {
+            ensure!(bytes.len() < 1 << 20, "{} bytes", bytes.len());
+            same_bits(&elf, &buffer, 4)?;
+        }
+    }
+    Ok(())
+}
