@@ -308,6 +308,16 @@ impl<'a> Image<'a> {
         (0..self.op_count()).filter_map(move |i| image.op(i).ok())
     }
 
+    /// Values of noise that an evaluation takes; 0 where it takes none.
+    pub fn noise_len(&self) -> usize {
+        self.noise().len
+    }
+
+    /// Arena region of the noise, which the first operation fills; empty where there is none.
+    pub(crate) fn noise(&self) -> Region {
+        self.op(0).ok().filter(|op| op.kind == OpKind::Noise).map_or(Region::default(), |op| op.dst())
+    }
+
     /// Operation `i`, refused where its record says something impossible. (Within a checked image every record parses.)
     pub(crate) fn op(&self, i: usize) -> Result<Op<'a>, ImageError> {
         let op = record(self.words, (self.head(W_OPS) as usize).wrapping_add(i * OP_WORDS))?;

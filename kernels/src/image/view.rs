@@ -1,7 +1,6 @@
 //! A parsed image, and what its header says.
 
 use super::header::{self as h, Kind};
-use super::op::OpKind;
 use super::region::Region;
 use super::words::{high, low, section, word};
 
@@ -71,16 +70,6 @@ impl<'a> Image<'a> {
     /// How often these run: the denoising steps, or 1.
     pub fn denoising_steps(&self) -> usize {
         high(self.head(h::W_DENOISING)).max(1)
-    }
-
-    /// Values of noise that an evaluation takes; 0 where it takes none.
-    pub fn noise_len(&self) -> usize {
-        self.noise().len
-    }
-
-    /// Arena region of the noise, which the first operation fills; empty where there is none.
-    pub(crate) fn noise(&self) -> Region {
-        self.op(0).ok().filter(|op| op.kind == OpKind::Noise).map_or(Region::default(), |op| op.dst())
     }
 
     /// Words of scratch memory that a head needs.
