@@ -36,41 +36,42 @@ pub(crate) fn cargo_build(what: &str, arguments: &[&str], environment: &[(&str, 
     Ok(())
 }
 
-const APPLICATION: &str = "actq-firmware-demo";
 const BENCH: &str = "actq-firmware-bench";
+/// Its binary that runs an image.
+const HARNESS: &str = "harness";
 
-/// The folders of the ELF files that this process has built, by package and target. Even where nothing is to be built, cargo takes
+/// The folders of the ELF files that this process has built, by what they are and target. Even where nothing is to be built, cargo takes
 /// a while to find out.
 static BUILT: Mutex<BTreeMap<(&str, Target), PathBuf>> = Mutex::new(BTreeMap::new());
 
-/// Builds a package once.
-fn once(package: &'static str, target: Target, build: impl FnOnce() -> Result<PathBuf>) -> Result<PathBuf> {
+/// Builds something once.
+fn once(what: &'static str, target: Target, build: impl FnOnce() -> Result<PathBuf>) -> Result<PathBuf> {
     // A build that panicked has left nothing in the map.
     let mut built = BUILT.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-    if let Some(folder) = built.get(&(package, target)) {
+    if let Some(folder) = built.get(&(what, target)) {
         return Ok(folder.clone());
     }
     let folder = build()?;
-    built.insert((package, target), folder.clone());
+    built.insert((what, target), folder.clone());
     Ok(folder)
 }
 
-/// Builds the application with an image built in that is the same in all runs, and gives the path of the ELF file. Other images
-/// are run from the slot.
-pub fn application(target: Target) -> Result<PathBuf> {
-    let build = || application_in_folder(target, built_in()?);
-    Ok(once(APPLICATION, target, build)?.join(APPLICATION))
+/// Builds the harness, which serves an image through semihosting, with an image built in that is the same in all runs, and gives the
+/// path of the ELF file. Other images are run from the slot.
+pub fn harness(target: Target) -> Result<PathBuf> {
+    let build = || harness_in_folder(target, built_in()?);
+    Ok(once(HARNESS, target, build)?.join(HARNESS))
 }
 
-/// Builds the application with `image` built in.
-pub fn application_with(target: Target, image: &Path) -> Result<PathBuf> {
-    Ok(application_in_folder(target, image)?.join(APPLICATION))
+/// Builds the harness with `image` built in.
+pub fn harness_with(target: Target, image: &Path) -> Result<PathBuf> {
+    Ok(harness_in_folder(target, image)?.join(HARNESS))
 }
 
-fn application_in_folder(target: Target, image: &Path) -> Result<PathBuf> {
+fn harness_in_folder(target: Target, image: &Path) -> Result<PathBuf> {
     let image = fs::canonicalize(image).with_context(|| format!("{}: cannot be read", image.display()))?;
     let image = ("ACTQ_IMAGE", &*image.to_string_lossy());
-    build(APPLICATION, &[APPLICATION], &target_dir(), target, target.profile(), &[image])
+    build(BENCH, &[HARNESS], &target_dir(), target, target.profile(), &[image])
 }
 
 /// Builds the binaries of `firmware-bench` that run on a target's board, and gives the path of one's ELF file.
@@ -96,7 +97,8 @@ pub fn portable_binary(name: &str, target: Target) -> Result<PathBuf> {
     Ok(build(BENCH, &[name], &folder, target, "release", &[("ACTQ_BACKEND", "portable")])?.join(name))
 }
 
-/// Builds binaries of a package and gives the folder of their ELF files.
+/// Builds binaries of a package and gives the folder of their ELF files: a folder of the board, because cargo gives the files of all
+/// boards of a triple the same names.
 fn build(
     package: &str,
     binaries: &[&str],
@@ -105,15 +107,26 @@ fn build(
     profile: &str,
     environment: &[(&str, &str)],
 ) -> Result<PathBuf> {
+    // Held until the files are where no other build replaces them.
+    static BUILDING: Mutex<()> = Mutex::new(());
+    let _building = BUILDING.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     let folder = dir.to_string_lossy();
     let mut arguments = vec!["--package", package, "--target", target.triple(), "--profile", profile];
     arguments.extend(["--target-dir", &folder]);
+    arguments.extend(target.feature().iter().flat_map(|board| ["--features", board]));
     arguments.extend(binaries.iter().flat_map(|binary| ["--bin", binary]));
-    cargo_build(&format!("{package} for {}", target.triple()), &arguments, environment)?;
-    Ok(dir.join(target.triple()).join(profile))
+    cargo_build(&format!("{package} for {}", target.board().name), &arguments, environment)?;
+    let built = dir.join(target.triple()).join(profile);
+    let own = built.join(target.board().name);
+    fs::create_dir_all(&own).with_context(|| format!("{}: cannot be made", own.display()))?;
+    for binary in binaries {
+        let elf = fs::read(built.join(binary)).with_context(|| format!("{binary}: cannot be read"))?;
+        files::write(&own.join(binary), &elf)?;
+    }
+    Ok(own)
 }
 
-/// The image that [`application`] carries: the UR3 policy at 3 bits, rounded.
+/// The image that [`harness`] carries: the UR3 policy at 3 bits, rounded.
 pub fn built_in() -> Result<&'static Path> {
     static FILE: LazyLock<Result<PathBuf, String>> = LazyLock::new(|| write_built_in().map_err(|e| format!("{e:#}")));
     FILE.as_deref().map_err(|error| anyhow!("the image to build in: {error}"))

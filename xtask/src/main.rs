@@ -1,10 +1,11 @@
 //! What people and CI type: `cargo demo`, `cargo verify`, `cargo xtask bench`, `cargo xtask budgets`, `cargo xtask fit`,
-//! `cargo xtask compare`, `cargo xtask doctor`.
+//! `cargo xtask compare`, `cargo xtask firmware`, `cargo xtask doctor`.
 //!
 //! This crate depends on next to nothing, so that it is built and speaks at once. What measures is the binary of `actq-bench`.
 #![forbid(unsafe_code)]
 
 mod cpu;
+mod firmware;
 mod setup;
 mod verify;
 
@@ -20,11 +21,12 @@ Commands of the actq workspace. Usage: cargo xtask COMMAND
   bench    Count the instructions of kernels and whole heads on a Cortex-M4 in QEMU and model their cycles
   budgets  Measure instructions, code, scratch and stack, and compare them with budgets.json
   compare  Compare the quantizer's methods: held-out error, true bits, closed-loop success
+  firmware Build the motor controller for a board: --board NAME [--image F.actq] --out FILE.elf; --list shows the boards
   fit      Measure the cost model's rates anew (after every change of the kernels)
   verify   Everything that CI checks: format, lints, documentation, tests on the host and under QEMU, budgets
   doctor   Check and install what the other commands need: Rust targets and QEMU
 
-The first five show their options with --help.";
+demo, bench, budgets, compare, fit and firmware show their options with --help.";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -32,6 +34,13 @@ fn main() -> ExitCode {
     let outcome = match &words[..] {
         ["verify"] => verify::run(),
         ["doctor"] => setup::ensure(&Target::ALL).map(|()| println!("all there")),
+        ["firmware", options @ ..] => match firmware::Options::parse(options) {
+            Ok(options) => options.run(),
+            Err(wrong) => {
+                eprintln!("{wrong}");
+                return ExitCode::from(2);
+            }
+        },
         ["compare", ..] => measuring(&words),
         ["demo" | "bench" | "budgets" | "fit", ..] => measure(&words),
         ["help" | "-h" | "--help"] => {

@@ -139,10 +139,12 @@ fn steps(oldest: Result<(), String>, narrow: Result<(), String>, skipped: &str) 
     for target in Target::ALL {
         let mut arguments = vec!["clippy", "--target", target.triple(), "--profile", target.profile()];
         arguments.extend(&firmware);
-        arguments.extend(["--lib", "--bin", "actq-firmware-demo"]);
+        arguments.extend(["--lib", "--bin", "harness"]);
         arguments.extend(target.board().shows.iter().flat_map(|binary| ["--bin", binary]));
+        let board = target.feature().map(|board| format!("actq-firmware-demo/{board},actq-firmware-bench/{board}"));
+        arguments.extend(board.iter().flat_map(|features| ["--features", features]));
         arguments.extend(deny);
-        add(&format!("lints of the firmware, {}", target.triple()), &arguments, &[image]);
+        add(&format!("lints of the firmware, {target:?}"), &arguments, &[image]);
     }
     let fpu = ["--target", Target::Fpu.triple(), "--profile", Target::Fpu.profile()];
     let defmt = ["clippy", "--package", "actq-kernels", "--features", "defmt"];
