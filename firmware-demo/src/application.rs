@@ -8,12 +8,14 @@ use embedded_io::Write;
 use crate::tick::Timing;
 
 /// What an application may want to tell.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct Status {
     /// The tick's times.
     pub timing: Timing,
     /// Bytes of the serial port that were lost, modulo 2^32.
     pub lost: u32,
+    /// Measures the bytes of stack that were in use at most.
+    pub stack: fn() -> u32,
     /// Whether a head runs: its image was checked, and its self-test passed.
     pub ready: bool,
 }

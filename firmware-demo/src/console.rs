@@ -26,7 +26,7 @@ impl<'i> Console<'i> {
     }
 
     fn on_byte(&mut self, byte: u8, status: &Status, out: &mut impl Write) {
-        let Status { timing, lost, ready } = status;
+        let Status { timing, lost, stack, ready } = status;
         match byte {
             b'?' => Text::to(out)
                 .text(if *ready { "ready" } else { "not ready" })
@@ -40,11 +40,16 @@ impl<'i> Console<'i> {
                 .number(timing.overruns)
                 .text(", lost bytes ")
                 .number(*lost)
+                .text(", stack ")
+                .number(stack())
+                .text(" bytes")
                 .end(),
             b's' if *ready => self.asked = self.asked.saturating_add(1),
             b's' => Text::to(out).text("no action: not ready").end(),
             #[cfg(feature = "faults")]
             b'w' => self.well = false,
+            #[cfg(all(feature = "faults", target_os = "none"))]
+            b'h' => cortex_m::asm::udf(),
             #[cfg(feature = "faults")]
             b'p' => panic!("asked for"),
             b'\r' | b'\n' => {}

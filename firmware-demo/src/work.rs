@@ -27,7 +27,8 @@ pub struct Work<'p, 'i, 's, A, W> {
     pub watchdog: &'p mut W,
     /// The head, where there is an image that may run.
     pub head: Option<Head<'i, 's>>,
-    /// The head's state.
+    /// Measures the bytes of stack that were in use at most.
+    pub stack: fn() -> u32,
     step: Step,
 }
 
@@ -39,8 +40,8 @@ enum Step {
 
 impl<'p, 'i, 's, A: Application, W: Watchdog> Work<'p, 'i, 's, A, W> {
     /// With nothing begun.
-    pub fn new(application: A, port: &'p mut Port<'static>, watchdog: &'p mut W, head: Option<Head<'i, 's>>) -> Self {
-        Self { application, port, watchdog, head, step: Step::None }
+    pub fn new(application: A, port: &'p mut Port<'static>, watchdog: &'p mut W, head: Option<Head<'i, 's>>, stack: fn() -> u32) -> Self {
+        Self { application, port, watchdog, head, stack, step: Step::None }
     }
 
     /// A turn of the loop: takes what has come, runs one slice of the head, and feeds the watchdog where all is well. A new action
@@ -50,7 +51,8 @@ impl<'p, 'i, 's, A: Application, W: Watchdog> Work<'p, 'i, 's, A, W> {
         if self.port.read_ready() == Ok(true) {
             let mut bytes = [0; BYTES];
             let Ok(len) = self.port.read(&mut bytes);
-            let status = Status { timing, lost: self.port.lost(), ready: self.head.is_some() };
+            let (lost, ready) = (self.port.lost(), self.head.is_some());
+            let status = Status { timing, lost, stack: self.stack, ready };
             self.application.on_bytes(bytes.get(..len).unwrap_or_default(), &status, self.port);
         }
         self.slice(share);

@@ -9,6 +9,8 @@ pub mod crumb;
 pub mod host;
 pub mod machine;
 pub mod slot;
+#[cfg(target_arch = "arm")]
+pub mod stack;
 
 use core::fmt::Write as _;
 use core::panic::PanicInfo;

@@ -75,6 +75,7 @@ mod app {
 
     #[init(local = [buffers: Buffers = Buffers::new()])]
     fn init(cx: init::Context) -> (Shared, Local) {
+        start::paint_stack();
         let crumb = crumb::take();
         // SAFETY: RTIC runs this once, and nothing else has the board's peripherals.
         let Parts { clock, cause, uart, mut watchdog, stage } = unsafe { device::start(BAUD) };
@@ -118,7 +119,7 @@ mod app {
         let (mut output, mut timing) = (cx.shared.output, cx.shared.timing);
         let head = start::head(port, found);
         let application = Console::new(head.as_ref().map(|head| *head.image()));
-        let mut work = Work::new(application, port, watchdog, head);
+        let mut work = Work::new(application, port, watchdog, head, start::stack);
         loop {
             let times = timing.lock(|timing| *timing);
             work.turn(times, |take| output.lock(take));

@@ -9,6 +9,7 @@ use actq_firmware_demo::text::Text;
 use actq_firmware_demo::tick::MAX_ACTION;
 use actq_firmware_support::crumb::Kind;
 use actq_firmware_support::slot;
+use actq_firmware_support::stack::Room;
 use actq_kernels::{Head, Image};
 
 use crate::app::Found;
@@ -77,6 +78,7 @@ fn report(port: &mut Port<'static>, found: &Found) {
     let cause = match (found.cause, found.crumb.map(|crumb| crumb.kind)) {
         // The board tells nothing itself.
         (Cause::Unknown, Some(Kind::Nmi)) => NMI,
+        (Cause::Unknown, Some(Kind::Panic | Kind::HardFault)) => Cause::Software.text(),
         (cause, _) => cause.text(),
     };
     Text::to(port).text("actq controller, reset by ").text(cause).end();
@@ -95,6 +97,25 @@ fn report(port: &mut Port<'static>, found: &Found) {
     };
     let text = Text::to(port).text("clock ").number(found.clock.hz).text(source);
     text.text(if found.watchdog { ", watchdog runs" } else { ", NO WATCHDOG" }).end();
+}
+
+/// Words of stack that are painted: more than the program takes, less than any board has.
+const STACK: usize = 2048;
+
+fn room() -> Room {
+    // SAFETY: every board's memory leaves the stack as many words; the linker's script puts it behind all else.
+    unsafe { Room::of_stack(STACK) }
+}
+
+/// Prepares [`stack`]. To be called before any interrupt comes.
+pub(crate) fn paint_stack() {
+    // SAFETY: no interrupt comes yet.
+    unsafe { room().paint() }
+}
+
+/// Bytes of stack that were in use at most.
+pub(crate) fn stack() -> u32 {
+    room().used() as u32
 }
 
 /// The scratch memory, which is 0.
