@@ -34,6 +34,7 @@ fn main() {
 /// Whether the last processor that the compiler's flags name has the DSP extension.
 fn flags_have_dsp() -> bool {
     let flags = std::env::var("CARGO_ENCODED_RUSTFLAGS").unwrap_or_default();
-    let processors = flags.split('\u{1f}').filter_map(|flag| flag.trim_start_matches("-C").strip_prefix("target-cpu="));
-    processors.last().is_some_and(|processor| WITH_DSP.contains(&processor))
+    let processor =
+        flags.split('\u{1f}').rev().find_map(|flag| flag.trim_start_matches("-C").strip_prefix("target-cpu="));
+    processor.is_some_and(|processor| WITH_DSP.contains(&processor))
 }

@@ -1,11 +1,11 @@
-//! What the firmware is for. [`crate::work`] and [`crate::tick`] call it; the link and the safety of a controller stand behind these two
+//! What the firmware is for. [`crate::work`] and the tick call it; the link and the safety of a controller stand behind these two
 //! traits, and know neither boards nor tasks.
 
 use actq_boards::seams::Stage;
 use actq_kernels::StepError;
 use embedded_io::Write;
 
-use crate::tick::Timing;
+use crate::timing::Timing;
 
 /// What an application may want to tell.
 #[derive(Clone, Copy, Debug)]

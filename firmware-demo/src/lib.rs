@@ -4,6 +4,8 @@
 
 pub mod application;
 pub mod console;
+pub mod off;
+pub mod output;
 pub mod text;
-pub mod tick;
+pub mod timing;
 pub mod work;

@@ -8,7 +8,8 @@ use actq_kernels::Head;
 use embedded_io::{Read, ReadReady};
 
 use crate::application::{Application, Status};
-use crate::tick::{Output, Timing};
+use crate::output::Output;
+use crate::timing::Timing;
 
 /// Modelled instructions of a slice, where an image needs no more: 0.12 ms of a Cortex-M4 at 168 MHz. Bytes that come wait for as
 /// long; the tick does not.
@@ -40,7 +41,13 @@ enum Step {
 
 impl<'p, 'i, 's, A: Application, W: Watchdog> Work<'p, 'i, 's, A, W> {
     /// With nothing begun.
-    pub fn new(application: A, port: &'p mut Port<'static>, watchdog: &'p mut W, head: Option<Head<'i, 's>>, stack: fn() -> u32) -> Self {
+    pub fn new(
+        application: A,
+        port: &'p mut Port<'static>,
+        watchdog: &'p mut W,
+        head: Option<Head<'i, 's>>,
+        stack: fn() -> u32,
+    ) -> Self {
         Self { application, port, watchdog, head, stack, step: Step::None }
     }
 

@@ -82,7 +82,7 @@ impl Options {
 }
 
 /// The boards that the application has a device for, each by its first target.
-fn boards() -> impl Iterator<Item = (Target, Application)> {
+pub(crate) fn boards() -> impl Iterator<Item = (Target, Application)> {
     let first = |target: &Target| Target::on(target.board().name) == Some(*target);
     Target::ALL.into_iter().filter(first).filter_map(|target| Some((target, target.board().application?)))
 }

@@ -22,3 +22,4 @@ mod recorded;
 mod recordings;
 mod slices;
 mod stats;
+mod work;

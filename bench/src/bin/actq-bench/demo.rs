@@ -116,7 +116,8 @@ pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
         let elf = firmware::harness_with(Target::Fpu, &path)?;
         let firmware = Firmware::run(&elf, image, qemu_episodes)?;
         let heldout = eval::heldout(&policy_dir, &image)?;
-        let instructions = evaluation::count(&counter, &elf, None, &image, heldout.episode(0))?.instructions;
+        let instructions =
+            evaluation::count(&counter, Target::Fpu, &elf, None, &image, heldout.episode(0))?.instructions;
         let nmse = eval::evaluate(image, &heldout)?.nmse;
         columns.push(Column {
             name: name.into(),

@@ -105,7 +105,7 @@ pub(crate) fn measure(policies: &[PathBuf], counter: &Counter, wait_states: u64)
             let buffer = ImageBuffer::new(&write_image(quantizer, &options, &path)?);
             let image = buffer.image(&path)?;
             let recorded = eval::heldout(dir, &image)?;
-            let region = evaluation::count(counter, &elf, Some(&path), &image, recorded.episode(0))?;
+            let region = evaluation::count(counter, Target::Fpu, &elf, Some(&path), &image, recorded.episode(0))?;
             heads.push(Head {
                 record: Record {
                     policy: policy.name.clone(),

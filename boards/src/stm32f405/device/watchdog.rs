@@ -27,7 +27,7 @@ impl Iwdg {
 
     fn key(&self, key: u16) {
         // SAFETY: the register takes any key, and does nothing on those that it does not know.
-        self.0.kr().write(|w| unsafe { w.bits(key.into()) });
+        self.0.kr().write(|w| unsafe { w.bits(key) });
     }
 }
 

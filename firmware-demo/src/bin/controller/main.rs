@@ -14,6 +14,8 @@ fn main() {
 #[cfg(target_os = "none")]
 mod faults;
 #[cfg(target_os = "none")]
+mod log;
+#[cfg(target_os = "none")]
 mod start;
 
 #[cfg(all(target_os = "none", feature = "defmt-rtt"))]
@@ -24,12 +26,14 @@ use defmt_semihosting as _;
 #[cfg(target_os = "none")]
 #[rtic::app(device = actq_boards::device, peripherals = false)]
 mod app {
-    use actq_boards::device::{self, Interrupt, Parts};
+    use actq_boards::device::{self, Interrupt, Parts, SCRATCH};
     use actq_boards::port::{Buffers, Port, Wire};
     use actq_boards::seams::{Cause, Clock, Watchdog as _};
     use actq_firmware_demo::application::Control as _;
     use actq_firmware_demo::console::Console;
-    use actq_firmware_demo::tick::{Off, Output, Timing};
+    use actq_firmware_demo::off::Off;
+    use actq_firmware_demo::output::Output;
+    use actq_firmware_demo::timing::Timing;
     use actq_firmware_demo::work::Work;
     use actq_firmware_support::crumb;
     use cortex_m::peripheral::SYST;
@@ -113,11 +117,11 @@ mod app {
     }
 
     /// The loop below.
-    #[idle(shared = [output, timing], local = [port, watchdog, found])]
+    #[idle(shared = [output, timing], local = [port, watchdog, found, scratch: [u32; SCRATCH] = [0; SCRATCH]])]
     fn idle(cx: idle::Context) -> ! {
-        let idle::LocalResources { port, watchdog, found, .. } = cx.local;
+        let idle::LocalResources { port, watchdog, found, scratch, .. } = cx.local;
         let (mut output, mut timing) = (cx.shared.output, cx.shared.timing);
-        let head = start::head(port, found);
+        let head = start::head(port, found, scratch);
         let application = Console::new(head.as_ref().map(|head| *head.image()));
         let mut work = Work::new(application, port, watchdog, head, start::stack);
         loop {

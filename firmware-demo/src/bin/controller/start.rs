@@ -1,18 +1,17 @@
 //! The start: what was found is told, the image is checked and tested.
 
-use core::mem::MaybeUninit;
-
-use actq_boards::device::{NMI, SCRATCH};
+use actq_boards::device::NMI;
 use actq_boards::port::Port;
 use actq_boards::seams::{Cause, Parts, Source};
+use actq_firmware_demo::output::MAX_ACTION;
 use actq_firmware_demo::text::Text;
-use actq_firmware_demo::tick::MAX_ACTION;
 use actq_firmware_support::crumb::Kind;
 use actq_firmware_support::slot;
 use actq_firmware_support::stack::Room;
 use actq_kernels::{Head, Image};
 
 use crate::app::Found;
+use crate::log::info;
 
 /// The types of a board.
 pub(crate) trait Board {
@@ -36,8 +35,8 @@ static BUILT_IN: &Aligned<[u8]> = &Aligned(*include_bytes!(env!(
 )));
 
 /// Tells what was found, and makes the head of the image in the slot or of the one that was built in. `None`, and the reason is told,
-/// where the image may not run. To be called once.
-pub(crate) fn head(port: &mut Port<'static>, found: &Found) -> Option<Head<'static, 'static>> {
+/// where the image may not run.
+pub(crate) fn head<'s>(port: &mut Port<'static>, found: &Found, scratch: &'s mut [u32]) -> Option<Head<'static, 's>> {
     report(port, found);
     let bytes = slot::image().unwrap_or(&BUILT_IN.0);
     let image = match Image::new_checked(bytes) {
@@ -58,7 +57,7 @@ pub(crate) fn head(port: &mut Port<'static>, found: &Found) -> Option<Head<'stat
         text.text(" values, the tick takes ").number(MAX_ACTION as u32).end();
         return None;
     }
-    let mut head = match Head::new(image, scratch()) {
+    let mut head = match Head::new(image, scratch) {
         Ok(head) => head,
         Err(error) => {
             let text = Text::to(port).text("image refused: it needs ").number(image.scratch_words() as u32);
@@ -70,6 +69,7 @@ pub(crate) fn head(port: &mut Port<'static>, found: &Found) -> Option<Head<'stat
         Text::to(port).text("image refused: its self-test fails, error ").number(error.code().into()).end();
         return None;
     }
+    info!("{=str} is ready", image.name());
     Text::to(port).text("self-test passed, ready").end();
     Some(head)
 }
@@ -81,6 +81,7 @@ fn report(port: &mut Port<'static>, found: &Found) {
         (Cause::Unknown, Some(Kind::Panic | Kind::HardFault)) => Cause::Software.text(),
         (cause, _) => cause.text(),
     };
+    info!("reset by {=str}, {=u32} Hz", cause, found.clock.hz);
     Text::to(port).text("actq controller, reset by ").text(cause).end();
     if let Some(crumb) = found.crumb {
         let text = Text::to(port).text("before it: ");
@@ -116,11 +117,4 @@ pub(crate) fn paint_stack() {
 /// Bytes of stack that were in use at most.
 pub(crate) fn stack() -> u32 {
     room().used() as u32
-}
-
-/// The scratch memory, which is 0.
-fn scratch() -> &'static mut [u32] {
-    static mut SCRATCH_MEMORY: MaybeUninit<[u32; SCRATCH]> = MaybeUninit::zeroed();
-    // SAFETY: `head` is called once, and nobody else takes this memory; zeroes are words.
-    unsafe { (*(&raw mut SCRATCH_MEMORY)).assume_init_mut() }
 }

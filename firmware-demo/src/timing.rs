@@ -1,37 +1,4 @@
-//! The control tick: its times, and what it does until a controller stands behind it.
-
-use actq_boards::seams::Stage;
-
-use crate::application::Control;
-
-/// Values of an action that the tick takes at most.
-pub const MAX_ACTION: usize = 64;
-
-/// The last action, on its way from the loop to the tick.
-#[derive(Clone, Copy, Debug)]
-pub struct Output {
-    values: [f32; MAX_ACTION],
-    len: usize,
-}
-
-impl Output {
-    /// No action yet.
-    pub const NONE: Self = Self { values: [0.0; MAX_ACTION], len: 0 };
-
-    /// Takes an action. One that is longer than [`MAX_ACTION`] counts as none.
-    pub fn set(&mut self, action: &[f32]) {
-        self.len = 0;
-        if let Some(values) = self.values.get_mut(..action.len()) {
-            values.copy_from_slice(action);
-            self.len = action.len();
-        }
-    }
-
-    /// The last action.
-    pub fn get(&self) -> Option<&[f32]> {
-        self.values.get(..self.len).filter(|action| !action.is_empty())
-    }
-}
+//! The control tick's times.
 
 /// When the tick began and how long it took, in cycles of a timer that counts down from `period` - 1 and makes the tick at its end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -66,16 +33,6 @@ impl Timing {
     }
 }
 
-/// Keeps the power stage off: what stands here until a controller does.
-#[derive(Debug)]
-pub struct Off;
-
-impl<S: Stage> Control<S> for Off {
-    fn on_tick(&mut self, _: Option<&[f32]>, stage: &mut S) {
-        stage.disable();
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -90,15 +47,5 @@ mod tests {
         assert_eq!(timing.jitter(), 15);
         timing.note(1000, 990, 995, true);
         assert_eq!((timing.worst, timing.overruns), (1000, 1));
-    }
-
-    #[test]
-    fn an_action_that_is_too_long_is_none() {
-        let mut output = Output::NONE;
-        assert_eq!(output.get(), None);
-        output.set(&[1.0, 2.0]);
-        assert_eq!(output.get(), Some(&[1.0, 2.0][..]));
-        output.set(&[0.0; MAX_ACTION + 1]);
-        assert_eq!(output.get(), None);
     }
 }
