@@ -82,10 +82,9 @@ fn harness_in_folder(target: Target, image: &Path) -> Result<PathBuf> {
 pub fn controller(target: Target, features: &'static str) -> Result<PathBuf> {
     let build = || {
         let image = built_in()?.to_string_lossy();
-        let all = [target.board().name, features].join(",");
-        // Builds with other features in a folder of their own, so that all of them stay.
-        let dir = target_dir().join(if features.is_empty() { "" } else { "features" }).join(features);
-        build(APPLICATION, &[CONTROLLER], &all, &dir, target, target.profile(), &[("ACTQ_IMAGE", &image)])
+        let more = if features.is_empty() { String::new() } else { format!(",{features}") };
+        let all = target.board().name.to_owned() + &more;
+        build(APPLICATION, &[CONTROLLER], &all, &target_dir(), target, target.profile(), &[("ACTQ_IMAGE", &image)])
     };
     let what = if features.is_empty() { CONTROLLER } else { features };
     Ok(once(what, target, build)?.join(CONTROLLER))
@@ -117,8 +116,8 @@ pub fn portable_binary(name: &str, target: Target) -> Result<PathBuf> {
     Ok(build(BENCH, &[name], features, &folder, target, "release", &[("ACTQ_BACKEND", "portable")])?.join(name))
 }
 
-/// Builds binaries of a package and gives the folder of their ELF files: a folder of the board, because cargo gives the files of all
-/// boards of a triple the same names.
+/// Builds binaries of a package and gives the folder of their ELF files: a folder of the board and its features, because cargo
+/// gives the files of all boards of a triple the same names.
 fn build(
     package: &str,
     binaries: &[&str],
@@ -138,7 +137,7 @@ fn build(
     arguments.extend(binaries.iter().flat_map(|binary| ["--bin", binary]));
     cargo_build(&format!("{package} for {}", target.board().name), &arguments, environment)?;
     let built = dir.join(target.triple()).join(profile);
-    let own = built.join(target.board().name);
+    let own = built.join(if features.is_empty() { target.board().name } else { features });
     fs::create_dir_all(&own).with_context(|| format!("{}: cannot be made", own.display()))?;
     for binary in binaries {
         let elf = fs::read(built.join(binary)).with_context(|| format!("{binary}: cannot be read"))?;

@@ -1,11 +1,9 @@
 //! Running the firmware under QEMU, and counting what it executes.
 
 use std::fs;
-use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::io::{Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Output, Stdio};
-use std::sync::mpsc::Receiver;
-use std::time::Duration;
 
 use actq_boards::{Target, version};
 use actq_link::{RESET, STEP};
@@ -29,7 +27,7 @@ pub fn command_on(target: Target, elf: &Path, slot: Option<&Path>, arguments: &s
 }
 
 /// Puts an image into the slot, if one is given.
-fn in_slot(command: &mut Command, elf: &Path, slot: Option<&Path>) -> Result<()> {
+pub(crate) fn in_slot(command: &mut Command, elf: &Path, slot: Option<&Path>) -> Result<()> {
     if let Some(image) = slot {
         let address = slot_address(elf)?;
         command.arg("-device").arg(format!("loader,file={},addr={address:#x},force-raw=on", image.display()));
@@ -45,7 +43,7 @@ fn slot_address(elf: &Path) -> Result<u64> {
     }
 }
 
-fn spawn(command: &mut Command) -> Result<Child> {
+pub(crate) fn spawn(command: &mut Command) -> Result<Child> {
     let emulator = command.get_program().to_string_lossy().into_owned();
     command
         .spawn()
@@ -109,63 +107,6 @@ impl Server {
         let status = self.child.wait().context("QEMU does not end")?;
         ensure!(status.success(), "the firmware ended with a failure");
         Ok(())
-    }
-}
-
-/// An application under QEMU, with its serial port in reach: lines of text. It is ended with the value.
-#[derive(Debug)]
-pub struct Console {
-    child: Child,
-    stdin: ChildStdin,
-    lines: Receiver<String>,
-}
-
-/// How long a line may take: a busy machine runs QEMU slowly.
-const LINE: Duration = Duration::from_secs(60);
-
-impl Console {
-    /// Starts an application, with an image in the slot if one is given.
-    pub fn start(target: Target, elf: &Path, slot: Option<&Path>) -> Result<Self> {
-        let mut command = target.run_with_serial(elf, "stdio");
-        in_slot(&mut command, elf, slot)?;
-        let mut child = spawn(command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::inherit()))?;
-        let (stdin, stdout) = (child.stdin.take(), child.stdout.take());
-        let stdin = stdin.context("no standard input")?;
-        let stdout = BufReader::new(stdout.context("no standard output")?);
-        let (sender, lines) = std::sync::mpsc::channel();
-        // It ends with QEMU's output, or with the receiver.
-        std::thread::spawn(move || stdout.lines().map_while(Result::ok).all(|line| sender.send(line).is_ok()));
-        Ok(Self { child, stdin, lines })
-    }
-
-    /// Sends bytes.
-    pub fn send(&mut self, bytes: &[u8]) -> Result<()> {
-        self.stdin.write_all(bytes).and_then(|()| self.stdin.flush()).context("QEMU has ended")
-    }
-
-    /// The next line.
-    pub fn line(&mut self) -> Result<String> {
-        self.lines.recv_timeout(LINE).context("the application says nothing")
-    }
-
-    /// The lines up to the one that begins so, which is the last.
-    pub fn lines_until(&mut self, begin: &str) -> Result<Vec<String>> {
-        let mut lines = Vec::new();
-        loop {
-            let line = self.line().with_context(|| format!("waiting for {begin:?} after {lines:#?}"))?;
-            lines.push(line);
-            if lines.last().is_some_and(|line| line.starts_with(begin)) {
-                return Ok(lines);
-            }
-        }
-    }
-}
-
-impl Drop for Console {
-    fn drop(&mut self) {
-        // Where it has ended already, there is nothing to end.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
     }
 }
 

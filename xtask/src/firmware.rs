@@ -137,6 +137,10 @@ fn build(target: Target, image: &Path, features: Option<&str>) -> Result<Vec<u8>
     let mut command = cargo();
     command.current_dir(root()).args(["build", "--package", "actq-firmware-demo", "--bin", "controller"]);
     command.args(["--profile", target.profile(), "--target", target.triple(), "--features", &features]);
+    // defmt's own default leaves out all but errors.
+    if std::env::var_os("DEFMT_LOG").is_none() {
+        command.env("DEFMT_LOG", "info");
+    }
     let status = command.arg("--target-dir").arg(&folder).env("ACTQ_IMAGE", image).status();
     if !status.context("cargo cannot be started")?.success() {
         bail!("the application does not build for {name}");
@@ -184,6 +188,15 @@ mod tests {
             let wrong = Options::parse(words).expect_err("refused");
             assert!(wrong.contains(expected), "{words:?}: {wrong}");
         }
+    }
+
+    #[test]
+    fn what_is_no_image_is_refused_by_name() {
+        let application = Target::F405.board().application.expect("an application");
+        let refused = |path: &Path| format!("{:#}", check(path, application, Target::F405).expect_err("refused"));
+        let readme = root().join("README.md");
+        assert!(refused(&readme).ends_with("README.md: refused: not an actq image (magic differs)"));
+        assert!(refused(Path::new("none.actq")).starts_with("none.actq: the image cannot be read: "));
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The registers of AN386 and AN500 (Arm DAI 0386C, section 3): UART 0, the watchdog, no power stage.
 
-use crate::cmsdk::{NoStage, Uart, Watchdog};
+pub use crate::cmsdk::{NoStage as Stage, Uart, Watchdog};
 use crate::seams::{self, Cause, Clock, Source};
 use crate::vectors::interrupts;
 
@@ -19,7 +19,7 @@ const UART: usize = 0x4000_4000;
 const WATCHDOG: usize = 0x4000_8000;
 
 /// The board.
-pub type Parts = seams::Parts<Uart, Watchdog, NoStage>;
+pub type Parts = seams::Parts<Uart, Watchdog, Stage>;
 
 /// Sets the board up, with its serial port at `baud`.
 ///
@@ -30,5 +30,5 @@ pub unsafe fn start(baud: u32) -> Parts {
     // SAFETY: these are the addresses of DAI 0386C, and nobody else has the peripherals.
     let (uart, watchdog) = unsafe { (Uart::new(UART, HZ, baud), Watchdog::new(WATCHDOG, HZ)) };
     let clock = Clock { hz: HZ, source: Source::Crystal };
-    Parts { clock, cause: Cause::Unknown, uart, watchdog, stage: NoStage::default() }
+    Parts { clock, cause: Cause::Unknown, uart, watchdog, stage: Stage::default() }
 }

@@ -1,7 +1,7 @@
 //! The registers of AN505 (Arm DAI 0505B, section 3) in the secure state, whose addresses have bit 28 set: UART 0, the secure watchdog,
 //! no power stage.
 
-use crate::cmsdk::{NoStage, Uart, Watchdog};
+pub use crate::cmsdk::{NoStage as Stage, Uart, Watchdog};
 use crate::seams::{self, Cause, Clock, Source};
 use crate::vectors::interrupts;
 
@@ -20,7 +20,7 @@ const UART: usize = 0x5020_0000;
 const WATCHDOG: usize = 0x5008_1000;
 
 /// The board.
-pub type Parts = seams::Parts<Uart, Watchdog, NoStage>;
+pub type Parts = seams::Parts<Uart, Watchdog, Stage>;
 
 /// Sets the board up, with its serial port at `baud`.
 ///
@@ -31,5 +31,5 @@ pub unsafe fn start(baud: u32) -> Parts {
     // SAFETY: these are the addresses of DAI 0505B, and nobody else has the peripherals.
     let (uart, watchdog) = unsafe { (Uart::new(UART, HZ, baud), Watchdog::new(WATCHDOG, HZ)) };
     let clock = Clock { hz: HZ, source: Source::Crystal };
-    Parts { clock, cause: Cause::Unknown, uart, watchdog, stage: NoStage::default() }
+    Parts { clock, cause: Cause::Unknown, uart, watchdog, stage: Stage::default() }
 }

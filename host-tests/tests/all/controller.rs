@@ -5,9 +5,9 @@ use std::path::Path;
 
 use actq::runtime::ImageBuffer;
 use actq_bench::Target;
+use actq_bench::console::Console;
 use actq_bench::cycles::Code;
 use actq_bench::firmware::{self, built_in, halfword_at};
-use actq_bench::qemu::Console;
 use anyhow::{Context, Result, ensure};
 
 /// The boards that the application has a device for.

@@ -2,7 +2,8 @@
 
 use actq::measure::eval;
 use actq::runtime::ImageBuffer;
-use actq_bench::qemu::{Console, Counter};
+use actq_bench::console::Console;
+use actq_bench::qemu::Counter;
 use actq_bench::{Target, evaluation, firmware, ur3};
 use anyhow::{Context, Result};
 

@@ -12,9 +12,9 @@ mod watchdog;
 use stm32f4::stm32f405 as pac;
 
 pub use adc::Currents;
-pub use pwm::{Phase, Pwm};
-pub use usart::Usart;
-pub use watchdog::Iwdg;
+pub use pwm::{Phase, Pwm as Stage};
+pub use usart::Usart as Uart;
+pub use watchdog::Iwdg as Watchdog;
 
 use crate::seams::{self, Cause};
 use crate::vectors::interrupts;
@@ -30,7 +30,7 @@ pub const SCRATCH: usize = super::SCRATCH;
 pub const NMI: &str = "nmi";
 
 /// The board.
-pub type Parts = seams::Parts<Usart, Iwdg, Pwm>;
+pub type Parts = seams::Parts<Uart, Watchdog, Stage>;
 
 /// Sets the part up: 168 MHz where the crystal starts, else 16 MHz; its serial port at `baud`; the power stage off, at 20 kHz.
 ///
@@ -44,12 +44,15 @@ pub unsafe fn start(baud: u32) -> Parts {
     // SAFETY: nobody else has the peripherals, as the caller promises.
     let p = unsafe { pac::Peripherals::steal() };
     let cause = cause(&p.RCC);
+    // A debugger that halts the program stops the watchdog, and the power stage's timer, whose outputs are then off (section 17.3.21).
+    p.DBGMCU.apb1_fz().modify(|_, w| w.dbg_iwdg_stop().set_bit());
+    p.DBGMCU.apb2_fz().modify(|_, w| w.dbg_tim1_stop().set_bit());
     let clock = clock::start(&p.RCC, &p.FLASH, &p.PWR);
     let timer_hz = clock.hz;
     let bus_hz = clock::apb2(clock);
-    let uart = Usart::new(p.USART1, &p.RCC, &p.GPIOB, bus_hz, baud);
-    let stage = Pwm::new(p.TIM1, &p.RCC, &p.GPIOA, &p.GPIOB, timer_hz, Currents::new(p.ADC1, &p.RCC, &p.GPIOC));
-    let watchdog = Iwdg::new(p.IWDG);
+    let uart = Uart::new(p.USART1, &p.RCC, &p.GPIOB, bus_hz, baud);
+    let stage = Stage::new(p.TIM1, &p.RCC, &p.GPIOA, &p.GPIOB, timer_hz, Currents::new(p.ADC1, &p.RCC, &p.GPIOC));
+    let watchdog = Watchdog::new(p.IWDG);
     Parts { clock, cause, uart, watchdog, stage }
 }
 

@@ -26,7 +26,7 @@ use defmt_semihosting as _;
 #[cfg(target_os = "none")]
 #[rtic::app(device = actq_boards::device, peripherals = false)]
 mod app {
-    use actq_boards::device::{self, Interrupt, Parts, SCRATCH};
+    use actq_boards::device::{self, Interrupt, Parts, SCRATCH, Stage, Uart, Watchdog};
     use actq_boards::port::{Buffers, Port, Wire};
     use actq_boards::seams::{Cause, Clock, Watchdog as _};
     use actq_firmware_demo::application::Control as _;
@@ -72,10 +72,6 @@ mod app {
         period: u32,
         found: Found,
     }
-
-    type Uart = <Parts as start::Board>::Uart;
-    type Watchdog = <Parts as start::Board>::Watchdog;
-    type Stage = <Parts as start::Board>::Stage;
 
     #[init(local = [buffers: Buffers = Buffers::new()])]
     fn init(cx: init::Context) -> (Shared, Local) {

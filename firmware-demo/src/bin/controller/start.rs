@@ -2,7 +2,7 @@
 
 use actq_boards::device::NMI;
 use actq_boards::port::Port;
-use actq_boards::seams::{Cause, Parts, Source};
+use actq_boards::seams::{Cause, Source};
 use actq_firmware_demo::output::MAX_ACTION;
 use actq_firmware_demo::text::Text;
 use actq_firmware_support::crumb::Kind;
@@ -12,19 +12,6 @@ use actq_kernels::{Head, Image};
 
 use crate::app::Found;
 use crate::log::info;
-
-/// The types of a board.
-pub(crate) trait Board {
-    type Uart;
-    type Watchdog;
-    type Stage;
-}
-
-impl<U, W, S> Board for Parts<U, W, S> {
-    type Uart = U;
-    type Watchdog = W;
-    type Stage = S;
-}
 
 /// Includes a file at an address that is a multiple of 4.
 #[repr(C, align(4))]
