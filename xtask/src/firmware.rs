@@ -194,8 +194,16 @@ mod tests {
     fn what_is_no_image_is_refused_by_name() {
         let application = Target::F405.board().application.expect("an application");
         let refused = |path: &Path| format!("{:#}", check(path, application, Target::F405).expect_err("refused"));
-        let readme = root().join("README.md");
-        assert!(refused(&readme).ends_with("README.md: refused: not an actq image (magic differs)"));
+        let file = std::env::temp_dir().join(format!("actq-no-image-{}", std::process::id()));
+        for (bytes, why) in [
+            (&[0; 4096][..], "not an actq image (magic differs)"),
+            (&[0; 16], "image is shorter than its header"),
+            (&[0; 4097], "image length differs from its header"),
+        ] {
+            fs::write(&file, bytes).expect("written");
+            assert_eq!(refused(&file), format!("{}: refused: {why}", file.display()));
+        }
+        fs::remove_file(&file).expect("removed");
         assert!(refused(Path::new("none.actq")).starts_with("none.actq: the image cannot be read: "));
     }
 
