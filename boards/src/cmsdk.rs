@@ -187,4 +187,8 @@ impl Stage for NoStage {
     fn disable(&mut self) {
         self.on = false;
     }
+
+    fn currents(&mut self) -> Option<[u16; 2]> {
+        None
+    }
 }

@@ -86,6 +86,10 @@ pub trait Stage {
 
     /// Switches all six outputs off, now.
     fn disable(&mut self);
+
+    /// Two phase currents that were measured in the middle of the last period, as the ADC gives them (0 to 4095); `None` where there
+    /// are no new ones.
+    fn currents(&mut self) -> Option<[u16; 2]>;
 }
 
 /// A board that has been set up.

@@ -84,11 +84,6 @@ impl Pwm {
             currents,
         }
     }
-
-    /// The phase currents of the last period, as the ADC gives them; `None` where there are no new ones.
-    pub fn currents(&mut self) -> Option<[u16; 2]> {
-        self.currents.take()
-    }
 }
 
 impl Stage for Pwm {
@@ -107,6 +102,10 @@ impl Stage for Pwm {
 
     fn disable(&mut self) {
         self.timer.bdtr().modify(|_, w| w.moe().clear_bit());
+    }
+
+    fn currents(&mut self) -> Option<[u16; 2]> {
+        self.currents.take()
     }
 }
 
