@@ -42,7 +42,8 @@ fn main() -> ExitCode {
             }
         },
         ["compare", ..] => measuring(&words),
-        ["demo" | "bench" | "budgets" | "fit", ..] => measure(&words),
+        ["demo" | "bench" | "fit", ..] => measure(&words, &[Target::Fpu]),
+        ["budgets", ..] => measure(&words, &[Target::Fpu, Target::M33]),
         ["help" | "-h" | "--help"] => {
             println!("{USAGE}");
             Ok(())
@@ -61,10 +62,11 @@ fn main() -> ExitCode {
     }
 }
 
-/// A command of `actq-bench` that needs QEMU.
-fn measure(arguments: &[&str]) -> Result<()> {
-    println!("{}: on the Cortex-M4 in QEMU", arguments[0]);
-    setup::ensure(&[Target::Fpu])?;
+/// A command of `actq-bench` that needs QEMU, and what these targets need.
+fn measure(arguments: &[&str], targets: &[Target]) -> Result<()> {
+    let boards: Vec<&str> = targets.iter().map(|target| target.board().name).collect();
+    println!("{}: on {} in QEMU", arguments[0], boards.join(" and "));
+    setup::ensure(targets)?;
     measuring(arguments)
 }
 
