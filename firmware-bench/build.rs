@@ -1,5 +1,5 @@
-//! Links for the board of the target.
+//! Links for the board.
 
-fn main() {
-    actq_boards::link();
+fn main() -> Result<(), String> {
+    actq_boards::link()
 }

@@ -37,53 +37,72 @@ pub(crate) fn cargo_build(what: &str, arguments: &[&str], environment: &[(&str, 
 }
 
 const APPLICATION: &str = "actq-firmware-demo";
+/// Its binary.
+const CONTROLLER: &str = "controller";
 const BENCH: &str = "actq-firmware-bench";
+/// Its binary that runs an image.
+const HARNESS: &str = "harness";
 
-/// The folders of the ELF files that this process has built, by package and target. Even where nothing is to be built, cargo takes
+/// The folders of the ELF files that this process has built, by what they are and target. Even where nothing is to be built, cargo takes
 /// a while to find out.
 static BUILT: Mutex<BTreeMap<(&str, Target), PathBuf>> = Mutex::new(BTreeMap::new());
 
-/// Builds a package once.
-fn once(package: &'static str, target: Target, build: impl FnOnce() -> Result<PathBuf>) -> Result<PathBuf> {
+/// Builds something once.
+fn once(what: &'static str, target: Target, build: impl FnOnce() -> Result<PathBuf>) -> Result<PathBuf> {
     // A build that panicked has left nothing in the map.
     let mut built = BUILT.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-    if let Some(folder) = built.get(&(package, target)) {
+    if let Some(folder) = built.get(&(what, target)) {
         return Ok(folder.clone());
     }
     let folder = build()?;
-    built.insert((package, target), folder.clone());
+    built.insert((what, target), folder.clone());
     Ok(folder)
 }
 
-/// Builds the application with an image built in that is the same in all runs, and gives the path of the ELF file. Other images
-/// are run from the slot.
-pub fn application(target: Target) -> Result<PathBuf> {
-    let build = || application_in_folder(target, built_in()?);
-    Ok(once(APPLICATION, target, build)?.join(APPLICATION))
+/// Builds the harness, which serves an image through semihosting, with an image built in that is the same in all runs, and gives the
+/// path of the ELF file. Other images are run from the slot.
+pub fn harness(target: Target) -> Result<PathBuf> {
+    let build = || harness_in_folder(target, built_in()?);
+    Ok(once(HARNESS, target, build)?.join(HARNESS))
 }
 
-/// Builds the application with `image` built in.
-pub fn application_with(target: Target, image: &Path) -> Result<PathBuf> {
-    Ok(application_in_folder(target, image)?.join(APPLICATION))
+/// Builds the harness with `image` built in.
+pub fn harness_with(target: Target, image: &Path) -> Result<PathBuf> {
+    Ok(harness_in_folder(target, image)?.join(HARNESS))
 }
 
-fn application_in_folder(target: Target, image: &Path) -> Result<PathBuf> {
+fn harness_in_folder(target: Target, image: &Path) -> Result<PathBuf> {
     let image = fs::canonicalize(image).with_context(|| format!("{}: cannot be read", image.display()))?;
     let image = ("ACTQ_IMAGE", &*image.to_string_lossy());
-    build(APPLICATION, &[APPLICATION], &target_dir(), target, target.profile(), &[image])
+    build(BENCH, &[HARNESS], target.feature().unwrap_or_default(), &target_dir(), target, target.profile(), &[image])
+}
+
+/// Builds the application for a target's board, with the image of [`harness`] and with more features, separated by commas, and gives the
+/// path of the ELF file.
+pub fn controller(target: Target, features: &'static str) -> Result<PathBuf> {
+    let build = || {
+        let image = built_in()?.to_string_lossy();
+        let more = if features.is_empty() { String::new() } else { format!(",{features}") };
+        let all = target.board().name.to_owned() + &more;
+        build(APPLICATION, &[CONTROLLER], &all, &target_dir(), target, target.profile(), &[("ACTQ_IMAGE", &image)])
+    };
+    let what = if features.is_empty() { CONTROLLER } else { features };
+    Ok(once(what, target, build)?.join(CONTROLLER))
 }
 
 /// Builds the binaries of `firmware-bench` that run on a target's board, and gives the path of one's ELF file.
 pub fn binary(name: &str, target: Target) -> Result<PathBuf> {
     let board = target.board();
     ensure!(board.shows.contains(&name), "firmware {name} does not run on {}", board.name);
-    let build = || build(BENCH, board.shows, &target_dir(), target, target.profile(), &[]);
+    let features = target.feature().unwrap_or_default();
+    let build = || build(BENCH, board.shows, features, &target_dir(), target, target.profile(), &[]);
     Ok(once(BENCH, target, build)?.join(name))
 }
 
 /// As [`binary`], with a profile of `Cargo.toml` that is not the target's own.
 pub fn binary_in(profile: &str, name: &str, target: Target) -> Result<PathBuf> {
-    Ok(build(BENCH, &[name], &target_dir(), target, profile, &[])?.join(name))
+    let features = target.feature().unwrap_or_default();
+    Ok(build(BENCH, &[name], features, &target_dir(), target, profile, &[])?.join(name))
 }
 
 /// As [`binary`], without the assembler (`ACTQ_BACKEND=portable`).
@@ -93,27 +112,41 @@ pub fn portable_binary(name: &str, target: Target) -> Result<PathBuf> {
     }
     // In a folder of its own, so that builds of both kinds stay.
     let folder = target_dir().join("portable");
-    Ok(build(BENCH, &[name], &folder, target, "release", &[("ACTQ_BACKEND", "portable")])?.join(name))
+    let features = target.feature().unwrap_or_default();
+    Ok(build(BENCH, &[name], features, &folder, target, "release", &[("ACTQ_BACKEND", "portable")])?.join(name))
 }
 
-/// Builds binaries of a package and gives the folder of their ELF files.
+/// Builds binaries of a package and gives the folder of their ELF files: a folder of the board and its features, because cargo
+/// gives the files of all boards of a triple the same names.
 fn build(
     package: &str,
     binaries: &[&str],
+    features: &str,
     dir: &Path,
     target: Target,
     profile: &str,
     environment: &[(&str, &str)],
 ) -> Result<PathBuf> {
+    // Held until the files are where no other build replaces them.
+    static BUILDING: Mutex<()> = Mutex::new(());
+    let _building = BUILDING.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     let folder = dir.to_string_lossy();
     let mut arguments = vec!["--package", package, "--target", target.triple(), "--profile", profile];
     arguments.extend(["--target-dir", &folder]);
+    arguments.extend(["--features", features]);
     arguments.extend(binaries.iter().flat_map(|binary| ["--bin", binary]));
-    cargo_build(&format!("{package} for {}", target.triple()), &arguments, environment)?;
-    Ok(dir.join(target.triple()).join(profile))
+    cargo_build(&format!("{package} for {}", target.board().name), &arguments, environment)?;
+    let built = dir.join(target.triple()).join(profile);
+    let own = built.join(if features.is_empty() { target.board().name } else { features });
+    fs::create_dir_all(&own).with_context(|| format!("{}: cannot be made", own.display()))?;
+    for binary in binaries {
+        let elf = fs::read(built.join(binary)).with_context(|| format!("{binary}: cannot be read"))?;
+        files::write(&own.join(binary), &elf)?;
+    }
+    Ok(own)
 }
 
-/// The image that [`application`] carries: the UR3 policy at 3 bits, rounded.
+/// The image that [`harness`] carries: the UR3 policy at 3 bits, rounded.
 pub fn built_in() -> Result<&'static Path> {
     static FILE: LazyLock<Result<PathBuf, String>> = LazyLock::new(|| write_built_in().map_err(|e| format!("{e:#}")));
     FILE.as_deref().map_err(|error| anyhow!("the image to build in: {error}"))
@@ -142,8 +175,26 @@ pub(crate) fn symbol(elf: &Path, name: &str) -> Result<Option<(u64, u64)>> {
 
 /// Bytes of flash that an ELF file takes: code, constants (the built-in image among them) and initial values.
 pub fn flash_bytes(elf: &Path) -> Result<u64> {
+    section_bytes(elf, &[".vector_table", ".text", ".rodata", ".data"])
+}
+
+/// Bytes of RAM that an ELF file takes for its variables.
+pub fn ram_bytes(elf: &Path) -> Result<u64> {
+    section_bytes(elf, &[".data", ".bss", ".uninit"])
+}
+
+fn section_bytes(elf: &Path, names: &[&str]) -> Result<u64> {
     let data = fs::read(elf).with_context(|| format!("{}: cannot be read", elf.display()))?;
     let file = object::File::parse(&*data).with_context(|| format!("{}: not an ELF file", elf.display()))?;
-    let flash = [".vector_table", ".text", ".rodata", ".data"];
-    Ok(file.sections().filter(|s| s.name().is_ok_and(|n| flash.contains(&n))).map(|s| s.size()).sum())
+    Ok(file.sections().filter(|s| s.name().is_ok_and(|n| names.contains(&n))).map(|s| s.size()).sum())
+}
+
+/// The halfword at an address, in hexadecimal digits, of the code of an ELF file.
+pub fn halfword_at(elf: &Path, address: &str) -> Result<u16> {
+    let address = u64::from_str_radix(address, 16).with_context(|| format!("{address:?} is no address"))?;
+    let data = fs::read(elf).with_context(|| format!("{}: cannot be read", elf.display()))?;
+    let file = object::File::parse(&*data).with_context(|| format!("{}: not an ELF file", elf.display()))?;
+    let text = file.section_by_name(".text").context("there is no code")?;
+    let bytes = text.data_range(address, 2)?.with_context(|| format!("{address:x} is not in the code"))?;
+    Ok(u16::from_le_bytes(bytes.try_into()?))
 }

@@ -22,11 +22,17 @@ pub fn command_on(target: Target, elf: &Path, slot: Option<&Path>, arguments: &s
     if !arguments.is_empty() {
         command.arg("-append").arg(arguments);
     }
+    in_slot(&mut command, elf, slot)?;
+    Ok(command)
+}
+
+/// Puts an image into the slot, if one is given.
+pub(crate) fn in_slot(command: &mut Command, elf: &Path, slot: Option<&Path>) -> Result<()> {
     if let Some(image) = slot {
         let address = slot_address(elf)?;
         command.arg("-device").arg(format!("loader,file={},addr={address:#x},force-raw=on", image.display()));
     }
-    Ok(command)
+    Ok(())
 }
 
 /// Where the image slot begins that the firmware was linked with.
@@ -37,7 +43,7 @@ fn slot_address(elf: &Path) -> Result<u64> {
     }
 }
 
-fn spawn(command: &mut Command) -> Result<Child> {
+pub(crate) fn spawn(command: &mut Command) -> Result<Child> {
     let emulator = command.get_program().to_string_lossy().into_owned();
     command
         .spawn()

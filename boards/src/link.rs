@@ -1,28 +1,64 @@
 //! What a build script of a firmware tells cargo.
 
-use std::env;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::{env, fs};
 
 use crate::Target;
 
-/// Links the package's binaries for the board of the target that is built for; on the host, does nothing. For build scripts of
-/// packages one folder below the workspace's root.
-pub fn link() {
+/// Links the package's binaries for a board; on the host, does nothing. For build scripts of packages one folder below the
+/// workspace's root.
+///
+/// # Errors
+///
+/// A feature names a board that the compiler's target does not run on, or two do; or the linker's script cannot be copied.
+pub fn link() -> Result<(), String> {
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rustc-check-cfg=cfg(actq_small)");
-    let Some(board) = env::var("TARGET").ok().and_then(|triple| Target::of(&triple)).map(Target::board) else { return };
+    let Some(target) = target()? else { return Ok(()) };
+    let board = target.board();
     // The variable of this run: a build script may have been compiled for another checkout.
-    let package = env::var("CARGO_MANIFEST_DIR").unwrap_or_default();
-    let root = Path::new(&package).parent().unwrap_or(Path::new("."));
-    for script in ["memory.x", board.memory] {
-        println!("cargo::rerun-if-changed={}", root.join(script).display());
-    }
-    println!("cargo::rustc-link-search={}", root.display());
-    if board.memory != "memory.x" {
-        println!("cargo::rustc-link-arg-bins=-T{}", root.join(board.memory).display());
+    let [package, out] =
+        ["CARGO_MANIFEST_DIR", "OUT_DIR"].map(|name| PathBuf::from(env::var_os(name).unwrap_or_default()));
+    let script = package.parent().unwrap_or(Path::new(".")).join(board.memory);
+    println!("cargo::rerun-if-changed={}", script.display());
+    if target.triple().starts_with("riscv") {
+        println!("cargo::rustc-link-arg-bins=-T{}", script.display());
+    } else {
+        // The name that cortex-m-rt's link.x includes; riscv-rt's includes none.
+        fs::copy(&script, out.join("memory.x")).map_err(|error| format!("{}: {error}", script.display()))?;
+        // What it includes for a device: a handler that a program need not have.
+        fs::write(out.join("device.x"), "PROVIDE(SERIAL = DefaultHandler);\n")
+            .map_err(|error| format!("device.x: {error}"))?;
+        println!("cargo::rustc-link-search={}", out.display());
     }
     println!("cargo::rustc-link-arg-bins=-Tlink.x");
+    if env::vars_os().any(|(name, _)| name.to_string_lossy().starts_with("CARGO_FEATURE_DEFMT")) {
+        println!("cargo::rustc-link-arg-bins=-Tdefmt.x");
+    }
     if board.small {
         println!("cargo::rustc-cfg=actq_small");
+    }
+    Ok(())
+}
+
+/// What is built for: the board that a feature names, else the first one of the compiler's target.
+fn target() -> Result<Option<Target>, String> {
+    let triple = env::var("TARGET").unwrap_or_default();
+    let Some(default) = Target::of(&triple) else { return Ok(None) };
+    let chosen = |target: &Target| {
+        let name = target.board().name.to_uppercase().replace('-', "_");
+        env::var_os(format!("CARGO_FEATURE_{name}")).is_some()
+    };
+    let mut boards: Vec<Target> = Target::ALL.into_iter().filter(chosen).collect();
+    boards.dedup_by_key(|target| target.board().name);
+    match boards[..] {
+        [] => Ok(Some(default)),
+        [board] => {
+            let name = board.board().name;
+            let same = |target: &Target| target.board().name == name && target.triple() == triple;
+            let found = Target::ALL.into_iter().find(same);
+            found.map(Some).ok_or(format!("{name} is built with --target {}, not {triple}", board.triple()))
+        }
+        [one, other, ..] => Err(format!("features choose two boards: {}, {}", one.board().name, other.board().name)),
     }
 }

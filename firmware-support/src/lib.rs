@@ -1,23 +1,37 @@
-//! What the firmware binaries share: the processor's crates, the host's files through semihosting, the image slot, and the
-//! marks between which instructions are counted.
+//! What the firmware binaries share: the processor's crates, the host's files through semihosting, the image slot, the marks between
+//! which instructions are counted, and what a program leaves for the start after its end.
 #![no_std]
 #![cfg(target_os = "none")]
 
 pub mod count;
+#[cfg(target_arch = "arm")]
+pub mod crumb;
 pub mod host;
 pub mod machine;
 pub mod slot;
+#[cfg(target_arch = "arm")]
+pub mod stack;
 
 use core::fmt::Write as _;
 use core::panic::PanicInfo;
 
-/// A fault of the firmware itself ends the run with a failure, and says where.
-#[panic_handler]
-fn panic(info: &PanicInfo<'_>) -> ! {
+/// What a panic does in firmware with a host: it ends the run with a failure, and says where. [`panic_to_host`] makes it the handler.
+pub fn panicked(info: &PanicInfo<'_>) -> ! {
     if let Ok(mut out) = machine::semihosting::hio::hstderr() {
         let _ = writeln!(out, "{info}");
     }
     host::exit(false)
+}
+
+/// Declares [`panicked`] as the panic handler.
+#[macro_export]
+macro_rules! panic_to_host {
+    () => {
+        #[panic_handler]
+        fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
+            $crate::panicked(info)
+        }
+    };
 }
 
 /// An exception ends the run with a failure, too, and says which and where; riscv-rt would loop.

@@ -30,13 +30,18 @@ macro_rules! image_errors {
         impl ImageError {
             /// All of them.
             pub const ALL: &[Self] = &[$(Self::$name,)*];
+
+            /// What [`Display`](fmt::Display) writes, for programs without `core::fmt`.
+            pub const fn text(self) -> &'static str {
+                match self {
+                    $(Self::$name => $text,)*
+                }
+            }
         }
 
         impl fmt::Display for ImageError {
             fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str(match self {
-                    $(Self::$name => $text,)*
-                })
+                f.write_str(self.text())
             }
         }
     };

@@ -1,10 +1,11 @@
 //! What people and CI type: `cargo demo`, `cargo verify`, `cargo xtask bench`, `cargo xtask budgets`, `cargo xtask fit`,
-//! `cargo xtask compare`, `cargo xtask doctor`.
+//! `cargo xtask compare`, `cargo xtask firmware`, `cargo xtask doctor`.
 //!
 //! This crate depends on next to nothing, so that it is built and speaks at once. What measures is the binary of `actq-bench`.
 #![forbid(unsafe_code)]
 
 mod cpu;
+mod firmware;
 mod setup;
 mod verify;
 
@@ -20,11 +21,12 @@ Commands of the actq workspace. Usage: cargo xtask COMMAND
   bench    Count the instructions of kernels and whole heads on a Cortex-M4 in QEMU and model their cycles
   budgets  Measure instructions, code, scratch and stack, and compare them with budgets.json
   compare  Compare the quantizer's methods: held-out error, true bits, closed-loop success
+  firmware Build the motor controller for a board: --board NAME [--image F.actq] --out FILE.elf; --list shows the boards
   fit      Measure the cost model's rates anew (after every change of the kernels)
   verify   Everything that CI checks: format, lints, documentation, tests on the host and under QEMU, budgets
   doctor   Check and install what the other commands need: Rust targets and QEMU
 
-The first five show their options with --help.";
+demo, bench, budgets, compare, fit and firmware show their options with --help.";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -32,8 +34,16 @@ fn main() -> ExitCode {
     let outcome = match &words[..] {
         ["verify"] => verify::run(),
         ["doctor"] => setup::ensure(&Target::ALL).map(|()| println!("all there")),
+        ["firmware", options @ ..] => match firmware::Options::parse(options) {
+            Ok(options) => options.run(),
+            Err(wrong) => {
+                eprintln!("{wrong}");
+                return ExitCode::from(2);
+            }
+        },
         ["compare", ..] => measuring(&words),
-        ["demo" | "bench" | "budgets" | "fit", ..] => measure(&words),
+        ["demo" | "bench" | "fit", ..] => measure(&words, &[Target::Fpu]),
+        ["budgets", ..] => measure(&words, &[Target::Fpu, Target::M33]),
         ["help" | "-h" | "--help"] => {
             println!("{USAGE}");
             Ok(())
@@ -52,10 +62,11 @@ fn main() -> ExitCode {
     }
 }
 
-/// A command of `actq-bench` that needs QEMU.
-fn measure(arguments: &[&str]) -> Result<()> {
-    println!("{}: on the Cortex-M4 in QEMU", arguments[0]);
-    setup::ensure(&[Target::Fpu])?;
+/// A command of `actq-bench` that needs QEMU, and what these targets need.
+fn measure(arguments: &[&str], targets: &[Target]) -> Result<()> {
+    let boards: Vec<&str> = targets.iter().map(|target| target.board().name).collect();
+    println!("{}: on {} in QEMU", arguments[0], boards.join(" and "));
+    setup::ensure(targets)?;
     measuring(arguments)
 }
 

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use actq_boards::{Target, root};
 use anyhow::{Context, Result, bail};
 
-use crate::{cargo, cpu, setup};
+use crate::{cargo, cpu, firmware, setup};
 
 /// CPU-minutes that all steps may take from a fresh clone; `ACTQ_VERIFY_CPU_MINUTES` sets another number on a slower machine, or
 /// where more is tested.
@@ -23,7 +23,9 @@ const OLDEST: &str = concat!(env!("CARGO_PKG_RUST_VERSION"), ".0");
 const NARROW: &str = "i686-unknown-linux-musl";
 
 /// The packages that are built for boards only.
-const FIRMWARE: [&str; 3] = ["actq-firmware-support", "actq-firmware-demo", "actq-firmware-bench"];
+const FIRMWARE: [&str; 2] = ["actq-firmware-support", "actq-firmware-bench"];
+/// The application, of which the host builds and tests what is not of a board.
+const APPLICATION: &str = "actq-firmware-demo";
 
 /// A command with a name.
 struct Step {
@@ -130,7 +132,7 @@ fn steps(oldest: Result<(), String>, narrow: Result<(), String>, skipped: &str) 
     // The firmware includes an image by path. Lints and documentation do not run it, so any file will do for them.
     let any_file = root().join("Cargo.toml").display().to_string();
     let image = ("ACTQ_IMAGE", any_file.as_str());
-    let firmware = [&["--package", "actq-kernels"][..], &FIRMWARE.map(|name| ["--package", name]).concat()].concat();
+    let packages = [&["--package", "actq-kernels"][..], &FIRMWARE.map(|name| ["--package", name]).concat()].concat();
     let deny = ["--", "-D", "warnings"];
     let deny_in_documentation = ("RUSTDOCFLAGS", "-D warnings");
 
@@ -138,11 +140,20 @@ fn steps(oldest: Result<(), String>, narrow: Result<(), String>, skipped: &str) 
     add("lints", &[&["clippy", "--all-targets"], &host[..], &all_but_firmware, &deny].concat(), &[]);
     for target in Target::ALL {
         let mut arguments = vec!["clippy", "--target", target.triple(), "--profile", target.profile()];
-        arguments.extend(&firmware);
-        arguments.extend(["--lib", "--bin", "actq-firmware-demo"]);
+        arguments.extend(&packages);
+        arguments.extend(["--lib", "--bin", "harness"]);
         arguments.extend(target.board().shows.iter().flat_map(|binary| ["--bin", binary]));
+        arguments.extend(["--features", target.feature().unwrap_or_default()]);
         arguments.extend(deny);
-        add(&format!("lints of the firmware, {}", target.triple()), &arguments, &[image]);
+        add(&format!("lints of the firmware, {target:?}"), &arguments, &[image]);
+    }
+    for (target, _) in firmware::boards() {
+        let build = ["--target", target.triple(), "--profile", target.profile()];
+        let what = ["--package", APPLICATION, "--package", "actq-boards", "--lib", "--bin", "controller", "--features"];
+        let name = target.board().name;
+        let features = [name, "defmt-rtt", "faults"].map(|feature| format!("{APPLICATION}/{feature}")).join(",");
+        let arguments = [&["clippy"][..], &build, &what, &[&features], &deny].concat();
+        add(&format!("lints of the application, {name}"), &arguments, &[image]);
     }
     let fpu = ["--target", Target::Fpu.triple(), "--profile", Target::Fpu.profile()];
     let defmt = ["clippy", "--package", "actq-kernels", "--features", "defmt"];
@@ -150,7 +161,7 @@ fn steps(oldest: Result<(), String>, narrow: Result<(), String>, skipped: &str) 
     let doc = ["doc", "--no-deps"];
     let documented = [&doc[..], &host, &all_but_firmware, &["--exclude", "xtask"]].concat();
     add("documentation", &documented, &[deny_in_documentation]);
-    add("documentation of the firmware", &[&doc[..], &fpu, &firmware].concat(), &[deny_in_documentation, image]);
+    add("documentation of the firmware", &[&doc[..], &fpu, &packages].concat(), &[deny_in_documentation, image]);
     add("tests", &[&["test"], &host[..]].concat(), &[("ACTQ_SKIPPED", skipped)]);
     add("budgets", &[&["run"], &host[..], &["--package", "actq-bench", "--", "budgets"]].concat(), &[]);
 

@@ -1,6 +1,6 @@
 //! The BBC micro:bit: a Cortex-M0 (nRF51822) with 256 KB of flash and 16 KB of RAM. Of the golden cases it runs those that fit.
 
-use crate::{Board, Transport};
+use crate::table::{Board, Transport};
 
 pub(crate) const BOARD: Board = Board {
     name: "microbit",
@@ -10,4 +10,5 @@ pub(crate) const BOARD: Board = Board {
     machine: &["-M", "microbit"],
     transport: Transport::Semihosting,
     shows: &["golden"],
+    application: None,
 };

@@ -1,13 +1,16 @@
-//! Arm's MPS2 with image AN386: a Cortex-M4 with FPU. The default board, whose memory is the workspace's `memory.x`.
+//! Arm's MPS2 with image AN386: a Cortex-M4 with FPU. The default board.
 
-use crate::{Board, Transport};
+#[cfg(all(target_os = "none", any(feature = "mps2-an386", feature = "mps2-an500")))]
+pub mod device;
 
-pub(crate) const BOARD: Board = Board {
+#[cfg(not(target_os = "none"))]
+pub(crate) const BOARD: crate::Board = crate::Board {
     name: "mps2-an386",
-    memory: "memory.x",
+    memory: "boards/src/mps2_an386/memory.x",
     small: false,
     emulator: "qemu-system-arm",
     machine: &["-M", "mps2-an386"],
-    transport: Transport::Semihosting,
+    transport: crate::Transport::Semihosting,
     shows: &["bench", "functions", "golden", "portable", "runtime", "runtime-poll", "stack"],
+    application: Some(crate::Application { about: "Cortex-M4F, QEMU", scratch: super::MPS2_SCRATCH }),
 };

@@ -1,6 +1,6 @@
 //! QEMU's virt with a SiFive E31, which has RV32IMAC and nothing else: what it lacks is an illegal instruction.
 
-use crate::{Board, Transport};
+use crate::table::{Board, Transport};
 
 pub(crate) const BOARD: Board = Board {
     name: "virt",
@@ -10,4 +10,5 @@ pub(crate) const BOARD: Board = Board {
     machine: &["-M", "virt", "-cpu", "sifive-e31", "-bios", "none"],
     transport: Transport::Semihosting,
     shows: &["golden", "portable"],
+    application: None,
 };

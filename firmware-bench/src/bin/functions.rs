@@ -11,6 +11,8 @@ fn main() {
 
 #[cfg(target_os = "none")]
 mod firmware {
+    actq_firmware_support::panic_to_host!();
+
     use core::fmt::Write as _;
     use core::hint::black_box;
 

@@ -10,6 +10,8 @@ fn main() {
 
 #[cfg(target_os = "none")]
 mod firmware {
+    actq_firmware_support::panic_to_host!();
+
     use core::fmt::Write as _;
 
     use actq_firmware_support::host::{self, File};
@@ -20,7 +22,7 @@ mod firmware {
     use actq_kernels::x::{Plan, Prepared, Scale};
 
     /// Of the largest case, weights and activations.
-    const WORDS: usize = if cfg!(actq_small) { 1536 } else { 64 * 1024 };
+    const WORDS: usize = if cfg!(actq_small) { 1536 } else { 16 * 1024 };
     const ROWS: usize = if cfg!(actq_small) { 32 } else { 256 };
     const COLS: usize = if cfg!(actq_small) { 256 } else { 2048 };
 

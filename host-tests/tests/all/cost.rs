@@ -45,7 +45,7 @@ fn observations(dir: &Path, policy: &Policy) -> Result<Vec<Vec<f32>>> {
 /// Predicts the step of every image, and compares with the mean over recorded observations. Gives the counted instructions per
 /// weight of the f32 policy.
 fn predictions_hold(dir: &Path, images: &[Options]) -> Result<Vec<f64>> {
-    let (elf, counter) = (firmware::application(Target::Fpu)?, Counter::build()?);
+    let (elf, counter) = (firmware::harness(Target::Fpu)?, Counter::build()?);
     let policy = Policy::load(dir)?;
     let observations = observations(dir, &policy)?;
     let mut per_mac = Vec::new();
@@ -106,7 +106,7 @@ fn steps_of_shared_policies_take_what_was_predicted() -> Result<()> {
 /// Runs every image in polls of several budgets: each stays within its budget, and the actions have the same bits as on the
 /// host. Gives how many budgets were not below the least.
 fn polls_keep_their_budget(dir: &Path, images: &[Options]) -> Result<usize> {
-    let (elf, counter) = (firmware::application(Target::Fpu)?, Counter::build()?);
+    let (elf, counter) = (firmware::harness(Target::Fpu)?, Counter::build()?);
     let policy = Policy::load(dir)?;
     let observations = observations(dir, &policy)?;
     let mut tried = 0;
@@ -188,7 +188,7 @@ fn a_budget_of_time_is_kept_and_used() -> Result<()> {
 fn mixed_widths_cost_little_more_than_their_blocks() -> Result<()> {
     const ROWS: usize = 64;
     const COLS: usize = 256;
-    let (elf, counter) = (firmware::application(Target::Fpu)?, Counter::build()?);
+    let (elf, counter) = (firmware::harness(Target::Fpu)?, Counter::build()?);
     for activations in [Activations::Int8, Activations::Int16] {
         let mut builder = Builder::new(COLS);
         let linear = |builder: &mut Builder, rows, widths: &dyn Fn(usize) -> Width| {
@@ -221,7 +221,7 @@ fn mixed_widths_cost_little_more_than_their_blocks() -> Result<()> {
 fn polls_that_add_biases_stay_within_their_budget() -> Result<()> {
     const ROWS: usize = 1000;
     const COLS: usize = 8;
-    let (elf, counter) = (firmware::application(Target::Fpu)?, Counter::build()?);
+    let (elf, counter) = (firmware::harness(Target::Fpu)?, Counter::build()?);
     let mut builder = Builder::new(COLS);
     for _ in 0..2 {
         builder.linear((ROWS, COLS), Activations::Int8, |_| Some(Width::W2), 0, true)?;

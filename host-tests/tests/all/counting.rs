@@ -28,9 +28,9 @@ fn a_step_of_a_head_reads_each_weight_once() -> Result<()> {
     let buffer = ImageBuffer::new(&bytes);
     let image = buffer.image(path)?;
     let recorded = eval::heldout(&dir, &image)?;
-    let elf = firmware::application(Target::Fpu)?;
+    let elf = firmware::harness(Target::Fpu)?;
     let (code, counter) = (Code::read(&elf)?, Counter::build()?);
-    let count = || evaluation::count(&counter, &elf, Some(path), &image, recorded.episode(0));
+    let count = || evaluation::count(&counter, Target::Fpu, &elf, Some(path), &image, recorded.episode(0));
     let region = count()?;
 
     // The network has run: no instruction makes more than four MACs. A line holds 16 weights of 8 bits; biases, scales and the

@@ -107,7 +107,7 @@ fn a_head_with_an_lstm_stays_within_its_instructions() -> Result<()> {
     let buffer = ImageBuffer::new(&bytes);
     let matrices = buffer.image(file.path())?.ops().filter_map(|op| op.matrix());
     let macs = matrices.map(|matrix| matrix.rows * matrix.cols).sum::<usize>() as f64;
-    let elf = firmware::application(Target::Fpu)?;
+    let elf = firmware::harness(Target::Fpu)?;
     let counter = Counter::build()?;
     let mut command = qemu::command(&elf, Some(file.path()), "")?;
     counter.attach(&mut command, &elf)?;

@@ -29,9 +29,9 @@ fn rtn(policy: &Policy, width: Width, group: usize, activations: Activations) ->
 #[test]
 fn kernels_give_the_golden_sums_on_the_target() -> Result<()> {
     let cases = golden::cases(1);
-    for target in [Target::Fpu, Target::NoFpu] {
+    for target in Target::ALL.into_iter().filter(|target| target.has_assembler()) {
         let elf = firmware::binary("golden", target)?;
-        let output = qemu::run(qemu::command(&elf, None, "")?, &golden::stream(&cases))?;
+        let output = qemu::run(qemu::command_on(target, &elf, None, "")?, &golden::stream(&cases))?;
         let text = String::from_utf8_lossy(&output.stdout);
         ensure!(output.status.success(), "{target:?}: {text}");
         assert_eq!(text.trim(), format!("Armv7em: {} cases", cases.len()));
@@ -81,7 +81,7 @@ fn the_built_in_image_replays_its_self_test() -> Result<()> {
         expected += &format!("step {step}:{bits}\n");
     }
     for target in Target::ALL {
-        let elf = firmware::application(target)?;
+        let elf = firmware::harness(target)?;
         let output = qemu::run(qemu::command_on(target, &elf, None, "")?, &[])?;
         assert_eq!(String::from_utf8_lossy(&output.stdout), expected, "{target:?}");
         assert!(output.status.success());
@@ -113,7 +113,7 @@ fn the_target_allows_int32_to_the_last_product_as_the_host_does() -> Result<()> 
             assert_eq!(ImageBuffer::new(&bytes).image(Path::new("ur3")).is_err(), refused, "scales of {group}, host");
             let slot = tempfile::NamedTempFile::new()?;
             fs::write(slot.path(), &bytes)?;
-            let elf = firmware::application(Target::Fpu)?;
+            let elf = firmware::harness(Target::Fpu)?;
             let output = qemu::run(qemu::command(&elf, Some(slot.path()), "")?, &[])?;
             // What is allowed comes to its self-test, which may fail, where its actions were computed with another x_max.
             let text = String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned();
@@ -131,7 +131,7 @@ fn a_damaged_image_in_the_slot_is_refused() -> Result<()> {
     bytes[middle] ^= 4;
     let slot = tempfile::NamedTempFile::new()?;
     fs::write(slot.path(), bytes)?;
-    let elf = firmware::application(Target::Fpu)?;
+    let elf = firmware::harness(Target::Fpu)?;
     let output = qemu::run(qemu::command(&elf, Some(slot.path()), "")?, &[])?;
     assert!(!output.status.success());
     assert!(String::from_utf8_lossy(&output.stderr).contains("checksum"), "{output:?}");
@@ -141,7 +141,7 @@ fn a_damaged_image_in_the_slot_is_refused() -> Result<()> {
 #[test]
 fn an_unknown_argument_is_refused() -> Result<()> {
     for target in [Target::Fpu, Target::Riscv] {
-        let elf = firmware::application(target)?;
+        let elf = firmware::harness(target)?;
         let output = qemu::run(qemu::command_on(target, &elf, None, "fly")?, &[])?;
         assert!(!output.status.success());
         assert!(String::from_utf8_lossy(&output.stderr).contains("unknown argument: fly"), "{target:?}: {output:?}");
@@ -151,12 +151,13 @@ fn an_unknown_argument_is_refused() -> Result<()> {
 
 /// Runs an image from the slot on recorded observations, in QEMU and on the host, with a reset in the middle; every action must
 /// have the same bits.
-fn same_bits(elf: &Path, bytes: &[u8], dataset: &Dataset) -> Result<()> {
+fn same_bits(target: Target, bytes: &[u8], dataset: &Dataset) -> Result<()> {
+    let elf = firmware::harness(target)?;
     let slot = tempfile::NamedTempFile::new()?;
     fs::write(slot.path(), bytes)?;
     let buffer = ImageBuffer::new(bytes);
     let image = buffer.image(slot.path())?;
-    let mut server = Server::start(qemu::command(elf, Some(slot.path()), "serve")?, image.act_len())?;
+    let mut server = Server::start(qemu::command_on(target, &elf, Some(slot.path()), "serve")?, image.act_len())?;
     let observations: Vec<Vec<f32>> = (0..dataset.length.len()).flat_map(|e| dataset.episode(e)).take(STEPS).collect();
     ensure!(observations.len() == STEPS, "too few recorded observations");
     with_head(image, |head| {
@@ -175,21 +176,23 @@ fn same_bits(elf: &Path, bytes: &[u8], dataset: &Dataset) -> Result<()> {
     server.finish()
 }
 
-/// All widths with int8 and int16 activations; the build without FPU, which is slower, runs one image.
+/// All widths with int8 and int16 activations; the build without FPU, which is slower, and the other cores run one image of each.
 fn policy_has_the_same_bits(dir: &Path) -> Result<()> {
     let policy = Policy::load(dir)?;
     let dataset = Recording::Heldout.require(Some(dir), None, Sizes::of(&policy), "this test")?;
-    let elf = firmware::application(Target::Fpu)?;
     for activations in [Activations::Int8, Activations::Int16] {
         for width in Width::ALL {
             for group in [0, 32] {
                 let at = || format!("{}: {width:?}, group {group}, {activations:?}", policy.name);
-                same_bits(&elf, &rtn(&policy, width, group, activations)?, &dataset).with_context(at)?;
+                same_bits(Target::Fpu, &rtn(&policy, width, group, activations)?, &dataset).with_context(at)?;
             }
         }
     }
-    let elf = firmware::application(Target::NoFpu)?;
-    same_bits(&elf, &rtn(&policy, Width::W3, 0, Activations::Int8)?, &dataset).context("without FPU")
+    let image = rtn(&policy, Width::W3, 0, Activations::Int8)?;
+    for target in [Target::NoFpu, Target::M33, Target::M7, Target::F405] {
+        same_bits(target, &image, &dataset).with_context(|| format!("{target:?}"))?;
+    }
+    Ok(())
 }
 
 #[test]

@@ -1,8 +1,20 @@
 //! What has more than one backend, and the one place that chooses.
 //!
 //! [`mod@reference`] is what all others are compared with, [`portable`] plain Rust for every target, `armv7em` assembler for
-//! Cortex-M4 and M7, `armv7em_fpu` what needs their FPU's registers as well. All of them compute the same bits; the tests run them
+//! Cortex-M4, M7 and M33, `armv7em_fpu` what needs their FPU's registers as well. All of them compute the same bits; the tests run them
 //! on the same data. The build script says what a target has.
+
+/// Assembles a file. The instructions of a module's assembler are those of its architecture, which in Armv8-M leaves the DSP extension
+/// out whatever processor the build names; so the file says it itself.
+#[cfg(actq_armv7em)]
+macro_rules! assembler {
+    ($file:literal) => {
+        #[cfg(actq_armv8m)]
+        core::arch::global_asm!(".cpu cortex-m33", include_str!($file), options(raw));
+        #[cfg(not(actq_armv8m))]
+        core::arch::global_asm!(include_str!($file), options(raw));
+    };
+}
 
 #[cfg(actq_armv7em)]
 #[allow(unsafe_code, reason = "the assembler backend; every block carries its proof")]
@@ -36,7 +48,7 @@ use crate::x::{Plan, Prepared, Scale};
 pub enum Backend {
     /// [`portable`].
     Portable,
-    /// `armv7em`: assembler for Cortex-M4 and M7.
+    /// `armv7em`: assembler for Cortex-M4, M7 and M33.
     Armv7em,
 }
 

@@ -11,7 +11,7 @@ use actq_bench::{Target, firmware, root, ur3};
 use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 
-use crate::{heads, kernels};
+use crate::{boards, heads, kernels};
 
 /// How far a figure may lie above its budget, in percent, where another rustc made it (the compiler is not pinned), or, of a
 /// head, another processor: widths and activations follow from sums that it may round otherwise.
@@ -19,6 +19,10 @@ const SLACK: u64 = 2;
 
 /// Bytes of code that the runtime may take at most, where steps are not cut.
 const RUNTIME_MOST: u64 = 24 * 1024;
+
+/// Bytes of flash that the application may take at most, without its image, and bytes of RAM, without its scratch memory.
+const APPLICATION_FLASH_MOST: u64 = 64 * 1024;
+const APPLICATION_RAM_MOST: u64 = 24 * 1024;
 
 /// Functions that are shown where the runtime is above its budget.
 const SHOWN: usize = 20;
@@ -98,12 +102,15 @@ fn difference(budgets: &Figures, measured: &Figures) -> Vec<String> {
     missing.chain(gone).collect()
 }
 
-/// The figures above their budgets, or above the limits of an inner loop and of the runtime, which no budget raises.
+/// The figures above their budgets, or above the limits of an inner loop, of the runtime and of the application, which no budget
+/// raises.
 fn compare(budgets: &Budgets, measured: &Figures, rustc: &str) -> Vec<Excess> {
     let allowed = |name: &str| {
         let slack = if budgets.rustc == rustc && !name.starts_with(HEAD) { 0 } else { SLACK };
         let most = match name {
             RUNTIME => RUNTIME_MOST,
+            _ if name.starts_with(boards::FLASH) => APPLICATION_FLASH_MOST,
+            _ if name.starts_with(boards::RAM) => APPLICATION_RAM_MOST,
             _ if name.starts_with(LOOP) => CODE_LINES,
             _ => u64::MAX,
         };
@@ -123,6 +130,7 @@ fn compare(budgets: &Budgets, measured: &Figures, rustc: &str) -> Vec<Excess> {
 fn measure() -> Result<Figures> {
     let counter = Counter::build()?;
     let mut figures = code()?;
+    figures.extend(boards::measure(&counter)?);
     for record in kernels::measure(&counter, 0)?.into_iter().filter(kernels::Record::is_kernel) {
         let kernels::Record { name, bits, group, rows, cols, instructions, .. } = record;
         let scales = group_name(group);
@@ -206,6 +214,8 @@ mod tests {
     fn no_budget_raises_a_limit() {
         assert_eq!(excess((&format!("{LOOP}f"), 70), 65, "rustc 2"), Some((64, 65)));
         assert_eq!(excess((RUNTIME, 30_000), 24_577, "rustc 1"), Some((24_576, 24_577)));
+        let flash = format!("{}x", boards::FLASH);
+        assert_eq!(excess((&flash, 70_000), 65_537, "rustc 1"), Some((65_536, 65_537)));
     }
 
     #[test]

@@ -113,10 +113,11 @@ pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
         println!("Closed loop at {name}, {episodes} episodes on the host");
         let outcomes = with_head(image, |head| closed_loop(episodes, |seed| episode_on_host(head, seed)))?;
         println!("Closed loop at {name}, {qemu_episodes} episodes with the firmware in QEMU as the policy");
-        let elf = firmware::application_with(Target::Fpu, &path)?;
+        let elf = firmware::harness_with(Target::Fpu, &path)?;
         let firmware = Firmware::run(&elf, image, qemu_episodes)?;
         let heldout = eval::heldout(&policy_dir, &image)?;
-        let instructions = evaluation::count(&counter, &elf, None, &image, heldout.episode(0))?.instructions;
+        let instructions =
+            evaluation::count(&counter, Target::Fpu, &elf, None, &image, heldout.episode(0))?.instructions;
         let nmse = eval::evaluate(image, &heldout)?.nmse;
         columns.push(Column {
             name: name.into(),

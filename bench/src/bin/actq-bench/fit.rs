@@ -79,7 +79,7 @@ struct Sample {
 }
 
 pub(crate) fn run() -> Result<()> {
-    let elf = firmware::application(Target::Fpu)?;
+    let elf = firmware::harness(Target::Fpu)?;
     let counter = Counter::build()?;
     let mut samples = Vec::new();
     let mut polls = Vec::new();

@@ -87,7 +87,7 @@ pub(crate) fn write_image(quantizer: &Quantizer<'_>, options: &Options, path: &P
 pub(crate) fn measure(policies: &[PathBuf], counter: &Counter, wait_states: u64) -> Result<Vec<Head>> {
     let folder = firmware::target_dir().join("heads");
     fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
-    let elf = firmware::application(Target::Fpu)?;
+    let elf = firmware::harness(Target::Fpu)?;
     let code = Code::read(&elf)?;
     let best = |bits| Options { steps: Some(STEPS), ..Options::new(Method::Best, Budget::BitsPerWeight(bits)) };
     let mut heads = Vec::new();
@@ -105,7 +105,7 @@ pub(crate) fn measure(policies: &[PathBuf], counter: &Counter, wait_states: u64)
             let buffer = ImageBuffer::new(&write_image(quantizer, &options, &path)?);
             let image = buffer.image(&path)?;
             let recorded = eval::heldout(dir, &image)?;
-            let region = evaluation::count(counter, &elf, Some(&path), &image, recorded.episode(0))?;
+            let region = evaluation::count(counter, Target::Fpu, &elf, Some(&path), &image, recorded.episode(0))?;
             heads.push(Head {
                 record: Record {
                     policy: policy.name.clone(),

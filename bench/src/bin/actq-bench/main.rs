@@ -3,6 +3,7 @@
 #![forbid(unsafe_code)]
 
 mod bench;
+mod boards;
 mod budgets;
 mod demo;
 mod fit;

@@ -13,6 +13,8 @@ mod depth;
 
 #[cfg(target_os = "none")]
 mod firmware {
+    actq_firmware_support::panic_to_host!();
+
     use core::fmt::Write as _;
 
     use actq_firmware_support::{host, slot};

@@ -1,4 +1,5 @@
-//! The GEMV in Armv7E-M assembler (Cortex-M4 and M7): SMLAD makes two MACs a cycle, four with paired lanes.
+//! The GEMV in Armv7E-M assembler (Cortex-M4 and M7): SMLAD makes two MACs a cycle, four with paired lanes. Armv8-M with the DSP
+//! extension (Cortex-M33) has the same instructions.
 //!
 //! `single.s` holds one loop nest, stamped over the four layouts of single lanes; the layouts of paired lanes have a file
 //! each, with a kernel for row scales and one for group scales. All compute exactly what [`super::portable`] computes; the tests
@@ -8,18 +9,16 @@
 
 mod table;
 
-use core::arch::global_asm;
-
 use self::table::kernels;
 use super::product::Product;
 use crate::layout::QUAD;
 
-global_asm!(include_str!("single.s"), options(raw));
-global_asm!(include_str!("paired_w2.s"), options(raw));
-global_asm!(include_str!("paired_w3.s"), options(raw));
-global_asm!(include_str!("paired_w4.s"), options(raw));
-global_asm!(include_str!("paired_w8.s"), options(raw));
-global_asm!(include_str!("vector.s"), options(raw));
+assembler!("single.s");
+assembler!("paired_w2.s");
+assembler!("paired_w3.s");
+assembler!("paired_w4.s");
+assembler!("paired_w8.s");
+assembler!("vector.s");
 
 /// As [`crate::arch::gemv`].
 #[inline(always)]

@@ -3,7 +3,6 @@
 
 mod table;
 
-use core::arch::global_asm;
 use core::ops::Range;
 use core::ptr::NonNull;
 use core::slice;
@@ -15,8 +14,8 @@ use crate::math::exp2::{EXP, QUARTER, exp2_constants};
 use crate::round::ROUND;
 use crate::x::Plan;
 
-global_asm!(include_str!("vector.s"), options(raw));
-global_asm!(include_str!("cells.s"), options(raw));
+assembler!("vector.s");
+assembler!("cells.s");
 
 unsafe extern "C" {
     fn actq_sqrt(x: f32) -> f32;

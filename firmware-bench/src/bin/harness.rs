@@ -1,4 +1,4 @@
-//! The demo firmware: checks its image, self-tests it, and runs it.
+//! The harness: checks its image, self-tests it, and runs it for a host.
 //!
 //! Without arguments it plays the image's self-test observations and prints the actions' bits. With the argument `serve` it
 //! reads observations from standard input and writes actions to standard output, in the protocol of `actq serve`. `poll N` does
@@ -16,6 +16,8 @@ fn main() {
 
 #[cfg(target_os = "none")]
 mod firmware {
+    actq_firmware_support::panic_to_host!();
+
     use core::fmt::{Display, Write as _};
     use core::task::Poll;
 

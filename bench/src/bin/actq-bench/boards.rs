@@ -1,0 +1,60 @@
+//! What the application takes on each board, and what a head takes on each core.
+
+use actq::measure::eval;
+use actq::runtime::ImageBuffer;
+use actq_bench::console::Console;
+use actq_bench::qemu::Counter;
+use actq_bench::{Target, evaluation, firmware, ur3};
+use anyhow::{Context, Result};
+
+/// Bytes of flash of the application without its image.
+pub(crate) const FLASH: &str = "bytes of flash, application on ";
+/// Bytes of RAM of the application without its scratch memory: variables and stack.
+pub(crate) const RAM: &str = "bytes of RAM, application on ";
+const STACK: &str = "bytes of stack, application on ";
+const STEP: &str = "instructions of an evaluation, ur3_reach at 3 bits, rounded, on ";
+
+/// Steps that the application runs before its stack is looked at: chunks of several evaluations.
+const STEPS: usize = 20;
+
+/// All figures, by name.
+pub(crate) fn measure(counter: &Counter) -> Result<Vec<(String, u64)>> {
+    let path = firmware::built_in()?;
+    let buffer = ImageBuffer::read(path)?;
+    let image = buffer.image(path)?;
+    let recorded = eval::heldout(&ur3(), &image)?;
+    let mut figures = Vec::new();
+    for target in [Target::Fpu, Target::M33, Target::M7, Target::F405] {
+        let board = target.board();
+        let scratch = board.application.context("the board has no application")?.scratch;
+        let elf = firmware::controller(target, "")?;
+        let stack = stack(target, &elf)?;
+        let harness = firmware::harness(target)?;
+        let step = evaluation::count(counter, target, &harness, None, &image, recorded.episode(0))?;
+        let ram = firmware::ram_bytes(&elf)? - 4 * scratch as u64 + stack;
+        for (what, figure) in [
+            (FLASH, firmware::flash_bytes(&elf)? - image.bytes() as u64),
+            (RAM, ram),
+            (STACK, stack),
+            (STEP, step.instructions),
+        ] {
+            figures.push((format!("{what}{}", board.name), figure));
+        }
+    }
+    Ok(figures)
+}
+
+/// Bytes of stack that the application has used after some steps.
+fn stack(target: Target, elf: &std::path::Path) -> Result<u64> {
+    let mut console = Console::start(target, elf, None)?;
+    console.lines_until("self-test passed, ready")?;
+    for _ in 0..STEPS {
+        console.send(b"s")?;
+        console.line()?;
+    }
+    console.send(b"?")?;
+    let status = console.line()?;
+    let (_, stack) = status.split_once("stack ").with_context(|| status.clone())?;
+    let bytes = stack.split(' ').next().unwrap_or_default();
+    bytes.parse().with_context(|| status.clone())
+}

@@ -1,0 +1,35 @@
+//! The registers of AN505 (Arm DAI 0505B, section 3) in the secure state, whose addresses have bit 28 set: UART 0, the secure watchdog,
+//! no power stage.
+
+pub use crate::cmsdk::{NoStage as Stage, Uart, Watchdog};
+use crate::seams::{self, Cause, Clock, Source};
+use crate::vectors::interrupts;
+
+// UART 0, whatever has happened.
+interrupts!(42 of 96);
+
+/// Bits of an interrupt's priority.
+pub const NVIC_PRIO_BITS: u8 = 3;
+/// Words of scratch memory for a head.
+pub const SCRATCH: usize = crate::MPS2_SCRATCH;
+/// What a non-maskable interrupt says: the watchdog's time has ended, a reset will follow.
+pub const NMI: &str = "watchdog";
+
+const HZ: u32 = 20_000_000;
+const UART: usize = 0x5020_0000;
+const WATCHDOG: usize = 0x5008_1000;
+
+/// The board.
+pub type Parts = seams::Parts<Uart, Watchdog, Stage>;
+
+/// Sets the board up, with its serial port at `baud`.
+///
+/// # Safety
+///
+/// To be called once: all of the board's peripherals are the caller's.
+pub unsafe fn start(baud: u32) -> Parts {
+    // SAFETY: these are the addresses of DAI 0505B, and nobody else has the peripherals.
+    let (uart, watchdog) = unsafe { (Uart::new(UART, HZ, baud), Watchdog::new(WATCHDOG, HZ)) };
+    let clock = Clock { hz: HZ, source: Source::Crystal };
+    Parts { clock, cause: Cause::Unknown, uart, watchdog, stage: Stage::default() }
+}

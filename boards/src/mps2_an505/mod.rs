@@ -1,0 +1,16 @@
+//! Arm's MPS2 with image AN505: a Cortex-M33 with FPU, DSP extension and TrustZone, of which all runs in the secure state.
+
+#[cfg(all(target_os = "none", feature = "mps2-an505"))]
+pub mod device;
+
+#[cfg(not(target_os = "none"))]
+pub(crate) const BOARD: crate::Board = crate::Board {
+    name: "mps2-an505",
+    memory: "boards/src/mps2_an505/memory.x",
+    small: false,
+    emulator: "qemu-system-arm",
+    machine: &["-M", "mps2-an505"],
+    transport: crate::Transport::Semihosting,
+    shows: &["golden"],
+    application: Some(crate::Application { about: "Cortex-M33, QEMU", scratch: super::MPS2_SCRATCH }),
+};

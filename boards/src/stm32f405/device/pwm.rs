@@ -1,0 +1,149 @@
+//! TIM 1 as the power stage's PWM (RM0090, section 17): three phases and their complements with dead time, counted up and down, and a
+//! break input that switches all six off without the program. In the middle of a period it makes the ADC measure.
+//!
+//! QEMU has no TIM 1: nothing here has been run. `docs/BOARDS.md` says what a bench has to show.
+
+use core::convert::Infallible;
+
+use embedded_hal::pwm::{ErrorType, SetDutyCycle};
+use stm32f4::stm32f405 as pac;
+
+use super::adc::Currents;
+use crate::seams::Stage;
+
+/// Periods a second.
+const PWM_HZ: u32 = 20_000;
+/// Nanoseconds in which neither switch of a phase is on.
+const DEAD_NS: u32 = 500;
+/// The longest dead time that is as many cycles as its field says.
+const DEAD_LONGEST: u32 = 127;
+
+const ALTERNATE: u8 = 1;
+/// A channel that is on below its compare value, and takes a new one at the end of a period.
+const PWM_MODE: u8 = 0b110;
+
+/// The power stage.
+#[derive(Debug)]
+pub struct Pwm {
+    timer: pac::TIM1,
+    phases: [Phase; 3],
+    currents: Currents,
+}
+
+impl Pwm {
+    pub(super) fn new(
+        timer: pac::TIM1,
+        rcc: &pac::RCC,
+        a: &pac::GPIOA,
+        b: &pac::GPIOB,
+        timer_hz: u32,
+        currents: Currents,
+    ) -> Self {
+        rcc.ahb1enr().modify(|_, w| w.gpioaen().set_bit().gpioben().set_bit());
+        rcc.apb2enr().modify(|_, w| w.tim1en().set_bit());
+        let top = (timer_hz / (2 * PWM_HZ)) as u16;
+        let dead = (DEAD_NS * (timer_hz / 1_000_000)).div_ceil(1000).min(DEAD_LONGEST) as u8;
+        // SAFETY: every value is in its field's range.
+        unsafe {
+            // Counted up and down, compare values taken when the count turns.
+            timer.cr1().write(|w| w.cms().bits(0b01).arpe().set_bit());
+            timer.arr().write(|w| w.bits(top.into()));
+            timer
+                .ccmr1_output()
+                .write(|w| w.oc1m().bits(PWM_MODE).oc1pe().set_bit().oc2m().bits(PWM_MODE).oc2pe().set_bit());
+            timer
+                .ccmr2_output()
+                .write(|w| w.oc3m().bits(PWM_MODE).oc3pe().set_bit().oc4m().bits(PWM_MODE).oc4pe().set_bit());
+            // Channel 4 has no pin: it asks the ADC to measure at the top, where all lower switches are on.
+            timer.ccr4().write(|w| w.bits(u32::from(top) - 1));
+            // Off until `enable`, and on no break by itself (AOE is 0); a low level or an open pin breaks; driven low when off. The
+            // lock keeps dead time, break and idle levels as they are until the next reset.
+            timer
+                .bdtr()
+                .write(|w| w.dtg().bits(dead).lock().bits(0b01).ossi().set_bit().ossr().set_bit().bke().set_bit());
+            timer.egr().write(|w| w.ug().set_bit());
+            timer.ccer().write(|w| {
+                let w = w.cc1e().set_bit().cc1ne().set_bit().cc2e().set_bit().cc2ne().set_bit();
+                w.cc3e().set_bit().cc3ne().set_bit().cc4e().set_bit()
+            });
+            timer.cr1().modify(|_, w| w.cen().set_bit());
+            // The pins last, when what they show is off.
+            b.pupdr().modify(|_, w| w.pupdr12().bits(0b10));
+            a.afrh().modify(|_, w| w.afrh8().bits(ALTERNATE).afrh9().bits(ALTERNATE).afrh10().bits(ALTERNATE));
+            b.afrh().modify(|_, w| {
+                let w = w.afrh12().bits(ALTERNATE).afrh13().bits(ALTERNATE);
+                w.afrh14().bits(ALTERNATE).afrh15().bits(ALTERNATE)
+            });
+            a.moder().modify(|_, w| w.moder8().bits(0b10).moder9().bits(0b10).moder10().bits(0b10));
+            b.moder()
+                .modify(|_, w| w.moder12().bits(0b10).moder13().bits(0b10).moder14().bits(0b10).moder15().bits(0b10));
+        }
+        Self {
+            timer,
+            phases: [Channel::One, Channel::Two, Channel::Three].map(|channel| Phase { channel, top }),
+            currents,
+        }
+    }
+}
+
+impl Stage for Pwm {
+    type Phase = Phase;
+
+    fn phases(&mut self) -> &mut [Phase; 3] {
+        &mut self.phases
+    }
+
+    fn enable(&mut self) -> bool {
+        self.timer.sr().modify(|_, w| w.bif().clear_bit());
+        self.timer.bdtr().modify(|_, w| w.moe().set_bit());
+        // The break input keeps it at 0.
+        self.timer.bdtr().read().moe().bit()
+    }
+
+    fn disable(&mut self) {
+        self.timer.bdtr().modify(|_, w| w.moe().clear_bit());
+    }
+
+    fn currents(&mut self) -> Option<[u16; 2]> {
+        self.currents.take()
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Channel {
+    One,
+    Two,
+    Three,
+}
+
+/// A phase: its compare value.
+#[derive(Debug)]
+pub struct Phase {
+    channel: Channel,
+    top: u16,
+}
+
+impl ErrorType for Phase {
+    type Error = Infallible;
+}
+
+impl SetDutyCycle for Phase {
+    fn max_duty_cycle(&self) -> u16 {
+        self.top
+    }
+
+    fn set_duty_cycle(&mut self, duty: u16) -> Result<(), Infallible> {
+        let duty = u32::from(duty.min(self.top));
+        // SAFETY: the timer runs for as long as the program does; a compare register is written whole, each by one phase alone.
+        let timer = unsafe { &*pac::TIM1::ptr() };
+        // SAFETY: any value up to the top is allowed.
+        unsafe {
+            match self.channel {
+                Channel::One => timer.ccr1().write(|w| w.bits(duty)),
+                Channel::Two => timer.ccr2().write(|w| w.bits(duty)),
+                Channel::Three => timer.ccr3().write(|w| w.bits(duty)),
+            };
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,202 @@
+//! What the host knows of boards.
+//!
+//! A [`Target`] is a board and the compiler's target for it, one line in the table below. From these follow the linker's scripts
+//! ([`link`](crate::link())), cargo's runner (this crate's binary, `.cargo/config.toml`), what is installed, and what tests and
+//! measurements run where.
+
+use std::io;
+use std::path::Path;
+use std::process::Command;
+
+use crate::{microbit, mps2_an385, mps2_an386, mps2_an500, mps2_an505, stm32f405, virt};
+
+/// A machine.
+#[derive(Debug)]
+pub struct Board {
+    /// Its name, and that of its folder with hyphens for underscores.
+    pub name: &'static str,
+    /// Linker script of its memory, from the workspace's root: what link.x includes as `memory.x`.
+    pub memory: &'static str,
+    /// Whether its memory holds little more than a small policy (cfg `actq_small` of the firmware).
+    pub small: bool,
+    /// QEMU's program.
+    pub emulator: &'static str,
+    /// QEMU's machine, as arguments.
+    pub machine: &'static [&'static str],
+    /// How the firmware and the host talk.
+    pub transport: Transport,
+    /// The measuring binaries of `firmware-bench` that run on it. Its harness runs on every board.
+    pub shows: &'static [&'static str],
+    /// What the application runs with, where it has a `device` for the board.
+    pub application: Option<Application>,
+}
+
+/// What the application runs with on a board.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Application {
+    /// What it is, for people.
+    pub about: &'static str,
+    /// Words of scratch memory that it gives to a head (the device's `SCRATCH`).
+    pub scratch: usize,
+}
+
+/// How the firmware and the host talk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Transport {
+    /// Calls to the host: command line, files, exit status.
+    Semihosting,
+}
+
+impl Transport {
+    /// QEMU's arguments for it.
+    fn arguments(self) -> &'static [&'static str] {
+        match self {
+            Self::Semihosting => &["-semihosting-config", "enable=on,target=native"],
+        }
+    }
+}
+
+/// Declares [`Target`] from a line for each.
+macro_rules! targets {
+    ($($(#[doc = $doc:literal])* $target:ident: $triple:literal on $board:ident;)*) => {
+        /// What the firmware is built for: a board and rustc's target.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+        pub enum Target {
+            $($(#[doc = $doc])* $target,)*
+        }
+
+        impl Target {
+            /// All of them.
+            pub const ALL: [Self; [$($triple),*].len()] = [$(Self::$target),*];
+
+            /// rustc's name.
+            pub fn triple(self) -> &'static str {
+                match self {
+                    $(Self::$target => $triple,)*
+                }
+            }
+
+            /// What it runs on.
+            pub fn board(self) -> &'static Board {
+                match self {
+                    $(Self::$target => &$board::BOARD,)*
+                }
+            }
+        }
+    };
+}
+
+targets! {
+    /// Cortex-M4 with FPU.
+    Fpu: "thumbv7em-none-eabihf" on mps2_an386;
+    /// Cortex-M4, floats in software: the same bits.
+    NoFpu: "thumbv7em-none-eabi" on mps2_an386;
+    /// Cortex-M3, without the DSP extension: the portable kernels.
+    NoDsp: "thumbv7m-none-eabi" on mps2_an385;
+    /// Cortex-M0: the portable kernels in little memory.
+    Small: "thumbv6m-none-eabi" on microbit;
+    /// RV32IMAC: the portable kernels.
+    Riscv: "riscv32imac-unknown-none-elf" on virt;
+    /// Cortex-M33 with FPU and DSP extension.
+    M33: "thumbv8m.main-none-eabihf" on mps2_an505;
+    /// Cortex-M7: the code of the Cortex-M4.
+    M7: "thumbv7em-none-eabihf" on mps2_an500;
+    /// STM32F405: a Cortex-M4 with the memory of a motor controller.
+    F405: "thumbv7em-none-eabihf" on stm32f405;
+}
+
+impl Target {
+    /// The target with this name of rustc's; where several boards share it, the first one.
+    pub fn of(triple: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|target| target.triple() == triple)
+    }
+
+    /// The target of the board with this name; where it has several, the first one.
+    pub fn on(board: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|target| target.board().name == board)
+    }
+
+    /// The feature of a firmware package that chooses the board: its name. Without a feature it is that of [`Target::of`].
+    pub fn feature(self) -> Option<&'static str> {
+        (Self::of(self.triple()) != Some(self)).then_some(self.board().name)
+    }
+
+    /// Whether the kernels are in assembler, unless `ACTQ_BACKEND` leaves it out.
+    pub fn has_assembler(self) -> bool {
+        ["thumbv7em", "thumbv8m.main"].iter().any(|core| self.triple().starts_with(core))
+    }
+
+    /// The profile of a build (`Cargo.toml`).
+    pub fn profile(self) -> &'static str {
+        if self.has_assembler() { "firmware" } else { "release" }
+    }
+
+    /// The board with the firmware `elf`, under QEMU, which talks to the host.
+    pub fn run(self, elf: &Path) -> Command {
+        let mut command = self.emulate(elf, "none");
+        command.args(self.board().transport.arguments());
+        command
+    }
+
+    /// The board with the application `elf`, under QEMU, its serial port at one of QEMU's character devices. An instruction takes
+    /// 32 ns, so that times are the same in every run.
+    pub fn run_with_serial(self, elf: &Path, serial: &str) -> Command {
+        let mut command = self.emulate(elf, serial);
+        command.args(["-icount", "shift=5,sleep=off"]);
+        command
+    }
+
+    fn emulate(self, elf: &Path, serial: &str) -> Command {
+        let board = self.board();
+        let mut command = Command::new(board.emulator);
+        command.args(board.machine).args(["-display", "none", "-monitor", "none", "-serial", serial]);
+        command.arg("-kernel").arg(elf);
+        command
+    }
+}
+
+/// The workspace's root.
+pub fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."))
+}
+
+/// First line of the version text of a program: an emulator, the compiler.
+pub fn version(program: &str) -> io::Result<String> {
+    let output = Command::new(program).arg("--version").output()?;
+    Ok(String::from_utf8_lossy(&output.stdout).lines().next().unwrap_or_default().to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    #[test]
+    fn cargo_runs_every_target_by_this_table() {
+        let config = fs::read_to_string(root().join(".cargo/config.toml")).expect("cargo's configuration");
+        for target in Target::ALL {
+            let triple = target.triple();
+            let section = config.split("[target.").find(|section| section.starts_with(&format!("{triple}]")));
+            let runner = format!("runner = \"cargo run --quiet --package actq-boards -- {triple}\"");
+            assert!(section.is_some_and(|section| section.contains(&runner)), "{triple}");
+            assert!(root().join(target.board().memory).is_file(), "{triple}");
+        }
+    }
+
+    #[test]
+    fn a_target_is_found_by_its_name() {
+        let found =
+            |target: &Target| Target::of(target.triple()).is_some_and(|found| found.triple() == target.triple());
+        assert!(Target::ALL.iter().all(found));
+        assert_eq!(Target::of("x86_64-unknown-linux-gnu"), None);
+        assert_eq!(Target::on("stm32f405"), Some(Target::F405));
+        assert_eq!(Target::on("stm32"), None);
+    }
+
+    #[test]
+    fn a_feature_chooses_what_the_triple_does_not() {
+        let chosen: Vec<_> = Target::ALL.into_iter().filter_map(Target::feature).collect();
+        assert_eq!(chosen, ["mps2-an500", "stm32f405"]);
+    }
+}
