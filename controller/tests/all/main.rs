@@ -1,0 +1,7 @@
+//! The controller's decisions, one by one and together.
+
+mod guard;
+mod memory;
+mod random;
+mod safety;
+mod transitions;
