@@ -1,7 +1,7 @@
 //! What a motor controller decides, without its peripherals: the firmware feeds bytes, ticks and times, and writes the outputs.
 //!
 //! [`endpoint`] answers the link, [`guard`] lets observations to the head, [`safety`] decides every tick what the outputs do,
-//! [`progress`] when the watchdog is fed, [`scrub`] notices that the image has changed, and [`breadcrumb`] says what the last run
+//! [`slots`] which image runs, [`progress`] when the watchdog is fed, [`scrub`] notices that the image has changed, and [`breadcrumb`] says what the last run
 //! died of. `docs/SAFETY.md` has the states, and what is not claimed.
 //!
 //! Nothing here allocates, blocks or panics; each call's work is bounded.
@@ -17,7 +17,9 @@ pub mod health;
 pub mod progress;
 pub mod safety;
 pub mod scrub;
+pub mod slots;
 pub mod state;
+pub mod update;
 
 pub use axis::{Axis, Output, SafeAction};
 pub use guard::Guard;

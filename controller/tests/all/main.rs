@@ -4,4 +4,5 @@ mod guard;
 mod memory;
 mod random;
 mod safety;
+mod slots;
 mod transitions;

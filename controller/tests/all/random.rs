@@ -3,6 +3,7 @@
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng as _, SeedableRng as _};
 
+#[derive(Clone)]
 pub(super) struct Random(Pcg64Mcg);
 
 impl Random {
