@@ -3,6 +3,7 @@
 use core::fmt;
 
 use actq_link::Floats;
+use actq_link::code::Refusal;
 
 use crate::age::Age;
 
@@ -60,7 +61,9 @@ impl core::error::Error for Refused {}
 pub struct Guard<'r, const OBS: usize> {
     ranges: &'r [Range],
     /// Oldest age in µs.
-    pub(crate) max_age: u32,
+    max_age: u32,
+    /// What the build allows at most.
+    built_max_age: u32,
     age: Age,
     values: [f32; OBS],
     len: usize,
@@ -75,8 +78,16 @@ impl<'r, const OBS: usize> Guard<'r, OBS> {
     ///
     /// `None` where there is no room for `len` values.
     pub fn new(len: usize, ranges: &'r [Range], max_age: u32) -> Option<Self> {
-        let empty = Self { ranges, max_age, age: Age::default(), values: [0.0; OBS], len, newest: None, refused: 0 };
-        (len <= OBS).then_some(empty)
+        (len <= OBS).then_some(Self {
+            ranges,
+            max_age,
+            built_max_age: max_age,
+            age: Age::default(),
+            values: [0.0; OBS],
+            len,
+            newest: None,
+            refused: 0,
+        })
     }
 
     /// Lets an observation through that was sent at `remote` µs and came at `local` µs. One that is refused is counted, and the
@@ -116,6 +127,24 @@ impl<'r, const OBS: usize> Guard<'r, OBS> {
     /// The newest observation with its frame's number, once.
     pub fn newest(&mut self) -> Option<(u32, &[f32])> {
         Some((self.newest.take()?, self.values.get(..self.len)?))
+    }
+
+    /// Age in µs above which an observation is refused.
+    pub const fn max_age(&self) -> u32 {
+        self.max_age
+    }
+
+    /// Sets it, not above that of the build.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal::Range`] where it is.
+    pub fn set_max_age(&mut self, max_age: u32) -> Result<(), Refusal> {
+        if max_age > self.built_max_age {
+            return Err(Refusal::Range);
+        }
+        self.max_age = max_age;
+        Ok(())
     }
 
     /// Forgets how the clocks stand to each other, and what was not taken.

@@ -12,9 +12,12 @@
 mod age;
 pub mod axis;
 pub mod breadcrumb;
+pub mod endpoint;
 pub mod guard;
 pub mod health;
+mod parameters;
 pub mod progress;
+mod requests;
 pub mod safety;
 pub mod scrub;
 pub mod slots;
@@ -22,6 +25,8 @@ pub mod state;
 pub mod update;
 
 pub use axis::{Axis, Output, SafeAction};
+pub use endpoint::Endpoint;
 pub use guard::Guard;
 pub use health::Check;
+pub use requests::Settings;
 pub use safety::{Safety, Shared};

@@ -24,12 +24,21 @@ impl<const AXES: usize> Shared<AXES> for Safety<AXES> {
     }
 }
 
+/// What a build allows at most.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Built<const AXES: usize> {
+    pub(crate) axes: [Axis; AXES],
+    pub(crate) deadline: u32,
+}
+
 /// Decides, every tick, what the outputs do.
 #[derive(Debug)]
 pub struct Safety<const AXES: usize> {
     pub(crate) axes: [Axis; AXES],
     /// Ticks without an observation, or an action, that are bearable.
     pub(crate) deadline: u32,
+    /// What the build allows at most.
+    pub(crate) built: Built<AXES>,
     health: Health,
     state: State<AXES>,
     /// The last fault.
@@ -44,9 +53,11 @@ impl<const AXES: usize> Safety<AXES> {
     /// Disarmed. `deadline` in ticks, at least 1 (0 is taken as 1); `seed` should be another one at every start, so that requests
     /// from before it are refused: a count of starts in memory that a reset keeps, or a free-running timer.
     pub fn new(axes: [Axis; AXES], deadline: u32, seed: u32) -> Self {
+        let deadline = deadline.max(1);
         Self {
             axes,
-            deadline: deadline.max(1),
+            deadline,
+            built: Built { axes, deadline },
             health: Health::default(),
             state: State::Disarmed(Disarmed::new()),
             fault: None,

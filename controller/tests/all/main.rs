@@ -1,5 +1,6 @@
 //! The controller's decisions, one by one and together.
 
+mod endpoint;
 mod guard;
 mod memory;
 mod random;
