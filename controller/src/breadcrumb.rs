@@ -3,13 +3,11 @@
 //! After power-on that memory holds anything, so that a record has a checksum.
 
 use actq_link::code::{Crash, ResetCause};
+use actq_link::frame::CRC;
 use actq_link::report::Breadcrumb;
-use crc::{CRC_32_ISO_HDLC, Crc};
 
 /// Words of a record: the memory to set aside, as a static in a section that the start-up code leaves alone.
 pub const WORDS: usize = 6;
-
-static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// A crash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

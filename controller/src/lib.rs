@@ -2,7 +2,7 @@
 //!
 //! [`endpoint`] answers the link, [`guard`] lets observations to the head, [`safety`] decides every tick what the outputs do,
 //! [`slots`] which image runs, [`progress`] when the watchdog is fed, [`scrub`] notices that the image has changed, and [`breadcrumb`] says what the last run
-//! died of. `docs/SAFETY.md` has the states, and what is not claimed.
+//! died of. [`foc`] is a current loop for the control tick. `docs/SAFETY.md` has the states, and what is not claimed.
 //!
 //! Nothing here allocates, blocks or panics; each call's work is bounded.
 #![no_std]
@@ -13,6 +13,7 @@ mod age;
 pub mod axis;
 pub mod breadcrumb;
 pub mod endpoint;
+pub mod foc;
 pub mod guard;
 pub mod health;
 mod parameters;

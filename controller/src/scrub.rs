@@ -1,8 +1,7 @@
 //! Reads the running image again and again, to notice that flash has changed.
 
-use crc::{CRC_32_ISO_HDLC, Crc, Digest};
-
-static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+use actq_link::frame::CRC;
+use crc::Digest;
 
 /// CRC-32 of all bytes, in pieces.
 pub struct Scrub {

@@ -9,6 +9,8 @@
 //! Flash is reached by the traits of `embedded-storage`.
 
 mod authority;
+#[cfg(feature = "signature")]
+mod key;
 mod layout;
 mod marks;
 mod readback;
@@ -18,7 +20,7 @@ mod updater;
 
 pub use authority::{Anyone, Authority};
 #[cfg(feature = "signature")]
-pub use authority::{BadKey, Key, context};
+pub use key::{BadKey, Key, context};
 pub use layout::{HEADER, Layout, LayoutError, Slot};
 pub use store::{Candidate, Slots, TRIALS};
 pub use updater::{Updater, Work};

@@ -25,7 +25,8 @@ pub const CHECKSUM: usize = 4;
 /// The longest payload in bytes: 1024 values of an observation. A receiver may have memory for less.
 pub const MAX_PAYLOAD: usize = 4096;
 
-pub(crate) static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+/// CRC-32 (ISO-HDLC), and the one table of it that a target needs.
+pub static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// Bytes of a frame with so many bytes of payload, before stuffing: the memory that a [`crate::Receiver`] needs.
 pub const fn bytes(payload: usize) -> usize {

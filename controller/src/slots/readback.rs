@@ -1,10 +1,10 @@
 //! Reads an image back from flash in pieces, to compare its checksum and its signature.
 
+use actq_link::frame::CRC;
 use crc::Digest;
 use embedded_storage::nor_flash::NorFlash;
 
 use super::authority::Authority;
-use super::record::CRC;
 use crate::update::Plan;
 
 /// Bytes read at once.

@@ -3,7 +3,7 @@
 //! Little-endian words: magic, format, length, CRC-32 of the image, version, generation, whether a signature follows, the signature
 //! (64 bytes), zeros, and the CRC-32 (ISO-HDLC) of all before it.
 
-use crc::{CRC_32_ISO_HDLC, Crc};
+use actq_link::frame::CRC;
 
 use crate::update::Plan;
 
@@ -12,8 +12,6 @@ pub(super) const BYTES: usize = 128;
 
 const MAGIC: u32 = u32::from_le_bytes(*b"ACTS");
 const FORMAT: u32 = 1;
-
-pub(super) static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// An image that was whole.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,6 +1,7 @@
 //! The controller's decisions, one by one and together.
 
 mod endpoint;
+mod foc;
 mod guard;
 mod memory;
 mod random;
