@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use actq_link::code::{Parameter, Refusal, Report};
+use actq_link::code::{Parameter, Refusal, Report, State};
 use actq_link::report::{Breadcrumb, Status, Timing};
 use actq_link::{Floats, Message};
 use anyhow::{Context as _, Result, bail};
@@ -162,10 +162,12 @@ impl Client {
     pub fn arm(&mut self) -> Result<()> {
         // A repeated request whose first answer was lost is refused for its token.
         let outcome = self.with_token(|token| Message::Arm { token })?;
-        if outcome == Err(Refusal::Token) && self.status()?.state == actq_link::code::State::Armed {
-            return Ok(());
+        if !(outcome == Err(Refusal::Token) && self.status()?.state == State::Armed) {
+            outcome.context("not armed")?;
         }
-        outcome.context("not armed")
+        // What was told before speaks of the state before.
+        self.events.retain(|event| !matches!(event, Event::Status(_)));
+        Ok(())
     }
 
     /// Disarms.

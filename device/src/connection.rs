@@ -65,8 +65,9 @@ impl Connection {
         let mut buffer = [0; frame::wire_bytes(frame::MAX_PAYLOAD)];
         let micros = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_micros() as u32;
         let wire = self.sender.frame(message, micros, &mut buffer).context("the message is longer than a frame")?;
+        // A zero first, so that a frame whose end was lost on the way does not take this one with it.
         if let Some(port) = &mut self.port
-            && let Err(error) = port.write_all(wire).and_then(|()| port.flush())
+            && let Err(error) = port.write_all(&[&[0], wire].concat()).and_then(|()| port.flush())
         {
             self.lose(error);
         }

@@ -4,5 +4,6 @@ mod keys;
 mod line;
 mod pushes;
 mod requests;
+mod serves;
 mod simulated;
 mod streams;
