@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use actq_controller::breadcrumb::Record;
 use actq_controller::endpoint::Facts;
+use actq_controller::ram::Ram;
 use actq_controller::slots::{Authority, Layout, Slots, Updater, Work};
 use actq_controller::{Axis, Check, Endpoint, Guard, Output, SafeAction, Safety, Settings};
 use actq_device::client::Client;
@@ -17,7 +18,7 @@ use actq_device::port::Address;
 use actq_link::code::{Crash, Refusal, ResetCause};
 use actq_link::frame;
 use actq_link::report::{BUILT_IN, Timing};
-use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
+use embedded_storage::nor_flash::ReadNorFlash as _;
 
 use crate::line::Line;
 
@@ -29,53 +30,6 @@ const SECTOR: usize = 4096;
 pub(super) const GOOD: &[u8] = b"good";
 
 type End = Endpoint<'static, OBSERVATION, { frame::bytes(512) }>;
-
-/// RAM with the rules of NOR flash.
-struct Ram(Vec<u8>);
-
-#[derive(Debug)]
-struct Broken;
-
-impl NorFlashError for Broken {
-    fn kind(&self) -> NorFlashErrorKind {
-        NorFlashErrorKind::Other
-    }
-}
-
-impl ErrorType for Ram {
-    type Error = Broken;
-}
-
-impl ReadNorFlash for Ram {
-    const READ_SIZE: usize = 1;
-
-    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Broken> {
-        bytes.copy_from_slice(&self.0[offset as usize..][..bytes.len()]);
-        Ok(())
-    }
-
-    fn capacity(&self) -> usize {
-        self.0.len()
-    }
-}
-
-impl NorFlash for Ram {
-    const WRITE_SIZE: usize = 4;
-    const ERASE_SIZE: usize = SECTOR;
-
-    fn erase(&mut self, from: u32, to: u32) -> Result<(), Broken> {
-        self.0[from as usize..to as usize].fill(0xff);
-        Ok(())
-    }
-
-    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Broken> {
-        for (place, byte) in self.0[offset as usize..].iter_mut().zip(bytes) {
-            assert_eq!(*place, 0xff, "programmed twice");
-            *place = *byte;
-        }
-        Ok(())
-    }
-}
 
 /// What a test does to the controller, and sees of it.
 #[derive(Default)]
@@ -111,11 +65,11 @@ impl Simulated {
         let control = Arc::new(Control::default());
         let shared = control.clone();
         let thread = std::thread::spawn(move || {
-            let mut flash = Ram(vec![0x5a; 4 * SECTOR]);
+            let mut flash = vec![0x5a; 4 * SECTOR];
             while !shared.stop.load(Ordering::Relaxed) {
                 shared.reset.store(false, Ordering::Relaxed);
                 let starts = shared.starts.fetch_add(1, Ordering::Relaxed);
-                flash = run(&shared, &listener, flash, authority(), faults, starts);
+                run(&shared, &listener, &mut flash, authority(), faults, starts);
             }
         });
         Self { control, address, thread: Some(thread) }
@@ -155,14 +109,15 @@ fn test(image: &[u8]) -> Result<(), Refusal> {
 fn run<A: Authority>(
     control: &Control,
     listener: &TcpListener,
-    mut flash: Ram,
+    flash: &mut [u8],
     authority: A,
     faults: u64,
     starts: u32,
-) -> Ram {
+) {
     listener.set_nonblocking(true).expect("it is a socket");
+    let flash = Ram::<4, SECTOR>(flash);
     let layout = Layout::new(&flash, 0..8192, 8192..16384).expect("the slots fit");
-    let mut slots = Slots::new(&mut flash, layout, authority);
+    let mut slots = Slots::new(flash, layout, authority);
     let running = slots.select().filter(|candidate| !candidate.trial).map(|candidate| candidate.slot);
     let mut updater = Updater::new(slots, running);
 
@@ -236,6 +191,4 @@ fn run<A: Authority>(
             stream = None;
         }
     }
-    drop(updater);
-    flash
 }

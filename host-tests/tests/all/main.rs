@@ -4,6 +4,7 @@ mod arrows;
 mod best;
 mod cli;
 mod compare;
+mod controller;
 mod cost;
 mod counting;
 mod digests;
