@@ -33,6 +33,8 @@ use tempfile::TempDir;
 const OBS: usize = 24;
 const ACT: usize = 3;
 const SECTOR: usize = 16 << 10;
+/// Pieces of a step between two looks at the line, which take a millisecond where nothing comes.
+const SLICES: usize = 100;
 
 fn image(name: &str, seed: u64) -> Result<Vec<u8>> {
     let mut builder = Builder::new(OBS);
@@ -168,15 +170,17 @@ fn firmware(listener: &TcpListener, stop: &AtomicBool, built_in: &[u8], key: &[u
                 }
                 stepping = head.begin(step.observation).is_ok().then_some(step.of);
             }
-            // A slice of the step, and its action where it is the last one.
-            let acted = stepping.and_then(|of| match head.poll(budget) {
-                Ok(Poll::Pending) => None,
-                Ok(Poll::Ready(action)) => Some((of, Ok(action))),
-                Err(error) => Some((of, Err(error))),
-            });
-            if let Some((of, action)) = acted {
-                stepping = None;
-                sent.extend(endpoint.acted(of, action, micros, &mut safety, &mut out).unwrap_or_default());
+            // Some slices of the step, and its action behind the last one.
+            for _ in 0..SLICES {
+                let acted = stepping.and_then(|of| match head.poll(budget) {
+                    Ok(Poll::Pending) => None,
+                    Ok(Poll::Ready(action)) => Some((of, Ok(action))),
+                    Err(error) => Some((of, Err(error))),
+                });
+                if let Some((of, action)) = acted {
+                    stepping = None;
+                    sent.extend(endpoint.acted(of, action, micros, &mut safety, &mut out).unwrap_or_default());
+                }
             }
             if let Some(port) = &mut port {
                 // A host that has gone is noticed by the next read.
@@ -236,7 +240,7 @@ fn a_controller_is_watched_streamed_to_and_updated_by_the_command() -> Result<()
     failed(&controller.actq("get", &["low", "--axis", "3"])?, 1, &["no such parameter or axis"])?;
 
     let (recording, log) = (recording.display().to_string(), path("log.npz"));
-    let arguments = [&path("old.actq"), &recording, "--arm", "--rate", "200", "--log", &log];
+    let arguments = [&path("old.actq"), &recording, "--arm", "--rate", "50", "--log", &log];
     succeeded(&controller.actq("stream", &arguments)?)?;
     check_log(&log, &old)?;
 
@@ -254,7 +258,7 @@ fn a_controller_is_watched_streamed_to_and_updated_by_the_command() -> Result<()
     failed(&push("old.actq", &["--signature", &path("old.sig")])?, 1, &["lower than one that ran before"])?;
     assert!(succeeded(&controller.actq("watch", &["--once"])?)?.contains("slot "));
     failed(&controller.actq("stream", &arguments)?, 1, &["runs another image", "actq link push"])?;
-    let arguments = [&path("new.actq"), &recording, "--rate", "200", "--log", &log];
+    let arguments = [&path("new.actq"), &recording, "--rate", "50", "--log", &log];
     succeeded(&controller.actq("stream", &arguments)?)?;
     check_log(&log, &new)?;
     controller.end()
