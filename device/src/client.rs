@@ -11,8 +11,11 @@ use anyhow::{Context as _, Result, bail};
 use crate::connection::Connection;
 use crate::event::Event;
 
-/// After so long without an answer a request is sent again.
+/// After so long without an answer a request is sent again, then after half as long again each time: a slow line is not to be filled
+/// with repetitions.
 const REPEAT: Duration = Duration::from_millis(150);
+/// But no longer than this.
+const SLOWEST: Duration = Duration::from_secs(1);
 
 /// A controller, to ask.
 pub struct Client {
@@ -57,11 +60,11 @@ impl Client {
     /// Sends `message` until `wanted` takes an event as the answer to one of the numbers it was sent under. The others are kept.
     fn ask<T>(&mut self, message: &Message<'_>, wanted: impl Fn(&Event, &[u32]) -> Option<T>) -> Result<T> {
         let begun = Instant::now();
-        let mut numbers = Vec::new();
+        let (mut numbers, mut wait) = (Vec::new(), REPEAT);
         while begun.elapsed() < self.patience {
             numbers.push(self.connection.send(message)?);
             let sent = Instant::now();
-            while sent.elapsed() < REPEAT {
+            while sent.elapsed() < wait {
                 let (mut answer, events) = (None, &mut self.events);
                 self.connection.poll(|event| match answer.take().or_else(|| wanted(&event, &numbers)) {
                     Some(found) => answer = Some(found),
@@ -71,6 +74,7 @@ impl Client {
                     return Ok(answer);
                 }
             }
+            wait = wait.mul_f64(1.5).min(SLOWEST);
         }
         bail!("no answer for {:.1?}: is it a controller with this link, and at this speed?", self.patience)
     }

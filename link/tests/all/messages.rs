@@ -9,7 +9,7 @@ use proptest::prelude::*;
 pub(super) const LONGEST: usize = frame::bytes(frame::MAX_PAYLOAD);
 
 /// What a message borrows.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Content {
     values: Vec<f32>,
     bytes: Vec<u8>,

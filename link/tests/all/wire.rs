@@ -4,7 +4,7 @@ use actq_link::code::{Parameter, Refusal, Report, State};
 use actq_link::report::Counters;
 use actq_link::{Floats, Message, Receiver, Sender, frame};
 
-use super::messages::LONGEST;
+use super::messages::{Content, LONGEST, all};
 use super::random::Random;
 
 /// The messages that a receiver finds, as text.
@@ -49,7 +49,7 @@ fn the_example_in_the_documentation_is_what_is_sent_and_received() {
     assert_eq!((received.sequence, received.micros, received.message), (258, 1_000_000, message));
 }
 
-/// The table of kinds and that of each code name every one of them.
+/// The table of each code names every one of them.
 #[test]
 fn the_documentation_lists_every_code() {
     let rows = |code: u8, name: String| (format!("| {code} | `{name}`"), name);
@@ -61,6 +61,16 @@ fn the_documentation_lists_every_code() {
     let names = names.chain(actq_link::code::ResetCause::ALL.iter().map(|c| rows(c.code(), format!("{c:?}"))));
     for (row, name) in names.chain(Report::ALL.iter().map(|c| rows(c.code(), format!("{c:?}")))) {
         assert!(DOCUMENTATION.contains(&row), "docs/LINK.md has no row for {name}: {row}");
+    }
+}
+
+#[test]
+fn the_documentation_lists_every_message() {
+    for message in all(&Content::default(), &[0; 6], 0) {
+        let name = format!("{message:?}").to_lowercase();
+        let name = name.split(|c: char| !c.is_alphabetic()).next().expect("a message has a name");
+        let row = format!("| {} | {name}", message.kind());
+        assert!(DOCUMENTATION.contains(&row), "docs/LINK.md has no row {row}");
     }
 }
 

@@ -29,7 +29,8 @@ pub(crate) enum LinkCommand {
     Set(SetArgs),
     /// Send a recording's observations, each at its time
     ///
-    /// The image is the one that the controller runs: it says how long an observation is, and its checksum is compared.
+    /// The image is the one that the controller runs: it says how long an observation is, and its checksum is compared. Episodes
+    /// follow each other without a reset.
     ///
     /// Example: actq link stream /dev/ttyACM0 ur3.actq heldout.npz --arm --log drive.npz
     Stream(StreamArgs),
