@@ -1,17 +1,28 @@
-//! The pipe protocol: any simulator runs an image as its policy, served by `actq serve` on the host or by the demo firmware.
+//! What host and target say to each other. `docs/LINK.md` has the wire format.
 //!
-//! Little-endian. A request is one byte: [`RESET`], which has no reply, or [`STEP`] and the observation (f32), which are answered by
-//! the action (f32). Chunks are queued by the policy. Where the observation, or a value that the network makes of it, is not finite,
-//! all values of the answer are [`NO_ACTION`]: the recurrent state and what was left of a chunk are forgotten, the last action is
-//! kept for the step limit, and serving goes on.
+//! [`Sender`] makes frames of messages, [`Receiver`] finds messages in bytes. Both are pure state machines: they own no port, no
+//! clock and no heap, and carry on after any byte. How bytes travel is for others to say: a UART, a socket, or CAN frames ([`can`]).
+//!
+//! [`pipe`] is another, simpler protocol: a simulator that runs an image as its policy through standard input and output.
 #![no_std]
 #![forbid(unsafe_code)]
 
-/// Resets the policy.
-pub const RESET: u8 = b'R';
+// Which of these may use which: the table in docs/ARCHITECTURE.md, which a test reads.
+pub mod can;
+pub mod code;
+mod decoder;
+mod fields;
+mod floats;
+pub mod frame;
+mod message;
+pub mod pipe;
+mod receiver;
+pub mod report;
+mod sender;
+mod window;
 
-/// Steps the policy.
-pub const STEP: u8 = b'S';
-
-/// The value of an answer without an action: a quiet NaN.
-pub const NO_ACTION: f32 = f32::from_bits(0x7fc0_0000);
+pub use floats::Floats;
+pub use message::Message;
+pub use pipe::{NO_ACTION, RESET, STEP};
+pub use receiver::{Received, Receiver};
+pub use sender::Sender;

@@ -1,170 +1,301 @@
-//! The application on its boards under QEMU: it starts, refuses, acts, is reset, and tells why.
+//! A whole controller with a real image: what the firmware does, in a thread behind a socket, and the command `actq` at the other end.
 
-use std::fs;
-use std::path::Path;
+use std::io::{ErrorKind, Read as _, Write as _};
+use std::net::TcpListener;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::task::Poll;
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+use std::{fs, thread};
 
 use actq::runtime::ImageBuffer;
-use actq_bench::Target;
-use actq_bench::console::Console;
-use actq_bench::cycles::Code;
-use actq_bench::firmware::{self, built_in, halfword_at};
-use anyhow::{Context, Result, ensure};
+use actq_bench::command::{actq, failed, run, succeeded};
+use actq_bench::golden::Random;
+use actq_bench::networks::Builder;
+use actq_controller::breadcrumb::Record;
+use actq_controller::endpoint::Facts;
+use actq_controller::ram::Ram;
+use actq_controller::slots::{Candidate, Key, Layout, Slots, Updater, Work};
+use actq_controller::{Axis, Check, Endpoint, Guard, SafeAction, Safety, Settings};
+use actq_kernels::image::{header as h, seal};
+use actq_kernels::{Head, Image, Width};
+use actq_link::code::{Refusal, ResetCause};
+use actq_link::frame;
+use actq_link::report::{BUILT_IN, Timing};
+use anyhow::{Context, Result};
+use embedded_storage::nor_flash::ReadNorFlash as _;
+use ndarray::{Array2, Array3};
+use ndarray_npy::{NpzReader, NpzWriter};
+use tempfile::TempDir;
 
-/// The boards that the application has a device for.
-const BOARDS: [Target; 4] = [Target::Fpu, Target::M33, Target::M7, Target::F405];
+const OBS: usize = 24;
+const ACT: usize = 3;
+const SECTOR: usize = 16 << 10;
+/// Pieces of a step between two looks at the line, which take a millisecond where nothing comes.
+const SLICES: usize = 100;
 
-/// Starts it and waits until it is ready; gives what it said.
-fn ready(target: Target, elf: &Path) -> Result<(Console, Vec<String>)> {
-    let mut console = Console::start(target, elf, None)?;
-    let said = console.lines_until("self-test passed, ready")?;
-    Ok((console, said))
+fn image(name: &str, seed: u64) -> Result<Vec<u8>> {
+    let mut builder = Builder::new(OBS);
+    // Other weights for other seeds.
+    builder.values(seed as usize);
+    builder.linear((ACT, OBS), actq::methods::Activations::Int8, |_| Some(Width::W3), 0, true)?;
+    let (policy, outcomes) = builder.finish(name.to_owned(), false);
+    actq::emit::image(&policy, &outcomes)
 }
 
-/// The number that follows `name` in a line.
-fn number(line: &str, name: &str) -> Result<u32> {
-    let (_, rest) = line.split_once(name).with_context(|| format!("{name:?} is not in {line:?}"))?;
-    let number = rest.trim_start().split(|c: char| !c.is_ascii_digit()).next().unwrap_or_default();
-    number.parse().with_context(|| format!("{name:?} in {line:?}"))
+/// The image with another expected action in its self-test.
+fn with_wrong_self_test(image: &[u8]) -> Vec<u8> {
+    let word = |at: usize| u32::from_le_bytes([0, 1, 2, 3].map(|i| image[4 * at + i])) as usize;
+    let mut wrong = image.to_vec();
+    wrong[4 * (word(h::W_SELF_TEST) + OBS)] ^= 1;
+    seal(&mut wrong).expect("its length is as before");
+    wrong
 }
 
-#[test]
-fn every_board_starts_and_acts_with_the_bits_of_the_host() -> Result<()> {
-    let buffer = ImageBuffer::read(built_in()?)?;
-    let image = buffer.image(built_in()?)?;
-    for target in BOARDS {
-        let (mut console, said) = ready(target, &firmware::controller(target, "")?)?;
-        let clock = match target {
-            Target::M33 => "clock 20000000 Hz, watchdog runs",
-            // QEMU has no clocks for it: the wait for the crystal has ended.
-            Target::F405 => "clock 16000000 Hz, without its crystal, watchdog runs",
-            _ => "clock 25000000 Hz, watchdog runs",
+struct Controller {
+    port: String,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<Result<()>>>,
+}
+
+impl Controller {
+    fn start(built_in: Vec<u8>, key: [u8; 32]) -> Result<Self> {
+        let listener = TcpListener::bind("127.0.0.1:0")?;
+        let (port, stop) = (format!("tcp:{}", listener.local_addr()?), Arc::new(AtomicBool::new(false)));
+        let stopped = stop.clone();
+        let thread = thread::spawn(move || firmware(&listener, &stopped, &built_in, &key));
+        Ok(Self { port, stop, thread: Some(thread) })
+    }
+
+    /// A command of `actq link` and its output.
+    fn actq(&self, command: &str, more: &[&str]) -> Result<std::process::Output> {
+        run(actq(&[&["link", command, &self.port], more].concat()), &[])
+    }
+
+    fn end(mut self) -> Result<()> {
+        self.stop.store(true, Ordering::Relaxed);
+        let ended = self.thread.take().context("it runs")?.join();
+        ended.map_err(|_| anyhow::anyhow!("the controller has panicked"))?
+    }
+}
+
+/// Whether an image may run here: the kernels take it, its lengths are ours, and its self-test passes.
+fn test(buffer: &ImageBuffer) -> Result<(), Refusal> {
+    let image = Image::new_checked(buffer.bytes()).map_err(|_| Refusal::Unfit)?;
+    if (image.obs_len(), image.act_len()) != (OBS, ACT) {
+        return Err(Refusal::Unfit);
+    }
+    let mut scratch = vec![0; image.scratch_words()];
+    let mut head = Head::new(image, &mut scratch).map_err(|_| Refusal::Unfit)?;
+    head.self_test().map_err(|_| Refusal::SelfTest)
+}
+
+/// The firmware's main, with a socket for a UART and a clock for a timer.
+fn firmware(listener: &TcpListener, stop: &AtomicBool, built_in: &[u8], key: &[u8; 32]) -> Result<()> {
+    let mut memory = vec![0; 4 * SECTOR];
+    let flash = Ram::<4, SECTOR>(&mut memory);
+    let sector = SECTOR as u32;
+    let layout = Layout::new(&flash, 0..2 * sector, 2 * sector..4 * sector)?;
+    let mut updater = Updater::new(Slots::new(flash, layout, Key::new(key)?), None);
+
+    let axis = Axis::new(-100.0, 100.0, f32::INFINITY, 0.0, SafeAction::Coast)?;
+    let mut safety = Safety::new([axis; ACT], 500, 1);
+    [Check::Clock, Check::Watchdog, Check::Hardware].into_iter().for_each(|check| safety.check(check, true));
+    let breadcrumb = Record::report(ResetCause::Power, None);
+    let facts = Facts { image: 0, slot: BUILT_IN, timing: Timing::default(), breadcrumb };
+    let guard = Guard::<OBS>::new(OBS, &[], 500_000).context("there is room")?;
+    let settings = Settings { status_period: 50, erase_while_armed: false };
+    let mut endpoint = Endpoint::<OBS, { frame::bytes(256) }>::new(guard, facts, settings);
+
+    let (begun, mut ticks, mut port) = (Instant::now(), 0, None);
+    let mut buffer = ImageBuffer::new(built_in);
+    let read = |updater: &mut Updater<_, _>, candidate: &Candidate| -> Result<ImageBuffer> {
+        let mut bytes = vec![0; candidate.length as usize];
+        let flash: &mut Ram<'_, 4, SECTOR> = Updater::slots(updater).flash();
+        flash.read(candidate.address, &mut bytes).map_err(|e| anyhow::anyhow!("{e:?}"))?;
+        Ok(ImageBuffer::new(&bytes))
+    };
+    loop {
+        let good = test(&buffer).is_ok();
+        [Check::Image, Check::SelfTest].into_iter().for_each(|check| safety.check(check, good));
+        let image = buffer.image(Path::new("the controller's image"))?;
+        endpoint.facts.image = image.crc();
+        let mut scratch = vec![0; image.scratch_words()];
+        let mut head = Head::new(image, &mut scratch)?;
+        let budget = head.least_budget();
+        let mut stepping = None;
+        let next = loop {
+            if stop.load(Ordering::Relaxed) {
+                return Ok(());
+            }
+            let micros = begun.elapsed().as_micros() as u32;
+            let (mut out, mut sent, mut bytes) = ([0; 512], Vec::new(), [0; 1024]);
+            if port.is_none()
+                && let Ok((stream, _)) = {
+                    listener.set_nonblocking(true)?;
+                    listener.accept()
+                }
+            {
+                stream.set_nonblocking(false)?;
+                stream.set_read_timeout(Some(Duration::from_millis(1)))?;
+                stream.set_nodelay(true)?;
+                port = Some(stream);
+            }
+            let count = match port.as_mut().map(|port| port.read(&mut bytes)) {
+                Some(Ok(count)) if count > 0 => count,
+                Some(Err(e)) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => 0,
+                // The host has gone; another one may come.
+                _ => {
+                    port = None;
+                    thread::sleep(Duration::from_millis(1));
+                    0
+                }
+            };
+            for byte in &bytes[..count] {
+                let answer = endpoint.receive(*byte, micros, &mut safety, &mut updater, &mut out);
+                sent.extend(answer.unwrap_or_default());
+            }
+            while begun.elapsed().as_millis() > ticks {
+                ticks += 1;
+                safety.tick();
+                sent.extend(endpoint.report(micros, &mut safety, &mut out).unwrap_or_default());
+            }
+            if stepping.is_none()
+                && let Some(step) = endpoint.step(&mut safety)
+            {
+                if step.reset {
+                    head.reset();
+                }
+                stepping = head.begin(step.observation).is_ok().then_some(step.of);
+            }
+            // Some slices of the step, and its action behind the last one.
+            for _ in 0..SLICES {
+                let acted = stepping.and_then(|of| match head.poll(budget) {
+                    Ok(Poll::Pending) => None,
+                    Ok(Poll::Ready(action)) => Some((of, Ok(action))),
+                    Err(error) => Some((of, Err(error))),
+                });
+                if let Some((of, action)) = acted {
+                    stepping = None;
+                    sent.extend(endpoint.acted(of, action, micros, &mut safety, &mut out).unwrap_or_default());
+                }
+            }
+            if let Some(port) = &mut port {
+                // A host that has gone is noticed by the next read.
+                drop(port.write_all(&sent));
+            }
+            if let Work::Test(candidate) = updater.work() {
+                let new = read(&mut updater, &candidate)?;
+                if updater.tested(test(&new)) {
+                    endpoint.facts.slot = candidate.slot as u8;
+                    break new;
+                }
+            }
         };
-        let expected = [
-            "actq controller, reset by unknown",
-            clock,
-            &format!("image {}, crc32 {:08x}", image.name(), image.crc()),
-            "self-test passed, ready",
-        ];
-        assert_eq!(said, expected, "{target:?}");
-        for step in 0..image.self_test_steps() {
-            let (_, action) = image.self_test(step).context("a self-test step is missing")?;
-            let bits: String = action.iter().map(|word| format!(" {:08x}", u32::from_le(*word))).collect();
-            console.send(b"s")?;
-            assert_eq!(console.line()?, format!("action{bits}"), "{target:?}, step {step}");
+        buffer = next;
+    }
+}
+
+/// A folder for files, with a recording in it.
+fn folder() -> Result<(TempDir, PathBuf)> {
+    let folder = TempDir::new()?;
+    let path = folder.path().join("drive.npz");
+    let mut random = Random::new(3);
+    let mut npz = NpzWriter::new(fs::File::create(&path)?);
+    npz.add_array("obs", &Array3::from_shape_simple_fn((2, 20, OBS), || random.unit()))?;
+    npz.finish()?;
+    Ok((folder, path))
+}
+
+#[test]
+fn a_controller_is_watched_streamed_to_and_updated_by_the_command() -> Result<()> {
+    let (folder, recording) = folder()?;
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let (old, new) = (image("old", 0)?, image("new", 50)?);
+    for (name, bytes) in [("old.actq", &old), ("new.actq", &new), ("wrong.actq", &with_wrong_self_test(&new))] {
+        fs::write(path(name), bytes)?;
+    }
+    let key = path("key.pem");
+    let told = succeeded(&run(actq(&["keygen", "--out", &key]), &[])?)?;
+    let public = told.rsplit_once("public key: ").context("no public key")?.1.trim().to_owned();
+    failed(&run(actq(&["keygen", "--out", &key]), &[])?, 1, &["key.pem", "never replaced"])?;
+    let bytes: Vec<u8> = public
+        .as_bytes()
+        .chunks(2)
+        .map(|d| Ok(u8::from_str_radix(std::str::from_utf8(d)?, 16)?))
+        .collect::<Result<_>>()?;
+    let controller = Controller::start(old.clone(), bytes.as_slice().try_into()?)?;
+
+    let shown = succeeded(&controller.actq("watch", &["--once"])?)?;
+    for words in ["disarmed", "refused: no good observation", "built in, 24 values to 3", "power on"] {
+        assert!(shown.contains(words), "no {words:?} in\n{shown}");
+    }
+    failed(&controller.actq("arm", &[])?, 1, &["not armed", "send observations"])?;
+    assert_eq!(succeeded(&controller.actq("get", &["high", "--axis", "2"])?)?, "100\n");
+    succeeded(&controller.actq("set", &["high", "--axis", "2", "50"])?)?;
+    assert_eq!(succeeded(&controller.actq("get", &["high", "--axis", "2"])?)?, "50\n");
+    failed(&controller.actq("set", &["low", "-101"])?, 1, &["lower limit", "outside the parameter's range"])?;
+    failed(&controller.actq("get", &["low", "--axis", "3"])?, 1, &["no such parameter or axis"])?;
+
+    let (recording, log) = (recording.display().to_string(), path("log.npz"));
+    let arguments = [&path("old.actq"), &recording, "--arm", "--rate", "50", "--log", &log];
+    succeeded(&controller.actq("stream", &arguments)?)?;
+    check_log(&log, &old)?;
+
+    for (name, version) in [("new", "2"), ("old", "1"), ("wrong", "3")] {
+        let (image, signature) = (path(&format!("{name}.actq")), path(&format!("{name}.sig")));
+        let sign = ["sign", &image, "--key", &key, "--version", version, "--out", &signature];
+        succeeded(&run(actq(&sign), &[])?)?;
+    }
+    let push = |image: &str, more: &[&str]| controller.actq("push", &[&[&*path(image)], more].concat());
+    failed(&push("new.actq", &[])?, 1, &["signature is missing"])?;
+    failed(&push("new.actq", &["--signature", &path("old.sig")])?, 1, &["old.sig", "not that of this image"])?;
+    failed(&push("wrong.actq", &["--signature", &path("wrong.sig")])?, 1, &["self-test failed"])?;
+    let told = succeeded(&push("new.actq", &["--signature", &path("new.sig")])?)?;
+    assert!(told.contains("new runs, version 2"), "{told}");
+    failed(&push("old.actq", &["--signature", &path("old.sig")])?, 1, &["lower than one that ran before"])?;
+    assert!(succeeded(&controller.actq("watch", &["--once"])?)?.contains("slot "));
+    failed(&controller.actq("stream", &arguments)?, 1, &["runs another image", "actq link push"])?;
+    let arguments = [&path("new.actq"), &recording, "--rate", "50", "--log", &log];
+    succeeded(&controller.actq("stream", &arguments)?)?;
+    check_log(&log, &new)?;
+    controller.end()
+}
+
+/// Every action is that of the image on this host, bit for bit.
+fn check_log(log: &str, image: &[u8]) -> Result<()> {
+    let mut npz = NpzReader::new(fs::File::open(log)?)?;
+    let (obs, actions): (Array2<f32>, Array2<f32>) = (npz.by_name("obs")?, npz.by_name("action")?);
+    assert_eq!((obs.dim(), actions.dim()), ((40, OBS), (40, ACT)));
+    let buffer = ImageBuffer::new(image);
+    actq::runtime::with_head(buffer.image(Path::new("image"))?, |head| {
+        let mut answered = 0;
+        for (obs, action) in obs.outer_iter().zip(actions.outer_iter()).filter(|(_, action)| !action[0].is_nan()) {
+            let expected = head.step(&obs.to_vec())?;
+            assert_eq!(action.map(|v| v.to_bits()).to_vec(), expected.iter().map(|v| v.to_bits()).collect::<Vec<_>>());
+            answered += 1;
         }
-        console.send(b"?")?;
-        let status = console.line()?;
-        assert!(status.starts_with("ready, ticks "), "{target:?}: {status}");
-        assert!(number(&status, "ticks ")? > 10, "{target:?}: {status}");
-        assert_eq!((number(&status, "overruns ")?, number(&status, "lost bytes ")?), (0, 0), "{target:?}: {status}");
-    }
-    Ok(())
-}
-
-/// At 8 kHz, with a head of 330 thousand weights below: no tick is lost, and none begins later or takes longer than a tenth of a
-/// period. An instruction takes QEMU 32 ns, and a period 3125 cycles of 40 ns. Twenty steps play chunks of several evaluations.
-#[test]
-fn a_head_below_leaves_the_tick_alone() -> Result<()> {
-    let (mut console, _) = ready(Target::Fpu, &firmware::controller(Target::Fpu, "tick-8khz")?)?;
-    for _ in 0..20 {
-        console.send(b"s")?;
-        assert!(console.line()?.starts_with("action "));
-    }
-    console.send(b"?")?;
-    let status = console.line()?;
-    let [ticks, longest, jitter, overruns] =
-        ["ticks ", "longest ", "jitter ", "overruns "].map(|name| number(&status, name));
-    assert!(ticks? > 800, "{status}");
-    assert!(longest? < 312 && jitter? < 312, "{status}");
-    assert_eq!(overruns?, 0, "{status}");
-    Ok(())
+        // A machine that is busy may skip an observation, as a newer one is there.
+        assert!(answered >= 30, "{answered} of 40");
+        Ok(())
+    })
 }
 
 #[test]
-fn a_damaged_image_is_refused_with_its_reason() -> Result<()> {
-    let mut bytes = fs::read(built_in()?)?;
-    let middle = bytes.len() / 2;
-    bytes[middle] ^= 4;
-    let slot = tempfile::NamedTempFile::new()?;
-    fs::write(slot.path(), bytes)?;
-    for target in BOARDS {
-        let mut console = Console::start(target, &firmware::controller(target, "")?, Some(slot.path()))?;
-        let said = console.lines_until("image refused")?;
-        let last = said.last().map(String::as_str);
-        assert_eq!(last, Some("image refused: image checksum differs: the image is damaged, error 7"), "{target:?}");
-        console.send(b"s?")?;
-        assert_eq!(console.line()?, "no action: not ready", "{target:?}");
-        assert!(console.line()?.starts_with("not ready, ticks "), "{target:?}");
+fn a_controller_that_is_not_there_and_a_wrong_command_line_are_told() -> Result<()> {
+    let link = |arguments: &[&str]| run(actq(&[&["link"], arguments].concat()), &[]);
+    succeeded(&link(&["ports"])?)?;
+    failed(&link(&["watch", "tcp:127.0.0.1:1", "--once"])?, 1, &["tcp:127.0.0.1:1", "cannot be opened"])?;
+    failed(&link(&["arm", "/dev/no-such-port"])?, 1, &["/dev/no-such-port", "cannot be opened"])?;
+    for arguments in
+        [&["arm", "tcp:host"][..], &["arm"], &["set", "COM3", "high"], &["stream", "COM3", "a", "b", "--rate", "0"]]
+    {
+        failed(&link(arguments)?, 2, &["error"])?;
     }
-    Ok(())
-}
-
-/// An image that was checked well, and whose self-test vector is another's.
-#[test]
-fn an_image_that_fails_its_self_test_is_refused() -> Result<()> {
-    let mut bytes = fs::read(built_in()?)?;
-    let buffer = ImageBuffer::new(&bytes);
-    let image = buffer.image(built_in()?)?;
-    let (_, action) = image.self_test(0).context("the image has a self-test")?;
-    let action: Vec<u8> = action.iter().flat_map(|word| word.to_ne_bytes()).collect();
-    let at = bytes.windows(action.len()).position(|window| window == action).context("its action is in the image")?;
-    bytes[at] ^= 1;
-    let crc = actq_kernels::image::checksum(&bytes);
-    bytes[4 * actq_kernels::image::header::W_CRC..][..4].copy_from_slice(&crc.to_le_bytes());
-    let slot = tempfile::NamedTempFile::new()?;
-    fs::write(slot.path(), bytes)?;
-    let mut console = Console::start(Target::F405, &firmware::controller(Target::F405, "")?, Some(slot.path()))?;
-    let said = console.lines_until("image refused")?;
-    assert_eq!(said.last().map(String::as_str), Some("image refused: its self-test fails, error 84"));
-    Ok(())
-}
-
-/// The boards whose watchdog QEMU has. The loop that no longer feeds it goes on, so what it interrupts is somewhere in it.
-#[test]
-fn the_watchdog_resets_a_loop_without_progress() -> Result<()> {
-    for target in [Target::Fpu, Target::M33, Target::M7] {
-        let elf = firmware::controller(target, "faults")?;
-        let (mut console, _) = ready(target, &elf)?;
-        console.send(b"w")?;
-        let said = console.lines_until("self-test passed, ready")?;
-        assert_eq!(said[0], "actq controller, reset by watchdog", "{target:?}");
-        let at = said[1].strip_prefix("before it: watchdog at ").with_context(|| format!("{target:?}: {said:?}"))?;
-        halfword_at(&elf, at.get(..8).context("an address")?)?;
-        // A crumb is told once.
-        console.send(b"p")?;
-        assert_eq!(console.line()?, "actq controller, reset by software", "{target:?}");
-        assert!(console.line()?.starts_with("before it: panic in line "), "{target:?}");
-    }
-    Ok(())
-}
-
-#[test]
-fn a_hard_fault_leaves_its_address() -> Result<()> {
-    for target in BOARDS {
-        let elf = firmware::controller(target, "faults")?;
-        let (mut console, _) = ready(target, &elf)?;
-        console.send(b"h")?;
-        let said = console.lines_until("self-test passed, ready")?;
-        assert_eq!(said[0], "actq controller, reset by software", "{target:?}");
-        let at = said[1].strip_prefix("before it: hard fault at ").with_context(|| format!("{target:?}: {said:?}"))?;
-        let instruction = halfword_at(&elf, at.get(..8).context("an address")?)? & 0xff00;
-        ensure!(instruction == 0xde00, "{target:?}: {said:?} is {instruction:04x}, not the UDF");
-        console.send(b"?")?;
-        assert!(console.line()?.starts_with("ready"), "{target:?}");
-    }
-    Ok(())
-}
-
-/// There is nothing in the application that panics, nor the text of a panic.
-#[test]
-fn no_panic_is_in_the_application() -> Result<()> {
-    for target in BOARDS {
-        let code = Code::read(&firmware::controller(target, "")?)?;
-        let names = || code.functions().iter().map(|function| function.name.as_str());
-        let telling = ["panic", "core::fmt", "unwind"];
-        let found: Vec<&str> = names().filter(|name| telling.iter().any(|part| name.contains(part))).collect();
-        assert!(found.is_empty(), "{target:?}: {found:?}");
-        assert!(names().any(|name| name.contains("Head")), "{target:?}: nothing is in it");
-    }
-    Ok(())
+    // Something that listens and is no controller.
+    let listener = TcpListener::bind("127.0.0.1:0")?;
+    let port = format!("tcp:{}", listener.local_addr()?);
+    failed(&link(&["arm", &port, "--patience", "0.3"])?, 1, &["no answer", &port])
 }

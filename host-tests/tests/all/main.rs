@@ -1,5 +1,6 @@
 //! The tests that take more than one crate: one binary, so that one is linked and what they build is built once.
 
+mod application;
 mod arrows;
 mod best;
 mod cli;

@@ -7,6 +7,8 @@ use actq_kernels::Width;
 use actq_kernels::layout::is_group;
 use clap::{Parser, Subcommand, ValueEnum, value_parser};
 
+use crate::link::args::{KeygenArgs, LinkArgs, SignArgs};
+
 /// Quantizes robot policies to 2, 3, 4 or 8 bits and packs them into one image for a microcontroller.
 ///
 /// Exit status: 0 on success, 1 on an error, 2 on a wrong command line.
@@ -78,6 +80,18 @@ pub(crate) enum Command {
     ///
     /// Example: actq serve ur3.actq --record drive.npz --policy policies/ur3
     Serve(ServeArgs),
+    /// Talk to a motor controller: watch, arm, stream observations, send an image
+    ///
+    /// docs/LINK.md describes what goes over the wire, docs/SAFETY.md what the controller does.
+    Link(LinkArgs),
+    /// Make a key to sign images with
+    ///
+    /// The private key is written in PKCS #8 as PEM; the public one is printed, for builds that require signatures.
+    Keygen(KeygenArgs),
+    /// Sign an image and its version, for controllers that require it
+    ///
+    /// Example: actq sign ur3.actq --key fleet.pem --version 3 --out ur3.sig
+    Sign(SignArgs),
 }
 
 #[derive(clap::Args)]

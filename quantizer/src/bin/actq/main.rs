@@ -4,8 +4,10 @@
 mod args;
 mod drive;
 mod eval;
+mod link;
 mod quantize;
 mod serve;
+mod sign;
 mod tune;
 
 use std::io::{self, Write as _};
@@ -48,6 +50,9 @@ fn run(command: Command) -> Result<()> {
         Command::Tune(args) => tune::run(&args),
         Command::Sweep(args) => run_sweep(&args),
         Command::Serve(args) => serve::run(&args),
+        Command::Link(args) => link::run(&args),
+        Command::Keygen(args) => sign::keygen(&args),
+        Command::Sign(args) => sign::sign(&args),
     }
 }
 

@@ -1,0 +1,145 @@
+//! An axis: its limits, and what it does when nobody tells it what to do.
+
+use core::fmt;
+
+/// What an axis does once the controller has latched.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SafeAction {
+    /// Drives the last value on: a position that is to be kept.
+    Hold,
+    /// Shorts the motor's windings.
+    Brake,
+    /// Lets the motor turn.
+    Coast,
+    /// Drives the last value down to zero.
+    Ramp {
+        /// Change in a tick, above 0.
+        step: f32,
+    },
+}
+
+/// What an axis is told in a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Output {
+    /// A value in the unit of the actions, within the limits.
+    Drive(f32),
+    /// Windings shorted.
+    Brake,
+    /// All switches open.
+    Coast,
+}
+
+/// Limits and safe action of an axis, in the unit of the actions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Axis {
+    low: f32,
+    high: f32,
+    rate: f32,
+    start: f32,
+    safe: SafeAction,
+}
+
+/// Why an axis cannot be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AxisError {
+    /// A limit is not finite, or the lower one exceeds the upper one.
+    Limits,
+    /// The largest change in a tick is not above 0.
+    Rate,
+    /// The value at the start is outside the limits.
+    Start,
+    /// A ramp's step is not above 0 and finite, or 0, where it ends, is outside the limits.
+    Ramp,
+}
+
+impl fmt::Display for AxisError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Limits => "an axis' limits are not finite or reversed",
+            Self::Rate => "an axis' largest change in a tick is not above 0",
+            Self::Start => "an axis' value at the start is outside its limits",
+            Self::Ramp => "an axis' ramp has no step above 0, or its limits exclude 0, where it ends",
+        })
+    }
+}
+
+impl core::error::Error for AxisError {}
+
+impl Axis {
+    /// An axis with finite limits `low` to `high`, that changes by at most `rate` in a tick (infinite: at once), and whose first
+    /// value after arming changes by at most that from `start`.
+    ///
+    /// # Errors
+    ///
+    /// Where these do not fit; see [`AxisError`].
+    pub fn new(low: f32, high: f32, rate: f32, start: f32, safe: SafeAction) -> Result<Self, AxisError> {
+        if !(low.is_finite() && high.is_finite() && low <= high) {
+            return Err(AxisError::Limits);
+        }
+        if !rate.gt(&0.0) {
+            return Err(AxisError::Rate);
+        }
+        if !(low..=high).contains(&start) {
+            return Err(AxisError::Start);
+        }
+        if let SafeAction::Ramp { step } = safe
+            && !(step > 0.0 && step.is_finite() && (low..=high).contains(&0.0))
+        {
+            return Err(AxisError::Ramp);
+        }
+        Ok(Self { low, high, rate, start, safe })
+    }
+
+    /// The lower limit.
+    pub const fn low(&self) -> f32 {
+        self.low
+    }
+
+    /// The upper limit.
+    pub const fn high(&self) -> f32 {
+        self.high
+    }
+
+    /// The largest change in a tick.
+    pub const fn rate(&self) -> f32 {
+        self.rate
+    }
+
+    /// The value that the first change after arming counts from.
+    pub const fn start(&self) -> f32 {
+        self.start
+    }
+
+    /// What it does once latched.
+    pub const fn safe(&self) -> SafeAction {
+        self.safe
+    }
+
+    /// A finite value, brought within the limits.
+    pub(crate) fn limit(&self, value: f32) -> f32 {
+        value.max(self.low).min(self.high)
+    }
+
+    /// One tick on from `last` towards `target`. What was not driven begins at the start value.
+    pub(crate) fn follow(&self, last: Output, target: f32) -> Output {
+        let last = if let Output::Drive(value) = last { value } else { self.start };
+        Output::Drive(self.limit(towards(last, target, self.rate)))
+    }
+
+    /// One tick of the safe action on from `last`. What was not driven has nothing to hold.
+    pub(crate) fn rest(&self, last: Output) -> Output {
+        match (self.safe, last) {
+            (SafeAction::Brake, _) => Output::Brake,
+            (SafeAction::Coast, _) => Output::Coast,
+            (SafeAction::Hold | SafeAction::Ramp { .. }, Output::Brake | Output::Coast) => last,
+            (SafeAction::Hold, Output::Drive(_)) => last,
+            (SafeAction::Ramp { step }, Output::Drive(value)) => Output::Drive(towards(value, 0.0, step)),
+        }
+    }
+}
+
+/// `from`, moved towards `to` by at most `step`.
+fn towards(from: f32, to: f32, step: f32) -> f32 {
+    let way = to - from;
+    if way.abs() <= step { to } else { from + step.copysign(way) }
+}

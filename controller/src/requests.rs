@@ -1,0 +1,62 @@
+//! What is done for the messages that are acknowledged.
+
+use actq_link::Message;
+use actq_link::code::{Parameter, Refusal, State};
+
+use crate::guard::Guard;
+use crate::parameters::whole;
+use crate::safety::{Safety, Shared};
+use crate::update::{Plan, Update};
+
+/// What the link's end does by itself.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// Ticks between two reports of the status; 0: none unasked.
+    pub status_period: u32,
+    /// Whether flash can be erased while the outputs move: not where code is fetched from the same bank.
+    pub erase_while_armed: bool,
+}
+
+/// Does what is acknowledged; `None` for what only a controller says.
+pub(crate) fn request<const OBS: usize, const AXES: usize>(
+    message: &Message<'_>,
+    guard: &mut Guard<'_, OBS>,
+    settings: &mut Settings,
+    safety: &mut impl Shared<AXES>,
+    update: &mut impl Update,
+) -> Option<Result<(), Refusal>> {
+    let outcome = match *message {
+        Message::Arm { .. } if update.is_busy() => Err(Refusal::Busy),
+        Message::Arm { token } => safety.with(|safety| safety.arm(token)),
+        Message::Disarm => {
+            safety.with(Safety::disarm);
+            Ok(())
+        }
+        Message::Set { token, parameter: Parameter::MaxAge, value, .. } => {
+            safety.with(|safety| safety.may_change(token)).and_then(|()| guard.set_max_age(whole(value, 0, u32::MAX)?))
+        }
+        Message::Set { token, parameter: Parameter::StatusPeriod, value, .. } => {
+            let period = safety.with(|safety| safety.may_change(token)).and_then(|()| whole(value, 0, u32::MAX));
+            period.map(|period| settings.status_period = period)
+        }
+        Message::Set { token, parameter, axis, value } => {
+            safety.with(|safety| safety.set(token, parameter, axis, value))
+        }
+        Message::Begin { token, length, crc, version } => {
+            let may = safety.with(|safety| match safety.may_change(token) {
+                Err(Refusal::Armed) if settings.erase_while_armed => Ok(()),
+                other => other,
+            });
+            may.and_then(|()| update.begin(Plan { length, crc, version }))
+        }
+        Message::Chunk { offset, bytes } => update.chunk(offset, bytes),
+        Message::Commit { .. } if safety.with(|safety| safety.state()) == State::Armed => Err(Refusal::Armed),
+        Message::Commit { signature } => update.commit(signature),
+        Message::Abort => {
+            update.abort();
+            Ok(())
+        }
+        _ => return None,
+    };
+    Some(outcome)
+}

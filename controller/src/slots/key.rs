@@ -1,0 +1,60 @@
+//! Images of one key.
+
+use core::fmt;
+
+use salty::{PublicKey, Sha512, Signature};
+
+use super::authority::Authority;
+
+/// Images run that the owner of a key has signed: Ed25519ph (RFC 8032) with [`context`].
+pub struct Key(PublicKey);
+
+/// The bytes are no point of the curve.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BadKey;
+
+impl fmt::Display for BadKey {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("not an Ed25519 public key; `actq keygen` makes one")
+    }
+}
+
+impl core::error::Error for BadKey {}
+
+impl Key {
+    /// The key of these bytes, as `actq keygen` prints them.
+    ///
+    /// # Errors
+    ///
+    /// Where they are none.
+    pub fn new(bytes: &[u8; 32]) -> Result<Self, BadKey> {
+        PublicKey::try_from(bytes).map(Self).map_err(|_| BadKey)
+    }
+}
+
+/// What is signed besides the image: that it is one, and its version.
+pub fn context(version: u32) -> [u8; 14] {
+    let mut context = *b"actq image    ";
+    if let Some(place) = context.last_chunk_mut() {
+        *place = version.to_le_bytes();
+    }
+    context
+}
+
+impl Authority for Key {
+    type Hash = Sha512;
+
+    fn hash(&self) -> Self::Hash {
+        Sha512::new()
+    }
+
+    fn add(hash: &mut Self::Hash, bytes: &[u8]) {
+        hash.update(bytes);
+    }
+
+    fn accepts(&self, hash: Self::Hash, version: u32, signature: Option<&[u8; 64]>) -> bool {
+        let Some(signature) = signature else { return false };
+        let (digest, context) = (hash.finalize(), context(version));
+        self.0.verify_prehashed(&digest, &Signature::from(signature), Some(&context)).is_ok()
+    }
+}

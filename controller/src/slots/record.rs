@@ -1,0 +1,53 @@
+//! What a slot's first bytes say about its image.
+//!
+//! Little-endian words: magic, format, length, CRC-32 of the image, version, generation, whether a signature follows, the signature
+//! (64 bytes), zeros, and the CRC-32 (ISO-HDLC) of all before it.
+
+use actq_link::frame::CRC;
+
+use crate::update::Plan;
+
+/// Bytes of a record; a multiple of every unit in which flash is written.
+pub(super) const BYTES: usize = 128;
+
+const MAGIC: u32 = u32::from_le_bytes(*b"ACTS");
+const FORMAT: u32 = 1;
+
+/// An image that was whole.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Record {
+    pub(super) plan: Plan,
+    /// One more than that of any slot before.
+    pub(super) generation: u32,
+    pub(super) signature: Option<[u8; 64]>,
+}
+
+impl Record {
+    pub(super) fn to_bytes(self) -> [u8; BYTES] {
+        let Plan { length, crc, version } = self.plan;
+        let words = [MAGIC, FORMAT, length, crc, version, self.generation, self.signature.is_some().into()];
+        let words = words.iter().flat_map(|word| word.to_le_bytes());
+        let content = words.chain(self.signature.unwrap_or([0; 64]));
+        let mut bytes = [0; BYTES];
+        bytes.iter_mut().zip(content).for_each(|(place, byte)| *place = byte);
+        if let Some((content, checksum)) = bytes.split_last_chunk_mut() {
+            *checksum = CRC.checksum(content).to_le_bytes();
+        }
+        bytes
+    }
+
+    /// The record; `None` where the bytes are none.
+    pub(super) fn from_bytes(bytes: &[u8; BYTES]) -> Option<Self> {
+        let (content, checksum) = bytes.split_last_chunk()?;
+        if CRC.checksum(content) != u32::from_le_bytes(*checksum) {
+            return None;
+        }
+        let (words, rest) = content.split_first_chunk::<28>()?;
+        let (words, _) = words.as_chunks();
+        let [magic, format, length, crc, version, generation, signed] =
+            <[[u8; 4]; 7]>::try_from(words).ok()?.map(u32::from_le_bytes);
+        let signature = (signed != 0).then_some(*rest.first_chunk()?);
+        let plan = Plan { length, crc, version };
+        ((magic, format) == (MAGIC, FORMAT)).then_some(Self { plan, generation, signature })
+    }
+}

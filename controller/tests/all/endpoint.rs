@@ -1,0 +1,288 @@
+//! Messages in, messages and outputs out.
+
+use actq_controller::breadcrumb::Record;
+use actq_controller::endpoint::{Facts, QUIET};
+use actq_controller::update::NoUpdate;
+use actq_controller::{Axis, Check, Endpoint, Guard, Output, SafeAction, Safety, Settings};
+use actq_link::code::{Fault, Parameter, Refusal, Report, ResetCause, State};
+use actq_link::report::{BUILT_IN, Status, Timing};
+use actq_link::{Floats, Message, Receiver, Sender, frame};
+use proptest::prelude::*;
+
+const FRAME: usize = frame::bytes(128);
+const OBSERVATION: [f32; 3] = [0.5, -0.5, 0.0];
+const DEADLINE: u32 = 10;
+
+/// A controller and a host without a line between them.
+struct Bench {
+    safety: Safety<2>,
+    endpoint: Endpoint<'static, 8, FRAME>,
+    host: Sender,
+    answers: Receiver<FRAME>,
+    micros: u32,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let axis = Axis::new(-1.0, 1.0, 0.1, 0.0, SafeAction::Hold).expect("the axis fits");
+        let mut safety = Safety::new([axis; 2], DEADLINE, 77);
+        Check::ALL.into_iter().for_each(|check| safety.check(check, true));
+        let breadcrumb = Record::report(ResetCause::Watchdog, None);
+        let facts = Facts { image: 0xabcd, slot: BUILT_IN, timing: Timing::default(), breadcrumb };
+        let guard = Guard::new(3, &[], 50_000).expect("there is room");
+        let endpoint = Endpoint::new(guard, facts, Settings { status_period: 0, erase_while_armed: false });
+        Self { safety, endpoint, host: Sender::new(9), answers: Receiver::new(), micros: 0 }
+    }
+
+    fn bytes(&mut self, bytes: &[u8]) -> Vec<u8> {
+        let mut out = [0; 256];
+        let mut answers = Vec::new();
+        for byte in bytes {
+            let sent = self.endpoint.receive(*byte, self.micros, &mut self.safety, &mut NoUpdate, &mut out);
+            answers.extend(sent.unwrap_or_default());
+        }
+        answers
+    }
+
+    fn parse<T>(&mut self, bytes: &[u8], then: impl FnOnce(Message<'_>) -> T) -> Option<T> {
+        let last = bytes.len().checked_sub(1)?;
+        bytes[..last].iter().for_each(|byte| assert_eq!(self.answers.push(*byte), None));
+        self.answers.push(bytes[last]).map(|received| then(received.message))
+    }
+
+    fn send<T>(&mut self, message: &Message<'_>, then: impl FnOnce(Message<'_>) -> T) -> Option<T> {
+        let mut buffer = [0; 256];
+        let wire = self.host.frame(message, self.micros, &mut buffer).expect("there is room").to_vec();
+        let answer = self.bytes(&wire);
+        self.parse(&answer, then)
+    }
+
+    /// The outcome of a request.
+    fn ask(&mut self, message: &Message<'_>) -> Result<(), Refusal> {
+        let number = self.host.next();
+        let acknowledged = self.send(message, |answer| match answer {
+            Message::Ack { of, refusal, .. } => (of, refusal),
+            other => panic!("{other:?}"),
+        });
+        let (of, refusal) = acknowledged.expect("it is answered");
+        assert_eq!(of, number);
+        refusal.map_or(Ok(()), Err)
+    }
+
+    fn status(&mut self) -> Status {
+        let status = self.send(&Message::Ask(Report::Status), |answer| match answer {
+            Message::Status(status) => status,
+            other => panic!("{other:?}"),
+        });
+        status.expect("it is answered")
+    }
+
+    fn observe(&mut self) {
+        assert_eq!(self.send(&Message::Observation(Floats::Values(&OBSERVATION)), |_| ()), None);
+    }
+
+    fn arm(&mut self) {
+        self.observe();
+        let token = self.status().token;
+        assert_eq!(self.ask(&Message::Arm { token }), Ok(()));
+    }
+
+    fn act(&mut self, of: u32, action: &[f32]) -> Option<(u32, bool, Vec<f32>)> {
+        let mut out = [0; 256];
+        let action = Ok::<_, ()>(action);
+        let sent = self.endpoint.acted(of, action, self.micros, &mut self.safety, &mut out)?.to_vec();
+        self.parse(&sent, |answer| match answer {
+            Message::Action { of, applied, values } => Some((of, applied, values.iter().collect())),
+            _ => None,
+        })?
+    }
+}
+
+#[test]
+fn an_observation_becomes_an_action_and_an_output() {
+    let mut bench = Bench::new();
+    bench.arm();
+    let step = bench.endpoint.step(&mut bench.safety).expect("the observation from before arming");
+    assert!(step.reset);
+    let of = bench.host.next();
+    bench.observe();
+    let step = bench.endpoint.step(&mut bench.safety).expect("there is an observation");
+    assert_eq!((step.of, step.reset, step.observation), (of, false, &OBSERVATION[..]));
+    assert_eq!(bench.endpoint.step(&mut bench.safety), None, "it is given once");
+    assert_eq!(bench.act(of, &[0.25, -7.0]), Some((of, true, vec![0.25, -1.0])));
+    assert_eq!(bench.safety.tick(), [Output::Drive(0.1), Output::Drive(-0.1)]);
+}
+
+#[test]
+fn an_action_of_a_step_from_before_arming_is_told_and_not_applied() {
+    let mut bench = Bench::new();
+    bench.observe();
+    let of = bench.endpoint.step(&mut bench.safety).expect("there is an observation").of;
+    assert_eq!(bench.act(of, &[0.25, 0.5]), Some((of, false, vec![0.25, 0.5])), "disarmed");
+    bench.observe();
+    let of = bench.endpoint.step(&mut bench.safety).expect("there is an observation").of;
+    bench.arm();
+    assert_eq!(bench.act(of, &[0.25, 0.5]), Some((of, false, vec![0.25, 0.5])));
+    assert_eq!(bench.safety.tick(), [Output::Coast; 2]);
+}
+
+#[test]
+fn an_action_that_is_not_finite_and_a_head_that_fails_latch_and_are_told() {
+    let mut bench = Bench::new();
+    bench.arm();
+    bench.endpoint.step(&mut bench.safety);
+    assert_eq!(bench.act(1, &[f32::NAN, 0.0]), None, "a status is sent instead");
+    assert_eq!((bench.status().state, bench.status().fault), (State::Latched, Some(Fault::ActionNotFinite)));
+    bench.arm();
+    let mut out = [0; 256];
+    let sent = bench.endpoint.acted(1, Err(()), 0, &mut bench.safety, &mut out).expect("a status").to_vec();
+    let fault = bench.parse(&sent, |answer| if let Message::Status(status) = answer { status.fault } else { None });
+    assert_eq!(fault, Some(Some(Fault::Head)));
+}
+
+#[test]
+fn parameters_become_stricter_while_disarmed_and_nothing_else() {
+    let mut bench = Bench::new();
+    let get = |bench: &mut Bench, parameter, axis| {
+        bench.send(&Message::Get { parameter, axis }, |answer| match answer {
+            Message::Value { value, .. } => Ok(value),
+            Message::Ack { refusal, .. } => Err(refusal),
+            other => panic!("{other:?}"),
+        })
+    };
+    let built = [(Parameter::Deadline, 10.0), (Parameter::MaxAge, 50_000.0), (Parameter::StatusPeriod, 0.0)];
+    let axis = [(Parameter::Low, -1.0), (Parameter::High, 1.0), (Parameter::Rate, 0.1), (Parameter::Start, 0.0)];
+    for (parameter, value) in built.into_iter().chain(axis) {
+        assert_eq!(get(&mut bench, parameter, 1), Some(Ok(value)), "{parameter}");
+    }
+    assert_eq!(get(&mut bench, Parameter::Low, 2), Some(Err(Some(Refusal::Parameter))));
+    let token = bench.status().token;
+    let set = |parameter, axis, value| Message::Set { token, parameter, axis, value };
+    let cases = [
+        (set(Parameter::Deadline, 0, 9.0), Ok(())),
+        (set(Parameter::Deadline, 0, 0.0), Err(Refusal::Range)),
+        (set(Parameter::Deadline, 0, 11.0), Err(Refusal::Range)),
+        (set(Parameter::Deadline, 0, 5.5), Err(Refusal::Range)),
+        (set(Parameter::Deadline, 0, f32::NAN), Err(Refusal::Range)),
+        (set(Parameter::MaxAge, 0, 20_000.0), Ok(())),
+        (set(Parameter::MaxAge, 0, 50_001.0), Err(Refusal::Range)),
+        (set(Parameter::StatusPeriod, 0, 100.0), Ok(())),
+        (set(Parameter::StatusPeriod, 0, -1.0), Err(Refusal::Range)),
+        (set(Parameter::Low, 1, -0.5), Ok(())),
+        (set(Parameter::Low, 1, -1.5), Err(Refusal::Range)),
+        (set(Parameter::Low, 1, f32::NEG_INFINITY), Err(Refusal::Range)),
+        (set(Parameter::High, 1, 0.5), Ok(())),
+        (set(Parameter::High, 1, 1.5), Err(Refusal::Range)),
+        (set(Parameter::High, 1, -0.75), Err(Refusal::Range)),
+        (set(Parameter::Rate, 1, 0.05), Ok(())),
+        (set(Parameter::Rate, 1, 0.2), Err(Refusal::Range)),
+        (set(Parameter::Rate, 1, 0.0), Err(Refusal::Range)),
+        (set(Parameter::Start, 1, 0.25), Ok(())),
+        (set(Parameter::Start, 1, 0.75), Err(Refusal::Range)),
+        (set(Parameter::Low, 2, 0.0), Err(Refusal::Parameter)),
+        (set(Parameter::Low, 255, 0.0), Err(Refusal::Parameter)),
+    ];
+    for (message, outcome) in cases {
+        assert_eq!(bench.ask(&message), outcome, "{message:?}");
+    }
+    assert_eq!(get(&mut bench, Parameter::Low, 1), Some(Ok(-0.5)));
+    assert_eq!(get(&mut bench, Parameter::Deadline, 0), Some(Ok(9.0)));
+    bench.arm();
+    let changed = Message::Set { token: bench.status().token, parameter: Parameter::Low, axis: 0, value: -0.1 };
+    assert_eq!(bench.ask(&changed), Err(Refusal::Armed));
+    assert_eq!(bench.ask(&set(Parameter::Low, 0, -0.1)), Err(Refusal::Token), "an old one");
+}
+
+#[test]
+fn a_request_of_an_old_state_and_an_update_that_cannot_be_are_refused() {
+    let mut bench = Bench::new();
+    bench.observe();
+    let token = bench.status().token;
+    assert_eq!(bench.ask(&Message::Arm { token: token ^ 1 }), Err(Refusal::Token));
+    assert_eq!(bench.ask(&Message::Disarm), Ok(()));
+    assert_eq!(bench.ask(&Message::Arm { token }), Err(Refusal::Token), "it was disarmed since");
+    let token = bench.status().token;
+    let begin = Message::Begin { token, length: 4, crc: 0, version: 0 };
+    assert_eq!(bench.ask(&begin), Err(Refusal::Unsupported));
+    assert_eq!(bench.ask(&Message::Chunk { offset: 0, bytes: &[0; 4] }), Err(Refusal::Unsupported));
+    assert_eq!(bench.ask(&Message::Commit { signature: None }), Err(Refusal::Unsupported));
+    assert_eq!(bench.ask(&Message::Abort), Ok(()));
+    bench.arm();
+    let begin = Message::Begin { token: bench.status().token, length: 4, crc: 0, version: 0 };
+    assert_eq!(bench.ask(&begin), Err(Refusal::Armed));
+    assert_eq!(bench.ask(&Message::Commit { signature: None }), Err(Refusal::Armed));
+}
+
+#[test]
+fn a_status_comes_every_period_and_a_new_host_is_heard_after_a_silence() {
+    let mut bench = Bench::new();
+    let token = bench.status().token;
+    let set = Message::Set { token, parameter: Parameter::StatusPeriod, axis: 0, value: 50.0 };
+    assert_eq!(bench.ask(&set), Ok(()));
+    let mut out = [0; 256];
+    let mut reports = 0;
+    for _ in 0..500 {
+        bench.safety.tick();
+        reports += u32::from(bench.endpoint.report(0, &mut bench.safety, &mut out).is_some());
+    }
+    assert_eq!(reports, 10);
+    // Another host, that counts from below.
+    bench.host = Sender::new(3);
+    bench.observe();
+    assert!(bench.safety.is_stale(), "not heard: its number is old");
+    for _ in 0..=QUIET {
+        bench.safety.tick();
+        bench.endpoint.report(0, &mut bench.safety, &mut out);
+    }
+    bench.observe();
+    assert!(!bench.safety.is_stale());
+}
+
+/// A frame of any kind and content, with a right checksum.
+fn frame_of(kind: u8, sequence: u32, payload: &[u8]) -> Vec<u8> {
+    let content = [&[frame::VERSION, kind][..], &sequence.to_le_bytes(), &[0; 4], payload].concat();
+    let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&content);
+    let content = [&content[..], &crc.to_le_bytes()].concat();
+    let mut wire = vec![0; cobs::max_encoding_length(content.len())];
+    let len = cobs::encode(&content, &mut wire);
+    wire.truncate(len);
+    wire.push(0);
+    wire
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(5000))]
+
+    /// Whatever comes, well-made or not, by whoever does not know the token: but for a disarm, and observations that are good, the
+    /// controller is as it was.
+    #[test]
+    fn frames_of_any_content_change_nothing_but_counters(
+        armed: bool, kind in prop_oneof![0..12u8, 126..136u8, any::<u8>()],
+        payload in prop::collection::vec(any::<u8>(), 0..80), skip in 1..1000u32,
+    ) {
+        prop_assume!(kind != 3);
+        let mut bench = Bench::new();
+        if armed { bench.arm(); }
+        let sequence = bench.host.next().wrapping_add(skip);
+        let before = format!("{:?}", bench.safety);
+        // The token of the bench is not in what is drawn, or the case proves nothing.
+        let token = bench.safety.token().to_le_bytes();
+        prop_assume!(payload.first_chunk() != Some(&token));
+        bench.bytes(&frame_of(kind, sequence, &payload));
+        let after = format!("{:?}", bench.safety);
+        let observation = kind == 1 && payload.len() == 12;
+        prop_assert!(before == after || observation, "{}\n{}", before, after);
+    }
+
+    /// Noise of any kind does not stop it either.
+    #[test]
+    fn noise_changes_nothing_but_counters(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
+        let mut bench = Bench::new();
+        bench.arm();
+        let before = format!("{:?}", bench.safety);
+        prop_assert_eq!(bench.bytes(&bytes), vec![]);
+        prop_assert_eq!(before, format!("{:?}", bench.safety));
+        bench.bytes(&[0]);
+        prop_assert_eq!(bench.status().state, State::Armed);
+    }
+}

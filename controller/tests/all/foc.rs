@@ -1,0 +1,4 @@
+//! Field-oriented control: against f64, against the laws of its parts, and with a motor.
+
+mod motor;
+mod parts;

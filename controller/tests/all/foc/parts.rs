@@ -1,0 +1,115 @@
+//! Each part against the same in f64, and against what it is to do.
+
+use std::f64::consts::{PI, TAU};
+
+use actq_controller::foc::{Angle, CurrentLoop, Gains, Measured, Pi, Rotor, Stator, duties};
+use proptest::prelude::*;
+
+const SQRT_3: f64 = 1.732_050_807_568_877_2;
+
+fn near(a: f32, b: f64, scale: f64) -> bool {
+    (f64::from(a) - b).abs() <= 4.0 * f64::from(f32::EPSILON) * scale
+}
+
+fn current() -> impl Strategy<Value = f32> {
+    -100.0..100.0f32
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(20_000))]
+
+    #[test]
+    fn transforms_are_those_of_f64(phases in [current(), current(), current()], radians in -100.0..100.0f32) {
+        let [a, b, c] = phases.map(f64::from);
+        let (alpha, beta) = ((2.0 * a - b - c) / 3.0, (b - c) / SQRT_3);
+        let stator = Stator::of_phases(phases);
+        prop_assert!(near(stator.alpha, alpha, 400.0) && near(stator.beta, beta, 400.0));
+        let (sin, cos) = f64::from(radians).sin_cos();
+        let rotor = stator.to_rotor(Angle::new(radians));
+        prop_assert!(near(rotor.d, alpha * cos + beta * sin, 800.0));
+        prop_assert!(near(rotor.q, beta * cos - alpha * sin, 800.0));
+        let back = rotor.to_stator(Angle::new(radians));
+        prop_assert!(near(back.alpha, alpha, 800.0) && near(back.beta, beta, 800.0));
+        let common = (a + b + c) / 3.0;
+        let there = back.phases();
+        for (there, was) in there.into_iter().zip([a, b, c]) {
+            prop_assert!(near(there, was - common, 1600.0));
+        }
+    }
+
+    /// Line to line, the bridges give what was asked for, while the voltage is within reach.
+    #[test]
+    fn duties_give_the_voltage(length in 0.0..0.577_35f32, radians in -4.0..4.0f32, supply in 1.0..800.0f32) {
+        let length = f64::from(length * supply);
+        let phase = |k: f64| (length * (f64::from(radians) - k * TAU / 3.0).cos()) as f32;
+        let phases = [phase(0.0), phase(1.0), phase(2.0)];
+        let [a, b, c] = duties(phases, supply);
+        for duty in [a, b, c] {
+            prop_assert!((0.0..=1.0).contains(&duty));
+        }
+        let scale = f64::from(supply) * 2.0;
+        prop_assert!(near((a - b) * supply, f64::from(phases[0]) - f64::from(phases[1]), scale));
+        prop_assert!(near((b - c) * supply, f64::from(phases[1]) - f64::from(phases[2]), scale));
+        // Both zero vectors are equally long.
+        prop_assert!((a.max(b).max(c) + a.min(b).min(c) - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn duties_stay_within_0_and_1_whatever_is_asked(phases: [f32; 3], supply in 1e-3..1e5f32) {
+        for duty in duties(phases, supply) {
+            prop_assert!((0.0..=1.0).contains(&duty));
+        }
+    }
+
+    #[test]
+    fn a_limited_controller_does_not_wind_up(errors in prop::collection::vec(-50.0..50.0f32, 1..200), limit in 0.1..20.0f32) {
+        let mut pi = Pi::new();
+        for error in &errors {
+            let output = pi.step(*error, 0.5, 0.1, limit);
+            prop_assert!(output.abs() <= limit);
+        }
+        // However long it was at its limit: an error of the other sign that asks for more than the limit turns it around at once.
+        let largest = 2.0 * limit / 0.5 + 1.0;
+        prop_assert!(pi.step(-largest, 0.5, 0.1, limit) < 0.0);
+    }
+
+    #[test]
+    fn an_unlimited_controller_is_that_of_f64(errors in prop::collection::vec(-1.0..1.0f32, 1..100)) {
+        let (mut pi, mut integral) = (Pi::new(), 0.0);
+        for error in errors {
+            let output = pi.step(error, 0.5, 0.1, 1e6);
+            integral += 0.1 * f64::from(error);
+            prop_assert!(near(output, 0.5 * f64::from(error) + integral, 1000.0));
+        }
+    }
+
+    /// Whatever is measured, the bridges get duty cycles or nothing, and the voltage is one that the supply has.
+    #[test]
+    fn a_tick_gives_duties_or_nothing(values: [f32; 7], tame in [current(), current(), current()], supply in 1.0..100.0f32) {
+        let mut wild = CurrentLoop::new(Gains { proportional: 0.3, integral: 0.05 });
+        let mut calm = wild;
+        let [a, b, c, angle, volts, d, q] = values;
+        let (measured, target) = (Measured { phases: [a, b, c], angle, supply: volts }, Rotor { d, q });
+        if let Some(tick) = wild.step(&measured, target) {
+            prop_assert!(tick.duties.iter().all(|duty| (0.0..=1.0).contains(duty)), "{tick:?}");
+        } else {
+            prop_assert!(wild == calm, "nothing has changed");
+        }
+        let measured = Measured { phases: tame, angle: 0.0, supply };
+        for _ in 0..50 {
+            let tick = calm.step(&measured, Rotor { d: 30.0, q: -60.0 }).expect("all is finite");
+            let length = f64::from(tick.voltage.d).hypot(f64::from(tick.voltage.q));
+            prop_assert!(length <= f64::from(supply) / SQRT_3);
+        }
+    }
+}
+
+#[test]
+fn sine_and_cosine_are_right_to_an_ulp_around_the_circle() {
+    for step in 0..200_000 {
+        let radians = (step as f32 / 100_000.0 - 1.0) * PI as f32;
+        let turned = Rotor { d: 1.0, q: 0.0 }.to_stator(Angle::new(radians));
+        let (sin, cos) = f64::from(radians).sin_cos();
+        assert!((f64::from(turned.alpha) - cos).abs() < 1.2e-7 && (f64::from(turned.beta) - sin).abs() < 1.2e-7);
+    }
+}

@@ -1,0 +1,10 @@
+//! The controller's decisions, one by one and together.
+
+mod endpoint;
+mod foc;
+mod guard;
+mod memory;
+mod random;
+mod safety;
+mod slots;
+mod transitions;

@@ -1,0 +1,87 @@
+//! What is told from garbage: breadcrumbs, the scrubbed image; what feeds the watchdog; RAM that has flash's rules.
+
+use actq_controller::breadcrumb::{Record, WORDS};
+use actq_controller::progress::Progress;
+use actq_controller::ram::{Ram, RamError};
+use actq_controller::scrub::Scrub;
+use actq_link::code::{Crash, ResetCause};
+use embedded_storage::nor_flash::{NorFlash as _, ReadNorFlash as _};
+
+use super::random::Random;
+
+const RECORD: Record = Record { crash: Crash::HardFault, pc: 0x0800_1234, detail: 0x0001_0000, ticks: 77, count: 2 };
+
+#[test]
+fn a_breadcrumb_is_found_and_nothing_else_is() {
+    let words = RECORD.to_words();
+    assert_eq!(Record::from_words(&words), Some(RECORD));
+    for bit in 0..32 * WORDS {
+        let mut damaged = words;
+        damaged[bit / 32] ^= 1 << (bit % 32);
+        assert_eq!(Record::from_words(&damaged), None, "bit {bit}");
+    }
+    for fill in [0, u32::MAX, 0xdead_beef, 0xcccc_cccc] {
+        assert_eq!(Record::from_words(&[fill; WORDS]), None);
+    }
+    let mut random = Random::new(3);
+    for _ in 0..1_000_000 {
+        let mut words = [0; WORDS];
+        words.iter_mut().for_each(|word| *word = random.bits() as u32);
+        // As a crash would have it, so that only the checksum is left to tell.
+        words[0] %= 5;
+        assert_eq!(Record::from_words(&words), None);
+    }
+}
+
+#[test]
+fn a_breadcrumb_is_reported_with_the_cause_of_the_reset() {
+    let report = Record::report(ResetCause::Watchdog, Some(RECORD));
+    assert_eq!((report.reset, report.crash, report.pc), (ResetCause::Watchdog, Some(Crash::HardFault), RECORD.pc));
+    assert_eq!((report.detail, report.ticks, report.count), (RECORD.detail, RECORD.ticks, RECORD.count));
+    let none = Record::report(ResetCause::Power, None);
+    assert_eq!((none.crash, none.pc, none.count), (None, 0, 0));
+}
+
+#[test]
+fn the_watchdog_is_fed_only_where_all_three_have_made_progress() {
+    for made in 0..8u32 {
+        let mut progress = Progress { link: made & 1 != 0, head: made & 2 != 0, output: made & 4 != 0 };
+        assert_eq!(progress.missing(), 7 - made);
+        let before = progress;
+        assert_eq!(progress.feed(), made == 7);
+        // What was made before counts on until the others have made theirs.
+        assert_eq!(progress, if made == 7 { Progress::default() } else { before });
+    }
+}
+
+#[test]
+fn every_flipped_bit_of_an_image_is_noticed_by_the_next_whole_round() {
+    let image: Vec<u8> = (0..300u32).map(|i| (i * i) as u8).collect();
+    for piece in [1, 7, 64, 299, 300, 1000] {
+        let mut scrub = Scrub::new(&image);
+        let mut round = |image: &[u8]| (0..=image.len()).find_map(|_| scrub.advance(image, piece)).expect("it ends");
+        assert!(round(&image) && round(&image));
+        for bit in (0..8 * image.len()).step_by(if piece == 64 { 1 } else { 37 }) {
+            let mut decayed = image.clone();
+            decayed[bit / 8] ^= 1 << (bit % 8);
+            assert!(!round(&decayed), "bit {bit}");
+            assert!(round(&image));
+        }
+    }
+}
+
+#[test]
+fn ram_has_the_rules_of_flash() {
+    let mut memory = [7; 64];
+    let mut ram = Ram::<4, 16>(&mut memory);
+    assert_eq!(ram.write(0, &[1; 4]), Err(RamError::Programmed), "not erased");
+    assert_eq!(ram.erase(0, 32), Ok(()));
+    assert_eq!(ram.write(4, &[1; 8]), Ok(()));
+    assert_eq!(ram.write(8, &[1; 4]), Err(RamError::Programmed));
+    assert_eq!([ram.erase(4, 16), ram.erase(0, 8), ram.write(2, &[0; 4])], [Err(RamError::Alignment); 3]);
+    assert_eq!([ram.erase(32, 16), ram.erase(48, 80), ram.write(64, &[0; 4])], [Err(RamError::Bounds); 3]);
+    let mut bytes = [0; 16];
+    assert_eq!(ram.read(3, &mut bytes), Ok(()));
+    assert_eq!(bytes, [255, 1, 1, 1, 1, 1, 1, 1, 1, 255, 255, 255, 255, 255, 255, 255]);
+    assert_eq!(ram.read(50, &mut bytes), Err(RamError::Bounds));
+}

@@ -1,0 +1,90 @@
+//! A device with two slots: what its firmware does at the start, and for an update.
+
+use actq_controller::slots::{Authority, Candidate, Layout, Slots, Updater, Work};
+use actq_controller::update::{Plan, Update};
+use actq_link::code::Refusal;
+use embedded_storage::nor_flash::NorFlash;
+
+/// Bytes that stand for an image. The first one says whether its self-test passes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Image {
+    pub(super) bytes: Vec<u8>,
+    pub(super) version: u32,
+}
+
+impl Image {
+    pub(super) fn new(words: usize, version: u32, passes: bool) -> Self {
+        let mut bytes: Vec<u8> = (0..4 * words).map(|i| (i as u32 * 31 + version * 7) as u8).collect();
+        bytes[0] = passes.into();
+        bytes[1..4].copy_from_slice(b"img");
+        Self { bytes, version }
+    }
+
+    pub(super) fn plan(&self) -> Plan {
+        let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&self.bytes);
+        Plan { length: self.bytes.len() as u32, crc, version: self.version }
+    }
+}
+
+fn read<F: NorFlash, A: Authority>(slots: &mut Slots<F, A>, image: &Candidate) -> Vec<u8> {
+    let mut bytes = vec![0; image.length as usize];
+    slots.flash().read(image.address, &mut bytes).expect("the image is within the flash");
+    bytes
+}
+
+fn self_test(image: &[u8]) -> Result<(), Refusal> {
+    if image.starts_with(b"\x01img") { Ok(()) } else { Err(Refusal::SelfTest) }
+}
+
+/// A device after its start.
+pub(super) struct Device<F, A: Authority> {
+    pub(super) updater: Updater<F, A>,
+    /// The image that runs, where there is one.
+    pub(super) runs: Option<Vec<u8>>,
+}
+
+impl<F: NorFlash, A: Authority> Device<F, A> {
+    /// Power comes on.
+    pub(super) fn start(flash: F, layout: &Layout, authority: A) -> Self {
+        let mut slots = Slots::new(flash, layout.clone(), authority);
+        while let Some(candidate) = slots.select() {
+            let image = read(&mut slots, &candidate);
+            if self_test(&image).is_ok() {
+                // Where power fails in here, the device is gone.
+                let _ = !candidate.trial || slots.confirm(candidate.slot);
+                return Self { updater: Updater::new(slots, Some(candidate.slot)), runs: Some(image) };
+            }
+            slots.reject(candidate.slot);
+        }
+        Self { updater: Updater::new(slots, None), runs: None }
+    }
+
+    /// Does the work that a request has begun, and repeats the request until it is done.
+    pub(super) fn wait(
+        &mut self,
+        mut request: impl FnMut(&mut Updater<F, A>) -> Result<(), Refusal>,
+    ) -> Result<(), Refusal> {
+        loop {
+            match request(&mut self.updater) {
+                Err(Refusal::Busy) => {}
+                outcome => return outcome,
+            }
+            while let work @ (Work::More | Work::Test(_)) = self.updater.work() {
+                let Work::Test(candidate) = work else { continue };
+                let image = read(self.updater.slots(), &candidate);
+                if self.updater.tested(self_test(&image)) {
+                    self.runs = Some(image);
+                }
+            }
+        }
+    }
+
+    /// A whole update, in chunks of `chunk` bytes.
+    pub(super) fn update(&mut self, image: &Image, chunk: usize, signature: Option<&[u8; 64]>) -> Result<(), Refusal> {
+        self.wait(|updater| updater.begin(image.plan()))?;
+        for (i, bytes) in image.bytes.chunks(chunk).enumerate() {
+            self.updater.chunk((i * chunk) as u32, bytes)?;
+        }
+        self.wait(|updater| updater.commit(signature))
+    }
+}

@@ -1,0 +1,125 @@
+//! NOR flash with its rules: erasing gives ones, programming takes ones away, a unit is programmed once after an erase. Power may
+//! fail in the middle of any of it.
+
+use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
+
+use crate::random::Random;
+
+/// Flash written in units of `UNIT` bytes and erased in sectors of `SECTOR`.
+#[derive(Clone)]
+pub(super) struct Nor<const UNIT: usize, const SECTOR: usize> {
+    pub(super) bytes: Vec<u8>,
+    /// Units that were programmed since they were erased.
+    programmed: Vec<bool>,
+    /// Units programmed and sectors erased, ever.
+    pub(super) done: usize,
+    /// In the course of which of these power fails.
+    pub(super) fails_at: Option<usize>,
+    pub(super) random: Random,
+}
+
+/// Power is gone, or the request breaks a rule.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct NoPower;
+
+impl NorFlashError for NoPower {
+    fn kind(&self) -> NorFlashErrorKind {
+        NorFlashErrorKind::Other
+    }
+}
+
+impl<const UNIT: usize, const SECTOR: usize> Nor<UNIT, SECTOR> {
+    /// As it comes from the factory, or from another use: full of anything.
+    pub(super) fn new(sectors: usize, seed: u64) -> Self {
+        let mut random = Random::new(seed);
+        let bytes = (0..sectors * SECTOR).map(|_| random.bits() as u8).collect();
+        Self { bytes, programmed: vec![true; sectors * SECTOR / UNIT], done: 0, fails_at: None, random }
+    }
+
+    /// Whether the next change is made whole, in part, or not at all.
+    fn next(&mut self) -> Outcome {
+        let outcome = match self.fails_at {
+            Some(at) if self.done == at => Outcome::Part,
+            Some(at) if self.done > at => return Outcome::Nothing,
+            _ => Outcome::Whole,
+        };
+        self.done += 1;
+        outcome
+    }
+}
+
+enum Outcome {
+    Whole,
+    Part,
+    Nothing,
+}
+
+impl<const UNIT: usize, const SECTOR: usize> ErrorType for Nor<UNIT, SECTOR> {
+    type Error = NoPower;
+}
+
+impl<const UNIT: usize, const SECTOR: usize> ReadNorFlash for Nor<UNIT, SECTOR> {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), NoPower> {
+        let offset = offset as usize;
+        bytes.copy_from_slice(&self.bytes[offset..offset + bytes.len()]);
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        self.bytes.len()
+    }
+}
+
+impl<const UNIT: usize, const SECTOR: usize> NorFlash for Nor<UNIT, SECTOR> {
+    const WRITE_SIZE: usize = UNIT;
+    const ERASE_SIZE: usize = SECTOR;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), NoPower> {
+        let (from, to) = (from as usize, to as usize);
+        assert!(from.is_multiple_of(SECTOR) && to.is_multiple_of(SECTOR) && from < to && to <= self.bytes.len());
+        for start in (from..to).step_by(SECTOR) {
+            match self.next() {
+                Outcome::Whole => {
+                    self.bytes[start..start + SECTOR].fill(0xff);
+                    self.programmed[start / UNIT..(start + SECTOR) / UNIT].fill(false);
+                }
+                Outcome::Part => {
+                    // Some bits are ones already. How many depends on the moment: few, about half, or almost all.
+                    let moment = self.random.below(3);
+                    for at in start..start + SECTOR {
+                        let (a, b) = (self.random.bits() as u8, self.random.bits() as u8);
+                        self.bytes[at] |= [a & b & (self.random.bits() as u8), a, a | b][moment];
+                    }
+                    self.programmed[start / UNIT..(start + SECTOR) / UNIT].fill(true);
+                    return Err(NoPower);
+                }
+                Outcome::Nothing => return Err(NoPower),
+            }
+        }
+        Ok(())
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), NoPower> {
+        let offset = offset as usize;
+        assert!(offset.is_multiple_of(UNIT) && bytes.len().is_multiple_of(UNIT), "not whole units");
+        for (i, unit) in bytes.chunks(UNIT).enumerate() {
+            let start = offset + i * UNIT;
+            let outcome = self.next();
+            if let Outcome::Nothing = outcome {
+                return Err(NoPower);
+            }
+            assert!(!self.programmed[start / UNIT], "the unit at {start} is programmed twice");
+            self.programmed[start / UNIT] = true;
+            for (at, byte) in unit.iter().enumerate() {
+                let kept = if let Outcome::Part = outcome { self.random.bits() as u8 } else { 0 };
+                self.bytes[start + at] &= byte | kept;
+            }
+            if let Outcome::Part = outcome {
+                return Err(NoPower);
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,133 @@
+//! Power fails in the middle of every single change that a sequence of updates makes to the flash, and again while the device
+//! starts after that.
+
+use actq_controller::slots::{Anyone, Layout};
+use actq_link::code::Refusal;
+
+use super::device::{Device, Image};
+use super::nor::Nor;
+
+/// Images one after the other; the third and the fifth fail their test.
+fn images() -> Vec<Image> {
+    let passes = [true, true, false, true, false, true];
+    passes.iter().enumerate().map(|(i, passes)| Image::new(80 + 7 * i, 1 + i as u32, *passes)).collect()
+}
+
+/// What the host knows, and what may be there.
+struct Known {
+    /// The image that was last acknowledged.
+    acknowledged: Option<Image>,
+    /// The one that was in flight, and may run as well.
+    in_flight: Option<Image>,
+}
+
+impl Known {
+    fn check(&self, runs: Option<&Vec<u8>>, what: &str) {
+        let is = |image: &Option<Image>| image.as_ref().map(|image| &image.bytes) == runs;
+        assert!(is(&self.acknowledged) || (runs.is_some() && is(&self.in_flight)), "{what}");
+    }
+}
+
+/// Updates to every image in turn until power fails.
+fn updates<const U: usize, const S: usize>(
+    flash: &mut Nor<U, S>,
+    layout: &Layout,
+    images: &[Image],
+    known: &mut Known,
+) {
+    let fails_at = flash.fails_at;
+    let mut device = Device::start(&mut *flash, layout, Anyone);
+    for image in images {
+        known.in_flight = (image.bytes[0] == 1).then(|| image.clone());
+        let outcome = device.update(image, 60, None);
+        let died = device.updater.slots().flash().done > fails_at.unwrap_or(usize::MAX);
+        match outcome {
+            Ok(()) => known.acknowledged = known.in_flight.take(),
+            Err(Refusal::SelfTest) if image.bytes[0] == 0 => known.in_flight = None,
+            Err(refusal) => assert!(died, "{refusal}"),
+        }
+        if died {
+            return;
+        }
+        known.check(device.runs.as_ref(), "while running");
+    }
+}
+
+fn check_all_cuts<const U: usize, const S: usize>() {
+    let images = images();
+    // Each slot has two sectors, with others before, between and behind them.
+    let s = S as u32;
+    let fresh = |seed| Nor::<U, S>::new(7, seed);
+    let layout = Layout::new(&fresh(0), s..3 * s, 4 * s..6 * s).expect("the slots fit");
+    let mut whole = fresh(0);
+    updates(&mut whole, &layout, &images, &mut Known { acknowledged: None, in_flight: None });
+    let changes = whole.done;
+    assert!(changes > images.len() * (4 * 80 / U + 2 + 128 / U + 2), "{changes}");
+    for fails_at in 0..changes {
+        for seed in 0..3 {
+            let mut flash = fresh(seed);
+            let outside = |flash: &Nor<U, S>| [0..S, 3 * S..4 * S, 6 * S..7 * S].map(|part| flash.bytes[part].to_vec());
+            let others = outside(&flash);
+            flash.fails_at = Some(fails_at);
+            let mut known = Known { acknowledged: None, in_flight: None };
+            updates(&mut flash, &layout, &images, &mut known);
+            let what = format!("power fails at change {fails_at}, {seed}");
+            // Power fails in each change of the start that follows, too, of which there are few.
+            for again in 0.. {
+                let mut once_more = flash.clone();
+                (once_more.done, once_more.fails_at) = (0, Some(again));
+                drop(Device::start(&mut once_more, &layout, Anyone));
+                let ended = once_more.done <= again;
+                once_more.fails_at = None;
+                let device = Device::start(&mut once_more, &layout, Anyone);
+                known.check(device.runs.as_ref(), &format!("{what}, then at {again} of the start"));
+                if ended {
+                    break;
+                }
+            }
+            // The host goes on with the last image, as it was not acknowledged.
+            flash.fails_at = None;
+            let mut device = Device::start(&mut flash, &layout, Anyone);
+            known.check(device.runs.as_ref(), &what);
+            let last = images.last().expect("there are images");
+            assert_eq!(device.update(last, 52, None), Ok(()), "{what}");
+            assert_eq!(device.runs.as_ref(), Some(&last.bytes), "{what}");
+            drop(device);
+            assert_eq!(outside(&flash), others, "{what}: only the slots are written");
+        }
+    }
+}
+
+#[test]
+fn a_valid_image_runs_after_power_failed_at_any_change_and_no_acknowledged_update_is_lost() {
+    // STM32F405: words. QSPI flash: bytes. STM32H5 and U5: 16 bytes.
+    check_all_cuts::<4, 512>();
+    check_all_cuts::<1, 512>();
+    check_all_cuts::<16, 1024>();
+}
+
+/// Power fails at every start, in the middle of the trial of a new image, as often as it likes: the image is given up after three
+/// trials, and the old one runs.
+#[test]
+fn an_image_whose_trial_never_ends_is_given_up_and_the_old_one_runs() {
+    let mut flash = Nor::<4, 1024>::new(2, 1);
+    let layout = Layout::new(&flash, 0..1024, 1024..2048).expect("the slots fit");
+    let (old, new) = (Image::new(50, 1, true), Image::new(60, 2, true));
+    assert_eq!(Device::start(&mut flash, &layout, Anyone).update(&old, 64, None), Ok(()));
+    // Up to the change behind which only the confirmation is missing.
+    let mut trial = flash.clone();
+    assert_eq!(Device::start(&mut trial, &layout, Anyone).update(&new, 64, None), Ok(()));
+    (flash.fails_at, trial) = (Some(trial.done - 1), flash.clone());
+    drop(trial);
+    assert_eq!(Device::start(&mut flash, &layout, Anyone).update(&new, 64, None), Err(Refusal::Flash));
+    let mut slots = 0;
+    for start in 0..4 {
+        flash.fails_at = None;
+        let mut chosen = actq_controller::slots::Slots::new(&mut flash, layout.clone(), Anyone);
+        let candidate = chosen.select().expect("one of them runs");
+        slots += u32::from(candidate.trial);
+        // The first trial was that of the update itself.
+        assert_eq!((candidate.version, candidate.trial), if start < 2 { (2, true) } else { (1, false) }, "{start}");
+    }
+    assert_eq!(slots, 2);
+}

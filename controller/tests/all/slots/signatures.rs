@@ -1,0 +1,51 @@
+//! Images of one key: signed by another implementation than the one that checks.
+
+use actq_controller::slots::{Key, Layout, context};
+use actq_link::code::Refusal;
+use ed25519_dalek::{Digest as _, Sha512, SigningKey};
+
+use super::device::{Device, Image};
+use super::nor::Nor;
+
+type Flash = Nor<4, 1024>;
+
+fn sign(key: &SigningKey, image: &Image, version: u32) -> [u8; 64] {
+    let digest = Sha512::new().chain_update(&image.bytes);
+    key.sign_prehashed(digest, Some(&context(version))).expect("the context is short").to_bytes()
+}
+
+fn authority(key: &SigningKey) -> Key {
+    Key::new(key.verifying_key().as_bytes()).expect("it is a point of the curve")
+}
+
+#[test]
+fn only_what_the_key_has_signed_runs() {
+    let (key, stranger) = (SigningKey::from_bytes(&[7; 32]), SigningKey::from_bytes(&[8; 32]));
+    let mut flash = Flash::new(4, 9);
+    let layout = Layout::new(&flash, 0..2048, 2048..4096).expect("the slots fit");
+    let image = Image::new(130, 3, true);
+    let good = sign(&key, &image, 3);
+    let mut device = Device::start(&mut flash, &layout, authority(&key));
+    assert_eq!(device.update(&image, 64, None), Err(Refusal::Signature));
+    assert_eq!(device.update(&image, 64, Some(&sign(&stranger, &image, 3))), Err(Refusal::Signature));
+    assert_eq!(device.update(&image, 64, Some(&sign(&key, &image, 4))), Err(Refusal::Signature), "another version");
+    let other = Image::new(131, 3, true);
+    assert_eq!(device.update(&other, 64, Some(&good)), Err(Refusal::Signature), "another image");
+    for bit in 0..512 {
+        let mut damaged = good;
+        damaged[bit / 8] ^= 1 << (bit % 8);
+        if bit % 37 == 0 {
+            assert_eq!(device.update(&image, 400, Some(&damaged)), Err(Refusal::Signature), "bit {bit}");
+        }
+    }
+    assert_eq!(device.runs, None);
+    assert_eq!(device.update(&image, 64, Some(&good)), Ok(()));
+    drop(device);
+    assert_eq!(Device::start(&mut flash, &layout, authority(&key)).runs, Some(image.bytes), "checked at every start");
+    assert_eq!(Device::start(&mut flash, &layout, authority(&stranger)).runs, None, "a build with another key");
+}
+
+#[test]
+fn what_is_no_key_is_refused() {
+    assert!((0..=255).any(|byte| Key::new(&[byte; 32]).is_err()));
+}

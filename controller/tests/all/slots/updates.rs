@@ -1,0 +1,172 @@
+//! Updates over a line that loses and repeats requests, and those that are refused.
+
+use actq_controller::slots::{Anyone, Layout, LayoutError, Slot, Slots, TRIALS};
+use actq_controller::update::{Plan, Update};
+use actq_link::code::Refusal;
+use embedded_storage::nor_flash::NorFlash;
+
+use super::device::{Device, Image};
+use super::nor::Nor;
+use crate::random::Random;
+
+type Flash = Nor<4, 1024>;
+
+fn flash() -> (Flash, Layout) {
+    let flash = Flash::new(4, 5);
+    let layout = Layout::new(&flash, 0..2048, 2048..4096).expect("the slots fit");
+    (flash, layout)
+}
+
+#[test]
+fn chunks_of_any_length_lost_repeated_and_out_of_order_give_the_image() {
+    let mut random = Random::new(6);
+    for round in 0..200 {
+        let (mut flash, layout) = flash();
+        let mut device = Device::start(&mut flash, &layout, Anyone);
+        let image = Image::new(1 + random.below(400), 1, true);
+        device.wait(|updater| updater.begin(image.plan())).expect("there is room");
+        let mut known = 0;
+        while known < image.bytes.len() {
+            // A host that has not heard of some acknowledgements, or believes itself further on.
+            let offset = match random.below(4) {
+                0 => random.below(known + 1),
+                1 => (known + random.below(9)).min(image.bytes.len() - 1),
+                _ => known,
+            };
+            let end = (offset + 1 + random.below(70)).min(image.bytes.len());
+            let outcome = device.updater.chunk(offset as u32, &image.bytes[offset..end]);
+            let taken = device.updater.written() as usize;
+            match outcome {
+                Ok(()) => assert!(taken >= end),
+                Err(refusal) => assert_eq!((refusal, taken), (Refusal::Offset, known)),
+            }
+            known = taken;
+        }
+        assert_eq!(device.wait(|updater| updater.commit(None)), Ok(()), "round {round}");
+        // The acknowledgement was lost, and the host asks again.
+        assert_eq!(device.updater.commit(None), Ok(()));
+        assert_eq!(device.runs.as_ref(), Some(&image.bytes));
+    }
+}
+
+#[test]
+fn what_does_not_fit_is_refused_and_changes_nothing() {
+    let (mut flash, layout) = flash();
+    let mut device = Device::start(&mut flash, &layout, Anyone);
+    let image = Image::new(100, 5, true);
+    assert_eq!(device.updater.chunk(0, &[1; 4]), Err(Refusal::NoUpdate));
+    assert_eq!(device.updater.commit(None), Err(Refusal::NoUpdate));
+    assert_eq!(device.update(&image, 100, None), Ok(()));
+    let plan = image.plan();
+    let room = 2048 - 256;
+    for length in [0, 2, 3, 401, room + 4, u32::MAX, u32::MAX - 3] {
+        assert_eq!(device.updater.begin(Plan { length, ..plan }), Err(Refusal::Length), "{length}");
+    }
+    assert_eq!(device.updater.begin(Plan { version: 4, ..plan }), Err(Refusal::Rollback));
+    device.wait(|updater| updater.begin(plan)).expect("the same version may come again");
+    assert_eq!(device.updater.chunk(396, &[0; 5]), Err(Refusal::Length));
+    assert_eq!(device.updater.chunk(u32::MAX, &[0; 5]), Err(Refusal::Length));
+    assert_eq!(device.updater.chunk(4, &[0; 4]), Err(Refusal::Offset));
+    assert_eq!(device.updater.commit(None), Err(Refusal::Length), "it is not all there");
+    let mut other = image.bytes.clone();
+    other[17] ^= 1;
+    assert_eq!(device.updater.chunk(0, &other), Ok(()));
+    assert_eq!(device.wait(|updater| updater.commit(None)), Err(Refusal::Checksum));
+    assert_eq!(device.wait(|updater| updater.commit(None)), Err(Refusal::Checksum), "asked again");
+    device.updater.abort();
+    assert_eq!(device.updater.commit(None), Err(Refusal::NoUpdate));
+    drop(device);
+    assert_eq!(Device::start(&mut flash, &layout, Anyone).runs, Some(image.bytes));
+}
+
+#[test]
+fn an_image_that_fails_its_test_is_not_run_and_not_tried_again() {
+    let (mut flash, layout) = flash();
+    let (good, bad) = (Image::new(100, 1, true), Image::new(90, 2, false));
+    let mut device = Device::start(&mut flash, &layout, Anyone);
+    assert_eq!(device.update(&good, 64, None), Ok(()));
+    assert_eq!(device.update(&bad, 64, None), Err(Refusal::SelfTest));
+    assert_eq!(device.runs.as_ref(), Some(&good.bytes));
+    // Its version does not count, as it never ran.
+    assert_eq!(device.updater.slots().least_version(), 1);
+    drop(device);
+    let before = flash.bytes.clone();
+    assert_eq!(Device::start(&mut flash, &layout, Anyone).runs, Some(good.bytes));
+    assert_eq!(flash.bytes, before, "not tried again");
+}
+
+#[test]
+fn where_the_newest_image_has_decayed_the_other_runs() {
+    let (mut flash, layout) = flash();
+    let images = [Image::new(100, 1, true), Image::new(100, 2, true)];
+    for image in &images {
+        assert_eq!(Device::start(&mut flash, &layout, Anyone).update(image, 64, None), Ok(()));
+    }
+    for bit in 0..8 * (256 + 400) {
+        let mut decayed = flash.clone();
+        decayed.bytes[2048 + bit / 8] ^= 1 << (bit % 8);
+        let runs = Device::start(&mut decayed, &layout, Anyone).runs;
+        let image = bit / 8 >= 256;
+        assert!(runs.as_ref() == Some(&images[0].bytes) || (!image && runs.as_ref() == Some(&images[1].bytes)));
+        assert!(!image || runs.as_ref() == Some(&images[0].bytes), "bit {bit} of the image");
+    }
+}
+
+#[test]
+fn flash_full_of_anything_has_no_image() {
+    for seed in 0..500 {
+        let mut flash = Flash::new(4, seed);
+        let layout = Layout::new(&flash, 0..2048, 2048..4096).expect("the slots fit");
+        if seed == 0 {
+            flash.bytes.fill(0xff);
+        }
+        assert_eq!(Device::start(&mut flash, &layout, Anyone).runs, None);
+        assert_eq!(flash.done, 0, "nothing is written");
+    }
+}
+
+#[test]
+fn the_slot_that_runs_is_never_the_one_that_is_erased() {
+    let (mut flash, layout) = flash();
+    for version in 1..6 {
+        let mut device = Device::start(&mut flash, &layout, Anyone);
+        let running = device.updater.running();
+        let before = running.map(|slot| {
+            let range = layout.range(slot);
+            let mut bytes = vec![0; (range.end - range.start) as usize];
+            embedded_storage::nor_flash::ReadNorFlash::read(device.updater.slots().flash(), range.start, &mut bytes)
+                .expect("it is within the flash");
+            (range.clone(), bytes)
+        });
+        assert_eq!(device.update(&Image::new(50, version, true), 64, None), Ok(()));
+        assert_eq!(device.updater.running(), Some(running.map_or(Slot::A, Slot::other)));
+        drop(device);
+        if let Some((range, bytes)) = before {
+            assert_eq!(flash.bytes[range.start as usize..range.end as usize], bytes);
+        }
+    }
+    assert_eq!(TRIALS, 3, "docs/SAFETY.md says so");
+}
+
+#[test]
+fn slots_that_cannot_be_are_refused() {
+    fn case<F: NorFlash>(flash: &F, a: (u32, u32), b: (u32, u32)) -> Option<LayoutError> {
+        Layout::new(flash, a.0..a.1, b.0..b.1).err()
+    }
+    let flash = Flash::new(4, 0);
+    assert_eq!(case(&flash, (0, 1024), (1024, 4096)), None);
+    assert_eq!(case(&flash, (0, 1000), (1024, 2048)), Some(LayoutError::Sector));
+    assert_eq!(case(&flash, (4, 1024), (1024, 2048)), Some(LayoutError::Sector));
+    assert_eq!(case(&flash, (0, 2048), (1024, 3072)), Some(LayoutError::Overlap));
+    assert_eq!(case(&flash, (0, 1024), (0, 1024)), Some(LayoutError::Overlap));
+    assert_eq!(case(&flash, (0, 0), (1024, 2048)), Some(LayoutError::Size));
+    assert_eq!(case(&flash, (2048, 1024), (2048, 3072)), Some(LayoutError::Size));
+    assert_eq!(case(&flash, (0, 1024), (3072, 5120)), Some(LayoutError::Size));
+    assert_eq!(case(&Nor::<64, 1024>::new(4, 0), (0, 1024), (1024, 2048)), Some(LayoutError::Granularity));
+    // The sectors of 128 KiB of an STM32F405, of which two slots of two are taken.
+    const SECTOR: u32 = 128 << 10;
+    let f405 = Nor::<4, { SECTOR as usize }>::new(5, 0);
+    assert_eq!(case(&f405, (SECTOR, 3 * SECTOR), (3 * SECTOR, 5 * SECTOR)), None);
+    assert_eq!(case(&f405, (16 << 10, 3 * SECTOR), (3 * SECTOR, 5 * SECTOR)), Some(LayoutError::Sector));
+    drop(Slots::new(flash, Layout::new(&Flash::new(4, 0), 0..1024, 1024..2048).expect("they fit"), Anyone));
+}

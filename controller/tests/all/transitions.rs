@@ -1,0 +1,194 @@
+//! Every state with every event, against the table of docs/SAFETY.md.
+
+use actq_controller::{Axis, Check, Output, SafeAction, Safety};
+use actq_link::code::{Fault, Refusal, State};
+
+const DEADLINE: u32 = 5;
+
+/// A controller of one axis that could be armed.
+pub(super) fn ready(safe: SafeAction) -> Safety<1> {
+    let axis = Axis::new(-1.0, 1.0, 0.1, 0.0, safe).expect("the axis fits");
+    let mut safety = Safety::new([axis], DEADLINE, 1);
+    Check::ALL.into_iter().for_each(|check| safety.check(check, true));
+    safety.observed();
+    safety
+}
+
+/// In the state, with an output of 0.3 behind it where it has one.
+pub(super) fn in_state(state: State, safe: SafeAction) -> Safety<1> {
+    let mut safety = ready(safe);
+    if state != State::Disarmed {
+        safety.arm(safety.token()).expect("nothing keeps it from arming");
+        safety.act(&[0.3]).expect("the action is good");
+        for _ in 0..3 {
+            safety.observed();
+            safety.tick();
+        }
+    }
+    if state == State::Latched {
+        safety.trip(Fault::Head);
+    }
+    assert_eq!(safety.state(), state);
+    safety.observed();
+    safety
+}
+
+type Event = fn(&mut Safety<1>);
+
+const ARM: Event = |s| {
+    let _ = s.arm(s.token());
+};
+const STALE: Event = |s| {
+    for _ in 0..=DEADLINE {
+        s.tick();
+    }
+};
+
+/// The event with the states that Disarmed, Armed and Latched go to.
+const TABLE: [(&str, Event, [State; 3]); 15] = {
+    use State::{Armed, Disarmed, Latched};
+    [
+        ("arm", ARM, [Armed, Armed, Armed]),
+        ("arm with another token", |s| _ = s.arm(s.token() ^ 1), [Disarmed, Armed, Latched]),
+        ("disarm", Safety::disarm, [Disarmed, Disarmed, Disarmed]),
+        ("tick", |s| _ = s.tick(), [Disarmed, Armed, Latched]),
+        ("deadline passed", STALE, [Disarmed, Latched, Latched]),
+        (
+            "no action within the deadline",
+            |s| {
+                for _ in 0..=DEADLINE {
+                    s.observed();
+                    s.tick();
+                }
+            },
+            [Disarmed, Latched, Latched],
+        ),
+        ("action", |s| _ = s.act(&[0.5]), [Disarmed, Armed, Latched]),
+        ("action outside the limits", |s| _ = s.act(&[-7.0]), [Disarmed, Armed, Latched]),
+        ("action that is NaN", |s| _ = s.act(&[f32::NAN]), [Disarmed, Latched, Latched]),
+        ("action that is infinite", |s| _ = s.act(&[f32::INFINITY]), [Disarmed, Latched, Latched]),
+        ("action without values", |s| _ = s.act(&[]), [Disarmed, Latched, Latched]),
+        ("action of two values", |s| _ = s.act(&[0.0; 2]), [Disarmed, Latched, Latched]),
+        ("the head fails", |s| s.trip(Fault::Head), [Disarmed, Latched, Latched]),
+        ("a check passes", |s| s.check(Check::Clock, true), [Disarmed, Armed, Latched]),
+        ("the image decays", |s| s.check(Check::Image, false), [Disarmed, Latched, Latched]),
+    ]
+};
+
+#[test]
+fn every_event_in_every_state_leads_where_the_table_says() {
+    for (name, event, to) in TABLE {
+        for (from, to) in State::ALL.iter().zip(to) {
+            let mut safety = in_state(*from, SafeAction::Hold);
+            let token = safety.token();
+            event(&mut safety);
+            assert_eq!(safety.state(), to, "{name} in {from:?}");
+            if *from != to {
+                assert_ne!(safety.token(), token, "{name} in {from:?}: a request from before it must not count");
+            }
+        }
+    }
+}
+
+#[test]
+fn each_fault_latches_and_is_told() {
+    for fault in Fault::ALL {
+        let mut safety = in_state(State::Armed, SafeAction::Hold);
+        safety.trip(*fault);
+        assert_eq!((safety.state(), safety.fault()), (State::Latched, Some(*fault)));
+        // The first one stays.
+        safety.trip(Fault::Head);
+        assert_eq!(safety.fault(), Some(*fault));
+    }
+    let faults = [(Check::Image, Fault::Image), (Check::SelfTest, Fault::Image), (Check::Clock, Fault::Clock)];
+    for (check, fault) in
+        faults.into_iter().chain([(Check::Watchdog, Fault::Watchdog), (Check::Hardware, Fault::Break)])
+    {
+        let mut safety = in_state(State::Armed, SafeAction::Hold);
+        safety.check(check, false);
+        assert_eq!((safety.state(), safety.fault()), (State::Latched, Some(fault)));
+    }
+}
+
+#[test]
+fn arming_is_refused_for_each_check_that_has_failed_or_was_not_done() {
+    let refusals = [Refusal::Image, Refusal::SelfTest, Refusal::Clock, Refusal::Watchdog, Refusal::Hardware];
+    for (check, refusal) in Check::ALL.into_iter().zip(refusals) {
+        for state in [State::Disarmed, State::Latched] {
+            let mut safety = in_state(state, SafeAction::Hold);
+            safety.check(check, false);
+            assert_eq!(safety.refusal(), Some(refusal));
+            assert_eq!(safety.arm(safety.token()), Err(refusal));
+            assert_eq!(safety.state(), state);
+            safety.check(check, true);
+            assert_eq!(safety.arm(safety.token()), Ok(()));
+        }
+    }
+    let axis = Axis::new(-1.0, 1.0, 0.1, 0.0, SafeAction::Coast).expect("the axis fits");
+    let mut new = Safety::new([axis], DEADLINE, 1);
+    new.observed();
+    for (check, refusal) in Check::ALL.into_iter().zip(refusals) {
+        assert_eq!(new.arm(new.token()), Err(refusal), "nothing is right until it was said");
+        new.check(check, true);
+    }
+    assert_eq!(new.arm(new.token()), Ok(()));
+}
+
+#[test]
+fn arming_is_refused_without_a_fresh_observation_and_twice() {
+    let mut safety = ready(SafeAction::Hold);
+    STALE(&mut safety);
+    assert_eq!(safety.arm(safety.token()), Err(Refusal::Stale));
+    safety.observed();
+    let token = safety.token();
+    assert_eq!(safety.arm(token), Ok(()));
+    assert_eq!(safety.arm(token), Err(Refusal::Token), "the same request once more");
+    assert_eq!(safety.arm(safety.token()), Err(Refusal::Armed));
+}
+
+#[test]
+fn safe_actions_do_what_they_say() {
+    let after = |safe, ticks| {
+        let mut safety = in_state(State::Latched, safe);
+        (0..ticks).map(|_| safety.tick()[0]).last().expect("there is a tick")
+    };
+    let Output::Drive(held) = after(SafeAction::Hold, 1) else { panic!("hold drives") };
+    assert!((held - 0.3).abs() < 1e-6);
+    assert_eq!(after(SafeAction::Hold, 10_000), Output::Drive(held));
+    assert_eq!(after(SafeAction::Brake, 1), Output::Brake);
+    assert_eq!(after(SafeAction::Coast, 1), Output::Coast);
+    let Output::Drive(on_the_way) = after(SafeAction::Ramp { step: 0.1 }, 1) else { panic!("a ramp drives") };
+    assert!((on_the_way - 0.2).abs() < 1e-6);
+    assert_eq!(after(SafeAction::Ramp { step: 0.1 }, 4), Output::Drive(0.0));
+}
+
+#[test]
+fn armed_again_the_output_goes_on_from_where_it_is() {
+    let mut safety = in_state(State::Latched, SafeAction::Hold);
+    safety.arm(safety.token()).expect("nothing keeps it from arming");
+    let Output::Drive(held) = safety.tick()[0] else { panic!("it holds until the first action") };
+    safety.act(&[-1.0]).expect("the action is good");
+    let Output::Drive(next) = safety.tick()[0] else { panic!("it drives") };
+    assert!((held - next - 0.1).abs() < 1e-6);
+}
+
+#[test]
+fn axes_that_cannot_be_are_refused() {
+    let new = Axis::new;
+    let cases = [
+        new(f32::NAN, 1.0, 1.0, 0.0, SafeAction::Hold),
+        new(-1.0, f32::INFINITY, 1.0, 0.0, SafeAction::Hold),
+        new(1.0, -1.0, 1.0, 0.0, SafeAction::Hold),
+        new(-1.0, 1.0, 0.0, 0.0, SafeAction::Hold),
+        new(-1.0, 1.0, f32::NAN, 0.0, SafeAction::Hold),
+        new(-1.0, 1.0, 1.0, 2.0, SafeAction::Hold),
+        new(-1.0, 1.0, 1.0, f32::NAN, SafeAction::Hold),
+        new(-1.0, 1.0, 1.0, 0.0, SafeAction::Ramp { step: 0.0 }),
+        new(-1.0, 1.0, 1.0, 0.0, SafeAction::Ramp { step: f32::INFINITY }),
+        new(0.5, 1.0, 1.0, 0.5, SafeAction::Ramp { step: 0.1 }),
+    ];
+    for (i, case) in cases.into_iter().enumerate() {
+        let error = case.expect_err(&i.to_string());
+        assert!(!error.to_string().is_empty());
+    }
+}

@@ -1,0 +1,119 @@
+//! Where a controller is: behind a serial port, or a socket, as that of an emulator's serial port.
+
+use std::fmt;
+use std::io::{self, Read, Write};
+use std::net::TcpStream;
+use std::str::FromStr;
+use std::time::Duration;
+
+use anyhow::{Context as _, Result, bail};
+
+/// Bits a second of a serial port, where none are named.
+const BAUD: u32 = 921_600;
+
+/// What bytes travel over. A read waits for at most [`WAIT`].
+pub trait Port: Read + Write + Send {}
+
+impl<P: Read + Write + Send> Port for P {}
+
+/// How long a read waits for a first byte.
+pub const WAIT: Duration = Duration::from_millis(2);
+
+/// How long a write may take.
+const WRITE: Duration = Duration::from_secs(2);
+
+/// How a controller is reached.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Address {
+    /// A serial port: its name, and bits a second.
+    Serial(String, u32),
+    /// A TCP socket: host and port.
+    Tcp(String),
+    /// A Unix domain socket: its path.
+    Unix(String),
+}
+
+/// `NAME`, `NAME@BAUD`, `tcp:HOST:PORT` or `unix:PATH`.
+impl FromStr for Address {
+    type Err = anyhow::Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        if let Some(address) = text.strip_prefix("tcp:") {
+            let has_port =
+                address.rsplit_once(':').is_some_and(|(host, port)| !host.is_empty() && port.parse::<u16>().is_ok());
+            return if has_port { Ok(Self::Tcp(address.to_owned())) } else { bail!("the form is tcp:HOST:PORT") };
+        }
+        if let Some(path) = text.strip_prefix("unix:") {
+            return if path.is_empty() { bail!("the form is unix:PATH") } else { Ok(Self::Unix(path.to_owned())) };
+        }
+        let (name, baud) = match text.rsplit_once('@') {
+            Some((name, baud)) => (name, baud.parse().ok().filter(|baud| *baud > 0).context("the form is NAME@BAUD")?),
+            None => (text, BAUD),
+        };
+        if name.is_empty() { bail!("a port has a name") } else { Ok(Self::Serial(name.to_owned(), baud)) }
+    }
+}
+
+impl fmt::Display for Address {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Serial(name, baud) => write!(f, "{name}@{baud}"),
+            Self::Tcp(address) => write!(f, "tcp:{address}"),
+            Self::Unix(path) => write!(f, "unix:{path}"),
+        }
+    }
+}
+
+impl Address {
+    /// Opens it.
+    ///
+    /// # Errors
+    ///
+    /// Where it is not there or may not be opened.
+    pub fn open(&self) -> io::Result<Box<dyn Port>> {
+        match self {
+            Self::Serial(name, baud) => Ok(Box::new(serialport::new(name, *baud).timeout(WAIT).open()?)),
+            Self::Tcp(address) => {
+                let stream = TcpStream::connect(address)?;
+                stream.set_nodelay(true)?;
+                stream.set_read_timeout(Some(WAIT))?;
+                stream.set_write_timeout(Some(WRITE))?;
+                Ok(Box::new(stream))
+            }
+            Self::Unix(path) => unix(path),
+        }
+    }
+}
+
+#[cfg(unix)]
+fn unix(path: &str) -> io::Result<Box<dyn Port>> {
+    let stream = std::os::unix::net::UnixStream::connect(path)?;
+    stream.set_read_timeout(Some(WAIT))?;
+    stream.set_write_timeout(Some(WRITE))?;
+    Ok(Box::new(stream))
+}
+
+#[cfg(not(unix))]
+fn unix(_: &str) -> io::Result<Box<dyn Port>> {
+    Err(io::Error::new(io::ErrorKind::Unsupported, "this system has no Unix sockets; use tcp:HOST:PORT"))
+}
+
+/// The serial ports of this machine, each with what is known about it.
+///
+/// # Errors
+///
+/// Where the system does not tell.
+pub fn list() -> Result<Vec<(String, String)>> {
+    let about = |kind: serialport::SerialPortType| match kind {
+        serialport::SerialPortType::UsbPort(usb) => {
+            let names = [usb.manufacturer, usb.product, usb.serial_number];
+            let names: Vec<String> = names.into_iter().flatten().collect();
+            format!("USB {:04x}:{:04x} {}", usb.vid, usb.pid, names.join(" "))
+        }
+        serialport::SerialPortType::PciPort => "PCI".to_owned(),
+        serialport::SerialPortType::BluetoothPort => "Bluetooth".to_owned(),
+        serialport::SerialPortType::Unknown => String::new(),
+    };
+    let ports = serialport::available_ports().context("the system does not tell its serial ports")?;
+    Ok(ports.into_iter().map(|port| (port.port_name, about(port.port_type))).collect())
+}

@@ -1,0 +1,80 @@
+//! A controller as a simulator's policy: the pipe protocol (`actq_link::pipe`) on one side, the link on the other.
+
+use std::io::{ErrorKind, Read, Write};
+use std::time::{Duration, Instant};
+
+use actq_link::code::State;
+use actq_link::{NO_ACTION, RESET, STEP};
+use anyhow::{Context as _, Result, bail};
+
+use crate::client::Client;
+use crate::event::Event;
+
+/// Sends an observation again after so long without its action.
+const REPEAT: Duration = Duration::from_millis(200);
+/// Tries before a step is answered by no action.
+const TRIES: usize = 5;
+
+/// Answers the simulator until its requests end. The controller's image sees every observation; with `arm` the outputs follow it, and
+/// the answers are what they are led to. A reset disarms, which resets the head.
+///
+/// # Errors
+///
+/// Where the controller is lost, cannot be armed or has stopped for a fault, or where the simulator breaks the protocol.
+pub fn serve(client: &mut Client, arm: bool, mut input: impl Read, mut output: impl Write) -> Result<()> {
+    let status = client.status()?;
+    let mut bytes = vec![0; 4 * usize::from(status.observation)];
+    let no_action = vec![NO_ACTION; usize::from(status.axes)];
+    let mut armed = false;
+    loop {
+        let mut command = [0];
+        match input.read_exact(&mut command) {
+            Err(e) if e.kind() == ErrorKind::UnexpectedEof => return client.disarm(),
+            other => other.context("input cannot be read")?,
+        }
+        match command {
+            [RESET] => {
+                client.disarm()?;
+                armed = false;
+            }
+            [STEP] => {
+                let ended = || format!("the input ended inside an observation of {} bytes", 4 * status.observation);
+                input.read_exact(&mut bytes).with_context(ended)?;
+                let (values, _) = bytes.as_chunks();
+                let observation: Vec<f32> = values.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
+                if arm && !armed {
+                    step(client, &observation, false)?;
+                    client.arm()?;
+                    armed = true;
+                }
+                let action = step(client, &observation, armed)?.unwrap_or_else(|| no_action.clone());
+                let action: Vec<u8> = action.iter().flat_map(|value| value.to_le_bytes()).collect();
+                output.write_all(&action).and_then(|()| output.flush()).context("output cannot be written")?;
+            }
+            [other] => bail!("unknown command byte 0x{other:02x}; R resets, S steps"),
+        }
+    }
+}
+
+/// The action on an observation; `None` where none comes.
+fn step(client: &mut Client, observation: &[f32], armed: bool) -> Result<Option<Vec<f32>>> {
+    for _ in 0..TRIES {
+        let number = client.observe(observation)?;
+        let sent = Instant::now();
+        while sent.elapsed() < REPEAT {
+            for event in client.events()? {
+                match event {
+                    Event::Action { of, applied, values, .. } if of == number && applied == armed => {
+                        return Ok(Some(values));
+                    }
+                    Event::Status(status) if armed && status.state != State::Armed => {
+                        let why = status.fault.map_or("it was disarmed".to_owned(), |fault| fault.to_string());
+                        bail!("the controller is {}: {why}", status.state);
+                    }
+                    _ => {}
+                }
+            }
+        }
+    }
+    Ok(None)
+}

@@ -1,0 +1,85 @@
+//! Images over the link.
+
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use actq_controller::slots::{Anyone, Key};
+use actq_device::keys;
+use actq_device::push::{Package, push};
+use actq_link::code::Refusal;
+
+use crate::requests::observe_until_fresh;
+use crate::simulated::{GOOD, Simulated};
+
+fn image(seed: u8, words: usize) -> Vec<u8> {
+    let rest = (0..4 * words).map(|i| (i * 13) as u8 ^ seed);
+    GOOD.iter().copied().chain(rest).collect()
+}
+
+#[test]
+fn images_get_through_a_bad_line_and_run_after_a_reset() {
+    let controller = Simulated::start(100, || Anyone);
+    let mut client = controller.client();
+    for (version, image) in [(1, image(1, 700)), (2, image(2, 1500)), (2, image(3, 2))] {
+        let mut told = Vec::new();
+        let package = Package { image: &image, version, signature: None };
+        push(&mut client, &package, |taken| told.push(taken)).expect("it is a good image");
+        assert_eq!(controller.image(), image);
+        assert_eq!((told.first(), told.last()), (Some(&0), Some(&image.len())));
+        assert!(told.is_sorted(), "{told:?}");
+    }
+    let starts = controller.control.starts.load(Ordering::Relaxed);
+    controller.control.reset.store(true, Ordering::Relaxed);
+    while controller.control.starts.load(Ordering::Relaxed) == starts {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let old = Package { image: &image(4, 10), version: 1, signature: None };
+    let error = push(&mut client, &old, |_| ()).expect_err("its version is too low");
+    assert!(format!("{error:#}").contains(&Refusal::Rollback.to_string()), "{error:#}");
+}
+
+#[test]
+fn what_is_refused_says_why_and_changes_nothing() {
+    let controller = Simulated::start(0, || Anyone);
+    let mut client = controller.client();
+    let good = image(1, 100);
+    push(&mut client, &Package { image: &good, version: 3, signature: None }, |_| ()).expect("it is a good image");
+    let bad = [b"evil", &good[4..]].concat();
+    let cases = [
+        (&bad[..], 3, Refusal::SelfTest),
+        (&[][..], 3, Refusal::Length),
+        (&good[..401], 3, Refusal::Length),
+        (&[1; 9000][..], 3, Refusal::Length),
+        (&good[..], 2, Refusal::Rollback),
+    ];
+    for (image, version, why) in cases {
+        let error =
+            push(&mut client, &Package { image, version, signature: None }, |_| ()).expect_err(&why.to_string());
+        assert!(format!("{error:#}").contains(&why.to_string()), "{error:#}");
+        assert_eq!(controller.image(), good);
+    }
+    observe_until_fresh(&mut client);
+    client.arm().expect("nothing keeps it from arming");
+    let error = push(&mut client, &Package { image: &good, version: 3, signature: None }, |_| ());
+    let error = format!("{:#}", error.expect_err("it is armed"));
+    // By then the observations may be old already.
+    assert!(error.contains(&Refusal::Armed.to_string()) || error.contains(&Refusal::Token.to_string()), "{error}");
+}
+
+#[test]
+fn a_build_with_a_key_takes_what_the_key_has_signed() {
+    let key = keys::generate().expect("there is randomness");
+    let public = *key.verifying_key().as_bytes();
+    let controller = Simulated::start(0, move || Key::new(&public).expect("it is a key"));
+    let mut client = controller.client();
+    let image = image(1, 100);
+    let signed = keys::sign(&key, &image, 7).expect("it can be signed");
+    let signature = signed.check(&image).expect("it is that of the image");
+    let mut pushed = |version, signature| push(&mut client, &Package { image: &image, version, signature }, |_| ());
+    for (version, signature) in [(7, None), (8, Some(&signature)), (7, Some(&[9; 64]))] {
+        let error = format!("{:#}", pushed(version, signature).expect_err("it is not signed so"));
+        assert!(error.contains(&Refusal::Signature.to_string()), "{error}");
+    }
+    pushed(7, Some(&signature)).expect("it is signed");
+    assert_eq!(controller.image(), image);
+}

@@ -1,0 +1,122 @@
+//! Requests over a good and a bad line.
+
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use actq_controller::Output;
+use actq_controller::slots::Anyone;
+use actq_device::client::Client;
+use actq_device::port::Address;
+use actq_link::code::{Crash, Fault, Parameter, Refusal, ResetCause, State};
+use actq_link::report::BUILT_IN;
+
+use crate::simulated::{DEADLINE, OBSERVATION, Simulated};
+
+/// Sends observations until the controller can be armed.
+pub(super) fn observe_until_fresh(client: &mut Client) {
+    let begun = Instant::now();
+    loop {
+        for _ in 0..5 {
+            client.observe(&[0.4; OBSERVATION]).expect("it fits");
+        }
+        if client.status().expect("it answers").refusal.is_none() {
+            return;
+        }
+        assert!(begun.elapsed() < Duration::from_secs(10), "no observation gets through");
+    }
+}
+
+/// Arms, over a line that may lose so much that the observations grow old meanwhile.
+fn arm(client: &mut Client) {
+    for _ in 0..50 {
+        observe_until_fresh(client);
+        if client.arm().is_ok() {
+            return;
+        }
+    }
+    panic!("it is never armed");
+}
+
+#[test]
+fn every_request_is_answered_however_bad_the_line_is() {
+    for faults in [0, 100, 300] {
+        let controller = Simulated::start(faults, || Anyone);
+        let mut client = controller.client();
+        let status = client.status().expect("it answers");
+        assert_eq!((status.state, status.slot, status.axes), (State::Disarmed, BUILT_IN, 2));
+        assert_eq!((usize::from(status.observation), status.image), (OBSERVATION, 0x1234));
+        assert_eq!(client.timing().expect("it answers").period, 1_000_000);
+        let breadcrumb = client.breadcrumb().expect("it answers");
+        assert_eq!((breadcrumb.reset, breadcrumb.crash), (ResetCause::Watchdog, None));
+        client.set(Parameter::High, 1, 0.5).expect("it is stricter");
+        assert_eq!(client.get(Parameter::High, 1).expect("there is one"), 0.5);
+        let error = client.set(Parameter::High, 1, 1.5).expect_err("it is wider");
+        assert!(format!("{error:#}").contains(&Refusal::Range.to_string()), "{error:#}");
+        let error = client.get(Parameter::High, 2).expect_err("there are two axes");
+        assert!(format!("{error:#}").contains(&Refusal::Parameter.to_string()), "{error:#}");
+        arm(&mut client);
+        client.disarm().expect("never refused");
+        assert_eq!(client.status().expect("it answers").state, State::Disarmed);
+    }
+}
+
+#[test]
+fn arming_without_observations_is_refused_with_the_reason() {
+    let controller = Simulated::start(0, || Anyone);
+    let mut client = controller.client();
+    let error = client.arm().expect_err("there are no observations");
+    assert!(format!("{error:#}").contains(&Refusal::Stale.to_string()), "{error:#}");
+}
+
+#[test]
+fn a_cut_cable_is_safe_and_the_connection_comes_back() {
+    let controller = Simulated::start(0, || Anyone);
+    let mut client = controller.client();
+    arm(&mut client);
+    controller.control.cut.store(true, Ordering::Relaxed);
+    // The host goes on; the deadline passes, and the ramp ends at 0.
+    let begun = Instant::now();
+    while begun.elapsed() < Duration::from_millis(u64::from(DEADLINE) + 300) {
+        client.observe(&[1.0; OBSERVATION]).expect("it fits");
+        client.events().expect("it tries again");
+    }
+    assert!(controller.outputs().iter().all(|o| matches!(o, Output::Coast | Output::Drive(0.0))));
+    controller.control.cut.store(false, Ordering::Relaxed);
+    let status = client.status().expect("it answers again");
+    assert_eq!((status.state, status.fault), (State::Latched, Some(Fault::Stale)));
+    assert!(client.connection().reopened() >= 1);
+    arm(&mut client);
+}
+
+#[test]
+fn a_controller_that_was_reset_is_heard_again_and_says_why() {
+    let controller = Simulated::start(0, || Anyone);
+    let mut client = controller.client();
+    arm(&mut client);
+    controller.control.reset.store(true, Ordering::Relaxed);
+    while controller.control.starts.load(Ordering::Relaxed) < 2 {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    assert_eq!(client.status().expect("it answers").state, State::Disarmed);
+    let breadcrumb = client.breadcrumb().expect("it answers");
+    assert_eq!((breadcrumb.crash, breadcrumb.pc, breadcrumb.count), (Some(Crash::Panic), 0x0800_0100, 1));
+}
+
+#[test]
+fn a_port_that_is_not_there_is_named() {
+    let address: Address = "tcp:127.0.0.1:1".parse().expect("it is an address");
+    let error = actq_device::connection::Connection::open(address, Duration::ZERO).err().expect("nobody listens");
+    assert!(format!("{error:#}").contains("tcp:127.0.0.1:1"), "{error:#}");
+}
+
+#[test]
+fn addresses_are_read_as_they_are_shown() {
+    for text in ["/dev/ttyUSB0@115200", "COM3@921600", "tcp:localhost:4000", "tcp:[::1]:4000", "unix:/tmp/uart"] {
+        assert_eq!(text.parse::<Address>().expect(text).to_string(), text);
+    }
+    assert_eq!("COM3".parse::<Address>().expect("a name is enough").to_string(), "COM3@921600");
+    for text in ["", "tcp:", "tcp:host", "tcp::4000", "tcp:host:70000", "unix:", "COM3@fast", "COM3@0"] {
+        assert!(text.parse::<Address>().is_err(), "{text}");
+    }
+    actq_device::port::list().expect("a machine may have no serial port, but tells");
+}

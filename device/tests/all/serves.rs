@@ -1,0 +1,80 @@
+//! A controller as a simulator's policy.
+
+use std::sync::atomic::Ordering;
+
+use actq_controller::Output;
+use actq_controller::slots::Anyone;
+use actq_device::serve::serve;
+use actq_link::{NO_ACTION, RESET, STEP};
+
+use crate::simulated::Simulated;
+
+fn step(values: [f32; 4]) -> Vec<u8> {
+    [STEP].into_iter().chain(values.into_iter().flat_map(f32::to_le_bytes)).collect()
+}
+
+fn actions(bytes: &[u8]) -> Vec<f32> {
+    bytes.as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect()
+}
+
+#[test]
+fn steps_are_answered_by_the_heads_actions_armed_or_not() {
+    for (arm, faults) in [(false, 0), (true, 0), (false, 100)] {
+        let controller = Simulated::start(faults, || Anyone);
+        let mut input = Vec::new();
+        for episode in 0..3u8 {
+            input.push(RESET);
+            for i in 0..20u8 {
+                input.extend(step([f32::from(episode) / 8.0, f32::from(i) / 32.0, 0.0, 0.0]));
+            }
+        }
+        let mut output = Vec::new();
+        serve(&mut controller.client(), arm, &input[..], &mut output).expect("it answers");
+        let expected: Vec<f32> =
+            (0..3u8).flat_map(|e| (0..20u8).flat_map(move |i| [f32::from(e) / 16.0, f32::from(i) / 64.0])).collect();
+        assert_eq!(actions(&output), expected, "armed {arm}, {faults} faults in 1000");
+        let coasts = || controller.outputs().iter().all(|output| *output == Output::Coast);
+        let begun = std::time::Instant::now();
+        while !coasts() {
+            assert!(begun.elapsed().as_secs() < 5, "it disarms at the end");
+        }
+    }
+}
+
+#[test]
+fn what_the_controller_refuses_has_no_action_and_a_broken_protocol_is_told() {
+    let controller = Simulated::start(0, || Anyone);
+    let input = [step([f32::NAN, 0.0, 0.0, 0.0]), step([1.0; 4])].concat();
+    let mut output = Vec::new();
+    serve(&mut controller.client(), false, &input[..], &mut output).expect("it answers");
+    let bits: Vec<u32> = actions(&output).into_iter().map(f32::to_bits).collect();
+    assert_eq!(bits, [NO_ACTION.to_bits(), NO_ACTION.to_bits(), 0.5f32.to_bits(), 0.5f32.to_bits()]);
+    let error = serve(&mut controller.client(), false, &b"x"[..], Vec::new()).expect_err("no such command");
+    assert!(error.to_string().contains("0x78"), "{error:#}");
+    let error = serve(&mut controller.client(), false, &step([0.0; 4])[..9], Vec::new()).expect_err("half a step");
+    assert!(error.to_string().contains("16 bytes"), "{error:#}");
+}
+
+#[test]
+fn a_controller_that_stops_ends_the_serving_with_its_reason() {
+    let controller = Simulated::start(0, || Anyone);
+    let control = controller.control.clone();
+    /// Requests that pause after some steps, as long as it takes the deadline to pass.
+    struct Pausing(Vec<u8>, usize);
+    impl std::io::Read for Pausing {
+        fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+            self.1 += 1;
+            if self.1 == 40 {
+                std::thread::sleep(std::time::Duration::from_millis(300));
+            }
+            let count = buffer.len().min(self.0.len());
+            buffer[..count].copy_from_slice(&self.0[..count]);
+            self.0.drain(..count);
+            Ok(count)
+        }
+    }
+    let input = Pausing((0..100).flat_map(|_| step([0.5; 4])).collect(), 0);
+    let error = serve(&mut controller.client(), true, input, Vec::new()).expect_err("it has latched");
+    assert!(error.to_string().contains("no good observation came within the deadline"), "{error:#}");
+    assert_eq!(control.starts.load(Ordering::Relaxed), 1);
+}

@@ -1,0 +1,194 @@
+//! A controller in a thread, at the other end of a TCP socket: the decisions are those of the firmware's crate.
+
+use std::io::{ErrorKind, Read as _, Write as _};
+use std::net::{TcpListener, TcpStream};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use actq_controller::breadcrumb::Record;
+use actq_controller::endpoint::Facts;
+use actq_controller::ram::Ram;
+use actq_controller::slots::{Authority, Layout, Slots, Updater, Work};
+use actq_controller::{Axis, Check, Endpoint, Guard, Output, SafeAction, Safety, Settings};
+use actq_device::client::Client;
+use actq_device::connection::Connection;
+use actq_device::port::Address;
+use actq_link::code::{Crash, Refusal, ResetCause};
+use actq_link::frame;
+use actq_link::report::{BUILT_IN, Timing};
+use embedded_storage::nor_flash::ReadNorFlash as _;
+
+use crate::line::Line;
+
+pub(super) const OBSERVATION: usize = 4;
+/// Ticks of 1 ms.
+pub(super) const DEADLINE: u32 = 100;
+const SECTOR: usize = 4096;
+/// What an image begins with that passes its test.
+pub(super) const GOOD: &[u8] = b"good";
+
+type End = Endpoint<'static, OBSERVATION, { frame::bytes(512) }>;
+
+/// What a test does to the controller, and sees of it.
+#[derive(Default)]
+pub(super) struct Control {
+    stop: AtomicBool,
+    /// Ends the connection, and takes no other one while it is set.
+    pub(super) cut: AtomicBool,
+    /// Starts the controller anew.
+    pub(super) reset: AtomicBool,
+    /// Starts so far.
+    pub(super) starts: AtomicU32,
+    /// Outputs of the last tick.
+    pub(super) outputs: Mutex<Vec<Output>>,
+    /// The image that runs.
+    pub(super) image: Mutex<Vec<u8>>,
+}
+
+/// A running controller.
+pub(super) struct Simulated {
+    pub(super) control: Arc<Control>,
+    address: Address,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Simulated {
+    /// One whose line has so many faults in a thousand frames, each way.
+    pub(super) fn start<A>(faults: u64, authority: impl Fn() -> A + Send + 'static) -> Self
+    where
+        A: Authority,
+    {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+        let address = Address::Tcp(listener.local_addr().expect("it is bound").to_string());
+        let control = Arc::new(Control::default());
+        let shared = control.clone();
+        let thread = std::thread::spawn(move || {
+            let mut flash = vec![0x5a; 4 * SECTOR];
+            while !shared.stop.load(Ordering::Relaxed) {
+                shared.reset.store(false, Ordering::Relaxed);
+                let starts = shared.starts.fetch_add(1, Ordering::Relaxed);
+                run(&shared, &listener, &mut flash, authority(), faults, starts);
+            }
+        });
+        Self { control, address, thread: Some(thread) }
+    }
+
+    pub(super) fn client(&self) -> Client {
+        let connection = Connection::open(self.address.clone(), Duration::from_secs(5)).expect("it listens");
+        Client::new(connection, Duration::from_secs(10))
+    }
+
+    pub(super) fn outputs(&self) -> Vec<Output> {
+        self.control.outputs.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    pub(super) fn image(&self) -> Vec<u8> {
+        self.control.image.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
+impl Drop for Simulated {
+    fn drop(&mut self) {
+        self.control.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take()
+            && thread.join().is_err()
+            && !std::thread::panicking()
+        {
+            panic!("the controller has panicked");
+        }
+    }
+}
+
+fn test(image: &[u8]) -> Result<(), Refusal> {
+    if image.starts_with(GOOD) { Ok(()) } else { Err(Refusal::SelfTest) }
+}
+
+/// What the firmware does, from a start to a reset.
+fn run<A: Authority>(
+    control: &Control,
+    listener: &TcpListener,
+    flash: &mut [u8],
+    authority: A,
+    faults: u64,
+    starts: u32,
+) {
+    listener.set_nonblocking(true).expect("it is a socket");
+    let flash = Ram::<4, SECTOR>(flash);
+    let layout = Layout::new(&flash, 0..8192, 8192..16384).expect("the slots fit");
+    let mut slots = Slots::new(flash, layout, authority);
+    let running = slots.select().filter(|candidate| !candidate.trial).map(|candidate| candidate.slot);
+    let mut updater = Updater::new(slots, running);
+
+    let axis = Axis::new(-1.0, 1.0, 0.05, 0.0, SafeAction::Ramp { step: 0.01 }).expect("the axis fits");
+    let mut safety = Safety::new([axis; 2], DEADLINE, starts);
+    Check::ALL.into_iter().for_each(|check| safety.check(check, true));
+    let crash = Record { crash: Crash::Panic, pc: 0x0800_0100, detail: 17, ticks: 5, count: starts };
+    let breadcrumb = Record::report(ResetCause::Watchdog, (starts > 0).then_some(crash));
+    let facts =
+        Facts { image: 0x1234, slot: BUILT_IN, timing: Timing { period: 1_000_000, ..Timing::default() }, breadcrumb };
+    let guard = Guard::new(OBSERVATION, &[], 1_000_000).expect("there is room");
+    let mut endpoint = End::new(guard, facts, Settings { status_period: 20, erase_while_armed: false });
+
+    let (mut inward, mut outward) = (Line::new(1, faults), Line::new(2, faults));
+    let (mut stream, begun, mut ticks) = (None::<TcpStream>, Instant::now(), 0);
+    while !control.stop.load(Ordering::Relaxed) && !control.reset.load(Ordering::Relaxed) {
+        if control.cut.load(Ordering::Relaxed) {
+            stream = None;
+        } else if stream.is_none()
+            && let Ok((accepted, _)) = listener.accept()
+        {
+            accepted.set_nonblocking(false).expect("it is a socket");
+            accepted.set_read_timeout(Some(Duration::from_millis(1))).expect("it is a socket");
+            accepted.set_nodelay(true).expect("it is a socket");
+            stream = Some(accepted);
+        }
+        let micros = begun.elapsed().as_micros() as u32;
+        let (mut out, mut sent) = ([0; 1024], Vec::new());
+        let mut bytes = [0; 4096];
+        let count = match stream.as_mut().map(|stream| stream.read(&mut bytes)) {
+            Some(Ok(0)) => {
+                stream = None;
+                0
+            }
+            Some(Ok(count)) => count,
+            Some(Err(e)) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => 0,
+            Some(Err(_)) => {
+                stream = None;
+                0
+            }
+            None => {
+                std::thread::sleep(Duration::from_millis(1));
+                0
+            }
+        };
+        for byte in inward.carry(&bytes[..count]) {
+            sent.extend(endpoint.receive(byte, micros, &mut safety, &mut updater, &mut out).unwrap_or_default());
+        }
+        while begun.elapsed().as_millis() > ticks {
+            ticks += 1;
+            *control.outputs.lock().unwrap_or_else(PoisonError::into_inner) = safety.tick().to_vec();
+            sent.extend(endpoint.report(micros, &mut safety, &mut out).unwrap_or_default());
+        }
+        // The head: half of the first two values.
+        if let Some(step) = endpoint.step(&mut safety) {
+            let (of, action) = (step.of, [0.5 * step.observation[0], 0.5 * step.observation[1]]);
+            let told = endpoint.acted(of, Ok::<_, ()>(&action[..]), micros, &mut safety, &mut out);
+            sent.extend(told.unwrap_or_default());
+        }
+        if let Work::Test(candidate) = updater.work() {
+            let mut image = vec![0; candidate.length as usize];
+            updater.slots().flash().read(candidate.address, &mut image).expect("it is in the flash");
+            if updater.tested(test(&image)) {
+                endpoint.facts.slot = candidate.slot as u8;
+                *control.image.lock().unwrap_or_else(PoisonError::into_inner) = image;
+            }
+        }
+        if let Some(open) = &mut stream
+            && open.write_all(&outward.carry(&sent)).is_err()
+        {
+            stream = None;
+        }
+    }
+}

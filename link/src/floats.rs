@@ -1,0 +1,47 @@
+//! Values of an observation or an action.
+
+/// f32 values, as they are in memory or as they came over the wire.
+#[derive(Clone, Copy, Debug)]
+pub enum Floats<'a> {
+    /// In memory.
+    Values(&'a [f32]),
+    /// Little-endian, as received; always whole values.
+    Wire(&'a [[u8; 4]]),
+}
+
+impl<'a> Floats<'a> {
+    /// What `bytes` hold; `None` where they are no whole values.
+    pub(crate) fn of_wire(bytes: &'a [u8]) -> Option<Self> {
+        let (values, rest) = bytes.as_chunks();
+        rest.is_empty().then_some(Self::Wire(values))
+    }
+
+    /// Number of values.
+    pub const fn len(&self) -> usize {
+        match self {
+            Self::Values(values) => values.len(),
+            Self::Wire(values) => values.len(),
+        }
+    }
+
+    /// Whether there are none.
+    pub const fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The values in order.
+    pub fn iter(&self) -> impl Iterator<Item = f32> + use<'a> {
+        let (values, wire): (&'a [f32], &'a [[u8; 4]]) = match *self {
+            Self::Values(values) => (values, &[]),
+            Self::Wire(wire) => (&[], wire),
+        };
+        values.iter().copied().chain(wire.iter().map(|bytes| f32::from_le_bytes(*bytes)))
+    }
+}
+
+/// Bit for bit, so that a NaN equals itself.
+impl PartialEq for Floats<'_> {
+    fn eq(&self, other: &Self) -> bool {
+        self.iter().map(f32::to_bits).eq(other.iter().map(f32::to_bits))
+    }
+}

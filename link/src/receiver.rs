@@ -1,0 +1,91 @@
+//! From bytes to messages.
+
+use crate::decoder::Decoder;
+use crate::fields::Reader;
+use crate::frame::{self, VERSION};
+use crate::message::Message;
+use crate::report::Counters;
+use crate::window::{Order, Window};
+
+/// A message, and what its frame says about it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Received<'a> {
+    /// The frame's sequence number.
+    pub sequence: u32,
+    /// The sender's time in µs; wraps.
+    pub micros: u32,
+    /// The message.
+    pub message: Message<'a>,
+}
+
+/// Finds messages in bytes. `N` is the length of the longest frame before stuffing ([`frame::bytes`] of a payload).
+///
+/// A message is given only of a frame that is whole, undamaged, of this version, well-formed and new. All others are counted, and
+/// change nothing else.
+#[derive(Debug)]
+pub struct Receiver<const N: usize> {
+    decoder: Decoder<N>,
+    window: Window,
+    counters: Counters,
+}
+
+impl<const N: usize> Receiver<N> {
+    /// The longest payload in bytes that finds room.
+    pub const PAYLOAD: usize = N.saturating_sub(frame::bytes(0));
+
+    /// A receiver that takes the first good frame as it comes.
+    pub const fn new() -> Self {
+        let counters = Counters { good: 0, damaged: 0, malformed: 0, repeated: 0, lost: 0 };
+        Self { decoder: Decoder::new(), window: Window::open(), counters }
+    }
+
+    /// Takes a byte; the message whose frame it ends.
+    pub fn push(&mut self, byte: u8) -> Option<Received<'_>> {
+        let Self { decoder, window, counters } = self;
+        let Ok(content) = decoder.push(byte)? else {
+            counters.damaged = counters.damaged.wrapping_add(1);
+            return None;
+        };
+        let Some(received) = parse(content) else {
+            counters.malformed = counters.malformed.wrapping_add(1);
+            return None;
+        };
+        match window.admit(received.sequence) {
+            Order::Repeated => {
+                counters.repeated = counters.repeated.wrapping_add(1);
+                None
+            }
+            Order::New { lost } => {
+                counters.good = counters.good.wrapping_add(1);
+                counters.lost = counters.lost.wrapping_add(lost);
+                Some(received)
+            }
+        }
+    }
+
+    /// Takes the next good frame with whatever sequence number it has: the other end may have started anew. To be called where
+    /// nothing good has come for long, and where nothing moves.
+    pub fn reopen(&mut self) {
+        self.window = Window::open();
+    }
+
+    /// What was seen so far.
+    pub const fn counters(&self) -> Counters {
+        self.counters
+    }
+}
+
+impl<const N: usize> Default for Receiver<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+fn parse(content: &[u8]) -> Option<Received<'_>> {
+    let mut r = Reader(content);
+    if r.u8()? != VERSION {
+        return None;
+    }
+    let (kind, sequence, micros) = (r.u8()?, r.u32()?, r.u32()?);
+    Some(Received { sequence, micros, message: Message::parse(kind, r.rest())? })
+}

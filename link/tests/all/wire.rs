@@ -1,0 +1,150 @@
+//! The bytes on the wire: the example of docs/LINK.md, every damage to it, and frames that lie.
+
+use actq_link::code::{Parameter, Refusal, Report, State};
+use actq_link::report::Counters;
+use actq_link::{Floats, Message, Receiver, Sender, frame};
+
+use super::messages::{Content, LONGEST, all};
+use super::random::Random;
+
+/// The messages that a receiver finds, as text.
+pub(super) fn found<const N: usize>(receiver: &mut Receiver<N>, bytes: &[u8]) -> Vec<String> {
+    bytes.iter().filter_map(|byte| receiver.push(*byte).map(|received| format!("{received:?}"))).collect()
+}
+
+/// A frame of these bytes, which need not be a message.
+fn frame_of(content: &[u8]) -> Vec<u8> {
+    let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(content);
+    let frame = [content, &crc.to_le_bytes()].concat();
+    let mut wire = vec![0; cobs::max_encoding_length(frame.len())];
+    let len = cobs::encode(&frame, &mut wire);
+    wire.truncate(len);
+    wire.push(0);
+    wire
+}
+
+fn content(version: u8, kind: u8, sequence: u32, payload: &[u8]) -> Vec<u8> {
+    [&[version, kind][..], &sequence.to_le_bytes(), &7u32.to_le_bytes(), payload].concat()
+}
+
+const DOCUMENTATION: &str = include_str!("../../../docs/LINK.md");
+
+/// The hexadecimal bytes of the documentation's example behind `label`.
+fn example(label: &str) -> Vec<u8> {
+    let line = DOCUMENTATION.lines().find_map(|line| line.trim().strip_prefix(label)).expect("the label stands there");
+    line.split_whitespace().map(|byte| u8::from_str_radix(byte, 16).expect("a byte in hexadecimal")).collect()
+}
+
+#[test]
+fn the_example_in_the_documentation_is_what_is_sent_and_received() {
+    let (wire, plain) = (example("wire:"), example("frame:"));
+    let message = Message::Observation(Floats::Values(&[1.0, -0.5, 0.0]));
+    let mut buffer = [0; 64];
+    assert_eq!(Sender::new(258).frame(&message, 1_000_000, &mut buffer), Some(&wire[..]));
+    assert_eq!(frame_of(&plain[..plain.len() - 4]), wire, "the frame before stuffing");
+    let mut receiver = Receiver::<LONGEST>::new();
+    let (last, first) = wire.split_last().expect("the example is not empty");
+    assert!(found(&mut receiver, first).is_empty());
+    let received = receiver.push(*last).expect("the frame ends");
+    assert_eq!((received.sequence, received.micros, received.message), (258, 1_000_000, message));
+}
+
+/// The table of each code names every one of them.
+#[test]
+fn the_documentation_lists_every_code() {
+    let rows = |code: u8, name: String| (format!("| {code} | `{name}`"), name);
+    let names = State::ALL.iter().map(|c| rows(c.code(), format!("{c:?}")));
+    let names = names.chain(Refusal::ALL.iter().map(|c| rows(c.code(), format!("{c:?}"))));
+    let names = names.chain(Parameter::ALL.iter().map(|c| rows(c.code(), format!("{c:?}"))));
+    let names = names.chain(actq_link::code::Fault::ALL.iter().map(|c| rows(c.code(), format!("{c:?}"))));
+    let names = names.chain(actq_link::code::Crash::ALL.iter().map(|c| rows(c.code(), format!("{c:?}"))));
+    let names = names.chain(actq_link::code::ResetCause::ALL.iter().map(|c| rows(c.code(), format!("{c:?}"))));
+    for (row, name) in names.chain(Report::ALL.iter().map(|c| rows(c.code(), format!("{c:?}")))) {
+        assert!(DOCUMENTATION.contains(&row), "docs/LINK.md has no row for {name}: {row}");
+    }
+}
+
+#[test]
+fn the_documentation_lists_every_message() {
+    for message in all(&Content::default(), &[0; 6], 0) {
+        let name = format!("{message:?}").to_lowercase();
+        let name = name.split(|c: char| !c.is_alphabetic()).next().expect("a message has a name");
+        let row = format!("| {} | {name}", message.kind());
+        assert!(DOCUMENTATION.contains(&row), "docs/LINK.md has no row {row}");
+    }
+}
+
+#[test]
+fn no_flipped_bit_and_no_cut_gives_a_message() {
+    let mut buffer = [0; 128];
+    let values: Vec<f32> = (0..16u8).map(f32::from).collect();
+    let message = Message::Observation(Floats::Values(&values));
+    let wire = Sender::default().frame(&message, 5, &mut buffer).expect("there is room").to_vec();
+    for bit in 0..8 * wire.len() {
+        let mut damaged = wire.clone();
+        damaged[bit / 8] ^= 1 << (bit % 8);
+        let mut receiver = Receiver::<LONGEST>::new();
+        let mut messages = found(&mut receiver, &damaged);
+        messages.extend(found(&mut receiver, &[0]));
+        assert_eq!(messages, Vec::<String>::new(), "bit {bit}");
+    }
+    for cut in 0..wire.len() - 1 {
+        let mut receiver = Receiver::<LONGEST>::new();
+        let mut messages = found(&mut receiver, &wire[..cut]);
+        messages.extend(found(&mut receiver, &[0]));
+        assert_eq!(messages, Vec::<String>::new(), "cut behind {cut} bytes");
+        // The frame behind a cut one is found.
+        assert_eq!(found(&mut receiver, &wire).len(), 1, "cut behind {cut} bytes");
+    }
+}
+
+#[test]
+fn frames_with_a_right_checksum_and_a_wrong_content_are_counted_and_give_nothing() {
+    let wrong: [(&str, Vec<u8>); 18] = [
+        ("version 0", content(0, 3, 1, &[])),
+        ("version 2", content(2, 3, 1, &[])),
+        ("kind 0", content(1, 0, 1, &[])),
+        ("kind 11", content(1, 11, 1, &[])),
+        ("kind 127", content(1, 127, 1, &[])),
+        ("kind 255", content(1, 255, 1, &[])),
+        ("an observation of 3 bytes", content(1, 1, 1, &[0; 3])),
+        ("arm without a token", content(1, 2, 1, &[])),
+        ("arm with 5 bytes", content(1, 2, 1, &[0; 5])),
+        ("disarm with a byte", content(1, 3, 1, &[0])),
+        ("get of parameter 0", content(1, 4, 1, &[0, 0])),
+        ("get of parameter 200", content(1, 4, 1, &[200, 0])),
+        ("ask for report 9", content(1, 6, 1, &[9])),
+        ("chunk without an offset", content(1, 8, 1, &[0; 3])),
+        ("commit with half a signature", content(1, 9, 1, &[0; 32])),
+        ("commit with more than a signature", content(1, 9, 1, &[0; 65])),
+        ("an action that is applied twice", content(1, 128, 1, &[0, 0, 0, 0, 2])),
+        ("a status of state 77", content(1, 129, 1, &[77; 46])),
+    ];
+    let mut receiver = Receiver::<LONGEST>::new();
+    for (name, content) in &wrong {
+        assert_eq!(found(&mut receiver, &frame_of(content)), Vec::<String>::new(), "{name}");
+    }
+    let too_short = [&[][..], &[1], &[1; 9]];
+    for content in too_short {
+        assert_eq!(found(&mut receiver, &frame_of(content)), Vec::<String>::new());
+    }
+    let expected = Counters { malformed: wrong.len() as u32, damaged: too_short.len() as u32, ..Counters::default() };
+    assert_eq!(receiver.counters(), expected);
+    // They have not moved the window either.
+    assert_eq!(found(&mut receiver, &frame_of(&content(1, 3, 1, &[]))).len(), 1);
+}
+
+#[test]
+fn noise_gives_no_message() {
+    let mut random = Random::new(14);
+    let mut receiver = Receiver::<{ frame::bytes(64) }>::new();
+    for _ in 0..4_000_000 / 8 {
+        let mut bytes = random.bits().to_le_bytes();
+        // Plenty of frame ends, so that there are plenty of short frames.
+        bytes[0] &= 0x0f;
+        for byte in bytes {
+            assert_eq!(receiver.push(byte), None);
+        }
+    }
+    assert!(receiver.counters().damaged > 10_000);
+}

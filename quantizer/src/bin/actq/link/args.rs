@@ -1,0 +1,191 @@
+//! The command line of `actq link`, `actq keygen` and `actq sign`.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use actq_device::port::Address;
+use actq_link::code::Parameter;
+use clap::{Subcommand, ValueEnum};
+
+#[derive(clap::Args)]
+pub(crate) struct LinkArgs {
+    #[command(subcommand)]
+    pub(crate) command: LinkCommand,
+}
+
+#[derive(Subcommand)]
+pub(crate) enum LinkCommand {
+    /// List the serial ports
+    Ports,
+    /// Show state, counters and times, and follow them until the command is ended
+    Watch(WatchArgs),
+    /// Let the outputs follow the head: for a controller to which something sends observations
+    Arm(PortArgs),
+    /// Let the outputs coast
+    Disarm(PortArgs),
+    /// Read a parameter
+    Get(GetArgs),
+    /// Set a parameter, while disarmed
+    Set(SetArgs),
+    /// Send a recording's observations, each at its time
+    ///
+    /// The image is the one that the controller runs: it says how long an observation is, and its checksum is compared. Episodes
+    /// follow each other without a reset.
+    ///
+    /// Example: actq link stream /dev/ttyACM0 ur3.actq heldout.npz --arm --log drive.npz
+    Stream(StreamArgs),
+    /// Let the controller be a simulator's policy, by the protocol of `actq serve` on standard input and output
+    ///
+    /// A reset disarms, which resets the head. Without --arm the outputs coast, and the head answers all the same.
+    Serve(ServeArgs),
+    /// Send an image into the slot that does not run, and let it run
+    ///
+    /// Example: actq link push /dev/ttyACM0 ur3.actq --signature ur3.sig
+    Push(PushArgs),
+}
+
+#[derive(clap::Args)]
+pub(crate) struct PortArgs {
+    /// A serial port, as /dev/ttyACM0, COM3 or /dev/ttyUSB0@115200 [921600 bits a second where none are named], or a socket:
+    /// tcp:HOST:PORT or unix:PATH
+    pub(crate) port: Address,
+    /// Seconds to ask without an answer, and to wait for a port that is lost
+    #[arg(long, value_name = "SECONDS", default_value = "5", value_parser = seconds)]
+    pub(crate) patience: Duration,
+}
+
+#[derive(clap::Args)]
+pub(crate) struct WatchArgs {
+    #[command(flatten)]
+    pub(crate) port: PortArgs,
+    /// Show them once
+    #[arg(long)]
+    pub(crate) once: bool,
+}
+
+/// A parameter's name.
+#[derive(Clone, Copy, ValueEnum)]
+pub(crate) enum ParameterArg {
+    /// Ticks without observation or action before the safe action
+    Deadline,
+    /// Oldest observation, in µs
+    MaxAge,
+    /// Ticks between two reports of the status; 0: none
+    StatusPeriod,
+    /// Lower limit of an axis
+    Low,
+    /// Upper limit of an axis
+    High,
+    /// Largest change of an axis in a tick
+    Rate,
+    /// Value from which an axis' first action is rate-limited
+    Start,
+}
+
+impl From<ParameterArg> for Parameter {
+    fn from(name: ParameterArg) -> Self {
+        match name {
+            ParameterArg::Deadline => Self::Deadline,
+            ParameterArg::MaxAge => Self::MaxAge,
+            ParameterArg::StatusPeriod => Self::StatusPeriod,
+            ParameterArg::Low => Self::Low,
+            ParameterArg::High => Self::High,
+            ParameterArg::Rate => Self::Rate,
+            ParameterArg::Start => Self::Start,
+        }
+    }
+}
+
+#[derive(clap::Args)]
+pub(crate) struct GetArgs {
+    #[command(flatten)]
+    pub(crate) port: PortArgs,
+    /// Which
+    pub(crate) parameter: ParameterArg,
+    /// Of which axis, from 0 on
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) axis: u8,
+}
+
+#[derive(clap::Args)]
+pub(crate) struct SetArgs {
+    #[command(flatten)]
+    pub(crate) of: GetArgs,
+    /// The value
+    #[arg(allow_negative_numbers = true)]
+    pub(crate) value: f32,
+}
+
+#[derive(clap::Args)]
+pub(crate) struct StreamArgs {
+    #[command(flatten)]
+    pub(crate) port: PortArgs,
+    /// The image that the controller runs
+    pub(crate) image: PathBuf,
+    /// The recording: .npz, .npy or .safetensors
+    pub(crate) recording: PathBuf,
+    /// Observations a second [default: the image's rate]
+    #[arg(long, value_name = "HZ", value_parser = rate)]
+    pub(crate) rate: Option<f64>,
+    /// Arm once observations flow, and disarm at the end
+    #[arg(long)]
+    pub(crate) arm: bool,
+    /// Write what was sent and what came back: obs, action, applied, sent and received (seconds)
+    #[arg(long, value_name = "FILE.npz")]
+    pub(crate) log: Option<PathBuf>,
+}
+
+#[derive(clap::Args)]
+pub(crate) struct ServeArgs {
+    #[command(flatten)]
+    pub(crate) port: PortArgs,
+    /// Arm at the first step of an episode
+    #[arg(long)]
+    pub(crate) arm: bool,
+}
+
+#[derive(clap::Args)]
+pub(crate) struct PushArgs {
+    #[command(flatten)]
+    pub(crate) port: PortArgs,
+    /// The image
+    pub(crate) image: PathBuf,
+    /// Its version, not lower than one that the controller has run [default: that of the signature, else 0]
+    #[arg(long, value_name = "N", conflicts_with = "signature")]
+    pub(crate) version: Option<u32>,
+    /// Its signature, by `actq sign`
+    #[arg(long, value_name = "FILE")]
+    pub(crate) signature: Option<PathBuf>,
+}
+
+#[derive(clap::Args)]
+pub(crate) struct KeygenArgs {
+    /// The file to write the private key to, which only its owner may read; one that is there is never replaced
+    #[arg(long, value_name = "FILE.pem")]
+    pub(crate) out: PathBuf,
+}
+
+#[derive(clap::Args)]
+pub(crate) struct SignArgs {
+    /// The image
+    pub(crate) image: PathBuf,
+    /// The private key, as `actq keygen` or `openssl genpkey -algorithm ed25519` writes it
+    #[arg(long, value_name = "FILE.pem")]
+    pub(crate) key: PathBuf,
+    /// The image's version: a controller that has run a higher one refuses it
+    #[arg(long, value_name = "N")]
+    pub(crate) version: u32,
+    /// The file to write the signature to
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: PathBuf,
+}
+
+fn seconds(text: &str) -> Result<Duration, String> {
+    let seconds = text.parse().ok().filter(|seconds| (0.1..=3600.0).contains(seconds));
+    seconds.map(Duration::from_secs_f64).ok_or_else(|| "0.1 to 3600 seconds".to_owned())
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    let rate = text.parse().ok().filter(|rate| (0.1..=1000.0).contains(rate));
+    rate.ok_or_else(|| "0.1 to 1000 observations a second".to_owned())
+}
