@@ -47,7 +47,7 @@ pub(super) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
         0 => [part(arena, &(dst.offset + range.start..dst.offset + range.end)), &mut [], &mut []],
         _ => regions(arena, &op.regions),
     };
-    if matches!(op.kind, OpKind::Normalize | OpKind::Add | OpKind::Copy) {
+    if matches!(op.kind, OpKind::Normalize | OpKind::Add | OpKind::Mul | OpKind::Copy) {
         (dst, src) = (part(dst, &range), part(src, &range));
     }
     if dst.is_empty() {
@@ -56,6 +56,7 @@ pub(super) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
     match op.kind {
         OpKind::Function(function) => function.apply(f(dst)),
         OpKind::Add => elementwise::add(f(src), f(dst)),
+        OpKind::Mul => elementwise::mul(f(src), f(dst)),
         OpKind::Copy => copy(src, dst),
         OpKind::LstmCell => {
             arch::lstm_elements(range.clone(), f(src), f(third), f(dst));

@@ -36,6 +36,8 @@ pub enum OpKind {
     LstmCell,
     /// A GRU cell: `src` holds `W_ih x + b_ih`, `third` holds `W_hh h + b_hh`, each of gates `[r z n]`, `dst` is the state.
     GruCell,
+    /// `dst *= src`
+    Mul,
 }
 
 impl OpKind {
@@ -143,6 +145,8 @@ operations! {
     LSTM_CELL = 8 "lstm cell": OpKind::LstmCell, Uses { src: 4, third: 1, ..Uses::NONE };
     /// [`OpKind::GruCell`]
     GRU_CELL = 9 "gru cell": OpKind::GruCell, Uses { src: 3, third: 3, reads_dst: true, ..Uses::NONE };
+    /// [`OpKind::Mul`]
+    MUL = 10 "mul": OpKind::Mul, Uses { src: 1, reads_dst: true, ..Uses::NONE };
 }
 
 /// What a writer says in an operation's record.

@@ -6,6 +6,7 @@ mod function;
 mod gru;
 mod linear;
 mod lstm;
+mod mul;
 mod norm;
 mod normalize;
 
@@ -17,6 +18,7 @@ pub use function::Pointwise;
 pub use gru::Gru;
 pub use linear::Linear;
 pub use lstm::Lstm;
+pub use mul::Mul;
 pub use norm::{LayerNorm, RmsNorm};
 pub use normalize::Normalize;
 
@@ -69,6 +71,8 @@ operations! {
     RmsNorm,
     /// Sum of two values.
     Add,
+    /// Product of two values, element by element.
+    Mul,
     /// Parts of values behind each other.
     Concat,
     /// A recurrent cell with a cell state.

@@ -19,6 +19,8 @@ pub(crate) struct Cli {
 
 #[derive(Subcommand)]
 pub(crate) enum Command {
+    /// Make a policy's folder of an ONNX file
+    Import(ImportArgs),
     /// Quantize a policy into an image
     ///
     /// POLICY_DIR holds policy.json (the op list), policy.safetensors (the weights) and, for every method but rtn, a recording
@@ -78,6 +80,16 @@ pub(crate) enum Command {
     ///
     /// Example: actq serve ur3.actq --record drive.npz --policy policies/ur3
     Serve(ServeArgs),
+}
+
+#[derive(clap::Args)]
+pub(crate) struct ImportArgs {
+    /// The ONNX file
+    pub(crate) model: PathBuf,
+    #[arg(long)]
+    pub(crate) output: Option<String>,
+    #[arg(long, value_parser = pair)]
+    pub(crate) state: Vec<(String, String)>,
 }
 
 #[derive(clap::Args)]
@@ -312,6 +324,11 @@ impl From<MethodArg> for Method {
 fn width(text: &str) -> Result<Width, String> {
     let known = text.parse().ok().and_then(Width::from_bits);
     known.ok_or_else(|| "weights have 2, 3, 4 or 8 bits".to_owned())
+}
+
+fn pair(text: &str) -> Result<(String, String), String> {
+    let (from, to) = text.split_once('=').ok_or_else(|| "the form is INPUT=OUTPUT".to_owned())?;
+    Ok((from.to_owned(), to.to_owned()))
 }
 
 fn rounds(text: &str) -> Result<usize, String> {
