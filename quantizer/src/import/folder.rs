@@ -37,7 +37,7 @@ impl Policy {
     pub fn load(path: &Path) -> Result<Self> {
         if is_onnx(path) {
             let imported = onnx::import(path, &Choice::default())?;
-            return Self::of_files(folder_of(path), [path, path], &imported.json, &imported.weights);
+            return Self::of_files(path, [path, path], &imported.json, &imported.weights);
         }
         ensure!(path.is_dir(), "{}: not a folder; give the one that holds policy.json, or an .onnx file", path.display());
         let [json_path, weights_path] = FILES.map(|name| path.join(name));
@@ -46,7 +46,7 @@ impl Policy {
         Self::of_files(path, [&json_path, &weights_path], &json, &weights)
     }
 
-    /// A policy whose recordings are in `dir`, from the bytes of its two files, which errors call by `names`.
+    /// A policy that is at `dir`, from the bytes of its two files, which errors call by `names`.
     pub fn of_files(dir: &Path, names: [&Path; 2], json: &[u8], weights: &[u8]) -> Result<Self> {
         let [json_name, weights_name] = names.map(|name| name.display().to_string());
         let parsed = Json::parse(json).with_context(|| json_name.clone())?;

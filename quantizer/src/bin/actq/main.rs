@@ -15,7 +15,7 @@ use std::process::ExitCode;
 
 use actq::data::{Learned, Recording, Recordings, Sizes, files_of};
 use actq::emit::files;
-use actq::import as policies;
+use actq::import::{FILES, is_onnx};
 use actq::measure::time::StepTime;
 use actq::methods::Method;
 use actq::pipeline::stats::Stats;
@@ -107,7 +107,7 @@ fn run_inspect(args: &InspectArgs) -> Result<()> {
 
 /// All files that a policy's folder may hold, whether they are there or not.
 fn policy_files(dir: &Path) -> Vec<PathBuf> {
-    let own = policies::FILES.map(|name| dir.join(name));
+    let own = if is_onnx(dir) { vec![dir.to_owned()] } else { FILES.map(|name| dir.join(name)).to_vec() };
     own.into_iter().chain(Recording::Calib.paths(dir)).chain(Recording::Heldout.paths(dir)).collect()
 }
 
