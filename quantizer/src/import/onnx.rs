@@ -21,6 +21,7 @@ mod norm;
 mod places;
 mod pointwise;
 pub mod proto;
+mod select;
 mod simplify;
 mod states;
 mod tensor;

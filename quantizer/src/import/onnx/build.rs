@@ -79,6 +79,16 @@ impl Exprs {
                 let norm = Expr::RmsNorm(*of, product(weight, &a), *eps);
                 self.put(norm, len)
             }
+            // Rows that went through the same matrix, with their bias behind them.
+            Expr::Pick(runs) if ones && runs.len() > 1 && runs.iter().all(|run| self.is_whole_linear(run)) => {
+                let (runs, mut at, mut moved) = (runs.clone(), 0, Vec::new());
+                for run in runs {
+                    let b = b[at..at + run.len].to_vec();
+                    moved.push(Run { of: self.affine(run.of, vec![1.0; run.len], b), ..run });
+                    at += run.len;
+                }
+                self.put(Expr::Pick(moved), len)
+            }
             Expr::Spread(one) if uniform(&a).is_some() && uniform(&b).is_some() => {
                 let one = *one;
                 let one = self.affine(one, a[..1].to_vec(), b[..1].to_vec());
@@ -86,6 +96,10 @@ impl Exprs {
             }
             _ => self.put(Expr::Affine(x, a, b), len),
         }
+    }
+
+    fn is_whole_linear(&self, run: &Run) -> bool {
+        matches!(self.get(run.of), Expr::Linear(..)) && run.from == 0 && run.len == self.len_of(run.of)
     }
 
     /// `W x + b`
@@ -257,6 +271,13 @@ impl Exprs {
     /// `x` where positive, else `slope x`, with a slope for each element.
     pub(super) fn leaky(&mut self, x: Id, slope: Vec<f64>) -> Id {
         let positive = self.function(Function::Relu, x);
+        if let Some(slope) = uniform(&slope)
+            && slope < 1.0
+        {
+            let all = self.scaled(x, slope / (1.0 - slope), 0.0);
+            let sum = self.add(positive, all);
+            return self.scaled(sum, 1.0 - slope, 0.0);
+        }
         let rest: Vec<f64> = slope.iter().map(|s| 1.0 - s).collect();
         let zeros = vec![0.0; slope.len()];
         let (positive, all) = (self.affine(positive, rest, zeros.clone()), self.affine(x, slope, zeros));

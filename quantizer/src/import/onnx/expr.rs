@@ -43,6 +43,8 @@ pub(super) enum Unary {
     Reciprocal,
     /// `|x|`
     Abs,
+    /// Whether x is above this.
+    Above(f64),
 }
 
 /// An LSTM or GRU cell.

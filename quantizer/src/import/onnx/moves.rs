@@ -63,6 +63,7 @@ pub(super) fn run(call: &Call<'_>, most: usize) -> Result<Option<Vec<Tensor>>> {
         "Slice" => one(slice(call)?),
         "Split" => split(call).map(Some),
         "Gather" => one(gather(call)?),
+        "GatherND" => one(gather_nd(call)?),
         "Concat" => one(concat(call)?),
         "Expand" => {
             let input = call.input(0)?;
@@ -235,6 +236,27 @@ fn gather(call: &Call<'_>) -> Result<Tensor> {
     input.taken([before, shape, behind].concat(), &found)
 }
 
+/// Pieces at known places.
+fn gather_nd(call: &Call<'_>) -> Result<Tensor> {
+    let input = call.input(0)?;
+    let batch = call.int("batch_dims").and_then(|n| usize::try_from(n).ok()).unwrap_or(0);
+    let indices = call.integers(1, "the indices")?;
+    let (depth, outer) = call.input(1)?.shape.split_last().context("its indices have no axis")?;
+    let piece = batch.checked_add(*depth).and_then(|n| input.shape.get(n..)).context("its indices have too many parts")?;
+    // Batches of length 1 are none.
+    ensure!(*depth > 0 && input.shape[..batch].iter().all(|&n| n == 1), "takes pieces of several batches");
+    let n = count(piece)?;
+    let mut places = Vec::new();
+    for index in indices.chunks(*depth) {
+        let mut at = 0;
+        for (&i, &n) in index.iter().zip(&input.shape[batch..]) {
+            at = at * n + axis(i, n)?;
+        }
+        places.extend(at * n..(at + 1) * n);
+    }
+    input.taken([outer, piece].concat(), &places)
+}
+
 fn concat(call: &Call<'_>) -> Result<Tensor> {
     let parts = call.inputs.iter().copied().flatten().collect::<Vec<_>>();
     let first = parts.first().context("joins nothing")?;
@@ -271,9 +293,9 @@ fn concat(call: &Call<'_>) -> Result<Tensor> {
 /// A choice that is known for every element.
 fn where_known(call: &Call<'_>, most: usize) -> Result<Option<Vec<Tensor>>> {
     let (choice, x, y) = (call.input(0)?, call.input(1)?, call.input(2)?);
-    let Some(_) = choice.integers() else {
-        bail!("chooses by a value of the network; only a choice by constants is taken; {}", super::call::HELP)
-    };
+    if choice.integers().is_none() {
+        return Ok(None);
+    }
     let shape = broadcast(&broadcast(&choice.shape, &x.shape)?, &y.shape)?;
     let choice = expanded(choice, &shape, most)?;
     let whole = x.integers().is_some() && y.integers().is_some();
