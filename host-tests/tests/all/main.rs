@@ -12,6 +12,7 @@ mod faults;
 mod format;
 mod functions;
 mod malformed;
+mod onnx;
 mod ops;
 mod outputs;
 mod parity;

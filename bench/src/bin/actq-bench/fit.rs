@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use actq::emit::{self, files};
-use actq::graph::ops::{Add, Gru, LayerNorm, Lstm, Normalize, Pointwise, RmsNorm};
+use actq::graph::ops::{Add, Gru, LayerNorm, Lstm, Mul, Normalize, Pointwise, RmsNorm};
 use actq::methods::{Activations, Outcome};
 use actq::policy::Policy;
 use actq::random::Random;
@@ -432,6 +432,8 @@ fn policies() -> Result<Vec<(Policy, Vec<Outcome>)>> {
             builder.node_of_part(len, RmsNorm { weight: scale, eps: 1e-5 })?;
             let (a, b) = (builder.part(len)?, builder.part(len)?);
             builder.node(Add, &[a, b])?;
+            let (a, b) = (builder.part(len)?, builder.part(len)?);
+            builder.node(Mul, &[a, b])?;
         }
         for hidden in HIDDEN {
             for width in [Width::W2, Width::W4] {

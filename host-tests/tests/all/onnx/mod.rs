@@ -1,0 +1,93 @@
+//! Policies out of ONNX files: what exporters write gives the actions that another reader of ONNX gives, and nothing in a file
+//! does harm.
+
+mod damaged;
+mod file;
+mod styles;
+
+use std::path::Path;
+
+use actq::import::onnx::{Choice, Imported, import_bytes};
+use actq::measure::actions::actions;
+use actq::policy::Policy;
+use actq_bench::golden::Random;
+use anyhow::{Context as _, Result, ensure};
+use tract_onnx::prelude::*;
+
+/// Steps that are compared.
+const STEPS: usize = 6;
+/// Of the largest action.
+const TOLERANCE: f32 = 1e-5;
+
+fn imported(bytes: &[u8], choice: &Choice) -> Result<(Imported, Policy)> {
+    let imported = import_bytes(bytes.to_vec(), Path::new("."), "test", choice)?;
+    let policy = Policy::of_files(Path::new("."), [Path::new("policy.json"); 2], &imported.json, &imported.weights)?;
+    Ok((imported, policy))
+}
+
+fn drawn(policy: &Policy) -> Vec<Vec<f32>> {
+    let mut random = Random::new(3);
+    (0..STEPS).map(|_| (0..policy.graph.obs_len).map(|_| 2.0 * random.unit()).collect()).collect()
+}
+
+/// What tract gives, step by step, with every state carried on. Inputs have the shapes that the file says, in the file's order.
+fn by_tract(bytes: &[u8], imported: &Imported, observations: &[Vec<f32>]) -> Result<Vec<Vec<f32>>> {
+    let mut model = tract_onnx::onnx().model_for_read(&mut &bytes[..])?;
+    let names: Vec<String> = (0..model.inputs.len()).map(|i| model.input_name(i).map(str::to_owned)).collect::<Result<_, _>>()?;
+    let mut shapes = Vec::new();
+    for i in 0..names.len() {
+        let fact = model.input_fact(i)?.clone();
+        let axes = fact.shape.dims().map(|d| d.concretize().and_then(|d| d.to_usize().ok()).unwrap_or(1)).collect::<Vec<_>>();
+        model.set_input_fact(i, f32::fact(&axes).into())?;
+        shapes.push(axes);
+    }
+    let outputs: Vec<String> =
+        [&imported.output.0].into_iter().chain(imported.states.iter().map(|(_, to, _)| to)).cloned().collect();
+    model = model.with_output_names(&outputs)?;
+    let model = model.into_optimized()?.into_runnable()?;
+    let mut states: Vec<Vec<f32>> = imported.states.iter().map(|(.., len)| vec![0.0; *len]).collect();
+    let mut all = Vec::new();
+    for obs in observations {
+        let mut inputs = TVec::new();
+        for (name, shape) in names.iter().zip(&shapes) {
+            let mut at = 0;
+            let mut values = vec![0.0; shape.iter().product()];
+            for (input, len) in &imported.inputs {
+                if input == name {
+                    values.copy_from_slice(&obs[at..at + len]);
+                }
+                at += len;
+            }
+            if let Some(i) = imported.states.iter().position(|(from, ..)| from == name) {
+                values.clone_from(&states[i]);
+            }
+            inputs.push(Tensor::from_shape(shape, &values)?.into());
+        }
+        let mut results = model.run(inputs)?.into_iter().map(|value| values(&value));
+        all.push(results.next().context("no action")??);
+        states = results.collect::<Result<_>>()?;
+    }
+    Ok(all)
+}
+
+fn values(value: &TValue) -> Result<Vec<f32>> {
+    Ok(value.to_plain_array_view::<f32>()?.iter().copied().collect())
+}
+
+/// That the policy gives what tract gives.
+fn same(bytes: &[u8]) -> Result<Imported> {
+    let (imported, policy) = imported(bytes, &Choice::default())?;
+    let observations = drawn(&policy);
+    compare(&by_tract(bytes, &imported, &observations)?, &actions(&policy, &observations))?;
+    Ok(imported)
+}
+
+fn compare(expected: &[Vec<f32>], ours: &[Vec<f32>]) -> Result<()> {
+    let (expected, ours) = (expected.concat(), ours.concat());
+    ensure!(expected.len() == ours.len(), "{} values, {} are ours", expected.len(), ours.len());
+    let scale = expected.iter().fold(0f32, |most, v| most.max(v.abs()));
+    let error = expected.iter().zip(&ours).fold(0f32, |most, (a, b)| most.max((a - b).abs()));
+    ensure!(scale > 1e-3, "an output that is always 0 says nothing");
+    ensure!(error <= TOLERANCE * scale, "off by {error} of {scale}");
+    Ok(())
+}
