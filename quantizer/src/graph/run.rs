@@ -147,7 +147,9 @@ mod tests {
     fn graph() -> Graph {
         let mut seed = Random::new(11);
         let mut graph = Graph::new(5);
-        for (rows, cols) in [(6, 5)].into_iter().chain([(6, 6); Function::ALL.len()]).chain([(16, 7), (16, 4), (9, 4), (9, 3), (2, 3)]) {
+        for (rows, cols) in
+            [(6, 5)].into_iter().chain([(6, 6); Function::ALL.len()]).chain([(16, 7), (16, 4), (9, 4), (9, 3), (2, 3)])
+        {
             let data = random(rows * cols, &mut seed).iter().map(|w| 0.6 * w).collect();
             graph.matrices.push(WeightMatrix { name: "m".into(), rows, cols, data });
         }

@@ -39,7 +39,11 @@ impl Policy {
             let imported = onnx::import(path, &Choice::default())?;
             return Self::of_files(path, [path, path], &imported.json, &imported.weights);
         }
-        ensure!(path.is_dir(), "{}: not a folder; give the one that holds policy.json, or an .onnx file", path.display());
+        ensure!(
+            path.is_dir(),
+            "{}: not a folder; give the one that holds policy.json, or an .onnx file",
+            path.display()
+        );
         let [json_path, weights_path] = FILES.map(|name| path.join(name));
         let json = fs::read(&json_path).with_context(|| format!("{}: cannot be read", json_path.display()))?;
         let weights = fs::read(&weights_path).with_context(|| format!("{}: cannot be read", weights_path.display()))?;

@@ -96,7 +96,10 @@ fn each_wrong_file_is_refused_by_what_is_wrong_with_it() {
     refused(node("ReduceSum", &[], &[]), "only within a norm");
     refused(node("Frobnicate", &[], &[]), "(Frobnicate): is not known; docs/IMPORT.md lists what is taken");
     refused(node("Cast", &[], &[("to", Value::Int(10))]), "rounds a value of the network to ONNX's type 10");
-    refused(node("Clip", &[], &[("min", Value::Real(2.0)), ("max", Value::Real(1.0))]), "limits to 2 .. 1, which is no range");
+    refused(
+        node("Clip", &[], &[("min", Value::Real(2.0)), ("max", Value::Real(1.0))]),
+        "limits to 2 .. 1, which is no range",
+    );
     let not_finite = with(|file| {
         let w = file.reals(&[4, 4], &[f32::NAN; 16]);
         file.nodes("MatMul", &["obs", &w], &["actions"], &[]);
@@ -108,12 +111,21 @@ fn each_wrong_file_is_refused_by_what_is_wrong_with_it() {
     });
     refused(divided, "(Div): computes with a constant that is not finite, or divides by 0");
     let nested = (0..64).fold(proto::Graph::default(), |inner, _| {
-        let g = proto::Attribute { name: Some("then_branch".to_owned()), g: Some(encoded(&inner)), ..Default::default() };
-        let node = proto::Node { op_type: Some("If".to_owned()), output: vec!["actions".to_owned()], attribute: vec![encoded(&g)], ..Default::default() };
+        let g =
+            proto::Attribute { name: Some("then_branch".to_owned()), g: Some(encoded(&inner)), ..Default::default() };
+        let node = proto::Node {
+            op_type: Some("If".to_owned()),
+            output: vec!["actions".to_owned()],
+            attribute: vec![encoded(&g)],
+            ..Default::default()
+        };
         let output = proto::ValueInfo { name: Some("actions".to_owned()), r#type: None };
         proto::Graph { node: vec![encoded(&node)], output: vec![encoded(&output)], ..Default::default() }
     });
-    refused(encoded(&proto::Model { graph: Some(encoded(&nested)), ..Default::default() }).to_vec(), "graphs stand within each other");
+    refused(
+        encoded(&proto::Model { graph: Some(encoded(&nested)), ..Default::default() }).to_vec(),
+        "graphs stand within each other",
+    );
     let forgets = with(|file| {
         let (w, r) = (file.drawn(&[1, 16, 4]), file.drawn(&[1, 16, 4]));
         let axes = file.ints(&[0]);
@@ -131,7 +143,10 @@ fn each_wrong_file_is_refused_by_what_is_wrong_with_it() {
         file.nodes("Add", &["h_out", "obs"], &["actions"], &[]);
         file.output("h_out", &[1, 4]);
     });
-    refused(lost, "\"h_in\" and the output \"h_out\" look like a recurrent state, but no LSTM or GRU cell is between them");
+    refused(
+        lost,
+        "\"h_in\" and the output \"h_out\" look like a recurrent state, but no LSTM or GRU cell is between them",
+    );
 }
 
 fn read(bytes: Vec<u8>) -> Result<()> {

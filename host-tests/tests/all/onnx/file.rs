@@ -17,7 +17,6 @@ pub(super) enum Value {
     Int(i64),
     Ints(Vec<i64>),
     Real(f32),
-    Text(&'static str),
 }
 
 pub(super) fn tensor(name: &str, dims: &[usize], data: &[f32]) -> proto::Tensor {
@@ -109,7 +108,6 @@ impl File {
                 Value::Int(i) => proto::Attribute { name, i: Some(i), ..Default::default() },
                 Value::Ints(ints) => proto::Attribute { name, ints, ..Default::default() },
                 Value::Real(f) => proto::Attribute { name, f: Some(f), ..Default::default() },
-                Value::Text(s) => proto::Attribute { name, s: Some(s.into()), ..Default::default() },
             })
         };
         // Readers other than ours want the type beside the value.
@@ -117,7 +115,6 @@ impl File {
             let number: u8 = match value {
                 Value::Real(_) => 1,
                 Value::Int(_) => 2,
-                Value::Text(_) => 3,
                 Value::Ints(_) => 7,
             };
             // Field 20, a varint.
@@ -137,7 +134,11 @@ impl File {
     /// `x W + b` as Gemm with weights [out, in].
     pub(super) fn gemm(&mut self, x: &str, rows: usize, cols: usize) -> String {
         let (w, b) = (self.drawn(&[rows, cols]), self.drawn(&[rows]));
-        self.node("Gemm", &[x, &w, &b], &[("transB", Value::Int(1)), ("alpha", Value::Real(1.0)), ("beta", Value::Real(1.0))])
+        self.node(
+            "Gemm",
+            &[x, &w, &b],
+            &[("transB", Value::Int(1)), ("alpha", Value::Real(1.0)), ("beta", Value::Real(1.0))],
+        )
     }
 
     /// The file's bytes.

@@ -1,17 +1,20 @@
 //! Policies out of ONNX files: what exporters write gives the actions that another reader of ONNX gives, and nothing in a file
 //! does harm.
 
+mod command;
 mod damaged;
 mod file;
 mod styles;
 
 use std::path::Path;
 
-use actq::import::onnx::{Choice, Imported, import_bytes};
+use actq::import::onnx::{Choice, Imported, import_bytes, proto};
 use actq::measure::actions::actions;
 use actq::policy::Policy;
 use actq_bench::golden::Random;
 use anyhow::{Context as _, Result, ensure};
+use prost::Message as _;
+use prost::bytes::Bytes;
 use tract_onnx::prelude::*;
 
 /// Steps that are compared.
@@ -33,23 +36,19 @@ fn drawn(policy: &Policy) -> Vec<Vec<f32>> {
 /// What tract gives, step by step, with every state carried on. Inputs have the shapes that the file says, in the file's order.
 fn by_tract(bytes: &[u8], imported: &Imported, observations: &[Vec<f32>]) -> Result<Vec<Vec<f32>>> {
     let mut model = tract_onnx::onnx().model_for_read(&mut &bytes[..])?;
-    let names: Vec<String> = (0..model.inputs.len()).map(|i| model.input_name(i).map(str::to_owned)).collect::<Result<_, _>>()?;
-    let mut shapes = Vec::new();
-    for i in 0..names.len() {
-        let fact = model.input_fact(i)?.clone();
-        let axes = fact.shape.dims().map(|d| d.concretize().and_then(|d| d.to_usize().ok()).unwrap_or(1)).collect::<Vec<_>>();
-        model.set_input_fact(i, f32::fact(&axes).into())?;
-        shapes.push(axes);
+    let ports = ports(bytes)?;
+    for (i, (_, shape)) in ports.iter().enumerate() {
+        model.set_input_fact(i, f32::fact(shape).into())?;
     }
     let outputs: Vec<String> =
         [&imported.output.0].into_iter().chain(imported.states.iter().map(|(_, to, _)| to)).cloned().collect();
-    model = model.with_output_names(&outputs)?;
+    model.select_outputs_by_name(&outputs)?;
     let model = model.into_optimized()?.into_runnable()?;
     let mut states: Vec<Vec<f32>> = imported.states.iter().map(|(.., len)| vec![0.0; *len]).collect();
     let mut all = Vec::new();
     for obs in observations {
         let mut inputs = TVec::new();
-        for (name, shape) in names.iter().zip(&shapes) {
+        for (name, shape) in &ports {
             let mut at = 0;
             let mut values = vec![0.0; shape.iter().product()];
             for (input, len) in &imported.inputs {
@@ -68,6 +67,18 @@ fn by_tract(bytes: &[u8], imported: &Imported, observations: &[Vec<f32>]) -> Res
         states = results.collect::<Result<_>>()?;
     }
     Ok(all)
+}
+
+/// The inputs of a file with their shapes; what is dynamic is 1.
+fn ports(bytes: &[u8]) -> Result<Vec<(String, Vec<usize>)>> {
+    let graph = proto::Graph::decode(proto::Model::decode(bytes)?.graph.context("a graph")?)?;
+    let port = |bytes: &Bytes| -> Result<(String, Vec<usize>)> {
+        let port = proto::ValueInfo::decode(bytes.clone())?;
+        let shape = port.r#type.and_then(|t| t.tensor_type?.shape).context("a shape")?;
+        let axis = |bytes: &Bytes| Ok(proto::Dimension::decode(bytes.clone())?.dim_value.map_or(1, |n| n as usize));
+        Ok((port.name.unwrap_or_default(), shape.dim.iter().map(axis).collect::<Result<_>>()?))
+    };
+    graph.input.iter().map(port).collect()
 }
 
 fn values(value: &TValue) -> Result<Vec<f32>> {

@@ -36,7 +36,11 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
         ensure!(args.force || !path.exists(), "{}: is there already; --force replaces it", path.display());
     }
     let other = others.iter().find(|path| calib.is_some() && path.exists());
-    ensure!(other.is_none(), "{}: is there already, and one recording can be", other.map_or("".into(), |p| p.display().to_string()));
+    ensure!(
+        other.is_none(),
+        "{}: is there already, and one recording can be",
+        other.map_or("".into(), |p| p.display().to_string())
+    );
     let checked = match args.check {
         true => Some(check(&args.model, &imported, &policy, calib.as_ref())?),
         false => None,
@@ -51,9 +55,14 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
     files::write_all(&written)?;
     print(&imported::summary(&imported, &policy))?;
     if let Some((frames, error)) = checked {
-        print(&format!("checked   {frames} observations against onnxruntime: off by {error:.1e} of the largest action at most\n"))?;
+        print(&format!(
+            "checked   {frames} observations against onnxruntime: off by {error:.1e} of the largest action at most\n"
+        ))?;
     }
-    print(&format!("written   {}\n", written.iter().map(|(path, _)| path.display().to_string()).collect::<Vec<_>>().join(", ")))
+    print(&format!(
+        "written   {}\n",
+        written.iter().map(|(path, _)| path.display().to_string()).collect::<Vec<_>>().join(", ")
+    ))
 }
 
 /// Runs the file by onnxruntime and the policy by this program's f32 interpreter; gives the frames, and how far they are apart.
@@ -89,7 +98,8 @@ fn check(model: &Path, imported: &Imported, policy: &Policy, calib: Option<&Data
     let ours = actions(policy, &observations).concat();
     ensure!(expected.len() == ours.len(), "onnxruntime gives {} values, {} are ours", expected.len(), ours.len());
     let scale = expected.iter().fold(0f32, |most, v| most.max(v.abs()));
-    let error = expected.iter().zip(&ours).fold(0f32, |most, (a, b)| most.max((a - b).abs())) / scale.max(f32::MIN_POSITIVE);
+    let error =
+        expected.iter().zip(&ours).fold(0f32, |most, (a, b)| most.max((a - b).abs())) / scale.max(f32::MIN_POSITIVE);
     let finite = expected.iter().chain(&ours).all(|v| v.is_finite());
     ensure!(
         finite && error <= TOLERANCE,

@@ -61,7 +61,8 @@ impl Ends {
                 return Some(None);
             }
             // The shortest text that is this f32.
-            let one = |v: &f64| if *v == none { Some(unlimited) } else { format!("{:?}", *v as f32).parse::<f64>().ok() };
+            let one =
+                |v: &f64| if *v == none { Some(unlimited) } else { format!("{:?}", *v as f32).parse::<f64>().ok() };
             let values: Vec<f64> = first.iter().map(one).collect::<Option<_>>()?;
             values.iter().all(|v| (*v as f32).is_finite()).then_some(Some(values))
         };

@@ -149,8 +149,12 @@ impl Exprs {
             let one = self.add(p, q);
             return self.put(Expr::Spread(one), len);
         }
-        // max(x, 0) + ln(1 + e^-|x|)
         for (p, q) in [(x, y), (y, x)] {
+            if let Some((centred, inverse, a, b)) = self.late_centring(p, q) {
+                let normed = self.mul(centred, inverse);
+                return self.affine(normed, a, b);
+            }
+            // max(x, 0) + ln(1 + e^-|x|)
             if let Some(z) = self.known_of(p, Function::Relu)
                 && let Some(negative) = self.known_of(q, Function::Softplus)
                 && let (absolute, -1.0, 0.0) = self.affine_of(negative)
@@ -160,6 +164,36 @@ impl Exprs {
             }
         }
         self.put(Expr::Add(x.min(y), x.max(y)), len)
+    }
+
+    /// Whether `p + q` is `a r x + (b - a r mean(x))`, as Keras norms: the deviations `x - mean(x)`, r, a and b.
+    fn late_centring(&mut self, p: Id, q: Id) -> Option<(Id, Id, Vec<f64>, Vec<f64>)> {
+        let (product, a, b) = self.split(p);
+        let (mean, c, d) = self.split(q);
+        let (&Expr::Mul(s, t), &Expr::Spread(mean)) = (self.get(product), self.get(mean)) else { return None };
+        let (mean, k, zero) = self.affine_of(mean);
+        let &Expr::Mul(m, r) = self.get(mean) else { return None };
+        let n = self.len_of(product) as f64;
+        for (x, inverse) in [(s, t), (t, s)] {
+            let &Expr::Spread(one) = self.get(inverse) else { continue };
+            let sum = if m == one { r } else { m };
+            let same = (m == one || r == one) && *self.get(sum) == Expr::Sum(x) && zero == 0.0;
+            if same && a.iter().zip(&c).all(|(a, c)| near(c * k * n, -a)) {
+                let mean = self.scaled(sum, -1.0 / n, 0.0);
+                let mean = self.put(Expr::Spread(mean), n as usize);
+                let centred = self.add(x, mean);
+                return Some((centred, inverse, a, b.iter().zip(&d).map(|(b, d)| b + d).collect()));
+            }
+        }
+        None
+    }
+
+    /// An expression as `a x + b`.
+    fn split(&self, id: Id) -> (Id, Vec<f64>, Vec<f64>) {
+        match self.get(id) {
+            Expr::Affine(x, a, b) => (*x, a.clone(), b.clone()),
+            _ => (id, vec![1.0; self.len_of(id)], vec![0.0; self.len_of(id)]),
+        }
     }
 
     /// `x y`

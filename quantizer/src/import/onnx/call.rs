@@ -7,7 +7,8 @@ use super::model::Node;
 use super::tensor::Tensor;
 
 /// What helps where an operation is not known.
-pub(super) const HELP: &str = "docs/IMPORT.md lists what is taken; with --output NAME, a value before this node is the action";
+pub(super) const HELP: &str =
+    "docs/IMPORT.md lists what is taken; with --output NAME, a value before this node is the action";
 
 /// A node and its inputs.
 #[derive(Clone, Copy)]
@@ -40,7 +41,9 @@ impl<'a> Call<'a> {
     pub(super) fn integers(&self, i: usize, what: &str) -> Result<Vec<i64>> {
         let tensor = self.input(i)?;
         let known = tensor.integers().map(<[i64]>::to_vec);
-        known.with_context(|| format!("{what} depends on the observation or is not of integers; export with fixed shapes"))
+        known.with_context(|| {
+            format!("{what} depends on the observation or is not of integers; export with fixed shapes")
+        })
     }
 
     pub(super) fn int(&self, name: &str) -> Option<i64> {
@@ -81,7 +84,8 @@ impl<'a> Call<'a> {
     /// The operation is not one that can be taken.
     pub(super) fn refuse<T>(&self) -> Result<T> {
         match self.op() {
-            "RandomNormal" | "RandomNormalLike" | "RandomUniform" | "RandomUniformLike" | "Multinomial" | "Bernoulli" => {
+            "RandomNormal" | "RandomNormalLike" | "RandomUniform" | "RandomUniformLike" | "Multinomial"
+            | "Bernoulli" => {
                 bail!("draws random numbers; export the deterministic action, or name it with --output")
             }
             "QuantizeLinear" | "DequantizeLinear" | "DynamicQuantizeLinear" | "MatMulInteger" | "QLinearMatMul" => {
@@ -94,7 +98,8 @@ impl<'a> Call<'a> {
             "Softmax" | "LogSoftmax" | "ArgMax" | "TopK" => {
                 bail!("is no operation of an action; --output takes the value before it")
             }
-            "GreaterOrEqual" | "Greater" | "Less" | "LessOrEqual" | "Equal" | "Not" | "And" | "Or" | "IsNaN" | "IsInf" => {
+            "GreaterOrEqual" | "Greater" | "Less" | "LessOrEqual" | "Equal" | "Not" | "And" | "Or" | "IsNaN"
+            | "IsInf" => {
                 bail!("compares with the observation; only comparisons of constants are taken; {HELP}")
             }
             _ => bail!("is not known; {HELP}"),

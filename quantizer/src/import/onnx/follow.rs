@@ -69,7 +69,11 @@ impl<'m> Follower<'m> {
                 self.exprs.node = i;
             }
             self.node(node, scope, depth).with_context(|| {
-                let op = if node.domain.is_empty() { node.op.clone() } else { format!("{}.{}", printable(&node.domain), node.op) };
+                let op = if node.domain.is_empty() {
+                    node.op.clone()
+                } else {
+                    format!("{}.{}", printable(&node.domain), node.op)
+                };
                 format!("node {i} {:?} ({op})", node.name)
             })?;
         }
@@ -81,7 +85,10 @@ impl<'m> Follower<'m> {
             "" => Ok(None),
             name => match scope.get(name) {
                 Some(tensor) => Ok(Some(Rc::clone(tensor))),
-                None => bail!("reads {:?} before anything gives it: the graph has a circle, or its nodes are not in order", printable(name)),
+                None => bail!(
+                    "reads {:?} before anything gives it: the graph has a circle, or its nodes are not in order",
+                    printable(name)
+                ),
             },
         };
         let inputs = node.inputs.iter().map(input).collect::<Result<Vec<_>>>()?;
@@ -138,7 +145,8 @@ impl<'m> Follower<'m> {
 
     /// An operation of ONNX's own.
     fn own(&mut self, call: &Call<'_>) -> Result<Vec<Tensor>> {
-        let own = ["", "ai.onnx", "com.microsoft", "pkg.onnxscript.torch_lib.common"].contains(&call.node.domain.as_str());
+        let own =
+            ["", "ai.onnx", "com.microsoft", "pkg.onnxscript.torch_lib.common"].contains(&call.node.domain.as_str());
         ensure!(own, "operations of this domain are not known; {}", super::call::HELP);
         let most = self.budget;
         if let Some(constant) = call.constant()? {
@@ -173,7 +181,8 @@ impl<'m> Follower<'m> {
         let name = printable(&port.name);
         let types = [0, 1, 11].contains(&port.kind);
         ensure!(types, "the input {name:?} is of ONNX's type {}; export it as float32", port.kind);
-        let shape = port.shape.as_ref().with_context(|| format!("the input {name:?} has no shape; export it with one"))?;
+        let shape =
+            port.shape.as_ref().with_context(|| format!("the input {name:?} has no shape; export it with one"))?;
         let last = shape.len().saturating_sub(1);
         let one = |(axis, n): (usize, &Option<usize>)| {
             ensure!(
@@ -185,7 +194,10 @@ impl<'m> Follower<'m> {
         };
         let shape = shape.iter().enumerate().map(one).collect::<Result<Vec<usize>>>()?;
         let n = count(&shape)?;
-        ensure!((1..=usize::from(u16::MAX)).contains(&n), "the input {name:?} has {n} values; 1 to 65535 can be observed");
+        ensure!(
+            (1..=usize::from(u16::MAX)).contains(&n),
+            "the input {name:?} has {n} values; 1 to 65535 can be observed"
+        );
         let id = self.exprs.put(Expr::Input(i), n);
         if !self.read.contains(&i) {
             self.read.push(i);

@@ -90,12 +90,16 @@ impl Exprs {
         let gates = [i, f, g, o].map(|gate| self.form(gate));
         let gates: Vec<Form> = gates.into_iter().collect::<Option<_>>()?;
         let hidden = self.len_of(next);
-        let h = candidates.iter().copied().find(|run| {
-            run.len == hidden && *run != c && gates.iter().all(|gate| self.reads(gate, run))
-        })?;
+        let h = candidates
+            .iter()
+            .copied()
+            .find(|run| run.len == hidden && *run != c && gates.iter().all(|gate| self.reads(gate, run)))?;
         let (x, w_ih, w_hh, bias) = self.gates(&gates, h)?;
         let b_hh = vec![0.0; bias.len()];
-        Some(Found { cell: Cell { lstm: true, x, w_ih, w_hh, b_ih: bias, b_hh, states: vec![h, c] }, next_c: Some(next_c) })
+        Some(Found {
+            cell: Cell { lstm: true, x, w_ih, w_hh, b_ih: bias, b_hh, states: vec![h, c] },
+            next_c: Some(next_c),
+        })
     }
 
     /// The GRU whose state after the step is `next`: `(1 - z) n + z h` with `n = tanh(input + r (W h + b))`.
@@ -185,7 +189,10 @@ impl Exprs {
         let mut terms = Vec::new();
         for gate in gates {
             for (x, rows) in &gate.terms {
-                let elements = self.elements(*x).into_iter().map(|e| if let Element::Of(of, i) = e { Some((of, i)) } else { None });
+                let elements = self
+                    .elements(*x)
+                    .into_iter()
+                    .map(|e| if let Element::Of(of, i) = e { Some((of, i)) } else { None });
                 let elements: Vec<(Id, usize)> = elements.collect::<Option<_>>()?;
                 for &(of, i) in elements.iter().filter(|(of, i)| !in_state(*of, *i)) {
                     place.entry((of, i)).or_insert_with(|| {

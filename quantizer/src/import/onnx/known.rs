@@ -153,7 +153,8 @@ fn reduce(call: &Call<'_>, x: &Tensor) -> Result<Tensor> {
     };
     let values: Vec<f64> = x.reals().context("is not known")?.chunks(each).map(fold).collect();
     // Lengths of axes are far below what f64 counts exactly.
-    let data = if x.integers().is_some() { Data::Int(values.iter().map(|&v| v as i64).collect()) } else { Data::Real(values) };
+    let data =
+        if x.integers().is_some() { Data::Int(values.iter().map(|&v| v as i64).collect()) } else { Data::Real(values) };
     Ok(Tensor::new(shape, data))
 }
 

@@ -21,7 +21,8 @@ pub(super) fn run(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> 
             let scale = call.reals(1, "the scale")?;
             let bias = if call.optional(2).is_some() { call.reals(2, "the bias")? } else { vec![0.0; scale.len()] };
             let eps = epsilon(1e-5);
-            norm(call, exprs, scale.len(), bias.len(), &|x| Expr::LayerNorm(x, scale.clone(), bias.clone(), eps)).map(Some)
+            norm(call, exprs, scale.len(), bias.len(), &|x| Expr::LayerNorm(x, scale.clone(), bias.clone(), eps))
+                .map(Some)
         }
         "RMSNormalization" | "SimplifiedLayerNormalization" => {
             let scale = call.reals(1, "the scale")?;
@@ -83,12 +84,18 @@ fn norm(call: &Call<'_>, exprs: &mut Exprs, scales: usize, biases: usize, expr: 
 /// What inference makes of a batch norm: a factor and an offset for each channel.
 fn batch_norm(call: &Call<'_>, exprs: &mut Exprs, eps: f64) -> Result<Tensor> {
     let x = call.input(0)?;
-    ensure!(x.shape.len() >= 2 && call.int("training_mode").unwrap_or(0) == 0, "only inference over [batch, channel, ..] is taken");
+    ensure!(
+        x.shape.len() >= 2 && call.int("training_mode").unwrap_or(0) == 0,
+        "only inference over [batch, channel, ..] is taken"
+    );
     let [scale, bias, mean, variance] =
         [(1, "the scale"), (2, "the bias"), (3, "the mean"), (4, "the variance")].map(|(i, what)| call.reals(i, what));
     let (scale, bias, mean, variance) = (scale?, bias?, mean?, variance?);
     let n = x.shape[1];
-    ensure!([&scale, &bias, &mean, &variance].iter().all(|v| v.len() == n), "its constants are not one for each of {n} channels");
+    ensure!(
+        [&scale, &bias, &mean, &variance].iter().all(|v| v.len() == n),
+        "its constants are not one for each of {n} channels"
+    );
     let a: Vec<f64> = scale.iter().zip(&variance).map(|(s, v)| s / (v + eps).sqrt()).collect();
     let b = bias.iter().zip(&mean).zip(&a).map(|((b, m), a)| b - m * a).collect();
     let mut shape = vec![n];
@@ -208,7 +215,8 @@ fn product(call: &Call<'_>, exprs: &mut Exprs, a: &Tensor, b: &Tensor, factor: f
 fn row_product(exprs: &mut Exprs, x: &[Element], w: &Arc<Matrix>) -> Result<Vec<Element>> {
     let open: Vec<usize> = (0..x.len()).filter(|&i| matches!(x[i], Element::Of(..))).collect();
     let known = |i: usize| if let Element::Known(v) = x[i] { v } else { 0.0 };
-    let bias: Vec<f64> = w.data.chunks(w.cols).map(|row| row.iter().enumerate().map(|(i, w)| w * known(i)).sum()).collect();
+    let bias: Vec<f64> =
+        w.data.chunks(w.cols).map(|row| row.iter().enumerate().map(|(i, w)| w * known(i)).sum()).collect();
     if open.is_empty() {
         return Ok(bias.into_iter().map(Element::Known).collect());
     }

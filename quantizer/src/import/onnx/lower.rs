@@ -71,7 +71,8 @@ pub(super) fn lower(
             _ => continue,
         };
         // What an op takes along, it takes whole: at most a clip, factors, a clip.
-        let over = matches!(exprs.get(id), Expr::Affine(..)) && matches!(exprs.get(inner), Expr::Clip(x, _) if lowered.taken.contains(x));
+        let over = matches!(exprs.get(id), Expr::Affine(..))
+            && matches!(exprs.get(inner), Expr::Clip(x, _) if lowered.taken.contains(x));
         if readers.get(&inner) == Some(&1) && !over {
             lowered.taken.insert(inner);
         }
@@ -143,7 +144,12 @@ impl Lowered {
             Expr::LayerNorm(x, weight, bias, eps) => {
                 let w_ln = self.vector("norm.weight", weight)?;
                 let b_ln = self.bias(&w_ln, bias)?;
-                self.push(JsonOp { w_ln: Some(w_ln), b_ln, eps: Some(*eps), ..op("layernorm") }, self.place(*x), None, len)
+                self.push(
+                    JsonOp { w_ln: Some(w_ln), b_ln, eps: Some(*eps), ..op("layernorm") },
+                    self.place(*x),
+                    None,
+                    len,
+                )
             }
             Expr::RmsNorm(x, weight, eps) => {
                 let w_ln = Some(self.vector("norm.weight", weight)?);
@@ -151,7 +157,9 @@ impl Lowered {
             }
             Expr::Cell(cell) => self.cell(cell, len)?,
             Expr::CellState(_) => bail!("an LSTM's cell state is read outside its cell"),
-            Expr::Unary(f, _) => bail!("{f:?} is no operation of the network by itself, only within a norm, GELU or softplus"),
+            Expr::Unary(f, _) => {
+                bail!("{f:?} is no operation of the network by itself, only within a norm, GELU or softplus")
+            }
             Expr::Sum(_) => bail!("a sum or mean is no operation of the network by itself, only within a norm"),
             Expr::Input(_) | Expr::Pick(_) | Expr::Spread(_) => bail!("is only moved"),
         })
@@ -228,7 +236,10 @@ impl Lowered {
         let last = self.ops.len();
         if self.place(root)[..] != [Part { slot: last, from: 0, len: self.lens[last] }] || last == 0 {
             let n = self.place(root).iter().map(|part| part.len).sum();
-            ensure!(self.place(root) != [Part { slot: 0, from: 0, len: self.lens[0] }], "the action is the observation itself");
+            ensure!(
+                self.place(root) != [Part { slot: 0, from: 0, len: self.lens[0] }],
+                "the action is the observation itself"
+            );
             self.push(JsonOp { op: "identity".to_owned(), ..JsonOp::default() }, self.place(root), None, n);
         }
         Ok(())
@@ -246,10 +257,15 @@ impl Lowered {
             op.input = match &input[..] {
                 [part] if whole(part) && part.slot == i => None,
                 [part] if whole(part) => Some(Input::One(name(part.slot))),
-                parts => Some(Input::Many(parts.iter().map(|part| match whole(part) {
-                    true => name(part.slot),
-                    false => format!("{}[{}:{}]", name(part.slot), part.from, part.from + part.len),
-                }).collect())),
+                parts => Some(Input::Many(
+                    parts
+                        .iter()
+                        .map(|part| match whole(part) {
+                            true => name(part.slot),
+                            false => format!("{}[{}:{}]", name(part.slot), part.from, part.from + part.len),
+                        })
+                        .collect(),
+                )),
             };
             if op.input.is_some() {
                 named.extend(input.iter().map(|part| part.slot));
@@ -289,7 +305,10 @@ impl Lowered {
     /// Takes a tensor, rounded to f32, and gives its name, which has a number where it is taken.
     fn weight(&mut self, wanted: &str, shape: Vec<usize>, values: &[f64]) -> Result<String> {
         let data: Vec<f32> = values.iter().map(|&v| v as f32).collect();
-        ensure!(data.iter().all(|v| v.is_finite()), "{wanted:?} holds a value that is not finite, or beyond float32's range");
+        ensure!(
+            data.iter().all(|v| v.is_finite()),
+            "{wanted:?} holds a value that is not finite, or beyond float32's range"
+        );
         let mut name = wanted.to_owned();
         let mut number = 1;
         while !self.names.insert(name.clone()) {

@@ -201,7 +201,11 @@ impl Graph {
     pub(super) fn parse(bytes: &Bytes) -> Result<Self> {
         let graph: proto::Graph = decode(bytes, "the graph")?;
         let nodes = nodes(&graph.node)?;
-        ensure!(graph.initializer.len() <= MOST, "there are {} initializers, {MOST} are the most", graph.initializer.len());
+        ensure!(
+            graph.initializer.len() <= MOST,
+            "there are {} initializers, {MOST} are the most",
+            graph.initializer.len()
+        );
         let mut initializers = HashMap::new();
         for bytes in graph.initializer {
             let tensor: Name = decode(&bytes, "an initializer")?;

@@ -112,7 +112,13 @@ fn lengths(shape: &[i64]) -> Result<Vec<usize>> {
 fn cast(call: &Call<'_>) -> Result<Tensor> {
     let input = call.input(0)?;
     let to = match call.op() {
-        "CastLike" => if matches!(call.input(1)?.data, Data::Int(_)) { 7 } else { 1 },
+        "CastLike" => {
+            if matches!(call.input(1)?.data, Data::Int(_)) {
+                7
+            } else {
+                1
+            }
+        }
         _ => call.int("to").unwrap_or(0),
     };
     let data = match (to, &input.data) {
@@ -147,11 +153,14 @@ fn constant(call: &Call<'_>) -> Result<Tensor> {
 pub(super) fn constant_of_shape(call: &Call<'_>, fill: &Data, most: usize) -> Result<Tensor> {
     let shape = lengths(&call.integers(0, "the shape")?)?;
     let n = room(&shape, most)?;
-    Ok(Tensor::new(shape, match fill {
-        Data::Int(v) => Data::Int(vec![v.first().copied().unwrap_or(0); n]),
-        Data::Real(v) => Data::Real(vec![v.first().copied().unwrap_or(0.0); n]),
-        Data::Open(_) => bail!("its value is not known"),
-    }))
+    Ok(Tensor::new(
+        shape,
+        match fill {
+            Data::Int(v) => Data::Int(vec![v.first().copied().unwrap_or(0); n]),
+            Data::Real(v) => Data::Real(vec![v.first().copied().unwrap_or(0.0); n]),
+            Data::Open(_) => bail!("its value is not known"),
+        },
+    ))
 }
 
 fn range(call: &Call<'_>, most: usize) -> Result<Tensor> {
@@ -161,10 +170,13 @@ fn range(call: &Call<'_>, most: usize) -> Result<Tensor> {
     let n = ((limit - start) / step).ceil().max(0.0);
     ensure!(n.is_finite() && n <= most as f64, "from {start} to {limit} in steps of {step} is too long");
     let values = (0..n as usize).map(|i| start + i as f64 * step);
-    Ok(Tensor::new(vec![n as usize], match whole(0) {
-        true => Data::Int(values.map(|v| v as i64).collect()),
-        false => Data::Real(values.collect()),
-    }))
+    Ok(Tensor::new(
+        vec![n as usize],
+        match whole(0) {
+            true => Data::Int(values.map(|v| v as i64).collect()),
+            false => Data::Real(values.collect()),
+        },
+    ))
 }
 
 fn reshape(call: &Call<'_>) -> Result<Tensor> {
@@ -189,7 +201,10 @@ fn slice(call: &Call<'_>) -> Result<Tensor> {
     let ends = call.ints_or_input("ends", 2)?.context("has no ends")?;
     let axes = call.ints_or_input("axes", 3)?.unwrap_or_else(|| (0..starts.len() as i64).collect());
     let steps = if call.optional(4).is_some() { call.integers(4, "the steps")? } else { vec![1; starts.len()] };
-    ensure!(ends.len() == starts.len() && axes.len() == starts.len() && steps.len() == starts.len(), "its lists differ in length");
+    ensure!(
+        ends.len() == starts.len() && axes.len() == starts.len() && steps.len() == starts.len(),
+        "its lists differ in length"
+    );
     let mut kept = input.clone();
     for (((start, end), at), step) in starts.into_iter().zip(ends).zip(axes).zip(steps) {
         let at = axis(at, kept.shape.len())?;
@@ -208,7 +223,8 @@ fn split(call: &Call<'_>) -> Result<Vec<Tensor>> {
     let parts = match call.ints_or_input("split", 1)? {
         Some(parts) => lengths(&parts)?,
         None => {
-            let outputs = call.int("num_outputs").and_then(|n| usize::try_from(n).ok()).unwrap_or(call.node.outputs.len());
+            let outputs =
+                call.int("num_outputs").and_then(|n| usize::try_from(n).ok()).unwrap_or(call.node.outputs.len());
             ensure!((1..=n.max(1)).contains(&outputs), "{n} values cannot be split into {outputs} parts");
             let each = n.div_ceil(outputs);
             (0..outputs).map(|i| each.min(n.saturating_sub(i * each))).collect()
@@ -242,7 +258,8 @@ fn gather_nd(call: &Call<'_>) -> Result<Tensor> {
     let batch = call.int("batch_dims").and_then(|n| usize::try_from(n).ok()).unwrap_or(0);
     let indices = call.integers(1, "the indices")?;
     let (depth, outer) = call.input(1)?.shape.split_last().context("its indices have no axis")?;
-    let piece = batch.checked_add(*depth).and_then(|n| input.shape.get(n..)).context("its indices have too many parts")?;
+    let piece =
+        batch.checked_add(*depth).and_then(|n| input.shape.get(n..)).context("its indices have too many parts")?;
     // Batches of length 1 are none.
     ensure!(*depth > 0 && input.shape[..batch].iter().all(|&n| n == 1), "takes pieces of several batches");
     let n = count(piece)?;
@@ -301,8 +318,13 @@ fn where_known(call: &Call<'_>, most: usize) -> Result<Option<Vec<Tensor>>> {
     let whole = x.integers().is_some() && y.integers().is_some();
     let (x, y) = (expanded(x, &shape, most)?, expanded(y, &shape, most)?);
     let n = x.len();
-    let places: Vec<usize> =
-        choice.integers().unwrap_or_default().iter().enumerate().map(|(i, &c)| if c != 0 { i } else { n + i }).collect();
+    let places: Vec<usize> = choice
+        .integers()
+        .unwrap_or_default()
+        .iter()
+        .enumerate()
+        .map(|(i, &c)| if c != 0 { i } else { n + i })
+        .collect();
     let both = match (x.integers(), y.integers()) {
         (Some(x), Some(y)) if whole => Tensor::ints([x, y].concat()),
         _ => Tensor::of_elements(vec![2 * n], [x.elements(), y.elements()].concat()),
@@ -313,7 +335,10 @@ fn where_known(call: &Call<'_>, most: usize) -> Result<Option<Vec<Tensor>>> {
 /// Rows at known places are replaced.
 fn scatter(call: &Call<'_>) -> Result<Tensor> {
     let (data, updates) = (call.input(0)?, call.input(2)?);
-    ensure!(matches!(call.text("reduction").as_deref(), None | Some("none")), "only replaces where it has no reduction");
+    ensure!(
+        matches!(call.text("reduction").as_deref(), None | Some("none")),
+        "only replaces where it has no reduction"
+    );
     let indices = call.integers(1, "the indices")?;
     let depth = call.input(1)?.shape.last().copied().unwrap_or(1);
     ensure!((1..=data.shape.len()).contains(&depth), "its indices have {depth} parts for {} axes", data.shape.len());

@@ -90,12 +90,19 @@ fn network(model: &Model, name: &str, choice: &Choice) -> Result<Imported> {
 
     let value = Tensor::of_elements(act_shape.clone(), cells.elements(&outputs[chosen].value));
     let values = value.elements();
-    let open = values.iter().map(|e| if let Element::Of(id, i) = e { Some((*id, *i)) } else { None }).collect::<Option<Vec<_>>>();
-    let open = open.with_context(|| format!("the output {:?} has constants among its values", printable(&action)))?;
+    // A constant among the values is 0 times another one, and an offset.
+    let first = values.iter().find_map(|e| if let Element::Of(id, i) = e { Some((*id, *i)) } else { None });
+    let first = first.with_context(|| format!("the output {:?} depends on no input", printable(&action)))?;
+    let open: Vec<(Id, usize)> =
+        values.iter().map(|e| if let Element::Of(id, i) = e { (*id, *i) } else { first }).collect();
+    let parts = |e: &Element| if let Element::Known(v) = e { (0.0, *v) } else { (1.0, 0.0) };
+    let (scale, offset) = values.iter().map(parts).unzip();
     let root = exprs.vector(&open);
+    let root = exprs.affine(root, scale, offset);
     let live = exprs.needed_instead(&[root], &cells.instead);
     let pairs = cells.pairs(model, &exprs, &live, &outputs)?;
-    let mut read: Vec<usize> = live.iter().filter_map(|&id| if let Expr::Input(i) = exprs.get(id) { Some(*i) } else { None }).collect();
+    let mut read: Vec<usize> =
+        live.iter().filter_map(|&id| if let Expr::Input(i) = exprs.get(id) { Some(*i) } else { None }).collect();
     read.sort_unstable();
     refuse_lost_states(model, &read, &pairs, &outputs, &action, &choice.states)?;
     read.retain(|i| !pairs.iter().any(|(state, _)| state == i));
@@ -128,7 +135,14 @@ fn network(model: &Model, name: &str, choice: &Choice) -> Result<Imported> {
     let lowered = lower(&exprs, root, &offsets, obs_len).map_err(|(id, error)| at_node(model, &exprs, id, error))?;
     let used = |name: &str| inputs.iter().any(|(n, _)| n == name) || states.iter().any(|(n, ..)| n == name);
     let shown = |name: &String| printable(name).into_owned();
-    let cut_inputs: Vec<String> = model.graph.inputs.iter().filter(|port| !model.graph.initializers.contains_key(&port.name)).map(|port| shown(&port.name)).filter(|name| !used(name)).collect();
+    let cut_inputs: Vec<String> = model
+        .graph
+        .inputs
+        .iter()
+        .filter(|port| !model.graph.initializers.contains_key(&port.name))
+        .map(|port| shown(&port.name))
+        .filter(|name| !used(name))
+        .collect();
     let is_cut = |name: &String| *name != shown(&action) && !states.iter().any(|(_, to, _)| to == name);
     let cut_outputs = model.graph.outputs.iter().map(|port| shown(&port.name)).filter(is_cut).collect();
     let keys = contract.iter().flat_map(keys).collect();
@@ -162,7 +176,8 @@ fn network(model: &Model, name: &str, choice: &Choice) -> Result<Imported> {
 }
 
 fn keys(contract: &JsonContract) -> Vec<&'static str> {
-    let all = [("scale", &contract.scale), ("offset", &contract.offset), ("low", &contract.low), ("high", &contract.high)];
+    let all =
+        [("scale", &contract.scale), ("offset", &contract.offset), ("low", &contract.low), ("high", &contract.high)];
     all.into_iter().filter(|(_, values)| values.is_some()).map(|(name, _)| name).collect()
 }
 
@@ -254,17 +269,20 @@ fn text(
     if !states.is_empty() {
         extra += &about("states", serde_json::to_string(states)?);
     }
-    let ops: Vec<String> = lowered.ops.iter().map(|op| Ok(format!("    {}", serde_json::to_string(op)?))).collect::<Result<_>>()?;
+    let ops: Vec<String> =
+        lowered.ops.iter().map(|op| Ok(format!("    {}", serde_json::to_string(op)?))).collect::<Result<_>>()?;
     let end = text.rfind("  \"ops\": []").context("policy.json has ops")?;
     text.truncate(end);
     Ok(format!("{text}{extra}  \"ops\": [\n{}\n  ]\n}}\n", ops.join(",\n")).into_bytes())
 }
 
 fn tensors(lowered: &Lowered) -> Result<Vec<u8>> {
-    let bytes: Vec<Vec<u8>> = lowered.weights.iter().map(|w| w.data.iter().flat_map(|v| v.to_le_bytes()).collect()).collect();
-    let views = lowered.weights.iter().zip(&bytes).map(|(weight, bytes)| {
-        Ok((weight.name.as_str(), TensorView::new(Dtype::F32, weight.shape.clone(), bytes)?))
-    });
+    let bytes: Vec<Vec<u8>> =
+        lowered.weights.iter().map(|w| w.data.iter().flat_map(|v| v.to_le_bytes()).collect()).collect();
+    let views =
+        lowered.weights.iter().zip(&bytes).map(|(weight, bytes)| {
+            Ok((weight.name.as_str(), TensorView::new(Dtype::F32, weight.shape.clone(), bytes)?))
+        });
     let views: BTreeMap<&str, TensorView<'_>> = views.collect::<Result<_>>()?;
     Ok(safetensors::serialize(views, None)?)
 }

@@ -72,7 +72,12 @@ impl Exprs {
             let ((squares, a, b), (mean, c, d)) = (self.affine_of(first), self.affine_of(second));
             let &Expr::Mul(p, q) = self.get(mean) else { return false };
             let sums = p == q && *self.get(p) == Expr::Sum(u);
-            self.squares_of(squares) == Some(u) && sums && b == 0.0 && d == 0.0 && near(a * n, 1.0) && near(c * n * n, -1.0)
+            self.squares_of(squares) == Some(u)
+                && sums
+                && b == 0.0
+                && d == 0.0
+                && near(a * n, 1.0)
+                && near(c * n * n, -1.0)
         })
     }
 }

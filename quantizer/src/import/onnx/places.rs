@@ -67,7 +67,8 @@ pub(super) fn transpose(shape: &[usize], order: &[usize]) -> Result<Places> {
     let out: Vec<usize> = order.iter().map(|&axis| shape[axis]).collect();
     let mut places = vec![0];
     for (&axis, &n) in order.iter().zip(&out) {
-        places = places.iter().flat_map(|&at| (0..n).map(move |i| (at, i))).map(|(at, i)| at + i * from[axis]).collect();
+        places =
+            places.iter().flat_map(|&at| (0..n).map(move |i| (at, i))).map(|(at, i)| at + i * from[axis]).collect();
     }
     Ok((out, places))
 }

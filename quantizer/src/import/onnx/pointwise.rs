@@ -26,7 +26,9 @@ pub(super) fn run(call: &Call<'_>, exprs: &mut Exprs, most: usize) -> Result<Opt
                 all = two(op, exprs, &all, next, most)?;
             }
             if call.op() == "Mean" {
-                all = each(exprs, &all, &|exprs, x| exprs.scaled(x, 1.0 / given.len() as f64, 0.0), &|v| v / given.len() as f64);
+                all = each(exprs, &all, &|exprs, x| exprs.scaled(x, 1.0 / given.len() as f64, 0.0), &|v| {
+                    v / given.len() as f64
+                });
             }
             Ok(Some(all))
         }
@@ -71,7 +73,8 @@ fn not(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> {
 
 /// A choice by a value of the network, where it makes up an activation.
 fn choice(call: &Call<'_>, exprs: &mut Exprs, most: usize) -> Result<Tensor> {
-    let refused = || anyhow::anyhow!("chooses by a value of the network in a way that no activation does; {}", super::call::HELP);
+    let refused =
+        || anyhow::anyhow!("chooses by a value of the network in a way that no activation does; {}", super::call::HELP);
     let (condition, x, y) = (call.input(0)?, call.input(1)?, call.input(2)?);
     let shape = broadcast(&broadcast(&condition.shape, &x.shape)?, &y.shape)?;
     let [condition, x, y] = [condition, x, y].map(|tensor| expanded(tensor, &shape, most).map(|t| t.elements()));
@@ -296,7 +299,9 @@ pub(super) fn two(op: &str, exprs: &mut Exprs, x: &Tensor, y: &Tensor, most: usi
 fn affine(exprs: &mut Exprs, x: Id, a: Vec<f64>, b: Vec<f64>) -> Result<Vec<Element>> {
     ensure!(a.iter().chain(&b).all(|v| v.is_finite()), "computes with a constant that is not finite, or divides by 0");
     let known: Vec<Option<f64>> = a.iter().zip(&b).map(|(&a, &b)| (a == 0.0).then_some(b)).collect();
-    let kept = |values: Vec<f64>, none: f64| values.into_iter().zip(&known).map(|(v, k)| if k.is_some() { none } else { v }).collect();
+    let kept = |values: Vec<f64>, none: f64| {
+        values.into_iter().zip(&known).map(|(v, k)| if k.is_some() { none } else { v }).collect()
+    };
     let value = exprs.affine(x, kept(a, 1.0), kept(b, 0.0));
     let elements = exprs.elements(value).into_iter().zip(known);
     Ok(elements.map(|(element, known)| known.map_or(element, Element::Known)).collect())

@@ -23,14 +23,19 @@ pub(super) fn simplify(exprs: &mut Exprs, root: Id, instead: &HashMap<Id, Id>) -
             let operand = instead.get(operand).copied().unwrap_or(*operand);
             new.get(&operand).copied().unwrap_or(operand)
         };
-        let read_by = |operand: &Id| readers.get(&instead.get(operand).copied().unwrap_or(*operand)).map_or(&[][..], |r| r);
+        let read_by =
+            |operand: &Id| readers.get(&instead.get(operand).copied().unwrap_or(*operand)).map_or(&[][..], |r| r);
         let len = exprs.len_of(id);
         let done = match old {
             Expr::Affine(x, a, b) => {
                 let value = of(&x);
                 match exprs.get(value) {
                     Expr::Linear(y, w, bias) if read_by(&x).len() == 1 => {
-                        let (y, w, bias) = (*y, scaled_rows(w, &a), bias.iter().zip(&a).zip(&b).map(|((bias, a), b)| bias * a + b).collect());
+                        let (y, w, bias) = (
+                            *y,
+                            scaled_rows(w, &a),
+                            bias.iter().zip(&a).zip(&b).map(|((bias, a), b)| bias * a + b).collect(),
+                        );
                         exprs.put(Expr::Linear(y, w, bias), len)
                     }
                     _ => exprs.put(Expr::Affine(value, a, b), len),

@@ -91,7 +91,10 @@ impl Cells {
                     format!("no output holds the next value of the state {name:?}; export it as an output, in the state's order")
                 })?;
                 let known = pairs.iter().find(|(other, _)| *other == input);
-                ensure!(known.is_none_or(|(_, other)| *other == output), "the state {name:?} is carried by two outputs");
+                ensure!(
+                    known.is_none_or(|(_, other)| *other == output),
+                    "the state {name:?} is carried by two outputs"
+                );
                 if known.is_none() {
                     pairs.push((input, output));
                 }
@@ -112,9 +115,10 @@ fn input_of(model: &Model, exprs: &Exprs, run: &Run) -> Result<(usize, String)> 
 fn candidates(model: &Model, exprs: &mut Exprs, output: &Output, place: Run, named: &[(String, String)]) -> Vec<Run> {
     let mut found: Vec<(usize, Run)> = Vec::new();
     for (i, port) in model.graph.inputs.iter().enumerate() {
-        let len: Option<usize> = port.shape.as_ref().and_then(|shape| {
-            shape.iter().try_fold(1usize, |n, axis| n.checked_mul(axis.unwrap_or(1)))
-        });
+        let len: Option<usize> = port
+            .shape
+            .as_ref()
+            .and_then(|shape| shape.iter().try_fold(1usize, |n, axis| n.checked_mul(axis.unwrap_or(1))));
         if len != Some(output.value.len()) {
             continue;
         }
@@ -134,10 +138,13 @@ fn candidates(model: &Model, exprs: &mut Exprs, output: &Output, place: Run, nam
 
 /// A name without what tells a state before a step from the one after it.
 fn stem(name: &str) -> String {
-    const SIDES: [&str; 16] =
-        ["in", "out", "input", "output", "inputs", "outputs", "prev", "next", "new", "old", "last", "state", "states", "0", "n", "t"];
+    const SIDES: [&str; 16] = [
+        "in", "out", "input", "output", "inputs", "outputs", "prev", "next", "new", "old", "last", "state", "states",
+        "0", "n", "t",
+    ];
     let lower = name.to_lowercase();
-    let parts = lower.split(|c: char| !c.is_ascii_alphanumeric()).filter(|part| !part.is_empty() && !SIDES.contains(part));
+    let parts =
+        lower.split(|c: char| !c.is_ascii_alphanumeric()).filter(|part| !part.is_empty() && !SIDES.contains(part));
     let joined = parts.collect::<Vec<_>>().join("_");
     // h0 and hn, hin and hout
     for end in ["in", "out", "n", "0"] {
@@ -160,13 +167,21 @@ pub(super) fn refuse_lost_states(
     let help = "only the states of LSTM and GRU cells (torch's forms) are carried from step to step";
     for (from, to) in named {
         let is_pair = |(i, o): &(usize, usize)| model.graph.inputs[*i].name == *from && outputs[*o].name == *to;
-        ensure!(pairs.iter().any(is_pair), "--state {}={}: between them is no cell that the action needs; {help}", printable(from), printable(to));
+        ensure!(
+            pairs.iter().any(is_pair),
+            "--state {}={}: between them is no cell that the action needs; {help}",
+            printable(from),
+            printable(to)
+        );
     }
     for &i in live_inputs.iter().filter(|i| !pairs.iter().any(|(state, _)| state == *i)) {
         let port = &model.graph.inputs[i];
         let len: usize = port.shape.iter().flatten().map(|n| n.unwrap_or(1)).product();
         let same = |output: &&Output| {
-            output.name != action && output.value.len() == len && !stem(&port.name).is_empty() && stem(&port.name) == stem(&output.name)
+            output.name != action
+                && output.value.len() == len
+                && !stem(&port.name).is_empty()
+                && stem(&port.name) == stem(&output.name)
         };
         if let Some(output) = outputs.iter().find(same) {
             bail!(
