@@ -16,6 +16,9 @@ struct Form {
     bias: Vec<f64>,
 }
 
+/// What a cell's gates read beside the state, the matrices of that and of the state, and the biases.
+type Gates = (Id, Arc<Matrix>, Arc<Matrix>, Vec<f64>);
+
 /// A cell that was taken apart.
 pub(super) struct Found {
     pub(super) cell: Cell,
@@ -181,7 +184,7 @@ impl Exprs {
     }
 
     /// The gates behind each other: what they read beside the state, the matrices of it and of the state, and the biases.
-    fn gates(&mut self, gates: &[Form], h: Run) -> Option<(Id, Arc<Matrix>, Arc<Matrix>, Vec<f64>)> {
+    fn gates(&mut self, gates: &[Form], h: Run) -> Option<Gates> {
         // Every element that a gate reads beside the state, once.
         let mut read: Vec<(Id, usize)> = Vec::new();
         let mut place: std::collections::HashMap<(Id, usize), usize> = std::collections::HashMap::new();

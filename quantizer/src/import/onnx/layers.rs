@@ -15,7 +15,7 @@ use super::tensor::{Data, Element, Tensor, count};
 pub(super) fn run(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> {
     let epsilon = |default: f64| call.float("epsilon").unwrap_or(default);
     match call.op() {
-        "MatMul" => product(call, exprs, call.input(0)?, call.input(1)?, 1.0).map(Some),
+        "MatMul" => product(exprs, call.input(0)?, call.input(1)?, 1.0).map(Some),
         "Gemm" => gemm(call, exprs).map(Some),
         "LayerNormalization" => {
             let scale = call.reals(1, "the scale")?;
@@ -145,7 +145,7 @@ fn gemm(call: &Call<'_>, exprs: &mut Exprs) -> Result<Tensor> {
         Ok(Tensor { name: x.name.clone(), ..x.taken(shape, &places)? })
     };
     let (a, b) = (turned(0, "transA")?, turned(1, "transB")?);
-    let y = product(call, exprs, &a, &b, call.float("alpha").unwrap_or(1.0))?;
+    let y = product(exprs, &a, &b, call.float("alpha").unwrap_or(1.0))?;
     let Some(c) = call.optional(2) else { return Ok(y) };
     let beta = Tensor::new(vec![], Data::Real(vec![call.float("beta").unwrap_or(1.0)]));
     let c = match c.reals() {
@@ -168,7 +168,7 @@ fn matrix(w: &Tensor, factor: f64, what: &str) -> Result<Arc<Matrix>> {
 }
 
 /// `factor A B`, one of which is known.
-fn product(call: &Call<'_>, exprs: &mut Exprs, a: &Tensor, b: &Tensor, factor: f64) -> Result<Tensor> {
+fn product(exprs: &mut Exprs, a: &Tensor, b: &Tensor, factor: f64) -> Result<Tensor> {
     ensure!(!a.shape.is_empty() && !b.shape.is_empty(), "multiplies {:?} with {:?}", a.shape, b.shape);
     match (a.is_known(), b.is_known()) {
         (false, true) => {}
@@ -182,7 +182,7 @@ fn product(call: &Call<'_>, exprs: &mut Exprs, a: &Tensor, b: &Tensor, factor: f
                 let (shape, places) = transpose(&x.shape, &order)?;
                 Ok(Tensor { name: x.name.clone(), ..x.taken(shape, &places)? })
             };
-            let y = product(call, exprs, &flat(b)?, &flat(a)?, factor)?;
+            let y = product(exprs, &flat(b)?, &flat(a)?, factor)?;
             return if a.shape.len() > 1 && b.shape.len() > 1 { flat(&y) } else { Ok(y) };
         }
         (true, true) => bail!("multiplies constants of {:?} and {:?}", a.shape, b.shape),

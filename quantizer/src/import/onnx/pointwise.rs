@@ -10,6 +10,9 @@ use super::moves::expanded;
 use super::places::broadcast;
 use super::tensor::{Element, Tensor};
 
+/// What works on all elements of a vector.
+type OnVector = Box<dyn Fn(&mut Exprs, Id) -> Id>;
+
 /// The output, where the node is such an operation.
 pub(super) fn run(call: &Call<'_>, exprs: &mut Exprs, most: usize) -> Result<Option<Tensor>> {
     match call.op() {
@@ -141,7 +144,7 @@ fn one(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> {
         }
     };
     let tanh_form = call.text("approximate").is_some_and(|form| form == "tanh");
-    let open: Box<dyn Fn(&mut Exprs, Id) -> Id> = match call.op() {
+    let open: OnVector = match call.op() {
         "Relu" => Box::new(function(Function::Relu)),
         "Tanh" => Box::new(function(Function::Tanh)),
         "Sigmoid" => Box::new(function(Function::Sigmoid)),
@@ -200,7 +203,7 @@ fn one(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> {
 }
 
 /// `x sigmoid(k x)`
-fn gate(k: f64) -> Box<dyn Fn(&mut Exprs, Id) -> Id> {
+fn gate(k: f64) -> OnVector {
     Box::new(move |exprs, x| {
         let scaled = exprs.scaled(x, k, 0.0);
         let silu = exprs.function(Function::Silu, scaled);
@@ -209,7 +212,7 @@ fn gate(k: f64) -> Box<dyn Fn(&mut Exprs, Id) -> Id> {
 }
 
 /// `gamma x` where positive, else `gamma alpha (exp(x) - 1)`: of the two, `alpha elu(x) + (1 - alpha) relu(x)`.
-fn elu(alpha: f64, gamma: f64) -> Box<dyn Fn(&mut Exprs, Id) -> Id> {
+fn elu(alpha: f64, gamma: f64) -> OnVector {
     Box::new(move |exprs, x| {
         let elu = exprs.function(Function::Elu, x);
         let sum = if alpha == 1.0 {

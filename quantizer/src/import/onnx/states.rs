@@ -197,10 +197,7 @@ pub(super) fn refuse_lost_states(
 /// Whether an output is nothing but states of cells.
 pub(super) fn is_state(cells: &Cells, exprs: &Exprs, value: &Tensor) -> bool {
     cells.elements(value).iter().all(|e| match *e {
-        Element::Of(id, _) => match exprs.get(id) {
-            Expr::CellState(_) | Expr::Cell(_) => true,
-            _ => false,
-        },
+        Element::Of(id, _) => matches!(exprs.get(id), Expr::CellState(_) | Expr::Cell(_)),
         Element::Known(_) => false,
     })
 }
