@@ -4,8 +4,9 @@
 mod denoising;
 mod folder;
 mod json;
+pub mod onnx;
 mod ops;
 pub mod tensors;
 pub mod values;
 
-pub use folder::FILES;
+pub use folder::{FILES, folder_of, is_onnx};

@@ -1,5 +1,6 @@
 //! Tables, notes and pictures for people.
 
+pub mod imported;
 pub mod inspect;
 pub mod learned;
 pub mod notes;

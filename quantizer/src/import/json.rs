@@ -3,7 +3,7 @@
 use actq_kernels::image::Kind;
 use actq_kernels::math::Function;
 use anyhow::{Context, Result, bail, ensure};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::denoising::{self, JsonDenoising};
@@ -11,16 +11,21 @@ use crate::contract::ActionContract;
 use crate::strict_json;
 use crate::text::is_control;
 
-#[derive(Deserialize)]
+#[derive(Default, Deserialize, Serialize)]
 pub(super) struct Json {
     pub(super) name: String,
-    kind: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) kind: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) chunk: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) execute: Option<usize>,
     pub(super) obs_dim: usize,
     pub(super) act_dim: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) control_hz: Option<f64>,
-    action: Option<JsonContract>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) action: Option<JsonContract>,
     #[serde(flatten)]
     pub(super) denoising: JsonDenoising,
     pub(super) ops: Vec<JsonOp>,
@@ -29,45 +34,69 @@ pub(super) struct Json {
 /// Keys of [`Json`].
 const KEYS: [&str; 9] = ["name", "kind", "chunk", "execute", "obs_dim", "act_dim", "control_hz", "action", "ops"];
 /// Keys that tell people where a policy is from. Their values are not read.
-const ABOUT: [&str; 6] = ["source", "commit", "source_path", "license", "recurrent", "n_params"];
+const ABOUT: [&str; 8] = ["source", "commit", "source_path", "license", "recurrent", "n_params", "inputs", "states"];
 
-#[derive(Deserialize)]
+#[derive(Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-struct JsonContract {
-    scale: Option<Vec<f64>>,
-    offset: Option<Vec<f64>>,
-    low: Option<Vec<f64>>,
-    high: Option<Vec<f64>>,
-    max_step: Option<Vec<f64>>,
+pub(super) struct JsonContract {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) scale: Option<Vec<f64>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) offset: Option<Vec<f64>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) low: Option<Vec<f64>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) high: Option<Vec<f64>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) max_step: Option<Vec<f64>>,
 }
 
 /// One op; [`op_keys`] says which keys it may have.
-#[derive(Deserialize)]
+#[derive(Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct JsonOp {
     pub(super) op: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) input: Option<Input>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) save: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) with: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) w: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) b: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) mean: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) scale: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) pre_clip: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) clip: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) w_ln: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) b_ln: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) eps: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) hidden: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) gates: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) w_ih: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) w_hh: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) b_ih: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) b_hh: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) approximate: Option<String>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 #[serde(untagged)]
 pub(super) enum Input {
     One(String),
@@ -150,7 +179,7 @@ fn op_keys(op: &str) -> Option<&'static [&'static str]> {
         "linear" => &["w", "b"],
         "layernorm" => &["w_ln", "b_ln", "eps"],
         "rmsnorm" => &["w_ln", "eps"],
-        "add" => &["with"],
+        "add" | "mul" => &["with"],
         "lstm" | "gru" => &["hidden", "gates", "w_ih", "w_hh", "b_ih", "b_hh"],
         "gelu" => &["approximate"],
         name if Function::ALL.iter().any(|f| f.name() == name) => &[],
