@@ -4,6 +4,7 @@
 mod denoising;
 mod folder;
 mod json;
+mod numbers;
 pub mod onnx;
 mod ops;
 pub mod tensors;

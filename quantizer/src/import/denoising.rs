@@ -153,7 +153,7 @@ impl JsonDenoising {
         let chosen: Vec<usize> = (0..steps).rev().map(|k| k * (train / steps)).collect();
         let limit = match self.clip_sample {
             None => f32::INFINITY,
-            Some(clip) => super::json::positive(clip, "clip_sample")?,
+            Some(clip) => super::numbers::positive(clip, "clip_sample")?,
         };
         let mut by = Vec::new();
         for (i, &t) in chosen.iter().enumerate() {

@@ -8,7 +8,8 @@ use actq_kernels::image::Kind;
 use anyhow::{Context, Result, ensure};
 use sha2::{Digest, Sha256};
 
-use super::json::{Json, positive};
+use super::json::Json;
+use super::numbers::positive;
 use super::onnx::{self, Choice};
 use super::ops::{Builder, Weights};
 use super::tensors::TensorFile;

@@ -7,7 +7,8 @@ use actq_kernels::math::Function;
 use anyhow::{Context, Result, bail, ensure};
 
 use super::denoising::{JsonDenoising, JsonNorm, JsonTime, Schedule};
-use super::json::{Input, JsonOp, positive};
+use super::json::{Input, JsonOp};
+use super::numbers::positive;
 use super::tensors::TensorFile;
 use crate::graph::ops::{Add, Concat, Gru, LayerNorm, Linear, Lstm, Mul, Normalize, Pointwise, RmsNorm, Span};
 use crate::graph::{Graph, NodeKind, ValueId, WeightMatrix};
