@@ -186,7 +186,7 @@ fn steps(oldest: Result<(), String>, narrow: Result<(), String>, skipped: &str) 
     steps.push(Step { name: "kernels' tests with words of 32 bits".to_owned(), command });
     let command = oldest.map(|()| {
         let mut command = Command::new("rustup");
-        command.current_dir(root()).args(["run", OLDEST, "cargo", "check"]).args(host).args(&all_but_firmware);
+        command.current_dir(root()).args(["run", OLDEST, "cargo", "check"]).args(host).args(all_but_firmware);
         command
     });
     steps.push(Step { name: format!("oldest compiler, {OLDEST}"), command });
