@@ -18,6 +18,7 @@ mod malformed;
 mod ops;
 mod outputs;
 mod parity;
+mod playback;
 mod portable;
 mod qemu;
 mod recorded;

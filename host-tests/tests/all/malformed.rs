@@ -64,6 +64,7 @@ fn valid_image() -> Vec<u8> {
             low: Some(vec![-1.0; ACT]),
             high: Some(vec![1.0; ACT]),
             max_step: Some(vec![0.25; ACT]),
+            ..ActionContract::default()
         },
         weights: graph.weights(),
         graph,
