@@ -5,8 +5,10 @@ mod contract;
 mod denoising;
 mod folder;
 mod json;
+mod numbers;
+pub mod onnx;
 mod ops;
 pub mod tensors;
 pub mod values;
 
-pub use folder::FILES;
+pub use folder::{FILES, folder_of, is_onnx};

@@ -15,6 +15,7 @@ mod faults;
 mod format;
 mod functions;
 mod malformed;
+mod memory;
 mod ops;
 mod outputs;
 mod parity;

@@ -1,15 +1,21 @@
 //! The action contract, chunk playback, and saved states, against plain arithmetic in f64. The networks are none: the observation is
 //! the raw output, bit for bit.
 
+use std::fs;
 use std::task::Poll;
 
 use actq::contract::{ActionContract, Binarise, Ensemble, Playback};
-use actq::graph::ops::Normalize;
+use actq::graph::ops::{Linear, Lstm, Normalize};
 use actq::graph::{Graph, NodeKind};
+use actq::methods::Activations;
 use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
+use actq_bench::networks::Builder;
+use actq_bench::qemu::{self, Server};
+use actq_bench::{Target, firmware};
 use actq_kernels::image::Kind;
-use actq_kernels::{Head, SavedError, StepError};
+use actq_kernels::{Head, SavedError, StepError, Width};
+use anyhow::{Result, ensure};
 use proptest::prelude::*;
 
 /// Length of an action.
@@ -358,17 +364,20 @@ fn a_step_policy_has_a_deadline_for_its_observation() {
 }
 
 /// A contract and playback with memory of every kind.
-fn remembering(m: f64) -> ImageBuffer {
+fn memory(m: f64) -> ActionContract {
     let binarise =
         Binarise { on: vec![0.2; ACT], off: vec![-0.2; ACT], on_value: vec![0.9, 0.0], off_value: vec![-0.9, 0.0] };
-    let contract = ActionContract {
+    ActionContract {
         binarise: Some(binarise),
         max_step: Some(vec![0.7; ACT]),
         smoothing: Some(vec![0.6; ACT]),
         playback: Playback { ensemble: Some(Ensemble { horizon: 3, m }), ..Playback::default() },
         ..ActionContract::default()
-    };
-    echo(4, 1, contract)
+    }
+}
+
+fn remembering(m: f64) -> ImageBuffer {
+    echo(4, 1, memory(m))
 }
 
 /// Observations of a wave.
@@ -389,12 +398,16 @@ fn a_restored_head_goes_on_with_the_same_bits() {
         with_head(&buffer, |head| (0..40).map(|i| head.step(&wave(i)).expect("an action").to_vec()).collect());
     for at in 0..40 {
         let state = with_head(&buffer, |head| {
-            (0..at).for_each(|i| drop(head.step(&wave(i)).expect("an action")));
+            for i in 0..at {
+                head.step(&wave(i)).expect("an action");
+            }
             saved(head)
         });
         with_head(&buffer, |head| {
             // Of another life.
-            (0..5).for_each(|i| drop(head.step(&wave(3 * i)).expect("an action")));
+            for i in 0..5 {
+                head.step(&wave(3 * i)).expect("an action");
+            }
             head.restore(&state).expect("it is the image's");
             assert_eq!(saved(head), state);
             for (i, expected) in whole.iter().enumerate().skip(at) {
@@ -408,7 +421,9 @@ fn a_restored_head_goes_on_with_the_same_bits() {
 fn states_that_are_damaged_or_of_another_image_are_refused() {
     let buffer = remembering(0.1);
     with_head(&buffer, |head| {
-        (0..5).for_each(|i| drop(head.step(&wave(i)).expect("an action")));
+        for i in 0..5 {
+            head.step(&wave(i)).expect("an action");
+        }
         let state = saved(head);
         let len = state.len();
         head.step(&wave(5)).expect("an action");
@@ -438,4 +453,38 @@ fn states_that_are_damaged_or_of_another_image_are_refused() {
         head.reset();
         assert_eq!(head.restore(&state), Ok(()));
     });
+}
+
+/// On the target every step is one after a warm restart, on the host none is.
+#[test]
+fn six_hundred_steps_have_the_same_bits_through_as_many_restarts_on_the_target() -> Result<()> {
+    const HIDDEN: usize = 24;
+    let mut builder = Builder::new(4 * ACT);
+    let mut matrix = |rows: usize, cols| builder.matrix(rows, cols, Activations::Int8, &vec![Some(Width::W3); rows], 0);
+    let (input, state) = (matrix(4 * HIDDEN, 4 * ACT)?, matrix(4 * HIDDEN, HIDDEN)?);
+    let output = matrix(4 * ACT, HIDDEN)?;
+    let [bias, last] = [builder.values(4 * HIDDEN), builder.values(4 * ACT)];
+    let hidden = builder.node(Lstm { hidden: HIDDEN, input, state, bias }, &[0])?;
+    builder.node(Linear { matrix: output, bias: last }, &[hidden])?;
+    let (mut policy, outcomes) = builder.finish("restarts".to_owned(), false);
+    (policy.kind, policy.chunk, policy.act_len, policy.contract) = (Kind::Chunk, 4, ACT, memory(0.1));
+    let buffer = ImageBuffer::new(&actq::emit::image(&policy, &outcomes)?);
+    let slot = tempfile::NamedTempFile::new()?;
+    fs::write(slot.path(), buffer.bytes())?;
+    let elf = firmware::harness(Target::Fpu)?;
+    let mut target = Server::start(qemu::command(&elf, Some(slot.path()), "restart")?, ACT)?;
+    let mut different = 0;
+    with_head(&buffer, |head| -> Result<()> {
+        let mut before = Vec::new();
+        for step in 0..600 {
+            let (here, there) = (head.step(&wave(step))?, target.step(&wave(step))?);
+            let same = here.iter().zip(&there).all(|(a, b)| a.to_bits() == b.to_bits());
+            ensure!(same, "step {step}: {there:?} on the target, {here:?} on the host");
+            different += usize::from(before != there);
+            before = there;
+        }
+        Ok(())
+    })?;
+    ensure!(different > 300, "the actions hardly change");
+    target.finish()
 }

@@ -221,7 +221,9 @@ mod tests {
     use actq_kernels::math::Function;
 
     use super::*;
-    use crate::graph::ops::{Add, Concat, Gru, LayerNorm, Linear, Lstm, NodeKind, Normalize, Pointwise, RmsNorm, Span};
+    use crate::graph::ops::{
+        Add, Concat, Gru, LayerNorm, Linear, Lstm, Mul, NodeKind, Normalize, Pointwise, RmsNorm, Span,
+    };
     use crate::graph::values::{ValueId, WeightMatrix};
     use crate::graph::weights::zero_state;
     use crate::random::Random;
@@ -234,7 +236,9 @@ mod tests {
     fn graph() -> Graph {
         let mut seed = Random::new(11);
         let mut graph = Graph::new(5);
-        for (rows, cols) in [(6, 5)].into_iter().chain([(6, 6); 7]).chain([(16, 7), (16, 4), (9, 4), (9, 3), (2, 3)]) {
+        for (rows, cols) in
+            [(6, 5)].into_iter().chain([(6, 6); Function::ALL.len()]).chain([(16, 7), (16, 4), (9, 4), (9, 3), (2, 3)])
+        {
             let data = random(rows * cols, &mut seed).iter().map(|w| 0.6 * w).collect();
             graph.matrices.push(WeightMatrix { name: "m".into(), rows, cols, data });
         }
@@ -250,14 +254,19 @@ mod tests {
             last = push(Pointwise(function).into(), &[last]);
             last = push(Add.into(), &[last, kept]);
         }
+        // Both operands of a product, and one that is both.
+        last = push(Mul.into(), &[last, kept]);
+        last = push(Mul.into(), &[last, last]);
+        last = push(LayerNorm { weight: weight(6, 12), bias: vector(6, 13), eps: 1e-3 }.into(), &[last]);
         last = push(LayerNorm { weight: weight(6, 5), bias: vector(6, 6), eps: 1e-3 }.into(), &[last]);
         let spans = vec![Span { from: 1, len: 4 }, Span { from: 0, len: 3 }];
         last = push(Concat(spans).into(), &[last, normal]);
         last = push(RmsNorm { weight: weight(7, 7), eps: 1e-3 }.into(), &[last]);
-        last = push(Lstm { hidden: 4, input: 8, state: 9, bias: vector(16, 8) }.into(), &[last]);
+        let next = 1 + Function::ALL.len();
+        last = push(Lstm { hidden: 4, input: next, state: next + 1, bias: vector(16, 8) }.into(), &[last]);
         let (input_bias, state_bias) = (vector(9, 9), vector(9, 10));
-        last = push(Gru { hidden: 3, input: 10, state: 11, input_bias, state_bias }.into(), &[last]);
-        push(Linear { matrix: 12, bias: vector(2, 11) }.into(), &[last]);
+        last = push(Gru { hidden: 3, input: next + 2, state: next + 3, input_bias, state_bias }.into(), &[last]);
+        push(Linear { matrix: next + 4, bias: vector(2, 11) }.into(), &[last]);
         graph
     }
 

@@ -1,38 +1,49 @@
 //! The object `action` of `policy.json`, and what else it says of how actions are played.
 
 use anyhow::{Context, Result, bail, ensure};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
-use super::json::real;
+use super::numbers::real;
 use crate::contract::{ActionContract, Binarise};
 
 /// What RLDS adds to the distance of two quantiles, so that it is not 0.
 const QUANTILE_EPS: f64 = 1e-8;
 
 /// An array with a value for each action; null where it does not concern an action.
-type Array = Option<Vec<Option<f64>>>;
+pub(super) type Array = Option<Vec<Option<f64>>>;
 
 /// Keys of `action`.
-#[derive(Deserialize)]
+#[derive(Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct JsonContract {
-    mean: Array,
-    std: Array,
-    q01: Array,
-    q99: Array,
-    scale: Array,
-    offset: Array,
-    binarise: Option<JsonBinarise>,
-    low: Array,
-    high: Array,
-    max_step: Array,
-    smoothing: Array,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) mean: Array,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) std: Array,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) q01: Array,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) q99: Array,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) scale: Array,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) offset: Array,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) binarise: Option<JsonBinarise>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) low: Array,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) high: Array,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) max_step: Array,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) smoothing: Array,
 }
 
 /// Keys of `action.binarise`.
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-struct JsonBinarise {
+pub(super) struct JsonBinarise {
     on: Array,
     off: Array,
     on_value: Array,
@@ -40,7 +51,7 @@ struct JsonBinarise {
 }
 
 /// Keys of `ensemble`.
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct JsonEnsemble {
     pub(super) horizon: usize,
@@ -105,9 +116,10 @@ impl JsonBinarise {
             // Where both values are 0, nothing is binarised.
             let values = values(&name, array, Some(0.0), act_dim)?;
             *to = reals(&name, &values.with_context(|| format!("action.{name} is missing"))?)?;
-            let others = named.iter().map(|(_, other)| other.iter().flatten().map(Option::is_some));
-            let same = others.clone().all(|other| other.eq(array.iter().flatten().map(Option::is_some)));
-            ensure!(same, "action.{name} is null for other actions than the rest of action.binarise");
+        }
+        let concerned = |array: &Array| array.iter().flatten().map(Option::is_some).collect::<Vec<bool>>();
+        if let Some((key, _)) = named.iter().find(|(_, array)| concerned(array) != concerned(&self.on)) {
+            bail!("action.binarise.{key} is null for other actions than action.binarise.on");
         }
         let [on, off, on_value, off_value] = arrays;
         for i in (0..act_dim).filter(|&i| self.on.as_ref().is_some_and(|on| on[i].is_some())) {

@@ -2,8 +2,8 @@
 
 use actq_kernels::image::Kind;
 use actq_kernels::math::Function;
-use anyhow::{Context, Result, bail, ensure};
-use serde::Deserialize;
+use anyhow::{Context, Result, bail};
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::contract::{JsonContract, JsonEnsemble};
@@ -12,19 +12,27 @@ use crate::contract::{ActionContract, Ensemble, Playback};
 use crate::strict_json;
 use crate::text::is_control;
 
-#[derive(Deserialize)]
+#[derive(Default, Deserialize, Serialize)]
 pub(super) struct Json {
     pub(super) name: String,
-    kind: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) kind: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) chunk: Option<usize>,
-    execute: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) execute: Option<usize>,
     pub(super) obs_dim: usize,
     pub(super) act_dim: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) control_hz: Option<f64>,
-    action: Option<JsonContract>,
-    ensemble: Option<JsonEnsemble>,
-    overlap: Option<usize>,
-    deadline: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) action: Option<JsonContract>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) ensemble: Option<JsonEnsemble>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) overlap: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) deadline: Option<usize>,
     #[serde(flatten)]
     pub(super) denoising: JsonDenoising,
     pub(super) ops: Vec<JsonOp>,
@@ -46,35 +54,54 @@ const KEYS: [&str; 12] = [
     "ops",
 ];
 /// Keys that tell people where a policy is from. Their values are not read.
-const ABOUT: [&str; 6] = ["source", "commit", "source_path", "license", "recurrent", "n_params"];
+const ABOUT: [&str; 8] = ["source", "commit", "source_path", "license", "recurrent", "n_params", "inputs", "states"];
 
 /// One op; [`op_keys`] says which keys it may have.
-#[derive(Deserialize)]
+#[derive(Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct JsonOp {
     pub(super) op: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) input: Option<Input>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) save: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) with: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) w: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) b: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) mean: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) scale: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) pre_clip: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) clip: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) w_ln: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) b_ln: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) eps: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) hidden: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) gates: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) w_ih: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) w_hh: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) b_ih: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) b_hh: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) approximate: Option<String>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 #[serde(untagged)]
 pub(super) enum Input {
     One(String),
@@ -154,7 +181,7 @@ fn op_keys(op: &str) -> Option<&'static [&'static str]> {
         "linear" => &["w", "b"],
         "layernorm" => &["w_ln", "b_ln", "eps"],
         "rmsnorm" => &["w_ln", "eps"],
-        "add" => &["with"],
+        "add" | "mul" => &["with"],
         "lstm" | "gru" => &["hidden", "gates", "w_ih", "w_hh", "b_ih", "b_hh"],
         "gelu" => &["approximate"],
         name if Function::ALL.iter().any(|f| f.name() == name) => &[],
@@ -178,19 +205,4 @@ fn check_text(place: &str, value: &Value) -> Result<()> {
         }
         _ => Ok(()),
     }
-}
-
-/// A number as f32, rounded; refuses what f32 cannot hold.
-pub(super) fn real(value: f64, name: &str) -> Result<f32> {
-    let real = value as f32;
-    ensure!(real.is_finite(), "{name} is {value:?}, beyond float32's range");
-    Ok(real)
-}
-
-/// As [`real`], above 0.
-pub(super) fn positive(value: f64, name: &str) -> Result<f32> {
-    let real = real(value, name)?;
-    let rounded = if value > 0.0 { "float32 rounds that to 0, and " } else { "" };
-    ensure!(real > 0.0, "{name} is {value:?}; {rounded}it must be above 0");
-    Ok(real)
 }
