@@ -3,6 +3,7 @@
 pub mod imported;
 pub mod inspect;
 pub mod learned;
+pub mod memory;
 pub mod notes;
 pub mod plot;
 pub mod quantized;

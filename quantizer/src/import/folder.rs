@@ -77,7 +77,7 @@ fn build(dir: &Path, json: &Json, weights: Weights<'_>, digest: [u8; 32]) -> Res
         Kind::Step => (1, 1),
         Kind::Chunk | Kind::Flow | Kind::Diffusion => {
             let chunk = json.chunk.context("a policy of several actions needs the key chunk")?;
-            let execute = json.execute.unwrap_or(chunk);
+            let execute = json.execute(chunk);
             ensure!((1..=chunk).contains(&execute), "execute is {execute}, it must be 1 to chunk ({chunk})");
             (chunk, execute)
         }

@@ -2,13 +2,13 @@
 
 use actq_kernels::image::Kind;
 use actq_kernels::math::Function;
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, bail};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::contract::{JsonContract, JsonEnsemble};
 use super::denoising::{self, JsonDenoising};
-use super::numbers::real;
-use crate::contract::ActionContract;
+use crate::contract::{ActionContract, Ensemble, Playback};
 use crate::strict_json;
 use crate::text::is_control;
 
@@ -27,30 +27,34 @@ pub(super) struct Json {
     pub(super) control_hz: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) action: Option<JsonContract>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) ensemble: Option<JsonEnsemble>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) overlap: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) deadline: Option<usize>,
     #[serde(flatten)]
     pub(super) denoising: JsonDenoising,
     pub(super) ops: Vec<JsonOp>,
 }
 
 /// Keys of [`Json`].
-const KEYS: [&str; 9] = ["name", "kind", "chunk", "execute", "obs_dim", "act_dim", "control_hz", "action", "ops"];
+const KEYS: [&str; 12] = [
+    "name",
+    "kind",
+    "chunk",
+    "execute",
+    "ensemble",
+    "overlap",
+    "deadline",
+    "obs_dim",
+    "act_dim",
+    "control_hz",
+    "action",
+    "ops",
+];
 /// Keys that tell people where a policy is from. Their values are not read.
 const ABOUT: [&str; 8] = ["source", "commit", "source_path", "license", "recurrent", "n_params", "inputs", "states"];
-
-#[derive(Default, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct JsonContract {
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) scale: Option<Vec<f64>>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) offset: Option<Vec<f64>>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) low: Option<Vec<f64>>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) high: Option<Vec<f64>>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) max_step: Option<Vec<f64>>,
-}
 
 /// One op; [`op_keys`] says which keys it may have.
 #[derive(Default, Deserialize, Serialize)]
@@ -136,24 +140,21 @@ impl Json {
 
     /// The action contract. Without the key `action` whatever is chunked is limited to -1..1, as the reference runtime of the format does.
     pub(super) fn contract(&self, kind: Kind) -> Result<ActionContract> {
-        let Some(json) = &self.action else {
-            let limit = |at: f32| (kind != Kind::Step).then(|| vec![at; self.act_dim]);
-            return Ok(ActionContract { low: limit(-1.0), high: limit(1.0), ..ActionContract::default() });
+        let contract = match &self.action {
+            Some(json) => json.contract(self.act_dim)?,
+            None => {
+                let limit = |at: f32| (kind != Kind::Step).then(|| vec![at; self.act_dim]);
+                ActionContract { low: limit(-1.0), high: limit(1.0), ..ActionContract::default() }
+            }
         };
-        let array = |name: &str, values: &Option<Vec<f64>>| {
-            let Some(values) = values else { return Ok(None) };
-            let (len, act_dim) = (values.len(), self.act_dim);
-            ensure!(len == act_dim, "action.{name} has {len} values, act_dim is {act_dim}");
-            let one = |(i, v): (usize, &f64)| real(*v, &format!("action.{name}[{i}]"));
-            values.iter().enumerate().map(one).collect::<Result<Vec<f32>>>().map(Some)
-        };
-        Ok(ActionContract {
-            scale: array("scale", &json.scale)?,
-            offset: array("offset", &json.offset)?,
-            low: array("low", &json.low)?,
-            high: array("high", &json.high)?,
-            max_step: array("max_step", &json.max_step)?,
-        })
+        let ensemble = self.ensemble.as_ref().map(|json| Ensemble { horizon: json.horizon, m: json.m.unwrap_or(0.01) });
+        let playback = Playback { ensemble, overlap: self.overlap.unwrap_or(0), deadline: self.deadline };
+        Ok(ActionContract { playback, ..contract })
+    }
+
+    /// How many actions of a chunk are executed where nothing says so: all, but of chunks that are averaged one.
+    pub(super) fn execute(&self, chunk: usize) -> usize {
+        self.execute.unwrap_or(if self.ensemble.is_some() { 1 } else { chunk })
     }
 }
 

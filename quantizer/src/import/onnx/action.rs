@@ -1,6 +1,6 @@
 //! The end of a network as an action contract: factors, offsets and limits behind the last operation.
 
-use super::super::json::JsonContract;
+use super::super::contract::{Array, JsonContract};
 use super::expr::{Expr, Exprs, Id};
 
 /// Scale, offset and limits of every value, as the contract applies them.
@@ -52,7 +52,7 @@ pub(super) fn contract(exprs: &Exprs, root: Id, act_len: usize) -> (Id, Option<J
 impl Ends {
     /// The contract, where all actions of a chunk have the same and f32 holds it.
     fn json(&self, act_len: usize) -> Option<JsonContract> {
-        let each = |values: &[f64], none: f64, unlimited: f64| -> Option<Option<Vec<f64>>> {
+        let each = |values: &[f64], none: f64, unlimited: f64| -> Option<Array> {
             let first = values.get(..act_len)?;
             if values.chunks(act_len).any(|action| action != first) {
                 return None;
@@ -64,7 +64,7 @@ impl Ends {
             let one =
                 |v: &f64| if *v == none { Some(unlimited) } else { format!("{:?}", *v as f32).parse::<f64>().ok() };
             let values: Vec<f64> = first.iter().map(one).collect::<Option<_>>()?;
-            values.iter().all(|v| (*v as f32).is_finite()).then_some(Some(values))
+            values.iter().all(|v| (*v as f32).is_finite()).then(|| Some(values.into_iter().map(Some).collect()))
         };
         let most = f64::from(f32::MAX);
         Some(JsonContract {

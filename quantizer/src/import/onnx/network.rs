@@ -8,7 +8,8 @@ use prost::bytes::Bytes;
 use safetensors::Dtype;
 use safetensors::tensor::TensorView;
 
-use super::super::json::{Json, JsonContract};
+use super::super::contract::JsonContract;
+use super::super::json::Json;
 use super::action;
 use super::expr::{Expr, Exprs, Id};
 use super::follow::Follower;
