@@ -303,7 +303,7 @@ fn however_a_step_is_cut_its_bits_are_the_same() -> Result<()> {
 
 #[test]
 fn the_target_gives_the_hosts_bits() -> Result<()> {
-    let elf = firmware::application(actq_bench::Target::Fpu)?;
+    let elf = firmware::harness(actq_bench::Target::Fpu)?;
     for (json, _) in policies() {
         let buffer = quantized(json.clone())?;
         same_bits(&elf, &buffer, 12)?;
@@ -449,7 +449,7 @@ fn the_shared_flow_policy_runs_on_the_target() -> Result<()> {
     let policy = Policy::load(&dir)?;
     let heldout = Dataset::load(&dir.join("heldout.npz"), Sizes::of(&policy))?;
     let heldout = heldout.thinned(60, false);
-    let elf = firmware::application(actq_bench::Target::Fpu)?;
+    let elf = firmware::harness(actq_bench::Target::Fpu)?;
     for (width, limit) in [(Width::W8, 5.1e-4), (Width::W3, 0.33), (Width::W2, 3.0)] {
         let options = Options { group: 32, ..Options::new(Method::Rtn, Budget::Width(width)) };
         let bytes = quantize(&policy, &Recordings::default(), &options, |_, _| {})?.image;
