@@ -24,4 +24,3 @@ mod recorded;
 mod recordings;
 mod slices;
 mod stats;
-mod work;
