@@ -189,12 +189,11 @@ fn section_bytes(elf: &Path, names: &[&str]) -> Result<u64> {
     Ok(file.sections().filter(|s| s.name().is_ok_and(|n| names.contains(&n))).map(|s| s.size()).sum())
 }
 
-/// The halfword at an address, in hexadecimal digits, of the code of an ELF file.
-pub fn halfword_at(elf: &Path, address: &str) -> Result<u16> {
-    let address = u64::from_str_radix(address, 16).with_context(|| format!("{address:?} is no address"))?;
+/// The halfword at an address of the code of an ELF file.
+pub fn halfword_at(elf: &Path, address: u32) -> Result<u16> {
     let data = fs::read(elf).with_context(|| format!("{}: cannot be read", elf.display()))?;
     let file = object::File::parse(&*data).with_context(|| format!("{}: not an ELF file", elf.display()))?;
     let text = file.section_by_name(".text").context("there is no code")?;
-    let bytes = text.data_range(address, 2)?.with_context(|| format!("{address:x} is not in the code"))?;
+    let bytes = text.data_range(address.into(), 2)?.with_context(|| format!("{address:x} is not in the code"))?;
     Ok(u16::from_le_bytes(bytes.try_into()?))
 }

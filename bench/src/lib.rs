@@ -5,7 +5,7 @@
 pub mod closed_loop;
 pub mod command;
 pub mod compare;
-pub mod console;
+pub mod controller;
 pub mod cycles;
 pub mod evaluation;
 pub mod firmware;

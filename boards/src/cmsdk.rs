@@ -184,6 +184,10 @@ impl Stage for NoStage {
         true
     }
 
+    fn is_on(&mut self) -> bool {
+        self.on
+    }
+
     fn disable(&mut self) {
         self.on = false;
     }

@@ -84,6 +84,9 @@ pub trait Stage {
     /// Switches the outputs on; false where the break input or the hardware keeps them off.
     fn enable(&mut self) -> bool;
 
+    /// Whether the outputs are on: not after a break, either.
+    fn is_on(&mut self) -> bool;
+
     /// Switches all six outputs off, now.
     fn disable(&mut self);
 

@@ -66,6 +66,9 @@ impl fmt::Display for AxisError {
 impl core::error::Error for AxisError {}
 
 impl Axis {
+    /// An axis that may not leave 0.
+    pub const STILL: Self = Self { low: 0.0, high: 0.0, rate: 1.0, start: 0.0, safe: SafeAction::Coast };
+
     /// An axis with finite limits `low` to `high`, that changes by at most `rate` in a tick (infinite: at once), and whose first
     /// value after arming changes by at most that from `start`.
     ///

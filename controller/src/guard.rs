@@ -78,16 +78,21 @@ impl<'r, const OBS: usize> Guard<'r, OBS> {
     ///
     /// `None` where there is no room for `len` values.
     pub fn new(len: usize, ranges: &'r [Range], max_age: u32) -> Option<Self> {
-        (len <= OBS).then_some(Self {
+        (len <= OBS).then(|| Self { len, ..Self::full(ranges, max_age) })
+    }
+
+    /// As [`Self::new`], for observations of `OBS` values.
+    pub fn full(ranges: &'r [Range], max_age: u32) -> Self {
+        Self {
             ranges,
             max_age,
             built_max_age: max_age,
             age: Age::default(),
             values: [0.0; OBS],
-            len,
+            len: OBS,
             newest: None,
             refused: 0,
-        })
+        }
     }
 
     /// Lets an observation through that was sent at `remote` µs and came at `local` µs. One that is refused is counted, and the

@@ -37,6 +37,11 @@ impl Client {
         &self.connection
     }
 
+    /// The connection, to send bytes of one's own.
+    pub const fn connection_mut(&mut self) -> &mut Connection {
+        &mut self.connection
+    }
+
     /// Sends an observation and gives its sequence number.
     ///
     /// # Errors

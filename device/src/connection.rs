@@ -66,12 +66,17 @@ impl Connection {
         let micros = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_micros() as u32;
         let wire = self.sender.frame(message, micros, &mut buffer).context("the message is longer than a frame")?;
         // A zero first, so that a frame whose end was lost on the way does not take this one with it.
+        self.raw(&[&[0], wire].concat());
+        Ok(number)
+    }
+
+    /// Sends bytes that are no message: what tests need.
+    pub fn raw(&mut self, bytes: &[u8]) {
         if let Some(port) = &mut self.port
-            && let Err(error) = port.write_all(&[&[0], wire].concat()).and_then(|()| port.flush())
+            && let Err(error) = port.write_all(bytes).and_then(|()| port.flush())
         {
             self.lose(error);
         }
-        Ok(number)
     }
 
     /// Reads what has come, at most for [`crate::port::WAIT`] where there is nothing.

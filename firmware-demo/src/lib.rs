@@ -1,11 +1,13 @@
-//! The motor controller without a board: what its loop, its tick and its console do. `bin/controller` puts it on one.
+//! The motor controller without a board: what its loop and its tick do with the decisions of `actq_controller`. `bin/controller` puts it
+//! on one.
 #![no_std]
 #![forbid(unsafe_code)]
 
-pub mod application;
-pub mod console;
-pub mod off;
+#[cfg(feature = "faults")]
+mod faults;
+pub mod image;
 pub mod output;
-pub mod text;
+pub mod running;
 pub mod timing;
+pub mod updates;
 pub mod work;

@@ -1,94 +1,137 @@
-//! The loop below the tick: bytes of the serial port, slices of the head, the watchdog.
-
-use core::task::Poll;
+//! The loop below the tick: bytes of the link, slices of the head, pieces of an update, the watchdog.
 
 use actq_boards::port::Port;
 use actq_boards::seams::Watchdog;
-use actq_kernels::Head;
-use embedded_io::{Read, ReadReady};
+use actq_controller::progress::Progress;
+use actq_controller::slots::Candidate;
+use actq_controller::{Endpoint, Shared};
+use embedded_io::{Read, ReadReady, Write};
+use embedded_storage::nor_flash::NorFlash;
 
-use crate::application::{Application, Status};
-use crate::output::Output;
-use crate::timing::Timing;
-
-/// Modelled instructions of a slice, where an image needs no more: 0.12 ms of a Cortex-M4 at 168 MHz. Bytes that come wait for as
-/// long; the tick does not.
-pub const SLICE: u32 = 20_000;
+#[cfg(feature = "faults")]
+use crate::faults::{Asked, Faults};
+use crate::running::Running;
+use crate::timing::{Rates, Timing};
+use crate::updates::Updates;
 
 /// Bytes that are taken from the port in one turn.
 const BYTES: usize = 64;
+/// Ticks between two looks at times and stack.
+const LOOK: u32 = 100;
 
 /// What the loop works with.
-pub struct Work<'p, 'i, 's, A, W> {
-    /// The application.
-    pub application: A,
+pub struct Work<'p, S, W, F, const AXES: usize, const OBS: usize, const N: usize> {
     /// The serial port.
     pub port: &'p mut Port<'static>,
     /// The watchdog, which runs.
     pub watchdog: &'p mut W,
-    /// The head, where there is an image that may run.
-    pub head: Option<Head<'i, 's>>,
+    /// What decides about the outputs.
+    pub safety: S,
+    /// The link's end.
+    pub endpoint: Endpoint<'static, OBS, N>,
+    /// Image updates.
+    pub updates: Updates<F>,
+    /// The clock's rates.
+    pub rates: Rates,
     /// Measures the bytes of stack that were in use at most.
     pub stack: fn() -> u32,
-    step: Step,
+    /// Room for the longest frame that is sent.
+    pub out: &'p mut [u8],
+    /// What the loop has done since it fed the watchdog.
+    pub state: State,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Step {
-    None,
-    Running,
+/// What the loop keeps from turn to turn.
+#[derive(Debug, Default)]
+pub struct State {
+    progress: Progress,
+    /// Ticks at the last turn.
+    ticks: u32,
+    /// Ticks at the last look at times and stack.
+    looked: Option<u32>,
+    #[cfg(feature = "faults")]
+    faults: Faults,
+    /// Progress that is hidden.
+    #[cfg(feature = "faults")]
+    hidden: u8,
 }
 
-impl<'p, 'i, 's, A: Application, W: Watchdog> Work<'p, 'i, 's, A, W> {
-    /// With nothing begun.
-    pub fn new(
-        application: A,
-        port: &'p mut Port<'static>,
-        watchdog: &'p mut W,
-        head: Option<Head<'i, 's>>,
-        stack: fn() -> u32,
-    ) -> Self {
-        Self { application, port, watchdog, head, stack, step: Step::None }
+impl State {
+    /// What has made no progress since the watchdog was fed ([`Progress::missing`]).
+    pub const fn missing(&self) -> u32 {
+        self.progress.missing()
     }
+}
 
-    /// A turn of the loop: takes what has come, runs one slice of the head, and feeds the watchdog where all is well. A new action
-    /// is put into `output` by `share`, which holds the tick off meanwhile.
-    pub fn turn(&mut self, timing: Timing, share: impl FnOnce(&mut dyn FnMut(&mut Output))) {
+impl<S, W, F, const AXES: usize, const OBS: usize, const N: usize> Work<'_, S, W, F, AXES, OBS, N>
+where
+    S: Shared<AXES>,
+    W: Watchdog,
+    F: NorFlash,
+{
+    /// A turn of the loop: takes what has come, runs one slice of the head, does a piece of an update, and feeds the watchdog where all
+    /// has made progress. Gives the image that an update wants tested.
+    pub fn turn(&mut self, running: &mut Option<Running<'_, '_>>, timing: &Timing) -> Option<Candidate> {
+        let micros = self.rates.micros(timing.ticks);
+        self.look(running, timing);
         self.port.pump();
         if self.port.read_ready() == Ok(true) {
             let mut bytes = [0; BYTES];
             let Ok(len) = self.port.read(&mut bytes);
-            let (lost, ready) = (self.port.lost(), self.head.is_some());
-            let status = Status { timing, lost, stack: self.stack, ready };
-            self.application.on_bytes(bytes.get(..len).unwrap_or_default(), &status, self.port);
+            bytes.iter().take(len).for_each(|byte| self.take(*byte, micros));
         }
-        self.slice(share);
-        if self.application.is_well() {
+        self.state.progress.link = true;
+        if let Some(frame) = self.endpoint.report(micros, &mut self.safety, self.out) {
+            let Ok(()) = self.port.write_all(frame);
+        }
+        if let Some(running) = running {
+            running.scrub(&mut self.safety);
+            if let Some(frame) = running.slice(&mut self.endpoint, micros, &mut self.safety, self.out) {
+                let Ok(()) = self.port.write_all(frame);
+            }
+        }
+        self.state.progress.head = true;
+        // A tick that has come to its end has told the outputs.
+        self.state.progress.output |= timing.ticks != self.state.ticks;
+        self.state.ticks = timing.ticks;
+        #[cfg(feature = "faults")]
+        self.hide();
+        if self.state.progress.feed() {
             self.watchdog.feed();
+        }
+        self.updates.work()
+    }
+
+    fn take(&mut self, byte: u8, micros: u32) {
+        #[cfg(feature = "faults")]
+        match self.state.faults.push(byte) {
+            Some(Asked::Hide(parts)) => self.state.hidden = parts,
+            #[cfg(target_os = "none")]
+            Some(Asked::Undefined) => cortex_m::asm::udf(),
+            Some(Asked::Panic) => panic!("asked for"),
+            _ => {}
+        }
+        let answer = self.endpoint.receive(byte, micros, &mut self.safety, &mut self.updates, self.out);
+        if let Some(frame) = answer {
+            let Ok(()) = self.port.write_all(frame);
         }
     }
 
-    /// Begins a step, or runs a slice of the one that was begun.
-    fn slice(&mut self, share: impl FnOnce(&mut dyn FnMut(&mut Output))) {
-        let Some(head) = &mut self.head else { return };
-        if self.step == Step::None {
-            let Some(observation) = self.application.observation() else { return };
-            match head.begin(observation) {
-                Ok(()) => self.step = Step::Running,
-                Err(error) => self.application.on_action(Err(error), self.port),
-            }
+    /// Tells the link times and stack anew, every now and then.
+    fn look(&mut self, running: &Option<Running<'_, '_>>, timing: &Timing) {
+        if self.state.looked.is_some_and(|looked| timing.ticks.wrapping_sub(looked) < LOOK) {
             return;
         }
-        let budget = SLICE.max(head.least_budget());
-        let ended = match head.poll(budget) {
-            Ok(Poll::Pending) => return,
-            Ok(Poll::Ready(action)) => {
-                share(&mut |output| output.set(action));
-                Ok(action)
-            }
-            Err(error) => Err(error),
-        };
-        self.step = Step::None;
-        self.application.on_action(ended, self.port);
+        self.state.looked = Some(timing.ticks);
+        let worst_head = running.as_ref().map_or(0, Running::worst);
+        self.endpoint.facts.timing = self.rates.report(timing, worst_head, (self.stack)());
+    }
+
+    #[cfg(feature = "faults")]
+    fn hide(&mut self) {
+        let (progress, hidden) = (&mut self.state.progress, self.state.hidden);
+        progress.link &= hidden & 1 == 0;
+        progress.head &= hidden & 2 == 0;
+        progress.output &= hidden & 4 == 0;
     }
 }

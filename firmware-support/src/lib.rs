@@ -1,12 +1,12 @@
 //! What the firmware binaries share: the processor's crates, the host's files through semihosting, the image slot, the marks between
-//! which instructions are counted, and what a program leaves for the start after its end.
+//! which instructions are counted, and memory that a reset leaves as it is.
 #![no_std]
 #![cfg(target_os = "none")]
 
 pub mod count;
-#[cfg(target_arch = "arm")]
-pub mod crumb;
 pub mod host;
+#[cfg(target_arch = "arm")]
+pub mod kept;
 pub mod machine;
 pub mod slot;
 #[cfg(target_arch = "arm")]

@@ -1,4 +1,6 @@
-//! The image slot: a region of code memory that the linker script names, outside the firmware.
+//! The image slot, and two for updates: regions of code memory that the linker script names, outside the firmware.
+
+use core::cell::Cell;
 
 use actq_kernels::image::header::{MAGIC, W_BYTES};
 
@@ -19,4 +21,31 @@ pub fn image() -> Option<&'static [u8]> {
         return None;
     }
     bytemuck::cast_slice(slot).get(..*slot.get(W_BYTES)? as usize)
+}
+
+/// The memory of the slots for updates, on a board with memory in the place of flash; else empty.
+///
+/// # Safety
+///
+/// To be called once.
+pub unsafe fn updates() -> &'static [Cell<u8>] {
+    unsafe extern "C" {
+        static _update_slots_start: Cell<u8>;
+        static _update_slots_end: Cell<u8>;
+    }
+    let (start, end) = (&raw const _update_slots_start, &raw const _update_slots_end);
+    // SAFETY: the linker script gives the slots these bounds in memory that can be written, which nothing else uses, as the caller calls
+    // once; where there are none, they are equal and not null.
+    unsafe { core::slice::from_raw_parts(start, end as usize - start as usize) }
+}
+
+/// Part of a flash in memory, to run an image in place.
+///
+/// # Safety
+///
+/// Nothing writes there for as long as the bytes are used.
+pub unsafe fn mapped(flash: &'static [Cell<u8>], address: u32, length: u32) -> Option<&'static [u8]> {
+    let cells = flash.get(address as usize..)?.get(..length as usize)?;
+    // SAFETY: a cell of a byte is a byte in memory, and the caller promises that none changes.
+    Some(unsafe { core::slice::from_raw_parts(cells.as_ptr().cast(), cells.len()) })
 }

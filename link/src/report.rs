@@ -95,7 +95,7 @@ impl Status {
     }
 }
 
-/// How long things take. What is not measured is 0.
+/// What things take. What is not measured is 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Timing {
     /// Period of the control tick in ns.
@@ -108,12 +108,14 @@ pub struct Timing {
     pub worst_head: u32,
     /// Ticks that ended after the next one was due.
     pub overruns: u32,
+    /// Bytes of stack that were in use at most.
+    pub stack: u32,
 }
 
 impl Timing {
     pub(crate) fn write(&self, w: &mut Writer<'_>) {
-        let Self { period, worst_tick, worst_jitter, worst_head, overruns } = *self;
-        [period, worst_tick, worst_jitter, worst_head, overruns].into_iter().for_each(|n| w.u32(n));
+        let Self { period, worst_tick, worst_jitter, worst_head, overruns, stack } = *self;
+        [period, worst_tick, worst_jitter, worst_head, overruns, stack].into_iter().for_each(|n| w.u32(n));
     }
 
     pub(crate) fn read(r: &mut Reader<'_>) -> Option<Self> {
@@ -123,6 +125,7 @@ impl Timing {
             worst_jitter: r.u32()?,
             worst_head: r.u32()?,
             overruns: r.u32()?,
+            stack: r.u32()?,
         })
     }
 }

@@ -11,8 +11,8 @@ interrupts!(0 of 32);
 pub const NVIC_PRIO_BITS: u8 = 3;
 /// Words of scratch memory for a head.
 pub const SCRATCH: usize = crate::MPS2_SCRATCH;
-/// What a non-maskable interrupt says: the watchdog's time has ended, a reset will follow.
-pub const NMI: &str = "watchdog";
+/// Whether a non-maskable interrupt says that the watchdog's time has ended, and that it will reset the board.
+pub const WATCHDOG_NMI: bool = true;
 
 const HZ: u32 = 25_000_000;
 const UART: usize = 0x4000_4000;

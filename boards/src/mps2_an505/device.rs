@@ -12,8 +12,8 @@ interrupts!(42 of 96);
 pub const NVIC_PRIO_BITS: u8 = 3;
 /// Words of scratch memory for a head.
 pub const SCRATCH: usize = crate::MPS2_SCRATCH;
-/// What a non-maskable interrupt says: the watchdog's time has ended, a reset will follow.
-pub const NMI: &str = "watchdog";
+/// Whether a non-maskable interrupt says that the watchdog's time has ended, and that it will reset the board.
+pub const WATCHDOG_NMI: bool = true;
 
 const HZ: u32 = 20_000_000;
 const UART: usize = 0x5020_0000;

@@ -73,7 +73,7 @@ fn every_flipped_bit_of_an_image_is_noticed_by_the_next_whole_round() {
 #[test]
 fn ram_has_the_rules_of_flash() {
     let mut memory = [7; 64];
-    let mut ram = Ram::<4, 16>(&mut memory);
+    let mut ram = Ram::<4, 16>::new(&mut memory);
     assert_eq!(ram.write(0, &[1; 4]), Err(RamError::Programmed), "not erased");
     assert_eq!(ram.erase(0, 32), Ok(()));
     assert_eq!(ram.write(4, &[1; 8]), Ok(()));

@@ -115,7 +115,7 @@ fn run<A: Authority>(
     starts: u32,
 ) {
     listener.set_nonblocking(true).expect("it is a socket");
-    let flash = Ram::<4, SECTOR>(flash);
+    let flash = Ram::<4, SECTOR>::new(flash);
     let layout = Layout::new(&flash, 0..8192, 8192..16384).expect("the slots fit");
     let mut slots = Slots::new(flash, layout, authority);
     let running = slots.select().filter(|candidate| !candidate.trial).map(|candidate| candidate.slot);

@@ -1,30 +1,65 @@
-//! The application on its boards under QEMU: it starts, refuses, acts, is reset, and tells why.
+//! The application on its boards under QEMU, at the other end of its link: it starts, refuses, acts, is updated, is reset, and tells why.
 
 use std::fs;
+use std::io::Write as _;
 use std::path::Path;
+use std::time::Instant;
 
+use actq::methods::Activations;
 use actq::runtime::ImageBuffer;
 use actq_bench::Target;
-use actq_bench::console::Console;
+use actq_bench::controller::{Controller, PATIENCE, act, until};
 use actq_bench::cycles::Code;
 use actq_bench::firmware::{self, built_in, halfword_at};
+use actq_bench::networks::Builder;
+use actq_device::client::Client;
+use actq_device::push::{Package, push};
+use actq_kernels::image::{header as h, seal};
+use actq_kernels::{Image, Width};
+use actq_link::code::{Crash, Fault, Refusal, ResetCause, State};
+use actq_link::report::BUILT_IN;
+use actq_ur3::{ACT_DIM, OBS_DIM};
 use anyhow::{Context, Result, ensure};
+use tempfile::NamedTempFile;
 
 /// The boards that the application has a device for.
 const BOARDS: [Target; 4] = [Target::Fpu, Target::M33, Target::M7, Target::F405];
+/// Those that have a watchdog, a clock and memory for slots in QEMU.
+const WHOLE: [Target; 3] = [Target::Fpu, Target::M33, Target::M7];
 
-/// Starts it and waits until it is ready; gives what it said.
-fn ready(target: Target, elf: &Path) -> Result<(Console, Vec<String>)> {
-    let mut console = Console::start(target, elf, None)?;
-    let said = console.lines_until("self-test passed, ready")?;
-    Ok((console, said))
+fn start(target: Target, features: &'static str) -> Result<(Controller, Client)> {
+    let controller = Controller::start(target, &firmware::controller(target, features)?, None)?;
+    let client = controller.client()?;
+    Ok((controller, client))
 }
 
-/// The number that follows `name` in a line.
-fn number(line: &str, name: &str) -> Result<u32> {
-    let (_, rest) = line.split_once(name).with_context(|| format!("{name:?} is not in {line:?}"))?;
-    let number = rest.trim_start().split(|c: char| !c.is_ascii_digit()).next().unwrap_or_default();
-    number.parse().with_context(|| format!("{name:?} in {line:?}"))
+fn self_test(image: &Image<'_>, step: usize) -> Option<(Vec<f32>, Vec<u32>)> {
+    let (observation, action) = image.self_test(step)?;
+    let observation = observation.iter().map(|word| f32::from_bits(u32::from_le(*word))).collect();
+    Some((observation, action.iter().map(|word| u32::from_le(*word)).collect()))
+}
+
+/// A small image of the built-in one's lengths: QEMU's serial ports take a byte at a time.
+fn small() -> Result<Vec<u8>> {
+    let mut builder = Builder::new(OBS_DIM);
+    builder.linear((ACT_DIM, OBS_DIM), Activations::Int8, |_| Some(Width::W3), 0, true)?;
+    let (policy, outcomes) = builder.finish("small".to_owned(), false);
+    actq::emit::image(&policy, &outcomes)
+}
+
+/// The image with another expected action in its self-test.
+fn with_wrong_self_test(mut bytes: Vec<u8>) -> Result<Vec<u8>> {
+    let at = 4 * h::W_SELF_TEST;
+    let begin = u32::from_le_bytes(bytes[at..at + 4].try_into()?) as usize + OBS_DIM;
+    bytes[4 * begin] ^= 1;
+    seal(&mut bytes).context("its length is as before")?;
+    Ok(bytes)
+}
+
+fn file(bytes: &[u8]) -> Result<NamedTempFile> {
+    let mut file = NamedTempFile::new()?;
+    file.write_all(bytes)?;
+    Ok(file)
 }
 
 #[test]
@@ -32,108 +67,126 @@ fn every_board_starts_and_acts_with_the_bits_of_the_host() -> Result<()> {
     let buffer = ImageBuffer::read(built_in()?)?;
     let image = buffer.image(built_in()?)?;
     for target in BOARDS {
-        let (mut console, said) = ready(target, &firmware::controller(target, "")?)?;
-        let clock = match target {
-            Target::M33 => "clock 20000000 Hz, watchdog runs",
-            // QEMU has no clocks for it: the wait for the crystal has ended.
-            Target::F405 => "clock 16000000 Hz, without its crystal, watchdog runs",
-            _ => "clock 25000000 Hz, watchdog runs",
-        };
-        let expected = [
-            "actq controller, reset by unknown",
-            clock,
-            &format!("image {}, crc32 {:08x}", image.name(), image.crc()),
-            "self-test passed, ready",
-        ];
-        assert_eq!(said, expected, "{target:?}");
+        let (_controller, mut client) = start(target, "")?;
+        let status = client.status()?;
+        assert_eq!((status.state, status.fault, status.reset), (State::Disarmed, None, ResetCause::Unknown));
+        assert_eq!((status.image, status.slot), (image.crc(), BUILT_IN), "{target:?}");
+        assert_eq!((usize::from(status.observation), usize::from(status.axes)), (image.obs_len(), image.act_len()));
+        assert_eq!(client.breadcrumb()?.crash, None, "{target:?}");
         for step in 0..image.self_test_steps() {
-            let (_, action) = image.self_test(step).context("a self-test step is missing")?;
-            let bits: String = action.iter().map(|word| format!(" {:08x}", u32::from_le(*word))).collect();
-            console.send(b"s")?;
-            assert_eq!(console.line()?, format!("action{bits}"), "{target:?}, step {step}");
+            let (observation, bits) = self_test(&image, step).context("a self-test step is missing")?;
+            let (applied, action) = act(&mut client, &observation)?;
+            assert!(!applied);
+            assert_eq!(action.iter().map(|v| v.to_bits()).collect::<Vec<_>>(), bits, "{target:?}, step {step}");
         }
-        console.send(b"?")?;
-        let status = console.line()?;
-        assert!(status.starts_with("ready, ticks "), "{target:?}: {status}");
-        assert!(number(&status, "ticks ")? > 10, "{target:?}: {status}");
-        assert_eq!((number(&status, "overruns ")?, number(&status, "lost bytes ")?), (0, 0), "{target:?}: {status}");
+        if target == Target::F405 {
+            // QEMU has no clocks for it: the wait for the crystal has ended, and nothing may move at another rate.
+            assert_eq!(client.status()?.refusal, Some(Refusal::Clock));
+            assert!(push(&mut client, &package(&small()?), |_| {}).is_err(), "it has no slots");
+            continue;
+        }
+        let (observation, _) = self_test(&image, 0).context("it has a self-test")?;
+        assert_eq!(client.get(actq_link::code::Parameter::High, 0)?, 1.5, "{target:?}: not the contract's limit");
+        let mut armed = || -> Result<(bool, Vec<f32>)> {
+            arm(&mut client, &observation)?;
+            act(&mut client, &observation)
+        };
+        // The machine may be so busy that the deadline passes in between.
+        let mut outcome = armed()?;
+        if !outcome.0 {
+            outcome = armed()?;
+        }
+        let (applied, action) = outcome;
+        assert!(applied && action.iter().all(|value| value.abs() <= 2.0), "{target:?}: {action:?}");
+        client.disarm()?;
+        let status = client.status()?;
+        assert_eq!(status.state, State::Disarmed, "{target:?}");
+        let timing = until(&mut client, "timed", |status| status.ticks > 200).and_then(|_| client.timing())?;
+        assert_eq!((timing.period, timing.overruns), (1_000_000, 0), "{target:?}");
+        assert!(timing.worst_head > 0 && timing.stack > 0, "{target:?}: {timing:?}");
     }
     Ok(())
+}
+
+/// Arms behind a fresh observation; again where the machine was so busy that it has become an old one.
+fn arm(client: &mut Client, observation: &[f32]) -> Result<()> {
+    let begun = Instant::now();
+    loop {
+        act(client, observation)?;
+        match client.arm() {
+            Err(_) if begun.elapsed() < PATIENCE && client.status()?.refusal == Some(Refusal::Stale) => {}
+            outcome => return outcome,
+        }
+    }
+}
+
+fn package(image: &[u8]) -> Package<'_> {
+    Package { image, version: 1, signature: None }
 }
 
 /// At 8 kHz, with a head of 330 thousand weights below: no tick is lost, and none begins later or takes longer than a tenth of a
-/// period. An instruction takes QEMU 32 ns, and a period 3125 cycles of 40 ns. Twenty steps play chunks of several evaluations.
+/// period. An instruction takes QEMU 32 ns. Twenty steps play chunks of several evaluations.
 #[test]
 fn a_head_below_leaves_the_tick_alone() -> Result<()> {
-    let (mut console, _) = ready(Target::Fpu, &firmware::controller(Target::Fpu, "tick-8khz")?)?;
-    for _ in 0..20 {
-        console.send(b"s")?;
-        assert!(console.line()?.starts_with("action "));
-    }
-    console.send(b"?")?;
-    let status = console.line()?;
-    let [ticks, longest, jitter, overruns] =
-        ["ticks ", "longest ", "jitter ", "overruns "].map(|name| number(&status, name));
-    assert!(ticks? > 800, "{status}");
-    assert!(longest? < 312 && jitter? < 312, "{status}");
-    assert_eq!(overruns?, 0, "{status}");
-    Ok(())
-}
-
-#[test]
-fn a_damaged_image_is_refused_with_its_reason() -> Result<()> {
-    let mut bytes = fs::read(built_in()?)?;
-    let middle = bytes.len() / 2;
-    bytes[middle] ^= 4;
-    let slot = tempfile::NamedTempFile::new()?;
-    fs::write(slot.path(), bytes)?;
-    for target in BOARDS {
-        let mut console = Console::start(target, &firmware::controller(target, "")?, Some(slot.path()))?;
-        let said = console.lines_until("image refused")?;
-        let last = said.last().map(String::as_str);
-        assert_eq!(last, Some("image refused: image checksum differs: the image is damaged, error 7"), "{target:?}");
-        console.send(b"s?")?;
-        assert_eq!(console.line()?, "no action: not ready", "{target:?}");
-        assert!(console.line()?.starts_with("not ready, ticks "), "{target:?}");
-    }
-    Ok(())
-}
-
-/// An image that was checked well, and whose self-test vector is another's.
-#[test]
-fn an_image_that_fails_its_self_test_is_refused() -> Result<()> {
-    let mut bytes = fs::read(built_in()?)?;
-    let buffer = ImageBuffer::new(&bytes);
+    let buffer = ImageBuffer::read(built_in()?)?;
     let image = buffer.image(built_in()?)?;
-    let (_, action) = image.self_test(0).context("the image has a self-test")?;
-    let action: Vec<u8> = action.iter().flat_map(|word| word.to_ne_bytes()).collect();
-    let at = bytes.windows(action.len()).position(|window| window == action).context("its action is in the image")?;
-    bytes[at] ^= 1;
-    let crc = actq_kernels::image::checksum(&bytes);
-    bytes[4 * actq_kernels::image::header::W_CRC..][..4].copy_from_slice(&crc.to_le_bytes());
-    let slot = tempfile::NamedTempFile::new()?;
-    fs::write(slot.path(), bytes)?;
-    let mut console = Console::start(Target::F405, &firmware::controller(Target::F405, "")?, Some(slot.path()))?;
-    let said = console.lines_until("image refused")?;
-    assert_eq!(said.last().map(String::as_str), Some("image refused: its self-test fails, error 84"));
+    let (_controller, mut client) = start(Target::Fpu, "tick-8khz")?;
+    let (observation, _) = self_test(&image, 0).context("it has a self-test")?;
+    for _ in 0..20 {
+        act(&mut client, &observation)?;
+    }
+    let ticks = client.status()?.ticks;
+    until(&mut client, "later", |status| status.ticks > ticks + 200)?;
+    let timing = client.timing()?;
+    assert!(ticks > 800, "{ticks}");
+    assert_eq!((timing.period, timing.overruns), (125_000, 0));
+    assert!(timing.worst_tick < 12_500 && timing.worst_jitter < 12_500, "{timing:?}");
     Ok(())
 }
 
-/// The boards whose watchdog QEMU has. The loop that no longer feeds it goes on, so what it interrupts is somewhere in it.
 #[test]
-fn the_watchdog_resets_a_loop_without_progress() -> Result<()> {
-    for target in [Target::Fpu, Target::M33, Target::M7] {
+fn an_image_that_may_not_run_is_refused_with_its_reason() -> Result<()> {
+    let mut damaged = fs::read(built_in()?)?;
+    let middle = damaged.len() / 2;
+    damaged[middle] ^= 4;
+    let observation = vec![0.0; ImageBuffer::read(built_in()?)?.image(built_in()?)?.obs_len()];
+    for (target, bytes, refusal) in BOARDS
+        .map(|target| (target, damaged.clone(), Refusal::Image))
+        .into_iter()
+        .chain([(Target::F405, with_wrong_self_test(fs::read(built_in()?)?)?, Refusal::SelfTest)])
+    {
+        let slot = file(&bytes)?;
+        let controller = Controller::start(target, &firmware::controller(target, "")?, Some(slot.path()))?;
+        let mut client = controller.client()?;
+        client.observe(&observation)?;
+        let status = client.status()?;
+        assert_eq!((status.state, status.refusal, status.image), (State::Disarmed, Some(refusal), 0), "{target:?}");
+        assert!(client.arm().is_err(), "{target:?}");
+    }
+    Ok(())
+}
+
+/// What hides its progress is reset: the link's, the head's, the output's. The loop goes on, so what the watchdog interrupts is
+/// somewhere in it.
+#[test]
+fn the_watchdog_resets_what_makes_no_progress() -> Result<()> {
+    for (target, hidden) in WHOLE.into_iter().zip([1, 2, 4]) {
         let elf = firmware::controller(target, "faults")?;
-        let (mut console, _) = ready(target, &elf)?;
-        console.send(b"w")?;
-        let said = console.lines_until("self-test passed, ready")?;
-        assert_eq!(said[0], "actq controller, reset by watchdog", "{target:?}");
-        let at = said[1].strip_prefix("before it: watchdog at ").with_context(|| format!("{target:?}: {said:?}"))?;
-        halfword_at(&elf, at.get(..8).context("an address")?)?;
-        // A crumb is told once.
-        console.send(b"p")?;
-        assert_eq!(console.line()?, "actq controller, reset by software", "{target:?}");
-        assert!(console.line()?.starts_with("before it: panic in line "), "{target:?}");
+        let (_controller, mut client) = start(target, "faults")?;
+        let first = client.status()?;
+        client.connection_mut().raw(&[0, b'0' + hidden, 0]);
+        until(&mut client, "reset", |status| status.reset == ResetCause::Watchdog)?;
+        let crumb = client.breadcrumb()?;
+        assert_eq!((crumb.reset, crumb.crash), (ResetCause::Watchdog, Some(Crash::Watchdog)), "{target:?}");
+        assert_eq!((crumb.detail, crumb.count), (hidden.into(), 1), "{target:?}");
+        halfword_at(&elf, crumb.pc)?;
+        let second = client.status()?;
+        assert_ne!(first.token, second.token, "{target:?}: a request from before the reset would be taken");
+        // A crash is told once, and counted on.
+        client.connection_mut().raw(&[0, b'p', 0]);
+        until(&mut client, "reset", |status| status.reset == ResetCause::Software)?;
+        let crumb = client.breadcrumb()?;
+        assert_eq!((crumb.crash, crumb.count), (Some(Crash::Panic), 2), "{target:?}");
     }
     Ok(())
 }
@@ -142,29 +195,70 @@ fn the_watchdog_resets_a_loop_without_progress() -> Result<()> {
 fn a_hard_fault_leaves_its_address() -> Result<()> {
     for target in BOARDS {
         let elf = firmware::controller(target, "faults")?;
-        let (mut console, _) = ready(target, &elf)?;
-        console.send(b"h")?;
-        let said = console.lines_until("self-test passed, ready")?;
-        assert_eq!(said[0], "actq controller, reset by software", "{target:?}");
-        let at = said[1].strip_prefix("before it: hard fault at ").with_context(|| format!("{target:?}: {said:?}"))?;
-        let instruction = halfword_at(&elf, at.get(..8).context("an address")?)? & 0xff00;
-        ensure!(instruction == 0xde00, "{target:?}: {said:?} is {instruction:04x}, not the UDF");
-        console.send(b"?")?;
-        assert!(console.line()?.starts_with("ready"), "{target:?}");
+        let (_controller, mut client) = start(target, "faults")?;
+        client.status()?;
+        client.connection_mut().raw(&[0, b'h', 0]);
+        until(&mut client, "reset", |status| status.reset == ResetCause::Software)?;
+        let crumb = client.breadcrumb()?;
+        assert_eq!(crumb.crash, Some(Crash::HardFault), "{target:?}");
+        let instruction = halfword_at(&elf, crumb.pc)? & 0xff00;
+        ensure!(instruction == 0xde00, "{target:?}: {crumb:?} is {instruction:04x}, not the UDF");
     }
     Ok(())
 }
 
-/// There is nothing in the application that panics, nor the text of a panic.
+/// There is nothing in the application that panics, nor the text of a panic; it has the size that it may have.
 #[test]
-fn no_panic_is_in_the_application() -> Result<()> {
+fn no_panic_is_in_the_application_and_it_is_small() -> Result<()> {
+    let image = fs::read(built_in()?)?.len() as u64;
     for target in BOARDS {
-        let code = Code::read(&firmware::controller(target, "")?)?;
+        let elf = firmware::controller(target, "")?;
+        let code = Code::read(&elf)?;
         let names = || code.functions().iter().map(|function| function.name.as_str());
         let telling = ["panic", "core::fmt", "unwind"];
         let found: Vec<&str> = names().filter(|name| telling.iter().any(|part| name.contains(part))).collect();
         assert!(found.is_empty(), "{target:?}: {found:?}");
         assert!(names().any(|name| name.contains("Head")), "{target:?}: nothing is in it");
+        let flash = firmware::flash_bytes(&elf)? - image;
+        assert!(flash <= 64 << 10, "{target:?}: {flash} bytes of flash");
     }
     Ok(())
+}
+
+/// The application is updated while it runs; what fails its self-test is refused, and the one before runs on, over a reset, too.
+#[test]
+fn an_image_comes_over_the_link_and_one_that_fails_is_rolled_back() -> Result<()> {
+    let new = ImageBuffer::new(&small()?);
+    let wrong = with_wrong_self_test(small()?)?;
+    let (observation, bits) = self_test(&new.image(Path::new("small"))?, 0).context("it has a self-test")?;
+    for target in WHOLE {
+        let (_controller, mut client) = start(target, "faults")?;
+        let told = push(&mut client, &package(&wrong), |_| {}).expect_err("its self-test fails");
+        assert!(format!("{told:#}").contains("self-test failed"), "{told:#}");
+        let status = client.status()?;
+        assert_eq!((status.slot, status.refusal), (BUILT_IN, Some(Refusal::Stale)), "{target:?}");
+        push(&mut client, &package(new.bytes()), |_| {})?;
+        let slot = client.status()?.slot;
+        assert_ne!(slot, BUILT_IN, "{target:?}");
+        assert!(push(&mut client, &package(&wrong), |_| {}).is_err());
+        assert_eq!(client.status()?.slot, slot, "{target:?}: not rolled back");
+        client.connection_mut().raw(&[0, b'p', 0]);
+        let status = until(&mut client, "reset", |status| status.reset == ResetCause::Software)?;
+        assert_eq!(status.slot, slot, "{target:?}: not kept");
+        let (_, action) = act(&mut client, &observation)?;
+        assert_eq!(action.iter().map(|v| v.to_bits()).collect::<Vec<_>>(), bits, "{target:?}");
+    }
+    Ok(())
+}
+
+/// Without observations the outputs go to their safe action, which is kept until armed again.
+#[test]
+fn a_host_that_stops_is_noticed_at_the_deadline() -> Result<()> {
+    let buffer = ImageBuffer::read(built_in()?)?;
+    let (observation, _) = self_test(&buffer.image(built_in()?)?, 0).context("it has a self-test")?;
+    let (_controller, mut client) = start(Target::Fpu, "")?;
+    arm(&mut client, &observation)?;
+    let status = until(&mut client, "latched", |status| status.state == State::Latched)?;
+    assert_eq!((status.fault, status.refusal), (Some(Fault::Stale), Some(Refusal::Stale)));
+    arm(&mut client, &observation)
 }

@@ -95,7 +95,7 @@ fn test(buffer: &ImageBuffer) -> Result<(), Refusal> {
 /// The firmware's main, with a socket for a UART and a clock for a timer.
 fn firmware(listener: &TcpListener, stop: &AtomicBool, built_in: &[u8], key: &[u8; 32]) -> Result<()> {
     let mut memory = vec![0; 4 * SECTOR];
-    let flash = Ram::<4, SECTOR>(&mut memory);
+    let flash = Ram::<4, SECTOR>::new(&mut memory);
     let sector = SECTOR as u32;
     let layout = Layout::new(&flash, 0..2 * sector, 2 * sector..4 * sector)?;
     let mut updater = Updater::new(Slots::new(flash, layout, Key::new(key)?), None);

@@ -26,4 +26,3 @@ mod recorded;
 mod recordings;
 mod slices;
 mod stats;
-mod work;

@@ -65,7 +65,7 @@ pub(super) fn all<'a>(content: &'a Content, n: &[u32; 6], pick: usize) -> Vec<Me
         Message::Abort,
         Message::Action { of: a, applied: pick.is_multiple_of(2), values },
         Message::Status(status),
-        Message::Timing(Timing { period: a, worst_tick: b, worst_jitter: c, worst_head: d, overruns: e }),
+        Message::Timing(Timing { period: a, worst_tick: b, worst_jitter: c, worst_head: d, overruns: e, stack: a }),
         Message::Breadcrumb(Breadcrumb { reset, crash, pc: a, detail: b, ticks: c, count: d }),
         Message::Value { parameter, axis, value },
         Message::Ack { of: a, refusal, written: b },

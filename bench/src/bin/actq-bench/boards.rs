@@ -1,8 +1,10 @@
 //! What the application takes on each board, and what a head takes on each core.
 
+use std::path::Path;
+
 use actq::measure::eval;
 use actq::runtime::ImageBuffer;
-use actq_bench::console::Console;
+use actq_bench::controller::{Controller, act, until};
 use actq_bench::qemu::Counter;
 use actq_bench::{Target, evaluation, firmware, ur3};
 use anyhow::{Context, Result};
@@ -28,7 +30,7 @@ pub(crate) fn measure(counter: &Counter) -> Result<Vec<(String, u64)>> {
         let board = target.board();
         let scratch = board.application.context("the board has no application")?.scratch;
         let elf = firmware::controller(target, "")?;
-        let stack = stack(target, &elf)?;
+        let stack = stack(target, &elf, recorded.episode(0))?;
         let harness = firmware::harness(target)?;
         let step = evaluation::count(counter, target, &harness, None, &image, recorded.episode(0))?;
         let ram = firmware::ram_bytes(&elf)? - 4 * scratch as u64 + stack;
@@ -45,16 +47,14 @@ pub(crate) fn measure(counter: &Counter) -> Result<Vec<(String, u64)>> {
 }
 
 /// Bytes of stack that the application has used after some steps.
-fn stack(target: Target, elf: &std::path::Path) -> Result<u64> {
-    let mut console = Console::start(target, elf, None)?;
-    console.lines_until("self-test passed, ready")?;
-    for _ in 0..STEPS {
-        console.send(b"s")?;
-        console.line()?;
+fn stack(target: Target, elf: &Path, observations: impl Iterator<Item = Vec<f32>>) -> Result<u64> {
+    let controller = Controller::start(target, elf, None)?;
+    let mut client = controller.client()?;
+    for observation in observations.take(STEPS) {
+        act(&mut client, &observation)?;
     }
-    console.send(b"?")?;
-    let status = console.line()?;
-    let (_, stack) = status.split_once("stack ").with_context(|| status.clone())?;
-    let bytes = stack.split(' ').next().unwrap_or_default();
-    bytes.parse().with_context(|| status.clone())
+    // The firmware looks at its stack every now and then.
+    let ticks = client.status()?.ticks;
+    until(&mut client, "later", |status| status.ticks.wrapping_sub(ticks) > 300)?;
+    Ok(client.timing()?.stack.into())
 }

@@ -26,8 +26,8 @@ interrupts!(37 of 82);
 pub const NVIC_PRIO_BITS: u8 = 4;
 /// Words of scratch memory for a head.
 pub const SCRATCH: usize = super::SCRATCH;
-/// What a non-maskable interrupt says: nothing here asks for one.
-pub const NMI: &str = "nmi";
+/// Whether a non-maskable interrupt says that the watchdog's time has ended: nothing here asks for one.
+pub const WATCHDOG_NMI: bool = false;
 
 /// The board.
 pub type Parts = seams::Parts<Uart, Watchdog, Stage>;

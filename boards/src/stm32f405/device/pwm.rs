@@ -97,6 +97,10 @@ impl Stage for Pwm {
         self.timer.sr().modify(|_, w| w.bif().clear_bit());
         self.timer.bdtr().modify(|_, w| w.moe().set_bit());
         // The break input keeps it at 0.
+        self.is_on()
+    }
+
+    fn is_on(&mut self) -> bool {
         self.timer.bdtr().read().moe().bit()
     }
 

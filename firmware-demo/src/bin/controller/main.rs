@@ -1,5 +1,5 @@
-//! The controller on a board, which a feature names: a control tick at high priority, the head in slices below it, a serial port, a
-//! watchdog. `cargo xtask firmware` builds it.
+//! The controller on a board, which a feature names: a control tick at high priority, the head in slices below it, the link at a
+//! serial port, a watchdog. `cargo xtask firmware` builds it.
 //!
 //! RTIC runs it: tick and loop share one value, whose lock is a priority that the hardware has, and what may delay the tick is known
 //! when it is compiled. An executor of async tasks, as Embassy's, has its place where much is waited for; here nothing is.
@@ -14,6 +14,8 @@ fn main() {
 #[cfg(target_os = "none")]
 mod faults;
 #[cfg(target_os = "none")]
+mod locked;
+#[cfg(target_os = "none")]
 mod log;
 #[cfg(target_os = "none")]
 mod start;
@@ -23,41 +25,66 @@ use defmt_rtt as _;
 #[cfg(all(target_os = "none", feature = "defmt-semihosting"))]
 use defmt_semihosting as _;
 
+/// What a build allows, and a host may only make stricter.
+#[cfg(target_os = "none")]
+mod limits {
+    /// Ticks a second.
+    pub(crate) const TICK_HZ: u32 = if cfg!(feature = "tick-8khz") { 8000 } else { 1000 };
+    /// Ticks without an observation, or without an action, before the safe action: half a second.
+    pub(crate) const DEADLINE: u32 = TICK_HZ / 2;
+    /// Age in us of an observation, against the fastest one.
+    pub(crate) const MAX_AGE: u32 = 500_000;
+    /// Ticks in which an axis may go from one limit to the other.
+    pub(crate) const WAY: u32 = TICK_HZ / 10;
+    /// Ticks between two reports.
+    pub(crate) const REPORT: u32 = TICK_HZ / 10;
+    /// Milliseconds without progress until the watchdog resets the board.
+    pub(crate) const PATIENCE: u16 = 500;
+}
+
 #[cfg(target_os = "none")]
 #[rtic::app(device = actq_boards::device, peripherals = false)]
 mod app {
+    use core::sync::atomic::Ordering;
+
     use actq_boards::device::{self, Interrupt, Parts, SCRATCH, Stage, Uart, Watchdog};
     use actq_boards::port::{Buffers, Port, Wire};
-    use actq_boards::seams::{Cause, Clock, Watchdog as _};
-    use actq_firmware_demo::application::Control as _;
-    use actq_firmware_demo::console::Console;
-    use actq_firmware_demo::off::Off;
-    use actq_firmware_demo::output::Output;
-    use actq_firmware_demo::timing::Timing;
-    use actq_firmware_demo::work::Work;
-    use actq_firmware_support::crumb;
+    use actq_boards::seams::{Source, Watchdog as _};
+    use actq_controller::endpoint::Facts;
+    use actq_controller::ram::Ram;
+    use actq_controller::slots::Candidate;
+    use actq_controller::{Check, Endpoint, Guard, Safety, Settings, Shared as _};
+    use actq_firmware_demo::image;
+    use actq_firmware_demo::output::Bridges;
+    use actq_firmware_demo::running::Running;
+    use actq_firmware_demo::timing::{Rates, Timing};
+    use actq_firmware_demo::updates::Updates;
+    use actq_firmware_demo::work::{State, Work};
+    use actq_firmware_support::slot;
+    use actq_kernels::Image;
+    use actq_link::code::{Fault, Refusal};
+    use actq_link::frame;
+    use actq_link::report::{BUILT_IN, Breadcrumb};
     use cortex_m::peripheral::SYST;
     use cortex_m::peripheral::syst::SystClkSource;
 
-    use crate::start;
+    use crate::limits::{DEADLINE, MAX_AGE, PATIENCE, REPORT, TICK_HZ, WAY};
+    use crate::locked::Locked;
+    use crate::log::info;
+    use crate::{faults, start};
 
-    /// Ticks a second.
-    const TICK_HZ: u32 = if cfg!(feature = "tick-8khz") { 8000 } else { 1000 };
-    const BAUD: u32 = 115_200;
-    /// Milliseconds without progress until the watchdog resets the board.
-    const PATIENCE: u16 = 500;
-
-    /// What the start found, for its report.
-    pub(crate) struct Found {
-        pub(crate) cause: Cause,
-        pub(crate) crumb: Option<crumb::Crumb>,
-        pub(crate) clock: Clock,
-        pub(crate) watchdog: bool,
-    }
+    const BAUD: u32 = 921_600;
+    /// Values of an observation.
+    const OBS: usize = start::LENGTHS[0];
+    const AXES: usize = start::LENGTHS[1];
+    /// The longest frame that comes: an observation, or a piece of an image.
+    const INWARD: usize = frame::bytes(if 4 * OBS > 516 { 4 * OBS } else { 516 });
+    /// The longest frame that goes: a status or an action.
+    const OUTWARD: usize = frame::wire_bytes(if 4 * AXES + 5 > 46 { 4 * AXES + 5 } else { 46 });
 
     #[shared]
     struct Shared {
-        output: Output,
+        safety: Safety<AXES>,
         timing: Timing,
     }
 
@@ -66,20 +93,25 @@ mod app {
         wire: Wire<'static, Uart>,
         port: Port<'static>,
         watchdog: Watchdog,
-        stage: Stage,
-        control: Off,
+        bridges: Bridges<Stage>,
         timer: SYST,
         period: u32,
-        found: Found,
+        rates: Rates,
+        breadcrumb: Breadcrumb,
     }
 
     #[init(local = [buffers: Buffers = Buffers::new()])]
     fn init(cx: init::Context) -> (Shared, Local) {
         start::paint_stack();
-        let crumb = crumb::take();
+        let (record, starts) = (faults::found(), faults::starts());
         // SAFETY: RTIC runs this once, and nothing else has the board's peripherals.
         let Parts { clock, cause, uart, mut watchdog, stage } = unsafe { device::start(BAUD) };
-        let watchdog_runs = watchdog.start(PATIENCE);
+        let breadcrumb = start::report(cause, record);
+        info!("start {=u32}, reset cause {=u8}, {=u32} Hz", starts, breadcrumb.reset.code(), clock.hz);
+        let image = Image::new_checked(start::built_in()).ok();
+        let mut safety = Safety::new(image::axes(image.as_ref(), WAY as f32), DEADLINE, starts);
+        safety.check(Check::Clock, clock.source == Source::Crystal);
+        safety.check(Check::Watchdog, watchdog.start(PATIENCE));
         let (wire, port) = cx.local.buffers.split(uart, || rtic::pend(Interrupt::SERIAL));
         let mut timer = cx.core.SYST;
         let period = clock.hz / TICK_HZ;
@@ -88,21 +120,31 @@ mod app {
         timer.clear_current();
         timer.enable_counter();
         timer.enable_interrupt();
-        let found = Found { cause, crumb, clock, watchdog: watchdog_runs };
-        let local = Local { wire, port, watchdog, stage, control: Off, timer, period, found };
-        (Shared { output: Output::NONE, timing: Timing::default() }, local)
+        let rates = Rates::new(clock.hz, TICK_HZ);
+        let bridges = Bridges::new(stage);
+        let local = Local { wire, port, watchdog, bridges, timer, period, rates, breadcrumb };
+        (Shared { safety, timing: Timing::default() }, local)
     }
 
     /// The control tick.
-    #[task(binds = SysTick, priority = 3, shared = [output, timing], local = [control, stage, timer, period])]
+    #[task(binds = SysTick, priority = 3, shared = [safety, timing], local = [bridges, timer, period])]
     fn tick(cx: tick::Context) {
         let began = SYST::get_current();
         // What it says until here is the end that made this tick.
         let _ = cx.local.timer.has_wrapped();
-        let (control, stage) = (cx.local.control, cx.local.stage);
-        let (mut output, mut timing) = (cx.shared.output, cx.shared.timing);
-        output.lock(|output| control.on_tick(output.get(), stage));
+        let (mut safety, mut timing) = (cx.shared.safety, cx.shared.timing);
+        let ticks = safety.lock(|safety| {
+            let outputs = safety.tick();
+            // A break is cleared by disarming: outputs that coast are as they should be.
+            let told = cx.local.bridges.tell(&outputs, safety.axes());
+            safety.check(Check::Hardware, told);
+            safety.ticks()
+        });
+        faults::TICKS.store(ticks, Ordering::Relaxed);
         let (ended, overrun) = (SYST::get_current(), cx.local.timer.has_wrapped());
+        if overrun {
+            safety.lock(|safety| safety.trip(Fault::Overrun));
+        }
         timing.lock(|timing| timing.note(*cx.local.period, began, ended, overrun));
     }
 
@@ -113,16 +155,53 @@ mod app {
     }
 
     /// The loop below.
-    #[idle(shared = [output, timing], local = [port, watchdog, found, scratch: [u32; SCRATCH] = [0; SCRATCH]])]
+    #[idle(shared = [safety, timing], local = [
+        port, watchdog, rates, breadcrumb, scratch: [u32; SCRATCH] = [0; SCRATCH], out: [u8; OUTWARD] = [0; OUTWARD],
+    ])]
     fn idle(cx: idle::Context) -> ! {
-        let idle::LocalResources { port, watchdog, found, scratch, .. } = cx.local;
-        let (mut output, mut timing) = (cx.shared.output, cx.shared.timing);
-        let head = start::head(port, found, scratch);
-        let application = Console::new(head.as_ref().map(|head| *head.image()));
-        let mut work = Work::new(application, port, watchdog, head, start::stack);
+        let idle::LocalResources { port, watchdog, rates, breadcrumb, scratch, out, .. } = cx.local;
+        let mut timing = cx.shared.timing;
+        // SAFETY: RTIC runs this once.
+        let flash = unsafe { slot::updates() };
+        let bytes_of = |candidate: &Candidate| {
+            // SAFETY: an update writes to the slot that does not run, and to none while an image waits for its test.
+            unsafe { slot::mapped(flash, candidate.address, candidate.length) }.unwrap_or_default()
+        };
+        // As the flash of an STM32F405: sectors of 128 KB, written in words.
+        let flash = Ram::<4, { 128 << 10 }>(flash);
+        let passes = |candidate: &Candidate| image::open(bytes_of(candidate), scratch, start::LENGTHS).is_ok();
+        let (updates, running) = Updates::new(flash, passes);
+        let mut bytes = running.as_ref().map_or_else(start::built_in, bytes_of);
+        let facts = Facts { image: 0, slot: BUILT_IN, timing: Default::default(), breadcrumb: *breadcrumb };
+        let settings = Settings { status_period: REPORT, erase_while_armed: true };
+        let endpoint = Endpoint::<OBS, INWARD>::new(Guard::full(&[], MAX_AGE), facts, settings);
+        let (safety, state) = (Locked(cx.shared.safety), State::default());
+        let mut work =
+            Work { port, watchdog, safety, endpoint, updates, rates: *rates, stack: start::stack, out, state };
         loop {
-            let times = timing.lock(|timing| *timing);
-            work.turn(times, |take| output.lock(take));
+            work.watchdog.feed();
+            let head = image::open(bytes, scratch, start::LENGTHS);
+            let refusal = head.as_ref().err().copied();
+            work.safety.with(|safety| {
+                safety.check(Check::Image, matches!(refusal, None | Some(Refusal::SelfTest)));
+                safety.check(Check::SelfTest, refusal.is_none());
+            });
+            work.endpoint.facts.image = head.as_ref().map_or(0, |head| head.image().crc());
+            work.endpoint.facts.slot = work.updates.running().map_or(BUILT_IN, |slot| slot as u8);
+            let mut running = head.ok().map(|head| Running::new(head, bytes));
+            let candidate = loop {
+                let times = timing.lock(|timing| *timing);
+                if let Some(candidate) = work.turn(&mut running, &times) {
+                    break candidate;
+                }
+                faults::MISSING.store(work.state.missing(), Ordering::Relaxed);
+            };
+            work.watchdog.feed();
+            let new = bytes_of(&candidate);
+            let outcome = image::open(new, scratch, start::LENGTHS).map(drop);
+            if work.updates.tested(outcome) {
+                bytes = new;
+            }
         }
     }
 }

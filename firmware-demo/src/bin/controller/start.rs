@@ -1,17 +1,13 @@
-//! The start: what was found is told, the image is checked and tested.
+//! What the start finds: the cause of the reset, the image, the stack.
 
-use actq_boards::device::NMI;
-use actq_boards::port::Port;
-use actq_boards::seams::{Cause, Source};
-use actq_firmware_demo::output::MAX_ACTION;
-use actq_firmware_demo::text::Text;
-use actq_firmware_support::crumb::Kind;
+use actq_boards::device::WATCHDOG_NMI;
+use actq_boards::seams::Cause;
+use actq_controller::breadcrumb::Record;
+use actq_firmware_demo::image::lengths;
 use actq_firmware_support::slot;
 use actq_firmware_support::stack::Room;
-use actq_kernels::{Head, Image};
-
-use crate::app::Found;
-use crate::log::info;
+use actq_link::code::{Crash, ResetCause};
+use actq_link::report::Breadcrumb;
 
 /// Includes a file at an address that is a multiple of 4.
 #[repr(C, align(4))]
@@ -21,70 +17,27 @@ static BUILT_IN: &Aligned<[u8]> = &Aligned(*include_bytes!(env!(
     "set ACTQ_IMAGE to the absolute path of the image to build in; `cargo xtask firmware` does"
 )));
 
-/// Tells what was found, and makes the head of the image in the slot or of the one that was built in. `None`, and the reason is told,
-/// where the image may not run.
-pub(crate) fn head<'s>(port: &mut Port<'static>, found: &Found, scratch: &'s mut [u32]) -> Option<Head<'static, 's>> {
-    report(port, found);
-    let bytes = slot::image().unwrap_or(&BUILT_IN.0);
-    let image = match Image::new_checked(bytes) {
-        Ok(image) => image,
-        Err(error) => {
-            Text::to(port)
-                .text("image refused: ")
-                .text(error.text())
-                .text(", error ")
-                .number(error.code().into())
-                .end();
-            return None;
-        }
-    };
-    Text::to(port).text("image ").text(image.name()).text(", crc32 ").hex(image.crc()).end();
-    if image.act_len() > MAX_ACTION {
-        let text = Text::to(port).text("image refused: its action has ").number(image.act_len() as u32);
-        text.text(" values, the tick takes ").number(MAX_ACTION as u32).end();
-        return None;
-    }
-    let mut head = match Head::new(image, scratch) {
-        Ok(head) => head,
-        Err(error) => {
-            let text = Text::to(port).text("image refused: it needs ").number(image.scratch_words() as u32);
-            text.text(" words of scratch memory, error ").number(error.code().into()).end();
-            return None;
-        }
-    };
-    if let Err(error) = head.self_test() {
-        Text::to(port).text("image refused: its self-test fails, error ").number(error.code().into()).end();
-        return None;
-    }
-    info!("{=str} is ready", image.name());
-    Text::to(port).text("self-test passed, ready").end();
-    Some(head)
+/// Values of an observation and of an action: those of the image that is built in. Every image that runs has as many.
+pub(crate) const LENGTHS: [usize; 2] = lengths(&BUILT_IN.0);
+
+/// The image in the image slot, or the one that is built in.
+pub(crate) fn built_in() -> &'static [u8] {
+    slot::image().unwrap_or(&BUILT_IN.0)
 }
 
-fn report(port: &mut Port<'static>, found: &Found) {
-    let cause = match (found.cause, found.crumb.map(|crumb| crumb.kind)) {
+/// Why the processor started, and what the program before has left.
+pub(crate) fn report(cause: Cause, found: Option<Record>) -> Breadcrumb {
+    let reset = match (cause, found.map(|record| record.crash)) {
+        (Cause::Power, _) => ResetCause::Power,
+        (Cause::Pin, _) => ResetCause::Pin,
+        (Cause::Software, _) => ResetCause::Software,
+        (Cause::Watchdog, _) => ResetCause::Watchdog,
         // The board tells nothing itself.
-        (Cause::Unknown, Some(Kind::Nmi)) => NMI,
-        (Cause::Unknown, Some(Kind::Panic | Kind::HardFault)) => Cause::Software.text(),
-        (cause, _) => cause.text(),
+        (Cause::Unknown, Some(Crash::Watchdog)) if WATCHDOG_NMI => ResetCause::Watchdog,
+        (Cause::Unknown, Some(_)) => ResetCause::Software,
+        (Cause::Unknown, None) => ResetCause::Unknown,
     };
-    info!("reset by {=str}, {=u32} Hz", cause, found.clock.hz);
-    Text::to(port).text("actq controller, reset by ").text(cause).end();
-    if let Some(crumb) = found.crumb {
-        let text = Text::to(port).text("before it: ");
-        match crumb.kind {
-            Kind::Panic => text.text("panic in line ").number(crumb.at),
-            Kind::HardFault => text.text("hard fault at ").hex(crumb.at).text(" called from ").hex(crumb.from),
-            Kind::Nmi => text.text(NMI).text(" at ").hex(crumb.at).text(" called from ").hex(crumb.from),
-        }
-        .end();
-    }
-    let source = match found.clock.source {
-        Source::Crystal => " Hz",
-        Source::Fallback => " Hz, without its crystal",
-    };
-    let text = Text::to(port).text("clock ").number(found.clock.hz).text(source);
-    text.text(if found.watchdog { ", watchdog runs" } else { ", NO WATCHDOG" }).end();
+    Record::report(reset, found)
 }
 
 /// Words of stack that are painted: more than the program takes, less than any board has.

@@ -42,6 +42,9 @@ pub(super) fn table(
         ),
     );
     row("head", format!("worst {:.3} ms", f64::from(timing.worst_head) / 1e3));
+    if timing.stack > 0 {
+        row("stack", format!("at most {} bytes", timing.stack));
+    }
     row("refused observations", status.refused.to_string());
     for (name, c) in [("received there", &status.counters), ("received here", here)] {
         let text = format!(

@@ -1,0 +1,13 @@
+//! The safety machine between loop and tick.
+
+use actq_controller::{Safety, Shared};
+use rtic::Mutex;
+
+/// A resource of RTIC's, whose lock is a priority.
+pub(crate) struct Locked<M>(pub(crate) M);
+
+impl<const AXES: usize, M: Mutex<T = Safety<AXES>>> Shared<AXES> for Locked<M> {
+    fn with<R>(&mut self, work: impl FnOnce(&mut Safety<AXES>) -> R) -> R {
+        self.0.lock(work)
+    }
+}

@@ -1,0 +1,72 @@
+//! Image updates, on a board that has a place for them.
+
+use actq_controller::slots::{Anyone, Candidate, Layout, Slot, Slots, Updater, Work};
+use actq_controller::update::{NoUpdate, Plan, Update};
+use actq_link::code::Refusal;
+use embedded_storage::nor_flash::NorFlash;
+
+/// Two slots, or none.
+pub struct Updates<F>(Option<Updater<F, Anyone>>);
+
+impl<F: NorFlash> Updates<F> {
+    /// For the two halves of `flash`, and the image of them that passes `test` and so runs. Without room for two slots there are none.
+    pub fn new(flash: F, mut test: impl FnMut(&Candidate) -> bool) -> (Self, Option<Candidate>) {
+        let middle = (flash.capacity() / 2) as u32;
+        let Ok(layout) = Layout::new(&flash, 0..middle, middle..2 * middle) else { return (Self(None), None) };
+        let mut slots = Slots::new(flash, layout, Anyone);
+        let running = loop {
+            match slots.select() {
+                Some(candidate) if test(&candidate) && slots.confirm(candidate.slot) => break Some(candidate),
+                Some(candidate) => slots.reject(candidate.slot),
+                None => break None,
+            }
+        };
+        (Self(Some(Updater::new(slots, running.map(|candidate| candidate.slot)))), running)
+    }
+
+    /// Does a piece of what an update takes; an image that waits for its test, whose outcome [`Self::tested`] takes.
+    pub fn work(&mut self) -> Option<Candidate> {
+        match self.0.as_mut()?.work() {
+            Work::Test(candidate) => Some(candidate),
+            Work::Idle | Work::More => None,
+        }
+    }
+
+    /// Whether an image with this outcome of its test is the one that runs from now on.
+    pub fn tested(&mut self, outcome: Result<(), Refusal>) -> bool {
+        self.0.as_mut().is_some_and(|updater| updater.tested(outcome))
+    }
+
+    /// The slot of the image that runs; `None` where that is built in.
+    pub fn running(&self) -> Option<Slot> {
+        self.0.as_ref()?.running()
+    }
+}
+
+impl<F: NorFlash> Update for Updates<F> {
+    fn begin(&mut self, plan: Plan) -> Result<(), Refusal> {
+        self.0.as_mut().map_or_else(|| NoUpdate.begin(plan), |updater| updater.begin(plan))
+    }
+
+    fn chunk(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Refusal> {
+        self.0.as_mut().map_or_else(|| NoUpdate.chunk(offset, bytes), |updater| updater.chunk(offset, bytes))
+    }
+
+    fn commit(&mut self, signature: Option<&[u8; 64]>) -> Result<(), Refusal> {
+        self.0.as_mut().map_or_else(|| NoUpdate.commit(signature), |updater| updater.commit(signature))
+    }
+
+    fn abort(&mut self) {
+        if let Some(updater) = &mut self.0 {
+            updater.abort();
+        }
+    }
+
+    fn written(&self) -> u32 {
+        self.0.as_ref().map_or(0, Update::written)
+    }
+
+    fn is_busy(&self) -> bool {
+        self.0.as_ref().is_some_and(Update::is_busy)
+    }
+}
