@@ -19,7 +19,7 @@ mod shared;
 use std::path::PathBuf;
 
 pub use actq_boards::{Target, root};
-pub use shared::shared_policies;
+pub use shared::{shared_policies, skipped};
 
 /// The project's own policy.
 pub fn ur3() -> PathBuf {

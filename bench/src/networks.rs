@@ -108,6 +108,7 @@ impl Builder {
                 low: array(-1.0),
                 high: array(1.0),
                 max_step: array(0.25),
+                ..ActionContract::default()
             },
             weights: self.graph.weights(),
             graph: self.graph,

@@ -12,13 +12,19 @@ pub fn shared_policies() -> Option<PathBuf> {
     match std::env::var_os("ACTQ_SHARED") {
         Some(folder) if !folder.is_empty() => Some(PathBuf::from(folder).join("policies")),
         _ => {
-            skipped(Location::caller(), "ACTQ_SHARED is not set");
+            skip(Location::caller(), "ACTQ_SHARED is not set");
             None
         }
     }
 }
 
-fn skipped(place: &Location<'_>, why: &str) {
+/// Says that a test, or a part of one, is skipped, as [`shared_policies`] does.
+#[track_caller]
+pub fn skipped(why: &str) {
+    skip(Location::caller(), why);
+}
+
+fn skip(place: &Location<'_>, why: &str) {
     // The test harness names a test's thread after it, unless it runs all tests on one.
     let name = std::thread::current().name().filter(|name| *name != "main").map(str::to_owned);
     let name = name.unwrap_or_else(|| format!("{}:{}", place.file(), place.line()));

@@ -33,7 +33,7 @@ pub fn open<'i, 's>(bytes: &'i [u8], scratch: &'s mut [u32], lengths: [usize; 2]
 /// An axis for each value of an image's actions, with the limits of its contract, the whole way in `ticks`, and 0 as its safe action.
 /// Without an image or without finite limits, an axis stays where it is.
 pub fn axes<const AXES: usize>(image: Option<&Image<'_>>, ticks: f32) -> [Axis; AXES] {
-    let [_, _, low, high, _] = image.map(Image::contract_arrays).unwrap_or_default();
+    let [_, _, low, high, ..] = image.map(Image::contract_arrays).unwrap_or_default();
     let mut axes = [Axis::STILL; AXES];
     for ((axis, low), high) in axes.iter_mut().zip(low).zip(high) {
         let [low, high] = [low, high].map(|word| f32::from_bits(u32::from_le(*word)));

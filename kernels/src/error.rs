@@ -103,6 +103,13 @@ image_errors! {
     SelfTest = 26, "the self-test vector has no steps";
     /// Denoising steps without operations or of a policy that has none, or noise where none is.
     Denoising = 27, "denoising steps, their operations and their noise do not fit";
+    /// Playback averages more chunks than there are actions in one, or of chunks of which several actions are executed; leads over
+    /// by more actions than the chunk before has left, or in an average; or has a deadline before the last action that is executed.
+    Playback = 28, "horizon, overlap, deadline, chunk and execute lengths do not fit";
+    /// Some of the arrays that binarise are missing, or an upper threshold is below its lower one.
+    Binarise = 29, "an action is binarised without all four arrays, or by thresholds that are reversed";
+    /// A smoothing coefficient is not above 0 and at most 1.
+    Smoothing = 30, "a smoothing coefficient is not above 0 and at most 1";
 }
 
 impl ImageError {
@@ -129,7 +136,7 @@ pub enum HeadError {
 }
 
 impl HeadError {
-    /// The error's number, which stays the same in all versions: 64 to 79.
+    /// The error's number, which stays the same in all versions: 64 to 69.
     pub const fn code(self) -> u8 {
         match self {
             Self::ScratchTooSmall { .. } => 64,
@@ -148,6 +155,57 @@ impl fmt::Display for HeadError {
 }
 
 impl core::error::Error for HeadError {}
+
+/// Why the state of a head was not saved or restored. Nothing has changed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum SavedError {
+    /// The slice has not the length that the image's state has.
+    Length {
+        /// Bytes needed: [`crate::Head::saved_len`].
+        needed: usize,
+        /// Bytes given.
+        given: usize,
+    },
+    /// The bytes are no saved state, or that of another version of it.
+    Version,
+    /// The state is that of another image.
+    Image,
+    /// The checksum does not match, or a number is impossible: the bytes are damaged.
+    Damaged,
+    /// A step was begun and is not ready: take it to its end, or reset.
+    Begun,
+}
+
+impl SavedError {
+    /// The error's number, which stays the same in all versions: 70 to 79.
+    pub const fn code(self) -> u8 {
+        match self {
+            Self::Length { .. } => 70,
+            Self::Version => 71,
+            Self::Image => 72,
+            Self::Damaged => 73,
+            Self::Begun => 74,
+        }
+    }
+}
+
+impl fmt::Display for SavedError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Length { needed, given } => write!(f, "saved state has {given} bytes, the image's has {needed}"),
+            Self::Version => f.write_str("not a saved state, or one of another version; reset instead"),
+            Self::Image => f.write_str("saved state is that of another image; reset instead"),
+            Self::Damaged => f.write_str("saved state is damaged; reset instead"),
+            Self::Begun => {
+                f.write_str("a step was begun and is not ready; poll it to its end before its state is saved")
+            }
+        }
+    }
+}
+
+impl core::error::Error for SavedError {}
 
 /// Why a step gave no action. The recurrent state and the chunk are as after a reset; the last action stays, so that the step
 /// limit holds across the error. [`StepError::Budget`] and [`StepError::NotBegun`] change nothing.
@@ -197,6 +255,8 @@ pub enum StepError {
         /// Its position.
         index: usize,
     },
+    /// Every action at hand is older than its deadline, or was for a time that has passed.
+    Stale,
 }
 
 impl StepError {
@@ -212,6 +272,7 @@ impl StepError {
             Self::NotBegun => 86,
             Self::NoiseLength { .. } => 87,
             Self::NoiseNotFinite { .. } => 88,
+            Self::Stale => 89,
         }
     }
 }
@@ -221,6 +282,7 @@ impl From<Fault> for StepError {
         match fault {
             Fault::NotFinite => Self::NotFinite,
             Fault::Damaged => Self::Damaged,
+            Fault::Stale => Self::Stale,
         }
     }
 }
@@ -232,6 +294,8 @@ pub(crate) enum Fault {
     NotFinite,
     /// See [`StepError::Damaged`].
     Damaged,
+    /// See [`StepError::Stale`].
+    Stale,
 }
 
 impl From<NotFinite> for Fault {
@@ -256,6 +320,7 @@ impl fmt::Display for StepError {
             Self::NotBegun => f.write_str("no step was begun: begin takes the observation, then poll"),
             Self::NoiseLength { expected, given } => write!(f, "noise has {given} values, the policy takes {expected}"),
             Self::NoiseNotFinite { index } => write!(f, "noise value {index} is not finite"),
+            Self::Stale => f.write_str("no action at hand is young enough to play"),
         }
     }
 }
@@ -300,6 +365,9 @@ mod tests {
             "Name",
             "SelfTest",
             "Denoising",
+            "Playback",
+            "Binarise",
+            "Smoothing",
         ];
         assert_eq!(codes, (1..).zip(expected.map(Into::into)).collect::<std::vec::Vec<_>>());
         assert_eq!(HeadError::ScratchTooSmall { needed: 1, given: 0 }.code(), 64);
@@ -313,7 +381,16 @@ mod tests {
             StepError::NotBegun,
             StepError::NoiseLength { expected: 1, given: 0 },
             StepError::NoiseNotFinite { index: 0 },
+            StepError::Stale,
         ];
-        assert_eq!(steps.map(StepError::code), [80, 81, 82, 83, 84, 85, 86, 87, 88]);
+        assert_eq!(steps.map(StepError::code), [80, 81, 82, 83, 84, 85, 86, 87, 88, 89]);
+        let saved = [
+            SavedError::Length { needed: 1, given: 0 },
+            SavedError::Version,
+            SavedError::Image,
+            SavedError::Damaged,
+            SavedError::Begun,
+        ];
+        assert_eq!(saved.map(SavedError::code), [70, 71, 72, 73, 74]);
     }
 }

@@ -36,7 +36,7 @@ pub mod pace;
 pub mod round;
 pub mod x;
 
-pub use error::{HeadError, ImageError, StepError};
+pub use error::{HeadError, ImageError, SavedError, StepError};
 pub use head::Head;
 pub use image::Image;
 pub use layout::{Block, BlockShape, Width};

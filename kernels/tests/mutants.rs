@@ -141,7 +141,7 @@ fn play(image: Image<'_>, fill: u32, random: &mut Random) -> Vec<Option<Vec<u32>
 #[test]
 fn what_is_accepted_runs_and_keeps_its_limits() {
     let seen = accepted(|image, random| {
-        let [_, _, low, high, _] = image.contract_arrays();
+        let [_, _, low, high, ..] = image.contract_arrays();
         let limit = |array: &[u32], i: usize| array.get(i).map(|w| f32::from_bits(u32::from_le(*w)));
         let fill = random.bits() as u32;
         for action in play(image, fill, random).into_iter().flatten() {

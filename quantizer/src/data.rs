@@ -10,6 +10,7 @@ mod npz;
 mod origin;
 mod range;
 mod recording;
+mod save;
 #[cfg(test)]
 mod tests;
 mod thinning;

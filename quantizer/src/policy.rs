@@ -40,6 +40,7 @@ impl Policy {
     pub fn check(&self) -> Result<()> {
         let (len, expected) = (self.graph.len_of(self.graph.output()), self.chunk * self.act_len);
         ensure!(len == expected, "the last op gives {len} values, chunk * act_dim is {expected}");
+        self.contract.playback.check(self.chunk, self.execute)?;
         self.contract.check(self.act_len)
     }
 }

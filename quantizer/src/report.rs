@@ -1,7 +1,9 @@
 //! Tables, notes and pictures for people.
 
+pub mod imported;
 pub mod inspect;
 pub mod learned;
+pub mod memory;
 pub mod notes;
 pub mod plot;
 pub mod quantized;

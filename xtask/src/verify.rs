@@ -27,6 +27,10 @@ const FIRMWARE: [&str; 2] = ["actq-firmware-support", "actq-firmware-bench"];
 /// The application, of which the host builds and tests what is not of a board.
 const APPLICATION: &str = "actq-firmware-demo";
 
+/// The tests that compare with tract, a reader of ONNX that takes minutes to build, and the variable that asks for them.
+const ONNX_TESTS: &str = "actq-onnx-tests";
+const ONNX_VARIABLE: &str = "ACTQ_TRACT";
+
 /// A command with a name.
 struct Step {
     name: String,
@@ -128,7 +132,8 @@ fn steps(oldest: Result<(), String>, narrow: Result<(), String>, skipped: &str) 
     };
     // One profile for all that is built for the host.
     let host = ["--profile", "host"];
-    let all_but_firmware = [&["--workspace"][..], &FIRMWARE.map(|name| ["--exclude", name]).concat()].concat();
+    let [support, benches] = FIRMWARE;
+    let all_but_firmware = ["--workspace", "--exclude", support, "--exclude", benches, "--exclude", ONNX_TESTS];
     // The firmware includes an image by path. Lints and documentation do not run it, so any file will do for them.
     let any_file = root().join("Cargo.toml").display().to_string();
     let image = ("ACTQ_IMAGE", any_file.as_str());
@@ -165,6 +170,14 @@ fn steps(oldest: Result<(), String>, narrow: Result<(), String>, skipped: &str) 
     add("tests", &[&["test"], &host[..]].concat(), &[("ACTQ_SKIPPED", skipped)]);
     add("budgets", &[&["run"], &host[..], &["--package", "actq-bench", "--", "budgets"]].concat(), &[]);
 
+    let asked = std::env::var_os(ONNX_VARIABLE).is_some_and(|value| !value.is_empty());
+    let command = asked.then(|| {
+        let mut command = cargo();
+        command.current_dir(root()).args(["test", "--package", ONNX_TESTS]).args(host).env("ACTQ_SKIPPED", skipped);
+        command
+    });
+    let why = format!("{ONNX_VARIABLE} is not set: tract takes minutes to build");
+    steps.push(Step { name: "ONNX files against tract".to_owned(), command: command.ok_or(why) });
     let command = narrow.map(|()| {
         let mut command = cargo();
         command.current_dir(root()).args(["test", "--package", "actq-kernels", "--target", NARROW]).args(host);
@@ -173,7 +186,7 @@ fn steps(oldest: Result<(), String>, narrow: Result<(), String>, skipped: &str) 
     steps.push(Step { name: "kernels' tests with words of 32 bits".to_owned(), command });
     let command = oldest.map(|()| {
         let mut command = Command::new("rustup");
-        command.current_dir(root()).args(["run", OLDEST, "cargo", "check"]).args(host).args(&all_but_firmware);
+        command.current_dir(root()).args(["run", OLDEST, "cargo", "check"]).args(host).args(all_but_firmware);
         command
     });
     steps.push(Step { name: format!("oldest compiler, {OLDEST}"), command });

@@ -2,7 +2,8 @@
 //!
 //! Without arguments it plays the image's self-test observations and prints the actions' bits. With the argument `serve` it
 //! reads observations from standard input and writes actions to standard output, in the protocol of `actq serve`. `poll N` does
-//! the same in polls of N instructions, `ops N` in polls of one operation each. Every step, or begin and each poll, is a counted
+//! the same in polls of N instructions, `ops N` in polls of one operation each. `restart` saves the state before every step,
+//! resets, and restores it. Every step, or begin and each poll, is a counted
 //! region.
 //!
 //! The image is the one in the slot, if there is one, else the one that was built in (environment variable `ACTQ_IMAGE`).
@@ -38,6 +39,8 @@ mod firmware {
     const SCRATCH: usize = if cfg!(actq_small) { 1536 } else { 24 * 1024 };
     /// The longest observation that `serve` takes.
     const MAX_OBSERVATION: usize = if cfg!(actq_small) { 64 } else { 1024 };
+    /// The longest state that `restart` saves, in bytes.
+    const MAX_SAVED: usize = if cfg!(actq_small) { 1024 } else { 8192 };
 
     #[entry]
     fn main() -> ! {
@@ -71,6 +74,7 @@ mod firmware {
         match (arguments.split(' ').next(), number) {
             _ if arguments.is_empty() => replay(&mut head),
             _ if arguments == "serve" => serve(&mut head, Run::Whole),
+            _ if arguments == "restart" => serve(&mut head, Run::Restarts),
             (Some("poll"), Some(budget)) => serve(&mut head, Run::Polls(budget)),
             (Some("ops"), Some(budget)) => serve(&mut head, Run::Ops(budget)),
             _ => Err(message("unknown argument", arguments.as_str())),
@@ -81,6 +85,8 @@ mod firmware {
     #[derive(Clone, Copy)]
     enum Run {
         Whole,
+        /// From a saved state.
+        Restarts,
         /// In polls of so many instructions.
         Polls(u32),
         /// In polls that also end behind each operation.
@@ -91,6 +97,10 @@ mod firmware {
         fn step<'h>(self, head: &'h mut Head<'_, '_>, observation: &[f32]) -> Result<&'h [f32], StepError> {
             match self {
                 Self::Whole => return count::region(|| head.step(observation)),
+                Self::Restarts => {
+                    restart(head);
+                    return head.step(observation);
+                }
                 Self::Polls(budget) => {
                     count::region(|| head.begin(observation))?;
                     while count::region(|| head.poll(budget).map(|p| p.is_pending()))? {}
@@ -104,6 +114,18 @@ mod firmware {
                 Poll::Ready(action) => Ok(action),
                 Poll::Pending => Err(StepError::NotBegun),
             }
+        }
+    }
+
+    /// Saves the state, forgets it, and restores it; where that fails, the state stays forgotten, and the actions show it.
+    #[inline(never)]
+    fn restart(head: &mut Head<'_, '_>) {
+        let mut saved = [0; MAX_SAVED];
+        let Some(saved) = saved.get_mut(..head.saved_len()) else { return head.reset() };
+        let kept = head.save(saved);
+        head.reset();
+        if kept.is_ok() {
+            let _ = head.restore(saved);
         }
     }
 

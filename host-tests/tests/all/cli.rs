@@ -641,6 +641,53 @@ const SPOILT: &[Spoilt] = &[
     ("unknown contract", |p| edit(p, "/action/lowest", json!([0, 0, 0])), "", &["policy.json", "lowest"]),
     ("limits reversed", |p| edit(p, "/action/low", json!([0, 2, 0])), "", &["policy.json", "low"]),
     ("negative step", |p| edit(p, "/action/max_step", json!([1, -1, 1])), "", &["policy.json", "max_step"]),
+    ("smoothing 0", |p| edit(p, "/action/smoothing", json!([1, 0, 1])), "", &["action.smoothing must be above 0"]),
+    ("mean alone", |p| edit(p, "/action/mean", json!([0, 0, 0])), "", &["action has mean or std alone"]),
+    ("std 0", |p| both(p, ["mean", "std"], [json!([0, 0, 0]), json!([1, 0, 1])]), "", &["action.std[1] is 0.0"]),
+    (
+        "quantiles reversed",
+        |p| both(p, ["q01", "q99"], [json!([0, null, 2]), json!([1, null, 1])]),
+        "",
+        &["action.q01[2] is 2.0, above action.q99[2], 1.0"],
+    ),
+    (
+        "a quantile without the other",
+        |p| both(p, ["q01", "q99"], [json!([0, 0, 0]), json!([1, null, 1])]),
+        "",
+        &["action.q01[1] or action.q99[1] alone is null"],
+    ),
+    (
+        "two ways to un-normalise",
+        |p| {
+            both(p, ["mean", "std"], [json!([0, 0, 0]), json!([1, 1, 1])])?;
+            let path = p.join("policy.json");
+            let mut policy: Value = serde_json::from_slice(&fs::read(&path)?)?;
+            policy["action"]["q01"] = json!([0, 0, 0]);
+            policy["action"]["q99"] = json!([1, 1, 1]);
+            Ok(fs::write(path, policy.to_string())?)
+        },
+        "",
+        &["mean and std, and q01 and q99: leave one pair"],
+    ),
+    ("scale null", |p| edit(p, "/action/scale", json!([1, null, 1])), "", &["action.scale[1] is null"]),
+    ("binarise in part", |p| edit(p, "/action/binarise", json!({"on": [1, 1, 1]})), "", &["action.binarise.off"]),
+    (
+        "thresholds reversed",
+        |p| edit(p, "/action/binarise", binarise([0.5, 0.6], [1, 0])),
+        "",
+        &["binarise.off exceeds"],
+    ),
+    ("one value", |p| edit(p, "/action/binarise", binarise([0.6, 0.5], [1, 1])), "", &["off_value[2] are both 1"]),
+    ("overlap", |p| edit(p, "/overlap", json!(3)), "", &["overlap is 3, of a chunk 2 actions are left"]),
+    ("deadline", |p| edit(p, "/deadline", json!(1)), "", &["deadline is 1, it must be 2"]),
+    ("ensemble", |p| edit(p, "/ensemble", json!({"horizon": 4})), "", &["execute is 2", "execute must be 1"]),
+    (
+        "horizon 0",
+        |p| edit(p, "/ensemble", json!({"horizon": 0})),
+        "",
+        &["ensemble.horizon is 0, it must be 1 to chunk (4)"],
+    ),
+    ("unknown ensemble", |p| edit(p, "/ensemble", json!({"horizons": 4})), "", &["policy.json", "horizons"]),
     ("control rate 0", |p| edit(p, "/control_hz", json!(0)), "", &["policy.json", "control_hz"]),
     (
         "no recording",
@@ -678,6 +725,24 @@ const SPOILT: &[Spoilt] = &[
     ("length beyond the array", |p| calib(p, OBS, 0.0, 21), "", &["calib.npz", "21", "20"]),
     ("negative length", |p| calib(p, OBS, 0.0, -1), "", &["calib.npz", "length"]),
 ];
+
+/// The policy with two more keys in `action`.
+fn both(policy: &Path, keys: [&str; 2], values: [Value; 2]) -> Result<()> {
+    let mut json = description();
+    for (key, value) in keys.into_iter().zip(values) {
+        json["action"][key] = value;
+    }
+    Ok(fs::write(policy.join("policy.json"), json.to_string())?)
+}
+
+/// Of the last of three actions.
+fn binarise([on, off]: [f64; 2], [on_value, off_value]: [i32; 2]) -> Value {
+    let last = |value: Value| json!([null, null, value]);
+    json!({
+        "on": last(json!(on)), "off": last(json!(off)),
+        "on_value": last(json!(on_value)), "off_value": last(json!(off_value)),
+    })
+}
 
 fn vast_lstm() -> Value {
     json!({"op": "lstm", "hidden": 1u64 << 62, "w_ih": "in.weight", "w_hh": "mid.weight"})

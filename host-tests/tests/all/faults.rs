@@ -108,8 +108,10 @@ fn no_operation_hides_a_value_that_has_left_the_range() {
         NodeKind::from(Normalize { mean: vec![0.0; N], scale: vec![1.0; N], pre_clip, clip })
     };
     let one = || vec![1.0; N];
+    // The exponential of values as large as these is infinite by itself: no image passes its self-test.
     let cases: Vec<(&str, Vec<NodeKind>)> = Function::ALL
         .into_iter()
+        .filter(|function| *function != Function::Exp)
         .map(|function| (function.name(), vec![Pointwise(function).into()]))
         .chain([
             ("clip before", vec![clip(true)]),

@@ -64,6 +64,7 @@ fn valid_image() -> Vec<u8> {
             low: Some(vec![-1.0; ACT]),
             high: Some(vec![1.0; ACT]),
             max_step: Some(vec![0.25; ACT]),
+            ..ActionContract::default()
         },
         weights: graph.weights(),
         graph,
@@ -263,12 +264,30 @@ fn headers_that_cannot_be_are_refused() {
         ("a longer header", E::Version, |d| d.set_high(h::W_VERSION, 33)),
         ("a length one word off", E::Length, |d| d.set(h::W_BYTES, d.get(h::W_BYTES) + 4)),
         ("another layout stamp", E::Layout, |d| d.set(h::W_LAYOUT, d.get(h::W_LAYOUT) + 1)),
-        ("reserved half beside the number of matrices", E::Reserved, |d| d.set_high(h::W_MATRIX_COUNT, 1)),
-        ("reserved word 30", E::Reserved, |d| d.set(30, 1)),
-        ("reserved word 31", E::Reserved, |d| d.set(31, 1 << 31)),
+        ("an average of chunks of which two actions are executed", E::Playback, |d| d.set_high(h::W_MATRIX_COUNT, 1)),
+        ("an average of more chunks than a chunk has actions", E::Playback, |d| {
+            d.set_high(h::W_CHUNK, 1);
+            d.set_high(h::W_MATRIX_COUNT, CHUNK as u32 + 1);
+        }),
+        ("an average and an overlap", E::Playback, |d| {
+            d.set_high(h::W_CHUNK, 1);
+            d.set_high(h::W_MATRIX_COUNT, 1);
+            d.set_low(h::W_PLAYBACK, 1);
+        }),
+        ("an average without memory for it", E::Arena, |d| {
+            d.set_high(h::W_CHUNK, 1);
+            d.set_high(h::W_MATRIX_COUNT, 1);
+        }),
+        ("an overlap where nothing is left", E::Playback, |d| d.set_low(h::W_PLAYBACK, 1)),
+        ("an overlap without memory for it", E::Arena, |d| {
+            d.set_high(h::W_CHUNK, 1);
+            d.set_low(h::W_PLAYBACK, 1);
+        }),
+        ("a deadline before the last action", E::Playback, |d| d.set_high(h::W_PLAYBACK, 1)),
+        ("operations of denoising steps in another kind", E::Denoising, |d| d.set(h::W_DENOISING, 1)),
         ("reserved byte beside the kind", E::Reserved, |d| d.set(h::W_KIND, d.get(h::W_KIND) | 1 << 8)),
-        ("an unknown contract flag", E::Reserved, |d| d.set_high(h::W_WORK_FLAGS, 0x3f)),
-        ("an unknown kind", E::Kind, |d| d.set(h::W_KIND, d.get(h::W_KIND) + 1)),
+        ("an unknown contract flag", E::Reserved, |d| d.set_high(h::W_WORK_FLAGS, 0x41f)),
+        ("an unknown kind", E::Kind, |d| d.set(h::W_KIND, d.get(h::W_KIND) & !0xff | 4)),
         ("execute above chunk", E::Chunk, |d| d.set_high(h::W_CHUNK, CHUNK as u32 + 1)),
         ("execute 0", E::Chunk, |d| d.set_high(h::W_CHUNK, 0)),
         ("chunk 0", E::Chunk, |d| d.set(h::W_CHUNK, 0)),
@@ -340,6 +359,12 @@ fn contracts_that_cannot_be_are_refused() {
     fn array(d: &Draft, which: usize) -> usize {
         d.offset(h::W_CONTRACT) + which * ACT
     }
+    /// Flags of a contract that binarises, and memory for what is on.
+    fn binarised(d: &mut Draft, flags: u32) {
+        d.set_high(h::W_WORK_FLAGS, flags);
+        d.set_high(h::W_ACTION_WORK, d.high(h::W_ACTION_WORK) + ACT as u32);
+        d.set(h::W_SCRATCH, d.get(h::W_SCRATCH) + ACT as u32);
+    }
     refused(&[
         ("contract outside", E::Section, |d| d.set(h::W_CONTRACT, d.0.len() as u32)),
         ("contract in the header", E::Section, |d| d.set(h::W_CONTRACT, 0)),
@@ -351,6 +376,22 @@ fn contracts_that_cannot_be_are_refused() {
         ("limits reversed", E::Limits, |d| d.set_f32(array(d, 3) + 3, -1.5)),
         ("max_step negative", E::Constant, |d| d.set_f32(array(d, 4) + 3, -0.25)),
         ("max_step NaN", E::Constant, |d| d.set_f32(array(d, 4), NAN)),
+        ("thresholds without values", E::Binarise, |d| binarised(d, 0xdf)),
+        ("values without thresholds", E::Binarise, |d| d.set_high(h::W_WORK_FLAGS, 0x31f)),
+        // max_step's array as that of smoothing.
+        ("smoothing 0", E::Smoothing, |d| {
+            d.set_high(h::W_WORK_FLAGS, 0x2f);
+            d.set_f32(array(d, 4) + 1, 0.0);
+        }),
+        ("smoothing above 1", E::Smoothing, |d| {
+            d.set_high(h::W_WORK_FLAGS, 0x2f);
+            d.set_f32(array(d, 4) + 1, 1.5);
+        }),
+        // As the four arrays that binarise; of its limits' array the thresholds are reversed.
+        ("thresholds reversed", E::Binarise, |d| {
+            binarised(d, 0x3c1);
+            d.set_f32(array(d, 2), 0.5);
+        }),
     ]);
 }
 
@@ -362,8 +403,8 @@ fn operations_that_cannot_be_are_refused() {
         ("operations at a huge offset", E::Section, |d| d.set(h::W_OPS, HUGE)),
         ("too many operations", E::Op, |d| d.set_high(h::W_KIND, 0xffff)),
         ("operation code 0", E::Op, |d| d.set(d.op(FUNCTION), 0)),
-        ("operation code 10", E::Op, |d| d.set(d.op(FUNCTION), 10)),
-        ("an unknown function", E::Op, |d| d.set_low(d.op(FUNCTION), u32::from(op::FUNCTION) | 7 << 8)),
+        ("operation code 14", E::Op, |d| d.set(d.op(FUNCTION), 14)),
+        ("an unknown function", E::Op, |d| d.set_low(d.op(FUNCTION), u32::from(op::FUNCTION) | 12 << 8)),
         ("detail 2 in linear", E::Reserved, |d| d.set_low(d.op(FIRST), u32::from(op::LINEAR) | 2 << 8)),
         ("detail 1 in layer norm", E::Reserved, |d| d.set_low(d.op(LAYER_NORM), u32::from(op::LAYER_NORM) | 1 << 8)),
         ("an operation of no length", E::Shape, |d| d.set_high(d.op(FUNCTION), 0)),

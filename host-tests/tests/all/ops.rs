@@ -559,6 +559,13 @@ fn contract(action: &Value, raw: &[f64], last: Option<&[f64]>, met: &mut [usize;
     raw.iter()
         .enumerate()
         .map(|(i, &y)| {
+            let wide = |name: &str| action[name][i].as_f64();
+            let y = match (wide("mean"), wide("std"), wide("q01"), wide("q99")) {
+                (Some(mean), Some(std), _, _) => y * std + mean,
+                // As RLDS and OpenVLA have it.
+                (_, _, Some(q01), Some(q99)) => 0.5 * (y + 1.0) * (q99 - q01 + 1e-8) + q01,
+                _ => y,
+            };
             let a = y * at("scale", i).unwrap_or(1.0) + at("offset", i).unwrap_or(0.0);
             let a = limit(0, a, a.max(at("low", i).unwrap_or(f64::MIN)));
             let a = limit(1, a, a.min(at("high", i).unwrap_or(f64::MAX)));
@@ -625,6 +632,19 @@ fn chunks_go_through_the_whole_contract() -> Result<()> {
     // 3 executed of 4; the reset (step 25) falls inside a chunk.
     let met = check_actions(json!({"kind": "chunk", "chunk": 4, "execute": 3, "action": action}), &action)?;
     ensure!(met.iter().all(|&n| n > 2), "limits that were not tried: {met:?}");
+    Ok(())
+}
+
+#[test]
+fn outputs_are_unnormalised_by_moments_or_quantiles() -> Result<()> {
+    for action in [
+        json!({"mean": [0.3, -0.2], "std": [0.5, 1.5]}),
+        json!({"mean": [0.3, null], "std": [0.5, null], "scale": [2.0, -1.0], "offset": [0.1, 0.2]}),
+        json!({"q01": [-0.4, 0.1], "q99": [0.9, 1.1], "low": [-0.3, 0.2], "high": [0.8, 1.0]}),
+        json!({"q01": [null, 0.1], "q99": [null, 1.1], "scale": [0.5, 3.0]}),
+    ] {
+        check_actions(json!({"action": action}), &action).with_context(|| action.to_string())?;
+    }
     Ok(())
 }
 

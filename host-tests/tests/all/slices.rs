@@ -4,7 +4,7 @@ use std::path::Path;
 use std::task::Poll;
 
 use actq::emit;
-use actq::graph::ops::{Add, Gru, LayerNorm, Linear, Lstm, Normalize, Pointwise, RmsNorm};
+use actq::graph::ops::{Add, Gru, LayerNorm, Linear, Lstm, Mul, Normalize, Pointwise, RmsNorm};
 use actq::methods::{Activations, Outcome};
 use actq::policy::Policy;
 use actq::runtime::{ImageBuffer, with_head};
@@ -41,6 +41,7 @@ fn network(seed: u64) -> Result<(Policy, Vec<Outcome>)> {
     let kept = last;
     last = builder.node(Pointwise(Function::ALL[seed as usize % Function::ALL.len()]), &[last])?;
     last = builder.node(Add, &[last, kept])?;
+    last = builder.node(Mul, &[last, kept])?;
     let [weight, bias] = [builder.values(rows), builder.values(rows)];
     last = builder.node(LayerNorm { weight: weight.clone(), bias, eps: 1e-3 }, &[last])?;
     last = builder.node(RmsNorm { weight, eps: 1e-3 }, &[last])?;

@@ -3,22 +3,47 @@
 use crate::error::Fault;
 use crate::image::Image;
 use crate::math::clamp;
+use crate::ops::elementwise::copy;
 
-/// Takes the network's output `next` through the contract in place, against the `last` action where there is one (`started`).
+/// Takes the network's output `next` through the contract, against the `last` action where there is one (`started`), which it becomes.
+/// `switches` remembers what is on.
 #[inline(always)]
-pub(super) fn apply(image: &Image<'_>, next: &mut [u32], last: &[u32], started: bool) -> Result<(), Fault> {
-    for (i, (next, last)) in next.iter_mut().zip(last).enumerate() {
-        let [scale, offset, low, high, max_step] = image.contract_of(i);
-        let a = f32::from_bits(*next) * scale + offset;
+pub(super) fn apply(
+    image: &Image<'_>,
+    next: &mut [u32],
+    last: &mut [u32],
+    switches: &mut [u32],
+    started: bool,
+) -> Result<(), Fault> {
+    // First in place of the output, and in a second bit of the switches: an error must not have changed the last action, not even
+    // in part.
+    for (i, (next, last)) in next.iter_mut().zip(&*last).enumerate() {
+        let [scale, offset, low, high, max_step, smoothing, on, off, on_value, off_value] = image.contract_of(i);
+        let mut a = f32::from_bits(*next) * scale + offset;
         if !a.is_finite() {
             return Err(Fault::NotFinite);
         }
-        let mut a = clamp(a, low, high);
+        if let Some(switch) = switches.get_mut(i)
+            && on_value != off_value
+        {
+            let was = *switch & 1;
+            let is = a >= on || a > off && was == 1;
+            *switch = was | u32::from(is) << 1;
+            a = if is { on_value } else { off_value };
+        }
+        a = clamp(a, low, high);
         if started {
             let last = f32::from_bits(*last);
             a = clamp(a, last - max_step, last + max_step);
+            if smoothing < 1.0 {
+                // On the way there, however it is rounded, so that all limits hold.
+                let (low, high) = if last < a { (last, a) } else { (a, last) };
+                a = clamp(last + smoothing * (a - last), low, high);
+            }
         }
         *next = a.to_bits();
     }
+    switches.iter_mut().for_each(|switch| *switch >>= 1);
+    copy(next, last);
     Ok(())
 }

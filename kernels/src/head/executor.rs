@@ -50,7 +50,7 @@ pub(super) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
         0 => [part(arena, &(dst.offset + range.start..dst.offset + range.end)), &mut [], &mut []],
         _ => regions(arena, &op.regions),
     };
-    if matches!(op.kind, OpKind::Normalize | OpKind::Add | OpKind::Copy | OpKind::Denoise) {
+    if matches!(op.kind, OpKind::Normalize | OpKind::Add | OpKind::Mul | OpKind::Copy | OpKind::Denoise) {
         (dst, src) = (part(dst, &range), part(src, &range));
     }
     if dst.is_empty() {
@@ -59,6 +59,7 @@ pub(super) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
     match op.kind {
         OpKind::Function(function) => function.apply(f(dst)),
         OpKind::Add => elementwise::add(f(src), f(dst)),
+        OpKind::Mul => elementwise::mul(f(src), f(dst)),
         OpKind::Copy => copy(src, dst),
         OpKind::Noise => {
             if let Some([seed, draw]) = cursor.draw {

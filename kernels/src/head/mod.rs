@@ -3,12 +3,15 @@
 mod arena;
 mod contract;
 mod executor;
+mod playback;
+mod saved;
 
 use core::task::Poll;
 
 use self::arena::{part, regions};
 use self::executor::run;
 pub use self::executor::run_whole;
+use self::playback::Playback;
 use crate::cursor::Cursor;
 use crate::error::{Fault, HeadError, StepError};
 use crate::image::{Image, Region};
@@ -24,8 +27,7 @@ pub struct Head<'a, 's> {
     /// [`Self::least_budget`], once it was computed; 0 before.
     least_budget: u32,
     phase: Phase,
-    /// Actions of the current chunk that have been played; 0 = the network must run.
-    played: usize,
+    playback: Playback,
     /// Whether an action has been given since the reset, so that the step limit has something to hold on to.
     started: bool,
     /// Of the noise.
@@ -52,14 +54,17 @@ impl<'a, 's> Head<'a, 's> {
         let arena = scratch.get_mut(..needed).ok_or(HeadError::ScratchTooSmall { needed, given })?;
         // Nothing depends on what the memory held.
         arena.fill(0);
-        Ok(Self { image, arena, least_budget: 0, phase: Phase::Idle, played: 0, started: false, seed: 0, draws: 0 })
+        let mut playback = Playback::default();
+        playback.forget(&image, arena);
+        Ok(Self { image, arena, least_budget: 0, phase: Phase::Idle, playback, started: false, seed: 0, draws: 0 })
     }
 
-    /// Forgets the recurrent state, the rest of a chunk, the last action and a step that was begun. The noise of an iterative head
+    /// Forgets the recurrent state, all chunks, the last action and a step that was begun. The noise of an iterative head
     /// begins anew: after a reset the same observations give the same actions.
     #[inline(never)]
     pub fn reset(&mut self) {
         self.abandon();
+        self.words_mut(self.image.switches()).fill(0);
         self.started = false;
         self.draws = 0;
     }
@@ -70,13 +75,13 @@ impl<'a, 's> Head<'a, 's> {
         self.reset();
     }
 
-    /// As [`Self::reset`], but the last action stays: after an error the robot is still where that left it, and the step limit
-    /// holds on to it.
+    /// As [`Self::reset`], but the last action stays, and what is on: after an error the robot is still where that left it, and the
+    /// step limit holds on to it.
     #[inline(never)]
     fn abandon(&mut self) {
         self.forget();
         self.phase = Phase::Idle;
-        self.played = 0;
+        self.playback.forget(&self.image, self.arena);
     }
 
     /// Zeroes the recurrent state.
@@ -97,7 +102,7 @@ impl<'a, 's> Head<'a, 's> {
     }
 
     /// The action for `observation`: of the next chunk position where the image is chunked, after the action contract. It is
-    /// [`Self::begin`] and one [`Self::poll`] without a limit.
+    /// [`Self::begin`] and one [`Self::poll`] without a limit. Each action is one control period; [`Self::pass`] counts those without.
     ///
     /// On an error the recurrent state and the chunk are reset, so that no part of a failed evaluation reaches a later action.
     /// The last action stays: the next one is limited by `max_step` as ever.
@@ -135,10 +140,37 @@ impl<'a, 's> Head<'a, 's> {
         self.least_budget
     }
 
+    /// Lets so many control periods pass without an action: the observation of a step that was begun is so much older when it is
+    /// ready, and the actions that were for these periods never play. (So an observation that is old when it comes: first
+    /// [`Self::begin`], then its age.) Where nothing is left that is younger than the image's deadline, the step ends with
+    /// [`StepError::Stale`].
+    pub fn pass(&mut self, periods: usize) {
+        self.playback.pass(&self.image, self.arena, periods);
+    }
+
+    /// The action that is due by what chunks have foreseen, without an observation: while a step is being computed, so that the next
+    /// chunk goes on behind what has been played, or where an observation is missing. Of a chunk that is being replaced, only an
+    /// image with an overlap or an ensemble keeps what is left.
+    ///
+    /// # Errors
+    ///
+    /// [`StepError::Stale`] where nothing is left, or nothing young enough, which changes nothing. Others are those of [`Self::step`].
+    #[inline(never)]
+    pub fn play(&mut self) -> Result<&[f32], StepError> {
+        if let Err(fault) = self.act() {
+            if fault != Fault::Stale {
+                self.abandon();
+            }
+            return Err(fault.into());
+        }
+        Ok(self.floats(self.image.action()))
+    }
+
     #[inline(never)]
     fn take(&mut self, observation: &[f32], noise: Option<&[f32]>) -> Result<(), StepError> {
         self.drop_step();
         self.load(observation).inspect_err(|_| self.abandon())?;
+        self.playback.turn(&self.image, self.arena);
         if let Some(noise) = noise {
             self.load_noise(noise).inspect_err(|_| self.abandon())?;
         }
@@ -189,14 +221,14 @@ impl<'a, 's> Head<'a, 's> {
 
     /// Where a step begins: before the first operation, or, within a chunk, behind the last.
     fn fresh(&self) -> Cursor {
-        Cursor { op: if self.played == 0 { 0 } else { self.image.op_count() }, ..Cursor::default() }
+        Cursor { op: if self.playback.ready { self.image.op_count() } else { 0 }, ..Cursor::default() }
     }
 
     /// Begins a step with the observation that the arena holds, and with noise of the generator or with that of the arena.
     #[inline(never)]
     fn start(&mut self, draw: bool) {
         let draw = draw.then_some([self.seed, self.draws]);
-        if self.played == 0 && draw.is_some() {
+        if !self.playback.ready && draw.is_some() {
             self.draws = self.draws.wrapping_add(1);
         }
         self.phase = Phase::Begun(Cursor { draw, ..self.fresh() });
@@ -218,12 +250,11 @@ impl<'a, 's> Head<'a, 's> {
             if !self.evaluate(budget, one_op)? || budget.take(1, Work::Act(&self.image)) == 0 {
                 return Ok(false);
             }
+            if !self.playback.ready {
+                self.playback.merge(&self.image, self.arena)?;
+            }
             self.act()?;
             self.phase = Phase::Ready;
-            self.played += 1;
-            if self.played == self.image.execute() {
-                self.played = 0;
-            }
         }
         Ok(true)
     }
@@ -243,7 +274,7 @@ impl<'a, 's> Head<'a, 's> {
     fn infer_from(&mut self, observation: &[f32], noise: Option<&[f32]>) -> Result<&[f32], StepError> {
         self.drop_step();
         // From the first operation on, whatever is left of a chunk.
-        self.played = 0;
+        self.playback.forget(&self.image, self.arena);
         self.take(observation, noise)?;
         self.evaluate(&mut Unlimited, false).inspect_err(|_| self.abandon())?;
         self.phase = Phase::Idle;
@@ -264,6 +295,7 @@ impl<'a, 's> Head<'a, 's> {
         let mut step = 0;
         while let Some((observation, expected)) = self.image.self_test(step) {
             copy_le(observation, self.words_mut(self.image.observation()));
+            self.playback.turn(&self.image, self.arena);
             self.start(true);
             self.finish()?;
             let action = self.floats(self.image.action());
@@ -299,7 +331,7 @@ impl<'a, 's> Head<'a, 's> {
         if let Some(index) = noise.iter().position(|v| !v.is_finite()) {
             return Err(StepError::NoiseNotFinite { index });
         }
-        if self.played == 0 {
+        if !self.playback.ready {
             copy(bytemuck::must_cast_slice(noise), self.words_mut(region));
         }
         Ok(())
@@ -332,20 +364,17 @@ impl<'a, 's> Head<'a, 's> {
         Ok(true)
     }
 
-    /// Takes the chunk's current action through the contract. Not inlined, so that the operations do not run on top of its stack.
+    /// Takes the action that is due through the contract. Not inlined, so that the operations do not run on top of its stack.
     #[inline(never)]
     fn act(&mut self) -> Result<(), Fault> {
-        let (output, action) = (self.image.output(), self.image.action());
-        let position = self.played * action.len;
-        let [output, action, _] = regions(self.arena, &[output, action, Region::default()]);
-        // In place of the output: an error must not have changed the last action, not even in part.
-        let next = part(output, &(position..position + action.len()));
+        let due = self.playback.due(&self.image, self.arena)?;
+        let [next, action, switches] = regions(self.arena, &[due, self.image.action(), self.image.switches()]);
         if next.is_empty() {
             return Err(Fault::Damaged);
         }
-        contract::apply(&self.image, next, action, self.started)?;
-        copy(next, action);
+        contract::apply(&self.image, next, action, switches, self.started)?;
         self.started = true;
+        self.playback.pass(&self.image, self.arena, 1);
         Ok(())
     }
 

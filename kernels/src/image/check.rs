@@ -1,6 +1,6 @@
 //! The check of an image: everything that an image says, once. `docs/FORMAT.md` has the list.
 
-use super::contract::CONTRACT_ARRAYS;
+use super::contract::{ARRAY_BINARISE, CONTRACT_ARRAYS};
 use super::crc::checksum;
 use super::header as h;
 use super::matrix::{matrix, row_block};
@@ -52,11 +52,7 @@ impl<'a> Image<'a> {
     }
 
     fn check(&self) -> Result<(), ImageError> {
-        let reserved = high(self.head(h::W_MATRIX_COUNT)) as u32 | self.header[31];
-        if reserved != 0
-            || (self.head(h::W_KIND) >> 8) as u8 != 0
-            || high(self.head(h::W_WORK_FLAGS)) >> CONTRACT_ARRAYS != 0
-        {
+        if (self.head(h::W_KIND) >> 8) as u8 != 0 || high(self.head(h::W_WORK_FLAGS)) >> CONTRACT_ARRAYS != 0 {
             return Err(ImageError::Reserved);
         }
         match (self.head(h::W_KIND) as u8, self.chunk(), self.execute()) {
@@ -64,6 +60,12 @@ impl<'a> Image<'a> {
             (1..=3, chunk, execute) if (1..=chunk).contains(&execute) => {}
             (0..=3, ..) => return Err(ImageError::Chunk),
             _ => return Err(ImageError::Kind),
+        }
+        let (horizon, overlap) = (self.horizon(), self.overlap());
+        let averaged = horizon == 0 || horizon <= self.chunk() && self.execute() == 1 && overlap == 0;
+        let in_time = self.deadline().is_none_or(|age| age >= self.execute().max(horizon));
+        if !averaged || !in_time || overlap > self.chunk() - self.execute() {
+            return Err(ImageError::Playback);
         }
         // Denoising steps have operations, and only an iterative head has them.
         let (once, steps) = (self.once(), high(self.head(h::W_DENOISING)));
@@ -75,13 +77,13 @@ impl<'a> Image<'a> {
         if self.obs_len() == 0 || self.act_len() == 0 || self.op_count() == 0 {
             return Err(ImageError::Shape);
         }
-        // State, observation, what operations write, action, work area: in this order and without a gap. (`check_sections` sees
+        // State, observation, what operations write, action, what is kept with it, work area: in this order and without a gap. (`check_sections` sees
         // to the middle.)
-        let (action, work) = (self.action(), self.work());
+        let work = self.work();
         if self.state().offset != 0
             || self.observation().offset != self.state().end()
             || self.output().offset < self.observation().end()
-            || work.offset != action.end()
+            || work.offset != self.kept().end()
             || work.end() != self.scratch_words()
             || work.end() > h::MAX_SCRATCH
         {
@@ -126,16 +128,28 @@ impl<'a> Image<'a> {
     }
 
     fn check_contract(&self, front: &mut Front<'a>) -> Result<(), ImageError> {
-        let arrays = (0..CONTRACT_ARRAYS).filter(|which| self.has_contract(*which)).count();
-        front.take_finite(self.head(h::W_CONTRACT) as usize, arrays * self.act_len())?;
+        if (ARRAY_BINARISE + 1..CONTRACT_ARRAYS).any(|i| self.has_contract(i) != self.has_contract(ARRAY_BINARISE)) {
+            return Err(ImageError::Binarise);
+        }
+        let (arrays, horizon) = (self.contract_count() * self.act_len(), self.horizon());
+        front.take_finite(self.head(h::W_CONTRACT) as usize, arrays + 2 * horizon)?;
         for i in 0..self.act_len() {
-            let [_, _, low, high, max_step] = self.contract_of(i);
+            let [_, _, low, high, max_step, smoothing, on, off, _, _] = self.contract_of(i);
             if low > high {
                 return Err(ImageError::Limits);
             }
             if max_step < 0.0 {
                 return Err(ImageError::Constant);
             }
+            if smoothing <= 0.0 || smoothing > 1.0 {
+                return Err(ImageError::Smoothing);
+            }
+            if off > on {
+                return Err(ImageError::Binarise);
+            }
+        }
+        if !(0..horizon).flat_map(|count| self.ensemble(count)).all(is_positive) {
+            return Err(ImageError::Constant);
         }
         Ok(())
     }

@@ -1,15 +1,17 @@
-//! The action contract: arrays of f32 bits, one per action dimension, in the order in which they apply: `a = out * scale + offset`,
-//! then the limits `low` and `high`, then the step limit `max_step` against the last action.
+//! The action contract: arrays of f32 bits, one per action dimension. `docs/FORMAT.md` has the order in which they apply.
 
 use super::header as h;
 use super::view::Image;
 use super::words::high;
 
 /// Arrays of the action contract.
-pub const CONTRACT_ARRAYS: usize = 5;
+pub const CONTRACT_ARRAYS: usize = 10;
+/// The first of the four arrays that binarise, which are all there or none.
+pub(super) const ARRAY_BINARISE: usize = 6;
 
 impl<'a> Image<'a> {
-    /// The arrays, in their order: scale, offset, low, high, max_step. Those that the contract has not are empty.
+    /// The arrays, in their order: scale, offset, low, high, max_step, smoothing, on, off, on_value, off_value. Those that the contract
+    /// has not are empty.
     pub fn contract_arrays(&self) -> [&'a [u32]; CONTRACT_ARRAYS] {
         let mut offset = self.head(h::W_CONTRACT) as usize;
         core::array::from_fn(|which| {
@@ -22,10 +24,13 @@ impl<'a> Image<'a> {
 
     /// The contract of action `i`; numbers that change nothing stand for the arrays that it has not.
     pub(crate) fn contract_of(&self, i: usize) -> [f32; CONTRACT_ARRAYS] {
-        let mut numbers = [1.0, -0.0, f32::NEG_INFINITY, f32::INFINITY, f32::INFINITY];
+        let mut numbers = [1.0, -0.0, f32::NEG_INFINITY, f32::INFINITY, f32::INFINITY, 1.0, 0.0, 0.0, 0.0, 0.0];
         let (mut flags, len) = (high(self.head(h::W_WORK_FLAGS)), self.act_len());
         let mut at = (self.head(h::W_CONTRACT) as usize).wrapping_add(i);
         for number in &mut numbers {
+            if flags == 0 {
+                break;
+            }
             if flags & 1 == 1 {
                 *number = f32::from_bits(self.word(at));
                 at = at.wrapping_add(len);
@@ -33,6 +38,11 @@ impl<'a> Image<'a> {
             flags >>= 1;
         }
         numbers
+    }
+
+    /// How many arrays there are.
+    pub(super) fn contract_count(&self) -> usize {
+        high(self.head(h::W_WORK_FLAGS)).count_ones() as usize
     }
 
     pub(super) fn has_contract(&self, which: usize) -> bool {

@@ -69,11 +69,12 @@ pub const W_WEIGHTS: usize = 19;
 pub const W_DIGEST: usize = 20;
 /// Offset of the matrix records.
 pub const W_MATRICES: usize = 28;
-/// u16 number of matrices, u16 zero.
+/// u16 number of matrices, u16 chunks that are averaged for an action; 0 where none are.
 pub const W_MATRIX_COUNT: usize = 29;
-
 /// u16 first operation of those that every denoising step runs, u16 denoising steps; 0 where the network runs once.
 pub const W_DENOISING: usize = 30;
+/// u16 actions that lead over from one chunk to the next, u16 age from which on an action never plays; 0 where there is none.
+pub const W_PLAYBACK: usize = 31;
 
 /// What a policy's output means.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -111,6 +112,12 @@ pub struct Header {
     pub chunk: usize,
     /// How many of a chunk's actions are executed.
     pub execute: usize,
+    /// Chunks that are averaged for an action; 0 where none are.
+    pub horizon: usize,
+    /// Actions that lead over from one chunk to the next.
+    pub overlap: usize,
+    /// Age from which on an action never plays; 0 where there is none.
+    pub deadline: usize,
     /// Control rate in Hz.
     pub rate_hz: f32,
     /// Words of the arena.
@@ -173,8 +180,9 @@ impl Header {
             *word = u32::from_le_bytes(*bytes);
         }
         words[W_MATRICES] = self.matrices.offset;
-        words[W_MATRIX_COUNT] = halves(self.matrices.count, 0)?;
+        words[W_MATRIX_COUNT] = halves(self.matrices.count, self.horizon)?;
         words[W_DENOISING] = halves(self.once, self.denoising_steps)?;
+        words[W_PLAYBACK] = halves(self.overlap, self.deadline)?;
         Ok(words)
     }
 }

@@ -36,6 +36,8 @@ pub enum OpKind {
     LstmCell,
     /// A GRU cell: `src` holds `W_ih x + b_ih`, `third` holds `W_hh h + b_hh`, each of gates `[r z n]`, `dst` is the state.
     GruCell,
+    /// `dst *= src`
+    Mul,
     /// `dst` = noise: of the caller, or of the head's generator.
     Noise,
     /// `dst` = the row of the array for this denoising step. Arrays: one for each.
@@ -159,12 +161,14 @@ operations! {
     LSTM_CELL = 8 "lstm cell": OpKind::LstmCell, Uses { src: 4, third: 1, ..Uses::NONE };
     /// [`OpKind::GruCell`]
     GRU_CELL = 9 "gru cell": OpKind::GruCell, Uses { src: 3, third: 3, reads_dst: true, ..Uses::NONE };
+    /// [`OpKind::Mul`]
+    MUL = 10 "mul": OpKind::Mul, Uses { src: 1, reads_dst: true, ..Uses::NONE };
     /// [`OpKind::Noise`]
-    NOISE = 10 "noise": OpKind::Noise, Uses::NONE;
+    NOISE = 11 "noise": OpKind::Noise, Uses::NONE;
     /// [`OpKind::Table`]
-    TABLE = 11 "table": OpKind::Table, Uses { constants: NAMED, ..Uses::NONE };
+    TABLE = 12 "table": OpKind::Table, Uses { constants: NAMED, ..Uses::NONE };
     /// [`OpKind::Denoise`]
-    DENOISE = 12 "denoise": OpKind::Denoise, Uses { src: 1, third: 1, constants: NAMED, reads_dst: true, ..Uses::NONE };
+    DENOISE = 13 "denoise": OpKind::Denoise, Uses { src: 1, third: 1, constants: NAMED, reads_dst: true, ..Uses::NONE };
 }
 
 /// What a writer says in an operation's record.

@@ -19,13 +19,24 @@ pub fn normalize(x: &[f32], mean: &[u32], scale: &[u32], pre_clip: f32, clip: f3
 /// `y += x`, as far as both go.
 #[inline(never)]
 pub fn add(x: &[f32], y: &mut [f32]) {
+    in_pairs(x, y, |y, x| y + x);
+}
+
+/// `y *= x`, as far as both go.
+#[inline(never)]
+pub fn mul(x: &[f32], y: &mut [f32]) {
+    in_pairs(x, y, |y, x| y * x);
+}
+
+#[inline(always)]
+fn in_pairs(x: &[f32], y: &mut [f32], of: impl Fn(f32, f32) -> f32) {
     let len = x.len().min(y.len());
     let ((x, xs), (y, ys)) = (x[..len].as_rchunks::<2>(), y[..len].as_rchunks_mut::<2>());
     if let ([y], [x]) = (y, x) {
-        *y += *x;
+        *y = of(*y, *x);
     }
     for (y, x) in ys.iter_mut().zip(xs) {
-        *y = [y[0] + x[0], y[1] + x[1]];
+        *y = [of(y[0], x[0]), of(y[1], x[1])];
     }
 }
 

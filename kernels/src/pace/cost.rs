@@ -123,14 +123,18 @@ pub fn frame(image: &Image<'_>, add: &mut dyn FnMut(Feature, usize)) {
 /// The features of taking the observation.
 pub fn begin(image: &Image<'_>, add: &mut dyn FnMut(Feature, usize)) {
     add(Feature::STEP, 1);
-    add(Feature::OBSERVATION, image.obs_len());
+    // What is left of a chunk is kept.
+    let rest = if image.overlap() > 0 { image.kept().len } else { 0 };
+    add(Feature::OBSERVATION, image.obs_len() + rest);
 }
 
 /// The features of the way from the network's output to the action.
 pub fn action(image: &Image<'_>, add: &mut dyn FnMut(Feature, usize)) {
     add(Feature::ACTION, 1);
     add(Feature::ACTION_VALUE, image.act_len());
-    add(Feature::CONTRACT, image.contract_arrays().iter().map(|array| array.len()).sum());
+    // A value that is averaged or led over costs less than two of the contract.
+    let merged = (image.horizon() + image.overlap()) * image.act_len();
+    add(Feature::CONTRACT, 2 * merged + image.contract_arrays().iter().map(|array| array.len()).sum::<usize>());
 }
 
 /// The features of an operation.

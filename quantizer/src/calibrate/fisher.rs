@@ -217,7 +217,7 @@ mod tests {
         for d in 0..2 {
             let mut grads = weights.zeros_like();
             let unit = Array2::from_shape_fn((1, 2), |(_, k)| if k == d { 1.0 } else { 0.0 });
-            network.backward(&weights, &pass, unit, &mut zero_state(&graph, 1), &mut grads, &mut |_, _, _, _| {});
+            network.backward(&weights, &pass, unit, &mut zero_state(&graph, 1), &mut grads, &mut |_, _, _| {});
             expected += &grads.matrices[0].mapv(|g| g * g);
         }
         let largest = expected.iter().copied().fold(0.0, f32::max);

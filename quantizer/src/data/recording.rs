@@ -7,6 +7,7 @@ use anyhow::{Context, Result, bail, ensure};
 
 use super::arrays::ENDINGS;
 use super::dataset::{Dataset, Sizes};
+use crate::import::folder_of;
 use crate::policy::Policy;
 
 /// The two recordings that a policy's folder may hold. The only place that knows the files' names.
@@ -30,14 +31,15 @@ impl Recording {
         ENDINGS.map(|ending| format!("{}.{ending}", self.stem()))
     }
 
-    /// Where it may be in a policy's folder.
+    /// Where it may be in a policy's folder, or beside its ONNX file.
     pub fn paths(self, policy_dir: &Path) -> [PathBuf; 3] {
-        self.names().map(|name| policy_dir.join(name))
+        self.names().map(|name| folder_of(policy_dir).join(name))
     }
 
     /// The recording in a policy's folder; `None` where there is none. More than one is an error: which of them counts would
     /// be a guess.
     pub fn find(self, policy_dir: &Path) -> Result<Option<PathBuf>> {
+        let policy_dir = folder_of(policy_dir);
         let mut there: Vec<String> = self.names().into_iter().filter(|n| policy_dir.join(n).exists()).collect();
         if there.len() > 1 {
             bail!("{}: {} are there; leave one of them", policy_dir.display(), there.join(" and "));

@@ -1,16 +1,17 @@
 //! From the graph's values to regions of the arena: which operation reads and writes where.
 //!
 //! The operations say what they become over buffers ([`crate::graph::lowering`]); here the buffers get their places. The arena
-//! holds the recurrent state, the observation, the values, which share memory by their lifetimes, first fit, the last action, and
-//! the work area. Buffers are placed in the order in which they are written, each as low as it fits: so none leaves a gap, and what
+//! holds the recurrent state, the observation, the values, which share memory by their lifetimes, first fit, the last action with what
+//! is kept beside it, and the work area. Buffers are placed in the order in which they are written, each as low as it fits: so none leaves a gap, and what
 //! a step has written always is the begin of the arena, as the image's check wants it.
 
-use actq_kernels::image::{OpKind, Region};
+use actq_kernels::image::{OpKind, Region, kept_words};
 use actq_kernels::x::max_prepared_words;
 use anyhow::{Result, ensure};
 
 use crate::graph::lowering::{BufferId, Lifetime, Lowering, Slice, Step, StepData};
-use crate::graph::{Graph, Node, ValueId};
+use crate::graph::{Node, ValueId};
+use crate::policy::Policy;
 
 /// The arena and the operations in it.
 #[derive(Debug)]
@@ -33,8 +34,9 @@ pub struct Program {
     pub words: usize,
 }
 
-/// Lowers `graph` for actions of `act_len` values and weights with scale groups of `group` columns.
-pub fn lower(graph: &Graph, act_len: usize, group: usize) -> Result<Program> {
+/// Lowers the policy's graph for weights with scale groups of `group` columns.
+pub fn lower(policy: &Policy, group: usize) -> Result<Program> {
+    let graph = &policy.graph;
     let mut readers = vec![0; graph.nodes.len() + 1];
     readers[graph.output()] = 1;
     for &value in graph.nodes.iter().flat_map(|node| &node.inputs) {
@@ -42,12 +44,16 @@ pub fn lower(graph: &Graph, act_len: usize, group: usize) -> Result<Program> {
     }
     let mut lowering = Lowering::new(graph.obs_len, readers);
     let work_len = graph.matrices.iter().map(|m| max_prepared_words(m.cols, group)).max().unwrap_or(0);
+    let (contract, act_len) = (&policy.contract, policy.act_len);
+    let horizon = contract.playback.ensemble.map_or(0, |ensemble| ensemble.horizon);
+    let kept = kept_words([act_len, policy.chunk, policy.execute], horizon, contract.playback.overlap);
+    let kept_len = kept + if contract.binarise.is_some() { act_len } else { 0 };
     let Some(denoising) = &graph.denoising else {
         nodes(&graph.nodes, &mut lowering);
         let output = lowering.private(graph.output());
         lowering.buffers[output].lifetime = Lifetime::Output;
         let output = lowering.whole(output);
-        return Arena { lowering, work_len }.assign(OBSERVATION, 0, output, act_len);
+        return Arena { lowering, kept_len, work_len }.assign(OBSERVATION, 0, output, act_len);
     };
     let iterate = lowering.noise(graph.noise_len(), denoising.len);
     let (before, of_step) = graph.nodes.split_at(denoising.first);
@@ -62,7 +68,7 @@ pub fn lower(graph: &Graph, act_len: usize, group: usize) -> Result<Program> {
     let data =
         StepData::Denoise { constants, noise: denoising.draws().then_some(Slice { offset: denoising.len, ..iterate }) };
     lowering.emit(OpKind::Denoise, iterate, Some(velocity), Some(read_next), data);
-    Arena { lowering, work_len }.assign(OBSERVATION, once, iterate, act_len)
+    Arena { lowering, kept_len, work_len }.assign(OBSERVATION, once, iterate, act_len)
 }
 
 /// Lowers nodes, one after the other.
@@ -79,6 +85,8 @@ const OBSERVATION: BufferId = 0;
 /// Buffers that need places.
 struct Arena {
     lowering: Lowering,
+    /// Words that the contract and playback keep beside the last action.
+    kept_len: usize,
     work_len: usize,
 }
 
@@ -118,7 +126,7 @@ impl Arena {
             placed.push((buffer, life));
         }
         let action = Region { offset: ends.into_iter().max().unwrap_or(top), len: act_len };
-        let work_offset = action.offset + action.len;
+        let work_offset = action.offset + action.len + self.kept_len;
         let words = work_offset + self.work_len;
         ensure!(
             words <= usize::from(u16::MAX),

@@ -20,7 +20,7 @@ use crate::runtime::{ImageBuffer, with_head};
 /// executor itself.
 pub fn image(policy: &Policy, matrices: &[Outcome]) -> Result<Vec<u8>> {
     let group = matrices.first().map_or(0, |m| m.quantized.group);
-    let program = lower(&policy.graph, policy.act_len, group)?;
+    let program = lower(policy, group)?;
     let mut writer = Writer { words: vec![0; h::WORDS], matrices: 0 };
     let matrix_records = matrices.iter().map(|m| writer.matrix(m)).collect::<Result<Vec<_>>>()?;
     writer.matrices = writer.push(matrix_records.into_iter().flatten());
@@ -34,8 +34,13 @@ pub fn image(policy: &Policy, matrices: &[Outcome]) -> Result<Vec<u8>> {
             writer.push_floats(array);
         }
     }
+    let playback = policy.contract.playback;
+    let horizon = playback.ensemble.map_or(0, |ensemble| ensemble.horizon);
+    if let Some(ensemble) = playback.ensemble {
+        writer.push_floats(&ensemble.weights());
+    }
     let name = writer.push_bytes(policy.name.as_bytes());
-    let steps = policy.execute + 2;
+    let steps = policy.execute.max(horizon) + 2;
     let observations = self_test_observations(&policy.graph, steps);
     let self_test = writer.words.len() as u32;
     for observation in &observations {
@@ -48,6 +53,9 @@ pub fn image(policy: &Policy, matrices: &[Outcome]) -> Result<Vec<u8>> {
         act_len: policy.act_len,
         chunk: policy.chunk,
         execute: policy.execute,
+        horizon,
+        overlap: playback.overlap,
+        deadline: playback.deadline.unwrap_or(0),
         rate_hz: policy.rate_hz,
         scratch: program.words,
         state: program.state,

@@ -40,7 +40,7 @@ impl Graph {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::graph::ops::{Add, Concat, Gru, LayerNorm, Linear, Lstm, Normalize, RmsNorm, Span};
+    use crate::graph::ops::{Add, Concat, Gru, LayerNorm, Linear, Lstm, Mul, Normalize, RmsNorm, Span};
 
     fn matrix(name: &str, rows: usize, cols: usize) -> WeightMatrix {
         WeightMatrix { name: name.into(), rows, cols, data: vec![0.5; rows * cols] }
@@ -67,6 +67,7 @@ mod tests {
             (Linear { matrix: 7, bias: vec![] }.into(), vec![0], "there is no matrix 7"),
             (Add.into(), vec![y, 0], "adds 4 values to 3"),
             (Add.into(), vec![y], "takes two inputs, not 1"),
+            (Mul.into(), vec![y, 0], "multiplies 3 values with 4"),
             (norm(4).into(), vec![y], "weight has 4 values, 3 are needed"),
             (norm(3).into(), vec![y, y], "takes one input, not 2"),
             (RmsNorm { weight: vec![1.0], eps: 1e-5 }.into(), vec![0], "weight has 1 values, 4 are needed"),

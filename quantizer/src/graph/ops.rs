@@ -7,6 +7,7 @@ mod gru;
 mod iterate;
 mod linear;
 mod lstm;
+mod mul;
 mod norm;
 mod normalize;
 mod table;
@@ -20,6 +21,7 @@ pub use gru::Gru;
 pub use iterate::Iterate;
 pub use linear::Linear;
 pub use lstm::Lstm;
+pub use mul::Mul;
 pub use norm::{LayerNorm, RmsNorm};
 pub use normalize::Normalize;
 pub use table::Table;
@@ -73,6 +75,8 @@ operations! {
     RmsNorm,
     /// Sum of two values.
     Add,
+    /// Product of two values, element by element.
+    Mul,
     /// Parts of values behind each other.
     Concat,
     /// A recurrent cell with a cell state.

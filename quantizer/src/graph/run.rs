@@ -35,6 +35,16 @@ struct StepPass {
     saved: Vec<Saved>,
 }
 
+/// A denoising step to run.
+#[derive(Clone, Copy)]
+struct OfStep<'v> {
+    step: usize,
+    /// What the network reads of the iterate.
+    iterate: &'v Array2<f32>,
+    /// Values of the nodes that run once.
+    once: &'v [Array2<f32>],
+}
+
 impl Pass {
     /// The network's output.
     pub fn output(&self) -> &Array2<f32> {
@@ -89,7 +99,14 @@ impl<'a> Network<'a> {
         let mut steps = Vec::with_capacity(denoising.steps.len());
         for step in 0..denoising.steps.len() {
             let mut of_step = (Vec::with_capacity(end - first), Vec::with_capacity(end - first));
-            self.run(weights, first..end, Some((step, &at.y, &values)), &mut of_step.0, &mut of_step.1, state);
+            self.run(
+                weights,
+                first..end,
+                Some(OfStep { step, iterate: &at.y, once: &values }),
+                &mut of_step.0,
+                &mut of_step.1,
+                state,
+            );
             let next = denoising.next(step, &at, &of_step.0[end - first - 1], noise.view());
             steps.push(StepPass { at, values: of_step.0, saved: of_step.1 });
             at = next;
@@ -97,12 +114,12 @@ impl<'a> Network<'a> {
         Pass { values, saved, steps, denoised: Some(at.x) }
     }
 
-    /// Runs nodes; within a denoising step, with its number, what the network reads of the iterate, and the values that stay.
+    /// Runs nodes, outside of denoising steps or in one.
     fn run(
         &self,
         weights: &Weights,
         nodes: Range<usize>,
-        step: Option<(usize, &Array2<f32>, &[Array2<f32>])>,
+        step: Option<OfStep<'_>>,
         values: &mut Vec<Array2<f32>>,
         saved: &mut Vec<Saved>,
         state: &mut State,
@@ -111,14 +128,14 @@ impl<'a> Network<'a> {
             let node = &self.graph.nodes[i];
             let run = Forward {
                 values: match step {
-                    Some((_, _, once)) => Values { once, of_step: values },
+                    Some(OfStep { once, .. }) => Values { once, of_step: values },
                     None => Values { once: values, of_step: &[] },
                 },
                 inputs: &node.inputs,
                 matrices: &weights.matrices,
                 vectors: &weights.vectors[i],
-                iterate: step.map(|(_, iterate, _)| iterate),
-                step: step.map_or(0, |(step, ..)| step),
+                iterate: step.map(|of| of.iterate),
+                step: step.map_or(0, |of| of.step),
                 x_max: self.x_max,
                 sums: self.sums,
             };
@@ -219,9 +236,14 @@ impl<'a> Network<'a> {
 #[cfg(test)]
 mod tests {
     use actq_kernels::math::Function;
+    use actq_kernels::ops::denoise::Coefficients;
 
     use super::*;
-    use crate::graph::ops::{Add, Concat, Gru, LayerNorm, Linear, Lstm, NodeKind, Normalize, Pointwise, RmsNorm, Span};
+    use crate::graph::Denoising;
+    use crate::graph::ops::{
+        Add, Concat, Gru, LayerNorm, Linear, Lstm, Mul, NodeKind, Normalize, Pointwise, RmsNorm, Span,
+    };
+    use crate::graph::ops::{Iterate, Table};
     use crate::graph::values::{ValueId, WeightMatrix};
     use crate::graph::weights::zero_state;
     use crate::random::Random;
@@ -234,7 +256,9 @@ mod tests {
     fn graph() -> Graph {
         let mut seed = Random::new(11);
         let mut graph = Graph::new(5);
-        for (rows, cols) in [(6, 5)].into_iter().chain([(6, 6); 7]).chain([(16, 7), (16, 4), (9, 4), (9, 3), (2, 3)]) {
+        for (rows, cols) in
+            [(6, 5)].into_iter().chain([(6, 6); Function::ALL.len()]).chain([(16, 7), (16, 4), (9, 4), (9, 3), (2, 3)])
+        {
             let data = random(rows * cols, &mut seed).iter().map(|w| 0.6 * w).collect();
             graph.matrices.push(WeightMatrix { name: "m".into(), rows, cols, data });
         }
@@ -250,14 +274,19 @@ mod tests {
             last = push(Pointwise(function).into(), &[last]);
             last = push(Add.into(), &[last, kept]);
         }
+        // Both operands of a product, and one that is both.
+        last = push(Mul.into(), &[last, kept]);
+        last = push(Mul.into(), &[last, last]);
+        last = push(LayerNorm { weight: weight(6, 12), bias: vector(6, 13), eps: 1e-3 }.into(), &[last]);
         last = push(LayerNorm { weight: weight(6, 5), bias: vector(6, 6), eps: 1e-3 }.into(), &[last]);
         let spans = vec![Span { from: 1, len: 4 }, Span { from: 0, len: 3 }];
         last = push(Concat(spans).into(), &[last, normal]);
         last = push(RmsNorm { weight: weight(7, 7), eps: 1e-3 }.into(), &[last]);
-        last = push(Lstm { hidden: 4, input: 8, state: 9, bias: vector(16, 8) }.into(), &[last]);
+        let next = 1 + Function::ALL.len();
+        last = push(Lstm { hidden: 4, input: next, state: next + 1, bias: vector(16, 8) }.into(), &[last]);
         let (input_bias, state_bias) = (vector(9, 9), vector(9, 10));
-        last = push(Gru { hidden: 3, input: 10, state: 11, input_bias, state_bias }.into(), &[last]);
-        push(Linear { matrix: 12, bias: vector(2, 11) }.into(), &[last]);
+        last = push(Gru { hidden: 3, input: next + 2, state: next + 3, input_bias, state_bias }.into(), &[last]);
+        push(Linear { matrix: next + 4, bias: vector(2, 11) }.into(), &[last]);
         graph
     }
 
@@ -266,6 +295,29 @@ mod tests {
     fn observations() -> Vec<Array2<f32>> {
         let mut seed = Random::new(5);
         (0..STEPS).map(|_| Array2::from_shape_fn((2, 5), |_| seed.unit())).collect()
+    }
+
+    /// A head of three values of observation and two of noise, whose steps use every coefficient but that of further noise.
+    fn iterative() -> Graph {
+        let mut seed = Random::new(12);
+        let mut graph = Graph::new(3);
+        for (rows, cols) in [(4, 3), (4, 2), (2, 4)] {
+            let data = random(rows * cols, &mut seed);
+            graph.matrices.push(WeightMatrix { name: "m".into(), rows, cols, data });
+        }
+        let mut push = |kind: NodeKind, inputs: &[ValueId]| graph.add(kind, inputs).expect("it fits");
+        let condition = push(Linear { matrix: 0, bias: vec![0.1; 4] }.into(), &[0]);
+        let x = push(Iterate { len: 2 }.into(), &[]);
+        let x = push(Linear { matrix: 1, bias: vec![0.2; 4] }.into(), &[x]);
+        let time = push(Table { rows: random(3 * 4, &mut Random::new(13)), len: 4 }.into(), &[]);
+        let sum = push(Add.into(), &[x, time]);
+        let sum = push(Add.into(), &[sum, condition]);
+        let y = push(Pointwise(Function::Tanh).into(), &[sum]);
+        push(Linear { matrix: 2, bias: vec![0.3; 2] }.into(), &[y]);
+        let step = |k: f32| Coefficients::from_array([0.9, -0.3 * k, 0.6, 0.2 * k, 0.4, 0.0, 0.15]);
+        let steps = [1.0, 1.5, 2.0].map(step).to_vec();
+        graph.denoising = Some(Denoising { first: 1, len: 2, limit: 10.0, steps });
+        graph
     }
 
     /// A loss over all steps with different weights on each output.
@@ -290,22 +342,30 @@ mod tests {
         for (t, pass) in passes.iter().enumerate().rev() {
             let cols = pass.output().ncols();
             let d = Array2::from_shape_fn(pass.output().raw_dim(), |(r, c)| (1 + r * cols + c + t) as f32);
-            network.backward(weights, pass, d, &mut d_state, &mut grads, &mut |_, _, _, _| {});
+            network.backward(weights, pass, d, &mut d_state, &mut grads, &mut |_, _, _| {});
         }
         grads
     }
 
     #[test]
     fn gradients_agree_with_finite_differences() {
-        let graph = graph();
-        let weights = Weights::of(&graph);
-        let grads = gradient(&graph, &weights);
+        derivatives_are_right(&graph());
+    }
+
+    #[test]
+    fn gradients_go_back_through_denoising_steps() {
+        derivatives_are_right(&iterative());
+    }
+
+    fn derivatives_are_right(graph: &Graph) {
+        let weights = Weights::of(graph);
+        let grads = gradient(graph, &weights);
         let step = 2e-3;
         let compare = |exact: f32, change: &dyn Fn(&mut Weights, f32)| {
             let at = |d: f32| {
                 let mut moved = weights.clone();
                 change(&mut moved, d);
-                loss(&graph, &moved)
+                loss(graph, &moved)
             };
             let numeric = (at(step) - at(-step)) / (2.0 * f64::from(step));
             let error = (numeric - f64::from(exact)).abs();

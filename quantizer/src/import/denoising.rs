@@ -2,7 +2,7 @@
 
 use actq_kernels::ops::denoise::Coefficients;
 use anyhow::{Context, Result, bail, ensure};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use crate::graph::Denoising;
 
@@ -10,18 +10,29 @@ use crate::graph::Denoising;
 const MOST_STEPS: usize = 1000;
 
 /// Keys of `policy.json` for the kinds flow and diffusion.
-#[derive(Debug, Default, Deserialize)]
+#[derive(Debug, Default, Deserialize, Serialize)]
 pub(super) struct JsonDenoising {
+    #[serde(skip_serializing_if = "Option::is_none")]
     euler_steps: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     steps: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     solver: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     schedule: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     train_steps: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     prediction: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     clip_sample: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     variance: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     beta: Option<[f64; 2]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) time: Option<JsonTime>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) obs_norm: Option<JsonNorm>,
 }
 
@@ -41,22 +52,28 @@ pub(super) const KEYS: [&str; 11] = [
 ];
 
 /// What the network reads of the time.
-#[derive(Debug, Default, Deserialize)]
+#[derive(Debug, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct JsonTime {
+    #[serde(skip_serializing_if = "Option::is_none")]
     freq: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     order: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     turns: Option<bool>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     from: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     to: Option<f64>,
 }
 
 /// How observations are normalised before the ops.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct JsonNorm {
     pub(super) mean: String,
     pub(super) scale: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) clip: Option<f64>,
 }
 
@@ -136,7 +153,7 @@ impl JsonDenoising {
         let chosen: Vec<usize> = (0..steps).rev().map(|k| k * (train / steps)).collect();
         let limit = match self.clip_sample {
             None => f32::INFINITY,
-            Some(clip) => super::json::positive(clip, "clip_sample")?,
+            Some(clip) => super::numbers::positive(clip, "clip_sample")?,
         };
         let mut by = Vec::new();
         for (i, &t) in chosen.iter().enumerate() {

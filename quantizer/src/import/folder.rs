@@ -1,4 +1,5 @@
-//! A policy folder: `policy.json` (the op list) and `policy.safetensors` (the weights).
+//! A policy folder: `policy.json` (the op list) and `policy.safetensors` (the weights). An ONNX file stands for the folder that it
+//! would be imported to.
 
 use std::fs;
 use std::path::Path;
@@ -7,7 +8,9 @@ use actq_kernels::image::Kind;
 use anyhow::{Context, Result, ensure};
 use sha2::{Digest, Sha256};
 
-use super::json::{Json, positive};
+use super::json::Json;
+use super::numbers::positive;
+use super::onnx::{self, Choice};
 use super::ops::{Builder, Weights};
 use super::tensors::TensorFile;
 use crate::graph::hoist;
@@ -16,22 +19,49 @@ use crate::policy::Policy;
 /// The files that make a policy, in its folder.
 pub const FILES: [&str; 2] = ["policy.json", "policy.safetensors"];
 
+/// Whether a path names an ONNX file and not a policy's folder.
+pub fn is_onnx(path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("onnx"))
+}
+
+/// The folder in which a policy's recordings are: its own, or that of its ONNX file.
+pub fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if is_onnx(path) && parent.as_os_str().is_empty() => Path::new("."),
+        Some(parent) if is_onnx(path) => parent,
+        _ => path,
+    }
+}
+
 impl Policy {
-    /// Reads `policy.json` and `policy.safetensors` from `dir`. Every error names the file and the op or tensor.
-    pub fn load(dir: &Path) -> Result<Self> {
-        ensure!(dir.is_dir(), "{}: not a folder; give the one that holds policy.json", dir.display());
-        let [json_path, weights_path] = FILES.map(|name| dir.join(name));
-        let json_bytes = fs::read(&json_path).with_context(|| format!("{}: cannot be read", json_path.display()))?;
-        let weight_bytes =
-            fs::read(&weights_path).with_context(|| format!("{}: cannot be read", weights_path.display()))?;
-        let json = Json::parse(&json_bytes).with_context(|| json_path.display().to_string())?;
-        let file = TensorFile::new(&weight_bytes)
-            .with_context(|| format!("{}: not a safetensors file", weights_path.display()))?;
+    /// Reads `policy.json` and `policy.safetensors` from `path`, or an ONNX file as if it had been imported without choices. Every
+    /// error names the file and the op, node or tensor.
+    pub fn load(path: &Path) -> Result<Self> {
+        if is_onnx(path) {
+            let imported = onnx::import(path, &Choice::default())?;
+            return Self::of_files(path, [path, path], &imported.json, &imported.weights);
+        }
+        ensure!(
+            path.is_dir(),
+            "{}: not a folder; give the one that holds policy.json, or an .onnx file",
+            path.display()
+        );
+        let [json_path, weights_path] = FILES.map(|name| path.join(name));
+        let json = fs::read(&json_path).with_context(|| format!("{}: cannot be read", json_path.display()))?;
+        let weights = fs::read(&weights_path).with_context(|| format!("{}: cannot be read", weights_path.display()))?;
+        Self::of_files(path, [&json_path, &weights_path], &json, &weights)
+    }
+
+    /// A policy that is at `dir`, from the bytes of its two files, which errors call by `names`.
+    pub fn of_files(dir: &Path, names: [&Path; 2], json: &[u8], weights: &[u8]) -> Result<Self> {
+        let [json_name, weights_name] = names.map(|name| name.display().to_string());
+        let parsed = Json::parse(json).with_context(|| json_name.clone())?;
+        let file = TensorFile::new(weights).with_context(|| format!("{weights_name}: not a safetensors file"))?;
         let mut digest = Sha256::new();
-        digest.update(&json_bytes);
-        digest.update(&weight_bytes);
-        let weights = Weights { file, path: &weights_path };
-        build(dir, &json, weights, digest.finalize().into()).with_context(|| json_path.display().to_string())
+        digest.update(json);
+        digest.update(weights);
+        let weights = Weights { file, path: names[1] };
+        build(dir, &parsed, weights, digest.finalize().into()).context(json_name)
     }
 }
 
@@ -47,7 +77,7 @@ fn build(dir: &Path, json: &Json, weights: Weights<'_>, digest: [u8; 32]) -> Res
         Kind::Step => (1, 1),
         Kind::Chunk | Kind::Flow | Kind::Diffusion => {
             let chunk = json.chunk.context("a policy of several actions needs the key chunk")?;
-            let execute = json.execute.unwrap_or(chunk);
+            let execute = json.execute(chunk);
             ensure!((1..=chunk).contains(&execute), "execute is {execute}, it must be 1 to chunk ({chunk})");
             (chunk, execute)
         }

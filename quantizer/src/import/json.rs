@@ -2,72 +2,106 @@
 
 use actq_kernels::image::Kind;
 use actq_kernels::math::Function;
-use anyhow::{Context, Result, bail, ensure};
-use serde::Deserialize;
+use anyhow::{Context, Result, bail};
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::contract::{JsonContract, JsonEnsemble};
 use super::denoising::{self, JsonDenoising};
-use crate::contract::ActionContract;
+use crate::contract::{ActionContract, Ensemble, Playback};
 use crate::strict_json;
 use crate::text::is_control;
 
-#[derive(Deserialize)]
+#[derive(Default, Deserialize, Serialize)]
 pub(super) struct Json {
     pub(super) name: String,
-    kind: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) kind: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) chunk: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) execute: Option<usize>,
     pub(super) obs_dim: usize,
     pub(super) act_dim: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) control_hz: Option<f64>,
-    action: Option<JsonContract>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) action: Option<JsonContract>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) ensemble: Option<JsonEnsemble>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) overlap: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) deadline: Option<usize>,
     #[serde(flatten)]
     pub(super) denoising: JsonDenoising,
     pub(super) ops: Vec<JsonOp>,
 }
 
 /// Keys of [`Json`].
-const KEYS: [&str; 9] = ["name", "kind", "chunk", "execute", "obs_dim", "act_dim", "control_hz", "action", "ops"];
+const KEYS: [&str; 12] = [
+    "name",
+    "kind",
+    "chunk",
+    "execute",
+    "ensemble",
+    "overlap",
+    "deadline",
+    "obs_dim",
+    "act_dim",
+    "control_hz",
+    "action",
+    "ops",
+];
 /// Keys that tell people where a policy is from. Their values are not read.
-const ABOUT: [&str; 6] = ["source", "commit", "source_path", "license", "recurrent", "n_params"];
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct JsonContract {
-    scale: Option<Vec<f64>>,
-    offset: Option<Vec<f64>>,
-    low: Option<Vec<f64>>,
-    high: Option<Vec<f64>>,
-    max_step: Option<Vec<f64>>,
-}
+const ABOUT: [&str; 8] = ["source", "commit", "source_path", "license", "recurrent", "n_params", "inputs", "states"];
 
 /// One op; [`op_keys`] says which keys it may have.
-#[derive(Deserialize)]
+#[derive(Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct JsonOp {
     pub(super) op: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) input: Option<Input>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) save: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) with: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) w: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) b: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) mean: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) scale: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) pre_clip: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) clip: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) w_ln: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) b_ln: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) eps: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) hidden: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) gates: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) w_ih: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) w_hh: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) b_ih: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) b_hh: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) approximate: Option<String>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 #[serde(untagged)]
 pub(super) enum Input {
     One(String),
@@ -106,24 +140,21 @@ impl Json {
 
     /// The action contract. Without the key `action` whatever is chunked is limited to -1..1, as the reference runtime of the format does.
     pub(super) fn contract(&self, kind: Kind) -> Result<ActionContract> {
-        let Some(json) = &self.action else {
-            let limit = |at: f32| (kind != Kind::Step).then(|| vec![at; self.act_dim]);
-            return Ok(ActionContract { low: limit(-1.0), high: limit(1.0), ..ActionContract::default() });
+        let contract = match &self.action {
+            Some(json) => json.contract(self.act_dim)?,
+            None => {
+                let limit = |at: f32| (kind != Kind::Step).then(|| vec![at; self.act_dim]);
+                ActionContract { low: limit(-1.0), high: limit(1.0), ..ActionContract::default() }
+            }
         };
-        let array = |name: &str, values: &Option<Vec<f64>>| {
-            let Some(values) = values else { return Ok(None) };
-            let (len, act_dim) = (values.len(), self.act_dim);
-            ensure!(len == act_dim, "action.{name} has {len} values, act_dim is {act_dim}");
-            let one = |(i, v): (usize, &f64)| real(*v, &format!("action.{name}[{i}]"));
-            values.iter().enumerate().map(one).collect::<Result<Vec<f32>>>().map(Some)
-        };
-        Ok(ActionContract {
-            scale: array("scale", &json.scale)?,
-            offset: array("offset", &json.offset)?,
-            low: array("low", &json.low)?,
-            high: array("high", &json.high)?,
-            max_step: array("max_step", &json.max_step)?,
-        })
+        let ensemble = self.ensemble.as_ref().map(|json| Ensemble { horizon: json.horizon, m: json.m.unwrap_or(0.01) });
+        let playback = Playback { ensemble, overlap: self.overlap.unwrap_or(0), deadline: self.deadline };
+        Ok(ActionContract { playback, ..contract })
+    }
+
+    /// How many actions of a chunk are executed where nothing says so: all, but of chunks that are averaged one.
+    pub(super) fn execute(&self, chunk: usize) -> usize {
+        self.execute.unwrap_or(if self.ensemble.is_some() { 1 } else { chunk })
     }
 }
 
@@ -150,7 +181,7 @@ fn op_keys(op: &str) -> Option<&'static [&'static str]> {
         "linear" => &["w", "b"],
         "layernorm" => &["w_ln", "b_ln", "eps"],
         "rmsnorm" => &["w_ln", "eps"],
-        "add" => &["with"],
+        "add" | "mul" => &["with"],
         "lstm" | "gru" => &["hidden", "gates", "w_ih", "w_hh", "b_ih", "b_hh"],
         "gelu" => &["approximate"],
         name if Function::ALL.iter().any(|f| f.name() == name) => &[],
@@ -174,19 +205,4 @@ fn check_text(place: &str, value: &Value) -> Result<()> {
         }
         _ => Ok(()),
     }
-}
-
-/// A number as f32, rounded; refuses what f32 cannot hold.
-pub(super) fn real(value: f64, name: &str) -> Result<f32> {
-    let real = value as f32;
-    ensure!(real.is_finite(), "{name} is {value:?}, beyond float32's range");
-    Ok(real)
-}
-
-/// As [`real`], above 0.
-pub(super) fn positive(value: f64, name: &str) -> Result<f32> {
-    let real = real(value, name)?;
-    let rounded = if value > 0.0 { "float32 rounds that to 0, and " } else { "" };
-    ensure!(real > 0.0, "{name} is {value:?}; {rounded}it must be above 0");
-    Ok(real)
 }

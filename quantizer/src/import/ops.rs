@@ -7,9 +7,10 @@ use actq_kernels::math::Function;
 use anyhow::{Context, Result, bail, ensure};
 
 use super::denoising::{JsonDenoising, JsonNorm, JsonTime, Schedule};
-use super::json::{Input, JsonOp, positive};
+use super::json::{Input, JsonOp};
+use super::numbers::positive;
 use super::tensors::TensorFile;
-use crate::graph::ops::{Add, Concat, Gru, LayerNorm, Linear, Lstm, Normalize, Pointwise, RmsNorm, Span};
+use crate::graph::ops::{Add, Concat, Gru, LayerNorm, Linear, Lstm, Mul, Normalize, Pointwise, RmsNorm, Span};
 use crate::graph::{Graph, NodeKind, ValueId, WeightMatrix};
 
 /// The weights, and their file's name for errors.
@@ -140,9 +141,9 @@ impl<'a> Builder<'a> {
                 weight: self.weights.vector(need(&op.w_ln, "w_ln")?, len)?,
                 eps: positive(op.eps.unwrap_or(1e-6), "eps")?,
             })),
-            "add" => {
+            "add" | "mul" => {
                 inputs.push(self.slot(need(&op.with, "with")?)?);
-                Some(Add.into())
+                Some(if op.op == "add" { Add.into() } else { Mul.into() })
             }
             "lstm" | "gru" => Some(self.recurrent(op, len)?),
             name => Some(Pointwise(function(name, op.approximate.as_deref())?).into()),
@@ -248,7 +249,7 @@ fn function(name: &str, approximate: Option<&str>) -> Result<Function> {
     };
     Function::ALL.into_iter().find(|f| f.name() == name).with_context(|| {
         format!(
-            "unknown op; known are normalize, linear, layernorm, rmsnorm, add, lstm, gru, identity, {}",
+            "unknown op; known are normalize, linear, layernorm, rmsnorm, add, mul, lstm, gru, identity, {}",
             Function::ALL.map(Function::name).join(", ")
         )
     })

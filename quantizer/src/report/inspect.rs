@@ -6,6 +6,7 @@ use actq_kernels::Image;
 use actq_kernels::image::Matrix;
 use actq_kernels::image::{Kind, Op, OpKind, Region};
 
+use super::memory::{Peak, peak};
 use super::table::{group_name, table};
 use crate::measure::size::{bits_per_weight, hex};
 use crate::text::printable;
@@ -39,9 +40,16 @@ pub fn report(image: &Image<'_>) -> String {
     let _ = writeln!(text, "source        sha256 {digest}");
     let _ = writeln!(text, "image         {} bytes, crc32 {:08x}", image.bytes(), image.crc());
     let _ = writeln!(text, "kind          {kind}, {obs} observations -> {act} actions at {rate} Hz");
+    let playback = playback(image);
+    if !playback.is_empty() {
+        let _ = writeln!(text, "playback      {}", playback.join(", "));
+    }
     let _ = writeln!(text, "weights       {:.3} bits each, everything counted", bits_per_weight(image));
     let _ =
         writeln!(text, "scratch       {} bytes, {} of them state", 4 * image.scratch_words(), 4 * image.state().len);
+    let Peak { op, words, placed } = peak(image);
+    let name = image.ops().nth(op).map_or("", |op| op.kind.name());
+    let _ = writeln!(text, "values        {} bytes, {} of them in use at op {op} ({name})", 4 * placed, 4 * words);
     let _ = writeln!(text, "self-test     {} steps\n", image.self_test_steps());
     let mut ops = table(&["op", "output", "input", "detail", "bits", "group", "x max", "bytes"]);
     for op in image.ops() {
@@ -49,14 +57,39 @@ pub fn report(image: &Image<'_>) -> String {
     }
     let _ = writeln!(text, "{ops}\n");
     let contract = image.contract_arrays();
-    let mut actions = table(&["action", "scale", "offset", "low", "high", "max step"]);
+    // Of what few policies have, only columns that are there.
+    const ALWAYS: usize = 5;
+    let names = ["scale", "offset", "low", "high", "max step", "smoothing", "on from", "off to", "on is", "off is"];
+    let columns: Vec<_> = names
+        .into_iter()
+        .zip(contract)
+        .enumerate()
+        .filter(|(i, (_, array))| *i < ALWAYS || !array.is_empty())
+        .collect();
+    let heads: Vec<&str> = std::iter::once("action").chain(columns.iter().map(|(_, (name, _))| *name)).collect();
+    let mut actions = table(&heads);
     for i in 0..image.act_len() {
         let cell =
             |array: &[u32]| array.get(i).map_or("-".to_owned(), |w| format!("{}", f32::from_bits(u32::from_le(*w))));
-        actions.add_row([i.to_string()].into_iter().chain(contract.map(cell)));
+        actions.add_row([i.to_string()].into_iter().chain(columns.iter().map(|(_, (_, array))| cell(array))));
     }
     let _ = writeln!(text, "{actions}");
     text
+}
+
+/// How chunks are played, where that is said.
+fn playback(image: &Image<'_>) -> Vec<String> {
+    let mut says = Vec::new();
+    if image.horizon() > 0 {
+        says.push(format!("average of {} chunks", image.horizon()));
+    }
+    if image.overlap() > 0 {
+        says.push(format!("{} actions lead over to a new chunk", image.overlap()));
+    }
+    if let Some(periods) = image.deadline() {
+        says.push(format!("no action plays {periods} or more periods behind its observation"));
+    }
+    says
 }
 
 fn row(op: &Op<'_>) -> Vec<String> {

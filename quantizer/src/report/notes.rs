@@ -5,6 +5,7 @@ use std::fmt;
 use crate::data::{Range, Recordings, runs};
 use crate::measure::check::Check;
 use crate::measure::eval::{ActivationShare, ErrorReport};
+use crate::policy::Policy;
 
 /// Held-out errors beyond this multiple of the calibration error, and this much above it, are worth a warning.
 const TIMES: f64 = 3.0;
@@ -19,6 +20,17 @@ impl fmt::Display for ActivationShare {
         };
         write!(f, "{:.0}% of the error ({types})", 100.0 * self.share)
     }
+}
+
+/// Where a method needs a recording and there is none: how to make one, and why.
+pub fn how_to_record(policy: &Policy) -> String {
+    let n = policy.graph.obs_len;
+    format!(
+        "no recording is given (--calib FILE, or calib.npz beside the file). Which weights may be rounded coarsely follows from the \
+         observations that the policy really sees, and no ONNX file holds them. Run the policy in its simulator for a few thousand \
+         steps, keep each observation as the file takes it ({n} values), and save them in order: numpy.save(\"obs.npy\", \
+         numpy.stack(observations).astype(\"float32\")). --method rtn works without, with larger errors"
+    )
 }
 
 /// The errors in a few lines.

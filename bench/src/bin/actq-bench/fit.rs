@@ -10,7 +10,7 @@ use std::path::Path;
 
 use actq::emit::{self, files};
 use actq::graph::Denoising;
-use actq::graph::ops::{Add, Gru, Iterate, LayerNorm, Lstm, Normalize, Pointwise, RmsNorm, Table};
+use actq::graph::ops::{Add, Gru, Iterate, LayerNorm, Lstm, Mul, Normalize, Pointwise, RmsNorm, Table};
 use actq::methods::{Activations, Outcome};
 use actq::policy::Policy;
 use actq::random::Random;
@@ -435,6 +435,8 @@ fn policies() -> Result<Vec<(Policy, Vec<Outcome>)>> {
             builder.node_of_part(len, RmsNorm { weight: scale, eps: 1e-5 })?;
             let (a, b) = (builder.part(len)?, builder.part(len)?);
             builder.node(Add, &[a, b])?;
+            let (a, b) = (builder.part(len)?, builder.part(len)?);
+            builder.node(Mul, &[a, b])?;
         }
         for hidden in HIDDEN {
             for width in [Width::W2, Width::W4] {

@@ -21,6 +21,15 @@ pub(crate) struct Cli {
 
 #[derive(Subcommand)]
 pub(crate) enum Command {
+    /// Make a policy's folder of an ONNX file
+    ///
+    /// Takes what PyTorch, rsl_rl, Brax, MuJoCo Playground, mjlab, Isaac Lab, Stable-Baselines3, CleanRL and ML-Agents export:
+    /// matrix products, activations, norms, LSTM and GRU cells, and what moves and scales values between them, with a batch of 1.
+    /// The observation is the concatenation of the inputs, in the order that is printed. The action is the output that is called
+    /// so, or the only one that can be; what does not lead to it is cut. What cannot be taken is refused by the node's name.
+    ///
+    /// Example: actq import model.onnx --out policies/walker --calib obs.npy --check
+    Import(ImportArgs),
     /// Quantize a policy into an image
     ///
     /// POLICY_DIR holds policy.json (the op list), policy.safetensors (the weights) and, for every method but rtn, a recording
@@ -29,7 +38,11 @@ pub(crate) enum Command {
     /// state before the first step), or calib.npy with the observations alone. Two axes [frame, value] are one episode. Where
     /// heldout.npz, .npy or .safetensors is there too, the image is run on both, and errors and warnings are printed.
     ///
+    /// An .onnx file stands for the folder that `actq import` makes of it, here and wherever a POLICY_DIR is taken; its recordings are
+    /// those beside it.
+    ///
     /// Example: actq quantize policies/ur3 --bits 3 --out ur3.actq
+    /// Example: actq quantize model.onnx --calib obs.npy --bpw 2 --out model.actq
     Quantize(QuantizeArgs),
     /// Show what is in an image: operations, matrices, bits, memory, time on a Cortex-M4, the action contract
     ///
@@ -95,6 +108,31 @@ pub(crate) enum Command {
 }
 
 #[derive(clap::Args)]
+pub(crate) struct ImportArgs {
+    /// The ONNX file; tensors in files beside it are read, too
+    pub(crate) model: PathBuf,
+    /// The policy's folder, which is made: policy.json, policy.safetensors and, with --calib, calib.npz
+    #[arg(long, value_name = "POLICY_DIR")]
+    pub(crate) out: PathBuf,
+    /// A recording of observations to learn from: .npy, .npz or .safetensors
+    #[arg(long, value_name = "FILE")]
+    pub(crate) calib: Option<PathBuf>,
+    /// The output that is the action, or any value of the graph [default: the one called action, or the only one]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) output: Option<String>,
+    /// An input that holds recurrent state, and the output of its next value; may be repeated [default: found by the cells]
+    #[arg(long, value_name = "IN=OUT", value_parser = pair)]
+    pub(crate) state: Vec<(String, String)>,
+    /// Compare the actions with onnxruntime's on the recording, or on random observations: to 1e-5 of the largest action. Needs
+    /// Python with onnxruntime (python3, or what ACTQ_PYTHON names)
+    #[arg(long)]
+    pub(crate) check: bool,
+    /// Replace files that are there
+    #[arg(long)]
+    pub(crate) force: bool,
+}
+
+#[derive(clap::Args)]
 pub(crate) struct ServeArgs {
     /// The image
     pub(crate) image: PathBuf,
@@ -109,7 +147,7 @@ pub(crate) struct ServeArgs {
 
 #[derive(clap::Args)]
 pub(crate) struct QuantizeArgs {
-    /// The policy's folder
+    /// The policy's folder, or an .onnx file
     pub(crate) policy_dir: PathBuf,
     /// The image to write
     #[arg(long, value_name = "FILE")]
@@ -326,6 +364,11 @@ impl From<MethodArg> for Method {
 fn width(text: &str) -> Result<Width, String> {
     let known = text.parse().ok().and_then(Width::from_bits);
     known.ok_or_else(|| "weights have 2, 3, 4 or 8 bits".to_owned())
+}
+
+fn pair(text: &str) -> Result<(String, String), String> {
+    let (from, to) = text.split_once('=').ok_or_else(|| "the form is INPUT=OUTPUT".to_owned())?;
+    Ok((from.to_owned(), to.to_owned()))
 }
 
 fn rounds(text: &str) -> Result<usize, String> {

@@ -4,6 +4,7 @@
 mod args;
 mod drive;
 mod eval;
+mod import;
 mod link;
 mod quantize;
 mod serve;
@@ -16,7 +17,7 @@ use std::process::ExitCode;
 
 use actq::data::{Learned, Recording, Recordings, Sizes, files_of};
 use actq::emit::files;
-use actq::import;
+use actq::import::{FILES, is_onnx};
 use actq::measure::time::StepTime;
 use actq::methods::Method;
 use actq::pipeline::stats::Stats;
@@ -44,6 +45,7 @@ fn main() -> ExitCode {
 
 fn run(command: Command) -> Result<()> {
     match command {
+        Command::Import(args) => import::run(&args),
         Command::Quantize(args) => quantize::run(&args),
         Command::Inspect(args) => run_inspect(&args),
         Command::Eval(args) => eval::run(&args),
@@ -110,7 +112,7 @@ fn run_inspect(args: &InspectArgs) -> Result<()> {
 
 /// All files that a policy's folder may hold, whether they are there or not.
 fn policy_files(dir: &Path) -> Vec<PathBuf> {
-    let own = import::FILES.map(|name| dir.join(name));
+    let own = if is_onnx(dir) { vec![dir.to_owned()] } else { FILES.map(|name| dir.join(name)).to_vec() };
     own.into_iter().chain(Recording::Calib.paths(dir)).chain(Recording::Heldout.paths(dir)).collect()
 }
 

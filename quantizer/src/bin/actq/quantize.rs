@@ -6,6 +6,7 @@ use std::time::Instant;
 use actq::budget::{Budget, TimeLimit};
 use actq::data::{Learned, Recording, Recordings, Sizes, driven_by, files_of};
 use actq::emit::files;
+use actq::import::is_onnx;
 use actq::measure::{check, own};
 use actq::methods::{Activations, Method, Options};
 use actq::pipeline::Quantizer;
@@ -14,9 +15,9 @@ use actq::policy::Policy;
 use actq::report::learned::learned;
 use actq::report::{notes, quantized, time};
 use actq_kernels::Width;
-use anyhow::Result;
+use anyhow::{Result, bail};
 
-use crate::args::{ActivationArg, QuantizeArgs};
+use crate::args::{ActivationArg, MethodArg, QuantizeArgs};
 use crate::{note, policy_files, print, progress_bar, set_share, start_threads};
 
 /// Quantizes a policy, writes the image and says what became of it.
@@ -28,6 +29,10 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
     let source = Policy::load(&args.policy_dir)?;
     let (calib, shares) = Learned::load(&source, &calib)?.map(|l| (l.dataset, l.shares)).unzip();
     let shares = shares.unwrap_or_default();
+    let rtn = matches!(args.method, Some(MethodArg::Rtn));
+    if is_onnx(&args.policy_dir) && calib.is_none() && !rtn {
+        bail!("{}: {}", args.policy_dir.display(), notes::how_to_record(&source));
+    }
     let heldout = Recording::Heldout.load(Some(&args.policy_dir), None, Sizes::of(&source))?;
     let recordings = Recordings { calib, heldout };
     note(notes::of_recordings(&recordings));

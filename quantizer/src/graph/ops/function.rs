@@ -57,5 +57,13 @@ fn derivative(function: Function) -> fn(f32, f32) -> f32 {
         },
         Function::Tanh => |_, y| 1.0 - y * y,
         Function::Sigmoid => |_, y| y * (1.0 - y),
+        Function::Exp => |_, y| y,
+        Function::Sin => |x, _| math::cos(x),
+        Function::Cos => |x, _| -math::sin(x),
+        Function::Softplus => |x, _| math::sigmoid(x),
+        Function::Mish => |x, _| {
+            let t = math::tanh(math::softplus(x));
+            t + x * (1.0 - t * t) * math::sigmoid(x)
+        },
     }
 }

@@ -1,0 +1,106 @@
+#!/usr/bin/env python3
+"""From a PyTorch module to a policy's folder for actq.
+
+    from actq_export import export
+    export(actor, observations, "policies/walker")
+
+`actor` is an nn.Module that takes one batch of observations, or several (a tuple of arrays), and gives actions: Sequential, Linear,
+activations, norms, residual blocks. A recurrent one takes its states behind the observations and gives the next ones behind the
+action; `states` names them with their shapes:
+
+    export(actor, observations, "policies/walker", states={"h": (1, 1, 64), "c": (1, 1, 64)})
+
+`observations` are those that the policy has seen, [frame, value] or [episode, step, value] (several inputs: joined in order); the
+quantizer learns from them. As a command, for a module that torch.save has written whole:
+
+    actq_export.py actor.pt obs.npy policies/walker
+
+Needs torch and numpy, and actq in PATH (or where ACTQ names it). torch.onnx writes the file; actq reads it and refuses, by name, what
+it cannot take.
+"""
+import argparse
+import os
+import subprocess
+import tempfile
+import warnings
+from pathlib import Path
+from unittest import mock
+
+import numpy
+import torch
+
+
+def export(module, observations, folder, sizes=None, states=None, check=False, force=False):
+    """Writes policy.json, policy.safetensors and calib.npz to `folder`; gives what actq says of them.
+
+    sizes: lengths of the module's inputs, where it has several; their sum is that of an observation.
+    states: names and shapes of a recurrent module's states, a batch of 1 included.
+    check: compares with onnxruntime, which must be installed beside this torch.
+    """
+    observations = numpy.asarray(observations, numpy.float32)
+    if observations.ndim not in (2, 3):
+        raise ValueError(f"observations are {observations.shape}; [frame, value] or [episode, step, value] is needed")
+    width = observations.shape[-1]
+    sizes = list(sizes or [width])
+    if sum(sizes) != width:
+        raise ValueError(f"the inputs have {sizes} values, which are not the {width} of an observation")
+    states = dict(states or {})
+    frame = torch.from_numpy(observations.reshape(-1, width)[:1].copy())
+    inputs = [*torch.split(frame, sizes, dim=1), *(torch.zeros(shape) for shape in states.values())]
+    names = ["obs"] if len(sizes) == 1 else [f"obs_{i}" for i in range(len(sizes))]
+    with tempfile.TemporaryDirectory() as temporary:
+        model, recording = Path(temporary, "policy.onnx"), Path(temporary, "obs.npy")
+        numpy.save(recording, observations)
+        write_onnx(module, inputs, model, names, states)
+        command = [os.environ.get("ACTQ", "actq"), "import", str(model), "--out", str(folder), "--calib", str(recording)]
+        command += [f"--state={name}_in={name}_out" for name in states]
+        command += ["--check"] * check + ["--force"] * force
+        done = subprocess.run(command, capture_output=True, text=True)
+        if done.returncode != 0:
+            raise RuntimeError(done.stderr.strip())
+        return done.stdout
+
+
+def write_onnx(module, inputs, path, names, states):
+    """Writes one step of the module, in evaluation mode, as an ONNX file."""
+    training, device = module.training, next((p.device for p in module.parameters()), torch.device("cpu"))
+    module.eval()
+    try:
+        with torch.no_grad(), warnings.catch_warnings(), mock.patch.object(torch.nn.RMSNorm, "forward", rms_norm):
+            # The exporter that traces needs no package beside torch. It warns of its age, and of a fixed batch.
+            warnings.simplefilter("ignore")
+            torch.onnx.export(
+                module,
+                tuple(tensor.to(device) for tensor in inputs),
+                str(path),
+                input_names=[*names, *(f"{name}_in" for name in states)],
+                output_names=["actions", *(f"{name}_out" for name in states)],
+                opset_version=17,
+                dynamo=False,
+            )
+    finally:
+        module.train(training)
+
+
+def rms_norm(self, x):
+    """nn.RMSNorm in operations that the tracing exporter knows."""
+    axes = tuple(range(-len(self.normalized_shape), 0))
+    eps = torch.finfo(x.dtype).eps if self.eps is None else self.eps
+    y = x * torch.rsqrt((x * x).mean(axes, keepdim=True) + eps)
+    return y if self.weight is None else y * self.weight
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("module", help="what torch.save(module, FILE) has written; it is unpickled, so only from whom you trust")
+    parser.add_argument("observations", help="an .npy array")
+    parser.add_argument("folder", help="the policy's folder")
+    parser.add_argument("--check", action="store_true", help="compare with onnxruntime")
+    parser.add_argument("--force", action="store_true", help="replace files that are there")
+    args = parser.parse_args()
+    module = torch.load(args.module, map_location="cpu", weights_only=False)
+    print(export(module, numpy.load(args.observations), args.folder, check=args.check, force=args.force), end="")
+
+
+if __name__ == "__main__":
+    main()

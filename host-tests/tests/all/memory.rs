@@ -1,0 +1,45 @@
+//! Scratch memory of whole policies: how much it is, and how far from what liveness allows.
+
+use std::path::Path;
+
+use actq::budget::Budget;
+use actq::data::Recordings;
+use actq::methods::{Method, Options};
+use actq::pipeline::quantize;
+use actq::policy::Policy;
+use actq::report::memory::{Peak, peak};
+use actq::runtime::ImageBuffer;
+use actq_bench::{shared_policies, ur3};
+use actq_kernels::Width;
+use anyhow::{Result, ensure};
+
+/// Words of the arena, and of what operations write: where most of that is needed, how many words are, and how many there are.
+fn scratch_is(dir: &Path, words: usize, [op, needed, placed]: [usize; 3]) -> Result<()> {
+    let policy = Policy::load(dir)?;
+    let options = Options::new(Method::Rtn, Budget::Width(Width::W3));
+    let buffer = ImageBuffer::new(&quantize(&policy, &Recordings::default(), &options, |_, _| {})?.image);
+    let image = buffer.image(dir)?;
+    let (is, expected) = ((image.scratch_words(), peak(&image)), (words, Peak { op, words: needed, placed }));
+    ensure!(is == expected, "{}: {is:?} instead of {expected:?}", dir.display());
+    Ok(())
+}
+
+#[test]
+fn scratch_of_the_ur3_policy() -> Result<()> {
+    scratch_is(&ur3(), 1212, [5, 960, 978])
+}
+
+#[test]
+fn scratch_of_shared_policies() -> Result<()> {
+    let Some(policies) = shared_policies() else { return Ok(()) };
+    for (name, words, values) in [
+        ("go1_mlp", 1212, [3, 768, 816]),
+        ("g1_lstm64", 517, [0, 256, 256]),
+        ("g1_lstm256", 1925, [1, 1120, 1120]),
+        ("fetch_pickplace", 740, [3, 512, 540]),
+        ("fetch_flow", 2540, [10, 1808, 1836]),
+    ] {
+        scratch_is(&policies.join(name), words, values)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,490 @@
+//! The action contract, chunk playback, and saved states, against plain arithmetic in f64. The networks are none: the observation is
+//! the raw output, bit for bit.
+
+use std::fs;
+use std::task::Poll;
+
+use actq::contract::{ActionContract, Binarise, Ensemble, Playback};
+use actq::graph::ops::{Linear, Lstm, Normalize};
+use actq::graph::{Graph, NodeKind};
+use actq::methods::Activations;
+use actq::policy::Policy;
+use actq::runtime::ImageBuffer;
+use actq_bench::networks::Builder;
+use actq_bench::qemu::{self, Server};
+use actq_bench::{Target, firmware};
+use actq_kernels::image::Kind;
+use actq_kernels::{Head, SavedError, StepError, Width};
+use anyhow::{Result, ensure};
+use proptest::prelude::*;
+
+/// Length of an action.
+const ACT: usize = 2;
+
+/// An image whose raw output is its observation.
+fn echo(chunk: usize, execute: usize, contract: ActionContract) -> ImageBuffer {
+    let len = chunk * ACT;
+    let mut graph = Graph::new(len);
+    let unlimited = f32::INFINITY;
+    let same = Normalize { mean: vec![0.0; len], scale: vec![1.0; len], pre_clip: unlimited, clip: unlimited };
+    graph.add(NodeKind::from(same), &[0]).expect("it fits");
+    let kind = if chunk > 1 { Kind::Chunk } else { Kind::Step };
+    let policy = Policy {
+        dir: ".".into(),
+        name: "echo".into(),
+        kind,
+        chunk,
+        execute,
+        act_len: ACT,
+        rate_hz: 50.0,
+        contract,
+        weights: 0,
+        graph,
+        digest: [0; 32],
+    };
+    policy.check().expect("the policy fits together");
+    ImageBuffer::new(&actq::emit::image(&policy, &[]).expect("the policy fits the format"))
+}
+
+fn with_head<T>(buffer: &ImageBuffer, work: impl FnOnce(&mut Head<'_, '_>) -> T) -> T {
+    let image = buffer.image("memory".as_ref()).expect("the image is valid");
+    let mut scratch = vec![0; image.scratch_words()];
+    work(&mut Head::new(image, &mut scratch).expect("the scratch memory has the image's size"))
+}
+
+/// Sixty-fourths: sums and products of a few are exact in f32, so that a threshold is met or not as in f64.
+fn sixty_fourths(from: i32, to: i32) -> impl Strategy<Value = f32> + Clone {
+    (from..=to).prop_map(|n| n as f32 / 64.0)
+}
+
+fn each<T: std::fmt::Debug + Clone>(of: impl Strategy<Value = T> + Clone) -> impl Strategy<Value = Vec<T>> {
+    prop::collection::vec(of, ACT)
+}
+
+fn contracts() -> impl Strategy<Value = ActionContract> {
+    let value = || sixty_fourths(-128, 128);
+    let some = |of: BoxedStrategy<Vec<f32>>| prop::option::of(of);
+    let binarise = (each(value()), each(sixty_fourths(0, 64)), each(value()), each(prop::bool::ANY)).prop_map(
+        |(off, gap, off_value, concerned)| Binarise {
+            on: off.iter().zip(&gap).map(|(off, gap)| off + gap).collect(),
+            on_value: off_value.iter().zip(&concerned).map(|(v, yes)| if *yes { v + 0.75 } else { *v }).collect(),
+            off_value,
+            off,
+        },
+    );
+    let limits = (each(value()), each(sixty_fourths(0, 96)))
+        .prop_map(|(low, range)| (low.iter().zip(range).map(|(low, range)| low + range).collect::<Vec<f32>>(), low));
+    let affine = (some(each(value()).boxed()), some(each(value()).boxed()), prop::option::of(binarise));
+    let steps = (some(each(sixty_fourths(0, 64)).boxed()), some(each(sixty_fourths(1, 64)).boxed()));
+    (affine, prop::option::of(limits), steps).prop_map(|((scale, offset, binarise), limits, (max_step, smoothing))| {
+        let (high, low) = limits.unzip();
+        ActionContract { scale, offset, binarise, low, high, max_step, smoothing, ..ActionContract::default() }
+    })
+}
+
+/// The contract in f64, in the order of docs/FORMAT.md.
+struct Oracle<'c> {
+    by: &'c ActionContract,
+    last: Option<Vec<f64>>,
+    on: Vec<bool>,
+}
+
+impl<'c> Oracle<'c> {
+    fn new(by: &'c ActionContract) -> Self {
+        Self { by, last: None, on: vec![false; ACT] }
+    }
+
+    fn action(&mut self, raw: &[f64]) -> Vec<f64> {
+        let at = |array: &Option<Vec<f32>>, i: usize| array.as_ref().map(|values| f64::from(values[i]));
+        let one = |(i, x): (usize, &f64)| {
+            let mut a = x * at(&self.by.scale, i).unwrap_or(1.0) + at(&self.by.offset, i).unwrap_or(0.0);
+            if let Some(by) = &self.by.binarise
+                && by.on_value[i] != by.off_value[i]
+            {
+                if a >= f64::from(by.on[i]) {
+                    self.on[i] = true;
+                } else if a <= f64::from(by.off[i]) {
+                    self.on[i] = false;
+                }
+                a = f64::from(if self.on[i] { by.on_value[i] } else { by.off_value[i] });
+            }
+            a = a.max(at(&self.by.low, i).unwrap_or(f64::MIN)).min(at(&self.by.high, i).unwrap_or(f64::MAX));
+            if let Some(last) = self.last.as_ref().map(|last| last[i]) {
+                let step = at(&self.by.max_step, i).unwrap_or(f64::MAX);
+                a = a.clamp(last - step, last + step);
+                a = last + at(&self.by.smoothing, i).unwrap_or(1.0) * (a - last);
+            }
+            a
+        };
+        let action: Vec<f64> = raw.iter().enumerate().map(one).collect();
+        self.last = Some(action.clone());
+        action
+    }
+}
+
+fn wide(values: &[f32]) -> Vec<f64> {
+    values.iter().map(|v| f64::from(*v)).collect()
+}
+
+fn close(ours: &[f32], expected: &[f64]) -> bool {
+    ours.len() == expected.len() && ours.iter().zip(expected).all(|(a, e)| (f64::from(*a) - e).abs() <= 1e-5)
+}
+
+proptest! {
+    #[test]
+    fn the_contract_is_that_of_plain_arithmetic(
+        contract in contracts(),
+        raw in prop::collection::vec(each(sixty_fourths(-160, 160)), 1..40),
+    ) {
+        let mut oracle = Oracle::new(&contract);
+        with_head(&echo(1, 1, contract.clone()), |head| {
+            let mut last: Option<Vec<f32>> = None;
+            for raw in &raw {
+                let action = head.step(raw).expect("it is finite").to_vec();
+                let expected = oracle.action(&wide(raw));
+                prop_assert!(close(&action, &expected), "{action:?} instead of {expected:?}");
+                for (i, a) in action.iter().enumerate() {
+                    // Limits hold to the last bit, however the low-pass is rounded.
+                    prop_assert!(contract.low.as_ref().is_none_or(|low| *a >= low[i]));
+                    prop_assert!(contract.high.as_ref().is_none_or(|high| *a <= high[i]));
+                    if let (Some(last), Some(step)) = (&last, &contract.max_step) {
+                        prop_assert!(*a >= last[i] - step[i] && *a <= last[i] + step[i]);
+                    }
+                }
+                last = Some(action);
+            }
+            Ok(())
+        })?;
+    }
+}
+
+/// What becomes of a control period.
+#[derive(Clone, Debug)]
+enum Period {
+    /// A step, at whose end so many periods have passed, in each of which the chunk before played on, or nothing did.
+    Step(Vec<f32>, Vec<bool>),
+    /// The chunk plays on without an observation.
+    Play,
+    /// Nothing.
+    Pass(usize),
+}
+
+fn periods(chunk: usize) -> impl Strategy<Value = Vec<Period>> {
+    let raw = prop::collection::vec(-1.0f32..1.0, chunk * ACT);
+    let prompt = raw.clone().prop_map(|raw| Period::Step(raw, Vec::new()));
+    let late = (raw, prop::collection::vec(prop::bool::weighted(0.7), 0..chunk + 2));
+    let period = prop_oneof![
+        6 => prompt,
+        4 => late.prop_map(|(raw, waits)| Period::Step(raw, waits)),
+        1 => Just(Period::Play),
+        1 => (0..chunk + 2).prop_map(Period::Pass),
+    ];
+    prop::collection::vec(period, 1..60)
+}
+
+/// Chunk and execute length, and how they are played.
+fn playbacks() -> impl Strategy<Value = (usize, usize, Playback)> {
+    (2usize..9).prop_flat_map(|chunk| {
+        let late = move |oldest: usize| prop::option::of(oldest..=chunk + 1);
+        let ensemble = (1..=chunk, -0.5f64..1.0).prop_flat_map(move |(horizon, m)| {
+            late(horizon).prop_map(move |deadline| {
+                (chunk, 1, Playback { ensemble: Some(Ensemble { horizon, m }), overlap: 0, deadline })
+            })
+        });
+        let overlap = (1..=chunk).prop_flat_map(move |execute| {
+            (0..=chunk - execute, late(execute))
+                .prop_map(move |(overlap, deadline)| (chunk, execute, Playback { ensemble: None, overlap, deadline }))
+        });
+        prop_oneof![ensemble, overlap]
+    })
+}
+
+/// Playback in f64, in absolute time.
+struct Player {
+    chunk: usize,
+    execute: usize,
+    by: Playback,
+    now: usize,
+    /// Of the chunk that is played: when it was observed, and its actions.
+    plan: Option<(usize, Vec<Vec<f64>>)>,
+    /// All chunks, the oldest first: when observed, and from when on they play.
+    all: Vec<(usize, usize, Vec<Vec<f64>>)>,
+}
+
+impl Player {
+    fn new(chunk: usize, execute: usize, by: Playback) -> Self {
+        Self { chunk, execute, by, now: 0, plan: None, all: Vec::new() }
+    }
+
+    /// The action of now, or none that is young enough.
+    fn action(&self) -> Option<Vec<f64>> {
+        if let Some(Ensemble { horizon, m }) = self.by.ensemble {
+            let now = self.now;
+            let told = self.all.iter().filter(|(seen, from, _)| *from <= now && now < seen + horizon);
+            let told: Vec<&Vec<f64>> = told.map(|(seen, _, chunk)| &chunk[now - seen]).collect();
+            let weight = |i: usize| (-m * i as f64).exp();
+            let sum: f64 = (0..told.len()).map(weight).sum();
+            let mean = |d: usize| told.iter().enumerate().map(|(i, a)| weight(i) * a[d]).sum::<f64>() / sum;
+            return (!told.is_empty()).then(|| (0..ACT).map(mean).collect());
+        }
+        let (seen, plan) = self.plan.as_ref()?;
+        let age = self.now - seen;
+        plan.get(age).filter(|_| self.by.deadline.is_none_or(|deadline| age < deadline)).cloned()
+    }
+
+    fn runs(&self) -> bool {
+        self.plan.as_ref().is_none_or(|(seen, _)| self.now - seen >= self.execute)
+    }
+
+    /// A chunk that was observed at `seen` is ready now.
+    fn take(&mut self, seen: usize, raw: &[f32]) {
+        let mut plan: Vec<Vec<f64>> = raw.chunks(ACT).map(wide).collect();
+        self.all.push((seen, self.now, plan.clone()));
+        if let Some((old_seen, old)) = self.plan.take()
+            && self.by.overlap > 0
+        {
+            let (old_age, age) = (self.now - old_seen, self.now - seen);
+            let left = self.chunk.saturating_sub(old_age).min(self.chunk.saturating_sub(age));
+            let lead = self.by.overlap.min(left);
+            for k in 0..lead {
+                let share = (k + 1) as f64 / (lead + 1) as f64;
+                for (new, old) in plan[age + k].iter_mut().zip(&old[old_age + k]) {
+                    *new = old * (1.0 - share) + *new * share;
+                }
+            }
+        }
+        self.plan = Some((seen, plan));
+    }
+}
+
+proptest! {
+    #[test]
+    fn chunks_are_played_as_in_plain_arithmetic(
+        ((chunk, execute, playback), periods) in playbacks().prop_flat_map(|by| (Just(by), periods(by.0))),
+    ) {
+        let contract = ActionContract { playback, ..ActionContract::default() };
+        let mut player = Player::new(chunk, execute, playback);
+        let agree = |ours: Result<&[f32], StepError>, expected: &Option<Vec<f64>>| match (ours, expected) {
+            (Ok(ours), Some(expected)) => close(ours, expected),
+            (Err(StepError::Stale), None) => true,
+            _ => false,
+        };
+        with_head(&echo(chunk, execute, contract), |head| {
+            for (i, period) in periods.iter().enumerate() {
+                match period {
+                    Period::Pass(n) => {
+                        head.pass(*n);
+                        player.now += n;
+                    }
+                    Period::Play => {
+                        let expected = player.action();
+                        prop_assert!(agree(head.play(), &expected), "period {i}: {expected:?}");
+                        player.now += usize::from(expected.is_some());
+                    }
+                    Period::Step(raw, waits) => {
+                        let (seen, runs) = (player.now, player.runs());
+                        head.begin(raw).expect("it is finite");
+                        if runs && playback.overlap == 0 {
+                            // Nothing is kept of a chunk that is being replaced.
+                            player.plan = None;
+                        }
+                        for &play in waits {
+                            let expected = player.action().filter(|_| play);
+                            if play {
+                                prop_assert!(agree(head.play(), &expected), "period {i}, waiting: {expected:?}");
+                            }
+                            if expected.is_none() {
+                                head.pass(1);
+                            }
+                            player.now += 1;
+                        }
+                        let late = player.now - seen;
+                        if runs && playback.deadline.is_some_and(|deadline| late >= deadline) {
+                            player.all.clear();
+                            player.plan = None;
+                        } else if runs {
+                            player.take(seen, raw);
+                        }
+                        let expected = player.action();
+                        let ours = head.poll(u32::MAX).map(|ours| match ours {
+                            Poll::Ready(action) => action.to_vec(),
+                            Poll::Pending => Vec::new(),
+                        });
+                        let agrees = agree(ours.as_deref().map_err(|e| *e), &expected);
+                        prop_assert!(agrees, "period {i}: {ours:?} instead of {expected:?}");
+                        match expected {
+                            Some(_) => player.now += 1,
+                            None => {
+                                player.all.clear();
+                                player.plan = None;
+                            }
+                        }
+                    }
+                }
+            }
+            Ok(())
+        })?;
+    }
+
+    #[test]
+    fn a_new_chunk_takes_over_without_a_jump(chunk in 4usize..12, raw in prop::collection::vec(-1.0f32..1.0, 12 * ACT)) {
+        // All of the old chunk is 0: what the new one adds grows by its share of each action.
+        let overlap = chunk - 2;
+        let by = Playback { overlap, ..Playback::default() };
+        with_head(&echo(chunk, 2, ActionContract { playback: by, ..ActionContract::default() }), |head| {
+            let (old, new) = (vec![0.0; chunk * ACT], &raw[..chunk * ACT]);
+            head.step(&old).expect("an action");
+            head.step(&old).expect("an action");
+            let mut shares = Vec::new();
+            for (k, new) in new.chunks(ACT).enumerate() {
+                let action = if k < 2 { head.step(&raw[..chunk * ACT]) } else { head.play() }.expect("an action");
+                shares.push(action.iter().zip(new).map(|(a, n)| a / n).fold(0.0, f32::max));
+            }
+            for (k, share) in shares.iter().enumerate() {
+                let expected = ((k + 1) as f32 / (overlap + 1) as f32).min(1.0);
+                prop_assert!((share - expected).abs() < 1e-5, "{shares:?}");
+            }
+            Ok(())
+        })?;
+    }
+}
+
+#[test]
+fn a_step_policy_has_a_deadline_for_its_observation() {
+    let by = Playback { deadline: Some(3), ..Playback::default() };
+    with_head(&echo(1, 1, ActionContract { playback: by, ..ActionContract::default() }), |head| {
+        for (late, plays) in [(0, true), (2, true), (3, false), (usize::MAX, false), (2, true)] {
+            head.begin(&[0.5, -0.5]).expect("it is finite");
+            head.pass(late);
+            let outcome = head.poll(u32::MAX).map(|ready| ready.is_ready());
+            assert_eq!(outcome, if plays { Ok(true) } else { Err(StepError::Stale) }, "{late} periods late");
+            assert_eq!(head.play().map(|_| ()), Err(StepError::Stale), "an action plays once");
+        }
+    });
+}
+
+/// A contract and playback with memory of every kind.
+fn memory(m: f64) -> ActionContract {
+    let binarise =
+        Binarise { on: vec![0.2; ACT], off: vec![-0.2; ACT], on_value: vec![0.9, 0.0], off_value: vec![-0.9, 0.0] };
+    ActionContract {
+        binarise: Some(binarise),
+        max_step: Some(vec![0.7; ACT]),
+        smoothing: Some(vec![0.6; ACT]),
+        playback: Playback { ensemble: Some(Ensemble { horizon: 3, m }), ..Playback::default() },
+        ..ActionContract::default()
+    }
+}
+
+fn remembering(m: f64) -> ImageBuffer {
+    echo(4, 1, memory(m))
+}
+
+/// Observations of a wave.
+fn wave(step: usize) -> Vec<f32> {
+    (0..4 * ACT).map(|i| ((step * 7 + i * 3) as f32 * 0.37).sin()).collect()
+}
+
+fn saved(head: &Head<'_, '_>) -> Vec<u8> {
+    let mut bytes = vec![0; head.saved_len()];
+    head.save(&mut bytes).expect("no step has begun");
+    bytes
+}
+
+#[test]
+fn a_restored_head_goes_on_with_the_same_bits() {
+    let buffer = remembering(0.1);
+    let whole: Vec<Vec<f32>> =
+        with_head(&buffer, |head| (0..40).map(|i| head.step(&wave(i)).expect("an action").to_vec()).collect());
+    for at in 0..40 {
+        let state = with_head(&buffer, |head| {
+            for i in 0..at {
+                head.step(&wave(i)).expect("an action");
+            }
+            saved(head)
+        });
+        with_head(&buffer, |head| {
+            // Of another life.
+            for i in 0..5 {
+                head.step(&wave(3 * i)).expect("an action");
+            }
+            head.restore(&state).expect("it is the image's");
+            assert_eq!(saved(head), state);
+            for (i, expected) in whole.iter().enumerate().skip(at) {
+                assert_eq!(head.step(&wave(i)).expect("an action"), expected, "saved at {at}, step {i}");
+            }
+        });
+    }
+}
+
+#[test]
+fn states_that_are_damaged_or_of_another_image_are_refused() {
+    let buffer = remembering(0.1);
+    with_head(&buffer, |head| {
+        for i in 0..5 {
+            head.step(&wave(i)).expect("an action");
+        }
+        let state = saved(head);
+        let len = state.len();
+        head.step(&wave(5)).expect("an action");
+        let before = saved(head);
+        for bit in 0..8 * len {
+            let mut damaged = state.clone();
+            damaged[bit / 8] ^= 1 << (bit % 8);
+            let expected = match bit / 32 {
+                0 | 1 => SavedError::Version,
+                2 => SavedError::Image,
+                _ => SavedError::Damaged,
+            };
+            assert_eq!(head.restore(&damaged), Err(expected), "bit {bit}");
+        }
+        for given in [0, 39, len - 1, len + 4] {
+            let error = Err(SavedError::Length { needed: len, given });
+            assert_eq!((head.restore(&vec![0; given]), head.save(&mut vec![0; given])), (error, error));
+        }
+        let other = with_head(&remembering(0.2), |other| saved(other));
+        assert_eq!(head.restore(&other), Err(SavedError::Image));
+        assert_eq!(saved(head), before, "a refusal changes nothing");
+        head.begin(&wave(6)).expect("it is finite");
+        assert_eq!(
+            (head.restore(&state), head.save(&mut vec![0; len])),
+            (Err(SavedError::Begun), Err(SavedError::Begun))
+        );
+        head.reset();
+        assert_eq!(head.restore(&state), Ok(()));
+    });
+}
+
+/// On the target every step is one after a warm restart, on the host none is.
+#[test]
+fn six_hundred_steps_have_the_same_bits_through_as_many_restarts_on_the_target() -> Result<()> {
+    const HIDDEN: usize = 24;
+    let mut builder = Builder::new(4 * ACT);
+    let mut matrix = |rows: usize, cols| builder.matrix(rows, cols, Activations::Int8, &vec![Some(Width::W3); rows], 0);
+    let (input, state) = (matrix(4 * HIDDEN, 4 * ACT)?, matrix(4 * HIDDEN, HIDDEN)?);
+    let output = matrix(4 * ACT, HIDDEN)?;
+    let [bias, last] = [builder.values(4 * HIDDEN), builder.values(4 * ACT)];
+    let hidden = builder.node(Lstm { hidden: HIDDEN, input, state, bias }, &[0])?;
+    builder.node(Linear { matrix: output, bias: last }, &[hidden])?;
+    let (mut policy, outcomes) = builder.finish("restarts".to_owned(), false);
+    (policy.kind, policy.chunk, policy.act_len, policy.contract) = (Kind::Chunk, 4, ACT, memory(0.1));
+    let buffer = ImageBuffer::new(&actq::emit::image(&policy, &outcomes)?);
+    let slot = tempfile::NamedTempFile::new()?;
+    fs::write(slot.path(), buffer.bytes())?;
+    let elf = firmware::harness(Target::Fpu)?;
+    let mut target = Server::start(qemu::command(&elf, Some(slot.path()), "restart")?, ACT)?;
+    let mut different = 0;
+    with_head(&buffer, |head| -> Result<()> {
+        let mut before = Vec::new();
+        for step in 0..600 {
+            let (here, there) = (head.step(&wave(step))?, target.step(&wave(step))?);
+            let same = here.iter().zip(&there).all(|(a, b)| a.to_bits() == b.to_bits());
+            ensure!(same, "step {step}: {there:?} on the target, {here:?} on the host");
+            different += usize::from(before != there);
+            before = there;
+        }
+        Ok(())
+    })?;
+    ensure!(different > 300, "the actions hardly change");
+    target.finish()
+}

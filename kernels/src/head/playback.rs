@@ -1,0 +1,137 @@
+//! Which of the network's outputs is the next action: of a chunk, of one that leads over from the chunk before, or the average of all
+//! chunks that foresaw it.
+//!
+//! Time counts in control periods: the position of an action in its chunk is its age when it plays. Whatever has begun to play, or
+//! was for a time that has passed, no later chunk changes.
+
+use super::arena::{part, regions};
+use crate::error::Fault;
+use crate::image::{Image, Region};
+use crate::ops::elementwise::copy;
+
+/// Where playback stands.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Playback {
+    /// Whether the output holds a chunk; else it is to be computed.
+    pub(super) ready: bool,
+    /// Position of the action that is due in the chunk at hand, or in the one that is to be computed.
+    pub(super) next: usize,
+    /// The same in the chunk before, where that is kept; where nothing of it is left, its length.
+    pub(super) old: usize,
+    /// Where the sum for the action that is due stands among those that are kept.
+    pub(super) slot: usize,
+}
+
+impl Playback {
+    /// Without a chunk.
+    #[inline(never)]
+    pub(super) fn forget(&mut self, image: &Image<'_>, arena: &mut [u32]) {
+        *self = Self { old: image.chunk(), ..Self::default() };
+        counts(image, arena).fill(0);
+    }
+
+    /// Whether the network must run for the action that is due. Then what is left of the chunk at hand is kept before the output is
+    /// written anew.
+    #[inline(never)]
+    pub(super) fn turn(&mut self, image: &Image<'_>, arena: &mut [u32]) -> bool {
+        if self.ready && self.next < image.execute() {
+            return false;
+        }
+        if self.ready && image.overlap() > 0 {
+            let [output, kept, _] = regions(arena, &[image.output(), image.kept(), Region::default()]);
+            let rest = image.execute() * image.act_len()..output.len();
+            copy(part(output, &rest), kept);
+            self.old = self.next.min(image.chunk());
+        }
+        (self.ready, self.next) = (false, 0);
+        true
+    }
+
+    /// Takes the chunk that the output holds now, with what earlier ones say of the time from now on.
+    #[inline(never)]
+    pub(super) fn merge(&mut self, image: &Image<'_>, arena: &mut [u32]) -> Result<(), Fault> {
+        let (chunk, len) = (image.chunk(), image.act_len());
+        if image.deadline().is_some_and(|age| self.next >= age) {
+            return Err(Fault::Stale);
+        }
+        if chunk == 1 {
+            // An action that is for no time in particular.
+            self.next = 0;
+        }
+        let [output, kept, _] = regions(arena, &[image.output(), image.kept(), Region::default()]);
+        let from = self.next * len;
+        if let horizon @ 1.. = image.horizon() {
+            let (sums, counts) = kept.split_at_mut_checked(horizon * len).ok_or(Fault::Damaged)?;
+            for (ahead, new) in
+                output.chunks_exact(len.max(1)).skip(self.next).take(horizon - self.next.min(horizon)).enumerate()
+            {
+                let slot = (self.slot + ahead) % horizon;
+                let sum = part(sums, &(slot * len..slot * len + len));
+                let count = counts.get_mut(slot).ok_or(Fault::Damaged)?;
+                let [weight, _] = image.ensemble(*count as usize);
+                for (sum, new) in sum.iter_mut().zip(new) {
+                    let before = if *count == 0 { 0.0 } else { f32::from_bits(*sum) };
+                    *sum = (before + weight * f32::from_bits(*new)).to_bits();
+                }
+                *count += 1;
+            }
+        }
+        let lead = image.overlap().min(chunk - self.old.min(chunk)).min(chunk - self.next.min(chunk));
+        if lead > 0 {
+            let old = self.old.saturating_sub(image.execute()) * len;
+            let (new, old) = (part(output, &(from..from + lead * len)), part(kept, &(old..old + lead * len)));
+            for (i, (new, old)) in new.iter_mut().zip(old).enumerate() {
+                let share = (i / len.max(1) + 1) as f32 / (lead + 1) as f32;
+                let (to, old) = (f32::from_bits(*new), f32::from_bits(*old));
+                *new = (old * (1.0 - share) + to * share).to_bits();
+            }
+        }
+        (self.ready, self.old) = (true, chunk);
+        Ok(())
+    }
+
+    /// Where the action that is due stands, before the contract.
+    ///
+    /// # Errors
+    ///
+    /// [`Fault::Stale`] where no chunk at hand reaches to it.
+    #[inline(never)]
+    pub(super) fn due(&self, image: &Image<'_>, arena: &mut [u32]) -> Result<Region, Fault> {
+        let (len, kept) = (image.act_len(), image.kept());
+        if let horizon @ 1.. = image.horizon() {
+            let count = counts(image, arena).get(self.slot).copied().unwrap_or(0);
+            let last = (count as usize).checked_sub(1).ok_or(Fault::Stale)?;
+            let [_, by] = image.ensemble(last);
+            let sum = Region { offset: kept.offset + self.slot.min(horizon) * len, len };
+            part(arena, &sum.range()).iter_mut().for_each(|sum| *sum = (f32::from_bits(*sum) * by).to_bits());
+            return Ok(sum);
+        }
+        let (from, position, at) = match self.ready {
+            true => (image.output(), self.next, self.next),
+            false => (kept, self.old, self.old.saturating_sub(image.execute())),
+        };
+        if position >= image.chunk().min(image.deadline().unwrap_or(usize::MAX)) {
+            return Err(Fault::Stale);
+        }
+        Ok(Region { offset: from.offset + at * len, len })
+    }
+
+    /// Lets so many control periods pass.
+    #[inline(never)]
+    pub(super) fn pass(&mut self, image: &Image<'_>, arena: &mut [u32], periods: usize) {
+        self.next = self.next.saturating_add(periods);
+        self.old = self.old.saturating_add(periods).min(image.chunk());
+        let horizon = image.horizon();
+        for _ in 0..periods.min(horizon) {
+            // What was foreseen for it.
+            counts(image, arena).iter_mut().skip(self.slot).take(1).for_each(|count| *count = 0);
+            self.slot = (self.slot + 1) % horizon;
+        }
+    }
+}
+
+/// How many chunks have foreseen each period that an ensemble keeps.
+fn counts<'r>(image: &Image<'_>, arena: &'r mut [u32]) -> &'r mut [u32] {
+    let (kept, horizon) = (image.kept().range(), image.horizon());
+    part(arena, &(kept.end.saturating_sub(horizon)..kept.end))
+}

@@ -1,0 +1,93 @@
+//! The state of a head as bytes, for a warm restart: what the next actions depend on besides the image and the observations.
+//!
+//! Words, little-endian: `ACTS`, version, checksum of the image, checksum of what follows; seed, draws, flags (bit 0: an action has been
+//! given, bit 1: the output holds a chunk), the positions of playback; then, of the arena, the recurrent state, the output, and all from
+//! the last action to the work area.
+
+use super::playback::Playback;
+use super::{Head, Phase};
+use crate::error::SavedError;
+use crate::image::{Region, checksum};
+
+const MAGIC: u32 = u32::from_le_bytes(*b"ACTS");
+/// Of what is saved.
+const VERSION: u32 = 1;
+/// Words before those of the arena.
+const WORDS: usize = 10;
+/// The checksum's.
+const W_CHECKSUM: usize = 3;
+
+impl Head<'_, '_> {
+    /// Bytes of a saved state: 40, and those of the recurrent state, the output and what stands between the observation's values and the
+    /// work area.
+    pub fn saved_len(&self) -> usize {
+        4 * (WORDS + self.saved_regions().iter().map(|region| region.len).sum::<usize>())
+    }
+
+    /// Writes the state into `to`, of [`Self::saved_len`] bytes: recurrent state, chunks, last action, what is on, seed and draws of the
+    /// noise. A head that restores it goes on with the same bits.
+    ///
+    /// # Errors
+    ///
+    /// [`SavedError::Begun`] between [`Self::begin`] and the action, and [`SavedError::Length`].
+    pub fn save(&self, to: &mut [u8]) -> Result<(), SavedError> {
+        self.check_saved(to.len())?;
+        let Playback { ready, next, old, slot } = self.playback;
+        let flags = u32::from(self.started) | u32::from(ready) << 1;
+        let [next, old, slot] = [next, old, slot].map(|n| u32::try_from(n).unwrap_or(u32::MAX));
+        let head: [u32; WORDS] = [MAGIC, VERSION, self.image.crc(), 0, self.seed, self.draws, flags, next, old, slot];
+        let arena = self.saved_regions().into_iter().flat_map(|r| self.arena.get(r.range()).unwrap_or_default());
+        for (bytes, word) in to.as_chunks_mut().0.iter_mut().zip(head.iter().chain(arena)) {
+            *bytes = word.to_le_bytes();
+        }
+        let sum = checksum(to).to_le_bytes();
+        to.as_chunks_mut().0.iter_mut().skip(W_CHECKSUM).take(1).for_each(|bytes| *bytes = sum);
+        Ok(())
+    }
+
+    /// Goes on where the head stood that [`Self::save`]d `from`, of the same image.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Self::save`], and where the bytes are those of another version or image, or damaged. They change nothing: the head
+    /// is as it was.
+    pub fn restore(&mut self, from: &[u8]) -> Result<(), SavedError> {
+        self.check_saved(from.len())?;
+        let mut words = from.as_chunks().0.iter().map(|bytes| u32::from_le_bytes(*bytes));
+        let mut head = [0; WORDS];
+        head.iter_mut().zip(&mut words).for_each(|(to, word)| *to = word);
+        let [magic, version, image, sum, seed, draws, flags, next, old, slot] = head;
+        if magic != MAGIC || version != VERSION {
+            return Err(SavedError::Version);
+        }
+        if image != self.image.crc() {
+            return Err(SavedError::Image);
+        }
+        let [next, old, slot] = [next, old, slot].map(|n| n as usize);
+        if sum != checksum(from) || flags > 3 || old > self.image.chunk() || slot >= self.image.horizon().max(1) {
+            return Err(SavedError::Damaged);
+        }
+        for region in self.saved_regions() {
+            self.words_mut(region).iter_mut().zip(&mut words).for_each(|(to, word)| *to = word);
+        }
+        self.phase = Phase::Idle;
+        self.playback = Playback { ready: flags & 2 != 0, next, old, slot };
+        (self.seed, self.draws, self.started) = (seed, draws, flags & 1 != 0);
+        Ok(())
+    }
+
+    fn check_saved(&self, given: usize) -> Result<(), SavedError> {
+        let needed = self.saved_len();
+        if given != needed {
+            return Err(SavedError::Length { needed, given });
+        }
+        if let Phase::Begun(_) = self.phase { Err(SavedError::Begun) } else { Ok(()) }
+    }
+
+    /// What is saved of the arena.
+    fn saved_regions(&self) -> [Region; 3] {
+        let action = self.image.action().offset;
+        let len = self.image.work().offset.saturating_sub(action);
+        [self.image.state(), self.image.output(), Region { offset: action, len }]
+    }
+}

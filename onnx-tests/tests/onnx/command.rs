@@ -1,0 +1,84 @@
+//! `actq import`, and .onnx files where a policy's folder is taken; PyTorch's way to both.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use actq::policy::Policy;
+use actq_bench::command::{actq, binary, failed, succeeded};
+use actq_bench::skipped;
+use anyhow::{Result, ensure};
+use ndarray::Array2;
+use ndarray_npy::WriteNpyExt as _;
+use tempfile::TempDir;
+
+use super::file::File;
+
+const OBS: usize = 6;
+
+fn text(path: &Path) -> &str {
+    path.to_str().expect("a name")
+}
+
+/// A folder with `model.onnx` and `obs.npy`.
+fn folder() -> Result<TempDir> {
+    let dir = TempDir::new()?;
+    let mut file = File::default();
+    file.input("obs", &[1, OBS as i64]);
+    let x = file.gemm("obs", 24, OBS);
+    let x = file.node("Tanh", &[&x], &[]);
+    let y = file.gemm(&x, 2, 24);
+    file.nodes("Identity", &[&y], &["actions"], &[]);
+    file.output("actions", &[1, 2]);
+    fs::write(dir.path().join("model.onnx"), file.bytes())?;
+    let obs = Array2::from_shape_fn((300, OBS), |(i, k)| ((7 * i + 3 * k) as f64 / 11.0).sin());
+    obs.write_npy(fs::File::create(dir.path().join("obs.npy"))?)?;
+    Ok(dir)
+}
+
+#[test]
+fn import_writes_a_folder_and_overwrites_nothing() -> Result<()> {
+    let dir = folder()?;
+    let [model, obs, out] = ["model.onnx", "obs.npy", "policy"].map(|name| dir.path().join(name));
+    let import = |more: &[&str]| actq(&[&["import", text(&model), "--out", text(&out)], more].concat()).output();
+    let said = succeeded(&import(&["--calib", text(&obs)])?)?;
+    for line in ["input     obs[0:6] = obs\n", "output    actions, 2 values\n", "ops       linear, tanh, linear\n"] {
+        ensure!(said.contains(line), "{said}");
+    }
+    let mut written: Vec<String> = fs::read_dir(&out)?
+        .map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned()))
+        .collect::<Result<_>>()?;
+    written.sort();
+    assert_eq!(written, ["calib.npz", "policy.json", "policy.safetensors"]);
+    failed(&import(&[])?, 1, &["policy.json: is there already; --force replaces it"])?;
+    succeeded(&import(&["--force"])?)?;
+    // The file stands for the folder, with the same digest.
+    assert_eq!(Policy::load(&out)?.digest, Policy::load(&model)?.digest);
+    failed(&import(&["--force", "--output", "nothing"])?, 1, &["the output \"nothing\"", "nothing gives the value"])?;
+    failed(&import(&["--force", "--state", "obs=actions"])?, 1, &["--state obs=actions: between them is no cell"])?;
+    // As it comes out of the command, so it goes into an image.
+    let image = dir.path().join("a.actq");
+    let quantize = |more: &[&str]| actq(&[&["quantize", text(&model), "--out", text(&image)], more].concat()).output();
+    failed(&quantize(&["--bpw", "3"])?, 1, &["no recording is given", "numpy.save(\"obs.npy\"", "(6 values)"])?;
+    succeeded(&quantize(&["--bpw", "3", "--calib", text(&obs), "--steps", "0"])?)?;
+    succeeded(&quantize(&["--bits", "8", "--method", "rtn"])?)?;
+    fs::rename(&obs, dir.path().join("heldout.npy"))?;
+    let said = succeeded(&actq(&["eval", text(&image), "--policy", text(&model)]).output()?)?;
+    ensure!(said.contains("observations   300"), "{said}");
+    Ok(())
+}
+
+#[test]
+fn modules_of_pytorch_become_policies() -> Result<()> {
+    let python = std::env::var_os("ACTQ_PYTHON").unwrap_or_else(|| "python3".into());
+    let has = Command::new(&python).args(["-c", "import torch, onnx, onnxruntime"]).output();
+    if !has.is_ok_and(|output| output.status.success()) {
+        skipped("no Python with torch, onnx and onnxruntime (python3, or what ACTQ_PYTHON names)");
+        return Ok(());
+    }
+    let script = actq_boards::root().join("examples/pytorch/test_actq_export.py");
+    let output = Command::new(&python).arg(script).env("ACTQ", binary()?).env("ACTQ_PYTHON", &python).output()?;
+    let said = succeeded(&output)?;
+    ensure!(said.contains("5 modules"), "{said}");
+    Ok(())
+}

@@ -1,0 +1,185 @@
+//! Files that were made to harm, or were harmed: each is refused by what is wrong with it, and none ends the process or fills the
+//! memory.
+
+use actq::import::onnx::{Choice, import_bytes, proto};
+use anyhow::Result;
+use proptest::prelude::*;
+use tempfile::TempDir;
+
+use super::file::{File, Value, encoded, tensor};
+
+fn refused(bytes: Vec<u8>, expected: &str) {
+    let dir = TempDir::new().expect("a folder");
+    let error = import_bytes(bytes, dir.path(), "test", &Choice::default()).expect_err(expected);
+    let error = format!("{error:#}");
+    assert!(error.contains(expected), "{error} instead of {expected}");
+}
+
+fn with(build: impl FnOnce(&mut File)) -> Vec<u8> {
+    let mut file = File::default();
+    file.input("obs", &[1, 4]);
+    build(&mut file);
+    file.output("actions", &[1, 4]);
+    file.bytes()
+}
+
+fn whole() -> Vec<u8> {
+    with(|file| {
+        let x = file.gemm("obs", 6, 4);
+        let x = file.node("Elu", &[&x], &[]);
+        let y = file.gemm(&x, 4, 6);
+        file.nodes("Tanh", &[&y], &["actions"], &[]);
+    })
+}
+
+/// One node between the observation and the action.
+fn node(op: &str, more: &[&str], attributes: &[(&str, Value)]) -> Vec<u8> {
+    with(|file| file.nodes(op, &[&["obs"], more].concat(), &["actions"], attributes))
+}
+
+fn external(location: &str) -> Vec<u8> {
+    with(|file| {
+        let entry = proto::Entry { key: Some("location".to_owned()), value: Some(location.to_owned()) };
+        file.initializer(&proto::Tensor {
+            raw_data: None,
+            external_data: vec![encoded(&entry)],
+            data_location: Some(1),
+            ..tensor("w", &[4, 4], &[0.0; 16])
+        });
+        file.nodes("MatMul", &["obs", "w"], &["actions"], &[]);
+    })
+}
+
+#[test]
+fn each_wrong_file_is_refused_by_what_is_wrong_with_it() {
+    refused(Vec::new(), "the file is empty");
+    refused(b"not an onnx file".to_vec(), "no ONNX file");
+    let bytes = whole();
+    refused(bytes[..bytes.len() / 2].to_vec(), "damaged, or the file was cut off");
+    let vast = |dims: &[usize]| {
+        let dims = dims.to_vec();
+        with(move |file| {
+            file.initializer(&proto::Tensor { raw_data: None, ..tensor("w", &dims, &[]) });
+            file.nodes("MatMul", &["obs", "w"], &["actions"], &[]);
+        })
+    };
+    refused(vast(&[4, 1 << 40]), "has more elements than any policy");
+    refused(vast(&[4, 1 << 20]), "needs 4194304 values, 0 are there");
+    let huge = with(|file| {
+        let shape = file.ints(&[1 << 13, 1 << 13]);
+        let x = file.node("ConstantOfShape", &[&shape], &[]);
+        file.nodes("MatMul", &["obs", &x], &["actions"], &[]);
+    });
+    refused(huge, "more values than a policy of this size can have");
+    let doubled = with(|file| {
+        let mut x = "obs".to_owned();
+        for _ in 0..40 {
+            x = file.node("Concat", &[&x, &x], &[("axis", Value::Int(1))]);
+        }
+        file.nodes("Identity", &[&x], &["actions"], &[]);
+    });
+    refused(doubled, "gives more values than a policy of this size can have");
+    refused(external("../secret"), "outside the model's folder");
+    refused(external("/etc/passwd"), "outside the model's folder");
+    refused(external("weights.bin"), "is not beside the model; copy both together");
+    let circle = with(|file| {
+        file.nodes("Add", &["obs", "b"], &["a"], &[]);
+        file.nodes("Tanh", &["a"], &["b"], &[]);
+        file.nodes("Tanh", &["b"], &["actions"], &[]);
+    });
+    refused(circle, "node 0 \"/node/0\" (Add): reads \"b\" before anything gives it: the graph has a circle");
+    refused(node("Add", &["nowhere"], &[]), "reads \"nowhere\" before anything gives it");
+    refused(node("Conv", &["obs"], &[]), "node 0 \"/node/0\" (Conv): convolutions have no kernel here");
+    refused(node("MatMul", &["obs"], &[]), "multiplies two values of the network, as attention does");
+    refused(node("Softmax", &[], &[]), "(Softmax): is no operation of an action");
+    refused(node("Sqrt", &[], &[]), "node 0 \"/node/0\" (Sqrt): Sqrt is no operation of the network by itself");
+    refused(node("ReduceSum", &[], &[]), "only within a norm");
+    refused(node("Frobnicate", &[], &[]), "(Frobnicate): is not known; docs/IMPORT.md lists what is taken");
+    refused(node("Cast", &[], &[("to", Value::Int(10))]), "rounds a value of the network to ONNX's type 10");
+    refused(
+        node("Clip", &[], &[("min", Value::Real(2.0)), ("max", Value::Real(1.0))]),
+        "limits to 2 .. 1, which is no range",
+    );
+    let not_finite = with(|file| {
+        let w = file.reals(&[4, 4], &[f32::NAN; 16]);
+        file.nodes("MatMul", &["obs", &w], &["actions"], &[]);
+    });
+    refused(not_finite, "holds a value that is not finite");
+    let divided = with(|file| {
+        let w = file.reals(&[4], &[0.0; 4]);
+        file.nodes("Div", &["obs", &w], &["actions"], &[]);
+    });
+    refused(divided, "(Div): computes with a constant that is not finite, or divides by 0");
+    let nested = (0..64).fold(proto::Graph::default(), |inner, _| {
+        let g =
+            proto::Attribute { name: Some("then_branch".to_owned()), g: Some(encoded(&inner)), ..Default::default() };
+        let node = proto::Node {
+            op_type: Some("If".to_owned()),
+            output: vec!["actions".to_owned()],
+            attribute: vec![encoded(&g)],
+            ..Default::default()
+        };
+        let output = proto::ValueInfo { name: Some("actions".to_owned()), r#type: None };
+        proto::Graph { node: vec![encoded(&node)], output: vec![encoded(&output)], ..Default::default() }
+    });
+    refused(
+        encoded(&proto::Model { graph: Some(encoded(&nested)), ..Default::default() }).to_vec(),
+        "graphs stand within each other",
+    );
+    let forgets = with(|file| {
+        let (w, r) = (file.drawn(&[1, 16, 4]), file.drawn(&[1, 16, 4]));
+        let axes = file.ints(&[0]);
+        let x = file.node("Unsqueeze", &["obs", &axes], &[]);
+        file.nodes("LSTM", &[&x, &w, &r], &["actions"], &[("hidden_size", Value::Int(4))]);
+    });
+    refused(forgets, "forgets its hidden state after every step; export it as an input of the graph");
+    let reset = with(|file| {
+        file.nodes("GRU", &["obs", "obs", "obs"], &["actions"], &[("hidden_size", Value::Int(4))]);
+    });
+    refused(reset, "computes the reset gate before the matrix");
+    let lost = with(|file| {
+        file.input("h_in", &[1, 4]);
+        file.nodes("Tanh", &["h_in"], &["h_out"], &[]);
+        file.nodes("Add", &["h_out", "obs"], &["actions"], &[]);
+        file.output("h_out", &[1, 4]);
+    });
+    refused(
+        lost,
+        "\"h_in\" and the output \"h_out\" look like a recurrent state, but no LSTM or GRU cell is between them",
+    );
+}
+
+fn read(bytes: Vec<u8>) -> Result<()> {
+    let dir = TempDir::new()?;
+    import_bytes(bytes, dir.path(), "test", &Choice::default()).map(drop)
+}
+
+#[test]
+fn no_damage_to_a_byte_ends_the_process() {
+    let whole = whole();
+    assert!(read(whole.clone()).is_ok());
+    for at in 0..whole.len() {
+        let mut bytes = whole.clone();
+        for value in [0, 0xff, whole[at] ^ 1, whole[at] ^ 0x80] {
+            bytes[at] = value;
+            // Whatever comes out, it comes back.
+            drop(read(bytes.clone()));
+        }
+        drop(read(whole[..at].to_vec()));
+    }
+}
+
+proptest! {
+    #[test]
+    fn no_bytes_end_the_process(bytes in prop::collection::vec(any::<u8>(), 0..400), at in 0usize..800, cut in any::<bool>()) {
+        drop(read(bytes.clone()));
+        let mut whole = whole();
+        let at = at.min(whole.len());
+        if cut {
+            whole.truncate(at);
+        }
+        let end = (at + bytes.len()).min(whole.len());
+        whole.splice(at.min(end)..end, bytes);
+        drop(read(whole));
+    }
+}

@@ -1,0 +1,156 @@
+//! ONNX files for tests, as exporters write them.
+
+use actq::import::onnx::proto;
+use prost::Message as _;
+use prost::bytes::Bytes;
+
+/// A graph that grows. Values are called by name.
+#[derive(Clone, Default)]
+pub(super) struct File {
+    graph: proto::Graph,
+    weights: u64,
+}
+
+/// An attribute's value.
+#[derive(Clone)]
+pub(super) enum Value {
+    Int(i64),
+    Ints(Vec<i64>),
+    Real(f32),
+}
+
+pub(super) fn tensor(name: &str, dims: &[usize], data: &[f32]) -> proto::Tensor {
+    proto::Tensor {
+        dims: dims.iter().map(|&n| n as i64).collect(),
+        data_type: Some(1),
+        raw_data: Some(data.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>().into()),
+        name: Some(name.to_owned()),
+        ..Default::default()
+    }
+}
+
+pub(super) fn encoded(message: &impl prost::Message) -> Bytes {
+    message.encode_to_vec().into()
+}
+
+fn port(name: &str, dims: &[i64]) -> Bytes {
+    let axis = |&n: &i64| match n {
+        0.. => proto::Dimension { dim_value: Some(n), dim_param: None },
+        _ => proto::Dimension { dim_value: None, dim_param: Some("batch".to_owned()) },
+    };
+    let shape = proto::Shape { dim: dims.iter().map(|n| encoded(&axis(n))).collect() };
+    let tensor_type = Some(proto::TensorType { elem_type: Some(1), shape: Some(shape) });
+    encoded(&proto::ValueInfo { name: Some(name.to_owned()), r#type: Some(proto::Type { tensor_type }) })
+}
+
+impl File {
+    /// An input; -1 is a dynamic axis.
+    pub(super) fn input(&mut self, name: &str, dims: &[i64]) {
+        self.graph.input.push(port(name, dims));
+    }
+
+    pub(super) fn output(&mut self, name: &str, dims: &[i64]) {
+        self.graph.output.push(port(name, dims));
+    }
+
+    pub(super) fn initializer(&mut self, tensor: &proto::Tensor) {
+        self.graph.initializer.push(encoded(tensor));
+    }
+
+    /// A weight of these values.
+    pub(super) fn reals(&mut self, dims: &[usize], data: &[f32]) -> String {
+        self.weights += 1;
+        let name = format!("w{}", self.weights);
+        self.initializer(&tensor(&name, dims, data));
+        name
+    }
+
+    /// A weight of drawn values, small enough for sums to stay about 1.
+    pub(super) fn drawn(&mut self, dims: &[usize]) -> String {
+        let n: usize = dims.iter().product();
+        let scale = if dims.len() > 1 { 1.5 / (dims.iter().max().map_or(1.0, |&n| n as f32)).sqrt() } else { 0.5 };
+        let mut state = 0x9e37_79b9_7f4a_7c15u64.wrapping_mul(self.weights + 1);
+        let mut next = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            ((state >> 40) as f32 / (1 << 23) as f32 - 1.0) * scale
+        };
+        let data: Vec<f32> = (0..n).map(|_| next()).collect();
+        self.reals(dims, &data)
+    }
+
+    /// Integers.
+    pub(super) fn ints(&mut self, data: &[i64]) -> String {
+        self.weights += 1;
+        let name = format!("w{}", self.weights);
+        let tensor = proto::Tensor {
+            dims: vec![data.len() as i64],
+            data_type: Some(7),
+            int64_data: data.to_vec(),
+            name: Some(name.clone()),
+            ..Default::default()
+        };
+        self.initializer(&tensor);
+        name
+    }
+
+    /// A node with one output, which is called after it.
+    pub(super) fn node(&mut self, op: &str, inputs: &[&str], attributes: &[(&str, Value)]) -> String {
+        let name = format!("{}_{}", op.to_lowercase(), self.graph.node.len());
+        self.nodes(op, inputs, &[&name], attributes);
+        name
+    }
+
+    /// A node with these outputs.
+    pub(super) fn nodes(&mut self, op: &str, inputs: &[&str], outputs: &[&str], attributes: &[(&str, Value)]) {
+        let attribute = |(name, value): &(&str, Value)| {
+            let name = Some((*name).to_owned());
+            encoded(&match value.clone() {
+                Value::Int(i) => proto::Attribute { name, i: Some(i), ..Default::default() },
+                Value::Ints(ints) => proto::Attribute { name, ints, ..Default::default() },
+                Value::Real(f) => proto::Attribute { name, f: Some(f), ..Default::default() },
+            })
+        };
+        // Readers other than ours want the type beside the value.
+        let typed = |(attribute, value): (Bytes, &Value)| {
+            let number: u8 = match value {
+                Value::Real(_) => 1,
+                Value::Int(_) => 2,
+                Value::Ints(_) => 7,
+            };
+            // Field 20, a varint.
+            [&attribute[..], &[0xa0, 0x01, number]].concat().into()
+        };
+        let list = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+        self.graph.node.push(encoded(&proto::Node {
+            input: list(inputs),
+            output: list(outputs),
+            name: Some(format!("/node/{}", self.graph.node.len())),
+            op_type: Some(op.to_owned()),
+            attribute: attributes.iter().map(|a| (attribute(a), &a.1)).map(typed).collect(),
+            domain: None,
+        }));
+    }
+
+    /// `x W + b` as Gemm with weights [out, in].
+    pub(super) fn gemm(&mut self, x: &str, rows: usize, cols: usize) -> String {
+        let (w, b) = (self.drawn(&[rows, cols]), self.drawn(&[rows]));
+        self.node(
+            "Gemm",
+            &[x, &w, &b],
+            &[("transB", Value::Int(1)), ("alpha", Value::Real(1.0)), ("beta", Value::Real(1.0))],
+        )
+    }
+
+    /// The file's bytes.
+    pub(super) fn bytes(&self) -> Vec<u8> {
+        let opset = proto::OperatorSet { domain: Some(String::new()), version: Some(17) };
+        let model = proto::Model {
+            ir_version: Some(8),
+            producer_name: Some("test".to_owned()),
+            graph: Some(encoded(&proto::Graph { name: Some("g".to_owned()), ..self.graph.clone() })),
+            opset_import: vec![encoded(&opset)],
+            ..Default::default()
+        };
+        model.encode_to_vec()
+    }
+}

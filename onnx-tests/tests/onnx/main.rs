@@ -1,0 +1,104 @@
+//! Policies out of ONNX files: what exporters write gives the actions that another reader of ONNX gives, and nothing in a file
+//! does harm.
+
+mod command;
+mod damaged;
+mod file;
+mod styles;
+
+use std::path::Path;
+
+use actq::import::onnx::{Choice, Imported, import_bytes, proto};
+use actq::measure::actions::actions;
+use actq::policy::Policy;
+use actq_bench::golden::Random;
+use anyhow::{Context as _, Result, ensure};
+use prost::Message as _;
+use prost::bytes::Bytes;
+use tract_onnx::prelude::*;
+
+/// Steps that are compared.
+const STEPS: usize = 6;
+/// Of the largest action.
+const TOLERANCE: f32 = 1e-5;
+
+fn imported(bytes: &[u8], choice: &Choice) -> Result<(Imported, Policy)> {
+    let imported = import_bytes(bytes.to_vec(), Path::new("."), "test", choice)?;
+    let policy = Policy::of_files(Path::new("."), [Path::new("policy.json"); 2], &imported.json, &imported.weights)?;
+    Ok((imported, policy))
+}
+
+fn drawn(policy: &Policy) -> Vec<Vec<f32>> {
+    let mut random = Random::new(3);
+    (0..STEPS).map(|_| (0..policy.graph.obs_len).map(|_| 2.0 * random.unit()).collect()).collect()
+}
+
+/// What tract gives, step by step, with every state carried on. Inputs have the shapes that the file says, in the file's order.
+fn by_tract(bytes: &[u8], imported: &Imported, observations: &[Vec<f32>]) -> Result<Vec<Vec<f32>>> {
+    let mut model = tract_onnx::onnx().model_for_read(&mut &bytes[..])?;
+    let ports = ports(bytes)?;
+    for (i, (_, shape)) in ports.iter().enumerate() {
+        model.set_input_fact(i, f32::fact(shape).into())?;
+    }
+    let outputs: Vec<String> =
+        [&imported.output.0].into_iter().chain(imported.states.iter().map(|(_, to, _)| to)).cloned().collect();
+    model.select_outputs_by_name(&outputs)?;
+    let model = model.into_optimized()?.into_runnable()?;
+    let mut states: Vec<Vec<f32>> = imported.states.iter().map(|(.., len)| vec![0.0; *len]).collect();
+    let mut all = Vec::new();
+    for obs in observations {
+        let mut inputs = TVec::new();
+        for (name, shape) in &ports {
+            let mut at = 0;
+            let mut values = vec![0.0; shape.iter().product()];
+            for (input, len) in &imported.inputs {
+                if input == name {
+                    values.copy_from_slice(&obs[at..at + len]);
+                }
+                at += len;
+            }
+            if let Some(i) = imported.states.iter().position(|(from, ..)| from == name) {
+                values.clone_from(&states[i]);
+            }
+            inputs.push(Tensor::from_shape(shape, &values)?.into());
+        }
+        let mut results = model.run(inputs)?.into_iter().map(|value| values(&value));
+        all.push(results.next().context("no action")??);
+        states = results.collect::<Result<_>>()?;
+    }
+    Ok(all)
+}
+
+/// The inputs of a file with their shapes; what is dynamic is 1.
+fn ports(bytes: &[u8]) -> Result<Vec<(String, Vec<usize>)>> {
+    let graph = proto::Graph::decode(proto::Model::decode(bytes)?.graph.context("a graph")?)?;
+    let port = |bytes: &Bytes| -> Result<(String, Vec<usize>)> {
+        let port = proto::ValueInfo::decode(bytes.clone())?;
+        let shape = port.r#type.and_then(|t| t.tensor_type?.shape).context("a shape")?;
+        let axis = |bytes: &Bytes| Ok(proto::Dimension::decode(bytes.clone())?.dim_value.map_or(1, |n| n as usize));
+        Ok((port.name.unwrap_or_default(), shape.dim.iter().map(axis).collect::<Result<_>>()?))
+    };
+    graph.input.iter().map(port).collect()
+}
+
+fn values(value: &TValue) -> Result<Vec<f32>> {
+    Ok(value.to_plain_array_view::<f32>()?.iter().copied().collect())
+}
+
+/// That the policy gives what tract gives.
+fn same(bytes: &[u8]) -> Result<Imported> {
+    let (imported, policy) = imported(bytes, &Choice::default())?;
+    let observations = drawn(&policy);
+    compare(&by_tract(bytes, &imported, &observations)?, &actions(&policy, &observations))?;
+    Ok(imported)
+}
+
+fn compare(expected: &[Vec<f32>], ours: &[Vec<f32>]) -> Result<()> {
+    let (expected, ours) = (expected.concat(), ours.concat());
+    ensure!(expected.len() == ours.len(), "{} values, {} are ours", expected.len(), ours.len());
+    let scale = expected.iter().fold(0f32, |most, v| most.max(v.abs()));
+    let error = expected.iter().zip(&ours).fold(0f32, |most, (a, b)| most.max((a - b).abs()));
+    ensure!(scale > 1e-3, "an output that is always 0 says nothing");
+    ensure!(error <= TOLERANCE * scale, "off by {error} of {scale}");
+    Ok(())
+}

@@ -1,0 +1,320 @@
+//! New expressions: what exporters have taken apart is put together again where it comes up.
+
+use std::sync::Arc;
+
+use actq_kernels::math::Function;
+
+use super::compare::{near, uniform};
+use super::expr::{Expr, Exprs, Id, Matrix, Run, Unary};
+use super::norm::Norm;
+use super::tensor::Element;
+
+/// Steps that a polynomial may be written in.
+const DEPTH: usize = 12;
+/// The two coefficients of GELU's tanh form: `sqrt(2 / pi)`, and that times 0.044715.
+const GELU_TANH: [f64; 2] = [0.797_884_560_802_865_4, 0.035_677_408_136_300_125];
+/// A clip within so much is done by one operation about its middle; beyond, that would cost digits.
+const MOST_MIDDLE: f64 = 100.0;
+
+impl Exprs {
+    /// The vector of these elements of other expressions.
+    pub(super) fn vector(&mut self, elements: &[(Id, usize)]) -> Id {
+        let mut runs: Vec<Run> = Vec::new();
+        for &(of, at) in elements {
+            match runs.last_mut() {
+                Some(run) if run.of == of && run.from + run.len == at => run.len += 1,
+                _ => runs.push(Run { of, from: at, len: 1 }),
+            }
+        }
+        match runs[..] {
+            [Run { of, from: 0, len }] if len == self.len_of(of) => of,
+            [first, ..] if elements.len() > 1 && elements.iter().all(|e| *e == elements[0]) => {
+                let one = if self.len_of(first.of) == 1 { first.of } else { self.put(Expr::Pick(vec![first]), 1) };
+                self.put(Expr::Spread(one), elements.len())
+            }
+            _ => self.put(Expr::Pick(runs), elements.len()),
+        }
+    }
+
+    /// The elements of an expression, as those of what it only moves.
+    pub(super) fn elements(&self, id: Id) -> Vec<Element> {
+        match self.get(id) {
+            Expr::Spread(one) => vec![Element::Of(*one, 0); self.len_of(id)],
+            Expr::Pick(runs) => {
+                runs.iter().flat_map(|run| (run.from..run.from + run.len).map(|i| Element::Of(run.of, i))).collect()
+            }
+            _ => (0..self.len_of(id)).map(|i| Element::Of(id, i)).collect(),
+        }
+    }
+
+    /// `a x + b`, with the same a and b for all elements.
+    pub(super) fn scaled(&mut self, x: Id, a: f64, b: f64) -> Id {
+        let n = self.len_of(x);
+        self.affine(x, vec![a; n], vec![b; n])
+    }
+
+    /// `a x + b`
+    pub(super) fn affine(&mut self, x: Id, a: Vec<f64>, b: Vec<f64>) -> Id {
+        let len = self.len_of(x);
+        let (ones, zeros) = (uniform(&a) == Some(1.0), uniform(&b) == Some(0.0));
+        if ones && zeros {
+            return x;
+        }
+        let product = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).collect::<Vec<f64>>();
+        let sum = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x + y).collect::<Vec<f64>>();
+        match self.get(x) {
+            Expr::Affine(of, a0, b0) => {
+                let (of, a0, b0) = (*of, product(a0, &a), sum(&product(b0, &a), &b));
+                self.affine(of, a0, b0)
+            }
+            Expr::Linear(of, w, bias) if ones => {
+                let linear = Expr::Linear(*of, Arc::clone(w), sum(bias, &b));
+                self.put(linear, len)
+            }
+            Expr::LayerNorm(of, weight, bias, eps) => {
+                let norm = Expr::LayerNorm(*of, product(weight, &a), sum(&product(bias, &a), &b), *eps);
+                self.put(norm, len)
+            }
+            Expr::RmsNorm(of, weight, eps) if zeros => {
+                let norm = Expr::RmsNorm(*of, product(weight, &a), *eps);
+                self.put(norm, len)
+            }
+            // Rows that went through the same matrix, with their bias behind them.
+            Expr::Pick(runs) if ones && runs.len() > 1 && runs.iter().all(|run| self.is_whole_linear(run)) => {
+                let (runs, mut at, mut moved) = (runs.clone(), 0, Vec::new());
+                for run in runs {
+                    let b = b[at..at + run.len].to_vec();
+                    moved.push(Run { of: self.affine(run.of, vec![1.0; run.len], b), ..run });
+                    at += run.len;
+                }
+                self.put(Expr::Pick(moved), len)
+            }
+            Expr::Spread(one) if uniform(&a).is_some() && uniform(&b).is_some() => {
+                let one = *one;
+                let one = self.affine(one, a[..1].to_vec(), b[..1].to_vec());
+                self.put(Expr::Spread(one), len)
+            }
+            _ => self.put(Expr::Affine(x, a, b), len),
+        }
+    }
+
+    fn is_whole_linear(&self, run: &Run) -> bool {
+        matches!(self.get(run.of), Expr::Linear(..)) && run.from == 0 && run.len == self.len_of(run.of)
+    }
+
+    /// `W x + b`
+    pub(super) fn linear(&mut self, x: Id, w: Arc<Matrix>, b: Vec<f64>) -> Id {
+        let rows = w.rows;
+        self.put(Expr::Linear(x, w, b), rows)
+    }
+
+    /// A function of the network.
+    pub(super) fn function(&mut self, function: Function, x: Id) -> Id {
+        self.unary(Unary::Known(function), x)
+    }
+
+    /// A function of every element.
+    pub(super) fn unary(&mut self, f: Unary, x: Id) -> Id {
+        let len = self.len_of(x);
+        if let &Expr::Spread(one) = self.get(x) {
+            let one = self.unary(f, one);
+            return self.put(Expr::Spread(one), len);
+        }
+        let (inner, a, b) = self.affine_of(x);
+        let exponent = self.known_of(inner, Function::Exp);
+        match (f, exponent) {
+            // ln(1 + e^x)
+            (Unary::Log, Some(x)) if a == 1.0 && b == 1.0 => self.function(Function::Softplus, x),
+            // 1 / (a + a e^x)
+            (Unary::Reciprocal, Some(x)) if a == b => {
+                let negative = self.scaled(x, -1.0, 0.0);
+                let sigmoid = self.function(Function::Sigmoid, negative);
+                self.scaled(sigmoid, 1.0 / a, 0.0)
+            }
+            (Unary::Reciprocal, _) if a != 1.0 && b == 0.0 => {
+                let reciprocal = self.unary(f, inner);
+                self.scaled(reciprocal, 1.0 / a, 0.0)
+            }
+            _ => self.put(Expr::Unary(f, x), len),
+        }
+    }
+
+    /// `x + y`
+    pub(super) fn add(&mut self, x: Id, y: Id) -> Id {
+        let len = self.len_of(x);
+        if x == y {
+            return self.scaled(x, 2.0, 0.0);
+        }
+        if let (&Expr::Spread(p), &Expr::Spread(q)) = (self.get(x), self.get(y)) {
+            let one = self.add(p, q);
+            return self.put(Expr::Spread(one), len);
+        }
+        for (p, q) in [(x, y), (y, x)] {
+            if let Some((centred, inverse, a, b)) = self.late_centring(p, q) {
+                let normed = self.mul(centred, inverse);
+                return self.affine(normed, a, b);
+            }
+            // max(x, 0) + ln(1 + e^-|x|)
+            if let Some(z) = self.known_of(p, Function::Relu)
+                && let Some(negative) = self.known_of(q, Function::Softplus)
+                && let (absolute, -1.0, 0.0) = self.affine_of(negative)
+                && self.operand_of(absolute, Unary::Abs) == Some(z)
+            {
+                return self.function(Function::Softplus, z);
+            }
+        }
+        self.put(Expr::Add(x.min(y), x.max(y)), len)
+    }
+
+    /// Whether `p + q` is `a r x + (b - a r mean(x))`, as Keras norms: the deviations `x - mean(x)`, r, a and b.
+    fn late_centring(&mut self, p: Id, q: Id) -> Option<(Id, Id, Vec<f64>, Vec<f64>)> {
+        let (product, a, b) = self.split(p);
+        let (mean, c, d) = self.split(q);
+        let (&Expr::Mul(s, t), &Expr::Spread(mean)) = (self.get(product), self.get(mean)) else { return None };
+        let (mean, k, zero) = self.affine_of(mean);
+        let &Expr::Mul(m, r) = self.get(mean) else { return None };
+        let n = self.len_of(product) as f64;
+        for (x, inverse) in [(s, t), (t, s)] {
+            let &Expr::Spread(one) = self.get(inverse) else { continue };
+            let sum = if m == one { r } else { m };
+            let same = (m == one || r == one) && *self.get(sum) == Expr::Sum(x) && zero == 0.0;
+            if same && a.iter().zip(&c).all(|(a, c)| near(c * k * n, -a)) {
+                let mean = self.scaled(sum, -1.0 / n, 0.0);
+                let mean = self.put(Expr::Spread(mean), n as usize);
+                let centred = self.add(x, mean);
+                return Some((centred, inverse, a, b.iter().zip(&d).map(|(b, d)| b + d).collect()));
+            }
+        }
+        None
+    }
+
+    /// An expression as `a x + b`.
+    fn split(&self, id: Id) -> (Id, Vec<f64>, Vec<f64>) {
+        match self.get(id) {
+            Expr::Affine(x, a, b) => (*x, a.clone(), b.clone()),
+            _ => (id, vec![1.0; self.len_of(id)], vec![0.0; self.len_of(id)]),
+        }
+    }
+
+    /// `x y`
+    pub(super) fn mul(&mut self, x: Id, y: Id) -> Id {
+        let len = self.len_of(x);
+        if let (&Expr::Spread(p), &Expr::Spread(q)) = (self.get(x), self.get(y)) {
+            let one = self.mul(p, q);
+            return self.put(Expr::Spread(one), len);
+        }
+        for (p, q) in [(x, y), (y, x)] {
+            if let Some((function, of, factor)) = self.gated(p, q) {
+                let value = self.function(function, of);
+                return self.scaled(value, factor, 0.0);
+            }
+        }
+        for (p, q) in [(x, y), (y, x)] {
+            if let Expr::Affine(of, a, b) = self.get(p)
+                && uniform(b) == Some(0.0)
+            {
+                let (of, a, b) = (*of, a.clone(), b.clone());
+                let product = self.mul(of, q);
+                return self.affine(product, a, b);
+            }
+            if let &Expr::Spread(one) = self.get(q)
+                && let Some(norm) = self.norm(p, one)
+            {
+                return self.normed(p, norm);
+            }
+        }
+        self.put(Expr::Mul(x.min(y), x.max(y)), len)
+    }
+
+    fn normed(&mut self, v: Id, Norm { factor, eps, centred }: Norm) -> Id {
+        let len = self.len_of(v);
+        let ones = vec![1.0; len];
+        let norm = match centred {
+            Some(of) => Expr::LayerNorm(of, ones, vec![0.0; len], eps),
+            None => Expr::RmsNorm(v, ones, eps),
+        };
+        let norm = self.put(norm, len);
+        self.scaled(norm, factor, 0.0)
+    }
+
+    /// Whether `p q` is a factor times a function that multiplies its operand with a gate: SiLU, GELU, Mish.
+    fn gated(&self, p: Id, q: Id) -> Option<(Function, Id, f64)> {
+        if let Some(s) = self.known_of(q, Function::Sigmoid)
+            && let Some(k) = self.ratio(s, p)
+        {
+            return Some((Function::Silu, s, 1.0 / k));
+        }
+        if let Some(softplus) = self.known_of(q, Function::Tanh)
+            && self.known_of(softplus, Function::Softplus) == Some(p)
+        {
+            return Some((Function::Mish, p, 1.0));
+        }
+        // p (a + a gate)
+        let (gate, a, b) = self.affine_of(q);
+        if a != b {
+            return None;
+        }
+        if let Some(u) = self.operand_of(gate, Unary::Erf) {
+            return near(self.ratio(u, p)?, 0.5f64.sqrt()).then_some((Function::Gelu, p, 2.0 * a));
+        }
+        let [zero, first, square, cube] = self.polynomial(self.known_of(gate, Function::Tanh)?, p, DEPTH)?;
+        let is_gelu = zero == 0.0 && square == 0.0 && near(first, GELU_TANH[0]) && near(cube, GELU_TANH[1]);
+        is_gelu.then_some((Function::GeluTanh, p, 2.0 * a))
+    }
+
+    /// The sum of all elements.
+    pub(super) fn sum(&mut self, x: Id) -> Id {
+        if self.len_of(x) == 1 { x } else { self.put(Expr::Sum(x), 1) }
+    }
+
+    /// `max(x, low)`
+    pub(super) fn at_least(&mut self, x: Id, low: f64) -> Id {
+        let over = self.scaled(x, 1.0, -low);
+        let over = self.function(Function::Relu, over);
+        self.scaled(over, 1.0, low)
+    }
+
+    /// `min(x, high)`
+    pub(super) fn at_most(&mut self, x: Id, high: f64) -> Id {
+        let under = self.scaled(x, -1.0, high);
+        let under = self.function(Function::Relu, under);
+        self.scaled(under, -1.0, high)
+    }
+
+    /// Limited to low ..= high, either of which may be infinite.
+    pub(super) fn clip(&mut self, x: Id, low: f64, high: f64) -> Id {
+        let middle = low / 2.0 + high / 2.0;
+        if middle == 0.0 || low.abs().max(high.abs()) <= MOST_MIDDLE {
+            let len = self.len_of(x);
+            let about = self.scaled(x, 1.0, -middle);
+            let clipped = self.put(Expr::Clip(about, high - middle), len);
+            return self.scaled(clipped, 1.0, middle);
+        }
+        let x = if low > f64::NEG_INFINITY { self.at_least(x, low) } else { x };
+        if high < f64::INFINITY { self.at_most(x, high) } else { x }
+    }
+
+    /// `|x|`, `max(x, y)` and `slope x` below zero are sums of relus.
+    pub(super) fn max(&mut self, x: Id, y: Id) -> Id {
+        let negative = self.scaled(x, -1.0, 0.0);
+        let more = self.add(y, negative);
+        let more = self.function(Function::Relu, more);
+        self.add(x, more)
+    }
+
+    /// `x` where positive, else `slope x`, with a slope for each element.
+    pub(super) fn leaky(&mut self, x: Id, slope: Vec<f64>) -> Id {
+        let positive = self.function(Function::Relu, x);
+        if let Some(slope) = uniform(&slope)
+            && slope < 1.0
+        {
+            let all = self.scaled(x, slope / (1.0 - slope), 0.0);
+            let sum = self.add(positive, all);
+            return self.scaled(sum, 1.0 - slope, 0.0);
+        }
+        let rest: Vec<f64> = slope.iter().map(|s| 1.0 - s).collect();
+        let zeros = vec![0.0; slope.len()];
+        let (positive, all) = (self.affine(positive, rest, zeros.clone()), self.affine(x, slope, zeros));
+        self.add(positive, all)
+    }
+}

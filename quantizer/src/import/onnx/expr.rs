@@ -1,0 +1,191 @@
+//! What a file computes, as expressions over vectors: every expression once, in the order in which they came up.
+
+use std::collections::HashMap;
+use std::mem::discriminant;
+use std::sync::Arc;
+
+use actq_kernels::math::Function;
+
+/// Index of an expression.
+pub(super) type Id = usize;
+
+/// A weight matrix, rows are outputs.
+#[derive(Debug, PartialEq)]
+pub(super) struct Matrix {
+    /// The initializer's name, as far as there is one.
+    pub(super) name: Option<String>,
+    pub(super) rows: usize,
+    pub(super) cols: usize,
+    /// Row-major.
+    pub(super) data: Vec<f64>,
+}
+
+/// A run of elements of an expression.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Run {
+    pub(super) of: Id,
+    pub(super) from: usize,
+    pub(super) len: usize,
+}
+
+/// A function of every element.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Unary {
+    /// One that the network has.
+    Known(Function),
+    /// `ln x`; only within a pattern, as those below.
+    Log,
+    /// Square root.
+    Sqrt,
+    /// The error function.
+    Erf,
+    /// `1 / x`
+    Reciprocal,
+    /// `|x|`
+    Abs,
+    /// Whether x is above this.
+    Above(f64),
+}
+
+/// An LSTM or GRU cell.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Cell {
+    /// Whether it is an LSTM, of gates `[i f g o]`; else a GRU, of gates `[r z n]`.
+    pub(super) lstm: bool,
+    /// What it reads.
+    pub(super) x: Id,
+    pub(super) w_ih: Arc<Matrix>,
+    pub(super) w_hh: Arc<Matrix>,
+    pub(super) b_ih: Vec<f64>,
+    pub(super) b_hh: Vec<f64>,
+    /// Elements of graph inputs that hold its hidden state, and of an LSTM its cell state, before the step.
+    pub(super) states: Vec<Run>,
+}
+
+/// An expression; its length stands beside it.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Expr {
+    /// Graph input of this index.
+    Input(usize),
+    /// Runs behind each other.
+    Pick(Vec<Run>),
+    /// The one element of a value, again and again.
+    Spread(Id),
+    /// `a x + b`, element by element.
+    Affine(Id, Vec<f64>, Vec<f64>),
+    /// `W x + b`
+    Linear(Id, Arc<Matrix>, Vec<f64>),
+    Unary(Unary, Id),
+    Add(Id, Id),
+    Mul(Id, Id),
+    /// The sum of all elements.
+    Sum(Id),
+    /// Limited to so much in both directions.
+    Clip(Id, f64),
+    /// Of what, weight, bias, what is added to the variance.
+    LayerNorm(Id, Vec<f64>, Vec<f64>, f64),
+    /// Of what, weight, what is added to the mean square.
+    RmsNorm(Id, Vec<f64>, f64),
+    /// The hidden state after the step.
+    Cell(Box<Cell>),
+    /// The cell state after the step of an LSTM.
+    CellState(Id),
+}
+
+impl Expr {
+    /// What it reads.
+    pub(super) fn operands(&self) -> Vec<Id> {
+        match self {
+            Self::Input(_) => vec![],
+            Self::Pick(runs) => runs.iter().map(|run| run.of).collect(),
+            Self::Add(x, y) | Self::Mul(x, y) => vec![*x, *y],
+            Self::Cell(cell) => vec![cell.x],
+            Self::Spread(x)
+            | Self::Affine(x, ..)
+            | Self::Linear(x, ..)
+            | Self::Unary(_, x)
+            | Self::Sum(x)
+            | Self::Clip(x, _)
+            | Self::LayerNorm(x, ..)
+            | Self::RmsNorm(x, ..)
+            | Self::CellState(x) => vec![*x],
+        }
+    }
+}
+
+/// All expressions.
+#[derive(Debug, Default)]
+pub(super) struct Exprs {
+    all: Vec<(Expr, usize)>,
+    /// By kind and first operand.
+    known: HashMap<(std::mem::Discriminant<Expr>, Id), Vec<Id>>,
+    /// Which node of the file each came up in.
+    origins: Vec<usize>,
+    /// The node that is followed now.
+    pub(super) node: usize,
+}
+
+impl Exprs {
+    /// The expression, which may be there already.
+    pub(super) fn put(&mut self, expr: Expr, len: usize) -> Id {
+        let key = (discriminant(&expr), expr.operands().first().copied().unwrap_or(0));
+        let same = self.known.entry(key).or_default();
+        if let Some(&id) = same.iter().find(|&&id| self.all[id].0 == expr && self.all[id].1 == len) {
+            return id;
+        }
+        let id = self.all.len();
+        same.push(id);
+        self.all.push((expr, len));
+        self.origins.push(self.node);
+        id
+    }
+
+    pub(super) fn get(&self, id: Id) -> &Expr {
+        &self.all[id].0
+    }
+
+    pub(super) fn len_of(&self, id: Id) -> usize {
+        self.all[id].1
+    }
+
+    /// The node of the file that it came up in.
+    pub(super) fn origin(&self, id: Id) -> usize {
+        self.origins[id]
+    }
+
+    /// Says that `id` came up where `old` did.
+    pub(super) fn keep_origin(&mut self, old: Id, id: Id) {
+        self.origins[id] = self.origins[old];
+    }
+
+    /// Whether a value is nothing but parts of the graph's inputs.
+    pub(super) fn is_observed(&self, id: Id) -> bool {
+        match self.get(id) {
+            Expr::Input(_) => true,
+            Expr::Pick(runs) => runs.iter().all(|run| matches!(self.get(run.of), Expr::Input(_))),
+            _ => false,
+        }
+    }
+
+    /// Which expressions `roots` need, themselves included, each behind its operands.
+    pub(super) fn needed(&self, roots: &[Id]) -> Vec<Id> {
+        self.needed_instead(roots, &HashMap::new())
+    }
+
+    /// As [`Self::needed`], where some expressions stand for others.
+    pub(super) fn needed_instead(&self, roots: &[Id], instead: &HashMap<Id, Id>) -> Vec<Id> {
+        let meant = |id: Id| instead.get(&id).copied().unwrap_or(id);
+        let mut order = Vec::new();
+        let mut seen = vec![false; self.all.len()];
+        let mut stack: Vec<(Id, bool)> = roots.iter().rev().map(|&id| (meant(id), false)).collect();
+        while let Some((id, done)) = stack.pop() {
+            if done {
+                order.push(id);
+            } else if !std::mem::replace(&mut seen[id], true) {
+                stack.push((id, true));
+                stack.extend(self.get(id).operands().into_iter().rev().map(|id| (meant(id), false)));
+            }
+        }
+        order
+    }
+}

@@ -1,0 +1,173 @@
+//! Arithmetic on what is known: shape chains, and constants that exporters compute in the file.
+
+use anyhow::{Context as _, Result, ensure};
+
+use super::call::Call;
+use super::moves::expanded;
+use super::places::{axis, broadcast};
+use super::tensor::{Data, Tensor, count};
+
+/// The output, where the node computes with known numbers alone.
+pub(super) fn run(call: &Call<'_>, most: usize) -> Result<Option<Tensor>> {
+    let given: Vec<&Tensor> = call.inputs.iter().copied().flatten().collect();
+    if given.is_empty() || !given.iter().all(|tensor| tensor.is_known()) {
+        return Ok(None);
+    }
+    if let [one] = given[..]
+        && let Some(f) = function(call.op())
+    {
+        return unary(one, call.op(), f).map(Some);
+    }
+    if let [x, y] = given[..]
+        && (real(call.op()).is_some() || whole(call.op()).is_some())
+    {
+        let shape = broadcast(&x.shape, &y.shape)?;
+        let (x, y) = (expanded(x, &shape, most)?, expanded(y, &shape, most)?);
+        return binary(call.op(), &x, &y, shape).map(Some);
+    }
+    match call.op() {
+        "ReduceProd" | "ReduceSum" | "ReduceMean" | "ReduceMax" | "ReduceMin" => reduce(call, given[0]).map(Some),
+        "MatMul" => matrix_product(given[0], given.get(1).context("has one input")?, most).map(Some),
+        _ => Ok(None),
+    }
+}
+
+/// A function of one known number.
+pub(super) fn function(op: &str) -> Option<fn(f64) -> f64> {
+    Some(match op {
+        "Neg" => |x| -x,
+        "Abs" => f64::abs,
+        "Sqrt" => f64::sqrt,
+        "Exp" => f64::exp,
+        "Log" => f64::ln,
+        "Sin" => f64::sin,
+        "Cos" => f64::cos,
+        "Tanh" => f64::tanh,
+        "Sigmoid" => |x| 1.0 / (1.0 + (-x).exp()),
+        "Softplus" => |x| x.max(0.0) + (-x.abs()).exp().ln_1p(),
+        "Relu" => |x| x.max(0.0),
+        "Reciprocal" => |x| 1.0 / x,
+        "Floor" => f64::floor,
+        "Ceil" => f64::ceil,
+        "Round" => f64::round_ties_even,
+        "Sign" => |x| if x == 0.0 { 0.0 } else { x.signum() },
+        "Not" => |x| f64::from(u8::from(x == 0.0)),
+        _ => return None,
+    })
+}
+
+fn unary(x: &Tensor, op: &str, f: fn(f64) -> f64) -> Result<Tensor> {
+    let data = match (&x.data, op) {
+        (Data::Int(v), "Neg") => Data::Int(v.iter().map(|v| v.wrapping_neg()).collect()),
+        (Data::Int(v), "Abs") => Data::Int(v.iter().map(|v| v.wrapping_abs()).collect()),
+        (Data::Int(v), "Not") => Data::Int(v.iter().map(|&v| i64::from(v == 0)).collect()),
+        (Data::Int(v), "Floor" | "Ceil" | "Round") => Data::Int(v.clone()),
+        _ => Data::Real(x.reals().context("is not known")?.into_iter().map(f).collect()),
+    };
+    Ok(Tensor::new(x.shape.clone(), data))
+}
+
+/// An operation on two known numbers.
+pub(super) fn real(op: &str) -> Option<fn(f64, f64) -> f64> {
+    Some(match op {
+        "Add" => |x, y| x + y,
+        "Sub" => |x, y| x - y,
+        "Mul" => |x, y| x * y,
+        "Div" => |x, y| x / y,
+        "Pow" => f64::powf,
+        "Max" => f64::max,
+        "Min" => f64::min,
+        "Mod" => |x, y| x - y * (x / y).floor(),
+        _ => return None,
+    })
+}
+
+/// As [`real`], of integers, where the result is one; division goes towards zero.
+fn whole(op: &str) -> Option<fn(i64, i64) -> Option<i64>> {
+    Some(match op {
+        "Add" => i64::checked_add,
+        "Sub" => i64::checked_sub,
+        "Mul" => i64::checked_mul,
+        "Div" => i64::checked_div,
+        "Mod" => i64::checked_rem_euclid,
+        "Pow" => |x, y| x.checked_pow(u32::try_from(y).ok()?),
+        "Max" => |x, y| Some(x.max(y)),
+        "Min" => |x, y| Some(x.min(y)),
+        "And" => |x, y| Some(i64::from(x != 0 && y != 0)),
+        "Or" => |x, y| Some(i64::from(x != 0 || y != 0)),
+        "Equal" => |x, y| Some(i64::from(x == y)),
+        "Less" => |x, y| Some(i64::from(x < y)),
+        "LessOrEqual" => |x, y| Some(i64::from(x <= y)),
+        "Greater" => |x, y| Some(i64::from(x > y)),
+        "GreaterOrEqual" => |x, y| Some(i64::from(x >= y)),
+        _ => return None,
+    })
+}
+
+fn binary(op: &str, x: &Tensor, y: &Tensor, shape: Vec<usize>) -> Result<Tensor> {
+    if let (Some(x), Some(y)) = (x.integers(), y.integers())
+        && let Some(f) = whole(op)
+    {
+        let values = x.iter().zip(y).map(|(&x, &y)| f(x, y)).collect::<Option<Vec<i64>>>();
+        return Ok(Tensor::new(shape, Data::Int(values.context("its integers overflow, or it divides by 0")?)));
+    }
+    let f = real(op).with_context(|| format!("compares real numbers; {}", super::call::HELP))?;
+    let (x, y) = (x.reals().context("is not known")?, y.reals().context("is not known")?);
+    Ok(Tensor::new(shape, Data::Real(x.into_iter().zip(y).map(|(x, y)| f(x, y)).collect())))
+}
+
+/// The axes that a Reduce node goes over, and its result's shape, with and without them.
+pub(super) struct Reduced {
+    pub(super) axes: Vec<usize>,
+    pub(super) shape: Vec<usize>,
+}
+
+/// What a Reduce node does to the shape of its input.
+pub(super) fn reduced(call: &Call<'_>) -> Result<Reduced> {
+    let shape = &call.input(0)?.shape;
+    let axes = match call.ints_or_input("axes", 1)? {
+        Some(axes) if !axes.is_empty() => axes.into_iter().map(|a| axis(a, shape.len())).collect::<Result<Vec<_>>>()?,
+        _ if call.int("noop_with_empty_axes").unwrap_or(0) != 0 => vec![],
+        _ => (0..shape.len()).collect(),
+    };
+    let keep = call.int("keepdims").unwrap_or(1) != 0;
+    let kept = |(i, &n): (usize, &usize)| if axes.contains(&i) { keep.then_some(1) } else { Some(n) };
+    Ok(Reduced { shape: shape.iter().enumerate().filter_map(kept).collect(), axes })
+}
+
+fn reduce(call: &Call<'_>, x: &Tensor) -> Result<Tensor> {
+    let Reduced { axes, shape } = reduced(call)?;
+    // The axes that stay in front, so that each result has its own run.
+    let order: Vec<usize> = (0..x.shape.len()).filter(|i| !axes.contains(i)).chain(axes.iter().copied()).collect();
+    let (turned, places) = super::places::transpose(&x.shape, &order)?;
+    let x = x.taken(turned, &places)?;
+    let outputs = count(&shape)?;
+    ensure!(outputs > 0 && !x.shape.contains(&0), "goes over no values");
+    let each = x.len() / outputs;
+    let fold = |run: &[f64]| match call.op() {
+        "ReduceProd" => run.iter().product::<f64>(),
+        "ReduceSum" => run.iter().sum(),
+        "ReduceMean" => run.iter().sum::<f64>() / each as f64,
+        "ReduceMax" => run.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        _ => run.iter().copied().fold(f64::INFINITY, f64::min),
+    };
+    let values: Vec<f64> = x.reals().context("is not known")?.chunks(each).map(fold).collect();
+    // Lengths of axes are far below what f64 counts exactly.
+    let data =
+        if x.integers().is_some() { Data::Int(values.iter().map(|&v| v as i64).collect()) } else { Data::Real(values) };
+    Ok(Tensor::new(shape, data))
+}
+
+/// The product of two known matrices.
+fn matrix_product(x: &Tensor, y: &Tensor, most: usize) -> Result<Tensor> {
+    let (&[rows, n], &[m, cols]) = (&x.shape[..], &y.shape[..]) else {
+        anyhow::bail!("multiplies constants of {:?} and {:?}; only matrices are taken", x.shape, y.shape)
+    };
+    ensure!(n == m, "multiplies {:?} with {:?}", x.shape, y.shape);
+    // The work is bounded as the values are.
+    let work = rows.checked_mul(cols).and_then(|c| c.checked_mul(n)).filter(|work| *work <= most.saturating_mul(64));
+    ensure!(work.is_some(), "multiplies larger constants than a policy of this size can have");
+    let (x, y) = (x.reals().context("is not known")?, y.reals().context("is not known")?);
+    let one = |i: usize| (0..n).map(|k| x[i / cols * n + k] * y[k * cols + i % cols]).sum();
+    Ok(Tensor::new(vec![rows, cols], Data::Real((0..rows * cols).map(one).collect())))
+}

@@ -1,0 +1,366 @@
+//! Operations that only move elements, and those about shapes: what is known and what is not goes the same way.
+
+use anyhow::{Context as _, Result, bail, ensure};
+
+use super::call::Call;
+use super::places::{self, Places, along, axis, broadcast};
+use super::tensor::{Data, Element, Tensor, count};
+
+/// The outputs, where the node is such an operation; of at most `most` elements.
+pub(super) fn run(call: &Call<'_>, most: usize) -> Result<Option<Vec<Tensor>>> {
+    let one = |tensor: Tensor| Ok(Some(vec![tensor]));
+    match call.op() {
+        "Identity" | "Dropout" => one(call.input(0)?.clone()),
+        "Cast" | "CastLike" => one(cast(call)?),
+        "Constant" => one(constant(call)?),
+        "Shape" => {
+            let shape: Vec<i64> = call.input(0)?.shape.iter().map(|&n| n as i64).collect();
+            let (start, end) = (call.int("start").unwrap_or(0), call.int("end").unwrap_or(i64::MAX));
+            let kept = places::slice(shape.len(), start, end, 1)?;
+            one(Tensor::ints(kept.into_iter().map(|i| shape[i]).collect()))
+        }
+        "Size" => one(Tensor::new(vec![], Data::Int(vec![call.input(0)?.len() as i64]))),
+        "Range" => one(range(call, most)?),
+        "Reshape" => one(reshape(call)?),
+        "Flatten" => {
+            let input = call.input(0)?;
+            let rank = input.shape.len();
+            let at = match call.int("axis").unwrap_or(1) {
+                at if at == rank as i64 => rank,
+                at => axis(at, rank.max(1))?,
+            };
+            let (rows, cols) = input.shape.split_at(at.min(rank));
+            one(input.reshaped(vec![count(rows)?, count(cols)?])?)
+        }
+        "Squeeze" => {
+            let input = call.input(0)?;
+            let rank = input.shape.len();
+            let axes = match call.ints_or_input("axes", 1)? {
+                Some(axes) => axes.into_iter().map(|a| axis(a, rank)).collect::<Result<Vec<_>>>()?,
+                None => (0..rank).filter(|&i| input.shape[i] == 1).collect(),
+            };
+            let kept = (0..rank).filter(|i| !axes.contains(i)).map(|i| input.shape[i]).collect();
+            one(input.reshaped(kept).context("only axes of length 1 can be squeezed")?)
+        }
+        "Unsqueeze" => {
+            let input = call.input(0)?;
+            let axes = call.ints_or_input("axes", 1)?.context("has no axes")?;
+            let rank = input.shape.len() + axes.len();
+            let axes = axes.into_iter().map(|a| axis(a, rank)).collect::<Result<Vec<_>>>()?;
+            let mut rest = input.shape.iter();
+            let shape = (0..rank).map(|i| if axes.contains(&i) { Some(1) } else { rest.next().copied() });
+            one(input.reshaped(shape.collect::<Option<_>>().context("an axis is there twice")?)?)
+        }
+        "Transpose" => {
+            let input = call.input(0)?;
+            let rank = input.shape.len();
+            let order = match call.ints("perm") {
+                Some(perm) => perm.into_iter().map(|a| axis(a, rank)).collect::<Result<Vec<_>>>()?,
+                None => (0..rank).rev().collect(),
+            };
+            one(taken(input, places::transpose(&input.shape, &order)?)?)
+        }
+        "Slice" => one(slice(call)?),
+        "Split" => split(call).map(Some),
+        "Gather" => one(gather(call)?),
+        "GatherND" => one(gather_nd(call)?),
+        "Concat" => one(concat(call)?),
+        "Expand" => {
+            let input = call.input(0)?;
+            let shape = lengths(&call.integers(1, "the shape")?)?;
+            one(expanded(input, &broadcast(&input.shape, &shape)?, most)?)
+        }
+        "Tile" => {
+            let input = call.input(0)?;
+            let times = lengths(&call.integers(1, "the repeats")?)?;
+            let out: Option<Vec<usize>> = input.shape.iter().zip(&times).map(|(&n, &t)| n.checked_mul(t)).collect();
+            room(&out.context("the repeats are too many")?, most)?;
+            one(taken(input, places::tile(&input.shape, &times)?)?)
+        }
+        "Where" => where_known(call, most),
+        "ScatterND" => one(scatter(call)?),
+        _ => Ok(None),
+    }
+}
+
+fn taken(input: &Tensor, (shape, places): Places) -> Result<Tensor> {
+    input.taken(shape, &places)
+}
+
+/// That a result of this shape may come up.
+fn room(shape: &[usize], most: usize) -> Result<usize> {
+    let n = count(shape)?;
+    ensure!(n <= most, "{shape:?} are more values than a policy of this size can have");
+    Ok(n)
+}
+
+/// Repeated along axes of length 1, to a shape that fits.
+pub(super) fn expanded(input: &Tensor, shape: &[usize], most: usize) -> Result<Tensor> {
+    if input.shape == shape {
+        return Ok(input.clone());
+    }
+    room(shape, most)?;
+    input.taken(shape.to_vec(), &places::expand(&input.shape, shape)?)
+}
+
+fn lengths(shape: &[i64]) -> Result<Vec<usize>> {
+    let axes = shape.iter().map(|&n| usize::try_from(n).ok()).collect::<Option<_>>();
+    axes.with_context(|| format!("{shape:?} has a negative length"))
+}
+
+/// Between types of real numbers nothing is lost but digits; values of the network have no other.
+fn cast(call: &Call<'_>) -> Result<Tensor> {
+    let input = call.input(0)?;
+    let to = match call.op() {
+        "CastLike" => {
+            if matches!(call.input(1)?.data, Data::Int(_)) {
+                7
+            } else {
+                1
+            }
+        }
+        _ => call.int("to").unwrap_or(0),
+    };
+    let data = match (to, &input.data) {
+        (1 | 11, Data::Int(v)) => Data::Real(v.iter().map(|&v| v as f64).collect()),
+        (1 | 11, data) => data.clone(),
+        (10 | 16, Data::Real(v)) => Data::Real(v.clone()),
+        (9, Data::Int(v)) => Data::Int(v.iter().map(|&v| i64::from(v != 0)).collect()),
+        (9, Data::Real(v)) => Data::Int(v.iter().map(|&v| i64::from(v != 0.0)).collect()),
+        (2..=7 | 12 | 13, Data::Int(v)) => Data::Int(v.clone()),
+        (2..=7 | 12 | 13, Data::Real(v)) => Data::Int(v.iter().map(|&v| v as i64).collect()),
+        _ => bail!("rounds a value of the network to ONNX's type {to}; export the policy in float32 throughout"),
+    };
+    Ok(Tensor { data, ..input.clone() })
+}
+
+fn constant(call: &Call<'_>) -> Result<Tensor> {
+    if let Some(v) = call.int("value_int") {
+        return Ok(Tensor::new(vec![], Data::Int(vec![v])));
+    }
+    if let Some(v) = call.float("value_float") {
+        return Ok(Tensor::new(vec![], Data::Real(vec![v])));
+    }
+    if let Some(v) = call.ints("value_ints") {
+        return Ok(Tensor::ints(v));
+    }
+    let floats = call.node.attributes.get("value_floats").context("its value is of a type that is not known")?;
+    let values: Vec<f64> = floats.floats.iter().map(|&v| v.into()).collect();
+    Ok(Tensor::new(vec![values.len()], Data::Real(values)))
+}
+
+/// A tensor of a shape that is given, of one number.
+pub(super) fn constant_of_shape(call: &Call<'_>, fill: &Data, most: usize) -> Result<Tensor> {
+    let shape = lengths(&call.integers(0, "the shape")?)?;
+    let n = room(&shape, most)?;
+    Ok(Tensor::new(
+        shape,
+        match fill {
+            Data::Int(v) => Data::Int(vec![v.first().copied().unwrap_or(0); n]),
+            Data::Real(v) => Data::Real(vec![v.first().copied().unwrap_or(0.0); n]),
+            Data::Open(_) => bail!("its value is not known"),
+        },
+    ))
+}
+
+fn range(call: &Call<'_>, most: usize) -> Result<Tensor> {
+    let whole = |i: usize| call.input(i).is_ok_and(|t| t.integers().is_some());
+    let bound = |i: usize| call.reals(i, "a bound")?.first().copied().context("has a bound without a value");
+    let (start, limit, step) = (bound(0)?, bound(1)?, bound(2)?);
+    let n = ((limit - start) / step).ceil().max(0.0);
+    ensure!(n.is_finite() && n <= most as f64, "from {start} to {limit} in steps of {step} is too long");
+    let values = (0..n as usize).map(|i| start + i as f64 * step);
+    Ok(Tensor::new(
+        vec![n as usize],
+        match whole(0) {
+            true => Data::Int(values.map(|v| v as i64).collect()),
+            false => Data::Real(values.collect()),
+        },
+    ))
+}
+
+fn reshape(call: &Call<'_>) -> Result<Tensor> {
+    let input = call.input(0)?;
+    let wanted = call.ints_or_input("shape", 1)?.context("has no shape")?;
+    let keep = call.int("allowzero").unwrap_or(0) == 0;
+    let axis = |(i, n): (usize, i64)| match n {
+        0 if keep => input.shape.get(i).copied().map(Some).context("keeps an axis that is not there"),
+        -1 => Ok(None),
+        n => usize::try_from(n).map(Some).with_context(|| format!("{n} is no length of an axis")),
+    };
+    let axes = wanted.into_iter().enumerate().map(axis).collect::<Result<Vec<_>>>()?;
+    ensure!(axes.iter().filter(|a| a.is_none()).count() <= 1, "two lengths are left open");
+    let rest = count(&axes.iter().map(|a| a.unwrap_or(1)).collect::<Vec<_>>())?;
+    let open = input.len().checked_div(rest).unwrap_or(0);
+    input.reshaped(axes.into_iter().map(|a| a.unwrap_or(open)).collect())
+}
+
+fn slice(call: &Call<'_>) -> Result<Tensor> {
+    let input = call.input(0)?;
+    let starts = call.ints_or_input("starts", 1)?.context("has no starts")?;
+    let ends = call.ints_or_input("ends", 2)?.context("has no ends")?;
+    let axes = call.ints_or_input("axes", 3)?.unwrap_or_else(|| (0..starts.len() as i64).collect());
+    let steps = if call.optional(4).is_some() { call.integers(4, "the steps")? } else { vec![1; starts.len()] };
+    ensure!(
+        ends.len() == starts.len() && axes.len() == starts.len() && steps.len() == starts.len(),
+        "its lists differ in length"
+    );
+    let mut kept = input.clone();
+    for (((start, end), at), step) in starts.into_iter().zip(ends).zip(axes).zip(steps) {
+        let at = axis(at, kept.shape.len())?;
+        let chosen = places::slice(kept.shape[at], start, end, step)?;
+        if chosen.len() != kept.shape[at] || step < 0 {
+            kept = taken(&kept, along(&kept.shape, at, chosen)?)?;
+        }
+    }
+    Ok(kept)
+}
+
+fn split(call: &Call<'_>) -> Result<Vec<Tensor>> {
+    let input = call.input(0)?;
+    let at = axis(call.int("axis").unwrap_or(0), input.shape.len())?;
+    let n = input.shape[at];
+    let parts = match call.ints_or_input("split", 1)? {
+        Some(parts) => lengths(&parts)?,
+        None => {
+            let outputs =
+                call.int("num_outputs").and_then(|n| usize::try_from(n).ok()).unwrap_or(call.node.outputs.len());
+            ensure!((1..=n.max(1)).contains(&outputs), "{n} values cannot be split into {outputs} parts");
+            let each = n.div_ceil(outputs);
+            (0..outputs).map(|i| each.min(n.saturating_sub(i * each))).collect()
+        }
+    };
+    let sum = parts.iter().try_fold(0usize, |n, &part| n.checked_add(part));
+    ensure!(sum == Some(n), "its parts {parts:?} are not the {n} values of the axis");
+    let mut from = 0;
+    let mut part = |len: usize| {
+        from += len;
+        taken(input, along(&input.shape, at, (from - len..from).collect())?)
+    };
+    parts.into_iter().map(&mut part).collect()
+}
+
+fn gather(call: &Call<'_>) -> Result<Tensor> {
+    let input = call.input(0)?;
+    let at = axis(call.int("axis").unwrap_or(0), input.shape.len())?;
+    let n = input.shape[at];
+    let indices = call.integers(1, "the indices")?;
+    let shape = &call.input(1)?.shape;
+    let chosen = indices.iter().map(|&i| axis(i, n)).collect::<Result<Vec<_>>>()?;
+    let (_, found) = along(&input.shape, at, chosen)?;
+    let (before, behind) = (&input.shape[..at], &input.shape[at + 1..]);
+    input.taken([before, shape, behind].concat(), &found)
+}
+
+/// Pieces at known places.
+fn gather_nd(call: &Call<'_>) -> Result<Tensor> {
+    let input = call.input(0)?;
+    let batch = call.int("batch_dims").and_then(|n| usize::try_from(n).ok()).unwrap_or(0);
+    let indices = call.integers(1, "the indices")?;
+    let (depth, outer) = call.input(1)?.shape.split_last().context("its indices have no axis")?;
+    let piece =
+        batch.checked_add(*depth).and_then(|n| input.shape.get(n..)).context("its indices have too many parts")?;
+    // Batches of length 1 are none.
+    ensure!(*depth > 0 && input.shape[..batch].iter().all(|&n| n == 1), "takes pieces of several batches");
+    let n = count(piece)?;
+    let mut places = Vec::new();
+    for index in indices.chunks(*depth) {
+        let mut at = 0;
+        for (&i, &n) in index.iter().zip(&input.shape[batch..]) {
+            at = at * n + axis(i, n)?;
+        }
+        places.extend(at * n..(at + 1) * n);
+    }
+    input.taken([outer, piece].concat(), &places)
+}
+
+fn concat(call: &Call<'_>) -> Result<Tensor> {
+    let parts = call.inputs.iter().copied().flatten().collect::<Vec<_>>();
+    let first = parts.first().context("joins nothing")?;
+    let at = axis(call.int("axis").unwrap_or(0), first.shape.len())?;
+    for part in &parts {
+        let fits = part.shape.len() == first.shape.len();
+        let fits = fits && (0..first.shape.len()).all(|i| i == at || part.shape[i] == first.shape[i]);
+        ensure!(fits, "joins {:?} to {:?} along axis {at}", part.shape, first.shape);
+    }
+    // All elements one part behind the other; then, for each row in front of the axis, its piece of every part.
+    let mut shape = first.shape.clone();
+    shape[at] = parts.iter().map(|part| part.shape[at]).sum();
+    let rows = count(&shape[..at])?;
+    let mut found = Vec::with_capacity(count(&shape)?);
+    for row in 0..rows {
+        let mut from = 0;
+        for part in &parts {
+            let piece = part.len() / rows;
+            found.extend(from + row * piece..from + (row + 1) * piece);
+            from += part.len();
+        }
+    }
+    let ints: Option<Vec<&[i64]>> = parts.iter().map(|part| part.integers()).collect();
+    let all = match ints {
+        Some(ints) => Tensor::ints(ints.concat()),
+        None => {
+            let elements: Vec<Element> = parts.iter().flat_map(|part| part.elements()).collect();
+            Tensor::of_elements(vec![elements.len()], elements)
+        }
+    };
+    all.taken(shape, &found)
+}
+
+/// A choice that is known for every element.
+fn where_known(call: &Call<'_>, most: usize) -> Result<Option<Vec<Tensor>>> {
+    let (choice, x, y) = (call.input(0)?, call.input(1)?, call.input(2)?);
+    if choice.integers().is_none() {
+        return Ok(None);
+    }
+    let shape = broadcast(&broadcast(&choice.shape, &x.shape)?, &y.shape)?;
+    let choice = expanded(choice, &shape, most)?;
+    let whole = x.integers().is_some() && y.integers().is_some();
+    let (x, y) = (expanded(x, &shape, most)?, expanded(y, &shape, most)?);
+    let n = x.len();
+    let places: Vec<usize> = choice
+        .integers()
+        .unwrap_or_default()
+        .iter()
+        .enumerate()
+        .map(|(i, &c)| if c != 0 { i } else { n + i })
+        .collect();
+    let both = match (x.integers(), y.integers()) {
+        (Some(x), Some(y)) if whole => Tensor::ints([x, y].concat()),
+        _ => Tensor::of_elements(vec![2 * n], [x.elements(), y.elements()].concat()),
+    };
+    Ok(Some(vec![both.taken(shape, &places)?]))
+}
+
+/// Rows at known places are replaced.
+fn scatter(call: &Call<'_>) -> Result<Tensor> {
+    let (data, updates) = (call.input(0)?, call.input(2)?);
+    ensure!(
+        matches!(call.text("reduction").as_deref(), None | Some("none")),
+        "only replaces where it has no reduction"
+    );
+    let indices = call.integers(1, "the indices")?;
+    let depth = call.input(1)?.shape.last().copied().unwrap_or(1);
+    ensure!((1..=data.shape.len()).contains(&depth), "its indices have {depth} parts for {} axes", data.shape.len());
+    let piece = count(&data.shape[depth..])?;
+    let rows = indices.chunks(depth);
+    ensure!(updates.len() == rows.len() * piece, "its updates do not fit its indices");
+    let mut places: Vec<usize> = (0..data.len()).collect();
+    for (row, index) in rows.enumerate() {
+        let mut at = 0;
+        for (&i, &n) in index.iter().zip(&data.shape) {
+            at = at * n + axis(i, n)?;
+        }
+        for k in 0..piece {
+            places[at * piece + k] = data.len() + row * piece + k;
+        }
+    }
+    let both = match (data.integers(), updates.integers()) {
+        (Some(data), Some(updates)) => Tensor::ints([data, updates].concat()),
+        _ => {
+            let all = [data.elements(), updates.elements()].concat();
+            Tensor::of_elements(vec![all.len()], all)
+        }
+    };
+    both.taken(data.shape.clone(), &places)
+}

@@ -1,0 +1,49 @@
+//! Choices by a value's sign or size, which exporters make of activations: `where(x > t, x, f(x))`.
+
+use actq_kernels::math::Function;
+
+use super::compare::near;
+use super::expr::{Expr, Exprs, Id, Unary};
+
+/// From here on f32's softplus is its operand.
+const SOFTPLUS_END: f64 = 17.0;
+
+impl Exprs {
+    /// `where(condition, x, y)`, where that is a function of the network.
+    pub(super) fn select(&mut self, condition: Id, x: Id, y: Id) -> Option<Id> {
+        let &Expr::Unary(Unary::Above(limit), of) = self.get(condition) else { return None };
+        // Softplus above its limit.
+        let (softplus, factor, zero) = self.affine_of(y);
+        if let Some(z) = self.known_of(softplus, Function::Softplus)
+            && zero == 0.0
+            && near(self.ratio(x, z)?, factor)
+            && limit / self.ratio(of, z)? > SOFTPLUS_END
+        {
+            return Some(y);
+        }
+        // Everything else bends at zero.
+        if limit != 0.0 || self.ratio(of, x)? <= 0.0 {
+            return None;
+        }
+        if let Some(slope) = self.ratio(y, x) {
+            let slopes = vec![slope; self.len_of(x)];
+            return Some(self.leaky(x, slopes));
+        }
+        let (power, alpha, minus) = self.affine_of(y);
+        let exponent = self.known_of(power, Function::Exp).filter(|_| near(alpha, -minus))?;
+        let below = self.at_most(x, 0.0);
+        let same = exponent == x || exponent == below;
+        same.then(|| {
+            let (elu, relu) = (self.function(Function::Elu, x), self.function(Function::Relu, x));
+            let (elu, relu) = (self.scaled(elu, alpha, 0.0), self.scaled(relu, 1.0 - alpha, 0.0));
+            if alpha == 1.0 { elu } else { self.add(elu, relu) }
+        })
+    }
+
+    /// `where(condition, x, 0)`, or with x and 0 the other way round, for a condition by the sign of x.
+    pub(super) fn select_zero(&mut self, condition: Id, x: Id, where_true: bool) -> Option<Id> {
+        let &Expr::Unary(Unary::Above(0.0), of) = self.get(condition) else { return None };
+        let above = self.ratio(of, x)? > 0.0;
+        Some(if above == where_true { self.function(Function::Relu, x) } else { self.at_most(x, 0.0) })
+    }
+}

@@ -1,0 +1,121 @@
+//! Expressions as a network has them: factors and offsets go into the matrices beside them, rows that nobody reads go.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use actq_kernels::math::Function;
+
+use super::expr::{Cell, Expr, Exprs, Id, Matrix, Run, Unary};
+
+/// The same value, simplified. `instead` says which expressions stand for others.
+pub(super) fn simplify(exprs: &mut Exprs, root: Id, instead: &HashMap<Id, Id>) -> Id {
+    let order = exprs.needed_instead(&[root], instead);
+    let mut readers: HashMap<Id, Vec<Id>> = HashMap::from([(root, vec![root])]);
+    for &id in &order {
+        for operand in exprs.get(id).operands() {
+            readers.entry(instead.get(&operand).copied().unwrap_or(operand)).or_default().push(id);
+        }
+    }
+    let mut new: HashMap<Id, Id> = HashMap::new();
+    for id in order {
+        let old = exprs.get(id).clone();
+        let of = |operand: &Id| {
+            let operand = instead.get(operand).copied().unwrap_or(*operand);
+            new.get(&operand).copied().unwrap_or(operand)
+        };
+        let read_by =
+            |operand: &Id| readers.get(&instead.get(operand).copied().unwrap_or(*operand)).map_or(&[][..], |r| r);
+        let len = exprs.len_of(id);
+        let done = match old {
+            Expr::Affine(x, a, b) => {
+                let value = of(&x);
+                match exprs.get(value) {
+                    Expr::Linear(y, w, bias) if read_by(&x).len() == 1 => {
+                        let (y, w, bias) = (
+                            *y,
+                            scaled_rows(w, &a),
+                            bias.iter().zip(&a).zip(&b).map(|((bias, a), b)| bias * a + b).collect(),
+                        );
+                        exprs.put(Expr::Linear(y, w, bias), len)
+                    }
+                    _ => exprs.put(Expr::Affine(value, a, b), len),
+                }
+            }
+            Expr::Linear(x, w, bias) => {
+                let value = of(&x);
+                let all_linear = read_by(&x).iter().all(|&reader| matches!(exprs.get(reader), Expr::Linear(..)));
+                match exprs.get(value) {
+                    Expr::Affine(y, a, b) if all_linear && !exprs.is_observed(*y) => {
+                        let (y, w, bias) = (*y, scaled_cols(&w, a), offset(&w, b, bias));
+                        exprs.put(Expr::Linear(y, w, bias), len)
+                    }
+                    _ => exprs.put(Expr::Linear(value, w, bias), len),
+                }
+            }
+            Expr::Pick(runs) => {
+                let same = runs.iter().all(|run| run.of == runs[0].of);
+                let runs: Vec<Run> = runs.iter().map(|run| Run { of: of(&run.of), ..*run }).collect();
+                match exprs.get(runs[0].of) {
+                    Expr::Linear(y, w, bias) if same && read_by_one(&readers, id, exprs, instead) => {
+                        let rows: Vec<usize> = runs.iter().flat_map(|run| run.from..run.from + run.len).collect();
+                        let data = rows.iter().flat_map(|&r| &w.data[r * w.cols..(r + 1) * w.cols]).copied().collect();
+                        let bias = rows.iter().map(|&r| bias[r]).collect();
+                        let w = Matrix { name: w.name.clone(), rows: rows.len(), cols: w.cols, data };
+                        let y = *y;
+                        exprs.put(Expr::Linear(y, Arc::new(w), bias), len)
+                    }
+                    _ => exprs.put(Expr::Pick(runs), len),
+                }
+            }
+            Expr::Unary(Unary::Abs, x) => {
+                let x = of(&x);
+                let negative = exprs.scaled(x, -1.0, 0.0);
+                let (up, down) = (exprs.function(Function::Relu, x), exprs.function(Function::Relu, negative));
+                exprs.add(up, down)
+            }
+            Expr::Input(_) => id,
+            Expr::Spread(x) => exprs.put(Expr::Spread(of(&x)), len),
+            Expr::Unary(f, x) => exprs.put(Expr::Unary(f, of(&x)), len),
+            Expr::Add(x, y) => exprs.put(Expr::Add(of(&x), of(&y)), len),
+            Expr::Mul(x, y) => exprs.put(Expr::Mul(of(&x), of(&y)), len),
+            Expr::Sum(x) => exprs.put(Expr::Sum(of(&x)), len),
+            Expr::Clip(x, limit) => exprs.put(Expr::Clip(of(&x), limit), len),
+            Expr::LayerNorm(x, weight, bias, eps) => exprs.put(Expr::LayerNorm(of(&x), weight, bias, eps), len),
+            Expr::RmsNorm(x, weight, eps) => exprs.put(Expr::RmsNorm(of(&x), weight, eps), len),
+            Expr::Cell(cell) => exprs.put(Expr::Cell(Box::new(Cell { x: of(&cell.x), ..*cell })), len),
+            Expr::CellState(x) => exprs.put(Expr::CellState(of(&x)), len),
+        };
+        exprs.keep_origin(id, done);
+        new.insert(id, done);
+    }
+    new.get(&root).copied().unwrap_or(root)
+}
+
+/// Whether nothing but this reads what it reads.
+fn read_by_one(readers: &HashMap<Id, Vec<Id>>, reader: Id, exprs: &Exprs, instead: &HashMap<Id, Id>) -> bool {
+    exprs.get(reader).operands().iter().all(|operand| {
+        let operand = instead.get(operand).copied().unwrap_or(*operand);
+        readers.get(&operand).is_some_and(|all| all.iter().all(|other| *other == reader))
+    })
+}
+
+fn scaled_rows(w: &Arc<Matrix>, a: &[f64]) -> Arc<Matrix> {
+    if a.iter().all(|a| *a == 1.0) {
+        return Arc::clone(w);
+    }
+    let data = w.data.chunks(w.cols).zip(a).flat_map(|(row, a)| row.iter().map(move |w| w * a)).collect();
+    Arc::new(Matrix { name: w.name.clone(), rows: w.rows, cols: w.cols, data })
+}
+
+fn scaled_cols(w: &Arc<Matrix>, a: &[f64]) -> Arc<Matrix> {
+    if a.iter().all(|a| *a == 1.0) {
+        return Arc::clone(w);
+    }
+    let data = w.data.chunks(w.cols).flat_map(|row| row.iter().zip(a).map(|(w, a)| w * a)).collect();
+    Arc::new(Matrix { name: w.name.clone(), rows: w.rows, cols: w.cols, data })
+}
+
+fn offset(w: &Matrix, b: &[f64], bias: Vec<f64>) -> Vec<f64> {
+    let products = w.data.chunks(w.cols).map(|row| row.iter().zip(b).map(|(w, b)| w * b).sum::<f64>());
+    bias.into_iter().zip(products).map(|(bias, product)| bias + product).collect()
+}

@@ -1,0 +1,25 @@
+//! The f32 policy's actions: the network's output through the action contract.
+
+use ndarray::Array2;
+
+use crate::graph::{Network, Weights, zero_state};
+use crate::policy::Policy;
+
+/// What the f32 policy gives for each of `observations`, from a zero state on: all actions of its output behind each other, scaled,
+/// offset and limited. The step limit is not applied: it is between actions that are executed.
+pub fn actions(policy: &Policy, observations: &[Vec<f32>]) -> Vec<Vec<f32>> {
+    let (network, weights) = (Network::new(&policy.graph), Weights::of(&policy.graph));
+    let mut state = zero_state(&policy.graph, 1);
+    let contract = &policy.contract;
+    let at = |array: &Option<Vec<f32>>, i: usize, none: f32| array.as_ref().map_or(none, |values| values[i]);
+    let one = |(i, raw): (usize, &f32)| {
+        let i = i % policy.act_len;
+        let action = raw * at(&contract.scale, i, 1.0) + at(&contract.offset, i, 0.0);
+        action.max(at(&contract.low, i, f32::NEG_INFINITY)).min(at(&contract.high, i, f32::INFINITY))
+    };
+    let mut step = |obs: &Vec<f32>| {
+        let obs = Array2::from_shape_fn((1, obs.len()), |(_, i)| obs[i]);
+        network.forward(&weights, obs, &mut state).output().iter().enumerate().map(one).collect()
+    };
+    observations.iter().map(&mut step).collect()
+}

@@ -1,0 +1,56 @@
+//! How many of an image's scratch words hold something that is still needed, operation by operation.
+
+use actq_kernels::Image;
+use actq_kernels::image::{OpKind, Region};
+
+/// Where the values of a step need most memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Peak {
+    /// The operation.
+    pub op: usize,
+    /// Words that hold something that it or a later one needs: no placement of the values takes fewer.
+    pub words: usize,
+    /// Words that the image gives to what operations write.
+    pub placed: usize,
+}
+
+/// The first operation at which most values are needed: from the last operation backwards, a word is needed from where it is written to
+/// where it is read. What every denoising step reads is needed through all of them.
+pub fn peak(image: &Image<'_>) -> Peak {
+    let (first, end) = (image.observation().range().end, image.action().offset);
+    let words = |region: Region| region.range().filter(|word| (first..end).contains(word)).map(|word| word - first);
+    let ops: Vec<_> = image.ops().collect();
+    let mut live = vec![false; end.saturating_sub(first)];
+    // A chunk is played over several steps.
+    words(image.output()).for_each(|word| live[word] = true);
+    let mut peak = Peak { op: 0, words: 0, placed: live.len() };
+    let order = |from: usize| (from..ops.len()).rev();
+    // Denoising steps twice: what the first operation of a step finds, the last one of the step before has left.
+    let rounds = if image.denoising_steps() > 1 {
+        order(image.once()).chain(order(0))
+    } else {
+        order(0).chain(order(ops.len()))
+    };
+    for i in rounds {
+        let op = &ops[i];
+        let replaces = matches!(
+            op.kind,
+            OpKind::Normalize | OpKind::Linear { accumulate: false } | OpKind::Copy | OpKind::Noise | OpKind::Table
+        );
+        for region in [op.dst(), op.src(), op.third()] {
+            words(region).for_each(|word| live[word] = true);
+        }
+        let needed = live.iter().filter(|word| **word).count();
+        if needed >= peak.words {
+            (peak.op, peak.words) = (i, needed);
+        }
+        if replaces {
+            words(op.dst()).for_each(|word| live[word] = false);
+        }
+        if op.kind == OpKind::Denoise {
+            words(op.third()).for_each(|word| live[word] = false);
+        }
+        words(op.src()).for_each(|word| live[word] = true);
+    }
+    peak
+}
