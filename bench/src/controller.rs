@@ -15,7 +15,7 @@ use tempfile::TempDir;
 
 use crate::qemu::{in_slot, spawn};
 
-/// How long an answer, or what [`Controller::until`] waits for, may take: a busy machine runs QEMU slowly.
+/// How long an answer, or what [`until`] waits for, may take: a busy machine runs QEMU slowly.
 pub const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Between two looks whether an observation was refused.

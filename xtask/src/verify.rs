@@ -167,7 +167,7 @@ fn steps(oldest: Result<(), String>, narrow: Result<(), String>, skipped: &str) 
     let documented = [&doc[..], &host, &all_but_firmware, &["--exclude", "xtask"]].concat();
     add("documentation", &documented, &[deny_in_documentation]);
     add("documentation of the firmware", &[&doc[..], &fpu, &packages].concat(), &[deny_in_documentation, image]);
-    add("tests", &[&["test"], &host[..]].concat(), &[("ACTQ_SKIPPED", skipped)]);
+    add("tests", &[&["test", "--no-fail-fast"], &host[..]].concat(), &[("ACTQ_SKIPPED", skipped)]);
     add("budgets", &[&["run"], &host[..], &["--package", "actq-bench", "--", "budgets"]].concat(), &[]);
 
     let asked = std::env::var_os(ONNX_VARIABLE).is_some_and(|value| !value.is_empty());
