@@ -67,7 +67,8 @@ mod tests {
             let exact = f64::from(u).ln();
             assert!((f64::from(ln(u)) - exact).abs() <= 2e-7 * (1.0 + exact.abs()), "{u}");
             let exact = (std::f64::consts::TAU * (f64::from(u) - 0.5)).cos();
-            assert!((f64::from(cos_turns(u - 0.5)) - exact).abs() <= 4e-7, "{u}");
+            // Four times the sine's error: that of the series' end, 6e-8, and of roundings.
+            assert!((f64::from(cos_turns(u - 0.5)) - exact).abs() <= 8e-7, "{u}");
         }
         assert!((f64::from(ln(f32::from_bits(0x3380_0000))) + 24.0 * std::f64::consts::LN_2).abs() < 2e-6);
     }
@@ -89,6 +90,6 @@ mod tests {
         let neighbours = values.windows(2).map(|v| v[0] * v[1]).sum::<f64>() / f64::from(N);
         near(neighbours, 0.0, 1.0);
         assert!(values.iter().all(|v| v.abs() < 5.8));
-        assert_eq!([normal(0, 0, 0).to_bits(), normal(1, 2, 3).to_bits()], [0, 0]);
+        assert_eq!([normal(0, 0, 0).to_bits(), normal(1, 2, 3).to_bits()], [1_033_359_405, 1_063_383_619]);
     }
 }
