@@ -136,9 +136,8 @@ fn a_head_below_leaves_the_tick_alone() -> Result<()> {
         act(&mut client, &observation)?;
     }
     let ticks = client.status()?.ticks;
-    until(&mut client, "later", |status| status.ticks > ticks + 200)?;
+    until(&mut client, "later", |status| status.ticks > 1000.max(ticks + 200))?;
     let timing = client.timing()?;
-    assert!(ticks > 800, "{ticks}");
     assert_eq!((timing.period, timing.overruns), (125_000, 0));
     assert!(timing.worst_tick < 12_500 && timing.worst_jitter < 12_500, "{timing:?}");
     Ok(())
