@@ -66,7 +66,7 @@ pub(super) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
                 f(dst).iter_mut().zip(range.start as u32..).for_each(|(x, index)| *x = normal(seed, draw, index));
             }
         }
-        OpKind::Table => copy_le(op.row(cursor.step, &range), dst),
+        OpKind::Table => copy_le(op.part(cursor.step, &range), dst),
         OpKind::Denoise => {
             let (by, noise) = op.coefficients(cursor.step);
             let by = Coefficients::from_array(by);

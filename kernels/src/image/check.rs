@@ -77,8 +77,8 @@ impl<'a> Image<'a> {
         if self.obs_len() == 0 || self.act_len() == 0 || self.op_count() == 0 {
             return Err(ImageError::Shape);
         }
-        // State, observation, what operations write, action, what is kept with it, work area: in this order and without a gap. (`check_sections` sees
-        // to the middle.)
+        // State, observation, what operations write, action, what is kept with it, work area: in this order and without a gap.
+        // (`check_sections` sees to the middle.)
         let work = self.work();
         if self.state().offset != 0
             || self.observation().offset != self.state().end()

@@ -87,7 +87,7 @@ pub(super) struct Uses {
     /// Lengths of `src` and of the third region; 0 where there is none. (Linear has its own length.)
     src: u8,
     third: u8,
-    /// Single constants, and arrays behind them.
+    /// Single constants, and arrays behind them; of a table, one for each denoising step.
     pub(super) constants: u8,
     pub(super) arrays: u8,
     /// Passes over the elements, each of which a step in pieces may stop in.
@@ -95,9 +95,6 @@ pub(super) struct Uses {
     /// Whether it works on what `dst` holds. (Of linear, the detail decides.)
     reads_dst: bool,
 }
-
-/// In place of the number of constants, where that depends on the denoising steps.
-const NAMED: u8 = u8::MAX;
 
 impl Uses {
     /// Nothing but its destination, once.
@@ -113,7 +110,7 @@ impl Form {
         let unused = [
             unless(uses.src > 0, !0xffff),
             unless(linear, 0xffff) | unless(linear || uses.third > 0, !0xffff),
-            unless(linear || uses.constants > 0, !0),
+            unless(linear || uses.constants > 0 || uses.arrays > 0, !0),
         ];
         Self { code, kind, uses, unused }
     }
@@ -166,9 +163,9 @@ operations! {
     /// [`OpKind::Noise`]
     NOISE = 11 "noise": OpKind::Noise, Uses::NONE;
     /// [`OpKind::Table`]
-    TABLE = 12 "table": OpKind::Table, Uses { constants: NAMED, ..Uses::NONE };
+    TABLE = 12 "table": OpKind::Table, Uses { arrays: 1, ..Uses::NONE };
     /// [`OpKind::Denoise`]
-    DENOISE = 13 "denoise": OpKind::Denoise, Uses { src: 1, third: 1, constants: NAMED, reads_dst: true, ..Uses::NONE };
+    DENOISE = 13 "denoise": OpKind::Denoise, Uses { src: 1, third: 1, constants: h::DENOISE_WORDS as u8, reads_dst: true, ..Uses::NONE };
 }
 
 /// What a writer says in an operation's record.
@@ -249,12 +246,6 @@ impl<'a> Op<'a> {
     /// Single constant `i`: see [`OpKind`].
     pub fn constant(&self, i: usize) -> f32 {
         f32::from_bits(word(self.image, self.data().wrapping_add(i)))
-    }
-
-    /// Row `step` of a table, as far as `range` says; empty where that is not in the image.
-    pub(crate) fn row(&self, step: usize, range: &Range<usize>) -> &'a [u32] {
-        let before = step.wrapping_mul(self.dst().len).wrapping_add(range.start);
-        section(self.image, self.data().wrapping_add(before), range.len()).unwrap_or_default()
     }
 
     /// The coefficients of denoising step `step`, and the arena offset of its noise.

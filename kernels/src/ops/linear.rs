@@ -43,8 +43,7 @@ impl RowBlock<'_> {
     }
 
     /// As [`Self::apply`], for a run of the block's rows, which starts at a multiple of [`STRIP`] and ends at another or with
-    /// the block. Where rows have steps,
-    /// `output` is that of the row before (0 before the first); becomes that of the last.
+    /// the block. Where rows have steps, `output` is that of the row before (0 before the first); it becomes that of the last.
     pub(crate) fn apply_rows(
         &self,
         rows: Range<usize>,

@@ -82,26 +82,21 @@ impl Dataset {
         ensure!(episodes > 0 && steps > 0, "array \"obs\" is empty: {:?}", obs.shape);
         ensure!(width == sizes.obs, "array \"obs\" has {width} values a step, the policy takes {}", sizes.obs);
         let noise = arrays.take("noise").filter(|_| sizes.noise > 0);
-        if let Some(noise) = &noise {
+        let beside_obs = |array: &Option<Tensor>, name: &str, width: usize, what: &str| -> Result<()> {
+            let Some(array) = array else { return Ok(()) };
             let mut expected = obs.shape.clone();
-            *expected.last_mut().unwrap_or(&mut 0) = sizes.noise;
+            *expected.last_mut().unwrap_or(&mut 0) = width;
             ensure!(
-                noise.shape == expected,
-                "array \"noise\" is {:?}, {expected:?} is needed: what the policy began from at every observation",
-                noise.shape
+                array.shape == expected,
+                "array {name:?} is {:?}, {expected:?} is needed: {what} at every observation",
+                array.shape
             );
-        }
+            Ok(())
+        };
+        beside_obs(&noise, "noise", sizes.noise, "what the policy began from")?;
         // Actions from noise that nobody knows say nothing.
         let action = arrays.take("action").filter(|_| sizes.noise == 0 || noise.is_some());
-        if let Some(action) = &action {
-            let mut expected = obs.shape.clone();
-            *expected.last_mut().unwrap_or(&mut 0) = sizes.out;
-            ensure!(
-                action.shape == expected,
-                "array \"action\" is {:?}, {expected:?} is needed: the network's raw output at every observation",
-                action.shape
-            );
-        }
+        beside_obs(&action, "action", sizes.out, "the network's raw output")?;
         let state = arrays.take("state");
         if let Some(state) = &state {
             ensure!(sizes.state > 0, "array \"state\" is there, but the policy has no recurrent state");

@@ -4,7 +4,7 @@
 use anyhow::{Result, bail, ensure};
 
 use super::nodes::{Graph, Node};
-use super::ops::NodeKind;
+use super::ops::{Concat, NodeKind, Span};
 use super::values::{ValueId, WeightMatrix};
 
 impl Graph {
@@ -17,9 +17,21 @@ impl Graph {
         Ok(self.matrices.len() - 1)
     }
 
-    /// The index of the matrix of this name.
-    pub fn matrix_named(&self, name: &str) -> Option<usize> {
-        self.matrices.iter().position(|m| m.name == name)
+    /// Takes a weight matrix that several nodes may share, and gives the index of its first.
+    pub fn share_matrix(&mut self, matrix: WeightMatrix) -> Result<usize> {
+        let known = self.matrices.iter().position(|known| *known == matrix);
+        known.map_or_else(|| self.add_matrix(matrix), Ok)
+    }
+
+    /// Parts of values behind each other; a single one that is whole is the value itself.
+    pub fn join(&mut self, parts: Vec<(ValueId, Span)>) -> Result<ValueId> {
+        if let [(value, span)] = parts[..]
+            && span.len == self.len_of(value)
+        {
+            return Ok(value);
+        }
+        let (values, spans): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
+        self.add(Concat(spans), &values)
     }
 
     /// Appends a node that reads `inputs`, and gives its output. An operation that these values or the matrices do not fit is
@@ -86,6 +98,9 @@ mod tests {
         let error =
             graph.add_matrix(WeightMatrix { data: vec![0.0; 5], ..matrix("short", 2, 3) }).expect_err("too short");
         assert_eq!(error.to_string(), "the matrix \"short\" of 2 x 3 has 5 values");
-        assert_eq!(graph.matrix_named("square"), Some(1));
+        // One that is there is shared; another of its name is not.
+        let [known, other] = [matrix("square", 12, 3), WeightMatrix { data: vec![7.0; 36], ..matrix("square", 12, 3) }];
+        assert_eq!(graph.share_matrix(known).expect("fits"), 1);
+        assert_eq!(graph.share_matrix(other).expect("fits"), 2);
     }
 }

@@ -1,6 +1,6 @@
 //! What makes a network an iterative head: the steps from noise to its output.
 
-use actq_kernels::ops::denoise::Coefficients;
+use actq_kernels::ops::denoise::{Coefficients, add_noise, denoise};
 use ndarray::{Array2, ArrayView2, s};
 
 /// The denoising steps of a flow or a diffusion policy. The network reads the iterate by a node
@@ -45,18 +45,16 @@ impl Denoising {
     /// After `step`, in which the network gave `v`: as [`actq_kernels::ops::denoise`].
     pub(super) fn next(&self, step: usize, at: &Iterates, v: &Array2<f32>, noise: ArrayView2<'_, f32>) -> Iterates {
         let by = &self.steps[step];
-        let (mut x, mut y) = (at.x.clone(), at.y.clone());
-        for (i, v) in v.rows().into_iter().enumerate() {
-            let v: Vec<f32> = v.to_vec();
-            let (mut x, mut y) = (x.row_mut(i), y.row_mut(i));
-            let (Some(x), Some(y)) = (x.as_slice_mut(), y.as_slice_mut()) else { continue };
-            actq_kernels::ops::denoise::denoise(by, self.limit, &v, x, y);
-            if by.sigma != 0.0 {
-                let z = noise.slice(s![i, (1 + step) * self.len..(2 + step) * self.len]).to_vec();
-                actq_kernels::ops::denoise::add_noise(by.sigma, &z, x, y);
-            }
+        let mut x: Vec<f32> = at.x.iter().copied().collect();
+        let (mut y, v) = (vec![0.0; x.len()], v.iter().copied().collect::<Vec<f32>>());
+        denoise(by, self.limit, &v, &mut x, &mut y);
+        if by.sigma != 0.0 {
+            let z: Vec<f32> =
+                noise.slice(s![.., (1 + step) * self.len..(2 + step) * self.len]).iter().copied().collect();
+            add_noise(by.sigma, &z, &mut x, &mut y);
         }
-        Iterates { x, y }
+        let array = |values| Array2::from_shape_vec(at.x.raw_dim(), values).unwrap_or_default();
+        Iterates { x: array(x), y: array(y) }
     }
 
     /// From the derivatives by the iterate and the network's input after a step to those by the iterate before it and by the

@@ -51,8 +51,7 @@ pub fn iterative(flat: &Graph, obs_len: usize, times: &[Vec<f32>], steps: Denois
     });
     let pass = Network::in_order(flat).forward(&Weights::of(flat), rows, &mut zero_state(flat, times.len()));
     let needs = needs(flat, obs_len, time_len)?;
-    let ensured = needs[flat.output()] == Needs::Step;
-    ensure!(ensured, "the output does not depend on the iterate");
+    ensure!(needs[flat.output()] == Needs::Step, "the output does not depend on the iterate");
     let mut hoist = Hoist {
         flat,
         spans: [0..obs_len, obs_len..obs_len + time_len, obs_len + time_len..flat.obs_len],
@@ -246,16 +245,9 @@ impl Hoist<'_> {
         let data = whole.data.chunks_exact(whole.cols).flat_map(|row| columns.iter().map(|&c| row[c])).collect();
         let name = format!("{} ({part})", whole.name);
         let (rows, cols) = (whole.rows, columns.len());
-        let matrix = match self.graph.matrix_named(&name) {
-            Some(matrix) => matrix,
-            None => self.graph.add_matrix(WeightMatrix { name, rows, cols, data })?,
-        };
+        let matrix = self.graph.share_matrix(WeightMatrix { name, rows, cols, data })?;
         let bias = if biased { linear.bias.clone() } else { vec![0.0; rows] };
-        let (values, spans) = self.gathered(&chosen)?;
-        let input = match (&values[..], &spans[..]) {
-            ([value], [span]) if span.len == self.graph.len_of(*value) => *value,
-            _ => self.graph.add(Concat(spans), &values)?,
-        };
+        let input = self.joined(chosen)?;
         self.graph.add(Linear { matrix, bias }, &[input]).map(Some)
     }
 
@@ -265,18 +257,10 @@ impl Hoist<'_> {
         let mut kind = node.kind.clone();
         if let NodeKind::Linear(linear) = &mut kind {
             let matrix = &self.flat.matrices[linear.matrix];
-            linear.matrix = match self.graph.matrix_named(&matrix.name) {
-                Some(known) => known,
-                None => self.graph.add_matrix(matrix.clone())?,
-            };
+            linear.matrix = self.graph.share_matrix(matrix.clone())?;
         }
         let place = if let NodeKind::Concat(Concat(spans)) = &kind {
-            let chosen: Vec<_> = node.inputs.iter().copied().zip(spans.iter().copied()).collect();
-            let (values, spans) = self.gathered(&chosen)?;
-            match (&values[..], &spans[..]) {
-                ([value], [span]) if span.len == self.graph.len_of(*value) => *value,
-                _ => self.graph.add(Concat(spans), &values)?,
-            }
+            self.joined(node.inputs.iter().copied().zip(spans.iter().copied()).collect())?
         } else {
             let inputs = node.inputs.iter().map(|&value| self.place(value)).collect::<Result<Vec<_>>>()?;
             self.graph.add(kind, &inputs)?
@@ -285,12 +269,11 @@ impl Hoist<'_> {
         Ok(())
     }
 
-    /// Parts of the flat network's values as parts of the result's.
-    fn gathered(&mut self, parts: &[(ValueId, Span)]) -> Result<(Vec<ValueId>, Vec<Span>)> {
+    /// Parts of the flat network's values behind each other.
+    fn joined(&mut self, mut parts: Vec<(ValueId, Span)>) -> Result<ValueId> {
         let [_, time, iterate] = self.spans.clone();
-        let mut gathered = (Vec::new(), Vec::new());
-        for (value, span) in parts {
-            let (value, from) = match (*value, self.needs_of(*value, span)) {
+        for (value, span) in &mut parts {
+            (*value, span.from) = match (*value, self.needs_of(*value, span)) {
                 (0, Needs::Observation) => (0, span.from),
                 (0, Needs::Time) => {
                     let rows = self.tables[0].rows().into_iter();
@@ -300,10 +283,8 @@ impl Hoist<'_> {
                 (0, Needs::Step) => (self.iterate, span.from - iterate.start),
                 (value, _) => (self.place(value)?, span.from),
             };
-            gathered.0.push(value);
-            gathered.1.push(Span { from, len: span.len });
         }
-        Ok(gathered)
+        self.graph.join(parts)
     }
 
     /// The result's value for one of the flat network; of the time alone, a table.
@@ -313,6 +294,8 @@ impl Hoist<'_> {
         }
         ensure!(value != 0 && self.needs[value] == Needs::Time, "an op takes observation, time and iterate as one");
         let (rows, len) = (self.tables[value].iter().copied().collect(), self.tables[value].ncols());
-        self.graph.add(Table { rows, len }, &[])
+        let table = self.graph.add(Table { rows, len }, &[])?;
+        self.places[value] = Some(table);
+        Ok(table)
     }
 }

@@ -4,7 +4,7 @@
 pub type ValueId = usize;
 
 /// A weight matrix, row-major, rows are outputs.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct WeightMatrix {
     /// The tensor's name.
     pub name: String,

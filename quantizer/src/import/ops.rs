@@ -187,7 +187,7 @@ impl<'a> Builder<'a> {
     /// The matrix of a tensor; one that several ops share is read once.
     fn matrix(&mut self, name: &str, rows: Option<usize>, cols: usize) -> Result<usize> {
         let matrix = self.weights.matrix(name, rows, cols)?;
-        self.graph.matrix_named(name).map_or_else(|| self.graph.add_matrix(matrix), Ok)
+        self.graph.share_matrix(matrix)
     }
 
     fn slot(&self, name: &str) -> Result<ValueId> {
@@ -202,13 +202,7 @@ impl<'a> Builder<'a> {
     fn gather(&mut self, names: &[String]) -> Result<ValueId> {
         let parts = names.iter().map(|name| self.part(name)).collect::<Result<Vec<_>>>()?;
         ensure!(!parts.is_empty(), "input is an empty list");
-        if let [(value, span)] = parts[..]
-            && span.len == self.graph.len_of(value)
-        {
-            return Ok(value);
-        }
-        let (values, spans): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
-        self.graph.add(Concat(spans), &values)
+        self.graph.join(parts)
     }
 
     fn part(&self, text: &str) -> Result<(ValueId, Span)> {
