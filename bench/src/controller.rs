@@ -1,16 +1,17 @@
 //! The application under QEMU, and the link to it.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
-use actq_boards::Target;
+use actq_boards::{Clock, Target};
 use actq_device::client::Client;
 use actq_device::connection::Connection;
 use actq_device::event::Event;
-use actq_device::port::Address;
+use actq_device::port::{Address, Port};
 use actq_link::report::Status;
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Result, bail, ensure};
 use tempfile::TempDir;
 
 use crate::qemu::{in_slot, spawn};
@@ -30,17 +31,23 @@ pub struct Controller {
 }
 
 impl Controller {
-    /// Starts an application, with an image in the slot if one is given.
+    /// Starts an application, with an image in the slot if one is given. Its time is counted in instructions.
     pub fn start(target: Target, elf: &Path, slot: Option<&Path>) -> Result<Self> {
+        Self::start_by(target, elf, slot, Clock::Counted)
+    }
+
+    /// As [`Self::start`], by another clock.
+    pub fn start_by(target: Target, elf: &Path, slot: Option<&Path>, clock: Clock) -> Result<Self> {
         let folder = TempDir::new()?;
         let serial = format!("unix:{},server=on,wait=off", socket(&folder).display());
-        let mut command = target.run_with_serial(elf, &serial);
+        let mut command = target.run_with_serial(elf, &serial, clock);
+        command.arg("-qmp").arg(format!("unix:{},server=on,wait=off", monitor(&folder).display()));
         in_slot(&mut command, elf, slot)?;
         // With its time aligned to the host's, QEMU says on its output when it is late.
         let child = spawn(command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::inherit()))?;
         let controller = Self { child, folder };
         let begun = Instant::now();
-        while !socket(&controller.folder).exists() {
+        while !(socket(&controller.folder).exists() && monitor(&controller.folder).exists()) {
             if begun.elapsed() > PATIENCE {
                 bail!("QEMU does not open its serial port");
             }
@@ -54,10 +61,44 @@ impl Controller {
         Address::Unix(socket(&self.folder).display().to_string())
     }
 
+    /// Resets the board, as its pin does (QEMU's `system_reset`). Memory keeps what it has.
+    pub fn reset(&self) -> Result<()> {
+        let mut monitor =
+            Address::Unix(monitor(&self.folder).display().to_string()).open().context("QEMU's monitor")?;
+        for command in ["qmp_capabilities", "system_reset"] {
+            writeln!(monitor, "{{\"execute\": \"{command}\"}}")?;
+            answered(&mut *monitor).with_context(|| format!("QEMU's {command}"))?;
+        }
+        Ok(())
+    }
+
     /// A host at the serial port.
     pub fn client(&self) -> Result<Client> {
         Ok(Client::new(Connection::open(self.address(), PATIENCE)?, PATIENCE))
     }
+}
+
+fn socket(folder: &TempDir) -> PathBuf {
+    folder.path().join("serial")
+}
+
+fn monitor(folder: &TempDir) -> PathBuf {
+    folder.path().join("monitor")
+}
+
+/// Waits for the answer to a command of QEMU's monitor. Greeting and events may come before.
+fn answered(monitor: &mut dyn Port) -> Result<()> {
+    let (begun, mut said) = (Instant::now(), String::new());
+    while !said.contains("\"return\"") {
+        ensure!(!said.contains("\"error\"") && begun.elapsed() < PATIENCE, "no success: {said:?}");
+        let mut bytes = [0; 512];
+        match monitor.read(&mut bytes) {
+            Ok(count) => said += &String::from_utf8_lossy(bytes.get(..count).unwrap_or_default()),
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
+            Err(error) => return Err(error.into()),
+        }
+    }
+    Ok(())
 }
 
 /// The action on an observation, and whether the outputs follow it. On a line without faults, but on a machine that may stop QEMU for so
@@ -83,10 +124,6 @@ pub fn act(client: &mut Client, observation: &[f32]) -> Result<(bool, Vec<f32>)>
         }
     }
     bail!("no action: {:?}", client.status()?)
-}
-
-fn socket(folder: &TempDir) -> PathBuf {
-    folder.path().join("serial")
 }
 
 /// Asks for the status until `wanted`.

@@ -80,14 +80,22 @@ fn harness_in_folder(target: Target, image: &Path) -> Result<PathBuf> {
 /// Builds the application for a target's board, with the image of [`harness`] and with more features, separated by commas, and gives the
 /// path of the ELF file.
 pub fn controller(target: Target, features: &'static str) -> Result<PathBuf> {
-    let build = || {
-        let image = built_in()?.to_string_lossy();
-        let more = if features.is_empty() { String::new() } else { format!(",{features}") };
-        let all = target.board().name.to_owned() + &more;
-        build(APPLICATION, &[CONTROLLER], &all, &target_dir(), target, target.profile(), &[("ACTQ_IMAGE", &image)])
-    };
+    let build = || controller_in_folder(target, features, built_in()?);
     let what = if features.is_empty() { CONTROLLER } else { features };
     Ok(once(what, target, build)?.join(CONTROLLER))
+}
+
+/// Builds the application with `image` built in.
+pub fn controller_with(target: Target, image: &Path) -> Result<PathBuf> {
+    Ok(controller_in_folder(target, "", image)?.join(CONTROLLER))
+}
+
+fn controller_in_folder(target: Target, features: &str, image: &Path) -> Result<PathBuf> {
+    let image = fs::canonicalize(image).with_context(|| format!("{}: cannot be read", image.display()))?;
+    let more = if features.is_empty() { String::new() } else { format!(",{features}") };
+    let all = target.board().name.to_owned() + &more;
+    let image = ("ACTQ_IMAGE", &*image.to_string_lossy());
+    build(APPLICATION, &[CONTROLLER], &all, &target_dir(), target, target.profile(), &[image])
 }
 
 /// Builds the binaries of `firmware-bench` that run on a target's board, and gives the path of one's ELF file.

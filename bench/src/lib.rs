@@ -15,6 +15,7 @@ pub mod networks;
 pub mod profile;
 pub mod qemu;
 mod shared;
+pub mod uart;
 
 use std::path::PathBuf;
 

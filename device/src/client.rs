@@ -16,6 +16,8 @@ use crate::event::Event;
 const REPEAT: Duration = Duration::from_millis(150);
 /// But no longer than this.
 const SLOWEST: Duration = Duration::from_secs(1);
+/// How often a change is asked for, each time with the token of now.
+const TRIES: usize = 3;
 
 /// A controller, to ask.
 pub struct Client {
@@ -159,7 +161,14 @@ impl Client {
     ///
     /// Where it is refused, or there is no answer.
     pub fn set(&mut self, parameter: Parameter, axis: u8, value: f32) -> Result<()> {
-        let outcome = self.with_token(|token| Message::Set { token, parameter, axis, value })?;
+        let mut outcome = Err(Refusal::Token);
+        for _ in 0..TRIES {
+            outcome = self.with_token(|token| Message::Set { token, parameter, axis, value })?;
+            // A request before this one that was repeated may have changed the state once more.
+            if outcome != Err(Refusal::Token) {
+                break;
+            }
+        }
         outcome.with_context(|| format!("{parameter} of axis {axis} is not set to {value}"))
     }
 

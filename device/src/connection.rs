@@ -15,12 +15,26 @@ const RETRY: Duration = Duration::from_millis(200);
 /// After so long without a good frame the controller may have started anew, and counts from the beginning.
 const QUIET: Duration = Duration::from_millis(500);
 
+/// Opens a port; called again where it has broken.
+pub type Opener = Box<dyn FnMut() -> io::Result<Box<dyn Port>> + Send>;
+
+/// A host's time in µs; wraps.
+pub type Clock = Box<dyn Fn() -> u32 + Send>;
+
+fn since_epoch() -> Duration {
+    SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default()
+}
+
 /// A link to a controller.
 pub struct Connection {
-    address: Address,
+    /// What errors call it.
+    name: String,
+    open: Opener,
     port: Option<Box<dyn Port>>,
     receiver: Receiver<{ frame::bytes(frame::MAX_PAYLOAD) }>,
     sender: Sender,
+    /// What a frame says about its time, µs.
+    clock: Clock,
     /// How long to try to open the port again.
     patience: Duration,
     /// Since when the port is gone.
@@ -38,21 +52,37 @@ impl Connection {
     ///
     /// Where it cannot be opened now.
     pub fn open(address: Address, patience: Duration) -> Result<Self> {
-        let port = address.open().with_context(|| format!("{address}: cannot be opened"))?;
+        Self::open_by(address.to_string(), Box::new(move || address.open()), patience)
+    }
+
+    /// As [`Self::open`], for a port that has no [`Address`]: `name` is what errors call it.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::open`].
+    pub fn open_by(name: String, mut open: Opener, patience: Duration) -> Result<Self> {
+        let port = open().with_context(|| format!("{name}: cannot be opened"))?;
         let now = Instant::now();
         // Ahead of what an earlier process has sent, as long as that was less than a thousand frames a second.
-        let first = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_millis() as u32;
+        let first = since_epoch().as_millis() as u32;
         Ok(Self {
-            address,
+            name,
+            open,
             port: Some(port),
             receiver: Receiver::new(),
             sender: Sender::new(first),
+            clock: Box::new(|| since_epoch().as_micros() as u32),
             patience,
             gone: None,
             tried: now,
             heard: now,
             reopened: 0,
         })
+    }
+
+    /// Takes the time from another clock than the system's: a simulator's.
+    pub fn set_clock(&mut self, clock: Clock) {
+        self.clock = clock;
     }
 
     /// Sends a message and gives its sequence number. On a port that is gone it is lost, as on any line.
@@ -63,8 +93,8 @@ impl Connection {
     pub fn send(&mut self, message: &Message<'_>) -> Result<u32> {
         let number = self.sender.next();
         let mut buffer = [0; frame::wire_bytes(frame::MAX_PAYLOAD)];
-        let micros = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_micros() as u32;
-        let wire = self.sender.frame(message, micros, &mut buffer).context("the message is longer than a frame")?;
+        let wire =
+            self.sender.frame(message, (self.clock)(), &mut buffer).context("the message is longer than a frame")?;
         // A zero first, so that a frame whose end was lost on the way does not take this one with it.
         self.raw(&[&[0], wire].concat());
         Ok(number)
@@ -117,14 +147,14 @@ impl Connection {
             return Ok(());
         }
         self.tried = Instant::now();
-        match (self.address.open(), &self.gone) {
+        match ((self.open)(), &self.gone) {
             (Ok(port), _) => {
                 (self.port, self.gone) = (Some(port), None);
                 self.reopened += 1;
                 self.receiver.reopen();
             }
             (Err(error), Some((since, first))) if since.elapsed() >= self.patience => {
-                bail!("{}: lost ({first}), and not there again for {:.1?}: {error}", self.address, self.patience)
+                bail!("{}: lost ({first}), and not there again for {:.1?}: {error}", self.name, self.patience)
             }
             (Err(_), _) => {}
         }

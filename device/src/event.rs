@@ -46,7 +46,7 @@ pub enum Event {
 
 impl Event {
     /// What a controller may say; `None` for what only a host says.
-    pub(crate) fn of(message: &Message<'_>, micros: u32) -> Option<Self> {
+    pub fn of(message: &Message<'_>, micros: u32) -> Option<Self> {
         Some(match *message {
             Message::Action { of, applied, values } => {
                 Self::Action { of, applied, micros, values: values.iter().collect() }

@@ -27,39 +27,103 @@ pub struct Package<'a> {
     pub signature: Option<&'a [u8; 64]>,
 }
 
+/// An image on its way into a controller, a request at a time: observations may be sent in between.
+#[derive(Debug)]
+pub struct Push<'a> {
+    package: Package<'a>,
+    /// Of an image's bytes in a frame.
+    chunk: usize,
+    stage: Stage,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    Begin,
+    /// So many bytes are written.
+    Write(usize),
+    Done,
+}
+
+impl<'a> Push<'a> {
+    /// Asks the controller how much it takes at once.
+    ///
+    /// # Errors
+    ///
+    /// Where there is no answer, or the image or the controller's memory is of no use.
+    pub fn new(client: &mut Client, package: Package<'a>) -> Result<Self> {
+        let payload = usize::from(client.status()?.payload);
+        // Whole words, beside the offset.
+        let chunk = payload.min(MOST).saturating_sub(4) / 4 * 4;
+        ensure!(chunk > 0, "the controller's memory for a frame has no room for a part of an image ({payload} bytes)");
+        u32::try_from(package.image.len()).context("the image is longer than 4 GiB")?;
+        Ok(Self { package, chunk, stage: Stage::Begin })
+    }
+
+    /// Sends at most so many bytes in a frame: where the line is slow, observations go in between. At least 4.
+    pub fn in_chunks_of(&mut self, most: usize) {
+        self.chunk = self.chunk.min(most.max(4) / 4 * 4);
+    }
+
+    /// Bytes that the controller has taken.
+    pub const fn taken(&self) -> usize {
+        match self.stage {
+            Stage::Begin => 0,
+            Stage::Write(at) => at,
+            Stage::Done => self.package.image.len(),
+        }
+    }
+
+    /// Does the next request; whether the image runs now. Before the first and the last one the controller may be busy for a while.
+    ///
+    /// # Errors
+    ///
+    /// Where the controller refuses it, with the reason; the old image runs on.
+    pub fn advance(&mut self, client: &mut Client) -> Result<bool> {
+        let Package { image, version, signature } = self.package;
+        let length = image.len() as u32;
+        match self.stage {
+            Stage::Begin => {
+                let crc = CRC.checksum(image);
+                let begin = |client: &mut Client| {
+                    let token = client.status()?.token;
+                    client.request(&Message::Begin { token, length, crc, version })
+                };
+                until_done(client, begin)?.context("the update cannot begin")?;
+                self.stage = Stage::Write(0);
+            }
+            Stage::Write(at) if at < image.len() => {
+                let bytes = image.get(at..image.len().min(at + self.chunk)).unwrap_or_default();
+                let (written, outcome) = client.request(&Message::Chunk { offset: at as u32, bytes })?;
+                match outcome {
+                    // It tells from where to go on.
+                    Ok(()) | Err(Refusal::Offset) => {}
+                    Err(refusal) => bail!("the image's bytes from {at} on are refused: {refusal}"),
+                }
+                ensure!(written <= length, "the controller says that it has {written} bytes of {length}");
+                self.stage = Stage::Write(written as usize);
+            }
+            Stage::Write(_) => {
+                until_done(client, |client| client.request(&Message::Commit { signature }))?
+                    .context("the image is refused")?;
+                self.stage = Stage::Done;
+            }
+            Stage::Done => {}
+        }
+        Ok(self.stage == Stage::Done)
+    }
+}
+
 /// Sends an image, and returns once it runs. `progress` is told bytes taken.
 ///
 /// # Errors
 ///
-/// Where the controller refuses it, with the reason; the old image runs on.
+/// As [`Push::new`] and [`Push::advance`].
 pub fn push(client: &mut Client, package: &Package<'_>, mut progress: impl FnMut(usize)) -> Result<()> {
-    let Package { image, version, signature } = *package;
-    let payload = usize::from(client.status()?.payload);
-    // Whole words, beside the offset.
-    let chunk = payload.min(MOST).saturating_sub(4) / 4 * 4;
-    ensure!(chunk > 0, "the controller's memory for a frame has no room for a part of an image ({payload} bytes)");
-    let length = u32::try_from(image.len()).context("the image is longer than 4 GiB")?;
-    let crc = CRC.checksum(image);
-    let begin = |client: &mut Client| {
-        let token = client.status()?.token;
-        client.request(&Message::Begin { token, length, crc, version })
-    };
-    until_done(client, begin)?.context("the update cannot begin")?;
-    let mut at = 0;
-    progress(at);
-    while at < image.len() {
-        let bytes = image.get(at..image.len().min(at + chunk)).unwrap_or_default();
-        let (written, outcome) = client.request(&Message::Chunk { offset: at as u32, bytes })?;
-        match outcome {
-            // It tells from where to go on.
-            Ok(()) | Err(Refusal::Offset) => {}
-            Err(refusal) => bail!("the image's bytes from {at} on are refused: {refusal}"),
-        }
-        ensure!(written <= length, "the controller says that it has {written} bytes of {length}");
-        at = written as usize;
-        progress(at);
+    let mut push = Push::new(client, *package)?;
+    while !push.advance(client)? {
+        progress(push.taken());
     }
-    until_done(client, |client| client.request(&Message::Commit { signature }))?.context("the image is refused")
+    Ok(())
 }
 
 /// Repeats a request while the controller is busy with it.
@@ -70,7 +134,8 @@ fn until_done(
     let begun = Instant::now();
     loop {
         match request(client)?.1 {
-            Err(Refusal::Busy) if begun.elapsed() < BUSY => std::thread::sleep(ASK_AGAIN),
+            // A repeated request before this one may have changed the state: the token of now is another one.
+            Err(Refusal::Busy | Refusal::Token) if begun.elapsed() < BUSY => std::thread::sleep(ASK_AGAIN),
             outcome => return Ok(outcome),
         }
     }

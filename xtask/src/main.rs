@@ -1,5 +1,5 @@
 //! What people and CI type: `cargo demo`, `cargo verify`, `cargo xtask bench`, `cargo xtask budgets`, `cargo xtask fit`,
-//! `cargo xtask compare`, `cargo xtask firmware`, `cargo xtask doctor`.
+//! `cargo xtask compare`, `cargo xtask faults`, `cargo xtask firmware`, `cargo xtask doctor`.
 //!
 //! This crate depends on next to nothing, so that it is built and speaks at once. What measures is the binary of `actq-bench`.
 #![forbid(unsafe_code)]
@@ -22,11 +22,12 @@ Commands of the actq workspace. Usage: cargo xtask COMMAND
   budgets  Measure instructions, code, scratch and stack, and compare them with budgets.json
   compare  Compare the quantizer's methods: held-out error, true bits, closed-loop success
   firmware Build the motor controller for a board: --board NAME [--image F.actq] --out FILE.elf; --list shows the boards
+  faults   Drive an arm through the serial port of the controller in QEMU, with faults on the line
   fit      Measure the cost model's rates anew (after every change of the kernels)
   verify   Everything that CI checks: format, lints, documentation, tests on the host and under QEMU, budgets
   doctor   Check and install what the other commands need: Rust targets and QEMU
 
-demo, bench, budgets, compare, fit and firmware show their options with --help.";
+demo, bench, budgets, compare, faults, fit and firmware show their options with --help.";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -42,7 +43,7 @@ fn main() -> ExitCode {
             }
         },
         ["compare", ..] => measuring(&words),
-        ["demo" | "bench" | "fit", ..] => measure(&words, &[Target::Fpu]),
+        ["demo" | "bench" | "faults" | "fit", ..] => measure(&words, &[Target::Fpu]),
         ["budgets", ..] => measure(&words, &[Target::Fpu, Target::M33]),
         ["help" | "-h" | "--help"] => {
             println!("{USAGE}");

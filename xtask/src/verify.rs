@@ -170,6 +170,9 @@ fn steps(oldest: Result<(), String>, narrow: Result<(), String>, skipped: &str) 
     add("tests", &[&["test", "--no-fail-fast"], &host[..]].concat(), &[("ACTQ_SKIPPED", skipped)]);
     add("budgets", &[&["run"], &host[..], &["--package", "actq-bench", "--", "budgets"]].concat(), &[]);
 
+    // By itself: what it shows is a matter of time.
+    add("faults on the line", &[&["run"], &host[..], &["--package", "actq-bench", "--", "faults"]].concat(), &[]);
+
     let asked = std::env::var_os(ONNX_VARIABLE).is_some_and(|value| !value.is_empty());
     let command = asked.then(|| {
         let mut command = cargo();

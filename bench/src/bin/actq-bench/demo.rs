@@ -22,7 +22,7 @@ use actq_ur3::task::{EPISODE_STEPS, Outcome, run_episode};
 use anyhow::{Context, Result, ensure};
 use ndarray::Array3;
 
-use crate::{heads, kernels};
+use crate::{faults, heads, kernels};
 
 /// First seed of the closed-loop episodes; the policy was trained and calibrated on others.
 const FIRST_SEED: u64 = 1000;
@@ -51,6 +51,9 @@ fn record(policy: &mut PolicyF32) -> Result<Dataset> {
         state: None,
     })
 }
+
+/// What the motor controller runs.
+const IN_THE_APPLICATION: &str = "3.0 bits";
 
 /// A policy's column in the table.
 struct Column {
@@ -103,10 +106,10 @@ pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
     let recordings = Recordings { calib: Some(record(&mut reference)?), heldout: None };
     let eight = Options::new(Method::Gptq, Budget::Width(Width::W8));
     let best = |bits| Options { steps: Some(STEPS), ..Options::new(Method::Best, Budget::BitsPerWeight(bits)) };
-    for (name, options) in [("8 bits", eight), ("3.0 bits", best(3.0)), ("2.0 bits", best(2.0))] {
+    for (name, options) in [("8 bits", eight), (IN_THE_APPLICATION, best(3.0)), ("2.0 bits", best(2.0))] {
         println!("Quantizing to {name} by {}", options.method);
         let quantizer = Quantizer::new(&policy, &recordings, options.method, |_| {})?;
-        let path = work.join(format!("ur3 {name}.actq").replace(' ', "-"));
+        let path = work.join(file(name));
         let bytes = heads::write_image(&quantizer, &options, &path)?;
         let buffer = ImageBuffer::new(&bytes);
         let image = buffer.image(&path)?;
@@ -150,12 +153,17 @@ pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
         summary.add_row(std::iter::once((*row).to_owned()).chain(cells));
     }
     println!("\n{summary}\n\n{}\n", report.join("\n"));
+    faults::some(&work.join(file(IN_THE_APPLICATION)))?;
     let records = kernels::measure(&counter, 0)?;
     println!(
         "A whole call each on the Cortex-M4, instructions counted, cycles modelled:\n\n{}",
         kernels::report(&records, Some((256, 256)))
     );
     Ok(())
+}
+
+fn file(name: &str) -> String {
+    format!("ur3 {name}.actq").replace(' ', "-")
 }
 
 fn closed_loop(episodes: u64, mut episode: impl FnMut(u64) -> Result<Outcome>) -> Result<Vec<Outcome>> {

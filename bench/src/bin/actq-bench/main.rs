@@ -1,11 +1,12 @@
 //! The commands that measure: `cargo demo`, `cargo xtask bench`, `cargo xtask budgets`, `cargo xtask fit`,
-//! `cargo xtask compare`. xtask installs what they need, builds this binary and runs it.
+//! `cargo xtask faults`, `cargo xtask compare`. xtask installs what they need, builds this binary and runs it.
 #![forbid(unsafe_code)]
 
 mod bench;
 mod boards;
 mod budgets;
 mod demo;
+mod faults;
 mod fit;
 mod heads;
 mod kernels;
@@ -49,6 +50,10 @@ enum Command {
         #[arg(long)]
         by_function: bool,
     },
+    /// Drive the UR3's arm through the serial port of the controller in QEMU, with faults on the line
+    ///
+    /// One episode of 4 s for each fault: frames lost, late, twice and damaged, a cut cable, a host that stalls, a reset, an update.
+    Faults,
     /// Measure instructions, code, scratch and stack, and compare them with budgets.json
     Budgets {
         /// Write what was measured to budgets.json
@@ -68,6 +73,7 @@ enum Command {
 fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Demo { episodes, qemu_episodes } => demo::run(episodes, qemu_episodes),
+        Command::Faults => faults::all(),
         Command::Bench { json, wait_states, by_function } => bench::run(json.as_deref(), wait_states, by_function),
         Command::Budgets { update } => budgets::run(update),
         Command::Fit => fit::run(),

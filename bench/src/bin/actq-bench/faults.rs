@@ -1,0 +1,111 @@
+//! `cargo xtask faults`: the arm in closed loop through the controller's serial port, with faults on the line.
+
+use std::path::Path;
+
+use actq::budget::Budget;
+use actq::data::Recordings;
+use actq::methods::{Method, Options};
+use actq::pipeline::quantize;
+use actq::policy::Policy;
+use actq::report::table::table;
+use actq::runtime::ImageBuffer;
+use actq_bench::uart::{Rig, Run, Trouble, foreign};
+use actq_bench::{Target, firmware, ur3};
+use actq_kernels::Image;
+use actq_ur3::task::EPISODE_STEPS;
+use anyhow::{Result, ensure};
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// First seed of the episodes; the policy was trained and recorded on others, and `cargo demo`'s other episodes are others.
+const FIRST_SEED: u64 = 3000;
+/// Of the faults.
+const SEED: u64 = 1;
+/// Attempts at an episode.
+const ATTEMPTS: usize = 3;
+
+/// All faults, with the UR3's policy in 3 bits, and an update to another image of it.
+pub(crate) fn all() -> Result<()> {
+    let policy = Policy::load(&ur3())?;
+    let options = Options { steps: Some(0), ..Options::new(Method::Best, Budget::BitsPerWeight(3.0)) };
+    let new = ImageBuffer::new(&quantize(&policy, &Recordings::load(&policy)?, &options, |_, _| {})?.image);
+    let old = firmware::built_in()?;
+    let buffer = ImageBuffer::read(old)?;
+    run(Target::Fpu, old, &Trouble::all(new.bytes()), &[buffer.image(old)?, new.image(Path::new("the new image"))?])
+}
+
+/// Two of them, with this image: for a demonstration.
+pub(crate) fn some(image: &Path) -> Result<()> {
+    let buffer = ImageBuffer::read(image)?;
+    let troubles: Vec<_> = Trouble::all(&[]).into_iter().filter(Trouble::is_telling).collect();
+    run(Target::Fpu, image, &troubles, &[buffer.image(image)?])
+}
+
+/// An episode for each of `troubles` with the application for the target's board, which has `image` built in, and the table of what
+/// happened. `images` are the one that is built in and those that updates bring.
+pub(crate) fn run(target: Target, image: &Path, troubles: &[Trouble<'_>], images: &[Image<'_>]) -> Result<()> {
+    println!(
+        "\nClosed loop through the serial port of the controller ({} in QEMU), with faults on the line",
+        target.board().name
+    );
+    let elf = firmware::controller_with(target, image)?;
+    let mut rig = Rig::start(target, &elf, &images[0], SEED)?;
+    let mut summary =
+        table(&["fault", "of frames", "found", "safe after", "armed again", "actions", "goals", "tracking"]);
+    let mut failures = Vec::new();
+    for (seed, trouble) in (FIRST_SEED..).zip(troubles) {
+        let mut run = episode(&mut rig, seed, trouble)?;
+        for _ in 1..ATTEMPTS {
+            // On a machine that is busy otherwise, QEMU's serial port may be too slow for the deadline.
+            let Err(why) = run.check(trouble) else { break };
+            println!("  {trouble}: {why}; once more");
+            run = episode(&mut rig, seed, trouble)?;
+        }
+        failures.extend(run.check(trouble).err().map(|why| format!("{trouble}: {why}")));
+        summary.add_row(row(trouble, &run));
+    }
+    println!("\n{summary}\n");
+    let (said, shown) = rig.log();
+    let (foreign, _) = foreign(said, shown, images)?;
+    println!(
+        "{} actions of the controller, {foreign} of them not those of the host's executor, bit for bit",
+        said.len()
+    );
+    ensure!(foreign == 0, "the controller has given actions that its head does not give");
+    ensure!(failures.is_empty(), "{}", failures.join("\n"));
+    Ok(())
+}
+
+/// An episode, with a live line on a terminal.
+fn episode(rig: &mut Rig, seed: u64, trouble: &Trouble<'_>) -> Result<Run> {
+    let bar = ProgressBar::new(EPISODE_STEPS as u64).with_prefix(trouble.to_string());
+    bar.set_style(ProgressStyle::with_template("  {prefix:22} [{bar:30}] {msg}")?.progress_chars("=> "));
+    let run = rig.run(seed, *trouble, |progress| {
+        bar.set_position(progress.steps as u64);
+        let (millimetres, speed) = (1e3 * progress.distance, progress.fastest);
+        bar.set_message(format!("{}, {millimetres:.0} mm to the goal, {speed:.1} rad/s", progress.state));
+    });
+    bar.finish_and_clear();
+    run
+}
+
+fn row(trouble: &Trouble<'_>, run: &Run) -> Vec<String> {
+    let dash = || "-".to_owned();
+    let tally = run.tally;
+    let met = tally.dropped + tally.delayed + tally.duplicated + tally.corrupted;
+    let found = run.found.0 + run.found.1 + run.refused;
+    let goals = match (run.outcome.success, run.reached) {
+        (true, _) => "both",
+        (false, true) => "the second",
+        (false, false) => "missed",
+    };
+    vec![
+        trouble.to_string(),
+        format!("{met} of {}", tally.sent),
+        found.to_string(),
+        run.reaction.map_or_else(dash, |reaction| format!("{} to {} ms", reaction.least, reaction.most)),
+        run.again.map_or_else(dash, |ms| format!("{ms} ms")),
+        format!("{} of {EPISODE_STEPS}", run.applied),
+        goals.to_owned(),
+        format!("{:.1} mm", 1e3 * run.outcome.tracking_error_m),
+    ]
+}

@@ -1,0 +1,52 @@
+//! Whether the board's actions are those of the host's executor.
+
+use std::collections::HashMap;
+
+use actq_kernels::{Head, Image};
+use anyhow::Result;
+
+/// An action of the board's head.
+#[derive(Clone, Debug)]
+pub struct Said {
+    /// Number of its observation.
+    pub of: u32,
+    /// Its bits.
+    pub bits: Vec<u32>,
+}
+
+fn bits(action: &[f32]) -> Vec<u32> {
+    action.iter().map(|value| value.to_bits()).collect()
+}
+
+/// How many of the board's actions, in their order, no head of these images gives on their observations: going on from the action before,
+/// from a reset, or as the first one of the next image. And how often a head began anew.
+pub fn foreign(said: &[Said], shown: &HashMap<u32, Vec<f32>>, images: &[Image<'_>]) -> Result<(usize, usize)> {
+    let mut memory: Vec<Vec<u32>> = images.iter().map(|image| vec![0; image.scratch_words()]).collect();
+    let mut heads = images
+        .iter()
+        .zip(&mut memory)
+        .map(|(image, scratch)| Head::new(*image, scratch))
+        .collect::<Result<Vec<_>, _>>()?;
+    let (mut foreign, mut anew, mut current) = (0, 0, 0);
+    for said in said {
+        let Some(observation) = shown.get(&said.of) else {
+            foreign += 1;
+            continue;
+        };
+        if bits(heads[current].step(observation)?) == said.bits {
+            continue;
+        }
+        anew += 1;
+        let found = (current..heads.len()).find_map(|which| {
+            let head = heads.get_mut(which)?;
+            head.reset();
+            let same = head.step(observation).is_ok_and(|action| bits(action) == said.bits);
+            same.then_some(which)
+        });
+        match found {
+            Some(which) => current = which,
+            None => foreign += 1,
+        }
+    }
+    Ok((foreign, anew))
+}

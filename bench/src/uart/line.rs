@@ -1,0 +1,339 @@
+//! The line between host and board, and what happens on it.
+
+use std::collections::VecDeque;
+use std::io::{self, ErrorKind, Read, Write};
+use std::mem;
+use std::sync::{Arc, Mutex, MutexGuard};
+
+use actq_device::event::Event;
+use actq_device::port::Port;
+use actq_link::{Receiver, frame};
+use actq_ur3::random::Random;
+
+/// Shares of the frames that meet a fault, in each direction; each meets one at most.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Noise {
+    /// Gone.
+    pub drop: f64,
+    /// Late by up to [`LATEST`], and so behind newer ones.
+    pub delay: f64,
+    /// Twice.
+    pub duplicate: f64,
+    /// With a wrong byte.
+    pub corrupt: f64,
+}
+
+/// The longest delay of a frame, µs.
+const LATEST: f64 = 150_000.0;
+
+/// What has happened to frames on their way to the board.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// All that were sent.
+    pub sent: u32,
+    /// Gone, where the line was cut, too.
+    pub dropped: u32,
+    /// Late.
+    pub delayed: u32,
+    /// Twice.
+    pub duplicated: u32,
+    /// With a wrong byte.
+    pub corrupted: u32,
+}
+
+/// A line with faults. Both its ends are in this process: [`Line::host_end`] is the port of a host, the board's end is a port that the
+/// line was given.
+#[derive(Clone)]
+pub struct Line(Arc<Mutex<Wires>>);
+
+struct Wires {
+    board: Box<dyn Port>,
+    /// What the board says, whatever becomes of it.
+    tap: Receiver<{ frame::bytes(frame::MAX_PAYLOAD) }>,
+    heard: VecDeque<Event>,
+    /// The board's time in µs, over its resets: the time of the line, as a busy machine stops QEMU now and then.
+    now: u64,
+    /// What the board's last frame said of it.
+    micros: u32,
+    down: Wire,
+    up: Wire,
+    noise: Noise,
+    cut: bool,
+    held: bool,
+    random: Random,
+}
+
+/// A direction: an unfinished frame, and those that wait for their time.
+#[derive(Default)]
+struct Wire {
+    partial: Vec<u8>,
+    waiting: Vec<(u64, Vec<u8>)>,
+    tally: Tally,
+}
+
+impl Wire {
+    /// Takes bytes; each frame that they end meets its fate.
+    fn take(&mut self, bytes: &[u8], now: u64, noise: &Noise, cut: bool, random: &mut Random) {
+        for byte in bytes {
+            self.partial.push(*byte);
+            if *byte == 0 {
+                let frame = mem::take(&mut self.partial);
+                self.send(frame, now, noise, cut, random);
+            }
+        }
+    }
+
+    fn send(&mut self, mut frame: Vec<u8>, now: u64, noise: &Noise, cut: bool, random: &mut Random) {
+        let content = frame.len() - 1;
+        // Zeros between frames are no frames.
+        if content == 0 {
+            if !cut {
+                self.waiting.push((now, frame));
+            }
+            return;
+        }
+        self.tally.sent += 1;
+        let (mut fate, tally) = (random.unit(), &mut self.tally);
+        let mut falls = |share: f64| {
+            fate -= share;
+            fate < 0.0
+        };
+        if cut || falls(noise.drop) {
+            tally.dropped += 1;
+        } else if falls(noise.delay) {
+            tally.delayed += 1;
+            self.waiting.push((now + (LATEST * random.unit()) as u64, frame));
+        } else if falls(noise.duplicate) {
+            tally.duplicated += 1;
+            self.waiting.extend([(now, frame.clone()), (now, frame)]);
+        } else {
+            if falls(noise.corrupt) {
+                tally.corrupted += 1;
+                let byte = &mut frame[(random.unit() * content as f64) as usize];
+                // Another one, and no zero: that would make two frames of it.
+                *byte = if *byte == 1 { 2 } else { *byte ^ 1 };
+            }
+            self.waiting.push((now, frame));
+        }
+    }
+
+    /// What has arrived, in the order of its arrival.
+    fn arrived(&mut self, now: u64) -> Vec<u8> {
+        let (mut there, waiting): (Vec<_>, Vec<_>) =
+            mem::take(&mut self.waiting).into_iter().partition(|(due, _)| *due <= now);
+        self.waiting = waiting;
+        there.sort_by_key(|(due, _)| *due);
+        there.into_iter().flat_map(|(_, frame)| frame).collect()
+    }
+}
+
+impl Wires {
+    /// Gives the board what has arrived there.
+    fn deliver(&mut self) -> io::Result<()> {
+        if self.held {
+            return Ok(());
+        }
+        let bytes = self.down.arrived(self.now);
+        self.board.write_all(&bytes)
+    }
+
+    /// Takes what the board has said.
+    fn listen(&mut self) -> io::Result<()> {
+        // All that is there: a host that lags behind would hear old times.
+        let mut bytes = vec![0; 64 << 10];
+        let count = match self.board.read(&mut bytes) {
+            Ok(0) => return Err(ErrorKind::UnexpectedEof.into()),
+            Ok(count) => count,
+            Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => 0,
+            Err(error) => return Err(error),
+        };
+        let bytes = bytes.get(..count).unwrap_or_default();
+        for byte in bytes {
+            // All frames: after a reset the board counts from the beginning.
+            self.tap.reopen();
+            let Some(received) = self.tap.push(*byte) else { continue };
+            // After a reset the board's time begins anew.
+            let passed = received.micros.checked_sub(self.micros).unwrap_or(received.micros);
+            (self.now, self.micros) = (self.now + u64::from(passed), received.micros);
+            self.heard.extend(Event::of(&received.message, received.micros));
+        }
+        self.up.take(bytes, self.now, &self.noise, self.cut, &mut self.random);
+        Ok(())
+    }
+}
+
+impl Line {
+    /// A line to a board, without faults. The seed is that of the faults.
+    pub fn new(board: Box<dyn Port>, seed: u64) -> Self {
+        Self(Arc::new(Mutex::new(Wires {
+            board,
+            tap: Receiver::new(),
+            heard: VecDeque::new(),
+            now: 0,
+            micros: 0,
+            down: Wire::default(),
+            up: Wire::default(),
+            noise: Noise::default(),
+            cut: false,
+            held: false,
+            random: Random::new(seed),
+        })))
+    }
+
+    fn wires(&self) -> MutexGuard<'_, Wires> {
+        // Nothing is left half-done where a thread has panicked: whole frames move.
+        self.0.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+    }
+
+    /// The host's end.
+    pub fn host_end(&self) -> Box<dyn Port> {
+        Box::new(HostEnd(self.clone()))
+    }
+
+    /// Sets how many frames meet a fault.
+    pub fn set_noise(&self, noise: Noise) {
+        self.wires().noise = noise;
+    }
+
+    /// Cuts the line, in both directions, or mends it.
+    pub fn cut(&self, cut: bool) {
+        self.wires().cut = cut;
+    }
+
+    /// Keeps what the host sends, as where its driver stalls, or lets it go all at once.
+    pub fn hold(&self, held: bool) {
+        self.wires().held = held;
+    }
+
+    /// The board's time in µs, over its resets, as of what it said last.
+    pub fn now(&self) -> u64 {
+        self.wires().now
+    }
+
+    /// What the board has said since the last call, whatever became of it on the line.
+    pub fn heard(&self) -> VecDeque<Event> {
+        mem::take(&mut self.wires().heard)
+    }
+
+    /// Whether frames to the board are still on their way.
+    pub fn is_waiting(&self) -> bool {
+        !self.wires().down.waiting.is_empty()
+    }
+
+    /// What has happened to the frames to the board.
+    pub fn tally(&self) -> Tally {
+        self.wires().down.tally
+    }
+}
+
+struct HostEnd(Line);
+
+impl Read for HostEnd {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let mut wires = self.0.wires();
+        wires.deliver()?;
+        wires.listen()?;
+        let now = wires.now;
+        let bytes = wires.up.arrived(now);
+        let (head, rest) = bytes.split_at(bytes.len().min(buffer.len()));
+        if !rest.is_empty() {
+            wires.up.waiting.push((now, rest.to_vec()));
+        }
+        if head.is_empty() {
+            return Err(ErrorKind::TimedOut.into());
+        }
+        buffer[..head.len()].copy_from_slice(head);
+        Ok(head.len())
+    }
+}
+
+impl Write for HostEnd {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let mut wires = self.0.wires();
+        let Wires { down, now, noise, cut, random, .. } = &mut *wires;
+        down.take(bytes, *now, noise, *cut, random);
+        wires.deliver()?;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.0.wires().board.flush()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use actq_link::{Message, Sender};
+
+    use super::*;
+
+    /// A board that says nothing and keeps what it hears.
+    #[derive(Clone, Default)]
+    struct Board(Arc<Mutex<Vec<u8>>>);
+
+    impl Read for Board {
+        fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
+            Err(ErrorKind::WouldBlock.into())
+        }
+    }
+
+    impl Write for Board {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.0.lock().expect("no panic").extend(bytes);
+            Ok(bytes.len())
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    /// What a receiver at the board makes of `frames` frames: good, damaged, repeated.
+    fn heard(frames: u32, set: impl FnOnce(&Line)) -> ([u32; 3], Tally) {
+        let board = Board::default();
+        let line = Line::new(Box::new(board.clone()), 1);
+        set(&line);
+        let (mut end, mut sender) = (line.host_end(), Sender::new(0));
+        for _ in 0..frames {
+            let mut buffer = [0; 64];
+            let frame = sender.frame(&Message::Disarm, 0, &mut buffer).expect("room");
+            end.write_all(&[&[0], frame].concat()).expect("it takes all");
+        }
+        let mut receiver = Receiver::<64>::new();
+        for byte in board.0.lock().expect("no panic").iter() {
+            receiver.push(*byte);
+        }
+        let counters = receiver.counters();
+        ([counters.good, counters.damaged, counters.repeated], line.tally())
+    }
+
+    #[test]
+    fn each_fault_is_what_its_name_says() {
+        let none = Noise::default();
+        assert_eq!(heard(50, |_| ()), ([50, 0, 0], Tally { sent: 50, ..Tally::default() }));
+        let (found, tally) = heard(500, |line| line.set_noise(Noise { drop: 0.2, ..none }));
+        assert!((70..130).contains(&tally.dropped) && found == [500 - tally.dropped, 0, 0], "{tally:?} {found:?}");
+        let (found, tally) = heard(500, |line| line.set_noise(Noise { corrupt: 0.2, ..none }));
+        assert!((70..130).contains(&tally.corrupted), "{tally:?}");
+        assert_eq!(found, [500 - tally.corrupted, tally.corrupted, 0]);
+        let (found, tally) = heard(500, |line| line.set_noise(Noise { duplicate: 0.2, ..none }));
+        assert!((70..130).contains(&tally.duplicated) && found == [500, 0, tally.duplicated], "{tally:?} {found:?}");
+        // The board says nothing, so its time stands still, and what is late does not come.
+        let (found, tally) = heard(500, |line| line.set_noise(Noise { delay: 0.2, ..none }));
+        assert!((70..130).contains(&tally.delayed) && found == [500 - tally.delayed, 0, 0], "{tally:?} {found:?}");
+    }
+
+    #[test]
+    fn nothing_passes_a_cut_and_what_is_held_comes_later() {
+        assert_eq!(heard(50, |line| line.cut(true)).0, [0; 3]);
+        let board = Board::default();
+        let line = Line::new(Box::new(board.clone()), 1);
+        line.hold(true);
+        let mut end = line.host_end();
+        end.write_all(&[1, 2, 0]).expect("it takes all");
+        assert!(board.0.lock().expect("no panic").is_empty() && line.is_waiting());
+        line.hold(false);
+        end.write_all(&[1, 3, 0]).expect("it takes all");
+        assert_eq!(*board.0.lock().expect("no panic"), [1, 2, 0, 1, 3, 0]);
+    }
+}

@@ -1,0 +1,270 @@
+//! Arm, controller and host.
+
+use std::collections::HashMap;
+use std::path::Path;
+use std::time::Instant;
+
+use actq_boards::{Clock, Target};
+use actq_controller::Axis;
+use actq_device::client::Client;
+use actq_device::connection::Connection;
+use actq_device::event::Event;
+use actq_device::push::Push;
+use actq_kernels::Image;
+use actq_link::code::{Fault, Parameter, State};
+use actq_link::report::Status;
+use actq_ur3::ACT_DIM;
+use actq_ur3::task::{EPISODE_STEPS, Outcome};
+use anyhow::{Context as _, Result, ensure};
+
+use super::arm::{Arm, TICKS};
+use super::bits::Said;
+use super::line::Line;
+use crate::controller::{Controller, PATIENCE};
+
+/// Ticks in which an output goes from one limit to the other, as in the application at 1 kHz.
+const WAY: f32 = 100.0;
+
+/// Age above which an observation is refused, µs. The build's 500 ms are as long as the deadline: nothing would be seen of it.
+const MAX_AGE: f32 = 200_000.0;
+
+/// Ticks between two reports: what is known of the controller's time.
+const REPORTS: f32 = 5.0;
+
+/// Ticks after which an observation's action is not waited for any longer. A control step takes 20; but on a busy machine QEMU's serial
+/// port is slower than a real one, and the arm's time then waits for it.
+const ANSWER: u64 = 60;
+
+/// What a reset forgets.
+fn set_up(client: &mut Client) -> Result<()> {
+    client.set(Parameter::StatusPeriod, 0, REPORTS)?;
+    client.set(Parameter::MaxAge, 0, MAX_AGE)
+}
+
+/// How soon the controller has stopped by itself, in ms of its own clock: from the last good frame to the safe action. The true time is
+/// within; what is known of either moment is between which two reports it was.
+#[derive(Clone, Copy, Debug)]
+pub struct Reaction {
+    /// Why.
+    pub fault: Fault,
+    /// At least.
+    pub least: u32,
+    /// At most.
+    pub most: u32,
+}
+
+/// Where an episode is.
+#[derive(Clone, Copy, Debug)]
+pub struct Progress {
+    /// Control steps done.
+    pub steps: usize,
+    /// What the outputs do.
+    pub state: State,
+    /// Distance of the tool to its goal, m.
+    pub distance: f64,
+    /// The fastest joint's command, rad/s.
+    pub fastest: f32,
+}
+
+/// The arm at the outputs of the application in QEMU, and the host at the other end of its serial port.
+pub struct Rig {
+    pub(crate) controller: Controller,
+    pub(crate) line: Line,
+    pub(crate) client: Client,
+    pub(crate) arm: Arm,
+    /// Ticks of the controller since the rig began, over its resets.
+    pub(crate) time: u64,
+    /// The controller's last status, as it left the board.
+    pub(crate) status: Status,
+    /// The last good frame: the ticks of the reports before and behind it.
+    good: (u32, u32),
+    /// The last time that the controller has stopped by itself.
+    pub(crate) reaction: Option<Reaction>,
+    /// Resets of the board.
+    pub(crate) resets: u32,
+    /// Actions that the outputs were led to.
+    pub(crate) applied: u32,
+    /// What the host has read, where that is news, and the ticks of what it read before.
+    read: Option<Status>,
+    read_ticks: u32,
+    said: Vec<Said>,
+    shown: HashMap<u32, Vec<f32>>,
+}
+
+impl Rig {
+    /// The application `elf` in QEMU, with `image` built in. The seed is that of the line's faults.
+    pub fn start(target: Target, elf: &Path, image: &Image<'_>, seed: u64) -> Result<Self> {
+        let controller = Controller::start_by(target, elf, None, Clock::Host)?;
+        let line = Line::new(controller.address().open().context("the board's serial port")?, seed);
+        let end = line.clone();
+        let open = Box::new(move || Ok(end.host_end()));
+        let mut connection = Connection::open_by("the line".to_owned(), open, PATIENCE)?;
+        let clock = line.clone();
+        connection.set_clock(Box::new(move || clock.now() as u32));
+        let mut client = Client::new(connection, PATIENCE);
+        let status = client.status()?;
+        set_up(&mut client)?;
+        line.heard();
+        let axes: [Axis; ACT_DIM] = actq_firmware_demo::image::axes(Some(image), WAY);
+        Ok(Self {
+            controller,
+            line,
+            client,
+            arm: Arm::new(axes, 0),
+            time: 0,
+            status,
+            good: (status.ticks, status.ticks),
+            reaction: None,
+            resets: 0,
+            applied: 0,
+            read: None,
+            read_ticks: 0,
+            said: Vec::new(),
+            shown: HashMap::new(),
+        })
+    }
+
+    /// The line, to make faults on it.
+    pub const fn line(&self) -> &Line {
+        &self.line
+    }
+
+    /// What the board's head has said since the start, and the observations by their numbers.
+    pub const fn log(&self) -> (&Vec<Said>, &HashMap<u32, Vec<f32>>) {
+        (&self.said, &self.shown)
+    }
+
+    /// Begins an episode: the controller is armed anew. The arm stands still until then. `exact`: its time is to be known to a tick.
+    pub(crate) fn begin(&mut self, seed: u64, exact: bool) -> Result<()> {
+        self.client.disarm()?;
+        while self.status.state != State::Disarmed {
+            self.listen()?;
+        }
+        // A report in each tick tells exactly when what has happened, and keeps QEMU busy.
+        self.client.set(Parameter::StatusPeriod, 0, if exact { 1.0 } else { REPORTS })?;
+        self.arm.begin(seed);
+        let begun = Instant::now();
+        while self.status.state != State::Armed {
+            self.exchange()?;
+            self.supervise()?;
+            ensure!(begun.elapsed() < PATIENCE, "not armed: {:?}", self.status);
+        }
+        self.reaction = None;
+        self.arm.start();
+        Ok(())
+    }
+
+    /// A control step: an observation on its way to the controller, and the arm 20 ms further.
+    pub(crate) fn step(&mut self) -> Result<()> {
+        self.exchange()?;
+        self.arm.step();
+        self.supervise()
+    }
+
+    /// Sends an observation, and listens until its action has come, or might have.
+    fn exchange(&mut self) -> Result<()> {
+        let observation = self.arm.task.observe();
+        let number = self.client.observe(&observation)?;
+        self.shown.insert(number, observation.to_vec());
+        let (begun, from) = (Instant::now(), self.time);
+        loop {
+            let passed = self.time - from;
+            let answered = self.said.last().is_some_and(|said| said.of == number);
+            if passed >= TICKS.into() && (answered || passed >= ANSWER) {
+                break;
+            }
+            self.listen()?;
+            ensure!(begun.elapsed() < PATIENCE, "the controller is silent: {:?}", self.status);
+        }
+        Ok(())
+    }
+
+    fn listen(&mut self) -> Result<()> {
+        for event in self.client.events()? {
+            if let Event::Status(status) = event {
+                self.read = Some(status);
+            }
+        }
+        for event in self.line.heard() {
+            match event {
+                Event::Status(status) => self.reported(status),
+                Event::Action { of, applied, values, .. } => {
+                    self.said.push(Said { of, bits: values.iter().map(|value| value.to_bits()).collect() });
+                    if applied && let Ok(values) = values.try_into() {
+                        self.arm.target = values;
+                        self.applied += 1;
+                    }
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// A status as it left the board.
+    fn reported(&mut self, status: Status) {
+        let before = std::mem::replace(&mut self.status, status);
+        let was_reset = status.ticks < before.ticks;
+        let passed = if was_reset { status.ticks } else { status.ticks - before.ticks };
+        if was_reset {
+            self.resets += 1;
+            self.arm.state = State::Disarmed;
+            self.good = (status.ticks, status.ticks);
+        }
+        self.time += u64::from(passed);
+        (0..passed).for_each(|_| self.arm.tick());
+        if status.counters.good != before.counters.good && !was_reset {
+            self.good = (before.ticks, status.ticks);
+        }
+        if let (State::Latched, State::Armed, Some(fault)) = (status.state, self.arm.state, status.fault) {
+            let (least, most) = ((before.ticks + 1).saturating_sub(self.good.1), status.ticks - self.good.0);
+            self.reaction = Some(Reaction { fault, least, most });
+        }
+        self.arm.state = status.state;
+    }
+
+    /// What the host does: sets what a reset has lost, and arms where it reads that the controller could be, and is not.
+    fn supervise(&mut self) -> Result<()> {
+        let Some(status) = self.read.take() else { return Ok(()) };
+        if status.ticks < self.read_ticks {
+            set_up(&mut self.client)?;
+        }
+        self.read_ticks = status.ticks;
+        if status.state != State::Armed && status.refusal.is_none() {
+            // Refused where it has become stale meanwhile: the next status tells.
+            let _ = self.client.arm();
+            self.listen()?;
+            self.read = None;
+        }
+        Ok(())
+    }
+
+    /// Waits until the board has counted all that was sent.
+    pub(crate) fn settle(&mut self) -> Result<()> {
+        while self.line.is_waiting() {
+            self.listen()?;
+        }
+        self.client.status()?;
+        self.listen()
+    }
+
+    /// Sends a piece of an image.
+    pub(crate) fn push(&mut self, push: &mut Push<'_>) -> Result<()> {
+        push.advance(&mut self.client)?;
+        self.listen()
+    }
+
+    pub(crate) fn progress(&self, steps: usize) -> Progress {
+        let distance = self.arm.outcome().final_error_m;
+        Progress { steps, state: self.arm.state, distance, fastest: self.arm.fastest() }
+    }
+
+    /// Steps until the end of the episode; `seen` is told each, and the controller's time.
+    pub(crate) fn finish(&mut self, from: usize, mut seen: impl FnMut(&Progress, u64)) -> Result<Outcome> {
+        for step in from..EPISODE_STEPS {
+            self.step()?;
+            seen(&self.progress(step + 1), self.time);
+        }
+        Ok(self.arm.outcome())
+    }
+}
