@@ -42,6 +42,9 @@ const CONTROLLER: &str = "controller";
 const BENCH: &str = "actq-firmware-bench";
 /// Its binary that runs an image.
 const HARNESS: &str = "harness";
+const STYLES: &str = "actq-firmware-styles";
+/// Its binaries: a head in one's own firmware, each in another style.
+pub const STYLE_NAMES: [&str; 3] = ["bare", "rtic", "embassy"];
 
 /// The folders of the ELF files that this process has built, by what they are and target. Even where nothing is to be built, cargo takes
 /// a while to find out.
@@ -88,6 +91,17 @@ pub fn controller(target: Target, features: &'static str) -> Result<PathBuf> {
     };
     let what = if features.is_empty() { CONTROLLER } else { features };
     Ok(once(what, target, build)?.join(CONTROLLER))
+}
+
+/// Builds the programs of `firmware-styles` for the board that they are written for, with the image of [`harness`], and gives the path of
+/// one's ELF file.
+pub fn style(name: &str) -> Result<PathBuf> {
+    let target = Target::Fpu;
+    let build = || {
+        let image = built_in()?.to_string_lossy();
+        build(STYLES, &STYLE_NAMES, "", &target_dir(), target, target.profile(), &[("ACTQ_IMAGE", &image)])
+    };
+    Ok(once(STYLES, target, build)?.join(name))
 }
 
 /// Builds the binaries of `firmware-bench` that run on a target's board, and gives the path of one's ELF file.
