@@ -9,5 +9,6 @@ pub mod image;
 pub mod output;
 pub mod running;
 pub mod timing;
+pub mod trace;
 pub mod updates;
 pub mod work;

@@ -9,7 +9,7 @@ use actq::methods::Activations;
 use actq::runtime::ImageBuffer;
 use actq_bench::Target;
 use actq_bench::controller::{Controller, PATIENCE, act, until};
-use actq_bench::cycles::Code;
+use actq_bench::cycles::{Code, Function};
 use actq_bench::firmware::{self, built_in, halfword_at};
 use actq_bench::networks::Builder;
 use actq_device::client::Client;
@@ -203,6 +203,38 @@ fn a_hard_fault_leaves_its_address() -> Result<()> {
         assert_eq!(crumb.crash, Some(Crash::HardFault), "{target:?}");
         let instruction = halfword_at(&elf, crumb.pc)? & 0xff00;
         ensure!(instruction == 0xde00, "{target:?}: {crumb:?} is {instruction:04x}, not the UDF");
+    }
+    Ok(())
+}
+
+/// A stack that has grown to its end is found out before it writes over a variable; where the program was, as far as its stack tells.
+#[test]
+fn a_stack_that_overflows_leaves_where_it_was() -> Result<()> {
+    for target in BOARDS {
+        let elf = firmware::controller(target, "faults")?;
+        let (_controller, mut client) = start(target, "faults")?;
+        client.status()?;
+        client.connection_mut().raw(&[0, b's', 0]);
+        until(&mut client, "reset", |status| status.reset == ResetCause::Software)?;
+        let crumb = client.breadcrumb()?;
+        // That it stands in the record at all: its memory is the nearest below the stack.
+        assert_eq!((crumb.crash, crumb.count), (Some(Crash::StackOverflow), 1), "{target:?}");
+        let code = Code::read(&elf)?;
+        let holds = |f: &&Function| (f.address..f.address + f.size).contains(&crumb.pc.into());
+        let function = code.functions().iter().find(holds).with_context(|| format!("{target:?}: {crumb:?}"))?;
+        assert!(function.name.contains("recurse"), "{target:?}: {crumb:?} is in {}", function.name);
+    }
+    Ok(())
+}
+
+/// No frame leaps over the guard, 4 KB, of the boards that have no limit of the stack.
+#[test]
+fn no_frame_of_the_application_is_larger_than_the_guard() -> Result<()> {
+    for target in [Target::Fpu, Target::M7, Target::F405] {
+        let code = Code::read(&firmware::controller(target, "")?)?;
+        let largest = code.functions().iter().map(|function| (code.largest_frame(function), &function.name)).max();
+        let (bytes, name) = largest.context("there are functions")?;
+        assert!((1024..4096).contains(&bytes), "{target:?}: {name} has a frame of {bytes} bytes");
     }
     Ok(())
 }

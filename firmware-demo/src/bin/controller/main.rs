@@ -103,6 +103,8 @@ mod app {
     #[init(local = [buffers: Buffers = Buffers::new()])]
     fn init(cx: init::Context) -> (Shared, Local) {
         start::paint_stack();
+        let mut core = cx.core;
+        faults::guard_stack(&mut core.SCB);
         let (record, starts) = (faults::found(), faults::starts());
         // SAFETY: RTIC runs this once, and nothing else has the board's peripherals.
         let Parts { clock, cause, uart, mut watchdog, stage } = unsafe { device::start(BAUD) };
@@ -113,7 +115,7 @@ mod app {
         safety.check(Check::Clock, clock.source == Source::Crystal);
         safety.check(Check::Watchdog, watchdog.start(PATIENCE));
         let (wire, port) = cx.local.buffers.split(uart, || rtic::pend(Interrupt::SERIAL));
-        let mut timer = cx.core.SYST;
+        let mut timer = core.SYST;
         let period = clock.hz / TICK_HZ;
         timer.set_clock_source(SystClkSource::Core);
         timer.set_reload(period - 1);
