@@ -18,6 +18,9 @@ use crate::qemu::{in_slot, spawn};
 /// How long an answer, or what [`until`] waits for, may take: a busy machine runs QEMU slowly.
 pub const PATIENCE: Duration = Duration::from_secs(60);
 
+/// log2 of the nanoseconds that an instruction takes: 32 ns.
+const INSTRUCTION: u32 = 5;
+
 /// Between two looks whether an observation was refused.
 const LOOK: Duration = Duration::from_millis(500);
 
@@ -32,9 +35,14 @@ pub struct Controller {
 impl Controller {
     /// Starts an application, with an image in the slot if one is given.
     pub fn start(target: Target, elf: &Path, slot: Option<&Path>) -> Result<Self> {
+        Self::start_at(target, elf, slot, INSTRUCTION)
+    }
+
+    /// As [`Self::start`], with 2^`instruction` ns for an instruction.
+    pub fn start_at(target: Target, elf: &Path, slot: Option<&Path>, instruction: u32) -> Result<Self> {
         let folder = TempDir::new()?;
         let serial = format!("unix:{},server=on,wait=off", socket(&folder).display());
-        let mut command = target.run_with_serial(elf, &serial);
+        let mut command = target.run_with_serial(elf, &serial, instruction);
         in_slot(&mut command, elf, slot)?;
         // With its time aligned to the host's, QEMU says on its output when it is late.
         let child = spawn(command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::inherit()))?;

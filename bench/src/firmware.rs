@@ -83,11 +83,17 @@ fn harness_in_folder(target: Target, image: &Path) -> Result<PathBuf> {
 /// Builds the application for a target's board, with the image of [`harness`] and with more features, separated by commas, and gives the
 /// path of the ELF file.
 pub fn controller(target: Target, features: &'static str) -> Result<PathBuf> {
+    controller_of_key(target, features, "")
+}
+
+/// As [`controller`], for the feature `signed` with a key's 64 hexadecimal digits, the same in every call.
+pub fn controller_of_key(target: Target, features: &'static str, key: &str) -> Result<PathBuf> {
     let build = || {
         let image = built_in()?.to_string_lossy();
+        let environment = [("ACTQ_IMAGE", &*image), ("ACTQ_PUBLIC_KEY", key)];
         let more = if features.is_empty() { String::new() } else { format!(",{features}") };
         let all = target.board().name.to_owned() + &more;
-        build(APPLICATION, &[CONTROLLER], &all, &target_dir(), target, target.profile(), &[("ACTQ_IMAGE", &image)])
+        build(APPLICATION, &[CONTROLLER], &all, &target_dir(), target, target.profile(), &environment)
     };
     let what = if features.is_empty() { CONTROLLER } else { features };
     Ok(once(what, target, build)?.join(CONTROLLER))

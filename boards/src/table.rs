@@ -139,11 +139,11 @@ impl Target {
     }
 
     /// The board with the application `elf`, under QEMU, its serial port at one of QEMU's character devices. An instruction takes
-    /// 32 ns, so that times are the same in every run, and the board's time does not run ahead of the host's, whose clock is in what it
+    /// 2^`instruction` ns, so that times are the same in every run, and the board's time does not run ahead of the host's, whose clock is in what it
     /// sends.
-    pub fn run_with_serial(self, elf: &Path, serial: &str) -> Command {
+    pub fn run_with_serial(self, elf: &Path, serial: &str, instruction: u32) -> Command {
         let mut command = self.emulate(elf, serial);
-        command.args(["-icount", "shift=5,align=on"]);
+        command.arg("-icount").arg(format!("shift={instruction},align=on"));
         command
     }
 

@@ -6,6 +6,9 @@
 #[cfg(feature = "faults")]
 mod faults;
 pub mod image;
+pub mod key;
+#[cfg(feature = "foc")]
+pub mod motor;
 pub mod output;
 pub mod running;
 pub mod timing;

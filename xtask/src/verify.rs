@@ -163,6 +163,13 @@ fn steps(oldest: Result<(), String>, narrow: Result<(), String>, skipped: &str) 
         add(&format!("lints of the application, {name}"), &arguments, &[image]);
     }
     let fpu = ["--target", Target::Fpu.triple(), "--profile", Target::Fpu.profile()];
+    let other = ["clippy", "--package", APPLICATION, "--lib", "--bin", "controller", "--features"];
+    let other = [&other[..], &["mps2-an386,tick-8khz,foc,signed"], &fpu, &deny].concat();
+    // Any digits will do.
+    let digits = "0".repeat(64);
+    add("lints of the application's other features", &other, &[image, ("ACTQ_PUBLIC_KEY", &digits)]);
+    let host_features = ["test", "--package", APPLICATION, "--lib", "--features", "foc"];
+    add("tests of the application's current loop", &[&host_features[..], &host].concat(), &[]);
     let styles = ["clippy", "--package", STYLES, "--lib", "--bins"];
     add("lints of the styles", &[&styles[..], &fpu, &deny].concat(), &[image]);
     let defmt = ["clippy", "--package", "actq-kernels", "--features", "defmt"];
