@@ -383,6 +383,8 @@ fn frame(first: u16, second: u16) -> u32 {
         _ if first & 0xff80 == 0xb080 => u32::from(first & 0x7f) * 4,
         (0xf2ad, 0x0d00) => plain,
         (0xf1ad, 0x0d00) if plain < 0x100 => plain,
+        // A size in a register, which may be any.
+        _ if first == 0xebad && second & 0x0f00 == 0x0d00 => u32::MAX,
         // Bytes that are repeated are no frame's size.
         (0xf1ad, 0x0d00) if plain >= 0x400 => (0x80 | plain & 0x7f).rotate_right(plain >> 7),
         _ => 0,
@@ -549,7 +551,7 @@ mod tests {
     fn frames_are_what_the_stack_pointer_loses() {
         // sub sp, #268; sub.w sp, sp, #1264; subw sp, sp, #2808; sub.w r0, sp, #8; sub.w sp, sp, r0.
         assert_eq!([frame(0xb0c3, 0), frame(0xf5ad, 0x6d9e), frame(0xf6ad, 0x2df8)], [268, 1264, 2808]);
-        assert_eq!([frame(0xf1ad, 0x0008), frame(0xebad, 0x0d00)], [0, 0]);
+        assert_eq!([frame(0xf1ad, 0x0008), frame(0xebad, 0x0d00)], [0, u32::MAX]);
     }
 
     #[test]

@@ -139,8 +139,8 @@ impl Target {
     }
 
     /// The board with the application `elf`, under QEMU, its serial port at one of QEMU's character devices. An instruction takes
-    /// 2^`instruction` ns, so that times are the same in every run, and the board's time does not run ahead of the host's, whose clock is in what it
-    /// sends.
+    /// 2^`instruction` ns, so that times are the same in every run, and the board's time does not run ahead of the host's, whose clock
+    /// is in what it sends.
     pub fn run_with_serial(self, elf: &Path, serial: &str, instruction: u32) -> Command {
         let mut command = self.emulate(elf, serial);
         command.arg("-icount").arg(format!("shift={instruction},align=on"));

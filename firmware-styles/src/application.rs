@@ -12,7 +12,7 @@ use cortex_m::peripheral::syst::SystClkSource;
 
 actq_firmware_support::panic_to_host!();
 
-/// Values of an observation, and of an action.
+/// Values of an observation.
 pub const OBS: usize = 18;
 /// Values of an action.
 pub const AXES: usize = 6;
