@@ -19,6 +19,9 @@ use crate::qemu::{in_slot, spawn};
 /// How long an answer, or what [`until`] waits for, may take: a busy machine runs QEMU slowly.
 pub const PATIENCE: Duration = Duration::from_secs(60);
 
+/// log2 of the nanoseconds that an instruction takes: 32 ns.
+const INSTRUCTION: u32 = 5;
+
 /// Between two looks whether an observation was refused.
 const LOOK: Duration = Duration::from_millis(500);
 
@@ -33,7 +36,7 @@ pub struct Controller {
 impl Controller {
     /// Starts an application, with an image in the slot if one is given. Its time is counted in instructions.
     pub fn start(target: Target, elf: &Path, slot: Option<&Path>) -> Result<Self> {
-        Self::start_by(target, elf, slot, Clock::Counted)
+        Self::start_by(target, elf, slot, Clock::Counted(INSTRUCTION))
     }
 
     /// As [`Self::start`], by another clock.

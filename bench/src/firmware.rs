@@ -42,6 +42,9 @@ const CONTROLLER: &str = "controller";
 const BENCH: &str = "actq-firmware-bench";
 /// Its binary that runs an image.
 const HARNESS: &str = "harness";
+const STYLES: &str = "actq-firmware-styles";
+/// Its binaries: a head in one's own firmware, each in another style.
+pub const STYLE_NAMES: [&str; 3] = ["bare", "rtic", "embassy"];
 
 /// The folders of the ELF files that this process has built, by what they are and target. Even where nothing is to be built, cargo takes
 /// a while to find out.
@@ -80,22 +83,38 @@ fn harness_in_folder(target: Target, image: &Path) -> Result<PathBuf> {
 /// Builds the application for a target's board, with the image of [`harness`] and with more features, separated by commas, and gives the
 /// path of the ELF file.
 pub fn controller(target: Target, features: &'static str) -> Result<PathBuf> {
-    let build = || controller_in_folder(target, features, built_in()?);
+    controller_of_key(target, features, "")
+}
+
+/// As [`controller`], for the feature `signed` with a key's 64 hexadecimal digits, the same in every call.
+pub fn controller_of_key(target: Target, features: &'static str, key: &str) -> Result<PathBuf> {
+    let build = || controller_in_folder(target, features, key, built_in()?);
     let what = if features.is_empty() { CONTROLLER } else { features };
     Ok(once(what, target, build)?.join(CONTROLLER))
 }
 
 /// Builds the application with `image` built in.
 pub fn controller_with(target: Target, image: &Path) -> Result<PathBuf> {
-    Ok(controller_in_folder(target, "", image)?.join(CONTROLLER))
+    Ok(controller_in_folder(target, "", "", image)?.join(CONTROLLER))
 }
 
-fn controller_in_folder(target: Target, features: &str, image: &Path) -> Result<PathBuf> {
+fn controller_in_folder(target: Target, features: &str, key: &str, image: &Path) -> Result<PathBuf> {
     let image = fs::canonicalize(image).with_context(|| format!("{}: cannot be read", image.display()))?;
+    let environment = [("ACTQ_IMAGE", &*image.to_string_lossy()), ("ACTQ_PUBLIC_KEY", key)];
     let more = if features.is_empty() { String::new() } else { format!(",{features}") };
     let all = target.board().name.to_owned() + &more;
-    let image = ("ACTQ_IMAGE", &*image.to_string_lossy());
-    build(APPLICATION, &[CONTROLLER], &all, &target_dir(), target, target.profile(), &[image])
+    build(APPLICATION, &[CONTROLLER], &all, &target_dir(), target, target.profile(), &environment)
+}
+
+/// Builds the programs of `firmware-styles` for the board that they are written for, with the image of [`harness`], and gives the path of
+/// one's ELF file.
+pub fn style(name: &str) -> Result<PathBuf> {
+    let target = Target::Fpu;
+    let build = || {
+        let image = built_in()?.to_string_lossy();
+        build(STYLES, &STYLE_NAMES, "", &target_dir(), target, target.profile(), &[("ACTQ_IMAGE", &image)])
+    };
+    Ok(once(STYLES, target, build)?.join(name))
 }
 
 /// Builds the binaries of `firmware-bench` that run on a target's board, and gives the path of one's ELF file.

@@ -26,6 +26,10 @@ mod cmsdk;
 mod mps2_an386;
 mod mps2_an500;
 mod mps2_an505;
+#[cfg(all(target_os = "none", any(feature = "mps2-an386", feature = "mps2-an500", feature = "stm32f405")))]
+mod mpu;
+#[cfg(all(target_os = "none", feature = "device"))]
+mod stack;
 #[cfg(any(not(target_os = "none"), feature = "stm32f405"))]
 mod stm32f405;
 #[cfg(all(target_os = "none", feature = "device"))]

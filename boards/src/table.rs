@@ -60,8 +60,8 @@ impl Transport {
 /// How the time of an emulated board passes. Neither runs ahead of the host's, whose clock is in what it sends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Clock {
-    /// By 32 ns an instruction: times are the same in every run. QEMU then takes about a millisecond for a byte of the serial port.
-    Counted,
+    /// By 2^`0` ns an instruction: times are the same in every run. QEMU then takes about a millisecond for a byte of the serial port.
+    Counted(u32),
     /// With the host's, by as many instructions as that takes. A byte takes some 40 µs.
     Host,
 }
@@ -151,10 +151,10 @@ impl Target {
     pub fn run_with_serial(self, elf: &Path, serial: &str, clock: Clock) -> Command {
         let mut command = self.emulate(elf, serial);
         let count = match clock {
-            Clock::Counted => "shift=5,align=on",
-            Clock::Host => "shift=auto",
+            Clock::Counted(instruction) => format!("shift={instruction},align=on"),
+            Clock::Host => "shift=auto".to_owned(),
         };
-        command.args(["-icount", count]);
+        command.args(["-icount", &count]);
         command
     }
 

@@ -9,6 +9,8 @@ pub(crate) enum Asked {
     Undefined,
     /// A panic.
     Panic,
+    /// More stack than there is.
+    Recursion,
 }
 
 /// The last bytes.
@@ -23,7 +25,17 @@ impl Faults {
             [0, digit @ b'0'..=b'7', 0] => Some(Asked::Hide(digit - b'0')),
             [0, b'h', 0] => Some(Asked::Undefined),
             [0, b'p', 0] => Some(Asked::Panic),
+            [0, b's', 0] => Some(Asked::Recursion),
             _ => None,
         }
     }
+}
+
+/// Calls itself until the stack ends.
+#[cfg(target_os = "none")]
+#[inline(never)]
+pub(crate) fn recurse(depth: u32) -> u32 {
+    let frame = core::hint::black_box([depth; 8]);
+    // What comes back is needed, and whether it ends is not known.
+    if depth == u32::MAX { depth } else { recurse(depth + 1) ^ core::hint::black_box(frame)[7] }
 }

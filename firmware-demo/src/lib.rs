@@ -6,8 +6,12 @@
 #[cfg(feature = "faults")]
 mod faults;
 pub mod image;
+pub mod key;
+#[cfg(feature = "foc")]
+pub mod motor;
 pub mod output;
 pub mod running;
 pub mod timing;
+pub mod trace;
 pub mod updates;
 pub mod work;

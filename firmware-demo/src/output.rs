@@ -1,5 +1,5 @@
 //! What the tick tells the power stage: each of the first axes commands a half bridge, whose duty cycle is the value's place between the
-//! limits. What a motor needs instead, as the current loop `actq_controller::foc`, has its place here.
+//! limits. What a motor needs instead is in `motor.rs`.
 
 use actq_boards::seams::Stage;
 use actq_controller::{Axis, Output};
@@ -21,21 +21,33 @@ impl<S: Stage> Bridges<S> {
     /// Tells the outputs of a tick; false where the stage is off and should not be. One switch is for all bridges: one axis that
     /// coasts lets all of them coast.
     pub fn tell(&mut self, outputs: &[Output], axes: &[Axis]) -> bool {
-        let phases = self.stage.phases();
-        if outputs.iter().take(phases.len()).any(|output| *output == Output::Coast) {
-            self.stage.disable();
-            self.on = false;
-            return true;
-        }
-        let mut told = true;
-        for ((phase, output), axis) in phases.iter_mut().zip(outputs).zip(axes) {
-            let share = match output {
-                Output::Drive(value) => (value - axis.low()) / (axis.high() - axis.low()),
+        let mut shares = [0.0; 3];
+        for ((place, output), axis) in shares.iter_mut().zip(outputs).zip(axes) {
+            *place = match output {
+                Output::Drive(value) => share(*value, axis),
                 // The lower switches are on.
-                Output::Brake | Output::Coast => 0.0,
+                Output::Brake => 0.0,
+                Output::Coast => {
+                    self.coast();
+                    return true;
+                }
             };
-            // A share that is none, of an axis without a way, becomes 0; one above 1 is cut.
-            let duty = (share * f32::from(phase.max_duty_cycle())) as u16;
+        }
+        self.drive(shares)
+    }
+
+    /// Switches all bridges off.
+    pub(crate) fn coast(&mut self) {
+        self.stage.disable();
+        self.on = false;
+    }
+
+    /// Gives the bridges these duty cycles, 0 to 1; false where the stage is off and should not be.
+    pub(crate) fn drive(&mut self, duties: [f32; 3]) -> bool {
+        let mut told = true;
+        for (phase, duty) in self.stage.phases().iter_mut().zip(duties) {
+            // One that is NaN becomes 0; one above 1 is cut.
+            let duty = (duty * f32::from(phase.max_duty_cycle())) as u16;
             told &= phase.set_duty_cycle(duty.min(phase.max_duty_cycle())).is_ok();
         }
         // It is switched on once: what a break has switched off stays off until the controller was disarmed.
@@ -43,19 +55,28 @@ impl<S: Stage> Bridges<S> {
         self.on = true;
         told && on
     }
+
+    #[cfg(all(test, feature = "foc"))]
+    pub(crate) fn stage(&self) -> &S {
+        &self.stage
+    }
 }
 
+/// The place of a value between its axis' limits, 0 to 1; of an axis without a way, NaN.
+pub(crate) fn share(value: f32, axis: &Axis) -> f32 {
+    (value - axis.low()) / (axis.high() - axis.low())
+}
+
+/// A power stage for tests.
 #[cfg(test)]
-mod tests {
+pub(crate) mod mock {
     use core::convert::Infallible;
 
-    use actq_controller::SafeAction;
+    use actq_boards::seams::Stage;
     use embedded_hal::pwm::{ErrorType, SetDutyCycle};
 
-    use super::*;
-
-    #[derive(Default)]
-    struct Phase(u16);
+    #[derive(Debug, Default)]
+    pub(crate) struct Phase(u16);
 
     impl ErrorType for Phase {
         type Error = Infallible;
@@ -72,10 +93,16 @@ mod tests {
         }
     }
 
-    #[derive(Default)]
-    struct Mock {
+    #[derive(Debug, Default)]
+    pub(crate) struct Mock {
         phases: [Phase; 3],
-        on: bool,
+        pub(crate) on: bool,
+    }
+
+    impl Mock {
+        pub(crate) fn duties(&self) -> [u16; 3] {
+            self.phases.each_ref().map(|phase| phase.0)
+        }
     }
 
     impl Stage for Mock {
@@ -102,12 +129,20 @@ mod tests {
             None
         }
     }
+}
+
+#[cfg(test)]
+mod tests {
+    use actq_controller::SafeAction;
+
+    use super::mock::Mock;
+    use super::*;
 
     #[test]
     fn a_duty_cycle_is_the_place_between_the_limits() {
         let axis = Axis::new(-1.0, 3.0, 1.0, 0.0, SafeAction::Brake).expect("it fits");
         let (axes, mut bridges) = ([axis; 4], Bridges::new(Mock::default()));
-        let duties = |bridges: &Bridges<Mock>| bridges.stage.phases.each_ref().map(|phase| phase.0);
+        let duties = |bridges: &Bridges<Mock>| bridges.stage.duties();
         assert!(bridges.tell(&[-1.0, 0.0, 3.0, 2.0].map(Output::Drive), &axes));
         assert_eq!((duties(&bridges), bridges.stage.on), ([0, 250, 1000], true));
         assert!(bridges.tell(&[Output::Drive(1.0), Output::Brake, Output::Drive(f32::NAN), Output::Coast], &axes));

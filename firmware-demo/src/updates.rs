@@ -1,19 +1,21 @@
 //! Image updates, on a board that has a place for them.
 
-use actq_controller::slots::{Anyone, Candidate, Layout, Slot, Slots, Updater, Work};
+use actq_controller::slots::{Authority, Candidate, Layout, Slot, Slots, Updater, Work};
 use actq_controller::update::{NoUpdate, Plan, Update};
 use actq_link::code::Refusal;
 use embedded_storage::nor_flash::NorFlash;
 
 /// Two slots, or none.
-pub struct Updates<F>(Option<Updater<F, Anyone>>);
+pub struct Updates<F, A: Authority>(Option<Updater<F, A>>);
 
-impl<F: NorFlash> Updates<F> {
-    /// For the two halves of `flash`, and the image of them that passes `test` and so runs. Without room for two slots there are none.
-    pub fn new(flash: F, mut test: impl FnMut(&Candidate) -> bool) -> (Self, Option<Candidate>) {
+impl<F: NorFlash, A: Authority> Updates<F, A> {
+    /// For the two halves of `flash`, and the image of them that is `authority`'s, passes `test` and so runs. Without room for two slots,
+    /// and without an authority, there are none.
+    pub fn new(flash: F, authority: Option<A>, mut test: impl FnMut(&Candidate) -> bool) -> (Self, Option<Candidate>) {
+        let Some(authority) = authority else { return (Self(None), None) };
         let middle = (flash.capacity() / 2) as u32;
         let Ok(layout) = Layout::new(&flash, 0..middle, middle..2 * middle) else { return (Self(None), None) };
-        let mut slots = Slots::new(flash, layout, Anyone);
+        let mut slots = Slots::new(flash, layout, authority);
         let running = loop {
             match slots.select() {
                 Some(candidate) if test(&candidate) && slots.confirm(candidate.slot) => break Some(candidate),
@@ -43,7 +45,7 @@ impl<F: NorFlash> Updates<F> {
     }
 }
 
-impl<F: NorFlash> Update for Updates<F> {
+impl<F: NorFlash, A: Authority> Update for Updates<F, A> {
     fn begin(&mut self, plan: Plan) -> Result<(), Refusal> {
         self.0.as_mut().map_or_else(|| NoUpdate.begin(plan), |updater| updater.begin(plan))
     }

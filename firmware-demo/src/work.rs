@@ -3,7 +3,7 @@
 use actq_boards::port::Port;
 use actq_boards::seams::Watchdog;
 use actq_controller::progress::Progress;
-use actq_controller::slots::Candidate;
+use actq_controller::slots::{Authority, Candidate};
 use actq_controller::{Endpoint, Shared};
 use embedded_io::{Read, ReadReady, Write};
 use embedded_storage::nor_flash::NorFlash;
@@ -20,7 +20,7 @@ const BYTES: usize = 64;
 const LOOK: u32 = 100;
 
 /// What the loop works with.
-pub struct Work<'p, S, W, F, const AXES: usize, const OBS: usize, const N: usize> {
+pub struct Work<'p, S, W, F, A: Authority, const AXES: usize, const OBS: usize, const N: usize> {
     /// The serial port.
     pub port: &'p mut Port<'static>,
     /// The watchdog, which runs.
@@ -30,7 +30,7 @@ pub struct Work<'p, S, W, F, const AXES: usize, const OBS: usize, const N: usize
     /// The link's end.
     pub endpoint: Endpoint<'static, OBS, N>,
     /// Image updates.
-    pub updates: Updates<F>,
+    pub updates: Updates<F, A>,
     /// The clock's rates.
     pub rates: Rates,
     /// Measures the bytes of stack that were in use at most.
@@ -63,11 +63,12 @@ impl State {
     }
 }
 
-impl<S, W, F, const AXES: usize, const OBS: usize, const N: usize> Work<'_, S, W, F, AXES, OBS, N>
+impl<S, W, F, A, const AXES: usize, const OBS: usize, const N: usize> Work<'_, S, W, F, A, AXES, OBS, N>
 where
     S: Shared<AXES>,
     W: Watchdog,
     F: NorFlash,
+    A: Authority,
 {
     /// A turn of the loop: takes what has come, runs one slice of the head, does a piece of an update, and feeds the watchdog where all
     /// has made progress. Gives the image that an update wants tested.
@@ -108,6 +109,8 @@ where
             Some(Asked::Hide(parts)) => self.state.hidden = parts,
             #[cfg(target_os = "none")]
             Some(Asked::Undefined) => cortex_m::asm::udf(),
+            #[cfg(target_os = "none")]
+            Some(Asked::Recursion) => drop(core::hint::black_box(crate::faults::recurse(0))),
             Some(Asked::Panic) => panic!("asked for"),
             _ => {}
         }

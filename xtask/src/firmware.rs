@@ -10,12 +10,13 @@ use anyhow::{Context as _, Result, bail, ensure};
 use crate::{cargo, setup};
 
 const USAGE: &str = "\
-Usage: cargo xtask firmware --board NAME [--image FILE.actq] [--features LIST] --out FILE.elf
+Usage: cargo xtask firmware --board NAME [--image FILE.actq] [--features LIST] [--key HEX] --out FILE.elf
        cargo xtask firmware --list
 
   --board NAME       The board; --list shows them
   --image FILE.actq  The image to build in; without it, that of the UR3 policy at 3 bits
-  --features LIST    Features of firmware-demo: tick-8khz, defmt-rtt, defmt-semihosting
+  --features LIST    Features of firmware-demo: tick-8khz, foc, defmt-rtt, defmt-semihosting
+  --key HEX          The public key, as `actq keygen` prints it, whose images alone run (feature signed)
   --out FILE.elf     Where the ELF file goes, whole or not at all";
 
 /// What is asked for.
@@ -23,7 +24,7 @@ Usage: cargo xtask firmware --board NAME [--image FILE.actq] [--features LIST] -
 pub(crate) enum Options {
     Help,
     List,
-    Build { target: Target, image: Option<PathBuf>, features: Option<String>, out: PathBuf },
+    Build { target: Target, image: Option<PathBuf>, features: Option<String>, key: Option<String>, out: PathBuf },
 }
 
 impl Options {
@@ -35,13 +36,14 @@ impl Options {
             _ => {}
         }
         let wrong = |what: String| format!("error: {what}\n\n{USAGE}");
-        let (mut board, mut image, mut features, mut out) = (None, None, None, None);
+        let (mut board, mut image, mut features, mut key, mut out) = (None, None, None, None, None);
         let mut words = words.iter();
         while let Some(option) = words.next() {
             let value = match *option {
                 "--board" => &mut board,
                 "--image" => &mut image,
                 "--features" => &mut features,
+                "--key" => &mut key,
                 "--out" => &mut out,
                 other => return Err(wrong(format!("{other:?} is no option"))),
             };
@@ -55,7 +57,12 @@ impl Options {
         let known = || boards().map(|(target, _)| target.board().name).collect::<Vec<_>>().join(", ");
         let target = boards().map(|(target, _)| target).find(|target| target.board().name == board);
         let target = target.ok_or_else(|| format!("error: there is no board {board:?}; there are {}", known()))?;
-        Ok(Self::Build { target, image: image.map(PathBuf::from), features: features.map(str::to_owned), out })
+        let is_key = |key: &str| key.len() == 64 && key.bytes().all(|digit| digit.is_ascii_hexdigit());
+        if key.is_some_and(|key| !is_key(key)) {
+            return Err(wrong("--key takes the 64 hexadecimal digits that `actq keygen` prints".to_owned()));
+        }
+        let [features, key] = [features, key].map(|value| value.map(str::to_owned));
+        Ok(Self::Build { target, image: image.map(PathBuf::from), features, key, out })
     }
 
     pub(crate) fn run(self) -> Result<()> {
@@ -66,13 +73,13 @@ impl Options {
                     println!("{:12} {:27} {}", target.board().name, target.triple(), application.about);
                 }
             }
-            Self::Build { target, image, features, out } => {
+            Self::Build { target, image, features, key, out } => {
                 let application = target.board().application.context("the board has no application")?;
                 let given = image.as_deref().map(|image| check(image, application, target)).transpose()?;
                 setup::rust_target(target.triple())?;
                 let image = given.map_or_else(example, Ok)?;
                 check(&image, application, target)?;
-                let elf = build(target, &image, features.as_deref())?;
+                let elf = build(target, &image, features.as_deref(), key.as_deref())?;
                 write(&out, &elf)?;
                 println!("{}: {} with {}", out.display(), target.board().name, image.display());
             }
@@ -129,12 +136,16 @@ fn example() -> Result<PathBuf> {
 }
 
 /// Builds, and gives the ELF file's bytes.
-fn build(target: Target, image: &Path, features: Option<&str>) -> Result<Vec<u8>> {
+fn build(target: Target, image: &Path, features: Option<&str>, key: Option<&str>) -> Result<Vec<u8>> {
     let name = target.board().name;
     // A folder of its own: cargo gives the files of all boards with one triple the same name, and two may be built at a time.
     let folder = root().join("target/boards").join(name);
-    let features = features.map_or(name.to_owned(), |features| format!("{name},{features}"));
+    let features = [Some(name), features, key.map(|_| "signed")];
+    let features = features.into_iter().flatten().collect::<Vec<_>>().join(",");
     let mut command = cargo();
+    if let Some(key) = key {
+        command.env("ACTQ_PUBLIC_KEY", key);
+    }
     command.current_dir(root()).args(["build", "--package", "actq-firmware-demo", "--bin", "controller"]);
     command.args(["--profile", target.profile(), "--target", target.triple(), "--features", &features]);
     // defmt's own default leaves out all but errors.
@@ -170,7 +181,7 @@ mod tests {
     fn options_are_read_or_refused() {
         let out = PathBuf::from("f.elf");
         let build = |target, image: Option<&str>| {
-            Ok(Options::Build { target, image: image.map(PathBuf::from), features: None, out: out.clone() })
+            Ok(Options::Build { target, image: image.map(PathBuf::from), features: None, key: None, out: out.clone() })
         };
         assert_eq!(Options::parse(&["--list"]), Ok(Options::List));
         assert_eq!(Options::parse(&["--board", "stm32f405", "--out", "f.elf"]), build(Target::F405, None));
@@ -181,6 +192,7 @@ mod tests {
             (&["--board", "microbit", "--out", "f.elf"], "there is no board \"microbit\""),
             (&["--board", "stm32f405"], "--out is missing"),
             (&["--out", "f.elf"], "--board is missing"),
+            (&["--board", "stm32f405", "--out", "f.elf", "--key", "12"], "--key takes the 64 hexadecimal digits"),
             (&["--board"], "--board needs a value"),
             (&["--board", "a", "--board", "b"], "--board is there twice"),
             (&["--bord", "a"], "\"--bord\" is no option"),

@@ -26,6 +26,8 @@ const NARROW: &str = "i686-unknown-linux-musl";
 const FIRMWARE: [&str; 2] = ["actq-firmware-support", "actq-firmware-bench"];
 /// The application, of which the host builds and tests what is not of a board.
 const APPLICATION: &str = "actq-firmware-demo";
+/// The head in firmware of other styles.
+const STYLES: &str = "actq-firmware-styles";
 
 /// The tests that compare with tract, a reader of ONNX that takes minutes to build, and the variable that asks for them.
 const ONNX_TESTS: &str = "actq-onnx-tests";
@@ -161,6 +163,15 @@ fn steps(oldest: Result<(), String>, narrow: Result<(), String>, skipped: &str) 
         add(&format!("lints of the application, {name}"), &arguments, &[image]);
     }
     let fpu = ["--target", Target::Fpu.triple(), "--profile", Target::Fpu.profile()];
+    let other = ["clippy", "--package", APPLICATION, "--lib", "--bin", "controller", "--features"];
+    let other = [&other[..], &["mps2-an386,tick-8khz,foc,signed"], &fpu, &deny].concat();
+    // Any digits will do.
+    let digits = "0".repeat(64);
+    add("lints of the application's other features", &other, &[image, ("ACTQ_PUBLIC_KEY", &digits)]);
+    let host_features = ["test", "--package", APPLICATION, "--lib", "--features", "foc"];
+    add("tests of the application's current loop", &[&host_features[..], &host].concat(), &[]);
+    let styles = ["clippy", "--package", STYLES, "--lib", "--bins"];
+    add("lints of the styles", &[&styles[..], &fpu, &deny].concat(), &[image]);
     let defmt = ["clippy", "--package", "actq-kernels", "--features", "defmt"];
     add("optional features", &[&defmt[..], &fpu, &deny].concat(), &[]);
     let doc = ["doc", "--no-deps"];

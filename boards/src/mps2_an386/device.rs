@@ -1,6 +1,7 @@
 //! The registers of AN386 and AN500 (Arm DAI 0386C, section 3): UART 0, the watchdog, no power stage.
 
 pub use crate::cmsdk::{NoStage as Stage, Uart, Watchdog};
+pub use crate::mpu::guard_stack;
 use crate::seams::{self, Cause, Clock, Source};
 use crate::vectors::interrupts;
 

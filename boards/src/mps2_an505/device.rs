@@ -1,6 +1,10 @@
 //! The registers of AN505 (Arm DAI 0505B, section 3) in the secure state, whose addresses have bit 28 set: UART 0, the secure watchdog,
 //! no power stage.
 
+use core::ops::Range;
+
+use cortex_m::register::msplim;
+
 pub use crate::cmsdk::{NoStage as Stage, Uart, Watchdog};
 use crate::seams::{self, Cause, Clock, Source};
 use crate::vectors::interrupts;
@@ -32,4 +36,18 @@ pub unsafe fn start(baud: u32) -> Parts {
     let (uart, watchdog) = unsafe { (Uart::new(UART, HZ, baud), Watchdog::new(WATCHDOG, HZ)) };
     let clock = Clock { hz: HZ, source: Source::Crystal };
     Parts { clock, cause: Cause::Unknown, uart, watchdog, stage: Stage::default() }
+}
+
+/// Limits the stack (Armv8-M has a register for it), and gives where it is.
+///
+/// # Safety
+///
+/// The stack is nowhere near its end.
+pub unsafe fn guard_stack() -> Range<u32> {
+    let memory = crate::stack::memory();
+    // The register has no lower bits.
+    let limit = memory.start.next_multiple_of(8);
+    // SAFETY: behind all variables, and below the stack pointer, as the caller promises.
+    unsafe { msplim::write(limit) };
+    limit..memory.end
 }

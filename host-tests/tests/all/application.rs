@@ -9,10 +9,12 @@ use actq::methods::Activations;
 use actq::runtime::ImageBuffer;
 use actq_bench::Target;
 use actq_bench::controller::{Controller, PATIENCE, act, until};
-use actq_bench::cycles::Code;
+use actq_bench::cycles::{Code, Function};
 use actq_bench::firmware::{self, built_in, halfword_at};
 use actq_bench::networks::Builder;
+use actq_boards::Clock;
 use actq_device::client::Client;
+use actq_device::keys;
 use actq_device::push::{Package, push};
 use actq_kernels::image::{header as h, seal};
 use actq_kernels::{Image, Width};
@@ -144,6 +146,34 @@ fn a_head_below_leaves_the_tick_alone() -> Result<()> {
     Ok(())
 }
 
+/// The tick drives a simulated motor by the current loop, with the same head below: no tick is lost. The current loop's 3,400 instructions
+/// and the longest lock below it are more than fits into a tick of 8 kHz where an instruction takes 32 ns; there it takes 16 ns.
+#[test]
+fn a_current_loop_in_the_tick_leaves_room_for_the_head() -> Result<()> {
+    let buffer = ImageBuffer::read(built_in()?)?;
+    let image = buffer.image(built_in()?)?;
+    let (observation, _) = self_test(&image, 0).context("it has a self-test")?;
+    for (features, period, instruction) in [("foc", 1_000_000, 5), ("foc,tick-8khz", 125_000, 4)] {
+        let elf = firmware::controller(Target::Fpu, features)?;
+        let controller = Controller::start_by(Target::Fpu, &elf, None, Clock::Counted(instruction))?;
+        let mut client = controller.client()?;
+        // What latches at the deadline, where the machine is busy, still drives the motor: to 0.
+        arm(&mut client, &observation)?;
+        for _ in 0..20 {
+            act(&mut client, &observation)?;
+        }
+        let ticks = client.status()?.ticks;
+        let status = until(&mut client, "later", |status| status.ticks > ticks + 200)?;
+        assert!(matches!(status.fault, None | Some(Fault::Stale)) && status.state != State::Disarmed, "{status:?}");
+        let timing = client.timing()?;
+        assert_eq!((timing.period, timing.overruns), (period, 0), "{features}");
+        // The current loop has run, and a tick's time with its worst delay is within the period.
+        let ran = 2800 << instruction;
+        assert!((ran..period - timing.worst_jitter).contains(&timing.worst_tick), "{features}: {timing:?}");
+    }
+    Ok(())
+}
+
 #[test]
 fn an_image_that_may_not_run_is_refused_with_its_reason() -> Result<()> {
     let mut damaged = fs::read(built_in()?)?;
@@ -207,12 +237,45 @@ fn a_hard_fault_leaves_its_address() -> Result<()> {
     Ok(())
 }
 
+/// A stack that has grown to its end is found out before it writes over a variable; where the program was, as far as its stack tells.
+#[test]
+fn a_stack_that_overflows_leaves_where_it_was() -> Result<()> {
+    for target in BOARDS {
+        let elf = firmware::controller(target, "faults")?;
+        let (_controller, mut client) = start(target, "faults")?;
+        client.status()?;
+        client.connection_mut().raw(&[0, b's', 0]);
+        until(&mut client, "reset", |status| status.reset == ResetCause::Software)?;
+        let crumb = client.breadcrumb()?;
+        // That it stands in the record at all: its memory is the nearest below the stack.
+        assert_eq!((crumb.crash, crumb.count), (Some(Crash::StackOverflow), 1), "{target:?}");
+        let code = Code::read(&elf)?;
+        let holds = |f: &&Function| (f.address..f.address + f.size).contains(&crumb.pc.into());
+        let function = code.functions().iter().find(holds).with_context(|| format!("{target:?}: {crumb:?}"))?;
+        assert!(function.name.contains("recurse"), "{target:?}: {crumb:?} is in {}", function.name);
+    }
+    Ok(())
+}
+
+/// No frame leaps over the guard, 4 KB, of the boards that have no limit of the stack.
+#[test]
+fn no_frame_of_the_application_is_larger_than_the_guard() -> Result<()> {
+    for target in [Target::Fpu, Target::M7, Target::F405] {
+        let code = Code::read(&firmware::controller(target, "")?)?;
+        let largest = code.functions().iter().map(|function| (code.largest_frame(function), &function.name)).max();
+        let (bytes, name) = largest.context("there are functions")?;
+        assert!((1024..4096).contains(&bytes), "{target:?}: {name} has a frame of {bytes} bytes");
+    }
+    Ok(())
+}
+
 /// There is nothing in the application that panics, nor the text of a panic; it has the size that it may have.
 #[test]
 fn no_panic_is_in_the_application_and_it_is_small() -> Result<()> {
     let image = fs::read(built_in()?)?.len() as u64;
-    for target in BOARDS {
-        let elf = firmware::controller(target, "")?;
+    let foc = [Target::Fpu, Target::M33].map(|target| (target, "foc"));
+    for (target, features) in BOARDS.map(|target| (target, "")).into_iter().chain(foc) {
+        let elf = firmware::controller(target, features)?;
         let code = Code::read(&elf)?;
         let names = || code.functions().iter().map(|function| function.name.as_str());
         let telling = ["panic", "core::fmt", "unwind"];
@@ -220,7 +283,46 @@ fn no_panic_is_in_the_application_and_it_is_small() -> Result<()> {
         assert!(found.is_empty(), "{target:?}: {found:?}");
         assert!(names().any(|name| name.contains("Head")), "{target:?}: nothing is in it");
         let flash = firmware::flash_bytes(&elf)? - image;
-        assert!(flash <= 64 << 10, "{target:?}: {flash} bytes of flash");
+        assert!(flash <= 64 << 10 || !features.is_empty(), "{target:?}: {flash} bytes of flash");
+    }
+    Ok(())
+}
+
+/// The private key of RFC 8410, section 10.3.
+const PRIVATE_KEY: &str = "-----BEGIN PRIVATE KEY-----\nMC4CAQAwBQYDK2VwBCIEINTuctv5E1hK1bbY8fdp+K06/nwoy/HU++CXqI9EdVhC\n\
+    -----END PRIVATE KEY-----\n";
+
+/// A build with a key runs only what the key has signed, over a reset, too, and has no slot for a debugger's image.
+#[test]
+fn a_build_with_a_key_runs_signed_images_alone() -> Result<()> {
+    let pem = file(PRIVATE_KEY.as_bytes())?;
+    let key = keys::read(pem.path())?;
+    let new = small()?;
+    let signature = keys::sign(&key, &new, 1)?.check(&new)?;
+    let (observation, bits) =
+        self_test(&ImageBuffer::new(&new).image(Path::new("small"))?, 0).context("it has a self-test")?;
+    let slot = file(&new)?;
+    for target in WHOLE {
+        let elf = firmware::controller_of_key(target, "signed,faults", &keys::public(&key))?;
+        let told = format!("{:#}", Controller::start(target, &elf, Some(slot.path())).expect_err("it has a slot"));
+        assert!(told.contains("no image slot"), "{target:?}: {told}");
+        let controller = Controller::start(target, &elf, None)?;
+        let mut client = controller.client()?;
+        let wrong = [signature[0] ^ 1].into_iter().chain(signature[1..].iter().copied()).collect::<Vec<u8>>();
+        for refused in [None, Some(&wrong.try_into().expect("as many bytes"))] {
+            let told = push(&mut client, &Package { image: &new, version: 1, signature: refused }, |_| {});
+            let told = format!("{:#}", told.expect_err("it is not signed"));
+            assert!(told.contains("signature"), "{target:?}: {told}");
+            assert_eq!(client.status()?.slot, BUILT_IN, "{target:?}");
+        }
+        push(&mut client, &Package { image: &new, version: 1, signature: Some(&signature) }, |_| {})?;
+        let slot = client.status()?.slot;
+        assert_ne!(slot, BUILT_IN, "{target:?}");
+        client.connection_mut().raw(&[0, b'p', 0]);
+        let status = until(&mut client, "reset", |status| status.reset == ResetCause::Software)?;
+        assert_eq!(status.slot, slot, "{target:?}: not kept");
+        let (_, action) = act(&mut client, &observation)?;
+        assert_eq!(action.iter().map(|v| v.to_bits()).collect::<Vec<_>>(), bits, "{target:?}");
     }
     Ok(())
 }

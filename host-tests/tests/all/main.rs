@@ -26,3 +26,4 @@ mod recorded;
 mod recordings;
 mod slices;
 mod stats;
+mod styles;

@@ -16,6 +16,7 @@ pub use pwm::{Phase, Pwm as Stage};
 pub use usart::Usart as Uart;
 pub use watchdog::Iwdg as Watchdog;
 
+pub use crate::mpu::guard_stack;
 use crate::seams::{self, Cause};
 use crate::vectors::interrupts;
 

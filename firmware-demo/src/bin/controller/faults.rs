@@ -4,17 +4,31 @@ use core::arch::naked_asm;
 use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use actq_boards::device::WATCHDOG_NMI;
+use actq_boards::device::{self, WATCHDOG_NMI};
 use actq_controller::breadcrumb::{Record, WORDS};
+use actq_firmware_demo::trace::innermost_call;
 use actq_firmware_support::kept::Kept;
 use actq_link::code::Crash;
 use cortex_m::peripheral::SCB;
-use cortex_m_rt::{ExceptionFrame, exception};
+use cortex_m::peripheral::scb::Exception;
+use cortex_m_rt::ExceptionFrame;
 
 #[unsafe(link_section = ".uninit.record")]
 static RECORD: Kept<WORDS> = Kept::new();
 #[unsafe(link_section = ".uninit.starts")]
 static STARTS: Kept<1> = Kept::new();
+
+/// Address of the register that says what a fault is.
+const CFSR: u32 = 0xe000_ed28;
+/// What it says of a stack that has overflown: the core could not stack, the program touched the guard, which is all that the memory
+/// protection unit forbids, or the pointer would have passed its limit (Armv8-M).
+const STACKING: u32 = 1 << 4;
+const ACCESS: u32 = 1 << 1;
+const LIMIT: u32 = 1 << 20;
+
+/// Where the stack is.
+static BOTTOM: AtomicU32 = AtomicU32::new(0);
+static TOP: AtomicU32 = AtomicU32::new(0);
 
 /// What a record tells besides the crash.
 pub(crate) static TICKS: AtomicU32 = AtomicU32::new(0);
@@ -44,6 +58,16 @@ pub(crate) fn starts() -> u32 {
     starts
 }
 
+/// Lets a stack that overflows be a fault, instead of writing over variables.
+pub(crate) fn guard_stack(scb: &mut SCB) {
+    // SAFETY: the start is not deep in the stack, and nothing else here uses the memory protection unit.
+    let stack = unsafe { device::guard_stack() };
+    BOTTOM.store(stack.start, Ordering::Relaxed);
+    TOP.store(stack.end, Ordering::Relaxed);
+    scb.enable(Exception::MemoryManagement);
+    scb.enable(Exception::UsageFault);
+}
+
 fn leave(crash: Crash, pc: u32, detail: u32) {
     let (ticks, count) = (TICKS.load(Ordering::Relaxed), CRASHES.load(Ordering::Relaxed).wrapping_add(1));
     RECORD.write(Record { crash, pc, detail, ticks, count }.to_words());
@@ -55,11 +79,77 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     SCB::sys_reset()
 }
 
-#[exception]
-unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
-    // SAFETY: reading it changes nothing.
-    let status = unsafe { (*SCB::PTR).cfsr.read() };
+/// Faults. Where the stack has overflown, it is left before anything else: what runs here runs at its begin. What the core has stacked,
+/// or could not, is passed on.
+///
+/// # Safety
+///
+/// For the vector table alone.
+#[unsafe(naked)]
+#[unsafe(no_mangle)]
+unsafe extern "C" fn HardFault() {
+    naked_asm!(
+        "mrs  r0, msp",
+        "movw r1, #:lower16:{status}",
+        "movt r1, #:upper16:{status}",
+        "ldr  r1, [r1]",
+        "movw r2, #:lower16:{overflown}",
+        "movt r2, #:upper16:{overflown}",
+        "tst  r1, r2",
+        "beq  {other}",
+        "movw r2, #:lower16:_stack_start",
+        "movt r2, #:upper16:_stack_start",
+        "msr  msp, r2",
+        "b    {overflow}",
+        status = const CFSR,
+        overflown = const STACKING | ACCESS | LIMIT,
+        other = sym other,
+        overflow = sym overflow,
+    )
+}
+
+/// The memory protection unit's, or the stack's limit: [`HardFault`] looks which.
+///
+/// # Safety
+///
+/// For the vector table alone.
+#[unsafe(naked)]
+#[unsafe(no_mangle)]
+unsafe extern "C" fn MemoryManagement() {
+    naked_asm!("b {fault}", fault = sym HardFault)
+}
+
+/// As [`MemoryManagement`].
+///
+/// # Safety
+///
+/// For the vector table alone.
+#[unsafe(naked)]
+#[unsafe(no_mangle)]
+unsafe extern "C" fn UsageFault() {
+    naked_asm!("b {fault}", fault = sym HardFault)
+}
+
+extern "C" fn other(frame: &ExceptionFrame, status: u32) -> ! {
     leave(Crash::HardFault, frame.pc(), status);
+    SCB::sys_reset()
+}
+
+extern "C" fn overflow(pointer: u32, status: u32) -> ! {
+    unsafe extern "C" {
+        static __stext: u16;
+        static __etext: u16;
+    }
+    let code = (&raw const __stext) as u32..(&raw const __etext) as u32;
+    let half = |address: u32| {
+        // SAFETY: an even address of the code.
+        code.contains(&address).then(|| unsafe { (address as *const u16).read() })
+    };
+    let [bottom, top] = [&BOTTOM, &TOP].map(|address| address.load(Ordering::Relaxed));
+    let words = (pointer.max(bottom)..top).step_by(4);
+    // SAFETY: memory of the stack that may be read: words of it, as its pointer and its ends are multiples of 4.
+    let words = words.map(|address| unsafe { (address as *const u32).read_volatile() });
+    leave(Crash::StackOverflow, innermost_call(words, half).unwrap_or(0), status);
     SCB::sys_reset()
 }
 

@@ -55,7 +55,10 @@ mod app {
     use actq_controller::slots::Candidate;
     use actq_controller::{Check, Endpoint, Guard, Safety, Settings, Shared as _};
     use actq_firmware_demo::image;
-    use actq_firmware_demo::output::Bridges;
+    #[cfg(feature = "foc")]
+    use actq_firmware_demo::motor::Motor as Drives;
+    #[cfg(not(feature = "foc"))]
+    use actq_firmware_demo::output::Bridges as Drives;
     use actq_firmware_demo::running::Running;
     use actq_firmware_demo::timing::{Rates, Timing};
     use actq_firmware_demo::updates::Updates;
@@ -93,7 +96,7 @@ mod app {
         wire: Wire<'static, Uart>,
         port: Port<'static>,
         watchdog: Watchdog,
-        bridges: Bridges<Stage>,
+        drives: Drives<Stage>,
         timer: SYST,
         period: u32,
         rates: Rates,
@@ -103,6 +106,8 @@ mod app {
     #[init(local = [buffers: Buffers = Buffers::new()])]
     fn init(cx: init::Context) -> (Shared, Local) {
         start::paint_stack();
+        let mut core = cx.core;
+        faults::guard_stack(&mut core.SCB);
         let (record, starts) = (faults::found(), faults::starts());
         // SAFETY: RTIC runs this once, and nothing else has the board's peripherals.
         let Parts { clock, cause, uart, mut watchdog, stage } = unsafe { device::start(BAUD) };
@@ -113,7 +118,7 @@ mod app {
         safety.check(Check::Clock, clock.source == Source::Crystal);
         safety.check(Check::Watchdog, watchdog.start(PATIENCE));
         let (wire, port) = cx.local.buffers.split(uart, || rtic::pend(Interrupt::SERIAL));
-        let mut timer = cx.core.SYST;
+        let mut timer = core.SYST;
         let period = clock.hz / TICK_HZ;
         timer.set_clock_source(SystClkSource::Core);
         timer.set_reload(period - 1);
@@ -121,13 +126,16 @@ mod app {
         timer.enable_counter();
         timer.enable_interrupt();
         let rates = Rates::new(clock.hz, TICK_HZ);
-        let bridges = Bridges::new(stage);
-        let local = Local { wire, port, watchdog, bridges, timer, period, rates, breadcrumb };
+        #[cfg(feature = "foc")]
+        let drives = Drives::new(stage, TICK_HZ);
+        #[cfg(not(feature = "foc"))]
+        let drives = Drives::new(stage);
+        let local = Local { wire, port, watchdog, drives, timer, period, rates, breadcrumb };
         (Shared { safety, timing: Timing::default() }, local)
     }
 
     /// The control tick.
-    #[task(binds = SysTick, priority = 3, shared = [safety, timing], local = [bridges, timer, period])]
+    #[task(binds = SysTick, priority = 3, shared = [safety, timing], local = [drives, timer, period])]
     fn tick(cx: tick::Context) {
         let began = SYST::get_current();
         // What it says until here is the end that made this tick.
@@ -136,7 +144,7 @@ mod app {
         let ticks = safety.lock(|safety| {
             let outputs = safety.tick();
             // A break is cleared by disarming: outputs that coast are as they should be.
-            let told = cx.local.bridges.tell(&outputs, safety.axes());
+            let told = cx.local.drives.tell(&outputs, safety.axes());
             safety.check(Check::Hardware, told);
             safety.ticks()
         });
@@ -170,7 +178,7 @@ mod app {
         // As the flash of an STM32F405: sectors of 128 KB, written in words.
         let flash = Ram::<4, { 128 << 10 }>(flash);
         let passes = |candidate: &Candidate| image::open(bytes_of(candidate), scratch, start::LENGTHS).is_ok();
-        let (updates, running) = Updates::new(flash, passes);
+        let (updates, running) = Updates::new(flash, start::authority(), passes);
         let mut bytes = running.as_ref().map_or_else(start::built_in, bytes_of);
         let facts = Facts { image: 0, slot: BUILT_IN, timing: Default::default(), breadcrumb: *breadcrumb };
         let settings = Settings { status_period: REPORT, erase_while_armed: true };

@@ -20,9 +20,29 @@ static BUILT_IN: &Aligned<[u8]> = &Aligned(*include_bytes!(env!(
 /// Values of an observation and of an action: those of the image that is built in. Every image that runs has as many.
 pub(crate) const LENGTHS: [usize; 2] = lengths(&BUILT_IN.0);
 
-/// The image in the image slot, or the one that is built in.
+/// The image in the image slot, or the one that is built in. A build that asks for signatures does not look at the slot, where none is.
 pub(crate) fn built_in() -> &'static [u8] {
-    slot::image().unwrap_or(&BUILT_IN.0)
+    let slot = if cfg!(feature = "signed") { None } else { slot::image() };
+    slot.unwrap_or(&BUILT_IN.0)
+}
+
+/// Whose images the link may bring: anyone's.
+#[cfg(not(feature = "signed"))]
+pub(crate) fn authority() -> Option<actq_controller::slots::Anyone> {
+    Some(actq_controller::slots::Anyone)
+}
+
+/// Whose images the link may bring: those of the build's key; nobody's, where its digits are no point of the curve.
+#[cfg(feature = "signed")]
+pub(crate) fn authority() -> Option<actq_controller::slots::Key> {
+    const KEY: [u8; 32] = match actq_firmware_demo::key::parse(env!(
+        "ACTQ_PUBLIC_KEY",
+        "set ACTQ_PUBLIC_KEY to the public key's 64 hexadecimal digits, which `actq keygen` prints; `cargo xtask firmware --key` does"
+    )) {
+        Some(key) => key,
+        None => panic!("ACTQ_PUBLIC_KEY is not 64 hexadecimal digits; `actq keygen` prints them"),
+    };
+    actq_controller::slots::Key::new(&KEY).ok()
 }
 
 /// Why the processor started, and what the program before has left.

@@ -1,0 +1,43 @@
+//! The current loop: ten thousand ticks, of which every hundredth is a counted region. It prints the CRC-32 of all duty cycles' bits, the
+//! number of the test in `controller/tests/all/foc/motor.rs`, whose inputs these are.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[cfg(not(target_os = "none"))]
+fn main() {
+    eprintln!("this is firmware: build it with --target thumbv7em-none-eabihf");
+    std::process::exit(1);
+}
+
+#[cfg(target_os = "none")]
+mod firmware {
+    actq_firmware_support::panic_to_host!();
+
+    use core::fmt::Write as _;
+    use core::hint::black_box;
+
+    use actq_controller::foc::{CurrentLoop, Gains, Measured, Rotor};
+    use actq_firmware_support::{count, host};
+    use actq_link::frame::CRC;
+    use cortex_m_semihosting::hio;
+
+    #[cortex_m_rt::entry]
+    fn main() -> ! {
+        host::exit(run().is_some())
+    }
+
+    fn run() -> Option<()> {
+        let mut control = CurrentLoop::new(Gains { proportional: 0.188_5, integral: 0.039_27 });
+        let (mut digest, mut phases) = (CRC.digest(), [0.0f32; 3]);
+        for i in 0..10_000u16 {
+            let measured = Measured { phases, angle: f32::from(i) * 0.037, supply: 24.0 };
+            let target = Rotor { d: 0.0, q: f32::from(i % 997) * 0.04 - 20.0 };
+            let mut step = || control.step(black_box(&measured), target);
+            let tick = if i % 100 == 0 { count::region(step) } else { step() }?;
+            for (phase, duty) in phases.iter_mut().zip(tick.duties) {
+                digest.update(&duty.to_bits().to_le_bytes());
+                *phase = 0.9 * *phase + 3.0 * (duty - 0.5);
+            }
+        }
+        writeln!(hio::hstdout().ok()?, "{:08x}", digest.finalize()).ok()
+    }
+}

@@ -1,0 +1,171 @@
+//! A three-phase motor in the tick: the current loop of `actq_controller::foc` drives a motor that is simulated, so that the tick does the
+//! work that a real one would have. The first axis commands the current that makes torque.
+//!
+//! Real currents and a real angle take the place of [`Simulated::measure`]; the duty cycles go to the board's power stage as they are.
+
+use actq_boards::seams::Stage;
+use actq_controller::foc::{CurrentLoop, Gains, Measured, Rotor, Stator};
+use actq_controller::{Axis, Output};
+
+use crate::output::{Bridges, share};
+
+/// A slow motor behind a gear, which a tick of 1 kHz can hold, too: ohm, henry, volt second, pole pairs.
+const RESISTANCE: f32 = 1.0;
+const INDUCTANCE: f32 = 10e-3;
+const FLUX: f32 = 0.02;
+const PAIRS: f32 = 7.0;
+/// Kilogram square metre, and newton metre second.
+const INERTIA: f32 = 1e-3;
+const FRICTION: f32 = 0.05;
+/// Volt.
+const SUPPLY: f32 = 24.0;
+/// Ampere, at an axis' limits.
+const CURRENT: f32 = 1.0;
+/// Of the current loop, in rad/s.
+const BANDWIDTH: f32 = 300.0;
+
+/// A power stage, the current loop before it, and the motor behind it.
+#[derive(Debug)]
+pub struct Motor<S> {
+    bridges: Bridges<S>,
+    control: CurrentLoop,
+    motor: Simulated,
+}
+
+impl<S: Stage> Motor<S> {
+    /// At a stand, of a stage that is off, with so many ticks a second.
+    pub fn new(stage: S, tick_hz: u32) -> Self {
+        let tick = 1.0 / tick_hz as f32;
+        let gains = Gains::for_motor(RESISTANCE, INDUCTANCE, BANDWIDTH, tick);
+        Self { bridges: Bridges::new(stage), control: CurrentLoop::new(gains), motor: Simulated::new(tick) }
+    }
+
+    /// Tells the first output of a tick, as [`Bridges::tell`]; false also where what was measured is not finite.
+    pub fn tell(&mut self, outputs: &[Output], axes: &[Axis]) -> bool {
+        let duties = match (outputs.first(), axes.first()) {
+            (Some(Output::Drive(value)), Some(axis)) => {
+                // An axis without a way stays still.
+                let still = axis.low() == axis.high();
+                let q = if still { 0.0 } else { (2.0 * share(*value, axis) - 1.0) * CURRENT };
+                self.control.step(&self.motor.measure(), Rotor { d: 0.0, q }).map(|tick| tick.duties)
+            }
+            (Some(Output::Brake), _) => {
+                self.control.reset();
+                Some([0.0; 3])
+            }
+            _ => None,
+        };
+        self.motor.run(duties);
+        match duties {
+            Some(duties) => self.bridges.drive(duties),
+            None => {
+                self.control.reset();
+                self.bridges.coast();
+                outputs.first() == Some(&Output::Coast)
+            }
+        }
+    }
+}
+
+/// A permanent-magnet synchronous motor, in the axes of its stator, so that no sine is computed: explicit Euler steps of a tick.
+#[derive(Debug)]
+struct Simulated {
+    current: Stator,
+    /// Along the flux.
+    flux: Stator,
+    /// The same as an angle, in radians from -pi to pi.
+    angle: f32,
+    /// Electrical, in rad/s.
+    speed: f32,
+    /// Seconds.
+    tick: f32,
+}
+
+impl Simulated {
+    const fn new(tick: f32) -> Self {
+        Self {
+            current: Stator { alpha: 0.0, beta: 0.0 },
+            flux: Stator { alpha: 1.0, beta: 0.0 },
+            angle: 0.0,
+            speed: 0.0,
+            tick,
+        }
+    }
+
+    fn measure(&self) -> Measured {
+        Measured { phases: self.current.phases(), angle: self.angle, supply: SUPPLY }
+    }
+
+    /// One tick with duty cycles; without them no current flows.
+    fn run(&mut self, duties: Option<[f32; 3]>) {
+        let Stator { alpha, beta } = self.flux;
+        match duties.map(Stator::of_phases) {
+            Some(voltage) => {
+                let (by, back) = (self.tick / INDUCTANCE, self.speed * FLUX);
+                self.current.alpha += by * (SUPPLY * voltage.alpha - RESISTANCE * self.current.alpha + back * beta);
+                self.current.beta += by * (SUPPLY * voltage.beta - RESISTANCE * self.current.beta - back * alpha);
+            }
+            None => self.current = Stator::default(),
+        }
+        let torque = 1.5 * PAIRS * FLUX * (alpha * self.current.beta - beta * self.current.alpha);
+        self.speed += self.tick / INERTIA * (PAIRS * torque - FRICTION * self.speed);
+        // A turn by so little that its sine and cosine end with these terms; what rounding makes of the length is taken back.
+        let turn = self.tick * self.speed;
+        let (sin, cos) = (turn - turn * turn * turn / 6.0, 1.0 - 0.5 * turn * turn);
+        let (alpha, beta) = (cos * alpha - sin * beta, sin * alpha + cos * beta);
+        let length = 1.5 - 0.5 * (alpha * alpha + beta * beta);
+        self.flux = Stator { alpha: length * alpha, beta: length * beta };
+        self.angle += turn;
+        if self.angle.abs() > core::f32::consts::PI {
+            self.angle -= core::f32::consts::TAU.copysign(self.angle);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use actq_controller::SafeAction;
+
+    use super::*;
+    use crate::output::mock::Mock;
+
+    /// The motor's current along the torque axis.
+    fn torque_current(motor: &Motor<Mock>) -> f32 {
+        let Simulated { current, flux, .. } = &motor.motor;
+        flux.alpha * current.beta - flux.beta * current.alpha
+    }
+
+    #[test]
+    fn the_current_follows_the_output_and_the_motor_turns() {
+        let axes = [Axis::new(-2.0, 2.0, 1.0, 0.0, SafeAction::Brake).expect("it fits")];
+        for tick_hz in [1000, 8000] {
+            let mut motor = Motor::new(Mock::default(), tick_hz);
+            for (value, current) in [(1.0, 0.5), (-2.0, -1.0), (0.0, 0.0)] {
+                for _ in 0..tick_hz / 2 {
+                    assert!(motor.tell(&[Output::Drive(value)], &axes));
+                }
+                assert!((torque_current(&motor) - current).abs() < 0.03, "{tick_hz} Hz: {}", torque_current(&motor));
+                // Friction balances the torque.
+                let speed = PAIRS * 1.5 * PAIRS * FLUX * current / FRICTION;
+                assert!((motor.motor.speed - speed).abs() < 1.0, "{tick_hz} Hz: {} of {speed}", motor.motor.speed);
+            }
+            let (sin, cos) = motor.motor.angle.sin_cos();
+            let Stator { alpha, beta } = motor.motor.flux;
+            assert!((cos - alpha).abs() < 1e-3 && (sin - beta).abs() < 1e-3, "both are the same angle");
+        }
+    }
+
+    #[test]
+    fn coasting_is_off_and_braking_is_on_without_a_duty() {
+        let axes = [Axis::STILL];
+        let mut motor = Motor::new(Mock::default(), 1000);
+        assert!(motor.tell(&[Output::Brake], &axes) && motor.bridges.stage().on);
+        assert_eq!(motor.bridges.stage().duties(), [0; 3]);
+        assert!(motor.tell(&[Output::Coast], &axes) && !motor.bridges.stage().on);
+        // An axis without a way.
+        assert!(motor.tell(&[Output::Drive(0.0)], &axes) && motor.bridges.stage().on);
+        assert_eq!((torque_current(&motor), motor.bridges.stage().duties()), (0.0, [500; 3]));
+        // What no controller says.
+        assert!(!motor.tell(&[Output::Drive(f32::NAN)], &[Axis::STILL; 0]) && !motor.bridges.stage().on);
+    }
+}

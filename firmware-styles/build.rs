@@ -1,0 +1,5 @@
+//! Links for the board.
+
+fn main() -> Result<(), String> {
+    actq_boards::link()
+}

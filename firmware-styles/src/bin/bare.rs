@@ -1,0 +1,57 @@
+//! A bare loop: the control tick is an exception handler, the head runs below it in slices, and what both share is in a critical section.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[cfg(not(target_os = "none"))]
+use actq_firmware_styles::main;
+
+#[cfg(target_os = "none")]
+mod firmware {
+    use core::cell::Cell;
+    use core::convert::Infallible;
+    use core::task::Poll;
+
+    use actq_firmware_styles::{Action, Motors, SCRATCH, SLICE, Sensors, open, start_tick};
+    use actq_firmware_support::host;
+    use cortex_m::peripheral::SYST;
+    use cortex_m::{Peripherals, singleton};
+    use cortex_m_rt::{entry, exception};
+    use critical_section::Mutex;
+
+    /// From the loop to the tick: the last action.
+    static ACTION: Mutex<Cell<Option<Action>>> = Mutex::new(Cell::new(None));
+
+    #[entry]
+    fn main() -> ! {
+        let (peripherals, scratch) = (Peripherals::take(), singleton!(: [u32; SCRATCH] = [0; SCRATCH]));
+        if let (Some(peripherals), Some(scratch)) = (peripherals, scratch) {
+            let _ = control(peripherals.SYST, scratch);
+        }
+        host::exit(false)
+    }
+
+    /// The control tick, which interrupts whatever the loop does.
+    #[exception]
+    fn SysTick() {
+        static mut MOTORS: Motors = Motors::new();
+        let action = critical_section::with(|cs| ACTION.borrow(cs).get());
+        MOTORS.tick(action);
+    }
+
+    /// The loop; it ends where there is no head, or a step of it fails.
+    fn control(timer: SYST, scratch: &mut [u32]) -> Option<Infallible> {
+        let mut head = open(scratch)?;
+        let mut sensors = Sensors::new(head.image());
+        start_tick(timer);
+        loop {
+            let Some(observation) = sensors.read() else { continue };
+            head.begin(&observation).ok()?;
+            let action = loop {
+                // What else the loop has to do has its place here: it waits for a slice at most.
+                if let Poll::Ready(action) = head.poll(SLICE).ok()? {
+                    break action.try_into().ok()?;
+                }
+            };
+            critical_section::with(|cs| ACTION.borrow(cs).set(Some(action)));
+        }
+    }
+}

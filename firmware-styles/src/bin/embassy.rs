@@ -1,0 +1,84 @@
+//! Embassy: the control tick is a task of an executor in an interrupt, the head a task of the one below, which lets others run between
+//! slices. Embassy has no timer for the board: where it has one, an `embassy_time::Ticker` takes the place of the signal of the timer.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[cfg(not(target_os = "none"))]
+use actq_firmware_styles::main;
+
+#[cfg(target_os = "none")]
+mod firmware {
+    use core::cell::Cell;
+    use core::convert::Infallible;
+    use core::task::Poll;
+
+    use actq_boards::device::{Interrupt, interrupt};
+    use actq_firmware_styles::{Action, Motors, SCRATCH, SLICE, Sensors, open, start_tick};
+    use actq_firmware_support::host;
+    use cortex_m::peripheral::SYST;
+    use cortex_m::{Peripherals, singleton};
+    use cortex_m_rt::exception;
+    use embassy_executor::{InterruptExecutor, Spawner};
+    use embassy_futures::yield_now;
+    use embassy_sync::blocking_mutex::CriticalSectionMutex;
+    use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+    use embassy_sync::signal::Signal;
+
+    static CONTROL: InterruptExecutor = InterruptExecutor::new();
+    static TICK: Signal<CriticalSectionRawMutex, ()> = Signal::new();
+    /// From the head to the tick: the last action.
+    static ACTION: CriticalSectionMutex<Cell<Option<Action>>> = CriticalSectionMutex::new(Cell::new(None));
+
+    #[embassy_executor::main(entry = "cortex_m_rt::entry")]
+    async fn main(_below: Spawner) {
+        let (peripherals, scratch) = (Peripherals::take(), singleton!(: [u32; SCRATCH] = [0; SCRATCH]));
+        if let (Some(peripherals), Some(scratch)) = (peripherals, scratch) {
+            // An interrupt that nothing else here uses, above all that runs in the thread.
+            CONTROL.start(Interrupt::SERIAL).spawn(tick().expect("it is the first"));
+            let _ = control(peripherals.SYST, scratch).await;
+        }
+        host::exit(false)
+    }
+
+    #[exception]
+    fn SysTick() {
+        TICK.signal(());
+    }
+
+    #[cortex_m_rt::interrupt]
+    fn SERIAL() {
+        // SAFETY: this is the executor's interrupt, which it has enabled when it was started.
+        unsafe { CONTROL.on_interrupt() }
+    }
+
+    /// The control tick, which interrupts whatever the tasks below do.
+    #[embassy_executor::task]
+    async fn tick() {
+        let mut motors = Motors::new();
+        loop {
+            TICK.wait().await;
+            motors.tick(ACTION.lock(Cell::get));
+        }
+    }
+
+    /// The head's task; it ends where there is none, or a step of it fails.
+    async fn control(timer: SYST, scratch: &mut [u32]) -> Option<Infallible> {
+        let mut head = open(scratch)?;
+        let mut sensors = Sensors::new(head.image());
+        start_tick(timer);
+        loop {
+            let Some(observation) = sensors.read() else {
+                yield_now().await;
+                continue;
+            };
+            head.begin(&observation).ok()?;
+            let action = loop {
+                if let Poll::Ready(action) = head.poll(SLICE).ok()? {
+                    break action.try_into().ok()?;
+                }
+                // Other tasks wait for a slice at most.
+                yield_now().await;
+            };
+            ACTION.lock(|last| last.set(Some(action)));
+        }
+    }
+}

@@ -1,0 +1,64 @@
+//! RTIC 2: the control tick is a hardware task, the head runs in `idle` in slices, and what both share is a resource, whose lock is a
+//! priority of the processor.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[cfg(not(target_os = "none"))]
+use actq_firmware_styles::main;
+
+#[cfg(target_os = "none")]
+#[rtic::app(device = actq_boards::device, peripherals = false)]
+mod app {
+    use core::convert::Infallible;
+    use core::task::Poll;
+
+    use actq_firmware_styles::{Action, Motors, SCRATCH, SLICE, Sensors, open, start_tick};
+    use actq_firmware_support::host;
+    use cortex_m::peripheral::SYST;
+
+    #[shared]
+    struct Shared {
+        /// From the loop to the tick: the last action.
+        action: Option<Action>,
+    }
+
+    #[local]
+    struct Local {
+        motors: Motors,
+        timer: Option<SYST>,
+    }
+
+    #[init]
+    fn init(cx: init::Context) -> (Shared, Local) {
+        (Shared { action: None }, Local { motors: Motors::new(), timer: Some(cx.core.SYST) })
+    }
+
+    /// The control tick, which interrupts whatever the loop does.
+    #[task(binds = SysTick, priority = 2, shared = [action], local = [motors])]
+    fn tick(mut cx: tick::Context) {
+        let action = cx.shared.action.lock(|action| *action);
+        cx.local.motors.tick(action);
+    }
+
+    #[idle(shared = [action], local = [timer, scratch: [u32; SCRATCH] = [0; SCRATCH]])]
+    fn idle(mut cx: idle::Context) -> ! {
+        let _ = control(cx.local.timer, cx.local.scratch, |new| cx.shared.action.lock(|action| *action = Some(new)));
+        host::exit(false)
+    }
+
+    /// The loop; it ends where there is no head, or a step of it fails.
+    fn control(timer: &mut Option<SYST>, scratch: &mut [u32], mut tell: impl FnMut(Action)) -> Option<Infallible> {
+        let mut head = open(scratch)?;
+        let mut sensors = Sensors::new(head.image());
+        start_tick(timer.take()?);
+        loop {
+            let Some(observation) = sensors.read() else { continue };
+            head.begin(&observation).ok()?;
+            tell(loop {
+                // What else the loop has to do has its place here: it waits for a slice at most.
+                if let Poll::Ready(action) = head.poll(SLICE).ok()? {
+                    break action.try_into().ok()?;
+                }
+            });
+        }
+    }
+}
