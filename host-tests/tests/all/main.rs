@@ -14,6 +14,7 @@ mod drive;
 mod faults;
 mod format;
 mod functions;
+mod heads;
 mod malformed;
 mod memory;
 mod ops;
