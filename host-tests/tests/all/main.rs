@@ -12,6 +12,7 @@ mod denoising;
 mod digests;
 mod drive;
 mod faults;
+mod flow;
 mod format;
 mod functions;
 mod heads;
