@@ -2,7 +2,6 @@
 #![forbid(unsafe_code)]
 
 use std::path::{Path, PathBuf};
-use std::task::Poll;
 
 use actq::budget::Budget;
 use actq::data::Recordings;
@@ -106,7 +105,7 @@ fn slices(image: Image<'_>, budget: u32) -> Result<String> {
     with_head(image, |head| {
         head.begin(&vec![0.5; image.obs_len()])?;
         let mut polls = 1;
-        while let Poll::Pending = head.poll(budget)?.map(|_| ()) {
+        while head.poll(budget)?.is_pending() {
             polls += 1;
         }
         Ok(polls.to_string())
