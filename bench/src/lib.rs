@@ -26,3 +26,8 @@ pub use shared::{shared_policies, skipped};
 pub fn ur3() -> PathBuf {
     actq_ur3::policy_folder().to_owned()
 }
+
+/// The project's own flow.
+pub fn ur3_flow() -> PathBuf {
+    actq_ur3::flow_folder().to_owned()
+}

@@ -28,6 +28,11 @@ pub fn policy_folder() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/policy"))
 }
 
+/// The folder of the policy that makes its chunks of noise, with its recordings.
+pub fn flow_folder() -> &'static Path {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/flow"))
+}
+
 /// Number of values in one observation; [`task::Task::observe`] gives their order.
 pub const OBS_DIM: usize = 18;
 

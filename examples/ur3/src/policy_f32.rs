@@ -1,28 +1,50 @@
 //! Plain `f32` runner of an exported policy: the baseline against which quantized policies are judged.
 
 use std::collections::{HashMap, VecDeque};
+use std::f64::consts::TAU;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
 use safetensors::{Dtype, SafeTensors};
 use serde_json::Value;
 
+use crate::random::Random;
 use crate::{ACT_DIM, OBS_DIM};
 
+/// What a flow's observation is limited to once it is normalised: the default of policy.json.
+const OBS_CLIP: f32 = 5.0;
+/// Of a flow's noise, from each reset on.
+const NOISE_SEED: u64 = 1;
+
 /// A chunk policy: the network proposes a chunk of actions, the first `execute` of them are played, then it is asked
-/// again.
+/// again. The chunk is the network's output, or a flow's: noise that has followed the velocities that the network gives.
 #[derive(Debug)]
 pub struct PolicyF32 {
     layers: Vec<Layer>,
+    flow: Option<Flow>,
     execute: usize,
     contract: Contract,
     queue: VecDeque<[f32; ACT_DIM]>,
 }
 
+/// How a chunk comes of noise: by Euler steps from time 0 to 1.
+#[derive(Debug)]
+struct Flow {
+    normalize: Op,
+    /// The network reads cosine and sine of the time at these, in turns.
+    freq: Vec<f32>,
+    steps: usize,
+    /// Values of a chunk.
+    len: usize,
+    noise: Random,
+}
+
 #[derive(Debug)]
 struct Layer {
+    /// Names of the values that are read one behind the other; where there are none, the output before.
+    input: Vec<String>,
     op: Op,
-    /// Name under which the output is kept for a later `add`.
+    /// Name under which the output is kept.
     save: Option<String>,
 }
 
@@ -83,11 +105,24 @@ impl PolicyF32 {
             ensure!(found == expected, "{key} is {found}, this task has {expected}");
         }
 
+        let flow = match text(spec, "kind")? {
+            "chunk" => None,
+            "flow" => Some(Flow::read(spec, tensors, chunk * ACT_DIM)?),
+            other => bail!("kind {other:?} is not supported"),
+        };
         let mut layers = Vec::new();
         let mut width = OBS_DIM;
-        let mut saved = HashMap::new();
+        let mut saved = flow.as_ref().map_or_else(HashMap::new, |flow| {
+            let slots = [("obs", OBS_DIM), ("tfeat", 2 * flow.freq.len()), ("x", flow.len)];
+            HashMap::from(slots.map(|(name, len)| (name.to_owned(), len)))
+        });
         for (i, op) in list(spec, "ops")?.iter().enumerate() {
             let context = || format!("op {i}");
+            let input = inputs(op).with_context(context)?;
+            if !input.is_empty() {
+                let len = |name: &String| saved.get(name).with_context(|| format!("no input {name:?}"));
+                width = input.iter().map(len).sum::<Result<usize>>().with_context(context)?;
+            }
             let layer_op = read_op(op, tensors, width, &saved).with_context(context)?;
             if let Op::Linear { bias, .. } = &layer_op {
                 width = bias.len();
@@ -96,7 +131,7 @@ impl PolicyF32 {
             if let Some(name) = save {
                 saved.insert(name.to_owned(), width);
             }
-            layers.push(Layer { op: layer_op, save: save.map(str::to_owned) });
+            layers.push(Layer { input, op: layer_op, save: save.map(str::to_owned) });
         }
         ensure!(width == chunk * ACT_DIM, "the last op has {width} outputs, chunk * act_dim is {}", chunk * ACT_DIM);
 
@@ -108,12 +143,20 @@ impl PolicyF32 {
             high: numbers(action, "high")?,
         };
         ensure!(contract.low.iter().zip(&contract.high).all(|(low, high)| low <= high), "`action`: low is above high");
-        Ok(Self { layers, execute, contract, queue: VecDeque::new() })
+        Ok(Self { layers, flow, execute, contract, queue: VecDeque::new() })
     }
 
-    /// Forgets the queued actions; call it before every episode.
+    /// Forgets the queued actions and begins the noise anew; call it before every episode.
     pub fn reset(&mut self) {
         self.queue.clear();
+        if let Some(flow) = &mut self.flow {
+            flow.noise = Random::new(NOISE_SEED);
+        }
+    }
+
+    /// Whether its output depends on noise.
+    pub fn draws(&self) -> bool {
+        self.flow.is_some()
     }
 
     /// The next action (joint velocities, rad/s) at the observation `obs` ([`OBS_DIM`] values).
@@ -133,14 +176,55 @@ impl PolicyF32 {
     ///
     /// # Panics
     /// If `obs` has another length.
-    pub fn raw(&self, obs: &[f32]) -> Vec<f32> {
+    pub fn raw(&mut self, obs: &[f32]) -> Vec<f32> {
         assert_eq!(obs.len(), OBS_DIM, "length of the observation");
-        let mut saved: HashMap<&str, Vec<f32>> = HashMap::new();
-        let mut x = obs.to_vec();
-        for layer in &self.layers {
-            layer.op.apply(&mut x, &saved);
-            if let Some(name) = &layer.save {
-                saved.insert(name, x.clone());
+        match &mut self.flow {
+            None => run(&self.layers, obs.to_vec(), HashMap::new()),
+            Some(flow) => flow.chunk(&self.layers, obs.to_vec()),
+        }
+    }
+}
+
+/// The output of layers for `x`, and for what else they read by its name.
+fn run<'a>(layers: &'a [Layer], mut x: Vec<f32>, mut saved: HashMap<&'a str, Vec<f32>>) -> Vec<f32> {
+    for layer in layers {
+        if !layer.input.is_empty() {
+            x = layer.input.iter().flat_map(|name| &saved[name.as_str()]).copied().collect();
+        }
+        layer.op.apply(&mut x, &saved);
+        if let Some(name) = &layer.save {
+            saved.insert(name, x.clone());
+        }
+    }
+    x
+}
+
+impl Flow {
+    fn read(spec: &Value, tensors: &SafeTensors<'_>, len: usize) -> Result<Self> {
+        let vector = |name: &str| tensor(tensors, name, &[OBS_DIM]);
+        let [mean, scale] = [vector("obs_norm.mean")?, vector("obs_norm.scale")?];
+        let freq = tensors.tensor("time.freq").context("tensor time.freq")?.shape().to_vec();
+        let steps = count(spec, "steps")?;
+        ensure!(steps > 0, "steps is 0");
+        Ok(Self {
+            normalize: Op::Normalize { mean, scale, clip: Some(OBS_CLIP) },
+            freq: tensor(tensors, "time.freq", &freq)?,
+            steps,
+            len,
+            noise: Random::new(NOISE_SEED),
+        })
+    }
+
+    fn chunk(&mut self, layers: &[Layer], mut obs: Vec<f32>) -> Vec<f32> {
+        self.normalize.apply(&mut obs, &HashMap::new());
+        let mut x: Vec<f32> = (0..self.len).map(|_| self.noise.normal() as f32).collect();
+        let h = 1.0 / self.steps as f32;
+        for step in 0..self.steps {
+            let angles = self.freq.iter().map(|f| TAU * f64::from(h * step as f32 * f));
+            let tfeat = angles.clone().map(libm::cos).chain(angles.map(libm::sin)).map(|v| v as f32).collect();
+            let slots = HashMap::from([("obs", obs.clone()), ("tfeat", tfeat), ("x", x.clone())]);
+            for (x, v) in x.iter_mut().zip(run(layers, Vec::new(), slots)) {
+                *x += h * v;
             }
         }
         x
@@ -227,6 +311,17 @@ fn tensor(tensors: &SafeTensors<'_>, name: &str, shape: &[usize]) -> Result<Vec<
     Ok(values.iter().map(|&bytes| f32::from_le_bytes(bytes)).collect())
 }
 
+/// The names in `input`: none, one, or a list.
+fn inputs(op: &Value) -> Result<Vec<String>> {
+    let name = |name: &Value| name.as_str().map(str::to_owned);
+    match op.get("input") {
+        None => Some(Vec::new()),
+        Some(Value::Array(names)) => names.iter().map(name).collect::<Option<_>>(),
+        Some(one) => name(one).map(|name| vec![name]),
+    }
+    .context("`input` is not a name or a list of names")
+}
+
 fn text<'a>(object: &'a Value, key: &str) -> Result<&'a str> {
     object.get(key).and_then(Value::as_str).with_context(|| format!("no text {key:?}"))
 }
@@ -270,7 +365,7 @@ mod tests {
         ];
         let bytes = safetensors::serialize(views, None)?;
         let mut spec = json!({
-            "chunk": chunk, "execute": 2, "obs_dim": OBS_DIM, "act_dim": ACT_DIM,
+            "kind": "chunk", "chunk": chunk, "execute": 2, "obs_dim": OBS_DIM, "act_dim": ACT_DIM,
             "ops": [{"op": "linear", "w": "w", "b": "b"}],
             "action": {"scale": [2, 2, 2, 2, 2, 2], "offset": [1, 1, 1, 1, 1, 1],
                        "low": [0, 0, 0, 0, 0, 0], "high": [20, 20, 20, 20, 20, 20]},
@@ -304,6 +399,9 @@ mod tests {
     fn bad_policies_are_errors() {
         for (key, value) in [
             ("chunk", json!(4)),
+            ("kind", json!("diffusion")),
+            ("kind", json!("flow")),
+            ("ops", json!([{"op": "linear", "w": "w", "b": "b", "input": ["x"]}])),
             ("execute", json!(0)),
             ("execute", json!(4)),
             ("obs_dim", json!(3)),

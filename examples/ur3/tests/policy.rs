@@ -4,25 +4,27 @@ use std::fs::File;
 
 use actq_ur3::policy_f32::PolicyF32;
 use actq_ur3::task::run_episode;
-use actq_ur3::{OBS_DIM, policy_folder};
+use actq_ur3::{OBS_DIM, flow_folder, policy_folder};
 use ndarray::{Array1, Array3, Axis};
 use ndarray_npy::NpzReader;
 
 #[test]
-fn shipped_policy_solves_the_task() {
-    let mut policy = PolicyF32::load(policy_folder()).unwrap();
-    let solved = (1000..1100)
-        .filter(|&seed| {
-            policy.reset();
-            run_episode(seed, |obs| policy.act(obs)).success
-        })
-        .count();
-    assert!(solved >= 95, "{solved} of 100 episodes");
+fn shipped_policies_solve_the_task() {
+    for folder in [policy_folder(), flow_folder()] {
+        let mut policy = PolicyF32::load(folder).unwrap();
+        let solved = (1000..1100)
+            .filter(|&seed| {
+                policy.reset();
+                run_episode(seed, |obs| policy.act(obs)).success
+            })
+            .count();
+        assert!(solved >= 95, "{}: {solved} of 100 episodes", folder.display());
+    }
 }
 
 #[test]
 fn recorded_outputs_are_those_of_the_policy() {
-    let policy = PolicyF32::load(policy_folder()).unwrap();
+    let mut policy = PolicyF32::load(policy_folder()).unwrap();
     for name in ["calib.npz", "heldout.npz"] {
         let mut npz = NpzReader::new(File::open(policy_folder().join(name)).unwrap()).unwrap();
         let obs: Array3<f32> = npz.by_name("obs").unwrap();

@@ -90,6 +90,14 @@ fn policies() -> Vec<(Value, Solver)> {
             Solver::Ddim { prediction: "epsilon", clip: 2.0 },
         ),
         (
+            diffusion("cosine", json!({"prediction": "epsilon", "clip_iterate": 0.8, "variance": "large"})),
+            ddpm("epsilon", f64::INFINITY, true),
+        ),
+        (
+            diffusion("cosine", json!({"prediction": "v", "solver": "ddim", "steps": 4, "clip_iterate": 0.6})),
+            Solver::Ddim { prediction: "v", clip: f64::INFINITY },
+        ),
+        (
             diffusion("cosine", json!({"prediction": "sample", "solver": "ddim", "steps": 3})),
             Solver::Ddim { prediction: "sample", clip: f64::INFINITY },
         ),
@@ -150,7 +158,9 @@ fn reference(case: &Case, json: &Value, solver: &Solver, obs: &[f64], noise: &[f
         None => (1.0 - bar(i + 1) / bar(i)).min(0.999),
     };
     let signal = |i: u64| (0..=i).map(|i| 1.0 - beta(i)).product::<f64>();
+    let limit = json["clip_iterate"].as_f64().unwrap_or(f64::INFINITY);
     for k in (0..steps).rev() {
+        x = x.iter().map(|x| x.clamp(-limit, limit)).collect();
         let t = k * (train / steps);
         let (now, before) = (signal(t), if k > 0 { signal((k - 1) * (train / steps)) } else { 1.0 });
         let out = at(&x, t as f64);
@@ -369,6 +379,11 @@ fn policies_that_cannot_be_are_refused() -> Result<()> {
         (diffusion(json!({"train_steps": 4, "schedule": "cosine", "prediction": "mean"})), "prediction is \"mean\""),
         (diffusion(json!({"train_steps": 4, "schedule": "cosine", "solver": "euler"})), "solver is \"euler\""),
         (diffusion(json!({"train_steps": 4, "schedule": "cosine", "clip_sample": 0.0})), "clip_sample is 0.0"),
+        (
+            diffusion(json!({"train_steps": 4, "schedule": "cosine", "clip_sample": 1.0, "clip_iterate": 1.0})),
+            "give one of them",
+        ),
+        (flow(json!({"steps": 2, "clip_iterate": 1.0})), "belongs to kind diffusion"),
         (diffusion(json!({"train_steps": 4, "schedule": "cosine", "variance": "none"})), "variance is \"none\""),
     ] {
         let case = Case::new(json.clone())?;

@@ -16,6 +16,9 @@ use crate::policy::Policy;
 use crate::random::Random;
 use crate::runtime::{ImageBuffer, with_head};
 
+/// The most bytes that a self-test vector of more than one step may take.
+const SELF_TEST_BYTES: usize = 64 << 10;
+
 /// The image of a policy with its quantized matrices, one per matrix of the graph. The self-test vector is computed by the
 /// executor itself.
 pub fn image(policy: &Policy, matrices: &[Outcome]) -> Result<Vec<u8>> {
@@ -40,7 +43,9 @@ pub fn image(policy: &Policy, matrices: &[Outcome]) -> Result<Vec<u8>> {
         writer.push_floats(&ensemble.weights());
     }
     let name = writer.push_bytes(policy.name.as_bytes());
-    let steps = policy.execute.max(horizon) + 2;
+    // Where observations are long, fewer than those of a chunk and the next.
+    let room = SELF_TEST_BYTES / (4 * (policy.graph.obs_len + policy.act_len));
+    let steps = (policy.execute.max(horizon) + 2).min(room.max(1));
     let observations = self_test_observations(&policy.graph, steps);
     let self_test = writer.words.len() as u32;
     for observation in &observations {

@@ -11,7 +11,7 @@ pub struct Denoising {
     pub first: usize,
     /// Values of the iterate.
     pub len: usize,
-    /// Limit of the predicted sample's magnitude, or infinite.
+    /// Limit of the magnitude of the predicted sample, or of what stands in its place; or infinite.
     pub limit: f32,
     /// What each step does.
     pub steps: Vec<Coefficients>,

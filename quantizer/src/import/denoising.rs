@@ -27,6 +27,8 @@ pub(super) struct JsonDenoising {
     #[serde(skip_serializing_if = "Option::is_none")]
     clip_sample: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) clip_iterate: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     variance: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     beta: Option<[f64; 2]>,
@@ -37,7 +39,7 @@ pub(super) struct JsonDenoising {
 }
 
 /// Keys of [`JsonDenoising`].
-pub(super) const KEYS: [&str; 11] = [
+pub(super) const KEYS: [&str; 12] = [
     "euler_steps",
     "steps",
     "solver",
@@ -45,6 +47,7 @@ pub(super) const KEYS: [&str; 11] = [
     "train_steps",
     "prediction",
     "clip_sample",
+    "clip_iterate",
     "variance",
     "beta",
     "time",
@@ -110,6 +113,7 @@ impl JsonDenoising {
             ("train_steps", self.train_steps.is_some()),
             ("prediction", self.prediction.is_some()),
             ("clip_sample", self.clip_sample.is_some()),
+            ("clip_iterate", self.clip_iterate.is_some()),
             ("variance", self.variance.is_some()),
             ("beta", self.beta.is_some()),
         ] {
@@ -151,9 +155,11 @@ impl JsonDenoising {
         let remaining = self.remaining(train)?;
         // Evenly spaced, from the noisiest on; the last is 0.
         let chosen: Vec<usize> = (0..steps).rev().map(|k| k * (train / steps)).collect();
-        let limit = match self.clip_sample {
-            None => f32::INFINITY,
-            Some(clip) => super::numbers::positive(clip, "clip_sample")?,
+        let limit = match (self.clip_sample, self.clip_iterate) {
+            (None, None) => f32::INFINITY,
+            (Some(clip), None) => super::numbers::positive(clip, "clip_sample")?,
+            (None, Some(clip)) => super::numbers::positive(clip, "clip_iterate")?,
+            (Some(_), Some(_)) => bail!("clip_sample and clip_iterate limit by one limit; give one of them"),
         };
         let mut by = Vec::new();
         for (i, &t) in chosen.iter().enumerate() {
@@ -236,6 +242,13 @@ impl JsonDenoising {
                 [sample[0], sample[1], keep, 0.0, before.sqrt() * (1.0 - alpha) / (1.0 - ab), variance.sqrt(), 0.0]
             }
             Some(other) => bail!("solver is {other:?}; ddpm and ddim are those of a diffusion policy"),
+        };
+        // A sample without a limit of its own is a sum like the rest, and its place is free for the iterate.
+        let numbers = match (self.clip_iterate, numbers) {
+            (None, numbers) => numbers,
+            (Some(_), [sample_x, sample_v, keep, direct, sample, sigma, ahead]) => {
+                [1.0, 0.0, 0.0, direct + sample * sample_v, keep + sample * sample_x, sigma, ahead]
+            }
         };
         Ok(Coefficients::from_array(numbers.map(|number| number as f32)))
     }

@@ -107,6 +107,18 @@ impl<'a> Builder<'a> {
             let normal = graph.add(normalize, &[slots["obs"]])?;
             slots.insert("obs".to_owned(), normal);
         }
+        // What the network reads is limited as what the step keeps (`Schedule`).
+        if by.clip_iterate.is_some() {
+            let len = schedule.denoising.len;
+            let limited = Normalize {
+                mean: vec![0.0; len],
+                scale: vec![1.0; len],
+                pre_clip: f32::INFINITY,
+                clip: schedule.denoising.limit,
+            };
+            let limited = graph.add(limited, &[slots["x"]])?;
+            slots.insert("x".to_owned(), limited);
+        }
         Ok((Self { weights, graph, slots }, times))
     }
 

@@ -15,6 +15,8 @@ pub struct OpTime {
     pub op: String,
     /// Values that it writes.
     pub output: usize,
+    /// How often it runs; everything below is of all its runs.
+    pub runs: usize,
     /// Multiplications of a weight; 0 where the operation has no weights.
     pub macs: usize,
     /// Instructions.
@@ -47,20 +49,22 @@ pub struct StepTime {
 impl StepTime {
     /// Predicts the cost of a step.
     pub fn new(image: &Image<'_>, clock_hz: f64) -> Self {
-        let time = |op: &str, output, macs, cost: Cost| OpTime {
+        let time = |op: &str, output, runs, macs, cost: Cost| OpTime {
             op: op.to_owned(),
             output,
+            runs,
             macs,
             instructions: cost.instructions,
             cycles: cost.cycles,
             microseconds: 1e6 * cost.cycles as f64 / clock_hz,
         };
-        let of_op = |op: Op<'_>| {
+        let of_op = |(i, op): (usize, Op<'_>)| {
+            let runs = if i < image.once() { 1 } else { image.denoising_steps() };
             let macs = op.matrix().map_or(0, |matrix| matrix.rows * matrix.cols);
-            time(op.kind.name(), op.dst().len, macs, cost::of_op(&op))
+            time(op.kind.name(), op.dst().len, runs, runs * macs, cost::of_op(&op) * runs as u64)
         };
-        let frame = time("step", image.act_len(), 0, cost::of_frame(image));
-        let ops: Vec<OpTime> = image.ops().map(of_op).chain([frame]).collect();
+        let frame = time("step", image.act_len(), 1, 0, cost::of_frame(image));
+        let ops: Vec<OpTime> = image.ops().enumerate().map(of_op).chain([frame]).collect();
         let Cost { instructions, cycles } = cost::of_step(image);
         Self {
             clock_hz,

@@ -5,13 +5,14 @@ use crate::measure::time::StepTime;
 
 /// The table that `actq inspect` prints.
 pub fn report(step: &StepTime) -> String {
-    let mut rows = table(&["op", "output", "MACs", "instructions", "per MAC", "cycles", "per MAC", "us"]);
-    let mut row = |op: &str, output: String, macs: usize, instructions: u64, cycles: u64, us: f64| {
+    let mut rows = table(&["op", "output", "runs", "MACs", "instructions", "per MAC", "cycles", "per MAC", "us"]);
+    let mut row = |op: &str, output: String, runs: String, macs: usize, instructions: u64, cycles: u64, us: f64| {
         let per_mac = |n: u64| if macs == 0 { "-".to_owned() } else { format!("{:.3}", n as f64 / macs as f64) };
         let count = if macs == 0 { "-".to_owned() } else { macs.to_string() };
         rows.add_row([
             op.to_owned(),
             output,
+            runs,
             count,
             instructions.to_string(),
             per_mac(instructions),
@@ -21,9 +22,9 @@ pub fn report(step: &StepTime) -> String {
         ]);
     };
     for op in &step.ops {
-        row(&op.op, op.output.to_string(), op.macs, op.instructions, op.cycles, op.microseconds);
+        row(&op.op, op.output.to_string(), op.runs.to_string(), op.macs, op.instructions, op.cycles, op.microseconds);
     }
-    row("all", String::new(), step.macs, step.instructions, step.cycles, 1e3 * step.milliseconds);
+    row("all", String::new(), String::new(), step.macs, step.instructions, step.cycles, 1e3 * step.milliseconds);
     format!("{rows}\n\n{}Polls of at least {} instructions take it in pieces.\n", sentence(step), step.least_budget)
 }
 

@@ -1,7 +1,7 @@
-//! `cargo demo`: the UR3 policy from its PyTorch weights to a Cortex-M4, in closed loop.
+//! `cargo demo`: the UR3's policies from their PyTorch weights to a Cortex-M4, in closed loop.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use actq::budget::Budget;
 use actq::data::{Dataset, Recordings};
@@ -14,7 +14,7 @@ use actq::report::table::table;
 use actq::runtime::{ImageBuffer, with_head};
 use actq_bench::closed_loop::{episode, episode_on_host};
 use actq_bench::qemu::{self, Counter, Server};
-use actq_bench::{Target, evaluation, firmware, ur3};
+use actq_bench::{Target, evaluation, firmware, ur3, ur3_flow};
 use actq_kernels::{Image, Width};
 use actq_ur3::OBS_DIM;
 use actq_ur3::policy_f32::PolicyF32;
@@ -29,6 +29,10 @@ const FIRST_SEED: u64 = 1000;
 
 /// The most steps of distillation: a quarter of what `actq quantize` takes by default, for an answer within a minute.
 const STEPS: usize = 2000;
+
+/// The same of the flow, where a step goes through five of the network's; and the share of the episodes that it drives.
+const FLOW_STEPS: usize = 100;
+const FLOW_SHARE: u64 = 4;
 
 /// Episodes of the f32 policy that are learned from, from seed 0: the 12 of `calib.npz` are a thin tube through what the policy meets.
 const RECORDED: usize = 200;
@@ -55,6 +59,18 @@ fn record(policy: &mut PolicyF32) -> Result<Dataset> {
 /// What the motor controller runs.
 const IN_THE_APPLICATION: &str = "3.0 bits";
 
+/// What is made of a policy, and how it is tried.
+struct Trial<'a> {
+    /// For people.
+    name: &'a str,
+    dir: PathBuf,
+    images: Vec<(&'a str, Options)>,
+    /// Learns from episodes of f32 instead of the folder's recording.
+    recorded: bool,
+    episodes: u64,
+    qemu_episodes: u64,
+}
+
 /// A policy's column in the table.
 struct Column {
     name: String,
@@ -74,86 +90,29 @@ const ROWS: [&str; 9] = [
 ];
 
 pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
-    let policy_dir = ur3();
-    let work = firmware::target_dir().join("demo");
-    fs::create_dir_all(&work)?;
-    let policy = Policy::load(&policy_dir)?;
-    let f32_bytes = 4 * policy.graph.parameters();
-    println!("\nQuantizing {} ({} parameters, {f32_bytes} bytes in f32)", policy.name, policy.graph.parameters());
-
-    println!("Closed loop in f32, {episodes} episodes");
-    let mut reference = PolicyF32::load(&policy_dir)?;
-    let outcomes = closed_loop(episodes, |seed| {
-        reference.reset();
-        Ok(run_episode(seed, |obs| reference.act(obs)))
-    })?;
-    let mut columns = vec![Column {
-        name: "f32".into(),
-        cells: vec![
-            "32".into(),
-            f32_bytes.to_string(),
-            "1.0x".into(),
-            "-".into(),
-            "-".into(),
-            success(&outcomes),
-            tracking(&outcomes),
-        ],
-    }];
-
-    let counter = Counter::build()?;
-    let mut report = Vec::new();
-    println!("Recording {RECORDED} episodes of f32, to learn from");
-    let recordings = Recordings { calib: Some(record(&mut reference)?), heldout: None };
     let eight = Options::new(Method::Gptq, Budget::Width(Width::W8));
-    let best = |bits| Options { steps: Some(STEPS), ..Options::new(Method::Best, Budget::BitsPerWeight(bits)) };
-    for (name, options) in [("8 bits", eight), (IN_THE_APPLICATION, best(3.0)), ("2.0 bits", best(2.0))] {
-        println!("Quantizing to {name} by {}", options.method);
-        let quantizer = Quantizer::new(&policy, &recordings, options.method, |_| {})?;
-        let path = work.join(file(name));
-        let bytes = heads::write_image(&quantizer, &options, &path)?;
-        let buffer = ImageBuffer::new(&bytes);
-        let image = buffer.image(&path)?;
-        println!("Closed loop at {name}, {episodes} episodes on the host");
-        let outcomes = with_head(image, |head| closed_loop(episodes, |seed| episode_on_host(head, seed)))?;
-        println!("Closed loop at {name}, {qemu_episodes} episodes with the firmware in QEMU as the policy");
-        let elf = firmware::harness_with(Target::Fpu, &path)?;
-        let firmware = Firmware::run(&elf, image, qemu_episodes)?;
-        let heldout = eval::heldout(&policy_dir, &image)?;
-        let instructions =
-            evaluation::count(&counter, Target::Fpu, &elf, None, &image, heldout.episode(0))?.instructions;
-        let nmse = eval::evaluate(image, &heldout)?.nmse;
-        columns.push(Column {
-            name: name.into(),
-            cells: vec![
-                format!("{:.2}", bits_per_weight(&image)),
-                bytes.len().to_string(),
-                format!("{:.1}x", f32_bytes as f64 / bytes.len() as f64),
-                (4 * image.scratch_words()).to_string(),
-                format!("{nmse:.1e}"),
-                success(&outcomes),
-                tracking(&outcomes),
-                instructions.to_string(),
-                format!("{:.2}", instructions as f64 / policy.graph.weights() as f64),
-            ],
-        });
-        report.push(format!(
-            "{name}, firmware in QEMU: success {}, identical bits: {} of {} actions, {} bytes of code beside the image",
-            success(&firmware.outcomes),
-            firmware.identical,
-            firmware.actions,
-            firmware::flash_bytes(&elf)? - image.bytes() as u64,
-        ));
-        ensure!(firmware.identical == firmware.actions, "the firmware's actions differ from the host's");
-    }
-
-    let names: Vec<&str> = std::iter::once("UR3 reach").chain(columns.iter().map(|c| c.name.as_str())).collect();
-    let mut summary = table(&names);
-    for (i, row) in ROWS.iter().enumerate() {
-        let cells = columns.iter().map(|c| c.cells.get(i).cloned().unwrap_or_else(|| "-".into()));
-        summary.add_row(std::iter::once((*row).to_owned()).chain(cells));
-    }
-    println!("\n{summary}\n\n{}\n", report.join("\n"));
-    faults::some(&work.join(file(IN_THE_APPLICATION)))?;
+    let best = |bits, steps| Options { steps: Some(steps), ..Options::new(Method::Best, Budget::BitsPerWeight(bits)) };
+    let counter = Counter::build()?;
+    let reach = Trial {
+        name: "UR3 reach",
+        dir: ur3(),
+        images: vec![("8 bits", eight), (IN_THE_APPLICATION, best(3.0, STEPS)), ("2.0 bits", best(2.0, STEPS))],
+        recorded: true,
+        episodes,
+        qemu_episodes,
+    };
+    let flow = Trial {
+        name: "UR3 flow",
+        dir: ur3_flow(),
+        images: vec![("3.0 bits", best(3.0, FLOW_STEPS)), ("2.0 bits", best(2.0, FLOW_STEPS))],
+        recorded: false,
+        episodes: (episodes / FLOW_SHARE).max(1),
+        qemu_episodes: (qemu_episodes / FLOW_SHARE).max(1),
+    };
+    let reports = [reach.run(&counter)?, flow.run(&counter)?];
+    println!("\n{}", reports.join("\n"));
+    faults::some(&reach.path(IN_THE_APPLICATION))?;
+    println!();
     let records = kernels::measure(&counter, 0)?;
     println!(
         "A whole call each on the Cortex-M4, instructions counted, cycles modelled:\n\n{}",
@@ -162,8 +121,104 @@ pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
     Ok(())
 }
 
-fn file(name: &str) -> String {
-    format!("ur3 {name}.actq").replace(' ', "-")
+/// Of the images.
+fn folder() -> PathBuf {
+    firmware::target_dir().join("demo")
+}
+
+impl Trial<'_> {
+    /// The image of this name.
+    fn path(&self, image: &str) -> PathBuf {
+        folder().join(format!("{} {image}.actq", self.name).to_lowercase().replace(' ', "-"))
+    }
+
+    /// The table, and what the firmware did.
+    fn run(&self, counter: &Counter) -> Result<String> {
+        let &Self { name: policy_name, recorded, episodes, qemu_episodes, .. } = self;
+        let policy_dir = &self.dir;
+        fs::create_dir_all(folder())?;
+        let policy = Policy::load(policy_dir)?;
+        let f32_bytes = 4 * policy.graph.parameters();
+        println!("\nQuantizing {} ({} parameters, {f32_bytes} bytes in f32)", policy.name, policy.graph.parameters());
+
+        println!("Closed loop in f32, {episodes} episodes");
+        let mut reference = PolicyF32::load(policy_dir)?;
+        let outcomes = closed_loop(episodes, |seed| {
+            reference.reset();
+            Ok(run_episode(seed, |obs| reference.act(obs)))
+        })?;
+        let mut columns = vec![Column {
+            name: "f32".into(),
+            cells: vec![
+                "32".into(),
+                f32_bytes.to_string(),
+                "1.0x".into(),
+                "-".into(),
+                "-".into(),
+                success(&outcomes),
+                tracking(&outcomes),
+            ],
+        }];
+
+        let mut report = Vec::new();
+        let recordings = if recorded {
+            println!("Recording {RECORDED} episodes of f32, to learn from");
+            Recordings { calib: Some(record(&mut reference)?), heldout: None }
+        } else {
+            Recordings::load(&policy)?
+        };
+        for (name, options) in &self.images {
+            println!("Quantizing to {name} by {}", options.method);
+            let quantizer = Quantizer::new(&policy, &recordings, options.method, |_| {})?;
+            let path = self.path(name);
+            let bytes = heads::write_image(&quantizer, options, &path)?;
+            let buffer = ImageBuffer::new(&bytes);
+            let image = buffer.image(&path)?;
+            println!("Closed loop at {name}, {episodes} episodes on the host");
+            let outcomes = with_head(image, |head| closed_loop(episodes, |seed| episode_on_host(head, seed)))?;
+            println!("Closed loop at {name}, {qemu_episodes} episodes with the firmware in QEMU as the policy");
+            let elf = firmware::harness_with(Target::Fpu, &path)?;
+            let firmware = Firmware::run(&elf, image, qemu_episodes)?;
+            let heldout = eval::heldout(policy_dir, &image)?;
+            let instructions =
+                evaluation::count(counter, Target::Fpu, &elf, None, &image, heldout.episode(0))?.instructions;
+            let nmse = eval::evaluate(image, &heldout)?.nmse;
+            columns.push(Column {
+                name: (*name).into(),
+                cells: vec![
+                    format!("{:.2}", bits_per_weight(&image)),
+                    bytes.len().to_string(),
+                    format!("{:.1}x", f32_bytes as f64 / bytes.len() as f64),
+                    (4 * image.scratch_words()).to_string(),
+                    format!("{nmse:.1e}"),
+                    success(&outcomes),
+                    tracking(&outcomes),
+                    instructions.to_string(),
+                    match policy.graph.denoising {
+                        None => format!("{:.2}", instructions as f64 / policy.graph.weights() as f64),
+                        // A weight is multiplied once or as often as there are steps.
+                        Some(_) => "-".to_owned(),
+                    },
+                ],
+            });
+            report.push(format!(
+            "{name}, firmware in QEMU: success {}, identical bits: {} of {} actions, {} bytes of code beside the image",
+            success(&firmware.outcomes),
+            firmware.identical,
+            firmware.actions,
+            firmware::flash_bytes(&elf)? - image.bytes() as u64,
+        ));
+            ensure!(firmware.identical == firmware.actions, "the firmware's actions differ from the host's");
+        }
+
+        let names: Vec<&str> = std::iter::once(policy_name).chain(columns.iter().map(|c| c.name.as_str())).collect();
+        let mut summary = table(&names);
+        for (i, row) in ROWS.iter().enumerate() {
+            let cells = columns.iter().map(|c| c.cells.get(i).cloned().unwrap_or_else(|| "-".into()));
+            summary.add_row(std::iter::once((*row).to_owned()).chain(cells));
+        }
+        Ok(format!("{summary}\n\n{}\n", report.join("\n")))
+    }
 }
 
 fn closed_loop(episodes: u64, mut episode: impl FnMut(u64) -> Result<Outcome>) -> Result<Vec<Outcome>> {

@@ -99,7 +99,8 @@ fn record_expert(seeds: std::ops::Range<u64>, path: &Path) -> Result<()> {
 }
 
 /// Writes closed-loop episodes of the policy: `obs [episode, step, 18]`, `action [episode, step, 48]` (the network's
-/// output at every step, also where a queued action is played), `length [episode]`, `seed [episode]`.
+/// output at every step, also where a queued action is played; not of a flow, whose output depends on noise), `length [episode]`,
+/// `seed [episode]`.
 fn record_policy(policy: &mut PolicyF32, seeds: std::ops::Range<u64>, path: &Path) -> Result<()> {
     let mut obs = Vec::new();
     let mut action = Vec::new();
@@ -109,16 +110,20 @@ fn record_policy(policy: &mut PolicyF32, seeds: std::ops::Range<u64>, path: &Pat
         while !task.is_over() {
             let observation = task.observe();
             obs.extend(observation);
-            action.extend(policy.raw(&observation));
+            if !policy.draws() {
+                action.extend(policy.raw(&observation));
+            }
             task.step(&policy.act(&observation));
         }
     }
     let seeds: Array1<i64> = seeds.map(|seed| seed as i64).collect();
     let episodes = seeds.len();
-    let outputs = action.len() / (episodes * EPISODE_STEPS);
     let mut npz = create(path, NpzWriter::new_compressed)?;
     npz.add_array("obs", &Array3::from_shape_vec((episodes, EPISODE_STEPS, OBS_DIM), obs)?)?;
-    npz.add_array("action", &Array3::from_shape_vec((episodes, EPISODE_STEPS, outputs), action)?)?;
+    if !policy.draws() {
+        let outputs = action.len() / (episodes * EPISODE_STEPS);
+        npz.add_array("action", &Array3::from_shape_vec((episodes, EPISODE_STEPS, outputs), action)?)?;
+    }
     npz.add_array("length", &Array1::from_elem(episodes, EPISODE_STEPS as i64))?;
     npz.add_array("seed", &seeds)?;
     npz.finish()?;

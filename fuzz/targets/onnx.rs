@@ -1,0 +1,15 @@
+//! An ONNX file is refused or imported, and what was imported is a policy.
+#![no_main]
+
+use std::path::Path;
+
+use actq::import::onnx::{Choice, import_bytes};
+use actq::policy::Policy;
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|bytes: &[u8]| {
+    let here = Path::new("no such folder");
+    if let Ok(imported) = import_bytes(bytes.to_vec(), here, "fuzzed", &Choice::default()) {
+        Policy::of_files(here, [here, here], &imported.json, &imported.weights).expect("what was imported is a policy");
+    }
+});

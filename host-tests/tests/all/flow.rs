@@ -1,0 +1,55 @@
+//! The UR3's flow in closed loop: f32, and images of few bits that have learned for a moment.
+
+use actq::budget::Budget;
+use actq::data::Recordings;
+use actq::methods::{Method, Options};
+use actq::pipeline::Quantizer;
+use actq::policy::Policy;
+use actq::runtime::with_head;
+use actq_bench::closed_loop::episode_on_host;
+use actq_bench::ur3_flow;
+use actq_ur3::policy_f32::PolicyF32;
+use actq_ur3::task::{Outcome, run_episode};
+use anyhow::{Result, ensure};
+
+/// Seeds that no recording has.
+const SEEDS: std::ops::Range<u64> = 1000..1040;
+/// Of distillation, as `cargo demo` takes.
+const STEPS: usize = 100;
+
+/// Limits of the tracking error in mm, 1.5 times what was measured at most.
+const F32_MM: f64 = 1.3;
+const W3_MM: f64 = 2.4;
+const W2_MM: f64 = 5.6;
+
+/// All but one episode succeed, and the mean tracking error stays below a limit in mm.
+fn drives(name: &str, outcomes: &[Outcome], limit_mm: f64) -> Result<()> {
+    let solved = outcomes.iter().filter(|outcome| outcome.success).count();
+    let error = 1e3 * outcomes.iter().map(|outcome| outcome.tracking_error_m).sum::<f64>() / outcomes.len() as f64;
+    println!("{name}: {solved} of {}, tracking error {error:.2} mm", outcomes.len());
+    ensure!(solved + 1 >= outcomes.len(), "{name}: {solved} of {}", outcomes.len());
+    ensure!(error < limit_mm, "{name}: {error:.2} mm, {limit_mm} mm is allowed");
+    Ok(())
+}
+
+#[test]
+fn the_ur3s_flow_drives_at_few_bits() -> Result<()> {
+    let mut reference = PolicyF32::load(&ur3_flow())?;
+    let episode = |seed| {
+        reference.reset();
+        run_episode(seed, |obs| reference.act(obs))
+    };
+    drives("f32", &SEEDS.map(episode).collect::<Vec<_>>(), F32_MM)?;
+    let policy = Policy::load(&ur3_flow())?;
+    let recordings = Recordings::load(&policy)?;
+    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, |_| {})?;
+    for (bits, limit_mm) in [(3.0, W3_MM), (2.0, W2_MM)] {
+        let options = Options { steps: Some(STEPS), ..Options::new(Method::Best, Budget::BitsPerWeight(bits)) };
+        let buffer = quantizer.quantize(&options, |_, _| {})?.buffer();
+        let image = buffer.image("flow".as_ref())?;
+        let outcomes =
+            with_head(image, |head| SEEDS.map(|seed| episode_on_host(head, seed)).collect::<Result<Vec<_>>>())?;
+        drives(&format!("{bits} bits"), &outcomes, limit_mm)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,73 @@
+//! Heads of published sizes (`examples/heads`) on the target: the host's bits, and the predicted cost.
+
+use actq::budget::Budget;
+use actq::data::Recordings;
+use actq::measure::time::{CLOCK, StepTime};
+use actq::methods::{Method, Options};
+use actq::pipeline::quantize;
+use actq::random::Random;
+use actq::runtime::{ImageBuffer, with_head};
+use actq_bench::qemu::Counter;
+use actq_bench::{Target, firmware, profile};
+use actq_heads::{octo, oft};
+use actq_kernels::Width;
+use anyhow::{Result, bail, ensure};
+
+const TOKEN: usize = 384;
+/// Largest error of a prediction.
+const ERROR: f64 = 0.03;
+
+fn near(what: &str, predicted: u64, counted: u64) -> Result<()> {
+    let error = predicted as f64 / counted as f64 - 1.0;
+    println!("{what}: {predicted} predicted, {counted} counted: {:+.2}%", 1e2 * error);
+    ensure!(error.abs() < ERROR, "{what}: {predicted} for {counted}");
+    Ok(())
+}
+
+/// A chunk of Octo's head in 20 denoising steps and in 10: what both have in common runs once, the rest by the step.
+#[test]
+fn octos_head_takes_what_was_predicted_and_gives_the_hosts_bits() -> Result<()> {
+    let (elf, counter) = (firmware::harness(Target::Fpu)?, Counter::build()?);
+    let mut random = Random::new(3);
+    let observation: Vec<f32> = (0..TOKEN).map(|_| random.normal()).collect();
+    let mut chunks = Vec::new();
+    for steps in [octo::STEPS, octo::STEPS / 2] {
+        let policy = octo::head(TOKEN, steps)?.policy()?;
+        let options = Options { group: 32, ..Options::new(Method::Rtn, Budget::Width(Width::W3)) };
+        let bytes = quantize(&policy, &Recordings::default(), &options, |_, _| {})?.image;
+        ensure!(bytes.len() < 750_000, "{} bytes", bytes.len());
+        let buffer = ImageBuffer::new(&bytes);
+        let image = buffer.image("octo".as_ref())?;
+        let (costs, actions) = profile::regions(&elf, &counter, &bytes, "serve", std::slice::from_ref(&observation))?;
+        let bits = |action: &[f32]| action.iter().map(|a| a.to_bits()).collect::<Vec<_>>();
+        let expected = with_head(image, |head| Ok(bits(head.step(&observation)?)))?;
+        ensure!(bits(&actions[0]) == expected, "other bits in {steps} steps");
+        let time = StepTime::new(&image, CLOCK);
+        near(&format!("a chunk in {steps} steps"), time.instructions, costs[0].instructions)?;
+        chunks.push([time.instructions, costs[0].instructions]);
+    }
+    let [whole, half] = chunks[..] else { bail!("{chunks:?}") };
+    // Noise is drawn before the first step, but as much of it as there are steps.
+    let step = [0, 1].map(|i| (whole[i] - half[i]) / (octo::STEPS / 2) as u64);
+    let once = [0, 1].map(|i| 2 * half[i] - whole[i]);
+    near("a denoising step and its noise", step[0], step[1])?;
+    near("what runs once", once[0], once[1])
+}
+
+/// All rows of a chunk share the matrices, which stand in the image once; norms and biases stand there for each row.
+#[test]
+fn ofts_head_has_its_matrices_once() -> Result<()> {
+    const HIDDEN: usize = 64;
+    let policy = oft::head(HIDDEN)?.policy()?;
+    ensure!(policy.weights == oft::weights(HIDDEN), "{} weights", policy.weights);
+    let options = Options::new(Method::Rtn, Budget::Width(Width::W8));
+    let bytes = quantize(&policy, &Recordings::default(), &options, |_, _| {})?.image;
+    let buffer = ImageBuffer::new(&bytes);
+    let image = buffer.image("oft".as_ref())?;
+    let time = StepTime::new(&image, CLOCK);
+    ensure!(time.macs == 8 * policy.weights, "{} MACs", time.macs);
+    let self_test = 4 * image.self_test_steps() * (image.obs_len() + image.act_len());
+    ensure!(self_test <= 64 << 10, "{self_test} bytes of self-test");
+    ensure!(bytes.len() - self_test < 3 * policy.weights, "{} bytes", bytes.len());
+    with_head(image, |head| Ok(head.self_test()?))
+}
