@@ -15,7 +15,7 @@ use actq_ur3::random::Random;
 pub struct Noise {
     /// Gone.
     pub drop: f64,
-    /// Late by up to [`LATEST`], and so behind newer ones.
+    /// Late by up to 150 ms, and so behind newer ones.
     pub delay: f64,
     /// Twice.
     pub duplicate: f64,
