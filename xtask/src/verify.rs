@@ -14,7 +14,7 @@ use crate::{cargo, cpu, firmware, setup};
 const CPU_MINUTES: f64 = 28.0;
 const CPU_MINUTES_VARIABLE: &str = "ACTQ_VERIFY_CPU_MINUTES";
 /// Minutes that this takes on two idle cores.
-const MINUTES: f64 = 15.0;
+const MINUTES: f64 = 20.0;
 
 /// The oldest compiler.
 const OLDEST: &str = concat!(env!("CARGO_PKG_RUST_VERSION"), ".0");

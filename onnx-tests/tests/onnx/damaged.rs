@@ -65,6 +65,15 @@ fn each_wrong_file_is_refused_by_what_is_wrong_with_it() {
     };
     refused(vast(&[4, 1 << 40]), "has more elements than any policy");
     refused(vast(&[4, 1 << 20]), "needs 4194304 values, 0 are there");
+    let norm = |epsilon: f32| {
+        with(|file| {
+            let ones = file.reals(&[4], &[1.0; 4]);
+            let more = [("axis", Value::Int(-1)), ("epsilon", Value::Real(epsilon))];
+            file.nodes("LayerNormalization", &["obs", &ones], &["actions"], &more);
+        })
+    };
+    refused(norm(-0.5), "epsilon is -0.5");
+    refused(norm(0.0), "it must be above 0");
     let huge = with(|file| {
         let shape = file.ints(&[1 << 13, 1 << 13]);
         let x = file.node("ConstantOfShape", &[&shape], &[]);

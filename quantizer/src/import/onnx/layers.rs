@@ -10,26 +10,27 @@ use super::known::{Reduced, reduced};
 use super::places::{axis, transpose};
 use super::pointwise::two;
 use super::tensor::{Data, Element, Tensor, count};
+use crate::import::numbers::positive;
 
 /// The output, where the node is such an operation.
 pub(super) fn run(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> {
-    let epsilon = |default: f64| call.float("epsilon").unwrap_or(default);
+    let epsilon = call.float("epsilon").unwrap_or(1e-5);
     match call.op() {
         "MatMul" => product(exprs, call.input(0)?, call.input(1)?, 1.0).map(Some),
         "Gemm" => gemm(call, exprs).map(Some),
         "LayerNormalization" => {
             let scale = call.reals(1, "the scale")?;
             let bias = if call.optional(2).is_some() { call.reals(2, "the bias")? } else { vec![0.0; scale.len()] };
-            let eps = epsilon(1e-5);
-            norm(call, exprs, scale.len(), bias.len(), &|x| Expr::LayerNorm(x, scale.clone(), bias.clone(), eps))
+            positive(epsilon, "epsilon")?;
+            norm(call, exprs, scale.len(), bias.len(), &|x| Expr::LayerNorm(x, scale.clone(), bias.clone(), epsilon))
                 .map(Some)
         }
         "RMSNormalization" | "SimplifiedLayerNormalization" => {
             let scale = call.reals(1, "the scale")?;
-            let eps = epsilon(1e-5);
-            norm(call, exprs, scale.len(), scale.len(), &|x| Expr::RmsNorm(x, scale.clone(), eps)).map(Some)
+            positive(epsilon, "epsilon")?;
+            norm(call, exprs, scale.len(), scale.len(), &|x| Expr::RmsNorm(x, scale.clone(), epsilon)).map(Some)
         }
-        "BatchNormalization" => batch_norm(call, exprs, epsilon(1e-5)).map(Some),
+        "BatchNormalization" => batch_norm(call, exprs, epsilon).map(Some),
         "ReduceSum" | "ReduceMean" | "ReduceL2" | "ReduceSumSquare" => reduce(call, exprs).map(Some),
         "LpNormalization" => {
             ensure!(call.int("p").unwrap_or(2) == 2, "only the norm with p = 2 is taken");
@@ -96,6 +97,7 @@ fn batch_norm(call: &Call<'_>, exprs: &mut Exprs, eps: f64) -> Result<Tensor> {
         [&scale, &bias, &mean, &variance].iter().all(|v| v.len() == n),
         "its constants are not one for each of {n} channels"
     );
+    ensure!(variance.iter().all(|v| v + eps > 0.0), "a variance with epsilon {eps} is not above 0");
     let a: Vec<f64> = scale.iter().zip(&variance).map(|(s, v)| s / (v + eps).sqrt()).collect();
     let b = bias.iter().zip(&mean).zip(&a).map(|((b, m), a)| b - m * a).collect();
     let mut shape = vec![n];
