@@ -1,12 +1,9 @@
 //! The peripherals of Arm's MPS2 boards: UART and watchdog of the Cortex-M System Design Kit (Arm DDI 0479C, sections 4.3 and 4.5). No
 //! crate has their registers.
 
-use core::convert::Infallible;
-
-use embedded_hal::pwm::{ErrorType, SetDutyCycle};
 use volatile_register::{RW, WO};
 
-use crate::seams::{self, Lost, Stage};
+use crate::seams::{self, Lost};
 
 #[repr(C)]
 struct UartRegisters {
@@ -142,57 +139,5 @@ impl seams::Watchdog for Watchdog {
     fn feed(&mut self) {
         // SAFETY: any value clears the interrupt and loads the time anew.
         self.write(|registers| unsafe { registers.clear.write(1) });
-    }
-}
-
-/// A power stage that is not there: it keeps what it is told.
-#[derive(Debug, Default)]
-pub struct NoStage {
-    phases: [NoPhase; 3],
-    /// Whether it would be on.
-    pub on: bool,
-}
-
-/// A phase of [`NoStage`].
-#[derive(Debug, Default)]
-pub struct NoPhase(u16);
-
-impl ErrorType for NoPhase {
-    type Error = Infallible;
-}
-
-impl SetDutyCycle for NoPhase {
-    fn max_duty_cycle(&self) -> u16 {
-        4200
-    }
-
-    fn set_duty_cycle(&mut self, duty: u16) -> Result<(), Infallible> {
-        self.0 = duty;
-        Ok(())
-    }
-}
-
-impl Stage for NoStage {
-    type Phase = NoPhase;
-
-    fn phases(&mut self) -> &mut [NoPhase; 3] {
-        &mut self.phases
-    }
-
-    fn enable(&mut self) -> bool {
-        self.on = true;
-        true
-    }
-
-    fn is_on(&mut self) -> bool {
-        self.on
-    }
-
-    fn disable(&mut self) {
-        self.on = false;
-    }
-
-    fn currents(&mut self) -> Option<[u16; 2]> {
-        None
     }
 }

@@ -6,6 +6,8 @@
 #![cfg_attr(target_os = "none", no_std)]
 #![cfg_attr(not(target_os = "none"), forbid(unsafe_code))]
 
+#[cfg(any(not(target_os = "none"), feature = "cmsdk"))]
+pub mod no_stage;
 pub mod port;
 mod ring;
 pub mod seams;

@@ -161,14 +161,7 @@ impl Client {
     ///
     /// Where it is refused, or there is no answer.
     pub fn set(&mut self, parameter: Parameter, axis: u8, value: f32) -> Result<()> {
-        let mut outcome = Err(Refusal::Token);
-        for _ in 0..TRIES {
-            outcome = self.with_token(|token| Message::Set { token, parameter, axis, value })?;
-            // A request before this one that was repeated may have changed the state once more.
-            if outcome != Err(Refusal::Token) {
-                break;
-            }
-        }
+        let outcome = self.change(|token| Message::Set { token, parameter, axis, value })?;
         outcome.with_context(|| format!("{parameter} of axis {axis} is not set to {value}"))
     }
 
@@ -197,8 +190,21 @@ impl Client {
         self.request(&Message::Disarm)?.1.context("not disarmed")
     }
 
+    /// As [`Self::with_token`], for what may be asked whatever the state has become: a request before it that was repeated may have changed
+    /// the token once more.
+    pub(crate) fn change<'m>(&mut self, message: impl Fn(u32) -> Message<'m>) -> Result<Result<(), Refusal>> {
+        let mut outcome = Err(Refusal::Token);
+        for _ in 0..TRIES {
+            outcome = self.with_token(&message)?;
+            if outcome != Err(Refusal::Token) {
+                break;
+            }
+        }
+        Ok(outcome)
+    }
+
     /// A request with the token of now.
-    pub(crate) fn with_token<'m>(&mut self, message: impl FnOnce(u32) -> Message<'m>) -> Result<Result<(), Refusal>> {
+    fn with_token<'m>(&mut self, message: impl FnOnce(u32) -> Message<'m>) -> Result<Result<(), Refusal>> {
         let token = self.status()?.token;
         Ok(self.request(&message(token))?.1)
     }

@@ -84,10 +84,7 @@ impl<'a> Push<'a> {
         match self.stage {
             Stage::Begin => {
                 let crc = CRC.checksum(image);
-                let begin = |client: &mut Client| {
-                    let token = client.status()?.token;
-                    client.request(&Message::Begin { token, length, crc, version })
-                };
+                let begin = |client: &mut Client| client.change(|token| Message::Begin { token, length, crc, version });
                 until_done(client, begin)?.context("the update cannot begin")?;
                 self.stage = Stage::Write(0);
             }
@@ -103,7 +100,7 @@ impl<'a> Push<'a> {
                 self.stage = Stage::Write(written as usize);
             }
             Stage::Write(_) => {
-                until_done(client, |client| client.request(&Message::Commit { signature }))?
+                until_done(client, |client| Ok(client.request(&Message::Commit { signature })?.1))?
                     .context("the image is refused")?;
                 self.stage = Stage::Done;
             }
@@ -129,13 +126,12 @@ pub fn push(client: &mut Client, package: &Package<'_>, mut progress: impl FnMut
 /// Repeats a request while the controller is busy with it.
 fn until_done(
     client: &mut Client,
-    mut request: impl FnMut(&mut Client) -> Result<(u32, Result<(), Refusal>)>,
+    mut request: impl FnMut(&mut Client) -> Result<Result<(), Refusal>>,
 ) -> Result<Result<(), Refusal>> {
     let begun = Instant::now();
     loop {
-        match request(client)?.1 {
-            // A repeated request before this one may have changed the state: the token of now is another one.
-            Err(Refusal::Busy | Refusal::Token) if begun.elapsed() < BUSY => std::thread::sleep(ASK_AGAIN),
+        match request(client)? {
+            Err(Refusal::Busy) if begun.elapsed() < BUSY => std::thread::sleep(ASK_AGAIN),
             outcome => return Ok(outcome),
         }
     }

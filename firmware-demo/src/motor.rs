@@ -124,10 +124,12 @@ impl Simulated {
 
 #[cfg(test)]
 mod tests {
+    use actq_boards::no_stage::NoStage;
     use actq_controller::SafeAction;
 
     use super::*;
-    use crate::output::mock::Mock;
+
+    type Mock = NoStage<1000>;
 
     /// The motor's current along the torque axis.
     fn torque_current(motor: &Motor<Mock>) -> f32 {

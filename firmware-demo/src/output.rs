@@ -67,76 +67,14 @@ pub(crate) fn share(value: f32, axis: &Axis) -> f32 {
     (value - axis.low()) / (axis.high() - axis.low())
 }
 
-/// A power stage for tests.
-#[cfg(test)]
-pub(crate) mod mock {
-    use core::convert::Infallible;
-
-    use actq_boards::seams::Stage;
-    use embedded_hal::pwm::{ErrorType, SetDutyCycle};
-
-    #[derive(Debug, Default)]
-    pub(crate) struct Phase(u16);
-
-    impl ErrorType for Phase {
-        type Error = Infallible;
-    }
-
-    impl SetDutyCycle for Phase {
-        fn max_duty_cycle(&self) -> u16 {
-            1000
-        }
-
-        fn set_duty_cycle(&mut self, duty: u16) -> Result<(), Infallible> {
-            self.0 = duty;
-            Ok(())
-        }
-    }
-
-    #[derive(Debug, Default)]
-    pub(crate) struct Mock {
-        phases: [Phase; 3],
-        pub(crate) on: bool,
-    }
-
-    impl Mock {
-        pub(crate) fn duties(&self) -> [u16; 3] {
-            self.phases.each_ref().map(|phase| phase.0)
-        }
-    }
-
-    impl Stage for Mock {
-        type Phase = Phase;
-
-        fn phases(&mut self) -> &mut [Phase; 3] {
-            &mut self.phases
-        }
-
-        fn enable(&mut self) -> bool {
-            self.on = true;
-            true
-        }
-
-        fn is_on(&mut self) -> bool {
-            self.on
-        }
-
-        fn disable(&mut self) {
-            self.on = false;
-        }
-
-        fn currents(&mut self) -> Option<[u16; 2]> {
-            None
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use actq_boards::no_stage::NoStage;
     use actq_controller::SafeAction;
 
-    use super::mock::Mock;
     use super::*;
+
+    type Mock = NoStage<1000>;
 
     #[test]
     fn a_duty_cycle_is_the_place_between_the_limits() {

@@ -1,6 +1,6 @@
 //! The registers of AN386 and AN500 (Arm DAI 0386C, section 3): UART 0, the watchdog, no power stage.
 
-pub use crate::cmsdk::{NoStage as Stage, Uart, Watchdog};
+pub use crate::cmsdk::{Uart, Watchdog};
 pub use crate::mpu::guard_stack;
 use crate::seams::{self, Cause, Clock, Source};
 use crate::vectors::interrupts;
@@ -14,6 +14,9 @@ pub const NVIC_PRIO_BITS: u8 = 3;
 pub const SCRATCH: usize = crate::MPS2_SCRATCH;
 /// Whether a non-maskable interrupt says that the watchdog's time has ended, and that it will reset the board.
 pub const WATCHDOG_NMI: bool = true;
+
+/// There is no power stage.
+pub type Stage = crate::no_stage::NoStage<4200>;
 
 const HZ: u32 = 25_000_000;
 const UART: usize = 0x4000_4000;

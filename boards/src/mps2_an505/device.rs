@@ -5,7 +5,7 @@ use core::ops::Range;
 
 use cortex_m::register::msplim;
 
-pub use crate::cmsdk::{NoStage as Stage, Uart, Watchdog};
+pub use crate::cmsdk::{Uart, Watchdog};
 use crate::seams::{self, Cause, Clock, Source};
 use crate::vectors::interrupts;
 
@@ -18,6 +18,9 @@ pub const NVIC_PRIO_BITS: u8 = 3;
 pub const SCRATCH: usize = crate::MPS2_SCRATCH;
 /// Whether a non-maskable interrupt says that the watchdog's time has ended, and that it will reset the board.
 pub const WATCHDOG_NMI: bool = true;
+
+/// There is no power stage.
+pub type Stage = crate::no_stage::NoStage<4200>;
 
 const HZ: u32 = 20_000_000;
 const UART: usize = 0x5020_0000;

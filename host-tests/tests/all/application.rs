@@ -288,6 +288,16 @@ fn no_panic_is_in_the_application_and_it_is_small() -> Result<()> {
     Ok(())
 }
 
+/// The image of this slot still runs after a reset, and gives these bits.
+fn runs_over_a_reset(client: &mut Client, slot: u8, observation: &[f32], bits: &[u32]) -> Result<()> {
+    client.connection_mut().raw(&[0, b'p', 0]);
+    let status = until(client, "reset", |status| status.reset == ResetCause::Software)?;
+    ensure!(status.slot == slot, "not kept: {status:?}");
+    let (_, action) = act(client, observation)?;
+    ensure!(action.iter().map(|v| v.to_bits()).eq(bits.iter().copied()), "other bits: {action:?}");
+    Ok(())
+}
+
 /// The private key of RFC 8410, section 10.3.
 const PRIVATE_KEY: &str = "-----BEGIN PRIVATE KEY-----\nMC4CAQAwBQYDK2VwBCIEINTuctv5E1hK1bbY8fdp+K06/nwoy/HU++CXqI9EdVhC\n\
     -----END PRIVATE KEY-----\n";
@@ -318,11 +328,7 @@ fn a_build_with_a_key_runs_signed_images_alone() -> Result<()> {
         push(&mut client, &Package { image: &new, version: 1, signature: Some(&signature) }, |_| {})?;
         let slot = client.status()?.slot;
         assert_ne!(slot, BUILT_IN, "{target:?}");
-        client.connection_mut().raw(&[0, b'p', 0]);
-        let status = until(&mut client, "reset", |status| status.reset == ResetCause::Software)?;
-        assert_eq!(status.slot, slot, "{target:?}: not kept");
-        let (_, action) = act(&mut client, &observation)?;
-        assert_eq!(action.iter().map(|v| v.to_bits()).collect::<Vec<_>>(), bits, "{target:?}");
+        runs_over_a_reset(&mut client, slot, &observation, &bits).with_context(|| format!("{target:?}"))?;
     }
     Ok(())
 }
@@ -344,11 +350,7 @@ fn an_image_comes_over_the_link_and_one_that_fails_is_rolled_back() -> Result<()
         assert_ne!(slot, BUILT_IN, "{target:?}");
         assert!(push(&mut client, &package(&wrong), |_| {}).is_err());
         assert_eq!(client.status()?.slot, slot, "{target:?}: not rolled back");
-        client.connection_mut().raw(&[0, b'p', 0]);
-        let status = until(&mut client, "reset", |status| status.reset == ResetCause::Software)?;
-        assert_eq!(status.slot, slot, "{target:?}: not kept");
-        let (_, action) = act(&mut client, &observation)?;
-        assert_eq!(action.iter().map(|v| v.to_bits()).collect::<Vec<_>>(), bits, "{target:?}");
+        runs_over_a_reset(&mut client, slot, &observation, &bits).with_context(|| format!("{target:?}"))?;
     }
     Ok(())
 }
