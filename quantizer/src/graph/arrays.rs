@@ -29,7 +29,8 @@ impl Sums {
 
     /// `x W' + bias`: `[sample, row]`, rows contiguous.
     pub fn affine(self, x: &Array2<f32>, w: &Array2<f32>, bias: &[f32]) -> Array2<f32> {
-        let mut y = Array2::from_shape_fn((x.nrows(), bias.len()), |(_, row)| bias[row]);
+        let mut y = Array2::zeros((x.nrows(), bias.len()));
+        y += &ArrayView1::from(bias);
         match self {
             Self::InOrder => add_in_order(x, w, y.view_mut()),
             Self::Blocked => general_mat_mul(1.0, x, &w.t(), 1.0, &mut y),

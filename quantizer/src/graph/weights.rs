@@ -1,6 +1,7 @@
 //! What of a network changes while it learns or runs: weights, recurrent state.
 
 use ndarray::Array2;
+use rayon::prelude::*;
 
 use super::nodes::Graph;
 use super::operation::NodeState;
@@ -34,14 +35,14 @@ impl Weights {
         }
     }
 
-    /// Adds another set.
-    pub fn add(&mut self, other: &Self) {
+    /// This set and another, added element by element.
+    pub fn sum(mut self, other: Self) -> Self {
         for (a, b) in self.matrices.iter_mut().zip(&other.matrices) {
-            *a += b;
+            let (a, b) = (a.as_slice_mut().unwrap_or_default(), b.as_slice().unwrap_or_default());
+            a.par_chunks_mut(CHUNK).zip(b.par_chunks(CHUNK)).for_each(|(a, b)| add(a, b));
         }
-        for (a, b) in self.vectors.iter_mut().flatten().zip(other.vectors.iter().flatten()) {
-            a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
-        }
+        self.vectors.iter_mut().flatten().zip(other.vectors.iter().flatten()).for_each(|(a, b)| add(a, b));
+        self
     }
 
     /// Puts the vectors into a graph's nodes.
@@ -50,6 +51,13 @@ impl Weights {
             node.kind.vectors_mut().into_iter().zip(vectors).for_each(|(to, from)| to.clone_from(from));
         }
     }
+}
+
+/// Elements that a thread adds at once.
+const CHUNK: usize = 1 << 14;
+
+fn add(to: &mut [f32], from: &[f32]) {
+    to.iter_mut().zip(from).for_each(|(to, from)| *to += from);
 }
 
 /// Recurrent state of every node.

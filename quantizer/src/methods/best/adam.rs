@@ -1,33 +1,50 @@
 //! Adam (arXiv 1412.6980).
 
 /// Adam's moments of a run of parameters.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Adam {
-    first: Vec<f32>,
-    second: Vec<f32>,
+    pub(super) first: Vec<f32>,
+    pub(super) second: Vec<f32>,
+}
+
+const FIRST: f32 = 0.9;
+const SECOND: f32 = 0.999;
+/// Keeps a parameter without a gradient where it is.
+const TINY: f32 = 1e-12;
+
+/// How far one step goes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stride {
+    rate: f32,
+    /// What the moments lack after so few steps.
+    first: f32,
+    second: f32,
+}
+
+impl Stride {
+    /// Of step `t`, which counts from 1.
+    pub(super) fn new(rate: f32, t: i32) -> Self {
+        Self { rate, first: 1.0 / (1.0 - FIRST.powi(t)), second: 1.0 / (1.0 - SECOND.powi(t)) }
+    }
 }
 
 impl Adam {
-    /// Moves `parameters` along `grads` at `rate`; `t` counts from 1.
-    pub(super) fn step<'p>(
-        &mut self,
-        parameters: impl Iterator<Item = &'p mut f32>,
-        grads: impl Iterator<Item = f32>,
-        rate: f32,
-        t: i32,
-    ) {
-        const FIRST: f32 = 0.9;
-        const SECOND: f32 = 0.999;
-        let (c1, c2) = (1.0 / (1.0 - FIRST.powi(t)), 1.0 / (1.0 - SECOND.powi(t)));
-        for (i, (p, g)) in parameters.zip(grads).enumerate() {
-            if i == self.first.len() {
-                self.first.push(0.0);
-                self.second.push(0.0);
-            }
-            let (m, v) = (&mut self.first[i], &mut self.second[i]);
-            *m = FIRST * *m + (1.0 - FIRST) * g;
-            *v = SECOND * *v + (1.0 - SECOND) * g * g;
-            *p -= rate * *m * c1 / ((*v * c2).sqrt() + 1e-12);
-        }
+    /// Of so many parameters.
+    pub(super) fn new(len: usize) -> Self {
+        Self { first: vec![0.0; len], second: vec![0.0; len] }
+    }
+
+    /// Moves `parameters` along `grads`.
+    pub(super) fn step(&mut self, parameters: &mut [f32], grads: &[f32], stride: Stride) {
+        step(parameters, grads, &mut self.first, &mut self.second, stride);
+    }
+}
+
+/// [`Adam::step`] on a part of the parameters and the moments that belong to it.
+pub(super) fn step(parameters: &mut [f32], grads: &[f32], first: &mut [f32], second: &mut [f32], stride: Stride) {
+    for ((p, g), (m, v)) in parameters.iter_mut().zip(grads).zip(first.iter_mut().zip(second)) {
+        *m = FIRST * *m + (1.0 - FIRST) * g;
+        *v = SECOND * *v + (1.0 - SECOND) * g * g;
+        *p -= stride.rate * *m * stride.first / ((*v * stride.second).sqrt() + TINY);
     }
 }

@@ -9,7 +9,7 @@ use actq_kernels::Width;
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use super::adam::Adam;
+use super::adam::{Adam, Stride};
 use super::latent::Latent;
 use super::schedule::{Bounds, Schedule, most_steps};
 use crate::calibrate::widening::Widening;
@@ -83,9 +83,7 @@ pub fn distill(task: &Task<'_>, windows: &Windows<'_>, mut progress: impl FnMut(
     let matrices = task.graph.matrices.iter().zip(task.widths).zip(task.importance);
     let mut latents: Vec<Latent> =
         matrices.map(|((matrix, widths), importance)| Latent::new(matrix, widths, task.group, importance)).collect();
-    let mut adam_codes: Vec<Adam> = latents.iter().map(|_| Adam::default()).collect();
-    let mut adam_scales: Vec<Adam> = latents.iter().map(|_| Adam::default()).collect();
-    let mut adam_vectors = Adam::default();
+    let mut adam_vectors: Vec<Adam> = weights.vectors.iter().flatten().map(|v| Adam::new(v.len())).collect();
     let mut random = Random::new(task.seed);
     let (size, shards, rates) = match windows.recurrent() {
         true => (WINDOWS, WINDOW_SHARDS, OF_WINDOWS),
@@ -95,7 +93,7 @@ pub fn distill(task: &Task<'_>, windows: &Windows<'_>, mut progress: impl FnMut(
     let mut schedule = Schedule::new(task.bounds, most_steps(task.graph.weights(), windows.recurrent()));
     while let Some(rate) = schedule.rate() {
         for (latent, weights) in latents.iter().zip(&mut weights.matrices) {
-            latent.weights(weights);
+            latent.weights(values(weights));
         }
         let seeds: Vec<u64> = (0..shards).map(|_| random.bits()).collect();
         let of_shards: Vec<(f32, Weights)> = seeds
@@ -105,30 +103,32 @@ pub fn distill(task: &Task<'_>, windows: &Windows<'_>, mut progress: impl FnMut(
                 gradient(&network, &weights, windows, batch)
             })
             .collect();
-        let mut grads = weights.zeros_like();
-        let mut loss = 0.0;
-        for (of_shard, shard) in &of_shards {
-            loss += of_shard / shards as f32;
-            grads.add(shard);
-        }
+        let loss = of_shards.iter().map(|(loss, _)| loss / shards as f32).sum();
+        let Some(mut grads) = of_shards.into_iter().map(|(_, grads)| grads).reduce(Weights::sum) else { break };
         if windows.recurrent() {
             clip(&mut grads);
         }
         schedule.took(loss);
-        let t = schedule.steps() as i32;
-        for (m, latent) in latents.iter_mut().enumerate() {
-            let by_scale = latent.chain(&mut grads.matrices[m]);
-            let by_code = grads.matrices[m].iter().copied();
-            adam_codes[m].step(latent.codes.iter_mut(), by_code, rates.latent * rate, t);
-            adam_scales[m].step(latent.log_scales.iter_mut(), by_scale.into_iter(), rates.scale * rate, t);
+        let stride = |of: f32| Stride::new(of * rate, schedule.steps() as i32);
+        let (by_code, by_scale, by_vector) = (stride(rates.latent), stride(rates.scale), stride(rates.vector));
+        let matrices = latents.iter_mut().zip(&mut grads.matrices).zip(&mut weights.matrices);
+        for ((latent, grads), weights) in matrices {
+            latent.learn(values(grads), values(weights), by_code, by_scale);
         }
-        let by_vector = grads.vectors.iter().flatten().flatten().copied();
-        adam_vectors.step(weights.vectors.iter_mut().flatten().flatten(), by_vector, rates.vector * rate, t);
+        let vectors = weights.vectors.iter_mut().flatten().zip(grads.vectors.iter().flatten());
+        for (adam, (vector, grads)) in adam_vectors.iter_mut().zip(vectors) {
+            adam.step(vector, grads, by_vector);
+        }
         progress(schedule.share(), schedule.error().unwrap_or_default());
     }
     let mut graph = task.graph.clone();
     weights.store_vectors(&mut graph);
     Learned { quantized: latents.iter().map(Latent::quantized).collect(), graph, steps: schedule.steps() }
+}
+
+/// The elements of a matrix, row by row.
+fn values(matrix: &mut Array2<f32>) -> &mut [f32] {
+    matrix.as_slice_mut().unwrap_or_default()
 }
 
 /// The loss on a batch, and its derivative by the (rounded) weights.

@@ -3,118 +3,159 @@
 use actq_kernels::Width;
 use actq_kernels::round::ROUND;
 use half::bf16;
-use ndarray::Array2;
+use rayon::prelude::*;
 
+use super::adam::{Adam, Stride, step};
 use crate::graph::WeightMatrix;
 use crate::methods::quantized::Quantized;
 use crate::methods::scale::Scales;
 
 /// Scales that are smaller count as this, so that their logarithm is finite.
 const SMALLEST: f32 = 1e-12;
+/// Rows that a thread takes at once.
+const ROWS: usize = 16;
 
 /// A matrix while it learns.
 pub(super) struct Latent {
+    rows: usize,
+    cols: usize,
     widths: Vec<Option<Width>>,
-    /// Codes before rounding, `[row, col]`.
-    pub(super) codes: Array2<f32>,
+    /// Codes before rounding, row by row.
+    codes: Vec<f32>,
     /// Natural logarithm of each row's scale.
-    pub(super) log_scales: Vec<f32>,
+    log_scales: Vec<f32>,
     /// The scales that learning started from, of which those of groups stay.
     fitted: Scales,
+    adam_codes: Adam,
+    adam_scales: Adam,
 }
 
-/// What rounds a latent code: the lowest and highest code, and the level of code `c`, `step * c + base`.
-fn grid(width: Width) -> (f32, f32, f32, f32) {
-    match width {
-        Width::W8 => (-127.0, 127.0, 1.0, 0.0),
-        _ => {
-            let top = width.max_level() as f32;
-            (0.0, top, 2.0, -top)
+/// How a width rounds a latent code: the lowest and highest code, and the level of code `c`, `step * c + base`.
+#[derive(Clone, Copy)]
+struct Grid {
+    low: f32,
+    high: f32,
+    step: f32,
+    base: f32,
+}
+
+impl Grid {
+    fn of(width: Width) -> Self {
+        let top = width.max_level() as f32;
+        match width {
+            Width::W8 => Self { low: -127.0, high: 127.0, step: 1.0, base: 0.0 },
+            _ => Self { low: 0.0, high: top, step: 2.0, base: -top },
         }
     }
-}
 
-/// To the nearest integer, ties to even; codes are far from where this ends. (The standard library's is a call where the
-/// processor need not have an instruction for it.)
-fn round(x: f32) -> f32 {
-    (x + ROUND) - ROUND
+    /// To the nearest code, ties to even; codes are far from where this ends. (The standard library's is a call where the
+    /// processor need not have an instruction for it.)
+    fn round(self, code: f32) -> f32 {
+        ((code + ROUND) - ROUND).clamp(self.low, self.high)
+    }
+
+    /// The level of the code that is nearest.
+    fn level(self, code: f32) -> f32 {
+        self.round(code) * self.step + self.base
+    }
 }
 
 impl Latent {
     /// What rounds to the nearest codes of `matrix`.
     pub(super) fn new(matrix: &WeightMatrix, widths: &[Option<Width>], group: usize, importance: &[f64]) -> Self {
+        let (rows, cols) = (matrix.rows, matrix.cols);
         let fitted = Scales::fit(matrix, widths, group, importance);
-        let log_scales: Vec<f32> = fitted.rows.iter().map(|s| s.to_f32().max(SMALLEST).ln()).collect();
-        let mut latent =
-            Self { widths: widths.to_vec(), codes: Array2::zeros((matrix.rows, matrix.cols)), log_scales, fitted };
-        for (r, row) in matrix.data.chunks_exact(matrix.cols).enumerate() {
-            let Some(width) = widths[r] else { continue };
-            let (_, _, step, base) = grid(width);
-            for (c, w) in row.iter().enumerate() {
-                latent.codes[[r, c]] = (w / latent.at(r, c) - base) / step;
+        let mut latent = Self {
+            rows,
+            cols,
+            widths: widths.to_vec(),
+            codes: vec![0.0; rows * cols],
+            log_scales: fitted.rows.iter().map(|s| s.to_f32().max(SMALLEST).ln()).collect(),
+            fitted,
+            adam_codes: Adam::new(rows * cols),
+            adam_scales: Adam::new(rows),
+        };
+        for r in 0..rows {
+            let Some(grid) = latent.grid(r) else { continue };
+            for at in r * cols..(r + 1) * cols {
+                let scale = latent.scale(r) * f32::from(latent.fitted.group_scale(r, at % cols));
+                latent.codes[at] = (matrix.data[at] / scale - grid.base) / grid.step;
             }
         }
         latent
+    }
+
+    fn grid(&self, row: usize) -> Option<Grid> {
+        self.widths[row].map(Grid::of)
     }
 
     fn scale(&self, row: usize) -> f32 {
         bf16::from_f32(self.log_scales[row].exp()).to_f32()
     }
 
-    /// What a level is multiplied with.
-    fn at(&self, row: usize, col: usize) -> f32 {
-        self.scale(row) * f32::from(self.fitted.group_scale(row, col))
+    /// What the levels of a row are multiplied with, group by group, and how many columns a group has.
+    fn scales(&self, row: usize) -> (usize, impl Iterator<Item = f32>) {
+        let group = if self.fitted.group == 0 { self.cols } else { self.fitted.group };
+        let scale = self.scale(row);
+        let of = move |start| scale * f32::from(self.fitted.group_scale(row, start));
+        (group, (0..self.cols).step_by(group).map(of))
     }
 
-    /// The weights that the rounded codes stand for.
-    pub(super) fn weights(&self, out: &mut Array2<f32>) {
-        for (r, width) in self.widths.iter().enumerate() {
-            let mut out = out.row_mut(r);
-            let Some(width) = *width else {
+    /// The weights that the rounded codes stand for, row by row.
+    pub(super) fn weights(&self, out: &mut [f32]) {
+        let rows = out.par_chunks_mut(self.cols).zip(self.codes.par_chunks(self.cols)).enumerate();
+        rows.with_min_len(ROWS).for_each(|(r, (out, codes))| {
+            let Some(grid) = self.grid(r) else {
                 out.fill(0.0);
-                continue;
+                return;
             };
-            let (low, high, step, base) = grid(width);
-            let scale = self.scale(r);
-            for (i, (w, c)) in out.iter_mut().zip(self.codes.row(r)).enumerate() {
-                let scale = scale * f32::from(self.fitted.group_scale(r, i));
-                *w = (round(*c).clamp(low, high) * step + base) * scale;
+            let (group, scales) = self.scales(r);
+            for ((out, codes), scale) in out.chunks_mut(group).zip(codes.chunks(group)).zip(scales) {
+                out.iter_mut().zip(codes).for_each(|(w, c)| *w = grid.level(*c) * scale);
             }
-        }
+        });
     }
 
-    /// Turns the derivative by the weights into those by the latent codes (in place) and by the scales' logarithms.
-    pub(super) fn chain(&self, grad: &mut Array2<f32>) -> Vec<f32> {
-        let mut by_scale = vec![0.0; self.widths.len()];
-        for (r, width) in self.widths.iter().enumerate() {
-            let mut grad = grad.row_mut(r);
-            let Some(width) = *width else {
-                grad.fill(0.0);
-                continue;
-            };
-            let (low, high, step, base) = grid(width);
-            let scale = self.scale(r);
-            for (i, (g, c)) in grad.iter_mut().zip(self.codes.row(r)).enumerate() {
-                let scale = scale * f32::from(self.fitted.group_scale(r, i));
-                by_scale[r] += *g * (round(*c).clamp(low, high) * step + base) * scale;
-                // Beyond the grid only a pull back inside passes.
-                let outside = (*c < low - 0.5 && *g > 0.0) || (*c > high + 0.5 && *g < 0.0);
-                *g = if outside { 0.0 } else { *g * step * scale };
-            }
-        }
-        by_scale
+    /// Moves codes and scales along `grads`, the derivative by `weights`, which are those of [`Self::weights`]. `grads` then hold
+    /// the derivative by the codes.
+    pub(super) fn learn(&mut self, grads: &mut [f32], weights: &[f32], by_code: Stride, by_scale: Stride) {
+        let cols = self.cols;
+        // A weight is its level times its scale, and so its derivative by the scale's logarithm.
+        let by_scales: Vec<f32> = grads
+            .par_chunks_mut(cols)
+            .zip(weights.par_chunks(cols))
+            .enumerate()
+            .with_min_len(ROWS)
+            .map(|(r, (grads, weights))| {
+                let Some(grid) = self.grid(r) else {
+                    grads.fill(0.0);
+                    return 0.0;
+                };
+                let by_scale = grads.iter().zip(weights).map(|(g, w)| g * w).sum();
+                let (group, scales) = self.scales(r);
+                let codes = self.codes[r * cols..][..cols].chunks(group);
+                for ((grads, codes), scale) in grads.chunks_mut(group).zip(codes).zip(scales) {
+                    for (g, c) in grads.iter_mut().zip(codes) {
+                        // Beyond the grid only a pull back inside passes.
+                        let outside = (*c < grid.low - 0.5 && *g > 0.0) || (*c > grid.high + 0.5 && *g < 0.0);
+                        *g = if outside { 0.0 } else { *g * grid.step * scale };
+                    }
+                }
+                by_scale
+            })
+            .collect();
+        let Adam { first, second } = &mut self.adam_codes;
+        let moments = first.par_chunks_mut(cols).zip(second.par_chunks_mut(cols));
+        let rows = self.codes.par_chunks_mut(cols).zip(grads.par_chunks(cols)).zip(moments);
+        rows.with_min_len(ROWS)
+            .for_each(|((codes, grads), (first, second))| step(codes, grads, first, second, by_code));
+        self.adam_scales.step(&mut self.log_scales, &by_scales, by_scale);
     }
 
     /// The rounded codes.
     pub(super) fn quantized(&self) -> Quantized {
-        let (rows, cols) = self.codes.dim();
-        let code = |r: usize, c: &f32| match self.widths[r] {
-            None => 0,
-            Some(width) => {
-                let (low, high, ..) = grid(width);
-                round(*c).clamp(low, high) as i32 as u8
-            }
-        };
+        let Self { rows, cols, .. } = *self;
+        let code = |(at, code): (usize, &f32)| self.grid(at / cols).map_or(0, |grid| grid.round(*code) as i32 as u8);
         Quantized {
             rows,
             cols,
@@ -122,7 +163,7 @@ impl Latent {
             widths: self.widths.clone(),
             scales: (0..rows).map(|r| bf16::from_f32(self.scale(r))).collect(),
             group_scales: self.fitted.groups.clone(),
-            codes: self.codes.indexed_iter().map(|((r, _), c)| code(r, c)).collect(),
+            codes: self.codes.iter().enumerate().map(code).collect(),
         }
     }
 }
