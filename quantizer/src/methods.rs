@@ -11,7 +11,7 @@ mod progress;
 mod quantized;
 pub mod scale;
 
-pub use learning::{Learning, Tried};
+pub use learning::{Choice, Learning, Tried};
 pub use options::{Activations, Method, Options, Packing};
 pub use prepared::{PreparedMethod, quantize};
 pub use progress::Progress;

@@ -17,7 +17,7 @@ use anyhow::{Result, ensure};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::learning::Learning;
+use super::learning::{Choice, Learning};
 use super::options::{Activations, Options};
 use super::progress::Progress;
 use super::quantized::{Outcome, Quantized, QuantizedNetwork, RowAllocation, dequantized};
@@ -30,7 +30,7 @@ use crate::data::Dataset;
 use crate::graph::{Graph, Network, WeightMatrix};
 use crate::random::Random;
 use allocate::{Rows, allocate, energies, removals};
-use choose::{CHOOSING, choose};
+use choose::{CHOOSING, Chosen, choose};
 use compact::{Compacted, add_to_bias, compact};
 use dimension::{Dimension, dimensions};
 use distill::{Learned, Task, distill, loss};
@@ -50,10 +50,8 @@ pub struct RowStatistics<'a> {
     inputs: Vec<Vec<f64>>,
     centred: Vec<Vec<f64>>,
     outputs: Vec<Vec<f64>>,
-    /// Of every matrix's input.
-    moments: Vec<Moments>,
-    /// `G` of every matrix.
-    output_moments: Vec<DMatrix<f64>>,
+    /// Of every matrix's input, and `G`.
+    moments: Vec<(Moments, DMatrix<f64>)>,
 }
 
 impl<'a> RowStatistics<'a> {
@@ -72,8 +70,7 @@ impl<'a> RowStatistics<'a> {
             inputs: moments.iter().map(|m| importance(&m.second, Side::Input)).collect(),
             centred: moments.iter().map(|m| importance(&m.centred(), Side::Input)).collect(),
             outputs: output_moments.iter().map(|g| importance(g, Side::Output)).collect(),
-            moments,
-            output_moments,
+            moments: moments.into_iter().zip(output_moments).collect(),
         })
     }
 
@@ -121,7 +118,8 @@ pub fn quantize(
         })
         .collect();
     let widths = allocate(graph, &dimensions, &rows, options.packing(), allowed)?;
-    let compacted = compact(graph, &dimensions, &widths, moments);
+    let input_moments: Vec<&Moments> = moments.iter().map(|(input, _)| input).collect();
+    let compacted = compact(graph, &dimensions, &widths, &input_moments);
     let importance: Vec<Vec<f64>> = compacted
         .columns
         .iter()
@@ -140,19 +138,25 @@ pub fn quantize(
         bounds,
         seed: options.seed,
     };
-    let (quantized, learned, learning) = if bounds.steps == Some(0) {
-        let (quantized, graph) = feed_back(&compacted, options.group, &importance, statistics);
-        (quantized, graph, None)
-    } else {
-        let of_choosing = |share: f64| share * CHOOSING;
-        let (task, tried) =
-            choose(&task, windows, |share, error| progress(Progress::Choosing { share: of_choosing(share), error }));
-        let from = if tried.is_empty() { 0.0 } else { CHOOSING };
-        let learned = distill(&task, windows, |share, error| {
-            progress(Progress::Learning { share: from + (1.0 - from) * share, error });
-        });
-        let Learned { quantized, graph, steps } = learned;
-        (quantized, graph, Some(Learning { steps, widening: task.widening, tried }))
+    let feedback = |moments: &[(Moments, DMatrix<f64>)], damping: f64| {
+        feed_back(&compacted, options.group, &importance, moments, damping)
+    };
+    let Chosen { choice, bounds, tried } = choose(&task, windows, &feedback, |share, error| {
+        progress(Progress::Choosing { share: CHOOSING * share, error });
+    });
+    let from = if tried.is_empty() { 0.0 } else { CHOOSING };
+    let (quantized, learned, steps) = match choice {
+        Choice::Feedback { damping } => {
+            let (quantized, graph) = feedback(moments, damping);
+            (quantized, graph, 0)
+        }
+        Choice::Learning(widening) => {
+            let Learned { quantized, graph, steps } =
+                distill(&Task { widening, bounds, ..task }, windows, |share, error| {
+                    progress(Progress::Learning { share: from + (1.0 - from) * share, error });
+                });
+            (quantized, graph, steps)
+        }
     };
     let wanted = match options.activations {
         Activations::Auto => choose_activations(&learned, &quantized, windows, options.seed),
@@ -178,27 +182,31 @@ pub fn quantize(
         let allocation = RowAllocation { widths, energy, removal, expected, inputs: inputs[m].clone(), rows, columns };
         outcome.allocation = Some(allocation);
     }
+    let learning = Some(Learning { steps, choice, tried });
     Ok(QuantizedNetwork { graph: learned, outcomes, learning })
 }
 
-/// Quantizes without learning: every matrix by two-sided error feedback, the mean error into the biases.
+/// Quantizes without learning: every matrix by two-sided error feedback with the moments of its input and of its output's
+/// derivative, the mean error into the biases.
 fn feed_back(
     compacted: &Compacted,
     group: usize,
     importance: &[Vec<f64>],
-    statistics: &RowStatistics<'_>,
+    moments: &[(Moments, DMatrix<f64>)],
+    damping: f64,
 ) -> (Vec<Quantized>, Graph) {
     let part = |second: &DMatrix<f64>, of: &[usize]| second.select_rows(of).select_columns(of);
     let mut graph = compacted.graph.clone();
     let one = |m: usize| {
-        let (columns, moments) = (&compacted.columns[m], &statistics.moments[m]);
+        let (columns, (input, output)) = (&compacted.columns[m], &moments[m]);
         let input = Moments {
-            second: part(&moments.second, columns),
-            mean: columns.iter().map(|&c| moments.mean[c]).collect(),
-            count: moments.count,
+            second: part(&input.second, columns),
+            mean: columns.iter().map(|&c| input.mean[c]).collect(),
+            count: input.count,
         };
-        let output = part(&statistics.output_moments[m], &compacted.rows[m]);
-        feedback(&compacted.graph.matrices[m], &compacted.widths[m], group, &importance[m], &input, &output)
+        let output = part(output, &compacted.rows[m]);
+        let matrix = &compacted.graph.matrices[m];
+        feedback(matrix, &compacted.widths[m], group, &importance[m], (&input, damping), &output)
     };
     let found: Vec<(Quantized, Vec<f32>)> = (0..graph.matrices.len()).into_par_iter().map(one).collect();
     let quantized = found.into_iter().enumerate().map(|(m, (quantized, shift))| {

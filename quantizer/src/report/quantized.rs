@@ -8,7 +8,7 @@ use crate::budget::Rate;
 use crate::graph::Graph;
 use crate::measure::eval::ErrorReport;
 use crate::methods::actquant::ActionStatistics;
-use crate::methods::{Learning, Tried};
+use crate::methods::{Choice, Learning, Tried};
 use crate::pipeline::{QuantizedPolicy, Search, Try};
 
 /// ActQuant's scores, and the bits that they led to.
@@ -52,14 +52,17 @@ pub fn matrices(quantized: &QuantizedPolicy) -> String {
     format!("{rows}\n\n{total} bytes of weights, {bits:.3} bits each, everything counted\n{widths}")
 }
 
-/// How long was learned, and what was chosen for it.
+/// How codes were chosen, and what was tried for it.
 pub fn learning(learning: &Learning) -> String {
-    let Learning { steps, widening, tried } = learning;
-    let mut text = format!("learned {steps} steps with {widening}\n");
+    let Learning { steps, choice, tried } = learning;
+    let mut text = match choice {
+        Choice::Learning(widening) => format!("learned {steps} steps with {widening}\n"),
+        Choice::Feedback { .. } => format!("not learned: {choice}\n"),
+    };
     if !tried.is_empty() {
         let mut rows = table(&["tried", "error, episodes left out", "there, off the path"]);
-        for Tried { widening, recorded, widened } in tried {
-            rows.add_row([widening.to_string(), format!("{recorded:.2e}"), format!("{widened:.2e}")]);
+        for Tried { choice, recorded, widened } in tried {
+            rows.add_row([choice.to_string(), format!("{recorded:.2e}"), format!("{widened:.2e}")]);
         }
         text += &format!("\n{rows}\n");
     }

@@ -1,19 +1,23 @@
-//! How far the inputs are widened, chosen by leaving whole episodes out.
+//! How codes are chosen, and how far learning widens the inputs: what does best on whole episodes that are left out.
 //!
-//! Each choice learns for an eighth of the steps from three quarters of the episodes. On the others its error is measured twice, at
-//! the recorded observations and at widened ones. A feed-forward network takes the choice with the lowest error at the recorded
-//! observations, a recurrent one that with the lowest geometric mean of both: the error on the recorded path alone would always
-//! take the least noise, with which a recurrent policy that balances falls (docs/QUANTIZER.md).
+//! Each choice has three quarters of the episodes; to learn, it has an eighth of the steps. On the others its error is measured
+//! twice, at the recorded observations and at widened ones. A feed-forward network takes the choice with the lowest error at the
+//! recorded observations, a recurrent one that with the lowest geometric mean of both: the error on the recorded path alone would
+//! always take the least noise, with which a recurrent policy that balances falls (docs/QUANTIZER.md).
 
 use std::time::Duration;
 
-use super::distill::{Learned, Task, distill, loss};
+use nalgebra::DMatrix;
+
+use super::distill::{Task, distill, loss};
 use super::schedule::Bounds;
+use crate::calibrate::moments::Moments;
+use crate::calibrate::sensitivity::{DAMPING_INPUT, drawn_moments};
 use crate::calibrate::widening::Widening;
 use crate::calibrate::windows::Windows;
-use crate::graph::Network;
-use crate::methods::learning::Tried;
-use crate::methods::quantized::dequantized;
+use crate::graph::{Graph, Network};
+use crate::methods::learning::{Choice, Tried};
+use crate::methods::quantized::{Quantized, dequantized};
 use crate::random::Random;
 
 /// With fewer steps there is nothing to share.
@@ -25,45 +29,80 @@ const TIME: u32 = 12;
 const TIME_LEFT: f64 = 0.75;
 /// Of all the work, roughly.
 pub const CHOOSING: f64 = 0.27;
+/// What all the steps leave of the error that an eighth of them leaves: 0.6 at 2 bits, 0.9 to 1.1 at 3 and 4 (docs/records).
+const LEFT: f64 = 0.8;
+/// Dampings of feedback that are tried.
+const DAMPINGS: [f64; 2] = [DAMPING_INPUT, 0.03];
 /// Batches that an error is measured on, and frames in each.
 const BATCHES: usize = 16;
 const FRAMES: usize = 512;
 
-/// Tries all choices and gives the best in `task`, with what is left of the time. With few steps, or where no episode can be left
-/// out, nothing is tried.
-pub fn choose<'a>(
-    task: &Task<'a>,
-    windows: &Windows<'_>,
-    mut progress: impl FnMut(f64, f64),
-) -> (Task<'a>, Vec<Tried>) {
-    let Bounds { steps, time } = task.bounds;
-    let parts = windows.split().filter(|_| steps.is_none_or(|steps| steps >= LEAST_STEPS));
-    let Some((learned_from, left_out)) = parts else { return (task.clone(), Vec::new()) };
-    let bounds = Bounds { steps: steps.map(|steps| steps / STEPS), time: time.map(|time| time / TIME) };
-    let choices = Widening::CHOICES;
-    let of = |(i, &widening): (usize, &Widening)| {
-        let task = Task { widening, bounds, ..task.clone() };
-        let learned = distill(&task, &learned_from, |share, error| {
-            progress((i as f64 + share) / choices.len() as f64, error);
-        });
-        let [recorded, widened] = errors(&task, &learned, &left_out);
-        Tried { widening, recorded, widened }
-    };
-    let tried: Vec<Tried> = choices.iter().enumerate().map(of).collect();
-    let decides = |tried: &Tried| match windows.recurrent() {
-        true => (tried.recorded * tried.widened).sqrt(),
-        false => tried.recorded,
-    };
-    let best = tried.iter().min_by(|a, b| decides(a).total_cmp(&decides(b)));
-    let widening = best.map_or(task.widening, |best| best.widening);
-    let left = time.map(|time| Duration::from_secs_f64(time.as_secs_f64() * TIME_LEFT));
-    (Task { widening, bounds: Bounds { steps, time: left }, ..task.clone() }, tried)
+/// What feedback makes of moments and a damping.
+pub type Feedback<'f> = dyn Fn(&[(Moments, DMatrix<f64>)], f64) -> (Vec<Quantized>, Graph) + 'f;
+
+/// What was chosen.
+#[derive(Debug)]
+pub struct Chosen {
+    /// The way.
+    pub choice: Choice,
+    /// What is left for learning.
+    pub bounds: Bounds,
+    /// What it was chosen from.
+    pub tried: Vec<Tried>,
 }
 
-/// The errors of what was learned, at recorded and at widened observations, the same for every choice.
-fn errors(task: &Task<'_>, learned: &Learned, windows: &Windows<'_>) -> [f64; 2] {
-    let network = Network::rounded(&learned.graph, task.x_max);
-    let weights = dequantized(&learned.graph, &learned.quantized);
+/// Tries all choices. Where no episode can be left out, or few steps are to be learned, nothing is tried. Of an iterative head
+/// feedback is not: its moments over all denoising steps take longer than what they could say is worth.
+pub fn choose(
+    task: &Task<'_>,
+    windows: &Windows<'_>,
+    feedback: &Feedback<'_>,
+    mut progress: impl FnMut(f64, f64),
+) -> Chosen {
+    let Bounds { steps, time } = task.bounds;
+    let learns = steps != Some(0);
+    let untried = if learns { Choice::Learning(task.widening) } else { Choice::Feedback { damping: DAMPING_INPUT } };
+    let untried = Chosen { choice: untried, bounds: task.bounds, tried: Vec::new() };
+    let iterative = task.graph.denoising_steps() > 1;
+    if learns && steps.is_some_and(|steps| steps < LEAST_STEPS) || !learns && iterative {
+        return untried;
+    }
+    let Some((learned_from, left_out)) = windows.split() else { return untried };
+    let mut tried = Vec::new();
+    let mut try_out = |choice, (quantized, graph): (Vec<Quantized>, Graph)| {
+        let [recorded, widened] = errors(task, &graph, &quantized, &left_out);
+        tried.push(Tried { choice, recorded, widened });
+    };
+    if !iterative {
+        let moments = drawn_moments(&learned_from, task.seed);
+        for damping in DAMPINGS {
+            try_out(Choice::Feedback { damping }, feedback(&moments, damping));
+        }
+    }
+    if learns {
+        let bounds = Bounds { steps: steps.map(|steps| steps / STEPS), time: time.map(|time| time / TIME) };
+        let choices = Widening::CHOICES;
+        for (i, widening) in choices.into_iter().enumerate() {
+            let learned = distill(&Task { widening, bounds, ..task.clone() }, &learned_from, |share, error| {
+                progress((i as f64 + share) / choices.len() as f64, error);
+            });
+            try_out(Choice::Learning(widening), (learned.quantized, learned.graph));
+        }
+    }
+    let expected = |tried: &Tried| {
+        let error = if windows.recurrent() { (tried.recorded * tried.widened).sqrt() } else { tried.recorded };
+        if matches!(tried.choice, Choice::Learning(_)) { LEFT * error } else { error }
+    };
+    let best = tried.iter().min_by(|a, b| expected(a).total_cmp(&expected(b)));
+    let choice = best.map_or(untried.choice, |best| best.choice);
+    let left = time.map(|time| Duration::from_secs_f64(time.as_secs_f64() * TIME_LEFT));
+    Chosen { choice, bounds: Bounds { steps, time: left }, tried }
+}
+
+/// The errors of a network at recorded and at widened observations, the same for every choice.
+fn errors(task: &Task<'_>, graph: &Graph, quantized: &[Quantized], windows: &Windows<'_>) -> [f64; 2] {
+    let network = Network::rounded(graph, task.x_max);
+    let weights = dequantized(graph, quantized);
     let size = (FRAMES / windows.window).max(1);
     [None, Some(Widening::WIDE)].map(|widening| {
         let mut random = Random::new(task.seed);

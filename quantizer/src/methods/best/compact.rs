@@ -22,7 +22,7 @@ pub struct Compacted {
 
 /// Removes the elements that have no bits and sorts the others by width. What a removed element contributed is guessed from the
 /// elements that stay, by the moments of every matrix's input, and goes into their columns and the biases.
-pub fn compact(graph: &Graph, dimensions: &[Dimension], widths: &Widths, moments: &[Moments]) -> Compacted {
+pub fn compact(graph: &Graph, dimensions: &[Dimension], widths: &Widths, moments: &[&Moments]) -> Compacted {
     let mut graph = graph.clone();
     let mut widths = widths.clone();
     let mut kept: Vec<Vec<usize>> = graph.matrices.iter().map(|m| (0..m.cols).collect()).collect();
@@ -34,7 +34,7 @@ pub fn compact(graph: &Graph, dimensions: &[Dimension], widths: &Widths, moments
         kept_rows[dimension.maker].clone_from(&order);
         for &consumer in &dimension.consumers {
             let matrix = &mut graph.matrices[consumer];
-            let contribution = absorb(matrix, &gone, &order, &moments[consumer]);
+            let contribution = absorb(matrix, &gone, &order, moments[consumer]);
             *matrix = columns(matrix, &order);
             kept[consumer].clone_from(&order);
             add_to_bias(&mut graph, consumer, &contribution);
@@ -120,6 +120,11 @@ mod tests {
         graph.matrices.iter().enumerate().map(of).collect()
     }
 
+    fn compacted(graph: &Graph, widths: &Widths, hidden: &[f32]) -> Compacted {
+        let moments = moments(graph, hidden);
+        compact(graph, &dimensions(graph), widths, &moments.iter().collect::<Vec<_>>())
+    }
+
     fn output(graph: &Graph) -> Vec<f32> {
         Evaluator::new(graph).step(&[0.3, -0.7, 1.1], &mut |_, _| {})
     }
@@ -132,7 +137,7 @@ mod tests {
             vec![Some(Width::W4); 4],
             vec![Some(Width::W4); 4],
         ];
-        let compacted = compact(&graph, &dimensions(&graph), &widths, &moments(&graph, &[0.0; 5]));
+        let compacted = compacted(&graph, &widths, &[0.0; 5]);
         assert_eq!(compacted.columns[1], [1, 3, 4, 2, 0]);
         assert_eq!(compacted.rows, [vec![1, 3, 4, 2, 0], vec![0, 1, 2, 3], vec![0, 1, 2, 3]]);
         assert!(compacted.widths[0].is_sorted());
@@ -153,7 +158,7 @@ mod tests {
                 hidden = x.to_vec();
             }
         });
-        let compacted = compact(&graph, &dimensions(&graph), &widths, &moments(&graph, &hidden));
+        let compacted = compacted(&graph, &widths, &hidden);
         assert_eq!((compacted.graph.matrices[0].rows, compacted.graph.matrices[1].cols), (4, 4));
         for (a, b) in output(&graph).iter().zip(output(&compacted.graph)) {
             assert!((a - b).abs() < 1e-6);

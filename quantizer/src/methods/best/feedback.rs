@@ -12,7 +12,7 @@ use half::bf16;
 use nalgebra::DMatrix;
 
 use crate::calibrate::moments::Moments;
-use crate::calibrate::sensitivity::{Side, damped};
+use crate::calibrate::sensitivity::{DAMPING_OUTPUT, damped};
 use crate::graph::WeightMatrix;
 use crate::methods::quantized::Quantized;
 use crate::methods::scale::Scales;
@@ -31,9 +31,10 @@ struct Factor {
 }
 
 impl Factor {
-    fn new(second: &DMatrix<f64>, side: Side) -> Self {
+    /// With this share of the mean diagonal added to it.
+    fn new(second: &DMatrix<f64>, damping: f64) -> Self {
         let n = second.nrows();
-        let (order, ordered) = damped(second, side);
+        let (order, ordered) = damped(second, damping);
         let mut moment = vec![0.0; n * n];
         for (i, &a) in order.iter().enumerate() {
             for (j, &b) in order.iter().enumerate() {
@@ -67,7 +68,8 @@ impl Factor {
 }
 
 /// Quantizes `matrix`, whose rows have these widths and `group` columns a scale (0 = none). `input` holds the moments of its
-/// input, `output` is `G`; `importance` weighs the columns for the first scales.
+/// input, `damping` is what is added to their diagonal, as a share of its mean; `output` is `G`; `importance` weighs the columns for
+/// the first scales.
 ///
 /// The mean error is left to the biases, so that `H` is taken about the input's mean: returns the matrix and what is to be added
 /// to the biases behind it.
@@ -76,11 +78,11 @@ pub fn feedback(
     widths: &[Option<Width>],
     group: usize,
     importance: &[f64],
-    input: &Moments,
+    (input, damping): (&Moments, f64),
     output: &DMatrix<f64>,
 ) -> (Quantized, Vec<f32>) {
     let (rows, cols) = (matrix.rows, matrix.cols);
-    let (h, g) = (Factor::new(&input.centred(), Side::Input), Factor::new(output, Side::Output));
+    let (h, g) = (Factor::new(&input.centred(), damping), Factor::new(output, DAMPING_OUTPUT));
     let mut scales = Scales::fit(matrix, widths, group, importance);
     let mut codes = vec![0u8; rows * cols];
     // What is rounded less what was wanted.
@@ -166,6 +168,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::calibrate::sensitivity::DAMPING_INPUT;
     use crate::methods::{gptq, scale};
     use crate::random::Random;
 
@@ -198,7 +201,7 @@ mod tests {
         for width in [Width::W2, Width::W3, Width::W4] {
             let one_sided = gptq::quantize(&matrix, width, 0, &input).expect("positive definite");
             let widths = vec![Some(width); ROWS];
-            let (both, shift) = feedback(&matrix, &widths, 0, &[], &input, &output);
+            let (both, shift) = feedback(&matrix, &widths, 0, &[], (&input, DAMPING_INPUT), &output);
             let [plain, one, both] = [&scale::round_to_nearest(&matrix, width, 0), &one_sided, &both]
                 .map(|q| error(&matrix, q, &input.second, &output));
             assert!(both < 0.5 * one && one < plain, "{width:?}: {both}, {one}, {plain}");
@@ -211,7 +214,8 @@ mod tests {
     fn unit_moments_reduce_to_rounding_with_fitted_scales() {
         let (matrix, ..) = case();
         let unit = Moments { second: DMatrix::identity(COLS, COLS), mean: vec![0.0; COLS], count: 1 };
-        let (found, _) = feedback(&matrix, &[Some(Width::W3); ROWS], 0, &[], &unit, &DMatrix::identity(ROWS, ROWS));
+        let (found, _) =
+            feedback(&matrix, &[Some(Width::W3); ROWS], 0, &[], (&unit, DAMPING_INPUT), &DMatrix::identity(ROWS, ROWS));
         for (r, row) in matrix.data.chunks_exact(COLS).enumerate() {
             let scale = found.scales[r].to_f32();
             let nearest: Vec<u8> = row.iter().map(|w| Width::W3.nearest_code(w / scale)).collect();
@@ -229,7 +233,7 @@ mod tests {
         input.second += &mean * mean.transpose();
         let mut widths = vec![Some(Width::W2); ROWS];
         widths[3] = None;
-        let (found, shift) = feedback(&matrix, &widths, 0, &[], &input, &output);
+        let (found, shift) = feedback(&matrix, &widths, 0, &[], (&input, DAMPING_INPUT), &output);
         let weights = found.dequantized();
         assert!(weights[3 * COLS..4 * COLS].iter().all(|w| *w == 0.0));
         let rows = matrix.data.chunks_exact(COLS).zip(weights.chunks_exact(COLS)).zip(shift);
