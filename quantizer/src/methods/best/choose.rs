@@ -110,3 +110,50 @@ fn errors(task: &Task<'_>, graph: &Graph, quantized: &[Quantized], windows: &Win
         batches.map(|batch| f64::from(loss(&network, &weights, windows, batch))).sum::<f64>() / BATCHES as f64
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use actq_kernels::Width;
+
+    use super::*;
+    use crate::budget::{Budget, Rate};
+    use crate::methods::actquant::testing::{dataset, mlp};
+    use crate::methods::{Learning, Method, Options, PreparedMethod};
+
+    fn chosen(episodes: usize, steps: usize) -> Learning {
+        let graph = mlp();
+        let recording = dataset(&graph, episodes, 240 / episodes);
+        let method = PreparedMethod::new(&graph, Method::Best, Some(&recording), |_| {}).expect("statistics");
+        let options = Options { steps: Some(steps), ..Options::new(Method::Best, Budget::Width(Width::W3)) };
+        let found = method.quantize(Rate::Width(Width::W3), &options, |_| {}).expect("quantized");
+        found.learning.expect("best says how")
+    }
+
+    #[test]
+    fn without_learning_the_better_damping_is_taken() {
+        let Learning { steps, choice, tried } = chosen(4, 0);
+        assert_eq!((steps, tried.len()), (0, DAMPINGS.len()));
+        let best = tried.iter().min_by(|a, b| a.recorded.total_cmp(&b.recorded)).map(|tried| tried.choice);
+        assert_eq!(best, Some(choice));
+    }
+
+    #[test]
+    fn with_enough_steps_feedback_stands_beside_learning() {
+        let Learning { steps, choice, tried } = chosen(4, LEAST_STEPS);
+        assert_eq!(tried.len(), DAMPINGS.len() + Widening::CHOICES.len());
+        let expected = |tried: &Tried| match tried.choice {
+            Choice::Feedback { .. } => tried.recorded,
+            Choice::Learning(_) => LEFT * tried.recorded,
+        };
+        let best = tried.iter().min_by(|a, b| expected(a).total_cmp(&expected(b))).map(|tried| tried.choice);
+        assert_eq!(best, Some(choice));
+        assert_eq!(steps > 0, matches!(choice, Choice::Learning(_)));
+    }
+
+    #[test]
+    fn of_one_episode_or_few_steps_nothing_is_tried() {
+        let found = |Learning { choice, tried, .. }: Learning| (choice, tried.len());
+        assert_eq!(found(chosen(1, 0)), (Choice::Feedback { damping: DAMPING_INPUT }, 0));
+        assert_eq!(found(chosen(4, 8)), (Choice::Learning(Widening::WIDE), 0));
+    }
+}
