@@ -3,7 +3,8 @@
 //! Each choice has three quarters of the episodes; to learn, it has an eighth of the steps. On the others its error is measured
 //! twice, at the recorded observations and at widened ones. A feed-forward network takes the choice with the lowest error at the
 //! recorded observations, a recurrent one that with the lowest geometric mean of both: the error on the recorded path alone would
-//! always take the least noise, with which a recurrent policy that balances falls (docs/QUANTIZER.md).
+//! always take the least noise, with which a recurrent policy that balances falls (docs/QUANTIZER.md). Where several ways to learn are
+//! nearly as good there, the one that is best at widened observations is taken.
 
 use std::time::Duration;
 
@@ -31,6 +32,8 @@ const TIME_LEFT: f64 = 0.75;
 pub const CHOOSING: f64 = 0.27;
 /// What all the steps leave of the error that an eighth of them leaves: 0.6 at 2 bits, 0.9 to 1.1 at 3 and 4 (docs/records).
 const LEFT: f64 = 0.8;
+/// What is not higher than the lowest error by more than this is not known to be worse: seeds move an error by as much.
+const NEAR: f64 = 1.1;
 /// Dampings of feedback that are tried.
 const DAMPINGS: [f64; 2] = [DAMPING_INPUT, 0.03];
 /// Batches that an error is measured on, and frames in each.
@@ -89,14 +92,24 @@ pub fn choose(
             try_out(Choice::Learning(widening), (learned.quantized, learned.graph));
         }
     }
-    let expected = |tried: &Tried| {
-        let error = if windows.recurrent() { (tried.recorded * tried.widened).sqrt() } else { tried.recorded };
-        if matches!(tried.choice, Choice::Learning(_)) { LEFT * error } else { error }
-    };
-    let best = tried.iter().min_by(|a, b| expected(a).total_cmp(&expected(b)));
-    let choice = best.map_or(untried.choice, |best| best.choice);
+    let choice = best(&tried, windows.recurrent()).map_or(untried.choice, |best| best.choice);
     let left = time.map(|time| Duration::from_secs_f64(time.as_secs_f64() * TIME_LEFT));
     Chosen { choice, bounds: Bounds { steps, time: left }, tried }
+}
+
+/// The best of what was tried. Of ways to learn that are equally good as far as a few episodes can tell, the one that is best off the path.
+fn best(tried: &[Tried], recurrent: bool) -> Option<&Tried> {
+    let error = |tried: &&Tried| if recurrent { (tried.recorded * tried.widened).sqrt() } else { tried.recorded };
+    let (learned, fed_back): (Vec<&Tried>, Vec<&Tried>) =
+        tried.iter().partition(|tried| matches!(tried.choice, Choice::Learning(_)));
+    let lowest = learned.iter().map(error).fold(f64::INFINITY, f64::min);
+    let near = learned.into_iter().filter(|tried| error(tried) <= NEAR * lowest);
+    let learned = near.min_by(|a, b| a.widened.total_cmp(&b.widened));
+    let fed_back = fed_back.into_iter().min_by(|a, b| error(a).total_cmp(&error(b)));
+    match (learned, fed_back) {
+        (Some(learned), Some(fed_back)) if error(&fed_back) < LEFT * error(&learned) => Some(fed_back),
+        (learned, fed_back) => learned.or(fed_back),
+    }
 }
 
 /// The errors of a network at recorded and at widened observations, the same for every choice.
@@ -141,13 +154,25 @@ mod tests {
     fn with_enough_steps_feedback_stands_beside_learning() {
         let Learning { steps, choice, tried } = chosen(4, LEAST_STEPS);
         assert_eq!(tried.len(), DAMPINGS.len() + Widening::CHOICES.len());
-        let expected = |tried: &Tried| match tried.choice {
-            Choice::Feedback { .. } => tried.recorded,
-            Choice::Learning(_) => LEFT * tried.recorded,
-        };
-        let best = tried.iter().min_by(|a, b| expected(a).total_cmp(&expected(b))).map(|tried| tried.choice);
-        assert_eq!(best, Some(choice));
+        assert_eq!(best(&tried, false).map(|tried| tried.choice), Some(choice));
         assert_eq!(steps > 0, matches!(choice, Choice::Learning(_)));
+    }
+
+    #[test]
+    fn what_is_as_good_is_told_apart_off_the_path() {
+        let learned =
+            |i: usize, recorded, widened| Tried { choice: Choice::Learning(Widening::CHOICES[i]), recorded, widened };
+        let fed_back = |recorded| Tried { choice: Choice::Feedback { damping: 0.01 }, recorded, widened: 9.0 };
+        let [a, b, c] = [learned(0, 1.05, 2.0), learned(1, 1.0, 3.0), learned(2, 1.2, 1.0)];
+        let choice = |tried: &[Tried], recurrent| best(tried, recurrent).map(|tried| tried.choice);
+        assert_eq!(choice(&[a, b, c], false), Some(a.choice));
+        assert_eq!(choice(&[b, c], false), Some(b.choice));
+        assert_eq!(choice(&[a, b, c], true), Some(c.choice));
+        let [worse, better] = [fed_back(0.9), fed_back(0.8)];
+        assert_eq!(choice(&[worse, a, b], false), Some(a.choice));
+        assert_eq!(choice(&[worse, better, a, b], false), Some(better.choice));
+        assert_eq!(choice(&[worse, better], false), Some(better.choice));
+        assert_eq!(choice(&[], false), None);
     }
 
     #[test]
