@@ -4,13 +4,10 @@ use core::ops::Range;
 
 use crate::image::Region;
 
-/// Three regions as slices; empty where they overlap or lie outside, which the image's check has excluded.
+/// Regions as slices; empty where they overlap or lie outside, which the image's check has excluded.
 #[inline(never)]
-pub(super) fn regions<'r>(arena: &'r mut [u32], regions: &[Region; 3]) -> [&'r mut [u32]; 3] {
-    match arena.get_disjoint_mut(regions.map(Region::range)) {
-        Ok([a, b, c]) => [a, b, c],
-        Err(_) => [&mut [], &mut [], &mut []],
-    }
+pub(super) fn regions<'r, const N: usize>(arena: &'r mut [u32], regions: &[Region; N]) -> [&'r mut [u32]; N] {
+    arena.get_disjoint_mut(regions.map(Region::range)).unwrap_or_else(|_| core::array::from_fn(|_| Default::default()))
 }
 
 /// Some of a region's words; none where they are not all there.

@@ -6,7 +6,7 @@ use crate::cursor::Cursor;
 use crate::error::{Fault, StepError};
 use crate::image::{Op, OpKind, Region};
 use crate::meter::{Meter, Unlimited, Work};
-use crate::ops::denoise::{Coefficients, add_noise, denoise};
+use crate::ops::denoise::{Coefficients, denoise};
 use crate::ops::elementwise::{self, copy, copy_le};
 use crate::ops::noise::normal;
 use crate::ops::norm;
@@ -70,12 +70,10 @@ pub(super) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
         OpKind::Denoise => {
             let (by, noise) = op.coefficients(cursor.step);
             let by = Coefficients::from_array(by);
-            denoise(&by, op.constant(0), f(src), f(dst), f(part(third, &range)));
-            if by.sigma != 0.0 {
-                let places = [op.dst(), Region { offset: noise, len: dst.len() }, op.third()];
-                let [x, z, y] = regions(arena, &places).map(|all| f(part(all, &range)));
-                add_noise(by.sigma, z, x, y);
-            }
+            let len = if by.sigma == 0.0 { 0 } else { op.dst().len };
+            let z = Region { offset: noise, len };
+            let [x, v, y, z] = regions(arena, &[op.dst(), op.src(), op.third(), z]).map(|all| f(part(all, &range)));
+            denoise(&by, op.constant(0), v, z, x, y);
         }
         OpKind::LstmCell => {
             arch::lstm_elements(range.clone(), f(src), f(third), f(dst));
