@@ -25,11 +25,13 @@ fn limit(name: &str) -> u64 {
     match name {
         "add" | "mul" | "denoise" | "denoise with noise" => 12,
         // A limit takes two comparisons, which are eight instructions.
-        "denoise by a limit" | "denoise by a limit with noise" => 24,
-        "softplus" => 37,
-        "sin" | "exp" => 32,
-        "cos" => 34,
-        "noise" => 200,
+        "denoise by a limit" => 25,
+        "denoise by a limit with noise" => 26,
+        "softplus" => 38,
+        "exp" => 36,
+        "cos" => 35,
+        "sin" => 32,
+        "noise" => 176,
         _ => 30 * functions(name),
     }
 }
@@ -80,10 +82,10 @@ fn expected() -> Vec<(&'static str, u32)> {
         ("denoise by a limit", 0.4, 2.0, &[]),
         ("denoise by a limit with noise", 0.4, 2.0, &z),
     ] {
-        let by = Coefficients::from_array([sample, -sample, 0.6, 0.2, sample, 0.1, 0.3]);
+        let by = Coefficients::from_array([sample, 0.5 * sample, 0.6, 0.2, sample, 0.1, 0.3]);
         let (mut next, mut y) = (values(LEN), vec![0.0; LEN]);
         denoise(&by, limit, &values(LEN), noise, &mut next, &mut y);
-        all.push((name, hash(&[&next, &y])));
+        all.push((name, hash(&[&next, &y[1..]])));
     }
     all.push(("noise", hash(&[&z])));
     let lstm = |gates: &[f32]| {

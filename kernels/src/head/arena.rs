@@ -6,8 +6,11 @@ use crate::image::Region;
 
 /// Regions as slices; empty where they overlap or lie outside, which the image's check has excluded.
 #[inline(never)]
-pub(super) fn regions<'r, const N: usize>(arena: &'r mut [u32], regions: &[Region; N]) -> [&'r mut [u32]; N] {
-    arena.get_disjoint_mut(regions.map(Region::range)).unwrap_or_else(|_| core::array::from_fn(|_| Default::default()))
+pub(super) fn regions<'r>(arena: &'r mut [u32], [a, b, c]: &[Region; 3], more: Region) -> [&'r mut [u32]; 4] {
+    match arena.get_disjoint_mut([a.range(), b.range(), c.range(), more.range()]) {
+        Ok([a, b, c, more]) => [a, b, c, more],
+        Err(_) => [&mut [], &mut [], &mut [], &mut []],
+    }
 }
 
 /// Some of a region's words; none where they are not all there.

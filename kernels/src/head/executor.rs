@@ -33,7 +33,7 @@ pub(super) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
     if let OpKind::Linear { accumulate } = op.kind {
         let matrix = &op.linear_matrix();
         let matrix = matrix.as_ref().map_err(|_| Fault::Damaged)?;
-        let [dst, src, work] = regions(arena, &op.regions);
+        let [dst, src, work, _] = regions(arena, &op.regions, Region::default());
         return matrix.resume(&mut cursor.linear, budget, f(src), work, f(dst), accumulate);
     }
     // Elements that this piece takes, or units of a norm.
@@ -46,9 +46,9 @@ pub(super) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
     cursor.done = units.end;
     let norm = matches!(op.kind, OpKind::LayerNorm | OpKind::RmsNorm);
     let range = if norm { 0..dst.len } else { units.clone() };
-    let [mut dst, mut src, third] = match op.src().len {
-        0 => [part(arena, &(dst.offset + range.start..dst.offset + range.end)), &mut [], &mut []],
-        _ => regions(arena, &op.regions),
+    let [mut dst, mut src, third, _] = match op.src().len {
+        0 => [part(arena, &(dst.offset + range.start..dst.offset + range.end)), &mut [], &mut [], &mut []],
+        _ => regions(arena, &op.regions, Region::default()),
     };
     if matches!(op.kind, OpKind::Normalize | OpKind::Add | OpKind::Mul | OpKind::Copy | OpKind::Denoise) {
         (dst, src) = (part(dst, &range), part(src, &range));
@@ -72,7 +72,8 @@ pub(super) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
             let by = Coefficients::from_array(by);
             let len = if by.sigma == 0.0 { 0 } else { op.dst().len };
             let z = Region { offset: noise, len };
-            let [x, v, y, z] = regions(arena, &[op.dst(), op.src(), op.third(), z]).map(|all| f(part(all, &range)));
+            let [x, v, y, z] = regions(arena, &op.regions, z);
+            let [x, v, y, z] = [x, v, y, z].map(|all| f(part(all, &range)));
             denoise(&by, op.constant(0), v, z, x, y);
         }
         OpKind::LstmCell => {

@@ -61,8 +61,8 @@ pub fn denoise(by: &Coefficients, limit: f32, v: &[f32], z: &[f32], x: &mut [f32
     };
     // A loop for each, in which nothing is left to choose.
     match (sample_x == 0.0 && sample_v == 0.0, z.is_empty()) {
-        (true, true) => in_fours(v, v, x, y, |v, _, x| look(straight(v, x), v)),
-        (true, false) => in_fours(v, z, x, y, |v, z, x| stir(straight(v, x), z)),
+        (true, true) => each(v, v, x, y, |v, _, x| look(straight(v, x), v)),
+        (true, false) => in_eights(v, z, x, y, |v, z, x| stir(straight(v, x), z)),
         (false, true) => each(v, v, x, y, |v, _, x| look(limited(v, x), v)),
         (false, false) => each(v, z, x, y, |v, z, x| stir(limited(v, x), z)),
     }
@@ -76,17 +76,21 @@ fn each(v: &[f32], z: &[f32], x: &mut [f32], y: &mut [f32], of: impl Fn(f32, f32
     }
 }
 
-/// As [`each`], four elements in a pass.
+/// As [`each`], eight elements in a pass: with three operands to count up, a pass costs more.
 #[inline(always)]
-fn in_fours(v: &[f32], z: &[f32], x: &mut [f32], y: &mut [f32], of: impl Fn(f32, f32, f32) -> [f32; 2]) {
+fn in_eights(v: &[f32], z: &[f32], x: &mut [f32], y: &mut [f32], of: impl Fn(f32, f32, f32) -> [f32; 2]) {
     let len = x.len().min(y.len()).min(v.len()).min(z.len());
-    let ((v, vs), (z, zs)) = (v[..len].as_rchunks::<4>(), z[..len].as_rchunks::<4>());
-    let ((x, xs), (y, ys)) = (x[..len].as_rchunks_mut::<4>(), y[..len].as_rchunks_mut::<4>());
+    let ((v, vs), (z, zs)) = (v[..len].as_rchunks::<8>(), z[..len].as_rchunks::<8>());
+    let ((x, xs), (y, ys)) = (x[..len].as_rchunks_mut::<8>(), y[..len].as_rchunks_mut::<8>());
     each(v, z, x, y, &of);
     for ((x, y), (v, z)) in xs.iter_mut().zip(ys).zip(vs.iter().zip(zs)) {
         [x[0], y[0]] = of(v[0], z[0], x[0]);
         [x[1], y[1]] = of(v[1], z[1], x[1]);
         [x[2], y[2]] = of(v[2], z[2], x[2]);
         [x[3], y[3]] = of(v[3], z[3], x[3]);
+        [x[4], y[4]] = of(v[4], z[4], x[4]);
+        [x[5], y[5]] = of(v[5], z[5], x[5]);
+        [x[6], y[6]] = of(v[6], z[6], x[6]);
+        [x[7], y[7]] = of(v[7], z[7], x[7]);
     }
 }

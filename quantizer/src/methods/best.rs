@@ -247,7 +247,7 @@ fn choose_activations(
     let int8 = vec![127; quantized.len()];
     let choices = 1 + quantized.len();
     let measured = allowance.map_or(MEASURED, |allowance| {
-        let batches = allowance.fits(1, || drop(error(&int8, 1)), choices, choices * MEASURED);
+        let batches = allowance.fits(1, || _ = error(&int8, 1), choices, choices * MEASURED);
         batches / choices
     });
     let with_int8 = error(&int8, measured);
