@@ -74,6 +74,9 @@ pub(super) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
             let z = Region { offset: noise, len };
             let [x, v, y, z] = regions(arena, &op.regions, z);
             let [x, v, y, z] = [x, v, y, z].map(|all| f(part(all, &range)));
+            if x.is_empty() {
+                return Err(Fault::Damaged);
+            }
             denoise(&by, op.constant(0), v, z, x, y);
         }
         OpKind::LstmCell => {

@@ -336,6 +336,7 @@ mod tests {
                     x.abs() < 50.0 || (sigmoid(x) - sign).abs() < 1e-9 && (tanh(x) + 1.0 - 2.0 * sign) == 0.0,
                     "{x}"
                 );
+                assert!(sin(x).abs() <= 1.0 + f32::EPSILON && cos(x).abs() <= 1.0 + f32::EPSILON, "{x}");
                 for f in [elu, silu, gelu, gelu_tanh, softplus, mish] {
                     assert!((f(x) - x * sign).abs() <= 1f32.max(1e-7 * x.abs()), "{x}");
                 }
