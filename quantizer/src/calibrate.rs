@@ -1,5 +1,6 @@
 //! What is learned of a network from recorded observations, before anything is quantized.
 
+pub mod allowance;
 pub mod fisher;
 pub mod hsic;
 pub mod moments;

@@ -11,6 +11,7 @@ mod progress;
 mod quantized;
 pub mod scale;
 
+pub use crate::calibrate::allowance::Sampled;
 pub use learning::{Choice, Learning, Tried};
 pub use options::{Activations, Method, Options, Packing};
 pub use prepared::{PreparedMethod, quantize};

@@ -18,6 +18,8 @@ mod firmware {
 
     use actq_firmware_support::{count, host};
     use actq_kernels::math::Function;
+    use actq_kernels::ops::denoise::{Coefficients, denoise};
+    use actq_kernels::ops::noise::normal;
     use actq_kernels::ops::{cells, elementwise, norm};
     use cortex_m_semihosting::hio;
 
@@ -61,6 +63,28 @@ mod firmware {
         let (x, mut y) = (values::<LEN>(), [0.0; LEN]);
         count::region(|| elementwise::normalize(black_box(&x), &constants, &constants, 1.0, 5.0, black_box(&mut y)));
         line("normalize", &[&y])?;
+        for (name, of) in [("add", elementwise::add as fn(&[f32], &mut [f32])), ("mul", elementwise::mul)] {
+            let mut y = values::<LEN>();
+            count::region(|| of(black_box(&x), black_box(&mut y)));
+            line(name, &[&y])?;
+        }
+        let z: [f32; LEN] = core::array::from_fn(|i| normal(1, 2, i as u32));
+        for (name, sample, limit, noise) in [
+            ("denoise", 0.0, f32::INFINITY, &[][..]),
+            ("denoise with noise", 0.0, f32::INFINITY, &z),
+            ("denoise by a limit", 0.4, 2.0, &[]),
+            ("denoise by a limit with noise", 0.4, 2.0, &z),
+        ] {
+            let by = [sample, 0.5 * sample, 0.6, 0.2, sample, 0.1, 0.3];
+            let (by, mut next, mut y) = (Coefficients::from_array(by), values::<LEN>(), [0.0; LEN]);
+            count::region(|| {
+                denoise(black_box(&by), limit, black_box(&x), noise, black_box(&mut next), black_box(&mut y))
+            });
+            line(name, &[&next, &y[1..]])?;
+        }
+        let mut z = [0.0; LEN];
+        count::region(|| black_box(&mut z).iter_mut().zip(0..).for_each(|(z, i)| *z = normal(1, 2, i)));
+        line("noise", &[&z])?;
         let (gates, mut c, mut h) = (values::<{ 4 * LEN }>(), values::<LEN>(), [0.0; LEN]);
         count::region(|| cells::lstm_cell(black_box(&gates), &mut c, black_box(&mut h)));
         let (mut all_c, mut all_h) = (values::<LEN>(), [0.0; LEN]);

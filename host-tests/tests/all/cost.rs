@@ -3,16 +3,19 @@
 use std::path::Path;
 
 use actq::budget::{Budget, TimeLimit};
+use actq::contract::{Ensemble, Playback};
 use actq::data::{Dataset, Recordings, Sizes};
 use actq::emit;
 use actq::measure::time::{CLOCK, StepTime};
 use actq::methods::{Activations, Method, Options};
 use actq::pipeline::{Quantizer, quantize};
 use actq::policy::Policy;
+use actq::random::Random;
 use actq::runtime::{ImageBuffer, with_head};
 use actq_bench::networks::{Builder, accumulating};
 use actq_bench::qemu::{self, Counter};
 use actq_bench::{Target, firmware, profile, shared_policies, ur3};
+use actq_kernels::image::Kind;
 use actq_kernels::pace::cost::{Cost, of_op, of_step};
 use actq_kernels::{StepError, Width};
 use anyhow::{Context, Result, bail, ensure};
@@ -72,6 +75,41 @@ fn predictions_hold(dir: &Path, images: &[Options]) -> Result<Vec<f64>> {
         per_mac.push(mean(|c| c.instructions) / policy.weights as f64);
     }
     Ok(per_mac)
+}
+
+/// Chunks that are averaged, and such that lead over from one to the next, of other sizes than those of the fit.
+#[test]
+fn steps_that_merge_chunks_take_what_was_predicted() -> Result<()> {
+    let (elf, counter) = (firmware::harness(Target::Fpu)?, Counter::build()?);
+    const OBSERVATION: usize = 24;
+    let mut random = Random::new(6);
+    let observations: Vec<Vec<f32>> = (0..STEPS).map(|_| (0..OBSERVATION).map(|_| random.normal()).collect()).collect();
+    for (chunk, act_len, horizon, overlap) in
+        [(12, 4, 12, 0), (30, 7, 9, 0), (40, 14, 40, 0), (12, 4, 0, 9), (40, 14, 0, 30)]
+    {
+        let mut builder = Builder::new(OBSERVATION);
+        builder.linear((chunk * act_len, OBSERVATION), Activations::Int8, |_| Some(Width::W3), 0, true)?;
+        let (mut policy, outcomes) =
+            builder.finish(format!("chunks of {chunk}, horizon {horizon}, overlap {overlap}"), false);
+        (policy.kind, policy.chunk, policy.act_len) = (Kind::Chunk, chunk, act_len);
+        let ensemble = (horizon > 0).then_some(Ensemble { horizon, m: 0.1 });
+        policy.contract.playback = Playback { ensemble, overlap, deadline: None };
+        let bytes = emit::image(&policy, &outcomes)?;
+        let buffer = ImageBuffer::new(&bytes);
+        let predicted = of_step(&buffer.image(Path::new("chunks"))?);
+        // Before the second chunk there is nothing to lead over from.
+        let counted = &profile::steps(&elf, &counter, &bytes, &observations)?[1..];
+        let mean = |of: fn(&Cost) -> u64| counted.iter().map(of).sum::<u64>() as f64 / counted.len() as f64;
+        for (what, predicted, counted) in [
+            ("instructions", predicted.instructions, mean(|c| c.instructions)),
+            ("cycles", predicted.cycles, mean(|c| c.cycles)),
+        ] {
+            let error = predicted as f64 / counted - 1.0;
+            println!("{}: {predicted} {what}, {counted:.0} counted: {:+.2}%", policy.name, 1e2 * error);
+            ensure!(error.abs() < 0.03, "{}: {predicted} {what}, {counted:.0} counted", policy.name);
+        }
+    }
+    Ok(())
 }
 
 /// Whole steps of rtn images, with groups and without, and of the method best.

@@ -2,15 +2,15 @@
 
 use actq::budget::Budget;
 use actq::data::Recordings;
-use actq::methods::{Method, Options};
+use actq::methods::{Method, Options, Sampled};
 use actq::pipeline::Quantizer;
 use actq::policy::Policy;
 use actq::runtime::with_head;
 use actq_bench::closed_loop::episode_on_host;
-use actq_bench::ur3_flow;
+use actq_bench::{ur3, ur3_flow};
 use actq_ur3::policy_f32::PolicyF32;
 use actq_ur3::task::{Outcome, run_episode};
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
 
 /// Seeds that no recording has.
 const SEEDS: std::ops::Range<u64> = 1000..1040;
@@ -29,6 +29,28 @@ fn drives(name: &str, outcomes: &[Outcome], limit_mm: f64) -> Result<()> {
     println!("{name}: {solved} of {}, tracking error {error:.2} mm", outcomes.len());
     ensure!(solved + 1 >= outcomes.len(), "{name}: {solved} of {}", outcomes.len());
     ensure!(error < limit_mm, "{name}: {error:.2} mm, {limit_mm} mm is allowed");
+    Ok(())
+}
+
+/// Statistics of every denoising step take a share of the time that learning has; those of other policies are of all frames.
+#[test]
+fn statistics_keep_their_share_of_the_time() -> Result<()> {
+    let policy = Policy::load(&ur3_flow())?;
+    let recordings = Recordings::load(&policy)?;
+    let all = recordings.calib.as_ref().context("a recording")?.frames();
+    let sampled = |minutes| -> Result<Sampled> {
+        let quantizer = Quantizer::before(&policy, &recordings, Method::Best, minutes, |_| {})?;
+        quantizer.method().sampled().context("an iterative head")
+    };
+    let (free, bound) = (sampled(None)?, sampled(Some(1e-4))?);
+    println!("{free:?}, {bound:?}");
+    ensure!(free.frames == all && bound.frames == all);
+    ensure!(free.inputs == all.min(8192 / policy.graph.denoising_steps()) && free.outputs == 24 * 128, "{free:?}");
+    // 0.6 ms each are less than the fewest take.
+    ensure!(bound.inputs == 64 && bound.outputs == 2 * 128, "{bound:?}");
+    let (policy, recordings) = (Policy::load(&ur3())?, Recordings::load(&Policy::load(&ur3())?)?);
+    let quantizer = Quantizer::before(&policy, &recordings, Method::Gptq, Some(1e-4), |_| {})?;
+    ensure!(quantizer.method().sampled().is_none());
     Ok(())
 }
 

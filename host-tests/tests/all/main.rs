@@ -5,6 +5,7 @@ mod arrows;
 mod best;
 mod cli;
 mod compare;
+mod constants;
 mod controller;
 mod cost;
 mod counting;

@@ -503,7 +503,9 @@ fn matrices_that_cannot_be_are_refused() {
                 d.set(d.block(STATE, 0) + word, d.get(d.block(INPUT, 0) + word));
             }
         }),
-        ("two operations with the same biases", E::Section, |d| d.set(d.op(INPUT) + 2, d.get(d.op(FIRST) + 2))),
+        ("biases of an operation before, and behind them", E::Section, |d| {
+            d.set(d.op(INPUT) + 2, d.get(d.op(FIRST) + 2))
+        }),
         ("biases in the weights", E::Section, |d| d.set(d.op(FIRST) + 2, d.get(d.block(FIRST, 0) + 1))),
         ("int32 overflow possible", E::Overflow, |d| {
             // The 8-bit rows have 24 columns; with the largest group scale they exceed 2^31 / 32767.

@@ -4,12 +4,12 @@ use core::ops::Range;
 
 use crate::image::Region;
 
-/// Three regions as slices; empty where they overlap or lie outside, which the image's check has excluded.
+/// Regions as slices; empty where they overlap or lie outside, which the image's check has excluded.
 #[inline(never)]
-pub(super) fn regions<'r>(arena: &'r mut [u32], regions: &[Region; 3]) -> [&'r mut [u32]; 3] {
-    match arena.get_disjoint_mut(regions.map(Region::range)) {
-        Ok([a, b, c]) => [a, b, c],
-        Err(_) => [&mut [], &mut [], &mut []],
+pub(super) fn regions<'r>(arena: &'r mut [u32], [a, b, c]: &[Region; 3], more: Region) -> [&'r mut [u32]; 4] {
+    match arena.get_disjoint_mut([a.range(), b.range(), c.range(), more.range()]) {
+        Ok([a, b, c, more]) => [a, b, c, more],
+        Err(_) => [&mut [], &mut [], &mut [], &mut []],
     }
 }
 

@@ -6,7 +6,7 @@ use crate::cursor::Cursor;
 use crate::error::{Fault, StepError};
 use crate::image::{Op, OpKind, Region};
 use crate::meter::{Meter, Unlimited, Work};
-use crate::ops::denoise::{Coefficients, add_noise, denoise};
+use crate::ops::denoise::{Coefficients, denoise};
 use crate::ops::elementwise::{self, copy, copy_le};
 use crate::ops::noise::normal;
 use crate::ops::norm;
@@ -33,7 +33,7 @@ pub(super) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
     if let OpKind::Linear { accumulate } = op.kind {
         let matrix = &op.linear_matrix();
         let matrix = matrix.as_ref().map_err(|_| Fault::Damaged)?;
-        let [dst, src, work] = regions(arena, &op.regions);
+        let [dst, src, work, _] = regions(arena, &op.regions, Region::default());
         return matrix.resume(&mut cursor.linear, budget, f(src), work, f(dst), accumulate);
     }
     // Elements that this piece takes, or units of a norm.
@@ -46,9 +46,9 @@ pub(super) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
     cursor.done = units.end;
     let norm = matches!(op.kind, OpKind::LayerNorm | OpKind::RmsNorm);
     let range = if norm { 0..dst.len } else { units.clone() };
-    let [mut dst, mut src, third] = match op.src().len {
-        0 => [part(arena, &(dst.offset + range.start..dst.offset + range.end)), &mut [], &mut []],
-        _ => regions(arena, &op.regions),
+    let [mut dst, mut src, third, _] = match op.src().len {
+        0 => [part(arena, &(dst.offset + range.start..dst.offset + range.end)), &mut [], &mut [], &mut []],
+        _ => regions(arena, &op.regions, Region::default()),
     };
     if matches!(op.kind, OpKind::Normalize | OpKind::Add | OpKind::Mul | OpKind::Copy | OpKind::Denoise) {
         (dst, src) = (part(dst, &range), part(src, &range));
@@ -70,12 +70,14 @@ pub(super) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
         OpKind::Denoise => {
             let (by, noise) = op.coefficients(cursor.step);
             let by = Coefficients::from_array(by);
-            denoise(&by, op.constant(0), f(src), f(dst), f(part(third, &range)));
-            if by.sigma != 0.0 {
-                let places = [op.dst(), Region { offset: noise, len: dst.len() }, op.third()];
-                let [x, z, y] = regions(arena, &places).map(|all| f(part(all, &range)));
-                add_noise(by.sigma, z, x, y);
+            let len = if by.sigma == 0.0 { 0 } else { op.dst().len };
+            let z = Region { offset: noise, len };
+            let [x, v, y, z] = regions(arena, &op.regions, z);
+            let [x, v, y, z] = [x, v, y, z].map(|all| f(part(all, &range)));
+            if x.is_empty() {
+                return Err(Fault::Damaged);
             }
+            denoise(&by, op.constant(0), v, z, x, y);
         }
         OpKind::LstmCell => {
             arch::lstm_elements(range.clone(), f(src), f(third), f(dst));

@@ -368,7 +368,8 @@ impl<'a, 's> Head<'a, 's> {
     #[inline(never)]
     fn act(&mut self) -> Result<(), Fault> {
         let due = self.playback.due(&self.image, self.arena)?;
-        let [next, action, switches] = regions(self.arena, &[due, self.image.action(), self.image.switches()]);
+        let places = [due, self.image.action(), self.image.switches()];
+        let [next, action, switches, _] = regions(self.arena, &places, Region::default());
         if next.is_empty() {
             return Err(Fault::Damaged);
         }

@@ -38,7 +38,8 @@ impl Playback {
             return false;
         }
         if self.ready && image.overlap() > 0 {
-            let [output, kept, _] = regions(arena, &[image.output(), image.kept(), Region::default()]);
+            let [output, kept, ..] =
+                regions(arena, &[image.output(), image.kept(), Region::default()], Region::default());
             let rest = image.execute() * image.act_len()..output.len();
             copy(part(output, &rest), kept);
             self.old = self.next.min(image.chunk());
@@ -58,7 +59,7 @@ impl Playback {
             // An action that is for no time in particular.
             self.next = 0;
         }
-        let [output, kept, _] = regions(arena, &[image.output(), image.kept(), Region::default()]);
+        let [output, kept, ..] = regions(arena, &[image.output(), image.kept(), Region::default()], Region::default());
         let from = self.next * len;
         if let horizon @ 1.. = image.horizon() {
             let (sums, counts) = kept.split_at_mut_checked(horizon * len).ok_or(Fault::Damaged)?;

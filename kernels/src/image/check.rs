@@ -101,7 +101,7 @@ impl<'a> Image<'a> {
 
     /// The sections, in the order in which they stand, and what they hold.
     fn check_sections(&self) -> Result<(), ImageError> {
-        let front = &mut Front { words: self.words, at: h::WORDS };
+        let front = &mut Front { words: self.words, at: h::WORDS, finite: h::WORDS };
         for i in 0..self.matrix_count() {
             check_matrix(self.matrix_at(i), front, self.work().len)?;
         }
@@ -190,7 +190,7 @@ impl<'a> Image<'a> {
             }
         } else if *constants > 0 {
             let [constants, arrays] = [*constants, *arrays].map(usize::from);
-            for constant in front.take(op.data(), constants)? {
+            for constant in front.constants(op.data(), constants)? {
                 // Above 0, and finite but for limits: positive numbers are in the order of their bits.
                 let infinity = f32::INFINITY.to_bits() + u32::from(op.kind == OpKind::Normalize);
                 if u32::from_le(*constant).wrapping_sub(1) >= infinity - 1 {
@@ -243,12 +243,14 @@ impl<'a> Image<'a> {
     }
 }
 
-/// Takes sections in the order in which they stand. None shares a word with another, so that what is checked is no longer than
-/// the image.
+/// Takes sections in the order in which they stand. None shares a word with another, but constants that several operations have in
+/// common stand once, and are looked at once: so what is checked is no longer than the image.
 struct Front<'a> {
     words: &'a [u32],
     /// The end of the last one.
     at: usize,
+    /// From here to that end all words are constants, and finite.
+    finite: usize,
 }
 
 impl<'a> Front<'a> {
@@ -261,15 +263,36 @@ impl<'a> Front<'a> {
     fn next(&mut self, offset: usize, len: usize) -> Option<&'a [u32]> {
         let section = section(self.words, offset, len).filter(|_| offset >= self.at)?;
         self.at = offset + len;
+        self.finite = self.at;
         Some(section)
     }
 
-    /// As [`Self::take`], of f32 constants, refused where one is not finite.
+    /// As [`Self::take`], of f32 constants, or of some that were taken before and are finite.
+    #[inline(never)]
+    fn constants(&mut self, offset: usize, len: usize) -> Result<&'a [u32], ImageError> {
+        if self.has(offset, len) {
+            return section(self.words, offset, len).ok_or(ImageError::Section);
+        }
+        let begin = if offset == self.at { self.finite } else { offset };
+        let constants = self.take(offset, len)?;
+        if constants.iter().all(|&w| f32::from_bits(u32::from_le(w)).is_finite()) {
+            self.finite = begin;
+        }
+        Ok(constants)
+    }
+
+    /// Constants, refused where one is not finite.
     #[inline(never)]
     fn take_finite(&mut self, offset: usize, len: usize) -> Result<(), ImageError> {
-        let constants = self.take(offset, len)?;
-        let finite = constants.iter().all(|&w| f32::from_bits(u32::from_le(w)).is_finite());
-        if finite { Ok(()) } else { Err(ImageError::Constant) }
+        if !self.has(offset, len) {
+            self.constants(offset, len)?;
+        }
+        if self.has(offset, len) { Ok(()) } else { Err(ImageError::Constant) }
+    }
+
+    /// Whether these were taken before, and are finite.
+    fn has(&self, offset: usize, len: usize) -> bool {
+        self.finite <= offset && offset <= self.at && len <= self.at - offset
     }
 }
 

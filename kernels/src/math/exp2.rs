@@ -7,20 +7,35 @@ use crate::round::ROUND;
 /// What uses the fraction has to divide anyway.
 ///
 /// In units, `y = n + f` with `|f| <= 1/2`. `2^f = (Q + f P) / (Q - f P)`, where `f P / Q` is `tanh(f ln 2 / 2)` with
-/// `P = p0 + p1 f^2` and `Q = q0 + f^2`, fitted for the smallest relative error, 1e-10. `n` is added to the numerator's
-/// exponent. The numbers are between 17 and 25 times `one^2`, and times `2^n` in the numerator.
+/// `P = p0 + p1 f^2` and `Q = q0 + f^2`, fitted for the smallest relative error, 1e-10. The numerator is multiplied by
+/// `2^n`. The numbers are between 17 and 25 times `one^2`, and times `2^n` in the numerator.
 #[inline(always)]
 pub(super) fn exp2(y: f32, one: f32) -> (f32, f32) {
-    let [round, p1, p0, q0] = exp2_constants(one);
-    let n = (y + round) - round;
-    let f = y - n;
+    let [round, ..] = exp2_constants(one);
+    let whole = (y + round) - round;
+    let (n, d) = fraction(y - whole, one);
+    // With 26 bits behind the point, 6 are left for the whole part: the conversion limits it.
+    (n * power((whole * (FIXED_ONE / one)) as i32 >> (26 - EXPONENT)), d)
+}
+
+/// `2^(f / one)` as in [`exp2`], for `|f| <= one / 2`.
+#[inline(always)]
+pub(super) fn fraction(f: f32, one: f32) -> (f32, f32) {
+    let [_, p1, p0, q0] = exp2_constants(one);
     let square = f * f;
     let p = (p1 * square + p0) * f;
     let q = square + q0;
-    // With 26 bits behind the point, 6 are left for n: the conversion limits it. The exponent of an f32 begins at bit 23.
-    let n = (n * (FIXED_ONE / one)) as i32 >> 3;
-    (f32::from_bits((q + p).to_bits().wrapping_add(n as u32)), q - p)
+    (q + p, q - p)
 }
+
+/// A power of two, by its exponent where that stands in an f32, with zeros below.
+#[inline(always)]
+pub(super) fn power(exponent: i32) -> f32 {
+    f32::from_bits((1.0f32.to_bits() as i32).wrapping_add(exponent) as u32)
+}
+
+/// The bit at which the exponent of an f32 begins.
+pub(super) const EXPONENT: u32 = f32::MANTISSA_DIGITS - 1;
 
 /// What rounds in these units, p1, p0 and q0.
 pub(crate) const fn exp2_constants(one: f32) -> [f32; 4] {

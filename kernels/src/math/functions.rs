@@ -1,6 +1,6 @@
 //! The elementwise functions.
 
-use super::exp2::{EXP, FIXED_ONE, QUARTER, exp_fraction, exp2, tanh_fraction};
+use super::exp2::{EXP, EXPONENT, FIXED_ONE, QUARTER, exp_fraction, exp2, fraction, power, tanh_fraction};
 use super::limits::{clamp, zero_or_nan};
 use crate::round::ROUND;
 
@@ -84,10 +84,10 @@ impl Function {
             Self::GeluTanh => each(x, gelu_tanh),
             Self::Tanh => each_ratio(x, &TANH),
             Self::Sigmoid => each_ratio(x, &SIGMOID),
-            Self::Exp => each(x, exp),
-            Self::Sin => each_wave(x, SIN),
-            Self::Cos => each_wave(x, COS),
-            Self::Softplus => each(x, softplus),
+            Self::Exp => in_pairs(x, |pairs| each(pairs, |[a, b]| [exp(a), exp(b)])),
+            Self::Sin => in_pairs(x, |pairs| each(pairs, |[a, b]| [sin(a), sin(b)])),
+            Self::Cos => in_pairs(x, |pairs| each(pairs, |[a, b]| [cos(a), cos(b)])),
+            Self::Softplus => in_pairs(x, |pairs| each(pairs, |[a, b]| [softplus(a), softplus(b)])),
             Self::Mish => each(x, mish),
         }
     }
@@ -144,24 +144,16 @@ fn each_ratio(x: &mut [f32], ratio: &Ratio) {
     }
 }
 
-/// One loop for sine and cosine.
-#[inline(never)]
-fn each_wave(x: &mut [f32], quarter: f32) {
-    for x in x {
-        *x = wave(*x, quarter);
-    }
-}
-
 /// `e^x`, infinite where f32 has no such number: whole powers of two by two factors, since one does not reach f32's ends, and a
 /// fraction for the rest.
 #[inline(always)]
 pub fn exp(x: f32) -> f32 {
     let y = clamp(x * core::f32::consts::LOG2_E, -250.0, 250.0);
-    let whole = (y + ROUND) - ROUND;
-    let (n, d) = exp2(y - whole, 1.0);
-    let whole = whole as i32;
-    let power = |n: i32| f32::from_bits(((n + 127) as u32) << 23);
-    let half = whole >> 1;
+    // The sum's last bits are the whole part; here they move to where an exponent stands.
+    let sum = y + ROUND;
+    let whole = (sum.to_bits() << EXPONENT) as i32;
+    let (n, d) = fraction(y - (sum - ROUND), 1.0);
+    let half = whole >> 1 & (-1 << EXPONENT);
     n / d * power(half) * power(whole - half) + zero_or_nan(x)
 }
 
@@ -190,16 +182,16 @@ fn wave(x: f32, zero: f32) -> f32 {
     let turns = (x * core::f32::consts::FRAC_1_PI - zero) + ROUND;
     let n = (turns - ROUND) + zero;
     let r = ((x - n * TURN[0]) - n * TURN[1]) - n * TURN[2];
-    // Beyond 2^22 half turns x says nothing of the angle; the result stays a sine.
-    let r = clamp(r, -2.0, 2.0);
+    // Beyond 2^22 half turns, where the sum leaves the exponent of ROUND, x says nothing of the angle.
+    let r = if turns.to_bits() >> 23 == ROUND.to_bits() >> 23 { r } else { 0.0 * x };
+    // ROUND is even: the sum's last bit says whether the number of half turns is odd. Then the sine falls.
+    let falls = (turns.to_bits() << 31) ^ (((zero != 0.0) as u32) << 31);
+    let r = f32::from_bits(r.to_bits() ^ falls);
     let square = r * r;
     let p = 2.590_488_5e-6 * square - 1.980_089_7e-4;
     let p = p * square + 8.332_9e-3;
     let p = p * square - 0.166_666_48;
-    let y = p * square * r + r;
-    // ROUND is even: the sum's last bit says whether the number of half turns is odd.
-    let falls = (turns.to_bits() << 31) ^ (((zero != 0.0) as u32) << 31);
-    f32::from_bits(y.to_bits() ^ falls)
+    p * square * r + r
 }
 
 /// `ln(1 + exp(x)) = max(x, 0) + ln(1 + e)` with `e = exp(-|x|) = n / d`; of that, `ln(1 + e) = 2 artanh(s)` with `s = e / (2 + e)`
@@ -207,15 +199,16 @@ fn wave(x: f32, zero: f32) -> f32 {
 #[inline(always)]
 pub fn softplus(x: f32) -> f32 {
     let half = 0.5 * x;
-    // max(x, 0) without a comparison.
-    let positive = half + half.abs();
-    let (n, d) = exp_fraction(-x.abs());
-    let s = n / (n + 2.0 * d);
-    let square = s * s;
-    let p = 0.288_700_2 * square + 0.277_875_78;
-    let p = p * square + 0.400_393_4;
-    let p = p * square + 0.666_658_7;
-    positive + (p * square * s + 2.0 * s)
+    let magnitude = half.abs();
+    let (n, d) = exp2(magnitude * (-2.0 * EXP), QUARTER);
+    // 2 s, and so 2^-2k for k powers of s in the polynomial.
+    let t = n / (0.5 * n + d);
+    let square = t * t;
+    let p = 0.288_700_2 / 512.0 * square + 0.277_875_78 / 128.0;
+    let p = p * square + 0.400_393_4 / 32.0;
+    let p = p * square + 0.666_658_7 / 8.0;
+    // Half and its magnitude are max(x, 0) without a comparison.
+    (half + magnitude) + (p * square * t + t)
 }
 
 /// `x * tanh(softplus(x))`, which is `x w / (w + 2)` with `w = e (e + 2)` and `e = exp(x) = n / d`.
@@ -343,6 +336,7 @@ mod tests {
                     x.abs() < 50.0 || (sigmoid(x) - sign).abs() < 1e-9 && (tanh(x) + 1.0 - 2.0 * sign) == 0.0,
                     "{x}"
                 );
+                assert!(sin(x).abs() <= 1.0 + f32::EPSILON && cos(x).abs() <= 1.0 + f32::EPSILON, "{x}");
                 for f in [elu, silu, gelu, gelu_tanh, softplus, mish] {
                     assert!((f(x) - x * sign).abs() <= 1f32.max(1e-7 * x.abs()), "{x}");
                 }

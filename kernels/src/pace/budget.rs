@@ -43,8 +43,8 @@ impl Price {
             Work::Enter(op) => Self { first: 0, each: parts(cost::most(|add| cost::enter(op, add))) },
             // A unit of a norm takes less than an element in all passes; each of its pieces computes anew what the sums give.
             Work::Elements(op) => {
-                let (operation, value, _) = cost::values(op);
-                Self::new(if op.units() == op.dst().len { 0 } else { operation.most() }, value.most())
+                let first = if op.units() == op.dst().len { 0 } else { cost::values(op).0.most() };
+                Self::new(first, cost::most(|add| cost::elements(op, 1, add)))
             }
             Work::Magnitude(cols) => Self::new(cost::most(|add| cost::magnitude(cols, add)), 0),
             Work::Start(start) => Self::new(Feature::BIASED.most(), cost::most(|add| cost::start(start, 1, add))),

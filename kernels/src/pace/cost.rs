@@ -132,9 +132,15 @@ pub fn begin(image: &Image<'_>, add: &mut dyn FnMut(Feature, usize)) {
 pub fn action(image: &Image<'_>, add: &mut dyn FnMut(Feature, usize)) {
     add(Feature::ACTION, 1);
     add(Feature::ACTION_VALUE, image.act_len());
-    // A value that is averaged or led over costs less than two of the contract.
-    let merged = (image.horizon() + image.overlap()) * image.act_len();
-    add(Feature::CONTRACT, 2 * merged + image.contract_arrays().iter().map(|array| array.len()).sum::<usize>());
+    add(Feature::CONTRACT, image.contract_arrays().iter().map(|array| array.len()).sum::<usize>());
+    // What a new chunk says of the periods that an ensemble keeps.
+    let foreseen = image.horizon().min(image.chunk());
+    if foreseen > 0 {
+        add(Feature::ENSEMBLE, 1);
+        add(Feature::FORESEEN, foreseen);
+        add(Feature::FORESEEN_VALUE, (foreseen + 1) * image.act_len());
+    }
+    add(Feature::LED, image.overlap() * image.act_len());
 }
 
 /// The features of an operation.
@@ -142,9 +148,19 @@ pub fn features(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
     if let (OpKind::Linear { accumulate }, Some(matrix)) = (op.kind, op.matrix()) {
         linear(&matrix, accumulate, add);
     } else {
-        let (operation, value, len) = values(op);
+        let (operation, _, len) = values(op);
         add(operation, 1);
-        add(value, len);
+        elements(op, len, add);
+    }
+}
+
+/// The features of so many of an operation's values. (Of a denoising step, as if all were like the first.)
+pub(super) fn elements(op: &Op<'_>, len: usize, add: &mut dyn FnMut(Feature, usize)) {
+    add(values(op).1, len);
+    if op.kind == OpKind::Denoise {
+        let ([sample_x, sample_v, _, _, _, sigma, _], _) = op.coefficients(0);
+        add(Feature::LIMITED, if [sample_x, sample_v] == [0.0; 2] { 0 } else { len });
+        add(Feature::STIRRED, if sigma == 0.0 { 0 } else { len });
     }
 }
 

@@ -9,6 +9,7 @@ use nalgebra::DMatrix;
 use ndarray::linalg::general_mat_mul;
 use ndarray::{Array1, Array2, Axis};
 
+use super::allowance::Allowance;
 use super::moments::Moments;
 use super::windows::Windows;
 use crate::graph::{Network, Pass, zero_state};
@@ -17,6 +18,8 @@ use crate::random::Random;
 /// Batches that `G` is averaged over, and samples in each.
 const BATCHES: usize = 24;
 const SAMPLES: usize = 128;
+/// Batches at least, however little time there is.
+const LEAST_BATCHES: usize = 2;
 /// Frames that [`drawn_moments`] are taken of.
 const DRAWN: usize = 12_288;
 /// Added to the diagonal of an input's moment, as a share of its mean.
@@ -24,8 +27,8 @@ pub const DAMPING_INPUT: f64 = 0.01;
 /// The same of `G`.
 pub const DAMPING_OUTPUT: f64 = 0.02;
 
-/// `G` of every matrix, `rows * rows`.
-pub fn output_moments(windows: &Windows<'_>, seed: u64) -> Vec<DMatrix<f64>> {
+/// `G` of every matrix, `rows * rows`, and how many frames or windows it was taken of: with an allowance, those that fit.
+pub fn output_moments(windows: &Windows<'_>, allowance: Option<Allowance>, seed: u64) -> (Vec<DMatrix<f64>>, usize) {
     let graph = windows.graph;
     let network = Network::new(graph);
     let mut random = Random::new(seed);
@@ -33,7 +36,7 @@ pub fn output_moments(windows: &Windows<'_>, seed: u64) -> Vec<DMatrix<f64>> {
     let mut counts = vec![0usize; sums.len()];
     let mut grads = windows.weights.zeros_like();
     let samples = (SAMPLES / windows.window.min(16)).max(4);
-    for _ in 0..BATCHES {
+    let mut one = || {
         let batch = windows.batch(samples, None, &mut random);
         let mut state = batch.state;
         let pass = network.forward(&windows.weights, batch.frames, &mut state);
@@ -43,11 +46,17 @@ pub fn output_moments(windows: &Windows<'_>, seed: u64) -> Vec<DMatrix<f64>> {
             general_mat_mul(1.0, &dy.t(), dy, 1.0, &mut sums[m]);
             counts[m] += dy.nrows();
         });
-    }
+    };
+    let batches = match allowance {
+        Some(allowance) => allowance.fits(1, &mut one, LEAST_BATCHES, BATCHES),
+        None => BATCHES,
+    };
+    let done = usize::from(allowance.is_some());
+    (done..batches).for_each(|_| one());
     let mean = |(sum, count): (Array2<f32>, usize)| {
         DMatrix::from_fn(sum.nrows(), sum.ncols(), |r, c| f64::from(sum[[r, c]]) / count.max(1) as f64)
     };
-    sums.into_iter().zip(counts).map(mean).collect()
+    (sums.into_iter().zip(counts).map(mean).collect(), batches * samples)
 }
 
 /// A random sign over the deviation of every output.

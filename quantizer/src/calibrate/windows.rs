@@ -46,6 +46,11 @@ pub struct Windows<'a> {
 impl<'a> Windows<'a> {
     /// Runs the f32 network over the recording.
     pub fn new(graph: &'a Graph, dataset: &Dataset) -> Self {
+        Self::with_outputs_of(graph, dataset, 1)
+    }
+
+    /// As [`Self::new`], but that the outputs' variance is that of one in `every` frames where frames do not depend on each other.
+    pub fn with_outputs_of(graph: &'a Graph, dataset: &Dataset, every: usize) -> Self {
         let weights = Weights::of(graph);
         let network = Network::new(graph);
         let recurrent = graph.state_len() > 0;
@@ -68,8 +73,9 @@ impl<'a> Windows<'a> {
                 }
                 states.push(kept);
             } else {
-                let mut state = zero_state(graph, length);
-                outputs.push(network.forward(&weights, episode.clone(), &mut state).output().clone());
+                let some = episode.slice(s![..;every, ..]).to_owned();
+                let mut state = zero_state(graph, some.nrows());
+                outputs.push(network.forward(&weights, some, &mut state).output().clone());
             }
             episodes.push(episode);
         }

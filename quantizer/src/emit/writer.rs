@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use actq_kernels::image::{
-    BlockRecord, Header, MatrixRecord, OpRecord, Records, Region, half_words, header as h, quarter_words, seal,
+    BlockRecord, Header, MatrixRecord, OpKind, OpRecord, Records, Region, half_words, header as h, quarter_words, seal,
 };
 use actq_kernels::layout::{self, BlockShape};
 use anyhow::{Context, Result, ensure};
@@ -24,9 +24,10 @@ const SELF_TEST_BYTES: usize = 64 << 10;
 pub fn image(policy: &Policy, matrices: &[Outcome]) -> Result<Vec<u8>> {
     let group = matrices.first().map_or(0, |m| m.quantized.group);
     let program = lower(policy, group)?;
-    let mut writer = Writer { words: vec![0; h::WORDS], matrices: 0 };
+    let mut writer = Writer { words: vec![0; h::WORDS], matrices: 0, finite: 0 };
     let matrix_records = matrices.iter().map(|m| writer.matrix(m)).collect::<Result<Vec<_>>>()?;
     writer.matrices = writer.push(matrix_records.into_iter().flatten());
+    writer.finite = writer.words.len();
     let records = program.steps.iter().map(|step| writer.op(step)).collect::<Result<Vec<[u32; h::OP_WORDS]>>>()?;
     let ops = writer.push(records.into_iter().flatten());
     let contract = writer.words.len() as u32;
@@ -125,6 +126,8 @@ struct Writer {
     words: Vec<u32>,
     /// Offset of the matrix records.
     matrices: u32,
+    /// From here on all words are finite constants of operations, which others may have, too.
+    finite: usize,
 }
 
 impl Writer {
@@ -137,6 +140,20 @@ impl Writer {
 
     fn push_floats(&mut self, values: &[f32]) -> u32 {
         self.push(values.iter().map(|v| v.to_bits()))
+    }
+
+    /// Constants of an operation, where they stand already or at the end.
+    fn constants(&mut self, values: &[f32]) -> u32 {
+        let words: Vec<u32> = values.iter().map(|v| v.to_bits()).collect();
+        let same = |window: &[u32]| window == words;
+        if let Some(at) = self.words[self.finite..].windows(words.len().max(1)).position(same) {
+            return (self.finite + at) as u32;
+        }
+        let offset = self.push(words);
+        if values.iter().any(|v| !v.is_finite()) {
+            self.finite = self.words.len();
+        }
+        offset
     }
 
     fn push_bytes(&mut self, bytes: &[u8]) -> u32 {
@@ -175,9 +192,11 @@ impl Writer {
     fn op(&mut self, step: &Step<Region>) -> Result<[u32; h::OP_WORDS]> {
         let (bias, data) = match &step.data {
             StepData::None => (0, 0),
-            StepData::Constants(values) | StepData::Denoise { constants: values, .. } => (0, self.push_floats(values)),
+            // Its first words are not constants of f32 alone.
+            StepData::Constants(values) if step.kind == OpKind::Denoise => (0, self.push_floats(values)),
+            StepData::Constants(values) | StepData::Denoise { constants: values, .. } => (0, self.constants(values)),
             StepData::Product { matrix, bias } => {
-                let bias = if bias.iter().all(|b| *b == 0.0) { 0 } else { self.push_floats(bias) };
+                let bias = if bias.iter().all(|b| *b == 0.0) { 0 } else { self.constants(bias) };
                 (bias, self.matrices + (matrix * h::MATRIX_WORDS) as u32)
             }
         };

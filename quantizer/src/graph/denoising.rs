@@ -1,6 +1,6 @@
 //! What makes a network an iterative head: the steps from noise to its output.
 
-use actq_kernels::ops::denoise::{Coefficients, add_noise, denoise};
+use actq_kernels::ops::denoise::{Coefficients, denoise};
 use ndarray::{Array2, ArrayView2, s};
 
 /// The denoising steps of a flow or a diffusion policy. The network reads the iterate by a node
@@ -47,12 +47,9 @@ impl Denoising {
         let by = &self.steps[step];
         let mut x: Vec<f32> = at.x.iter().copied().collect();
         let (mut y, v) = (vec![0.0; x.len()], v.iter().copied().collect::<Vec<f32>>());
-        denoise(by, self.limit, &v, &mut x, &mut y);
-        if by.sigma != 0.0 {
-            let z: Vec<f32> =
-                noise.slice(s![.., (1 + step) * self.len..(2 + step) * self.len]).iter().copied().collect();
-            add_noise(by.sigma, &z, &mut x, &mut y);
-        }
+        let drawn = if by.sigma == 0.0 { 0..0 } else { (1 + step) * self.len..(2 + step) * self.len };
+        let z: Vec<f32> = noise.slice(s![.., drawn]).iter().copied().collect();
+        denoise(by, self.limit, &v, &z, &mut x, &mut y);
         let array = |values| Array2::from_shape_vec(at.x.raw_dim(), values).unwrap_or_default();
         Iterates { x: array(x), y: array(y) }
     }

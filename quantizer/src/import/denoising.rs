@@ -243,12 +243,13 @@ impl JsonDenoising {
             }
             Some(other) => bail!("solver is {other:?}; ddpm and ddim are those of a diffusion policy"),
         };
-        // A sample without a limit of its own is a sum like the rest, and its place is free for the iterate.
-        let numbers = match (self.clip_iterate, numbers) {
-            (None, numbers) => numbers,
-            (Some(_), [sample_x, sample_v, keep, direct, sample, sigma, ahead]) => {
-                [1.0, 0.0, 0.0, direct + sample * sample_v, keep + sample * sample_x, sigma, ahead]
-            }
+        // A sample without a limit of its own is a sum like the rest, and its place is free for the iterate, if that has one.
+        let [sample_x, sample_v, keep, direct, sample, sigma, ahead] = numbers;
+        let (by_x, by_v) = (keep + sample * sample_x, direct + sample * sample_v);
+        let numbers = match (self.clip_sample, self.clip_iterate) {
+            (Some(_), _) => numbers,
+            (None, Some(_)) => [1.0, 0.0, 0.0, by_v, by_x, sigma, ahead],
+            (None, None) => [0.0, 0.0, by_x, by_v, 0.0, sigma, ahead],
         };
         Ok(Coefficients::from_array(numbers.map(|number| number as f32)))
     }

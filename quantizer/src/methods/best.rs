@@ -22,6 +22,7 @@ use super::options::{Activations, Options};
 use super::progress::Progress;
 use super::quantized::{Outcome, Quantized, QuantizedNetwork, RowAllocation, dequantized};
 use crate::budget::Rate;
+use crate::calibrate::allowance::Allowance;
 use crate::calibrate::moments::Moments;
 use crate::calibrate::sensitivity::{Side, importance, output_moments};
 use crate::calibrate::widening::Widening;
@@ -52,25 +53,35 @@ pub struct RowStatistics<'a> {
     outputs: Vec<Vec<f64>>,
     /// Of every matrix's input, and `G`.
     moments: Vec<(Moments, DMatrix<f64>)>,
+    /// Frames or windows that `G` was taken of.
+    pub(super) outputs_of: usize,
 }
 
 impl<'a> RowStatistics<'a> {
-    /// Runs the f32 network over `dataset`, forwards and backwards. `moments` are those of the matrices' inputs.
-    pub fn collect(graph: &'a Graph, dataset: &Dataset, moments: Vec<Moments>) -> Result<Self> {
+    /// Runs the f32 network over `dataset`, forwards and backwards. `moments` are those of the matrices' inputs, of so many frames
+    /// that no more fit the allowance, if there is one.
+    pub fn collect(
+        graph: &'a Graph,
+        dataset: &Dataset,
+        (moments, frames): (Vec<Moments>, usize),
+        allowance: Option<Allowance>,
+    ) -> Result<Self> {
         dataset.require_frames(LEAST_FRAMES, "learning from fewer repeats them by heart")?;
-        let windows = Windows::new(graph, dataset);
+        let every = if allowance.is_some() { dataset.frames().div_ceil(frames.max(1)) } else { 1 };
+        let windows = Windows::with_outputs_of(graph, dataset, every);
         ensure!(
             windows.output_variance.iter().any(|v| *v > 0.0),
             "{}: the policy gives the same action at every observation",
             dataset.path.display()
         );
-        let output_moments = output_moments(&windows, SEED);
+        let (output_moments, outputs_of) = output_moments(&windows, allowance, SEED);
         Ok(Self {
             windows,
             inputs: moments.iter().map(|m| importance(&m.second, Side::Input)).collect(),
             centred: moments.iter().map(|m| importance(&m.centred(), Side::Input)).collect(),
             outputs: output_moments.iter().map(|g| importance(g, Side::Output)).collect(),
             moments: moments.into_iter().zip(output_moments).collect(),
+            outputs_of,
         })
     }
 
@@ -159,7 +170,10 @@ pub fn quantize(
         }
     };
     let wanted = match options.activations {
-        Activations::Auto => choose_activations(&learned, &quantized, windows, options.seed),
+        Activations::Auto => {
+            let allowance = bounds.time.filter(|_| graph.denoising_steps() > 1).map(Allowance::of);
+            choose_activations(&learned, &quantized, windows, allowance, options.seed)
+        }
         Activations::Int8 | Activations::Int16 => learned_with.clone(),
     };
     let outcome = |quantized: &Quantized, limit: u16| -> Result<Outcome> {
@@ -225,16 +239,27 @@ const MEASURED: usize = 8;
 const SAMPLES: usize = 256;
 
 /// int16 for each matrix whose input, rounded to int8, adds more to the error than int16 costs in time; int8 for the others.
-fn choose_activations(graph: &Graph, quantized: &[Quantized], windows: &Windows<'_>, seed: u64) -> Vec<u16> {
+fn choose_activations(
+    graph: &Graph,
+    quantized: &[Quantized],
+    windows: &Windows<'_>,
+    allowance: Option<Allowance>,
+    seed: u64,
+) -> Vec<u16> {
     let weights = dequantized(graph, quantized);
-    let error = |x_max: &[u16]| -> f32 {
+    let error = |x_max: &[u16], measured: usize| -> f32 {
         let network = Network::rounded(graph, x_max);
         let samples = (SAMPLES / windows.window).max(8);
-        let batches = (0..MEASURED).map(|i| windows.batch(samples, None, &mut Random::new(seed + i as u64)));
+        let batches = (0..measured).map(|i| windows.batch(samples, None, &mut Random::new(seed + i as u64)));
         batches.map(|batch| loss(&network, &weights, windows, batch)).sum()
     };
     let int8 = vec![127; quantized.len()];
-    let with_int8 = error(&int8);
+    let choices = 1 + quantized.len();
+    let measured = allowance.map_or(MEASURED, |allowance| {
+        let batches = allowance.fits(1, || _ = error(&int8, 1), choices, choices * MEASURED);
+        batches / choices
+    });
+    let with_int8 = error(&int8, measured);
     let weights_of = |q: &Quantized| (q.rows * q.cols) as f32;
     let all: f32 = quantized.iter().map(weights_of).sum();
     (0..quantized.len())
@@ -242,7 +267,7 @@ fn choose_activations(graph: &Graph, quantized: &[Quantized], windows: &Windows<
             let mut x_max = int8.clone();
             x_max[m] = i16::MAX as u16;
             let worth = WORTH + WORTH_OF_ALL * weights_of(&quantized[m]) / all;
-            if with_int8 - error(&x_max) > worth * with_int8 { i16::MAX as u16 } else { 127 }
+            if with_int8 - error(&x_max, measured) > worth * with_int8 { i16::MAX as u16 } else { 127 }
         })
         .collect()
 }

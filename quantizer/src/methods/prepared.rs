@@ -1,6 +1,7 @@
 //! A method with all that it needs to know about the recorded observations.
 
 use std::borrow::Cow;
+use std::time::Duration;
 
 use anyhow::{Context as _, Result, ensure};
 
@@ -12,6 +13,7 @@ use super::options::{Method, Options};
 use super::progress::Progress;
 use super::quantized::{Outcome, QuantizedNetwork};
 use crate::budget::Rate;
+use crate::calibrate::allowance::{Allowance, Sampled};
 use crate::calibrate::moments::{Moments, collect};
 use crate::data::{Dataset, Recording};
 use crate::graph::Graph;
@@ -22,11 +24,16 @@ const LEAST_FRAMES: usize = 16;
 /// Vectors of an iterative head's matrices that statistics are taken of; every frame gives one for each denoising step.
 const MOST_VECTORS: usize = 8192;
 
+/// Frames of it that are taken however little time there is, and those that tell how much a frame takes.
+const LEAST_SAMPLED: usize = 64;
+const TIMED: usize = 8;
+
 /// A method made ready once, to quantize a network at any number of rates.
 #[derive(Debug)]
 pub struct PreparedMethod<'a> {
     graph: &'a Graph,
     statistics: Statistics<'a>,
+    sampled: Option<Sampled>,
 }
 
 /// What a method takes from the recorded observations.
@@ -40,34 +47,63 @@ enum Statistics<'a> {
 
 impl<'a> PreparedMethod<'a> {
     /// Collects what the method needs from `calib`, a recording that fits the network. `progress` gets the share done.
-    pub fn new(
+    pub fn new(graph: &'a Graph, method: Method, calib: Option<&Dataset>, progress: impl FnMut(f64)) -> Result<Self> {
+        Self::before(graph, method, calib, None, progress)
+    }
+
+    /// As [`Self::new`], before learning of at most so many `minutes`: the statistics of an iterative head are taken of so many
+    /// frames that they take a share of it. They then depend on the machine, as learning by the clock does.
+    pub fn before(
         graph: &'a Graph,
         method: Method,
         calib: Option<&Dataset>,
+        minutes: Option<f64>,
         mut progress: impl FnMut(f64),
     ) -> Result<Self> {
+        let steps = graph.denoising_steps();
+        let time = minutes.filter(|_| steps > 1).map(|minutes| Duration::from_secs_f64(60.0 * minutes));
+        let allowance = time.map(Allowance::of);
         let calib = || -> Result<&Dataset> {
             let calib = calib.with_context(|| Recording::Calib.missing(&method.to_string()))?;
             calib.require_frames(LEAST_FRAMES, "statistics of fewer are those of a few chance observations")?;
             Ok(calib)
         };
         let mut moments = |dataset: &Dataset| {
-            let steps = graph.denoising_steps();
-            let dataset = if steps > 1 { dataset.thinned(MOST_VECTORS / steps, false) } else { Cow::Borrowed(dataset) };
+            let most = if steps > 1 { (MOST_VECTORS / steps).min(dataset.frames()) } else { dataset.frames() };
+            let most = allowance.map_or(most, |allowance| {
+                let timed = dataset.thinned(TIMED, false);
+                allowance.fits(timed.frames(), || drop(collect(graph, &timed, |_| {})), LEAST_SAMPLED, most)
+            });
+            let dataset = if steps > 1 { dataset.thinned(most, false) } else { Cow::Borrowed(dataset) };
             let all = dataset.frames().max(1) as f64;
-            collect(graph, &dataset, |frames| progress(frames as f64 / all))
+            (collect(graph, &dataset, |frames| progress(frames as f64 / all)), dataset.frames())
         };
+        let mut sampled = None;
+        let mut say = |frames, inputs, outputs| sampled = Some(Sampled { frames, inputs, outputs });
         let statistics = match method {
             Method::Rtn => Statistics::Rtn,
-            Method::Gptq => Statistics::Gptq(moments(calib()?)),
+            Method::Gptq => {
+                let dataset = calib()?;
+                let (moments, inputs) = moments(dataset);
+                say(dataset.frames(), inputs, 0);
+                Statistics::Gptq(moments)
+            }
             Method::ActQuant => Statistics::ActQuant(ActionStatistics::collect(graph, calib()?, progress)?),
             Method::Best => {
                 let dataset = calib()?;
                 let moments = moments(dataset);
-                Statistics::Best(Box::new(RowStatistics::collect(graph, dataset, moments)?))
+                let inputs = moments.1;
+                let rows = RowStatistics::collect(graph, dataset, moments, allowance)?;
+                say(dataset.frames(), inputs, rows.outputs_of);
+                Statistics::Best(Box::new(rows))
             }
         };
-        Ok(Self { graph, statistics })
+        Ok(Self { graph, statistics, sampled: sampled.filter(|_| steps > 1) })
+    }
+
+    /// Of how many frames the statistics of an iterative head were taken; `None` where they are those of all.
+    pub fn sampled(&self) -> Option<Sampled> {
+        self.sampled
     }
 
     /// The method.

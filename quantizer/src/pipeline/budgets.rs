@@ -17,7 +17,8 @@ pub fn quantize(
     options: &Options,
     mut progress: impl FnMut(&str, f64),
 ) -> Result<QuantizedPolicy> {
-    let quantizer = Quantizer::new(policy, recordings, options.method, |share| progress("calibrating", share))?;
+    let quantizer =
+        Quantizer::before(policy, recordings, options.method, options.minutes, |share| progress("calibrating", share))?;
     quantizer.quantize(options, progress)
 }
 

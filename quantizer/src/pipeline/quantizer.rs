@@ -47,7 +47,18 @@ impl<'a> Quantizer<'a> {
         method: Method,
         progress: impl FnMut(f64),
     ) -> Result<Self> {
-        let method = PreparedMethod::new(&policy.graph, method, recordings.calib.as_ref(), progress)?;
+        Self::before(policy, recordings, method, None, progress)
+    }
+
+    /// As [`Self::new`], before learning of at most so many `minutes` ([`PreparedMethod::before`]).
+    pub fn before(
+        policy: &'a Policy,
+        recordings: &'a Recordings,
+        method: Method,
+        minutes: Option<f64>,
+        progress: impl FnMut(f64),
+    ) -> Result<Self> {
+        let method = PreparedMethod::before(&policy.graph, method, recordings.calib.as_ref(), minutes, progress)?;
         Ok(Self { policy, recordings, method })
     }
 

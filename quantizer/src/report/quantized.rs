@@ -8,7 +8,7 @@ use crate::budget::Rate;
 use crate::graph::Graph;
 use crate::measure::eval::ErrorReport;
 use crate::methods::actquant::ActionStatistics;
-use crate::methods::{Choice, Learning, Tried};
+use crate::methods::{Choice, Learning, Sampled, Tried};
 use crate::pipeline::{QuantizedPolicy, Search, Try};
 
 /// ActQuant's scores, and the bits that they led to.
@@ -50,6 +50,12 @@ pub fn matrices(quantized: &QuantizedPolicy) -> String {
     let by_row = outcomes.iter().any(|outcome| outcome.allocation.is_some());
     let widths = if by_row { widths::line(policy, outcomes) + "\n" } else { String::new() };
     format!("{rows}\n\n{total} bytes of weights, {bits:.3} bits each, everything counted\n{widths}")
+}
+
+/// What the statistics of an iterative head were taken of.
+pub fn sampled(Sampled { frames, inputs, outputs }: Sampled) -> String {
+    let derived = if outputs > 0 { format!(", derivatives at {outputs} drawn ones") } else { String::new() };
+    format!("statistics of {inputs} of {frames} frames{derived}, in every denoising step\n")
 }
 
 /// How codes were chosen, and what was tried for it.

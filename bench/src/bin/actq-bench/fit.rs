@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
+use actq::contract::{Ensemble, Playback};
 use actq::emit::{self, files};
 use actq::graph::Denoising;
 use actq::graph::ops::{Add, Gru, Iterate, LayerNorm, Lstm, Mul, Normalize, Pointwise, RmsNorm, Table};
@@ -59,6 +60,8 @@ const SHAPES: [(usize, usize); 28] = [
 /// Lengths of elementwise operations, and of the states of cells.
 const LENGTHS: [usize; 5] = [8, 33, 64, 100, 256];
 const HIDDEN: [usize; 4] = [8, 24, 64, 100];
+/// Actions of chunks, and values of an action.
+const CHUNKS: [(usize, usize); 5] = [(2, 3), (8, 7), (16, 2), (20, 14), (50, 6)];
 /// Longest observation.
 const OBSERVATION: usize = 700;
 /// Steps with standard normal observations, whose cost is the expected one.
@@ -157,11 +160,13 @@ fn measure(
     let frame = features(|add| cost::frame(&image, add));
     let ops: Vec<Op<'_>> = image.ops().collect();
     let of_ops: Vec<_> = ops.iter().map(|op| features(|add| cost::features(op, add))).collect();
+    // There is nothing to lead over from before the second chunk.
+    let expected = |step| (usize::from(image.overlap() > 0)..NORMAL).contains(&step);
     let steps = profile::steps(elf, counter, bytes, &observations)?;
     for (step, cost) in steps.into_iter().enumerate() {
         let mut all = frame.clone();
         of_ops.iter().flatten().for_each(|(feature, n)| *all.entry(*feature).or_default() += n);
-        samples.push(Sample { name: format!("{name}, a step"), features: all, cost, expected: step < NORMAL });
+        samples.push(Sample { name: format!("{name}, a step"), features: all, cost, expected: expected(step) });
     }
     let single = profile::parts(elf, counter, &image, bytes, &observations, u32::MAX)?;
     let limited = profile::parts(elf, counter, &image, bytes, &observations[..1], AMPLE)?;
@@ -173,7 +178,7 @@ fn measure(
             if poll > 0.0 {
                 features.insert(Feature::POLL_OP, poll);
             }
-            samples.push(Sample { name: format!("{name}, {what}"), features, cost, expected: step < NORMAL });
+            samples.push(Sample { name: format!("{name}, {what}"), features, cost, expected: expected(step) });
         };
         sample("begin".to_owned(), parts.begin, 0.0, features(|add| cost::begin(&image, add)));
         sample("action".to_owned(), parts.action, 1.0, features(|add| cost::action(&image, add)));
@@ -294,7 +299,10 @@ fn most(samples: &[Sample], polls: &[(f64, usize)], rates: &Rates) -> Rates {
             Feature::value(op::LSTM_CELL),
             Feature::value(op::GRU_CELL),
             Feature::value(op::DENOISE),
+            Feature::LIMITED,
             Feature::CONTRACT,
+            Feature::FORESEEN_VALUE,
+            Feature::LED,
         ])
         .collect();
     // Whole steps differ in much; only parts of them by themselves say what a value takes.
@@ -456,18 +464,34 @@ fn policies() -> Result<Vec<(Policy, Vec<Outcome>)>> {
         builder.part(12)?;
         policies.push(builder.finish(name.to_owned(), contract));
     }
-    // A denoising step, without noise and with it.
-    for (sigma, len) in [0.0, 0.1].into_iter().flat_map(|sigma| LENGTHS.map(|len| (sigma, len))) {
-        let mut builder = Builder::new(8);
-        let rows = builder.values(len);
-        let (iterate, table) = (builder.node(Iterate { len }, &[])?, builder.node(Table { rows, len }, &[])?);
-        builder.node(Add, &[iterate, table])?;
-        let numbers = [1.0, -0.5, 0.5, 0.1, 0.3, sigma, 0.0];
-        let steps = vec![Coefficients::from_array(numbers)];
-        builder.graph.denoising = Some(Denoising { first: 0, len, limit: 1.0, steps });
-        let (mut policy, outcomes) = builder.finish(format!("a denoising step, sigma {sigma}"), false);
-        policy.kind = Kind::Flow;
-        policies.push((policy, outcomes));
+    // Chunks that are averaged, and such that lead over from one to the next.
+    for (chunk, act_len) in CHUNKS {
+        for (horizon, overlap) in [(chunk, 0), (chunk / 2, 0), (0, chunk - 1), (0, chunk / 2)] {
+            let mut builder = Builder::new(chunk * act_len);
+            builder.part(chunk * act_len)?;
+            let name = format!("chunks of {chunk} by {act_len}, horizon {horizon}, overlap {overlap}");
+            let (mut policy, outcomes) = builder.finish(name, false);
+            (policy.kind, policy.chunk, policy.act_len) = (Kind::Chunk, chunk, act_len);
+            let ensemble = (horizon > 0).then_some(Ensemble { horizon, m: 0.01 });
+            policy.contract.playback = Playback { ensemble, overlap, deadline: None };
+            policies.push((policy, outcomes));
+        }
+    }
+    // A denoising step, with a limit and noise and without.
+    for (limit, sigma) in [(f32::INFINITY, 0.0), (f32::INFINITY, 0.1), (1.0, 0.0), (1.0, 0.1)] {
+        for len in LENGTHS {
+            let mut builder = Builder::new(8);
+            let rows = builder.values(len);
+            let (iterate, table) = (builder.node(Iterate { len }, &[])?, builder.node(Table { rows, len }, &[])?);
+            builder.node(Add, &[iterate, table])?;
+            let sample = if limit.is_finite() { 0.3 } else { 0.0 };
+            let steps = vec![Coefficients::from_array([sample, -sample, 0.5, 0.1, sample, sigma, 0.0])];
+            builder.graph.denoising = Some(Denoising { first: 0, len, limit, steps });
+            let (mut policy, outcomes) =
+                builder.finish(format!("a denoising step, limit {limit}, sigma {sigma}"), false);
+            policy.kind = Kind::Flow;
+            policies.push((policy, outcomes));
+        }
     }
     Ok(policies)
 }

@@ -41,7 +41,8 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
     start_threads(args.run.threads)?;
     let bar = progress_bar()?;
     bar.set_message("calibrating");
-    let quantizer = Quantizer::new(&source, &recordings, options.method, |share| set_share(&bar, share))?;
+    let quantizer =
+        Quantizer::before(&source, &recordings, options.method, options.minutes, |share| set_share(&bar, share))?;
     bar.reset();
     let found = quantizer.quantize(&options, |work, share| {
         bar.set_message(work.to_owned());
@@ -58,7 +59,8 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
         print(&quantized::scores(&source.graph, statistics, &found))?;
     }
     let search = found.search.as_ref().map_or(String::new(), |search| quantized::search(search) + "\n");
-    let learned = found.learning.as_ref().map_or(String::new(), quantized::learning);
+    let sampled = quantizer.method().sampled().map_or(String::new(), quantized::sampled);
+    let learned = sampled + &found.learning.as_ref().map_or(String::new(), quantized::learning);
     let time = found.time.as_ref().map_or(String::new(), time::sentence);
     let (parameters, bytes) = (source.graph.parameters(), found.image.len());
     let f32_bytes = 4 * parameters;

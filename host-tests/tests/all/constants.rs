@@ -1,0 +1,94 @@
+//! Constants that operations have in common stand once in an image, and run as if they stood twice.
+
+use actq::emit;
+use actq::graph::ops::LayerNorm;
+use actq::methods::Activations;
+use actq::runtime::{ImageBuffer, with_head};
+use actq_bench::networks::Builder;
+use actq_kernels::image::{header as h, seal};
+use actq_kernels::{ImageError, Width};
+use anyhow::{Context, Result};
+
+const LEN: usize = 32;
+/// Words of a layer norm's constants.
+const CONSTANTS: usize = 1 + 2 * LEN;
+
+/// Three layer norms of a vector, the second with constants of its own, the others with the same.
+fn image() -> Result<Vec<u8>> {
+    let mut builder = Builder::new(LEN);
+    let last = builder.linear((LEN, LEN), Activations::Int8, |_| Some(Width::W4), 0, true)?;
+    let (weight, bias) = (builder.values(LEN), builder.values(LEN));
+    let mut value = last;
+    for sign in [1.0, -1.0, 1.0] {
+        let weight = weight.iter().map(|w| sign * w).collect();
+        value = builder.node(LayerNorm { weight, bias: bias.clone(), eps: 1e-5 }, &[value])?;
+    }
+    let (policy, outcomes) = builder.finish("shared".to_owned(), false);
+    emit::image(&policy, &outcomes)
+}
+
+fn words(bytes: &[u8]) -> Vec<u32> {
+    bytes.as_chunks().0.iter().map(|word| u32::from_le_bytes(*word)).collect()
+}
+
+fn sealed(words: &[u32]) -> Result<Vec<u8>> {
+    let mut bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+    seal(&mut bytes).context("the image is too long")?;
+    Ok(bytes)
+}
+
+/// Where the last operation's record names its constants.
+fn last_data(words: &[u32]) -> usize {
+    let count = (words[h::W_KIND] >> 16) as usize;
+    words[h::W_OPS] as usize + (count - 1) * h::OP_WORDS + 3
+}
+
+/// The image with the last operation's constants standing a second time, before the operation records.
+fn with_its_own(bytes: &[u8]) -> Result<Vec<u8>> {
+    let mut words = words(bytes);
+    let at = words[h::W_OPS] as usize;
+    let data = words[last_data(&words)] as usize;
+    let constants: Vec<u32> = words[data..][..CONSTANTS].to_vec();
+    words.splice(at..at, constants);
+    for offset in [h::W_OPS, h::W_CONTRACT, h::W_NAME, h::W_SELF_TEST] {
+        words[offset] += CONSTANTS as u32;
+    }
+    let last = last_data(&words);
+    words[last] = at as u32;
+    sealed(&words)
+}
+
+#[test]
+fn an_image_with_common_constants_is_smaller_and_runs_the_same_bits() -> Result<()> {
+    let shared = image()?;
+    let own = with_its_own(&shared)?;
+    assert_eq!(shared.len() + 4 * CONSTANTS, own.len());
+    let run = |bytes: &[u8]| {
+        let buffer = ImageBuffer::new(bytes);
+        with_head(buffer.image("memory".as_ref())?, |head| {
+            head.self_test()?;
+            let observation = |step: usize| (0..LEN).map(|i| ((7 * i + step) as f32).sin()).collect::<Vec<f32>>();
+            (0..8).map(|step| Ok(head.step(&observation(step))?.iter().map(|v| v.to_bits()).collect())).collect()
+        })
+    };
+    let (a, b): (Vec<Vec<u32>>, Vec<Vec<u32>>) = (run(&shared)?, run(&own)?);
+    assert_eq!(a, b);
+    Ok(())
+}
+
+#[test]
+fn nothing_but_constants_before_may_be_named_again() -> Result<()> {
+    let plain = words(&image()?);
+    let last = last_data(&plain);
+    // One word of these has not been looked at.
+    let behind = plain[h::W_OPS] as usize - CONSTANTS + 1;
+    for data in [behind, h::WORDS] {
+        let mut words = plain.clone();
+        words[last] = data as u32;
+        let bytes = sealed(&words)?;
+        let refused = ImageBuffer::new(&bytes).image("memory".as_ref()).map(|_| ());
+        let error = refused.expect_err("constants that are none");
+        assert_eq!(error.downcast_ref::<ImageError>(), Some(&ImageError::Section), "{data}");
+    }
+    Ok(())
+}
