@@ -30,7 +30,7 @@ impl Bench {
         let breadcrumb = Record::report(ResetCause::Watchdog, None);
         let facts = Facts { image: 0xabcd, slot: BUILT_IN, timing: Timing::default(), breadcrumb };
         let guard = Guard::new(3, &[], 50_000).expect("there is room");
-        let endpoint = Endpoint::new(guard, facts, Settings { status_period: 0, erase_while_armed: false });
+        let endpoint = Endpoint::new(guard, facts, Settings { status_period: 0, flash_while_armed: false });
         Self { safety, endpoint, host: Sender::new(9), answers: Receiver::new(), micros: 0 }
     }
 

@@ -1,5 +1,7 @@
 //! What the start finds: the cause of the reset, the image, the stack.
 
+use core::cell::Cell;
+
 use actq_boards::device::WATCHDOG_NMI;
 use actq_boards::seams::Cause;
 use actq_controller::breadcrumb::Record;
@@ -24,6 +26,18 @@ pub(crate) const LENGTHS: [usize; 2] = lengths(&BUILT_IN.0);
 pub(crate) fn built_in() -> &'static [u8] {
     let slot = if cfg!(feature = "signed") { None } else { slot::image() };
     slot.unwrap_or(&BUILT_IN.0)
+}
+
+/// The memory of the slots for updates; none where the image that a debugger has put into the same memory is the one that runs.
+///
+/// # Safety
+///
+/// To be called once.
+pub(crate) unsafe fn slots() -> &'static [Cell<u8>] {
+    // SAFETY: as the caller promises.
+    let memory = unsafe { slot::updates() };
+    let is_taken = memory.as_ptr_range().contains(&built_in().as_ptr().cast());
+    if is_taken { &[] } else { memory }
 }
 
 /// Whose images the link may bring: anyone's.
