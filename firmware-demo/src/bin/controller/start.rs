@@ -46,10 +46,10 @@ pub(crate) fn authority() -> Option<actq_controller::slots::Anyone> {
     Some(actq_controller::slots::Anyone)
 }
 
-/// Whose images the link may bring: those of the build's key; nobody's, where its digits are no point of the curve.
+/// Whose images the link may bring: those of the build's key. The build script has seen that it is one.
 #[cfg(feature = "signed")]
 pub(crate) fn authority() -> Option<actq_controller::slots::Key> {
-    const KEY: [u8; 32] = match actq_firmware_demo::key::parse(env!(
+    const KEY: [u8; 32] = match actq_controller::slots::Key::parse(env!(
         "ACTQ_PUBLIC_KEY",
         "set ACTQ_PUBLIC_KEY to the public key's 64 hexadecimal digits, which `actq keygen` prints; `cargo xtask firmware --key` does"
     )) {
