@@ -9,7 +9,7 @@ fn main() -> Result<(), String> {
 /// A text that is not 64 hexadecimal digits is refused where it becomes a constant.
 #[cfg(feature = "signed")]
 fn check_key() -> Result<(), String> {
-    use signature::slots::Key;
+    use actq_controller::slots::Key;
 
     println!("cargo::rerun-if-env-changed=ACTQ_PUBLIC_KEY");
     let digits = std::env::var("ACTQ_PUBLIC_KEY").unwrap_or_default();
