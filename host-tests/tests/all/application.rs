@@ -144,8 +144,7 @@ fn a_head_below_leaves_the_tick_alone() -> Result<()> {
     until(&mut client, "later", |status| status.ticks > 1000.max(ticks + 200))?;
     let timing = client.timing()?;
     assert_eq!((timing.period, timing.overruns), (125_000, 0));
-    // A tick waits for the loop's locks, up to 450 instructions, which take 14.4 us here: QEMU runs 31 million a second.
-    assert!(timing.worst_tick < 12_500 && timing.worst_jitter < 16_000, "{timing:?}");
+    assert!(timing.worst_tick < 12_500 && timing.worst_jitter < 12_500, "{timing:?}");
     Ok(())
 }
 
