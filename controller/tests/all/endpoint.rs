@@ -226,13 +226,15 @@ fn an_update_that_would_hold_up_the_tick_waits_until_disarmed() {
     };
     for flash_while_armed in [false, true] {
         let mut bench = Bench::of(Settings { status_period: 0, flash_while_armed });
-        let mut outcomes = |bench: &mut Bench| requests(bench.status().token).map(|request| bench.ask(&request));
+        let outcomes = |bench: &mut Bench| requests(bench.status().token).map(|request| bench.ask(&request));
         let (done, armed) = (Err(Refusal::Unsupported), Err(Refusal::Armed));
         assert_eq!(outcomes(&mut bench), [done; 3]);
         bench.observe();
         bench.arm();
         assert_eq!(outcomes(&mut bench), if flash_while_armed { [done, done, armed] } else { [armed; 3] });
-        (0..=DEADLINE).for_each(|_| drop(bench.safety.tick()));
+        for _ in 0..=DEADLINE {
+            bench.safety.tick();
+        }
         assert_eq!(bench.status().state, State::Latched);
         assert_eq!(
             outcomes(&mut bench),
