@@ -9,6 +9,8 @@
 #[cfg(any(not(target_os = "none"), feature = "cmsdk"))]
 pub mod no_stage;
 pub mod port;
+#[cfg(any(not(target_os = "none"), feature = "cmsdk"))]
+pub mod ram;
 mod ring;
 pub mod seams;
 
@@ -33,7 +35,7 @@ mod mpu;
 #[cfg(all(target_os = "none", feature = "device"))]
 mod stack;
 #[cfg(any(not(target_os = "none"), feature = "stm32f405"))]
-mod stm32f405;
+pub mod stm32f405;
 #[cfg(all(target_os = "none", feature = "device"))]
 mod vectors;
 

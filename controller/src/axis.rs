@@ -118,9 +118,14 @@ impl Axis {
         self.safe
     }
 
-    /// A finite value, brought within the limits.
+    /// A finite value, brought within the limits. (By comparisons: a Cortex-M4 has no instruction for `f32::max`, and calls a function,
+    /// while the tick waits.)
     pub(crate) fn limit(&self, value: f32) -> f32 {
-        value.max(self.low).min(self.high)
+        match value {
+            below if below < self.low => self.low,
+            above if above > self.high => self.high,
+            within => within,
+        }
     }
 
     /// One tick on from `last` towards `target`. What was not driven begins at the start value.

@@ -170,14 +170,16 @@ impl<'r, const OBS: usize, const N: usize> Endpoint<'r, OBS, N> {
         match report {
             Report::Timing => Message::Timing(self.facts.timing),
             Report::Breadcrumb => Message::Breadcrumb(self.facts.breadcrumb),
-            Report::Status => safety.with(|safety| {
+            Report::Status => {
+                let (state, fault, refusal, token, ticks) = safety
+                    .with(|safety| (safety.state(), safety.fault(), safety.refusal(), safety.token(), safety.ticks()));
                 Message::Status(Status {
-                    state: safety.state(),
-                    fault: safety.fault(),
-                    refusal: safety.refusal(),
+                    state,
+                    fault,
+                    refusal,
                     reset: self.facts.breadcrumb.reset,
-                    token: safety.token(),
-                    ticks: safety.ticks(),
+                    token,
+                    ticks,
                     image: self.facts.image,
                     slot: self.facts.slot,
                     axes: u8::try_from(AXES).unwrap_or(u8::MAX),
@@ -186,7 +188,7 @@ impl<'r, const OBS: usize, const N: usize> Endpoint<'r, OBS, N> {
                     refused: self.guard.refused(),
                     counters: self.receiver.counters(),
                 })
-            }),
+            }
         }
     }
 }

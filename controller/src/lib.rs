@@ -18,7 +18,6 @@ pub mod guard;
 pub mod health;
 mod parameters;
 pub mod progress;
-pub mod ram;
 mod requests;
 pub mod safety;
 pub mod scrub;

@@ -13,8 +13,8 @@ use crate::update::{Plan, Update};
 pub struct Settings {
     /// Ticks between two reports of the status; 0: none unasked.
     pub status_period: u32,
-    /// Whether flash can be erased while the outputs move: not where code is fetched from the same bank.
-    pub erase_while_armed: bool,
+    /// Whether flash can be erased and written while the outputs are driven: not where code is fetched from the same bank.
+    pub flash_while_armed: bool,
 }
 
 /// Does what is acknowledged; `None` for what only a controller says.
@@ -44,10 +44,15 @@ pub(crate) fn request<const OBS: usize, const AXES: usize>(
         }
         Message::Begin { token, length, crc, version } => {
             let may = safety.with(|safety| match safety.may_change(token) {
-                Err(Refusal::Armed) if settings.erase_while_armed => Ok(()),
+                Err(Refusal::Armed) if settings.flash_while_armed => Ok(()),
                 other => other,
             });
             may.and_then(|()| update.begin(Plan { length, crc, version }))
+        }
+        Message::Chunk { .. } | Message::Commit { .. }
+            if !settings.flash_while_armed && safety.with(|safety| safety.state()) != State::Disarmed =>
+        {
+            Err(Refusal::Armed)
         }
         Message::Chunk { offset, bytes } => update.chunk(offset, bytes),
         Message::Commit { .. } if safety.with(|safety| safety.state()) == State::Armed => Err(Refusal::Armed),

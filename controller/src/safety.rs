@@ -104,10 +104,19 @@ impl<const AXES: usize> Safety<AXES> {
     ///
     /// A fault where it has not one finite value for each axis. It latches.
     pub fn act(&mut self, action: &[f32]) -> Result<Option<[f32; AXES]>, Fault> {
-        let target = checked(&self.axes, action).inspect_err(|fault| self.trip(*fault))?;
-        let State::Armed(armed) = &mut self.state else { return Ok(None) };
-        armed.follow(target);
-        Ok(Some(target))
+        let fault = match <&[f32; AXES]>::try_from(action) {
+            Err(_) => Fault::ActionLength,
+            Ok(action) if !action.iter().all(|value| value.is_finite()) => Fault::ActionNotFinite,
+            Ok(action) => {
+                let State::Armed(armed) = &mut self.state else { return Ok(None) };
+                let mut target = *action;
+                target.iter_mut().zip(&self.axes).for_each(|(value, axis)| *value = axis.limit(*value));
+                armed.follow(target);
+                return Ok(Some(target));
+            }
+        };
+        self.trip(fault);
+        Err(fault)
     }
 
     /// Latches, where armed: the head has failed, a tick took too long, the break input was seen.
@@ -212,18 +221,6 @@ impl<const AXES: usize> Safety<AXES> {
     pub const fn axes(&self) -> &[Axis; AXES] {
         &self.axes
     }
-}
-
-/// An action within the limits.
-fn checked<const AXES: usize>(axes: &[Axis; AXES], action: &[f32]) -> Result<[f32; AXES], Fault> {
-    let mut target: [f32; AXES] = action.try_into().map_err(|_| Fault::ActionLength)?;
-    for (value, axis) in target.iter_mut().zip(axes) {
-        if !value.is_finite() {
-            return Err(Fault::ActionNotFinite);
-        }
-        *value = axis.limit(*value);
-    }
-    Ok(target)
 }
 
 /// The next of 2^32 different numbers (a full-period linear congruential generator; Numerical Recipes' constants).

@@ -6,7 +6,6 @@
 #[cfg(feature = "faults")]
 mod faults;
 pub mod image;
-pub mod key;
 #[cfg(feature = "foc")]
 pub mod motor;
 pub mod output;

@@ -1,10 +1,23 @@
-//! Where a program was whose stack has overflown: the core could not stack its program counter, but the calls before it are there.
+//! Where a program was whose stack has overflown.
+
+/// The word of a frame that has the program counter.
+const PC: usize = 6;
+
+/// Where the program was, by `words`, those of its stack from the pointer on: the first ones are the frame that the core has stacked, or
+/// it could not, and they tell the innermost call. `half` as for [`innermost_call`].
+pub fn program_counter(
+    mut words: impl Iterator<Item = u32>,
+    is_stacked: bool,
+    half: impl Fn(u32) -> Option<u16>,
+) -> Option<u32> {
+    if is_stacked { words.nth(PC) } else { innermost_call(words, half) }
+}
 
 /// The address of the call whose return address is the first among `words`, those of a stack from its pointer on. `half` gives the
 /// halfword at an address of the code; `None` where there is no code.
 ///
 /// A word counts as a return address where it is odd (a Thumb address) and a call stands before it (Arm DDI 0403E, A7.7.18 and A7.7.19).
-pub fn innermost_call(mut words: impl Iterator<Item = u32>, half: impl Fn(u32) -> Option<u16>) -> Option<u32> {
+fn innermost_call(mut words: impl Iterator<Item = u32>, half: impl Fn(u32) -> Option<u16>) -> Option<u32> {
     words.find_map(|word| {
         let back = word.checked_sub(1).filter(|back| back % 2 == 0)?;
         let before = |bytes| Some((back.checked_sub(bytes)?, half(back.checked_sub(bytes)?)?));
@@ -27,6 +40,14 @@ mod tests {
 
     fn half(address: u32) -> Option<u16> {
         CODE.get(usize::try_from(address.checked_sub(0x100)?).ok()? / 2).copied()
+    }
+
+    #[test]
+    fn a_frame_tells_more_than_the_calls_before_it() {
+        let words = [1, 2, 3, 4, 5, 0x105, 0x10a, 0x0100_0000];
+        assert_eq!(program_counter(words.into_iter(), true, half), Some(0x10a));
+        assert_eq!(program_counter(words.into_iter(), false, half), Some(0x100));
+        assert_eq!(program_counter(words.into_iter().take(PC), true, half), None);
     }
 
     #[test]

@@ -23,7 +23,7 @@ pub fn image() -> Option<&'static [u8]> {
     bytemuck::cast_slice(slot).get(..*slot.get(W_BYTES)? as usize)
 }
 
-/// The memory of the slots for updates, on a board with memory in the place of flash; else empty.
+/// The memory of the slots for updates; empty on a board without.
 ///
 /// # Safety
 ///
@@ -34,8 +34,8 @@ pub unsafe fn updates() -> &'static [Cell<u8>] {
         static _update_slots_end: Cell<u8>;
     }
     let (start, end) = (&raw const _update_slots_start, &raw const _update_slots_end);
-    // SAFETY: the linker script gives the slots these bounds in memory that can be written, which nothing else uses, as the caller calls
-    // once; where there are none, they are equal and not null.
+    // SAFETY: the linker script gives the slots these bounds in memory of which only the board's flash changes a cell, as the caller
+    // calls once; where there are none, they are equal and not null.
     unsafe { core::slice::from_raw_parts(start, end as usize - start as usize) }
 }
 

@@ -2,7 +2,7 @@
 //! the first byte is odd.
 #![no_main]
 
-use actq_controller::ram::Ram;
+use actq_boards::ram::Ram;
 use actq_controller::slots::{Anyone, Authority, Key, Layout, Slots};
 use actq_link::frame::CRC;
 use libfuzzer_sys::fuzz_target;

@@ -30,6 +30,25 @@ impl Key {
     pub fn new(bytes: &[u8; 32]) -> Result<Self, BadKey> {
         PublicKey::try_from(bytes).map(Self).map_err(|_| BadKey)
     }
+
+    /// The bytes of 64 hexadecimal digits; `None` where the text is something else. For constants, so that a build with another text
+    /// fails.
+    pub const fn parse(text: &str) -> Option<[u8; 32]> {
+        let (pairs, rest) = text.as_bytes().as_chunks();
+        if pairs.len() != 32 || !rest.is_empty() {
+            return None;
+        }
+        let (mut key, mut i) = ([0; 32], 0);
+        while i < key.len() {
+            let [high, low]: [u8; 2] = pairs[i];
+            let (Some(high), Some(low)) = ((high as char).to_digit(16), (low as char).to_digit(16)) else {
+                return None;
+            };
+            key[i] = (high << 4 | low) as u8;
+            i += 1;
+        }
+        Some(key)
+    }
 }
 
 /// What is signed besides the image: that it is one, and its version.

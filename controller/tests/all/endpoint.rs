@@ -24,13 +24,17 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
+        Self::of(Settings { status_period: 0, flash_while_armed: false })
+    }
+
+    fn of(settings: Settings) -> Self {
         let axis = Axis::new(-1.0, 1.0, 0.1, 0.0, SafeAction::Hold).expect("the axis fits");
         let mut safety = Safety::new([axis; 2], DEADLINE, 77);
         Check::ALL.into_iter().for_each(|check| safety.check(check, true));
         let breadcrumb = Record::report(ResetCause::Watchdog, None);
         let facts = Facts { image: 0xabcd, slot: BUILT_IN, timing: Timing::default(), breadcrumb };
         let guard = Guard::new(3, &[], 50_000).expect("there is room");
-        let endpoint = Endpoint::new(guard, facts, Settings { status_period: 0, erase_while_armed: false });
+        let endpoint = Endpoint::new(guard, facts, settings);
         Self { safety, endpoint, host: Sender::new(9), answers: Receiver::new(), micros: 0 }
     }
 
@@ -211,6 +215,34 @@ fn a_request_of_an_old_state_and_an_update_that_cannot_be_are_refused() {
     let begin = Message::Begin { token: bench.status().token, length: 4, crc: 0, version: 0 };
     assert_eq!(bench.ask(&begin), Err(Refusal::Armed));
     assert_eq!(bench.ask(&Message::Commit { signature: None }), Err(Refusal::Armed));
+}
+
+/// Where flash and outputs do not go together, no request gets to the update unless disarmed: what writes would hold up the tick.
+#[test]
+fn an_update_that_would_hold_up_the_tick_waits_until_disarmed() {
+    let requests = |token| {
+        let begin = Message::Begin { token, length: 4, crc: 0, version: 0 };
+        [begin, Message::Chunk { offset: 0, bytes: &[0; 4] }, Message::Commit { signature: None }]
+    };
+    for flash_while_armed in [false, true] {
+        let mut bench = Bench::of(Settings { status_period: 0, flash_while_armed });
+        let outcomes = |bench: &mut Bench| requests(bench.status().token).map(|request| bench.ask(&request));
+        let (done, armed) = (Err(Refusal::Unsupported), Err(Refusal::Armed));
+        assert_eq!(outcomes(&mut bench), [done; 3]);
+        bench.observe();
+        bench.arm();
+        assert_eq!(outcomes(&mut bench), if flash_while_armed { [done, done, armed] } else { [armed; 3] });
+        for _ in 0..=DEADLINE {
+            bench.safety.tick();
+        }
+        assert_eq!(bench.status().state, State::Latched);
+        assert_eq!(
+            outcomes(&mut bench),
+            [if flash_while_armed { done } else { armed }; 3],
+            "outputs go to their safe action"
+        );
+        assert_eq!((bench.ask(&Message::Disarm), outcomes(&mut bench)), (Ok(()), [done; 3]));
+    }
 }
 
 #[test]

@@ -7,9 +7,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use actq_boards::ram::Ram;
 use actq_controller::breadcrumb::Record;
 use actq_controller::endpoint::Facts;
-use actq_controller::ram::Ram;
 use actq_controller::slots::{Authority, Layout, Slots, Updater, Work};
 use actq_controller::{Axis, Check, Endpoint, Guard, Output, SafeAction, Safety, Settings};
 use actq_device::client::Client;
@@ -129,7 +129,7 @@ fn run<A: Authority>(
     let facts =
         Facts { image: 0x1234, slot: BUILT_IN, timing: Timing { period: 1_000_000, ..Timing::default() }, breadcrumb };
     let guard = Guard::new(OBSERVATION, &[], 1_000_000).expect("there is room");
-    let mut endpoint = End::new(guard, facts, Settings { status_period: 20, erase_while_armed: false });
+    let mut endpoint = End::new(guard, facts, Settings { status_period: 20, flash_while_armed: false });
 
     let (mut inward, mut outward) = (Line::new(1, faults), Line::new(2, faults));
     let (mut stream, begun, mut ticks) = (None::<TcpStream>, Instant::now(), 0);

@@ -84,7 +84,10 @@ fn every_board_starts_and_acts_with_the_bits_of_the_host() -> Result<()> {
         if target == Target::F405 {
             // QEMU has no clocks for it: the wait for the crystal has ended, and nothing may move at another rate.
             assert_eq!(client.status()?.refusal, Some(Refusal::Clock));
-            assert!(push(&mut client, &package(&small()?), |_| {}).is_err(), "it has no slots");
+            // Nor a flash controller: an erase is refused, and it runs on.
+            let told = push(&mut client, &package(&small()?), |_| {}).expect_err("nothing can be erased");
+            assert!(format!("{told:#}").contains(&Refusal::Flash.to_string()), "{told:#}");
+            assert_eq!(client.status()?.slot, BUILT_IN);
             continue;
         }
         let (observation, _) = self_test(&image, 0).context("it has a self-test")?;
@@ -141,8 +144,7 @@ fn a_head_below_leaves_the_tick_alone() -> Result<()> {
     until(&mut client, "later", |status| status.ticks > 1000.max(ticks + 200))?;
     let timing = client.timing()?;
     assert_eq!((timing.period, timing.overruns), (125_000, 0));
-    // A tick waits for the loop's locks, up to 450 instructions, which take 14.4 us here: QEMU runs 31 million a second.
-    assert!(timing.worst_tick < 12_500 && timing.worst_jitter < 16_000, "{timing:?}");
+    assert!(timing.worst_tick < 12_500 && timing.worst_jitter < 12_500, "{timing:?}");
     Ok(())
 }
 
@@ -192,6 +194,10 @@ fn an_image_that_may_not_run_is_refused_with_its_reason() -> Result<()> {
         let status = client.status()?;
         assert_eq!((status.state, status.refusal, status.image), (State::Disarmed, Some(refusal), 0), "{target:?}");
         assert!(client.arm().is_err(), "{target:?}");
+        if target == Target::F405 {
+            let told = push(&mut client, &package(&damaged), |_| {}).expect_err("it would erase the debugger's image");
+            assert!(format!("{told:#}").contains(&Refusal::Unsupported.to_string()), "{told:#}");
+        }
     }
     Ok(())
 }
@@ -331,6 +337,14 @@ fn a_build_with_a_key_runs_signed_images_alone() -> Result<()> {
         runs_over_a_reset(&mut client, slot, &observation, &bits).with_context(|| format!("{target:?}"))?;
     }
     Ok(())
+}
+
+/// No point of the curve has 2 as its y.
+#[test]
+fn a_key_that_is_none_does_not_build() {
+    let none = "02".to_owned() + &"00".repeat(31);
+    let told = firmware::controller_of_key(Target::Fpu, "signed", &none).expect_err("it is no point of the curve");
+    assert!(format!("{told:#}").contains("ACTQ_PUBLIC_KEY is not an Ed25519 public key"), "{told:#}");
 }
 
 /// The application is updated while it runs; what fails its self-test is refused, and the one before runs on, over a reset, too.

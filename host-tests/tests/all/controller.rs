@@ -14,9 +14,9 @@ use actq::runtime::ImageBuffer;
 use actq_bench::command::{actq, failed, run, succeeded};
 use actq_bench::golden::Random;
 use actq_bench::networks::Builder;
+use actq_boards::ram::Ram;
 use actq_controller::breadcrumb::Record;
 use actq_controller::endpoint::Facts;
-use actq_controller::ram::Ram;
 use actq_controller::slots::{Candidate, Key, Layout, Slots, Updater, Work};
 use actq_controller::{Axis, Check, Endpoint, Guard, SafeAction, Safety, Settings};
 use actq_kernels::image::{header as h, seal};
@@ -106,7 +106,7 @@ fn firmware(listener: &TcpListener, stop: &AtomicBool, built_in: &[u8], key: &[u
     let breadcrumb = Record::report(ResetCause::Power, None);
     let facts = Facts { image: 0, slot: BUILT_IN, timing: Timing::default(), breadcrumb };
     let guard = Guard::<OBS>::new(OBS, &[], 500_000).context("there is room")?;
-    let settings = Settings { status_period: 50, erase_while_armed: false };
+    let settings = Settings { status_period: 50, flash_while_armed: false };
     let mut endpoint = Endpoint::<OBS, { frame::bytes(256) }>::new(guard, facts, settings);
 
     let (begun, mut ticks, mut port) = (Instant::now(), 0, None);

@@ -1,17 +1,22 @@
-//! The registers of an STM32F405 by its peripheral access crate (RM0090): clocks, USART 1, TIM 1, ADC 1, the independent watchdog.
+//! The registers of an STM32F405 by its peripheral access crate (RM0090): clocks, USART 1, TIM 1, ADC 1, the independent watchdog,
+//! the flash.
 //!
 //! The crates that own whole parts, stm32f4xx-hal and embassy-stm32, wait without end for a crystal that does not start. Here every
 //! wait has an end, and the part runs on from its own oscillator; so the registers are set below them.
 
 mod adc;
 mod clock;
+mod flash;
 mod pwm;
 mod usart;
 mod watchdog;
 
+use core::cell::Cell;
+
 use stm32f4::stm32f405 as pac;
 
 pub use adc::Currents;
+pub use flash::Controller;
 pub use pwm::{Phase, Pwm as Stage};
 pub use usart::Usart as Uart;
 pub use watchdog::Iwdg as Watchdog;
@@ -29,9 +34,16 @@ pub const NVIC_PRIO_BITS: u8 = 4;
 pub const SCRATCH: usize = super::SCRATCH;
 /// Whether a non-maskable interrupt says that the watchdog's time has ended: nothing here asks for one.
 pub const WATCHDOG_NMI: bool = false;
+/// Whether the flash may be written while the outputs are driven: the tick stands still then, for up to 2 s.
+pub const FLASH_WHILE_ARMED: bool = false;
 
 /// The board.
 pub type Parts = seams::Parts<Uart, Watchdog, Stage>;
+/// Its flash, as far as it is for updates.
+pub type Flash = super::flash::Flash<Controller>;
+
+/// Where the flash begins.
+const FLASH: usize = 0x0800_0000;
 
 /// Sets the part up: 168 MHz where the crystal starts, else 16 MHz; its serial port at `baud`; the power stage off, at 20 kHz.
 ///
@@ -55,6 +67,19 @@ pub unsafe fn start(baud: u32) -> Parts {
     let stage = Stage::new(p.TIM1, &p.RCC, &p.GPIOA, &p.GPIOB, timer_hz, Currents::new(p.ADC1, &p.RCC, &p.GPIOC));
     let watchdog = Watchdog::new(p.IWDG);
     Parts { clock, cause, uart, watchdog, stage }
+}
+
+/// The part's own flash, of which `memory` is to be written.
+///
+/// # Safety
+///
+/// To be called once, behind [`start`], and from where the watchdog is fed. `memory` is the part's flash, and nothing but the flash that
+/// is given here changes it.
+pub unsafe fn flash(memory: &'static [Cell<u8>]) -> Flash {
+    // SAFETY: `start` has set up what it wanted of these, and nobody else has them since.
+    let p = unsafe { pac::Peripherals::steal() };
+    let begin = (memory.as_ptr() as usize).wrapping_sub(FLASH) as u32;
+    Flash::new(Controller::new(p.FLASH, p.PWR, &p.RCC, memory), begin)
 }
 
 /// What the reset flags say, which are cleared for the next time.

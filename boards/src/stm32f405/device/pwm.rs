@@ -86,6 +86,12 @@ impl Pwm {
     }
 }
 
+/// Whether the outputs are on, by the register, whoever has the power stage.
+pub(super) fn is_driving() -> bool {
+    // SAFETY: only read, which changes nothing.
+    unsafe { &*pac::TIM1::ptr() }.bdtr().read().moe().bit()
+}
+
 impl Stage for Pwm {
     type Phase = Phase;
 

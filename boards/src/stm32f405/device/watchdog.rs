@@ -1,6 +1,7 @@
 //! The independent watchdog (RM0090, section 21), which has an oscillator of its own: 32 kHz, in truth 17 to 47 kHz.
 
 use stm32f4::stm32f405 as pac;
+use stm32f4::stm32f405::iwdg::RegisterBlock;
 
 use super::wait;
 use crate::seams::Watchdog;
@@ -24,11 +25,35 @@ impl Iwdg {
     pub(super) fn new(iwdg: pac::IWDG) -> Self {
         Self(iwdg)
     }
+}
 
-    fn key(&self, key: u16) {
-        // SAFETY: the register takes any key, and does nothing on those that it does not know.
-        self.0.kr().write(|w| unsafe { w.bits(key) });
+fn key(iwdg: &RegisterBlock, key: u16) {
+    // SAFETY: the register takes any key, and does nothing on those that it does not know.
+    iwdg.kr().write(|w| unsafe { w.bits(key) });
+}
+
+/// Sets the time anew to so many ticks and one; false where that is not taken.
+fn set(iwdg: &RegisterBlock, ticks: u16) -> bool {
+    key(iwdg, OPEN);
+    // SAFETY: values in the fields' ranges: 3 of 0 to 7, 12 bits.
+    unsafe {
+        iwdg.pr().write(|w| w.pr().bits(DIVIDER));
+        iwdg.rlr().write(|w| w.rl().bits(ticks & (LONGEST - 1)));
     }
+    let taken = wait(TAKEN, || iwdg.sr().read().bits() == 0);
+    key(iwdg, FEED);
+    taken
+}
+
+/// Does `work` with the longest time, at least 2.7 s (4096 ticks of 32 cycles at 47 kHz), and sets the one before again; `None` where one of
+/// these is not taken, for the longest with nothing done. To be called where the watchdog is fed: by the loop.
+pub(super) fn patiently<R>(work: impl FnOnce() -> R) -> Option<R> {
+    // SAFETY: the registers are there for as long as the program runs; besides the loop, which waits for this, nothing writes them.
+    let iwdg = unsafe { &*pac::IWDG::ptr() };
+    // The last change was taken, so that this is what counts.
+    let before = iwdg.rlr().read().rl().bits();
+    let outcome = set(iwdg, LONGEST - 1).then(work);
+    set(iwdg, before).then_some(outcome)?
 }
 
 impl Watchdog for Iwdg {
@@ -36,19 +61,11 @@ impl Watchdog for Iwdg {
         if !(1..=LONGEST).contains(&milliseconds) {
             return false;
         }
-        self.key(START);
-        self.key(OPEN);
-        // SAFETY: values in the fields' ranges: 3 of 0 to 7, at most 4095 of 12 bits.
-        unsafe {
-            self.0.pr().write(|w| w.pr().bits(DIVIDER));
-            self.0.rlr().write(|w| w.rl().bits(milliseconds - 1));
-        }
-        let taken = wait(TAKEN, || self.0.sr().read().bits() == 0);
-        self.feed();
-        taken
+        key(&self.0, START);
+        set(&self.0, milliseconds - 1)
     }
 
     fn feed(&mut self) {
-        self.key(FEED);
+        key(&self.0, FEED);
     }
 }

@@ -1,6 +1,7 @@
 //! NOR flash with its rules: erasing gives ones, programming takes ones away, a unit is programmed once after an erase. Power may
 //! fail in the middle of any of it.
 
+use actq_boards::stm32f405::flash::{Flash, LARGE, Model};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 
 use crate::random::Random;
@@ -25,6 +26,62 @@ pub(super) struct NoPower;
 impl NorFlashError for NoPower {
     fn kind(&self) -> NorFlashErrorKind {
         NorFlashErrorKind::Other
+    }
+}
+
+/// Flash whose power fails, of as many sectors as a test asks for.
+pub(super) trait Fails: NorFlash + Clone {
+    /// As it comes from the factory, or from another use: full of anything.
+    fn new(sectors: usize, seed: u64) -> Self;
+
+    /// Its bytes.
+    fn bytes(&self) -> Vec<u8>;
+
+    /// Changes so far.
+    fn done(&self) -> usize;
+
+    /// Power comes back, and fails in the course of the change behind so many, if it does.
+    fn restart(&mut self, fails_at: Option<usize>);
+}
+
+impl<const UNIT: usize, const SECTOR: usize> Fails for Nor<UNIT, SECTOR> {
+    fn new(sectors: usize, seed: u64) -> Self {
+        Self::new(sectors, seed)
+    }
+
+    fn bytes(&self) -> Vec<u8> {
+        self.bytes.clone()
+    }
+
+    fn done(&self) -> usize {
+        self.done
+    }
+
+    fn restart(&mut self, fails_at: Option<usize>) {
+        (self.done, self.fails_at) = (0, fails_at);
+    }
+}
+
+/// The upper sectors of an STM32F405, by its driver: what fails is a write to a register or to the memory.
+impl Fails for Flash<Model> {
+    fn new(sectors: usize, seed: u64) -> Self {
+        let begin = (1 << 20) - sectors as u32 * LARGE;
+        let mut random = Random::new(seed);
+        let memory = (0..sectors * LARGE as usize).map(|_| random.bits() as u8).collect();
+        Self::new(Model::new(memory, begin, seed), begin)
+    }
+
+    fn bytes(&self) -> Vec<u8> {
+        self.part.bytes()
+    }
+
+    fn done(&self) -> usize {
+        self.part.done
+    }
+
+    fn restart(&mut self, fails_at: Option<usize>) {
+        self.part = self.part.clone().restarted();
+        self.part.fails_at = fails_at;
     }
 }
 

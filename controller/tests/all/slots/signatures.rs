@@ -49,3 +49,13 @@ fn only_what_the_key_has_signed_runs() {
 fn what_is_no_key_is_refused() {
     assert!((0..=255).any(|byte| Key::new(&[byte; 32]).is_err()));
 }
+
+#[test]
+fn a_key_is_64_hexadecimal_digits() {
+    let text = "00ff".to_owned() + &"0a".repeat(28) + "Bc10";
+    let key = Key::parse(&text).expect("a key");
+    assert_eq!((key[..3].to_vec(), &key[30..]), (vec![0, 0xff, 10], &[0xbc, 0x10][..]));
+    assert_eq!((Key::parse(""), Key::parse(&text[1..]), Key::parse(&text[2..])), (None, None, None));
+    assert_eq!((Key::parse(&(text.clone() + "0")), Key::parse(&(text.clone() + "00"))), (None, None));
+    assert_eq!((Key::parse(&text.replace('f', "g")), Key::parse(&text.replace("ff", "\u{e9}"))), (None, None));
+}

@@ -6,7 +6,7 @@ use core::sync::atomic::{AtomicU32, Ordering};
 
 use actq_boards::device::{self, WATCHDOG_NMI};
 use actq_controller::breadcrumb::{Record, WORDS};
-use actq_firmware_demo::trace::innermost_call;
+use actq_firmware_demo::trace::program_counter;
 use actq_firmware_support::kept::Kept;
 use actq_link::code::Crash;
 use cortex_m::peripheral::SCB;
@@ -149,7 +149,9 @@ extern "C" fn overflow(pointer: u32, status: u32) -> ! {
     let words = (pointer.max(bottom)..top).step_by(4);
     // SAFETY: memory of the stack that may be read: words of it, as its pointer and its ends are multiples of 4.
     let words = words.map(|address| unsafe { (address as *const u32).read_volatile() });
-    leave(Crash::StackOverflow, innermost_call(words, half).unwrap_or(0), status);
+    // Where the core could not stack, Armv7-M says so, and Armv8-M leaves the pointer at the limit.
+    let is_stacked = status & STACKING == 0 && pointer > bottom;
+    leave(Crash::StackOverflow, program_counter(words, is_stacked, half).unwrap_or(0), status);
     SCB::sys_reset()
 }
 

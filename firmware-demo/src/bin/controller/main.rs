@@ -40,6 +40,8 @@ mod limits {
     pub(crate) const REPORT: u32 = TICK_HZ / 10;
     /// Milliseconds without progress until the watchdog resets the board.
     pub(crate) const PATIENCE: u16 = 500;
+    /// The same for the start, which reads both slots, slowly where the crystal is dead. Nothing is armed until it has ended.
+    pub(crate) const START: u16 = 4000;
 }
 
 #[cfg(target_os = "none")]
@@ -47,11 +49,10 @@ mod limits {
 mod app {
     use core::sync::atomic::Ordering;
 
-    use actq_boards::device::{self, Interrupt, Parts, SCRATCH, Stage, Uart, Watchdog};
+    use actq_boards::device::{self, FLASH_WHILE_ARMED, Interrupt, Parts, SCRATCH, Stage, Uart, Watchdog};
     use actq_boards::port::{Buffers, Port, Wire};
     use actq_boards::seams::{Source, Watchdog as _};
     use actq_controller::endpoint::Facts;
-    use actq_controller::ram::Ram;
     use actq_controller::slots::Candidate;
     use actq_controller::{Check, Endpoint, Guard, Safety, Settings, Shared as _};
     use actq_firmware_demo::image;
@@ -71,7 +72,7 @@ mod app {
     use cortex_m::peripheral::SYST;
     use cortex_m::peripheral::syst::SystClkSource;
 
-    use crate::limits::{DEADLINE, MAX_AGE, PATIENCE, REPORT, TICK_HZ, WAY};
+    use crate::limits::{DEADLINE, MAX_AGE, PATIENCE, REPORT, START, TICK_HZ, WAY};
     use crate::locked::Locked;
     use crate::log::info;
     use crate::{faults, start};
@@ -116,7 +117,8 @@ mod app {
         let image = Image::new_checked(start::built_in()).ok();
         let mut safety = Safety::new(image::axes(image.as_ref(), WAY as f32), DEADLINE, starts);
         safety.check(Check::Clock, clock.source == Source::Crystal);
-        safety.check(Check::Watchdog, watchdog.start(PATIENCE));
+        // Whether it runs counts with the time that it has in the end.
+        let _ = watchdog.start(START);
         let (wire, port) = cx.local.buffers.split(uart, || rtic::pend(Interrupt::SERIAL));
         let mut timer = core.SYST;
         let period = clock.hz / TICK_HZ;
@@ -170,20 +172,22 @@ mod app {
         let idle::LocalResources { port, watchdog, rates, breadcrumb, scratch, out, .. } = cx.local;
         let mut timing = cx.shared.timing;
         // SAFETY: RTIC runs this once.
-        let flash = unsafe { slot::updates() };
+        let memory = unsafe { start::slots() };
+        // SAFETY: once, by the loop that feeds the watchdog.
+        let flash = unsafe { device::flash(memory) };
         let bytes_of = |candidate: &Candidate| {
             // SAFETY: an update writes to the slot that does not run, and to none while an image waits for its test.
-            unsafe { slot::mapped(flash, candidate.address, candidate.length) }.unwrap_or_default()
+            unsafe { slot::mapped(memory, candidate.address, candidate.length) }.unwrap_or_default()
         };
-        // As the flash of an STM32F405: sectors of 128 KB, written in words.
-        let flash = Ram::<4, { 128 << 10 }>(flash);
         let passes = |candidate: &Candidate| image::open(bytes_of(candidate), scratch, start::LENGTHS).is_ok();
         let (updates, running) = Updates::new(flash, start::authority(), passes);
         let mut bytes = running.as_ref().map_or_else(start::built_in, bytes_of);
         let facts = Facts { image: 0, slot: BUILT_IN, timing: Default::default(), breadcrumb: *breadcrumb };
-        let settings = Settings { status_period: REPORT, erase_while_armed: true };
+        let settings = Settings { status_period: REPORT, flash_while_armed: FLASH_WHILE_ARMED };
         let endpoint = Endpoint::<OBS, INWARD>::new(Guard::full(&[], MAX_AGE), facts, settings);
-        let (safety, state) = (Locked(cx.shared.safety), State::default());
+        let (mut safety, state) = (Locked(cx.shared.safety), State::default());
+        let watched = watchdog.start(PATIENCE);
+        safety.with(|safety| safety.check(Check::Watchdog, watched));
         let mut work =
             Work { port, watchdog, safety, endpoint, updates, rates: *rates, stack: start::stack, out, state };
         loop {

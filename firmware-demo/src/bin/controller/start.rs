@@ -1,5 +1,7 @@
 //! What the start finds: the cause of the reset, the image, the stack.
 
+use core::cell::Cell;
+
 use actq_boards::device::WATCHDOG_NMI;
 use actq_boards::seams::Cause;
 use actq_controller::breadcrumb::Record;
@@ -26,16 +28,28 @@ pub(crate) fn built_in() -> &'static [u8] {
     slot.unwrap_or(&BUILT_IN.0)
 }
 
+/// The memory of the slots for updates; none where the image that a debugger has put into the same memory is the one that runs.
+///
+/// # Safety
+///
+/// To be called once.
+pub(crate) unsafe fn slots() -> &'static [Cell<u8>] {
+    // SAFETY: as the caller promises.
+    let memory = unsafe { slot::updates() };
+    let is_taken = memory.as_ptr_range().contains(&built_in().as_ptr().cast());
+    if is_taken { &[] } else { memory }
+}
+
 /// Whose images the link may bring: anyone's.
 #[cfg(not(feature = "signed"))]
 pub(crate) fn authority() -> Option<actq_controller::slots::Anyone> {
     Some(actq_controller::slots::Anyone)
 }
 
-/// Whose images the link may bring: those of the build's key; nobody's, where its digits are no point of the curve.
+/// Whose images the link may bring: those of the build's key. The build script has seen that it is one.
 #[cfg(feature = "signed")]
 pub(crate) fn authority() -> Option<actq_controller::slots::Key> {
-    const KEY: [u8; 32] = match actq_firmware_demo::key::parse(env!(
+    const KEY: [u8; 32] = match actq_controller::slots::Key::parse(env!(
         "ACTQ_PUBLIC_KEY",
         "set ACTQ_PUBLIC_KEY to the public key's 64 hexadecimal digits, which `actq keygen` prints; `cargo xtask firmware --key` does"
     )) {

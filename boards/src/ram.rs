@@ -84,3 +84,24 @@ impl<const UNIT: usize, const SECTOR: usize> NorFlash for Ram<'_, UNIT, SECTOR> 
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ram_has_the_rules_of_flash() {
+        let mut memory = [7; 64];
+        let mut ram = Ram::<4, 16>::new(&mut memory);
+        assert_eq!(ram.write(0, &[1; 4]), Err(RamError::Programmed), "not erased");
+        assert_eq!(ram.erase(0, 32), Ok(()));
+        assert_eq!(ram.write(4, &[1; 8]), Ok(()));
+        assert_eq!(ram.write(8, &[1; 4]), Err(RamError::Programmed));
+        assert_eq!([ram.erase(4, 16), ram.erase(0, 8), ram.write(2, &[0; 4])], [Err(RamError::Alignment); 3]);
+        assert_eq!([ram.erase(32, 16), ram.erase(48, 80), ram.write(64, &[0; 4])], [Err(RamError::Bounds); 3]);
+        let mut bytes = [0; 16];
+        assert_eq!(ram.read(3, &mut bytes), Ok(()));
+        assert_eq!(bytes, [255, 1, 1, 1, 1, 1, 1, 1, 1, 255, 255, 255, 255, 255, 255, 255]);
+        assert_eq!(ram.read(50, &mut bytes), Err(RamError::Bounds));
+    }
+}

@@ -1,0 +1,264 @@
+//! The flash controller of an STM32F405 for tests, with the rules of RM0090, section 3, and a supply that may fail in the course of any
+//! write. A rule that only a wrong driver breaks, and that the part has no flag for, panics.
+
+use core::cell::Cell;
+
+use super::{
+    BSY, DCEN, DCRST, ICEN, ICRST, KEYS, LOCK, PG, PGAERR, PGPERR, PGSERR, Part, Register, SECTORS, SER, SNB, STRT,
+    WORDS, WRPERR, sector,
+};
+
+/// The widths that PSIZE has.
+const PSIZE: u32 = 0b11 << 8;
+
+/// A part with flash from some sector on.
+#[derive(Clone, Debug)]
+pub struct Model {
+    memory: Vec<Cell<u8>>,
+    begin: u32,
+    access: u32,
+    status: Cell<u32>,
+    control: u32,
+    /// Keys that were right so far; `None` after a wrong one, until a reset.
+    keys: Option<usize>,
+    /// Reads of the status until what was begun has ended.
+    left: Cell<u32>,
+    is_patient: bool,
+    /// What the caches have was erased.
+    pub is_stale: bool,
+    /// Reads of the status that an operation takes.
+    pub takes: u32,
+    /// Sectors that are write-protected, a bit each.
+    pub protected: u32,
+    /// Flags that the next operation raises, instead of being done.
+    pub raises: u32,
+    /// The power stage is on.
+    pub is_driving: bool,
+    /// The supply is high enough.
+    pub is_supplied: bool,
+    /// The watchdog takes another time.
+    pub is_lenient: bool,
+    /// There is a controller: without one, as in QEMU, all its registers read as 0.
+    pub is_there: bool,
+    /// Writes to registers and memory so far.
+    pub done: usize,
+    /// In the course of which of these the supply fails. From there on nothing changes, and registers read as 0.
+    pub fails_at: Option<usize>,
+    random: u64,
+}
+
+/// What becomes of a write.
+#[derive(PartialEq, Eq)]
+enum Outcome {
+    Whole,
+    Part,
+    Nothing,
+}
+
+impl Model {
+    /// After power-on: locked, both caches on, with `memory` as the flash from `begin` on.
+    pub fn new(memory: Vec<u8>, begin: u32, seed: u64) -> Self {
+        Self {
+            memory: memory.into_iter().map(Cell::new).collect(),
+            begin,
+            access: ICEN | DCEN,
+            status: Cell::new(0),
+            control: LOCK,
+            keys: Some(0),
+            left: Cell::new(0),
+            is_patient: false,
+            is_stale: false,
+            takes: 2,
+            protected: 0,
+            raises: 0,
+            is_driving: false,
+            is_supplied: true,
+            is_lenient: true,
+            is_there: true,
+            done: 0,
+            fails_at: None,
+            random: seed,
+        }
+    }
+
+    /// Power goes and comes back.
+    #[must_use]
+    pub fn restarted(self) -> Self {
+        Self { memory: self.memory, ..Self::new(Vec::new(), self.begin, self.random) }
+    }
+
+    /// The memory's bytes.
+    pub fn bytes(&self) -> Vec<u8> {
+        self.memory.iter().map(Cell::get).collect()
+    }
+
+    fn outcome(&mut self) -> Outcome {
+        let outcome = match self.fails_at {
+            Some(at) if self.done == at => Outcome::Part,
+            Some(at) if self.done > at => return Outcome::Nothing,
+            _ => Outcome::Whole,
+        };
+        self.done += 1;
+        outcome
+    }
+
+    fn is_off(&self) -> bool {
+        !self.is_there || self.fails_at.is_some_and(|at| self.done > at)
+    }
+
+    /// SplitMix64.
+    fn random(&mut self) -> u8 {
+        self.random = self.random.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut bits = self.random;
+        bits = (bits ^ bits >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        bits = (bits ^ bits >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (bits ^ bits >> 31) as u8
+    }
+
+    fn raise(&self, flags: u32) {
+        self.status.set(self.status.get() | flags);
+    }
+
+    fn begins(&self) {
+        self.raise(BSY);
+        self.left.set(self.takes);
+    }
+
+    fn erase(&mut self, outcome: &Outcome) {
+        let number = self.control >> SNB & 0xf;
+        assert!(number < SECTORS && self.control & PG == 0, "no such erase: {:#x}", self.control);
+        assert!(self.is_patient && !self.is_driving && self.is_supplied, "an erase that must not begin");
+        let protected = if self.protected & 1 << number == 0 { 0 } else { WRPERR };
+        if self.raises | protected != 0 {
+            return self.raise(self.raises | protected);
+        }
+        // Some bits are ones already. How many depends on the moment: few, about half, or almost all.
+        let moment = self.random() % 3;
+        let begin = self.begin;
+        for at in sector(number).map(|at| (at - begin) as usize) {
+            let ones = match outcome {
+                Outcome::Whole => 0xff,
+                _ => {
+                    let [a, b, c] = [self.random(), self.random(), self.random()];
+                    [a & b & c, a, a | b][usize::from(moment)]
+                }
+            };
+            self.memory[at].set(self.memory[at].get() | ones);
+        }
+        self.is_stale |= self.access & (ICEN | DCEN) != 0;
+        self.begins();
+    }
+
+    fn control(&mut self, value: u32, outcome: &Outcome) {
+        // The bus stalls until the end.
+        self.left.set(0);
+        self.status.set(self.status.get() & !BSY);
+        if self.control & LOCK != 0 {
+            return;
+        }
+        self.control = value & !STRT;
+        if value & LOCK != 0 {
+            self.keys = self.keys.map(|_| 0);
+        } else if value & (SER | STRT) == SER | STRT {
+            self.erase(outcome);
+        }
+    }
+
+    fn key(&mut self, value: u32) {
+        let place = self.keys.filter(|place| self.control & LOCK != 0 && KEYS.get(*place) == Some(&value));
+        self.keys = place.map(|place| place + 1);
+        match self.keys {
+            Some(2) => self.control &= !LOCK,
+            Some(_) => {}
+            None => self.control |= LOCK,
+        }
+    }
+}
+
+impl Part for Model {
+    fn read(&self, register: Register) -> u32 {
+        if self.is_off() {
+            return 0;
+        }
+        match register {
+            Register::Access => self.access,
+            Register::Key => 0,
+            Register::Control => self.control,
+            Register::Status => {
+                let status = self.status.get();
+                match self.left.get() {
+                    0 => self.status.set(status & !BSY),
+                    left => self.left.set(left - 1),
+                }
+                self.status.get()
+            }
+        }
+    }
+
+    fn write(&mut self, register: Register, value: u32) {
+        let outcome = self.outcome();
+        // A register is set or not.
+        let is_start = register == Register::Control && value & STRT != 0;
+        if !self.is_there || outcome == Outcome::Nothing || outcome == Outcome::Part && !is_start {
+            return;
+        }
+        match register {
+            Register::Access => {
+                assert!(value & (ICRST | DCRST) == 0 || value & (ICEN | DCEN) == 0, "a cache that is on is flushed");
+                self.is_stale &= value & (ICRST | DCRST) != ICRST | DCRST;
+                self.access = value;
+            }
+            Register::Key => self.key(value),
+            Register::Status => self.status.set(self.status.get() & !(value & !BSY)),
+            Register::Control => self.control(value, &outcome),
+        }
+    }
+
+    fn memory(&self) -> &[Cell<u8>] {
+        &self.memory
+    }
+
+    fn program(&mut self, at: u32, word: u32) {
+        let outcome = self.outcome();
+        if !self.is_there || outcome == Outcome::Nothing {
+            return;
+        }
+        assert!(self.status.get() & BSY == 0 && !self.is_driving && self.is_supplied, "a write that must not begin");
+        let number = (0..SECTORS).find(|number| sector(*number).contains(&(self.begin + at)));
+        if self.raises != 0 {
+            self.raise(self.raises);
+        } else if self.control & (LOCK | PG) != PG {
+            self.raise(PGSERR);
+        } else if !at.is_multiple_of(4) && at % 16 > 12 {
+            self.raise(PGAERR);
+        } else if self.control & PSIZE != WORDS {
+            self.raise(PGPERR);
+        } else if number.is_none_or(|number| self.protected & 1 << number != 0) {
+            self.raise(WRPERR);
+        } else {
+            for (at, byte) in (at as usize..).zip(word.to_le_bytes()) {
+                let kept = if outcome == Outcome::Part { self.random() } else { 0 };
+                self.memory[at].set(self.memory[at].get() & (byte | kept));
+            }
+            self.begins();
+        }
+    }
+
+    fn is_driving(&self) -> bool {
+        self.is_driving
+    }
+
+    fn is_supplied(&self) -> bool {
+        self.is_supplied
+    }
+
+    fn patiently<R>(&mut self, work: impl FnOnce(&mut Self) -> R) -> Option<R> {
+        if !self.is_lenient {
+            return None;
+        }
+        self.is_patient = true;
+        let outcome = work(self);
+        self.is_patient = false;
+        Some(outcome)
+    }
+}
