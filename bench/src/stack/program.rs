@@ -1,6 +1,7 @@
 //! What an ELF file says of a program, as far as its stack depends on it.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 use std::path::Path;
 
 use anyhow::{Context as _, Result};
@@ -8,6 +9,10 @@ use object::{FileFlags, Object as _, ObjectSection as _, ObjectSymbol as _, Sect
 
 /// The section of the vector table, whose addresses the processor calls.
 const VECTORS: &str = ".vector_table";
+
+/// The image that is built in (`firmware-demo/src/bin/controller/start.rs`): it holds no addresses, and a hundred thousand bytes that may look
+/// like some.
+const IMAGE: &str = "controller::start::BUILT_IN";
 
 /// A function.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -29,6 +34,8 @@ pub(super) struct Program {
     pub(super) functions: BTreeMap<u32, Function>,
     /// Where code (true) and where data among it begins: the mapping symbols of Arm's ELF (IHI 0044, section 5.5.5).
     pub(super) marks: BTreeMap<u32, bool>,
+    /// The addresses of what holds no pointers.
+    pub(super) weights: Range<u32>,
     /// Symbols of the linker's script.
     pub(super) symbols: BTreeMap<String, u32>,
     /// The vector table: the stack's begin, then the addresses of the handlers, with the Thumb bit.
@@ -54,15 +61,17 @@ impl Program {
         }
         for symbol in file.symbols() {
             let (name, address, size) = (symbol.name()?, symbol.address() as u32, symbol.size() as u32);
+            let demangled = format!("{:#}", rustc_demangle::demangle(name));
             if symbol.kind() == SymbolKind::Text {
-                let address = address & !1;
-                let name = format!("{:#}", rustc_demangle::demangle(name));
+                let (name, address) = (demangled, address & !1);
                 // Several names of one function: the one that has its size.
                 if size > 0 || !program.functions.contains_key(&address) {
                     program.functions.insert(address, Function { name, address, size });
                 }
             } else if let Some(is_code @ ("t" | "d")) = name.strip_prefix('$').and_then(|name| name.get(..1)) {
                 program.marks.insert(address, is_code == "t");
+            } else if demangled.starts_with(IMAGE) {
+                program.weights = address..address.saturating_add(size);
             } else {
                 program.symbols.insert(name.to_owned(), address);
             }
@@ -116,7 +125,7 @@ impl Program {
             let skip = (start.next_multiple_of(4) - start) as usize;
             let words = bytes.get(skip..).unwrap_or_default().chunks_exact(4).map(word);
             for (address, value) in (start.next_multiple_of(4)..).step_by(4).zip(words) {
-                if !self.is_code(address) {
+                if !self.is_code(address) && !self.weights.contains(&address) {
                     note(value);
                 }
             }
