@@ -41,6 +41,12 @@ fn program(functions: &[&[u16]]) -> Program {
     program
 }
 
+/// A function with so many bytes of stack that calls nothing.
+fn leaf(bytes: u16) -> [u16; 3] {
+    let words = bytes / 4;
+    [0xb080 | words, 0xb000 | words, BX_LR]
+}
+
 fn frame_of(halves: &[u16]) -> Result<u32> {
     let program = program(&[halves]);
     Ok(frame(&program, &program.functions[&at(0)])?.bytes)
@@ -50,7 +56,10 @@ fn refused(halves: &[u16]) -> String {
     format!("{:#}", frame_of(halves).expect_err("it is refused"))
 }
 
-fn path(program: &Program) -> Result<(u32, Vec<(String, u32, bool)>)> {
+type Named = (String, u32, bool);
+
+/// The stack of the first function, and its deepest way: names, bytes, and whether the next one is called by a pointer.
+fn path(program: &Program) -> Result<(u32, Vec<Named>)> {
     let mut depths = Depths::new(program);
     let calls = depths.path(at(0))?.into_iter().map(|call| (call.function, call.frame, call.by_pointer)).collect();
     Ok((depths.of(at(0))?, calls))
@@ -148,7 +157,6 @@ fn a_callee_that_does_not_return_ends_the_way() -> Result<()> {
 #[test]
 fn a_pointer_may_point_to_all_whose_address_is_taken() -> Result<()> {
     let f0 = [PUSH_R4_LR, BLX_R3, POP_R4_PC];
-    let leaf = |bytes: u16| [0xb080 | bytes / 4, 0xb000 | bytes / 4, BX_LR];
     let mut by_constant = program(&[&f0, &leaf(16), &leaf(32), &leaf(64)]);
     let told = format!("{:#}", path(&by_constant).expect_err("there is nothing to point to"));
     assert_eq!(told, "f0 calls by a pointer, and no function's address is taken");
@@ -198,7 +206,6 @@ fn the_stack_may_begin_anew() -> Result<()> {
 
 #[test]
 fn every_priority_adds_its_deepest_handler() -> Result<()> {
-    let leaf = |bytes: u16| [0xb080 | bytes / 4, 0xb000 | bytes / 4, BX_LR];
     let mut program = program(&[&leaf(100), &leaf(8), &leaf(16), &leaf(32), &leaf(64), &leaf(4), &leaf(12)]);
     let vectors =
         [at(0), at(1), at(2), at(3), at(3), at(4), 0, at(5), at(6)].map(|address| address | u32::from(address != 0));
