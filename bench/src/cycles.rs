@@ -376,21 +376,6 @@ pub struct Cost {
     pub cycles: u64,
 }
 
-/// Bytes that an instruction subtracts from the stack pointer (SUB (SP minus immediate); Arm DDI 0403E, A7.7.176 and A5.3.2).
-fn frame(first: u16, second: u16) -> u32 {
-    let plain = u32::from(first >> 10 & 1) << 11 | u32::from(second >> 12 & 7) << 8 | u32::from(second & 0xff);
-    match (first & 0xfbff, second & 0x8f00) {
-        _ if first & 0xff80 == 0xb080 => u32::from(first & 0x7f) * 4,
-        (0xf2ad, 0x0d00) => plain,
-        (0xf1ad, 0x0d00) if plain < 0x100 => plain,
-        // A size in a register, which may be any.
-        _ if first == 0xebad && second & 0x0f00 == 0x0d00 => u32::MAX,
-        // Bytes that are repeated are no frame's size.
-        (0xf1ad, 0x0d00) if plain >= 0x400 => (0x80 | plain & 0x7f).rotate_right(plain >> 7),
-        _ => 0,
-    }
-}
-
 impl Code {
     /// Reads the code of an ELF file.
     pub fn read(elf: &Path) -> Result<Self> {
@@ -419,14 +404,6 @@ impl Code {
     /// All functions, by address.
     pub fn functions(&self) -> &[Function] {
         &self.functions
-    }
-
-    /// Bytes of the largest frame that a function takes from the stack in one instruction, besides what it pushes. Constants between the
-    /// instructions may read as one; so it is an upper bound.
-    pub fn largest_frame(&self, function: &Function) -> u32 {
-        let halves = (function.address..function.address + function.size).step_by(2);
-        let pairs = halves.map(|at| (self.half(at).unwrap_or(0), self.half(at + 2).unwrap_or(0)));
-        pairs.map(|(first, second)| frame(first, second)).max().unwrap_or(0)
     }
 
     fn half(&self, address: u64) -> Option<u16> {
@@ -545,13 +522,6 @@ mod tests {
         let decoded = Instruction::decode(halves[0], halves[1]);
         let expected = (size, class, writes, address);
         assert_eq!((decoded.size, decoded.class, decoded.writes, decoded.address), expected, "{halves:x?}");
-    }
-
-    #[test]
-    fn frames_are_what_the_stack_pointer_loses() {
-        // sub sp, #268; sub.w sp, sp, #1264; subw sp, sp, #2808; sub.w r0, sp, #8; sub.w sp, sp, r0.
-        assert_eq!([frame(0xb0c3, 0), frame(0xf5ad, 0x6d9e), frame(0xf6ad, 0x2df8)], [268, 1264, 2808]);
-        assert_eq!([frame(0xf1ad, 0x0008), frame(0xebad, 0x0d00)], [0, u32::MAX]);
     }
 
     #[test]

@@ -100,7 +100,7 @@ pub fn controller_with(target: Target, image: &Path) -> Result<PathBuf> {
 
 fn controller_in_folder(target: Target, features: &str, key: &str, image: &Path) -> Result<PathBuf> {
     let image = fs::canonicalize(image).with_context(|| format!("{}: cannot be read", image.display()))?;
-    let environment = [("ACTQ_IMAGE", &*image.to_string_lossy()), ("ACTQ_PUBLIC_KEY", key)];
+    let environment = [("ACTQ_IMAGE", &*image.to_string_lossy()), ("ACTQ_PUBLIC_KEY", key), ("DEFMT_LOG", "info")];
     let more = if features.is_empty() { String::new() } else { format!(",{features}") };
     let all = target.board().name.to_owned() + &more;
     build(APPLICATION, &[CONTROLLER], &all, &target_dir(), target, target.profile(), &environment)

@@ -1,5 +1,5 @@
 //! What the tests and the measuring commands share: the firmware, built and under QEMU, counted instructions and modelled cycles,
-//! golden kernel cases, drawn networks, the command `actq`, closed loops, the comparison of methods, llama.cpp's K-quants.
+//! the most stack of the application, golden kernel cases, drawn networks, the command `actq`, closed loops, the comparison of methods, llama.cpp's K-quants.
 #![forbid(unsafe_code)]
 
 pub mod closed_loop;
@@ -15,6 +15,7 @@ pub mod networks;
 pub mod profile;
 pub mod qemu;
 mod shared;
+pub mod stack;
 pub mod uart;
 
 use std::path::PathBuf;

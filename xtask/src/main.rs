@@ -1,5 +1,5 @@
 //! What people and CI type: `cargo demo`, `cargo verify`, `cargo xtask bench`, `cargo xtask budgets`, `cargo xtask fit`,
-//! `cargo xtask compare`, `cargo xtask faults`, `cargo xtask firmware`, `cargo xtask doctor`.
+//! `cargo xtask compare`, `cargo xtask faults`, `cargo xtask firmware`, `cargo xtask stack`, `cargo xtask doctor`.
 //!
 //! This crate depends on next to nothing, so that it is built and speaks at once. What measures is the binary of `actq-bench`.
 #![forbid(unsafe_code)]
@@ -23,11 +23,12 @@ Commands of the actq workspace. Usage: cargo xtask COMMAND
   compare  Compare the quantizer's methods: held-out error, true bits, closed-loop success
   firmware Build the motor controller for a board: --board NAME [--image F.actq] --out FILE.elf; --list shows the boards
   faults   Drive an arm through the serial port of the controller in QEMU, with faults on the line
+  stack    Show the most stack that the controller can take, from the calls in its ELF file: --board NAME, or --elf FILE
   fit      Measure the cost model's rates anew (after every change of the kernels)
   verify   Everything that CI checks: format, lints, documentation, tests on the host and under QEMU, budgets
   doctor   Check and install what the other commands need: Rust targets and QEMU
 
-demo, bench, budgets, compare, faults, fit and firmware show their options with --help.";
+demo, bench, budgets, compare, faults, fit, firmware and stack show their options with --help.";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -43,6 +44,9 @@ fn main() -> ExitCode {
             }
         },
         ["compare", ..] => measuring(&words),
+        ["stack", ..] => firmware::boards()
+            .try_for_each(|(target, _)| setup::rust_target(target.triple()))
+            .and_then(|()| measuring(&words)),
         ["demo" | "bench" | "faults" | "fit", ..] => measure(&words, &[Target::Fpu]),
         ["budgets", ..] => measure(&words, &[Target::Fpu, Target::M33]),
         ["help" | "-h" | "--help"] => {

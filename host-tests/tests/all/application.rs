@@ -12,6 +12,7 @@ use actq_bench::controller::{Controller, PATIENCE, act, until};
 use actq_bench::cycles::{Code, Function};
 use actq_bench::firmware::{self, built_in, halfword_at};
 use actq_bench::networks::Builder;
+use actq_bench::stack::worst_case;
 use actq_boards::Clock;
 use actq_device::client::Client;
 use actq_device::keys;
@@ -263,15 +264,22 @@ fn a_stack_that_overflows_leaves_where_it_was() -> Result<()> {
     Ok(())
 }
 
-/// No frame leaps over the guard, 4 KB, of the boards that have no limit of the stack.
+/// Whatever is called and whatever interrupts it, the stack has room; and no frame leaps over the guard, 4 KB, of the boards that have no
+/// limit of the stack. `cargo xtask budgets` holds what was measured below.
 #[test]
-fn no_frame_of_the_application_is_larger_than_the_guard() -> Result<()> {
-    for target in [Target::Fpu, Target::M7, Target::F405] {
-        let code = Code::read(&firmware::controller(target, "")?)?;
-        let largest = code.functions().iter().map(|function| (code.largest_frame(function), &function.name)).max();
-        let (bytes, name) = largest.context("there are functions")?;
-        assert!((1024..4096).contains(&bytes), "{target:?}: {name} has a frame of {bytes} bytes");
+fn the_stack_has_room_for_the_deepest_calls_and_interrupts() -> Result<()> {
+    let foc = [Target::Fpu, Target::M33].map(|target| (target, "foc"));
+    for (target, features) in BOARDS.map(|target| (target, "")).into_iter().chain(foc) {
+        let worst = worst_case(&firmware::controller(target, features)?)?;
+        assert!((4096..=worst.room).contains(&worst.bytes()), "{target:?}: {} of {}", worst.bytes(), worst.room);
+        let (name, bytes) = worst.frames.iter().max_by_key(|(_, bytes)| bytes).context("there are functions")?;
+        assert!((1024..4096).contains(bytes), "{target:?}: {name} has a frame of {bytes} bytes");
+        // The loop, the serial port, the tick, the faults, a hard fault, and what cannot be masked.
+        assert_eq!(worst.levels.len(), 6, "{target:?}: {:?}", worst.levels);
     }
+    let recursion =
+        worst_case(&firmware::controller(Target::Fpu, "faults")?).expect_err("it calls itself when asked to");
+    assert!(format!("{recursion:#}").contains("recurse calls itself"), "{recursion:#}");
     Ok(())
 }
 

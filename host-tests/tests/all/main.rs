@@ -17,6 +17,7 @@ mod flow;
 mod format;
 mod functions;
 mod heads;
+mod logs;
 mod malformed;
 mod memory;
 mod ops;

@@ -6,14 +6,16 @@ use actq::measure::eval;
 use actq::runtime::ImageBuffer;
 use actq_bench::controller::{Controller, act, until};
 use actq_bench::qemu::Counter;
+use actq_bench::stack::worst_case;
 use actq_bench::{Target, evaluation, firmware, ur3};
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 
 /// Bytes of flash of the application without its image.
 pub(crate) const FLASH: &str = "bytes of flash, application on ";
 /// Bytes of RAM of the application without its scratch memory: variables and stack.
 pub(crate) const RAM: &str = "bytes of RAM, application on ";
 const STACK: &str = "bytes of stack, application on ";
+const MOST_STACK: &str = "bytes of stack at most, application on ";
 const STEP: &str = "instructions of an evaluation, ur3_reach at 3 bits, rounded, on ";
 
 /// Steps that the application runs before its stack is looked at: chunks of several evaluations.
@@ -31,6 +33,13 @@ pub(crate) fn measure(counter: &Counter) -> Result<Vec<(String, u64)>> {
         let scratch = board.application.context("the board has no application")?.scratch;
         let elf = firmware::controller(target, "")?;
         let stack = stack(target, &elf, recorded.episode(0))?;
+        let worst = worst_case(&elf)?;
+        let (most, room) = (worst.bytes().into(), worst.room.into());
+        ensure!(
+            stack <= most && most <= room,
+            "{}: {stack} bytes of stack were used, at most {most} can be, and there is room for {room}",
+            board.name
+        );
         let harness = firmware::harness(target)?;
         let step = evaluation::count(counter, target, &harness, None, &image, recorded.episode(0))?;
         let ram = firmware::ram_bytes(&elf)? - 4 * scratch as u64 + stack;
@@ -38,6 +47,7 @@ pub(crate) fn measure(counter: &Counter) -> Result<Vec<(String, u64)>> {
             (FLASH, firmware::flash_bytes(&elf)? - image.bytes() as u64),
             (RAM, ram),
             (STACK, stack),
+            (MOST_STACK, most),
             (STEP, step.instructions),
         ] {
             figures.push((format!("{what}{}", board.name), figure));

@@ -1,5 +1,5 @@
 //! The commands that measure: `cargo demo`, `cargo xtask bench`, `cargo xtask budgets`, `cargo xtask fit`,
-//! `cargo xtask faults`, `cargo xtask compare`. xtask installs what they need, builds this binary and runs it.
+//! `cargo xtask faults`, `cargo xtask compare`, `cargo xtask stack`. xtask installs what they need, builds this binary and runs it.
 #![forbid(unsafe_code)]
 
 mod bench;
@@ -10,6 +10,7 @@ mod faults;
 mod fit;
 mod heads;
 mod kernels;
+mod stack;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -60,6 +61,15 @@ enum Command {
         #[arg(long)]
         update: bool,
     },
+    /// Show the most stack that the application can take, from the calls in its ELF file
+    Stack {
+        /// Build it for this board
+        #[arg(long, required_unless_present = "elf")]
+        board: Option<String>,
+        /// A file that `cargo xtask firmware` has made
+        #[arg(long, conflicts_with = "board")]
+        elf: Option<PathBuf>,
+    },
     /// Measure the cost model's rates anew (after every change of the kernels)
     Fit,
     /// Compare the methods at equal budgets: held-out error, true bits, closed-loop success
@@ -77,6 +87,8 @@ fn main() -> ExitCode {
         Command::Bench { json, wait_states, by_function } => bench::run(json.as_deref(), wait_states, by_function),
         Command::Budgets { update } => budgets::run(update),
         Command::Fit => fit::run(),
+        Command::Stack { board: Some(board), .. } => stack::of_board(&board),
+        Command::Stack { elf, .. } => stack::show(&elf.unwrap_or_default()),
         Command::Compare(plan) => compare::run(&plan),
     };
     match outcome {

@@ -200,6 +200,12 @@ mod app {
             });
             work.endpoint.facts.image = head.as_ref().map_or(0, |head| head.image().crc());
             work.endpoint.facts.slot = work.updates.running().map_or(BUILT_IN, |slot| slot as u8);
+            info!(
+                "image {=u32:08x} of slot {=u8}, refusal {=u8}",
+                work.endpoint.facts.image,
+                work.endpoint.facts.slot,
+                refusal.map_or(0, Refusal::code),
+            );
             let mut running = head.ok().map(|head| Running::new(head, bytes));
             let candidate = loop {
                 let times = timing.lock(|timing| *timing);

@@ -263,7 +263,7 @@ actq_w2_paired_group:
     ldr r5, [sp, #112]
     cmp r5, #0
     bne.w 8f
-    cmp r3, #0
+    movs r4, #1
     b.n 2f
     .balign 4
 3:

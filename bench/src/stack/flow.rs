@@ -1,0 +1,275 @@
+//! How deep a function's own stack is, and how deep it is where it calls, by following its instructions on all ways.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use anyhow::{Context as _, Result, bail, ensure};
+
+use super::program::{Function, Half, Program};
+use super::step::{LR, Step, zero_behind};
+use crate::cycles::{Class, Instruction};
+
+/// Registers that a call may change: r0 to r3, r12 and the link register (AAPCS).
+const CHANGED: u32 = 0x500f;
+
+/// What an assembler fills words with, where it does not take 0.
+const NOP: u16 = 0xbf00;
+
+/// What a function calls.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Callee {
+    /// The function at an address.
+    Function(u32),
+    /// What a pointer points to.
+    Pointer,
+}
+
+/// A function's stack.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Frame {
+    /// Bytes, at most.
+    pub(super) bytes: u32,
+    /// Bytes at the calls of each function, at most.
+    pub(super) calls: BTreeMap<Callee, u32>,
+}
+
+/// What is known before an instruction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct State {
+    /// Bytes of stack.
+    depth: i32,
+    /// The registers that hold the return address.
+    link: u32,
+    /// The flag Z.
+    zero: Option<bool>,
+}
+
+/// Follows a function from its begin. An error says which instruction is not understood, or which two ways contradict each other.
+pub(super) fn frame(program: &Program, function: &Function) -> Result<Frame> {
+    let mut walk = Walk {
+        program,
+        function,
+        frame: Frame::default(),
+        known: BTreeMap::new(),
+        left: Vec::new(),
+        reached: BTreeSet::new(),
+    };
+    walk.meet(function.address, State { depth: 0, link: 1 << LR, zero: None })?;
+    while let Some(place @ (at, _)) = walk.left.pop() {
+        let state = walk.known[&place];
+        for (next, state) in walk.step(at, state)? {
+            walk.meet(next, state)?;
+        }
+    }
+    walk.all_is_reached()?;
+    Ok(walk.frame)
+}
+
+struct Walk<'p> {
+    program: &'p Program,
+    function: &'p Function,
+    frame: Frame,
+    /// What is known where ways come to. A kernel may have more on its stack where the flag Z is set: these are two places.
+    known: BTreeMap<(u32, Option<bool>), State>,
+    /// Places from which the ways have still to be followed.
+    left: Vec<(u32, Option<bool>)>,
+    /// Addresses of the instructions that were looked at.
+    reached: BTreeSet<u32>,
+}
+
+impl Walk<'_> {
+    /// A way comes to an instruction.
+    fn meet(&mut self, at: u32, state: State) -> Result<()> {
+        let place = (at, state.zero);
+        let before = self.known.get(&place).copied();
+        let depth = before.map_or(state.depth, |before| before.depth);
+        ensure!(depth == state.depth, "{at:#x} is reached with {depth} and with {} bytes of stack", state.depth);
+        let met = State { link: state.link & before.map_or(u32::MAX, |before| before.link), ..state };
+        if before != Some(met) {
+            self.known.insert(place, met);
+            self.left.push(place);
+        }
+        Ok(())
+    }
+
+    fn halves(&self, at: u32) -> Result<[u16; 2]> {
+        let halves = self.program.halves(at).filter(|_| self.holds(at));
+        halves.with_context(|| format!("{at:#x} is reached, where no code of the function is"))
+    }
+
+    fn holds(&self, at: u32) -> bool {
+        at.wrapping_sub(self.function.address) < self.function.size && self.program.is_code(at)
+    }
+
+    /// Where execution may go on behind an instruction, and with what.
+    fn step(&mut self, at: u32, state: State) -> Result<Vec<(u32, State)>> {
+        let [first, second] = self.halves(at)?;
+        let instruction = Instruction::decode(first, second);
+        let step = Step::decode(at, first, second);
+        let next = at + instruction.size as u32;
+        self.reached.insert(at);
+        let mut after = State {
+            link: state.link & !(instruction.writes | instruction.address),
+            zero: zero_behind(state.zero, first, second),
+            ..state
+        };
+        Ok(match step {
+            Step::Next => {
+                // MOV of registers: a copy of the return address.
+                let (from, to) = (u32::from(first >> 3 & 0xf), u32::from(first >> 4 & 8 | first & 7));
+                if first >> 8 == 0x46 && state.link >> from & 1 == 1 {
+                    after.link |= 1 << to;
+                }
+                vec![(next, after)]
+            }
+            Step::Stack(bytes) => {
+                after.depth += bytes;
+                ensure!(after.depth >= 0, "{at:#x} pops what the function has not pushed");
+                // The caller's return address is what a function pushes of the link register, and so what it pops to it.
+                if bytes < 0 && instruction.writes >> LR & 1 == 1 {
+                    after.link |= 1 << LR;
+                }
+                self.frame.bytes = self.frame.bytes.max(after.depth as u32);
+                vec![(next, after)]
+            }
+            Step::SetStack(register) => {
+                // What ends the program begins the stack anew. As if it went on where it was, which is no less.
+                let begin = self.program.symbol("_stack_start")?;
+                let set = self.constant_before(at, register);
+                ensure!(set == Some(begin), "{at:#x} sets the stack pointer, not to the stack's begin");
+                vec![(next, after)]
+            }
+            Step::If { mask, condition } => self.conditional(next, state, mask, condition)?,
+            Step::Conditional { to, zero } => {
+                let may_be = |flag: Option<bool>| flag.is_none_or(|flag| state.zero.is_none_or(|zero| zero == flag));
+                let mut ways = Vec::new();
+                if may_be(zero) {
+                    ways = self.jump(to, State { zero: zero.or(state.zero), ..state });
+                }
+                let other = zero.map(|zero| !zero);
+                if may_be(other) {
+                    ways.push((next, State { zero: other.or(state.zero), ..state }));
+                }
+                ways
+            }
+            Step::Branch(to) => self.jump(to, state),
+            Step::BranchRegister(register) if state.link >> register & 1 == 1 => self.end(at, state)?,
+            Step::BranchRegister(_) => {
+                self.call(Callee::Pointer, state);
+                Vec::new()
+            }
+            Step::Table(size) => self.table(at, size)?.into_iter().map(|to| (to, after)).collect(),
+            Step::Call(_) | Step::CallRegister => {
+                let callee = if let Step::Call(to) = step { Callee::Function(to) } else { Callee::Pointer };
+                self.call(callee, state);
+                after = State { link: after.link & !CHANGED, zero: None, ..after };
+                // Where no code follows, the callee does not return.
+                if self.holds(next) { vec![(next, after)] } else { Vec::new() }
+            }
+            Step::Return(bytes) => self.end(at, State { depth: state.depth - bytes, ..state })?,
+            Step::Trap => Vec::new(),
+            Step::Unknown => bail!("{at:#x}: {first:04x} {second:04x} is not understood"),
+        })
+    }
+
+    fn call(&mut self, callee: Callee, state: State) {
+        let depth = self.frame.calls.entry(callee).or_default();
+        *depth = (*depth).max(state.depth as u32);
+    }
+
+    /// A branch: inside of the function, or a call in place of a return.
+    fn jump(&mut self, to: u32, state: State) -> Vec<(u32, State)> {
+        if to.wrapping_sub(self.function.address) < self.function.size {
+            return vec![(to, state)];
+        }
+        self.call(Callee::Function(to), state);
+        Vec::new()
+    }
+
+    fn end(&self, at: u32, state: State) -> Result<Vec<(u32, State)>> {
+        ensure!(state.depth == 0, "{at:#x} returns with {} bytes of stack left", state.depth);
+        Ok(Vec::new())
+    }
+
+    /// The ways through the instructions behind IT: where the condition holds, and where it does not.
+    fn conditional(&mut self, begin: u32, state: State, mask: u32, condition: u32) -> Result<Vec<(u32, State)>> {
+        let count = 4 - mask.trailing_zeros();
+        let mut ways = Vec::new();
+        'ways: for holds in [true, false] {
+            // Here, and only here, MOVS and others do not set the flags.
+            let (mut at, mut state, mut compared) = (begin, State { zero: None, ..state }, false);
+            for i in 0..count {
+                let [first, second] = self.halves(at)?;
+                let instruction = Instruction::decode(first, second);
+                // The first is executed where the condition holds, another one where its bit of the mask is the condition's.
+                let executed = (i == 0 || mask >> (4 - i) & 1 == condition) == holds;
+                let step = Step::decode(at, first, second);
+                ensure!(!compared || step == Step::Next, "{at:#x} depends on flags that are set behind IT");
+                let sets_flags = instruction.writes & 0x7fff == 0 || instruction.size == 4 && first & 0x10 != 0;
+                compared |= matches!(instruction.class, Class::Alu | Class::FloatMove) && sets_flags;
+                let next = at + instruction.size as u32;
+                if executed {
+                    let mut after = self.step(at, state)?;
+                    after.iter_mut().for_each(|(_, after)| after.zero = None);
+                    match after[..] {
+                        [(to, after)] if to == next => state = after,
+                        _ => {
+                            ways.extend(after);
+                            continue 'ways;
+                        }
+                    }
+                }
+                at = next;
+            }
+            ways.push((at, state));
+        }
+        Ok(ways)
+    }
+
+    /// Where the table behind TBB or TBH leads: it ends where the code goes on, and before what it leads to.
+    fn table(&self, at: u32, size: u32) -> Result<BTreeSet<u32>> {
+        let begin = at + 4;
+        let end = self.program.data_end(begin).filter(|_| !self.program.is_code(begin));
+        let mut end = end.with_context(|| format!("{at:#x} branches by a table that is not marked as data"))?;
+        let mut targets = BTreeSet::new();
+        let mut entry = begin;
+        while entry + size <= end {
+            let half = self.program.halves(entry).unwrap_or_default()[0];
+            let offset = if size == 1 { half & 0xff } else { half };
+            // These fill the last word.
+            if !matches!(offset, 0 | NOP) {
+                let target = begin + 2 * u32::from(offset);
+                targets.insert(target);
+                end = end.min(target);
+            }
+            entry += size;
+        }
+        ensure!(!targets.is_empty(), "{at:#x} branches by an empty table");
+        Ok(targets)
+    }
+
+    /// What MOVW and MOVT have put into a register, right before an instruction.
+    fn constant_before(&self, at: u32, register: u32) -> Option<u32> {
+        let half = |before| self.program.halves(at - before).and_then(Half::decode);
+        let (low, high) = (half(8)?, half(4)?);
+        let fit = !low.is_high && high.is_high && [low.register, high.register] == [register as usize; 2];
+        fit.then_some(high.value << 16 | low.value)
+    }
+
+    /// No code of the function was left out, but what fills a word: the ways that were followed are all.
+    fn all_is_reached(&self) -> Result<()> {
+        let mut at = self.function.address;
+        while at < self.function.address + self.function.size {
+            let size = match self.program.halves(at) {
+                Some([first, second]) if self.program.is_code(at) => {
+                    // The compiler puts UDF behind what does not return.
+                    let fills = matches!(first, NOP | 0) || Step::decode(at, first, second) == Step::Trap;
+                    ensure!(self.reached.contains(&at) || fills, "{at:#x} is not reached: a way into it is missing");
+                    Instruction::decode(first, second).size as u32
+                }
+                _ => 2,
+            };
+            at += size;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,172 @@
+//! What an ELF file says of a program, as far as its stack depends on it.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+use std::path::Path;
+
+use anyhow::{Context as _, Result};
+use object::{FileFlags, Object as _, ObjectSection as _, ObjectSymbol as _, SectionFlags, SymbolKind, elf};
+
+/// The section of the vector table, whose addresses the processor calls.
+const VECTORS: &str = ".vector_table";
+
+/// The image that is built in (`firmware-demo/src/bin/controller/start.rs`): it holds no addresses, and a hundred thousand bytes that may look
+/// like some.
+const IMAGE: &str = "controller::start::BUILT_IN";
+
+/// A function.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Function {
+    /// Name, demangled.
+    pub(super) name: String,
+    /// Address, without the Thumb bit.
+    pub(super) address: u32,
+    /// Bytes.
+    pub(super) size: u32,
+}
+
+/// A program.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Program {
+    /// Bytes by address: code, constants and initial values.
+    pub(super) memory: Vec<(u32, Vec<u8>)>,
+    /// Functions by address.
+    pub(super) functions: BTreeMap<u32, Function>,
+    /// Where code (true) and where data among it begins: the mapping symbols of Arm's ELF (IHI 0044, section 5.5.5).
+    pub(super) marks: BTreeMap<u32, bool>,
+    /// The addresses of what holds no pointers.
+    pub(super) weights: Range<u32>,
+    /// Symbols of the linker's script.
+    pub(super) symbols: BTreeMap<String, u32>,
+    /// The vector table: the stack's begin, then the addresses of the handlers, with the Thumb bit.
+    pub(super) vectors: Vec<u32>,
+    /// Whether floats are passed in the FPU's registers.
+    pub(super) has_fpu: bool,
+}
+
+impl Program {
+    /// Reads an ELF file.
+    pub(super) fn read(path: &Path) -> Result<Self> {
+        let data = std::fs::read(path).with_context(|| format!("{}: cannot be read", path.display()))?;
+        let file = object::File::parse(&*data).with_context(|| format!("{}: not an ELF file", path.display()))?;
+        let mut program = Self::default();
+        for section in file.sections() {
+            let bytes = section.data()?;
+            if section.name() == Ok(VECTORS) {
+                program.vectors = bytes.chunks_exact(4).map(word).collect();
+            } else if matches!(section.flags(), SectionFlags::Elf { sh_flags, .. } if sh_flags & u64::from(elf::SHF_ALLOC) != 0)
+            {
+                program.memory.push((u32::try_from(section.address())?, bytes.to_vec()));
+            }
+        }
+        for symbol in file.symbols() {
+            let (name, address, size) = (symbol.name()?, symbol.address() as u32, symbol.size() as u32);
+            let demangled = format!("{:#}", rustc_demangle::demangle(name));
+            if symbol.kind() == SymbolKind::Text {
+                let (name, address) = (demangled, address & !1);
+                // Several names of one function: the one that has its size.
+                if size > 0 || !program.functions.contains_key(&address) {
+                    program.functions.insert(address, Function { name, address, size });
+                }
+            } else if let Some(is_code @ ("t" | "d")) = name.strip_prefix('$').and_then(|name| name.get(..1)) {
+                program.marks.insert(address, is_code == "t");
+            } else if demangled.starts_with(IMAGE) {
+                program.weights = address..address.saturating_add(size);
+            } else {
+                program.symbols.insert(name.to_owned(), address);
+            }
+        }
+        program.has_fpu =
+            matches!(file.flags(), FileFlags::Elf { e_flags, .. } if e_flags & elf::EF_ARM_ABI_FLOAT_HARD != 0);
+        Ok(program)
+    }
+
+    /// Bytes at an address.
+    pub(super) fn bytes<const N: usize>(&self, address: u32) -> Option<[u8; N]> {
+        self.memory.iter().find_map(|(start, bytes)| {
+            let at = address.checked_sub(*start)? as usize;
+            bytes.get(at..at.checked_add(N)?)?.try_into().ok()
+        })
+    }
+
+    /// The halfword at an address, and the one behind it, or 0.
+    pub(super) fn halves(&self, address: u32) -> Option<[u16; 2]> {
+        let half = |address| Some(u16::from_le_bytes(self.bytes(address)?));
+        Some([half(address)?, half(address.wrapping_add(2)).unwrap_or(0)])
+    }
+
+    /// Whether an address is one of a function's code.
+    pub(super) fn is_code(&self, address: u32) -> bool {
+        let function = self.functions.range(..=address).next_back();
+        function.is_some_and(|(start, function)| address - start < function.size)
+            && self.marks.range(..=address).next_back().is_some_and(|(_, is_code)| *is_code)
+    }
+
+    /// Where the data ends that begins at an address or before.
+    pub(super) fn data_end(&self, address: u32) -> Option<u32> {
+        self.marks.range(address + 1..).find(|(_, is_code)| **is_code).map(|(end, _)| *end)
+    }
+
+    /// A symbol of the linker's script.
+    pub(super) fn symbol(&self, name: &str) -> Result<u32> {
+        self.symbols.get(name).copied().with_context(|| format!("the ELF file has no symbol {name}"))
+    }
+
+    /// What a pointer of the program may point to: every function whose address stands among constants or initial values, or is made by a
+    /// function's MOVW and MOVT of one register. The vector table's functions are the processor's.
+    pub(super) fn taken(&self) -> BTreeSet<u32> {
+        let mut taken = BTreeSet::new();
+        let mut note = |value: u32| {
+            if value & 1 == 1 && self.functions.contains_key(&(value - 1)) {
+                taken.insert(value - 1);
+            }
+        };
+        for (start, bytes) in &self.memory {
+            let skip = (start.next_multiple_of(4) - start) as usize;
+            let words = bytes.get(skip..).unwrap_or_default().chunks_exact(4).map(word);
+            for (address, value) in (start.next_multiple_of(4)..).step_by(4).zip(words) {
+                if !self.is_code(address) && !self.weights.contains(&address) {
+                    note(value);
+                }
+            }
+        }
+        for function in self.functions.values() {
+            // The lower half of the constant in each register: MOVT completes the one that was begun last.
+            let mut low = [None; 16];
+            for at in (function.address..function.address + function.size).step_by(2) {
+                match self.halves(at).and_then(Half::decode) {
+                    Some(Half { register, value, is_high: false }) => low[register] = Some(value),
+                    Some(Half { register, value: high, .. }) => low[register].map_or((), |low| note(high << 16 | low)),
+                    None => {}
+                }
+            }
+        }
+        taken
+    }
+}
+
+/// Half of a constant, by MOVW or MOVT.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Half {
+    pub(super) register: usize,
+    pub(super) value: u32,
+    /// Whether it is the upper half.
+    pub(super) is_high: bool,
+}
+
+impl Half {
+    pub(super) fn decode([first, second]: [u16; 2]) -> Option<Self> {
+        let is_high = match (first & 0xfbf0, second >> 15) {
+            (0xf240, 0) => false,
+            (0xf2c0, 0) => true,
+            _ => return None,
+        };
+        let upper = u32::from(first & 0xf) << 12 | u32::from(first & 0x400) << 1;
+        let value = upper | u32::from(second & 0x7000) >> 4 | u32::from(second & 0xff);
+        Some(Self { register: usize::from(second >> 8 & 0xf), value, is_high })
+    }
+}
+
+fn word(bytes: &[u8]) -> u32 {
+    bytes.iter().rev().fold(0, |word, byte| word << 8 | u32::from(*byte))
+}

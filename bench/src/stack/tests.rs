@@ -1,0 +1,241 @@
+//! The analysis on programs of a few instructions, whose functions stand 256 bytes apart.
+
+use super::depth::Depths;
+use super::flow::{Callee, frame};
+use super::program::{Function, Program};
+use super::*;
+
+const PUSH_R4_LR: u16 = 0xb510;
+const POP_R4_PC: u16 = 0xbd10;
+const SUB_SP_8: u16 = 0xb082;
+const ADD_SP_8: u16 = 0xb002;
+const BX_LR: u16 = 0x4770;
+const BLX_R3: u16 = 0x4798;
+const BX_R3: u16 = 0x4718;
+const NOP: u16 = 0xbf00;
+
+/// The address of a function.
+const fn at(function: u32) -> u32 {
+    0x1000 + 0x100 * function
+}
+
+/// BL (`link`) or B.W at an address.
+fn far(from: u32, to: u32, link: bool) -> [u16; 2] {
+    let offset = to.wrapping_sub(from + 4);
+    let [sign, one, two] = [24, 23, 22].map(|bit| (offset >> bit & 1) as u16);
+    let high = 0xf000 | sign << 10 | (offset >> 12 & 0x3ff) as u16;
+    let jump = if link { 0xd000 } else { 0x9000 };
+    [high, jump | (1 ^ one ^ sign) << 13 | (1 ^ two ^ sign) << 11 | (offset >> 1 & 0x7ff) as u16]
+}
+
+/// A program of functions `f0`, `f1` and so on.
+fn program(functions: &[&[u16]]) -> Program {
+    let mut program = Program::default();
+    for (i, halves) in functions.iter().enumerate() {
+        let address = at(i as u32);
+        program.memory.push((address, halves.iter().flat_map(|half| half.to_le_bytes()).collect()));
+        let size = 2 * halves.len() as u32;
+        program.functions.insert(address, Function { name: format!("f{i}"), address, size });
+        program.marks.insert(address, true);
+    }
+    program
+}
+
+/// A function with so many bytes of stack that calls nothing.
+fn leaf(bytes: u16) -> [u16; 3] {
+    let words = bytes / 4;
+    [0xb080 | words, 0xb000 | words, BX_LR]
+}
+
+fn frame_of(halves: &[u16]) -> Result<u32> {
+    let program = program(&[halves]);
+    Ok(frame(&program, &program.functions[&at(0)])?.bytes)
+}
+
+fn refused(halves: &[u16]) -> String {
+    format!("{:#}", frame_of(halves).expect_err("it is refused"))
+}
+
+type Named = (String, u32, bool);
+
+/// The stack of the first function, and its deepest way: names, bytes, and whether the next one is called by a pointer.
+fn path(program: &Program) -> Result<(u32, Vec<Named>)> {
+    let mut depths = Depths::new(program);
+    let calls = depths.path(at(0))?.into_iter().map(|call| (call.function, call.frame, call.by_pointer)).collect();
+    Ok((depths.of(at(0))?, calls))
+}
+
+#[test]
+fn a_frame_is_the_deepest_of_all_ways() -> Result<()> {
+    // cbz r0: one way takes 8 bytes more, and gives them back.
+    assert_eq!(frame_of(&[PUSH_R4_LR, 0xb108, SUB_SP_8, ADD_SP_8, POP_R4_PC])?, 16);
+    // Stored and loaded one by one, and floats: str r8, [sp, #-4]!; vpush {d8}; vpop {d8}; ldr r8, [sp], #4.
+    assert_eq!(frame_of(&[0xf84d, 0x8d04, 0xed2d, 0x8b02, 0xecbd, 0x8b02, 0xf85d, 0x8b04, BX_LR])?, 12);
+    // A loop without an end.
+    assert_eq!(frame_of(&[SUB_SP_8, 0xe7fe])?, 8);
+    Ok(())
+}
+
+#[test]
+fn instructions_behind_it_are_executed_together_or_not_at_all() -> Result<()> {
+    // itt ne: addne sp, #8; popne {r4, pc}. Then as without.
+    let code = [PUSH_R4_LR, SUB_SP_8, 0xbf1c, ADD_SP_8, POP_R4_PC, SUB_SP_8, 0xb004, POP_R4_PC];
+    assert_eq!(frame_of(&code)?, 24);
+    // ite eq: subeq sp, #8; subne sp, #8.
+    assert_eq!(frame_of(&[0xbf0c, SUB_SP_8, SUB_SP_8, ADD_SP_8, BX_LR])?, 8);
+    // it eq: subeq sp, #8.
+    assert!(refused(&[0xbf08, SUB_SP_8, ADD_SP_8, BX_LR]).contains("is reached with"));
+    // itt eq: cmpeq r1, r0; popeq {r4, pc}.
+    assert!(refused(&[PUSH_R4_LR, 0xbf04, 0x4281, POP_R4_PC, POP_R4_PC]).contains("flags that are set behind IT"));
+    Ok(())
+}
+
+#[test]
+fn ways_that_contradict_each_other_are_refused() {
+    // cbz r0 leaves the 8 bytes out.
+    assert_eq!(
+        refused(&[0xb100, SUB_SP_8, NOP, ADD_SP_8, BX_LR]),
+        "0x1004 is reached with 0 and with 8 bytes of stack"
+    );
+    // A loop that pushes.
+    assert!(refused(&[NOP, SUB_SP_8, 0xe7fc]).contains("0x1000 is reached with"));
+    assert_eq!(refused(&[SUB_SP_8, BX_LR]), "0x1002 returns with 8 bytes of stack left");
+    assert_eq!(refused(&[ADD_SP_8, BX_LR]), "0x1000 pops what the function has not pushed");
+    assert_eq!(refused(&[0x46bd, BX_LR]), "0x1000: 46bd 4770 is not understood"); // mov sp, r7
+    assert_eq!(refused(&[BX_LR, SUB_SP_8]), "0x1002 is not reached: a way into it is missing");
+    assert_eq!(refused(&[SUB_SP_8]), "0x1002 is reached, where no code of the function is");
+}
+
+/// As in the kernels that take groups in pairs: movs r4, #1; b; stmdb sp!, {r2, r7-r9}; cmp.w r0, r0; bne; ldmia sp!, {r2, r7-r9}.
+#[test]
+fn ways_with_the_flag_z_and_without_are_told_apart() -> Result<()> {
+    let mut code = [0x2401, 0xe003, 0xe92d, 0x0384, 0xebb0, 0x0f00, 0xd1fa, 0xe8bd, 0x0384, BX_LR];
+    assert_eq!(frame_of(&code)?, 16);
+    code[0] = 0x2c00; // cmp r4, #0
+    assert!(refused(&code).contains("pops what the function has not pushed"));
+    Ok(())
+}
+
+#[test]
+fn tables_lead_to_all_their_entries() -> Result<()> {
+    // tbb [pc, r0] by 2, 3 and 4, and what fills the last word.
+    let mut program = program(&[&[0xe8df, 0xf000, 0x0302, 0x0004, BX_LR, BX_LR, BX_LR]]);
+    program.marks.extend([(0x1004, false), (0x1008, true)]);
+    let f0 = &program.functions[&at(0)];
+    assert_eq!(frame(&program, f0)?.bytes, 0);
+    program.memory[0].1[6] = 9;
+    assert!(frame(&program, f0).is_err(), "it leads behind the function");
+    program.memory[0].1[6] = 3;
+    assert!(format!("{:#}", frame(&program, f0).expect_err("an entry is missing")).contains("0x100c is not reached"));
+    program.marks.clear();
+    program.marks.insert(at(0), true);
+    assert!(format!("{:#}", frame(&program, f0).expect_err("no data")).contains("not marked as data"));
+    Ok(())
+}
+
+#[test]
+fn calls_and_branches_out_are_calls_at_their_depth() -> Result<()> {
+    let [call, jump] = [far(at(0) + 4, at(1), true), far(at(0) + 12, at(2), false)];
+    // pop.w {r4, lr}; b.w: the second callee takes the place of the first.
+    let f0 = [PUSH_R4_LR, NOP, call[0], call[1], 0xe8bd, 0x4010, jump[0], jump[1]];
+    let program = program(&[&f0, &[SUB_SP_8, ADD_SP_8, BX_LR], &[0xb085, 0xb005, BX_LR]]);
+    let frame = frame(&program, &program.functions[&at(0)])?;
+    assert_eq!(frame.calls, [(Callee::Function(at(1)), 8), (Callee::Function(at(2)), 0)].into());
+    let names = [("f0", 0, false), ("f2", 20, false)].map(|(name, bytes, by)| (name.to_owned(), bytes, by));
+    assert_eq!(path(&program)?, (20, names.to_vec()));
+    Ok(())
+}
+
+#[test]
+fn a_callee_that_does_not_return_ends_the_way() -> Result<()> {
+    let [one, two] = far(at(0) + 2, at(1), true);
+    let program = program(&[&[SUB_SP_8, one, two], &[0xe7fe]]);
+    assert_eq!(path(&program)?.0, 8);
+    Ok(())
+}
+
+#[test]
+fn a_pointer_may_point_to_all_whose_address_is_taken() -> Result<()> {
+    let f0 = [PUSH_R4_LR, BLX_R3, POP_R4_PC];
+    let mut by_constant = program(&[&f0, &leaf(16), &leaf(32), &leaf(64)]);
+    let told = format!("{:#}", path(&by_constant).expect_err("there is nothing to point to"));
+    assert_eq!(told, "f0 calls by a pointer, and no function's address is taken");
+    let word = |function: u32| (at(function) | 1).to_le_bytes().to_vec();
+    by_constant.memory.push((0x8000, [word(1), word(2)].concat()));
+    assert_eq!(path(&by_constant)?.0, 8 + 32);
+    by_constant.weights = 0x8004..0x8008;
+    assert_eq!(path(&by_constant)?.0, 8 + 16);
+    // movw r3, #0x1301; movt r3, #0; bx r3.
+    let by_code = program(&[&[0xf241, 0x3301, 0xf2c0, 0x0300, BX_R3], &leaf(16), &leaf(32), &leaf(64)]);
+    let names = [("f0", 0, true), ("f3", 64, false)].map(|(name, bytes, by)| (name.to_owned(), bytes, by));
+    assert_eq!(path(&by_code)?, (64, names.to_vec()));
+    // mov r3, lr; bx r3: a return.
+    assert_eq!(path(&program(&[&[0x4673, BX_R3]]))?.0, 0);
+    // mov r3, lr; adds r3, #1; bx r3: anything.
+    assert!(path(&program(&[&[0x4673, 0x3301, BX_R3]])).is_err());
+    Ok(())
+}
+
+#[test]
+fn recursion_is_refused() {
+    let [one, two] = far(at(0) + 2, at(1), true);
+    let [back, to] = far(at(1) + 2, at(0), true);
+    let circle = program(&[&[PUSH_R4_LR, one, two, POP_R4_PC], &[PUSH_R4_LR, back, to, POP_R4_PC]]);
+    let told = format!("{:#}", path(&circle).expect_err("it calls itself"));
+    assert_eq!(told, "called by f0: called by f1: f0 calls itself: its stack has no bound");
+    let mut by_pointer = program(&[&[PUSH_R4_LR, BLX_R3, POP_R4_PC]]);
+    by_pointer.memory.push((0x8000, (at(0) | 1).to_le_bytes().to_vec()));
+    assert!(format!("{:#}", path(&by_pointer).expect_err("it may call itself")).contains("f0 calls itself"));
+    let [one, two] = far(at(0), 0x5000, true);
+    let nowhere = program(&[&[one, two, BX_LR]]);
+    let told = format!("{:#}", path(&nowhere).expect_err("there is nothing"));
+    assert!(told.contains("no function begins at 0x5000, which is called"), "{told}");
+}
+
+/// The stack's begin is where what ends the program may set the pointer, and nowhere else.
+#[test]
+fn the_stack_may_begin_anew() -> Result<()> {
+    // sub sp, #8; movw r2, #0x8000; movt r2, #0x2000; msr msp, r2; sub sp, #8; b .
+    let mut program = program(&[&[SUB_SP_8, 0xf248, 0x0200, 0xf2c2, 0x0200, 0xf382, 0x8808, SUB_SP_8, 0xe7fe]]);
+    program.symbols.insert("_stack_start".to_owned(), 0x2000_8000);
+    assert_eq!(path(&program)?.0, 16);
+    program.symbols.insert("_stack_start".to_owned(), 0x2000_4000);
+    assert!(path(&program).is_err());
+    Ok(())
+}
+
+#[test]
+fn every_priority_adds_its_deepest_handler() -> Result<()> {
+    let mut program = program(&[&leaf(100), &leaf(8), &leaf(16), &leaf(32), &leaf(64), &leaf(4), &leaf(12)]);
+    let vectors =
+        [at(0), at(1), at(2), at(3), at(3), at(4), 0, at(5), at(6)].map(|address| address | u32::from(address != 0));
+    program.vectors = [&[0x2000_8000][..], &vectors].concat();
+    program.symbols = [("_stack_start".to_owned(), 0x2000_8000), ("_stack_end".to_owned(), 0x2000_0104)].into();
+    let tasks: BTreeMap<_, _> = [("f5".to_owned(), 2), ("f6".to_owned(), 1)].into();
+    let found = worst(&program, &tasks)?;
+    let levels: Vec<_> = found.levels.iter().map(|level| (level.priority, level.bytes())).collect();
+    let expected = [
+        (Priority::Thread, 100),
+        (Priority::Task(1), 36 + 12),
+        (Priority::Task(2), 36 + 4),
+        (Priority::Fault, 36 + 64),
+        (Priority::HardFault, 36 + 16),
+        (Priority::Nmi, 36 + 8),
+    ];
+    assert_eq!(levels, expected);
+    assert_eq!((found.bytes(), found.room), (100 + 5 * 36 + 12 + 4 + 64 + 16 + 8, 0x8000 - 0x2000));
+    program.has_fpu = true;
+    assert_eq!(worst(&program, &tasks)?.bytes(), found.bytes() + 5 * 72);
+    let missing = [("f7".to_owned(), 2)].into();
+    assert!(format!("{:#}", worst(&program, &missing).expect_err("there is no f7")).contains("f7"));
+    Ok(())
+}
+
+#[test]
+fn priorities_are_those_of_the_source() -> Result<()> {
+    assert_eq!(tasks()?, [("SERIAL".to_owned(), 2), ("SysTick".to_owned(), 3)].into());
+    assert_eq!(bound("#[task(binds = UART0, local = [x])]")?, [("UART0".to_owned(), 1)].into());
+    assert!(bound("#[task(priority = 1)]").is_err());
+    assert!(bound("").is_err());
+    Ok(())
+}
