@@ -12,7 +12,7 @@ use actq::emit::files;
 use actq::graph::Graph;
 use actq::import::FILES;
 use actq::measure::eval;
-use actq::methods::actquant::{ActionStatistics, allocation};
+use actq::methods::actquant::{self, ActionStatistics, allocation};
 use actq::policy::Policy;
 use anyhow::{Context as _, Result, ensure};
 use safetensors::tensor::TensorView;
@@ -49,15 +49,17 @@ pub(super) fn quantize(
     let size = |matrix: usize, choice: usize| Format::ALL[choice].bytes(graph.matrices[matrix].data.len());
     let limit = Rate::BitsPerWeight(budget).bytes(graph.weights());
     let scores = statistics.effective_scores().0;
-    let chosen = allocation::spend(graph, &scores, &Format::ALL.map(Format::bits), size, limit)?;
+    let all = vec![0..Format::ALL.len(); graph.matrices.len()];
+    let bits = |_: usize, choice: usize| f64::from(Format::ALL[choice].bits());
+    let chosen = allocation::spend(graph, &scores, &all, bits, size, limit)?;
     let bytes = chosen.iter().enumerate().map(|(matrix, &choice)| size(matrix, choice)).sum();
     let formats: Vec<Format> = chosen.into_iter().map(|choice| Format::ALL[choice]).collect();
     let tries = [false, true].map(|by_magnitude| -> Result<(f64, Graph)> {
         let mut graph = graph.clone();
-        let importance = statistics.weight_importance();
+        let importance = statistics.weight_importance(&graph);
         for ((matrix, format), mut importance) in graph.matrices.iter_mut().zip(&formats).zip(importance) {
             if by_magnitude {
-                weigh_by_magnitude(&mut importance, &matrix.data, matrix.cols);
+                importance = actquant::by_magnitude(importance, matrix);
             }
             matrix.data = format.rounded(&matrix.data, matrix.cols, &importance);
         }
@@ -67,15 +69,6 @@ pub(super) fn quantize(
     let (plain, by_magnitude) = (plain?, by_magnitude?);
     let (nmse, graph) = if by_magnitude.0 < plain.0 { by_magnitude } else { plain };
     Ok(Simulated { graph, nmse, formats, bytes })
-}
-
-/// Times `sqrt(mean of the row's w^2 + w^2)`, as llama.cpp weighs.
-fn weigh_by_magnitude(importance: &mut [f64], weights: &[f32], cols: usize) {
-    for (importance, row) in importance.chunks_mut(cols.max(1)).zip(weights.chunks(cols.max(1))) {
-        let square = |w: &f32| f64::from(*w).powi(2);
-        let mean = row.iter().map(square).sum::<f64>() / row.len() as f64;
-        importance.iter_mut().zip(row).for_each(|(h, w)| *h *= (mean + square(w)).sqrt());
-    }
 }
 
 /// Writes the policy with the matrices of `graph` into a folder of its own.

@@ -113,7 +113,8 @@ impl<'a> Maker<'a> {
     /// ActQuant in K-quants.
     fn simulate(&self, budget: f64, preparing: f64) -> Result<Attempt> {
         let begun = Instant::now();
-        let (quantizer, _) = self.ready.get(&Method::ActQuant.to_string()).context("the method was not made ready")?;
+        let (quantizer, _) =
+            self.ready.get(&Contender::ActQuantK.method().to_string()).context("the method was not made ready")?;
         let statistics = quantizer.method().action_statistics().context("the method has no statistics")?;
         let policy = &self.subject.policy;
         let simulated = match actquant_k::quantize(&policy.graph, statistics, budget, self.subject.heldout()?) {

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use actq::methods::Method;
+use actq::methods::actquant::choices::Choices;
 use clap::{Args, ValueEnum};
 use serde::{Deserialize, Serialize};
 
@@ -21,6 +22,10 @@ pub enum Contender {
     #[value(name = "actquant")]
     #[serde(rename = "actquant")]
     ActQuant,
+    /// ActQuant in the formats of this project, by its authors' choices
+    #[value(name = "actquant-authors")]
+    #[serde(rename = "actquant-authors")]
+    ActQuantAuthors,
     /// ActQuant in llama.cpp's K-quants, as in its paper, simulated
     #[value(name = "actquant-k")]
     #[serde(rename = "actquant-k")]
@@ -39,7 +44,8 @@ impl Contender {
         match self {
             Self::Rtn => Method::Rtn,
             Self::Gptq => Method::Gptq,
-            Self::ActQuant | Self::ActQuantK => Method::ActQuant,
+            Self::ActQuant | Self::ActQuantK => Method::ActQuant(Choices::default()),
+            Self::ActQuantAuthors => Method::ActQuant(Choices::AUTHORS),
             Self::BestNotLearned | Self::Best => Method::Best,
         }
     }
@@ -55,6 +61,7 @@ impl Contender {
             Self::Rtn => "rtn",
             Self::Gptq => "gptq",
             Self::ActQuant => "actquant",
+            Self::ActQuantAuthors => "actquant, authors' choices",
             Self::ActQuantK => "actquant, K-quants",
             Self::BestNotLearned => "best, not learned",
             Self::Best => "best",
@@ -73,7 +80,7 @@ pub struct Plan {
         default_value = "go1_mlp,g1_lstm256,g1_lstm64,fetch_pickplace,ur3"
     )]
     pub policies: Vec<String>,
-    /// Methods; best-0 is best with --steps 0, not learned
+    /// Methods; best-0 is best with --steps 0, not learned; actquant-authors is not in the default
     #[arg(
         long,
         value_name = "LIST",

@@ -3,6 +3,7 @@
 use actq::budget::Budget;
 use actq::data::Recordings;
 use actq::measure::eval;
+use actq::methods::actquant::choices::Choices;
 use actq::methods::{Method, Options};
 use actq::pipeline;
 use actq::policy::Policy;
@@ -53,5 +54,5 @@ fn best_keeps_its_error_and_every_episode() -> Result<()> {
 #[test]
 fn rivals_keep_their_errors() -> Result<()> {
     hold(Method::Gptq, 3.0, 8.4e-3, 1.25)?;
-    hold(Method::ActQuant, 4.0, 1.56e-2, 2.6)
+    hold(Method::ActQuant(Choices::default()), 4.0, 1.56e-2, 2.6)
 }

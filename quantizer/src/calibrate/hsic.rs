@@ -3,6 +3,20 @@
 
 use ndarray::{Array1, Array2, Axis};
 
+/// How wide a Gaussian kernel is. Either way of an even number of pairs the upper of the two in the middle is the median, and
+/// where it is 0, the mean takes its place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bandwidth {
+    /// `sigma^2` is the median of the squared distances: the usual heuristic, which no scale of the samples changes.
+    Median,
+    /// `sigma` is that median, but at least 0.01: what ActQuant's code does. Samples on a small scale then all seem far apart, those
+    /// on a large one all alike.
+    SquaredMedian,
+}
+
+/// The least `sigma` of [`Bandwidth::SquaredMedian`].
+const LEAST_SIGMA: f64 = 1e-2;
+
 /// A centred kernel matrix `H K H` of n samples.
 #[derive(Clone, Debug)]
 pub struct Kernel(Array2<f64>);
@@ -16,15 +30,17 @@ impl Kernel {
 
     /// The Gaussian kernel `k(a, b) = exp(-|a - b|^2 / (2 sigma^2))` of `samples`, `[sample, element]`.
     ///
-    /// `sigma^2` is the median of `|a - b|^2` over all pairs of different samples (of an even number of pairs, the upper of the
-    /// two in the middle); their mean where the median is 0. Samples that are all equal give a kernel of zeros. This is the usual
-    /// median heuristic, which no scale of the samples changes; ActQuant's code takes that median as `sigma` itself.
-    pub fn gaussian(samples: &Array2<f64>) -> Self {
+    /// `sigma` follows from `|a - b|^2` over all pairs of different samples. Samples that are all equal give a kernel of zeros.
+    pub fn gaussian(samples: &Array2<f64>, bandwidth: Bandwidth) -> Self {
         let mut kernel = squared_distances(samples);
-        let sigma2 = median_or_mean(&kernel);
-        if sigma2 == 0.0 {
+        let median = median_or_mean(&kernel);
+        if median == 0.0 {
             return Self(Array2::zeros(kernel.raw_dim()));
         }
+        let sigma2 = match bandwidth {
+            Bandwidth::Median => median,
+            Bandwidth::SquaredMedian => median.max(LEAST_SIGMA).powi(2),
+        };
         kernel.mapv_inplace(|d| (-d / (2.0 * sigma2)).exp());
         // K is symmetric: its row means are its column means.
         let means = means(&kernel);
@@ -114,9 +130,9 @@ mod tests {
             let (x, y) = (samples(n, 3, 1), samples(n, 2, 2));
             let linear = y.dot(&y.t());
             let gaussian = gaussian_by_definition(&x);
-            let found = hsic(&Kernel::gaussian(&x), &Kernel::linear(&y));
+            let found = hsic(&Kernel::gaussian(&x, Bandwidth::Median), &Kernel::linear(&y));
             assert!((found - definition(&gaussian, &linear)).abs() < 1e-12, "n = {n}");
-            let with_itself = hsic(&Kernel::gaussian(&x), &Kernel::gaussian(&x));
+            let with_itself = hsic(&Kernel::gaussian(&x, Bandwidth::Median), &Kernel::gaussian(&x, Bandwidth::Median));
             assert!((with_itself - definition(&gaussian, &gaussian)).abs() < 1e-12, "n = {n}");
         }
     }
@@ -125,8 +141,8 @@ mod tests {
     fn tells_dependent_from_independent() {
         let (x, other) = (samples(400, 2, 3), samples(400, 1, 4));
         let of_x = Array2::from_shape_fn((400, 1), |(i, _)| (3.0 * x[(i, 0)]).sin());
-        let kernel = Kernel::gaussian(&x);
-        let score = |y: &Array2<f64>| hsic(&kernel, &Kernel::gaussian(y));
+        let kernel = Kernel::gaussian(&x, Bandwidth::Median);
+        let score = |y: &Array2<f64>| hsic(&kernel, &Kernel::gaussian(y, Bandwidth::Median));
         assert!(score(&of_x) > 10.0 * score(&other), "{} against {}", score(&of_x), score(&other));
         assert!(score(&other) < 1e-3);
     }
@@ -134,27 +150,43 @@ mod tests {
     #[test]
     fn neither_kernel_sees_a_translation_nor_the_gaussian_one_a_scale() {
         let (x, y) = (samples(30, 4, 5), samples(30, 2, 6));
-        let base = hsic(&Kernel::gaussian(&x), &Kernel::linear(&y));
-        let moved = hsic(&Kernel::gaussian(&(&x * 7.0 + 40.0)), &Kernel::linear(&(&y - 9.0)));
+        let base = hsic(&Kernel::gaussian(&x, Bandwidth::Median), &Kernel::linear(&y));
+        let moved = hsic(&Kernel::gaussian(&(&x * 7.0 + 40.0), Bandwidth::Median), &Kernel::linear(&(&y - 9.0)));
         assert!((moved - base).abs() < 1e-9 * base, "{moved} against {base}");
+    }
+
+    #[test]
+    fn the_squared_median_is_a_bandwidth_of_its_own() {
+        // Squared distances 1, 4 and 1 * 9: the median is 4, sigma either 2 or 4.
+        let x = Array2::from_shape_vec((3, 1), vec![0.0, 1.0, 3.0]).expect("three samples");
+        for (bandwidth, sigma2) in [(Bandwidth::Median, 4.0), (Bandwidth::SquaredMedian, 16.0)] {
+            let kernel = x.dot(&Array2::ones((1, 3))) - Array2::<f64>::ones((3, 1)).dot(&x.t());
+            let kernel = kernel.mapv(|d| (-d * d / (2.0 * sigma2)).exp());
+            let found = Kernel::gaussian(&x, bandwidth);
+            let expected = definition(&kernel, &x.dot(&x.t()));
+            assert!((hsic(&found, &Kernel::linear(&x)) - expected).abs() < 1e-12, "{bandwidth:?}");
+        }
+        // On so small a scale sigma is the least, and all samples are nearly one.
+        let small = Kernel::gaussian(&(&x * 1e-3), Bandwidth::SquaredMedian);
+        assert!(small.0.iter().all(|k| k.abs() < 0.05), "{small:?}");
     }
 
     #[test]
     fn constant_and_single_samples_give_zero() {
         let y = Kernel::linear(&samples(12, 2, 7));
         for constant in [Array2::from_elem((12, 3), 0.1), Array2::zeros((12, 3)), Array2::zeros((12, 0))] {
-            assert_eq!(hsic(&Kernel::gaussian(&constant), &y), 0.0);
+            assert_eq!(hsic(&Kernel::gaussian(&constant, Bandwidth::Median), &y), 0.0);
             assert!(hsic(&Kernel::linear(&constant), &y).abs() < 1e-12);
         }
         let one = samples(1, 3, 8);
-        assert_eq!(hsic(&Kernel::gaussian(&one), &Kernel::linear(&one)), 0.0);
+        assert_eq!(hsic(&Kernel::gaussian(&one, Bandwidth::Median), &Kernel::linear(&one)), 0.0);
     }
 
     #[test]
     fn mostly_equal_samples_fall_back_to_the_mean_distance() {
         let mut x = Array2::zeros((10, 1));
         x[(0, 0)] = 1.0;
-        let kernel = Kernel::gaussian(&x);
+        let kernel = Kernel::gaussian(&x, Bandwidth::Median);
         let score = hsic(&kernel, &kernel);
         assert!(score.is_finite() && score > 0.0, "{score}");
     }

@@ -5,11 +5,10 @@
 //! weighted by the [Fisher](fisher) information of the action loss, by the same search that plain rounding uses. Where the budget is
 //! one width for all, stage 1 is skipped.
 //!
-//! The paper leaves the action head at 16 bits; here it is quantized like everything else. Its blocks are those of llama.cpp, whose
-//! search also multiplies the importance by `sqrt(mean of the row's w^2 + w^2)`; here the importance stands alone, as in the
-//! paper's objective.
+//! What is done otherwise than in the paper or in its authors' code is a [choice](choices); `docs/QUANTIZER.md` lists all of it.
 
 pub mod allocation;
+pub mod choices;
 pub mod score;
 
 use actq_kernels::layout::Width;
@@ -23,6 +22,7 @@ use crate::budget::Rate;
 use crate::calibrate::fisher;
 use crate::data::Dataset;
 use crate::graph::{Graph, WeightMatrix};
+use choices::Choices;
 use score::Score;
 
 /// Share of the matrix's mean importance that every weight has at least. It decides where no recorded frame says anything, as
@@ -32,6 +32,8 @@ const FLOOR: f64 = 1e-6;
 /// What ActQuant takes from the recorded observations, for any number of budgets.
 #[derive(Clone, Debug)]
 pub struct ActionStatistics {
+    /// What they were taken by, and how they are used.
+    pub choices: Choices,
     /// Stage 1, per matrix.
     pub scores: Vec<Score>,
     /// Stage 2, per matrix `[rows, cols]`.
@@ -40,25 +42,35 @@ pub struct ActionStatistics {
 
 impl ActionStatistics {
     /// Runs the f32 network over `dataset`, which must hold actions. `progress` gets the share done.
-    pub fn collect(graph: &Graph, dataset: &Dataset, progress: impl FnMut(f64)) -> Result<Self> {
+    pub fn collect(graph: &Graph, dataset: &Dataset, choices: Choices, progress: impl FnMut(f64)) -> Result<Self> {
         let path = dataset.path.display();
         ensure!(
             dataset.action.is_some(),
             "{path}: array \"action\" is missing; actquant weighs weights by the actions"
         );
-        Ok(Self { scores: score::scores(graph, dataset)?, importance: fisher::importance(graph, dataset, progress)? })
+        Ok(Self {
+            choices,
+            scores: score::scores(graph, dataset, choices.frames, choices.bandwidth)?,
+            importance: fisher::importance(graph, dataset, choices.fisher, progress)?,
+        })
     }
 
-    /// What the allocation works with: `sens`, negative scores as 0, or 1 for every matrix where none is above 0 (and then
+    /// What the allocation works with: the chosen score, negative ones as 0, or 1 for every matrix where none is above 0 (and then
     /// `true`): scores that tell nothing apart give every layer the same claim.
     pub fn effective_scores(&self) -> (Vec<f64>, bool) {
-        let scores: Vec<f64> = self.scores.iter().map(|s| s.sens().max(0.0)).collect();
+        let scores: Vec<f64> = self.scores.iter().map(|s| s.of(self.choices.score).max(0.0)).collect();
         if scores.iter().all(|s| *s == 0.0) { (vec![1.0; scores.len()], true) } else { (scores, false) }
     }
 
-    /// What the fits of scales weigh every weight by, per matrix: its importance and a little more.
-    pub fn weight_importance(&self) -> Vec<Vec<f64>> {
-        self.importance.iter().map(weight_importance).collect()
+    /// What the fits of scales weigh every weight by, per matrix: its importance and a little more, and where that is chosen
+    /// [`by_magnitude`].
+    pub fn weight_importance(&self, graph: &Graph) -> Vec<Vec<f64>> {
+        let matrices = graph.matrices.iter().zip(&self.importance);
+        let weighed = |(matrix, importance): (&WeightMatrix, &Array2<f32>)| {
+            let importance = floored(importance);
+            if self.choices.magnitude { by_magnitude(importance, matrix) } else { importance }
+        };
+        matrices.map(weighed).collect()
     }
 }
 
@@ -68,10 +80,11 @@ pub fn quantize(graph: &Graph, statistics: &ActionStatistics, rate: Rate, option
         Rate::Width(width) => vec![width; graph.matrices.len()],
         Rate::BitsPerWeight(_) => {
             let scores = statistics.effective_scores().0;
-            allocation::allocate(graph, &scores, options.packing(), rate.bytes(graph.weights()))?
+            allocation::allocate(graph, &scores, &statistics.choices, options.packing(), rate.bytes(graph.weights()))?
         }
     };
-    let matrices = graph.matrices.iter().zip(widths).zip(&statistics.importance);
+    let importance = statistics.weight_importance(graph);
+    let matrices = graph.matrices.iter().zip(widths).zip(&importance);
     matrices
         .map(|((matrix, width), importance)| {
             let quantized = quantize_matrix(matrix, width, options.group, importance);
@@ -81,12 +94,22 @@ pub fn quantize(graph: &Graph, statistics: &ActionStatistics, rate: Rate, option
 }
 
 /// Rounds to nearest with scales that minimise `sum of importance * error^2` of each group, or of each row.
-fn quantize_matrix(matrix: &WeightMatrix, width: Width, group: usize, importance: &Array2<f32>) -> Quantized {
-    let importance = weight_importance(importance);
-    round_to(matrix, width, Scales::fit(matrix, &vec![Some(width); matrix.rows], group, &importance))
+fn quantize_matrix(matrix: &WeightMatrix, width: Width, group: usize, importance: &[f64]) -> Quantized {
+    round_to(matrix, width, Scales::fit(matrix, &vec![Some(width); matrix.rows], group, importance))
 }
 
-fn weight_importance(importance: &Array2<f32>) -> Vec<f64> {
+/// Every importance of a matrix times `sqrt(mean of the row's w^2 + w^2)`, as llama.cpp's fits weigh.
+pub fn by_magnitude(mut importance: Vec<f64>, matrix: &WeightMatrix) -> Vec<f64> {
+    let cols = matrix.cols.max(1);
+    for (importance, row) in importance.chunks_mut(cols).zip(matrix.data.chunks(cols)) {
+        let square = |w: &f32| f64::from(*w).powi(2);
+        let mean = row.iter().map(square).sum::<f64>() / row.len() as f64;
+        importance.iter_mut().zip(row).for_each(|(h, w)| *h *= (mean + square(w)).sqrt());
+    }
+    importance
+}
+
+fn floored(importance: &Array2<f32>) -> Vec<f64> {
     let mean = importance.iter().map(|&i| f64::from(i)).sum::<f64>() / importance.len().max(1) as f64;
     let least = if mean > 0.0 { FLOOR * mean } else { 1.0 };
     importance.iter().map(|&i| f64::from(i) + least).collect()
@@ -163,9 +186,11 @@ mod tests {
     use crate::budget::{Budget, BudgetTooSmall};
     use crate::methods::options::Method;
     use crate::methods::scale;
+    use choices::ScoreOf;
 
     fn quantize_at(graph: &Graph, statistics: &ActionStatistics, rate: Rate) -> Result<Vec<Outcome>> {
-        let options = Options { group: 32, ..Options::new(Method::ActQuant, Budget::BitsPerWeight(3.0)) };
+        let options =
+            Options { group: 32, ..Options::new(Method::ActQuant(statistics.choices), Budget::BitsPerWeight(3.0)) };
         quantize(graph, statistics, rate, &options)
     }
 
@@ -181,7 +206,7 @@ mod tests {
         };
         for width in [Width::W2, Width::W3] {
             for group in [0, 32] {
-                let weighted = error(&quantize_matrix(&matrix, width, group, &importance));
+                let weighted = error(&quantize_matrix(&matrix, width, group, &floored(&importance)));
                 let plain = error(&scale::round_to_nearest(&matrix, width, group));
                 assert!(weighted < plain, "{width:?} group {group}: {weighted} against {plain}");
             }
@@ -194,7 +219,7 @@ mod tests {
         let matrix = WeightMatrix { name: "w".into(), rows: 2, cols: 40, data };
         let plain = scale::round_to_nearest(&matrix, Width::W3, 32);
         for level in [0.0, 2.0] {
-            let found = quantize_matrix(&matrix, Width::W3, 32, &Array2::from_elem((2, 40), level));
+            let found = quantize_matrix(&matrix, Width::W3, 32, &floored(&Array2::from_elem((2, 40), level)));
             assert_eq!((found.codes, found.scales), (plain.codes.clone(), plain.scales.clone()));
         }
     }
@@ -203,7 +228,7 @@ mod tests {
     fn a_budget_is_kept_and_a_width_is_taken_as_it_is() {
         let graph = testing::lstm();
         let dataset = testing::dataset(&graph, 2, 24);
-        let statistics = ActionStatistics::collect(&graph, &dataset, |_| {}).expect("statistics");
+        let statistics = ActionStatistics::collect(&graph, &dataset, Choices::default(), |_| {}).expect("statistics");
         let uniform = quantize_at(&graph, &statistics, Rate::Width(Width::W3)).expect("quantized");
         assert!(uniform.iter().all(|o| o.quantized.widths.iter().all(|w| *w == Some(Width::W3))));
         let bytes = |outcomes: &[Outcome]| -> usize { outcomes.iter().map(|o| o.bytes()).sum() };
@@ -219,10 +244,31 @@ mod tests {
         let graph = testing::mlp();
         let mut dataset = testing::dataset(&graph, 1, 8);
         dataset.action = None;
-        let error = ActionStatistics::collect(&graph, &dataset, |_| {}).expect_err("no actions");
+        let error = ActionStatistics::collect(&graph, &dataset, Choices::default(), |_| {}).expect_err("no actions");
         assert!(error.to_string().contains("\"action\" is missing"), "{error}");
         let zero = Score { x_input: 0.0, y_input: 1.0, x_output: 0.0, y_output: 0.5 };
-        let statistics = ActionStatistics { scores: vec![zero; 2], importance: Vec::new() };
+        let choices = Choices::default();
+        let mut statistics = ActionStatistics { choices, scores: vec![zero; 2], importance: Vec::new() };
         assert_eq!(statistics.effective_scores(), (vec![1.0; 2], true));
+        statistics.choices.score = ScoreOf::Output;
+        assert_eq!(statistics.effective_scores(), (vec![0.5; 2], false));
+    }
+
+    #[test]
+    fn magnitude_favours_large_weights() {
+        let matrix = WeightMatrix { name: "w".into(), rows: 2, cols: 2, data: vec![3.0, -1.0, 0.0, 0.0] };
+        // The mean square of the first row is 5.
+        let expected = [14f64.sqrt(), 2.0 * 6f64.sqrt(), 0.0, 0.0];
+        for (found, expected) in by_magnitude(vec![1.0, 2.0, 1.0, 1.0], &matrix).iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-12, "{found} against {expected}");
+        }
+        let graph = Graph { matrices: vec![matrix], ..Graph::new(2) };
+        let statistics = |magnitude| ActionStatistics {
+            choices: Choices { magnitude, ..Choices::default() },
+            scores: Vec::new(),
+            importance: vec![Array2::ones((2, 2))],
+        };
+        let of = |magnitude| statistics(magnitude).weight_importance(&graph);
+        assert_eq!(of(true)[0], by_magnitude(of(false)[0].clone(), &graph.matrices[0]));
     }
 }

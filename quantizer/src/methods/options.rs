@@ -6,6 +6,7 @@ use actq_kernels::Width;
 use actq_kernels::layout::{BlockShape, GROUPS, Lanes, is_group};
 use anyhow::{Result, ensure};
 
+use super::actquant::choices::Choices;
 use crate::budget::Budget;
 
 /// How codes are chosen.
@@ -16,8 +17,8 @@ pub enum Method {
     /// Column-wise error feedback with the second moment of the matrix's input (GPTQ, arXiv 2210.17323).
     Gptq,
     /// Round to nearest, widths by HSIC scores, scales by the Fisher information of the action loss (ActQuant, arXiv
-    /// 2605.24011).
-    ActQuant,
+    /// 2605.24011); where it may be read in several ways, by these choices.
+    ActQuant(Choices),
     /// Widths by rows, pruning and distillation ([`super::best`]).
     Best,
 }
@@ -27,18 +28,22 @@ impl Method {
     /// a row loses; rounding has only its scales.
     pub fn default_group(self) -> usize {
         match self {
-            Self::Rtn | Self::ActQuant => 32,
+            Self::Rtn | Self::ActQuant(_) => 32,
             Self::Gptq | Self::Best => 0,
         }
     }
 }
 
+/// The name, and in parentheses other choices of ActQuant's than the defaults.
 impl fmt::Display for Method {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {
             Self::Rtn => "rtn",
             Self::Gptq => "gptq",
-            Self::ActQuant => "actquant",
+            Self::ActQuant(choices) if *choices != Choices::default() => {
+                return f.pad(&format!("actquant ({choices})"));
+            }
+            Self::ActQuant(_) => "actquant",
             Self::Best => "best",
         })
     }

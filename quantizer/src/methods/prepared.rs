@@ -88,7 +88,9 @@ impl<'a> PreparedMethod<'a> {
                 say(dataset.frames(), inputs, 0);
                 Statistics::Gptq(moments)
             }
-            Method::ActQuant => Statistics::ActQuant(ActionStatistics::collect(graph, calib()?, progress)?),
+            Method::ActQuant(choices) => {
+                Statistics::ActQuant(ActionStatistics::collect(graph, calib()?, choices, progress)?)
+            }
             Method::Best => {
                 let dataset = calib()?;
                 let moments = moments(dataset);
@@ -108,10 +110,10 @@ impl<'a> PreparedMethod<'a> {
 
     /// The method.
     pub fn method(&self) -> Method {
-        match self.statistics {
+        match &self.statistics {
             Statistics::Rtn => Method::Rtn,
             Statistics::Gptq(_) => Method::Gptq,
-            Statistics::ActQuant(_) => Method::ActQuant,
+            Statistics::ActQuant(statistics) => Method::ActQuant(statistics.choices),
             Statistics::Best(_) => Method::Best,
         }
     }

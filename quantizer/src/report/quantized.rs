@@ -17,7 +17,7 @@ pub fn scores(graph: &Graph, statistics: &ActionStatistics, quantized: &Quantize
     let mut rows = table(&["matrix", "HSIC score", "bits"]);
     for ((matrix, score), outcome) in graph.matrices.iter().zip(&statistics.scores).zip(&quantized.outcomes) {
         let bits = outcome.quantized.width_counts();
-        rows.add_row([matrix.name.clone(), format!("{:.4}", score.sens()), bits]);
+        rows.add_row([matrix.name.clone(), format!("{:.4}", score.of(statistics.choices.score)), bits]);
     }
     let note = match quantized.rate {
         Rate::Width(_) => "One width for all: the scores are not used.",

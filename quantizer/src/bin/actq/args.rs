@@ -3,8 +3,10 @@
 use std::path::PathBuf;
 
 use actq::methods::Method;
+use actq::methods::actquant::choices::Choices;
 use actq_kernels::Width;
 use actq_kernels::layout::is_group;
+use anyhow::ensure;
 use clap::{Parser, Subcommand, ValueEnum, value_parser};
 
 use crate::link::args::{KeygenArgs, LinkArgs, SignArgs};
@@ -192,6 +194,8 @@ pub(crate) struct QuantizeArgs {
     #[arg(long)]
     pub(crate) method: Option<MethodArg>,
     #[command(flatten)]
+    pub(crate) actquant: ActQuantArgs,
+    #[command(flatten)]
     pub(crate) learn: LearnArgs,
     #[command(flatten)]
     pub(crate) run: RunArgs,
@@ -300,9 +304,55 @@ pub(crate) struct SweepArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
     #[command(flatten)]
+    pub(crate) actquant: ActQuantArgs,
+    #[command(flatten)]
     pub(crate) learn: LearnArgs,
     #[command(flatten)]
     pub(crate) run: RunArgs,
+}
+
+/// Where ActQuant may be read in several ways.
+#[derive(clap::Args)]
+pub(crate) struct ActQuantArgs {
+    /// Choices of method actquant: KEY=VALUE,KEY=VALUE, or authors for all that its authors choose, which keys behind it alter
+    ///
+    /// [defaults in brackets; (authors) is what theirs is]
+    ///
+    /// bandwidth=[median]|squared(authors): the Gaussian kernels' sigma^2, or sigma, is the median squared distance.
+    /// frames=N|all(authors) [512]: frames that HSIC is taken over, never more than 8192.
+    /// score=[gain](authors)|output: a matrix's score is what it adds, F(output) - F(input), or F(output).
+    /// noise=[codes]|format(authors): a width's expected error is 2^(-2 bits) with the bits of a code, or with all that it takes.
+    /// widest=2|3|4(authors)|[8]: the widest codes that the allocation gives.
+    /// head=[free]|2|3|4|8(authors): the width of the matrices that give the action. (The authors keep them at 16 bits.)
+    /// samples=N|all(authors) [4096]: frames that the Fisher information is taken over, about.
+    /// batch=N [1] (authors: 8): frames whose gradients are averaged before they are squared.
+    /// signs=[random]|loss(authors): the loss's derivative where the recorded action is the policy's own: a random sign, or that of
+    /// whatever difference there is.
+    /// magnitude=[no]|yes(authors): fits of scales weigh by the importance, or by it times sqrt(mean of the row's w^2 + w^2).
+    ///
+    /// With one width for all (--bits), widths are not allocated, and only the last four keys count. docs/QUANTIZER.md has sources and
+    /// reasons.
+    ///
+    /// Example: --method actquant --actquant authors,head=free
+    #[arg(long, value_name = "CHOICES", verbatim_doc_comment)]
+    actquant: Option<Choices>,
+}
+
+impl ActQuantArgs {
+    /// These methods, actquant by these choices.
+    pub(crate) fn of(&self, methods: &[Method]) -> anyhow::Result<Vec<Method>> {
+        let choose = |&method| match (method, self.actquant) {
+            (Method::ActQuant(_), Some(choices)) => Method::ActQuant(choices),
+            (other, _) => other,
+        };
+        let methods: Vec<Method> = methods.iter().map(choose).collect();
+        ensure!(
+            self.actquant.is_none() || methods.iter().any(|method| matches!(method, Method::ActQuant(_))),
+            "--actquant goes with method actquant, not with {}",
+            methods.iter().map(Method::to_string).collect::<Vec<_>>().join(", ")
+        );
+        Ok(methods)
+    }
 }
 
 /// How long method best learns. It ends by itself when the error no longer falls.
@@ -355,7 +405,7 @@ impl From<MethodArg> for Method {
         match arg {
             MethodArg::Rtn => Self::Rtn,
             MethodArg::Gptq => Self::Gptq,
-            MethodArg::Actquant => Self::ActQuant,
+            MethodArg::Actquant => Self::ActQuant(Choices::default()),
             MethodArg::Best => Self::Best,
         }
     }

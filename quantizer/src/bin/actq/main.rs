@@ -123,7 +123,8 @@ fn run_sweep(args: &SweepArgs) -> Result<()> {
     let outputs: Vec<&Path> = [&args.svg, &args.json].into_iter().filter_map(|path| path.as_deref()).collect();
     files::check_outputs(&outputs, &inputs)?;
     start_threads(args.run.threads)?;
-    let methods: Vec<Method> = args.methods.iter().map(|&m| m.into()).collect();
+    let methods: Vec<Method> = args.methods.iter().map(|&method| method.into()).collect();
+    let methods = args.actquant.of(&methods)?;
     let policies = args.policy_dirs.iter().map(|dir| Policy::load(dir)).collect::<Result<Vec<_>>>()?;
     let named = !calib.is_empty() || args.heldout.is_some();
     ensure!(policies.len() == 1 || !named, "--calib and --heldout go with one policy");

@@ -36,7 +36,7 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
     let heldout = Recording::Heldout.load(Some(&args.policy_dir), None, Sizes::of(&source))?;
     let recordings = Recordings { calib, heldout };
     note(notes::of_recordings(&recordings));
-    let options = options(args, &recordings);
+    let options = options(args, &recordings)?;
     let started = Instant::now();
     start_threads(args.run.threads)?;
     let bar = progress_bar()?;
@@ -95,12 +95,13 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
 }
 
 /// What the command line asks for, as far as it says.
-fn options(args: &QuantizeArgs, recordings: &Recordings) -> Options {
+fn options(args: &QuantizeArgs, recordings: &Recordings) -> Result<Options> {
     let method = match args.method {
         Some(method) => method.into(),
         None if recordings.calib.is_none() => Method::Rtn,
         None => Method::Best,
     };
+    let method = args.actquant.of(&[method])?[0];
     let limits = [
         args.bpw.map(Budget::BitsPerWeight),
         args.flash.map(Budget::ImageBytes),
@@ -109,7 +110,7 @@ fn options(args: &QuantizeArgs, recordings: &Recordings) -> Options {
     ];
     let width = args.bits.unwrap_or(Width::W3);
     let protected = args.protect.iter().map(|name| (name.clone(), Width::W8));
-    Options {
+    Ok(Options {
         group: args.group.unwrap_or(method.default_group()),
         activations: match args.activations {
             Some(ActivationArg::Int8) => Activations::Int8,
@@ -121,5 +122,5 @@ fn options(args: &QuantizeArgs, recordings: &Recordings) -> Options {
         seed: args.run.seed,
         forced: args.width.iter().cloned().chain(protected).collect(),
         ..Options::new(method, limits.into_iter().flatten().next().unwrap_or(Budget::Width(width)))
-    }
+    })
 }

@@ -4,12 +4,13 @@ use anyhow::{Context, Result, ensure};
 use ndarray::Array2;
 use serde::Serialize;
 
-use crate::calibrate::hsic::{Kernel, hsic};
+use super::choices::ScoreOf;
+use crate::calibrate::hsic::{Bandwidth, Kernel, hsic};
 use crate::data::Dataset;
 use crate::graph::{Evaluator, Graph, WeightMatrix};
 
-/// Frames that the kernels are built over, at most: time and memory go with the square.
-const FRAMES: usize = 512;
+/// Frames that kernels can be built over, at most: time and memory go with the square, and so many take 512 MiB a kernel.
+pub const MOST_FRAMES: usize = 8192;
 
 /// Weight of the dependence on the network's input (the paper's lambda_x).
 const LAMBDA_X: f64 = 1.0;
@@ -20,8 +21,7 @@ const LAMBDA_Y: f64 = 1.0;
 ///
 /// ActQuant (arXiv 2605.24011) scores values Z by the HSIC bottleneck `F(Z) = -lambda_x HSIC(X, Z) + lambda_y HSIC(Y, Z)`, and a
 /// matrix by `sens = F(output) - F(input)`. As in the authors' code, X is the same for every matrix, namely the input of the
-/// network's first one, so that `sens` says how far the matrix moves the values from the observation towards the actions. (Their
-/// scripts can allocate by `F(output)` alone, too.)
+/// network's first one, so that `sens` says how far the matrix moves the values from the observation towards the actions.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Score {
     /// HSIC(X, the matrix's input)
@@ -49,32 +49,40 @@ impl Score {
     pub fn sens(&self) -> f64 {
         self.f_output() - self.f_input()
     }
+
+    /// The one that is chosen.
+    pub fn of(&self, score: ScoreOf) -> f64 {
+        match score {
+            ScoreOf::Gain => self.sens(),
+            ScoreOf::Output => self.f_output(),
+        }
+    }
 }
 
-/// The scores of all matrices over evenly spaced frames of `dataset`, which must hold actions.
+/// The scores of all matrices over evenly spaced frames of `dataset`, at most so many; it must hold actions.
 ///
 /// Gaussian kernels on inputs and outputs, the linear kernel on the actions. A matrix that is used several times in a frame is
 /// scored by the mean of its inputs and outputs. Biases are left out: no kernel sees them.
-pub fn scores(graph: &Graph, dataset: &Dataset) -> Result<Vec<Score>> {
+pub fn scores(graph: &Graph, dataset: &Dataset, most: usize, bandwidth: Bandwidth) -> Result<Vec<Score>> {
     let frames = dataset.frames();
-    let step = frames.div_ceil(FRAMES).max(1);
+    let step = frames.div_ceil(most.clamp(1, MOST_FRAMES)).max(1);
     ensure!(frames.div_ceil(step) >= 2, "{}: at least 2 frames are needed", dataset.path.display());
     let samples = Samples::collect(graph, dataset, step)?;
     let actions = Kernel::linear(&standardized(&samples.actions));
-    let inputs: Vec<Kernel> = samples.inputs.iter().map(Kernel::gaussian).collect();
-    let observation = &inputs[samples.first];
-    let score = |(matrix, (x, input)): (&WeightMatrix, (&Array2<f64>, &Kernel))| {
+    let observation = Kernel::gaussian(&samples.inputs[samples.first], bandwidth);
+    let score = |(matrix, x): (&WeightMatrix, &Array2<f64>)| {
+        let input = Kernel::gaussian(x, bandwidth);
         let weights =
             Array2::from_shape_fn((matrix.cols, matrix.rows), |(c, r)| f64::from(matrix.data[r * matrix.cols + c]));
-        let output = Kernel::gaussian(&x.dot(&weights));
+        let output = Kernel::gaussian(&x.dot(&weights), bandwidth);
         Score {
-            x_input: hsic(observation, input),
-            y_input: hsic(&actions, input),
-            x_output: hsic(observation, &output),
+            x_input: hsic(&observation, &input),
+            y_input: hsic(&actions, &input),
+            x_output: hsic(&observation, &output),
             y_output: hsic(&actions, &output),
         }
     };
-    Ok(graph.matrices.iter().zip(samples.inputs.iter().zip(&inputs)).map(score).collect())
+    Ok(graph.matrices.iter().zip(&samples.inputs).map(score).collect())
 }
 
 /// Every `step`-th frame.
@@ -144,13 +152,26 @@ mod tests {
     fn scores_are_finite_and_the_first_matrix_has_the_observation_as_input() {
         let graph = lstm();
         let dataset = dataset(&graph, 3, 20);
-        let scores = scores(&graph, &dataset).expect("scores");
+        let scores = scores(&graph, &dataset, 512, Bandwidth::Median).expect("scores");
         assert_eq!(scores.len(), graph.matrices.len());
         for score in &scores {
             assert!(score.sens().is_finite());
         }
         let first = scores[0];
         assert!(first.x_input > first.x_output, "nothing depends on X more than X itself: {first:?}");
+    }
+
+    #[test]
+    fn frames_are_a_limit() {
+        let graph = lstm();
+        let dataset = dataset(&graph, 1, 24);
+        let score = |most| scores(&graph, &dataset, most, Bandwidth::Median).expect("scores")[0].sens();
+        assert_eq!(score(24), score(usize::MAX));
+        assert_ne!(score(24), score(8));
+        // Not so many as 13, evenly spaced: every second.
+        assert_eq!(score(12), score(13));
+        let error = scores(&graph, &Dataset { length: vec![1], ..dataset.clone() }, 24, Bandwidth::Median);
+        assert!(error.is_err_and(|error| error.to_string().contains("at least 2 frames")));
     }
 
     #[test]
