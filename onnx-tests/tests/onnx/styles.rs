@@ -12,23 +12,23 @@ use actq::import::onnx::import;
 use actq::measure::actions::actions;
 use actq::policy::Policy;
 
-const OBS: usize = 11;
+pub(super) const OBS: usize = 11;
 
-fn begun() -> File {
+pub(super) fn begun() -> File {
     let mut file = File::default();
     file.input("obs", &[1, OBS as i64]);
     file
 }
 
 /// Ends with a layer and the output `actions`.
-fn ended(mut file: File, last: &str, len: usize) -> Vec<u8> {
+pub(super) fn ended(mut file: File, last: &str, len: usize) -> Vec<u8> {
     let y = file.gemm(last, 3, len);
     file.nodes("Identity", &[&y], &["actions"], &[]);
     file.output("actions", &[1, 3]);
     file.bytes()
 }
 
-fn ops(bytes: &[u8]) -> Result<String> {
+pub(super) fn ops(bytes: &[u8]) -> Result<String> {
     Ok(same(bytes)?.ops.join(" "))
 }
 
