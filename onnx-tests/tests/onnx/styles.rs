@@ -122,7 +122,7 @@ fn activations_that_were_taken_apart_are_found() -> Result<()> {
         }),
         ("gelu_tanh", |file, x| {
             let [three, small, root, one, half] =
-                [3.0, 0.044_715, 0.797_884_56, 1.0, 0.5].map(|v| file.reals(&[], &[v]));
+                [3.0, 0.044_715, 0.797_884_6, 1.0, 0.5].map(|v| file.reals(&[], &[v]));
             let cube = file.node("Pow", &[x, &three], &[]);
             let cube = file.node("Mul", &[&cube, &small], &[]);
             let sum = file.node("Add", &[x, &cube], &[]);
