@@ -38,7 +38,8 @@ pub(super) fn run(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> 
         bail!("takes {:?} with a kernel of {:?}; [1, channel, ..] is taken", x.shape, w.shape)
     };
     let groups = usize::try_from(call.int("group").unwrap_or(1)).unwrap_or(0);
-    let fits = groups > 0 && channels == inputs * groups && outputs.is_multiple_of(groups) && lens.len() == kernel.len();
+    let fits =
+        groups > 0 && channels == inputs * groups && outputs.is_multiple_of(groups) && lens.len() == kernel.len();
     ensure!(
         fits && x.len() > 0 && w.len() > 0,
         "takes {:?} with a kernel of {:?} in {groups} groups",
