@@ -98,13 +98,12 @@ fn each_wrong_file_is_refused_by_what_is_wrong_with_it() {
     });
     refused(circle, "node 0 \"/node/0\" (Add): reads \"b\" before anything gives it: the graph has a circle");
     refused(node("Add", &["nowhere"], &[]), "reads \"nowhere\" before anything gives it");
-    refused(node("Conv", &["obs"], &[]), "node 0 \"/node/0\" (Conv): convolutions have no kernel here");
+    refused(node("MaxPool", &["obs"], &[]), "node 0 \"/node/0\" (MaxPool): has no kernel here; export the part behind");
     refused(node("MatMul", &["obs"], &[]), "multiplies two values of the network, as attention does");
-    refused(node("Softmax", &[], &[]), "(Softmax): is no operation of an action");
-    refused(node("Sqrt", &[], &[]), "node 0 \"/node/0\" (Sqrt): Sqrt is no operation of the network by itself");
-    refused(node("ReduceSum", &[], &[]), "only within a norm");
+    refused(node("Softmax", &[], &[]), "(Softmax): has no kernel here");
+    refused(node("Sqrt", &[], &[]), "node 0 \"/node/0\" (Sqrt): a square root has no kernel here by itself");
     refused(node("Frobnicate", &[], &[]), "(Frobnicate): is not known; docs/IMPORT.md lists what is taken");
-    refused(node("Cast", &[], &[("to", Value::Int(10))]), "rounds a value of the network to ONNX's type 10");
+    refused(node("Cast", &[], &[("to", Value::Int(10))]), "rounds a value of the network to float16");
     refused(
         node("Clip", &[], &[("min", Value::Real(2.0)), ("max", Value::Real(1.0))]),
         "limits to 2 .. 1, which is no range",
@@ -132,7 +131,7 @@ fn each_wrong_file_is_refused_by_what_is_wrong_with_it() {
         proto::Graph { node: vec![encoded(&node)], output: vec![encoded(&output)], ..Default::default() }
     });
     refused(
-        encoded(&proto::Model { graph: Some(encoded(&nested)), ..Default::default() }).to_vec(),
+        encoded(&proto::Model { graph: Some(encoded(&nested)), ..File::default().model() }).to_vec(),
         "graphs stand within each other",
     );
     let forgets = with(|file| {

@@ -17,6 +17,7 @@ pub(super) enum Value {
     Int(i64),
     Ints(Vec<i64>),
     Real(f32),
+    Text(&'static str),
 }
 
 pub(super) fn tensor(name: &str, dims: &[usize], data: &[f32]) -> proto::Tensor {
@@ -108,6 +109,7 @@ impl File {
                 Value::Int(i) => proto::Attribute { name, i: Some(i), ..Default::default() },
                 Value::Ints(ints) => proto::Attribute { name, ints, ..Default::default() },
                 Value::Real(f) => proto::Attribute { name, f: Some(f), ..Default::default() },
+                Value::Text(s) => proto::Attribute { name, s: Some(s.into()), ..Default::default() },
             })
         };
         // Readers other than ours want the type beside the value.
@@ -115,6 +117,7 @@ impl File {
             let number: u8 = match value {
                 Value::Real(_) => 1,
                 Value::Int(_) => 2,
+                Value::Text(_) => 3,
                 Value::Ints(_) => 7,
             };
             // Field 20, a varint.
@@ -127,8 +130,22 @@ impl File {
             name: Some(format!("/node/{}", self.graph.node.len())),
             op_type: Some(op.to_owned()),
             attribute: attributes.iter().map(|a| (attribute(a), &a.1)).map(typed).collect(),
-            domain: None,
+            ..Default::default()
         }));
+    }
+
+    /// A call of an overload of the function `local.Act`.
+    pub(super) fn call(&mut self, overload: &str, x: &str) -> String {
+        let name = format!("act_{}", self.graph.node.len());
+        self.graph.node.push(encoded(&proto::Node {
+            input: vec![x.to_owned()],
+            output: vec![name.clone()],
+            op_type: Some("Act".to_owned()),
+            domain: Some("local".to_owned()),
+            overload: Some(overload.to_owned()),
+            ..Default::default()
+        }));
+        name
     }
 
     /// `x W + b` as Gemm with weights [out, in].
@@ -143,14 +160,18 @@ impl File {
 
     /// The file's bytes.
     pub(super) fn bytes(&self) -> Vec<u8> {
+        self.model().encode_to_vec()
+    }
+
+    /// The file.
+    pub(super) fn model(&self) -> proto::Model {
         let opset = proto::OperatorSet { domain: Some(String::new()), version: Some(17) };
-        let model = proto::Model {
+        proto::Model {
             ir_version: Some(8),
             producer_name: Some("test".to_owned()),
             graph: Some(encoded(&proto::Graph { name: Some("g".to_owned()), ..self.graph.clone() })),
             opset_import: vec![encoded(&opset)],
             ..Default::default()
-        };
-        model.encode_to_vec()
+        }
     }
 }

@@ -3,6 +3,7 @@
 
 mod command;
 mod damaged;
+mod exporters;
 mod file;
 mod styles;
 

@@ -12,23 +12,23 @@ use actq::import::onnx::import;
 use actq::measure::actions::actions;
 use actq::policy::Policy;
 
-const OBS: usize = 11;
+pub(super) const OBS: usize = 11;
 
-fn begun() -> File {
+pub(super) fn begun() -> File {
     let mut file = File::default();
     file.input("obs", &[1, OBS as i64]);
     file
 }
 
 /// Ends with a layer and the output `actions`.
-fn ended(mut file: File, last: &str, len: usize) -> Vec<u8> {
+pub(super) fn ended(mut file: File, last: &str, len: usize) -> Vec<u8> {
     let y = file.gemm(last, 3, len);
     file.nodes("Identity", &[&y], &["actions"], &[]);
     file.output("actions", &[1, 3]);
     file.bytes()
 }
 
-fn ops(bytes: &[u8]) -> Result<String> {
+pub(super) fn ops(bytes: &[u8]) -> Result<String> {
     Ok(same(bytes)?.ops.join(" "))
 }
 
@@ -122,7 +122,7 @@ fn activations_that_were_taken_apart_are_found() -> Result<()> {
         }),
         ("gelu_tanh", |file, x| {
             let [three, small, root, one, half] =
-                [3.0, 0.044_715, 0.797_884_56, 1.0, 0.5].map(|v| file.reals(&[], &[v]));
+                [3.0, 0.044_715, 0.797_884_6, 1.0, 0.5].map(|v| file.reals(&[], &[v]));
             let cube = file.node("Pow", &[x, &three], &[]);
             let cube = file.node("Mul", &[&cube, &small], &[]);
             let sum = file.node("Add", &[x, &cube], &[]);

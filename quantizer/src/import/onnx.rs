@@ -4,15 +4,22 @@
 //! take apart (`build`, `norm`, `forms`), simplified and lowered to the ops of policy.json (`simplify`, `lower`).
 
 mod action;
+mod arithmetic;
 mod build;
 mod call;
 mod cells;
 mod compare;
+mod conditions;
+mod convolutions;
+mod einsum;
+mod elements;
+mod evaluation;
 mod expr;
 mod follow;
 mod forms;
+mod functions;
+mod gather;
 mod known;
-mod layers;
 mod lower;
 mod model;
 mod moves;
@@ -20,7 +27,9 @@ mod network;
 mod norm;
 mod places;
 mod pointwise;
+mod products;
 pub mod proto;
+mod reductions;
 mod select;
 mod simplify;
 mod states;

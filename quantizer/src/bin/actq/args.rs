@@ -26,7 +26,8 @@ pub(crate) enum Command {
     /// Make a policy's folder of an ONNX file
     ///
     /// Takes what PyTorch, rsl_rl, Brax, MuJoCo Playground, mjlab, Isaac Lab, Stable-Baselines3, CleanRL and ML-Agents export:
-    /// matrix products, activations, norms, LSTM and GRU cells, and what moves and scales values between them, with a batch of 1.
+    /// matrix products, activations, norms, LSTM and GRU cells, convolutions over few positions, and what moves and scales values
+    /// between them, with a batch of 1. docs/IMPORT.md lists what is taken, and what helps where something is not.
     /// The observation is the concatenation of the inputs, in the order that is printed. The action is the output that is called
     /// so, or the only one that can be; what does not lead to it is cut. What cannot be taken is refused by the node's name.
     ///

@@ -11,7 +11,10 @@ except ImportError as error:
 path, plan = sys.argv[1], json.loads(sys.argv[2])
 options = onnxruntime.SessionOptions()
 options.log_severity_level = 3
-session = onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
+try:
+    session = onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
+except Exception as error:
+    sys.exit(f"onnxruntime cannot run this file: {error}")
 kinds = {"tensor(float)": numpy.float32, "tensor(double)": numpy.float64, "tensor(int64)": numpy.int64,
          "tensor(int32)": numpy.int32, "tensor(bool)": numpy.bool_}
 

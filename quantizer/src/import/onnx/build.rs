@@ -122,11 +122,17 @@ impl Exprs {
         }
         let (inner, a, b) = self.affine_of(x);
         let exponent = self.known_of(inner, Function::Exp);
-        match (f, exponent) {
+        match (f, exponent.or(self.known_of(x, Function::Sigmoid))) {
             // ln(1 + e^x)
-            (Unary::Log, Some(x)) if a == 1.0 && b == 1.0 => self.function(Function::Softplus, x),
+            (Unary::Log, Some(x)) if exponent.is_some() && a == 1.0 && b == 1.0 => self.function(Function::Softplus, x),
+            // ln(1 / (1 + e^-x))
+            (Unary::Log, Some(x)) if exponent.is_none() => {
+                let negative = self.scaled(x, -1.0, 0.0);
+                let softplus = self.function(Function::Softplus, negative);
+                self.scaled(softplus, -1.0, 0.0)
+            }
             // 1 / (a + a e^x)
-            (Unary::Reciprocal, Some(x)) if a == b => {
+            (Unary::Reciprocal, Some(x)) if exponent.is_some() && a == b => {
                 let negative = self.scaled(x, -1.0, 0.0);
                 let sigmoid = self.function(Function::Sigmoid, negative);
                 self.scaled(sigmoid, 1.0 / a, 0.0)

@@ -8,7 +8,7 @@ use super::tensor::Tensor;
 
 /// What helps where an operation is not known.
 pub(super) const HELP: &str =
-    "docs/IMPORT.md lists what is taken; with --output NAME, a value before this node is the action";
+    "docs/IMPORT.md lists what is taken; --output NAME makes a value before this node the action";
 
 /// A node and its inputs.
 #[derive(Clone, Copy)]
@@ -92,15 +92,20 @@ impl<'a> Call<'a> {
                 bail!("the file is quantized already; export it in float32 and let actq quantize it")
             }
             "Loop" | "Scan" | "SequenceAt" => bail!("runs a loop; export one step of the policy, unrolled"),
-            "Conv" | "ConvTranspose" | "MaxPool" | "AveragePool" | "GlobalAveragePool" => {
-                bail!("convolutions have no kernel here; export the part behind the encoder as a policy of its own")
+            "ConvTranspose" | "MaxPool" | "AveragePool" | "GlobalAveragePool" | "GlobalMaxPool" => {
+                bail!("has no kernel here; export the part behind the encoder as a policy of its own")
             }
             "Softmax" | "LogSoftmax" | "ArgMax" | "TopK" => {
-                bail!("is no operation of an action; --output takes the value before it")
+                bail!(
+                    "has no kernel here; where it only chooses among actions, --output NAME takes the value before it"
+                )
             }
             "GreaterOrEqual" | "Greater" | "Less" | "LessOrEqual" | "Equal" | "Not" | "And" | "Or" | "IsNaN"
             | "IsInf" => {
                 bail!("compares with the observation; only comparisons of constants are taken; {HELP}")
+            }
+            _ if self.node.domain == "com.microsoft" => {
+                bail!("is what onnxruntime's optimizer makes of several operations; import the file from before it")
             }
             _ => bail!("is not known; {HELP}"),
         }

@@ -6,7 +6,7 @@ use anyhow::{Context as _, Result, bail, ensure};
 
 use super::call::Call;
 use super::expr::{Cell, Expr, Exprs, Id, Matrix, Run};
-use super::layers::open_vector;
+use super::products::open_vector;
 use super::tensor::{Element, Tensor};
 
 /// The outputs, where the node is such an operation.
@@ -76,9 +76,9 @@ pub(super) fn run(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Vec<Tenso
 fn state(call: &Call<'_>, exprs: &Exprs, i: usize, what: &str, hidden: usize) -> Result<Run> {
     let carried = "export it as an input of the graph, and its next value as an output";
     let tensor = call.optional(i).with_context(|| format!("forgets its {what} state after every step; {carried}"))?;
-    run_of_input(exprs, &tensor.elements())
-        .filter(|run| run.len == hidden)
-        .with_context(|| format!("its {what} state is no input of the graph; {carried}"))
+    run_of_input(exprs, &tensor.elements()).filter(|run| run.len == hidden).with_context(|| {
+        format!("its {what} state is a constant, or an input that other nodes change first; {carried}")
+    })
 }
 
 /// The run of one graph input that these elements are.

@@ -7,9 +7,9 @@ use anyhow::{Context as _, Result, bail, ensure};
 
 use super::call::Call;
 use super::expr::{Expr, Exprs};
-use super::model::{Graph, Model, Node, Port};
+use super::model::{Graph, Model, Node, Port, kind_name};
 use super::tensor::{Data, Element, Tensor, count};
-use super::{cells, known, layers, moves, pointwise};
+use super::{cells, convolutions, einsum, known, moves, pointwise, products, reductions};
 use crate::text::printable;
 
 /// Graphs and functions within each other.
@@ -92,7 +92,7 @@ impl<'m> Follower<'m> {
             },
         };
         let inputs = node.inputs.iter().map(input).collect::<Result<Vec<_>>>()?;
-        let key = (node.domain.clone(), node.op.clone());
+        let key = [node.domain.clone(), node.op.clone(), node.overload.clone()];
         let outputs = if let Some(function) = self.model.functions.get(&key) {
             let mut inner: Scope = Scope::new();
             ensure!(inputs.len() <= function.inputs.len(), "the function takes {} inputs", function.inputs.len());
@@ -168,10 +168,20 @@ impl<'m> Follower<'m> {
         if let Some(output) = pointwise::run(call, &mut self.exprs, most)? {
             return Ok(vec![output]);
         }
-        if let Some(output) = layers::run(call, &mut self.exprs)? {
+        let exprs = &mut self.exprs;
+        if let Some(output) = products::run(call, exprs, most)? {
             return Ok(vec![output]);
         }
-        if let Some(outputs) = cells::run(call, &mut self.exprs)? {
+        if let Some(output) = einsum::run(call, exprs, most)? {
+            return Ok(vec![output]);
+        }
+        if let Some(output) = convolutions::run(call, exprs)? {
+            return Ok(vec![output]);
+        }
+        if let Some(output) = reductions::run(call, exprs)? {
+            return Ok(vec![output]);
+        }
+        if let Some(outputs) = cells::run(call, exprs)? {
             return Ok(outputs);
         }
         call.refuse()
@@ -180,7 +190,11 @@ impl<'m> Follower<'m> {
     fn input(&mut self, i: usize, port: &Port) -> Result<Tensor> {
         let name = printable(&port.name);
         let types = [0, 1, 11].contains(&port.kind);
-        ensure!(types, "the input {name:?} is of ONNX's type {}; export it as float32", port.kind);
+        ensure!(
+            types,
+            "the input {name:?} is of {}; an observation is of float32, so export it as that",
+            kind_name(port.kind)
+        );
         let shape =
             port.shape.as_ref().with_context(|| format!("the input {name:?} has no shape; export it with one"))?;
         let last = shape.len().saturating_sub(1);

@@ -1,5 +1,7 @@
 //! Arithmetic on what is known: shape chains, and constants that exporters compute in the file.
 
+use std::cmp::Ordering;
+
 use anyhow::{Context as _, Result, ensure};
 
 use super::call::Call;
@@ -19,7 +21,7 @@ pub(super) fn run(call: &Call<'_>, most: usize) -> Result<Option<Tensor>> {
         return unary(one, call.op(), f).map(Some);
     }
     if let [x, y] = given[..]
-        && (real(call.op()).is_some() || whole(call.op()).is_some())
+        && (real(call.op()).is_some() || whole(call.op()).is_some() || compared(call.op()).is_some())
     {
         let shape = broadcast(&x.shape, &y.shape)?;
         let (x, y) = (expanded(x, &shape, most)?, expanded(y, &shape, most)?);
@@ -27,26 +29,15 @@ pub(super) fn run(call: &Call<'_>, most: usize) -> Result<Option<Tensor>> {
     }
     match call.op() {
         "ReduceProd" | "ReduceSum" | "ReduceMean" | "ReduceMax" | "ReduceMin" => reduce(call, given[0]).map(Some),
-        "MatMul" => matrix_product(given[0], given.get(1).context("has one input")?, most).map(Some),
         _ => Ok(None),
     }
 }
 
-/// A function of one known number.
-pub(super) fn function(op: &str) -> Option<fn(f64) -> f64> {
+/// A function of one known number that no value of a network goes through, or that integers do.
+fn function(op: &str) -> Option<fn(f64) -> f64> {
     Some(match op {
         "Neg" => |x| -x,
         "Abs" => f64::abs,
-        "Sqrt" => f64::sqrt,
-        "Exp" => f64::exp,
-        "Log" => f64::ln,
-        "Sin" => f64::sin,
-        "Cos" => f64::cos,
-        "Tanh" => f64::tanh,
-        "Sigmoid" => |x| 1.0 / (1.0 + (-x).exp()),
-        "Softplus" => |x| x.max(0.0) + (-x.abs()).exp().ln_1p(),
-        "Relu" => |x| x.max(0.0),
-        "Reciprocal" => |x| 1.0 / x,
         "Floor" => f64::floor,
         "Ceil" => f64::ceil,
         "Round" => f64::round_ties_even,
@@ -78,6 +69,7 @@ pub(super) fn real(op: &str) -> Option<fn(f64, f64) -> f64> {
         "Max" => f64::max,
         "Min" => f64::min,
         "Mod" => |x, y| x - y * (x / y).floor(),
+        "PRelu" => |x, slope| if x < 0.0 { slope * x } else { x },
         _ => return None,
     })
 }
@@ -95,25 +87,41 @@ fn whole(op: &str) -> Option<fn(i64, i64) -> Option<i64>> {
         "Min" => |x, y| Some(x.min(y)),
         "And" => |x, y| Some(i64::from(x != 0 && y != 0)),
         "Or" => |x, y| Some(i64::from(x != 0 || y != 0)),
-        "Equal" => |x, y| Some(i64::from(x == y)),
-        "Less" => |x, y| Some(i64::from(x < y)),
-        "LessOrEqual" => |x, y| Some(i64::from(x <= y)),
-        "Greater" => |x, y| Some(i64::from(x > y)),
-        "GreaterOrEqual" => |x, y| Some(i64::from(x >= y)),
+        _ => return None,
+    })
+}
+
+/// A comparison.
+fn compared(op: &str) -> Option<fn(Ordering) -> bool> {
+    Some(match op {
+        "Equal" => Ordering::is_eq,
+        "Less" => Ordering::is_lt,
+        "LessOrEqual" => Ordering::is_le,
+        "Greater" => Ordering::is_gt,
+        "GreaterOrEqual" => Ordering::is_ge,
         _ => return None,
     })
 }
 
 fn binary(op: &str, x: &Tensor, y: &Tensor, shape: Vec<usize>) -> Result<Tensor> {
-    if let (Some(x), Some(y)) = (x.integers(), y.integers())
-        && let Some(f) = whole(op)
-    {
-        let values = x.iter().zip(y).map(|(&x, &y)| f(x, y)).collect::<Option<Vec<i64>>>();
-        return Ok(Tensor::new(shape, Data::Int(values.context("its integers overflow, or it divides by 0")?)));
+    let truths = |values: Vec<bool>| Data::Int(values.into_iter().map(i64::from).collect());
+    if let (Some(x), Some(y)) = (x.integers(), y.integers()) {
+        if let Some(holds) = compared(op) {
+            return Ok(Tensor::new(shape, truths(x.iter().zip(y).map(|(x, y)| holds(x.cmp(y))).collect())));
+        }
+        if let Some(f) = whole(op) {
+            let values = x.iter().zip(y).map(|(&x, &y)| f(x, y)).collect::<Option<Vec<i64>>>();
+            return Ok(Tensor::new(shape, Data::Int(values.context("its integers overflow, or it divides by 0")?)));
+        }
     }
-    let f = real(op).with_context(|| format!("compares real numbers; {}", super::call::HELP))?;
     let (x, y) = (x.reals().context("is not known")?, y.reals().context("is not known")?);
-    Ok(Tensor::new(shape, Data::Real(x.into_iter().zip(y).map(|(x, y)| f(x, y)).collect())))
+    let pairs = x.into_iter().zip(y);
+    if let Some(holds) = compared(op) {
+        // What is not a number compares as nothing.
+        return Ok(Tensor::new(shape, truths(pairs.map(|(x, y)| x.partial_cmp(&y).is_some_and(holds)).collect())));
+    }
+    let f = real(op).context("joins truth values of real numbers")?;
+    Ok(Tensor::new(shape, Data::Real(pairs.map(|(x, y)| f(x, y)).collect())))
 }
 
 /// The axes that a Reduce node goes over, and its result's shape, with and without them.
@@ -156,18 +164,4 @@ fn reduce(call: &Call<'_>, x: &Tensor) -> Result<Tensor> {
     let data =
         if x.integers().is_some() { Data::Int(values.iter().map(|&v| v as i64).collect()) } else { Data::Real(values) };
     Ok(Tensor::new(shape, data))
-}
-
-/// The product of two known matrices.
-fn matrix_product(x: &Tensor, y: &Tensor, most: usize) -> Result<Tensor> {
-    let (&[rows, n], &[m, cols]) = (&x.shape[..], &y.shape[..]) else {
-        anyhow::bail!("multiplies constants of {:?} and {:?}; only matrices are taken", x.shape, y.shape)
-    };
-    ensure!(n == m, "multiplies {:?} with {:?}", x.shape, y.shape);
-    // The work is bounded as the values are.
-    let work = rows.checked_mul(cols).and_then(|c| c.checked_mul(n)).filter(|work| *work <= most.saturating_mul(64));
-    ensure!(work.is_some(), "multiplies larger constants than a policy of this size can have");
-    let (x, y) = (x.reals().context("is not known")?, y.reals().context("is not known")?);
-    let one = |i: usize| (0..n).map(|k| x[i / cols * n + k] * y[k * cols + i % cols]).sum();
-    Ok(Tensor::new(vec![rows, cols], Data::Real((0..rows * cols).map(one).collect())))
 }

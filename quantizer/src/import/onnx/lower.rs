@@ -158,10 +158,19 @@ impl Lowered {
             Expr::Cell(cell) => self.cell(cell, len)?,
             Expr::CellState(_) => bail!("an LSTM's cell state is read outside its cell"),
             Expr::Unary(f, _) => {
-                bail!("{f:?} is no operation of the network by itself, only within a norm, GELU or softplus")
+                let what = match f {
+                    Unary::Log => "a logarithm",
+                    Unary::Sqrt => "a square root",
+                    Unary::Erf => "an error function",
+                    Unary::Reciprocal => "a quotient by a value",
+                    _ => "a comparison",
+                };
+                bail!(
+                    "{what} has no kernel here by itself, only within a norm, an activation or a cell; compute it before the policy, \
+                     as an input, or behind it"
+                )
             }
-            Expr::Sum(_) => bail!("a sum or mean is no operation of the network by itself, only within a norm"),
-            Expr::Input(_) | Expr::Pick(_) | Expr::Spread(_) => bail!("is only moved"),
+            Expr::Sum(_) | Expr::Input(_) | Expr::Pick(_) | Expr::Spread(_) => bail!("is no operation"),
         })
     }
 

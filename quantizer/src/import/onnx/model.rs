@@ -19,12 +19,16 @@ const MOST: usize = 1 << 16;
 /// The most bytes of a file: protobuf has no longer ones.
 const MOST_BYTES: u64 = 1 << 31;
 
+/// The first operator set whose arithmetic repeats operands as numpy does.
+const LEAST_OPSET: i64 = 7;
+
 /// A node.
 #[derive(Clone, Debug)]
 pub(super) struct Node {
     pub(super) name: String,
     pub(super) op: String,
     pub(super) domain: String,
+    pub(super) overload: String,
     pub(super) inputs: Vec<String>,
     pub(super) outputs: Vec<String>,
     pub(super) attributes: HashMap<String, proto::Attribute>,
@@ -62,8 +66,8 @@ pub(super) struct Function {
 #[derive(Debug)]
 pub(super) struct Model {
     pub(super) graph: Graph,
-    /// By domain and name.
-    pub(super) functions: HashMap<(String, String), Function>,
+    /// By domain, name and overload.
+    pub(super) functions: HashMap<[String; 3], Function>,
     /// What wrote it, for people.
     pub(super) producer: String,
     /// Where files with its tensors may be.
@@ -94,13 +98,19 @@ impl Model {
         let model: proto::Model = decode(&bytes, "this is no ONNX file: its protobuf")?;
         let graph = model.graph.as_ref().context("this is no ONNX file: it holds no graph")?;
         let opsets: Vec<proto::OperatorSet> = all(&model.opset_import, "the operator sets")?;
-        let own = opsets.iter().find(|set| set.domain.as_deref().unwrap_or_default().is_empty());
-        let opset = own.and_then(|set| set.version).map_or(String::new(), |version| format!(", opset {version}"));
+        let own = opsets.iter().find(|set| ["", "ai.onnx"].contains(&set.domain.as_deref().unwrap_or_default()));
+        let opset = own.and_then(|set| set.version).context(
+            "the file does not say which version of ONNX's operators it uses (opset_import); export it again",
+        )?;
+        ensure!(
+            opset >= LEAST_OPSET,
+            "the file uses version {opset} of ONNX's operators, which join values by other rules; export it with opset {LEAST_OPSET} or above"
+        );
         let [name, version] = [&model.producer_name, &model.producer_version].map(|t| t.as_deref().unwrap_or_default());
-        let producer = printable(format!("{name} {version}").trim()).into_owned() + &opset;
+        let producer = format!("{}, opset {opset}", printable(format!("{name} {version}").trim()));
         let functions: Vec<proto::Function> = all(&model.functions, "the functions")?;
         let functions = functions.into_iter().map(|function| {
-            let key = (function.domain.unwrap_or_default(), function.name.unwrap_or_default());
+            let key = [function.domain, function.name, function.overload].map(Option::unwrap_or_default);
             let graph = Graph { nodes: nodes(&function.node)?, ..Graph::default() };
             let defaults = attributes(&function.attribute_proto)?;
             Ok((key, Function { inputs: function.input, outputs: function.output, defaults, graph }))
@@ -150,7 +160,7 @@ impl Model {
             (2 | 9, Some(raw)) => Data::Int(cut(raw, |b| u8::from_le_bytes(b).into())?),
             (2..=6 | 9, None) => Data::Int(tensor.int32_data.iter().map(|&v| v.into()).collect()),
             (12, None) => Data::Int(tensor.uint64_data.iter().map(|&v| v as i64).collect()),
-            _ => bail!("its type is ONNX's number {kind}; export it as float32 or int64"),
+            _ => bail!("its type is {}; export it as float32 or int64", kind_name(kind)),
         };
         let tensor = Tensor::new(shape, data);
         ensure!(tensor.len() == n, "its shape {:?} needs {n} values, {} are there", tensor.shape, tensor.len());
@@ -188,6 +198,31 @@ impl Model {
         file.seek(SeekFrom::Start(offset)).and_then(|_| file.read_exact(&mut bytes)).with_context(missing)?;
         Ok(bytes.into())
     }
+}
+
+/// What ONNX calls a type of elements.
+pub(super) fn kind_name(kind: i32) -> String {
+    const NAMES: [&str; 17] = [
+        "undefined",
+        "float32",
+        "uint8",
+        "int8",
+        "uint16",
+        "int16",
+        "int32",
+        "int64",
+        "string",
+        "bool",
+        "float16",
+        "float64",
+        "uint32",
+        "uint64",
+        "complex64",
+        "complex128",
+        "bfloat16",
+    ];
+    let name = usize::try_from(kind).ok().and_then(|kind| NAMES.get(kind));
+    name.map_or_else(|| format!("ONNX's number {kind}"), |name| (*name).to_owned())
 }
 
 fn cut<const N: usize, T>(raw: &Bytes, one: impl Fn([u8; N]) -> T) -> Result<Vec<T>> {
@@ -230,6 +265,7 @@ fn nodes(list: &[Bytes]) -> Result<Vec<Node>> {
             name: printable(&node.name.unwrap_or_default()).into_owned(),
             op: printable(&node.op_type.unwrap_or_default()).into_owned(),
             domain: node.domain.unwrap_or_default(),
+            overload: node.overload.unwrap_or_default(),
             attributes: attributes(&node.attribute)?,
             inputs: node.input,
             outputs: node.output,

@@ -3,6 +3,8 @@
 use anyhow::{Context as _, Result, bail, ensure};
 
 use super::call::Call;
+use super::gather;
+use super::model::kind_name;
 use super::places::{self, Places, along, axis, broadcast};
 use super::tensor::{Data, Element, Tensor, count};
 
@@ -62,8 +64,9 @@ pub(super) fn run(call: &Call<'_>, most: usize) -> Result<Option<Vec<Tensor>>> {
         }
         "Slice" => one(slice(call)?),
         "Split" => split(call).map(Some),
-        "Gather" => one(gather(call)?),
-        "GatherND" => one(gather_nd(call)?),
+        "Gather" => one(gather::gather(call)?),
+        "GatherElements" => one(gather::gather_elements(call)?),
+        "GatherND" => one(gather::gather_nd(call)?),
         "Concat" => one(concat(call)?),
         "Expand" => {
             let input = call.input(0)?;
@@ -78,7 +81,9 @@ pub(super) fn run(call: &Call<'_>, most: usize) -> Result<Option<Vec<Tensor>>> {
             one(taken(input, places::tile(&input.shape, &times)?)?)
         }
         "Where" => where_known(call, most),
-        "ScatterND" => one(scatter(call)?),
+        "ScatterElements" => one(gather::scatter_elements(call)?),
+        "ScatterND" => one(gather::scatter_nd(call)?),
+        "Pad" => one(pad(call, most)?),
         _ => Ok(None),
     }
 }
@@ -129,7 +134,9 @@ fn cast(call: &Call<'_>) -> Result<Tensor> {
         (9, Data::Real(v)) => Data::Int(v.iter().map(|&v| i64::from(v != 0.0)).collect()),
         (2..=7 | 12 | 13, Data::Int(v)) => Data::Int(v.clone()),
         (2..=7 | 12 | 13, Data::Real(v)) => Data::Int(v.iter().map(|&v| v as i64).collect()),
-        _ => bail!("rounds a value of the network to ONNX's type {to}; export the policy in float32 throughout"),
+        _ => {
+            bail!("rounds a value of the network to {}; export the policy in float32 throughout", kind_name(to as i32))
+        }
     };
     Ok(Tensor { data, ..input.clone() })
 }
@@ -240,45 +247,16 @@ fn split(call: &Call<'_>) -> Result<Vec<Tensor>> {
     parts.into_iter().map(&mut part).collect()
 }
 
-fn gather(call: &Call<'_>) -> Result<Tensor> {
-    let input = call.input(0)?;
-    let at = axis(call.int("axis").unwrap_or(0), input.shape.len())?;
-    let n = input.shape[at];
-    let indices = call.integers(1, "the indices")?;
-    let shape = &call.input(1)?.shape;
-    let chosen = indices.iter().map(|&i| axis(i, n)).collect::<Result<Vec<_>>>()?;
-    let (_, found) = along(&input.shape, at, chosen)?;
-    let (before, behind) = (&input.shape[..at], &input.shape[at + 1..]);
-    input.taken([before, shape, behind].concat(), &found)
-}
-
-/// Pieces at known places.
-fn gather_nd(call: &Call<'_>) -> Result<Tensor> {
-    let input = call.input(0)?;
-    let batch = call.int("batch_dims").and_then(|n| usize::try_from(n).ok()).unwrap_or(0);
-    let indices = call.integers(1, "the indices")?;
-    let (depth, outer) = call.input(1)?.shape.split_last().context("its indices have no axis")?;
-    let piece =
-        batch.checked_add(*depth).and_then(|n| input.shape.get(n..)).context("its indices have too many parts")?;
-    // Batches of length 1 are none.
-    ensure!(*depth > 0 && input.shape[..batch].iter().all(|&n| n == 1), "takes pieces of several batches");
-    let n = count(piece)?;
-    let mut places = Vec::new();
-    for index in indices.chunks(*depth) {
-        let mut at = 0;
-        for (&i, &n) in index.iter().zip(&input.shape[batch..]) {
-            at = at * n + axis(i, n)?;
-        }
-        places.extend(at * n..(at + 1) * n);
-    }
-    input.taken([outer, piece].concat(), &places)
-}
-
 fn concat(call: &Call<'_>) -> Result<Tensor> {
     let parts = call.inputs.iter().copied().flatten().collect::<Vec<_>>();
     let first = parts.first().context("joins nothing")?;
-    let at = axis(call.int("axis").unwrap_or(0), first.shape.len())?;
-    for part in &parts {
+    joined(&parts, axis(call.int("axis").unwrap_or(0), first.shape.len())?)
+}
+
+/// Tensors behind each other along an axis.
+fn joined(parts: &[&Tensor], at: usize) -> Result<Tensor> {
+    let first = parts.first().context("joins nothing")?;
+    for part in parts {
         let fits = part.shape.len() == first.shape.len();
         let fits = fits && (0..first.shape.len()).all(|i| i == at || part.shape[i] == first.shape[i]);
         ensure!(fits, "joins {:?} to {:?} along axis {at}", part.shape, first.shape);
@@ -290,7 +268,7 @@ fn concat(call: &Call<'_>) -> Result<Tensor> {
     let mut found = Vec::with_capacity(count(&shape)?);
     for row in 0..rows {
         let mut from = 0;
-        for part in &parts {
+        for part in parts {
             let piece = part.len() / rows;
             found.extend(from + row * piece..from + (row + 1) * piece);
             from += part.len();
@@ -305,6 +283,37 @@ fn concat(call: &Call<'_>) -> Result<Tensor> {
         }
     };
     all.taken(shape, &found)
+}
+
+/// More values, or fewer, at both ends of axes.
+fn pad(call: &Call<'_>, most: usize) -> Result<Tensor> {
+    let input = call.input(0)?;
+    let pads = call.ints_or_input("pads", 1)?.context("has no pads")?;
+    let fill = match call.optional(2) {
+        Some(_) => call.reals(2, "the value of the padding")?.first().copied().unwrap_or(0.0),
+        None => call.float("value").unwrap_or(0.0),
+    };
+    let rank = input.shape.len();
+    let axes = if call.optional(3).is_some() { call.integers(3, "the axes")? } else { (0..rank as i64).collect() };
+    ensure!(pads.len() == 2 * axes.len(), "has {} pads for {} axes", pads.len(), axes.len());
+    let mode = call.text("mode").unwrap_or_else(|| "constant".to_owned());
+    ensure!(mode == "constant", "pads with {mode:?}; only constants are taken");
+    let mut all = input.clone();
+    for (&at, (&before, &behind)) in axes.iter().zip(pads.iter().zip(&pads[axes.len()..])) {
+        let at = axis(at, rank)?;
+        // Negative ones cut.
+        let end = if behind < 0 { behind } else { i64::MAX };
+        let kept = places::slice(all.shape[at], before.min(0).saturating_neg(), end, 1)?;
+        let kept = taken(&all, along(&all.shape, at, kept)?)?;
+        let block = |n: i64| -> Result<Tensor> {
+            let mut shape = kept.shape.clone();
+            shape[at] = usize::try_from(n.max(0))?;
+            let n = room(&shape, most)?;
+            Ok(Tensor::new(shape, Data::Real(vec![fill; n])))
+        };
+        all = joined(&[&block(before)?, &kept, &block(behind)?], at)?;
+    }
+    Ok(all)
 }
 
 /// A choice that is known for every element.
@@ -330,37 +339,4 @@ fn where_known(call: &Call<'_>, most: usize) -> Result<Option<Vec<Tensor>>> {
         _ => Tensor::of_elements(vec![2 * n], [x.elements(), y.elements()].concat()),
     };
     Ok(Some(vec![both.taken(shape, &places)?]))
-}
-
-/// Rows at known places are replaced.
-fn scatter(call: &Call<'_>) -> Result<Tensor> {
-    let (data, updates) = (call.input(0)?, call.input(2)?);
-    ensure!(
-        matches!(call.text("reduction").as_deref(), None | Some("none")),
-        "only replaces where it has no reduction"
-    );
-    let indices = call.integers(1, "the indices")?;
-    let depth = call.input(1)?.shape.last().copied().unwrap_or(1);
-    ensure!((1..=data.shape.len()).contains(&depth), "its indices have {depth} parts for {} axes", data.shape.len());
-    let piece = count(&data.shape[depth..])?;
-    let rows = indices.chunks(depth);
-    ensure!(updates.len() == rows.len() * piece, "its updates do not fit its indices");
-    let mut places: Vec<usize> = (0..data.len()).collect();
-    for (row, index) in rows.enumerate() {
-        let mut at = 0;
-        for (&i, &n) in index.iter().zip(&data.shape) {
-            at = at * n + axis(i, n)?;
-        }
-        for k in 0..piece {
-            places[at * piece + k] = data.len() + row * piece + k;
-        }
-    }
-    let both = match (data.integers(), updates.integers()) {
-        (Some(data), Some(updates)) => Tensor::ints([data, updates].concat()),
-        _ => {
-            let all = [data.elements(), updates.elements()].concat();
-            Tensor::of_elements(vec![all.len()], all)
-        }
-    };
-    both.taken(data.shape.clone(), &places)
 }

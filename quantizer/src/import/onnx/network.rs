@@ -115,7 +115,7 @@ fn network(model: &Model, name: &str, choice: &Choice) -> Result<Imported> {
     let mut offsets = HashMap::new();
     let mut inputs = Vec::new();
     let mut obs_len = 0;
-    for i in read {
+    for &i in &read {
         let len = len_of(&exprs, i);
         offsets.insert(i, obs_len);
         obs_len += len;
@@ -130,6 +130,7 @@ fn network(model: &Model, name: &str, choice: &Choice) -> Result<Imported> {
         })
         .collect();
 
+    refuse_batch(model, &read, &act_shape)?;
     let (chunk, act_len) = actions(&act_shape, open.len())?;
     let (root, contract) = action::contract(&exprs, root, act_len);
     let root = simplify(&mut exprs, root, &cells.instead);
@@ -234,6 +235,17 @@ fn choose(
 
 fn is_action(name: &str) -> bool {
     name.to_lowercase().contains("action") && !name.to_lowercase().contains("shape")
+}
+
+/// Refuses several observations at once: their actions would be taken for a chunk.
+fn refuse_batch(model: &Model, read: &[usize], act_shape: &[usize]) -> Result<()> {
+    let first = |i: &usize| model.graph.inputs[*i].shape.as_ref()?.first().copied().flatten();
+    let &[batch, _, ..] = act_shape else { return Ok(()) };
+    ensure!(
+        batch == 1 || read.iter().any(|i| first(i) != Some(batch)),
+        "the action and all inputs have {batch} rows, which is a batch; a control step has one observation, so export with a batch of 1"
+    );
+    Ok(())
 }
 
 /// Actions in the output, and the length of each.

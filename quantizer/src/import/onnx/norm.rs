@@ -26,13 +26,15 @@ impl Exprs {
         let root = self.operand_of(root, Unary::Reciprocal).filter(|_| zero == 0.0)?;
         // `max(length, limit)` is `relu(length - limit) + limit`.
         let (root, limit) = match self.affine_of(root) {
-            (relu, 1.0, limit) if limit > 0.0 => {
+            (relu, 1.0, limit) if limit > 0.0 && self.known_of(relu, Function::Relu).is_some() => {
                 let (root, one, off) = self.affine_of(self.known_of(relu, Function::Relu)?);
                 if one != 1.0 || !near(-off, limit) || limit > MOST_LIMIT {
                     return None;
                 }
                 (root, limit)
             }
+            // `length + limit` is off that by no more than the limit.
+            (root, 1.0, limit) if (0.0..=MOST_LIMIT).contains(&limit) => (root, limit),
             _ => (root, 0.0),
         };
         let (square, a, e) = self.affine_of(self.operand_of(root, Unary::Sqrt)?);

@@ -67,6 +67,9 @@ pub struct Node {
     pub attribute: Vec<Bytes>,
     #[prost(string, optional, tag = "7")]
     pub domain: Option<String>,
+    /// Which of several functions of one name.
+    #[prost(string, optional, tag = "8")]
+    pub overload: Option<String>,
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -185,4 +188,7 @@ pub struct Function {
     /// Of [`Attribute`]: defaults.
     #[prost(bytes = "bytes", repeated, tag = "11")]
     pub attribute_proto: Vec<Bytes>,
+    /// As [`Node::overload`].
+    #[prost(string, optional, tag = "13")]
+    pub overload: Option<String>,
 }

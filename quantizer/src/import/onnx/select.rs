@@ -5,8 +5,8 @@ use actq_kernels::math::Function;
 use super::compare::near;
 use super::expr::{Expr, Exprs, Id, Unary};
 
-/// From here on f32's softplus is its operand.
-const SOFTPLUS_END: f64 = 17.0;
+/// From here on f32's softplus is its operand: `ln(1 + e^-15)` is less than half the last digit of 15.
+const SOFTPLUS_END: f64 = 15.0;
 
 impl Exprs {
     /// `where(condition, x, y)`, where that is a function of the network.
@@ -17,7 +17,7 @@ impl Exprs {
         if let Some(z) = self.known_of(softplus, Function::Softplus)
             && zero == 0.0
             && near(self.ratio(x, z)?, factor)
-            && limit / self.ratio(of, z)? > SOFTPLUS_END
+            && limit / self.ratio(of, z)? >= SOFTPLUS_END
         {
             return Some(y);
         }

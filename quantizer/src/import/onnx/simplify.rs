@@ -78,7 +78,13 @@ pub(super) fn simplify(exprs: &mut Exprs, root: Id, instead: &HashMap<Id, Id>) -
             Expr::Unary(f, x) => exprs.put(Expr::Unary(f, of(&x)), len),
             Expr::Add(x, y) => exprs.put(Expr::Add(of(&x), of(&y)), len),
             Expr::Mul(x, y) => exprs.put(Expr::Mul(of(&x), of(&y)), len),
-            Expr::Sum(x) => exprs.put(Expr::Sum(of(&x)), len),
+            // A sum that is left is a product with a row of ones.
+            Expr::Sum(x) => {
+                let x = of(&x);
+                let cols = exprs.len_of(x);
+                let ones = Matrix { name: Some("sum.weight".to_owned()), rows: 1, cols, data: vec![1.0; cols] };
+                exprs.put(Expr::Linear(x, Arc::new(ones), vec![0.0]), len)
+            }
             Expr::Clip(x, limit) => exprs.put(Expr::Clip(of(&x), limit), len),
             Expr::LayerNorm(x, weight, bias, eps) => exprs.put(Expr::LayerNorm(of(&x), weight, bias, eps), len),
             Expr::RmsNorm(x, weight, eps) => exprs.put(Expr::RmsNorm(of(&x), weight, eps), len),

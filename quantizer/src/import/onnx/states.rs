@@ -164,7 +164,8 @@ pub(super) fn refuse_lost_states(
     action: &str,
     named: &[(String, String)],
 ) -> Result<()> {
-    let help = "only the states of LSTM and GRU cells (torch's forms) are carried from step to step";
+    let help = "only the states of LSTM and GRU cells (torch's forms) are carried from step to step; what else the policy \
+                should remember, observe: an input without an output";
     for (from, to) in named {
         let is_pair = |(i, o): &(usize, usize)| model.graph.inputs[*i].name == *from && outputs[*o].name == *to;
         ensure!(

@@ -1,0 +1,270 @@
+//! Forms that PyTorch's exporters and tf2onnx were found to write (docs/records/2026-11-22-exporters.md), against tract.
+
+use actq::import::onnx::{Choice, proto};
+use actq::measure::actions::actions;
+use anyhow::{Context as _, Result};
+use prost::Message as _;
+
+use super::file::{File, Value, encoded};
+use super::styles::{OBS, begun, ended, ops};
+use super::{compare, drawn, imported, same};
+
+/// A step of a network whose value has 16 elements.
+type Step = fn(&mut File, &str) -> String;
+
+/// The ops between two layers, each form compared with tract.
+fn between(steps: &[(&str, Step)]) -> Result<()> {
+    for (i, (expected, step)) in steps.iter().enumerate() {
+        let mut file = begun();
+        let x = file.gemm("obs", 16, OBS);
+        let x = step(&mut file, &x);
+        let found = ops(&ended(file, &x, 16)).with_context(|| format!("{i} {expected}"))?;
+        assert_eq!(found, format!("linear {expected} linear"), "{i}");
+    }
+    Ok(())
+}
+
+fn refused(bytes: &[u8], expected: &str) {
+    let error = format!("{:#}", imported(bytes, &Choice::default()).expect_err(expected));
+    assert!(error.contains(expected), "{error} instead of {expected}");
+}
+
+#[test]
+fn layers_of_constants_are_folded() -> Result<()> {
+    // The time of a denoising step that the exporter wrote as a constant, with its embedding and layers.
+    let mut file = begun();
+    let time = file.drawn(&[1, 4]);
+    let x = file.gemm(&time, 8, 4);
+    let erf = file.node("Erf", &[&x], &[]);
+    let x = file.node("Mul", &[&x, &erf], &[]);
+    let x = ["Elu", "Softplus", "LeakyRelu", "Tanh", "HardSigmoid"].iter().fold(x, |x, op| file.node(op, &[&x], &[]));
+    let w = file.drawn(&[8]);
+    let x = file.node("LayerNormalization", &[&x, &w, &w], &[("axis", Value::Int(-1))]);
+    let x = file.node("LpNormalization", &[&x], &[("axis", Value::Int(-1)), ("p", Value::Int(2))]);
+    // Beside the observation, through one function.
+    let x = file.node("Concat", &["obs", &x], &[("axis", Value::Int(1))]);
+    let x = file.node("Elu", &[&x], &[]);
+    assert_eq!(ops(&ended(file, &x, OBS + 8))?, "elu linear");
+    // A choice by a comparison of real constants.
+    let mut file = begun();
+    let (mask, zero) = (file.drawn(&[1, OBS]), file.reals(&[], &[0.0]));
+    let above = file.node("Greater", &[&mask, &zero], &[]);
+    let x = file.node("Where", &[&above, "obs", &mask], &[]);
+    assert_eq!(ops(&ended(file, &x, OBS))?, "linear");
+    Ok(())
+}
+
+#[test]
+fn sums_and_means_are_products_with_ones() -> Result<()> {
+    fn mean(file: &mut File, x: &str) -> String {
+        file.node("ReduceMean", &[x], &[("axes", Value::Ints(vec![-1])), ("keepdims", Value::Int(1))])
+    }
+    between(&[("linear identity add", |file, x| {
+        let mean = mean(file, x);
+        file.node("Sub", &[x, &mean], &[])
+    })])?;
+    // The mean of an ensemble is of whole vectors.
+    let mut file = begun();
+    let members = [0; 3].map(|_| {
+        let y = file.gemm("obs", 5, OBS);
+        let y = file.node("Tanh", &[&y], &[]);
+        let axes = file.ints(&[0]);
+        file.node("Unsqueeze", &[&y, &axes], &[])
+    });
+    let members = members.each_ref().map(String::as_str);
+    let all = file.node("Concat", &members, &[("axis", Value::Int(0))]);
+    let x = file.node("ReduceMean", &[&all], &[("axes", Value::Ints(vec![0])), ("keepdims", Value::Int(0))]);
+    let found = ops(&ended(file, &x, 5))?;
+    assert_eq!(found.matches("add").count(), 2, "{found}");
+    assert_eq!(found.matches("linear").count(), 4, "{found}");
+    Ok(())
+}
+
+#[test]
+fn powers_logarithms_and_lengths_are_found() -> Result<()> {
+    between(&[
+        ("exp", |file, x| {
+            let two = file.reals(&[], &[2.0]);
+            file.node("Pow", &[&two, x], &[])
+        }),
+        ("mul mul", |file, x| {
+            let four = file.reals(&[], &[4.0]);
+            file.node("Pow", &[x, &four], &[])
+        }),
+        // LogSigmoid
+        ("softplus", |file, x| {
+            let s = file.node("Sigmoid", &[x], &[]);
+            file.node("Log", &[&s], &[])
+        }),
+        // x / (|x| + 1e-8)
+        ("rmsnorm", |file, x| {
+            let length = file.node("ReduceL2", &[x], &[("axes", Value::Ints(vec![1])), ("keepdims", Value::Int(1))]);
+            let least = file.reals(&[], &[1e-8]);
+            let length = file.node("Add", &[&length, &least], &[]);
+            file.node("Div", &[x, &length], &[])
+        }),
+    ])
+}
+
+#[test]
+fn elements_are_taken_replaced_and_padded() -> Result<()> {
+    let mut file = begun();
+    let [pads, indices, places] = [vec![0, 1, 0, 2], vec![3, 1, 1], vec![2, 0]].map(|v| file.ints(&v));
+    let (fill, new, one) = (file.reals(&[], &[0.7]), file.drawn(&[1, 2]), file.ints(&[1, -1]));
+    let padded = file.node("Pad", &["obs", &pads, &fill], &[]);
+    let row = |file: &mut File, list: &str| file.node("Reshape", &[list, &one], &[]);
+    let (indices, places) = (row(&mut file, &indices), row(&mut file, &places));
+    let taken = file.node("GatherElements", &["obs", &indices], &[("axis", Value::Int(1))]);
+    let replaced = file.node("ScatterElements", &["obs", &places, &new], &[("axis", Value::Int(1))]);
+    let x = file.node("Concat", &[&padded, &taken, &replaced], &[("axis", Value::Int(1))]);
+    assert_eq!(ops(&ended(file, &x, OBS + 3 + 3 + OBS))?, "linear");
+    Ok(())
+}
+
+#[test]
+fn convolutions_over_few_positions_are_products() -> Result<()> {
+    let ints = |name, values: &[i64]| (name, Value::Ints(values.to_vec()));
+    // Kernel, shape of the value, attributes, values behind it.
+    let cases = [
+        (vec![6, 8, 1], vec![1, 8, 4], vec![], 24),
+        (vec![6, 8, 3], vec![1, 8, 4], vec![ints("pads", &[1, 1]), ints("strides", &[2])], 12),
+        (vec![6, 2, 2], vec![1, 4, 8], vec![("group", Value::Int(2)), ints("dilations", &[3])], 30),
+        (vec![6, 8, 2], vec![1, 8, 4], vec![("auto_pad", Value::Text("SAME_UPPER"))], 24),
+        (vec![3, 2, 2, 3], vec![1, 2, 4, 4], vec![], 18),
+    ];
+    for (i, (kernel, shape, attributes, behind)) in cases.into_iter().enumerate() {
+        let mut file = begun();
+        let x = file.gemm("obs", 32, OBS);
+        let shape = file.ints(&shape);
+        let x = file.node("Reshape", &[&x, &shape], &[]);
+        let (w, b) = (file.drawn(&kernel), file.drawn(&[kernel[0]]));
+        let x = file.node("Conv", &[&x, &w, &b], &attributes);
+        let x = file.node("Flatten", &[&x], &[]);
+        let x = file.node("Relu", &[&x], &[]);
+        same(&ended(file, &x, behind)).with_context(|| i.to_string())?;
+    }
+    let mut file = File::default();
+    file.input("image", &[1, 3, 16, 16]);
+    let w = file.drawn(&[4, 3, 3, 3]);
+    let x = file.node("Conv", &["image", &w], &[]);
+    let x = file.node("Flatten", &[&x], &[]);
+    refused(&ended(file, &x, 784), "(Conv): goes over 196 positions, 1 to 64 are taken");
+    Ok(())
+}
+
+#[test]
+fn what_a_transpose_scatters_is_computed_in_its_order() -> Result<()> {
+    let mut file = begun();
+    let x = file.gemm("obs", 16, OBS);
+    let (apart, joined) = (file.ints(&[1, 4, 4]), file.ints(&[1, 16]));
+    let x = file.node("Reshape", &[&x, &apart], &[]);
+    let x = file.node("Transpose", &[&x], &[("perm", Value::Ints(vec![0, 2, 1]))]);
+    let gate = file.node("Sigmoid", &[&x], &[]);
+    let x = file.node("Mul", &[&x, &gate], &[]);
+    let x = file.node("Transpose", &[&x], &[("perm", Value::Ints(vec![0, 2, 1]))]);
+    let x = file.node("Reshape", &[&x, &joined], &[]);
+    assert_eq!(ops(&ended(file, &x, 16))?, "linear silu linear");
+    Ok(())
+}
+
+#[test]
+fn einsums_with_constants_are_products() -> Result<()> {
+    for (equation, w, rest) in [
+        ("bi,oi->bo", vec![16, 16], None),
+        ("bi,io->bo", vec![16, 16], None),
+        ("btd,hdk->bhtk", vec![2, 4, 2], Some(4)),
+    ] {
+        let mut file = begun();
+        let mut x = file.gemm("obs", 16, OBS);
+        if let Some(steps) = rest {
+            let shape = file.ints(&[1, steps, 4]);
+            x = file.node("Reshape", &[&x, &shape], &[]);
+        }
+        let w = file.drawn(&w);
+        let x = file.node("Einsum", &[&x, &w], &[("equation", Value::Text(equation))]);
+        let x = file.node("Flatten", &[&x], &[]);
+        let x = file.node("Tanh", &[&x], &[]);
+        same(&ended(file, &x, 16)).with_context(|| equation.to_owned())?;
+    }
+    Ok(())
+}
+
+#[test]
+fn norms_of_groups_are_norms_of_rows() -> Result<()> {
+    // torch's GroupNorm: an instance norm of [1, group, ..], then a factor and an offset for each channel.
+    let mut file = begun();
+    let x = file.gemm("obs", 16, OBS);
+    let (apart, joined) = (file.ints(&[1, 4, 4]), file.ints(&[1, 16]));
+    let x = file.node("Reshape", &[&x, &apart], &[]);
+    let (ones, zeros) = (file.reals(&[4], &[1.0; 4]), file.reals(&[4], &[0.0; 4]));
+    let x = file.node("InstanceNormalization", &[&x, &ones, &zeros], &[("epsilon", Value::Real(1e-5))]);
+    let x = file.node("Reshape", &[&x, &joined], &[]);
+    let (w, b) = (file.drawn(&[16]), file.drawn(&[16]));
+    let x = file.node("Mul", &[&x, &w], &[]);
+    let x = file.node("Add", &[&x, &b], &[]);
+    assert_eq!(same(&ended(file, &x, 16))?.ops.iter().filter(|op| *op == "layernorm").count(), 4);
+    Ok(())
+}
+
+#[test]
+fn functions_are_told_apart_by_their_overload() -> Result<()> {
+    let function = |overload: &str, op: &str| {
+        let node = proto::Node {
+            op_type: Some(op.to_owned()),
+            input: vec!["x".to_owned()],
+            output: vec!["y".to_owned()],
+            ..Default::default()
+        };
+        encoded(&proto::Function {
+            name: Some("Act".to_owned()),
+            domain: Some("local".to_owned()),
+            overload: Some(overload.to_owned()),
+            input: vec!["x".to_owned()],
+            output: vec!["y".to_owned()],
+            node: vec![encoded(&node)],
+            ..Default::default()
+        })
+    };
+    let network = |called: bool| {
+        let mut file = begun();
+        let mut x = file.gemm("obs", 16, OBS);
+        for (overload, op) in [("first", "Tanh"), ("second", "Elu")] {
+            x = if called { file.call(overload, &x) } else { file.node(op, &[&x], &[]) };
+        }
+        let y = file.gemm(&x, 3, 16);
+        file.nodes("Identity", &[&y], &["actions"], &[]);
+        file.output("actions", &[1, 3]);
+        file.model()
+    };
+    let plain = network(false).encode_to_vec();
+    let functions = vec![function("first", "Tanh"), function("second", "Elu")];
+    let called = proto::Model { functions, ..network(true) }.encode_to_vec();
+    let [ours, theirs] = [called, plain].map(|bytes| imported(&bytes, &Choice::default()));
+    let (ours, theirs) = (ours?.1, theirs?.1);
+    let observations = drawn(&ours);
+    compare(&actions(&theirs, &observations), &actions(&ours, &observations))
+}
+
+#[test]
+fn files_that_would_be_misread_are_refused() -> Result<()> {
+    let mut file = begun();
+    let x = file.node("Tanh", &["obs"], &[]);
+    let x = file.gemm(&x, 3, OBS);
+    file.nodes("Identity", &[&x], &["actions"], &[]);
+    file.output("actions", &[1, 3]);
+    same(&file.bytes())?;
+    let with_opset = |version: Option<i64>| {
+        let set = |version| encoded(&proto::OperatorSet { domain: None, version: Some(version) });
+        proto::Model { opset_import: version.map(set).into_iter().collect(), ..file.model() }.encode_to_vec()
+    };
+    refused(&with_opset(None), "does not say which version of ONNX's operators it uses");
+    refused(&with_opset(Some(6)), "export it with opset 7 or above");
+    // A batch, which is no chunk of actions.
+    let mut file = File::default();
+    file.input("obs", &[4, OBS as i64]);
+    let y = file.gemm("obs", 3, OBS);
+    file.nodes("Tanh", &[&y], &["actions"], &[]);
+    file.output("actions", &[4, 3]);
+    refused(&file.bytes(), "have 4 rows, which is a batch");
+    Ok(())
+}

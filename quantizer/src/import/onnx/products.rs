@@ -1,0 +1,131 @@
+//! Products with matrices that are known.
+
+use std::sync::Arc;
+
+use anyhow::{Context as _, Result, bail, ensure};
+
+use super::arithmetic::two;
+use super::call::Call;
+use super::elements::value;
+use super::expr::{Exprs, Id, Matrix};
+use super::places::transpose;
+use super::tensor::{Data, Element, Tensor};
+
+/// The output, where the node is such an operation.
+pub(super) fn run(call: &Call<'_>, exprs: &mut Exprs, most: usize) -> Result<Option<Tensor>> {
+    match call.op() {
+        "MatMul" => product(exprs, call.input(0)?, call.input(1)?, 1.0, most).map(Some),
+        "Gemm" => gemm(call, exprs, most).map(Some),
+        _ => Ok(None),
+    }
+}
+
+/// `alpha A B + beta C`
+fn gemm(call: &Call<'_>, exprs: &mut Exprs, most: usize) -> Result<Tensor> {
+    let turned = |i: usize, name: &str| {
+        let x = call.input(i)?;
+        ensure!(x.shape.len() == 2, "takes matrices, not {:?}", x.shape);
+        if call.int(name).unwrap_or(0) == 0 {
+            return Ok(x.clone());
+        }
+        let (shape, places) = transpose(&x.shape, &[1, 0])?;
+        Ok(Tensor { name: x.name.clone(), ..x.taken(shape, &places)? })
+    };
+    let (a, b) = (turned(0, "transA")?, turned(1, "transB")?);
+    let y = product(exprs, &a, &b, call.float("alpha").unwrap_or(1.0), most)?;
+    let Some(c) = call.optional(2) else { return Ok(y) };
+    let beta = Tensor::new(vec![], Data::Real(vec![call.float("beta").unwrap_or(1.0)]));
+    let c = match c.reals() {
+        Some(c) if beta.data == Data::Real(vec![1.0]) => Tensor::new(call.input(2)?.shape.clone(), Data::Real(c)),
+        Some(v) => {
+            let factor = call.float("beta").unwrap_or(1.0);
+            Tensor::new(c.shape.clone(), Data::Real(v.iter().map(|v| factor * v).collect()))
+        }
+        None => two("Mul", exprs, c, &beta, c.len())?,
+    };
+    two("Add", exprs, &y, &c, y.len())
+}
+
+/// The matrix of a tensor [cols, rows] that is known, times a factor.
+fn matrix(w: &Tensor, factor: f64, what: &str) -> Result<Arc<Matrix>> {
+    let &[cols, rows] = &w.shape[..] else { bail!("{what} is {:?}; a matrix is taken", w.shape) };
+    let values = w.reals().with_context(|| format!("{what} is not known"))?;
+    let data = (0..rows * cols).map(|i| factor * values[i % cols * rows + i / cols]).collect();
+    Ok(Arc::new(Matrix { name: w.name.clone(), rows, cols, data }))
+}
+
+/// `factor A B`, one of which is known, or both.
+pub(super) fn product(exprs: &mut Exprs, a: &Tensor, b: &Tensor, factor: f64, most: usize) -> Result<Tensor> {
+    ensure!(!a.shape.is_empty() && !b.shape.is_empty(), "multiplies {:?} with {:?}", a.shape, b.shape);
+    match (a.is_known(), b.is_known()) {
+        (_, true) => {}
+        // A B is B' A', turned.
+        (true, false) => {
+            let flat = |x: &Tensor| -> Result<Tensor> {
+                let mut order: Vec<usize> = (0..x.shape.len()).collect();
+                if let [.., last, end] = &mut order[..] {
+                    std::mem::swap(last, end);
+                }
+                let (shape, places) = transpose(&x.shape, &order)?;
+                Ok(Tensor { name: x.name.clone(), ..x.taken(shape, &places)? })
+            };
+            let y = product(exprs, &flat(b)?, &flat(a)?, factor, most)?;
+            return if a.shape.len() > 1 && b.shape.len() > 1 { flat(&y) } else { Ok(y) };
+        }
+        (false, false) => bail!(
+            "multiplies two values of the network, as attention does; only products with constant matrices are taken, so export the \
+             part behind it"
+        ),
+    }
+    // Leading axes of length 1 say nothing.
+    let ones = b.shape.len().saturating_sub(2);
+    ensure!(b.shape[..ones].iter().all(|&n| n == 1), "multiplies with several matrices at once, {:?}", b.shape);
+    let vector = b.shape.len() == 1;
+    let mut shape = b.shape[ones..].to_vec();
+    shape.resize(2, 1);
+    let w = matrix(&Tensor { name: b.name.clone(), ..b.reshaped(shape)? }, factor, "the constant")?;
+    let n = a.shape[a.shape.len() - 1];
+    ensure!(n == w.cols && n > 0, "multiplies {:?} with {:?}", a.shape, b.shape);
+    // The work is bounded as the values are.
+    let work = a.len().checked_mul(w.rows).filter(|work| !a.is_known() || *work <= most.saturating_mul(64));
+    ensure!(work.is_some(), "multiplies larger constants than a policy of this size can have");
+    let mut all = Vec::new();
+    for row in a.elements().chunks(n) {
+        all.extend(row_product(exprs, row, &w)?);
+    }
+    let mut out = a.shape[..a.shape.len() - 1].to_vec();
+    if !vector {
+        out.push(w.rows);
+    }
+    let missing = b.shape.len().saturating_sub(out.len().max(2));
+    Ok(Tensor::of_elements([vec![1; missing], out].concat(), all))
+}
+
+/// The product of a vector; what is known of it goes into the bias, without its columns.
+pub(super) fn row_product(exprs: &mut Exprs, x: &[Element], w: &Arc<Matrix>) -> Result<Vec<Element>> {
+    let open: Vec<usize> = (0..x.len()).filter(|&i| matches!(x[i], Element::Of(..))).collect();
+    let known = |i: usize| if let Element::Known(v) = x[i] { v } else { 0.0 };
+    let bias: Vec<f64> =
+        w.data.chunks(w.cols).map(|row| row.iter().enumerate().map(|(i, w)| w * known(i)).sum()).collect();
+    if open.is_empty() {
+        return Ok(bias.into_iter().map(Element::Known).collect());
+    }
+    let w = if open.len() == x.len() {
+        Arc::clone(w)
+    } else {
+        let data = w.data.chunks(w.cols).flat_map(|row| open.iter().map(|&i| row[i])).collect();
+        Arc::new(Matrix { name: w.name.clone(), rows: w.rows, cols: open.len(), data })
+    };
+    let x: Vec<Element> = open.into_iter().map(|i| x[i]).collect();
+    let x = open_vector(exprs, &x)?;
+    let y = exprs.linear(x, w, bias);
+    Ok(exprs.elements(y))
+}
+
+/// The vector of elements none of which is known.
+pub(super) fn open_vector(exprs: &mut Exprs, elements: &[Element]) -> Result<Id> {
+    let values: Option<Vec<(Id, usize)>> = elements.iter().map(value).collect();
+    Ok(exprs.vector(&values.context(
+        "mixes constants and values of the network in one vector; join them behind it, or observe the constants",
+    )?))
+}
