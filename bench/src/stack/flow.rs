@@ -14,6 +14,22 @@ const CHANGED: u32 = 0x500f;
 /// What an assembler fills words with, where it does not take 0.
 const NOP: u16 = 0xbf00;
 
+/// Bytes before a choice from branches in which their address is taken.
+const ADDRESSED: u32 = 32;
+
+/// The address that ADR takes.
+fn address_of(at: u32, first: u16, second: u16) -> Option<u32> {
+    let pc = at.wrapping_add(4) & !3;
+    let [first, second] = [first, second].map(u32::from);
+    match first {
+        _ if first >> 11 == 0b10100 => Some(pc + 4 * (first & 0xff)),
+        _ if first & 0xfbff == 0xf20f && second & 0x8000 == 0 => {
+            Some(pc + ((first & 0x400) << 1 | (second & 0x7000) >> 4 | second & 0xff))
+        }
+        _ => None,
+    }
+}
+
 /// What a function calls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Callee {
@@ -158,6 +174,7 @@ impl Walk<'_> {
                 Vec::new()
             }
             Step::Table(size) => self.table(at, size)?.into_iter().map(|to| (to, after)).collect(),
+            Step::Branches => self.branches(at, next)?.into_iter().map(|to| (to, after)).collect(),
             Step::Call(_) | Step::CallRegister => {
                 let callee = if let Step::Call(to) = step { Callee::Function(to) } else { Callee::Pointer };
                 self.call(callee, state);
@@ -245,6 +262,25 @@ impl Walk<'_> {
         }
         ensure!(!targets.is_empty(), "{at:#x} branches by an empty table");
         Ok(targets)
+    }
+
+    /// The addresses of the branches, four bytes each, that stand from `begin` on and that the instruction before chooses from. Behind
+    /// the last of them may stand one that is none of them; its way exists, too.
+    fn branches(&self, at: u32, begin: u32) -> Result<Vec<u32>> {
+        let is_addressed = (at.saturating_sub(ADDRESSED)..at).step_by(2).any(|before| {
+            let [first, second] = self.program.halves(before).unwrap_or_default();
+            address_of(before, first, second) == Some(begin)
+        });
+        ensure!(is_addressed, "{at:#x} sets the program counter to what is not followed here");
+        let is_branch = |entry: &u32| {
+            let halves = self.program.halves(*entry).filter(|_| self.holds(*entry));
+            halves.is_some_and(|[first, second]| {
+                first & 0xf800 == 0xf000 && matches!(Step::decode(*entry, first, second), Step::Branch(_))
+            })
+        };
+        let entries: Vec<u32> = (begin..).step_by(4).take_while(is_branch).collect();
+        ensure!(!entries.is_empty(), "{at:#x} chooses from branches that are not there");
+        Ok(entries)
     }
 
     /// What MOVW and MOVT have put into a register, right before an instruction.

@@ -37,6 +37,8 @@ pub(super) enum Step {
     BranchRegister(u32),
     /// A branch by a table behind the instruction, whose entries have so many bytes.
     Table(u32),
+    /// A branch to one of the branches behind the instruction.
+    Branches,
     /// A call.
     Call(u32),
     /// A call of what a register holds.
@@ -115,6 +117,8 @@ fn narrow(pc: u32, half: u16) -> Option<Step> {
         0xd0..=0xdd => Step::Conditional { to: to(signed(8)), zero: equal(bits(half, 11, 8)) },
         0xde => Step::Trap,
         0xe0..=0xe7 => Step::Branch(to(signed(11))),
+        // MOV to the program counter.
+        0x46 if half & 0x87 == 0x87 => Step::Branches,
         // With bit 2 set they change the security state.
         0x47 if half & 0x87 == 0 => Step::BranchRegister(bits(half, 6, 3)),
         0x47 if half & 0x87 == 0x80 => Step::CallRegister,
@@ -262,7 +266,6 @@ mod tests {
         check([0xe8ad, 0x5140], Step::Unknown); // stmia sp!, {r6, r8, r12, lr}
         check([0xf382, 0x8809], Step::Unknown); // msr psp, r2
         check([0xf382, 0x8814], Step::Unknown); // msr control, r2
-        check([0x4687, 0], Step::Unknown); // mov pc, r0
         check([0xf8d0, 0xf000], Step::Unknown); // ldr.w pc, [r0]
         check([0x4774, 0], Step::Unknown); // bxns lr
         check([0xf000, 0xe800], Step::Unknown); // blx, to Arm's instruction set
@@ -284,6 +287,7 @@ mod tests {
         check([0x4798, 0], Step::CallRegister); // blx r3
         check([0xe8df, 0xf000], Step::Table(1)); // tbb [pc, r0]
         check([0xe8df, 0xf010], Step::Table(2)); // tbh [pc, r0, lsl #1]
+        check([0x46b7, 0], Step::Branches); // mov pc, r6
         check([0xbd10, 0], Step::Return(8)); // pop {r4, pc}
         check([0xe8bd, 0x8ff0], Step::Return(36)); // pop.w {r4-r11, pc}
         check([0xf85d, 0xfb04], Step::Return(4)); // ldr pc, [sp], #4

@@ -77,6 +77,18 @@ fn a_frame_is_the_deepest_of_all_ways() -> Result<()> {
 }
 
 #[test]
+fn a_choice_from_branches_goes_all_their_ways() -> Result<()> {
+    // adr r0, the first branch; add.w r0, r0, r1, lsl #2; mov pc, r0
+    let choice = [0xa001, 0xeb00, 0x0081, 0x4687];
+    let [first, second] = [far(at(0) + 8, at(0) + 16, false), far(at(0) + 12, at(0) + 22, false)];
+    let code = [&choice[..], &first, &second, &leaf(8), &[BX_LR]].concat();
+    assert_eq!(frame_of(&code)?, 8);
+    assert!(refused(&[&[NOP], &choice[1..], &first[..], &[BX_LR; 6]].concat()).contains("is not followed here"));
+    assert!(refused(&[&choice[..], &[BX_LR]].concat()).contains("not there"));
+    Ok(())
+}
+
+#[test]
 fn instructions_behind_it_are_executed_together_or_not_at_all() -> Result<()> {
     // itt ne: addne sp, #8; popne {r4, pc}. Then as without.
     let code = [PUSH_R4_LR, SUB_SP_8, 0xbf1c, ADD_SP_8, POP_R4_PC, SUB_SP_8, 0xb004, POP_R4_PC];
