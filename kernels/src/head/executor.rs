@@ -70,8 +70,8 @@ pub(super) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
         OpKind::Denoise => {
             let (by, noise) = op.coefficients(cursor.step);
             let by = Coefficients::from_array(by);
-            let len = if by.sigma == 0.0 { 0 } else { op.dst().len };
-            let z = Region { offset: noise, len };
+            let all = Region { offset: noise, len: op.dst().len };
+            let z = if by.sigma == 0.0 { Region::default() } else { all };
             let [x, v, y, z] = regions(arena, &op.regions, z);
             let [x, v, y, z] = [x, v, y, z].map(|all| f(part(all, &range)));
             if x.is_empty() {

@@ -123,9 +123,11 @@ pub fn frame(image: &Image<'_>, add: &mut dyn FnMut(Feature, usize)) {
 /// The features of taking the observation.
 pub fn begin(image: &Image<'_>, add: &mut dyn FnMut(Feature, usize)) {
     add(Feature::STEP, 1);
-    // What is left of a chunk is kept.
-    let rest = if image.overlap() > 0 { image.kept().len } else { 0 };
-    add(Feature::OBSERVATION, image.obs_len() + rest);
+    add(Feature::OBSERVATION, image.obs_len());
+    if image.overlap() > 0 {
+        add(Feature::LEFT, 1);
+        add(Feature::LEFT_VALUE, image.kept().len);
+    }
 }
 
 /// The features of the way from the network's output to the action.

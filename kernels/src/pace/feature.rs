@@ -31,6 +31,8 @@ singles! {
     ENSEMBLE "an action that is an average"
     FORESEEN "an action of a chunk that is added to an average"
     FORESEEN_VALUE "a value of such an action, or of the average"
+    LEFT "a chunk of which something is kept for the next"
+    LEFT_VALUE "a value of what is kept"
     LED "a value of an action that leads over to a new chunk"
     LIMITED "a value of an iterate whose predicted sample has a limit"
     STIRRED "a value of an iterate that noise is added to"
