@@ -4,7 +4,8 @@
 const PC: usize = 6;
 
 /// Where the program was, by `words`, those of its stack from the pointer on: the first ones are the frame that the core has stacked, or
-/// it could not, and they tell the innermost call. `half` as for [`innermost_call`].
+/// it could not, and they tell the innermost call. `half` gives the halfword at an address
+/// of the code; `None` where there is no code.
 pub fn program_counter(
     mut words: impl Iterator<Item = u32>,
     is_stacked: bool,

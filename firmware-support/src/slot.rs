@@ -13,14 +13,16 @@ unsafe extern "C" {
 /// checked here.
 pub fn image() -> Option<&'static [u8]> {
     let (start, end) = (&raw const _image_slot_start, &raw const _image_slot_end);
-    let words = (end as usize - start as usize) / 4;
-    // SAFETY: the linker script gives the slot these bounds in readable memory, aligned to 4, which nothing else uses and nothing
-    // writes while the firmware runs; where there is no slot, they are equal and not null.
-    let slot = unsafe { core::slice::from_raw_parts(start, words) };
-    if slot.first() != Some(&MAGIC) {
+    let bytes = end as usize - start as usize;
+    // SAFETY: the linker script gives the slot these bounds in readable memory, aligned to 4; where there is no slot, they are equal.
+    let word = |at: usize| (at < bytes / 4).then(|| unsafe { start.add(at).read_volatile() });
+    if word(0)? != MAGIC {
         return None;
     }
-    bytemuck::cast_slice(slot).get(..*slot.get(W_BYTES)? as usize)
+    let length = word(W_BYTES)? as usize;
+    // SAFETY: within the slot, as above. Nothing writes there while an image is in it: where updates have the same memory, the application
+    // leaves it alone then.
+    (length <= bytes).then(|| unsafe { core::slice::from_raw_parts(start.cast(), length) })
 }
 
 /// The memory of the slots for updates; empty on a board without.

@@ -17,14 +17,14 @@ const NOP: u16 = 0xbf00;
 /// Bytes before a choice from branches in which their address is taken.
 const ADDRESSED: u32 = 32;
 
-/// The address that ADR takes.
-fn address_of(at: u32, first: u16, second: u16) -> Option<u32> {
+/// The register and the address that ADR takes.
+fn address_of(at: u32, first: u16, second: u16) -> Option<(u32, u32)> {
     let pc = at.wrapping_add(4) & !3;
     let [first, second] = [first, second].map(u32::from);
     match first {
-        _ if first >> 11 == 0b10100 => Some(pc + 4 * (first & 0xff)),
+        _ if first >> 11 == 0b10100 => Some((first >> 8 & 7, pc + 4 * (first & 0xff))),
         _ if first & 0xfbff == 0xf20f && second & 0x8000 == 0 => {
-            Some(pc + ((first & 0x400) << 1 | (second & 0x7000) >> 4 | second & 0xff))
+            Some((second >> 8 & 0xf, pc + ((first & 0x400) << 1 | (second & 0x7000) >> 4 | second & 0xff)))
         }
         _ => None,
     }
@@ -174,7 +174,9 @@ impl Walk<'_> {
                 Vec::new()
             }
             Step::Table(size) => self.table(at, size)?.into_iter().map(|to| (to, after)).collect(),
-            Step::Branches => self.branches(at, next)?.into_iter().map(|to| (to, after)).collect(),
+            Step::Branches => {
+                self.branches(at, u32::from(first >> 3 & 0xf), next)?.into_iter().map(|to| (to, after)).collect()
+            }
             Step::Call(_) | Step::CallRegister => {
                 let callee = if let Step::Call(to) = step { Callee::Function(to) } else { Callee::Pointer };
                 self.call(callee, state);
@@ -264,12 +266,19 @@ impl Walk<'_> {
         Ok(targets)
     }
 
-    /// The addresses of the branches, four bytes each, that stand from `begin` on and that the instruction before chooses from. Behind
-    /// the last of them may stand one that is none of them; its way exists, too.
-    fn branches(&self, at: u32, begin: u32) -> Result<Vec<u32>> {
-        let is_addressed = (at.saturating_sub(ADDRESSED)..at).step_by(2).any(|before| {
-            let [first, second] = self.program.halves(before).unwrap_or_default();
-            address_of(before, first, second) == Some(begin)
+    /// The addresses of the branches, four bytes each, that stand from `begin` on and of which `register` has one's address. Behind the
+    /// last of them may stand one that is none of them; its way exists, too.
+    fn branches(&self, at: u32, register: u32, begin: u32) -> Result<Vec<u32>> {
+        let before: Vec<(u32, [u16; 2])> = (self.reached.range(at.saturating_sub(ADDRESSED)..at))
+            .filter_map(|&before| Some((before, self.program.halves(before)?)))
+            .collect();
+        // ADD of a register, shifted by 2, to the address that ADR took.
+        let is_addressed = before.iter().any(|&(place, [first, second])| {
+            address_of(place, first, second).is_some_and(|(to, address)| {
+                let added = [0xeb00 | to, register << 8 | 0x80];
+                address == begin
+                    && before.iter().any(|&(_, [first, second])| added == [first, second & 0xfff0].map(u32::from))
+            })
         });
         ensure!(is_addressed, "{at:#x} sets the program counter to what is not followed here");
         let is_branch = |entry: &u32| {

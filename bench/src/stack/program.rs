@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::Path;
 
+use crate::cycles::Instruction;
 use anyhow::{Context as _, Result};
 use object::{FileFlags, Object as _, ObjectSection as _, ObjectSymbol as _, SectionFlags, SymbolKind, elf};
 
@@ -133,8 +134,11 @@ impl Program {
         for function in self.functions.values() {
             // The lower half of the constant in each register: MOVT completes the one that was begun last.
             let mut low = [None; 16];
-            for at in (function.address..function.address + function.size).step_by(2) {
-                match self.halves(at).and_then(Half::decode) {
+            let mut at = function.address;
+            while at < function.address + function.size {
+                let halves = self.halves(at).filter(|_| self.is_code(at));
+                at += halves.map_or(2, |[first, second]| Instruction::decode(first, second).size as u32);
+                match halves.and_then(Half::decode) {
                     Some(Half { register, value, is_high: false }) => low[register] = Some(value),
                     Some(Half { register, value: high, .. }) => low[register].map_or((), |low| note(high << 16 | low)),
                     None => {}

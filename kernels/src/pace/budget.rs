@@ -44,7 +44,7 @@ impl Price {
             // A unit of a norm takes less than an element in all passes; each of its pieces computes anew what the sums give.
             Work::Elements(op) => {
                 let first = if op.units() == op.dst().len { 0 } else { cost::values(op).0.most() };
-                Self::new(first, cost::most(|add| cost::elements(op, 1, add)))
+                Self::new(first, cost::most(|add| cost::dearest_element(op, add)))
             }
             Work::Magnitude(cols) => Self::new(cost::most(|add| cost::magnitude(cols, add)), 0),
             Work::Start(start) => Self::new(Feature::BIASED.most(), cost::most(|add| cost::start(start, 1, add))),

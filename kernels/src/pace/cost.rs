@@ -157,12 +157,21 @@ pub fn features(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
 }
 
 /// The features of so many of an operation's values. (Of a denoising step, as if all were like the first.)
-pub(super) fn elements(op: &Op<'_>, len: usize, add: &mut dyn FnMut(Feature, usize)) {
+fn elements(op: &Op<'_>, len: usize, add: &mut dyn FnMut(Feature, usize)) {
     add(values(op).1, len);
     if op.kind == OpKind::Denoise {
         let ([sample_x, sample_v, _, _, _, sigma, _], _) = op.coefficients(0);
         add(Feature::LIMITED, if [sample_x, sample_v] == [0.0; 2] { 0 } else { len });
         add(Feature::STIRRED, if sigma == 0.0 { 0 } else { len });
+    }
+}
+
+/// The features of one value of an operation, in whichever step it takes most.
+pub(super) fn dearest_element(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
+    add(values(op).1, 1);
+    if op.kind == OpKind::Denoise {
+        add(Feature::LIMITED, 1);
+        add(Feature::STIRRED, 1);
     }
 }
 

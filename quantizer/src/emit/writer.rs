@@ -192,8 +192,12 @@ impl Writer {
     fn op(&mut self, step: &Step<Region>) -> Result<[u32; h::OP_WORDS]> {
         let (bias, data) = match &step.data {
             StepData::None => (0, 0),
-            // Its first words are not constants of f32 alone.
-            StepData::Constants(values) if step.kind == OpKind::Denoise => (0, self.push_floats(values)),
+            // Its first words are not constants of f32 alone, and nothing before them is named again behind them.
+            StepData::Constants(values) if step.kind == OpKind::Denoise => {
+                let data = self.push_floats(values);
+                self.finite = self.words.len();
+                (0, data)
+            }
             StepData::Constants(values) | StepData::Denoise { constants: values, .. } => (0, self.constants(values)),
             StepData::Product { matrix, bias } => {
                 let bias = if bias.iter().all(|b| *b == 0.0) { 0 } else { self.constants(bias) };

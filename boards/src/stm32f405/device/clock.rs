@@ -48,6 +48,8 @@ fn fast(rcc: &pac::RCC, flash: &pac::FLASH, power: &pac::PWR) -> bool {
     }
     // The regulator's higher voltage, which more than 144 MHz need.
     rcc.apb1enr().modify(|_, w| w.pwren().set_bit());
+    // A clock is there two cycles after it is switched on (errata sheet ES0182).
+    let _ = rcc.apb1enr().read();
     power.cr().modify(|_, w| w.vos().set_bit());
     // 8 MHz / 4 * 168 / 2 = 168 MHz; / 7 of 336 MHz are 48 MHz for USB.
     // SAFETY: within the ranges of section 7.3.2: 1 to 2 MHz in, 100 to 432 MHz inside; the field of 0 divides by 2.

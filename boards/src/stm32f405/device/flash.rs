@@ -8,8 +8,8 @@ use stm32f4::stm32f405 as pac;
 use super::{pwm, watchdog};
 use crate::stm32f405::flash::{Part, Register};
 
-/// The detector's threshold of 2.7 V.
-const VOLTAGE: u8 = 0b101;
+/// The detector's highest threshold, 2.9 V: with its spread still above the 2.7 V that a word needs.
+const VOLTAGE: u8 = 0b111;
 
 /// The flash controller, and the part of the flash that it writes.
 #[derive(Debug)]
@@ -22,6 +22,8 @@ pub struct Controller {
 impl Controller {
     pub(super) fn new(registers: pac::FLASH, power: pac::PWR, rcc: &pac::RCC, memory: &'static [Cell<u8>]) -> Self {
         rcc.apb1enr().modify(|_, w| w.pwren().set_bit());
+        // A clock is there two cycles after it is switched on (errata sheet ES0182).
+        let _ = rcc.apb1enr().read();
         // SAFETY: the value is in the field's range.
         power.cr().modify(|_, w| unsafe { w.pls().bits(VOLTAGE).pvde().set_bit() });
         Self { registers, power, memory }
@@ -72,7 +74,8 @@ impl Part for Controller {
     }
 
     fn is_supplied(&self) -> bool {
-        !self.power.csr().read().pvdo().bit()
+        // A detector that is off sees nothing.
+        self.power.cr().read().pvde().bit() && !self.power.csr().read().pvdo().bit()
     }
 
     fn patiently<R>(&mut self, work: impl FnOnce(&mut Self) -> R) -> Option<R> {

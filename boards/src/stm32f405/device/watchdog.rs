@@ -1,5 +1,7 @@
 //! The independent watchdog (RM0090, section 21), which has an oscillator of its own: 32 kHz, in truth 17 to 47 kHz.
 
+use core::sync::atomic::{AtomicU16, Ordering};
+
 use stm32f4::stm32f405 as pac;
 use stm32f4::stm32f405::iwdg::RegisterBlock;
 
@@ -15,7 +17,10 @@ const DIVIDER: u8 = 3;
 const LONGEST: u16 = 4096;
 /// Reads until the registers count as taken; they take 5 cycles of 17 kHz at most, and the watchdog starts with its reset values
 /// where they do not.
-const TAKEN: u32 = 100_000;
+const TAKEN: u32 = 1_000_000;
+
+/// The ticks that [`Watchdog::start`] was asked for. (The register has them only once they are taken.)
+static TICKS: AtomicU16 = AtomicU16::new(LONGEST - 1);
 
 /// The independent watchdog.
 #[derive(Debug)]
@@ -32,7 +37,7 @@ fn key(iwdg: &RegisterBlock, key: u16) {
     iwdg.kr().write(|w| unsafe { w.bits(key) });
 }
 
-/// Sets the time anew to so many ticks and one; false where that is not taken.
+/// Sets the time anew to so many ticks and one, and starts it; false where that is not taken.
 fn set(iwdg: &RegisterBlock, ticks: u16) -> bool {
     key(iwdg, OPEN);
     // SAFETY: values in the fields' ranges: 3 of 0 to 7, 12 bits.
@@ -41,19 +46,21 @@ fn set(iwdg: &RegisterBlock, ticks: u16) -> bool {
         iwdg.rlr().write(|w| w.rl().bits(ticks & (LONGEST - 1)));
     }
     let taken = wait(TAKEN, || iwdg.sr().read().bits() == 0);
-    key(iwdg, FEED);
+    if taken {
+        key(iwdg, FEED);
+    }
     taken
 }
 
-/// Does `work` with the longest time, at least 2.7 s (4096 ticks of 32 cycles at 47 kHz), and sets the one before again; `None` where one of
-/// these is not taken, for the longest with nothing done. To be called where the watchdog is fed: by the loop.
+/// Does `work` with the longest time, at least 2.7 s (4096 ticks of 32 cycles at 47 kHz), and sets the one before again; `None` where the
+/// longest is not taken, with nothing done. To be called where the watchdog is fed: by the loop. Where its own time is not taken again,
+/// it does not return, and the watchdog resets the board.
 pub(super) fn patiently<R>(work: impl FnOnce() -> R) -> Option<R> {
     // SAFETY: the registers are there for as long as the program runs; besides the loop, which waits for this, nothing writes them.
     let iwdg = unsafe { &*pac::IWDG::ptr() };
-    // The last change was taken, so that this is what counts.
-    let before = iwdg.rlr().read().rl().bits();
     let outcome = set(iwdg, LONGEST - 1).then(work);
-    set(iwdg, before).then_some(outcome)?
+    while !set(iwdg, TICKS.load(Ordering::Relaxed)) {}
+    outcome
 }
 
 impl Watchdog for Iwdg {
@@ -61,6 +68,7 @@ impl Watchdog for Iwdg {
         if !(1..=LONGEST).contains(&milliseconds) {
             return false;
         }
+        TICKS.store(milliseconds - 1, Ordering::Relaxed);
         key(&self.0, START);
         set(&self.0, milliseconds - 1)
     }

@@ -40,7 +40,8 @@ mod limits {
     pub(crate) const REPORT: u32 = TICK_HZ / 10;
     /// Milliseconds without progress until the watchdog resets the board.
     pub(crate) const PATIENCE: u16 = 500;
-    /// The same for the start, which reads both slots, slowly where the crystal is dead. Nothing is armed until it has ended.
+    /// The same for the start, which reads both slots, and for an image's check and self-test: slow where the crystal is dead. Nothing is
+    /// armed until they have ended.
     pub(crate) const START: u16 = 4000;
 }
 
@@ -185,16 +186,16 @@ mod app {
         let facts = Facts { image: 0, slot: BUILT_IN, timing: Default::default(), breadcrumb: *breadcrumb };
         let settings = Settings { status_period: REPORT, flash_while_armed: FLASH_WHILE_ARMED };
         let endpoint = Endpoint::<OBS, INWARD>::new(Guard::full(&[], MAX_AGE), facts, settings);
-        let (mut safety, state) = (Locked(cx.shared.safety), State::default());
-        let watched = watchdog.start(PATIENCE);
-        safety.with(|safety| safety.check(Check::Watchdog, watched));
+        let (safety, state) = (Locked(cx.shared.safety), State::default());
         let mut work =
             Work { port, watchdog, safety, endpoint, updates, rates: *rates, stack: start::stack, out, state };
         loop {
             work.watchdog.feed();
             let head = image::open(bytes, scratch, start::LENGTHS);
             let refusal = head.as_ref().err().copied();
+            let watched = work.watchdog.start(PATIENCE);
             work.safety.with(|safety| {
+                safety.check(Check::Watchdog, watched);
                 safety.check(Check::Image, matches!(refusal, None | Some(Refusal::SelfTest)));
                 safety.check(Check::SelfTest, refusal.is_none());
             });
@@ -214,7 +215,7 @@ mod app {
                 }
                 faults::MISSING.store(work.state.missing(), Ordering::Relaxed);
             };
-            work.watchdog.feed();
+            let _ = work.watchdog.start(START);
             let new = bytes_of(&candidate);
             let outcome = image::open(new, scratch, start::LENGTHS).map(drop);
             if work.updates.tested(outcome) {

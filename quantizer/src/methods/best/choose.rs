@@ -30,7 +30,8 @@ const TIME: u32 = 12;
 const TIME_LEFT: f64 = 0.75;
 /// Of all the work, roughly.
 pub const CHOOSING: f64 = 0.27;
-/// What all the steps leave of the error that an eighth of them leaves: 0.6 at 2 bits, 0.9 to 1.1 at 3 and 4 (docs/records).
+/// What all the steps leave of the error that an eighth of them leaves: 0.6 to 1.15, 0.81 in the mean
+/// (docs/records/2026-11-22-choice.md).
 const LEFT: f64 = 0.8;
 /// What is not higher than the lowest error by more than this is not known to be worse: seeds move an error by as much.
 const NEAR: f64 = 1.1;
