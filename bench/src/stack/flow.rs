@@ -174,9 +174,11 @@ impl Walk<'_> {
                 Vec::new()
             }
             Step::Table(size) => self.table(at, size)?.into_iter().map(|to| (to, after)).collect(),
-            Step::Branches => {
-                self.branches(at, u32::from(first >> 3 & 0xf), next)?.into_iter().map(|to| (to, after)).collect()
-            }
+            Step::Branches => self
+                .branches(at, u32::from(first >> 3 & 0xf), next.next_multiple_of(4))?
+                .into_iter()
+                .map(|to| (to, after))
+                .collect(),
             Step::Call(_) | Step::CallRegister => {
                 let callee = if let Step::Call(to) = step { Callee::Function(to) } else { Callee::Pointer };
                 self.call(callee, state);
@@ -266,7 +268,7 @@ impl Walk<'_> {
         Ok(targets)
     }
 
-    /// The addresses of the branches, four bytes each, that stand from `begin` on and of which `register` has one's address. Behind the
+    /// The addresses of the branches, four bytes each, that stand from `begin` on, where a word begins, and of which `register` has one's address. Behind the
     /// last of them may stand one that is none of them; its way exists, too.
     fn branches(&self, at: u32, register: u32, begin: u32) -> Result<Vec<u32>> {
         let before: Vec<(u32, [u16; 2])> = (self.reached.range(at.saturating_sub(ADDRESSED)..at))
