@@ -157,6 +157,49 @@ fn each_wrong_file_is_refused_by_what_is_wrong_with_it() {
     );
 }
 
+#[test]
+fn what_a_node_gives_is_bounded_before_it_is_built() {
+    let with_input = |dims: &[i64], build: &dyn Fn(&mut File)| {
+        let mut file = File::default();
+        file.input("obs", dims);
+        build(&mut file);
+        file.output("actions", &[1, 4]);
+        file.bytes()
+    };
+    let product = |dims: [i64; 2], rows: i64, weights: [usize; 2]| {
+        with_input(&dims, &|file| {
+            let shape = file.ints(&[rows, dims[1]]);
+            let x = file.node("Expand", &["obs", &shape], &[]);
+            let w = file.reals(&weights, &vec![0.5; weights[0] * weights[1]]);
+            file.nodes("MatMul", &[&x, &w], &["actions"], &[]);
+        })
+    };
+    let values = product([1, 1], 1 << 20, [1, 1 << 16]);
+    refused(values, "(MatMul): multiplies [1048576, 1] with [1, 65536], which are more values than a policy");
+    let work = product([1, 1024], 2048, [1024, 1024]);
+    refused(work, "(MatMul): multiplies [2048, 1024] with [1024, 1024], which takes more work than a policy");
+    let gathered = |op: &str, shape: &[i64]| {
+        with(|file| {
+            let (data, shape, zero) = (file.reals(&[1, 60_000], &[0.5; 60_000]), file.ints(shape), file.ints(&[0]));
+            let indices = file.node("Expand", &[&zero, &shape], &[]);
+            let rows = file.node(op, &[&data, &indices], &[]);
+            file.nodes("Add", &["obs", &rows], &["actions"], &[]);
+        })
+    };
+    for (op, shape) in [("Gather", &[4096][..]), ("GatherND", &[4096, 1])] {
+        refused(gathered(op, shape), "[4096, 60000] are more values than a policy of this size can have");
+    }
+    // At padding every position has a matrix of its own.
+    let convolution = |length: i64, kernel: [usize; 3], biases: usize, pads: [i64; 2]| {
+        with_input(&[1, kernel[1] as i64, length], &|file| {
+            let (w, b) = (file.drawn(&kernel), file.drawn(&[biases]));
+            file.nodes("Conv", &["obs", &w, &b], &["actions"], &[("pads", Value::Ints(pads.to_vec()))]);
+        })
+    };
+    refused(convolution(63, [64, 64, 64], 64, [31, 32]), "(Conv): cuts constants, or padding, out of its matrix");
+    refused(convolution(4, [6, 2, 1], 1, [0, 0]), "(Conv): its bias has 1 values for 6 channels");
+}
+
 fn read(bytes: Vec<u8>) -> Result<()> {
     let dir = TempDir::new()?;
     import_bytes(bytes, dir.path(), "test", &Choice::default()).map(drop)

@@ -63,6 +63,18 @@ fn sums_and_means_are_products_with_ones() -> Result<()> {
         let mean = mean(file, x);
         file.node("Sub", &[x, &mean], &[])
     })])?;
+    // Sums of one length share their row of ones.
+    let mut file = begun();
+    let (x, axes) = (file.gemm("obs", 16, OBS), file.ints(&[-1]));
+    let sums = ["Tanh", "Sin"].map(|op| {
+        let y = file.node(op, &[&x], &[]);
+        file.node("ReduceSum", &[&y, &axes], &[("keepdims", Value::Int(1))])
+    });
+    let sums = sums.each_ref().map(String::as_str);
+    let both = file.node("Concat", &sums, &[("axis", Value::Int(1))]);
+    let both = file.node("Tanh", &[&both], &[]);
+    let json = String::from_utf8(same(&ended(file, &both, 2))?.json)?;
+    assert!(json.contains("sum.weight") && !json.contains("sum.weight.2"), "{json}");
     // The mean of an ensemble is of whole vectors.
     let mut file = begun();
     let members = [0; 3].map(|_| {
@@ -148,7 +160,13 @@ fn convolutions_over_few_positions_are_products() -> Result<()> {
     let w = file.drawn(&[4, 3, 3, 3]);
     let x = file.node("Conv", &["image", &w], &[]);
     let x = file.node("Flatten", &[&x], &[]);
-    refused(&ended(file, &x, 784), "(Conv): goes over 196 positions, 1 to 64 are taken");
+    refused(&ended(file, &x, 784), "(Conv): goes over 196 positions with 1 groups; 1 to 64 are taken");
+    let mut file = File::default();
+    file.input("history", &[1, 8, 10]);
+    let w = file.drawn(&[8, 1, 1]);
+    let x = file.node("Conv", &["history", &w], &[("group", Value::Int(8))]);
+    let x = file.node("Flatten", &[&x], &[]);
+    refused(&ended(file, &x, 80), "goes over 10 positions with 8 groups; 1 to 64 are taken, positions times groups");
     Ok(())
 }
 
@@ -266,5 +284,68 @@ fn files_that_would_be_misread_are_refused() -> Result<()> {
     file.nodes("Tanh", &[&y], &["actions"], &[]);
     file.output("actions", &[4, 3]);
     refused(&file.bytes(), "have 4 rows, which is a batch");
+    // One that an input of one row stands beside.
+    let mut file = File::default();
+    file.input("command", &[1, 2]);
+    file.input("obs", &[4, OBS as i64]);
+    let (x, y) = (file.gemm("command", 3, 2), file.gemm("obs", 3, OBS));
+    file.nodes("Add", &[&x, &y], &["actions"], &[]);
+    file.output("actions", &[4, 3]);
+    refused(&file.bytes(), "the action and the input \"obs\" have 4 rows, which is a batch");
+    // A vector with as many values as the chunk has actions is no batch.
+    let mut file = File::default();
+    file.input("x", &[4]);
+    let (w, shape) = (file.drawn(&[4, 12]), file.ints(&[4, 3]));
+    let y = file.node("MatMul", &["x", &w], &[]);
+    file.nodes("Reshape", &[&y, &shape], &["actions"], &[]);
+    file.output("actions", &[4, 3]);
+    assert_eq!(imported(&file.bytes(), &Choice::default())?.0.output.1, 12);
+    Ok(())
+}
+
+#[test]
+fn choices_that_only_look_like_an_activation_are_refused() -> Result<()> {
+    let softplus = |compare: &str, linear_first: bool| {
+        let mut file = begun();
+        let (x, limit) = (file.gemm("obs", 16, OBS), file.reals(&[], &[20.0]));
+        let s = file.node("Softplus", &[&x], &[]);
+        let c = file.node(compare, &[&x, &limit], &[]);
+        let (a, b) = if linear_first { (&x, &s) } else { (&s, &x) };
+        let y = file.node("Where", &[&c, a, b], &[]);
+        ended(file, &y, 16)
+    };
+    assert_eq!(ops(&softplus("Greater", true))?, "linear softplus linear");
+    assert_eq!(ops(&softplus("Less", false))?, "linear softplus linear");
+    // The linear part below the limit.
+    for (compare, linear_first) in [("Less", true), ("Greater", false)] {
+        refused(&softplus(compare, linear_first), "chooses by a value of the network in a way that no activation does");
+    }
+    // A limit that repeats the value: [1, 5] and [5, 1] give [5, 5].
+    let mut file = begun();
+    let (x, limit) = (file.gemm("obs", 5, OBS), file.reals(&[5, 1], &[0.0; 5]));
+    let c = file.node("Greater", &[&x, &limit], &[]);
+    let zero = file.reals(&[], &[0.0]);
+    let y = file.node("Where", &[&c, &x, &zero], &[]);
+    refused(&ended(file, &y, 5), "(Greater): compares with the observation");
+    Ok(())
+}
+
+#[test]
+fn the_same_file_gives_the_same_bytes() -> Result<()> {
+    let mut file = File::default();
+    file.input("b", &[1, 4]);
+    file.input("a", &[1, 4]);
+    // Elements of both in turn, which are computed in the order of their values.
+    let joined = file.node("Concat", &["a", "b"], &[("axis", Value::Int(0))]);
+    let turned = file.node("Transpose", &[&joined], &[("perm", Value::Ints(vec![1, 0]))]);
+    let shape = file.ints(&[1, 8]);
+    let x = file.node("Reshape", &[&turned, &shape], &[]);
+    let x = file.node("Tanh", &[&x], &[]);
+    let bytes = ended(file, &x, 8);
+    let first = same(&bytes)?;
+    for _ in 0..8 {
+        let again = imported(&bytes, &Choice::default())?.0;
+        assert_eq!((&again.json, &again.weights), (&first.json, &first.weights));
+    }
     Ok(())
 }

@@ -18,7 +18,8 @@ pub(super) fn above(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>
         (Some(x), None) => (y, x, if greater { -1.0 } else { 1.0 }),
         _ => return Ok(None),
     };
-    let (Some(limit), true) = (super::compare::uniform(&limit), limit.len() == 1 || limit.len() == compared.len())
+    // A limit that repeats the value along an axis would change its shape.
+    let (Some(limit), true) = (super::compare::uniform(&limit), broadcast(&x.shape, &y.shape)? == compared.shape)
     else {
         return Ok(None);
     };

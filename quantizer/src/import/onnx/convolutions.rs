@@ -1,4 +1,4 @@
-//! Convolutions over few positions, as encoders of histories have: a product with the same matrix for each position.
+//! Convolutions over few positions, as encoders of histories have: a product for each position and group.
 
 use std::sync::Arc;
 
@@ -11,8 +11,8 @@ use super::places::transpose;
 use super::products::row_product;
 use super::tensor::{Data, Element, Tensor, count};
 
-/// The most positions: the image has an operation for each.
-const MOST_POSITIONS: usize = 64;
+/// The most positions, each counted once for every group: the image has an operation for each.
+const MOST_PRODUCTS: usize = 64;
 
 /// An axis that the kernel moves along.
 struct Axis {
@@ -28,7 +28,7 @@ struct Axis {
 }
 
 /// The output, where the node is a convolution.
-pub(super) fn run(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> {
+pub(super) fn run(call: &Call<'_>, exprs: &mut Exprs, budget: &mut usize) -> Result<Option<Tensor>> {
     if call.op() != "Conv" {
         return Ok(None);
     }
@@ -50,8 +50,9 @@ pub(super) fn run(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> 
     let shape: Vec<usize> = axes.iter().map(|axis| axis.positions).collect();
     let positions = count(&shape)?;
     ensure!(
-        (1..=MOST_POSITIONS).contains(&positions),
-        "goes over {positions} positions, 1 to {MOST_POSITIONS} are taken; export the part behind the encoder as a policy of its own"
+        (1..=MOST_PRODUCTS).contains(&positions.saturating_mul(groups)),
+        "goes over {positions} positions with {groups} groups; 1 to {MOST_PRODUCTS} are taken, positions times groups; export the \
+         part behind the encoder as a policy of its own"
     );
     let (rows, cols, size) = (outputs / groups, w.len() / outputs, count(kernel)?);
     let matrix = |(g, data): (usize, &[f64])| {
@@ -72,12 +73,13 @@ pub(super) fn run(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> 
                 (g * inputs..(g + 1) * inputs).map(of).collect()
             };
             let seen: Vec<Element> = places.iter().flat_map(seen).collect();
-            all.extend(row_product(exprs, &seen, matrix)?);
+            all.extend(row_product(exprs, &seen, matrix, budget)?);
         }
     }
     let mut y = Tensor::of_elements(vec![positions, outputs], all);
     if call.optional(2).is_some() {
         let bias = call.reals(2, "the bias")?;
+        ensure!(bias.len() == outputs, "its bias has {} values for {outputs} channels", bias.len());
         y = two("Add", exprs, &y, &Tensor::new(vec![outputs], Data::Real(bias)), y.len())?;
     }
     let (turned, places) = transpose(&y.shape, &[1, 0])?;

@@ -9,7 +9,7 @@ use super::products::product;
 use super::tensor::{Tensor, count};
 
 /// The output, where the node is an Einsum.
-pub(super) fn run(call: &Call<'_>, exprs: &mut Exprs, most: usize) -> Result<Option<Tensor>> {
+pub(super) fn run(call: &Call<'_>, exprs: &mut Exprs, budget: &mut usize) -> Result<Option<Tensor>> {
     if call.op() != "Einsum" {
         return Ok(None);
     }
@@ -38,7 +38,7 @@ pub(super) fn run(call: &Call<'_>, exprs: &mut Exprs, most: usize) -> Result<Opt
     );
     let (left, of_a) = turned(x, &a, [&of_a, &summed])?;
     let (right, of_b) = turned(y, &b, [&summed, &of_b])?;
-    let result = product(exprs, &left, &right, 1.0, most)?.reshaped([&of_a[0][..], &of_b[1]].concat())?;
+    let result = product(exprs, &left, &right, 1.0, budget)?.reshaped([&of_a[0][..], &of_b[1]].concat())?;
     let order = output.iter().map(|c| joined.iter().position(|other| other == c));
     let order: Vec<usize> = order.collect::<Option<_>>().context("an axis is lost")?;
     let (shape, places) = transpose(&result.shape, &order)?;

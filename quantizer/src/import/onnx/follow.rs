@@ -1,6 +1,6 @@
 //! Follows a graph from its inputs to the values that are asked for, node by node.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::rc::Rc;
 
 use anyhow::{Context as _, Result, bail, ensure};
@@ -57,11 +57,13 @@ impl<'m> Follower<'m> {
                 let tensor = self.model.tensor(bytes)?;
                 self.budget = self.budget.saturating_add(PER_ELEMENT * tensor.len());
                 scope.insert(name.clone(), Rc::new(tensor));
-            } else if let Some(i) = graph.inputs.iter().position(|port| port.name == *name)
-                && top
-            {
-                let tensor = self.input(i, &graph.inputs[i])?;
-                scope.insert(name.clone(), Rc::new(tensor));
+            }
+        }
+        // In the file's order, which the observation has: what is sorted by its values comes out the same every time.
+        for (i, port) in graph.inputs.iter().enumerate().filter(|_| top) {
+            if needed.names.contains(&port.name) && !scope.contains_key(&port.name) {
+                let tensor = self.input(i, port)?;
+                scope.insert(port.name.clone(), Rc::new(tensor));
             }
         }
         for (i, node) in graph.nodes.iter().enumerate().filter(|(i, _)| needed.nodes.contains(i)) {
@@ -169,13 +171,13 @@ impl<'m> Follower<'m> {
             return Ok(vec![output]);
         }
         let exprs = &mut self.exprs;
-        if let Some(output) = products::run(call, exprs, most)? {
+        if let Some(output) = products::run(call, exprs, &mut self.budget)? {
             return Ok(vec![output]);
         }
-        if let Some(output) = einsum::run(call, exprs, most)? {
+        if let Some(output) = einsum::run(call, exprs, &mut self.budget)? {
             return Ok(vec![output]);
         }
-        if let Some(output) = convolutions::run(call, exprs)? {
+        if let Some(output) = convolutions::run(call, exprs, &mut self.budget)? {
             return Ok(vec![output]);
         }
         if let Some(output) = reductions::run(call, exprs)? {
@@ -223,7 +225,7 @@ impl<'m> Follower<'m> {
 /// The nodes and names that `targets` come from.
 struct Needed {
     nodes: HashSet<usize>,
-    names: HashSet<String>,
+    names: BTreeSet<String>,
 }
 
 fn needed(graph: &Graph, scope: &Scope, targets: &[String]) -> Result<Needed> {
@@ -234,7 +236,7 @@ fn needed(graph: &Graph, scope: &Scope, targets: &[String]) -> Result<Needed> {
             ensure!(!again, "the value {:?} is given by two nodes", printable(name));
         }
     }
-    let mut found = Needed { nodes: HashSet::new(), names: HashSet::new() };
+    let mut found = Needed { nodes: HashSet::new(), names: BTreeSet::new() };
     let mut open: Vec<String> = targets.to_vec();
     while let Some(name) = open.pop() {
         if scope.contains_key(&name) || !found.names.insert(name.clone()) {

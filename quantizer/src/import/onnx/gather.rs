@@ -3,24 +3,27 @@
 use anyhow::{Context as _, Result, ensure};
 
 use super::call::Call;
+use super::moves::room;
 use super::places::{along, axis};
 use super::tensor::{Tensor, count};
 
 /// Slices at known indices of an axis.
-pub(super) fn gather(call: &Call<'_>) -> Result<Tensor> {
+pub(super) fn gather(call: &Call<'_>, most: usize) -> Result<Tensor> {
     let input = call.input(0)?;
     let at = axis(call.int("axis").unwrap_or(0), input.shape.len())?;
     let n = input.shape[at];
     let indices = call.integers(1, "the indices")?;
     let shape = &call.input(1)?.shape;
+    let (before, behind) = (&input.shape[..at], &input.shape[at + 1..]);
+    let out = [before, shape, behind].concat();
+    room(&out, most)?;
     let chosen = indices.iter().map(|&i| axis(i, n)).collect::<Result<Vec<_>>>()?;
     let (_, found) = along(&input.shape, at, chosen)?;
-    let (before, behind) = (&input.shape[..at], &input.shape[at + 1..]);
-    input.taken([before, shape, behind].concat(), &found)
+    input.taken(out, &found)
 }
 
 /// Pieces at known places.
-pub(super) fn gather_nd(call: &Call<'_>) -> Result<Tensor> {
+pub(super) fn gather_nd(call: &Call<'_>, most: usize) -> Result<Tensor> {
     let input = call.input(0)?;
     let batch = call.int("batch_dims").and_then(|n| usize::try_from(n).ok()).unwrap_or(0);
     let indices = call.integers(1, "the indices")?;
@@ -29,6 +32,8 @@ pub(super) fn gather_nd(call: &Call<'_>) -> Result<Tensor> {
         batch.checked_add(*depth).and_then(|n| input.shape.get(n..)).context("its indices have too many parts")?;
     // Batches of length 1 are none.
     ensure!(*depth > 0 && input.shape[..batch].iter().all(|&n| n == 1), "takes pieces of several batches");
+    let out = [outer, piece].concat();
+    room(&out, most)?;
     let n = count(piece)?;
     let mut places = Vec::new();
     for index in indices.chunks(*depth) {
@@ -38,7 +43,7 @@ pub(super) fn gather_nd(call: &Call<'_>) -> Result<Tensor> {
         }
         places.extend(at * n..(at + 1) * n);
     }
-    input.taken([outer, piece].concat(), &places)
+    input.taken(out, &places)
 }
 
 /// Rows at known places are replaced.

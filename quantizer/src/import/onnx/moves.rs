@@ -64,9 +64,9 @@ pub(super) fn run(call: &Call<'_>, most: usize) -> Result<Option<Vec<Tensor>>> {
         }
         "Slice" => one(slice(call)?),
         "Split" => split(call).map(Some),
-        "Gather" => one(gather::gather(call)?),
+        "Gather" => one(gather::gather(call, most)?),
         "GatherElements" => one(gather::gather_elements(call)?),
-        "GatherND" => one(gather::gather_nd(call)?),
+        "GatherND" => one(gather::gather_nd(call, most)?),
         "Concat" => one(concat(call)?),
         "Expand" => {
             let input = call.input(0)?;
@@ -93,7 +93,7 @@ fn taken(input: &Tensor, (shape, places): Places) -> Result<Tensor> {
 }
 
 /// That a result of this shape may come up.
-fn room(shape: &[usize], most: usize) -> Result<usize> {
+pub(super) fn room(shape: &[usize], most: usize) -> Result<usize> {
     let n = count(shape)?;
     ensure!(n <= most, "{shape:?} are more values than a policy of this size can have");
     Ok(n)

@@ -239,12 +239,21 @@ fn is_action(name: &str) -> bool {
 
 /// Refuses several observations at once: their actions would be taken for a chunk.
 fn refuse_batch(model: &Model, read: &[usize], act_shape: &[usize]) -> Result<()> {
-    let first = |i: &usize| model.graph.inputs[*i].shape.as_ref()?.first().copied().flatten();
     let &[batch, _, ..] = act_shape else { return Ok(()) };
-    ensure!(
-        batch == 1 || read.iter().any(|i| first(i) != Some(batch)),
-        "the action and all inputs have {batch} rows, which is a batch; a control step has one observation, so export with a batch of 1"
-    );
+    // A vector has values, not rows. One input with rows is enough: what stands beside it may be the same for all of them.
+    let in_rows = |i: &&usize| match model.graph.inputs[**i].shape.as_deref() {
+        Some(&[first, _, ..]) => first == Some(batch),
+        _ => false,
+    };
+    if batch > 1
+        && let Some(&i) = read.iter().find(in_rows)
+    {
+        bail!(
+            "the action and the input {:?} have {batch} rows, which is a batch; a control step has one observation, so export with a \
+             batch of 1, and a history with a chunk of its length as [1, {batch}, n]",
+            printable(&model.graph.inputs[i].name)
+        );
+    }
     Ok(())
 }
 

@@ -12,16 +12,16 @@ use super::places::transpose;
 use super::tensor::{Data, Element, Tensor};
 
 /// The output, where the node is such an operation.
-pub(super) fn run(call: &Call<'_>, exprs: &mut Exprs, most: usize) -> Result<Option<Tensor>> {
+pub(super) fn run(call: &Call<'_>, exprs: &mut Exprs, budget: &mut usize) -> Result<Option<Tensor>> {
     match call.op() {
-        "MatMul" => product(exprs, call.input(0)?, call.input(1)?, 1.0, most).map(Some),
-        "Gemm" => gemm(call, exprs, most).map(Some),
+        "MatMul" => product(exprs, call.input(0)?, call.input(1)?, 1.0, budget).map(Some),
+        "Gemm" => gemm(call, exprs, budget).map(Some),
         _ => Ok(None),
     }
 }
 
 /// `alpha A B + beta C`
-fn gemm(call: &Call<'_>, exprs: &mut Exprs, most: usize) -> Result<Tensor> {
+fn gemm(call: &Call<'_>, exprs: &mut Exprs, budget: &mut usize) -> Result<Tensor> {
     let turned = |i: usize, name: &str| {
         let x = call.input(i)?;
         ensure!(x.shape.len() == 2, "takes matrices, not {:?}", x.shape);
@@ -32,7 +32,7 @@ fn gemm(call: &Call<'_>, exprs: &mut Exprs, most: usize) -> Result<Tensor> {
         Ok(Tensor { name: x.name.clone(), ..x.taken(shape, &places)? })
     };
     let (a, b) = (turned(0, "transA")?, turned(1, "transB")?);
-    let y = product(exprs, &a, &b, call.float("alpha").unwrap_or(1.0), most)?;
+    let y = product(exprs, &a, &b, call.float("alpha").unwrap_or(1.0), budget)?;
     let Some(c) = call.optional(2) else { return Ok(y) };
     let beta = Tensor::new(vec![], Data::Real(vec![call.float("beta").unwrap_or(1.0)]));
     let c = match c.reals() {
@@ -55,7 +55,7 @@ fn matrix(w: &Tensor, factor: f64, what: &str) -> Result<Arc<Matrix>> {
 }
 
 /// `factor A B`, one of which is known, or both.
-pub(super) fn product(exprs: &mut Exprs, a: &Tensor, b: &Tensor, factor: f64, most: usize) -> Result<Tensor> {
+pub(super) fn product(exprs: &mut Exprs, a: &Tensor, b: &Tensor, factor: f64, budget: &mut usize) -> Result<Tensor> {
     ensure!(!a.shape.is_empty() && !b.shape.is_empty(), "multiplies {:?} with {:?}", a.shape, b.shape);
     match (a.is_known(), b.is_known()) {
         (_, true) => {}
@@ -69,7 +69,7 @@ pub(super) fn product(exprs: &mut Exprs, a: &Tensor, b: &Tensor, factor: f64, mo
                 let (shape, places) = transpose(&x.shape, &order)?;
                 Ok(Tensor { name: x.name.clone(), ..x.taken(shape, &places)? })
             };
-            let y = product(exprs, &flat(b)?, &flat(a)?, factor, most)?;
+            let y = product(exprs, &flat(b)?, &flat(a)?, factor, budget)?;
             return if a.shape.len() > 1 && b.shape.len() > 1 { flat(&y) } else { Ok(y) };
         }
         (false, false) => bail!(
@@ -86,12 +86,23 @@ pub(super) fn product(exprs: &mut Exprs, a: &Tensor, b: &Tensor, factor: f64, mo
     let w = matrix(&Tensor { name: b.name.clone(), ..b.reshaped(shape)? }, factor, "the constant")?;
     let n = a.shape[a.shape.len() - 1];
     ensure!(n == w.cols && n > 0, "multiplies {:?} with {:?}", a.shape, b.shape);
-    // The work is bounded as the values are.
-    let work = a.len().checked_mul(w.rows).filter(|work| !a.is_known() || *work <= most.saturating_mul(64));
-    ensure!(work.is_some(), "multiplies larger constants than a policy of this size can have");
+    let rows = a.len() / n;
+    ensure!(
+        rows.checked_mul(w.rows).is_some_and(|values| values <= *budget),
+        "multiplies {:?} with {:?}, which are more values than a policy of this size can have",
+        a.shape,
+        b.shape
+    );
+    // The work is bounded as the values are: adding up what is known takes it for every row, open or not.
+    ensure!(
+        a.len().checked_mul(w.rows).is_some_and(|work| work <= budget.saturating_mul(64)),
+        "multiplies {:?} with {:?}, which takes more work than a policy of this size can have",
+        a.shape,
+        b.shape
+    );
     let mut all = Vec::new();
     for row in a.elements().chunks(n) {
-        all.extend(row_product(exprs, row, &w)?);
+        all.extend(row_product(exprs, row, &w, budget)?);
     }
     let mut out = a.shape[..a.shape.len() - 1].to_vec();
     if !vector {
@@ -101,8 +112,14 @@ pub(super) fn product(exprs: &mut Exprs, a: &Tensor, b: &Tensor, factor: f64, mo
     Ok(Tensor::of_elements([vec![1; missing], out].concat(), all))
 }
 
-/// The product of a vector; what is known of it goes into the bias, without its columns.
-pub(super) fn row_product(exprs: &mut Exprs, x: &[Element], w: &Arc<Matrix>) -> Result<Vec<Element>> {
+/// The product of a vector; what is known of it goes into the bias, without its columns. The matrix that is left counts as values
+/// that come up.
+pub(super) fn row_product(
+    exprs: &mut Exprs,
+    x: &[Element],
+    w: &Arc<Matrix>,
+    budget: &mut usize,
+) -> Result<Vec<Element>> {
     let open: Vec<usize> = (0..x.len()).filter(|&i| matches!(x[i], Element::Of(..))).collect();
     let known = |i: usize| if let Element::Known(v) = x[i] { v } else { 0.0 };
     let bias: Vec<f64> =
@@ -113,8 +130,16 @@ pub(super) fn row_product(exprs: &mut Exprs, x: &[Element], w: &Arc<Matrix>) -> 
     let w = if open.len() == x.len() {
         Arc::clone(w)
     } else {
+        let (rows, cols) = (w.rows, open.len());
+        let left = rows.checked_mul(cols).and_then(|n| budget.checked_sub(n)).with_context(|| {
+            format!(
+                "cuts constants, or padding, out of its matrix, and the {rows} x {cols} weights that are left are more than a policy of \
+                 this size can have; export the part behind it"
+            )
+        })?;
+        *budget = left;
         let data = w.data.chunks(w.cols).flat_map(|row| open.iter().map(|&i| row[i])).collect();
-        Arc::new(Matrix { name: w.name.clone(), rows: w.rows, cols: open.len(), data })
+        Arc::new(Matrix { name: w.name.clone(), rows, cols, data })
     };
     let x: Vec<Element> = open.into_iter().map(|i| x[i]).collect();
     let x = open_vector(exprs, &x)?;

@@ -17,9 +17,12 @@ impl Exprs {
         if let Some(z) = self.known_of(softplus, Function::Softplus)
             && zero == 0.0
             && near(self.ratio(x, z)?, factor)
-            && limit / self.ratio(of, z)? >= SOFTPLUS_END
         {
-            return Some(y);
+            // Below 0 it compares the other way round: the linear part would stand where softplus bends.
+            let compared = self.ratio(of, z)?;
+            if compared > 0.0 && limit / compared >= SOFTPLUS_END {
+                return Some(y);
+            }
         }
         // Everything else bends at zero.
         if limit != 0.0 || self.ratio(of, x)? <= 0.0 {

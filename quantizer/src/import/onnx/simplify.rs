@@ -17,6 +17,8 @@ pub(super) fn simplify(exprs: &mut Exprs, root: Id, instead: &HashMap<Id, Id>) -
         }
     }
     let mut new: HashMap<Id, Id> = HashMap::new();
+    // By columns: sums of one length share their row, as matrices are told apart by their place.
+    let mut rows_of_ones: HashMap<usize, Arc<Matrix>> = HashMap::new();
     for id in order {
         let old = exprs.get(id).clone();
         let of = |operand: &Id| {
@@ -82,8 +84,11 @@ pub(super) fn simplify(exprs: &mut Exprs, root: Id, instead: &HashMap<Id, Id>) -
             Expr::Sum(x) => {
                 let x = of(&x);
                 let cols = exprs.len_of(x);
-                let ones = Matrix { name: Some("sum.weight".to_owned()), rows: 1, cols, data: vec![1.0; cols] };
-                exprs.put(Expr::Linear(x, Arc::new(ones), vec![0.0]), len)
+                let ones = rows_of_ones.entry(cols).or_insert_with(|| {
+                    let (name, data) = (Some("sum.weight".to_owned()), vec![1.0; cols]);
+                    Arc::new(Matrix { name, rows: 1, cols, data })
+                });
+                exprs.put(Expr::Linear(x, Arc::clone(ones), vec![0.0]), len)
             }
             Expr::Clip(x, limit) => exprs.put(Expr::Clip(of(&x), limit), len),
             Expr::LayerNorm(x, weight, bias, eps) => exprs.put(Expr::LayerNorm(of(&x), weight, bias, eps), len),
