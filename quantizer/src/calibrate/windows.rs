@@ -44,13 +44,9 @@ pub struct Windows<'a> {
 }
 
 impl<'a> Windows<'a> {
-    /// Runs the f32 network over the recording.
-    pub fn new(graph: &'a Graph, dataset: &Dataset) -> Self {
-        Self::with_outputs_of(graph, dataset, 1)
-    }
-
-    /// As [`Self::new`], but that the outputs' variance is that of one in `every` frames where frames do not depend on each other.
-    pub fn with_outputs_of(graph: &'a Graph, dataset: &Dataset, every: usize) -> Self {
+    /// Runs the f32 network over the recording; where frames do not depend on each other, over one in `every` of them, of which the
+    /// outputs' variance then is.
+    pub fn new(graph: &'a Graph, dataset: &Dataset, every: usize) -> Self {
         let weights = Weights::of(graph);
         let network = Network::new(graph);
         let recurrent = graph.state_len() > 0;
@@ -212,7 +208,7 @@ mod tests {
         let graph = lstm();
         let mut dataset = dataset(&graph, 2, 80);
         dataset.length[1] = 5;
-        let windows = Windows::new(&graph, &dataset);
+        let windows = Windows::new(&graph, &dataset, 1);
         assert_eq!((windows.window, windows.episodes[0].nrows(), windows.episodes[1].nrows()), (WINDOW, 80, WINDOW));
         assert_eq!(windows.episodes[1].row(4), windows.episodes[1].row(63));
         assert_ne!(windows.episodes[1].row(3), windows.episodes[1].row(4));

@@ -68,7 +68,7 @@ impl<'a> RowStatistics<'a> {
     ) -> Result<Self> {
         dataset.require_frames(LEAST_FRAMES, "learning from fewer repeats them by heart")?;
         let every = if allowance.is_some() { dataset.frames().div_ceil(frames.max(1)) } else { 1 };
-        let windows = Windows::with_outputs_of(graph, dataset, every);
+        let windows = Windows::new(graph, dataset, every);
         ensure!(
             windows.output_variance.iter().any(|v| *v > 0.0),
             "{}: the policy gives the same action at every observation",
