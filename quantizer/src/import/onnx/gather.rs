@@ -3,9 +3,8 @@
 use anyhow::{Context as _, Result, ensure};
 
 use super::call::Call;
-use super::moves::room;
 use super::places::{along, axis};
-use super::tensor::{Tensor, count};
+use super::tensor::{Tensor, count, room};
 
 /// Slices at known indices of an axis.
 pub(super) fn gather(call: &Call<'_>, most: usize) -> Result<Tensor> {

@@ -6,7 +6,7 @@ use super::call::Call;
 use super::gather;
 use super::model::kind_name;
 use super::places::{self, Places, along, axis, broadcast};
-use super::tensor::{Data, Element, Tensor, count};
+use super::tensor::{Data, Element, Tensor, count, room};
 
 /// The outputs, where the node is such an operation; of at most `most` elements.
 pub(super) fn run(call: &Call<'_>, most: usize) -> Result<Option<Vec<Tensor>>> {
@@ -90,13 +90,6 @@ pub(super) fn run(call: &Call<'_>, most: usize) -> Result<Option<Vec<Tensor>>> {
 
 fn taken(input: &Tensor, (shape, places): Places) -> Result<Tensor> {
     input.taken(shape, &places)
-}
-
-/// That a result of this shape may come up.
-pub(super) fn room(shape: &[usize], most: usize) -> Result<usize> {
-    let n = count(shape)?;
-    ensure!(n <= most, "{shape:?} are more values than a policy of this size can have");
-    Ok(n)
 }
 
 /// Repeated along axes of length 1, to a shape that fits.

@@ -46,6 +46,13 @@ pub(super) fn count(shape: &[usize]) -> Result<usize> {
     Ok(fits.filter(|_| !empty).unwrap_or_default())
 }
 
+/// How many elements a shape has that may come up as a result: at most so many.
+pub(super) fn room(shape: &[usize], most: usize) -> Result<usize> {
+    let n = count(shape)?;
+    ensure!(n <= most, "{shape:?} are more values than a policy of this size can have");
+    Ok(n)
+}
+
 impl Tensor {
     pub(super) fn new(shape: Vec<usize>, data: Data) -> Self {
         Self { shape, data, name: None }
