@@ -111,9 +111,8 @@ pub fn distill(task: &Task<'_>, windows: &Windows<'_>, mut progress: impl FnMut(
         schedule.took(loss);
         let stride = |of: f32| Stride::new(of * rate, schedule.steps() as i32);
         let (by_code, by_scale, by_vector) = (stride(rates.latent), stride(rates.scale), stride(rates.vector));
-        let matrices = latents.iter_mut().zip(&mut grads.matrices).zip(&mut weights.matrices);
-        for ((latent, grads), weights) in matrices {
-            latent.learn(values(grads), values(weights), by_code, by_scale);
+        for (latent, grads) in latents.iter_mut().zip(&mut grads.matrices) {
+            latent.learn(values(grads), by_code, by_scale);
         }
         let vectors = weights.vectors.iter_mut().flatten().zip(grads.vectors.iter().flatten());
         for (adam, (vector, grads)) in adam_vectors.iter_mut().zip(vectors) {

@@ -116,26 +116,24 @@ impl Latent {
         });
     }
 
-    /// Moves codes and scales along `grads`, the derivative by `weights`, which are those of [`Self::weights`]. `grads` then hold
-    /// the derivative by the codes.
-    pub(super) fn learn(&mut self, grads: &mut [f32], weights: &[f32], by_code: Stride, by_scale: Stride) {
+    /// Moves codes and scales along `grads`, the derivative by the weights, which then hold that by the codes.
+    pub(super) fn learn(&mut self, grads: &mut [f32], by_code: Stride, by_scale: Stride) {
         let cols = self.cols;
-        // A weight is its level times its scale, and so its derivative by the scale's logarithm.
         let by_scales: Vec<f32> = grads
             .par_chunks_mut(cols)
-            .zip(weights.par_chunks(cols))
             .enumerate()
             .with_min_len(ROWS)
-            .map(|(r, (grads, weights))| {
+            .map(|(r, grads)| {
                 let Some(grid) = self.grid(r) else {
                     grads.fill(0.0);
                     return 0.0;
                 };
-                let by_scale = grads.iter().zip(weights).map(|(g, w)| g * w).sum();
+                let mut by_scale = 0.0;
                 let (group, scales) = self.scales(r);
                 let codes = self.codes[r * cols..][..cols].chunks(group);
                 for ((grads, codes), scale) in grads.chunks_mut(group).zip(codes).zip(scales) {
                     for (g, c) in grads.iter_mut().zip(codes) {
+                        by_scale += *g * grid.level(*c) * scale;
                         // Beyond the grid only a pull back inside passes.
                         let outside = (*c < grid.low - 0.5 && *g > 0.0) || (*c > grid.high + 0.5 && *g < 0.0);
                         *g = if outside { 0.0 } else { *g * grid.step * scale };
