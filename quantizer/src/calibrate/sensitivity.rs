@@ -12,7 +12,8 @@ use ndarray::{Array1, Array2, Axis};
 use super::allowance::Allowance;
 use super::moments::Moments;
 use super::windows::Windows;
-use crate::graph::{Network, Pass, zero_state};
+use crate::graph::operation::See;
+use crate::graph::{Network, Weights, zero_state};
 use crate::random::Random;
 
 /// Batches that `G` is averaged over, and samples in each.
@@ -30,19 +31,13 @@ pub const DAMPING_OUTPUT: f64 = 0.02;
 /// `G` of every matrix, `rows * rows`, and how many frames or windows it was taken of: with an allowance, those that fit.
 pub fn output_moments(windows: &Windows<'_>, allowance: Option<Allowance>, seed: u64) -> (Vec<DMatrix<f64>>, usize) {
     let graph = windows.graph;
-    let network = Network::new(graph);
     let mut random = Random::new(seed);
     let mut sums: Vec<Array2<f32>> = graph.matrices.iter().map(|m| Array2::zeros((m.rows, m.rows))).collect();
     let mut counts = vec![0usize; sums.len()];
     let mut grads = windows.weights.zeros_like();
     let samples = (SAMPLES / windows.window.min(16)).max(4);
     let mut one = || {
-        let batch = windows.batch(samples, None, &mut random);
-        let mut state = batch.state;
-        let pass = network.forward(&windows.weights, batch.frames, &mut state);
-        let probe = probe(windows, &pass, &mut random);
-        let mut d_state = zero_state(graph, samples);
-        network.backward(&windows.weights, &pass, probe, &mut d_state, &mut grads, &mut |m, _, dy| {
+        probe(windows, samples, &mut random, &mut grads, &mut |m, _, dy| {
             general_mat_mul(1.0, &dy.t(), dy, 1.0, &mut sums[m]);
             counts[m] += dy.nrows();
         });
@@ -59,30 +54,30 @@ pub fn output_moments(windows: &Windows<'_>, allowance: Option<Allowance>, seed:
     (sums.into_iter().zip(counts).map(mean).collect(), batches * samples)
 }
 
-/// A random sign over the deviation of every output.
-fn probe(windows: &Windows<'_>, pass: &Pass, random: &mut Random) -> Array2<f32> {
-    Array2::from_shape_fn(pass.output().raw_dim(), |(_, d)| {
+/// Draws so many samples and runs a random sign over the deviation of every output back through the network, past `see`.
+fn probe(windows: &Windows<'_>, samples: usize, random: &mut Random, grads: &mut Weights, see: &mut See<'_>) {
+    let network = Network::new(windows.graph);
+    let batch = windows.batch(samples, None, random);
+    let mut state = batch.state;
+    let pass = network.forward(&windows.weights, batch.frames, &mut state);
+    let signs = Array2::from_shape_fn(pass.output().raw_dim(), |(_, d)| {
         let variance = windows.output_variance[d];
         if variance > 0.0 { random.sign() / variance.sqrt() } else { 0.0 }
-    })
+    });
+    let mut d_state = zero_state(windows.graph, samples);
+    network.backward(&windows.weights, &pass, signs, &mut d_state, grads, see);
 }
 
 /// The moments on both sides of every matrix, of batches that are drawn: `E[x x']` with its mean, and `G`. What frames are drawn
 /// together is summed at once, and so in a fraction of the time that all frames take one by one.
 pub fn drawn_moments(windows: &Windows<'_>, seed: u64) -> Vec<(Moments, DMatrix<f64>)> {
     let graph = windows.graph;
-    let network = Network::new(graph);
     let mut random = Random::new(seed);
     let mut sums: Vec<Drawn> = graph.matrices.iter().map(|m| Drawn::zeros(m.rows, m.cols)).collect();
     let mut grads = windows.weights.zeros_like();
     let samples = (SAMPLES / windows.window).max(4);
     for _ in 0..(DRAWN / (samples * windows.window)).max(BATCHES) {
-        let batch = windows.batch(samples, None, &mut random);
-        let mut state = batch.state;
-        let pass = network.forward(&windows.weights, batch.frames, &mut state);
-        let mut d_state = zero_state(graph, samples);
-        let probe = probe(windows, &pass, &mut random);
-        network.backward(&windows.weights, &pass, probe, &mut d_state, &mut grads, &mut |m, x, dy| sums[m].add(x, dy));
+        probe(windows, samples, &mut random, &mut grads, &mut |m, x, dy| sums[m].add(x, dy));
     }
     sums.into_iter().map(Drawn::mean).collect()
 }
