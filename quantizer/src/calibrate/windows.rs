@@ -135,7 +135,7 @@ impl<'a> Windows<'a> {
             let (a, b) = (self.row(random), self.row(random));
             shift.iter_mut().zip(a.iter().zip(b)).for_each(|(s, (a, b))| *s = share * (a - b));
         }
-        let amplitude = widening.noise * random.share();
+        let amplitude = widening.noise * random.share().powi(widening.power);
         let fresh = (1.0 - MEMORY * MEMORY).sqrt();
         let mut noise: Vec<f32> = (0..self.graph.obs_len).map(|_| random.normal()).collect();
         for row in rows {

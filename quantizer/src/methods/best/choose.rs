@@ -82,7 +82,7 @@ pub fn choose(
     }
     if learns {
         let bounds = Bounds { steps: steps.map(|steps| steps / STEPS), time: time.map(|time| time / TIME) };
-        let choices = Widening::CHOICES;
+        let choices = Widening::choices(windows.recurrent());
         for (i, widening) in choices.into_iter().enumerate() {
             let learned = distill(&Task { widening, bounds, ..task.clone() }, &learned_from, |share, error| {
                 progress((i as f64 + share) / choices.len() as f64, error);
@@ -145,7 +145,7 @@ mod tests {
     #[test]
     fn with_enough_steps_feedback_stands_beside_learning() {
         let Learning { steps, choice, tried } = chosen(4, LEAST_STEPS);
-        assert_eq!(tried.len(), DAMPINGS.len() + Widening::CHOICES.len());
+        assert_eq!(tried.len(), DAMPINGS.len() + Widening::choices(false).len());
         assert_eq!(best(&tried, false).map(|tried| tried.choice), Some(choice));
         assert_eq!(steps > 0, matches!(choice, Choice::Learning(_)));
     }
@@ -153,7 +153,7 @@ mod tests {
     #[test]
     fn feedback_has_to_be_better_than_what_learning_may_still_reach() {
         let learned = |i: usize, recorded, widened| {
-            let choice = Choice::Learning(Widening::CHOICES[i]);
+            let choice = Choice::Learning(Widening::choices(false)[i]);
             Tried { choice, recorded, widened }
         };
         let fed_back = |recorded| Tried { choice: Choice::Feedback { damping: 0.01 }, recorded, widened: 9.0 };
