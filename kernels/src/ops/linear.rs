@@ -16,7 +16,7 @@ use crate::image::header::BLOCK_WORDS;
 use crate::image::{Matrix, RowBlock, row_block};
 use crate::layout::half::bf16;
 use crate::layout::{QUAD, STRIP};
-use crate::meter::{Meter, RUN, Start, Work};
+use crate::meter::{Meter, OutputStart, RUN, Work};
 use crate::x::{Plan, Prepared, Scale};
 
 /// `len` of the outputs from `first` on, with their biases if there are any; `None` where there are too few.
@@ -151,7 +151,7 @@ impl Matrix<'_> {
         // One pass over the output where every row has its bias and is written once, in order.
         let start = self.start_values(accumulate);
         if start.is_none() && at.started < y.len() {
-            let work = Work::Start(Start::of(accumulate, !self.bias.is_empty()));
+            let work = Work::Start(OutputStart::of(accumulate, !self.bias.is_empty()));
             let end = at.started + budget.take(y.len() - at.started, work);
             self.start(at.started..end, y, accumulate);
             at.started = end;

@@ -6,7 +6,7 @@
 
 use super::cost::{self, Feature};
 use crate::image::{Image, Op, OpKind, RowBlock};
-use crate::meter::{Meter, Start, Work};
+use crate::meter::{Meter, OutputStart, Work};
 
 /// Budgets are kept in 16ths of an instruction, so that elements of a few instructions are not rounded up by much.
 const PARTS: u32 = 16;
@@ -115,7 +115,7 @@ impl Image<'_> {
                         let (shape, in_order) = (rows.block.shape(), rows.steps.is_empty());
                         least(Work::Prepare(shape)).max(least(Work::Strips { shape, in_order, start }))
                     };
-                    let bias = Work::Start(Start::of(accumulate, !matrix.bias.is_empty()));
+                    let bias = Work::Start(OutputStart::of(accumulate, !matrix.bias.is_empty()));
                     let first = least(Work::Magnitude(matrix.cols)).max(if start { 0 } else { least(bias) });
                     matrix.blocks().map(of_block).fold(first, u32::max)
                 }

@@ -15,7 +15,7 @@ use super::rates::RATES;
 use crate::image::op;
 use crate::image::{Image, Matrix, Op, OpKind, RowBlock};
 use crate::layout::{BlockShape, QUAD, STRIP};
-use crate::meter::{RUN, Start};
+use crate::meter::{OutputStart, RUN};
 use crate::x::{Extent, Plan};
 
 /// Instructions, and cycles as the project's model of the Cortex-M4 has them.
@@ -192,7 +192,7 @@ fn linear(matrix: &Matrix<'_>, accumulate: bool, add: &mut dyn FnMut(Feature, us
     magnitude(matrix.cols, add);
     if !in_place {
         add(Feature::BIASED, 1);
-        start(Start::of(accumulate, !matrix.bias.is_empty()), matrix.rows, add);
+        start(OutputStart::of(accumulate, !matrix.bias.is_empty()), matrix.rows, add);
     }
     let mut last = None;
     for rows in matrix.blocks() {
@@ -215,12 +215,12 @@ pub(super) fn enter(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
 }
 
 /// Setting outputs up before rows are added to them.
-pub(super) fn start(start: Start, outputs: usize, add: &mut dyn FnMut(Feature, usize)) {
+pub(super) fn start(start: OutputStart, outputs: usize, add: &mut dyn FnMut(Feature, usize)) {
     match start {
-        Start::Zero => add(Feature::ZEROED, outputs),
-        Start::Bias => add(Feature::BIAS, outputs),
-        Start::Added => add(Feature::ADDED, outputs),
-        Start::Kept => {}
+        OutputStart::Zero => add(Feature::ZEROED, outputs),
+        OutputStart::Bias => add(Feature::BIAS, outputs),
+        OutputStart::Added => add(Feature::ADDED, outputs),
+        OutputStart::Kept => {}
     }
 }
 
