@@ -6,7 +6,7 @@ use anyhow::{Context as _, Result, bail, ensure};
 
 use super::program::{Function, Half, Program};
 use super::step::{LR, Step, zero_behind};
-use crate::cycles::{Class, Instruction};
+use crate::instruction::{Class, Instruction};
 
 /// Registers that a call may change: r0 to r3, r12 and the link register (AAPCS).
 const CHANGED: u32 = 0x500f;

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::Path;
 
-use crate::cycles::Instruction;
+use crate::instruction::Instruction;
 use anyhow::{Context as _, Result};
 use object::{FileFlags, Object as _, ObjectSection as _, ObjectSymbol as _, SectionFlags, SymbolKind, elf};
 

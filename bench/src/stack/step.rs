@@ -1,7 +1,7 @@
 //! What a Thumb-2 instruction does to the stack pointer and to where execution goes on (Arm DDI 0403E, chapters A5 and A7; DDI 0553
 //! for what Armv8-M adds).
 
-use crate::cycles::{Class, Instruction};
+use crate::instruction::{Class, Instruction};
 
 /// Register numbers.
 pub(super) const SP: u32 = 13;

@@ -13,10 +13,12 @@ use actq::pipeline::Quantizer;
 use actq::policy::Policy;
 use actq::report::table::table;
 use actq::runtime::ImageBuffer;
-use actq_bench::cycles::{Code, Cost, Kind};
+use actq_bench::cycles::Code;
+use actq_bench::instruction::Kind;
 use actq_bench::qemu::Counter;
 use actq_bench::{Target, evaluation, firmware, shared_policies, ur3};
 use actq_kernels::Width;
+use actq_kernels::pace::cost::Cost;
 use anyhow::{Context, Result};
 use serde::Serialize;
 
