@@ -147,7 +147,7 @@ impl<'a> Maker<'a> {
         }
         let begun = Instant::now();
         let Subject { policy, recordings } = self.subject;
-        let quantizer = Quantizer::new(policy, recordings, method, |share| progress("calibrating", share))?;
+        let quantizer = Quantizer::new(policy, recordings, method, None, |share| progress("calibrating", share))?;
         let seconds = begun.elapsed().as_secs_f64();
         self.ready.insert(method.to_string(), (quantizer, seconds));
         Ok(seconds)

@@ -203,7 +203,7 @@ fn polls_of_shared_policies_stay_within_their_budget() -> Result<()> {
 fn a_budget_of_time_is_kept_and_used() -> Result<()> {
     let policy = Policy::load(&ur3())?;
     let recordings = Recordings::load(&policy)?;
-    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, |_| {})?;
+    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, None, |_| {})?;
     let within = |milliseconds| {
         let budget = Budget::Time(TimeLimit { milliseconds, clock_hz: CLOCK });
         quantizer.quantize(&Options { budget, ..best(1.0) }, |_, _| {})

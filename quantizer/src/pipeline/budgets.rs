@@ -18,7 +18,7 @@ pub fn quantize(
     mut progress: impl FnMut(&str, f64),
 ) -> Result<QuantizedPolicy> {
     let quantizer =
-        Quantizer::before(policy, recordings, options.method, options.minutes, |share| progress("calibrating", share))?;
+        Quantizer::new(policy, recordings, options.method, options.minutes, |share| progress("calibrating", share))?;
     quantizer.quantize(options, progress)
 }
 

@@ -94,7 +94,7 @@ pub fn run(plan: &SweepPlan<'_>, mut progress: impl FnMut(&str, f64)) -> Result<
         // Calibration counts as much as one budget.
         let done = |steps: f64| (m as f64 + steps / (1 + budgets.len()) as f64) / methods.len() as f64;
         let work = format!("{method}, calibrating");
-        let quantizer = Quantizer::before(policy, recordings, method, minutes, |share| progress(&work, done(share)))?;
+        let quantizer = Quantizer::new(policy, recordings, method, minutes, |share| progress(&work, done(share)))?;
         let mut points = Vec::new();
         for (b, &budget) in budgets.iter().enumerate() {
             let work = format!("{method}, {budget} bits per weight");

@@ -132,9 +132,8 @@ fn learn(
     mut progress: impl FnMut(&str, f64),
 ) -> Result<QuantizedPolicy> {
     let recordings = Recordings { calib: Some(calib), heldout: None };
-    let quantizer = Quantizer::before(policy, &recordings, options.method, options.minutes, |share| {
-        progress("calibrating", share)
-    })?;
+    let quantizer =
+        Quantizer::new(policy, &recordings, options.method, options.minutes, |share| progress("calibrating", share))?;
     quantizer.quantize(options, |work, share| progress(work, share))
 }
 

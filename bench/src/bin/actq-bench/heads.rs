@@ -96,8 +96,8 @@ pub(crate) fn measure(policies: &[PathBuf], counter: &Counter, wait_states: u64)
     for dir in policies {
         let policy = Policy::load(dir)?;
         let recordings = Recordings::load(&policy)?;
-        let rounded = Quantizer::new(&policy, &recordings, Method::Rtn, |_| {})?;
-        let learned = Quantizer::new(&policy, &recordings, Method::Best, |_| {})?;
+        let rounded = Quantizer::new(&policy, &recordings, Method::Rtn, None, |_| {})?;
+        let learned = Quantizer::new(&policy, &recordings, Method::Best, None, |_| {})?;
         for (quantizer, bits, options) in [
             (&rounded, 8.0, Options::new(Method::Rtn, Budget::Width(Width::W8))),
             (&learned, 3.0, best(3.0)),
