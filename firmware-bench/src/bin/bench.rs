@@ -6,10 +6,7 @@
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
-fn main() {
-    eprintln!("this is firmware: build it with --target thumbv7em-none-eabihf");
-    std::process::exit(1);
-}
+use actq_firmware_bench::main;
 
 #[cfg(target_os = "none")]
 mod firmware {
@@ -19,6 +16,7 @@ mod firmware {
     use core::fmt::Write as _;
     use core::hint::black_box;
 
+    use actq_firmware_bench::random_words;
     use actq_firmware_support::{count, host};
     use actq_kernels::image::RowBlock;
     use actq_kernels::layout::{Block, BlockShape, Lanes, Width, pack};
@@ -66,13 +64,7 @@ mod firmware {
 
     fn run(b: &mut Flash, ram: &mut Ram) -> Option<()> {
         let mut out = hio::hstdout().ok()?;
-        let mut seed = 0x1234_5678u32;
-        let mut random = move || {
-            seed ^= seed << 13;
-            seed ^= seed >> 17;
-            seed ^= seed << 5;
-            seed
-        };
+        let mut random = random_words();
         b.codes.iter_mut().for_each(|c| *c = random() as u8);
         b.scales.iter_mut().for_each(|s| *s = random() as u8);
         b.weights.iter_mut().for_each(|w| *w = random() as i32 as f32);
