@@ -1,13 +1,14 @@
 //! Cycles of a Cortex-M4, modelled from counted instructions.
 //!
-//! The counter says how often each instruction was executed and how often execution jumped away from it. An instruction that
-//! was not jumped to follows the one before it in memory, so pairs of neighbours, on which the pipeline's stalls depend, are
-//! known exactly as well. What each of them takes is in `instruction.rs`. It is a model.
+//! The counter says how often each instruction was executed and how often execution jumped away from it. An instruction
+//! that was not jumped to follows the one before it in memory, so pairs of neighbours, on which the pipeline's stalls
+//! depend, are known exactly as well. What each of them takes is in `instruction.rs`. It is a model.
 //!
-//! A board's flash waits. The counter plays every instruction and every load in order through the caches of an STM32F4 (see
-//! `xtask/insn-count`), so the lines that they miss are exact for caches that are empty at first. A line costs the flash's wait
-//! states; the next line of code is prefetched while the line before it is executed, one cycle an instruction. That is a model,
-//! too: fetches of code and data do not delay each other, and RAM never waits. An STM32F405 at 168 MHz has 5 wait states.
+//! A board's flash waits. The counter plays every instruction and every load in order through the caches of an STM32F4
+//! (see `xtask/insn-count`), so the lines that they miss are exact for caches that are empty at first. A line costs the
+//! flash's wait states; the next line of code is prefetched while the line before it is executed, one cycle an
+//! instruction. That is a model, too: fetches of code and data do not delay each other, and RAM never waits. An
+//! STM32F405 at 168 MHz has 5 wait states.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -140,9 +141,9 @@ impl Code {
         Ok(costs)
     }
 
-    /// Lines of flash that the longest innermost loop of a function takes where the function starts at a line: from the target
-    /// of a conditional branch back to that branch, with no other such loop inside; 0 without loops. A loop of more than
-    /// [`CODE_LINES`] misses a cache that replaces the least recently used line at every line.
+    /// Lines of flash that the longest innermost loop of a function takes where the function starts at a line: from the
+    /// target of a conditional branch back to that branch, with no other such loop inside; 0 without loops. A loop of
+    /// more than [`CODE_LINES`] misses a cache that replaces the least recently used line at every line.
     pub fn longest_inner_loop(&self, function: &Function) -> Result<u64> {
         let mut loops: Vec<(u64, u64)> = Vec::new();
         let mut address = function.address;

@@ -1,6 +1,7 @@
 //! Instructions of Armv7E-M with FPU (Thumb-2), as far as their cycles and the stack depend on them.
 //!
-//! What each class of them takes is from the Cortex-M4 Technical Reference Manual, tables 3-1 and 7-1, with memory that never waits.
+//! What each class of them takes is from the Cortex-M4 Technical Reference Manual, tables 3-1 and 7-1, with memory that
+//! never waits.
 
 /// Cycles to refill the pipeline after a taken branch; the manual gives 1 to 3.
 pub(crate) const REFILL: u64 = 2;

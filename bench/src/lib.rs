@@ -1,6 +1,6 @@
-//! What the tests and the measuring commands share: the firmware, built and under QEMU, counted instructions and modelled
-//! cycles, the most stack of the application, golden kernel cases, drawn networks, the command `actq`, closed loops, the
-//! comparison of methods, llama.cpp's K-quants.
+//! What the tests and the measuring commands share: the firmware, built and under QEMU, counted instructions and
+//! modelled cycles, the most stack of the application, golden kernel cases, drawn networks, the command `actq`, closed
+//! loops, the comparison of methods, llama.cpp's K-quants.
 #![forbid(unsafe_code)]
 
 pub mod closed_loop;

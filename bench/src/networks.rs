@@ -124,8 +124,8 @@ impl Builder {
     }
 }
 
-/// The image with every linear operation that has biases, and whose output holds something before it, made to accumulate: the
-/// format has such operations, and no graph lowers to one.
+/// The image with every linear operation that has biases, and whose output holds something before it, made to
+/// accumulate: the format has such operations, and no graph lowers to one.
 pub fn accumulating(bytes: &[u8]) -> Result<Vec<u8>> {
     let name = Path::new("accumulating");
     let mut bytes = bytes.to_vec();

@@ -2,8 +2,8 @@
 
 use anyhow::{Result, ensure};
 
-/// The action contract; each array has one value per action dimension, or is absent. `docs/FORMAT.md` has the order in which they
-/// apply.
+/// The action contract; each array has one value per action dimension, or is absent. `docs/FORMAT.md` has the order in
+/// which they apply.
 #[derive(Clone, Debug, Default)]
 pub struct ActionContract {
     /// Factors.
@@ -48,8 +48,9 @@ pub struct Playback {
     pub deadline: Option<usize>,
 }
 
-/// Temporal ensembling (Zhao et al., Learning fine-grained bimanual manipulation with low-cost hardware, arXiv 2304.13705): an action
-/// is the average of what the last chunks foresaw for it, the i-th of them weighted by `exp(-m i)`, the oldest first.
+/// Temporal ensembling (Zhao et al., Learning fine-grained bimanual manipulation with low-cost hardware, arXiv
+/// 2304.13705): an action is the average of what the last chunks foresaw for it, the i-th of them weighted by
+/// `exp(-m i)`, the oldest first.
 #[derive(Clone, Copy, Debug)]
 pub struct Ensemble {
     /// Chunks.

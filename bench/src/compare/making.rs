@@ -70,8 +70,9 @@ impl<'a> Maker<'a> {
 
     /// Makes the image of a cell. `progress` gets what is being done and the share of it that is done.
     ///
-    /// The method's default group counts. Only where it does not fit the budget, the others are tried, and of those that fit the one
-    /// with the lowest held-out error is taken: the choice on what errors are measured on is in the method's favour.
+    /// The method's default group counts. Only where it does not fit the budget, the others are tried, and of those
+    /// that fit the one with the lowest held-out error is taken: the choice on what errors are measured on is in the
+    /// method's favour.
     pub(super) fn make(
         &mut self,
         contender: Contender,

@@ -1,5 +1,5 @@
-//! The whole runtime as `runtime.rs` has it, and steps in pieces, which bring the cost model with them: `cargo xtask budgets`
-//! measures its code. It is not run.
+//! The whole runtime as `runtime.rs` has it, and steps in pieces, which bring the cost model with them:
+//! `cargo xtask budgets` measures its code. It is not run.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]

@@ -1,5 +1,5 @@
-//! The whole runtime, with steps as wholes, and nothing else (no host, no text): `cargo xtask budgets` measures its code. It is not
-//! run.
+//! The whole runtime, with steps as wholes, and nothing else (no host, no text): `cargo xtask budgets` measures its
+//! code. It is not run.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]

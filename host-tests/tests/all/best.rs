@@ -95,8 +95,8 @@ fn another_seed_gives_another_image() -> Result<()> {
     Ok(())
 }
 
-/// Errors below half of GPTQ's at about the same bits (GPTQ has one scale a row and one width, so it gets a little more), after
-/// a share of the default steps.
+/// Errors below half of GPTQ's at about the same bits (GPTQ has one scale a row and one width, so it gets a little
+/// more), after a share of the default steps.
 fn halves_gptq(dir: &Path, steps: usize) -> Result<()> {
     let policy = Policy::load(dir)?;
     let recordings = Recordings::load(&policy)?;

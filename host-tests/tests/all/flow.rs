@@ -32,7 +32,8 @@ fn drives(name: &str, outcomes: &[Outcome], limit_mm: f64) -> Result<()> {
     Ok(())
 }
 
-/// Statistics of every denoising step take a share of the time that learning has; those of other policies are of all frames.
+/// Statistics of every denoising step take a share of the time that learning has; those of other policies are of all
+/// frames.
 #[test]
 fn statistics_keep_their_share_of_the_time() -> Result<()> {
     let policy = Policy::load(&ur3_flow())?;

@@ -179,7 +179,8 @@ fn lanes(cell: &str) -> Lanes {
     }
 }
 
-/// Where a bit of a code stands in a cell: a bit of a word, possibly the exclusive or with another one, possibly inverted.
+/// Where a bit of a code stands in a cell: a bit of a word, possibly the exclusive or with another one, possibly
+/// inverted.
 struct Place {
     at: (usize, usize),
     xor: Option<(usize, usize)>,

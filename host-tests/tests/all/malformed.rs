@@ -1,5 +1,5 @@
-//! Damaged images, and images with a correct checksum that say something impossible: none may pass `Image::new_checked`. (That
-//! whatever passes runs without a panic, `kernels/tests/mutants.rs` shows.)
+//! Damaged images, and images with a correct checksum that say something impossible: none may pass
+//! `Image::new_checked`. (That whatever passes runs without a panic, `kernels/tests/mutants.rs` shows.)
 
 mod damaged;
 mod draft;

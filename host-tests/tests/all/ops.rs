@@ -1,5 +1,5 @@
-//! Every operation of the executor, and the f32 evaluator that calibration uses, against an interpreter of policy.json in f64
-//! that shares no code with them.
+//! Every operation of the executor, and the f32 evaluator that calibration uses, against an interpreter of policy.json
+//! in f64 that shares no code with them.
 //!
 //! A tensor's name in these policies ends with its shape ("w 8x5"); its values are drawn.
 
@@ -25,19 +25,21 @@ pub(crate) use reference::{Case, wide};
 /// The step before which a run is reset.
 const RESET: usize = 25;
 
-/// Largest error, over the RMS of the output, in parts of activation rounding (1 / x_max). A product rounds each value of its
-/// input by at most amax / (2 x_max), and the drawn matrices keep the variance, so one product is off by about
-/// 0.3 amax / x_max (one sigma), amax being 2 to 4 RMS: one part. Several products in a row, recurrence, and the largest of a
-/// hundred samples or more make it ten. A wrong operation is off by hundreds.
+/// Largest error, over the RMS of the output, in parts of activation rounding (1 / x_max). A product rounds each value
+/// of its input by at most amax / (2 x_max), and the drawn matrices keep the variance, so one product is off by about
+/// 0.3 amax / x_max (one sigma), amax being 2 to 4 RMS: one part. Several products in a row, recurrence, and the
+/// largest of a hundred samples or more make it ten. A wrong operation is off by hundreds.
 const PARTS: f64 = 20.0;
 
-/// What rounding to f32 and the functions' own errors (`kernels/src/math/functions.rs`) leave of a few operations without weights.
+/// What rounding to f32 and the functions' own errors (`kernels/src/math/functions.rs`) leave of a few operations
+/// without weights.
 const F32: f64 = 2e-6;
 
 /// [`F32`] through recurrence and a dozen operations with sums of some ten products.
 const F32_DEEP: f64 = 2e-5;
 
-/// The largest difference of two runs over the RMS of the second. A step takes an observation and whether to reset before.
+/// The largest difference of two runs over the RMS of the second. A step takes an observation and whether to reset
+/// before.
 fn deviation(
     observations: &[Vec<f32>],
     mut run: impl FnMut(&[f32], bool) -> Result<Vec<f64>>,

@@ -1,5 +1,5 @@
-//! The action contract, chunk playback, and saved states, against plain arithmetic in f64. The networks are none: the observation is
-//! the raw output, bit for bit.
+//! The action contract, chunk playback, and saved states, against plain arithmetic in f64. The networks are none: the
+//! observation is the raw output, bit for bit.
 
 use std::fs;
 use std::task::Poll;

@@ -11,8 +11,8 @@ use crate::ops::elementwise::{self, copy, copy_le};
 use crate::ops::noise::normal;
 use crate::ops::norm;
 
-/// Runs a whole operation over an arena, as a head does in a denoising step: for whoever runs a network's operations one by one. Noise
-/// is that of the arena.
+/// Runs a whole operation over an arena, as a head does in a denoising step: for whoever runs a network's operations
+/// one by one. Noise is that of the arena.
 ///
 /// # Errors
 ///

@@ -1,4 +1,5 @@
-//! A head: runs an image on observations, a step at once or in pieces, and keeps the recurrent state and the chunk queue.
+//! A head: runs an image on observations, a step at once or in pieces, and keeps the recurrent state and the chunk
+//! queue.
 
 mod arena;
 mod contract;
@@ -55,8 +56,8 @@ impl<'a, 's> Head<'a, 's> {
         Ok(Self { image, arena, least_budget: 0, phase: Phase::Idle, playback, started: false, seed: 0, draws: 0 })
     }
 
-    /// Forgets the recurrent state, all chunks, the last action and a step that was begun. The noise of an iterative head
-    /// begins anew: after a reset the same observations give the same actions.
+    /// Forgets the recurrent state, all chunks, the last action and a step that was begun. The noise of an iterative
+    /// head begins anew: after a reset the same observations give the same actions.
     #[inline(never)]
     pub fn reset(&mut self) {
         self.abandon();
@@ -71,8 +72,8 @@ impl<'a, 's> Head<'a, 's> {
         self.reset();
     }
 
-    /// As [`Self::reset`], but the last action stays, and what is on: after an error the robot is still where that left it, and the
-    /// step limit holds on to it.
+    /// As [`Self::reset`], but the last action stays, and what is on: after an error the robot is still where that left
+    /// it, and the step limit holds on to it.
     #[inline(never)]
     fn abandon(&mut self) {
         self.forget();
@@ -86,8 +87,8 @@ impl<'a, 's> Head<'a, 's> {
         self.words_mut(self.image.state()).fill(0);
     }
 
-    /// The recurrent state, to read or to set: of each operation in order an LSTM's hidden, then cell state, or a GRU's state.
-    /// A reset zeroes it.
+    /// The recurrent state, to read or to set: of each operation in order an LSTM's hidden, then cell state, or a GRU's
+    /// state. A reset zeroes it.
     pub fn state_mut(&mut self) -> &mut [f32] {
         self.floats_mut(self.image.state())
     }

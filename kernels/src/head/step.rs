@@ -13,11 +13,12 @@ use crate::ops::elementwise::copy;
 use crate::pace::budget::Budget;
 
 impl Head<'_, '_> {
-    /// The action for `observation`: of the next chunk position where the image is chunked, after the action contract. It is
-    /// [`Self::begin`] and one [`Self::poll`] without a limit. Each action is one control period; [`Self::pass`] counts those without.
+    /// The action for `observation`: of the next chunk position where the image is chunked, after the action contract.
+    /// It is [`Self::begin`] and one [`Self::poll`] without a limit. Each action is one control period; [`Self::pass`]
+    /// counts those without.
     ///
-    /// On an error the recurrent state and the chunk are reset, so that no part of a failed evaluation reaches a later action.
-    /// The last action stays: the next one is limited by `max_step` as ever.
+    /// On an error the recurrent state and the chunk are reset, so that no part of a failed evaluation reaches a later
+    /// action. The last action stays: the next one is limited by `max_step` as ever.
     #[inline(never)]
     pub fn step(&mut self, observation: &[f32]) -> Result<&[f32], StepError> {
         self.take(observation, None)?;
@@ -27,24 +28,26 @@ impl Head<'_, '_> {
 
     /// Begins a step: takes the observation. The work itself is done by [`Self::poll`].
     ///
-    /// A step that was begun and is not ready is dropped. If a poll has already worked on it, the recurrent state may be partly
-    /// that of the dropped step, and is zeroed as by [`Self::reset`]; the last action stays, so that the step limit holds.
+    /// A step that was begun and is not ready is dropped. If a poll has already worked on it, the recurrent state may
+    /// be partly that of the dropped step, and is zeroed as by [`Self::reset`]; the last action stays, so that the step
+    /// limit holds.
     ///
-    /// Errors are those of [`Self::step`]. The first call takes longer where [`Self::least_budget`] was not called before.
+    /// Errors are those of [`Self::step`]. The first call takes longer where [`Self::least_budget`] was not called
+    /// before.
     pub fn begin(&mut self, observation: &[f32]) -> Result<(), StepError> {
         self.least_budget();
         self.take(observation, None)
     }
 
-    /// As [`Self::begin`], with the noise of an iterative head: [`crate::Image::noise_len`] values, the first iterate and behind it, where
-    /// denoising steps add noise, that of each. Within a chunk it is not used.
+    /// As [`Self::begin`], with the noise of an iterative head: [`crate::Image::noise_len`] values, the first iterate
+    /// and behind it, where denoising steps add noise, that of each. Within a chunk it is not used.
     pub fn begin_with_noise(&mut self, observation: &[f32], noise: &[f32]) -> Result<(), StepError> {
         self.least_budget();
         self.take(observation, Some(noise))
     }
 
-    /// [`crate::Image::least_budget`], computed once, which takes about as long as a short step. (Not by [`Self::new`]: where steps are
-    /// not cut, the cost model is not in the program.)
+    /// [`crate::Image::least_budget`], computed once, which takes about as long as a short step. (Not by [`Self::new`]:
+    /// where steps are not cut, the cost model is not in the program.)
     pub fn least_budget(&mut self) -> u32 {
         if self.least_budget == 0 {
             self.least_budget = self.image.least_budget();
@@ -52,17 +55,17 @@ impl Head<'_, '_> {
         self.least_budget
     }
 
-    /// Runs at most `budget` instructions of the step that was begun, by the cost model ([`crate::pace::cost`]), and gives the action
-    /// once it is ready; then, again and again until the next [`Self::begin`]. Steps that play on from a chunk have little to
-    /// do, and are ready at the first poll. A budget of 2^28 or more is no limit.
+    /// Runs at most `budget` instructions of the step that was begun, by the cost model ([`crate::pace::cost`]), and
+    /// gives the action once it is ready; then, again and again until the next [`Self::begin`]. Steps that play on from
+    /// a chunk have little to do, and are ready at the first poll. A budget of 2^28 or more is no limit.
     ///
-    /// The cost model is that of the build for thumbv7em-none-eabihf; elsewhere pieces are cut in the same places. However a
-    /// step is cut, its bits are the same.
+    /// The cost model is that of the build for thumbv7em-none-eabihf; elsewhere pieces are cut in the same places.
+    /// However a step is cut, its bits are the same.
     ///
     /// # Errors
     ///
-    /// [`StepError::Budget`] where `budget` is below [`crate::Image::least_budget`], and [`StepError::NotBegun`], change nothing. Others
-    /// are those of [`Self::step`].
+    /// [`StepError::Budget`] where `budget` is below [`crate::Image::least_budget`], and [`StepError::NotBegun`],
+    /// change nothing. Others are those of [`Self::step`].
     pub fn poll(&mut self, budget: u32) -> Result<Poll<&[f32]>, StepError> {
         self.poll_until(budget, false)
     }
@@ -72,21 +75,22 @@ impl Head<'_, '_> {
         self.poll_until(budget, true)
     }
 
-    /// Lets so many control periods pass without an action: the observation of a step that was begun is so much older when it is
-    /// ready, and the actions that were for these periods never play. (So an observation that is old when it comes: first
-    /// [`Self::begin`], then its age.) Where nothing is left that is younger than the image's deadline, the step ends with
-    /// [`StepError::Stale`].
+    /// Lets so many control periods pass without an action: the observation of a step that was begun is so much older
+    /// when it is ready, and the actions that were for these periods never play. (So an observation that is old when it
+    /// comes: first [`Self::begin`], then its age.) Where nothing is left that is younger than the image's deadline,
+    /// the step ends with [`StepError::Stale`].
     pub fn pass(&mut self, periods: usize) {
         self.playback.pass(&self.image, self.arena, periods);
     }
 
-    /// The action that is due by what chunks have foreseen, without an observation: while a step is being computed, so that the next
-    /// chunk goes on behind what has been played, or where an observation is missing. Of a chunk that is being replaced, only an
-    /// image with an overlap or an ensemble keeps what is left.
+    /// The action that is due by what chunks have foreseen, without an observation: while a step is being computed, so
+    /// that the next chunk goes on behind what has been played, or where an observation is missing. Of a chunk that is
+    /// being replaced, only an image with an overlap or an ensemble keeps what is left.
     ///
     /// # Errors
     ///
-    /// [`StepError::Stale`] where nothing is left, or nothing young enough, which changes nothing. Others are those of [`Self::step`].
+    /// [`StepError::Stale`] where nothing is left, or nothing young enough, which changes nothing. Others are those of
+    /// [`Self::step`].
     #[inline(never)]
     pub fn play(&mut self) -> Result<&[f32], StepError> {
         if let Err(fault) = self.act() {
@@ -177,7 +181,8 @@ impl Head<'_, '_> {
         Ok(())
     }
 
-    /// Begins a step with the observation that the arena holds, and with noise of the generator or with that of the arena.
+    /// Begins a step with the observation that the arena holds, and with noise of the generator or with that of the
+    /// arena.
     #[inline(never)]
     pub(super) fn start(&mut self, draw: bool) {
         let draw = draw.then_some([self.seed, self.draws]);
@@ -250,7 +255,8 @@ impl Head<'_, '_> {
         Ok(true)
     }
 
-    /// Takes the action that is due through the contract. Not inlined, so that the operations do not run on top of its stack.
+    /// Takes the action that is due through the contract. Not inlined, so that the operations do not run on top of its
+    /// stack.
     #[inline(never)]
     fn act(&mut self) -> Result<(), Fault> {
         let due = self.playback.due(&self.image, self.arena)?;

@@ -9,9 +9,9 @@ use super::eval::{ErrorReport, evaluate};
 use crate::data::{Dataset, Sizes, driven_by, joined};
 use crate::policy::Policy;
 
-/// The error of `image` on the recordings in `files` of what it was shown itself (`actq serve --record`). Those of another image
-/// are refused, those that name none are believed. Where actions are missing, `source` gives them, the policy that the image was
-/// made from.
+/// The error of `image` on the recordings in `files` of what it was shown itself (`actq serve --record`). Those of
+/// another image are refused, those that name none are believed. Where actions are missing, `source` gives them, the
+/// policy that the image was made from.
 pub fn own_path(image: Image<'_>, files: &[PathBuf], source: Option<&Policy>) -> Result<ErrorReport> {
     let load = |file: &PathBuf| -> Result<Dataset> {
         let name = file.display();

@@ -40,8 +40,8 @@ pub struct QuantizedPolicy {
 }
 
 impl<'a> Quantizer<'a> {
-    /// Collects what the method needs from the calibration recording, as [`PreparedMethod::before`] does, with its errors. `minutes` is
-    /// what learning may take at most, [`Options::minutes`].
+    /// Collects what the method needs from the calibration recording, as [`PreparedMethod::before`] does, with its
+    /// errors. `minutes` is what learning may take at most, [`Options::minutes`].
     pub fn new(
         policy: &'a Policy,
         recordings: &'a Recordings,

@@ -1,5 +1,5 @@
-//! Drive, record, learn again: an image is driven, the f32 policy says what it would have done where that has led, and the next
-//! image learns from that as well (DAgger: Ross, Gordon, Bagnell 2011, with the f32 policy as the expert).
+//! Drive, record, learn again: an image is driven, the f32 policy says what it would have done where that has led, and
+//! the next image learns from that as well (DAgger: Ross, Gordon, Bagnell 2011, with the f32 policy as the expert).
 
 use std::path::Path;
 use std::time::Instant;
@@ -46,8 +46,8 @@ pub struct Round {
     pub bytes: usize,
     /// Error (NMSE) on the f32 policy's path.
     pub nmse: f64,
-    /// Error (NMSE) on the path on which the image itself has led the robot; `None` where the f32 policy's actions never vary
-    /// there, or the image has none at an observation that it did not plan at.
+    /// Error (NMSE) on the path on which the image itself has led the robot; `None` where the f32 policy's actions
+    /// never vary there, or the image has none at an observation that it did not plan at.
     pub own_nmse: Option<f64>,
     /// How it drove.
     pub driven: DriveOutcome,
@@ -77,9 +77,9 @@ impl Tuned {
     }
 }
 
-/// Learns once from the f32 policy's recordings, then `rounds` times from those and from all that was driven before. `drive` gets
-/// each image, counted from 0, and gives what the image was shown. `progress` gets what is being done and the share of it that
-/// is done.
+/// Learns once from the f32 policy's recordings, then `rounds` times from those and from all that was driven before.
+/// `drive` gets each image, counted from 0, and gives what the image was shown. `progress` gets what is being done and
+/// the share of it that is done.
 pub fn run(
     plan: TunePlan<'_>,
     mut drive: impl FnMut(usize, &[u8]) -> Result<Driven>,

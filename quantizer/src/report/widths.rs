@@ -40,8 +40,8 @@ impl Reasons {
     }
 }
 
-/// A matrix's rows: without statistics those of the image, in the order of its output; with statistics those of the matrix as it
-/// was trained, in its own order.
+/// A matrix's rows: without statistics those of the image, in the order of its output; with statistics those of the
+/// matrix as it was trained, in its own order.
 #[derive(Clone, Debug)]
 struct Layer {
     name: String,
@@ -120,7 +120,8 @@ impl Widths {
         text
     }
 
-    /// One row per matrix and width: how many rows, their bytes; with statistics also their energies and expected errors.
+    /// One row per matrix and width: how many rows, their bytes; with statistics also their energies and expected
+    /// errors.
     fn table(&self) -> Table {
         let mut header = vec!["matrix", "shape", "bits", "rows", "bytes", "share"];
         let reasons = self.layers.iter().flat_map(|l| &l.rows).any(|r| r.reasons.is_some());

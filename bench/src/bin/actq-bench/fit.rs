@@ -1,8 +1,8 @@
 //! `cargo xtask fit`: the rates of the cost model (`kernels/src/pace/`), from counted operations.
 //!
-//! Images with many shapes of every operation run under QEMU; every operation, and every whole step, is a sample: how many of
-//! each feature it has, and what it took. The rates are the least squares of the relative errors. A feature that others
-//! determine, or whose rate would be negative, gets the rate 0.
+//! Images with many shapes of every operation run under QEMU; every operation, and every whole step, is a sample: how
+//! many of each feature it has, and what it took. The rates are the least squares of the relative errors. A feature
+//! that others determine, or whose rate would be negative, gets the rate 0.
 
 mod images;
 mod least_squares;
@@ -214,8 +214,8 @@ fn most(samples: &[Sample], polls: &[(f64, usize)], rates: &Rates) -> Rates {
     most
 }
 
-/// What coming back to a linear operation takes for each of its blocks: from steps in short polls, whose number tells how often
-/// that was. The image's least budget is that of the rates before, which need not be exact here.
+/// What coming back to a linear operation takes for each of its blocks: from steps in short polls, whose number tells
+/// how often that was. The image's least budget is that of the rates before, which need not be exact here.
 fn resumed(elf: &Path, counter: &Counter, most: &Rates) -> Result<f64> {
     let known: f64 = [Feature::POLL, Feature::ENTERED, Feature::operation(op::LINEAR), Feature::PIECE]
         .map(|f| most[&f])

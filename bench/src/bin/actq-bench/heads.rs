@@ -24,8 +24,8 @@ use serde::Serialize;
 
 use crate::kernels::Cycles;
 
-/// Steps of distillation: too few for accuracy, but the widths of the rows, which matter here, are chosen before. (Which
-/// matrices take int16 activations is chosen after, and may differ a little.)
+/// Steps of distillation: too few for accuracy, but the widths of the rows, which matter here, are chosen before.
+/// (Which matrices take int16 activations is chosen after, and may differ a little.)
 const STEPS: usize = 50;
 
 /// Functions that the report by function shows of each head.

@@ -54,8 +54,8 @@ impl Fixture {
         self.0.path().join("out").join(name)
     }
 
-    /// `actq quantize` of the policy with more arguments, separated by spaces; by gptq where they name no method. (The default
-    /// method learns, for which the recording here is too short.)
+    /// `actq quantize` of the policy with more arguments, separated by spaces; by gptq where they name no method. (The
+    /// default method learns, for which the recording here is too short.)
     pub(super) fn quantize(&self, out: &Path, options: &str) -> Result<Output> {
         let method = if options.contains("--method") { "" } else { "--method gptq" };
         self.quantize_as_given(out, &format!("{options} {method}"))

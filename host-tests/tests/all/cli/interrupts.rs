@@ -38,13 +38,15 @@ fn an_interrupt_leaves_no_file() -> Result<()> {
 }
 
 fn interrupt(child: &Child) -> Result<()> {
-    // SIGTERM ends the command as Ctrl-C does: it has a handler for neither. SIGINT is ignored by all that a shell starts in the
-    // background, tests and their children among it. A child that has just ended cannot be interrupted, which is no error.
+    // SIGTERM ends the command as Ctrl-C does: it has a handler for neither. SIGINT is ignored by all that a shell
+    // starts in the background, tests and their children among it. A child that has just ended cannot be interrupted,
+    // which is no error.
     Command::new("kill").args(["-TERM", &child.id().to_string()]).stderr(Stdio::null()).status()?;
     Ok(())
 }
 
-/// Interrupts all over the time that the command takes, the writing among it: the old image is there, or the whole new one.
+/// Interrupts all over the time that the command takes, the writing among it: the old image is there, or the whole new
+/// one.
 #[test]
 fn an_interrupt_at_any_time_leaves_a_whole_image() -> Result<()> {
     const TRIES: u32 = 40;

@@ -1,4 +1,5 @@
-//! What any command refuses: wrong arguments, damaged images, outputs that cannot be written; and a reader that goes away.
+//! What any command refuses: wrong arguments, damaged images, outputs that cannot be written; and a reader that goes
+//! away.
 
 use std::fs;
 use std::process::Stdio;

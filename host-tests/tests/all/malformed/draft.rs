@@ -19,8 +19,8 @@ pub(super) const UNITS: usize = 24;
 pub(super) const ACT: usize = 4;
 pub(super) const CHUNK: usize = 2;
 
-/// A policy with every kind of section: normalization, matrices of all widths with group scales, an LSTM, a matrix of mixed
-/// widths with its output steps, a chunk and the whole contract.
+/// A policy with every kind of section: normalization, matrices of all widths with group scales, an LSTM, a matrix of
+/// mixed widths with its output steps, a chunk and the whole contract.
 fn valid_image() -> Vec<u8> {
     let mut random = Random::new(7);
     let mut values = |n: usize| (0..n).map(|_| random.unit()).collect::<Vec<f32>>();
@@ -176,7 +176,8 @@ pub(super) type Change = fn(&mut Draft);
 /// What is wrong, the error that must say so, and how the valid image is made so.
 pub(super) type Case = (&'static str, E, Change);
 
-/// Applies every case to the valid image, makes the checksum fit, and reports all cases that are not refused as expected.
+/// Applies every case to the valid image, makes the checksum fit, and reports all cases that are not refused as
+/// expected.
 pub(super) fn refused(cases: &[Case]) {
     let wrong = cases.iter().filter_map(|(name, expected, change)| {
         let mut draft = VALID.clone();

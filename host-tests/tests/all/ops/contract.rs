@@ -36,7 +36,8 @@ fn contract(action: &Value, raw: &[f64], last: Option<&[f64]>, met: &mut [usize;
         .collect()
 }
 
-/// Plays the policy through its contract, `execute` actions of each chunk, and gives how often low, high and max_step acted.
+/// Plays the policy through its contract, `execute` actions of each chunk, and gives how often low, high and max_step
+/// acted.
 fn check_actions(mut json: Value, action: &Value) -> Result<[usize; 3]> {
     let act = 2;
     let chunk = json["chunk"].as_u64().unwrap_or(1) as usize;

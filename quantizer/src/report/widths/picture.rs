@@ -57,8 +57,8 @@ fn colour(width: Option<Width>) -> &'static str {
 }
 
 impl Widths {
-    /// A strip per matrix, its rows coloured by width: with energies sorted by them and below their line, else in the order of
-    /// the output.
+    /// A strip per matrix, its rows coloured by width: with energies sorted by them and below their line, else in the
+    /// order of the output.
     pub fn svg(&self) -> String {
         let reasons = self.layers.iter().flat_map(|l| &l.rows).filter_map(|r| r.reasons);
         let decades = Decades::around(reasons.clone().flat_map(|r| [r.energy, r.removal]));

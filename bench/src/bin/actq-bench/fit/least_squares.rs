@@ -6,8 +6,8 @@ use actq_kernels::pace::cost::{Cost, Feature};
 
 use super::{Rates, Sample};
 
-/// The rates, none of them negative, with the least sum of squared relative errors (Lawson and Hanson, Solving Least Squares
-/// Problems, 1974, chapter 23, on the normal equations).
+/// The rates, none of them negative, with the least sum of squared relative errors (Lawson and Hanson, Solving Least
+/// Squares Problems, 1974, chapter 23, on the normal equations).
 pub(super) fn solve(samples: &[&Sample], of: impl Fn(Cost) -> u64) -> Rates {
     let mut features: Vec<Feature> = samples.iter().flat_map(|s| s.features.keys().copied()).collect();
     features.sort();
