@@ -172,6 +172,14 @@ pub fn heldout_from(policy_dir: Option<&Path>, file: Option<&Path>, image: &Imag
     let mut dataset = Recording::Heldout.require(policy_dir, file, Sizes::of_image(image), "actq eval")?;
     if dataset.action.is_none() {
         let source = policy_dir.and_then(|dir| Policy::load(dir).ok()).filter(|p| p.digest == image.digest());
+        fill_actions(&mut dataset, source.as_ref())?;
+    }
+    Ok(dataset)
+}
+
+/// Puts the actions of `source`, the policy that the image was made from, where a recording has none.
+pub(super) fn fill_actions(dataset: &mut Dataset, source: Option<&Policy>) -> Result<()> {
+    if dataset.action.is_none() {
         let source = source.with_context(|| {
             format!(
                 "{}: array \"action\" is missing, and so is the policy that the image was made from, which could give it: \
@@ -181,7 +189,7 @@ pub fn heldout_from(policy_dir: Option<&Path>, file: Option<&Path>, image: &Imag
         })?;
         dataset.fill_actions(&source.graph);
     }
-    Ok(dataset)
+    Ok(())
 }
 
 #[derive(Clone, Default)]
