@@ -74,6 +74,10 @@ impl Ensemble {
 
 impl Playback {
     /// That chunks of `chunk` actions, of which `execute` are executed, can be played so.
+    ///
+    /// # Errors
+    ///
+    /// What cannot be, by its key in policy.json, with the values that can.
     pub fn check(&self, chunk: usize, execute: usize) -> Result<()> {
         if let Some(ensemble) = self.ensemble {
             let Ensemble { horizon, m } = ensemble;
@@ -120,6 +124,10 @@ impl ActionContract {
     }
 
     /// That each array has one finite value per action dimension, and that the limits can be kept.
+    ///
+    /// # Errors
+    ///
+    /// The array that does not fit, by its key in policy.json.
     pub fn check(&self, act_len: usize) -> Result<()> {
         for (name, array) in self.arrays() {
             let Some(array) = array else { continue };

@@ -62,6 +62,10 @@ pub const BACKEND: Backend = if cfg!(actq_armv7em) { Backend::Armv7em } else { B
 ///
 /// The true sum fits an i32 where [`crate::image::worst_case`] says so, which [`crate::Image::new_checked`] has
 /// verified.
+///
+/// # Errors
+///
+/// [`Mismatch`] where block, vector and `acc` do not fit each other.
 #[inline(never)]
 pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i32]) -> Result<(), Mismatch> {
     integers::gemv(Product::new(block, x, first_row, acc)?);
@@ -70,6 +74,10 @@ pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i3
 
 impl Scale {
     /// The scale of `x` for integers in `-x_max ..= x_max`. `x_max` is 127 for int8 activations and at most 32767.
+    ///
+    /// # Errors
+    ///
+    /// Where a value of `x` is NaN or infinite.
     pub fn new(x: &[f32], x_max: u16) -> Result<Self, NotFinite> {
         Self::of_magnitude(integers::magnitude(x), x_max)
     }

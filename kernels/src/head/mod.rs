@@ -46,6 +46,10 @@ enum Phase {
 
 impl<'a, 's> Head<'a, 's> {
     /// Takes `scratch`, of at least [`Image::scratch_words`] words, which it zeroes.
+    ///
+    /// # Errors
+    ///
+    /// [`HeadError::ScratchTooSmall`] where it has fewer.
     pub fn new(image: Image<'a>, scratch: &'s mut [u32]) -> Result<Self, HeadError> {
         let (needed, given) = (image.scratch_words(), scratch.len());
         let arena = scratch.get_mut(..needed).ok_or(HeadError::ScratchTooSmall { needed, given })?;

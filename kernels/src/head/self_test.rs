@@ -6,6 +6,10 @@ use crate::ops::elementwise::copy_le;
 
 impl Head<'_, '_> {
     /// Plays the image's self-test vector from a reset and compares every action bit for bit; resets again at the end.
+    ///
+    /// # Errors
+    ///
+    /// [`StepError::SelfTest`] with the first step whose bits differ; [`StepError::Damaged`] and [`StepError::NotFinite`] as of a step.
     #[inline(never)]
     pub fn self_test(&mut self) -> Result<(), StepError> {
         let seed = core::mem::take(&mut self.seed);

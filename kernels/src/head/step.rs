@@ -17,6 +17,12 @@ impl Head<'_, '_> {
     /// It is [`Self::begin`] and one [`Self::poll`] without a limit. Each action is one control period; [`Self::pass`]
     /// counts those without.
     ///
+    /// # Errors
+    ///
+    /// [`StepError::ObservationLength`] and [`StepError::ObservationNotFinite`] for what is given;
+    /// [`StepError::NotFinite`] where a value inside the network leaves f32's range, [`StepError::Damaged`] where the
+    /// image's memory has changed since its check, [`StepError::Stale`] where the action is older than its deadline.
+    ///
     /// On an error the recurrent state and the chunk are reset, so that no part of a failed evaluation reaches a later
     /// action. The last action stays: the next one is limited by `max_step` as ever.
     #[inline(never)]
@@ -41,6 +47,10 @@ impl Head<'_, '_> {
 
     /// As [`Self::begin`], with the noise of an iterative head: [`crate::Image::noise_len`] values, the first iterate
     /// and behind it, where denoising steps add noise, that of each. Within a chunk it is not used.
+    ///
+    /// # Errors
+    ///
+    /// [`StepError::NoiseLength`], [`StepError::NoiseNotFinite`], and those of [`Self::step`].
     pub fn begin_with_noise(&mut self, observation: &[f32], noise: &[f32]) -> Result<(), StepError> {
         self.least_budget();
         self.take(observation, Some(noise))
@@ -104,11 +114,15 @@ impl Head<'_, '_> {
 
     /// The network's raw output for `observation` (`chunk * act_len` values), before the action contract. Advances the
     /// recurrent state, and drops what was left of a chunk or of a step that was begun.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Self::step`], but for [`StepError::Stale`]: nothing is played.
     pub fn infer(&mut self, observation: &[f32]) -> Result<&[f32], StepError> {
         self.infer_from(observation, None)
     }
 
-    /// As [`Self::infer`], with the noise of [`Self::begin_with_noise`].
+    /// As [`Self::infer`], with the noise of [`Self::begin_with_noise`] and the errors of both.
     pub fn infer_with_noise(&mut self, observation: &[f32], noise: &[f32]) -> Result<&[f32], StepError> {
         self.infer_from(observation, Some(noise))
     }

@@ -22,6 +22,10 @@ impl<'a> Image<'a> {
     ///
     /// Checks the checksum, every section, every operation, all constants, and that no row can overflow its int32
     /// accumulator for any activations. Time is linear in the image's length.
+    ///
+    /// # Errors
+    ///
+    /// The first thing that is found wrong; `docs/FORMAT.md` lists all checks.
     #[inline(never)]
     pub fn new_checked(bytes: &'a [u8]) -> Result<Self, ImageError> {
         if bytes.as_ptr().align_offset(4) != 0 {

@@ -157,6 +157,10 @@ pub struct Header {
 
 impl Header {
     /// The header's words, without length and checksum ([`seal`](super::crc::seal)).
+    ///
+    /// # Errors
+    ///
+    /// [`TooLarge`] where a size has no room in its field.
     pub fn emit(&self) -> Result<[u32; WORDS], TooLarge> {
         let mut words = [0; WORDS];
         words[0] = MAGIC;

@@ -44,6 +44,10 @@ impl MatrixRecord {
     }
 
     /// The record's words.
+    ///
+    /// # Errors
+    ///
+    /// [`TooLarge`] where a size has no room in its field.
     pub fn emit(&self) -> Result<[u32; MATRIX_WORDS], TooLarge> {
         let Self { rows, cols, group, x_max, blocks } = *self;
         Ok([halves(rows, cols)?, halves(group, x_max.into())?, halves(blocks.count, 0)?, blocks.offset])
@@ -80,6 +84,10 @@ impl BlockRecord {
     }
 
     /// The record's words.
+    ///
+    /// # Errors
+    ///
+    /// [`TooLarge`] where a size has no room in its field.
     pub fn emit(&self) -> Result<[u32; BLOCK_WORDS], TooLarge> {
         let head = self.width.bits() | u32::from(self.lanes.code()) << 8;
         Ok([halves(head as usize, self.rows)?, self.weights, self.scales, self.steps])

@@ -188,6 +188,10 @@ pub struct OpRecord {
 
 impl OpRecord {
     /// The record's words, which [`Image::ops`] reads.
+    ///
+    /// # Errors
+    ///
+    /// [`TooLarge`] where a size has no room in its field.
     pub fn emit(&self) -> Result<[u32; OP_WORDS], TooLarge> {
         let code = self.kind.form().map_or(0, |form| form.code);
         let detail = match self.kind {

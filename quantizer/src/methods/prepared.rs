@@ -53,6 +53,10 @@ impl<'a> PreparedMethod<'a> {
 
     /// As [`Self::new`], before learning of at most so many `minutes`: the statistics of an iterative head are taken of
     /// so many frames that they take a share of it. They then depend on the machine, as learning by the clock does.
+    ///
+    /// # Errors
+    ///
+    /// Where a method that needs a recording has none, or too short a one, and where one of actquant holds no actions.
     pub fn before(
         graph: &'a Graph,
         method: Method,
