@@ -14,7 +14,7 @@ mod scale;
 
 pub use crate::error::NotFinite;
 pub(crate) use plan::Extent;
-pub use plan::{Plan, Told, max_prepared_words};
+pub use plan::{KernelArguments, Plan, max_prepared_words};
 pub(crate) use prepared::lay_out;
 pub use prepared::{Prepared, prepare};
 pub use scale::{Scale, TINY};

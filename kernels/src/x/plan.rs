@@ -2,8 +2,8 @@
 
 use crate::layout::{Block, BlockShape, Lanes, Layout, PAD_COLS, PAIRED_GROUP, div_down, div_up, round_up};
 
-/// How a vector is prepared for blocks of a shape, and what their kernels are told of it. Groups and chunks are whole:
-/// zeros fill them.
+/// How a vector is prepared for blocks of a shape, and what their kernels are given with it. Groups and chunks are
+/// whole: zeros fill them.
 #[derive(Clone, Copy, Debug)]
 pub struct Plan {
     /// The shape; its rows do not matter.
@@ -19,12 +19,13 @@ pub struct Plan {
     pub(crate) first: usize,
     /// Words of the prepared vector.
     pub(super) words: usize,
-    told: Told,
+    arguments: KernelArguments,
 }
 
-/// What a kernel in assembler is told of a vector. Kept with the plan, because it takes longer to find than a call may.
+/// The arguments of a kernel in assembler that depend on the vector's lengths. Kept with the plan, because it takes
+/// longer to find than a call may.
 #[derive(Clone, Copy, Debug)]
-pub struct Told {
+pub struct KernelArguments {
     /// The words up to where it stops reading. Single lanes read no more than the block's own units; with row scales,
     /// the vector's sum stands behind the end, and behind a last group without a partner the pair's word.
     pub end: usize,
@@ -75,7 +76,7 @@ impl Plan {
             chunks,
             first,
             words,
-            told: Told {
+            arguments: KernelArguments {
                 end: words - (padded - read) / 2 - (format.sum && shape.group == 0) as usize,
                 extra: match shape.lanes {
                     _ if format.sum => 0usize.wrapping_sub(chunks * format.starts[0].bias as usize),
@@ -106,10 +107,10 @@ impl Plan {
         if len == self.padded { self.words } else { self.words + self.padded / 2 }
     }
 
-    /// What a kernel in assembler is told.
+    /// What a kernel in assembler is given with the vector.
     #[inline(always)]
-    pub const fn told(&self) -> Told {
-        self.told
+    pub const fn arguments(&self) -> KernelArguments {
+        self.arguments
     }
 
     /// Columns of a group.

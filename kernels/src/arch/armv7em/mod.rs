@@ -29,7 +29,7 @@ pub fn gemv(Product { block, x, first_row, acc }: Product<'_>) {
     let strips = acc.len() >> strip_log;
     let rows = strips << strip_log;
     let rest = acc.len() - rows;
-    let told = x.plan().told();
+    let arguments = x.plan().arguments();
     // SAFETY: the rows from `first_row` on, as many as `acc` has, are rows of the block or of its padding: that is what
     // `Product::new` checks, as is that `first_row` is a multiple of 8, so that a strip begins there. A block has the
     // words of all of its rows (`Block::leading`). Each call reads the words of its strips and writes as many sums. It
@@ -39,13 +39,13 @@ pub fn gemv(Product { block, x, first_row, acc }: Product<'_>) {
     unsafe {
         let weights = block.words().as_ptr().add(first_row / QUAD * block.quad_words());
         let (x, acc) = (x.words().as_ptr(), acc.as_mut_ptr());
-        let end = x.add(told.end);
+        let end = x.add(arguments.end);
         if strips > 0 {
-            kernel(weights, x, acc, strips, end, told.extra, told.skip);
+            kernel(weights, x, acc, strips, end, arguments.extra, arguments.skip);
         }
         if rest > 0 {
             let weights = weights.add(rows / QUAD * block.quad_words());
-            four(weights, x, acc.add(rows), 1, end, told.extra, told.skip);
+            four(weights, x, acc.add(rows), 1, end, arguments.extra, arguments.skip);
         }
     }
 }
