@@ -14,7 +14,7 @@ use actq::methods::{Method, Options, quantize};
 use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
 use actq_bench::golden::Random;
-use actq_kernels::image::{Kind, header as h, op};
+use actq_kernels::image::{header as h, op};
 use actq_kernels::layout::Width;
 use actq_kernels::{Image, ImageError as E};
 
@@ -381,19 +381,8 @@ fn a_matrix_is_checked_once_however_many_operations_share_it() {
         let options = Options { group: 32, ..Options::new(Method::Rtn, Budget::Width(Width::W8)) };
         let (_, outcomes) =
             quantize(&graph, None, Rate::Width(Width::W8), &options).expect("the graph can be quantized");
-        let policy = Policy {
-            dir: ".".into(),
-            name: "shared".into(),
-            kind: Kind::Step,
-            chunk: 1,
-            execute: 1,
-            act_len: N,
-            rate_hz: 50.0,
-            contract: ActionContract { scale: Some(vec![1e-30; N]), ..ActionContract::default() },
-            weights: graph.weights(),
-            graph,
-            digest: [0; 32],
-        };
+        let contract = ActionContract { scale: Some(vec![1e-30; N]), ..ActionContract::default() };
+        let policy = Policy { contract, ..Policy::of("shared", graph) };
         let bytes = actq::emit::image(&policy, &outcomes).expect("the policy fits the format");
         let buffer = ImageBuffer::new(&bytes);
         let start = Instant::now();

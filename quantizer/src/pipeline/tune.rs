@@ -80,6 +80,11 @@ impl Tuned {
 /// Learns once from the f32 policy's recordings, then `rounds` times from those and from all that was driven before.
 /// `drive` gets each image, counted from 0, and gives what the image was shown. `progress` gets what is being done and
 /// the share of it that is done.
+///
+/// # Errors
+///
+/// Without a recording to learn from; where a recording cannot be learned from or measured on; those of `drive`, with the
+/// round.
 pub fn run(
     plan: TunePlan<'_>,
     mut drive: impl FnMut(usize, &[u8]) -> Result<Driven>,
@@ -143,27 +148,12 @@ mod tests {
 
     use super::*;
     use crate::budget::Budget;
-    use crate::contract::ActionContract;
     use crate::methods::Method;
     use crate::methods::actquant::testing::{dataset, lstm};
     use crate::random::Random;
-    use actq_kernels::image::Kind;
 
     fn policy() -> Policy {
-        let graph = lstm();
-        Policy {
-            dir: "policy".into(),
-            name: "tiny".into(),
-            kind: Kind::Step,
-            chunk: 1,
-            execute: 1,
-            act_len: 2,
-            rate_hz: 50.0,
-            contract: ActionContract::default(),
-            weights: graph.weights(),
-            graph,
-            digest: [7; 32],
-        }
+        Policy { dir: "policy".into(), digest: [7; 32], ..Policy::of("tiny", lstm()) }
     }
 
     fn said(success: f64) -> DriveOutcome {

@@ -9,6 +9,7 @@ use actq::graph::{Graph, NodeKind, WeightMatrix};
 use actq::methods::{Method, Options, Outcome, quantize};
 use actq::policy::Policy;
 use actq_bench::golden::Random;
+use actq_bench::networks::replace_row;
 use actq_kernels::image::{Kind, checksum, header as h, op};
 use actq_kernels::layout::Width;
 use actq_kernels::math::Function;
@@ -47,13 +48,10 @@ fn valid_image() -> Vec<u8> {
     let [w2, w3, w4, w8] = Width::ALL.map(at_width);
     let matrices = [w4[0].clone(), w3[1].clone(), w2[2].clone(), interleaved(&w2[3], &w8[3])];
     let policy = Policy {
-        dir: ".".into(),
-        name: "malformed".into(),
         kind: Kind::Chunk,
         chunk: CHUNK,
         execute: CHUNK,
         act_len: ACT,
-        rate_hz: 50.0,
         contract: ActionContract {
             scale: Some(vec![0.5; ACT]),
             offset: Some(vec![0.1; ACT]),
@@ -62,24 +60,18 @@ fn valid_image() -> Vec<u8> {
             max_step: Some(vec![0.25; ACT]),
             ..ActionContract::default()
         },
-        weights: graph.weights(),
-        graph,
         digest: [7; 32],
+        ..Policy::of("malformed", graph)
     };
     actq::emit::image(&policy, &matrices).expect("the policy fits the format")
 }
 
 /// Even rows of `a`, odd rows of `b`, for activations beyond int8, so that they are packed in single lanes.
 fn interleaved(a: &Outcome, b: &Outcome) -> Outcome {
-    let (mut out, other) = (a.clone(), &b.quantized);
+    let mut out = a.clone();
     out.x_max = 255;
-    let mixed = &mut out.quantized;
-    let (cols, groups) = (mixed.cols, mixed.groups());
-    for row in (1..mixed.rows).step_by(2) {
-        mixed.widths[row] = other.widths[row];
-        mixed.scales[row] = other.scales[row];
-        mixed.codes[row * cols..][..cols].copy_from_slice(&other.codes[row * cols..][..cols]);
-        mixed.group_scales[row * groups..][..groups].copy_from_slice(&other.group_scales[row * groups..][..groups]);
+    for row in (1..out.quantized.rows).step_by(2) {
+        replace_row(&mut out.quantized, row, &b.quantized);
     }
     out
 }
