@@ -1,4 +1,5 @@
-//! Takes the Rust examples out of README.md, for rustdoc to test: it would take the terminal's text there for Rust as well.
+//! Takes the Rust examples out of README.md, for rustdoc to test: it would take the terminal's text there for Rust as
+//! well.
 
 use std::path::PathBuf;
 use std::{env, fs, io};

@@ -1,7 +1,7 @@
-//! Says which backends the target has; `src/arch/mod.rs` chooses. Stable rustc shows no `target_feature = "dsp"`, so the target's name
-//! decides, and for Armv8-M, where the extension is an option, the processor that the build names (`-C target-cpu=cortex-m33`).
-//! `actq_kernels::arch::BACKEND` says which backend was compiled in. The environment variable `ACTQ_BACKEND=portable` leaves the
-//! assembler out: to compare, or where assembler is not wanted.
+//! Says which backends the target has; `src/arch/mod.rs` chooses. Stable rustc shows no `target_feature = "dsp"`, so
+//! the target's name decides, and for Armv8-M, where the extension is an option, the processor that the build names
+//! (`-C target-cpu=cortex-m33`). `actq_kernels::arch::BACKEND` says which backend was compiled in. The environment
+//! variable `ACTQ_BACKEND=portable` leaves the assembler out: to compare, or where assembler is not wanted.
 
 /// Processors of Armv8-M whose DSP extension LLVM takes for granted.
 const WITH_DSP: [&str; 5] = ["cortex-m33", "cortex-m35p", "cortex-m52", "cortex-m55", "cortex-m85"];

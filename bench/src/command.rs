@@ -9,8 +9,8 @@ use anyhow::{Context, Result, ensure};
 
 use crate::firmware::cargo_build;
 
-/// The command `actq`; built once, since cargo does not build the binaries of a dependency, in the profile of this build and
-/// beside it.
+/// The command `actq`; built once, since cargo does not build the binaries of a dependency, in the profile of this
+/// build and beside it.
 pub fn binary() -> Result<&'static Path> {
     static BINARY: OnceLock<PathBuf> = OnceLock::new();
     if let Some(path) = BINARY.get() {
@@ -22,7 +22,8 @@ pub fn binary() -> Result<&'static Path> {
     let folder = if folder.ends_with("deps") { folder.parent().unwrap_or(folder) } else { folder };
     let profile = folder.file_name().and_then(|name| name.to_str()).context("a profile's name is text")?;
     let profile = if profile == "debug" { "dev" } else { profile };
-    // With this package, for the features that the tests were built with: else cargo would build the quantizer once more.
+    // With this package, for the features that the tests were built with: else cargo would build the quantizer once
+    // more.
     let packages = ["--package", "actq", "--package", env!("CARGO_PKG_NAME")];
     let command = [&packages[..], &["--bin", "actq", "--profile", profile]].concat();
     cargo_build("actq", &command, &[])?;

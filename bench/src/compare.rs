@@ -1,6 +1,7 @@
 //! The comparison: every method at every budget on every policy, each image in its own task.
 //!
-//! One thread quantizes, as learning uses all cores; another drives what was made before, and appends it to the journal.
+//! One thread quantizes, as learning uses all cores; another drives what was made before, and appends it to the
+//! journal.
 
 mod actquant_k;
 mod cell;

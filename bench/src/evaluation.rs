@@ -11,8 +11,9 @@ use crate::qemu::{self, Counter, Region, Server};
 /// Evaluations before the one that is counted, so that recurrent state is none that a reset leaves.
 const WARM_UP: usize = 4;
 
-/// Serves `observations` from a reset with the harness at `elf` on a target's board under QEMU, with the image file at `slot` in the slot or
-/// the built-in image; counts one step that evaluates the network, of a chunked head one that begins a chunk.
+/// Serves `observations` from a reset with the harness at `elf` on a target's board under QEMU, with the image file at
+/// `slot` in the slot or the built-in image; counts one step that evaluates the network, of a chunked head one that
+/// begins a chunk.
 pub fn count(
     counter: &Counter,
     target: Target,

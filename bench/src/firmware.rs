@@ -46,8 +46,8 @@ const STYLES: &str = "actq-firmware-styles";
 /// Its binaries: a head in one's own firmware, each in another style.
 pub const STYLE_NAMES: [&str; 3] = ["bare", "rtic", "embassy"];
 
-/// The folders of the ELF files that this process has built, by what they are and target. Even where nothing is to be built, cargo takes
-/// a while to find out.
+/// The folders of the ELF files that this process has built, by what they are and target. Even where nothing is to be
+/// built, cargo takes a while to find out.
 static BUILT: Mutex<BTreeMap<(&str, Target), PathBuf>> = Mutex::new(BTreeMap::new());
 
 /// Builds something once.
@@ -62,8 +62,8 @@ fn once(what: &'static str, target: Target, build: impl FnOnce() -> Result<PathB
     Ok(folder)
 }
 
-/// Builds the harness, which serves an image through semihosting, with an image built in that is the same in all runs, and gives the
-/// path of the ELF file. Other images are run from the slot.
+/// Builds the harness, which serves an image through semihosting, with an image built in that is the same in all runs,
+/// and gives the path of the ELF file. Other images are run from the slot.
 pub fn harness(target: Target) -> Result<PathBuf> {
     let build = || harness_in_folder(target, built_in()?);
     Ok(once(HARNESS, target, build)?.join(HARNESS))
@@ -80,8 +80,8 @@ fn harness_in_folder(target: Target, image: &Path) -> Result<PathBuf> {
     build(BENCH, &[HARNESS], target.feature().unwrap_or_default(), &target_dir(), target, target.profile(), &[image])
 }
 
-/// Builds the application for a target's board, with the image of [`harness`] and with more features, separated by commas, and gives the
-/// path of the ELF file.
+/// Builds the application for a target's board, with the image of [`harness`] and with more features, separated by
+/// commas, and gives the path of the ELF file.
 pub fn controller(target: Target, features: &'static str) -> Result<PathBuf> {
     controller_of_key(target, features, "")
 }
@@ -106,8 +106,8 @@ fn controller_in_folder(target: Target, features: &str, key: &str, image: &Path)
     build(APPLICATION, &[CONTROLLER], &all, &target_dir(), target, target.profile(), &environment)
 }
 
-/// Builds the programs of `firmware-styles` for the board that they are written for, with the image of [`harness`], and gives the path of
-/// one's ELF file.
+/// Builds the programs of `firmware-styles` for the board that they are written for, with the image of [`harness`], and
+/// gives the path of one's ELF file.
 pub fn style(name: &str) -> Result<PathBuf> {
     let target = Target::Fpu;
     let build = || {
@@ -143,8 +143,8 @@ pub fn portable_binary(name: &str, target: Target) -> Result<PathBuf> {
     Ok(build(BENCH, &[name], features, &folder, target, "release", &[("ACTQ_BACKEND", "portable")])?.join(name))
 }
 
-/// Builds binaries of a package and gives the folder of their ELF files: a folder of the board and its features, because cargo
-/// gives the files of all boards of a triple the same names.
+/// Builds binaries of a package and gives the folder of their ELF files: a folder of the board and its features,
+/// because cargo gives the files of all boards of a triple the same names.
 fn build(
     package: &str,
     binaries: &[&str],

@@ -1,7 +1,8 @@
 //! Kernel cases with their expected sums, as one stream of little-endian words that the host and the firmware read.
 //!
-//! A case: width, lanes, rows, cols, group, start (words of padding to put before weights and activations, 0 to 3), then the
-//! packed words, the prepared activations, and the sums with those of padding rows. The stream ends with a width of 0.
+//! A case: width, lanes, rows, cols, group, start (words of padding to put before weights and activations, 0 to 3),
+//! then the packed words, the prepared activations, and the sums with those of padding rows. The stream ends with a
+//! width of 0.
 
 pub use actq::random::Random;
 use actq_kernels::layout::{Block, BlockShape, Lanes, Width, pack};
@@ -16,7 +17,8 @@ pub enum Draw {
     Ends,
     /// Every product at its largest and of one sign: the worst case of the accumulators.
     Worst,
-    /// All activations equal, each row's weights at one end of their range: the longest way of one lane and not of another.
+    /// All activations equal, each row's weights at one end of their range: the longest way of one lane and not of
+    /// another.
     Aligned,
 }
 
@@ -127,8 +129,8 @@ impl Case {
     }
 }
 
-/// All layouts and groups over all lengths from 1 to 67 and larger ones, with 1 to 17 rows, random and extreme values, and
-/// activations up to the layout's limit.
+/// All layouts and groups over all lengths from 1 to 67 and larger ones, with 1 to 17 rows, random and extreme values,
+/// and activations up to the layout's limit.
 pub fn cases(seed: u64) -> Vec<Case> {
     let mut random = Random::new(seed);
     let mut cases = Vec::new();

@@ -1,9 +1,10 @@
 //! llama.cpp's K-quants, simulated: what a matrix becomes in them, at their true bits.
 //!
-//! Only the weights that codes and scales stand for are made here, not the bytes in llama.cpp's order. A super-block is 256 weights of
-//! a row, in sub-blocks of 16 or 32; a weight is `d * scale * code - d_min * min`, d and d_min being f16, scale and min small integers
-//! of the sub-block. Scales and mins are fitted by least squares, every weight weighed by its importance: candidates for the clipping
-//! point, then the neighbours of the rounded scales, then d and d_min for the codes that were found.
+//! Only the weights that codes and scales stand for are made here, not the bytes in llama.cpp's order. A super-block is
+//! 256 weights of a row, in sub-blocks of 16 or 32; a weight is `d * scale * code - d_min * min`, d and d_min being
+//! f16, scale and min small integers of the sub-block. Scales and mins are fitted by least squares, every weight
+//! weighed by its importance: candidates for the clipping point, then the neighbours of the rounded scales, then d and
+//! d_min for the codes that were found.
 
 mod fit;
 
@@ -82,7 +83,8 @@ impl Format {
         f64::from(bits) + f64::from(scales) / SUPER_BLOCK as f64
     }
 
-    /// Bytes of so many weights. Where rows do not fill super-blocks, llama.cpp would pad them; here the padding is not counted.
+    /// Bytes of so many weights. Where rows do not fill super-blocks, llama.cpp would pad them; here the padding is not
+    /// counted.
     pub fn bytes(self, weights: usize) -> usize {
         (self.bits_per_weight() * weights as f64 / 8.0).ceil() as usize
     }
@@ -146,7 +148,8 @@ impl Block {
         block
     }
 
-    /// For every sub-block the scale and min next to the present ones, and their codes, that are nearest to the weights.
+    /// For every sub-block the scale and min next to the present ones, and their codes, that are nearest to the
+    /// weights.
     fn choose_integers(&mut self, weights: &[f32], importance: &[f64]) {
         let (low, high) = self.layout.scales();
         let size = self.layout.sub_block;

@@ -1,5 +1,6 @@
-//! What the tests and the measuring commands share: the firmware, built and under QEMU, counted instructions and modelled cycles,
-//! the most stack of the application, golden kernel cases, drawn networks, the command `actq`, closed loops, the comparison of methods, llama.cpp's K-quants.
+//! What the tests and the measuring commands share: the firmware, built and under QEMU, counted instructions and
+//! modelled cycles, the most stack of the application, golden kernel cases, drawn networks, the command `actq`, closed
+//! loops, the comparison of methods, llama.cpp's K-quants.
 #![forbid(unsafe_code)]
 
 pub mod closed_loop;
@@ -10,6 +11,7 @@ pub mod cycles;
 pub mod evaluation;
 pub mod firmware;
 pub mod golden;
+pub mod instruction;
 pub mod kquants;
 pub mod networks;
 pub mod profile;

@@ -1,17 +1,17 @@
 //! Networks of drawn weights, for measurements and properties.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use actq::contract::ActionContract;
 use actq::graph::ops::{Concat, Linear, Span};
 use actq::graph::{Graph, NodeKind, ValueId, WeightMatrix};
 use actq::methods::scale::round_to_nearest;
-use actq::methods::{Activations, Outcome};
+use actq::methods::{Activations, Outcome, Quantized};
 use actq::policy::Policy;
 use actq::random::Random;
 use actq::runtime::{ImageBuffer, with_head};
 use actq_kernels::Width;
-use actq_kernels::image::{Kind, header as h, op, seal};
+use actq_kernels::image::{header as h, op, seal};
 use anyhow::{Context, Result, ensure};
 
 /// A network under construction: parts of the observation go through one operation each.
@@ -63,11 +63,7 @@ impl Builder {
         for &width in &used[1..] {
             let other = round_to_nearest(&matrix, width, group);
             for (row, _) in widths.iter().enumerate().filter(|(_, w)| **w == Some(width)) {
-                quantized.scales[row] = other.scales[row];
-                quantized.codes[row * cols..][..cols].copy_from_slice(&other.codes[row * cols..][..cols]);
-                let groups = quantized.groups();
-                quantized.group_scales[row * groups..][..groups]
-                    .copy_from_slice(&other.group_scales[row * groups..][..groups]);
+                replace_row(&mut quantized, row, &other);
             }
         }
         self.outcomes.push(Outcome::new(&matrix, quantized, None, activations)?);
@@ -95,12 +91,6 @@ impl Builder {
         let act_len = self.graph.len_of(self.graph.output());
         let array = |value: f32| contract.then(|| vec![value; act_len]);
         let policy = Policy {
-            dir: PathBuf::new(),
-            name,
-            kind: Kind::Step,
-            chunk: 1,
-            execute: 1,
-            act_len,
             rate_hz: 100.0,
             contract: ActionContract {
                 scale: array(0.5),
@@ -110,9 +100,7 @@ impl Builder {
                 max_step: array(0.25),
                 ..ActionContract::default()
             },
-            weights: self.graph.weights(),
-            graph: self.graph,
-            digest: [0; 32],
+            ..Policy::of(&name, self.graph)
         };
         (policy, self.outcomes)
     }
@@ -124,8 +112,17 @@ impl Builder {
     }
 }
 
-/// The image with every linear operation that has biases, and whose output holds something before it, made to accumulate: the
-/// format has such operations, and no graph lowers to one.
+/// Makes a row what it is in `other`, a matrix of the same size and groups.
+pub fn replace_row(matrix: &mut Quantized, row: usize, other: &Quantized) {
+    let (cols, groups) = (matrix.cols, matrix.groups());
+    matrix.widths[row] = other.widths[row];
+    matrix.scales[row] = other.scales[row];
+    matrix.codes[row * cols..][..cols].copy_from_slice(&other.codes[row * cols..][..cols]);
+    matrix.group_scales[row * groups..][..groups].copy_from_slice(&other.group_scales[row * groups..][..groups]);
+}
+
+/// The image with every linear operation that has biases, and whose output holds something before it, made to
+/// accumulate: the format has such operations, and no graph lowers to one.
 pub fn accumulating(bytes: &[u8]) -> Result<Vec<u8>> {
     let name = Path::new("accumulating");
     let mut bytes = bytes.to_vec();

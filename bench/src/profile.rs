@@ -9,8 +9,8 @@ use anyhow::{Result, bail, ensure};
 use crate::cycles::Code;
 use crate::qemu::{self, Counter, Server};
 
-/// Runs an image from the slot on observations, after one reset, and gives the cost of every counted region, and the actions.
-/// `arguments` are those of the firmware.
+/// Runs an image from the slot on observations, after one reset, and gives the cost of every counted region, and the
+/// actions. `arguments` are those of the firmware.
 pub fn regions(
     elf: &Path,
     counter: &Counter,
@@ -50,8 +50,8 @@ pub struct Parts {
     pub action: Cost,
 }
 
-/// The cost of every part of every step of an image that evaluates its network at each, in polls of one operation with `budget`
-/// instructions.
+/// The cost of every part of every step of an image that evaluates its network at each, in polls of one operation with
+/// `budget` instructions.
 pub fn parts(
     elf: &Path,
     counter: &Counter,

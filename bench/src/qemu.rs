@@ -181,7 +181,8 @@ pub struct Region {
     pub data_lines: u64,
     /// Lines of code fetched from flash after a jump into a cache of 64 lines of 16 bytes, empty at first.
     pub code_lines: u64,
-    /// Lines of code fetched into it behind the line before, by how many instructions, from one on, were executed there.
+    /// Lines of code fetched into it behind the line before, by how many instructions, from one on, were executed
+    /// there.
     pub next_lines: Vec<u64>,
     /// Each instruction that was executed, by address.
     pub executed: Vec<Executed>,
@@ -198,8 +199,8 @@ pub struct Executed {
     pub jumps: u64,
 }
 
-/// The plugin API of the installed QEMU: 1 up to 9.0, 2 from 9.1 on (QEMU's docs/devel/tcg-plugins). The emulators of all targets
-/// are taken to be of one release; QEMU refuses a plugin of another API.
+/// The plugin API of the installed QEMU: 1 up to 9.0, 2 from 9.1 on (QEMU's docs/devel/tcg-plugins). The emulators of
+/// all targets are taken to be of one release; QEMU refuses a plugin of another API.
 fn plugin_api() -> Result<u32> {
     let emulator = Target::Fpu.board().emulator;
     let version = version(emulator).with_context(|| format!("{emulator} is not installed"))?;

@@ -5,8 +5,9 @@ use std::io::{Write as _, stderr};
 use std::panic::Location;
 use std::path::PathBuf;
 
-/// The folder of shared policies, where `ACTQ_SHARED` names it. Where it does not, what would run on them is skipped, which is
-/// said on standard error, past the capture of tests, and in the file that `ACTQ_SKIPPED` names, for `cargo verify` to count.
+/// The folder of shared policies, where `ACTQ_SHARED` names it. Where it does not, what would run on them is skipped,
+/// which is said on standard error, past the capture of tests, and in the file that `ACTQ_SKIPPED` names, for
+/// `cargo verify` to count.
 #[track_caller]
 pub fn shared_policies() -> Option<PathBuf> {
     match std::env::var_os("ACTQ_SHARED") {

@@ -1,13 +1,15 @@
-//! The most stack that the application can take, from the ELF file alone: its functions' frames, read from their instructions, along the
-//! deepest way through their calls, with everything that may interrupt it on top.
+//! The most stack that the application can take, from the ELF file alone: its functions' frames, read from their
+//! instructions, along the deepest way through their calls, with everything that may interrupt it on top.
 //!
-//! What is not understood is an error, not a guess: an instruction that changes the stack pointer in another way than by a constant, ways
-//! that come to an instruction with different depths, code that no way leads to, a function that calls itself, by a pointer, too. A call
-//! by a pointer may reach every function whose address is taken anywhere. The frames of the functions in assembler are read as all others.
+//! What is not understood is an error, not a guess: an instruction that changes the stack pointer in another way than
+//! by a constant, ways that come to an instruction with different depths, code that no way leads to, a function that
+//! calls itself, by a pointer, too. A call by a pointer may reach every function whose address is taken anywhere. The
+//! frames of the functions in assembler are read as all others.
 //!
-//! An exception may come at any instruction of what has a lower priority. The processor stacks 8 words, or 26 where floats are in use,
-//! and one more to align them (Arm DDI 0403E, section B1.5.6; no board here stacks the FPU's upper half, as FPCCR.TS asks for). So
-//! the worst case is the deepest way of the program and, for every priority, that of its deepest handler, each with such a frame.
+//! An exception may come at any instruction of what has a lower priority. The processor stacks 8 words, or 26 where
+//! floats are in use, and one more to align them (Arm DDI 0403E, section B1.5.6; no board here stacks the FPU's upper
+//! half, as FPCCR.TS asks for). So the worst case is the deepest way of the program and, for every priority, that of
+//! its deepest handler, each with such a frame.
 
 mod depth;
 mod flow;

@@ -1,7 +1,8 @@
 //! What the three programs have in the place of an application: an image, sensors, motors, a timer.
 //!
-//! The sensors show the first observation of the image's self-test, and the motors write the first action that they get to the host of
-//! QEMU, with the number of control ticks that the head has taken for it: `host-tests/tests/all/styles.rs` compares.
+//! The sensors show the first observation of the image's self-test, and the motors write the first action that they get
+//! to the host of QEMU, with the number of control ticks that the head has taken for it:
+//! `host-tests/tests/all/styles.rs` compares.
 #![cfg_attr(target_os = "none", no_std)]
 
 #[cfg(target_os = "none")]

@@ -1,4 +1,5 @@
-//! Bytes on the link, and payloads in frames whose checksum is right: each gives a message or none, and a message can be sent on.
+//! Bytes on the link, and payloads in frames whose checksum is right: each gives a message or none, and a message can
+//! be sent on.
 #![no_main]
 
 use actq_link::frame::{CRC, VERSION, wire_bytes};

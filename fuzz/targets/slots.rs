@@ -1,5 +1,5 @@
-//! A flash that holds anything gives an image to run or none, and takes what is said about it. The records' checksums are right where
-//! the first byte is odd.
+//! A flash that holds anything gives an image to run or none, and takes what is said about it. The records' checksums
+//! are right where the first byte is odd.
 #![no_main]
 
 use actq_boards::ram::Ram;

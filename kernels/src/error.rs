@@ -1,5 +1,5 @@
-//! The errors of parsing, of construction and of a step. Their numbers are for what cannot take an enum: C, a frame of a few bytes, a
-//! register that survives a reset. 0 is no error.
+//! The errors of parsing, of construction and of a step. Their numbers are for what cannot take an enum: C, a frame of
+//! a few bytes, a register that survives a reset. 0 is no error.
 
 use core::fmt;
 
@@ -70,8 +70,8 @@ image_errors! {
     Chunk = 10, "chunk and execute lengths do not fit";
     /// A section lies outside the image, shares words with another, or does not stand in its place in their order.
     Section = 11, "a section lies outside the image, or overlaps or precedes one that stands before it";
-    /// The scratch memory is not state, observation, what operations write, action and work area, one behind the other, in at
-    /// most 65535 words; or the work area is too short.
+    /// The scratch memory is not state, observation, what operations write, action and work area, one behind the other,
+    /// in at most 65535 words; or the work area is too short.
     Arena = 12, "the scratch memory's regions do not follow each other, or the work area is too short";
     /// Regions of an operation overlap.
     Overlap = 13, "regions of an operation overlap";
@@ -103,8 +103,9 @@ image_errors! {
     SelfTest = 26, "the self-test vector has no steps";
     /// Denoising steps without operations or of a policy that has none, or noise where none is.
     Denoising = 27, "denoising steps, their operations and their noise do not fit";
-    /// Playback averages more chunks than there are actions in one, or of chunks of which several actions are executed; leads over
-    /// by more actions than the chunk before has left, or in an average; or has a deadline before the last action that is executed.
+    /// Playback averages more chunks than there are actions in one, or of chunks of which several actions are executed;
+    /// leads over by more actions than the chunk before has left, or in an average; or has a deadline before the last
+    /// action that is executed.
     Playback = 28, "horizon, overlap, deadline, chunk and execute lengths do not fit";
     /// Some of the arrays that binarise are missing, or an upper threshold is below its lower one.
     Binarise = 29, "an action is binarised without all four arrays, or by thresholds that are reversed";
@@ -207,8 +208,8 @@ impl fmt::Display for SavedError {
 
 impl core::error::Error for SavedError {}
 
-/// Why a step gave no action. The recurrent state and the chunk are as after a reset; the last action stays, so that the step
-/// limit holds across the error. [`StepError::Budget`] and [`StepError::NotBegun`] change nothing.
+/// Why a step gave no action. The recurrent state and the chunk are as after a reset; the last action stays, so that
+/// the step limit holds across the error. [`StepError::Budget`] and [`StepError::NotBegun`] change nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]

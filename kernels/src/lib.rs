@@ -1,8 +1,8 @@
 //! Low-bit GEMV kernels and an action-head executor for microcontrollers: `no_std`, no allocation, no panic after
 //! [`Image::new_checked`].
 //!
-//! A robot policy's last layers, or a whole small policy, are quantized on a host (by the command `actq`) into one image of
-//! bytes. This crate runs that image in place from flash:
+//! A robot policy's last layers, or a whole small policy, are quantized on a host (by the command `actq`) into one
+//! image of bytes. This crate runs that image in place from flash:
 //!
 //! ```
 //! # fn run(bytes: &[u8], scratch: &mut [u32], observation: &[f32]) -> Result<(), Box<dyn std::error::Error>> {
@@ -16,9 +16,9 @@
 //! # }
 //! ```
 //!
-//! The arithmetic, in the order in which it happens, is documented in [`ops::linear`]; the packed layouts in [`layout`]; the image
-//! in `docs/FORMAT.md`. Everything outside the integer GEMV is IEEE 754 binary32 in a fixed order, without fused
-//! multiply-add, so that a host, QEMU and a board give identical bits.
+//! The arithmetic, in the order in which it happens, is documented in [`ops::linear`]; the packed layouts in
+//! [`layout`]; the image in `docs/FORMAT.md`. Everything outside the integer GEMV is IEEE 754 binary32 in a fixed
+//! order, without fused multiply-add, so that a host, QEMU and a board give identical bits.
 #![cfg_attr(not(test), no_std)]
 #![deny(unsafe_code)]
 

@@ -16,7 +16,7 @@ pub(crate) enum Work<'w> {
     /// Finding the scale of an input of so many values.
     Magnitude(usize),
     /// Setting outputs up before rows are added to them.
-    Start(Start),
+    Start(OutputStart),
     /// Preparing an input for blocks of this shape.
     Prepare(BlockShape),
     /// Strips of eight of a block's rows, whose outputs are `in_order`, or by an index, and `start` from the biases.
@@ -27,7 +27,7 @@ pub(crate) enum Work<'w> {
 
 /// What outputs are set to before rows are added to them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Start {
+pub(crate) enum OutputStart {
     /// To 0.
     Zero,
     /// To the biases.
@@ -38,7 +38,7 @@ pub(crate) enum Start {
     Added,
 }
 
-impl Start {
+impl OutputStart {
     /// Of an operation that accumulates or not, with biases or without.
     pub(crate) const fn of(accumulate: bool, bias: bool) -> Self {
         match (accumulate, bias) {

@@ -1,6 +1,6 @@
-//! Images changed at random, with a correct checksum: what passes `Image::new_checked` runs without a panic, keeps its limits, and
-//! sees nothing but its observations; and what changes behind the check's back does not panic either. These tests need nothing but
-//! this crate, so that they run where a word has 32 bits, and under Miri, too.
+//! Images changed at random, with a correct checksum: what passes `Image::new_checked` runs without a panic, keeps its
+//! limits, and sees nothing but its observations; and what changes behind the check's back does not panic either. These
+//! tests need nothing but this crate, so that they run where a word has 32 bits, and under Miri, too.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -103,7 +103,8 @@ fn mutate(random: &mut Random, draft: &mut Draft, structure: &[usize]) {
     draft.seal();
 }
 
-/// Hands the images of the mutations that are accepted to `see`; gives their number. A panic in `see` fails with the numbers of all such cases.
+/// Hands the images of the mutations that are accepted to `see`; gives their number. A panic in `see` fails with the
+/// numbers of all such cases.
 fn accepted(see: impl Fn(Image<'_>, &mut Random)) -> u64 {
     let structure = Draft::valid().structure();
     let (mut seen, mut failed) = (0, Vec::new());
@@ -124,8 +125,8 @@ fn accepted(see: impl Fn(Image<'_>, &mut Random)) -> u64 {
     seen
 }
 
-/// Three steps and the self-test in memory of exactly the size that the image asks for, filled with `fill`: the bits of the
-/// actions that it gives.
+/// Three steps and the self-test in memory of exactly the size that the image asks for, filled with `fill`: the bits of
+/// the actions that it gives.
 fn play(image: Image<'_>, fill: u32, random: &mut Random) -> Vec<Option<Vec<u32>>> {
     let mut scratch = vec![fill; image.scratch_words()];
     let mut head = Head::new(image, &mut scratch).expect("the scratch memory has the image's size");

@@ -2,8 +2,8 @@
 
 use anyhow::{Result, ensure};
 
-/// The action contract; each array has one value per action dimension, or is absent. `docs/FORMAT.md` has the order in which they
-/// apply.
+/// The action contract; each array has one value per action dimension, or is absent. `docs/FORMAT.md` has the order in
+/// which they apply.
 #[derive(Clone, Debug, Default)]
 pub struct ActionContract {
     /// Factors.
@@ -48,8 +48,9 @@ pub struct Playback {
     pub deadline: Option<usize>,
 }
 
-/// Temporal ensembling (Zhao et al., Learning fine-grained bimanual manipulation with low-cost hardware, arXiv 2304.13705): an action
-/// is the average of what the last chunks foresaw for it, the i-th of them weighted by `exp(-m i)`, the oldest first.
+/// Temporal ensembling (Zhao et al., Learning fine-grained bimanual manipulation with low-cost hardware, arXiv
+/// 2304.13705): an action is the average of what the last chunks foresaw for it, the i-th of them weighted by
+/// `exp(-m i)`, the oldest first.
 #[derive(Clone, Copy, Debug)]
 pub struct Ensemble {
     /// Chunks.
@@ -73,6 +74,10 @@ impl Ensemble {
 
 impl Playback {
     /// That chunks of `chunk` actions, of which `execute` are executed, can be played so.
+    ///
+    /// # Errors
+    ///
+    /// What cannot be, by its key in policy.json, with the values that can.
     pub fn check(&self, chunk: usize, execute: usize) -> Result<()> {
         if let Some(ensemble) = self.ensemble {
             let Ensemble { horizon, m } = ensemble;
@@ -119,6 +124,10 @@ impl ActionContract {
     }
 
     /// That each array has one finite value per action dimension, and that the limits can be kept.
+    ///
+    /// # Errors
+    ///
+    /// The array that does not fit, by its key in policy.json.
     pub fn check(&self, act_len: usize) -> Result<()> {
         for (name, array) in self.arrays() {
             let Some(array) = array else { continue };

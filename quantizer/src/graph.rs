@@ -1,4 +1,5 @@
-//! The network: operations over values, what they compute in f32 forwards and backwards, and what they become in an image.
+//! The network: operations over values, what they compute in f32 forwards and backwards, and what they become in an
+//! image.
 //!
 //! An operation is said once, in its file in [`ops`]; everything else asks it through [`operation::Operation`].
 

@@ -1,9 +1,9 @@
 //! From a PyTorch policy to one flashable image: what the command `actq` is made of.
 //!
 //! [`import`] reads a [`policy::Policy`] with its network, a [`graph::Graph`], and [`data`] the recorded observations.
-//! [`pipeline`] makes an image of them: a method of [`methods`] turns every weight matrix into codes and scales, from what
-//! [`calibrate`] finds in the recordings, and [`emit`] lays the bytes out. [`measure`] and [`serve`] run the finished image through
-//! the same executor that the firmware runs; [`report`] says it to people.
+//! [`pipeline`] makes an image of them: a method of [`methods`] turns every weight matrix into codes and scales, from
+//! what [`calibrate`] finds in the recordings, and [`emit`] lays the bytes out. [`measure`] and [`serve`] run the
+//! finished image through the same executor that the firmware runs; [`report`] says it to people.
 //!
 //! Which folder may use which is written in `docs/ARCHITECTURE.md`, and tested.
 #![deny(unsafe_code)]

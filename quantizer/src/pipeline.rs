@@ -1,5 +1,5 @@
-//! From a policy and its recordings to an image: what the command calls, and whoever else wants images. Nothing here prints or
-//! writes files.
+//! From a policy and its recordings to an image: what the command calls, and whoever else wants images. Nothing here
+//! prints or writes files.
 
 mod budgets;
 pub mod driven;

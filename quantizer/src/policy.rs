@@ -36,7 +36,29 @@ pub struct Policy {
 }
 
 impl Policy {
+    /// A policy of kind step that was read from nowhere: the network's output is the action, 50 times a second, without
+    /// a contract.
+    pub fn of(name: &str, graph: Graph) -> Self {
+        Self {
+            dir: PathBuf::new(),
+            name: name.to_owned(),
+            kind: Kind::Step,
+            chunk: 1,
+            execute: 1,
+            act_len: graph.len_of(graph.output()),
+            rate_hz: 50.0,
+            contract: ActionContract::default(),
+            weights: graph.weights(),
+            graph,
+            digest: [0; 32],
+        }
+    }
+
     /// That output, chunk, action and contract fit each other.
+    ///
+    /// # Errors
+    ///
+    /// What does not fit, by its key in policy.json.
     pub fn check(&self) -> Result<()> {
         let (len, expected) = (self.graph.len_of(self.graph.output()), self.chunk * self.act_len);
         ensure!(len == expected, "the last op gives {len} values, chunk * act_dim is {expected}");

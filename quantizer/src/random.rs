@@ -5,8 +5,8 @@ use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng as _, SeedableRng as _};
 
-/// PCG XSL RR 128/64 (MCG) (O'Neill: PCG, a family of simple fast space-efficient statistically good algorithms for random number
-/// generation, 2014).
+/// PCG XSL RR 128/64 (MCG) (O'Neill: PCG, a family of simple fast space-efficient statistically good algorithms for
+/// random number generation, 2014).
 #[derive(Clone, Debug)]
 pub struct Random(Pcg64Mcg);
 

@@ -21,7 +21,7 @@ impl ImageBuffer {
         Self { words, len: bytes.len() }
     }
 
-    /// Reads a file.
+    /// Reads a file; an error names it.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = fs::read(path).with_context(|| format!("{}: cannot be read", path.display()))?;
         Ok(Self::new(&bytes))
@@ -38,7 +38,7 @@ impl ImageBuffer {
     }
 }
 
-/// Runs `work` with a head over `image` in fresh scratch memory.
+/// Runs `work` with a head over `image` in fresh scratch memory; the errors are those of `work`.
 pub fn with_head<T>(image: Image<'_>, work: impl FnOnce(&mut Head<'_, '_>) -> Result<T>) -> Result<T> {
     let mut scratch = vec![0u32; image.scratch_words()];
     work(&mut Head::new(image, &mut scratch)?)

@@ -4,7 +4,8 @@ use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, SeqAccess, Visi
 use serde_json::{Map, Number, Value};
 use std::fmt;
 
-/// Parses `bytes` and refuses an object with a key that stands in it twice, of which `serde_json` alone would take the last.
+/// Parses `bytes` and refuses an object with a key that stands in it twice, of which `serde_json` alone would take the
+/// last.
 pub(crate) fn parse(bytes: &[u8]) -> serde_json::Result<Value> {
     let mut input = serde_json::Deserializer::from_slice(bytes);
     let value = Strict.deserialize(&mut input)?;

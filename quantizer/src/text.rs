@@ -5,8 +5,8 @@ use std::ffi::OsStr;
 
 use anyhow::{Context as _, Result};
 
-/// Whether a character does something to a terminal, or to the order in which the text around it is shown, instead of being
-/// shown itself.
+/// Whether a character does something to a terminal, or to the order in which the text around it is shown, instead of
+/// being shown itself.
 pub(crate) fn is_control(c: char) -> bool {
     c.is_control() || matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }

@@ -6,14 +6,14 @@ use std::time::Duration;
 /// Ticks of a second in Linux's /proc, on all of its architectures that Rust is at home on.
 const TICKS: u64 = 100;
 
-/// User and system time of all processes that were started and have ended, and of those that they started; `None` where there is
-/// no /proc.
+/// User and system time of all processes that were started and have ended, and of those that they started; `None` where
+/// there is no /proc.
 pub(crate) fn of_children() -> Option<Duration> {
     ticks(&fs::read_to_string("/proc/self/stat").ok()?).map(|ticks| Duration::from_millis(1000 / TICKS * ticks))
 }
 
-/// Fields 16 and 17 of `/proc/self/stat` (proc(5): cutime, cstime). The second field is a name in parentheses, which may hold
-/// anything.
+/// Fields 16 and 17 of `/proc/self/stat` (proc(5): cutime, cstime). The second field is a name in parentheses, which
+/// may hold anything.
 fn ticks(stat: &str) -> Option<u64> {
     let (_, fields) = stat.rsplit_once(')')?;
     let mut fields = fields.split_whitespace().skip(13);

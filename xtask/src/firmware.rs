@@ -138,7 +138,8 @@ fn example() -> Result<PathBuf> {
 /// Builds, and gives the ELF file's bytes.
 fn build(target: Target, image: &Path, features: Option<&str>, key: Option<&str>) -> Result<Vec<u8>> {
     let name = target.board().name;
-    // A folder of its own: cargo gives the files of all boards with one triple the same name, and two may be built at a time.
+    // A folder of its own: cargo gives the files of all boards with one triple the same name, and two may be built at a
+    // time.
     let folder = root().join("target/boards").join(name);
     let features = [Some(name), features, key.map(|_| "signed")];
     let features = features.into_iter().flatten().collect::<Vec<_>>().join(",");

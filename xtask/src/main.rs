@@ -1,7 +1,9 @@
-//! What people and CI type: `cargo demo`, `cargo verify`, `cargo xtask bench`, `cargo xtask budgets`, `cargo xtask fit`,
-//! `cargo xtask compare`, `cargo xtask faults`, `cargo xtask firmware`, `cargo xtask stack`, `cargo xtask doctor`.
+//! What people and CI type: `cargo demo`, `cargo verify`, `cargo xtask bench`, `cargo xtask budgets`,
+//! `cargo xtask fit`, `cargo xtask compare`, `cargo xtask faults`, `cargo xtask firmware`, `cargo xtask stack`,
+//! `cargo xtask doctor`.
 //!
-//! This crate depends on next to nothing, so that it is built and speaks at once. What measures is the binary of `actq-bench`.
+//! This crate depends on next to nothing, so that it is built and speaks at once. What measures is the binary of
+//! `actq-bench`.
 #![forbid(unsafe_code)]
 
 mod cpu;

@@ -1,4 +1,5 @@
-//! What must be installed: the Rust targets, QEMU, and for `cargo verify` the toolchain's tools and the oldest compiler.
+//! What must be installed: the Rust targets, QEMU, and for `cargo verify` the toolchain's tools and the oldest
+//! compiler.
 
 use std::path::Path;
 use std::process::{Command, Stdio};

@@ -9,8 +9,8 @@ use anyhow::{Context, Result, bail};
 
 use crate::{cargo, cpu, firmware, setup};
 
-/// CPU-minutes that all steps may take from a fresh clone; `ACTQ_VERIFY_CPU_MINUTES` sets another number on a slower machine, or
-/// where more is tested.
+/// CPU-minutes that all steps may take from a fresh clone; `ACTQ_VERIFY_CPU_MINUTES` sets another number on a slower
+/// machine, or where more is tested.
 const CPU_MINUTES: f64 = 28.0;
 const CPU_MINUTES_VARIABLE: &str = "ACTQ_VERIFY_CPU_MINUTES";
 /// Minutes that this takes on two idle cores.
@@ -29,7 +29,8 @@ const APPLICATION: &str = "actq-firmware-demo";
 /// The head in firmware of other styles.
 const STYLES: &str = "actq-firmware-styles";
 
-/// The tests that compare with tract, a reader of ONNX that takes minutes to build, and the variable that asks for them.
+/// The tests that compare with tract, a reader of ONNX that takes minutes to build, and the variable that asks for
+/// them.
 const ONNX_TESTS: &str = "actq-onnx-tests";
 const ONNX_VARIABLE: &str = "ACTQ_TRACT";
 

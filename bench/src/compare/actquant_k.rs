@@ -1,7 +1,7 @@
 //! ActQuant in the block formats of its paper, llama.cpp's K-quants, simulated.
 //!
-//! Everything that this project's own kernels would cost it is left out, in its favour: activations stay in f32, and padding to whole
-//! super-blocks is not counted.
+//! Everything that this project's own kernels would cost it is left out, in its favour: activations stay in f32, and
+//! padding to whole super-blocks is not counted.
 
 use std::fs;
 use std::path::Path;
@@ -34,8 +34,8 @@ pub(super) struct Simulated {
 
 /// Formats by ActQuant's scores and its allocation, scales by the Fisher importance.
 ///
-/// llama.cpp's search also multiplies the importance by the weights' magnitude, the paper's objective does not. Both are made, and the
-/// one with the lower error on what errors are measured on is taken: a choice in the rival's favour.
+/// llama.cpp's search also multiplies the importance by the weights' magnitude, the paper's objective does not. Both
+/// are made, and the one with the lower error on what errors are measured on is taken: a choice in the rival's favour.
 ///
 /// # Errors
 ///

@@ -70,8 +70,9 @@ impl<'a> Maker<'a> {
 
     /// Makes the image of a cell. `progress` gets what is being done and the share of it that is done.
     ///
-    /// The method's default group counts. Only where it does not fit the budget, the others are tried, and of those that fit the one
-    /// with the lowest held-out error is taken: the choice on what errors are measured on is in the method's favour.
+    /// The method's default group counts. Only where it does not fit the budget, the others are tried, and of those
+    /// that fit the one with the lowest held-out error is taken: the choice on what errors are measured on is in the
+    /// method's favour.
     pub(super) fn make(
         &mut self,
         contender: Contender,
@@ -147,7 +148,7 @@ impl<'a> Maker<'a> {
         }
         let begun = Instant::now();
         let Subject { policy, recordings } = self.subject;
-        let quantizer = Quantizer::new(policy, recordings, method, |share| progress("calibrating", share))?;
+        let quantizer = Quantizer::new(policy, recordings, method, None, |share| progress("calibrating", share))?;
         let seconds = begun.elapsed().as_secs_f64();
         self.ready.insert(method.to_string(), (quantizer, seconds));
         Ok(seconds)

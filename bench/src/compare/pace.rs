@@ -2,8 +2,9 @@
 
 use super::cell::{Cell, CellKey};
 
-/// Seconds that `missing` cells take, as far as those that are done tell: each as long as its method took on its policy, or else
-/// on any, or else as the mean of all. Making and driving go on at the same time. `None` where nothing is done yet.
+/// Seconds that `missing` cells take, as far as those that are done tell: each as long as its method took on its
+/// policy, or else on any, or else as the mean of all. Making and driving go on at the same time. `None` where nothing
+/// is done yet.
 pub(super) fn seconds_left(done: &[Cell], missing: &[CellKey]) -> Option<f64> {
     let mean = |part: &dyn Fn(&Cell) -> Option<f64>, is_like: &dyn Fn(&CellKey) -> bool| -> Option<f64> {
         let values: Vec<f64> = done.iter().filter(|cell| is_like(&cell.key)).filter_map(part).collect();

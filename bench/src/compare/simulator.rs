@@ -65,7 +65,8 @@ impl Simulator {
                 let mut command = Command::new(python);
                 let [count, first] = [episodes.count, episodes.first].map(|number| number.to_string());
                 command.current_dir(folder).args(["evaluate.py", task, "--episodes", &count, "--seed0", &first]);
-                // As one step of a small network gains nothing by more threads. No cache of Python's is left in the folder.
+                // As one step of a small network gains nothing by more threads. No cache of Python's is left in the
+                // folder.
                 command.env("OMP_NUM_THREADS", "1").env("PYTHONDONTWRITEBYTECODE", "1");
                 match driver {
                     Driver::Image(image) => {
@@ -84,8 +85,8 @@ impl Simulator {
     }
 }
 
-/// A program as it is called from another folder: a path is made absolute, a name is looked for as a shell does. Links stay, by which
-/// the Python of a virtual environment knows where it is.
+/// A program as it is called from another folder: a path is made absolute, a name is looked for as a shell does. Links
+/// stay, by which the Python of a virtual environment knows where it is.
 fn program(name: PathBuf) -> PathBuf {
     if name.components().count() > 1 { std::path::absolute(&name).unwrap_or(name) } else { name }
 }

@@ -1,6 +1,7 @@
 //! Scales and mins by weighted least squares.
 
-/// Candidates for the clipping point, from [`NARROWEST`] to [`WIDEST`] times the scale that just reaches the outermost weight.
+/// Candidates for the clipping point, from [`NARROWEST`] to [`WIDEST`] times the scale that just reaches the outermost
+/// weight.
 const CANDIDATES: usize = 32;
 const NARROWEST: f64 = 0.5;
 const WIDEST: f64 = 1.1;
@@ -13,8 +14,8 @@ pub(super) struct Term {
     pub(super) b: f64,
 }
 
-/// The d and d_min of least weighted squared error, none of them below what the terms ask for: where there is no b, or a d_min below 0
-/// would be best, d_min is 0.
+/// The d and d_min of least weighted squared error, none of them below what the terms ask for: where there is no b, or
+/// a d_min below 0 would be best, d_min is 0.
 pub(super) fn least_squares(terms: impl Iterator<Item = Term>) -> (f64, f64) {
     let (mut aa, mut ab, mut bb, mut wa, mut wb) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for Term { importance, weight, a, b } in terms {

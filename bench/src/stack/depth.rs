@@ -42,8 +42,8 @@ impl<'p> Depths<'p> {
         Self { program, taken: program.taken(), frames: BTreeMap::new(), deepest: BTreeMap::new() }
     }
 
-    /// Bytes of stack that a function takes with all that it calls. An error names a function that calls itself, one that is not
-    /// understood, or an address without a function.
+    /// Bytes of stack that a function takes with all that it calls. An error names a function that calls itself, one
+    /// that is not understood, or an address without a function.
     pub(super) fn of(&mut self, address: u32) -> Result<u32> {
         let name = self.name(address)?;
         match self.deepest.get(&address) {

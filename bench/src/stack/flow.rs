@@ -6,7 +6,7 @@ use anyhow::{Context as _, Result, bail, ensure};
 
 use super::program::{Function, Half, Program};
 use super::step::{LR, Step, zero_behind};
-use crate::cycles::{Class, Instruction};
+use crate::instruction::{Class, Instruction};
 
 /// Registers that a call may change: r0 to r3, r12 and the link register (AAPCS).
 const CHANGED: u32 = 0x500f;
@@ -59,7 +59,8 @@ struct State {
     zero: Option<bool>,
 }
 
-/// Follows a function from its begin. An error says which instruction is not understood, or which two ways contradict each other.
+/// Follows a function from its begin. An error says which instruction is not understood, or which two ways contradict
+/// each other.
 pub(super) fn frame(program: &Program, function: &Function) -> Result<Frame> {
     let mut walk = Walk {
         program,
@@ -84,7 +85,8 @@ struct Walk<'p> {
     program: &'p Program,
     function: &'p Function,
     frame: Frame,
-    /// What is known where ways come to. A kernel may have more on its stack where the flag Z is set: these are two places.
+    /// What is known where ways come to. A kernel may have more on its stack where the flag Z is set: these are two
+    /// places.
     known: BTreeMap<(u32, Option<bool>), State>,
     /// Places from which the ways have still to be followed.
     left: Vec<(u32, Option<bool>)>,
@@ -140,7 +142,8 @@ impl Walk<'_> {
             Step::Stack(bytes) => {
                 after.depth += bytes;
                 ensure!(after.depth >= 0, "{at:#x} pops what the function has not pushed");
-                // The caller's return address is what a function pushes of the link register, and so what it pops to it.
+                // The caller's return address is what a function pushes of the link register, and so what it pops to
+                // it.
                 if bytes < 0 && instruction.writes >> LR & 1 == 1 {
                     after.link |= 1 << LR;
                 }
@@ -221,7 +224,8 @@ impl Walk<'_> {
             for i in 0..count {
                 let [first, second] = self.halves(at)?;
                 let instruction = Instruction::decode(first, second);
-                // The first is executed where the condition holds, another one where its bit of the mask is the condition's.
+                // The first is executed where the condition holds, another one where its bit of the mask is the
+                // condition's.
                 let executed = (i == 0 || mask >> (4 - i) & 1 == condition) == holds;
                 let step = Step::decode(at, first, second);
                 ensure!(!compared || step == Step::Next, "{at:#x} depends on flags that are set behind IT");
@@ -268,8 +272,8 @@ impl Walk<'_> {
         Ok(targets)
     }
 
-    /// The addresses of the branches, four bytes each, that stand from `begin` on, where a word begins, and of which `register` has one's address. Behind the
-    /// last of them may stand one that is none of them; its way exists, too.
+    /// The addresses of the branches, four bytes each, that stand from `begin` on, where a word begins, and of which
+    /// `register` has one's address. Behind the last of them may stand one that is none of them; its way exists, too.
     fn branches(&self, at: u32, register: u32, begin: u32) -> Result<Vec<u32>> {
         let before: Vec<(u32, [u16; 2])> = (self.reached.range(at.saturating_sub(ADDRESSED)..at))
             .filter_map(|&before| Some((before, self.program.halves(before)?)))

@@ -4,15 +4,15 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::Path;
 
-use crate::cycles::Instruction;
+use crate::instruction::Instruction;
 use anyhow::{Context as _, Result};
 use object::{FileFlags, Object as _, ObjectSection as _, ObjectSymbol as _, SectionFlags, SymbolKind, elf};
 
 /// The section of the vector table, whose addresses the processor calls.
 const VECTORS: &str = ".vector_table";
 
-/// The image that is built in (`firmware-demo/src/bin/controller/start.rs`): it holds no addresses, and a hundred thousand bytes that may look
-/// like some.
+/// The image that is built in (`firmware-demo/src/bin/controller/start.rs`): it holds no addresses, and a hundred
+/// thousand bytes that may look like some.
 const IMAGE: &str = "controller::start::BUILT_IN";
 
 /// A function.
@@ -113,8 +113,9 @@ impl Program {
         self.symbols.get(name).copied().with_context(|| format!("the ELF file has no symbol {name}"))
     }
 
-    /// What a pointer of the program may point to: every function whose address stands among constants or initial values, or is made by a
-    /// function's MOVW and MOVT of one register. The vector table's functions are the processor's.
+    /// What a pointer of the program may point to: every function whose address stands among constants or initial
+    /// values, or is made by a function's MOVW and MOVT of one register. The vector table's functions are the
+    /// processor's.
     pub(super) fn taken(&self) -> BTreeSet<u32> {
         let mut taken = BTreeSet::new();
         let mut note = |value: u32| {

@@ -1,7 +1,7 @@
-//! What a Thumb-2 instruction does to the stack pointer and to where execution goes on (Arm DDI 0403E, chapters A5 and A7; DDI 0553
-//! for what Armv8-M adds).
+//! What a Thumb-2 instruction does to the stack pointer and to where execution goes on (Arm DDI 0403E, chapters A5 and
+//! A7; DDI 0553 for what Armv8-M adds).
 
-use crate::cycles::{Class, Instruction};
+use crate::instruction::{Class, Instruction};
 
 /// Register numbers.
 pub(super) const SP: u32 = 13;
@@ -135,7 +135,8 @@ fn transfer(first: u16, second: u16) -> Option<Step> {
     }
     let popped = second & 0x8000 != 0;
     Some(match first & 0xfe40 {
-        // LDM and STM. Without writing back, the stack pointer only stands in the set of what the model takes for written.
+        // LDM and STM. Without writing back, the stack pointer only stands in the set of what the model takes for
+        // written.
         0xe800 if write_back => match (first & 0x0190, words(u32::from(second).count_ones())) {
             (0x0100, bytes) => Step::Stack(bytes),
             (0x0090, bytes) if popped => Step::Return(bytes),

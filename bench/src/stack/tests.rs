@@ -118,7 +118,8 @@ fn ways_that_contradict_each_other_are_refused() {
     assert_eq!(refused(&[SUB_SP_8]), "0x1002 is reached, where no code of the function is");
 }
 
-/// As in the kernels that take groups in pairs: movs r4, #1; b; stmdb sp!, {r2, r7-r9}; cmp.w r0, r0; bne; ldmia sp!, {r2, r7-r9}.
+/// As in the kernels that take groups in pairs: movs r4, #1; b; stmdb sp!, {r2, r7-r9}; cmp.w r0, r0; bne; ldmia sp!,
+/// {r2, r7-r9}.
 #[test]
 fn ways_with_the_flag_z_and_without_are_told_apart() -> Result<()> {
     let mut code = [0x2401, 0xe003, 0xe92d, 0x0384, 0xebb0, 0x0f00, 0xd1fa, 0xe8bd, 0x0384, BX_LR];

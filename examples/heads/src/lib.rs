@@ -1,5 +1,5 @@
-//! Action heads of the sizes of published policies, as policy folders. **Their weights are seeded random numbers: sizes and times are
-//! real, accuracy is not.**
+//! Action heads of the sizes of published policies, as policy folders. **Their weights are seeded random numbers: sizes
+//! and times are real, accuracy is not.**
 #![forbid(unsafe_code)]
 
 mod network;

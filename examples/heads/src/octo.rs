@@ -1,5 +1,5 @@
-//! Octo's diffusion head (Ghosh et al., arXiv 2405.12213): the noise in a chunk of actions, from a time code, a readout token of the
-//! transformer and the noisy chunk.
+//! Octo's diffusion head (Ghosh et al., arXiv 2405.12213): the noise in a chunk of actions, from a time code, a readout
+//! token of the transformer and the noisy chunk.
 
 use anyhow::Result;
 use serde_json::{Value, json};

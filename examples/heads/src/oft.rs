@@ -1,5 +1,5 @@
-//! OpenVLA-OFT's head for L1 regression (Kim et al., arXiv 2502.19645): every action of a chunk from the hidden states of its tokens,
-//! through the same residual network.
+//! OpenVLA-OFT's head for L1 regression (Kim et al., arXiv 2502.19645): every action of a chunk from the hidden states
+//! of its tokens, through the same residual network.
 
 use anyhow::Result;
 use serde_json::json;

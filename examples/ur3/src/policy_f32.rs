@@ -17,7 +17,8 @@ const OBS_CLIP: f32 = 5.0;
 const NOISE_SEED: u64 = 1;
 
 /// A chunk policy: the network proposes a chunk of actions, the first `execute` of them are played, then it is asked
-/// again. The chunk is the network's output, or a flow's: noise that has followed the velocities that the network gives.
+/// again. The chunk is the network's output, or a flow's: noise that has followed the velocities that the network
+/// gives.
 #[derive(Debug)]
 pub struct PolicyF32 {
     layers: Vec<Layer>,

@@ -4,8 +4,8 @@ use serde_json::{Value, json};
 
 use crate::task::Outcome;
 
-/// What a run over episodes says of itself: `episodes`, `success` (their share), `ci` (its 95% interval), and the mean errors over
-/// the hold phases.
+/// What a run over episodes says of itself: `episodes`, `success` (their share), `ci` (its 95% interval), and the mean
+/// errors over the hold phases.
 pub fn summary(outcomes: &[Outcome]) -> Value {
     let successes = outcomes.iter().filter(|outcome| outcome.success).count();
     let mean = |part: fn(&Outcome) -> f64| outcomes.iter().map(part).sum::<f64>() / outcomes.len() as f64;

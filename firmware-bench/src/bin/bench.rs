@@ -1,15 +1,12 @@
 //! Counted kernel calls: each prints a line `name bits group rows cols`, in the order of the counted regions.
 //!
-//! A region is a whole call: activations from f32, the product, and the results back in f32 with row scales and biases. What an
-//! image would hold stands in the image slot, so that its lines count as fetched from flash. The yardsticks are a naive loop in
-//! f32, and 8-bit rows with SXTB16 and SMLAD as one would write them with intrinsics.
+//! A region is a whole call: activations from f32, the product, and the results back in f32 with row scales and biases.
+//! What an image would hold stands in the image slot, so that its lines count as fetched from flash. The yardsticks are
+//! a naive loop in f32, and 8-bit rows with SXTB16 and SMLAD as one would write them with intrinsics.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
-fn main() {
-    eprintln!("this is firmware: build it with --target thumbv7em-none-eabihf");
-    std::process::exit(1);
-}
+use actq_firmware_bench::main;
 
 #[cfg(target_os = "none")]
 mod firmware {
@@ -19,6 +16,7 @@ mod firmware {
     use core::fmt::Write as _;
     use core::hint::black_box;
 
+    use actq_firmware_bench::random_words;
     use actq_firmware_support::{count, host};
     use actq_kernels::image::RowBlock;
     use actq_kernels::layout::{Block, BlockShape, Lanes, Width, pack};
@@ -58,21 +56,15 @@ mod firmware {
         let ram = singleton!(: Ram = Ram { x: [0.0; COLS], prepared: [0; COLS], y: [0.0; ROWS] });
         let slot = (&raw const _image_slot_end as usize) - (&raw const _image_slot_start as usize);
         let fits = size_of::<Flash>() <= slot;
-        // SAFETY: memory.x gives the slot's bounds, aligned to 4, in memory that nothing else uses; QEMU's code memory can be
-        // written. Every bit pattern is a value of the arrays' types, and this is the only reference.
+        // SAFETY: memory.x gives the slot's bounds, aligned to 4, in memory that nothing else uses; QEMU's code memory
+        // can be written. Every bit pattern is a value of the arrays' types, and this is the only reference.
         let flash = unsafe { (&raw mut _image_slot_start).as_mut() };
         host::exit(fits && flash.zip(ram).is_some_and(|(flash, ram)| run(flash, ram).is_some()))
     }
 
     fn run(b: &mut Flash, ram: &mut Ram) -> Option<()> {
         let mut out = hio::hstdout().ok()?;
-        let mut seed = 0x1234_5678u32;
-        let mut random = move || {
-            seed ^= seed << 13;
-            seed ^= seed >> 17;
-            seed ^= seed << 5;
-            seed
-        };
+        let mut random = random_words();
         b.codes.iter_mut().for_each(|c| *c = random() as u8);
         b.scales.iter_mut().for_each(|s| *s = random() as u8);
         b.weights.iter_mut().for_each(|w| *w = random() as i32 as f32);

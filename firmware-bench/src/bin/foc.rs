@@ -1,12 +1,9 @@
-//! The current loop: ten thousand ticks, of which every hundredth is a counted region. It prints the CRC-32 of all duty cycles' bits, the
-//! number of the test in `controller/tests/all/foc/motor.rs`, whose inputs these are.
+//! The current loop: ten thousand ticks, of which every hundredth is a counted region. It prints the CRC-32 of all duty
+//! cycles' bits, the number of the test in `controller/tests/all/foc/motor.rs`, whose inputs these are.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
-fn main() {
-    eprintln!("this is firmware: build it with --target thumbv7em-none-eabihf");
-    std::process::exit(1);
-}
+use actq_firmware_bench::main;
 
 #[cfg(target_os = "none")]
 mod firmware {

@@ -1,13 +1,10 @@
-//! Counted functions: each prints a line `name elements hash`, in the order of the counted regions. The hash is of the bits of
-//! what was counted and, of functions and cells, of the results for values of every magnitude, which are not counted;
-//! `host-tests/tests/all/functions.rs` computes the same on the host.
+//! Counted functions: each prints a line `name elements hash`, in the order of the counted regions. The hash is of the
+//! bits of what was counted and, of functions and cells, of the results for values of every magnitude, which are not
+//! counted; `host-tests/tests/all/functions.rs` computes the same on the host.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
-fn main() {
-    eprintln!("this is firmware: build it with --target thumbv7em-none-eabihf");
-    std::process::exit(1);
-}
+use actq_firmware_bench::main;
 
 #[cfg(target_os = "none")]
 mod firmware {

@@ -3,10 +3,7 @@
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
-fn main() {
-    eprintln!("this is firmware: build it with --target thumbv7em-none-eabihf");
-    std::process::exit(1);
-}
+use actq_firmware_bench::main;
 
 #[cfg(target_os = "none")]
 mod firmware {
@@ -98,8 +95,8 @@ mod firmware {
         Ok(true)
     }
 
-    /// The way from f32 to f32 on the case's numbers. Integers whose largest magnitude is the limit have the scale 1, so the
-    /// prepared vector must be the case's own, word for word.
+    /// The way from f32 to f32 on the case's numbers. Integers whose largest magnitude is the limit have the scale 1,
+    /// so the prepared vector must be the case's own, word for word.
     fn float_path(block: &Block<'_>, x: &Prepared<'_>, sums: &[i32]) -> Result<(), &'static str> {
         let shape = block.shape();
         let mut floats = [0f32; COLS];

@@ -1,19 +1,16 @@
 //! The harness: checks its image, self-tests it, and runs it for a host.
 //!
-//! Without arguments it plays the image's self-test observations and prints the actions' bits. With the argument `serve` it
-//! reads observations from standard input and writes actions to standard output, in the protocol of `actq serve`. `poll N` does
-//! the same in polls of N instructions, `ops N` in polls of one operation each. `restart` saves the state before every step,
-//! resets, and restores it. Every step, or begin and each poll, is a counted
-//! region.
+//! Without arguments it plays the image's self-test observations and prints the actions' bits. With the argument
+//! `serve` it reads observations from standard input and writes actions to standard output, in the protocol of
+//! `actq serve`. `poll N` does the same in polls of N instructions, `ops N` in polls of one operation each. `restart`
+//! saves the state before every step, resets, and restores it. Every step, or begin and each poll, is a counted region.
 //!
-//! The image is the one in the slot, if there is one, else the one that was built in (environment variable `ACTQ_IMAGE`).
+//! The image is the one in the slot, if there is one, else the one that was built in (environment variable
+//! `ACTQ_IMAGE`).
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
-fn main() {
-    eprintln!("this is firmware: build it with --target thumbv7em-none-eabihf, or see `cargo demo`");
-    std::process::exit(1);
-}
+use actq_firmware_bench::main;
 
 #[cfg(target_os = "none")]
 mod firmware {
@@ -117,7 +114,8 @@ mod firmware {
         }
     }
 
-    /// Saves the state, forgets it, and restores it; where that fails, the state stays forgotten, and the actions show it.
+    /// Saves the state, forgets it, and restores it; where that fails, the state stays forgotten, and the actions show
+    /// it.
     #[inline(never)]
     fn restart(head: &mut Head<'_, '_>) {
         let mut saved = [0; MAX_SAVED];
@@ -148,8 +146,8 @@ mod firmware {
         Ok(())
     }
 
-    /// Answers requests of the pipe protocol from standard input until it ends. A step whose observation or whose network leaves
-    /// f32's range has no action: it is answered by NaNs.
+    /// Answers requests of the pipe protocol from standard input until it ends. A step whose observation or whose
+    /// network leaves f32's range has no action: it is answered by NaNs.
     fn serve(head: &mut Head<'_, '_>, run: Run) -> Result<(), Message> {
         let input = host::File::open(c"/dev/stdin", false).ok_or_else(|| message("input", "cannot be opened"))?;
         let output = host::File::open(c"/dev/stdout", true).ok_or_else(|| message("output", "cannot be opened"))?;

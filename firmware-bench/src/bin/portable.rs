@@ -1,15 +1,12 @@
 //! Counted products of 256 x 256 weights by the backend that was compiled in: each prints a line
 //! `backend bits lanes group`, in the order of the counted regions.
 //!
-//! A region is a whole call: activations from f32, the product, and the results back in f32 with row scales and biases. The
-//! results are compared with those of the plain reference, bit for bit.
+//! A region is a whole call: activations from f32, the product, and the results back in f32 with row scales and biases.
+//! The results are compared with those of the plain reference, bit for bit.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
-fn main() {
-    eprintln!("this is firmware: build it with --target thumbv7em-none-eabihf");
-    std::process::exit(1);
-}
+use actq_firmware_bench::main;
 
 #[cfg(target_os = "none")]
 mod firmware {
@@ -18,6 +15,7 @@ mod firmware {
     use core::fmt::Write as _;
     use core::hint::black_box;
 
+    use actq_firmware_bench::random_words;
     use actq_firmware_support::machine::{entry, semihosting::hio, singleton};
     use actq_firmware_support::{count, host};
     use actq_kernels::arch::{BACKEND, reference};
@@ -48,13 +46,7 @@ mod firmware {
 
     fn run(b: &mut Buffers) -> Option<()> {
         let mut out = hio::hstdout().ok()?;
-        let mut seed = 0x1234_5678u32;
-        let mut random = move || {
-            seed ^= seed << 13;
-            seed ^= seed >> 17;
-            seed ^= seed << 5;
-            seed
-        };
+        let mut random = random_words();
         b.codes.iter_mut().for_each(|c| *c = random() as u8);
         b.scales.iter_mut().for_each(|s| *s = random() as u8);
         let x: [f32; COLS] = core::array::from_fn(|_| random() as i32 as f32);

@@ -1,12 +1,9 @@
-//! The whole runtime as `runtime.rs` has it, and steps in pieces, which bring the cost model with them: `cargo xtask budgets`
-//! measures its code. It is not run.
+//! The whole runtime as `runtime.rs` has it, and steps in pieces, which bring the cost model with them:
+//! `cargo xtask budgets` measures its code. It is not run.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
-fn main() {
-    eprintln!("this is firmware: build it with --target thumbv7em-none-eabihf");
-    std::process::exit(1);
-}
+use actq_firmware_bench::main;
 
 #[cfg(target_os = "none")]
 mod firmware {

@@ -1,12 +1,9 @@
-//! The whole runtime, with steps as wholes, and nothing else (no host, no text): `cargo xtask budgets` measures its code. It is not
-//! run.
+//! The whole runtime, with steps as wholes, and nothing else (no host, no text): `cargo xtask budgets` measures its
+//! code. It is not run.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
-fn main() {
-    eprintln!("this is firmware: build it with --target thumbv7em-none-eabihf");
-    std::process::exit(1);
-}
+use actq_firmware_bench::main;
 
 #[cfg(target_os = "none")]
 mod firmware {

@@ -1,4 +1,5 @@
-//! A bare loop: the control tick is an exception handler, the head runs below it in slices, and what both share is in a critical section.
+//! A bare loop: the control tick is an exception handler, the head runs below it in slices, and what both share is in a
+//! critical section.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]

@@ -1,5 +1,6 @@
-//! Embassy: the control tick is a task of an executor in an interrupt, the head a task of the one below, which lets others run between
-//! slices. Embassy has no timer for the board: where it has one, an `embassy_time::Ticker` takes the place of the signal of the timer.
+//! Embassy: the control tick is a task of an executor in an interrupt, the head a task of the one below, which lets
+//! others run between slices. Embassy has no timer for the board: where it has one, an `embassy_time::Ticker` takes the
+//! place of the signal of the timer.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]

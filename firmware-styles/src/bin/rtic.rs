@@ -1,5 +1,5 @@
-//! RTIC 2: the control tick is a hardware task, the head runs in `idle` in slices, and what both share is a resource, whose lock is a
-//! priority of the processor.
+//! RTIC 2: the control tick is a hardware task, the head runs in `idle` in slices, and what both share is a resource,
+//! whose lock is a priority of the processor.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]

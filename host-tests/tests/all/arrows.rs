@@ -1,5 +1,5 @@
-//! Which source file uses which, against the tables in `docs/ARCHITECTURE.md`: between folders only the arrows that stand there,
-//! and no circles between files.
+//! Which source file uses which, against the tables in `docs/ARCHITECTURE.md`: between folders only the arrows that
+//! stand there, and no circles between files.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -89,8 +89,8 @@ fn expand(tree: &str) -> Vec<String> {
     parts.flat_map(expand).map(|path| format!("{}{path}", front.trim())).collect()
 }
 
-/// Every path in the code that may lead to another file: those that a `use` names, and those that begin with `crate`, `super` or
-/// a module of the file.
+/// Every path in the code that may lead to another file: those that a `use` names, and those that begin with `crate`,
+/// `super` or a module of the file.
 fn paths(code: &str) -> Vec<String> {
     let mut paths = Vec::new();
     let mut plain = String::new();

@@ -31,7 +31,7 @@ fn best(bits: f64, steps: usize) -> Options {
 fn budgets_are_kept_and_used() -> Result<()> {
     let policy = Policy::load(&ur3())?;
     let recordings = Recordings::load(&policy)?;
-    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, |_| {})?;
+    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, None, |_| {})?;
     for bits in [1.0, 1.5, 2.0, 2.5, 3.0, 4.0] {
         let bpw = report(&ur3(), &image(&quantizer, &best(bits, 2))?)?.bpw;
         assert!(bpw <= bits && bpw > bits - 0.1, "{bpw} for {bits}");
@@ -47,7 +47,7 @@ fn the_image_does_not_depend_on_the_number_of_threads() -> Result<()> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
         pool.install(|| {
             let policy = Policy::load(&ur3())?;
-            image(&Quantizer::new(&policy, &Recordings::load(&policy)?, Method::Best, |_| {})?, &best(2.0, 20))
+            image(&Quantizer::new(&policy, &Recordings::load(&policy)?, Method::Best, None, |_| {})?, &best(2.0, 20))
         })
     };
     let one = on(1)?;
@@ -61,7 +61,7 @@ fn the_image_does_not_depend_on_the_number_of_threads() -> Result<()> {
 fn an_image_fits_the_flash_that_it_is_given() -> Result<()> {
     let policy = Policy::load(&ur3())?;
     let recordings = Recordings::load(&policy)?;
-    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, |_| {})?;
+    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, None, |_| {})?;
     for bytes in [64 << 10, 96 << 10, 200 << 10] {
         let options = Options { budget: Budget::ImageBytes(bytes), ..best(1.0, 2) };
         let len = image(&quantizer, &options)?.len();
@@ -76,7 +76,7 @@ fn an_image_fits_the_flash_that_it_is_given() -> Result<()> {
 fn a_forced_width_reaches_every_row() -> Result<()> {
     let policy = Policy::load(&ur3())?;
     let recordings = Recordings::load(&policy)?;
-    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, |_| {})?;
+    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, None, |_| {})?;
     let forced = |name: &str| Options { forced: vec![(name.into(), Width::W4)], ..best(2.0, 2) };
     let outcomes = quantizer.quantize(&forced("out.weight"), |_, _| {})?.outcomes;
     let out = policy.graph.matrices.iter().position(|m| m.name == "out.weight");
@@ -89,19 +89,19 @@ fn a_forced_width_reaches_every_row() -> Result<()> {
 fn another_seed_gives_another_image() -> Result<()> {
     let policy = Policy::load(&ur3())?;
     let recordings = Recordings::load(&policy)?;
-    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, |_| {})?;
+    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, None, |_| {})?;
     let options = best(2.0, 5);
     assert_ne!(image(&quantizer, &options)?, image(&quantizer, &Options { seed: 2, ..options.clone() })?);
     Ok(())
 }
 
-/// Errors below half of GPTQ's at about the same bits (GPTQ has one scale a row and one width, so it gets a little more), after
-/// a share of the default steps.
+/// Errors below half of GPTQ's at about the same bits (GPTQ has one scale a row and one width, so it gets a little
+/// more), after a share of the default steps.
 fn halves_gptq(dir: &Path, steps: usize) -> Result<()> {
     let policy = Policy::load(dir)?;
     let recordings = Recordings::load(&policy)?;
-    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, |_| {})?;
-    let gptq = Quantizer::new(&policy, &recordings, Method::Gptq, |_| {})?;
+    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, None, |_| {})?;
+    let gptq = Quantizer::new(&policy, &recordings, Method::Gptq, None, |_| {})?;
     for (bits, width) in [(3.0, Width::W3), (2.0, Width::W2)] {
         let ours = report(dir, &image(&quantizer, &best(bits, steps))?)?;
         let theirs = report(dir, &image(&gptq, &Options::new(Method::Gptq, Budget::Width(width)))?)?;
@@ -132,7 +132,7 @@ fn shared_policies_stay_below_their_errors() -> Result<()> {
         let dir = policies.join(name);
         let policy = Policy::load(&dir)?;
         let recordings = Recordings::load(&policy)?;
-        let quantizer = Quantizer::new(&policy, &recordings, Method::Best, |_| {})?;
+        let quantizer = Quantizer::new(&policy, &recordings, Method::Best, None, |_| {})?;
         for (bits, limit) in limits {
             let options = Options::new(Method::Best, Budget::BitsPerWeight(bits));
             let found = report(&dir, &image(&quantizer, &options)?)?;

@@ -45,8 +45,8 @@ fn observations(dir: &Path, policy: &Policy) -> Result<Vec<Vec<f32>>> {
     Ok(all.iter().step_by(all.len() / STEPS).take(STEPS).cloned().collect())
 }
 
-/// Predicts the step of every image, and compares with the mean over recorded observations. Gives the counted instructions per
-/// weight of the f32 policy.
+/// Predicts the step of every image, and compares with the mean over recorded observations. Gives the counted
+/// instructions per weight of the f32 policy.
 fn predictions_hold(dir: &Path, images: &[Options]) -> Result<Vec<f64>> {
     let (elf, counter) = (firmware::harness(Target::Fpu)?, Counter::build()?);
     let policy = Policy::load(dir)?;
@@ -141,8 +141,8 @@ fn steps_of_shared_policies_take_what_was_predicted() -> Result<()> {
     Ok(())
 }
 
-/// Runs every image in polls of several budgets: each stays within its budget, and the actions have the same bits as on the
-/// host. Gives how many budgets were not below the least.
+/// Runs every image in polls of several budgets: each stays within its budget, and the actions have the same bits as on
+/// the host. Gives how many budgets were not below the least.
 fn polls_keep_their_budget(dir: &Path, images: &[Options]) -> Result<usize> {
     let (elf, counter) = (firmware::harness(Target::Fpu)?, Counter::build()?);
     let policy = Policy::load(dir)?;
@@ -203,7 +203,7 @@ fn polls_of_shared_policies_stay_within_their_budget() -> Result<()> {
 fn a_budget_of_time_is_kept_and_used() -> Result<()> {
     let policy = Policy::load(&ur3())?;
     let recordings = Recordings::load(&policy)?;
-    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, |_| {})?;
+    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, None, |_| {})?;
     let within = |milliseconds| {
         let budget = Budget::Time(TimeLimit { milliseconds, clock_hz: CLOCK });
         quantizer.quantize(&Options { budget, ..best(1.0) }, |_, _| {})
@@ -220,8 +220,8 @@ fn a_budget_of_time_is_kept_and_used() -> Result<()> {
     Ok(())
 }
 
-/// A matrix of rows of all widths against matrices of its blocks alone, counted; with the rows of a width behind each other, and
-/// scattered, so that they need an index.
+/// A matrix of rows of all widths against matrices of its blocks alone, counted; with the rows of a width behind each
+/// other, and scattered, so that they need an index.
 #[test]
 fn mixed_widths_cost_little_more_than_their_blocks() -> Result<()> {
     const ROWS: usize = 64;

@@ -33,8 +33,8 @@ fn a_step_of_a_head_reads_each_weight_once() -> Result<()> {
     let count = || evaluation::count(&counter, Target::Fpu, &elf, Some(path), &image, recorded.episode(0));
     let region = count()?;
 
-    // The network has run: no instruction makes more than four MACs. A line holds 16 weights of 8 bits; biases, scales and the
-    // rest of what is read are a tenth at most.
+    // The network has run: no instruction makes more than four MACs. A line holds 16 weights of 8 bits; biases, scales
+    // and the rest of what is read are a tenth at most.
     let weights = policy.graph.weights() as u64;
     assert!(region.instructions > weights / 4, "{}", region.instructions);
     assert!((weights / 16..weights / 16 * 11 / 10).contains(&region.data_lines), "{} of {weights}", region.data_lines);

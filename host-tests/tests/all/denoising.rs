@@ -1,5 +1,6 @@
-//! Flow and diffusion policies: their steps against the textbooks' formulas in f64, with weights that are hoisted and tables that are
-//! computed when the image is built; noise; and the same bits however a step is cut, on the host and on the target.
+//! Flow and diffusion policies: their steps against the textbooks' formulas in f64, with weights that are hoisted and
+//! tables that are computed when the image is built; noise; and the same bits however a step is cut, on the host and on
+//! the target.
 
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -30,7 +31,8 @@ const ACT: usize = 2;
 const LEN: usize = CHUNK * ACT;
 const FREQUENCIES: usize = 3;
 
-/// A residual network of time, observation and iterate, whose first layer reads all three and whose second norm reads a time code.
+/// A residual network of time, observation and iterate, whose first layer reads all three and whose second norm reads a
+/// time code.
 fn policy(kind: &str, more: Value) -> Value {
     let mut json = json!({
         "name": "denoiser", "kind": kind, "chunk": CHUNK, "execute": 2, "obs_dim": OBS, "act_dim": ACT,
@@ -224,7 +226,8 @@ fn steps_are_those_of_the_textbooks() -> Result<()> {
                 let of_f32 = off(&evaluator.step(&[obs.clone(), noise.clone()].concat(), &mut |_, _| {}));
                 assert!(of_f32 < 1e-4, "f32 is off by {of_f32:.1e}: {json}");
                 let of_image = off(head.infer_with_noise(&obs, &noise)?);
-                // 8-bit weights over many steps that build on each other; a wrong coefficient is off by tens of percent.
+                // 8-bit weights over many steps that build on each other; a wrong coefficient is off by tens of
+                // percent.
                 assert!(of_image < 0.08, "the image is off by {of_image:.1e}: {json}");
             }
             Ok(())

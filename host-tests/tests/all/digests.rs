@@ -1,5 +1,5 @@
-//! The same policy and options give the same image, from one release to the next: rounding to nearest has no learning in it, so
-//! that its images are the same on every machine, too.
+//! The same policy and options give the same image, from one release to the next: rounding to nearest has no learning
+//! in it, so that its images are the same on every machine, too.
 
 use std::fs;
 use std::path::Path;

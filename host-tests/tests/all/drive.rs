@@ -1,4 +1,5 @@
-//! Driving, recording, and learning again: `actq serve --record`, `actq tune`, `actq eval --driven`, several recordings.
+//! Driving, recording, and learning again: `actq serve --record`, `actq tune`, `actq eval --driven`, several
+//! recordings.
 #![cfg(unix)]
 
 use std::fs::{self, File};

@@ -9,7 +9,6 @@ use actq::graph::{Graph, NodeKind, WeightMatrix};
 use actq::methods::{Method, Options, quantize};
 use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
-use actq_kernels::image::Kind;
 use actq_kernels::math::Function;
 use actq_kernels::{Head, StepError, Width};
 
@@ -17,8 +16,8 @@ use actq_kernels::{Head, StepError, Width};
 const N: usize = 2;
 const MAX_STEP: f32 = 0.25;
 
-/// An image of a policy that multiplies the observation with `gain`, then with `factor`, and then does `nodes`. (The self-test's
-/// observations are about `1 / gain`.)
+/// An image of a policy that multiplies the observation with `gain`, then with `factor`, and then does `nodes`. (The
+/// self-test's observations are about `1 / gain`.)
 fn image(gain: f32, factor: f32, nodes: Vec<NodeKind>, contract: ActionContract) -> ImageBuffer {
     let mut graph = Graph::new(N);
     graph.matrices.push(WeightMatrix { name: "w".into(), rows: N, cols: N, data: vec![factor, 0.0, 0.0, factor] });
@@ -30,19 +29,7 @@ fn image(gain: f32, factor: f32, nodes: Vec<NodeKind>, contract: ActionContract)
     }
     let options = Options::new(Method::Rtn, Budget::Width(Width::W8));
     let (_, outcomes) = quantize(&graph, None, Rate::Width(Width::W8), &options).expect("it is a graph");
-    let policy = Policy {
-        dir: ".".into(),
-        name: "faults".into(),
-        kind: Kind::Step,
-        chunk: 1,
-        execute: 1,
-        act_len: N,
-        rate_hz: 50.0,
-        contract,
-        weights: graph.weights(),
-        graph,
-        digest: [0; 32],
-    };
+    let policy = Policy { contract, ..Policy::of("faults", graph) };
     ImageBuffer::new(&actq::emit::image(&policy, &outcomes).expect("the policy fits the format"))
 }
 

@@ -32,14 +32,15 @@ fn drives(name: &str, outcomes: &[Outcome], limit_mm: f64) -> Result<()> {
     Ok(())
 }
 
-/// Statistics of every denoising step take a share of the time that learning has; those of other policies are of all frames.
+/// Statistics of every denoising step take a share of the time that learning has; those of other policies are of all
+/// frames.
 #[test]
 fn statistics_keep_their_share_of_the_time() -> Result<()> {
     let policy = Policy::load(&ur3_flow())?;
     let recordings = Recordings::load(&policy)?;
     let all = recordings.calib.as_ref().context("a recording")?.frames();
     let sampled = |minutes| -> Result<Sampled> {
-        let quantizer = Quantizer::before(&policy, &recordings, Method::Best, minutes, |_| {})?;
+        let quantizer = Quantizer::new(&policy, &recordings, Method::Best, minutes, |_| {})?;
         quantizer.method().sampled().context("an iterative head")
     };
     let (free, bound) = (sampled(None)?, sampled(Some(1e-4))?);
@@ -49,7 +50,7 @@ fn statistics_keep_their_share_of_the_time() -> Result<()> {
     // 0.6 ms each are less than the fewest take.
     ensure!(bound.inputs == 64 && bound.outputs == 2 * 128, "{bound:?}");
     let (policy, recordings) = (Policy::load(&ur3())?, Recordings::load(&Policy::load(&ur3())?)?);
-    let quantizer = Quantizer::before(&policy, &recordings, Method::Gptq, Some(1e-4), |_| {})?;
+    let quantizer = Quantizer::new(&policy, &recordings, Method::Gptq, Some(1e-4), |_| {})?;
     ensure!(quantizer.method().sampled().is_none());
     Ok(())
 }
@@ -64,7 +65,7 @@ fn the_ur3s_flow_drives_at_few_bits() -> Result<()> {
     drives("f32", &SEEDS.map(episode).collect::<Vec<_>>(), F32_MM)?;
     let policy = Policy::load(&ur3_flow())?;
     let recordings = Recordings::load(&policy)?;
-    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, |_| {})?;
+    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, None, |_| {})?;
     for (bits, limit_mm) in [(3.0, W3_MM), (2.0, W2_MM)] {
         let options = Options { steps: Some(STEPS), ..Options::new(Method::Best, Budget::BitsPerWeight(bits)) };
         let buffer = quantizer.quantize(&options, |_, _| {})?.buffer();

@@ -51,17 +51,9 @@ fn library_bytes() -> Vec<u8> {
     graph.matrices.push(WeightMatrix { name: "w".into(), rows: 3, cols: 2, data: vec![0.0; 6] });
     graph.add(Linear { matrix: 0, bias: BIAS.to_vec() }, &[0]).expect("it fits");
     let policy = Policy {
-        dir: ".".into(),
-        name: "tiny".into(),
-        kind: Kind::Step,
-        chunk: 1,
-        execute: 1,
-        act_len: 3,
-        rate_hz: 50.0,
         contract: ActionContract { low: Some(vec![-40.0; 3]), high: Some(vec![40.0; 3]), ..ActionContract::default() },
-        graph,
-        weights: 6,
         digest: std::array::from_fn(|i| i as u8),
+        ..Policy::of("tiny", graph)
     };
     let quantized = Quantized {
         rows: 3,
@@ -179,7 +171,8 @@ fn lanes(cell: &str) -> Lanes {
     }
 }
 
-/// Where a bit of a code stands in a cell: a bit of a word, possibly the exclusive or with another one, possibly inverted.
+/// Where a bit of a code stands in a cell: a bit of a word, possibly the exclusive or with another one, possibly
+/// inverted.
 struct Place {
     at: (usize, usize),
     xor: Option<(usize, usize)>,

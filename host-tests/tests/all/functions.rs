@@ -36,7 +36,8 @@ fn limit(name: &str) -> u64 {
     }
 }
 
-/// Functions of an element: an LSTM cell has three gates by sigmoid and two hyperbolic tangents, a GRU cell two gates and one.
+/// Functions of an element: an LSTM cell has three gates by sigmoid and two hyperbolic tangents, a GRU cell two gates
+/// and one.
 fn functions(name: &str) -> u64 {
     match name {
         "lstm" => 5,

@@ -1,260 +1,27 @@
-//! Damaged images, and images with a correct checksum that say something impossible: none may pass `Image::new_checked`. (That
-//! whatever passes runs without a panic, `kernels/tests/mutants.rs` shows.)
+//! Damaged images, and images with a correct checksum that say something impossible: none may pass
+//! `Image::new_checked`. (That whatever passes runs without a panic, `kernels/tests/mutants.rs` shows.)
 
-use std::sync::LazyLock;
+mod damaged;
+mod draft;
+
 use std::time::Instant;
 
 use actq::budget::{Budget, Rate};
 use actq::contract::ActionContract;
-use actq::graph::ops::{LayerNorm, Linear, Lstm, Normalize, Pointwise};
-use actq::graph::{Graph, NodeKind, WeightMatrix};
-use actq::methods::{Method, Options, Outcome, quantize};
+use actq::graph::ops::Linear;
+use actq::graph::{Graph, WeightMatrix};
+use actq::methods::{Method, Options, quantize};
 use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
 use actq_bench::golden::Random;
-use actq_bench::root;
-use actq_kernels::image::{Kind, checksum, header as h, op};
+use actq_kernels::image::{header as h, op};
 use actq_kernels::layout::Width;
-use actq_kernels::math::Function;
-use actq_kernels::{Head, Image, ImageError as E, StepError};
+use actq_kernels::{Image, ImageError as E};
 
-const OBS: usize = 10;
-const UNITS: usize = 24;
-const ACT: usize = 4;
-const CHUNK: usize = 2;
-
-/// A policy with every kind of section: normalization, matrices of all widths with group scales, an LSTM, a matrix of mixed
-/// widths with its output steps, a chunk and the whole contract.
-fn valid_image() -> Vec<u8> {
-    let mut random = Random::new(7);
-    let mut values = |n: usize| (0..n).map(|_| random.unit()).collect::<Vec<f32>>();
-    let mut graph = Graph::new(OBS);
-    for (rows, cols) in [(UNITS, OBS), (4 * UNITS, UNITS), (4 * UNITS, UNITS), (CHUNK * ACT, UNITS)] {
-        let name = format!("w{}", graph.matrices.len());
-        graph.matrices.push(WeightMatrix { name, rows, cols, data: values(rows * cols) });
-    }
-    let nodes: [NodeKind; 6] = [
-        Normalize { mean: values(OBS), scale: vec![0.5; OBS], pre_clip: 20.0, clip: 5.0 }.into(),
-        Linear { matrix: 0, bias: values(UNITS) }.into(),
-        Pointwise(Function::Elu).into(),
-        LayerNorm { weight: values(UNITS), bias: values(UNITS), eps: 1e-5 }.into(),
-        Lstm { hidden: UNITS, input: 1, state: 2, bias: values(4 * UNITS) }.into(),
-        Linear { matrix: 3, bias: values(CHUNK * ACT) }.into(),
-    ];
-    for (input, kind) in nodes.into_iter().enumerate() {
-        graph.add(kind, &[input]).expect("it fits");
-    }
-    let at_width = |width| {
-        let options = Options { group: 32, ..Options::new(Method::Rtn, Budget::Width(width)) };
-        quantize(&graph, None, Rate::Width(width), &options).expect("the graph can be quantized").1
-    };
-    let [w2, w3, w4, w8] = Width::ALL.map(at_width);
-    let matrices = [w4[0].clone(), w3[1].clone(), w2[2].clone(), interleaved(&w2[3], &w8[3])];
-    let policy = Policy {
-        dir: ".".into(),
-        name: "malformed".into(),
-        kind: Kind::Chunk,
-        chunk: CHUNK,
-        execute: CHUNK,
-        act_len: ACT,
-        rate_hz: 50.0,
-        contract: ActionContract {
-            scale: Some(vec![0.5; ACT]),
-            offset: Some(vec![0.1; ACT]),
-            low: Some(vec![-1.0; ACT]),
-            high: Some(vec![1.0; ACT]),
-            max_step: Some(vec![0.25; ACT]),
-            ..ActionContract::default()
-        },
-        weights: graph.weights(),
-        graph,
-        digest: [7; 32],
-    };
-    actq::emit::image(&policy, &matrices).expect("the policy fits the format")
-}
-
-/// Even rows of `a`, odd rows of `b`, for activations beyond int8, so that they are packed in single lanes.
-fn interleaved(a: &Outcome, b: &Outcome) -> Outcome {
-    let (mut out, other) = (a.clone(), &b.quantized);
-    out.x_max = 255;
-    let mixed = &mut out.quantized;
-    let (cols, groups) = (mixed.cols, mixed.groups());
-    for row in (1..mixed.rows).step_by(2) {
-        mixed.widths[row] = other.widths[row];
-        mixed.scales[row] = other.scales[row];
-        mixed.codes[row * cols..][..cols].copy_from_slice(&other.codes[row * cols..][..cols]);
-        mixed.group_scales[row * groups..][..groups].copy_from_slice(&other.group_scales[row * groups..][..groups]);
-    }
-    out
-}
-
-/// An image whose words can be changed.
-#[derive(Clone)]
-struct Draft(Vec<u32>);
-
-static VALID: LazyLock<Draft> = LazyLock::new(|| {
-    let bytes = valid_image();
-    Draft(bytes.chunks_exact(4).map(|w| u32::from_ne_bytes([w[0], w[1], w[2], w[3]])).collect())
-});
-
-/// Operations of the valid image: linear operations are the first layer, the LSTM's two products and the output layer.
-const FIRST: (u8, usize) = (op::LINEAR, 0);
-const INPUT: (u8, usize) = (op::LINEAR, 1);
-const STATE: (u8, usize) = (op::LINEAR, 2);
-const OUTPUT: (u8, usize) = (op::LINEAR, 3);
-const NORMALIZE: (u8, usize) = (op::NORMALIZE, 0);
-const LAYER_NORM: (u8, usize) = (op::LAYER_NORM, 0);
-const FUNCTION: (u8, usize) = (op::FUNCTION, 0);
-const LSTM: (u8, usize) = (op::LSTM_CELL, 0);
-
-impl Draft {
-    fn bytes(&self) -> &[u8] {
-        bytemuck::cast_slice(&self.0)
-    }
-
-    fn check(&self) -> Result<Image<'_>, E> {
-        Image::new_checked(self.bytes())
-    }
-
-    fn get(&self, at: usize) -> u32 {
-        u32::from_le(self.0[at])
-    }
-
-    fn offset(&self, at: usize) -> usize {
-        self.get(at) as usize
-    }
-
-    fn low(&self, at: usize) -> u32 {
-        self.get(at) & 0xffff
-    }
-
-    fn high(&self, at: usize) -> u32 {
-        self.get(at) >> 16
-    }
-
-    fn set(&mut self, at: usize, value: u32) {
-        self.0[at] = value.to_le();
-    }
-
-    fn set_f32(&mut self, at: usize, value: f32) {
-        self.set(at, value.to_bits());
-    }
-
-    fn set_low(&mut self, at: usize, value: u32) {
-        self.set(at, (self.get(at) & 0xffff_0000) | value);
-    }
-
-    fn set_high(&mut self, at: usize, value: u32) {
-        self.set(at, self.low(at) | value << 16);
-    }
-
-    /// Makes the checksum fit.
-    fn seal(&mut self) {
-        self.set(h::W_CRC, checksum(self.bytes()));
-    }
-
-    /// Where the record of the `nth` operation with this code stands.
-    fn op(&self, (code, nth): (u8, usize)) -> usize {
-        let records = (0..self.high(h::W_KIND) as usize).map(|i| self.offset(h::W_OPS) + i * h::OP_WORDS);
-        records.filter(|&at| self.get(at) as u8 == code).nth(nth).expect("the image has the operation")
-    }
-
-    /// Where the constants or the matrix record of an operation stand.
-    fn data(&self, which: (u8, usize)) -> usize {
-        self.offset(self.op(which) + 3)
-    }
-
-    /// Where block record `i` of a linear operation stands.
-    fn block(&self, which: (u8, usize), i: usize) -> usize {
-        self.offset(self.data(which) + 3) + i * h::BLOCK_WORDS
-    }
-}
-
-#[test]
-fn the_starting_point_is_valid_and_about_four_kib() {
-    let image = VALID.check().expect("the image is valid");
-    assert!((4096..5120).contains(&image.bytes()), "{} bytes", image.bytes());
-    let mut scratch = vec![!0; image.scratch_words()];
-    let mut head = Head::new(image, &mut scratch).expect("the scratch memory has the image's size");
-    head.self_test().expect("the self-test passes");
-}
-
-/// The kernels' own tests change it at random. `ACTQ_BLESS=1` writes it anew.
-#[test]
-fn the_kernels_tests_have_this_image() {
-    let path = root().join("kernels/tests/valid.actq");
-    if std::env::var_os("ACTQ_BLESS").is_some() {
-        std::fs::write(&path, VALID.bytes()).expect("the file can be written");
-    }
-    let there = std::fs::read(&path).expect("the file can be read");
-    assert!(there == VALID.bytes(), "{} is of another format: run the test with ACTQ_BLESS=1", path.display());
-}
-
-#[test]
-fn every_single_bit_flip_is_refused() {
-    let mut draft = VALID.clone();
-    for at in 0..draft.0.len() {
-        for bit in 0..32 {
-            draft.0[at] ^= 1 << bit;
-            assert!(draft.check().is_err(), "bit {bit} of word {at}");
-            draft.0[at] ^= 1 << bit;
-        }
-    }
-    assert!(draft.check().is_ok());
-}
-
-#[test]
-fn every_truncation_and_every_extension_up_to_64_bytes_is_refused() {
-    let len = VALID.bytes().len();
-    for fill in [0, !0, 0x5a5a_5a5a] {
-        let mut draft = VALID.clone();
-        draft.0.extend([fill; 16]);
-        for n in (0..=len + 64).filter(|n| *n != len) {
-            let expected = if n < 4 * h::WORDS { E::TooShort } else { E::Length };
-            assert_eq!(Image::new_checked(&draft.bytes()[..n]).err(), Some(expected), "{n} bytes");
-        }
-        // A header that claims the other length has no checksum to go with it.
-        for words in (h::WORDS..draft.0.len()).filter(|n| *n != len / 4) {
-            let mut other = Draft(draft.0[..words].to_vec());
-            other.set(h::W_BYTES, 4 * words as u32);
-            assert_eq!(other.check().err(), Some(E::Checksum), "{words} words");
-        }
-    }
-}
-
-#[test]
-fn a_misaligned_start_is_refused() {
-    let len = VALID.bytes().len();
-    let mut memory = Draft(vec![0; len / 4 + 1]);
-    for shift in 1..4 {
-        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut memory.0);
-        bytes[shift..shift + len].copy_from_slice(VALID.bytes());
-        assert_eq!(Image::new_checked(&memory.bytes()[shift..shift + len]).err(), Some(E::Misaligned), "{shift}");
-    }
-}
-
-/// A change of an image.
-type Change = fn(&mut Draft);
-
-/// What is wrong, the error that must say so, and how the valid image is made so.
-type Case = (&'static str, E, Change);
-
-/// Applies every case to the valid image, makes the checksum fit, and reports all cases that are not refused as expected.
-fn refused(cases: &[Case]) {
-    let wrong = cases.iter().filter_map(|(name, expected, change)| {
-        let mut draft = VALID.clone();
-        change(&mut draft);
-        draft.seal();
-        let got = draft.check().err();
-        (got != Some(*expected)).then(|| format!("{name}: expected {expected:?}, got {got:?}"))
-    });
-    let wrong: Vec<_> = wrong.collect();
-    assert!(wrong.is_empty(), "{} of {}:\n{}", wrong.len(), cases.len(), wrong.join("\n"));
-}
-
-const NAN: f32 = f32::NAN;
-/// Offsets whose sum with a length does not fit 32 bits.
-const HUGE: u32 = u32::MAX - 1;
+use draft::{
+    ACT, CHUNK, Draft, FIRST, FUNCTION, HUGE, INPUT, LAYER_NORM, LSTM, NAN, NORMALIZE, OBS, OUTPUT, STATE, UNITS,
+    VALID, refused,
+};
 
 #[test]
 fn headers_that_cannot_be_are_refused() {
@@ -594,45 +361,6 @@ fn fields_that_an_operation_does_not_use_are_zero() {
     ]);
 }
 
-/// Flash that decays, or is rewritten behind the head's back: what no longer parses is an error, not a stale action.
-#[test]
-fn damage_after_the_check_is_an_error() {
-    let cases: &[(&str, Change)] = &[
-        ("an operation's code", |d| d.set_low(d.op(FUNCTION), 0)),
-        ("a function's code", |d| d.set_low(d.op(FUNCTION), u32::from(op::FUNCTION) | 99 << 8)),
-        ("a destination", |d| d.set_low(d.op(FUNCTION) + 1, 0xffff)),
-        ("a source", |d| d.set_high(d.op(NORMALIZE) + 1, 0xffff)),
-        ("a cell state", |d| d.set_high(d.op(LSTM) + 2, 0xffff)),
-        ("constants", |d| d.set(d.op(NORMALIZE) + 3, HUGE)),
-        ("constants of a norm", |d| d.set(d.op(LAYER_NORM) + 3, d.0.len() as u32)),
-        ("a matrix", |d| d.set(d.op(FIRST) + 3, HUGE)),
-        ("a matrix's rows", |d| d.set_low(d.data(FIRST), UNITS as u32 - 1)),
-        ("a matrix's group", |d| d.set_low(d.data(FIRST) + 1, 7)),
-        ("a matrix's blocks", |d| d.set(d.data(FIRST) + 3, HUGE)),
-        ("biases", |d| d.set(d.op(FIRST) + 2, HUGE)),
-        ("a width", |d| d.set_low(d.block(FIRST, 0), 5)),
-        ("a block's rows", |d| d.set_high(d.block(FIRST, 0), UNITS as u32 + 1)),
-        ("weights", |d| d.set(d.block(FIRST, 0) + 1, HUGE)),
-        ("scales", |d| d.set(d.block(FIRST, 0) + 2, HUGE)),
-        ("output steps", |d| d.set(d.offset(d.block(OUTPUT, 1) + 3), u32::MAX)),
-        ("the observation's place", |d| d.set_low(h::W_OBS_OUT, 0xffff)),
-        ("the output's place", |d| d.set_high(h::W_OBS_OUT, 0xffff)),
-        ("the action's place", |d| d.set_low(h::W_ACTION_WORK, 0xffff)),
-        ("the work area's place", |d| d.set_high(h::W_ACTION_WORK, 0xffff)),
-    ];
-    for (name, damage) in cases {
-        let mut draft = VALID.clone();
-        damage(&mut draft);
-        let image = Image::unchecked(draft.bytes()).expect("the header is there");
-        let mut scratch = vec![0; image.scratch_words()];
-        let mut head = Head::new(image, &mut scratch).expect("the scratch memory has the image's size");
-        assert_eq!(head.step(&[0.5; OBS]).err(), Some(StepError::Damaged), "{name}");
-        // In pieces, too, and again and again.
-        let in_pieces = head.begin(&[0.5; OBS]).and_then(|()| head.poll(u32::MAX).map(|_| ()));
-        assert_eq!(in_pieces, Err(StepError::Damaged), "{name}");
-    }
-}
-
 /// Else 500 operations could make the check of a small image last for seconds.
 #[test]
 fn a_matrix_is_checked_once_however_many_operations_share_it() {
@@ -653,19 +381,8 @@ fn a_matrix_is_checked_once_however_many_operations_share_it() {
         let options = Options { group: 32, ..Options::new(Method::Rtn, Budget::Width(Width::W8)) };
         let (_, outcomes) =
             quantize(&graph, None, Rate::Width(Width::W8), &options).expect("the graph can be quantized");
-        let policy = Policy {
-            dir: ".".into(),
-            name: "shared".into(),
-            kind: Kind::Step,
-            chunk: 1,
-            execute: 1,
-            act_len: N,
-            rate_hz: 50.0,
-            contract: ActionContract { scale: Some(vec![1e-30; N]), ..ActionContract::default() },
-            weights: graph.weights(),
-            graph,
-            digest: [0; 32],
-        };
+        let contract = ActionContract { scale: Some(vec![1e-30; N]), ..ActionContract::default() };
+        let policy = Policy { contract, ..Policy::of("shared", graph) };
         let bytes = actq::emit::image(&policy, &outcomes).expect("the policy fits the format");
         let buffer = ImageBuffer::new(&bytes);
         let start = Instant::now();

@@ -13,7 +13,8 @@ use actq_bench::{shared_policies, ur3};
 use actq_kernels::Width;
 use anyhow::{Result, ensure};
 
-/// Words of the arena, and of what operations write: where most of that is needed, how many words are, and how many there are.
+/// Words of the arena, and of what operations write: where most of that is needed, how many words are, and how many
+/// there are.
 fn scratch_is(dir: &Path, words: usize, [op, needed, placed]: [usize; 3]) -> Result<()> {
     let policy = Policy::load(dir)?;
     let options = Options::new(Method::Rtn, Budget::Width(Width::W3));

@@ -281,19 +281,7 @@ fn single_matrix_image(case: &Case) -> Vec<u8> {
     let mut graph = Graph::new(cols);
     graph.matrices.push(WeightMatrix { name: "w".into(), rows, cols, data: vec![0.0; rows * cols] });
     graph.add(Linear { matrix: 0, bias: vec![0.5; rows] }, &[0]).expect("it fits");
-    let policy = actq::policy::Policy {
-        dir: ".".into(),
-        name: "single".into(),
-        kind: actq_kernels::image::Kind::Step,
-        chunk: 1,
-        execute: 1,
-        act_len: rows,
-        rate_hz: 50.0,
-        contract: actq::contract::ActionContract::default(),
-        graph,
-        weights: rows * cols,
-        digest: [0; 32],
-    };
+    let policy = actq::policy::Policy::of("single", graph);
     let quantized = Quantized {
         rows,
         cols,

@@ -1,5 +1,5 @@
-//! The action contract, chunk playback, and saved states, against plain arithmetic in f64. The networks are none: the observation is
-//! the raw output, bit for bit.
+//! The action contract, chunk playback, and saved states, against plain arithmetic in f64. The networks are none: the
+//! observation is the raw output, bit for bit.
 
 use std::fs;
 use std::task::Poll;
@@ -29,19 +29,7 @@ fn echo(chunk: usize, execute: usize, contract: ActionContract) -> ImageBuffer {
     let same = Normalize { mean: vec![0.0; len], scale: vec![1.0; len], pre_clip: unlimited, clip: unlimited };
     graph.add(NodeKind::from(same), &[0]).expect("it fits");
     let kind = if chunk > 1 { Kind::Chunk } else { Kind::Step };
-    let policy = Policy {
-        dir: ".".into(),
-        name: "echo".into(),
-        kind,
-        chunk,
-        execute,
-        act_len: ACT,
-        rate_hz: 50.0,
-        contract,
-        weights: 0,
-        graph,
-        digest: [0; 32],
-    };
+    let policy = Policy { kind, chunk, execute, act_len: ACT, contract, ..Policy::of("echo", graph) };
     policy.check().expect("the policy fits together");
     ImageBuffer::new(&actq::emit::image(&policy, &[]).expect("the policy fits the format"))
 }

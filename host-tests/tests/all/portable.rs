@@ -4,8 +4,8 @@ use actq_bench::qemu::{self, Counter, Region};
 use actq_bench::{Target, firmware, golden};
 use anyhow::{Result, ensure};
 
-/// Instructions of a whole call of 256 x 256 weights by width, lanes and group. The firmware compares the results with the
-/// reference's, bit for bit.
+/// Instructions of a whole call of 256 x 256 weights by width, lanes and group. The firmware compares the results with
+/// the reference's, bit for bit.
 fn counts(target: Target) -> Result<Vec<(String, f64)>> {
     let elf = firmware::portable_binary("portable", target)?;
     let counter = Counter::build()?;

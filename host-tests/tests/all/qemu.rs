@@ -97,7 +97,8 @@ fn the_target_allows_int32_to_the_last_product_as_the_host_does() -> Result<()> 
         let buffer = ImageBuffer::new(&bytes);
         let image = buffer.image(Path::new("ur3"))?;
         let matrices: Vec<_> = image.ops().filter_map(|op| op.matrix()).collect();
-        // Of the matrix with the most columns the shape alone does not prove it; which operation has it, the records say.
+        // Of the matrix with the most columns the shape alone does not prove it; which operation has it, the records
+        // say.
         let widest = (0..matrices.len()).max_by_key(|i| matrices[*i].cols).context("there is a matrix")?;
         let blocks = matrices[widest].blocks().map(|rows| worst_case(&rows.block, 1));
         let largest = i64::from(i32::MAX) / blocks.max().context("there is a block")?;
@@ -115,7 +116,8 @@ fn the_target_allows_int32_to_the_last_product_as_the_host_does() -> Result<()> 
             fs::write(slot.path(), &bytes)?;
             let elf = firmware::harness(Target::Fpu)?;
             let output = qemu::run(qemu::command(&elf, Some(slot.path()), "")?, &[])?;
-            // What is allowed comes to its self-test, which may fail, where its actions were computed with another x_max.
+            // What is allowed comes to its self-test, which may fail, where its actions were computed with another
+            // x_max.
             let text = String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned();
             let expected = if refused { "can overflow its int32" } else { "self-test" };
             assert!(text.contains(expected), "scales of {group}, target: {text}");
@@ -149,8 +151,8 @@ fn an_unknown_argument_is_refused() -> Result<()> {
     Ok(())
 }
 
-/// Runs an image from the slot on recorded observations, in QEMU and on the host, with a reset in the middle; every action must
-/// have the same bits.
+/// Runs an image from the slot on recorded observations, in QEMU and on the host, with a reset in the middle; every
+/// action must have the same bits.
 fn same_bits(target: Target, bytes: &[u8], dataset: &Dataset) -> Result<()> {
     let elf = firmware::harness(target)?;
     let slot = tempfile::NamedTempFile::new()?;
@@ -176,7 +178,8 @@ fn same_bits(target: Target, bytes: &[u8], dataset: &Dataset) -> Result<()> {
     server.finish()
 }
 
-/// All widths with int8 and int16 activations; the build without FPU, which is slower, and the other cores run one image of each.
+/// All widths with int8 and int16 activations; the build without FPU, which is slower, and the other cores run one
+/// image of each.
 fn policy_has_the_same_bits(dir: &Path) -> Result<()> {
     let policy = Policy::load(dir)?;
     let dataset = Recording::Heldout.require(Some(dir), None, Sizes::of(&policy), "this test")?;
@@ -246,8 +249,8 @@ fn gptq_beats_rounding_at_low_bits() -> Result<()> {
     Ok(())
 }
 
-/// Whatever an image or an observation holds, there is nothing in the runtime that panics, nor the text of a panic: also with the
-/// profile of an application that has not set one for the kernels.
+/// Whatever an image or an observation holds, there is nothing in the runtime that panics, nor the text of a panic:
+/// also with the profile of an application that has not set one for the kernels.
 #[test]
 fn no_panic_is_in_the_runtime() -> Result<()> {
     for profile in ["firmware", "release"] {

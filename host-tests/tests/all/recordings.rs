@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use actq::budget::Budget;
-use actq::contract::ActionContract;
 use actq::data::{Dataset, Range, Recording, Recordings, Sizes};
 use actq::graph::ops::{Linear, Lstm};
 use actq::graph::{Graph, Network, WeightMatrix, Weights, zero_state};
@@ -15,7 +14,6 @@ use actq::runtime::ImageBuffer;
 use actq_bench::golden::Random;
 use actq_bench::{shared_policies, ur3};
 use actq_kernels::Width;
-use actq_kernels::image::Kind;
 use anyhow::Result;
 use ndarray::{Array2, Array3};
 
@@ -59,19 +57,7 @@ fn policy() -> Policy {
     bias[HIDDEN..2 * HIDDEN].iter_mut().for_each(|b| *b += 3.0);
     graph.add(Lstm { hidden: HIDDEN, input: 0, state: 1, bias }, &[0]).expect("it fits");
     graph.add(Linear { matrix: 2, bias: values(ACT) }, &[1]).expect("it fits");
-    Policy {
-        dir: ".".into(),
-        name: "lstm".into(),
-        kind: Kind::Step,
-        chunk: 1,
-        execute: 1,
-        act_len: ACT,
-        rate_hz: 50.0,
-        contract: ActionContract::default(),
-        weights: graph.weights(),
-        graph,
-        digest: [0; 32],
-    }
+    Policy::of("lstm", graph)
 }
 
 #[test]

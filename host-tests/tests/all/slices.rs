@@ -1,4 +1,5 @@
-//! Steps in pieces on the host: the same bits however they are cut, and what begin, step, poll and reset do to each other.
+//! Steps in pieces on the host: the same bits however they are cut, and what begin, step, poll and reset do to each
+//! other.
 
 use std::path::Path;
 use std::task::Poll;
@@ -21,7 +22,8 @@ const OBSERVATION: usize = 37;
 /// Steps of a run.
 const STEPS: usize = 7;
 
-/// A network of all operations, with drawn lengths: products with all widths in order and by index, cells, norms, functions.
+/// A network of all operations, with drawn lengths: products with all widths in order and by index, cells, norms,
+/// functions.
 fn network(seed: u64) -> Result<(Policy, Vec<Outcome>)> {
     let mut random = Random::new(seed);
     let mut length = |most: usize| 1 + random.below(most);

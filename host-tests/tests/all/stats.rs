@@ -1,114 +1,25 @@
 //! Statistics of an image, the widths that `actq inspect` shows, the search for the fewest bits, and the sweep's files.
 
+mod fixture;
+mod search;
+mod sweep;
+
 use std::collections::BTreeMap;
-use std::fs::{self, File};
-use std::path::{Path, PathBuf};
-use std::process::Output;
+use std::fs;
+use std::path::Path;
 
 use actq::budget::Budget;
 use actq::data::Recordings;
-use actq::graph::Evaluator;
 use actq::methods::{Method, Options};
 use actq::pipeline::quantize;
 use actq::pipeline::stats::{AllocationRecord, MatrixRecord, Stats};
 use actq::policy::Policy;
 use actq_bench::command::{actq, all, failed, run, succeeded};
-use actq_bench::golden::Random;
 use actq_bench::{root, ur3};
 use anyhow::{Context, Result, ensure};
-use ndarray::Array3;
-use ndarray_npy::NpzWriter;
-use safetensors::Dtype;
-use safetensors::tensor::{TensorView, serialize};
 use serde_json::{Value, json};
-use tempfile::TempDir;
 
-const OBS: usize = 16;
-const HIDDEN: usize = 40;
-const ACT: usize = 3;
-/// Rows of the first matrix that give next to nothing.
-const IDLE: [usize; 3] = [3, 11, 30];
-
-/// A policy 16 -> 40 tanh -> 40 tanh -> 3 with recordings, and a place for files.
-struct Fixture(TempDir);
-
-impl Fixture {
-    fn new() -> Result<Self> {
-        let fixture = Self(TempDir::new()?);
-        let dir = fixture.policy();
-        fs::create_dir(&dir)?;
-        let linear = |name| json!({"op": "linear", "w": name});
-        let ops = [linear("first"), json!({"op": "tanh"}), linear("second"), json!({"op": "tanh"}), linear("last")];
-        let json = json!({
-            "name": "small leg", "kind": "step", "obs_dim": OBS, "act_dim": ACT, "control_hz": 50, "ops": ops,
-        });
-        fs::write(dir.join("policy.json"), json.to_string())?;
-        let mut random = Random::new(4);
-        let mut matrix = |rows: usize, cols: usize| -> Vec<f32> {
-            (0..rows * cols).map(|_| random.unit() * (3.0 / cols as f32).sqrt()).collect()
-        };
-        let (mut first, second, last) = (matrix(HIDDEN, OBS), matrix(HIDDEN, HIDDEN), matrix(ACT, HIDDEN));
-        for row in IDLE {
-            first[row * OBS..][..OBS].iter_mut().for_each(|w| *w *= 1e-3);
-        }
-        let bytes = |data: Vec<f32>| data.into_iter().flat_map(f32::to_le_bytes).collect::<Vec<u8>>();
-        let tensors = [("first", HIDDEN, OBS, first), ("second", HIDDEN, HIDDEN, second), ("last", ACT, HIDDEN, last)]
-            .map(|(name, rows, cols, data)| (name, vec![rows, cols], bytes(data)));
-        let views =
-            tensors.iter().map(|(name, shape, data)| Ok((*name, TensorView::new(Dtype::F32, shape.clone(), data)?)));
-        fs::write(dir.join("policy.safetensors"), serialize(views.collect::<Result<Vec<_>>>()?, None)?)?;
-        let policy = Policy::load(&dir)?;
-        for (name, seed) in [("calib.npz", 5), ("heldout.npz", 6)] {
-            let mut random = Random::new(seed);
-            let obs = Array3::from_shape_simple_fn((2, 150, OBS), || 2.0 * random.unit());
-            let mut evaluator = Evaluator::new(&policy.graph);
-            let actions = obs.rows().into_iter().flat_map(|row| evaluator.step(&row.to_vec(), &mut |_, _| {}));
-            let action = Array3::from_shape_vec((2, 150, ACT), actions.collect())?;
-            let mut npz = NpzWriter::new(File::create(dir.join(name))?);
-            npz.add_array("obs", &obs)?;
-            npz.add_array("action", &action)?;
-            npz.finish()?;
-        }
-        Ok(fixture)
-    }
-
-    fn policy(&self) -> PathBuf {
-        self.path("policy")
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    /// Runs a command, its arguments separated by spaces, in the fixture's folder.
-    fn actq(&self, line: &str) -> Result<Output> {
-        let mut command = actq(&[]);
-        command.current_dir(self.0.path()).args(line.split_whitespace());
-        run(command, b"")
-    }
-
-    fn quantize(&self, options: &str) -> Result<Output> {
-        self.actq(&format!("quantize policy {options}"))
-    }
-
-    /// An image `NAME.actq` and its statistics `NAME.json`.
-    fn image(&self, name: &str, options: &str) -> Result<Value> {
-        succeeded(&self.quantize(&format!("--out {name}.actq --save-stats {name}.json {options}"))?)?;
-        Ok(serde_json::from_slice(&fs::read(self.path(&format!("{name}.json")))?)?)
-    }
-
-    fn nmse(&self, image: &str) -> Result<f64> {
-        let report: Value =
-            serde_json::from_str(&succeeded(&self.actq(&format!("eval {image} --policy policy --json"))?)?)?;
-        report["nmse"].as_f64().context("nmse")
-    }
-
-    fn files(&self) -> Result<Vec<PathBuf>> {
-        let mut files = fs::read_dir(self.0.path())?.map(|e| Ok(e?.path())).collect::<Result<Vec<_>>>()?;
-        files.sort();
-        Ok(files)
-    }
-}
+use fixture::{Fixture, HIDDEN, IDLE};
 
 fn parsed(value: &Value) -> Result<Stats> {
     Ok(serde_json::from_value(value.clone())?)
@@ -307,122 +218,6 @@ fn image_and_statistics_are_written_both_or_not_at_all() -> Result<()> {
     }))?;
     failed(&fixture.quantize("--bits 3 --method rtn --out x.actq --save-stats x.actq")?, 1, &["x.actq"])?;
     assert_eq!(fixture.files()?, before);
-    Ok(())
-}
-
-#[test]
-fn the_fewest_bits_keep_the_error() -> Result<()> {
-    let fixture = Fixture::new()?;
-    for method in ["rtn", "gptq", "actquant"] {
-        let value = fixture.image("fewest", &format!("--method {method} --max-nmse 0.02"))?;
-        assert_eq!(value["budget"], json!({"max_nmse": 0.02}));
-        let nmse = fixture.nmse("fewest.actq")?;
-        ensure!(nmse <= 0.02, "{method}: {nmse}");
-        // The same bytes as with the budget itself; a tenth of a bit less is too few.
-        let said = succeeded(&fixture.quantize(&format!("--out again.actq --method {method} --max-nmse 0.02"))?)?;
-        let line = said.lines().find(|l| l.contains("keep the error within 0.02")).context("no result")?;
-        let budget: f64 = line.split_whitespace().next().context("no budget")?.parse()?;
-        let less = budget - 0.1;
-        ensure!(line.contains(&format!("{less:.1} is too few")), "{line}");
-        fixture.image("same", &format!("--method {method} --bpw {budget:.1}"))?;
-        let image = fs::read(fixture.path("fewest.actq"))?;
-        ensure!(image == fs::read(fixture.path("again.actq"))? && image == fs::read(fixture.path("same.actq"))?);
-        fixture.image("less", &format!("--method {method} --bpw {less:.1}"))?;
-        ensure!(fixture.nmse("less.actq")? > 0.02, "{method}: {less} bits are enough");
-    }
-    Ok(())
-}
-
-/// The steps of every try, from the table of tries.
-fn steps_tried(said: &str) -> Vec<&str> {
-    let cells = said.lines().skip(1).map(|line| line.split_whitespace().nth(1));
-    cells.map_while(|steps| steps).collect()
-}
-
-#[test]
-fn a_method_that_learns_looks_with_few_steps_and_ends_with_all() -> Result<()> {
-    let fixture = Fixture::new()?;
-    let options = "--method best --steps 40 --max-nmse 0.05";
-    let said = succeeded(&fixture.quantize(&format!("--out a.actq {options}"))?)?;
-    let steps = steps_tried(&said);
-    let looks = steps.iter().take_while(|s| **s == "5").count();
-    ensure!((1..=6).contains(&looks) && (1..=5).contains(&(steps.len() - looks)), "{said}");
-    ensure!(steps[looks..].iter().all(|s| *s == "40"), "{said}");
-    ensure!(fixture.nmse("a.actq")? <= 0.05, "{said}");
-    succeeded(&fixture.quantize(&format!("--out b.actq {options} --threads 1"))?)?;
-    ensure!(fs::read(fixture.path("a.actq"))? == fs::read(fixture.path("b.actq"))?, "two runs differ");
-    // Without steps there is nothing to take an eighth of.
-    let said = succeeded(&fixture.quantize("--out c.actq --method best --steps 0 --max-nmse 0.3")?)?;
-    let steps = steps_tried(&said);
-    ensure!(!steps.is_empty() && steps.iter().all(|s| *s == "0"), "{said}");
-    ensure!(fixture.nmse("c.actq")? <= 0.3, "{said}");
-    Ok(())
-}
-
-#[test]
-fn an_error_that_eight_bits_do_not_reach_is_an_error() -> Result<()> {
-    let fixture = Fixture::new()?;
-    let before = fixture.files()?;
-    for method in ["gptq", "best --steps 2"] {
-        let output =
-            fixture.quantize(&format!("--out x.actq --save-stats x.json --method {method} --max-nmse 1e-12"))?;
-        failed(&output, 1, &["8 bits", "0.000000000001", "lowest", "NMSE"])?;
-    }
-    for other in ["--bits 3", "--bpw 3", "--flash 20K"] {
-        failed(&fixture.quantize(&format!("--out x.actq --max-nmse 0.1 {other}"))?, 2, &["--max-nmse"])?;
-    }
-    for wrong in ["0", "-1", "nan", "few"] {
-        failed(&fixture.quantize(&format!("--out x.actq --max-nmse={wrong}"))?, 2, &["max-nmse"])?;
-    }
-    assert_eq!(fixture.files()?, before);
-    Ok(())
-}
-
-#[test]
-fn without_a_held_out_recording_the_error_is_that_of_calibration() -> Result<()> {
-    let fixture = Fixture::new()?;
-    let options = "--out x.actq --method rtn --max-nmse 0.02";
-    ensure!(succeeded(&fixture.quantize(options)?)?.contains("Measured on heldout.npz."));
-    fs::remove_file(fixture.policy().join("heldout.npz"))?;
-    ensure!(succeeded(&fixture.quantize(options)?)?.contains("Measured on calib.npz"));
-    // It is what eval says of that recording.
-    fs::rename(fixture.policy().join("calib.npz"), fixture.policy().join("heldout.npz"))?;
-    let nmse = fixture.nmse("x.actq")?;
-    ensure!(nmse <= 0.02, "{nmse}");
-    fs::remove_file(fixture.policy().join("heldout.npz"))?;
-    failed(&fixture.quantize(options)?, 1, &["recorded observations", "heldout.npz"])
-}
-
-#[test]
-fn a_sweep_of_two_policies_keeps_allocations_and_scores() -> Result<()> {
-    let (fixture, other) = (Fixture::new()?, Fixture::new()?);
-    fs::rename(other.policy(), fixture.path("other"))?;
-    let line =
-        "sweep policy other --bpw 2.5,3.5,5 --methods actquant,best --steps 3 --threads 2 --json s.json --svg s.svg";
-    let said = succeeded(&fixture.actq(line)?)?;
-    let value: Value = serde_json::from_slice(&fs::read(fixture.path("s.json"))?)?;
-    assert_eq!(value.as_array().map(Vec::len), Some(2));
-    let stars = |v: &Value| usize::from(!v["knee"].is_null());
-    let rows = [HIDDEN, HIDDEN, ACT];
-    for sweep in value.as_array().context("no array")? {
-        for curve in sweep["curves"].as_array().context("curves")? {
-            assert_eq!(curve["scores"].as_array().map(Vec::len), (curve["method"] == "actquant").then_some(3));
-            for point in curve["points"].as_array().context("points")?.iter().filter(|p| !p.is_null()) {
-                let counts: Vec<BTreeMap<u32, usize>> = serde_json::from_value(point["rows"].clone())?;
-                assert_eq!(counts.iter().map(|c| c.values().sum::<usize>()).collect::<Vec<_>>(), rows);
-            }
-        }
-    }
-    assert_eq!(value[0], value[1], "the same policy in two folders");
-    let marked = said.lines().filter(|l| !l.starts_with('*')).map(|l| l.matches('*').count()).sum::<usize>();
-    assert_eq!(marked, stars(&value[0]) + stars(&value[1]), "{said}");
-    assert_eq!(fs::read_to_string(fixture.path("s.svg"))?.matches("<polyline").count(), 4);
-    let seed = |n: u32| -> Result<Value> {
-        succeeded(&fixture.actq(&format!("sweep policy --bpw 4 --methods best --steps 3 --seed {n} --json t.json"))?)?;
-        Ok(serde_json::from_slice(&fs::read(fixture.path("t.json"))?)?)
-    };
-    let (one, again, two) = (seed(1)?, seed(1)?, seed(2)?);
-    ensure!(one == again && one != two, "the seed does not reach the images");
     Ok(())
 }
 

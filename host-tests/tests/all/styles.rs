@@ -5,8 +5,8 @@ use actq_bench::firmware::{self, STYLE_NAMES, built_in};
 use actq_bench::qemu;
 use anyhow::{Context, Result, ensure};
 
-/// The first action that the motors get has the host's bits, and control ticks have come while the head ran: a step of 377 thousand
-/// instructions, of which one takes QEMU 32 ns here, and a tick each millisecond.
+/// The first action that the motors get has the host's bits, and control ticks have come while the head ran: a step of
+/// 377 thousand instructions, of which one takes QEMU 32 ns here, and a tick each millisecond.
 #[test]
 fn every_style_acts_with_the_bits_of_the_host_below_its_tick() -> Result<()> {
     let buffer = ImageBuffer::read(built_in()?)?;

@@ -5,8 +5,8 @@ use core::fmt;
 use crate::layout::{Block, STRIP};
 use crate::x::Prepared;
 
-/// The block and the prepared vector do not belong together (other columns, another group size or layout), or the rows are
-/// no whole strips.
+/// The block and the prepared vector do not belong together (other columns, another group size or layout), or the rows
+/// are no whole strips.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Mismatch;
@@ -19,8 +19,8 @@ impl fmt::Display for Mismatch {
 
 impl core::error::Error for Mismatch {}
 
-/// A run of a block's rows, a vector that was prepared for its shape, and room for the sums. All of it fits, so that no backend
-/// can fail.
+/// A run of a block's rows, a vector that was prepared for its shape, and room for the sums. All of it fits, so that no
+/// backend can fail.
 #[derive(Debug)]
 pub struct Product<'a> {
     pub(super) block: &'a Block<'a>,
@@ -30,8 +30,8 @@ pub struct Product<'a> {
 }
 
 impl<'a> Product<'a> {
-    /// As many rows as `acc` has values. The run starts at a multiple of [`STRIP`]; it ends at another or where the block does,
-    /// padded to a multiple of [`QUAD`](crate::layout::QUAD) rows.
+    /// As many rows as `acc` has values. The run starts at a multiple of [`STRIP`]; it ends at another or where the
+    /// block does, padded to a multiple of [`QUAD`](crate::layout::QUAD) rows.
     #[inline(always)]
     pub fn new(
         block: &'a Block<'a>,

@@ -5,8 +5,8 @@ use crate::image::Image;
 use crate::math::clamp;
 use crate::ops::elementwise::copy;
 
-/// Takes the network's output `next` through the contract, against the `last` action where there is one (`started`), which it becomes.
-/// `switches` remembers what is on.
+/// Takes the network's output `next` through the contract, against the `last` action where there is one (`started`),
+/// which it becomes. `switches` remembers what is on.
 #[inline(always)]
 pub(super) fn apply(
     image: &Image<'_>,
@@ -15,8 +15,8 @@ pub(super) fn apply(
     switches: &mut [u32],
     started: bool,
 ) -> Result<(), Fault> {
-    // First in place of the output, and in a second bit of the switches: an error must not have changed the last action, not even
-    // in part.
+    // First in place of the output, and in a second bit of the switches: an error must not have changed the last
+    // action, not even in part.
     for (i, (next, last)) in next.iter_mut().zip(&*last).enumerate() {
         let [scale, offset, low, high, max_step, smoothing, on, off, on_value, off_value] = image.contract_of(i);
         let mut a = f32::from_bits(*next) * scale + offset;

@@ -11,8 +11,8 @@ use crate::ops::elementwise::{self, copy, copy_le};
 use crate::ops::noise::normal;
 use crate::ops::norm;
 
-/// Runs a whole operation over an arena, as a head does in a denoising step: for whoever runs a network's operations one by one. Noise
-/// is that of the arena.
+/// Runs a whole operation over an arena, as a head does in a denoising step: for whoever runs a network's operations
+/// one by one. Noise is that of the arena.
 ///
 /// # Errors
 ///
@@ -44,13 +44,24 @@ pub(super) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
     }
     let units = cursor.done..cursor.done + units;
     cursor.done = units.end;
+    if op.kind == OpKind::Denoise {
+        let (by, noise) = op.coefficients(cursor.step);
+        let by = Coefficients::from_array(by);
+        let noise = if by.sigma == 0.0 { Region::default() } else { Region { offset: noise, len: dst.len } };
+        let [x, v, y, z] = regions(arena, &op.regions, noise).map(|all| f(part(all, &units)));
+        if x.is_empty() {
+            return Err(Fault::Damaged);
+        }
+        denoise(&by, op.constant(0), v, z, x, y);
+        return Ok(units.end == len);
+    }
     let norm = matches!(op.kind, OpKind::LayerNorm | OpKind::RmsNorm);
     let range = if norm { 0..dst.len } else { units.clone() };
     let [mut dst, mut src, third, _] = match op.src().len {
         0 => [part(arena, &(dst.offset + range.start..dst.offset + range.end)), &mut [], &mut [], &mut []],
         _ => regions(arena, &op.regions, Region::default()),
     };
-    if matches!(op.kind, OpKind::Normalize | OpKind::Add | OpKind::Mul | OpKind::Copy | OpKind::Denoise) {
+    if matches!(op.kind, OpKind::Normalize | OpKind::Add | OpKind::Mul | OpKind::Copy) {
         (dst, src) = (part(dst, &range), part(src, &range));
     }
     if dst.is_empty() {
@@ -67,18 +78,6 @@ pub(super) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
             }
         }
         OpKind::Table => copy_le(op.part(cursor.step, &range), dst),
-        OpKind::Denoise => {
-            let (by, noise) = op.coefficients(cursor.step);
-            let by = Coefficients::from_array(by);
-            let all = Region { offset: noise, len: op.dst().len };
-            let z = if by.sigma == 0.0 { Region::default() } else { all };
-            let [x, v, y, z] = regions(arena, &op.regions, z);
-            let [x, v, y, z] = [x, v, y, z].map(|all| f(part(all, &range)));
-            if x.is_empty() {
-                return Err(Fault::Damaged);
-            }
-            denoise(&by, op.constant(0), v, z, x, y);
-        }
         OpKind::LstmCell => {
             arch::lstm_elements(range.clone(), f(src), f(third), f(dst));
         }

@@ -1,8 +1,8 @@
-//! Which of the network's outputs is the next action: of a chunk, of one that leads over from the chunk before, or the average of all
-//! chunks that foresaw it.
+//! Which of the network's outputs is the next action: of a chunk, of one that leads over from the chunk before, or the
+//! average of all chunks that foresaw it.
 //!
-//! Time counts in control periods: the position of an action in its chunk is its age when it plays. Whatever has begun to play, or
-//! was for a time that has passed, no later chunk changes.
+//! Time counts in control periods: the position of an action in its chunk is its age when it plays. Whatever has begun
+//! to play, or was for a time that has passed, no later chunk changes.
 
 use super::arena::{part, regions};
 use crate::error::Fault;
@@ -30,8 +30,8 @@ impl Playback {
         counts(image, arena).fill(0);
     }
 
-    /// Whether the network must run for the action that is due. Then what is left of the chunk at hand is kept before the output is
-    /// written anew.
+    /// Whether the network must run for the action that is due. Then what is left of the chunk at hand is kept before
+    /// the output is written anew.
     #[inline(never)]
     pub(super) fn turn(&mut self, image: &Image<'_>, arena: &mut [u32]) -> bool {
         if self.ready && self.next < image.execute() {

@@ -1,8 +1,9 @@
-//! The state of a head as bytes, for a warm restart: what the next actions depend on besides the image and the observations.
+//! The state of a head as bytes, for a warm restart: what the next actions depend on besides the image and the
+//! observations.
 //!
-//! Words, little-endian: `ACTS`, version, checksum of the image, checksum of what follows; seed, draws, flags (bit 0: an action has been
-//! given, bit 1: the output holds a chunk), the positions of playback; then, of the arena, the recurrent state, the output, and all from
-//! the last action to the work area.
+//! Words, little-endian: `ACTS`, version, checksum of the image, checksum of what follows; seed, draws, flags (bit 0:
+//! an action has been given, bit 1: the output holds a chunk), the positions of playback; then, of the arena, the
+//! recurrent state, the output, and all from the last action to the work area.
 
 use super::playback::Playback;
 use super::{Head, Phase};
@@ -18,14 +19,14 @@ const WORDS: usize = 10;
 const W_CHECKSUM: usize = 3;
 
 impl Head<'_, '_> {
-    /// Bytes of a saved state: 40, and those of the recurrent state, the output and what stands between the observation's values and the
-    /// work area.
+    /// Bytes of a saved state: 40, and those of the recurrent state, the output and what stands between the
+    /// observation's values and the work area.
     pub fn saved_len(&self) -> usize {
         4 * (WORDS + self.saved_regions().iter().map(|region| region.len).sum::<usize>())
     }
 
-    /// Writes the state into `to`, of [`Self::saved_len`] bytes: recurrent state, chunks, last action, what is on, seed and draws of the
-    /// noise. A head that restores it goes on with the same bits.
+    /// Writes the state into `to`, of [`Self::saved_len`] bytes: recurrent state, chunks, last action, what is on, seed
+    /// and draws of the noise. A head that restores it goes on with the same bits.
     ///
     /// # Errors
     ///
@@ -49,8 +50,8 @@ impl Head<'_, '_> {
     ///
     /// # Errors
     ///
-    /// Those of [`Self::save`], and where the bytes are those of another version or image, or damaged. They change nothing: the head
-    /// is as it was.
+    /// Those of [`Self::save`], and where the bytes are those of another version or image, or damaged. They change
+    /// nothing: the head is as it was.
     pub fn restore(&mut self, from: &[u8]) -> Result<(), SavedError> {
         self.check_saved(from.len())?;
         let mut words = from.as_chunks().0.iter().map(|bytes| u32::from_le_bytes(*bytes));

@@ -22,6 +22,10 @@ impl<'a> Image<'a> {
     ///
     /// Checks the checksum, every section, every operation, all constants, and that no row can overflow its int32
     /// accumulator for any activations. Time is linear in the image's length.
+    ///
+    /// # Errors
+    ///
+    /// The first thing that is found wrong; `docs/FORMAT.md` lists all checks.
     #[inline(never)]
     pub fn new_checked(bytes: &'a [u8]) -> Result<Self, ImageError> {
         if bytes.as_ptr().align_offset(4) != 0 {
@@ -77,8 +81,8 @@ impl<'a> Image<'a> {
         if self.obs_len() == 0 || self.act_len() == 0 || self.op_count() == 0 {
             return Err(ImageError::Shape);
         }
-        // State, observation, what operations write, action, what is kept with it, work area: in this order and without a gap.
-        // (`check_sections` sees to the middle.)
+        // State, observation, what operations write, action, what is kept with it, work area: in this order and without
+        // a gap. (`check_sections` sees to the middle.)
         let work = self.work();
         if self.state().offset != 0
             || self.observation().offset != self.state().end()
@@ -154,8 +158,8 @@ impl<'a> Image<'a> {
         Ok(())
     }
 
-    /// Checks an operation before which the first `written` words of the arena hold something of the step; gives their number
-    /// behind it.
+    /// Checks an operation before which the first `written` words of the arena hold something of the step; gives their
+    /// number behind it.
     #[inline(never)]
     fn check_op(&self, i: usize, front: &mut Front<'a>, written: usize) -> Result<usize, ImageError> {
         let op = self.op(i);
@@ -203,8 +207,8 @@ impl<'a> Image<'a> {
         if dst.overlaps(src) || dst.overlaps(third) || src.overlaps(third) {
             return Err(ImageError::Overlap);
         }
-        // Nothing is read that no operation of this step has written: what a step before or the caller left there, or the work
-        // area, where backends differ.
+        // Nothing is read that no operation of this step has written: what a step before or the caller left there, or
+        // the work area, where backends differ.
         let third = if op.is_linear() { Region::default() } else { third };
         let old = if op.reads_dst() { dst.end() } else { 0 };
         if src.end().max(third.end()).max(old) > written {
@@ -243,8 +247,8 @@ impl<'a> Image<'a> {
     }
 }
 
-/// Takes sections in the order in which they stand. None shares a word with another, but constants that several operations have in
-/// common stand once, and are looked at once: so what is checked is no longer than the image.
+/// Takes sections in the order in which they stand. None shares a word with another, but constants that several
+/// operations have in common stand once, and are looked at once: so what is checked is no longer than the image.
 struct Front<'a> {
     words: &'a [u32],
     /// The end of the last one.
@@ -296,8 +300,8 @@ impl<'a> Front<'a> {
     }
 }
 
-/// The matrix of the record at `at`: its blocks, the places of their rows, their sums, and the words of the `work` area that its
-/// input takes.
+/// The matrix of the record at `at`: its blocks, the places of their rows, their sums, and the words of the `work` area
+/// that its input takes.
 #[inline(never)]
 fn check_matrix(at: usize, front: &mut Front<'_>, work: usize) -> Result<(), ImageError> {
     let matrix = &matrix(front.words, at, 0);

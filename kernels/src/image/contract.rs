@@ -1,4 +1,5 @@
-//! The action contract: arrays of f32 bits, one per action dimension. `docs/FORMAT.md` has the order in which they apply.
+//! The action contract: arrays of f32 bits, one per action dimension. `docs/FORMAT.md` has the order in which they
+//! apply.
 
 use super::header as h;
 use super::view::Image;
@@ -10,8 +11,8 @@ pub const CONTRACT_ARRAYS: usize = 10;
 pub(super) const ARRAY_BINARISE: usize = 6;
 
 impl<'a> Image<'a> {
-    /// The arrays, in their order: scale, offset, low, high, max_step, smoothing, on, off, on_value, off_value. Those that the contract
-    /// has not are empty.
+    /// The arrays, in their order: scale, offset, low, high, max_step, smoothing, on, off, on_value, off_value. Those
+    /// that the contract has not are empty.
     pub fn contract_arrays(&self) -> [&'a [u32]; CONTRACT_ARRAYS] {
         let mut offset = self.head(h::W_CONTRACT) as usize;
         core::array::from_fn(|which| {

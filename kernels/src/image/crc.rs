@@ -8,7 +8,8 @@ pub fn checksum(bytes: &[u8]) -> u32 {
     CRC.checksum(bytes.get(UNCHECKED_WORDS * 4..).unwrap_or(&[]))
 }
 
-/// Writes length and checksum into an image that is otherwise complete; `None` where it is shorter than what it should name.
+/// Writes length and checksum into an image that is otherwise complete; `None` where it is shorter than what it should
+/// name.
 pub fn seal(bytes: &mut [u8]) -> Option<()> {
     let len = u32::try_from(bytes.len()).ok()?;
     *bytes.get_mut(4 * W_BYTES..)?.first_chunk_mut()? = len.to_le_bytes();

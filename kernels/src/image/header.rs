@@ -73,7 +73,8 @@ pub const W_MATRICES: usize = 28;
 pub const W_MATRIX_COUNT: usize = 29;
 /// u16 first operation of those that every denoising step runs, u16 denoising steps; 0 where the network runs once.
 pub const W_DENOISING: usize = 30;
-/// u16 actions that lead over from one chunk to the next, u16 age from which on an action never plays; 0 where there is none.
+/// u16 actions that lead over from one chunk to the next, u16 age from which on an action never plays; 0 where there is
+/// none.
 pub const W_PLAYBACK: usize = 31;
 
 /// What a policy's output means.
@@ -156,6 +157,10 @@ pub struct Header {
 
 impl Header {
     /// The header's words, without length and checksum ([`seal`](super::crc::seal)).
+    ///
+    /// # Errors
+    ///
+    /// [`TooLarge`] where a size has no room in its field.
     pub fn emit(&self) -> Result<[u32; WORDS], TooLarge> {
         let mut words = [0; WORDS];
         words[0] = MAGIC;

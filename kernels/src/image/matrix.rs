@@ -44,6 +44,10 @@ impl MatrixRecord {
     }
 
     /// The record's words.
+    ///
+    /// # Errors
+    ///
+    /// [`TooLarge`] where a size has no room in its field.
     pub fn emit(&self) -> Result<[u32; MATRIX_WORDS], TooLarge> {
         let Self { rows, cols, group, x_max, blocks } = *self;
         Ok([halves(rows, cols)?, halves(group, x_max.into())?, halves(blocks.count, 0)?, blocks.offset])
@@ -80,6 +84,10 @@ impl BlockRecord {
     }
 
     /// The record's words.
+    ///
+    /// # Errors
+    ///
+    /// [`TooLarge`] where a size has no room in its field.
     pub fn emit(&self) -> Result<[u32; BLOCK_WORDS], TooLarge> {
         let head = self.width.bits() | u32::from(self.lanes.code()) << 8;
         Ok([halves(head as usize, self.rows)?, self.weights, self.scales, self.steps])
@@ -112,8 +120,8 @@ pub struct RowBlock<'a> {
     pub block: Block<'a>,
     /// bf16 row scales, two a word.
     pub scales: &'a [u32],
-    /// Four u8 a word: the steps from the output of the row before (from output 0, the first) to each row's own; empty where the
-    /// rows follow each other from `first_row` on.
+    /// Four u8 a word: the steps from the output of the row before (from output 0, the first) to each row's own; empty
+    /// where the rows follow each other from `first_row` on.
     pub steps: &'a [u32],
     /// The output of the first row, or, where there are steps, 0, which they start from.
     pub first_row: usize,
@@ -126,8 +134,8 @@ impl<'a> RowBlock<'a> {
         bf16(half_word(self.scales, i))
     }
 
-    /// The weights of the block's row `i`: `level * group scale * row scale`, the integers multiplied first. Fills `out` up to the
-    /// number of columns.
+    /// The weights of the block's row `i`: `level * group scale * row scale`, the integers multiplied first. Fills
+    /// `out` up to the number of columns.
     pub fn dequantize(&self, i: usize, out: &mut [f32]) {
         let scale = self.scale(i);
         for (col, out) in out.iter_mut().enumerate().take(self.block.shape().cols) {
@@ -179,7 +187,8 @@ impl<'a> Matrix<'a> {
         self.bias.get(row).map_or(0.0, |w| f32::from_bits(u32::from_le(*w)))
     }
 
-    /// The bits of the values that the output starts from, where these are the biases and every row is written once, in order.
+    /// The bits of the values that the output starts from, where these are the biases and every row is written once, in
+    /// order.
     pub fn start_values(&self, accumulate: bool) -> Option<&[u32]> {
         if accumulate || self.bias.is_empty() || !self.is_whole() { None } else { Some(self.bias) }
     }
@@ -200,7 +209,8 @@ impl<'a> Matrix<'a> {
     }
 }
 
-/// The matrix of the record at `at` with the biases at `bias` (0: none), refused where the record says something impossible.
+/// The matrix of the record at `at` with the biases at `bias` (0: none), refused where the record says something
+/// impossible.
 pub(super) fn matrix(image: &[u32], at: usize, bias: usize) -> Result<Matrix<'_>, ImageError> {
     let MatrixRecord { rows, cols, group, x_max, blocks } = MatrixRecord::parse(record(image, at)?)?;
     let section = |offset, len| section(image, offset, len).ok_or(ImageError::Section);
@@ -231,8 +241,8 @@ pub(crate) fn row_block<'a>(
     }
 }
 
-/// Bytes that a block takes: packed words with their padding and group scales, row scales, output steps where the block is
-/// `stepped`, and the block record.
+/// Bytes that a block takes: packed words with their padding and group scales, row scales, output steps where the block
+/// is `stepped`, and the block record.
 pub const fn block_bytes(shape: BlockShape, stepped: bool) -> usize {
     let steps = if stepped { shape.rows.div_ceil(4) } else { 0 };
     4 * (shape.words() + shape.rows.div_ceil(2) + steps + BLOCK_WORDS)

@@ -14,8 +14,8 @@ use crate::math::Function;
 /// What an operation does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OpKind {
-    /// `dst = clamp((clamp(src, ±pre_clip) - mean) * scale, ±clip)`. Constants: `pre_clip`, `clip`, infinite where there is no
-    /// limit; arrays: `mean`, `scale`, the reciprocals of the standard deviation.
+    /// `dst = clamp((clamp(src, ±pre_clip) - mean) * scale, ±clip)`. Constants: `pre_clip`, `clip`, infinite where
+    /// there is no limit; arrays: `mean`, `scale`, the reciprocals of the standard deviation.
     Normalize,
     /// `dst = W src + b`
     Linear {
@@ -34,7 +34,8 @@ pub enum OpKind {
     Copy,
     /// An LSTM cell: `src` holds the four gates `[i f g o]`, `dst` is the hidden state, `third` the cell state.
     LstmCell,
-    /// A GRU cell: `src` holds `W_ih x + b_ih`, `third` holds `W_hh h + b_hh`, each of gates `[r z n]`, `dst` is the state.
+    /// A GRU cell: `src` holds `W_ih x + b_ih`, `third` holds `W_hh h + b_hh`, each of gates `[r z n]`, `dst` is the
+    /// state.
     GruCell,
     /// `dst *= src`
     Mul,
@@ -42,9 +43,9 @@ pub enum OpKind {
     Noise,
     /// `dst` = the row of the array for this denoising step. Arrays: one for each.
     Table,
-    /// A denoising step ([`crate::ops::denoise`]) of the iterate `dst` by the network's output `src`; `third` is what the network reads
-    /// next. Constants: the limit of the predicted sample, infinite where there is none; the arena offset of the first step's noise,
-    /// or 0; the coefficients of each step.
+    /// A denoising step ([`crate::ops::denoise`]) of the iterate `dst` by the network's output `src`; `third` is what
+    /// the network reads next. Constants: the limit of the predicted sample, infinite where there is none; the arena
+    /// offset of the first step's noise, or 0; the coefficients of each step.
     Denoise,
 }
 
@@ -187,6 +188,10 @@ pub struct OpRecord {
 
 impl OpRecord {
     /// The record's words, which [`Image::ops`] reads.
+    ///
+    /// # Errors
+    ///
+    /// [`TooLarge`] where a size has no room in its field.
     pub fn emit(&self) -> Result<[u32; OP_WORDS], TooLarge> {
         let code = self.kind.form().map_or(0, |form| form.code);
         let detail = match self.kind {

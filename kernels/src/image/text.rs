@@ -1,9 +1,10 @@
 //! Text that a terminal may print.
 
-/// Whether bytes are UTF-8 without control characters (C0, DEL, C1), which would steer the terminal that a name is printed on.
-/// In a quarter of the code of `core::str::from_utf8`.
+/// Whether bytes are UTF-8 without control characters (C0, DEL, C1), which would steer the terminal that a name is
+/// printed on. In a quarter of the code of `core::str::from_utf8`.
 pub(super) fn is_text(bytes: &[u8]) -> bool {
-    // Bytes that must follow, the code point so far, and the least one that needs so many bytes and is no control character.
+    // Bytes that must follow, the code point so far, and the least one that needs so many bytes and is no control
+    // character.
     let (mut more, mut point, mut least) = (0, 0u32, 0);
     for &byte in bytes {
         // In a lead byte as many as the sequence has bytes, in the others 1; in an ASCII character 0.

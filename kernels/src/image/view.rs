@@ -13,9 +13,9 @@ pub struct Image<'a> {
 }
 
 impl<'a> Image<'a> {
-    /// An image whose memory may hold anything, as it does where flash has changed since the check: to test what becomes of it. A
-    /// step of it ends with an action that means nothing or with [`crate::StepError::Damaged`]. `None` where the bytes are
-    /// misaligned, no whole words, or shorter than a header.
+    /// An image whose memory may hold anything, as it does where flash has changed since the check: to test what
+    /// becomes of it. A step of it ends with an action that means nothing or with [`crate::StepError::Damaged`]. `None`
+    /// where the bytes are misaligned, no whole words, or shorter than a header.
     #[doc(hidden)]
     pub fn unchecked(bytes: &'a [u8]) -> Option<Self> {
         let words: &[u32] = bytemuck::try_cast_slice(bytes).ok()?;

@@ -22,8 +22,8 @@ pub struct BlockShape {
 }
 
 impl BlockShape {
-    /// Whether the lengths are usable: rows and columns from 1 to 65535 and a group that the lanes know; with groups in paired
-    /// lanes at most [`MAX_PAIRED_GROUPED`] columns.
+    /// Whether the lengths are usable: rows and columns from 1 to 65535 and a group that the lanes know; with groups in
+    /// paired lanes at most [`MAX_PAIRED_GROUPED`] columns.
     pub const fn is_valid(self) -> bool {
         let (group, cols) = match self.lanes {
             Lanes::Single => (is_group(self.group), 0xffff),

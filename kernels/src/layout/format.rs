@@ -31,14 +31,14 @@ impl Cell {
     }
 }
 
-/// What a layout needs in the prepared activations: they are cut into chunks, whose sums a kernel takes apart before they can
-/// overflow.
+/// What a layout needs in the prepared activations: they are cut into chunks, whose sums a kernel takes apart before
+/// they can overflow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct XLayout {
     /// The int16 pairs hold `x << shift`.
     pub shift: u8,
-    /// Columns of a chunk, a power of two; a chunk ends with its scale group, too. Where a row's chunks are not all full, the
-    /// first is short.
+    /// Columns of a chunk, a power of two; a chunk ends with its scale group, too. Where a row's chunks are not all
+    /// full, the first is short.
     pub chunk: usize,
     /// Columns of a pass through the loop of the kernel for row scales; the first pass may be short.
     pub run: usize,
@@ -46,11 +46,11 @@ pub struct XLayout {
     pub start_words: usize,
     /// What they hold.
     pub starts: [Start; 2],
-    /// Whether the row's chunks are followed by the sum of its x, and those of a group by the sum of the group's in both halves of
-    /// a word.
+    /// Whether the row's chunks are followed by the sum of its x, and those of a group by the sum of the group's in
+    /// both halves of a word.
     pub sum: bool,
-    /// Whether groups are taken in pairs: two are prepared as one, with their sums in the halves of the word, and the scales of
-    /// strips of eight stand behind both groups' units.
+    /// Whether groups are taken in pairs: two are prepared as one, with their sums in the halves of the word, and the
+    /// scales of strips of eight stand behind both groups' units.
     pub pairs: bool,
 }
 
@@ -109,8 +109,8 @@ pub trait Format {
     /// Adds a cell's products to its sums, modulo 2^32. `x` holds `CELL.cols / 2` int16 pairs.
     fn mac(words: &[u32; 3], x: &[u32], t: &mut Sums);
 
-    /// Adds what a chunk's sums mean, `sum(level * x)` of each of the cell's rows. Where [`XLayout::sum`] says so, the sum of
-    /// the group's x is still missing in rows of odd index.
+    /// Adds what a chunk's sums mean, `sum(level * x)` of each of the cell's rows. Where [`XLayout::sum`] says so, the
+    /// sum of the group's x is still missing in rows of odd index.
     fn finish(t: &Sums, rows: &mut [i32]);
 }
 

@@ -37,8 +37,8 @@ impl Lanes {
     /// The largest activation that paired lanes hold.
     pub const PAIRED_X_MAX: u16 = 127;
 
-    /// The lanes of a matrix with activations up to `x_max` and scale groups of `group` columns: paired where they can be,
-    /// which is for int8 activations and row scales or groups of 32 ([`GROUPS`]).
+    /// The lanes of a matrix with activations up to `x_max` and scale groups of `group` columns: paired where they can
+    /// be, which is for int8 activations and row scales or groups of 32 ([`GROUPS`]).
     pub const fn of(x_max: u16, group: usize) -> Self {
         if x_max <= Self::PAIRED_X_MAX && matches!(group, 0 | PAIRED_GROUP) { Self::Paired } else { Self::Single }
     }

@@ -6,8 +6,8 @@ use super::table::with_format;
 
 /// Packs a block.
 ///
-/// `codes` is row-major, `rows * cols`; `scales` is row-major, `rows * groups()` (empty without groups); `out` holds exactly
-/// [`BlockShape::words`] words and is overwritten. Returns `None` where a length or the shape does not fit.
+/// `codes` is row-major, `rows * cols`; `scales` is row-major, `rows * groups()` (empty without groups); `out` holds
+/// exactly [`BlockShape::words`] words and is overwritten. Returns `None` where a length or the shape does not fit.
 pub fn pack(shape: BlockShape, codes: &[u8], scales: &[u8], out: &mut [u32]) -> Option<()> {
     if !shape.is_valid()
         || codes.len() != shape.rows * shape.cols

@@ -29,7 +29,8 @@ pub struct Layout {
     pub step_log: u8,
 }
 
-/// Binary logarithm of a strip's rows: of [`QUAD`] or of [`STRIP`]. Of an enum the compiler knows that it can be shifted by.
+/// Binary logarithm of a strip's rows: of [`QUAD`] or of [`STRIP`]. Of an enum the compiler knows that it can be
+/// shifted by.
 #[derive(Clone, Copy, Debug)]
 #[repr(u8)]
 pub enum StripLog {

@@ -1,8 +1,9 @@
 //! 2-bit codes, paired lanes: one word holds 8 columns of two rows, exactly 2 bits a weight.
 //!
-//! A lane holds the code of the even row in bits 0 and 1, unsigned, and that of the odd row in bits 14 and 15, as a signed
-//! `code - 2`. Pair `j` (columns `2j`, `2j + 1`) stands rotated left by `4j`, so that `ror(word, 4j) & 0xc003_c003` is both
-//! lanes of the pair: one AND and one SMLAD for four MACs. Around the 32-bit ring, before the rotation:
+//! A lane holds the code of the even row in bits 0 and 1, unsigned, and that of the odd row in bits 14 and 15, as a
+//! signed `code - 2`. Pair `j` (columns `2j`, `2j + 1`) stands rotated left by `4j`, so that
+//! `ror(word, 4j) & 0xc003_c003` is both lanes of the pair: one AND and one SMLAD for four MACs. Around the 32-bit
+//! ring, before the rotation:
 //!
 //! ```text
 //! bit   31 30   29 .. 18   17 16   15 14   13 .. 2   1  0
@@ -10,16 +11,16 @@
 //! ```
 //!
 //! With `x << 2`, a sum over SMLADs is `t = 4*even + 2^16*odd`. It starts from `0x8000 - 6*sum(x)`, so that it holds
-//! `4*sum((code - 1.5) * x) + 0x8000` in its low half: at most `4 * 1.5 * 127 * 32 = 24384` away from the middle after a
-//! chunk of 32 columns, so the low half never borrows, and `t >> 16` is exactly the odd row's `sum((code - 2) * x)`. Chunks
-//! are summed without being taken apart: the high halves for themselves, and all of `t` modulo 2^32, from which the sum of
-//! the high halves is taken away in the end. The even row's level sum is then half of what is left, the odd row's is
-//! `2*odd + sum(x)`.
+//! `4*sum((code - 1.5) * x) + 0x8000` in its low half: at most `4 * 1.5 * 127 * 32 = 24384` away from the middle after
+//! a chunk of 32 columns, so the low half never borrows, and `t >> 16` is exactly the odd row's `sum((code - 2) * x)`.
+//! Chunks are summed without being taken apart: the high halves for themselves, and all of `t` modulo 2^32, from which
+//! the sum of the high halves is taken away in the end. The even row's level sum is then half of what is left, the odd
+//! row's is `2*odd + sum(x)`.
 //!
-//! With group scales, two groups' low halves without the bias and their high halves, at most `2 * 127 * 32 = 8128`, are pairs
-//! of int16 that one SMLAD each multiplies with both groups' scales (the odd rows' doubled: 510 at most). The sums over groups
-//! are modulo 2^32. The even row's is twice its level sum, at most `2 * 3 * 127 * 255` a column, which fits an int32 up to
-//! [`MAX_PAIRED_GROUPED`] columns, and no block has more.
+//! With group scales, two groups' low halves without the bias and their high halves, at most `2 * 127 * 32 = 8128`, are
+//! pairs of int16 that one SMLAD each multiplies with both groups' scales (the odd rows' doubled: 510 at most). The
+//! sums over groups are modulo 2^32. The even row's is twice its level sum, at most `2 * 3 * 127 * 255` a column, which
+//! fits an int32 up to [`MAX_PAIRED_GROUPED`] columns, and no block has more.
 
 use super::format::{Cell, Format, STRIP, Start, Sums, XLayout, smlad};
 use super::lanes::MAX_PAIRED_GROUPED;

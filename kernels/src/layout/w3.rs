@@ -1,9 +1,9 @@
 //! 3-bit codes, single lanes: three words hold 32 columns of a row, exactly 3 bits a weight.
 //!
-//! Pair `j` is columns `2j` (low lane) and `2j + 1` (high lane). A 16-bit lane holds five 3-bit fields and one spare bit.
-//! Word `k` holds pairs `5k` to `5k + 4`; the three words' spare bits hold pair 15, bit `k` of its code in word `k`. In word
-//! `k` the spare bit stands at bit `k + 1`, where it already has the weight of bit `k` of a **doubled** code, so one AND
-//! with an immediate extracts it; the five fields follow it around the 32-bit ring:
+//! Pair `j` is columns `2j` (low lane) and `2j + 1` (high lane). A 16-bit lane holds five 3-bit fields and one spare
+//! bit. Word `k` holds pairs `5k` to `5k + 4`; the three words' spare bits hold pair 15, bit `k` of its code in word
+//! `k`. In word `k` the spare bit stands at bit `k + 1`, where it already has the weight of bit `k` of a **doubled**
+//! code, so one AND with an immediate extracts it; the five fields follow it around the 32-bit ring:
 //!
 //! ```text
 //! word k, low lane:   bit k+1: spare    bits k+2 .. k+4: pair 5k    k+5 .. k+7: pair 5k+1   ..   k+14 .. k+16: pair 5k+4

@@ -1,22 +1,23 @@
 //! 3-bit codes, paired lanes: three words hold 8 columns of four rows, exactly 3 bits a weight.
 //!
-//! A **set** is a pair of columns in two rows: a lane holds the even row's code in bits 0 to 2, unsigned, and the odd row's in
-//! bits 13 to 15, as a signed `code - 4`. A cell has eight sets: set `2j + p` is columns `2j`, `2j + 1` of rows `2p`,
-//! `2p + 1`. Word `k` holds set `2k`, and set `2k + 1` rotated left by 6, each extracted by an AND with `0xe007_e007`:
+//! A **set** is a pair of columns in two rows: a lane holds the even row's code in bits 0 to 2, unsigned, and the odd
+//! row's in bits 13 to 15, as a signed `code - 4`. A cell has eight sets: set `2j + p` is columns `2j`, `2j + 1` of
+//! rows `2p`, `2p + 1`. Word `k` holds set `2k`, and set `2k + 1` rotated left by 6, each extracted by an AND with
+//! `0xe007_e007`:
 //!
 //! ```text
 //! bit   31-29   28-25   24-22   21-19   18-16   15-13   12-9    8-6     5-3     2-0
 //! set    2k     spare   2k+1    2k+1     2k      2k     spare   2k+1    2k+1    2k
 //! ```
 //!
-//! The last two sets stand in the spare bits, where all three words meet: set 6 is `ror(w0 ^ ror(w1, 2), 10) & 0xe007_e007`,
-//! set 7 is `ror(w2 ^ ror(w1, 4), 10) & 0xe007_e007`. Of the 12 bits that such an expression reads, 8 are spare in `w0`
-//! (`w2`); the other 4 are spare in `w1` only, bits 9 and 10 for set 6, bits 11 and 12 for set 7 (and 16 further). The packer
-//! solves `w1` first, then `w0` and `w2`.
+//! The last two sets stand in the spare bits, where all three words meet: set 6 is
+//! `ror(w0 ^ ror(w1, 2), 10) & 0xe007_e007`, set 7 is `ror(w2 ^ ror(w1, 4), 10) & 0xe007_e007`. Of the 12 bits that
+//! such an expression reads, 8 are spare in `w0` (`w2`); the other 4 are spare in `w1` only, bits 9 and 10 for set 6,
+//! bits 11 and 12 for set 7 (and 16 further). The packer solves `w1` first, then `w0` and `w2`.
 //!
-//! With `x << 3`, a sum over SMLADs is `t = 8*even + 2^16*odd`. It starts from `0x8000 - 28*sum(x)`, so that its low half
-//! holds `8*sum((code - 3.5) * x) + 0x8000`: at most `8 * 3.5 * 127 * 8 = 28448` away from the middle after a chunk of 8
-//! columns. All else is as in [`super::w2_paired`].
+//! With `x << 3`, a sum over SMLADs is `t = 8*even + 2^16*odd`. It starts from `0x8000 - 28*sum(x)`, so that its low
+//! half holds `8*sum((code - 3.5) * x) + 0x8000`: at most `8 * 3.5 * 127 * 8 = 28448` away from the middle after a
+//! chunk of 8 columns. All else is as in [`super::w2_paired`].
 
 use super::format::{Cell, Format, QUAD, Start, Sums, XLayout, smlad};
 use super::width::Width;

@@ -8,16 +8,17 @@
 //! col      1      1      0      1      0      0     1     0
 //! ```
 //!
-//! `word & 0xf00f_f00f` is `a + 2^12*b` in each lane, `ror(word, 8) & 0xf00f_f00f` is `c + 2^12*d`, and `word & 0x0f0f_0f0f`
-//! is `a + 2^8*c`: three SMLADs for eight MACs. With `x << 1` and start values that take the offsets back, the three sums are
+//! `word & 0xf00f_f00f` is `a + 2^12*b` in each lane, `ror(word, 8) & 0xf00f_f00f` is `c + 2^12*d`, and
+//! `word & 0x0f0f_0f0f` is `a + 2^8*c`: three SMLADs for eight MACs. With `x << 1` and start values that take the
+//! offsets back, the three sums are
 //!
 //! ```text
 //! p = A + 2^12*B,   q = C + 2^12*D,   k = A + 2^8*C    (modulo 2^32; A to D: the rows' sums of level * x)
 //! ```
 //!
 //! `p` and `q` may wrap, for `k - 2^8*q = A - 2^20*D` gives `A` from its low 20 bits, and then `C = (k - A) / 2^8`,
-//! `B = (p - A) / 2^12` and `D = (q - C) / 2^12` are exact. That holds while all sums have 20 bits: `15 * 127 * 256 = 487680`
-//! is below `2^19 = 524288`, so a chunk has up to 256 columns.
+//! `B = (p - A) / 2^12` and `D = (q - C) / 2^12` are exact. That holds while all sums have 20 bits:
+//! `15 * 127 * 256 = 487680` is below `2^19 = 524288`, so a chunk has up to 256 columns.
 
 use super::format::{Cell, Format, STRIP, Start, Sums, XLayout, smlad};
 use super::width::Width;

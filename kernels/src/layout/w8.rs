@@ -1,7 +1,7 @@
 //! 8-bit codes, single lanes, two's complement: one word holds 4 columns of a row.
 //!
-//! Bytes 0 and 2 are columns 0 and 1, bytes 1 and 3 are columns 2 and 3, so that SXTB16 of the word and of the word rotated
-//! by 8 are the two pairs, signed, each value in its lane:
+//! Bytes 0 and 2 are columns 0 and 1, bytes 1 and 3 are columns 2 and 3, so that SXTB16 of the word and of the word
+//! rotated by 8 are the two pairs, signed, each value in its lane:
 //!
 //! ```text
 //! byte    3   2   1   0

@@ -8,8 +8,8 @@
 //! col      1      1     0      0
 //! ```
 //!
-//! SMLAD of the word as it stands sums `even + 2^8*odd`, SMLAD of its UXTB16 sums `even`: three instructions for four MACs.
-//! Both start from `-128 * sum(x)`, and the odd row's sum is their difference over 2^8. It has 24 bits as long as
+//! SMLAD of the word as it stands sums `even + 2^8*odd`, SMLAD of its UXTB16 sums `even`: three instructions for four
+//! MACs. Both start from `-128 * sum(x)`, and the odd row's sum is their difference over 2^8. It has 24 bits as long as
 //! `128 * 127 * 512 = 8323072` is below `2^23 = 8388608`: a chunk has up to 512 columns.
 
 use super::format::{Cell, Format, QUAD, Start, Sums, XLayout, smlad};

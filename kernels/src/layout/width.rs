@@ -67,8 +67,8 @@ impl Width {
         }
     }
 
-    /// The code whose level is nearest to `x` (a weight divided by its scale); ties go to the even code. At 8 bits the result
-    /// is symmetric: -128 is not used. NaN gives the lowest code.
+    /// The code whose level is nearest to `x` (a weight divided by its scale); ties go to the even code. At 8 bits the
+    /// result is symmetric: -128 is not used. NaN gives the lowest code.
     pub fn nearest_code(self, x: f32) -> u8 {
         match self.grid() {
             Grid::Whole => libm::rintf(x.clamp(-127.0, 127.0)) as i32 as u8,

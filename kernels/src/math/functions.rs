@@ -144,8 +144,8 @@ fn each_ratio(x: &mut [f32], ratio: &Ratio) {
     }
 }
 
-/// `e^x`, infinite where f32 has no such number: whole powers of two by two factors, since one does not reach f32's ends, and a
-/// fraction for the rest.
+/// `e^x`, infinite where f32 has no such number: whole powers of two by two factors, since one does not reach f32's
+/// ends, and a fraction for the rest.
 #[inline(always)]
 pub fn exp(x: f32) -> f32 {
     let y = clamp(x * core::f32::consts::LOG2_E, -250.0, 250.0);
@@ -173,9 +173,10 @@ pub fn cos(x: f32) -> f32 {
     wave(x, COS)
 }
 
-/// The sine of what x is beyond the nearest zero, of which the function has one at `zero` and then at every half turn; it rises at
-/// every other one. Half a turn is taken off in three parts, the first two of which f32 multiplies without error with every number
-/// of turns below 2^13 (so Cody and Waite). The sine is a polynomial, fitted for the smallest error, 3e-9.
+/// The sine of what x is beyond the nearest zero, of which the function has one at `zero` and then at every half turn;
+/// it rises at every other one. Half a turn is taken off in three parts, the first two of which f32 multiplies without
+/// error with every number of turns below 2^13 (so Cody and Waite). The sine is a polynomial, fitted for the smallest
+/// error, 3e-9.
 #[inline(always)]
 fn wave(x: f32, zero: f32) -> f32 {
     const TURN: [f32; 3] = [3.140_625, 9.675_026e-4, 1.509_958e-7];
@@ -194,8 +195,8 @@ fn wave(x: f32, zero: f32) -> f32 {
     p * square * r + r
 }
 
-/// `ln(1 + exp(x)) = max(x, 0) + ln(1 + e)` with `e = exp(-|x|) = n / d`; of that, `ln(1 + e) = 2 artanh(s)` with `s = e / (2 + e)`
-/// at most 1/3, by a polynomial that was fitted for the smallest error, 1.4e-9.
+/// `ln(1 + exp(x)) = max(x, 0) + ln(1 + e)` with `e = exp(-|x|) = n / d`; of that, `ln(1 + e) = 2 artanh(s)` with
+/// `s = e / (2 + e)` at most 1/3, by a polynomial that was fitted for the smallest error, 1.4e-9.
 #[inline(always)]
 pub fn softplus(x: f32) -> f32 {
     let half = 0.5 * x;
@@ -219,8 +220,8 @@ pub fn mish(x: f32) -> f32 {
     x * (w / (w + 2.0 * (d * d)))
 }
 
-/// `max(x, 0)`; what is not finite stays as it is, so that an overflow is seen behind it. By the bits, as a signed number:
-/// finite negative numbers stand below minus infinity, which stands below all else.
+/// `max(x, 0)`; what is not finite stays as it is, so that an overflow is seen behind it. By the bits, as a signed
+/// number: finite negative numbers stand below minus infinity, which stands below all else.
 #[inline(always)]
 pub fn relu(x: f32) -> f32 {
     let bits = x.to_bits() as i32;
@@ -253,9 +254,9 @@ pub fn silu(x: f32) -> f32 {
     x * sigmoid(x)
 }
 
-/// `max(x, 0) - a * tail(a)` with `a = |x|`, where `tail = 1 - Phi` is `p^8`, a power of a polynomial that was fitted for the
-/// smallest error of `a * tail / max(1, a)`, 5e-8. From 5.5 on, `a * tail` is below 1.1e-7 and stays what it is there. The code
-/// takes half of `a`, whose double is in `p^8`.
+/// `max(x, 0) - a * tail(a)` with `a = |x|`, where `tail = 1 - Phi` is `p^8`, a power of a polynomial that was fitted
+/// for the smallest error of `a * tail / max(1, a)`, 5e-8. From 5.5 on, `a * tail` is below 1.1e-7 and stays what it is
+/// there. The code takes half of `a`, whose double is in `p^8`.
 #[inline(always)]
 pub fn gelu(x: f32) -> f32 {
     const END: f32 = 5.5 / 2.0;

@@ -3,8 +3,8 @@
 use crate::image::header::COEFFICIENTS;
 use crate::math::clamp;
 
-/// Coefficients of one denoising step, as they stand in the image. With the iterate `x`, the network's output `v`, noise `z` and a
-/// limit, the next iterate and what the network reads next are
+/// Coefficients of one denoising step, as they stand in the image. With the iterate `x`, the network's output `v`,
+/// noise `z` and a limit, the next iterate and what the network reads next are
 ///
 /// ```text
 /// s  = clamp(sample_x * x + sample_v * v, ±limit)
@@ -12,9 +12,9 @@ use crate::math::clamp;
 /// y  = x' + ahead * v
 /// ```
 ///
-/// each from left to right. So all of these are one operation: Euler's and the midpoint method of a flow (Lipman et al., Flow
-/// matching, arXiv 2210.02747), DDPM (Ho et al., arXiv 2006.11239, equation 11) and DDIM (Song et al., arXiv 2010.02502, equation 12)
-/// with their predictions of noise, sample or velocity, where `s` is the predicted sample.
+/// each from left to right. So all of these are one operation: Euler's and the midpoint method of a flow (Lipman et
+/// al., Flow matching, arXiv 2210.02747), DDPM (Ho et al., arXiv 2006.11239, equation 11) and DDIM (Song et al., arXiv
+/// 2010.02502, equation 12) with their predictions of noise, sample or velocity, where `s` is the predicted sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Coefficients {
     /// The iterate's share in the predicted sample.
@@ -46,8 +46,8 @@ impl Coefficients {
     }
 }
 
-/// The iterate `x` and the network's input `y` after its output `v`, with noise `z` or, where that is empty, without. Where `v` is not
-/// finite, neither are they. As far as all go.
+/// The iterate `x` and the network's input `y` after its output `v`, with noise `z` or, where that is empty, without.
+/// Where `v` is not finite, neither are they. As far as all go.
 #[inline(never)]
 pub fn denoise(by: &Coefficients, limit: f32, v: &[f32], z: &[f32], x: &mut [f32], y: &mut [f32]) {
     let &Coefficients { sample_x, sample_v, keep, direct, sample, sigma, ahead } = by;

@@ -3,8 +3,8 @@
 use crate::arch;
 use crate::math::{clamp, zero_or_nan};
 
-/// `y = clamp((clamp(x, ±pre_clip) - mean) * scale, ±clip)`; an infinite clip does nothing. `mean` and `scale` hold f32 bits. An
-/// x that is not finite gives NaN.
+/// `y = clamp((clamp(x, ±pre_clip) - mean) * scale, ±clip)`; an infinite clip does nothing. `mean` and `scale` hold f32
+/// bits. An x that is not finite gives NaN.
 #[inline(never)]
 pub fn normalize(x: &[f32], mean: &[u32], scale: &[u32], pre_clip: f32, clip: f32, y: &mut [f32]) {
     for (((y, x), &mean), &scale) in y.iter_mut().zip(x).zip(mean).zip(scale) {

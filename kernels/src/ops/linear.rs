@@ -2,8 +2,8 @@
 //!
 //! 1. `x` is quantized to integers `q` with one scale ([`crate::x::Scale`]).
 //! 2. Per row, the integer sum `acc = sum_g s_g * sum_c level * q` in int32 ([`crate::arch::gemv`]).
-//! 3. `y = start + acc * (row_scale * x_scale)`, each operation rounded to f32, where `start` is the bias, or, where the
-//!    operation accumulates, the sum of the old `y` and the bias. Rows that no block holds (0 bits) keep `start`.
+//! 3. `y = start + acc * (row_scale * x_scale)`, each operation rounded to f32, where `start` is the bias, or, where
+//!    the operation accumulates, the sum of the old `y` and the bias. Rows that no block holds (0 bits) keep `start`.
 
 use core::ops::Range;
 
@@ -16,7 +16,7 @@ use crate::image::header::BLOCK_WORDS;
 use crate::image::{Matrix, RowBlock, row_block};
 use crate::layout::half::bf16;
 use crate::layout::{QUAD, STRIP};
-use crate::meter::{Meter, RUN, Start, Work};
+use crate::meter::{Meter, OutputStart, RUN, Work};
 use crate::x::{Plan, Prepared, Scale};
 
 /// `len` of the outputs from `first` on, with their biases if there are any; `None` where there are too few.
@@ -35,15 +35,16 @@ fn outputs<'y>(
 }
 
 impl RowBlock<'_> {
-    /// `y = start + acc * (row_scale * x_scale)` for the block's rows and their places in `y`, with a vector that was prepared
-    /// for the block. `start` holds the bits of the whole output's biases; without it, and for rows with steps, y itself is
-    /// the start. `None` where `start` or `y` is too short.
+    /// `y = start + acc * (row_scale * x_scale)` for the block's rows and their places in `y`, with a vector that was
+    /// prepared for the block. `start` holds the bits of the whole output's biases; without it, and for rows with
+    /// steps, y itself is the start. `None` where `start` or `y` is too short.
     pub fn apply(&self, x: &Prepared<'_>, x_scale: Scale, start: Option<&[u32]>, y: &mut [f32]) -> Option<()> {
         self.apply_rows(0..self.block.shape().rows, &mut 0, x, x_scale, start, y)
     }
 
-    /// As [`Self::apply`], for a run of the block's rows, which starts at a multiple of [`STRIP`] and ends at another or with
-    /// the block. Where rows have steps, `output` is that of the row before (0 before the first); it becomes that of the last.
+    /// As [`Self::apply`], for a run of the block's rows, which starts at a multiple of [`STRIP`] and ends at another
+    /// or with the block. Where rows have steps, `output` is that of the row before (0 before the first); it becomes
+    /// that of the last.
     pub(crate) fn apply_rows(
         &self,
         rows: Range<usize>,
@@ -106,7 +107,8 @@ impl RowBlock<'_> {
         arch::scale(sums, start, self.scales.get(first / 2..).unwrap_or(&[]), x_scale, y);
     }
 
-    /// Adds the sums of the rows from `first` on, scaled, to what stands at the rows' places; `None` where there is no such place.
+    /// Adds the sums of the rows from `first` on, scaled, to what stands at the rows' places; `None` where there is no
+    /// such place.
     #[inline(never)]
     fn scale_in_steps(
         &self,
@@ -128,8 +130,9 @@ impl RowBlock<'_> {
 }
 
 impl Matrix<'_> {
-    /// `y = W x + b`, or `y = y + b + W x` where `accumulate`, from where `at` stands and as far as the budget reaches; true when
-    /// all is done. `work` holds at least [`Self::prepared_words`] words; `x` and `y` have the matrix's lengths.
+    /// `y = W x + b`, or `y = y + b + W x` where `accumulate`, from where `at` stands and as far as the budget reaches;
+    /// true when all is done. `work` holds at least [`Self::prepared_words`] words; `x` and `y` have the matrix's
+    /// lengths.
     #[inline(never)]
     pub(crate) fn resume(
         &self,
@@ -151,7 +154,7 @@ impl Matrix<'_> {
         // One pass over the output where every row has its bias and is written once, in order.
         let start = self.start_values(accumulate);
         if start.is_none() && at.started < y.len() {
-            let work = Work::Start(Start::of(accumulate, !self.bias.is_empty()));
+            let work = Work::Start(OutputStart::of(accumulate, !self.bias.is_empty()));
             let end = at.started + budget.take(y.len() - at.started, work);
             self.start(at.started..end, y, accumulate);
             at.started = end;

@@ -2,11 +2,11 @@
 
 use crate::arch::sqrt;
 
-/// A value of standard normal noise: the one at `index` of draw `draw` under `seed`. Values are independent of each other and can be
-/// asked for in any order.
+/// A value of standard normal noise: the one at `index` of draw `draw` under `seed`. Values are independent of each
+/// other and can be asked for in any order.
 ///
-/// Bits are those of the counter-based generator Philox2x32-10 (Salmon et al., Parallel random numbers: as easy as 1, 2, 3, SC 2011),
-/// normal values come from them by Box and Muller's transform in f32. They lie within ±5.8.
+/// Bits are those of the counter-based generator Philox2x32-10 (Salmon et al., Parallel random numbers: as easy as 1,
+/// 2, 3, SC 2011), normal values come from them by Box and Muller's transform in f32. They lie within ±5.8.
 #[inline(never)]
 pub fn normal(seed: u32, draw: u32, index: u32) -> f32 {
     let [a, b] = philox(seed, [index, draw]);

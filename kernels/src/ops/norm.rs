@@ -7,8 +7,8 @@ use crate::arch::sqrt;
 use crate::cursor::Moments;
 use crate::math::zero_or_nan;
 
-/// In place `(x - mean) / sqrt(variance + eps) * weight + bias`, mean and biased variance over the vector (torch's LayerNorm).
-/// Sums run in order from the first element. Nothing is done where weights or biases are too few.
+/// In place `(x - mean) / sqrt(variance + eps) * weight + bias`, mean and biased variance over the vector (torch's
+/// LayerNorm). Sums run in order from the first element. Nothing is done where weights or biases are too few.
 pub fn layer_norm(x: &mut [f32], weight: &[u32], bias: &[u32], eps: f32) {
     layer_norm_units(0..3 * x.len(), &mut Moments::default(), x, weight, bias, eps);
 }

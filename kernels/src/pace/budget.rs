@@ -1,12 +1,12 @@
 //! What the pieces of a step cost, and what a poll may spend.
 //!
-//! A piece is a run of units of one kind of work: strips of rows of a matrix, outputs set to their biases, elements of a
-//! function, of a cell, of a copy. Preparing a matrix's input is two pieces, its scale and its integers: neither takes longer
-//! than a strip of the rows that it is prepared for.
+//! A piece is a run of units of one kind of work: strips of rows of a matrix, outputs set to their biases, elements of
+//! a function, of a cell, of a copy. Preparing a matrix's input is two pieces, its scale and its integers: neither
+//! takes longer than a strip of the rows that it is prepared for.
 
 use super::cost::{self, Feature};
 use crate::image::{Image, Op, OpKind, RowBlock};
-use crate::meter::{Meter, Start, Work};
+use crate::meter::{Meter, OutputStart, Work};
 
 /// Budgets are kept in 16ths of an instruction, so that elements of a few instructions are not rounded up by much.
 const PARTS: u32 = 16;
@@ -41,7 +41,8 @@ impl Price {
         match work {
             // No piece of its own: what a piece takes is the price of what follows.
             Work::Enter(op) => Self { first: 0, each: parts(cost::most(|add| cost::enter(op, add))) },
-            // A unit of a norm takes less than an element in all passes; each of its pieces computes anew what the sums give.
+            // A unit of a norm takes less than an element in all passes; each of its pieces computes anew what the sums
+            // give.
             Work::Elements(op) => {
                 let first = if op.units() == op.dst().len { 0 } else { cost::values(op).0.most() };
                 Self::new(first, cost::most(|add| cost::dearest_element(op, add)))
@@ -115,7 +116,7 @@ impl Image<'_> {
                         let (shape, in_order) = (rows.block.shape(), rows.steps.is_empty());
                         least(Work::Prepare(shape)).max(least(Work::Strips { shape, in_order, start }))
                     };
-                    let bias = Work::Start(Start::of(accumulate, !matrix.bias.is_empty()));
+                    let bias = Work::Start(OutputStart::of(accumulate, !matrix.bias.is_empty()));
                     let first = least(Work::Magnitude(matrix.cols)).max(if start { 0 } else { least(bias) });
                     matrix.blocks().map(of_block).fold(first, u32::max)
                 }

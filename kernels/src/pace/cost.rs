@@ -1,13 +1,13 @@
 //! What a step costs on a Cortex-M4 with FPU (thumbv7em-none-eabihf, zero-wait memory), from the image alone.
 //!
-//! An operation is described by [`Feature`]s that follow the loops of its code: how often a GEMV is called, strips, passes
-//! through a kernel's loop, columns, values prepared, rows scaled, elements of a function. A feature's **rate** says what one of
-//! it takes. Rates come from measurements alone: `cargo xtask fit` counts many operations under QEMU, solves for the rates, and
-//! writes `rates.rs`.
+//! An operation is described by [`Feature`]s that follow the loops of its code: how often a GEMV is called, strips,
+//! passes through a kernel's loop, columns, values prepared, rows scaled, elements of a function. A feature's **rate**
+//! says what one of it takes. Rates come from measurements alone: `cargo xtask fit` counts many operations under QEMU,
+//! solves for the rates, and writes `rates.rs`.
 //!
-//! Most code takes the same instructions whatever the values. Where it branches on values (elu, normalize and the action's
-//! limits) the expected cost is that of standard normal values, and a third rate says what one element takes at most; pieces of
-//! a step ([`crate::Head::poll`]) are measured by that.
+//! Most code takes the same instructions whatever the values. Where it branches on values (elu, normalize and the
+//! action's limits) the expected cost is that of standard normal values, and a third rate says what one element takes
+//! at most; pieces of a step ([`crate::Head::poll`]) are measured by that.
 
 pub use super::feature::Feature;
 use super::feature::{Gemv, Prepare, Strips};
@@ -15,7 +15,7 @@ use super::rates::RATES;
 use crate::image::op;
 use crate::image::{Image, Matrix, Op, OpKind, RowBlock};
 use crate::layout::{BlockShape, QUAD, STRIP};
-use crate::meter::{RUN, Start};
+use crate::meter::{OutputStart, RUN};
 use crate::x::{Extent, Plan};
 
 /// Instructions, and cycles as the project's model of the Cortex-M4 has them.
@@ -52,7 +52,8 @@ impl core::iter::Sum for Cost {
 /// 1024ths of an instruction or a cycle.
 const ONE: f64 = 1024.0;
 
-/// A column of the measured rates, in 1024ths. Features that were added since the last fit count nothing until the next.
+/// A column of the measured rates, in 1024ths. Features that were added since the last fit count nothing until the
+/// next.
 const fn column(which: usize) -> [u32; Feature::COUNT] {
     let (mut column, mut rated) = ([0; Feature::COUNT], [false; Feature::COUNT]);
     let mut i = 0;
@@ -175,8 +176,8 @@ pub(super) fn dearest_element(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) 
     }
 }
 
-/// The features of an operation: its own, that of its values, and how many those are. (Of a linear one, its parts are counted one
-/// by one.)
+/// The features of an operation: its own, that of its values, and how many those are. (Of a linear one, its parts are
+/// counted one by one.)
 pub fn values(op: &Op<'_>) -> (Feature, Feature, usize) {
     let value = match op.kind {
         OpKind::Function(function) => Feature::function(function),
@@ -192,7 +193,7 @@ fn linear(matrix: &Matrix<'_>, accumulate: bool, add: &mut dyn FnMut(Feature, us
     magnitude(matrix.cols, add);
     if !in_place {
         add(Feature::BIASED, 1);
-        start(Start::of(accumulate, !matrix.bias.is_empty()), matrix.rows, add);
+        start(OutputStart::of(accumulate, !matrix.bias.is_empty()), matrix.rows, add);
     }
     let mut last = None;
     for rows in matrix.blocks() {
@@ -215,12 +216,12 @@ pub(super) fn enter(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
 }
 
 /// Setting outputs up before rows are added to them.
-pub(super) fn start(start: Start, outputs: usize, add: &mut dyn FnMut(Feature, usize)) {
+pub(super) fn start(start: OutputStart, outputs: usize, add: &mut dyn FnMut(Feature, usize)) {
     match start {
-        Start::Zero => add(Feature::ZEROED, outputs),
-        Start::Bias => add(Feature::BIAS, outputs),
-        Start::Added => add(Feature::ADDED, outputs),
-        Start::Kept => {}
+        OutputStart::Zero => add(Feature::ZEROED, outputs),
+        OutputStart::Bias => add(Feature::BIAS, outputs),
+        OutputStart::Added => add(Feature::ADDED, outputs),
+        OutputStart::Kept => {}
     }
 }
 
@@ -305,8 +306,8 @@ pub(super) fn products(shape: BlockShape, rows: usize, calls: usize, add: &mut d
     }
 }
 
-/// What a strip's worth of a block's rows ([`STRIP`]) takes at most, and what its rows take once in every piece, in 1024ths of
-/// an instruction.
+/// What a strip's worth of a block's rows ([`STRIP`]) takes at most, and what its rows take once in every piece, in
+/// 1024ths of an instruction.
 pub(super) fn strips(shape: BlockShape, in_order: bool, start: bool) -> (u32, u32) {
     let row = if in_order { Feature::SCALED_REST } else { Feature::SCALED_STEPPED };
     let first = most(|add| {

@@ -67,7 +67,8 @@ macro_rules! kinds {
     };
 }
 kinds! {
-    /// Features of an operation of each code. Those of linear are many, and all others; a function's values are its own.
+    /// Features of an operation of each code. Those of linear are many, and all others; a function's values are its
+    /// own.
     Operation {
         Once "once"
         Value "a value"

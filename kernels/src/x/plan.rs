@@ -2,8 +2,8 @@
 
 use crate::layout::{Block, BlockShape, Lanes, Layout, PAD_COLS, PAIRED_GROUP, div_down, div_up, round_up};
 
-/// How a vector is prepared for blocks of a shape, and what their kernels are told of it. Groups and chunks are whole: zeros fill
-/// them.
+/// How a vector is prepared for blocks of a shape, and what their kernels are given with it. Groups and chunks are
+/// whole: zeros fill them.
 #[derive(Clone, Copy, Debug)]
 pub struct Plan {
     /// The shape; its rows do not matter.
@@ -19,17 +19,18 @@ pub struct Plan {
     pub(crate) first: usize,
     /// Words of the prepared vector.
     pub(super) words: usize,
-    told: Told,
+    arguments: KernelArguments,
 }
 
-/// What a kernel in assembler is told of a vector. Kept with the plan, because it takes longer to find than a call may.
+/// The arguments of a kernel in assembler that depend on the vector's lengths. Kept with the plan, because it takes
+/// longer to find than a call may.
 #[derive(Clone, Copy, Debug)]
-pub struct Told {
-    /// The words up to where it stops reading. Single lanes read no more than the block's own units; with row scales, the
-    /// vector's sum stands behind the end, and behind a last group without a partner the pair's word.
+pub struct KernelArguments {
+    /// The words up to where it stops reading. Single lanes read no more than the block's own units; with row scales,
+    /// the vector's sum stands behind the end, and behind a last group without a partner the pair's word.
     pub end: usize,
-    /// Where chunks are summed without being taken apart, minus the biases of all of them; for single lanes with row scales 0;
-    /// else the bytes of a group's first chunk.
+    /// Where chunks are summed without being taken apart, minus the biases of all of them; for single lanes with row
+    /// scales 0; else the bytes of a group's first chunk.
     pub extra: usize,
     /// Steps that the first pass through the loop of a kernel for row scales leaves out, or the last pair of groups.
     pub skip: usize,
@@ -46,7 +47,8 @@ impl Plan {
         Self::of_valid(block.shape())
     }
 
-    /// Every call of a kernel comes through here; all lengths but the vector's are powers of two, so nothing is divided.
+    /// Every call of a kernel comes through here; all lengths but the vector's are powers of two, so nothing is
+    /// divided.
     #[inline(never)]
     const fn of_valid(shape: BlockShape) -> Self {
         let layout = shape.layout();
@@ -74,7 +76,7 @@ impl Plan {
             chunks,
             first,
             words,
-            told: Told {
+            arguments: KernelArguments {
                 end: words - (padded - read) / 2 - (format.sum && shape.group == 0) as usize,
                 extra: match shape.lanes {
                     _ if format.sum => 0usize.wrapping_sub(chunks * format.starts[0].bias as usize),
@@ -99,16 +101,16 @@ impl Plan {
         self.words
     }
 
-    /// Words that preparing a vector of `len` values needs. A vector that does not fill its groups is copied first and filled
-    /// up with zeros: to the end of the room, while the prepared words grow from its begin.
+    /// Words that preparing a vector of `len` values needs. A vector that does not fill its groups is copied first and
+    /// filled up with zeros: to the end of the room, while the prepared words grow from its begin.
     pub const fn room(&self, len: usize) -> usize {
         if len == self.padded { self.words } else { self.words + self.padded / 2 }
     }
 
-    /// What a kernel in assembler is told.
+    /// What a kernel in assembler is given with the vector.
     #[inline(always)]
-    pub const fn told(&self) -> Told {
-        self.told
+    pub const fn arguments(&self) -> KernelArguments {
+        self.arguments
     }
 
     /// Columns of a group.
@@ -157,8 +159,8 @@ pub(crate) struct Extent {
     pub(crate) passes: usize,
 }
 
-/// Words that suffice to prepare a vector for blocks of any layout that has such groups: the most that [`Plan::room`] gives. That
-/// is with chunks of eight columns and a sum, or where single lanes or pairs of groups need more columns.
+/// Words that suffice to prepare a vector for blocks of any layout that has such groups: the most that [`Plan::room`]
+/// gives. That is with chunks of eight columns and a sum, or where single lanes or pairs of groups need more columns.
 pub const fn max_prepared_words(cols: usize, group: usize) -> usize {
     // Pairs of the columns up to a multiple of `unit`, and of a copy, where that has more columns.
     const fn pairs(cols: usize, unit: usize) -> usize {

@@ -11,8 +11,8 @@ pub struct Prepared<'a> {
 }
 
 impl<'a> Prepared<'a> {
-    /// Names a vector that [`Scale::quantize`](super::Scale::quantize) or [`prepare`] wrote by this plan to the first of `words`; `None` where they are
-    /// fewer than [`Plan::words`].
+    /// Names a vector that [`Scale::quantize`](super::Scale::quantize) or [`prepare`] wrote by this plan to the first
+    /// of `words`; `None` where they are fewer than [`Plan::words`].
     #[inline(always)]
     pub fn new(words: &'a [u32], plan: &'a Plan) -> Option<Self> {
         Some(Self { words: words.get(..plan.words)?, plan })

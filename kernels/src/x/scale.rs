@@ -2,7 +2,8 @@
 
 use crate::error::NotFinite;
 
-/// Vectors whose largest magnitude is below this (2^-100) count as zero, so that the reciprocal of the scale stays finite.
+/// Vectors whose largest magnitude is below this (2^-100) count as zero, so that the reciprocal of the scale stays
+/// finite.
 pub const TINY: f32 = f32::from_bits(27 << 23);
 
 /// The scale of a vector: `x[i]` is about `scale * q[i]`, where `q[i] = round(x[i] * (x_max / amax))` and
@@ -18,8 +19,8 @@ impl Scale {
     /// Takes integers as they are.
     pub(crate) const ONE: Self = Self { scale: 1.0, inverse: 1.0 };
 
-    /// The scale of a vector whose largest magnitude has these bits, for integers in `-x_max ..= x_max`. Magnitudes compare as
-    /// their bits, and anything from the infinity's bits up is not finite.
+    /// The scale of a vector whose largest magnitude has these bits, for integers in `-x_max ..= x_max`. Magnitudes
+    /// compare as their bits, and anything from the infinity's bits up is not finite.
     #[inline(always)]
     pub(crate) fn of_magnitude(bits: u32, x_max: u16) -> Result<Self, NotFinite> {
         if bits >= f32::INFINITY.to_bits() {

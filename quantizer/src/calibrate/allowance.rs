@@ -1,9 +1,10 @@
-//! What statistics of an iterative head may take. Every frame runs its network once for each denoising step, so that they would
-//! take minutes where learning was given one.
+//! What statistics of an iterative head may take. Every frame runs its network once for each denoising step, so that
+//! they would take minutes where learning was given one.
 
 use std::time::{Duration, Instant};
 
-/// The share of the time for learning that each of three may take: moments of inputs, moments of outputs, the choice of activations.
+/// The share of the time for learning that each of three may take: moments of inputs, moments of outputs, the choice of
+/// activations.
 const SHARE: u32 = 10;
 
 /// Time on the clock for one of the statistics.

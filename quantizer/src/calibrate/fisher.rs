@@ -17,8 +17,9 @@ const WINDOW: usize = 16;
 pub struct Sampling {
     /// Frames whose gradient is taken, about so many at most; evenly spaced.
     pub samples: usize,
-    /// Frames whose gradients are averaged before they are squared, at least 1: 1 for the Fisher information, more for what a training loop's
-    /// batches give. Successive frames; of a recurrent network as many episodes at the same time.
+    /// Frames whose gradients are averaged before they are squared, at least 1: 1 for the Fisher information, more for
+    /// what a training loop's batches give. Successive frames; of a recurrent network as many episodes at the same
+    /// time.
     pub batch: usize,
     /// Where the recorded actions are the network's own.
     pub signs: Signs,
@@ -36,14 +37,16 @@ pub enum Signs {
 /// An output that is off its record by less than this share of the dimension's standard deviation counts as equal.
 const EQUAL: f32 = 1e-3;
 
-/// The mean over frames (or batches) of `(dL/dw)^2` for every weight, `L = sum over d of |y_d - t_d|`, as `[rows, cols]` per matrix:
-/// the action-mixed Fisher information of ActQuant (arXiv 2605.24011) at alpha = 1, that is, without a token loss.
+/// The mean over frames (or batches) of `(dL/dw)^2` for every weight, `L = sum over d of |y_d - t_d|`, as
+/// `[rows, cols]` per matrix: the action-mixed Fisher information of ActQuant (arXiv 2605.24011) at alpha = 1, that is,
+/// without a token loss.
 ///
-/// `dL/dy_d` is the sign of `y_d - t_d`. Recorded actions are mostly the policy's own, where `L` has its kink: [`Signs`].
+/// `dL/dy_d` is the sign of `y_d - t_d`. Recorded actions are mostly the policy's own, where `L` has its kink:
+/// [`Signs`].
 ///
-/// A recurrent network's gradient is truncated: episodes are run from their starting state, cut into windows of 16 steps, and
-/// each window's last frame is one sample whose gradient runs back to the start of the window. Shorter rests are left out. All
-/// else is exact: contributions of several steps or uses are summed before they are squared.
+/// A recurrent network's gradient is truncated: episodes are run from their starting state, cut into windows of 16
+/// steps, and each window's last frame is one sample whose gradient runs back to the start of the window. Shorter rests
+/// are left out. All else is exact: contributions of several steps or uses are summed before they are squared.
 ///
 /// `progress` gets the share done.
 pub fn importance(
@@ -133,7 +136,8 @@ fn side_by_side(dataset: &Dataset, count: usize) -> Dataset {
     }
 }
 
-/// Runs back from the last of `passes` and adds to `fisher` the squares of gradients, each averaged over a batch of so many samples.
+/// Runs back from the last of `passes` and adds to `fisher` the squares of gradients, each averaged over a batch of so
+/// many samples.
 fn add_squares(
     network: &Network<'_>,
     weights: &Weights,
@@ -295,8 +299,8 @@ mod tests {
     #[test]
     fn random_signs_give_the_sum_of_the_outputs_squares() {
         let graph = mlp();
-        // Many times the same observation, actions equal to the policy's own. They do not deviate, so even a last bit would count
-        // as a difference: they come from the very pass that they are compared with.
+        // Many times the same observation, actions equal to the policy's own. They do not deviate, so even a last bit
+        // would count as a difference: they come from the very pass that they are compared with.
         let mut dataset = dataset(&graph, 1, 1);
         let weights = Weights::of(&graph);
         let network = Network::new(&graph);

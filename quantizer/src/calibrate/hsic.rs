@@ -1,16 +1,17 @@
-//! The Hilbert-Schmidt independence criterion (Gretton et al., "Measuring Statistical Dependence with Hilbert-Schmidt Norms",
-//! 2005, equation 9): `HSIC(A, B) = tr(K_A H K_B H) / (n - 1)^2` with `H = I - 11'/n`, the biased estimate from n samples.
+//! The Hilbert-Schmidt independence criterion (Gretton et al., "Measuring Statistical Dependence with Hilbert-Schmidt
+//! Norms", 2005, equation 9): `HSIC(A, B) = tr(K_A H K_B H) / (n - 1)^2` with `H = I - 11'/n`, the biased estimate from
+//! n samples.
 
 use ndarray::{Array1, Array2, Axis};
 
-/// How wide a Gaussian kernel is. Either way of an even number of pairs the upper of the two in the middle is the median, and
-/// where it is 0, the mean takes its place.
+/// How wide a Gaussian kernel is. Either way of an even number of pairs the upper of the two in the middle is the
+/// median, and where it is 0, the mean takes its place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bandwidth {
     /// `sigma^2` is the median of the squared distances: the usual heuristic, which no scale of the samples changes.
     Median,
-    /// `sigma` is that median, but at least 0.01: what ActQuant's code does. Samples on a small scale then all seem far apart, those
-    /// on a large one all alike.
+    /// `sigma` is that median, but at least 0.01: what ActQuant's code does. Samples on a small scale then all seem far
+    /// apart, those on a large one all alike.
     SquaredMedian,
 }
 
@@ -30,7 +31,8 @@ impl Kernel {
 
     /// The Gaussian kernel `k(a, b) = exp(-|a - b|^2 / (2 sigma^2))` of `samples`, `[sample, element]`.
     ///
-    /// `sigma` follows from `|a - b|^2` over all pairs of different samples. Samples that are all equal give a kernel of zeros.
+    /// `sigma` follows from `|a - b|^2` over all pairs of different samples. Samples that are all equal give a kernel
+    /// of zeros.
     pub fn gaussian(samples: &Array2<f64>, bandwidth: Bandwidth) -> Self {
         let mut kernel = squared_distances(samples);
         let median = median_or_mean(&kernel);

@@ -27,8 +27,8 @@ impl Moments {
 /// Input vectors gathered before they are multiplied out at once.
 const BATCH: usize = 256;
 
-/// Runs the f32 network over `dataset` and gives the moments of every matrix's input. `progress` is called after each episode
-/// with the number of frames done.
+/// Runs the f32 network over `dataset` and gives the moments of every matrix's input. `progress` is called after each
+/// episode with the number of frames done.
 pub fn collect(graph: &Graph, dataset: &Dataset, mut progress: impl FnMut(usize)) -> Vec<Moments> {
     let mut sums: Vec<_> = graph
         .matrices
@@ -73,7 +73,8 @@ fn flush(moments: &mut Moments, batch: &mut Vec<f64>) {
     batch.clear();
 }
 
-/// `E |(W' - W) x|^2 / E |W x|^2`; of white inputs where there are no moments. 0 for a matrix that never gives anything.
+/// `E |(W' - W) x|^2 / E |W x|^2`; of white inputs where there are no moments. 0 for a matrix that never gives
+/// anything.
 pub fn relative_error(matrix: &WeightMatrix, quantized: &[f32], moments: Option<&Moments>) -> f64 {
     let energy = |rows: &[f64]| -> f64 {
         rows.chunks_exact(matrix.cols)

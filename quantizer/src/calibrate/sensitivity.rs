@@ -1,9 +1,9 @@
 //! How much an error of a weight moves the actions: second moments on both sides of every matrix.
 //!
-//! To second order an error `E` of a matrix adds `tr(E H E' G)` to the squared action error, where `H = E[x x']` is the moment
-//! of its input and `G = E[g g']` that of the action error's derivative at its output (Gauss-Newton). `G` is taken by running
-//! random signs back through the network, each output divided by its standard deviation: over the signs, the expectation of
-//! `g g'` is the sum over the outputs.
+//! To second order an error `E` of a matrix adds `tr(E H E' G)` to the squared action error, where `H = E[x x']` is the
+//! moment of its input and `G = E[g g']` that of the action error's derivative at its output (Gauss-Newton). `G` is
+//! taken by running random signs back through the network, each output divided by its standard deviation: over the
+//! signs, the expectation of `g g'` is the sum over the outputs.
 
 use nalgebra::DMatrix;
 use ndarray::linalg::general_mat_mul;
@@ -28,7 +28,8 @@ pub const DAMPING_INPUT: f64 = 0.01;
 /// The same of `G`.
 pub const DAMPING_OUTPUT: f64 = 0.02;
 
-/// `G` of every matrix, `rows * rows`, and how many frames or windows it was taken of: with an allowance, those that fit.
+/// `G` of every matrix, `rows * rows`, and how many frames or windows it was taken of: with an allowance, those that
+/// fit.
 pub fn output_moments(windows: &Windows<'_>, allowance: Option<Allowance>, seed: u64) -> (Vec<DMatrix<f64>>, usize) {
     let graph = windows.graph;
     let mut random = Random::new(seed);
@@ -54,7 +55,8 @@ pub fn output_moments(windows: &Windows<'_>, allowance: Option<Allowance>, seed:
     (sums.into_iter().zip(counts).map(mean).collect(), batches * samples)
 }
 
-/// Draws so many samples and runs a random sign over the deviation of every output back through the network, past `see`.
+/// Draws so many samples and runs a random sign over the deviation of every output back through the network, past
+/// `see`.
 fn probe(windows: &Windows<'_>, samples: usize, random: &mut Random, grads: &mut Weights, see: &mut See<'_>) {
     let network = Network::new(windows.graph);
     let batch = windows.batch(samples, None, random);
@@ -68,8 +70,8 @@ fn probe(windows: &Windows<'_>, samples: usize, random: &mut Random, grads: &mut
     network.backward(&windows.weights, &pass, signs, &mut d_state, grads, see);
 }
 
-/// The moments on both sides of every matrix, of batches that are drawn: `E[x x']` with its mean, and `G`. What frames are drawn
-/// together is summed at once, and so in a fraction of the time that all frames take one by one.
+/// The moments on both sides of every matrix, of batches that are drawn: `E[x x']` with its mean, and `G`. What frames
+/// are drawn together is summed at once, and so in a fraction of the time that all frames take one by one.
 pub fn drawn_moments(windows: &Windows<'_>, seed: u64) -> Vec<(Moments, DMatrix<f64>)> {
     let graph = windows.graph;
     let mut random = Random::new(seed);
@@ -124,9 +126,9 @@ pub enum Side {
     Output,
 }
 
-/// The weight that each row or column has in the action error: the geometric mean of the moment's diagonal, which an error
-/// costs that nothing compensates, and of its conditional diagonal, which remains where those after it (in order of falling
-/// diagonal) compensate as far as they can.
+/// The weight that each row or column has in the action error: the geometric mean of the moment's diagonal, which an
+/// error costs that nothing compensates, and of its conditional diagonal, which remains where those after it (in order
+/// of falling diagonal) compensate as far as they can.
 pub fn importance(second: &DMatrix<f64>, side: Side) -> Vec<f64> {
     let damping = match side {
         Side::Input => DAMPING_INPUT,
@@ -146,8 +148,8 @@ pub fn importance(second: &DMatrix<f64>, side: Side) -> Vec<f64> {
     importance
 }
 
-/// A moment with its rows and columns in order of rising diagonal, and this share of the mean diagonal added to it; and the order.
-/// The triangular factor's diagonal is then conditioned on those that come after, which are the largest.
+/// A moment with its rows and columns in order of rising diagonal, and this share of the mean diagonal added to it; and
+/// the order. The triangular factor's diagonal is then conditioned on those that come after, which are the largest.
 pub fn damped(second: &DMatrix<f64>, share: f64) -> (Vec<usize>, DMatrix<f64>) {
     let n = second.nrows();
     let damping = (share * second.trace() / n as f64).max(1e-30);

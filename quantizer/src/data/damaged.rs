@@ -1,4 +1,5 @@
-//! Recordings that were made to harm, or were harmed: none may end the process, fill the memory or be read as something else.
+//! Recordings that were made to harm, or were harmed: none may end the process, fill the memory or be read as something
+//! else.
 
 use std::fs;
 use std::io::Write as _;

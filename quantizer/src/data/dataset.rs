@@ -55,8 +55,8 @@ pub struct Dataset {
     pub action: Option<Array3<f32>>,
     /// Valid steps of each episode.
     pub length: Vec<usize>,
-    /// `[episode, value]`: the recurrent state before an episode's first step, in the order of [`Graph::state_len`]. Zero where
-    /// there is none.
+    /// `[episode, value]`: the recurrent state before an episode's first step, in the order of [`Graph::state_len`].
+    /// Zero where there is none.
     pub state: Option<Array2<f32>>,
 }
 
@@ -210,7 +210,8 @@ impl Dataset {
         self.action = Some(action);
     }
 
-    /// At most about `most` frames: evenly spaced ones, or, for a `recurrent` policy, the beginnings of evenly spaced episodes.
+    /// At most about `most` frames: evenly spaced ones, or, for a `recurrent` policy, the beginnings of evenly spaced
+    /// episodes.
     pub fn thinned(&self, most: usize, recurrent: bool) -> Cow<'_, Self> {
         /// Fewer steps than these say little about a recurrent policy.
         const STEPS: usize = 64;

@@ -11,8 +11,8 @@ use super::thinning::{Place, episodes, frames, places};
 use crate::graph::Graph;
 use crate::policy::Policy;
 
-/// Frames that are learned from at most; of more, those are kept that add most (`docs/QUANTIZER.md`, Recordings). Statistics are
-/// collected frame by frame, in order.
+/// Frames that are learned from at most; of more, those are kept that add most (`docs/QUANTIZER.md`, Recordings).
+/// Statistics are collected frame by frame, in order.
 pub const MOST_FRAMES: usize = 400_000;
 /// Bytes that a joined recording may take, padding counted.
 const MOST_BYTES: usize = 4 << 30;
@@ -40,8 +40,8 @@ pub struct Share {
 }
 
 impl Learned {
-    /// Reads `files`, or where none are named the recording in the policy's folder; `None` where there is none. Every error names
-    /// the file.
+    /// Reads `files`, or where none are named the recording in the policy's folder; `None` where there is none. Every
+    /// error names the file.
     pub fn load(policy: &Policy, files: &[PathBuf]) -> Result<Option<Self>> {
         let sizes = Sizes::of(policy);
         let mut parts = files.iter().map(|file| Dataset::load(file, sizes)).collect::<Result<Vec<_>>>()?;
@@ -51,8 +51,9 @@ impl Learned {
         if parts.is_empty() { Ok(None) } else { Self::join(&mut parts, &policy.graph).map(Some) }
     }
 
-    /// Joins recordings that fit the network. Episodes are padded to the longest. Where one has actions and another none, those of
-    /// the f32 network are put there (into `parts` as well); where one has states and another none, they are zero.
+    /// Joins recordings that fit the network. Episodes are padded to the longest. Where one has actions and another
+    /// none, those of the f32 network are put there (into `parts` as well); where one has states and another none, they
+    /// are zero.
     pub fn join(parts: &mut [Dataset], graph: &Graph) -> Result<Self> {
         Self::at_most(MOST_FRAMES, parts, graph)
     }
@@ -89,8 +90,8 @@ pub fn joined(parts: &[Dataset], state_len: usize) -> Result<Dataset> {
     gather(parts, &if state_len > 0 { episodes } else { cut(episodes) }, state_len)
 }
 
-/// The steps after which episodes of a feed-forward policy are cut, so that however long the longest is, no more than twice as
-/// much padding stands beside their `frames` frames as is in them.
+/// The steps after which episodes of a feed-forward policy are cut, so that however long the longest is, no more than
+/// twice as much padding stands beside their `frames` frames as is in them.
 pub fn longest_piece(frames: usize, episodes: usize) -> usize {
     (2 * frames).div_ceil(episodes.max(1)).max(1)
 }

@@ -1,5 +1,5 @@
-//! Arrays in numpy's format .npy, versions 1 to 3 (numpy.lib.format): a header, which is the literal of a Python dictionary, and
-//! the elements.
+//! Arrays in numpy's format .npy, versions 1 to 3 (numpy.lib.format): a header, which is the literal of a Python
+//! dictionary, and the elements.
 
 use std::io::{self, Read};
 

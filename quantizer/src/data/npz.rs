@@ -1,7 +1,7 @@
 //! Archives of arrays in numpy's format .npz: a ZIP file (APPNOTE.TXT 6.3) of .npy members, stored or deflated.
 //!
-//! A reader of its own, because an archive can state any size: what a member says is held against the file before anything is
-//! inflated, and no more is inflated than it said.
+//! A reader of its own, because an archive can state any size: what a member says is held against the file before
+//! anything is inflated, and no more is inflated than it said.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -16,8 +16,8 @@ use crate::import::values::Tensor;
 
 /// Bytes that the members of any archive may have, inflated.
 const ROOM: u64 = 64 << 20;
-/// Beyond that: times the archive's own size. Recorded motions keep most of their size when they are deflated; what keeps less
-/// than a sixty-fourth hardly changes.
+/// Beyond that: times the archive's own size. Recorded motions keep most of their size when they are deflated; what
+/// keeps less than a sixty-fourth hardly changes.
 const RATIO: u64 = 64;
 
 /// The records of the format that are read: signature and length without what varies.

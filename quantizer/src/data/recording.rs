@@ -36,8 +36,8 @@ impl Recording {
         self.names().map(|name| folder_of(policy_dir).join(name))
     }
 
-    /// The recording in a policy's folder; `None` where there is none. More than one is an error: which of them counts would
-    /// be a guess.
+    /// The recording in a policy's folder; `None` where there is none. More than one is an error: which of them counts
+    /// would be a guess.
     pub fn find(self, policy_dir: &Path) -> Result<Option<PathBuf>> {
         let policy_dir = folder_of(policy_dir);
         let mut there: Vec<String> = self.names().into_iter().filter(|n| policy_dir.join(n).exists()).collect();

@@ -1,8 +1,8 @@
-//! What of a long recording is kept: what adds to the rest, where blind thinning would keep a thousand frames of a robot that
-//! stands still and lose the one in which it stumbles.
+//! What of a long recording is kept: what adds to the rest, where blind thinning would keep a thousand frames of a
+//! robot that stands still and lose the one in which it stumbles.
 //!
-//! Observations are standardized and counted by the cells of a grid. One frame of a cell is kept; the cells are made as wide as
-//! it takes for all of them to have room.
+//! Observations are standardized and counted by the cells of a grid. One frame of a cell is kept; the cells are made as
+//! wide as it takes for all of them to have room.
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashSet};
@@ -41,8 +41,8 @@ pub(super) fn frames(parts: &[Dataset], most: usize) -> Vec<Place> {
     all.filter(|(_, observation)| visited.insert(grid.cell(observation))).map(|(place, _)| place).collect()
 }
 
-/// Whole episodes of at most `most` frames together, in the order of recording: again and again the one that visits most cells
-/// which none before it has visited. Of an episode that is longer than that, its beginning counts.
+/// Whole episodes of at most `most` frames together, in the order of recording: again and again the one that visits
+/// most cells which none before it has visited. Of an episode that is longer than that, its beginning counts.
 pub(super) fn episodes(parts: &[Dataset], most: usize) -> Vec<Vec<Place>> {
     let grid = Grid::fitting(parts, most);
     let mut observations = observations(parts);

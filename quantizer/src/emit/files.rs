@@ -13,17 +13,17 @@ const MOST_LINKS: usize = 40;
 /// Numbers that are tried behind a name that is taken.
 const MOST_NUMBERS: usize = 9999;
 
-/// Writes `bytes` to `path` so that neither a failure nor an end of the process leaves part of a file there. (A process that is
-/// killed while it writes can leave a hidden file of this name with the ending .part.)
+/// Writes `bytes` to `path` so that neither a failure nor an end of the process leaves part of a file there. (A process
+/// that is killed while it writes can leave a hidden file of this name with the ending .part.)
 ///
-/// A symbolic link stays, and what it points to is written. A file that is replaced keeps its permissions; one that is read-only
-/// is refused. A device or pipe is written to as it is.
+/// A symbolic link stays, and what it points to is written. A file that is replaced keeps its permissions; one that is
+/// read-only is refused. A device or pipe is written to as it is.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     write_all(&[(path, bytes)])
 }
 
-/// Writes all files, each as [`write()`] does, or none where one of them cannot be written. What a device or pipe was given is
-/// given.
+/// Writes all files, each as [`write()`] does, or none where one of them cannot be written. What a device or pipe was
+/// given is given.
 pub fn write_all(files: &[(&Path, impl AsRef<[u8]>)]) -> Result<()> {
     // Everything that is likely to fail is done before the first file takes its place.
     let staged = files.iter().map(|(path, bytes)| stage(path, bytes.as_ref()).with_context(|| named(path)));
@@ -37,8 +37,9 @@ pub fn write_all(files: &[(&Path, impl AsRef<[u8]>)]) -> Result<()> {
     Ok(())
 }
 
-/// Writes a new file, as [`write()`] does, and gives its name: `path`, or, where something is there already, `path` with the
-/// first number from 2 on behind its stem that is free. Nothing is ever replaced, whoever else is looking for a name.
+/// Writes a new file, as [`write()`] does, and gives its name: `path`, or, where something is there already, `path`
+/// with the first number from 2 on behind its stem that is free. Nothing is ever replaced, whoever else is looking for
+/// a name.
 pub fn write_new(path: &Path, bytes: &[u8]) -> Result<PathBuf> {
     let create = || -> Result<PathBuf> {
         let (folder, name) = folder_and_name(path)?;
@@ -85,8 +86,9 @@ fn folder_and_name(path: &Path) -> Result<(&Path, &OsStr)> {
     Ok((folder, name))
 }
 
-/// Refuses, before any work is done, outputs that are one of the command's `inputs` or each other, under whatever names, and
-/// outputs that have no place. An input that does not exist counts as well: a file of its name would be read the next time.
+/// Refuses, before any work is done, outputs that are one of the command's `inputs` or each other, under whatever
+/// names, and outputs that have no place. An input that does not exist counts as well: a file of its name would be read
+/// the next time.
 pub fn check_outputs(outputs: &[&Path], inputs: &[PathBuf]) -> Result<()> {
     let inputs: Vec<(Identity, &PathBuf)> = inputs.iter().filter_map(|path| Some((identity(path)?, path))).collect();
     let mut before: Vec<(Identity, &Path)> = Vec::new();
@@ -128,8 +130,8 @@ fn identity(path: &Path) -> Option<Identity> {
     fs::canonicalize(path).or_else(|_| follow(path)).ok().map(Identity::Place)
 }
 
-/// The path that is meant, its folder resolved and its links followed; a file need not exist there. A link to an open file, as
-/// `/dev/stdout` is one in the end, is not followed.
+/// The path that is meant, its folder resolved and its links followed; a file need not exist there. A link to an open
+/// file, as `/dev/stdout` is one in the end, is not followed.
 fn follow(path: &Path) -> Result<PathBuf> {
     let mut path = path.to_owned();
     for _ in 0..MOST_LINKS {

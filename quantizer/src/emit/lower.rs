@@ -1,9 +1,10 @@
 //! From the graph's values to regions of the arena: which operation reads and writes where.
 //!
-//! The operations say what they become over buffers ([`crate::graph::lowering`]); here the buffers get their places. The arena
-//! holds the recurrent state, the observation, the values, which share memory by their lifetimes, first fit, the last action with what
-//! is kept beside it, and the work area. Buffers are placed in the order in which they are written, each as low as it fits: so none leaves a gap, and what
-//! a step has written always is the begin of the arena, as the image's check wants it.
+//! The operations say what they become over buffers ([`crate::graph::lowering`]); here the buffers get their places.
+//! The arena holds the recurrent state, the observation, the values, which share memory by their lifetimes, first fit,
+//! the last action with what is kept beside it, and the work area. Buffers are placed in the order in which they are
+//! written, each as low as it fits: so none leaves a gap, and what a step has written always is the begin of the arena,
+//! as the image's check wants it.
 
 use actq_kernels::image::{OpKind, Region, kept_words};
 use actq_kernels::x::max_prepared_words;

@@ -19,8 +19,13 @@ use crate::runtime::{ImageBuffer, with_head};
 /// The most bytes that a self-test vector of more than one step may take.
 const SELF_TEST_BYTES: usize = 64 << 10;
 
-/// The image of a policy with its quantized matrices, one per matrix of the graph. The self-test vector is computed by the
-/// executor itself.
+/// The image of a policy with its quantized matrices, one per matrix of the graph. The self-test vector is computed by
+/// the executor itself.
+///
+/// # Errors
+///
+/// Where a size of the policy has no room in the format, where the kernels refuse the image, and where the network leaves
+/// f32's range on the self-test's observations.
 pub fn image(policy: &Policy, matrices: &[Outcome]) -> Result<Vec<u8>> {
     let group = matrices.first().map_or(0, |m| m.quantized.group);
     let program = lower(policy, group)?;
@@ -99,8 +104,8 @@ fn sealed(words: &[u32]) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Observations that reach every input: spread over about two standard deviations where the policy normalizes, else over -1
-/// to 1, from a fixed generator.
+/// Observations that reach every input: spread over about two standard deviations where the policy normalizes, else
+/// over -1 to 1, from a fixed generator.
 fn self_test_observations(graph: &Graph, steps: usize) -> Vec<Vec<f32>> {
     let mut random = Random::new(0);
     let norm = graph.nodes.iter().find_map(|node| match &node.kind {

@@ -1,5 +1,5 @@
-//! Arrays `[sample, element]` and what operations do with them: products in either order of summing, rounding as the kernels
-//! round.
+//! Arrays `[sample, element]` and what operations do with them: products in either order of summing, rounding as the
+//! kernels round.
 
 use std::ops::Range;
 

@@ -1,5 +1,5 @@
-//! How a network grows: every matrix and every node is checked against what is there. Importers call this; what they call
-//! their values is their own affair.
+//! How a network grows: every matrix and every node is checked against what is there. Importers call this; what they
+//! call their values is their own affair.
 
 use anyhow::{Result, bail, ensure};
 
@@ -34,8 +34,8 @@ impl Graph {
         self.add(Concat(spans), &values)
     }
 
-    /// Appends a node that reads `inputs`, and gives its output. An operation that these values or the matrices do not fit is
-    /// an error.
+    /// Appends a node that reads `inputs`, and gives its output. An operation that these values or the matrices do not
+    /// fit is an error.
     pub fn add(&mut self, kind: impl Into<NodeKind>, inputs: &[ValueId]) -> Result<ValueId> {
         let kind = kind.into();
         let known = self.output();

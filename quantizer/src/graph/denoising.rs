@@ -54,8 +54,8 @@ impl Denoising {
         Iterates { x: array(x), y: array(y) }
     }
 
-    /// From the derivatives by the iterate and the network's input after a step to those by the iterate before it and by the
-    /// network's output.
+    /// From the derivatives by the iterate and the network's input after a step to those by the iterate before it and
+    /// by the network's output.
     pub(super) fn back(&self, step: usize, at: &Iterates, v: &Array2<f32>, d: Iterates) -> (Array2<f32>, Array2<f32>) {
         let by = &self.steps[step];
         let mut dx = d.x + &d.y;

@@ -32,7 +32,8 @@ impl<'g> Evaluator<'g> {
         self.state = start_state(self.network.graph, &[state.map(<[f32]>::to_vec)]);
     }
 
-    /// The network's output for one observation of the graph's length, with its noise. `tap` sees every matrix's index and input vector.
+    /// The network's output for one observation of the graph's length, with its noise. `tap` sees every matrix's index
+    /// and input vector.
     pub fn step(&mut self, obs: &[f32], tap: &mut dyn FnMut(usize, &[f32])) -> Vec<f32> {
         let obs = Array2::from_shape_fn((1, obs.len()), |(_, i)| obs[i]);
         let pass = self.network.forward(&self.weights, obs, &mut self.state);

@@ -1,7 +1,8 @@
 //! From a network of observation, time and iterate to an iterative head that computes nothing twice.
 //!
-//! What depends on the time alone becomes a table: the steps are known when the image is built. What depends on the observation alone
-//! runs once for an output. A linear layer of several of these behind each other is cut into their columns.
+//! What depends on the time alone becomes a table: the steps are known when the image is built. What depends on the
+//! observation alone runs once for an output. A linear layer of several of these behind each other is cut into their
+//! columns.
 
 use anyhow::{Context, Result, ensure};
 use ndarray::Array2;
@@ -28,8 +29,8 @@ impl Needs {
     }
 }
 
-/// The head that runs `flat`, a network of `[observation | time | iterate]`, in the steps of `denoising`. `times` holds what it reads
-/// as the time in each of them.
+/// The head that runs `flat`, a network of `[observation | time | iterate]`, in the steps of `denoising`. `times` holds
+/// what it reads as the time in each of them.
 pub fn iterative(flat: &Graph, obs_len: usize, times: &[Vec<f32>], steps: Denoising) -> Result<Graph> {
     let time_len = times.first().map_or(0, Vec::len);
     ensure!(

@@ -63,8 +63,8 @@ pub struct Slice {
 pub enum Lifetime {
     /// Between the first and the last operation that names it.
     Step,
-    /// From the first operation that names it on: the output, a chunk of which is played over several steps, and what every
-    /// denoising step reads.
+    /// From the first operation that names it on: the output, a chunk of which is played over several steps, and what
+    /// every denoising step reads.
     Output,
     /// In a place of its own, written before the first operation.
     Observation,
@@ -123,7 +123,8 @@ impl Lowering {
         iterate
     }
 
-    /// The denoising steps begin with the next operation: what these values hold stays. Gives the number of operations before.
+    /// The denoising steps begin with the next operation: what these values hold stays. Gives the number of operations
+    /// before.
     pub fn begin_steps(&mut self, iterate: Slice, read: &[ValueId]) -> usize {
         self.emit(OpKind::Copy, self.whole(self.iterate), Some(iterate), None, StepData::None);
         for &value in read {

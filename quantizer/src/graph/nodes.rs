@@ -64,8 +64,8 @@ impl Graph {
         (0..self.nodes.len()).filter(|&n| self.nodes[n].inputs.contains(&value)).collect()
     }
 
-    /// Values of the recurrent state: of each node in order its hidden state, then its cell state. An image keeps them in the
-    /// same order.
+    /// Values of the recurrent state: of each node in order its hidden state, then its cell state. An image keeps them
+    /// in the same order.
     pub fn state_len(&self) -> usize {
         self.nodes.iter().flat_map(|node| node.kind.state_lens()).sum()
     }

@@ -69,15 +69,16 @@ pub trait Operation {
         [0, 0]
     }
 
-    /// The output for a batch, or for a sequence of batches behind each other: a node with a state has one row of it for each row
-    /// of a batch, and `state` advances through the sequence.
+    /// The output for a batch, or for a sequence of batches behind each other: a node with a state has one row of it
+    /// for each row of a batch, and `state` advances through the sequence.
     fn forward(&self, run: &Forward<'_>, state: &mut NodeState) -> (Array2<f32>, Saved);
 
-    /// From the derivative `dy` of the loss by the output to those by the inputs and weights, which `run` takes. `d_state`, the
-    /// derivative by the state after the step, becomes that by the state before it.
+    /// From the derivative `dy` of the loss by the output to those by the inputs and weights, which `run` takes.
+    /// `d_state`, the derivative by the state after the step, becomes that by the state before it.
     fn backward(&self, run: &mut Backward<'_>, saved: &Saved, dy: Array2<f32>, d_state: &mut NodeState);
 
-    /// Appends its operations over the values `inputs`, and gives the buffer that then holds its output of `len` values.
+    /// Appends its operations over the values `inputs`, and gives the buffer that then holds its output of `len`
+    /// values.
     fn lower(&self, to: &mut Lowering, inputs: &[ValueId], len: usize) -> BufferId;
 }
 

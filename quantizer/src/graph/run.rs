@@ -1,8 +1,9 @@
 //! The network on batches, forwards and backwards: the one interpreter of a graph in f32.
 //!
-//! Values are matrices `[sample, element]`, or, where several steps run at once, `[frame, element]`: all samples of the first step,
-//! then all of the second. Only nodes with a state see the difference; for all others a sequence is a larger batch. The gradient
-//! runs back through all steps. The derivatives are checked against finite differences in the tests.
+//! Values are matrices `[sample, element]`, or, where several steps run at once, `[frame, element]`: all samples of the
+//! first step, then all of the second. Only nodes with a state see the difference; for all others a sequence is a
+//! larger batch. The gradient runs back through all steps. The derivatives are checked against finite differences in
+//! the tests.
 
 use std::ops::Range;
 
@@ -83,8 +84,8 @@ impl<'a> Network<'a> {
         Self { sums: Sums::InOrder, ..Self::new(graph) }
     }
 
-    /// One or more steps for a batch of observations, whose size is that of `state`, which advances. Behind an observation stands the
-    /// noise of an iterative head.
+    /// One or more steps for a batch of observations, whose size is that of `state`, which advances. Behind an
+    /// observation stands the noise of an iterative head.
     pub fn forward(&self, weights: &Weights, obs: Array2<f32>, state: &mut State) -> Pass {
         let Some(denoising) = &self.graph.denoising else {
             let (mut values, mut saved) = (vec![obs], Vec::with_capacity(self.graph.nodes.len()));
@@ -156,9 +157,9 @@ impl<'a> Network<'a> {
         nodes.iter().zip(&pass.saved).chain(of_steps).flat_map(of_node)
     }
 
-    /// Goes back through a pass. `d_output` is the loss's derivative by the network's output; `d_state`, by the state after
-    /// the pass, becomes that by the state before it. `grads` gets the derivatives by the weights added. `see` is shown
-    /// every matrix product.
+    /// Goes back through a pass. `d_output` is the loss's derivative by the network's output; `d_state`, by the state
+    /// after the pass, becomes that by the state before it. `grads` gets the derivatives by the weights added. `see` is
+    /// shown every matrix product.
     pub fn backward(
         &self,
         weights: &Weights,
@@ -186,8 +187,8 @@ impl<'a> Network<'a> {
         self.back(weights, pass, None, &mut d_values, d_state, grads, see);
     }
 
-    /// Goes back through the nodes of a denoising step, or those that run once; gives the derivative by what the network reads of
-    /// the iterate.
+    /// Goes back through the nodes of a denoising step, or those that run once; gives the derivative by what the
+    /// network reads of the iterate.
     #[expect(clippy::too_many_arguments, reason = "those of `backward`")]
     fn back(
         &self,
@@ -297,7 +298,8 @@ mod tests {
         (0..STEPS).map(|_| Array2::from_shape_fn((2, 5), |_| seed.unit())).collect()
     }
 
-    /// A head of three values of observation and two of noise, whose steps use every coefficient but that of further noise.
+    /// A head of three values of observation and two of noise, whose steps use every coefficient but that of further
+    /// noise.
     fn iterative() -> Graph {
         let mut seed = Random::new(12);
         let mut graph = Graph::new(3);

@@ -5,8 +5,8 @@ use ndarray::Array2;
 use crate::graph::{Network, Weights, zero_state};
 use crate::policy::Policy;
 
-/// What the f32 policy gives for each of `observations`, from a zero state on: all actions of its output behind each other, scaled,
-/// offset and limited. The step limit is not applied: it is between actions that are executed.
+/// What the f32 policy gives for each of `observations`, from a zero state on: all actions of its output behind each
+/// other, scaled, offset and limited. The step limit is not applied: it is between actions that are executed.
 pub fn actions(policy: &Policy, observations: &[Vec<f32>]) -> Vec<Vec<f32>> {
     let (network, weights) = (Network::new(&policy.graph), Weights::of(&policy.graph));
     let mut state = zero_state(&policy.graph, 1);

@@ -8,8 +8,8 @@ use crate::data::Dataset;
 
 use crate::policy::Policy;
 
-/// Multiplications that one run over a recording may take, about half a second of the executor on a host; a longer recording
-/// is thinned.
+/// Multiplications that one run over a recording may take, about half a second of the executor on a host; a longer
+/// recording is thinned.
 const MOST_MACS: usize = 600_000_000;
 
 /// Frames that are kept in any case: an iterative head runs its network many times for each.

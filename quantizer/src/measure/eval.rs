@@ -33,8 +33,8 @@ pub struct ErrorReport {
     pub worst_dimension: usize,
 }
 
-/// Runs `image` over the valid steps of `dataset`, each episode from its starting state, and compares its raw output with the
-/// recorded actions. Dimensions that never vary in the record are left out of the ratios.
+/// Runs `image` over the valid steps of `dataset`, each episode from its starting state, and compares its raw output
+/// with the recorded actions. Dimensions that never vary in the record are left out of the ratios.
 pub fn evaluate(image: Image<'_>, dataset: &Dataset) -> Result<ErrorReport> {
     with_head(image, |head| compare(&image, dataset, head))
 }
@@ -166,12 +166,20 @@ pub fn heldout(policy_dir: &Path, image: &Image<'_>) -> Result<Dataset> {
     heldout_from(Some(policy_dir), None, image)
 }
 
-/// The held-out recording in `file`, or where none is given in the policy's folder. Where it holds no actions, and the folder
-/// holds the policy that the image was made from, that policy gives them.
+/// The held-out recording in `file`, or where none is given in the policy's folder. Where it holds no actions, and the
+/// folder holds the policy that the image was made from, that policy gives them.
 pub fn heldout_from(policy_dir: Option<&Path>, file: Option<&Path>, image: &Image<'_>) -> Result<Dataset> {
     let mut dataset = Recording::Heldout.require(policy_dir, file, Sizes::of_image(image), "actq eval")?;
     if dataset.action.is_none() {
         let source = policy_dir.and_then(|dir| Policy::load(dir).ok()).filter(|p| p.digest == image.digest());
+        fill_actions(&mut dataset, source.as_ref())?;
+    }
+    Ok(dataset)
+}
+
+/// Puts the actions of `source`, the policy that the image was made from, where a recording has none.
+pub(super) fn fill_actions(dataset: &mut Dataset, source: Option<&Policy>) -> Result<()> {
+    if dataset.action.is_none() {
         let source = source.with_context(|| {
             format!(
                 "{}: array \"action\" is missing, and so is the policy that the image was made from, which could give it: \
@@ -181,7 +189,7 @@ pub fn heldout_from(policy_dir: Option<&Path>, file: Option<&Path>, image: &Imag
         })?;
         dataset.fill_actions(&source.graph);
     }
-    Ok(dataset)
+    Ok(())
 }
 
 #[derive(Clone, Default)]

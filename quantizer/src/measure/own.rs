@@ -3,15 +3,15 @@
 use std::path::PathBuf;
 
 use actq_kernels::Image;
-use anyhow::{Context as _, Result, ensure};
+use anyhow::{Result, ensure};
 
-use super::eval::{ErrorReport, evaluate};
+use super::eval::{ErrorReport, evaluate, fill_actions};
 use crate::data::{Dataset, Sizes, driven_by, joined};
 use crate::policy::Policy;
 
-/// The error of `image` on the recordings in `files` of what it was shown itself (`actq serve --record`). Those of another image
-/// are refused, those that name none are believed. Where actions are missing, `source` gives them, the policy that the image was
-/// made from.
+/// The error of `image` on the recordings in `files` of what it was shown itself (`actq serve --record`). Those of
+/// another image are refused, those that name none are believed. Where actions are missing, `source` gives them, the
+/// policy that the image was made from.
 pub fn own_path(image: Image<'_>, files: &[PathBuf], source: Option<&Policy>) -> Result<ErrorReport> {
     let load = |file: &PathBuf| -> Result<Dataset> {
         let name = file.display();
@@ -24,15 +24,7 @@ pub fn own_path(image: Image<'_>, files: &[PathBuf], source: Option<&Policy>) ->
             );
         }
         let mut dataset = Dataset::load(file, Sizes::of_image(&image))?;
-        if dataset.action.is_none() {
-            let missing = || {
-                format!(
-                    "{name}: array \"action\" is missing, and so is the policy that the image was made from, which could give it: \
-                     name its folder with --policy"
-                )
-            };
-            dataset.fill_actions(&source.with_context(missing)?.graph);
-        }
+        fill_actions(&mut dataset, source)?;
         Ok(dataset)
     };
     let parts = files.iter().map(load).collect::<Result<Vec<_>>>()?;

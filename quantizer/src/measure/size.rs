@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use actq_kernels::Image;
 use actq_kernels::image::Matrix;
 
-/// Bits per weight of the policy as it was trained: codes, padding, scales, steps and block records of all matrices over the
-/// number of the source's weights. A matrix that several operations share counts once.
+/// Bits per weight of the policy as it was trained: codes, padding, scales, steps and block records of all matrices
+/// over the number of the source's weights. A matrix that several operations share counts once.
 pub fn bits_per_weight(image: &Image<'_>) -> f64 {
     let bytes: usize = distinct(image).iter().map(Matrix::weight_bytes).sum();
     8.0 * bytes as f64 / image.source_weights().max(1) as f64

@@ -79,7 +79,6 @@ mod tests {
     use std::path::Path;
 
     use actq_kernels::Width;
-    use actq_kernels::image::Kind;
     use actq_kernels::math::Function;
 
     use super::*;
@@ -137,20 +136,7 @@ mod tests {
     fn image(graph: &Graph, width: Width, activations: Activations) -> (Vec<Outcome>, ImageBuffer) {
         let options = Options { group: 32, activations, ..Options::new(Method::Rtn, Budget::Width(width)) };
         let (_, outcomes) = quantize(graph, None, Rate::Width(width), &options).expect("outcomes");
-        let policy = Policy {
-            dir: ".".into(),
-            name: "all".into(),
-            kind: Kind::Step,
-            chunk: 1,
-            execute: 1,
-            act_len: ACT,
-            rate_hz: 50.0,
-            contract: crate::contract::ActionContract::default(),
-            weights: graph.weights(),
-            graph: graph.clone(),
-            digest: [0; 32],
-        };
-        let bytes = emit::image(&policy, &outcomes).expect("an image");
+        let bytes = emit::image(&Policy::of("all", graph.clone()), &outcomes).expect("an image");
         (outcomes, ImageBuffer::new(&bytes))
     }
 

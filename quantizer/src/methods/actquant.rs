@@ -1,11 +1,13 @@
-//! ActQuant (Akbari et al., "Sub-4-bit Action-Guided Quantization for Vision-Language-Action Models", arXiv 2605.24011).
+//! ActQuant (Akbari et al., "Sub-4-bit Action-Guided Quantization for Vision-Language-Action Models", arXiv
+//! 2605.24011).
 //!
-//! Stage 1 gives each matrix a width: [`score`] measures by HSIC how much it adds to what its values say about the actions,
-//! [`allocation`] spends the budget on these scores. Stage 2 fits the scales inside a matrix: they minimise the rounding error
-//! weighted by the [Fisher](fisher) information of the action loss, by the same search that plain rounding uses. Where the budget is
-//! one width for all, stage 1 is skipped.
+//! Stage 1 gives each matrix a width: [`score`] measures by HSIC how much it adds to what its values say about the
+//! actions, [`allocation`] spends the budget on these scores. Stage 2 fits the scales inside a matrix: they minimise
+//! the rounding error weighted by the [Fisher](fisher) information of the action loss, by the same search that plain
+//! rounding uses. Where the budget is one width for all, stage 1 is skipped.
 //!
-//! What is done otherwise than in the paper or in its authors' code is a [choice](choices); `docs/QUANTIZER.md` lists all of it.
+//! What is done otherwise than in the paper or in its authors' code is a [choice](choices); `docs/QUANTIZER.md` lists
+//! all of it.
 
 pub mod allocation;
 pub mod choices;
@@ -25,8 +27,8 @@ use crate::graph::{Graph, WeightMatrix};
 use choices::Choices;
 use score::Score;
 
-/// Share of the matrix's mean importance that every weight has at least. It decides where no recorded frame says anything, as
-/// in rows behind a ReLU that never fires.
+/// Share of the matrix's mean importance that every weight has at least. It decides where no recorded frame says
+/// anything, as in rows behind a ReLU that never fires.
 const FLOOR: f64 = 1e-6;
 
 /// What ActQuant takes from the recorded observations, for any number of budgets.
@@ -55,15 +57,15 @@ impl ActionStatistics {
         })
     }
 
-    /// What the allocation works with: the chosen score, negative ones as 0, or 1 for every matrix where none is above 0 (and then
-    /// `true`): scores that tell nothing apart give every layer the same claim.
+    /// What the allocation works with: the chosen score, negative ones as 0, or 1 for every matrix where none is above
+    /// 0 (and then `true`): scores that tell nothing apart give every layer the same claim.
     pub fn effective_scores(&self) -> (Vec<f64>, bool) {
         let scores: Vec<f64> = self.scores.iter().map(|s| s.of(self.choices.score).max(0.0)).collect();
         if scores.iter().all(|s| *s == 0.0) { (vec![1.0; scores.len()], true) } else { (scores, false) }
     }
 
-    /// What the fits of scales weigh every weight by, per matrix: its importance and a little more, and where that is chosen
-    /// [`by_magnitude`].
+    /// What the fits of scales weigh every weight by, per matrix: its importance and a little more, and where that is
+    /// chosen [`by_magnitude`].
     pub fn weight_importance(&self, graph: &Graph) -> Vec<Vec<f64>> {
         let matrices = graph.matrices.iter().zip(&self.importance);
         let weighed = |(matrix, importance): (&WeightMatrix, &Array2<f32>)| {

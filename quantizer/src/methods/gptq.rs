@@ -1,5 +1,5 @@
-//! GPTQ (Frantar et al., arXiv 2210.17323, algorithm 1): columns are quantized one after the other, and each column's error is
-//! spread over the columns still to come so that the output changes least.
+//! GPTQ (Frantar et al., arXiv 2210.17323, algorithm 1): columns are quantized one after the other, and each column's
+//! error is spread over the columns still to come so that the output changes least.
 
 use actq_kernels::layout::Width;
 use anyhow::{Context, Result};
@@ -13,8 +13,8 @@ use crate::graph::WeightMatrix;
 /// Share of the mean diagonal that is added to the diagonal of H (the paper's dampening).
 const DAMPING: f64 = 0.01;
 
-/// Quantizes `matrix` with the second moment `E[x x']` of its input. Columns go in order of falling diagonal ("act-order");
-/// scales are fitted before, weighted with the diagonal.
+/// Quantizes `matrix` with the second moment `E[x x']` of its input. Columns go in order of falling diagonal
+/// ("act-order"); scales are fitted before, weighted with the diagonal.
 pub fn quantize(matrix: &WeightMatrix, width: Width, group: usize, moments: &Moments) -> Result<Quantized> {
     let (rows, cols) = (matrix.rows, matrix.cols);
     let diagonal: Vec<f64> = moments.second.diagonal().iter().copied().collect();

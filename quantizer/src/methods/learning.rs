@@ -36,7 +36,8 @@ pub struct Learning {
     pub tried: Vec<Tried>,
 }
 
-/// A choice and its error on the episodes that were left out: the mean over samples and outputs of squared error over variance.
+/// A choice and its error on the episodes that were left out: the mean over samples and outputs of squared error over
+/// variance.
 #[derive(Clone, Copy, Debug)]
 pub struct Tried {
     /// The choice.

@@ -1,4 +1,5 @@
-//! Methods that quantize every matrix by itself and to one width: round to nearest, and GPTQ. A budget upgrades widths greedily.
+//! Methods that quantize every matrix by itself and to one width: round to nearest, and GPTQ. A budget upgrades widths
+//! greedily.
 
 use actq_kernels::Width;
 use anyhow::{Result, ensure};
@@ -10,8 +11,8 @@ use crate::budget::{BudgetTooSmall, Rate};
 use crate::calibrate::moments::Moments;
 use crate::graph::{Graph, WeightMatrix};
 
-/// Quantizes every matrix of `graph`: by error feedback with the `moments` of its input, where there are any, or by rounding to
-/// nearest.
+/// Quantizes every matrix of `graph`: by error feedback with the `moments` of its input, where there are any, or by
+/// rounding to nearest.
 pub fn quantize(graph: &Graph, moments: Option<&[Moments]>, rate: Rate, options: &Options) -> Result<Vec<Outcome>> {
     let one = |m: usize, width| -> Result<Outcome> {
         let matrix: &WeightMatrix = &graph.matrices[m];
@@ -34,8 +35,9 @@ pub fn quantize(graph: &Graph, moments: Option<&[Moments]>, rate: Rate, options:
     }
 }
 
-/// One of each matrix's tries so that the bytes stay within `limit`: starting from the narrowest, always the change that lowers
-/// the sum of relative errors most per byte and still fits. (A wider try can take fewer bytes, where it pads less.)
+/// One of each matrix's tries so that the bytes stay within `limit`: starting from the narrowest, always the change
+/// that lowers the sum of relative errors most per byte and still fits. (A wider try can take fewer bytes, where it
+/// pads less.)
 fn allocate(tries: &[Vec<Outcome>], limit: f64, weights: usize) -> Result<Vec<usize>> {
     let size = |m: usize, choice: usize| tries[m][choice].bytes();
     let error = |m: usize, choice: usize| tries[m][choice].error.unwrap_or(0.0);

@@ -24,8 +24,8 @@ pub enum Method {
 }
 
 impl Method {
-    /// Columns per u8 scale where the user asks for none in particular. Error feedback and learning make good what one scale
-    /// a row loses; rounding has only its scales.
+    /// Columns per u8 scale where the user asks for none in particular. Error feedback and learning make good what one
+    /// scale a row loses; rounding has only its scales.
     pub fn default_group(self) -> usize {
         match self {
             Self::Rtn | Self::ActQuant(_) => 32,

@@ -51,8 +51,12 @@ impl<'a> PreparedMethod<'a> {
         Self::before(graph, method, calib, None, progress)
     }
 
-    /// As [`Self::new`], before learning of at most so many `minutes`: the statistics of an iterative head are taken of so many
-    /// frames that they take a share of it. They then depend on the machine, as learning by the clock does.
+    /// As [`Self::new`], before learning of at most so many `minutes`: the statistics of an iterative head are taken of
+    /// so many frames that they take a share of it. They then depend on the machine, as learning by the clock does.
+    ///
+    /// # Errors
+    ///
+    /// Where a method that needs a recording has none, or too short a one, and where one of actquant holds no actions.
     pub fn before(
         graph: &'a Graph,
         method: Method,
@@ -118,8 +122,8 @@ impl<'a> PreparedMethod<'a> {
         }
     }
 
-    /// Quantizes the network. `options.method` is the one that was prepared; not `options.budget` counts, but `rate`. `progress` is
-    /// called by what learns.
+    /// Quantizes the network. `options.method` is the one that was prepared; not `options.budget` counts, but `rate`.
+    /// `progress` is called by what learns.
     pub fn quantize(&self, rate: Rate, options: &Options, progress: impl FnMut(Progress)) -> Result<QuantizedNetwork> {
         let (graph, method) = (self.graph, self.method());
         ensure!(options.method == method, "prepared for {method}, not for {}", options.method);

@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-/// What is being done, with the share of it that is done. Errors are squared differences to the f32 network over the variance of its
-/// outputs, at the widened inputs of learning: they fall, but are not those of a recording.
+/// What is being done, with the share of it that is done. Errors are squared differences to the f32 network over the
+/// variance of its outputs, at the widened inputs of learning: they fall, but are not those of a recording.
 #[derive(Clone, Copy, Debug)]
 pub enum Progress {
     /// How far to widen the inputs is being chosen.

@@ -63,8 +63,8 @@ impl Quantized {
         }
     }
 
-    /// Whether the blocks' rows follow each other in the order of the output, so that no index is stored. (Missing rows may
-    /// only be the last.)
+    /// Whether the blocks' rows follow each other in the order of the output, so that no index is stored. (Missing rows
+    /// may only be the last.)
     pub fn in_order(blocks: &[(BlockShape, Vec<usize>)]) -> bool {
         blocks.iter().flat_map(|(_, rows)| rows).enumerate().all(|(i, &row)| i == row)
     }
@@ -92,8 +92,8 @@ pub(super) fn dequantized(graph: &Graph, quantized: &[Quantized]) -> Weights {
     weights
 }
 
-/// What became of the rows and columns of a matrix as it was trained, and why. Errors are squared differences of the actions over
-/// their variances, summed over the network's outputs.
+/// What became of the rows and columns of a matrix as it was trained, and why. Errors are squared differences of the
+/// actions over their variances, summed over the network's outputs.
 #[derive(Clone, Debug)]
 pub struct RowAllocation {
     /// The width of each of its rows; `None` for rows without bits.
@@ -128,8 +128,8 @@ pub struct QuantizedNetwork {
 pub struct Outcome {
     /// Codes and scales.
     pub quantized: Quantized,
-    /// `E |(W' - W) x|^2 / E |W x|^2` under the second moment of the calibration inputs; without them, of white inputs. None
-    /// where the matrix was learned anew, so that its own error says nothing.
+    /// `E |(W' - W) x|^2 / E |W x|^2` under the second moment of the calibration inputs; without them, of white inputs.
+    /// None where the matrix was learned anew, so that its own error says nothing.
     pub error: Option<f64>,
     /// Activation magnitude.
     pub x_max: u16,
@@ -160,7 +160,8 @@ impl Outcome {
         Lanes::of(self.x_max, self.quantized.group)
     }
 
-    /// Rows sorted by width, as blocks: shape and rows of each. A matrix of one width is one block in the rows' own order.
+    /// Rows sorted by width, as blocks: shape and rows of each. A matrix of one width is one block in the rows' own
+    /// order.
     pub fn blocks(&self) -> Vec<(BlockShape, Vec<usize>)> {
         let matrix = &self.quantized;
         let lanes = self.lanes();

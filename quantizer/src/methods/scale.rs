@@ -54,8 +54,8 @@ pub struct Scales {
 }
 
 impl Scales {
-    /// Fits the scales of every row, or of every group of every row; those of rows without a width are 1. `importance` has an entry
-    /// per column, or one per weight, or none.
+    /// Fits the scales of every row, or of every group of every row; those of rows without a width are 1. `importance`
+    /// has an entry per column, or one per weight, or none.
     pub fn fit(matrix: &WeightMatrix, widths: &[Option<Width>], group: usize, importance: &[f64]) -> Self {
         let mut scales = Self { group, rows: Vec::new(), groups: Vec::new() };
         for (r, (row, width)) in matrix.data.chunks_exact(matrix.cols).zip(widths).enumerate() {

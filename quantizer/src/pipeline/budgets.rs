@@ -9,8 +9,8 @@ use crate::data::Recordings;
 use crate::methods::{Options, Progress};
 use crate::policy::Policy;
 
-/// Makes one image: [`Quantizer::new`] and [`Quantizer::quantize`]. `progress` gets what is being done and the share of it that
-/// is done.
+/// Makes one image: [`Quantizer::new`] and [`Quantizer::quantize`]. `progress` gets what is being done and the share of
+/// it that is done.
 pub fn quantize(
     policy: &Policy,
     recordings: &Recordings,
@@ -18,7 +18,7 @@ pub fn quantize(
     mut progress: impl FnMut(&str, f64),
 ) -> Result<QuantizedPolicy> {
     let quantizer =
-        Quantizer::before(policy, recordings, options.method, options.minutes, |share| progress("calibrating", share))?;
+        Quantizer::new(policy, recordings, options.method, options.minutes, |share| progress("calibrating", share))?;
     quantizer.quantize(options, progress)
 }
 
@@ -27,8 +27,8 @@ impl Quantizer<'_> {
     ///
     /// # Errors
     ///
-    /// [`crate::budget::BudgetTooSmall`] where not even the fewest bits keep a budget of bits or bytes. The words of the others
-    /// say what can be had.
+    /// [`crate::budget::BudgetTooSmall`] where not even the fewest bits keep a budget of bits or bytes. The words of
+    /// the others say what can be had.
     pub fn quantize(&self, options: &Options, progress: impl FnMut(&str, f64)) -> Result<QuantizedPolicy> {
         let rate = match options.budget {
             Budget::Width(width) => Rate::Width(width),

@@ -40,18 +40,9 @@ pub struct QuantizedPolicy {
 }
 
 impl<'a> Quantizer<'a> {
-    /// Collects what the method needs from the calibration recording. `progress` gets the share done.
+    /// Collects what the method needs from the calibration recording, as [`PreparedMethod::before`] does, with its
+    /// errors. `minutes` is what learning may take at most, [`Options::minutes`].
     pub fn new(
-        policy: &'a Policy,
-        recordings: &'a Recordings,
-        method: Method,
-        progress: impl FnMut(f64),
-    ) -> Result<Self> {
-        Self::before(policy, recordings, method, None, progress)
-    }
-
-    /// As [`Self::new`], before learning of at most so many `minutes` ([`PreparedMethod::before`]).
-    pub fn before(
         policy: &'a Policy,
         recordings: &'a Recordings,
         method: Method,

@@ -1,10 +1,10 @@
 //! The smallest budget whose measured error stays within a limit.
 //!
-//! Budgets are multiples of a tenth of a bit per weight. Each try is a whole quantization whose image is run by the executor. A
-//! method that learns first looks with an eighth of the steps, at most `LOOKS` times; then, from the budget found so, with all
-//! its steps. What is returned has kept the limit with all its steps. Tries stop when the next smaller budget is known to
-//! fail, or after `TRIES` (`PLAIN_TRIES` without learning, or with too few steps to share): then a smaller budget may do, and the tries tell
-//! which range is open. The search takes errors as falling with bits.
+//! Budgets are multiples of a tenth of a bit per weight. Each try is a whole quantization whose image is run by the
+//! executor. A method that learns first looks with an eighth of the steps, at most `LOOKS` times; then, from the budget
+//! found so, with all its steps. What is returned has kept the limit with all its steps. Tries stop when the next
+//! smaller budget is known to fail, or after `TRIES` (`PLAIN_TRIES` without learning, or with too few steps to share):
+//! then a smaller budget may do, and the tries tell which range is open. The search takes errors as falling with bits.
 
 use std::borrow::Cow;
 use std::path::Path;
@@ -34,8 +34,8 @@ const START: usize = 3;
 /// How the logarithm of the error is expected to fall with a bit where nothing is known: rounding to half the step.
 const SLOPE: f64 = 2.0 * std::f64::consts::LN_2;
 
-/// What errors are measured on: the held-out recording; without one, what the method learns from. Missing actions are those of
-/// the f32 network.
+/// What errors are measured on: the held-out recording; without one, what the method learns from. Missing actions are
+/// those of the f32 network.
 fn measured<'a>(policy: &Policy, recordings: &'a Recordings) -> Result<Cow<'a, Dataset>> {
     let dataset = recordings.heldout.as_ref().or(recordings.calib.as_ref());
     let mut dataset = Cow::Borrowed(dataset.with_context(|| Recording::Heldout.missing("a limit to the error"))?);
@@ -45,8 +45,8 @@ fn measured<'a>(policy: &Policy, recordings: &'a Recordings) -> Result<Cow<'a, D
     Ok(dataset)
 }
 
-/// The image of the smallest budget that has at most the error `limit` (NMSE); `options.budget` does not count. `progress` gets
-/// what is being done and the share of it that is done.
+/// The image of the smallest budget that has at most the error `limit` (NMSE); `options.budget` does not count.
+/// `progress` gets what is being done and the share of it that is done.
 pub(super) fn smallest(
     quantizer: &Quantizer<'_>,
     options: &Options,
@@ -117,7 +117,8 @@ fn top(policy: &Policy, options: &Options) -> Result<usize> {
     Ok((PER_BIT * 8 * bytes).div_ceil(policy.graph.weights().max(1)))
 }
 
-/// The range in which the smallest budget lies: the largest cell known to fail and the smallest known to pass, with errors.
+/// The range in which the smallest budget lies: the largest cell known to fail and the smallest known to pass, with
+/// errors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Range {
     fails: (usize, f64),
@@ -130,8 +131,8 @@ impl Range {
         self.fails.0 + 1 > self.passes.map_or(top, |p| p.0 - 1)
     }
 
-    /// Where the limit is expected, from the errors at the ends: on the line through their logarithms, or from the one that is
-    /// known along [`SLOPE`].
+    /// Where the limit is expected, from the errors at the ends: on the line through their logarithms, or from the one
+    /// that is known along [`SLOPE`].
     fn guess(&self, limit: f64) -> f64 {
         let (low, low_error) = (self.fails.0 as f64, self.fails.1.max(1e-300).ln());
         let limit = limit.ln();
@@ -150,8 +151,8 @@ impl Range {
     }
 }
 
-/// Narrows the range of cells 1 to `top` with at most `runs` calls of `error`, the first at `first`: by guesses, and by halves
-/// where guesses alone might creep. Where nothing has passed, the last run is at `top`.
+/// Narrows the range of cells 1 to `top` with at most `runs` calls of `error`, the first at `first`: by guesses, and by
+/// halves where guesses alone might creep. Where nothing has passed, the last run is at `top`.
 fn narrow(
     first: usize,
     top: usize,

@@ -79,8 +79,8 @@ pub struct MatrixRecord {
     pub score: Option<HsicScore>,
 }
 
-/// What the widths of a matrix's rows were chosen from. Errors are squared differences of the actions over their variances,
-/// summed over the network's outputs.
+/// What the widths of a matrix's rows were chosen from. Errors are squared differences of the actions over their
+/// variances, summed over the network's outputs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AllocationRecord {
     /// Per row: the error scale, which a width's rounding is a share of.

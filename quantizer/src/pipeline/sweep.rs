@@ -84,8 +84,8 @@ pub struct SweepPlan<'a> {
     pub seed: u64,
 }
 
-/// Quantizes the policy by every method for every budget and runs each image over the held-out recording. `progress` gets what
-/// is being done and the share of the whole that is done.
+/// Quantizes the policy by every method for every budget and runs each image over the held-out recording. `progress`
+/// gets what is being done and the share of the whole that is done.
 pub fn run(plan: &SweepPlan<'_>, mut progress: impl FnMut(&str, f64)) -> Result<Sweep> {
     let SweepPlan { policy, recordings, methods, budgets, steps, minutes, seed } = *plan;
     let heldout = recordings.heldout.as_ref().with_context(|| Recording::Heldout.missing("a sweep"))?;
@@ -94,7 +94,7 @@ pub fn run(plan: &SweepPlan<'_>, mut progress: impl FnMut(&str, f64)) -> Result<
         // Calibration counts as much as one budget.
         let done = |steps: f64| (m as f64 + steps / (1 + budgets.len()) as f64) / methods.len() as f64;
         let work = format!("{method}, calibrating");
-        let quantizer = Quantizer::before(policy, recordings, method, minutes, |share| progress(&work, done(share)))?;
+        let quantizer = Quantizer::new(policy, recordings, method, minutes, |share| progress(&work, done(share)))?;
         let mut points = Vec::new();
         for (b, &budget) in budgets.iter().enumerate() {
             let work = format!("{method}, {budget} bits per weight");
@@ -131,9 +131,9 @@ fn rows(outcome: &Outcome) -> BTreeMap<u32, usize> {
 
 /// The knee of the best method.
 ///
-/// The best method has the lowest error at most budgets; among equals, the one named first. Its knee is the point furthest below
-/// the chord from its first point to its last, in log error over true bits per weight: up to there a bit gains more than on
-/// average, after it less. `None` where no point is below the chord.
+/// The best method has the lowest error at most budgets; among equals, the one named first. Its knee is the point
+/// furthest below the chord from its first point to its last, in log error over true bits per weight: up to there a bit
+/// gains more than on average, after it less. `None` where no point is below the chord.
 pub fn knee(curves: &[Curve]) -> Option<Knee> {
     let budgets = curves.iter().map(|c| c.points.len()).max()?;
     let mut wins = vec![0; curves.len()];
@@ -151,8 +151,8 @@ pub fn knee(curves: &[Curve]) -> Option<Knee> {
     (depth > 1e-9).then(|| Knee { method: curves[best].method.clone(), bpw, nmse })
 }
 
-/// True bits per weight and error of a curve's points, from few bits to many, each image once. An error of 0 has no logarithm;
-/// it counts as the smallest that f32 actions can show.
+/// True bits per weight and error of a curve's points, from few bits to many, each image once. An error of 0 has no
+/// logarithm; it counts as the smallest that f32 actions can show.
 pub fn line(curve: &Curve) -> Vec<(f64, f64)> {
     let mut line: Vec<(f64, f64)> =
         curve.points.iter().flatten().map(|p| (p.report.bpw, p.report.nmse.max(1e-14))).collect();

@@ -22,9 +22,9 @@ fn predict(quantized: &QuantizedPolicy, limit: TimeLimit) -> Result<StepTime> {
 
 /// The image of the most bits per weight whose step keeps the limit; `options.budget` does not count.
 ///
-/// The bits are found with int8 activations (where the options do not ask for int16) and without learning, on which no time
-/// depends; then the policy is quantized once. Activations that the method would rather have in int16 are, as far as the
-/// time allows. `progress` gets the share done.
+/// The bits are found with int8 activations (where the options do not ask for int16) and without learning, on which no
+/// time depends; then the policy is quantized once. Activations that the method would rather have in int16 are, as far
+/// as the time allows. `progress` gets the share done.
 pub(super) fn most_bits(
     quantizer: &Quantizer<'_>,
     options: &Options,

@@ -1,5 +1,5 @@
-//! Drive, record, learn again: an image is driven, the f32 policy says what it would have done where that has led, and the next
-//! image learns from that as well (DAgger: Ross, Gordon, Bagnell 2011, with the f32 policy as the expert).
+//! Drive, record, learn again: an image is driven, the f32 policy says what it would have done where that has led, and
+//! the next image learns from that as well (DAgger: Ross, Gordon, Bagnell 2011, with the f32 policy as the expert).
 
 use std::path::Path;
 use std::time::Instant;
@@ -46,8 +46,8 @@ pub struct Round {
     pub bytes: usize,
     /// Error (NMSE) on the f32 policy's path.
     pub nmse: f64,
-    /// Error (NMSE) on the path on which the image itself has led the robot; `None` where the f32 policy's actions never vary
-    /// there, or the image has none at an observation that it did not plan at.
+    /// Error (NMSE) on the path on which the image itself has led the robot; `None` where the f32 policy's actions
+    /// never vary there, or the image has none at an observation that it did not plan at.
     pub own_nmse: Option<f64>,
     /// How it drove.
     pub driven: DriveOutcome,
@@ -77,9 +77,14 @@ impl Tuned {
     }
 }
 
-/// Learns once from the f32 policy's recordings, then `rounds` times from those and from all that was driven before. `drive` gets
-/// each image, counted from 0, and gives what the image was shown. `progress` gets what is being done and the share of it that
-/// is done.
+/// Learns once from the f32 policy's recordings, then `rounds` times from those and from all that was driven before.
+/// `drive` gets each image, counted from 0, and gives what the image was shown. `progress` gets what is being done and
+/// the share of it that is done.
+///
+/// # Errors
+///
+/// Without a recording to learn from; where a recording cannot be learned from or measured on; those of `drive`, with the
+/// round.
 pub fn run(
     plan: TunePlan<'_>,
     mut drive: impl FnMut(usize, &[u8]) -> Result<Driven>,
@@ -132,9 +137,8 @@ fn learn(
     mut progress: impl FnMut(&str, f64),
 ) -> Result<QuantizedPolicy> {
     let recordings = Recordings { calib: Some(calib), heldout: None };
-    let quantizer = Quantizer::before(policy, &recordings, options.method, options.minutes, |share| {
-        progress("calibrating", share)
-    })?;
+    let quantizer =
+        Quantizer::new(policy, &recordings, options.method, options.minutes, |share| progress("calibrating", share))?;
     quantizer.quantize(options, |work, share| progress(work, share))
 }
 
@@ -144,27 +148,12 @@ mod tests {
 
     use super::*;
     use crate::budget::Budget;
-    use crate::contract::ActionContract;
     use crate::methods::Method;
     use crate::methods::actquant::testing::{dataset, lstm};
     use crate::random::Random;
-    use actq_kernels::image::Kind;
 
     fn policy() -> Policy {
-        let graph = lstm();
-        Policy {
-            dir: "policy".into(),
-            name: "tiny".into(),
-            kind: Kind::Step,
-            chunk: 1,
-            execute: 1,
-            act_len: 2,
-            rate_hz: 50.0,
-            contract: ActionContract::default(),
-            weights: graph.weights(),
-            graph,
-            digest: [7; 32],
-        }
+        Policy { dir: "policy".into(), digest: [7; 32], ..Policy::of("tiny", lstm()) }
     }
 
     fn said(success: f64) -> DriveOutcome {

@@ -14,8 +14,8 @@ pub struct Peak {
     pub placed: usize,
 }
 
-/// The first operation at which most values are needed: from the last operation backwards, a word is needed from where it is written to
-/// where it is read. What every denoising step reads is needed through all of them.
+/// The first operation at which most values are needed: from the last operation backwards, a word is needed from where
+/// it is written to where it is read. What every denoising step reads is needed through all of them.
 pub fn peak(image: &Image<'_>) -> Peak {
     let (first, end) = (image.observation().range().end, image.action().offset);
     let words = |region: Region| region.range().filter(|word| (first..end).contains(word)).map(|word| word - first);

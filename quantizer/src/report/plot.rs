@@ -1,9 +1,9 @@
 //! Pictures as SVG: the parts that all of them share, and a line plot whose vertical axis is
 //! logarithmic or in percent.
 //!
-//! They are drawn by hand after a trial of plotters 0.3.7 with its SVG backend alone. Its three crates would be no burden, but its
-//! backends take whole pixels: a layer of 1,024 rows leaves 0.6 of one for each in the strip of [`super::widths`], so that rows
-//! would merge or vanish, and points of a plot would stand up to half a pixel off.
+//! They are drawn by hand after a trial of plotters 0.3.7 with its SVG backend alone. Its three crates would be no
+//! burden, but its backends take whole pixels: a layer of 1,024 rows leaves 0.6 of one for each in the strip of
+//! [`super::widths`], so that rows would merge or vanish, and points of a plot would stand up to half a pixel off.
 
 use std::fmt::Write as _;
 

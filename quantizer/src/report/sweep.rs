@@ -26,8 +26,8 @@ fn is_knee(sweep: &Sweep, curve: &Curve, point: &Point) -> bool {
     sweep.knee.as_ref().is_some_and(|knee| knee.method == curve.method && knee.bpw == point.report.bpw)
 }
 
-/// One row per policy and budget, one column per method: error and true bits per weight, and a star at each policy's knee. All
-/// sweeps have the same methods.
+/// One row per policy and budget, one column per method: error and true bits per weight, and a star at each policy's
+/// knee. All sweeps have the same methods.
 pub fn table(sweeps: &[Sweep]) -> Table {
     let methods = sweeps.first().map_or(&[][..], |sweep| &sweep.curves).iter().map(|c| c.method.as_str());
     let header: Vec<&str> = ["policy", "budget"].into_iter().chain(methods).collect();

@@ -11,8 +11,8 @@ use crate::pipeline::tune::{Round, Tuned};
 /// What every table shows, from left to right.
 const HEADER: [&str; 7] = ["round", "episodes", "frames", "f32 path", "own path", "success", "seconds"];
 
-/// One image a row: what it learned from, its errors, how it drove. Tracking errors stand in columns of their own, if any were
-/// said.
+/// One image a row: what it learned from, its errors, how it drove. Tracking errors stand in columns of their own, if
+/// any were said.
 pub fn table(tuned: &Tuned) -> String {
     let mut tracking: Vec<&str> = tuned.rounds.iter().flat_map(|round| round.driven.keys()).collect();
     tracking.retain(|key| key.starts_with("tracking_error"));

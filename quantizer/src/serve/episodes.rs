@@ -54,8 +54,8 @@ impl Episodes {
         rows.saturating_mul(4 * (self.widths[0] + self.widths[1]))
     }
 
-    /// The recording as an .npz archive; `crc` is that of the image that was driven. Nothing is compressed: it would take
-    /// longer than the policy itself.
+    /// The recording as an .npz archive; `crc` is that of the image that was driven. Nothing is compressed: it would
+    /// take longer than the policy itself.
     pub(super) fn npz(&self, crc: u32) -> Result<Vec<u8>> {
         let pieces = self.pieces();
         let mut npz = NpzWriter::new(Cursor::new(Vec::new()));

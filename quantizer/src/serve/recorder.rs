@@ -15,15 +15,15 @@ use crate::emit::files;
 use crate::graph::Evaluator;
 use crate::policy::Policy;
 
-/// New frames from which on the file is written again; and, of a long recording, their share of what it holds. So what is lost
-/// when the process is killed, and how often a frame is written, are both in proportion.
+/// New frames from which on the file is written again; and, of a long recording, their share of what it holds. So what
+/// is lost when the process is killed, and how often a frame is written, are both in proportion.
 const LEAST_NEW: usize = 256;
 const NEW_SHARE: usize = 20;
-/// Requests that may wait to be recorded. Where labels take longer than answers, answers wait from here on, so that little is lost
-/// when the process is killed.
+/// Requests that may wait to be recorded. Where labels take longer than answers, answers wait from here on, so that
+/// little is lost when the process is killed.
 const QUEUE: usize = 256;
-/// Bytes that the arrays of a recording may take. The quantizer keeps [`crate::data::MOST_FRAMES`] frames, and reads no archive of
-/// 4 GiB.
+/// Bytes that the arrays of a recording may take. The quantizer keeps [`crate::data::MOST_FRAMES`] frames, and reads no
+/// archive of 4 GiB.
 const MOST_BYTES: usize = 1 << 30;
 
 /// Where to record to, and who labels.
@@ -42,9 +42,9 @@ enum Event {
     Observation(Vec<f32>),
 }
 
-/// As [`serve`], and everything that the image is shown goes into a recording. It is replaced as a whole, again and again, so that
-/// it can be read whenever the process ends. `note` is told what the user should know at once. Where nothing can be recorded any
-/// more, serving goes on, and the error is returned at the end.
+/// As [`serve`], and everything that the image is shown goes into a recording. It is replaced as a whole, again and
+/// again, so that it can be read whenever the process ends. `note` is told what the user should know at once. Where
+/// nothing can be recorded any more, serving goes on, and the error is returned at the end.
 pub fn serve_recorded(
     image: Image<'_>,
     plan: RecordPlan<'_>,
@@ -81,8 +81,8 @@ struct Recorder<'a, F> {
     /// The f32 policy, its recurrent state run along.
     labels: Option<Evaluator<'a>>,
     episodes: Episodes,
-    /// Steps since the policy was reset, and after how many of them an observation reaches a recurrent network: one that plays the
-    /// rest of a chunk does not, so that its next step is the one after.
+    /// Steps since the policy was reset, and after how many of them an observation reaches a recurrent network: one
+    /// that plays the rest of a chunk does not, so that its next step is the one after.
     step: usize,
     every: usize,
     /// Frames in the file, and its name once there is one.

@@ -1,5 +1,5 @@
-//! Who is recording into a folder: as long as a recorder runs it shares a lock of the folder, which falls with its process
-//! however it ends. A simulator may be gone before the policy that it drove has written its last episode.
+//! Who is recording into a folder: as long as a recorder runs it shares a lock of the folder, which falls with its
+//! process however it ends. A simulator may be gone before the policy that it drove has written its last episode.
 
 use std::fs::File;
 use std::path::Path;

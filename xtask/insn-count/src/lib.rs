@@ -1,20 +1,21 @@
-//! A QEMU plugin that counts executed instructions exactly, and the lines of flash that caches would have to fetch for them.
+//! A QEMU plugin that counts executed instructions exactly, and the lines of flash that caches would have to fetch for
+//! them.
 //!
-//! `qemu-system-arm ... -plugin libinsn_count.so,out=FILE,begin=ADDR,begin_end=ADDR,end=ADDR`: counting starts when execution
-//! leaves the function at `begin..begin_end` and stops when it enters the function at `end`. The call of `end` itself is not
-//! counted. Addresses are hexadecimal.
+//! `qemu-system-arm ... -plugin libinsn_count.so,out=FILE,begin=ADDR,begin_end=ADDR,end=ADDR`: counting starts when
+//! execution leaves the function at `begin..begin_end` and stops when it enters the function at `end`. The call of
+//! `end` itself is not counted. Addresses are hexadecimal.
 //!
-//! Each such region adds lines to FILE: `region N DATA CODE NEXT1 .. NEXT8` with the number of instructions and of lines
-//! fetched from flash: for data, for code after a jump, and for code that goes on behind a line of which 1 to 8 instructions
-//! were executed (meanwhile the next line can be prefetched). Then, for every instruction that was executed, `ADDR COUNT JUMPS`,
-//! where JUMPS says how often execution did not go on at the next instruction.
+//! Each such region adds lines to FILE: `region N DATA CODE NEXT1 .. NEXT8` with the number of instructions and of
+//! lines fetched from flash: for data, for code after a jump, and for code that goes on behind a line of which 1 to 8
+//! instructions were executed (meanwhile the next line can be prefetched). Then, for every instruction that was
+//! executed, `ADDR COUNT JUMPS`, where JUMPS says how often execution did not go on at the next instruction.
 //!
-//! Flash is what lies below 0x20000000, the code region of the Cortex-M's memory map. Fetched lines are those that the caches of
-//! an STM32F4 would miss (reference manual RM0090, section 3.5.2): lines of 16 bytes, 64 for code and 8 for data, the least
-//! recently used one replaced, both empty at the start of a region.
+//! Flash is what lies below 0x20000000, the code region of the Cortex-M's memory map. Fetched lines are those that the
+//! caches of an STM32F4 would miss (reference manual RM0090, section 3.5.2): lines of 16 bytes, 64 for code and 8 for
+//! data, the least recently used one replaced, both empty at the start of a region.
 //!
-//! Only functions that every plugin API since QEMU 7.2 has in the same form are used; the API version that QEMU asks for is set
-//! when the plugin is built (environment variable `ACTQ_QEMU_API`, default 1; 2 from QEMU 9.1 on).
+//! Only functions that every plugin API since QEMU 7.2 has in the same form are used; the API version that QEMU asks
+//! for is set when the plugin is built (environment variable `ACTQ_QEMU_API`, default 1; 2 from QEMU 9.1 on).
 
 use std::collections::BTreeMap;
 use std::ffi::{CStr, c_char, c_int, c_uint, c_void};
@@ -74,7 +75,8 @@ static INSTRUCTIONS: Mutex<BTreeMap<u64, &'static Instruction>> = Mutex::new(BTr
 const FLASH_END: u64 = 0x2000_0000;
 /// Bytes of a line, as a power of two.
 const LINE: u32 = 4;
-/// `QEMU_PLUGIN_MEM_RW`: loads and stores. (QEMU 7.2 gives stores where only loads are asked for; nothing stores to flash.)
+/// `QEMU_PLUGIN_MEM_RW`: loads and stores. (QEMU 7.2 gives stores where only loads are asked for; nothing stores to
+/// flash.)
 const ACCESSES: c_int = 3;
 /// Instructions that a line holds.
 const LINE_INSTRUCTIONS: usize = 8;
@@ -106,7 +108,8 @@ impl Flash {
         }
     }
 
-    /// An instruction is executed. One that straddles two lines counts for its first one; the next one fetches the second.
+    /// An instruction is executed. One that straddles two lines counts for its first one; the next one fetches the
+    /// second.
     fn execute(&mut self, line: u64) {
         if self.line != Some(line) {
             if !self.code.access(line) {
@@ -227,8 +230,8 @@ fn write_region() -> io::Result<()> {
 
 unsafe extern "C" fn on_translate(_id: Id, tb: *mut c_void) {
     let Ok(mut all) = INSTRUCTIONS.lock() else { return };
-    // SAFETY: QEMU hands over a translation block that is valid during this call; indexes stay below its length, and the
-    // callbacks have the signatures that QEMU expects. Flag 0: they read no registers.
+    // SAFETY: QEMU hands over a translation block that is valid during this call; indexes stay below its length, and
+    // the callbacks have the signatures that QEMU expects. Flag 0: they read no registers.
     unsafe {
         for i in 0..qemu_plugin_tb_n_insns(tb) {
             let insn = qemu_plugin_tb_get_insn(tb, i);

@@ -13,15 +13,17 @@ use serde::{Deserialize, Serialize};
 
 use crate::{boards, heads, kernels};
 
-/// How far a figure may lie above its budget, in percent, where another rustc made it (the compiler is not pinned), or, of a
-/// head, another processor: widths and activations follow from sums that it may round otherwise.
+/// How far a figure may lie above its budget, in percent, where another rustc made it (the compiler is not pinned), or,
+/// of a head, another processor: widths and activations follow from sums that it may round otherwise.
 const SLACK: u64 = 2;
 
-/// Bytes of code that the runtime may take at most, where steps are not cut: 24 KiB for step and chunk policies, and 8 for products
-/// of values, five more functions, noise and the steps of flow and diffusion policies, the whole action contract and playback.
+/// Bytes of code that the runtime may take at most, where steps are not cut: 24 KiB for step and chunk policies, and 8
+/// for products of values, five more functions, noise and the steps of flow and diffusion policies, the whole action
+/// contract and playback.
 const RUNTIME_MOST: u64 = 32 * 1024;
 
-/// Bytes of flash that the application may take at most, without its image, and bytes of RAM, without its scratch memory.
+/// Bytes of flash that the application may take at most, without its image, and bytes of RAM, without its scratch
+/// memory.
 const APPLICATION_FLASH_MOST: u64 = 64 * 1024;
 const APPLICATION_RAM_MOST: u64 = 24 * 1024;
 
@@ -103,8 +105,8 @@ fn difference(budgets: &Figures, measured: &Figures) -> Vec<String> {
     missing.chain(gone).collect()
 }
 
-/// The figures above their budgets, or above the limits of an inner loop, of the runtime and of the application, which no budget
-/// raises.
+/// The figures above their budgets, or above the limits of an inner loop, of the runtime and of the application, which
+/// no budget raises.
 fn compare(budgets: &Budgets, measured: &Figures, rustc: &str) -> Vec<Excess> {
     let allowed = |name: &str| {
         let slack = if budgets.rustc == rustc && !name.starts_with(HEAD) { 0 } else { SLACK };
@@ -153,8 +155,8 @@ fn measure() -> Result<Figures> {
     Ok(figures)
 }
 
-/// Bytes of code of the whole runtime and of every function in assembler, and the lines of its longest inner loop, which the
-/// instruction cache must hold.
+/// Bytes of code of the whole runtime and of every function in assembler, and the lines of its longest inner loop,
+/// which the instruction cache must hold.
 fn code() -> Result<Figures> {
     let code = runtime()?;
     let with_polls = Code::read(&firmware::binary("runtime-poll", Target::Fpu)?)?;

@@ -34,7 +34,8 @@ const STEPS: usize = 2000;
 const FLOW_STEPS: usize = 100;
 const FLOW_SHARE: u64 = 4;
 
-/// Episodes of the f32 policy that are learned from, from seed 0: the 12 of `calib.npz` are a thin tube through what the policy meets.
+/// Episodes of the f32 policy that are learned from, from seed 0: the 12 of `calib.npz` are a thin tube through what
+/// the policy meets.
 const RECORDED: usize = 200;
 
 /// The observations of the f32 policy's episodes.
@@ -169,7 +170,7 @@ impl Trial<'_> {
         };
         for (name, options) in &self.images {
             println!("Quantizing to {name} by {}", options.method);
-            let quantizer = Quantizer::new(&policy, &recordings, options.method, |_| {})?;
+            let quantizer = Quantizer::new(&policy, &recordings, options.method, None, |_| {})?;
             let path = self.path(name);
             let bytes = heads::write_image(&quantizer, options, &path)?;
             let buffer = ImageBuffer::new(&bytes);

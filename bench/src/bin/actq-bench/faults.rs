@@ -16,7 +16,8 @@ use actq_ur3::task::EPISODE_STEPS;
 use anyhow::{Result, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// First seed of the episodes; the policy was trained and recorded on others, and `cargo demo`'s other episodes are others.
+/// First seed of the episodes; the policy was trained and recorded on others, and `cargo demo`'s other episodes are
+/// others.
 const FIRST_SEED: u64 = 3000;
 /// Of the faults.
 const SEED: u64 = 1;
@@ -40,8 +41,8 @@ pub(crate) fn some(image: &Path) -> Result<()> {
     run(Target::Fpu, image, &troubles, &[buffer.image(image)?])
 }
 
-/// An episode for each of `troubles` with the application for the target's board, which has `image` built in, and the table of what
-/// happened. `images` are the one that is built in and those that updates bring.
+/// An episode for each of `troubles` with the application for the target's board, which has `image` built in, and the
+/// table of what happened. `images` are the one that is built in and those that updates bring.
 pub(crate) fn run(target: Target, image: &Path, troubles: &[Trouble<'_>], images: &[Image<'_>]) -> Result<()> {
     println!(
         "\nClosed loop through the serial port of the controller ({} in QEMU), with faults on the line",

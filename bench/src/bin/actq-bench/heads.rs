@@ -13,17 +13,19 @@ use actq::pipeline::Quantizer;
 use actq::policy::Policy;
 use actq::report::table::table;
 use actq::runtime::ImageBuffer;
-use actq_bench::cycles::{Code, Cost, Kind};
+use actq_bench::cycles::Code;
+use actq_bench::instruction::Kind;
 use actq_bench::qemu::Counter;
 use actq_bench::{Target, evaluation, firmware, shared_policies, ur3};
 use actq_kernels::Width;
+use actq_kernels::pace::cost::Cost;
 use anyhow::{Context, Result};
 use serde::Serialize;
 
 use crate::kernels::Cycles;
 
-/// Steps of distillation: too few for accuracy, but the widths of the rows, which matter here, are chosen before. (Which
-/// matrices take int16 activations is chosen after, and may differ a little.)
+/// Steps of distillation: too few for accuracy, but the widths of the rows, which matter here, are chosen before.
+/// (Which matrices take int16 activations is chosen after, and may differ a little.)
 const STEPS: usize = 50;
 
 /// Functions that the report by function shows of each head.
@@ -94,8 +96,8 @@ pub(crate) fn measure(policies: &[PathBuf], counter: &Counter, wait_states: u64)
     for dir in policies {
         let policy = Policy::load(dir)?;
         let recordings = Recordings::load(&policy)?;
-        let rounded = Quantizer::new(&policy, &recordings, Method::Rtn, |_| {})?;
-        let learned = Quantizer::new(&policy, &recordings, Method::Best, |_| {})?;
+        let rounded = Quantizer::new(&policy, &recordings, Method::Rtn, None, |_| {})?;
+        let learned = Quantizer::new(&policy, &recordings, Method::Best, None, |_| {})?;
         for (quantizer, bits, options) in [
             (&rounded, 8.0, Options::new(Method::Rtn, Budget::Width(Width::W8))),
             (&learned, 3.0, best(3.0)),

@@ -1,5 +1,6 @@
 //! The commands that measure: `cargo demo`, `cargo xtask bench`, `cargo xtask budgets`, `cargo xtask fit`,
-//! `cargo xtask faults`, `cargo xtask compare`, `cargo xtask stack`. xtask installs what they need, builds this binary and runs it.
+//! `cargo xtask faults`, `cargo xtask compare`, `cargo xtask stack`. xtask installs what they need, builds this binary
+//! and runs it.
 #![forbid(unsafe_code)]
 
 mod bench;
@@ -53,7 +54,8 @@ enum Command {
     },
     /// Drive the UR3's arm through the serial port of the controller in QEMU, with faults on the line
     ///
-    /// One episode of 4 s for each fault: frames lost, late, twice and damaged, a cut cable, a host that stalls, a reset, an update.
+    /// One episode of 4 s for each fault: frames lost, late, twice and damaged, a cut cable, a host that stalls, a
+    /// reset, an update.
     Faults,
     /// Measure instructions, code, scratch and stack, and compare them with budgets.json
     Budgets {
@@ -74,9 +76,9 @@ enum Command {
     Fit,
     /// Compare the methods at equal budgets: held-out error, true bits, closed-loop success
     ///
-    /// The policies are that of the UR3 and, where ACTQ_SHARED names their folder, the shared ones. Their tasks run in MuJoCo with
-    /// the Python of ACTQ_MUJOCO_PYTHON (go1_*, g1_*) and ACTQ_GYMNASIUM_PYTHON (fetch_*). Every result stands in DIR/compare.jsonl
-    /// at once: the same command goes on where it was ended. The report is DIR/compare.md.
+    /// The policies are that of the UR3 and, where ACTQ_SHARED names their folder, the shared ones. Their tasks run in
+    /// MuJoCo with the Python of ACTQ_MUJOCO_PYTHON (go1_*, g1_*) and ACTQ_GYMNASIUM_PYTHON (fetch_*). Every result
+    /// stands in DIR/compare.jsonl at once: the same command goes on where it was ended. The report is DIR/compare.md.
     Compare(Plan),
 }
 

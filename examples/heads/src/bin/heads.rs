@@ -24,8 +24,8 @@ const REST: usize = 16 << 10;
 /// Ticks of the control loop, per second.
 const TICKS: f64 = 1000.0;
 
-/// Prints what heads of the sizes of published policies take on a Cortex-M4 at 168 MHz, by the cost model behind `actq inspect`. Their
-/// weights are seeded random numbers: sizes and times are real, accuracy is not.
+/// Prints what heads of the sizes of published policies take on a Cortex-M4 at 168 MHz, by the cost model behind
+/// `actq inspect`. Their weights are seeded random numbers: sizes and times are real, accuracy is not.
 #[derive(Parser)]
 struct Arguments {
     /// Also writes each head's policy folder here.

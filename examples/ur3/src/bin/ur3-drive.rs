@@ -6,14 +6,14 @@ use actq_ur3::task::{Outcome, Task};
 use anyhow::{Result, ensure};
 use clap::Parser;
 
-/// Seeds kept for driving: above those of calib.npz (0 on), heldout.npz (500 on) and evaluation (1000 on), below those of
-/// demonstrations.
+/// Seeds kept for driving: above those of calib.npz (0 on), heldout.npz (500 on) and evaluation (1000 on), below those
+/// of demonstrations.
 const DRIVING_SEEDS: std::ops::Range<u64> = 10_000..100_000;
 /// From one round to the next, so that every round drives episodes of its own.
 const SEEDS_OF_A_ROUND: u64 = 500;
 
-/// Runs episodes with the command in POLICY_CMD as the policy, over its standard input and output, and prints one JSON object:
-/// episodes, success (their share), ci (its 95% interval), errors over the hold phases.
+/// Runs episodes with the command in POLICY_CMD as the policy, over its standard input and output, and prints one JSON
+/// object: episodes, success (their share), ci (its 95% interval), errors over the hold phases.
 #[derive(Parser)]
 struct Options {
     /// The policy's command, as a shell reads it.

@@ -33,7 +33,8 @@ struct Options {
     /// Folder for the files; created if it does not exist.
     #[arg(long)]
     out: PathBuf,
-    /// Number of demonstrations, or of the policy's episodes in calib.npz, at most 500 [default: 5000, of the policy 12].
+    /// Number of demonstrations, or of the policy's episodes in calib.npz, at most 500 [default: 5000, of the policy
+    /// 12].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=20_000))]
     episodes: Option<u32>,
     /// Seed of the first demonstration, from 100000 on.
@@ -99,8 +100,8 @@ fn record_expert(seeds: std::ops::Range<u64>, path: &Path) -> Result<()> {
 }
 
 /// Writes closed-loop episodes of the policy: `obs [episode, step, 18]`, `action [episode, step, 48]` (the network's
-/// output at every step, also where a queued action is played; not of a flow, whose output depends on noise), `length [episode]`,
-/// `seed [episode]`.
+/// output at every step, also where a queued action is played; not of a flow, whose output depends on noise),
+/// `length [episode]`, `seed [episode]`.
 fn record_policy(policy: &mut PolicyF32, seeds: std::ops::Range<u64>, path: &Path) -> Result<()> {
     let mut obs = Vec::new();
     let mut action = Vec::new();

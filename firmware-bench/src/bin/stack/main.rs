@@ -1,12 +1,9 @@
-//! Measures the stack of the runtime on the image in the slot: prints the bytes that the check of the image, the self-test and
-//! a step take, with the frames of all that they call.
+//! Measures the stack of the runtime on the image in the slot: prints the bytes that the check of the image, the
+//! self-test and a step take, with the frames of all that they call.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
-fn main() {
-    eprintln!("this is firmware: build it with --target thumbv7em-none-eabihf");
-    std::process::exit(1);
-}
+use actq_firmware_bench::main;
 
 #[cfg(target_os = "none")]
 mod depth;

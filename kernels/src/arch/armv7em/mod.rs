@@ -1,9 +1,9 @@
-//! The GEMV in Armv7E-M assembler (Cortex-M4 and M7): SMLAD makes two MACs a cycle, four with paired lanes. Armv8-M with the DSP
-//! extension (Cortex-M33) has the same instructions.
+//! The GEMV in Armv7E-M assembler (Cortex-M4 and M7): SMLAD makes two MACs a cycle, four with paired lanes. Armv8-M
+//! with the DSP extension (Cortex-M33) has the same instructions.
 //!
-//! `single.s` holds one loop nest, stamped over the four layouts of single lanes; the layouts of paired lanes have a file
-//! each, with a kernel for row scales and one for group scales. All compute exactly what [`super::portable`] computes; the tests
-//! run both on the same data.
+//! `single.s` holds one loop nest, stamped over the four layouts of single lanes; the layouts of paired lanes have a
+//! file each, with a kernel for row scales and one for group scales. All compute exactly what [`super::portable`]
+//! computes; the tests run both on the same data.
 //!
 //! SMLAD sets the Q flag; the procedure call standard lets a call change it.
 
@@ -29,23 +29,23 @@ pub fn gemv(Product { block, x, first_row, acc }: Product<'_>) {
     let strips = acc.len() >> strip_log;
     let rows = strips << strip_log;
     let rest = acc.len() - rows;
-    let told = x.plan().told();
-    // SAFETY: the rows from `first_row` on, as many as `acc` has, are rows of the block or of its padding: that is what `Product::new` checks,
-    // as is that `first_row` is a multiple of 8, so that a strip begins there. A block has the words of all of its rows
-    // (`Block::leading`). Each call reads the words of its strips and writes as many sums. It reads the prepared vector from its
-    // begin to `end`, and the sums of x that stand behind where the layout has sums; both are in the vector,
-    // because it was prepared for a block of this shape (`Plan::of`). The slices are of u32 and i32, so every address is a
-    // multiple of 4, as LDM and LDRD demand.
+    let arguments = x.plan().arguments();
+    // SAFETY: the rows from `first_row` on, as many as `acc` has, are rows of the block or of its padding: that is what
+    // `Product::new` checks, as is that `first_row` is a multiple of 8, so that a strip begins there. A block has the
+    // words of all of its rows (`Block::leading`). Each call reads the words of its strips and writes as many sums. It
+    // reads the prepared vector from its begin to `end`, and the sums of x that stand behind where the layout has sums;
+    // both are in the vector, because it was prepared for a block of this shape (`Plan::of`). The slices are of u32 and
+    // i32, so every address is a multiple of 4, as LDM and LDRD demand.
     unsafe {
         let weights = block.words().as_ptr().add(first_row / QUAD * block.quad_words());
         let (x, acc) = (x.words().as_ptr(), acc.as_mut_ptr());
-        let end = x.add(told.end);
+        let end = x.add(arguments.end);
         if strips > 0 {
-            kernel(weights, x, acc, strips, end, told.extra, told.skip);
+            kernel(weights, x, acc, strips, end, arguments.extra, arguments.skip);
         }
         if rest > 0 {
             let weights = weights.add(rows / QUAD * block.quad_words());
-            four(weights, x, acc.add(rows), 1, end, told.extra, told.skip);
+            four(weights, x, acc.add(rows), 1, end, arguments.extra, arguments.skip);
         }
     }
 }

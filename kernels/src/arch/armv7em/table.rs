@@ -2,9 +2,9 @@
 
 use crate::layout::{BlockShape, Lanes, Width};
 
-/// Reads `strips` strips at `weights` and the prepared vector from `x` up to `x_end`, writes the strips' sums at `acc`. What
-/// `extra` is, the kernel's file says; the first pass through the loop of a kernel for row scales leaves `skip` of the layout's
-/// steps out.
+/// Reads `strips` strips at `weights` and the prepared vector from `x` up to `x_end`, writes the strips' sums at `acc`.
+/// What `extra` is, the kernel's file says; the first pass through the loop of a kernel for row scales leaves `skip` of
+/// the layout's steps out.
 pub(super) type Kernel = unsafe extern "C" fn(
     weights: *const u32,
     x: *const u32,
@@ -38,7 +38,8 @@ kernels! {
     actq_w8_paired_row actq_w8_paired_group
 }
 
-/// The kernel for the layout's strips, and that for a last strip of four rows; where strips have four rows, they are one.
+/// The kernel for the layout's strips, and that for a last strip of four rows; where strips have four rows, they are
+/// one.
 pub(super) type Kernels = [Kernel; 2];
 
 /// A layout's kernels for row scales and for group scales.

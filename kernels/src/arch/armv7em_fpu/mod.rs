@@ -1,5 +1,5 @@
-//! What converts from and to f32, in assembler for the FPU of a Cortex-M4 or M7: the arithmetic of [`super::portable`], operation for
-//! operation.
+//! What converts from and to f32, in assembler for the FPU of a Cortex-M4 or M7: the arithmetic of [`super::portable`],
+//! operation for operation.
 
 mod table;
 
@@ -39,12 +39,12 @@ pub fn quantize(x: &[f32], inverse: f32, plan: &Plan, out: &mut [u32]) -> Option
     let XLayout { shift, chunk, starts: [start, second], .. } = plan.layout.x;
     let (kernel, first, eights) = (quantizer(shift), plan.first / 8, chunk / 8);
     let (x, bias, factor, second) = (x.as_ptr(), start.bias, start.factor, second.factor);
-    // SAFETY: x is the plan's padded columns, the caller's or a copy at the end of the room, and the room has at least the plan's
-    // words. What is written never reaches what is still to be read of the copy: behind `n` of its columns those are `n / 2` words
-    // and start words and sums, of which there are as many in all as words before the copy. `of_valid` makes all counts 1 or more
-    // and all lengths multiples of 8 columns. The kernel reads eight columns before it writes them. It writes as many start words
-    // and sums as the layout has, which `table` asserts, and where it takes eight columns for a chunk, that is the layout's limit
-    // and so `first` and `eights`.
+    // SAFETY: x is the plan's padded columns, the caller's or a copy at the end of the room, and the room has at least
+    // the plan's words. What is written never reaches what is still to be read of the copy: behind `n` of its columns
+    // those are `n / 2` words and start words and sums, of which there are as many in all as words before the copy.
+    // `of_valid` makes all counts 1 or more and all lengths multiples of 8 columns. The kernel reads eight columns
+    // before it writes them. It writes as many start words and sums as the layout has, which `table` asserts, and where
+    // it takes eight columns for a chunk, that is the layout's limit and so `first` and `eights`.
     unsafe {
         let (groups, chunks, group) = (plan.groups, plan.chunks, plan.shape.group);
         kernel(inverse, ROUND, x, out, groups, chunks, first, eights, bias, factor, second, group);
@@ -52,8 +52,8 @@ pub fn quantize(x: &[f32], inverse: f32, plan: &Plan, out: &mut [u32]) -> Option
     Some(())
 }
 
-/// A copy, at the end of the room, of a vector that does not fill its groups, with zeros that do. (And `inverse` as it is, so that
-/// no register has to hold it meanwhile.)
+/// A copy, at the end of the room, of a vector that does not fill its groups, with zeros that do. (And `inverse` as it
+/// is, so that no register has to hold it meanwhile.)
 ///
 /// # Safety
 ///
@@ -72,8 +72,8 @@ unsafe fn filled(x: &[f32], inverse: f32, plan: &Plan, room: *mut u32, words: us
     Some((NonNull::new(copied)?.cast(), inverse))
 }
 
-/// `y[i] = start[i] + sum[i] * (scale[i] * x_scale)`, with two bf16 scales a word; what is `None` stands in y, the sums with
-/// their bits. As far as the shortest goes.
+/// `y[i] = start[i] + sum[i] * (scale[i] * x_scale)`, with two bf16 scales a word; what is `None` stands in y, the sums
+/// with their bits. As far as the shortest goes.
 #[inline(never)]
 pub fn scale(sums: Option<&[i32]>, start: Option<&[u32]>, scales: &[u32], x_scale: f32, y: &mut [f32]) {
     let len = y.len().min(2 * scales.len());
@@ -97,9 +97,9 @@ pub fn lstm_elements(elements: Range<usize>, gates: &[f32], c: &mut [f32], h: &m
     if start >= end || end > n || end > c.len() || gates.len() < 3 * n + end {
         return;
     }
-    // SAFETY: of `gates`, the kernel reads the elements of four rows of n values, the last up to `3 n + end`, which is no more
-    // than there are (n values take less than half of the memory: 4 n is no overflow). Of `c` and `h` it reads and writes the
-    // elements, which both have. There is at least one.
+    // SAFETY: of `gates`, the kernel reads the elements of four rows of n values, the last up to `3 n + end`, which is
+    // no more than there are (n values take less than half of the memory: 4 n is no overflow). Of `c` and `h` it reads
+    // and writes the elements, which both have. There is at least one.
     unsafe {
         let (c, h) = (c.as_mut_ptr().add(start), h.as_mut_ptr().add(start));
         actq_lstm(gates.as_ptr().add(start), size_of::<f32>() * n, c, h, end - start, &CELL);

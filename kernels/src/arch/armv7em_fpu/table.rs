@@ -4,8 +4,8 @@ use crate::layout::{LAYOUTS, XLayout};
 
 macro_rules! quantize_kernels {
     ($($name:ident)*) => {
-        /// Writes `groups` groups of `chunks` chunks, the first of `first` times eight values and the others of `eights`. `group` is 0
-        /// where there is but one, whose sum, if any, has a word of its own.
+        /// Writes `groups` groups of `chunks` chunks, the first of `first` times eight values and the others of
+        /// `eights`. `group` is 0 where there is but one, whose sum, if any, has a word of its own.
         pub(super) type Quantize = unsafe extern "C" fn(
             inverse: f32, round: f32, x: *const f32, out: *mut u32,
             groups: usize, chunks: usize, first: usize, eights: usize, bias: i32, factor: i32, second_factor: i32, group: usize,
@@ -30,8 +30,8 @@ pub(super) fn quantizer(shift: u8) -> Quantize {
     QUANTIZERS[shift as usize % QUANTIZERS.len()]
 }
 
-/// Whether that kernel does: it writes two start words, the second without a bias, at shift 1; sums from 2 on, those of pairs
-/// at 2; chunks of eight at 3.
+/// Whether that kernel does: it writes two start words, the second without a bias, at shift 1; sums from 2 on, those of
+/// pairs at 2; chunks of eight at 3.
 const fn suits(x: &XLayout) -> bool {
     let &XLayout { shift, chunk, start_words, starts: [_, second], sum, pairs, .. } = x;
     let starts = start_words == if shift == 1 { 2 } else { 1 } && second.bias == 0;

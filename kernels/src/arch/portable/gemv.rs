@@ -1,7 +1,8 @@
 //! The GEMV in plain Rust, for any target: the arithmetic of the assembler backend, sum for sum.
 //!
-//! The loops are written for a compiler that has few registers and knows the layout: a strip's cells are walked side by side,
-//! so that an activation is loaded once for all of them, and lengths are constants wherever the layout gives them.
+//! The loops are written for a compiler that has few registers and knows the layout: a strip's cells are walked side by
+//! side, so that an activation is loaded once for all of them, and lengths are constants wherever the layout gives
+//! them.
 
 use crate::arch::product::Product;
 use crate::layout::{Block, Format, QUAD, Sums, XLayout, with_format};

@@ -1,15 +1,17 @@
 //! The command line.
 
+mod values;
+
 use std::path::PathBuf;
 
 use actq::methods::Method;
 use actq::methods::actquant::choices::Choices;
 use actq_kernels::Width;
-use actq_kernels::layout::is_group;
 use anyhow::ensure;
 use clap::{Parser, Subcommand, ValueEnum, value_parser};
 
 use crate::link::args::{KeygenArgs, LinkArgs, SignArgs};
+use values::{clock, forced, group, minutes, npz, pair, positive, rounds, size, width};
 
 /// Quantizes robot policies to 2, 3, 4 or 8 bits and packs them into one image for a microcontroller.
 ///
@@ -25,24 +27,26 @@ pub(crate) struct Cli {
 pub(crate) enum Command {
     /// Make a policy's folder of an ONNX file
     ///
-    /// Takes what PyTorch, rsl_rl, Brax, MuJoCo Playground, mjlab, Isaac Lab, Stable-Baselines3, CleanRL and ML-Agents export:
-    /// matrix products, activations, norms, LSTM and GRU cells, convolutions over few positions, and what moves and scales values
-    /// between them, with a batch of 1. docs/IMPORT.md lists what is taken, and what helps where something is not.
-    /// The observation is the concatenation of the inputs, in the order that is printed. The action is the output that is called
-    /// so, or the only one that can be; what does not lead to it is cut. What cannot be taken is refused by the node's name.
+    /// Takes what PyTorch, rsl_rl, Brax, MuJoCo Playground, mjlab, Isaac Lab, Stable-Baselines3, CleanRL and ML-Agents
+    /// export: matrix products, activations, norms, LSTM and GRU cells, convolutions over few positions, and what moves
+    /// and scales values between them, with a batch of 1. docs/IMPORT.md lists what is taken, and what helps where
+    /// something is not. The observation is the concatenation of the inputs, in the order that is printed. The action
+    /// is the output that is called so, or the only one that can be; what does not lead to it is cut. What cannot be
+    /// taken is refused by the node's name.
     ///
     /// Example: actq import model.onnx --out policies/walker --calib obs.npy --check
     Import(ImportArgs),
     /// Quantize a policy into an image
     ///
-    /// POLICY_DIR holds policy.json (the op list), policy.safetensors (the weights) and, for every method but rtn, a recording
-    /// to learn from: calib.npz or calib.safetensors with the arrays "obs" [episode, step, value] and optionally "action" (the
-    /// network's raw output at each observation), "length" [episode] (valid steps) and "state" [episode, value] (recurrent
-    /// state before the first step), or calib.npy with the observations alone. Two axes [frame, value] are one episode. Where
-    /// heldout.npz, .npy or .safetensors is there too, the image is run on both, and errors and warnings are printed.
+    /// POLICY_DIR holds policy.json (the op list), policy.safetensors (the weights) and, for every method but rtn, a
+    /// recording to learn from: calib.npz or calib.safetensors with the arrays "obs" [episode, step, value] and
+    /// optionally "action" (the network's raw output at each observation), "length" [episode] (valid steps) and "state"
+    /// [episode, value] (recurrent state before the first step), or calib.npy with the observations alone. Two axes
+    /// [frame, value] are one episode. Where heldout.npz, .npy or .safetensors is there too, the image is run on both,
+    /// and errors and warnings are printed.
     ///
-    /// An .onnx file stands for the folder that `actq import` makes of it, here and wherever a POLICY_DIR is taken; its recordings are
-    /// those beside it.
+    /// An .onnx file stands for the folder that `actq import` makes of it, here and wherever a POLICY_DIR is taken; its
+    /// recordings are those beside it.
     ///
     /// Example: actq quantize policies/ur3 --bits 3 --out ur3.actq
     /// Example: actq quantize model.onnx --calib obs.npy --bpw 2 --out model.actq
@@ -53,46 +57,47 @@ pub(crate) enum Command {
     Inspect(InspectArgs),
     /// Compare an image's actions with the f32 policy's on held-out observations
     ///
-    /// The recording is heldout.npz, .npy or .safetensors in POLICY_DIR, or the file named. It holds "obs" and "action"; without
-    /// "action", the policy in POLICY_DIR gives the actions. Also printed: how much of the error comes from rounding the
-    /// activations, and, where calib.npz, .npy or .safetensors is there, a warning if the observations leave its range. With
-    /// --driven, the error on the image's own path: where it has led a robot itself, which need not be where f32 leads.
+    /// The recording is heldout.npz, .npy or .safetensors in POLICY_DIR, or the file named. It holds "obs" and
+    /// "action"; without "action", the policy in POLICY_DIR gives the actions. Also printed: how much of the error
+    /// comes from rounding the activations, and, where calib.npz, .npy or .safetensors is there, a warning if the
+    /// observations leave its range. With --driven, the error on the image's own path: where it has led a robot itself,
+    /// which need not be where f32 leads.
     ///
     /// Example: actq eval ur3.actq --policy policies/ur3
     Eval(EvalArgs),
     /// Drive an image, record, and learn again
     ///
-    /// Quantizes by method best from the f32 policy's recordings. Then, every round, a command drives the newest image: a
-    /// simulator or a robot that runs what the environment variable POLICY_CMD holds as its policy (actq serve IMAGE --record
-    /// FILE, to be split as a shell does). The f32 policy labels what the image was shown, and the next image learns from all
-    /// recordings together. The last image is driven, too. At the end: one image a row, with its error on the f32 policy's
-    /// path, on its own, and how it drove.
+    /// Quantizes by method best from the f32 policy's recordings. Then, every round, a command drives the newest image:
+    /// a simulator or a robot that runs what the environment variable POLICY_CMD holds as its policy (actq serve IMAGE
+    /// --record FILE, to be split as a shell does). The f32 policy labels what the image was shown, and the next image
+    /// learns from all recordings together. The last image is driven, too. At the end: one image a row, with its error
+    /// on the f32 policy's path, on its own, and how it drove.
     ///
-    /// The command is run by sh -c, with ACTQ_ROUND = 1, 2, ... N + 1 (to drive other episodes each time) and ACTQ_POLICY (the
-    /// policy's folder). What it prints goes to standard error; the last line that is one JSON object says how it went: success
-    /// (a share), ci (its interval), episodes, and any other numbers.
+    /// The command is run by sh -c, with ACTQ_ROUND = 1, 2, ... N + 1 (to drive other episodes each time) and
+    /// ACTQ_POLICY (the policy's folder). What it prints goes to standard error; the last line that is one JSON object
+    /// says how it went: success (a share), ci (its interval), episodes, and any other numbers.
     ///
     /// Example: actq tune policies/ur3 --bpw 1.5 --drive "ur3-drive --episodes 50" --rounds 3 --out ur3.actq
     Tune(TuneArgs),
     /// Compare methods at several budgets on held-out observations
     ///
-    /// A cell of the table is the error (mean squared error / variance of the actions, mean over dimensions) and the true bits
-    /// per weight, scales and padding counted; "-" where not even 2 bits fit. Every method uses its default groups; activations
-    /// are int8, for best int16 where it pays. A star marks the knee of a policy's best method.
+    /// A cell of the table is the error (mean squared error / variance of the actions, mean over dimensions) and the
+    /// true bits per weight, scales and padding counted; "-" where not even 2 bits fit. Every method uses its default
+    /// groups; activations are int8, for best int16 where it pays. A star marks the knee of a policy's best method.
     ///
     /// Example: actq sweep policies/ur3 policies/go1 --bpw 2.5,3,4 --svg errors.svg
     Sweep(SweepArgs),
     /// Run an image as a policy over standard input and output
     ///
-    /// Little-endian: "R" resets and has no reply; "S" and the observation as f32 are answered by the action as f32. Where the
-    /// observation, or a value inside the network, is not finite, every value of the answer is a NaN (bits 0x7fc00000): no
-    /// action. The recurrent state and what was left of a chunk are forgotten, the last action is not: the step limit still
-    /// counts from it.
+    /// Little-endian: "R" resets and has no reply; "S" and the observation as f32 are answered by the action as f32.
+    /// Where the observation, or a value inside the network, is not finite, every value of the answer is a NaN (bits
+    /// 0x7fc00000): no action. The recurrent state and what was left of a chunk are forgotten, the last action is not:
+    /// the step limit still counts from it.
     ///
-    /// With --record, the observations go into a recording that `actq quantize --calib` learns from and `actq eval --driven`
-    /// measures on, labelled by the f32 policy. "R" begins an episode, and so does what follows an answer without an action.
-    /// The file is replaced as a whole while the policy runs: whenever the process ends, all but about the last twentieth is
-    /// there. No file is ever overwritten.
+    /// With --record, the observations go into a recording that `actq quantize --calib` learns from and
+    /// `actq eval --driven` measures on, labelled by the f32 policy. "R" begins an episode, and so does what follows an
+    /// answer without an action. The file is replaced as a whole while the policy runs: whenever the process ends, all
+    /// but about the last twentieth is there. No file is ever overwritten.
     ///
     /// Example: actq serve ur3.actq --record drive.npz --policy policies/ur3
     Serve(ServeArgs),
@@ -123,11 +128,12 @@ pub(crate) struct ImportArgs {
     /// The output that is the action, or any value of the graph [default: the one called action, or the only one]
     #[arg(long, value_name = "NAME")]
     pub(crate) output: Option<String>,
-    /// An input that holds recurrent state, and the output of its next value; may be repeated [default: found by the cells]
+    /// An input that holds recurrent state, and the output of its next value; may be repeated [default: found by the
+    /// cells]
     #[arg(long, value_name = "IN=OUT", value_parser = pair)]
     pub(crate) state: Vec<(String, String)>,
-    /// Compare the actions with onnxruntime's on the recording, or on random observations: to 1e-5 of the largest action. Needs
-    /// Python with onnxruntime (python3, or what ACTQ_PYTHON names)
+    /// Compare the actions with onnxruntime's on the recording, or on random observations: to 1e-5 of the largest
+    /// action. Needs Python with onnxruntime (python3, or what ACTQ_PYTHON names)
     #[arg(long)]
     pub(crate) check: bool,
     /// Replace files that are there
@@ -142,8 +148,8 @@ pub(crate) struct ServeArgs {
     /// Record what the policy is shown; where the file is there, FILE-2.npz and so on is taken
     #[arg(long, value_name = "FILE.npz", value_parser = npz)]
     pub(crate) record: Option<PathBuf>,
-    /// The folder of the policy that the image was made from, which labels what is recorded [default: the image's folder, if
-    /// that policy is there; else nothing is labelled]
+    /// The folder of the policy that the image was made from, which labels what is recorded [default: the image's
+    /// folder, if that policy is there; else nothing is labelled]
     #[arg(long, value_name = "POLICY_DIR", env = "ACTQ_POLICY")]
     pub(crate) policy: Option<PathBuf>,
 }
@@ -168,8 +174,8 @@ pub(crate) struct QuantizeArgs {
     /// Bytes of the whole image, as 98304 or 96K
     #[arg(long, value_name = "SIZE", conflicts_with_all = ["bits", "bpw"], value_parser = size)]
     pub(crate) flash: Option<usize>,
-    /// The fewest bits whose error (NMSE, as eval measures it) is at most X, to a tenth of a bit per weight; measured on
-    /// the held-out recording, else on that of calibration
+    /// The fewest bits whose error (NMSE, as eval measures it) is at most X, to a tenth of a bit per weight; measured
+    /// on the held-out recording, else on that of calibration
     #[arg(long, value_name = "X", conflicts_with_all = ["bits", "bpw", "flash"], value_parser = positive)]
     pub(crate) max_nmse: Option<f64>,
     /// Milliseconds that a step may take on a Cortex-M4, predicted; takes the most bits that keep them
@@ -263,14 +269,14 @@ pub(crate) struct TuneArgs {
     /// Bits of every weight: 2, 3, 4 or 8 [default: 3]
     #[arg(long, value_name = "N", conflicts_with = "bpw", value_parser = width)]
     pub(crate) bits: Option<Width>,
-    /// A recording of the f32 policy: .npz, .npy or .safetensors, or a folder of them; may be repeated [default: calib.* in
-    /// POLICY_DIR]
+    /// A recording of the f32 policy: .npz, .npy or .safetensors, or a folder of them; may be repeated [default:
+    /// calib.* in POLICY_DIR]
     #[arg(long, value_name = "FILE|DIR")]
     pub(crate) calib: Vec<PathBuf>,
     #[command(flatten)]
     pub(crate) learn: LearnArgs,
-    /// Keep the images (round-0.actq, ...) and what each of them drove (round-0/drive.npz, ...) in this folder, which is made or
-    /// empty
+    /// Keep the images (round-0.actq, ...) and what each of them drove (round-0/drive.npz, ...) in this folder, which
+    /// is made or empty
     #[arg(long, value_name = "DIR")]
     pub(crate) keep: Option<PathBuf>,
     /// Write the table, and all numbers that the command said
@@ -410,65 +416,4 @@ impl From<MethodArg> for Method {
             MethodArg::Best => Self::Best,
         }
     }
-}
-
-fn width(text: &str) -> Result<Width, String> {
-    let known = text.parse().ok().and_then(Width::from_bits);
-    known.ok_or_else(|| "weights have 2, 3, 4 or 8 bits".to_owned())
-}
-
-fn pair(text: &str) -> Result<(String, String), String> {
-    let (from, to) = text.split_once('=').ok_or_else(|| "the form is INPUT=OUTPUT".to_owned())?;
-    Ok((from.to_owned(), to.to_owned()))
-}
-
-fn rounds(text: &str) -> Result<usize, String> {
-    let known = text.parse().ok().filter(|n| (1..=100).contains(n));
-    known.ok_or_else(|| "1 to 100 rounds can be learned".to_owned())
-}
-
-fn npz(text: &str) -> Result<PathBuf, String> {
-    let path = PathBuf::from(text);
-    let is_npz = path.extension().is_some_and(|ending| ending == "npz");
-    is_npz.then_some(path).ok_or_else(|| "a recording is written as .npz, and its name ends so".to_owned())
-}
-
-fn forced(text: &str) -> Result<(String, Width), String> {
-    let (name, bits) = text.split_once('=').ok_or_else(|| "the form is NAME=BITS".to_owned())?;
-    Ok((name.to_owned(), width(bits)?))
-}
-
-fn size(text: &str) -> Result<usize, String> {
-    let (digits, unit) = match text.strip_suffix(['K', 'k']) {
-        Some(digits) => (digits, 1024),
-        None => (text, 1),
-    };
-    let bytes = digits.parse().ok().and_then(|n: usize| n.checked_mul(unit)).filter(|n| *n > 0);
-    bytes.ok_or_else(|| "a size is a number of bytes, or of KiB with a K behind it".to_owned())
-}
-
-fn group(text: &str) -> Result<usize, String> {
-    let known = text.parse().ok().filter(|group| is_group(*group));
-    known.ok_or_else(|| "groups have 32, 64 or 128 columns, or 0 for none".to_owned())
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0);
-    number.ok_or_else(|| "a number above 0 is needed".to_owned())
-}
-
-fn minutes(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|x: &f64| *x > 0.0 && *x <= 10_080.0);
-    number.ok_or_else(|| "a number above 0 is needed, and at most a week's 10080".to_owned())
-}
-
-/// Reads a clock in Hz, as `168M`, `84000K` or `168000000`.
-fn clock(text: &str) -> Result<f64, String> {
-    let (digits, unit) = match text.char_indices().next_back() {
-        Some((at, 'M' | 'm')) => (&text[..at], 1e6),
-        Some((at, 'K' | 'k')) => (&text[..at], 1e3),
-        _ => (text, 1.0),
-    };
-    let hertz = digits.parse().ok().map(|n: f64| n * unit).filter(|n| n.is_finite() && *n >= 1.0);
-    hertz.ok_or_else(|| "a clock is a number of Hz, or of MHz with an M behind it".to_owned())
 }

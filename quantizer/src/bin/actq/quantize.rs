@@ -42,7 +42,7 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
     let bar = progress_bar()?;
     bar.set_message("calibrating");
     let quantizer =
-        Quantizer::before(&source, &recordings, options.method, options.minutes, |share| set_share(&bar, share))?;
+        Quantizer::new(&source, &recordings, options.method, options.minutes, |share| set_share(&bar, share))?;
     bar.reset();
     let found = quantizer.quantize(&options, |work, share| {
         bar.set_message(work.to_owned());

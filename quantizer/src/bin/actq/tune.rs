@@ -79,7 +79,8 @@ enum Folder {
 }
 
 impl Folder {
-    /// The folder to keep, which is made or is empty, so that no recording of another time is among them; else one that goes.
+    /// The folder to keep, which is made or is empty, so that no recording of another time is among them; else one that
+    /// goes.
     fn new(keep: Option<&Path>) -> Result<Self> {
         let Some(dir) = keep else {
             return Ok(Self::Gone(TempDir::with_prefix("actq-").context("no folder for recordings")?));

@@ -117,8 +117,8 @@ impl Operation for Lstm {
     }
 }
 
-/// The derivatives of one cell, from those by its hidden state `d_h` and by its new cell state `d_c`, which becomes that by the
-/// one before.
+/// The derivatives of one cell, from those by its hidden state `d_h` and by its new cell state `d_c`, which becomes
+/// that by the one before.
 fn derivative(gates: &[f32], c_before: &[f32], d_h: &[f32], d_gates: &mut [f32], d_c: &mut [f32]) {
     let n = d_h.len();
     let ([i, f, g, o], [d_i, d_f, d_g, d_o]) = (quarters(gates, n), quarters_mut(d_gates, n));

@@ -74,11 +74,11 @@ pub fn allocate(graph: &Graph, scores: &[f64], choices: &Choices, packing: Packi
 }
 
 /// A format per matrix that keeps the sum over layers of `E_l^2` low, `E_l` being the sum over the layer's matrices of
-/// `score * 2^(-2 bits)`, within `limit` bytes. Formats are numbered from few bits to many; `allowed` has those that each
-/// matrix may get, `bits` gives the bits of a matrix in one of them, and `size` its bytes.
+/// `score * 2^(-2 bits)`, within `limit` bytes. Formats are numbered from few bits to many; `allowed` has those that
+/// each matrix may get, `bits` gives the bits of a matrix in one of them, and `size` its bytes.
 ///
-/// Greedy, as in the paper: from the narrowest format on, always the upgrade with the largest fall of `E_l^2` per byte among
-/// those that fit. Among equals the narrowest matrix goes first, so that what the scores leave over is spread.
+/// Greedy, as in the paper: from the narrowest format on, always the upgrade with the largest fall of `E_l^2` per byte
+/// among those that fit. Among equals the narrowest matrix goes first, so that what the scores leave over is spread.
 ///
 /// # Errors
 ///
@@ -148,8 +148,8 @@ mod tests {
         graph.matrices.iter().zip(widths).map(|(m, w)| bytes(m, *w, PACKING)).sum()
     }
 
-    /// For separate layers of equal size the objective is a sum of functions of the bytes that fall ever more slowly, where
-    /// greedy gives the best of all assignments with at most the bytes that it used.
+    /// For separate layers of equal size the objective is a sum of functions of the bytes that fall ever more slowly,
+    /// where greedy gives the best of all assignments with at most the bytes that it used.
     #[test]
     fn greedy_is_the_best_for_separate_layers_of_equal_size() {
         let graph = chain(4);
@@ -207,7 +207,8 @@ mod tests {
 
     #[test]
     fn noise_of_the_format_counts_its_scales() {
-        // One matrix has many short rows, whose scales and padding take more bits than those of the long rows of the other.
+        // One matrix has many short rows, whose scales and padding take more bits than those of the long rows of the
+        // other.
         let mut graph = Graph::new(8);
         for (matrix, (rows, cols)) in [(64, 8), (8, 64)].into_iter().enumerate() {
             graph.matrices.push(WeightMatrix { name: format!("w{matrix}"), rows, cols, data: vec![0.0; 512] });

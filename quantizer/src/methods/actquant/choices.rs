@@ -1,4 +1,5 @@
-//! Where ActQuant's paper and code leave a choice, or this project has made another one: what is done, and what the authors do.
+//! Where ActQuant's paper and code leave a choice, or this project has made another one: what is done, and what the
+//! authors do.
 //!
 //! `docs/QUANTIZER.md`, section actquant, has the sources and the reasons.
 
@@ -168,8 +169,8 @@ impl FromStr for Choices {
     }
 }
 
-/// As [`FromStr`] reads it: what differs from the defaults, or from the authors' choices where that is less; nothing for the
-/// defaults.
+/// As [`FromStr`] reads it: what differs from the defaults, or from the authors' choices where that is less; nothing
+/// for the defaults.
 impl fmt::Display for Choices {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let differing = |from: &Self| -> Vec<String> {

@@ -9,7 +9,8 @@ use crate::calibrate::hsic::{Bandwidth, Kernel, hsic};
 use crate::data::Dataset;
 use crate::graph::{Evaluator, Graph, WeightMatrix};
 
-/// Frames that kernels can be built over, at most: time and memory go with the square, and so many take 512 MiB a kernel.
+/// Frames that kernels can be built over, at most: time and memory go with the square, and so many take 512 MiB a
+/// kernel.
 pub const MOST_FRAMES: usize = 8192;
 
 /// Weight of the dependence on the network's input (the paper's lambda_x).
@@ -19,9 +20,10 @@ const LAMBDA_Y: f64 = 1.0;
 
 /// The dependences that a matrix's score is made of.
 ///
-/// ActQuant (arXiv 2605.24011) scores values Z by the HSIC bottleneck `F(Z) = -lambda_x HSIC(X, Z) + lambda_y HSIC(Y, Z)`, and a
-/// matrix by `sens = F(output) - F(input)`. As in the authors' code, X is the same for every matrix, namely the input of the
-/// network's first one, so that `sens` says how far the matrix moves the values from the observation towards the actions.
+/// ActQuant (arXiv 2605.24011) scores values Z by the HSIC bottleneck
+/// `F(Z) = -lambda_x HSIC(X, Z) + lambda_y HSIC(Y, Z)`, and a matrix by `sens = F(output) - F(input)`. As in the
+/// authors' code, X is the same for every matrix, namely the input of the network's first one, so that `sens` says how
+/// far the matrix moves the values from the observation towards the actions.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Score {
     /// HSIC(X, the matrix's input)
@@ -61,8 +63,8 @@ impl Score {
 
 /// The scores of all matrices over evenly spaced frames of `dataset`, at most so many; it must hold actions.
 ///
-/// Gaussian kernels on inputs and outputs, the linear kernel on the actions. A matrix that is used several times in a frame is
-/// scored by the mean of its inputs and outputs. Biases are left out: no kernel sees them.
+/// Gaussian kernels on inputs and outputs, the linear kernel on the actions. A matrix that is used several times in a
+/// frame is scored by the mean of its inputs and outputs. Biases are left out: no kernel sees them.
 pub fn scores(graph: &Graph, dataset: &Dataset, most: usize, bandwidth: Bandwidth) -> Result<Vec<Score>> {
     let frames = dataset.frames();
     let step = frames.div_ceil(most.clamp(1, MOST_FRAMES)).max(1);

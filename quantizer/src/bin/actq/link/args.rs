@@ -29,8 +29,8 @@ pub(crate) enum LinkCommand {
     Set(SetArgs),
     /// Send a recording's observations, each at its time
     ///
-    /// The image is the one that the controller runs: it says how long an observation is, and its checksum is compared. Episodes
-    /// follow each other without a reset.
+    /// The image is the one that the controller runs: it says how long an observation is, and its checksum is compared.
+    /// Episodes follow each other without a reset.
     ///
     /// Example: actq link stream /dev/ttyACM0 ur3.actq heldout.npz --arm --log drive.npz
     Stream(StreamArgs),
@@ -46,8 +46,8 @@ pub(crate) enum LinkCommand {
 
 #[derive(clap::Args)]
 pub(crate) struct PortArgs {
-    /// A serial port, as /dev/ttyACM0, COM3 or /dev/ttyUSB0@115200 [921600 bits a second where none are named], or a socket:
-    /// tcp:HOST:PORT or unix:PATH
+    /// A serial port, as /dev/ttyACM0, COM3 or /dev/ttyUSB0@115200 [921600 bits a second where none are named], or a
+    /// socket: tcp:HOST:PORT or unix:PATH
     pub(crate) port: Address,
     /// Seconds to ask without an answer, and to wait for a port that is lost
     #[arg(long, value_name = "SECONDS", default_value = "5", value_parser = seconds)]

@@ -1,0 +1,182 @@
+//! The images that are measured: many shapes of every operation.
+
+use actq::contract::{Ensemble, Playback};
+use actq::emit;
+use actq::graph::Denoising;
+use actq::graph::ops::{Add, Gru, Iterate, LayerNorm, Lstm, Mul, Normalize, Pointwise, RmsNorm, Table};
+use actq::methods::{Activations, Outcome};
+use actq::policy::Policy;
+use actq_bench::networks::{Builder, accumulating};
+use actq_kernels::Width;
+use actq_kernels::image::Kind;
+use actq_kernels::math::Function;
+use actq_kernels::ops::denoise::Coefficients;
+use anyhow::Result;
+
+/// Rows and columns of the matrices: strips of all heights, runs of more than one, columns with and without a rest.
+const SHAPES: [(usize, usize); 28] = [
+    (4, 8),
+    (8, 8),
+    (8, 18),
+    (12, 30),
+    (16, 32),
+    (3, 64),
+    (20, 64),
+    (64, 64),
+    (128, 48),
+    (33, 100),
+    (96, 100),
+    (16, 128),
+    (48, 128),
+    (72, 200),
+    (30, 235),
+    (8, 256),
+    (64, 256),
+    (128, 256),
+    (20, 320),
+    (40, 330),
+    (6, 512),
+    (24, 512),
+    (12, 517),
+    (16, 700),
+    (40, 96),
+    (100, 72),
+    (320, 40),
+    (288, 128),
+];
+/// Lengths of elementwise operations, and of the states of cells.
+const LENGTHS: [usize; 5] = [8, 33, 64, 100, 256];
+const HIDDEN: [usize; 4] = [8, 24, 64, 100];
+/// Actions of chunks, and values of an action.
+const CHUNKS: [(usize, usize); 5] = [(2, 3), (8, 7), (16, 2), (20, 14), (50, 6)];
+/// Longest observation.
+const OBSERVATION: usize = 700;
+/// Images with their names.
+pub(super) fn images() -> Result<Vec<(String, Vec<u8>)>> {
+    let mut images = Vec::new();
+    for (policy, outcomes) in policies()? {
+        images.push((policy.name.clone(), emit::image(&policy, &outcomes)?));
+    }
+    let mut builder = Builder::new(OBSERVATION);
+    for rows in LENGTHS {
+        for _ in 0..2 {
+            builder.linear((rows, 40), Activations::Int8, |_| Some(Width::W2), 0, true)?;
+        }
+    }
+    let (policy, outcomes) = builder.finish("biases that are added".to_owned(), false);
+    images.push((policy.name.clone(), accumulating(&emit::image(&policy, &outcomes)?)?));
+    Ok(images)
+}
+
+fn policies() -> Result<Vec<(Policy, Vec<Outcome>)>> {
+    let mut policies = Vec::new();
+    for activations in [Activations::Int8, Activations::Int16] {
+        for group in [0, 32, 64, 128] {
+            for width in Width::ALL {
+                let mut builder = Builder::new(OBSERVATION);
+                for shape in SHAPES {
+                    builder.linear(shape, activations, |_| Some(width), group, true)?;
+                }
+                policies.push(builder.finish(format!("{width:?} {activations:?} group {group}"), false));
+            }
+        }
+        // Blocks of several widths in order, by index, and outputs without biases.
+        type Widths = fn(usize, usize) -> usize;
+        let in_order: Widths = |row, rows| 4 * row / rows;
+        let mixed: Widths = |row, _| row * 7 % 4;
+        // Two of three rows have no bits.
+        let pruned: Widths = |row, _| [3, 4, 4][row % 3];
+        for (name, which, bias) in [
+            ("in order", in_order, true),
+            ("in order, no bias", in_order, false),
+            ("mixed", mixed, true),
+            ("pruned", pruned, true),
+            ("pruned, no bias", pruned, false),
+        ] {
+            let mut builder = Builder::new(OBSERVATION);
+            for (rows, cols) in SHAPES {
+                let width = |row| Width::ALL.get(which(row, rows)).copied();
+                builder.linear((rows, cols), activations, width, 0, bias)?;
+            }
+            policies.push(builder.finish(format!("blocks {name}, {activations:?}"), false));
+        }
+    }
+    // Steps with hardly any work.
+    for (observation, action, contract) in
+        [(8, 8, false), (40, 2, true), (256, 30, false), (256, 30, true), (40, 12, true)]
+    {
+        let mut builder = Builder::new(observation);
+        builder.part(action)?;
+        policies.push(builder.finish(format!("{observation} to {action}, contract {contract}"), contract));
+    }
+    for (name, contract) in [("functions", false), ("functions with contract", true)] {
+        let mut builder = Builder::new(if contract { OBSERVATION } else { 256 });
+        for len in LENGTHS {
+            for function in Function::ALL {
+                let input = builder.part(len)?;
+                builder.node(Pointwise(function), &[input])?;
+            }
+            let [mean, scale] = [builder.values(len), vec![1.5; len]];
+            builder
+                .node_of_part(len, Normalize { mean: mean.clone(), scale: scale.clone(), pre_clip: 10.0, clip: 5.0 })?;
+            let limitless = f32::INFINITY;
+            builder.node_of_part(
+                len,
+                Normalize { mean: mean.clone(), scale: scale.clone(), pre_clip: limitless, clip: limitless },
+            )?;
+            builder.node_of_part(len, LayerNorm { weight: scale.clone(), bias: mean, eps: 1e-5 })?;
+            builder.node_of_part(len, RmsNorm { weight: scale, eps: 1e-5 })?;
+            let (a, b) = (builder.part(len)?, builder.part(len)?);
+            builder.node(Add, &[a, b])?;
+            let (a, b) = (builder.part(len)?, builder.part(len)?);
+            builder.node(Mul, &[a, b])?;
+        }
+        for hidden in HIDDEN {
+            for width in [Width::W2, Width::W4] {
+                let cols = 40;
+                let all = vec![Some(width); 4 * hidden];
+                let input = builder.matrix(4 * hidden, cols, Activations::Int8, &all, 0)?;
+                let state = builder.matrix(4 * hidden, hidden, Activations::Int8, &all, 0)?;
+                let bias = builder.values(4 * hidden);
+                builder.node_of_part(cols, Lstm { hidden, input, state, bias })?;
+                let all = vec![Some(width); 3 * hidden];
+                let input = builder.matrix(3 * hidden, cols, Activations::Int8, &all, 0)?;
+                let state = builder.matrix(3 * hidden, hidden, Activations::Int8, &all, 0)?;
+                let (input_bias, state_bias) = (builder.values(3 * hidden), builder.values(3 * hidden));
+                builder.node_of_part(cols, Gru { hidden, input, state, input_bias, state_bias })?;
+            }
+        }
+        builder.part(12)?;
+        policies.push(builder.finish(name.to_owned(), contract));
+    }
+    // Chunks that are averaged, and such that lead over from one to the next.
+    for (chunk, act_len) in CHUNKS {
+        for (horizon, overlap) in [(chunk, 0), (chunk / 2, 0), (0, chunk - 1), (0, chunk / 2)] {
+            let mut builder = Builder::new(chunk * act_len);
+            builder.part(chunk * act_len)?;
+            let name = format!("chunks of {chunk} by {act_len}, horizon {horizon}, overlap {overlap}");
+            let (mut policy, outcomes) = builder.finish(name, false);
+            (policy.kind, policy.chunk, policy.act_len) = (Kind::Chunk, chunk, act_len);
+            let ensemble = (horizon > 0).then_some(Ensemble { horizon, m: 0.01 });
+            policy.contract.playback = Playback { ensemble, overlap, deadline: None };
+            policies.push((policy, outcomes));
+        }
+    }
+    // A denoising step, with a limit and noise and without.
+    for (limit, sigma) in [(f32::INFINITY, 0.0), (f32::INFINITY, 0.1), (1.0, 0.0), (1.0, 0.1)] {
+        for len in LENGTHS {
+            let mut builder = Builder::new(8);
+            let rows = builder.values(len);
+            let (iterate, table) = (builder.node(Iterate { len }, &[])?, builder.node(Table { rows, len }, &[])?);
+            builder.node(Add, &[iterate, table])?;
+            let sample = if limit.is_finite() { 0.3 } else { 0.0 };
+            let steps = vec![Coefficients::from_array([sample, -sample, 0.5, 0.1, sample, sigma, 0.0])];
+            builder.graph.denoising = Some(Denoising { first: 0, len, limit, steps });
+            let (mut policy, outcomes) =
+                builder.finish(format!("a denoising step, limit {limit}, sigma {sigma}"), false);
+            policy.kind = Kind::Flow;
+            policies.push((policy, outcomes));
+        }
+    }
+    Ok(policies)
+}

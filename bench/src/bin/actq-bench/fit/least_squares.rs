@@ -1,0 +1,81 @@
+//! The rates that fit the samples best.
+
+use std::collections::BTreeMap;
+
+use actq_kernels::pace::cost::{Cost, Feature};
+
+use super::{Rates, Sample};
+
+/// The rates, none of them negative, with the least sum of squared relative errors (Lawson and Hanson, Solving Least
+/// Squares Problems, 1974, chapter 23, on the normal equations).
+pub(super) fn solve(samples: &[&Sample], of: impl Fn(Cost) -> u64) -> Rates {
+    let mut features: Vec<Feature> = samples.iter().flat_map(|s| s.features.keys().copied()).collect();
+    features.sort();
+    features.dedup();
+    let place: BTreeMap<Feature, usize> = features.iter().enumerate().map(|(i, f)| (*f, i)).collect();
+    let n = features.len();
+    let (mut normal, mut right) = (vec![vec![0.0f64; n]; n], vec![0.0f64; n]);
+    for sample in samples {
+        let target = of(sample.cost) as f64;
+        // Relative errors, and some instructions either way in what is short.
+        let weight = 1.0 / (target + 100.0);
+        let row: Vec<(usize, f64)> = sample.features.iter().map(|(f, count)| (place[f], count * weight)).collect();
+        for &(i, a) in &row {
+            row.iter().for_each(|&(j, b)| normal[i][j] += a * b);
+            right[i] += a * target * weight;
+        }
+    }
+    // Features of the same size, so that one measure of what is small holds for all.
+    let scale: Vec<f64> = (0..n).map(|i| normal[i][i].sqrt()).collect();
+    for i in 0..n {
+        right[i] /= scale[i];
+        (0..n).for_each(|j| normal[i][j] /= scale[i] * scale[j]);
+    }
+    let mut rates = vec![0.0f64; n];
+    let mut used: Vec<usize> = Vec::new();
+    loop {
+        let gain = |i: usize| right[i] - (0..n).map(|j| normal[i][j] * rates[j]).sum::<f64>();
+        let unused = (0..n).filter(|i| !used.contains(i));
+        let Some((gain, next)) = unused.map(|i| (gain(i), i)).max_by(|a, b| a.0.total_cmp(&b.0)) else { break };
+        if gain < 1e-7 {
+            break;
+        }
+        used.push(next);
+        loop {
+            let wanted = least_squares(&normal, &right, &used);
+            // As far towards the solution as no rate becomes negative; those that would are used no more.
+            let share = |(&i, &x): (&usize, &f64)| if x > 0.0 { 1.0 } else { rates[i] / (rates[i] - x) };
+            let step = used.iter().zip(&wanted).map(share).fold(1.0, f64::min);
+            used.iter().zip(&wanted).for_each(|(&i, x)| rates[i] += step * (x - rates[i]));
+            if step >= 1.0 {
+                break;
+            }
+            used.retain(|&i| rates[i] > 1e-12);
+            rates.iter_mut().enumerate().filter(|(i, _)| !used.contains(i)).for_each(|(_, rate)| *rate = 0.0);
+        }
+    }
+    (0..n).map(|i| (features[i], rates[i] / scale[i])).collect()
+}
+
+/// The solution of the normal equations for some of the features, by elimination.
+fn least_squares(normal: &[Vec<f64>], right: &[f64], used: &[usize]) -> Vec<f64> {
+    let mut rows: Vec<Vec<f64>> =
+        used.iter().map(|&i| used.iter().map(|&j| normal[i][j]).chain([right[i]]).collect()).collect();
+    for pivot in 0..rows.len() {
+        let row = rows[pivot].clone();
+        // What others determine gets 0.
+        let small = row[pivot] < 1e-9;
+        for (i, other) in rows.iter_mut().enumerate() {
+            match (i == pivot, small) {
+                (true, true) => other.fill(0.0),
+                (false, true) => other[pivot] = 0.0,
+                (true, false) => {}
+                (false, false) => {
+                    let factor = other[pivot] / row[pivot];
+                    other.iter_mut().zip(&row).skip(pivot).for_each(|(o, r)| *o -= factor * r);
+                }
+            }
+        }
+    }
+    (0..rows.len()).map(|i| if rows[i][i] == 0.0 { 0.0 } else { rows[i][rows.len()] / rows[i][i] }).collect()
+}

@@ -1,0 +1,20 @@
+//! What the measuring programs have in common. On a host they only say what they are.
+#![cfg_attr(target_os = "none", no_std)]
+
+/// What the programs do where they are built for a host.
+#[cfg(not(target_os = "none"))]
+pub fn main() {
+    eprintln!("this is firmware: build it with --target thumbv7em-none-eabihf, or see `cargo xtask bench`");
+    std::process::exit(1);
+}
+
+/// Words that look random, the same in every run (Marsaglia's xorshift32).
+pub fn random_words() -> impl FnMut() -> u32 {
+    let mut seed = 0x1234_5678u32;
+    move || {
+        seed ^= seed << 13;
+        seed ^= seed >> 17;
+        seed ^= seed << 5;
+        seed
+    }
+}

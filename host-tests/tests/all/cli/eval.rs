@@ -1,0 +1,84 @@
+//! `actq eval`: its figures, and the recordings that it takes.
+
+use std::fs;
+
+use actq_bench::command::{actq, failed, run, succeeded};
+use anyhow::{Context, Result, ensure};
+use ndarray::Array3;
+use serde_json::{Value, json};
+
+use super::fixture::{
+    ACT, CHUNK, EPISODES, Fixture, OBS, STEPS, draw_observations, edit, text, write_npy, write_recording,
+};
+
+#[test]
+fn eval_prints_one_object_with_six_numbers() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let path = fixture.image("--bits 8")?;
+    let report = fixture.eval(&path)?;
+    let keys: Vec<_> = report.as_object().context("no object")?.keys().map(String::as_str).collect();
+    let mut expected = ["nmse", "worst_nmse", "max_abs", "steps", "bpw", "bytes"];
+    expected.sort_unstable();
+    assert_eq!(keys, expected);
+    assert_eq!(report["steps"], json!(2 * STEPS + 7));
+    assert_eq!(report["bytes"], json!(fs::metadata(&path)?.len()));
+    let number = |key: &str| report[key].as_f64().with_context(|| format!("{key} is no number"));
+    ensure!(number("nmse")? > 0.0 && number("nmse")? <= number("worst_nmse")? && number("worst_nmse")? < 1e-2);
+    ensure!(number("max_abs")? > 0.0 && number("bpw")? > 8.0);
+    let people = run(actq(&["eval", &text(&path), "--policy", &text(&fixture.policy())]), b"")?;
+    ensure!(succeeded(&people)?.contains("nmse"), "the report for people lacks the error");
+    Ok(())
+}
+
+#[test]
+fn eval_names_what_is_wrong_with_a_recording() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let image = text(&fixture.image("")?);
+    let path = fixture.policy().join("heldout.npz");
+    let (obs, full) = (draw_observations(1, OBS), [STEPS as i64; EPISODES]);
+    let action = |width| Array3::<f32>::zeros((EPISODES, STEPS, width));
+    let eval = |words: &[&str]| {
+        let output = run(actq(&["eval", &image, "--policy", &text(&fixture.policy()), "--json"]), b"")?;
+        ensure!(output.stdout.is_empty(), "something is printed");
+        failed(&output, 1, words)
+    };
+    write_recording(&path, &obs, Some(&action(ACT)), full)?;
+    eval(&["heldout.npz", "action"]).context("actions of another width")?;
+    write_recording(&path, &draw_observations(1, OBS - 1), Some(&action(CHUNK * ACT)), full)?;
+    eval(&["heldout.npz", "obs"]).context("observations of another width")?;
+    write_recording(&path, &obs, Some(&action(CHUNK * ACT)), full)?;
+    eval(&["heldout.npz", "vary"]).context("actions that never vary")?;
+    write_recording(&path, &obs, Some(&action(CHUNK * ACT)), [0; EPISODES])?;
+    eval(&["heldout.npz"]).context("no steps")?;
+    fs::remove_file(&path)?;
+    eval(&["heldout.npz"]).context("no recording")
+}
+
+#[test]
+fn eval_takes_a_named_recording_and_asks_the_policy_for_its_actions() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let image = text(&fixture.image("--bits 4")?);
+    let policy = text(&fixture.policy());
+    let heldout = fixture.policy().join("heldout.npz");
+    let named = fixture.out("drive.npz");
+    fs::rename(&heldout, &named)?;
+    let eval = |arguments: &[&str]| run(actq(&[&["eval", &image, "--json"], arguments].concat()), b"");
+    let expected = succeeded(&eval(&["--heldout", &text(&named)])?)?;
+    assert_eq!(serde_json::from_str::<Value>(&expected)?["steps"], json!(2 * STEPS + 7));
+    failed(
+        &eval(&["--policy", &policy])?,
+        1,
+        &["actq eval needs recorded observations: put heldout.npz, heldout.npy or heldout.safetensors", "--heldout"],
+    )?;
+    failed(&eval(&[])?, 2, &["--policy"])?;
+    // Observations alone: the image's own policy gives the actions, another does not.
+    write_recording(&heldout, &draw_observations(6, OBS), None, [STEPS as i64, 7, STEPS as i64])?;
+    assert_eq!(succeeded(&eval(&["--policy", &policy])?)?, expected);
+    failed(&eval(&["--heldout", &text(&heldout)])?, 1, &["heldout.npz: array \"action\" is missing", "--policy"])?;
+    fs::remove_file(&heldout)?;
+    write_npy(&fixture.policy().join("heldout.npy"), &draw_observations(6, OBS))?;
+    let all: Value = serde_json::from_str(&succeeded(&eval(&["--policy", &policy])?)?)?;
+    assert_eq!(all["steps"], json!(EPISODES * STEPS));
+    edit(&fixture.policy(), "/control_hz", json!(26))?;
+    failed(&eval(&["--policy", &policy])?, 1, &["heldout.npy: array \"action\" is missing"])
+}

@@ -1,0 +1,122 @@
+//! What any command refuses: wrong arguments, damaged images, outputs that cannot be written; and a reader that goes
+//! away.
+
+use std::fs;
+use std::process::Stdio;
+
+use actq_bench::command::{actq, all, failed, run};
+use actq_link::RESET;
+use anyhow::{Context, Result, ensure};
+
+use super::fixture::{Fixture, text};
+
+#[test]
+fn a_wrong_command_line_has_status_2() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let before = fixture.snapshot()?;
+    let options = [
+        ("--bits 5", "bits"),
+        ("--bits 0", "bits"),
+        ("--bits three", "bits"),
+        ("--group 7", "group"),
+        ("--activations 12", "activations"),
+        ("--method foo", "method"),
+        ("--bits 3 --bpw 3", "bpw"),
+        ("--bpw many", "bpw"),
+        ("--bpw 0", "bpw"),
+        ("--bpw nan", "bpw"),
+        ("--bpw inf", "bpw"),
+        ("--bpw=-1", "bpw"),
+        ("--threads 257", "0..=256"),
+        ("--threads 5000", "threads"),
+        ("--colour", "colour"),
+    ];
+    let policy = text(&fixture.policy());
+    let lines: [&[&str]; 4] = [&[], &["paint"], &["quantize", &policy], &["eval", "x.actq"]];
+    let out = fixture.out("image");
+    let quantized = options.map(|(options, word)| {
+        (options.to_owned(), fixture.quantize(&out, options).and_then(|output| failed(&output, 2, &[word])))
+    });
+    let other =
+        lines.map(|line| (format!("{line:?}"), run(actq(line), b"").and_then(|output| failed(&output, 2, &[]))));
+    all(quantized.into_iter().chain(other))?;
+    ensure!(fixture.snapshot()? == before, "files have changed");
+    Ok(())
+}
+
+#[test]
+fn an_output_that_cannot_be_written_leaves_no_file() -> Result<()> {
+    let fixture = Fixture::new()?;
+    fs::create_dir(fixture.out("folder"))?;
+    let before = fixture.snapshot()?;
+    all(["none/image.actq", "folder"].map(|name| {
+        let out = fixture.out(name);
+        (name.to_owned(), fixture.quantize(&out, "").and_then(|output| failed(&output, 1, &[&text(&out)])))
+    }))?;
+    ensure!(fixture.snapshot()? == before, "files have changed");
+    Ok(())
+}
+
+#[test]
+fn damaged_images_are_refused_by_every_command() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let good = fs::read(fixture.image("")?)?;
+    let flipped = |at: usize| {
+        let mut bytes = good.clone();
+        bytes[at] ^= 1 << (at % 8);
+        (format!("bit flipped in byte {at}"), bytes)
+    };
+    // Every word of the header, and samples of the rest.
+    let flips = (0..good.len()).filter(|at| at % 4 == 1 && (*at < 128 || at % 509 == 0)).chain([good.len() - 1]);
+    let shorter = [0, 1, 3, 100, 128, good.len() / 2, good.len() - 4, good.len() - 1];
+    let longer = ("four bytes more".to_owned(), [&good[..], &[0; 4]].concat());
+    let damaged = flips
+        .map(flipped)
+        .chain(shorter.map(|len| (format!("{len} bytes left"), good[..len].to_vec())))
+        .chain([longer]);
+    let path = fixture.out("damaged.actq");
+    let (image, policy) = (text(&path), text(&fixture.policy()));
+    let commands: [&[&str]; 4] = [
+        &["inspect", &image],
+        &["eval", &image, "--policy", &policy],
+        &["eval", &image, "--policy", &policy, "--json"],
+        &["serve", &image],
+    ];
+    let refused = |bytes: &[u8]| {
+        fs::write(&path, bytes)?;
+        commands.iter().try_for_each(|command| {
+            let output = run(actq(command), &[RESET])?;
+            ensure!(output.stdout.is_empty(), "{command:?} prints something");
+            failed(&output, 1, &[&image]).with_context(|| format!("{command:?}"))
+        })
+    };
+    all(damaged.map(|(what, bytes)| (what, refused(&bytes))))?;
+    fs::remove_file(&path)?;
+    all(commands.map(|command| {
+        (
+            format!("{command:?} without a file"),
+            run(actq(command), b"").and_then(|output| failed(&output, 1, &[&image])),
+        )
+    }))
+}
+
+/// `actq inspect image | head -1` is how people use it.
+#[test]
+fn a_reader_that_goes_away_is_no_panic() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let image = text(&fixture.image("")?);
+    let (policy, out) = (text(&fixture.policy()), text(&fixture.out("other.actq")));
+    let commands: [&[&str]; 3] =
+        [&["inspect", &image], &["eval", &image, "--policy", &policy], &["quantize", &policy, "--out", &out]];
+    all(commands.map(|command| {
+        let run = || {
+            let (reader, writer) = std::io::pipe()?;
+            drop(reader);
+            let output = actq(command).stdout(writer).stderr(Stdio::piped()).spawn()?.wait_with_output()?;
+            let message = String::from_utf8_lossy(&output.stderr);
+            ensure!(!message.contains("panicked"), "{message}");
+            Ok(())
+        };
+        (command[0].to_owned(), run())
+    }))
+}

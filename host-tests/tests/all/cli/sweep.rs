@@ -1,0 +1,30 @@
+//! `actq sweep`, and the recordings that it takes.
+
+use std::fs;
+
+use actq_bench::command::{actq, failed, run, succeeded};
+use anyhow::{Result, ensure};
+
+use super::fixture::{Fixture, text};
+
+#[test]
+fn sweep_takes_named_recordings() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let policy = fixture.policy();
+    let (calib, heldout) = (fixture.out("c.npz"), fixture.out("h.npz"));
+    fs::rename(policy.join("calib.npz"), &calib)?;
+    fs::rename(policy.join("heldout.npz"), &heldout)?;
+    let sweep = |more: &[&str]| {
+        let policy = text(&policy);
+        run(actq(&[&["sweep", &policy, "--methods", "rtn,gptq", "--bpw", "4"], more].concat()), b"")
+    };
+    failed(&sweep(&[])?, 1, &["actq sweep needs recorded observations: put heldout.npz", "--heldout"])?;
+    failed(
+        &sweep(&["--heldout", &text(&heldout)])?,
+        1,
+        &["gptq needs recorded observations: put calib.npz", "--calib"],
+    )?;
+    let table = succeeded(&sweep(&["--heldout", &text(&heldout), "--calib", &text(&calib)])?)?;
+    ensure!(table.contains("4 bits") && table.contains("gptq"), "{table}");
+    Ok(())
+}

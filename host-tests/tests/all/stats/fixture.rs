@@ -1,0 +1,104 @@
+//! A small policy with recordings, in a folder in which commands run.
+
+use std::fs::{self, File};
+use std::path::PathBuf;
+use std::process::Output;
+
+use actq::graph::Evaluator;
+use actq::policy::Policy;
+use actq_bench::command::{actq, run, succeeded};
+use actq_bench::golden::Random;
+use anyhow::{Context, Result};
+use ndarray::Array3;
+use ndarray_npy::NpzWriter;
+use safetensors::Dtype;
+use safetensors::tensor::{TensorView, serialize};
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+pub(super) const OBS: usize = 16;
+pub(super) const HIDDEN: usize = 40;
+pub(super) const ACT: usize = 3;
+/// Rows of the first matrix that give next to nothing.
+pub(super) const IDLE: [usize; 3] = [3, 11, 30];
+
+/// A policy 16 -> 40 tanh -> 40 tanh -> 3 with recordings, and a place for files.
+pub(super) struct Fixture(TempDir);
+
+impl Fixture {
+    pub(super) fn new() -> Result<Self> {
+        let fixture = Self(TempDir::new()?);
+        let dir = fixture.policy();
+        fs::create_dir(&dir)?;
+        let linear = |name| json!({"op": "linear", "w": name});
+        let ops = [linear("first"), json!({"op": "tanh"}), linear("second"), json!({"op": "tanh"}), linear("last")];
+        let json = json!({
+            "name": "small leg", "kind": "step", "obs_dim": OBS, "act_dim": ACT, "control_hz": 50, "ops": ops,
+        });
+        fs::write(dir.join("policy.json"), json.to_string())?;
+        let mut random = Random::new(4);
+        let mut matrix = |rows: usize, cols: usize| -> Vec<f32> {
+            (0..rows * cols).map(|_| random.unit() * (3.0 / cols as f32).sqrt()).collect()
+        };
+        let (mut first, second, last) = (matrix(HIDDEN, OBS), matrix(HIDDEN, HIDDEN), matrix(ACT, HIDDEN));
+        for row in IDLE {
+            first[row * OBS..][..OBS].iter_mut().for_each(|w| *w *= 1e-3);
+        }
+        let bytes = |data: Vec<f32>| data.into_iter().flat_map(f32::to_le_bytes).collect::<Vec<u8>>();
+        let tensors = [("first", HIDDEN, OBS, first), ("second", HIDDEN, HIDDEN, second), ("last", ACT, HIDDEN, last)]
+            .map(|(name, rows, cols, data)| (name, vec![rows, cols], bytes(data)));
+        let views =
+            tensors.iter().map(|(name, shape, data)| Ok((*name, TensorView::new(Dtype::F32, shape.clone(), data)?)));
+        fs::write(dir.join("policy.safetensors"), serialize(views.collect::<Result<Vec<_>>>()?, None)?)?;
+        let policy = Policy::load(&dir)?;
+        for (name, seed) in [("calib.npz", 5), ("heldout.npz", 6)] {
+            let mut random = Random::new(seed);
+            let obs = Array3::from_shape_simple_fn((2, 150, OBS), || 2.0 * random.unit());
+            let mut evaluator = Evaluator::new(&policy.graph);
+            let actions = obs.rows().into_iter().flat_map(|row| evaluator.step(&row.to_vec(), &mut |_, _| {}));
+            let action = Array3::from_shape_vec((2, 150, ACT), actions.collect())?;
+            let mut npz = NpzWriter::new(File::create(dir.join(name))?);
+            npz.add_array("obs", &obs)?;
+            npz.add_array("action", &action)?;
+            npz.finish()?;
+        }
+        Ok(fixture)
+    }
+
+    pub(super) fn policy(&self) -> PathBuf {
+        self.path("policy")
+    }
+
+    pub(super) fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// Runs a command, its arguments separated by spaces, in the fixture's folder.
+    pub(super) fn actq(&self, line: &str) -> Result<Output> {
+        let mut command = actq(&[]);
+        command.current_dir(self.0.path()).args(line.split_whitespace());
+        run(command, b"")
+    }
+
+    pub(super) fn quantize(&self, options: &str) -> Result<Output> {
+        self.actq(&format!("quantize policy {options}"))
+    }
+
+    /// An image `NAME.actq` and its statistics `NAME.json`.
+    pub(super) fn image(&self, name: &str, options: &str) -> Result<Value> {
+        succeeded(&self.quantize(&format!("--out {name}.actq --save-stats {name}.json {options}"))?)?;
+        Ok(serde_json::from_slice(&fs::read(self.path(&format!("{name}.json")))?)?)
+    }
+
+    pub(super) fn nmse(&self, image: &str) -> Result<f64> {
+        let report: Value =
+            serde_json::from_str(&succeeded(&self.actq(&format!("eval {image} --policy policy --json"))?)?)?;
+        report["nmse"].as_f64().context("nmse")
+    }
+
+    pub(super) fn files(&self) -> Result<Vec<PathBuf>> {
+        let mut files = fs::read_dir(self.0.path())?.map(|e| Ok(e?.path())).collect::<Result<Vec<_>>>()?;
+        files.sort();
+        Ok(files)
+    }
+}

@@ -1,0 +1,43 @@
+//! The files of a sweep.
+
+use std::collections::BTreeMap;
+use std::fs;
+
+use actq_bench::command::succeeded;
+use anyhow::{Context, Result, ensure};
+use serde_json::Value;
+
+use super::fixture::{ACT, Fixture, HIDDEN};
+
+#[test]
+fn a_sweep_of_two_policies_keeps_allocations_and_scores() -> Result<()> {
+    let (fixture, other) = (Fixture::new()?, Fixture::new()?);
+    fs::rename(other.policy(), fixture.path("other"))?;
+    let line =
+        "sweep policy other --bpw 2.5,3.5,5 --methods actquant,best --steps 3 --threads 2 --json s.json --svg s.svg";
+    let said = succeeded(&fixture.actq(line)?)?;
+    let value: Value = serde_json::from_slice(&fs::read(fixture.path("s.json"))?)?;
+    assert_eq!(value.as_array().map(Vec::len), Some(2));
+    let stars = |v: &Value| usize::from(!v["knee"].is_null());
+    let rows = [HIDDEN, HIDDEN, ACT];
+    for sweep in value.as_array().context("no array")? {
+        for curve in sweep["curves"].as_array().context("curves")? {
+            assert_eq!(curve["scores"].as_array().map(Vec::len), (curve["method"] == "actquant").then_some(3));
+            for point in curve["points"].as_array().context("points")?.iter().filter(|p| !p.is_null()) {
+                let counts: Vec<BTreeMap<u32, usize>> = serde_json::from_value(point["rows"].clone())?;
+                assert_eq!(counts.iter().map(|c| c.values().sum::<usize>()).collect::<Vec<_>>(), rows);
+            }
+        }
+    }
+    assert_eq!(value[0], value[1], "the same policy in two folders");
+    let marked = said.lines().filter(|l| !l.starts_with('*')).map(|l| l.matches('*').count()).sum::<usize>();
+    assert_eq!(marked, stars(&value[0]) + stars(&value[1]), "{said}");
+    assert_eq!(fs::read_to_string(fixture.path("s.svg"))?.matches("<polyline").count(), 4);
+    let seed = |n: u32| -> Result<Value> {
+        succeeded(&fixture.actq(&format!("sweep policy --bpw 4 --methods best --steps 3 --seed {n} --json t.json"))?)?;
+        Ok(serde_json::from_slice(&fs::read(fixture.path("t.json"))?)?)
+    };
+    let (one, again, two) = (seed(1)?, seed(1)?, seed(2)?);
+    ensure!(one == again && one != two, "the seed does not reach the images");
+    Ok(())
+}
