@@ -39,6 +39,8 @@ pub(super) struct Control {
     pub(super) cut: AtomicBool,
     /// Starts the controller anew.
     pub(super) reset: AtomicBool,
+    /// Holds the control tick up.
+    pub(super) hold: AtomicBool,
     /// Starts so far.
     pub(super) starts: AtomicU32,
     /// Outputs of the last tick.
@@ -166,7 +168,7 @@ fn run<A: Authority>(
         for byte in inward.carry(&bytes[..count]) {
             sent.extend(endpoint.receive(byte, micros, &mut safety, &mut updater, &mut out).unwrap_or_default());
         }
-        while begun.elapsed().as_millis() > ticks {
+        while begun.elapsed().as_millis() > ticks && !control.hold.load(Ordering::Relaxed) {
             ticks += 1;
             *control.outputs.lock().unwrap_or_else(PoisonError::into_inner) = safety.tick().to_vec();
             sent.extend(endpoint.report(micros, &mut safety, &mut out).unwrap_or_default());
