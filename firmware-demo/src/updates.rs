@@ -26,6 +26,11 @@ impl<F: NorFlash, A: Authority> Updates<F, A> {
         (Self(Some(Updater::new(slots, running.map(|candidate| candidate.slot)))), running)
     }
 
+    /// Whether the next [`Self::work`] erases a sector.
+    pub fn is_erasing(&self) -> bool {
+        self.0.as_ref().is_some_and(Updater::is_erasing)
+    }
+
     /// Does a piece of what an update takes; an image that waits for its test, whose outcome [`Self::tested`] takes.
     pub fn work(&mut self) -> Option<Candidate> {
         match self.0.as_mut()?.work() {

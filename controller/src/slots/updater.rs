@@ -69,6 +69,11 @@ impl<F: NorFlash, A: Authority> Updater<F, A> {
         self.running
     }
 
+    /// Whether the next [`Self::work`] erases a sector.
+    pub const fn is_erasing(&self) -> bool {
+        matches!(self.phase, Phase::Erasing { .. })
+    }
+
     /// Erases one sector or reads one block.
     pub fn work(&mut self) -> Work {
         match core::mem::replace(&mut self.phase, Phase::Idle) {
