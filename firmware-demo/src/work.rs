@@ -4,12 +4,13 @@ use actq_boards::port::Port;
 use actq_boards::seams::Watchdog;
 use actq_controller::progress::Progress;
 use actq_controller::slots::{Authority, Candidate};
-use actq_controller::{Endpoint, Shared};
+use actq_controller::{Check, Endpoint, Shared};
 use embedded_io::{Read, ReadReady, Write};
 use embedded_storage::nor_flash::NorFlash;
 
 #[cfg(feature = "faults")]
 use crate::faults::{Asked, Faults};
+use crate::patience::PATIENCE;
 use crate::running::Running;
 use crate::timing::{Rates, Timing};
 use crate::updates::Updates;
@@ -101,8 +102,18 @@ where
         if fed {
             self.watchdog.feed();
         }
-        // An erase lets the watchdog wait anew, which only what has made progress may.
-        if self.updates.is_erasing() && !fed { None } else { self.updates.work() }
+        if !self.updates.takes_long() {
+            return self.updates.work();
+        }
+        // The watchdog waits anew for it, which it does only for what has made progress.
+        if !fed {
+            return None;
+        }
+        let _ = self.watchdog.start(PATIENCE.long);
+        let candidate = self.updates.work();
+        let watched = self.watchdog.start(PATIENCE.turn);
+        self.safety.with(|safety| safety.check(Check::Watchdog, watched));
+        candidate
     }
 
     fn take(&mut self, byte: u8, micros: u32) {
@@ -146,6 +157,7 @@ mod tests {
     extern crate std;
 
     use std::boxed::Box;
+    use std::vec::Vec;
 
     use actq_boards::port::Buffers;
     use actq_boards::ram::Ram;
@@ -174,12 +186,13 @@ mod tests {
         fn ask_for_room(&mut self, _: bool) {}
     }
 
-    /// How often it was fed.
+    /// How often it was fed, and the times that it was given.
     #[derive(Default)]
-    struct Fed(u32);
+    struct Fed(u32, Vec<u16>);
 
     impl Watchdog for Fed {
-        fn start(&mut self, _: u16) -> bool {
+        fn start(&mut self, milliseconds: u16) -> bool {
+            self.1.push(milliseconds);
             true
         }
 
@@ -188,13 +201,13 @@ mod tests {
         }
     }
 
-    /// The watchdog is fed, and a sector erased, only where all has made progress: without a control tick neither is.
+    /// The watchdog is fed, and waits for what takes long, only where all has made progress: not without a control tick.
     #[test]
     fn without_a_tick_nothing_is_fed_or_erased() {
         let (_, port) = Box::leak(Box::new(Buffers::new())).split(NoUart, || ());
         let (port, mut watchdog) = (Box::leak(Box::new(port)), Fed::default());
         let flash = Ram::<4, 512>::new(Box::leak(Box::new([0; 2048])));
-        let (updates, _) = Updates::new(Ram::<4, 512>(flash.0), Some(Anyone), |_| false);
+        let (updates, _) = Updates::new(Ram::<4, 512>(flash.0), Some(Anyone), |_| false, || ());
         let breadcrumb = Record::report(ResetCause::Power, None);
         let facts = Facts { image: 0, slot: BUILT_IN, timing: Default::default(), breadcrumb };
         let settings = Settings { status_period: 0, flash_while_armed: false };
@@ -221,5 +234,13 @@ mod tests {
             assert_eq!((work.watchdog.0, erased()), (ticks, ticks as usize));
         }
         assert_eq!(work.updates.begin(plan), Ok(()), "a slot of two sectors");
+        // The last block of the image is its only one, and as wrong as the checksum that was announced.
+        assert_eq!([work.updates.chunk(0, &[1; 4]), work.updates.commit(None)], [Ok(()), Err(Refusal::Busy)]);
+        assert_eq!(work.turn(&mut None, &timing), None);
+        assert_eq!(work.updates.commit(None), Err(Refusal::Busy));
+        timing.ticks += 1;
+        assert_eq!(work.turn(&mut None, &timing), None);
+        assert_eq!(work.updates.commit(None), Err(Refusal::Checksum));
+        assert_eq!(work.watchdog.1, [PATIENCE.long, PATIENCE.turn].repeat(3));
     }
 }

@@ -69,9 +69,13 @@ impl<F: NorFlash, A: Authority> Updater<F, A> {
         self.running
     }
 
-    /// Whether the next [`Self::work`] erases a sector.
-    pub const fn is_erasing(&self) -> bool {
-        matches!(self.phase, Phase::Erasing { .. })
+    /// Whether the next [`Self::work`] takes long: it erases a sector, or checks a signature.
+    pub const fn takes_long(&self) -> bool {
+        match &self.phase {
+            Phase::Erasing { .. } => true,
+            Phase::Checking { plan, readback, .. } => readback.is_last(plan),
+            _ => false,
+        }
     }
 
     /// Erases one sector or reads one block.

@@ -120,7 +120,7 @@ fn run<A: Authority>(
     let flash = Ram::<4, SECTOR>::new(flash);
     let layout = Layout::new(&flash, 0..8192, 8192..16384).expect("the slots fit");
     let mut slots = Slots::new(flash, layout, authority);
-    let running = slots.select().filter(|candidate| !candidate.trial).map(|candidate| candidate.slot);
+    let running = slots.select(|| ()).filter(|candidate| !candidate.trial).map(|candidate| candidate.slot);
     let mut updater = Updater::new(slots, running);
 
     let axis = Axis::new(-1.0, 1.0, 0.05, 0.0, SafeAction::Ramp { step: 0.01 }).expect("the axis fits");
