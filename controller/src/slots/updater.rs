@@ -69,10 +69,10 @@ impl<F: NorFlash, A: Authority> Updater<F, A> {
         self.running
     }
 
-    /// Whether the next [`Self::work`] takes long: it erases a sector, or checks a signature.
+    /// Whether the next [`Self::work`] takes long: it erases a sector, checks a signature, or asks for a test.
     pub const fn takes_long(&self) -> bool {
         match &self.phase {
-            Phase::Erasing { .. } => true,
+            Phase::Erasing { .. } | Phase::Testing { .. } => true,
             Phase::Checking { plan, readback, .. } => readback.is_last(plan),
             _ => false,
         }
