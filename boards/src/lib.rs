@@ -9,7 +9,6 @@
 #[cfg(any(not(target_os = "none"), feature = "cmsdk"))]
 pub mod no_stage;
 pub mod port;
-#[cfg(any(not(target_os = "none"), feature = "cmsdk"))]
 pub mod ram;
 mod ring;
 pub mod seams;

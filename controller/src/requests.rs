@@ -17,6 +17,13 @@ pub struct Settings {
     pub flash_while_armed: bool,
 }
 
+impl Settings {
+    /// Whether flash may be written now. Where that stops the tick, not before a tick has switched the power stage off.
+    fn may_write<const AXES: usize>(&self, safety: &mut impl Shared<AXES>) -> Result<(), Refusal> {
+        if self.flash_while_armed { Ok(()) } else { safety.with(|safety| safety.may_stall()) }
+    }
+}
+
 /// Does what is acknowledged; `None` for what only a controller says.
 pub(crate) fn request<const OBS: usize, const AXES: usize>(
     message: &Message<'_>,
@@ -47,16 +54,11 @@ pub(crate) fn request<const OBS: usize, const AXES: usize>(
                 Err(Refusal::Armed) if settings.flash_while_armed => Ok(()),
                 other => other,
             });
-            may.and_then(|()| update.begin(Plan { length, crc, version }))
+            may.and_then(|()| settings.may_write(safety)).and_then(|()| update.begin(Plan { length, crc, version }))
         }
-        Message::Chunk { .. } | Message::Commit { .. }
-            if !settings.flash_while_armed && safety.with(|safety| safety.state()) != State::Disarmed =>
-        {
-            Err(Refusal::Armed)
-        }
-        Message::Chunk { offset, bytes } => update.chunk(offset, bytes),
+        Message::Chunk { offset, bytes } => settings.may_write(safety).and_then(|()| update.chunk(offset, bytes)),
         Message::Commit { .. } if safety.with(|safety| safety.state()) == State::Armed => Err(Refusal::Armed),
-        Message::Commit { signature } => update.commit(signature),
+        Message::Commit { signature } => settings.may_write(safety).and_then(|()| update.commit(signature)),
         Message::Abort => {
             update.abort();
             Ok(())

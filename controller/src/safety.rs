@@ -81,7 +81,7 @@ impl<const AXES: usize> Safety<AXES> {
             }
         }
         match &mut self.state {
-            State::Disarmed(_) => [Output::Coast; AXES],
+            State::Disarmed(disarmed) => disarmed.tick(),
             State::Armed(armed) => armed.tick(&self.axes),
             State::Latched(latched) => latched.tick(&self.axes),
         }
@@ -189,6 +189,19 @@ impl<const AXES: usize> Safety<AXES> {
         match self.state {
             _ if token != self.token => Err(Refusal::Token),
             State::Disarmed(_) => Ok(()),
+            State::Armed(_) | State::Latched(_) => Err(Refusal::Armed),
+        }
+    }
+
+    /// Whether the tick may stand still, as while flash is written: disarmed, and a tick has let the outputs coast.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal::Armed`], or [`Refusal::Busy`] up to the next tick.
+    pub const fn may_stall(&self) -> Result<(), Refusal> {
+        match &self.state {
+            State::Disarmed(disarmed) if disarmed.told() => Ok(()),
+            State::Disarmed(_) => Err(Refusal::Busy),
             State::Armed(_) | State::Latched(_) => Err(Refusal::Armed),
         }
     }

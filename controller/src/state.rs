@@ -35,7 +35,10 @@ use crate::health::Ready;
 
 /// Outputs coast.
 #[derive(Debug)]
-pub struct Disarmed(());
+pub struct Disarmed {
+    /// Whether they do: not before the tick that tells them.
+    told: bool,
+}
 
 /// Outputs follow the actions.
 #[derive(Debug)]
@@ -56,9 +59,20 @@ pub struct Latched<const AXES: usize> {
 }
 
 impl Disarmed {
-    /// Where everything begins.
+    /// Where everything begins: with outputs that are off.
     pub const fn new() -> Self {
-        Self(())
+        Self { told: true }
+    }
+
+    /// Whether the outputs coast by now.
+    pub(crate) const fn told(&self) -> bool {
+        self.told
+    }
+
+    /// The outputs of the next tick.
+    pub(crate) fn tick<const AXES: usize>(&mut self) -> [Output; AXES] {
+        self.told = true;
+        [Output::Coast; AXES]
     }
 
     /// To [`Armed`].
@@ -103,7 +117,7 @@ impl<const AXES: usize> Armed<AXES> {
 
     /// To [`Disarmed`].
     pub fn disarm(self) -> Disarmed {
-        Disarmed::new()
+        Disarmed { told: false }
     }
 }
 
@@ -128,7 +142,7 @@ impl<const AXES: usize> Latched<AXES> {
 
     /// To [`Disarmed`].
     pub fn disarm(self) -> Disarmed {
-        Disarmed::new()
+        Disarmed { told: false }
     }
 }
 

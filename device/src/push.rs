@@ -11,7 +11,7 @@ use crate::client::Client;
 
 /// The longest payload of a chunk: longer ones gain nothing and lose more where one is damaged.
 const MOST: usize = 1024;
-/// How long a controller may erase, or check and test.
+/// How long a controller may erase, check and test, or switch its outputs off.
 const BUSY: Duration = Duration::from_secs(60);
 /// Between two questions whether it is done.
 const ASK_AGAIN: Duration = Duration::from_millis(20);
@@ -73,7 +73,8 @@ impl<'a> Push<'a> {
         }
     }
 
-    /// Does the next request; whether the image runs now. Before the first and the last one the controller may be busy for a while.
+    /// Does the next request; whether the image runs now. Before the first and the last one the controller may be busy for a while, and
+    /// before any where it was just disarmed.
     ///
     /// # Errors
     ///
@@ -90,7 +91,12 @@ impl<'a> Push<'a> {
             }
             Stage::Write(at) if at < image.len() => {
                 let bytes = image.get(at..image.len().min(at + self.chunk)).unwrap_or_default();
-                let (written, outcome) = client.request(&Message::Chunk { offset: at as u32, bytes })?;
+                let mut written = 0;
+                let outcome = until_done(client, |client| {
+                    let (taken, outcome) = client.request(&Message::Chunk { offset: at as u32, bytes })?;
+                    written = taken;
+                    Ok(outcome)
+                })?;
                 match outcome {
                     // It tells from where to go on.
                     Ok(()) | Err(Refusal::Offset) => {}

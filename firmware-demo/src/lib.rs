@@ -9,6 +9,7 @@ pub mod image;
 #[cfg(feature = "foc")]
 pub mod motor;
 pub mod output;
+pub mod patience;
 pub mod running;
 pub mod timing;
 pub mod trace;

@@ -10,20 +10,31 @@ pub struct Updates<F, A: Authority>(Option<Updater<F, A>>);
 
 impl<F: NorFlash, A: Authority> Updates<F, A> {
     /// For the two halves of `flash`, and the image of them that is `authority`'s, passes `test` and so runs. Without room for two slots,
-    /// and without an authority, there are none.
-    pub fn new(flash: F, authority: Option<A>, mut test: impl FnMut(&Candidate) -> bool) -> (Self, Option<Candidate>) {
+    /// and without an authority, there are none. `progress` is told before each piece of it, as by [`Slots::select`], and before each test.
+    pub fn new(
+        flash: F,
+        authority: Option<A>,
+        mut test: impl FnMut(&Candidate) -> bool,
+        mut progress: impl FnMut(),
+    ) -> (Self, Option<Candidate>) {
         let Some(authority) = authority else { return (Self(None), None) };
         let middle = (flash.capacity() / 2) as u32;
         let Ok(layout) = Layout::new(&flash, 0..middle, middle..2 * middle) else { return (Self(None), None) };
         let mut slots = Slots::new(flash, layout, authority);
         let running = loop {
-            match slots.select() {
-                Some(candidate) if test(&candidate) && slots.confirm(candidate.slot) => break Some(candidate),
-                Some(candidate) => slots.reject(candidate.slot),
-                None => break None,
+            let Some(candidate) = slots.select(&mut progress) else { break None };
+            progress();
+            if test(&candidate) && slots.confirm(candidate.slot) {
+                break Some(candidate);
             }
+            slots.reject(candidate.slot);
         };
         (Self(Some(Updater::new(slots, running.map(|candidate| candidate.slot)))), running)
+    }
+
+    /// Whether the next [`Self::work`] takes long ([`Updater::takes_long`]).
+    pub fn takes_long(&self) -> bool {
+        self.0.as_ref().is_some_and(Updater::takes_long)
     }
 
     /// Does a piece of what an update takes; an image that waits for its test, whose outcome [`Self::tested`] takes.

@@ -4,12 +4,13 @@ use actq_boards::port::Port;
 use actq_boards::seams::Watchdog;
 use actq_controller::progress::Progress;
 use actq_controller::slots::{Authority, Candidate};
-use actq_controller::{Endpoint, Shared};
+use actq_controller::{Check, Endpoint, Shared};
 use embedded_io::{Read, ReadReady, Write};
 use embedded_storage::nor_flash::NorFlash;
 
 #[cfg(feature = "faults")]
 use crate::faults::{Asked, Faults};
+use crate::patience::PATIENCE;
 use crate::running::Running;
 use crate::timing::{Rates, Timing};
 use crate::updates::Updates;
@@ -97,10 +98,22 @@ where
         self.state.ticks = timing.ticks;
         #[cfg(feature = "faults")]
         self.hide();
-        if self.state.progress.feed() {
+        let fed = self.state.progress.feed();
+        if fed {
             self.watchdog.feed();
         }
-        self.updates.work()
+        if !self.updates.takes_long() {
+            return self.updates.work();
+        }
+        // The watchdog waits anew for it, which it does only for what has made progress.
+        if !fed {
+            return None;
+        }
+        let _ = self.watchdog.start(PATIENCE.long);
+        let candidate = self.updates.work();
+        let watched = self.watchdog.start(PATIENCE.turn);
+        self.safety.with(|safety| safety.check(Check::Watchdog, watched));
+        candidate
     }
 
     fn take(&mut self, byte: u8, micros: u32) {
@@ -136,5 +149,102 @@ where
         progress.link &= hidden & 1 == 0;
         progress.head &= hidden & 2 == 0;
         progress.output &= hidden & 4 == 0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use std::boxed::Box;
+    use std::vec::Vec;
+
+    use actq_boards::port::Buffers;
+    use actq_boards::ram::Ram;
+    use actq_boards::seams::{Lost, Uart};
+    use actq_controller::breadcrumb::Record;
+    use actq_controller::endpoint::Facts;
+    use actq_controller::slots::Anyone;
+    use actq_controller::update::{Plan, Update as _};
+    use actq_controller::{Axis, Guard, Safety, Settings};
+    use actq_link::code::{Refusal, ResetCause};
+    use actq_link::frame::CRC;
+    use actq_link::report::BUILT_IN;
+
+    use super::*;
+
+    struct NoUart;
+
+    impl Uart for NoUart {
+        fn receive(&mut self) -> Option<Result<u8, Lost>> {
+            None
+        }
+
+        fn transmit(&mut self, _: u8) -> bool {
+            true
+        }
+
+        fn ask_for_room(&mut self, _: bool) {}
+    }
+
+    /// How often it was fed, and the times that it was given.
+    #[derive(Default)]
+    struct Fed(u32, Vec<u16>);
+
+    impl Watchdog for Fed {
+        fn start(&mut self, milliseconds: u16) -> bool {
+            self.1.push(milliseconds);
+            true
+        }
+
+        fn feed(&mut self) {
+            self.0 += 1;
+        }
+    }
+
+    /// The watchdog is fed, and waits for what takes long, only where all has made progress: not without a control tick.
+    #[test]
+    fn without_a_tick_nothing_is_fed_or_erased() {
+        let (_, port) = Box::leak(Box::new(Buffers::new())).split(NoUart, || ());
+        let (port, mut watchdog) = (Box::leak(Box::new(port)), Fed::default());
+        let flash = Ram::<4, 512>::new(Box::leak(Box::new([0; 2048])));
+        let (updates, _) = Updates::new(Ram::<4, 512>(flash.0), Some(Anyone), |_| false, || ());
+        let breadcrumb = Record::report(ResetCause::Power, None);
+        let facts = Facts { image: 0, slot: BUILT_IN, timing: Default::default(), breadcrumb };
+        let settings = Settings { status_period: 0, flash_while_armed: false };
+        let mut work = Work {
+            port,
+            watchdog: &mut watchdog,
+            safety: Safety::new([Axis::STILL; 1], 10, 0),
+            endpoint: Endpoint::<1, 64>::new(Guard::full(&[], 0), facts, settings),
+            updates,
+            rates: Rates::new(1_000_000, 1000),
+            stack: || 0,
+            out: &mut [],
+            state: State::default(),
+        };
+        let image = [1; 4];
+        let plan = Plan { length: 4, crc: CRC.checksum(&image), version: 0 };
+        assert_eq!(work.updates.begin(plan), Err(Refusal::Busy));
+        let erased = || flash.0.chunks(512).take_while(|sector| sector[0].get() == 0xff).count();
+        let mut timing = Timing::default();
+        for ticks in 0..=2 {
+            timing.ticks = ticks;
+            for _ in 0..3 {
+                assert_eq!(work.turn(&mut None, &timing), None);
+            }
+            assert_eq!((work.watchdog.0, erased()), (ticks, ticks as usize));
+        }
+        assert_eq!(work.updates.begin(plan), Ok(()), "a slot of two sectors");
+        assert_eq!([work.updates.chunk(0, &image), work.updates.commit(None)], [Ok(()), Err(Refusal::Busy)]);
+        // The last block, which is the only one, and the test.
+        let mut test = None;
+        for ticks in 3..=4 {
+            assert_eq!(work.turn(&mut None, &timing), None);
+            timing.ticks = ticks;
+            test = work.turn(&mut None, &timing);
+        }
+        assert_eq!(test.map(|candidate| candidate.length), Some(4));
+        assert_eq!(work.watchdog.1, [PATIENCE.long, PATIENCE.turn].repeat(4));
     }
 }

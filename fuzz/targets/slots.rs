@@ -23,9 +23,9 @@ fn run(mut memory: [u8; FLASH], authority: impl Authority) {
     let layout = Layout::new(&flash, 0..half, half..FLASH as u32).expect("both slots are in the flash");
     let mut slots = Slots::new(flash, layout, authority);
     let _ = slots.least_version();
-    if let Some(first) = slots.select() {
+    if let Some(first) = slots.select(|| ()) {
         slots.reject(first.slot);
-        if let Some(second) = slots.select() {
+        if let Some(second) = slots.select(|| ()) {
             assert_ne!(first.slot, second.slot, "what was rejected runs");
             let _ = slots.confirm(second.slot);
         }

@@ -101,8 +101,8 @@ codes! {
         Length = 11, "the image's length does not fit";
         /// No update was begun.
         NoUpdate = 12, "no update was begun";
-        /// An update is being erased or checked; ask again.
-        Busy = 13, "the update is being erased or checked; ask again";
+        /// An update is being erased or checked, or has to wait until the outputs coast; ask again.
+        Busy = 13, "the update is being erased or checked, or waits for the outputs to coast; ask again";
         /// The checksum of what was written is not the one announced.
         Checksum = 14, "the image's checksum is not the one announced";
         /// The signature is missing or not by the key of this build.

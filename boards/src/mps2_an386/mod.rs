@@ -11,6 +11,6 @@ pub(crate) const BOARD: crate::Board = crate::Board {
     emulator: "qemu-system-arm",
     machine: &["-M", "mps2-an386"],
     transport: crate::Transport::Semihosting,
-    shows: &["bench", "foc", "functions", "golden", "portable", "runtime", "runtime-poll", "stack"],
+    shows: &["bench", "foc", "functions", "golden", "portable", "runtime", "runtime-poll", "stack", "start"],
     application: Some(crate::Application { about: "Cortex-M4F, QEMU", scratch: super::MPS2_SCRATCH }),
 };

@@ -3,8 +3,8 @@
 //!
 //! The part has one bank: while a sector is erased, for up to 2 s, or a word is programmed, up to 0.1 ms, the processor stands still as
 //! soon as it fetches an instruction or reads from flash, its interrupts with it. So nothing begins unless the power stage is off by its
-//! register, and no sector is erased but with a watchdog that waits for so long. Where the controller itself does not come to an end,
-//! that watchdog does.
+//! register, and no sector is erased but with a watchdog that waits for as long as the data sheet gives it, and is fed behind that only
+//! where it took no longer. Where the controller itself does not come to an end, that watchdog does.
 
 #[cfg(not(target_os = "none"))]
 mod model;
@@ -30,6 +30,15 @@ pub const fn sector(number: u32) -> Range<u32> {
         0..=3 => number * SMALL..(number + 1) * SMALL,
         4 => 4 * SMALL..LARGE,
         _ => (number - 4) * LARGE..(number - 3) * LARGE,
+    }
+}
+
+/// Milliseconds that the erase of a sector takes at most, in words (data sheet DS8626, characteristics of the flash, x32).
+pub const fn longest_erase(number: u32) -> u16 {
+    match number {
+        0..=3 => 500,
+        4 => 1100,
+        _ => 2000,
     }
 }
 
@@ -92,9 +101,9 @@ pub trait Part {
     /// Whether the supply has the voltage that words need.
     fn is_supplied(&self) -> bool;
 
-    /// Does `work` while the watchdog waits for longer than an erase takes. `None` where it does not take that time, with nothing done,
-    /// or its own time back.
-    fn patiently<R>(&mut self, work: impl FnOnce(&mut Self) -> R) -> Option<R>;
+    /// Does `work` while the watchdog waits for so many milliseconds, and gives it its own time again. `None` where it does not take that
+    /// time, with nothing done. Where the work has taken longer, nothing feeds the watchdog any more, and it resets the board.
+    fn patiently<R>(&mut self, milliseconds: u16, work: impl FnOnce(&mut Self) -> R) -> Option<R>;
 }
 
 /// Why a request was not done, or not to its end.
@@ -198,7 +207,7 @@ impl<P: Part> Flash<P> {
 
     fn erase_sector(&mut self, number: u32) -> Result<(), FlashError> {
         self.may_stall()?;
-        let erased = self.part.patiently(|part| {
+        let erased = self.part.patiently(longest_erase(number), |part| {
             let erased = opened(part, |part| {
                 let chosen = SER | number << SNB | WORDS;
                 set(part, chosen)?;
@@ -440,7 +449,8 @@ mod tests {
         let mut endless = flash(0xff);
         endless.part.takes = u32::MAX;
         assert_eq!(endless.write(0, &[0; 4]), Err(FlashError::Busy));
-        assert_eq!(endless.erase(0, LARGE), Err(FlashError::Busy));
+        // Of an erase the watchdog notices it.
+        assert_eq!((endless.erase(0, LARGE), endless.part.is_reset), (Err(FlashError::Watchdog), true));
         let mut locked = flash(0xff);
         locked.part.write(Register::Key, KEYS[1]);
         assert_eq!([locked.erase(0, LARGE), locked.write(0, &[0; 4])], [Err(FlashError::Locked); 2]);
@@ -449,6 +459,22 @@ mod tests {
         let mut none = flash(0xff);
         none.part.is_there = false;
         assert_eq!([none.erase(0, LARGE), none.write(0, &[0; 4])], [Err(FlashError::Settings); 2]);
+    }
+
+    /// The watchdog waits for what the data sheet gives a sector, and is not fed behind an erase that has taken longer.
+    #[test]
+    fn an_erase_that_takes_longer_than_it_may_ends_in_a_reset() {
+        for number in 0..SECTORS {
+            let Range { start, end } = sector(number);
+            let erased_in = |milliseconds| {
+                let mut flash = flash(0);
+                flash.part.takes = milliseconds;
+                (flash.erase(start, end), flash.part.is_reset)
+            };
+            let longest = longest_erase(number).into();
+            assert_eq!(erased_in(longest), (Ok(()), false), "{number}");
+            assert_eq!(erased_in(longest + 1), (Err(FlashError::Watchdog), true), "{number}");
+        }
     }
 
     /// The model has the rules that the sequences keep: without them the part refuses, too.

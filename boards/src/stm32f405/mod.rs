@@ -2,6 +2,7 @@
 //! and without its clocks, PWM, watchdog, DMA and flash controller.
 
 pub mod flash;
+pub mod patience;
 
 #[cfg(all(target_os = "none", feature = "stm32f405"))]
 pub mod device;

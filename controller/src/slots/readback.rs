@@ -33,6 +33,11 @@ impl<H> Readback<H> {
         Self { at: 0, crc: CRC.digest(), hash: authority.hash() }
     }
 
+    /// Whether the next block is the last one, with which the signature is checked.
+    pub(super) const fn is_last(&self, plan: &Plan) -> bool {
+        plan.length.saturating_sub(self.at) <= BLOCK as u32
+    }
+
     /// Reads a block of the image at an address on; gives itself back until the image ends.
     pub(super) fn advance<F: NorFlash, A: Authority<Hash = H>>(
         mut self,

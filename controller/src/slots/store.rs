@@ -49,19 +49,20 @@ impl<F: NorFlash, A: Authority> Slots<F, A> {
     }
 
     /// The image to run: whole, signed as it must be, not rejected, the newest such. To be tested then, and
-    /// [confirmed](Self::confirm) or [rejected](Self::reject), after which this gives another one or none. Reads both images.
-    pub fn select(&mut self) -> Option<Candidate> {
+    /// [confirmed](Self::confirm) or [rejected](Self::reject), after which this gives another one or none. Reads one image or both, and
+    /// tells `progress` before each block of them, and so before the check of a signature, which comes with the last one.
+    pub fn select(&mut self, mut progress: impl FnMut()) -> Option<Candidate> {
         let generation = |record: Option<Record>| record.map(|record| record.generation);
         let newest = match generation(self.record(Slot::B)) > generation(self.record(Slot::A)) {
             true => Slot::B,
             false => Slot::A,
         };
-        self.candidate(newest).or_else(|| self.candidate(newest.other()))
+        self.candidate(newest, &mut progress).or_else(|| self.candidate(newest.other(), &mut progress))
     }
 
-    fn candidate(&mut self, slot: Slot) -> Option<Candidate> {
+    fn candidate(&mut self, slot: Slot, progress: impl FnMut()) -> Option<Candidate> {
         let (record, marks) = (self.record(slot)?, self.marks(slot)?);
-        if self.is_refused(slot) || marks.rejected || self.read_back(slot, &record) != Found::Good {
+        if self.is_refused(slot) || marks.rejected || self.read_back(slot, &record, progress) != Found::Good {
             return None;
         }
         let may_run = marks.confirmed || marks.trials < TRIALS && marks.write(&mut self.flash, Mark::Trial);
@@ -145,9 +146,10 @@ impl<F: NorFlash, A: Authority> Slots<F, A> {
         Marks::read(&mut self.flash, self.layout.range(slot).start + HEADER / 2)
     }
 
-    fn read_back(&mut self, slot: Slot, record: &Record) -> Found {
+    fn read_back(&mut self, slot: Slot, record: &Record, mut progress: impl FnMut()) -> Found {
         let mut readback = Readback::new(&self.authority);
         loop {
+            progress();
             let (image, signature) = (self.layout.image(slot), record.signature.as_ref());
             match readback.advance(&mut self.flash, image, &record.plan, signature, &self.authority) {
                 Ok(on) => readback = on,

@@ -69,6 +69,15 @@ impl<F: NorFlash, A: Authority> Updater<F, A> {
         self.running
     }
 
+    /// Whether the next [`Self::work`] takes long: it erases a sector, checks a signature, or asks for a test.
+    pub const fn takes_long(&self) -> bool {
+        match &self.phase {
+            Phase::Erasing { .. } | Phase::Testing { .. } => true,
+            Phase::Checking { plan, readback, .. } => readback.is_last(plan),
+            _ => false,
+        }
+    }
+
     /// Erases one sector or reads one block.
     pub fn work(&mut self) -> Work {
         match core::mem::replace(&mut self.phase, Phase::Idle) {

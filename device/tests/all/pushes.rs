@@ -5,10 +5,10 @@ use std::time::Duration;
 
 use actq_controller::slots::{Anyone, Key};
 use actq_device::keys;
-use actq_device::push::{Package, push};
+use actq_device::push::{Package, Push, push};
 use actq_link::code::Refusal;
 
-use crate::requests::observe_until_fresh;
+use crate::requests::{arm, observe_until_fresh};
 use crate::simulated::{GOOD, Simulated};
 
 fn image(seed: u8, words: usize) -> Vec<u8> {
@@ -64,6 +64,32 @@ fn what_is_refused_says_why_and_changes_nothing() {
     let error = format!("{:#}", error.expect_err("it is armed"));
     // By then the observations may be old already.
     assert!(error.contains(&Refusal::Armed.to_string()) || error.contains(&Refusal::Token.to_string()), "{error}");
+}
+
+/// A controller that was armed in the course of an update is busy, not out of order, until a tick has switched its outputs off.
+#[test]
+fn a_push_goes_on_behind_a_disarm() {
+    let controller = Simulated::start(0, || Anyone);
+    let mut client = controller.client();
+    let image = image(1, 400);
+    let mut push = Push::new(&mut client, Package { image: &image, version: 1, signature: None }).expect("it answers");
+    while push.taken() == 0 {
+        push.advance(&mut client).expect("there is room");
+    }
+    arm(&mut client);
+    controller.control.hold.store(true, Ordering::Relaxed);
+    client.disarm().expect("never refused");
+    let control = controller.control.clone();
+    let tick = std::thread::spawn(move || {
+        std::thread::sleep(Duration::from_millis(200));
+        control.hold.store(false, Ordering::Relaxed);
+    });
+    let taken = push.taken();
+    push.advance(&mut client).expect("it waits for the tick");
+    assert!(push.taken() > taken && !controller.control.hold.load(Ordering::Relaxed));
+    tick.join().expect("it ends");
+    while !push.advance(&mut client).expect("it goes on") {}
+    assert_eq!(controller.image(), image);
 }
 
 #[test]

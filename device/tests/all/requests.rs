@@ -27,7 +27,7 @@ pub(super) fn observe_until_fresh(client: &mut Client) {
 }
 
 /// Arms, over a line that may lose so much that the observations grow old meanwhile.
-fn arm(client: &mut Client) {
+pub(super) fn arm(client: &mut Client) {
     for _ in 0..50 {
         observe_until_fresh(client);
         if client.arm().is_ok() {

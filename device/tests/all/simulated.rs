@@ -39,6 +39,8 @@ pub(super) struct Control {
     pub(super) cut: AtomicBool,
     /// Starts the controller anew.
     pub(super) reset: AtomicBool,
+    /// Holds the control tick up.
+    pub(super) hold: AtomicBool,
     /// Starts so far.
     pub(super) starts: AtomicU32,
     /// Outputs of the last tick.
@@ -118,7 +120,7 @@ fn run<A: Authority>(
     let flash = Ram::<4, SECTOR>::new(flash);
     let layout = Layout::new(&flash, 0..8192, 8192..16384).expect("the slots fit");
     let mut slots = Slots::new(flash, layout, authority);
-    let running = slots.select().filter(|candidate| !candidate.trial).map(|candidate| candidate.slot);
+    let running = slots.select(|| ()).filter(|candidate| !candidate.trial).map(|candidate| candidate.slot);
     let mut updater = Updater::new(slots, running);
 
     let axis = Axis::new(-1.0, 1.0, 0.05, 0.0, SafeAction::Ramp { step: 0.01 }).expect("the axis fits");
@@ -166,7 +168,7 @@ fn run<A: Authority>(
         for byte in inward.carry(&bytes[..count]) {
             sent.extend(endpoint.receive(byte, micros, &mut safety, &mut updater, &mut out).unwrap_or_default());
         }
-        while begun.elapsed().as_millis() > ticks {
+        while begun.elapsed().as_millis() > ticks && !control.hold.load(Ordering::Relaxed) {
             ticks += 1;
             *control.outputs.lock().unwrap_or_else(PoisonError::into_inner) = safety.tick().to_vec();
             sent.extend(endpoint.report(micros, &mut safety, &mut out).unwrap_or_default());

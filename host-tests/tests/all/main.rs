@@ -29,5 +29,6 @@ mod qemu;
 mod recorded;
 mod recordings;
 mod slices;
+mod start;
 mod stats;
 mod styles;

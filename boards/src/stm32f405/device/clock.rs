@@ -33,6 +33,11 @@ pub(super) fn start(rcc: &pac::RCC, flash: &pac::FLASH, power: &pac::PWR) -> Clo
     FALLBACK
 }
 
+/// The clock that runs.
+pub(super) fn running(rcc: &pac::RCC) -> Clock {
+    if rcc.cfgr().read().sws().bits() == PLL { FAST } else { FALLBACK }
+}
+
 /// The clock of the peripherals at the second bus.
 pub(super) fn apb2(clock: Clock) -> u32 {
     match clock.source {
@@ -68,5 +73,5 @@ fn fast(rcc: &pac::RCC, flash: &pac::FLASH, power: &pac::PWR) -> bool {
     }
     // SAFETY: buses at 42 MHz (divided by 4) and 84 MHz (by 2), their highest, before the core's clock is switched.
     rcc.cfgr().modify(|_, w| unsafe { w.hpre().bits(0).ppre1().bits(0b101).ppre2().bits(0b100).sw().bits(PLL) });
-    wait(LOCK, || rcc.cfgr().read().sws().bits() == PLL)
+    wait(LOCK, || running(rcc) == FAST)
 }

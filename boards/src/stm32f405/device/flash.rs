@@ -5,7 +5,7 @@ use core::cell::Cell;
 
 use stm32f4::stm32f405 as pac;
 
-use super::{pwm, watchdog};
+use super::{clock, pwm, watchdog};
 use crate::stm32f405::flash::{Part, Register};
 
 /// The detector's highest threshold, 2.9 V: with its spread still above the 2.7 V that a word needs.
@@ -17,6 +17,8 @@ pub struct Controller {
     registers: pac::FLASH,
     power: pac::PWR,
     memory: &'static [Cell<u8>],
+    /// Of the core.
+    khz: u32,
 }
 
 impl Controller {
@@ -26,7 +28,7 @@ impl Controller {
         let _ = rcc.apb1enr().read();
         // SAFETY: the value is in the field's range.
         power.cr().modify(|_, w| unsafe { w.pls().bits(VOLTAGE).pvde().set_bit() });
-        Self { registers, power, memory }
+        Self { registers, power, memory, khz: clock::running(rcc).hz / 1000 }
     }
 }
 
@@ -78,7 +80,7 @@ impl Part for Controller {
         self.power.cr().read().pvde().bit() && !self.power.csr().read().pvdo().bit()
     }
 
-    fn patiently<R>(&mut self, work: impl FnOnce(&mut Self) -> R) -> Option<R> {
-        watchdog::patiently(|| work(self))
+    fn patiently<R>(&mut self, milliseconds: u16, work: impl FnOnce(&mut Self) -> R) -> Option<R> {
+        watchdog::patiently(milliseconds, self.khz, || work(self))
     }
 }

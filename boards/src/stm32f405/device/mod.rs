@@ -78,6 +78,10 @@ pub unsafe fn start(baud: u32) -> Parts {
 pub unsafe fn flash(memory: &'static [Cell<u8>]) -> Flash {
     // SAFETY: `start` has set up what it wanted of these, and nobody else has them since.
     let p = unsafe { pac::Peripherals::steal() };
+    // SAFETY: as above. The count of cycles is for the watchdog alone.
+    let mut core = unsafe { cortex_m::Peripherals::steal() };
+    core.DCB.enable_trace();
+    core.DWT.enable_cycle_counter();
     let begin = (memory.as_ptr() as usize).wrapping_sub(FLASH) as u32;
     Flash::new(Controller::new(p.FLASH, p.PWR, &p.RCC, memory), begin)
 }

@@ -1,12 +1,15 @@
-//! The independent watchdog (RM0090, section 21), which has an oscillator of its own: 32 kHz, in truth 17 to 47 kHz.
+//! The independent watchdog (RM0090, section 21). How long its ticks are is in `../patience.rs`.
 
 use core::sync::atomic::{AtomicU16, Ordering};
 
+use cortex_m::asm;
+use cortex_m::peripheral::DWT;
 use stm32f4::stm32f405 as pac;
 use stm32f4::stm32f405::iwdg::RegisterBlock;
 
 use super::wait;
 use crate::seams::Watchdog;
+use crate::stm32f405::patience::{LONGEST, ticks};
 
 const OPEN: u16 = 0x5555;
 const START: u16 = 0xcccc;
@@ -14,7 +17,6 @@ const FEED: u16 = 0xaaaa;
 
 /// Divided by 32: a tick is about a millisecond.
 const DIVIDER: u8 = 3;
-const LONGEST: u16 = 4096;
 /// Reads until the registers count as taken; they take 5 cycles of 17 kHz at most, and the watchdog starts with its reset values
 /// where they do not.
 const TAKEN: u32 = 1_000_000;
@@ -52,13 +54,22 @@ fn set(iwdg: &RegisterBlock, ticks: u16) -> bool {
     taken
 }
 
-/// Does `work` with the longest time, at least 2.7 s (4096 ticks of 32 cycles at 47 kHz), and sets the one before again; `None` where the
-/// longest is not taken, with nothing done. To be called where the watchdog is fed: by the loop. Where its own time is not taken again,
-/// it does not return, and the watchdog resets the board.
-pub(super) fn patiently<R>(work: impl FnOnce() -> R) -> Option<R> {
+/// Does `work` with a time of so many milliseconds at least, and sets the one before again; `None` where the first one is not taken, with
+/// nothing done. To be called where the watchdog is fed: by the loop. Where the work has taken longer, by the cycles of the core, of which
+/// `khz` are a millisecond, or where its own time is not taken again, it does not return, and the watchdog resets the board.
+pub(super) fn patiently<R>(milliseconds: u16, khz: u32, work: impl FnOnce() -> R) -> Option<R> {
     // SAFETY: the registers are there for as long as the program runs; besides the loop, which waits for this, nothing writes them.
     let iwdg = unsafe { &*pac::IWDG::ptr() };
-    let outcome = set(iwdg, LONGEST - 1).then(work);
+    let outcome = set(iwdg, ticks(milliseconds)).then(|| {
+        let begun = DWT::cycle_count();
+        let outcome = work();
+        if DWT::cycle_count().wrapping_sub(begun) > khz.saturating_mul(milliseconds.into()) {
+            loop {
+                asm::nop();
+            }
+        }
+        outcome
+    });
     while !set(iwdg, TICKS.load(Ordering::Relaxed)) {}
     outcome
 }

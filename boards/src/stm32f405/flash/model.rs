@@ -5,7 +5,7 @@ use core::cell::Cell;
 
 use super::{
     BSY, DCEN, DCRST, ICEN, ICRST, KEYS, LOCK, PG, PGAERR, PGPERR, PGSERR, Part, Register, SECTORS, SER, SNB, STRT,
-    WORDS, WRPERR, sector,
+    WORDS, WRPERR, longest_erase, sector,
 };
 
 /// The widths that PSIZE has.
@@ -23,10 +23,13 @@ pub struct Model {
     keys: Option<usize>,
     /// Reads of the status until what was begun has ended.
     left: Cell<u32>,
-    is_patient: bool,
+    /// Milliseconds of all operations so far: each read of the status that finds one takes one.
+    now: Cell<u64>,
+    /// Milliseconds that the watchdog waits for, where it was given more than its own time.
+    patience: Option<u16>,
     /// What the caches have was erased.
     pub is_stale: bool,
-    /// Reads of the status that an operation takes.
+    /// Milliseconds that an operation takes.
     pub takes: u32,
     /// Sectors that are write-protected, a bit each.
     pub protected: u32,
@@ -44,6 +47,8 @@ pub struct Model {
     pub done: usize,
     /// In the course of which of these the supply fails. From there on nothing changes, and registers read as 0.
     pub fails_at: Option<usize>,
+    /// The watchdog was not fed, and has reset the part: as if the supply had failed.
+    pub is_reset: bool,
     random: u64,
 }
 
@@ -66,7 +71,8 @@ impl Model {
             control: LOCK,
             keys: Some(0),
             left: Cell::new(0),
-            is_patient: false,
+            now: Cell::new(0),
+            patience: None,
             is_stale: false,
             takes: 2,
             protected: 0,
@@ -77,6 +83,7 @@ impl Model {
             is_there: true,
             done: 0,
             fails_at: None,
+            is_reset: false,
             random: seed,
         }
     }
@@ -94,6 +101,7 @@ impl Model {
 
     fn outcome(&mut self) -> Outcome {
         let outcome = match self.fails_at {
+            _ if self.is_reset => return Outcome::Nothing,
             Some(at) if self.done == at => Outcome::Part,
             Some(at) if self.done > at => return Outcome::Nothing,
             _ => Outcome::Whole,
@@ -103,7 +111,7 @@ impl Model {
     }
 
     fn is_off(&self) -> bool {
-        !self.is_there || self.fails_at.is_some_and(|at| self.done > at)
+        !self.is_there || self.is_reset || self.fails_at.is_some_and(|at| self.done > at)
     }
 
     /// SplitMix64.
@@ -127,7 +135,8 @@ impl Model {
     fn erase(&mut self, outcome: &Outcome) {
         let number = self.control >> SNB & 0xf;
         assert!(number < SECTORS && self.control & PG == 0, "no such erase: {:#x}", self.control);
-        assert!(self.is_patient && !self.is_driving && self.is_supplied, "an erase that must not begin");
+        assert!(!self.is_driving && self.is_supplied, "an erase that must not begin");
+        assert!(self.patience >= Some(longest_erase(number)), "the watchdog would end an erase");
         let protected = if self.protected & 1 << number == 0 { 0 } else { WRPERR };
         if self.raises | protected != 0 {
             return self.raise(self.raises | protected);
@@ -151,7 +160,7 @@ impl Model {
 
     fn control(&mut self, value: u32, outcome: &Outcome) {
         // The bus stalls until the end.
-        self.left.set(0);
+        self.now.set(self.now.get() + u64::from(self.left.take()));
         self.status.set(self.status.get() & !BSY);
         if self.control & LOCK != 0 {
             return;
@@ -188,7 +197,10 @@ impl Part for Model {
                 let status = self.status.get();
                 match self.left.get() {
                     0 => self.status.set(status & !BSY),
-                    left => self.left.set(left - 1),
+                    left => {
+                        self.left.set(left - 1);
+                        self.now.set(self.now.get() + 1);
+                    }
                 }
                 self.status.get()
             }
@@ -252,13 +264,15 @@ impl Part for Model {
         self.is_supplied
     }
 
-    fn patiently<R>(&mut self, work: impl FnOnce(&mut Self) -> R) -> Option<R> {
+    fn patiently<R>(&mut self, milliseconds: u16, work: impl FnOnce(&mut Self) -> R) -> Option<R> {
         if !self.is_lenient {
             return None;
         }
-        self.is_patient = true;
+        self.patience = Some(milliseconds);
+        let begun = self.now.get();
         let outcome = work(self);
-        self.is_patient = false;
-        Some(outcome)
+        self.patience = None;
+        self.is_reset |= self.now.get() - begun > milliseconds.into();
+        (!self.is_reset).then_some(outcome)
     }
 }

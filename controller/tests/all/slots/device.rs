@@ -47,7 +47,7 @@ impl<F: NorFlash, A: Authority> Device<F, A> {
     /// Power comes on.
     pub(super) fn start(flash: F, layout: &Layout, authority: A) -> Self {
         let mut slots = Slots::new(flash, layout.clone(), authority);
-        while let Some(candidate) = slots.select() {
+        while let Some(candidate) = slots.select(|| ()) {
             let image = read(&mut slots, &candidate);
             if self_test(&image).is_ok() {
                 // Where power fails in here, the device is gone.

@@ -112,6 +112,25 @@ fn where_the_newest_image_has_decayed_the_other_runs() {
     }
 }
 
+/// Whoever feeds a watchdog at the start feeds it then.
+#[test]
+fn a_start_tells_before_each_block_that_it_reads() {
+    let (mut flash, layout) = flash();
+    for version in [1, 2] {
+        let image = Image::new(100, version, true);
+        assert_eq!(Device::start(&mut flash, &layout, Anyone).update(&image, 64, None), Ok(()));
+    }
+    let (mut slots, mut told) = (Slots::new(&mut flash, layout, Anyone), Vec::new());
+    for _ in 0..3 {
+        let mut blocks = 0;
+        let found = slots.select(|| blocks += 1).map(|candidate| candidate.slot);
+        told.push((found, blocks));
+        found.into_iter().for_each(|slot| slots.reject(slot));
+    }
+    // 400 bytes are two blocks.
+    assert_eq!(told, [(Some(Slot::B), 2), (Some(Slot::A), 2), (None, 0)]);
+}
+
 #[test]
 fn flash_full_of_anything_has_no_image() {
     for seed in 0..500 {

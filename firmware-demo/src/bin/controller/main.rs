@@ -38,11 +38,6 @@ mod limits {
     pub(crate) const WAY: u32 = TICK_HZ / 10;
     /// Ticks between two reports.
     pub(crate) const REPORT: u32 = TICK_HZ / 10;
-    /// Milliseconds without progress until the watchdog resets the board.
-    pub(crate) const PATIENCE: u16 = 500;
-    /// The same for the start, which reads both slots, and for an image's check and self-test: slow where the crystal is dead. Nothing is
-    /// armed until they have ended.
-    pub(crate) const START: u16 = 4000;
 }
 
 #[cfg(target_os = "none")]
@@ -61,6 +56,7 @@ mod app {
     use actq_firmware_demo::motor::Motor as Drives;
     #[cfg(not(feature = "foc"))]
     use actq_firmware_demo::output::Bridges as Drives;
+    use actq_firmware_demo::patience::PATIENCE;
     use actq_firmware_demo::running::Running;
     use actq_firmware_demo::timing::{Rates, Timing};
     use actq_firmware_demo::updates::Updates;
@@ -73,7 +69,7 @@ mod app {
     use cortex_m::peripheral::SYST;
     use cortex_m::peripheral::syst::SystClkSource;
 
-    use crate::limits::{DEADLINE, MAX_AGE, PATIENCE, REPORT, START, TICK_HZ, WAY};
+    use crate::limits::{DEADLINE, MAX_AGE, REPORT, TICK_HZ, WAY};
     use crate::locked::Locked;
     use crate::log::info;
     use crate::{faults, start};
@@ -119,7 +115,7 @@ mod app {
         let mut safety = Safety::new(image::axes(image.as_ref(), WAY as f32), DEADLINE, starts);
         safety.check(Check::Clock, clock.source == Source::Crystal);
         // Whether it runs counts with the time that it has in the end.
-        let _ = watchdog.start(START);
+        let _ = watchdog.start(PATIENCE.long);
         let (wire, port) = cx.local.buffers.split(uart, || rtic::pend(Interrupt::SERIAL));
         let mut timer = core.SYST;
         let period = clock.hz / TICK_HZ;
@@ -181,7 +177,7 @@ mod app {
             unsafe { slot::mapped(memory, candidate.address, candidate.length) }.unwrap_or_default()
         };
         let passes = |candidate: &Candidate| image::open(bytes_of(candidate), scratch, start::LENGTHS).is_ok();
-        let (updates, running) = Updates::new(flash, start::authority(), passes);
+        let (updates, running) = Updates::new(flash, start::authority(), passes, || watchdog.feed());
         let mut bytes = running.as_ref().map_or_else(start::built_in, bytes_of);
         let facts = Facts { image: 0, slot: BUILT_IN, timing: Default::default(), breadcrumb: *breadcrumb };
         let settings = Settings { status_period: REPORT, flash_while_armed: FLASH_WHILE_ARMED };
@@ -193,7 +189,7 @@ mod app {
             work.watchdog.feed();
             let head = image::open(bytes, scratch, start::LENGTHS);
             let refusal = head.as_ref().err().copied();
-            let watched = work.watchdog.start(PATIENCE);
+            let watched = work.watchdog.start(PATIENCE.turn);
             work.safety.with(|safety| {
                 safety.check(Check::Watchdog, watched);
                 safety.check(Check::Image, matches!(refusal, None | Some(Refusal::SelfTest)));
@@ -215,7 +211,7 @@ mod app {
                 }
                 faults::MISSING.store(work.state.missing(), Ordering::Relaxed);
             };
-            let _ = work.watchdog.start(START);
+            let _ = work.watchdog.start(PATIENCE.long);
             let new = bytes_of(&candidate);
             let outcome = image::open(new, scratch, start::LENGTHS).map(drop);
             if work.updates.tested(outcome) {
