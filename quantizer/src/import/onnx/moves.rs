@@ -149,7 +149,11 @@ fn cast(call: &Call<'_>) -> Result<Tensor> {
         (2..=7 | 12 | 13, Data::Real(v)) => {
             let whole = |v: &f64| {
                 let one = *v as i64;
-                ensure!(one as f64 == v.trunc() && wrapped(one, to) == one, "casts {v} to {}", kind_name(to as i32));
+                ensure!(
+                    one as f64 == v.trunc() && wrapped(one, to) == one,
+                    "casts {v} to {}, which does not hold it",
+                    kind_name(to as i32)
+                );
                 Ok(one)
             };
             Data::Int(v.iter().map(whole).collect::<Result<_>>()?)
