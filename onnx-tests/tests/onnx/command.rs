@@ -8,7 +8,7 @@ use actq::policy::Policy;
 use actq_bench::command::{actq, binary, failed, succeeded};
 use actq_bench::skipped;
 use anyhow::{Result, ensure};
-use ndarray::Array2;
+use ndarray::{Array2, Array3};
 use ndarray_npy::WriteNpyExt as _;
 use tempfile::TempDir;
 
@@ -52,9 +52,23 @@ fn import_writes_a_folder_and_overwrites_nothing() -> Result<()> {
     assert_eq!(written, ["calib.npz", "policy.json", "policy.safetensors"]);
     failed(&import(&[])?, 1, &["policy.json: is there already; --force replaces it"])?;
     succeeded(&import(&["--force"])?)?;
+    // Frames with the axis of a batch look like episodes.
+    let (rows, out) = (dir.path().join("rows.npy"), dir.path().join("rows"));
+    Array3::from_shape_fn((9, 1, OBS), |(i, _, k)| (i * k) as f32).write_npy(fs::File::create(&rows)?)?;
+    let noted = actq(&["import", text(&model), "--out", text(&out), "--calib", text(&rows)]).output()?;
+    let said = String::from_utf8_lossy(&noted.stderr);
+    ensure!(said.contains("rows.npy holds 9 episodes of one step each; if they are one run, save it as"), "{said}");
     // The file stands for the folder, with the same digest.
     assert_eq!(Policy::load(&out)?.digest, Policy::load(&model)?.digest);
-    failed(&import(&["--force", "--output", "nothing"])?, 1, &["the output \"nothing\"", "nothing gives the value"])?;
+    failed(
+        &import(&["--force", "--output", "nothing"])?,
+        1,
+        &["--output nothing: the file gives no such value; its outputs are actions"],
+    )?;
+    let lost = import(&["--force", "--state", "h=actions"])?;
+    failed(&lost, 1, &["--state h=actions: the file has no input \"h\"; its inputs are obs"])?;
+    let lost = import(&["--force", "--state", "obs=h"])?;
+    failed(&lost, 1, &["--state obs=h: the file has no output \"h\"; its outputs are actions"])?;
     failed(&import(&["--force", "--state", "obs=actions"])?, 1, &["--state obs=actions: between them is no cell"])?;
     // As it comes out of the command, so it goes into an image.
     let image = dir.path().join("a.actq");

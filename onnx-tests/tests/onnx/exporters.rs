@@ -103,6 +103,15 @@ fn powers_logarithms_and_lengths_are_found() -> Result<()> {
             let four = file.reals(&[], &[4.0]);
             file.node("Pow", &[x, &four], &[])
         }),
+        // A LeakyReLU behind a norm, which takes the slope.
+        ("layernorm relu layernorm add", |file, x| {
+            let (w, b) = (file.drawn(&[16]), file.drawn(&[16]));
+            let x = file.node("LayerNormalization", &[x, &w, &b], &[("axis", Value::Int(-1))]);
+            let (zero, slope) = (file.reals(&[], &[0.0]), file.reals(&[], &[0.1]));
+            let above = file.node("Greater", &[&x, &zero], &[]);
+            let below = file.node("Mul", &[&slope, &x], &[]);
+            file.node("Where", &[&above, &x, &below], &[])
+        }),
         // LogSigmoid
         ("softplus", |file, x| {
             let s = file.node("Sigmoid", &[x], &[]);
@@ -300,6 +309,152 @@ fn files_that_would_be_misread_are_refused() -> Result<()> {
     file.nodes("Reshape", &[&y, &shape], &["actions"], &[]);
     file.output("actions", &[4, 3]);
     assert_eq!(imported(&file.bytes(), &Choice::default())?.0.output.1, 12);
+    Ok(())
+}
+
+#[test]
+fn limits_far_from_zero_lose_no_digits() -> Result<()> {
+    // A million is far beyond what a layer of about 1 gives: taken off and added again, 0.06 of it would be lost.
+    fn clipped(file: &mut File, x: &str, low: &str, high: &str) -> String {
+        let limits = [low, high].map(|limit| match limit {
+            "" => String::new(),
+            limit => file.reals(&[], &[limit.parse().expect("a number")]),
+        });
+        file.node("Clip", &[x, &limits[0], &limits[1]], &[])
+    }
+    between(&[
+        ("normalize normalize relu add", |file, x| clipped(file, x, "-1e6", "")),
+        ("normalize normalize relu normalize add", |file, x| clipped(file, x, "", "1e6")),
+        ("relu normalize", |file, x| clipped(file, x, "0", "1e6")),
+        // Of two limits one behind the other one clip.
+        ("normalize", |file, x| {
+            let low = clipped(file, x, "-1e6", "");
+            clipped(file, &low, "", "1e6")
+        }),
+        ("relu normalize", |file, x| {
+            let positive = file.node("Relu", &[x], &[]);
+            clipped(file, &positive, "", "6")
+        }),
+        ("normalize", |file, x| {
+            let (high, low) = (file.reals(&[], &[0.3]), file.reals(&[], &[-0.3]));
+            let [above, below] =
+                [("Greater", &high), ("Less", &low)].map(|(op, limit)| file.node(op, &[x, limit], &[]));
+            let x = file.node("Where", &[&below, &low, x], &[]);
+            file.node("Where", &[&above, &high, &x], &[])
+        }),
+    ])?;
+    // A limit for each value, on either side of zero, and none.
+    let limits: Vec<f32> =
+        (0..16).map(|i| [-1e6, -0.2, 0.0, 0.1, 5.0, -40.0, -3e4, f32::NEG_INFINITY][i % 8]).collect();
+    for (op, sign) in [("Max", 1.0), ("Min", -1.0)] {
+        let mut file = begun();
+        let x = file.gemm("obs", 16, OBS);
+        let limits: Vec<f32> = limits.iter().map(|limit| sign * limit).collect();
+        let limits = file.reals(&[16], &limits);
+        let x = file.node(op, &[&x, &limits], &[]);
+        same(&ended(file, &x, 16)).with_context(|| op.to_owned())?;
+    }
+    Ok(())
+}
+
+#[test]
+fn values_of_a_network_are_finite() -> Result<()> {
+    fn zero(file: &mut File) -> String {
+        file.reals(&[], &[0.0])
+    }
+    between(&[
+        // nan_to_num
+        ("relu", |file, x| {
+            let (zero, large) = (zero(file), file.reals(&[], &[3e38]));
+            let (nan, infinite) = (file.node("IsNaN", &[x], &[]), file.node("IsInf", &[x], &[]));
+            let y = file.node("Where", &[&nan, &zero, x], &[]);
+            let y = file.node("Where", &[&infinite, &large, &y], &[]);
+            file.node("Relu", &[&y], &[])
+        }),
+        // The same by torch's exporter: infinite, and above 0.
+        ("relu", |file, x| {
+            let (zero, large) = (zero(file), file.reals(&[], &[3e38]));
+            let infinite = file.node("IsInf", &[x], &[]);
+            let above = file.node("Greater", &[x, &zero], &[]);
+            let above = file.node("Cast", &[&above], &[("to", Value::Int(9))]);
+            let both = file.node("And", &[&infinite, &above], &[]);
+            let y = file.node("Where", &[&both, &large, x], &[]);
+            file.node("Relu", &[&y], &[])
+        }),
+        // jax.numpy.logaddexp(x, 0)
+        ("softplus", |file, x| {
+            let (zero, one) = (zero(file), file.reals(&[], &[1.0]));
+            let same = file.node("Equal", &[x, x], &[]);
+            let nan = file.node("Not", &[&same], &[]);
+            let (more, size) = (file.node("Max", &[x, &zero], &[]), file.node("Abs", &[x], &[]));
+            let e = file.node("Neg", &[&size], &[]);
+            let e = file.node("Exp", &[&e], &[]);
+            let e = file.node("Add", &[&e, &one], &[]);
+            let e = file.node("Log", &[&e], &[]);
+            let y = file.node("Add", &[&more, &e], &[]);
+            file.node("Where", &[&nan, x, &y], &[])
+        }),
+    ])
+}
+
+#[test]
+fn the_largest_the_least_and_the_mean_of_positions_are_found() -> Result<()> {
+    // A set of points, each through one layer; what is left of them behind the pooling.
+    for op in ["ReduceMax", "ReduceMin", "GlobalMaxPool", "GlobalAveragePool", "ReduceL1"] {
+        let mut file = File::default();
+        file.input("points", &[1, 5, 3]);
+        let w = file.drawn(&[3, 8]);
+        let x = file.node("MatMul", &["points", &w], &[]);
+        let x = file.node("Transpose", &[&x], &[("perm", Value::Ints(vec![0, 2, 1]))]);
+        let axes = [("axes", Value::Ints(vec![2])), ("keepdims", Value::Int(1))];
+        let x = file.node(op, &[&x], if op.starts_with("Reduce") { &axes } else { &[] });
+        let x = file.node("Flatten", &[&x], &[]);
+        same(&ended(file, &x, 8)).with_context(|| op.to_owned())?;
+    }
+    let mut file = File::default();
+    file.input("points", &[1, 65, 1]);
+    let x = file.node("ReduceMax", &["points"], &[("axes", Value::Ints(vec![1])), ("keepdims", Value::Int(0))]);
+    refused(&ended(file, &x, 1), "(ReduceMax): takes the largest or least of 65 values; up to 64 are taken");
+    Ok(())
+}
+
+#[test]
+fn several_matrices_at_once_are_several_products() -> Result<()> {
+    // An ensemble of three, as torch.bmm has it.
+    let mut file = begun();
+    let (w, b, v) = (file.drawn(&[3, OBS, 8]), file.drawn(&[3, 1, 8]), file.drawn(&[3, 8, 5]));
+    let x = file.node("MatMul", &["obs", &w], &[]);
+    let x = file.node("Add", &[&x, &b], &[]);
+    let x = file.node("Tanh", &[&x], &[]);
+    let x = file.node("MatMul", &[&x, &v], &[]);
+    let x = file.node("ReduceMean", &[&x], &[("axes", Value::Ints(vec![0])), ("keepdims", Value::Int(0))]);
+    let found = ops(&ended(file, &x, 5))?;
+    assert_eq!(found.matches("linear").count(), 7, "{found}");
+    Ok(())
+}
+
+#[test]
+fn a_norm_takes_constants_beside_values() -> Result<()> {
+    // SimbaV2: an L2 norm of the observation and a constant.
+    let mut file = begun();
+    let shift = file.reals(&[1, 1], &[3.0]);
+    let x = file.node("Concat", &["obs", &shift], &[("axis", Value::Int(1))]);
+    let length = file.node("ReduceL2", &[&x], &[("axes", Value::Ints(vec![1])), ("keepdims", Value::Int(1))]);
+    let x = file.node("Div", &[&x, &length], &[]);
+    assert_eq!(ops(&ended(file, &x, OBS + 1))?, "linear rmsnorm linear");
+    Ok(())
+}
+
+#[test]
+fn one_value_can_be_joined_to_many() -> Result<()> {
+    // The time of a denoising step, and its 150 frequencies.
+    let mut file = File::default();
+    file.input("time", &[1, 1]);
+    let frequencies = file.drawn(&[1, 150]);
+    let x = file.node("Mul", &["time", &frequencies], &[]);
+    let [sin, cos] = ["Sin", "Cos"].map(|op| file.node(op, &[&x], &[]));
+    let x = file.node("Concat", &[&sin, &cos], &[("axis", Value::Int(1))]);
+    assert_eq!(ops(&ended(file, &x, 300))?, "identity normalize sin cos linear");
     Ok(())
 }
 

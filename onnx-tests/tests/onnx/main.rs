@@ -2,6 +2,7 @@
 //! does harm.
 
 mod command;
+mod constants;
 mod damaged;
 mod exporters;
 mod file;

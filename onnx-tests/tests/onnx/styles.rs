@@ -111,7 +111,17 @@ fn every_activation_is_itself_or_made_of_others() -> Result<()> {
 #[test]
 fn activations_that_were_taken_apart_are_found() -> Result<()> {
     type Written = fn(&mut File, &str) -> String;
-    let cases: [(&str, Written); 6] = [
+    let cases: [(&str, Written); 7] = [
+        // jax.nn.gelu: 1 - erf(-x / sqrt 2)
+        ("gelu", |file, x| {
+            let [root, one, half] = [0.5f32.sqrt(), 1.0, 0.5].map(|v| file.reals(&[], &[v]));
+            let e = file.node("Neg", &[x], &[]);
+            let e = file.node("Mul", &[&e, &root], &[]);
+            let e = file.node("Erf", &[&e], &[]);
+            let e = file.node("Sub", &[&one, &e], &[]);
+            let y = file.node("Mul", &[x, &e], &[]);
+            file.node("Mul", &[&half, &y], &[])
+        }),
         ("gelu", |file, x| {
             let [root, one, half] = [2f32.sqrt(), 1.0, 0.5].map(|v| file.reals(&[], &[v]));
             let e = file.node("Div", &[x, &root], &[]);
@@ -497,8 +507,18 @@ fn outputs_that_could_both_be_the_action_are_not_guessed() -> Result<()> {
     }
     let bytes = file.bytes();
     let error = format!("{:#}", imported(&bytes, &Choice::default()).expect_err("two outputs"));
-    ensure!(error.contains("mean (2 values), value (2 values); choose one with --output NAME"), "{error}");
+    ensure!(error.contains("mean (2 values), value (2 values); choose one with actq import --output NAME"), "{error}");
     let choice = Choice { output: Some("value".to_owned()), ..Choice::default() };
     assert_eq!(imported(&bytes, &choice)?.0.cut_outputs, ["mean"]);
+    // What stands beside an output that cannot be taken need not be the action.
+    let mut file = begun();
+    let [x, y] = [(); 2].map(|()| file.gemm("obs", 2, OBS));
+    for (op, of, name) in [("Softmax", &x, "policy"), ("Identity", &y, "value")] {
+        file.nodes(op, &[of], &[name], &[]);
+        file.output(name, &[1, 2]);
+    }
+    let error = format!("{:#}", imported(&file.bytes(), &Choice::default()).expect_err("a value"));
+    let expected = "\"policy\" cannot be taken, and \"value\" is not called action; actq import --output NAME says which is the action: node 2";
+    ensure!(error.contains(expected), "{error}");
     Ok(())
 }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::data::{Range, Recordings, runs};
+use crate::data::{Dataset, Range, Recordings, runs};
 use crate::measure::check::Check;
 use crate::measure::eval::{ActivationShare, ErrorReport};
 use crate::policy::Policy;
@@ -29,7 +29,7 @@ pub fn how_to_record(policy: &Policy) -> String {
         "no recording is given (--calib FILE, or calib.npz beside the file). Which weights may be rounded coarsely follows from the \
          observations that the policy really sees, and no ONNX file holds them. Run the policy in its simulator for a few thousand \
          steps, keep each observation as the file takes it ({n} values), and save them in order: numpy.save(\"obs.npy\", \
-         numpy.stack(observations).astype(\"float32\")). --method rtn works without, with larger errors"
+         numpy.reshape(observations, (-1, {n})).astype(\"float32\")). --method rtn works without, with larger errors"
     )
 }
 
@@ -64,7 +64,19 @@ pub fn overfit_warning(check: &Check) -> Option<String> {
 pub fn of_recordings(recordings: &Recordings) -> Vec<String> {
     let Some(range) = recordings.calib.as_ref().map(Range::of) else { return Vec::new() };
     let outside = recordings.heldout.as_ref().and_then(|heldout| range.warning(heldout));
-    [range.constant_note(), outside].into_iter().flatten().collect()
+    let single = recordings.calib.as_ref().and_then(single_steps);
+    [single, range.constant_note(), outside].into_iter().flatten().collect()
+}
+
+/// A note where every episode has a single step, as frames with a batch's axis look.
+pub fn single_steps(recording: &Dataset) -> Option<String> {
+    let episodes = recording.length.len();
+    (episodes > 1 && recording.length.iter().all(|steps| *steps <= 1)).then(|| {
+        format!(
+            "{} holds {episodes} episodes of one step each; if they are one run, save it as [frame, value], without the axis of a batch",
+            recording.name()
+        )
+    })
 }
 
 #[cfg(test)]

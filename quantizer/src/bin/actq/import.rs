@@ -13,11 +13,11 @@ use actq::import::onnx::{Choice, Imported, import};
 use actq::measure::actions::actions;
 use actq::policy::Policy;
 use actq::random::Random;
-use actq::report::imported;
+use actq::report::{imported, notes};
 use anyhow::{Context as _, Result, bail, ensure};
 
 use crate::args::ImportArgs;
-use crate::print;
+use crate::{note, print};
 
 /// Observations that the check draws, and takes of a recording.
 const FRAMES: usize = 256;
@@ -31,7 +31,13 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
     let [json, weights] = FILES.map(|name| args.out.join(name));
     let policy = Policy::of_files(&args.out, [&args.model, &args.model], &imported.json, &imported.weights)?;
     let calib = args.calib.as_ref().map(|path| Dataset::load(path, Sizes::of(&policy))).transpose()?;
+    note(calib.as_ref().and_then(notes::single_steps));
     let [calib_npz, others @ ..] = Recording::Calib.paths(&args.out);
+    ensure!(
+        args.out.is_dir() || !args.out.exists(),
+        "{}: is there already and no folder; --out names the folder that is made",
+        args.out.display()
+    );
     for path in [&json, &weights].into_iter().chain(calib.is_some().then_some(&calib_npz)) {
         ensure!(args.force || !path.exists(), "{}: is there already; --force replaces it", path.display());
     }

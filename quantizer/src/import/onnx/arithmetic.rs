@@ -3,7 +3,7 @@
 use actq_kernels::math::Function;
 use anyhow::{Context as _, Result, bail, ensure};
 
-use super::elements::{in_order, value};
+use super::elements::{in_order, open_vector, value};
 use super::expr::{Exprs, Id, Unary};
 use super::known;
 use super::moves::expanded;
@@ -22,7 +22,13 @@ enum Open {
 /// An operation on two values, repeated to one shape.
 pub(super) fn two(op: &str, exprs: &mut Exprs, x: &Tensor, y: &Tensor, most: usize) -> Result<Tensor> {
     let shape = broadcast(&x.shape, &y.shape)?;
-    let (x, y) = (expanded(x, &shape, most)?.elements(), expanded(y, &shape, most)?.elements());
+    let (mut x, y) = (expanded(x, &shape, most)?.elements(), expanded(y, &shape, most)?.elements());
+    // A vector with constants in it that is divided by its length stays one.
+    let mixed = |e: &[Element]| e.iter().any(|e| value(e).is_some()) && e.iter().any(|e| value(e).is_none());
+    if op == "Div" && mixed(&x) && value(&y[0]).is_some() && y.iter().all(|e| *e == y[0]) {
+        let whole = open_vector(exprs, &x)?;
+        x = exprs.elements(whole);
+    }
     let open = |i: usize| match (value(&x[i]), value(&y[i])) {
         (None, None) => Open::Neither,
         (Some(_), None) => Open::First,
@@ -97,11 +103,7 @@ fn with_known(op: &str, exprs: &mut Exprs, x: Id, y: &[f64]) -> Result<Vec<Eleme
                 ("Min", Some(high)) => exprs.clip(x, f64::NEG_INFINITY, high),
                 _ => {
                     ensure!(op != "Pow", "has several exponents; one for all elements is taken");
-                    let sign = if op == "Max" { 1.0 } else { -1.0 };
-                    let signs = vec![sign; y.len()];
-                    let over = exprs.affine(x, signs.clone(), y.iter().map(|y| -sign * y).collect());
-                    let over = exprs.function(Function::Relu, over);
-                    exprs.affine(over, signs, y.to_vec())
+                    return Ok(exprs.limited_each(x, y, if op == "Max" { 1.0 } else { -1.0 }));
                 }
             };
             Ok(exprs.elements(value))
@@ -152,11 +154,7 @@ fn both(op: &str, exprs: &mut Exprs, x: Id, y: Id) -> Result<Id> {
             }
             _ => exprs.max(x, y),
         },
-        "Min" => {
-            let (x, y) = (exprs.scaled(x, -1.0, 0.0), exprs.scaled(y, -1.0, 0.0));
-            let least = exprs.max(x, y);
-            exprs.scaled(least, -1.0, 0.0)
-        }
+        "Min" => exprs.min(x, y),
         _ => bail!("{op} of two values of the network is not known"),
     })
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use actq_kernels::math::Function;
 
 use super::compare::{near, uniform};
+use super::elements::value;
 use super::expr::{Expr, Exprs, Id, Matrix, Run, Unary};
 use super::norm::Norm;
 use super::tensor::Element;
@@ -15,6 +16,8 @@ const DEPTH: usize = 12;
 const GELU_TANH: [f64; 2] = [0.797_884_560_802_865_4, 0.035_677_408_136_300_125];
 /// A clip within so much is done by one operation about its middle; beyond, that would cost digits.
 const MOST_MIDDLE: f64 = 100.0;
+/// A limit so far from zero may not be taken off a value and added again: what is small would lose its digits.
+const FAR: f64 = 1.0;
 
 impl Exprs {
     /// The vector of these elements of other expressions.
@@ -255,17 +258,19 @@ impl Exprs {
         {
             return Some((Function::Mish, p, 1.0));
         }
-        // p (a + a gate)
+        // p (b + b gate); with the gate's operand turned around also p (b - b gate), as both gates are odd.
         let (gate, a, b) = self.affine_of(q);
-        if a != b {
+        if a.abs() != b.abs() {
             return None;
         }
+        let side = if a == b { 1.0 } else { -1.0 };
         if let Some(u) = self.operand_of(gate, Unary::Erf) {
-            return near(self.ratio(u, p)?, 0.5f64.sqrt()).then_some((Function::Gelu, p, 2.0 * a));
+            return near(side * self.ratio(u, p)?, 0.5f64.sqrt()).then_some((Function::Gelu, p, 2.0 * b));
         }
-        let [zero, first, square, cube] = self.polynomial(self.known_of(gate, Function::Tanh)?, p, DEPTH)?;
+        let polynomial = self.polynomial(self.known_of(gate, Function::Tanh)?, p, DEPTH)?;
+        let [zero, first, square, cube] = polynomial.map(|factor| side * factor);
         let is_gelu = zero == 0.0 && square == 0.0 && near(first, GELU_TANH[0]) && near(cube, GELU_TANH[1]);
-        is_gelu.then_some((Function::GeluTanh, p, 2.0 * a))
+        is_gelu.then_some((Function::GeluTanh, p, 2.0 * b))
     }
 
     /// The sum of all elements.
@@ -275,20 +280,99 @@ impl Exprs {
 
     /// `max(x, low)`
     pub(super) fn at_least(&mut self, x: Id, low: f64) -> Id {
-        let over = self.scaled(x, 1.0, -low);
-        let over = self.function(Function::Relu, over);
-        self.scaled(over, 1.0, low)
+        let limited = if low < -FAR {
+            self.beyond(x, -low, 1.0)
+        } else {
+            let over = self.scaled(x, 1.0, -low);
+            let over = self.function(Function::Relu, over);
+            self.scaled(over, 1.0, low)
+        };
+        self.limited.insert(limited, (x, low, f64::INFINITY));
+        limited
     }
 
     /// `min(x, high)`
     pub(super) fn at_most(&mut self, x: Id, high: f64) -> Id {
-        let under = self.scaled(x, -1.0, high);
-        let under = self.function(Function::Relu, under);
-        self.scaled(under, -1.0, high)
+        let limited = if high > FAR {
+            self.beyond(x, high, -1.0)
+        } else {
+            let under = self.scaled(x, -1.0, high);
+            let under = self.function(Function::Relu, under);
+            self.scaled(under, -1.0, high)
+        };
+        self.limited.insert(limited, (x, f64::NEG_INFINITY, high));
+        limited
+    }
+
+    /// `x` within `limit` in both directions, and what is beyond it in the direction of `sign`.
+    fn beyond(&mut self, x: Id, limit: f64, sign: f64) -> Id {
+        let len = self.len_of(x);
+        let inside = self.put(Expr::Clip(x, limit), len);
+        // An offset of its own: in the bias of a layer it would need the layer twice.
+        let over = self.put(Expr::Affine(x, vec![sign; len], vec![-limit; len]), len);
+        let over = self.function(Function::Relu, over);
+        let over = self.scaled(over, sign, 0.0);
+        self.add(inside, over)
+    }
+
+    /// The elements of `max(x, limits)`, or `min` where `sign` is -1, with a limit for each.
+    pub(super) fn limited_each(&mut self, x: Id, limits: &[f64], sign: f64) -> Vec<Element> {
+        let mut all = self.elements(x);
+        for far in [false, true] {
+            let side = |i: usize| -sign * limits[i];
+            let at = (0..limits.len()).filter(|&i| side(i) < f64::from(f32::MAX) && (side(i) > FAR) == far);
+            let at: Vec<usize> = at.collect();
+            let values: Vec<(Id, usize)> = at.iter().filter_map(|&i| value(&all[i])).collect();
+            if values.is_empty() {
+                continue;
+            }
+            let part = self.vector(&values);
+            let limits: Vec<f64> = at.iter().map(|&i| limits[i]).collect();
+            let part = if far { self.beyond_each(part, &limits, sign) } else { self.over_each(part, limits, sign) };
+            at.into_iter().zip(self.elements(part)).for_each(|(i, element)| all[i] = element);
+        }
+        all
+    }
+
+    /// A limit is taken off and added again.
+    fn over_each(&mut self, x: Id, limits: Vec<f64>, sign: f64) -> Id {
+        let signs = vec![sign; limits.len()];
+        let over = self.affine(x, signs.clone(), limits.iter().map(|limit| -sign * limit).collect());
+        let over = self.function(Function::Relu, over);
+        self.affine(over, signs, limits)
+    }
+
+    /// As [`Self::beyond`]: shares of the limits have one limit.
+    fn beyond_each(&mut self, x: Id, limits: &[f64], sign: f64) -> Id {
+        let (len, zeros) = (limits.len(), vec![0.0; limits.len()]);
+        let sizes: Vec<f64> = limits.iter().map(|limit| limit.abs()).collect();
+        let shares = self.affine(x, sizes.iter().map(|size| 1.0 / size).collect(), zeros.clone());
+        let inside = self.put(Expr::Clip(shares, 1.0), len);
+        let inside = self.affine(inside, sizes.clone(), zeros.clone());
+        let over = self.put(Expr::Affine(x, vec![sign; len], sizes.iter().map(|size| -size).collect()), len);
+        let over = self.function(Function::Relu, over);
+        let over = self.affine(over, vec![sign; len], zeros);
+        self.add(inside, over)
+    }
+
+    /// Of a value with a limit on one side what is limited, and the limits, of which one is infinite.
+    pub(super) fn limited(&self, x: Id) -> Option<(Id, f64, f64)> {
+        let relu = self.known_of(x, Function::Relu).map(|of| (of, 0.0, f64::INFINITY));
+        relu.or_else(|| self.limited.get(&x).copied())
     }
 
     /// Limited to low ..= high, either of which may be infinite.
     pub(super) fn clip(&mut self, x: Id, low: f64, high: f64) -> Id {
+        // Of two limits one behind the other, as Max and Min have them.
+        if let Some((inner, lowest, highest)) = self.limited(x)
+            && low.max(lowest) < high.min(highest)
+        {
+            return self.clip(inner, low.max(lowest), high.min(highest));
+        }
+        if low == 0.0 && high > FAR {
+            let (len, positive) = (self.len_of(x), self.function(Function::Relu, x));
+            return if high < f64::INFINITY { self.put(Expr::Clip(positive, high), len) } else { positive };
+        }
         let middle = low / 2.0 + high / 2.0;
         if middle == 0.0 || low.abs().max(high.abs()) <= MOST_MIDDLE {
             let len = self.len_of(x);
@@ -306,6 +390,13 @@ impl Exprs {
         let more = self.add(y, negative);
         let more = self.function(Function::Relu, more);
         self.add(x, more)
+    }
+
+    /// `min(x, y)`
+    pub(super) fn min(&mut self, x: Id, y: Id) -> Id {
+        let (x, y) = (self.scaled(x, -1.0, 0.0), self.scaled(y, -1.0, 0.0));
+        let most = self.max(x, y);
+        self.scaled(most, -1.0, 0.0)
     }
 
     /// `x` where positive, else `slope x`, with a slope for each element.

@@ -8,7 +8,11 @@ use super::tensor::Tensor;
 
 /// What helps where an operation is not known.
 pub(super) const HELP: &str =
-    "docs/IMPORT.md lists what is taken; --output NAME makes a value before this node the action";
+    "docs/IMPORT.md lists what is taken; actq import --output NAME makes a value before this node the action";
+
+/// Why a random number is refused.
+pub(super) const RANDOM: &str =
+    "draws random numbers; export the deterministic action, or name it with actq import --output NAME";
 
 /// A node and its inputs.
 #[derive(Clone, Copy)]
@@ -85,19 +89,32 @@ impl<'a> Call<'a> {
     pub(super) fn refuse<T>(&self) -> Result<T> {
         match self.op() {
             "RandomNormal" | "RandomNormalLike" | "RandomUniform" | "RandomUniformLike" | "Multinomial"
-            | "Bernoulli" => {
-                bail!("draws random numbers; export the deterministic action, or name it with --output")
-            }
-            "QuantizeLinear" | "DequantizeLinear" | "DynamicQuantizeLinear" | "MatMulInteger" | "QLinearMatMul" => {
+            | "Bernoulli" => bail!(RANDOM),
+            "QuantizeLinear"
+            | "DequantizeLinear"
+            | "DynamicQuantizeLinear"
+            | "MatMulInteger"
+            | "ConvInteger"
+            | "QLinearMatMul"
+            | "QLinearConv"
+            | "QGemm"
+            | "DynamicQuantizeMatMul"
+            | "MatMulNBits" => {
                 bail!("the file is quantized already; export it in float32 and let actq quantize it")
             }
-            "Loop" | "Scan" | "SequenceAt" => bail!("runs a loop; export one step of the policy, unrolled"),
-            "ConvTranspose" | "MaxPool" | "AveragePool" | "GlobalAveragePool" | "GlobalMaxPool" => {
+            "Loop" | "Scan" => bail!("runs a loop; export one step of the policy, unrolled"),
+            "SequenceAt" | "SequenceConstruct" | "SplitToSequence" | "ConcatFromSequence" => {
+                bail!("works on a list of tensors, as scripted modules do; export by tracing, or with dynamo=True")
+            }
+            "Attention" | "MultiHeadAttention" | "GroupQueryAttention" => {
+                bail!("attention has no kernel here; export the part behind it as a policy of its own")
+            }
+            "ConvTranspose" | "MaxPool" | "AveragePool" => {
                 bail!("has no kernel here; export the part behind the encoder as a policy of its own")
             }
             "Softmax" | "LogSoftmax" | "ArgMax" | "TopK" => {
                 bail!(
-                    "has no kernel here; where it only chooses among actions, --output NAME takes the value before it"
+                    "has no kernel here; where it only chooses among actions, actq import --output NAME takes the value before it"
                 )
             }
             "GreaterOrEqual" | "Greater" | "Less" | "LessOrEqual" | "Equal" | "Not" | "And" | "Or" | "IsNaN"

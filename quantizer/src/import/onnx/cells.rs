@@ -5,8 +5,8 @@ use std::sync::Arc;
 use anyhow::{Context as _, Result, bail, ensure};
 
 use super::call::Call;
+use super::elements::open_vector;
 use super::expr::{Cell, Expr, Exprs, Id, Matrix, Run};
-use super::products::open_vector;
 use super::tensor::{Element, Tensor};
 
 /// The outputs, where the node is such an operation.
@@ -77,7 +77,10 @@ fn state(call: &Call<'_>, exprs: &Exprs, i: usize, what: &str, hidden: usize) ->
     let carried = "export it as an input of the graph, and its next value as an output";
     let tensor = call.optional(i).with_context(|| format!("forgets its {what} state after every step; {carried}"))?;
     run_of_input(exprs, &tensor.elements()).filter(|run| run.len == hidden).with_context(|| {
-        format!("its {what} state is a constant, or an input that other nodes change first; {carried}")
+        format!(
+            "its {what} state is a constant, or an input that other nodes change first; {carried}, without what resets it: the policy is \
+             reset as a whole"
+        )
     })
 }
 

@@ -1,7 +1,10 @@
 //! Whether expressions are the same but for factors, which is what patterns ask.
 
-use super::expr::{Expr, Exprs, Id, Unary};
+use std::mem::discriminant;
+
 use actq_kernels::math::Function;
+
+use super::expr::{Expr, Exprs, Id, Unary};
 
 /// Exporters write constants such as `sqrt(2)` in f32.
 const TOLERANCE: f64 = 2e-6;
@@ -49,13 +52,17 @@ impl Exprs {
         if y == x {
             return Some(1.0);
         }
+        let zeros = vec![0.0; self.len_of(x)];
+        // Factors and offsets may have gone into a norm.
         let split = |id: Id| match self.get(id) {
-            Expr::Affine(of, a, b) => (*of, Some((a, b))),
-            _ => (id, None),
+            Expr::Affine(of, a, b) => (*of, None, Some((a, b))),
+            expr @ Expr::LayerNorm(of, a, b, eps) => (*of, Some((discriminant(expr), *eps)), Some((a, b))),
+            expr @ Expr::RmsNorm(of, a, eps) => (*of, Some((discriminant(expr), *eps)), Some((a, &zeros))),
+            _ => (id, None, None),
         };
         let at = |parts: Option<(&Vec<f64>, &Vec<f64>)>, i: usize| parts.map_or((1.0, 0.0), |(a, b)| (a[i], b[i]));
-        let ((of_y, y), (of_x, x)) = (split(y), split(x));
-        if of_y != of_x {
+        let ((of_y, norm_y, y), (of_x, norm_x, x)) = (split(y), split(x));
+        if of_y != of_x || norm_y != norm_x {
             return None;
         }
         let k = at(y, 0).0 / at(x, 0).0;

@@ -7,7 +7,7 @@ use super::elements::{apply, value};
 use super::expr::{Expr, Exprs, Unary};
 use super::moves::expanded;
 use super::places::broadcast;
-use super::tensor::{Element, Tensor};
+use super::tensor::{Data, Element, Tensor};
 
 /// A comparison of a value with one number, as whether something is above one.
 pub(super) fn above(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> {
@@ -32,6 +32,62 @@ pub(super) fn above(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>
     Ok(Some(Tensor::of_elements(compared.shape.clone(), conditions)))
 }
 
+/// Whether elements are not numbers, or infinite. Those of values never are: where the network gives such a one, the image gives no
+/// action.
+pub(super) fn not_finite(call: &Call<'_>) -> Result<Tensor> {
+    let found = |v: f64| match call.op() {
+        "IsNaN" => v.is_nan(),
+        _ => v.is_infinite() && call.int(if v > 0.0 { "detect_positive" } else { "detect_negative" }) != Some(0),
+    };
+    let one = |element: &Element| if let Element::Known(v) = element { found(*v).into() } else { 0 };
+    let x = call.input(0)?;
+    Ok(Tensor::new(x.shape.clone(), Data::Int(x.elements().iter().map(one).collect())))
+}
+
+/// Whether a value is equal to itself, which asks whether it is a number.
+pub(super) fn itself(call: &Call<'_>) -> Result<Option<Tensor>> {
+    let (x, y) = (call.input(0)?, call.input(1)?);
+    let same = x.shape == y.shape && x.elements() == y.elements();
+    Ok(same.then(|| Tensor::new(x.shape.clone(), Data::Int(vec![1; x.len()]))))
+}
+
+/// `And` and `Or` where one side of every element is known.
+pub(super) fn both(call: &Call<'_>, most: usize) -> Result<Option<Tensor>> {
+    let (x, y) = (call.input(0)?, call.input(1)?);
+    let shape = broadcast(&x.shape, &y.shape)?;
+    // What decides alone: false of And, true of Or.
+    let decides = f64::from(u8::from(call.op() == "Or"));
+    let one = |(x, y): (Element, Element)| match (x, y) {
+        (Element::Known(v), other) | (other, Element::Known(v)) => {
+            let truth = f64::from(u8::from(v != 0.0));
+            Some(if truth == decides { Element::Known(truth) } else { other })
+        }
+        _ => None,
+    };
+    let (x, y) = (expanded(x, &shape, most)?.elements(), expanded(y, &shape, most)?.elements());
+    let all = x.into_iter().zip(y).map(one).collect::<Option<Vec<_>>>();
+    Ok(all.map(|all| truths(shape, all)))
+}
+
+/// A value as truth values, where it holds some.
+pub(super) fn as_truth(input: &Tensor, exprs: &Exprs) -> Option<Tensor> {
+    let is_truth = |e: &Element| match *e {
+        Element::Known(v) => v == 0.0 || v == 1.0,
+        Element::Of(id, _) => matches!(exprs.get(id), Expr::Unary(Unary::Above(_), _)),
+    };
+    let elements = input.elements();
+    elements.iter().all(is_truth).then(|| truths(input.shape.clone(), elements))
+}
+
+/// Truth values, as integers where all are known.
+fn truths(shape: Vec<usize>, elements: Vec<Element>) -> Tensor {
+    let tensor = Tensor::of_elements(shape, elements);
+    match tensor.data {
+        Data::Real(values) => Tensor::new(tensor.shape, Data::Int(values.into_iter().map(|v| v as i64).collect())),
+        _ => tensor,
+    }
+}
+
 /// Not above a limit: the negative value is above the negative limit, or at it, where the choices that are taken agree.
 pub(super) fn not(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> {
     let input = call.input(0)?;
@@ -52,7 +108,10 @@ pub(super) fn choice(call: &Call<'_>, exprs: &mut Exprs, most: usize) -> Result<
     let [condition, x, y] = [condition, x, y].map(|tensor| expanded(tensor, &shape, most).map(|t| t.elements()));
     let (condition, x, y) = (condition?, x?, y?);
     let values = |elements: &[Element]| elements.iter().map(value).collect::<Option<Vec<_>>>();
-    let zeros = |elements: &[Element]| elements.iter().all(|e| *e == Element::Known(0.0));
+    let uniform = |elements: &[Element]| match elements.first()? {
+        Element::Known(v) => elements.iter().all(|e| e == &elements[0]).then_some(*v),
+        Element::Of(..) => None,
+    };
     let condition = exprs.vector(&values(&condition).with_context(refused)?);
     let chosen = match (values(&x), values(&y)) {
         (Some(x), Some(y)) => {
@@ -65,14 +124,14 @@ pub(super) fn choice(call: &Call<'_>, exprs: &mut Exprs, most: usize) -> Result<
                 exprs.select(other, y, x)
             })
         }
-        (Some(open), None) if zeros(&y) => {
+        (Some(open), None) => uniform(&y).and_then(|other| {
             let open = exprs.vector(&open);
-            exprs.select_zero(condition, open, true)
-        }
-        (None, Some(open)) if zeros(&x) => {
+            exprs.select_constant(condition, open, other, true)
+        }),
+        (None, Some(open)) => uniform(&x).and_then(|other| {
             let open = exprs.vector(&open);
-            exprs.select_zero(condition, open, false)
-        }
+            exprs.select_constant(condition, open, other, false)
+        }),
         _ => None,
     };
     Ok(Tensor::of_elements(shape, exprs.elements(chosen.with_context(refused)?)))

@@ -1,9 +1,11 @@
 //! A function of the elements of a tensor, some of which may be known.
 
-use anyhow::Result;
+use std::sync::Arc;
+
+use anyhow::{Context as _, Result};
 
 use super::evaluation::computed;
-use super::expr::{Exprs, Id};
+use super::expr::{Exprs, Id, Matrix};
 use super::tensor::{Element, Tensor};
 
 /// Applies what works on a vector to all elements; those that are known give known ones.
@@ -49,4 +51,21 @@ pub(super) fn apply(exprs: &mut Exprs, values: &[(Id, usize)], f: &dyn Fn(&mut E
 /// The value that an element is of, and its place there, where it is not known.
 pub(super) fn value(element: &Element) -> Option<(Id, usize)> {
     if let Element::Of(id, i) = element { Some((*id, *i)) } else { None }
+}
+
+/// The vector of these elements, of which at least one is not known: those that are come out of a layer that only has a bias.
+pub(super) fn open_vector(exprs: &mut Exprs, elements: &[Element]) -> Result<Id> {
+    let first = elements.iter().find_map(value).context("computes with constants alone; fold them in the exporter")?;
+    let known = |element: &Element| if let Element::Known(v) = element { Some(*v) } else { None };
+    let biases: Vec<f64> = elements.iter().filter_map(known).collect();
+    let mut constants = Vec::new();
+    if !biases.is_empty() {
+        let one = exprs.vector(&[first]);
+        let (rows, name) = (biases.len(), Some("constant.weight".to_owned()));
+        let layer = exprs.linear(one, Arc::new(Matrix { name, rows, cols: 1, data: vec![0.0; rows] }), biases);
+        constants.extend((0..rows).map(|k| (layer, k)));
+    }
+    let mut constants = constants.into_iter();
+    let values: Option<Vec<(Id, usize)>> = elements.iter().map(|e| value(e).or_else(|| constants.next())).collect();
+    Ok(exprs.vector(&values.context("a constant is lost")?))
 }

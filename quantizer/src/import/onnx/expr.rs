@@ -119,6 +119,8 @@ pub(super) struct Exprs {
     all: Vec<(Expr, usize)>,
     /// By kind and first operand.
     known: HashMap<(std::mem::Discriminant<Expr>, Id), Vec<Id>>,
+    /// Values with a limit on one side: of what, and the limits, of which one is infinite.
+    pub(super) limited: HashMap<Id, (Id, f64, f64)>,
     /// Which node of the file each came up in.
     origins: Vec<usize>,
     /// The node that is followed now.

@@ -9,8 +9,11 @@ use super::call::Call;
 use super::expr::{Expr, Exprs};
 use super::model::{Graph, Model, Node, Port, kind_name};
 use super::tensor::{Data, Element, Tensor, count};
-use super::{cells, convolutions, einsum, known, moves, pointwise, products, reductions};
+use super::{cells, conditions, convolutions, einsum, known, moves, pointwise, products, reductions};
 use crate::text::printable;
+
+/// ONNX's type of truth values.
+const TRUTH: i64 = 9;
 
 /// Graphs and functions within each other.
 const MOST_DEPTH: usize = 16;
@@ -160,6 +163,12 @@ impl<'m> Follower<'m> {
                 None => Tensor::new(vec![1], Data::Real(vec![0.0])),
             };
             return Ok(vec![moves::constant_of_shape(call, &fill.data, most)?]);
+        }
+        if call.op() == "Cast"
+            && call.int("to") == Some(TRUTH)
+            && let Some(truth) = conditions::as_truth(call.input(0)?, &self.exprs)
+        {
+            return Ok(vec![truth]);
         }
         if let Some(outputs) = moves::run(call, most)? {
             return Ok(outputs);

@@ -9,6 +9,9 @@ use super::moves::expanded;
 use super::places::{axis, broadcast};
 use super::tensor::{Data, Tensor, count};
 
+/// Mod with the sign of the first operand, which is the only one of real numbers; without the attribute it is that of the second.
+const FMOD: &str = "Mod, fmod";
+
 /// The output, where the node computes with known numbers alone.
 pub(super) fn run(call: &Call<'_>, most: usize) -> Result<Option<Tensor>> {
     let given: Vec<&Tensor> = call.inputs.iter().copied().flatten().collect();
@@ -20,17 +23,42 @@ pub(super) fn run(call: &Call<'_>, most: usize) -> Result<Option<Tensor>> {
     {
         return unary(one, call.op(), f).map(Some);
     }
+    let op = if call.op() == "Mod" && call.int("fmod").unwrap_or(0) != 0 { FMOD } else { call.op() };
     if let [x, y] = given[..]
-        && (real(call.op()).is_some() || whole(call.op()).is_some() || compared(call.op()).is_some())
+        && (real(op).is_some() || whole(op).is_some() || compared(op).is_some())
     {
         let shape = broadcast(&x.shape, &y.shape)?;
         let (x, y) = (expanded(x, &shape, most)?, expanded(y, &shape, most)?);
-        return binary(call.op(), &x, &y, shape).map(Some);
+        return binary(op, &x, &y, shape).map(Some);
     }
     match call.op() {
         "ReduceProd" | "ReduceSum" | "ReduceMean" | "ReduceMax" | "ReduceMin" => reduce(call, given[0]).map(Some),
+        "DequantizeLinear" => dequantized(call).map(Some),
         _ => Ok(None),
     }
+}
+
+/// What quantized weights stand for: a scale and a zero for all of them, or for each index of an axis.
+fn dequantized(call: &Call<'_>) -> Result<Tensor> {
+    let (x, scale) = (call.input(0)?, call.input(1)?);
+    ensure!(
+        scale.shape.len() < 2 && call.int("block_size").unwrap_or(0) == 0,
+        "has a scale for each block of weights; export it in float32"
+    );
+    let n = scale.len();
+    let each = if n == 1 {
+        x.len()
+    } else {
+        let at = axis(call.int("axis").unwrap_or(1), x.shape.len())?;
+        ensure!(x.shape[at] == n, "has {n} scales for an axis of {}", x.shape[at]);
+        count(&x.shape[at + 1..])?
+    };
+    let (scales, values) = (call.reals(1, "the scale")?, call.reals(0, "what is quantized")?);
+    let zeros = if call.optional(2).is_some() { call.reals(2, "the zero point")? } else { vec![0.0; n] };
+    ensure!(zeros.len() == n, "has {} zero points for {n} scales", zeros.len());
+    let runs = values.chunks(each.max(1)).zip((0..n).cycle());
+    let values = runs.flat_map(|(run, k)| run.iter().map(|v| (v - zeros[k]) * scales[k]).collect::<Vec<f64>>());
+    Ok(Tensor::new(x.shape.clone(), Data::Real(values.collect())))
 }
 
 /// A function of one known number that no value of a network goes through, or that integers do.
@@ -68,7 +96,7 @@ pub(super) fn real(op: &str) -> Option<fn(f64, f64) -> f64> {
         "Pow" => f64::powf,
         "Max" => f64::max,
         "Min" => f64::min,
-        "Mod" => |x, y| x - y * (x / y).floor(),
+        FMOD => |x, y| x % y,
         "PRelu" => |x, slope| if x < 0.0 { slope * x } else { x },
         _ => return None,
     })
@@ -81,7 +109,11 @@ fn whole(op: &str) -> Option<fn(i64, i64) -> Option<i64>> {
         "Sub" => i64::checked_sub,
         "Mul" => i64::checked_mul,
         "Div" => i64::checked_div,
-        "Mod" => i64::checked_rem_euclid,
+        "Mod" => |x, y| {
+            let rest = x.checked_rem(y)?;
+            Some(if rest != 0 && (rest < 0) != (y < 0) { rest + y } else { rest })
+        },
+        FMOD => i64::checked_rem,
         "Pow" => |x, y| x.checked_pow(u32::try_from(y).ok()?),
         "Max" => |x, y| Some(x.max(y)),
         "Min" => |x, y| Some(x.min(y)),
@@ -120,7 +152,7 @@ fn binary(op: &str, x: &Tensor, y: &Tensor, shape: Vec<usize>) -> Result<Tensor>
         // What is not a number compares as nothing.
         return Ok(Tensor::new(shape, truths(pairs.map(|(x, y)| x.partial_cmp(&y).is_some_and(holds)).collect())));
     }
-    let f = real(op).context("joins truth values of real numbers")?;
+    let f = real(op).context("is of integers or truth values, and these are real numbers")?;
     Ok(Tensor::new(shape, Data::Real(pairs.map(|(x, y)| f(x, y)).collect())))
 }
 

@@ -23,8 +23,8 @@ struct Part {
     len: usize,
 }
 
-/// The longest vector that one element is repeated to, as an operand: each repetition is copied.
-const MOST_SPREAD: usize = 64;
+/// The most repetitions of an element in one operand: each is copied by itself. What is longer repeats a copy of so many.
+const MOST_COPIES: usize = 64;
 
 /// Ops and tensors so far.
 pub(super) struct Lowered {
@@ -95,15 +95,25 @@ impl Lowered {
                 vec![Part { slot: 0, from, len: exprs.len_of(id) }]
             }
             Expr::Pick(runs) => merged(runs.iter().flat_map(|run| self.cut(*run)).collect()),
-            Expr::Spread(x) => {
-                let n = exprs.len_of(id);
-                ensure!(n <= MOST_SPREAD, "computes {n} values with one; up to {MOST_SPREAD} are taken");
-                vec![self.place(*x); n].concat()
-            }
+            Expr::Spread(x) => self.spread(*x, exprs.len_of(id))?,
             _ => self.op(exprs, id)?,
         };
         self.places.insert(id, place);
         Ok(())
+    }
+
+    /// An element `n` times.
+    fn spread(&mut self, x: Id, n: usize) -> Result<Vec<Part>> {
+        let one = self.place(x);
+        if n <= MOST_COPIES {
+            return Ok(vec![one; n].concat());
+        }
+        let most = MOST_COPIES * MOST_COPIES;
+        ensure!(n <= most, "computes {n} values with one; up to {most} are taken");
+        let copies = JsonOp { op: "identity".to_owned(), ..JsonOp::default() };
+        let copies = self.push(copies, vec![one; MOST_COPIES].concat(), None, MOST_COPIES);
+        let rest = copies.iter().map(|part| Part { len: n % MOST_COPIES, ..*part }).filter(|part| part.len > 0);
+        Ok(vec![copies.clone(); n / MOST_COPIES].concat().into_iter().chain(rest).collect())
     }
 
     fn place(&self, id: Id) -> Vec<Part> {

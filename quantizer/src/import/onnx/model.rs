@@ -95,6 +95,11 @@ impl Model {
     /// Parses a file whose tensors may be in other files of `folder`.
     pub(super) fn parse(bytes: Bytes, folder: &Path) -> Result<Self> {
         ensure!(!bytes.is_empty(), "the file is empty");
+        ensure!(
+            !bytes.starts_with(b"PK\x03\x04"),
+            "this is no ONNX file but a zip archive, as PyTorch's checkpoints are; export the module to ONNX, or to a policy's folder \
+             (docs/IMPORT.md, PyTorch)"
+        );
         let model: proto::Model = decode(&bytes, "this is no ONNX file: its protobuf")?;
         let graph = model.graph.as_ref().context("this is no ONNX file: it holds no graph")?;
         let opsets: Vec<proto::OperatorSet> = all(&model.opset_import, "the operator sets")?;

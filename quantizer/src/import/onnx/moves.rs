@@ -1,6 +1,7 @@
 //! Operations that only move elements, and those about shapes: what is known and what is not goes the same way.
 
 use anyhow::{Context as _, Result, bail, ensure};
+use half::{bf16, f16};
 
 use super::call::Call;
 use super::gather;
@@ -106,7 +107,25 @@ fn lengths(shape: &[i64]) -> Result<Vec<usize>> {
     axes.with_context(|| format!("{shape:?} has a negative length"))
 }
 
-/// Between types of real numbers nothing is lost but digits; values of the network have no other.
+/// Known numbers, each rounded to a type of fewer digits.
+fn rounded(input: &Tensor, to: fn(f64) -> f64) -> Vec<f64> {
+    input.reals().unwrap_or_default().into_iter().map(to).collect()
+}
+
+/// An integer as one of ONNX's type `kind`, which keeps the last bits.
+fn wrapped(v: i64, kind: i64) -> i64 {
+    match kind {
+        2 => i64::from(v as u8),
+        3 => i64::from(v as i8),
+        4 => i64::from(v as u16),
+        5 => i64::from(v as i16),
+        6 => i64::from(v as i32),
+        12 => i64::from(v as u32),
+        _ => v,
+    }
+}
+
+/// Between float32 and float64 nothing is lost but digits that float32 has not; values of the network have no other type.
 fn cast(call: &Call<'_>) -> Result<Tensor> {
     let input = call.input(0)?;
     let to = match call.op() {
@@ -122,11 +141,23 @@ fn cast(call: &Call<'_>) -> Result<Tensor> {
     let data = match (to, &input.data) {
         (1 | 11, Data::Int(v)) => Data::Real(v.iter().map(|&v| v as f64).collect()),
         (1 | 11, data) => data.clone(),
-        (10 | 16, Data::Real(v)) => Data::Real(v.clone()),
+        (10, Data::Real(_) | Data::Int(_)) => Data::Real(rounded(input, |v| f16::from_f64(v).to_f64())),
+        (16, Data::Real(_) | Data::Int(_)) => Data::Real(rounded(input, |v| bf16::from_f64(v).to_f64())),
         (9, Data::Int(v)) => Data::Int(v.iter().map(|&v| i64::from(v != 0)).collect()),
         (9, Data::Real(v)) => Data::Int(v.iter().map(|&v| i64::from(v != 0.0)).collect()),
-        (2..=7 | 12 | 13, Data::Int(v)) => Data::Int(v.clone()),
-        (2..=7 | 12 | 13, Data::Real(v)) => Data::Int(v.iter().map(|&v| v as i64).collect()),
+        (2..=7 | 12 | 13, Data::Int(v)) => Data::Int(v.iter().map(|&v| wrapped(v, to)).collect()),
+        (2..=7 | 12 | 13, Data::Real(v)) => {
+            let whole = |v: &f64| {
+                let one = *v as i64;
+                ensure!(
+                    one as f64 == v.trunc() && wrapped(one, to) == one,
+                    "casts {v} to {}, which does not hold it",
+                    kind_name(to as i32)
+                );
+                Ok(one)
+            };
+            Data::Int(v.iter().map(whole).collect::<Result<_>>()?)
+        }
         _ => {
             bail!("rounds a value of the network to {}; export the policy in float32 throughout", kind_name(to as i32))
         }

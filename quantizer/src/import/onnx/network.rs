@@ -11,14 +11,18 @@ use safetensors::tensor::TensorView;
 use super::super::contract::JsonContract;
 use super::super::json::Json;
 use super::action;
+use super::call::RANDOM;
 use super::expr::{Expr, Exprs, Id};
 use super::follow::Follower;
 use super::lower::{Lowered, lower};
-use super::model::Model;
+use super::model::{Graph, Model, Port};
 use super::simplify::simplify;
 use super::states::{Cells, Output, is_state, refuse_lost_states};
 use super::tensor::{Element, Tensor};
 use crate::text::printable;
+
+/// The most names of a message.
+const MOST_LISTED: usize = 20;
 
 /// What the caller chooses; nothing by default.
 #[derive(Clone, Debug, Default)]
@@ -27,6 +31,45 @@ pub struct Choice {
     pub output: Option<String>,
     /// Inputs that hold recurrent state, with the outputs of their next values.
     pub states: Vec<(String, String)>,
+}
+
+impl Choice {
+    /// Refuses names that the file does not have.
+    fn check(&self, graph: &Graph) -> Result<()> {
+        let outputs = || format!("its outputs are {}", listed(&graph.outputs));
+        if let Some(name) = &self.output {
+            let gives =
+                graph.nodes.iter().flat_map(|node| &node.outputs).chain(graph.outputs.iter().map(|port| &port.name));
+            ensure!(
+                gives.into_iter().any(|given| given == name),
+                "--output {}: the file gives no such value; {}",
+                printable(name),
+                outputs()
+            );
+        }
+        for (from, to) in &self.states {
+            let [state, from_name, to_name] =
+                [&format!("{from}={to}"), from, to].map(|name| printable(name).into_owned());
+            ensure!(
+                graph.inputs.iter().any(|port| port.name == *from),
+                "--state {state}: the file has no input {from_name:?}; its inputs are {}",
+                listed(&graph.inputs)
+            );
+            ensure!(
+                graph.outputs.iter().any(|port| port.name == *to),
+                "--state {state}: the file has no output {to_name:?}; {}",
+                outputs()
+            );
+        }
+        Ok(())
+    }
+}
+
+/// Names for a message.
+fn listed(ports: &[Port]) -> String {
+    let names: Vec<_> = ports.iter().take(MOST_LISTED).map(|port| printable(&port.name)).collect();
+    let more = ports.len() - names.len();
+    names.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
 }
 
 /// An ONNX file as a policy's files, and what became of it.
@@ -69,6 +112,7 @@ pub fn import_bytes(bytes: Vec<u8>, folder: &Path, name: &str, choice: &Choice) 
 }
 
 fn network(model: &Model, name: &str, choice: &Choice) -> Result<Imported> {
+    choice.check(&model.graph)?;
     let mut follower = Follower::new(model);
     let mut outputs = Vec::new();
     let mut errors = Vec::new();
@@ -222,19 +266,29 @@ fn choose(
             .iter()
             .map(|&i| format!("{} ({} values)", printable(&outputs[i].name), outputs[i].value.len()))
             .collect();
-        bail!("several outputs can be the action: {}; choose one with --output NAME", list.join(", "))
+        bail!("several outputs can be the action: {}; choose one with actq import --output NAME", list.join(", "))
     };
-    // An action that cannot be taken is not replaced by something else.
-    if !is_action(&outputs[one].name)
-        && let Some((name, error)) = errors.into_iter().find(|(name, _)| is_action(name))
+    // An action that cannot be taken is not replaced by something else, as by the value that stands beside it. But beside what is drawn
+    // stands the deterministic action.
+    let name = &outputs[one].name;
+    if !is_action(name)
+        && let Some((lost, error)) = errors.into_iter().find(|(lost, error)| is_action(lost) || !is_drawn(error))
     {
-        return Err(error.context(format!("the output {:?} cannot be taken", printable(&name))));
+        let [lost, name] = [&lost, name].map(|name| printable(name));
+        return Err(error.context(format!(
+            "the output {lost:?} cannot be taken, and {name:?} is not called action; actq import --output NAME says which is the action"
+        )));
     }
     Ok(one)
 }
 
 fn is_action(name: &str) -> bool {
     name.to_lowercase().contains("action") && !name.to_lowercase().contains("shape")
+}
+
+/// Whether an output was refused as it draws random numbers.
+fn is_drawn(error: &anyhow::Error) -> bool {
+    error.root_cause().to_string() == RANDOM
 }
 
 /// Refuses several observations at once: their actions would be taken for a chunk.

@@ -6,10 +6,11 @@ use anyhow::{Context as _, Result, bail, ensure};
 
 use super::arithmetic::two;
 use super::call::Call;
-use super::elements::value;
-use super::expr::{Exprs, Id, Matrix};
-use super::places::transpose;
-use super::tensor::{Data, Element, Tensor};
+use super::elements::open_vector;
+use super::expr::{Exprs, Matrix};
+use super::moves::expanded;
+use super::places::{broadcast, transpose};
+use super::tensor::{Data, Element, Tensor, count};
 
 /// The output, where the node is such an operation.
 pub(super) fn run(call: &Call<'_>, exprs: &mut Exprs, budget: &mut usize) -> Result<Option<Tensor>> {
@@ -79,7 +80,9 @@ pub(super) fn product(exprs: &mut Exprs, a: &Tensor, b: &Tensor, factor: f64, bu
     }
     // Leading axes of length 1 say nothing.
     let ones = b.shape.len().saturating_sub(2);
-    ensure!(b.shape[..ones].iter().all(|&n| n == 1), "multiplies with several matrices at once, {:?}", b.shape);
+    if b.shape[..ones].iter().any(|&n| n != 1) {
+        return products(exprs, a, b, factor, budget);
+    }
     let vector = b.shape.len() == 1;
     let mut shape = b.shape[ones..].to_vec();
     shape.resize(2, 1);
@@ -110,6 +113,28 @@ pub(super) fn product(exprs: &mut Exprs, a: &Tensor, b: &Tensor, factor: f64, bu
     }
     let missing = b.shape.len().saturating_sub(out.len().max(2));
     Ok(Tensor::of_elements([vec![1; missing], out].concat(), all))
+}
+
+/// As [`product`], with several matrices, as those of an ensemble: each has its own rows of `a`.
+fn products(exprs: &mut Exprs, a: &Tensor, b: &Tensor, factor: f64, budget: &mut usize) -> Result<Tensor> {
+    let (&[ref of_a @ .., m, n], &[ref of_b @ .., k, cols]) = (&a.shape[..], &b.shape[..]) else {
+        bail!("multiplies {:?} with {:?}; several matrices are taken with several rows", a.shape, b.shape)
+    };
+    let of_both = broadcast(of_a, of_b)?;
+    let of_each = |x: &Tensor, shape: [usize; 2]| {
+        expanded(x, &[&of_both[..], &shape].concat(), *budget).map(|all| (all, shape[0] * shape[1]))
+    };
+    let ((rows, of_rows), (matrices, of_matrix)) = (of_each(a, [m, n])?, of_each(b, [k, cols])?);
+    let mut all = Vec::new();
+    for i in 0..count(&of_both)? {
+        let part = |x: &Tensor, len: usize, shape: [usize; 2]| {
+            x.taken(shape.to_vec(), &(i * len..(i + 1) * len).collect::<Vec<_>>())
+        };
+        let name = b.name.as_ref().map(|name| format!("{name}.{i}"));
+        let matrix = Tensor { name, ..part(&matrices, of_matrix, [k, cols])? };
+        all.extend(product(exprs, &part(&rows, of_rows, [m, n])?, &matrix, factor, budget)?.elements());
+    }
+    Ok(Tensor::of_elements([of_both, vec![m, cols]].concat(), all))
 }
 
 /// The product of a vector; what is known of it goes into the bias, without its columns. The matrix that is left counts as values
@@ -145,12 +170,4 @@ pub(super) fn row_product(
     let x = open_vector(exprs, &x)?;
     let y = exprs.linear(x, w, bias);
     Ok(exprs.elements(y))
-}
-
-/// The vector of elements none of which is known.
-pub(super) fn open_vector(exprs: &mut Exprs, elements: &[Element]) -> Result<Id> {
-    let values: Option<Vec<(Id, usize)>> = elements.iter().map(value).collect();
-    Ok(exprs.vector(&values.context(
-        "mixes constants and values of the network in one vector; join them behind it, or observe the constants",
-    )?))
 }

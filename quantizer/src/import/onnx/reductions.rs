@@ -4,13 +4,16 @@ use anyhow::{Context as _, Result, ensure};
 
 use super::arithmetic::two;
 use super::call::Call;
+use super::elements::open_vector;
 use super::evaluation::computed;
 use super::expr::{Expr, Exprs, Id, Unary};
 use super::known::{Reduced, reduced};
 use super::places::{axis, transpose};
-use super::products::open_vector;
 use super::tensor::{Data, Element, Tensor, count};
 use crate::import::numbers::positive;
+
+/// The most values of which the largest is taken: each takes operations of its own.
+const MOST_COMPARED: usize = 64;
 
 /// The output, where the node is such an operation.
 pub(super) fn run(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> {
@@ -30,7 +33,16 @@ pub(super) fn run(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> 
         }
         "BatchNormalization" => batch_norm(call, exprs, epsilon).map(Some),
         "InstanceNormalization" | "GroupNormalization" => group_norm(call, exprs, epsilon).map(Some),
-        "ReduceSum" | "ReduceMean" | "ReduceL2" | "ReduceSumSquare" => reduce(call, exprs).map(Some),
+        "ReduceSum" | "ReduceMean" | "ReduceMax" | "ReduceMin" | "ReduceL1" | "ReduceL2" | "ReduceSumSquare" => {
+            reduce(call.op(), call.input(0)?, reduced(call)?, exprs).map(Some)
+        }
+        "GlobalAveragePool" | "GlobalMaxPool" => {
+            let x = call.input(0)?;
+            let positions = x.shape.len().saturating_sub(2);
+            let shape = x.shape.iter().take(2).copied().chain(std::iter::repeat_n(1, positions)).collect();
+            let op = if call.op() == "GlobalMaxPool" { "ReduceMax" } else { "ReduceMean" };
+            reduce(op, x, Reduced { axes: (2..x.shape.len()).collect(), shape }, exprs).map(Some)
+        }
         "LpNormalization" => {
             ensure!(call.int("p").unwrap_or(2) == 2, "only the norm with p = 2 is taken");
             let x = call.input(0)?;
@@ -136,16 +148,18 @@ fn group_norm(call: &Call<'_>, exprs: &mut Exprs, eps: f64) -> Result<Tensor> {
     two("Add", exprs, &scaled, &constant(2, "the bias")?, x.len())
 }
 
-fn reduce(call: &Call<'_>, exprs: &mut Exprs) -> Result<Tensor> {
-    let x = call.input(0)?;
-    let Reduced { axes, shape } = reduced(call)?;
+fn reduce(op: &str, x: &Tensor, Reduced { axes, shape }: Reduced, exprs: &mut Exprs) -> Result<Tensor> {
     let order: Vec<usize> = (0..x.shape.len()).filter(|i| !axes.contains(i)).chain(axes.iter().copied()).collect();
     let (turned, places) = transpose(&x.shape, &order)?;
     let outputs = count(&shape)?;
     ensure!(outputs > 0 && x.len() > 0, "goes over no values");
     let each = x.len() / outputs;
     let mut all = Vec::with_capacity(outputs);
-    let one = |exprs: &mut Exprs, row: Id| match call.op() {
+    let one = |exprs: &mut Exprs, row: Id| match op {
+        "ReduceL1" => {
+            let sizes = exprs.unary(Unary::Abs, row);
+            exprs.sum(sizes)
+        }
         "ReduceL2" => root_of_squares(exprs, row),
         "ReduceSumSquare" => {
             let squares = exprs.mul(row, row);
@@ -158,8 +172,13 @@ fn reduce(call: &Call<'_>, exprs: &mut Exprs) -> Result<Tensor> {
         _ => exprs.sum(row),
     };
     let elements = x.taken(turned, &places)?.elements();
-    if matches!(call.op(), "ReduceSum" | "ReduceMean") && elements.chunks(each).all(of_different_values) {
-        return slices_summed(call, exprs, &elements, each, shape);
+    let largest = matches!(op, "ReduceMax" | "ReduceMin");
+    if largest || matches!(op, "ReduceSum" | "ReduceMean") && elements.chunks(each).all(of_different_values) {
+        ensure!(
+            !largest || each <= MOST_COMPARED,
+            "takes the largest or least of {each} values; up to {MOST_COMPARED} are taken; export the part behind it"
+        );
+        return slices_joined(op, exprs, &elements, each, shape);
     }
     for row in elements.chunks(each) {
         all.extend(of_row(exprs, row, &one)?);
@@ -176,22 +195,20 @@ fn of_different_values(row: &[Element]) -> bool {
     values.len() == row.len() && row.len() > 1
 }
 
-/// The sum or mean over runs of `each` elements, as sums of whole vectors.
-fn slices_summed(
-    call: &Call<'_>,
-    exprs: &mut Exprs,
-    elements: &[Element],
-    each: usize,
-    shape: Vec<usize>,
-) -> Result<Tensor> {
+/// The sum, mean, largest or least over runs of `each` elements, of whole vectors.
+fn slices_joined(op: &str, exprs: &mut Exprs, elements: &[Element], each: usize, shape: Vec<usize>) -> Result<Tensor> {
     let slice = |k: usize| elements[k..].iter().step_by(each).copied().collect::<Vec<Element>>();
-    let mut sum = open_vector(exprs, &slice(0))?;
+    let mut all = open_vector(exprs, &slice(0))?;
     for k in 1..each {
         let next = open_vector(exprs, &slice(k))?;
-        sum = exprs.add(sum, next);
+        all = match op {
+            "ReduceMax" => exprs.max(all, next),
+            "ReduceMin" => exprs.min(all, next),
+            _ => exprs.add(all, next),
+        };
     }
-    if call.op() == "ReduceMean" {
-        sum = exprs.scaled(sum, 1.0 / each as f64, 0.0);
+    if op == "ReduceMean" {
+        all = exprs.scaled(all, 1.0 / each as f64, 0.0);
     }
-    Ok(Tensor::of_elements(shape, exprs.elements(sum)))
+    Ok(Tensor::of_elements(shape, exprs.elements(all)))
 }

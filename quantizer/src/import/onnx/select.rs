@@ -43,10 +43,22 @@ impl Exprs {
         })
     }
 
-    /// `where(condition, x, 0)`, or with x and 0 the other way round, for a condition by the sign of x.
-    pub(super) fn select_zero(&mut self, condition: Id, x: Id, where_true: bool) -> Option<Id> {
-        let &Expr::Unary(Unary::Above(0.0), of) = self.get(condition) else { return None };
-        let above = self.ratio(of, x)? > 0.0;
-        Some(if above == where_true { self.function(Function::Relu, x) } else { self.at_most(x, 0.0) })
+    /// `where(condition, x, limit)`, or with x and the limit the other way round, for a condition by which side of the limit x is on.
+    pub(super) fn select_constant(&mut self, condition: Id, x: Id, limit: f64, where_true: bool) -> Option<Id> {
+        let &Expr::Unary(Unary::Above(bound), of) = self.get(condition) else { return None };
+        // What is compared may have a limit already, on the other side or farther away.
+        let compared = self.ratio(of, x).or_else(|| {
+            let (inner, low, high) = self.limited(x)?;
+            (low..=high).contains(&limit).then(|| self.ratio(of, inner))?
+        })?;
+        if !near(bound / compared, limit) {
+            return None;
+        }
+        let above = compared > 0.0;
+        Some(if above == where_true {
+            self.clip(x, limit, f64::INFINITY)
+        } else {
+            self.clip(x, f64::NEG_INFINITY, limit)
+        })
     }
 }
