@@ -66,8 +66,8 @@ impl Controller {
 
     /// Resets the board, as its pin does (QEMU's `system_reset`). Memory keeps what it has.
     pub fn reset(&self) -> Result<()> {
-        let mut monitor =
-            Address::Unix(monitor(&self.folder).display().to_string()).open().context("QEMU's monitor")?;
+        let address = Address::Unix(monitor(&self.folder).display().to_string());
+        let mut monitor = listening(|| address.open().context("QEMU's monitor"))?;
         for command in ["qmp_capabilities", "system_reset"] {
             writeln!(monitor, "{{\"execute\": \"{command}\"}}")?;
             answered(&mut *monitor).with_context(|| format!("QEMU's {command}"))?;
@@ -77,7 +77,18 @@ impl Controller {
 
     /// A host at the serial port.
     pub fn client(&self) -> Result<Client> {
-        Ok(Client::new(Connection::open(self.address(), PATIENCE)?, PATIENCE))
+        Ok(Client::new(listening(|| Connection::open(self.address(), PATIENCE))?, PATIENCE))
+    }
+}
+
+/// What `open` opens. A socket stands in its folder a moment before QEMU listens at it.
+pub(crate) fn listening<T>(open: impl Fn() -> Result<T>) -> Result<T> {
+    let begun = Instant::now();
+    loop {
+        match open() {
+            Err(_) if begun.elapsed() < PATIENCE => std::thread::sleep(Duration::from_millis(5)),
+            opened => return opened,
+        }
     }
 }
 
