@@ -28,10 +28,11 @@ impl Widening {
     pub const WIDE: Self = Self { noise: 0.8, power: 1, mix: 0.0 };
 
     /// What can be chosen from. The first of a feed-forward policy has lower errors than [`Self::WIDE`] on its path and hardly higher
-    /// ones off it; a recurrent policy that balances needs as many windows far from the path as near it
-    /// (docs/records/2026-11-22-choice.md).
+    /// ones off it; a recurrent policy that balances needs as many windows far from the path as near it, and farther ones
+    /// (docs/records/2026-11-22-choice.md and 2026-11-23-loss.md).
     pub fn choices(recurrent: bool) -> [Self; 3] {
-        let wide = if recurrent { Self::WIDE } else { Self { noise: 0.8, power: 3, mix: 0.5 } };
+        let wide =
+            if recurrent { Self { noise: 1.2, power: 1, mix: 0.0 } } else { Self { noise: 0.8, power: 3, mix: 0.5 } };
         [wide, Self { noise: 0.1, power: 1, mix: 0.5 }, Self { noise: 0.1, power: 1, mix: 1.0 }]
     }
 }

@@ -9,6 +9,7 @@ pub mod dimension;
 pub mod distill;
 pub mod feedback;
 mod latent;
+mod objective;
 pub mod schedule;
 
 use std::time::Duration;

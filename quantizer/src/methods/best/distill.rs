@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use super::adam::{Adam, Stride};
 use super::latent::Latent;
+use super::objective::Objective;
 use super::schedule::{Bounds, Schedule, most_steps};
 use crate::calibrate::widening::Widening;
 use crate::calibrate::windows::{Batch, Windows};
@@ -90,6 +91,9 @@ pub fn distill(task: &Task<'_>, windows: &Windows<'_>, mut progress: impl FnMut(
         // A frame of an iterative head is one of every denoising step.
         false => ((FRAMES / task.graph.denoising_steps().isqrt()).max(4 * FRAME_SHARDS), FRAME_SHARDS, OF_FRAMES),
     };
+    // Of a recurrent policy the weight would depend on where a window happens to stand: it keeps fewer episodes so (docs/records).
+    let variance = &windows.output_variance;
+    let objective = if windows.recurrent() { Objective::even(variance) } else { Objective::relative(variance) };
     let mut schedule = Schedule::new(task.bounds, most_steps(task.graph.weights(), windows.recurrent()));
     while let Some(rate) = schedule.rate() {
         for (latent, weights) in latents.iter().zip(&mut weights.matrices) {
@@ -100,7 +104,7 @@ pub fn distill(task: &Task<'_>, windows: &Windows<'_>, mut progress: impl FnMut(
             .into_par_iter()
             .map(|seed| {
                 let batch = windows.batch(size / shards, Some(task.widening), &mut Random::new(seed));
-                gradient(&network, &weights, windows, batch)
+                gradient(&network, &weights, windows, &objective, batch)
             })
             .collect();
         let loss = of_shards.iter().map(|(loss, _)| loss / shards as f32).sum();
@@ -131,10 +135,18 @@ fn values(matrix: &mut Array2<f32>) -> &mut [f32] {
 }
 
 /// The loss on a batch, and its derivative by the (rounded) weights.
-fn gradient(network: &Network<'_>, weights: &Weights, windows: &Windows<'_>, batch: Batch) -> (f32, Weights) {
+fn gradient(
+    network: &Network<'_>,
+    weights: &Weights,
+    windows: &Windows<'_>,
+    objective: &Objective,
+    batch: Batch,
+) -> (f32, Weights) {
     let zeros = |state: &NodeState| state.each_ref().map(|array| Array2::zeros(array.raw_dim()));
     let mut d_state: State = batch.state.iter().map(zeros).collect();
-    let (pass, error, loss) = run(network, weights, windows, batch);
+    let target = windows.teach(&batch);
+    let pass = forward(network, weights, batch);
+    let (error, loss) = objective.measure(pass.output(), &target);
     let mut grads = weights.zeros_like();
     network.backward(weights, &pass, error, &mut d_state, &mut grads, &mut |_, _, _| {});
     (loss, grads)
@@ -142,27 +154,13 @@ fn gradient(network: &Network<'_>, weights: &Weights, windows: &Windows<'_>, bat
 
 /// The mean over samples and outputs of squared error over variance, against the f32 network.
 pub fn loss(network: &Network<'_>, weights: &Weights, windows: &Windows<'_>, batch: Batch) -> f32 {
-    run(network, weights, windows, batch).2
+    let target = windows.teach(&batch);
+    Objective::even(&windows.output_variance).measure(forward(network, weights, batch).output(), &target).1
 }
 
-/// The forward pass of a batch, the loss's derivative by its output, and the loss.
-fn run(network: &Network<'_>, weights: &Weights, windows: &Windows<'_>, batch: Batch) -> (Pass, Array2<f32>, f32) {
-    let target = windows.teach(&batch);
+fn forward(network: &Network<'_>, weights: &Weights, batch: Batch) -> Pass {
     let mut state = batch.state;
-    let pass = network.forward(weights, batch.frames, &mut state);
-    let varying = windows.output_variance.iter().filter(|v| **v > 0.0).count().max(1);
-    let count = target.nrows() * varying;
-    let weight = |variance: &f32| if *variance > 0.0 { 1.0 / (variance * count as f32) } else { 0.0 };
-    let of_outputs: Vec<f32> = windows.output_variance.iter().map(weight).collect();
-    let mut loss = 0.0;
-    let mut error = pass.output() - &target;
-    for mut row in error.rows_mut() {
-        for (d, weight) in row.iter_mut().zip(&of_outputs) {
-            loss += *d * *d * weight;
-            *d *= 2.0 * weight;
-        }
-    }
-    (pass, error, loss)
+    network.forward(weights, batch.frames, &mut state)
 }
 
 fn clip(grads: &mut Weights) {
