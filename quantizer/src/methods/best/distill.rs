@@ -91,9 +91,10 @@ pub fn distill(task: &Task<'_>, windows: &Windows<'_>, mut progress: impl FnMut(
         // A frame of an iterative head is one of every denoising step.
         false => ((FRAMES / task.graph.denoising_steps().isqrt()).max(4 * FRAME_SHARDS), FRAME_SHARDS, OF_FRAMES),
     };
-    // Of a recurrent policy the weight would depend on where a window happens to stand: it keeps fewer episodes so (docs/records).
-    let variance = &windows.output_variance;
-    let objective = if windows.recurrent() { Objective::even(variance) } else { Objective::relative(variance) };
+    // A recurrent policy that balances keeps fewer episodes with errors relative to its actions (docs/records/2026-11-23-loss.md); an
+    // iterative head was not tried.
+    let even = windows.recurrent() || task.graph.denoising_steps() > 1;
+    let objective = if even { Objective::even } else { Objective::relative }(&windows.output_variance);
     let mut schedule = Schedule::new(task.bounds, most_steps(task.graph.weights(), windows.recurrent()));
     while let Some(rate) = schedule.rate() {
         for (latent, weights) in latents.iter().zip(&mut weights.matrices) {
@@ -139,7 +140,7 @@ fn gradient(
     network: &Network<'_>,
     weights: &Weights,
     windows: &Windows<'_>,
-    objective: &Objective,
+    objective: &Objective<'_>,
     batch: Batch,
 ) -> (f32, Weights) {
     let zeros = |state: &NodeState| state.each_ref().map(|array| Array2::zeros(array.raw_dim()));

@@ -9,37 +9,34 @@ const FLOOR: f32 = 0.1;
 
 /// The loss of a batch and its derivative.
 #[derive(Debug)]
-pub(super) struct Objective {
-    /// One over each output's variance; 0 where it does not vary.
-    of_outputs: Vec<f32>,
-    /// Outputs that vary.
-    varying: f32,
+pub(super) struct Objective<'a> {
+    variance: &'a [f32],
     /// Whether frames are weighed by the size of their action.
     relative: bool,
 }
 
-impl Objective {
+impl<'a> Objective<'a> {
     /// Every frame counts alike: the mean over samples and outputs of squared error over variance.
-    pub(super) fn even(variance: &[f32]) -> Self {
-        let of_outputs = variance.iter().map(|v| if *v > 0.0 { 1.0 / v } else { 0.0 }).collect();
-        let varying = variance.iter().filter(|v| **v > 0.0).count().max(1) as f32;
-        Self { of_outputs, varying, relative: false }
+    pub(super) fn even(variance: &'a [f32]) -> Self {
+        Self { variance, relative: false }
     }
 
     /// Frames count the more, the smaller their action is, with 1 in the mean over a batch.
-    pub(super) fn relative(variance: &[f32]) -> Self {
-        Self { relative: true, ..Self::even(variance) }
+    pub(super) fn relative(variance: &'a [f32]) -> Self {
+        Self { variance, relative: true }
     }
 
-    /// The derivative by the outputs, `[frame, element]`, and the loss, for what the f32 network gives.
+    /// The derivative by the outputs, `[frame, element]`, and the loss, for what the f32 network gives. Outputs that do not vary count
+    /// for nothing.
     pub(super) fn measure(&self, outputs: &Array2<f32>, target: &Array2<f32>) -> (Array2<f32>, f32) {
-        let of_frames = self.of_frames(target);
-        let each = of_frames.iter().sum::<f32>() * self.varying;
+        let count = (target.nrows() * self.varying()) as f32;
+        let weight = |variance: &f32| if *variance > 0.0 { 1.0 / (variance * count) } else { 0.0 };
+        let of_outputs: Vec<f32> = self.variance.iter().map(weight).collect();
         let mut loss = 0.0;
         let mut error = outputs - target;
-        for (mut row, of_frame) in error.rows_mut().into_iter().zip(of_frames) {
-            for (d, of_output) in row.iter_mut().zip(&self.of_outputs) {
-                let weight = of_frame * of_output / each;
+        for (mut row, of_frame) in error.rows_mut().into_iter().zip(self.of_frames(target)) {
+            for (d, of_output) in row.iter_mut().zip(&of_outputs) {
+                let weight = of_frame * of_output;
                 loss += *d * *d * weight;
                 *d *= 2.0 * weight;
             }
@@ -47,12 +44,24 @@ impl Objective {
         (error, loss)
     }
 
+    /// The weights of frames, 1 in the mean.
     fn of_frames(&self, target: &Array2<f32>) -> Vec<f32> {
+        if !self.relative {
+            return vec![1.0; target.nrows()];
+        }
         let weight = |row: ArrayView1<'_, f32>| {
-            let squares = row.iter().zip(&self.of_outputs).map(|(a, of_output)| a * a * of_output);
-            if self.relative { 1.0 / (squares.sum::<f32>() / self.varying + FLOOR) } else { 1.0 }
+            let varying = row.iter().zip(self.variance).filter(|(_, variance)| **variance > 0.0);
+            let size = varying.map(|(a, variance)| a * a / variance).sum::<f32>() / self.varying() as f32;
+            1.0 / (size + FLOOR)
         };
-        target.rows().into_iter().map(weight).collect()
+        let mut weights: Vec<f32> = target.rows().into_iter().map(weight).collect();
+        let mean = weights.iter().sum::<f32>() / weights.len().max(1) as f32;
+        weights.iter_mut().for_each(|weight| *weight /= mean);
+        weights
+    }
+
+    fn varying(&self) -> usize {
+        self.variance.iter().filter(|variance| **variance > 0.0).count().max(1)
     }
 }
 
