@@ -13,6 +13,7 @@ mod denoising;
 mod digests;
 mod drive;
 mod faults;
+mod firmware;
 mod flow;
 mod format;
 mod functions;
