@@ -18,6 +18,7 @@ mod flow;
 mod format;
 mod functions;
 mod heads;
+mod link;
 mod logs;
 mod malformed;
 mod memory;
