@@ -12,17 +12,12 @@ use actq::emit::files;
 use actq::methods::{Activations, Method, Options};
 use actq::pipeline::quantize;
 use actq::policy::Policy;
-use actq_boards::{Target, root};
+use actq_boards::{Target, root, target_dir};
 use actq_kernels::Width;
 use anyhow::{Context, Result, anyhow, ensure};
 use object::{Object as _, ObjectSection as _, ObjectSymbol as _};
 
 use crate::ur3;
-
-/// The folder that cargo builds into.
-pub fn target_dir() -> PathBuf {
-    std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), |dir| root().join(dir))
-}
 
 pub(crate) fn cargo_build(what: &str, arguments: &[&str], environment: &[(&str, &str)]) -> Result<()> {
     let output = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
@@ -173,14 +168,14 @@ fn build(
     Ok(own)
 }
 
-/// The image that [`harness`] carries: the UR3 policy at 3 bits, rounded.
+/// The image that [`harness`] carries: the UR3 policy at 3 bits, rounded. `cargo xtask firmware` makes the same file.
 pub fn built_in() -> Result<&'static Path> {
     static FILE: LazyLock<Result<PathBuf, String>> = LazyLock::new(|| write_built_in().map_err(|e| format!("{e:#}")));
     FILE.as_deref().map_err(|error| anyhow!("the image to build in: {error}"))
 }
 
 fn write_built_in() -> Result<PathBuf> {
-    let path = target_dir().join("built-in.actq");
+    let path = target_dir().join("firmware-example.actq");
     let policy = Policy::load(&ur3())?;
     let options =
         Options { group: 32, activations: Activations::Int8, ..Options::new(Method::Rtn, Budget::Width(Width::W3)) };

@@ -22,7 +22,7 @@ pub mod uart;
 
 use std::path::PathBuf;
 
-pub use actq_boards::{Target, root};
+pub use actq_boards::{Target, root, target_dir};
 pub use shared::{shared_policies, skipped};
 
 /// The project's own policy.

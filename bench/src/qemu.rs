@@ -5,11 +5,11 @@ use std::io::{Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Output, Stdio};
 
-use actq_boards::{Target, version};
+use actq_boards::{Target, target_dir, version};
 use actq_link::{RESET, STEP};
 use anyhow::{Context, Result, bail, ensure};
 
-use crate::firmware::{cargo_build, symbol, target_dir};
+use crate::firmware::{cargo_build, symbol};
 
 /// QEMU with `elf`, an image in the slot if one is given, and arguments for the firmware.
 pub fn command(elf: &Path, slot: Option<&Path>, arguments: &str) -> Result<Command> {

@@ -51,4 +51,4 @@ pub use mps2_an505::device;
 #[cfg(all(target_os = "none", feature = "stm32f405"))]
 pub use stm32f405::device;
 #[cfg(not(target_os = "none"))]
-pub use table::{Application, Board, Clock, Target, Transport, root, version};
+pub use table::{Application, Board, Clock, Target, Transport, root, target_dir, version};

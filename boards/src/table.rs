@@ -5,7 +5,7 @@
 //! measurements run where.
 
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::{microbit, mps2_an385, mps2_an386, mps2_an500, mps2_an505, stm32f405, virt};
@@ -170,6 +170,11 @@ impl Target {
 /// The workspace's root.
 pub fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."))
+}
+
+/// The folder that cargo builds into.
+pub fn target_dir() -> PathBuf {
+    std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), |dir| root().join(dir))
 }
 
 /// First line of the version text of a program: an emulator, the compiler.

@@ -83,7 +83,7 @@ impl Client {
             }
             wait = wait.mul_f64(1.5).min(SLOWEST);
         }
-        bail!("no answer for {:.1?}: is it a controller with this link, and at this speed?", self.patience)
+        bail!("no answer for {:.1?}: {}", self.patience, self.connection.silence())
     }
 
     /// Sends a request until it is acknowledged: bytes of the update that were taken, and why it was not done.

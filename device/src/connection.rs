@@ -41,6 +41,8 @@ pub struct Connection {
     gone: Option<(Instant, io::Error)>,
     tried: Instant,
     heard: Instant,
+    /// Whether anything has come.
+    has_read: bool,
     /// Times that the port was opened again.
     reopened: u32,
 }
@@ -76,6 +78,7 @@ impl Connection {
             gone: None,
             tried: now,
             heard: now,
+            has_read: false,
             reopened: 0,
         })
     }
@@ -124,6 +127,7 @@ impl Connection {
         match port.read(&mut bytes) {
             Ok(0) => self.lose(ErrorKind::UnexpectedEof.into()),
             Ok(count) => {
+                self.has_read = true;
                 for byte in bytes.iter().take(count) {
                     let Some(received) = self.receiver.push(*byte) else { continue };
                     self.heard = Instant::now();
@@ -169,6 +173,17 @@ impl Connection {
     /// Times that the port was opened again.
     pub const fn reopened(&self) -> u32 {
         self.reopened
+    }
+
+    /// Why nothing is answered, as far as it can be seen here.
+    pub(crate) const fn silence(&self) -> &'static str {
+        match (self.has_read, self.counters().good) {
+            (false, _) => "nothing came; is it a controller that runs, and has no other program the port?",
+            (true, 0) => "what came is not this link's; is it a controller, and at this speed?",
+            (true, _) => {
+                "other frames came; are its firmware and this program of one version, and does the line carry both ways?"
+            }
+        }
     }
 
     /// What this end's receiver has seen.

@@ -72,7 +72,14 @@ impl Address {
     /// Where it is not there or may not be opened.
     pub fn open(&self) -> io::Result<Box<dyn Port>> {
         match self {
-            Self::Serial(name, baud) => Ok(Box::new(serialport::new(name, *baud).timeout(WAIT).open()?)),
+            Self::Serial(name, baud) => {
+                let port = serialport::new(name, *baud).timeout(WAIT).open();
+                let told = |error| {
+                    let error = io::Error::from(error);
+                    io::Error::new(error.kind(), format!("{error}; `actq link ports` lists the ports"))
+                };
+                Ok(Box::new(port.map_err(told)?))
+            }
             Self::Tcp(address) => {
                 let stream = TcpStream::connect(address)?;
                 stream.set_nodelay(true)?;

@@ -1,9 +1,13 @@
 //! What an image has to be for this controller, and what its contract says of the axes.
 
+use actq_boards::seams::Watchdog;
 use actq_controller::{Axis, SafeAction};
 use actq_kernels::image::header::W_SIZES;
 use actq_kernels::{Head, Image};
 use actq_link::code::Refusal;
+
+use crate::patience::LONGEST;
+use crate::running::SLICE;
 
 /// Values of an observation and of an action, by an image's header: an array's length, so that it is known when the firmware is
 /// compiled. One each where the bytes are no image.
@@ -15,18 +19,28 @@ pub const fn lengths(image: &[u8]) -> [usize; 2] {
     [u16::from_le_bytes([*a, *b]) as usize, u16::from_le_bytes([*c, *d]) as usize]
 }
 
-/// The head of an image that was checked, has these lengths, and whose self-test comes out bit for bit.
+/// The head of an image that was checked, has these lengths, and whose self-test comes out bit for bit. The watchdog is fed before the
+/// check, which is as long as the image, and before each slice of the self-test, of which no image makes a longer one than [`LONGEST`].
 ///
 /// # Errors
 ///
 /// Why it may not run.
-pub fn open<'i, 's>(bytes: &'i [u8], scratch: &'s mut [u32], lengths: [usize; 2]) -> Result<Head<'i, 's>, Refusal> {
+pub fn open<'i, 's>(
+    bytes: &'i [u8],
+    scratch: &'s mut [u32],
+    lengths: [usize; 2],
+    watchdog: &mut impl Watchdog,
+) -> Result<Head<'i, 's>, Refusal> {
+    watchdog.feed();
     let image = Image::new_checked(bytes).map_err(|_| Refusal::Unfit)?;
     if [image.obs_len(), image.act_len()] != lengths {
         return Err(Refusal::Unfit);
     }
     let mut head = Head::new(image, scratch).map_err(|_| Refusal::Unfit)?;
-    head.self_test().map_err(|_| Refusal::SelfTest)?;
+    if head.least_budget() > LONGEST {
+        return Err(Refusal::Unfit);
+    }
+    head.self_test_in_pieces(SLICE, || watchdog.feed()).map_err(|_| Refusal::SelfTest)?;
     Ok(head)
 }
 
@@ -50,6 +64,16 @@ pub fn axes<const AXES: usize>(image: Option<&Image<'_>>, ticks: f32) -> [Axis; 
 mod tests {
     use super::*;
 
+    struct NoWatchdog;
+
+    impl Watchdog for NoWatchdog {
+        fn start(&mut self, _: u16) -> bool {
+            true
+        }
+
+        fn feed(&mut self) {}
+    }
+
     #[test]
     fn bytes_that_are_no_image_have_the_least_lengths() {
         assert_eq!(lengths(b""), [1; 2]);
@@ -63,6 +87,6 @@ mod tests {
     #[test]
     fn without_an_image_nothing_may_move() {
         assert_eq!(axes::<3>(None, 100.0), [Axis::STILL; 3]);
-        assert_eq!(open(&[0; 8], &mut [], [1; 2]).err(), Some(Refusal::Unfit));
+        assert_eq!(open(&[0; 8], &mut [], [1; 2], &mut NoWatchdog).err(), Some(Refusal::Unfit));
     }
 }

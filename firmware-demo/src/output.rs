@@ -47,8 +47,8 @@ impl<S: Stage> Bridges<S> {
         let mut told = true;
         for (phase, duty) in self.stage.phases().iter_mut().zip(duties) {
             // One that is NaN becomes 0; one above 1 is cut.
-            let duty = (duty * f32::from(phase.max_duty_cycle())) as u16;
-            told &= phase.set_duty_cycle(duty.min(phase.max_duty_cycle())).is_ok();
+            let most = phase.max_duty_cycle();
+            told &= phase.set_duty_cycle(((duty * f32::from(most)) as u16).min(most)).is_ok();
         }
         // It is switched on once: what a break has switched off stays off until the controller was disarmed.
         let on = if self.on { self.stage.is_on() } else { self.stage.enable() };
@@ -69,12 +69,62 @@ pub(crate) fn share(value: f32, axis: &Axis) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    extern crate std;
+
+    use std::io::ErrorKind;
+
     use actq_boards::no_stage::NoStage;
     use actq_controller::SafeAction;
+    use embedded_hal_mock::eh1::MockError;
+    use embedded_hal_mock::eh1::pwm::{Mock as Phase, Transaction};
 
     use super::*;
 
     type Mock = NoStage<1000>;
+
+    /// A power stage that is always on, of phases that know what they will be told.
+    struct Told([Phase; 3]);
+
+    impl Stage for Told {
+        type Phase = Phase;
+
+        fn phases(&mut self) -> &mut [Phase; 3] {
+            &mut self.0
+        }
+
+        fn enable(&mut self) -> bool {
+            true
+        }
+
+        fn is_on(&mut self) -> bool {
+            true
+        }
+
+        fn disable(&mut self) {}
+
+        fn currents(&mut self) -> Option<[u16; 2]> {
+            None
+        }
+    }
+
+    /// The others get theirs all the same: what follows is the machine's decision.
+    #[test]
+    fn a_phase_that_does_not_take_its_duty_cycle_is_a_fault() {
+        let axis = Axis::new(0.0, 1.0, 1.0, 0.0, SafeAction::Brake).expect("it fits");
+        for failing in [None, Some(0), Some(1), Some(2)] {
+            let mut phase = 0;
+            let phases = [100, 200, 300].map(|duty| {
+                let told = Transaction::set_duty_cycle(duty);
+                let refused = MockError::Io(ErrorKind::NotConnected);
+                let told = if failing == Some(phase) { told.with_error(refused) } else { told };
+                phase += 1;
+                Phase::new(&[Transaction::max_duty_cycle(400), told])
+            });
+            let mut bridges = Bridges::new(Told(phases));
+            assert_eq!(bridges.tell(&[0.25, 0.5, 0.75].map(Output::Drive), &[axis; 3]), failing.is_none());
+            bridges.stage.0.iter_mut().for_each(Phase::done);
+        }
+    }
 
     #[test]
     fn a_duty_cycle_is_the_place_between_the_limits() {

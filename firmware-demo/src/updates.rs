@@ -1,5 +1,6 @@
 //! Image updates, on a board that has a place for them.
 
+use actq_boards::seams::Watchdog;
 use actq_controller::slots::{Authority, Candidate, Layout, Slot, Slots, Updater, Work};
 use actq_controller::update::{NoUpdate, Plan, Update};
 use actq_link::code::Refusal;
@@ -10,21 +11,20 @@ pub struct Updates<F, A: Authority>(Option<Updater<F, A>>);
 
 impl<F: NorFlash, A: Authority> Updates<F, A> {
     /// For the two halves of `flash`, and the image of them that is `authority`'s, passes `test` and so runs. Without room for two slots,
-    /// and without an authority, there are none. `progress` is told before each piece of it, as by [`Slots::select`], and before each test.
-    pub fn new(
+    /// and without an authority, there are none. The watchdog is fed before each piece of it ([`Slots::select`]), and given to the test.
+    pub fn new<W: Watchdog>(
         flash: F,
         authority: Option<A>,
-        mut test: impl FnMut(&Candidate) -> bool,
-        mut progress: impl FnMut(),
+        watchdog: &mut W,
+        mut test: impl FnMut(&Candidate, &mut W) -> bool,
     ) -> (Self, Option<Candidate>) {
         let Some(authority) = authority else { return (Self(None), None) };
         let middle = (flash.capacity() / 2) as u32;
         let Ok(layout) = Layout::new(&flash, 0..middle, middle..2 * middle) else { return (Self(None), None) };
         let mut slots = Slots::new(flash, layout, authority);
         let running = loop {
-            let Some(candidate) = slots.select(&mut progress) else { break None };
-            progress();
-            if test(&candidate) && slots.confirm(candidate.slot) {
+            let Some(candidate) = slots.select(|| watchdog.feed()) else { break None };
+            if test(&candidate, watchdog) && slots.confirm(candidate.slot) {
                 break Some(candidate);
             }
             slots.reject(candidate.slot);

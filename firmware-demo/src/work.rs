@@ -208,7 +208,7 @@ mod tests {
         let (_, port) = Box::leak(Box::new(Buffers::new())).split(NoUart, || ());
         let (port, mut watchdog) = (Box::leak(Box::new(port)), Fed::default());
         let flash = Ram::<4, 512>::new(Box::leak(Box::new([0; 2048])));
-        let (updates, _) = Updates::new(Ram::<4, 512>(flash.0), Some(Anyone), |_| false, || ());
+        let (updates, _) = Updates::new(Ram::<4, 512>(flash.0), Some(Anyone), &mut Fed::default(), |_, _| false);
         let breadcrumb = Record::report(ResetCause::Power, None);
         let facts = Facts { image: 0, slot: BUILT_IN, timing: Default::default(), breadcrumb };
         let settings = Settings { status_period: 0, flash_while_armed: false };

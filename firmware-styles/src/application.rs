@@ -1,11 +1,12 @@
 //! The parts that are any firmware's own.
 
 use core::fmt::Write as _;
+use core::future::poll_fn;
+use core::task::Poll;
 
 // The board's vector table.
 use actq_boards as _;
 use actq_firmware_support::host;
-use actq_firmware_support::machine::semihosting::hio;
 use actq_kernels::{Head, Image};
 use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
@@ -59,6 +60,11 @@ impl Sensors {
     pub fn read(&mut self) -> Option<[f32; OBS]> {
         self.0.take()
     }
+
+    /// Waits for what comes, as an async driver does. It comes once: nothing wakes who waits again.
+    pub async fn wait(&mut self) -> [f32; OBS] {
+        poll_fn(|_| self.read().map_or(Poll::Pending, Poll::Ready)).await
+    }
 }
 
 /// Starts the control tick.
@@ -83,7 +89,7 @@ impl Motors {
     /// What a control tick tells them: the last action, once there is one.
     pub fn tick(&mut self, action: Option<Action>) {
         self.0 += 1;
-        let (Some(action), Ok(mut out)) = (action, hio::hstdout()) else { return };
+        let (Some(action), Some(mut out)) = (action, host::stdout()) else { return };
         let told = write!(out, "{}", self.0)
             .and_then(|()| action.iter().try_for_each(|value| write!(out, " {:08x}", value.to_bits())));
         host::exit(told.is_ok())

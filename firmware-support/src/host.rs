@@ -1,5 +1,7 @@
 //! The host that runs QEMU, or a debugger, through semihosting: the command line, standard input and output, the exit status.
 
+use core::fmt;
+
 use heapless::String;
 
 use crate::machine::asm;
@@ -27,6 +29,21 @@ pub fn arguments() -> String<64> {
     arguments
 }
 
+/// Standard output, as text. Unlike the stream of the semihosting crates it does not try for ever where the host's end is closed.
+pub fn stdout() -> Option<File> {
+    File::open(c":tt", true)
+}
+
+/// Standard error, as [`stdout`].
+pub fn stderr() -> Option<File> {
+    File::open_as(c":tt", APPEND)
+}
+
+/// Modes of SYS_OPEN: fopen's "rb", "wb" and "a". The host's terminal ":tt" is standard input, output and error in these.
+const READ: usize = 1;
+const WRITE: usize = 5;
+const APPEND: usize = 8;
+
 /// An open file of the host.
 #[derive(Debug)]
 pub struct File(usize);
@@ -34,7 +51,10 @@ pub struct File(usize);
 impl File {
     /// Opens the host's file at `path`, which ends with a zero byte; `write` truncates it.
     pub fn open(path: &core::ffi::CStr, write: bool) -> Option<Self> {
-        let mode = if write { 5 } else { 1 }; // "wb", "rb"
+        Self::open_as(path, if write { WRITE } else { READ })
+    }
+
+    fn open_as(path: &core::ffi::CStr, mode: usize) -> Option<Self> {
         // SAFETY: SYS_OPEN reads the path, whose length is given without its zero.
         let handle = unsafe { syscall!(OPEN, path.as_ptr() as usize, mode, path.count_bytes()) };
         (handle != usize::MAX).then_some(Self(handle))
@@ -59,5 +79,11 @@ impl File {
     pub fn write_all(&self, bytes: &[u8]) -> bool {
         // SAFETY: SYS_WRITE reads `len` bytes from the buffer; it returns how many it did not write.
         unsafe { syscall!(WRITE, self.0, bytes.as_ptr() as usize, bytes.len()) == 0 }
+    }
+}
+
+impl fmt::Write for File {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        if self.write_all(text.as_bytes()) { Ok(()) } else { Err(fmt::Error) }
     }
 }

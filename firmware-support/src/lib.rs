@@ -17,8 +17,8 @@ use core::panic::PanicInfo;
 
 /// What a panic does in firmware with a host: it ends the run with a failure, and says where. [`panic_to_host`] makes it the handler.
 pub fn panicked(info: &PanicInfo<'_>) -> ! {
-    if let Ok(mut out) = machine::semihosting::hio::hstderr() {
-        let _ = writeln!(out, "{info}");
+    if let Some(mut err) = host::stderr() {
+        let _ = writeln!(err, "{info}");
     }
     host::exit(false)
 }

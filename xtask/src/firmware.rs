@@ -2,8 +2,9 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
-use actq_boards::{Application, Target, root};
+use actq_boards::{Application, Target, root, target_dir};
 use actq_kernels::Image;
 use anyhow::{Context as _, Result, bail, ensure};
 
@@ -75,6 +76,7 @@ impl Options {
             }
             Self::Build { target, image, features, key, out } => {
                 let application = target.board().application.context("the board has no application")?;
+                check_out(&out, image.as_deref())?;
                 let given = image.as_deref().map(|image| check(image, application, target)).transpose()?;
                 setup::rust_target(target.triple())?;
                 let image = given.map_or_else(example, Ok)?;
@@ -94,6 +96,20 @@ pub(crate) fn boards() -> impl Iterator<Item = (Target, Application)> {
     Target::ALL.into_iter().filter(first).filter_map(|target| Some((target, target.board().application?)))
 }
 
+/// Refuses a place that the ELF file cannot take or should not, before minutes are spent on it.
+fn check_out(out: &Path, image: Option<&Path>) -> Result<()> {
+    let folder = match out.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    };
+    ensure!(folder.is_dir(), "{}: there is no folder {}", out.display(), folder.display());
+    ensure!(!out.is_dir(), "{}: is a folder; --out takes the name of a file", out.display());
+    let whole = |path: &Path| fs::canonicalize(path).ok();
+    let is_image = image.is_some_and(|image| whole(image).is_some() && whole(image) == whole(out));
+    ensure!(!is_image, "{}: is the image itself; --out takes another name", out.display());
+    Ok(())
+}
+
 /// The whole path of an image that the board's application runs; an error says why it does not.
 fn check(path: &Path, application: Application, target: Target) -> Result<PathBuf> {
     let bytes = fs::read(path).with_context(|| format!("{}: the image cannot be read", path.display()))?;
@@ -101,12 +117,13 @@ fn check(path: &Path, application: Application, target: Target) -> Result<PathBu
     let mut words = vec![0u32; bytes.len().div_ceil(4)];
     let aligned = &mut bytemuck::cast_slice_mut::<u32, u8>(&mut words)[..bytes.len()];
     aligned.copy_from_slice(&bytes);
-    let image = Image::new_checked(aligned).with_context(|| format!("{}: refused", path.display()))?;
+    let image = Image::new_checked(aligned)
+        .with_context(|| format!("{}: refused as an image, which `actq quantize` makes", path.display()))?;
     let (needed, given) = (image.scratch_words(), application.scratch);
     let name = target.board().name;
     ensure!(
         needed <= given,
-        "{}: needs {needed} words of scratch memory, the application on {name} has {given}",
+        "{}: needs {needed} words of scratch memory, the application on {name} has {given} (SCRATCH of the board)",
         path.display()
     );
     fs::canonicalize(path).with_context(|| path.display().to_string())
@@ -114,24 +131,24 @@ fn check(path: &Path, application: Application, target: Target) -> Result<PathBu
 
 /// The image of the UR3 policy: rounded, which takes a second.
 fn example() -> Result<PathBuf> {
-    let path = root().join("target/firmware-example.actq");
+    let path = target_dir().join("firmware-example.actq");
+    let new = path.with_extension(format!("{}.tmp", std::process::id()));
     println!("Quantizing the UR3 policy to 3 bits, rounded; --image takes another image");
-    let mut command = cargo();
-    command.current_dir(root()).args(["run", "--quiet", "--profile", "host", "--package", "actq", "--", "quantize"]);
-    command.args([
-        "examples/ur3/policy",
-        "--method",
-        "rtn",
-        "--bits",
-        "3",
-        "--group",
-        "32",
-        "--activations",
-        "8",
-        "--out",
-    ]);
-    let output = command.arg(&path).output().context("cargo cannot be started")?;
+    let mut build = cargo();
+    // With actq-bench, for the features that tests and measurements are built with: else the quantizer would be built once more.
+    build.current_dir(root()).args(["build", "--quiet", "--profile", "host", "--bin", "actq"]);
+    let built =
+        build.args(["--package", "actq", "--package", "actq-bench"]).status().context("cargo cannot be started")?;
+    ensure!(built.success(), "actq does not build");
+    let mut command =
+        Command::new(target_dir().join("host").join("actq").with_extension(std::env::consts::EXE_EXTENSION));
+    command.current_dir(root()).args(["quantize", "examples/ur3/policy", "--method", "rtn", "--bits", "3"]);
+    let output = command.args(["--group", "32", "--activations", "8", "--out"]).arg(&new).output()?;
     ensure!(output.status.success(), "the UR3 policy: {}", String::from_utf8_lossy(&output.stderr));
+    // Cargo builds anew what includes a newer file.
+    let is_same = fs::read(&path).ok() == Some(fs::read(&new)?);
+    if is_same { fs::remove_file(&new) } else { fs::rename(&new, &path) }
+        .with_context(|| format!("{}: cannot be written", path.display()))?;
     Ok(path)
 }
 
@@ -139,8 +156,8 @@ fn example() -> Result<PathBuf> {
 fn build(target: Target, image: &Path, features: Option<&str>, key: Option<&str>) -> Result<Vec<u8>> {
     let name = target.board().name;
     // A folder of its own: cargo gives the files of all boards with one triple the same name, and two may be built at a
-    // time.
-    let folder = root().join("target/boards").join(name);
+    // time. What is built on the way there is shared, by a cargo that knows the variable (1.91).
+    let folder = target_dir().join("boards").join(name);
     let features = [Some(name), features, key.map(|_| "signed")];
     let features = features.into_iter().flatten().collect::<Vec<_>>().join(",");
     let mut command = cargo();
@@ -153,9 +170,16 @@ fn build(target: Target, image: &Path, features: Option<&str>, key: Option<&str>
     if std::env::var_os("DEFMT_LOG").is_none() {
         command.env("DEFMT_LOG", "info");
     }
-    let status = command.arg("--target-dir").arg(&folder).env("ACTQ_IMAGE", image).status();
+    command.arg("--target-dir").arg(&folder).env("ACTQ_IMAGE", image);
+    let status = command.env("CARGO_BUILD_BUILD_DIR", target_dir()).status();
     if !status.context("cargo cannot be started")?.success() {
-        bail!("the application does not build for {name}");
+        let memory = target.board().memory;
+        bail!(
+            "the application does not build for {name}; where the linker says that FLASH overflows, it has no room for \
+             {} ({} bytes): `actq quantize --flash` makes a smaller image, and {memory} has the room",
+            image.display(),
+            fs::metadata(image).map_or(0, |file| file.len())
+        );
     }
     let elf = folder.join(target.triple()).join(target.profile()).join("controller");
     fs::read(&elf).with_context(|| elf.display().to_string())
@@ -214,7 +238,10 @@ mod tests {
             (&[0; 4097], "image length differs from its header"),
         ] {
             fs::write(&file, bytes).expect("written");
-            assert_eq!(refused(&file), format!("{}: refused: {why}", file.display()));
+            assert_eq!(
+                refused(&file),
+                format!("{}: refused as an image, which `actq quantize` makes: {why}", file.display())
+            );
         }
         fs::remove_file(&file).expect("removed");
         assert!(refused(Path::new("none.actq")).starts_with("none.actq: the image cannot be read: "));

@@ -22,7 +22,6 @@ mod firmware {
     use actq_kernels::layout::{Block, BlockShape, Lanes, Width, pack};
     use actq_kernels::x::{Plan, Scale};
     use cortex_m::singleton;
-    use cortex_m_semihosting::hio;
 
     const SHAPES: [(usize, usize); 5] = [(64, 256), (256, 256), (512, 512), (128, 1024), (28, 256)];
     const WEIGHTS: usize = 512 * 512;
@@ -63,7 +62,7 @@ mod firmware {
     }
 
     fn run(b: &mut Flash, ram: &mut Ram) -> Option<()> {
-        let mut out = hio::hstdout().ok()?;
+        let mut out = host::stdout()?;
         let mut random = random_words();
         b.codes.iter_mut().for_each(|c| *c = random() as u8);
         b.scales.iter_mut().for_each(|s| *s = random() as u8);

@@ -15,7 +15,6 @@ mod firmware {
     use actq_controller::foc::{CurrentLoop, Gains, Measured, Rotor};
     use actq_firmware_support::{count, host};
     use actq_link::frame::CRC;
-    use cortex_m_semihosting::hio;
 
     #[cortex_m_rt::entry]
     fn main() -> ! {
@@ -35,6 +34,6 @@ mod firmware {
                 *phase = 0.9 * *phase + 3.0 * (duty - 0.5);
             }
         }
-        writeln!(hio::hstdout().ok()?, "{:08x}", digest.finalize()).ok()
+        writeln!(host::stdout()?, "{:08x}", digest.finalize()).ok()
     }
 }

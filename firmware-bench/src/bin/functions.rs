@@ -18,7 +18,6 @@ mod firmware {
     use actq_kernels::ops::denoise::{Coefficients, denoise};
     use actq_kernels::ops::noise::normal;
     use actq_kernels::ops::{cells, elementwise, norm};
-    use cortex_m_semihosting::hio;
 
     const LEN: usize = 256;
 
@@ -38,7 +37,7 @@ mod firmware {
     }
 
     fn run() -> Option<()> {
-        let mut out = hio::hstdout().ok()?;
+        let mut out = host::stdout()?;
         let mut line = |name: &str, results: &[&[f32]]| {
             let bits = |v: &f32| if v.is_nan() { f32::NAN.to_bits() } else { v.to_bits() };
             let hash = results.iter().copied().flatten().map(bits).fold(0u32, |hash, bits| hash.rotate_left(5) ^ bits);

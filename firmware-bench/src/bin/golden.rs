@@ -12,7 +12,7 @@ mod firmware {
     use core::fmt::Write as _;
 
     use actq_firmware_support::host::{self, File};
-    use actq_firmware_support::machine::{entry, semihosting::hio, singleton};
+    use actq_firmware_support::machine::{entry, singleton};
     use actq_kernels::arch::{BACKEND, Product, gemv, portable};
     use actq_kernels::image::RowBlock;
     use actq_kernels::layout::{Block, BlockShape, Lanes, Width};
@@ -26,7 +26,7 @@ mod firmware {
     #[entry]
     fn main() -> ! {
         let outcome = run();
-        if let Ok(mut out) = hio::hstdout() {
+        if let Some(mut out) = host::stdout() {
             let _ = match outcome {
                 Ok(cases) => writeln!(out, "{:?}: {cases} cases", BACKEND),
                 Err((case, why)) => writeln!(out, "{:?}: case {case}: {why}", BACKEND),

@@ -19,7 +19,7 @@ mod firmware {
     use core::fmt::{Display, Write as _};
     use core::task::Poll;
 
-    use actq_firmware_support::machine::{entry, semihosting::hio, singleton};
+    use actq_firmware_support::machine::{entry, singleton};
     use actq_firmware_support::{count, host, slot};
     use actq_kernels::{Head, Image, StepError};
     use actq_link::{NO_ACTION, RESET, STEP};
@@ -43,7 +43,7 @@ mod firmware {
     fn main() -> ! {
         let outcome = run();
         if let Err(message) = &outcome
-            && let Ok(mut err) = hio::hstderr()
+            && let Some(mut err) = host::stderr()
         {
             let _ = writeln!(err, "firmware: {message}");
         }
@@ -129,7 +129,7 @@ mod firmware {
 
     /// Plays the self-test observations and prints each action's bits.
     fn replay(head: &mut Head<'_, '_>) -> Result<(), Message> {
-        let mut out = hio::hstdout().map_err(|()| message("output", "no semihosting host"))?;
+        let mut out = host::stdout().ok_or_else(|| message("output", "no semihosting host"))?;
         let image = *head.image();
         let _ = writeln!(out, "{}: crc32 {:08x}, self-test passed", image.name(), image.crc());
         let mut step = 0;

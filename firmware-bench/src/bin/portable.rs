@@ -16,7 +16,7 @@ mod firmware {
     use core::hint::black_box;
 
     use actq_firmware_bench::random_words;
-    use actq_firmware_support::machine::{entry, semihosting::hio, singleton};
+    use actq_firmware_support::machine::{entry, singleton};
     use actq_firmware_support::{count, host};
     use actq_kernels::arch::{BACKEND, reference};
     use actq_kernels::image::RowBlock;
@@ -45,7 +45,7 @@ mod firmware {
     }
 
     fn run(b: &mut Buffers) -> Option<()> {
-        let mut out = hio::hstdout().ok()?;
+        let mut out = host::stdout()?;
         let mut random = random_words();
         b.codes.iter_mut().for_each(|c| *c = random() as u8);
         b.scales.iter_mut().for_each(|s| *s = random() as u8);

@@ -1,5 +1,5 @@
 //! What holds the application up, in pieces between which the watchdog is fed: the check of an image that came over the link, the start that
-//! reads two slots, an image's own check and self-test. Each is a counted region, whose name is printed.
+//! reads two slots, an image's own check, the slices of its self-test. Each is a counted region, whose name is printed.
 //!
 //! The image is the one in the slot; standard input gives a public key, and the signature of the image with version 1.
 #![cfg_attr(target_os = "none", no_std, no_main)]
@@ -18,14 +18,15 @@ mod firmware {
     use core::fmt::Write as _;
 
     use actq_boards::ram::Ram;
+    use actq_boards::seams::Watchdog;
     use actq_controller::slots::{Key, Layout, Slot, Slots, Updater, Work};
     use actq_controller::update::{Plan, Update as _};
+    use actq_firmware_demo::image;
     use actq_firmware_support::{count, host, slot};
-    use actq_kernels::{Head, Image};
+    use actq_kernels::Image;
     use actq_link::code::Refusal;
     use actq_link::frame::CRC;
     use cortex_m::singleton;
-    use cortex_m_semihosting::hio::{self, HostStream};
 
     const SECTOR: usize = 128 << 10;
     const SCRATCH: usize = 24 * 1024;
@@ -38,7 +39,7 @@ mod firmware {
     }
 
     fn run() -> Option<()> {
-        let (image, input, mut names) = (slot::image()?, host::File::open(c":tt", false)?, hio::hstdout().ok()?);
+        let (image, input, mut names) = (slot::image()?, host::File::open(c":tt", false)?, host::stdout()?);
         let (mut key, mut signature) = ([0; 32], [0; 64]);
         if !(input.read_exact(&mut key) && input.read_exact(&mut signature)) {
             return None;
@@ -69,8 +70,30 @@ mod firmware {
         }
         (0..pieces).try_for_each(|_| writeln!(names, "start")).ok()?;
         let scratch = singleton!(: [u32; SCRATCH] = [0; SCRATCH])?;
-        writeln!(names, "image").ok()?;
-        count::region(|| Head::new(Image::new_checked(image).ok()?, scratch).ok()?.self_test().ok())
+        let header = Image::new_checked(image).ok()?;
+        let (lengths, mut feeds) = ([header.obs_len(), header.act_len()], Feeds(0));
+        count::actq_count_begin();
+        let opened = image::open(image, scratch, lengths, &mut feeds).is_ok();
+        count::actq_count_end();
+        // Up to the first time it is fed there is nothing; then comes the check.
+        writeln!(names, "turn\nimage").ok()?;
+        (1..feeds.0).try_for_each(|_| writeln!(names, "slice")).ok()?;
+        opened.then_some(())
+    }
+
+    /// Ends a region and begins one each time that it is fed.
+    struct Feeds(usize);
+
+    impl Watchdog for Feeds {
+        fn start(&mut self, _: u16) -> bool {
+            true
+        }
+
+        fn feed(&mut self) {
+            count::actq_count_end();
+            self.0 += 1;
+            count::actq_count_begin();
+        }
     }
 
     /// An update up to its acknowledgement.
@@ -78,7 +101,7 @@ mod firmware {
         mut updater: Updater<Flash, Key>,
         image: &[u8],
         signature: &[u8; 64],
-        names: &mut HostStream,
+        names: &mut host::File,
     ) -> Option<()> {
         let plan = Plan { length: image.len() as u32, crc: CRC.checksum(image), version: 1 };
         while updater.begin(plan) == Err(Refusal::Busy) {

@@ -8,39 +8,32 @@ use actq_firmware_styles::main;
 
 #[cfg(target_os = "none")]
 mod firmware {
-    use core::cell::Cell;
     use core::convert::Infallible;
     use core::task::Poll;
 
     use actq_boards::device::{Interrupt, interrupt};
     use actq_firmware_styles::{Action, Motors, SCRATCH, SLICE, Sensors, open, start_tick};
     use actq_firmware_support::host;
-    use cortex_m::peripheral::SYST;
     use cortex_m::{Peripherals, singleton};
-    use cortex_m_rt::exception;
     use embassy_executor::{InterruptExecutor, Spawner};
     use embassy_futures::yield_now;
-    use embassy_sync::blocking_mutex::CriticalSectionMutex;
     use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
     use embassy_sync::signal::Signal;
 
     static CONTROL: InterruptExecutor = InterruptExecutor::new();
     static TICK: Signal<CriticalSectionRawMutex, ()> = Signal::new();
-    /// From the head to the tick: the last action.
-    static ACTION: CriticalSectionMutex<Cell<Option<Action>>> = CriticalSectionMutex::new(Cell::new(None));
+    /// From the head to the tick: the newest action.
+    static ACTION: Signal<CriticalSectionRawMutex, Action> = Signal::new();
 
     #[embassy_executor::main(entry = "cortex_m_rt::entry")]
     async fn main(_below: Spawner) {
-        let (peripherals, scratch) = (Peripherals::take(), singleton!(: [u32; SCRATCH] = [0; SCRATCH]));
-        if let (Some(peripherals), Some(scratch)) = (peripherals, scratch) {
-            // An interrupt that nothing else here uses, above all that runs in the thread.
-            CONTROL.start(Interrupt::SERIAL).spawn(tick().expect("it is the first"));
-            let _ = control(peripherals.SYST, scratch).await;
-        }
+        // An interrupt that nothing else here uses, above all that runs in the thread.
+        CONTROL.start(Interrupt::SERIAL).spawn(tick().expect("it is the first"));
+        let _ = control().await;
         host::exit(false)
     }
 
-    #[exception]
+    #[cortex_m_rt::exception]
     fn SysTick() {
         TICK.signal(());
     }
@@ -54,32 +47,28 @@ mod firmware {
     /// The control tick, which interrupts whatever the tasks below do.
     #[embassy_executor::task]
     async fn tick() {
-        let mut motors = Motors::new();
+        let (mut motors, mut action) = (Motors::new(), None);
         loop {
             TICK.wait().await;
-            motors.tick(ACTION.lock(Cell::get));
+            action = ACTION.try_take().or(action);
+            motors.tick(action);
         }
     }
 
     /// The head's task; it ends where there is none, or a step of it fails.
-    async fn control(timer: SYST, scratch: &mut [u32]) -> Option<Infallible> {
-        let mut head = open(scratch)?;
+    async fn control() -> Option<Infallible> {
+        let mut head = open(singleton!(: [u32; SCRATCH] = [0; SCRATCH])?)?;
         let mut sensors = Sensors::new(head.image());
-        start_tick(timer);
+        start_tick(Peripherals::take()?.SYST);
         loop {
-            let Some(observation) = sensors.read() else {
-                yield_now().await;
-                continue;
-            };
-            head.begin(&observation).ok()?;
-            let action = loop {
+            head.begin(&sensors.wait().await).ok()?;
+            ACTION.signal(loop {
                 if let Poll::Ready(action) = head.poll(SLICE).ok()? {
                     break action.try_into().ok()?;
                 }
                 // Other tasks wait for a slice at most.
                 yield_now().await;
-            };
-            ACTION.lock(|last| last.set(Some(action)));
+            });
         }
     }
 }

@@ -36,14 +36,14 @@ fn start(target: Target, features: &'static str) -> Result<(Controller, Client)>
     Ok((controller, client))
 }
 
-fn self_test(image: &Image<'_>, step: usize) -> Option<(Vec<f32>, Vec<u32>)> {
+pub(super) fn self_test(image: &Image<'_>, step: usize) -> Option<(Vec<f32>, Vec<u32>)> {
     let (observation, action) = image.self_test(step)?;
     let observation = observation.iter().map(|word| f32::from_bits(u32::from_le(*word))).collect();
     Some((observation, action.iter().map(|word| u32::from_le(*word)).collect()))
 }
 
 /// A small image of the built-in one's lengths: QEMU's serial ports take a byte at a time.
-fn small() -> Result<Vec<u8>> {
+pub(super) fn small() -> Result<Vec<u8>> {
     let mut builder = Builder::new(OBS_DIM);
     builder.linear((ACT_DIM, OBS_DIM), Activations::Int8, |_| Some(Width::W3), 0, true)?;
     let (policy, outcomes) = builder.finish("small".to_owned(), false);
@@ -59,7 +59,7 @@ fn with_wrong_self_test(mut bytes: Vec<u8>) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-fn file(bytes: &[u8]) -> Result<NamedTempFile> {
+pub(super) fn file(bytes: &[u8]) -> Result<NamedTempFile> {
     let mut file = NamedTempFile::new()?;
     file.write_all(bytes)?;
     Ok(file)

@@ -288,7 +288,7 @@ fn a_controller_that_is_not_there_and_a_wrong_command_line_are_told() -> Result<
     let link = |arguments: &[&str]| run(actq(&[&["link"], arguments].concat()), &[]);
     succeeded(&link(&["ports"])?)?;
     failed(&link(&["watch", "tcp:127.0.0.1:1", "--once"])?, 1, &["tcp:127.0.0.1:1", "cannot be opened"])?;
-    failed(&link(&["arm", "/dev/no-such-port"])?, 1, &["/dev/no-such-port", "cannot be opened"])?;
+    failed(&link(&["arm", "/dev/no-such-port"])?, 1, &["/dev/no-such-port", "cannot be opened", "actq link ports"])?;
     for arguments in
         [&["arm", "tcp:host"][..], &["arm"], &["set", "COM3", "high"], &["stream", "COM3", "a", "b", "--rate", "0"]]
     {

@@ -11,7 +11,7 @@ use actq::policy::Policy;
 use actq::runtime::{ImageBuffer, with_head};
 use actq_bench::golden::Random;
 use actq_bench::networks::Builder;
-use actq_kernels::image::Kind;
+use actq_kernels::image::{Kind, header as h, seal};
 use actq_kernels::math::Function;
 use actq_kernels::{Head, StepError, Width};
 use anyhow::{Context, Result, ensure};
@@ -301,4 +301,34 @@ fn polls_of_one_operation_end_behind_each() -> Result<()> {
         ensure!(head.poll_op(u32::MAX)?.is_ready(), "not ready behind the last operation");
         Ok(())
     })
+}
+
+/// As in one piece: it passes with the least budget and more, and finds a wrong action at its step.
+#[test]
+fn a_self_test_in_pieces_is_the_same_test() -> Result<()> {
+    for seed in 0..4 {
+        let (policy, outcomes) = network(seed)?;
+        let bytes = emit::image(&policy, &outcomes)?;
+        let in_pieces = |bytes: &[u8], budget| {
+            let buffer = ImageBuffer::new(bytes);
+            with_head(buffer.image(Path::new("slices"))?, |head| {
+                let mut pieces = 0;
+                let whole = head.self_test();
+                Ok((head.self_test_in_pieces(budget, || pieces += 1), whole, pieces, head.image().self_test_steps()))
+            })
+        };
+        let (passed, whole, finest, steps) = in_pieces(&bytes, 0)?;
+        assert_eq!((passed, whole), (Ok(()), Ok(())));
+        let (passed, _, coarsest, _) = in_pieces(&bytes, u32::MAX)?;
+        assert_eq!((passed, coarsest), (Ok(()), steps));
+        assert!(finest > 2 * steps, "{finest} pieces of {steps} steps");
+        let at = 4 * h::W_SELF_TEST;
+        let vector = u32::from_le_bytes(bytes[at..at + 4].try_into()?) as usize;
+        let mut wrong = bytes;
+        wrong[4 * (vector + OBSERVATION)] ^= 1;
+        seal(&mut wrong).context("its length is as before")?;
+        let (refused, whole, ..) = in_pieces(&wrong, 0)?;
+        assert_eq!((refused, whole), (Err(StepError::SelfTest { step: 0 }), Err(StepError::SelfTest { step: 0 })));
+    }
+    Ok(())
 }

@@ -1,14 +1,23 @@
 //! The watchdog outlasts each piece of what holds the application up, at its slowest clock, with signatures.
 
 use std::fs;
+use std::path::Path;
 
+use actq::methods::Activations;
+use actq::runtime::ImageBuffer;
 use actq_bench::Target;
 use actq_bench::cycles::Code;
 use actq_bench::firmware::{self, built_in};
+use actq_bench::networks::Builder;
 use actq_bench::qemu::{self, Counter};
+use actq_boards::seams::Watchdog;
 use actq_boards::stm32f405::patience;
 use actq_device::keys;
-use actq_firmware_demo::patience::PATIENCE;
+use actq_firmware_demo::image;
+use actq_firmware_demo::patience::{LONGEST, PATIENCE};
+use actq_firmware_demo::running::SLICE;
+use actq_kernels::Width;
+use actq_link::code::Refusal;
 use anyhow::{Context as _, Result, ensure};
 
 /// An STM32F405 whose crystal is dead: kHz, and the wait states of its flash where the crystal has died late.
@@ -29,7 +38,7 @@ fn the_watchdog_waits_for_each_piece_of_a_start_and_of_a_check() -> Result<()> {
     ensure!(output.status.success(), "{output:?}");
     let (names, regions) = (String::from_utf8(output.stdout)?, counter.regions()?);
     ensure!(names.lines().count() == regions.len(), "{} regions: {names}", regions.len());
-    for piece in ["key", "turn", "long", "start", "image"] {
+    for piece in ["key", "turn", "long", "start", "image", "slice"] {
         let of_piece = names.lines().zip(&regions).filter(|(name, _)| *name == piece).map(|(_, region)| region);
         let longest = of_piece.max_by_key(|region| region.instructions).context("it has run")?;
         let (instructions, cycles) = (longest.instructions, code.cycles(longest, WAIT_STATES)?);
@@ -38,6 +47,45 @@ fn the_watchdog_waits_for_each_piece_of_a_start_and_of_a_check() -> Result<()> {
         assert!(took < patience::milliseconds(waits).into(), "{piece}: {took} ms");
         // Where a signature is checked, by the update and by the start, it takes most.
         assert!(!["long", "start"].contains(&piece) || instructions > 2_000_000, "{piece}: {instructions}");
+        if piece == "slice" {
+            // However long a self-test is, this is between two times that the watchdog is fed; and the longest that an image may need,
+            // at the cycles of these instructions, is within a turn of the loop, too.
+            assert!((SLICE / 2..=SLICE).contains(&(instructions as u32)), "{instructions}");
+            let most = u64::from(LONGEST) * cycles / instructions / SLOWEST;
+            assert!(most < patience::milliseconds(PATIENCE.turn).into(), "{most} ms");
+        }
+    }
+    Ok(())
+}
+
+/// Counts how often it is fed.
+struct Feeds(usize);
+
+impl Watchdog for Feeds {
+    fn start(&mut self, _: u16) -> bool {
+        true
+    }
+
+    fn feed(&mut self) {
+        self.0 += 1;
+    }
+}
+
+/// An image of one product with a wide row, which is the longest piece: it runs up to the rule's length, in pieces, and not beyond.
+#[test]
+fn an_image_whose_longest_piece_is_too_long_does_not_run() -> Result<()> {
+    for (cols, outcome) in [(2_000, Ok(())), (24_000, Err(Refusal::Unfit))] {
+        let mut builder = Builder::new(cols);
+        builder.linear((8, cols), Activations::Int16, |_| Some(Width::W8), 0, false)?;
+        let (policy, outcomes) = builder.finish("wide".to_owned(), false);
+        let buffer = ImageBuffer::new(&actq::emit::image(&policy, &outcomes)?);
+        let made = buffer.image(Path::new("wide"))?;
+        let (mut scratch, mut feeds) = (vec![0; made.scratch_words()], Feeds(0));
+        let lengths = [made.obs_len(), made.act_len()];
+        let opened = image::open(buffer.bytes(), &mut scratch, lengths, &mut feeds).map(drop);
+        assert_eq!((opened, made.least_budget() > LONGEST), (outcome, outcome.is_err()), "{}", made.least_budget());
+        // Before the check; and before a slice, where it comes to that.
+        assert!(if outcome.is_ok() { feeds.0 > made.self_test_steps() } else { feeds.0 == 1 }, "{}", feeds.0);
     }
     Ok(())
 }

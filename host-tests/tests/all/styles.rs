@@ -1,8 +1,14 @@
 //! The head in one's own firmware, in each style of `firmware-styles`, under QEMU.
 
+use std::fs;
+use std::process::Stdio;
+use std::thread;
+use std::time::{Duration, Instant};
+
 use actq::runtime::ImageBuffer;
+use actq_bench::controller::PATIENCE;
 use actq_bench::firmware::{self, STYLE_NAMES, built_in};
-use actq_bench::qemu;
+use actq_bench::{qemu, root};
 use anyhow::{Context, Result, ensure};
 
 /// The first action that the motors get has the host's bits, and control ticks have come while the head ran: a step of
@@ -22,5 +28,38 @@ fn every_style_acts_with_the_bits_of_the_host_below_its_tick() -> Result<()> {
         assert_eq!(action, expected.join(" "), "{name}");
         assert!((10..20).contains(&ticks.parse::<u32>()?), "{name}: {ticks} ticks in a step");
     }
+    Ok(())
+}
+
+/// Lines that are neither empty nor a comment.
+#[test]
+fn every_style_has_at_most_sixty_lines_of_code() -> Result<()> {
+    for name in STYLE_NAMES {
+        let source = fs::read_to_string(root().join(format!("firmware-styles/src/bin/{name}.rs")))?;
+        let lines = source.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with("//")).count();
+        assert!((30..=60).contains(&lines), "{name}: {lines}");
+    }
+    Ok(())
+}
+
+/// Where nobody reads what QEMU writes, the firmware notices, and the run ends.
+#[test]
+fn an_output_that_is_closed_ends_the_run() -> Result<()> {
+    let mut command = qemu::command(&firmware::style("bare")?, None, "")?;
+    let mut child = command.stdin(Stdio::null()).stdout(Stdio::piped()).spawn()?;
+    drop(child.stdout.take());
+    let begun = Instant::now();
+    let status = loop {
+        match child.try_wait()? {
+            Some(status) => break Some(status),
+            None if begun.elapsed() > PATIENCE => break None,
+            None => thread::sleep(Duration::from_millis(20)),
+        }
+    };
+    if status.is_none() {
+        child.kill()?;
+        child.wait()?;
+    }
+    ensure!(status.is_some_and(|status| status.code() == Some(1)), "{status:?}");
     Ok(())
 }

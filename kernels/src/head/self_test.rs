@@ -1,8 +1,9 @@
 //! The self-test: an image brings observations and the actions that they must give.
 
 use super::Head;
-use crate::error::StepError;
+use crate::error::{Fault, StepError};
 use crate::ops::elementwise::copy_le;
+use crate::pace::budget::Budget;
 
 impl Head<'_, '_> {
     /// Plays the image's self-test vector from a reset and compares every action bit for bit; resets again at the end.
@@ -10,22 +11,43 @@ impl Head<'_, '_> {
     /// # Errors
     ///
     /// [`StepError::SelfTest`] with the first step whose bits differ; [`StepError::Damaged`] and [`StepError::NotFinite`] as of a step.
-    #[inline(never)]
     pub fn self_test(&mut self) -> Result<(), StepError> {
+        self.play_self_test(Self::finish)
+    }
+
+    /// As [`Self::self_test`], in pieces of at most `budget` modelled instructions as of [`Self::poll`], or of [`Self::least_budget`]
+    /// where that is more. `before` is told of each piece, so that a watchdog can be fed however long all of it takes.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Self::self_test`].
+    pub fn self_test_in_pieces(&mut self, budget: u32, mut before: impl FnMut()) -> Result<(), StepError> {
+        let budget = budget.max(self.least_budget());
+        self.play_self_test(|head| {
+            before();
+            while !head.advance(&mut Budget::of_poll(budget), false)? {
+                before();
+            }
+            Ok(())
+        })
+    }
+
+    #[inline(never)]
+    fn play_self_test(&mut self, finish: impl FnMut(&mut Self) -> Result<(), Fault>) -> Result<(), StepError> {
         let seed = core::mem::take(&mut self.seed);
         self.reset();
-        let outcome = self.play_self_test();
+        let outcome = self.compare_self_test(finish);
         self.seed(seed);
         outcome
     }
 
-    fn play_self_test(&mut self) -> Result<(), StepError> {
+    fn compare_self_test(&mut self, mut finish: impl FnMut(&mut Self) -> Result<(), Fault>) -> Result<(), StepError> {
         let mut step = 0;
         while let Some((observation, expected)) = self.image.self_test(step) {
             copy_le(observation, self.words_mut(self.image.observation()));
             self.playback.turn(&self.image, self.arena);
             self.start(true);
-            self.finish()?;
+            finish(self)?;
             let action = self.floats(self.image.action());
             if action.iter().zip(expected).any(|(a, w)| a.to_bits() != u32::from_le(*w)) {
                 return Err(StepError::SelfTest { step });

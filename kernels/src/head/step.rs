@@ -224,7 +224,7 @@ impl Head<'_, '_> {
     }
 
     /// Goes on as far as the budget reaches; true when the action is ready. On an error the step is abandoned.
-    fn advance(&mut self, budget: &mut impl Meter, one_op: bool) -> Result<bool, Fault> {
+    pub(super) fn advance(&mut self, budget: &mut impl Meter, one_op: bool) -> Result<bool, Fault> {
         self.go_on(budget, one_op).inspect_err(|_| self.abandon())
     }
 

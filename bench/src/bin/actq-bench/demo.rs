@@ -14,7 +14,7 @@ use actq::report::table::table;
 use actq::runtime::{ImageBuffer, with_head};
 use actq_bench::closed_loop::{episode, episode_on_host};
 use actq_bench::qemu::{self, Counter, Server};
-use actq_bench::{Target, evaluation, firmware, ur3, ur3_flow};
+use actq_bench::{Target, evaluation, firmware, target_dir, ur3, ur3_flow};
 use actq_kernels::{Image, Width};
 use actq_ur3::OBS_DIM;
 use actq_ur3::policy_f32::PolicyF32;
@@ -124,7 +124,7 @@ pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
 
 /// Of the images.
 fn folder() -> PathBuf {
-    firmware::target_dir().join("demo")
+    target_dir().join("demo")
 }
 
 impl Trial<'_> {

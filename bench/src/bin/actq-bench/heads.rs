@@ -16,7 +16,7 @@ use actq::runtime::ImageBuffer;
 use actq_bench::cycles::Code;
 use actq_bench::instruction::Kind;
 use actq_bench::qemu::Counter;
-use actq_bench::{Target, evaluation, firmware, shared_policies, ur3};
+use actq_bench::{Target, evaluation, firmware, shared_policies, target_dir, ur3};
 use actq_kernels::Width;
 use actq_kernels::pace::cost::Cost;
 use anyhow::{Context, Result};
@@ -87,7 +87,7 @@ pub(crate) fn write_image(quantizer: &Quantizer<'_>, options: &Options, path: &P
 
 /// Quantizes each policy to 8, 3 and 2 bits a weight, and counts a step that evaluates the network.
 pub(crate) fn measure(policies: &[PathBuf], counter: &Counter, wait_states: u64) -> Result<Vec<Head>> {
-    let folder = firmware::target_dir().join("heads");
+    let folder = target_dir().join("heads");
     fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
     let elf = firmware::harness(Target::Fpu)?;
     let code = Code::read(&elf)?;

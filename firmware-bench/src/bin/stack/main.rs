@@ -17,7 +17,6 @@ mod firmware {
     use actq_firmware_support::{host, slot};
     use actq_kernels::{Head, Image};
     use cortex_m::singleton;
-    use cortex_m_semihosting::hio;
 
     use crate::depth::depth;
 
@@ -39,6 +38,6 @@ mod firmware {
         let (observation, _) = image.self_test(0)?;
         let (stepped, step) = depth(|| head.step(bytemuck::cast_slice(observation)).map(|_| ()));
         stepped.ok()?;
-        writeln!(hio::hstdout().ok()?, "{check} {self_test} {step}").ok()
+        writeln!(host::stdout()?, "{check} {self_test} {step}").ok()
     }
 }

@@ -176,8 +176,9 @@ mod app {
             // SAFETY: an update writes to the slot that does not run, and to none while an image waits for its test.
             unsafe { slot::mapped(memory, candidate.address, candidate.length) }.unwrap_or_default()
         };
-        let passes = |candidate: &Candidate| image::open(bytes_of(candidate), scratch, start::LENGTHS).is_ok();
-        let (updates, running) = Updates::new(flash, start::authority(), passes, || watchdog.feed());
+        let (updates, running) = Updates::new(flash, start::authority(), watchdog, |candidate, watchdog| {
+            image::open(bytes_of(candidate), scratch, start::LENGTHS, watchdog).is_ok()
+        });
         let mut bytes = running.as_ref().map_or_else(start::built_in, bytes_of);
         let facts = Facts { image: 0, slot: BUILT_IN, timing: Default::default(), breadcrumb: *breadcrumb };
         let settings = Settings { status_period: REPORT, flash_while_armed: FLASH_WHILE_ARMED };
@@ -186,8 +187,7 @@ mod app {
         let mut work =
             Work { port, watchdog, safety, endpoint, updates, rates: *rates, stack: start::stack, out, state };
         loop {
-            work.watchdog.feed();
-            let head = image::open(bytes, scratch, start::LENGTHS);
+            let head = image::open(bytes, scratch, start::LENGTHS, work.watchdog);
             let refusal = head.as_ref().err().copied();
             let watched = work.watchdog.start(PATIENCE.turn);
             work.safety.with(|safety| {
@@ -213,7 +213,7 @@ mod app {
             };
             let _ = work.watchdog.start(PATIENCE.long);
             let new = bytes_of(&candidate);
-            let outcome = image::open(new, scratch, start::LENGTHS).map(drop);
+            let outcome = image::open(new, scratch, start::LENGTHS, work.watchdog).map(drop);
             if work.updates.tested(outcome) {
                 bytes = new;
             }

@@ -1,0 +1,110 @@
+//! `cargo xtask firmware` as it is typed: the application with an image, for a board, in a file.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use actq::methods::Activations;
+use actq::runtime::ImageBuffer;
+use actq_bench::command::{all, failed, run, succeeded};
+use actq_bench::controller::{Controller, act};
+use actq_bench::firmware::{built_in, controller};
+use actq_bench::networks::Builder;
+use actq_bench::{Target, root};
+use actq_kernels::Width;
+use actq_link::report::BUILT_IN;
+use anyhow::{Context as _, Result};
+use tempfile::TempDir;
+
+use crate::application::{self_test, small};
+
+/// Boards that other tools ask for by this command.
+const BOARDS: [Target; 3] = [Target::Fpu, Target::F405, Target::M33];
+
+fn firmware(words: &[&str]) -> Result<Output> {
+    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    command.current_dir(root()).args(["xtask", "firmware"]).args(words);
+    run(command, &[])
+}
+
+fn text(path: &Path) -> String {
+    path.display().to_string()
+}
+
+/// Without an image it is what the other tests run; with one, it acts with its bits.
+#[test]
+fn every_board_gets_the_example_or_an_image_of_ones_own() -> Result<()> {
+    let folder = TempDir::new()?;
+    let own = folder.path().join("own.actq");
+    fs::write(&own, small()?)?;
+    for target in BOARDS {
+        let (name, elf) = (target.board().name, folder.path().join("firmware.elf"));
+        let told = succeeded(&firmware(&["--board", name, "--out", &text(&elf)])?)?;
+        assert!(told.contains(&format!("{}: {name} with {}", text(&elf), text(built_in()?))), "{told}");
+        assert!(fs::read(&elf)? == fs::read(controller(target, "")?)?, "{name}: not the application of the tests");
+
+        // A file that is there is replaced.
+        succeeded(&firmware(&["--board", name, "--image", &text(&own), "--out", &text(&elf)])?)?;
+        let buffer = ImageBuffer::read(&own)?;
+        let image = buffer.image(&own)?;
+        let controller = Controller::start(target, &elf, None)?;
+        let mut client = controller.client()?;
+        let status = client.status()?;
+        assert_eq!((status.image, status.slot), (image.crc(), BUILT_IN), "{name}");
+        let (observation, bits) = self_test(&image, 0).context("it has a self-test")?;
+        let (_, action) = act(&mut client, &observation)?;
+        assert_eq!(action.iter().map(|v| v.to_bits()).collect::<Vec<_>>(), bits, "{name}");
+    }
+    Ok(())
+}
+
+/// An image of one product, of more bytes than an STM32F405's program may have, or more scratch memory.
+fn large(rows: usize, cols: usize) -> Result<Vec<u8>> {
+    let mut builder = Builder::new(cols);
+    builder.linear((rows, cols), Activations::Int8, |_| Some(Width::W8), 0, false)?;
+    let (policy, outcomes) = builder.finish("large".to_owned(), false);
+    actq::emit::image(&policy, &outcomes)
+}
+
+#[test]
+fn what_cannot_be_built_is_told_and_leaves_no_file() -> Result<()> {
+    let folder = TempDir::new()?;
+    let path = |name: &str| text(&folder.path().join(name));
+    let good = small()?;
+    let mut damaged = good.clone();
+    damaged[good.len() / 2] ^= 1;
+    for (name, bytes) in
+        [("good", &good), ("damaged", &damaged), ("long", &large(800, 800)?), ("wide", &large(4, 16 << 10)?)]
+    {
+        fs::write(path(name), bytes)?;
+    }
+    let there = || -> Result<Vec<_>> {
+        let mut there = fs::read_dir(folder.path())?.map(|entry| Ok(entry?.file_name())).collect::<Result<Vec<_>>>()?;
+        there.sort();
+        Ok(there)
+    };
+    let (before, elf) = (there()?, path("firmware.elf"));
+    let (nowhere, itself) = (path("none/firmware.elf"), path("good"));
+    let refused = |words: &[&str], status, told: &[&str]| {
+        let outcome = firmware(words).and_then(|output| failed(&output, status, told));
+        (words.join(" "), outcome)
+    };
+    let image = |name: &str, out: &str, told: &[&str]| {
+        refused(&["--board", "stm32f405", "--image", &path(name), "--out", out], 1, told)
+    };
+    all([
+        refused(&["--board", "nucleo", "--out", &elf], 2, &["there is no board \"nucleo\"", "stm32f405"]),
+        refused(&["--board", "stm32f405"], 2, &["--out is missing", "Usage: cargo xtask firmware"]),
+        refused(&["--board", "stm32f405", "--img", "a", "--out", &elf], 2, &["\"--img\" is no option", "Usage"]),
+        image("none", &elf, &["none: the image cannot be read"]),
+        image("damaged", &elf, &["damaged: refused", "actq quantize"]),
+        image("wide", &elf, &["wide: needs", "words of scratch memory", "stm32f405 has 12288"]),
+        image("long", &elf, &["no room for", "long", "actq quantize --flash", "boards/src/stm32f405/memory.x"]),
+        image("good", &nowhere, &["there is no folder"]),
+        image("good", &text(folder.path()), &["is a folder"]),
+        image("good", &itself, &["is the image itself"]),
+    ])?;
+    assert_eq!(there()?, before);
+    assert!(fs::read(path("good"))? == good);
+    Ok(())
+}

@@ -1,0 +1,160 @@
+//! `actq link` at the application in QEMU, through the socket of its serial port: what no other test types, and what it says where
+//! something is wrong with the line.
+
+use std::io::{Read as _, Write as _};
+use std::net::TcpListener;
+use std::process::{Output, Stdio};
+use std::thread;
+use std::time::Instant;
+
+use actq::runtime::ImageBuffer;
+use actq_bench::Target;
+use actq_bench::command::{actq, failed, run, succeeded};
+use actq_bench::controller::{Controller, PATIENCE, act};
+use actq_bench::firmware;
+use actq_bench::qemu::step_request;
+use actq_boards::Clock;
+use actq_link::RESET;
+use actq_link::code::State;
+use actq_ur3::ACT_DIM;
+use anyhow::{Context as _, Result, ensure};
+use tempfile::NamedTempFile;
+
+use crate::application::{file, self_test, small};
+
+/// With a small image in the slot, and as fast as the host: a byte takes it 40 µs.
+fn start() -> Result<(Controller, NamedTempFile)> {
+    let slot = file(&small()?)?;
+    let elf = firmware::controller(Target::Fpu, "")?;
+    Ok((Controller::start_by(Target::Fpu, &elf, Some(slot.path()), Clock::Host)?, slot))
+}
+
+fn link(controller: &Controller, words: &[&str], input: &[u8]) -> Result<Output> {
+    let port = controller.address().to_string();
+    let [command, more @ ..] = words else { anyhow::bail!("a command has a name") };
+    run(actq(&[&["link", command, &port], more].concat()), input)
+}
+
+/// The first observation of the image's self-test, and the bits of its action.
+fn observation(slot: &NamedTempFile) -> Result<(Vec<f32>, Vec<u32>)> {
+    self_test(&ImageBuffer::read(slot.path())?.image(slot.path())?, 0).context("it has a self-test")
+}
+
+#[test]
+fn arm_and_disarm_change_the_state() -> Result<()> {
+    let (controller, slot) = start()?;
+    let (observation, _) = observation(&slot)?;
+    failed(&link(&controller, &["arm"], b"")?, 1, &["not armed", "send observations before arming"])?;
+    // An observation is fresh for half a second, in which the command has to start.
+    let begun = Instant::now();
+    loop {
+        act(&mut controller.client()?, &observation)?;
+        let output = link(&controller, &["arm"], b"")?;
+        if output.status.success() {
+            break;
+        }
+        failed(&output, 1, &["not armed", "send observations before arming"])?;
+        ensure!(begun.elapsed() < PATIENCE, "never within the deadline");
+    }
+    // Latched, where the deadline has passed since.
+    assert_ne!(controller.client()?.status()?.state, State::Disarmed);
+    failed(&link(&controller, &["set", "deadline", "100"], b"")?, 1, &["deadline", "not set to 100"])?;
+    succeeded(&link(&controller, &["disarm"], b"")?)?;
+    assert_eq!(controller.client()?.status()?.state, State::Disarmed);
+    succeeded(&link(&controller, &["set", "deadline", "100"], b"")?)?;
+    assert_eq!(succeeded(&link(&controller, &["get", "deadline"], b"")?)?, "100\n");
+    let told = succeeded(&link(&controller, &["watch", "--once"], b"")?)?;
+    assert!(told.contains("state                 disarmed"), "{told}");
+    Ok(())
+}
+
+#[test]
+fn serve_answers_a_simulator_and_disarms_behind_it() -> Result<()> {
+    let (controller, slot) = start()?;
+    let (observation, bits) = observation(&slot)?;
+    let input = [&[RESET][..], &step_request(&observation), &[RESET], &step_request(&observation)].concat();
+    let output = link(&controller, &["serve"], &input)?;
+    succeeded_with(&output)?;
+    let told: Vec<u32> = output.stdout.as_chunks().0.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect();
+    assert_eq!(told, [&bits[..], &bits].concat());
+    // Armed, the answers are what the outputs are led to: an image without a contract leaves its axes still.
+    let begun = Instant::now();
+    loop {
+        let output = link(&controller, &["serve", "--arm"], &step_request(&observation))?;
+        if output.status.success() {
+            assert_eq!(output.stdout, [0; 4 * ACT_DIM]);
+            break;
+        }
+        // On a machine that is so busy that half a second has passed in between.
+        failed(&output, 1, &["no good observation"])?;
+        ensure!(begun.elapsed() < PATIENCE, "never within the deadline");
+    }
+    assert_eq!(controller.client()?.status()?.state, State::Disarmed);
+    failed(&link(&controller, &["serve"], b"x")?, 1, &["unknown command byte 0x78"])?;
+    failed(&link(&controller, &["serve"], &step_request(&observation)[..9])?, 1, &["ended inside an observation"])
+}
+
+/// As [`succeeded`], of an output that is no text.
+fn succeeded_with(output: &Output) -> Result<()> {
+    ensure!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    Ok(())
+}
+
+/// The board goes while a simulator is served: the command says so, once its patience is over.
+#[test]
+fn a_line_that_is_cut_is_told() -> Result<()> {
+    let (controller, slot) = start()?;
+    let (observation, bits) = observation(&slot)?;
+    let port = controller.address().to_string();
+    let mut child = actq(&["link", "serve", &port, "--patience", "3"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()?;
+    let mut stdin = child.stdin.take().context("no standard input")?;
+    let mut answer = vec![0; 4 * bits.len()];
+    stdin.write_all(&step_request(&observation))?;
+    child.stdout.as_mut().context("no standard output")?.read_exact(&mut answer)?;
+    assert_eq!(answer, bits.iter().flat_map(|bits| bits.to_le_bytes()).collect::<Vec<_>>());
+    drop(controller);
+    // Until then a step has no action.
+    for _ in 0..8 {
+        drop(stdin.write_all(&step_request(&observation)));
+    }
+    let output = child.wait_with_output()?;
+    failed(&output, 1, &[&port, "lost", "not there again for 3"])
+}
+
+/// Two at a time: QEMU's port, as a socket that takes one connection, leaves the second without an answer.
+#[test]
+fn a_port_that_another_program_has_is_told() -> Result<()> {
+    let (controller, _slot) = start()?;
+    let mut first = controller.client()?;
+    first.status()?;
+    failed(
+        &link(&controller, &["disarm", "--patience", "1"], b"")?,
+        1,
+        &["nothing came", "has no other program the port"],
+    )?;
+    drop(first);
+    succeeded(&link(&controller, &["disarm"], b"")?)?;
+    Ok(())
+}
+
+/// What answers is no controller, or one at another speed.
+#[test]
+fn an_answer_that_is_not_the_links_is_told() -> Result<()> {
+    let listener = TcpListener::bind("127.0.0.1:0")?;
+    let port = format!("tcp:{}", listener.local_addr()?);
+    let chatter = thread::spawn(move || -> Result<()> {
+        let (mut stream, _) = listener.accept()?;
+        // Until the command hangs up.
+        while stream.write_all(b"login: \0").is_ok() {
+            thread::sleep(std::time::Duration::from_millis(10));
+        }
+        Ok(())
+    });
+    let output = run(actq(&["link", "watch", &port, "--once", "--patience", "0.5"]), b"")?;
+    failed(&output, 1, &[&port, "what came is not this link's", "speed"])?;
+    chatter.join().map_err(|_| anyhow::anyhow!("it has panicked"))?
+}
