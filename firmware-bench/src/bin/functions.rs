@@ -36,6 +36,23 @@ mod firmware {
         core::array::from_fn(|i| f32::from_bits(((i as u32) << 31) | (i as u32 * (0x7f80_0000 / N as u32))))
     }
 
+    /// What leaves f32's range, is not in it, or is nothing.
+    const EXTREMES: [f32; 13] = [
+        f32::MAX,
+        f32::MIN,
+        1e38,
+        -1e38,
+        1.0,
+        -1.0,
+        f32::INFINITY,
+        f32::NEG_INFINITY,
+        f32::NAN,
+        1e-40,
+        -1e-40,
+        0.0,
+        -0.0,
+    ];
+
     fn run() -> Option<()> {
         let mut out = host::stdout()?;
         let mut line = |name: &str, results: &[&[f32]]| {
@@ -52,31 +69,48 @@ mod firmware {
         }
         let mut x = values::<LEN>();
         count::region(|| norm::layer_norm(black_box(&mut x), &constants, &constants, 1e-5));
-        line("layernorm", &[&x])?;
+        let mut rest = values::<13>();
+        norm::layer_norm(&mut rest, &constants, &constants, 1e-5);
+        line("layernorm", &[&x, &rest])?;
         let mut x = values::<LEN>();
         count::region(|| norm::rms_norm(black_box(&mut x), &constants, 1e-5));
-        line("rmsnorm", &[&x])?;
-        let (x, mut y) = (values::<LEN>(), [0.0; LEN]);
-        count::region(|| elementwise::normalize(black_box(&x), &constants, &constants, 1.0, 5.0, black_box(&mut y)));
-        line("normalize", &[&y])?;
+        let mut rest = values::<13>();
+        norm::rms_norm(&mut rest, &constants, 1e-5);
+        line("rmsnorm", &[&x, &rest])?;
+        let x = values::<LEN>();
         for (name, of) in [("add", elementwise::add as fn(&[f32], &mut [f32])), ("mul", elementwise::mul)] {
             let mut y = values::<LEN>();
             count::region(|| of(black_box(&x), black_box(&mut y)));
-            line(name, &[&y])?;
+            let mut rest = values::<13>();
+            of(&x, &mut rest);
+            line(name, &[&y, &rest])?;
         }
+        let mut y = [0.0; LEN];
+        count::region(|| elementwise::normalize(black_box(&x), &constants, &constants, 1.0, 5.0, black_box(&mut y)));
+        let [mut limited, mut free] = [EXTREMES; 2];
+        elementwise::normalize(&EXTREMES, &constants, &constants, 1e37, 5.0, &mut limited);
+        elementwise::normalize(&EXTREMES, &constants, &constants, f32::INFINITY, f32::INFINITY, &mut free);
+        line("normalize", &[&y, &limited, &free])?;
         let z: [f32; LEN] = core::array::from_fn(|i| normal(1, 2, i as u32));
         for (name, sample, limit, noise) in [
             ("denoise", 0.0, f32::INFINITY, &[][..]),
             ("denoise with noise", 0.0, f32::INFINITY, &z),
-            ("denoise by a limit", 0.4, 2.0, &[]),
-            ("denoise by a limit with noise", 0.4, 2.0, &z),
+            ("denoise, none limited", 0.4, 4.0, &[]),
+            ("denoise, half limited", 0.4, 1.8, &[]),
+            ("denoise, all limited", 0.4, 0.001, &[]),
+            ("denoise with noise, none", 0.4, 4.0, &z),
+            ("denoise with noise, half", 0.4, 1.8, &z),
+            ("denoise with noise, all", 0.4, 0.001, &z),
         ] {
-            let by = [sample, 0.5 * sample, 0.6, 0.2, sample, 0.1, 0.3];
-            let (by, mut next, mut y) = (Coefficients::from_array(by), values::<LEN>(), [0.0; LEN]);
+            let by = |x, v| Coefficients::from_array([x * sample, v * sample, 0.6, 0.2, sample, 0.1, 0.3]);
+            let (mut next, mut y) = (EXTREMES, EXTREMES);
+            denoise(&by(10.0, -9.0), limit, &EXTREMES, noise, &mut next, &mut y);
+            let (extremes, by) = ([next, y], by(1.0, 0.5));
+            let (mut next, mut y) = (values::<LEN>(), [0.0; LEN]);
             count::region(|| {
                 denoise(black_box(&by), limit, black_box(&x), noise, black_box(&mut next), black_box(&mut y))
             });
-            line(name, &[&next, &y[1..]])?;
+            line(name, &[&next, &y[1..], extremes.as_flattened()])?;
         }
         let mut z = [0.0; LEN];
         count::region(|| black_box(&mut z).iter_mut().zip(0..).for_each(|(z, i)| *z = normal(1, 2, i)));

@@ -35,7 +35,7 @@ use portable as floats;
 #[cfg(not(actq_armv7em))]
 use portable as integers;
 
-pub(crate) use floats::{gru_elements, lstm_elements, scale, sqrt};
+pub(crate) use floats::{denoise, gru_elements, lstm_elements, normalize, scale, sqrt, standardize, sum, sum_squares};
 pub(crate) use integers::copy;
 pub use product::{Mismatch, Product};
 

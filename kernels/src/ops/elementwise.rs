@@ -1,19 +1,11 @@
 //! Operations on the elements of vectors.
 
 use crate::arch;
-use crate::math::{clamp, zero_or_nan};
 
 /// `y = clamp((clamp(x, ±pre_clip) - mean) * scale, ±clip)`; an infinite clip does nothing. `mean` and `scale` hold f32
-/// bits. An x that is not finite gives NaN.
-#[inline(never)]
+/// bits. An x that is not finite gives NaN. As far as all go.
 pub fn normalize(x: &[f32], mean: &[u32], scale: &[u32], pre_clip: f32, clip: f32, y: &mut [f32]) {
-    for (((y, x), &mean), &scale) in y.iter_mut().zip(x).zip(mean).zip(scale) {
-        // A clip would hide that a value before it has left f32's range.
-        let zero = zero_or_nan(*x);
-        let x = clamp(*x, -pre_clip, pre_clip);
-        let z = (x - (constant(mean) + zero)) * constant(scale);
-        *y = clamp(z, -clip, clip);
-    }
+    arch::normalize(x, mean, scale, pre_clip, clip, y);
 }
 
 /// `y += x`, as far as both go.
@@ -51,10 +43,4 @@ pub(crate) fn copy_le(from: &[u32], to: &mut [u32]) {
     if cfg!(target_endian = "big") {
         to.iter_mut().for_each(|word| *word = u32::from_le(*word));
     }
-}
-
-/// An f32 constant as it stands in the image.
-#[inline(always)]
-pub(super) fn constant(bits: u32) -> f32 {
-    f32::from_bits(u32::from_le(bits))
 }

@@ -2,8 +2,7 @@
 
 use core::ops::Range;
 
-use super::elementwise::constant;
-use crate::arch::sqrt;
+use crate::arch::{sqrt, standardize, sum, sum_squares};
 use crate::cursor::Moments;
 use crate::math::zero_or_nan;
 
@@ -24,20 +23,11 @@ pub(crate) fn layer_norm_units(
     eps: f32,
 ) {
     let [summed, squared, normed] = [0, 1, 2].map(|pass| elements(&units, pass, x.len()));
-    moments.sum = sum(moments.sum, x.get(summed).unwrap_or(&[]), |v| v);
+    moments.sum = sum(moments.sum, x.get(summed).unwrap_or(&[]));
     let mean = moments.sum / count(x);
     let inverse = inverse_deviation(moments, x, squared, mean, eps);
     let (Some(weight), Some(bias)) = (weight.get(normed.clone()), bias.get(normed.clone())) else { return };
-    let apply = |x: &mut f32, weight: u32, bias: u32| *x = (*x - mean) * inverse * constant(weight) + constant(bias);
-    let ((odd, pairs), (weight, weights), (bias, biases)) =
-        (x.get_mut(normed).unwrap_or_default().as_rchunks_mut::<2>(), weight.as_rchunks::<2>(), bias.as_rchunks::<2>());
-    if let ([x], [weight], [bias]) = (odd, weight, bias) {
-        apply(x, *weight, *bias);
-    }
-    for ((x, weight), bias) in pairs.iter_mut().zip(weights).zip(biases) {
-        apply(&mut x[0], weight[0], bias[0]);
-        apply(&mut x[1], weight[1], bias[1]);
-    }
+    standardize(mean, inverse, x.get_mut(normed).unwrap_or_default(), weight, bias);
 }
 
 /// In place `x / sqrt(mean(x^2) + eps) * weight`. Nothing is done where weights are too few.
@@ -52,7 +42,7 @@ pub(crate) fn rms_norm_units(units: Range<usize>, moments: &mut Moments, x: &mut
     let inverse = inverse_deviation(moments, x, squared, 0.0, eps);
     let Some(weight) = weight.get(normed.clone()) else { return };
     for (x, &weight) in x.get_mut(normed).unwrap_or_default().iter_mut().zip(weight) {
-        *x = *x * inverse * constant(weight);
+        *x = *x * inverse * f32::from_bits(u32::from_le(weight));
     }
 }
 
@@ -65,19 +55,11 @@ fn elements(units: &Range<usize>, pass: usize, len: usize) -> Range<usize> {
 /// `1 / sqrt(mean((x - center)^2) + eps)`, once all squares are summed; adds those of some more elements.
 #[inline(never)]
 fn inverse_deviation(moments: &mut Moments, x: &[f32], squared: Range<usize>, center: f32, eps: f32) -> f32 {
-    moments.squares = sum(moments.squares, x.get(squared).unwrap_or(&[]), |v| (v - center) * (v - center));
+    moments.squares = sum_squares(moments.squares, center, x.get(squared).unwrap_or(&[]));
     // Divided by an infinite deviation, a vector would be zeros.
     1.0 / sqrt(moments.squares / count(x) + eps) + zero_or_nan(moments.squares)
 }
 
 fn count(x: &[f32]) -> f32 {
     x.len().max(1) as f32
-}
-
-/// `start` and then the elements in order from the first, four in a pass.
-#[inline(always)]
-fn sum(start: f32, x: &[f32], of: impl Fn(f32) -> f32) -> f32 {
-    let (rest, fours) = x.as_rchunks::<4>();
-    let sum = rest.iter().fold(start, |sum, v| sum + of(*v));
-    fours.iter().fold(sum, |sum, [a, b, c, d]| sum + of(*a) + of(*b) + of(*c) + of(*d))
 }

@@ -41,11 +41,9 @@ impl Price {
         match work {
             // No piece of its own: what a piece takes is the price of what follows.
             Work::Enter(op) => Self { first: 0, each: parts(cost::most(|add| cost::enter(op, add))) },
-            // A unit of a norm takes less than an element in all passes; each of its pieces computes anew what the sums
-            // give.
+            // A unit of a norm takes less than an element in all passes.
             Work::Elements(op) => {
-                let first = if op.units() == op.dst().len { 0 } else { cost::values(op).0.most() };
-                Self::new(first, cost::most(|add| cost::dearest_element(op, add)))
+                Self::new(cost::most(|add| cost::piece(op, add)), cost::most(|add| cost::dearest_element(op, add)))
             }
             Work::Magnitude(cols) => Self::new(cost::most(|add| cost::magnitude(cols, add)), 0),
             Work::Start(start) => Self::new(Feature::BIASED.most(), cost::most(|add| cost::start(start, 1, add))),

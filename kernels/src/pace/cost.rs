@@ -5,8 +5,8 @@
 //! says what one of it takes. Rates come from measurements alone: `cargo xtask fit` counts many operations under QEMU,
 //! solves for the rates, and writes `rates.rs`.
 //!
-//! Most code takes the same instructions whatever the values. Where it branches on values (elu, normalize and the
-//! action's limits) the expected cost is that of standard normal values, and a third rate says what one element takes
+//! Most code takes the same instructions whatever the values. Where it branches on values (elu and the action's
+//! limits) the expected cost is that of standard normal values, and a third rate says what one element takes
 //! at most; pieces of a step ([`crate::Head::poll`]) are measured by that.
 
 pub use super::feature::Feature;
@@ -160,11 +160,33 @@ pub fn features(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
 /// The features of so many of an operation's values. (Of a denoising step, as if all were like the first.)
 fn elements(op: &Op<'_>, len: usize, add: &mut dyn FnMut(Feature, usize)) {
     add(values(op).1, len);
+    rest(op, len % EIGHT, add);
     if op.kind == OpKind::Denoise {
         let ([sample_x, sample_v, _, _, _, sigma, _], _) = op.coefficients(0);
         add(Feature::LIMITED, if [sample_x, sample_v] == [0.0; 2] { 0 } else { len });
         add(Feature::STIRRED, if sigma == 0.0 { 0 } else { len });
     }
+}
+
+/// Values of a pass through the loops that have a slower one for the rest.
+const EIGHT: usize = 8;
+
+/// What so many values take more than others because they are the rest, fewer than [`EIGHT`].
+fn rest(op: &Op<'_>, len: usize, add: &mut dyn FnMut(Feature, usize)) {
+    match op.kind {
+        OpKind::Denoise => add(Feature::DENOISED_REST, len),
+        OpKind::Normalize => add(Feature::NORMALIZED_REST, len),
+        _ => {}
+    }
+}
+
+/// The features of a piece of an operation's values, but for those of each of them.
+pub(super) fn piece(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
+    // Each piece of a norm computes anew what the sums give.
+    if op.units() != op.dst().len {
+        add(values(op).0, 1);
+    }
+    rest(op, EIGHT - 1, add);
 }
 
 /// The features of one value of an operation, in whichever step it takes most.

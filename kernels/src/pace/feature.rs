@@ -36,6 +36,8 @@ singles! {
     LED "a value of an action that leads over to a new chunk"
     LIMITED "a value of an iterate whose predicted sample has a limit"
     STIRRED "a value of an iterate that noise is added to"
+    DENOISED_REST "a value of an iterate beyond the last eight"
+    NORMALIZED_REST "a value normalized beyond the last eight"
     POLL_OP "a call that runs one operation"
     POLL "a call that runs pieces"
     ENTERED "an operation that a poll comes to"

@@ -4,7 +4,7 @@
 mod table;
 
 use core::ops::Range;
-use core::ptr::NonNull;
+use core::ptr::{self, NonNull};
 use core::slice;
 
 use self::table::quantizer;
@@ -16,11 +16,25 @@ use crate::x::Plan;
 
 assembler!("vector.s");
 assembler!("cells.s");
+assembler!("elementwise.s");
 
 unsafe extern "C" {
     fn actq_sqrt(x: f32) -> f32;
     fn actq_lstm(gates: *const f32, row: usize, c: *mut f32, h: *mut f32, len: usize, cell: &[f32; 6]);
     fn actq_gru(a: *const f32, b: *const f32, row: usize, h: *mut f32, len: usize, cell: &[f32; 6]);
+    fn actq_denoise(by: &[f32; 7], limit: f32, v: *const f32, z: *const f32, x: *mut f32, y: *mut f32, len: usize);
+    fn actq_normalize(
+        pre_clip: f32,
+        clip: f32,
+        x: *const f32,
+        mean: *const u32,
+        scale: *const u32,
+        y: *mut f32,
+        len: usize,
+    );
+    fn actq_sum(start: f32, x: *const f32, len: usize) -> f32;
+    fn actq_sum_squares(start: f32, center: f32, x: *const f32, len: usize) -> f32;
+    fn actq_standardize(mean: f32, inverse: f32, x: *mut f32, weight: *const u32, bias: *const u32, len: usize);
     fn actq_scale_add(x_scale: f32, sums: *const i32, scales: *const u32, start: *const f32, y: *mut f32, len: usize);
 }
 
@@ -117,6 +131,46 @@ pub fn gru_elements(elements: Range<usize>, a: &[f32], b: &[f32], h: &mut [f32])
         let (a, b, h) = (a.as_ptr().add(start), b.as_ptr().add(start), h.as_mut_ptr().add(start));
         actq_gru(a, b, size_of::<f32>() * n, h, end - start, &CELL);
     }
+}
+
+/// See [`crate::ops::denoise::denoise`]; `by` are its coefficients, in their order.
+#[inline(always)]
+pub fn denoise(by: &[f32; 7], limit: f32, v: &[f32], z: &[f32], x: &mut [f32], y: &mut [f32]) {
+    let len = x.len().min(y.len()).min(v.len());
+    let (z, len) = if z.is_empty() { (ptr::null(), len) } else { (z.as_ptr(), len.min(z.len())) };
+    // SAFETY: all operands hold at least `len` values, or are none; the kernel reads and writes no others. Noise is only
+    // read where there is any.
+    unsafe { actq_denoise(by, limit, v.as_ptr(), z, x.as_mut_ptr(), y.as_mut_ptr(), len) }
+}
+
+/// See [`crate::ops::elementwise::normalize`].
+#[inline(always)]
+pub fn normalize(x: &[f32], mean: &[u32], scale: &[u32], pre_clip: f32, clip: f32, y: &mut [f32]) {
+    let len = y.len().min(x.len()).min(mean.len()).min(scale.len());
+    // SAFETY: all operands hold at least `len` values, and the kernel reads and writes no others.
+    unsafe { actq_normalize(pre_clip, clip, x.as_ptr(), mean.as_ptr(), scale.as_ptr(), y.as_mut_ptr(), len) }
+}
+
+/// `start` and the elements of `x`, in order.
+#[inline(always)]
+pub fn sum(start: f32, x: &[f32]) -> f32 {
+    // SAFETY: the kernel reads the elements of `x`.
+    unsafe { actq_sum(start, x.as_ptr(), x.len()) }
+}
+
+/// `start` and the squares of the differences of `x` from `center`, in order.
+#[inline(always)]
+pub fn sum_squares(start: f32, center: f32, x: &[f32]) -> f32 {
+    // SAFETY: the kernel reads the elements of `x`.
+    unsafe { actq_sum_squares(start, center, x.as_ptr(), x.len()) }
+}
+
+/// In place `(x - mean) * inverse * weight + bias`, as far as all go.
+#[inline(always)]
+pub fn standardize(mean: f32, inverse: f32, x: &mut [f32], weight: &[u32], bias: &[u32]) {
+    let len = x.len().min(weight.len()).min(bias.len());
+    // SAFETY: all operands hold at least `len` values; the kernel reads and writes no others.
+    unsafe { actq_standardize(mean, inverse, x.as_mut_ptr(), weight.as_ptr(), bias.as_ptr(), len) }
 }
 
 /// The FPU's square root, which is correctly rounded as IEEE 754 has it.

@@ -1,9 +1,13 @@
 //! Everything in plain Rust, for any target: the arithmetic of the assembler backends, operation for operation.
 
 mod cells;
+mod elementwise;
 mod gemv;
+mod norm;
 mod vector;
 
 pub use cells::{gru_elements, lstm_elements};
+pub use elementwise::{denoise, normalize};
 pub use gemv::gemv;
+pub use norm::{standardize, sum, sum_squares};
 pub use vector::{copy, magnitude, quantize, scale, sqrt};

@@ -45,7 +45,7 @@ const SHAPES: [(usize, usize); 28] = [
     (288, 128),
 ];
 /// Lengths of elementwise operations, and of the states of cells.
-const LENGTHS: [usize; 5] = [8, 33, 64, 100, 256];
+const LENGTHS: [usize; 5] = [8, 39, 64, 100, 256];
 const HIDDEN: [usize; 4] = [8, 24, 64, 100];
 /// Actions of chunks, and values of an action.
 const CHUNKS: [(usize, usize); 5] = [(2, 3), (8, 7), (16, 2), (20, 14), (50, 6)];
