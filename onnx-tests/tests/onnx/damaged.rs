@@ -98,7 +98,8 @@ fn each_wrong_file_is_refused_by_what_is_wrong_with_it() {
     });
     refused(circle, "node 0 \"/node/0\" (Add): reads \"b\" before anything gives it: the graph has a circle");
     refused(node("Add", &["nowhere"], &[]), "reads \"nowhere\" before anything gives it");
-    refused(node("MaxPool", &["obs"], &[]), "node 0 \"/node/0\" (MaxPool): has no kernel here; export the part behind");
+    refused(node("MaxPool", &["obs"], &[]), "node 0 \"/node/0\" (MaxPool): its kernel does not fit [1, 4]");
+    refused(node("ConvTranspose", &["obs"], &[]), "(ConvTranspose): has no kernel here; export the part behind");
     refused(node("MatMul", &["obs"], &[]), "multiplies two values of the network, as attention does");
     refused(node("Softmax", &[], &[]), "(Softmax): has no kernel here");
     refused(node("Sqrt", &[], &[]), "node 0 \"/node/0\" (Sqrt): a square root has no kernel here by itself");

@@ -67,6 +67,8 @@ pub(super) struct Cell {
 pub(super) enum Expr {
     /// Graph input of this index.
     Input(usize),
+    /// Graph input of this index, of integers that are not yet cast to float.
+    Integers(usize),
     /// Runs behind each other.
     Pick(Vec<Run>),
     /// The one element of a value, again and again.
@@ -96,7 +98,7 @@ impl Expr {
     /// What it reads.
     pub(super) fn operands(&self) -> Vec<Id> {
         match self {
-            Self::Input(_) => vec![],
+            Self::Input(_) | Self::Integers(_) => vec![],
             Self::Pick(runs) => runs.iter().map(|run| run.of).collect(),
             Self::Add(x, y) | Self::Mul(x, y) => vec![*x, *y],
             Self::Cell(cell) => vec![cell.x],
