@@ -302,11 +302,11 @@ impl Exprs {
         }
         // Squares of a row among others, which a norm compares with its row.
         if let Expr::Pick(runs) = self.get(x)
-            && let &[Run { of, from, len }] = &runs[..]
-            && let &Expr::Mul(row, same) = self.get(of)
-            && row == same
+            && let &[run] = &runs[..]
+            && let &Expr::Mul(all, same) = self.get(run.of)
+            && all == same
+            && let Some(row) = self.within(Run { of: all, ..run })
         {
-            let row: Vec<(Id, usize)> = self.elements(row)[from..from + len].iter().filter_map(value).collect();
             let row = self.vector(&row);
             let squares = self.mul(row, row);
             return self.put(Expr::Sum(squares), 1);

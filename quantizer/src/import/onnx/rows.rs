@@ -43,6 +43,23 @@ fn rows(exprs: &mut Exprs, at: &[usize], operand: &[Element]) -> Option<Vec<Vec<
 }
 
 impl Exprs {
+    /// The elements of a run, as those of what is only moved there, of at most so many runs as there may be rows.
+    pub(super) fn within(&self, run: Run) -> Option<Vec<(Id, usize)>> {
+        let all = match self.get(run.of) {
+            Expr::Spread(one) => return Some(vec![(*one, 0); run.len]),
+            Expr::Pick(runs) if runs.len() <= MOST_ROWS => runs,
+            Expr::Pick(_) => return None,
+            _ => return Some((run.from..run.from + run.len).map(|i| (run.of, i)).collect()),
+        };
+        let (mut skip, mut elements) = (run.from, Vec::with_capacity(run.len));
+        for part in all {
+            let places = part.from + skip.min(part.len)..part.from + part.len;
+            elements.extend(places.take(run.len - elements.len()).map(|i| (part.of, i)));
+            skip = skip.saturating_sub(part.len);
+        }
+        Some(elements)
+    }
+
     /// Element `i` of a value as a value by itself, where it is computed of sums alone.
     pub(super) fn lone(&mut self, of: Id, i: usize) -> Option<Id> {
         self.lone_within(of, i, DEPTH, &mut Found::new())
@@ -56,16 +73,9 @@ impl Exprs {
         let mut at = |exprs: &mut Self, x: Id, i: usize| exprs.lone_within(x, i, depth, found);
         let lone = match *self.get(of) {
             Expr::Sum(_) => Some(of),
-            Expr::Spread(one) => at(self, one, 0),
-            Expr::Pick(ref runs) if runs.len() <= MOST_ROWS => {
-                let mut left = i;
-                let holds = |run: &&Run| {
-                    let is_here = left < run.len;
-                    left = if is_here { left } else { left - run.len };
-                    is_here
-                };
-                let run = *runs.iter().find(holds)?;
-                at(self, run.of, run.from + left)
+            Expr::Pick(_) | Expr::Spread(_) => {
+                let [(of, i)] = self.within(Run { of, from: i, len: 1 })?[..] else { return None };
+                at(self, of, i)
             }
             Expr::Affine(x, ref a, ref b) => {
                 let (a, b) = (a[i], b[i]);
