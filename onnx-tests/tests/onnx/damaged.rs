@@ -88,6 +88,14 @@ fn each_wrong_file_is_refused_by_what_is_wrong_with_it() {
         file.nodes("Identity", &[&x], &["actions"], &[]);
     });
     refused(doubled, "gives more values than a policy of this size can have");
+    // Neither side of the padding alone.
+    let padded = with(|file| {
+        let pads = file.ints(&[0, 600_000, 0, 600_000]);
+        let x = file.node("Pad", &["obs", &pads], &[]);
+        let pads = file.ints(&[2, 0, 2, 0]);
+        file.nodes("Pad", &[&x, &pads], &["actions"], &[]);
+    });
+    refused(padded, "(Pad): [5, 1200004] are more values than a policy of this size can have");
     refused(external("../secret"), "outside the model's folder");
     refused(external("/etc/passwd"), "outside the model's folder");
     refused(external("weights.bin"), "is not beside the model; copy both together");
@@ -98,7 +106,8 @@ fn each_wrong_file_is_refused_by_what_is_wrong_with_it() {
     });
     refused(circle, "node 0 \"/node/0\" (Add): reads \"b\" before anything gives it: the graph has a circle");
     refused(node("Add", &["nowhere"], &[]), "reads \"nowhere\" before anything gives it");
-    refused(node("MaxPool", &["obs"], &[]), "node 0 \"/node/0\" (MaxPool): has no kernel here; export the part behind");
+    refused(node("MaxPool", &["obs"], &[]), "node 0 \"/node/0\" (MaxPool): its kernel does not fit [1, 4]");
+    refused(node("ConvTranspose", &["obs"], &[]), "(ConvTranspose): has no kernel here; export the part behind");
     refused(node("MatMul", &["obs"], &[]), "multiplies two values of the network, as attention does");
     refused(node("Softmax", &[], &[]), "(Softmax): has no kernel here");
     refused(node("Sqrt", &[], &[]), "node 0 \"/node/0\" (Sqrt): a square root has no kernel here by itself");

@@ -104,7 +104,7 @@ fn powers_logarithms_and_lengths_are_found() -> Result<()> {
             file.node("Pow", &[x, &four], &[])
         }),
         // A LeakyReLU behind a norm, which takes the slope.
-        ("layernorm relu layernorm add", |file, x| {
+        ("layernorm relu normalize add", |file, x| {
             let (w, b) = (file.drawn(&[16]), file.drawn(&[16]));
             let x = file.node("LayerNormalization", &[x, &w, &b], &[("axis", Value::Int(-1))]);
             let (zero, slope) = (file.reals(&[], &[0.0]), file.reals(&[], &[0.1]));

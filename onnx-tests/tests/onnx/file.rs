@@ -34,24 +34,33 @@ pub(super) fn encoded(message: &impl prost::Message) -> Bytes {
     message.encode_to_vec().into()
 }
 
-fn port(name: &str, dims: &[i64]) -> Bytes {
+/// ONNX's types of inputs and outputs.
+const FLOAT: i32 = 1;
+const INT64: i32 = 7;
+
+fn port(name: &str, kind: i32, dims: &[i64]) -> Bytes {
     let axis = |&n: &i64| match n {
         0.. => proto::Dimension { dim_value: Some(n), dim_param: None },
         _ => proto::Dimension { dim_value: None, dim_param: Some("batch".to_owned()) },
     };
     let shape = proto::Shape { dim: dims.iter().map(|n| encoded(&axis(n))).collect() };
-    let tensor_type = Some(proto::TensorType { elem_type: Some(1), shape: Some(shape) });
+    let tensor_type = Some(proto::TensorType { elem_type: Some(kind), shape: Some(shape) });
     encoded(&proto::ValueInfo { name: Some(name.to_owned()), r#type: Some(proto::Type { tensor_type }) })
 }
 
 impl File {
     /// An input; -1 is a dynamic axis.
     pub(super) fn input(&mut self, name: &str, dims: &[i64]) {
-        self.graph.input.push(port(name, dims));
+        self.graph.input.push(port(name, FLOAT, dims));
+    }
+
+    /// An input of integers.
+    pub(super) fn integers(&mut self, name: &str, dims: &[i64]) {
+        self.graph.input.push(port(name, INT64, dims));
     }
 
     pub(super) fn output(&mut self, name: &str, dims: &[i64]) {
-        self.graph.output.push(port(name, dims));
+        self.graph.output.push(port(name, FLOAT, dims));
     }
 
     pub(super) fn initializer(&mut self, tensor: &proto::Tensor) {

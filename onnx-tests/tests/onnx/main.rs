@@ -6,6 +6,9 @@ mod constants;
 mod damaged;
 mod exporters;
 mod file;
+mod integers;
+mod pools;
+mod rows;
 mod styles;
 
 use std::path::Path;

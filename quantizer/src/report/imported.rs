@@ -10,7 +10,8 @@ pub fn summary(imported: &Imported, policy: &Policy) -> String {
     let mut at = 0;
     for (i, (name, len)) in imported.inputs.iter().enumerate() {
         let head = if i == 0 { "input" } else { "" };
-        text += &format!("{head:9} obs[{at}:{}] = {name}\n", at + len);
+        let integers = if imported.integers.contains(name) { ", integers" } else { "" };
+        text += &format!("{head:9} obs[{at}:{}] = {name}{integers}\n", at + len);
         at += len;
     }
     for (from, to, len) in &imported.states {

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use crate::data::{Dataset, Range, Recordings, runs};
-use crate::measure::check::Check;
+use crate::measure::check::{Check, Checked};
 use crate::measure::eval::{ActivationShare, ErrorReport};
 use crate::policy::Policy;
 
@@ -35,22 +35,24 @@ pub fn how_to_record(policy: &Policy) -> String {
 
 /// The errors in a few lines.
 pub fn errors(check: &Check) -> String {
-    let calib = check.calib.as_ref().map_or(String::new(), |report| line("calibration nmse", report));
-    format!("{calib}{}{:<17} {}\n", line("held-out nmse", &check.heldout), "activations", check.activations)
+    let of = |name: &str, checked: &Checked| line(name, &checked.report, checked.recorded);
+    let calib = check.calib.as_ref().map_or(String::new(), |checked| of("calibration nmse", checked));
+    format!("{calib}{}{:<17} {}\n", of("held-out nmse", &check.heldout), "activations", check.activations)
 }
 
 /// The error where the image itself has led.
 pub fn own_path(report: &ErrorReport) -> String {
-    line("own-path nmse", report)
+    line("own-path nmse", report, report.steps)
 }
 
-fn line(name: &str, report: &ErrorReport) -> String {
-    format!("{name:<17} {:.3e}   ({} observations)\n", report.nmse, report.steps)
+fn line(name: &str, report: &ErrorReport, recorded: usize) -> String {
+    let of = if recorded > report.steps { format!(" of {recorded}") } else { String::new() };
+    format!("{name:<17} {:.3e}   ({}{of} observations)\n", report.nmse, report.steps)
 }
 
 /// A warning where the held-out error is far above the calibration error.
 pub fn overfit_warning(check: &Check) -> Option<String> {
-    let (heldout, calib) = (check.heldout.nmse, check.calib.as_ref()?.nmse);
+    let (heldout, calib) = (check.heldout.report.nmse, check.calib.as_ref()?.report.nmse);
     (heldout > TIMES * calib && heldout > calib + ABOVE).then(|| {
         format!(
             "the held-out error is {:.1} times the calibration error: the image fits what was recorded for it better \
@@ -89,7 +91,8 @@ mod tests {
 
     fn check(calib: Option<f64>, heldout: f64) -> Check {
         let activations = ActivationShare { unrounded_nmse: 0.0, share: 0.125, int16: vec![0, 4], linear: 5 };
-        Check { heldout: report(heldout), calib: calib.map(report), activations }
+        let checked = |nmse: f64, recorded: usize| Checked { report: report(nmse), recorded };
+        Check { heldout: checked(heldout, 7), calib: calib.map(|nmse| checked(nmse, 30)), activations }
     }
 
     #[test]
@@ -106,7 +109,7 @@ mod tests {
     fn the_summary_has_a_line_for_each_error() {
         assert_eq!(
             errors(&check(Some(0.002), 0.0084)),
-            "calibration nmse  2.000e-3   (7 observations)\n\
+            "calibration nmse  2.000e-3   (7 of 30 observations)\n\
              held-out nmse     8.400e-3   (7 observations)\n\
              activations       12% of the error (int8; linear operations in int16: 0, 4)\n"
         );

@@ -77,7 +77,14 @@ fn check(model: &Path, imported: &Imported, policy: &Policy, calib: Option<&Data
         Some(calib) => calib.episode(0).take(FRAMES).collect(),
         None => {
             let mut random = Random::new(1);
-            (0..FRAMES).map(|_| (0..policy.graph.obs_len).map(|_| 2.0 * random.unit()).collect()).collect()
+            // What the file takes as integers is drawn so.
+            let whole = |(name, len): &(String, usize)| vec![imported.integers.contains(name); *len];
+            let whole: Vec<bool> = imported.inputs.iter().flat_map(whole).collect();
+            let mut value = |whole: &bool| {
+                let value = 2.0 * random.unit();
+                if *whole { (100.0 * value).round() } else { value }
+            };
+            (0..FRAMES).map(|_| whole.iter().map(&mut value).collect()).collect()
         }
     };
     let states: Vec<[&str; 2]> = imported.states.iter().map(|(from, to, _)| [from.as_str(), to]).collect();

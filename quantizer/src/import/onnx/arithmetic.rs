@@ -8,6 +8,7 @@ use super::expr::{Exprs, Id, Unary};
 use super::known;
 use super::moves::expanded;
 use super::places::broadcast;
+use super::rows::by_row;
 use super::tensor::{Element, Tensor};
 
 /// Which of two elements are known.
@@ -39,35 +40,37 @@ pub(super) fn two(op: &str, exprs: &mut Exprs, x: &Tensor, y: &Tensor, most: usi
     let mut all = x.clone();
     for kind in [Open::Neither, Open::First, Open::Second, Open::Both] {
         let at: Vec<usize> = (0..x.len()).filter(|&i| open(i) == kind).collect();
-        let at = in_order(at, &|i| {
-            let (x, y) = (value(&x[i]), value(&y[i]));
-            [x.or(y).unwrap_or_default(), y.or(x).unwrap_or_default()]
-        });
         if at.is_empty() {
             continue;
         }
-        let [values_x, values_y] = [&x, &y].map(|v| at.iter().filter_map(|&i| value(&v[i])).collect::<Vec<_>>());
-        let [known_x, known_y] = [&x, &y].map(|v| at.iter().map(|&i| known(&v[i])).collect::<Vec<f64>>());
-        let result = match kind {
-            Open::Neither => {
-                let f = known::real(op).with_context(|| format!("{op} of constants beside values is not taken"))?;
-                known_x.into_iter().zip(known_y).map(|(x, y)| Element::Known(f(x, y))).collect()
-            }
-            Open::First => {
-                let x = exprs.vector(&values_x);
-                with_known(op, exprs, x, &known_y)?
-            }
-            Open::Second => {
-                let y = exprs.vector(&values_y);
-                known_with(op, exprs, &known_x, y)?
-            }
-            Open::Both => {
-                let (x, y) = (exprs.vector(&values_x), exprs.vector(&values_y));
-                let result = both(op, exprs, x, y)?;
-                exprs.elements(result)
-            }
-        };
-        at.into_iter().zip(result).for_each(|(i, element)| all[i] = element);
+        for at in by_row(exprs, at, [&x, &y]) {
+            let at = in_order(at, &|i| {
+                let (x, y) = (value(&x[i]), value(&y[i]));
+                [x.or(y).unwrap_or_default(), y.or(x).unwrap_or_default()]
+            });
+            let [values_x, values_y] = [&x, &y].map(|v| at.iter().filter_map(|&i| value(&v[i])).collect::<Vec<_>>());
+            let [known_x, known_y] = [&x, &y].map(|v| at.iter().map(|&i| known(&v[i])).collect::<Vec<f64>>());
+            let result = match kind {
+                Open::Neither => {
+                    let f = known::real(op).with_context(|| format!("{op} of constants beside values is not taken"))?;
+                    known_x.into_iter().zip(known_y).map(|(x, y)| Element::Known(f(x, y))).collect()
+                }
+                Open::First => {
+                    let x = exprs.vector(&values_x);
+                    with_known(op, exprs, x, &known_y)?
+                }
+                Open::Second => {
+                    let y = exprs.vector(&values_y);
+                    known_with(op, exprs, &known_x, y)?
+                }
+                Open::Both => {
+                    let (x, y) = (exprs.vector(&values_x), exprs.vector(&values_y));
+                    let result = both(op, exprs, x, y)?;
+                    exprs.elements(result)
+                }
+            };
+            at.into_iter().zip(result).for_each(|(i, element)| all[i] = element);
+        }
     }
     Ok(Tensor::of_elements(shape, all))
 }

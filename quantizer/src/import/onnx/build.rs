@@ -32,7 +32,7 @@ impl Exprs {
         match runs[..] {
             [Run { of, from: 0, len }] if len == self.len_of(of) => of,
             [first, ..] if elements.len() > 1 && elements.iter().all(|e| *e == elements[0]) => {
-                let one = if self.len_of(first.of) == 1 { first.of } else { self.put(Expr::Pick(vec![first]), 1) };
+                let one = self.lone(first.of, first.from).unwrap_or_else(|| self.vector(&elements[..1]));
                 self.put(Expr::Spread(one), elements.len())
             }
             _ => self.put(Expr::Pick(runs), elements.len()),
@@ -82,12 +82,12 @@ impl Exprs {
                 let norm = Expr::RmsNorm(*of, product(weight, &a), *eps);
                 self.put(norm, len)
             }
-            // Rows that went through the same matrix, with their bias behind them.
-            Expr::Pick(runs) if ones && runs.len() > 1 && runs.iter().all(|run| self.is_whole_linear(run)) => {
+            // Rows that went through the same matrix, with their bias behind them, or through norms.
+            Expr::Pick(runs) if runs.len() > 1 && runs.iter().all(|run| self.takes(run, ones, zeros)) => {
                 let (runs, mut at, mut moved) = (runs.clone(), 0, Vec::new());
                 for run in runs {
-                    let b = b[at..at + run.len].to_vec();
-                    moved.push(Run { of: self.affine(run.of, vec![1.0; run.len], b), ..run });
+                    let (a, b) = (a[at..at + run.len].to_vec(), b[at..at + run.len].to_vec());
+                    moved.push(Run { of: self.affine(run.of, a, b), ..run });
                     at += run.len;
                 }
                 self.put(Expr::Pick(moved), len)
@@ -101,8 +101,16 @@ impl Exprs {
         }
     }
 
-    fn is_whole_linear(&self, run: &Run) -> bool {
-        matches!(self.get(run.of), Expr::Linear(..)) && run.from == 0 && run.len == self.len_of(run.of)
+    /// Whether a run is a whole layer or norm that takes factors and offsets into itself; `ones` and `zeros`: there are no factors, or
+    /// no offsets.
+    fn takes(&self, run: &Run, ones: bool, zeros: bool) -> bool {
+        let of_kind = match self.get(run.of) {
+            Expr::Linear(..) => ones,
+            Expr::LayerNorm(..) => true,
+            Expr::RmsNorm(..) => zeros,
+            _ => false,
+        };
+        of_kind && run.from == 0 && run.len == self.len_of(run.of)
     }
 
     /// `W x + b`
@@ -186,11 +194,18 @@ impl Exprs {
         for (x, inverse) in [(s, t), (t, s)] {
             let &Expr::Spread(one) = self.get(inverse) else { continue };
             let sum = if m == one { r } else { m };
-            let same = (m == one || r == one) && *self.get(sum) == Expr::Sum(x) && zero == 0.0;
-            if same && a.iter().zip(&c).all(|(a, c)| near(c * k * n, -a)) {
+            let &Expr::Sum(whole) = self.get(sum) else { continue };
+            // Factors of what is normed have come out of the product.
+            let (of, factors, zeros) = self.split(whole);
+            let is_normed = whole == x || of == x && uniform(&zeros) == Some(0.0);
+            if !is_normed || (m != one && r != one) || zero != 0.0 {
+                continue;
+            }
+            let a: Vec<f64> = if whole == x { a.clone() } else { a.iter().zip(&factors).map(|(a, f)| a / f).collect() };
+            if a.iter().zip(&c).all(|(a, c)| near(c * k * n, -a)) {
                 let mean = self.scaled(sum, -1.0 / n, 0.0);
                 let mean = self.put(Expr::Spread(mean), n as usize);
-                let centred = self.add(x, mean);
+                let centred = self.add(whole, mean);
                 return Some((centred, inverse, a, b.iter().zip(&d).map(|(b, d)| b + d).collect()));
             }
         }
@@ -219,17 +234,24 @@ impl Exprs {
             }
         }
         for (p, q) in [(x, y), (y, x)] {
-            if let Expr::Affine(of, a, b) = self.get(p)
-                && uniform(b) == Some(0.0)
-            {
-                let (of, a, b) = (*of, a.clone(), b.clone());
-                let product = self.mul(of, q);
-                return self.affine(product, a, b);
-            }
             if let &Expr::Spread(one) = self.get(q)
                 && let Some(norm) = self.norm(p, one)
             {
                 return self.normed(p, norm);
+            }
+        }
+        // Factors come out of the product; those of a root that is spread first, as those of what it norms belong to its squares.
+        let of_spread =
+            |id: Id| matches!(self.get(id), Expr::Affine(of, ..) if matches!(self.get(*of), Expr::Spread(_)));
+        let (p, q) = if of_spread(y) { (y, x) } else { (x, y) };
+        for (p, q) in [(p, q), (q, p)] {
+            if let Expr::Affine(of, a, b) = self.get(p)
+                && uniform(b) == Some(0.0)
+                && (x != y || uniform(a).is_some())
+            {
+                let (of, a, b) = (*of, a.clone(), b.clone());
+                let product = self.mul(of, q);
+                return self.affine(product, a, b);
             }
         }
         self.put(Expr::Mul(x.min(y), x.max(y)), len)
@@ -275,7 +297,21 @@ impl Exprs {
 
     /// The sum of all elements.
     pub(super) fn sum(&mut self, x: Id) -> Id {
-        if self.len_of(x) == 1 { x } else { self.put(Expr::Sum(x), 1) }
+        if self.len_of(x) == 1 {
+            return x;
+        }
+        // Squares of a row among others, which a norm compares with its row.
+        if let Expr::Pick(runs) = self.get(x)
+            && let &[run] = &runs[..]
+            && let &Expr::Mul(all, same) = self.get(run.of)
+            && all == same
+            && let Some(row) = self.within(Run { of: all, ..run })
+        {
+            let row = self.vector(&row);
+            let squares = self.mul(row, row);
+            return self.put(Expr::Sum(squares), 1);
+        }
+        self.put(Expr::Sum(x), 1)
     }
 
     /// `max(x, low)`

@@ -109,7 +109,7 @@ impl<'a> Call<'a> {
             "Attention" | "MultiHeadAttention" | "GroupQueryAttention" => {
                 bail!("attention has no kernel here; export the part behind it as a policy of its own")
             }
-            "ConvTranspose" | "MaxPool" | "AveragePool" => {
+            "ConvTranspose" => {
                 bail!("has no kernel here; export the part behind the encoder as a policy of its own")
             }
             "Softmax" | "LogSoftmax" | "ArgMax" | "TopK" => {

@@ -15,7 +15,7 @@ use super::tensor::{Data, Element, Tensor, count};
 const MOST_PRODUCTS: usize = 64;
 
 /// An axis that the kernel moves along.
-struct Axis {
+pub(super) struct Axis {
     /// Length of the operand.
     len: usize,
     /// Length of the kernel.
@@ -24,7 +24,17 @@ struct Axis {
     dilation: usize,
     /// Zeros before the operand.
     pad: usize,
-    positions: usize,
+    /// Of the kernel.
+    pub(super) positions: usize,
+    /// Values behind the last position, which the kernel does not reach.
+    rest: usize,
+}
+
+impl Axis {
+    /// Whether the positions end with the operand and its padding.
+    pub(super) fn is_even(&self) -> bool {
+        self.rest == 0
+    }
 }
 
 /// The output, where the node is a convolution.
@@ -86,7 +96,8 @@ pub(super) fn run(call: &Call<'_>, exprs: &mut Exprs, budget: &mut usize) -> Res
     y.taken(turned, &places)?.reshaped([vec![1, outputs], shape].concat()).map(Some)
 }
 
-fn axes(call: &Call<'_>, lens: &[usize], kernel: &[usize]) -> Result<Vec<Axis>> {
+/// The axes of a kernel of these lengths along operands of these, by the node's attributes.
+pub(super) fn axes(call: &Call<'_>, lens: &[usize], kernel: &[usize]) -> Result<Vec<Axis>> {
     let n = lens.len();
     let list = |name: &str, count: usize, default: usize| -> Result<Vec<usize>> {
         let Some(given) = call.ints(name) else { return Ok(vec![default; count]) };
@@ -109,13 +120,14 @@ fn axes(call: &Call<'_>, lens: &[usize], kernel: &[usize]) -> Result<Vec<Axis>> 
         };
         let whole = len.saturating_add(before).saturating_add(behind);
         ensure!(reach <= whole, "its kernel reaches over {reach} of {whole} values");
-        Ok(Axis { len, kernel, stride, dilation, pad: before, positions: (whole - reach) / stride + 1 })
+        let (steps, rest) = ((whole - reach) / stride, (whole - reach) % stride);
+        Ok(Axis { len, kernel, stride, dilation, pad: before, positions: steps + 1, rest })
     };
     (0..n).map(one).collect()
 }
 
 /// What the kernel sees at a position, as places of a channel; `None` is padding.
-fn window(axes: &[Axis], position: usize) -> Vec<Option<usize>> {
+pub(super) fn window(axes: &[Axis], position: usize) -> Vec<Option<usize>> {
     // The position along each axis, the last one first.
     let mut left = position;
     let mut starts: Vec<usize> = Vec::with_capacity(axes.len());

@@ -49,7 +49,7 @@ impl Exprs {
                     let s = inverse_root(of(x)?, *eps);
                     of(x)?.iter().zip(weight).map(|(v, w)| v * s * w).collect()
                 }
-                Expr::Linear(..) | Expr::Cell(_) | Expr::CellState(_) => return None,
+                Expr::Integers(_) | Expr::Linear(..) | Expr::Cell(_) | Expr::CellState(_) => return None,
             };
             values.insert(id, value);
         }

@@ -67,6 +67,8 @@ pub(super) struct Cell {
 pub(super) enum Expr {
     /// Graph input of this index.
     Input(usize),
+    /// Graph input of this index, of integers that are not yet cast to float.
+    Integers(usize),
     /// Runs behind each other.
     Pick(Vec<Run>),
     /// The one element of a value, again and again.
@@ -96,7 +98,7 @@ impl Expr {
     /// What it reads.
     pub(super) fn operands(&self) -> Vec<Id> {
         match self {
-            Self::Input(_) => vec![],
+            Self::Input(_) | Self::Integers(_) => vec![],
             Self::Pick(runs) => runs.iter().map(|run| run.of).collect(),
             Self::Add(x, y) | Self::Mul(x, y) => vec![*x, *y],
             Self::Cell(cell) => vec![cell.x],
@@ -117,8 +119,8 @@ impl Expr {
 #[derive(Debug, Default)]
 pub(super) struct Exprs {
     all: Vec<(Expr, usize)>,
-    /// By kind and first operand.
-    known: HashMap<(std::mem::Discriminant<Expr>, Id), Vec<Id>>,
+    /// By kind, first operand, and where that is cut: rows of one value must not be looked for among each other.
+    known: HashMap<(std::mem::Discriminant<Expr>, Id, usize), Vec<Id>>,
     /// Values with a limit on one side: of what, and the limits, of which one is infinite.
     pub(super) limited: HashMap<Id, (Id, f64, f64)>,
     /// Which node of the file each came up in.
@@ -130,7 +132,11 @@ pub(super) struct Exprs {
 impl Exprs {
     /// The expression, which may be there already.
     pub(super) fn put(&mut self, expr: Expr, len: usize) -> Id {
-        let key = (discriminant(&expr), expr.operands().first().copied().unwrap_or(0));
+        let (first, from) = match &expr {
+            Expr::Pick(runs) => runs.first().map_or((0, 0), |run| (run.of, run.from)),
+            _ => (expr.operands().first().copied().unwrap_or(0), 0),
+        };
+        let key = (discriminant(&expr), first, from);
         let same = self.known.entry(key).or_default();
         if let Some(&id) = same.iter().find(|&&id| self.all[id].0 == expr && self.all[id].1 == len) {
             return id;

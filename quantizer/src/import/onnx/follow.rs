@@ -9,11 +9,14 @@ use super::call::Call;
 use super::expr::{Expr, Exprs};
 use super::model::{Graph, Model, Node, Port, kind_name};
 use super::tensor::{Data, Element, Tensor, count};
-use super::{cells, conditions, convolutions, einsum, known, moves, pointwise, products, reductions};
+use super::{cells, conditions, convolutions, einsum, integers, known, moves, pointwise, pools, products, reductions};
 use crate::text::printable;
 
 /// ONNX's type of truth values.
 const TRUTH: i64 = 9;
+
+/// ONNX's int32 and int64.
+pub(super) const INTEGERS: [i32; 2] = [6, 7];
 
 /// Graphs and functions within each other.
 const MOST_DEPTH: usize = 16;
@@ -170,6 +173,9 @@ impl<'m> Follower<'m> {
         {
             return Ok(vec![truth]);
         }
+        if let Some(output) = integers::cast(call, &mut self.exprs)? {
+            return Ok(vec![output]);
+        }
         if let Some(outputs) = moves::run(call, most)? {
             return Ok(outputs);
         }
@@ -189,6 +195,9 @@ impl<'m> Follower<'m> {
         if let Some(output) = convolutions::run(call, exprs, &mut self.budget)? {
             return Ok(vec![output]);
         }
+        if let Some(output) = pools::run(call, exprs, most)? {
+            return Ok(vec![output]);
+        }
         if let Some(output) = reductions::run(call, exprs)? {
             return Ok(vec![output]);
         }
@@ -200,9 +209,9 @@ impl<'m> Follower<'m> {
 
     fn input(&mut self, i: usize, port: &Port) -> Result<Tensor> {
         let name = printable(&port.name);
-        let types = [0, 1, 11].contains(&port.kind);
+        let integers = INTEGERS.contains(&port.kind);
         ensure!(
-            types,
+            integers || [0, 1, 11].contains(&port.kind),
             "the input {name:?} is of {}; an observation is of float32, so export it as that",
             kind_name(port.kind)
         );
@@ -223,7 +232,7 @@ impl<'m> Follower<'m> {
             (1..=usize::from(u16::MAX)).contains(&n),
             "the input {name:?} has {n} values; 1 to 65535 can be observed"
         );
-        let id = self.exprs.put(Expr::Input(i), n);
+        let id = self.exprs.put(if integers { Expr::Integers(i) } else { Expr::Input(i) }, n);
         if !self.read.contains(&i) {
             self.read.push(i);
         }

@@ -180,7 +180,9 @@ impl Lowered {
                      as an input, or behind it"
                 )
             }
-            Expr::Sum(_) | Expr::Input(_) | Expr::Pick(_) | Expr::Spread(_) => bail!("is no operation"),
+            Expr::Sum(_) | Expr::Input(_) | Expr::Integers(_) | Expr::Pick(_) | Expr::Spread(_) => {
+                bail!("is no operation")
+            }
         })
     }
 

@@ -329,10 +329,12 @@ fn pad(call: &Call<'_>, most: usize) -> Result<Tensor> {
         let end = if behind < 0 { behind } else { i64::MAX };
         let kept = places::slice(all.shape[at], before.min(0).saturating_neg(), end, 1)?;
         let kept = taken(&all, along(&all.shape, at, kept)?)?;
-        let block = |n: i64| -> Result<Tensor> {
-            let mut shape = kept.shape.clone();
-            shape[at] = usize::try_from(n.max(0))?;
-            let n = room(&shape, most)?;
+        let of_length = |n: usize| [&kept.shape[..at], &[n], &kept.shape[at + 1..]].concat();
+        let [before, behind] = [before, behind].map(|n| usize::try_from(n.max(0)).unwrap_or(usize::MAX));
+        room(&of_length(kept.shape[at].saturating_add(before).saturating_add(behind)), most)?;
+        let block = |n: usize| -> Result<Tensor> {
+            let shape = of_length(n);
+            let n = count(&shape)?;
             Ok(Tensor::new(shape, Data::Real(vec![fill; n])))
         };
         all = joined(&[&block(before)?, &kept, &block(behind)?], at)?;

@@ -13,7 +13,7 @@ use super::super::json::Json;
 use super::action;
 use super::call::RANDOM;
 use super::expr::{Expr, Exprs, Id};
-use super::follow::Follower;
+use super::follow::{Follower, INTEGERS};
 use super::lower::{Lowered, lower};
 use super::model::{Graph, Model, Port};
 use super::simplify::simplify;
@@ -83,6 +83,8 @@ pub struct Imported {
     pub producer: String,
     /// Inputs that are observed, with their lengths: the observation is their concatenation in this order.
     pub inputs: Vec<(String, usize)>,
+    /// Which of these inputs the file takes as integers: they are observed as such, in float32.
+    pub integers: Vec<String>,
     /// Inputs that hold recurrent state, the outputs of their next values, and lengths.
     pub states: Vec<(String, String, usize)>,
     /// The output that is the action, and its values.
@@ -145,6 +147,13 @@ fn network(model: &Model, name: &str, choice: &Choice) -> Result<Imported> {
     let root = exprs.vector(&open);
     let root = exprs.affine(root, scale, offset);
     let live = exprs.needed_instead(&[root], &cells.instead);
+    if let Some(i) = live.iter().find_map(|&id| if let Expr::Integers(i) = exprs.get(id) { Some(*i) } else { None }) {
+        bail!(
+            "the action is computed with the integers of the input {:?}; an observation is of float32, so cast them to that before \
+             anything else",
+            printable(&model.graph.inputs[i].name)
+        );
+    }
     let pairs = cells.pairs(model, &exprs, &live, &outputs)?;
     let mut read: Vec<usize> =
         live.iter().filter_map(|&id| if let Expr::Input(i) = exprs.get(id) { Some(*i) } else { None }).collect();
@@ -158,12 +167,15 @@ fn network(model: &Model, name: &str, choice: &Choice) -> Result<Imported> {
     };
     let mut offsets = HashMap::new();
     let mut inputs = Vec::new();
+    let mut integers = Vec::new();
     let mut obs_len = 0;
     for &i in &read {
         let len = len_of(&exprs, i);
         offsets.insert(i, obs_len);
         obs_len += len;
-        inputs.push((printable(&model.graph.inputs[i].name).into_owned(), len));
+        let port = &model.graph.inputs[i];
+        inputs.push((printable(&port.name).into_owned(), len));
+        integers.extend(INTEGERS.contains(&port.kind).then(|| printable(&port.name).into_owned()));
     }
     let states: Vec<(String, String, usize)> = pairs
         .iter()
@@ -211,6 +223,7 @@ fn network(model: &Model, name: &str, choice: &Choice) -> Result<Imported> {
         weights: tensors(&lowered)?,
         producer: model.producer.clone(),
         inputs,
+        integers,
         states,
         output: (shown(&action), open.len()),
         ops,

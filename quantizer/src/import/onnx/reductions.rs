@@ -13,7 +13,7 @@ use super::tensor::{Data, Element, Tensor, count};
 use crate::import::numbers::positive;
 
 /// The most values of which the largest is taken: each takes operations of its own.
-const MOST_COMPARED: usize = 64;
+pub(super) const MOST_COMPARED: usize = 64;
 
 /// The output, where the node is such an operation.
 pub(super) fn run(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> {

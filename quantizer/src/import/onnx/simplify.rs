@@ -6,6 +6,7 @@ use std::sync::Arc;
 use actq_kernels::math::Function;
 
 use super::expr::{Cell, Expr, Exprs, Id, Matrix, Run, Unary};
+use super::slices::sums_of_slices;
 
 /// The same value, simplified. `instead` says which expressions stand for others.
 pub(super) fn simplify(exprs: &mut Exprs, root: Id, instead: &HashMap<Id, Id>) -> Id {
@@ -19,6 +20,8 @@ pub(super) fn simplify(exprs: &mut Exprs, root: Id, instead: &HashMap<Id, Id>) -
     let mut new: HashMap<Id, Id> = HashMap::new();
     // By columns: sums of one length share their row, as matrices are told apart by their place.
     let mut rows_of_ones: HashMap<usize, Arc<Matrix>> = HashMap::new();
+    // The first norm of each value.
+    let mut norms: HashMap<Id, Id> = HashMap::new();
     for id in order {
         let old = exprs.get(id).clone();
         let of = |operand: &Id| {
@@ -55,6 +58,7 @@ pub(super) fn simplify(exprs: &mut Exprs, root: Id, instead: &HashMap<Id, Id>) -
                 }
             }
             Expr::Pick(runs) => {
+                let runs = sums_of_slices(exprs, &runs, &of);
                 let same = runs.iter().all(|run| run.of == runs[0].of);
                 let runs: Vec<Run> = runs.iter().map(|run| Run { of: of(&run.of), ..*run }).collect();
                 match exprs.get(runs[0].of) {
@@ -71,11 +75,11 @@ pub(super) fn simplify(exprs: &mut Exprs, root: Id, instead: &HashMap<Id, Id>) -
             }
             Expr::Unary(Unary::Abs, x) => {
                 let x = of(&x);
-                let negative = exprs.scaled(x, -1.0, 0.0);
+                let negative = times(exprs, x, -1.0);
                 let (up, down) = (exprs.function(Function::Relu, x), exprs.function(Function::Relu, negative));
                 exprs.add(up, down)
             }
-            Expr::Input(_) => id,
+            Expr::Input(_) | Expr::Integers(_) => id,
             Expr::Spread(x) => exprs.put(Expr::Spread(of(&x)), len),
             Expr::Unary(f, x) => exprs.put(Expr::Unary(f, of(&x)), len),
             Expr::Add(x, y) => exprs.put(Expr::Add(of(&x), of(&y)), len),
@@ -91,8 +95,14 @@ pub(super) fn simplify(exprs: &mut Exprs, root: Id, instead: &HashMap<Id, Id>) -
                 exprs.put(Expr::Linear(x, Arc::clone(ones), vec![0.0]), len)
             }
             Expr::Clip(x, limit) => exprs.put(Expr::Clip(of(&x), limit), len),
-            Expr::LayerNorm(x, weight, bias, eps) => exprs.put(Expr::LayerNorm(of(&x), weight, bias, eps), len),
-            Expr::RmsNorm(x, weight, eps) => exprs.put(Expr::RmsNorm(of(&x), weight, eps), len),
+            Expr::LayerNorm(x, weight, bias, eps) => {
+                let norm = exprs.put(Expr::LayerNorm(of(&x), weight, bias, eps), len);
+                once(exprs, *norms.entry(of(&x)).or_insert(norm), norm)
+            }
+            Expr::RmsNorm(x, weight, eps) => {
+                let norm = exprs.put(Expr::RmsNorm(of(&x), weight, eps), len);
+                once(exprs, *norms.entry(of(&x)).or_insert(norm), norm)
+            }
             Expr::Cell(cell) => exprs.put(Expr::Cell(Box::new(Cell { x: of(&cell.x), ..*cell })), len),
             Expr::CellState(x) => exprs.put(Expr::CellState(of(&x)), len),
         };
@@ -100,6 +110,20 @@ pub(super) fn simplify(exprs: &mut Exprs, root: Id, instead: &HashMap<Id, Id>) -
         new.insert(id, done);
     }
     new.get(&root).copied().unwrap_or(root)
+}
+
+/// `k x`, also where x is a norm that something else reads: a factor within would need the norm again.
+fn times(exprs: &mut Exprs, x: Id, k: f64) -> Id {
+    let len = exprs.len_of(x);
+    exprs.put(Expr::Affine(x, vec![k; len], vec![0.0; len]), len)
+}
+
+/// A norm, as a multiple of the `first` of the same value where it is one: the sum of a LeakyReLU reads both.
+fn once(exprs: &mut Exprs, first: Id, norm: Id) -> Id {
+    match exprs.ratio(norm, first) {
+        Some(k) if norm != first => times(exprs, first, k),
+        _ => norm,
+    }
 }
 
 /// Whether nothing but this reads what it reads.

@@ -93,7 +93,7 @@ impl Cells {
                 let known = pairs.iter().find(|(other, _)| *other == input);
                 ensure!(
                     known.is_none_or(|(_, other)| *other == output),
-                    "the state {name:?} is carried by two outputs"
+                    "the state {name:?} is carried by two outputs; where an exporter was given one tensor for two states, give it two"
                 );
                 if known.is_none() {
                     pairs.push((input, output));

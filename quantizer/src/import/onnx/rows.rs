@@ -1,0 +1,92 @@
+//! Rows with a number for each, as the mean of a row is: an operation on all rows and their numbers is done row by row, so that norms
+//! are found.
+
+use std::collections::HashMap;
+
+use super::expr::{Expr, Exprs, Id, Run};
+use super::tensor::Element;
+
+/// The most rows: each takes operations of its own.
+const MOST_ROWS: usize = 256;
+/// Operations between sums and a number that is computed of them.
+const DEPTH: usize = 16;
+
+/// What is known of elements that were looked for.
+type Found = HashMap<(Id, usize), Option<Id>>;
+
+/// The places `at`, row by row, where one of two operands has a number for each row; else all of them.
+pub(super) fn by_row(exprs: &mut Exprs, at: Vec<usize>, operands: [&[Element]; 2]) -> Vec<Vec<usize>> {
+    operands.into_iter().find_map(|operand| rows(exprs, &at, operand)).unwrap_or_else(|| vec![at])
+}
+
+/// The places that have the same element of `operand`, or one that is only that one scaled, where these are sums or computed of sums.
+fn rows(exprs: &mut Exprs, at: &[usize], operand: &[Element]) -> Option<Vec<Vec<usize>>> {
+    let mut rows: Vec<((Id, usize), Vec<usize>)> = Vec::new();
+    let mut row_of: HashMap<(Id, usize), usize> = HashMap::new();
+    for &place in at {
+        let Element::Of(id, i) = operand[place] else { return None };
+        let number = match *exprs.get(id) {
+            Expr::Affine(x, ..) if matches!(exprs.get(x), Expr::Spread(_)) => (x, 0),
+            _ => (id, i),
+        };
+        let row = *row_of.entry(number).or_insert(rows.len());
+        match rows.get_mut(row) {
+            Some((_, places)) => places.push(place),
+            None if row < MOST_ROWS => rows.push((number, vec![place])),
+            None => return None,
+        }
+    }
+    let each = at.len() / rows.len().max(1);
+    let are_rows = rows.len() > 1 && each > 1 && rows.iter().all(|(_, places)| places.len() == each);
+    let of_sums = are_rows && rows.iter().all(|&((of, i), _)| exprs.lone(of, i).is_some());
+    of_sums.then(|| rows.into_iter().map(|(_, places)| places).collect())
+}
+
+impl Exprs {
+    /// The elements of a run, as those of what is only moved there, of at most so many runs as there may be rows.
+    pub(super) fn within(&self, run: Run) -> Option<Vec<(Id, usize)>> {
+        let all = match self.get(run.of) {
+            Expr::Spread(one) => return Some(vec![(*one, 0); run.len]),
+            Expr::Pick(runs) if runs.len() <= MOST_ROWS => runs,
+            Expr::Pick(_) => return None,
+            _ => return Some((run.from..run.from + run.len).map(|i| (run.of, i)).collect()),
+        };
+        let (mut skip, mut elements) = (run.from, Vec::with_capacity(run.len));
+        for part in all {
+            let places = part.from + skip.min(part.len)..part.from + part.len;
+            elements.extend(places.take(run.len - elements.len()).map(|i| (part.of, i)));
+            skip = skip.saturating_sub(part.len);
+        }
+        Some(elements)
+    }
+
+    /// Element `i` of a value as a value by itself, where it is computed of sums alone.
+    pub(super) fn lone(&mut self, of: Id, i: usize) -> Option<Id> {
+        self.lone_within(of, i, DEPTH, &mut Found::new())
+    }
+
+    fn lone_within(&mut self, of: Id, i: usize, depth: usize, found: &mut Found) -> Option<Id> {
+        if let Some(&known) = found.get(&(of, i)) {
+            return known;
+        }
+        let depth = depth.checked_sub(1)?;
+        let mut at = |exprs: &mut Self, x: Id, i: usize| exprs.lone_within(x, i, depth, found);
+        let lone = match *self.get(of) {
+            Expr::Sum(_) => Some(of),
+            Expr::Pick(_) | Expr::Spread(_) => {
+                let [(of, i)] = self.within(Run { of, from: i, len: 1 })?[..] else { return None };
+                at(self, of, i)
+            }
+            Expr::Affine(x, ref a, ref b) => {
+                let (a, b) = (a[i], b[i]);
+                at(self, x, i).map(|x| self.affine(x, vec![a], vec![b]))
+            }
+            Expr::Unary(f, x) => at(self, x, i).map(|x| self.unary(f, x)),
+            Expr::Add(x, y) => at(self, x, i).zip(at(self, y, i)).map(|(x, y)| self.add(x, y)),
+            Expr::Mul(x, y) => at(self, x, i).zip(at(self, y, i)).map(|(x, y)| self.mul(x, y)),
+            _ => None,
+        };
+        found.insert((of, i), lone);
+        lone
+    }
+}
