@@ -35,6 +35,8 @@ pub(super) struct Lowered {
     /// Length of the observation, then of each op's output.
     lens: Vec<usize>,
     names: HashSet<String>,
+    /// The last number behind a name that was taken.
+    numbers: HashMap<String, usize>,
     /// Names of the matrices, which several ops may share.
     matrices: HashMap<*const Matrix, String>,
     places: HashMap<Id, Vec<Part>>,
@@ -56,6 +58,7 @@ pub(super) fn lower(
         reads: Vec::new(),
         lens: vec![obs_len],
         names: HashSet::new(),
+        numbers: HashMap::new(),
         matrices: HashMap::new(),
         places: HashMap::new(),
         taken: HashSet::new(),
@@ -331,9 +334,10 @@ impl Lowered {
             "{wanted:?} holds a value that is not finite, or beyond float32's range"
         );
         let mut name = wanted.to_owned();
-        let mut number = 1;
         while !self.names.insert(name.clone()) {
-            number += 1;
+            // One counter a name: a file may ask for thousands of the same.
+            let number = self.numbers.entry(wanted.to_owned()).or_insert(1);
+            *number += 1;
             name = format!("{wanted}.{number}");
         }
         self.weights.push(Weight { name: name.clone(), shape, data });
