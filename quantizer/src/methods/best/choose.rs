@@ -2,8 +2,8 @@
 //!
 //! Each choice has three quarters of the episodes; to learn, it has an eighth of the steps. On the others its error is measured
 //! twice, at the recorded observations and at widened ones. A feed-forward network takes the choice with the lowest error at the
-//! recorded observations, a recurrent one that with the lowest geometric mean of both: the error on the recorded path alone would
-//! always take the least noise, with which a recurrent policy that balances falls (docs/QUANTIZER.md).
+//! recorded observations, a recurrent one that with the lowest error at widened ones: the error on the recorded path takes the least
+//! noise, with which a recurrent policy that balances falls (docs/QUANTIZER.md).
 
 use std::time::Duration;
 
@@ -98,7 +98,7 @@ pub fn choose(
 /// The best of what was tried. Feedback has all that it will have, learning an eighth of its steps.
 fn best(tried: &[Tried], recurrent: bool) -> Option<&Tried> {
     let expected = |tried: &Tried| {
-        let error = if recurrent { (tried.recorded * tried.widened).sqrt() } else { tried.recorded };
+        let error = if recurrent { tried.widened } else { tried.recorded };
         if matches!(tried.choice, Choice::Learning(_)) { LEFT * error } else { error }
     };
     tried.iter().min_by(|a, b| expected(a).total_cmp(&expected(b)))
