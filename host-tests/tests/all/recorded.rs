@@ -51,6 +51,17 @@ fn best_keeps_its_error_and_every_episode() -> Result<()> {
     hold(Method::Best, 2.0, 6.7e-3, 1.45)
 }
 
+/// What `--relative` is for: actions that are small where the arm holds its goal.
+#[test]
+fn with_errors_relative_to_its_actions_the_arm_keeps_closer_to_its_goals() -> Result<()> {
+    let even = Options { steps: Some(1000), ..Options::new(Method::Best, Budget::BitsPerWeight(2.0)) };
+    let [(_, kept, even), (_, kept_so, relative)] =
+        [figures(&even)?, figures(&Options { relative: true, ..even.clone() })?];
+    assert_eq!([kept as u64, kept_so as u64], [EPISODES; 2]);
+    assert!(relative < even, "{relative} mm, and {even} mm with even errors");
+    Ok(())
+}
+
 #[test]
 fn rivals_keep_their_errors() -> Result<()> {
     hold(Method::Gptq, 3.0, 8.4e-3, 1.25)?;

@@ -147,6 +147,7 @@ pub fn quantize(
         importance: &importance,
         x_max: &learned_with,
         widening: Widening::WIDE,
+        relative: options.relative,
         bounds,
         seed: options.seed,
     };

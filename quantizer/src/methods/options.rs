@@ -85,6 +85,8 @@ pub struct Options {
     pub steps: Option<usize>,
     /// The most minutes of distillation; None: only the steps bound it.
     pub minutes: Option<f64>,
+    /// Whether what is learned counts errors relative to the action's size (method best).
+    pub relative: bool,
     /// Seed of everything that is drawn.
     pub seed: u64,
     /// Matrices, by their tensors' names, whose rows all get a certain width (method best).
@@ -108,8 +110,12 @@ impl Packing {
 }
 
 impl Options {
-    /// Refuses groups that no kernel has.
+    /// Refuses groups that no kernel has, and a way to learn where nothing is learned.
     pub fn check(&self) -> Result<()> {
+        ensure!(
+            !self.relative || self.method == Method::Best && self.steps != Some(0),
+            "--relative says how method best learns: leave it out with other methods and with --steps 0"
+        );
         ensure!(is_group(self.group), "group is {}, it must be 0 or one of {GROUPS:?}", self.group);
         Ok(())
     }
@@ -128,6 +134,7 @@ impl Options {
             activations: Activations::Auto,
             steps: None,
             minutes: None,
+            relative: false,
             seed: 1,
             forced: Vec::new(),
         }

@@ -80,6 +80,8 @@ pub struct SweepPlan<'a> {
     pub steps: Option<usize>,
     /// The most minutes of distillation; None: only the steps bound it.
     pub minutes: Option<f64>,
+    /// Whether method best counts errors relative to the action's size.
+    pub relative: bool,
     /// Seed of everything that is drawn.
     pub seed: u64,
 }
@@ -87,7 +89,7 @@ pub struct SweepPlan<'a> {
 /// Quantizes the policy by every method for every budget and runs each image over the held-out recording. `progress`
 /// gets what is being done and the share of the whole that is done.
 pub fn run(plan: &SweepPlan<'_>, mut progress: impl FnMut(&str, f64)) -> Result<Sweep> {
-    let SweepPlan { policy, recordings, methods, budgets, steps, minutes, seed } = *plan;
+    let SweepPlan { policy, recordings, methods, budgets, steps, minutes, relative, seed } = *plan;
     let heldout = recordings.heldout.as_ref().with_context(|| Recording::Heldout.missing("a sweep"))?;
     let mut curves = Vec::new();
     for (m, &method) in methods.iter().enumerate() {
@@ -99,7 +101,8 @@ pub fn run(plan: &SweepPlan<'_>, mut progress: impl FnMut(&str, f64)) -> Result<
         for (b, &budget) in budgets.iter().enumerate() {
             let work = format!("{method}, {budget} bits per weight");
             let plain = Options::new(method, Budget::BitsPerWeight(budget));
-            let options = Options { group: method.default_group(), steps, minutes, seed, ..plain };
+            let relative = relative && method == Method::Best;
+            let options = Options { group: method.default_group(), steps, minutes, relative, seed, ..plain };
             let share = |_: &str, share| progress(&work, done(1.0 + b as f64 + share));
             points.push(match quantizer.quantize(&options, share) {
                 Ok(quantized) => Some(point(heldout, budget, &quantized)?),

@@ -39,6 +39,24 @@ fn a_budget_of_time_is_kept_or_refused() -> Result<()> {
     Ok(())
 }
 
+#[test]
+fn relative_errors_go_with_learning_alone() -> Result<()> {
+    let dir = TempDir::new()?;
+    let (policy, out) = (text(&ur3()), text(&dir.path().join("relative.actq")));
+    let quantize = |arguments: &[&str]| {
+        run(actq(&[&["quantize", &policy, "--out", &out, "--bpw", "2.0"], arguments].concat()), b"")
+    };
+    for arguments in [["--relative", "--method", "rtn"], ["--relative", "--steps", "0"]] {
+        failed(&quantize(&arguments)?, 1, &["--relative says how method best learns", "leave it out"])?;
+        ensure!(!Path::new(&out).exists(), "an image was written");
+    }
+    succeeded(&quantize(&["--steps", "8"])?)?;
+    let even = fs::read(&out)?;
+    succeeded(&quantize(&["--steps", "8", "--relative"])?)?;
+    ensure!(fs::read(&out)? != even, "it changes nothing");
+    Ok(())
+}
+
 /// The widths of an image's matrices, narrow to wide.
 fn widths(path: &Path) -> Result<Vec<u32>> {
     let buffer = ImageBuffer::read(path)?;

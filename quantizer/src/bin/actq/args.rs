@@ -362,7 +362,7 @@ impl ActQuantArgs {
     }
 }
 
-/// How long method best learns. It ends by itself when the error no longer falls.
+/// How method best learns. It ends by itself when the error no longer falls.
 #[derive(clap::Args)]
 pub(crate) struct LearnArgs {
     /// The most steps of distillation; 0 = none, but two-sided error feedback: seconds, and a larger error at few bits
@@ -372,6 +372,10 @@ pub(crate) struct LearnArgs {
     /// The most minutes of distillation, instead of the default steps; what is learned then depends on the machine
     #[arg(long, value_name = "X", value_parser = minutes)]
     pub(crate) minutes: Option<f64>,
+    /// Count errors relative to the action's size. For a robot that holds its goal by small actions, which stays as far off as they
+    /// are wrong: it gets closer, although the held-out error, in which wide movements count most, rises
+    #[arg(long)]
+    pub(crate) relative: bool,
 }
 
 /// What every quantization is run with.

@@ -144,6 +144,7 @@ fn run_sweep(args: &SweepArgs) -> Result<()> {
             budgets: &args.bpw,
             steps: args.learn.steps,
             minutes: args.learn.minutes,
+            relative: args.learn.relative,
             seed: args.run.seed,
         };
         sweeps.push(sweep::run(&plan, |work, share| {

@@ -37,6 +37,7 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
     let recordings = Recordings { calib, heldout };
     note(notes::of_recordings(&recordings));
     let options = options(args, &recordings)?;
+    options.check()?;
     let started = Instant::now();
     start_threads(args.run.threads)?;
     let bar = progress_bar()?;
@@ -119,6 +120,7 @@ fn options(args: &QuantizeArgs, recordings: &Recordings) -> Result<Options> {
         },
         steps: args.learn.steps,
         minutes: args.learn.minutes,
+        relative: args.learn.relative,
         seed: args.run.seed,
         forced: args.width.iter().cloned().chain(protected).collect(),
         ..Options::new(method, limits.into_iter().flatten().next().unwrap_or(Budget::Width(width)))

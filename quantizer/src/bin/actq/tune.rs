@@ -39,8 +39,8 @@ pub(crate) fn run(args: &TuneArgs) -> Result<()> {
         Some(bits) => Budget::BitsPerWeight(bits),
         None => Budget::Width(args.bits.unwrap_or(Width::W3)),
     };
-    let LearnArgs { steps, minutes } = args.learn;
-    let options = Options { steps, minutes, seed: args.run.seed, ..Options::new(Method::Best, budget) };
+    let LearnArgs { steps, minutes, relative } = args.learn;
+    let options = Options { steps, minutes, relative, seed: args.run.seed, ..Options::new(Method::Best, budget) };
     let plan = TunePlan { policy: &policy, calib, heldout, options: &options, rounds: args.rounds };
     let bar = progress_bar()?;
     let tuned = tune::run(

@@ -59,6 +59,8 @@ pub struct Task<'a> {
     pub x_max: &'a [u16],
     /// How far the inputs are taken off the recorded ones.
     pub widening: Widening,
+    /// Whether errors count relative to the action's size.
+    pub relative: bool,
     /// Where it ends at the latest.
     pub bounds: Bounds,
     /// Seed of the batches.
@@ -91,10 +93,7 @@ pub fn distill(task: &Task<'_>, windows: &Windows<'_>, mut progress: impl FnMut(
         // A frame of an iterative head is one of every denoising step.
         false => ((FRAMES / task.graph.denoising_steps().isqrt()).max(4 * FRAME_SHARDS), FRAME_SHARDS, OF_FRAMES),
     };
-    // A recurrent policy that balances keeps fewer episodes with errors relative to its actions (docs/records/2026-11-23-loss.md); an
-    // iterative head was not tried.
-    let even = windows.recurrent() || task.graph.denoising_steps() > 1;
-    let objective = if even { Objective::even } else { Objective::relative }(&windows.output_variance);
+    let objective = if task.relative { Objective::relative } else { Objective::even }(&windows.output_variance);
     let mut schedule = Schedule::new(task.bounds, most_steps(task.graph.weights(), windows.recurrent()));
     while let Some(rate) = schedule.rate() {
         for (latent, weights) in latents.iter().zip(&mut weights.matrices) {
