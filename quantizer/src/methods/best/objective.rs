@@ -10,6 +10,8 @@ const FLOOR: f32 = 0.1;
 #[derive(Debug)]
 pub(super) struct Objective<'a> {
     variance: &'a [f32],
+    /// Outputs that vary.
+    varying: usize,
     /// Whether frames are weighed by the size of their action.
     relative: bool,
 }
@@ -17,18 +19,19 @@ pub(super) struct Objective<'a> {
 impl<'a> Objective<'a> {
     /// Every frame counts alike: the mean over samples and outputs of squared error over variance.
     pub(super) fn even(variance: &'a [f32]) -> Self {
-        Self { variance, relative: false }
+        let varying = variance.iter().filter(|variance| **variance > 0.0).count().max(1);
+        Self { variance, varying, relative: false }
     }
 
     /// Frames count the more, the smaller their action is, with 1 in the mean over a batch.
     pub(super) fn relative(variance: &'a [f32]) -> Self {
-        Self { variance, relative: true }
+        Self { relative: true, ..Self::even(variance) }
     }
 
     /// The derivative by the outputs, `[frame, element]`, and the loss, for what the f32 network gives. Outputs that do not vary count
     /// for nothing.
     pub(super) fn measure(&self, outputs: &Array2<f32>, target: &Array2<f32>) -> (Array2<f32>, f32) {
-        let count = (target.nrows() * self.varying()) as f32;
+        let count = (target.nrows() * self.varying) as f32;
         let weight = |variance: &f32| if *variance > 0.0 { 1.0 / (variance * count) } else { 0.0 };
         let of_outputs: Vec<f32> = self.variance.iter().map(weight).collect();
         let mut loss = 0.0;
@@ -50,17 +53,13 @@ impl<'a> Objective<'a> {
         }
         let weight = |row: ArrayView1<'_, f32>| {
             let varying = row.iter().zip(self.variance).filter(|(_, variance)| **variance > 0.0);
-            let size = varying.map(|(a, variance)| a * a / variance).sum::<f32>() / self.varying() as f32;
+            let size = varying.map(|(a, variance)| a * a / variance).sum::<f32>() / self.varying as f32;
             1.0 / (size + FLOOR)
         };
         let mut weights: Vec<f32> = target.rows().into_iter().map(weight).collect();
         let mean = weights.iter().sum::<f32>() / weights.len().max(1) as f32;
         weights.iter_mut().for_each(|weight| *weight /= mean);
         weights
-    }
-
-    fn varying(&self) -> usize {
-        self.variance.iter().filter(|variance| **variance > 0.0).count().max(1)
     }
 }
 
