@@ -50,7 +50,8 @@ impl Controller {
         let child = spawn(command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::inherit()))?;
         let controller = Self { child, folder };
         let begun = Instant::now();
-        while !(socket(&controller.folder).exists() && monitor(&controller.folder).exists()) {
+        // A socket stands in its folder a moment before QEMU listens at it. What is opened here is closed at once.
+        while !(controller.address().open().is_ok() && controller.monitor().open().is_ok()) {
             if begun.elapsed() > PATIENCE {
                 bail!("QEMU does not open its serial port");
             }
@@ -66,8 +67,7 @@ impl Controller {
 
     /// Resets the board, as its pin does (QEMU's `system_reset`). Memory keeps what it has.
     pub fn reset(&self) -> Result<()> {
-        let address = Address::Unix(monitor(&self.folder).display().to_string());
-        let mut monitor = listening(|| address.open().context("QEMU's monitor"))?;
+        let mut monitor = self.monitor().open().context("QEMU's monitor")?;
         for command in ["qmp_capabilities", "system_reset"] {
             writeln!(monitor, "{{\"execute\": \"{command}\"}}")?;
             answered(&mut *monitor).with_context(|| format!("QEMU's {command}"))?;
@@ -77,18 +77,11 @@ impl Controller {
 
     /// A host at the serial port.
     pub fn client(&self) -> Result<Client> {
-        Ok(Client::new(listening(|| Connection::open(self.address(), PATIENCE))?, PATIENCE))
+        Ok(Client::new(Connection::open(self.address(), PATIENCE)?, PATIENCE))
     }
-}
 
-/// What `open` opens. A socket stands in its folder a moment before QEMU listens at it.
-pub(crate) fn listening<T>(open: impl Fn() -> Result<T>) -> Result<T> {
-    let begun = Instant::now();
-    loop {
-        match open() {
-            Err(_) if begun.elapsed() < PATIENCE => std::thread::sleep(Duration::from_millis(5)),
-            opened => return opened,
-        }
+    fn monitor(&self) -> Address {
+        Address::Unix(monitor(&self.folder).display().to_string())
     }
 }
 

@@ -20,7 +20,7 @@ use anyhow::{Context as _, Result, ensure};
 use super::arm::{Arm, TICKS};
 use super::bits::Said;
 use super::line::Line;
-use crate::controller::{Controller, PATIENCE, listening};
+use crate::controller::{Controller, PATIENCE};
 
 /// Ticks in which an output goes from one limit to the other, as in the application at 1 kHz.
 const WAY: f32 = 100.0;
@@ -95,7 +95,7 @@ impl Rig {
     /// The application `elf` in QEMU, with `image` built in. The seed is that of the line's faults.
     pub fn start(target: Target, elf: &Path, image: &Image<'_>, seed: u64) -> Result<Self> {
         let controller = Controller::start_by(target, elf, None, Clock::Host)?;
-        let line = Line::new(listening(|| controller.address().open().context("the board's serial port"))?, seed);
+        let line = Line::new(controller.address().open().context("the board's serial port")?, seed);
         let end = line.clone();
         let open = Box::new(move || Ok(end.host_end()));
         let mut connection = Connection::open_by("the line".to_owned(), open, PATIENCE)?;
