@@ -49,6 +49,15 @@
     vmla.f32 s2\j, s31, s28
 .endm
 
+@ s2<i> += s29 s<vector><i>, elements 0 to \last of the vector 0, which has no number, or 1.
+.macro stir vector, last
+    .irp i, 0, 1, 2, 3, 4, 5, 6, 7
+    .if \i <= \last
+    vmla.f32 s2\i, s\vector\i, s29
+    .endif
+    .endr
+.endm
+
 @ Elements 0 to \last. Of one alone, limits take a second, of what the registers hold, which is not stored.
 .macro denoise_pass last
     vldmia r1!, {s10-s1\last}
@@ -72,20 +81,12 @@
 5:
     cbz r2, 6f
     vldmia r2!, {s0-s\last}
-    .irp i, 0, 1, 2, 3, 4, 5, 6, 7
-    .if \i <= \last
-    vmla.f32 s2\i, s\i, s29
-    .endif
-    .endr
+    stir , \last
     vstmia r3!, {s20-s2\last}
     b 7f
 6:
     vstmia r3!, {s20-s2\last}
-    .irp i, 0, 1, 2, 3, 4, 5, 6, 7
-    .if \i <= \last
-    vmla.f32 s2\i, s1\i, s29
-    .endif
-    .endr
+    stir 1, \last
 7:
     vstmia r4!, {s20-s2\last}
 .endm
