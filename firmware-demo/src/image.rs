@@ -63,16 +63,7 @@ pub fn axes<const AXES: usize>(image: Option<&Image<'_>>, ticks: f32) -> [Axis; 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    struct NoWatchdog;
-
-    impl Watchdog for NoWatchdog {
-        fn start(&mut self, _: u16) -> bool {
-            true
-        }
-
-        fn feed(&mut self) {}
-    }
+    use crate::work::tests::Fed;
 
     #[test]
     fn bytes_that_are_no_image_have_the_least_lengths() {
@@ -87,6 +78,6 @@ mod tests {
     #[test]
     fn without_an_image_nothing_may_move() {
         assert_eq!(axes::<3>(None, 100.0), [Axis::STILL; 3]);
-        assert_eq!(open(&[0; 8], &mut [], [1; 2], &mut NoWatchdog).err(), Some(Refusal::Unfit));
+        assert_eq!(open(&[0; 8], &mut [], [1; 2], &mut Fed::default()).err(), Some(Refusal::Unfit));
     }
 }

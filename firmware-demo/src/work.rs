@@ -153,7 +153,7 @@ where
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     extern crate std;
 
     use std::boxed::Box;
@@ -189,7 +189,7 @@ mod tests {
 
     /// How often it was fed, and the times that it was given.
     #[derive(Default)]
-    struct Fed(u32, Vec<u16>);
+    pub(crate) struct Fed(u32, Vec<u16>);
 
     impl Watchdog for Fed {
         fn start(&mut self, milliseconds: u16) -> bool {
