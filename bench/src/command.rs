@@ -49,8 +49,13 @@ pub fn run(mut command: Command, input: &[u8]) -> Result<Output> {
 
 /// Standard output of a run that must have ended well.
 pub fn succeeded(output: &Output) -> Result<String> {
+    Ok(String::from_utf8(answered(output)?.to_vec())?)
+}
+
+/// As [`succeeded`], of an output that is no text.
+pub fn answered(output: &Output) -> Result<&[u8]> {
     ensure!(output.status.code() == Some(0), "{}: {}", output.status, String::from_utf8_lossy(&output.stderr));
-    Ok(String::from_utf8(output.stdout.clone())?)
+    Ok(&output.stdout)
 }
 
 /// Requires an exit status and a message that holds `words`, and no panic.

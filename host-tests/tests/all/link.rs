@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use actq::runtime::ImageBuffer;
 use actq_bench::Target;
-use actq_bench::command::{actq, failed, run, succeeded};
+use actq_bench::command::{actq, answered, failed, run, succeeded};
 use actq_bench::controller::{Controller, PATIENCE, act};
 use actq_bench::firmware;
 use actq_bench::qemu::step_request;
@@ -74,8 +74,7 @@ fn serve_answers_a_simulator_and_disarms_behind_it() -> Result<()> {
     let (observation, bits) = observation(&slot)?;
     let input = [&[RESET][..], &step_request(&observation), &[RESET], &step_request(&observation)].concat();
     let output = link(&controller, &["serve"], &input)?;
-    succeeded_with(&output)?;
-    let told: Vec<u32> = output.stdout.as_chunks().0.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect();
+    let told: Vec<u32> = answered(&output)?.as_chunks().0.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect();
     assert_eq!(told, [&bits[..], &bits].concat());
     // Armed, the answers are what the outputs are led to: an image without a contract leaves its axes still.
     let begun = Instant::now();
@@ -92,12 +91,6 @@ fn serve_answers_a_simulator_and_disarms_behind_it() -> Result<()> {
     assert_eq!(controller.client()?.status()?.state, State::Disarmed);
     failed(&link(&controller, &["serve"], b"x")?, 1, &["unknown command byte 0x78"])?;
     failed(&link(&controller, &["serve"], &step_request(&observation)[..9])?, 1, &["ended inside an observation"])
-}
-
-/// As [`succeeded`], of an output that is no text.
-fn succeeded_with(output: &Output) -> Result<()> {
-    ensure!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    Ok(())
 }
 
 /// The board goes while a simulator is served: the command says so, once its patience is over.
