@@ -1,6 +1,8 @@
 //! What the measuring programs have in common. On a host they only say what they are.
 #![cfg_attr(target_os = "none", no_std)]
 
+pub mod functions;
+
 /// What the programs do where they are built for a host.
 #[cfg(not(target_os = "none"))]
 pub fn main() {

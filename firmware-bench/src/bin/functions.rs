@@ -13,53 +13,21 @@ mod firmware {
     use core::fmt::Write as _;
     use core::hint::black_box;
 
+    use actq_firmware_bench::functions::{DENOISED, EXTREMES, LEN, hash, magnitudes, values};
     use actq_firmware_support::{count, host};
     use actq_kernels::math::Function;
     use actq_kernels::ops::denoise::{Coefficients, denoise};
     use actq_kernels::ops::noise::normal;
     use actq_kernels::ops::{cells, elementwise, norm};
 
-    const LEN: usize = 256;
-
     #[cortex_m_rt::entry]
     fn main() -> ! {
         host::exit(run().is_some())
     }
 
-    /// From -6 up to 0, where no function has a shorter way.
-    fn values<const N: usize>() -> [f32; N] {
-        core::array::from_fn(|i| i as f32 * (6.0 / N as f32) - 6.0)
-    }
-
-    /// Every magnitude, with both signs.
-    fn magnitudes<const N: usize>() -> [f32; N] {
-        core::array::from_fn(|i| f32::from_bits(((i as u32) << 31) | (i as u32 * (0x7f80_0000 / N as u32))))
-    }
-
-    /// What leaves f32's range, is not in it, or is nothing.
-    const EXTREMES: [f32; 13] = [
-        f32::MAX,
-        f32::MIN,
-        1e38,
-        -1e38,
-        1.0,
-        -1.0,
-        f32::INFINITY,
-        f32::NEG_INFINITY,
-        f32::NAN,
-        1e-40,
-        -1e-40,
-        0.0,
-        -0.0,
-    ];
-
     fn run() -> Option<()> {
         let mut out = host::stdout()?;
-        let mut line = |name: &str, results: &[&[f32]]| {
-            let bits = |v: &f32| if v.is_nan() { f32::NAN.to_bits() } else { v.to_bits() };
-            let hash = results.iter().copied().flatten().map(bits).fold(0u32, |hash, bits| hash.rotate_left(5) ^ bits);
-            writeln!(out, "{name} {LEN} {hash:08x}").ok()
-        };
+        let mut line = |name: &str, results: &[&[f32]]| writeln!(out, "{name} {LEN} {:08x}", hash(results)).ok();
         let constants = values::<LEN>().map(f32::to_bits);
         for function in Function::ALL {
             let (mut x, mut y) = (values::<LEN>(), magnitudes::<LEN>());
@@ -92,17 +60,9 @@ mod firmware {
         elementwise::normalize(&EXTREMES, &constants, &constants, f32::INFINITY, f32::INFINITY, &mut free);
         line("normalize", &[&y, &limited, &free])?;
         let z: [f32; LEN] = core::array::from_fn(|i| normal(1, 2, i as u32));
-        for (name, sample, limit, noise) in [
-            ("denoise", 0.0, f32::INFINITY, &[][..]),
-            ("denoise with noise", 0.0, f32::INFINITY, &z),
-            ("denoise, none limited", 0.4, 4.0, &[]),
-            ("denoise, half limited", 0.4, 1.8, &[]),
-            ("denoise, all limited", 0.4, 0.001, &[]),
-            ("denoise with noise, none", 0.4, 4.0, &z),
-            ("denoise with noise, half", 0.4, 1.8, &z),
-            ("denoise with noise, all", 0.4, 0.001, &z),
-        ] {
-            let by = |x, v| Coefficients::from_array([x * sample, v * sample, 0.6, 0.2, sample, 0.1, 0.3]);
+        for case in &DENOISED {
+            let by = |x, v| Coefficients::from_array(case.coefficients(x, v));
+            let (limit, noise) = (case.limit, if case.noise { &z[..] } else { &[] });
             let (mut next, mut y) = (EXTREMES, EXTREMES);
             denoise(&by(10.0, -9.0), limit, &EXTREMES, noise, &mut next, &mut y);
             let (extremes, by) = ([next, y], by(1.0, 0.5));
@@ -110,7 +70,7 @@ mod firmware {
             count::region(|| {
                 denoise(black_box(&by), limit, black_box(&x), noise, black_box(&mut next), black_box(&mut y))
             });
-            line(name, &[&next, &y[1..], extremes.as_flattened()])?;
+            line(case.name, &[&next, &y[1..], extremes.as_flattened()])?;
         }
         let mut z = [0.0; LEN];
         count::region(|| black_box(&mut z).iter_mut().zip(0..).for_each(|(z, i)| *z = normal(1, 2, i)));

@@ -10,15 +10,13 @@ use actq::runtime::ImageBuffer;
 use actq_bench::cycles::Code;
 use actq_bench::qemu::{self, Counter};
 use actq_bench::{Target, firmware, shared_policies};
+use actq_firmware_bench::functions::{DENOISED, EXTREMES, LEN, hash, magnitudes, values};
 use actq_kernels::Width;
 use actq_kernels::math::Function;
 use actq_kernels::ops::denoise::{Coefficients, denoise};
 use actq_kernels::ops::noise::normal;
 use actq_kernels::ops::{cells, elementwise, norm};
 use anyhow::{Result, ensure};
-
-/// Elements.
-const LEN: usize = 256;
 
 /// Instructions per element: 12 without a function, 30 for one, and what stands here.
 fn limit(name: &str) -> u64 {
@@ -44,81 +42,59 @@ fn functions(name: &str) -> u64 {
     }
 }
 
-/// What leaves f32's range, is not in it, or is nothing.
-const EXTREMES: [f32; 13] =
-    [f32::MAX, f32::MIN, 1e38, -1e38, 1.0, -1.0, f32::INFINITY, f32::NEG_INFINITY, f32::NAN, 1e-40, -1e-40, 0.0, -0.0];
-
 /// What `firmware-bench/src/bin/functions.rs` computes: names and hashes of the results, in its order.
 fn expected() -> Vec<(&'static str, u32)> {
-    fn values(n: usize) -> Vec<f32> {
-        (0..n).map(|i| i as f32 * (6.0 / n as f32) - 6.0).collect()
-    }
-    fn magnitudes(n: usize) -> Vec<f32> {
-        (0..n as u32).map(|i| f32::from_bits((i << 31) | (i * (0x7f80_0000 / n as u32)))).collect()
-    }
-    let bits = |v: &f32| if v.is_nan() { f32::NAN.to_bits() } else { v.to_bits() };
-    let hash = |results: &[&[f32]]| {
-        results.iter().copied().flatten().map(bits).fold(0u32, |hash, bits| hash.rotate_left(5) ^ bits)
-    };
     let mut all = Vec::new();
-    let constants: Vec<u32> = values(LEN).into_iter().map(f32::to_bits).collect();
+    let constants = values::<LEN>().map(f32::to_bits);
     for function in Function::ALL {
-        let (mut x, mut y) = (values(LEN), magnitudes(LEN));
+        let (mut x, mut y) = (values::<LEN>(), magnitudes::<LEN>());
         function.apply(&mut x);
         function.apply(&mut y);
         all.push((function.name(), hash(&[&x, &y])));
     }
     let mut add = |name, run: &dyn Fn(&mut [f32])| {
-        let (mut x, mut rest) = (values(LEN), values(13));
+        let (mut x, mut rest) = (values::<LEN>(), values::<13>());
         run(&mut x);
         run(&mut rest);
         all.push((name, hash(&[&x, &rest])));
     };
     add("layernorm", &|x| norm::layer_norm(x, &constants, &constants, 1e-5));
     add("rmsnorm", &|x| norm::rms_norm(x, &constants, 1e-5));
-    add("add", &|y| elementwise::add(&values(LEN), y));
-    add("mul", &|y| elementwise::mul(&values(LEN), y));
+    add("add", &|y| elementwise::add(&values::<LEN>(), y));
+    add("mul", &|y| elementwise::mul(&values::<LEN>(), y));
     let normalize = |x: &[f32], pre_clip, clip| {
         let mut y = vec![0.0; x.len()];
         elementwise::normalize(x, &constants, &constants, pre_clip, clip, &mut y);
         y
     };
     let free = normalize(&EXTREMES, f32::INFINITY, f32::INFINITY);
-    let normalized = [&normalize(&values(LEN), 1.0, 5.0), &normalize(&EXTREMES, 1e37, 5.0), &free[..]];
+    let normalized = [&normalize(&values::<LEN>(), 1.0, 5.0), &normalize(&EXTREMES, 1e37, 5.0), &free[..]];
     all.push(("normalize", hash(&normalized)));
     let z: Vec<f32> = (0..LEN as u32).map(|i| normal(1, 2, i)).collect();
-    for (name, sample, limit, noise) in [
-        ("denoise", 0.0, f32::INFINITY, &[][..]),
-        ("denoise with noise", 0.0, f32::INFINITY, &z),
-        ("denoise, none limited", 0.4, 4.0, &[]),
-        ("denoise, half limited", 0.4, 1.8, &[]),
-        ("denoise, all limited", 0.4, 0.001, &[]),
-        ("denoise with noise, none", 0.4, 4.0, &z),
-        ("denoise with noise, half", 0.4, 1.8, &z),
-        ("denoise with noise, all", 0.4, 0.001, &z),
-    ] {
+    for case in &DENOISED {
+        let noise = if case.noise { &z[..] } else { &[] };
         let denoised = |values: &[f32], x: f32, v: f32| {
-            let by = Coefficients::from_array([x * sample, v * sample, 0.6, 0.2, sample, 0.1, 0.3]);
+            let by = Coefficients::from_array(case.coefficients(x, v));
             let (mut next, mut y) = (values.to_vec(), values.to_vec());
-            denoise(&by, limit, values, noise, &mut next, &mut y);
+            denoise(&by, case.limit, values, noise, &mut next, &mut y);
             (next, y)
         };
-        let ((next, y), (x, read)) = (denoised(&values(LEN), 1.0, 0.5), denoised(&EXTREMES, 10.0, -9.0));
-        all.push((name, hash(&[&next, &y[1..], &x, &read])));
+        let ((next, y), (x, read)) = (denoised(&values::<LEN>(), 1.0, 0.5), denoised(&EXTREMES, 10.0, -9.0));
+        all.push((case.name, hash(&[&next, &y[1..], &x, &read])));
     }
     all.push(("noise", hash(&[&z])));
     let lstm = |gates: &[f32]| {
-        let (mut c, mut h) = (values(LEN), vec![0.0; LEN]);
+        let (mut c, mut h) = (values::<LEN>(), [0.0; LEN]);
         cells::lstm_cell(gates, &mut c, &mut h);
         [h, c].concat()
     };
-    all.push(("lstm", hash(&[&lstm(&values(4 * LEN)), &lstm(&magnitudes(4 * LEN))])));
+    all.push(("lstm", hash(&[&lstm(&values::<{ 4 * LEN }>()), &lstm(&magnitudes::<{ 4 * LEN }>())])));
     let gru = |a: &[f32]| {
-        let mut h = values(LEN);
-        cells::gru_cell(a, &values(3 * LEN), &mut h);
+        let mut h = values::<LEN>();
+        cells::gru_cell(a, &values::<{ 3 * LEN }>(), &mut h);
         h
     };
-    all.push(("gru", hash(&[&gru(&values(3 * LEN)), &gru(&magnitudes(3 * LEN))])));
+    all.push(("gru", hash(&[&gru(&values::<{ 3 * LEN }>()), &gru(&magnitudes::<{ 3 * LEN }>())])));
     all
 }
 
