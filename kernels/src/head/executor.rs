@@ -61,7 +61,7 @@ pub(super) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
         0 => [part(arena, &(dst.offset + range.start..dst.offset + range.end)), &mut [], &mut [], &mut []],
         _ => regions(arena, &op.regions, Region::default()),
     };
-    if matches!(op.kind, OpKind::Normalize | OpKind::Add | OpKind::Mul | OpKind::Copy) {
+    if matches!(op.kind, OpKind::Normalize { .. } | OpKind::Add | OpKind::Mul | OpKind::Copy) {
         (dst, src) = (part(dst, &range), part(src, &range));
     }
     if dst.is_empty() {

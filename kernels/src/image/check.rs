@@ -196,7 +196,7 @@ impl<'a> Image<'a> {
             let [constants, arrays] = [*constants, *arrays].map(usize::from);
             for constant in front.constants(op.data(), constants)? {
                 // Above 0, and finite but for limits: positive numbers are in the order of their bits.
-                let infinity = f32::INFINITY.to_bits() + u32::from(op.kind == OpKind::Normalize);
+                let infinity = f32::INFINITY.to_bits() + u32::from(matches!(op.kind, OpKind::Normalize { .. }));
                 if u32::from_le(*constant).wrapping_sub(1) >= infinity - 1 {
                     return Err(ImageError::Constant);
                 }

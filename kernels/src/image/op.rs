@@ -16,7 +16,11 @@ use crate::math::Function;
 pub enum OpKind {
     /// `dst = clamp((clamp(src, ±pre_clip) - mean) * scale, ±clip)`. Constants: `pre_clip`, `clip`, infinite where
     /// there is no limit; arrays: `mean`, `scale`, the reciprocals of the standard deviation.
-    Normalize,
+    Normalize {
+        /// Whether the quantizer added it, for the sake of the matrices that read it: then its constants count among their
+        /// bytes. Nothing else depends on it.
+        added: bool,
+    },
     /// `dst = W src + b`
     Linear {
         /// `dst += W src + b` instead.
@@ -142,7 +146,7 @@ macro_rules! operations {
 }
 operations! {
     /// [`OpKind::Normalize`]
-    NORMALIZE = 1 "normalize": OpKind::Normalize, Uses { src: 1, constants: 2, arrays: 2, ..Uses::NONE };
+    NORMALIZE = 1 "normalize": OpKind::Normalize { added: false }, Uses { max_detail: 1, src: 1, constants: 2, arrays: 2, ..Uses::NONE };
     /// [`OpKind::Linear`]
     LINEAR = 2 "linear": OpKind::Linear { accumulate: false }, Uses { max_detail: 1, src: 1, ..Uses::NONE };
     /// [`OpKind::Function`]
@@ -195,7 +199,7 @@ impl OpRecord {
     pub fn emit(&self) -> Result<[u32; OP_WORDS], TooLarge> {
         let code = self.kind.form().map_or(0, |form| form.code);
         let detail = match self.kind {
-            OpKind::Linear { accumulate } => accumulate.into(),
+            OpKind::Linear { accumulate: detail } | OpKind::Normalize { added: detail } => detail.into(),
             OpKind::Function(function) => function as u8,
             _ => 0,
         };
@@ -331,6 +335,7 @@ impl<'a> Image<'a> {
                 (src, third) = (high(self.word(data as usize)), self.work());
                 OpKind::Linear { accumulate: detail == 1 }
             }
+            OpKind::Normalize { .. } => OpKind::Normalize { added: detail == 1 },
             OpKind::Function(_) => OpKind::Function(Function::from_code(detail).ok_or(ImageError::Op)?),
             kind => kind,
         };

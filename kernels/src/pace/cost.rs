@@ -175,7 +175,7 @@ const EIGHT: usize = 8;
 fn rest(op: &Op<'_>, len: usize, add: &mut dyn FnMut(Feature, usize)) {
     match op.kind {
         OpKind::Denoise => add(Feature::DENOISED_REST, len),
-        OpKind::Normalize => add(Feature::NORMALIZED_REST, len),
+        OpKind::Normalize { .. } => add(Feature::NORMALIZED_REST, len),
         _ => {}
     }
 }

@@ -30,8 +30,8 @@ pub const DAMPING_OUTPUT: f64 = 0.02;
 
 /// `G` of every matrix, `rows * rows`, and how many frames or windows it was taken of: with an allowance, those that
 /// fit.
-pub fn output_moments(windows: &Windows<'_>, allowance: Option<Allowance>, seed: u64) -> (Vec<DMatrix<f64>>, usize) {
-    let graph = windows.graph;
+pub fn output_moments(windows: &Windows, allowance: Option<Allowance>, seed: u64) -> (Vec<DMatrix<f64>>, usize) {
+    let graph = &windows.graph;
     let mut random = Random::new(seed);
     let mut sums: Vec<Array2<f32>> = graph.matrices.iter().map(|m| Array2::zeros((m.rows, m.rows))).collect();
     let mut counts = vec![0usize; sums.len()];
@@ -57,8 +57,8 @@ pub fn output_moments(windows: &Windows<'_>, allowance: Option<Allowance>, seed:
 
 /// Draws so many samples and runs a random sign over the deviation of every output back through the network, past
 /// `see`.
-fn probe(windows: &Windows<'_>, samples: usize, random: &mut Random, grads: &mut Weights, see: &mut See<'_>) {
-    let network = Network::new(windows.graph);
+fn probe(windows: &Windows, samples: usize, random: &mut Random, grads: &mut Weights, see: &mut See<'_>) {
+    let network = Network::new(&windows.graph);
     let batch = windows.batch(samples, None, random);
     let mut state = batch.state;
     let pass = network.forward(&windows.weights, batch.frames, &mut state);
@@ -66,14 +66,14 @@ fn probe(windows: &Windows<'_>, samples: usize, random: &mut Random, grads: &mut
         let variance = windows.output_variance[d];
         if variance > 0.0 { random.sign() / variance.sqrt() } else { 0.0 }
     });
-    let mut d_state = zero_state(windows.graph, samples);
+    let mut d_state = zero_state(&windows.graph, samples);
     network.backward(&windows.weights, &pass, signs, &mut d_state, grads, see);
 }
 
 /// The moments on both sides of every matrix, of batches that are drawn: `E[x x']` with its mean, and `G`. What frames
 /// are drawn together is summed at once, and so in a fraction of the time that all frames take one by one.
-pub fn drawn_moments(windows: &Windows<'_>, seed: u64) -> Vec<(Moments, DMatrix<f64>)> {
-    let graph = windows.graph;
+pub fn drawn_moments(windows: &Windows, seed: u64) -> Vec<(Moments, DMatrix<f64>)> {
+    let graph = &windows.graph;
     let mut random = Random::new(seed);
     let mut sums: Vec<Drawn> = graph.matrices.iter().map(|m| Drawn::zeros(m.rows, m.cols)).collect();
     let mut grads = windows.weights.zeros_like();

@@ -26,9 +26,9 @@ pub struct Batch {
 
 /// The f32 network and its recorded observations.
 #[derive(Debug)]
-pub struct Windows<'a> {
+pub struct Windows {
     /// The f32 network.
-    pub graph: &'a Graph,
+    pub graph: Graph,
     /// Its weights.
     pub weights: Weights,
     /// Valid observations of each episode, `[step, element]`, at least as many as a window has.
@@ -43,12 +43,12 @@ pub struct Windows<'a> {
     pub window: usize,
 }
 
-impl<'a> Windows<'a> {
+impl Windows {
     /// Runs the f32 network over the recording; where frames do not depend on each other, over one in `every` of them, of which the
     /// outputs' variance then is.
-    pub fn new(graph: &'a Graph, dataset: &Dataset, every: usize) -> Self {
-        let weights = Weights::of(graph);
-        let network = Network::new(graph);
+    pub fn new(graph: Graph, dataset: &Dataset, every: usize) -> Self {
+        let weights = Weights::of(&graph);
+        let network = Network::new(&graph);
         let recurrent = graph.state_len() > 0;
         let mut episodes = Vec::new();
         let mut states = Vec::new();
@@ -57,8 +57,8 @@ impl<'a> Windows<'a> {
             let rows: Vec<f32> = dataset.episode(e).flatten().collect();
             let episode = Array2::from_shape_vec((length, graph.input_len()), rows).unwrap_or_default();
             if recurrent {
-                let mut state = start_state(graph, &[dataset.start(e)]);
-                let mut kept = zero_state(graph, length);
+                let mut state = start_state(&graph, &[dataset.start(e)]);
+                let mut kept = zero_state(&graph, length);
                 for (t, obs) in episode.axis_chunks_iter(Axis(0), 1).enumerate() {
                     for (kept, now) in kept.iter_mut().flatten().zip(state.iter().flatten()) {
                         if now.ncols() > 0 {
@@ -70,7 +70,7 @@ impl<'a> Windows<'a> {
                 states.push(kept);
             } else {
                 let some = episode.slice(s![..;every, ..]).to_owned();
-                let mut state = zero_state(graph, some.nrows());
+                let mut state = zero_state(&graph, some.nrows());
                 outputs.push(network.forward(&weights, some, &mut state).output().clone());
             }
             episodes.push(episode);
@@ -94,10 +94,24 @@ impl<'a> Windows<'a> {
         episode.row(random.below(episode.nrows()))
     }
 
+    /// With another network that gives the same outputs and whose nodes have the same states in the same order.
+    pub fn with(self, graph: Graph) -> Self {
+        let moved = |state: State| {
+            let mut moved = zero_state(&graph, 0);
+            let mut from = state.into_iter().flatten().filter(|of| of.ncols() > 0);
+            for to in moved.iter_mut().flatten().filter(|to| to.ncols() > 0) {
+                *to = from.next().unwrap_or_default();
+            }
+            moved
+        };
+        let states = self.states.into_iter().map(moved).collect();
+        Self { weights: Weights::of(&graph), states, graph, ..self }
+    }
+
     /// A batch of `size` windows, at the recorded observations or widened.
     pub fn batch(&self, size: usize, widening: Option<Widening>, random: &mut Random) -> Batch {
         let mut frames = Array2::zeros((size * self.window, self.graph.input_len()));
-        let mut state = zero_state(self.graph, size);
+        let mut state = zero_state(&self.graph, size);
         for sample in 0..size {
             let e = random.below(self.episodes.len());
             let start = random.below(self.episodes[e].nrows() + 1 - self.window);
@@ -155,7 +169,7 @@ impl<'a> Windows<'a> {
             let of = |e: &usize| (e % LEFT_OUT == LEFT_OUT - 1) == left_out;
             let chosen: Vec<usize> = (0..self.episodes.len()).filter(of).collect();
             (!chosen.is_empty()).then(|| Self {
-                graph: self.graph,
+                graph: self.graph.clone(),
                 weights: self.weights.clone(),
                 episodes: chosen.iter().map(|&e| self.episodes[e].clone()).collect(),
                 states: chosen.iter().filter_map(|&e| self.states.get(e).cloned()).collect(),
@@ -170,7 +184,7 @@ impl<'a> Windows<'a> {
     /// The f32 network's outputs on a batch, `[frame, element]`.
     pub fn teach(&self, batch: &Batch) -> Array2<f32> {
         let mut state = batch.state.clone();
-        Network::new(self.graph).forward(&self.weights, batch.frames.clone(), &mut state).into_output()
+        Network::new(&self.graph).forward(&self.weights, batch.frames.clone(), &mut state).into_output()
     }
 }
 
@@ -208,7 +222,7 @@ mod tests {
         let graph = lstm();
         let mut dataset = dataset(&graph, 2, 80);
         dataset.length[1] = 5;
-        let windows = Windows::new(&graph, &dataset, 1);
+        let windows = Windows::new(graph.clone(), &dataset, 1);
         assert_eq!((windows.window, windows.episodes[0].nrows(), windows.episodes[1].nrows()), (WINDOW, 80, WINDOW));
         assert_eq!(windows.episodes[1].row(4), windows.episodes[1].row(63));
         assert_ne!(windows.episodes[1].row(3), windows.episodes[1].row(4));

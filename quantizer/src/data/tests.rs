@@ -397,7 +397,7 @@ fn windows_with_their_state_are_as_good_as_the_whole_episode() {
     };
     assert!(near(&moments(&cut), &moments(&whole)) && !near(&moments(&zero), &moments(&whole)));
 
-    let variance = |dataset: &Dataset| Windows::new(&graph, dataset, 1).output_variance;
+    let variance = |dataset: &Dataset| Windows::new(graph.clone(), dataset, 1).output_variance;
     assert!(near(&variance(&cut), &variance(&whole)) && !near(&variance(&zero), &variance(&whole)));
 }
 

@@ -110,6 +110,7 @@ fn self_test_observations(graph: &Graph, steps: usize) -> Vec<Vec<f32>> {
     let mut random = Random::new(0);
     let norm = graph.nodes.iter().find_map(|node| match &node.kind {
         NodeKind::Normalize(norm) if node.inputs == [0] => Some(norm),
+        NodeKind::Balance(balance) if node.inputs == [0] => Some(balance.normalize()),
         _ => None,
     });
     let mut value = |i: usize| match norm {

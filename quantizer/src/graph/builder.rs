@@ -47,15 +47,61 @@ impl Graph {
         self.nodes.push(Node { kind, inputs: inputs.to_vec(), len });
         Ok(self.output())
     }
+
+    /// Puts a node behind `value`, for `readers` of it, which then read the new node's output instead; gives that. Values behind it
+    /// have their numbers raised by one.
+    pub fn insert(&mut self, kind: impl Into<NodeKind>, value: ValueId, readers: &[usize]) -> Result<ValueId> {
+        let kind = kind.into();
+        let len = kind.output_len(&self.matrices, &[self.len_of(value)])?;
+        for (n, node) in self.nodes.iter_mut().enumerate() {
+            for input in &mut node.inputs {
+                if *input > value || (*input == value && readers.contains(&n)) {
+                    *input += 1;
+                }
+            }
+        }
+        self.nodes.insert(value, Node { kind, inputs: vec![value], len });
+        if let Some(denoising) = &mut self.denoising
+            && value <= denoising.first
+        {
+            denoising.first += 1;
+        }
+        Ok(value + 1)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::graph::ops::{Add, Concat, Gru, LayerNorm, Linear, Lstm, Mul, Normalize, RmsNorm, Span};
+    use crate::graph::Evaluator;
+    use crate::graph::ops::{Add, Balance, Concat, Gru, LayerNorm, Linear, Lstm, Mul, Normalize, RmsNorm, Span};
+    use crate::graph::run::tests::iterative;
 
     fn matrix(name: &str, rows: usize, cols: usize) -> WeightMatrix {
         WeightMatrix { name: name.into(), rows, cols, data: vec![0.5; rows * cols] }
+    }
+
+    #[test]
+    fn what_is_inserted_moves_what_stands_behind_it() {
+        let graph = iterative();
+        let mut more = graph.clone();
+        let same = Balance::new(vec![0.0; 3], vec![1.0; 3]);
+        assert_eq!(more.insert(same, 0, &graph.readers(0)).expect("it fits"), 1);
+        assert_eq!((more.nodes[1].inputs[0], more.readers(0)), (1, vec![0]));
+        let first = |graph: &Graph| graph.denoising.as_ref().map_or(0, |denoising| denoising.first);
+        assert_eq!(first(&more), first(&graph) + 1);
+        let input: Vec<f32> = (0..graph.input_len()).map(|i| 0.3 * i as f32 - 0.5).collect();
+        let outputs = [&graph, &more].map(|graph| Evaluator::new(graph).step(&input, &mut |_, _| {}));
+        assert_eq!(outputs[0], outputs[1]);
+        // Behind what only the steps read, they begin where they did.
+        let read = first(&graph) + 1;
+        more.clone_from(&graph);
+        let same = Balance::new(vec![0.0; 2], vec![1.0; 2]);
+        more.insert(same, read, &graph.readers(read)).expect("it fits");
+        assert_eq!((first(&more), more.readers(read)), (first(&graph), vec![read]));
+        assert_eq!(Evaluator::new(&more).step(&input, &mut |_, _| {}), outputs[0]);
+        let error = more.insert(Balance::new(vec![0.0; 9], vec![1.0; 9]), 0, &[]).expect_err("too many").to_string();
+        assert_eq!(error, "mean has 9 values, 3 are needed");
     }
 
     #[test]

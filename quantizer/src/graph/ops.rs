@@ -23,7 +23,7 @@ pub use linear::Linear;
 pub use lstm::Lstm;
 pub use mul::Mul;
 pub use norm::{LayerNorm, RmsNorm};
-pub use normalize::Normalize;
+pub use normalize::{Balance, Normalize};
 pub use table::Table;
 
 use super::operation::Operation;
@@ -65,6 +65,8 @@ macro_rules! operations {
 operations! {
     /// Mean, scale and clips of observations.
     Normalize,
+    /// Mean and scale that the quantizer adds before matrices.
+    Balance,
     /// A matrix product.
     Linear,
     /// A function of every element.

@@ -235,7 +235,7 @@ impl<'a> Network<'a> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use actq_kernels::math::Function;
     use actq_kernels::ops::denoise::Coefficients;
 
@@ -300,7 +300,7 @@ mod tests {
 
     /// A head of three values of observation and two of noise, whose steps use every coefficient but that of further
     /// noise.
-    fn iterative() -> Graph {
+    pub(in crate::graph) fn iterative() -> Graph {
         let mut seed = Random::new(12);
         let mut graph = Graph::new(3);
         for (rows, cols) in [(4, 3), (4, 2), (2, 4)] {

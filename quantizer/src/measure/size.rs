@@ -3,13 +3,18 @@
 use std::collections::BTreeSet;
 
 use actq_kernels::Image;
-use actq_kernels::image::Matrix;
+use actq_kernels::image::{Matrix, OpKind};
 
-/// Bits per weight of the policy as it was trained: codes, padding, scales, steps and block records of all matrices
-/// over the number of the source's weights. A matrix that several operations share counts once.
+use crate::graph::ops::Balance;
+
+/// Bits per weight of the policy as it was trained: codes, padding, scales, steps and block records of all matrices, and the
+/// constants that the quantizer put before them, over the number of the source's weights. A matrix that several operations share
+/// counts once.
 pub fn bits_per_weight(image: &Image<'_>) -> f64 {
     let bytes: usize = distinct(image).iter().map(Matrix::weight_bytes).sum();
-    8.0 * bytes as f64 / image.source_weights().max(1) as f64
+    let added = image.ops().filter(|op| op.kind == OpKind::Normalize { added: true });
+    let constants: usize = added.map(|op| Balance::bytes(op.dst().len)).sum();
+    8.0 * (bytes + constants) as f64 / image.source_weights().max(1) as f64
 }
 
 /// Bytes as hexadecimal digits.

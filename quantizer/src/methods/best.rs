@@ -3,6 +3,7 @@
 
 mod adam;
 pub mod allocate;
+pub mod balance;
 pub mod choose;
 pub mod compact;
 pub mod dimension;
@@ -32,7 +33,8 @@ use crate::data::Dataset;
 use crate::graph::{Graph, Network, WeightMatrix};
 use crate::random::Random;
 use allocate::{Rows, allocate, energies, removals};
-use choose::{CHOOSING, Chosen, choose};
+use balance::{balance, balance_bytes};
+use choose::{Chosen, choose, choosing};
 use compact::{Compacted, add_to_bias, compact};
 use dimension::{Dimension, dimensions};
 use distill::{Learned, Task, distill, loss};
@@ -46,8 +48,9 @@ const SEED: u64 = 1;
 
 /// What the pipeline takes from the recorded observations, for any number of budgets.
 #[derive(Debug)]
-pub struct RowStatistics<'a> {
-    windows: Windows<'a>,
+pub struct RowStatistics {
+    /// The network, its columns balanced, and the recorded observations.
+    windows: Windows,
     /// Importance of every matrix's columns; of its columns about their means; of its rows.
     inputs: Vec<Vec<f64>>,
     centred: Vec<Vec<f64>>,
@@ -58,32 +61,39 @@ pub struct RowStatistics<'a> {
     pub(super) outputs_of: usize,
 }
 
-impl<'a> RowStatistics<'a> {
+impl RowStatistics {
     /// Runs the f32 network over `dataset`, forwards and backwards. `moments` are those of the matrices' inputs, of so many frames
     /// that no more fit the allowance, if there is one.
     pub fn collect(
-        graph: &'a Graph,
+        graph: &Graph,
         dataset: &Dataset,
-        (moments, frames): (Vec<Moments>, usize),
+        (mut moments, frames): (Vec<Moments>, usize),
         allowance: Option<Allowance>,
     ) -> Result<Self> {
         dataset.require_frames(LEAST_FRAMES, "learning from fewer repeats them by heart")?;
         let every = if allowance.is_some() { dataset.frames().div_ceil(frames.max(1)) } else { 1 };
-        let windows = Windows::new(graph, dataset, every);
+        let windows = Windows::new(graph.clone(), dataset, every);
         ensure!(
             windows.output_variance.iter().any(|v| *v > 0.0),
             "{}: the policy gives the same action at every observation",
             dataset.path.display()
         );
         let (output_moments, outputs_of) = output_moments(&windows, allowance, SEED);
+        let outputs: Vec<Vec<f64>> = output_moments.iter().map(|g| importance(g, Side::Output)).collect();
+        let balanced = balance(graph, &mut moments, &outputs)?;
         Ok(Self {
-            windows,
+            windows: windows.with(balanced),
             inputs: moments.iter().map(|m| importance(&m.second, Side::Input)).collect(),
             centred: moments.iter().map(|m| importance(&m.centred(), Side::Input)).collect(),
-            outputs: output_moments.iter().map(|g| importance(g, Side::Output)).collect(),
+            outputs,
             moments: moments.into_iter().zip(output_moments).collect(),
             outputs_of,
         })
+    }
+
+    /// The network, its columns balanced.
+    pub fn graph(&self) -> &Graph {
+        &self.windows.graph
     }
 
     /// The most steps of distillation with these options.
@@ -101,13 +111,13 @@ impl<'a> RowStatistics<'a> {
 
 /// Quantizes a network. Hidden elements without bits are gone from it, biases and norms have learned.
 pub fn quantize(
-    graph: &Graph,
-    statistics: &RowStatistics<'_>,
+    statistics: &RowStatistics,
     rate: Rate,
     options: &Options,
     mut progress: impl FnMut(Progress),
 ) -> Result<QuantizedNetwork> {
     let RowStatistics { windows, inputs, centred, outputs, moments, .. } = statistics;
+    let graph = &windows.graph;
     for (name, _) in &options.forced {
         let names = || graph.matrices.iter().map(|m| m.name.as_str()).collect::<Vec<_>>().join(", ");
         ensure!(graph.matrices.iter().any(|m| m.name == *name), "no matrix is named {name:?}; there are {}", names());
@@ -154,10 +164,11 @@ pub fn quantize(
     let feedback = |moments: &[(Moments, DMatrix<f64>)], damping: f64| {
         feed_back(&compacted, options.group, &importance, moments, damping)
     };
+    let work = choosing(windows.recurrent());
     let Chosen { choice, bounds, tried } = choose(&task, windows, &feedback, |share, error| {
-        progress(Progress::Choosing { share: CHOOSING * share, error });
+        progress(Progress::Choosing { share: work * share, error });
     });
-    let from = if tried.is_empty() { 0.0 } else { CHOOSING };
+    let from = if tried.is_empty() { 0.0 } else { work };
     let (quantized, learned, steps) = match choice {
         Choice::Feedback { damping } => {
             let (quantized, graph) = feedback(moments, damping);
@@ -186,7 +197,8 @@ pub fn quantize(
     // int16 is packed in another layout, which may pad more; it is taken where it still fits.
     for (m, &limit) in wanted.iter().enumerate() {
         let other = outcome(&quantized[m], limit)?;
-        let total = outcomes.iter().map(Outcome::bytes).sum::<usize>() - outcomes[m].bytes() + other.bytes();
+        let total = balance_bytes(graph) + outcomes.iter().map(Outcome::bytes).sum::<usize>() - outcomes[m].bytes()
+            + other.bytes();
         if total as f64 <= allowed {
             outcomes[m] = other;
         }
@@ -244,7 +256,7 @@ const SAMPLES: usize = 256;
 fn choose_activations(
     graph: &Graph,
     quantized: &[Quantized],
-    windows: &Windows<'_>,
+    windows: &Windows,
     allowance: Option<Allowance>,
     seed: u64,
 ) -> Vec<u16> {

@@ -32,17 +32,17 @@ const TIMED: usize = 8;
 #[derive(Debug)]
 pub struct PreparedMethod<'a> {
     graph: &'a Graph,
-    statistics: Statistics<'a>,
+    statistics: Statistics,
     sampled: Option<Sampled>,
 }
 
 /// What a method takes from the recorded observations.
 #[derive(Debug)]
-enum Statistics<'a> {
+enum Statistics {
     Rtn,
     Gptq(Vec<Moments>),
     ActQuant(ActionStatistics),
-    Best(Box<RowStatistics<'a>>),
+    Best(Box<RowStatistics>),
 }
 
 impl<'a> PreparedMethod<'a> {
@@ -112,6 +112,14 @@ impl<'a> PreparedMethod<'a> {
         self.sampled
     }
 
+    /// The network that is quantized: of best with balanced columns.
+    pub fn graph(&self) -> &Graph {
+        match &self.statistics {
+            Statistics::Best(statistics) => statistics.graph(),
+            _ => self.graph,
+        }
+    }
+
     /// The method.
     pub fn method(&self) -> Method {
         match &self.statistics {
@@ -136,7 +144,7 @@ impl<'a> PreparedMethod<'a> {
             Statistics::Rtn => matrixwise::quantize(graph, None, rate, options)?,
             Statistics::Gptq(moments) => matrixwise::quantize(graph, Some(moments), rate, options)?,
             Statistics::ActQuant(statistics) => actquant::quantize(graph, statistics, rate, options)?,
-            Statistics::Best(statistics) => return best::quantize(graph, statistics, rate, options, progress),
+            Statistics::Best(statistics) => return best::quantize(statistics, rate, options, progress),
         };
         Ok(QuantizedNetwork { graph: graph.clone(), outcomes, learning: None })
     }

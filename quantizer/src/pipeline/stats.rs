@@ -12,6 +12,7 @@ use crate::budget::Budget;
 use crate::graph::WeightMatrix;
 use crate::measure::size::{bits_per_weight, hex};
 use crate::methods::actquant::score::Score;
+use crate::methods::best::balance::balance_bytes;
 use crate::methods::{Options, Outcome, Quantized};
 use crate::strict_json;
 
@@ -43,6 +44,9 @@ pub struct Stats {
     pub seed: u64,
     /// Steps of distillation; 0 for methods that do not learn.
     pub steps: usize,
+    /// Bytes of the means and factors that balance the matrices' columns (best).
+    #[serde(default)]
+    pub balance: usize,
     /// The matrices in the policy's order.
     pub matrices: Vec<MatrixRecord>,
 }
@@ -139,6 +143,7 @@ impl Stats {
             budget: options.budget,
             seed: options.seed,
             steps: quantized.steps(),
+            balance: balance_bytes(&quantized.policy.graph),
             matrices: matrices.map(|(m, (source, outcome))| matrix(source, outcome, scores.get(m))).collect(),
         })
     }

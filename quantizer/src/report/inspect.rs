@@ -99,7 +99,9 @@ fn row(op: &Op<'_>) -> Vec<String> {
         (OpKind::Linear { accumulate }, Some(matrix)) => {
             format!("{}x{}{}", matrix.rows, matrix.cols, if accumulate { " added" } else { "" })
         }
-        (OpKind::Normalize, _) => format!("clip {} {}", op.constant(0), op.constant(1)),
+        (OpKind::Normalize { added }, _) => {
+            format!("clip {} {}{}", op.constant(0), op.constant(1), if added { ", by the quantizer" } else { "" })
+        }
         (OpKind::LayerNorm | OpKind::RmsNorm, _) => format!("eps {}", op.constant(0)),
         (OpKind::LstmCell, _) => format!("cell {}", region(op.third())),
         (OpKind::GruCell, _) => format!("gates {}", region(op.third())),

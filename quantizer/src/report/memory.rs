@@ -35,7 +35,11 @@ pub fn peak(image: &Image<'_>) -> Peak {
         let op = &ops[i];
         let replaces = matches!(
             op.kind,
-            OpKind::Normalize | OpKind::Linear { accumulate: false } | OpKind::Copy | OpKind::Noise | OpKind::Table
+            OpKind::Normalize { .. }
+                | OpKind::Linear { accumulate: false }
+                | OpKind::Copy
+                | OpKind::Noise
+                | OpKind::Table
         );
         for region in [op.dst(), op.src(), op.third()] {
             words(region).for_each(|word| live[word] = true);

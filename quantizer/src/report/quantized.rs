@@ -8,6 +8,7 @@ use crate::budget::Rate;
 use crate::graph::Graph;
 use crate::measure::eval::ErrorReport;
 use crate::methods::actquant::ActionStatistics;
+use crate::methods::best::balance::balance_bytes;
 use crate::methods::{Choice, Learning, Sampled, Tried};
 use crate::pipeline::{QuantizedPolicy, Search, Try};
 
@@ -46,10 +47,12 @@ pub fn matrices(quantized: &QuantizedPolicy) -> String {
             outcome.error.map_or("-".to_owned(), |e| format!("{e:.2e}")),
         ]);
     }
-    let bits = 8.0 * total as f64 / policy.weights.max(1) as f64;
+    let added = balance_bytes(&policy.graph);
+    let with = if added > 0 { format!(" and {added} of the balance before them") } else { String::new() };
+    let bits = 8.0 * (total + added) as f64 / policy.weights.max(1) as f64;
     let by_row = outcomes.iter().any(|outcome| outcome.allocation.is_some());
     let widths = if by_row { widths::line(policy, outcomes) + "\n" } else { String::new() };
-    format!("{rows}\n\n{total} bytes of weights, {bits:.3} bits each, everything counted\n{widths}")
+    format!("{rows}\n\n{total} bytes of weights{with}, {bits:.3} bits each, everything counted\n{widths}")
 }
 
 /// What the statistics of an iterative head were taken of.

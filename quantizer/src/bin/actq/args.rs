@@ -366,7 +366,7 @@ impl ActQuantArgs {
 #[derive(clap::Args)]
 pub(crate) struct LearnArgs {
     /// The most steps of distillation; 0 = none, but two-sided error feedback: seconds, and a larger error at few bits
-    /// [default: by the number of weights, 10000 for 200 thousand, recurrent policies 6400]
+    /// [default: by the number of weights, 10000 for 200 thousand, recurrent policies 7800]
     #[arg(long, value_name = "N")]
     pub(crate) steps: Option<usize>,
     /// The most minutes of distillation, instead of the default steps; what is learned then depends on the machine

@@ -54,10 +54,60 @@ impl Operation for Normalize {
     }
 
     fn lower(&self, to: &mut Lowering, inputs: &[ValueId], len: usize) -> BufferId {
+        self.emit(false, to, inputs, len)
+    }
+}
+
+impl Normalize {
+    /// As [`Operation::lower`].
+    fn emit(&self, added: bool, to: &mut Lowering, inputs: &[ValueId], len: usize) -> BufferId {
         let dst = to.buffer(len, Lifetime::Step);
         let src = to.place(inputs[0]);
         let data = StepData::Constants([&[self.pre_clip, self.clip], &self.mean[..], &self.scale].concat());
-        to.emit(OpKind::Normalize, to.whole(dst), Some(src), None, data);
+        to.emit(OpKind::Normalize { added }, to.whole(dst), Some(src), None, data);
         dst
+    }
+}
+
+/// `(x - mean) * scale`, which the quantizer puts before matrices whose columns it has scaled.
+#[derive(Clone, Debug)]
+pub struct Balance(Normalize);
+
+impl Balance {
+    /// With these means and factors.
+    pub fn new(mean: Vec<f32>, scale: Vec<f32>) -> Self {
+        Self(Normalize { mean, scale, pre_clip: f32::INFINITY, clip: f32::INFINITY })
+    }
+
+    /// Bytes of the constants for so many values: means, scales, and the operation's two limits.
+    pub fn bytes(len: usize) -> usize {
+        4 * (2 * len + 2)
+    }
+
+    /// What it computes.
+    pub fn normalize(&self) -> &Normalize {
+        &self.0
+    }
+}
+
+impl Operation for Balance {
+    fn output_len(&self, matrices: &[WeightMatrix], inputs: &[usize]) -> Result<usize> {
+        self.0.output_len(matrices, inputs)
+    }
+
+    fn constants(&self) -> usize {
+        self.0.constants()
+    }
+
+    fn forward(&self, run: &Forward<'_>, state: &mut NodeState) -> (Array2<f32>, Saved) {
+        self.0.forward(run, state)
+    }
+
+    fn backward(&self, run: &mut Backward<'_>, saved: &Saved, dy: Array2<f32>, d_state: &mut NodeState) {
+        self.0.backward(run, saved, dy, d_state);
+    }
+
+    fn lower(&self, to: &mut Lowering, inputs: &[ValueId], len: usize) -> BufferId {
+        self.0.emit(true, to, inputs, len)
     }
 }

@@ -10,6 +10,7 @@ use actq_kernels::Width;
 use actq_kernels::image::block_bytes;
 use anyhow::{Result, ensure};
 
+use super::balance::balance_bytes;
 use super::dimension::{Dimension, Widths};
 use crate::budget::BudgetTooSmall;
 use crate::graph::{Graph, WeightMatrix};
@@ -68,24 +69,23 @@ pub fn removals(graph: &Graph, dimension: &Dimension, h: &[Vec<f64>], g: &[Vec<f
     removals
 }
 
-/// Bytes of all matrices with these widths: rows without bits and the columns that compaction removes are gone, everything
+/// Bytes of the balance, and of all matrices with these widths: rows without bits and the columns that compaction removes are gone, everything
 /// else is counted. Rows of a `dimension` are sorted by width, others have steps where widths are mixed.
 pub fn bytes(graph: &Graph, dimensions: &[Dimension], widths: &Widths, packing: Packing) -> usize {
-    (0..graph.matrices.len())
-        .map(|m| {
-            let kept_cols = Dimension::feeding(dimensions, m).map_or(graph.matrices[m].cols, |d| d.kept(widths).max(1));
-            let sorted = Dimension::made_by(dimensions, m).is_some();
-            let used: Vec<(Width, usize)> = Width::ALL
-                .into_iter()
-                .map(|w| (w, widths[m].iter().filter(|b| **b == Some(w)).count()))
-                .filter(|(_, n)| *n > 0)
-                .collect();
-            let all_rows = used.iter().map(|(_, n)| n).sum::<usize>() == widths[m].len();
-            let one_width = used.len() == 1 && all_rows;
-            let stepped = !(sorted || one_width);
-            used.iter().map(|&(width, rows)| block_bytes(packing.shape(width, rows, kept_cols), stepped)).sum::<usize>()
-        })
-        .sum()
+    let matrices = (0..graph.matrices.len()).map(|m| {
+        let kept_cols = Dimension::feeding(dimensions, m).map_or(graph.matrices[m].cols, |d| d.kept(widths).max(1));
+        let sorted = Dimension::made_by(dimensions, m).is_some();
+        let used: Vec<(Width, usize)> = Width::ALL
+            .into_iter()
+            .map(|w| (w, widths[m].iter().filter(|b| **b == Some(w)).count()))
+            .filter(|(_, n)| *n > 0)
+            .collect();
+        let all_rows = used.iter().map(|(_, n)| n).sum::<usize>() == widths[m].len();
+        let one_width = used.len() == 1 && all_rows;
+        let stepped = !(sorted || one_width);
+        used.iter().map(|&(width, rows)| block_bytes(packing.shape(width, rows, kept_cols), stepped)).sum::<usize>()
+    });
+    balance_bytes(graph) + matrices.sum::<usize>()
 }
 
 /// Chooses the widths so that [`bytes`] stays within `limit`.

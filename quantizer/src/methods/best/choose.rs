@@ -2,10 +2,8 @@
 //!
 //! Each choice has three quarters of the episodes; to learn, it has an eighth of the steps. On the others its error is measured
 //! twice, at the recorded observations and at widened ones. A feed-forward network takes the choice with the lowest error at the
-//! recorded observations, a recurrent one that with the lowest error at widened ones: the error on the recorded path takes the least
-//! noise, with which a recurrent policy that balances falls (docs/QUANTIZER.md).
-
-use std::time::Duration;
+//! recorded observations; a recurrent one learns as widely as it can ([`Widening::choices`]), and takes feedback where that is lower at
+//! widened ones (docs/QUANTIZER.md).
 
 use nalgebra::DMatrix;
 
@@ -25,10 +23,6 @@ const LEAST_STEPS: usize = 3000;
 /// Of the steps, and of the time, for one choice.
 const STEPS: usize = 8;
 const TIME: u32 = 12;
-/// What is left of the time for learning.
-const TIME_LEFT: f64 = 0.75;
-/// Of all the work, roughly.
-pub const CHOOSING: f64 = 0.27;
 /// What all the steps leave of the error that an eighth of them leaves: 0.6 to 1.15, 0.81 in the mean
 /// (docs/records/2026-11-22-choice.md).
 const LEFT: f64 = 0.8;
@@ -52,11 +46,17 @@ pub struct Chosen {
     pub tried: Vec<Tried>,
 }
 
+/// Roughly the share of all the work.
+pub fn choosing(recurrent: bool) -> f64 {
+    let tries = Widening::choices(recurrent).len() as f64 / STEPS as f64;
+    tries / (1.0 + tries)
+}
+
 /// Tries all choices. Where no episode can be left out, or few steps are to be learned, nothing is tried. Of an iterative head
 /// feedback is not: its moments over all denoising steps take longer than what they could say is worth.
 pub fn choose(
     task: &Task<'_>,
-    windows: &Windows<'_>,
+    windows: &Windows,
     feedback: &Feedback<'_>,
     mut progress: impl FnMut(f64, f64),
 ) -> Chosen {
@@ -83,7 +83,7 @@ pub fn choose(
     if learns {
         let bounds = Bounds { steps: steps.map(|steps| steps / STEPS), time: time.map(|time| time / TIME) };
         let choices = Widening::choices(windows.recurrent());
-        for (i, widening) in choices.into_iter().enumerate() {
+        for (i, &widening) in choices.iter().enumerate() {
             let learned = distill(&Task { widening, bounds, ..task.clone() }, &learned_from, |share, error| {
                 progress((i as f64 + share) / choices.len() as f64, error);
             });
@@ -91,7 +91,7 @@ pub fn choose(
         }
     }
     let choice = best(&tried, windows.recurrent()).map_or(untried.choice, |best| best.choice);
-    let left = time.map(|time| Duration::from_secs_f64(time.as_secs_f64() * TIME_LEFT));
+    let left = time.map(|time| time - time / TIME * Widening::choices(windows.recurrent()).len() as u32);
     Chosen { choice, bounds: Bounds { steps, time: left }, tried }
 }
 
@@ -105,7 +105,7 @@ fn best(tried: &[Tried], recurrent: bool) -> Option<&Tried> {
 }
 
 /// The errors of a network at recorded and at widened observations, the same for every choice.
-fn errors(task: &Task<'_>, graph: &Graph, quantized: &[Quantized], windows: &Windows<'_>) -> [f64; 2] {
+fn errors(task: &Task<'_>, graph: &Graph, quantized: &[Quantized], windows: &Windows) -> [f64; 2] {
     let network = Network::rounded(graph, task.x_max);
     let weights = dequantized(graph, quantized);
     let size = (FRAMES / windows.window).max(1);

@@ -80,7 +80,7 @@ pub struct Learned {
 
 /// Learns codes, scales, biases and norms. `progress` is called after each step with the share done and the error on the widened
 /// inputs.
-pub fn distill(task: &Task<'_>, windows: &Windows<'_>, mut progress: impl FnMut(f64, f64)) -> Learned {
+pub fn distill(task: &Task<'_>, windows: &Windows, mut progress: impl FnMut(f64, f64)) -> Learned {
     let network = Network::rounded(task.graph, task.x_max);
     let mut weights = Weights::of(task.graph);
     let matrices = task.graph.matrices.iter().zip(task.widths).zip(task.importance);
@@ -138,7 +138,7 @@ fn values(matrix: &mut Array2<f32>) -> &mut [f32] {
 fn gradient(
     network: &Network<'_>,
     weights: &Weights,
-    windows: &Windows<'_>,
+    windows: &Windows,
     objective: &Objective<'_>,
     batch: Batch,
 ) -> (f32, Weights) {
@@ -153,7 +153,7 @@ fn gradient(
 }
 
 /// The mean over samples and outputs of squared error over variance, against the f32 network.
-pub fn loss(network: &Network<'_>, weights: &Weights, windows: &Windows<'_>, batch: Batch) -> f32 {
+pub fn loss(network: &Network<'_>, weights: &Weights, windows: &Windows, batch: Batch) -> f32 {
     let target = windows.teach(&batch);
     Objective::even(&windows.output_variance).measure(forward(network, weights, batch).output(), &target).1
 }

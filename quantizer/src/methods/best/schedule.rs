@@ -11,7 +11,7 @@ const HELD: f64 = 0.7;
 /// Steps of a network of [`USUAL`] weights; others take as many as its square root of their size allows: a small network learns
 /// longer, a large one keeps its time. A recurrent network's step is a batch of windows, which costs four times as much.
 const STEPS: f64 = 10_000.0;
-const WINDOW_STEPS: f64 = 6_400.0;
+const WINDOW_STEPS: f64 = 7_800.0;
 const USUAL: f64 = 200_000.0;
 /// At most.
 const MOST: f64 = 20_000.0;
@@ -166,7 +166,7 @@ mod tests {
 
     #[test]
     fn small_networks_take_more_steps() {
-        assert_eq!(most_steps(31_000, true), 16_256);
+        assert_eq!(most_steps(31_000, true), 19_812);
         assert_eq!(
             (most_steps(200_000, false), most_steps(800_000, false), most_steps(10, true)),
             (10_000, 5_000, 20_000)

@@ -1,0 +1,375 @@
+//! Columns that weigh alike: what matrices read of the observation is scaled so that no column's weights and no column's values
+//! stand out.
+//!
+//! Observations come in units of people's choice. A row has one scale, so an error of its weights has the same size in every column:
+//! a column whose weights are small is rounded to nothing or to much more than it was, and one whose values are large multiplies what it
+//! was rounded by. Activations have one scale a vector, with the same consequence the other way round. With a factor `d_c` on what
+//! column `c` reads and its reciprocal on its weights, the network computes what it did, and the expected error of the matrices behind
+//! is proportional to
+//!
+//! `sum_c a_c / d_c^2 * sum_c h_c d_c^2` with `a_c = sum_r g_r w_rc^2`,
+//!
+//! `h` and `g` the importance of columns and rows. It is least, `(sum_c sqrt(a_c h_c))^2` by Cauchy and Schwarz, for
+//! `d_c = (a_c / h_c)^(1/4)`, which is also what SmoothQuant (arXiv 2211.10438, eq. 4) does to activations' and weights' maxima with
+//! alpha 1/2. The values' means go into the biases.
+//!
+//! Where nothing but matrices reads a normalization without a limit, factors and means go into its own and cost nothing; elsewhere they are
+//! an operation [`Balance`], whose bytes count, and which is added where it lowers the expected error by more than these bytes would.
+
+use anyhow::Result;
+use nalgebra::{DMatrix, DVector};
+
+use super::compact::add_to_bias;
+use crate::calibrate::moments::Moments;
+use crate::calibrate::sensitivity::{Side, importance};
+use crate::graph::operation::{Operand, Product};
+use crate::graph::ops::{Balance, Normalize};
+use crate::graph::{Graph, NodeKind, ValueId};
+
+/// A factor is at most so many times the others' geometric mean, or one over it: the recording need not show how far a value goes.
+const MOST: f64 = 32.0;
+/// A value whose variance is below this share of its mean square did not move.
+const STILL: f64 = 1e-9;
+
+/// A value of the observation, and what reads it.
+struct Site {
+    value: ValueId,
+    readers: Vec<usize>,
+    matrices: Vec<usize>,
+}
+
+/// The network with balanced columns; `moments` of the matrices' inputs become those of its inputs. `outputs` is the importance of the
+/// matrices' rows.
+///
+/// # Errors
+///
+/// None for a network that its builder has accepted.
+pub fn balance(graph: &Graph, moments: &mut [Moments], outputs: &[Vec<f64>]) -> Result<Graph> {
+    let mut balanced = graph.clone();
+    let whole: f64 = (0..graph.matrices.len()).map(|m| Columns::of(graph, &[m], moments, outputs).error()).sum();
+    // From the last on: what is inserted moves only what stands behind it.
+    for Site { value, readers, matrices } in sites(graph).into_iter().rev() {
+        let columns = Columns::of(graph, &matrices, moments, outputs);
+        let own = own_normalize(graph, value, &readers);
+        let bits =
+            if own { 0.0 } else { 8.0 * Balance::bytes(columns.mean.len()) as f64 / graph.weights().max(1) as f64 };
+        // Of the whole error, and what so many bits a weight fewer make of it.
+        let left = 1.0 - columns.gain() / whole.max(f64::MIN_POSITIVE);
+        if left * 4f64.powf(bits) >= 1.0 {
+            continue;
+        }
+        let Some(factors) = columns.factors() else { continue };
+        for &m in &matrices {
+            let shift = scale(&mut balanced, m, &columns.mean, &factors);
+            add_to_bias(&mut balanced, m, &shift);
+            moments[m].balance(&factors);
+        }
+        if own {
+            if let NodeKind::Normalize(normalize) = &mut balanced.nodes[value - 1].kind {
+                fold(normalize, &columns.mean, &factors);
+            }
+        } else {
+            let [mean, scale] = [&columns.mean, &factors].map(|of| of.iter().map(|v| *v as f32).collect());
+            balanced.insert(Balance::new(mean, scale), value, &readers)?;
+        }
+    }
+    Ok(balanced)
+}
+
+/// Bytes of what [`balance`] has added to a network.
+pub fn balance_bytes(graph: &Graph) -> usize {
+    let added = graph.nodes.iter().filter(|node| matches!(node.kind, NodeKind::Balance(_)));
+    added.map(|node| Balance::bytes(node.len)).sum()
+}
+
+/// Values that depend on the observation through no matrix, and the nodes that read them through nothing but matrices which read
+/// nothing else.
+fn sites(graph: &Graph) -> Vec<Site> {
+    let mut observed = vec![true];
+    for node in &graph.nodes {
+        let of_observation = !node.inputs.is_empty() && node.inputs.iter().all(|&value| observed[value]);
+        observed.push(of_observation && node.kind.products().is_empty());
+    }
+    let of_input = |n: usize| -> Vec<usize> {
+        let products = graph.nodes[n].kind.products().into_iter();
+        products.filter(|product| product.operand == Operand::Input).map(|product| product.matrix).collect()
+    };
+    let site = |value: ValueId| {
+        let mut readers = graph.readers(value);
+        readers.retain(|&n| !of_input(n).is_empty());
+        let mut matrices: Vec<usize> = readers.iter().flat_map(|&n| of_input(n)).collect();
+        matrices.sort_unstable();
+        matrices.dedup();
+        let elsewhere = |(n, product): (usize, Product)| {
+            matrices.contains(&product.matrix) && (product.operand != Operand::Input || !readers.contains(&n))
+        };
+        let mut products =
+            graph.nodes.iter().enumerate().flat_map(|(n, node)| node.kind.products().into_iter().map(move |p| (n, p)));
+        let alone = !matrices.is_empty() && !products.any(elsewhere);
+        alone.then_some(Site { value, readers, matrices })
+    };
+    (0..observed.len()).filter(|&value| observed[value]).filter_map(site).collect()
+}
+
+/// Whether the value is that of a normalization without a limit behind it that nothing else reads.
+fn own_normalize(graph: &Graph, value: ValueId, readers: &[usize]) -> bool {
+    let node = value.checked_sub(1).map(|n| &graph.nodes[n].kind);
+    matches!(node, Some(NodeKind::Normalize(normalize)) if normalize.clip == f32::INFINITY)
+        && value != graph.output()
+        && graph.readers(value) == readers
+}
+
+/// What the columns of the matrices that read one value have in common.
+struct Columns {
+    /// `a`
+    weights: Vec<f64>,
+    /// `h`, about the mean
+    values: Vec<f64>,
+    mean: Vec<f64>,
+    /// Standard deviation; 0 where the value did not move.
+    deviation: Vec<f64>,
+}
+
+impl Columns {
+    fn of(graph: &Graph, matrices: &[usize], moments: &[Moments], outputs: &[Vec<f64>]) -> Self {
+        let cols = graph.matrices[matrices[0]].cols;
+        let mut weights = vec![0.0; cols];
+        for &m in matrices {
+            for (row, g) in graph.matrices[m].data.chunks_exact(cols).zip(&outputs[m]) {
+                weights.iter_mut().zip(row).for_each(|(a, w)| *a += g * f64::from(*w).powi(2));
+            }
+        }
+        let moments = &moments[matrices[0]];
+        let centred = moments.centred();
+        let moves = |c: usize| centred[(c, c)] > STILL * moments.second[(c, c)];
+        Self {
+            weights,
+            values: importance(&centred, Side::Input),
+            mean: moments.mean.clone(),
+            deviation: (0..cols).map(|c| if moves(c) { centred[(c, c)].sqrt() } else { 0.0 }).collect(),
+        }
+    }
+
+    /// The expected error, up to a factor that all matrices have.
+    fn error(&self) -> f64 {
+        self.weights.iter().sum::<f64>() * self.values.iter().sum::<f64>() / self.weights.len() as f64
+    }
+
+    /// What balancing takes off it.
+    fn gain(&self) -> f64 {
+        let balanced = self.weights.iter().zip(&self.values).map(|(a, h)| (a * h).sqrt()).sum::<f64>().powi(2);
+        self.error() - balanced / self.weights.len() as f64
+    }
+
+    /// `d`, so that the deviations of what moved are 1 in the geometric mean; `None` where nothing did. The importance of what did not
+    /// move is its damping, so its factor is not much larger than the others'.
+    fn factors(&self) -> Option<Vec<f64>> {
+        let cols = 0..self.mean.len();
+        let factors: Vec<f64> =
+            self.weights.iter().zip(&self.values).map(|(a, h)| (a.max(f64::MIN_POSITIVE) / h).powf(0.25)).collect();
+        let usual = geometric_mean(factors.iter().copied())?;
+        let limited = |c: usize| factors[c].clamp(usual / MOST, usual * MOST);
+        let moved = cols.clone().filter(|&c| self.deviation[c] > 0.0);
+        let unit = geometric_mean(moved.map(|c| limited(c) * self.deviation[c]))?;
+        Some(cols.map(|c| limited(c) / unit).collect())
+    }
+}
+
+/// `None` of nothing.
+fn geometric_mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (sum, count) = values.fold((0.0, 0usize), |(sum, count), value| (sum + value.ln(), count + 1));
+    (count > 0).then(|| (sum / count as f64).exp())
+}
+
+/// Divides a matrix's columns by the factors, and gives what it makes of the mean.
+fn scale(graph: &mut Graph, matrix: usize, mean: &[f64], factors: &[f64]) -> Vec<f32> {
+    let matrix = &mut graph.matrices[matrix];
+    let rows = matrix.data.chunks_exact_mut(matrix.cols);
+    rows.map(|row| {
+        let of_mean: f64 = row.iter().zip(mean).map(|(w, mean)| f64::from(*w) * mean).sum();
+        row.iter_mut().zip(factors).for_each(|(w, d)| *w = (f64::from(*w) / d) as f32);
+        of_mean as f32
+    })
+    .collect()
+}
+
+/// `((x - mean) * scale - m) * d` as one.
+fn fold(normalize: &mut Normalize, mean: &[f64], factors: &[f64]) {
+    let Normalize { mean: own, scale, .. } = normalize;
+    for ((own, scale), (m, d)) in own.iter_mut().zip(scale).zip(mean.iter().zip(factors)) {
+        // Of a scale of 0 the mean is 0, too.
+        if *scale != 0.0 {
+            *own = (f64::from(*own) + m / f64::from(*scale)) as f32;
+        }
+        *scale = (f64::from(*scale) * d) as f32;
+    }
+}
+
+impl Moments {
+    /// Of `(x - mean) * factors`.
+    fn balance(&mut self, factors: &[f64]) {
+        let factors = DMatrix::from_diagonal(&DVector::from_column_slice(factors));
+        self.second = &factors * self.centred() * &factors;
+        self.mean.fill(0.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::graph::ops::{Add, Concat, Linear, Lstm, Span};
+    use crate::graph::{Evaluator, WeightMatrix};
+    use crate::random::Random;
+
+    const COLS: usize = 6;
+    /// So many that a balance takes a small share of the weights' bytes.
+    const ROWS: usize = 400;
+
+    /// A linear layer behind what `before` builds, over observations that `COLS` different powers of three scale, and weights that
+    /// powers of two do.
+    fn linear(before: impl FnOnce(&mut Graph) -> ValueId) -> Graph {
+        let mut graph = Graph::new(COLS);
+        let value = before(&mut graph);
+        let mut random = Random::new(3);
+        let data = (0..ROWS * COLS).map(|i| random.normal() * 2f32.powi((i % COLS) as i32)).collect();
+        let matrix =
+            graph.add_matrix(WeightMatrix { name: "w".into(), rows: ROWS, cols: COLS, data }).expect("a matrix");
+        graph.add(Linear { matrix, bias: vec![0.5; ROWS] }, &[value]).expect("it fits");
+        graph
+    }
+
+    /// Observations about a mean of 2; the last but one never moves, the last follows the first.
+    fn observations(count: usize) -> Vec<Vec<f32>> {
+        let mut random = Random::new(4);
+        let mut one = || {
+            let mut x: Vec<f32> = (0..COLS).map(|c| 2.0 + random.normal() * 3f32.powi(c as i32 - 4)).collect();
+            (x[4], x[5]) = (7.0, x[0]);
+            x
+        };
+        (0..count).map(|_| one()).collect()
+    }
+
+    fn run(graph: &Graph, observation: &[f32], see: &mut dyn FnMut(usize, &[f32])) -> Vec<f32> {
+        Evaluator::new(graph).step(observation, see)
+    }
+
+    /// Moments of every matrix's input.
+    fn moments(graph: &Graph, observations: &[Vec<f32>]) -> Vec<Moments> {
+        let zero =
+            |m: &WeightMatrix| Moments { second: DMatrix::zeros(m.cols, m.cols), mean: vec![0.0; m.cols], count: 0 };
+        let mut sums: Vec<Moments> = graph.matrices.iter().map(zero).collect();
+        for observation in observations {
+            run(graph, observation, &mut |m, x| {
+                let x = DVector::from_iterator(x.len(), x.iter().map(|v| f64::from(*v)));
+                sums[m].second += &x * x.transpose();
+                sums[m].mean.iter_mut().zip(&x).for_each(|(sum, v)| *sum += v);
+                sums[m].count += 1;
+            });
+        }
+        for Moments { second, mean, count } in &mut sums {
+            *second /= *count as f64;
+            mean.iter_mut().for_each(|sum| *sum /= *count as f64);
+        }
+        sums
+    }
+
+    fn close(a: f64, b: f64, share: f64) -> bool {
+        (a - b).abs() <= share * (1.0 + a.abs().max(b.abs()))
+    }
+
+    /// The balanced network and what its matrices read, which computes what `graph` does.
+    fn balanced(graph: &Graph) -> (Graph, Vec<Moments>) {
+        let observations = observations(400);
+        let mut told = moments(graph, &observations);
+        let outputs: Vec<Vec<f64>> = graph.matrices.iter().map(|m| vec![1.0; m.rows]).collect();
+        let balanced = balance(graph, &mut told, &outputs).expect("balanced");
+        for observation in &observations[..20] {
+            let (a, b) = (run(graph, observation, &mut |_, _| {}), run(&balanced, observation, &mut |_, _| {}));
+            assert!(a.iter().zip(&b).all(|(a, b)| close((*a).into(), (*b).into(), 1e-4)), "{a:?} {b:?}");
+        }
+        for (told, seen) in told.iter().zip(moments(&balanced, &observations)) {
+            assert!(told.mean.iter().zip(&seen.mean).all(|(a, b)| close(*a, *b, 1e-4)));
+            assert!(told.second.iter().zip(&seen.second).all(|(a, b)| close(*a, *b, 1e-3)));
+        }
+        (balanced, told)
+    }
+
+    fn added(graph: &Graph) -> usize {
+        graph.nodes.iter().filter(|node| matches!(node.kind, NodeKind::Balance(_))).count()
+    }
+
+    fn unit(clip: f32) -> Normalize {
+        Normalize { mean: vec![2.0; COLS], scale: vec![1.0; COLS], pre_clip: 9.0, clip }
+    }
+
+    #[test]
+    fn columns_weigh_what_their_values_do() {
+        let graph = linear(|_| 0);
+        let (balanced, moments) = balanced(&graph);
+        assert_eq!((added(&balanced), balance_bytes(&balanced)), (1, 4 * (2 * COLS + 2)));
+        let of = |graph: &Graph, moments: &[Moments]| Columns::of(graph, &[0], moments, &[vec![1.0; ROWS]]);
+        // Squares of weights and of deviations are in one proportion wherever values move by themselves.
+        let columns = of(&balanced, &moments);
+        let share = |c: usize| columns.weights[c].sqrt() / columns.deviation[c];
+        for c in 2..4 {
+            assert!((share(c) / share(1) - 1.0).abs() < 0.2, "{c}: {} {}", share(c), share(1));
+        }
+        let before = of(&graph, &self::moments(&graph, &observations(400)));
+        assert!(columns.error() < 0.6 * before.error(), "{} {}", columns.error(), before.error());
+        assert!(columns.gain() < 0.2 * before.gain(), "{} {}", columns.gain(), before.gain());
+        // What did not move reads 0, and its factor is no other than theirs.
+        let NodeKind::Balance(balance) = &balanced.nodes[0].kind else { panic!("not before the matrix") };
+        let Normalize { mean, scale, .. } = balance.normalize();
+        assert_eq!((mean[4], columns.deviation[4]), (7.0, 0.0));
+        let (least, most) = scale.iter().fold((f32::MAX, 0f32), |(a, b), v| (a.min(*v), b.max(*v)));
+        assert!(least < scale[4] && scale[4] < most, "{scale:?}");
+    }
+
+    #[test]
+    fn a_normalization_of_the_policys_own_takes_the_factors() {
+        let own = |clip| linear(|graph| graph.add(unit(clip), &[0]).expect("it fits"));
+        let (free, _) = balanced(&own(f32::INFINITY));
+        assert_eq!((added(&free), free.nodes.len()), (0, 2));
+        assert!(
+            matches!(&free.nodes[0].kind, NodeKind::Normalize(n) if n.scale.iter().any(|s| *s != 1.0) && n.pre_clip == 9.0)
+        );
+        // One with a limit, or that others read, stays as it is.
+        let (limited, _) = balanced(&own(5.0));
+        assert_eq!((added(&limited), limited.nodes[2].inputs[0]), (1, 2));
+        let shared = linear(|graph| {
+            let value = graph.add(unit(f32::INFINITY), &[0]).expect("it fits");
+            graph.add(Add, &[value, value]).expect("it fits");
+            value
+        });
+        let (shared, _) = balanced(&shared);
+        assert_eq!((added(&shared), &shared.nodes[2].inputs[..]), (1, &[1, 1][..]));
+    }
+
+    #[test]
+    fn what_gains_nothing_or_cannot_be_stays() {
+        // Once balanced, nothing is left to win.
+        let (once, _) = balanced(&linear(|_| 0));
+        let (twice, _) = balanced(&once);
+        assert_eq!(added(&twice), 1);
+        // A matrix that also reads something else has one set of columns.
+        let mut shared = linear(|_| 0);
+        let part =
+            shared.add(Concat(vec![Span { from: 0, len: 4 }, Span { from: 0, len: 2 }]), &[1, 0]).expect("it fits");
+        shared.add(Linear { matrix: 0, bias: vec![0.0; ROWS] }, &[part]).expect("it fits");
+        assert_eq!(added(&balanced(&shared).0), 0);
+    }
+
+    #[test]
+    fn the_gates_of_a_cell_read_balanced_columns() {
+        let mut graph = linear(|_| 0);
+        let mut random = Random::new(5);
+        let data = (0..ROWS * ROWS / 4).map(|_| 0.1 * random.normal()).collect();
+        let state =
+            graph.add_matrix(WeightMatrix { name: "s".into(), rows: ROWS, cols: ROWS / 4, data }).expect("a matrix");
+        graph.matrices[0].data.iter_mut().for_each(|w| *w *= 0.01);
+        graph.nodes.clear();
+        graph.add(Lstm { hidden: ROWS / 4, input: 0, state, bias: vec![0.1; ROWS] }, &[0]).expect("it fits");
+        let (balanced, _) = balanced(&graph);
+        assert_eq!((added(&balanced), &balanced.nodes[1].inputs[..]), (1, &[1][..]));
+    }
+}
