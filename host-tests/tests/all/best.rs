@@ -122,6 +122,21 @@ fn a_recurrent_policy_has_less_than_half_of_gptqs_error() -> Result<()> {
     halves_gptq(&policies.join("g1_lstm256"), 250)
 }
 
+/// Its columns are balanced: without that its error was 3.8e-2.
+#[test]
+fn a_recurrent_policy_that_does_not_normalize_stays_below_its_error() -> Result<()> {
+    let Some(policies) = shared_policies() else { return Ok(()) };
+    let dir = policies.join("g1_lstm64");
+    let policy = Policy::load(&dir)?;
+    let recordings = Recordings::load(&policy)?;
+    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, None, |_| {})?;
+    let options = Options { steps: Some(1500), ..Options::new(Method::Best, Budget::BitsPerWeight(2.0)) };
+    let found = report(&dir, &image(&quantizer, &options)?)?;
+    assert!(found.nmse < 0.027, "{}", found.nmse);
+    assert!(found.bpw <= 2.0);
+    Ok(())
+}
+
 /// The whole learning, as the command does it by default.
 #[test]
 fn shared_policies_stay_below_their_errors() -> Result<()> {
