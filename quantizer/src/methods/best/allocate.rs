@@ -69,8 +69,8 @@ pub fn removals(graph: &Graph, dimension: &Dimension, h: &[Vec<f64>], g: &[Vec<f
     removals
 }
 
-/// Bytes of the balance, and of all matrices with these widths: rows without bits and the columns that compaction removes are gone, everything
-/// else is counted. Rows of a `dimension` are sorted by width, others have steps where widths are mixed.
+/// Bytes of the balance, and of all matrices with these widths: rows without bits and the columns that compaction removes are
+/// gone, everything else is counted. Rows of a `dimension` are sorted by width, others have steps where widths are mixed.
 pub fn bytes(graph: &Graph, dimensions: &[Dimension], widths: &Widths, packing: Packing) -> usize {
     let matrices = (0..graph.matrices.len()).map(|m| {
         let kept_cols = Dimension::feeding(dimensions, m).map_or(graph.matrices[m].cols, |d| d.kept(widths).max(1));

@@ -2,8 +2,8 @@
 
 use ndarray::{Array2, ArrayView1};
 
-/// A robot that holds its goal by small actions stays as far off it as they are wrong. So learning can weigh a frame by `1 / (a + FLOOR)`, with `a` the mean square of the f32 network's outputs there in units
-/// of their variances: the error counts in units of the action itself, down to about a third of the deviation.
+/// A robot that holds its goal by small actions stays as far off it as they are wrong. So learning can weigh a frame by
+/// `1 / (a + FLOOR)`, with `a` the mean square of the f32 network's outputs there in units of their variances: the error counts in units of the action itself, down to about a third of the deviation.
 const FLOOR: f32 = 0.1;
 
 /// The loss of a batch and its derivative.
