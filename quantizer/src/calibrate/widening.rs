@@ -24,13 +24,14 @@ pub struct Widening {
 pub const MEMORY: f32 = 0.97;
 
 impl Widening {
-    /// What a recurrent policy learns with, and what others take where nothing can be left out to choose by; errors off the path are
-    /// measured with it. A policy that balances needs as many windows far from the path as near it
+    /// What a recurrent policy learns with, and what others take where nothing can be left out to choose by; errors off
+    /// the path are measured with it. A policy that balances needs as many windows far from the path as near it
     /// (docs/records/2026-11-22-choice.md and 2026-11-23-balance.md).
     pub const WIDE: Self = Self { noise: 0.8, power: 1, mix: 0.0 };
 
-    /// What can be chosen from. The first of a feed-forward policy has lower errors than [`Self::WIDE`] on its path and hardly higher
-    /// ones off it. Of a recurrent policy nothing narrower has the lowest error off the path, so there is no choice.
+    /// What can be chosen from. The first of a feed-forward policy has lower errors than [`Self::WIDE`] on its path and
+    /// hardly higher ones off it. Of a recurrent policy nothing narrower has the lowest error off the path, so there is
+    /// no choice.
     pub fn choices(recurrent: bool) -> &'static [Self] {
         const OF_FRAMES: [Widening; 3] = [
             Widening { noise: 0.8, power: 3, mix: 0.5 },

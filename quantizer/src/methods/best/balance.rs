@@ -1,20 +1,21 @@
 //! Columns that weigh alike: what matrices read of the observation is scaled so that no column's weights and no column's values
 //! stand out.
 //!
-//! Observations come in units of people's choice. A row has one scale, so an error of its weights has the same size in every column:
-//! a column whose weights are small is rounded to nothing or to much more than it was, and one whose values are large multiplies what it
-//! was rounded by. Activations have one scale a vector, with the same consequence the other way round. With a factor `d_c` on what
-//! column `c` reads and its reciprocal on its weights, the network computes what it did, and the expected error of the matrices behind
-//! is proportional to
+//! Observations come in units of people's choice. A row has one scale, so an error of its weights has the same size in
+//! every column: a column whose weights are small is rounded to nothing or to much more than it was, and one whose
+//! values are large multiplies what it was rounded by. Activations have one scale a vector, with the same consequence
+//! the other way round. With a factor `d_c` on what column `c` reads and its reciprocal on its weights, the network
+//! computes what it did, and the expected error of the matrices behind is proportional to
 //!
 //! `sum_c a_c / d_c^2 * sum_c h_c d_c^2` with `a_c = sum_r g_r w_rc^2`,
 //!
 //! `h` and `g` the importance of columns and rows. It is least, `(sum_c sqrt(a_c h_c))^2` by Cauchy and Schwarz, for
-//! `d_c = (a_c / h_c)^(1/4)`, which is also what SmoothQuant (arXiv 2211.10438, eq. 4) does to activations' and weights' maxima with
-//! alpha 1/2. The values' means go into the biases.
+//! `d_c = (a_c / h_c)^(1/4)`, which is also what SmoothQuant (arXiv 2211.10438, eq. 4) does to activations' and
+//! weights' maxima with alpha 1/2. The values' means go into the biases.
 //!
-//! Where nothing but matrices reads a normalization without a limit, factors and means go into its own and cost nothing; elsewhere they are
-//! an operation [`Balance`], whose bytes count, and which is added where it lowers the expected error by more than these bytes would.
+//! Where nothing but matrices reads a normalization without a limit, factors and means go into its own and cost
+//! nothing; elsewhere they are an operation [`Balance`], whose bytes count, and which is added where it lowers the
+//! expected error by more than these bytes would.
 
 use anyhow::Result;
 use nalgebra::{DMatrix, DVector};
@@ -38,8 +39,8 @@ struct Site {
     matrices: Vec<usize>,
 }
 
-/// The network with balanced columns; `moments` of the matrices' inputs become those of its inputs. `outputs` is the importance of the
-/// matrices' rows.
+/// The network with balanced columns; `moments` of the matrices' inputs become those of its inputs. `outputs` is the
+/// importance of the matrices' rows.
 ///
 /// # Errors
 ///
@@ -161,8 +162,8 @@ impl Columns {
         self.error() - balanced / self.weights.len() as f64
     }
 
-    /// `d`, so that the deviations of what moved are 1 in the geometric mean; `None` where nothing did. The importance of what did not
-    /// move is its damping, so its factor is not much larger than the others'.
+    /// `d`, so that the deviations of what moved are 1 in the geometric mean; `None` where nothing did. The importance
+    /// of what did not move is its damping, so its factor is not much larger than the others'.
     fn factors(&self) -> Option<Vec<f64>> {
         let cols = 0..self.mean.len();
         let factors: Vec<f64> =

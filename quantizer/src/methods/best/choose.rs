@@ -1,9 +1,9 @@
 //! How codes are chosen, and how far learning widens the inputs: what does best on whole episodes that are left out.
 //!
-//! Each choice has three quarters of the episodes; to learn, it has an eighth of the steps. On the others its error is measured
-//! twice, at the recorded observations and at widened ones. A feed-forward network takes the choice with the lowest error at the
-//! recorded observations; a recurrent one learns as widely as it can ([`Widening::choices`]), and takes feedback where that is lower at
-//! widened ones (docs/QUANTIZER.md).
+//! Each choice has three quarters of the episodes; to learn, it has an eighth of the steps. On the others its error is
+//! measured twice, at the recorded observations and at widened ones. A feed-forward network takes the choice with the
+//! lowest error at the recorded observations; a recurrent one learns as widely as it can ([`Widening::choices`]), and
+//! takes feedback where that is lower at widened ones (docs/QUANTIZER.md).
 
 use nalgebra::DMatrix;
 

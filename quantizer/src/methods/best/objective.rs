@@ -3,7 +3,8 @@
 use ndarray::{Array2, ArrayView1};
 
 /// A robot that holds its goal by small actions stays as far off it as they are wrong. So learning can weigh a frame by
-/// `1 / (a + FLOOR)`, with `a` the mean square of the f32 network's outputs there in units of their variances: the error counts in units of the action itself, down to about a third of the deviation.
+/// `1 / (a + FLOOR)`, with `a` the mean square of the f32 network's outputs there in units of their variances: the
+/// error counts in units of the action itself, down to about a third of the deviation.
 const FLOOR: f32 = 0.1;
 
 /// The loss of a batch and its derivative.
@@ -28,8 +29,8 @@ impl<'a> Objective<'a> {
         Self { relative: true, ..Self::even(variance) }
     }
 
-    /// The derivative by the outputs, `[frame, element]`, and the loss, for what the f32 network gives. Outputs that do not vary count
-    /// for nothing.
+    /// The derivative by the outputs, `[frame, element]`, and the loss, for what the f32 network gives. Outputs that do
+    /// not vary count for nothing.
     pub(super) fn measure(&self, outputs: &Array2<f32>, target: &Array2<f32>) -> (Array2<f32>, f32) {
         let count = (target.nrows() * self.varying) as f32;
         let weight = |variance: &f32| if *variance > 0.0 { 1.0 / (variance * count) } else { 0.0 };
