@@ -14,8 +14,8 @@
 //! weights' maxima with alpha 1/2. The values' means go into the biases.
 //!
 //! Where nothing but matrices reads a normalization without a limit, factors and means go into its own and cost
-//! nothing; elsewhere they are an operation [`Balance`], whose bytes count, and which is added where it lowers the
-//! expected error by more than these bytes would.
+//! nothing; elsewhere they are an operation [`Balance`], whose bytes count. It is added where it saves more bits: an
+//! error that falls to a share `s` is worth `log2(1 / s) / 2` bits for each weight of the matrices behind.
 
 use anyhow::Result;
 use nalgebra::{DMatrix, DVector};
@@ -29,6 +29,8 @@ use crate::graph::{Graph, NodeKind, ValueId};
 
 /// A factor is at most so many times the others' geometric mean, or one over it: the recording need not show how far a value goes.
 const MOST: f64 = 32.0;
+/// What an operation more has to save, in bits a weight of the whole policy: 1.4% of the error.
+const WORTH: f64 = 0.01;
 /// A value whose variance is below this share of its mean square did not move.
 const STILL: f64 = 1e-9;
 
@@ -47,16 +49,13 @@ struct Site {
 /// None for a network that its builder has accepted.
 pub fn balance(graph: &Graph, moments: &mut [Moments], outputs: &[Vec<f64>]) -> Result<Graph> {
     let mut balanced = graph.clone();
-    let whole: f64 = (0..graph.matrices.len()).map(|m| Columns::of(graph, &[m], moments, outputs).error()).sum();
     // From the last on: what is inserted moves only what stands behind it.
     for Site { value, readers, matrices } in sites(graph).into_iter().rev() {
         let columns = Columns::of(graph, &matrices, moments, outputs);
         let own = own_normalize(graph, value, &readers);
-        let bits =
-            if own { 0.0 } else { 8.0 * Balance::bytes(columns.mean.len()) as f64 / graph.weights().max(1) as f64 };
-        // Of the whole error, and what so many bits a weight fewer make of it.
-        let left = 1.0 - columns.gain() / whole.max(f64::MIN_POSITIVE);
-        if left * 4f64.powf(bits) >= 1.0 {
+        let elements: usize = matrices.iter().map(|&m| graph.matrices[m].data.len()).sum();
+        let saved = elements as f64 * columns.saved_bits() - 8.0 * Balance::bytes(columns.mean.len()) as f64;
+        if !own && saved < WORTH * graph.weights() as f64 {
             continue;
         }
         let Some(factors) = columns.factors() else { continue };
@@ -151,15 +150,11 @@ impl Columns {
         }
     }
 
-    /// The expected error, up to a factor that all matrices have.
-    fn error(&self) -> f64 {
-        self.weights.iter().sum::<f64>() * self.values.iter().sum::<f64>() / self.weights.len() as f64
-    }
-
-    /// What balancing takes off it.
-    fn gain(&self) -> f64 {
+    /// Bits that each weight can do without for the error that it has: half of the logarithm of what balancing leaves of it.
+    fn saved_bits(&self) -> f64 {
+        let sum = |values: &[f64]| values.iter().sum::<f64>();
         let balanced = self.weights.iter().zip(&self.values).map(|(a, h)| (a * h).sqrt()).sum::<f64>().powi(2);
-        self.error() - balanced / self.weights.len() as f64
+        0.5 * (sum(&self.weights) * sum(&self.values) / balanced.max(f64::MIN_POSITIVE)).log2()
     }
 
     /// `d`, so that the deviations of what moved are 1 in the geometric mean; `None` where nothing did. The importance
@@ -316,8 +311,8 @@ mod tests {
             assert!((share(c) / share(1) - 1.0).abs() < 0.2, "{c}: {} {}", share(c), share(1));
         }
         let before = of(&graph, &self::moments(&graph, &observations(400)));
-        assert!(columns.error() < 0.6 * before.error(), "{} {}", columns.error(), before.error());
-        assert!(columns.gain() < 0.2 * before.gain(), "{} {}", columns.gain(), before.gain());
+        assert!(before.saved_bits() > 0.3, "{}", before.saved_bits());
+        assert!(columns.saved_bits() < 0.2 * before.saved_bits(), "{}", columns.saved_bits());
         // What did not move reads 0, and its factor is no other than theirs.
         let NodeKind::Balance(balance) = &balanced.nodes[0].kind else { panic!("not before the matrix") };
         let Normalize { mean, scale, .. } = balance.normalize();
