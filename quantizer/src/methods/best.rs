@@ -1,6 +1,7 @@
 //! The pipeline: how much every row matters, a width for each to the budget, removal of what has none, and distillation, or, with
 //! 0 steps of it, two-sided error feedback.
 
+mod activations;
 mod adam;
 pub mod allocate;
 pub mod balance;
@@ -22,7 +23,7 @@ use rayon::prelude::*;
 use super::learning::{Choice, Learning};
 use super::options::{Activations, Options};
 use super::progress::Progress;
-use super::quantized::{Outcome, Quantized, QuantizedNetwork, RowAllocation, dequantized};
+use super::quantized::{Outcome, Quantized, QuantizedNetwork, RowAllocation};
 use crate::budget::Rate;
 use crate::calibrate::allowance::Allowance;
 use crate::calibrate::moments::Moments;
@@ -30,15 +31,16 @@ use crate::calibrate::sensitivity::{Side, importance, output_moments};
 use crate::calibrate::widening::Widening;
 use crate::calibrate::windows::Windows;
 use crate::data::Dataset;
-use crate::graph::{Graph, Network, WeightMatrix};
-use crate::random::Random;
-use allocate::{Rows, allocate, energies, removals};
+use crate::graph::{Graph, WeightMatrix};
+use activations::{allocated, choose_activations};
+use allocate::{Rows, energies, removals};
 use balance::{balance, balance_bytes};
 use choose::{Chosen, choose, choosing};
 use compact::{Compacted, add_to_bias, compact};
 use dimension::{Dimension, dimensions};
-use distill::{Learned, Task, distill, loss};
+use distill::{Learned, Task, distill};
 use feedback::feedback;
+use objective::Frames;
 use schedule::{Bounds, most_steps};
 
 /// Frames that learning needs at least.
@@ -98,7 +100,7 @@ impl RowStatistics {
 
     /// The most steps of distillation with these options.
     pub fn most_steps(&self, options: &Options) -> usize {
-        options.steps.unwrap_or_else(|| most_steps(self.windows.graph.weights(), self.windows.recurrent()))
+        options.steps.unwrap_or_else(|| most_steps(&self.windows.graph))
     }
 
     /// Where learning ends at the latest.
@@ -139,7 +141,7 @@ pub fn quantize(
             Rows { energy, removal, forced: forced(matrix) }
         })
         .collect();
-    let widths = allocate(graph, &dimensions, &rows, options.packing(), allowed)?;
+    let (widths, learned_with) = allocated(graph, &dimensions, &rows, options, allowed)?;
     let input_moments: Vec<&Moments> = moments.iter().map(|(input, _)| input).collect();
     let compacted = compact(graph, &dimensions, &widths, &input_moments);
     let importance: Vec<Vec<f64>> = compacted
@@ -148,7 +150,6 @@ pub fn quantize(
         .zip(inputs)
         .map(|(columns, importance)| columns.iter().map(|&c| importance[c]).collect())
         .collect();
-    let learned_with = vec![options.activations.limit(); graph.matrices.len()];
     let bounds = statistics.bounds(options);
     let task = Task {
         graph: &compacted.graph,
@@ -157,7 +158,7 @@ pub fn quantize(
         importance: &importance,
         x_max: &learned_with,
         widening: Widening::WIDE,
-        relative: options.relative,
+        frames: Frames::of(options, graph),
         bounds,
         seed: options.seed,
     };
@@ -185,7 +186,7 @@ pub fn quantize(
     let wanted = match options.activations {
         Activations::Auto => {
             let allowance = bounds.time.filter(|_| graph.denoising_steps() > 1).map(Allowance::of);
-            choose_activations(&learned, &quantized, windows, allowance, options.seed)
+            choose_activations(&learned, &quantized, windows, &learned_with, allowance, options.seed)
         }
         Activations::Int8 | Activations::Int16 => learned_with.clone(),
     };
@@ -242,46 +243,4 @@ fn feed_back(
         quantized
     });
     (quantized.collect(), graph)
-}
-
-/// An int16 input must lower the error by this share of it, and by more the more of the weights are behind it: its kernel takes
-/// 1.3 to 1.7 times as long.
-const WORTH: f32 = 0.03;
-const WORTH_OF_ALL: f32 = 0.12;
-/// Batches that the choice is measured on, and samples in each.
-const MEASURED: usize = 8;
-const SAMPLES: usize = 256;
-
-/// int16 for each matrix whose input, rounded to int8, adds more to the error than int16 costs in time; int8 for the others.
-fn choose_activations(
-    graph: &Graph,
-    quantized: &[Quantized],
-    windows: &Windows,
-    allowance: Option<Allowance>,
-    seed: u64,
-) -> Vec<u16> {
-    let weights = dequantized(graph, quantized);
-    let error = |x_max: &[u16], measured: usize| -> f32 {
-        let network = Network::rounded(graph, x_max);
-        let samples = (SAMPLES / windows.window).max(8);
-        let batches = (0..measured).map(|i| windows.batch(samples, None, &mut Random::new(seed + i as u64)));
-        batches.map(|batch| loss(&network, &weights, windows, batch)).sum()
-    };
-    let int8 = vec![127; quantized.len()];
-    let choices = 1 + quantized.len();
-    let measured = allowance.map_or(MEASURED, |allowance| {
-        let batches = allowance.fits(1, || _ = error(&int8, 1), choices, choices * MEASURED);
-        batches / choices
-    });
-    let with_int8 = error(&int8, measured);
-    let weights_of = |q: &Quantized| (q.rows * q.cols) as f32;
-    let all: f32 = quantized.iter().map(weights_of).sum();
-    (0..quantized.len())
-        .map(|m| {
-            let mut x_max = int8.clone();
-            x_max[m] = i16::MAX as u16;
-            let worth = WORTH + WORTH_OF_ALL * weights_of(&quantized[m]) / all;
-            if with_int8 - error(&x_max, measured) > worth * with_int8 { i16::MAX as u16 } else { 127 }
-        })
-        .collect()
 }

@@ -85,7 +85,7 @@ pub struct Options {
     pub steps: Option<usize>,
     /// The most minutes of distillation; None: only the steps bound it.
     pub minutes: Option<f64>,
-    /// Whether what is learned counts errors relative to the action's size (method best).
+    /// Whether what is learned counts errors relative to the action's size, more than it does by itself (method best).
     pub relative: bool,
     /// Seed of everything that is drawn.
     pub seed: u64,
@@ -103,6 +103,11 @@ pub struct Packing {
 }
 
 impl Packing {
+    /// That of activations up to this magnitude.
+    pub fn of(x_max: u16, group: usize) -> Self {
+        Self { lanes: Lanes::of(x_max, group), group }
+    }
+
     /// The shape of a block of rows.
     pub fn shape(self, width: Width, rows: usize, cols: usize) -> BlockShape {
         BlockShape { width, lanes: self.lanes, rows, cols, group: self.group }
@@ -122,7 +127,7 @@ impl Options {
 
     /// How matrices are packed before any of them is found to need int16 activations.
     pub fn packing(&self) -> Packing {
-        Packing { lanes: Lanes::of(self.activations.limit(), self.group), group: self.group }
+        Packing::of(self.activations.limit(), self.group)
     }
 
     /// A method and a budget, one scale a row, everything else as it suits the method.

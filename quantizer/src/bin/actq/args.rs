@@ -366,14 +366,15 @@ impl ActQuantArgs {
 #[derive(clap::Args)]
 pub(crate) struct LearnArgs {
     /// The most steps of distillation; 0 = none, but two-sided error feedback: seconds, and a larger error at few bits
-    /// [default: by the number of weights, 10000 for 200 thousand, recurrent policies 7800]
+    /// [default: by the number of weights, 20000 for 200 thousand, recurrent policies 7800, heads with denoising steps 10000]
     #[arg(long, value_name = "N")]
     pub(crate) steps: Option<usize>,
     /// The most minutes of distillation, instead of the default steps; what is learned then depends on the machine
     #[arg(long, value_name = "X", value_parser = minutes)]
     pub(crate) minutes: Option<f64>,
-    /// Count errors relative to the action's size. For a robot that holds its goal by small actions, which stays as far off as they
-    /// are wrong: it gets closer, although the held-out error, in which wide movements count most, rises
+    /// Count errors relative to the action's size, more than feed-forward policies do by themselves. For a robot that holds its goal
+    /// by small actions, which stays as far off as they are wrong: it gets closer, although the held-out error, in which wide
+    /// movements count most, rises
     #[arg(long)]
     pub(crate) relative: bool,
 }

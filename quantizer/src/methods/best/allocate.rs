@@ -30,6 +30,9 @@ fn epsilon(width: Width) -> f64 {
 /// Widths that a row may have.
 const CHOICES: [Option<Width>; 5] = [None, Some(Width::W2), Some(Width::W3), Some(Width::W4), Some(Width::W8)];
 
+/// Rows that are widened at once, at most: blocks are padded to so many.
+const MOST_AT_ONCE: usize = 4;
+
 /// What the allocation needs to know of a matrix.
 #[derive(Clone, Debug)]
 pub struct Rows {
@@ -70,22 +73,27 @@ pub fn removals(graph: &Graph, dimension: &Dimension, h: &[Vec<f64>], g: &[Vec<f
 }
 
 /// Bytes of the balance, and of all matrices with these widths: rows without bits and the columns that compaction removes are
-/// gone, everything else is counted. Rows of a `dimension` are sorted by width, others have steps where widths are mixed.
-pub fn bytes(graph: &Graph, dimensions: &[Dimension], widths: &Widths, packing: Packing) -> usize {
-    let matrices = (0..graph.matrices.len()).map(|m| {
-        let kept_cols = Dimension::feeding(dimensions, m).map_or(graph.matrices[m].cols, |d| d.kept(widths).max(1));
-        let sorted = Dimension::made_by(dimensions, m).is_some();
-        let used: Vec<(Width, usize)> = Width::ALL
-            .into_iter()
-            .map(|w| (w, widths[m].iter().filter(|b| **b == Some(w)).count()))
-            .filter(|(_, n)| *n > 0)
-            .collect();
-        let all_rows = used.iter().map(|(_, n)| n).sum::<usize>() == widths[m].len();
-        let one_width = used.len() == 1 && all_rows;
-        let stepped = !(sorted || one_width);
-        used.iter().map(|&(width, rows)| block_bytes(packing.shape(width, rows, kept_cols), stepped)).sum::<usize>()
-    });
-    balance_bytes(graph) + matrices.sum::<usize>()
+/// gone, everything else is counted. Of the packings that a matrix may get, the largest counts.
+pub fn bytes(graph: &Graph, dimensions: &[Dimension], widths: &Widths, packings: &[Vec<Packing>]) -> usize {
+    let of_matrix = |(m, packings): (usize, &Vec<Packing>)| -> usize {
+        packings.iter().map(|&packing| matrix_bytes(graph, dimensions, widths, m, packing)).max().unwrap_or(0)
+    };
+    balance_bytes(graph) + packings.iter().enumerate().map(of_matrix).sum::<usize>()
+}
+
+/// Bytes of a matrix. Rows of a `dimension` are sorted by width, others have steps where widths are mixed.
+pub fn matrix_bytes(graph: &Graph, dimensions: &[Dimension], widths: &Widths, m: usize, packing: Packing) -> usize {
+    let kept_cols = Dimension::feeding(dimensions, m).map_or(graph.matrices[m].cols, |d| d.kept(widths).max(1));
+    let sorted = Dimension::made_by(dimensions, m).is_some();
+    let used: Vec<(Width, usize)> = Width::ALL
+        .into_iter()
+        .map(|w| (w, widths[m].iter().filter(|b| **b == Some(w)).count()))
+        .filter(|(_, n)| *n > 0)
+        .collect();
+    let all_rows = used.iter().map(|(_, n)| n).sum::<usize>() == widths[m].len();
+    let one_width = used.len() == 1 && all_rows;
+    let stepped = !(sorted || one_width);
+    used.iter().map(|&(width, rows)| block_bytes(packing.shape(width, rows, kept_cols), stepped)).sum()
 }
 
 /// Chooses the widths so that [`bytes`] stays within `limit`.
@@ -93,24 +101,72 @@ pub fn allocate(
     graph: &Graph,
     dimensions: &[Dimension],
     rows: &[Rows],
-    packing: Packing,
+    packings: &[Vec<Packing>],
     limit: f64,
 ) -> Result<Widths> {
     let at = |multiplier: f64| choose(graph, dimensions, rows, multiplier);
     // Multipliers in units of error per bit; the range covers everything from 8 bits to none for any scale of energies.
     let largest = rows.iter().flat_map(|r| &r.energy).fold(1e-300f64, |m, e| m.max(*e));
     let (mut low, mut high) = ((largest * 1e-18).ln(), (largest * 10.0).ln());
-    let least = bytes(graph, dimensions, &at(high.exp()), packing);
+    let least = bytes(graph, dimensions, &at(high.exp()), packings);
     ensure!(least as f64 <= limit, BudgetTooSmall { bytes: least, limit, weights: graph.weights() });
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
-        if bytes(graph, dimensions, &at(middle.exp()), packing) as f64 <= limit {
+        if bytes(graph, dimensions, &at(middle.exp()), packings) as f64 <= limit {
             high = middle;
         } else {
             low = middle;
         }
     }
-    Ok(at(high.exp()))
+    let mut widths = at(high.exp());
+    fill(&mut widths, graph, dimensions, rows, packings, limit);
+    Ok(widths)
+}
+
+/// Widens rows as long as bytes are left. Blocks of rows are padded, and a row more may take hundreds of bytes or none, which
+/// no multiplier sees: again and again the rows whose errors fall most for the bytes that they take, of one matrix, one
+/// width and at most so many as a block is padded to.
+fn fill(
+    widths: &mut Widths,
+    graph: &Graph,
+    dimensions: &[Dimension],
+    rows: &[Rows],
+    packings: &[Vec<Packing>],
+    limit: f64,
+) {
+    let mut taken = bytes(graph, dimensions, widths, packings);
+    loop {
+        let mut best: Option<(f64, Widths, usize)> = None;
+        for m in (0..rows.len()).filter(|&m| rows[m].forced.is_none()) {
+            for (narrow, from) in CHOICES.into_iter().enumerate() {
+                for to in CHOICES.into_iter().skip(narrow + 1) {
+                    let gain = |r: &usize| rows[m].expected(*r, from) - rows[m].expected(*r, to);
+                    let mut candidates: Vec<usize> =
+                        (0..widths[m].len()).filter(|&r| widths[m][r] == from && gain(&r) > 0.0).collect();
+                    candidates.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
+                    let mut wider = widths.clone();
+                    let mut gained = 0.0;
+                    for &r in candidates.iter().take(MOST_AT_ONCE) {
+                        wider[m][r] = to;
+                        gained += gain(&r);
+                        let takes = bytes(graph, dimensions, &wider, packings);
+                        let worth = gained / takes.saturating_sub(taken).max(1) as f64;
+                        let reached = Dimension::made_by(dimensions, m).is_some() || are_within_steps(&wider[m]);
+                        if takes as f64 <= limit && reached && best.as_ref().is_none_or(|(best, ..)| worth > *best) {
+                            best = Some((worth, wider.clone(), takes));
+                        }
+                    }
+                }
+            }
+        }
+        let Some((_, wider, takes)) = best else { return };
+        (*widths, taken) = (wider, takes);
+    }
+}
+
+/// Whether rows of every width stand at most as far apart as the image's steps reach.
+fn are_within_steps(widths: &[Option<Width>]) -> bool {
+    Width::ALL.into_iter().all(|width| out_of_reach(widths, width).is_none())
 }
 
 /// The widths that minimise error plus `multiplier` times bits. What a removed row saves elsewhere depends on the other rows'
@@ -181,6 +237,38 @@ fn out_of_reach(widths: &[Option<Width>], width: Width) -> Option<(usize, Option
 mod tests {
     use super::*;
     use crate::random::Random;
+
+    #[test]
+    fn no_row_can_be_widened_with_the_bytes_that_are_left() {
+        let mut random = Random::new(1);
+        let mut graph = Graph::new(18);
+        for (rows, cols) in [(70, 18), (33, 70)] {
+            let data = (0..rows * cols).map(|_| random.normal()).collect();
+            graph.matrices.push(WeightMatrix { name: "m".into(), rows, cols, data });
+        }
+        let rows = |matrix: &WeightMatrix| {
+            let energy = energies(matrix, &vec![1.0; matrix.cols], &vec![1.0; matrix.rows]);
+            Rows { removal: energy.clone(), energy, forced: None }
+        };
+        let rows: Vec<Rows> = graph.matrices.iter().map(rows).collect();
+        let packings = vec![vec![Packing::of(127, 0), Packing::of(32767, 0)]; 2];
+        for limit in (1000..4000).step_by(97).map(f64::from) {
+            let widths = allocate(&graph, &[], &rows, &packings, limit).expect("it fits");
+            let taken = bytes(&graph, &[], &widths, &packings);
+            assert!(taken as f64 <= limit);
+            for (m, r) in (0..2).flat_map(|m| (0..widths[m].len()).map(move |r| (m, r))) {
+                for to in CHOICES.into_iter().filter(|to| *to > widths[m][r]) {
+                    let mut wider = widths.clone();
+                    wider[m][r] = to;
+                    let takes = bytes(&graph, &[], &wider, &packings);
+                    assert!(
+                        takes as f64 > limit,
+                        "{limit}: row {r} of {m} to {to:?} takes {takes} bytes, {taken} before"
+                    );
+                }
+            }
+        }
+    }
 
     #[test]
     fn rows_are_only_widened_until_steps_reach() {

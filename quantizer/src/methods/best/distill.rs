@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::adam::{Adam, Stride};
 use super::latent::Latent;
-use super::objective::Objective;
+use super::objective::{Frames, Objective};
 use super::schedule::{Bounds, Schedule, most_steps};
 use crate::calibrate::widening::Widening;
 use crate::calibrate::windows::{Batch, Windows};
@@ -59,8 +59,8 @@ pub struct Task<'a> {
     pub x_max: &'a [u16],
     /// How far the inputs are taken off the recorded ones.
     pub widening: Widening,
-    /// Whether errors count relative to the action's size.
-    pub relative: bool,
+    /// How much a frame counts.
+    pub frames: Frames,
     /// Where it ends at the latest.
     pub bounds: Bounds,
     /// Seed of the batches.
@@ -93,8 +93,8 @@ pub fn distill(task: &Task<'_>, windows: &Windows, mut progress: impl FnMut(f64,
         // A frame of an iterative head is one of every denoising step.
         false => ((FRAMES / task.graph.denoising_steps().isqrt()).max(4 * FRAME_SHARDS), FRAME_SHARDS, OF_FRAMES),
     };
-    let objective = if task.relative { Objective::relative } else { Objective::even }(&windows.output_variance);
-    let mut schedule = Schedule::new(task.bounds, most_steps(task.graph.weights(), windows.recurrent()));
+    let objective = Objective::new(&windows.output_variance, task.frames);
+    let mut schedule = Schedule::new(task.bounds, most_steps(task.graph));
     while let Some(rate) = schedule.rate() {
         for (latent, weights) in latents.iter().zip(&mut weights.matrices) {
             latent.weights(values(weights));
@@ -155,7 +155,7 @@ fn gradient(
 /// The mean over samples and outputs of squared error over variance, against the f32 network.
 pub fn loss(network: &Network<'_>, weights: &Weights, windows: &Windows, batch: Batch) -> f32 {
     let target = windows.teach(&batch);
-    Objective::even(&windows.output_variance).measure(forward(network, weights, batch).output(), &target).1
+    Objective::new(&windows.output_variance, Frames::Even).measure(forward(network, weights, batch).output(), &target).1
 }
 
 fn forward(network: &Network<'_>, weights: &Weights, batch: Batch) -> Pass {

@@ -2,10 +2,8 @@
 
 use ndarray::{Array2, ArrayView1};
 
-/// A robot that holds its goal by small actions stays as far off it as they are wrong. So learning can weigh a frame by
-/// `1 / (a + FLOOR)`, with `a` the mean square of the f32 network's outputs there in units of their variances: the
-/// error counts in units of the action itself, down to about a third of the deviation.
-const FLOOR: f32 = 0.1;
+use crate::graph::Graph;
+use crate::methods::Options;
 
 /// The loss of a batch and its derivative.
 #[derive(Debug)]
@@ -13,20 +11,48 @@ pub(super) struct Objective<'a> {
     variance: &'a [f32],
     /// Outputs that vary.
     varying: usize,
-    /// Whether frames are weighed by the size of their action.
-    relative: bool,
+    /// What a frame is weighed by.
+    frames: Frames,
+}
+
+/// How much a frame counts. A robot that holds its goal by small actions stays as far off it as they are wrong, which a
+/// mean over all frames hardly sees. So a frame weighs `1 / (a + c)`, with `a` the mean square of the f32 network's
+/// outputs there in units of their variances (docs/records/2026-11-23-loss.md).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Frames {
+    /// All alike.
+    Even,
+    /// `c` is 1: a frame at rest counts twice as much as the usual one, a wide movement less than it.
+    Mild,
+    /// `c` is 0.3: errors count in units of the action itself, down to about half of the deviation.
+    Relative,
+}
+
+impl Frames {
+    /// What a network learns with. A recurrent policy that balances keeps fewer episodes unless all frames count alike.
+    pub(super) fn of(options: &Options, graph: &Graph) -> Self {
+        match options.relative {
+            true => Self::Relative,
+            false if graph.state_len() > 0 => Self::Even,
+            false => Self::Mild,
+        }
+    }
+
+    fn floor(self) -> Option<f32> {
+        match self {
+            Self::Even => None,
+            Self::Mild => Some(1.0),
+            Self::Relative => Some(0.3),
+        }
+    }
 }
 
 impl<'a> Objective<'a> {
-    /// Every frame counts alike: the mean over samples and outputs of squared error over variance.
-    pub(super) fn even(variance: &'a [f32]) -> Self {
+    /// The mean over samples and outputs of squared error over variance and, but for [`Frames::Even`], times the
+    /// frame's weight, which is 1 in the mean over a batch.
+    pub(super) fn new(variance: &'a [f32], frames: Frames) -> Self {
         let varying = variance.iter().filter(|variance| **variance > 0.0).count().max(1);
-        Self { variance, varying, relative: false }
-    }
-
-    /// Frames count the more, the smaller their action is, with 1 in the mean over a batch.
-    pub(super) fn relative(variance: &'a [f32]) -> Self {
-        Self { relative: true, ..Self::even(variance) }
+        Self { variance, varying, frames }
     }
 
     /// The derivative by the outputs, `[frame, element]`, and the loss, for what the f32 network gives. Outputs that do
@@ -49,13 +75,11 @@ impl<'a> Objective<'a> {
 
     /// The weights of frames, 1 in the mean.
     fn of_frames(&self, target: &Array2<f32>) -> Vec<f32> {
-        if !self.relative {
-            return vec![1.0; target.nrows()];
-        }
+        let Some(floor) = self.frames.floor() else { return vec![1.0; target.nrows()] };
         let weight = |row: ArrayView1<'_, f32>| {
             let varying = row.iter().zip(self.variance).filter(|(_, variance)| **variance > 0.0);
             let size = varying.map(|(a, variance)| a * a / variance).sum::<f32>() / self.varying as f32;
-            1.0 / (size + FLOOR)
+            1.0 / (size + floor)
         };
         let mut weights: Vec<f32> = target.rows().into_iter().map(weight).collect();
         let mean = weights.iter().sum::<f32>() / weights.len().max(1) as f32;
@@ -77,20 +101,23 @@ mod tests {
     fn errors_of_equal_size_count_more_where_actions_are_small() {
         let target = array![[0.0, 5.0], [2.0, 5.0]];
         let outputs = array![[0.2, 9.0], [2.2, 9.0]];
-        let (even, loss) = Objective::even(&VARIANCE).measure(&outputs, &target);
+        let (even, loss) = Objective::new(&VARIANCE, Frames::Even).measure(&outputs, &target);
         assert!((loss - 0.01).abs() < 1e-6, "{loss}");
         assert!((even[[0, 0]] - even[[1, 0]]).abs() < 1e-7 && even.column(1).iter().all(|d| *d == 0.0));
-        let (relative, loss) = Objective::relative(&VARIANCE).measure(&outputs, &target);
-        assert!((loss - 0.01).abs() < 1e-6, "weights are 1 in the mean: {loss}");
-        let ratio = relative[[0, 0]] / relative[[1, 0]];
-        assert!((ratio - (1.0 + FLOOR) / FLOOR).abs() < 1e-3, "{ratio}");
+        for (frames, expected) in [(Frames::Mild, 2.0), (Frames::Relative, 13.0 / 3.0)] {
+            let (weighed, loss) = Objective::new(&VARIANCE, frames).measure(&outputs, &target);
+            assert!((loss - 0.01).abs() < 1e-6, "weights are 1 in the mean: {loss}");
+            let ratio = weighed[[0, 0]] / weighed[[1, 0]];
+            assert!((ratio - expected).abs() < 1e-3, "{ratio}");
+        }
     }
 
     #[test]
     fn the_derivative_is_that_of_the_loss() {
         let target = array![[0.1, 0.0], [-3.0, 0.0], [1.0, 0.0]];
         let outputs = array![[0.5, 0.0], [-2.0, 0.0], [1.5, 0.0]];
-        for objective in [Objective::even(&VARIANCE), Objective::relative(&VARIANCE)] {
+        for frames in [Frames::Even, Frames::Mild, Frames::Relative] {
+            let objective = Objective::new(&VARIANCE, frames);
             let (derivative, _) = objective.measure(&outputs, &target);
             for frame in 0..3 {
                 let at = |step: f32| {

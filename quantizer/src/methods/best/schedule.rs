@@ -6,11 +6,15 @@
 
 use std::time::{Duration, Instant};
 
+use crate::graph::Graph;
+
 /// Share of the steps at the full rate.
 const HELD: f64 = 0.7;
 /// Steps of a network of [`USUAL`] weights; others take as many as its square root of their size allows: a small network learns
-/// longer, a large one keeps its time. A recurrent network's step is a batch of windows, which costs four times as much.
-const STEPS: f64 = 10_000.0;
+/// longer, a large one keeps its time. A step costs more where a frame is one of every denoising step of an iterative head, and
+/// four times as much where it is a batch of a recurrent network's windows.
+const STEPS: f64 = 20_000.0;
+const DENOISING_STEPS: f64 = 10_000.0;
 const WINDOW_STEPS: f64 = 7_800.0;
 const USUAL: f64 = 200_000.0;
 /// At most.
@@ -22,9 +26,18 @@ const LEAST_PART: usize = 100;
 const FALLEN: f64 = 0.01;
 const FLAT: usize = 2;
 
-/// The most steps of a network with so many weights, where nothing else is asked for.
-pub fn most_steps(weights: usize, recurrent: bool) -> usize {
-    let usual = if recurrent { WINDOW_STEPS } else { STEPS };
+/// The most steps of a network, where nothing else is asked for.
+pub fn most_steps(graph: &Graph) -> usize {
+    let usual = match graph.state_len() > 0 {
+        true => WINDOW_STEPS,
+        false if graph.denoising_steps() > 1 => DENOISING_STEPS,
+        false => STEPS,
+    };
+    scaled(usual, graph.weights())
+}
+
+/// The steps of a network of so many weights.
+fn scaled(usual: f64, weights: usize) -> usize {
     (usual * (USUAL / weights.max(1) as f64).sqrt()).min(MOST) as usize
 }
 
@@ -166,10 +179,7 @@ mod tests {
 
     #[test]
     fn small_networks_take_more_steps() {
-        assert_eq!(most_steps(31_000, true), 19_812);
-        assert_eq!(
-            (most_steps(200_000, false), most_steps(800_000, false), most_steps(10, true)),
-            (10_000, 5_000, 20_000)
-        );
+        assert_eq!(scaled(WINDOW_STEPS, 31_000), 19_812);
+        assert_eq!([10, 200_000, 800_000].map(|weights| scaled(STEPS, weights)), [20_000, 20_000, 10_000]);
     }
 }

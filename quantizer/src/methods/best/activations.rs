@@ -1,0 +1,131 @@
+//! Which matrices read int8, and which int16.
+
+use anyhow::Result;
+
+use super::allocate::{Rows, allocate, matrix_bytes};
+use super::dimension::{Dimension, Widths};
+use super::distill::loss;
+use crate::calibrate::allowance::Allowance;
+use crate::calibrate::windows::Windows;
+use crate::graph::{Graph, Network, WeightMatrix};
+use crate::methods::options::{Activations, Options, Packing};
+use crate::methods::quantized::{Quantized, dequantized};
+use crate::random::Random;
+
+/// An int16 input must lower the error by this share of it, and by more the more of the weights are behind it: its kernel takes
+/// 1.3 to 1.7 times as long.
+const WORTH: f32 = 0.03;
+const WORTH_OF_ALL: f32 = 0.12;
+/// int8's layout takes this many times int16's bytes where a matrix of few columns has mostly rows of 8 bits: int8 pads columns to
+/// 8, int16 to 4.
+const PADDED: f64 = 1.15;
+/// A small matrix has at most one in so many of all weights.
+const SMALL: usize = 10;
+const INT8: u16 = 127;
+const INT16: u16 = i16::MAX as u16;
+/// Batches that the choice is measured on, and samples in each.
+const MEASURED: usize = 8;
+const SAMPLES: usize = 256;
+
+/// Widths for all rows, and the activations' magnitudes that learning goes by: where nothing was asked for int8, but where int16
+/// takes so many bytes less that other rows get them.
+pub(super) fn allocated(
+    graph: &Graph,
+    dimensions: &[Dimension],
+    rows: &[Rows],
+    options: &Options,
+    allowed: f64,
+) -> Result<(Widths, Vec<u16>)> {
+    let asked = vec![options.activations.limit(); graph.matrices.len()];
+    let widths = allocate(graph, dimensions, rows, &packings(graph, &asked, options), allowed)?;
+    let takes =
+        |m: usize, limit: u16| matrix_bytes(graph, dimensions, &widths, m, Packing::of(limit, options.group)) as f64;
+    let limit = |(m, &limit): (usize, &u16)| match options.activations {
+        Activations::Auto if takes(m, INT8) >= PADDED * takes(m, INT16) => INT16,
+        _ => limit,
+    };
+    let limits: Vec<u16> = asked.iter().enumerate().map(limit).collect();
+    if limits == asked {
+        return Ok((widths, limits));
+    }
+    Ok((allocate(graph, dimensions, rows, &packings(graph, &limits, options), allowed)?, limits))
+}
+
+/// The layouts that room is kept for: that of every matrix's limit, and of int16 where that is still to be chosen and likely to
+/// be worth it, as of the first and the last layer.
+fn packings(graph: &Graph, limits: &[u16], options: &Options) -> Vec<Vec<Packing>> {
+    let all = |(matrix, &limit): (&WeightMatrix, &u16)| match options.activations {
+        Activations::Auto if limit == INT8 && SMALL * matrix.data.len() <= graph.weights() => vec![INT8, INT16],
+        _ => vec![limit],
+    };
+    let packed = |limits: Vec<u16>| limits.into_iter().map(|limit| Packing::of(limit, options.group)).collect();
+    graph.matrices.iter().zip(limits).map(all).map(packed).collect()
+}
+
+/// int16 for each matrix whose input, rounded to int8, adds more to the error than int16 costs in time; for the others what
+/// they have at least.
+pub(super) fn choose_activations(
+    graph: &Graph,
+    quantized: &[Quantized],
+    windows: &Windows,
+    least: &[u16],
+    allowance: Option<Allowance>,
+    seed: u64,
+) -> Vec<u16> {
+    let weights = dequantized(graph, quantized);
+    let error = |x_max: &[u16], measured: usize| -> f32 {
+        let network = Network::rounded(graph, x_max);
+        let samples = (SAMPLES / windows.window).max(8);
+        let batches = (0..measured).map(|i| windows.batch(samples, None, &mut Random::new(seed + i as u64)));
+        batches.map(|batch| loss(&network, &weights, windows, batch)).sum()
+    };
+    let choices = 1 + quantized.len();
+    let measured = allowance.map_or(MEASURED, |allowance| {
+        let batches = allowance.fits(1, || _ = error(least, 1), choices, choices * MEASURED);
+        batches / choices
+    });
+    let before = error(least, measured);
+    let weights_of = |q: &Quantized| (q.rows * q.cols) as f32;
+    let all: f32 = quantized.iter().map(weights_of).sum();
+    (0..quantized.len())
+        .map(|m| {
+            let mut x_max = least.to_vec();
+            x_max[m] = INT16;
+            let worth = WORTH + WORTH_OF_ALL * weights_of(&quantized[m]) / all;
+            if before - error(&x_max, measured) > worth * before { INT16 } else { least[m] }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use actq_kernels::Width;
+
+    use super::*;
+    use crate::budget::Budget;
+    use crate::methods::Method;
+
+    #[test]
+    fn int16_is_taken_where_int8_pads_more() {
+        let mut graph = Graph::new(18);
+        for cols in [18, 320] {
+            graph.matrices.push(WeightMatrix { name: "m".into(), rows: 64, cols, data: vec![0.0; 64 * cols] });
+        }
+        let rows = |energy: f64| Rows { energy: vec![energy; 64], removal: vec![1e9; 64], forced: None };
+        let limits = |of_first: f64, activations: Activations| {
+            let plain = Options::new(Method::Best, Budget::BitsPerWeight(4.0));
+            let options = Options { activations, ..plain };
+            let allowed = 0.5 * graph.weights() as f64;
+            let found = allocated(&graph, &[], &[rows(of_first), rows(1.0)], &options, allowed).expect("it fits");
+            (found.0[0][0], found.1)
+        };
+        assert_eq!(limits(1e6, Activations::Auto), (Some(Width::W8), vec![INT16, INT8]));
+        assert_eq!(
+            limits(1e-6, Activations::Auto),
+            (Some(Width::W2), vec![INT8, INT8]),
+            "2 bits are padded less in int8"
+        );
+        assert_eq!(limits(1e6, Activations::Int8), (Some(Width::W8), vec![INT8, INT8]));
+        assert_eq!(limits(1e6, Activations::Int16), (Some(Width::W8), vec![INT16, INT16]));
+    }
+}
