@@ -188,7 +188,7 @@ pub fn quantize(
             let allowance = bounds.time.filter(|_| graph.denoising_steps() > 1).map(Allowance::of);
             choose_activations(&learned, &quantized, windows, &learned_with, allowance, options.seed)
         }
-        Activations::Int8 | Activations::Int16 => learned_with.clone(),
+        _ => learned_with.clone(),
     };
     let outcome = |quantized: &Quantized, limit: u16| -> Result<Outcome> {
         Ok(Outcome { x_max: quantized.x_max(limit)?, quantized: quantized.clone(), error: None, allocation: None })

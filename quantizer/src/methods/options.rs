@@ -58,13 +58,15 @@ pub enum Activations {
     Int16,
     /// int16 where it lowers the error noticeably, int8 elsewhere; methods that do not measure take int8.
     Auto,
+    /// What [`Self::Auto`] has before it measures, with the same widths: for drafts, whose time counts.
+    Unmeasured,
 }
 
 impl Activations {
     /// The largest magnitude.
     pub fn limit(self) -> u16 {
         match self {
-            Self::Int8 | Self::Auto => 127,
+            Self::Int8 | Self::Auto | Self::Unmeasured => 127,
             Self::Int16 => i16::MAX as u16,
         }
     }

@@ -22,7 +22,7 @@ fn predict(quantized: &QuantizedPolicy, limit: TimeLimit) -> Result<StepTime> {
 
 /// The image of the most bits per weight whose step keeps the limit; `options.budget` does not count.
 ///
-/// The bits are found with int8 activations (where the options do not ask for int16) and without learning, on which no
+/// The bits are found with the activations that are there before any are measured, and without learning, on which no
 /// time depends; then the policy is quantized once. Activations that the method would rather have in int16 are, as far
 /// as the time allows. `progress` gets the share done.
 pub(super) fn most_bits(
@@ -33,7 +33,7 @@ pub(super) fn most_bits(
 ) -> Result<QuantizedPolicy> {
     let allowed = limit.milliseconds;
     let activations = match options.activations {
-        Activations::Auto => Activations::Int8,
+        Activations::Auto => Activations::Unmeasured,
         given => given,
     };
     let draft = Options { activations, steps: Some(1), ..options.clone() };

@@ -41,7 +41,7 @@ pub(super) fn allocated(
     let takes =
         |m: usize, limit: u16| matrix_bytes(graph, dimensions, &widths, m, Packing::of(limit, options.group)) as f64;
     let limit = |(m, &limit): (usize, &u16)| match options.activations {
-        Activations::Auto if takes(m, INT8) >= PADDED * takes(m, INT16) => INT16,
+        Activations::Auto | Activations::Unmeasured if takes(m, INT8) >= PADDED * takes(m, INT16) => INT16,
         _ => limit,
     };
     let limits: Vec<u16> = asked.iter().enumerate().map(limit).collect();
@@ -55,7 +55,11 @@ pub(super) fn allocated(
 /// be worth it, as of the first and the last layer.
 fn packings(graph: &Graph, limits: &[u16], options: &Options) -> Vec<Vec<Packing>> {
     let all = |(matrix, &limit): (&WeightMatrix, &u16)| match options.activations {
-        Activations::Auto if limit == INT8 && SMALL * matrix.data.len() <= graph.weights() => vec![INT8, INT16],
+        Activations::Auto | Activations::Unmeasured
+            if limit == INT8 && SMALL * matrix.data.len() <= graph.weights() =>
+        {
+            vec![INT8, INT16]
+        }
         _ => vec![limit],
     };
     let packed = |limits: Vec<u16>| limits.into_iter().map(|limit| Packing::of(limit, options.group)).collect();

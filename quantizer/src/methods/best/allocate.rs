@@ -30,6 +30,8 @@ fn epsilon(width: Width) -> f64 {
 /// Widths that a row may have.
 const CHOICES: [Option<Width>; 5] = [None, Some(Width::W2), Some(Width::W3), Some(Width::W4), Some(Width::W8)];
 
+/// What a bit gains at least where a row is widened to use what is left, of what it gains elsewhere.
+const WORTH: f64 = 0.1;
 /// Rows that are widened at once, at most: blocks are padded to so many.
 const MOST_AT_ONCE: usize = 4;
 
@@ -119,13 +121,14 @@ pub fn allocate(
         }
     }
     let mut widths = at(high.exp());
-    fill(&mut widths, graph, dimensions, rows, packings, limit);
+    fill(&mut widths, graph, dimensions, rows, packings, limit, WORTH * high.exp());
     Ok(widths)
 }
 
 /// Widens rows as long as bytes are left. Blocks of rows are padded, and a row more may take hundreds of bytes or none, which
 /// no multiplier sees: again and again the rows whose errors fall most for the bytes that they take, of one matrix, one
-/// width and at most so many as a block is padded to.
+/// width and at most so many as a block is padded to. Rows that gain less than `least` for a bit stay as they are: what has
+/// no part in the actions shall not take time.
 fn fill(
     widths: &mut Widths,
     graph: &Graph,
@@ -133,16 +136,19 @@ fn fill(
     rows: &[Rows],
     packings: &[Vec<Packing>],
     limit: f64,
+    least: f64,
 ) {
     let mut taken = bytes(graph, dimensions, widths, packings);
     loop {
         let mut best: Option<(f64, Widths, usize)> = None;
         for m in (0..rows.len()).filter(|&m| rows[m].forced.is_none()) {
+            let bits = RowBits::new(graph, dimensions, widths, m);
             for (narrow, from) in CHOICES.into_iter().enumerate() {
                 for to in CHOICES.into_iter().skip(narrow + 1) {
                     let gain = |r: &usize| rows[m].expected(*r, from) - rows[m].expected(*r, to);
-                    let mut candidates: Vec<usize> =
-                        (0..widths[m].len()).filter(|&r| widths[m][r] == from && gain(&r) > 0.0).collect();
+                    let gained_at_least = least * (bits.at(to) - bits.at(from));
+                    let is_worth = |r: &usize| widths[m][*r] == from && gain(r) > gained_at_least;
+                    let mut candidates: Vec<usize> = (0..widths[m].len()).filter(is_worth).collect();
                     candidates.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
                     let mut wider = widths.clone();
                     let mut gained = 0.0;
@@ -169,23 +175,40 @@ fn are_within_steps(widths: &[Option<Width>]) -> bool {
     Width::ALL.into_iter().all(|width| out_of_reach(widths, width).is_none())
 }
 
+/// What a row of a matrix takes beside the others, without padding.
+struct RowBits {
+    cols: f64,
+    /// Scale, and step where there is one.
+    overhead: f64,
+    /// What the column saves that a removed row takes along: one bit per bit of each row that it crosses.
+    saving: f64,
+}
+
+impl RowBits {
+    fn new(graph: &Graph, dimensions: &[Dimension], widths: &Widths, m: usize) -> Self {
+        let bits_of = |m: usize| -> f64 { widths[m].iter().flatten().map(|w| f64::from(w.bits())).sum() };
+        let made = Dimension::made_by(dimensions, m);
+        Self {
+            cols: Dimension::feeding(dimensions, m).map_or(graph.matrices[m].cols, |d| d.kept(widths)) as f64,
+            overhead: if made.is_some() { 16.0 } else { 24.0 },
+            saving: made.map_or(0.0, |d| d.consumers.iter().map(|&c| bits_of(c)).sum()),
+        }
+    }
+
+    fn at(&self, width: Option<Width>) -> f64 {
+        width.map_or(-self.saving, |width| self.cols * f64::from(width.bits()) + self.overhead)
+    }
+}
+
 /// The widths that minimise error plus `multiplier` times bits. What a removed row saves elsewhere depends on the other rows'
 /// widths, so the choice is repeated until it settles.
 fn choose(graph: &Graph, dimensions: &[Dimension], rows: &[Rows], multiplier: f64) -> Widths {
     let mut widths: Widths = graph.matrices.iter().map(|m| vec![Some(Width::W2); m.rows]).collect();
     for _ in 0..4 {
-        let bits_of = |m: usize| -> f64 { widths[m].iter().flatten().map(|w| f64::from(w.bits())).sum() };
         let next: Widths = (0..graph.matrices.len())
             .map(|m| {
-                let cols = Dimension::feeding(dimensions, m).map_or(graph.matrices[m].cols, |d| d.kept(&widths)) as f64;
-                let made = Dimension::made_by(dimensions, m);
-                // One bit per bit of each row that a column crosses.
-                let saving: f64 = made.map_or(0.0, |d| d.consumers.iter().map(|&c| bits_of(c)).sum());
-                let overhead = if made.is_some() { 16.0 } else { 24.0 };
-                let cost = |r: usize, width: Option<Width>| {
-                    let bits = width.map_or(-saving, |width| cols * f64::from(width.bits()) + overhead);
-                    rows[m].expected(r, width) + multiplier * bits
-                };
+                let bits = RowBits::new(graph, dimensions, &widths, m);
+                let cost = |r: usize, width: Option<Width>| rows[m].expected(r, width) + multiplier * bits.at(width);
                 let best = |r: usize| {
                     let order = |a: &&Option<Width>, b: &&Option<Width>| cost(r, **a).total_cmp(&cost(r, **b));
                     rows[m].forced.or_else(|| CHOICES.iter().min_by(order).copied().flatten())

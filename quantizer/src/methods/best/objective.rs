@@ -3,7 +3,7 @@
 use ndarray::{Array2, ArrayView1};
 
 use crate::graph::Graph;
-use crate::methods::Options;
+use crate::methods::options::Options;
 
 /// The loss of a batch and its derivative.
 #[derive(Debug)]
