@@ -2,8 +2,8 @@
 //!
 //! Each choice has three quarters of the episodes; to learn, it has an eighth of the steps. On the others its error is
 //! measured twice, at the recorded observations and at widened ones. A feed-forward network takes the choice with the
-//! lowest error at the recorded observations; a recurrent one learns as widely as it can ([`Widening::choices`]), and
-//! takes feedback where that is lower at widened ones (docs/QUANTIZER.md).
+//! lowest error at the recorded observations, among equals that with the lowest at widened ones; a recurrent one learns as
+//! widely as it can ([`Widening::choices`]), and takes feedback where that is lower at widened ones (docs/QUANTIZER.md).
 
 use nalgebra::DMatrix;
 
@@ -26,6 +26,8 @@ const TIME: u32 = 12;
 /// What all the steps leave of the error that an eighth of them leaves: 0.6 to 1.15, 0.81 in the mean
 /// (docs/records/2026-11-22-choice.md).
 const LEFT: f64 = 0.8;
+/// Errors on a few episodes that differ by less say nothing of others (docs/records/2026-11-23-hold.md).
+const CHANCE: f64 = 0.05;
 /// Dampings of feedback that are tried.
 const DAMPINGS: [f64; 2] = [DAMPING_INPUT, 0.03];
 /// Batches that an error is measured on, and frames in each.
@@ -95,13 +97,15 @@ pub fn choose(
     Chosen { choice, bounds: Bounds { steps, time: left }, tried }
 }
 
-/// The best of what was tried. Feedback has all that it will have, learning an eighth of its steps.
+/// The best of what was tried: of those whose errors on the path differ by no more than chance, the one that is best off it.
+/// Feedback has all that it will have, learning an eighth of its steps.
 fn best(tried: &[Tried], recurrent: bool) -> Option<&Tried> {
-    let expected = |tried: &Tried| {
-        let error = if recurrent { tried.widened } else { tried.recorded };
-        if matches!(tried.choice, Choice::Learning(_)) { LEFT * error } else { error }
-    };
-    tried.iter().min_by(|a, b| expected(a).total_cmp(&expected(b)))
+    let left = |tried: &Tried| if matches!(tried.choice, Choice::Learning(_)) { LEFT } else { 1.0 };
+    let widened = |tried: &Tried| left(tried) * tried.widened;
+    let expected = |tried: &Tried| if recurrent { widened(tried) } else { left(tried) * tried.recorded };
+    let lowest = tried.iter().map(expected).min_by(f64::total_cmp)?;
+    let alike = tried.iter().filter(|tried| expected(tried) <= (1.0 + CHANCE) * lowest);
+    alike.min_by(|a, b| widened(a).total_cmp(&widened(b)))
 }
 
 /// The errors of a network at recorded and at widened observations, the same for every choice.
@@ -138,8 +142,7 @@ mod tests {
     fn without_learning_the_better_damping_is_taken() {
         let Learning { steps, choice, tried } = chosen(4, 0);
         assert_eq!((steps, tried.len()), (0, DAMPINGS.len()));
-        let best = tried.iter().min_by(|a, b| a.recorded.total_cmp(&b.recorded)).map(|tried| tried.choice);
-        assert_eq!(best, Some(choice));
+        assert_eq!(best(&tried, false).map(|tried| tried.choice), Some(choice));
     }
 
     #[test]
@@ -166,6 +169,8 @@ mod tests {
         assert_eq!(choice(&[better, a, b], true), Some(a.choice), "it is far off beside the path");
         assert_eq!(choice(&[worse, better], false), Some(better.choice));
         assert_eq!(choice(&[], false), None);
+        let wider = learned(2, 1.04, 2.9);
+        assert_eq!(choice(&[b, wider], false), Some(wider.choice), "as good on the path, and better off it");
     }
 
     #[test]
