@@ -63,8 +63,13 @@ pub enum Activations {
 }
 
 impl Activations {
+    /// Whether all matrices get what was asked for.
+    pub fn are_asked_for(self) -> bool {
+        matches!(self, Self::Int8 | Self::Int16)
+    }
+
     /// The largest magnitude.
-    pub fn limit(self) -> u16 {
+    pub const fn limit(self) -> u16 {
         match self {
             Self::Int8 | Self::Auto | Self::Unmeasured => 127,
             Self::Int16 => i16::MAX as u16,

@@ -21,8 +21,8 @@ const WORTH_OF_ALL: f32 = 0.12;
 const PADDED: f64 = 1.15;
 /// A small matrix has at most one in so many of all weights.
 const SMALL: usize = 10;
-const INT8: u16 = 127;
-const INT16: u16 = i16::MAX as u16;
+const INT8: u16 = Activations::Int8.limit();
+const INT16: u16 = Activations::Int16.limit();
 /// Batches that the choice is measured on, and samples in each.
 const MEASURED: usize = 8;
 const SAMPLES: usize = 256;
@@ -40,8 +40,8 @@ pub(super) fn allocated(
     let widths = allocate(graph, dimensions, rows, &packings(graph, &asked, options), allowed)?;
     let takes =
         |m: usize, limit: u16| matrix_bytes(graph, dimensions, &widths, m, Packing::of(limit, options.group)) as f64;
-    let limit = |(m, &limit): (usize, &u16)| match options.activations {
-        Activations::Auto | Activations::Unmeasured if takes(m, INT8) >= PADDED * takes(m, INT16) => INT16,
+    let limit = |(m, &limit): (usize, &u16)| match options.activations.are_asked_for() {
+        false if takes(m, INT8) >= PADDED * takes(m, INT16) => INT16,
         _ => limit,
     };
     let limits: Vec<u16> = asked.iter().enumerate().map(limit).collect();
@@ -54,12 +54,8 @@ pub(super) fn allocated(
 /// The layouts that room is kept for: that of every matrix's limit, and of int16 where that is still to be chosen and likely to
 /// be worth it, as of the first and the last layer.
 fn packings(graph: &Graph, limits: &[u16], options: &Options) -> Vec<Vec<Packing>> {
-    let all = |(matrix, &limit): (&WeightMatrix, &u16)| match options.activations {
-        Activations::Auto | Activations::Unmeasured
-            if limit == INT8 && SMALL * matrix.data.len() <= graph.weights() =>
-        {
-            vec![INT8, INT16]
-        }
+    let all = |(matrix, &limit): (&WeightMatrix, &u16)| match options.activations.are_asked_for() {
+        false if limit == INT8 && SMALL * matrix.data.len() <= graph.weights() => vec![INT8, INT16],
         _ => vec![limit],
     };
     let packed = |limits: Vec<u16>| limits.into_iter().map(|limit| Packing::of(limit, options.group)).collect();
@@ -93,6 +89,9 @@ pub(super) fn choose_activations(
     let all: f32 = quantized.iter().map(weights_of).sum();
     (0..quantized.len())
         .map(|m| {
+            if least[m] == INT16 {
+                return INT16;
+            }
             let mut x_max = least.to_vec();
             x_max[m] = INT16;
             let worth = WORTH + WORTH_OF_ALL * weights_of(&quantized[m]) / all;

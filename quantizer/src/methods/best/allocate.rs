@@ -141,33 +141,36 @@ fn fill(
     let mut taken = bytes(graph, dimensions, widths, packings);
     loop {
         let mut best: Option<(f64, Widths, usize)> = None;
-        for m in (0..rows.len()).filter(|&m| rows[m].forced.is_none()) {
+        let free = (0..rows.len()).filter(|&m| rows[m].forced.is_none());
+        for (m, (from, to)) in free.flat_map(|m| widenings().map(move |widening| (m, widening))) {
             let bits = RowBits::new(graph, dimensions, widths, m);
-            for (narrow, from) in CHOICES.into_iter().enumerate() {
-                for to in CHOICES.into_iter().skip(narrow + 1) {
-                    let gain = |r: &usize| rows[m].expected(*r, from) - rows[m].expected(*r, to);
-                    let gained_at_least = least * (bits.at(to) - bits.at(from));
-                    let is_worth = |r: &usize| widths[m][*r] == from && gain(r) > gained_at_least;
-                    let mut candidates: Vec<usize> = (0..widths[m].len()).filter(is_worth).collect();
-                    candidates.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
-                    let mut wider = widths.clone();
-                    let mut gained = 0.0;
-                    for &r in candidates.iter().take(MOST_AT_ONCE) {
-                        wider[m][r] = to;
-                        gained += gain(&r);
-                        let takes = bytes(graph, dimensions, &wider, packings);
-                        let worth = gained / takes.saturating_sub(taken).max(1) as f64;
-                        let reached = Dimension::made_by(dimensions, m).is_some() || are_within_steps(&wider[m]);
-                        if takes as f64 <= limit && reached && best.as_ref().is_none_or(|(best, ..)| worth > *best) {
-                            best = Some((worth, wider.clone(), takes));
-                        }
-                    }
+            let gain = |r: &usize| rows[m].expected(*r, from) - rows[m].expected(*r, to);
+            let gained_at_least = least * (bits.at(to) - bits.at(from));
+            let is_worth = |r: &usize| widths[m][*r] == from && gain(r) > gained_at_least;
+            let mut candidates: Vec<usize> = (0..widths[m].len()).filter(is_worth).collect();
+            candidates.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
+            let mut wider = widths.clone();
+            let mut gained = 0.0;
+            for &r in candidates.iter().take(MOST_AT_ONCE) {
+                wider[m][r] = to;
+                gained += gain(&r);
+                let takes = bytes(graph, dimensions, &wider, packings);
+                let worth = gained / takes.saturating_sub(taken).max(1) as f64;
+                let reached = Dimension::made_by(dimensions, m).is_some() || are_within_steps(&wider[m]);
+                if takes as f64 <= limit && reached && best.as_ref().is_none_or(|(best, ..)| worth > *best) {
+                    best = Some((worth, wider.clone(), takes));
                 }
             }
         }
         let Some((_, wider, takes)) = best else { return };
         (*widths, taken) = (wider, takes);
     }
+}
+
+/// Every width, and every wider one.
+fn widenings() -> impl Iterator<Item = (Option<Width>, Option<Width>)> {
+    let wider = |from| CHOICES.into_iter().filter(move |to| *to > from).map(move |to| (from, to));
+    CHOICES.into_iter().flat_map(wider)
 }
 
 /// Whether rows of every width stand at most as far apart as the image's steps reach.

@@ -82,9 +82,9 @@ pub fn choose(
             try_out(Choice::Feedback { damping }, feedback(&moments, damping));
         }
     }
+    let choices = Widening::choices(windows.recurrent());
     if learns {
         let bounds = Bounds { steps: steps.map(|steps| steps / STEPS), time: time.map(|time| time / TIME) };
-        let choices = Widening::choices(windows.recurrent());
         for (i, &widening) in choices.iter().enumerate() {
             let learned = distill(&Task { widening, bounds, ..task.clone() }, &learned_from, |share, error| {
                 progress((i as f64 + share) / choices.len() as f64, error);
@@ -93,7 +93,7 @@ pub fn choose(
         }
     }
     let choice = best(&tried, windows.recurrent()).map_or(untried.choice, |best| best.choice);
-    let left = time.map(|time| time - time / TIME * Widening::choices(windows.recurrent()).len() as u32);
+    let left = time.map(|time| time - time / TIME * choices.len() as u32);
     Chosen { choice, bounds: Bounds { steps, time: left }, tried }
 }
 

@@ -17,7 +17,7 @@ pub(super) struct Objective<'a> {
 
 /// How much a frame counts. A robot that holds its goal by small actions stays as far off it as they are wrong, which a
 /// mean over all frames hardly sees. So a frame weighs `1 / (a + c)`, with `a` the mean square of the f32 network's
-/// outputs there in units of their variances (docs/records/2026-11-23-loss.md).
+/// outputs there in units of their variances (docs/records/2026-11-23-hold.md).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Frames {
     /// All alike.
