@@ -108,8 +108,8 @@ fn answered(monitor: &mut dyn Port) -> Result<()> {
     Ok(())
 }
 
-/// The action on an observation, and whether the outputs follow it. On a line without faults, but on a machine that may stop QEMU for so
-/// long that the firmware refuses the observation as an old one: it is then sent again.
+/// The action on an observation, and whether the outputs follow it. On a line without faults, but on a machine that may
+/// stop QEMU for so long that the firmware refuses the observation as an old one: it is then sent again.
 pub fn act(client: &mut Client, observation: &[f32]) -> Result<(bool, Vec<f32>)> {
     let (begun, mut refused) = (Instant::now(), client.status()?.refused);
     let mut number = client.observe(observation)?;

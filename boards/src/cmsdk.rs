@@ -1,5 +1,5 @@
-//! The peripherals of Arm's MPS2 boards: UART and watchdog of the Cortex-M System Design Kit (Arm DDI 0479C, sections 4.3 and 4.5). No
-//! crate has their registers.
+//! The peripherals of Arm's MPS2 boards: UART and watchdog of the Cortex-M System Design Kit (Arm DDI 0479C, sections
+//! 4.3 and 4.5). No crate has their registers.
 
 use volatile_register::{RW, WO};
 

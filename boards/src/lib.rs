@@ -1,8 +1,9 @@
-//! The boards that the firmware runs on. A board is a folder of this crate: its memory, how it is emulated, what it can show, and, for
-//! the application, its registers.
+//! The boards that the firmware runs on. A board is a folder of this crate: its memory, how it is emulated, what it can
+//! show, and, for the application, its registers.
 //!
-//! On the host this crate is the table of boards: cargo's runner and the build scripts, tests and measurements read it. On a target it is
-//! the `device` of the board that a feature names, behind the traits of [`seams`], and [`port`], the serial port that all share.
+//! On the host this crate is the table of boards: cargo's runner and the build scripts, tests and measurements read it.
+//! On a target it is the `device` of the board that a feature names, behind the traits of [`seams`], and [`port`], the
+//! serial port that all share.
 #![cfg_attr(target_os = "none", no_std)]
 #![cfg_attr(not(target_os = "none"), forbid(unsafe_code))]
 

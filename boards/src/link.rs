@@ -5,12 +5,13 @@ use std::{env, fs};
 
 use crate::Target;
 
-/// Links the package's binaries for a board; on the host, does nothing. For build scripts of packages one folder below the
-/// workspace's root.
+/// Links the package's binaries for a board; on the host, does nothing. For build scripts of packages one folder below
+/// the workspace's root.
 ///
 /// # Errors
 ///
-/// A feature names a board that the compiler's target does not run on, or two do; or the linker's script cannot be copied.
+/// A feature names a board that the compiler's target does not run on, or two do; or the linker's script cannot be
+/// copied.
 pub fn link() -> Result<(), String> {
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rustc-check-cfg=cfg(actq_small)");

@@ -1,5 +1,6 @@
 //! `actq-boards TARGET ELF [ARGUMENT ...]`: runs a firmware on the emulated board of a target. It is cargo's runner, so
-//! `ACTQ_IMAGE=... cargo run --package actq-firmware-bench --bin harness --target thumbv7em-none-eabihf -- serve` serves.
+//! `ACTQ_IMAGE=... cargo run --package actq-firmware-bench --bin harness --target thumbv7em-none-eabihf -- serve`
+//! serves.
 #![forbid(unsafe_code)]
 
 use std::path::Path;

@@ -1,4 +1,5 @@
-//! The memory protection unit of Armv7-M (Arm DDI 0403E, section B3.5): a guard at the stack's lower end, which nothing may touch.
+//! The memory protection unit of Armv7-M (Arm DDI 0403E, section B3.5): a guard at the stack's lower end, which nothing
+//! may touch.
 
 use core::ops::Range;
 
@@ -17,7 +18,8 @@ const ENABLE: u32 = 1;
 /// Everything else is as without the unit.
 const DEFAULT_MAP: u32 = 1 << 2;
 
-/// Guards the stack, and gives what is left of it. A fault handler runs with the guard up; HardFault and NMI run without it.
+/// Guards the stack, and gives what is left of it. A fault handler runs with the guard up; HardFault and NMI run
+/// without it.
 ///
 /// # Safety
 ///
@@ -25,8 +27,8 @@ const DEFAULT_MAP: u32 = 1 << 2;
 pub unsafe fn guard_stack() -> Range<u32> {
     let memory = crate::stack::memory();
     let guard = memory.start.next_multiple_of(1 << SIZE_LOG2);
-    // SAFETY: the unit's registers, which nothing else writes, as the caller promises; the region begins at a multiple of its size, and
-    // is memory of the stack that is not in use.
+    // SAFETY: the unit's registers, which nothing else writes, as the caller promises; the region begins at a multiple
+    // of its size, and is memory of the stack that is not in use.
     unsafe {
         let mpu = &*MPU::PTR;
         mpu.rbar.write(guard | VALID_REGION_0);

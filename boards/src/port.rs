@@ -1,5 +1,5 @@
-//! A serial port of two queues between an interrupt and the program: [`Wire`] is the interrupt's end, [`Port`] the program's, with
-//! embedded-io's traits.
+//! A serial port of two queues between an interrupt and the program: [`Wire`] is the interrupt's end, [`Port`] the
+//! program's, with embedded-io's traits.
 
 use core::convert::Infallible;
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -74,7 +74,8 @@ pub struct Port<'b> {
 }
 
 impl Port<'_> {
-    /// Bytes that were received and lost since the start, modulo 2^32: overrun, wrongly framed, or without room in the queue.
+    /// Bytes that were received and lost since the start, modulo 2^32: overrun, wrongly framed, or without room in the
+    /// queue.
     pub fn lost(&self) -> u32 {
         self.buffers.lost.load(Ordering::Relaxed)
     }

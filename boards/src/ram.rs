@@ -5,8 +5,8 @@ use core::ops::Range;
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 
-/// Memory that is erased to ones in sectors of `SECTOR` bytes, and of which a unit of `UNIT` bytes is programmed once. Cells, because an
-/// image runs in place from one part of a flash while another part is written.
+/// Memory that is erased to ones in sectors of `SECTOR` bytes, and of which a unit of `UNIT` bytes is programmed once.
+/// Cells, because an image runs in place from one part of a flash while another part is written.
 #[derive(Debug)]
 pub struct Ram<'m, const UNIT: usize, const SECTOR: usize>(pub &'m [Cell<u8>]);
 

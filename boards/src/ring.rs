@@ -1,5 +1,5 @@
-//! A queue of bytes with one writer and one reader, one of which may be an interrupt. Nothing in it can panic, which heapless's queues
-//! cannot say of their views, and an application without the machinery of panics needs.
+//! A queue of bytes with one writer and one reader, one of which may be an interrupt. Nothing in it can panic, which
+//! heapless's queues cannot say of their views, and an application without the machinery of panics needs.
 
 use core::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
 
@@ -7,7 +7,8 @@ use core::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
 #[derive(Debug)]
 pub(crate) struct Ring<const LEN: usize> {
     bytes: [AtomicU8; LEN],
-    /// Bytes that were ever put in, and taken out, modulo 2^32. `LEN` is a power of two, so the remainder goes on over the end.
+    /// Bytes that were ever put in, and taken out, modulo 2^32. `LEN` is a power of two, so the remainder goes on over
+    /// the end.
     put: AtomicUsize,
     taken: AtomicUsize,
 }

@@ -6,7 +6,8 @@ use embedded_hal::pwm::SetDutyCycle;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lost;
 
-/// Single bytes of a serial port, without waiting: for the handler of its interrupt, which comes with every byte that is received.
+/// Single bytes of a serial port, without waiting: for the handler of its interrupt, which comes with every byte that
+/// is received.
 pub trait Uart {
     /// The byte that was received, if one was.
     fn receive(&mut self) -> Option<Result<u8, Lost>>;
@@ -14,7 +15,8 @@ pub trait Uart {
     /// Transmits a byte; false, with nothing done, where the transmitter is full.
     fn transmit(&mut self, byte: u8) -> bool;
 
-    /// Whether the interrupt also comes when the transmitter has room. A port without such an interrupt does nothing here.
+    /// Whether the interrupt also comes when the transmitter has room. A port without such an interrupt does nothing
+    /// here.
     fn ask_for_room(&mut self, on: bool);
 }
 
@@ -90,8 +92,8 @@ pub trait Stage {
     /// Switches all six outputs off, now.
     fn disable(&mut self);
 
-    /// Two phase currents that were measured in the middle of the last period, as the ADC gives them (0 to 4095); `None` where there
-    /// are no new ones.
+    /// Two phase currents that were measured in the middle of the last period, as the ADC gives them (0 to 4095);
+    /// `None` where there are no new ones.
     fn currents(&mut self) -> Option<[u16; 2]>;
 }
 

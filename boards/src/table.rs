@@ -1,8 +1,8 @@
 //! What the host knows of boards.
 //!
-//! A [`Target`] is a board and the compiler's target for it, one line in the table below. From these follow the linker's scripts
-//! ([`link`](crate::link())), cargo's runner (this crate's binary, `.cargo/config.toml`), what is installed, and what tests and
-//! measurements run where.
+//! A [`Target`] is a board and the compiler's target for it, one line in the table below. From these follow the
+//! linker's scripts ([`link`](crate::link())), cargo's runner (this crate's binary, `.cargo/config.toml`), what is
+//! installed, and what tests and measurements run where.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -60,7 +60,8 @@ impl Transport {
 /// How the time of an emulated board passes. Neither runs ahead of the host's, whose clock is in what it sends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Clock {
-    /// By 2^`0` ns an instruction: times are the same in every run. QEMU then takes about a millisecond for a byte of the serial port.
+    /// By 2^`0` ns an instruction: times are the same in every run. QEMU then takes about a millisecond for a byte of
+    /// the serial port.
     Counted(u32),
     /// With the host's, by as many instructions as that takes. A byte takes some 40 µs.
     Host,
@@ -125,7 +126,8 @@ impl Target {
         Self::ALL.into_iter().find(|target| target.board().name == board)
     }
 
-    /// The feature of a firmware package that chooses the board: its name. Without a feature it is that of [`Target::of`].
+    /// The feature of a firmware package that chooses the board: its name. Without a feature it is that of
+    /// [`Target::of`].
     pub fn feature(self) -> Option<&'static str> {
         (Self::of(self.triple()) != Some(self)).then_some(self.board().name)
     }

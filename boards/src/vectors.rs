@@ -1,5 +1,5 @@
-//! The part of the vector table that belongs to a device: the handler `SERIAL`, which the application has, at its place. `device.x`
-//! ([`crate::link`] on the host) gives a program without it the default handler.
+//! The part of the vector table that belongs to a device: the handler `SERIAL`, which the application has, at its
+//! place. `device.x` ([`crate::link`] on the host) gives a program without it the default handler.
 
 /// A handler.
 pub(crate) type Vector = unsafe extern "C" fn();
@@ -16,7 +16,8 @@ pub(crate) const fn table<const LEN: usize>(serial: usize) -> [Vector; LEN] {
     table
 }
 
-/// Declares, for a device, what RTIC asks for and the vector table: the number of the serial port's interrupt and of all of them.
+/// Declares, for a device, what RTIC asks for and the vector table: the number of the serial port's interrupt and of
+/// all of them.
 macro_rules! interrupts {
     ($serial:literal of $all:literal) => {
         /// The interrupts that the application has handlers for.

@@ -1,8 +1,9 @@
 //! How old an observation is, by two clocks that nobody has set.
 //!
-//! The difference of the receiver's and the sender's clock, less the smallest one seen, is what a frame took longer than the fastest.
-//! The smallest one is let rise slowly, as far as the two clocks may drift apart. So a sender whose time stands still or jumps back
-//! grows old, until the age is begun anew; one whose time jumps forward is from then on the new time.
+//! The difference of the receiver's and the sender's clock, less the smallest one seen, is what a frame took longer
+//! than the fastest. The smallest one is let rise slowly, as far as the two clocks may drift apart. So a sender whose
+//! time stands still or jumps back grows old, until the age is begun anew; one whose time jumps forward is from then on
+//! the new time.
 
 /// The clocks' drift is followed up to 1 in 2^12: 244 ppm, more than two crystals'.
 const DRIFT_BITS: u32 = 12;
@@ -22,7 +23,8 @@ struct Least {
 }
 
 impl Age {
-    /// Age in µs of what was sent at `remote` and came at `local`, against the fastest delivery. Right up to half an hour.
+    /// Age in µs of what was sent at `remote` and came at `local`, against the fastest delivery. Right up to half an
+    /// hour.
     pub(crate) fn of(&mut self, remote: u32, local: u32) -> u32 {
         let difference = local.wrapping_sub(remote);
         let least = self.least.get_or_insert(Least { difference, since: local });

@@ -69,8 +69,8 @@ impl Axis {
     /// An axis that may not leave 0.
     pub const STILL: Self = Self { low: 0.0, high: 0.0, rate: 1.0, start: 0.0, safe: SafeAction::Coast };
 
-    /// An axis with finite limits `low` to `high`, that changes by at most `rate` in a tick (infinite: at once), and whose first
-    /// value after arming changes by at most that from `start`.
+    /// An axis with finite limits `low` to `high`, that changes by at most `rate` in a tick (infinite: at once), and
+    /// whose first value after arming changes by at most that from `start`.
     ///
     /// # Errors
     ///
@@ -118,8 +118,8 @@ impl Axis {
         self.safe
     }
 
-    /// A finite value, brought within the limits. (By comparisons: a Cortex-M4 has no instruction for `f32::max`, and calls a function,
-    /// while the tick waits.)
+    /// A finite value, brought within the limits. (By comparisons: a Cortex-M4 has no instruction for `f32::max`, and
+    /// calls a function, while the tick waits.)
     pub(crate) fn limit(&self, value: f32) -> f32 {
         match value {
             below if below < self.low => self.low,

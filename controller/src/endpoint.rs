@@ -1,7 +1,7 @@
 //! The controller's end of the link: what each message does, and what is answered.
 //!
-//! The firmware calls [`Endpoint::receive`] for every byte that came, [`Endpoint::report`] every now and then, and sends what they
-//! give. It lets the head run on [`Endpoint::step`] and hands its action to [`Endpoint::acted`].
+//! The firmware calls [`Endpoint::receive`] for every byte that came, [`Endpoint::report`] every now and then, and
+//! sends what they give. It lets the head run on [`Endpoint::step`] and hands its action to [`Endpoint::acted`].
 
 use actq_link::code::{Fault, Parameter, Refusal, Report, State};
 use actq_link::report::{Breadcrumb, Status, Timing};
@@ -12,7 +12,8 @@ use crate::requests::{Settings, request};
 use crate::safety::{Safety, Shared};
 use crate::update::Update;
 
-/// Ticks without a good frame, while not armed, after which a host may have started anew and is listened to from any number on.
+/// Ticks without a good frame, while not armed, after which a host may have started anew and is listened to from any
+/// number on.
 pub const QUIET: u32 = 1000;
 
 /// What a controller tells of itself, besides what it decides.
@@ -39,7 +40,8 @@ pub struct Step<'a> {
     pub observation: &'a [f32],
 }
 
-/// The controller's end of the link. `OBS` is room for an observation's values, `N` for a frame ([`actq_link::frame::bytes`]).
+/// The controller's end of the link. `OBS` is room for an observation's values, `N` for a frame
+/// ([`actq_link::frame::bytes`]).
 #[derive(Debug)]
 pub struct Endpoint<'r, const OBS: usize, const N: usize> {
     receiver: Receiver<N>,
@@ -65,7 +67,8 @@ impl<'r, const OBS: usize, const N: usize> Endpoint<'r, OBS, N> {
 
     /// Takes a byte that came at `micros`; the frame to send for it, in `out`.
     ///
-    /// `out` needs room for [`actq_link::frame::wire_bytes`] of 46 bytes and of an action; a frame without room is not sent.
+    /// `out` needs room for [`actq_link::frame::wire_bytes`] of 46 bytes and of an action; a frame without room is not
+    /// sent.
     pub fn receive<'b, const AXES: usize>(
         &mut self,
         byte: u8,
@@ -107,7 +110,8 @@ impl<'r, const OBS: usize, const N: usize> Endpoint<'r, OBS, N> {
         self.sender.frame(&message, micros, out)
     }
 
-    /// A status, where one is due. To be called at least every few ticks: it also notices that the line has fallen silent.
+    /// A status, where one is due. To be called at least every few ticks: it also notices that the line has fallen
+    /// silent.
     pub fn report<'b, const AXES: usize>(
         &mut self,
         micros: u32,
@@ -141,8 +145,8 @@ impl<'r, const OBS: usize, const N: usize> Endpoint<'r, OBS, N> {
         Some(Step { of, reset, observation })
     }
 
-    /// Takes the head's action on the last [`Self::step`], or its failure; the frame to send. It is not applied where the state has
-    /// changed since the step began.
+    /// Takes the head's action on the last [`Self::step`], or its failure; the frame to send. It is not applied where
+    /// the state has changed since the step began.
     pub fn acted<'b, E, const AXES: usize>(
         &mut self,
         of: u32,

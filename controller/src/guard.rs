@@ -73,8 +73,8 @@ pub struct Guard<'r, const OBS: usize> {
 }
 
 impl<'r, const OBS: usize> Guard<'r, OBS> {
-    /// A guard for observations of `len` values, each in its range; without `ranges` they only have to be finite. Values without
-    /// a range (where there are fewer) are refused.
+    /// A guard for observations of `len` values, each in its range; without `ranges` they only have to be finite.
+    /// Values without a range (where there are fewer) are refused.
     ///
     /// `None` where there is no room for `len` values.
     pub fn new(len: usize, ranges: &'r [Range], max_age: u32) -> Option<Self> {
@@ -95,8 +95,8 @@ impl<'r, const OBS: usize> Guard<'r, OBS> {
         }
     }
 
-    /// Lets an observation through that was sent at `remote` µs and came at `local` µs. One that is refused is counted, and the
-    /// last one stays.
+    /// Lets an observation through that was sent at `remote` µs and came at `local` µs. One that is refused is counted,
+    /// and the last one stays.
     ///
     /// # Errors
     ///

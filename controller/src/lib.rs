@@ -1,8 +1,10 @@
-//! What a motor controller decides, without its peripherals: the firmware feeds bytes, ticks and times, and writes the outputs.
+//! What a motor controller decides, without its peripherals: the firmware feeds bytes, ticks and times, and writes the
+//! outputs.
 //!
-//! [`endpoint`] answers the link, [`guard`] lets observations to the head, [`safety`] decides every tick what the outputs do,
-//! [`slots`] which image runs, [`progress`] when the watchdog is fed, [`scrub`] notices that the image has changed, and [`breadcrumb`] says what the last run
-//! died of. [`foc`] is a current loop for the control tick. `docs/SAFETY.md` has the states, and what is not claimed.
+//! [`endpoint`] answers the link, [`guard`] lets observations to the head, [`safety`] decides every tick what the
+//! outputs do, [`slots`] which image runs, [`progress`] when the watchdog is fed, [`scrub`] notices that the image has
+//! changed, and [`breadcrumb`] says what the last run died of. [`foc`] is a current loop for the control tick.
+//! `docs/SAFETY.md` has the states, and what is not claimed.
 //!
 //! Nothing here allocates, blocks or panics; each call's work is bounded.
 #![no_std]

@@ -36,7 +36,8 @@ impl<const AXES: usize> Safety<AXES> {
         }
     }
 
-    /// Sets one of the parameters that [`Self::get`] gives. Limits, rate and deadline only become stricter than those of the build.
+    /// Sets one of the parameters that [`Self::get`] gives. Limits, rate and deadline only become stricter than those
+    /// of the build.
     ///
     /// # Errors
     ///

@@ -1,7 +1,8 @@
 //! When the watchdog is fed.
 //!
-//! Progress of the link is that its bytes are looked at, not that there are any: what a cut cable needs is the safe action, which a
-//! reset would end. Progress of the head is a piece of a step, or that there is none to do; that of the output a control tick.
+//! Progress of the link is that its bytes are looked at, not that there are any: what a cut cable needs is the safe
+//! action, which a reset would end. Progress of the head is a piece of a step, or that there is none to do; that of the
+//! output a control tick.
 
 /// What has made progress since the watchdog was last fed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

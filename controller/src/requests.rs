@@ -13,7 +13,8 @@ use crate::update::{Plan, Update};
 pub struct Settings {
     /// Ticks between two reports of the status; 0: none unasked.
     pub status_period: u32,
-    /// Whether flash can be erased and written while the outputs are driven: not where code is fetched from the same bank.
+    /// Whether flash can be erased and written while the outputs are driven: not where code is fetched from the same
+    /// bank.
     pub flash_while_armed: bool,
 }
 

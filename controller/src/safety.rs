@@ -1,7 +1,7 @@
 //! The state, the limits and the deadline: what stands between actions and outputs.
 //!
-//! A control interrupt calls [`Safety::tick`]; everything else comes from below it, through [`Shared`]. Each call takes time
-//! proportional to the number of axes at most.
+//! A control interrupt calls [`Safety::tick`]; everything else comes from below it, through [`Shared`]. Each call takes
+//! time proportional to the number of axes at most.
 
 use core::mem;
 
@@ -11,7 +11,8 @@ use crate::axis::{Axis, Output};
 use crate::health::{Check, Health};
 use crate::state::{Disarmed, State};
 
-/// A [`Safety`] that a control interrupt uses, too: however the firmware locks it (RTIC's resource, a critical section).
+/// A [`Safety`] that a control interrupt uses, too: however the firmware locks it (RTIC's resource, a critical
+/// section).
 pub trait Shared<const AXES: usize> {
     /// Runs `work` on it while no interrupt does.
     fn with<R>(&mut self, work: impl FnOnce(&mut Safety<AXES>) -> R) -> R;
@@ -50,8 +51,9 @@ pub struct Safety<const AXES: usize> {
 }
 
 impl<const AXES: usize> Safety<AXES> {
-    /// Disarmed. `deadline` in ticks, at least 1 (0 is taken as 1); `seed` should be another one at every start, so that requests
-    /// from before it are refused: a count of starts in memory that a reset keeps, or a free-running timer.
+    /// Disarmed. `deadline` in ticks, at least 1 (0 is taken as 1); `seed` should be another one at every start, so
+    /// that requests from before it are refused: a count of starts in memory that a reset keeps, or a free-running
+    /// timer.
     pub fn new(axes: [Axis; AXES], deadline: u32, seed: u32) -> Self {
         let deadline = deadline.max(1);
         Self {
@@ -97,8 +99,8 @@ impl<const AXES: usize> Safety<AXES> {
         self.since_observation = 0;
     }
 
-    /// Takes an action of the head; what the outputs are led to by it, within the limits, where it is applied. That is only while
-    /// armed.
+    /// Takes an action of the head; what the outputs are led to by it, within the limits, where it is applied. That is
+    /// only while armed.
     ///
     /// # Errors
     ///
@@ -151,8 +153,8 @@ impl<const AXES: usize> Safety<AXES> {
     ///
     /// # Errors
     ///
-    /// Where the token is not [`Self::token`], where armed already, where a check has failed or was not done, and without a fresh
-    /// observation. Nothing changes then.
+    /// Where the token is not [`Self::token`], where armed already, where a check has failed or was not done, and
+    /// without a fresh observation. Nothing changes then.
     pub fn arm(&mut self, token: u32) -> Result<(), Refusal> {
         if token != self.token {
             return Err(Refusal::Token);

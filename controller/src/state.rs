@@ -1,7 +1,7 @@
 //! The states, and the only ways from one to another.
 //!
-//! Each state is a type, and each way a function that takes the one and gives the other: what is not here cannot be written.
-//! A controller is not armed without [`Ready`], which only passed checks give:
+//! Each state is a type, and each way a function that takes the one and gives the other: what is not here cannot be
+//! written. A controller is not armed without [`Ready`], which only passed checks give:
 //!
 //! ```compile_fail
 //! # use actq_controller::state::{Armed, Disarmed};

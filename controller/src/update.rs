@@ -13,8 +13,8 @@ pub struct Plan {
     pub version: u32,
 }
 
-/// Does the requests of an update. Each may come again where its acknowledgement was lost. Where one takes longer than a call may, it
-/// is [`Refusal::Busy`] until it is done.
+/// Does the requests of an update. Each may come again where its acknowledgement was lost. Where one takes longer than
+/// a call may, it is [`Refusal::Busy`] until it is done.
 pub trait Update {
     /// Makes room for an image.
     ///

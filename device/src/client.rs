@@ -11,8 +11,8 @@ use anyhow::{Context as _, Result, bail};
 use crate::connection::Connection;
 use crate::event::Event;
 
-/// After so long without an answer a request is sent again, then after half as long again each time: a slow line is not to be filled
-/// with repetitions.
+/// After so long without an answer a request is sent again, then after half as long again each time: a slow line is not
+/// to be filled with repetitions.
 const REPEAT: Duration = Duration::from_millis(150);
 /// But no longer than this.
 const SLOWEST: Duration = Duration::from_secs(1);
@@ -64,7 +64,8 @@ impl Client {
         Ok(std::mem::take(&mut self.events))
     }
 
-    /// Sends `message` until `wanted` takes an event as the answer to one of the numbers it was sent under. The others are kept.
+    /// Sends `message` until `wanted` takes an event as the answer to one of the numbers it was sent under. The others
+    /// are kept.
     fn ask<T>(&mut self, message: &Message<'_>, wanted: impl Fn(&Event, &[u32]) -> Option<T>) -> Result<T> {
         let begun = Instant::now();
         let (mut numbers, mut wait) = (Vec::new(), REPEAT);
@@ -190,8 +191,8 @@ impl Client {
         self.request(&Message::Disarm)?.1.context("not disarmed")
     }
 
-    /// As [`Self::with_token`], for what may be asked whatever the state has become: a request before it that was repeated may have changed
-    /// the token once more.
+    /// As [`Self::with_token`], for what may be asked whatever the state has become: a request before it that was
+    /// repeated may have changed the token once more.
     pub(crate) fn change<'m>(&mut self, message: impl Fn(u32) -> Message<'m>) -> Result<Result<(), Refusal>> {
         let mut outcome = Err(Refusal::Token);
         for _ in 0..TRIES {

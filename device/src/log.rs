@@ -61,8 +61,8 @@ impl Log {
         self.rows.iter().filter_map(|row| Some(row.answer.as_ref()?.came - row.sent)).collect()
     }
 
-    /// An .npz with the arrays `obs` and `action` (one frame a row; an action that did not come is NaN), `applied` (0 or 1), and
-    /// `sent` and `received` (seconds since the log began, NaN where nothing came).
+    /// An .npz with the arrays `obs` and `action` (one frame a row; an action that did not come is NaN), `applied` (0
+    /// or 1), and `sent` and `received` (seconds since the log began, NaN where nothing came).
     ///
     /// # Errors
     ///

@@ -73,8 +73,8 @@ impl<'a> Push<'a> {
         }
     }
 
-    /// Does the next request; whether the image runs now. Before the first and the last one the controller may be busy for a while, and
-    /// before any where it was just disarmed.
+    /// Does the next request; whether the image runs now. Before the first and the last one the controller may be busy
+    /// for a while, and before any where it was just disarmed.
     ///
     /// # Errors
     ///

@@ -15,12 +15,13 @@ const REPEAT: Duration = Duration::from_millis(200);
 /// Tries before a step is answered by no action.
 const TRIES: usize = 5;
 
-/// Answers the simulator until its requests end. The controller's image sees every observation; with `arm` the outputs follow it, and
-/// the answers are what they are led to. A reset disarms, which resets the head.
+/// Answers the simulator until its requests end. The controller's image sees every observation; with `arm` the outputs
+/// follow it, and the answers are what they are led to. A reset disarms, which resets the head.
 ///
 /// # Errors
 ///
-/// Where the controller is lost, cannot be armed or has stopped for a fault, or where the simulator breaks the protocol.
+/// Where the controller is lost, cannot be armed or has stopped for a fault, or where the simulator breaks the
+/// protocol.
 pub fn serve(client: &mut Client, arm: bool, mut input: impl Read, mut output: impl Write) -> Result<()> {
     let status = client.status()?;
     let mut bytes = vec![0; 4 * usize::from(status.observation)];

@@ -1,5 +1,5 @@
-//! What `src/bin/functions.rs` computes on the target, and `host-tests/tests/all/functions.rs` on the host: operands, and the hash of
-//! what comes out.
+//! What `src/bin/functions.rs` computes on the target, and `host-tests/tests/all/functions.rs` on the host: operands,
+//! and the hash of what comes out.
 
 /// Elements.
 pub const LEN: usize = 256;

@@ -1,4 +1,5 @@
-//! Faults that a test asks for by three bytes of the line: a zero, a digit or letter, a zero. No frame is one byte long.
+//! Faults that a test asks for by three bytes of the line: a zero, a digit or letter, a zero. No frame is one byte
+//! long.
 
 /// What is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

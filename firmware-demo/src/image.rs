@@ -9,8 +9,8 @@ use actq_link::code::Refusal;
 use crate::patience::LONGEST;
 use crate::running::SLICE;
 
-/// Values of an observation and of an action, by an image's header: an array's length, so that it is known when the firmware is
-/// compiled. One each where the bytes are no image.
+/// Values of an observation and of an action, by an image's header: an array's length, so that it is known when the
+/// firmware is compiled. One each where the bytes are no image.
 pub const fn lengths(image: &[u8]) -> [usize; 2] {
     let ([b'A', b'C', b'T', b'Q', ..], Some((_, [a, b, c, d, ..]))) = (image, image.split_at_checked(4 * W_SIZES))
     else {
@@ -19,8 +19,9 @@ pub const fn lengths(image: &[u8]) -> [usize; 2] {
     [u16::from_le_bytes([*a, *b]) as usize, u16::from_le_bytes([*c, *d]) as usize]
 }
 
-/// The head of an image that was checked, has these lengths, and whose self-test comes out bit for bit. The watchdog is fed before the
-/// check, which is as long as the image, and before each slice of the self-test, of which no image makes a longer one than [`LONGEST`].
+/// The head of an image that was checked, has these lengths, and whose self-test comes out bit for bit. The watchdog is
+/// fed before the check, which is as long as the image, and before each slice of the self-test, of which no image makes
+/// a longer one than [`LONGEST`].
 ///
 /// # Errors
 ///
@@ -44,8 +45,8 @@ pub fn open<'i, 's>(
     Ok(head)
 }
 
-/// An axis for each value of an image's actions, with the limits of its contract, the whole way in `ticks`, and 0 as its safe action.
-/// Without an image or without finite limits, an axis stays where it is.
+/// An axis for each value of an image's actions, with the limits of its contract, the whole way in `ticks`, and 0 as
+/// its safe action. Without an image or without finite limits, an axis stays where it is.
 pub fn axes<const AXES: usize>(image: Option<&Image<'_>>, ticks: f32) -> [Axis; AXES] {
     let [_, _, low, high, ..] = image.map(Image::contract_arrays).unwrap_or_default();
     let mut axes = [Axis::STILL; AXES];

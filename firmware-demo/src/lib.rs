@@ -1,5 +1,5 @@
-//! The motor controller without a board: what its loop and its tick do with the decisions of `actq_controller`. `bin/controller` puts it
-//! on one.
+//! The motor controller without a board: what its loop and its tick do with the decisions of `actq_controller`.
+//! `bin/controller` puts it on one.
 #![no_std]
 #![forbid(unsafe_code)]
 

@@ -1,7 +1,8 @@
-//! A three-phase motor in the tick: the current loop of `actq_controller::foc` drives a motor that is simulated, so that the tick does the
-//! work that a real one would have. The first axis commands the current that makes torque.
+//! A three-phase motor in the tick: the current loop of `actq_controller::foc` drives a motor that is simulated, so
+//! that the tick does the work that a real one would have. The first axis commands the current that makes torque.
 //!
-//! Real currents and a real angle take the place of [`Simulated::measure`]; the duty cycles go to the board's power stage as they are.
+//! Real currents and a real angle take the place of [`Simulated::measure`]; the duty cycles go to the board's power
+//! stage as they are.
 
 use actq_boards::seams::Stage;
 use actq_controller::foc::{CurrentLoop, Gains, Measured, Rotor, Stator};
@@ -67,7 +68,8 @@ impl<S: Stage> Motor<S> {
     }
 }
 
-/// A permanent-magnet synchronous motor, in the axes of its stator, so that no sine is computed: explicit Euler steps of a tick.
+/// A permanent-magnet synchronous motor, in the axes of its stator, so that no sine is computed: explicit Euler steps
+/// of a tick.
 #[derive(Debug)]
 struct Simulated {
     current: Stator,
@@ -109,7 +111,8 @@ impl Simulated {
         }
         let torque = 1.5 * PAIRS * FLUX * (alpha * self.current.beta - beta * self.current.alpha);
         self.speed += self.tick / INERTIA * (PAIRS * torque - FRICTION * self.speed);
-        // A turn by so little that its sine and cosine end with these terms; what rounding makes of the length is taken back.
+        // A turn by so little that its sine and cosine end with these terms; what rounding makes of the length is taken
+        // back.
         let turn = self.tick * self.speed;
         let (sin, cos) = (turn - turn * turn * turn / 6.0, 1.0 - 0.5 * turn * turn);
         let (alpha, beta) = (cos * alpha - sin * beta, sin * alpha + cos * beta);

@@ -1,5 +1,5 @@
-//! What the tick tells the power stage: each of the first axes commands a half bridge, whose duty cycle is the value's place between the
-//! limits. What a motor needs instead is in `motor.rs`.
+//! What the tick tells the power stage: each of the first axes commands a half bridge, whose duty cycle is the value's
+//! place between the limits. What a motor needs instead is in `motor.rs`.
 
 use actq_boards::seams::Stage;
 use actq_controller::{Axis, Output};
@@ -18,8 +18,8 @@ impl<S: Stage> Bridges<S> {
         Self { stage, on: false }
     }
 
-    /// Tells the outputs of a tick; false where the stage is off and should not be. One switch is for all bridges: one axis that
-    /// coasts lets all of them coast.
+    /// Tells the outputs of a tick; false where the stage is off and should not be. One switch is for all bridges: one
+    /// axis that coasts lets all of them coast.
     pub fn tell(&mut self, outputs: &[Output], axes: &[Axis]) -> bool {
         let mut shares = [0.0; 3];
         for ((place, output), axis) in shares.iter_mut().zip(outputs).zip(axes) {

@@ -6,8 +6,8 @@ use actq_controller::scrub::Scrub;
 use actq_controller::{Check, Endpoint, Shared};
 use actq_kernels::Head;
 
-/// Modelled instructions of a slice, where an image needs no more: 0.12 ms of a Cortex-M4 at 168 MHz. Bytes that come wait for as
-/// long; the tick does not.
+/// Modelled instructions of a slice, where an image needs no more: 0.12 ms of a Cortex-M4 at 168 MHz. Bytes that come
+/// wait for as long; the tick does not.
 pub const SLICE: u32 = 20_000;
 
 /// Bytes that the scrub reads in a turn.

@@ -4,7 +4,8 @@ use core::num::NonZeroU64;
 
 use actq_link::report;
 
-/// When the tick began and how long it took, in cycles of a timer that counts down from `period` - 1 and makes the tick at its end.
+/// When the tick began and how long it took, in cycles of a timer that counts down from `period` - 1 and makes the tick
+/// at its end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Timing {
     /// Ticks, modulo 2^32.

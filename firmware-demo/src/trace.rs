@@ -3,9 +3,9 @@
 /// The word of a frame that has the program counter.
 const PC: usize = 6;
 
-/// Where the program was, by `words`, those of its stack from the pointer on: the first ones are the frame that the core has stacked, or
-/// it could not, and they tell the innermost call. `half` gives the halfword at an address
-/// of the code; `None` where there is no code.
+/// Where the program was, by `words`, those of its stack from the pointer on: the first ones are the frame that the
+/// core has stacked, or it could not, and they tell the innermost call. `half` gives the halfword at an address of the
+/// code; `None` where there is no code.
 pub fn program_counter(
     mut words: impl Iterator<Item = u32>,
     is_stacked: bool,
@@ -14,10 +14,11 @@ pub fn program_counter(
     if is_stacked { words.nth(PC) } else { innermost_call(words, half) }
 }
 
-/// The address of the call whose return address is the first among `words`, those of a stack from its pointer on. `half` gives the
-/// halfword at an address of the code; `None` where there is no code.
+/// The address of the call whose return address is the first among `words`, those of a stack from its pointer on.
+/// `half` gives the halfword at an address of the code; `None` where there is no code.
 ///
-/// A word counts as a return address where it is odd (a Thumb address) and a call stands before it (Arm DDI 0403E, A7.7.18 and A7.7.19).
+/// A word counts as a return address where it is odd (a Thumb address) and a call stands before it (Arm DDI 0403E,
+/// A7.7.18 and A7.7.19).
 fn innermost_call(mut words: impl Iterator<Item = u32>, half: impl Fn(u32) -> Option<u16>) -> Option<u32> {
     words.find_map(|word| {
         let back = word.checked_sub(1).filter(|back| back % 2 == 0)?;

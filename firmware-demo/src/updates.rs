@@ -10,8 +10,9 @@ use embedded_storage::nor_flash::NorFlash;
 pub struct Updates<F, A: Authority>(Option<Updater<F, A>>);
 
 impl<F: NorFlash, A: Authority> Updates<F, A> {
-    /// For the two halves of `flash`, and the image of them that is `authority`'s, passes `test` and so runs. Without room for two slots,
-    /// and without an authority, there are none. The watchdog is fed before each piece of it ([`Slots::select`]), and given to the test.
+    /// For the two halves of `flash`, and the image of them that is `authority`'s, passes `test` and so runs. Without
+    /// room for two slots, and without an authority, there are none. The watchdog is fed before each piece of it
+    /// ([`Slots::select`]), and given to the test.
     pub fn new<W: Watchdog>(
         flash: F,
         authority: Option<A>,

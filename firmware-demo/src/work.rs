@@ -71,8 +71,8 @@ where
     F: NorFlash,
     A: Authority,
 {
-    /// A turn of the loop: takes what has come, runs one slice of the head, does a piece of an update, and feeds the watchdog where all
-    /// has made progress. Gives the image that an update wants tested.
+    /// A turn of the loop: takes what has come, runs one slice of the head, does a piece of an update, and feeds the
+    /// watchdog where all has made progress. Gives the image that an update wants tested.
     pub fn turn(&mut self, running: &mut Option<Running<'_, '_>>, timing: &Timing) -> Option<Candidate> {
         let micros = self.rates.micros(timing.ticks);
         self.look(running, timing);
@@ -202,7 +202,8 @@ pub(crate) mod tests {
         }
     }
 
-    /// The watchdog is fed, and waits for what takes long, only where all has made progress: not without a control tick.
+    /// The watchdog is fed, and waits for what takes long, only where all has made progress: not without a control
+    /// tick.
     #[test]
     fn without_a_tick_nothing_is_fed_or_erased() {
         let (_, port) = Box::leak(Box::new(Buffers::new())).split(NoUart, || ());

@@ -1,5 +1,5 @@
-//! Marks for the instruction counter (`xtask/insn-count`): it counts what is executed between a call of [`actq_count_begin`] and the
-//! next call of [`actq_count_end`].
+//! Marks for the instruction counter (`xtask/insn-count`): it counts what is executed between a call of
+//! [`actq_count_begin`] and the next call of [`actq_count_end`].
 
 use crate::machine::asm;
 

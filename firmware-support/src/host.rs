@@ -1,4 +1,5 @@
-//! The host that runs QEMU, or a debugger, through semihosting: the command line, standard input and output, the exit status.
+//! The host that runs QEMU, or a debugger, through semihosting: the command line, standard input and output, the exit
+//! status.
 
 use core::fmt;
 
@@ -29,7 +30,8 @@ pub fn arguments() -> String<64> {
     arguments
 }
 
-/// Standard output, as text. Unlike the stream of the semihosting crates it does not try for ever where the host's end is closed.
+/// Standard output, as text. Unlike the stream of the semihosting crates it does not try for ever where the host's end
+/// is closed.
 pub fn stdout() -> Option<File> {
     File::open(c":tt", true)
 }
@@ -39,7 +41,8 @@ pub fn stderr() -> Option<File> {
     File::open_as(c":tt", APPEND)
 }
 
-/// Modes of SYS_OPEN: fopen's "rb", "wb" and "a". The host's terminal ":tt" is standard input, output and error in these.
+/// Modes of SYS_OPEN: fopen's "rb", "wb" and "a". The host's terminal ":tt" is standard input, output and error in
+/// these.
 const READ: usize = 1;
 const WRITE: usize = 5;
 const APPEND: usize = 8;

@@ -6,8 +6,8 @@ use core::mem::MaybeUninit;
 /// Words for a static in a section `.uninit`. After power-on they are anything.
 pub struct Kept<const WORDS: usize>(UnsafeCell<MaybeUninit<[u32; WORDS]>>);
 
-// SAFETY: words are read and written one by one, volatile, on a processor with one core; whoever is interrupted in between by one who
-// writes, too, may see words of both, which is all that is promised.
+// SAFETY: words are read and written one by one, volatile, on a processor with one core; whoever is interrupted in
+// between by one who writes, too, may see words of both, which is all that is promised.
 unsafe impl<const WORDS: usize> Sync for Kept<WORDS> {}
 
 impl<const WORDS: usize> Kept<WORDS> {
@@ -19,8 +19,8 @@ impl<const WORDS: usize> Kept<WORDS> {
 
     /// The words.
     pub fn read(&self) -> [u32; WORDS] {
-        // SAFETY: words of this program's memory, whose bits are words, whatever they are; volatile, because the program has not written
-        // them.
+        // SAFETY: words of this program's memory, whose bits are words, whatever they are; volatile, because the
+        // program has not written them.
         core::array::from_fn(|i| unsafe { self.0.get().cast::<u32>().wrapping_add(i).read_volatile() })
     }
 

@@ -1,5 +1,5 @@
-//! What the firmware binaries share: the processor's crates, the host's files through semihosting, the image slot, the marks between
-//! which instructions are counted, and memory that a reset leaves as it is.
+//! What the firmware binaries share: the processor's crates, the host's files through semihosting, the image slot, the
+//! marks between which instructions are counted, and memory that a reset leaves as it is.
 #![no_std]
 #![cfg(target_os = "none")]
 
@@ -15,7 +15,8 @@ pub mod stack;
 use core::fmt::Write as _;
 use core::panic::PanicInfo;
 
-/// What a panic does in firmware with a host: it ends the run with a failure, and says where. [`panic_to_host`] makes it the handler.
+/// What a panic does in firmware with a host: it ends the run with a failure, and says where. [`panic_to_host`] makes
+/// it the handler.
 pub fn panicked(info: &PanicInfo<'_>) -> ! {
     if let Some(mut err) = host::stderr() {
         let _ = writeln!(err, "{info}");

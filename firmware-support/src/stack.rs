@@ -55,8 +55,8 @@ impl Room {
 
     /// Bytes that were written to, up to the deepest.
     pub fn used(self) -> usize {
-        // SAFETY: memory of the stack, as whoever made this has promised; volatile, for what was written there is none of this
-        // function's.
+        // SAFETY: memory of the stack, as whoever made this has promised; volatile, for what was written there is none
+        // of this function's.
         let painted = |below: &usize| unsafe { self.address(*below).read_volatile() } == PAINT;
         4 * (1..=self.words).rev().find(|below| !painted(below)).unwrap_or(0)
     }

@@ -1,8 +1,9 @@
 //! The link over CAN: the bytes of the stuffed frames, some in each CAN frame.
 //!
-//! Each direction has an identifier of its own, and CAN frames of one identifier stay in order where the controller's mailboxes are
-//! sent as a queue. No byte is spent on segmenting: zeros end the link's frames, and its checksum finds what is lost, doubled or out
-//! of order. A CAN FD frame has one of few lengths; it is filled up with zeros, which are no frames.
+//! Each direction has an identifier of its own, and CAN frames of one identifier stay in order where the controller's
+//! mailboxes are sent as a queue. No byte is spent on segmenting: zeros end the link's frames, and its checksum finds
+//! what is lost, doubled or out of order. A CAN FD frame has one of few lengths; it is filled up with zeros, which are
+//! no frames.
 
 use embedded_can::{Frame, Id};
 
@@ -36,8 +37,8 @@ impl Payload {
     }
 }
 
-/// Bytes of the link as CAN frames, the last of which may be shorter. Frames that `F` cannot hold are left out, and so lost on the
-/// way as any other is.
+/// Bytes of the link as CAN frames, the last of which may be shorter. Frames that `F` cannot hold are left out, and so
+/// lost on the way as any other is.
 pub fn segments<F: Frame>(id: Id, payload: Payload, bytes: &[u8]) -> impl Iterator<Item = F> {
     bytes.chunks(payload.most()).filter_map(move |chunk| {
         let mut field = [0; 64];

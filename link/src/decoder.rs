@@ -4,7 +4,8 @@ use cobs::{DecodeResult, DecoderState};
 
 use crate::frame::{CHECKSUM, CRC, HEADER};
 
-/// Finds frames in a stream of bytes. `N` is the length of the longest frame, before stuffing ([`crate::frame::bytes`]).
+/// Finds frames in a stream of bytes. `N` is the length of the longest frame, before stuffing
+/// ([`crate::frame::bytes`]).
 ///
 /// Whatever came before, the frame behind the next zero is found.
 #[derive(Debug)]
@@ -23,7 +24,8 @@ impl<const N: usize> Decoder<N> {
         Self { stuffing: DecoderState::Idle, frame: [0; N], len: 0 }
     }
 
-    /// Takes a byte. At the end of a frame: its bytes without the checksum, which is right, at least [`HEADER`] of them.
+    /// Takes a byte. At the end of a frame: its bytes without the checksum, which is right, at least [`HEADER`] of
+    /// them.
     pub(crate) fn push(&mut self, byte: u8) -> Option<Result<&[u8], Damaged>> {
         match self.stuffing.feed(byte) {
             Ok(DecodeResult::DataContinue(byte)) => {

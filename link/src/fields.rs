@@ -87,7 +87,8 @@ impl<'b> Writer<'b> {
         self.bytes(&value.to_le_bytes());
     }
 
-    /// Appends the checksum; the number of bytes in the buffer, without the zero that ends a frame. `None` where it is too small.
+    /// Appends the checksum; the number of bytes in the buffer, without the zero that ends a frame. `None` where it is
+    /// too small.
     pub(crate) fn finish(mut self) -> Option<usize> {
         let crc = self.crc.clone().finalize();
         self.push(&crc.to_le_bytes());

@@ -9,7 +9,8 @@
 //! | n | payload of the message, at most [`MAX_PAYLOAD`] |
 //! | 4 | CRC-32 (ISO-HDLC) of all bytes before |
 //!
-//! Little-endian. The frame is stuffed by COBS (Cheshire and Baker, 1999) and ends with a zero, which stands nowhere else.
+//! Little-endian. The frame is stuffed by COBS (Cheshire and Baker, 1999) and ends with a zero, which stands nowhere
+//! else.
 
 use crc::{CRC_32_ISO_HDLC, Crc};
 

@@ -1,9 +1,11 @@
 //! What host and target say to each other. `docs/LINK.md` has the wire format.
 //!
-//! [`Sender`] makes frames of messages, [`Receiver`] finds messages in bytes. Both are pure state machines: they own no port, no
-//! clock and no heap, and carry on after any byte. How bytes travel is for others to say: a UART, a socket, or CAN frames ([`can`]).
+//! [`Sender`] makes frames of messages, [`Receiver`] finds messages in bytes. Both are pure state machines: they own no
+//! port, no clock and no heap, and carry on after any byte. How bytes travel is for others to say: a UART, a socket, or
+//! CAN frames ([`can`]).
 //!
-//! [`pipe`] is another, simpler protocol: a simulator that runs an image as its policy through standard input and output.
+//! [`pipe`] is another, simpler protocol: a simulator that runs an image as its policy through standard input and
+//! output.
 #![no_std]
 #![forbid(unsafe_code)]
 

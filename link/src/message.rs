@@ -43,7 +43,8 @@ pub enum Message<'a> {
         token: u32,
         /// Bytes of the image; whole words.
         length: u32,
-        /// CRC-32 (ISO-HDLC) of all bytes of the image. (Not the one in its header, which leaves out the words before it.)
+        /// CRC-32 (ISO-HDLC) of all bytes of the image. (Not the one in its header, which leaves out the words before
+        /// it.)
         crc: u32,
         /// Version of the image, which must not be lower than one that ran before.
         version: u32,
@@ -165,7 +166,8 @@ impl<'a> Message<'a> {
         }
     }
 
-    /// The message of a kind with this payload; `None` where the kind is unknown, or the payload is not one of that kind.
+    /// The message of a kind with this payload; `None` where the kind is unknown, or the payload is not one of that
+    /// kind.
     pub(crate) fn parse(kind: u8, payload: &'a [u8]) -> Option<Self> {
         let r = &mut Reader(payload);
         let message = match kind {

@@ -20,8 +20,8 @@ pub struct Received<'a> {
 
 /// Finds messages in bytes. `N` is the length of the longest frame before stuffing ([`frame::bytes`] of a payload).
 ///
-/// A message is given only of a frame that is whole, undamaged, of this version, well-formed and new. All others are counted, and
-/// change nothing else.
+/// A message is given only of a frame that is whole, undamaged, of this version, well-formed and new. All others are
+/// counted, and change nothing else.
 #[derive(Debug)]
 pub struct Receiver<const N: usize> {
     decoder: Decoder<N>,
@@ -63,8 +63,8 @@ impl<const N: usize> Receiver<N> {
         }
     }
 
-    /// Takes the next good frame with whatever sequence number it has: the other end may have started anew. To be called where
-    /// nothing good has come for long, and where nothing moves.
+    /// Takes the next good frame with whatever sequence number it has: the other end may have started anew. To be
+    /// called where nothing good has come for long, and where nothing moves.
     pub fn reopen(&mut self) {
         self.window = Window::open();
     }

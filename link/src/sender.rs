@@ -21,8 +21,8 @@ impl Sender {
         self.next
     }
 
-    /// Writes a frame at the time `micros` into `buffer`, and gives its bytes with the zero at the end. `None` where the buffer is
-    /// too small ([`crate::frame::wire_bytes`]); no number is used up then.
+    /// Writes a frame at the time `micros` into `buffer`, and gives its bytes with the zero at the end. `None` where
+    /// the buffer is too small ([`crate::frame::wire_bytes`]); no number is used up then.
     pub fn frame<'b>(&mut self, message: &Message<'_>, micros: u32, buffer: &'b mut [u8]) -> Option<&'b [u8]> {
         let mut w = Writer::new(buffer);
         w.u8(VERSION);

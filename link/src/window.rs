@@ -12,7 +12,8 @@ pub(crate) enum Order {
     Repeated,
 }
 
-/// The last sequence number that was let through. Numbers wrap; half of them count as new (RFC 1982): at 1 kHz those of 24 days.
+/// The last sequence number that was let through. Numbers wrap; half of them count as new (RFC 1982): at 1 kHz those of
+/// 24 days.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Window {
     last: Option<u32>,

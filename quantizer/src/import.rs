@@ -1,5 +1,5 @@
-//! Policies from files. An importer adds nodes to a [`crate::graph::Graph`], which checks that they fit, and fills in the rest of
-//! a [`crate::policy::Policy`]; how its format names values is its own affair.
+//! Policies from files. An importer adds nodes to a [`crate::graph::Graph`], which checks that they fit, and fills in
+//! the rest of a [`crate::policy::Policy`]; how its format names values is its own affair.
 
 mod contract;
 mod denoising;

@@ -135,7 +135,8 @@ fn example() -> Result<PathBuf> {
     let new = path.with_extension(format!("{}.tmp", std::process::id()));
     println!("Quantizing the UR3 policy to 3 bits, rounded; --image takes another image");
     let mut build = cargo();
-    // With actq-bench, for the features that tests and measurements are built with: else the quantizer would be built once more.
+    // With actq-bench, for the features that tests and measurements are built with: else the quantizer would be built
+    // once more.
     build.current_dir(root()).args(["build", "--quiet", "--profile", "host", "--bin", "actq"]);
     let built =
         build.args(["--package", "actq", "--package", "actq-bench"]).status().context("cargo cannot be started")?;

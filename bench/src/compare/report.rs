@@ -55,7 +55,8 @@ pub(super) fn sentence(cell: &Cell) -> String {
     if parts.is_empty() { "not driven".to_owned() } else { parts.join(", ") }
 }
 
-/// What the plan asked for, in its order.
+/// What the plan asked for: policies and methods in its order, budgets from few bits to many, in whatever order they
+/// ran.
 struct Asked {
     policies: Vec<String>,
     methods: Vec<Contender>,
@@ -65,10 +66,12 @@ struct Asked {
 impl Asked {
     fn of(header: &Header) -> Result<Self> {
         let read = |key: &str| header.options[key].clone();
+        let mut budgets: Vec<f64> = serde_json::from_value(read("budgets"))?;
+        budgets.sort_by(f64::total_cmp);
         Ok(Self {
             policies: serde_json::from_value(read("policies"))?,
             methods: serde_json::from_value(read("methods"))?,
-            budgets: serde_json::from_value(read("budgets"))?,
+            budgets,
         })
     }
 }

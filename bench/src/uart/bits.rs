@@ -18,8 +18,8 @@ fn bits(action: &[f32]) -> Vec<u32> {
     action.iter().map(|value| value.to_bits()).collect()
 }
 
-/// How many of the board's actions, in their order, no head of these images gives on their observations: going on from the action before,
-/// from a reset, or as the first one of the next image. And how often a head began anew.
+/// How many of the board's actions, in their order, no head of these images gives on their observations: going on from
+/// the action before, from a reset, or as the first one of the next image. And how often a head began anew.
 pub fn foreign(said: &[Said], shown: &HashMap<u32, Vec<f32>>, images: &[Image<'_>]) -> Result<(usize, usize)> {
     let mut memory: Vec<Vec<u32>> = images.iter().map(|image| vec![0; image.scratch_words()]).collect();
     let mut heads = images

@@ -41,8 +41,8 @@ pub struct Tally {
     pub corrupted: u32,
 }
 
-/// A line with faults. Both its ends are in this process: [`Line::host_end`] is the port of a host, the board's end is a port that the
-/// line was given.
+/// A line with faults. Both its ends are in this process: [`Line::host_end`] is the port of a host, the board's end is
+/// a port that the line was given.
 #[derive(Clone)]
 pub struct Line(Arc<Mutex<Wires>>);
 

@@ -25,14 +25,15 @@ use crate::controller::{Controller, PATIENCE};
 /// Ticks in which an output goes from one limit to the other, as in the application at 1 kHz.
 const WAY: f32 = 100.0;
 
-/// Age above which an observation is refused, µs. The build's 500 ms are as long as the deadline: nothing would be seen of it.
+/// Age above which an observation is refused, µs. The build's 500 ms are as long as the deadline: nothing would be seen
+/// of it.
 const MAX_AGE: f32 = 200_000.0;
 
 /// Ticks between two reports: what is known of the controller's time.
 const REPORTS: f32 = 5.0;
 
-/// Ticks after which an observation's action is not waited for any longer. A control step takes 20; but on a busy machine QEMU's serial
-/// port is slower than a real one, and the arm's time then waits for it.
+/// Ticks after which an observation's action is not waited for any longer. A control step takes 20; but on a busy
+/// machine QEMU's serial port is slower than a real one, and the arm's time then waits for it.
 const ANSWER: u64 = 60;
 
 /// What a reset forgets.
@@ -41,8 +42,8 @@ fn set_up(client: &mut Client) -> Result<()> {
     client.set(Parameter::MaxAge, 0, MAX_AGE)
 }
 
-/// How soon the controller has stopped by itself, in ms of its own clock: from the last good frame to the safe action. The true time is
-/// within; what is known of either moment is between which two reports it was.
+/// How soon the controller has stopped by itself, in ms of its own clock: from the last good frame to the safe action.
+/// The true time is within; what is known of either moment is between which two reports it was.
 #[derive(Clone, Copy, Debug)]
 pub struct Reaction {
     /// Why.
@@ -134,7 +135,8 @@ impl Rig {
         (&self.said, &self.shown)
     }
 
-    /// Begins an episode: the controller is armed anew. The arm stands still until then. `exact`: its time is to be known to a tick.
+    /// Begins an episode: the controller is armed anew. The arm stands still until then. `exact`: its time is to be
+    /// known to a tick.
     pub(crate) fn begin(&mut self, seed: u64, exact: bool) -> Result<()> {
         self.client.disarm()?;
         while self.status.state != State::Disarmed {
@@ -223,7 +225,8 @@ impl Rig {
         self.arm.state = status.state;
     }
 
-    /// What the host does: sets what a reset has lost, and arms where it reads that the controller could be, and is not.
+    /// What the host does: sets what a reset has lost, and arms where it reads that the controller could be, and is
+    /// not.
     fn supervise(&mut self) -> Result<()> {
         let Some(status) = self.read.take() else { return Ok(()) };
         if status.ticks < self.read_ticks {

@@ -14,16 +14,17 @@ use super::rig::{Progress, Reaction, Rig};
 const BEGIN: usize = 20;
 /// How long a cut lasts, ms: longer than the controller's deadline of 500.
 const CUT: u64 = 800;
-/// How long the host's driver stalls, ms: shorter than the deadline, but what it then sends is in part older than an observation may be;
-/// and longer than the deadline.
+/// How long the host's driver stalls, ms: shorter than the deadline, but what it then sends is in part older than an
+/// observation may be; and longer than the deadline.
 const STALLS: [u64; 2] = [280, 1200];
-/// Bytes of an image that are sent while the arm moves, and of them in a frame: QEMU's serial port is slow. What comes before them is sent
-/// before the arm moves.
+/// Bytes of an image that are sent while the arm moves, and of them in a frame: QEMU's serial port is slow. What comes
+/// before them is sent before the arm moves.
 const IN_FLIGHT: usize = 8 << 10;
 const CHUNK: usize = 128;
 /// The controller's deadline, ms.
 const DEADLINE: u32 = 500;
-/// What is not known of the time between two events, ms: each report comes in the tick behind the event, or behind a slice of the head.
+/// What is not known of the time between two events, ms: each report comes in the tick behind the event, or behind a
+/// slice of the head.
 const RESOLUTION: u32 = 4;
 /// Share of the frames that meet a fault of one kind: "1 in 10".
 const SHARE: f64 = 0.1;
@@ -101,8 +102,8 @@ impl fmt::Display for Trouble<'_> {
 pub struct Run {
     /// How it ended.
     pub outcome: Outcome,
-    /// Whether the arm did what it could: reached both goals, or, where something has held it up on the way to the first one, the second
-    /// one.
+    /// Whether the arm did what it could: reached both goals, or, where something has held it up on the way to the
+    /// first one, the second one.
     pub reached: bool,
     /// Whether the controller was armed at the end.
     pub armed: bool,

@@ -1,4 +1,5 @@
-//! The BBC micro:bit: a Cortex-M0 (nRF51822) with 256 KB of flash and 16 KB of RAM. Of the golden cases it runs those that fit.
+//! The BBC micro:bit: a Cortex-M0 (nRF51822) with 256 KB of flash and 16 KB of RAM. Of the golden cases it runs those
+//! that fit.
 
 use crate::table::{Board, Transport};
 

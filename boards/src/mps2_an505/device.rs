@@ -1,5 +1,5 @@
-//! The registers of AN505 (Arm DAI 0505B, section 3) in the secure state, whose addresses have bit 28 set: UART 0, the secure watchdog,
-//! no power stage.
+//! The registers of AN505 (Arm DAI 0505B, section 3) in the secure state, whose addresses have bit 28 set: UART 0, the
+//! secure watchdog, no power stage.
 
 use core::cell::Cell;
 use core::ops::Range;

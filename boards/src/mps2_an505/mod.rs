@@ -1,4 +1,5 @@
-//! Arm's MPS2 with image AN505: a Cortex-M33 with FPU, DSP extension and TrustZone, of which all runs in the secure state.
+//! Arm's MPS2 with image AN505: a Cortex-M33 with FPU, DSP extension and TrustZone, of which all runs in the secure
+//! state.
 
 #[cfg(all(target_os = "none", feature = "mps2-an505"))]
 pub mod device;

@@ -1,10 +1,12 @@
-//! The flash of an STM32F405, erased and programmed (RM0090, section 3.6): in which order its controller is told what, what has to hold
-//! before, and its errors by name. The registers are behind [`Part`], so that all of it runs on the host, too, on a [`Model`].
+//! The flash of an STM32F405, erased and programmed (RM0090, section 3.6): in which order its controller is told what,
+//! what has to hold before, and its errors by name. The registers are behind [`Part`], so that all of it runs on the
+//! host, too, on a [`Model`].
 //!
-//! The part has one bank: while a sector is erased, for up to 2 s, or a word is programmed, up to 0.1 ms, the processor stands still as
-//! soon as it fetches an instruction or reads from flash, its interrupts with it. So nothing begins unless the power stage is off by its
-//! register, and no sector is erased but with a watchdog that waits for as long as the data sheet gives it, and is fed behind that only
-//! where it took no longer. Where the controller itself does not come to an end, that watchdog does.
+//! The part has one bank: while a sector is erased, for up to 2 s, or a word is programmed, up to 0.1 ms, the processor
+//! stands still as soon as it fetches an instruction or reads from flash, its interrupts with it. So nothing begins
+//! unless the power stage is off by its register, and no sector is erased but with a watchdog that waits for as long as
+//! the data sheet gives it, and is fed behind that only where it took no longer. Where the controller itself does not
+//! come to an end, that watchdog does.
 
 #[cfg(not(target_os = "none"))]
 mod model;
@@ -33,7 +35,8 @@ pub const fn sector(number: u32) -> Range<u32> {
     }
 }
 
-/// Milliseconds that the erase of a sector takes at most, in words (data sheet DS8626, characteristics of the flash, x32).
+/// Milliseconds that the erase of a sector takes at most, in words (data sheet DS8626, characteristics of the flash,
+/// x32).
 pub const fn longest_erase(number: u32) -> u16 {
     match number {
         0..=3 => 500,
@@ -77,7 +80,8 @@ const DCEN: u32 = 1 << 10;
 const ICRST: u32 = 1 << 11;
 const DCRST: u32 = 1 << 12;
 
-/// Reads of BSY until a word, or a sector, counts as not done. A turn takes 4 cycles at least: above 0.1 ms and 2 s at 168 MHz.
+/// Reads of BSY until a word, or a sector, counts as not done. A turn takes 4 cycles at least: above 0.1 ms and 2 s at
+/// 168 MHz.
 const PROGRAMMED: u32 = 17_000;
 const ERASED: u32 = 84_000_000;
 
@@ -101,8 +105,9 @@ pub trait Part {
     /// Whether the supply has the voltage that words need.
     fn is_supplied(&self) -> bool;
 
-    /// Does `work` while the watchdog waits for so many milliseconds, and gives it its own time again. `None` where it does not take that
-    /// time, with nothing done. Where the work has taken longer, nothing feeds the watchdog any more, and it resets the board.
+    /// Does `work` while the watchdog waits for so many milliseconds, and gives it its own time again. `None` where it
+    /// does not take that time, with nothing done. Where the work has taken longer, nothing feeds the watchdog any
+    /// more, and it resets the board.
     fn patiently<R>(&mut self, milliseconds: u16, work: impl FnOnce(&mut Self) -> R) -> Option<R>;
 }
 
@@ -267,7 +272,8 @@ fn ended(part: &impl Part, turns: u32) -> Result<(), FlashError> {
     }
 }
 
-/// Forgets what the caches have (section 3.6.3), which must be off for it. Programming changes what they have together with the flash.
+/// Forgets what the caches have (section 3.6.3), which must be off for it. Programming changes what they have together
+/// with the flash.
 fn flush(part: &mut impl Part) {
     let access = part.read(Register::Access);
     let off = access & !(ICEN | DCEN);
@@ -313,8 +319,8 @@ impl<P: Part> NorFlash for Flash<P> {
         (first..=last).try_for_each(|number| self.erase_sector(number))
     }
 
-    /// Nothing tells from an erased word one that was programmed with ones; every other word is programmed once. (The part itself would
-    /// take ones away a second time, without an error.)
+    /// Nothing tells from an erased word one that was programmed with ones; every other word is programmed once. (The
+    /// part itself would take ones away a second time, without an error.)
     fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
         let (words, []) = bytes.as_chunks() else { return Err(FlashError::Alignment) };
         if !offset.is_multiple_of(4) {
@@ -498,7 +504,8 @@ mod tests {
         assert_eq!(told(&[PG | WORDS], 12), (0, true));
     }
 
-    /// Wherever the supply fails in the course of a request, nothing outside of it has changed, and it can be done again.
+    /// Wherever the supply fails in the course of a request, nothing outside of it has changed, and it can be done
+    /// again.
     #[test]
     fn a_request_that_was_cut_short_can_be_done_again() {
         let (slot, other) = (8 * LARGE - LARGE, 6 * LARGE);

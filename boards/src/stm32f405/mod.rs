@@ -1,5 +1,5 @@
-//! The STM32F405 of ODrive v3, VESC and Crazyflie: a Cortex-M4 with FPU at 168 MHz. QEMU's netduinoplus2 has this part, with its USARTs
-//! and without its clocks, PWM, watchdog, DMA and flash controller.
+//! The STM32F405 of ODrive v3, VESC and Crazyflie: a Cortex-M4 with FPU at 168 MHz. QEMU's netduinoplus2 has this part,
+//! with its USARTs and without its clocks, PWM, watchdog, DMA and flash controller.
 
 pub mod flash;
 pub mod patience;

@@ -1,5 +1,6 @@
-//! How long the independent watchdog waits (RM0090, section 21): its ticks are those of an oscillator of its own, divided by 32. That has
-//! 32 kHz, in truth 17 to 47 (data sheet DS8626), so that a tick is a millisecond, or 0.68 to 1.9.
+//! How long the independent watchdog waits (RM0090, section 21): its ticks are those of an oscillator of its own,
+//! divided by 32. That has 32 kHz, in truth 17 to 47 (data sheet DS8626), so that a tick is a millisecond, or 0.68 to
+//! 1.9.
 
 /// The oscillator's fastest, in kHz.
 const FASTEST: u32 = 47;

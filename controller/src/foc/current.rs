@@ -4,7 +4,8 @@ use super::pi::Pi;
 use super::pwm::duties;
 use super::transform::{Angle, Rotor, Stator};
 
-/// 1 / sqrt(3), less what rounding may add: the largest voltage that space-vector modulation reaches, as a share of the supply.
+/// 1 / sqrt(3), less what rounding may add: the largest voltage that space-vector modulation reaches, as a share of the
+/// supply.
 const REACH: f32 = 0.577_35;
 
 /// Gains of both axes.
@@ -17,8 +18,8 @@ pub struct Gains {
 }
 
 impl Gains {
-    /// The gains that cancel the winding's pole and leave a first-order response of `bandwidth` rad/s, for a resistance in ohm,
-    /// an inductance in henry and a tick in seconds.
+    /// The gains that cancel the winding's pole and leave a first-order response of `bandwidth` rad/s, for a resistance
+    /// in ohm, an inductance in henry and a tick in seconds.
     pub fn for_motor(resistance: f32, inductance: f32, bandwidth: f32, tick: f32) -> Self {
         Self { proportional: bandwidth * inductance, integral: bandwidth * resistance * tick }
     }
@@ -65,11 +66,11 @@ impl CurrentLoop {
         *self = Self::new(self.gains);
     }
 
-    /// One tick towards `target`. The voltage stays within what the supply reaches; where it is not enough for both axes, d comes
-    /// first, so that the flux is kept.
+    /// One tick towards `target`. The voltage stays within what the supply reaches; where it is not enough for both
+    /// axes, d comes first, so that the flux is kept.
     ///
-    /// `None`, and nothing changes, where a value is not finite or the supply not above 0: the sensor is broken, and the firmware has
-    /// to switch off.
+    /// `None`, and nothing changes, where a value is not finite or the supply not above 0: the sensor is broken, and
+    /// the firmware has to switch off.
     pub fn step(&mut self, measured: &Measured, target: Rotor) -> Option<Tick> {
         let Measured { phases, angle, supply } = *measured;
         let [a, b, c] = phases;

@@ -31,8 +31,8 @@ impl Key {
         PublicKey::try_from(bytes).map(Self).map_err(|_| BadKey)
     }
 
-    /// The bytes of 64 hexadecimal digits; `None` where the text is something else. For constants, so that a build with another text
-    /// fails.
+    /// The bytes of 64 hexadecimal digits; `None` where the text is something else. For constants, so that a build with
+    /// another text fails.
     pub const fn parse(text: &str) -> Option<[u8; 32]> {
         let (pairs, rest) = text.as_bytes().as_chunks();
         if pairs.len() != 32 || !rest.is_empty() {

@@ -1,7 +1,7 @@
 //! The marks behind a record: what became of the image.
 //!
-//! A mark is one unit of writing (4 bytes at least), programmed once, in the first one that is erased. One that was cut short is none
-//! of the codes: they have as many ones as each other, and programming only takes ones away.
+//! A mark is one unit of writing (4 bytes at least), programmed once, in the first one that is erased. One that was cut
+//! short is none of the codes: they have as many ones as each other, and programming only takes ones away.
 
 use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 

@@ -1,7 +1,7 @@
 //! What a slot's first bytes say about its image.
 //!
-//! Little-endian words: magic, format, length, CRC-32 of the image, version, generation, whether a signature follows, the signature
-//! (64 bytes), zeros, and the CRC-32 (ISO-HDLC) of all before it.
+//! Little-endian words: magic, format, length, CRC-32 of the image, version, generation, whether a signature follows,
+//! the signature (64 bytes), zeros, and the CRC-32 (ISO-HDLC) of all before it.
 
 use actq_link::frame::CRC;
 

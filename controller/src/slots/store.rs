@@ -8,7 +8,8 @@ use super::marks::{Mark, Marks};
 use super::readback::{Found, Readback};
 use super::record::{BYTES, Record};
 
-/// Trials of an image that is not confirmed, before it is taken for one that ends the program. A loss of power ends one, too.
+/// Trials of an image that is not confirmed, before it is taken for one that ends the program. A loss of power ends
+/// one, too.
 pub const TRIALS: u32 = 3;
 
 /// Two slots in a flash.
@@ -49,8 +50,9 @@ impl<F: NorFlash, A: Authority> Slots<F, A> {
     }
 
     /// The image to run: whole, signed as it must be, not rejected, the newest such. To be tested then, and
-    /// [confirmed](Self::confirm) or [rejected](Self::reject), after which this gives another one or none. Reads one image or both, and
-    /// tells `progress` before each block of them, and so before the check of a signature, which comes with the last one.
+    /// [confirmed](Self::confirm) or [rejected](Self::reject), after which this gives another one or none. Reads one
+    /// image or both, and tells `progress` before each block of them, and so before the check of a signature, which
+    /// comes with the last one.
     pub fn select(&mut self, mut progress: impl FnMut()) -> Option<Candidate> {
         let generation = |record: Option<Record>| record.map(|record| record.generation);
         let newest = match generation(self.record(Slot::B)) > generation(self.record(Slot::A)) {
@@ -80,8 +82,8 @@ impl<F: NorFlash, A: Authority> Slots<F, A> {
         marks.confirmed || marks.write(&mut self.flash, Mark::Confirmed)
     }
 
-    /// The image in a slot has failed its test. One that has never passed it is not tried again; one that has, not before the next
-    /// start.
+    /// The image in a slot has failed its test. One that has never passed it is not tried again; one that has, not
+    /// before the next start.
     pub fn reject(&mut self, slot: Slot) {
         if let Some(refused) = self.refused.get_mut(slot as usize) {
             *refused = true;

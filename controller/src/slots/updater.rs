@@ -133,7 +133,8 @@ impl<F: NorFlash, A: Authority> Updater<F, A> {
         Work::Test(Candidate { slot, address, length, crc, version, trial: true })
     }
 
-    /// Takes the outcome of the test; whether the image is confirmed, and so the one that runs. Else the one before has to run on.
+    /// Takes the outcome of the test; whether the image is confirmed, and so the one that runs. Else the one before has
+    /// to run on.
     pub fn tested(&mut self, outcome: Result<(), Refusal>) -> bool {
         let Phase::Testing { plan, slot } = self.phase else { return false };
         let outcome = match outcome {

@@ -227,7 +227,8 @@ fn a_request_of_an_old_state_and_an_update_that_cannot_be_are_refused() {
     assert_eq!(bench.ask(&Message::Commit { signature: None }), Err(Refusal::Armed));
 }
 
-/// Where flash and outputs do not go together, no request gets to the update unless disarmed: what writes would hold up the tick.
+/// Where flash and outputs do not go together, no request gets to the update unless disarmed: what writes would hold up
+/// the tick.
 #[test]
 fn an_update_that_would_hold_up_the_tick_waits_until_disarmed() {
     let requests = |token| {
@@ -259,8 +260,8 @@ fn an_update_that_would_hold_up_the_tick_waits_until_disarmed() {
     }
 }
 
-/// A disarm and what comes behind it may come in one read, with the power stage still on, which an STM32F405's driver takes for an error:
-/// the update waits for the tick, and goes on.
+/// A disarm and what comes behind it may come in one read, with the power stage still on, which an STM32F405's driver
+/// takes for an error: the update waits for the tick, and goes on.
 #[test]
 fn an_update_goes_on_behind_a_disarm_in_the_same_read() {
     let begin = (1 << 20) - 2 * LARGE;
@@ -338,8 +339,8 @@ fn frame_of(kind: u8, sequence: u32, payload: &[u8]) -> Vec<u8> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(5000))]
 
-    /// Whatever comes, well-made or not, by whoever does not know the token: but for a disarm, and observations that are good, the
-    /// controller is as it was.
+    /// Whatever comes, well-made or not, by whoever does not know the token: but for a disarm, and observations that
+    /// are good, the controller is as it was.
     #[test]
     fn frames_of_any_content_change_nothing_but_counters(
         armed: bool, kind in prop_oneof![0..12u8, 126..136u8, any::<u8>()],

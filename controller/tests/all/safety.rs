@@ -152,7 +152,8 @@ proptest! {
     }
 }
 
-/// For every deadline, whatever the last observation's tick: the output moves up to the deadline, and not at the tick behind it.
+/// For every deadline, whatever the last observation's tick: the output moves up to the deadline, and not at the tick
+/// behind it.
 #[test]
 fn a_cut_cable_leads_to_the_safe_action_at_the_deadline_and_one_tick() {
     for deadline in 1..50 {

@@ -66,7 +66,8 @@ fn what_is_refused_says_why_and_changes_nothing() {
     assert!(error.contains(&Refusal::Armed.to_string()) || error.contains(&Refusal::Token.to_string()), "{error}");
 }
 
-/// A controller that was armed in the course of an update is busy, not out of order, until a tick has switched its outputs off.
+/// A controller that was armed in the course of an update is busy, not out of order, until a tick has switched its
+/// outputs off.
 #[test]
 fn a_push_goes_on_behind_a_disarm() {
     let controller = Simulated::start(0, || Anyone);

@@ -1,5 +1,6 @@
-//! What holds the application up, in pieces between which the watchdog is fed: the check of an image that came over the link, the start that
-//! reads two slots, an image's own check, the slices of its self-test. Each is a counted region, whose name is printed.
+//! What holds the application up, in pieces between which the watchdog is fed: the check of an image that came over the
+//! link, the start that reads two slots, an image's own check, the slices of its self-test. Each is a counted region,
+//! whose name is printed.
 //!
 //! The image is the one in the slot; standard input gives a public key, and the signature of the image with version 1.
 #![cfg_attr(target_os = "none", no_std, no_main)]

@@ -1,4 +1,5 @@
-//! The application on its boards under QEMU, at the other end of its link: it starts, refuses, acts, is updated, is reset, and tells why.
+//! The application on its boards under QEMU, at the other end of its link: it starts, refuses, acts, is updated, is
+//! reset, and tells why.
 
 use std::fs;
 use std::io::Write as _;
@@ -130,8 +131,8 @@ fn package(image: &[u8]) -> Package<'_> {
     Package { image, version: 1, signature: None }
 }
 
-/// At 8 kHz, with a head of 330 thousand weights below: no tick is lost, and none begins later or takes longer than a tenth of a
-/// period. An instruction takes QEMU 32 ns. Twenty steps play chunks of several evaluations.
+/// At 8 kHz, with a head of 330 thousand weights below: no tick is lost, and none begins later or takes longer than a
+/// tenth of a period. An instruction takes QEMU 32 ns. Twenty steps play chunks of several evaluations.
 #[test]
 fn a_head_below_leaves_the_tick_alone() -> Result<()> {
     let buffer = ImageBuffer::read(built_in()?)?;
@@ -149,8 +150,9 @@ fn a_head_below_leaves_the_tick_alone() -> Result<()> {
     Ok(())
 }
 
-/// The tick drives a simulated motor by the current loop, with the same head below: no tick is lost. The current loop's 3,400 instructions
-/// and the longest lock below it are more than fits into a tick of 8 kHz where an instruction takes 32 ns; there it takes 16 ns.
+/// The tick drives a simulated motor by the current loop, with the same head below: no tick is lost. The current loop's
+/// 3,400 instructions and the longest lock below it are more than fits into a tick of 8 kHz where an instruction takes
+/// 32 ns; there it takes 16 ns.
 #[test]
 fn a_current_loop_in_the_tick_leaves_room_for_the_head() -> Result<()> {
     let buffer = ImageBuffer::read(built_in()?)?;
@@ -203,8 +205,8 @@ fn an_image_that_may_not_run_is_refused_with_its_reason() -> Result<()> {
     Ok(())
 }
 
-/// What hides its progress is reset: the link's, the head's, the output's. The loop goes on, so what the watchdog interrupts is
-/// somewhere in it.
+/// What hides its progress is reset: the link's, the head's, the output's. The loop goes on, so what the watchdog
+/// interrupts is somewhere in it.
 #[test]
 fn the_watchdog_resets_what_makes_no_progress() -> Result<()> {
     for (target, hidden) in WHOLE.into_iter().zip([1, 2, 4]) {
@@ -244,7 +246,8 @@ fn a_hard_fault_leaves_its_address() -> Result<()> {
     Ok(())
 }
 
-/// A stack that has grown to its end is found out before it writes over a variable; where the program was, as far as its stack tells.
+/// A stack that has grown to its end is found out before it writes over a variable; where the program was, as far as
+/// its stack tells.
 #[test]
 fn a_stack_that_overflows_leaves_where_it_was() -> Result<()> {
     for target in BOARDS {
@@ -264,8 +267,8 @@ fn a_stack_that_overflows_leaves_where_it_was() -> Result<()> {
     Ok(())
 }
 
-/// Whatever is called and whatever interrupts it, the stack has room; and no frame leaps over the guard, 4 KB, of the boards that have no
-/// limit of the stack. `cargo xtask budgets` holds what was measured below.
+/// Whatever is called and whatever interrupts it, the stack has room; and no frame leaps over the guard, 4 KB, of the
+/// boards that have no limit of the stack. `cargo xtask budgets` holds what was measured below.
 #[test]
 fn the_stack_has_room_for_the_deepest_calls_and_interrupts() -> Result<()> {
     let foc = [Target::Fpu, Target::M33].map(|target| (target, "foc"));
@@ -355,7 +358,8 @@ fn a_key_that_is_none_does_not_build() {
     assert!(format!("{told:#}").contains("ACTQ_PUBLIC_KEY is not an Ed25519 public key"), "{told:#}");
 }
 
-/// The application is updated while it runs; what fails its self-test is refused, and the one before runs on, over a reset, too.
+/// The application is updated while it runs; what fails its self-test is refused, and the one before runs on, over a
+/// reset, too.
 #[test]
 fn an_image_comes_over_the_link_and_one_that_fails_is_rolled_back() -> Result<()> {
     let new = ImageBuffer::new(&small()?);

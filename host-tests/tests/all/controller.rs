@@ -1,4 +1,5 @@
-//! A whole controller with a real image: what the firmware does, in a thread behind a socket, and the command `actq` at the other end.
+//! A whole controller with a real image: what the firmware does, in a thread behind a socket, and the command `actq` at
+//! the other end.
 
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::net::TcpListener;

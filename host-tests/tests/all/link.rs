@@ -1,5 +1,5 @@
-//! `actq link` at the application in QEMU, through the socket of its serial port: what no other test types, and what it says where
-//! something is wrong with the line.
+//! `actq link` at the application in QEMU, through the socket of its serial port: what no other test types, and what it
+//! says where something is wrong with the line.
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpListener;

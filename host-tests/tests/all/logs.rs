@@ -1,6 +1,7 @@
 //! What the application logs at its start, by defmt over semihosting in QEMU.
 //!
-//! The frames are decoded here by the crates below defmt-decoder, whose own tree takes longer to build than all of these tests may.
+//! The frames are decoded here by the crates below defmt-decoder, whose own tree takes longer to build than all of
+//! these tests may.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -16,7 +17,8 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 use defmt_parser::{DisplayHint, Fragment, ParserMode, Type};
 use object::{Object as _, ObjectSection as _, ObjectSymbol as _};
 
-/// The format strings of an ELF file by their index: the names of symbols in a section of their own (defmt's book, Interning).
+/// The format strings of an ELF file by their index: the names of symbols in a section of their own (defmt's book,
+/// Interning).
 fn formats(elf: &Path) -> Result<BTreeMap<u16, String>> {
     let data = fs::read(elf)?;
     let file = object::File::parse(&*data)?;

@@ -48,8 +48,8 @@ fn the_watchdog_waits_for_each_piece_of_a_start_and_of_a_check() -> Result<()> {
         // Where a signature is checked, by the update and by the start, it takes most.
         assert!(!["long", "start"].contains(&piece) || instructions > 2_000_000, "{piece}: {instructions}");
         if piece == "slice" {
-            // However long a self-test is, this is between two times that the watchdog is fed; and the longest that an image may need,
-            // at the cycles of these instructions, is within a turn of the loop, too.
+            // However long a self-test is, this is between two times that the watchdog is fed; and the longest that an
+            // image may need, at the cycles of these instructions, is within a turn of the loop, too.
             assert!((SLICE / 2..=SLICE).contains(&(instructions as u32)), "{instructions}");
             let most = u64::from(LONGEST) * cycles / instructions / SLOWEST;
             assert!(most < patience::milliseconds(PATIENCE.turn).into(), "{most} ms");
@@ -71,7 +71,8 @@ impl Watchdog for Feeds {
     }
 }
 
-/// An image of one product with a wide row, which is the longest piece: it runs up to the rule's length, in pieces, and not beyond.
+/// An image of one product with a wide row, which is the longest piece: it runs up to the rule's length, in pieces, and
+/// not beyond.
 #[test]
 fn an_image_whose_longest_piece_is_too_long_does_not_run() -> Result<()> {
     for (cols, outcome) in [(2_000, Ok(())), (24_000, Err(Refusal::Unfit))] {

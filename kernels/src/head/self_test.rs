@@ -10,13 +10,15 @@ impl Head<'_, '_> {
     ///
     /// # Errors
     ///
-    /// [`StepError::SelfTest`] with the first step whose bits differ; [`StepError::Damaged`] and [`StepError::NotFinite`] as of a step.
+    /// [`StepError::SelfTest`] with the first step whose bits differ; [`StepError::Damaged`] and
+    /// [`StepError::NotFinite`] as of a step.
     pub fn self_test(&mut self) -> Result<(), StepError> {
         self.play_self_test(Self::finish)
     }
 
-    /// As [`Self::self_test`], in pieces of at most `budget` modelled instructions as of [`Self::poll`], or of [`Self::least_budget`]
-    /// where that is more. `before` is told of each piece, so that a watchdog can be fed however long all of it takes.
+    /// As [`Self::self_test`], in pieces of at most `budget` modelled instructions as of [`Self::poll`], or of
+    /// [`Self::least_budget`] where that is more. `before` is told of each piece, so that a watchdog can be fed however
+    /// long all of it takes.
     ///
     /// # Errors
     ///

@@ -17,8 +17,8 @@ pub enum OpKind {
     /// `dst = clamp((clamp(src, ±pre_clip) - mean) * scale, ±clip)`. Constants: `pre_clip`, `clip`, infinite where
     /// there is no limit; arrays: `mean`, `scale`, the reciprocals of the standard deviation.
     Normalize {
-        /// Whether the quantizer added it, for the sake of the matrices that read it: then its constants count among their
-        /// bytes. Nothing else depends on it.
+        /// Whether the quantizer added it, for the sake of the matrices that read it: then its constants count among
+        /// their bytes. Nothing else depends on it.
         added: bool,
     },
     /// `dst = W src + b`

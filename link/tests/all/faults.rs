@@ -6,7 +6,8 @@ use actq_link::{Floats, Message, Receiver, Sender, frame};
 
 use super::random::Random;
 
-/// Values of an observation: their bits are the frame's number and what follows from it, so that each tells whether it is right.
+/// Values of an observation: their bits are the frame's number and what follows from it, so that each tells whether it
+/// is right.
 const VALUES: usize = 12;
 
 fn observation(number: u32) -> [f32; VALUES] {
@@ -122,8 +123,8 @@ impl Line {
     }
 }
 
-/// A million frames, of which 30 in 100 meet a fault: every message is one that was sent, whole, with its own number, and newer
-/// than the one before.
+/// A million frames, of which 30 in 100 meet a fault: every message is one that was sent, whole, with its own number,
+/// and newer than the one before.
 #[test]
 fn no_message_of_a_bad_frame_in_a_million_frames_at_30_in_100_faults() {
     const FRAMES: u32 = 1_000_000;
@@ -154,7 +155,8 @@ fn no_message_of_a_bad_frame_in_a_million_frames_at_30_in_100_faults() {
     assert_eq!(counters.good, messages);
     assert_eq!(counters.malformed, 0);
     assert!(counters.damaged > FRAMES / 10 && counters.repeated > FRAMES / 50);
-    // A frame that is whole is lost only where the end of a damaged one before it is missing, or a held one has passed it.
+    // A frame that is whole is lost only where the end of a damaged one before it is missing, or a held one has passed
+    // it.
     assert!(messages > whole - FRAMES / 10, "{messages} of {whole} whole frames");
     // All that is missing is counted, but what was lost behind the last message.
     assert!(counters.good + counters.lost + 20 > FRAMES, "{counters:?}");

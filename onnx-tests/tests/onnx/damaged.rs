@@ -1,5 +1,5 @@
-//! Files that were made to harm, or were harmed: each is refused by what is wrong with it, and none ends the process or fills the
-//! memory.
+//! Files that were made to harm, or were harmed: each is refused by what is wrong with it, and none ends the process or
+//! fills the memory.
 
 use actq::import::onnx::{Choice, import_bytes, proto};
 use anyhow::Result;

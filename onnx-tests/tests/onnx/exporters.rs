@@ -1,4 +1,5 @@
-//! Forms that PyTorch's exporters and tf2onnx were found to write (docs/records/2026-11-22-exporters.md), against tract.
+//! Forms that PyTorch's exporters and tf2onnx were found to write (docs/records/2026-11-22-exporters.md), against
+//! tract.
 
 use actq::import::onnx::{Choice, proto};
 use actq::measure::actions::actions;

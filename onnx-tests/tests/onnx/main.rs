@@ -1,5 +1,5 @@
-//! Policies out of ONNX files: what exporters write gives the actions that another reader of ONNX gives, and nothing in a file
-//! does harm.
+//! Policies out of ONNX files: what exporters write gives the actions that another reader of ONNX gives, and nothing in
+//! a file does harm.
 
 mod command;
 mod constants;
@@ -38,7 +38,8 @@ fn drawn(policy: &Policy) -> Vec<Vec<f32>> {
     (0..STEPS).map(|_| (0..policy.graph.obs_len).map(|_| 2.0 * random.unit()).collect()).collect()
 }
 
-/// What tract gives, step by step, with every state carried on. Inputs have the shapes that the file says, in the file's order.
+/// What tract gives, step by step, with every state carried on. Inputs have the shapes that the file says, in the
+/// file's order.
 fn by_tract(bytes: &[u8], imported: &Imported, observations: &[Vec<f32>]) -> Result<Vec<Vec<f32>>> {
     let mut model = tract_onnx::onnx().model_for_read(&mut &bytes[..])?;
     let ports = ports(bytes)?;

@@ -347,7 +347,8 @@ fn files_as_their_authors_publish_them_are_imported() -> Result<()> {
         let file = import(&path, &Choice::default())?;
         assert_eq!(file.ops.join(" "), expected);
         let policy = Policy::load(&path)?;
-        // Recorded where there is a recording: beside the path, sums of the drawn values lose more digits than the bound has.
+        // Recorded where there is a recording: beside the path, sums of the drawn values lose more digits than the
+        // bound has.
         let observations = match name {
             "brax_go1" => {
                 let recorded =

@@ -2,19 +2,20 @@
 
 use std::fmt;
 
-/// Noise on a window of observations. Its standard deviation is drawn for every window, between 0 and `noise`, in units of
-/// each value's own deviation over the recording; from step to step it keeps [`MEMORY`]. Where a policy drives, its own errors
-/// have taken it off the recorded path, slowly and for a while: that is what such noise stands for. Noise that is fresh in every
-/// step averages out and teaches a recurrent policy to ignore it (docs/QUANTIZER.md has the figures).
+/// Noise on a window of observations. Its standard deviation is drawn for every window, between 0 and `noise`, in units
+/// of each value's own deviation over the recording; from step to step it keeps [`MEMORY`]. Where a policy drives, its
+/// own errors have taken it off the recorded path, slowly and for a while: that is what such noise stands for. Noise
+/// that is fresh in every step averages out and teaches a recurrent policy to ignore it (docs/QUANTIZER.md has the
+/// figures).
 ///
-/// Half of the windows can also be moved as a whole, by up to `mix` times the difference of two recorded observations, which
-/// keeps the values together that move together.
+/// Half of the windows can also be moved as a whole, by up to `mix` times the difference of two recorded observations,
+/// which keeps the values together that move together.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Widening {
     /// The largest standard deviation of the noise, in units of each value's own.
     pub noise: f32,
-    /// It is drawn as `noise` times this power of an even draw from 0 to 1: the higher, the more windows stay close to the recorded
-    /// path.
+    /// It is drawn as `noise` times this power of an even draw from 0 to 1: the higher, the more windows stay close to
+    /// the recorded path.
     pub power: i32,
     /// The largest share of the difference of two recorded observations.
     pub mix: f32,

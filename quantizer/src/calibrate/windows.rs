@@ -1,5 +1,5 @@
-//! Batches of recorded observations: single frames for a feed-forward network, windows with the f32 network's own state at
-//! their start for a recurrent one.
+//! Batches of recorded observations: single frames for a feed-forward network, windows with the f32 network's own state
+//! at their start for a recurrent one.
 
 use ndarray::{Array2, Axis, s};
 
@@ -44,8 +44,8 @@ pub struct Windows {
 }
 
 impl Windows {
-    /// Runs the f32 network over the recording; where frames do not depend on each other, over one in `every` of them, of which the
-    /// outputs' variance then is.
+    /// Runs the f32 network over the recording; where frames do not depend on each other, over one in `every` of them,
+    /// of which the outputs' variance then is.
     pub fn new(graph: Graph, dataset: &Dataset, every: usize) -> Self {
         let weights = Weights::of(&graph);
         let network = Network::new(&graph);
@@ -188,8 +188,8 @@ impl Windows {
     }
 }
 
-/// Holds the last observation until the episode has `steps`: so windows need not be as short as the shortest episode, at whose end
-/// a robot may have fallen. The f32 network is asked there as everywhere.
+/// Holds the last observation until the episode has `steps`: so windows need not be as short as the shortest episode,
+/// at whose end a robot may have fallen. The f32 network is asked there as everywhere.
 fn last(episode: &mut Array2<f32>, steps: usize) {
     let there = episode.nrows();
     if there < steps {

@@ -24,8 +24,8 @@ const SELF_TEST_BYTES: usize = 64 << 10;
 ///
 /// # Errors
 ///
-/// Where a size of the policy has no room in the format, where the kernels refuse the image, and where the network leaves
-/// f32's range on the self-test's observations.
+/// Where a size of the policy has no room in the format, where the kernels refuse the image, and where the network
+/// leaves f32's range on the self-test's observations.
 pub fn image(policy: &Policy, matrices: &[Outcome]) -> Result<Vec<u8>> {
     let group = matrices.first().map_or(0, |m| m.quantized.group);
     let program = lower(policy, group)?;

@@ -48,8 +48,8 @@ impl Graph {
         Ok(self.output())
     }
 
-    /// Puts a node behind `value`, for `readers` of it, which then read the new node's output instead; gives that. Values behind it
-    /// have their numbers raised by one.
+    /// Puts a node behind `value`, for `readers` of it, which then read the new node's output instead; gives that.
+    /// Values behind it have their numbers raised by one.
     pub fn insert(&mut self, kind: impl Into<NodeKind>, value: ValueId, readers: &[usize]) -> Result<ValueId> {
         let kind = kind.into();
         let len = kind.output_len(&self.matrices, &[self.len_of(value)])?;

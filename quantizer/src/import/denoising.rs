@@ -145,8 +145,8 @@ impl JsonDenoising {
         Ok(Schedule { denoising: Denoising { first: 0, len, limit: f32::INFINITY, steps: by }, times })
     }
 
-    /// Of a diffusion process: Ho et al., arXiv 2006.11239, or Song et al., arXiv 2010.02502, with eta 0; the cosine schedule is that
-    /// of Nichol and Dhariwal, arXiv 2102.09672, equation 17.
+    /// Of a diffusion process: Ho et al., arXiv 2006.11239, or Song et al., arXiv 2010.02502, with eta 0; the cosine
+    /// schedule is that of Nichol and Dhariwal, arXiv 2102.09672, equation 17.
     pub(super) fn diffusion(&self, len: usize) -> Result<Schedule> {
         let train = self.train_steps.context("kind diffusion needs the key train_steps")?;
         ensure!((1..=MOST_STEPS).contains(&train), "train_steps is {train}, it must be 1 to {MOST_STEPS}");
@@ -243,7 +243,8 @@ impl JsonDenoising {
             }
             Some(other) => bail!("solver is {other:?}; ddpm and ddim are those of a diffusion policy"),
         };
-        // A sample without a limit of its own is a sum like the rest, and its place is free for the iterate, if that has one.
+        // A sample without a limit of its own is a sum like the rest, and its place is free for the iterate, if that
+        // has one.
         let [sample_x, sample_v, keep, direct, sample, sigma, ahead] = numbers;
         let (by_x, by_v) = (keep + sample * sample_x, direct + sample * sample_v);
         let numbers = match (self.clip_sample, self.clip_iterate) {

@@ -1,5 +1,5 @@
-//! A policy folder: `policy.json` (the op list) and `policy.safetensors` (the weights). An ONNX file stands for the folder that it
-//! would be imported to.
+//! A policy folder: `policy.json` (the op list) and `policy.safetensors` (the weights). An ONNX file stands for the
+//! folder that it would be imported to.
 
 use std::fs;
 use std::path::Path;
@@ -34,8 +34,8 @@ pub fn folder_of(path: &Path) -> &Path {
 }
 
 impl Policy {
-    /// Reads `policy.json` and `policy.safetensors` from `path`, or an ONNX file as if it had been imported without choices. Every
-    /// error names the file and the op, node or tensor.
+    /// Reads `policy.json` and `policy.safetensors` from `path`, or an ONNX file as if it had been imported without
+    /// choices. Every error names the file and the op, node or tensor.
     pub fn load(path: &Path) -> Result<Self> {
         if is_onnx(path) {
             let imported = onnx::import(path, &Choice::default())?;

@@ -138,7 +138,8 @@ impl Json {
         kind(self.kind.as_deref())
     }
 
-    /// The action contract. Without the key `action` whatever is chunked is limited to -1..1, as the reference runtime of the format does.
+    /// The action contract. Without the key `action` whatever is chunked is limited to -1..1, as the reference runtime
+    /// of the format does.
     pub(super) fn contract(&self, kind: Kind) -> Result<ActionContract> {
         let contract = match &self.action {
             Some(json) => json.contract(self.act_dim)?,

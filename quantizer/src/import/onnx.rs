@@ -1,7 +1,8 @@
 //! Policies out of ONNX files, by rule: docs/IMPORT.md says what is taken.
 //!
-//! A file is read ([`proto`], `model`), followed from its inputs to the chosen output (`follow`), put together from what exporters
-//! take apart (`build`, `norm`, `forms`), simplified and lowered to the ops of policy.json (`simplify`, `lower`).
+//! A file is read ([`proto`], `model`), followed from its inputs to the chosen output (`follow`), put together from
+//! what exporters take apart (`build`, `norm`, `forms`), simplified and lowered to the ops of policy.json (`simplify`,
+//! `lower`).
 
 mod action;
 mod arithmetic;

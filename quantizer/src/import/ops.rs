@@ -73,8 +73,8 @@ impl<'a> Builder<'a> {
         Self { weights, graph: Graph::new(obs_len), slots: HashMap::from([("obs".to_owned(), 0)]) }
     }
 
-    /// The network of observation, time and iterate of a flow or a diffusion policy (slots `obs`, `tfeat` and `x`), and what it reads
-    /// as the time in each step.
+    /// The network of observation, time and iterate of a flow or a diffusion policy (slots `obs`, `tfeat` and `x`), and
+    /// what it reads as the time in each step.
     pub(super) fn iterative(
         obs_len: usize,
         by: &JsonDenoising,

@@ -8,8 +8,8 @@ use crate::data::Dataset;
 
 use crate::policy::Policy;
 
-/// Multiplications that a run over the calibration recording may take, about half a second of the executor on a host; a longer
-/// recording is thinned.
+/// Multiplications that a run over the calibration recording may take, about half a second of the executor on a host; a
+/// longer recording is thinned.
 const MOST_MACS: usize = 600_000_000;
 
 /// As [`MOST_MACS`], of the held-out recording: so many that its error is what `actq eval` says, but for the longest.

@@ -7,9 +7,9 @@ use actq_kernels::image::{Matrix, OpKind};
 
 use crate::graph::ops::Balance;
 
-/// Bits per weight of the policy as it was trained: codes, padding, scales, steps and block records of all matrices, and the
-/// constants that the quantizer put before them, over the number of the source's weights. A matrix that several operations share
-/// counts once.
+/// Bits per weight of the policy as it was trained: codes, padding, scales, steps and block records of all matrices,
+/// and the constants that the quantizer put before them, over the number of the source's weights. A matrix that several
+/// operations share counts once.
 pub fn bits_per_weight(image: &Image<'_>) -> f64 {
     let bytes: usize = distinct(image).iter().map(Matrix::weight_bytes).sum();
     let added = image.ops().filter(|op| op.kind == OpKind::Normalize { added: true });

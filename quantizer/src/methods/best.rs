@@ -1,5 +1,5 @@
-//! The pipeline: how much every row matters, a width for each to the budget, removal of what has none, and distillation, or, with
-//! 0 steps of it, two-sided error feedback.
+//! The pipeline: how much every row matters, a width for each to the budget, removal of what has none, and
+//! distillation, or, with 0 steps of it, two-sided error feedback.
 
 mod activations;
 mod adam;
@@ -64,8 +64,8 @@ pub struct RowStatistics {
 }
 
 impl RowStatistics {
-    /// Runs the f32 network over `dataset`, forwards and backwards. `moments` are those of the matrices' inputs, of so many frames
-    /// that no more fit the allowance, if there is one.
+    /// Runs the f32 network over `dataset`, forwards and backwards. `moments` are those of the matrices' inputs, of so
+    /// many frames that no more fit the allowance, if there is one.
     pub fn collect(
         graph: &Graph,
         dataset: &Dataset,
@@ -215,8 +215,8 @@ pub fn quantize(
     Ok(QuantizedNetwork { graph: learned, outcomes, learning })
 }
 
-/// Quantizes without learning: every matrix by two-sided error feedback with the moments of its input and of its output's
-/// derivative, the mean error into the biases.
+/// Quantizes without learning: every matrix by two-sided error feedback with the moments of its input and of its
+/// output's derivative, the mean error into the biases.
 fn feed_back(
     compacted: &Compacted,
     group: usize,

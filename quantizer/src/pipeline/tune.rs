@@ -83,8 +83,8 @@ impl Tuned {
 ///
 /// # Errors
 ///
-/// Without a recording to learn from; where a recording cannot be learned from or measured on; those of `drive`, with the
-/// round.
+/// Without a recording to learn from; where a recording cannot be learned from or measured on; those of `drive`, with
+/// the round.
 pub fn run(
     plan: TunePlan<'_>,
     mut drive: impl FnMut(usize, &[u8]) -> Result<Driven>,

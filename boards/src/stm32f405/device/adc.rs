@@ -1,5 +1,5 @@
-//! ADC 1 (RM0090, section 13): two phase currents on PC0 and PC1, measured when TIM 1's channel 4 says so. Not run in QEMU, which has
-//! neither the timer nor voltages.
+//! ADC 1 (RM0090, section 13): two phase currents on PC0 and PC1, measured when TIM 1's channel 4 says so. Not run in
+//! QEMU, which has neither the timer nor voltages.
 
 use stm32f4::stm32f405 as pac;
 
@@ -17,8 +17,8 @@ impl Currents {
     pub(super) fn new(adc: pac::ADC1, rcc: &pac::RCC, pins: &pac::GPIOC) -> Self {
         rcc.ahb1enr().modify(|_, w| w.gpiocen().set_bit());
         rcc.apb2enr().modify(|_, w| w.adc1en().set_bit());
-        // SAFETY: every value is in its field's range. Of a sequence of two, the third and the fourth place count. The ADC's clock
-        // is half of the bus: too fast at 84 MHz, so a quarter.
+        // SAFETY: every value is in its field's range. Of a sequence of two, the third and the fourth place count. The
+        // ADC's clock is half of the bus: too fast at 84 MHz, so a quarter.
         unsafe {
             pins.moder().modify(|_, w| w.moder0().bits(0b11).moder1().bits(0b11));
             (*pac::ADC_COMMON::ptr()).ccr().modify(|_, w| w.adcpre().bits(0b01));

@@ -1,5 +1,5 @@
-//! The clock (RM0090, sections 3.5.1, 5.1.3 and 7.2): a crystal of 8 MHz, multiplied to 168 MHz; where one of the steps does not end,
-//! the oscillator inside, 16 MHz.
+//! The clock (RM0090, sections 3.5.1, 5.1.3 and 7.2): a crystal of 8 MHz, multiplied to 168 MHz; where one of the steps
+//! does not end, the oscillator inside, 16 MHz.
 
 use stm32f4::stm32f405 as pac;
 
@@ -9,8 +9,8 @@ use crate::seams::{Clock, Source};
 const FALLBACK: Clock = Clock { hz: 16_000_000, source: Source::Fallback };
 const FAST: Clock = Clock { hz: 168_000_000, source: Source::Crystal };
 
-/// Reads of a flag until a crystal counts as dead: above 100 ms at 16 MHz, where a turn takes at least 10 cycles. One that works
-/// takes about 2 ms.
+/// Reads of a flag until a crystal counts as dead: above 100 ms at 16 MHz, where a turn takes at least 10 cycles. One
+/// that works takes about 2 ms.
 const CRYSTAL: u32 = 160_000;
 /// Reads of a flag until the PLL, whose lock takes at most 0.3 ms, or a switch counts as dead.
 const LOCK: u32 = 16_000;

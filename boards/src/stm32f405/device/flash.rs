@@ -1,5 +1,6 @@
-//! The registers of the flash controller (RM0090, section 3.9), the supply's voltage (section 5.2.3), and what has to hold while the
-//! processor stands still. In which order they are used is in `../flash.rs`. QEMU has none of them: they read as 0 there.
+//! The registers of the flash controller (RM0090, section 3.9), the supply's voltage (section 5.2.3), and what has to
+//! hold while the processor stands still. In which order they are used is in `../flash.rs`. QEMU has none of them: they
+//! read as 0 there.
 
 use core::cell::Cell;
 
@@ -44,8 +45,8 @@ impl Part for Controller {
     }
 
     fn write(&mut self, register: Register, value: u32) {
-        // SAFETY: any value is allowed; what the controller does with one is written memory of its sectors alone, of which `../flash.rs`
-        // chooses those of `memory`, whose cells may change.
+        // SAFETY: any value is allowed; what the controller does with one is written memory of its sectors alone, of
+        // which `../flash.rs` chooses those of `memory`, whose cells may change.
         unsafe {
             match register {
                 Register::Access => self.registers.acr().write(|w| w.bits(value)),

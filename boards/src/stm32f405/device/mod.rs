@@ -1,8 +1,9 @@
-//! The registers of an STM32F405 by its peripheral access crate (RM0090): clocks, USART 1, TIM 1, ADC 1, the independent watchdog,
-//! the flash.
+//! The registers of an STM32F405 by its peripheral access crate (RM0090): clocks, USART 1, TIM 1, ADC 1, the
+//! independent watchdog, the flash.
 //!
-//! The crates that own whole parts, stm32f4xx-hal and embassy-stm32, wait without end for a crystal that does not start. Here every
-//! wait has an end, and the part runs on from its own oscillator; so the registers are set below them.
+//! The crates that own whole parts, stm32f4xx-hal and embassy-stm32, wait without end for a crystal that does not
+//! start. Here every wait has an end, and the part runs on from its own oscillator; so the registers are set below
+//! them.
 
 mod adc;
 mod clock;
@@ -45,10 +46,11 @@ pub type Flash = super::flash::Flash<Controller>;
 /// Where the flash begins.
 const FLASH: usize = 0x0800_0000;
 
-/// Sets the part up: 168 MHz where the crystal starts, else 16 MHz; its serial port at `baud`; the power stage off, at 20 kHz.
+/// Sets the part up: 168 MHz where the crystal starts, else 16 MHz; its serial port at `baud`; the power stage off, at
+/// 20 kHz.
 ///
-/// Pins: PB6 transmits, PB7 receives; PA8 to PA10 and PB13 to PB15 are the phases and their complements, PB12 low breaks; PC0 and PC1
-/// are currents.
+/// Pins: PB6 transmits, PB7 receives; PA8 to PA10 and PB13 to PB15 are the phases and their complements, PB12 low
+/// breaks; PC0 and PC1 are currents.
 ///
 /// # Safety
 ///
@@ -57,7 +59,8 @@ pub unsafe fn start(baud: u32) -> Parts {
     // SAFETY: nobody else has the peripherals, as the caller promises.
     let p = unsafe { pac::Peripherals::steal() };
     let cause = cause(&p.RCC);
-    // A debugger that halts the program stops the watchdog, and the power stage's timer, whose outputs are then off (section 17.3.21).
+    // A debugger that halts the program stops the watchdog, and the power stage's timer, whose outputs are then off
+    // (section 17.3.21).
     p.DBGMCU.apb1_fz().modify(|_, w| w.dbg_iwdg_stop().set_bit());
     p.DBGMCU.apb2_fz().modify(|_, w| w.dbg_tim1_stop().set_bit());
     let clock = clock::start(&p.RCC, &p.FLASH, &p.PWR);
@@ -73,8 +76,8 @@ pub unsafe fn start(baud: u32) -> Parts {
 ///
 /// # Safety
 ///
-/// To be called once, behind [`start`], and from where the watchdog is fed. `memory` is the part's flash, and nothing but the flash that
-/// is given here changes it.
+/// To be called once, behind [`start`], and from where the watchdog is fed. `memory` is the part's flash, and nothing
+/// but the flash that is given here changes it.
 pub unsafe fn flash(memory: &'static [Cell<u8>]) -> Flash {
     // SAFETY: `start` has set up what it wanted of these, and nobody else has them since.
     let p = unsafe { pac::Peripherals::steal() };

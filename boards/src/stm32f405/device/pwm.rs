@@ -1,5 +1,6 @@
-//! TIM 1 as the power stage's PWM (RM0090, section 17): three phases and their complements with dead time, counted up and down, and a
-//! break input that switches all six off without the program. In the middle of a period it makes the ADC measure.
+//! TIM 1 as the power stage's PWM (RM0090, section 17): three phases and their complements with dead time, counted up
+//! and down, and a break input that switches all six off without the program. In the middle of a period it makes the
+//! ADC measure.
 //!
 //! QEMU has no TIM 1: nothing here has been run. `docs/BOARDS.md` says what a bench has to show.
 
@@ -56,8 +57,8 @@ impl Pwm {
                 .write(|w| w.oc3m().bits(PWM_MODE).oc3pe().set_bit().oc4m().bits(PWM_MODE).oc4pe().set_bit());
             // Channel 4 has no pin: it asks the ADC to measure at the top, where all lower switches are on.
             timer.ccr4().write(|w| w.bits(u32::from(top) - 1));
-            // Off until `enable`, and on no break by itself (AOE is 0); a low level or an open pin breaks; driven low when off. The
-            // lock keeps dead time, break and idle levels as they are until the next reset.
+            // Off until `enable`, and on no break by itself (AOE is 0); a low level or an open pin breaks; driven low
+            // when off. The lock keeps dead time, break and idle levels as they are until the next reset.
             timer
                 .bdtr()
                 .write(|w| w.dtg().bits(dead).lock().bits(0b01).ossi().set_bit().ossr().set_bit().bke().set_bit());
@@ -144,7 +145,8 @@ impl SetDutyCycle for Phase {
 
     fn set_duty_cycle(&mut self, duty: u16) -> Result<(), Infallible> {
         let duty = u32::from(duty.min(self.top));
-        // SAFETY: the timer runs for as long as the program does; a compare register is written whole, each by one phase alone.
+        // SAFETY: the timer runs for as long as the program does; a compare register is written whole, each by one
+        // phase alone.
         let timer = unsafe { &*pac::TIM1::ptr() };
         // SAFETY: any value up to the top is allowed.
         unsafe {

@@ -17,8 +17,8 @@ const FEED: u16 = 0xaaaa;
 
 /// Divided by 32: a tick is about a millisecond.
 const DIVIDER: u8 = 3;
-/// Reads until the registers count as taken; they take 5 cycles of 17 kHz at most, and the watchdog starts with its reset values
-/// where they do not.
+/// Reads until the registers count as taken; they take 5 cycles of 17 kHz at most, and the watchdog starts with its
+/// reset values where they do not.
 const TAKEN: u32 = 1_000_000;
 
 /// The ticks that [`Watchdog::start`] was asked for. (The register has them only once they are taken.)
@@ -54,11 +54,13 @@ fn set(iwdg: &RegisterBlock, ticks: u16) -> bool {
     taken
 }
 
-/// Does `work` with a time of so many milliseconds at least, and sets the one before again; `None` where the first one is not taken, with
-/// nothing done. To be called where the watchdog is fed: by the loop. Where the work has taken longer, by the cycles of the core, of which
-/// `khz` are a millisecond, or where its own time is not taken again, it does not return, and the watchdog resets the board.
+/// Does `work` with a time of so many milliseconds at least, and sets the one before again; `None` where the first one
+/// is not taken, with nothing done. To be called where the watchdog is fed: by the loop. Where the work has taken
+/// longer, by the cycles of the core, of which `khz` are a millisecond, or where its own time is not taken again, it
+/// does not return, and the watchdog resets the board.
 pub(super) fn patiently<R>(milliseconds: u16, khz: u32, work: impl FnOnce() -> R) -> Option<R> {
-    // SAFETY: the registers are there for as long as the program runs; besides the loop, which waits for this, nothing writes them.
+    // SAFETY: the registers are there for as long as the program runs; besides the loop, which waits for this, nothing
+    // writes them.
     let iwdg = unsafe { &*pac::IWDG::ptr() };
     let outcome = set(iwdg, ticks(milliseconds)).then(|| {
         let begun = DWT::cycle_count();

@@ -1,5 +1,5 @@
-//! The flash controller of an STM32F405 for tests, with the rules of RM0090, section 3, and a supply that may fail in the course of any
-//! write. A rule that only a wrong driver breaks, and that the part has no flag for, panics.
+//! The flash controller of an STM32F405 for tests, with the rules of RM0090, section 3, and a supply that may fail in
+//! the course of any write. A rule that only a wrong driver breaks, and that the part has no flag for, panics.
 
 use core::cell::Cell;
 

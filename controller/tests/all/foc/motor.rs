@@ -2,8 +2,8 @@
 
 use actq_controller::foc::{CurrentLoop, Gains, Measured, Rotor, Tick};
 
-/// A permanent-magnet synchronous motor of the size of a quadruped's: equations in the rotor's axes, in f64, integrated by the
-/// midpoint rule in 50 steps a control tick.
+/// A permanent-magnet synchronous motor of the size of a quadruped's: equations in the rotor's axes, in f64, integrated
+/// by the midpoint rule in 50 steps a control tick.
 struct Motor {
     d: f64,
     q: f64,
@@ -110,8 +110,8 @@ fn a_free_motor_speeds_up_to_what_the_supply_allows_and_brakes_again() {
     assert!(motor.speed < 0.9 * speed, "it brakes");
 }
 
-/// CRC-32 of the bits of all duty cycles in ten thousand ticks whose inputs are computed with nothing but f32: the same number on
-/// every machine.
+/// CRC-32 of the bits of all duty cycles in ten thousand ticks whose inputs are computed with nothing but f32: the same
+/// number on every machine.
 #[test]
 fn ten_thousand_ticks_have_the_same_bits_everywhere() {
     let mut control = CurrentLoop::new(Gains { proportional: 0.188_5, integral: 0.039_27 });

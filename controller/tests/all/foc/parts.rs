@@ -68,7 +68,8 @@ proptest! {
             let output = pi.step(*error, 0.5, 0.1, limit);
             prop_assert!(output.abs() <= limit);
         }
-        // However long it was at its limit: an error of the other sign that asks for more than the limit turns it around at once.
+        // However long it was at its limit: an error of the other sign that asks for more than the limit turns it
+        // around at once.
         let largest = 2.0 * limit / 0.5 + 1.0;
         prop_assert!(pi.step(-largest, 0.5, 0.1, limit) < 0.0);
     }

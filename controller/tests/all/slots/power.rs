@@ -1,5 +1,5 @@
-//! Power fails in the middle of every single change that a sequence of updates makes to the flash, and again while the device
-//! starts after that.
+//! Power fails in the middle of every single change that a sequence of updates makes to the flash, and again while the
+//! device starts after that.
 
 use actq_boards::stm32f405::flash::{Flash, Model};
 use actq_controller::slots::{Anyone, Layout, Slot};
@@ -120,8 +120,8 @@ fn an_image_of_an_stm32f405_may_have_261888_bytes() {
     assert_eq!(Slot::BOTH.map(|slot| layout.room(slot)), [261_888; 2], "docs/BOARDS.md says so");
 }
 
-/// Power fails at every start, in the middle of the trial of a new image, as often as it likes: the image is given up after three
-/// trials, and the old one runs.
+/// Power fails at every start, in the middle of the trial of a new image, as often as it likes: the image is given up
+/// after three trials, and the old one runs.
 #[test]
 fn an_image_whose_trial_never_ends_is_given_up_and_the_old_one_runs() {
     let mut flash = Nor::<4, 1024>::new(2, 1);

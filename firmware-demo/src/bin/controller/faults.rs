@@ -20,8 +20,8 @@ static STARTS: Kept<1> = Kept::new();
 
 /// Address of the register that says what a fault is.
 const CFSR: u32 = 0xe000_ed28;
-/// What it says of a stack that has overflown: the core could not stack, the program touched the guard, which is all that the memory
-/// protection unit forbids, or the pointer would have passed its limit (Armv8-M).
+/// What it says of a stack that has overflown: the core could not stack, the program touched the guard, which is all
+/// that the memory protection unit forbids, or the pointer would have passed its limit (Armv8-M).
 const STACKING: u32 = 1 << 4;
 const ACCESS: u32 = 1 << 1;
 const LIMIT: u32 = 1 << 20;
@@ -79,8 +79,8 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     SCB::sys_reset()
 }
 
-/// Faults. Where the stack has overflown, it is left before anything else: what runs here runs at its begin. What the core has stacked,
-/// or could not, is passed on.
+/// Faults. Where the stack has overflown, it is left before anything else: what runs here runs at its begin. What the
+/// core has stacked, or could not, is passed on.
 ///
 /// # Safety
 ///

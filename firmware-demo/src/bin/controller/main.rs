@@ -1,8 +1,9 @@
-//! The controller on a board, which a feature names: a control tick at high priority, the head in slices below it, the link at a
-//! serial port, a watchdog. `cargo xtask firmware` builds it.
+//! The controller on a board, which a feature names: a control tick at high priority, the head in slices below it, the
+//! link at a serial port, a watchdog. `cargo xtask firmware` builds it.
 //!
-//! RTIC runs it: tick and loop share one value, whose lock is a priority that the hardware has, and what may delay the tick is known
-//! when it is compiled. An executor of async tasks, as Embassy's, has its place where much is waited for; here nothing is.
+//! RTIC runs it: tick and loop share one value, whose lock is a priority that the hardware has, and what may delay the
+//! tick is known when it is compiled. An executor of async tasks, as Embassy's, has its place where much is waited for;
+//! here nothing is.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]

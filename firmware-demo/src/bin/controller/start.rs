@@ -22,13 +22,15 @@ static BUILT_IN: &Aligned<[u8]> = &Aligned(*include_bytes!(env!(
 /// Values of an observation and of an action: those of the image that is built in. Every image that runs has as many.
 pub(crate) const LENGTHS: [usize; 2] = lengths(&BUILT_IN.0);
 
-/// The image in the image slot, or the one that is built in. A build that asks for signatures does not look at the slot, where none is.
+/// The image in the image slot, or the one that is built in. A build that asks for signatures does not look at the
+/// slot, where none is.
 pub(crate) fn built_in() -> &'static [u8] {
     let slot = if cfg!(feature = "signed") { None } else { slot::image() };
     slot.unwrap_or(&BUILT_IN.0)
 }
 
-/// The memory of the slots for updates; none where the image that a debugger has put into the same memory is the one that runs.
+/// The memory of the slots for updates; none where the image that a debugger has put into the same memory is the one
+/// that runs.
 ///
 /// # Safety
 ///

@@ -138,8 +138,8 @@ pub fn gru_elements(elements: Range<usize>, a: &[f32], b: &[f32], h: &mut [f32])
 pub fn denoise(by: &[f32; 7], limit: f32, v: &[f32], z: &[f32], x: &mut [f32], y: &mut [f32]) {
     let len = x.len().min(y.len()).min(v.len());
     let (z, len) = if z.is_empty() { (ptr::null(), len) } else { (z.as_ptr(), len.min(z.len())) };
-    // SAFETY: all operands hold at least `len` values, or are none; the kernel reads and writes no others. Noise is only
-    // read where there is any.
+    // SAFETY: all operands hold at least `len` values, or are none; the kernel reads and writes no others. Noise is
+    // only read where there is any.
     unsafe { actq_denoise(by, limit, v.as_ptr(), z, x.as_mut_ptr(), y.as_mut_ptr(), len) }
 }
 

@@ -321,24 +321,25 @@ pub(crate) struct SweepArgs {
 /// Where ActQuant may be read in several ways.
 #[derive(clap::Args)]
 pub(crate) struct ActQuantArgs {
-    /// Choices of method actquant: KEY=VALUE,KEY=VALUE, or authors for all that its authors choose, which keys behind it alter
+    /// Choices of method actquant: KEY=VALUE,KEY=VALUE, or authors for all that its authors choose, which keys behind
+    /// it alter
     ///
     /// [defaults in brackets; (authors) is what theirs is]
     ///
     /// bandwidth=[median]|squared(authors): the Gaussian kernels' sigma^2, or sigma, is the median squared distance.
     /// frames=N|all(authors) [512]: frames that HSIC is taken over, never more than 8192.
     /// score=[gain](authors)|output: a matrix's score is what it adds, F(output) - F(input), or F(output).
-    /// noise=[codes]|format(authors): a width's expected error is 2^(-2 bits) with the bits of a code, or with all that it takes.
-    /// widest=2|3|4(authors)|[8]: the widest codes that the allocation gives.
-    /// head=[free]|2|3|4|8(authors): the width of the matrices that give the action. (The authors keep them at 16 bits.)
-    /// samples=N|all(authors) [4096]: frames that the Fisher information is taken over, about.
-    /// batch=N [1] (authors: 8): frames whose gradients are averaged before they are squared.
-    /// signs=[random]|loss(authors): the loss's derivative where the recorded action is the policy's own: a random sign, or that of
-    /// whatever difference there is.
-    /// magnitude=[no]|yes(authors): fits of scales weigh by the importance, or by it times sqrt(mean of the row's w^2 + w^2).
+    /// noise=[codes]|format(authors): a width's expected error is 2^(-2 bits) with the bits of a code, or with all that
+    /// it takes. widest=2|3|4(authors)|[8]: the widest codes that the allocation gives. head=[free]|2|3|4|8(authors):
+    /// the width of the matrices that give the action. (The authors keep them at 16 bits.) samples=N|all(authors)
+    /// [4096]: frames that the Fisher information is taken over, about. batch=N [1] (authors: 8): frames whose
+    /// gradients are averaged before they are squared. signs=[random]|loss(authors): the loss's derivative where the
+    /// recorded action is the policy's own: a random sign, or that of whatever difference there is.
+    /// magnitude=[no]|yes(authors): fits of scales weigh by the importance, or by it times sqrt(mean of the row's w^2 +
+    /// w^2).
     ///
-    /// With one width for all (--bits), widths are not allocated, and only the last four keys count. docs/QUANTIZER.md has sources and
-    /// reasons.
+    /// With one width for all (--bits), widths are not allocated, and only the last four keys count. docs/QUANTIZER.md
+    /// has sources and reasons.
     ///
     /// Example: --method actquant --actquant authors,head=free
     #[arg(long, value_name = "CHOICES", verbatim_doc_comment)]
@@ -366,15 +367,16 @@ impl ActQuantArgs {
 #[derive(clap::Args)]
 pub(crate) struct LearnArgs {
     /// The most steps of distillation; 0 = none, but two-sided error feedback: seconds, and a larger error at few bits
-    /// [default: by the number of weights, 20000 for 200 thousand, recurrent policies 7800, heads with denoising steps 10000]
+    /// [default: by the number of weights, 20000 for 200 thousand, recurrent policies 7800, heads with denoising steps
+    /// 10000]
     #[arg(long, value_name = "N")]
     pub(crate) steps: Option<usize>,
     /// The most minutes of distillation, instead of the default steps; what is learned then depends on the machine
     #[arg(long, value_name = "X", value_parser = minutes)]
     pub(crate) minutes: Option<f64>,
-    /// Count errors relative to the action's size, more than feed-forward policies do by themselves. For a robot that holds its goal
-    /// by small actions, which stays as far off as they are wrong: it gets closer, although the held-out error, in which wide
-    /// movements count most, rises
+    /// Count errors relative to the action's size, more than feed-forward policies do by themselves. For a robot that
+    /// holds its goal by small actions, which stays as far off as they are wrong: it gets closer, although the held-out
+    /// error, in which wide movements count most, rises
     #[arg(long)]
     pub(crate) relative: bool,
 }

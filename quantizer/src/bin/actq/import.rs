@@ -71,7 +71,8 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
     ))
 }
 
-/// Runs the file by onnxruntime and the policy by this program's f32 interpreter; gives the frames, and how far they are apart.
+/// Runs the file by onnxruntime and the policy by this program's f32 interpreter; gives the frames, and how far they
+/// are apart.
 fn check(model: &Path, imported: &Imported, policy: &Policy, calib: Option<&Dataset>) -> Result<(usize, f32)> {
     let observations: Vec<Vec<f32>> = match calib {
         Some(calib) => calib.episode(0).take(FRAMES).collect(),

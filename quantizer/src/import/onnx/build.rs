@@ -101,8 +101,8 @@ impl Exprs {
         }
     }
 
-    /// Whether a run is a whole layer or norm that takes factors and offsets into itself; `ones` and `zeros`: there are no factors, or
-    /// no offsets.
+    /// Whether a run is a whole layer or norm that takes factors and offsets into itself; `ones` and `zeros`: there are
+    /// no factors, or no offsets.
     fn takes(&self, run: &Run, ones: bool, zeros: bool) -> bool {
         let of_kind = match self.get(run.of) {
             Expr::Linear(..) => ones,
@@ -240,7 +240,8 @@ impl Exprs {
                 return self.normed(p, norm);
             }
         }
-        // Factors come out of the product; those of a root that is spread first, as those of what it norms belong to its squares.
+        // Factors come out of the product; those of a root that is spread first, as those of what it norms belong to
+        // its squares.
         let of_spread =
             |id: Id| matches!(self.get(id), Expr::Affine(of, ..) if matches!(self.get(*of), Expr::Spread(_)));
         let (p, q) = if of_spread(y) { (y, x) } else { (x, y) };

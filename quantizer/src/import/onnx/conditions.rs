@@ -32,8 +32,8 @@ pub(super) fn above(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>
     Ok(Some(Tensor::of_elements(compared.shape.clone(), conditions)))
 }
 
-/// Whether elements are not numbers, or infinite. Those of values never are: where the network gives such a one, the image gives no
-/// action.
+/// Whether elements are not numbers, or infinite. Those of values never are: where the network gives such a one, the
+/// image gives no action.
 pub(super) fn not_finite(call: &Call<'_>) -> Result<Tensor> {
     let found = |v: f64| match call.op() {
         "IsNaN" => v.is_nan(),

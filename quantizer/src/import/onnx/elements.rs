@@ -25,8 +25,8 @@ pub(super) fn each(exprs: &mut Exprs, x: &Tensor, f: &dyn Fn(&mut Exprs, Id) -> 
     Ok(Tensor::of_elements(x.shape.clone(), all))
 }
 
-/// Places in the order in which their values came up, where that makes fewer runs of neighbours: what a transpose has scattered
-/// is computed in the order of the layer before it, and scattered behind.
+/// Places in the order in which their values came up, where that makes fewer runs of neighbours: what a transpose has
+/// scattered is computed in the order of the layer before it, and scattered behind.
 pub(super) fn in_order(at: Vec<usize>, values: &dyn Fn(usize) -> [(Id, usize); 2]) -> Vec<usize> {
     let breaks = |order: &[usize]| {
         let behind = |pair: &&[usize]| values(pair[0]).map(|(of, i)| (of, i + 1)) != values(pair[1]);
@@ -53,7 +53,8 @@ pub(super) fn value(element: &Element) -> Option<(Id, usize)> {
     if let Element::Of(id, i) = element { Some((*id, *i)) } else { None }
 }
 
-/// The vector of these elements, of which at least one is not known: those that are come out of a layer that only has a bias.
+/// The vector of these elements, of which at least one is not known: those that are come out of a layer that only has a
+/// bias.
 pub(super) fn open_vector(exprs: &mut Exprs, elements: &[Element]) -> Result<Id> {
     let first = elements.iter().find_map(value).context("computes with constants alone; fold them in the exporter")?;
     let known = |element: &Element| if let Element::Known(v) = element { Some(*v) } else { None };

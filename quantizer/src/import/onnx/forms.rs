@@ -74,8 +74,8 @@ impl Exprs {
         if let &Expr::Add(x, y) = self.get(id) { Some((x, y)) } else { None }
     }
 
-    /// The LSTM whose hidden state after the step is `next`: `o tanh(c')` with `c' = f c + i g`. The state before the step is one
-    /// of `candidates`.
+    /// The LSTM whose hidden state after the step is `next`: `o tanh(c')` with `c' = f c + i g`. The state before the
+    /// step is one of `candidates`.
     pub(super) fn lstm_of(&mut self, next: Id, candidates: &[Run]) -> Option<Found> {
         let both = |(x, y): (Id, Id)| [(x, y), (y, x)];
         let (o, next_c) = both(self.product(next)?)
@@ -133,8 +133,8 @@ impl Exprs {
         Some(Found { cell: Cell { lstm: false, x, w_ih, w_hh, b_ih, b_hh, states: vec![h] }, next_c: None })
     }
 
-    /// The update gate's operand, the new value and the old state of `(1 - z) n + z h` or `n + z (h - n)`, also with the gate turned
-    /// around.
+    /// The update gate's operand, the new value and the old state of `(1 - z) n + z h` or `n + z (h - n)`, also with
+    /// the gate turned around.
     fn mixed(&mut self, next: Id) -> Option<(Id, Id, Run)> {
         let (x, y) = self.sum_of(next)?;
         for (x, y) in [(x, y), (y, x)] {
@@ -183,7 +183,8 @@ impl Exprs {
         form.terms.iter().any(|(x, _)| self.elements(*x).iter().any(of_run))
     }
 
-    /// The gates behind each other: what they read beside the state, the matrices of it and of the state, and the biases.
+    /// The gates behind each other: what they read beside the state, the matrices of it and of the state, and the
+    /// biases.
     fn gates(&mut self, gates: &[Form], h: Run) -> Option<Gates> {
         // Every element that a gate reads beside the state, once.
         let mut read: Vec<(Id, usize)> = Vec::new();

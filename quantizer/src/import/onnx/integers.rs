@@ -1,4 +1,5 @@
-//! Inputs of integers, as the time step of a denoiser is: observed as float32 where the file casts them before it computes.
+//! Inputs of integers, as the time step of a denoiser is: observed as float32 where the file casts them before it
+//! computes.
 
 use anyhow::Result;
 

@@ -9,7 +9,8 @@ use super::moves::expanded;
 use super::places::{axis, broadcast};
 use super::tensor::{Data, Tensor, count};
 
-/// Mod with the sign of the first operand, which is the only one of real numbers; without the attribute it is that of the second.
+/// Mod with the sign of the first operand, which is the only one of real numbers; without the attribute it is that of
+/// the second.
 const FMOD: &str = "Mod, fmod";
 
 /// The output, where the node computes with known numbers alone.

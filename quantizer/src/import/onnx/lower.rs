@@ -23,7 +23,8 @@ struct Part {
     len: usize,
 }
 
-/// The most repetitions of an element in one operand: each is copied by itself. What is longer repeats a copy of so many.
+/// The most repetitions of an element in one operand: each is copied by itself. What is longer repeats a copy of so
+/// many.
 const MOST_COPIES: usize = 64;
 
 /// Ops and tensors so far.
@@ -44,8 +45,8 @@ pub(super) struct Lowered {
     taken: HashSet<Id>,
 }
 
-/// Lowers a value. `offsets` says where the elements of each graph input stand in the observation, of `obs_len` values. An error
-/// names the expression that has no op.
+/// Lowers a value. `offsets` says where the elements of each graph input stand in the observation, of `obs_len` values.
+/// An error names the expression that has no op.
 pub(super) fn lower(
     exprs: &Exprs,
     root: Id,

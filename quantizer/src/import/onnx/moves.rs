@@ -125,7 +125,8 @@ fn wrapped(v: i64, kind: i64) -> i64 {
     }
 }
 
-/// Between float32 and float64 nothing is lost but digits that float32 has not; values of the network have no other type.
+/// Between float32 and float64 nothing is lost but digits that float32 has not; values of the network have no other
+/// type.
 fn cast(call: &Call<'_>) -> Result<Tensor> {
     let input = call.input(0)?;
     let to = match call.op() {

@@ -1,4 +1,5 @@
-//! From a file to the two files of a policy's folder: which output is the action, which inputs are observed, and the network between.
+//! From a file to the two files of a policy's folder: which output is the action, which inputs are observed, and the
+//! network between.
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
@@ -281,8 +282,8 @@ fn choose(
             .collect();
         bail!("several outputs can be the action: {}; choose one with actq import --output NAME", list.join(", "))
     };
-    // An action that cannot be taken is not replaced by something else, as by the value that stands beside it. But beside what is drawn
-    // stands the deterministic action.
+    // An action that cannot be taken is not replaced by something else, as by the value that stands beside it. But
+    // beside what is drawn stands the deterministic action.
     let name = &outputs[one].name;
     if !is_action(name)
         && let Some((lost, error)) = errors.into_iter().find(|(lost, error)| is_action(lost) || !is_drawn(error))
@@ -307,7 +308,8 @@ fn is_drawn(error: &anyhow::Error) -> bool {
 /// Refuses several observations at once: their actions would be taken for a chunk.
 fn refuse_batch(model: &Model, read: &[usize], act_shape: &[usize]) -> Result<()> {
     let &[batch, _, ..] = act_shape else { return Ok(()) };
-    // A vector has values, not rows. One input with rows is enough: what stands beside it may be the same for all of them.
+    // A vector has values, not rows. One input with rows is enough: what stands beside it may be the same for all of
+    // them.
     let in_rows = |i: &&usize| match model.graph.inputs[**i].shape.as_deref() {
         Some(&[first, _, ..]) => first == Some(batch),
         _ => false,

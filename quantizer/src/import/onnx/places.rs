@@ -1,5 +1,5 @@
-//! Where the elements of a tensor go when it is cut, joined, turned or repeated: for each element of the result its place in the
-//! operand. What is known and what is not moves alike.
+//! Where the elements of a tensor go when it is cut, joined, turned or repeated: for each element of the result its
+//! place in the operand. What is known and what is not moves alike.
 
 use anyhow::{Context as _, Result, ensure};
 

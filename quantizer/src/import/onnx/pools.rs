@@ -40,7 +40,8 @@ pub(super) fn run(call: &Call<'_>, exprs: &mut Exprs, most: usize) -> Result<Opt
     room(&[positions.saturating_mul(size), channels], most)?;
     let (elements, len) = (x.elements(), count(lens)?);
     let windows: Vec<Vec<Option<usize>>> = (0..positions).map(|position| window(&axes, position)).collect();
-    // What stands at place k of every window, all channels of a position beside each other, as the layer before has given them.
+    // What stands at place k of every window, all channels of a position beside each other, as the layer before has
+    // given them.
     let slice = |k: usize| -> Result<Tensor> {
         let mut slice = Vec::with_capacity(positions * channels);
         for window in &windows {

@@ -137,8 +137,8 @@ fn products(exprs: &mut Exprs, a: &Tensor, b: &Tensor, factor: f64, budget: &mut
     Ok(Tensor::of_elements([of_both, vec![m, cols]].concat(), all))
 }
 
-/// The product of a vector; what is known of it goes into the bias, without its columns. The matrix that is left counts as values
-/// that come up.
+/// The product of a vector; what is known of it goes into the bias, without its columns. The matrix that is left counts
+/// as values that come up.
 pub(super) fn row_product(
     exprs: &mut Exprs,
     x: &[Element],

@@ -1,7 +1,8 @@
-//! The part of ONNX's protobuf messages that an importer reads, by the field numbers of onnx.proto (ONNX IR version 3 to 11).
+//! The part of ONNX's protobuf messages that an importer reads, by the field numbers of onnx.proto (ONNX IR version 3
+//! to 11).
 //!
-//! Messages that may occur many times stay bytes of the file until they are looked at: what a file can make prost allocate is
-//! then a small multiple of its size. On the wire, bytes and messages are the same.
+//! Messages that may occur many times stay bytes of the file until they are looked at: what a file can make prost
+//! allocate is then a small multiple of its size. On the wire, bytes and messages are the same.
 #![allow(missing_docs, reason = "the names are ONNX's own, and onnx.proto documents them")]
 
 use prost::Message;

@@ -120,7 +120,8 @@ fn batch_norm(call: &Call<'_>, exprs: &mut Exprs, eps: f64) -> Result<Tensor> {
     two("Add", exprs, &scaled, &b, x.len())
 }
 
-/// Norms of every group of channels, of one channel each where it is an instance norm, then a factor and an offset for each.
+/// Norms of every group of channels, of one channel each where it is an instance norm, then a factor and an offset for
+/// each.
 fn group_norm(call: &Call<'_>, exprs: &mut Exprs, eps: f64) -> Result<Tensor> {
     let x = call.input(0)?;
     ensure!(x.shape.len() >= 2 && x.shape[0] == 1, "takes {:?}; [1, channel, ..] is taken", x.shape);

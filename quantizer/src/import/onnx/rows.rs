@@ -1,5 +1,5 @@
-//! Rows with a number for each, as the mean of a row is: an operation on all rows and their numbers is done row by row, so that norms
-//! are found.
+//! Rows with a number for each, as the mean of a row is: an operation on all rows and their numbers is done row by row,
+//! so that norms are found.
 
 use std::collections::HashMap;
 
@@ -19,7 +19,8 @@ pub(super) fn by_row(exprs: &mut Exprs, at: Vec<usize>, operands: [&[Element]; 2
     operands.into_iter().find_map(|operand| rows(exprs, &at, operand)).unwrap_or_else(|| vec![at])
 }
 
-/// The places that have the same element of `operand`, or one that is only that one scaled, where these are sums or computed of sums.
+/// The places that have the same element of `operand`, or one that is only that one scaled, where these are sums or
+/// computed of sums.
 fn rows(exprs: &mut Exprs, at: &[usize], operand: &[Element]) -> Option<Vec<Vec<usize>>> {
     let mut rows: Vec<((Id, usize), Vec<usize>)> = Vec::new();
     let mut row_of: HashMap<(Id, usize), usize> = HashMap::new();

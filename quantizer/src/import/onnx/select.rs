@@ -43,7 +43,8 @@ impl Exprs {
         })
     }
 
-    /// `where(condition, x, limit)`, or with x and the limit the other way round, for a condition by which side of the limit x is on.
+    /// `where(condition, x, limit)`, or with x and the limit the other way round, for a condition by which side of the
+    /// limit x is on.
     pub(super) fn select_constant(&mut self, condition: Id, x: Id, limit: f64, where_true: bool) -> Option<Id> {
         let &Expr::Unary(Unary::Above(bound), of) = self.get(condition) else { return None };
         // What is compared may have a limit already, on the other side or farther away.

@@ -6,8 +6,8 @@ use super::expr::{Expr, Exprs, Id, Run};
 /// The most elements of a row that is one of a sum of slices.
 const MOST_SLICES: usize = 64;
 
-/// Sums over neighbours in runs beside each other, as a mean over time has, as a sum of slices where that takes fewer operations.
-/// `new` says what expressions have become.
+/// Sums over neighbours in runs beside each other, as a mean over time has, as a sum of slices where that takes fewer
+/// operations. `new` says what expressions have become.
 pub(super) fn sums_of_slices(exprs: &mut Exprs, runs: &[Run], new: &dyn Fn(&Id) -> Id) -> Vec<Run> {
     let mut done = Vec::new();
     let mut rest = runs;

@@ -25,7 +25,8 @@ pub(super) struct Cells {
 }
 
 impl Cells {
-    /// Finds the cells whose next states are among the outputs. `named` are the pairs that the caller knows, of input and output.
+    /// Finds the cells whose next states are among the outputs. `named` are the pairs that the caller knows, of input
+    /// and output.
     pub(super) fn find(model: &Model, exprs: &mut Exprs, outputs: &[Output], named: &[(String, String)]) -> Self {
         let mut found = Self::default();
         for output in outputs {
@@ -110,8 +111,8 @@ fn input_of(model: &Model, exprs: &Exprs, run: &Run) -> Result<(usize, String)> 
     Ok((i, printable(&port.name).into_owned()))
 }
 
-/// Runs of inputs that may be the hidden state whose next value is at `place` of an output: inputs as long as the output, those first
-/// that the caller names, then those whose name says so.
+/// Runs of inputs that may be the hidden state whose next value is at `place` of an output: inputs as long as the
+/// output, those first that the caller names, then those whose name says so.
 fn candidates(model: &Model, exprs: &mut Exprs, output: &Output, place: Run, named: &[(String, String)]) -> Vec<Run> {
     let mut found: Vec<(usize, Run)> = Vec::new();
     for (i, port) in model.graph.inputs.iter().enumerate() {

@@ -12,12 +12,12 @@ use crate::methods::options::{Activations, Options, Packing};
 use crate::methods::quantized::{Quantized, dequantized};
 use crate::random::Random;
 
-/// An int16 input must lower the error by this share of it, and by more the more of the weights are behind it: its kernel takes
-/// 1.3 to 1.7 times as long.
+/// An int16 input must lower the error by this share of it, and by more the more of the weights are behind it: its
+/// kernel takes 1.3 to 1.7 times as long.
 const WORTH: f32 = 0.03;
 const WORTH_OF_ALL: f32 = 0.12;
-/// int8's layout takes this many times int16's bytes where a matrix of few columns has mostly rows of 8 bits: int8 pads columns to
-/// 8, int16 to 4.
+/// int8's layout takes this many times int16's bytes where a matrix of few columns has mostly rows of 8 bits: int8 pads
+/// columns to 8, int16 to 4.
 const PADDED: f64 = 1.15;
 /// A small matrix has at most one in so many of all weights.
 const SMALL: usize = 10;
@@ -27,8 +27,8 @@ const INT16: u16 = Activations::Int16.limit();
 const MEASURED: usize = 8;
 const SAMPLES: usize = 256;
 
-/// Widths for all rows, and the activations' magnitudes that learning goes by: where nothing was asked for int8, but where int16
-/// takes so many bytes less that other rows get them.
+/// Widths for all rows, and the activations' magnitudes that learning goes by: where nothing was asked for int8, but
+/// where int16 takes so many bytes less that other rows get them.
 pub(super) fn allocated(
     graph: &Graph,
     dimensions: &[Dimension],
@@ -51,8 +51,8 @@ pub(super) fn allocated(
     Ok((allocate(graph, dimensions, rows, &packings(graph, &limits, options), allowed)?, limits))
 }
 
-/// The layouts that room is kept for: that of every matrix's limit, and of int16 where that is still to be chosen and likely to
-/// be worth it, as of the first and the last layer.
+/// The layouts that room is kept for: that of every matrix's limit, and of int16 where that is still to be chosen and
+/// likely to be worth it, as of the first and the last layer.
 fn packings(graph: &Graph, limits: &[u16], options: &Options) -> Vec<Vec<Packing>> {
     let all = |(matrix, &limit): (&WeightMatrix, &u16)| match options.activations.are_asked_for() {
         false if limit == INT8 && SMALL * matrix.data.len() <= graph.weights() => vec![INT8, INT16],
@@ -62,8 +62,8 @@ fn packings(graph: &Graph, limits: &[u16], options: &Options) -> Vec<Vec<Packing
     graph.matrices.iter().zip(limits).map(all).map(packed).collect()
 }
 
-/// int16 for each matrix whose input, rounded to int8, adds more to the error than int16 costs in time; for the others what
-/// they have at least.
+/// int16 for each matrix whose input, rounded to int8, adds more to the error than int16 costs in time; for the others
+/// what they have at least.
 pub(super) fn choose_activations(
     graph: &Graph,
     quantized: &[Quantized],

@@ -1,10 +1,10 @@
 //! A width for every row, to a budget.
 //!
-//! Rows (output neurons) differ far more in what they do to the actions than columns do. Row `r` at width `b` is expected to
-//! cost `eps_b * g_r * sum_c w_rc^2 h_c` of squared action error; one Lagrange multiplier, found by bisection, weighs that
-//! against bits. A row of 0 bits gives its bias alone; where its output only feeds matrices through elementwise functions, it
-//! disappears with the columns that it fed (see [`mod@super::compact`]): what those columns carried is its error, and their bits
-//! count as its saving.
+//! Rows (output neurons) differ far more in what they do to the actions than columns do. Row `r` at width `b` is
+//! expected to cost `eps_b * g_r * sum_c w_rc^2 h_c` of squared action error; one Lagrange multiplier, found by
+//! bisection, weighs that against bits. A row of 0 bits gives its bias alone; where its output only feeds matrices
+//! through elementwise functions, it disappears with the columns that it fed (see [`mod@super::compact`]): what those
+//! columns carried is its error, and their bits count as its saving.
 
 use actq_kernels::Width;
 use actq_kernels::image::block_bytes;
@@ -16,8 +16,9 @@ use crate::budget::BudgetTooSmall;
 use crate::graph::{Graph, WeightMatrix};
 use crate::methods::options::Packing;
 
-/// Expected squared error of a row in units of its own energy: that of the mid-rise grid with error feedback. At 8 bits more
-/// than rounding costs (0.00005), so that 8 bits go only where 4 are far from enough: learning mends the difference.
+/// Expected squared error of a row in units of its own energy: that of the mid-rise grid with error feedback. At 8 bits
+/// more than rounding costs (0.00005), so that 8 bits go only where 4 are far from enough: learning mends the
+/// difference.
 fn epsilon(width: Width) -> f64 {
     match width {
         Width::W2 => 0.125,
@@ -59,8 +60,8 @@ pub fn energies(matrix: &WeightMatrix, h: &[f64], g: &[f64]) -> Vec<f64> {
     rows.map(|(row, g)| g * row.iter().zip(h).map(|(w, h)| f64::from(*w).powi(2) * h).sum::<f64>()).collect()
 }
 
-/// The error of removing each element of `dimension`: the energies of the columns that it feeds, for the importances `h` of
-/// those columns about their means (which go into the biases) and `g` of the rows that they reach, by matrix.
+/// The error of removing each element of `dimension`: the energies of the columns that it feeds, for the importances
+/// `h` of those columns about their means (which go into the biases) and `g` of the rows that they reach, by matrix.
 pub fn removals(graph: &Graph, dimension: &Dimension, h: &[Vec<f64>], g: &[Vec<f64>]) -> Vec<f64> {
     let mut removals = vec![0.0; graph.matrices[dimension.maker].rows];
     for &consumer in &dimension.consumers {
@@ -74,8 +75,8 @@ pub fn removals(graph: &Graph, dimension: &Dimension, h: &[Vec<f64>], g: &[Vec<f
     removals
 }
 
-/// Bytes of the balance, and of all matrices with these widths: rows without bits and the columns that compaction removes are
-/// gone, everything else is counted. Of the packings that a matrix may get, the largest counts.
+/// Bytes of the balance, and of all matrices with these widths: rows without bits and the columns that compaction
+/// removes are gone, everything else is counted. Of the packings that a matrix may get, the largest counts.
 pub fn bytes(graph: &Graph, dimensions: &[Dimension], widths: &Widths, packings: &[Vec<Packing>]) -> usize {
     let of_matrix = |(m, packings): (usize, &Vec<Packing>)| -> usize {
         packings.iter().map(|&packing| matrix_bytes(graph, dimensions, widths, m, packing)).max().unwrap_or(0)
@@ -125,10 +126,10 @@ pub fn allocate(
     Ok(widths)
 }
 
-/// Widens rows as long as bytes are left. Blocks of rows are padded, and a row more may take hundreds of bytes or none, which
-/// no multiplier sees: again and again the rows whose errors fall most for the bytes that they take, of one matrix, one
-/// width and at most so many as a block is padded to. Rows that gain less than `least` for a bit stay as they are: what has
-/// no part in the actions shall not take time.
+/// Widens rows as long as bytes are left. Blocks of rows are padded, and a row more may take hundreds of bytes or none,
+/// which no multiplier sees: again and again the rows whose errors fall most for the bytes that they take, of one
+/// matrix, one width and at most so many as a block is padded to. Rows that gain less than `least` for a bit stay as
+/// they are: what has no part in the actions shall not take time.
 fn fill(
     widths: &mut Widths,
     graph: &Graph,
@@ -203,8 +204,8 @@ impl RowBits {
     }
 }
 
-/// The widths that minimise error plus `multiplier` times bits. What a removed row saves elsewhere depends on the other rows'
-/// widths, so the choice is repeated until it settles.
+/// The widths that minimise error plus `multiplier` times bits. What a removed row saves elsewhere depends on the other
+/// rows' widths, so the choice is repeated until it settles.
 fn choose(graph: &Graph, dimensions: &[Dimension], rows: &[Rows], multiplier: f64) -> Widths {
     let mut widths: Widths = graph.matrices.iter().map(|m| vec![Some(Width::W2); m.rows]).collect();
     for _ in 0..4 {

@@ -1,5 +1,5 @@
-//! Columns that weigh alike: what matrices read of the observation is scaled so that no column's weights and no column's values
-//! stand out.
+//! Columns that weigh alike: what matrices read of the observation is scaled so that no column's weights and no
+//! column's values stand out.
 //!
 //! Observations come in units of people's choice. A row has one scale, so an error of its weights has the same size in
 //! every column: a column whose weights are small is rounded to nothing or to much more than it was, and one whose
@@ -27,7 +27,8 @@ use crate::graph::operation::{Operand, Product};
 use crate::graph::ops::{Balance, Normalize};
 use crate::graph::{Graph, NodeKind, ValueId};
 
-/// A factor is at most so many times the others' geometric mean, or one over it: the recording need not show how far a value goes.
+/// A factor is at most so many times the others' geometric mean, or one over it: the recording need not show how far a
+/// value goes.
 const MOST: f64 = 32.0;
 /// What an operation more has to save, in bits a weight of the whole policy: 1.4% of the error.
 const WORTH: f64 = 0.01;
@@ -82,8 +83,8 @@ pub fn balance_bytes(graph: &Graph) -> usize {
     added.map(|node| Balance::bytes(node.len)).sum()
 }
 
-/// Values that depend on the observation through no matrix, and the nodes that read them through nothing but matrices which read
-/// nothing else.
+/// Values that depend on the observation through no matrix, and the nodes that read them through nothing but matrices
+/// which read nothing else.
 fn sites(graph: &Graph) -> Vec<Site> {
     let mut observed = vec![true];
     for node in &graph.nodes {
@@ -150,7 +151,8 @@ impl Columns {
         }
     }
 
-    /// Bits that each weight can do without for the error that it has: half of the logarithm of what balancing leaves of it.
+    /// Bits that each weight can do without for the error that it has: half of the logarithm of what balancing leaves
+    /// of it.
     fn saved_bits(&self) -> f64 {
         let sum = |values: &[f64]| values.iter().sum::<f64>();
         let balanced = self.weights.iter().zip(&self.values).map(|(a, h)| (a * h).sqrt()).sum::<f64>().powi(2);
@@ -221,8 +223,8 @@ mod tests {
     /// So many that a balance takes a small share of the weights' bytes.
     const ROWS: usize = 400;
 
-    /// A linear layer behind what `before` builds, over observations that `COLS` different powers of three scale, and weights that
-    /// powers of two do.
+    /// A linear layer behind what `before` builds, over observations that `COLS` different powers of three scale, and
+    /// weights that powers of two do.
     fn linear(before: impl FnOnce(&mut Graph) -> ValueId) -> Graph {
         let mut graph = Graph::new(COLS);
         let value = before(&mut graph);

@@ -2,8 +2,9 @@
 //!
 //! Each choice has three quarters of the episodes; to learn, it has an eighth of the steps. On the others its error is
 //! measured twice, at the recorded observations and at widened ones. A feed-forward network takes the choice with the
-//! lowest error at the recorded observations, among equals that with the lowest at widened ones; a recurrent one learns as
-//! widely as it can ([`Widening::choices`]), and takes feedback where that is lower at widened ones (docs/QUANTIZER.md).
+//! lowest error at the recorded observations, among equals that with the lowest at widened ones; a recurrent one learns
+//! as widely as it can ([`Widening::choices`]), and takes feedback where that is lower at widened ones
+//! (docs/QUANTIZER.md).
 
 use nalgebra::DMatrix;
 
@@ -54,8 +55,8 @@ pub fn choosing(recurrent: bool) -> f64 {
     tries / (1.0 + tries)
 }
 
-/// Tries all choices. Where no episode can be left out, or few steps are to be learned, nothing is tried. Of an iterative head
-/// feedback is not: its moments over all denoising steps take longer than what they could say is worth.
+/// Tries all choices. Where no episode can be left out, or few steps are to be learned, nothing is tried. Of an
+/// iterative head feedback is not: its moments over all denoising steps take longer than what they could say is worth.
 pub fn choose(
     task: &Task<'_>,
     windows: &Windows,
@@ -97,8 +98,8 @@ pub fn choose(
     Chosen { choice, bounds: Bounds { steps, time: left }, tried }
 }
 
-/// The best of what was tried: of those whose errors on the path differ by no more than chance, the one that is best off it.
-/// Feedback has all that it will have, learning an eighth of its steps.
+/// The best of what was tried: of those whose errors on the path differ by no more than chance, the one that is best
+/// off it. Feedback has all that it will have, learning an eighth of its steps.
 fn best(tried: &[Tried], recurrent: bool) -> Option<&Tried> {
     let left = |tried: &Tried| if matches!(tried.choice, Choice::Learning(_)) { LEFT } else { 1.0 };
     let widened = |tried: &Tried| left(tried) * tried.widened;

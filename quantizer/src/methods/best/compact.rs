@@ -20,8 +20,8 @@ pub struct Compacted {
     pub rows: Vec<Vec<usize>>,
 }
 
-/// Removes the elements that have no bits and sorts the others by width. What a removed element contributed is guessed from the
-/// elements that stay, by the moments of every matrix's input, and goes into their columns and the biases.
+/// Removes the elements that have no bits and sorts the others by width. What a removed element contributed is guessed
+/// from the elements that stay, by the moments of every matrix's input, and goes into their columns and the biases.
 pub fn compact(graph: &Graph, dimensions: &[Dimension], widths: &Widths, moments: &[&Moments]) -> Compacted {
     let mut graph = graph.clone();
     let mut widths = widths.clone();
@@ -58,8 +58,9 @@ pub fn compact(graph: &Graph, dimensions: &[Dimension], widths: &Widths, moments
     Compacted { graph, widths, columns: kept, rows: kept_rows }
 }
 
-/// Takes the columns `gone` out of account: the least-squares guess of what they contribute goes to the columns `kept`, and its
-/// constant part is returned, to be added to the biases. Where nothing is correlated, that is the contribution of their means.
+/// Takes the columns `gone` out of account: the least-squares guess of what they contribute goes to the columns `kept`,
+/// and its constant part is returned, to be added to the biases. Where nothing is correlated, that is the contribution
+/// of their means.
 fn absorb(matrix: &mut WeightMatrix, gone: &[usize], kept: &[usize], moments: &Moments) -> Vec<f32> {
     let centred = moments.centred();
     let damping = (DAMPING_INPUT * centred.trace() / matrix.cols.max(1) as f64).max(1e-30);

@@ -1,5 +1,5 @@
-//! Hidden vectors whose elements may be permuted, and folded into biases where they are constant: those that one matrix makes
-//! and that reach only matrices, through elementwise functions.
+//! Hidden vectors whose elements may be permuted, and folded into biases where they are constant: those that one matrix
+//! makes and that reach only matrices, through elementwise functions.
 
 use actq_kernels::Width;
 

@@ -1,9 +1,9 @@
-//! Distillation on the recorded observations: the quantized network learns to give what the f32 network gives. No labels, no
-//! environment.
+//! Distillation on the recorded observations: the quantized network learns to give what the f32 network gives. No
+//! labels, no environment.
 //!
-//! Codes are rounded from latent weights in units of the step; the derivative passes the rounding as if it were not there
-//! (straight-through). Row scales, biases and norms learn too. The inputs are widened ([`Widening`]), and the f32 network is asked
-//! again at the widened input.
+//! Codes are rounded from latent weights in units of the step; the derivative passes the rounding as if it were not
+//! there (straight-through). Row scales, biases and norms learn too. The inputs are widened ([`Widening`]), and the f32
+//! network is asked again at the widened input.
 
 use actq_kernels::Width;
 use ndarray::Array2;
@@ -37,8 +37,8 @@ const OF_WINDOWS: Rates = Rates { latent: 3e-2, scale: 1e-2, vector: 1e-2 };
 /// Samples of a batch: frames, or windows of a recurrent network.
 const FRAMES: usize = 256;
 const WINDOWS: usize = 16;
-/// Parts that a batch is cut into, whatever the number of threads, so that sums have one order. The fewer windows in a part, the
-/// slower the products with a recurrent matrix, which have a row for each.
+/// Parts that a batch is cut into, whatever the number of threads, so that sums have one order. The fewer windows in a
+/// part, the slower the products with a recurrent matrix, which have a row for each.
 const FRAME_SHARDS: usize = 4;
 const WINDOW_SHARDS: usize = 2;
 /// The gradient's norm is limited to this for recurrent networks.
@@ -78,8 +78,8 @@ pub struct Learned {
     pub steps: usize,
 }
 
-/// Learns codes, scales, biases and norms. `progress` is called after each step with the share done and the error on the widened
-/// inputs.
+/// Learns codes, scales, biases and norms. `progress` is called after each step with the share done and the error on
+/// the widened inputs.
 pub fn distill(task: &Task<'_>, windows: &Windows, mut progress: impl FnMut(f64, f64)) -> Learned {
     let network = Network::rounded(task.graph, task.x_max);
     let mut weights = Weights::of(task.graph);

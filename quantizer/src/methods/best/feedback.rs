@@ -1,11 +1,11 @@
-//! Two-sided error feedback, then coordinate descent: codes that keep `tr(E H E' G)` small, where `E` is the matrix's error,
-//! `H` the moment of its input and `G` that of the action error's derivative at its output.
+//! Two-sided error feedback, then coordinate descent: codes that keep `tr(E H E' G)` small, where `E` is the matrix's
+//! error, `H` the moment of its input and `G` that of the action error's derivative at its output.
 //!
-//! With `H = L D L'` and `G = M F M'` (unit lower triangles) the error is `sum_rc F_r D_c (M' E L)_rc^2`. Weights are rounded
-//! one by one, in order of falling diagonals, so that each `(M' E L)_rc`, in which it is the last to come, is as small as its
-//! grid allows: what its row (through H) and its column (through G) have got wrong before is taken back. For `G = I` that is
-//! GPTQ (arXiv 2210.17323). Sweeps of coordinate descent then move single codes, all others standing, and fit the rows' scales
-//! to their codes.
+//! With `H = L D L'` and `G = M F M'` (unit lower triangles) the error is `sum_rc F_r D_c (M' E L)_rc^2`. Weights are
+//! rounded one by one, in order of falling diagonals, so that each `(M' E L)_rc`, in which it is the last to come, is
+//! as small as its grid allows: what its row (through H) and its column (through G) have got wrong before is taken
+//! back. For `G = I` that is GPTQ (arXiv 2210.17323). Sweeps of coordinate descent then move single codes, all others
+//! standing, and fit the rows' scales to their codes.
 
 use actq_kernels::Width;
 use half::bf16;
@@ -67,12 +67,12 @@ impl Factor {
     }
 }
 
-/// Quantizes `matrix`, whose rows have these widths and `group` columns a scale (0 = none). `input` holds the moments of its
-/// input, `damping` is what is added to their diagonal, as a share of its mean; `output` is `G`; `importance` weighs the columns for
-/// the first scales.
+/// Quantizes `matrix`, whose rows have these widths and `group` columns a scale (0 = none). `input` holds the moments
+/// of its input, `damping` is what is added to their diagonal, as a share of its mean; `output` is `G`; `importance`
+/// weighs the columns for the first scales.
 ///
-/// The mean error is left to the biases, so that `H` is taken about the input's mean: returns the matrix and what is to be added
-/// to the biases behind it.
+/// The mean error is left to the biases, so that `H` is taken about the input's mean: returns the matrix and what is to
+/// be added to the biases behind it.
 pub fn feedback(
     matrix: &WeightMatrix,
     widths: &[Option<Width>],

@@ -48,8 +48,8 @@ impl Grid {
         }
     }
 
-    /// To the nearest code, ties to even; codes are far from where this ends. (The standard library's is a call where the
-    /// processor need not have an instruction for it.)
+    /// To the nearest code, ties to even; codes are far from where this ends. (The standard library's is a call where
+    /// the processor need not have an instruction for it.)
     fn round(self, code: f32) -> f32 {
         ((code + ROUND) - ROUND).clamp(self.low, self.high)
     }

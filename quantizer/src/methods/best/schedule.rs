@@ -1,8 +1,8 @@
 //! How long learning takes, and at what rate.
 //!
-//! The rate is held as long as the error falls, and then falls to zero itself, along a cosine, over 3 in 10 of all steps. So learning
-//! ends when it is done, or where it is bound, and is as good at either end as one that had been planned so long: at equal steps,
-//! no worse than a cosine from the first step on (docs/QUANTIZER.md).
+//! The rate is held as long as the error falls, and then falls to zero itself, along a cosine, over 3 in 10 of all
+//! steps. So learning ends when it is done, or where it is bound, and is as good at either end as one that had been
+//! planned so long: at equal steps, no worse than a cosine from the first step on (docs/QUANTIZER.md).
 
 use std::time::{Duration, Instant};
 
@@ -10,9 +10,9 @@ use crate::graph::Graph;
 
 /// Share of the steps at the full rate.
 const HELD: f64 = 0.7;
-/// Steps of a network of [`USUAL`] weights; others take as many as its square root of their size allows: a small network learns
-/// longer, a large one keeps its time. A step costs more where a frame is one of every denoising step of an iterative head, and
-/// four times as much where it is a batch of a recurrent network's windows.
+/// Steps of a network of [`USUAL`] weights; others take as many as its square root of their size allows: a small
+/// network learns longer, a large one keeps its time. A step costs more where a frame is one of every denoising step of
+/// an iterative head, and four times as much where it is a batch of a recurrent network's windows.
 const STEPS: f64 = 20_000.0;
 const DENOISING_STEPS: f64 = 10_000.0;
 const WINDOW_STEPS: f64 = 7_800.0;
@@ -22,7 +22,8 @@ const MOST: f64 = 20_000.0;
 /// The error's course is its means over so many parts of the most steps, of so many steps at least.
 const PARTS: usize = 16;
 const LEAST_PART: usize = 100;
-/// A part that is not lower than the lowest before it by this share has not fallen; after so many in a row learning is done.
+/// A part that is not lower than the lowest before it by this share has not fallen; after so many in a row learning is
+/// done.
 const FALLEN: f64 = 0.01;
 const FLAT: usize = 2;
 
@@ -60,7 +61,8 @@ pub struct Schedule {
     step: usize,
     /// Steps that were held, once the rate falls.
     held: Option<usize>,
-    /// The sum of the present part's errors, the mean of the last part, the lowest mean, and how many since were not lower.
+    /// The sum of the present part's errors, the mean of the last part, the lowest mean, and how many since were not
+    /// lower.
     sum: f64,
     last: Option<f64>,
     lowest: f64,
