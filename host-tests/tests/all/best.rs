@@ -97,8 +97,8 @@ fn another_seed_gives_another_image() -> Result<()> {
     Ok(())
 }
 
-/// After a share of the default steps, at about the same bits: GPTQ has one scale a row and one width, so it gets a little
-/// more. Of the UR3 the recorded figures say the same (`recorded.rs`).
+/// After a share of the default steps, at about the same bits: GPTQ has one scale a row and one width, so it gets a
+/// little more. Of the UR3 the recorded figures say the same (`recorded.rs`).
 #[test]
 fn a_recurrent_policy_has_less_than_half_of_gptqs_error() -> Result<()> {
     let Some(policies) = shared_policies() else { return Ok(()) };
