@@ -64,11 +64,5 @@ fn best_keeps_its_error_and_every_episode() -> Result<()> {
 fn rivals_keep_their_errors() -> Result<()> {
     hold(Method::Gptq, 3.0, 8.4e-3, 1.25)?;
     hold(Method::ActQuant(Choices::default()), 4.0, 1.56e-2, 2.6)?;
-    // The fewest bits that GPTQ's codes and scales take: it loses most episodes.
-    let (nmse, kept, _) = figures(&Options::new(Method::Gptq, Budget::BitsPerWeight(2.1)))?;
-    assert!(
-        nmse < ROOM * 0.16 && nmse > 0.16 / ROOM && 2 * (kept as u64) < EPISODES,
-        "gptq at 2.1 bits: {nmse}, {kept} episodes"
-    );
     Ok(())
 }
