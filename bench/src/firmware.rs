@@ -135,7 +135,8 @@ pub fn portable_binary(name: &str, target: Target) -> Result<PathBuf> {
     // In a folder of its own, so that builds of both kinds stay.
     let folder = target_dir().join("portable");
     let features = target.feature().unwrap_or_default();
-    Ok(build(BENCH, &[name], features, &folder, target, "release", &[("ACTQ_BACKEND", "portable")])?.join(name))
+    Ok(build(BENCH, &[name], features, &folder, target, "firmware-portable", &[("ACTQ_BACKEND", "portable")])?
+        .join(name))
 }
 
 /// Builds binaries of a package and gives the folder of their ELF files: a folder of the board and its features,

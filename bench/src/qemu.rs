@@ -111,7 +111,7 @@ impl Server {
 }
 
 /// The profile of the plugin (`Cargo.toml`).
-const PROFILE: &str = "host";
+const PROFILE: &str = "release";
 
 /// Counts instructions in the regions that a firmware marks.
 #[derive(Debug)]

@@ -1,4 +1,4 @@
-"""Exports modules of every kind and compares each with onnxruntime: ACTQ=target/host/actq python3 test_actq_export.py"""
+"""Exports modules of every kind and compares each with onnxruntime: ACTQ=target/release/actq python3 test_actq_export.py"""
 import json
 import os
 import tempfile

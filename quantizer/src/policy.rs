@@ -31,6 +31,8 @@ pub struct Policy {
     pub graph: Graph,
     /// Weights of all its matrices as they were trained, which bits per weight refer to.
     pub weights: usize,
+    /// Its trained values ([`Graph::parameters`]), before what depends on the time alone became tables.
+    pub parameters: usize,
     /// SHA-256 of policy.json, then policy.safetensors.
     pub digest: [u8; 32],
 }
@@ -49,6 +51,7 @@ impl Policy {
             rate_hz: 50.0,
             contract: ActionContract::default(),
             weights: graph.weights(),
+            parameters: graph.parameters(),
             graph,
             digest: [0; 32],
         }

@@ -8,7 +8,7 @@ use actq_boards::{Application, Target, root, target_dir};
 use actq_kernels::Image;
 use anyhow::{Context as _, Result, bail, ensure};
 
-use crate::{cargo, setup};
+use crate::setup::{self, cargo};
 
 const USAGE: &str = "\
 Usage: cargo xtask firmware --board NAME [--image FILE.actq] [--features LIST] [--key HEX] --out FILE.elf
@@ -137,12 +137,12 @@ fn example() -> Result<PathBuf> {
     let mut build = cargo();
     // With actq-bench, for the features that tests and measurements are built with: else the quantizer would be built
     // once more.
-    build.current_dir(root()).args(["build", "--quiet", "--profile", "host", "--bin", "actq"]);
+    build.current_dir(root()).args(["build", "--quiet", "--release", "--bin", "actq"]);
     let built =
         build.args(["--package", "actq", "--package", "actq-bench"]).status().context("cargo cannot be started")?;
     ensure!(built.success(), "actq does not build");
     let mut command =
-        Command::new(target_dir().join("host").join("actq").with_extension(std::env::consts::EXE_EXTENSION));
+        Command::new(target_dir().join("release").join("actq").with_extension(std::env::consts::EXE_EXTENSION));
     command.current_dir(root()).args(["quantize", "examples/ur3/policy", "--method", "rtn", "--bits", "3"]);
     let output = command.args(["--group", "32", "--activations", "8", "--out"]).arg(&new).output()?;
     ensure!(output.status.success(), "the UR3 policy: {}", String::from_utf8_lossy(&output.stderr));

@@ -6,12 +6,13 @@
 //! `actq-bench`.
 #![forbid(unsafe_code)]
 
-mod cpu;
+mod cost;
 mod firmware;
+mod relay;
 mod setup;
 mod verify;
 
-use std::process::{Command, ExitCode};
+use std::process::ExitCode;
 
 use actq_boards::Target;
 use anyhow::{Context as _, Result, ensure};
@@ -27,16 +28,22 @@ Commands of the actq workspace. Usage: cargo xtask COMMAND
   faults   Drive an arm through the serial port of the controller in QEMU, with faults on the line
   stack    Show the most stack that the controller can take, from the calls in its ELF file: --board NAME, or --elf FILE
   fit      Measure the cost model's rates anew (after every change of the kernels)
-  verify   Everything that CI checks: format, lints, documentation, tests on the host and under QEMU, budgets
+  verify   Format, lints, tests, a smoke run in QEMU; with --all everything that CI checks
   doctor   Check and install what the other commands need: Rust targets and QEMU
 
-demo, bench, budgets, compare, faults, fit, firmware and stack show their options with --help.";
+demo, verify, bench, budgets, compare, faults, fit, firmware and stack show their options with --help.";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let outcome = match &words[..] {
-        ["verify"] => verify::run(),
+        ["verify", options @ ..] => match verify::Options::parse(options) {
+            Ok(options) => options.run(),
+            Err(wrong) => {
+                eprintln!("{wrong}");
+                return ExitCode::from(2);
+            }
+        },
         ["doctor"] => setup::ensure(&Target::ALL).map(|()| println!("all there")),
         ["firmware", options @ ..] => match firmware::Options::parse(options) {
             Ok(options) => options.run(),
@@ -79,14 +86,9 @@ fn measure(arguments: &[&str], targets: &[Target]) -> Result<()> {
 
 /// A command of `actq-bench`.
 fn measuring(arguments: &[&str]) -> Result<()> {
-    let mut command = cargo();
-    command.args(["run", "--profile", "host", "--package", "actq-bench", "--"]).args(arguments);
+    let mut command = setup::cargo();
+    command.args(["run", "--release", "--package", "actq-bench", "--"]).args(arguments);
     println!("building what quantizes and measures");
     ensure!(command.status().context("cargo cannot be started")?.success(), "{} failed", arguments[0]);
     Ok(())
-}
-
-/// The cargo that runs this.
-fn cargo() -> Command {
-    Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }

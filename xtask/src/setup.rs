@@ -7,6 +7,11 @@ use std::process::{Command, Stdio};
 use actq_boards::{Target, version};
 use anyhow::{Context, Result, bail, ensure};
 
+/// The cargo that runs this.
+pub(crate) fn cargo() -> Command {
+    Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+}
+
 /// Installs what these targets need and is missing, where that can be done without asking.
 pub(crate) fn ensure(targets: &[Target]) -> Result<()> {
     for target in targets {

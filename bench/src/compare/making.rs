@@ -126,7 +126,7 @@ impl<'a> Maker<'a> {
             }
         };
         let seconds = preparing + begun.elapsed().as_secs_f64();
-        let (weights, parameters) = (policy.graph.weights(), policy.graph.parameters());
+        let (weights, parameters) = (policy.weights, policy.parameters);
         // Everything but the matrices stays in f32.
         let bytes = simulated.bytes + 4 * (parameters - weights);
         let made = Made {
@@ -178,7 +178,7 @@ impl<'a> Maker<'a> {
             nmse: report.nmse,
             bpw: report.bpw,
             bytes: report.bytes,
-            bytes_per_parameter: report.bytes as f64 / self.subject.policy.graph.parameters().max(1) as f64,
+            bytes_per_parameter: report.bytes as f64 / self.subject.policy.parameters.max(1) as f64,
             format: if group == 0 { "row".to_owned() } else { group.to_string() },
             default_group: group == method.default_group(),
             seconds,

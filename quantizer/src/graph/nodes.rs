@@ -70,9 +70,10 @@ impl Graph {
         self.nodes.iter().flat_map(|node| node.kind.state_lens()).sum()
     }
 
-    /// Weights and biases and all other constants, counted as the f32 policy stores them.
+    /// Number of trained values, as the f32 policy stores them: weights, biases, norms. Statistics that normalize the
+    /// observation are not trained and do not count.
     pub fn parameters(&self) -> usize {
-        self.nodes.iter().map(|node| node.kind.constants()).sum::<usize>() + self.weights()
+        self.nodes.iter().map(|node| node.kind.trained_values()).sum::<usize>() + self.weights()
     }
 
     /// Elements of all weight matrices.

@@ -59,8 +59,8 @@ pub trait Operation {
         Vec::new()
     }
 
-    /// Constants beside the matrices, counted as the f32 policy stores them.
-    fn constants(&self) -> usize {
+    /// Number of trained values beside the matrices, as the f32 policy stores them.
+    fn trained_values(&self) -> usize {
         self.vectors().into_iter().map(Vec::len).sum()
     }
 

@@ -88,18 +88,18 @@ fn build(dir: &Path, json: &Json, weights: Weights<'_>, digest: [u8; 32]) -> Res
         }
         Ok(())
     };
-    let (graph, weights) = if kind.is_iterative() {
+    let (graph, (weights, parameters)) = if kind.is_iterative() {
         let len = chunk * json.act_dim;
         let by = &json.denoising;
         let schedule = if kind == Kind::Flow { by.flow(len)? } else { by.diffusion(len)? };
         let (mut builder, times) = Builder::iterative(json.obs_dim, by, &schedule, weights)?;
         add(&mut builder)?;
-        let trained = builder.graph.weights();
+        let trained = (builder.graph.weights(), builder.graph.parameters());
         (hoist::iterative(&builder.graph, json.obs_dim, &times, schedule.denoising)?, trained)
     } else {
         let mut builder = Builder::new(json.obs_dim, weights);
         add(&mut builder)?;
-        let trained = builder.graph.weights();
+        let trained = (builder.graph.weights(), builder.graph.parameters());
         (builder.graph, trained)
     };
     let policy = Policy {
@@ -112,6 +112,7 @@ fn build(dir: &Path, json: &Json, weights: Weights<'_>, digest: [u8; 32]) -> Res
         rate_hz: positive(json.control_hz.unwrap_or(50.0), "control_hz")?,
         contract: json.contract(kind)?,
         weights,
+        parameters,
         graph,
         digest,
     };

@@ -25,8 +25,7 @@ pub fn summary(imported: &Imported, policy: &Policy) -> String {
     text += &format!("ops       {}\n", list(&counted(&imported.ops)));
     text += &format!(
         "network   {} weights, {} parameters; everything else in the file is folded into them or only moves values\n",
-        policy.graph.weights(),
-        policy.graph.parameters()
+        policy.weights, policy.parameters
     );
     for (what, names) in [("inputs", &imported.cut_inputs), ("outputs", &imported.cut_outputs)] {
         if !names.is_empty() {

@@ -93,7 +93,7 @@ fn report(head: &Head) -> Result<String> {
             slices(image, half as u32)?,
         ]);
     }
-    let (name, parameters) = (&policy.name, policy.graph.parameters());
+    let (name, parameters) = (&policy.name, policy.parameters);
     Ok(format!("{name}: {} weights, {} bytes in f32\n{rows}", policy.weights, 4 * parameters))
 }
 

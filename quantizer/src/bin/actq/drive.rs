@@ -14,7 +14,7 @@ use actq::serve::wait_for_recorders;
 use actq::text::quoted;
 use anyhow::{Context as _, Result, ensure};
 
-use crate::note;
+use crate::terminal::note;
 
 /// How long recorders may take to write their last episode once the command has ended.
 const PATIENCE: Duration = Duration::from_secs(60);

@@ -7,7 +7,7 @@ use actq::runtime::ImageBuffer;
 use anyhow::{Context as _, Result};
 
 use crate::args::EvalArgs;
-use crate::{note, print};
+use crate::terminal::{note, print};
 
 /// Runs an image over recordings and says how far it is from the f32 policy.
 pub(crate) fn run(args: &EvalArgs) -> Result<()> {

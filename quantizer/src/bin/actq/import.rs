@@ -17,7 +17,7 @@ use actq::report::{imported, notes};
 use anyhow::{Context as _, Result, bail, ensure};
 
 use crate::args::ImportArgs;
-use crate::{note, print};
+use crate::terminal::{note, print};
 
 /// Observations that the check draws, and takes of a recording.
 const FRAMES: usize = 256;

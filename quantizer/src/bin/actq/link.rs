@@ -21,7 +21,7 @@ use anyhow::{Context as _, Result, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use self::args::{LinkArgs, LinkCommand, PortArgs, PushArgs, StreamArgs, WatchArgs};
-use crate::{note, print, progress_bar, set_share};
+use crate::terminal::{note, print, progress_bar, set_share};
 
 /// Between two tables of `watch`.
 const REFRESH: Duration = Duration::from_millis(200);

@@ -5,19 +5,20 @@ mod args;
 mod drive;
 mod eval;
 mod import;
+mod inputs;
 mod link;
 mod quantize;
 mod serve;
 mod sign;
+mod terminal;
+mod threads;
 mod tune;
 
-use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use actq::data::{Learned, Recording, Recordings, Sizes, files_of};
 use actq::emit::files;
-use actq::import::{FILES, is_onnx};
 use actq::measure::time::StepTime;
 use actq::methods::Method;
 use actq::pipeline::stats::Stats;
@@ -27,11 +28,13 @@ use actq::report::widths::Widths;
 use actq::report::{self, inspect, notes, time};
 use actq::runtime::ImageBuffer;
 use actq::text::printable;
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, ensure};
 use clap::Parser as _;
-use indicatif::{ProgressBar, ProgressStyle};
 
 use args::{Cli, Command, InspectArgs, SweepArgs};
+use inputs::policy_files;
+use terminal::{note, print, progress_bar, set_share};
+use threads::start_threads;
 
 fn main() -> ExitCode {
     match run(Cli::parse().command) {
@@ -58,38 +61,6 @@ fn run(command: Command) -> Result<()> {
     }
 }
 
-/// Notes go to standard error, so that the report stays as it is.
-fn note(notes: impl IntoIterator<Item = String>) {
-    // That nobody reads them is no error.
-    notes.into_iter().for_each(|note| drop(writeln!(io::stderr(), "note: {}", printable(&note))));
-}
-
-/// Prints; that a reader has gone away (as `head` does) is no error.
-fn print(text: &str) -> Result<()> {
-    let lines: Vec<_> = text.split('\n').map(printable).collect();
-    match io::stdout().write_all(lines.join("\n").as_bytes()) {
-        Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),
-        other => other.context("standard output cannot be written"),
-    }
-}
-
-/// Steps of the progress bar; the work reports the share done.
-const PROGRESS: u64 = 1000;
-
-fn progress_bar() -> Result<ProgressBar> {
-    // Within 80 columns: a bar that wraps flickers.
-    let style = ProgressStyle::with_template("{msg:30} {bar:30} {percent:>3}%, {eta} left").context("progress bar")?;
-    Ok(ProgressBar::new(PROGRESS).with_style(style))
-}
-
-fn set_share(bar: &ProgressBar, share: f64) {
-    bar.set_position((share * PROGRESS as f64) as u64);
-}
-
-fn start_threads(threads: u16) -> Result<()> {
-    rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global().context("threads cannot be started")
-}
-
 fn run_inspect(args: &InspectArgs) -> Result<()> {
     let inputs = [Some(&args.image), args.stats.as_ref()].into_iter().flatten().cloned().collect::<Vec<_>>();
     files::check_outputs(args.svg.as_deref().as_slice(), &inputs)?;
@@ -108,12 +79,6 @@ fn run_inspect(args: &InspectArgs) -> Result<()> {
         files::write(path, widths.svg().as_bytes())?;
     }
     print(&widths.report())
-}
-
-/// All files that a policy's folder may hold, whether they are there or not.
-fn policy_files(dir: &Path) -> Vec<PathBuf> {
-    let own = if is_onnx(dir) { vec![dir.to_owned()] } else { FILES.map(|name| dir.join(name)).to_vec() };
-    own.into_iter().chain(Recording::Calib.paths(dir)).chain(Recording::Heldout.paths(dir)).collect()
 }
 
 fn run_sweep(args: &SweepArgs) -> Result<()> {

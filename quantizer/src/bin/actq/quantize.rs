@@ -18,7 +18,9 @@ use actq_kernels::Width;
 use anyhow::{Result, bail};
 
 use crate::args::{ActivationArg, MethodArg, QuantizeArgs};
-use crate::{note, policy_files, print, progress_bar, set_share, start_threads};
+use crate::inputs::policy_files;
+use crate::terminal::{note, print, progress_bar, set_share};
+use crate::threads::start_threads;
 
 /// Quantizes a policy, writes the image and says what became of it.
 pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
@@ -63,7 +65,7 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
     let sampled = quantizer.method().sampled().map_or(String::new(), quantized::sampled);
     let learned = sampled + &found.learning.as_ref().map_or(String::new(), quantized::learning);
     let time = found.time.as_ref().map_or(String::new(), time::sentence);
-    let (parameters, bytes) = (source.graph.parameters(), found.image.len());
+    let (parameters, bytes) = (source.parameters, found.image.len());
     let f32_bytes = 4 * parameters;
     print(&format!(
         "{search}{}{learned}\n{}: {bytes} bytes. The policy's {parameters} parameters take {f32_bytes} bytes in f32 ({:.1}x) and {} in \

@@ -10,7 +10,7 @@ use actq_kernels::Image;
 use anyhow::{Result, ensure};
 
 use crate::args::ServeArgs;
-use crate::note;
+use crate::terminal::note;
 
 /// Serves an image, and records what it is shown where that was asked for.
 pub(crate) fn run(args: &ServeArgs) -> Result<()> {

@@ -6,7 +6,7 @@ use actq_device::keys;
 use anyhow::Result;
 
 use crate::link::args::{KeygenArgs, SignArgs};
-use crate::print;
+use crate::terminal::print;
 
 /// Makes a key.
 pub(crate) fn keygen(args: &KeygenArgs) -> Result<()> {

@@ -16,7 +16,9 @@ use tempfile::TempDir;
 
 use crate::args::{LearnArgs, TuneArgs};
 use crate::drive::Drive;
-use crate::{note, policy_files, print, progress_bar, set_share, start_threads};
+use crate::inputs::policy_files;
+use crate::terminal::{note, print, progress_bar, set_share};
+use crate::threads::start_threads;
 
 /// Quantizes, drives, and learns again from what was driven.
 pub(crate) fn run(args: &TuneArgs) -> Result<()> {

@@ -48,7 +48,7 @@ impl Operation for Lstm {
         vec![&mut self.bias]
     }
 
-    fn constants(&self) -> usize {
+    fn trained_values(&self) -> usize {
         // torch stores both biases.
         2 * self.bias.len()
     }

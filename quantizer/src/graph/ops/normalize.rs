@@ -27,10 +27,6 @@ impl Operation for Normalize {
         Ok(len)
     }
 
-    fn constants(&self) -> usize {
-        self.mean.len() + self.scale.len()
-    }
-
     fn forward(&self, run: &Forward<'_>, _: &mut NodeState) -> (Array2<f32>, Saved) {
         let Self { mean, scale, pre_clip, clip } = self;
         let mut y = run.input(0).clone();
@@ -93,10 +89,6 @@ impl Balance {
 impl Operation for Balance {
     fn output_len(&self, matrices: &[WeightMatrix], inputs: &[usize]) -> Result<usize> {
         self.0.output_len(matrices, inputs)
-    }
-
-    fn constants(&self) -> usize {
-        self.0.constants()
     }
 
     fn forward(&self, run: &Forward<'_>, state: &mut NodeState) -> (Array2<f32>, Saved) {

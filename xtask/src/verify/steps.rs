@@ -1,0 +1,186 @@
+//! The steps of `cargo verify`.
+
+use std::process::Command;
+
+use actq_boards::{Target, root};
+
+use crate::setup::cargo;
+use crate::{firmware, setup};
+
+/// The oldest supported compiler.
+const OLDEST: &str = concat!(env!("CARGO_PKG_RUST_VERSION"), ".0");
+
+/// A host target with 32-bit words that runs on x86-64 Linux. `.cargo/config.toml` has its linker.
+const NARROW: &str = "i686-unknown-linux-musl";
+
+/// The packages that are built for boards only.
+const FIRMWARE: [&str; 2] = ["actq-firmware-support", "actq-firmware-bench"];
+/// The application; its parts that need no board are built and tested on the host.
+const APPLICATION: &str = "actq-firmware-demo";
+/// The head in firmware of other styles.
+const STYLES: &str = "actq-firmware-styles";
+/// The comparison of the ONNX importer with tract, which takes minutes to build.
+const ONNX_TESTS: &str = "actq-onnx-tests";
+
+/// The tests in QEMU that `cargo verify` runs, and those that only `cargo verify --all` runs: modules of
+/// `host-tests/tests/all`.
+const SMOKE: &str = "smoke::";
+const ON_TARGET: &str = "on_target::";
+
+/// A command with a name.
+pub(super) struct Step {
+    pub(super) name: String,
+    /// The command, or why it cannot be run.
+    pub(super) command: Result<Command, String>,
+}
+
+/// What must be installed besides targets and QEMU: for each, why it is not.
+pub(super) struct Installed {
+    /// The oldest supported compiler.
+    pub(super) oldest: Result<(), String>,
+    /// A host target with 32-bit words.
+    pub(super) narrow: Result<(), String>,
+}
+
+impl Installed {
+    /// Installs both where that is possible.
+    pub(super) fn ensure() -> Self {
+        let narrow = match cfg!(all(target_arch = "x86_64", target_os = "linux")) {
+            true => setup::rust_target(NARROW).map_err(|error| format!("{error:#}")),
+            false => Err(format!("this machine does not run {NARROW}")),
+        };
+        Self { oldest: setup::toolchain(OLDEST), narrow }
+    }
+}
+
+/// The steps of the short run.
+pub(super) fn short() -> Vec<Step> {
+    let mut steps = Steps::default();
+    steps.format_and_lints();
+    steps.add("tests", &[&TESTS, &["--", "--skip", SMOKE, "--skip", ON_TARGET][..]].concat());
+    steps.add("smoke run in QEMU", &["test", "--release", "--package", "actq-host-tests", "--", SMOKE]);
+    steps.0
+}
+
+/// All steps.
+pub(super) fn all(installed: Installed) -> Vec<Step> {
+    let mut steps = Steps::default();
+    steps.format_and_lints();
+    steps.add("tests", &TESTS);
+    steps.board_lints();
+    steps.application_lints();
+    steps.documentation();
+    steps.add("budgets", &["run", "--release", "--package", "actq-bench", "--", "budgets"]);
+    steps.add("faults on the line", &["run", "--release", "--package", "actq-bench", "--", "faults"]);
+    steps.add("ONNX files against tract", &["test", "--release", "--package", ONNX_TESTS]);
+    steps.narrow(installed.narrow);
+    steps.oldest(installed.oldest);
+    steps.0
+}
+
+const TESTS: [&str; 3] = ["test", "--release", "--no-fail-fast"];
+const DENY: [&str; 3] = ["--", "-D", "warnings"];
+
+/// All packages for the host, without those that are built for boards only and the comparison with tract.
+fn host_packages() -> Vec<&'static str> {
+    let [support, benches] = FIRMWARE;
+    vec!["--workspace", "--exclude", support, "--exclude", benches, "--exclude", ONNX_TESTS]
+}
+
+fn build_for(target: Target) -> [&'static str; 4] {
+    ["--target", target.triple(), "--profile", target.profile()]
+}
+
+#[derive(Default)]
+struct Steps(Vec<Step>);
+
+impl Steps {
+    /// Adds a cargo command with variables of its environment.
+    fn add_with(&mut self, name: &str, arguments: &[&str], environment: &[(&str, &str)]) {
+        let mut command = cargo();
+        command.current_dir(root()).args(arguments).envs(environment.iter().copied());
+        self.0.push(Step { name: name.to_owned(), command: Ok(command) });
+    }
+
+    fn add(&mut self, name: &str, arguments: &[&str]) {
+        self.add_with(name, arguments, &[]);
+    }
+
+    /// Adds a command that reads the firmware without running it: for the image that it includes, any file will do.
+    fn add_of_firmware(&mut self, name: &str, arguments: &[&str], environment: &[(&str, &str)]) {
+        let any_file = root().join("Cargo.toml").display().to_string();
+        self.add_with(name, arguments, &[environment, &[("ACTQ_IMAGE", &any_file)]].concat());
+    }
+
+    fn format_and_lints(&mut self) {
+        self.add("format", &["fmt", "--all", "--check"]);
+        let arguments = [&["clippy", "--all-targets", "--release"], &host_packages()[..], &DENY].concat();
+        self.add_of_firmware("lints", &arguments, &[]);
+    }
+
+    /// Adds the lints of the firmware that measures, for every target.
+    fn board_lints(&mut self) {
+        for target in Target::ALL {
+            let mut arguments = [&["clippy"], &build_for(target)[..]].concat();
+            arguments.extend(["--package", "actq-kernels"]);
+            arguments.extend(FIRMWARE.iter().flat_map(|name| ["--package", name]));
+            arguments.extend(["--lib", "--bin", "harness"]);
+            arguments.extend(target.board().shows.iter().flat_map(|binary| ["--bin", binary]));
+            arguments.extend(["--features", target.feature().unwrap_or_default()]);
+            arguments.extend(DENY);
+            self.add_of_firmware(&format!("lints of the firmware, {target:?}"), &arguments, &[]);
+        }
+    }
+
+    /// Adds the lints of the application with all its features, for every board, and of the other firmware styles.
+    fn application_lints(&mut self) {
+        let programs = ["--lib", "--bin", "controller", "--features"];
+        for (target, _) in firmware::boards() {
+            let name = target.board().name;
+            let features = [name, "defmt-rtt", "faults"].map(|feature| format!("{APPLICATION}/{feature}")).join(",");
+            let packages = ["--package", APPLICATION, "--package", "actq-boards"];
+            let arguments = [&["clippy"], &build_for(target)[..], &packages, &programs, &[&features], &DENY].concat();
+            self.add_of_firmware(&format!("lints of the application, {name}"), &arguments, &[]);
+        }
+        let fpu = build_for(Target::Fpu);
+        let features = ["mps2-an386,tick-8khz,foc,signed"];
+        let arguments = [&["clippy", "--package", APPLICATION], &fpu[..], &programs, &features, &DENY].concat();
+        // Any 64 digits will do.
+        let key = "0".repeat(64);
+        self.add_of_firmware("lints of the application's other features", &arguments, &[("ACTQ_PUBLIC_KEY", &key)]);
+        let current_loop = ["test", "--release", "--package", APPLICATION, "--lib", "--features", "foc"];
+        self.add("tests of the application's current loop", &current_loop);
+        let styles = [&["clippy", "--package", STYLES, "--lib", "--bins"], &fpu[..], &DENY].concat();
+        self.add_of_firmware("lints of the styles", &styles, &[]);
+        let defmt = [&["clippy", "--package", "actq-kernels", "--features", "defmt"], &fpu[..], &DENY].concat();
+        self.add("optional features", &defmt);
+    }
+
+    fn documentation(&mut self) {
+        let deny = [("RUSTDOCFLAGS", "-D warnings")];
+        let host = [&["doc", "--no-deps", "--release"], &host_packages()[..], &["--exclude", "xtask"]].concat();
+        self.add_of_firmware("documentation", &host, &deny);
+        let firmware = FIRMWARE.map(|name| ["--package", name]).concat();
+        let firmware = [&["doc", "--no-deps"], &build_for(Target::Fpu)[..], &firmware].concat();
+        self.add_of_firmware("documentation of the firmware", &firmware, &deny);
+    }
+
+    fn narrow(&mut self, installed: Result<(), String>) {
+        let command = installed.map(|()| {
+            let mut command = cargo();
+            command.current_dir(root());
+            command.args(["test", "--release", "--package", "actq-kernels", "--target", NARROW]);
+            command
+        });
+        self.0.push(Step { name: "kernels' tests with words of 32 bits".to_owned(), command });
+    }
+
+    fn oldest(&mut self, installed: Result<(), String>) {
+        let command = installed.map(|()| {
+            let mut command = Command::new("rustup");
+            command.current_dir(root()).args(["run", OLDEST, "cargo", "check", "--release"]).args(host_packages());
+            command
+        });
+        self.0.push(Step { name: format!("oldest compiler, {OLDEST}"), command });
+    }
+}
