@@ -11,9 +11,10 @@
 pub mod no_stage;
 pub mod port;
 pub mod ram;
-mod ring;
 pub mod seams;
 
+#[cfg(not(target_os = "none"))]
+mod board;
 #[cfg(not(target_os = "none"))]
 mod link;
 #[cfg(not(target_os = "none"))]
@@ -39,10 +40,8 @@ pub mod stm32f405;
 #[cfg(all(target_os = "none", feature = "device"))]
 mod vectors;
 
-/// Words of scratch memory that the application gives to a head on Arm's MPS2 boards.
-#[cfg(any(not(target_os = "none"), feature = "cmsdk"))]
-pub(crate) const MPS2_SCRATCH: usize = 24 * 1024;
-
+#[cfg(not(target_os = "none"))]
+pub use board::{Application, Board, Transport};
 #[cfg(not(target_os = "none"))]
 pub use link::link;
 #[cfg(all(target_os = "none", any(feature = "mps2-an386", feature = "mps2-an500")))]
@@ -52,4 +51,4 @@ pub use mps2_an505::device;
 #[cfg(all(target_os = "none", feature = "stm32f405"))]
 pub use stm32f405::device;
 #[cfg(not(target_os = "none"))]
-pub use table::{Application, Board, Clock, Target, Transport, root, target_dir, version};
+pub use table::{Clock, Target, root, target_dir, version};

@@ -3,7 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
-use crate::Target;
+use crate::table::Target;
+
+/// The memory of the default board, which link.x finds at the workspace's root.
+const DEFAULT_MEMORY: &str = "memory.x";
 
 /// Links the package's binaries for a board; on the host, does nothing. For build scripts of packages one folder below
 /// the workspace's root.
@@ -20,14 +23,21 @@ pub fn link() -> Result<(), String> {
     // The variable of this run: a build script may have been compiled for another checkout.
     let [package, out] =
         ["CARGO_MANIFEST_DIR", "OUT_DIR"].map(|name| PathBuf::from(env::var_os(name).unwrap_or_default()));
-    let script = package.parent().unwrap_or(Path::new(".")).join(board.memory);
+    let root = package.parent().unwrap_or(Path::new("."));
+    let script = root.join(board.memory);
     println!("cargo::rerun-if-changed={}", script.display());
     if target.triple().starts_with("riscv") {
+        // riscv-rt's link.x includes no memory.x.
         println!("cargo::rustc-link-arg-bins=-T{}", script.display());
     } else {
-        // The name that cortex-m-rt's link.x includes; riscv-rt's includes none.
-        fs::copy(&script, out.join("memory.x")).map_err(|error| format!("{}: {error}", script.display()))?;
-        // What it includes for a device: a handler that a program need not have.
+        // cortex-m-rt's link.x includes `memory.x`. Cargo starts the linker in the workspace's root, and the linker looks
+        // there before its search path: it always finds the default board's file, and for another board reads that
+        // board's in its place.
+        println!("cargo::rustc-link-search={}", root.display());
+        if board.memory != DEFAULT_MEMORY {
+            println!("cargo::rustc-link-arg-bins=--remap-inputs=*{DEFAULT_MEMORY}={}", script.display());
+        }
+        // It also includes device.x: a handler that a program need not have.
         fs::write(out.join("device.x"), "PROVIDE(SERIAL = DefaultHandler);\n")
             .map_err(|error| format!("device.x: {error}"))?;
         println!("cargo::rustc-link-search={}", out.display());

@@ -5,31 +5,34 @@ use core::convert::Infallible;
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use embedded_io::{ErrorType, Read, ReadReady, Write, WriteReady};
+use heapless::spsc::{Consumer, Producer, Queue};
 
-use crate::ring::Ring;
 use crate::seams::Uart;
 
 /// Bytes that wait in each direction at most.
-pub const ROOM: usize = 512;
+pub const ROOM: usize = LEN - 1;
+/// Bytes of memory of a queue, one of which is always free. A power of two, for its remainders.
+const LEN: usize = 512;
 
 /// The memory of a port.
 #[derive(Debug)]
 pub struct Buffers {
-    input: Ring<ROOM>,
-    output: Ring<ROOM>,
+    input: Queue<u8, LEN>,
+    output: Queue<u8, LEN>,
     lost: AtomicU32,
 }
 
 impl Buffers {
     /// Empty.
     pub const fn new() -> Self {
-        Self { input: Ring::new(), output: Ring::new(), lost: AtomicU32::new(0) }
+        Self { input: Queue::new(), output: Queue::new(), lost: AtomicU32::new(0) }
     }
 
     /// Both ends. `kick` makes the interrupt of `uart` come: what it is to transmit is there.
     pub fn split<U: Uart>(&mut self, uart: U, kick: fn()) -> (Wire<'_, U>, Port<'_>) {
-        let buffers = &*self;
-        (Wire { uart, buffers }, Port { buffers, kick })
+        let Self { input, output, lost } = self;
+        let ((received, input), (output, waiting)) = (input.split(), output.split());
+        (Wire { uart, input: received, output: waiting, lost }, Port { input, output, lost, kick })
     }
 }
 
@@ -40,36 +43,39 @@ impl Default for Buffers {
 }
 
 /// The interrupt's end.
-#[derive(Debug)]
 pub struct Wire<'b, U> {
     uart: U,
-    buffers: &'b Buffers,
+    input: Producer<'b, u8>,
+    output: Consumer<'b, u8>,
+    lost: &'b AtomicU32,
 }
 
 impl<U: Uart> Wire<'_, U> {
     /// What the interrupt does: takes what has come, gives what can go.
     pub fn on_interrupt(&mut self) {
-        let Buffers { input, output, lost } = self.buffers;
-        while let Some(byte) = self.uart.receive() {
-            if !byte.is_ok_and(|byte| input.put(byte)) {
+        let Self { uart, input, output, lost } = self;
+        while let Some(byte) = uart.receive() {
+            if !byte.is_ok_and(|byte| put(input, byte)) {
                 // Written here alone, so a load and a store lose nothing.
                 lost.store(lost.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
             }
         }
+        // What puts bytes in cannot interrupt this, so a byte that is seen is whole.
         while let Some(byte) = output.peek() {
-            if !self.uart.transmit(byte) {
+            if !uart.transmit(*byte) {
                 break;
             }
-            output.take();
+            take(output);
         }
-        self.uart.ask_for_room(output.len() > 0);
+        uart.ask_for_room(output.ready());
     }
 }
 
 /// The program's end.
-#[derive(Debug)]
 pub struct Port<'b> {
-    buffers: &'b Buffers,
+    input: Consumer<'b, u8>,
+    output: Producer<'b, u8>,
+    lost: &'b AtomicU32,
     kick: fn(),
 }
 
@@ -77,12 +83,12 @@ impl Port<'_> {
     /// Bytes that were received and lost since the start, modulo 2^32: overrun, wrongly framed, or without room in the
     /// queue.
     pub fn lost(&self) -> u32 {
-        self.buffers.lost.load(Ordering::Relaxed)
+        self.lost.load(Ordering::Relaxed)
     }
 
     /// Lets what waits go on, where the interrupt does not come by itself; to be called again and again.
     pub fn pump(&self) {
-        if self.buffers.output.len() > 0 {
+        if has_bytes(&self.output) {
             (self.kick)();
         }
     }
@@ -94,13 +100,13 @@ impl ErrorType for Port<'_> {
 
 impl ReadReady for Port<'_> {
     fn read_ready(&mut self) -> Result<bool, Infallible> {
-        Ok(self.buffers.input.len() > 0)
+        Ok(self.input.ready())
     }
 }
 
 impl WriteReady for Port<'_> {
     fn write_ready(&mut self) -> Result<bool, Infallible> {
-        Ok(self.buffers.output.len() < ROOM)
+        Ok(has_room(&self.output))
     }
 }
 
@@ -110,11 +116,11 @@ impl Read for Port<'_> {
         if buffer.is_empty() {
             return Ok(0);
         }
-        while self.buffers.input.len() == 0 {
+        while !self.input.ready() {
             core::hint::spin_loop();
         }
         let mut read = 0;
-        for (place, byte) in buffer.iter_mut().zip(core::iter::from_fn(|| self.buffers.input.take())) {
+        for (place, byte) in buffer.iter_mut().zip(core::iter::from_fn(|| take(&mut self.input))) {
             *place = byte;
             read += 1;
         }
@@ -128,10 +134,10 @@ impl Write for Port<'_> {
         if bytes.is_empty() {
             return Ok(0);
         }
-        while self.buffers.output.len() == ROOM {
+        while !has_room(&self.output) {
             self.pump();
         }
-        let written = bytes.iter().take_while(|byte| self.buffers.output.put(**byte)).count();
+        let written = bytes.iter().take_while(|byte| put(&mut self.output, **byte)).count();
         (self.kick)();
         Ok(written)
     }
@@ -139,7 +145,7 @@ impl Write for Port<'_> {
     /// Waits for room for all of them. (The trait's own way panics where a port takes nothing.)
     fn write_all(&mut self, bytes: &[u8]) -> Result<(), Infallible> {
         for byte in bytes {
-            while !self.buffers.output.put(*byte) {
+            while !put(&mut self.output, *byte) {
                 self.pump();
             }
         }
@@ -149,11 +155,35 @@ impl Write for Port<'_> {
 
     /// Waits until all has gone to the transmitter.
     fn flush(&mut self) -> Result<(), Infallible> {
-        while self.buffers.output.len() > 0 {
+        while has_bytes(&self.output) {
             self.pump();
         }
         Ok(())
     }
+}
+
+// Producer and consumer refer to their queue as a view. The compiler then does not know its length, and each remainder
+// is a division with a panic at zero. The comparison in these functions states the length, which makes it a mask. The
+// test of the application's ELF file fails if a panic is left.
+
+/// Puts a byte in; `false` if there is no room.
+fn put(queue: &mut Producer<'_, u8>, byte: u8) -> bool {
+    queue.capacity() == ROOM && queue.enqueue(byte).is_ok()
+}
+
+/// Takes the next byte, if there is one.
+fn take(queue: &mut Consumer<'_, u8>) -> Option<u8> {
+    if queue.capacity() == ROOM { queue.dequeue() } else { None }
+}
+
+/// Returns `true` if there is room for a byte.
+fn has_room(queue: &Producer<'_, u8>) -> bool {
+    queue.capacity() == ROOM && queue.ready()
+}
+
+/// Returns `true` if a byte that was put in has not been taken.
+fn has_bytes(queue: &Producer<'_, u8>) -> bool {
+    queue.capacity() == ROOM && !queue.is_empty()
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
-//! What the host knows of boards.
+//! The table of boards.
 //!
-//! A [`Target`] is a board and the compiler's target for it, one line in the table below. From these follow the
+//! A [`Target`] is a board and the compiler's target for it, one line in the table. From these follow the
 //! linker's scripts ([`link`](crate::link())), cargo's runner (this crate's binary, `.cargo/config.toml`), what is
 //! installed, and what tests and measurements run where.
 
@@ -8,55 +8,9 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use crate::board::Board;
 use crate::{microbit, mps2_an385, mps2_an386, mps2_an500, mps2_an505, stm32f405, virt};
 
-/// A machine.
-#[derive(Debug)]
-pub struct Board {
-    /// Its name, and that of its folder with hyphens for underscores.
-    pub name: &'static str,
-    /// Linker script of its memory, from the workspace's root: what link.x includes as `memory.x`.
-    pub memory: &'static str,
-    /// Whether its memory holds little more than a small policy (cfg `actq_small` of the firmware).
-    pub small: bool,
-    /// QEMU's program.
-    pub emulator: &'static str,
-    /// QEMU's machine, as arguments.
-    pub machine: &'static [&'static str],
-    /// How the firmware and the host talk.
-    pub transport: Transport,
-    /// The measuring binaries of `firmware-bench` that run on it. Its harness runs on every board.
-    pub shows: &'static [&'static str],
-    /// What the application runs with, where it has a `device` for the board.
-    pub application: Option<Application>,
-}
-
-/// What the application runs with on a board.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Application {
-    /// What it is, for people.
-    pub about: &'static str,
-    /// Words of scratch memory that it gives to a head (the device's `SCRATCH`).
-    pub scratch: usize,
-}
-
-/// How the firmware and the host talk.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Transport {
-    /// Calls to the host: command line, files, exit status.
-    Semihosting,
-}
-
-impl Transport {
-    /// QEMU's arguments for it.
-    fn arguments(self) -> &'static [&'static str] {
-        match self {
-            Self::Semihosting => &["-semihosting-config", "enable=on,target=native"],
-        }
-    }
-}
-
-/// Declares [`Target`] from a line for each.
 /// How the time of an emulated board passes. Neither runs ahead of the host's, whose clock is in what it sends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Clock {
@@ -67,6 +21,7 @@ pub enum Clock {
     Host,
 }
 
+/// Declares [`Target`] from a line for each.
 macro_rules! targets {
     ($($(#[doc = $doc:literal])* $target:ident: $triple:literal on $board:ident;)*) => {
         /// What the firmware is built for: a board and rustc's target.
@@ -139,7 +94,7 @@ impl Target {
 
     /// The profile of a build (`Cargo.toml`).
     pub fn profile(self) -> &'static str {
-        if self.has_assembler() { "firmware" } else { "release" }
+        if self.has_assembler() { "firmware" } else { "firmware-portable" }
     }
 
     /// The board with the firmware `elf`, under QEMU, which talks to the host.
@@ -187,6 +142,7 @@ pub fn version(program: &str) -> io::Result<String> {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
     use std::fs;
 
     use super::*;
@@ -201,6 +157,20 @@ mod tests {
             assert!(section.is_some_and(|section| section.contains(&runner)), "{triple}");
             assert!(root().join(target.board().memory).is_file(), "{triple}");
         }
+    }
+
+    /// The default board's memory is at the root, and no file is left that no board links with.
+    #[test]
+    fn every_memory_script_is_of_a_board() {
+        let default = Target::of("thumbv7em-none-eabihf").expect("the table's first line").board();
+        assert_eq!((default.name, default.memory), ("mps2-an386", "memory.x"));
+        let folders = fs::read_dir(root().join("boards/src")).expect("the boards").flatten().map(|entry| entry.path());
+        let found: BTreeSet<PathBuf> = folders
+            .chain([root().to_owned()])
+            .map(|folder| folder.join("memory.x"))
+            .filter(|file| file.is_file())
+            .collect();
+        assert_eq!(found, Target::ALL.map(|target| root().join(target.board().memory)).into());
     }
 
     #[test]

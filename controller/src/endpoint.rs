@@ -61,8 +61,8 @@ pub struct Endpoint<'r, const OBS: usize, const N: usize> {
 impl<'r, const OBS: usize, const N: usize> Endpoint<'r, OBS, N> {
     /// An end that has heard nothing yet.
     pub const fn new(guard: Guard<'r, OBS>, facts: Facts, settings: Settings) -> Self {
-        let (receiver, sender) = (Receiver::new(), Sender::new(0));
-        Self { receiver, sender, guard, facts, settings, reported: 0, heard: 0, step_token: None }
+        let receiver = Receiver::new();
+        Self { receiver, sender: Sender::new(0), guard, facts, settings, reported: 0, heard: 0, step_token: None }
     }
 
     /// Takes a byte that came at `micros`; the frame to send for it, in `out`.

@@ -2,6 +2,7 @@
 #![cfg_attr(target_os = "none", no_std)]
 
 pub mod functions;
+pub mod trigonometry;
 
 /// What the programs do where they are built for a host.
 #[cfg(not(target_os = "none"))]

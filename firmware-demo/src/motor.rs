@@ -1,11 +1,11 @@
 //! A three-phase motor in the tick: the current loop of `actq_controller::foc` drives a motor that is simulated, so
 //! that the tick does the work that a real one would have. The first axis commands the current that makes torque.
 //!
-//! Real currents and a real angle take the place of [`Simulated::measure`]; the duty cycles go to the board's power
-//! stage as they are.
+//! Real currents and signals of a real sensor take the place of `Simulated`'s in `Motor::measure`; the duty cycles go
+//! to the board's power stage as they are.
 
 use actq_boards::seams::Stage;
-use actq_controller::foc::{CurrentLoop, Gains, Measured, Rotor, Stator};
+use actq_controller::foc::{CurrentLoop, Gains, Measured, Observer, Rotor, Stator};
 use actq_controller::{Axis, Output};
 
 use crate::output::{Bridges, share};
@@ -24,11 +24,17 @@ const SUPPLY: f32 = 24.0;
 const CURRENT: f32 = 1.0;
 /// Of the current loop, in rad/s.
 const BANDWIDTH: f32 = 300.0;
+/// Of the observer, in rad/s.
+const OBSERVER_BANDWIDTH: f32 = 1000.0;
+/// Ticks from a measurement to the middle of the time in which its duty cycles act: they act in the tick that begins with
+/// it.
+const AHEAD: f32 = 0.5;
 
 /// A power stage, the current loop before it, and the motor behind it.
 #[derive(Debug)]
 pub struct Motor<S> {
     bridges: Bridges<S>,
+    observer: Observer,
     control: CurrentLoop,
     motor: Simulated,
 }
@@ -38,19 +44,26 @@ impl<S: Stage> Motor<S> {
     pub fn new(stage: S, tick_hz: u32) -> Self {
         let tick = 1.0 / tick_hz as f32;
         let gains = Gains::for_motor(RESISTANCE, INDUCTANCE, BANDWIDTH, tick);
-        Self { bridges: Bridges::new(stage), control: CurrentLoop::new(gains), motor: Simulated::new(tick) }
+        Self {
+            bridges: Bridges::new(stage),
+            observer: Observer::new(OBSERVER_BANDWIDTH, tick),
+            control: CurrentLoop::new(gains),
+            motor: Simulated::new(tick),
+        }
     }
 
-    /// Tells the first output of a tick, as [`Bridges::tell`]; false also where what was measured is not finite.
+    /// Tells the first output of a tick, as [`Bridges::tell`]; false also where what was measured is not that of a motor.
     pub fn tell(&mut self, outputs: &[Output], axes: &[Axis]) -> bool {
-        let duties = match (outputs.first(), axes.first()) {
-            (Some(Output::Drive(value)), Some(axis)) => {
+        // In every tick, so that the rotor is known when the outputs are driven again.
+        let measured = self.measure();
+        let duties = match (outputs.first(), axes.first(), measured) {
+            (Some(Output::Drive(value)), Some(axis), Some(measured)) => {
                 // An axis without a way stays still.
                 let still = axis.low() == axis.high();
                 let q = if still { 0.0 } else { (2.0 * share(*value, axis) - 1.0) * CURRENT };
-                self.control.step(&self.motor.measure(), Rotor { d: 0.0, q }).map(|tick| tick.duties)
+                self.control.step(&measured, Rotor { d: 0.0, q }).map(|tick| tick.duties)
             }
-            (Some(Output::Brake), _) => {
+            (Some(Output::Brake), ..) => {
                 self.control.reset();
                 Some([0.0; 3])
             }
@@ -68,15 +81,21 @@ impl<S: Stage> Motor<S> {
     }
 }
 
+impl<S> Motor<S> {
+    fn measure(&mut self) -> Option<Measured> {
+        let Simulated { current, flux, .. } = &self.motor;
+        let angle = self.observer.step(flux.beta, flux.alpha, AHEAD)?;
+        Some(Measured { phases: current.phases(), angle, supply: SUPPLY })
+    }
+}
+
 /// A permanent-magnet synchronous motor, in the axes of its stator, so that no sine is computed: explicit Euler steps
 /// of a tick.
 #[derive(Debug)]
 struct Simulated {
     current: Stator,
-    /// Along the flux.
+    /// Along the flux: cosine and sine of the rotor's angle, as its sensor shows them.
     flux: Stator,
-    /// The same as an angle, in radians from -pi to pi.
-    angle: f32,
     /// Electrical, in rad/s.
     speed: f32,
     /// Seconds.
@@ -85,17 +104,7 @@ struct Simulated {
 
 impl Simulated {
     const fn new(tick: f32) -> Self {
-        Self {
-            current: Stator { alpha: 0.0, beta: 0.0 },
-            flux: Stator { alpha: 1.0, beta: 0.0 },
-            angle: 0.0,
-            speed: 0.0,
-            tick,
-        }
-    }
-
-    fn measure(&self) -> Measured {
-        Measured { phases: self.current.phases(), angle: self.angle, supply: SUPPLY }
+        Self { current: Stator { alpha: 0.0, beta: 0.0 }, flux: Stator { alpha: 1.0, beta: 0.0 }, speed: 0.0, tick }
     }
 
     /// One tick with duty cycles; without them no current flows.
@@ -118,10 +127,6 @@ impl Simulated {
         let (alpha, beta) = (cos * alpha - sin * beta, sin * alpha + cos * beta);
         let length = 1.5 - 0.5 * (alpha * alpha + beta * beta);
         self.flux = Stator { alpha: length * alpha, beta: length * beta };
-        self.angle += turn;
-        if self.angle.abs() > core::f32::consts::PI {
-            self.angle -= core::f32::consts::TAU.copysign(self.angle);
-        }
     }
 }
 
@@ -154,9 +159,9 @@ mod tests {
                 let speed = PAIRS * 1.5 * PAIRS * FLUX * current / FRICTION;
                 assert!((motor.motor.speed - speed).abs() < 1.0, "{tick_hz} Hz: {} of {speed}", motor.motor.speed);
             }
-            let (sin, cos) = motor.motor.angle.sin_cos();
             let Stator { alpha, beta } = motor.motor.flux;
-            assert!((cos - alpha).abs() < 1e-3 && (sin - beta).abs() < 1e-3, "both are the same angle");
+            let (sin, cos) = motor.observer.step(beta, alpha, 0.0).expect("a turning magnet").sin_cos();
+            assert!((cos - alpha).abs() < 4e-3 && (sin - beta).abs() < 4e-3, "the observer has lost the rotor");
         }
     }
 
@@ -170,6 +175,9 @@ mod tests {
         // An axis without a way.
         assert!(motor.tell(&[Output::Drive(0.0)], &axes) && motor.bridges.stage().on);
         assert_eq!((torque_current(&motor), motor.bridges.stage().duties()), (0.0, [500; 3]));
+        // A sensor that is lost.
+        motor.motor.flux = Stator::default();
+        assert!(!motor.tell(&[Output::Drive(0.0)], &axes) && !motor.bridges.stage().on);
         // What no controller says.
         assert!(!motor.tell(&[Output::Drive(f32::NAN)], &[Axis::STILL; 0]) && !motor.bridges.stage().on);
     }

@@ -1,6 +1,7 @@
 //! From bytes to frames.
 
 use cobs::{DecodeResult, DecoderState};
+use heapless::Vec;
 
 use crate::frame::{CHECKSUM, CRC, HEADER};
 
@@ -11,9 +12,9 @@ use crate::frame::{CHECKSUM, CRC, HEADER};
 #[derive(Debug)]
 pub(crate) struct Decoder<const N: usize> {
     stuffing: DecoderState,
-    frame: [u8; N],
-    /// Bytes of the frame that came, also where `frame` has no room for them.
-    len: usize,
+    frame: Vec<u8, N>,
+    /// `true` if a byte of the frame found no room.
+    too_long: bool,
 }
 
 /// The frame is damaged, or longer than the memory for it.
@@ -21,30 +22,27 @@ pub(crate) struct Damaged;
 
 impl<const N: usize> Decoder<N> {
     pub(crate) const fn new() -> Self {
-        Self { stuffing: DecoderState::Idle, frame: [0; N], len: 0 }
+        Self { stuffing: DecoderState::Idle, frame: Vec::new(), too_long: false }
     }
 
     /// Takes a byte. At the end of a frame: its bytes without the checksum, which is right, at least [`HEADER`] of
     /// them.
     pub(crate) fn push(&mut self, byte: u8) -> Option<Result<&[u8], Damaged>> {
         match self.stuffing.feed(byte) {
-            Ok(DecodeResult::DataContinue(byte)) => {
-                if let Some(place) = self.frame.get_mut(self.len) {
-                    *place = byte;
-                }
-                self.len = self.len.saturating_add(1);
+            Ok(DecodeResult::DataStart) => {
+                self.frame.clear();
+                self.too_long = false;
                 None
             }
-            Ok(DecodeResult::DataComplete) => {
-                let len = core::mem::take(&mut self.len);
-                Some(self.frame.get(..len).and_then(checked).ok_or(Damaged))
+            Ok(DecodeResult::DataContinue(byte)) => {
+                self.too_long |= self.frame.push(byte).is_err();
+                None
             }
+            Ok(DecodeResult::DataComplete) if self.too_long => Some(Err(Damaged)),
+            Ok(DecodeResult::DataComplete) => Some(checked(&self.frame).ok_or(Damaged)),
             // The zero came too early; it ends this frame all the same.
-            Err(_) => {
-                self.len = 0;
-                Some(Err(Damaged))
-            }
-            Ok(DecodeResult::NoData | DecodeResult::DataStart) => None,
+            Err(_) => Some(Err(Damaged)),
+            Ok(DecodeResult::NoData) => None,
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The BBC micro:bit: a Cortex-M0 (nRF51822) with 256 KB of flash and 16 KB of RAM. Of the golden cases it runs those
 //! that fit.
 
-use crate::table::{Board, Transport};
+use crate::board::{Board, Transport};
 
 pub(crate) const BOARD: Board = Board {
     name: "microbit",

@@ -14,7 +14,7 @@ interrupts!(0 of 32);
 /// Bits of an interrupt's priority.
 pub const NVIC_PRIO_BITS: u8 = 3;
 /// Words of scratch memory for a head.
-pub const SCRATCH: usize = crate::MPS2_SCRATCH;
+pub const SCRATCH: usize = super::SCRATCH;
 /// Whether a non-maskable interrupt says that the watchdog's time has ended, and that it will reset the board.
 pub const WATCHDOG_NMI: bool = true;
 /// Whether the flash may be written while the outputs are driven: it takes no time.

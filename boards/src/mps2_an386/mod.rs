@@ -4,13 +4,31 @@
 pub mod device;
 
 #[cfg(not(target_os = "none"))]
-pub(crate) const BOARD: crate::Board = crate::Board {
+use crate::board::{Application, Board, Transport};
+
+/// Words of scratch memory that the application gives to a head on Arm's MPS2 boards.
+#[cfg(any(not(target_os = "none"), feature = "cmsdk"))]
+pub(crate) const SCRATCH: usize = 24 * 1024;
+
+#[cfg(not(target_os = "none"))]
+pub(crate) const BOARD: Board = Board {
     name: "mps2-an386",
-    memory: "boards/src/mps2_an386/memory.x",
+    memory: "memory.x",
     small: false,
     emulator: "qemu-system-arm",
     machine: &["-M", "mps2-an386"],
-    transport: crate::Transport::Semihosting,
-    shows: &["bench", "foc", "functions", "golden", "portable", "runtime", "runtime-poll", "stack", "start"],
-    application: Some(crate::Application { about: "Cortex-M4F, QEMU", scratch: super::MPS2_SCRATCH }),
+    transport: Transport::Semihosting,
+    shows: &[
+        "bench",
+        "foc",
+        "functions",
+        "golden",
+        "portable",
+        "runtime",
+        "runtime-poll",
+        "stack",
+        "start",
+        "trigonometry",
+    ],
+    application: Some(Application { about: "Cortex-M4F, QEMU", scratch: SCRATCH }),
 };

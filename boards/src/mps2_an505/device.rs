@@ -17,7 +17,7 @@ interrupts!(42 of 96);
 /// Bits of an interrupt's priority.
 pub const NVIC_PRIO_BITS: u8 = 3;
 /// Words of scratch memory for a head.
-pub const SCRATCH: usize = crate::MPS2_SCRATCH;
+pub const SCRATCH: usize = crate::mps2_an386::SCRATCH;
 /// Whether a non-maskable interrupt says that the watchdog's time has ended, and that it will reset the board.
 pub const WATCHDOG_NMI: bool = true;
 /// Whether the flash may be written while the outputs are driven: it takes no time.

@@ -5,13 +5,18 @@
 pub mod device;
 
 #[cfg(not(target_os = "none"))]
-pub(crate) const BOARD: crate::Board = crate::Board {
+use crate::board::{Application, Board, Transport};
+#[cfg(not(target_os = "none"))]
+use crate::mps2_an386::SCRATCH;
+
+#[cfg(not(target_os = "none"))]
+pub(crate) const BOARD: Board = Board {
     name: "mps2-an505",
     memory: "boards/src/mps2_an505/memory.x",
     small: false,
     emulator: "qemu-system-arm",
     machine: &["-M", "mps2-an505"],
-    transport: crate::Transport::Semihosting,
+    transport: Transport::Semihosting,
     shows: &["golden"],
-    application: Some(crate::Application { about: "Cortex-M33, QEMU", scratch: super::MPS2_SCRATCH }),
+    application: Some(Application { about: "Cortex-M33, QEMU", scratch: SCRATCH }),
 };

@@ -1,6 +1,6 @@
 //! The flash of an STM32F405, erased and programmed (RM0090, section 3.6): in which order its controller is told what,
 //! what has to hold before, and its errors by name. The registers are behind [`Part`], so that all of it runs on the
-//! host, too, on a [`Model`].
+//! host, too, on a [`model`].
 //!
 //! The part has one bank: while a sector is erased, for up to 2 s, or a word is programmed, up to 0.1 ms, the processor
 //! stands still as soon as it fetches an instruction or reads from flash, its interrupts with it. So nothing begins
@@ -9,16 +9,13 @@
 //! come to an end, that watchdog does.
 
 #[cfg(not(target_os = "none"))]
-mod model;
+pub mod model;
 
 use core::cell::Cell;
 use core::fmt;
 use core::ops::Range;
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
-
-#[cfg(not(target_os = "none"))]
-pub use model::Model;
 
 /// Sectors: 4 of 16 KB, one of 64 KB, 7 of 128 KB (section 3.4).
 pub const SECTORS: u32 = 12;
@@ -346,6 +343,7 @@ impl<P: Part> NorFlash for Flash<P> {
 
 #[cfg(test)]
 mod tests {
+    use super::model::Model;
     use super::*;
 
     /// All of the flash, full of `byte`.

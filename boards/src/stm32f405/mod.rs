@@ -7,19 +7,22 @@ pub mod patience;
 #[cfg(all(target_os = "none", feature = "stm32f405"))]
 pub mod device;
 
+#[cfg(not(target_os = "none"))]
+use crate::board::{Application, Board, Transport};
+
 /// Words of scratch memory: 48 of the 128 KB of RAM.
 pub(crate) const SCRATCH: usize = 12 * 1024;
 
 #[cfg(not(target_os = "none"))]
-pub(crate) const BOARD: crate::Board = crate::Board {
+pub(crate) const BOARD: Board = Board {
     name: "stm32f405",
     memory: "boards/src/stm32f405/memory.x",
     small: false,
     emulator: "qemu-system-arm",
     machine: &["-M", "netduinoplus2"],
-    transport: crate::Transport::Semihosting,
+    transport: Transport::Semihosting,
     shows: &["golden"],
-    application: Some(crate::Application {
+    application: Some(Application {
         about: "Cortex-M4F: ODrive v3, VESC, Crazyflie; QEMU's netduinoplus2",
         scratch: SCRATCH,
     }),

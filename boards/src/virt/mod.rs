@@ -1,6 +1,6 @@
 //! QEMU's virt with a SiFive E31, which has RV32IMAC and nothing else: what it lacks is an illegal instruction.
 
-use crate::table::{Board, Transport};
+use crate::board::{Board, Transport};
 
 pub(crate) const BOARD: Board = Board {
     name: "virt",

@@ -1,5 +1,6 @@
 //! The current loop.
 
+use super::functions::{MOST_RADIANS, inverse_root_below};
 use super::pi::Pi;
 use super::pwm::duties;
 use super::transform::{Angle, Rotor, Stator};
@@ -30,7 +31,8 @@ impl Gains {
 pub struct Measured {
     /// Currents of the phases, in ampere.
     pub phases: [f32; 3],
-    /// Electrical angle of the rotor, in radians, at the time when the duty cycles will act.
+    /// Electrical angle of the rotor, in radians, at the time when the duty cycles will act; within
+    /// [`MOST_RADIANS`] of 0.
     pub angle: f32,
     /// Supply, in volts.
     pub supply: f32,
@@ -69,22 +71,24 @@ impl CurrentLoop {
     /// One tick towards `target`. The voltage stays within what the supply reaches; where it is not enough for both
     /// axes, d comes first, so that the flux is kept.
     ///
-    /// `None`, and nothing changes, where a value is not finite or the supply not above 0: the sensor is broken, and
-    /// the firmware has to switch off.
+    /// `None`, and nothing changes, where a value is not finite, the angle beyond [`MOST_RADIANS`], or the supply not
+    /// above 0 or its square not finite: the sensor is broken, and the firmware has to switch off.
     pub fn step(&mut self, measured: &Measured, target: Rotor) -> Option<Tick> {
         let Measured { phases, angle, supply } = *measured;
         let [a, b, c] = phases;
-        let finite = [a, b, c, angle, supply, target.d, target.q].iter().all(|value| value.is_finite());
-        if !finite || supply <= 0.0 {
+        let limit = REACH * supply;
+        let square = limit * limit;
+        let finite = [a, b, c, square, target.d, target.q].iter().all(|value| value.is_finite());
+        if !finite || supply <= 0.0 || !(-MOST_RADIANS..=MOST_RADIANS).contains(&angle) {
             return None;
         }
         let angle = Angle::new(angle);
         let current = Stator::of_phases(phases).to_rotor(angle);
         let Gains { proportional, integral } = self.gains;
-        let limit = REACH * supply;
         let d = self.d.step(target.d - current.d, proportional, integral, limit);
-        // What d leaves of the circle.
-        let left = libm::sqrtf(limit * limit - d * d);
+        // What d leaves of the circle, squared.
+        let left = square - d * d;
+        let left = left * inverse_root_below(left);
         let q = self.q.step(target.q - current.q, proportional, integral, left);
         let voltage = Rotor { d, q };
         Some(Tick { duties: duties(voltage.to_stator(angle).phases(), supply), current, voltage })

@@ -1,5 +1,7 @@
 //! Between three phases, two axes that stand, and two that turn with the rotor.
 
+use super::functions::sin_cos;
+
 /// 1 / sqrt(3).
 const INV_SQRT_3: f32 = 0.577_350_26;
 /// sqrt(3) / 2.
@@ -26,14 +28,16 @@ pub struct Rotor {
 /// Sine and cosine of the rotor's electrical angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Angle {
-    sin: f32,
-    cos: f32,
+    /// The sine.
+    pub sin: f32,
+    /// The cosine.
+    pub cos: f32,
 }
 
 impl Angle {
-    /// Of an angle in radians.
+    /// An angle in radians, with the error of [`sin_cos`].
     pub fn new(radians: f32) -> Self {
-        let (sin, cos) = libm::sincosf(radians);
+        let (sin, cos) = sin_cos(radians);
         Self { sin, cos }
     }
 }

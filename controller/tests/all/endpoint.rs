@@ -1,6 +1,7 @@
 //! Messages in, messages and outputs out.
 
-use actq_boards::stm32f405::flash::{Flash, LARGE, Model};
+use actq_boards::stm32f405::flash::model::Model;
+use actq_boards::stm32f405::flash::{Flash, LARGE};
 use actq_controller::breadcrumb::Record;
 use actq_controller::endpoint::{Facts, QUIET};
 use actq_controller::slots::{Anyone, Layout, Slots, Updater, Work};

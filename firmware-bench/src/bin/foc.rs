@@ -1,4 +1,4 @@
-//! The current loop: ten thousand ticks, of which every hundredth is a counted region. It prints the CRC-32 of all duty
+//! The observer and the current loop: ten thousand ticks, of which every hundredth is a counted region. It prints the CRC-32 of all duty
 //! cycles' bits, the number of the test in `controller/tests/all/foc/motor.rs`, whose inputs these are.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
@@ -12,7 +12,7 @@ mod firmware {
     use core::fmt::Write as _;
     use core::hint::black_box;
 
-    use actq_controller::foc::{CurrentLoop, Gains, Measured, Rotor};
+    use actq_controller::foc::{CurrentLoop, Gains, Measured, Observer, Rotor};
     use actq_firmware_support::{count, host};
     use actq_link::frame::CRC;
 
@@ -24,10 +24,14 @@ mod firmware {
     fn run() -> Option<()> {
         let mut control = CurrentLoop::new(Gains { proportional: 0.188_5, integral: 0.039_27 });
         let (mut digest, mut phases) = (CRC.digest(), [0.0f32; 3]);
+        let (mut observer, mut sin, mut cos) = (Observer::new(1000.0, 125e-6), 0.0f32, 1.0f32);
         for i in 0..10_000u16 {
-            let measured = Measured { phases, angle: f32::from(i) * 0.037, supply: 24.0 };
+            (sin, cos) = (0.999_315_6 * sin + 0.036_991_56 * cos, 0.999_315_6 * cos - 0.036_991_56 * sin);
             let target = Rotor { d: 0.0, q: f32::from(i % 997) * 0.04 - 20.0 };
-            let mut step = || control.step(black_box(&measured), target);
+            let mut step = || {
+                let angle = observer.step(black_box(sin), black_box(cos), 1.5)?;
+                control.step(&Measured { phases: black_box(phases), angle, supply: 24.0 }, target)
+            };
             let tick = if i % 100 == 0 { count::region(step) } else { step() }?;
             for (phase, duty) in phases.iter_mut().zip(tick.duties) {
                 digest.update(&duty.to_bits().to_le_bytes());

@@ -1,152 +1,70 @@
-//! Which source file uses which, against the tables in `docs/ARCHITECTURE.md`: between folders only the arrows that
-//! stand there, and no circles between files.
+//! Which source file uses which, in every crate of the workspace: no dependency cycles between files, and, in a library,
+//! only the arrows between folders that `docs/ARCHITECTURE.md` has in its tables.
+
+mod uses;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
 use actq_bench::root;
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
+
+use uses::{Parts, Uses};
 
 /// A module's path from the crate's root; the root is empty.
 type Module = Vec<String>;
 
-/// The modules of a crate with the text of their files.
-type Sources = BTreeMap<Module, String>;
+/// The modules of a crate, and the paths in their files.
+type Sources = BTreeMap<Module, Vec<Parts>>;
 
-/// The files below `folder`, by module. Binaries are crates of their own.
-fn read(folder: &Path) -> Result<Sources> {
-    let mut sources = Sources::new();
+/// Reads the files below `folder` by module. The crate's root is the file `root`; the other roots beside it, and the
+/// folder `bin`, are crates of their own.
+fn read(folder: &Path, root: &str) -> Result<Sources> {
+    let (mut sources, mut tests) = (Sources::new(), Vec::new());
     let mut folders = vec![(folder.to_owned(), Module::new())];
     while let Some((folder, module)) = folders.pop() {
         for entry in fs::read_dir(&folder).with_context(|| folder.display().to_string())? {
             let path = entry?.path();
             let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-            let child = || module.iter().cloned().chain([name.clone()]).collect::<Module>();
+            let is_root = module.is_empty() && name == root;
+            if module.is_empty() && !is_root && ["lib", "main", "bin"].contains(&&*name) {
+                continue;
+            }
+            let at = if name == "mod" || is_root { module.clone() } else { child(&module, &name) };
             if path.is_dir() {
-                if !(module.is_empty() && name == "bin") {
-                    folders.push((path, child()));
-                }
+                folders.push((path, at));
             } else if path.extension().is_some_and(|e| e == "rs") {
-                let at = if name == "mod" || (module.is_empty() && name == "lib") { module.clone() } else { child() };
-                sources.insert(at, fs::read_to_string(&path)?);
+                let uses = Uses::of(&fs::read_to_string(&path)?).with_context(|| path.display().to_string())?;
+                tests.extend(uses.test_modules.iter().map(|name| child(&at, name)));
+                sources.insert(at, uses.paths);
             }
         }
     }
-    let tests: Vec<Module> = sources.iter().flat_map(|(module, text)| test_modules(module, text)).collect();
     sources.retain(|module, _| !tests.iter().any(|test| module.starts_with(test)));
     Ok(sources)
 }
 
-/// The modules that a file declares for tests alone.
-fn test_modules(module: &Module, text: &str) -> Vec<Module> {
-    let lines: Vec<&str> = text.lines().map(str::trim).collect();
-    let pairs = lines.windows(2).filter(|pair| pair[0].starts_with("#[cfg(") && pair[0].contains("test"));
-    let name = |pair: &[&str]| Some(pair[1].strip_suffix(';')?.split_once("mod ")?.1.to_owned());
-    pairs.filter_map(name).map(|name| module.iter().cloned().chain([name]).collect()).collect()
+fn child(module: &Module, name: &str) -> Module {
+    module.iter().cloned().chain([name.to_owned()]).collect()
 }
 
-/// The code that is no test: without comments, and without the items behind `#[cfg(test)]`.
-fn code(text: &str) -> String {
-    let mut code = String::new();
-    let mut lines = text.lines();
-    while let Some(line) = lines.next() {
-        let trimmed = line.trim();
-        if trimmed.starts_with("#[cfg(") && trimmed.contains("test") && !trimmed.contains("not(test") {
-            let indent = line.len() - line.trim_start().len();
-            // A block ends with the brace that stands as far in as the attribute, anything else with a semicolon.
-            let closes = |line: &&str| line.trim_start().starts_with('}') && line.find('}') == Some(indent);
-            let first = lines.next().unwrap_or_default();
-            if first.ends_with('{') {
-                lines.by_ref().find(closes);
-            } else if !first.ends_with([';', '}', ',']) {
-                lines.by_ref().find(|line| line.ends_with(';') || closes(line));
-            }
-        } else {
-            code += line.split_once("//").map_or(line, |(before, _)| before);
-            code.push('\n');
-        }
-    }
-    code
-}
-
-/// The paths that a `use` names: `a::{b, c::d}` gives `a::b` and `a::c::d`.
-fn expand(tree: &str) -> Vec<String> {
-    let tree = tree.trim();
-    let Some((front, rest)) = tree.split_once('{') else {
-        return vec![tree.split(" as ").next().unwrap_or_default().trim().to_owned()];
-    };
-    let (inner, mut depth) = (rest.strip_suffix('}').unwrap_or(rest), 0);
-    let parts = inner.split(|c| {
-        depth += match c {
-            '{' => 1,
-            '}' => -1,
-            _ => 0,
-        };
-        c == ',' && depth == 0
-    });
-    let parts = parts.filter(|part| !part.trim().is_empty());
-    parts.flat_map(expand).map(|path| format!("{}{path}", front.trim())).collect()
-}
-
-/// Every path in the code that may lead to another file: those that a `use` names, and those that begin with `crate`,
-/// `super` or a module of the file.
-fn paths(code: &str) -> Vec<String> {
-    let mut paths = Vec::new();
-    let mut plain = String::new();
-    // Statements end with a semicolon; braces of a `use` stay within it.
-    for statement in code.split_inclusive(';') {
-        let begin = statement.rfind("use ").filter(|&at| {
-            let before = statement[..at].trim_end();
-            let words = ["pub", ")", "}", "]", "{"];
-            before.is_empty() || words.iter().any(|word| before.ends_with(word))
-        });
-        match begin {
-            Some(at) => {
-                plain += &statement[..at];
-                paths.extend(expand(statement[at + 4..].trim_end_matches(';')));
-            }
-            None => plain += statement,
-        }
-    }
-    let modules: Vec<&str> = code.lines().filter_map(declared).collect();
-    let is_word = |c: char| c.is_alphanumeric() || c == '_' || c == ':';
-    for word in plain.split(|c| !is_word(c)) {
-        let first = word.split("::").next().unwrap_or_default();
-        if word.contains("::") && (["crate", "super", "self"].contains(&first) || modules.contains(&first)) {
-            paths.push(word.to_owned());
-        }
-    }
-    paths
-}
-
-/// The module that a line declares.
-fn declared(line: &str) -> Option<&str> {
-    let line = line.trim().strip_suffix(';')?;
-    let (visibility, name) = line.split_once("mod ")?;
-    (visibility.is_empty() || visibility.starts_with("pub")).then_some(name)
-}
-
-/// The file that `path`, in the file of `module`, leads to, where it is one of the crate.
-fn target(sources: &Sources, module: &Module, path: &str) -> Option<Module> {
-    let mut parts = path.split("::").filter(|part| !part.is_empty()).peekable();
-    let mut at = match *parts.peek()? {
-        "crate" => {
-            parts.next();
-            Module::new()
-        }
-        "super" | "self" => module.clone(),
-        child => {
-            let own: Module = module.iter().cloned().chain([child.to_owned()]).collect();
-            sources.contains_key(&own).then_some(())?;
-            module.clone()
+/// The file that `path`, in the file of `module`, leads to, if it is one of the crate.
+fn target(sources: &Sources, module: &Module, path: &[String]) -> Option<Module> {
+    let (first, rest) = path.split_first()?;
+    let (mut at, rest) = match first.as_str() {
+        "crate" => (Module::new(), rest),
+        "super" | "self" => (module.clone(), path),
+        name => {
+            sources.contains_key(&child(module, name)).then_some(())?;
+            (module.clone(), path)
         }
     };
-    for part in parts {
+    for part in rest {
         if part == "super" {
             at.pop();
         } else if part != "self" {
-            at.push(part.to_owned());
+            at.push(part.clone());
         }
     }
     while !sources.contains_key(&at) {
@@ -157,16 +75,17 @@ fn target(sources: &Sources, module: &Module, path: &str) -> Option<Module> {
 
 /// From every file the files that it uses.
 fn arrows(sources: &Sources) -> BTreeMap<&Module, BTreeSet<Module>> {
-    let of = |(module, text): (&Module, &String)| -> BTreeSet<Module> {
-        paths(&code(text)).iter().filter_map(|path| target(sources, module, path)).collect()
-    };
-    sources.iter().map(|(module, text)| (module, of((module, text)))).collect()
+    sources.iter().map(|(module, paths)| (module, targets(sources, module, paths))).collect()
 }
 
-/// A circle of files, where there is one.
-fn circle(arrows: &BTreeMap<&Module, BTreeSet<Module>>) -> Option<String> {
+fn targets(sources: &Sources, module: &Module, paths: &[Parts]) -> BTreeSet<Module> {
+    paths.iter().filter_map(|path| target(sources, module, path)).collect()
+}
+
+/// A cycle of files, if there is one.
+fn cycle(arrows: &BTreeMap<&Module, BTreeSet<Module>>) -> Option<String> {
     let mut left: BTreeSet<&Module> = arrows.keys().copied().collect();
-    // Files that use none of those that are left are in no circle.
+    // Files that use none of those that are left are in no cycle.
     while let Some(leaf) = left.iter().copied().find(|module| !arrows[module].iter().any(|to| left.contains(to))) {
         left.remove(leaf);
     }
@@ -243,27 +162,71 @@ fn check(sources: &Sources, allowed: &BTreeMap<String, BTreeSet<String>>) -> Res
     for from in found.keys().filter(|from| !allowed.contains_key(*from)) {
         wrong.push(format!("{from} has no row"));
     }
-    wrong.extend(circle(&arrows).map(|circle| format!("a circle of files: {circle}")));
+    wrong.extend(cycle(&arrows).map(|cycle| format!("a cycle of files: {cycle}")));
     ensure!(wrong.is_empty(), "{}\n\nAs it is:\n{}", wrong.join("\n"), rows(&found));
     Ok(())
 }
 
-#[test]
-fn crates_have_the_arrows_of_the_architecture_and_no_circles() -> Result<()> {
-    let text = fs::read_to_string(root().join("docs/ARCHITECTURE.md")).context("docs/ARCHITECTURE.md")?;
-    let mut tried = 0;
-    for title in text.lines().filter_map(|line| line.strip_prefix("### `")?.strip_suffix('`')) {
-        let allowed = table(&text, title).with_context(|| format!("{title} has no table"))?;
-        check(&read(&root().join(title))?, &allowed).with_context(|| title.to_owned())?;
-        tried += 1;
+/// The folders of the workspace's crates, with the name of the root file: of each package its library or program, and
+/// its programs of several files.
+fn crates() -> Result<Vec<(String, &'static str)>> {
+    let manifest = fs::read_to_string(root().join("Cargo.toml")).context("Cargo.toml")?;
+    let members = manifest.split_once("members = [").and_then(|(_, rest)| Some(rest.split_once(']')?.0));
+    let members = members.context("the workspace has no members")?.split(',').map(|name| name.trim().trim_matches('"'));
+    let mut crates = Vec::new();
+    for member in members.filter(|member| !member.is_empty()) {
+        let source = format!("{member}/src");
+        let root_file =
+            ["lib", "main"].into_iter().find(|name| root().join(&source).join(name).with_extension("rs").is_file());
+        crates.push((source.clone(), root_file.with_context(|| format!("{source} has no root file"))?));
+        if let Ok(programs) = fs::read_dir(root().join(&source).join("bin")) {
+            for program in programs {
+                let program = program?;
+                if program.path().is_dir() {
+                    crates.push((format!("{source}/bin/{}", program.file_name().to_string_lossy()), "main"));
+                }
+            }
+        }
     }
-    ensure!(tried > 0, "no crate has a table");
+    Ok(crates)
+}
+
+/// An error if files of a crate use each other.
+fn no_cycle(sources: &Sources) -> Result<()> {
+    match cycle(&arrows(sources)) {
+        Some(cycle) => bail!("a cycle of files: {cycle}"),
+        None => Ok(()),
+    }
+}
+
+#[test]
+fn crates_have_the_arrows_of_the_architecture_and_no_cycles() -> Result<()> {
+    let text = fs::read_to_string(root().join("docs/ARCHITECTURE.md")).context("docs/ARCHITECTURE.md")?;
+    let titles: BTreeSet<&str> =
+        text.lines().filter_map(|line| line.strip_prefix("### `")?.strip_suffix('`')).collect();
+    let (mut wrong, mut tables) = (Vec::new(), BTreeSet::new());
+    let crates = crates()?;
+    for (folder, root_file) in &crates {
+        let sources = read(&root().join(folder), root_file)?;
+        let allowed = table(&text, folder);
+        // Between two files there is nothing to decide, and a program is its own only user.
+        let is_small = sources.len() <= 2 || folders(&arrows(&sources)).values().all(BTreeSet::is_empty);
+        let outcome = match &allowed {
+            Some(allowed) => check(&sources, allowed),
+            None if is_small || *root_file == "main" => no_cycle(&sources),
+            None => check(&sources, &BTreeMap::new()).context("it has no table"),
+        };
+        tables.extend(allowed.map(|_| folder.as_str()));
+        wrong.extend(outcome.err().map(|error| format!("{folder}: {error:#}")));
+    }
+    wrong.extend(titles.difference(&tables).map(|title| format!("{title}: there is a table, and no crate")));
+    ensure!(wrong.is_empty(), "{}", wrong.join("\n\n"));
     Ok(())
 }
 
 fn sources(files: &[(&str, &str)]) -> Sources {
     let module = |name: &str| name.split("::").filter(|part| !part.is_empty()).map(str::to_owned).collect();
-    files.iter().map(|(name, text)| (module(name), (*text).to_owned())).collect()
+    files.iter().map(|(name, text)| (module(name), Uses::of(text).expect("tokens").paths)).collect()
 }
 
 #[test]
@@ -274,7 +237,7 @@ fn paths_are_found_wherever_they_stand() {
         ("a::c", "use crate::{b, X};\nuse super::d::{g, h};\n"),
         (
             "a::d",
-            "fn g() -> crate::b::e::T { 0 }\n// use crate::a::c;\n#[cfg(test)]\nmod tests {\n    const A: [u8; 1] = [\n    ];\n    use super::super::c;\n}\n",
+            "fn g() -> crate::b::e::T { \"use crate::a::c;\" }\n// use crate::a::c;\n#[cfg(test)]\nmod tests {\n    const A: [u8; 1] = [\n    ];\n    use super::super::c;\n}\n#[cfg(test)]\nuse crate::a::c::{d, e};\n",
         ),
         ("b", "use std::fmt;\nuse anyhow::{a, b};\n"),
         ("b::e", "pub(crate) use super::super::b::{\n    One,\n    self::two::{Three},\n};\n"),
@@ -286,13 +249,13 @@ fn paths_are_found_wherever_they_stand() {
     };
     assert_eq!(uses("a"), "a::c a::d");
     assert_eq!(uses("a::c"), "lib a::d b");
-    assert_eq!(uses("a::d"), "b::e", "neither comments nor tests count");
+    assert_eq!(uses("a::d"), "b::e", "comments, texts and tests do not count");
     assert_eq!(uses("b"), "", "other crates' modules of the same name do not count");
     assert_eq!(uses("b::e"), "b");
 }
 
 #[test]
-fn forbidden_arrows_circles_and_stale_rows_are_told() {
+fn forbidden_arrows_cycles_and_stale_rows_are_found() {
     let said = |files: &[(&str, &str)], table: &[(&str, &[&str])]| {
         let uses = |names: &[&str]| names.iter().map(|n| (*n).to_owned()).collect();
         let allowed = table.iter().map(|(folder, names)| ((*folder).to_owned(), uses(names))).collect();
@@ -308,7 +271,7 @@ fn forbidden_arrows_circles_and_stale_rows_are_told() {
     let mut round = good;
     round[4].1 = "fn f() { super::y::g() }";
     let error = said(&round, &table).expect_err("z and y use each other");
-    assert!(error.contains("a circle of files: b::y -> b::z -> b::y"), "{error}");
+    assert!(error.contains("a cycle of files: b::y -> b::z -> b::y"), "{error}");
     let error = said(&good, &[("lib", &["a"]), ("a", &["b"]), ("b", &[])]).expect_err("lib uses nothing");
     assert!(error.contains("lib -> a stands in the table, and nothing needs it"), "{error}");
     let error = said(&good, &table[..2]).expect_err("b has no row");

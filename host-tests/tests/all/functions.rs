@@ -122,24 +122,6 @@ fn every_function_has_the_same_bits_and_stays_within_its_instructions() -> Resul
     Ok(())
 }
 
-/// The current loop of a motor, with the bits that it has on the host (`controller/tests/all/foc/motor.rs`).
-#[test]
-fn a_tick_of_the_current_loop_has_the_same_bits_and_stays_within_its_instructions() -> Result<()> {
-    let elf = firmware::binary("foc", Target::Fpu)?;
-    let counter = Counter::build()?;
-    let mut command = qemu::command(&elf, None, "")?;
-    counter.attach(&mut command, &elf)?;
-    let output = qemu::run(command, &[])?;
-    assert_eq!(String::from_utf8_lossy(&output.stdout), "fb65de12\n");
-    let mut counts: Vec<u64> = counter.regions()?.iter().map(|region| region.instructions).collect();
-    counts.sort_unstable();
-    ensure!(counts.len() == 100, "{} ticks were counted", counts.len());
-    let (median, most) = (counts[50], counts[99]);
-    println!("current loop: {median} instructions in the median, {most} at most");
-    assert!((1000..=3400).contains(&median) && most <= 3450, "{median} in the median, {most} at most");
-    Ok(())
-}
-
 /// The gates of an LSTM are a small part of its head.
 #[test]
 fn a_head_with_an_lstm_stays_within_its_instructions() -> Result<()> {

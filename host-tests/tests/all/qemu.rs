@@ -253,7 +253,7 @@ fn gptq_beats_rounding_at_low_bits() -> Result<()> {
 /// also with the profile of an application that has not set one for the kernels.
 #[test]
 fn no_panic_is_in_the_runtime() -> Result<()> {
-    for profile in ["firmware", "release"] {
+    for profile in ["firmware", "firmware-portable"] {
         for binary in ["runtime", "runtime-poll"] {
             let code = Code::read(&firmware::binary_in(profile, binary, Target::Fpu)?)?;
             let names = || code.functions().iter().map(|function| function.name.as_str());

@@ -12,10 +12,10 @@ use anyhow::{Context, Result, ensure};
 
 /// Bytes of flash of the application without its image.
 pub(crate) const FLASH: &str = "bytes of flash, application on ";
-/// Bytes of RAM of the application without its scratch memory: variables and stack.
+/// Bytes of RAM of the application without its scratch memory: variables, and the most stack.
 pub(crate) const RAM: &str = "bytes of RAM, application on ";
-const STACK: &str = "bytes of stack, application on ";
-const MOST_STACK: &str = "bytes of stack at most, application on ";
+/// Bytes of stack, from the ELF file alone.
+const STACK: &str = "bytes of stack at most, application on ";
 const STEP: &str = "instructions of an evaluation, ur3_reach at 3 bits, rounded, on ";
 
 /// Steps that the application runs before its stack is looked at: chunks of several evaluations.
@@ -32,12 +32,13 @@ pub(crate) fn measure(counter: &Counter) -> Result<Vec<(String, u64)>> {
         let board = target.board();
         let scratch = board.application.context("the board has no application")?.scratch;
         let elf = firmware::controller(target, "")?;
-        let stack = stack(target, &elf, recorded.episode(0))?;
+        // What a run uses depends on when interrupts come. It is no figure, and may not be above the bound.
+        let used = stack(target, &elf, recorded.episode(0))?;
         let worst = worst_case(&elf)?;
-        let (most, room) = (worst.bytes().into(), worst.room.into());
+        let (stack, room) = (worst.bytes().into(), worst.room.into());
         ensure!(
-            stack <= most && most <= room,
-            "{}: {stack} bytes of stack were used, at most {most} can be, and there is room for {room}",
+            used <= stack && stack <= room,
+            "{}: {used} bytes of stack were used, at most {stack} can be, and there is room for {room}",
             board.name
         );
         let harness = firmware::harness(target)?;
@@ -47,7 +48,6 @@ pub(crate) fn measure(counter: &Counter) -> Result<Vec<(String, u64)>> {
             (FLASH, firmware::flash_bytes(&elf)? - image.bytes() as u64),
             (RAM, ram),
             (STACK, stack),
-            (MOST_STACK, most),
             (STEP, step.instructions),
         ] {
             figures.push((format!("{what}{}", board.name), figure));

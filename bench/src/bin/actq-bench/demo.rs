@@ -139,8 +139,8 @@ impl Trial<'_> {
         let policy_dir = &self.dir;
         fs::create_dir_all(folder())?;
         let policy = Policy::load(policy_dir)?;
-        let f32_bytes = 4 * policy.graph.parameters();
-        println!("\nQuantizing {} ({} parameters, {f32_bytes} bytes in f32)", policy.name, policy.graph.parameters());
+        let f32_bytes = 4 * policy.parameters;
+        println!("\nQuantizing {} ({} parameters, {f32_bytes} bytes in f32)", policy.name, policy.parameters);
 
         println!("Closed loop in f32, {episodes} episodes");
         let mut reference = PolicyF32::load(policy_dir)?;

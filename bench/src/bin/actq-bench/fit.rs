@@ -6,6 +6,7 @@
 
 mod images;
 mod least_squares;
+mod sample;
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -26,6 +27,7 @@ use anyhow::Result;
 
 use images::images;
 use least_squares::solve;
+use sample::{Rates, Sample, predicted};
 
 /// Steps with standard normal observations, whose cost is the expected one.
 const NORMAL: usize = 6;
@@ -33,16 +35,6 @@ const NORMAL: usize = 6;
 const WORST: usize = 8;
 /// A budget that limits nothing and is counted all the same.
 const AMPLE: u32 = 100_000_000;
-
-/// A counted operation or step.
-struct Sample {
-    /// What it is, for people.
-    name: String,
-    features: BTreeMap<Feature, f64>,
-    cost: Cost,
-    /// Whether the values were drawn as the expected cost has them.
-    expected: bool,
-}
 
 pub(crate) fn run() -> Result<()> {
     let elf = firmware::harness(Target::Fpu)?;
@@ -83,12 +75,6 @@ pub(crate) fn run() -> Result<()> {
     files::write(&path, table(&instructions, &cycles, &most).as_bytes())?;
     println!("{}: written", path.display());
     Ok(())
-}
-
-type Rates = BTreeMap<Feature, f64>;
-
-fn predicted(sample: &Sample, rates: &Rates) -> f64 {
-    sample.features.iter().map(|(feature, n)| n * rates.get(feature).copied().unwrap_or(0.0)).sum()
 }
 
 /// The rates as the source of the kernels' table: a feature's debug text is its key.

@@ -3,7 +3,7 @@
 
 use stm32f4::stm32f405 as pac;
 
-use super::wait;
+use super::wait::wait;
 use crate::seams::{Clock, Source};
 
 const FALLBACK: Clock = Clock { hz: 16_000_000, source: Source::Fallback };

@@ -10,6 +10,7 @@ mod clock;
 mod flash;
 mod pwm;
 mod usart;
+mod wait;
 mod watchdog;
 
 use core::cell::Cell;
@@ -105,9 +106,4 @@ fn cause(rcc: &pac::RCC) -> Cause {
     } else {
         Cause::Unknown
     }
-}
-
-/// Reads until `done`, at most `turns` times; whether it was.
-fn wait(turns: u32, mut done: impl FnMut() -> bool) -> bool {
-    (0..turns).any(|_| done())
 }

@@ -7,7 +7,7 @@ use cortex_m::peripheral::DWT;
 use stm32f4::stm32f405 as pac;
 use stm32f4::stm32f405::iwdg::RegisterBlock;
 
-use super::wait;
+use super::wait::wait;
 use crate::seams::Watchdog;
 use crate::stm32f405::patience::{LONGEST, ticks};
 

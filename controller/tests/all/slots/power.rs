@@ -1,7 +1,8 @@
 //! Power fails in the middle of every single change that a sequence of updates makes to the flash, and again while the
 //! device starts after that.
 
-use actq_boards::stm32f405::flash::{Flash, Model};
+use actq_boards::stm32f405::flash::Flash;
+use actq_boards::stm32f405::flash::model::Model;
 use actq_controller::slots::{Anyone, Layout, Slot};
 use actq_link::code::Refusal;
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use actq_kernels::pace::cost::{Cost, Feature};
 
-use super::{Rates, Sample};
+use super::sample::{Rates, Sample};
 
 /// The rates, none of them negative, with the least sum of squared relative errors (Lawson and Hanson, Solving Least
 /// Squares Problems, 1974, chapter 23, on the normal equations).
