@@ -7,7 +7,7 @@ use cortex_m::asm;
 use cortex_m::peripheral::MPU;
 
 /// log2 of the guard's bytes, of which it begins at a multiple. A frame that is larger may leap over it;
-/// `host-tests/tests/all/application.rs` holds all frames below.
+/// `host-tests/tests/all/on_target/application.rs` holds all frames below.
 const SIZE_LOG2: u32 = 12;
 
 /// Region 0 and a base address, in one write.

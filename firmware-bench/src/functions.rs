@@ -1,4 +1,4 @@
-//! What `src/bin/functions.rs` computes on the target, and `host-tests/tests/all/functions.rs` on the host: operands,
+//! What `src/bin/functions.rs` computes on the target, and `host-tests/tests/all/on_target/functions.rs` on the host: operands,
 //! and the hash of what comes out.
 
 /// Elements.

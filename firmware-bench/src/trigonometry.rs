@@ -1,5 +1,5 @@
 //! The functions that a current loop needs, by each crate that has them: what `src/bin/trigonometry.rs` counts on the
-//! target, and `host-tests/tests/all/foc.rs` compares with the same on the host.
+//! target, and `host-tests/tests/all/on_target/foc.rs` compares with the same on the host.
 
 use actq_controller::foc::functions;
 use actq_kernels::math;

@@ -11,10 +11,10 @@ pub struct Patience {
     pub long: u16,
 }
 
-/// The application's. `host-tests/tests/all/start.rs` holds each piece below them at the slowest clock.
+/// The application's. `host-tests/tests/all/on_target/start.rs` holds each piece below them at the slowest clock.
 pub const PATIENCE: Patience = Patience { turn: 500, long: 4000 };
 
 /// The longest piece of a step that an image may need ([`actq_kernels::Image::least_budget`]), in modelled
-/// instructions: one with a longer one does not run. `host-tests/tests/all/start.rs` holds it below [`Patience::turn`]
+/// instructions: one with a longer one does not run. `host-tests/tests/all/on_target/start.rs` holds it below [`Patience::turn`]
 /// at the slowest clock.
 pub const LONGEST: u32 = 100_000;

@@ -2,7 +2,7 @@
 //!
 //! The sensors show the first observation of the image's self-test, and the motors write the first action that they get
 //! to the host of QEMU, with the number of control ticks that the head has taken for it:
-//! `host-tests/tests/all/styles.rs` compares.
+//! `host-tests/tests/all/on_target/styles.rs` compares.
 #![cfg_attr(target_os = "none", no_std)]
 
 #[cfg(target_os = "none")]

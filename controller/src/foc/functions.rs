@@ -4,7 +4,7 @@
 //! of gain. So an angle may be off by a quarter of a degree, which turns 0.44 % of the current into the other axis, a
 //! current by a step of the ADC, and the limit of the voltage by half a percent. Of the functions of libm, micromath and
 //! the kernels that keep to it, each is the one that takes a Cortex-M4 the fewest cycles, which
-//! `host-tests/tests/all/foc.rs` asserts (figures: `docs/records/2026-11-24-foc.md`):
+//! `host-tests/tests/all/on_target/foc.rs` asserts (figures: `docs/records/2026-11-24-foc.md`):
 //!
 //! | function | of | worst error |
 //! |---|---|---|

@@ -1,7 +1,7 @@
 //! Elementary functions in f32 by additions, multiplications and at most one division: no tables, no calls into a
 //! system library, so the same bits on every machine. The error bounds are asserted over dense sweeps of the inputs,
 //! small and huge, in the crate's tests; that each function takes at most 30 instructions per element on the
-//! Cortex-M4's FPU (exp, cos and softplus at most 38), by `host-tests/tests/all/functions.rs`.
+//! Cortex-M4's FPU (exp, cos and softplus at most 38), by `host-tests/tests/all/on_target/functions.rs`.
 //!
 //! | function | error bound, against the exact value |
 //! |---|---|

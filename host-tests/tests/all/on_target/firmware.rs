@@ -16,7 +16,7 @@ use actq_link::report::BUILT_IN;
 use anyhow::{Context as _, Result};
 use tempfile::TempDir;
 
-use crate::application::{self_test, small};
+use super::application::{self_test, small};
 
 /// Boards that other tools ask for by this command.
 const BOARDS: [Target; 3] = [Target::Fpu, Target::F405, Target::M33];

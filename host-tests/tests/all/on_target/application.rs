@@ -67,50 +67,53 @@ pub(super) fn file(bytes: &[u8]) -> Result<NamedTempFile> {
 
 #[test]
 fn every_board_starts_and_acts_with_the_bits_of_the_host() -> Result<()> {
+    BOARDS.into_iter().try_for_each(starts_and_acts_with_the_bits_of_the_host)
+}
+
+/// The application acts with the bits of the host, disarmed; armed, its actions are limited and applied.
+pub(crate) fn starts_and_acts_with_the_bits_of_the_host(target: Target) -> Result<()> {
     let buffer = ImageBuffer::read(built_in()?)?;
     let image = buffer.image(built_in()?)?;
-    for target in BOARDS {
-        let (_controller, mut client) = start(target, "")?;
-        let status = client.status()?;
-        assert_eq!((status.state, status.fault, status.reset), (State::Disarmed, None, ResetCause::Unknown));
-        assert_eq!((status.image, status.slot), (image.crc(), BUILT_IN), "{target:?}");
-        assert_eq!((usize::from(status.observation), usize::from(status.axes)), (image.obs_len(), image.act_len()));
-        assert_eq!(client.breadcrumb()?.crash, None, "{target:?}");
-        for step in 0..image.self_test_steps() {
-            let (observation, bits) = self_test(&image, step).context("a self-test step is missing")?;
-            let (applied, action) = act(&mut client, &observation)?;
-            assert!(!applied);
-            assert_eq!(action.iter().map(|v| v.to_bits()).collect::<Vec<_>>(), bits, "{target:?}, step {step}");
-        }
-        if target == Target::F405 {
-            // QEMU has no clocks for it: the wait for the crystal has ended, and nothing may move at another rate.
-            assert_eq!(client.status()?.refusal, Some(Refusal::Clock));
-            // Nor a flash controller: an erase is refused, and it runs on.
-            let told = push(&mut client, &package(&small()?), |_| {}).expect_err("nothing can be erased");
-            assert!(format!("{told:#}").contains(&Refusal::Flash.to_string()), "{told:#}");
-            assert_eq!(client.status()?.slot, BUILT_IN);
-            continue;
-        }
-        let (observation, _) = self_test(&image, 0).context("it has a self-test")?;
-        assert_eq!(client.get(actq_link::code::Parameter::High, 0)?, 1.5, "{target:?}: not the contract's limit");
-        let mut armed = || -> Result<(bool, Vec<f32>)> {
-            arm(&mut client, &observation)?;
-            act(&mut client, &observation)
-        };
-        // The machine may be so busy that the deadline passes in between.
-        let mut outcome = armed()?;
-        if !outcome.0 {
-            outcome = armed()?;
-        }
-        let (applied, action) = outcome;
-        assert!(applied && action.iter().all(|value| value.abs() <= 2.0), "{target:?}: {action:?}");
-        client.disarm()?;
-        let status = client.status()?;
-        assert_eq!(status.state, State::Disarmed, "{target:?}");
-        let timing = until(&mut client, "timed", |status| status.ticks > 200).and_then(|_| client.timing())?;
-        assert_eq!((timing.period, timing.overruns), (1_000_000, 0), "{target:?}");
-        assert!(timing.worst_head > 0 && timing.stack > 0, "{target:?}: {timing:?}");
+    let (_controller, mut client) = start(target, "")?;
+    let status = client.status()?;
+    assert_eq!((status.state, status.fault, status.reset), (State::Disarmed, None, ResetCause::Unknown));
+    assert_eq!((status.image, status.slot), (image.crc(), BUILT_IN), "{target:?}");
+    assert_eq!((usize::from(status.observation), usize::from(status.axes)), (image.obs_len(), image.act_len()));
+    assert_eq!(client.breadcrumb()?.crash, None, "{target:?}");
+    for step in 0..image.self_test_steps() {
+        let (observation, bits) = self_test(&image, step).context("a self-test step is missing")?;
+        let (applied, action) = act(&mut client, &observation)?;
+        assert!(!applied);
+        assert_eq!(action.iter().map(|v| v.to_bits()).collect::<Vec<_>>(), bits, "{target:?}, step {step}");
     }
+    if target == Target::F405 {
+        // QEMU has no clocks for it: the wait for the crystal has ended, and nothing may move at another rate.
+        assert_eq!(client.status()?.refusal, Some(Refusal::Clock));
+        // Nor a flash controller: an erase is refused, and it runs on.
+        let told = push(&mut client, &package(&small()?), |_| {}).expect_err("nothing can be erased");
+        assert!(format!("{told:#}").contains(&Refusal::Flash.to_string()), "{told:#}");
+        assert_eq!(client.status()?.slot, BUILT_IN);
+        return Ok(());
+    }
+    let (observation, _) = self_test(&image, 0).context("it has a self-test")?;
+    assert_eq!(client.get(actq_link::code::Parameter::High, 0)?, 1.5, "{target:?}: not the contract's limit");
+    let mut armed = || -> Result<(bool, Vec<f32>)> {
+        arm(&mut client, &observation)?;
+        act(&mut client, &observation)
+    };
+    // The machine may be so busy that the deadline passes in between.
+    let mut outcome = armed()?;
+    if !outcome.0 {
+        outcome = armed()?;
+    }
+    let (applied, action) = outcome;
+    assert!(applied && action.iter().all(|value| value.abs() <= 2.0), "{target:?}: {action:?}");
+    client.disarm()?;
+    let status = client.status()?;
+    assert_eq!(status.state, State::Disarmed, "{target:?}");
+    let timing = until(&mut client, "timed", |status| status.ticks > 200).and_then(|_| client.timing())?;
+    assert_eq!((timing.period, timing.overruns), (1_000_000, 0), "{target:?}");
+    assert!(timing.worst_head > 0 && timing.stack > 0, "{target:?}: {timing:?}");
     Ok(())
 }
 

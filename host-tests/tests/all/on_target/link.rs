@@ -20,7 +20,7 @@ use actq_ur3::ACT_DIM;
 use anyhow::{Context as _, Result, ensure};
 use tempfile::NamedTempFile;
 
-use crate::application::{file, self_test, small};
+use super::application::{file, self_test, small};
 
 /// With a small image in the slot, and as fast as the host: a byte takes it 40 µs.
 fn start() -> Result<(Controller, NamedTempFile)> {

@@ -1,0 +1,17 @@
+//! The tests that build firmware and run it under QEMU, or read its ELF file: `cargo verify --all` runs them, and
+//! `cargo verify` runs those of [`crate::smoke`] only.
+
+pub(crate) mod application;
+mod cost;
+mod counting;
+mod firmware;
+mod foc;
+mod functions;
+mod heads;
+mod link;
+mod linked;
+mod logs;
+mod portable;
+pub(crate) mod qemu;
+mod start;
+mod styles;

@@ -1,0 +1,28 @@
+//! The smoke run of `cargo verify`: the kernels, a whole policy and the motor controller on a Cortex-M4 in QEMU.
+//! [`crate::on_target`] has all tests of this kind, on every board.
+
+use actq::data::{Recording, Sizes};
+use actq::methods::Activations;
+use actq::policy::Policy;
+use actq_bench::{Target, ur3};
+use actq_kernels::Width;
+use anyhow::Result;
+
+use crate::on_target::{application, qemu};
+
+#[test]
+fn kernels_give_the_golden_sums() -> Result<()> {
+    qemu::kernels_give_the_golden_sums(Target::Fpu)
+}
+
+#[test]
+fn the_ur3_policy_has_the_bits_of_the_host() -> Result<()> {
+    let policy = Policy::load(&ur3())?;
+    let dataset = Recording::Heldout.require(Some(&ur3()), None, Sizes::of(&policy), "this test")?;
+    qemu::same_bits(Target::Fpu, &qemu::rtn(&policy, Width::W3, 0, Activations::Int8)?, &dataset)
+}
+
+#[test]
+fn the_motor_controller_starts_and_acts_with_the_bits_of_the_host() -> Result<()> {
+    application::starts_and_acts_with_the_bits_of_the_host(Target::Fpu)
+}
