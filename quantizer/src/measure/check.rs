@@ -4,8 +4,7 @@ use actq_kernels::Image;
 use anyhow::Result;
 
 use super::eval::{self, ActivationShare, ErrorReport};
-use crate::data::Dataset;
-
+use crate::data::{Dataset, Recordings};
 use crate::policy::Policy;
 
 /// Multiplications that a run over the calibration recording may take, about half a second of the executor on a host; a
@@ -30,28 +29,40 @@ pub struct Checked {
 /// Errors of an image on its policy's recordings.
 #[derive(Clone, Debug)]
 pub struct Check {
-    /// On the held-out recording.
-    pub heldout: Checked,
+    /// On the held-out recording, where there is one.
+    pub heldout: Option<Checked>,
     /// On the calibration recording, where there is one.
     pub calib: Option<Checked>,
-    /// What rounding the activations adds, on the held-out recording.
+    /// What rounding the activations adds, on the held-out recording, or else on the calibration recording.
     pub activations: ActivationShare,
 }
 
-/// Runs `image`, made from `source`, over both recordings. Where one holds no actions, the f32 policy gives them.
-pub fn check(source: &Policy, image: Image<'_>, calib: Option<&Dataset>, heldout: &Dataset) -> Result<Check> {
+impl Check {
+    /// The error to go by: on the held-out recording, or else on the calibration recording.
+    pub fn nmse(&self) -> Option<f64> {
+        self.heldout.as_ref().or(self.calib.as_ref()).map(|checked| checked.report.nmse)
+    }
+}
+
+/// Runs `image`, made from `source`, over what recordings there are; `None` where there are none. Where one holds no
+/// actions, the f32 policy gives them.
+pub fn check(source: &Policy, image: Image<'_>, recordings: &Recordings) -> Result<Option<Check>> {
     let thinned = |dataset: &Dataset, most: usize| -> Dataset {
         let macs = source.graph.weights().max(1) * source.graph.denoising_steps();
         let mut dataset = dataset.thinned((most / macs).max(LEAST_FRAMES), source.graph.state_len() > 0).into_owned();
         dataset.fill_actions(&source.graph);
         dataset
     };
-    let checked = |dataset: &Dataset, whole: &Dataset| -> Result<Checked> {
-        Ok(Checked { report: eval::evaluate(image, dataset)?, recorded: whole.frames() })
+    let checked = |whole: Option<&Dataset>, most: usize| -> Result<Option<(Dataset, Checked)>> {
+        let Some(whole) = whole else { return Ok(None) };
+        let compared = thinned(whole, most);
+        let report = eval::evaluate(image, &compared)?;
+        Ok(Some((compared, Checked { report, recorded: whole.frames() })))
     };
-    let calib = calib.map(|calib| checked(&thinned(calib, MOST_MACS), calib)).transpose()?;
-    let compared = thinned(heldout, MOST_HELDOUT_MACS);
-    let heldout = checked(&compared, heldout)?;
-    let activations = eval::activation_share(image, &compared, heldout.report.nmse)?;
-    Ok(Check { heldout, calib, activations })
+    let calib = checked(recordings.calib.as_ref(), MOST_MACS)?;
+    let heldout = checked(recordings.heldout.as_ref(), MOST_HELDOUT_MACS)?;
+    let Some((compared, of)) = heldout.as_ref().or(calib.as_ref()) else { return Ok(None) };
+    let activations = eval::activation_share(image, compared, of.report.nmse)?;
+    let [heldout, calib] = [heldout, calib].map(|checked| checked.map(|(_, checked)| checked));
+    Ok(Some(Check { heldout, calib, activations }))
 }

@@ -11,6 +11,9 @@ use crate::policy::Policy;
 const TIMES: f64 = 3.0;
 const ABOVE: f64 = 0.002;
 
+/// Beyond this error the actions have little to do with the policy's.
+const USELESS: f64 = 0.1;
+
 impl fmt::Display for ActivationShare {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let types = match self.int16.len() {
@@ -37,7 +40,8 @@ pub fn how_to_record(policy: &Policy) -> String {
 pub fn errors(check: &Check) -> String {
     let of = |name: &str, checked: &Checked| line(name, &checked.report, checked.recorded);
     let calib = check.calib.as_ref().map_or(String::new(), |checked| of("calibration nmse", checked));
-    format!("{calib}{}{:<17} {}\n", of("held-out nmse", &check.heldout), "activations", check.activations)
+    let heldout = check.heldout.as_ref().map_or(String::new(), |checked| of("held-out nmse", checked));
+    format!("{calib}{heldout}{:<17} {}\n", "activations", check.activations)
 }
 
 /// The error where the image itself has led.
@@ -52,12 +56,24 @@ fn line(name: &str, report: &ErrorReport, recorded: usize) -> String {
 
 /// A warning where the held-out error is far above the calibration error.
 pub fn overfit_warning(check: &Check) -> Option<String> {
-    let (heldout, calib) = (check.heldout.report.nmse, check.calib.as_ref()?.report.nmse);
+    let (heldout, calib) = (check.heldout.as_ref()?.report.nmse, check.calib.as_ref()?.report.nmse);
     (heldout > TIMES * calib && heldout > calib + ABOVE).then(|| {
         format!(
             "the held-out error is {:.1} times the calibration error: the image fits what was recorded for it better \
              than what it will see; record more episodes, and more varied ones",
             heldout / calib
+        )
+    })
+}
+
+/// A warning where the image's actions are far from the policy's, whose error of 1 is that of a constant action.
+pub fn error_warning(check: &Check) -> Option<String> {
+    let nmse = check.nmse()?;
+    // An error that is not a number is not below the limit either.
+    (nmse.is_nan() || nmse > USELESS).then(|| {
+        format!(
+            "the error is {nmse:.2} (0: the policy's actions, 1: no better than their mean): do not drive a robot with this image; allow \
+             more bits (--bpw, --flash), record more steps for --calib, or try --activations int16"
         )
     })
 }
@@ -92,7 +108,7 @@ mod tests {
     fn check(calib: Option<f64>, heldout: f64) -> Check {
         let activations = ActivationShare { unrounded_nmse: 0.0, share: 0.125, int16: vec![0, 4], linear: 5 };
         let checked = |nmse: f64, recorded: usize| Checked { report: report(nmse), recorded };
-        Check { heldout: checked(heldout, 7), calib: calib.map(|nmse| checked(nmse, 30)), activations }
+        Check { heldout: Some(checked(heldout, 7)), calib: calib.map(|nmse| checked(nmse, 30)), activations }
     }
 
     #[test]
@@ -103,6 +119,18 @@ mod tests {
         for (calib, heldout) in [(Some(0.01), 0.029), (Some(1e-5), 0.002), (None, 0.5)] {
             assert_eq!(overfit_warning(&check(calib, heldout)), None, "{calib:?} {heldout}");
         }
+    }
+
+    #[test]
+    fn an_error_above_a_tenth_is_worth_a_warning() {
+        let calib_only = |nmse| Check { heldout: None, ..check(Some(nmse), 0.0) };
+        for of in [check(Some(0.001), 0.11), check(None, 1.0), check(None, f64::NAN), calib_only(0.2)] {
+            assert!(error_warning(&of).is_some_and(|text| text.contains("--bpw")), "{of:?}");
+        }
+        for of in [check(Some(0.5), 0.09), check(None, 0.0), calib_only(0.1)] {
+            assert_eq!(error_warning(&of), None, "{of:?}");
+        }
+        assert!(errors(&calib_only(0.2)).starts_with("calibration nmse  2.000e-1"));
     }
 
     #[test]

@@ -271,12 +271,23 @@ fn quantize_tells_both_errors_and_what_is_wrong_with_the_recordings() -> Result<
 }
 
 #[test]
+fn without_a_held_out_recording_the_calibration_error_is_printed() -> Result<()> {
+    let fixture = Fixture::new()?;
+    fs::remove_file(fixture.policy().join("heldout.npz"))?;
+    let output = fixture.quantize(&fixture.out("image.actq"), "--bits 8")?;
+    let report = succeeded(&output)?;
+    ensure!(report.contains("calibration nmse") && !report.contains("held-out nmse"), "{report}");
+    Ok(())
+}
+
+#[test]
 fn an_image_that_fits_its_calibration_alone_is_warned_of() -> Result<()> {
     let fixture = Fixture::new()?;
     // Held out are small motions, beside which the error that was small for large ones is large.
     let obs = 0.05 * draw_observations(6, OBS);
     write_recording(&fixture.policy().join("heldout.npz"), &obs, None, [STEPS as i64; EPISODES])?;
     let warnings = notes(&fixture.quantize(&fixture.out("image.actq"), "--bits 2")?)?;
-    ensure!(warnings.len() == 1 && warnings[0].contains("times the calibration error"), "{warnings:?}");
+    ensure!(warnings.len() == 2 && warnings[0].contains("times the calibration error"), "{warnings:?}");
+    ensure!(warnings[1].contains("do not drive a robot with this image"), "{warnings:?}");
     Ok(())
 }

@@ -79,15 +79,15 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
     ))?;
     let buffer = found.buffer();
     let image = buffer.image(&args.out)?;
-    if let Some(heldout) = &recordings.heldout {
-        match check::check(&source, image, recordings.calib.as_ref(), heldout) {
-            Ok(check) => {
-                print(&format!("\n{}", notes::errors(&check)))?;
-                note(notes::overfit_warning(&check));
-            }
-            // The image is written, and nothing is wrong with it.
-            Err(error) => note([format!("the held-out error is not known: {error:#}")]),
+    match check::check(&source, image, &recordings) {
+        Ok(Some(check)) => {
+            print(&format!("\n{}", notes::errors(&check)))?;
+            note(notes::overfit_warning(&check));
+            note(notes::error_warning(&check));
         }
+        Ok(None) => note(["the error is not known: there is no recording to compare with (--calib FILE)".to_owned()]),
+        // The image is written, and nothing is wrong with it.
+        Err(error) => note([format!("the error is not known: {error:#}")]),
     }
     let of_image = |path: &PathBuf| driven_by(path).is_ok_and(|crc| crc == Some(image.crc()));
     let driven: Vec<PathBuf> = shares.into_iter().map(|share| share.path).filter(of_image).collect();
