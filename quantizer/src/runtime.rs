@@ -3,8 +3,9 @@
 use std::fs;
 use std::path::Path;
 
+use actq_kernels::image::header::MAGIC;
 use actq_kernels::{Head, Image};
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 
 /// The bytes of an image at an address that is a multiple of 4.
 #[derive(Clone, Debug)]
@@ -34,6 +35,8 @@ impl ImageBuffer {
 
     /// Parses the image; `path` names it in the error.
     pub fn image(&self, path: &Path) -> Result<Image<'_>> {
+        let magic = MAGIC.to_le_bytes();
+        ensure!(self.bytes().starts_with(&magic), "{}: is not an actq image", path.display());
         Image::new_checked(self.bytes()).with_context(|| path.display().to_string())
     }
 }

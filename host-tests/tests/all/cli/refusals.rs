@@ -4,7 +4,7 @@
 use std::fs;
 use std::process::Stdio;
 
-use actq_bench::command::{actq, all, failed, run};
+use actq_bench::command::{actq, all, failed, run, succeeded};
 use actq_link::RESET;
 use anyhow::{Context, Result, ensure};
 
@@ -30,6 +30,11 @@ fn a_wrong_command_line_has_status_2() -> Result<()> {
         ("--threads 257", "0..=256"),
         ("--threads 5000", "threads"),
         ("--colour", "colour"),
+        ("--clock 84M", "--ms"),
+        ("--bits 3 --clock 84M", "--clock"),
+        ("--bpw 3 --clock 84M", "--clock"),
+        ("--flash 1G", "MiB"),
+        ("--flash M", "MiB"),
     ];
     let policy = text(&fixture.policy());
     let lines: [&[&str]; 4] = [&[], &["paint"], &["quantize", &policy], &["eval", "x.actq"]];
@@ -54,6 +59,32 @@ fn an_output_that_cannot_be_written_leaves_no_file() -> Result<()> {
         (name.to_owned(), fixture.quantize(&out, "").and_then(|output| failed(&output, 1, &[&text(&out)])))
     }))?;
     ensure!(fixture.snapshot()? == before, "files have changed");
+    Ok(())
+}
+
+#[test]
+fn a_text_is_no_image() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let path = fixture.out("notes.txt");
+    let image = text(&path);
+    for len in [5, 127, 128, 1001] {
+        fs::write(&path, "x".repeat(len))?;
+        for command in ["inspect", "serve"] {
+            failed(&run(actq(&[command, &image]), b"")?, 1, &["notes.txt: is not an actq image"])?;
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn flash_is_taken_in_mebibytes() -> Result<()> {
+    let fixture = Fixture::new()?;
+    for size in ["1M", "1m", "1024K", "1024k"] {
+        let out = fixture.out(&format!("{size}.actq"));
+        succeeded(&fixture.quantize(&out, &format!("--flash {size}"))?)?;
+    }
+    let (mega, kilo) = (fs::read(fixture.out("1M.actq"))?, fs::read(fixture.out("1024K.actq"))?);
+    ensure!(mega == kilo, "the units differ");
     Ok(())
 }
 

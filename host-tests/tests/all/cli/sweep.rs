@@ -5,7 +5,7 @@ use std::fs;
 use actq_bench::command::{actq, failed, run, succeeded};
 use anyhow::{Result, ensure};
 
-use super::fixture::{Fixture, text};
+use super::fixture::{Fixture, OBS, draw_observations, text, write_npy};
 
 #[test]
 fn sweep_takes_named_recordings() -> Result<()> {
@@ -26,5 +26,19 @@ fn sweep_takes_named_recordings() -> Result<()> {
     )?;
     let table = succeeded(&sweep(&["--heldout", &text(&heldout), "--calib", &text(&calib)])?)?;
     ensure!(table.contains("4 bits") && table.contains("gptq"), "{table}");
+    Ok(())
+}
+
+/// Every method that needs actions takes the f32 policy's.
+#[test]
+fn sweep_takes_observations_alone() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let policy = fixture.policy();
+    let obs = fixture.out("obs.npy");
+    fs::remove_file(policy.join("calib.npz"))?;
+    write_npy(&obs, &draw_observations(3, OBS))?;
+    let arguments = ["sweep", &text(&policy), "--methods", "rtn,actquant", "--bpw", "4", "--calib", &text(&obs)];
+    let table = succeeded(&run(actq(&arguments), b"")?)?;
+    ensure!(table.contains("actquant"), "{table}");
     Ok(())
 }

@@ -171,7 +171,7 @@ pub(crate) struct QuantizeArgs {
     /// Bits per weight of the whole, scales and padding counted; each matrix gets a width
     #[arg(long, value_name = "X", value_parser = positive)]
     pub(crate) bpw: Option<f64>,
-    /// Bytes of the whole image, as 98304 or 96K
+    /// Bytes of the whole image, as 98304, 96K or 1M (K is 1024 bytes, M is 1024 K)
     #[arg(long, value_name = "SIZE", conflicts_with_all = ["bits", "bpw"], value_parser = size)]
     pub(crate) flash: Option<usize>,
     /// The fewest bits whose error (NMSE, as eval measures it) is at most X, to a tenth of a bit per weight; measured
@@ -182,7 +182,15 @@ pub(crate) struct QuantizeArgs {
     #[arg(long, value_name = "X", conflicts_with_all = ["bits", "bpw", "flash", "max_nmse"], value_parser = positive)]
     pub(crate) ms: Option<f64>,
     /// The processor's clock for --ms, in Hz or as 168M
-    #[arg(long, value_name = "HZ", requires = "ms", default_value = "168M", value_parser = clock)]
+    // Without the conflicts, clap forgives a missing --ms where what is given conflicts with that.
+    #[arg(
+        long,
+        value_name = "HZ",
+        requires = "ms",
+        conflicts_with_all = ["bits", "bpw", "flash", "max_nmse"],
+        default_value = "168M",
+        value_parser = clock
+    )]
     pub(crate) clock: f64,
     /// Force the width of a matrix, by its tensor's name (method best); may be repeated
     #[arg(long, value_name = "NAME=BITS", value_parser = forced)]

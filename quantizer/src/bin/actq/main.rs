@@ -97,7 +97,10 @@ fn run_sweep(args: &SweepArgs) -> Result<()> {
     let mut sweeps = Vec::new();
     for (p, policy) in policies.iter().enumerate() {
         let (dir, sizes) = (Some(policy.dir.as_path()), Sizes::of(policy));
-        let calib = Learned::load(policy, &calib)?.map(|learned| learned.dataset);
+        let mut calib = Learned::load(policy, &calib)?.map(|learned| learned.dataset);
+        if let Some(calib) = &mut calib {
+            calib.fill_actions(&policy.graph);
+        }
         let mut heldout = Recording::Heldout.require(dir, args.heldout.as_deref(), sizes, "actq sweep")?;
         heldout.fill_actions(&policy.graph);
         let recordings = Recordings { calib, heldout: Some(heldout) };

@@ -32,12 +32,13 @@ pub(super) fn forced(text: &str) -> Result<(String, Width), String> {
 }
 
 pub(super) fn size(text: &str) -> Result<usize, String> {
-    let (digits, unit) = match text.strip_suffix(['K', 'k']) {
-        Some(digits) => (digits, 1024),
-        None => (text, 1),
+    let (digits, unit) = match text.char_indices().next_back() {
+        Some((at, 'M' | 'm')) => (&text[..at], 1024 * 1024),
+        Some((at, 'K' | 'k')) => (&text[..at], 1024),
+        _ => (text, 1),
     };
     let bytes = digits.parse().ok().and_then(|n: usize| n.checked_mul(unit)).filter(|n| *n > 0);
-    bytes.ok_or_else(|| "a size is a number of bytes, or of KiB with a K behind it".to_owned())
+    bytes.ok_or_else(|| "a size is a number of bytes, or of KiB with a K behind it, or of MiB with an M".to_owned())
 }
 
 pub(super) fn group(text: &str) -> Result<usize, String> {
