@@ -53,7 +53,7 @@ pub fn importance(
     graph: &Graph,
     dataset: &Dataset,
     sampling: Sampling,
-    mut progress: impl FnMut(f64),
+    progress: &mut dyn FnMut(f64),
 ) -> Result<Vec<Array2<f32>>> {
     let weights = Weights::of(graph);
     let network = Network::new(graph);
@@ -235,7 +235,7 @@ mod tests {
         let action = dataset.action.as_mut().expect("actions");
         action.indexed_iter_mut().for_each(|((e, s, d), a)| *a += if (e + s + d) % 3 == 0 { 3.0 } else { -4.0 });
         let sampling = Sampling { batch, ..PLAIN };
-        let found = importance(graph, &dataset, sampling, |_| {}).expect("importance");
+        let found = importance(graph, &dataset, sampling, &mut |_| {}).expect("importance");
         let weights = Weights::of(graph);
         let step = 4e-3;
         let starts = || (0..=steps - window).step_by(window);
@@ -283,7 +283,7 @@ mod tests {
         let mut dataset = dataset(&graph, 1, 12);
         dataset.action.as_mut().expect("actions").mapv_inplace(|a| a + 3.0);
         let few = Sampling { samples: 4, ..PLAIN };
-        let found = importance(&graph, &dataset, few, |_| {}).expect("importance");
+        let found = importance(&graph, &dataset, few, &mut |_| {}).expect("importance");
         // Every third frame alone.
         let third = |array: &Array3<f32>| array.slice(s![.., ..;3, ..]).to_owned();
         let thirds = Dataset {
@@ -292,8 +292,8 @@ mod tests {
             length: vec![4],
             ..dataset.clone()
         };
-        assert_eq!(found, importance(&graph, &thirds, PLAIN, |_| {}).expect("importance"));
-        assert_ne!(found, importance(&graph, &dataset, PLAIN, |_| {}).expect("importance"));
+        assert_eq!(found, importance(&graph, &thirds, PLAIN, &mut |_| {}).expect("importance"));
+        assert_ne!(found, importance(&graph, &dataset, PLAIN, &mut |_| {}).expect("importance"));
     }
 
     #[test]
@@ -310,7 +310,7 @@ mod tests {
             *array = ndarray::concatenate(Axis(1), &vec![array.view(); 4000]).expect("same shapes");
         }
         dataset.length = vec![4000];
-        let found = importance(&graph, &dataset, PLAIN, |_| {}).expect("importance");
+        let found = importance(&graph, &dataset, PLAIN, &mut |_| {}).expect("importance");
         let mut expected = Array2::<f32>::zeros(found[0].raw_dim());
         for d in 0..2 {
             let mut grads = weights.zeros_like();
@@ -325,10 +325,10 @@ mod tests {
 
         // Without random signs equal actions say nothing, and the least difference all.
         let loss = Sampling { signs: Signs::Loss, ..PLAIN };
-        let found = importance(&graph, &dataset, loss, |_| {}).expect("importance");
+        let found = importance(&graph, &dataset, loss, &mut |_| {}).expect("importance");
         assert!(found.iter().all(|matrix| matrix.iter().all(|i| *i == 0.0)), "{found:?}");
         dataset.action.as_mut().expect("actions").mapv_inplace(|a| a + 1e-6);
-        let found = importance(&graph, &dataset, loss, |_| {}).expect("importance");
+        let found = importance(&graph, &dataset, loss, &mut |_| {}).expect("importance");
         let mut grads = weights.zeros_like();
         let both = Array2::ones((1, 2));
         network.backward(&weights, &pass, both, &mut zero_state(&graph, 1), &mut grads, &mut |_, _, _| {});
@@ -342,7 +342,7 @@ mod tests {
         let graph = lstm();
         let mut dataset = dataset(&graph, 3, 40);
         dataset.length = vec![40, 7, 20];
-        let found = importance(&graph, &dataset, PLAIN, |_| {}).expect("importance");
+        let found = importance(&graph, &dataset, PLAIN, &mut |_| {}).expect("importance");
         assert!(found.iter().all(|m| m.iter().all(|v| v.is_finite()) && m.sum() > 0.0));
     }
 }

@@ -29,7 +29,7 @@ const BATCH: usize = 256;
 
 /// Runs the f32 network over `dataset` and gives the moments of every matrix's input. `progress` is called after each
 /// episode with the number of frames done.
-pub fn collect(graph: &Graph, dataset: &Dataset, mut progress: impl FnMut(usize)) -> Vec<Moments> {
+pub fn collect(graph: &Graph, dataset: &Dataset, progress: &mut dyn FnMut(usize)) -> Vec<Moments> {
     let mut sums: Vec<_> = graph
         .matrices
         .iter()

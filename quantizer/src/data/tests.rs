@@ -392,7 +392,7 @@ fn windows_with_their_state_are_as_good_as_the_whole_episode() {
     assert!(!near(&actions(&zero), &recorded));
 
     let moments = |dataset: &Dataset| {
-        let all = moments::collect(&graph, dataset, |_| {});
+        let all = moments::collect(&graph, dataset, &mut |_| {});
         all.iter().flat_map(|m| m.second.iter().map(|v| *v as f32).collect::<Vec<_>>()).collect::<Vec<f32>>()
     };
     assert!(near(&moments(&cut), &moments(&whole)) && !near(&moments(&zero), &moments(&whole)));

@@ -44,7 +44,7 @@ pub struct ActionStatistics {
 
 impl ActionStatistics {
     /// Runs the f32 network over `dataset`, which must hold actions. `progress` gets the share done.
-    pub fn collect(graph: &Graph, dataset: &Dataset, choices: Choices, progress: impl FnMut(f64)) -> Result<Self> {
+    pub fn collect(graph: &Graph, dataset: &Dataset, choices: Choices, progress: &mut dyn FnMut(f64)) -> Result<Self> {
         let path = dataset.path.display();
         ensure!(
             dataset.action.is_some(),
@@ -230,7 +230,8 @@ mod tests {
     fn a_budget_is_kept_and_a_width_is_taken_as_it_is() {
         let graph = testing::lstm();
         let dataset = testing::dataset(&graph, 2, 24);
-        let statistics = ActionStatistics::collect(&graph, &dataset, Choices::default(), |_| {}).expect("statistics");
+        let statistics =
+            ActionStatistics::collect(&graph, &dataset, Choices::default(), &mut |_| {}).expect("statistics");
         let uniform = quantize_at(&graph, &statistics, Rate::Width(Width::W3)).expect("quantized");
         assert!(uniform.iter().all(|o| o.quantized.widths.iter().all(|w| *w == Some(Width::W3))));
         let bytes = |outcomes: &[Outcome]| -> usize { outcomes.iter().map(|o| o.bytes()).sum() };
@@ -246,7 +247,8 @@ mod tests {
         let graph = testing::mlp();
         let mut dataset = testing::dataset(&graph, 1, 8);
         dataset.action = None;
-        let error = ActionStatistics::collect(&graph, &dataset, Choices::default(), |_| {}).expect_err("no actions");
+        let error =
+            ActionStatistics::collect(&graph, &dataset, Choices::default(), &mut |_| {}).expect_err("no actions");
         assert!(error.to_string().contains("\"action\" is missing"), "{error}");
         let zero = Score { x_input: 0.0, y_input: 1.0, x_output: 0.0, y_output: 0.5 };
         let choices = Choices::default();

@@ -116,7 +116,7 @@ pub fn quantize(
     statistics: &RowStatistics,
     rate: Rate,
     options: &Options,
-    mut progress: impl FnMut(Progress),
+    progress: &mut dyn FnMut(Progress),
 ) -> Result<QuantizedNetwork> {
     let RowStatistics { windows, inputs, centred, outputs, moments, .. } = statistics;
     let graph = &windows.graph;
@@ -166,7 +166,7 @@ pub fn quantize(
         feed_back(&compacted, options.group, &importance, moments, damping)
     };
     let work = choosing(windows.recurrent());
-    let Chosen { choice, bounds, tried } = choose(&task, windows, &feedback, |share, error| {
+    let Chosen { choice, bounds, tried } = choose(&task, windows, &feedback, &mut |share, error| {
         progress(Progress::Choosing { share: work * share, error });
     });
     let from = if tried.is_empty() { 0.0 } else { work };
@@ -177,7 +177,7 @@ pub fn quantize(
         }
         Choice::Learning(widening) => {
             let Learned { quantized, graph, steps } =
-                distill(&Task { widening, bounds, ..task }, windows, |share, error| {
+                distill(&Task { widening, bounds, ..task }, windows, &mut |share, error| {
                     progress(Progress::Learning { share: from + (1.0 - from) * share, error });
                 });
             (quantized, graph, steps)

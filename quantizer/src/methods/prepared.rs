@@ -76,11 +76,11 @@ impl<'a> PreparedMethod<'a> {
             let most = if steps > 1 { (MOST_VECTORS / steps).min(dataset.frames()) } else { dataset.frames() };
             let most = allowance.map_or(most, |allowance| {
                 let timed = dataset.thinned(TIMED, false);
-                allowance.fits(timed.frames(), || drop(collect(graph, &timed, |_| {})), LEAST_SAMPLED, most)
+                allowance.fits(timed.frames(), || drop(collect(graph, &timed, &mut |_| {})), LEAST_SAMPLED, most)
             });
             let dataset = if steps > 1 { dataset.thinned(most, false) } else { Cow::Borrowed(dataset) };
             let all = dataset.frames().max(1) as f64;
-            (collect(graph, &dataset, |frames| progress(frames as f64 / all)), dataset.frames())
+            (collect(graph, &dataset, &mut |frames| progress(frames as f64 / all)), dataset.frames())
         };
         let mut sampled = None;
         let mut say = |frames, inputs, outputs| sampled = Some(Sampled { frames, inputs, outputs });
@@ -93,7 +93,7 @@ impl<'a> PreparedMethod<'a> {
                 Statistics::Gptq(moments)
             }
             Method::ActQuant(choices) => {
-                Statistics::ActQuant(ActionStatistics::collect(graph, calib()?, choices, progress)?)
+                Statistics::ActQuant(ActionStatistics::collect(graph, calib()?, choices, &mut progress)?)
             }
             Method::Best => {
                 let dataset = calib()?;
@@ -132,7 +132,12 @@ impl<'a> PreparedMethod<'a> {
 
     /// Quantizes the network. `options.method` is the one that was prepared; not `options.budget` counts, but `rate`.
     /// `progress` is called by what learns.
-    pub fn quantize(&self, rate: Rate, options: &Options, progress: impl FnMut(Progress)) -> Result<QuantizedNetwork> {
+    pub fn quantize(
+        &self,
+        rate: Rate,
+        options: &Options,
+        mut progress: impl FnMut(Progress),
+    ) -> Result<QuantizedNetwork> {
         let (graph, method) = (self.graph, self.method());
         ensure!(options.method == method, "prepared for {method}, not for {}", options.method);
         ensure!(
@@ -144,7 +149,7 @@ impl<'a> PreparedMethod<'a> {
             Statistics::Rtn => matrixwise::quantize(graph, None, rate, options)?,
             Statistics::Gptq(moments) => matrixwise::quantize(graph, Some(moments), rate, options)?,
             Statistics::ActQuant(statistics) => actquant::quantize(graph, statistics, rate, options)?,
-            Statistics::Best(statistics) => return best::quantize(statistics, rate, options, progress),
+            Statistics::Best(statistics) => return best::quantize(statistics, rate, options, &mut progress),
         };
         Ok(QuantizedNetwork { graph: graph.clone(), outcomes, learning: None })
     }

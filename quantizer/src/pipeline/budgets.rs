@@ -29,15 +29,15 @@ impl Quantizer<'_> {
     ///
     /// [`crate::budget::BudgetTooSmall`] where not even the fewest bits keep a budget of bits or bytes. The words of
     /// the others say what can be had.
-    pub fn quantize(&self, options: &Options, progress: impl FnMut(&str, f64)) -> Result<QuantizedPolicy> {
+    pub fn quantize(&self, options: &Options, mut progress: impl FnMut(&str, f64)) -> Result<QuantizedPolicy> {
         let rate = match options.budget {
             Budget::Width(width) => Rate::Width(width),
             Budget::BitsPerWeight(bits) => Rate::BitsPerWeight(bits),
             Budget::ImageBytes(bytes) => self.within_image(bytes)?,
-            Budget::MaxNmse(limit) => return search::smallest(self, options, limit, progress),
-            Budget::Time(limit) => return time::most_bits(self, options, limit, shown(progress)),
+            Budget::MaxNmse(limit) => return search::smallest(self, options, limit, &mut progress),
+            Budget::Time(limit) => return time::most_bits(self, options, limit, &mut shown(progress)),
         };
-        self.at(rate, options, shown(progress))
+        self.at(rate, options, &mut shown(progress))
     }
 }
 

@@ -60,7 +60,12 @@ impl<'a> Quantizer<'a> {
     }
 
     /// Makes an image at a rate; `options.budget` does not count.
-    pub(super) fn at(&self, rate: Rate, options: &Options, progress: impl FnMut(Progress)) -> Result<QuantizedPolicy> {
+    pub(super) fn at(
+        &self,
+        rate: Rate,
+        options: &Options,
+        progress: &mut dyn FnMut(Progress),
+    ) -> Result<QuantizedPolicy> {
         let QuantizedNetwork { graph, outcomes, learning } = self.method.quantize(rate, options, progress)?;
         let policy = Policy { graph, ..self.policy.clone() };
         let image = emit::image(&policy, &outcomes)?;

@@ -51,7 +51,7 @@ pub(super) fn smallest(
     quantizer: &Quantizer<'_>,
     options: &Options,
     limit: f64,
-    mut progress: impl FnMut(&str, f64),
+    progress: &mut dyn FnMut(&str, f64),
 ) -> Result<QuantizedPolicy> {
     let policy = quantizer.policy;
     let dataset = measured(policy, quantizer.recordings)?;
@@ -63,17 +63,18 @@ pub(super) fn smallest(
         let budget = cell as f64 / PER_BIT as f64;
         let options = Options { steps: Some(steps), ..options.clone() };
         let work = format!("try {}: {budget} bits per weight", tries.len() + 1);
-        let report = match quantizer.at(Rate::BitsPerWeight(budget), &options, |state| progress(&work, state.share())) {
-            Err(error) if error.is::<BudgetTooSmall>() => None,
-            Err(error) => return Err(error),
-            Ok(quantized) => {
-                let report = eval::evaluate(quantized.buffer().image(Path::new("image in memory"))?, &dataset)?;
-                if report.nmse <= limit && steps == all_steps {
-                    found = Some((quantized, report.nmse, budget));
+        let report =
+            match quantizer.at(Rate::BitsPerWeight(budget), &options, &mut |state| progress(&work, state.share())) {
+                Err(error) if error.is::<BudgetTooSmall>() => None,
+                Err(error) => return Err(error),
+                Ok(quantized) => {
+                    let report = eval::evaluate(quantized.buffer().image(Path::new("image in memory"))?, &dataset)?;
+                    if report.nmse <= limit && steps == all_steps {
+                        found = Some((quantized, report.nmse, budget));
+                    }
+                    Some(report)
                 }
-                Some(report)
-            }
-        };
+            };
         let error = report.as_ref().map_or(f64::INFINITY, |r| r.nmse);
         tries.push(Try { budget, steps, report });
         Ok(error)

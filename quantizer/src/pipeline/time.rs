@@ -29,7 +29,7 @@ pub(super) fn most_bits(
     quantizer: &Quantizer<'_>,
     options: &Options,
     limit: TimeLimit,
-    progress: impl FnMut(Progress),
+    progress: &mut dyn FnMut(Progress),
 ) -> Result<QuantizedPolicy> {
     let allowed = limit.milliseconds;
     let activations = match options.activations {
@@ -37,7 +37,7 @@ pub(super) fn most_bits(
         given => given,
     };
     let draft = Options { activations, steps: Some(1), ..options.clone() };
-    let with = |bits: f64| quantizer.at(Rate::BitsPerWeight(bits), &draft, |_| {});
+    let with = |bits: f64| quantizer.at(Rate::BitsPerWeight(bits), &draft, &mut |_| {});
     let time = |bits: f64| Ok::<_, anyhow::Error>(predict(&with(bits)?, limit)?.milliseconds);
     let (mut low, mut high) = (least_bits(with(f64::MIN_POSITIVE))?, MOST_BITS);
     let fastest = time(low)?;

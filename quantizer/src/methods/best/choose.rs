@@ -61,7 +61,7 @@ pub fn choose(
     task: &Task<'_>,
     windows: &Windows,
     feedback: &Feedback<'_>,
-    mut progress: impl FnMut(f64, f64),
+    progress: &mut dyn FnMut(f64, f64),
 ) -> Chosen {
     let Bounds { steps, time } = task.bounds;
     let learns = steps != Some(0);
@@ -87,7 +87,7 @@ pub fn choose(
     if learns {
         let bounds = Bounds { steps: steps.map(|steps| steps / STEPS), time: time.map(|time| time / TIME) };
         for (i, &widening) in choices.iter().enumerate() {
-            let learned = distill(&Task { widening, bounds, ..task.clone() }, &learned_from, |share, error| {
+            let learned = distill(&Task { widening, bounds, ..task.clone() }, &learned_from, &mut |share, error| {
                 progress((i as f64 + share) / choices.len() as f64, error);
             });
             try_out(Choice::Learning(widening), (learned.quantized, learned.graph));

@@ -80,7 +80,7 @@ pub struct Learned {
 
 /// Learns codes, scales, biases and norms. `progress` is called after each step with the share done and the error on
 /// the widened inputs.
-pub fn distill(task: &Task<'_>, windows: &Windows, mut progress: impl FnMut(f64, f64)) -> Learned {
+pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(f64, f64)) -> Learned {
     let network = Network::rounded(task.graph, task.x_max);
     let mut weights = Weights::of(task.graph);
     let matrices = task.graph.matrices.iter().zip(task.widths).zip(task.importance);
