@@ -20,7 +20,7 @@ use anyhow::{Context as _, Result, ensure};
 use super::arm::{Arm, TICKS};
 use super::bits::Said;
 use super::line::Line;
-use crate::controller::{Controller, PATIENCE};
+use crate::controller::{Controller, HANG};
 
 /// Ticks in which an output goes from one limit to the other, as in the application at 1 kHz.
 const WAY: f32 = 100.0;
@@ -99,10 +99,10 @@ impl Rig {
         let line = Line::new(controller.address().open().context("the board's serial port")?, seed);
         let end = line.clone();
         let open = Box::new(move || Ok(end.host_end()));
-        let mut connection = Connection::open_by("the line".to_owned(), open, PATIENCE)?;
+        let mut connection = Connection::open_by("the line".to_owned(), open, HANG)?;
         let clock = line.clone();
         connection.set_clock(Box::new(move || clock.now() as u32));
-        let mut client = Client::new(connection, PATIENCE);
+        let mut client = Client::new(connection, HANG);
         let status = client.status()?;
         set_up(&mut client)?;
         line.heard();
@@ -149,7 +149,7 @@ impl Rig {
         while self.status.state != State::Armed {
             self.exchange()?;
             self.supervise()?;
-            ensure!(begun.elapsed() < PATIENCE, "not armed: {:?}", self.status);
+            ensure!(begun.elapsed() < HANG, "not armed: {:?}", self.status);
         }
         self.reaction = None;
         self.arm.start();
@@ -176,7 +176,7 @@ impl Rig {
                 break;
             }
             self.listen()?;
-            ensure!(begun.elapsed() < PATIENCE, "the controller is silent: {:?}", self.status);
+            ensure!(begun.elapsed() < HANG, "the controller is silent: {:?}", self.status);
         }
         Ok(())
     }

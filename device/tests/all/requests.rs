@@ -1,7 +1,7 @@
 //! Requests over a good and a bad line.
 
 use std::sync::atomic::Ordering;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use actq_controller::Output;
 use actq_controller::slots::Anyone;
@@ -10,25 +10,24 @@ use actq_device::port::Address;
 use actq_link::code::{Crash, Fault, Parameter, Refusal, ResetCause, State};
 use actq_link::report::BUILT_IN;
 
-use crate::simulated::{DEADLINE, OBSERVATION, Simulated};
+use crate::simulated::{OBSERVATION, Simulated};
 
 /// Sends observations until the controller can be armed.
 pub(super) fn observe_until_fresh(client: &mut Client) {
-    let begun = Instant::now();
-    loop {
+    for _ in 0..1000 {
         for _ in 0..5 {
             client.observe(&[0.4; OBSERVATION]).expect("it fits");
         }
         if client.status().expect("it answers").refusal.is_none() {
             return;
         }
-        assert!(begun.elapsed() < Duration::from_secs(10), "no observation gets through");
     }
+    panic!("no observation gets through");
 }
 
 /// Arms, over a line that may lose so much that the observations grow old meanwhile.
 pub(super) fn arm(client: &mut Client) {
-    for _ in 0..50 {
+    for _ in 0..1000 {
         observe_until_fresh(client);
         if client.arm().is_ok() {
             return;
@@ -75,11 +74,10 @@ fn a_cut_cable_is_safe_and_the_connection_comes_back() {
     arm(&mut client);
     controller.control.cut.store(true, Ordering::Relaxed);
     // The host goes on; the deadline passes, and the ramp ends at 0.
-    let begun = Instant::now();
-    while begun.elapsed() < Duration::from_millis(u64::from(DEADLINE) + 300) {
+    controller.control.miss_the_deadline(|| {
         client.observe(&[1.0; OBSERVATION]).expect("it fits");
         client.events().expect("it tries again");
-    }
+    });
     assert!(controller.outputs().iter().all(|o| matches!(o, Output::Coast | Output::Drive(0.0))));
     controller.control.cut.store(false, Ordering::Relaxed);
     let status = client.status().expect("it answers again");

