@@ -36,6 +36,9 @@ const REPORTS: f32 = 5.0;
 /// machine QEMU's serial port is slower than a real one, and the arm's time then waits for it.
 const ANSWER: u64 = 60;
 
+/// Ticks from one observation to the next above which the host was held up: five control steps, a fifth of the deadline.
+const LATE: u64 = 100;
+
 /// What a reset forgets.
 fn set_up(client: &mut Client) -> Result<()> {
     client.set(Parameter::StatusPeriod, 0, REPORTS)?;
@@ -90,6 +93,11 @@ pub struct Rig {
     read_ticks: u32,
     said: Vec<Said>,
     shown: HashMap<u32, Vec<f32>>,
+    /// The time at which the last observation was sent.
+    sent: u64,
+    /// `true` if this machine has held up the host since the episode began: a deadline that the controller then missed
+    /// says nothing of the controller.
+    pub(crate) disturbed: bool,
 }
 
 impl Rig {
@@ -122,6 +130,8 @@ impl Rig {
             read_ticks: 0,
             said: Vec::new(),
             shown: HashMap::new(),
+            sent: 0,
+            disturbed: false,
         })
     }
 
@@ -152,6 +162,7 @@ impl Rig {
             ensure!(begun.elapsed() < HANG, "not armed: {:?}", self.status);
         }
         self.reaction = None;
+        self.disturbed = false;
         self.arm.start();
         Ok(())
     }
@@ -169,6 +180,8 @@ impl Rig {
         let number = self.client.observe(&observation)?;
         self.shown.insert(number, observation.to_vec());
         let (begun, from) = (Instant::now(), self.time);
+        self.disturbed |= from - self.sent > LATE;
+        self.sent = from;
         loop {
             let passed = self.time - from;
             let answered = self.said.last().is_some_and(|said| said.of == number);
@@ -221,6 +234,9 @@ impl Rig {
         if let (State::Latched, State::Armed, Some(fault)) = (status.state, self.arm.state, status.fault) {
             let (least, most) = ((before.ticks + 1).saturating_sub(self.good.1), status.ticks - self.good.0);
             self.reaction = Some(Reaction { fault, least, most });
+            // QEMU's clock is the host's here: this machine has held up a tick. By a clock that counts instructions no
+            // tick is too long, as a test on targets asserts.
+            self.disturbed |= fault == Fault::Overrun;
         }
         self.arm.state = status.state;
     }

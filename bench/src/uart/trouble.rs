@@ -121,6 +121,8 @@ pub struct Run {
     pub applied: u32,
     /// Resets of the board.
     pub resets: u32,
+    /// `true` if this machine has held up the host, beyond the fault: a failed check then says nothing of the controller.
+    pub disturbed: bool,
 }
 
 impl Run {
@@ -250,6 +252,7 @@ impl Rig {
             refused: since(self.status.refused, status.refused),
             applied: self.applied - applied,
             resets: self.resets - resets,
+            disturbed: self.disturbed,
         })
     }
 }

@@ -21,8 +21,12 @@ impl Allowance {
     pub fn fits(self, some: usize, work: impl FnOnce(), least: usize, most: usize) -> usize {
         let started = Instant::now();
         work();
-        let each = started.elapsed().as_secs_f64() / some.max(1) as f64;
-        ((self.0.as_secs_f64() / each.max(f64::MIN_POSITIVE)) as usize).clamp(least.min(most), most)
+        self.fits_at(started.elapsed().div_f64(some.max(1) as f64), least, most)
+    }
+
+    /// As [`Self::fits`], of units that take `each`.
+    fn fits_at(self, each: Duration, least: usize, most: usize) -> usize {
+        ((self.0.as_secs_f64() / each.as_secs_f64().max(f64::MIN_POSITIVE)) as usize).clamp(least.min(most), most)
     }
 }
 
@@ -39,18 +43,16 @@ pub struct Sampled {
 
 #[cfg(test)]
 mod tests {
-    use std::thread::sleep;
-
     use super::*;
 
     #[test]
     fn work_is_bound_by_time_and_by_both_limits() {
         let of = |milliseconds, least, most| {
             let allowance = Allowance::of(SHARE * Duration::from_millis(milliseconds));
-            allowance.fits(2, || sleep(Duration::from_millis(4)), least, most)
+            allowance.fits_at(Duration::from_millis(2), least, most)
         };
-        // 2 ms or more each.
-        assert!((1..=20).contains(&of(40, 1, 1000)));
-        assert_eq!((of(40, 30, 1000), of(10_000, 1, 7), of(40, 30, 7)), (30, 7, 7));
+        assert_eq!((of(40, 1, 1000), of(40, 30, 1000), of(10_000, 1, 7), of(40, 30, 7)), (20, 30, 7, 7));
+        // Even units that take no time are counted.
+        assert_eq!(Allowance::of(Duration::from_secs(1)).fits_at(Duration::ZERO, 1, 9), 9);
     }
 }
