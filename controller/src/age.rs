@@ -1,12 +1,14 @@
 //! How old an observation is, by two clocks that nobody has set.
 //!
 //! The difference of the receiver's and the sender's clock, less the smallest one seen, is what a frame took longer
-//! than the fastest. The smallest one is let rise slowly, as far as the two clocks may drift apart. So a sender whose
-//! time stands still or jumps back grows old, until the age is begun anew; one whose time jumps forward is from then on
-//! the new time.
+//! than the fastest. The smallest one rises with time, as fast as the sender's clock may run slow: a crystal is right
+//! to 0.01 %, an RC oscillator to 3 %. So no rate has to be learnt, and of each frame let through before, whichever it
+//! was: an age is at least what the frame took longer than that one, less [`DRIFT_BITS`]' share of the time since, and
+//! less what the sender's clock runs fast. A sender whose time stops or jumps back grows old; one whose time jumps
+//! forward is from then on the new time.
 
-/// The clocks' drift is followed up to 1 in 2^12: 244 ppm, more than two crystals'.
-const DRIFT_BITS: u32 = 12;
+/// The smallest difference rises by 1 in 2^5 of the time: 3.1 %.
+const DRIFT_BITS: u32 = 5;
 
 /// Follows the difference of two clocks in µs, both of which wrap.
 #[derive(Clone, Copy, Debug, Default)]
