@@ -110,9 +110,11 @@ fn answered(monitor: &mut dyn Port) -> Result<()> {
 }
 
 /// The action on an observation, and whether the outputs follow it. On a line without faults, but on a machine that may
-/// stop QEMU for so long that the firmware refuses the observation as an old one: it is then sent again.
+/// stop QEMU for so long that the firmware refuses the observation as an old one, or latches before its action: it is
+/// then sent again.
 pub fn act(client: &mut Client, observation: &[f32]) -> Result<(bool, Vec<f32>)> {
-    let (begun, mut refused) = (Instant::now(), client.status()?.refused);
+    let known = |status: &Status| (status.refused, status.token);
+    let (begun, mut before) = (Instant::now(), known(&client.status()?));
     let mut number = client.observe(observation)?;
     while begun.elapsed() < HANG {
         let looked = Instant::now();
@@ -125,9 +127,9 @@ pub fn act(client: &mut Client, observation: &[f32]) -> Result<(bool, Vec<f32>)>
                 }
             }
         }
-        let status = client.status()?;
-        if status.refused != refused {
-            refused = status.refused;
+        let now = known(&client.status()?);
+        if now != before {
+            before = now;
             number = client.observe(observation)?;
         }
     }

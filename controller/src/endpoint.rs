@@ -2,6 +2,12 @@
 //!
 //! The firmware calls [`Endpoint::receive`] for every byte that came, [`Endpoint::report`] every now and then, and
 //! sends what they give. It lets the head run on [`Endpoint::step`] and hands its action to [`Endpoint::acted`].
+//!
+//! An observation, its step and its action belong to the token ([`Safety::token`]) that the observation came under:
+//! with another token they are dropped, and the head begins anew. So a host that reads each token, which a status tells
+//! before the first action under it, can predict every action.
+
+use core::mem;
 
 use actq_link::code::{Fault, Parameter, Refusal, Report, State};
 use actq_link::report::{Breadcrumb, Status, Timing};
@@ -34,7 +40,7 @@ pub struct Facts {
 pub struct Step<'a> {
     /// Sequence number of its frame.
     pub of: u32,
-    /// Whether the head has to be reset first: the outputs were armed, or have stopped.
+    /// Whether the head has to be reset first: the token is another one than that of the step before.
     pub reset: bool,
     /// Its values.
     pub observation: &'a [f32],
@@ -54,7 +60,11 @@ pub struct Endpoint<'r, const OBS: usize, const N: usize> {
     reported: u32,
     /// Tick of the last good frame.
     heard: u32,
-    /// [`Safety::token`] when the last step was given.
+    /// [`Safety::token`] in the last status.
+    told_token: Option<u32>,
+    /// When the newest observation came.
+    observed_token: Option<u32>,
+    /// When the last step was given.
     step_token: Option<u32>,
 }
 
@@ -62,7 +72,9 @@ impl<'r, const OBS: usize, const N: usize> Endpoint<'r, OBS, N> {
     /// An end that has heard nothing yet.
     pub const fn new(guard: Guard<'r, OBS>, facts: Facts, settings: Settings) -> Self {
         let receiver = Receiver::new();
-        Self { receiver, sender: Sender::new(0), guard, facts, settings, reported: 0, heard: 0, step_token: None }
+        let sender = Sender::new(0);
+        let [told_token, observed_token, step_token] = [None; 3];
+        Self { receiver, sender, guard, facts, settings, reported: 0, heard: 0, told_token, observed_token, step_token }
     }
 
     /// Takes a byte that came at `micros`; the frame to send for it, in `out`.
@@ -84,7 +96,10 @@ impl<'r, const OBS: usize, const N: usize> Endpoint<'r, OBS, N> {
         let answer = match received.message {
             Message::Observation(values) => {
                 if guard.take(of, values, received.micros, micros).is_ok() {
-                    safety.with(Safety::observed);
+                    self.observed_token = Some(safety.with(|safety| {
+                        safety.observed();
+                        safety.token()
+                    }));
                 }
                 return None;
             }
@@ -110,26 +125,19 @@ impl<'r, const OBS: usize, const N: usize> Endpoint<'r, OBS, N> {
         self.sender.frame(&message, micros, out)
     }
 
-    /// A status, where one is due. To be called at least every few ticks: it also notices that the line has fallen
-    /// silent.
+    /// A status, where one is due, or the token is another one. To be called at least every few ticks: it also notices
+    /// that the line has fallen silent.
     pub fn report<'b, const AXES: usize>(
         &mut self,
         micros: u32,
         safety: &mut impl Shared<AXES>,
         out: &'b mut [u8],
     ) -> Option<&'b [u8]> {
-        let (ticks, stale, state) = safety.with(|safety| (safety.ticks(), safety.is_stale(), safety.state()));
-        if state != State::Armed {
-            if stale {
-                self.guard.reopen();
-            }
-            if ticks.wrapping_sub(self.heard) > QUIET {
-                self.heard = ticks;
-                self.receiver.reopen();
-            }
-        }
+        self.relearn(safety);
+        let (ticks, token) = safety.with(|safety| (safety.ticks(), safety.token()));
         let period = self.settings.status_period;
-        if period == 0 || ticks.wrapping_sub(self.reported) < period {
+        let is_due = period > 0 && ticks.wrapping_sub(self.reported) >= period;
+        if !is_due && self.told_token == Some(token) {
             return None;
         }
         self.reported = ticks;
@@ -137,16 +145,42 @@ impl<'r, const OBS: usize, const N: usize> Endpoint<'r, OBS, N> {
         self.sender.frame(&status, micros, out)
     }
 
-    /// The newest observation, once. While not armed, too: the head's actions are then told and not applied.
+    /// While not armed: learns the clocks anew where no good observation has come in time, and the numbers, too, where
+    /// nothing has for long. What has come under the numbers before may then come once more: its token counts no more.
+    fn relearn<const AXES: usize>(&mut self, safety: &mut impl Shared<AXES>) {
+        let (ticks, stale, state) = safety.with(|safety| (safety.ticks(), safety.is_stale(), safety.state()));
+        if state == State::Armed {
+            return;
+        }
+        let is_quiet = ticks.wrapping_sub(self.heard) > QUIET;
+        if stale || is_quiet {
+            self.guard.reopen();
+        }
+        if is_quiet {
+            self.heard = ticks;
+            if self.receiver.reopen() {
+                safety.with(Safety::renew);
+            }
+        }
+    }
+
+    /// The newest observation, once, where it has come under the token of now; not before a status has told that. While
+    /// not armed, too: the head's actions are then told and not applied.
     pub fn step<const AXES: usize>(&mut self, safety: &mut impl Shared<AXES>) -> Option<Step<'_>> {
+        let token = Some(safety.with(|safety| safety.token()));
+        if self.told_token != token {
+            return None;
+        }
         let (of, observation) = self.guard.newest()?;
-        let token = safety.with(|safety| safety.token());
-        let reset = self.step_token.replace(token) != Some(token);
+        if self.observed_token != token {
+            return None;
+        }
+        let reset = mem::replace(&mut self.step_token, token) != token;
         Some(Step { of, reset, observation })
     }
 
-    /// Takes the head's action on the last [`Self::step`], or its failure; the frame to send. It is not applied where
-    /// the state has changed since the step began.
+    /// Takes the head's action on the last [`Self::step`], or its failure; the frame to send. An action is dropped where
+    /// the token has changed since the step began; a failure latches all the same.
     pub fn acted<'b, E, const AXES: usize>(
         &mut self,
         of: u32,
@@ -160,8 +194,8 @@ impl<'r, const OBS: usize, const N: usize> Endpoint<'r, OBS, N> {
             let status = self.of_report(Report::Status, safety);
             return self.sender.frame(&status, micros, out);
         };
-        let current = self.step_token;
-        let applied = safety.with(|safety| if current == Some(safety.token()) { safety.act(action) } else { Ok(None) });
+        let token = self.step_token;
+        let applied = safety.with(|safety| (token == Some(safety.token())).then(|| safety.act(action)))?;
         let message = match &applied {
             Ok(Some(target)) => Message::Action { of, applied: true, values: Floats::Values(target) },
             Ok(None) => Message::Action { of, applied: false, values: Floats::Values(action) },
@@ -170,13 +204,14 @@ impl<'r, const OBS: usize, const N: usize> Endpoint<'r, OBS, N> {
         self.sender.frame(&message, micros, out)
     }
 
-    fn of_report<const AXES: usize>(&self, report: Report, safety: &mut impl Shared<AXES>) -> Message<'static> {
+    fn of_report<const AXES: usize>(&mut self, report: Report, safety: &mut impl Shared<AXES>) -> Message<'static> {
         match report {
             Report::Timing => Message::Timing(self.facts.timing),
             Report::Breadcrumb => Message::Breadcrumb(self.facts.breadcrumb),
             Report::Status => {
                 let (state, fault, refusal, token, ticks) = safety
                     .with(|safety| (safety.state(), safety.fault(), safety.refusal(), safety.token(), safety.ticks()));
+                self.told_token = Some(token);
                 Message::Status(Status {
                     state,
                     fault,

@@ -11,7 +11,7 @@ use crate::update::{Plan, Update};
 /// What the link's end does by itself.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
-    /// Ticks between two reports of the status; 0: none unasked.
+    /// Ticks between two reports of the status; 0: none unasked but that of a new token.
     pub status_period: u32,
     /// Whether flash can be erased and written while the outputs are driven: not where code is fetched from the same
     /// bank.

@@ -126,7 +126,7 @@ impl<const AXES: usize> Safety<AXES> {
         self.state = match mem::replace(&mut self.state, State::Disarmed(Disarmed::new())) {
             State::Armed(armed) => {
                 self.fault = Some(fault);
-                self.token = next_token(self.token);
+                self.renew();
                 State::Latched(armed.latch(fault))
             }
             other => other,
@@ -168,7 +168,7 @@ impl<const AXES: usize> Safety<AXES> {
             State::Latched(latched) => State::Armed(latched.arm(ready)),
             armed @ State::Armed(_) => armed,
         };
-        self.token = next_token(self.token);
+        self.renew();
         Ok(())
     }
 
@@ -179,7 +179,7 @@ impl<const AXES: usize> Safety<AXES> {
             State::Armed(armed) => State::Disarmed(armed.disarm()),
             State::Latched(latched) => State::Disarmed(latched.disarm()),
         };
-        self.token = next_token(self.token);
+        self.renew();
     }
 
     /// Whether settings may change: while disarmed, and by who knows the state.
@@ -220,6 +220,11 @@ impl<const AXES: usize> Safety<AXES> {
     /// The last fault.
     pub const fn fault(&self) -> Option<Fault> {
         self.fault
+    }
+
+    /// Makes requests, observations and actions from before count no more.
+    pub fn renew(&mut self) {
+        self.token = next_token(self.token);
     }
 
     /// What requests have to name.

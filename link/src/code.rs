@@ -161,7 +161,7 @@ codes! {
         Deadline = 1, "deadline in ticks";
         /// Age in µs, against the fastest delivery seen, above which an observation is refused.
         MaxAge = 2, "oldest observation in µs";
-        /// Ticks between two status reports; 0 sends none unasked.
+        /// Ticks between two status reports; 0 sends none unasked but that of a new token.
         StatusPeriod = 3, "ticks between status reports";
         /// Lower limit of an axis.
         Low = 4, "lower limit";

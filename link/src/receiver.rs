@@ -64,9 +64,10 @@ impl<const N: usize> Receiver<N> {
     }
 
     /// Takes the next good frame with whatever sequence number it has: the other end may have started anew. To be
-    /// called where nothing good has come for long, and where nothing moves.
-    pub fn reopen(&mut self) {
-        self.window = Window::open();
+    /// called where nothing good has come for long, and where nothing moves. `true` if a frame was let through since it
+    /// was open: such a one may come once more.
+    pub fn reopen(&mut self) -> bool {
+        self.window.reopen()
     }
 
     /// What was seen so far.

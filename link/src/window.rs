@@ -24,6 +24,11 @@ impl Window {
         Self { last: None }
     }
 
+    /// Opens it; `true` if it was not open.
+    pub(crate) fn reopen(&mut self) -> bool {
+        self.last.take().is_some()
+    }
+
     /// Lets a new frame through.
     pub(crate) fn admit(&mut self, sequence: u32) -> Order {
         let ahead = self.last.map_or(1, |last| sequence.wrapping_sub(last));

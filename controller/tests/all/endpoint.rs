@@ -102,6 +102,14 @@ impl<U: Update> Bench<U> {
         assert_eq!(self.ask(&Message::Arm { token }), Ok(()));
     }
 
+    /// The next step, behind what is reported: number, reset and values.
+    fn step(&mut self) -> Option<(u32, bool, Vec<f32>)> {
+        let mut out = [0; 256];
+        self.endpoint.report(self.micros, &mut self.safety, &mut out);
+        let step = self.endpoint.step(&mut self.safety)?;
+        Some((step.of, step.reset, step.observation.to_vec()))
+    }
+
     fn act(&mut self, of: u32, action: &[f32]) -> Option<(u32, bool, Vec<f32>)> {
         let mut out = [0; 256];
         let action = Ok::<_, ()>(action);
@@ -117,27 +125,27 @@ impl<U: Update> Bench<U> {
 fn an_observation_becomes_an_action_and_an_output() {
     let mut bench = Bench::new();
     bench.arm();
-    let step = bench.endpoint.step(&mut bench.safety).expect("the observation from before arming");
-    assert!(step.reset);
-    let of = bench.host.next();
-    bench.observe();
-    let step = bench.endpoint.step(&mut bench.safety).expect("there is an observation");
-    assert_eq!((step.of, step.reset, step.observation), (of, false, &OBSERVATION[..]));
-    assert_eq!(bench.endpoint.step(&mut bench.safety), None, "it is given once");
-    assert_eq!(bench.act(of, &[0.25, -7.0]), Some((of, true, vec![0.25, -1.0])));
+    assert_eq!(bench.step(), None, "the observation from before arming");
+    for reset in [true, false] {
+        let of = bench.host.next();
+        bench.observe();
+        assert_eq!(bench.step(), Some((of, reset, OBSERVATION.to_vec())));
+        assert_eq!(bench.step(), None, "it is given once");
+        assert_eq!(bench.act(of, &[0.25, -7.0]), Some((of, true, vec![0.25, -1.0])));
+    }
     assert_eq!(bench.safety.tick(), [Output::Drive(0.1), Output::Drive(-0.1)]);
 }
 
 #[test]
-fn an_action_of_a_step_from_before_arming_is_told_and_not_applied() {
+fn an_action_of_a_step_from_before_arming_is_dropped() {
     let mut bench = Bench::new();
     bench.observe();
-    let of = bench.endpoint.step(&mut bench.safety).expect("there is an observation").of;
+    let (of, ..) = bench.step().expect("there is an observation");
     assert_eq!(bench.act(of, &[0.25, 0.5]), Some((of, false, vec![0.25, 0.5])), "disarmed");
     bench.observe();
-    let of = bench.endpoint.step(&mut bench.safety).expect("there is an observation").of;
+    let (of, ..) = bench.step().expect("there is an observation");
     bench.arm();
-    assert_eq!(bench.act(of, &[0.25, 0.5]), Some((of, false, vec![0.25, 0.5])));
+    assert_eq!(bench.act(of, &[0.25, 0.5]), None);
     assert_eq!(bench.safety.tick(), [Output::Coast; 2]);
 }
 
@@ -145,7 +153,8 @@ fn an_action_of_a_step_from_before_arming_is_told_and_not_applied() {
 fn an_action_that_is_not_finite_and_a_head_that_fails_latch_and_are_told() {
     let mut bench = Bench::new();
     bench.arm();
-    bench.endpoint.step(&mut bench.safety);
+    bench.observe();
+    bench.step();
     assert_eq!(bench.act(1, &[f32::NAN, 0.0]), None, "a status is sent instead");
     assert_eq!((bench.status().state, bench.status().fault), (State::Latched, Some(Fault::ActionNotFinite)));
     bench.arm();

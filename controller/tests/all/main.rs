@@ -1,5 +1,6 @@
 //! The controller's decisions, one by one and together.
 
+mod answers;
 mod endpoint;
 mod foc;
 mod guard;

@@ -218,6 +218,8 @@ mod app {
             if work.updates.tested(outcome) {
                 bytes = new;
             }
+            // The head begins anew.
+            work.safety.with(Safety::renew);
         }
     }
 }
