@@ -37,7 +37,7 @@ impl<const AXES: usize> Safety<AXES> {
     }
 
     /// Sets one of the parameters that [`Self::get`] gives. Limits, rate and deadline only become stricter than those
-    /// of the build.
+    /// of the build, the deadline not below its least.
     ///
     /// # Errors
     ///
@@ -45,7 +45,8 @@ impl<const AXES: usize> Safety<AXES> {
     pub fn set(&mut self, token: u32, parameter: Parameter, axis: u8, value: f32) -> Result<(), Refusal> {
         self.may_change(token)?;
         if parameter == Parameter::Deadline {
-            self.deadline = whole(value, 1, self.built.deadline)?;
+            let built = &self.built.deadline;
+            self.deadline = whole(value, *built.start(), *built.end())?;
             return Ok(());
         }
         self.get(parameter, axis)?;

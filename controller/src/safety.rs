@@ -4,6 +4,7 @@
 //! time proportional to the number of axes at most.
 
 use core::mem;
+use core::ops::RangeInclusive;
 
 use actq_link::code::{self, Fault, Refusal};
 
@@ -26,10 +27,10 @@ impl<const AXES: usize> Shared<AXES> for Safety<AXES> {
 }
 
 /// What a build allows at most.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Built<const AXES: usize> {
     pub(crate) axes: [Axis; AXES],
-    pub(crate) deadline: u32,
+    pub(crate) deadline: RangeInclusive<u32>,
 }
 
 /// Decides, every tick, what the outputs do.
@@ -51,15 +52,15 @@ pub struct Safety<const AXES: usize> {
 }
 
 impl<const AXES: usize> Safety<AXES> {
-    /// Disarmed. `deadline` in ticks, at least 1 (0 is taken as 1); `seed` should be another one at every start, so
-    /// that requests from before it are refused: a count of starts in memory that a reset keeps, or a free-running
-    /// timer.
-    pub fn new(axes: [Axis; AXES], deadline: u32, seed: u32) -> Self {
-        let deadline = deadline.max(1);
+    /// Disarmed. `deadline` in ticks: what may be set, at least 1 (0 is taken as 1), and what holds until then, its end.
+    /// `seed` should be another one at every start, so that requests from before it are refused: a count of starts in
+    /// memory that a reset keeps, or a free-running timer.
+    pub fn new(axes: [Axis; AXES], deadline: RangeInclusive<u32>, seed: u32) -> Self {
+        let (least, most) = (*deadline.start().max(&1), *deadline.end().max(&1));
         Self {
             axes,
-            deadline,
-            built: Built { axes, deadline },
+            deadline: most,
+            built: Built { axes, deadline: least..=most },
             health: Health::default(),
             state: State::Disarmed(Disarmed::new()),
             fault: None,

@@ -3,6 +3,7 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+pub mod deadline;
 #[cfg(feature = "faults")]
 mod faults;
 pub mod image;

@@ -216,7 +216,7 @@ pub(crate) mod tests {
         let mut work = Work {
             port,
             watchdog: &mut watchdog,
-            safety: Safety::new([Axis::STILL; 1], 10, 0),
+            safety: Safety::new([Axis::STILL; 1], 1..=10, 0),
             endpoint: Endpoint::<1, 64>::new(Guard::full(&[], 0), facts, settings),
             updates,
             rates: Rates::new(1_000_000, 1000),

@@ -42,7 +42,7 @@ struct Controller {
 impl Controller {
     fn new(seed: u32) -> Self {
         let axis = Axis::new(0.0, 1.0, 1.0, 0.0, SafeAction::Hold).expect("the axis fits");
-        let mut safety = Safety::new([axis], DEADLINE, seed);
+        let mut safety = Safety::new([axis], 1..=DEADLINE, seed);
         Check::ALL.into_iter().for_each(|check| safety.check(check, true));
         let breadcrumb = Record::report(ResetCause::Power, None);
         let facts = Facts { image: 0, slot: BUILT_IN, timing: Timing::default(), breadcrumb };

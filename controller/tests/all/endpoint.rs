@@ -16,6 +16,7 @@ use proptest::prelude::*;
 const FRAME: usize = frame::bytes(128);
 const OBSERVATION: [f32; 3] = [0.5, -0.5, 0.0];
 const DEADLINE: u32 = 10;
+const LEAST_DEADLINE: u32 = 3;
 
 /// A controller and a host without a line between them.
 struct Bench<U = NoUpdate> {
@@ -36,7 +37,7 @@ impl Bench {
 impl<U: Update> Bench<U> {
     fn of(settings: Settings, update: U) -> Self {
         let axis = Axis::new(-1.0, 1.0, 0.1, 0.0, SafeAction::Hold).expect("the axis fits");
-        let mut safety = Safety::new([axis; 2], DEADLINE, 77);
+        let mut safety = Safety::new([axis; 2], LEAST_DEADLINE..=DEADLINE, 77);
         Check::ALL.into_iter().for_each(|check| safety.check(check, true));
         let breadcrumb = Record::report(ResetCause::Watchdog, None);
         let facts = Facts { image: 0xabcd, slot: BUILT_IN, timing: Timing::default(), breadcrumb };
@@ -183,8 +184,9 @@ fn parameters_become_stricter_while_disarmed_and_nothing_else() {
     let token = bench.status().token;
     let set = |parameter, axis, value| Message::Set { token, parameter, axis, value };
     let cases = [
+        (set(Parameter::Deadline, 0, 3.0), Ok(())),
         (set(Parameter::Deadline, 0, 9.0), Ok(())),
-        (set(Parameter::Deadline, 0, 0.0), Err(Refusal::Range)),
+        (set(Parameter::Deadline, 0, 2.0), Err(Refusal::Range)),
         (set(Parameter::Deadline, 0, 11.0), Err(Refusal::Range)),
         (set(Parameter::Deadline, 0, 5.5), Err(Refusal::Range)),
         (set(Parameter::Deadline, 0, f32::NAN), Err(Refusal::Range)),

@@ -93,7 +93,7 @@ proptest! {
         first in axes(), second in axes(), deadline in 1..10u32, seed: u32,
         events in prop::collection::vec(events(), 1..200),
     ) {
-        let mut safety = Safety::new([first, second], deadline, seed);
+        let mut safety = Safety::new([first, second], 1..=deadline, seed);
         let mut passed = [false; Check::ALL.len()];
         let (mut outputs, mut since_observation, mut since_action) = ([Output::Coast; 2], u32::MAX, 0u32);
         for event in events {
@@ -158,7 +158,7 @@ proptest! {
 fn a_cut_cable_leads_to_the_safe_action_at_the_deadline_and_one_tick() {
     for deadline in 1..50 {
         let axis = Axis::new(-1e6, 1e6, 1.0, 0.0, SafeAction::Brake).expect("the axis fits");
-        let mut safety = Safety::new([axis], deadline, 0);
+        let mut safety = Safety::new([axis], 1..=deadline, 0);
         Check::ALL.into_iter().for_each(|check| safety.check(check, true));
         safety.observed();
         safety.arm(safety.token()).expect("nothing keeps it from arming");
@@ -186,7 +186,7 @@ fn a_cut_cable_leads_to_the_safe_action_at_the_deadline_and_one_tick() {
 #[test]
 fn a_head_that_gives_no_action_is_late_at_the_deadline_and_one_tick() {
     let axis = Axis::new(-1.0, 1.0, 1.0, 0.0, SafeAction::Coast).expect("the axis fits");
-    let mut safety = Safety::new([axis], 10, 0);
+    let mut safety = Safety::new([axis], 1..=10, 0);
     Check::ALL.into_iter().for_each(|check| safety.check(check, true));
     safety.observed();
     safety.arm(safety.token()).expect("nothing keeps it from arming");

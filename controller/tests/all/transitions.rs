@@ -8,7 +8,7 @@ const DEADLINE: u32 = 5;
 /// A controller of one axis that could be armed.
 pub(super) fn ready(safe: SafeAction) -> Safety<1> {
     let axis = Axis::new(-1.0, 1.0, 0.1, 0.0, safe).expect("the axis fits");
-    let mut safety = Safety::new([axis], DEADLINE, 1);
+    let mut safety = Safety::new([axis], 1..=DEADLINE, 1);
     Check::ALL.into_iter().for_each(|check| safety.check(check, true));
     safety.observed();
     safety
@@ -125,7 +125,7 @@ fn arming_is_refused_for_each_check_that_has_failed_or_was_not_done() {
         }
     }
     let axis = Axis::new(-1.0, 1.0, 0.1, 0.0, SafeAction::Coast).expect("the axis fits");
-    let mut new = Safety::new([axis], DEADLINE, 1);
+    let mut new = Safety::new([axis], 1..=DEADLINE, 1);
     new.observed();
     for (check, refusal) in Check::ALL.into_iter().zip(refusals) {
         assert_eq!(new.arm(new.token()), Err(refusal), "nothing is right until it was said");

@@ -148,7 +148,7 @@ fn run<A: Authority>(
     let mut updater = Updater::new(slots, running);
 
     let axis = Axis::new(-1.0, 1.0, 0.05, 0.0, SafeAction::Ramp { step: 0.01 }).expect("the axis fits");
-    let mut safety = Safety::new([axis; 2], DEADLINE, starts);
+    let mut safety = Safety::new([axis; 2], 1..=DEADLINE, starts);
     Check::ALL.into_iter().for_each(|check| safety.check(check, true));
     let crash = Record { crash: Crash::Panic, pc: 0x0800_0100, detail: 17, ticks: 5, count: starts };
     let breadcrumb = Record::report(ResetCause::Watchdog, (starts > 0).then_some(crash));

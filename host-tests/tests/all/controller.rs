@@ -108,7 +108,7 @@ fn firmware(listener: &TcpListener, stop: &AtomicBool, built_in: &[u8], key: &[u
     let mut updater = Updater::new(Slots::new(flash, layout, Key::new(key)?), None);
 
     let axis = Axis::new(-100.0, 100.0, f32::INFINITY, 0.0, SafeAction::Coast)?;
-    let mut safety = Safety::new([axis; ACT], DEADLINE, 1);
+    let mut safety = Safety::new([axis; ACT], 1..=DEADLINE, 1);
     [Check::Clock, Check::Watchdog, Check::Hardware].into_iter().for_each(|check| safety.check(check, true));
     let breadcrumb = Record::report(ResetCause::Power, None);
     let facts = Facts { image: 0, slot: BUILT_IN, timing: Timing::default(), breadcrumb };

@@ -29,10 +29,14 @@ use defmt_semihosting as _;
 /// What a build allows, and a host may only make stricter.
 #[cfg(target_os = "none")]
 mod limits {
+    use core::ops::RangeInclusive;
+
+    use actq_firmware_demo::deadline;
+
     /// Ticks a second.
     pub(crate) const TICK_HZ: u32 = if cfg!(feature = "tick-8khz") { 8000 } else { 1000 };
-    /// Ticks without an observation, or without an action, before the safe action: half a second.
-    pub(crate) const DEADLINE: u32 = TICK_HZ / 2;
+    /// Ticks without an observation, or without an action, before the safe action.
+    pub(crate) const DEADLINE: RangeInclusive<u32> = deadline::allowed(TICK_HZ);
     /// Age in us of an observation, against the fastest one.
     pub(crate) const MAX_AGE: u32 = 500_000;
     /// Ticks in which an axis may go from one limit to the other.
@@ -52,6 +56,7 @@ mod app {
     use actq_controller::endpoint::Facts;
     use actq_controller::slots::Candidate;
     use actq_controller::{Check, Endpoint, Guard, Safety, Settings, Shared as _};
+    use actq_firmware_demo::deadline::BAUD;
     use actq_firmware_demo::image;
     #[cfg(feature = "foc")]
     use actq_firmware_demo::motor::Motor as Drives;
@@ -75,7 +80,6 @@ mod app {
     use crate::log::info;
     use crate::{faults, start};
 
-    const BAUD: u32 = 921_600;
     /// Values of an observation.
     const OBS: usize = start::LENGTHS[0];
     const AXES: usize = start::LENGTHS[1];

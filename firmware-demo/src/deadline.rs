@@ -1,0 +1,127 @@
+//! The deadlines that a host may set.
+
+use core::ops::RangeInclusive;
+
+/// Bits of the line in a second.
+pub const BAUD: u32 = 921_600;
+
+/// Ticks without an observation, or without an action, before the safe action, at `tick_hz` ticks a second: 10 ms to
+/// half a second. Within less, a host that asks for the status before it arms has no fresh observation, or the head no
+/// action: its first one after arming may have to wait for a step under way.
+pub const fn allowed(tick_hz: u32) -> RangeInclusive<u32> {
+    tick_hz / 100..=tick_hz / 2
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use std::collections::VecDeque;
+    use std::vec::Vec;
+
+    use actq_controller::breadcrumb::Record;
+    use actq_controller::endpoint::Facts;
+    use actq_controller::update::NoUpdate;
+    use actq_controller::{Axis, Check, Endpoint, Guard, Safety, Settings};
+    use actq_link::code::{Parameter, Refusal, Report, ResetCause, State};
+    use actq_link::report::BUILT_IN;
+    use actq_link::{Floats, Message, Sender, frame};
+
+    use super::*;
+
+    const SECOND: u64 = 1_000_000_000;
+    /// Of ten bits, in ns.
+    const BYTE: u64 = 10 * SECOND / BAUD as u64;
+    /// Of the head, in ns.
+    const STEP: u64 = 5_000_000;
+    /// From a status to what the host sends for it, in ns: a USB frame.
+    const TURN: u64 = 1_000_000;
+    /// Observations before arming.
+    const BEFORE: u32 = 10;
+
+    fn of_axis(tick_hz: u32) -> Safety<1> {
+        let mut safety = Safety::new([Axis::STILL], 1..=*allowed(tick_hz).end(), 0);
+        Check::ALL.into_iter().for_each(|check| safety.check(check, true));
+        safety
+    }
+
+    /// What a host sends: observations in a row; the status is asked for, and waited for, before it arms.
+    struct Host {
+        sender: Sender,
+        observations: u32,
+        queue: VecDeque<u8>,
+        waits_until: u64,
+    }
+
+    impl Host {
+        fn send(&mut self, message: &Message<'_>) {
+            let mut buffer = [0; 256];
+            let frame = self.sender.frame(message, 0, &mut buffer).expect("there is room");
+            self.queue.extend([&[0], frame].concat());
+        }
+
+        fn speak(&mut self, now: u64, token: u32) {
+            self.observations += 1;
+            if self.observations == BEFORE {
+                self.send(&Message::Ask(Report::Status));
+                let bytes = self.queue.len() + frame::wire_bytes(46);
+                self.waits_until = now + bytes as u64 * BYTE + TURN;
+            } else {
+                if self.observations == BEFORE + 1 {
+                    self.send(&Message::Arm { token });
+                }
+                self.send(&Message::Observation(Floats::Values(&[0.0; 32])));
+            }
+        }
+    }
+
+    /// Whether the host arms, and the controller is still armed a tenth of a second later.
+    fn stays_armed(deadline: u32, tick_hz: u32, phase: u64) -> bool {
+        let mut safety = of_axis(tick_hz);
+        safety.set(safety.token(), Parameter::Deadline, 0, deadline as f32).expect("any is allowed here");
+        let breadcrumb = Record::report(ResetCause::Power, None);
+        let facts = Facts { image: 0, slot: BUILT_IN, timing: Default::default(), breadcrumb };
+        let settings = Settings { status_period: 0, flash_while_armed: false };
+        let mut endpoint = Endpoint::<32, { frame::bytes(128) }>::new(Guard::full(&[], u32::MAX >> 1), facts, settings);
+        let mut host = Host { sender: Sender::new(0), observations: 0, queue: VecDeque::new(), waits_until: 0 };
+        let (mut ticked, mut step, mut out) = (phase, None, [0; 128]);
+        for now in (0..SECOND / 10).step_by(BYTE as usize) {
+            while ticked <= now {
+                safety.tick();
+                ticked += SECOND / u64::from(tick_hz);
+            }
+            let micros = (now / 1000) as u32;
+            if host.queue.is_empty() && now >= host.waits_until {
+                host.speak(now, safety.token());
+            }
+            if let Some(byte) = host.queue.pop_front() {
+                endpoint.receive(byte, micros, &mut safety, &mut NoUpdate, &mut out);
+            }
+            endpoint.report(micros, &mut safety, &mut out);
+            match step {
+                None => step = endpoint.step(&mut safety).map(|step| (step.of, now + STEP)),
+                Some((of, ready)) if now >= ready => {
+                    endpoint.acted(of, Ok::<_, ()>(&[0.0][..]), micros, &mut safety, &mut out);
+                    step = None;
+                }
+                Some(_) => {}
+            }
+        }
+        safety.state() == State::Armed
+    }
+
+    /// With a head that takes 5 ms, whatever the phase of the ticks. Half of it is not enough.
+    #[test]
+    fn the_least_deadline_arms_and_a_lower_one_is_refused() {
+        for tick_hz in [1000, 8000] {
+            let least = *allowed(tick_hz).start();
+            let period = SECOND / u64::from(tick_hz);
+            let phases: Vec<u64> = (0..period).step_by(period as usize / 16).collect();
+            assert!(phases.iter().all(|phase| stays_armed(least, tick_hz, *phase)), "{tick_hz}");
+            assert!(phases.iter().any(|phase| !stays_armed(least / 2, tick_hz, *phase)), "{tick_hz}");
+            let mut safety = Safety::new([Axis::STILL], allowed(tick_hz), 0);
+            let mut set = |ticks: u32| safety.set(safety.token(), Parameter::Deadline, 0, ticks as f32);
+            assert_eq!((set(least), set(least - 1)), (Ok(()), Err(Refusal::Range)));
+        }
+    }
+}
