@@ -446,7 +446,30 @@ fn outputs_that_could_both_be_the_action_are_not_guessed() -> Result<()> {
         file.output(name, &[1, 2]);
     }
     let error = format!("{:#}", imported(&file.bytes(), &Choice::default()).expect_err("a value"));
-    let expected = "\"policy\" cannot be taken, and \"value\" is not called action; actq import --output NAME says which is the action: node 2";
+    let expected = "\"policy\" cannot be taken, and no other is called action; actq import --output NAME takes value (2 values): node 2";
     ensure!(error.contains(expected), "{error}");
     Ok(())
+}
+
+#[test]
+fn a_refused_action_is_not_replaced_by_states() {
+    const H: usize = 4;
+    let mut file = begun();
+    let axes = file.ints(&[0]);
+    let mut x = file.node("Unsqueeze", &["obs", &axes], &[]);
+    for (state, next, len) in [("h", "h_out", OBS), ("k", "k_out", H)] {
+        let [w, r, b] = [vec![1, 3 * H, len], vec![1, 3 * H, H], vec![1, 6 * H]].map(|dims| file.drawn(&dims));
+        let own = [("hidden_size", Value::Int(H as i64)), ("linear_before_reset", Value::Int(1))];
+        file.nodes("GRU", &[&x, &w, &r, &b, "", state], &["", next], &own);
+        file.input(state, &[1, 1, H as i64]);
+        file.output(next, &[1, 1, H as i64]);
+        x = next.to_owned();
+    }
+    let y = file.node("Squeeze", &["k_out", &axes], &[]);
+    let y = file.gemm(&y, 3, H);
+    file.nodes("Softsign", &[&y], &["action"], &[]);
+    file.output("action", &[1, 3]);
+    let error = format!("{:#}", imported(&file.bytes(), &Choice::default()).expect_err("Softsign"));
+    let expected = "the output \"action\" cannot be taken, and the other outputs are states: node 5";
+    assert!(error.contains(expected) && !error.contains("_out"), "{error}");
 }

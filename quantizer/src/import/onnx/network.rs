@@ -246,7 +246,7 @@ fn choose(
     exprs: &Exprs,
     cells: &Cells,
     outputs: &[Output],
-    errors: Vec<(String, anyhow::Error)>,
+    mut errors: Vec<(String, anyhow::Error)>,
     choice: &Choice,
 ) -> Result<usize> {
     if let Some(name) = &choice.output {
@@ -254,15 +254,8 @@ fn choose(
     }
     let mut can: Vec<usize> = (0..outputs.len()).filter(|&i| !outputs[i].value.is_known()).collect();
     if can.is_empty() {
-        let mut errors = errors;
-        return match (errors.pop(), errors.is_empty()) {
-            (Some((_, error)), true) => Err(error),
-            (None, _) => bail!("no output depends on an input"),
-            (Some((name, error)), false) => {
-                let called = errors.into_iter().find(|(name, _)| is_action(name)).unwrap_or((name, error));
-                Err(called.1.context(format!("no output can be taken; of {:?}", printable(&called.0))))
-            }
-        };
+        let (name, error) = refused(errors).context("no output depends on an input")?;
+        return Err(error.context(format!("the output {:?} cannot be taken", printable(&name))));
     }
     let is_paired = |i: &usize| is_state(cells, exprs, &outputs[*i].value);
     let named = |i: &usize| choice.states.iter().any(|(_, to)| *to == outputs[*i].name);
@@ -275,25 +268,39 @@ fn choose(
             can.retain(|i| keep(i));
         }
     }
-    let &[one] = &can[..] else {
-        let list: Vec<String> = can
-            .iter()
-            .map(|&i| format!("{} ({} values)", printable(&outputs[i].name), outputs[i].value.len()))
-            .collect();
-        bail!("several outputs can be the action: {}; choose one with actq import --output NAME", list.join(", "))
-    };
-    // An action that cannot be taken is not replaced by something else, as by the value that stands beside it. But
-    // beside what is drawn stands the deterministic action.
-    let name = &outputs[one].name;
-    if !is_action(name)
-        && let Some((lost, error)) = errors.into_iter().find(|(lost, error)| is_action(lost) || !is_drawn(error))
-    {
-        let [lost, name] = [&lost, name].map(|name| printable(name));
-        return Err(error.context(format!(
-            "the output {lost:?} cannot be taken, and {name:?} is not called action; actq import --output NAME says which is the action"
-        )));
+    // An action that cannot be taken is not replaced by something else: a critic's value, or a hidden state. But an
+    // exporter adds the deterministic action to one that is drawn.
+    errors.retain(|(name, error)| is_action(name) || !is_drawn(error));
+    let is_called = can.iter().any(|&i| is_action(&outputs[i].name));
+    if !is_called && let Some((lost, error)) = refused(errors) {
+        can.retain(|i| !is_paired(i) && !named(i));
+        let others = match &can[..] {
+            [] => "the other outputs are states".to_owned(),
+            _ => format!("no other is called action; actq import --output NAME takes {}", sizes(outputs, &can)),
+        };
+        return Err(error.context(format!("the output {:?} cannot be taken, and {others}", printable(&lost))));
     }
-    Ok(one)
+    match can[..] {
+        [one] => Ok(one),
+        _ => bail!(
+            "several outputs can be the action: {}; choose one with actq import --output NAME",
+            sizes(outputs, &can)
+        ),
+    }
+}
+
+/// Of the outputs that were refused the one called action, or else the last.
+fn refused(mut errors: Vec<(String, anyhow::Error)>) -> Option<(String, anyhow::Error)> {
+    match errors.iter().position(|(name, _)| is_action(name)) {
+        Some(at) => Some(errors.swap_remove(at)),
+        None => errors.pop(),
+    }
+}
+
+/// Some outputs with their lengths, for a message.
+fn sizes(outputs: &[Output], which: &[usize]) -> String {
+    let one = |&i: &usize| format!("{} ({} values)", printable(&outputs[i].name), outputs[i].value.len());
+    which.iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
 fn is_action(name: &str) -> bool {
