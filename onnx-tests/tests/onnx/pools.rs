@@ -4,7 +4,7 @@ use anyhow::{Context as _, Result};
 
 use actq::import::onnx::Choice;
 
-use super::file::{File, Value};
+use super::file::Value;
 use super::styles::{OBS, begun, ended};
 use super::{imported, same};
 
