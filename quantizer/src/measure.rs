@@ -1,6 +1,7 @@
 //! What an image does: its errors on recordings, its size, its time on the target.
 
 pub mod actions;
+pub mod agreement;
 pub mod check;
 pub mod eval;
 pub mod own;

@@ -1,9 +1,11 @@
 //! `actq import`, and .onnx files where a policy's folder is taken; PyTorch's way to both.
 
+use std::ffi::{OsStr, OsString};
 use std::fs;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Output};
 
+use actq::import::onnx::proto;
 use actq::policy::Policy;
 use actq_bench::command::{actq, binary, failed, succeeded};
 use actq_bench::skipped;
@@ -12,7 +14,7 @@ use ndarray::{Array2, Array3};
 use ndarray_npy::WriteNpyExt as _;
 use tempfile::TempDir;
 
-use super::file::File;
+use super::file::{File, tensor};
 
 const OBS: usize = 6;
 
@@ -82,14 +84,85 @@ fn import_writes_a_folder_and_overwrites_nothing() -> Result<()> {
     Ok(())
 }
 
+/// Python, if it has these modules; else the test is skipped.
+#[track_caller]
+fn python_with(modules: &str) -> Option<OsString> {
+    let python = std::env::var_os("ACTQ_PYTHON").unwrap_or_else(|| "python3".into());
+    let has = Command::new(&python).args(["-c", &format!("import {modules}")]).output();
+    if has.is_ok_and(|output| output.status.success()) {
+        return Some(python);
+    }
+    skipped(&format!("no Python with {modules} (python3, or what ACTQ_PYTHON names)"));
+    None
+}
+
+/// `actq import --check` of a file with the observation `obs` and one layer, whose values are `x`, before the last one.
+fn checked(python: impl AsRef<OsStr>, layer: impl FnOnce(&mut File) -> String) -> Result<Output> {
+    let dir = TempDir::new()?;
+    let mut file = File::default();
+    file.input("obs", &[1, OBS as i64]);
+    let x = layer(&mut file);
+    let y = file.gemm(&x, 2, 20);
+    file.nodes("Identity", &[&y], &["actions"], &[]);
+    file.output("actions", &[1, 2]);
+    let [model, out] = ["model.onnx", "policy"].map(|name| dir.path().join(name));
+    fs::write(&model, file.bytes())?;
+    let import = ["import", text(&model), "--out", text(&out), "--check"];
+    Ok(actq(&import).env("ACTQ_PYTHON", python).output()?)
+}
+
+#[test]
+fn check_needs_a_python() -> Result<()> {
+    let output = checked("no-such-python", |file| file.gemm("obs", 20, OBS))?;
+    failed(&output, 1, &["--check runs the file with onnxruntime, from Python (python3, or what ACTQ_PYTHON names)"])
+}
+
+#[test]
+fn check_finds_dequantized_weights_equal() -> Result<()> {
+    let Some(python) = python_with("numpy, onnx, onnxruntime") else { return Ok(()) };
+    // onnxruntime's optimizer would quantize the observations, too.
+    let output = checked(python, |file| {
+        let codes: Vec<u8> = (0..20 * OBS).map(|i| (37 * i % 255) as u8).collect();
+        file.initializer(&proto::Tensor {
+            data_type: Some(3),
+            raw_data: Some(codes.into()),
+            ..tensor("q", &[OBS, 20], &[])
+        });
+        file.initializer(&proto::Tensor {
+            data_type: Some(3),
+            raw_data: Some(vec![0].into()),
+            ..tensor("z", &[], &[])
+        });
+        let scale = file.reals(&[], &[0.01]);
+        let w = file.node("DequantizeLinear", &["q", &scale, "z"], &[]);
+        let x = file.node("MatMul", &["obs", &w], &[]);
+        file.node("Tanh", &[&x], &[])
+    })?;
+    let said = succeeded(&output)?;
+    ensure!(said.contains("checked   256 observations against onnxruntime: off by"), "{said}");
+    Ok(())
+}
+
+#[test]
+fn check_trusts_float64_over_onnxruntime() -> Result<()> {
+    let Some(python) = python_with("numpy, onnx, onnxruntime") else { return Ok(()) };
+    // In float32 the sigmoid is 0, and its logarithm infinite.
+    let output = checked(python, |file| {
+        let steep = file.reals(&[], &[100.0]);
+        let x = file.gemm("obs", 20, OBS);
+        let x = file.node("Mul", &[&x, &steep], &[]);
+        let x = file.node("Sigmoid", &[&x], &[]);
+        file.node("Log", &[&x], &[])
+    })?;
+    let said = succeeded(&output)?;
+    ensure!(said.contains("checked   256 observations against the file in float64: off by"), "{said}");
+    ensure!(said.contains("by its float32 arithmetic"), "{said}");
+    Ok(())
+}
+
 #[test]
 fn modules_of_pytorch_become_policies() -> Result<()> {
-    let python = std::env::var_os("ACTQ_PYTHON").unwrap_or_else(|| "python3".into());
-    let has = Command::new(&python).args(["-c", "import torch, onnx, onnxruntime"]).output();
-    if !has.is_ok_and(|output| output.status.success()) {
-        skipped("no Python with torch, onnx and onnxruntime (python3, or what ACTQ_PYTHON names)");
-        return Ok(());
-    }
+    let Some(python) = python_with("torch, onnx, onnxruntime") else { return Ok(()) };
     let script = actq_boards::root().join("examples/pytorch/test_actq_export.py");
     let output = Command::new(&python).arg(script).env("ACTQ", binary()?).env("ACTQ_PYTHON", &python).output()?;
     let said = succeeded(&output)?;

@@ -133,7 +133,8 @@ pub(crate) struct ImportArgs {
     #[arg(long, value_name = "IN=OUT", value_parser = pair)]
     pub(crate) state: Vec<(String, String)>,
     /// Compare the actions with onnxruntime's on the recording, or on random observations: to 1e-5 of the largest
-    /// action. Needs Python with onnxruntime (python3, or what ACTQ_PYTHON names)
+    /// action; where they differ, float64 says which is right. Needs Python with onnxruntime and onnx (python3, or what
+    /// ACTQ_PYTHON names)
     #[arg(long)]
     pub(crate) check: bool,
     /// Replace files that are there

@@ -1,40 +1,96 @@
-"""Runs an ONNX file over observations with onnxruntime: float32 rows on standard input, rows of actions on standard output."""
+"""Runs an ONNX file over observations: float32 rows on standard input, float64 rows of actions on standard output.
+
+check.py FILE PLAN onnxruntime: by onnxruntime without its optimizer, which may round what it fuses.
+check.py FILE PLAN float64: by the evaluator of the package onnx, with every float32 of the file made float64.
+"""
 import json
 import sys
 
+path, plan, way = sys.argv[1], json.loads(sys.argv[2]), sys.argv[3]
 try:
     import numpy
-    import onnxruntime
+    if way == "float64":
+        import onnx
+        import onnx.reference
+    else:
+        import onnxruntime
 except ImportError as error:
-    sys.exit(f"{error}: pip install onnxruntime numpy")
+    sys.exit(f"{error}: pip install onnxruntime onnx numpy")
 
-path, plan = sys.argv[1], json.loads(sys.argv[2])
-options = onnxruntime.SessionOptions()
-options.log_severity_level = 3
-try:
+
+def by_onnxruntime():
+    """Gives a function that runs the file, its inputs as zeros, and the names of its outputs."""
+    options = onnxruntime.SessionOptions()
+    options.log_severity_level = 3
+    options.graph_optimization_level = onnxruntime.GraphOptimizationLevel.ORT_DISABLE_ALL
     session = onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
+    kinds = {"tensor(float)": "f4", "tensor(double)": "f8", "tensor(int64)": "i8", "tensor(int32)": "i4", "tensor(bool)": "?"}
+    inputs = {port.name: zeros(port.shape, kinds[port.type]) for port in session.get_inputs()}
+    return session.run, inputs, [port.name for port in session.get_outputs()]
+
+
+def in_float64():
+    """As by_onnxruntime."""
+    model = onnx.load(path)
+    widen(model)
+    evaluator = onnx.reference.ReferenceEvaluator(model)
+    constants = {tensor.name for tensor in model.graph.initializer}
+    inputs = {}
+    for port in model.graph.input:
+        tensor = port.type.tensor_type
+        if port.name not in constants:
+            kind = onnx.helper.tensor_dtype_to_np_dtype(tensor.elem_type)
+            inputs[port.name] = zeros([axis.dim_value for axis in tensor.shape.dim], kind)
+    return evaluator.run, inputs, evaluator.output_names
+
+
+def widen(message):
+    """Makes every float32 tensor, type, constant and cast inside a protobuf message float64."""
+    single, double = onnx.TensorProto.FLOAT, onnx.TensorProto.DOUBLE
+    if isinstance(message, onnx.TensorProto):
+        if message.data_type == single:
+            message.CopyFrom(wide(onnx.numpy_helper.to_array(message), message.name))
+        return
+    if isinstance(message, onnx.TypeProto.Tensor) and message.elem_type == single:
+        message.elem_type = double
+    for attribute in message.attribute if isinstance(message, onnx.NodeProto) else []:
+        if message.op_type == "Cast" and attribute.name == "to" and attribute.i == single:
+            attribute.i = double
+        if message.op_type == "Constant" and attribute.name in ("value_float", "value_floats"):
+            value = wide(onnx.helper.get_attribute_value(attribute), "")
+            attribute.CopyFrom(onnx.helper.make_attribute("value", value))
+    for field, value in message.ListFields():
+        if field.type == field.TYPE_MESSAGE:
+            for part in [value] if hasattr(value, "ListFields") else value:
+                widen(part)
+
+
+def wide(values, name):
+    return onnx.numpy_helper.from_array(numpy.array(values, "f8"), name)
+
+
+def zeros(shape, kind):
+    return numpy.zeros([n if isinstance(n, int) and n > 0 else 1 for n in shape], kind)
+
+
+def main():
+    run, fed, given = in_float64() if way == "float64" else by_onnxruntime()
+    outputs = [plan["output"]] + [output for _, output in plan["states"]]
+    if not set(outputs) <= set(given):
+        sys.exit(f"{plan['output']} is no output of the file, only a value inside it: onnxruntime cannot show it")
+    width = sum(length for _, length in plan["inputs"])
+    for row in numpy.frombuffer(sys.stdin.buffer.read(), "<f4").reshape(-1, width):
+        at = 0
+        for name, length in plan["inputs"]:
+            fed[name] = row[at:at + length].reshape(fed[name].shape).astype(fed[name].dtype)
+            at += length
+        action, *states = run(outputs, fed)
+        for (name, _), state in zip(plan["states"], states):
+            fed[name] = state.reshape(fed[name].shape)
+        sys.stdout.buffer.write(action.astype("<f8").tobytes())
+
+
+try:
+    main()
 except Exception as error:
-    sys.exit(f"onnxruntime cannot run this file: {error}")
-kinds = {"tensor(float)": numpy.float32, "tensor(double)": numpy.float64, "tensor(int64)": numpy.int64,
-         "tensor(int32)": numpy.int32, "tensor(bool)": numpy.bool_}
-
-
-def zeros(port):
-    shape = [n if isinstance(n, int) and n > 0 else 1 for n in port.shape]
-    return numpy.zeros(shape, kinds[port.type])
-
-
-outputs = [plan["output"]] + [output for _, output in plan["states"]]
-if not set(outputs) <= {port.name for port in session.get_outputs()}:
-    sys.exit(f"{plan['output']} is no output of the file, only a value inside it: onnxruntime cannot show it")
-fed = {port.name: zeros(port) for port in session.get_inputs()}
-width = sum(length for _, length in plan["inputs"])
-for row in numpy.frombuffer(sys.stdin.buffer.read(), "<f4").reshape(-1, width):
-    at = 0
-    for name, length in plan["inputs"]:
-        fed[name] = row[at:at + length].reshape(fed[name].shape).astype(fed[name].dtype)
-        at += length
-    action, *states = session.run(outputs, fed)
-    for (name, _), state in zip(plan["states"], states):
-        fed[name] = state.reshape(fed[name].shape)
-    sys.stdout.buffer.write(action.astype("<f4").tobytes())
+    sys.exit(f"{'onnx in float64' if way == 'float64' else way} cannot run this file: {error}")
