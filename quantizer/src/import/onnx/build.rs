@@ -436,6 +436,20 @@ impl Exprs {
         self.scaled(most, -1.0, 0.0)
     }
 
+    /// `x` where positive, else `alpha (exp(x) - 1)`: `alpha (elu(x) + (1 / alpha - 1) relu(x))`.
+    pub(super) fn elu(&mut self, x: Id, alpha: f64) -> Id {
+        let (elu, relu) = (self.function(Function::Elu, x), self.function(Function::Relu, x));
+        match alpha {
+            0.0 => relu,
+            1.0 => elu,
+            alpha => {
+                let relu = self.scaled(relu, 1.0 / alpha - 1.0, 0.0);
+                let sum = self.add(elu, relu);
+                self.scaled(sum, alpha, 0.0)
+            }
+        }
+    }
+
     /// `x` where positive, else `slope x`, with a slope for each element.
     pub(super) fn leaky(&mut self, x: Id, slope: Vec<f64>) -> Id {
         let positive = self.function(Function::Relu, x);

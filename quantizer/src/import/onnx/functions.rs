@@ -85,18 +85,11 @@ fn gate(k: f64) -> OnVector {
     })
 }
 
-/// `gamma x` where positive, else `gamma alpha (exp(x) - 1)`: of the two, `alpha elu(x) + (1 - alpha) relu(x)`.
+/// `gamma x` where positive, else `gamma alpha (exp(x) - 1)`.
 fn elu(alpha: f64, gamma: f64) -> OnVector {
     Box::new(move |exprs, x| {
-        let elu = exprs.function(Function::Elu, x);
-        let sum = if alpha == 1.0 {
-            elu
-        } else {
-            let relu = exprs.function(Function::Relu, x);
-            let (elu, relu) = (exprs.scaled(elu, alpha, 0.0), exprs.scaled(relu, 1.0 - alpha, 0.0));
-            exprs.add(elu, relu)
-        };
-        exprs.scaled(sum, gamma, 0.0)
+        let elu = exprs.elu(x, alpha);
+        exprs.scaled(elu, gamma, 0.0)
     })
 }
 

@@ -36,11 +36,7 @@ impl Exprs {
         let exponent = self.known_of(power, Function::Exp).filter(|_| near(alpha, -minus))?;
         let below = self.at_most(x, 0.0);
         let same = exponent == x || exponent == below;
-        same.then(|| {
-            let (elu, relu) = (self.function(Function::Elu, x), self.function(Function::Relu, x));
-            let (elu, relu) = (self.scaled(elu, alpha, 0.0), self.scaled(relu, 1.0 - alpha, 0.0));
-            if alpha == 1.0 { elu } else { self.add(elu, relu) }
-        })
+        same.then(|| self.elu(x, alpha))
     }
 
     /// `where(condition, x, limit)`, or with x and the limit the other way round, for a condition by which side of the
