@@ -5,7 +5,7 @@ use anyhow::{Context as _, Result};
 use actq::import::onnx::Choice;
 
 use super::file::Value;
-use super::styles::{OBS, begun, ended};
+use super::styles::{OBS, begun, ended, ops};
 use super::{imported, same};
 
 /// A pool behind a layer whose values have this shape, with an activation and a layer behind.
@@ -37,6 +37,26 @@ fn pools_are_sums_and_the_largest_of_slices() -> Result<()> {
                 same(&pooled(op, shape, attributes, *behind)).with_context(|| format!("{op} {i}"))?;
             }
         }
+    }
+    Ok(())
+}
+
+#[test]
+fn positions_of_padding_alone_are_constants() -> Result<()> {
+    let ints = |name, values: &[i64]| (name, Value::Ints(values.to_vec()));
+    let conv = [ints("kernel_shape", &[1]), ints("strides", &[2]), ints("pads", &[1, 1])];
+    // Without a bias, a position that sees only padding is 0: the largest is a relu of the other.
+    for (op, expected) in [("GlobalMaxPool", "linear tanh relu linear"), ("GlobalAveragePool", "linear tanh linear")] {
+        let mut file = begun();
+        let x = file.gemm("obs", 8, OBS);
+        let (apart, w) = (file.ints(&[1, 4, 2]), file.drawn(&[5, 4, 1]));
+        let x = file.node("Reshape", &[&x, &apart], &[]);
+        let x = file.node("Conv", &[&x, &w], &conv);
+        let x = file.node("Tanh", &[&x], &[]);
+        let x = file.node(op, &[&x], &[]);
+        let x = file.node("Flatten", &[&x], &[]);
+        let found = ops(&ended(file, &x, 5)).with_context(|| op.to_owned())?;
+        assert_eq!(found, format!("linear {expected}"), "{op}");
     }
     Ok(())
 }

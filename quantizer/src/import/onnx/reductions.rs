@@ -4,7 +4,7 @@ use anyhow::{Context as _, Result, ensure};
 
 use super::arithmetic::two;
 use super::call::Call;
-use super::elements::open_vector;
+use super::elements::{open_vector, value};
 use super::evaluation::computed;
 use super::expr::{Expr, Exprs, Id, Unary};
 use super::known::{Reduced, reduced};
@@ -189,27 +189,28 @@ fn reduce(op: &str, x: &Tensor, Reduced { axes, shape }: Reduced, exprs: &mut Ex
 
 /// Whether a sum over these is one of several layers' outputs, rather than over the elements of one.
 fn of_different_values(row: &[Element]) -> bool {
-    let mut values: Vec<Id> =
-        row.iter().filter_map(|e| if let Element::Of(id, _) = e { Some(*id) } else { None }).collect();
+    let mut values: Vec<Id> = row.iter().filter_map(value).map(|(id, _)| id).collect();
+    let open = values.len();
     values.sort_unstable();
     values.dedup();
-    values.len() == row.len() && row.len() > 1
+    values.len() == open && row.len() > 1
 }
 
 /// The sum, mean, largest or least over runs of `each` elements, of whole vectors.
 fn slices_joined(op: &str, exprs: &mut Exprs, elements: &[Element], each: usize, shape: Vec<usize>) -> Result<Tensor> {
-    let slice = |k: usize| elements[k..].iter().step_by(each).copied().collect::<Vec<Element>>();
-    let mut all = open_vector(exprs, &slice(0))?;
+    let slice = |k: usize| Tensor::of_elements(shape.clone(), elements[k..].iter().step_by(each).copied().collect());
+    let two_of = match op {
+        "ReduceMax" => "Max",
+        "ReduceMin" => "Min",
+        _ => "Add",
+    };
+    let mut all = slice(0);
     for k in 1..each {
-        let next = open_vector(exprs, &slice(k))?;
-        all = match op {
-            "ReduceMax" => exprs.max(all, next),
-            "ReduceMin" => exprs.min(all, next),
-            _ => exprs.add(all, next),
-        };
+        all = two(two_of, exprs, &all, &slice(k), elements.len())?;
     }
     if op == "ReduceMean" {
-        all = exprs.scaled(all, 1.0 / each as f64, 0.0);
+        let share = Tensor::new(vec![], Data::Real(vec![1.0 / each as f64]));
+        all = two("Mul", exprs, &all, &share, elements.len())?;
     }
-    Ok(Tensor::of_elements(shape, exprs.elements(all)))
+    Ok(all)
 }
