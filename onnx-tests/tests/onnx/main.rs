@@ -7,6 +7,7 @@ mod damaged;
 mod exporters;
 mod file;
 mod integers;
+mod norms;
 mod pools;
 mod rows;
 mod styles;

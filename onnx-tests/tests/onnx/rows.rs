@@ -7,7 +7,7 @@ use super::same;
 use super::styles::{OBS, begun, ended, ops};
 
 /// A norm of the last axis of a value, which has so many elements.
-type Norm = fn(&mut File, &str, usize) -> String;
+pub(super) type Norm = fn(&mut File, &str, usize) -> String;
 
 fn mean(file: &mut File, x: &str) -> String {
     file.node("ReduceMean", &[x], &[("axes", Value::Ints(vec![-1])), ("keepdims", Value::Int(1))])
@@ -20,7 +20,13 @@ fn root(file: &mut File, square: &str) -> String {
 }
 
 /// The op that each is, and the nodes that exporters make of it.
-const NORMS: [(&str, Norm); 5] = [
+pub(super) const NORMS: [(&str, Norm); 6] = [
+    ("layernorm", |file, x, n| {
+        // The first weight is 0, as pruning leaves some.
+        let weight: Vec<f32> = (0..n).map(|i| 0.1 * i as f32).collect();
+        let (w, b) = (file.reals(&[n], &weight), file.drawn(&[n]));
+        file.node("LayerNormalization", &[x, &w, &b], &[("axis", Value::Int(-1))])
+    }),
     // Keras: the mean is taken off behind the product.
     ("layernorm", |file, x, n| {
         let m = mean(file, x);

@@ -108,67 +108,97 @@ fn every_activation_is_itself_or_made_of_others() -> Result<()> {
     Ok(())
 }
 
+/// The nodes of a function of a value.
+type Written = fn(&mut File, &str) -> String;
+
+/// The ops that each is, and the nodes that exporters make of it.
+pub(super) const ACTIVATIONS: [(&str, Written); 10] = [
+    // jax.nn.gelu: 1 - erf(-x / sqrt 2)
+    ("gelu", |file, x| {
+        let [root, one, half] = [0.5f32.sqrt(), 1.0, 0.5].map(|v| file.reals(&[], &[v]));
+        let e = file.node("Neg", &[x], &[]);
+        let e = file.node("Mul", &[&e, &root], &[]);
+        let e = file.node("Erf", &[&e], &[]);
+        let e = file.node("Sub", &[&one, &e], &[]);
+        let y = file.node("Mul", &[x, &e], &[]);
+        file.node("Mul", &[&half, &y], &[])
+    }),
+    ("gelu", |file, x| {
+        let [root, one, half] = [2f32.sqrt(), 1.0, 0.5].map(|v| file.reals(&[], &[v]));
+        let e = file.node("Div", &[x, &root], &[]);
+        let e = file.node("Erf", &[&e], &[]);
+        let e = file.node("Add", &[&e, &one], &[]);
+        let y = file.node("Mul", &[x, &e], &[]);
+        file.node("Mul", &[&y, &half], &[])
+    }),
+    ("gelu_tanh", |file, x| {
+        let [three, small, root, one, half] = [3.0, 0.044_715, 0.797_884_6, 1.0, 0.5].map(|v| file.reals(&[], &[v]));
+        let cube = file.node("Pow", &[x, &three], &[]);
+        let cube = file.node("Mul", &[&cube, &small], &[]);
+        let sum = file.node("Add", &[x, &cube], &[]);
+        let sum = file.node("Mul", &[&sum, &root], &[]);
+        let t = file.node("Tanh", &[&sum], &[]);
+        let t = file.node("Add", &[&one, &t], &[]);
+        let h = file.node("Mul", &[x, &half], &[]);
+        file.node("Mul", &[&h, &t], &[])
+    }),
+    // TensorFlow: half of x first.
+    ("gelu", |file, x| {
+        let [root, one, half] = [2f32.sqrt(), 1.0, 0.5].map(|v| file.reals(&[], &[v]));
+        let e = file.node("Div", &[x, &root], &[]);
+        let e = file.node("Erf", &[&e], &[]);
+        let e = file.node("Add", &[&e, &one], &[]);
+        let h = file.node("Mul", &[&half, x], &[]);
+        file.node("Mul", &[&h, &e], &[])
+    }),
+    ("gelu", |file, x| {
+        let [root, half] = [2f32.sqrt(), 0.5].map(|v| file.reals(&[], &[v]));
+        let e = file.node("Div", &[x, &root], &[]);
+        let e = file.node("Erf", &[&e], &[]);
+        let e = file.node("Mul", &[&e, &half], &[]);
+        let e = file.node("Add", &[&half, &e], &[]);
+        file.node("Mul", &[x, &e], &[])
+    }),
+    // Beside the residual that reads the same value.
+    ("gelu add", |file, x| {
+        let [root, one, half] = [2f32.sqrt(), 1.0, 0.5].map(|v| file.reals(&[], &[v]));
+        let e = file.node("Div", &[x, &root], &[]);
+        let e = file.node("Erf", &[&e], &[]);
+        let e = file.node("Add", &[&e, &one], &[]);
+        let h = file.node("Mul", &[x, &half], &[]);
+        let y = file.node("Mul", &[&h, &e], &[]);
+        file.node("Add", &[&y, x], &[])
+    }),
+    ("mish", |file, x| {
+        let s = file.node("Softplus", &[x], &[]);
+        let t = file.node("Tanh", &[&s], &[]);
+        file.node("Mul", &[x, &t], &[])
+    }),
+    ("silu", |file, x| {
+        let one = file.reals(&[], &[1.0]);
+        let e = file.node("Neg", &[x], &[]);
+        let e = file.node("Exp", &[&e], &[]);
+        let e = file.node("Add", &[&e, &one], &[]);
+        file.node("Div", &[x, &e], &[])
+    }),
+    ("softplus", |file, x| {
+        let one = file.reals(&[], &[1.0]);
+        let e = file.node("Exp", &[x], &[]);
+        let e = file.node("Add", &[&e, &one], &[]);
+        file.node("Log", &[&e], &[])
+    }),
+    ("elu", |file, x| {
+        let [one, zero] = [1.0, 0.0].map(|v| file.reals(&[], &[v]));
+        let e = file.node("Exp", &[x], &[]);
+        let e = file.node("Sub", &[&e, &one], &[]);
+        let above = file.node("Greater", &[x, &zero], &[]);
+        file.node("Where", &[&above, x, &e], &[])
+    }),
+];
+
 #[test]
 fn activations_that_were_taken_apart_are_found() -> Result<()> {
-    type Written = fn(&mut File, &str) -> String;
-    let cases: [(&str, Written); 7] = [
-        // jax.nn.gelu: 1 - erf(-x / sqrt 2)
-        ("gelu", |file, x| {
-            let [root, one, half] = [0.5f32.sqrt(), 1.0, 0.5].map(|v| file.reals(&[], &[v]));
-            let e = file.node("Neg", &[x], &[]);
-            let e = file.node("Mul", &[&e, &root], &[]);
-            let e = file.node("Erf", &[&e], &[]);
-            let e = file.node("Sub", &[&one, &e], &[]);
-            let y = file.node("Mul", &[x, &e], &[]);
-            file.node("Mul", &[&half, &y], &[])
-        }),
-        ("gelu", |file, x| {
-            let [root, one, half] = [2f32.sqrt(), 1.0, 0.5].map(|v| file.reals(&[], &[v]));
-            let e = file.node("Div", &[x, &root], &[]);
-            let e = file.node("Erf", &[&e], &[]);
-            let e = file.node("Add", &[&e, &one], &[]);
-            let y = file.node("Mul", &[x, &e], &[]);
-            file.node("Mul", &[&y, &half], &[])
-        }),
-        ("gelu_tanh", |file, x| {
-            let [three, small, root, one, half] =
-                [3.0, 0.044_715, 0.797_884_6, 1.0, 0.5].map(|v| file.reals(&[], &[v]));
-            let cube = file.node("Pow", &[x, &three], &[]);
-            let cube = file.node("Mul", &[&cube, &small], &[]);
-            let sum = file.node("Add", &[x, &cube], &[]);
-            let sum = file.node("Mul", &[&sum, &root], &[]);
-            let t = file.node("Tanh", &[&sum], &[]);
-            let t = file.node("Add", &[&one, &t], &[]);
-            let h = file.node("Mul", &[x, &half], &[]);
-            file.node("Mul", &[&h, &t], &[])
-        }),
-        ("mish", |file, x| {
-            let s = file.node("Softplus", &[x], &[]);
-            let t = file.node("Tanh", &[&s], &[]);
-            file.node("Mul", &[x, &t], &[])
-        }),
-        ("silu", |file, x| {
-            let one = file.reals(&[], &[1.0]);
-            let e = file.node("Neg", &[x], &[]);
-            let e = file.node("Exp", &[&e], &[]);
-            let e = file.node("Add", &[&e, &one], &[]);
-            file.node("Div", &[x, &e], &[])
-        }),
-        ("softplus", |file, x| {
-            let one = file.reals(&[], &[1.0]);
-            let e = file.node("Exp", &[x], &[]);
-            let e = file.node("Add", &[&e, &one], &[]);
-            file.node("Log", &[&e], &[])
-        }),
-        ("elu", |file, x| {
-            let [one, zero] = [1.0, 0.0].map(|v| file.reals(&[], &[v]));
-            let e = file.node("Exp", &[x], &[]);
-            let e = file.node("Sub", &[&e, &one], &[]);
-            let above = file.node("Greater", &[x, &zero], &[]);
-            file.node("Where", &[&above, x, &e], &[])
-        }),
-    ];
-    for (name, written) in cases {
+    for (name, written) in ACTIVATIONS {
         let mut file = begun();
         let x = file.gemm("obs", 16, OBS);
         let x = written(&mut file, &x);

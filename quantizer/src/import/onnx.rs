@@ -27,6 +27,7 @@ mod model;
 mod moves;
 mod network;
 mod norm;
+mod parts;
 mod places;
 mod pointwise;
 mod pools;
@@ -39,5 +40,6 @@ mod simplify;
 mod slices;
 mod states;
 mod tensor;
+mod totals;
 
 pub use network::{Choice, Imported, import, import_bytes};

@@ -23,12 +23,12 @@ enum Open {
 /// An operation on two values, repeated to one shape.
 pub(super) fn two(op: &str, exprs: &mut Exprs, x: &Tensor, y: &Tensor, most: usize) -> Result<Tensor> {
     let shape = broadcast(&x.shape, &y.shape)?;
-    let (mut x, y) = (expanded(x, &shape, most)?.elements(), expanded(y, &shape, most)?.elements());
-    // A vector with constants in it that is divided by its length stays one.
-    let mixed = |e: &[Element]| e.iter().any(|e| value(e).is_some()) && e.iter().any(|e| value(e).is_none());
-    if op == "Div" && mixed(&x) && value(&y[0]).is_some() && y.iter().all(|e| *e == y[0]) {
-        let whole = open_vector(exprs, &x)?;
-        x = exprs.elements(whole);
+    let (mut x, mut y) = (expanded(x, &shape, most)?.elements(), expanded(y, &shape, most)?.elements());
+    if matches!(op, "Add" | "Sub" | "Mul" | "Div") {
+        open_rows(exprs, &mut x, &y)?;
+    }
+    if matches!(op, "Add" | "Mul") {
+        open_rows(exprs, &mut y, &x)?;
     }
     let open = |i: usize| match (value(&x[i]), value(&y[i])) {
         (None, None) => Open::Neither,
@@ -66,13 +66,30 @@ pub(super) fn two(op: &str, exprs: &mut Exprs, x: &Tensor, y: &Tensor, most: usi
                 Open::Both => {
                     let (x, y) = (exprs.vector(&values_x), exprs.vector(&values_y));
                     let result = both(op, exprs, x, y)?;
-                    exprs.elements(result)
+                    exprs.known_elements(result)
                 }
             };
             at.into_iter().zip(result).for_each(|(i, element)| all[i] = element);
         }
     }
     Ok(Tensor::of_elements(shape, all))
+}
+
+/// Makes vectors of rows with constants in them, where `numbers` has one that is computed of sums for each: what is
+/// divided by its length, or loses its mean, may be normed.
+fn open_rows(exprs: &mut Exprs, elements: &mut [Element], numbers: &[Element]) -> Result<()> {
+    let is_mixed = |row: &[Element]| row.iter().any(|e| value(e).is_some()) && row.iter().any(|e| value(e).is_none());
+    if !is_mixed(elements) {
+        return Ok(());
+    }
+    for at in by_row(exprs, (0..elements.len()).collect(), [numbers; 2]) {
+        let [row, numbers] = [&*elements, numbers].map(|all| at.iter().map(|&i| all[i]).collect::<Vec<Element>>());
+        if is_mixed(&row) && exprs.is_number_of_sums(&numbers) {
+            let whole = open_vector(exprs, &row)?;
+            at.into_iter().zip(exprs.elements(whole)).for_each(|(i, element)| elements[i] = element);
+        }
+    }
+    Ok(())
 }
 
 /// `a x + b`; what is multiplied with 0 is known.

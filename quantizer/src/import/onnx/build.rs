@@ -4,10 +4,11 @@ use std::sync::Arc;
 
 use actq_kernels::math::Function;
 
-use super::compare::{near, uniform};
+use super::compare::{exact, near, uniform};
 use super::elements::value;
 use super::expr::{Expr, Exprs, Id, Matrix, Run, Unary};
 use super::norm::Norm;
+use super::parts::Part;
 use super::tensor::Element;
 
 /// Steps that a polynomial may be written in.
@@ -18,6 +19,14 @@ const GELU_TANH: [f64; 2] = [0.797_884_560_802_865_4, 0.035_677_408_136_300_125]
 const MOST_MIDDLE: f64 = 100.0;
 /// A limit so far from zero may not be taken off a value and added again: what is small would lose its digits.
 const FAR: f64 = 1.0;
+
+/// `factor function(scale of)`
+struct Gated {
+    function: Function,
+    of: Id,
+    scale: f64,
+    factor: f64,
+}
 
 impl Exprs {
     /// The vector of these elements of other expressions.
@@ -48,6 +57,15 @@ impl Exprs {
             }
             _ => (0..self.len_of(id)).map(|i| Element::Of(id, i)).collect(),
         }
+    }
+
+    /// As [`Self::elements`], with those of constants in a vector as what they are.
+    pub(super) fn known_elements(&self, id: Id) -> Vec<Element> {
+        let known = |(element, part): (Element, Part)| match part.source {
+            Some(_) => element,
+            None => Element::Known(part.offset),
+        };
+        self.elements(id).into_iter().zip(self.parts(id)).map(known).collect()
     }
 
     /// `a x + b`, with the same a and b for all elements.
@@ -196,12 +214,11 @@ impl Exprs {
             let sum = if m == one { r } else { m };
             let &Expr::Sum(whole) = self.get(sum) else { continue };
             // Factors of what is normed have come out of the product.
-            let (of, factors, zeros) = self.split(whole);
-            let is_normed = whole == x || of == x && uniform(&zeros) == Some(0.0);
-            if !is_normed || (m != one && r != one) || zero != 0.0 {
+            let Some(factors) = self.ratios(whole, x) else { continue };
+            if (m != one && r != one) || zero != 0.0 {
                 continue;
             }
-            let a: Vec<f64> = if whole == x { a.clone() } else { a.iter().zip(&factors).map(|(a, f)| a / f).collect() };
+            let a: Vec<f64> = a.iter().zip(&factors).map(|(a, f)| a / f).collect();
             if a.iter().zip(&c).all(|(a, c)| near(c * k * n, -a)) {
                 let mean = self.scaled(sum, -1.0 / n, 0.0);
                 let mean = self.put(Expr::Spread(mean), n as usize);
@@ -228,16 +245,19 @@ impl Exprs {
             return self.put(Expr::Spread(one), len);
         }
         for (p, q) in [(x, y), (y, x)] {
-            if let Some((function, of, factor)) = self.gated(p, q) {
+            if let Some(Gated { function, of, scale, factor }) = self.gated(p, q) {
+                let of = self.scaled(of, scale, 0.0);
                 let value = self.function(function, of);
                 return self.scaled(value, factor, 0.0);
             }
         }
         for (p, q) in [(x, y), (y, x)] {
+            // A factor that all elements have is one of the norm.
+            let (of, k) = if let (of, k, 0.0) = self.affine_of(p) { (of, k) } else { (p, 1.0) };
             if let &Expr::Spread(one) = self.get(q)
-                && let Some(norm) = self.norm(p, one)
+                && let Some(norm) = self.norm(of, one)
             {
-                return self.normed(p, norm);
+                return self.normed(of, k, &norm);
             }
         }
         // Factors come out of the product; those of a root that is spread first, as those of what it norms belong to
@@ -258,42 +278,52 @@ impl Exprs {
         self.put(Expr::Mul(x.min(y), x.max(y)), len)
     }
 
-    fn normed(&mut self, v: Id, Norm { factor, eps, centred }: Norm) -> Id {
+    /// `k` times a norm.
+    fn normed(&mut self, v: Id, k: f64, norm: &Norm) -> Id {
         let len = self.len_of(v);
-        let ones = vec![1.0; len];
-        let norm = match centred {
-            Some(of) => Expr::LayerNorm(of, ones, vec![0.0; len], eps),
-            None => Expr::RmsNorm(v, ones, eps),
-        };
-        let norm = self.put(norm, len);
-        self.scaled(norm, factor, 0.0)
+        let weight = vec![k * norm.factor; len];
+        match norm.centred {
+            Some(of) => self.layer_norm(of, &weight, vec![0.0; len], norm.eps),
+            None => self.rms_norm(v, &weight, norm.eps),
+        }
     }
 
-    /// Whether `p q` is a factor times a function that multiplies its operand with a gate: SiLU, GELU, Mish.
-    fn gated(&self, p: Id, q: Id) -> Option<(Function, Id, f64)> {
-        if let Some(s) = self.known_of(q, Function::Sigmoid)
-            && let Some(k) = self.ratio(s, p)
-        {
-            return Some((Function::Silu, s, 1.0 / k));
+    /// Whether `p q` is a function that multiplies its operand with a gate: SiLU, GELU, Mish.
+    fn gated(&self, p: Id, q: Id) -> Option<Gated> {
+        // f(s) / k, as p is s / k.
+        let of_gate = |function: Function, s: Id| {
+            let factor = 1.0 / self.ratio(s, p)?;
+            Some(Gated { function, of: s, scale: 1.0, factor })
+        };
+        if let Some(s) = self.known_of(q, Function::Sigmoid) {
+            return of_gate(Function::Silu, s);
         }
-        if let Some(softplus) = self.known_of(q, Function::Tanh)
-            && self.known_of(softplus, Function::Softplus) == Some(p)
+        if let Some(tanh) = self.known_of(q, Function::Tanh)
+            && let Some(s) = self.known_of(tanh, Function::Softplus)
         {
-            return Some((Function::Mish, p, 1.0));
+            return of_gate(Function::Mish, s);
         }
         // p (b + b gate); with the gate's operand turned around also p (b - b gate), as both gates are odd.
         let (gate, a, b) = self.affine_of(q);
         if a.abs() != b.abs() {
             return None;
         }
-        let side = if a == b { 1.0 } else { -1.0 };
-        if let Some(u) = self.operand_of(gate, Unary::Erf) {
-            return near(side * self.ratio(u, p)?, 0.5f64.sqrt()).then_some((Function::Gelu, p, 2.0 * b));
-        }
-        let polynomial = self.polynomial(self.known_of(gate, Function::Tanh)?, p, DEPTH)?;
-        let [zero, first, square, cube] = polynomial.map(|factor| side * factor);
-        let is_gelu = zero == 0.0 && square == 0.0 && near(first, GELU_TANH[0]) && near(cube, GELU_TANH[1]);
-        is_gelu.then_some((Function::GeluTanh, p, 2.0 * b))
+        let (function, scale) = if let Some(u) = self.operand_of(gate, Unary::Erf) {
+            (Function::Gelu, self.ratio(u, p)? * 2f64.sqrt())
+        } else {
+            (Function::GeluTanh, self.gelu_scale(self.known_of(gate, Function::Tanh)?, p)?)
+        };
+        let scale = exact(a / b * scale);
+        Some(Gated { function, of: p, scale, factor: 2.0 * b / scale })
+    }
+
+    /// The k for which `u` is the polynomial of `k p` whose tanh is in GELU's tanh form.
+    fn gelu_scale(&self, u: Id, p: Id) -> Option<f64> {
+        let polynomials = self.polynomials(u, p, DEPTH)?;
+        let k = polynomials.first()?[1] / GELU_TANH[0];
+        let expected = [0.0, GELU_TANH[0] * k, 0.0, GELU_TANH[1] * k.powi(3)];
+        let is_gelu = |found: &[f64; 4]| found.iter().zip(expected).all(|(found, expected)| near(*found, expected));
+        polynomials.iter().all(is_gelu).then_some(k)
     }
 
     /// The sum of all elements.
@@ -301,16 +331,8 @@ impl Exprs {
         if self.len_of(x) == 1 {
             return x;
         }
-        // Squares of a row among others, which a norm compares with its row.
-        if let Expr::Pick(runs) = self.get(x)
-            && let &[run] = &runs[..]
-            && let &Expr::Mul(all, same) = self.get(run.of)
-            && all == same
-            && let Some(row) = self.within(Run { of: all, ..run })
-        {
-            let row = self.vector(&row);
-            let squares = self.mul(row, row);
-            return self.put(Expr::Sum(squares), 1);
+        if let &Expr::Spread(one) = self.get(x) {
+            return self.scaled(one, self.len_of(x) as f64, 0.0);
         }
         self.put(Expr::Sum(x), 1)
     }

@@ -1,7 +1,5 @@
 //! Whether expressions are the same but for factors, which is what patterns ask.
 
-use std::mem::discriminant;
-
 use actq_kernels::math::Function;
 
 use super::expr::{Expr, Exprs, Id, Unary};
@@ -12,6 +10,12 @@ const TOLERANCE: f64 = 2e-6;
 /// Equal, as far as f32 tells.
 pub(super) fn near(a: f64, b: f64) -> bool {
     (a - b).abs() <= TOLERANCE * a.abs().max(b.abs())
+}
+
+/// A power of two, as far as f32 tells: exporters write one as the quotient of rounded constants.
+pub(super) fn exact(k: f64) -> f64 {
+    let power = k.abs().log2().round().exp2().copysign(k);
+    if near(power, k) { power } else { k }
 }
 
 /// The one value of a vector.
@@ -41,68 +45,37 @@ impl Exprs {
         self.operand_of(id, Unary::Known(function))
     }
 
-    /// The operand of a sum of squares.
-    pub(super) fn squares_of(&self, id: Id) -> Option<Id> {
-        let &Expr::Sum(product) = self.get(id) else { return None };
-        if let &Expr::Mul(x, y) = self.get(product) { (x == y).then_some(x) } else { None }
-    }
-
-    /// The k for which `y = k x`.
-    pub(super) fn ratio(&self, y: Id, x: Id) -> Option<f64> {
-        if y == x {
-            return Some(1.0);
+    /// The coefficients of each element of `y` as a polynomial in that of `x`, from the constant one on, up to the cube.
+    pub(super) fn polynomials(&self, y: Id, x: Id, depth: usize) -> Option<Vec<[f64; 4]>> {
+        let depth = depth.checked_sub(1)?;
+        if let Some(ratios) = self.ratios(y, x) {
+            return Some(ratios.into_iter().map(|k| [0.0, k, 0.0, 0.0]).collect());
         }
-        let zeros = vec![0.0; self.len_of(x)];
-        // Factors and offsets may have gone into a norm.
-        let split = |id: Id| match self.get(id) {
-            Expr::Affine(of, a, b) => (*of, None, Some((a, b))),
-            expr @ Expr::LayerNorm(of, a, b, eps) => (*of, Some((discriminant(expr), *eps)), Some((a, b))),
-            expr @ Expr::RmsNorm(of, a, eps) => (*of, Some((discriminant(expr), *eps)), Some((a, &zeros))),
-            _ => (id, None, None),
-        };
-        let at = |parts: Option<(&Vec<f64>, &Vec<f64>)>, i: usize| parts.map_or((1.0, 0.0), |(a, b)| (a[i], b[i]));
-        let ((of_y, norm_y, y), (of_x, norm_x, x)) = (split(y), split(x));
-        if of_y != of_x || norm_y != norm_x {
-            return None;
-        }
-        let k = at(y, 0).0 / at(x, 0).0;
-        let same = |i: usize| near(at(y, i).0, k * at(x, i).0) && near(at(y, i).1, k * at(x, i).1);
-        (k.is_finite() && k != 0.0 && (0..self.len_of(of_y)).all(same)).then_some(k)
-    }
-
-    /// The coefficients of `y` as a polynomial in `x`, from the constant one on, up to the cube.
-    pub(super) fn polynomial(&self, y: Id, x: Id, depth: usize) -> Option<[f64; 4]> {
-        if depth == 0 {
-            return None;
-        }
-        if let Some(k) = self.ratio(y, x) {
-            return Some([0.0, k, 0.0, 0.0]);
-        }
-        match *self.get(y) {
-            Expr::Affine(of, ..) => {
-                let (same, a, b) = self.affine_of(y);
-                let inner = if same == of { self.polynomial(of, x, depth - 1)? } else { return None };
-                Some([a * inner[0] + b, a * inner[1], a * inner[2], a * inner[3]])
+        match self.get(y) {
+            Expr::Affine(of, a, b) => {
+                let one = |((p, a), b): (([f64; 4], &f64), &f64)| [a * p[0] + b, a * p[1], a * p[2], a * p[3]];
+                Some(self.polynomials(*of, x, depth)?.into_iter().zip(a).zip(b).map(one).collect())
             }
             Expr::Add(p, q) => {
-                let (p, q) = (self.polynomial(p, x, depth - 1)?, self.polynomial(q, x, depth - 1)?);
-                Some([0, 1, 2, 3].map(|i| p[i] + q[i]))
+                let pairs = self.polynomials(*p, x, depth)?.into_iter().zip(self.polynomials(*q, x, depth)?);
+                Some(pairs.map(|(p, q)| [0, 1, 2, 3].map(|i| p[i] + q[i])).collect())
             }
             Expr::Mul(p, q) => {
-                let (p, q) = (self.polynomial(p, x, depth - 1)?, self.polynomial(q, x, depth - 1)?);
-                let mut product = [0.0; 4];
-                for (i, p) in p.into_iter().enumerate() {
-                    for (j, q) in q.into_iter().enumerate() {
-                        match product.get_mut(i + j) {
-                            Some(sum) => *sum += p * q,
-                            None if p * q == 0.0 => {}
-                            None => return None,
-                        }
-                    }
-                }
-                Some(product)
+                let pairs = self.polynomials(*p, x, depth)?.into_iter().zip(self.polynomials(*q, x, depth)?);
+                pairs.map(|(p, q)| product(p, q)).collect()
             }
             _ => None,
         }
     }
+}
+
+/// The product of two polynomials, where it is none of more than the cube.
+fn product(p: [f64; 4], q: [f64; 4]) -> Option<[f64; 4]> {
+    let mut product = [0.0; 4];
+    for (i, p) in p.into_iter().enumerate() {
+        for (j, q) in q.into_iter().enumerate().filter(|(_, q)| p * q != 0.0) {
+            *product.get_mut(i + j)? += p * q;
+        }
+    }
+    Some(product)
 }

@@ -6,7 +6,7 @@ use super::arithmetic::two;
 use super::call::Call;
 use super::elements::{open_vector, value};
 use super::evaluation::computed;
-use super::expr::{Expr, Exprs, Id, Unary};
+use super::expr::{Exprs, Id, Unary};
 use super::known::{Reduced, reduced};
 use super::places::{axis, transpose};
 use super::tensor::{Data, Element, Tensor, count};
@@ -23,13 +23,14 @@ pub(super) fn run(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> 
             let scale = call.reals(1, "the scale")?;
             let bias = if call.optional(2).is_some() { call.reals(2, "the bias")? } else { vec![0.0; scale.len()] };
             positive(epsilon, "epsilon")?;
-            norm(call, exprs, scale.len(), bias.len(), &|x| Expr::LayerNorm(x, scale.clone(), bias.clone(), epsilon))
-                .map(Some)
+            let normed = |exprs: &mut Exprs, x: Id| exprs.layer_norm(x, &scale, bias.clone(), epsilon);
+            norm(call, exprs, scale.len(), bias.len(), &normed).map(Some)
         }
         "RMSNormalization" | "SimplifiedLayerNormalization" => {
             let scale = call.reals(1, "the scale")?;
             positive(epsilon, "epsilon")?;
-            norm(call, exprs, scale.len(), scale.len(), &|x| Expr::RmsNorm(x, scale.clone(), epsilon)).map(Some)
+            let normed = |exprs: &mut Exprs, x: Id| exprs.rms_norm(x, &scale, epsilon);
+            norm(call, exprs, scale.len(), scale.len(), &normed).map(Some)
         }
         "BatchNormalization" => batch_norm(call, exprs, epsilon).map(Some),
         "InstanceNormalization" | "GroupNormalization" => group_norm(call, exprs, epsilon).map(Some),
@@ -74,7 +75,7 @@ fn of_row(exprs: &mut Exprs, row: &[Element], f: &dyn Fn(&mut Exprs, Id) -> Id) 
     }
     let row = open_vector(exprs, row)?;
     let result = f(exprs, row);
-    Ok(exprs.elements(result))
+    Ok(exprs.known_elements(result))
 }
 
 /// Applies what works on a vector to every run of `n` elements.
@@ -87,12 +88,18 @@ fn rows(exprs: &mut Exprs, x: &Tensor, n: usize, f: &dyn Fn(&mut Exprs, Id) -> I
     Ok(Tensor::of_elements(x.shape.clone(), all))
 }
 
-fn norm(call: &Call<'_>, exprs: &mut Exprs, scales: usize, biases: usize, expr: &dyn Fn(Id) -> Expr) -> Result<Tensor> {
+fn norm(
+    call: &Call<'_>,
+    exprs: &mut Exprs,
+    scales: usize,
+    biases: usize,
+    normed: &dyn Fn(&mut Exprs, Id) -> Id,
+) -> Result<Tensor> {
     let x = call.input(0)?;
     let at = axis(call.int("axis").unwrap_or(-1), x.shape.len())?;
     let n = count(&x.shape[at..])?;
     ensure!(scales == n && biases == n, "norms {n} values with {scales} scales and {biases} biases");
-    rows(exprs, x, n, &|exprs, row| exprs.put(expr(row), n))
+    rows(exprs, x, n, normed)
 }
 
 /// What inference makes of a batch norm: a factor and an offset for each channel.
@@ -134,8 +141,7 @@ fn group_norm(call: &Call<'_>, exprs: &mut Exprs, eps: f64) -> Result<Tensor> {
     ensure!(groups > 0 && n.is_multiple_of(groups), "{n} channels are not {groups} groups");
     let each = x.len() / groups;
     let ones = vec![1.0; each];
-    let y =
-        rows(exprs, x, each, &|exprs, row| exprs.put(Expr::LayerNorm(row, ones.clone(), vec![0.0; each], eps), each))?;
+    let y = rows(exprs, x, each, &|exprs, row| exprs.layer_norm(row, &ones, vec![0.0; each], eps))?;
     let constant = |i: usize, what: &str| -> Result<Tensor> {
         let values = call.reals(i, what)?;
         // Before operator set 21 there is one for each group.

@@ -3,7 +3,9 @@
 
 use std::collections::HashMap;
 
+use super::elements::value;
 use super::expr::{Expr, Exprs, Id, Run};
+use super::parts::cut;
 use super::tensor::Element;
 
 /// The most rows: each takes operations of its own.
@@ -25,11 +27,7 @@ fn rows(exprs: &mut Exprs, at: &[usize], operand: &[Element]) -> Option<Vec<Vec<
     let mut rows: Vec<((Id, usize), Vec<usize>)> = Vec::new();
     let mut row_of: HashMap<(Id, usize), usize> = HashMap::new();
     for &place in at {
-        let Element::Of(id, i) = operand[place] else { return None };
-        let number = match *exprs.get(id) {
-            Expr::Affine(x, ..) if matches!(exprs.get(x), Expr::Spread(_)) => (x, 0),
-            _ => (id, i),
-        };
+        let number = exprs.number(operand[place])?;
         let row = *row_of.entry(number).or_insert(rows.len());
         match rows.get_mut(row) {
             Some((_, places)) => places.push(place),
@@ -44,21 +42,19 @@ fn rows(exprs: &mut Exprs, at: &[usize], operand: &[Element]) -> Option<Vec<Vec<
 }
 
 impl Exprs {
-    /// The elements of a run, as those of what is only moved there, of at most so many runs as there may be rows.
-    pub(super) fn within(&self, run: Run) -> Option<Vec<(Id, usize)>> {
-        let all = match self.get(run.of) {
-            Expr::Spread(one) => return Some(vec![(*one, 0); run.len]),
-            Expr::Pick(runs) if runs.len() <= MOST_ROWS => runs,
-            Expr::Pick(_) => return None,
-            _ => return Some((run.from..run.from + run.len).map(|i| (run.of, i)).collect()),
-        };
-        let (mut skip, mut elements) = (run.from, Vec::with_capacity(run.len));
-        for part in all {
-            let places = part.from + skip.min(part.len)..part.from + part.len;
-            elements.extend(places.take(run.len - elements.len()).map(|i| (part.of, i)));
-            skip = skip.saturating_sub(part.len);
+    /// An element, or the number that is spread and then scaled to it, which rows have in common.
+    fn number(&self, element: Element) -> Option<(Id, usize)> {
+        let (id, i) = value(&element)?;
+        match *self.get(id) {
+            Expr::Affine(x, ..) if matches!(self.get(x), Expr::Spread(_)) => Some((x, 0)),
+            _ => Some((id, i)),
         }
-        Some(elements)
+    }
+
+    /// Whether these elements are one number that is computed of sums, each with its factor.
+    pub(super) fn is_number_of_sums(&mut self, elements: &[Element]) -> bool {
+        let Some(first) = elements.first().and_then(|element| self.number(*element)) else { return false };
+        elements.iter().all(|element| self.number(*element) == Some(first)) && self.lone(first.0, first.1).is_some()
     }
 
     /// Element `i` of a value as a value by itself, where it is computed of sums alone.
@@ -74,9 +70,10 @@ impl Exprs {
         let mut at = |exprs: &mut Self, x: Id, i: usize| exprs.lone_within(x, i, depth, found);
         let lone = match *self.get(of) {
             Expr::Sum(_) => Some(of),
-            Expr::Pick(_) | Expr::Spread(_) => {
-                let [(of, i)] = self.within(Run { of, from: i, len: 1 })?[..] else { return None };
-                at(self, of, i)
+            Expr::Spread(one) => at(self, one, 0),
+            Expr::Pick(ref runs) if runs.len() <= MOST_ROWS => {
+                let run = *cut(runs, Run { of, from: i, len: 1 }).first()?;
+                at(self, run.of, run.from)
             }
             Expr::Affine(x, ref a, ref b) => {
                 let (a, b) = (a[i], b[i]);
