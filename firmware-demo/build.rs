@@ -1,9 +1,26 @@
-//! Links for the board, and refuses a key that is none.
+//! Links for the board, writes the build's limits as Rust, and refuses a key that is none.
+
+use std::path::PathBuf;
+use std::{env, fs};
+
+use actq_controller::Limits;
 
 fn main() -> Result<(), String> {
+    write_limits()?;
     #[cfg(feature = "signed")]
     check_key()?;
     actq_boards::link()
+}
+
+/// Writes `limits.rs`: an array of the limits in the variable, which commas separate.
+fn write_limits() -> Result<(), String> {
+    println!("cargo::rerun-if-env-changed=ACTQ_LIMITS");
+    let text = env::var("ACTQ_LIMITS").unwrap_or_default();
+    let parts = text.split(',').filter(|_| !text.is_empty());
+    let one = |part: &str| part.parse().map_err(|error| format!("ACTQ_LIMITS has {part:?}: {error}"));
+    let limits: Vec<Limits> = parts.map(one).collect::<Result<_, _>>()?;
+    let path = PathBuf::from(env::var_os("OUT_DIR").ok_or("cargo sets OUT_DIR")?).join("limits.rs");
+    fs::write(&path, format!("{limits:?}")).map_err(|error| format!("{}: {error}", path.display()))
 }
 
 /// A text that is not 64 hexadecimal digits is refused where it becomes a constant.
@@ -12,7 +29,7 @@ fn check_key() -> Result<(), String> {
     use actq_controller::slots::Key;
 
     println!("cargo::rerun-if-env-changed=ACTQ_PUBLIC_KEY");
-    let digits = std::env::var("ACTQ_PUBLIC_KEY").unwrap_or_default();
+    let digits = env::var("ACTQ_PUBLIC_KEY").unwrap_or_default();
     let key = Key::parse(&digits).map_or(Ok(()), |bytes| Key::new(&bytes).map(drop));
     key.map_err(|error| format!("ACTQ_PUBLIC_KEY is {error}"))
 }

@@ -66,8 +66,8 @@ impl fmt::Display for AxisError {
 impl core::error::Error for AxisError {}
 
 impl Axis {
-    /// An axis that may not leave 0.
-    pub const STILL: Self = Self { low: 0.0, high: 0.0, rate: 1.0, start: 0.0, safe: SafeAction::Coast };
+    /// An axis without limits, and so without a rate: it may not leave 0, and keeps the controller from arming.
+    pub const STILL: Self = Self { low: 0.0, high: 0.0, rate: 0.0, start: 0.0, safe: SafeAction::Coast };
 
     /// An axis with finite limits `low` to `high`, that changes by at most `rate` in a tick (infinite: at once), and
     /// whose first value after arming changes by at most that from `start`.
@@ -91,6 +91,11 @@ impl Axis {
             return Err(AxisError::Ramp);
         }
         Ok(Self { low, high, rate, start, safe })
+    }
+
+    /// `true` for [`Self::STILL`] alone: [`Self::new`] makes none without a rate.
+    pub fn is_still(&self) -> bool {
+        self.rate == 0.0
     }
 
     /// The lower limit.

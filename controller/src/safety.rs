@@ -147,15 +147,16 @@ impl<const AXES: usize> Safety<AXES> {
         if let State::Armed(_) = self.state {
             return Some(Refusal::Armed);
         }
-        self.health.ready().err().or(self.is_stale().then_some(Refusal::Stale))
+        let limits = || self.axes.iter().any(Axis::is_still).then_some(Refusal::Limits);
+        self.health.ready().err().or(self.is_stale().then_some(Refusal::Stale)).or_else(limits)
     }
 
     /// Arms.
     ///
     /// # Errors
     ///
-    /// Where the token is not [`Self::token`], where armed already, where a check has failed or was not done, and
-    /// without a fresh observation. Nothing changes then.
+    /// Where the token is not [`Self::token`], where armed already, where a check has failed or was not done, without a
+    /// fresh observation, and with an axis without limits. Nothing changes then.
     pub fn arm(&mut self, token: u32) -> Result<(), Refusal> {
         if token != self.token {
             return Err(Refusal::Token);

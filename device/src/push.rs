@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use actq_link::Message;
-use actq_link::code::Refusal;
+use actq_link::code::{Parameter, Refusal};
 use actq_link::frame::CRC;
 use anyhow::{Context as _, Result, bail, ensure};
 
@@ -127,6 +127,23 @@ pub fn push(client: &mut Client, package: &Package<'_>, mut progress: impl FnMut
         progress(push.taken());
     }
     Ok(())
+}
+
+/// A note on axes of the controller without limits, which no image that is sent brings.
+///
+/// # Errors
+///
+/// Where there is no answer.
+pub fn axes_note(client: &mut Client) -> Result<Option<String>> {
+    let mut still = Vec::new();
+    for axis in 0..client.status()?.axes {
+        // Only what has no limits has no rate.
+        if client.get(Parameter::Rate, axis)? == 0.0 {
+            still.push(format!("axis {axis}"));
+        }
+    }
+    let note = || format!("the controller will refuse to arm, {}: {}", still.join(", "), Refusal::Limits);
+    Ok((!still.is_empty()).then(note))
 }
 
 /// Repeats a request while the controller is busy with it.

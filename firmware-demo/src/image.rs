@@ -1,13 +1,16 @@
 //! What an image has to be for this controller, and what its contract says of the axes.
 
 use actq_boards::seams::Watchdog;
-use actq_controller::{Axis, SafeAction};
+use actq_controller::{Axis, Limits, SafeAction};
 use actq_kernels::image::header::W_SIZES;
 use actq_kernels::{Head, Image};
 use actq_link::code::Refusal;
 
 use crate::patience::LONGEST;
 use crate::running::SLICE;
+
+/// How often an axis may go from one limit to the other in a second, where the build has no rate.
+const WAYS: f32 = 10.0;
 
 /// Values of an observation and of an action, by an image's header: an array's length, so that it is known when the
 /// firmware is compiled. One each where the bytes are no image.
@@ -45,20 +48,30 @@ pub fn open<'i, 's>(
     Ok(head)
 }
 
-/// An axis for each value of an image's actions, with the limits of its contract, the whole way in `ticks`, and 0 as
-/// its safe action. Without an image or without finite limits, an axis stays where it is.
-pub fn axes<const AXES: usize>(image: Option<&Image<'_>>, ticks: f32) -> [Axis; AXES] {
-    let [_, _, low, high, ..] = image.map(Image::contract_arrays).unwrap_or_default();
+/// An axis for each value of an image's actions, at `hz` ticks a second, with the stricter limits of its contract and of
+/// the build: each axis has its own there, or all have one. Without finite limits of either, an axis is still.
+pub fn axes<const AXES: usize>(image: Option<&Image<'_>>, built: &[Limits], hz: f32) -> [Axis; AXES] {
     let mut axes = [Axis::STILL; AXES];
-    for ((axis, low), high) in axes.iter_mut().zip(low).zip(high) {
-        let [low, high] = [low, high].map(|word| f32::from_bits(u32::from_le(*word)));
-        let (rate, start) = ((high - low) / ticks, 0f32.max(low).min(high));
-        let ramp = Axis::new(low, high, rate, start, SafeAction::Ramp { step: rate });
-        // Where 0 is outside the limits, there is no way to it.
-        let found = ramp.or_else(|_| Axis::new(low, high, rate, start, SafeAction::Coast));
-        *axis = found.unwrap_or(Axis::STILL);
+    for (i, axis) in axes.iter_mut().enumerate() {
+        let limits = Limits::of_axis(i, image.and_then(|image| image.limits(i)), built);
+        *axis = limits.and_then(|limits| limited(limits, hz)).unwrap_or(Axis::STILL);
     }
     axes
+}
+
+/// An axis with 0 as its safe action.
+fn limited(limits: Limits, hz: f32) -> Option<Axis> {
+    let Limits { low, high, rate } = limits;
+    let step = match rate {
+        Some(rate) => rate / hz,
+        // An axis with one value only goes nowhere, at any rate.
+        None if low == high => 1.0,
+        None => (high - low) / (hz / WAYS),
+    };
+    let start = 0f32.max(low).min(high);
+    let ramp = Axis::new(low, high, step, start, SafeAction::Ramp { step });
+    // Where 0 is outside the limits, there is no way to it.
+    ramp.or_else(|_| Axis::new(low, high, step, start, SafeAction::Coast)).ok()
 }
 
 #[cfg(test)]
@@ -77,8 +90,19 @@ mod tests {
     }
 
     #[test]
+    fn axes_have_the_limits_of_the_build() {
+        let limits = |text: &str| text.parse::<Limits>().expect("limits");
+        let all = axes::<2>(None, &[limits("-1:3")], 1000.0);
+        assert_eq!(all.map(|axis| (axis.low(), axis.high(), axis.rate(), axis.start())), [(-1.0, 3.0, 0.04, 0.0); 2]);
+        let [ramps, coasts, fixed] = axes(None, &["-1:1:20", "2:4:8", "3:3"].map(limits), 1000.0);
+        assert_eq!((ramps.rate(), ramps.safe()), (0.02, SafeAction::Ramp { step: 0.02 }));
+        assert_eq!((coasts.rate(), coasts.start(), coasts.safe()), (0.008, 2.0, SafeAction::Coast));
+        assert_eq!((fixed.low(), fixed.high(), fixed.start(), fixed.is_still()), (3.0, 3.0, 3.0, false));
+    }
+
+    #[test]
     fn without_an_image_nothing_may_move() {
-        assert_eq!(axes::<3>(None, 100.0), [Axis::STILL; 3]);
+        assert_eq!(axes::<3>(None, &[], 1000.0), [Axis::STILL; 3]);
         assert_eq!(open(&[0; 8], &mut [], [1; 2], &mut Fed::default()).err(), Some(Refusal::Unfit));
     }
 }

@@ -117,6 +117,9 @@ codes! {
         Unfit = 19, "the image is not one that this controller can run";
         /// A break or overrun has not been cleared.
         Hardware = 20, "the hardware reports a fault";
+        /// An axis has no finite limits, by the image that is built in or by the build.
+        Limits = 21, "an axis has no limits, so nothing may move; build the firmware with --limits LOW:HIGH, or with an image \
+            whose actions have low and high";
     }
 }
 

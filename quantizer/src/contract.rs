@@ -123,6 +123,13 @@ impl ActionContract {
         ]
     }
 
+    /// Lower and upper limit of action `i`, if it has both. (Where only other actions have some, f32's largest number is
+    /// in their place.)
+    pub fn limits(&self, i: usize) -> Option<[f32; 2]> {
+        let of = |array: &Option<Vec<f32>>| array.as_ref()?.get(i).copied();
+        Some([of(&self.low)?, of(&self.high)?]).filter(|[low, high]| *low > f32::MIN && *high < f32::MAX)
+    }
+
     /// That each array has one finite value per action dimension, and that the limits can be kept.
     ///
     /// # Errors

@@ -5,17 +5,22 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use actq_boards::{Application, Target, root, target_dir};
+use actq_controller::Limits;
 use actq_kernels::Image;
 use anyhow::{Context as _, Result, bail, ensure};
 
+use crate::limits;
 use crate::setup::{self, cargo};
 
 const USAGE: &str = "\
-Usage: cargo xtask firmware --board NAME [--image FILE.actq] [--features LIST] [--key HEX] --out FILE.elf
+Usage: cargo xtask firmware --board NAME [--image FILE.actq] [--limits LIMITS] [--features LIST] [--key HEX]
+                             --out FILE.elf
        cargo xtask firmware --list
 
   --board NAME       The board; --list shows them
   --image FILE.actq  The image to build in; without it, that of the UR3 policy at 3 bits
+  --limits LIMITS    The range of every axis, LOW:HIGH or LOW:HIGH:RATE (change in a second), or a file with a line for
+                     each axis. The stricter of these and the image's own limits hold; without either no axis may move
   --features LIST    Features of firmware-demo: tick-8khz, foc, defmt-rtt, defmt-semihosting
   --key HEX          The public key, as `actq keygen` prints it, whose images alone run (feature signed)
   --out FILE.elf     Where the ELF file goes, whole or not at all";
@@ -25,7 +30,14 @@ Usage: cargo xtask firmware --board NAME [--image FILE.actq] [--features LIST] [
 pub(crate) enum Options {
     Help,
     List,
-    Build { target: Target, image: Option<PathBuf>, features: Option<String>, key: Option<String>, out: PathBuf },
+    Build {
+        target: Target,
+        image: Option<PathBuf>,
+        limits: Option<String>,
+        features: Option<String>,
+        key: Option<String>,
+        out: PathBuf,
+    },
 }
 
 impl Options {
@@ -37,12 +49,13 @@ impl Options {
             _ => {}
         }
         let wrong = |what: String| format!("error: {what}\n\n{USAGE}");
-        let (mut board, mut image, mut features, mut key, mut out) = (None, None, None, None, None);
+        let (mut board, mut image, mut limits, mut features, mut key, mut out) = (None, None, None, None, None, None);
         let mut words = words.iter();
         while let Some(option) = words.next() {
             let value = match *option {
                 "--board" => &mut board,
                 "--image" => &mut image,
+                "--limits" => &mut limits,
                 "--features" => &mut features,
                 "--key" => &mut key,
                 "--out" => &mut out,
@@ -62,8 +75,8 @@ impl Options {
         if key.is_some_and(|key| !is_key(key)) {
             return Err(wrong("--key takes the 64 hexadecimal digits that `actq keygen` prints".to_owned()));
         }
-        let [features, key] = [features, key].map(|value| value.map(str::to_owned));
-        Ok(Self::Build { target, image: image.map(PathBuf::from), features, key, out })
+        let [limits, features, key] = [limits, features, key].map(|value| value.map(str::to_owned));
+        Ok(Self::Build { target, image: image.map(PathBuf::from), limits, features, key, out })
     }
 
     pub(crate) fn run(self) -> Result<()> {
@@ -74,14 +87,15 @@ impl Options {
                     println!("{:12} {:27} {}", target.board().name, target.triple(), application.about);
                 }
             }
-            Self::Build { target, image, features, key, out } => {
+            Self::Build { target, image, limits, features, key, out } => {
                 let application = target.board().application.context("the board has no application")?;
                 check_out(&out, image.as_deref())?;
-                let given = image.as_deref().map(|image| check(image, application, target)).transpose()?;
+                let limits = limits.as_deref().map_or(Ok(Vec::new()), limits::read)?;
+                let check = |image: &Path| check(image, &limits, application, target);
+                let given = image.as_deref().map(check).transpose()?;
                 setup::rust_target(target.triple())?;
-                let image = given.map_or_else(example, Ok)?;
-                check(&image, application, target)?;
-                let elf = build(target, &image, features.as_deref(), key.as_deref())?;
+                let image = given.map_or_else(|| check(&example()?), Ok)?;
+                let elf = build(target, &image, &limits, features.as_deref(), key.as_deref())?;
                 write(&out, &elf)?;
                 println!("{}: {} with {}", out.display(), target.board().name, image.display());
             }
@@ -110,8 +124,8 @@ fn check_out(out: &Path, image: Option<&Path>) -> Result<()> {
     Ok(())
 }
 
-/// The whole path of an image that the board's application runs; an error says why it does not.
-fn check(path: &Path, application: Application, target: Target) -> Result<PathBuf> {
+/// The whole path of an image that the board's application runs with these limits; an error says why it does not.
+fn check(path: &Path, limits: &[Limits], application: Application, target: Target) -> Result<PathBuf> {
     let bytes = fs::read(path).with_context(|| format!("{}: the image cannot be read", path.display()))?;
     // Words, because an image begins at a multiple of 4.
     let mut words = vec![0u32; bytes.len().div_ceil(4)];
@@ -126,6 +140,14 @@ fn check(path: &Path, application: Application, target: Target) -> Result<PathBu
         "{}: needs {needed} words of scratch memory, the application on {name} has {given} (SCRATCH of the board)",
         path.display()
     );
+    let still = limits::without_limits(limits, &image)?;
+    if !still.is_empty() {
+        eprintln!(
+            "warning: {}: no finite limits for {}: the controller will refuse to arm; --limits LOW:HIGH sets them",
+            path.display(),
+            still.join(", ")
+        );
+    }
     fs::canonicalize(path).with_context(|| path.display().to_string())
 }
 
@@ -154,7 +176,13 @@ fn example() -> Result<PathBuf> {
 }
 
 /// Builds, and gives the ELF file's bytes.
-fn build(target: Target, image: &Path, features: Option<&str>, key: Option<&str>) -> Result<Vec<u8>> {
+fn build(
+    target: Target,
+    image: &Path,
+    limits: &[Limits],
+    features: Option<&str>,
+    key: Option<&str>,
+) -> Result<Vec<u8>> {
     let name = target.board().name;
     // A folder of its own: cargo gives the files of all boards with one triple the same name, and two may be built at a
     // time. What is built on the way there is shared, by a cargo that knows the variable (1.91).
@@ -172,6 +200,10 @@ fn build(target: Target, image: &Path, features: Option<&str>, key: Option<&str>
         command.env("DEFMT_LOG", "info");
     }
     command.arg("--target-dir").arg(&folder).env("ACTQ_IMAGE", image);
+    match limits {
+        [] => command.env_remove("ACTQ_LIMITS"),
+        _ => command.env("ACTQ_LIMITS", limits.iter().map(Limits::to_string).collect::<Vec<_>>().join(",")),
+    };
     let status = command.env("CARGO_BUILD_BUILD_DIR", target_dir()).status();
     if !status.context("cargo cannot be started")?.success() {
         let memory = target.board().memory;
@@ -207,7 +239,8 @@ mod tests {
     fn options_are_read_or_refused() {
         let out = PathBuf::from("f.elf");
         let build = |target, image: Option<&str>| {
-            Ok(Options::Build { target, image: image.map(PathBuf::from), features: None, key: None, out: out.clone() })
+            let image = image.map(PathBuf::from);
+            Ok(Options::Build { target, image, limits: None, features: None, key: None, out: out.clone() })
         };
         assert_eq!(Options::parse(&["--list"]), Ok(Options::List));
         assert_eq!(Options::parse(&["--board", "stm32f405", "--out", "f.elf"]), build(Target::F405, None));
@@ -220,6 +253,7 @@ mod tests {
             (&["--out", "f.elf"], "--board is missing"),
             (&["--board", "stm32f405", "--out", "f.elf", "--key", "12"], "--key takes the 64 hexadecimal digits"),
             (&["--board"], "--board needs a value"),
+            (&["--limits", "-1:1", "--limits", "-1:1"], "--limits is there twice"),
             (&["--board", "a", "--board", "b"], "--board is there twice"),
             (&["--bord", "a"], "\"--bord\" is no option"),
         ] {
@@ -231,7 +265,7 @@ mod tests {
     #[test]
     fn what_is_no_image_is_refused_by_name() {
         let application = Target::F405.board().application.expect("an application");
-        let refused = |path: &Path| format!("{:#}", check(path, application, Target::F405).expect_err("refused"));
+        let refused = |path: &Path| format!("{:#}", check(path, &[], application, Target::F405).expect_err("refused"));
         let file = std::env::temp_dir().join(format!("actq-no-image-{}", std::process::id()));
         for (bytes, why) in [
             (&[0; 4096][..], "not an actq image (magic differs)"),

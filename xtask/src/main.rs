@@ -8,6 +8,7 @@
 
 mod cost;
 mod firmware;
+mod limits;
 mod relay;
 mod setup;
 mod verify;

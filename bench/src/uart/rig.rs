@@ -22,8 +22,8 @@ use super::bits::Said;
 use super::line::Line;
 use crate::controller::{Controller, HANG};
 
-/// Ticks in which an output goes from one limit to the other, as in the application at 1 kHz.
-const WAY: f32 = 100.0;
+/// Ticks a second of the application.
+const TICK_HZ: f32 = 1000.0;
 
 /// Age above which an observation is refused, µs. The build's 500 ms are as long as the deadline: nothing would be seen
 /// of it.
@@ -114,7 +114,7 @@ impl Rig {
         let status = client.status()?;
         set_up(&mut client)?;
         line.heard();
-        let axes: [Axis; ACT_DIM] = actq_firmware_demo::image::axes(Some(image), WAY);
+        let axes: [Axis; ACT_DIM] = actq_firmware_demo::image::axes(Some(image), &[], TICK_HZ);
         Ok(Self {
             controller,
             line,

@@ -4,6 +4,7 @@ mod answers;
 mod endpoint;
 mod foc;
 mod guard;
+mod limits;
 mod memory;
 mod random;
 mod safety;

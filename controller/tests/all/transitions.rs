@@ -147,6 +147,19 @@ fn arming_is_refused_without_a_fresh_observation_and_twice() {
 }
 
 #[test]
+fn an_axis_without_limits_keeps_from_arming() {
+    let axis = Axis::new(0.0, 0.0, 1.0, 0.0, SafeAction::Hold).expect("an axis with one value");
+    for (axes, refusal) in [([axis, Axis::STILL], Some(Refusal::Limits)), ([axis; 2], None)] {
+        let mut safety = Safety::new(axes, DEADLINE, 1);
+        Check::ALL.into_iter().for_each(|check| safety.check(check, true));
+        assert_eq!(safety.refusal(), Some(Refusal::Stale), "the first reason");
+        safety.observed();
+        assert_eq!(safety.refusal(), refusal);
+        assert_eq!(safety.arm(safety.token()).err(), refusal);
+    }
+}
+
+#[test]
 fn safe_actions_do_what_they_say() {
     let after = |safe, ticks| {
         let mut safety = in_state(State::Latched, safe);

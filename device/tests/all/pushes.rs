@@ -4,8 +4,9 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use actq_controller::slots::{Anyone, Key};
+use actq_controller::{Axis, SafeAction};
 use actq_device::keys;
-use actq_device::push::{Package, Push, push};
+use actq_device::push::{Package, Push, axes_note, push};
 use actq_link::code::Refusal;
 
 use crate::requests::{arm, observe_until_fresh};
@@ -64,6 +65,18 @@ fn what_is_refused_says_why_and_changes_nothing() {
     let error = format!("{:#}", error.expect_err("it is armed"));
     // By then the observations may be old already.
     assert!(error.contains(&Refusal::Armed.to_string()) || error.contains(&Refusal::Token.to_string()), "{error}");
+}
+
+#[test]
+fn axes_without_limits_are_noted_before_a_push() {
+    let axis = Axis::new(-1.0, 1.0, 0.05, 0.0, SafeAction::Coast).expect("the axis fits");
+    let cases = [([axis; 2], None), ([axis, Axis::STILL], Some("axis 1")), ([Axis::STILL; 2], Some("axis 0, axis 1"))];
+    for (axes, named) in cases {
+        let controller = Simulated::start_with(axes, 0, || Anyone);
+        let note = axes_note(&mut controller.client()).expect("it answers");
+        let expected = named.map(|axes| format!("the controller will refuse to arm, {axes}: {}", Refusal::Limits));
+        assert_eq!(note, expected);
+    }
 }
 
 /// A controller that was armed in the course of an update is busy, not out of order, until a tick has switched its

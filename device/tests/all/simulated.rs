@@ -86,6 +86,15 @@ impl Simulated {
     where
         A: Authority,
     {
+        let axis = Axis::new(-1.0, 1.0, 0.05, 0.0, SafeAction::Ramp { step: 0.01 }).expect("the axis fits");
+        Self::start_with([axis; 2], faults, authority)
+    }
+
+    /// As [`Self::start`], with other axes.
+    pub(super) fn start_with<A>(axes: [Axis; 2], faults: u64, authority: impl Fn() -> A + Send + 'static) -> Self
+    where
+        A: Authority,
+    {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
         let address = Address::Tcp(listener.local_addr().expect("it is bound").to_string());
         let control = Arc::new(Control::default());
@@ -95,7 +104,7 @@ impl Simulated {
             while !shared.stop.load(Ordering::Relaxed) {
                 shared.reset.store(false, Ordering::Relaxed);
                 let starts = shared.starts.fetch_add(1, Ordering::Relaxed);
-                run(&shared, &listener, &mut flash, authority(), faults, starts);
+                run(&shared, &listener, &mut flash, authority(), axes, faults, starts);
             }
         });
         Self { control, address, thread: Some(thread) }
@@ -137,6 +146,7 @@ fn run<A: Authority>(
     listener: &TcpListener,
     flash: &mut [u8],
     authority: A,
+    axes: [Axis; 2],
     faults: u64,
     starts: u32,
 ) {
@@ -147,8 +157,7 @@ fn run<A: Authority>(
     let running = slots.select(|| ()).filter(|candidate| !candidate.trial).map(|candidate| candidate.slot);
     let mut updater = Updater::new(slots, running);
 
-    let axis = Axis::new(-1.0, 1.0, 0.05, 0.0, SafeAction::Ramp { step: 0.01 }).expect("the axis fits");
-    let mut safety = Safety::new([axis; 2], 1..=DEADLINE, starts);
+    let mut safety = Safety::new(axes, 1..=DEADLINE, starts);
     Check::ALL.into_iter().for_each(|check| safety.check(check, true));
     let crash = Record { crash: Crash::Panic, pc: 0x0800_0100, detail: 17, ticks: 5, count: starts };
     let breadcrumb = Record::report(ResetCause::Watchdog, (starts > 0).then_some(crash));

@@ -23,6 +23,13 @@ impl<'a> Image<'a> {
         })
     }
 
+    /// Lower and upper limit of action `i`, if the contract has both. (Where it limits other actions only, f32's largest
+    /// number is in their place.)
+    pub fn limits(&self, i: usize) -> Option<[f32; 2]> {
+        let [_, _, low, high, ..] = self.contract_of(i);
+        (low > f32::MIN && high < f32::MAX).then_some([low, high])
+    }
+
     /// The contract of action `i`; numbers that change nothing stand for the arrays that it has not.
     pub(crate) fn contract_of(&self, i: usize) -> [f32; CONTRACT_ARRAYS] {
         let mut numbers = [1.0, -0.0, f32::NEG_INFINITY, f32::INFINITY, f32::INFINITY, 1.0, 0.0, 0.0, 0.0, 0.0];

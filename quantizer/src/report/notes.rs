@@ -36,6 +36,19 @@ pub fn how_to_record(policy: &Policy) -> String {
     )
 }
 
+/// A note on the actions without limits, which a motor controller cannot let move.
+pub fn without_limits(limits: impl IntoIterator<Item = Option<[f32; 2]>>) -> Option<String> {
+    let limits = limits.into_iter().enumerate();
+    let without: Vec<usize> = limits.filter(|(_, limits)| limits.is_none()).map(|(i, _)| i).collect();
+    (!without.is_empty()).then(|| {
+        format!(
+            "no finite limits for actions {}: a motor controller refuses to arm without; set low and high of action in policy.json, \
+             or build the firmware with cargo xtask firmware --limits LOW:HIGH",
+            runs(&without)
+        )
+    })
+}
+
 /// The errors in a few lines.
 pub fn errors(check: &Check) -> String {
     let of = |name: &str, checked: &Checked| line(name, &checked.report, checked.recorded);
@@ -131,6 +144,14 @@ mod tests {
             assert_eq!(error_warning(&of), None, "{of:?}");
         }
         assert!(errors(&calib_only(0.2)).starts_with("calibration nmse  2.000e-1"));
+    }
+
+    #[test]
+    fn actions_without_limits_are_worth_a_note() {
+        let limited = Some([-1.0, 1.0]);
+        let note = without_limits([None, limited, None, None]).expect("a note");
+        assert!(note.starts_with("no finite limits for actions 0, 2-3: ") && note.contains("--limits"), "{note}");
+        assert_eq!(without_limits([limited, limited]), None);
     }
 
     #[test]

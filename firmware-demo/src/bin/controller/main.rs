@@ -39,8 +39,6 @@ mod limits {
     pub(crate) const DEADLINE: RangeInclusive<u32> = deadline::allowed(TICK_HZ);
     /// Age in us of an observation, against the fastest one.
     pub(crate) const MAX_AGE: u32 = 500_000;
-    /// Ticks in which an axis may go from one limit to the other.
-    pub(crate) const WAY: u32 = TICK_HZ / 10;
     /// Ticks between two reports.
     pub(crate) const REPORT: u32 = TICK_HZ / 10;
 }
@@ -75,7 +73,7 @@ mod app {
     use cortex_m::peripheral::SYST;
     use cortex_m::peripheral::syst::SystClkSource;
 
-    use crate::limits::{DEADLINE, MAX_AGE, REPORT, TICK_HZ, WAY};
+    use crate::limits::{DEADLINE, MAX_AGE, REPORT, TICK_HZ};
     use crate::locked::Locked;
     use crate::log::info;
     use crate::{faults, start};
@@ -117,7 +115,8 @@ mod app {
         let breadcrumb = start::report(cause, record);
         info!("start {=u32}, reset cause {=u8}, {=u32} Hz", starts, breadcrumb.reset.code(), clock.hz);
         let image = Image::new_checked(start::built_in()).ok();
-        let mut safety = Safety::new(image::axes(image.as_ref(), WAY as f32), DEADLINE, starts);
+        let axes = image::axes(image.as_ref(), start::LIMITS, TICK_HZ as f32);
+        let mut safety = Safety::new(axes, DEADLINE, starts);
         safety.check(Check::Clock, clock.source == Source::Crystal);
         // Whether it runs counts with the time that it has in the end.
         let _ = watchdog.start(PATIENCE.long);

@@ -4,6 +4,7 @@ use core::cell::Cell;
 
 use actq_boards::device::WATCHDOG_NMI;
 use actq_boards::seams::Cause;
+use actq_controller::Limits;
 use actq_controller::breadcrumb::Record;
 use actq_firmware_demo::image::lengths;
 use actq_firmware_support::slot;
@@ -21,6 +22,13 @@ static BUILT_IN: &Aligned<[u8]> = &Aligned(*include_bytes!(env!(
 
 /// Values of an observation and of an action: those of the image that is built in. Every image that runs has as many.
 pub(crate) const LENGTHS: [usize; 2] = lengths(&BUILT_IN.0);
+
+/// Limits of the axes by the build, from the variable ACTQ_LIMITS: one for each, one for all, or none.
+pub(crate) const LIMITS: &[Limits] = &include!(concat!(env!("OUT_DIR"), "/limits.rs"));
+const _: () = assert!(
+    LIMITS.len() < 2 || LIMITS.len() == LENGTHS[1],
+    "ACTQ_LIMITS has neither one entry nor one for each of the image's actions"
+);
 
 /// The image in the image slot, or the one that is built in. A build that asks for signatures does not look at the
 /// slot, where none is.

@@ -44,9 +44,20 @@ pub(super) fn self_test(image: &Image<'_>, step: usize) -> Option<(Vec<f32>, Vec
 
 /// A small image of the built-in one's lengths: QEMU's serial ports take a byte at a time.
 pub(super) fn small() -> Result<Vec<u8>> {
+    small_within(None)
+}
+
+/// As [`small`], with limits in both directions that its actions do not reach.
+pub(super) fn small_with_limits() -> Result<Vec<u8>> {
+    small_within(Some(1000.0))
+}
+
+fn small_within(limit: Option<f32>) -> Result<Vec<u8>> {
     let mut builder = Builder::new(OBS_DIM);
     builder.linear((ACT_DIM, OBS_DIM), Activations::Int8, |_| Some(Width::W3), 0, true)?;
-    let (policy, outcomes) = builder.finish("small".to_owned(), false);
+    let (mut policy, outcomes) = builder.finish("small".to_owned(), false);
+    policy.contract.low = limit.map(|limit| vec![-limit; ACT_DIM]);
+    policy.contract.high = limit.map(|limit| vec![limit; ACT_DIM]);
     actq::emit::image(&policy, &outcomes)
 }
 
@@ -121,7 +132,7 @@ pub(crate) fn starts_and_acts_with_the_bits_of_the_host(target: Target) -> Resul
 }
 
 /// Arms behind a fresh observation; again where the machine was so busy that it has become an old one.
-fn arm(client: &mut Client, observation: &[f32]) -> Result<()> {
+pub(super) fn arm(client: &mut Client, observation: &[f32]) -> Result<()> {
     let begun = Instant::now();
     loop {
         act(client, observation)?;

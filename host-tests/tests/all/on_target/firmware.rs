@@ -12,11 +12,12 @@ use actq_bench::firmware::{built_in, controller};
 use actq_bench::networks::Builder;
 use actq_bench::{Target, root};
 use actq_kernels::Width;
+use actq_link::code::{Parameter, Refusal};
 use actq_link::report::BUILT_IN;
 use anyhow::{Context as _, Result};
 use tempfile::TempDir;
 
-use super::application::{self_test, small};
+use super::application::{arm, self_test, small, small_with_limits};
 
 /// Boards that other tools ask for by this command.
 const BOARDS: [Target; 3] = [Target::Fpu, Target::F405, Target::M33];
@@ -31,7 +32,8 @@ fn text(path: &Path) -> String {
     path.display().to_string()
 }
 
-/// Without an image it is what the other tests run; with one, it acts with its bits.
+/// Without an image it is what the other tests run; with one, it acts with its bits. The image has no limits: with those
+/// of the build its axes have them, without any it is not armed.
 #[test]
 fn every_board_gets_the_example_or_an_image_of_ones_own() -> Result<()> {
     let folder = TempDir::new()?;
@@ -44,7 +46,12 @@ fn every_board_gets_the_example_or_an_image_of_ones_own() -> Result<()> {
         assert!(fs::read(&elf)? == fs::read(controller(target, "")?)?, "{name}: not the application of the tests");
 
         // A file that is there is replaced.
-        succeeded(&firmware(&["--board", name, "--image", &text(&own), "--out", &text(&elf)])?)?;
+        let is_limited = target != Target::M33;
+        let limits = if is_limited { &["--limits", "-0.5:0.75:10"][..] } else { &[] };
+        let output = firmware(&[&["--board", name, "--image", &text(&own), "--out", &text(&elf)], limits].concat())?;
+        succeeded(&output)?;
+        let warning = "warning: ".to_owned() + &text(&own) + ": no finite limits for action 0, action 1,";
+        assert_eq!(String::from_utf8_lossy(&output.stderr).contains(&warning), !is_limited, "{name}");
         let buffer = ImageBuffer::read(&own)?;
         let image = buffer.image(&own)?;
         let controller = Controller::start(target, &elf, None)?;
@@ -54,6 +61,17 @@ fn every_board_gets_the_example_or_an_image_of_ones_own() -> Result<()> {
         let (observation, bits) = self_test(&image, 0).context("it has a self-test")?;
         let (_, action) = act(&mut client, &observation)?;
         assert_eq!(action.iter().map(|v| v.to_bits()).collect::<Vec<_>>(), bits, "{name}");
+        let axis = [Parameter::Low, Parameter::High, Parameter::Rate].map(|parameter| client.get(parameter, 1));
+        let expected = if is_limited { [-0.5, 0.75, 0.01] } else { [0.0; 3] };
+        assert_eq!(axis.into_iter().collect::<Result<Vec<_>>>()?, expected, "{name}");
+        // (QEMU has no clock for an STM32F405, which is a reason of its own.)
+        match arm(&mut client, &observation) {
+            Ok(()) => assert_eq!(target, Target::Fpu),
+            Err(error) => {
+                let refusal = if is_limited { Refusal::Clock } else { Refusal::Limits };
+                assert!(format!("{error:#}").contains(&refusal.to_string()), "{name}: {error:#}");
+            }
+        }
     }
     Ok(())
 }
@@ -73,9 +91,14 @@ fn what_cannot_be_built_is_told_and_leaves_no_file() -> Result<()> {
     let good = small()?;
     let mut damaged = good.clone();
     damaged[good.len() / 2] ^= 1;
-    for (name, bytes) in
-        [("good", &good), ("damaged", &damaged), ("long", &large(800, 800)?), ("wide", &large(4, 16 << 10)?)]
-    {
+    for (name, bytes) in [
+        ("good", &good),
+        ("damaged", &damaged),
+        ("bounded", &small_with_limits()?),
+        ("limits", &b"-1:1\n-1:1\n".to_vec()),
+        ("long", &large(800, 800)?),
+        ("wide", &large(4, 16 << 10)?),
+    ] {
         fs::write(path(name), bytes)?;
     }
     let there = || -> Result<Vec<_>> {
@@ -92,6 +115,10 @@ fn what_cannot_be_built_is_told_and_leaves_no_file() -> Result<()> {
     let image = |name: &str, out: &str, told: &[&str]| {
         refused(&["--board", "stm32f405", "--image", &path(name), "--out", out], 1, told)
     };
+    let limited = |name: &str, limits: &str, told: &[&str]| {
+        let words = ["--board", "stm32f405", "--image", &path(name), "--limits", limits, "--out", &elf];
+        refused(&words, 1, told)
+    };
     all([
         refused(&["--board", "nucleo", "--out", &elf], 2, &["there is no board \"nucleo\"", "stm32f405"]),
         refused(&["--board", "stm32f405"], 2, &["--out is missing", "Usage: cargo xtask firmware"]),
@@ -103,6 +130,9 @@ fn what_cannot_be_built_is_told_and_leaves_no_file() -> Result<()> {
         image("good", &nowhere, &["there is no folder"]),
         image("good", &text(folder.path()), &["is a folder"]),
         image("good", &itself, &["is the image itself"]),
+        limited("good", "1:-1", &["--limits \"1:-1\"", "the lower limit exceeds the upper one"]),
+        limited("good", &path("limits"), &["--limits has 2 lines, the image has 6 actions"]),
+        limited("bounded", "1001:1002", &["--limits leaves no value for action 0", "limits to -1000:1000"]),
     ])?;
     assert_eq!(there()?, before);
     assert!(fs::read(path("good"))? == good);

@@ -22,6 +22,7 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
     let policy = Policy::of_files(&args.out, [&args.model, &args.model], &imported.json, &imported.weights)?;
     let calib = args.calib.as_ref().map(|path| Dataset::load(path, Sizes::of(&policy))).transpose()?;
     note(calib.as_ref().and_then(notes::single_steps));
+    note(notes::without_limits((0..policy.act_len).map(|i| policy.contract.limits(i))));
     let [calib_npz, others @ ..] = Recording::Calib.paths(&args.out);
     ensure!(
         args.out.is_dir() || !args.out.exists(),

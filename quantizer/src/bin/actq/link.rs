@@ -9,12 +9,13 @@ use std::time::Duration;
 
 use actq::data::{Dataset, Sizes};
 use actq::emit::files;
+use actq::report::notes;
 use actq::runtime::ImageBuffer;
 use actq_device::client::Client;
 use actq_device::connection::Connection;
 use actq_device::keys::Signed;
 use actq_device::log::Log;
-use actq_device::push::{Package, push};
+use actq_device::push::{Package, axes_note, push};
 use actq_device::stream::{Pace, stream};
 use actq_device::{port, serve};
 use anyhow::{Context as _, Result, ensure};
@@ -131,7 +132,9 @@ fn run_push(args: &PushArgs) -> Result<()> {
     let signed = args.signature.as_deref().map(|path| read_signature(path, buffer.bytes())).transpose()?;
     let version = signed.map_or(args.version.unwrap_or(0), |(version, _)| version);
     let signature = signed.map(|(_, signature)| signature);
+    note(notes::without_limits((0..image.act_len()).map(|i| image.limits(i))));
     let mut client = connect(&args.port)?;
+    note(axes_note(&mut client)?);
     let package = Package { image: buffer.bytes(), version, signature: signature.as_ref() };
     let bar = progress_bar()?;
     bar.set_message("erasing");

@@ -38,6 +38,7 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
     let heldout = Recording::Heldout.load(Some(&args.policy_dir), None, Sizes::of(&source))?;
     let recordings = Recordings { calib, heldout };
     note(notes::of_recordings(&recordings));
+    note(notes::without_limits((0..source.act_len).map(|i| source.contract.limits(i))));
     let options = options(args, &recordings)?;
     options.check()?;
     let started = Instant::now();

@@ -1,0 +1,69 @@
+//! `--limits` of `cargo xtask firmware`.
+
+use std::fs;
+use std::path::Path;
+
+use actq_controller::Limits;
+use actq_kernels::Image;
+use anyhow::{Context as _, Result, bail, ensure};
+
+/// The limits that `--limits` names: one for all axes, or those of a file, which has a line for each.
+pub(crate) fn read(value: &str) -> Result<Vec<Limits>> {
+    let error = match value.parse() {
+        Ok(limits) => return Ok(vec![limits]),
+        Err(error) => error,
+    };
+    let path = Path::new(value);
+    ensure!(path.is_file(), "--limits {value:?}: no file has this name, and {error}");
+    let text = fs::read_to_string(path).with_context(|| format!("--limits {value}: the file cannot be read"))?;
+    ensure!(!text.trim().is_empty(), "--limits {value}: the file is empty; it takes a line LOW:HIGH for each axis");
+    let line = |(i, line): (usize, &str)| line.parse().with_context(|| format!("{value}, line {}: {line:?}", i + 1));
+    text.trim_end().lines().enumerate().map(line).collect()
+}
+
+/// Actions of an image that have no finite limits, of their own or of the build: as "action 0".
+pub(crate) fn without_limits(limits: &[Limits], image: &Image<'_>) -> Result<Vec<String>> {
+    let (given, actions) = (limits.len(), image.act_len());
+    ensure!(given < 2 || given == actions, "--limits has {given} lines, the image has {actions} actions: one for each");
+    let mut still = Vec::new();
+    for i in 0..actions {
+        match (Limits::of_axis(i, image.limits(i), limits), image.limits(i)) {
+            (Some(_), _) => {}
+            (None, None) => still.push(format!("action {i}")),
+            (None, Some([low, high])) => {
+                bail!("--limits leaves no value for action {i}, which the image limits to {low}:{high}")
+            }
+        }
+    }
+    Ok(still)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limits_are_read_or_refused() {
+        let limits = |low, high, rate| Limits { low, high, rate };
+        assert_eq!(read("-1:2").expect("limits"), [limits(-1.0, 2.0, None)]);
+        let file = std::env::temp_dir().join(format!("actq-limits-{}", std::process::id()));
+        let name = file.display().to_string();
+        fs::write(&file, "-1:1\n0:2.5:10\n").expect("written");
+        assert_eq!(read(&name).expect("limits"), [limits(-1.0, 1.0, None), limits(0.0, 2.5, Some(10.0))]);
+        for (text, why) in [
+            ("-1:1\n\n-1:1", "line 2: \"\": limits have the form LOW:HIGH or LOW:HIGH:RATE"),
+            ("-1:1\n2:1\n", "line 2: \"2:1\": the lower limit exceeds the upper one; the form is LOW:HIGH"),
+            ("\n", "the file is empty; it takes a line LOW:HIGH for each axis"),
+        ] {
+            fs::write(&file, text).expect("written");
+            let error = format!("{:#}", read(&name).expect_err("refused"));
+            assert!(error.contains(&name) && error.ends_with(why), "{error}");
+        }
+        fs::remove_file(&file).expect("removed");
+        let error = format!("{:#}", read("-1:one").expect_err("refused"));
+        assert_eq!(
+            error,
+            "--limits \"-1:one\": no file has this name, and limits are finite numbers: LOW:HIGH or LOW:HIGH:RATE"
+        );
+    }
+}
