@@ -1,61 +1,56 @@
 //! A serial port of two queues between an interrupt and the program: [`Wire`] is the interrupt's end, [`Port`] the
-//! program's, with embedded-io's traits.
+//! program's. Neither waits for the other, nor for the line.
 
 use core::convert::Infallible;
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use embedded_io::{ErrorType, Read, ReadReady, Write, WriteReady};
+use embedded_io::{ErrorType, Read, ReadReady};
 use heapless::spsc::{Consumer, Producer, Queue};
 
 use crate::seams::Uart;
 
-/// Bytes that wait in each direction at most.
-pub const ROOM: usize = LEN - 1;
-/// Bytes of memory of a queue, one of which is always free. A power of two, for its remainders.
-const LEN: usize = 512;
-
-/// The memory of a port.
+/// The memory of a port: two queues of `LEN` bytes, one of which is always free. A power of two, for its remainders.
 #[derive(Debug)]
-pub struct Buffers {
+pub struct Buffers<const LEN: usize> {
     input: Queue<u8, LEN>,
     output: Queue<u8, LEN>,
     lost: AtomicU32,
 }
 
-impl Buffers {
+impl<const LEN: usize> Buffers<LEN> {
     /// Empty.
     pub const fn new() -> Self {
         Self { input: Queue::new(), output: Queue::new(), lost: AtomicU32::new(0) }
     }
 
     /// Both ends. `kick` makes the interrupt of `uart` come: what it is to transmit is there.
-    pub fn split<U: Uart>(&mut self, uart: U, kick: fn()) -> (Wire<'_, U>, Port<'_>) {
+    pub fn split<U: Uart>(&mut self, uart: U, kick: fn()) -> (Wire<'_, U, LEN>, Port<'_, LEN>) {
         let Self { input, output, lost } = self;
         let ((received, input), (output, waiting)) = (input.split(), output.split());
         (Wire { uart, input: received, output: waiting, lost }, Port { input, output, lost, kick })
     }
 }
 
-impl Default for Buffers {
+impl<const LEN: usize> Default for Buffers<LEN> {
     fn default() -> Self {
         Self::new()
     }
 }
 
 /// The interrupt's end.
-pub struct Wire<'b, U> {
+pub struct Wire<'b, U, const LEN: usize> {
     uart: U,
     input: Producer<'b, u8>,
     output: Consumer<'b, u8>,
     lost: &'b AtomicU32,
 }
 
-impl<U: Uart> Wire<'_, U> {
+impl<U: Uart, const LEN: usize> Wire<'_, U, LEN> {
     /// What the interrupt does: takes what has come, gives what can go.
     pub fn on_interrupt(&mut self) {
         let Self { uart, input, output, lost } = self;
         while let Some(byte) = uart.receive() {
-            if !byte.is_ok_and(|byte| put(input, byte)) {
+            if !byte.is_ok_and(|byte| put::<LEN>(input, byte)) {
                 // Written here alone, so a load and a store lose nothing.
                 lost.store(lost.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
             }
@@ -65,21 +60,21 @@ impl<U: Uart> Wire<'_, U> {
             if !uart.transmit(*byte) {
                 break;
             }
-            take(output);
+            take::<LEN>(output);
         }
         uart.ask_for_room(output.ready());
     }
 }
 
 /// The program's end.
-pub struct Port<'b> {
+pub struct Port<'b, const LEN: usize> {
     input: Consumer<'b, u8>,
     output: Producer<'b, u8>,
     lost: &'b AtomicU32,
     kick: fn(),
 }
 
-impl Port<'_> {
+impl<const LEN: usize> Port<'_, LEN> {
     /// Bytes that were received and lost since the start, modulo 2^32: overrun, wrongly framed, or without room in the
     /// queue.
     pub fn lost(&self) -> u32 {
@@ -88,29 +83,34 @@ impl Port<'_> {
 
     /// Lets what waits go on, where the interrupt does not come by itself; to be called again and again.
     pub fn pump(&self) {
-        if has_bytes(&self.output) {
+        if has_bytes::<LEN>(&self.output) {
             (self.kick)();
         }
     }
+
+    /// Takes a frame to transmit, all of it or nothing; `false` if there is no room for all of it, as where the other end
+    /// does not read.
+    pub fn send(&mut self, frame: &[u8]) -> bool {
+        let has_room = room::<LEN>(&self.output) >= frame.len();
+        if has_room {
+            frame.iter().for_each(|byte| _ = put::<LEN>(&mut self.output, *byte));
+        }
+        self.pump();
+        has_room
+    }
 }
 
-impl ErrorType for Port<'_> {
+impl<const LEN: usize> ErrorType for Port<'_, LEN> {
     type Error = Infallible;
 }
 
-impl ReadReady for Port<'_> {
+impl<const LEN: usize> ReadReady for Port<'_, LEN> {
     fn read_ready(&mut self) -> Result<bool, Infallible> {
         Ok(self.input.ready())
     }
 }
 
-impl WriteReady for Port<'_> {
-    fn write_ready(&mut self) -> Result<bool, Infallible> {
-        Ok(has_room(&self.output))
-    }
-}
-
-impl Read for Port<'_> {
+impl<const LEN: usize> Read for Port<'_, LEN> {
     /// Waits for a byte, and takes as many as have come.
     fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Infallible> {
         if buffer.is_empty() {
@@ -120,45 +120,11 @@ impl Read for Port<'_> {
             core::hint::spin_loop();
         }
         let mut read = 0;
-        for (place, byte) in buffer.iter_mut().zip(core::iter::from_fn(|| take(&mut self.input))) {
+        for (place, byte) in buffer.iter_mut().zip(core::iter::from_fn(|| take::<LEN>(&mut self.input))) {
             *place = byte;
             read += 1;
         }
         Ok(read)
-    }
-}
-
-impl Write for Port<'_> {
-    /// Waits for room, and gives as many bytes as there is.
-    fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
-        if bytes.is_empty() {
-            return Ok(0);
-        }
-        while !has_room(&self.output) {
-            self.pump();
-        }
-        let written = bytes.iter().take_while(|byte| put(&mut self.output, **byte)).count();
-        (self.kick)();
-        Ok(written)
-    }
-
-    /// Waits for room for all of them. (The trait's own way panics where a port takes nothing.)
-    fn write_all(&mut self, bytes: &[u8]) -> Result<(), Infallible> {
-        for byte in bytes {
-            while !put(&mut self.output, *byte) {
-                self.pump();
-            }
-        }
-        self.pump();
-        Ok(())
-    }
-
-    /// Waits until all has gone to the transmitter.
-    fn flush(&mut self) -> Result<(), Infallible> {
-        while has_bytes(&self.output) {
-            self.pump();
-        }
-        Ok(())
     }
 }
 
@@ -167,23 +133,23 @@ impl Write for Port<'_> {
 // test of the application's ELF file fails if a panic is left.
 
 /// Puts a byte in; `false` if there is no room.
-fn put(queue: &mut Producer<'_, u8>, byte: u8) -> bool {
-    queue.capacity() == ROOM && queue.enqueue(byte).is_ok()
+fn put<const LEN: usize>(queue: &mut Producer<'_, u8>, byte: u8) -> bool {
+    queue.capacity() == LEN - 1 && queue.enqueue(byte).is_ok()
 }
 
 /// Takes the next byte, if there is one.
-fn take(queue: &mut Consumer<'_, u8>) -> Option<u8> {
-    if queue.capacity() == ROOM { queue.dequeue() } else { None }
+fn take<const LEN: usize>(queue: &mut Consumer<'_, u8>) -> Option<u8> {
+    if queue.capacity() == LEN - 1 { queue.dequeue() } else { None }
 }
 
-/// Returns `true` if there is room for a byte.
-fn has_room(queue: &Producer<'_, u8>) -> bool {
-    queue.capacity() == ROOM && queue.ready()
+/// Bytes that there is room for.
+fn room<const LEN: usize>(queue: &Producer<'_, u8>) -> usize {
+    if queue.capacity() == LEN - 1 { LEN - 1 - queue.len() } else { 0 }
 }
 
 /// Returns `true` if a byte that was put in has not been taken.
-fn has_bytes(queue: &Producer<'_, u8>) -> bool {
-    queue.capacity() == ROOM && !queue.is_empty()
+fn has_bytes<const LEN: usize>(queue: &Producer<'_, u8>) -> bool {
+    queue.capacity() == LEN - 1 && !queue.is_empty()
 }
 
 #[cfg(test)]
@@ -221,11 +187,14 @@ mod tests {
         }
     }
 
+    const LEN: usize = 16;
+    const ROOM: usize = LEN - 1;
+
     #[test]
     fn bytes_come_in_order_and_what_has_no_room_is_counted() {
         // The queue wraps.
         let mut mock = Mock::default();
-        let mut buffers = Buffers::new();
+        let mut buffers = Buffers::<LEN>::new();
         for start in 0..5u32 {
             let line = |i: u32| if i == 2 { Err(Lost) } else { Ok((start + i) as u8) };
             mock.line = (0..ROOM as u32 + 4).map(line).collect();
@@ -242,18 +211,18 @@ mod tests {
     }
 
     #[test]
-    fn what_the_transmitter_refuses_waits() {
+    fn a_frame_is_sent_whole_or_not_at_all() {
         let mut mock = Mock { room: 2, ..Mock::default() };
-        let mut buffers = Buffers::new();
+        let mut buffers = Buffers::<LEN>::new();
         let (mut wire, mut port) = buffers.split(&mut mock, || ());
-        assert_eq!(port.write(&[7; ROOM + 1]), Ok(ROOM), "as much as there is room");
-        assert_eq!(port.write_ready(), Ok(false));
+        assert!(!port.send(&[7; ROOM + 1]), "longer than the queue");
+        assert!(port.send(&[7; ROOM - 1]) && !port.send(&[8, 9]) && port.send(&[1]), "what there is room for");
         wire.on_interrupt();
-        assert!(wire.uart.asked);
-        assert_eq!((port.write(&[1, 2, 3]), wire.uart.sent.len()), (Ok(2), 2));
+        assert_eq!((wire.uart.sent.len(), wire.uart.asked), (2, true));
+        // The queue wraps.
+        assert!(!port.send(&[8, 9, 10]) && port.send(&[2, 3]) && port.send(&[]));
         wire.uart.room = 2 * ROOM;
         wire.on_interrupt();
-        assert_eq!((wire.uart.sent.len(), &wire.uart.sent[ROOM..], wire.uart.asked), (ROOM + 2, &[1, 2][..], false));
-        assert_eq!(port.flush(), Ok(()));
+        assert_eq!((&wire.uart.sent[ROOM - 1..], wire.uart.asked), (&[1, 2, 3][..], false));
     }
 }

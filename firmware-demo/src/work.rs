@@ -5,7 +5,7 @@ use actq_boards::seams::Watchdog;
 use actq_controller::progress::Progress;
 use actq_controller::slots::{Authority, Candidate};
 use actq_controller::{Check, Endpoint, Shared};
-use embedded_io::{Read, ReadReady, Write};
+use embedded_io::{Read, ReadReady};
 use embedded_storage::nor_flash::NorFlash;
 
 #[cfg(feature = "faults")]
@@ -21,9 +21,10 @@ const BYTES: usize = 64;
 const LOOK: u32 = 100;
 
 /// What the loop works with.
-pub struct Work<'p, S, W, F, A: Authority, const AXES: usize, const OBS: usize, const N: usize> {
-    /// The serial port.
-    pub port: &'p mut Port<'static>,
+pub struct Work<'p, S, W, F, A: Authority, const AXES: usize, const OBS: usize, const N: usize, const LEN: usize> {
+    /// The serial port. A frame that it has no room for is dropped: the loop waits for no host. The frame's number is
+    /// used up, so the host's receiver counts it as lost.
+    pub port: &'p mut Port<'static, LEN>,
     /// The watchdog, which runs.
     pub watchdog: &'p mut W,
     /// What decides about the outputs.
@@ -64,7 +65,8 @@ impl State {
     }
 }
 
-impl<S, W, F, A, const AXES: usize, const OBS: usize, const N: usize> Work<'_, S, W, F, A, AXES, OBS, N>
+impl<S, W, F, A, const AXES: usize, const OBS: usize, const N: usize, const LEN: usize>
+    Work<'_, S, W, F, A, AXES, OBS, N, LEN>
 where
     S: Shared<AXES>,
     W: Watchdog,
@@ -84,12 +86,12 @@ where
         }
         self.state.progress.link = true;
         if let Some(frame) = self.endpoint.report(micros, &mut self.safety, self.out) {
-            let Ok(()) = self.port.write_all(frame);
+            let _ = self.port.send(frame);
         }
         if let Some(running) = running {
             running.scrub(&mut self.safety);
             if let Some(frame) = running.slice(&mut self.endpoint, micros, &mut self.safety, self.out) {
-                let Ok(()) = self.port.write_all(frame);
+                let _ = self.port.send(frame);
             }
         }
         self.state.progress.head = true;
@@ -129,7 +131,7 @@ where
         }
         let answer = self.endpoint.receive(byte, micros, &mut self.safety, &mut self.updates, self.out);
         if let Some(frame) = answer {
-            let Ok(()) = self.port.write_all(frame);
+            let _ = self.port.send(frame);
         }
     }
 
@@ -157,6 +159,9 @@ pub(crate) mod tests {
     extern crate std;
 
     use std::boxed::Box;
+    use std::cell::RefCell;
+    use std::collections::VecDeque;
+    use std::rc::Rc;
     use std::vec::Vec;
 
     use actq_boards::port::Buffers;
@@ -167,21 +172,42 @@ pub(crate) mod tests {
     use actq_controller::slots::Anyone;
     use actq_controller::update::{Plan, Update as _};
     use actq_controller::{Axis, Guard, Safety, Settings};
-    use actq_link::code::{Refusal, ResetCause};
+    use actq_link::code::{Refusal, Report, ResetCause};
     use actq_link::frame::CRC;
-    use actq_link::report::BUILT_IN;
+    use actq_link::report::{BUILT_IN, Counters};
+    use actq_link::{Message, Receiver, Sender};
 
     use super::*;
 
-    struct NoUart;
+    const LEN: usize = 512;
 
-    impl Uart for NoUart {
+    type Flash = Ram<'static, 4, 512>;
+    type OneAxis<'p> = Work<'p, Safety<1>, Fed, Flash, Anyone, 1, 1, 64, LEN>;
+
+    /// A line to a host, which still reads so many bytes.
+    #[derive(Default)]
+    struct Line {
+        sent: VecDeque<u8>,
+        read: Vec<u8>,
+        room: usize,
+    }
+
+    /// The board's end of a line.
+    struct End(Rc<RefCell<Line>>);
+
+    impl Uart for End {
         fn receive(&mut self) -> Option<Result<u8, Lost>> {
-            None
+            self.0.borrow_mut().sent.pop_front().map(Ok)
         }
 
-        fn transmit(&mut self, _: u8) -> bool {
-            true
+        fn transmit(&mut self, byte: u8) -> bool {
+            let Line { read, room, .. } = &mut *self.0.borrow_mut();
+            let has_room = *room > 0;
+            if has_room {
+                read.push(byte);
+                *room -= 1;
+            }
+            has_room
         }
 
         fn ask_for_room(&mut self, _: bool) {}
@@ -202,28 +228,33 @@ pub(crate) mod tests {
         }
     }
 
+    fn work<'p>(
+        port: &'p mut Port<'static, LEN>,
+        watchdog: &'p mut Fed,
+        flash: &Flash,
+        status_period: u32,
+        out: &'p mut [u8],
+    ) -> OneAxis<'p> {
+        let (updates, _) = Updates::new(Ram(flash.0), Some(Anyone), &mut Fed::default(), |_, _| false);
+        let breadcrumb = Record::report(ResetCause::Power, None);
+        let facts = Facts { image: 0, slot: BUILT_IN, timing: Default::default(), breadcrumb };
+        let settings = Settings { status_period, flash_while_armed: false };
+        let endpoint = Endpoint::new(Guard::full(&[], 0), facts, settings);
+        let (safety, rates) = (Safety::new([Axis::STILL; 1], 1..=10, 0), Rates::new(1_000_000, 1000));
+        Work { port, watchdog, safety, endpoint, updates, rates, stack: || 0, out, state: State::default() }
+    }
+
+    fn flash() -> Flash {
+        Ram::new(Box::leak(Box::new([0; 2048])))
+    }
+
     /// The watchdog is fed, and waits for what takes long, only where all has made progress: not without a control
     /// tick.
     #[test]
     fn without_a_tick_nothing_is_fed_or_erased() {
-        let (_, port) = Box::leak(Box::new(Buffers::new())).split(NoUart, || ());
-        let (port, mut watchdog) = (Box::leak(Box::new(port)), Fed::default());
-        let flash = Ram::<4, 512>::new(Box::leak(Box::new([0; 2048])));
-        let (updates, _) = Updates::new(Ram::<4, 512>(flash.0), Some(Anyone), &mut Fed::default(), |_, _| false);
-        let breadcrumb = Record::report(ResetCause::Power, None);
-        let facts = Facts { image: 0, slot: BUILT_IN, timing: Default::default(), breadcrumb };
-        let settings = Settings { status_period: 0, flash_while_armed: false };
-        let mut work = Work {
-            port,
-            watchdog: &mut watchdog,
-            safety: Safety::new([Axis::STILL; 1], 1..=10, 0),
-            endpoint: Endpoint::<1, 64>::new(Guard::full(&[], 0), facts, settings),
-            updates,
-            rates: Rates::new(1_000_000, 1000),
-            stack: || 0,
-            out: &mut [],
-            state: State::default(),
-        };
+        let (_, mut port) = Box::leak(Box::new(Buffers::new())).split(End(Rc::default()), || ());
+        let (flash, mut watchdog) = (flash(), Fed::default());
+        let mut work = work(&mut port, &mut watchdog, &flash, 0, &mut []);
         let image = [1; 4];
         let plan = Plan { length: 4, crc: CRC.checksum(&image), version: 0 };
         assert_eq!(work.updates.begin(plan), Err(Refusal::Busy));
@@ -247,5 +278,43 @@ pub(crate) mod tests {
         }
         assert_eq!(test.map(|candidate| candidate.length), Some(4));
         assert_eq!(work.watchdog.1, [PATIENCE.long, PATIENCE.turn].repeat(4));
+    }
+
+    /// Ticks go on and the watchdog is fed, whatever the host does not read: that costs whole frames, whose numbers the
+    /// host misses.
+    #[test]
+    fn a_host_that_does_not_read_costs_only_frames() {
+        const TICKS: u32 = 3000;
+        // Ticks between two statuses, requests in a tick, bytes that the host reads in a tick.
+        for (status_period, requests, reads) in [(1, 0, 0), (0, 1, 0), (1, 3, 0), (1, 1, 40)] {
+            let line = Rc::new(RefCell::new(Line::default()));
+            let (mut wire, mut port) = Box::leak(Box::new(Buffers::new())).split(End(line.clone()), || ());
+            let (flash, mut watchdog, mut out) = (flash(), Fed::default(), [0; 64]);
+            let mut work = work(&mut port, &mut watchdog, &flash, status_period, &mut out);
+            let (mut host, mut timing) = (Sender::new(0), Timing::default());
+            let mut tick = |reads| {
+                let mut buffer = [0; 64];
+                for _ in 0..requests {
+                    let request = host.frame(&Message::Ask(Report::Timing), 0, &mut buffer).expect("there is room");
+                    line.borrow_mut().sent.extend(request);
+                }
+                line.borrow_mut().room += reads;
+                wire.on_interrupt();
+                timing.ticks += 1;
+                work.safety.tick();
+                assert_eq!(work.turn(&mut None, &timing), None);
+                wire.on_interrupt();
+            };
+            (0..TICKS).for_each(|_| tick(reads));
+            // It reads again.
+            (0..2).for_each(|_| tick(usize::MAX / 2));
+            assert_eq!((work.safety.ticks(), work.watchdog.0), (TICKS + 2, TICKS + 2));
+            let mut answers = Receiver::<64>::new();
+            line.borrow().read.iter().for_each(|byte| _ = answers.push(*byte));
+            let Counters { good, damaged, malformed, repeated, lost } = answers.counters();
+            assert_eq!([damaged, malformed, repeated], [0; 3], "whole frames, in order");
+            assert_eq!(good + lost, (TICKS + 2) * (status_period + requests));
+            assert!(lost > TICKS / 2 && good > 2, "{good} frames came, {lost} did not");
+        }
     }
 }

@@ -86,6 +86,9 @@ mod app {
     /// The longest frame that goes: a status or an action.
     const OUTWARD: usize = frame::wire_bytes(if 4 * AXES + 5 > 46 { 4 * AXES + 5 } else { 46 });
 
+    /// Bytes of the port's queues: what comes in a few ms, and room for several statuses or the longest frame.
+    const QUEUE: usize = if OUTWARD < 512 { 512 } else { (OUTWARD + 1).next_power_of_two() };
+
     #[shared]
     struct Shared {
         safety: Safety<AXES>,
@@ -94,8 +97,8 @@ mod app {
 
     #[local]
     struct Local {
-        wire: Wire<'static, Uart>,
-        port: Port<'static>,
+        wire: Wire<'static, Uart, QUEUE>,
+        port: Port<'static, QUEUE>,
         watchdog: Watchdog,
         drives: Drives<Stage>,
         timer: SYST,
@@ -104,7 +107,7 @@ mod app {
         breadcrumb: Breadcrumb,
     }
 
-    #[init(local = [buffers: Buffers = Buffers::new()])]
+    #[init(local = [buffers: Buffers<QUEUE> = Buffers::new()])]
     fn init(cx: init::Context) -> (Shared, Local) {
         start::paint_stack();
         let mut core = cx.core;

@@ -1,11 +1,11 @@
 //! `actq link` at the application in QEMU, through the socket of its serial port: what no other test types, and what it
 //! says where something is wrong with the line.
 
-use std::io::{Read as _, Write as _};
+use std::io::{ErrorKind, Read as _, Write as _};
 use std::net::TcpListener;
 use std::process::{Output, Stdio};
 use std::thread;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use actq::runtime::ImageBuffer;
 use actq_bench::Target;
@@ -14,8 +14,10 @@ use actq_bench::controller::{Controller, HANG, act};
 use actq_bench::firmware;
 use actq_bench::qemu::step_request;
 use actq_boards::Clock;
-use actq_link::RESET;
-use actq_link::code::State;
+use actq_firmware_demo::patience::PATIENCE as PATIENCE_OF_WATCHDOG;
+use actq_link::code::{Report, ResetCause, State};
+use actq_link::report::Counters;
+use actq_link::{Message, RESET, Receiver, Sender, frame};
 use anyhow::{Context as _, Result, ensure};
 use tempfile::NamedTempFile;
 
@@ -90,6 +92,36 @@ fn serve_answers_a_simulator_and_disarms_behind_it() -> Result<()> {
     assert_eq!(controller.client()?.status()?.state, State::Disarmed);
     failed(&link(&controller, &["serve"], b"x")?, 1, &["unknown command byte 0x78"])?;
     failed(&link(&controller, &["serve"], &step_request(&observation)[..9])?, 1, &["ended inside an observation"])
+}
+
+/// It asks until QEMU's socket and the port's queue are full, and is silent for longer than the watchdog waits.
+#[test]
+fn a_host_that_does_not_read_causes_no_reset() -> Result<()> {
+    let (controller, _slot) = start()?;
+    let mut host = controller.address().open()?;
+    let (mut sender, mut buffer) = (Sender::new(0), [0; 64]);
+    for _ in 0..200 {
+        host.write_all(sender.frame(&Message::Ask(Report::Status), 0, &mut buffer).context("room for a request")?)?;
+    }
+    let watchdog = Duration::from_millis(PATIENCE_OF_WATCHDOG.turn.into());
+    thread::sleep(4 * watchdog);
+    // The answers that were dropped are missing before the first one after them.
+    let (mut answers, mut told, begun) = (Receiver::<{ frame::bytes(64) }>::new(), None, Instant::now());
+    while answers.counters().lost == 0 {
+        ensure!(begun.elapsed() < PATIENCE, "no answer is missing: {told:?}");
+        match host.read(&mut buffer) {
+            Ok(count) => buffer[..count].iter().for_each(|byte| {
+                if let Some(Message::Status(status)) = answers.push(*byte).map(|received| received.message) {
+                    told = Some(status);
+                }
+            }),
+            Err(error) => ensure!(matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut), "{error}"),
+        }
+    }
+    let Counters { damaged, malformed, repeated, .. } = answers.counters();
+    assert_eq!([damaged, malformed, repeated], [0; 3]);
+    assert_eq!(told.context("a status comes")?.reset, ResetCause::Unknown);
+    Ok(())
 }
 
 /// The board goes while a simulator is served: the command says so, once its patience is over.
