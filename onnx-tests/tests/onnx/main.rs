@@ -1,6 +1,7 @@
 //! Policies out of ONNX files: what exporters write gives the actions that another reader of ONNX gives, and nothing in
 //! a file does harm.
 
+mod bounds;
 mod command;
 mod constants;
 mod damaged;

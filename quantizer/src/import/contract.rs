@@ -13,7 +13,7 @@ const QUANTILE_EPS: f64 = 1e-8;
 pub(super) type Array = Option<Vec<Option<f64>>>;
 
 /// Keys of `action`.
-#[derive(Default, Deserialize, Serialize)]
+#[derive(Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct JsonContract {
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -41,7 +41,7 @@ pub(super) struct JsonContract {
 }
 
 /// Keys of `action.binarise`.
-#[derive(Deserialize, Serialize)]
+#[derive(PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct JsonBinarise {
     on: Array,

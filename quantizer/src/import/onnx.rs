@@ -6,6 +6,7 @@
 
 mod action;
 mod arithmetic;
+mod bounds;
 mod build;
 mod call;
 mod cells;

@@ -22,6 +22,11 @@ pub fn summary(imported: &Imported, policy: &Policy) -> String {
     if !imported.contract.is_empty() {
         text += &format!("action    the last nodes became the contract's {}\n", imported.contract.join(", "));
     }
+    if imported.bounded > 0 {
+        let of = format!("{} of {} actions", imported.bounded, policy.act_len);
+        text +=
+            &format!("limits    low and high of {of} are the bounds of their last operation (tanh, sigmoid, clip)\n");
+    }
     text += &format!("ops       {}\n", list(&counted(&imported.ops)));
     text += &format!(
         "network   {} weights, {} parameters; everything else in the file is folded into them or only moves values\n",

@@ -1,6 +1,7 @@
 //! The end of a network as an action contract: factors, offsets and limits behind the last operation.
 
 use super::super::contract::{Array, JsonContract};
+use super::bounds::bounds;
 use super::expr::{Expr, Exprs, Id};
 
 /// Scale, offset and limits of every value, as the contract applies them.
@@ -49,6 +50,51 @@ pub(super) fn contract(exprs: &Exprs, root: Id, act_len: usize) -> (Id, Option<J
     }
 }
 
+/// Gives each action that the contract does not limit the bounds of its last operation as limits, if it has any; the
+/// contract then, and how many actions these are. `at` is the value before what the contract does.
+pub(super) fn bounded(
+    exprs: &Exprs,
+    at: Id,
+    contract: Option<JsonContract>,
+    act_len: usize,
+) -> (Option<JsonContract>, usize) {
+    let mut json = contract.unwrap_or_default();
+    let own = |i| [value(&json.low, i, f32::MIN), value(&json.high, i, f32::MAX)];
+    let (mut limits, mut found): (Vec<[f32; 2]>, _) = ((0..act_len).map(own).collect(), 0);
+    for (i, limits) in limits.iter_mut().enumerate().filter(|(_, limits)| **limits == [f32::MIN, f32::MAX]) {
+        if let Some(ends) = ends(exprs, at, &json, i, act_len) {
+            (*limits, found) = (ends, found + 1);
+        }
+    }
+    if found > 0 {
+        [json.low, json.high] = [0, 1].map(|side| Some(limits.iter().map(|limits| decimal(limits[side])).collect()));
+    }
+    (Some(json).filter(|json| *json != JsonContract::default()), found)
+}
+
+/// Bounds of action `i`, in all actions of a chunk, after the contract's factor and offset.
+fn ends(exprs: &Exprs, at: Id, json: &JsonContract, i: usize, act_len: usize) -> Option<[f32; 2]> {
+    let (scale, offset) = (value(&json.scale, i, 1.0), value(&json.offset, i, 0.0));
+    let [mut low, mut high] = [f32::MAX, f32::MIN];
+    for place in (i..exprs.len_of(at)).step_by(act_len) {
+        let bounds = if scale == 0.0 { [0.0; 2] } else { bounds(exprs, at, place)? };
+        // As the contract computes in f32, whose roundings keep the order.
+        for end in bounds.map(|bound| bound * scale + offset) {
+            (low, high) = (low.min(end), high.max(end));
+        }
+    }
+    (low > f32::MIN && high < f32::MAX).then_some([low, high])
+}
+
+fn value(array: &Array, i: usize, none: f32) -> f32 {
+    array.as_ref().and_then(|values| values[i]).map_or(none, |value| value as f32)
+}
+
+/// The number of the shortest text that is this f32.
+fn decimal(value: f32) -> Option<f64> {
+    format!("{value:?}").parse().ok()
+}
+
 impl Ends {
     /// The contract, where all actions of a chunk have the same and f32 holds it.
     fn json(&self, act_len: usize) -> Option<JsonContract> {
@@ -60,9 +106,7 @@ impl Ends {
             if first.iter().all(|v| *v == none) {
                 return Some(None);
             }
-            // The shortest text that is this f32.
-            let one =
-                |v: &f64| if *v == none { Some(unlimited) } else { format!("{:?}", *v as f32).parse::<f64>().ok() };
+            let one = |v: &f64| if *v == none { Some(unlimited) } else { decimal(*v as f32) };
             let values: Vec<f64> = first.iter().map(one).collect::<Option<_>>()?;
             values.iter().all(|v| (*v as f32).is_finite()).then(|| Some(values.into_iter().map(Some).collect()))
         };

@@ -100,6 +100,8 @@ pub struct Imported {
     pub nodes: usize,
     /// Keys of the action contract that the file's last nodes became.
     pub contract: Vec<&'static str>,
+    /// Actions whose limits are the bounds of their last operation, as of tanh.
+    pub bounded: usize,
 }
 
 /// Reads an ONNX file. An error names the file, and the node where there is one.
@@ -190,6 +192,8 @@ fn network(model: &Model, name: &str, choice: &Choice) -> Result<Imported> {
     refuse_batch(model, &read, &act_shape)?;
     let (chunk, act_len) = actions(&act_shape, open.len())?;
     let (root, contract) = action::contract(&exprs, root, act_len);
+    let last = contract.iter().flat_map(keys).collect();
+    let (contract, bounded) = action::bounded(&exprs, root, contract, act_len);
     let root = simplify(&mut exprs, root, &cells.instead);
     let lowered = lower(&exprs, root, &offsets, obs_len).map_err(|(id, error)| at_node(model, &exprs, id, error))?;
     let used = |name: &str| inputs.iter().any(|(n, _)| n == name) || states.iter().any(|(n, ..)| n == name);
@@ -204,7 +208,6 @@ fn network(model: &Model, name: &str, choice: &Choice) -> Result<Imported> {
         .collect();
     let is_cut = |name: &String| *name != shown(&action) && !states.iter().any(|(_, to, _)| to == name);
     let cut_outputs = model.graph.outputs.iter().map(|port| shown(&port.name)).filter(is_cut).collect();
-    let keys = contract.iter().flat_map(keys).collect();
     let json = Json {
         name: printable(name).chars().take(50).collect(),
         kind: (chunk > 1).then(|| "chunk".to_owned()),
@@ -231,7 +234,8 @@ fn network(model: &Model, name: &str, choice: &Choice) -> Result<Imported> {
         cut_inputs,
         cut_outputs,
         nodes: model.graph.nodes.len(),
-        contract: keys,
+        contract: last,
+        bounded,
     })
 }
 
