@@ -7,6 +7,7 @@ use anyhow::{Context, Result, bail, ensure};
 
 use super::arrays::ENDINGS;
 use super::dataset::{Dataset, Sizes};
+use crate::graph::Graph;
 use crate::import::folder_of;
 use crate::policy::Policy;
 
@@ -110,5 +111,10 @@ impl Recordings {
     pub fn load(policy: &Policy) -> Result<Self> {
         let read = |recording: Recording| recording.load(Some(&policy.dir), None, Sizes::of(policy));
         Ok(Self { calib: read(Recording::Calib)?, heldout: read(Recording::Heldout)? })
+    }
+
+    /// Where a recording holds no actions, puts those of the f32 network there.
+    pub fn fill_actions(&mut self, graph: &Graph) {
+        [&mut self.calib, &mut self.heldout].into_iter().flatten().for_each(|dataset| dataset.fill_actions(graph));
     }
 }

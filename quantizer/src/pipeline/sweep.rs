@@ -70,8 +70,9 @@ pub struct Sweep {
 pub struct SweepPlan<'a> {
     /// The policy.
     pub policy: &'a Policy,
-    /// What the methods learn from (only rtn does without), and what errors are measured on, with actions.
-    pub recordings: &'a Recordings,
+    /// What the methods learn from (only rtn does without), and what errors are measured on. The f32 policy gives actions
+    /// that were not recorded.
+    pub recordings: Recordings,
     /// The methods.
     pub methods: &'a [Method],
     /// Bits per weight that are allowed.
@@ -88,15 +89,16 @@ pub struct SweepPlan<'a> {
 
 /// Quantizes the policy by every method for every budget and runs each image over the held-out recording. `progress`
 /// gets what is being done and the share of the whole that is done.
-pub fn run(plan: &SweepPlan<'_>, mut progress: impl FnMut(&str, f64)) -> Result<Sweep> {
-    let SweepPlan { policy, recordings, methods, budgets, steps, minutes, relative, seed } = *plan;
+pub fn run(plan: SweepPlan<'_>, mut progress: impl FnMut(&str, f64)) -> Result<Sweep> {
+    let SweepPlan { policy, mut recordings, methods, budgets, steps, minutes, relative, seed } = plan;
+    recordings.fill_actions(&policy.graph);
     let heldout = recordings.heldout.as_ref().with_context(|| Recording::Heldout.missing("a sweep"))?;
     let mut curves = Vec::new();
     for (m, &method) in methods.iter().enumerate() {
         // Calibration counts as much as one budget.
         let done = |steps: f64| (m as f64 + steps / (1 + budgets.len()) as f64) / methods.len() as f64;
         let work = format!("{method}, calibrating");
-        let quantizer = Quantizer::new(policy, recordings, method, minutes, |share| progress(&work, done(share)))?;
+        let quantizer = Quantizer::new(policy, &recordings, method, minutes, |share| progress(&work, done(share)))?;
         let mut points = Vec::new();
         for (b, &budget) in budgets.iter().enumerate() {
             let work = format!("{method}, {budget} bits per weight");
@@ -167,6 +169,32 @@ pub fn line(curve: &Curve) -> Vec<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::methods::actquant::choices::Choices;
+    use crate::methods::actquant::testing::{dataset, lstm};
+
+    #[test]
+    fn observations_alone_give_the_same_errors() {
+        let policy = Policy::of("tiny", lstm());
+        let with_actions = [5, 6].map(|seed| dataset(&policy.graph, seed, 20));
+        let without = with_actions.clone().map(|recording| Dataset { action: None, ..recording });
+        let nmse = |[calib, heldout]: [Dataset; 2]| {
+            let plan = SweepPlan {
+                policy: &policy,
+                recordings: Recordings { calib: Some(calib), heldout: Some(heldout) },
+                methods: &[Method::ActQuant(Choices::default())],
+                budgets: &[50.0, 100.0],
+                steps: None,
+                minutes: None,
+                relative: false,
+                seed: 1,
+            };
+            let points = run(plan, |_, _| {}).expect("a sweep").curves.remove(0).points;
+            points.into_iter().map(|point| point.map(|point| point.report.nmse)).collect::<Vec<_>>()
+        };
+        let measured = nmse(with_actions);
+        assert!(measured.iter().any(Option::is_some), "{measured:?}");
+        assert_eq!(nmse(without), measured);
+    }
 
     fn curve(method: &str, points: &[(f64, f64)]) -> Curve {
         let point = |&(bpw, nmse): &(f64, f64)| {

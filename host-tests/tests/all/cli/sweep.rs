@@ -29,16 +29,22 @@ fn sweep_takes_named_recordings() -> Result<()> {
     Ok(())
 }
 
-/// Every method that needs actions takes the f32 policy's.
+/// Every method that needs actions takes the f32 policy's, and so do the errors.
 #[test]
 fn sweep_takes_observations_alone() -> Result<()> {
     let fixture = Fixture::new()?;
     let policy = fixture.policy();
-    let obs = fixture.out("obs.npy");
-    fs::remove_file(policy.join("calib.npz"))?;
-    write_npy(&obs, &draw_observations(3, OBS))?;
-    let arguments = ["sweep", &text(&policy), "--methods", "rtn,actquant", "--bpw", "4", "--calib", &text(&obs)];
-    let table = succeeded(&run(actq(&arguments), b"")?)?;
+    let [calib, heldout] =
+        [("calib", 3), ("heldout", 4)].map(|(name, seed)| (fixture.out(&format!("{name}.npy")), seed));
+    for (file, seed) in [&calib, &heldout] {
+        write_npy(file, &draw_observations(*seed, OBS))?;
+    }
+    for recording in ["calib.npz", "heldout.npz"] {
+        fs::remove_file(policy.join(recording))?;
+    }
+    let arguments = ["sweep", &text(&policy), "--methods", "rtn,actquant", "--bpw", "4"];
+    let recordings = ["--calib", &text(&calib.0), "--heldout", &text(&heldout.0)];
+    let table = succeeded(&run(actq(&[&arguments[..], &recordings].concat()), b"")?)?;
     ensure!(table.contains("actquant"), "{table}");
     Ok(())
 }

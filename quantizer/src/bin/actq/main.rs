@@ -98,17 +98,13 @@ fn run_sweep(args: &SweepArgs) -> Result<()> {
     let mut sweeps = Vec::new();
     for (p, policy) in policies.iter().enumerate() {
         let (dir, sizes) = (Some(policy.dir.as_path()), Sizes::of(policy));
-        let mut calib = Learned::load(policy, &calib)?.map(|learned| learned.dataset);
-        if let Some(calib) = &mut calib {
-            calib.fill_actions(&policy.graph);
-        }
-        let mut heldout = Recording::Heldout.require(dir, args.heldout.as_deref(), sizes, "actq sweep")?;
-        heldout.fill_actions(&policy.graph);
+        let calib = Learned::load(policy, &calib)?.map(|learned| learned.dataset);
+        let heldout = Recording::Heldout.require(dir, args.heldout.as_deref(), sizes, "actq sweep")?;
         let recordings = Recordings { calib, heldout: Some(heldout) };
         bar.suspend(|| note(notes::of_recordings(&recordings)));
         let plan = SweepPlan {
             policy,
-            recordings: &recordings,
+            recordings,
             methods: &methods,
             budgets: &args.bpw,
             steps: args.learn.steps,
@@ -116,7 +112,7 @@ fn run_sweep(args: &SweepArgs) -> Result<()> {
             relative: args.learn.relative,
             seed: args.run.seed,
         };
-        sweeps.push(sweep::run(&plan, |work, share| {
+        sweeps.push(sweep::run(plan, |work, share| {
             bar.set_message(format!("{}: {work}", policy.name));
             set_share(&bar, (p as f64 + share) / policies.len() as f64);
         })?);
