@@ -2,6 +2,7 @@
 
 pub mod files;
 mod lower;
+pub mod unfinished;
 mod writer;
 
 pub use lower::{Program, lower};

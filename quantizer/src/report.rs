@@ -6,6 +6,7 @@ pub mod learned;
 pub mod memory;
 pub mod notes;
 pub mod plot;
+pub mod progress;
 pub mod quantized;
 pub mod sweep;
 pub mod table;

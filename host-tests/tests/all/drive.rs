@@ -223,6 +223,8 @@ fn the_policy_that_labels_is_the_images_or_none() -> Result<()> {
         1,
         &["no/drive.npz", "there is no folder no"],
     )?;
+    let long = format!("serve image.actq --record {}.npz", "x".repeat(252));
+    failed(&fixture.run(&long, &input)?, 1, &["xxx.npz: cannot be written"])?;
     failed(&fixture.run("serve image.actq --record drive.npy", &input)?, 2, &["its name ends so"])?;
     // Nothing was shown: nothing is written.
     ended_well(&fixture.run("serve image.actq --record empty.npz --policy policy", &[RESET; 3])?)?;

@@ -220,8 +220,11 @@ fn a_device_is_written_to() -> Result<()> {
     ensure!(fs::metadata(fixture.path("null"))?.file_type().is_char_device(), "the device was replaced");
     let output = fixture.quantize("--out stdout")?;
     let image = fixture.image()?;
-    ensure!(output.status.success() && output.stdout.starts_with(&image), "the image is not on standard output");
-    ensure!(String::from_utf8(output.stdout[image.len()..].to_vec())?.contains("weights"), "no report behind it");
+    ensure!(output.status.success() && output.stdout == image, "standard output is not the image alone");
+    ensure!(String::from_utf8_lossy(&output.stderr).contains("weights"), "no report on standard error");
+    let svg = fixture.run("inspect old.actq --widths --svg stdout")?;
+    let (picture, report) = (String::from_utf8(svg.stdout)?, String::from_utf8(svg.stderr)?);
+    ensure!(picture.trim_end().ends_with("</svg>") && !report.is_empty(), "{picture} and {report}");
     // A file that is open already has a place at which others write.
     let log = fixture.path("log");
     fs::write(&log, "lines\n")?;

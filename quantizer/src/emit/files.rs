@@ -3,10 +3,13 @@
 use std::ffi::OsStr;
 use std::fs::{self, File, Metadata, OpenOptions, Permissions};
 use std::io::{ErrorKind, Write as _};
+#[cfg(unix)]
+use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
-use tempfile::NamedTempFile;
+
+use super::unfinished::{Part, hold};
 
 /// Links from one to the next that are followed; as many as Linux follows.
 const MOST_LINKS: usize = 40;
@@ -19,39 +22,29 @@ const MOST_NUMBERS: usize = 9999;
 /// A symbolic link stays, and what it points to is written. A file that is replaced keeps its permissions; one that is
 /// read-only is refused. A device or pipe is written to as it is.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    write_all(&[(path, bytes)])
+    reserve(&[path], &[])?.write(&[bytes])
 }
 
-/// Writes all files, each as [`write()`] does, or none where one of them cannot be written. What a device or pipe was
-/// given is given.
-pub fn write_all(files: &[(&Path, impl AsRef<[u8]>)]) -> Result<()> {
-    // Everything that is likely to fail is done before the first file takes its place.
-    let staged = files.iter().map(|(path, bytes)| stage(path, bytes.as_ref()).with_context(|| named(path)));
-    for (staged, (path, bytes)) in staged.collect::<Result<Vec<_>>>()?.into_iter().zip(files) {
-        match staged {
-            Staged::File(file, place) => file.persist(place).map(drop).map_err(|e| e.error),
-            Staged::Stream(mut stream) => stream.write_all(bytes.as_ref()),
-        }
-        .with_context(|| named(path))?;
-    }
-    Ok(())
+/// As [`write()`], with the content that `fill` puts into the file.
+pub fn write_with(path: &Path, fill: impl FnOnce(&mut File) -> Result<()>) -> Result<()> {
+    Output::place_all([Output::new(path)?.fill(fill)?])
 }
 
-/// Writes a new file, as [`write()`] does, and gives its name: `path`, or, where something is there already, `path`
+/// Writes a new file, as [`write_with`] does, and gives its name: `path`, or, where something is there already, `path`
 /// with the first number from 2 on behind its stem that is free. Nothing is ever replaced, whoever else is looking for
 /// a name.
-pub fn write_new(path: &Path, bytes: &[u8]) -> Result<PathBuf> {
+pub fn write_new(path: &Path, fill: impl FnOnce(&mut File) -> Result<()>) -> Result<PathBuf> {
     let create = || -> Result<PathBuf> {
         let (folder, name) = folder_and_name(path)?;
-        let mut file = part(folder, name)?;
-        file.write_all(bytes)?;
-        file.as_file().sync_all()?;
+        let mut part = Part::new(folder, name)?;
+        fill(part.file())?;
+        part.file().sync_all()?;
         for number in 1..=MOST_NUMBERS {
             let place = numbered(path, number);
-            match file.persist_noclobber(&place) {
-                Ok(_) => return Ok(place),
-                Err(error) if error.error.kind() == ErrorKind::AlreadyExists => file = error.file,
-                Err(error) => return Err(error.error.into()),
+            match part.persist_new(&place) {
+                Ok(()) => return Ok(place),
+                Err((error, rest)) if error.kind() == ErrorKind::AlreadyExists => part = rest,
+                Err((error, _)) => return Err(error.into()),
             }
         }
         bail!("all names up to {} are taken", numbered(path, MOST_NUMBERS).display())
@@ -61,7 +54,13 @@ pub fn write_new(path: &Path, bytes: &[u8]) -> Result<PathBuf> {
 
 /// Refuses, before any work is done, a name for [`write_new`] in whose folder no file can be made.
 pub fn check_new(path: &Path) -> Result<()> {
-    folder_and_name(path).and_then(|(folder, name)| part(folder, name)).with_context(|| named(path)).map(drop)
+    let check = || -> Result<()> {
+        let (folder, name) = folder_and_name(path)?;
+        // No name is too long for a temporary file.
+        path.try_exists()?;
+        Ok(Part::new(folder, name).map(drop)?)
+    };
+    check().with_context(|| named(path))
 }
 
 /// `path` itself as number 1, then `stem-2.ending`, `stem-3.ending` and so on.
@@ -86,10 +85,14 @@ fn folder_and_name(path: &Path) -> Result<(&Path, &OsStr)> {
     Ok((folder, name))
 }
 
-/// Refuses, before any work is done, outputs that are one of the command's `inputs` or each other, under whatever
-/// names, and outputs that have no place. An input that does not exist counts as well: a file of its name would be read
-/// the next time.
-pub fn check_outputs(outputs: &[&Path], inputs: &[PathBuf]) -> Result<()> {
+/// Outputs of a command, each with an empty file beside its place: what keeps a file from being written is known before
+/// any work is done. Nothing is left of them if they are not written.
+#[derive(Debug)]
+pub struct Outputs(Vec<Output>);
+
+/// Reserves outputs. Refuses those that are one of the command's `inputs` or each other, under whatever names, and those
+/// that cannot be written. An input that does not exist counts as well: a file of its name would be read the next time.
+pub fn reserve(outputs: &[&Path], inputs: &[PathBuf]) -> Result<Outputs> {
     let inputs: Vec<(Identity, &PathBuf)> = inputs.iter().filter_map(|path| Some((identity(path)?, path))).collect();
     let mut before: Vec<(Identity, &Path)> = Vec::new();
     for &output in outputs {
@@ -104,7 +107,28 @@ pub fn check_outputs(outputs: &[&Path], inputs: &[PathBuf]) -> Result<()> {
         }
         before.push((own, output));
     }
-    Ok(())
+    outputs.iter().map(|path| Output::new(path)).collect::<Result<_>>().map(Outputs)
+}
+
+impl Outputs {
+    /// Writes all files, one content for each output in their order, or none if one of them cannot be written. What a
+    /// device or pipe was given is given.
+    pub fn write(self, contents: &[impl AsRef<[u8]>]) -> Result<()> {
+        debug_assert_eq!(self.0.len(), contents.len());
+        // Everything that is likely to fail is done before the first file takes its place.
+        let filled = self
+            .0
+            .into_iter()
+            .zip(contents)
+            .map(|(output, bytes)| output.fill(|file| Ok(file.write_all(bytes.as_ref())?)));
+        Output::place_all(filled.collect::<Result<Vec<_>>>()?)
+    }
+
+    /// Returns `true` if one of the outputs is the device or pipe of this name.
+    pub fn include_stream(&self, stream: &Path) -> bool {
+        let stream = identity(stream);
+        self.0.iter().any(|output| matches!(output.target, Target::Stream(_)) && identity(&output.name) == stream)
+    }
 }
 
 fn named(path: &Path) -> String {
@@ -124,7 +148,6 @@ enum Identity {
 fn identity(path: &Path) -> Option<Identity> {
     #[cfg(unix)]
     if let Ok(file) = fs::metadata(path) {
-        use std::os::unix::fs::MetadataExt as _;
         return Some(Identity::Inode(file.dev(), file.ino()));
     }
     fs::canonicalize(path).or_else(|_| follow(path)).ok().map(Identity::Place)
@@ -157,8 +180,8 @@ fn holds_open_files(folder: &Path) -> bool {
 
 /// What an output becomes.
 enum Place {
-    /// A file, and what is replaced there.
-    File(PathBuf, Option<Metadata>),
+    /// A file, and the permissions of the one that it replaces.
+    File(PathBuf, Option<Permissions>),
     /// A device or a pipe.
     Stream(PathBuf),
 }
@@ -171,7 +194,7 @@ fn place(path: &Path) -> Result<Place> {
             let open = place.parent().is_some_and(holds_open_files);
             ensure!(!open, "it stands for a file that is open already; name the file itself");
             ensure!(!old.permissions().readonly(), "it is read-only");
-            Ok(Place::File(place, Some(old)))
+            Ok(Place::File(place, Some(kept(&old))))
         }
         Ok(_) => Ok(Place::Stream(place)),
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(Place::File(place, None)),
@@ -179,50 +202,66 @@ fn place(path: &Path) -> Result<Place> {
     }
 }
 
-/// An output that is ready.
-enum Staged {
-    /// A file beside its place.
-    File(NamedTempFile, PathBuf),
-    /// Opened.
-    Stream(File),
+/// An output that can be written.
+#[derive(Debug)]
+struct Output {
+    name: PathBuf,
+    target: Target,
 }
 
-fn stage(path: &Path, bytes: &[u8]) -> Result<Staged> {
-    let (place, old) = match place(path)? {
-        Place::File(place, old) => (place, old),
-        Place::Stream(place) => return Ok(Staged::Stream(OpenOptions::new().write(true).open(place)?)),
-    };
-    let (Some(folder), Some(name)) = (place.parent(), place.file_name()) else { bail!("it names no file") };
-    let mut file = part(folder, name)?;
-    file.write_all(bytes)?;
-    if let Some(old) = old {
-        file.as_file().set_permissions(kept(&old))?;
-    }
-    file.as_file().sync_all()?;
-    Ok(Staged::File(file, place))
+#[derive(Debug)]
+enum Target {
+    /// A file, the one beside its place that becomes it, and the permissions that it gets.
+    File(Part, PathBuf, Option<Permissions>),
+    /// A device or a pipe. It is opened when there is something to write: to open a pipe waits for its reader.
+    Stream(PathBuf),
 }
 
-/// An empty file in `folder`, to become the one of this name.
-fn part(folder: &Path, name: &OsStr) -> Result<NamedTempFile> {
-    let prefix = format!(".{}.", name.to_string_lossy());
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(&prefix).suffix(".part");
-    // A temporary file is private to its owner; an output is as readable as the one before it, or as any new file.
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt as _;
-        builder.permissions(Permissions::from_mode(0o666));
+impl Output {
+    fn new(name: &Path) -> Result<Self> {
+        let target = || -> Result<Target> {
+            let (place, permissions) = match place(name)? {
+                Place::File(place, permissions) => (place, permissions),
+                Place::Stream(place) => return Ok(Target::Stream(place)),
+            };
+            let (folder, file) = folder_and_name(&place)?;
+            Ok(Target::File(Part::new(folder, file)?, place, permissions))
+        };
+        Ok(Self { name: name.to_owned(), target: target().with_context(|| named(name))? })
     }
-    Ok(builder.tempfile_in(folder)?)
+
+    /// Writes the content; a file has yet to take its place.
+    fn fill(mut self, fill: impl FnOnce(&mut File) -> Result<()>) -> Result<Self> {
+        let write = || match &mut self.target {
+            Target::Stream(place) => fill(&mut OpenOptions::new().write(true).open(place)?),
+            Target::File(part, _, permissions) => {
+                fill(part.file())?;
+                if let Some(permissions) = permissions.take() {
+                    part.file().set_permissions(permissions)?;
+                }
+                Ok(part.file().sync_all()?)
+            }
+        };
+        write().with_context(|| named(&self.name))?;
+        Ok(self)
+    }
+
+    /// Moves filled files to their places; a signal ends the process before the first or after the last.
+    fn place_all(filled: impl IntoIterator<Item = Self>) -> Result<()> {
+        let _held = hold();
+        for Self { name, target } in filled {
+            if let Target::File(part, place, _) = target {
+                part.persist(&place).with_context(|| named(&name))?;
+            }
+        }
+        Ok(())
+    }
 }
 
 /// The permissions of a file that is replaced, without those that would be another owner's.
 fn kept(old: &Metadata) -> Permissions {
     #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt as _;
-        Permissions::from_mode(old.permissions().mode() & 0o777)
-    }
+    return Permissions::from_mode(old.permissions().mode() & 0o777);
     #[cfg(not(unix))]
     old.permissions()
 }
@@ -233,22 +272,26 @@ mod tests {
 
     use super::*;
 
+    fn new(path: &Path, bytes: &[u8]) -> Result<PathBuf> {
+        write_new(path, |file| Ok(file.write_all(bytes)?))
+    }
+
     #[test]
     fn new_files_find_a_free_name() {
         let dir = tempfile::TempDir::new().expect("a folder");
         let path = dir.path().join("drive.npz");
         let name = |path: PathBuf| path.file_name().expect("a name").to_string_lossy().into_owned();
-        assert_eq!(name(write_new(&path, b"1").expect("written")), "drive.npz");
+        assert_eq!(name(new(&path, b"1").expect("written")), "drive.npz");
         fs::write(dir.path().join("drive-2.npz"), "mine").expect("a file");
-        assert_eq!(name(write_new(&path, b"3").expect("written")), "drive-3.npz");
+        assert_eq!(name(new(&path, b"3").expect("written")), "drive-3.npz");
         let (one, two) = (fs::read(&path).expect("1"), fs::read(dir.path().join("drive-2.npz")).expect("2"));
         assert_eq!((&one[..], &two[..]), (&b"1"[..], &b"mine"[..]));
         // At once, everyone gets a name of their own, and nothing else is left.
-        let write = |i: u8| write_new(&path, &[i]).expect("written");
+        let write = |i: u8| new(&path, &[i]).expect("written");
         thread::scope(|scope| (0..8).for_each(|i| drop(scope.spawn(move || write(i)))));
         assert_eq!(fs::read_dir(dir.path()).expect("a folder").count(), 3 + 8);
         let missing = dir.path().join("no").join("drive.npz");
-        assert!(check_new(&path).is_ok() && check_new(&missing).is_err() && write_new(&missing, b"").is_err());
+        assert!(check_new(&path).is_ok() && check_new(&missing).is_err() && new(&missing, b"").is_err());
         assert_eq!(numbered(Path::new("a/b"), 12), Path::new("a/b-12"));
     }
 }

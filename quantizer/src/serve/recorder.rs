@@ -168,7 +168,7 @@ impl<'a, F: Fn(String)> Recorder<'a, F> {
         match &self.file {
             Some(file) => files::write(file, &bytes)?,
             None => {
-                let file = files::write_new(self.plan.path, &bytes)?;
+                let file = files::write_new(self.plan.path, |file| Ok(file.write_all(&bytes)?))?;
                 if file != self.plan.path {
                     let (taken, file) = (self.plan.path.display(), file.display());
                     (self.note)(format!("{taken} is there already; recording into {file}"));

@@ -208,11 +208,11 @@ pub(super) fn write_npy(path: &Path, obs: &Array3<f32>) -> Result<()> {
     Ok(obs.write_npy(File::create(path)?)?)
 }
 
-/// Lines on standard error, all of them notes.
+/// Lines on standard error, all of them notes, but for the progress of a run that takes longer than its lines wait.
 pub(super) fn notes(output: &Output) -> Result<Vec<String>> {
     succeeded(output)?;
     let text = String::from_utf8(output.stderr.clone())?;
-    let lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    let lines: Vec<String> = text.lines().filter(|l| !l.starts_with("progress: ")).map(str::to_owned).collect();
     ensure!(!text.contains(['\r', '\x1b']) && lines.iter().all(|line| line.starts_with("note: ")), "{text:?}");
     Ok(lines)
 }

@@ -1,54 +1,130 @@
-//! A command that is ended from outside leaves the old file, or the whole new one.
+//! A command that is ended by a signal leaves the old file, or the whole new one, and nothing else.
 #![cfg(unix)]
 
 use std::fs;
-use std::os::unix::process::ExitStatusExt as _;
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use actq_bench::command::actq;
+use actq_bench::command::{actq, binary};
 use actq_bench::golden::Random;
 use anyhow::{Result, ensure};
 use ndarray::Array3;
 
 use super::fixture::{Fixture, OBS, text, write_npy};
 
-/// Ctrl-C while the quantizer learns.
-#[test]
-fn an_interrupt_leaves_no_file() -> Result<()> {
+/// A policy with a recording that is long enough to learn from.
+fn fixture() -> Result<Fixture> {
     let fixture = Fixture::new()?;
     let random = &mut Random::new(8);
     let obs = Array3::from_shape_simple_fn((1, 300, OBS), || 2.0 * random.unit());
     fs::remove_file(fixture.policy().join("calib.npz"))?;
     write_npy(&fixture.policy().join("calib.npy"), &obs)?;
+    Ok(fixture)
+}
+
+/// Waits until something is so, which shows that the command is at work.
+fn wait_for(child: &mut Child, is_so: impl Fn() -> Result<bool>) -> Result<()> {
+    while !is_so()? {
+        ensure!(child.try_wait()?.is_none(), "the command has ended already");
+        sleep(Duration::from_millis(5));
+    }
+    Ok(())
+}
+
+fn send(signal: &str, child: &Child) -> Result<()> {
+    // A child that has just ended takes no signal, which is no error.
+    Command::new("kill").args([&format!("-{signal}"), &child.id().to_string()]).stderr(Stdio::null()).status()?;
+    Ok(())
+}
+
+/// Signals while the quantizer learns. (What a shell starts in the background, tests perhaps among it, ignores SIGINT,
+/// and so would the command.)
+#[cfg(target_os = "linux")]
+#[test]
+fn a_signal_leaves_no_file_and_decides_the_status() -> Result<()> {
+    let fixture = fixture()?;
     let out = fixture.out("image.actq");
     fs::write(&out, "an image that is in use")?;
     let before = fixture.snapshot()?;
-    let policy = text(&fixture.policy());
-    let mut command = actq(&["quantize", &policy, "--method", "best", "--steps", "100000000", "--out", &text(&out)]);
-    let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn()?;
-    sleep(Duration::from_secs(1));
-    ensure!(child.try_wait()?.is_none(), "the command has ended by itself");
-    interrupt(&child)?;
+    for (signal, status) in [("HUP", 129), ("INT", 130), ("TERM", 143)] {
+        let mut command = Command::new("env");
+        command.args(["--default-signal=HUP,INT,TERM".as_ref(), binary()?.as_os_str()]);
+        command.arg("quantize").arg(fixture.policy()).args(["--method", "best", "--steps", "100000000", "--out"]);
+        let mut child = command.arg(&out).stdout(Stdio::null()).stderr(Stdio::piped()).spawn()?;
+        wait_for(&mut child, || Ok(fixture.snapshot()?.len() > before.len()))?;
+        send(signal, &child)?;
+        let output = child.wait_with_output()?;
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(status), "{signal}: {said}");
+        ensure!(said.ends_with("actq: interrupted: no output was written\n"), "{said}");
+        ensure!(fixture.snapshot()? == before, "files have changed");
+    }
+    Ok(())
+}
+
+/// `actq tune` in a folder of its own, which also takes its temporary files; the command of `--drive` makes the file
+/// `started`.
+fn start_tune(fixture: &Fixture, mut command: Command, drive: &str) -> Result<Child> {
+    let folder = fixture.out("tune");
+    fs::create_dir(&folder)?;
+    command.arg("tune").arg(fixture.policy()).args(["--steps", "4", "--out", "image.actq", "--drive", drive]);
+    command.current_dir(&folder).env("TMPDIR", &folder).stdout(Stdio::null()).stderr(Stdio::piped());
+    let mut child = command.spawn()?;
+    wait_for(&mut child, || Ok(folder.join("started").exists()))?;
+    Ok(child)
+}
+
+fn names(folder: &Path) -> Result<Vec<String>> {
+    let names = fs::read_dir(folder)?.map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned()));
+    names.collect()
+}
+
+#[test]
+fn a_signal_ends_all_processes_of_the_drive() -> Result<()> {
+    let fixture = fixture()?;
+    let drive = "(sleep 60; touch survived) & touch started; wait";
+    let child = start_tune(&fixture, actq(&[]), drive)?;
+    send("TERM", &child)?;
+    // This waits for whoever can still write to standard error: all processes of the drive.
     let output = child.wait_with_output()?;
-    assert_eq!(output.status.signal(), Some(15), "{output:?}");
-    ensure!(fixture.snapshot()? == before, "files have changed");
+    assert_eq!(output.status.code(), Some(143), "{output:?}");
+    assert_eq!(names(&fixture.out("tune"))?, ["started"]);
     Ok(())
 }
 
-fn interrupt(child: &Child) -> Result<()> {
-    // SIGTERM ends the command as Ctrl-C does: it has a handler for neither. SIGINT is ignored by all that a shell
-    // starts in the background, tests and their children among it. A child that has just ended cannot be interrupted,
-    // which is no error.
-    Command::new("kill").args(["-TERM", &child.id().to_string()]).stderr(Stdio::null()).status()?;
+/// As a robot's driver disarms it at the end.
+#[test]
+fn a_drive_may_end_its_own_way() -> Result<()> {
+    let fixture = fixture()?;
+    let drive = "trap 'touch disarmed; exit' TERM; touch started; while :; do sleep 0.01; done";
+    let child = start_tune(&fixture, actq(&[]), drive)?;
+    send("TERM", &child)?;
+    let output = child.wait_with_output()?;
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    ensure!(output.status.code() == Some(143) && fixture.out("tune/disarmed").exists(), "{said}");
+    ensure!(!said.contains("has failed"), "the signal is not an error of the command: {said}");
     Ok(())
 }
 
-/// Interrupts all over the time that the command takes, the writing among it: the old image is there, or the whole new
+#[cfg(target_os = "linux")]
+#[test]
+fn an_ignored_signal_stays_ignored() -> Result<()> {
+    let fixture = fixture()?;
+    let mut command = Command::new("env");
+    command.args(["--ignore-signal=HUP".as_ref(), binary()?.as_os_str()]);
+    let child = start_tune(&fixture, command, "touch started; while :; do sleep 0.01; done")?;
+    send("HUP", &child)?;
+    send("TERM", &child)?;
+    assert_eq!(child.wait_with_output()?.status.code(), Some(143));
+    Ok(())
+}
+
+/// Signals all over the time that the command takes, the writing among it: the old image is there, or the whole new
 /// one.
 #[test]
-fn an_interrupt_at_any_time_leaves_a_whole_image() -> Result<()> {
+fn a_signal_at_any_time_leaves_a_whole_image() -> Result<()> {
     const TRIES: u32 = 40;
     let fixture = Fixture::new()?;
     let out = fixture.out("image.actq");
@@ -67,12 +143,13 @@ fn an_interrupt_at_any_time_leaves_a_whole_image() -> Result<()> {
         fs::write(&out, "old")?;
         let mut child = start()?;
         sleep(time * i / TRIES);
-        interrupt(&child)?;
+        send("TERM", &child)?;
         child.wait()?;
         let found = fs::read(&out)?;
-        ensure!(found == b"old" || found == whole, "{} bytes after interrupt {i}", found.len());
+        ensure!(found == b"old" || found == whole, "{} bytes after signal {i}", found.len());
+        assert_eq!(names(&fixture.out(""))?, ["image.actq"], "after signal {i}");
         seen[usize::from(found == whole)] += 1;
     }
-    ensure!(seen[0] > 0, "no interrupt came in time: {seen:?}");
+    ensure!(seen[0] > 0, "no signal came in time: {seen:?}");
     Ok(())
 }

@@ -62,6 +62,73 @@ fn an_output_that_cannot_be_written_leaves_no_file() -> Result<()> {
     Ok(())
 }
 
+/// There is no policy either; that is what a command would say first if it began its work.
+#[test]
+fn outputs_are_refused_before_any_work() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let (policy, good) = (text(&fixture.out("no-policy")), text(&fixture.out("good")));
+    fs::write(fixture.out("file"), "")?;
+    let before = fixture.snapshot()?;
+    let mut bad =
+        vec![text(&fixture.out("none/x")), text(&fixture.out("file/x")), text(&fixture.out(&"x".repeat(256)))];
+    if cfg!(target_os = "linux") {
+        // A folder in which nobody can make a file, not even root.
+        bad.push("/proc/x".to_owned());
+    }
+    let commands = |bad: &str| {
+        [
+            ["quantize", &policy, "--out", bad].map(str::to_owned).to_vec(),
+            ["quantize", &policy, "--out", &good, "--save-stats", bad].map(str::to_owned).to_vec(),
+            ["tune", &policy, "--drive", "true", "--out", bad].map(str::to_owned).to_vec(),
+            ["tune", &policy, "--drive", "true", "--out", &good, "--json", bad].map(str::to_owned).to_vec(),
+            ["sweep", &policy, "--svg", bad].map(str::to_owned).to_vec(),
+            ["sweep", &policy, "--svg", &good, "--json", bad].map(str::to_owned).to_vec(),
+        ]
+    };
+    all(bad.iter().flat_map(|bad| commands(bad).map(|command| (bad, command))).map(|(bad, command)| {
+        let words: Vec<&str> = command.iter().map(String::as_str).collect();
+        let refused = run(actq(&words), b"").and_then(|output| failed(&output, 1, &[bad, "cannot be written"]));
+        (command.join(" "), refused)
+    }))?;
+    ensure!(fixture.snapshot()? == before, "files have changed");
+    Ok(())
+}
+
+#[test]
+fn the_longest_name_can_be_written() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let out = fixture.out(&"x".repeat(255));
+    succeeded(&fixture.quantize(&out, "")?)?;
+    ensure!(out.exists(), "no image");
+    Ok(())
+}
+
+#[test]
+fn long_work_can_be_quiet() -> Result<()> {
+    ["quantize", "tune", "sweep", "eval"]
+        .iter()
+        .try_for_each(|command| succeeded(&run(actq(&[command, "--quiet", "--help"]), b"")?).map(drop))
+}
+
+#[test]
+fn a_misspelt_option_is_answered_with_the_right_one() -> Result<()> {
+    let lines: [(&[&str], &str); 5] = [
+        (&["quantize", "x", "--bwp", "2"], "--bpw"),
+        (&["tune", "x", "--bwp=2"], "--bpw"),
+        (&["quantize", "x", "--buts", "2"], "--bits"),
+        (&["quantize", "x", "--stpes", "2"], "--steps"),
+        (&["link", "stream", "x", "--lgo", "2"], "--log"),
+    ];
+    all(lines.map(|(line, meant)| {
+        let answer = format!("a similar argument exists: '{meant}'");
+        (line.join(" "), run(actq(line), b"").and_then(|output| failed(&output, 2, &[&answer])))
+    }))?;
+    // An option of another command is none of this one's.
+    let output = run(actq(&["inspect", "x", "--bwp", "2"]), b"")?;
+    ensure!(!String::from_utf8_lossy(&output.stderr).contains("similar"), "{output:?}");
+    Ok(())
+}
+
 #[test]
 fn a_text_is_no_image() -> Result<()> {
     let fixture = Fixture::new()?;

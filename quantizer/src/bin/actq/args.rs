@@ -15,7 +15,8 @@ use values::{clock, forced, group, minutes, npz, pair, positive, rounds, size, w
 
 /// Quantizes robot policies to 2, 3, 4 or 8 bits and packs them into one image for a microcontroller.
 ///
-/// Exit status: 0 on success, 1 on an error, 2 on a wrong command line.
+/// Exit status: 0 on success, 1 on an error, 2 on a wrong command line, 128 + N if signal N ended the command (130 for
+/// Ctrl-C). Long work shows its progress on standard error: a bar on a terminal, else a line every 10 s.
 #[derive(Parser)]
 #[command(name = "actq", version, max_term_width = 100)]
 pub(crate) struct Cli {
@@ -254,6 +255,9 @@ pub(crate) struct EvalArgs {
     /// What this image was shown, as actq serve --record has recorded it, or a folder of that; may be repeated
     #[arg(long, value_name = "FILE|DIR")]
     pub(crate) driven: Vec<PathBuf>,
+    /// Show no progress
+    #[arg(long)]
+    pub(crate) quiet: bool,
     /// Print one JSON object: nmse, worst_nmse, max_abs, steps, bpw, bytes; with --driven also own_nmse
     #[arg(long)]
     pub(crate) json: bool,
@@ -399,6 +403,9 @@ pub(crate) struct RunArgs {
     /// Threads to use, at most 256; no result depends on it [default: all cores]
     #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true, value_parser = value_parser!(u16).range(..=256))]
     pub(crate) threads: u16,
+    /// Show no progress
+    #[arg(long)]
+    pub(crate) quiet: bool,
 }
 
 #[derive(Clone, Copy, ValueEnum)]

@@ -14,6 +14,7 @@ use actq::serve::wait_for_recorders;
 use actq::text::quoted;
 use anyhow::{Context as _, Result, ensure};
 
+use crate::group;
 use crate::terminal::note;
 
 /// How long recorders may take to write their last episode once the command has ended.
@@ -51,15 +52,15 @@ impl<'a> Drive<'a> {
         let words =
             [self.actq.as_os_str(), "serve".as_ref(), path.as_os_str(), "--record".as_ref(), record.as_os_str()];
         let policy_command = words.into_iter().map(quoted).collect::<Result<Vec<_>>>()?.join(" ");
-        let mut child = Command::new("sh")
+        let mut shell = Command::new("sh");
+        shell
             .args(["-c", self.command])
             .env("POLICY_CMD", &policy_command)
             .env("ACTQ_POLICY", &self.policy)
             .env("ACTQ_ROUND", (round + 1).to_string())
             .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .spawn()
-            .context("sh cannot be started, which runs the command of --drive")?;
+            .stdout(Stdio::piped());
+        let mut child = group::spawn(&mut shell).context("cannot start `sh` to run the command of --drive")?;
         let mut outcome = None;
         if let Some(output) = child.stdout.take() {
             let mut lines = BufReader::new(output);
@@ -71,7 +72,7 @@ impl<'a> Drive<'a> {
                 line.clear();
             }
         }
-        let status = child.wait().context("the command of --drive is lost")?;
+        let status = group::wait(child).context("the command of --drive is lost")?;
         ensure!(
             status.success(),
             "the command of --drive has failed ({status}): {}; run it by itself, with POLICY_CMD={} in the environment, to see why",

@@ -7,7 +7,7 @@ use actq::runtime::ImageBuffer;
 use anyhow::{Context as _, Result};
 
 use crate::args::EvalArgs;
-use crate::terminal::{note, print};
+use crate::terminal::{Progress, note, print};
 
 /// Runs an image over recordings and says how far it is from the f32 policy.
 pub(crate) fn run(args: &EvalArgs) -> Result<()> {
@@ -15,6 +15,7 @@ pub(crate) fn run(args: &EvalArgs) -> Result<()> {
     let image = buffer.image(&args.image)?;
     let policy = args.policy.as_deref();
     let driven = files_of(&args.driven)?;
+    let _progress = Progress::new(args.quiet, "running the image over the recordings")?;
     let dataset = eval::heldout_from(policy, args.heldout.as_deref(), &image)?;
     let report = eval::evaluate(image, &dataset)?;
     let source = policy.and_then(|dir| Policy::load(dir).ok()).filter(|policy| policy.digest == image.digest());

@@ -1,9 +1,9 @@
 //! `actq import`
 
-use std::fs;
+use std::path::Path;
 
 use actq::data::{Dataset, Recording, Sizes};
-use actq::emit::files;
+use actq::emit::unfinished::OutputFolder;
 use actq::import::FILES;
 use actq::import::onnx::{Choice, import};
 use actq::policy::Policy;
@@ -12,7 +12,7 @@ use anyhow::{Context as _, Result, ensure};
 
 use crate::args::ImportArgs;
 use crate::check::check;
-use crate::terminal::{note, print};
+use crate::terminal::{note, print, reserve};
 
 /// Makes a policy's folder of an ONNX file and says what became of it.
 pub(crate) fn run(args: &ImportArgs) -> Result<()> {
@@ -38,24 +38,26 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
         "{}: is there already, and one recording can be",
         other.map_or("".into(), |p| p.display().to_string())
     );
+    let _folder = OutputFolder::new(&args.out).with_context(|| format!("{}: cannot be made", args.out.display()))?;
+    let names: Vec<&Path> =
+        [&json, &weights].into_iter().chain(calib.is_some().then_some(&calib_npz)).map(|p| &**p).collect();
+    let inputs: Vec<_> = [Some(args.model.clone()), args.calib.clone()].into_iter().flatten().collect();
+    let outputs = reserve(&names, &inputs)?;
     let checked = match args.check {
         true => Some(check(&args.model, &imported, &policy, calib.as_ref())?),
         false => None,
     };
-    fs::create_dir_all(&args.out).with_context(|| format!("{}: cannot be made", args.out.display()))?;
-    let mut written = vec![(json.as_path(), imported.json.clone()), (weights.as_path(), imported.weights.clone())];
+    let mut contents = vec![imported.json.clone(), imported.weights.clone()];
     if let Some(calib) = &calib {
-        written.push((calib_npz.as_path(), calib.npz()?));
+        contents.push(calib.npz()?);
     }
-    let inputs: Vec<_> = [Some(args.model.clone()), args.calib.clone()].into_iter().flatten().collect();
-    files::check_outputs(&written.iter().map(|(path, _)| *path).collect::<Vec<_>>(), &inputs)?;
-    files::write_all(&written)?;
+    outputs.write(&contents)?;
     print(&imported::summary(&imported, &policy))?;
     if let Some(checked) = checked {
         print(&format!("checked   {checked}\n"))?;
     }
     print(&format!(
         "written   {}\n",
-        written.iter().map(|(path, _)| path.display().to_string()).collect::<Vec<_>>().join(", ")
+        names.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ")
     ))
 }

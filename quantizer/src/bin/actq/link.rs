@@ -8,7 +8,6 @@ use std::path::Path;
 use std::time::Duration;
 
 use actq::data::{Dataset, Sizes};
-use actq::emit::files;
 use actq::report::notes;
 use actq::runtime::ImageBuffer;
 use actq_device::client::Client;
@@ -22,7 +21,7 @@ use anyhow::{Context as _, Result, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use self::args::{LinkArgs, LinkCommand, PortArgs, PushArgs, StreamArgs, WatchArgs};
-use crate::terminal::{note, print, progress_bar, set_share};
+use crate::terminal::{Progress, note, print, reserve};
 
 /// Between two tables of `watch`.
 const REFRESH: Duration = Duration::from_millis(200);
@@ -85,7 +84,7 @@ fn watch(args: &WatchArgs) -> Result<()> {
 
 fn run_stream(args: &StreamArgs) -> Result<()> {
     let outputs: Vec<&Path> = args.log.as_deref().into_iter().collect();
-    files::check_outputs(&outputs, &[args.image.clone(), args.recording.clone()])?;
+    let outputs = reserve(&outputs, &[args.image.clone(), args.recording.clone()])?;
     let buffer = ImageBuffer::read(&args.image)?;
     let image = buffer.image(&args.image)?;
     let recording = Dataset::load(&args.recording, Sizes::of_image(&image))?;
@@ -99,18 +98,18 @@ fn run_stream(args: &StreamArgs) -> Result<()> {
     );
     let rate = args.rate.unwrap_or(f64::from(image.rate_hz()));
     let pace = Pace { period: Duration::from_secs_f64(1.0 / rate), arm: args.arm };
-    let (bar, mut log) = (progress_bar()?, Log::default());
+    let (progress, mut log) = (Progress::new(false, "streaming")?, Log::default());
     let frames = recording.frames();
     let observations = recording.observations().enumerate().map(|(i, observation)| {
-        set_share(&bar, i as f64 / frames as f64);
+        progress.set_share(i as f64 / frames as f64);
         observation.to_vec()
     });
     let outcome =
-        stream(&mut client, observations, &pace, &mut log, |status| bar.set_message(status.state.to_string()));
-    bar.finish_and_clear();
+        stream(&mut client, observations, &pace, &mut log, |status| progress.set_work(&status.state.to_string()));
+    drop(progress);
     // What came before an error is what one wants to see.
-    if let Some(path) = &args.log {
-        files::write(path, &log.npz()?)?;
+    if args.log.is_some() {
+        outputs.write(&[log.npz()?])?;
     }
     let mut latencies = log.latencies();
     latencies.sort_by(f64::total_cmp);
@@ -136,13 +135,12 @@ fn run_push(args: &PushArgs) -> Result<()> {
     let mut client = connect(&args.port)?;
     note(axes_note(&mut client)?);
     let package = Package { image: buffer.bytes(), version, signature: signature.as_ref() };
-    let bar = progress_bar()?;
-    bar.set_message("erasing");
+    let progress = Progress::new(false, "erasing")?;
     let outcome = push(&mut client, &package, |taken| {
-        bar.set_message(if taken < buffer.bytes().len() { "sending" } else { "checking" });
-        set_share(&bar, taken as f64 / buffer.bytes().len() as f64);
+        let work = if taken < buffer.bytes().len() { "sending" } else { "checking" };
+        progress.set(work, taken as f64 / buffer.bytes().len() as f64);
     });
-    bar.finish_and_clear();
+    drop(progress);
     outcome?;
     print(&format!("{} runs, version {version}, {} bytes\n", image.name(), buffer.bytes().len()))
 }

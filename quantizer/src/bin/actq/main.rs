@@ -5,12 +5,16 @@ mod args;
 mod check;
 mod drive;
 mod eval;
+mod group;
 mod import;
 mod inputs;
+#[cfg(unix)]
+mod interrupts;
 mod link;
 mod quantize;
 mod serve;
 mod sign;
+mod suggestions;
 mod terminal;
 mod threads;
 mod tune;
@@ -19,7 +23,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use actq::data::{Learned, Recording, Recordings, Sizes, files_of};
-use actq::emit::files;
+use actq::emit::unfinished;
 use actq::measure::time::StepTime;
 use actq::methods::Method;
 use actq::pipeline::stats::Stats;
@@ -30,15 +34,17 @@ use actq::report::{self, inspect, notes, time};
 use actq::runtime::ImageBuffer;
 use actq::text::printable;
 use anyhow::{Result, ensure};
-use clap::Parser as _;
 
-use args::{Cli, Command, InspectArgs, SweepArgs};
+use args::{Command, InspectArgs, SweepArgs};
 use inputs::policy_files;
-use terminal::{note, print, progress_bar, set_share};
+use terminal::{Progress, note, print, reserve};
 use threads::start_threads;
 
 fn main() -> ExitCode {
-    match run(Cli::parse().command) {
+    let outcome = run(suggestions::parse().command);
+    // Where a signal ends the process, it decides the exit status.
+    let _held = unfinished::hold();
+    match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("actq: {}", printable(&format!("{error:#}")));
@@ -48,6 +54,8 @@ fn main() -> ExitCode {
 }
 
 fn run(command: Command) -> Result<()> {
+    #[cfg(unix)]
+    interrupts::watch()?;
     match command {
         Command::Import(args) => import::run(&args),
         Command::Quantize(args) => quantize::run(&args),
@@ -64,7 +72,7 @@ fn run(command: Command) -> Result<()> {
 
 fn run_inspect(args: &InspectArgs) -> Result<()> {
     let inputs = [Some(&args.image), args.stats.as_ref()].into_iter().flatten().cloned().collect::<Vec<_>>();
-    files::check_outputs(args.svg.as_deref().as_slice(), &inputs)?;
+    let outputs = reserve(args.svg.as_deref().as_slice(), &inputs)?;
     let buffer = ImageBuffer::read(&args.image)?;
     let image = buffer.image(&args.image)?;
     if !args.widths {
@@ -76,8 +84,8 @@ fn run_inspect(args: &InspectArgs) -> Result<()> {
     }
     let stats = args.stats.as_deref().map(|path| Stats::read(path, &image)).transpose()?;
     let widths = Widths::new(&image, stats.as_ref())?;
-    if let Some(path) = &args.svg {
-        files::write(path, widths.svg().as_bytes())?;
+    if args.svg.is_some() {
+        outputs.write(&[widths.svg()])?;
     }
     print(&widths.report())
 }
@@ -87,21 +95,21 @@ fn run_sweep(args: &SweepArgs) -> Result<()> {
     let calib = files_of(&args.calib)?;
     let inputs: Vec<PathBuf> = folders.chain(calib.iter().chain(&args.heldout).cloned()).collect();
     let outputs: Vec<&Path> = [&args.svg, &args.json].into_iter().filter_map(|path| path.as_deref()).collect();
-    files::check_outputs(&outputs, &inputs)?;
+    let outputs = reserve(&outputs, &inputs)?;
+    let progress = Progress::new(args.run.quiet, "reading")?;
     start_threads(args.run.threads)?;
     let methods: Vec<Method> = args.methods.iter().map(|&method| method.into()).collect();
     let methods = args.actquant.of(&methods)?;
     let policies = args.policy_dirs.iter().map(|dir| Policy::load(dir)).collect::<Result<Vec<_>>>()?;
     let named = !calib.is_empty() || args.heldout.is_some();
     ensure!(policies.len() == 1 || !named, "--calib and --heldout go with one policy");
-    let bar = progress_bar()?;
     let mut sweeps = Vec::new();
     for (p, policy) in policies.iter().enumerate() {
         let (dir, sizes) = (Some(policy.dir.as_path()), Sizes::of(policy));
         let calib = Learned::load(policy, &calib)?.map(|learned| learned.dataset);
         let heldout = Recording::Heldout.require(dir, args.heldout.as_deref(), sizes, "actq sweep")?;
         let recordings = Recordings { calib, heldout: Some(heldout) };
-        bar.suspend(|| note(notes::of_recordings(&recordings)));
+        note(notes::of_recordings(&recordings));
         let plan = SweepPlan {
             policy,
             recordings,
@@ -113,11 +121,10 @@ fn run_sweep(args: &SweepArgs) -> Result<()> {
             seed: args.run.seed,
         };
         sweeps.push(sweep::run(plan, |work, share| {
-            bar.set_message(format!("{}: {work}", policy.name));
-            set_share(&bar, (p as f64 + share) / policies.len() as f64);
+            progress.set(&format!("{}: {work}", policy.name), (p as f64 + share) / policies.len() as f64);
         })?);
     }
-    bar.finish_and_clear();
+    drop(progress);
     let mut knees = String::new();
     for sweep in &sweeps {
         if let Some(knee) = &sweep.knee {
@@ -129,7 +136,6 @@ fn run_sweep(args: &SweepArgs) -> Result<()> {
     }
     print(&format!("{}\n{knees}\n", report::sweep::table(&sweeps)))?;
     let (svg, json) = (report::sweep::svg(&sweeps), serde_json::to_string_pretty(&sweeps)? + "\n");
-    let files = [(&args.svg, svg), (&args.json, json)];
-    let files: Vec<_> = files.iter().filter_map(|(path, text)| Some((path.as_deref()?, text))).collect();
-    files::write_all(&files)
+    let contents = [args.svg.is_some().then_some(svg), args.json.is_some().then_some(json)];
+    outputs.write(&contents.into_iter().flatten().collect::<Vec<_>>())
 }

@@ -5,7 +5,6 @@ use std::time::Instant;
 
 use actq::budget::{Budget, TimeLimit};
 use actq::data::{Learned, Recording, Recordings, Sizes, driven_by, files_of};
-use actq::emit::files;
 use actq::import::is_onnx;
 use actq::measure::{check, own};
 use actq::methods::{Activations, Method, Options};
@@ -19,7 +18,7 @@ use anyhow::{Result, bail};
 
 use crate::args::{ActivationArg, MethodArg, QuantizeArgs};
 use crate::inputs::policy_files;
-use crate::terminal::{note, print, progress_bar, set_share};
+use crate::terminal::{Progress, note, print, reserve};
 use crate::threads::start_threads;
 
 /// Quantizes a policy, writes the image and says what became of it.
@@ -27,7 +26,8 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
     let outputs: Vec<&Path> = [Some(&args.out), args.save_stats.as_ref()].into_iter().flatten().map(|p| &**p).collect();
     let calib = files_of(&args.calib)?;
     let inputs: Vec<PathBuf> = policy_files(&args.policy_dir).into_iter().chain(calib.iter().cloned()).collect();
-    files::check_outputs(&outputs, &inputs)?;
+    let outputs = reserve(&outputs, &inputs)?;
+    let progress = Progress::new(args.run.quiet, "reading")?;
     let source = Policy::load(&args.policy_dir)?;
     let (calib, shares) = Learned::load(&source, &calib)?.map(|l| (l.dataset, l.shares)).unzip();
     let shares = shares.unwrap_or_default();
@@ -43,21 +43,18 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
     options.check()?;
     let started = Instant::now();
     start_threads(args.run.threads)?;
-    let bar = progress_bar()?;
-    bar.set_message("calibrating");
-    let quantizer =
-        Quantizer::new(&source, &recordings, options.method, options.minutes, |share| set_share(&bar, share))?;
-    bar.reset();
-    let found = quantizer.quantize(&options, |work, share| {
-        bar.set_message(work.to_owned());
-        set_share(&bar, share);
+    progress.begin("calibrating");
+    let quantizer = Quantizer::new(&source, &recordings, options.method, options.minutes, |share| {
+        progress.set("calibrating", share);
     })?;
-    bar.finish_and_clear();
-    let mut files = vec![(args.out.as_path(), found.image.clone())];
-    if let Some(path) = &args.save_stats {
-        files.push((path, Stats::new(&quantizer, &options, &found)?.json()?.into_bytes()));
+    progress.begin("choosing codes");
+    let found = quantizer.quantize(&options, |work, share| progress.set(work, share))?;
+    let mut contents = vec![found.image.clone()];
+    if args.save_stats.is_some() {
+        contents.push(Stats::new(&quantizer, &options, &found)?.json()?.into_bytes());
     }
-    files::write_all(&files)?;
+    outputs.write(&contents)?;
+    progress.begin("measuring the error");
     print(&learned(&shares))?;
     if let Some(statistics) = quantizer.method().action_statistics() {
         print(&quantized::scores(&source.graph, statistics, &found))?;

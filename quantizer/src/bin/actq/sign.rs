@@ -1,12 +1,11 @@
 //! `actq keygen` and `actq sign`
 
-use actq::emit::files;
 use actq::runtime::ImageBuffer;
 use actq_device::keys;
 use anyhow::Result;
 
 use crate::link::args::{KeygenArgs, SignArgs};
-use crate::terminal::print;
+use crate::terminal::{print, reserve};
 
 /// Makes a key.
 pub(crate) fn keygen(args: &KeygenArgs) -> Result<()> {
@@ -17,10 +16,10 @@ pub(crate) fn keygen(args: &KeygenArgs) -> Result<()> {
 
 /// Signs an image.
 pub(crate) fn sign(args: &SignArgs) -> Result<()> {
-    files::check_outputs(&[&args.out], &[args.image.clone(), args.key.clone()])?;
+    let outputs = reserve(&[&args.out], &[args.image.clone(), args.key.clone()])?;
     let buffer = ImageBuffer::read(&args.image)?;
     let image = buffer.image(&args.image)?;
     let signed = keys::sign(&keys::read(&args.key)?, buffer.bytes(), args.version)?;
-    files::write(&args.out, (serde_json::to_string_pretty(&signed)? + "\n").as_bytes())?;
+    outputs.write(&[serde_json::to_string_pretty(&signed)? + "\n"])?;
     print(&format!("{}: {}, version {}, by {}\n", args.out.display(), image.name(), signed.version, signed.public_key))
 }

@@ -5,19 +5,18 @@ use std::path::{Path, PathBuf};
 
 use actq::budget::Budget;
 use actq::data::{Dataset, Recording, Sizes, files_of};
-use actq::emit::files;
+use actq::emit::unfinished::Scratch;
 use actq::methods::{Method, Options};
 use actq::pipeline::tune::{self, TunePlan};
 use actq::policy::Policy;
 use actq::report;
 use actq_kernels::Width;
 use anyhow::{Context as _, Result, ensure};
-use tempfile::TempDir;
 
 use crate::args::{LearnArgs, TuneArgs};
 use crate::drive::Drive;
 use crate::inputs::policy_files;
-use crate::terminal::{note, print, progress_bar, set_share};
+use crate::terminal::{Progress, note, print, reserve};
 use crate::threads::start_threads;
 
 /// Quantizes, drives, and learns again from what was driven.
@@ -25,7 +24,8 @@ pub(crate) fn run(args: &TuneArgs) -> Result<()> {
     let outputs: Vec<&Path> = [Some(&args.out), args.json.as_ref()].into_iter().flatten().map(|p| &**p).collect();
     let mut calib = files_of(&args.calib)?;
     let inputs: Vec<PathBuf> = policy_files(&args.policy_dir).into_iter().chain(calib.iter().cloned()).collect();
-    files::check_outputs(&outputs, &inputs)?;
+    let outputs = reserve(&outputs, &inputs)?;
+    let progress = Progress::new(args.run.quiet, "reading")?;
     let policy = Policy::load(&args.policy_dir)?;
     let sizes = Sizes::of(&policy);
     if calib.is_empty() {
@@ -44,25 +44,23 @@ pub(crate) fn run(args: &TuneArgs) -> Result<()> {
     let LearnArgs { steps, minutes, relative } = args.learn;
     let options = Options { steps, minutes, relative, seed: args.run.seed, ..Options::new(Method::Best, budget) };
     let plan = TunePlan { policy: &policy, calib, heldout, options: &options, rounds: args.rounds };
-    let bar = progress_bar()?;
     let tuned = tune::run(
         plan,
-        // The command prints while it drives.
-        |round, image| bar.suspend(|| drive.run(round, image)),
-        |work, share| {
-            bar.set_message(work.to_owned());
-            set_share(&bar, share);
+        |round, image| {
+            progress.begin(&format!("round {round}: driving"));
+            // The command prints while it drives.
+            progress.without_bar(|| drive.run(round, image))
         },
+        |work, share| progress.set(work, share),
     );
-    bar.finish_and_clear();
+    drop(progress);
     let tuned = tuned.with_context(|| match &args.keep {
         Some(dir) => format!("nothing is written but what {} holds", dir.display()),
         None => "nothing is written (--keep DIR keeps the images and what they drove)".to_owned(),
     })?;
     let json = serde_json::to_string_pretty(&report::tuned::json(&tuned, &policy.name, &args.drive))? + "\n";
-    let image = Some((args.out.as_path(), &tuned.quantized.image[..]));
-    let table = args.json.as_deref().map(|path| (path, json.as_bytes()));
-    files::write_all(&image.into_iter().chain(table).collect::<Vec<_>>())?;
+    let table = args.json.is_some().then_some(json.as_bytes());
+    outputs.write(&[&tuned.quantized.image[..]].into_iter().chain(table).collect::<Vec<_>>())?;
     print(&format!(
         "{}\n{}: {} bytes, the image of round {}\n",
         report::tuned::table(&tuned),
@@ -77,7 +75,7 @@ pub(crate) fn run(args: &TuneArgs) -> Result<()> {
 /// Where images and recordings are while rounds are run.
 enum Folder {
     Kept(PathBuf),
-    Gone(TempDir),
+    Gone(Scratch),
 }
 
 impl Folder {
@@ -85,7 +83,7 @@ impl Folder {
     /// goes.
     fn new(keep: Option<&Path>) -> Result<Self> {
         let Some(dir) = keep else {
-            return Ok(Self::Gone(TempDir::with_prefix("actq-").context("no folder for recordings")?));
+            return Ok(Self::Gone(Scratch::new().context("cannot make a temporary folder for recordings")?));
         };
         let name = dir.display();
         if !dir.exists() {
