@@ -17,6 +17,7 @@ mod thinning;
 
 pub use dataset::{Dataset, Sizes};
 pub use joined::{Learned, MOST_FRAMES, Share, joined, longest_piece};
+pub use npy::npy_header;
 pub use origin::{CRC32, driven_by};
 pub use range::{Outside, Range, runs};
 pub use recording::{Recording, Recordings, files_of};

@@ -4,6 +4,7 @@ mod episodes;
 mod protocol;
 mod recorder;
 mod recorders;
+mod spool;
 
 pub use protocol::{Seen, serve};
 pub use recorder::{RecordPlan, serve_recorded};

@@ -60,6 +60,16 @@ pub(super) fn read(source: &mut impl Read, bytes: u64) -> Result<Tensor> {
     Ok(Tensor { shape: header.shape, values })
 }
 
+/// The header of an array of f32 in version 1.0, its last axis the fastest.
+pub fn npy_header(shape: &[usize]) -> Vec<u8> {
+    let axes: String = shape.iter().map(|len| format!("{len}, ")).collect();
+    let text = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({axes}), }}");
+    // The elements begin at a multiple of 64 bytes, after a line feed.
+    let length = (10 + text.len() + 1).next_multiple_of(64) - 10;
+    let text = format!("{text:width$}\n", width = length - 1);
+    [MAGIC, &[1, 0], &(length as u16).to_le_bytes(), text.as_bytes()].concat()
+}
+
 impl Header {
     /// `{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }`, the keys in any order, each once.
     fn parse(text: &str) -> Option<Self> {
@@ -155,6 +165,20 @@ impl<'a> Literal<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_written_header_is_read() {
+        for shape in [&[3][..], &[2, 1], &[100_000, 1234, 567_890]] {
+            let bytes = npy_header(shape);
+            let text = std::str::from_utf8(&bytes[10..]).expect("text");
+            assert!(bytes.len().is_multiple_of(64) && text.ends_with('\n'), "{text:?}");
+            let expected = Header { descr: "<f4".to_owned(), fortran_order: false, shape: shape.to_vec() };
+            assert_eq!(Header::parse(text.trim_end()), Some(expected));
+        }
+        let array = [npy_header(&[2]), 1f32.to_le_bytes().to_vec(), 2f32.to_le_bytes().to_vec()].concat();
+        let read = read(&mut &array[..], array.len() as u64).expect("an array");
+        assert!(matches!(read.values, Values::F32(values) if values == [1.0, 2.0]));
+    }
 
     #[test]
     fn headers_are_parsed_strictly() {

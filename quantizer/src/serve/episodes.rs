@@ -1,28 +1,35 @@
-//! Recorded episodes in memory, and the file that they make.
+//! Recorded episodes, and the file that they make.
 
-use std::io::Cursor;
+use std::fs::File;
+use std::io::{self, BufWriter};
+use std::path::Path;
 
 use anyhow::Result;
-use ndarray::{Array1, Array3, s};
-use ndarray_npy::NpzWriter;
+use ndarray::Array1;
+use ndarray_npy::WriteNpyExt as _;
+use zip::CompressionMethod;
+use zip::write::{SimpleFileOptions, ZipWriter};
 
+use super::spool::Spool;
 use crate::data::{CRC32, longest_piece};
 
-/// Episodes, one behind the other. Only the last may be empty.
+/// Episodes, one after the other. Only the last may be empty. Their values are on disk.
 #[derive(Debug)]
 pub(super) struct Episodes {
-    /// Values of an observation and of its action; no value where no actions are recorded.
-    widths: [usize; 2],
     /// Whether steps depend on each other, so that no episode may be cut.
     recurrent: bool,
-    values: [Vec<f32>; 2],
+    /// Observations, and the actions if those are recorded.
+    arrays: Vec<(&'static str, Spool)>,
     lengths: Vec<usize>,
     longest: usize,
 }
 
 impl Episodes {
-    pub(super) fn new(obs: usize, action: usize, recurrent: bool) -> Self {
-        Self { widths: [obs, action], recurrent, values: Default::default(), lengths: vec![0], longest: 0 }
+    /// Episodes of observations and actions of these widths, 0 for no actions; their values are on the disk of `folder`.
+    pub(super) fn new(folder: &Path, obs: usize, action: usize, recurrent: bool) -> io::Result<Self> {
+        let recorded = [("obs", obs), ("action", action)].into_iter().filter(|(_, width)| *width > 0);
+        let arrays = recorded.map(|(name, width)| Ok((name, Spool::new(folder, width)?))).collect::<io::Result<_>>()?;
+        Ok(Self { recurrent, arrays, lengths: vec![0], longest: 0 })
     }
 
     /// Begins an episode, unless one has begun that is still empty.
@@ -33,14 +40,15 @@ impl Episodes {
     }
 
     /// Adds a step to the last episode.
-    pub(super) fn push(&mut self, obs: &[f32], action: &[f32]) {
-        for (values, more) in self.values.iter_mut().zip([obs, action]) {
-            values.extend_from_slice(more);
+    pub(super) fn push(&mut self, obs: &[f32], action: &[f32]) -> io::Result<()> {
+        for ((_, spool), row) in self.arrays.iter_mut().zip([obs, action]) {
+            spool.push(row)?;
         }
         if let Some(length) = self.lengths.last_mut() {
             *length += 1;
             self.longest = self.longest.max(*length);
         }
+        Ok(())
     }
 
     pub(super) fn frames(&self) -> usize {
@@ -51,22 +59,31 @@ impl Episodes {
     pub(super) fn bytes_with_next(&self) -> usize {
         let padded = self.lengths.len().saturating_mul(self.longest + 1);
         let rows = if self.recurrent { padded } else { padded.min(3 * (self.frames() + 1)) };
-        rows.saturating_mul(4 * (self.widths[0] + self.widths[1]))
+        let width: usize = self.arrays.iter().map(|(_, spool)| spool.width()).sum();
+        rows.saturating_mul(4 * width)
     }
 
-    /// The recording as an .npz archive; `crc` is that of the image that was driven. Nothing is compressed: it would
-    /// take longer than the policy itself.
-    pub(super) fn npz(&self, crc: u32) -> Result<Vec<u8>> {
+    /// Writes the recording as an .npz archive; `crc` is that of the image that was driven. Nothing is compressed: it
+    /// would take longer than the policy itself.
+    pub(super) fn write_npz(&mut self, crc: u32, to: &mut File) -> Result<()> {
         let pieces = self.pieces();
-        let mut npz = NpzWriter::new(Cursor::new(Vec::new()));
-        for ((name, width), values) in ["obs", "action"].into_iter().zip(self.widths).zip(&self.values) {
-            if width > 0 {
-                npz.add_array(name, &padded(values, width, &pieces)?)?;
-            }
+        let mut npz = ZipWriter::new(BufWriter::new(to));
+        let begin = |npz: &mut ZipWriter<_>, name: &str| {
+            npz.start_file(
+                format!("{name}.npy"),
+                SimpleFileOptions::default().compression_method(CompressionMethod::Stored),
+            )
+        };
+        for (name, spool) in &mut self.arrays {
+            begin(&mut npz, name)?;
+            spool.write_npy(&pieces, &mut npz)?;
         }
-        npz.add_array("length", &pieces.iter().map(|&n| n as i64).collect::<Array1<i64>>())?;
-        npz.add_array(CRC32, &Array1::from_elem(1, i64::from(crc)))?;
-        Ok(npz.finish()?.into_inner())
+        begin(&mut npz, "length")?;
+        pieces.iter().map(|&n| n as i64).collect::<Array1<i64>>().write_npy(&mut npz)?;
+        begin(&mut npz, CRC32)?;
+        Array1::from_elem(1, i64::from(crc)).write_npy(&mut npz)?;
+        npz.finish()?.into_inner().map_err(io::IntoInnerError::into_error)?;
+        Ok(())
     }
 
     /// The lengths of the file's episodes. To a feed-forward policy it makes no difference where they are cut.
@@ -81,29 +98,15 @@ impl Episodes {
     }
 }
 
-/// `[episode, step, value]`, with zeros behind every episode's end.
-fn padded(values: &[f32], width: usize, lengths: &[usize]) -> Result<Array3<f32>> {
-    let longest = lengths.iter().copied().max().unwrap_or(0);
-    let mut array = Array3::zeros((lengths.len(), longest, width));
-    let mut rest = values;
-    for (episode, &length) in lengths.iter().enumerate() {
-        let (own, behind) = rest.split_at(length * width);
-        let own = ndarray::ArrayView2::from_shape((length, width), own)?;
-        array.slice_mut(s![episode, ..length, ..]).assign(&own);
-        rest = behind;
-    }
-    Ok(array)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn recorded(lengths: &[usize], recurrent: bool) -> Episodes {
-        let mut episodes = Episodes::new(2, 1, recurrent);
+        let mut episodes = Episodes::new(&std::env::temp_dir(), 2, 1, recurrent).expect("a temporary file");
         for length in lengths {
             episodes.begin();
-            (0..*length).for_each(|i| episodes.push(&[i as f32; 2], &[0.5]));
+            (0..*length).for_each(|i| episodes.push(&[i as f32; 2], &[0.5]).expect("written"));
         }
         episodes
     }
@@ -115,6 +118,13 @@ mod tests {
         episodes.begin();
         assert_eq!((episodes.pieces(), episodes.frames()), (vec![3, 2], 5));
         assert!(recorded(&[], false).pieces().is_empty());
+    }
+
+    #[test]
+    fn nothing_is_compressed() {
+        let mut file = tempfile::tempfile().expect("a file");
+        recorded(&[500, 500], true).write_npz(7, &mut file).expect("written");
+        assert!(file.metadata().expect("a size").len() > 4 * 3 * 1000);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Records what a served policy is shown, in a thread of its own: no answer waits for a label or for the disk.
 
+use std::fs::File;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, sync_channel};
@@ -35,6 +36,12 @@ pub struct RecordPlan<'a> {
     pub source: Option<&'a Policy>,
 }
 
+impl<'a> RecordPlan<'a> {
+    fn folder(&self) -> &'a Path {
+        self.path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+    }
+}
+
 /// One request, for the recorder.
 enum Event {
     /// A new episode begins: the policy was reset, or has reset itself.
@@ -53,10 +60,9 @@ pub fn serve_recorded(
     note: impl Fn(String) + Sync,
 ) -> Result<()> {
     files::check_new(plan.path)?;
-    let folder = plan.path.parent().filter(|folder| !folder.as_os_str().is_empty());
     // Before the first answer: who has got one can wait for the recording.
-    let _recording = recorders::share(folder.unwrap_or(Path::new(".")));
-    let recorder = Recorder::new(&image, plan, &note);
+    let _recording = recorders::share(plan.folder());
+    let recorder = Recorder::new(&image, plan, &note)?;
     let (sender, receiver) = sync_channel(QUEUE);
     thread::scope(|scope| {
         let recorder = scope.spawn(|| recorder.run(receiver));
@@ -92,20 +98,22 @@ struct Recorder<'a, F> {
 }
 
 impl<'a, F: Fn(String)> Recorder<'a, F> {
-    fn new(image: &Image<'_>, plan: RecordPlan<'a>, note: &'a F) -> Self {
+    fn new(image: &Image<'_>, plan: RecordPlan<'a>, note: &'a F) -> Result<Self> {
         let recurrent = image.state().len > 0;
         let action = if plan.source.is_some() { image.output().len } else { 0 };
-        Self {
+        let episodes = Episodes::new(plan.folder(), image.obs_len(), action, recurrent)
+            .with_context(|| format!("{}: cannot make a temporary file", plan.folder().display()))?;
+        Ok(Self {
             plan,
             crc: image.crc(),
             labels: plan.source.map(|source| Evaluator::new(&source.graph)),
-            episodes: Episodes::new(image.obs_len(), action, recurrent),
+            episodes,
             step: 0,
             every: if recurrent { image.execute().max(1) } else { 1 },
             saved: 0,
             file: None,
             note,
-        }
+        })
     }
 
     /// Records until no more events can come.
@@ -131,7 +139,7 @@ impl<'a, F: Fn(String)> Recorder<'a, F> {
                         (self.note)(format!("{name}: {mib} MiB are recorded, and no more than that will be"));
                         return Ok(());
                     }
-                    self.observe(&observation);
+                    self.observe(&observation)?;
                 }
             }
             if self.episodes.frames() >= self.saved + LEAST_NEW.max(self.saved / NEW_SHARE) {
@@ -148,27 +156,28 @@ impl<'a, F: Fn(String)> Recorder<'a, F> {
         }
     }
 
-    fn observe(&mut self, observation: &[f32]) {
+    fn observe(&mut self, observation: &[f32]) -> Result<()> {
         let reaches = self.step.is_multiple_of(self.every);
         self.step += 1;
         if !reaches {
-            return;
+            return Ok(());
         }
         let action = self.labels.as_mut().map_or(Vec::new(), |labels| labels.step(observation, &mut |_, _| {}));
         // Where the f32 policy itself overflows, there is nothing to learn.
         if action.iter().all(|v| v.is_finite()) {
-            self.episodes.push(observation, &action);
+            self.episodes.push(observation, &action)?;
         } else {
             self.begin();
         }
+        Ok(())
     }
 
     fn save(&mut self) -> Result<()> {
-        let bytes = self.episodes.npz(self.crc)?;
+        let write = |file: &mut File| self.episodes.write_npz(self.crc, file);
         match &self.file {
-            Some(file) => files::write(file, &bytes)?,
+            Some(file) => files::write_with(file, write)?,
             None => {
-                let file = files::write_new(self.plan.path, |file| Ok(file.write_all(&bytes)?))?;
+                let file = files::write_new(self.plan.path, write)?;
                 if file != self.plan.path {
                     let (taken, file) = (self.plan.path.display(), file.display());
                     (self.note)(format!("{taken} is there already; recording into {file}"));
