@@ -30,6 +30,9 @@ pub struct TimeLimit {
     pub clock_hz: f64,
 }
 
+/// The share of a budget that is used at least, where more bits reduce the error and fit.
+pub const USED: f64 = 0.97;
+
 /// How many bits the weights may take: what every method works to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Rate {
@@ -37,6 +40,9 @@ pub enum Rate {
     Width(Width),
     /// The widths that keep the whole below this many bits per weight, everything counted.
     BitsPerWeight(f64),
+    /// The widths that keep all that a method decides on within this many bytes: the weights, everything counted, and
+    /// the vectors that it changes ([`crate::graph::Graph::changed_vectors`]).
+    Bytes(usize),
 }
 
 impl Rate {
@@ -45,6 +51,7 @@ impl Rate {
         match self {
             Self::Width(_) => f64::INFINITY,
             Self::BitsPerWeight(bits) => bits * weights as f64 / 8.0,
+            Self::Bytes(bytes) => bytes as f64,
         }
     }
 }
@@ -52,22 +59,46 @@ impl Rate {
 /// The error of a budget that not even the narrowest widths keep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BudgetTooSmall {
-    /// What the narrowest widths take.
+    /// The fewest bytes of what the budget is for.
     pub bytes: usize,
     /// What is allowed.
     pub limit: f64,
     /// Weights of the policy.
     pub weights: usize,
+    /// Whether the budget is for the whole image.
+    pub image: bool,
+}
+
+impl BudgetTooSmall {
+    /// Refuses a limit for the weights below the fewest bytes that they take.
+    pub fn check(bytes: usize, limit: f64, weights: usize) -> Result<(), Self> {
+        if bytes as f64 <= limit { Ok(()) } else { Err(Self { bytes, limit, weights, image: false }) }
+    }
+
+    /// The same for an image of at most `limit` bytes, which has `fixed` bytes beside those.
+    pub fn in_image(self, fixed: usize, limit: usize) -> Self {
+        Self { bytes: self.bytes + fixed, limit: limit as f64, image: true, ..self }
+    }
 }
 
 impl fmt::Display for BudgetTooSmall {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { bytes, limit, weights } = *self;
-        let bits = 8.0 * bytes as f64 / weights.max(1) as f64;
+        let Self { bytes, limit, weights, image } = *self;
+        if image {
+            return write!(
+                f,
+                "the budget is too small: the smallest image of this policy by this method takes {bytes} bytes, {limit} are \
+                 allowed; allow {bytes} bytes or more"
+            );
+        }
+        let bits = |bytes: f64| 8.0 * bytes / weights.max(1) as f64;
+        // Rounded up, so that the budget that is named can be kept.
+        let enough = (1000.0 * bits(bytes as f64)).ceil() / 1000.0;
         write!(
             f,
-            "the budget is too small: with scales and padding the least is {bytes} bytes ({bits:.3} bits a weight), \
-             {limit:.0} bytes are allowed"
+            "the budget is too small: with scales and padding the weights take at least {bytes} bytes, {limit:.0} are \
+             allowed ({:.3} bits a weight); allow {enough:.3} bits a weight or more",
+            bits(limit)
         )
     }
 }

@@ -6,4 +6,4 @@ pub mod unfinished;
 mod writer;
 
 pub use lower::{Program, lower};
-pub use writer::image;
+pub use writer::{bytes_beside_blocks, image};

@@ -14,6 +14,6 @@ pub mod scale;
 pub use crate::calibrate::allowance::Sampled;
 pub use learning::{Choice, Learning, Tried};
 pub use options::{Activations, Method, Options, Packing};
-pub use prepared::{PreparedMethod, quantize};
+pub use prepared::{PreparedMethod, least_bytes, quantize};
 pub use progress::Progress;
 pub use quantized::{Outcome, Quantized, QuantizedNetwork, RowAllocation};

@@ -3,6 +3,7 @@
 
 mod budgets;
 pub mod driven;
+mod flash;
 mod quantizer;
 mod search;
 pub mod stats;
@@ -10,7 +11,10 @@ pub mod sweep;
 mod time;
 mod tries;
 pub mod tune;
+mod unused;
 
 pub use budgets::quantize;
+pub use flash::check_budget;
 pub use quantizer::{QuantizedPolicy, Quantizer};
 pub use tries::{Search, Try};
+pub use unused::{Reason, Unused};

@@ -3,6 +3,7 @@
 mod accuracy;
 mod arrows;
 mod best;
+mod budgets;
 mod cli;
 mod compare;
 mod constants;

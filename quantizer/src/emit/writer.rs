@@ -28,73 +28,31 @@ const SELF_TEST_BYTES: usize = 64 << 10;
 /// leaves f32's range on the self-test's observations.
 pub fn image(policy: &Policy, matrices: &[Outcome]) -> Result<Vec<u8>> {
     let group = matrices.first().map_or(0, |m| m.quantized.group);
-    let program = lower(policy, group)?;
-    let mut writer = Writer { words: vec![0; h::WORDS], matrices: 0, finite: 0 };
-    let matrix_records = matrices.iter().map(|m| writer.matrix(m)).collect::<Result<Vec<_>>>()?;
-    writer.matrices = writer.push(matrix_records.into_iter().flatten());
-    writer.finite = writer.words.len();
-    let records = program.steps.iter().map(|step| writer.op(step)).collect::<Result<Vec<[u32; h::OP_WORDS]>>>()?;
-    let ops = writer.push(records.into_iter().flatten());
-    let contract = writer.words.len() as u32;
-    let mut flags = 0;
-    for (bit, (_, array)) in policy.contract.arrays().into_iter().enumerate() {
-        if let Some(array) = array {
-            flags |= 1 << bit;
-            writer.push_floats(array);
-        }
-    }
-    let playback = policy.contract.playback;
-    let horizon = playback.ensemble.map_or(0, |ensemble| ensemble.horizon);
-    if let Some(ensemble) = playback.ensemble {
-        writer.push_floats(&ensemble.weights());
-    }
-    let name = writer.push_bytes(policy.name.as_bytes());
-    // Where observations are long, fewer than those of a chunk and the next.
-    let room = SELF_TEST_BYTES / (4 * (policy.graph.obs_len + policy.act_len));
-    let steps = (policy.execute.max(horizon) + 2).min(room.max(1));
-    let observations = self_test_observations(&policy.graph, steps);
-    let self_test = writer.words.len() as u32;
-    for observation in &observations {
-        writer.push_floats(observation);
-        writer.push_floats(&vec![0.0; policy.act_len]);
-    }
-    let header = Header {
-        kind: policy.kind,
-        obs_len: policy.graph.obs_len,
-        act_len: policy.act_len,
-        chunk: policy.chunk,
-        execute: policy.execute,
-        horizon,
-        overlap: playback.overlap,
-        deadline: playback.deadline.unwrap_or(0),
-        rate_hz: policy.rate_hz,
-        scratch: program.words,
-        state: program.state,
-        observation: program.observation.offset,
-        output: program.output.offset,
-        action: program.action.offset,
-        work: program.work,
-        matrices: Records { offset: writer.matrices, count: matrices.len() },
-        ops: Records { offset: ops, count: program.steps.len() },
-        once: program.once,
-        denoising_steps: policy.graph.denoising.as_ref().map_or(0, |denoising| denoising.steps.len()),
-        contract,
-        contract_flags: flags,
-        name: Records { offset: name, count: policy.name.len() },
-        self_test: Records { offset: self_test, count: steps },
-        weights: policy.weights as u32,
-        digest: policy.digest,
-    };
-    let mut words = writer.words;
-    words[..h::WORDS].copy_from_slice(&header.emit()?);
+    let mut writer = Writer::new();
+    let records = matrices.iter().map(|m| writer.matrix(m)).collect::<Result<Vec<_>>>()?;
+    let Draft { mut words, self_test, observations } = writer.finish(policy, group, &records)?;
     let actions = self_test_actions(&sealed(&words)?, &observations)?;
     for (step, action) in actions.iter().enumerate() {
-        let at = self_test as usize + step * (policy.graph.obs_len + policy.act_len) + policy.graph.obs_len;
+        let at = self_test + step * (policy.graph.obs_len + policy.act_len) + policy.graph.obs_len;
         for (word, value) in words[at..].iter_mut().zip(action) {
             *word = value.to_bits();
         }
     }
     sealed(&words)
+}
+
+/// Bytes of an image of `policy` beside its matrices' blocks. Values of its matrices do not count.
+pub fn bytes_beside_blocks(policy: &Policy) -> Result<usize> {
+    let records = vec![[0; h::MATRIX_WORDS]; policy.graph.matrices.len()];
+    Ok(4 * Writer::new().finish(policy, 0, &records)?.words.len())
+}
+
+/// An image but for the actions of its self-test, length and checksum.
+struct Draft {
+    words: Vec<u32>,
+    /// Offset of the self-test vector.
+    self_test: usize,
+    observations: Vec<Vec<f32>>,
 }
 
 /// The image's bytes, with length and checksum.
@@ -137,6 +95,72 @@ struct Writer {
 }
 
 impl Writer {
+    /// An image with room for its header.
+    fn new() -> Self {
+        Self { words: vec![0; h::WORDS], matrices: 0, finite: 0 }
+    }
+
+    /// Appends all that follows the matrices' blocks; `matrices` are their records.
+    fn finish(mut self, policy: &Policy, group: usize, matrices: &[[u32; h::MATRIX_WORDS]]) -> Result<Draft> {
+        let program = lower(policy, group)?;
+        self.matrices = self.push(matrices.iter().flatten().copied());
+        self.finite = self.words.len();
+        let records = program.steps.iter().map(|step| self.op(step)).collect::<Result<Vec<[u32; h::OP_WORDS]>>>()?;
+        let ops = self.push(records.into_iter().flatten());
+        let contract = self.words.len() as u32;
+        let mut flags = 0;
+        for (bit, (_, array)) in policy.contract.arrays().into_iter().enumerate() {
+            if let Some(array) = array {
+                flags |= 1 << bit;
+                self.push_floats(array);
+            }
+        }
+        let playback = policy.contract.playback;
+        let horizon = playback.ensemble.map_or(0, |ensemble| ensemble.horizon);
+        if let Some(ensemble) = playback.ensemble {
+            self.push_floats(&ensemble.weights());
+        }
+        let name = self.push_bytes(policy.name.as_bytes());
+        // Where observations are long, fewer than those of a chunk and the next.
+        let room = SELF_TEST_BYTES / (4 * (policy.graph.obs_len + policy.act_len));
+        let steps = (policy.execute.max(horizon) + 2).min(room.max(1));
+        let observations = self_test_observations(&policy.graph, steps);
+        let self_test = self.words.len() as u32;
+        for observation in &observations {
+            self.push_floats(observation);
+            self.push_floats(&vec![0.0; policy.act_len]);
+        }
+        let header = Header {
+            kind: policy.kind,
+            obs_len: policy.graph.obs_len,
+            act_len: policy.act_len,
+            chunk: policy.chunk,
+            execute: policy.execute,
+            horizon,
+            overlap: playback.overlap,
+            deadline: playback.deadline.unwrap_or(0),
+            rate_hz: policy.rate_hz,
+            scratch: program.words,
+            state: program.state,
+            observation: program.observation.offset,
+            output: program.output.offset,
+            action: program.action.offset,
+            work: program.work,
+            matrices: Records { offset: self.matrices, count: matrices.len() },
+            ops: Records { offset: ops, count: program.steps.len() },
+            once: program.once,
+            denoising_steps: policy.graph.denoising.as_ref().map_or(0, |denoising| denoising.steps.len()),
+            contract,
+            contract_flags: flags,
+            name: Records { offset: name, count: policy.name.len() },
+            self_test: Records { offset: self_test, count: steps },
+            weights: policy.weights as u32,
+            digest: policy.digest,
+        };
+        self.words[..h::WORDS].copy_from_slice(&header.emit()?);
+        Ok(Draft { words: self.words, self_test: self_test as usize, observations })
+    }
+
     /// Appends words and gives their offset.
     fn push(&mut self, words: impl IntoIterator<Item = u32>) -> u32 {
         let offset = self.words.len() as u32;

@@ -15,6 +15,14 @@ pub struct Node {
     pub len: usize,
 }
 
+impl Node {
+    /// For each of its vectors, `true` if quantization changes it.
+    fn changed(&self, learns: bool) -> Vec<bool> {
+        let behind = |i: usize| self.kind.products().iter().any(|product| product.bias == i);
+        (0..self.kind.vectors().len()).map(|i| learns || behind(i)).collect()
+    }
+}
+
 /// A network.
 #[derive(Clone, Debug)]
 pub struct Graph {
@@ -74,6 +82,25 @@ impl Graph {
     /// observation are not trained and do not count.
     pub fn parameters(&self) -> usize {
         self.nodes.iter().map(|node| node.kind.trained_values()).sum::<usize>() + self.weights()
+    }
+
+    /// The vectors that quantization changes: those behind matrices, which take their constant errors, and where it
+    /// `learns` all.
+    pub fn changed_vectors(&mut self, learns: bool) -> impl Iterator<Item = &mut Vec<f32>> {
+        self.nodes.iter_mut().flat_map(move |node| {
+            let changed = node.changed(learns);
+            let vectors = node.kind.vectors_mut().into_iter().zip(changed);
+            vectors.filter(|(_, changed)| *changed).map(|(vector, _)| vector)
+        })
+    }
+
+    /// Values of [`Self::changed_vectors`].
+    pub fn changed_values(&self, learns: bool) -> usize {
+        let of_node = |node: &Node| -> usize {
+            let vectors = node.kind.vectors().into_iter().zip(node.changed(learns));
+            vectors.filter(|(_, changed)| *changed).map(|(vector, _)| vector.len()).sum()
+        };
+        self.nodes.iter().map(of_node).sum()
     }
 
     /// Elements of all weight matrices.

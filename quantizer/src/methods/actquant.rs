@@ -80,7 +80,7 @@ impl ActionStatistics {
 pub fn quantize(graph: &Graph, statistics: &ActionStatistics, rate: Rate, options: &Options) -> Result<Vec<Outcome>> {
     let widths = match rate {
         Rate::Width(width) => vec![width; graph.matrices.len()],
-        Rate::BitsPerWeight(_) => {
+        Rate::BitsPerWeight(_) | Rate::Bytes(_) => {
             let scores = statistics.effective_scores().0;
             allocation::allocate(graph, &scores, &statistics.choices, options.packing(), rate.bytes(graph.weights()))?
         }

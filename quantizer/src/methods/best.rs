@@ -13,9 +13,11 @@ pub mod feedback;
 mod latent;
 mod objective;
 pub mod schedule;
+pub mod size;
 
 use std::time::Duration;
 
+use actq_kernels::Width;
 use anyhow::{Result, ensure};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -34,7 +36,7 @@ use crate::data::Dataset;
 use crate::graph::{Graph, WeightMatrix};
 use activations::{allocated, choose_activations};
 use allocate::{Rows, energies, removals};
-use balance::{balance, balance_bytes};
+use balance::balance;
 use choose::{Chosen, choose, choosing};
 use compact::{Compacted, add_to_bias, compact};
 use dimension::{Dimension, dimensions};
@@ -42,6 +44,7 @@ use distill::{Learned, Task, distill};
 use feedback::feedback;
 use objective::Frames;
 use schedule::{Bounds, most_steps};
+use size::Size;
 
 /// Frames that learning needs at least.
 const LEAST_FRAMES: usize = 200;
@@ -125,10 +128,7 @@ pub fn quantize(
         ensure!(graph.matrices.iter().any(|m| m.name == *name), "no matrix is named {name:?}; there are {}", names());
     }
     let allowed = rate.bytes(graph.weights());
-    let forced = |matrix: &WeightMatrix| match rate {
-        Rate::Width(width) => Some(width),
-        Rate::BitsPerWeight(_) => options.forced.iter().find(|(name, _)| *name == matrix.name).map(|(_, width)| *width),
-    };
+    let forced = forced(graph, rate, options);
     let dimensions = dimensions(graph);
     let rows: Vec<Rows> = graph
         .matrices
@@ -138,10 +138,11 @@ pub fn quantize(
             let energy = energies(matrix, &inputs[m], &outputs[m]);
             let made = Dimension::made_by(&dimensions, m);
             let removal = made.map_or_else(|| energy.clone(), |d| removals(graph, d, centred, outputs));
-            Rows { energy, removal, forced: forced(matrix) }
+            Rows { energy, removal, forced: forced[m] }
         })
         .collect();
-    let (widths, learned_with) = allocated(graph, &dimensions, &rows, options, allowed)?;
+    let size = Size { graph, dimensions: &dimensions, packings: Vec::new(), values: values(graph, rate, options) };
+    let (widths, learned_with) = allocated(size.clone(), &rows, options, allowed)?;
     let input_moments: Vec<&Moments> = moments.iter().map(|(input, _)| input).collect();
     let compacted = compact(graph, &dimensions, &widths, &input_moments);
     let importance: Vec<Vec<f64>> = compacted
@@ -198,7 +199,7 @@ pub fn quantize(
     // int16 is packed in another layout, which may pad more; it is taken where it still fits.
     for (m, &limit) in wanted.iter().enumerate() {
         let other = outcome(&quantized[m], limit)?;
-        let total = balance_bytes(graph) + outcomes.iter().map(Outcome::bytes).sum::<usize>() - outcomes[m].bytes()
+        let total = size.beside(&widths) + outcomes.iter().map(Outcome::bytes).sum::<usize>() - outcomes[m].bytes()
             + other.bytes();
         if total as f64 <= allowed {
             outcomes[m] = other;
@@ -213,6 +214,31 @@ pub fn quantize(
     }
     let learning = Some(Learning { steps, choice, tried });
     Ok(QuantizedNetwork { graph: learned, outcomes, learning })
+}
+
+/// The width that is forced on every matrix, if one is.
+fn forced(graph: &Graph, rate: Rate, options: &Options) -> Vec<Option<Width>> {
+    let named = |matrix: &WeightMatrix| options.forced.iter().find(|(name, _)| *name == matrix.name).map(|(_, w)| *w);
+    let of_matrix = |matrix: &WeightMatrix| match rate {
+        Rate::Width(width) => Some(width),
+        Rate::BitsPerWeight(_) | Rate::Bytes(_) => named(matrix),
+    };
+    graph.matrices.iter().map(of_matrix).collect()
+}
+
+/// Values of the vectors that a rate counts.
+fn values(graph: &Graph, rate: Rate, options: &Options) -> usize {
+    match rate {
+        Rate::Bytes(_) => graph.changed_values(options.learns()),
+        Rate::Width(_) | Rate::BitsPerWeight(_) => 0,
+    }
+}
+
+/// The fewest bytes that a rate can be met with. A balance, which only the recording can ask for, does not count.
+pub(super) fn least_bytes(graph: &Graph, rate: Rate, options: &Options) -> usize {
+    let dimensions = dimensions(graph);
+    let size = Size { graph, dimensions: &dimensions, packings: Vec::new(), values: values(graph, rate, options) };
+    activations::least_bytes(&size, options, &forced(graph, rate, options))
 }
 
 /// Quantizes without learning: every matrix by two-sided error feedback with the moments of its input and of its

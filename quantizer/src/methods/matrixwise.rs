@@ -2,7 +2,8 @@
 //! greedily.
 
 use actq_kernels::Width;
-use anyhow::{Result, ensure};
+use actq_kernels::image::block_bytes;
+use anyhow::Result;
 
 use super::options::Options;
 use super::quantized::{Outcome, Quantized};
@@ -26,7 +27,7 @@ pub fn quantize(graph: &Graph, moments: Option<&[Moments]>, rate: Rate, options:
     let indexes = 0..graph.matrices.len();
     match rate {
         Rate::Width(width) => indexes.map(|m| one(m, width)).collect(),
-        Rate::BitsPerWeight(_) => {
+        Rate::BitsPerWeight(_) | Rate::Bytes(_) => {
             let tries: Vec<Vec<Outcome>> =
                 indexes.map(|m| Width::ALL.into_iter().map(|width| one(m, width)).collect()).collect::<Result<_>>()?;
             let chosen = allocate(&tries, rate.bytes(graph.weights()), graph.weights())?;
@@ -35,15 +36,24 @@ pub fn quantize(graph: &Graph, moments: Option<&[Moments]>, rate: Rate, options:
     }
 }
 
-/// One of each matrix's tries so that the bytes stay within `limit`: starting from the narrowest, always the change
+/// The fewest bytes that the matrices of `graph` take.
+pub(super) fn least_bytes(graph: &Graph, options: &Options) -> usize {
+    let packing = options.packing();
+    let at = |m: &WeightMatrix, width| block_bytes(packing.shape(width, m.rows, m.cols), false);
+    let least = |m: &WeightMatrix| Width::ALL.into_iter().map(|width| at(m, width)).min().unwrap_or(0);
+    graph.matrices.iter().map(least).sum()
+}
+
+/// One of each matrix's tries so that the bytes stay within `limit`: starting from the smallest, always the change
 /// that lowers the sum of relative errors most per byte and still fits. (A wider try can take fewer bytes, where it
 /// pads less.)
 fn allocate(tries: &[Vec<Outcome>], limit: f64, weights: usize) -> Result<Vec<usize>> {
     let size = |m: usize, choice: usize| tries[m][choice].bytes();
     let error = |m: usize, choice: usize| tries[m][choice].error.unwrap_or(0.0);
-    let mut chosen = vec![0; tries.len()];
-    let mut bytes: usize = (0..tries.len()).map(|m| size(m, 0)).sum();
-    ensure!(bytes as f64 <= limit, BudgetTooSmall { bytes, limit, weights });
+    let smallest = |m: usize| (0..tries[m].len()).min_by_key(|&choice| size(m, choice)).unwrap_or(0);
+    let mut chosen: Vec<usize> = (0..tries.len()).map(smallest).collect();
+    let mut bytes: usize = chosen.iter().enumerate().map(|(m, &choice)| size(m, choice)).sum();
+    BudgetTooSmall::check(bytes, limit, weights)?;
     loop {
         let mut best: Option<(f64, usize, usize, usize)> = None;
         for m in 0..tries.len() {

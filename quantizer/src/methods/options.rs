@@ -125,11 +125,16 @@ impl Options {
     /// Refuses groups that no kernel has, and a way to learn where nothing is learned.
     pub fn check(&self) -> Result<()> {
         ensure!(
-            !self.relative || self.method == Method::Best && self.steps != Some(0),
+            !self.relative || self.learns(),
             "--relative says how method best learns: leave it out with other methods and with --steps 0"
         );
         ensure!(is_group(self.group), "group is {}, it must be 0 or one of {GROUPS:?}", self.group);
         Ok(())
+    }
+
+    /// `true` if the method learns.
+    pub fn learns(&self) -> bool {
+        self.method == Method::Best && self.steps != Some(0)
     }
 
     /// How matrices are packed before any of them is found to need int16 activations.

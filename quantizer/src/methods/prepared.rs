@@ -176,6 +176,15 @@ impl<'a> PreparedMethod<'a> {
     }
 }
 
+/// The fewest bytes with which a method can meet a rate, from the shapes alone.
+pub fn least_bytes(graph: &Graph, rate: Rate, options: &Options) -> usize {
+    match options.method {
+        Method::Rtn | Method::Gptq => matrixwise::least_bytes(graph, options),
+        Method::ActQuant(choices) => actquant::allocation::least_bytes(graph, &choices, options.packing()),
+        Method::Best => best::least_bytes(graph, rate, options),
+    }
+}
+
 /// Quantizes a network once, by any method: see [`PreparedMethod::quantize`].
 pub fn quantize(
     graph: &Graph,

@@ -155,6 +155,19 @@ impl Outcome {
         self.allocation.as_ref().map_or(&self.quantized.widths, |allocation| &allocation.widths)
     }
 
+    /// Weights of the matrix as it was trained.
+    pub fn trained_weights(&self) -> usize {
+        let shape = self.allocation.as_ref().map(|allocation| (allocation.widths.len(), allocation.inputs.len()));
+        let (rows, cols) = shape.unwrap_or((self.quantized.rows, self.quantized.cols));
+        rows * cols
+    }
+
+    /// The error that is expected of each row as it was trained, or where only that is known of the whole matrix.
+    pub fn expected_errors(&self) -> Vec<f64> {
+        let of_matrix = || vec![self.error.unwrap_or(0.0); self.quantized.rows];
+        self.allocation.as_ref().map_or_else(of_matrix, |allocation| allocation.expected.clone())
+    }
+
     /// The lanes that the matrix is packed for.
     pub fn lanes(&self) -> Lanes {
         Lanes::of(self.x_max, self.quantized.group)

@@ -3,7 +3,7 @@
 use anyhow::Result;
 
 use super::quantizer::{QuantizedPolicy, Quantizer};
-use super::{search, time};
+use super::{flash, search, time};
 use crate::budget::{Budget, Rate};
 use crate::data::Recordings;
 use crate::methods::{Options, Progress};
@@ -17,6 +17,7 @@ pub fn quantize(
     options: &Options,
     mut progress: impl FnMut(&str, f64),
 ) -> Result<QuantizedPolicy> {
+    flash::check_budget(policy, options)?;
     let quantizer =
         Quantizer::new(policy, recordings, options.method, options.minutes, |share| progress("calibrating", share))?;
     quantizer.quantize(options, progress)
@@ -33,7 +34,7 @@ impl Quantizer<'_> {
         let rate = match options.budget {
             Budget::Width(width) => Rate::Width(width),
             Budget::BitsPerWeight(bits) => Rate::BitsPerWeight(bits),
-            Budget::ImageBytes(bytes) => self.within_image(bytes)?,
+            Budget::ImageBytes(bytes) => return flash::within(self, options, bytes, &mut shown(progress)),
             Budget::MaxNmse(limit) => return search::smallest(self, options, limit, &mut progress),
             Budget::Time(limit) => return time::most_bits(self, options, limit, &mut shown(progress)),
         };

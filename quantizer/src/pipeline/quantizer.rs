@@ -1,15 +1,13 @@
 //! A policy and a method made ready, and the images that they give.
 
-use actq_kernels::Width;
-use anyhow::{Result, ensure};
+use anyhow::Result;
 
 use super::tries::Search;
-use crate::budget::{Budget, Rate};
+use crate::budget::Rate;
 use crate::data::Recordings;
 use crate::emit;
 use crate::measure::time::StepTime;
-use crate::methods::best::balance::balance_bytes;
-use crate::methods::{self, Learning, Method, Options, Outcome, PreparedMethod, Progress, QuantizedNetwork};
+use crate::methods::{Learning, Method, Options, Outcome, PreparedMethod, Progress, QuantizedNetwork};
 use crate::policy::Policy;
 use crate::runtime::ImageBuffer;
 
@@ -70,19 +68,6 @@ impl<'a> Quantizer<'a> {
         let policy = Policy { graph, ..self.policy.clone() };
         let image = emit::image(&policy, &outcomes)?;
         Ok(QuantizedPolicy { policy, outcomes, image, rate, learning, search: None, time: None })
-    }
-
-    /// The rate that leaves room for everything else in an image of `bytes` bytes.
-    pub(super) fn within_image(&self, bytes: usize) -> Result<Rate> {
-        let rate = Rate::Width(Width::W2);
-        let options = Options::new(Method::Rtn, Budget::Width(Width::W2));
-        // What best balances has operations more than the policy; their constants count as weights.
-        let policy = Policy { graph: self.method.graph().clone(), ..self.policy.clone() };
-        let (_, plain) = methods::quantize(&policy.graph, None, rate, &options)?;
-        let weights = plain.iter().map(Outcome::bytes).sum::<usize>() + balance_bytes(&policy.graph);
-        let rest = emit::image(&policy, &plain)?.len() - weights;
-        ensure!(bytes > rest, "{bytes} bytes are allowed, but all but the weights already takes {rest}");
-        Ok(Rate::BitsPerWeight(8.0 * (bytes - rest) as f64 / self.policy.graph.weights().max(1) as f64))
     }
 }
 

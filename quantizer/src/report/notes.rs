@@ -2,9 +2,12 @@
 
 use std::fmt;
 
+use crate::budget::Budget;
 use crate::data::{Dataset, Range, Recordings, runs};
 use crate::measure::check::{Check, Checked};
 use crate::measure::eval::{ActivationShare, ErrorReport};
+use crate::methods::Options;
+use crate::pipeline::{QuantizedPolicy, Reason, Unused};
 use crate::policy::Policy;
 
 /// Held-out errors beyond this multiple of the calibration error, and this much above it, are worth a warning.
@@ -89,6 +92,22 @@ pub fn error_warning(check: &Check) -> Option<String> {
              more bits (--bpw, --flash), record more steps for --calib, or try --activations int16"
         )
     })
+}
+
+/// A note where an image uses much less than its budget of bits or bytes: why, and what to do.
+pub fn unused_budget(found: &QuantizedPolicy, options: &Options) -> Option<String> {
+    let Unused { used, allowed, reason } = Unused::of(found, options)?;
+    let unit = if matches!(options.budget, Budget::ImageBytes(_)) { "bytes" } else { "bits per weight" };
+    let why = match reason {
+        Reason::Widest => "every row has the most bits that it may have; a smaller budget gives the same image",
+        Reason::NoError => {
+            "more bits do not reduce the error, as the other rows have no part in the recorded actions; pass a smaller budget, \
+             or record more varied episodes"
+        }
+        Reason::Step => "the next rows with more bits take more than is left; pass a larger budget to get them",
+    };
+    let rounded = |value: f64| (1000.0 * value).round() / 1000.0;
+    Some(format!("the image uses {} of {} {unit}: {why}", rounded(used), rounded(allowed)))
 }
 
 /// All warnings about the recordings themselves, before anything is quantized.

@@ -114,6 +114,43 @@ fn a_budget_that_is_too_small_names_the_least() -> Result<()> {
 }
 
 #[test]
+fn an_impossible_budget_is_refused_before_recordings_are_read() -> Result<()> {
+    let fixture = Fixture::new()?;
+    fs::write(fixture.policy().join("calib.npz"), "not a recording")?;
+    let out = fixture.out("small.actq");
+    for (options, words) in [
+        ("--flash 600 --method best", "the smallest image of this policy by this method takes"),
+        ("--flash 600", "600 are allowed; allow"),
+        ("--bpw 0.01 --method best", "bits a weight or more"),
+    ] {
+        failed(&fixture.quantize(&out, options)?, 1, &["the budget is too small", words])?;
+    }
+    failed(&fixture.quantize(&out, "--flash 1M")?, 1, &["calib.npz"])?;
+    ensure!(!out.exists(), "an image was written");
+    Ok(())
+}
+
+#[test]
+fn an_unused_budget_is_explained() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let first_note = |options: &str| -> Result<String> {
+        let notes = notes(&fixture.quantize(&fixture.out("image.actq"), options)?)?;
+        Ok(notes.into_iter().next().unwrap_or_default())
+    };
+    let bytes = fs::metadata(fixture.image("--bits 8")?)?.len();
+    assert_eq!(
+        first_note("--flash 1M")?,
+        format!(
+            "note: the image uses {bytes} of 1048576 bytes: every row has the most bits that it may have; a smaller budget \
+             gives the same image"
+        )
+    );
+    let step = first_note("--bpw 7")?;
+    ensure!(step.contains(" of 7 bits per weight: the next rows with more bits take more than is left"), "{step}");
+    Ok(())
+}
+
+#[test]
 fn the_default_method_follows_from_what_is_there() -> Result<()> {
     let fixture = Fixture::new()?;
     let out = fixture.out("default.actq");

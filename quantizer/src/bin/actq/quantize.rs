@@ -8,8 +8,8 @@ use actq::data::{Learned, Recording, Recordings, Sizes, driven_by, files_of};
 use actq::import::is_onnx;
 use actq::measure::{check, own};
 use actq::methods::{Activations, Method, Options};
-use actq::pipeline::Quantizer;
 use actq::pipeline::stats::Stats;
+use actq::pipeline::{Quantizer, check_budget};
 use actq::policy::Policy;
 use actq::report::learned::learned;
 use actq::report::{notes, quantized, time};
@@ -29,18 +29,20 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
     let outputs = reserve(&outputs, &inputs)?;
     let progress = Progress::new(args.run.quiet, "reading")?;
     let source = Policy::load(&args.policy_dir)?;
-    let (calib, shares) = Learned::load(&source, &calib)?.map(|l| (l.dataset, l.shares)).unzip();
-    let shares = shares.unwrap_or_default();
+    let has_calib = !calib.is_empty() || Recording::Calib.find(&args.policy_dir)?.is_some();
     let rtn = matches!(args.method, Some(MethodArg::Rtn));
-    if is_onnx(&args.policy_dir) && calib.is_none() && !rtn {
+    if is_onnx(&args.policy_dir) && !has_calib && !rtn {
         bail!("{}: {}", args.policy_dir.display(), notes::how_to_record(&source));
     }
+    let options = options(args, has_calib)?;
+    options.check()?;
+    check_budget(&source, &options)?;
+    let (calib, shares) = Learned::load(&source, &calib)?.map(|l| (l.dataset, l.shares)).unzip();
+    let shares = shares.unwrap_or_default();
     let heldout = Recording::Heldout.load(Some(&args.policy_dir), None, Sizes::of(&source))?;
     let recordings = Recordings { calib, heldout };
     note(notes::of_recordings(&recordings));
     note(notes::without_limits((0..source.act_len).map(|i| source.contract.limits(i))));
-    let options = options(args, &recordings)?;
-    options.check()?;
     let started = Instant::now();
     start_threads(args.run.threads)?;
     progress.begin("calibrating");
@@ -75,6 +77,7 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
         f32_bytes as f64 / 2.0 / bytes as f64,
         started.elapsed().as_secs_f64(),
     ))?;
+    note(notes::unused_budget(&found, &options));
     let buffer = found.buffer();
     let image = buffer.image(&args.out)?;
     match check::check(&source, image, &recordings) {
@@ -95,11 +98,11 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
     Ok(())
 }
 
-/// What the command line asks for, as far as it says.
-fn options(args: &QuantizeArgs, recordings: &Recordings) -> Result<Options> {
+/// What the command line asks for, as far as it says; the method also depends on whether there is a recording.
+fn options(args: &QuantizeArgs, has_calib: bool) -> Result<Options> {
     let method = match args.method {
         Some(method) => method.into(),
-        None if recordings.calib.is_none() => Method::Rtn,
+        None if !has_calib => Method::Rtn,
         None => Method::Best,
     };
     let method = args.actquant.of(&[method])?[0];

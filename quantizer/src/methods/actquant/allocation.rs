@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use actq_kernels::image::block_bytes;
 use actq_kernels::layout::Width;
-use anyhow::{Result, ensure};
+use anyhow::Result;
 
 use super::choices::{Choices, NoiseBits};
 use crate::budget::BudgetTooSmall;
@@ -50,6 +50,22 @@ fn heads(graph: &Graph) -> Vec<bool> {
     heads
 }
 
+/// The widths that every matrix may get, by their numbers in [`Width::ALL`].
+fn allowed(graph: &Graph, choices: &Choices) -> Vec<Range<usize>> {
+    let up_to = |width: Width| Width::ALL.iter().position(|w| *w == width).map_or(0, |choice| choice + 1);
+    let of_matrix = |head: bool| match choices.head {
+        Some(width) if head => up_to(width) - 1..up_to(width),
+        _ => 0..up_to(choices.widest),
+    };
+    heads(graph).into_iter().map(of_matrix).collect()
+}
+
+/// The fewest bytes that the matrices of `graph` take: those of the narrowest widths.
+pub fn least_bytes(graph: &Graph, choices: &Choices, packing: Packing) -> usize {
+    let allowed = allowed(graph, choices);
+    graph.matrices.iter().zip(allowed).map(|(m, allowed)| bytes(m, Width::ALL[allowed.start], packing)).sum()
+}
+
 /// A width per matrix within `limit` bytes: see [`spend`].
 ///
 /// # Errors
@@ -61,15 +77,7 @@ pub fn allocate(graph: &Graph, scores: &[f64], choices: &Choices, packing: Packi
         NoiseBits::Codes => f64::from(Width::ALL[choice].bits()),
         NoiseBits::Format => 8.0 * size(m, choice) as f64 / graph.matrices[m].data.len() as f64,
     };
-    let up_to = |width: Width| Width::ALL.iter().position(|w| *w == width).map_or(0, |choice| choice + 1);
-    let allowed: Vec<Range<usize>> = heads(graph)
-        .into_iter()
-        .map(|head| match choices.head {
-            Some(width) if head => up_to(width) - 1..up_to(width),
-            _ => 0..up_to(choices.widest),
-        })
-        .collect();
-    let chosen = spend(graph, scores, &allowed, bits, size, limit)?;
+    let chosen = spend(graph, scores, &allowed(graph, choices), bits, size, limit)?;
     Ok(chosen.into_iter().map(|choice| Width::ALL[choice]).collect())
 }
 
@@ -94,7 +102,7 @@ pub fn spend(
     let layers = layers(graph);
     let mut chosen: Vec<usize> = allowed.iter().map(|choices| choices.start).collect();
     let mut used: usize = chosen.iter().enumerate().map(|(m, &choice)| size(m, choice)).sum();
-    ensure!(used as f64 <= limit, BudgetTooSmall { bytes: used, limit, weights: graph.weights() });
+    BudgetTooSmall::check(used, limit, graph.weights())?;
     loop {
         let layer_error = |layer: usize| -> f64 {
             (0..chosen.len()).filter(|&m| layers[m] == layer).map(|m| noise(scores[m], bits(m, chosen[m]))).sum()

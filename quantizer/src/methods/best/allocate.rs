@@ -7,14 +7,12 @@
 //! columns carried is its error, and their bits count as its saving.
 
 use actq_kernels::Width;
-use actq_kernels::image::block_bytes;
-use anyhow::{Result, ensure};
+use anyhow::Result;
 
-use super::balance::balance_bytes;
 use super::dimension::{Dimension, Widths};
-use crate::budget::BudgetTooSmall;
+use super::size::Size;
+use crate::budget::{BudgetTooSmall, USED};
 use crate::graph::{Graph, WeightMatrix};
-use crate::methods::options::Packing;
 
 /// Expected squared error of a row in units of its own energy: that of the mid-rise grid with error feedback. At 8 bits
 /// more than rounding costs (0.00005), so that 8 bits go only where 4 are far from enough: learning mends the
@@ -75,54 +73,49 @@ pub fn removals(graph: &Graph, dimension: &Dimension, h: &[Vec<f64>], g: &[Vec<f
     removals
 }
 
-/// Bytes of the balance, and of all matrices with these widths: rows without bits and the columns that compaction
-/// removes are gone, everything else is counted. Of the packings that a matrix may get, the largest counts.
-pub fn bytes(graph: &Graph, dimensions: &[Dimension], widths: &Widths, packings: &[Vec<Packing>]) -> usize {
-    let of_matrix = |(m, packings): (usize, &Vec<Packing>)| -> usize {
-        packings.iter().map(|&packing| matrix_bytes(graph, dimensions, widths, m, packing)).max().unwrap_or(0)
+/// Chooses the widths so that [`Size::bytes`] stays within `limit`.
+///
+/// # Errors
+///
+/// [`BudgetTooSmall`] if [`Size::smallest`] takes more.
+pub fn allocate(size: &Size<'_>, rows: &[Rows], limit: f64) -> Result<Widths> {
+    let (mut widths, multiplier) = match lowest_multiplier(size, rows, limit) {
+        Some(multiplier) => (choose(size, rows, multiplier), multiplier),
+        None => (smallest(size, rows, limit)?, 0.0),
     };
-    balance_bytes(graph) + packings.iter().enumerate().map(of_matrix).sum::<usize>()
+    fill(&mut widths, size, rows, limit, WORTH * multiplier);
+    if (size.bytes(&widths) as f64) < USED * limit {
+        fill(&mut widths, size, rows, limit, 0.0);
+    }
+    Ok(widths)
 }
 
-/// Bytes of a matrix. Rows of a `dimension` are sorted by width, others have steps where widths are mixed.
-pub fn matrix_bytes(graph: &Graph, dimensions: &[Dimension], widths: &Widths, m: usize, packing: Packing) -> usize {
-    let kept_cols = Dimension::feeding(dimensions, m).map_or(graph.matrices[m].cols, |d| d.kept(widths).max(1));
-    let sorted = Dimension::made_by(dimensions, m).is_some();
-    let used: Vec<(Width, usize)> = Width::ALL
-        .into_iter()
-        .map(|w| (w, widths[m].iter().filter(|b| **b == Some(w)).count()))
-        .filter(|(_, n)| *n > 0)
-        .collect();
-    let all_rows = used.iter().map(|(_, n)| n).sum::<usize>() == widths[m].len();
-    let one_width = used.len() == 1 && all_rows;
-    let stepped = !(sorted || one_width);
-    used.iter().map(|&(width, rows)| block_bytes(packing.shape(width, rows, kept_cols), stepped)).sum()
-}
-
-/// Chooses the widths so that [`bytes`] stays within `limit`.
-pub fn allocate(
-    graph: &Graph,
-    dimensions: &[Dimension],
-    rows: &[Rows],
-    packings: &[Vec<Packing>],
-    limit: f64,
-) -> Result<Widths> {
-    let at = |multiplier: f64| choose(graph, dimensions, rows, multiplier);
-    // Multipliers in units of error per bit; the range covers everything from 8 bits to none for any scale of energies.
+/// The lowest multiplier, in units of error per bit, whose widths fit. `None` where not even the highest has any: it
+/// keeps the rows that matter most, and others may take fewer bytes.
+fn lowest_multiplier(size: &Size<'_>, rows: &[Rows], limit: f64) -> Option<f64> {
+    let fits = |multiplier: f64| size.bytes(&choose(size, rows, multiplier)) as f64 <= limit;
+    // The range covers everything from 8 bits to none for any scale of energies.
     let largest = rows.iter().flat_map(|r| &r.energy).fold(1e-300f64, |m, e| m.max(*e));
     let (mut low, mut high) = ((largest * 1e-18).ln(), (largest * 10.0).ln());
-    let least = bytes(graph, dimensions, &at(high.exp()), packings);
-    ensure!(least as f64 <= limit, BudgetTooSmall { bytes: least, limit, weights: graph.weights() });
+    if !fits(high.exp()) {
+        return None;
+    }
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
-        if bytes(graph, dimensions, &at(middle.exp()), packings) as f64 <= limit {
+        if fits(middle.exp()) {
             high = middle;
         } else {
             low = middle;
         }
     }
-    let mut widths = at(high.exp());
-    fill(&mut widths, graph, dimensions, rows, packings, limit, WORTH * high.exp());
+    Some(high.exp())
+}
+
+/// The widths that take the fewest bytes, if they fit.
+fn smallest(size: &Size<'_>, rows: &[Rows], limit: f64) -> Result<Widths> {
+    let forced: Vec<Option<Width>> = rows.iter().map(|rows| rows.forced).collect();
+    let widths = size.smallest(&forced);
+    BudgetTooSmall::check(size.bytes(&widths), limit, size.graph.weights())?;
     Ok(widths)
 }
 
@@ -130,21 +123,13 @@ pub fn allocate(
 /// which no multiplier sees: again and again the rows whose errors fall most for the bytes that they take, of one
 /// matrix, one width and at most so many as a block is padded to. Rows that gain less than `least` for a bit stay as
 /// they are: what has no part in the actions shall not take time.
-fn fill(
-    widths: &mut Widths,
-    graph: &Graph,
-    dimensions: &[Dimension],
-    rows: &[Rows],
-    packings: &[Vec<Packing>],
-    limit: f64,
-    least: f64,
-) {
-    let mut taken = bytes(graph, dimensions, widths, packings);
+fn fill(widths: &mut Widths, size: &Size<'_>, rows: &[Rows], limit: f64, least: f64) {
+    let mut taken = size.bytes(widths);
     loop {
         let mut best: Option<(f64, Widths, usize)> = None;
         let free = (0..rows.len()).filter(|&m| rows[m].forced.is_none());
         for (m, (from, to)) in free.flat_map(|m| widenings().map(move |widening| (m, widening))) {
-            let bits = RowBits::new(graph, dimensions, widths, m);
+            let bits = RowBits::new(size, widths, m);
             let gain = |r: &usize| rows[m].expected(*r, from) - rows[m].expected(*r, to);
             let gained_at_least = least * (bits.at(to) - bits.at(from));
             let is_worth = |r: &usize| widths[m][*r] == from && gain(r) > gained_at_least;
@@ -155,9 +140,9 @@ fn fill(
             for &r in candidates.iter().take(MOST_AT_ONCE) {
                 wider[m][r] = to;
                 gained += gain(&r);
-                let takes = bytes(graph, dimensions, &wider, packings);
+                let takes = size.bytes(&wider);
                 let worth = gained / takes.saturating_sub(taken).max(1) as f64;
-                let reached = Dimension::made_by(dimensions, m).is_some() || are_within_steps(&wider[m]);
+                let reached = Dimension::made_by(size.dimensions, m).is_some() || are_within_steps(&wider[m]);
                 if takes as f64 <= limit && reached && best.as_ref().is_none_or(|(best, ..)| worth > *best) {
                     best = Some((worth, wider.clone(), takes));
                 }
@@ -182,19 +167,24 @@ fn are_within_steps(widths: &[Option<Width>]) -> bool {
 /// What a row of a matrix takes beside the others, without padding.
 struct RowBits {
     cols: f64,
-    /// Scale, and step where there is one.
+    /// Scale, step where there is one, and bias where one goes with the row and counts.
     overhead: f64,
     /// What the column saves that a removed row takes along: one bit per bit of each row that it crosses.
     saving: f64,
 }
 
 impl RowBits {
-    fn new(graph: &Graph, dimensions: &[Dimension], widths: &Widths, m: usize) -> Self {
+    fn new(size: &Size<'_>, widths: &Widths, m: usize) -> Self {
+        let Size { graph, dimensions, values, .. } = *size;
         let bits_of = |m: usize| -> f64 { widths[m].iter().flatten().map(|w| f64::from(w.bits())).sum() };
         let made = Dimension::made_by(dimensions, m);
         Self {
             cols: Dimension::feeding(dimensions, m).map_or(graph.matrices[m].cols, |d| d.kept(widths)) as f64,
-            overhead: if made.is_some() { 16.0 } else { 24.0 },
+            overhead: match made {
+                Some(_) if values > 0 => 48.0,
+                Some(_) => 16.0,
+                None => 24.0,
+            },
             saving: made.map_or(0.0, |d| d.consumers.iter().map(|&c| bits_of(c)).sum()),
         }
     }
@@ -206,12 +196,13 @@ impl RowBits {
 
 /// The widths that minimise error plus `multiplier` times bits. What a removed row saves elsewhere depends on the other
 /// rows' widths, so the choice is repeated until it settles.
-fn choose(graph: &Graph, dimensions: &[Dimension], rows: &[Rows], multiplier: f64) -> Widths {
+fn choose(size: &Size<'_>, rows: &[Rows], multiplier: f64) -> Widths {
+    let Size { graph, dimensions, .. } = size;
     let mut widths: Widths = graph.matrices.iter().map(|m| vec![Some(Width::W2); m.rows]).collect();
     for _ in 0..4 {
         let next: Widths = (0..graph.matrices.len())
             .map(|m| {
-                let bits = RowBits::new(graph, dimensions, &widths, m);
+                let bits = RowBits::new(size, &widths, m);
                 let cost = |r: usize, width: Option<Width>| rows[m].expected(r, width) + multiplier * bits.at(width);
                 let best = |r: usize| {
                     let order = |a: &&Option<Width>, b: &&Option<Width>| cost(r, **a).total_cmp(&cost(r, **b));
@@ -263,6 +254,7 @@ fn out_of_reach(widths: &[Option<Width>], width: Width) -> Option<(usize, Option
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::methods::options::Packing;
     use crate::random::Random;
 
     #[test]
@@ -279,15 +271,16 @@ mod tests {
         };
         let rows: Vec<Rows> = graph.matrices.iter().map(rows).collect();
         let packings = vec![vec![Packing::of(127, 0), Packing::of(32767, 0)]; 2];
+        let size = Size { graph: &graph, dimensions: &[], packings, values: 0 };
         for limit in (1000..4000).step_by(97).map(f64::from) {
-            let widths = allocate(&graph, &[], &rows, &packings, limit).expect("it fits");
-            let taken = bytes(&graph, &[], &widths, &packings);
+            let widths = allocate(&size, &rows, limit).expect("it fits");
+            let taken = size.bytes(&widths);
             assert!(taken as f64 <= limit);
             for (m, r) in (0..2).flat_map(|m| (0..widths[m].len()).map(move |r| (m, r))) {
                 for to in CHOICES.into_iter().filter(|to| *to > widths[m][r]) {
                     let mut wider = widths.clone();
                     wider[m][r] = to;
-                    let takes = bytes(&graph, &[], &wider, &packings);
+                    let takes = size.bytes(&wider);
                     assert!(
                         takes as f64 > limit,
                         "{limit}: row {r} of {m} to {to:?} takes {takes} bytes, {taken} before"
@@ -295,6 +288,21 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn the_smallest_widths_fit_and_a_byte_less_is_refused() {
+        let mut graph = Graph::new(8);
+        graph.matrices = vec![WeightMatrix { name: "m".into(), rows: 300, cols: 8, data: vec![0.0; 2400] }];
+        let packings = vec![vec![Packing::of(127, 0)]];
+        let size = Size { graph: &graph, dimensions: &[], packings, values: 0 };
+        // The row that matters is beyond the reach of a step.
+        let energy: Vec<f64> = (0..300).map(|r| if r == 299 { 1.0 } else { 1e-9 }).collect();
+        let rows = [Rows { removal: energy.clone(), energy, forced: None }];
+        let least = size.bytes(&size.smallest(&[None]));
+        assert!(allocate(&size, &rows, least as f64).is_ok());
+        let error = allocate(&size, &rows, least as f64 - 1.0).expect_err("too small");
+        assert_eq!(error.downcast_ref::<BudgetTooSmall>().map(|small| small.bytes), Some(least));
     }
 
     #[test]

@@ -1,0 +1,142 @@
+//! Bytes as a function of the rows' widths: what an allocation has to keep within its limit, and the least of it.
+
+use actq_kernels::Width;
+use actq_kernels::image::block_bytes;
+
+use super::balance::balance_bytes;
+use super::dimension::{Dimension, Widths};
+use crate::graph::Graph;
+use crate::methods::options::Packing;
+
+/// What the bytes of a network follow from, beside its rows' widths.
+#[derive(Clone, Debug)]
+pub struct Size<'a> {
+    /// The network.
+    pub graph: &'a Graph,
+    /// Its hidden vectors that may be pruned.
+    pub dimensions: &'a [Dimension],
+    /// The layouts that room is kept for, of every matrix.
+    pub packings: Vec<Vec<Packing>>,
+    /// Values of the vectors that count, with all rows.
+    pub values: usize,
+}
+
+impl Size<'_> {
+    /// Bytes of all that counts: the balance, the vectors, and all matrices. Rows without bits and the columns that
+    /// compaction removes are gone. Of the layouts that a matrix may get, the largest counts.
+    pub fn bytes(&self, widths: &Widths) -> usize {
+        let of_matrix = |m: usize| -> usize {
+            self.packings[m].iter().map(|&packing| self.matrix(widths, m, packing)).max().unwrap_or(0)
+        };
+        self.beside(widths) + (0..self.packings.len()).map(of_matrix).sum::<usize>()
+    }
+
+    /// Those of the balance and the vectors.
+    pub fn beside(&self, widths: &Widths) -> usize {
+        let removed: usize = self.dimensions.iter().map(|d| widths[d.maker].len() - d.kept(widths)).sum();
+        balance_bytes(self.graph) + 4 * self.values.saturating_sub(removed)
+    }
+
+    /// Bytes of a matrix in one layout. Rows of a dimension are sorted by width; others have steps where their order is
+    /// not that of the blocks.
+    pub fn matrix(&self, widths: &Widths, m: usize, packing: Packing) -> usize {
+        let fed = Dimension::feeding(self.dimensions, m);
+        let cols = fed.map_or(self.graph.matrices[m].cols, |d| d.kept(widths).max(1));
+        let sorted = Dimension::made_by(self.dimensions, m).is_some() || are_in_order(&widths[m]);
+        let rows_of = |width: Width| widths[m].iter().filter(|w| **w == Some(width)).count();
+        let used = Width::ALL.into_iter().map(|width| (width, rows_of(width))).filter(|(_, rows)| *rows > 0);
+        used.map(|(width, rows)| block_bytes(packing.shape(width, rows, cols), !sorted)).sum()
+    }
+
+    /// The widths that take the fewest bytes: every matrix keeps one row, since without any it would cut the actions off
+    /// from the observations; those that are `forced` keep all.
+    pub fn smallest(&self, forced: &[Option<Width>]) -> Widths {
+        let one_row = |rows: usize, width: Width| {
+            let mut widths = vec![None; rows];
+            widths[..1.min(rows)].fill(Some(width));
+            widths
+        };
+        let all = self.graph.matrices.iter().zip(forced);
+        let mut widths: Widths = all
+            .map(|(m, forced)| forced.map_or(one_row(m.rows, Width::W2), |width| vec![Some(width); m.rows]))
+            .collect();
+        // A wider row can take fewer bytes, where it pads less.
+        for m in (0..forced.len()).filter(|&m| forced[m].is_none()) {
+            let tries = Width::ALL.map(|width| {
+                widths[m] = one_row(widths[m].len(), width);
+                (self.bytes(&widths), width)
+            });
+            let least = tries.into_iter().min_by_key(|(bytes, _)| *bytes);
+            widths[m] = one_row(widths[m].len(), least.map_or(Width::W2, |(_, width)| width));
+        }
+        widths
+    }
+}
+
+/// Whether blocks, narrow to wide, hold the rows in their own order; those without bits come last.
+fn are_in_order(widths: &[Option<Width>]) -> bool {
+    widths.is_sorted_by_key(|width| (width.is_none(), *width))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::graph::WeightMatrix;
+    use crate::methods::best::dimension::{dimensions, testing::graph};
+    use crate::methods::quantized::{Outcome, Quantized};
+    use crate::random::Random;
+    use half::bf16;
+
+    /// A matrix of the packer's, without codes.
+    fn outcome(matrix: &WeightMatrix, widths: &[Option<Width>], x_max: u16) -> Outcome {
+        let (rows, cols) = (matrix.rows, matrix.cols);
+        let (codes, scales) = (Vec::new(), vec![bf16::ONE; rows]);
+        let quantized =
+            Quantized { rows, cols, group: 0, widths: widths.to_vec(), scales, group_scales: Vec::new(), codes };
+        Outcome { quantized, error: None, x_max, allocation: None }
+    }
+
+    #[test]
+    fn a_matrix_takes_what_the_packer_writes() {
+        let mut random = Random::new(4);
+        let mut graph = Graph::new(19);
+        graph.matrices = vec![WeightMatrix { name: "m".into(), rows: 23, cols: 19, data: Vec::new() }];
+        for x_max in [127, 32767] {
+            let packing = Packing::of(x_max, 0);
+            let size = Size { graph: &graph, dimensions: &[], packings: vec![vec![packing]], values: 0 };
+            for _ in 0..200 {
+                let choices = [None, Some(Width::W2), Some(Width::W3), Some(Width::W4), Some(Width::W8)];
+                let of = 1 + random.below(5);
+                let mut widths: Vec<Option<Width>> = (0..23).map(|_| choices[random.below(of)]).collect();
+                if random.below(2) == 0 {
+                    widths.sort_by_key(|width| (width.is_none(), *width));
+                }
+                let found = outcome(&graph.matrices[0], &widths, x_max).bytes();
+                assert_eq!(size.bytes(&vec![widths.clone()]), found, "{widths:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_is_smaller_than_the_smallest_widths() {
+        let graph = graph();
+        let dimensions = dimensions(&graph);
+        let packings = vec![vec![Packing::of(127, 0)]; 3];
+        let size = Size { graph: &graph, dimensions: &dimensions, packings, values: 13 };
+        let least = size.bytes(&size.smallest(&[None; 3]));
+        let mut random = Random::new(5);
+        for _ in 0..500 {
+            let draw = |rows: usize, random: &mut Random| -> Vec<Option<Width>> {
+                let kept = random.below(rows);
+                let width = |r: usize, random: &mut Random| {
+                    (r == kept || random.below(4) == 0).then(|| Width::ALL[random.below(4)])
+                };
+                (0..rows).map(|r| width(r, random)).collect()
+            };
+            let widths: Widths = graph.matrices.iter().map(|m| draw(m.rows, &mut random)).collect();
+            assert!(size.bytes(&widths) >= least, "{widths:?}");
+        }
+        let forced = size.smallest(&[None, Some(Width::W4), None]);
+        assert_eq!((forced[1].clone(), forced[0].iter().flatten().count()), (vec![Some(Width::W4); 4], 1));
+    }
+}

@@ -1,0 +1,70 @@
+//! Budgets that an image does not use up.
+
+use actq_kernels::Width;
+
+use super::quantizer::QuantizedPolicy;
+use crate::budget::{Budget, USED};
+use crate::methods::best::balance::balance_bytes;
+use crate::methods::{Method, Options, Outcome};
+
+/// Rows of which a smaller error is expected have no part in the actions.
+const NONE: f64 = 1e-12;
+
+/// A budget of which a good part is left.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unused {
+    /// Bytes of the image, or bits per weight.
+    pub used: f64,
+    /// Those that are allowed.
+    pub allowed: f64,
+    /// Why the rest is not used.
+    pub reason: Reason,
+}
+
+/// Why the rest of a budget is not used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reason {
+    /// Every row has the most bits that it may have.
+    Widest,
+    /// More bits do not reduce the error: the other rows have no part in the actions.
+    NoError,
+    /// The next rows or matrices with more bits take more than is left.
+    Step,
+}
+
+impl Unused {
+    /// Of an image that was made with `options`; `None` where the budget is used or is none of bits or bytes.
+    pub fn of(found: &QuantizedPolicy, options: &Options) -> Option<Self> {
+        let (used, allowed) = match options.budget {
+            Budget::ImageBytes(bytes) => (found.image.len() as f64, bytes as f64),
+            Budget::BitsPerWeight(bits) => (bits_per_weight(found), bits),
+            Budget::Width(_) | Budget::MaxNmse(_) | Budget::Time(_) => return None,
+        };
+        (used < USED * allowed).then(|| Self { used, allowed, reason: reason(found, options) })
+    }
+}
+
+/// Bits per weight as the budget counts them.
+fn bits_per_weight(found: &QuantizedPolicy) -> f64 {
+    let bytes: usize = found.outcomes.iter().map(Outcome::bytes).sum();
+    let weights: usize = found.outcomes.iter().map(Outcome::trained_weights).sum();
+    8.0 * (bytes + balance_bytes(&found.policy.graph)) as f64 / weights.max(1) as f64
+}
+
+fn reason(found: &QuantizedPolicy, options: &Options) -> Reason {
+    let widest = match options.method {
+        Method::ActQuant(choices) => choices.widest,
+        _ => Width::W8,
+    };
+    let is_free = |m: usize| options.forced.iter().all(|(name, _)| *name != found.policy.graph.matrices[m].name);
+    let free = found.outcomes.iter().enumerate().filter(|(m, _)| is_free(*m)).map(|(_, outcome)| outcome);
+    let narrow = free.flat_map(|outcome| {
+        let rows = outcome.trained_widths().iter().zip(outcome.expected_errors());
+        rows.filter(|(width, _)| **width < Some(widest)).map(|(_, error)| error)
+    });
+    match narrow.reduce(f64::max) {
+        None => Reason::Widest,
+        Some(error) if error <= NONE => Reason::NoError,
+        Some(_) => Reason::Step,
+    }
+}
