@@ -150,7 +150,7 @@ fn arming_is_refused_without_a_fresh_observation_and_twice() {
 fn an_axis_without_limits_keeps_from_arming() {
     let axis = Axis::new(0.0, 0.0, 1.0, 0.0, SafeAction::Hold).expect("an axis with one value");
     for (axes, refusal) in [([axis, Axis::STILL], Some(Refusal::Limits)), ([axis; 2], None)] {
-        let mut safety = Safety::new(axes, DEADLINE, 1);
+        let mut safety = Safety::new(axes, 1..=DEADLINE, 1);
         Check::ALL.into_iter().for_each(|check| safety.check(check, true));
         assert_eq!(safety.refusal(), Some(Refusal::Stale), "the first reason");
         safety.observed();
