@@ -26,3 +26,4 @@ mod recordings;
 mod slices;
 mod smoke;
 mod stats;
+mod units;

@@ -75,13 +75,14 @@ impl Windows {
             }
             episodes.push(episode);
         }
-        let deviation = column_variances(&episodes).into_iter().map(f32::sqrt).collect();
+        let deviation = column_variances(&episodes).into_iter().map(root).collect();
+        let output_variance = column_variances(&outputs).into_iter().map(|v| v as f32).collect();
         let longest = episodes.iter().map(Array2::nrows).max().unwrap_or(1);
         let window = if recurrent { WINDOW.min(longest) } else { 1 };
         for episode in &mut episodes {
             last(episode, window);
         }
-        Self { graph, weights, states, deviation, output_variance: column_variances(&outputs), episodes, window }
+        Self { graph, weights, states, deviation, output_variance, episodes, window }
     }
 
     /// Whether steps depend on each other.
@@ -198,7 +199,7 @@ fn last(episode: &mut Array2<f32>, steps: usize) {
 }
 
 /// Variance of every column over all rows of all arrays.
-fn column_variances(arrays: &[Array2<f32>]) -> Vec<f32> {
+fn column_variances(arrays: &[Array2<f32>]) -> Vec<f64> {
     let cols = arrays.first().map_or(0, Array2::ncols);
     let rows = arrays.iter().map(Array2::nrows).sum::<usize>().max(1) as f64;
     let mean = |f: &dyn Fn(usize, f64) -> f64| -> Vec<f64> {
@@ -209,7 +210,13 @@ fn column_variances(arrays: &[Array2<f32>]) -> Vec<f32> {
         sums.iter().map(|s| s / rows).collect()
     };
     let means = mean(&|_, v| v);
-    mean(&|i, v| (v - means[i]).powi(2)).into_iter().map(|v| v as f32).collect()
+    mean(&|i, v| (v - means[i]).powi(2))
+}
+
+/// The root of a variance as f32, in which values of any unit have the same digits: f32 holds no squares from 1e20 on.
+fn root(variance: f64) -> f32 {
+    let unit = 2f64.powi((0.5 * variance.max(f64::MIN_POSITIVE).log2()) as i32);
+    ((variance / (unit * unit)) as f32).sqrt() * unit as f32
 }
 
 #[cfg(test)]
@@ -228,5 +235,16 @@ mod tests {
         assert_ne!(windows.episodes[1].row(3), windows.episodes[1].row(4));
         let batch = windows.batch(8, None, &mut Random::new(1));
         assert_eq!(windows.teach(&batch).nrows(), 8 * WINDOW);
+    }
+
+    #[test]
+    fn a_deviation_has_the_same_digits_in_every_unit() {
+        for variance in [0.0f64, 0.3, 1.0, 7.9e4] {
+            let deviation = root(variance);
+            assert_eq!(deviation, (variance as f32).sqrt());
+            for unit in [-66, 66].map(|n| 2f64.powi(n)) {
+                assert_eq!(root(variance * unit * unit), deviation * unit as f32);
+            }
+        }
     }
 }

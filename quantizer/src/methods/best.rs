@@ -36,7 +36,7 @@ use crate::data::Dataset;
 use crate::graph::{Graph, WeightMatrix};
 use activations::{allocated, choose_activations};
 use allocate::{Rows, energies, removals};
-use balance::balance;
+use balance::{MixedUnits, balance, mixed_units};
 use choose::{Chosen, choose, choosing};
 use compact::{Compacted, add_to_bias, compact};
 use dimension::{Dimension, dimensions};
@@ -64,6 +64,8 @@ pub struct RowStatistics {
     moments: Vec<(Moments, DMatrix<f64>)>,
     /// Frames or windows that `G` was taken of.
     pub(super) outputs_of: usize,
+    /// Matrices whose columns keep units that are far apart.
+    pub(super) mixed: Vec<MixedUnits>,
 }
 
 impl RowStatistics {
@@ -87,6 +89,7 @@ impl RowStatistics {
         let outputs: Vec<Vec<f64>> = output_moments.iter().map(|g| importance(g, Side::Output)).collect();
         let balanced = balance(graph, &mut moments, &outputs)?;
         Ok(Self {
+            mixed: mixed_units(&balanced, &moments),
             windows: windows.with(balanced),
             inputs: moments.iter().map(|m| importance(&m.second, Side::Input)).collect(),
             centred: moments.iter().map(|m| importance(&m.centred(), Side::Input)).collect(),

@@ -7,6 +7,7 @@ use anyhow::{Context as _, Result, ensure};
 
 use super::actquant::score::Score;
 use super::actquant::{self, ActionStatistics};
+use super::best::balance::MixedUnits;
 use super::best::{self, RowStatistics};
 use super::matrixwise;
 use super::options::{Method, Options};
@@ -110,6 +111,14 @@ impl<'a> PreparedMethod<'a> {
     /// Of how many frames the statistics of an iterative head were taken; `None` where they are those of all.
     pub fn sampled(&self) -> Option<Sampled> {
         self.sampled
+    }
+
+    /// Matrices that read observations in units far apart, which best could not balance; empty for other methods.
+    pub fn mixed_units(&self) -> &[MixedUnits] {
+        match &self.statistics {
+            Statistics::Best(statistics) => &statistics.mixed,
+            _ => &[],
+        }
     }
 
     /// The network that is quantized: of best with balanced columns.

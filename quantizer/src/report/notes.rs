@@ -7,6 +7,7 @@ use crate::data::{Dataset, Range, Recordings, runs};
 use crate::measure::check::{Check, Checked};
 use crate::measure::eval::{ActivationShare, ErrorReport};
 use crate::methods::Options;
+use crate::methods::best::balance::MixedUnits;
 use crate::pipeline::{QuantizedPolicy, Reason, Unused};
 use crate::policy::Policy;
 
@@ -118,6 +119,19 @@ pub fn of_recordings(recordings: &Recordings) -> Vec<String> {
     [single, range.constant_note(), outside].into_iter().flatten().collect()
 }
 
+/// A warning for each matrix that reads observations in units far apart, which are not balanced.
+pub fn mixed_units(mixed: &[MixedUnits]) -> Vec<String> {
+    let text = |MixedUnits { matrix, observations: [coarsest, finest], bits }: &MixedUnits| {
+        format!(
+            "{matrix}: observations come in units far apart (the coarsest is {coarsest}'s, the finest {finest}'s), which takes about \
+             {bits:.0} bits from each weight, and best cannot rescale the matrix's columns: another operation reads the same values or \
+             weights, or the factors take more bytes than they save; scale the observations by an op normalize in policy.json, and \
+             the columns to match"
+        )
+    };
+    mixed.iter().map(text).collect()
+}
+
 /// A note where every episode has a single step, as frames with a batch's axis look.
 pub fn single_steps(recording: &Dataset) -> Option<String> {
     let episodes = recording.length.len();
@@ -171,6 +185,17 @@ mod tests {
         let note = without_limits([None, limited, None, None]).expect("a note");
         assert!(note.starts_with("no finite limits for actions 0, 2-3: ") && note.contains("--limits"), "{note}");
         assert_eq!(without_limits([limited, limited]), None);
+    }
+
+    #[test]
+    fn a_matrix_with_units_far_apart_is_named_with_the_remedy() {
+        let mixed = MixedUnits { matrix: "leg.weight".into(), observations: [3, 9], bits: 5.2 };
+        let [text] = &mixed_units(&[mixed])[..] else { panic!("one note") };
+        assert!(
+            text.starts_with("leg.weight: ") && text.contains("3's, the finest 9's), which takes about 5 bits"),
+            "{text}"
+        );
+        assert!(text.contains("op normalize in policy.json"), "{text}");
     }
 
     #[test]

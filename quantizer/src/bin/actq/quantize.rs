@@ -49,6 +49,7 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
     let quantizer = Quantizer::new(&source, &recordings, options.method, options.minutes, |share| {
         progress.set("calibrating", share);
     })?;
+    note(notes::mixed_units(quantizer.method().mixed_units()));
     progress.begin("choosing codes");
     let found = quantizer.quantize(&options, |work, share| progress.set(work, share))?;
     let mut contents = vec![found.image.clone()];

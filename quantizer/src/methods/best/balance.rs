@@ -9,38 +9,38 @@
 //!
 //! `sum_c a_c / d_c^2 * sum_c h_c d_c^2` with `a_c = sum_r g_r w_rc^2`,
 //!
-//! `h` and `g` the importance of columns and rows. It is least, `(sum_c sqrt(a_c h_c))^2` by Cauchy and Schwarz, for
+//! `h` and `g` the importance of columns and rows, each column in a unit of its own ([`columns`]). It is least, `(sum_c sqrt(a_c h_c))^2` by Cauchy and Schwarz, for
 //! `d_c = (a_c / h_c)^(1/4)`, which is also what SmoothQuant (arXiv 2211.10438, eq. 4) does to activations' and
 //! weights' maxima with alpha 1/2. The values' means go into the biases.
 //!
 //! Where nothing but matrices reads a normalization without a limit, factors and means go into its own and cost
 //! nothing; elsewhere they are an operation [`Balance`], whose bytes count. It is added where it saves more bits: an
-//! error that falls to a share `s` is worth `log2(1 / s) / 2` bits for each weight of the matrices behind.
+//! error that falls to a share `s` is worth `log2(1 / s) / 2` bits for each weight of the matrices behind. Matrices that
+//! read the observation beside a hidden vector read it through the same operation ([`sites`]); the others are named
+//! ([`mixed_units`]) where units are far apart.
+
+mod columns;
+mod mixed;
+mod sites;
 
 use anyhow::Result;
 use nalgebra::{DMatrix, DVector};
 
 use super::compact::add_to_bias;
 use crate::calibrate::moments::Moments;
-use crate::calibrate::sensitivity::{Side, importance};
-use crate::graph::operation::{Operand, Product};
 use crate::graph::ops::{Balance, Normalize};
-use crate::graph::{Graph, NodeKind, ValueId};
+use crate::graph::{Graph, NodeKind};
+use columns::Columns;
+pub use mixed::{MixedUnits, mixed_units};
+use sites::{Reading, Site, sites};
 
-/// A factor is at most so many times the others' geometric mean, or one over it: the recording need not show how far a
-/// value goes.
-const MOST: f64 = 32.0;
 /// What an operation more has to save, in bits a weight of the whole policy: 1.4% of the error.
 const WORTH: f64 = 0.01;
-/// A value whose variance is below this share of its mean square did not move.
-const STILL: f64 = 1e-9;
-
-/// A value of the observation, and what reads it.
-struct Site {
-    value: ValueId,
-    readers: Vec<usize>,
-    matrices: Vec<usize>,
-}
+/// Beyond so many bits a weight of the matrices alone, units would ruin what they compute, however small their share of
+/// the policy is.
+const RUINOUS: f64 = 1.0;
+/// A weight has no more bits to save.
+const MOST_BITS: f64 = 8.0;
 
 /// The network with balanced columns; `moments` of the matrices' inputs become those of its inputs. `outputs` is the
 /// importance of the matrices' rows.
@@ -51,27 +51,27 @@ struct Site {
 pub fn balance(graph: &Graph, moments: &mut [Moments], outputs: &[Vec<f64>]) -> Result<Graph> {
     let mut balanced = graph.clone();
     // From the last on: what is inserted moves only what stands behind it.
-    for Site { value, readers, matrices } in sites(graph).into_iter().rev() {
-        let columns = Columns::of(graph, &matrices, moments, outputs);
-        let own = own_normalize(graph, value, &readers);
-        let elements: usize = matrices.iter().map(|&m| graph.matrices[m].data.len()).sum();
-        let saved = elements as f64 * columns.saved_bits() - 8.0 * Balance::bytes(columns.mean.len()) as f64;
-        if !own && saved < WORTH * graph.weights() as f64 {
+    for site in sites(graph).into_iter().rev() {
+        let columns = Columns::of(graph, &site, moments, outputs);
+        let own = own_normalize(graph, &site);
+        if !own && !pays(graph, &site, &columns) {
             continue;
         }
         let Some(factors) = columns.factors() else { continue };
-        for &m in &matrices {
-            let shift = scale(&mut balanced, m, &columns.mean, &factors);
+        for reading in &site.readings {
+            let (m, mean, factors) =
+                (reading.matrix, reading.spread(&columns.mean, 0.0), reading.spread(&factors, 1.0));
+            let shift = scale(&mut balanced, m, &mean, &factors);
             add_to_bias(&mut balanced, m, &shift);
-            moments[m].balance(&factors);
+            moments[m].balance(&mean, &factors);
         }
         if own {
-            if let NodeKind::Normalize(normalize) = &mut balanced.nodes[value - 1].kind {
+            if let NodeKind::Normalize(normalize) = &mut balanced.nodes[site.value - 1].kind {
                 fold(normalize, &columns.mean, &factors);
             }
         } else {
             let [mean, scale] = [&columns.mean, &factors].map(|of| of.iter().map(|v| *v as f32).collect());
-            balanced.insert(Balance::new(mean, scale), value, &readers)?;
+            balanced.insert(Balance::new(mean, scale), site.value, &site.readers)?;
         }
     }
     Ok(balanced)
@@ -83,100 +83,21 @@ pub fn balance_bytes(graph: &Graph) -> usize {
     added.map(|node| Balance::bytes(node.len)).sum()
 }
 
-/// Values that depend on the observation through no matrix, and the nodes that read them through nothing but matrices
-/// which read nothing else.
-fn sites(graph: &Graph) -> Vec<Site> {
-    let mut observed = vec![true];
-    for node in &graph.nodes {
-        let of_observation = !node.inputs.is_empty() && node.inputs.iter().all(|&value| observed[value]);
-        observed.push(of_observation && node.kind.products().is_empty());
-    }
-    let of_input = |n: usize| -> Vec<usize> {
-        let products = graph.nodes[n].kind.products().into_iter();
-        products.filter(|product| product.operand == Operand::Input).map(|product| product.matrix).collect()
-    };
-    let site = |value: ValueId| {
-        let mut readers = graph.readers(value);
-        readers.retain(|&n| !of_input(n).is_empty());
-        let mut matrices: Vec<usize> = readers.iter().flat_map(|&n| of_input(n)).collect();
-        matrices.sort_unstable();
-        matrices.dedup();
-        let elsewhere = |(n, product): (usize, Product)| {
-            matrices.contains(&product.matrix) && (product.operand != Operand::Input || !readers.contains(&n))
-        };
-        let mut products =
-            graph.nodes.iter().enumerate().flat_map(|(n, node)| node.kind.products().into_iter().map(move |p| (n, p)));
-        let alone = !matrices.is_empty() && !products.any(elsewhere);
-        alone.then_some(Site { value, readers, matrices })
-    };
-    (0..observed.len()).filter(|&value| observed[value]).filter_map(site).collect()
+/// Whether an operation is worth its bytes, or nothing but it keeps the policy whole.
+fn pays(graph: &Graph, site: &Site, columns: &Columns) -> bool {
+    let weights = |reading: &Reading| graph.matrices[reading.matrix].rows * reading.columns().count();
+    let bits = columns.saved_bits();
+    let saved = site.readings.iter().map(weights).sum::<usize>() as f64 * bits.min(MOST_BITS)
+        - 8.0 * Balance::bytes(columns.mean.len()) as f64;
+    saved >= WORTH * graph.weights() as f64 || (bits >= RUINOUS && saved >= 0.0) || columns.are_far()
 }
 
 /// Whether the value is that of a normalization without a limit behind it that nothing else reads.
-fn own_normalize(graph: &Graph, value: ValueId, readers: &[usize]) -> bool {
-    let node = value.checked_sub(1).map(|n| &graph.nodes[n].kind);
+fn own_normalize(graph: &Graph, site: &Site) -> bool {
+    let node = site.value.checked_sub(1).map(|n| &graph.nodes[n].kind);
     matches!(node, Some(NodeKind::Normalize(normalize)) if normalize.clip == f32::INFINITY)
-        && value != graph.output()
-        && graph.readers(value) == readers
-}
-
-/// What the columns of the matrices that read one value have in common.
-struct Columns {
-    /// `a`
-    weights: Vec<f64>,
-    /// `h`, about the mean
-    values: Vec<f64>,
-    mean: Vec<f64>,
-    /// Standard deviation; 0 where the value did not move.
-    deviation: Vec<f64>,
-}
-
-impl Columns {
-    fn of(graph: &Graph, matrices: &[usize], moments: &[Moments], outputs: &[Vec<f64>]) -> Self {
-        let cols = graph.matrices[matrices[0]].cols;
-        let mut weights = vec![0.0; cols];
-        for &m in matrices {
-            for (row, g) in graph.matrices[m].data.chunks_exact(cols).zip(&outputs[m]) {
-                weights.iter_mut().zip(row).for_each(|(a, w)| *a += g * f64::from(*w).powi(2));
-            }
-        }
-        let moments = &moments[matrices[0]];
-        let centred = moments.centred();
-        let moves = |c: usize| centred[(c, c)] > STILL * moments.second[(c, c)];
-        Self {
-            weights,
-            values: importance(&centred, Side::Input),
-            mean: moments.mean.clone(),
-            deviation: (0..cols).map(|c| if moves(c) { centred[(c, c)].sqrt() } else { 0.0 }).collect(),
-        }
-    }
-
-    /// Bits that each weight can do without for the error that it has: half of the logarithm of what balancing leaves
-    /// of it.
-    fn saved_bits(&self) -> f64 {
-        let sum = |values: &[f64]| values.iter().sum::<f64>();
-        let balanced = self.weights.iter().zip(&self.values).map(|(a, h)| (a * h).sqrt()).sum::<f64>().powi(2);
-        0.5 * (sum(&self.weights) * sum(&self.values) / balanced.max(f64::MIN_POSITIVE)).log2()
-    }
-
-    /// `d`, so that the deviations of what moved are 1 in the geometric mean; `None` where nothing did. The importance
-    /// of what did not move is its damping, so its factor is not much larger than the others'.
-    fn factors(&self) -> Option<Vec<f64>> {
-        let cols = 0..self.mean.len();
-        let factors: Vec<f64> =
-            self.weights.iter().zip(&self.values).map(|(a, h)| (a.max(f64::MIN_POSITIVE) / h).powf(0.25)).collect();
-        let usual = geometric_mean(factors.iter().copied())?;
-        let limited = |c: usize| factors[c].clamp(usual / MOST, usual * MOST);
-        let moved = cols.clone().filter(|&c| self.deviation[c] > 0.0);
-        let unit = geometric_mean(moved.map(|c| limited(c) * self.deviation[c]))?;
-        Some(cols.map(|c| limited(c) / unit).collect())
-    }
-}
-
-/// `None` of nothing.
-fn geometric_mean(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (sum, count) = values.fold((0.0, 0usize), |(sum, count), value| (sum + value.ln(), count + 1));
-    (count > 0).then(|| (sum / count as f64).exp())
+        && site.value != graph.output()
+        && graph.readers(site.value) == site.readers
 }
 
 /// Divides a matrix's columns by the factors, and gives what it makes of the mean.
@@ -205,18 +126,22 @@ fn fold(normalize: &mut Normalize, mean: &[f64], factors: &[f64]) {
 
 impl Moments {
     /// Of `(x - mean) * factors`.
-    fn balance(&mut self, factors: &[f64]) {
+    fn balance(&mut self, mean: &[f64], factors: &[f64]) {
+        let centred = self.centred();
+        self.mean.iter_mut().zip(mean).zip(factors).for_each(|((own, mean), d)| *own = (*own - mean) * d);
         let factors = DMatrix::from_diagonal(&DVector::from_column_slice(factors));
-        self.second = &factors * self.centred() * &factors;
-        self.mean.fill(0.0);
+        let own = DVector::from_column_slice(&self.mean);
+        self.second = &factors * centred * &factors + &own * own.transpose();
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use actq_kernels::math::Function;
+
     use super::*;
-    use crate::graph::ops::{Add, Concat, Linear, Lstm, Span};
-    use crate::graph::{Evaluator, WeightMatrix};
+    use crate::graph::ops::{Add, Concat, Linear, Lstm, Pointwise, Span};
+    use crate::graph::{Evaluator, ValueId, WeightMatrix};
     use crate::random::Random;
 
     const COLS: usize = 6;
@@ -305,7 +230,7 @@ mod tests {
         let graph = linear(|_| 0);
         let (balanced, moments) = balanced(&graph);
         assert_eq!((added(&balanced), balance_bytes(&balanced)), (1, 4 * (2 * COLS + 2)));
-        let of = |graph: &Graph, moments: &[Moments]| Columns::of(graph, &[0], moments, &[vec![1.0; ROWS]]);
+        let of = |graph: &Graph, moments: &[Moments]| Columns::of(graph, &sites(graph)[0], moments, &[vec![1.0; ROWS]]);
         // Squares of weights and of deviations are in one proportion wherever values move by themselves.
         let columns = of(&balanced, &moments);
         let share = |c: usize| columns.weights[c].sqrt() / columns.deviation[c];
@@ -355,6 +280,81 @@ mod tests {
             shared.add(Concat(vec![Span { from: 0, len: 4 }, Span { from: 0, len: 2 }]), &[1, 0]).expect("it fits");
         shared.add(Linear { matrix: 0, bias: vec![0.0; ROWS] }, &[part]).expect("it fits");
         assert_eq!(added(&balanced(&shared).0), 0);
+    }
+
+    fn set_column(graph: &mut Graph, column: usize, change: impl Fn(&mut f32)) {
+        graph.matrices[0].data.iter_mut().skip(column).step_by(COLS).for_each(change);
+    }
+
+    #[test]
+    fn a_column_without_weights_leaves_the_others_balanced() {
+        let mut graph = linear(|_| 0);
+        set_column(&mut graph, 2, |w| *w = 0.0);
+        let (balanced, moments) = balanced(&graph);
+        let columns = Columns::of(&balanced, &sites(&balanced)[0], &moments, &[vec![1.0; ROWS]]);
+        let share = |c: usize| columns.weights[c].sqrt() / columns.deviation[c];
+        assert!((share(3) / share(1) - 1.0).abs() < 0.2, "{} {}", share(3), share(1));
+    }
+
+    #[test]
+    fn a_small_matrix_is_balanced_where_units_would_ruin_it() {
+        const FEW: usize = 16;
+        let small = |factor: f32| {
+            let mut graph = linear(|_| 0);
+            set_column(&mut graph, 0, |w| *w *= factor);
+            graph.matrices[0].data.truncate(FEW * COLS);
+            graph.matrices[0].rows = FEW;
+            graph.nodes.clear();
+            let data = (0..3000 * FEW).map(|i| (i as f32).sin()).collect();
+            let large = WeightMatrix { name: "large".into(), rows: 3000, cols: FEW, data };
+            let large = graph.add_matrix(large).expect("a matrix");
+            let hidden = graph.add(Linear { matrix: 0, bias: vec![0.0; FEW] }, &[0]).expect("it fits");
+            let hidden = graph.add(Pointwise(Function::Tanh), &[hidden]).expect("it fits");
+            graph.add(Linear { matrix: large, bias: vec![0.0; 3000] }, &[hidden]).expect("it fits");
+            added(&balanced(&graph).0)
+        };
+        assert_eq!([small(1.0), small(1e4)], [0, 1]);
+    }
+
+    /// [observation, tanh of its product] -> sum of products, and what else reads both.
+    fn beside_a_hidden_vector(others: impl FnOnce(&mut Graph, ValueId)) -> Graph {
+        let mut graph = linear(|_| 0);
+        let hidden = graph.add(Pointwise(Function::Tanh), &[1]).expect("it fits");
+        let spans = vec![Span { from: 0, len: COLS }, Span { from: 0, len: ROWS }];
+        let both = graph.add(Concat(spans), &[0, hidden]).expect("it fits");
+        let data = (0..7 * (COLS + ROWS)).map(|i| (0.7 * i as f32).sin()).collect();
+        let second = WeightMatrix { name: "second".into(), rows: 7, cols: COLS + ROWS, data };
+        let second = graph.add_matrix(second).expect("a matrix");
+        others(&mut graph, both);
+        graph.add(Linear { matrix: second, bias: vec![0.1; 7] }, &[both]).expect("it fits");
+        graph
+    }
+
+    #[test]
+    fn one_operation_balances_all_that_reads_the_observation() {
+        let (all, _) = balanced(&beside_a_hidden_vector(|_, _| ()));
+        assert_eq!((added(&all), &all.nodes[1].inputs[..], &all.nodes[3].inputs[..]), (1, &[1][..], &[1, 3][..]));
+        // What others read stays as it is.
+        let read = |graph: &mut Graph, both| _ = graph.add(Add, &[both, both]).expect("it fits");
+        let (part, _) = balanced(&beside_a_hidden_vector(read));
+        assert_eq!((added(&part), &part.nodes[1].inputs[..], &part.nodes[3].inputs[..]), (1, &[1][..], &[0, 3][..]));
+    }
+
+    #[test]
+    fn a_matrix_that_cannot_be_balanced_is_named() {
+        let shared = |factor: f32| {
+            let mut graph = linear(|_| 0);
+            set_column(&mut graph, 1, |w| *w *= factor);
+            let turned = Concat(vec![Span { from: 3, len: 3 }, Span { from: 0, len: 3 }]);
+            let turned = graph.add(turned, &[0, 0]).expect("it fits");
+            graph.add(Linear { matrix: 0, bias: vec![0.5; ROWS] }, &[turned]).expect("it fits");
+            let (balanced, moments) = balanced(&graph);
+            assert_eq!(added(&balanced), 0);
+            mixed_units(&balanced, &moments)
+        };
+        assert_eq!(shared(1.0), []);
+        let [MixedUnits { matrix, observations, bits }] = &shared(1e9)[..] else { panic!("one matrix") };
+        assert!(matrix == "w" && observations.contains(&1) && *bits > 10.0, "{observations:?} {bits}");
     }
 
     #[test]

@@ -1,0 +1,164 @@
+//! The units of the observations do not matter to the method best.
+
+use actq::budget::Budget;
+use actq::data::{Dataset, Recordings};
+use actq::graph::ops::{Add, Concat, Linear, Lstm, Normalize, Pointwise, Span};
+use actq::graph::{Graph, ValueId, WeightMatrix};
+use actq::measure::eval;
+use actq::methods::{Method, Options};
+use actq::pipeline::quantize;
+use actq::policy::Policy;
+use actq::random::Random;
+use actq_kernels::math::Function;
+use anyhow::Result;
+use ndarray::Array3;
+
+const OBS: usize = 16;
+const HIDDEN: usize = 128;
+const ACTIONS: usize = 8;
+/// Errors may differ by the bytes of the operation that undoes the units.
+const RATIO: f64 = 1.2;
+
+/// How many of each observation's units make one of the recording's.
+type Units = [f32; OBS];
+/// A network that undoes the units where it first reads the observation.
+type Build = fn(&Units) -> Result<Graph>;
+
+/// A network in the making, with weights that are drawn.
+struct Drawn {
+    graph: Graph,
+    random: Random,
+}
+
+impl Drawn {
+    fn new() -> Self {
+        Self { graph: Graph::new(OBS), random: Random::new(3) }
+    }
+
+    /// A matrix whose first columns undo the units.
+    fn matrix(&mut self, rows: usize, cols: usize, units: &[f32]) -> Result<usize> {
+        let unit = |i: usize| units.get(i % cols).copied().unwrap_or(1.0);
+        let deviation = 1.3 / (cols as f32).sqrt();
+        let data = (0..rows * cols).map(|i| deviation * self.random.normal() / unit(i)).collect();
+        self.graph.add_matrix(WeightMatrix { name: format!("{rows} x {cols}"), rows, cols, data })
+    }
+
+    fn linear(&mut self, value: ValueId, rows: usize, units: &[f32]) -> Result<ValueId> {
+        let matrix = self.matrix(rows, self.graph.len_of(value), units)?;
+        self.graph.add(Linear { matrix, bias: vec![0.1; rows] }, &[value])
+    }
+
+    fn hidden(&mut self, value: ValueId, units: &[f32]) -> Result<ValueId> {
+        let value = self.linear(value, HIDDEN, units)?;
+        self.graph.add(Pointwise(Function::Elu), &[value])
+    }
+
+    fn actions(mut self, value: ValueId) -> Result<Graph> {
+        self.linear(value, ACTIONS, &[])?;
+        Ok(self.graph)
+    }
+}
+
+fn feed_forward(units: &Units) -> Result<Graph> {
+    let mut drawn = Drawn::new();
+    let first = drawn.hidden(0, units)?;
+    let second = drawn.hidden(first, &[])?;
+    drawn.actions(second)
+}
+
+fn normalizing(units: &Units) -> Result<Graph> {
+    let mut drawn = Drawn::new();
+    let scale = units.map(|unit| 1.0 / unit).to_vec();
+    let unit = Normalize { mean: vec![0.0; OBS], scale, pre_clip: f32::INFINITY, clip: 5.0 };
+    let value = drawn.graph.add(unit, &[0])?;
+    let first = drawn.hidden(value, &[])?;
+    drawn.actions(first)
+}
+
+fn recurrent(units: &Units) -> Result<Graph> {
+    const STATE: usize = HIDDEN / 2;
+    let mut drawn = Drawn::new();
+    let (input, state) = (drawn.matrix(4 * STATE, OBS, units)?, drawn.matrix(4 * STATE, STATE, &[])?);
+    let value = drawn.graph.add(Lstm { hidden: STATE, input, state, bias: vec![0.1; 4 * STATE] }, &[0])?;
+    drawn.actions(value)
+}
+
+/// The observation is read a second time beside the hidden vector, in a residual block.
+fn residual(units: &Units) -> Result<Graph> {
+    let mut drawn = Drawn::new();
+    let first = drawn.hidden(0, units)?;
+    let spans = vec![Span { from: 0, len: OBS }, Span { from: 0, len: HIDDEN }];
+    let both = drawn.graph.add(Concat(spans), &[0, first])?;
+    let second = drawn.hidden(both, units)?;
+    let sum = drawn.graph.add(Add, &[first, second])?;
+    drawn.actions(sum)
+}
+
+/// Episodes of observations that keep some of the last one.
+fn recorded(seed: u64, units: &Units, graph: &Graph) -> Dataset {
+    const EPISODES: usize = 4;
+    const STEPS: usize = 200;
+    let mut random = Random::new(seed);
+    let mut last = [0f32; OBS];
+    let obs = Array3::from_shape_fn((EPISODES, STEPS, OBS), |(_, _, i)| {
+        last[i] = 0.6 * last[i] + 0.8 * random.normal();
+        last[i] * units[i]
+    });
+    let mut dataset =
+        Dataset { path: "recorded.npz".into(), obs, action: None, length: vec![STEPS; EPISODES], state: None };
+    dataset.fill_actions(graph);
+    dataset
+}
+
+/// The held-out error at 3 bits a weight, everything counted.
+fn error(build: Build, units: &Units, steps: usize) -> Result<f64> {
+    let policy = Policy::of("units", build(units)?);
+    let recordings = Recordings { calib: Some(recorded(1, units, &policy.graph)), heldout: None };
+    let options = Options { steps: Some(steps), ..Options::new(Method::Best, Budget::BitsPerWeight(3.0)) };
+    let buffer = quantize(&policy, &recordings, &options, |_, _| {})?.buffer();
+    Ok(eval::evaluate(buffer.image("image".as_ref())?, &recorded(2, units, &policy.graph))?.nmse)
+}
+
+/// The first `count` observations in a unit `scale` times finer.
+fn first(count: usize, scale: f32) -> Units {
+    std::array::from_fn(|i| if i < count { scale } else { 1.0 })
+}
+
+fn keeps_its_error(build: Build, steps: usize, cases: &[(usize, f32)]) -> Result<()> {
+    let usual = error(build, &first(0, 1.0), steps)?;
+    for &(count, scale) in cases {
+        let found = error(build, &first(count, scale), steps)?;
+        assert!(found < RATIO * usual && usual < RATIO * found, "{count} times {scale:e}: {found:e}, else {usual:e}");
+    }
+    Ok(())
+}
+
+#[test]
+fn units_do_not_change_the_error() -> Result<()> {
+    let some: Vec<(usize, f32)> = [1e-6, 1e-3, 0.03, 30.0, 1e3, 1e6].map(|s| [(1, s), (7, s)]).concat();
+    let all = [1e-20, 1e-6, 1e-3, 1e3, 1e6, 1e20].map(|scale| (OBS, scale));
+    for build in [feed_forward, normalizing, recurrent, residual] {
+        keeps_its_error(build, 0, &some)?;
+    }
+    for build in [feed_forward, normalizing, recurrent] {
+        keeps_its_error(build, 0, &all)?;
+    }
+    Ok(())
+}
+
+#[test]
+fn units_do_not_change_what_is_learned() -> Result<()> {
+    for build in [feed_forward, recurrent] {
+        keeps_its_error(build, 40, &[(1, 1e-6), (7, 1e3), (OBS, 1e20)])?;
+    }
+    Ok(())
+}
+
+#[test]
+fn powers_of_two_give_the_same_bits() -> Result<()> {
+    for build in [feed_forward, recurrent, residual] {
+        let [some, others] = [10, -50].map(|n| error(build, &first(5, 2f32.powi(n)), 10));
+        assert_eq!(some?, others?);
+    }
+    Ok(())
+}
