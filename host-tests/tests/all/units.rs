@@ -135,12 +135,10 @@ fn keeps_its_error(build: Build, steps: usize, cases: &[(usize, f32)]) -> Result
 
 #[test]
 fn units_do_not_change_the_error() -> Result<()> {
-    let some: Vec<(usize, f32)> = [1e-6, 1e-3, 0.03, 30.0, 1e3, 1e6].map(|s| [(1, s), (7, s)]).concat();
-    let all = [1e-20, 1e-6, 1e-3, 1e3, 1e6, 1e20].map(|scale| (OBS, scale));
+    let some: Vec<(usize, f32)> = [1e-6, 30.0, 1e3, 1e6].map(|s| [(1, s), (7, s)]).concat();
+    let all = [1e-20, 1e-6, 1e3, 1e20].map(|scale| (OBS, scale));
     for build in [feed_forward, normalizing, recurrent, residual] {
         keeps_its_error(build, 0, &some)?;
-    }
-    for build in [feed_forward, normalizing, recurrent] {
         keeps_its_error(build, 0, &all)?;
     }
     Ok(())

@@ -15,3 +15,14 @@ pub struct WeightMatrix {
     /// `rows * cols` weights.
     pub data: Vec<f32>,
 }
+
+impl WeightMatrix {
+    /// The sum of squares of each column.
+    pub fn column_energies(&self) -> Vec<f64> {
+        let mut energies = vec![0.0; self.cols];
+        for row in self.data.chunks_exact(self.cols) {
+            energies.iter_mut().zip(row).for_each(|(energy, w)| *energy += f64::from(*w).powi(2));
+        }
+        energies
+    }
+}

@@ -30,7 +30,7 @@ use super::compact::add_to_bias;
 use crate::calibrate::moments::Moments;
 use crate::graph::ops::{Balance, Normalize};
 use crate::graph::{Graph, NodeKind};
-use columns::Columns;
+use columns::{Columns, deviations, lost_bits};
 pub use mixed::{MixedUnits, mixed_units};
 use sites::{Reading, Site, sites};
 
@@ -54,7 +54,7 @@ pub fn balance(graph: &Graph, moments: &mut [Moments], outputs: &[Vec<f64>]) -> 
     for site in sites(graph).into_iter().rev() {
         let columns = Columns::of(graph, &site, moments, outputs);
         let own = own_normalize(graph, &site);
-        if !own && !pays(graph, &site, &columns) {
+        if !own && !pays(graph, &site, &columns, moments) {
             continue;
         }
         let Some(factors) = columns.factors() else { continue };
@@ -84,12 +84,21 @@ pub fn balance_bytes(graph: &Graph) -> usize {
 }
 
 /// Whether an operation is worth its bytes, or nothing but it keeps the policy whole.
-fn pays(graph: &Graph, site: &Site, columns: &Columns) -> bool {
+fn pays(graph: &Graph, site: &Site, columns: &Columns, moments: &[Moments]) -> bool {
     let weights = |reading: &Reading| graph.matrices[reading.matrix].rows * reading.columns().count();
     let bits = columns.saved_bits();
     let saved = site.readings.iter().map(weights).sum::<usize>() as f64 * bits.min(MOST_BITS)
         - 8.0 * Balance::bytes(columns.mean.len()) as f64;
-    saved >= WORTH * graph.weights() as f64 || (bits >= RUINOUS && saved >= 0.0) || columns.are_far()
+    saved >= WORTH * graph.weights() as f64
+        || (bits >= RUINOUS && saved >= 0.0)
+        || columns.are_far()
+        || site.readings.iter().any(|reading| is_apart(graph, reading, moments))
+}
+
+/// Whether a matrix that also reads another value would be ruined by the unit that all elements of this one share.
+fn is_apart(graph: &Graph, reading: &Reading, moments: &[Moments]) -> bool {
+    let values: Vec<f64> = deviations(&moments[reading.matrix]).into_iter().map(|d| d * d).collect();
+    reading.is_partial() && lost_bits(&graph.matrices[reading.matrix].column_energies(), &values) >= RUINOUS
 }
 
 /// Whether the value is that of a normalization without a limit behind it that nothing else reads.

@@ -48,10 +48,10 @@ fn observations(graph: &Graph, value: ValueId) -> Vec<Option<usize>> {
 /// The observations whose units in a matrix are furthest apart, if that is far.
 fn furthest(graph: &Graph, m: usize, observations: &[Option<usize>], moments: &Moments) -> Option<MixedUnits> {
     let matrix = &graph.matrices[m];
-    let energy = |c: usize| matrix.data.iter().skip(c).step_by(matrix.cols).map(|w| f64::from(*w).powi(2)).sum::<f64>();
+    let energies = matrix.column_energies();
     let deviations = deviations(moments);
     let read = |(c, observation): (usize, &Option<usize>)| {
-        let (weights, values) = (energy(c), deviations[c].powi(2));
+        let (weights, values) = (energies[c], deviations[c].powi(2));
         (weights > 0.0 && values > 0.0).then_some(((*observation)?, weights, values))
     };
     let columns: Vec<(usize, f64, f64)> = observations.iter().enumerate().filter_map(read).collect();

@@ -32,6 +32,11 @@ impl Reading {
         self.elements.iter().enumerate().filter_map(|(column, element)| Some((column, (*element)?)))
     }
 
+    /// Whether the matrix also reads another value.
+    pub(super) fn is_partial(&self) -> bool {
+        self.elements.contains(&None)
+    }
+
     /// What belongs to each column: of `values`, the one of its element; `other` for a column without.
     pub(super) fn spread(&self, values: &[f64], other: f64) -> Vec<f64> {
         self.elements.iter().map(|element| element.map_or(other, |element| values[element])).collect()
