@@ -22,7 +22,7 @@ mod tests {
     use actq_controller::breadcrumb::Record;
     use actq_controller::endpoint::Facts;
     use actq_controller::update::NoUpdate;
-    use actq_controller::{Axis, Check, Endpoint, Guard, Safety, Settings};
+    use actq_controller::{Axis, Check, Endpoint, Guard, SafeAction, Safety, Settings};
     use actq_link::code::{Parameter, Refusal, Report, ResetCause, State};
     use actq_link::report::BUILT_IN;
     use actq_link::{Floats, Message, Sender, frame};
@@ -40,7 +40,8 @@ mod tests {
     const BEFORE: u32 = 10;
 
     fn of_axis(tick_hz: u32) -> Safety<1> {
-        let mut safety = Safety::new([Axis::STILL], 1..=*allowed(tick_hz).end(), 0);
+        let axis = Axis::new(-1.0, 1.0, 1.0, 0.0, SafeAction::Coast).expect("the axis fits");
+        let mut safety = Safety::new([axis], 1..=*allowed(tick_hz).end(), 0);
         Check::ALL.into_iter().for_each(|check| safety.check(check, true));
         safety
     }
