@@ -9,14 +9,14 @@
 //!
 //! `sum_c a_c / d_c^2 * sum_c h_c d_c^2` with `a_c = sum_r g_r w_rc^2`,
 //!
-//! `h` and `g` the importance of columns and rows, each column in a unit of its own ([`columns`]). It is least, `(sum_c sqrt(a_c h_c))^2` by Cauchy and Schwarz, for
-//! `d_c = (a_c / h_c)^(1/4)`, which is also what SmoothQuant (arXiv 2211.10438, eq. 4) does to activations' and
-//! weights' maxima with alpha 1/2. The values' means go into the biases.
+//! `h` and `g` the importance of columns and rows, each column in a unit of its own (`columns.rs`). It is least,
+//! `(sum_c sqrt(a_c h_c))^2` by Cauchy and Schwarz, for `d_c = (a_c / h_c)^(1/4)`, which is also what SmoothQuant (arXiv
+//! 2211.10438, eq. 4) does to activations' and weights' maxima with alpha 1/2. The values' means go into the biases.
 //!
 //! Where nothing but matrices reads a normalization without a limit, factors and means go into its own and cost
 //! nothing; elsewhere they are an operation [`Balance`], whose bytes count. It is added where it saves more bits: an
 //! error that falls to a share `s` is worth `log2(1 / s) / 2` bits for each weight of the matrices behind. Matrices that
-//! read the observation beside a hidden vector read it through the same operation ([`sites`]); the others are named
+//! read the observation beside a hidden vector read it through the same operation (`sites.rs`); the others are named
 //! ([`mixed_units`]) where units are far apart.
 
 mod columns;
