@@ -40,7 +40,7 @@ pub struct Facts {
 pub struct Step<'a> {
     /// Sequence number of its frame.
     pub of: u32,
-    /// Whether the head has to be reset first: the token is another one than that of the step before.
+    /// `true` if the head has to be reset first: the token differs from that of the step before.
     pub reset: bool,
     /// Its values.
     pub observation: &'a [f32],

@@ -79,7 +79,7 @@ pub(crate) fn run(target: Target, image: &Path, troubles: &[Trouble<'_>], images
     Ok(())
 }
 
-/// What an episode says of the controller.
+/// The verdict of all attempts at an episode.
 enum Verdict {
     Passed,
     Failed(anyhow::Error),
