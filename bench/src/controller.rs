@@ -136,6 +136,22 @@ pub fn act(client: &mut Client, observation: &[f32]) -> Result<(bool, Vec<f32>)>
     bail!("no action: {:?}", client.status()?)
 }
 
+/// The actions on observations in order, from a new state of the head. The controller takes a new token, and the head
+/// begins anew, where the machine holds up the host for so long that the line counts as silent: they are then all asked
+/// for again.
+pub fn act_in_order(client: &mut Client, observations: &[Vec<f32>]) -> Result<Vec<(bool, Vec<f32>)>> {
+    let begun = Instant::now();
+    while begun.elapsed() < HANG {
+        client.disarm()?;
+        let token = client.status()?.token;
+        let actions = observations.iter().map(|observation| act(client, observation)).collect::<Result<_>>()?;
+        if client.status()?.token == token {
+            return Ok(actions);
+        }
+    }
+    bail!("never {} actions under one token: {:?}", observations.len(), client.status()?)
+}
+
 /// Asks for the status until `wanted`.
 pub fn until(client: &mut Client, what: &str, mut wanted: impl FnMut(&Status) -> bool) -> Result<Status> {
     let begun = Instant::now();

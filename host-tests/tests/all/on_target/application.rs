@@ -9,7 +9,7 @@ use std::time::Instant;
 use actq::methods::Activations;
 use actq::runtime::ImageBuffer;
 use actq_bench::Target;
-use actq_bench::controller::{Controller, HANG, act, until};
+use actq_bench::controller::{Controller, HANG, act, act_in_order, until};
 use actq_bench::cycles::{Code, Function};
 use actq_bench::firmware::{self, built_in, halfword_at};
 use actq_bench::networks::Builder;
@@ -91,11 +91,12 @@ pub(crate) fn starts_and_acts_with_the_bits_of_the_host(target: Target) -> Resul
     assert_eq!((status.image, status.slot), (image.crc(), BUILT_IN), "{target:?}");
     assert_eq!((usize::from(status.observation), usize::from(status.axes)), (image.obs_len(), image.act_len()));
     assert_eq!(client.breadcrumb()?.crash, None, "{target:?}");
-    for step in 0..image.self_test_steps() {
-        let (observation, bits) = self_test(&image, step).context("a self-test step is missing")?;
-        let (applied, action) = act(&mut client, &observation)?;
+    let steps = (0..image.self_test_steps()).map(|step| self_test(&image, step));
+    let (observations, expected): (Vec<_>, Vec<_>) =
+        steps.collect::<Option<Vec<_>>>().context("a self-test step is missing")?.into_iter().unzip();
+    for (step, (applied, action)) in act_in_order(&mut client, &observations)?.into_iter().enumerate() {
         assert!(!applied);
-        assert_eq!(action.iter().map(|v| v.to_bits()).collect::<Vec<_>>(), bits, "{target:?}, step {step}");
+        assert_eq!(action.iter().map(|v| v.to_bits()).collect::<Vec<_>>(), expected[step], "{target:?}, step {step}");
     }
     if target == Target::F405 {
         // QEMU has no clocks for it: the wait for the crystal has ended, and nothing may move at another rate.
