@@ -24,7 +24,7 @@ pub fn binary() -> Result<&'static Path> {
     let profile = if profile == "debug" { "dev" } else { profile };
     // With this package, for the features that the tests were built with: else cargo would build the quantizer once
     // more.
-    let packages = ["--package", "actq", "--package", env!("CARGO_PKG_NAME")];
+    let packages = ["--package", "actq-cli", "--package", env!("CARGO_PKG_NAME")];
     let command = [&packages[..], &["--bin", "actq", "--profile", profile]].concat();
     cargo_build("actq", &command, &[])?;
     Ok(BINARY.get_or_init(|| folder.join(format!("actq{}", std::env::consts::EXE_SUFFIX))))

@@ -20,7 +20,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 use std::{env, fs};
 
-use actq::emit::files;
+use actq_cli::outputs::files;
 use anyhow::{Context as _, Result, anyhow, ensure};
 
 use crate::{command, ur3};

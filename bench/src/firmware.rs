@@ -8,11 +8,11 @@ use std::sync::{LazyLock, Mutex};
 
 use actq::budget::Budget;
 use actq::data::Recordings;
-use actq::emit::files;
 use actq::methods::{Activations, Method, Options};
 use actq::pipeline::quantize;
 use actq::policy::Policy;
 use actq_boards::{Target, root, target_dir};
+use actq_cli::outputs::files;
 use actq_kernels::Width;
 use anyhow::{Context, Result, anyhow, ensure};
 use object::{Object as _, ObjectSection as _, ObjectSymbol as _};

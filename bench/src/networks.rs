@@ -31,7 +31,7 @@ impl Builder {
 
     /// An operation on values; gives its output.
     pub fn node(&mut self, kind: impl Into<NodeKind>, inputs: &[ValueId]) -> Result<ValueId> {
-        self.graph.add(kind, inputs)
+        Ok(self.graph.add(kind, inputs)?)
     }
 
     /// The first values of the observation.
@@ -67,7 +67,7 @@ impl Builder {
             }
         }
         self.outcomes.push(Outcome::new(&matrix, quantized, None, activations)?);
-        self.graph.add_matrix(matrix)
+        Ok(self.graph.add_matrix(matrix)?)
     }
 
     /// A product with a part of the observation, with drawn biases or none.
@@ -146,7 +146,7 @@ pub fn accumulating(bytes: &[u8]) -> Result<Vec<u8>> {
     let buffer = ImageBuffer::new(&bytes);
     let image = buffer.image(name)?;
     let mut at = 4 * word(&bytes, h::W_SELF_TEST) as usize;
-    with_head(image, |head| {
+    with_head::<_, anyhow::Error>(image, |head| {
         for step in 0..image.self_test_steps() {
             let (observation, _) = image.self_test(step).context("the self-test has such a step")?;
             let observation: Vec<f32> = observation.iter().map(|word| f32::from_bits(u32::from_le(*word))).collect();

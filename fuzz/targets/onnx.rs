@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use actq::import::onnx::{Choice, import_bytes};
+use actq_onnx::{Choice, import_bytes};
 use actq::policy::Policy;
 use libfuzzer_sys::fuzz_target;
 

@@ -1,27 +1,58 @@
-//! From a PyTorch policy to one flashable image: what the command `actq` is made of.
-//!
-//! [`import`] reads a [`policy::Policy`] with its network, a [`graph::Graph`], and [`data`] the recorded observations.
-//! [`pipeline`] makes an image of them: a method of [`methods`] turns every weight matrix into codes and scales, from
-//! what [`calibrate`] finds in the recordings, and [`emit`] lays the bytes out. [`measure`] and [`serve`] run the
-//! finished image through the same executor that the firmware runs; [`report`] says it to people.
-//!
-//! Which folder may use which is written in `docs/ARCHITECTURE.md`, and tested.
-#![deny(unsafe_code)]
+//! The command `actq`: command line, tables, plots, progress, and the host's end of the link. What it does with
+//! policies is in the library `actq`.
+#![forbid(unsafe_code)]
 
-pub mod budget;
-pub mod calibrate;
-pub mod contract;
-pub mod data;
-pub mod emit;
-pub mod graph;
-pub mod import;
-pub mod measure;
-pub mod methods;
-pub mod pipeline;
-pub mod policy;
-pub mod random;
+mod agreement;
+mod args;
+mod check;
+mod commands;
+mod group;
+mod importers;
+#[cfg(unix)]
+mod interrupts;
+pub mod outputs;
 pub mod report;
-pub mod runtime;
-pub mod serve;
-mod strict_json;
-pub mod text;
+mod serve;
+mod suggestions;
+mod terminal;
+mod threads;
+
+use std::process::ExitCode;
+
+use actq::text::printable;
+use anyhow::Result;
+
+use args::Command;
+use commands::{eval, import, inspect, link, quantize, sign, sweep, tune};
+use outputs::unfinished;
+
+/// Runs the command line of this process.
+pub fn run() -> ExitCode {
+    let outcome = run_command(&suggestions::parse().command);
+    // Where a signal ends the process, it decides the exit status.
+    let _held = unfinished::hold();
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("actq: {}", printable(&format!("{error:#}")));
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run_command(command: &Command) -> Result<()> {
+    #[cfg(unix)]
+    interrupts::watch()?;
+    match command {
+        Command::Import(args) => import::run(args),
+        Command::Quantize(args) => quantize::run(args),
+        Command::Inspect(args) => inspect::run(args),
+        Command::Eval(args) => eval::run(args),
+        Command::Tune(args) => tune::run(args),
+        Command::Sweep(args) => sweep::run(args),
+        Command::Serve(args) => commands::serve::run(args),
+        Command::Link(args) => link::run(args),
+        Command::Keygen(args) => sign::keygen(args),
+        Command::Sign(args) => sign::sign(args),
+    }
+}

@@ -6,6 +6,6 @@ mod recorder;
 mod recorders;
 mod spool;
 
-pub use protocol::{Seen, serve};
-pub use recorder::{RecordPlan, serve_recorded};
-pub use recorders::wait_for_recorders;
+pub(crate) use protocol::serve;
+pub(crate) use recorder::{RecordPlan, serve_recorded};
+pub(crate) use recorders::wait_for_recorders;

@@ -161,7 +161,7 @@ fn example() -> Result<PathBuf> {
     // once more.
     build.current_dir(root()).args(["build", "--quiet", "--release", "--bin", "actq"]);
     let built =
-        build.args(["--package", "actq", "--package", "actq-bench"]).status().context("cargo cannot be started")?;
+        build.args(["--package", "actq-cli", "--package", "actq-bench"]).status().context("cargo cannot be started")?;
     ensure!(built.success(), "actq does not build");
     let mut command =
         Command::new(target_dir().join("release").join("actq").with_extension(std::env::consts::EXE_EXTENSION));

@@ -8,12 +8,12 @@ use std::path::Path;
 
 use actq::budget::Rate;
 use actq::data::Dataset;
-use actq::emit::files;
 use actq::graph::Graph;
 use actq::import::FILES;
 use actq::measure::eval;
 use actq::methods::actquant::{self, ActionStatistics, allocation};
 use actq::policy::Policy;
+use actq_cli::outputs::files;
 use anyhow::{Context as _, Result, ensure};
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};

@@ -170,7 +170,7 @@ impl<'a> Maker<'a> {
         let (quantizer, _) = self.ready.get(&method.to_string()).context("the method was not made ready")?;
         let quantized = match quantizer.quantize(&options, progress) {
             Ok(quantized) => quantized,
-            Err(error) => return error.downcast::<BudgetTooSmall>().map(Err),
+            Err(error) => return error.budget().map(|small| Err(*small)).ok_or(error.into()),
         };
         let seconds = preparing + begun.elapsed().as_secs_f64();
         let report = eval::evaluate(quantized.buffer().image(Path::new("image in memory"))?, self.subject.heldout()?)?;

@@ -3,9 +3,9 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use actq::emit::files;
 use actq::pipeline::driven::DriveOutcome;
-use actq::report::plot::{Plot, Series, Vertical, stacked};
+use actq_cli::outputs::files;
+use actq_cli::report::plot::{Plot, Series, Vertical, stacked};
 use anyhow::Result;
 use serde_json::Value;
 

@@ -71,7 +71,7 @@ impl Simulator {
                 match driver {
                     Driver::Image(image) => {
                         let words = [actq.as_os_str(), OsStr::new("serve"), image.as_os_str()];
-                        let words = words.into_iter().map(quoted).collect::<Result<Vec<_>>>()?;
+                        let words = words.into_iter().map(quoted).collect::<Result<Vec<_>, _>>()?;
                         command.args(["--policy", "pipe_policy:factory"]).env("POLICY_CMD", words.join(" "));
                     }
                     Driver::Folder(policy) => {

@@ -32,7 +32,7 @@ impl Head {
     /// The policy.
     pub fn policy(&self) -> Result<Policy> {
         let files = ["policy.json", "policy.safetensors"].map(Path::new);
-        Policy::of_files(Path::new("."), files, self.json.to_string().as_bytes(), &self.weights)
+        Ok(Policy::of_files(Path::new("."), files, self.json.to_string().as_bytes(), &self.weights)?)
     }
 
     /// Writes the policy's folder, with standard normal observations as `calib.npz`.

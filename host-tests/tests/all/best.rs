@@ -22,7 +22,7 @@ fn image(quantizer: &Quantizer<'_>, options: &Options) -> Result<Vec<u8>> {
 fn report(dir: &Path, bytes: &[u8]) -> Result<ErrorReport> {
     let buffer = ImageBuffer::new(bytes);
     let image = buffer.image(dir)?;
-    eval::evaluate(image, &eval::heldout(dir, &image)?)
+    Ok(eval::evaluate(image, &eval::heldout(dir, &image)?)?)
 }
 
 fn best(bits: f64, steps: usize) -> Options {

@@ -1,6 +1,7 @@
 //! Constants that operations have in common stand once in an image, and run as if they stood twice.
 
 use actq::emit;
+use actq::error::Cause;
 use actq::graph::ops::LayerNorm;
 use actq::methods::Activations;
 use actq::runtime::{ImageBuffer, with_head};
@@ -24,7 +25,7 @@ fn image() -> Result<Vec<u8>> {
         value = builder.node(LayerNorm { weight, bias: bias.clone(), eps: 1e-5 }, &[value])?;
     }
     let (policy, outcomes) = builder.finish("shared".to_owned(), false);
-    emit::image(&policy, &outcomes)
+    Ok(emit::image(&policy, &outcomes)?)
 }
 
 fn words(bytes: &[u8]) -> Vec<u32> {
@@ -65,7 +66,7 @@ fn an_image_with_common_constants_is_smaller_and_runs_the_same_bits() -> Result<
     assert_eq!(shared.len() + 4 * CONSTANTS, own.len());
     let run = |bytes: &[u8]| {
         let buffer = ImageBuffer::new(bytes);
-        with_head(buffer.image("memory".as_ref())?, |head| {
+        with_head::<_, anyhow::Error>(buffer.image("memory".as_ref())?, |head| {
             head.self_test()?;
             let observation = |step: usize| (0..LEN).map(|i| ((7 * i + step) as f32).sin()).collect::<Vec<f32>>();
             (0..8).map(|step| Ok(head.step(&observation(step))?.iter().map(|v| v.to_bits()).collect())).collect()
@@ -88,7 +89,7 @@ fn nothing_but_constants_before_may_be_named_again() -> Result<()> {
         let bytes = sealed(&words)?;
         let refused = ImageBuffer::new(&bytes).image("memory".as_ref()).map(|_| ());
         let error = refused.expect_err("constants that are none");
-        assert_eq!(error.downcast_ref::<ImageError>(), Some(&ImageError::Section), "{data}");
+        assert!(matches!(error.cause(), Cause::Image(ImageError::Section)), "{data}: {error:#}");
     }
     Ok(())
 }

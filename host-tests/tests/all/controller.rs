@@ -47,7 +47,7 @@ fn image(name: &str, seed: u64) -> Result<Vec<u8>> {
     builder.values(seed as usize);
     builder.linear((ACT, OBS), actq::methods::Activations::Int8, |_| Some(Width::W3), 0, true)?;
     let (policy, outcomes) = builder.finish(name.to_owned(), false);
-    actq::emit::image(&policy, &outcomes)
+    Ok(actq::emit::image(&policy, &outcomes)?)
 }
 
 /// The image with another expected action in its self-test.
@@ -278,7 +278,7 @@ fn check_log(log: &str, image: &[u8]) -> Result<()> {
     let (obs, actions): (Array2<f32>, Array2<f32>) = (npz.by_name("obs")?, npz.by_name("action")?);
     assert_eq!((obs.dim(), actions.dim()), ((40, OBS), (40, ACT)));
     let buffer = ImageBuffer::new(image);
-    actq::runtime::with_head(buffer.image(Path::new("image"))?, |head| {
+    actq::runtime::with_head::<_, anyhow::Error>(buffer.image(Path::new("image"))?, |head| {
         let mut answered = 0;
         for (obs, action) in obs.outer_iter().zip(actions.outer_iter()).filter(|(_, action)| !action[0].is_nan()) {
             let expected = head.step(&obs.to_vec())?;

@@ -214,7 +214,7 @@ fn steps_are_those_of_the_textbooks() -> Result<()> {
         let buffer = ImageBuffer::new(&quantized);
         let image = buffer.image(case.dir.path())?;
         assert_eq!((image.noise_len(), image.obs_len()), (graph.noise_len(), OBS), "{json}");
-        with_head(image, |head| {
+        with_head::<_, anyhow::Error>(image, |head| {
             for _ in 0..20 {
                 let (obs, noise) = (drawn(&mut random, OBS, 2.0), drawn(&mut random, graph.noise_len(), 2.0));
                 let expected = reference(&case, &json, &solver, &wide(&obs), &wide(&noise));
@@ -252,7 +252,7 @@ fn noise_is_the_generators_or_the_callers_and_a_reset_begins_it_anew() -> Result
     for (json, _) in policies() {
         let buffer = quantized(json.clone())?;
         let image = buffer.image("memory".as_ref())?;
-        with_head(image, |head| {
+        with_head::<_, anyhow::Error>(image, |head| {
             let obs = [0.3; OBS];
             let play = |head: &mut Head<'_, '_>| -> Result<Vec<Vec<u32>>> {
                 (0..6).map(|_| Ok(bits(head.step(&obs)?))).collect()
@@ -290,10 +290,10 @@ fn however_a_step_is_cut_its_bits_are_the_same() -> Result<()> {
         let image = buffer.image("memory".as_ref())?;
         let mut random = Random::new(5);
         let observations: Vec<Vec<f32>> = (0..6).map(|_| drawn(&mut random, OBS, 2.0)).collect();
-        let whole = with_head(image, |head| {
+        let whole = with_head::<_, anyhow::Error>(image, |head| {
             observations.iter().map(|obs| Ok(bits(head.step(obs)?))).collect::<Result<Vec<_>>>()
         })?;
-        let (cut, polls) = with_head(image, |head| {
+        let (cut, polls) = with_head::<_, anyhow::Error>(image, |head| {
             let least = head.least_budget();
             let mut polls = 0;
             let step = |obs: &Vec<f32>| -> Result<Vec<u32>> {
@@ -330,7 +330,7 @@ fn same_bits(elf: &std::path::Path, buffer: &ImageBuffer, steps: usize) -> Resul
     let image = buffer.image(slot.path())?;
     let mut server = Server::start(qemu::command(elf, Some(slot.path()), "serve")?, image.act_len())?;
     let mut random = Random::new(9);
-    with_head(image, |head| {
+    with_head::<_, anyhow::Error>(image, |head| {
         for step in 0..steps {
             let obs = drawn(&mut random, image.obs_len(), 1.0);
             ensure!(bits(&server.step(&obs)?) == bits(head.step(&obs)?), "{}, step {step}", image.name());

@@ -103,7 +103,7 @@ impl Fixture {
     }
 
     fn recording(&self, name: &str) -> Result<Dataset> {
-        Dataset::load(&self.path(name), Sizes::of(&self.policy))
+        Ok(Dataset::load(&self.path(name), Sizes::of(&self.policy))?)
     }
 
     fn crc(&self, name: &str) -> Result<u32> {

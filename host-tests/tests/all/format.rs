@@ -128,7 +128,7 @@ fn the_hex_example_reads_as_documented() {
     assert_eq!(image.self_test_steps(), 3);
     for step in 0..3 {
         let (observation, action) = image.self_test(step).expect("the step exists");
-        let played = with_head(image, |head| Ok(head.step(&floats(observation))?.to_vec()));
+        let played = with_head::<_, anyhow::Error>(image, |head| Ok(head.step(&floats(observation))?.to_vec()));
         assert_eq!(played.expect("the observation is finite"), floats(action));
     }
     assert!(image.self_test(3).is_none());
@@ -138,7 +138,7 @@ fn the_hex_example_reads_as_documented() {
 fn the_hex_example_computes_what_is_worked_out_by_hand() {
     let buffer = ImageBuffer::new(&example(&document()));
     let image = buffer.image(Path::new("docs/FORMAT.md")).expect("the example is a valid image");
-    with_head(image, |head| {
+    with_head::<_, anyhow::Error>(image, |head| {
         head.self_test()?;
         assert_eq!(head.infer(&OBSERVATION)?, [-60.0, 32.0, 48.0]);
         assert_eq!(head.step(&OBSERVATION)?, ACTION);

@@ -7,9 +7,9 @@ use actq::data::Recordings;
 use actq::methods::{Method, Options};
 use actq::pipeline::quantize;
 use actq::policy::Policy;
-use actq::report::memory::{Peak, peak};
 use actq::runtime::ImageBuffer;
 use actq_bench::{shared_policies, ur3};
+use actq_cli::report::memory::{Peak, peak};
 use actq_kernels::Width;
 use anyhow::{Result, ensure};
 

@@ -77,7 +77,7 @@ fn bound(outcomes: &[Outcome]) -> f64 {
 /// Runs `work` with a head over the quantized policy.
 fn on_head<T>(policy: &Policy, outcomes: &[Outcome], work: impl FnOnce(&mut Head<'_, '_>) -> Result<T>) -> Result<T> {
     let buffer = ImageBuffer::new(&emit::image(policy, outcomes)?);
-    with_head(buffer.image(&policy.dir)?, work)
+    with_head::<_, anyhow::Error>(buffer.image(&policy.dir)?, work)
 }
 
 /// Compares both implementations with the reference, on a policy of `ops`.

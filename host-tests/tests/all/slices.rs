@@ -77,7 +77,7 @@ fn network(seed: u64) -> Result<(Policy, Vec<Outcome>)> {
 fn on_head<T>(seed: u64, work: impl FnOnce(&mut Head<'_, '_>) -> Result<T>) -> Result<T> {
     let (policy, outcomes) = network(seed)?;
     let buffer = ImageBuffer::new(&emit::image(&policy, &outcomes)?);
-    with_head(buffer.image(Path::new("slices"))?, work)
+    with_head::<_, anyhow::Error>(buffer.image(Path::new("slices"))?, work)
 }
 
 fn observations(seed: u64) -> Vec<Vec<f32>> {
@@ -272,7 +272,7 @@ fn an_error_resets() -> Result<()> {
     builder.node(Linear { matrix, bias: vec![0.0; 3] }, &[hidden])?;
     let (policy, outcomes) = builder.finish("overflow".to_owned(), false);
     let buffer = ImageBuffer::new(&emit::image(&policy, &outcomes)?);
-    with_head(buffer.image(Path::new("overflow"))?, |head| {
+    with_head::<_, anyhow::Error>(buffer.image(Path::new("overflow"))?, |head| {
         let observations = observations(1);
         let expected = whole(head, &observations[..1])?;
         head.begin(&[f32::MAX; OBSERVATION])?;
@@ -311,7 +311,7 @@ fn a_self_test_in_pieces_is_the_same_test() -> Result<()> {
         let bytes = emit::image(&policy, &outcomes)?;
         let in_pieces = |bytes: &[u8], budget| {
             let buffer = ImageBuffer::new(bytes);
-            with_head(buffer.image(Path::new("slices"))?, |head| {
+            with_head::<_, anyhow::Error>(buffer.image(Path::new("slices"))?, |head| {
                 let mut pieces = 0;
                 let whole = head.self_test();
                 Ok((head.self_test_in_pieces(budget, || pieces += 1), whole, pieces, head.image().self_test_steps()))

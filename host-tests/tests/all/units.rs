@@ -40,17 +40,17 @@ impl Drawn {
         let unit = |i: usize| units.get(i % cols).copied().unwrap_or(1.0);
         let deviation = 1.3 / (cols as f32).sqrt();
         let data = (0..rows * cols).map(|i| deviation * self.random.normal() / unit(i)).collect();
-        self.graph.add_matrix(WeightMatrix { name: format!("{rows} x {cols}"), rows, cols, data })
+        Ok(self.graph.add_matrix(WeightMatrix { name: format!("{rows} x {cols}"), rows, cols, data })?)
     }
 
     fn linear(&mut self, value: ValueId, rows: usize, units: &[f32]) -> Result<ValueId> {
         let matrix = self.matrix(rows, self.graph.len_of(value), units)?;
-        self.graph.add(Linear { matrix, bias: vec![0.1; rows] }, &[value])
+        Ok(self.graph.add(Linear { matrix, bias: vec![0.1; rows] }, &[value])?)
     }
 
     fn hidden(&mut self, value: ValueId, units: &[f32]) -> Result<ValueId> {
         let value = self.linear(value, HIDDEN, units)?;
-        self.graph.add(Pointwise(Function::Elu), &[value])
+        Ok(self.graph.add(Pointwise(Function::Elu), &[value])?)
     }
 
     fn actions(mut self, value: ValueId) -> Result<Graph> {

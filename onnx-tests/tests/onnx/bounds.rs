@@ -1,8 +1,8 @@
 //! Limits of the action that follow from the last operation.
 
-use actq::import::onnx::Choice;
 use actq::measure::actions::actions;
-use actq::report::imported::summary;
+use actq_cli::report::imported::summary;
+use actq_onnx::Choice;
 use anyhow::{Context as _, Result, ensure};
 
 use super::file::{File, Value};

@@ -5,10 +5,10 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
-use actq::import::onnx::proto;
 use actq::policy::Policy;
 use actq_bench::command::{actq, binary, failed, succeeded};
 use actq_bench::skipped;
+use actq_onnx::proto;
 use anyhow::{Result, ensure};
 use ndarray::{Array2, Array3};
 use ndarray_npy::WriteNpyExt as _;

@@ -1,7 +1,7 @@
 //! What a file computes with constants alone, against the same file with the results in it.
 
-use actq::import::onnx::{Choice, proto};
 use actq::measure::actions::actions;
+use actq_onnx::{Choice, proto};
 use anyhow::Result;
 
 use super::file::{File, Value, tensor};

@@ -1,7 +1,7 @@
 //! Files that were made to harm, or were harmed: each is refused by what is wrong with it, and none ends the process or
 //! fills the memory.
 
-use actq::import::onnx::{Choice, import_bytes, proto};
+use actq_onnx::{Choice, import_bytes, proto};
 use anyhow::Result;
 use proptest::prelude::*;
 use tempfile::TempDir;
@@ -211,7 +211,7 @@ fn what_a_node_gives_is_bounded_before_it_is_built() {
 
 fn read(bytes: Vec<u8>) -> Result<()> {
     let dir = TempDir::new()?;
-    import_bytes(bytes, dir.path(), "test", &Choice::default()).map(drop)
+    Ok(import_bytes(bytes, dir.path(), "test", &Choice::default()).map(drop)?)
 }
 
 #[test]

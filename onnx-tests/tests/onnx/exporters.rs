@@ -1,8 +1,8 @@
 //! Forms that PyTorch's exporters and tf2onnx were found to write (docs/records/2026-11-22-exporters.md), against
 //! tract.
 
-use actq::import::onnx::{Choice, proto};
 use actq::measure::actions::actions;
+use actq_onnx::{Choice, proto};
 use anyhow::{Context as _, Result};
 use prost::Message as _;
 

@@ -1,6 +1,6 @@
 //! ONNX files for tests, as exporters write them.
 
-use actq::import::onnx::proto;
+use actq_onnx::proto;
 use prost::Message as _;
 use prost::bytes::Bytes;
 

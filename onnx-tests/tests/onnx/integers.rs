@@ -1,7 +1,7 @@
 //! Inputs of integers.
 
-use actq::import::onnx::Choice;
 use actq::measure::actions::actions;
+use actq_onnx::Choice;
 use anyhow::Result;
 
 use super::file::{File, Value};

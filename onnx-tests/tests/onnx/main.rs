@@ -15,10 +15,10 @@ mod styles;
 
 use std::path::Path;
 
-use actq::import::onnx::{Choice, Imported, import_bytes, proto};
 use actq::measure::actions::actions;
 use actq::policy::Policy;
 use actq_bench::golden::Random;
+use actq_onnx::{Choice, Imported, import_bytes, proto};
 use anyhow::{Context as _, Result, ensure};
 use prost::Message as _;
 use prost::bytes::Bytes;

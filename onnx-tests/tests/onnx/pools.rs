@@ -2,7 +2,7 @@
 
 use anyhow::{Context as _, Result};
 
-use actq::import::onnx::Choice;
+use actq_onnx::Choice;
 
 use super::file::Value;
 use super::styles::{OBS, begun, ended, ops};

@@ -1,16 +1,16 @@
 //! Each way in which exporters write a policy, against tract.
 
 use actq::data::{Recording, Sizes};
-use actq::import::onnx::Choice;
 use actq_bench::shared_policies;
+use actq_onnx::Choice;
 use anyhow::{Context as _, Result, ensure};
 use proptest::prelude::*;
 
 use super::file::{File, Value, encoded, tensor};
 use super::{by_tract, compare, drawn, imported, same};
-use actq::import::onnx::import;
 use actq::measure::actions::actions;
 use actq::policy::Policy;
+use actq_onnx::import;
 
 pub(super) const OBS: usize = 11;
 
@@ -342,9 +342,9 @@ fn no_batch_products_of_values_and_external_data_are_taken() -> Result<()> {
     let data: Vec<f32> = (0..3 * OBS).map(|i| i as f32 / 20.0 - 0.7).collect();
     let mut file = begun();
     let entry = |key: &str, value: &str| {
-        encoded(&actq::import::onnx::proto::Entry { key: Some(key.to_owned()), value: Some(value.to_owned()) })
+        encoded(&actq_onnx::proto::Entry { key: Some(key.to_owned()), value: Some(value.to_owned()) })
     };
-    let outside = actq::import::onnx::proto::Tensor {
+    let outside = actq_onnx::proto::Tensor {
         raw_data: None,
         external_data: vec![entry("location", "model.data"), entry("offset", "16")],
         data_location: Some(1),

@@ -1,7 +1,7 @@
 //! What became of an ONNX file.
 
-use crate::import::onnx::Imported;
-use crate::policy::Policy;
+use actq::policy::Policy;
+use actq_onnx::Imported;
 
 /// A summary: inputs in order, the output, states, ops, what was cut, what became the action contract.
 pub fn summary(imported: &Imported, policy: &Policy) -> String {

@@ -2,14 +2,14 @@
 
 use std::fmt::Write as _;
 
+use actq::measure::size::{bits_per_weight, hex};
+use actq::text::printable;
 use actq_kernels::Image;
 use actq_kernels::image::Matrix;
 use actq_kernels::image::{Kind, Op, OpKind, Region};
 
 use super::memory::{Peak, peak};
 use super::table::{group_name, table};
-use crate::measure::size::{bits_per_weight, hex};
-use crate::text::printable;
 
 /// Widths of a matrix's rows as text: `3`, or `2x200 4x56` where they differ.
 pub fn widths(matrix: &Matrix<'_>) -> String {

@@ -1,7 +1,8 @@
 //! What an image was learned from.
 
+use actq::data::Share;
+
 use super::table::table;
-use crate::data::Share;
 
 /// A line for every file, and one for all where there are several; nothing where one file was learned from as it is.
 pub fn learned(shares: &[Share]) -> String {

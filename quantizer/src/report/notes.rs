@@ -1,15 +1,13 @@
 //! Errors in a few lines, and what is worth a warning.
 
-use std::fmt;
-
-use crate::budget::Budget;
-use crate::data::{Dataset, Range, Recordings, runs};
-use crate::measure::check::{Check, Checked};
-use crate::measure::eval::{ActivationShare, ErrorReport};
-use crate::methods::Options;
-use crate::methods::best::balance::MixedUnits;
-use crate::pipeline::{QuantizedPolicy, Reason, Unused};
-use crate::policy::Policy;
+use actq::budget::Budget;
+use actq::data::{Dataset, Range, Recordings, runs};
+use actq::measure::check::{Check, Checked};
+use actq::measure::eval::{ActivationShare, ErrorReport};
+use actq::methods::Options;
+use actq::methods::best::balance::MixedUnits;
+use actq::pipeline::{QuantizedPolicy, Reason, Unused};
+use actq::policy::Policy;
 
 /// Held-out errors beyond this multiple of the calibration error, and this much above it, are worth a warning.
 const TIMES: f64 = 3.0;
@@ -18,15 +16,14 @@ const ABOVE: f64 = 0.002;
 /// Beyond this error the actions have little to do with the policy's.
 const USELESS: f64 = 0.1;
 
-impl fmt::Display for ActivationShare {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let types = match self.int16.len() {
-            0 => "int8".to_owned(),
-            n if n == self.linear => "int16".to_owned(),
-            _ => format!("int8; linear operations in int16: {}", runs(&self.int16)),
-        };
-        write!(f, "{:.0}% of the error ({types})", 100.0 * self.share)
-    }
+/// The share of the error that is due to rounded activations, and their types.
+pub fn activation_share(of: &ActivationShare) -> String {
+    let types = match of.int16.len() {
+        0 => "int8".to_owned(),
+        n if n == of.linear => "int16".to_owned(),
+        _ => format!("int8; linear operations in int16: {}", runs(&of.int16)),
+    };
+    format!("{:.0}% of the error ({types})", 100.0 * of.share)
 }
 
 /// Where a method needs a recording and there is none: how to make one, and why.
@@ -58,7 +55,7 @@ pub fn errors(check: &Check) -> String {
     let of = |name: &str, checked: &Checked| line(name, &checked.report, checked.recorded);
     let calib = check.calib.as_ref().map_or(String::new(), |checked| of("calibration nmse", checked));
     let heldout = check.heldout.as_ref().map_or(String::new(), |checked| of("held-out nmse", checked));
-    format!("{calib}{heldout}{:<17} {}\n", "activations", check.activations)
+    format!("{calib}{heldout}{:<17} {}\n", "activations", activation_share(&check.activations))
 }
 
 /// The error where the image itself has led.
@@ -213,6 +210,6 @@ mod tests {
             "held-out nmse     5.000e-1   (7 observations)\nactivations       -1% of the error (int8)\n"
         );
         one.activations.int16 = vec![0, 1, 2, 3, 4];
-        assert_eq!(one.activations.to_string(), "-1% of the error (int16)");
+        assert_eq!(activation_share(&one.activations), "-1% of the error (int16)");
     }
 }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::text::printable;
+use actq::text::printable;
 
 /// Between two lines.
 const INTERVAL: Duration = Duration::from_secs(10);

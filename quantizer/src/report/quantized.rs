@@ -1,16 +1,16 @@
 //! What became of a policy.
 
+use actq::budget::Rate;
+use actq::graph::Graph;
+use actq::measure::eval::ErrorReport;
+use actq::methods::actquant::ActionStatistics;
+use actq::methods::best::balance::balance_bytes;
+use actq::methods::{Choice, Learning, Sampled, Tried};
+use actq::pipeline::{QuantizedPolicy, Search, Try};
 use comfy_table::Table;
 
 use super::table::{group_name, table};
 use super::widths;
-use crate::budget::Rate;
-use crate::graph::Graph;
-use crate::measure::eval::ErrorReport;
-use crate::methods::actquant::ActionStatistics;
-use crate::methods::best::balance::balance_bytes;
-use crate::methods::{Choice, Learning, Sampled, Tried};
-use crate::pipeline::{QuantizedPolicy, Search, Try};
 
 /// ActQuant's scores, and the bits that they led to.
 pub fn scores(graph: &Graph, statistics: &ActionStatistics, quantized: &QuantizedPolicy) -> String {

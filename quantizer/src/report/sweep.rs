@@ -1,10 +1,10 @@
 //! A sweep as a table and as a plot.
 
+use actq::pipeline::sweep::{Curve, Point, Sweep, line};
 use comfy_table::Table;
 
 use super::plot::{Mark, Plot, Series, Vertical, stacked};
 use super::table;
-use crate::pipeline::sweep::{Curve, Point, Sweep, line};
 
 fn plot(sweep: &Sweep) -> Plot {
     let series = |curve: &Curve| Series { name: curve.method.clone(), points: line(curve) };
@@ -57,8 +57,8 @@ pub fn svg(sweeps: &[Sweep]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::eval::ErrorReport;
-    use crate::pipeline::sweep::knee;
+    use actq::measure::eval::ErrorReport;
+    use actq::pipeline::sweep::knee;
 
     fn curve(method: &str, points: &[(f64, f64)]) -> Curve {
         let point = |&(bpw, nmse): &(f64, f64)| {

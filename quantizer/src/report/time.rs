@@ -1,7 +1,8 @@
 //! The predicted time of a step.
 
+use actq::measure::time::StepTime;
+
 use super::table::table;
-use crate::measure::time::StepTime;
 
 /// The table that `actq inspect` prints.
 pub fn report(step: &StepTime) -> String {

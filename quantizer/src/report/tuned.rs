@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
+use actq::pipeline::tune::{Round, Tuned};
 use comfy_table::Table;
 use serde_json::{Value, json};
 
 use super::table;
-use crate::pipeline::tune::{Round, Tuned};
 
 /// What every table shows, from left to right.
 const HEADER: [&str; 7] = ["round", "episodes", "frames", "f32 path", "own path", "success", "seconds"];

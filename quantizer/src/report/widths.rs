@@ -4,17 +4,17 @@ mod picture;
 
 use std::fmt::Write as _;
 
+use actq::measure::size::distinct;
+use actq::methods::Outcome;
+use actq::pipeline::stats::{MatrixRecord, Stats};
+use actq::policy::Policy;
+use actq::text::printable;
 use actq_kernels::image::block_bytes;
 use actq_kernels::{Image, Width};
 use anyhow::{Context, Result, ensure};
 use comfy_table::Table;
 
 use super::table::table;
-use crate::measure::size::distinct;
-use crate::methods::Outcome;
-use crate::pipeline::stats::{MatrixRecord, Stats};
-use crate::policy::Policy;
-use crate::text::printable;
 
 /// A row of a matrix.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,7 +25,7 @@ struct Row {
     reasons: Option<Reasons>,
 }
 
-/// See [`crate::pipeline::stats::AllocationRecord`].
+/// See [`actq::pipeline::stats::AllocationRecord`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Reasons {
     energy: f64,

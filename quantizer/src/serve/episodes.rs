@@ -4,14 +4,10 @@ use std::fs::File;
 use std::io::{self, BufWriter};
 use std::path::Path;
 
+use actq::data::{CRC32, NpzWriter, longest_piece};
 use anyhow::Result;
-use ndarray::Array1;
-use ndarray_npy::WriteNpyExt as _;
-use zip::CompressionMethod;
-use zip::write::{SimpleFileOptions, ZipWriter};
 
 use super::spool::Spool;
-use crate::data::{CRC32, longest_piece};
 
 /// Episodes, one after the other. Only the last may be empty. Their values are on disk.
 #[derive(Debug)]
@@ -67,21 +63,12 @@ impl Episodes {
     /// would take longer than the policy itself.
     pub(super) fn write_npz(&mut self, crc: u32, to: &mut File) -> Result<()> {
         let pieces = self.pieces();
-        let mut npz = ZipWriter::new(BufWriter::new(to));
-        let begin = |npz: &mut ZipWriter<_>, name: &str| {
-            npz.start_file(
-                format!("{name}.npy"),
-                SimpleFileOptions::default().compression_method(CompressionMethod::Stored),
-            )
-        };
+        let mut npz = NpzWriter::new(BufWriter::new(to));
         for (name, spool) in &mut self.arrays {
-            begin(&mut npz, name)?;
-            spool.write_npy(&pieces, &mut npz)?;
+            spool.write_npy(&pieces, npz.begin(name)?)?;
         }
-        begin(&mut npz, "length")?;
-        pieces.iter().map(|&n| n as i64).collect::<Array1<i64>>().write_npy(&mut npz)?;
-        begin(&mut npz, CRC32)?;
-        Array1::from_elem(1, i64::from(crc)).write_npy(&mut npz)?;
+        npz.array("length", &[pieces.len()], pieces.iter().map(|&n| n as i64))?;
+        npz.array(CRC32, &[1], [i64::from(crc)])?;
         npz.finish()?.into_inner().map_err(io::IntoInnerError::into_error)?;
         Ok(())
     }

@@ -2,15 +2,14 @@
 
 use std::io::{ErrorKind, Read, Write};
 
+use actq::runtime::with_head;
 use actq_kernels::Image;
 use actq_link::{NO_ACTION, RESET, STEP};
 use anyhow::{Context, Result, bail};
 
-use crate::runtime::with_head;
-
 /// What the other side has done with the policy.
 #[derive(Clone, Copy, Debug)]
-pub enum Seen<'a> {
+pub(crate) enum Seen<'a> {
     /// It has reset it.
     Reset,
     /// It has shown it this observation, which was answered by an action.
@@ -20,7 +19,7 @@ pub enum Seen<'a> {
 }
 
 /// Serves until the input ends. `seen` is told of every request, once it has been answered.
-pub fn serve(
+pub(crate) fn serve(
     image: Image<'_>,
     mut input: impl Read,
     mut output: impl Write,

@@ -6,15 +6,15 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::thread;
 
+use actq::graph::Evaluator;
+use actq::policy::Policy;
 use actq_kernels::Image;
 use anyhow::{Context as _, Result, anyhow};
 
 use super::episodes::Episodes;
 use super::protocol::{Seen, serve};
 use super::recorders;
-use crate::emit::files;
-use crate::graph::Evaluator;
-use crate::policy::Policy;
+use crate::outputs::files;
 
 /// New frames from which on the file is written again; and, of a long recording, their share of what it holds. So what
 /// is lost when the process is killed, and how often a frame is written, are both in proportion.
@@ -23,17 +23,17 @@ const NEW_SHARE: usize = 20;
 /// Requests that may wait to be recorded. Where labels take longer than answers, answers wait from here on, so that
 /// little is lost when the process is killed.
 const QUEUE: usize = 256;
-/// Bytes that the arrays of a recording may take. The quantizer keeps [`crate::data::MOST_FRAMES`] frames, and reads no
+/// Bytes that the arrays of a recording may take. The quantizer keeps [`actq::data::MOST_FRAMES`] frames, and reads no
 /// archive of 4 GiB.
 const MOST_BYTES: usize = 1 << 30;
 
 /// Where to record to, and who labels.
 #[derive(Clone, Copy, Debug)]
-pub struct RecordPlan<'a> {
+pub(crate) struct RecordPlan<'a> {
     /// The file, which must not exist; where it does, a number is put behind its stem.
-    pub path: &'a Path,
+    pub(crate) path: &'a Path,
     /// The policy that the image was made from, whose output becomes the array "action"; without it there is none.
-    pub source: Option<&'a Policy>,
+    pub(crate) source: Option<&'a Policy>,
 }
 
 impl<'a> RecordPlan<'a> {
@@ -52,7 +52,7 @@ enum Event {
 /// As [`serve`], and everything that the image is shown goes into a recording. It is replaced as a whole, again and
 /// again, so that it can be read whenever the process ends. `note` is told what the user should know at once. Where
 /// nothing can be recorded any more, serving goes on, and the error is returned at the end.
-pub fn serve_recorded(
+pub(crate) fn serve_recorded(
     image: Image<'_>,
     plan: RecordPlan<'_>,
     input: impl Read,

@@ -14,7 +14,7 @@ pub(super) fn share(folder: &Path) -> Option<File> {
 }
 
 /// Waits until nobody records into `folder` any more, at most for `patience`; whether it is so.
-pub fn wait_for_recorders(folder: &Path, patience: Duration) -> bool {
+pub(crate) fn wait_for_recorders(folder: &Path, patience: Duration) -> bool {
     let Ok(folder) = File::open(folder) else { return true };
     let started = Instant::now();
     loop {

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Read as _, Seek as _, SeekFrom, Write};
 use std::path::Path;
 
-use crate::data::npy_header;
+use actq::data::npy_header;
 
 /// Bytes that are kept in memory before they are written.
 const BUFFER: usize = 1 << 16;
@@ -37,7 +37,7 @@ impl Spool {
     pub(super) fn write_npy(&mut self, lengths: &[usize], to: &mut impl Write) -> io::Result<()> {
         let longest = lengths.iter().copied().max().unwrap_or(0);
         let bytes = |steps: usize| 4 * (steps * self.width) as u64;
-        to.write_all(&npy_header(&[lengths.len(), longest, self.width]))?;
+        to.write_all(&npy_header("<f4", &[lengths.len(), longest, self.width]))?;
         self.rows.seek(SeekFrom::Start(0))?;
         for &length in lengths {
             let copied = io::copy(&mut self.rows.get_ref().take(bytes(length)), to)?;
@@ -81,7 +81,7 @@ mod tests {
             spool.push(&[row]).expect("written");
             let mut npy = Vec::new();
             spool.write_npy(lengths, &mut npy).expect("all rows");
-            let header = npy_header(&[lengths.len(), lengths.iter().copied().max().unwrap_or(0), 1]);
+            let header = npy_header("<f4", &[lengths.len(), lengths.iter().copied().max().unwrap_or(0), 1]);
             assert!(npy.starts_with(&header));
             npy[header.len()..].chunks(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect::<Vec<_>>()
         };

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
 
-use actq::report::table::{group_name, table};
 use actq_bench::cycles::{CODE_LINES, Code};
 use actq_bench::qemu::{self, Counter};
 use actq_bench::{Target, firmware, root, ur3};
+use actq_cli::report::table::{group_name, table};
 use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 

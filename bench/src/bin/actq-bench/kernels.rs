@@ -1,9 +1,9 @@
 //! Whole calls of the kernels on the Cortex-M4, counted and modelled.
 
-use actq::report::table::{group_name, table};
 use actq_bench::cycles::Code;
 use actq_bench::qemu::{self, Counter};
 use actq_bench::{Target, firmware};
+use actq_cli::report::table::{group_name, table};
 use anyhow::{Result, bail, ensure};
 use serde::Serialize;
 

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use actq::report::table::table;
 use actq_bench::stack::{Priority, Worst, worst_case};
 use actq_bench::{Target, firmware};
+use actq_cli::report::table::table;
 use anyhow::{Context as _, Result, ensure};
 
 /// Of the application for a board.

@@ -58,7 +58,7 @@ fn small_within(limit: Option<f32>) -> Result<Vec<u8>> {
     let (mut policy, outcomes) = builder.finish("small".to_owned(), false);
     policy.contract.low = limit.map(|limit| vec![-limit; ACT_DIM]);
     policy.contract.high = limit.map(|limit| vec![limit; ACT_DIM]);
-    actq::emit::image(&policy, &outcomes)
+    Ok(actq::emit::image(&policy, &outcomes)?)
 }
 
 /// The image with another expected action in its self-test.

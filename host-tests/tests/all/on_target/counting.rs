@@ -4,7 +4,6 @@ use std::collections::BTreeSet;
 
 use actq::budget::Budget;
 use actq::data::Recordings;
-use actq::emit::files;
 use actq::measure::eval;
 use actq::methods::{Method, Options};
 use actq::pipeline::quantize;
@@ -13,6 +12,7 @@ use actq::runtime::ImageBuffer;
 use actq_bench::cycles::Code;
 use actq_bench::qemu::Counter;
 use actq_bench::{Target, evaluation, firmware, ur3};
+use actq_cli::outputs::files;
 use actq_kernels::Width;
 use anyhow::Result;
 

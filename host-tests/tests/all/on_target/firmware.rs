@@ -81,7 +81,7 @@ fn large(rows: usize, cols: usize) -> Result<Vec<u8>> {
     let mut builder = Builder::new(cols);
     builder.linear((rows, cols), Activations::Int8, |_| Some(Width::W8), 0, false)?;
     let (policy, outcomes) = builder.finish("large".to_owned(), false);
-    actq::emit::image(&policy, &outcomes)
+    Ok(actq::emit::image(&policy, &outcomes)?)
 }
 
 #[test]

@@ -2,7 +2,6 @@
 
 use actq::budget::Budget;
 use actq::data::Recordings;
-use actq::emit::files;
 use actq::methods::{Method, Options};
 use actq::pipeline::quantize;
 use actq::policy::Policy;
@@ -10,6 +9,7 @@ use actq::runtime::ImageBuffer;
 use actq_bench::cycles::Code;
 use actq_bench::qemu::{self, Counter};
 use actq_bench::{Target, firmware, shared_policies};
+use actq_cli::outputs::files;
 use actq_firmware_bench::functions::{DENOISED, EXTREMES, LEN, hash, magnitudes, values};
 use actq_kernels::Width;
 use actq_kernels::math::Function;

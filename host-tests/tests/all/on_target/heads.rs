@@ -40,7 +40,7 @@ fn octos_head_takes_what_was_predicted_and_gives_the_hosts_bits() -> Result<()> 
         let image = buffer.image("octo".as_ref())?;
         let (costs, actions) = profile::regions(&elf, &counter, &bytes, "serve", std::slice::from_ref(&observation))?;
         let bits = |action: &[f32]| action.iter().map(|a| a.to_bits()).collect::<Vec<_>>();
-        let expected = with_head(image, |head| Ok(bits(head.step(&observation)?)))?;
+        let expected = with_head::<_, anyhow::Error>(image, |head| Ok(bits(head.step(&observation)?)))?;
         ensure!(bits(&actions[0]) == expected, "other bits in {steps} steps");
         let time = StepTime::new(&image, CLOCK);
         near(&format!("a chunk in {steps} steps"), time.instructions, costs[0].instructions)?;
@@ -69,5 +69,5 @@ fn ofts_head_has_its_matrices_once() -> Result<()> {
     let self_test = 4 * image.self_test_steps() * (image.obs_len() + image.act_len());
     ensure!(self_test <= 64 << 10, "{self_test} bytes of self-test");
     ensure!(bytes.len() - self_test < 3 * policy.weights, "{} bytes", bytes.len());
-    with_head(image, |head| Ok(head.self_test()?))
+    with_head::<_, anyhow::Error>(image, |head| Ok(head.self_test()?))
 }

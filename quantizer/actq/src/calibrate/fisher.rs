@@ -1,0 +1,348 @@
+//! Stage 2 of ActQuant: the importance of every weight, by the Fisher information of the action loss.
+
+use std::borrow::Cow;
+
+use ndarray::{Array2, Array3, Axis, Zip, linalg::general_mat_mul, s};
+
+use crate::data::Dataset;
+use crate::error::{Context, Result};
+use crate::graph::{Graph, Network, Pass, Weights, start_state, zero_state};
+use crate::random::Random;
+
+/// Steps that a recurrent network's gradient runs back.
+const WINDOW: usize = 16;
+
+/// Which gradients are taken, and of what.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sampling {
+    /// Frames whose gradient is taken, about so many at most; evenly spaced.
+    pub samples: usize,
+    /// Frames whose gradients are averaged before they are squared, at least 1: 1 for the Fisher information, more for
+    /// what a training loop's batches give. Successive frames; of a recurrent network as many episodes at the same
+    /// time.
+    pub batch: usize,
+    /// Where the recorded actions are the network's own.
+    pub signs: Signs,
+}
+
+/// The derivative of `|y - t|` where y is t, or as good as t.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Signs {
+    /// 1 or -1, both with equal probability (of a fixed seed). The square's expectation is `sum over d of (dy_d/dw)^2`.
+    Random,
+    /// What automatic differentiation gives: the sign of however small a difference, and 0 where there is none.
+    Loss,
+}
+
+/// An output that is off its record by less than this share of the dimension's standard deviation counts as equal.
+const EQUAL: f32 = 1e-3;
+
+/// The mean over frames (or batches) of `(dL/dw)^2` for every weight, `L = sum over d of |y_d - t_d|`, as
+/// `[rows, cols]` per matrix: the action-mixed Fisher information of ActQuant (arXiv 2605.24011) at alpha = 1, that is,
+/// without a token loss.
+///
+/// `dL/dy_d` is the sign of `y_d - t_d`. Recorded actions are mostly the policy's own, where `L` has its kink:
+/// [`Signs`].
+///
+/// A recurrent network's gradient is truncated: episodes are run from their starting state, cut into windows of 16
+/// steps, and each window's last frame is one sample whose gradient runs back to the start of the window. Shorter rests
+/// are left out. All else is exact: contributions of several steps or uses are summed before they are squared.
+///
+/// `progress` gets the share done.
+pub fn importance(
+    graph: &Graph,
+    dataset: &Dataset,
+    sampling: Sampling,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Vec<Array2<f32>>> {
+    let weights = Weights::of(graph);
+    let network = Network::new(graph);
+    let recurrent = graph.state_len() > 0;
+    let dataset = &if sampling.batch > 1 && !recurrent {
+        Cow::Owned(side_by_side(dataset, sampling.batch))
+    } else {
+        Cow::Borrowed(dataset)
+    };
+    let longest = dataset.length.iter().copied().max().unwrap_or(0);
+    let window = if recurrent { WINDOW.min(longest) } else { 1 };
+    let every = (dataset.frames() / window.max(1)).div_ceil(sampling.samples.max(1)).max(1);
+    let equal = deviations(dataset).context("array \"action\" is missing")?.map(|d| EQUAL * d);
+
+    let mut alive: Vec<usize> = (0..dataset.length.len()).collect();
+    let starts: Vec<_> = alive.iter().map(|&episode| dataset.start(episode)).collect();
+    let mut state = start_state(graph, &starts);
+    let mut fisher = weights.zeros_like().matrices;
+    // The gradients themselves are not asked for, but the backward pass adds to them.
+    let mut unused = weights.zeros_like();
+    let mut random = Random::new(0);
+    let mut batches = 0;
+    for (index, start) in (0..longest).step_by(window.max(1)).enumerate() {
+        let staying: Vec<usize> = (0..alive.len()).filter(|&i| dataset.length[alive[i]] >= start + window).collect();
+        if staying.is_empty() {
+            break;
+        }
+        alive = staying.iter().map(|&i| alive[i]).collect();
+        for array in state.iter_mut().flatten() {
+            *array = array.select(Axis(0), &staying);
+        }
+        let passes: Vec<Pass> = (start..start + window)
+            .map(|step| network.forward(&weights, rows(&dataset.obs, &alive, step), &mut state))
+            .collect();
+        if index % every == 0 {
+            let output = passes[passes.len() - 1].output();
+            let recorded =
+                rows(dataset.action.as_ref().context("array \"action\" is missing")?, &alive, start + window - 1);
+            let sign = Array2::from_shape_fn(output.raw_dim(), |at| {
+                let difference = output[at] - recorded[at];
+                match sampling.signs {
+                    Signs::Random if difference.abs() <= equal[at.1] => random.sign(),
+                    Signs::Loss if difference == 0.0 => 0.0,
+                    _ => difference.signum(),
+                }
+            });
+            add_squares(&network, &weights, &passes, (sign, sampling.batch), &mut unused, &mut fisher);
+            batches += alive.len().div_ceil(sampling.batch);
+        }
+        progress((start + window) as f64 / longest as f64);
+    }
+    for matrix in &mut fisher {
+        *matrix /= batches.max(1) as f32;
+    }
+    Ok(fisher)
+}
+
+/// The frames of all episodes, `count` successive ones at every step.
+fn side_by_side(dataset: &Dataset, count: usize) -> Dataset {
+    let frames: Vec<(usize, usize)> = dataset
+        .length
+        .iter()
+        .enumerate()
+        .flat_map(|(episode, &steps)| (0..steps).map(move |step| (episode, step)))
+        .collect();
+    let steps = frames.len().div_ceil(count);
+    let rearranged = |array: &Array3<f32>| {
+        let mut to = Array3::zeros((count, steps, array.dim().2));
+        for (i, &(episode, step)) in frames.iter().enumerate() {
+            to.slice_mut(s![i % count, i / count, ..]).assign(&array.slice(s![episode, step, ..]));
+        }
+        to
+    };
+    Dataset {
+        path: dataset.path.clone(),
+        obs: rearranged(&dataset.obs),
+        action: dataset.action.as_ref().map(rearranged),
+        length: (0..count).map(|i| (frames.len() - i.min(frames.len())).div_ceil(count)).collect(),
+        state: None,
+    }
+}
+
+/// Runs back from the last of `passes` and adds to `fisher` the squares of gradients, each averaged over a batch of so
+/// many samples.
+fn add_squares(
+    network: &Network<'_>,
+    weights: &Weights,
+    passes: &[Pass],
+    (d_output, batch): (Array2<f32>, usize),
+    unused: &mut Weights,
+    fisher: &mut [Array2<f32>],
+) {
+    let samples = d_output.nrows();
+    let mut d_state = zero_state(network.graph, samples);
+    // Per matrix: the gradient at the output and the input of each use.
+    let mut uses: Vec<Vec<(Array2<f32>, Array2<f32>)>> = vec![Vec::new(); fisher.len()];
+    let silent = Array2::zeros(d_output.raw_dim());
+    let mut d_output = Some(d_output);
+    for pass in passes.iter().rev() {
+        let d_output = d_output.take().unwrap_or_else(|| silent.clone());
+        network.backward(weights, pass, d_output, &mut d_state, unused, &mut |matrix, x, dy| {
+            if dy.iter().any(|d| *d != 0.0) {
+                uses[matrix].push((dy.clone(), x.clone()));
+            }
+        });
+    }
+    for (uses, fisher) in uses.iter().zip(fisher) {
+        match &uses[..] {
+            [] => {}
+            // The square of an outer product is the outer product of the squares.
+            [(dy, x)] if batch == 1 => general_mat_mul(1.0, &dy.mapv(|d| d * d).t(), &x.mapv(|x| x * x), 1.0, fisher),
+            many => {
+                for first in (0..samples).step_by(batch) {
+                    let batch = first..samples.min(first + batch);
+                    let count = batch.len() as f32;
+                    let steps: Vec<_> = many
+                        .iter()
+                        .flat_map(|(dy, x)| batch.clone().map(move |sample| (dy.row(sample), x.row(sample))))
+                        .collect();
+                    let dy = Array2::from_shape_fn((steps.len(), fisher.nrows()), |(t, r)| steps[t].0[r]);
+                    let x = Array2::from_shape_fn((steps.len(), fisher.ncols()), |(t, c)| steps[t].1[c]);
+                    Zip::from(&mut *fisher).and(&dy.t().dot(&x)).for_each(|sum, d| *sum += (d / count) * (d / count));
+                }
+            }
+        }
+    }
+}
+
+/// One step of the chosen episodes, `[episode, value]`.
+fn rows(array: &Array3<f32>, episodes: &[usize], step: usize) -> Array2<f32> {
+    array.index_axis(Axis(1), step).select(Axis(0), episodes).as_standard_layout().into_owned()
+}
+
+/// The standard deviation of every dimension of the recorded actions.
+fn deviations(dataset: &Dataset) -> Option<ndarray::Array1<f32>> {
+    let width = dataset.action.as_ref()?.dim().2;
+    let mut sums = vec![(0f64, 0f64); width];
+    for (episode, &length) in dataset.length.iter().enumerate() {
+        for step in 0..length {
+            for ((sum, square), a) in sums.iter_mut().zip(dataset.action_at(episode, step)?) {
+                *sum += f64::from(a);
+                *square += f64::from(a).powi(2);
+            }
+        }
+    }
+    let n = dataset.frames().max(1) as f64;
+    Some(sums.iter().map(|(sum, square)| (square / n - (sum / n).powi(2)).max(0.0).sqrt() as f32).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::methods::actquant::testing::{dataset, lstm, mlp};
+
+    const PLAIN: Sampling = Sampling { samples: 4096, batch: 1, signs: Signs::Random };
+
+    /// The sum over the recorded dimensions of the action error's magnitude at the last frame of a window.
+    fn loss(
+        graph: &Graph,
+        weights: &Weights,
+        dataset: &Dataset,
+        episode: usize,
+        window: std::ops::Range<usize>,
+    ) -> f64 {
+        let network = Network::new(graph);
+        let mut state = start_state(graph, &[dataset.start(episode)]);
+        let mut sum = 0.0;
+        for step in 0..window.end {
+            let pass = network.forward(weights, rows(&dataset.obs, &[episode], step), &mut state);
+            let recorded = dataset.action_at(episode, step).expect("actions");
+            sum = pass.output().iter().zip(recorded).map(|(y, t)| f64::from((y - t).abs())).sum();
+        }
+        sum
+    }
+
+    fn compare(graph: &Graph, steps: usize, window: usize, state: Option<Array2<f32>>, batch: usize) {
+        // Recorded actions far from the policy's own: no kink nearby, no random signs.
+        let mut dataset = Dataset { state, ..dataset(graph, 2, steps) };
+        let action = dataset.action.as_mut().expect("actions");
+        action.indexed_iter_mut().for_each(|((e, s, d), a)| *a += if (e + s + d) % 3 == 0 { 3.0 } else { -4.0 });
+        let sampling = Sampling { batch, ..PLAIN };
+        let found = importance(graph, &dataset, sampling, &mut |_| {}).expect("importance");
+        let weights = Weights::of(graph);
+        let step = 4e-3;
+        let starts = || (0..=steps - window).step_by(window);
+        let samples: Vec<(usize, usize)> = match graph.state_len() {
+            0 => (0..2).flat_map(|episode| starts().map(move |start| (episode, start))).collect(),
+            _ => starts().flat_map(|start| (0..2).map(move |episode| (episode, start))).collect(),
+        };
+        for (m, found) in found.iter().enumerate() {
+            for (at, exact) in found.indexed_iter().map(|(at, v)| (at, f64::from(*v))) {
+                let gradient = |&(episode, start): &(usize, usize)| {
+                    let moved = |d: f32| {
+                        let mut moved = weights.clone();
+                        moved.matrices[m][at] += d;
+                        loss(graph, &moved, &dataset, episode, start..start + window)
+                    };
+                    (moved(step) - moved(-step)) / (2.0 * f64::from(step))
+                };
+                let squares = samples.chunks(batch).map(|batch| {
+                    let mean = batch.iter().map(gradient).sum::<f64>() / batch.len() as f64;
+                    mean.powi(2)
+                });
+                let expected = squares.sum::<f64>() / samples.len().div_ceil(batch) as f64;
+                assert!((exact - expected).abs() < 2e-3 + 0.02 * expected, "{m} {at:?}: {exact} against {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn agrees_with_finite_differences() {
+        // Batches of 4 reach over the end of an episode, and the last one is short.
+        for batch in [1, 2, 4] {
+            compare(&mlp(), 3, 1, None, batch);
+        }
+        // One window from the start, which is zero or recorded: nothing is truncated.
+        let state = Array2::from_shape_fn((2, 6), |(e, v)| 0.8 - 0.25 * (v + e) as f32);
+        for batch in [1, 2] {
+            compare(&lstm(), 5, 5, None, batch);
+            compare(&lstm(), 5, 5, Some(state.clone()), batch);
+        }
+    }
+
+    #[test]
+    fn samples_are_a_limit() {
+        let graph = mlp();
+        let mut dataset = dataset(&graph, 1, 12);
+        dataset.action.as_mut().expect("actions").mapv_inplace(|a| a + 3.0);
+        let few = Sampling { samples: 4, ..PLAIN };
+        let found = importance(&graph, &dataset, few, &mut |_| {}).expect("importance");
+        // Every third frame alone.
+        let third = |array: &Array3<f32>| array.slice(s![.., ..;3, ..]).to_owned();
+        let thirds = Dataset {
+            obs: third(&dataset.obs),
+            action: dataset.action.as_ref().map(third),
+            length: vec![4],
+            ..dataset.clone()
+        };
+        assert_eq!(found, importance(&graph, &thirds, PLAIN, &mut |_| {}).expect("importance"));
+        assert_ne!(found, importance(&graph, &dataset, PLAIN, &mut |_| {}).expect("importance"));
+    }
+
+    #[test]
+    fn random_signs_give_the_sum_of_the_outputs_squares() {
+        let graph = mlp();
+        // Many times the same observation, actions equal to the policy's own. They do not deviate, so even a last bit
+        // would count as a difference: they come from the very pass that they are compared with.
+        let mut dataset = dataset(&graph, 1, 1);
+        let weights = Weights::of(&graph);
+        let network = Network::new(&graph);
+        let pass = network.forward(&weights, rows(&dataset.obs, &[0], 0), &mut zero_state(&graph, 1));
+        dataset.action = Some(pass.output().clone().insert_axis(Axis(0)));
+        for array in [Some(&mut dataset.obs), dataset.action.as_mut()].into_iter().flatten() {
+            *array = ndarray::concatenate(Axis(1), &vec![array.view(); 4000]).expect("same shapes");
+        }
+        dataset.length = vec![4000];
+        let found = importance(&graph, &dataset, PLAIN, &mut |_| {}).expect("importance");
+        let mut expected = Array2::<f32>::zeros(found[0].raw_dim());
+        for d in 0..2 {
+            let mut grads = weights.zeros_like();
+            let unit = Array2::from_shape_fn((1, 2), |(_, k)| if k == d { 1.0 } else { 0.0 });
+            network.backward(&weights, &pass, unit, &mut zero_state(&graph, 1), &mut grads, &mut |_, _, _| {});
+            expected += &grads.matrices[0].mapv(|g| g * g);
+        }
+        let largest = expected.iter().copied().fold(0.0, f32::max);
+        for (found, expected) in found[0].iter().zip(&expected) {
+            assert!((found - expected).abs() < 0.05 * largest, "{found} against {expected}");
+        }
+
+        // Without random signs equal actions say nothing, and the least difference all.
+        let loss = Sampling { signs: Signs::Loss, ..PLAIN };
+        let found = importance(&graph, &dataset, loss, &mut |_| {}).expect("importance");
+        assert!(found.iter().all(|matrix| matrix.iter().all(|i| *i == 0.0)), "{found:?}");
+        dataset.action.as_mut().expect("actions").mapv_inplace(|a| a + 1e-6);
+        let found = importance(&graph, &dataset, loss, &mut |_| {}).expect("importance");
+        let mut grads = weights.zeros_like();
+        let both = Array2::ones((1, 2));
+        network.backward(&weights, &pass, both, &mut zero_state(&graph, 1), &mut grads, &mut |_, _, _| {});
+        for (found, gradient) in found[0].iter().zip(&grads.matrices[0]) {
+            assert!((found - gradient * gradient).abs() < 1e-3 * largest, "{found} against {gradient} squared");
+        }
+    }
+
+    #[test]
+    fn episodes_of_different_lengths_are_taken_as_far_as_they_go() {
+        let graph = lstm();
+        let mut dataset = dataset(&graph, 3, 40);
+        dataset.length = vec![40, 7, 20];
+        let found = importance(&graph, &dataset, PLAIN, &mut |_| {}).expect("importance");
+        assert!(found.iter().all(|m| m.iter().all(|v| v.is_finite()) && m.sum() > 0.0));
+    }
+}

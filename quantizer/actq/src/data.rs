@@ -1,0 +1,24 @@
+//! Recorded observations, for calibration and held out. `docs/QUANTIZER.md`, section Recordings, describes the files.
+
+mod arrays;
+#[cfg(test)]
+mod damaged;
+mod dataset;
+mod joined;
+mod npy;
+mod npz;
+mod origin;
+mod range;
+mod recording;
+mod save;
+#[cfg(test)]
+mod tests;
+mod thinning;
+
+pub use dataset::{Dataset, Sizes};
+pub use joined::{Learned, MOST_FRAMES, Share, joined, longest_piece};
+pub use npy::npy_header;
+pub use origin::{CRC32, driven_by};
+pub use range::{Outside, Range, runs};
+pub use recording::{Recording, Recordings, files_of};
+pub use save::{Element, NpzWriter};

@@ -1,0 +1,89 @@
+//! The arrays of a recording, out of the files that it may come in.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io::BufReader;
+use std::path::Path;
+
+use super::npy;
+use super::npz::Archive;
+use crate::error::{Context, Result, bail, ensure};
+use crate::import::tensors::TensorFile;
+use crate::import::values::{Tensor, Values};
+
+/// The names that mean something; other arrays are left alone, whatever their type.
+const NAMES: [&str; 5] = ["obs", "action", "length", "state", "noise"];
+
+/// The endings of recordings' names.
+pub(super) const ENDINGS: [&str; 3] = ["npz", "npy", "safetensors"];
+
+/// The named arrays of a file.
+pub(super) struct Arrays {
+    /// All names in the file.
+    names: Vec<String>,
+    known: BTreeMap<&'static str, Tensor>,
+}
+
+impl Arrays {
+    /// The ending of the file's name says which format it has.
+    pub(super) fn read(path: &Path) -> Result<Self> {
+        ensure!(fs::metadata(path).context("cannot be read")?.len() > 0, "the file is empty");
+        match path.extension().and_then(|e| e.to_str()) {
+            Some("npz") => npz(path),
+            Some("npy") => npy(path),
+            Some("safetensors") => safetensors(path),
+            _ => bail!("a recording's name ends in .npz, .npy or .safetensors"),
+        }
+    }
+
+    pub(super) fn take(&mut self, name: &str) -> Option<Tensor> {
+        self.known.remove(name)
+    }
+
+    /// What the file holds, for messages.
+    pub(super) fn names(&self) -> String {
+        if self.names.is_empty() { "nothing".to_owned() } else { self.names.join(", ") }
+    }
+}
+
+/// One array of a file, without the others; `None` where there is none of this name.
+pub(super) fn one(path: &Path, name: &str) -> Result<Option<Tensor>> {
+    match path.extension().and_then(|e| e.to_str()) {
+        Some("npz") => Archive::open(File::open(path).context("cannot be read")?)?.read(name),
+        Some("safetensors") => Ok(TensorFile::new(&fs::read(path).context("cannot be read")?)?.get(name)),
+        _ => Ok(None),
+    }
+}
+
+/// The values of an array as f32; what f32 cannot hold becomes infinite.
+pub(super) fn floats(array: &Tensor, name: &str) -> Result<Vec<f32>> {
+    let of_recordings = matches!(array.values, Values::F32(_) | Values::F64(_));
+    let values = if of_recordings { array.values.to_f32() } else { None };
+    let found = array.values.type_name();
+    values.with_context(|| format!("array {name:?} is of type {found}, float32 or float64 is needed"))
+}
+
+fn npz(path: &Path) -> Result<Arrays> {
+    let mut archive = Archive::open(File::open(path).context("cannot be read")?)?;
+    let mut known = BTreeMap::new();
+    for name in NAMES {
+        let array = archive.read(name).with_context(|| format!("array {name:?} cannot be read"))?;
+        known.extend(array.map(|array| (name, array)));
+    }
+    Ok(Arrays { names: archive.names().map(str::to_owned).collect(), known })
+}
+
+/// One array without a name: the observations.
+fn npy(path: &Path) -> Result<Arrays> {
+    let file = File::open(path).context("cannot be read")?;
+    let bytes = file.metadata().context("cannot be read")?.len();
+    let obs = npy::read(&mut BufReader::new(file), bytes).context("not an .npy array, or one that was cut off")?;
+    Ok(Arrays { names: vec!["obs".to_owned()], known: BTreeMap::from([("obs", obs)]) })
+}
+
+fn safetensors(path: &Path) -> Result<Arrays> {
+    let bytes = fs::read(path).context("cannot be read")?;
+    let file = TensorFile::new(&bytes).context("not a .safetensors file, or one that was cut off")?;
+    let known = NAMES.into_iter().filter_map(|name| Some((name, file.get(name)?))).collect();
+    Ok(Arrays { names: file.names(), known })
+}

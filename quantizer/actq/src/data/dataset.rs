@@ -1,0 +1,264 @@
+//! Recorded observations, for calibration and held out. `docs/QUANTIZER.md`, section Recordings, describes the files.
+
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+
+use actq_kernels::Image;
+use actq_kernels::ops::noise::normal;
+use ndarray::{Array2, Array3, ArrayView1, Axis, concatenate, s};
+
+use super::arrays::{Arrays, floats};
+use crate::error::{Context, Result, bail, ensure};
+use crate::graph::{Evaluator, Graph};
+use crate::import::values::{Tensor, Values};
+use crate::policy::Policy;
+
+/// What a recording's arrays must fit.
+#[derive(Clone, Copy, Debug)]
+pub struct Sizes {
+    /// Values of an observation.
+    pub obs: usize,
+    /// Values of noise that an evaluation takes ([`Graph::noise_len`]).
+    pub noise: usize,
+    /// Values of the network's raw output.
+    pub out: usize,
+    /// Values of the recurrent state ([`Graph::state_len`]).
+    pub state: usize,
+}
+
+impl Sizes {
+    /// Those of a policy.
+    pub fn of(policy: &Policy) -> Self {
+        let graph = &policy.graph;
+        Self {
+            obs: graph.obs_len,
+            noise: graph.noise_len(),
+            out: policy.chunk * policy.act_len,
+            state: graph.state_len(),
+        }
+    }
+
+    /// Those of an image.
+    pub fn of_image(image: &Image<'_>) -> Self {
+        Self { obs: image.obs_len(), noise: image.noise_len(), out: image.output().len, state: image.state().len }
+    }
+}
+
+/// Episodes of observations, with the f32 policy's own actions where they were recorded.
+#[derive(Clone, Debug)]
+pub struct Dataset {
+    /// The file, for messages.
+    pub path: PathBuf,
+    /// `[episode, step, value]`; behind the values of an observation stands the noise of an iterative head.
+    pub obs: Array3<f32>,
+    /// `[episode, step, value]`: the network's raw output at that observation.
+    pub action: Option<Array3<f32>>,
+    /// Valid steps of each episode.
+    pub length: Vec<usize>,
+    /// `[episode, value]`: the recurrent state before an episode's first step, in the order of [`Graph::state_len`].
+    /// Zero where there is none.
+    pub state: Option<Array2<f32>>,
+}
+
+impl Dataset {
+    /// Reads a recording and checks it against what it must fit. Every error names the file and what is wrong in it.
+    pub fn load(path: &Path, sizes: Sizes) -> Result<Self> {
+        Self::read(path, sizes).with_context(|| path.display().to_string())
+    }
+
+    fn read(path: &Path, sizes: Sizes) -> Result<Self> {
+        let mut arrays = Arrays::read(path)?;
+        let Some(obs) = arrays.take("obs") else {
+            bail!("array \"obs\" is missing; the file holds {}", arrays.names())
+        };
+        let [episodes, steps, width] = match obs.shape[..] {
+            [episodes, steps, width] => [episodes, steps, width],
+            [frames, width] => [1, frames, width],
+            _ => bail!(
+                "array \"obs\" is {:?}; [episode, step, value], or [frame, value] for one episode, is needed",
+                obs.shape
+            ),
+        };
+        ensure!(episodes > 0 && steps > 0, "array \"obs\" is empty: {:?}", obs.shape);
+        ensure!(width == sizes.obs, "array \"obs\" has {width} values a step, the policy takes {}", sizes.obs);
+        let noise = arrays.take("noise").filter(|_| sizes.noise > 0);
+        let beside_obs = |array: &Option<Tensor>, name: &str, width: usize, what: &str| -> Result<()> {
+            let Some(array) = array else { return Ok(()) };
+            let mut expected = obs.shape.clone();
+            *expected.last_mut().unwrap_or(&mut 0) = width;
+            ensure!(
+                array.shape == expected,
+                "array {name:?} is {:?}, {expected:?} is needed: {what} at every observation",
+                array.shape
+            );
+            Ok(())
+        };
+        beside_obs(&noise, "noise", sizes.noise, "what the policy began from")?;
+        // Actions from noise that nobody knows say nothing.
+        let action = arrays.take("action").filter(|_| sizes.noise == 0 || noise.is_some());
+        beside_obs(&action, "action", sizes.out, "the network's raw output")?;
+        let state = arrays.take("state");
+        if let Some(state) = &state {
+            ensure!(sizes.state > 0, "array \"state\" is there, but the policy has no recurrent state");
+            let expected = [episodes, sizes.state];
+            ensure!(
+                state.shape == expected,
+                "array \"state\" is {:?}, {expected:?} is needed: the recurrent state before each episode's first step, \
+                 hidden then cell state of each lstm, the state of each gru, in the order of the ops",
+                state.shape
+            );
+        }
+        let length = match arrays.take("length") {
+            None => vec![steps; episodes],
+            Some(length) => lengths(&length, episodes, steps)?,
+        };
+        ensure!(length.iter().any(|n| *n > 0), "it holds no frame: every episode has the length 0");
+
+        let rows = |name: &str, array: &Tensor| -> Result<Array3<f32>> {
+            let values = floats(array, name)?;
+            let shaped = Array3::from_shape_vec((episodes, steps, values.len() / (episodes * steps)), values)?;
+            let bad = shaped.indexed_iter().enumerate().find(|(_, ((e, s, _), v))| !v.is_finite() && *s < length[*e]);
+            if let Some((i, ((episode, step, value), _))) = bad {
+                bail!("array {name:?} {} at episode {episode}, step {step}, value {value}", array.values.not_f32(i));
+            }
+            Ok(shaped)
+        };
+        let starts = |array: Tensor| -> Result<Array2<f32>> {
+            let values = floats(&array, "state")?;
+            if let Some(i) = values.iter().position(|v| !v.is_finite()) {
+                let (episode, value) = (i / sizes.state, i % sizes.state);
+                bail!("array \"state\" {} at episode {episode}, value {value}", array.values.not_f32(i));
+            }
+            Ok(Array2::from_shape_vec((episodes, sizes.state), values)?)
+        };
+        let mut obs = rows("obs", &obs)?;
+        if sizes.noise > 0 {
+            let noise = match noise {
+                Some(noise) => rows("noise", &noise)?,
+                None => Array3::from_shape_fn((episodes, steps, sizes.noise), |(e, s, i)| {
+                    normal(0, (e * steps + s) as u32, i as u32)
+                }),
+            };
+            obs = concatenate(Axis(2), &[obs.view(), noise.view()])?.as_standard_layout().into_owned();
+        }
+        Ok(Self {
+            path: path.to_owned(),
+            obs,
+            action: action.map(|action| rows("action", &action)).transpose()?,
+            state: state.map(starts).transpose()?,
+            length,
+        })
+    }
+
+    /// The file's name without its folder, for messages.
+    pub fn name(&self) -> Cow<'_, str> {
+        self.path.file_name().unwrap_or(self.path.as_os_str()).to_string_lossy()
+    }
+
+    /// All valid steps.
+    pub fn frames(&self) -> usize {
+        self.length.iter().sum()
+    }
+
+    /// Refuses a recording of fewer than `least` frames; `why` says what they are needed for.
+    pub fn require_frames(&self, least: usize, why: &str) -> Result<()> {
+        let frames = self.frames();
+        ensure!(frames >= least, "{}: {frames} frames are recorded, {least} are needed: {why}", self.path.display());
+        Ok(())
+    }
+
+    /// The observations of an episode, valid steps only.
+    pub fn episode(&self, episode: usize) -> impl Iterator<Item = Vec<f32>> + '_ {
+        (0..self.length[episode]).map(move |step| self.row(&self.obs, episode, step))
+    }
+
+    /// All valid observations, episode after episode.
+    pub fn observations(&self) -> impl Iterator<Item = ArrayView1<'_, f32>> {
+        let episodes = self.obs.outer_iter().zip(&self.length);
+        episodes.flat_map(|(steps, length)| steps.into_outer_iter().take(*length))
+    }
+
+    /// The recorded action at a step, where actions were recorded.
+    pub fn action_at(&self, episode: usize, step: usize) -> Option<Vec<f32>> {
+        Some(self.row(self.action.as_ref()?, episode, step))
+    }
+
+    /// The recurrent state before an episode's first step; `None`: zero.
+    pub fn start(&self, episode: usize) -> Option<Vec<f32>> {
+        Some(self.state.as_ref()?.row(episode).to_vec())
+    }
+
+    fn row(&self, array: &Array3<f32>, episode: usize, step: usize) -> Vec<f32> {
+        array.index_axis(Axis(0), episode).index_axis(Axis(0), step).to_vec()
+    }
+
+    /// Where no actions were recorded, puts those of the f32 network there.
+    pub fn fill_actions(&mut self, graph: &Graph) {
+        if self.action.is_some() {
+            return;
+        }
+        let (episodes, steps, _) = self.obs.dim();
+        let mut action = Array3::zeros((episodes, steps, graph.len_of(graph.output())));
+        let mut evaluator = Evaluator::new(graph);
+        for episode in 0..episodes {
+            evaluator.start(self.start(episode).as_deref());
+            for (step, obs) in self.episode(episode).enumerate() {
+                let output = evaluator.step(&obs, &mut |_, _| {});
+                action.slice_mut(s![episode, step, ..]).assign(&ArrayView1::from(&output));
+            }
+        }
+        self.action = Some(action);
+    }
+
+    /// At most about `most` frames: evenly spaced ones, or, for a `recurrent` policy, the beginnings of evenly spaced
+    /// episodes.
+    pub fn thinned(&self, most: usize, recurrent: bool) -> Cow<'_, Self> {
+        /// Fewer steps than these say little about a recurrent policy.
+        const STEPS: usize = 64;
+        let frames = self.frames();
+        if frames <= most {
+            return Cow::Borrowed(self);
+        }
+        let episodes = self.length.len();
+        let (obs, action, state, length);
+        if recurrent {
+            let longest = self.length.iter().copied().max().unwrap_or(0);
+            let steps = (most / episodes).max(STEPS).min(longest);
+            let count = (most / steps).clamp(1, episodes);
+            let chosen: Vec<usize> = (0..count).map(|i| i * episodes / count).collect();
+            let part = |array: &Array3<f32>| array.select(Axis(0), &chosen).slice_move(s![.., ..steps, ..]);
+            (obs, action) = (part(&self.obs), self.action.as_ref().map(&part));
+            state = self.state.as_ref().map(|state| state.select(Axis(0), &chosen));
+            length = chosen.iter().map(|&e| self.length[e].min(steps)).collect();
+        } else {
+            let places: Vec<(usize, usize)> =
+                self.length.iter().enumerate().flat_map(|(e, n)| (0..*n).map(move |step| (e, step))).collect();
+            let chosen: Vec<(usize, usize)> = (0..most).map(|i| places[i * frames / most]).collect();
+            let part = |array: &Array3<f32>| {
+                Array3::from_shape_fn((1, most, array.dim().2), |(_, i, v)| array[[chosen[i].0, chosen[i].1, v]])
+            };
+            (obs, action) = (part(&self.obs), self.action.as_ref().map(&part));
+            (state, length) = (None, vec![most]);
+        }
+        Cow::Owned(Self { path: self.path.clone(), obs, action, length, state })
+    }
+}
+
+fn lengths(array: &Tensor, episodes: usize, steps: usize) -> Result<Vec<usize>> {
+    let numbers: Vec<i64> = match &array.values {
+        Values::I32(values) => values.iter().map(|&n| n.into()).collect(),
+        Values::I64(values) => values.clone(),
+        other => bail!("array \"length\" is of type {}, int32 or int64 is needed", other.type_name()),
+    };
+    ensure!(
+        array.shape == [episodes],
+        "array \"length\" is {:?}, [{episodes}] is needed: the valid steps of each episode",
+        array.shape
+    );
+    let one = |(episode, n): (usize, i64)| {
+        let n = usize::try_from(n).ok().with_context(|| format!("array \"length\" holds {n} for episode {episode}"))?;
+        ensure!(n <= steps, "episode {episode} has the length {n}, but the array \"obs\" holds {steps} steps");
+        Ok(n)
+    };
+    numbers.into_iter().enumerate().map(one).collect()
+}

@@ -1,0 +1,103 @@
+//! Recordings and other arrays as files in numpy's format .npz.
+
+use std::io::{self, Cursor, Seek, Write};
+
+use zip::CompressionMethod;
+use zip::write::{SimpleFileOptions, ZipWriter};
+
+use super::dataset::Dataset;
+use super::npy::npy_header;
+use crate::error::Result;
+
+/// An element of an array, and its name in numpy.
+pub trait Element: Copy {
+    /// As in `numpy.dtype.str`.
+    const DESCR: &str;
+
+    /// Writes it, the lowest byte first.
+    ///
+    /// # Errors
+    ///
+    /// Those of `to`.
+    fn write(self, to: &mut impl Write) -> io::Result<()>;
+}
+
+macro_rules! elements {
+    ($($element:ty: $descr:literal),*) => {
+        $(impl Element for $element {
+            const DESCR: &str = $descr;
+
+            fn write(self, to: &mut impl Write) -> io::Result<()> {
+                to.write_all(&self.to_le_bytes())
+            }
+        })*
+    };
+}
+
+elements!(f32: "<f4", f64: "<f8", i64: "<i8", u8: "|u1");
+
+/// Writes an .npz archive, uncompressed.
+pub struct NpzWriter<W: Write + Seek>(ZipWriter<W>);
+
+impl<W: Write + Seek> NpzWriter<W> {
+    /// Writes to `to`.
+    pub fn new(to: W) -> Self {
+        Self(ZipWriter::new(to))
+    }
+
+    /// Adds an array, its values in row-major order.
+    ///
+    /// # Errors
+    ///
+    /// Those of the file.
+    pub fn array<T: Element>(
+        &mut self,
+        name: &str,
+        shape: &[usize],
+        values: impl IntoIterator<Item = T>,
+    ) -> Result<()> {
+        let member = self.begin(name)?;
+        member.write_all(&npy_header(T::DESCR, shape))?;
+        Ok(values.into_iter().try_for_each(|value| value.write(member))?)
+    }
+
+    /// Begins an array, whose header and elements the caller writes.
+    ///
+    /// # Errors
+    ///
+    /// Those of the file.
+    pub fn begin(&mut self, name: &str) -> Result<&mut impl Write> {
+        let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
+        self.0.start_file(format!("{name}.npy"), options)?;
+        Ok(&mut self.0)
+    }
+
+    /// Ends the archive.
+    ///
+    /// # Errors
+    ///
+    /// Those of the file.
+    pub fn finish(self) -> Result<W> {
+        Ok(self.0.finish()?)
+    }
+}
+
+impl Dataset {
+    /// The recording as an .npz archive, uncompressed.
+    ///
+    /// # Errors
+    ///
+    /// Where it takes more bytes than an archive may have.
+    pub fn npz(&self) -> Result<Vec<u8>> {
+        let mut npz = NpzWriter::new(Cursor::new(Vec::new()));
+        npz.array("obs", self.obs.shape(), self.obs.iter().copied())?;
+        if let Some(action) = &self.action {
+            npz.array("action", action.shape(), action.iter().copied())?;
+        }
+        npz.array("length", &[self.length.len()], self.length.iter().map(|&n| n as i64))?;
+        if let Some(state) = &self.state {
+            npz.array("state", state.shape(), state.iter().copied())?;
+        }
+        Ok(npz.finish()?.into_inner())
+    }
+}

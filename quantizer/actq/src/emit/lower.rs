@@ -1,0 +1,183 @@
+//! From the graph's values to regions of the arena: which operation reads and writes where.
+//!
+//! The operations say what they become over buffers ([`crate::graph::lowering`]); here the buffers get their places.
+//! The arena holds the recurrent state, the observation, the values, which share memory by their lifetimes, first fit,
+//! the last action with what is kept beside it, and the work area. Buffers are placed in the order in which they are
+//! written, each as low as it fits: so none leaves a gap, and what a step has written always is the begin of the arena,
+//! as the image's check wants it.
+
+use actq_kernels::image::{OpKind, Region, kept_words};
+use actq_kernels::x::max_prepared_words;
+
+use crate::error::{Result, ensure};
+use crate::graph::lowering::{BufferId, Lifetime, Lowering, Slice, Step, StepData};
+use crate::graph::{Node, ValueId};
+use crate::policy::Policy;
+
+/// The arena and the operations in it.
+#[derive(Debug)]
+pub struct Program {
+    /// The operations in order.
+    pub steps: Vec<Step<Region>>,
+    /// Zeroed by a reset.
+    pub state: Region,
+    /// The observation.
+    pub observation: Region,
+    /// How many operations run once, before those of the denoising steps; 0 where all do.
+    pub once: usize,
+    /// The network's output.
+    pub output: Region,
+    /// The action.
+    pub action: Region,
+    /// Prepared activations.
+    pub work: Region,
+    /// Words of the arena.
+    pub words: usize,
+}
+
+/// Lowers the policy's graph for weights with scale groups of `group` columns.
+pub fn lower(policy: &Policy, group: usize) -> Result<Program> {
+    let graph = &policy.graph;
+    let mut readers = vec![0; graph.nodes.len() + 1];
+    readers[graph.output()] = 1;
+    for &value in graph.nodes.iter().flat_map(|node| &node.inputs) {
+        readers[value] += 1;
+    }
+    let mut lowering = Lowering::new(graph.obs_len, readers);
+    let work_len = graph.matrices.iter().map(|m| max_prepared_words(m.cols, group)).max().unwrap_or(0);
+    let (contract, act_len) = (&policy.contract, policy.act_len);
+    let horizon = contract.playback.ensemble.map_or(0, |ensemble| ensemble.horizon);
+    let kept = kept_words([act_len, policy.chunk, policy.execute], horizon, contract.playback.overlap);
+    let kept_len = kept + if contract.binarise.is_some() { act_len } else { 0 };
+    let Some(denoising) = &graph.denoising else {
+        nodes(&graph.nodes, &mut lowering);
+        let output = lowering.private(graph.output());
+        lowering.buffers[output].lifetime = Lifetime::Output;
+        let output = lowering.whole(output);
+        return Arena { lowering, kept_len, work_len }.assign(OBSERVATION, 0, output, act_len);
+    };
+    let iterate = lowering.noise(graph.noise_len(), denoising.len);
+    let (before, of_step) = graph.nodes.split_at(denoising.first);
+    nodes(before, &mut lowering);
+    let read: Vec<ValueId> =
+        of_step.iter().flat_map(|node| node.inputs.iter().copied()).filter(|value| *value <= denoising.first).collect();
+    let once = lowering.begin_steps(iterate, &read);
+    nodes(of_step, &mut lowering);
+    let mut constants = vec![denoising.limit, f32::from_bits(0)];
+    constants.extend(denoising.steps.iter().flat_map(|step| step.to_array()));
+    let (velocity, read_next) = (lowering.place(graph.output()), lowering.whole(lowering.iterate()));
+    let data =
+        StepData::Denoise { constants, noise: denoising.draws().then_some(Slice { offset: denoising.len, ..iterate }) };
+    lowering.emit(OpKind::Denoise, iterate, Some(velocity), Some(read_next), data);
+    Arena { lowering, kept_len, work_len }.assign(OBSERVATION, once, iterate, act_len)
+}
+
+/// Lowers nodes, one after the other.
+fn nodes(nodes: &[Node], lowering: &mut Lowering) {
+    for node in nodes {
+        let place = node.kind.lower(lowering, &node.inputs, node.len);
+        lowering.finish_node(place, &node.inputs);
+    }
+}
+
+/// The buffer of the observation.
+const OBSERVATION: BufferId = 0;
+
+/// Buffers that need places.
+struct Arena {
+    lowering: Lowering,
+    /// Words that the contract and playback keep beside the last action.
+    kept_len: usize,
+    work_len: usize,
+}
+
+impl Arena {
+    /// Gives every buffer its place.
+    fn assign(self, observation: BufferId, once: usize, output: Slice, act_len: usize) -> Result<Program> {
+        let Lowering { steps, buffers, .. } = &self.lowering;
+        let mut offsets = vec![0; buffers.len()];
+        let mut top = 0;
+        let mut state_len = 0;
+        for lifetime in [Lifetime::State, Lifetime::Observation] {
+            for (offset, buffer) in offsets.iter_mut().zip(buffers).filter(|(_, b)| b.lifetime == lifetime) {
+                *offset = top;
+                top += buffer.len;
+            }
+            if lifetime == Lifetime::State {
+                state_len = top;
+            }
+        }
+        let mut ends = vec![top];
+        let mut placed: Vec<(usize, (usize, usize))> = Vec::new();
+        for (buffer, life) in self.lifetimes() {
+            let len = buffers[buffer].len;
+            let taken = |offset: usize| {
+                let clash = |&&(other, span): &&(usize, (usize, usize))| {
+                    let meets = span.0 <= life.1 && life.0 <= span.1;
+                    meets && offset < offsets[other] + buffers[other].len && offsets[other] < offset + len
+                };
+                placed.iter().find(clash).map(|&(other, _)| offsets[other] + buffers[other].len)
+            };
+            let mut offset = top;
+            while let Some(next) = taken(offset) {
+                offset = next;
+            }
+            offsets[buffer] = offset;
+            ends.push(offset + len);
+            placed.push((buffer, life));
+        }
+        let action = Region { offset: ends.into_iter().max().unwrap_or(top), len: act_len };
+        let work_offset = action.offset + action.len + self.kept_len;
+        let words = work_offset + self.work_len;
+        ensure!(
+            words <= usize::from(u16::MAX),
+            "the policy needs {words} words of scratch memory, 65535 are supported"
+        );
+        let region = |s: Slice| Region { offset: offsets[s.buffer] + s.offset, len: s.len };
+        let whole = |buffer: usize| Region { offset: offsets[buffer], len: buffers[buffer].len };
+        let steps = steps.iter().map(|step| Step {
+            kind: step.kind,
+            dst: region(step.dst),
+            src: step.src.map(region),
+            third: step.third.map(region),
+            data: match &step.data {
+                StepData::Denoise { constants, noise: Some(noise) } => {
+                    let mut constants = constants.clone();
+                    constants[1] = f32::from_bits(region(*noise).offset as u32);
+                    StepData::Constants(constants)
+                }
+                StepData::Denoise { constants, noise: None } => StepData::Constants(constants.clone()),
+                data => data.clone(),
+            },
+        });
+        Ok(Program {
+            steps: steps.collect(),
+            state: Region { offset: 0, len: state_len },
+            observation: whole(observation),
+            once,
+            output: region(output),
+            action,
+            work: Region { offset: work_offset, len: self.work_len },
+            words,
+        })
+    }
+
+    /// First and last operation during which each value's buffer is needed, in order of the first.
+    fn lifetimes(&self) -> Vec<(usize, (usize, usize))> {
+        let mut lives: Vec<(usize, (usize, usize))> = Vec::new();
+        for (at, step) in self.lowering.steps.iter().enumerate() {
+            for slice in [Some(step.dst), step.src, step.third].into_iter().flatten() {
+                let last = match self.lowering.buffers[slice.buffer].lifetime {
+                    Lifetime::Step => at,
+                    Lifetime::Output => usize::MAX,
+                    Lifetime::Observation | Lifetime::State => continue,
+                };
+                match lives.iter_mut().find(|(buffer, _)| *buffer == slice.buffer) {
+                    Some((_, life)) => life.1 = last,
+                    None => lives.push((slice.buffer, (at, last))),
+                }
+            }
+        }
+        lives
+    }
+}

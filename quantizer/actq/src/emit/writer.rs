@@ -1,0 +1,248 @@
+//! Lays an image out.
+
+use std::path::Path;
+
+use actq_kernels::image::{
+    BlockRecord, Header, MatrixRecord, OpKind, OpRecord, Records, Region, half_words, header as h, quarter_words, seal,
+};
+use actq_kernels::layout::{self, BlockShape};
+
+use super::lower::lower;
+use crate::error::{Context, Result, ensure};
+use crate::graph::lowering::{Step, StepData};
+use crate::graph::{Graph, NodeKind};
+use crate::methods::{Outcome, Quantized};
+use crate::policy::Policy;
+use crate::random::Random;
+use crate::runtime::{ImageBuffer, with_head};
+
+/// The most bytes that a self-test vector of more than one step may take.
+const SELF_TEST_BYTES: usize = 64 << 10;
+
+/// The image of a policy with its quantized matrices, one per matrix of the graph. The self-test vector is computed by
+/// the executor itself.
+///
+/// # Errors
+///
+/// Where a size of the policy has no room in the format, where the kernels refuse the image, and where the network
+/// leaves f32's range on the self-test's observations.
+pub fn image(policy: &Policy, matrices: &[Outcome]) -> Result<Vec<u8>> {
+    let group = matrices.first().map_or(0, |m| m.quantized.group);
+    let mut writer = Writer::new();
+    let records = matrices.iter().map(|m| writer.matrix(m)).collect::<Result<Vec<_>>>()?;
+    let Draft { mut words, self_test, observations } = writer.finish(policy, group, &records)?;
+    let actions = self_test_actions(&sealed(&words)?, &observations)?;
+    for (step, action) in actions.iter().enumerate() {
+        let at = self_test + step * (policy.graph.obs_len + policy.act_len) + policy.graph.obs_len;
+        for (word, value) in words[at..].iter_mut().zip(action) {
+            *word = value.to_bits();
+        }
+    }
+    sealed(&words)
+}
+
+/// Bytes of an image of `policy` beside its matrices' blocks. Values of its matrices do not count.
+pub fn bytes_beside_blocks(policy: &Policy) -> Result<usize> {
+    let records = vec![[0; h::MATRIX_WORDS]; policy.graph.matrices.len()];
+    Ok(4 * Writer::new().finish(policy, 0, &records)?.words.len())
+}
+
+/// An image but for the actions of its self-test, length and checksum.
+struct Draft {
+    words: Vec<u32>,
+    /// Offset of the self-test vector.
+    self_test: usize,
+    observations: Vec<Vec<f32>>,
+}
+
+/// The image's bytes, with length and checksum.
+fn sealed(words: &[u32]) -> Result<Vec<u8>> {
+    let mut bytes: Vec<u8> = words.iter().flat_map(|w| w.to_le_bytes()).collect();
+    seal(&mut bytes).context("the image has more than 4 GB")?;
+    Ok(bytes)
+}
+
+/// Observations that reach every input: spread over about two standard deviations where the policy normalizes, else
+/// over -1 to 1, from a fixed generator.
+fn self_test_observations(graph: &Graph, steps: usize) -> Vec<Vec<f32>> {
+    let mut random = Random::new(0);
+    let norm = graph.nodes.iter().find_map(|node| match &node.kind {
+        NodeKind::Normalize(norm) if node.inputs == [0] => Some(norm),
+        NodeKind::Balance(balance) if node.inputs == [0] => Some(balance.normalize()),
+        _ => None,
+    });
+    let mut value = |i: usize| match norm {
+        Some(norm) if norm.scale[i].abs() > 1e-6 => norm.mean[i] + 2.0 * random.unit() / norm.scale[i],
+        _ => random.unit(),
+    };
+    (0..steps).map(|_| (0..graph.obs_len).map(&mut value).collect()).collect()
+}
+
+fn self_test_actions(bytes: &[u8], observations: &[Vec<f32>]) -> Result<Vec<Vec<f32>>> {
+    let buffer = ImageBuffer::new(bytes);
+    let image = buffer.image(Path::new("the new image"))?;
+    with_head(image, |head| {
+        observations.iter().map(|obs| Ok(head.step(obs).context("self-test of the new image")?.to_vec())).collect()
+    })
+}
+
+struct Writer {
+    words: Vec<u32>,
+    /// Offset of the matrix records.
+    matrices: u32,
+    /// From here on all words are finite constants of operations, which others may have, too.
+    finite: usize,
+}
+
+impl Writer {
+    /// An image with room for its header.
+    fn new() -> Self {
+        Self { words: vec![0; h::WORDS], matrices: 0, finite: 0 }
+    }
+
+    /// Appends all that follows the matrices' blocks; `matrices` are their records.
+    fn finish(mut self, policy: &Policy, group: usize, matrices: &[[u32; h::MATRIX_WORDS]]) -> Result<Draft> {
+        let program = lower(policy, group)?;
+        self.matrices = self.push(matrices.iter().flatten().copied());
+        self.finite = self.words.len();
+        let records = program.steps.iter().map(|step| self.op(step)).collect::<Result<Vec<[u32; h::OP_WORDS]>>>()?;
+        let ops = self.push(records.into_iter().flatten());
+        let contract = self.words.len() as u32;
+        let mut flags = 0;
+        for (bit, (_, array)) in policy.contract.arrays().into_iter().enumerate() {
+            if let Some(array) = array {
+                flags |= 1 << bit;
+                self.push_floats(array);
+            }
+        }
+        let playback = policy.contract.playback;
+        let horizon = playback.ensemble.map_or(0, |ensemble| ensemble.horizon);
+        if let Some(ensemble) = playback.ensemble {
+            self.push_floats(&ensemble.weights());
+        }
+        let name = self.push_bytes(policy.name.as_bytes());
+        // Where observations are long, fewer than those of a chunk and the next.
+        let room = SELF_TEST_BYTES / (4 * (policy.graph.obs_len + policy.act_len));
+        let steps = (policy.execute.max(horizon) + 2).min(room.max(1));
+        let observations = self_test_observations(&policy.graph, steps);
+        let self_test = self.words.len() as u32;
+        for observation in &observations {
+            self.push_floats(observation);
+            self.push_floats(&vec![0.0; policy.act_len]);
+        }
+        let header = Header {
+            kind: policy.kind,
+            obs_len: policy.graph.obs_len,
+            act_len: policy.act_len,
+            chunk: policy.chunk,
+            execute: policy.execute,
+            horizon,
+            overlap: playback.overlap,
+            deadline: playback.deadline.unwrap_or(0),
+            rate_hz: policy.rate_hz,
+            scratch: program.words,
+            state: program.state,
+            observation: program.observation.offset,
+            output: program.output.offset,
+            action: program.action.offset,
+            work: program.work,
+            matrices: Records { offset: self.matrices, count: matrices.len() },
+            ops: Records { offset: ops, count: program.steps.len() },
+            once: program.once,
+            denoising_steps: policy.graph.denoising.as_ref().map_or(0, |denoising| denoising.steps.len()),
+            contract,
+            contract_flags: flags,
+            name: Records { offset: name, count: policy.name.len() },
+            self_test: Records { offset: self_test, count: steps },
+            weights: policy.weights as u32,
+            digest: policy.digest,
+        };
+        self.words[..h::WORDS].copy_from_slice(&header.emit()?);
+        Ok(Draft { words: self.words, self_test: self_test as usize, observations })
+    }
+
+    /// Appends words and gives their offset.
+    fn push(&mut self, words: impl IntoIterator<Item = u32>) -> u32 {
+        let offset = self.words.len() as u32;
+        self.words.extend(words);
+        offset
+    }
+
+    fn push_floats(&mut self, values: &[f32]) -> u32 {
+        self.push(values.iter().map(|v| v.to_bits()))
+    }
+
+    /// Constants of an operation, where they stand already or at the end.
+    fn constants(&mut self, values: &[f32]) -> u32 {
+        let words: Vec<u32> = values.iter().map(|v| v.to_bits()).collect();
+        let same = |window: &[u32]| window == words;
+        if let Some(at) = self.words[self.finite..].windows(words.len().max(1)).position(same) {
+            return (self.finite + at) as u32;
+        }
+        let offset = self.push(words);
+        if values.iter().any(|v| !v.is_finite()) {
+            self.finite = self.words.len();
+        }
+        offset
+    }
+
+    fn push_bytes(&mut self, bytes: &[u8]) -> u32 {
+        self.push(bytes.chunks(4).map(|c| c.iter().rev().fold(0, |word, b| word << 8 | u32::from(*b))))
+    }
+
+    /// Packs a matrix's blocks, and gives its record.
+    fn matrix(&mut self, outcome: &Outcome) -> Result<[u32; h::MATRIX_WORDS]> {
+        let matrix = &outcome.quantized;
+        ensure!(matrix.rows <= h::MAX_ROWS, "a matrix has {} rows, {} are supported", matrix.rows, h::MAX_ROWS);
+        let blocks = outcome.blocks();
+        let in_order = Quantized::in_order(&blocks);
+        let mut records = Vec::new();
+        for (shape, rows) in &blocks {
+            let codes: Vec<u8> =
+                rows.iter().flat_map(|r| &matrix.codes[r * matrix.cols..][..matrix.cols]).copied().collect();
+            let groups = matrix.groups();
+            let group_scales: Vec<u8> =
+                rows.iter().flat_map(|r| &matrix.group_scales[r * groups..][..groups]).copied().collect();
+            let mut words = vec![0; shape.words()];
+            layout::pack(*shape, &codes, &group_scales, &mut words).with_context(|| {
+                format!("{shape:?} cannot be packed; docs/FORMAT.md says how many columns may have group scales")
+            })?;
+            let weights = self.push(words.into_iter().map(u32::from_le));
+            let scales: Vec<u16> = rows.iter().map(|&r| matrix.scales[r].to_bits()).collect();
+            let scales = self.push(half_words(&scales));
+            let steps = if in_order { 0 } else { self.push(quarter_words(&steps(rows)?)) };
+            let BlockShape { width, lanes, rows, .. } = *shape;
+            records.push(BlockRecord { width, lanes, rows, weights, scales, steps }.emit()?);
+        }
+        let Quantized { rows, cols, group, .. } = *matrix;
+        let blocks = Records { count: records.len(), offset: self.push(records.into_iter().flatten()) };
+        Ok(MatrixRecord { rows, cols, group, x_max: outcome.x_max, blocks }.emit()?)
+    }
+
+    fn op(&mut self, step: &Step<Region>) -> Result<[u32; h::OP_WORDS]> {
+        let (bias, data) = match &step.data {
+            StepData::None => (0, 0),
+            // Its first words are not constants of f32 alone, and nothing before them is named again behind them.
+            StepData::Constants(values) if step.kind == OpKind::Denoise => {
+                let data = self.push_floats(values);
+                self.finite = self.words.len();
+                (0, data)
+            }
+            StepData::Constants(values) | StepData::Denoise { constants: values, .. } => (0, self.constants(values)),
+            StepData::Product { matrix, bias } => {
+                let bias = if bias.iter().all(|b| *b == 0.0) { 0 } else { self.constants(bias) };
+                (bias, self.matrices + (matrix * h::MATRIX_WORDS) as u32)
+            }
+        };
+        let offset = |region: Option<Region>| region.map_or(0, |r| r.offset);
+        let (src, third) = (offset(step.src), offset(step.third));
+        Ok(OpRecord { kind: step.kind, dst: step.dst, src, third, bias, data }.emit()?)
+    }
+}
+
+/// From the output of each row to that of the next, and from output 0 to the first.
+fn steps(rows: &[usize]) -> Result<Vec<u8>> {
+    let before = std::iter::once(&0).chain(rows);
+    let steps = before.zip(rows).map(|(before, row)| u8::try_from(row - before));
+    steps.collect::<Result<_, _>>().context("rows of one width stand more than 255 apart")
+}

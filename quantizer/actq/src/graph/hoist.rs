@@ -1,0 +1,302 @@
+//! From a network of observation, time and iterate to an iterative head that computes nothing twice.
+//!
+//! What depends on the time alone becomes a table: the steps are known when the image is built. What depends on the
+//! observation alone runs once for an output. A linear layer of several of these behind each other is cut into their
+//! columns.
+
+use ndarray::Array2;
+
+use super::denoising::Denoising;
+use super::nodes::{Graph, Node};
+use super::ops::{Add, Concat, Iterate, Linear, NodeKind, Span, Table};
+use super::run::Network;
+use super::values::{ValueId, WeightMatrix};
+use super::weights::{Weights, zero_state};
+use crate::error::{Context, Result, ensure};
+
+/// What a value depends on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Needs {
+    Time,
+    Observation,
+    /// The iterate, or time and observation both.
+    Step,
+}
+
+impl Needs {
+    fn with(self, other: Self) -> Self {
+        if self == other { self } else { Self::Step }
+    }
+}
+
+/// The head that runs `flat`, a network of `[observation | time | iterate]`, in the steps of `denoising`. `times` holds
+/// what it reads as the time in each of them.
+pub fn iterative(flat: &Graph, obs_len: usize, times: &[Vec<f32>], steps: Denoising) -> Result<Graph> {
+    let time_len = times.first().map_or(0, Vec::len);
+    ensure!(
+        steps.steps.len() == times.len() && !times.is_empty(),
+        "there are {} times for {} steps",
+        times.len(),
+        steps.steps.len()
+    );
+    ensure!(
+        obs_len + time_len + steps.len == flat.obs_len,
+        "observation, time and iterate are not what the network reads"
+    );
+    ensure!(flat.state_len() == 0, "a recurrent network cannot be the head of a flow or a diffusion policy");
+    let out = flat.len_of(flat.output());
+    ensure!(out == steps.len, "the last op gives {out} values, the iterate has {}", steps.len);
+    // The observation makes no difference to what depends on the time alone.
+    let rows = Array2::from_shape_fn((times.len(), flat.obs_len), |(k, i)| {
+        times[k].get(i.wrapping_sub(obs_len)).copied().unwrap_or(0.0)
+    });
+    let pass = Network::in_order(flat).forward(&Weights::of(flat), rows, &mut zero_state(flat, times.len()));
+    let needs = needs(flat, obs_len, time_len)?;
+    ensure!(needs[flat.output()] == Needs::Step, "the output does not depend on the iterate");
+    let mut hoist = Hoist {
+        flat,
+        spans: [0..obs_len, obs_len..obs_len + time_len, obs_len + time_len..flat.obs_len],
+        needs,
+        tables: pass.values,
+        graph: Graph::new(obs_len),
+        places: vec![None; flat.nodes.len() + 1],
+        condition: vec![None; flat.nodes.len() + 1],
+        iterate: 0,
+        len: steps.len,
+    };
+    hoist.once()?;
+    let first = hoist.graph.nodes.len();
+    hoist.of_step()?;
+    let mut graph = hoist.graph;
+    graph.denoising = Some(Denoising { first, ..steps });
+    Ok(graph)
+}
+
+/// What every value needs; the observation of the flat network, which is all three, counts as the step.
+fn needs(flat: &Graph, obs_len: usize, time_len: usize) -> Result<Vec<Needs>> {
+    let mut needs = vec![Needs::Step];
+    for node in &flat.nodes {
+        let of = match &node.kind {
+            NodeKind::Concat(Concat(spans)) => {
+                let part = |(&value, span): (&ValueId, &Span)| -> Result<Needs> {
+                    if value != 0 {
+                        return Ok(needs[value]);
+                    }
+                    of_input(span, obs_len, time_len).context("a part reaches over observation, time and iterate")
+                };
+                node.inputs.iter().zip(spans).map(part).collect::<Result<Vec<_>>>()?
+            }
+            _ => node.inputs.iter().map(|&value| needs[value]).collect(),
+        };
+        needs.push(of.into_iter().reduce(Needs::with).unwrap_or(Needs::Step));
+    }
+    Ok(needs)
+}
+
+/// Which of the three parts of the flat network's input a span is in.
+fn of_input(span: &Span, obs_len: usize, time_len: usize) -> Option<Needs> {
+    let (from, to) = (span.from, span.from + span.len);
+    if to <= obs_len {
+        Some(Needs::Observation)
+    } else if from >= obs_len && to <= obs_len + time_len {
+        Some(Needs::Time)
+    } else {
+        (from >= obs_len + time_len).then_some(Needs::Step)
+    }
+}
+
+struct Hoist<'a> {
+    flat: &'a Graph,
+    /// Observation, time and iterate in the flat network's input.
+    spans: [std::ops::Range<usize>; 3],
+    needs: Vec<Needs>,
+    /// Values of the flat network at each time.
+    tables: Vec<Array2<f32>>,
+    /// The result so far.
+    graph: Graph,
+    /// Its values for those of the flat network.
+    places: Vec<Option<ValueId>>,
+    /// What the observation gives to a linear layer that is cut.
+    condition: Vec<Option<ValueId>>,
+    iterate: ValueId,
+    len: usize,
+}
+
+impl Hoist<'_> {
+    /// Nodes of the observation alone, and the observation's columns of layers that are cut.
+    fn once(&mut self) -> Result<()> {
+        let flat = self.flat;
+        for (i, node) in flat.nodes.iter().enumerate() {
+            if self.needs[i + 1] == Needs::Observation {
+                self.copy(i)?;
+            } else if let Some((linear, parts)) = self.cut(node) {
+                // The biases stand in the table, where there is one, else here.
+                let biased = parts.iter().all(|(.., needs)| *needs != Needs::Time);
+                self.condition[i + 1] = self.columns(linear, &parts, Needs::Observation, biased)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Everything else but what depends on the time alone.
+    fn of_step(&mut self) -> Result<()> {
+        let flat = self.flat;
+        self.iterate = self.graph.add(Iterate { len: self.len }, &[])?;
+        for (i, node) in flat.nodes.iter().enumerate() {
+            if self.needs[i + 1] != Needs::Step || self.only_cut(i) {
+                continue;
+            }
+            let Some((linear, parts)) = self.cut(node) else {
+                self.copy(i)?;
+                continue;
+            };
+            let table = self.table_of(linear, &parts);
+            let biased = table.is_none() && self.condition[i + 1].is_none();
+            let mut sum = self.columns(linear, &parts, Needs::Step, biased)?;
+            let mut add = |graph: &mut Graph, value: ValueId| -> Result<()> {
+                sum = Some(match sum {
+                    Some(sum) => graph.add(Add, &[sum, value])?,
+                    None => value,
+                });
+                Ok(())
+            };
+            if let Some(table) = table {
+                let value = self.graph.add(table, &[])?;
+                add(&mut self.graph, value)?;
+            }
+            if let Some(condition) = self.condition[i + 1] {
+                add(&mut self.graph, condition)?;
+            }
+            self.places[i + 1] = sum;
+        }
+        Ok(())
+    }
+
+    /// Whether nothing but layers that are cut reads the parts that this node puts behind each other.
+    fn only_cut(&self, i: usize) -> bool {
+        let readers = self.flat.readers(i + 1);
+        matches!(self.flat.nodes[i].kind, NodeKind::Concat(_))
+            && !readers.is_empty()
+            && i + 1 != self.flat.output()
+            && readers.iter().all(|&reader| self.cut(&self.flat.nodes[reader]).is_some())
+    }
+
+    /// A linear layer over parts that need different things, and these: value, span, need.
+    #[expect(clippy::type_complexity, reason = "told in the line above")]
+    fn cut<'n>(&self, node: &'n Node) -> Option<(&'n Linear, Vec<(ValueId, Span, Needs)>)> {
+        let NodeKind::Linear(linear) = &node.kind else { return None };
+        let input = node.inputs.first()?.checked_sub(1)?;
+        let NodeKind::Concat(Concat(spans)) = &self.flat.nodes[input].kind else { return None };
+        let parts = self.flat.nodes[input].inputs.iter().zip(spans);
+        let parts: Vec<_> = parts.map(|(&value, span)| (value, *span, self.needs_of(value, span))).collect();
+        let first = parts.first()?.2;
+        parts.iter().any(|(.., needs)| *needs != first).then_some((linear, parts))
+    }
+
+    fn needs_of(&self, value: ValueId, span: &Span) -> Needs {
+        let [obs, time, _] = &self.spans;
+        if value == 0 { of_input(span, obs.len(), time.len()).unwrap_or(Needs::Step) } else { self.needs[value] }
+    }
+
+    /// What the time gives to a layer that is cut, with its biases; `None` where it gives nothing.
+    fn table_of(&self, linear: &Linear, parts: &[(ValueId, Span, Needs)]) -> Option<Table> {
+        let matrix = &self.flat.matrices[linear.matrix];
+        let mut rows = Vec::new();
+        for k in 0..self.tables[0].nrows() {
+            for (row, bias) in matrix.data.chunks_exact(matrix.cols).zip(&linear.bias) {
+                let mut sum = f64::from(*bias);
+                let mut col = 0;
+                for (value, span, needs) in parts {
+                    if *needs == Needs::Time {
+                        let x = self.tables[*value].row(k);
+                        sum +=
+                            (0..span.len).map(|i| f64::from(row[col + i]) * f64::from(x[span.from + i])).sum::<f64>();
+                    }
+                    col += span.len;
+                }
+                rows.push(sum as f32);
+            }
+        }
+        parts.iter().any(|(.., needs)| *needs == Needs::Time).then_some(Table { rows, len: matrix.rows })
+    }
+
+    /// The layer of those columns whose parts need this; `None` where there are none.
+    fn columns(
+        &mut self,
+        linear: &Linear,
+        parts: &[(ValueId, Span, Needs)],
+        which: Needs,
+        biased: bool,
+    ) -> Result<Option<ValueId>> {
+        let whole = &self.flat.matrices[linear.matrix];
+        let mut columns = Vec::new();
+        let mut chosen = Vec::new();
+        let mut col = 0;
+        for (value, span, needs) in parts {
+            if *needs == which {
+                columns.extend(col..col + span.len);
+                chosen.push((*value, *span));
+            }
+            col += span.len;
+        }
+        if columns.is_empty() {
+            return Ok(None);
+        }
+        let part = if which == Needs::Observation { "observation" } else { "iterate" };
+        let data = whole.data.chunks_exact(whole.cols).flat_map(|row| columns.iter().map(|&c| row[c])).collect();
+        let name = format!("{} ({part})", whole.name);
+        let (rows, cols) = (whole.rows, columns.len());
+        let matrix = self.graph.share_matrix(WeightMatrix { name, rows, cols, data })?;
+        let bias = if biased { linear.bias.clone() } else { vec![0.0; rows] };
+        let input = self.joined(chosen)?;
+        self.graph.add(Linear { matrix, bias }, &[input]).map(Some)
+    }
+
+    /// A node as it is, with its matrices.
+    fn copy(&mut self, i: usize) -> Result<()> {
+        let node = &self.flat.nodes[i];
+        let mut kind = node.kind.clone();
+        if let NodeKind::Linear(linear) = &mut kind {
+            let matrix = &self.flat.matrices[linear.matrix];
+            linear.matrix = self.graph.share_matrix(matrix.clone())?;
+        }
+        let place = if let NodeKind::Concat(Concat(spans)) = &kind {
+            self.joined(node.inputs.iter().copied().zip(spans.iter().copied()).collect())?
+        } else {
+            let inputs = node.inputs.iter().map(|&value| self.place(value)).collect::<Result<Vec<_>>>()?;
+            self.graph.add(kind, &inputs)?
+        };
+        self.places[i + 1] = Some(place);
+        Ok(())
+    }
+
+    /// Parts of the flat network's values behind each other.
+    fn joined(&mut self, mut parts: Vec<(ValueId, Span)>) -> Result<ValueId> {
+        let [_, time, iterate] = self.spans.clone();
+        for (value, span) in &mut parts {
+            (*value, span.from) = match (*value, self.needs_of(*value, span)) {
+                (0, Needs::Observation) => (0, span.from),
+                (0, Needs::Time) => {
+                    let rows = self.tables[0].rows().into_iter();
+                    let rows = rows.flat_map(|row| row.to_vec()[time.clone()].to_vec()).collect();
+                    (self.graph.add(Table { rows, len: time.len() }, &[])?, span.from - time.start)
+                }
+                (0, Needs::Step) => (self.iterate, span.from - iterate.start),
+                (value, _) => (self.place(value)?, span.from),
+            };
+        }
+        self.graph.join(parts)
+    }
+
+    /// The result's value for one of the flat network; of the time alone, a table.
+    fn place(&mut self, value: ValueId) -> Result<ValueId> {
+        if let Some(place) = self.places[value] {
+            return Ok(place);
+        }
+        ensure!(value != 0 && self.needs[value] == Needs::Time, "an op takes observation, time and iterate as one");
+        let (rows, len) = (self.tables[value].iter().copied().collect(), self.tables[value].ncols());
+        let table = self.graph.add(Table { rows, len }, &[])?;
+        self.places[value] = Some(table);
+        Ok(table)
+    }
+}

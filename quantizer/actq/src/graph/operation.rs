@@ -1,0 +1,252 @@
+//! What a network needs to know of an operation. Each operation says it once, in its own file in [`super::ops`].
+
+use ndarray::{Array2, ArrayBase, ArrayView2, Data, Ix2, linalg::general_mat_mul};
+
+use super::arrays::{Repeated, Sums, round_rows};
+use super::lowering::{BufferId, Lowering};
+use super::values::{ValueId, WeightMatrix};
+use crate::error::{Result, ensure};
+
+/// A matrix product inside an operation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Product {
+    /// Index in the graph's matrices.
+    pub matrix: usize,
+    /// Which of [`Operation::vectors`] is added to the product, so that a constant part of its error can go there.
+    pub bias: usize,
+    /// What the matrix is multiplied with.
+    pub operand: Operand,
+}
+
+/// What a product's matrix is multiplied with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Operand {
+    /// The node's input, which the node then reads through nothing but such products.
+    Input,
+    /// The node's hidden state.
+    State,
+}
+
+/// Hidden and cell state of a node, `[sample, element]`; without elements where it has none.
+pub type NodeState = [Array2<f32>; 2];
+
+/// What a node keeps of a forward pass for the backward pass.
+#[derive(Debug, Default)]
+pub struct Saved {
+    /// What the matrix of each of [`Operation::products`] was multiplied with.
+    pub operands: Vec<Array2<f32>>,
+    /// Whatever else the operation needs.
+    pub inner: Vec<Array2<f32>>,
+}
+
+/// An operation: what it computes, forwards and backwards, and what it becomes in an image.
+pub trait Operation {
+    /// Length of the output for inputs of these lengths. Errors say what does not fit.
+    fn output_len(&self, matrices: &[WeightMatrix], inputs: &[usize]) -> Result<usize>;
+
+    /// The matrix products.
+    fn products(&self) -> Vec<Product> {
+        Vec::new()
+    }
+
+    /// What can be learned beside the matrices.
+    fn vectors(&self) -> Vec<&Vec<f32>> {
+        Vec::new()
+    }
+
+    /// As [`Self::vectors`].
+    fn vectors_mut(&mut self) -> Vec<&mut Vec<f32>> {
+        Vec::new()
+    }
+
+    /// Number of trained values beside the matrices, as the f32 policy stores them.
+    fn trained_values(&self) -> usize {
+        self.vectors().into_iter().map(Vec::len).sum()
+    }
+
+    /// Lengths of the hidden and of the cell state; 0 where there is none.
+    fn state_lens(&self) -> [usize; 2] {
+        [0, 0]
+    }
+
+    /// The output for a batch, or for a sequence of batches behind each other: a node with a state has one row of it
+    /// for each row of a batch, and `state` advances through the sequence.
+    fn forward(&self, run: &Forward<'_>, state: &mut NodeState) -> (Array2<f32>, Saved);
+
+    /// From the derivative `dy` of the loss by the output to those by the inputs and weights, which `run` takes.
+    /// `d_state`, the derivative by the state after the step, becomes that by the state before it.
+    fn backward(&self, run: &mut Backward<'_>, saved: &Saved, dy: Array2<f32>, d_state: &mut NodeState);
+
+    /// Appends its operations over the values `inputs`, and gives the buffer that then holds its output of `len`
+    /// values.
+    fn lower(&self, to: &mut Lowering, inputs: &[ValueId], len: usize) -> BufferId;
+}
+
+/// The length of an operation's only input.
+pub fn only(inputs: &[usize]) -> Result<usize> {
+    ensure!(inputs.len() == 1, "takes one input, not {}", inputs.len());
+    Ok(inputs[0])
+}
+
+/// That `values`, called `what`, are as many as `len`.
+pub fn expect_len(what: &str, values: &[f32], len: usize) -> Result<()> {
+    ensure!(values.len() == len, "{what} has {} values, {len} are needed", values.len());
+    Ok(())
+}
+
+/// That matrix `index` exists, takes `cols` values and, where `rows` are given, gives as many; returns its rows.
+pub fn expect_shape(matrices: &[WeightMatrix], index: usize, rows: Option<usize>, cols: usize) -> Result<usize> {
+    ensure!(index < matrices.len(), "there is no matrix {index}");
+    let WeightMatrix { name, rows: r, cols: c, .. } = &matrices[index];
+    ensure!(*c == cols, "the matrix {name:?} takes {c} values, its operand has {cols}");
+    let wanted = rows.unwrap_or(*r);
+    ensure!(wanted == *r, "the matrix {name:?} gives {r} values, {wanted} are needed");
+    Ok(*r)
+}
+
+/// Values of a pass: those of the nodes that run once, then those of a denoising step.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Values<'a> {
+    pub(super) once: &'a [Array2<f32>],
+    pub(super) of_step: &'a [Array2<f32>],
+}
+
+impl<'a> Values<'a> {
+    pub(super) fn of(&self, value: ValueId) -> &'a Array2<f32> {
+        self.once.get(value).unwrap_or_else(|| &self.of_step[value - self.once.len()])
+    }
+}
+
+/// What a node sees in a forward pass.
+#[derive(Debug)]
+pub struct Forward<'a> {
+    /// Every value so far.
+    pub(super) values: Values<'a>,
+    /// The node's inputs among them.
+    pub(super) inputs: &'a [ValueId],
+    /// The graph's matrices.
+    pub(super) matrices: &'a [Array2<f32>],
+    /// As [`Operation::vectors`].
+    pub vectors: &'a [Vec<f32>],
+    /// What the network reads of the iterate; `None` outside of denoising steps.
+    pub(super) iterate: Option<&'a Array2<f32>>,
+    /// Which denoising step it is; 0 outside of them.
+    pub step: usize,
+    /// Activation magnitude of every matrix; empty: activations are not rounded.
+    pub(super) x_max: &'a [u16],
+    /// Order of sums.
+    pub sums: Sums,
+}
+
+impl<'a> Forward<'a> {
+    /// An input, `[sample, element]`.
+    pub fn input(&self, i: usize) -> &'a Array2<f32> {
+        self.values.of(self.inputs[i])
+    }
+
+    /// All inputs.
+    pub fn inputs(&self) -> impl Iterator<Item = &'a Array2<f32>> {
+        let values = self.values;
+        self.inputs.iter().map(move |&value| values.of(value))
+    }
+
+    /// Rows of every value.
+    pub fn samples(&self) -> usize {
+        self.values.of(0).nrows()
+    }
+
+    /// What the network reads of the iterate.
+    pub fn iterate(&self) -> &'a Array2<f32> {
+        self.iterate.unwrap_or(self.values.of(0))
+    }
+
+    /// `x` as it enters the product with a matrix: rounded where the image's activations are.
+    pub fn operand(&self, matrix: usize, x: ArrayView2<'_, f32>) -> Array2<f32> {
+        round_rows(x, self.x_max.get(matrix).copied().unwrap_or(0))
+    }
+
+    /// `W x` and the vector.
+    pub fn affine(&self, matrix: usize, x: &Array2<f32>, vector: usize) -> Array2<f32> {
+        self.sums.affine(x, &self.matrices[matrix], &self.vectors[vector])
+    }
+
+    /// A matrix that few rows are multiplied with, many times.
+    pub fn repeated(&self, matrix: usize) -> Repeated<'a> {
+        self.sums.repeated(&self.matrices[matrix])
+    }
+}
+
+/// Is shown a matrix product: matrix, operand, derivative by the output.
+pub type See<'a> = dyn FnMut(usize, &Array2<f32>, &Array2<f32>) + 'a;
+
+/// What a node sees, and where derivatives go, in a backward pass.
+pub struct Backward<'a> {
+    /// The node.
+    pub(super) node: usize,
+    /// Every value of the forward pass.
+    pub(super) values: Values<'a>,
+    /// The node's inputs among them.
+    pub(super) inputs: &'a [ValueId],
+    /// The graph's matrices.
+    pub(super) matrices: &'a [Array2<f32>],
+    /// As [`Operation::vectors`].
+    pub vectors: &'a [Vec<f32>],
+    /// Which denoising step it is.
+    pub step: usize,
+    /// Derivative by what the network reads of the iterate.
+    pub(super) d_iterate: &'a mut Option<Array2<f32>>,
+    /// Derivatives by all values, as far as they are known.
+    pub(super) d_values: &'a mut [Option<Array2<f32>>],
+    /// Derivatives by the matrices.
+    pub(super) d_matrices: &'a mut [Array2<f32>],
+    /// Derivatives by [`Operation::vectors`], to be added to.
+    pub d_vectors: &'a mut [Vec<f32>],
+    /// Is shown every matrix product.
+    pub(super) see: &'a mut See<'a>,
+}
+
+impl<'a> Backward<'a> {
+    /// An input, `[sample, element]`.
+    pub fn input(&self, i: usize) -> &'a Array2<f32> {
+        self.values.of(self.inputs[i])
+    }
+
+    /// The node's output.
+    pub fn output(&self) -> &'a Array2<f32> {
+        self.values.of(self.node + 1)
+    }
+
+    /// Adds the derivative by what the network reads of the iterate.
+    pub fn give_iterate(&mut self, d: Array2<f32>) {
+        match &mut *self.d_iterate {
+            Some(sum) => *sum += &d,
+            none => *none = Some(d),
+        }
+    }
+
+    /// Adds the derivative by an input.
+    pub fn give(&mut self, i: usize, d: Array2<f32>) {
+        match &mut self.d_values[self.inputs[i]] {
+            Some(sum) => *sum += &d,
+            none => *none = Some(d),
+        }
+    }
+
+    /// Takes the derivative `dy` by the output of a product: adds that by its matrix, whose operand was `x`.
+    pub fn product(&mut self, matrix: usize, x: &Array2<f32>, dy: &Array2<f32>) {
+        (self.see)(matrix, x, dy);
+        general_mat_mul(1.0, &dy.t(), x, 1.0, &mut self.d_matrices[matrix]);
+    }
+
+    /// From the derivative by the output of a matrix to that by its operand.
+    pub fn through<S: Data<Elem = f32>>(&self, matrix: usize, dy: &ArrayBase<S, Ix2>) -> Array2<f32> {
+        dy.dot(&self.matrices[matrix])
+    }
+
+    /// As [`Self::through`], given to an input. Nobody asks for the observation's derivative.
+    pub fn give_through(&mut self, i: usize, matrix: usize, dy: &Array2<f32>) {
+        if self.inputs[i] != 0 {
+            self.give(i, self.through(matrix, dy));
+        }
+    }
+}

@@ -1,0 +1,62 @@
+use actq_kernels::image::OpKind;
+use ndarray::{Array2, ArrayView2, Axis, concatenate, s};
+
+use crate::error::{Result, ensure};
+use crate::graph::lowering::{BufferId, Lifetime, Lowering, Slice, StepData};
+use crate::graph::operation::{Backward, Forward, NodeState, Operation, Saved};
+use crate::graph::values::{ValueId, WeightMatrix};
+
+/// A run of an input's elements.
+#[derive(Clone, Copy, Debug)]
+pub struct Span {
+    /// First element.
+    pub from: usize,
+    /// Elements.
+    pub len: usize,
+}
+
+/// A part of each input, behind each other.
+#[derive(Clone, Debug)]
+pub struct Concat(pub Vec<Span>);
+
+impl Operation for Concat {
+    fn output_len(&self, _: &[WeightMatrix], inputs: &[usize]) -> Result<usize> {
+        let spans = &self.0;
+        ensure!(spans.len() == inputs.len(), "{} parts of {} inputs", spans.len(), inputs.len());
+        for (span, len) in spans.iter().zip(inputs) {
+            let to = span.from + span.len;
+            ensure!(span.len > 0 && to <= *len, "{}:{to} reaches beyond the input's {len} values", span.from);
+        }
+        Ok(spans.iter().map(|span| span.len).sum())
+    }
+
+    fn forward(&self, run: &Forward<'_>, _: &mut NodeState) -> (Array2<f32>, Saved) {
+        let parts = run.inputs().zip(&self.0);
+        let views: Vec<ArrayView2<'_, f32>> =
+            parts.map(|(x, span)| x.slice_axis(Axis(1), (span.from..span.from + span.len).into())).collect();
+        let joined = concatenate(Axis(1), &views).unwrap_or_default();
+        (joined.as_standard_layout().into_owned(), Saved::default())
+    }
+
+    fn backward(&self, run: &mut Backward<'_>, _: &Saved, dy: Array2<f32>, _: &mut NodeState) {
+        let mut from = 0;
+        for (i, span) in self.0.iter().enumerate() {
+            let mut d = Array2::zeros(run.input(i).raw_dim());
+            d.slice_mut(s![.., span.from..span.from + span.len]).assign(&dy.slice(s![.., from..from + span.len]));
+            run.give(i, d);
+            from += span.len;
+        }
+    }
+
+    fn lower(&self, to: &mut Lowering, inputs: &[ValueId], len: usize) -> BufferId {
+        let dst = to.buffer(len, Lifetime::Step);
+        let mut offset = 0;
+        for (span, &input) in self.0.iter().zip(inputs) {
+            let part = Slice { buffer: dst, offset, len: span.len };
+            let from = Slice { offset: span.from, len: span.len, ..to.place(input) };
+            to.emit(OpKind::Copy, part, Some(from), None, StepData::None);
+            offset += span.len;
+        }
+        dst
+    }
+}

@@ -1,0 +1,127 @@
+use actq_kernels::image::OpKind;
+use ndarray::Array2;
+
+use crate::error::Result;
+use crate::graph::arrays::sum_rows;
+use crate::graph::lowering::{BufferId, Lowering, StepData};
+use crate::graph::operation::{Backward, Forward, NodeState, Operation, Saved, expect_len, only};
+use crate::graph::values::{ValueId, WeightMatrix};
+
+/// torch's LayerNorm: `(x - mean(x)) / sqrt(var(x) + eps) * weight + bias`
+#[derive(Clone, Debug)]
+pub struct LayerNorm {
+    /// Weights.
+    pub weight: Vec<f32>,
+    /// Biases.
+    pub bias: Vec<f32>,
+    /// Added to the variance.
+    pub eps: f32,
+}
+
+/// `x / sqrt(mean(x^2) + eps) * weight`
+#[derive(Clone, Debug)]
+pub struct RmsNorm {
+    /// Weights.
+    pub weight: Vec<f32>,
+    /// Added to the mean square.
+    pub eps: f32,
+}
+
+impl Operation for LayerNorm {
+    fn output_len(&self, _: &[WeightMatrix], inputs: &[usize]) -> Result<usize> {
+        let len = only(inputs)?;
+        expect_len("weight", &self.weight, len)?;
+        expect_len("bias", &self.bias, len)?;
+        Ok(len)
+    }
+
+    fn vectors(&self) -> Vec<&Vec<f32>> {
+        vec![&self.weight, &self.bias]
+    }
+
+    fn vectors_mut(&mut self) -> Vec<&mut Vec<f32>> {
+        vec![&mut self.weight, &mut self.bias]
+    }
+
+    fn forward(&self, run: &Forward<'_>, _: &mut NodeState) -> (Array2<f32>, Saved) {
+        normalized(run, self.eps, true)
+    }
+
+    fn backward(&self, run: &mut Backward<'_>, saved: &Saved, dy: Array2<f32>, _: &mut NodeState) {
+        sum_rows(&dy, &mut run.d_vectors[1]);
+        back(run, saved, dy, true);
+    }
+
+    fn lower(&self, to: &mut Lowering, inputs: &[ValueId], _: usize) -> BufferId {
+        let data = StepData::Constants([&[self.eps], &self.weight[..], &self.bias].concat());
+        to.in_place(inputs[0], OpKind::LayerNorm, data)
+    }
+}
+
+impl Operation for RmsNorm {
+    fn output_len(&self, _: &[WeightMatrix], inputs: &[usize]) -> Result<usize> {
+        let len = only(inputs)?;
+        expect_len("weight", &self.weight, len)?;
+        Ok(len)
+    }
+
+    fn vectors(&self) -> Vec<&Vec<f32>> {
+        vec![&self.weight]
+    }
+
+    fn vectors_mut(&mut self) -> Vec<&mut Vec<f32>> {
+        vec![&mut self.weight]
+    }
+
+    fn forward(&self, run: &Forward<'_>, _: &mut NodeState) -> (Array2<f32>, Saved) {
+        normalized(run, self.eps, false)
+    }
+
+    fn backward(&self, run: &mut Backward<'_>, saved: &Saved, dy: Array2<f32>, _: &mut NodeState) {
+        back(run, saved, dy, false);
+    }
+
+    fn lower(&self, to: &mut Lowering, inputs: &[ValueId], _: usize) -> BufferId {
+        let data = StepData::Constants([&[self.eps], &self.weight[..]].concat());
+        to.in_place(inputs[0], OpKind::RmsNorm, data)
+    }
+}
+
+/// Both norms; keeps the normalized values and the reciprocal deviation of each sample.
+fn normalized(run: &Forward<'_>, eps: f32, centred: bool) -> (Array2<f32>, Saved) {
+    let x = run.input(0);
+    let (weight, bias) = (&run.vectors[0], run.vectors.get(1));
+    let (mut hat, mut y) = (x.clone(), x.clone());
+    let mut inverses = Array2::zeros((x.nrows(), 1));
+    let rows = hat.rows_mut().into_iter().zip(y.rows_mut()).zip(&mut inverses);
+    for ((mut hat, mut y), inverse) in rows {
+        let n = hat.len() as f32;
+        let mean = if centred { run.sums.sum(&hat.view()) / n } else { 0.0 };
+        let square = hat.iter().map(|v| (v - mean) * (v - mean)).sum::<f32>() / n;
+        *inverse = 1.0 / (square + eps).sqrt();
+        for (k, (hat, y)) in hat.iter_mut().zip(y.iter_mut()).enumerate() {
+            *hat = (*hat - mean) * *inverse;
+            *y = *hat * weight[k] + bias.map_or(0.0, |bias| bias[k]);
+        }
+    }
+    (y, Saved { inner: vec![hat, inverses], ..Saved::default() })
+}
+
+/// Of both norms, all but the derivative by the bias.
+fn back(run: &mut Backward<'_>, saved: &Saved, mut dy: Array2<f32>, centred: bool) {
+    let weight = &run.vectors[0];
+    let d_weight = &mut run.d_vectors[0];
+    for ((mut d, hat), inverse) in dy.rows_mut().into_iter().zip(saved.inner[0].rows()).zip(&saved.inner[1]) {
+        let n = hat.len() as f32;
+        let (mut mean, mut along) = (0.0, 0.0);
+        for (k, (d, hat)) in d.iter_mut().zip(hat).enumerate() {
+            d_weight[k] += *d * hat;
+            *d *= weight[k];
+            mean += *d / n;
+            along += *d * hat / n;
+        }
+        let mean = if centred { mean } else { 0.0 };
+        d.iter_mut().zip(hat).for_each(|(d, hat)| *d = (*d - mean - hat * along) * inverse);
+    }
+    run.give(0, dy);
+}

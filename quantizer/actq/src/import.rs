@@ -1,0 +1,17 @@
+//! Policies from files. An importer adds nodes to a [`crate::graph::Graph`], which checks that they fit, and fills in
+//! the rest of a [`crate::policy::Policy`]; how its format names values is its own affair.
+
+#[expect(missing_docs, reason = "docs/POLICY.md describes the keys")]
+pub mod contract;
+mod denoising;
+mod folder;
+mod importer;
+#[expect(missing_docs, reason = "docs/POLICY.md describes the keys")]
+pub mod json;
+pub mod numbers;
+mod ops;
+pub mod tensors;
+pub mod values;
+
+pub use folder::{FILES, PolicyFolder};
+pub use importer::{Importer, folder_of};

@@ -1,0 +1,170 @@
+//! The object `action` of `policy.json`, and what else it says of how actions are played.
+
+use serde::{Deserialize, Serialize};
+
+use super::numbers::real;
+use crate::contract::{ActionContract, Binarise};
+use crate::error::{Context, Result, bail, ensure};
+
+/// What RLDS adds to the distance of two quantiles, so that it is not 0.
+const QUANTILE_EPS: f64 = 1e-8;
+
+/// An array with a value for each action; null where it does not concern an action.
+pub type Array = Option<Vec<Option<f64>>>;
+
+/// Keys of `action`.
+#[derive(Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct JsonContract {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean: Array,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub std: Array,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub q01: Array,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub q99: Array,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scale: Array,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub offset: Array,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub binarise: Option<JsonBinarise>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub low: Array,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub high: Array,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_step: Array,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub smoothing: Array,
+}
+
+/// Keys of `action.binarise`.
+#[derive(PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct JsonBinarise {
+    on: Array,
+    off: Array,
+    on_value: Array,
+    off_value: Array,
+}
+
+/// Keys of `ensemble`.
+#[derive(Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct JsonEnsemble {
+    pub horizon: usize,
+    pub m: Option<f64>,
+}
+
+impl JsonContract {
+    /// Gain and shift of each action, `a = x * gain + shift`, where the network's output is normalised.
+    fn unnormalise(&self, act_dim: usize) -> Result<Option<Vec<[f64; 2]>>> {
+        let normal = pairs(["mean", "std"], [&self.mean, &self.std], act_dim)?;
+        let quantiles = pairs(["q01", "q99"], [&self.q01, &self.q99], act_dim)?;
+        let pairs = match (&normal, &quantiles) {
+            (None, None) => return Ok(None),
+            (Some(_), Some(_)) => bail!("action has mean and std, and q01 and q99: leave one pair"),
+            (Some(pairs), None) | (None, Some(pairs)) => pairs,
+        };
+        let affine = |(i, pair): (usize, &Option<[f64; 2]>)| {
+            let Some([first, second]) = *pair else { return Ok([1.0, 0.0]) };
+            if normal.is_some() {
+                ensure!(second > 0.0, "action.std[{i}] is {second:?}; it must be above 0");
+                return Ok([second, first]);
+            }
+            ensure!(first <= second, "action.q01[{i}] is {first:?}, above action.q99[{i}], {second:?}");
+            let half = 0.5 * (second - first + QUANTILE_EPS);
+            Ok([half, half + first])
+        };
+        pairs.iter().enumerate().map(affine).collect::<Result<_>>().map(Some)
+    }
+
+    /// The contract of `act_dim` actions, with un-normalisation folded into scale and offset.
+    pub fn contract(&self, act_dim: usize) -> Result<ActionContract> {
+        let values = |name: &str, array: &Array, missing: Option<f64>| values(name, array, missing, act_dim);
+        let array = |name: &str, array: &Array| {
+            let Some(values) = values(name, array, None)? else { return Ok(None) };
+            reals(name, &values).map(Some)
+        };
+        let affine = self.unnormalise(act_dim)?;
+        let (mut scale, mut offset) = (array("scale", &self.scale)?, array("offset", &self.offset)?);
+        if let Some(affine) = affine {
+            let (by, plus) = (values("scale", &self.scale, None)?, values("offset", &self.offset, None)?);
+            let by = |i: usize| by.as_ref().map_or(1.0, |by| by[i]);
+            let plus = |i: usize| plus.as_ref().map_or(0.0, |plus| plus[i]);
+            let both = affine.iter().enumerate().map(|(i, [gain, shift])| (gain * by(i), shift * by(i) + plus(i)));
+            let (gains, shifts): (Vec<f64>, Vec<f64>) = both.unzip();
+            scale = Some(reals("scale, with un-normalising,", &gains)?);
+            offset = Some(reals("offset, with un-normalising,", &shifts)?);
+        }
+        let binarise = self.binarise.as_ref().map(|json| json.binarise(act_dim)).transpose()?;
+        let [low, high] = [array("low", &self.low)?, array("high", &self.high)?];
+        let [max_step, smoothing] = [array("max_step", &self.max_step)?, array("smoothing", &self.smoothing)?];
+        Ok(ActionContract { scale, offset, binarise, low, high, max_step, smoothing, ..ActionContract::default() })
+    }
+}
+
+impl JsonBinarise {
+    fn binarise(&self, act_dim: usize) -> Result<Binarise> {
+        let named =
+            [("on", &self.on), ("off", &self.off), ("on_value", &self.on_value), ("off_value", &self.off_value)];
+        let mut arrays = named.map(|_| Vec::new());
+        for (to, (key, array)) in arrays.iter_mut().zip(named) {
+            let name = format!("binarise.{key}");
+            // Where both values are 0, nothing is binarised.
+            let values = values(&name, array, Some(0.0), act_dim)?;
+            *to = reals(&name, &values.with_context(|| format!("action.{name} is missing"))?)?;
+        }
+        let concerned = |array: &Array| array.iter().flatten().map(Option::is_some).collect::<Vec<bool>>();
+        if let Some((key, _)) = named.iter().find(|(_, array)| concerned(array) != concerned(&self.on)) {
+            bail!("action.binarise.{key} is null for other actions than action.binarise.on");
+        }
+        let [on, off, on_value, off_value] = arrays;
+        for i in (0..act_dim).filter(|&i| self.on.as_ref().is_some_and(|on| on[i].is_some())) {
+            let value = on_value[i];
+            ensure!(value != off_value[i], "action.binarise.on_value[{i}] and off_value[{i}] are both {value:?}");
+        }
+        Ok(Binarise { on, off, on_value, off_value })
+    }
+}
+
+/// The pairs of two arrays, which both are there or none, and null in the same places.
+fn pairs([one, two]: [&str; 2], arrays: [&Array; 2], act_dim: usize) -> Result<Option<Vec<Option<[f64; 2]>>>> {
+    let [Some(first), Some(second)] = arrays else {
+        ensure!(
+            arrays[0].is_none() && arrays[1].is_none(),
+            "action has {one} or {two} alone; un-normalising takes both"
+        );
+        return Ok(None);
+    };
+    for (name, array) in [(one, first), (two, second)] {
+        let len = array.len();
+        ensure!(len == act_dim, "action.{name} has {len} values, act_dim is {act_dim}");
+    }
+    let pair = |(i, (first, second)): (usize, (&Option<f64>, &Option<f64>))| {
+        let same = first.is_some() == second.is_some();
+        ensure!(
+            same,
+            "action.{one}[{i}] or action.{two}[{i}] alone is null; both are for an action that is not normalised"
+        );
+        Ok(first.zip(*second).map(|(first, second)| [first, second]))
+    };
+    first.iter().zip(second).enumerate().map(pair).collect::<Result<_>>().map(Some)
+}
+
+/// An array's values; `missing` stands for null, which is refused where there is none.
+fn values(name: &str, array: &Array, missing: Option<f64>, act_dim: usize) -> Result<Option<Vec<f64>>> {
+    let Some(array) = array else { return Ok(None) };
+    let len = array.len();
+    ensure!(len == act_dim, "action.{name} has {len} values, act_dim is {act_dim}");
+    let one = |(i, v): (usize, &Option<f64>)| {
+        v.or(missing).with_context(|| format!("action.{name}[{i}] is null; it must be a number"))
+    };
+    array.iter().enumerate().map(one).collect::<Result<_>>().map(Some)
+}
+
+fn reals(name: &str, values: &[f64]) -> Result<Vec<f32>> {
+    values.iter().enumerate().map(|(i, v)| real(*v, &format!("action.{name}[{i}]"))).collect()
+}

@@ -1,0 +1,257 @@
+//! How a flow or a diffusion policy of `policy.json` gets from noise to its output.
+
+use actq_kernels::ops::denoise::Coefficients;
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Context, Result, bail, ensure};
+use crate::graph::Denoising;
+
+/// The most steps that a policy may take; an image has room for 65535.
+const MOST_STEPS: usize = 1000;
+
+/// Keys of `policy.json` for the kinds flow and diffusion.
+#[derive(Debug, Default, Deserialize, Serialize)]
+pub struct JsonDenoising {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    euler_steps: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    steps: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    solver: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    schedule: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    train_steps: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    prediction: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    clip_sample: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) clip_iterate: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    variance: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    beta: Option<[f64; 2]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) time: Option<JsonTime>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) obs_norm: Option<JsonNorm>,
+}
+
+/// Keys of [`JsonDenoising`].
+pub(super) const KEYS: [&str; 12] = [
+    "euler_steps",
+    "steps",
+    "solver",
+    "schedule",
+    "train_steps",
+    "prediction",
+    "clip_sample",
+    "clip_iterate",
+    "variance",
+    "beta",
+    "time",
+    "obs_norm",
+];
+
+/// What the network reads of the time.
+#[derive(Debug, Default, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct JsonTime {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    freq: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    order: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    turns: Option<bool>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    from: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    to: Option<f64>,
+}
+
+/// How observations are normalised before the ops.
+#[derive(Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct JsonNorm {
+    pub(super) mean: String,
+    pub(super) scale: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) clip: Option<f64>,
+}
+
+impl JsonTime {
+    /// The tensor of the frequencies.
+    pub(super) fn freq(&self) -> &str {
+        self.freq.as_deref().unwrap_or("time.freq")
+    }
+
+    /// Cosine and sine of a time at each frequency.
+    pub(super) fn features(&self, time: f64, freq: &[f32]) -> Result<Vec<f32>> {
+        let unit = if self.turns.unwrap_or(true) { std::f64::consts::TAU } else { 1.0 };
+        let of =
+            |f: &dyn Fn(f64) -> f64| freq.iter().map(|w| f(unit * time * f64::from(*w)) as f32).collect::<Vec<f32>>();
+        Ok(match self.order.as_deref() {
+            None | Some("cos,sin") => [of(&f64::cos), of(&f64::sin)].concat(),
+            Some("sin,cos") => [of(&f64::sin), of(&f64::cos)].concat(),
+            Some(other) => bail!("time.order is {other:?}; cos,sin and sin,cos are known"),
+        })
+    }
+}
+
+/// The steps, and the time that the network reads in each.
+pub(super) struct Schedule {
+    pub(super) denoising: Denoising,
+    pub(super) times: Vec<f64>,
+}
+
+impl JsonDenoising {
+    /// Of a flow over `len` values: Euler's or the midpoint method from the first time to the last.
+    pub(super) fn flow(&self, len: usize) -> Result<Schedule> {
+        for (key, given) in [
+            ("schedule", self.schedule.is_some()),
+            ("train_steps", self.train_steps.is_some()),
+            ("prediction", self.prediction.is_some()),
+            ("clip_sample", self.clip_sample.is_some()),
+            ("clip_iterate", self.clip_iterate.is_some()),
+            ("variance", self.variance.is_some()),
+            ("beta", self.beta.is_some()),
+        ] {
+            ensure!(!given, "the key {key:?} belongs to kind diffusion, not to flow");
+        }
+        let steps = self.step_count()?;
+        let time = self.time.as_ref();
+        let (from, to) = (time.and_then(|t| t.from).unwrap_or(0.0), time.and_then(|t| t.to).unwrap_or(1.0));
+        ensure!(from.is_finite() && to.is_finite() && from != to, "time runs from {from} to {to}");
+        let h = (to - from) / steps as f64;
+        let at = |k: f64| from + h * k;
+        let keep = Coefficients { keep: 1.0, ..Coefficients::default() };
+        let (mut by, mut times) = (Vec::new(), Vec::new());
+        for k in 0..steps {
+            match self.solver.as_deref() {
+                None | Some("euler") => {
+                    by.push(Coefficients { direct: h as f32, ..keep });
+                    times.push(at(k as f64));
+                }
+                // The network is asked half a step ahead; from there the whole step is taken.
+                Some("midpoint") => {
+                    by.push(Coefficients { ahead: (0.5 * h) as f32, ..keep });
+                    by.push(Coefficients { direct: h as f32, ..keep });
+                    times.extend([at(k as f64), at(k as f64 + 0.5)]);
+                }
+                Some(other) => bail!("solver is {other:?}; euler and midpoint are those of a flow"),
+            }
+        }
+        Ok(Schedule { denoising: Denoising { first: 0, len, limit: f32::INFINITY, steps: by }, times })
+    }
+
+    /// Of a diffusion process: Ho et al., arXiv 2006.11239, or Song et al., arXiv 2010.02502, with eta 0; the cosine
+    /// schedule is that of Nichol and Dhariwal, arXiv 2102.09672, equation 17.
+    pub(super) fn diffusion(&self, len: usize) -> Result<Schedule> {
+        let train = self.train_steps.context("kind diffusion needs the key train_steps")?;
+        ensure!((1..=MOST_STEPS).contains(&train), "train_steps is {train}, it must be 1 to {MOST_STEPS}");
+        let steps = if self.steps.or(self.euler_steps).is_some() { self.step_count()? } else { train };
+        ensure!(steps <= train, "steps is {steps}, train_steps only {train}");
+        let remaining = self.remaining(train)?;
+        // Evenly spaced, from the noisiest on; the last is 0.
+        let chosen: Vec<usize> = (0..steps).rev().map(|k| k * (train / steps)).collect();
+        let limit = match (self.clip_sample, self.clip_iterate) {
+            (None, None) => f32::INFINITY,
+            (Some(clip), None) => super::numbers::positive(clip, "clip_sample")?,
+            (None, Some(clip)) => super::numbers::positive(clip, "clip_iterate")?,
+            (Some(_), Some(_)) => bail!("clip_sample and clip_iterate limit by one limit; give one of them"),
+        };
+        let mut by = Vec::new();
+        for (i, &t) in chosen.iter().enumerate() {
+            let (ab, before) = (remaining[t], chosen.get(i + 1).map_or(1.0, |&t| remaining[t]));
+            by.push(self.step(ab, before)?);
+        }
+        let times = chosen.iter().map(|&t| t as f64).collect();
+        Ok(Schedule { denoising: Denoising { first: 0, len, limit, steps: by }, times })
+    }
+
+    fn step_count(&self) -> Result<usize> {
+        let steps = match (self.steps, self.euler_steps) {
+            (Some(_), Some(_)) => bail!("steps and euler_steps are the same; give one of them"),
+            (steps, euler) => steps.or(euler).context("kind flow needs the key steps")?,
+        };
+        ensure!((1..=MOST_STEPS).contains(&steps), "steps is {steps}, it must be 1 to {MOST_STEPS}");
+        Ok(steps)
+    }
+
+    /// The share of the signal's power that remains after each step of training (alpha bar).
+    fn remaining(&self, train: usize) -> Result<Vec<f64>> {
+        let betas: Vec<f64> = match self.schedule.as_deref() {
+            Some("cosine" | "squaredcos_cap_v2") => {
+                let power = |i: usize| {
+                    let angle = (i as f64 / train as f64 + 0.008) / 1.008 * std::f64::consts::FRAC_PI_2;
+                    angle.cos().powi(2)
+                };
+                (0..train).map(|i| (1.0 - power(i + 1) / power(i)).min(0.999)).collect()
+            }
+            Some("linear") => {
+                let [first, last] = self.beta.unwrap_or([1e-4, 0.02]);
+                let share = |i: usize| if train > 1 { i as f64 / (train - 1) as f64 } else { 0.0 };
+                (0..train).map(|i| first + (last - first) * share(i)).collect()
+            }
+            Some(other) => bail!("schedule is {other:?}; cosine and linear are known"),
+            None => bail!("kind diffusion needs the key schedule: cosine or linear"),
+        };
+        // Each step of training only ever adds noise.
+        ensure!(betas.iter().all(|b| *b > 0.0 && *b < 1.0), "the schedule's betas must lie between 0 and 1");
+        Ok(betas
+            .iter()
+            .scan(1.0, |product, beta| {
+                *product *= 1.0 - beta;
+                Some(*product)
+            })
+            .collect())
+    }
+
+    /// The step from the signal's share `ab` to `before`.
+    fn step(&self, ab: f64, before: f64) -> Result<Coefficients> {
+        let (signal, noise) = (ab.sqrt(), (1.0 - ab).sqrt());
+        // The sample and the noise that the output stands for, each by the iterate and the output.
+        let (sample, eps) = match self.prediction.as_deref() {
+            None | Some("epsilon") => ([1.0 / signal, -noise / signal], [0.0, 1.0]),
+            Some("sample") => ([0.0, 1.0], [1.0 / noise, -signal / noise]),
+            Some("v") => ([signal, -noise], [noise, signal]),
+            Some(other) => bail!("prediction is {other:?}; epsilon, sample and v are known"),
+        };
+        let numbers = match self.solver.as_deref() {
+            Some("ddim") => {
+                ensure!(self.variance.is_none(), "the key \"variance\" belongs to the solver ddpm");
+                let left = (1.0 - before).sqrt();
+                [sample[0], sample[1], left * eps[0], left * eps[1], before.sqrt(), 0.0, 0.0]
+            }
+            None | Some("ddpm") => {
+                let alpha = ab / before;
+                let keep = alpha.sqrt() * (1.0 - before) / (1.0 - ab);
+                let variance = match self.variance.as_deref() {
+                    None | Some("small") => (1.0 - before) / (1.0 - ab) * (1.0 - alpha),
+                    // The last step adds none.
+                    Some("large") => {
+                        if before < 1.0 {
+                            1.0 - alpha
+                        } else {
+                            0.0
+                        }
+                    }
+                    Some(other) => bail!("variance is {other:?}; small and large are known"),
+                };
+                [sample[0], sample[1], keep, 0.0, before.sqrt() * (1.0 - alpha) / (1.0 - ab), variance.sqrt(), 0.0]
+            }
+            Some(other) => bail!("solver is {other:?}; ddpm and ddim are those of a diffusion policy"),
+        };
+        // A sample without a limit of its own is a sum like the rest, and its place is free for the iterate, if that
+        // has one.
+        let [sample_x, sample_v, keep, direct, sample, sigma, ahead] = numbers;
+        let (by_x, by_v) = (keep + sample * sample_x, direct + sample * sample_v);
+        let numbers = match (self.clip_sample, self.clip_iterate) {
+            (Some(_), _) => numbers,
+            (None, Some(_)) => [1.0, 0.0, 0.0, by_v, by_x, sigma, ahead],
+            (None, None) => [0.0, 0.0, by_x, by_v, 0.0, sigma, ahead],
+        };
+        Ok(Coefficients::from_array(numbers.map(|number| number as f32)))
+    }
+}

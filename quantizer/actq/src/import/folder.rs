@@ -1,0 +1,119 @@
+//! A policy folder: `policy.json` (the op list) and `policy.safetensors` (the weights).
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use actq_kernels::image::Kind;
+use sha2::{Digest, Sha256};
+
+use super::importer::Importer;
+use super::json::PolicyJson;
+use super::numbers::positive;
+use super::ops::{Builder, Weights};
+use super::tensors::TensorFile;
+use crate::error::{Context, Result, ensure};
+use crate::graph::hoist;
+use crate::policy::Policy;
+
+/// The files that make a policy, in its folder.
+pub const FILES: [&str; 2] = ["policy.json", "policy.safetensors"];
+
+/// Policy folders as a format.
+#[derive(Clone, Copy, Debug)]
+pub struct PolicyFolder;
+
+impl Importer for PolicyFolder {
+    fn accepts(&self, path: &Path) -> bool {
+        path.is_dir()
+    }
+
+    fn files(&self, path: &Path) -> Vec<PathBuf> {
+        FILES.map(|name| path.join(name)).to_vec()
+    }
+
+    fn load(&self, path: &Path) -> Result<Policy> {
+        Policy::load(path)
+    }
+}
+
+impl Policy {
+    /// Reads `policy.json` and `policy.safetensors` from a folder. Every error names the file and the op or tensor.
+    pub fn load(path: &Path) -> Result<Self> {
+        ensure!(
+            path.is_dir(),
+            "{}: not a folder; give the one that holds policy.json, or an .onnx file",
+            path.display()
+        );
+        let [json_path, weights_path] = FILES.map(|name| path.join(name));
+        let json = fs::read(&json_path).with_context(|| format!("{}: cannot be read", json_path.display()))?;
+        let weights = fs::read(&weights_path).with_context(|| format!("{}: cannot be read", weights_path.display()))?;
+        Self::of_files(path, [&json_path, &weights_path], &json, &weights)
+    }
+
+    /// A policy that is at `dir`, from the bytes of its two files, which errors call by `names`.
+    pub fn of_files(dir: &Path, names: [&Path; 2], json: &[u8], weights: &[u8]) -> Result<Self> {
+        let [json_name, weights_name] = names.map(|name| name.display().to_string());
+        let parsed = PolicyJson::parse(json).with_context(|| json_name.clone())?;
+        let file = TensorFile::new(weights).with_context(|| format!("{weights_name}: not a safetensors file"))?;
+        let mut digest = Sha256::new();
+        digest.update(json);
+        digest.update(weights);
+        let weights = Weights { file, path: names[1] };
+        build(dir, &parsed, weights, digest.finalize().into()).context(json_name)
+    }
+}
+
+fn build(dir: &Path, json: &PolicyJson, weights: Weights<'_>, digest: [u8; 32]) -> Result<Policy> {
+    ensure!(json.obs_dim > 0 && json.act_dim > 0, "obs_dim and act_dim must be at least 1");
+    for (name, n) in [("obs_dim", json.obs_dim), ("act_dim", json.act_dim), ("chunk", json.chunk.unwrap_or(1))] {
+        ensure!(n <= usize::from(u16::MAX), "{name} is {n}, 65535 is the most");
+    }
+    ensure!(!json.ops.is_empty(), "ops is empty");
+    ensure!(json.name.len() <= 200, "name is longer than 200 bytes");
+    let kind = json.kind()?;
+    let (chunk, execute) = match kind {
+        Kind::Step => (1, 1),
+        Kind::Chunk | Kind::Flow | Kind::Diffusion => {
+            let chunk = json.chunk.context("a policy of several actions needs the key chunk")?;
+            let execute = json.execute(chunk);
+            ensure!((1..=chunk).contains(&execute), "execute is {execute}, it must be 1 to chunk ({chunk})");
+            (chunk, execute)
+        }
+    };
+    let add = |builder: &mut Builder<'_>| -> Result<()> {
+        for (i, op) in json.ops.iter().enumerate() {
+            builder.add(op).with_context(|| format!("op {i} ({})", op.op))?;
+        }
+        Ok(())
+    };
+    let (graph, (weights, parameters)) = if kind.is_iterative() {
+        let len = chunk * json.act_dim;
+        let by = &json.denoising;
+        let schedule = if kind == Kind::Flow { by.flow(len)? } else { by.diffusion(len)? };
+        let (mut builder, times) = Builder::iterative(json.obs_dim, by, &schedule, weights)?;
+        add(&mut builder)?;
+        let trained = (builder.graph.weights(), builder.graph.parameters());
+        (hoist::iterative(&builder.graph, json.obs_dim, &times, schedule.denoising)?, trained)
+    } else {
+        let mut builder = Builder::new(json.obs_dim, weights);
+        add(&mut builder)?;
+        let trained = (builder.graph.weights(), builder.graph.parameters());
+        (builder.graph, trained)
+    };
+    let policy = Policy {
+        dir: dir.to_owned(),
+        name: json.name.clone(),
+        kind,
+        chunk,
+        execute,
+        act_len: json.act_dim,
+        rate_hz: positive(json.control_hz.unwrap_or(50.0), "control_hz")?,
+        contract: json.contract(kind)?,
+        weights,
+        parameters,
+        graph,
+        digest,
+    };
+    policy.check()?;
+    Ok(policy)
+}

@@ -1,0 +1,209 @@
+//! `policy.json`: which keys it may have, and their values as f32.
+
+use actq_kernels::image::Kind;
+use actq_kernels::math::Function;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::contract::{JsonContract, JsonEnsemble};
+use super::denoising::{self, JsonDenoising};
+use crate::contract::{ActionContract, Ensemble, Playback};
+use crate::error::{Context, Result, bail};
+use crate::strict_json;
+use crate::text::is_control;
+
+#[derive(Default, Deserialize, Serialize)]
+pub struct PolicyJson {
+    pub name: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kind: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub chunk: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub execute: Option<usize>,
+    pub obs_dim: usize,
+    pub act_dim: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub control_hz: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub action: Option<JsonContract>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ensemble: Option<JsonEnsemble>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub overlap: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub deadline: Option<usize>,
+    #[serde(flatten)]
+    pub denoising: JsonDenoising,
+    pub ops: Vec<JsonOp>,
+}
+
+/// Keys of [`PolicyJson`].
+const KEYS: [&str; 12] = [
+    "name",
+    "kind",
+    "chunk",
+    "execute",
+    "ensemble",
+    "overlap",
+    "deadline",
+    "obs_dim",
+    "act_dim",
+    "control_hz",
+    "action",
+    "ops",
+];
+/// Keys that tell people where a policy is from. Their values are not read.
+const ABOUT: [&str; 8] = ["source", "commit", "source_path", "license", "recurrent", "n_params", "inputs", "states"];
+
+/// One op; [`op_keys`] says which keys it may have.
+#[derive(Default, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct JsonOp {
+    pub op: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub input: Option<Input>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub save: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub with: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub w: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub b: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scale: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pre_clip: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub clip: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub w_ln: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub b_ln: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub eps: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hidden: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gates: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub w_ih: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub w_hh: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub b_ih: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub b_hh: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub approximate: Option<String>,
+}
+
+#[derive(Deserialize, Serialize)]
+#[serde(untagged)]
+pub enum Input {
+    One(String),
+    Many(Vec<String>),
+}
+
+impl PolicyJson {
+    /// Refuses keys that are not known: one that is ignored would be another policy.
+    pub fn parse(bytes: &[u8]) -> Result<Self> {
+        const WRONG: &str = "not a policy description";
+        let value = strict_json::parse(bytes).context(WRONG)?;
+        // What the keys of an unknown kind are is not known either.
+        let iterative = kind(value["kind"].as_str())?.is_iterative();
+        let keys = [&KEYS[..], if iterative { &denoising::KEYS } else { &[] }].concat();
+        if let Some(key) = given(&value).find(|key| !keys.contains(key) && !ABOUT.contains(key)) {
+            let (keys, about) = (keys.join(", "), ABOUT.join(", "));
+            bail!("the key {key:?} is not known; known are {keys} and, for people alone, {about}");
+        }
+        for (i, op) in value["ops"].as_array().into_iter().flatten().enumerate() {
+            let Some(name) = op["op"].as_str() else { continue };
+            let Some(own) = op_keys(name) else { continue };
+            let keys = [&["op", "input", "save"], own].concat();
+            if let Some(key) = given(op).find(|key| !keys.contains(key)) {
+                bail!("op {i} ({name}) has the key {key:?}; its keys are {}", keys.join(", "));
+            }
+        }
+        for (place, value) in [("name", &value["name"]), ("ops", &value["ops"])] {
+            check_text(place, value)?;
+        }
+        serde_json::from_slice(bytes).context(WRONG)
+    }
+
+    pub fn kind(&self) -> Result<Kind> {
+        kind(self.kind.as_deref())
+    }
+
+    /// The action contract. Without the key `action` whatever is chunked is limited to -1..1, as the reference runtime
+    /// of the format does.
+    pub fn contract(&self, kind: Kind) -> Result<ActionContract> {
+        let contract = match &self.action {
+            Some(json) => json.contract(self.act_dim)?,
+            None => {
+                let limit = |at: f32| (kind != Kind::Step).then(|| vec![at; self.act_dim]);
+                ActionContract { low: limit(-1.0), high: limit(1.0), ..ActionContract::default() }
+            }
+        };
+        let ensemble = self.ensemble.as_ref().map(|json| Ensemble { horizon: json.horizon, m: json.m.unwrap_or(0.01) });
+        let playback = Playback { ensemble, overlap: self.overlap.unwrap_or(0), deadline: self.deadline };
+        Ok(ActionContract { playback, ..contract })
+    }
+
+    /// How many actions of a chunk are executed where nothing says so: all, but of chunks that are averaged one.
+    pub fn execute(&self, chunk: usize) -> usize {
+        self.execute.unwrap_or(if self.ensemble.is_some() { 1 } else { chunk })
+    }
+}
+
+/// The keys of an object that have a value; one without says nothing.
+fn given(object: &Value) -> impl Iterator<Item = &str> {
+    object.as_object().into_iter().flatten().filter(|(_, value)| !value.is_null()).map(|(key, _)| key.as_str())
+}
+
+fn kind(name: Option<&str>) -> Result<Kind> {
+    match name {
+        None | Some("step") => Ok(Kind::Step),
+        Some("chunk") => Ok(Kind::Chunk),
+        Some("flow") => Ok(Kind::Flow),
+        Some("diffusion") => Ok(Kind::Diffusion),
+        Some(other) => bail!("kind {other:?} is not known; step, chunk, flow and diffusion are"),
+    }
+}
+
+/// The keys of an op beside those of every op; `None` for an unknown op.
+fn op_keys(op: &str) -> Option<&'static [&'static str]> {
+    Some(match op {
+        "identity" => &[],
+        "normalize" => &["mean", "scale", "pre_clip", "clip"],
+        "linear" => &["w", "b"],
+        "layernorm" => &["w_ln", "b_ln", "eps"],
+        "rmsnorm" => &["w_ln", "eps"],
+        "add" | "mul" => &["with"],
+        "lstm" | "gru" => &["hidden", "gates", "w_ih", "w_hh", "b_ih", "b_hh"],
+        "gelu" => &["approximate"],
+        name if Function::ALL.iter().any(|f| f.name() == name) => &[],
+        _ => return None,
+    })
+}
+
+/// Refuses control characters in the text within `value`: names are printed.
+fn check_text(place: &str, value: &Value) -> Result<()> {
+    match value {
+        Value::String(text) => {
+            let control = text.chars().find(|c| is_control(*c));
+            let Some(c) = control else { return Ok(()) };
+            bail!("{place} {text:?} holds the control character U+{:04X}", u32::from(c));
+        }
+        Value::Array(items) => {
+            items.iter().enumerate().try_for_each(|(i, item)| check_text(&format!("{place}[{i}]"), item))
+        }
+        Value::Object(entries) => {
+            entries.iter().try_for_each(|(key, value)| check_text(&format!("{place}.{}", key.escape_debug()), value))
+        }
+        _ => Ok(()),
+    }
+}

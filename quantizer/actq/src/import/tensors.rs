@@ -1,0 +1,52 @@
+//! Files of tensors in the format safetensors: policies and recordings.
+
+use half::{bf16, f16};
+use safetensors::{Dtype, SafeTensors};
+
+use super::values::{Tensor, Values};
+use crate::error::{Context, Result};
+use crate::strict_json;
+
+/// The tensors of a file.
+#[derive(Debug)]
+pub struct TensorFile<'a>(SafeTensors<'a>);
+
+impl<'a> TensorFile<'a> {
+    /// Reads the header. Refuses a name that is there twice, of which the crate alone would take the last.
+    pub fn new(bytes: &'a [u8]) -> Result<Self> {
+        // The header, behind its length; whatever is wrong with that is left to the crate.
+        let header = bytes.split_first_chunk().and_then(|(len, rest)| {
+            let len = usize::try_from(u64::from_le_bytes(*len)).ok()?;
+            rest.get(..len)
+        });
+        header.map(strict_json::parse).transpose().context("its header")?;
+        Ok(Self(SafeTensors::deserialize(bytes)?))
+    }
+
+    /// The tensors' names, sorted.
+    pub fn names(&self) -> Vec<String> {
+        let mut names: Vec<String> = self.0.names().into_iter().map(str::to_owned).collect();
+        names.sort_unstable();
+        names
+    }
+
+    /// A tensor; `None` where there is none of that name.
+    pub fn get(&self, name: &str) -> Option<Tensor> {
+        let view = self.0.tensor(name).ok()?;
+        let bytes = view.data();
+        let values = match view.dtype() {
+            Dtype::F32 => Values::F32(elements(bytes, f32::from_le_bytes)),
+            Dtype::F64 => Values::F64(elements(bytes, f64::from_le_bytes)),
+            Dtype::F16 => Values::F16(elements(bytes, f16::from_le_bytes)),
+            Dtype::BF16 => Values::BF16(elements(bytes, bf16::from_le_bytes)),
+            Dtype::I32 => Values::I32(elements(bytes, i32::from_le_bytes)),
+            Dtype::I64 => Values::I64(elements(bytes, i64::from_le_bytes)),
+            other => Values::Other(format!("{other:?}")),
+        };
+        Some(Tensor { shape: view.shape().to_vec(), values })
+    }
+}
+
+fn elements<const N: usize, T>(bytes: &[u8], of: fn([u8; N]) -> T) -> Vec<T> {
+    bytes.as_chunks().0.iter().map(|b| of(*b)).collect()
+}

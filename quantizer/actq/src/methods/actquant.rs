@@ -1,0 +1,278 @@
+//! ActQuant (Akbari et al., "Sub-4-bit Action-Guided Quantization for Vision-Language-Action Models", arXiv
+//! 2605.24011).
+//!
+//! Stage 1 gives each matrix a width: [`score`] measures by HSIC how much it adds to what its values say about the
+//! actions, [`allocation`] spends the budget on these scores. Stage 2 fits the scales inside a matrix: they minimise
+//! the rounding error weighted by the [Fisher](fisher) information of the action loss, by the same search that plain
+//! rounding uses. Where the budget is one width for all, stage 1 is skipped.
+//!
+//! What is done otherwise than in the paper or in its authors' code is a [choice](choices); `docs/QUANTIZER.md` lists
+//! all of it.
+
+pub mod allocation;
+pub mod choices;
+pub mod score;
+
+use actq_kernels::layout::Width;
+use ndarray::Array2;
+
+use super::options::Options;
+use super::quantized::{Outcome, Quantized};
+use super::scale::{Scales, round_to};
+use crate::budget::Rate;
+use crate::calibrate::fisher;
+use crate::data::Dataset;
+use crate::error::{Result, ensure};
+use crate::graph::{Graph, WeightMatrix};
+use choices::Choices;
+use score::Score;
+
+/// Share of the matrix's mean importance that every weight has at least. It decides where no recorded frame says
+/// anything, as in rows behind a ReLU that never fires.
+const FLOOR: f64 = 1e-6;
+
+/// What ActQuant takes from the recorded observations, for any number of budgets.
+#[derive(Clone, Debug)]
+pub struct ActionStatistics {
+    /// What they were taken by, and how they are used.
+    pub choices: Choices,
+    /// Stage 1, per matrix.
+    pub scores: Vec<Score>,
+    /// Stage 2, per matrix `[rows, cols]`.
+    pub importance: Vec<Array2<f32>>,
+}
+
+impl ActionStatistics {
+    /// Runs the f32 network over `dataset`, which must hold actions. `progress` gets the share done.
+    pub fn collect(graph: &Graph, dataset: &Dataset, choices: Choices, progress: &mut dyn FnMut(f64)) -> Result<Self> {
+        let path = dataset.path.display();
+        ensure!(
+            dataset.action.is_some(),
+            "{path}: array \"action\" is missing; actquant weighs weights by the actions"
+        );
+        Ok(Self {
+            choices,
+            scores: score::scores(graph, dataset, choices.frames, choices.bandwidth)?,
+            importance: fisher::importance(graph, dataset, choices.fisher, progress)?,
+        })
+    }
+
+    /// What the allocation works with: the chosen score, negative ones as 0, or 1 for every matrix where none is above
+    /// 0 (and then `true`): scores that tell nothing apart give every layer the same claim.
+    pub fn effective_scores(&self) -> (Vec<f64>, bool) {
+        let scores: Vec<f64> = self.scores.iter().map(|s| s.of(self.choices.score).max(0.0)).collect();
+        if scores.iter().all(|s| *s == 0.0) { (vec![1.0; scores.len()], true) } else { (scores, false) }
+    }
+
+    /// What the fits of scales weigh every weight by, per matrix: its importance and a little more, and where that is
+    /// chosen [`by_magnitude`].
+    pub fn weight_importance(&self, graph: &Graph) -> Vec<Vec<f64>> {
+        let matrices = graph.matrices.iter().zip(&self.importance);
+        let weighed = |(matrix, importance): (&WeightMatrix, &Array2<f32>)| {
+            let importance = floored(importance);
+            if self.choices.magnitude { by_magnitude(importance, matrix) } else { importance }
+        };
+        matrices.map(weighed).collect()
+    }
+}
+
+/// Quantizes every matrix of `graph`.
+pub fn quantize(graph: &Graph, statistics: &ActionStatistics, rate: Rate, options: &Options) -> Result<Vec<Outcome>> {
+    let widths = match rate {
+        Rate::Width(width) => vec![width; graph.matrices.len()],
+        Rate::BitsPerWeight(_) | Rate::Bytes(_) => {
+            let scores = statistics.effective_scores().0;
+            allocation::allocate(graph, &scores, &statistics.choices, options.packing(), rate.bytes(graph.weights()))?
+        }
+    };
+    let importance = statistics.weight_importance(graph);
+    let matrices = graph.matrices.iter().zip(widths).zip(&importance);
+    matrices
+        .map(|((matrix, width), importance)| {
+            let quantized = quantize_matrix(matrix, width, options.group, importance);
+            Outcome::new(matrix, quantized, None, options.activations)
+        })
+        .collect()
+}
+
+/// Rounds to nearest with scales that minimise `sum of importance * error^2` of each group, or of each row.
+fn quantize_matrix(matrix: &WeightMatrix, width: Width, group: usize, importance: &[f64]) -> Quantized {
+    round_to(matrix, width, Scales::fit(matrix, &vec![Some(width); matrix.rows], group, importance))
+}
+
+/// Every importance of a matrix times `sqrt(mean of the row's w^2 + w^2)`, as llama.cpp's fits weigh.
+pub fn by_magnitude(mut importance: Vec<f64>, matrix: &WeightMatrix) -> Vec<f64> {
+    let cols = matrix.cols.max(1);
+    for (importance, row) in importance.chunks_mut(cols).zip(matrix.data.chunks(cols)) {
+        let square = |w: &f32| f64::from(*w).powi(2);
+        let mean = row.iter().map(square).sum::<f64>() / row.len() as f64;
+        importance.iter_mut().zip(row).for_each(|(h, w)| *h *= (mean + square(w)).sqrt());
+    }
+    importance
+}
+
+fn floored(importance: &Array2<f32>) -> Vec<f64> {
+    let mean = importance.iter().map(|&i| f64::from(i)).sum::<f64>() / importance.len().max(1) as f64;
+    let least = if mean > 0.0 { FLOOR * mean } else { 1.0 };
+    importance.iter().map(|&i| f64::from(i) + least).collect()
+}
+
+#[cfg(test)]
+pub(crate) mod testing {
+    //! Small networks, and recordings of them.
+
+    use ndarray::Array3;
+
+    use super::*;
+    use crate::graph::Evaluator;
+    use crate::graph::ops::{Linear, Lstm, Pointwise};
+    use crate::random::Random;
+    use actq_kernels::math::Function;
+
+    fn matrix(name: &str, rows: usize, cols: usize, random: &mut Random) -> WeightMatrix {
+        WeightMatrix { name: name.into(), rows, cols, data: (0..rows * cols).map(|_| 0.7 * random.unit()).collect() }
+    }
+
+    fn vector(len: usize, random: &mut Random) -> Vec<f32> {
+        (0..len).map(|_| 0.3 * random.unit()).collect()
+    }
+
+    /// 3 -> 4 tanh -> 2
+    pub(crate) fn mlp() -> Graph {
+        let mut random = Random::new(1);
+        let mut graph = Graph::new(3);
+        graph.matrices = vec![matrix("a", 4, 3, &mut random), matrix("b", 2, 4, &mut random)];
+        graph.add(Linear { matrix: 0, bias: vector(4, &mut random) }, &[0]).expect("it fits");
+        graph.add(Pointwise(Function::Tanh), &[1]).expect("it fits");
+        graph.add(Linear { matrix: 1, bias: vector(2, &mut random) }, &[2]).expect("it fits");
+        graph
+    }
+
+    /// LSTM 2 -> 3, then 3 -> 2
+    pub(crate) fn lstm() -> Graph {
+        let mut random = Random::new(2);
+        let mut graph = Graph::new(2);
+        graph.matrices = vec![
+            matrix("w_ih", 12, 2, &mut random),
+            matrix("w_hh", 12, 3, &mut random),
+            matrix("out", 2, 3, &mut random),
+        ];
+        let bias = vector(12, &mut random);
+        graph.add(Lstm { hidden: 3, input: 0, state: 1, bias }, &[0]).expect("it fits");
+        graph.add(Linear { matrix: 2, bias: vector(2, &mut random) }, &[1]).expect("it fits");
+        graph
+    }
+
+    /// Random observations with the network's own actions.
+    pub(crate) fn dataset(graph: &Graph, episodes: usize, steps: usize) -> Dataset {
+        let mut random = Random::new(3);
+        let obs = Array3::from_shape_fn((episodes, steps, graph.obs_len), |_| random.unit());
+        let mut action = Array3::zeros((episodes, steps, graph.len_of(graph.output())));
+        let mut evaluator = Evaluator::new(graph);
+        for episode in 0..episodes {
+            evaluator.reset();
+            for step in 0..steps {
+                let x: Vec<f32> = (0..graph.obs_len).map(|i| obs[(episode, step, i)]).collect();
+                for (i, y) in evaluator.step(&x, &mut |_, _| {}).into_iter().enumerate() {
+                    action[(episode, step, i)] = y;
+                }
+            }
+        }
+        Dataset { path: "test".into(), obs, action: Some(action), length: vec![steps; episodes], state: None }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::budget::Budget;
+    use crate::methods::options::Method;
+    use crate::methods::scale;
+    use choices::ScoreOf;
+
+    fn quantize_at(graph: &Graph, statistics: &ActionStatistics, rate: Rate) -> Result<Vec<Outcome>> {
+        let options =
+            Options { group: 32, ..Options::new(Method::ActQuant(statistics.choices), Budget::BitsPerWeight(3.0)) };
+        quantize(graph, statistics, rate, &options)
+    }
+
+    #[test]
+    fn scales_follow_the_importance() {
+        let data: Vec<f32> = (0..64).map(|i| (i as f32 * 0.7).sin()).collect();
+        let matrix = WeightMatrix { name: "w".into(), rows: 2, cols: 32, data };
+        // Only the even columns of row 0 and the odd ones of row 1 matter.
+        let importance = Array2::from_shape_fn((2, 32), |(r, c)| if r == c % 2 { 1.0 } else { 0.0 });
+        let error = |quantized: &Quantized| -> f64 {
+            let values = quantized.dequantized();
+            (0..64).map(|i| f64::from(importance[(i / 32, i % 32)] * (values[i] - matrix.data[i]).powi(2))).sum()
+        };
+        for width in [Width::W2, Width::W3] {
+            for group in [0, 32] {
+                let weighted = error(&quantize_matrix(&matrix, width, group, &floored(&importance)));
+                let plain = error(&scale::round_to_nearest(&matrix, width, group));
+                assert!(weighted < plain, "{width:?} group {group}: {weighted} against {plain}");
+            }
+        }
+    }
+
+    #[test]
+    fn equal_importance_is_plain_rounding_and_none_is_too() {
+        let data: Vec<f32> = (0..80).map(|i| (i as f32 * 1.3).cos()).collect();
+        let matrix = WeightMatrix { name: "w".into(), rows: 2, cols: 40, data };
+        let plain = scale::round_to_nearest(&matrix, Width::W3, 32);
+        for level in [0.0, 2.0] {
+            let found = quantize_matrix(&matrix, Width::W3, 32, &floored(&Array2::from_elem((2, 40), level)));
+            assert_eq!((found.codes, found.scales), (plain.codes.clone(), plain.scales.clone()));
+        }
+    }
+
+    #[test]
+    fn a_budget_is_kept_and_a_width_is_taken_as_it_is() {
+        let graph = testing::lstm();
+        let dataset = testing::dataset(&graph, 2, 24);
+        let statistics =
+            ActionStatistics::collect(&graph, &dataset, Choices::default(), &mut |_| {}).expect("statistics");
+        let uniform = quantize_at(&graph, &statistics, Rate::Width(Width::W3)).expect("quantized");
+        assert!(uniform.iter().all(|o| o.quantized.widths.iter().all(|w| *w == Some(Width::W3))));
+        let bytes = |outcomes: &[Outcome]| -> usize { outcomes.iter().map(|o| o.bytes()).sum() };
+        let limit = 8.0 * (bytes(&uniform) + 40) as f64 / graph.weights() as f64;
+        let mixed = quantize_at(&graph, &statistics, Rate::BitsPerWeight(limit)).expect("quantized");
+        assert!(8.0 * bytes(&mixed) as f64 / graph.weights() as f64 <= limit);
+        let error = quantize_at(&graph, &statistics, Rate::BitsPerWeight(0.5)).expect_err("too small");
+        assert!(error.budget().is_some());
+    }
+
+    #[test]
+    fn actions_are_needed_and_scores_without_a_positive_one_count_as_equal() {
+        let graph = testing::mlp();
+        let mut dataset = testing::dataset(&graph, 1, 8);
+        dataset.action = None;
+        let error =
+            ActionStatistics::collect(&graph, &dataset, Choices::default(), &mut |_| {}).expect_err("no actions");
+        assert!(error.to_string().contains("\"action\" is missing"), "{error}");
+        let zero = Score { x_input: 0.0, y_input: 1.0, x_output: 0.0, y_output: 0.5 };
+        let choices = Choices::default();
+        let mut statistics = ActionStatistics { choices, scores: vec![zero; 2], importance: Vec::new() };
+        assert_eq!(statistics.effective_scores(), (vec![1.0; 2], true));
+        statistics.choices.score = ScoreOf::Output;
+        assert_eq!(statistics.effective_scores(), (vec![0.5; 2], false));
+    }
+
+    #[test]
+    fn magnitude_favours_large_weights() {
+        let matrix = WeightMatrix { name: "w".into(), rows: 2, cols: 2, data: vec![3.0, -1.0, 0.0, 0.0] };
+        // The mean square of the first row is 5.
+        let expected = [14f64.sqrt(), 2.0 * 6f64.sqrt(), 0.0, 0.0];
+        for (found, expected) in by_magnitude(vec![1.0, 2.0, 1.0, 1.0], &matrix).iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-12, "{found} against {expected}");
+        }
+        let graph = Graph { matrices: vec![matrix], ..Graph::new(2) };
+        let statistics = |magnitude| ActionStatistics {
+            choices: Choices { magnitude, ..Choices::default() },
+            scores: Vec::new(),
+            importance: vec![Array2::ones((2, 2))],
+        };
+        let of = |magnitude| statistics(magnitude).weight_importance(&graph);
+        assert_eq!(of(true)[0], by_magnitude(of(false)[0].clone(), &graph.matrices[0]));
+    }
+}

@@ -1,0 +1,189 @@
+//! Stage 1 of ActQuant: how much each matrix adds to what its values say about the actions.
+
+use ndarray::Array2;
+use serde::Serialize;
+
+use super::choices::ScoreOf;
+use crate::calibrate::hsic::{Bandwidth, Kernel, hsic};
+use crate::data::Dataset;
+use crate::error::{Context, Result, ensure};
+use crate::graph::{Evaluator, Graph, WeightMatrix};
+
+/// Frames that kernels can be built over, at most: time and memory go with the square, and so many take 512 MiB a
+/// kernel.
+pub const MOST_FRAMES: usize = 8192;
+
+/// Weight of the dependence on the network's input (the paper's lambda_x).
+const LAMBDA_X: f64 = 1.0;
+/// Weight of the dependence on the actions (the paper's lambda_y).
+const LAMBDA_Y: f64 = 1.0;
+
+/// The dependences that a matrix's score is made of.
+///
+/// ActQuant (arXiv 2605.24011) scores values Z by the HSIC bottleneck
+/// `F(Z) = -lambda_x HSIC(X, Z) + lambda_y HSIC(Y, Z)`, and a matrix by `sens = F(output) - F(input)`. As in the
+/// authors' code, X is the same for every matrix, namely the input of the network's first one, so that `sens` says how
+/// far the matrix moves the values from the observation towards the actions.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Score {
+    /// HSIC(X, the matrix's input)
+    pub x_input: f64,
+    /// HSIC(Y, the matrix's input)
+    pub y_input: f64,
+    /// HSIC(X, the matrix's output)
+    pub x_output: f64,
+    /// HSIC(Y, the matrix's output)
+    pub y_output: f64,
+}
+
+impl Score {
+    /// `F(input)`
+    pub fn f_input(&self) -> f64 {
+        LAMBDA_Y * self.y_input - LAMBDA_X * self.x_input
+    }
+
+    /// `F(output)`
+    pub fn f_output(&self) -> f64 {
+        LAMBDA_Y * self.y_output - LAMBDA_X * self.x_output
+    }
+
+    /// `F(output) - F(input)`
+    pub fn sens(&self) -> f64 {
+        self.f_output() - self.f_input()
+    }
+
+    /// The one that is chosen.
+    pub fn of(&self, score: ScoreOf) -> f64 {
+        match score {
+            ScoreOf::Gain => self.sens(),
+            ScoreOf::Output => self.f_output(),
+        }
+    }
+}
+
+/// The scores of all matrices over evenly spaced frames of `dataset`, at most so many; it must hold actions.
+///
+/// Gaussian kernels on inputs and outputs, the linear kernel on the actions. A matrix that is used several times in a
+/// frame is scored by the mean of its inputs and outputs. Biases are left out: no kernel sees them.
+pub fn scores(graph: &Graph, dataset: &Dataset, most: usize, bandwidth: Bandwidth) -> Result<Vec<Score>> {
+    let frames = dataset.frames();
+    let step = frames.div_ceil(most.clamp(1, MOST_FRAMES)).max(1);
+    ensure!(frames.div_ceil(step) >= 2, "{}: at least 2 frames are needed", dataset.path.display());
+    let samples = Samples::collect(graph, dataset, step)?;
+    let actions = Kernel::linear(&standardized(&samples.actions));
+    let observation = Kernel::gaussian(&samples.inputs[samples.first], bandwidth);
+    let score = |(matrix, x): (&WeightMatrix, &Array2<f64>)| {
+        let input = Kernel::gaussian(x, bandwidth);
+        let weights =
+            Array2::from_shape_fn((matrix.cols, matrix.rows), |(c, r)| f64::from(matrix.data[r * matrix.cols + c]));
+        let output = Kernel::gaussian(&x.dot(&weights), bandwidth);
+        Score {
+            x_input: hsic(&observation, &input),
+            y_input: hsic(&actions, &input),
+            x_output: hsic(&observation, &output),
+            y_output: hsic(&actions, &output),
+        }
+    };
+    Ok(graph.matrices.iter().zip(&samples.inputs).map(score).collect())
+}
+
+/// Every `step`-th frame.
+struct Samples {
+    /// Per matrix `[frame, column]`.
+    inputs: Vec<Array2<f64>>,
+    /// `[frame, element]`
+    actions: Array2<f64>,
+    /// The matrix that is evaluated first.
+    first: usize,
+}
+
+impl Samples {
+    fn collect(graph: &Graph, dataset: &Dataset, step: usize) -> Result<Self> {
+        let count = dataset.frames().div_ceil(step);
+        let mut inputs: Vec<Array2<f64>> = graph.matrices.iter().map(|m| Array2::zeros((count, m.cols))).collect();
+        let mut actions = Array2::zeros((count, graph.len_of(graph.output())));
+        let mut first = None;
+        let mut evaluator = Evaluator::new(graph);
+        let mut frame = 0;
+        for episode in 0..dataset.length.len() {
+            evaluator.start(dataset.start(episode).as_deref());
+            for (at, obs) in dataset.episode(episode).enumerate() {
+                let row = (frame % step == 0).then_some(frame / step);
+                let mut uses = vec![0.0; graph.matrices.len()];
+                evaluator.step(&obs, &mut |m, x| {
+                    first.get_or_insert(m);
+                    let Some(row) = row else { return };
+                    uses[m] += 1.0;
+                    inputs[m].row_mut(row).iter_mut().zip(x).for_each(|(sum, &x)| *sum += f64::from(x));
+                });
+                if let Some(row) = row {
+                    for (input, uses) in inputs.iter_mut().zip(uses) {
+                        input.row_mut(row).mapv_inplace(|sum| sum / f64::max(uses, 1.0));
+                    }
+                    let action = dataset.action_at(episode, at).context("array \"action\" is missing")?;
+                    actions.row_mut(row).iter_mut().zip(action).for_each(|(to, a)| *to = f64::from(a));
+                }
+                frame += 1;
+            }
+        }
+        Ok(Self { inputs, actions, first: first.context("the network has no matrices")? })
+    }
+}
+
+/// Columns with mean 0 and variance 1; constant columns are left out.
+fn standardized(samples: &Array2<f64>) -> Array2<f64> {
+    let columns: Vec<Vec<f64>> = samples
+        .columns()
+        .into_iter()
+        .filter_map(|column| {
+            let mean = column.mean()?;
+            let variance = column.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / column.len() as f64;
+            let varies = variance > 1e-12 * (variance + mean * mean);
+            varies.then(|| column.iter().map(|v| (v - mean) / variance.sqrt()).collect())
+        })
+        .collect();
+    Array2::from_shape_fn((samples.nrows(), columns.len()), |(row, column)| columns[column][row])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::methods::actquant::testing::{dataset, lstm};
+
+    #[test]
+    fn scores_are_finite_and_the_first_matrix_has_the_observation_as_input() {
+        let graph = lstm();
+        let dataset = dataset(&graph, 3, 20);
+        let scores = scores(&graph, &dataset, 512, Bandwidth::Median).expect("scores");
+        assert_eq!(scores.len(), graph.matrices.len());
+        for score in &scores {
+            assert!(score.sens().is_finite());
+        }
+        let first = scores[0];
+        assert!(first.x_input > first.x_output, "nothing depends on X more than X itself: {first:?}");
+    }
+
+    #[test]
+    fn frames_are_a_limit() {
+        let graph = lstm();
+        let dataset = dataset(&graph, 1, 24);
+        let score = |most| scores(&graph, &dataset, most, Bandwidth::Median).expect("scores")[0].sens();
+        assert_eq!(score(24), score(usize::MAX));
+        assert_ne!(score(24), score(8));
+        // Not so many as 13, evenly spaced: every second.
+        assert_eq!(score(12), score(13));
+        let error = scores(&graph, &Dataset { length: vec![1], ..dataset.clone() }, 24, Bandwidth::Median);
+        assert!(error.is_err_and(|error| error.to_string().contains("at least 2 frames")));
+    }
+
+    #[test]
+    fn standardized_columns_have_unit_variance_and_constant_ones_are_gone() {
+        let samples = Array2::from_shape_fn((50, 3), |(i, j)| if j == 1 { 0.3 } else { 5.0 + (i * (j + 1)) as f64 });
+        let found = standardized(&samples);
+        assert_eq!(found.dim(), (50, 2));
+        for column in found.columns() {
+            assert!(column.sum().abs() < 1e-9);
+            assert!((column.dot(&column) / 50.0 - 1.0).abs() < 1e-9);
+        }
+    }
+}

@@ -1,0 +1,170 @@
+//! Which matrices read int8, and which int16.
+
+use actq_kernels::Width;
+
+use super::allocate::{Rows, allocate};
+use super::dimension::Widths;
+use super::distill::loss;
+use super::size::Size;
+use crate::calibrate::allowance::Allowance;
+use crate::calibrate::windows::Windows;
+use crate::error::Result;
+use crate::graph::{Graph, Network};
+use crate::methods::options::{Activations, Options, Packing};
+use crate::methods::quantized::{Quantized, dequantized};
+use crate::random::Random;
+
+/// An int16 input must lower the error by this share of it, and by more the more of the weights are behind it: its
+/// kernel takes 1.3 to 1.7 times as long.
+const WORTH: f32 = 0.03;
+const WORTH_OF_ALL: f32 = 0.12;
+/// int8's layout takes this many times int16's bytes where a matrix of few columns has mostly rows of 8 bits: int8 pads
+/// columns to 8, int16 to 4.
+const PADDED: f64 = 1.15;
+/// A small matrix has at most one in so many of all weights.
+const SMALL: usize = 10;
+const INT8: u16 = Activations::Int8.limit();
+const INT16: u16 = Activations::Int16.limit();
+/// Batches that the choice is measured on, and samples in each.
+const MEASURED: usize = 8;
+const SAMPLES: usize = 256;
+
+/// Widths for all rows, and the activations' magnitudes that learning goes by: where nothing was asked for int8, but
+/// where int16 takes so many bytes less that other rows get them. `size` keeps room for no layout yet.
+pub(super) fn allocated(size: Size<'_>, rows: &[Rows], options: &Options, allowed: f64) -> Result<(Widths, Vec<u16>)> {
+    let asked = vec![options.activations.limit(); size.graph.matrices.len()];
+    let within = |limits: &[u16]| {
+        let roomy = Size { packings: roomy(size.graph, limits, options), ..size.clone() };
+        allocate(&roomy, rows, allowed)
+    };
+    let Ok(widths) = within(&asked) else { return tight(size, rows, options, allowed) };
+    let takes = |m: usize, limit: u16| size.matrix(&widths, m, Packing::of(limit, options.group)) as f64;
+    let limit = |(m, &limit): (usize, &u16)| match options.activations.are_asked_for() {
+        false if takes(m, INT8) >= PADDED * takes(m, INT16) => INT16,
+        _ => limit,
+    };
+    let limits: Vec<u16> = asked.iter().enumerate().map(limit).collect();
+    if limits == asked {
+        return Ok((widths, limits));
+    }
+    Ok(within(&limits).map_or((widths, asked), |widths| (widths, limits)))
+}
+
+/// The same where there is room for one layout only: the one that can take the fewest bytes.
+fn tight(size: Size<'_>, rows: &[Rows], options: &Options, allowed: f64) -> Result<(Widths, Vec<u16>)> {
+    let forced: Vec<Option<Width>> = rows.iter().map(|rows| rows.forced).collect();
+    let limits = smallest_limits(&size, options, &forced);
+    let widths = allocate(&Size { packings: packed(&limits, options), ..size }, rows, allowed)?;
+    Ok((widths, limits))
+}
+
+/// The fewest bytes that a network takes, all that counts in `size`.
+pub(super) fn least_bytes(size: &Size<'_>, options: &Options, forced: &[Option<Width>]) -> usize {
+    let limits = smallest_limits(size, options, forced);
+    let size = Size { packings: packed(&limits, options), ..size.clone() };
+    size.bytes(&size.smallest(forced))
+}
+
+/// The activations' magnitude of every matrix with which it can take the fewest bytes.
+fn smallest_limits(size: &Size<'_>, options: &Options, forced: &[Option<Width>]) -> Vec<u16> {
+    let asked = vec![options.activations.limit(); forced.len()];
+    if options.activations.are_asked_for() {
+        return asked;
+    }
+    let least = |m: usize, limit: u16| {
+        let mut limits = asked.clone();
+        limits[m] = limit;
+        let size = Size { packings: packed(&limits, options), ..size.clone() };
+        size.bytes(&size.smallest(forced))
+    };
+    (0..forced.len()).map(|m| if least(m, INT16) < least(m, INT8) { INT16 } else { INT8 }).collect()
+}
+
+/// The layouts of these magnitudes.
+fn packed(limits: &[u16], options: &Options) -> Vec<Vec<Packing>> {
+    limits.iter().map(|&limit| vec![Packing::of(limit, options.group)]).collect()
+}
+
+/// The layouts that room is kept for: that of every matrix's limit, and of int16 where that is still to be chosen and
+/// likely to be worth it, as of the first and the last layer.
+fn roomy(graph: &Graph, limits: &[u16], options: &Options) -> Vec<Vec<Packing>> {
+    let mut packings = packed(limits, options);
+    for ((matrix, packings), limit) in graph.matrices.iter().zip(&mut packings).zip(limits) {
+        let open = !options.activations.are_asked_for() && *limit == INT8;
+        if open && SMALL * matrix.data.len() <= graph.weights() {
+            packings.push(Packing::of(INT16, options.group));
+        }
+    }
+    packings
+}
+
+/// int16 for each matrix whose input, rounded to int8, adds more to the error than int16 costs in time; for the others
+/// what they have at least.
+pub(super) fn choose_activations(
+    graph: &Graph,
+    quantized: &[Quantized],
+    windows: &Windows,
+    least: &[u16],
+    allowance: Option<Allowance>,
+    seed: u64,
+) -> Vec<u16> {
+    let weights = dequantized(graph, quantized);
+    let error = |x_max: &[u16], measured: usize| -> f32 {
+        let network = Network::rounded(graph, x_max);
+        let samples = (SAMPLES / windows.window).max(8);
+        let batches = (0..measured).map(|i| windows.batch(samples, None, &mut Random::new(seed + i as u64)));
+        batches.map(|batch| loss(&network, &weights, windows, batch)).sum()
+    };
+    let choices = 1 + quantized.len();
+    let measured = allowance.map_or(MEASURED, |allowance| {
+        let batches = allowance.fits(1, || _ = error(least, 1), choices, choices * MEASURED);
+        batches / choices
+    });
+    let before = error(least, measured);
+    let weights_of = |q: &Quantized| (q.rows * q.cols) as f32;
+    let all: f32 = quantized.iter().map(weights_of).sum();
+    (0..quantized.len())
+        .map(|m| {
+            if least[m] == INT16 {
+                return INT16;
+            }
+            let mut x_max = least.to_vec();
+            x_max[m] = INT16;
+            let worth = WORTH + WORTH_OF_ALL * weights_of(&quantized[m]) / all;
+            if before - error(&x_max, measured) > worth * before { INT16 } else { least[m] }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::budget::Budget;
+    use crate::graph::WeightMatrix;
+    use crate::methods::Method;
+
+    #[test]
+    fn int16_is_taken_where_int8_pads_more() {
+        let mut graph = Graph::new(18);
+        for cols in [18, 320] {
+            graph.matrices.push(WeightMatrix { name: "m".into(), rows: 64, cols, data: vec![0.0; 64 * cols] });
+        }
+        let size = Size { graph: &graph, dimensions: &[], packings: Vec::new(), values: 0 };
+        let rows = |energy: f64| Rows { energy: vec![energy; 64], removal: vec![1e9; 64], forced: None };
+        let limits = |of_first: f64, activations: Activations| {
+            let plain = Options::new(Method::Best, Budget::BitsPerWeight(4.0));
+            let options = Options { activations, ..plain };
+            let allowed = 0.5 * graph.weights() as f64;
+            let found = allocated(size.clone(), &[rows(of_first), rows(1.0)], &options, allowed).expect("it fits");
+            (found.0[0][0], found.1)
+        };
+        assert_eq!(limits(1e6, Activations::Auto), (Some(Width::W8), vec![INT16, INT8]));
+        assert_eq!(
+            limits(1e-6, Activations::Auto),
+            (Some(Width::W2), vec![INT8, INT8]),
+            "2 bits are padded less in int8"
+        );
+        assert_eq!(limits(1e6, Activations::Int8), (Some(Width::W8), vec![INT8, INT8]));
+        assert_eq!(limits(1e6, Activations::Int16), (Some(Width::W8), vec![INT16, INT16]));
+    }
+}

@@ -1,0 +1,327 @@
+//! A width for every row, to a budget.
+//!
+//! Rows (output neurons) differ far more in what they do to the actions than columns do. Row `r` at width `b` is
+//! expected to cost `eps_b * g_r * sum_c w_rc^2 h_c` of squared action error; one Lagrange multiplier, found by
+//! bisection, weighs that against bits. A row of 0 bits gives its bias alone; where its output only feeds matrices
+//! through elementwise functions, it disappears with the columns that it fed (see [`mod@super::compact`]): what those
+//! columns carried is its error, and their bits count as its saving.
+
+use actq_kernels::Width;
+
+use super::dimension::{Dimension, Widths};
+use super::size::Size;
+use crate::budget::{BudgetTooSmall, USED};
+use crate::error::Result;
+use crate::graph::{Graph, WeightMatrix};
+
+/// Expected squared error of a row in units of its own energy: that of the mid-rise grid with error feedback. At 8 bits
+/// more than rounding costs (0.00005), so that 8 bits go only where 4 are far from enough: learning mends the
+/// difference.
+fn epsilon(width: Width) -> f64 {
+    match width {
+        Width::W2 => 0.125,
+        Width::W3 => 0.036,
+        Width::W4 => 0.0102,
+        Width::W8 => 0.0003,
+    }
+}
+
+/// Widths that a row may have.
+const CHOICES: [Option<Width>; 5] = [None, Some(Width::W2), Some(Width::W3), Some(Width::W4), Some(Width::W8)];
+
+/// What a bit gains at least where a row is widened to use what is left, of what it gains elsewhere.
+const WORTH: f64 = 0.1;
+/// Rows that are widened at once, at most: blocks are padded to so many.
+const MOST_AT_ONCE: usize = 4;
+
+/// What the allocation needs to know of a matrix.
+#[derive(Clone, Debug)]
+pub struct Rows {
+    /// `g_r * sum_c w_rc^2 h_c` of each row.
+    pub energy: Vec<f64>,
+    /// Error of leaving each row without bits.
+    pub removal: Vec<f64>,
+    /// The width that is forced, for all rows.
+    pub forced: Option<Width>,
+}
+
+impl Rows {
+    /// The expected error of row `r` at a width.
+    pub fn expected(&self, r: usize, width: Option<Width>) -> f64 {
+        width.map_or(self.removal[r], |width| epsilon(width) * self.energy[r])
+    }
+}
+
+/// The energies of a matrix's rows for the importances of its columns (`h`) and rows (`g`).
+pub fn energies(matrix: &WeightMatrix, h: &[f64], g: &[f64]) -> Vec<f64> {
+    let rows = matrix.data.chunks_exact(matrix.cols).zip(g);
+    rows.map(|(row, g)| g * row.iter().zip(h).map(|(w, h)| f64::from(*w).powi(2) * h).sum::<f64>()).collect()
+}
+
+/// The error of removing each element of `dimension`: the energies of the columns that it feeds, for the importances
+/// `h` of those columns about their means (which go into the biases) and `g` of the rows that they reach, by matrix.
+pub fn removals(graph: &Graph, dimension: &Dimension, h: &[Vec<f64>], g: &[Vec<f64>]) -> Vec<f64> {
+    let mut removals = vec![0.0; graph.matrices[dimension.maker].rows];
+    for &consumer in &dimension.consumers {
+        let matrix = &graph.matrices[consumer];
+        for (row, g) in matrix.data.chunks_exact(matrix.cols).zip(&g[consumer]) {
+            for (c, (removal, w)) in removals.iter_mut().zip(row).enumerate() {
+                *removal += g * f64::from(*w).powi(2) * h[consumer][c];
+            }
+        }
+    }
+    removals
+}
+
+/// Chooses the widths so that [`Size::bytes`] stays within `limit`.
+///
+/// # Errors
+///
+/// [`BudgetTooSmall`] if [`Size::smallest`] takes more.
+pub fn allocate(size: &Size<'_>, rows: &[Rows], limit: f64) -> Result<Widths> {
+    let (mut widths, multiplier) = match lowest_multiplier(size, rows, limit) {
+        Some(multiplier) => (choose(size, rows, multiplier), multiplier),
+        None => (smallest(size, rows, limit)?, 0.0),
+    };
+    fill(&mut widths, size, rows, limit, WORTH * multiplier);
+    if (size.bytes(&widths) as f64) < USED * limit {
+        fill(&mut widths, size, rows, limit, 0.0);
+    }
+    Ok(widths)
+}
+
+/// The lowest multiplier, in units of error per bit, whose widths fit. `None` where not even the highest has any: it
+/// keeps the rows that matter most, and others may take fewer bytes.
+fn lowest_multiplier(size: &Size<'_>, rows: &[Rows], limit: f64) -> Option<f64> {
+    let fits = |multiplier: f64| size.bytes(&choose(size, rows, multiplier)) as f64 <= limit;
+    // The range covers everything from 8 bits to none for any scale of energies.
+    let largest = rows.iter().flat_map(|r| &r.energy).fold(1e-300f64, |m, e| m.max(*e));
+    let (mut low, mut high) = ((largest * 1e-18).ln(), (largest * 10.0).ln());
+    if !fits(high.exp()) {
+        return None;
+    }
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if fits(middle.exp()) {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    Some(high.exp())
+}
+
+/// The widths that take the fewest bytes, if they fit.
+fn smallest(size: &Size<'_>, rows: &[Rows], limit: f64) -> Result<Widths> {
+    let forced: Vec<Option<Width>> = rows.iter().map(|rows| rows.forced).collect();
+    let widths = size.smallest(&forced);
+    BudgetTooSmall::check(size.bytes(&widths), limit, size.graph.weights())?;
+    Ok(widths)
+}
+
+/// Widens rows as long as bytes are left. Blocks of rows are padded, and a row more may take hundreds of bytes or none,
+/// which no multiplier sees: again and again the rows whose errors fall most for the bytes that they take, of one
+/// matrix, one width and at most so many as a block is padded to. Rows that gain less than `least` for a bit stay as
+/// they are: what has no part in the actions shall not take time.
+fn fill(widths: &mut Widths, size: &Size<'_>, rows: &[Rows], limit: f64, least: f64) {
+    let mut taken = size.bytes(widths);
+    loop {
+        let mut best: Option<(f64, Widths, usize)> = None;
+        let free = (0..rows.len()).filter(|&m| rows[m].forced.is_none());
+        for (m, (from, to)) in free.flat_map(|m| widenings().map(move |widening| (m, widening))) {
+            let bits = RowBits::new(size, widths, m);
+            let gain = |r: &usize| rows[m].expected(*r, from) - rows[m].expected(*r, to);
+            let gained_at_least = least * (bits.at(to) - bits.at(from));
+            let is_worth = |r: &usize| widths[m][*r] == from && gain(r) > gained_at_least;
+            let mut candidates: Vec<usize> = (0..widths[m].len()).filter(is_worth).collect();
+            candidates.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
+            let mut wider = widths.clone();
+            let mut gained = 0.0;
+            for &r in candidates.iter().take(MOST_AT_ONCE) {
+                wider[m][r] = to;
+                gained += gain(&r);
+                let takes = size.bytes(&wider);
+                let worth = gained / takes.saturating_sub(taken).max(1) as f64;
+                let reached = Dimension::made_by(size.dimensions, m).is_some() || are_within_steps(&wider[m]);
+                if takes as f64 <= limit && reached && best.as_ref().is_none_or(|(best, ..)| worth > *best) {
+                    best = Some((worth, wider.clone(), takes));
+                }
+            }
+        }
+        let Some((_, wider, takes)) = best else { return };
+        (*widths, taken) = (wider, takes);
+    }
+}
+
+/// Every width, and every wider one.
+fn widenings() -> impl Iterator<Item = (Option<Width>, Option<Width>)> {
+    let wider = |from| CHOICES.into_iter().filter(move |to| *to > from).map(move |to| (from, to));
+    CHOICES.into_iter().flat_map(wider)
+}
+
+/// Whether rows of every width stand at most as far apart as the image's steps reach.
+fn are_within_steps(widths: &[Option<Width>]) -> bool {
+    Width::ALL.into_iter().all(|width| out_of_reach(widths, width).is_none())
+}
+
+/// What a row of a matrix takes beside the others, without padding.
+struct RowBits {
+    cols: f64,
+    /// Scale, step where there is one, and bias where one goes with the row and counts.
+    overhead: f64,
+    /// What the column saves that a removed row takes along: one bit per bit of each row that it crosses.
+    saving: f64,
+}
+
+impl RowBits {
+    fn new(size: &Size<'_>, widths: &Widths, m: usize) -> Self {
+        let Size { graph, dimensions, values, .. } = *size;
+        let bits_of = |m: usize| -> f64 { widths[m].iter().flatten().map(|w| f64::from(w.bits())).sum() };
+        let made = Dimension::made_by(dimensions, m);
+        Self {
+            cols: Dimension::feeding(dimensions, m).map_or(graph.matrices[m].cols, |d| d.kept(widths)) as f64,
+            overhead: match made {
+                Some(_) if values > 0 => 48.0,
+                Some(_) => 16.0,
+                None => 24.0,
+            },
+            saving: made.map_or(0.0, |d| d.consumers.iter().map(|&c| bits_of(c)).sum()),
+        }
+    }
+
+    fn at(&self, width: Option<Width>) -> f64 {
+        width.map_or(-self.saving, |width| self.cols * f64::from(width.bits()) + self.overhead)
+    }
+}
+
+/// The widths that minimise error plus `multiplier` times bits. What a removed row saves elsewhere depends on the other
+/// rows' widths, so the choice is repeated until it settles.
+fn choose(size: &Size<'_>, rows: &[Rows], multiplier: f64) -> Widths {
+    let Size { graph, dimensions, .. } = size;
+    let mut widths: Widths = graph.matrices.iter().map(|m| vec![Some(Width::W2); m.rows]).collect();
+    for _ in 0..4 {
+        let next: Widths = (0..graph.matrices.len())
+            .map(|m| {
+                let bits = RowBits::new(size, &widths, m);
+                let cost = |r: usize, width: Option<Width>| rows[m].expected(r, width) + multiplier * bits.at(width);
+                let best = |r: usize| {
+                    let order = |a: &&Option<Width>, b: &&Option<Width>| cost(r, **a).total_cmp(&cost(r, **b));
+                    rows[m].forced.or_else(|| CHOICES.iter().min_by(order).copied().flatten())
+                };
+                (0..rows[m].energy.len()).map(best).collect()
+            })
+            .collect();
+        widths = next;
+        // A matrix without any rows would cut the actions off from the observations.
+        for (widths, rows) in widths.iter_mut().zip(rows) {
+            if widths.iter().all(Option::is_none) {
+                let most = (0..rows.energy.len()).max_by(|&a, &b| rows.energy[a].total_cmp(&rows.energy[b]));
+                widths[most.unwrap_or(0)] = Some(Width::W2);
+            }
+        }
+    }
+    for (m, widths) in widths.iter_mut().enumerate() {
+        if Dimension::made_by(dimensions, m).is_none() {
+            within_steps(widths);
+        }
+    }
+    widths
+}
+
+/// Widens rows until those of every width stand at most as far apart as the image's steps reach.
+fn within_steps(widths: &mut [Option<Width>]) {
+    // A row that is widened may part those of its former width.
+    while let Some((row, width)) = Width::ALL.into_iter().find_map(|width| out_of_reach(widths, width)) {
+        widths[row] = width;
+    }
+}
+
+/// Where a row of this width is too far from the one before: a row to widen, and to which width.
+fn out_of_reach(widths: &[Option<Width>], width: Width) -> Option<(usize, Option<Width>)> {
+    const REACH: usize = u8::MAX as usize;
+    let mut last = 0;
+    for row in (0..widths.len()).filter(|&row| widths[row] == Some(width)) {
+        if row - last > REACH {
+            let between = (last..=last + REACH).rev().find(|&row| widths[row] < Some(width));
+            // Among wider rows alone, it goes with them.
+            return Some(between.map_or((row, widths[last + REACH]), |between| (between, Some(width))));
+        }
+        last = row;
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::methods::options::Packing;
+    use crate::random::Random;
+
+    #[test]
+    fn no_row_can_be_widened_with_the_bytes_that_are_left() {
+        let mut random = Random::new(1);
+        let mut graph = Graph::new(18);
+        for (rows, cols) in [(70, 18), (33, 70)] {
+            let data = (0..rows * cols).map(|_| random.normal()).collect();
+            graph.matrices.push(WeightMatrix { name: "m".into(), rows, cols, data });
+        }
+        let rows = |matrix: &WeightMatrix| {
+            let energy = energies(matrix, &vec![1.0; matrix.cols], &vec![1.0; matrix.rows]);
+            Rows { removal: energy.clone(), energy, forced: None }
+        };
+        let rows: Vec<Rows> = graph.matrices.iter().map(rows).collect();
+        let packings = vec![vec![Packing::of(127, 0), Packing::of(32767, 0)]; 2];
+        let size = Size { graph: &graph, dimensions: &[], packings, values: 0 };
+        for limit in (1000..4000).step_by(97).map(f64::from) {
+            let widths = allocate(&size, &rows, limit).expect("it fits");
+            let taken = size.bytes(&widths);
+            assert!(taken as f64 <= limit);
+            for (m, r) in (0..2).flat_map(|m| (0..widths[m].len()).map(move |r| (m, r))) {
+                for to in CHOICES.into_iter().filter(|to| *to > widths[m][r]) {
+                    let mut wider = widths.clone();
+                    wider[m][r] = to;
+                    let takes = size.bytes(&wider);
+                    assert!(
+                        takes as f64 > limit,
+                        "{limit}: row {r} of {m} to {to:?} takes {takes} bytes, {taken} before"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_smallest_widths_fit_and_a_byte_less_is_refused() {
+        let mut graph = Graph::new(8);
+        graph.matrices = vec![WeightMatrix { name: "m".into(), rows: 300, cols: 8, data: vec![0.0; 2400] }];
+        let packings = vec![vec![Packing::of(127, 0)]];
+        let size = Size { graph: &graph, dimensions: &[], packings, values: 0 };
+        // The row that matters is beyond the reach of a step.
+        let energy: Vec<f64> = (0..300).map(|r| if r == 299 { 1.0 } else { 1e-9 }).collect();
+        let rows = [Rows { removal: energy.clone(), energy, forced: None }];
+        let least = size.bytes(&size.smallest(&[None]));
+        assert!(allocate(&size, &rows, least as f64).is_ok());
+        let error = allocate(&size, &rows, least as f64 - 1.0).expect_err("too small");
+        assert_eq!(error.budget().map(|small| small.bytes), Some(least));
+    }
+
+    #[test]
+    fn rows_are_only_widened_until_steps_reach() {
+        let mut random = Random::new(1);
+        for case in 0..200 {
+            // Mostly one width, so that the others are far apart.
+            let most = [None, Some(Width::W2), Some(Width::W4)][case % 3];
+            let others = [None, Some(Width::W2), Some(Width::W3), Some(Width::W8)];
+            let row = |_| if random.below(300) < case { others[random.below(4)] } else { most };
+            let before: Widths = vec![(0..100 * case % 4097 + 1).map(row).collect()];
+            let mut after = before[0].clone();
+            within_steps(&mut after);
+            assert!(before[0].iter().zip(&after).all(|(before, after)| before <= after), "case {case}");
+            for width in Width::ALL {
+                let rows: Vec<usize> = (0..after.len()).filter(|&r| after[r] == Some(width)).collect();
+                let apart = rows.iter().scan(0, |last, &row| Some(row - std::mem::replace(last, row)));
+                assert!(apart.max().unwrap_or(0) <= 255, "case {case}");
+            }
+        }
+    }
+}

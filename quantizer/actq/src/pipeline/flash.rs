@@ -1,0 +1,64 @@
+//! Images within a number of bytes, and budgets that none can meet.
+
+use super::quantizer::{QuantizedPolicy, Quantizer};
+use crate::budget::{Budget, BudgetTooSmall, Rate};
+use crate::emit;
+use crate::error::{Error, Result, ensure};
+use crate::methods::best::balance::balance_bytes;
+use crate::methods::{Method, Options, Progress, least_bytes};
+use crate::policy::Policy;
+
+/// Refuses a budget of bits or bytes that no image of the policy can meet: from the shapes alone, before any work.
+///
+/// # Errors
+///
+/// [`BudgetTooSmall`], with what the smallest image takes. A balance, which only the recording can ask for, does not
+/// count: with one, [`Quantizer::quantize`] may need some bytes more.
+pub fn check_budget(policy: &Policy, options: &Options) -> Result<()> {
+    let weights = policy.graph.weights();
+    let check =
+        |rate: Rate| BudgetTooSmall::check(least_bytes(&policy.graph, rate, options), rate.bytes(weights), weights);
+    match options.budget {
+        Budget::BitsPerWeight(bits) => check(Rate::BitsPerWeight(bits))?,
+        Budget::ImageBytes(bytes) => {
+            let fixed = fixed_bytes(policy.clone(), options)?;
+            check(Rate::Bytes(bytes.saturating_sub(fixed))).map_err(|small| small.in_image(fixed, bytes))?;
+        }
+        Budget::Width(_) | Budget::MaxNmse(_) | Budget::Time(_) => (),
+    }
+    Ok(())
+}
+
+/// The image of at most `bytes` bytes; `options.budget` does not count.
+pub(super) fn within(
+    quantizer: &Quantizer<'_>,
+    options: &Options,
+    bytes: usize,
+    progress: &mut dyn FnMut(Progress),
+) -> Result<QuantizedPolicy> {
+    // What the method has balanced has operations more than the policy.
+    let policy = Policy { graph: quantizer.method.graph().clone(), ..quantizer.policy.clone() };
+    let fixed = fixed_bytes(policy, options)?;
+    let in_image = |error: Error| match error.budget() {
+        Some(small) => small.in_image(fixed, bytes).into(),
+        None => error,
+    };
+    let found = quantizer.at(Rate::Bytes(bytes.saturating_sub(fixed)), options, progress).map_err(in_image)?;
+    let len = found.image.len();
+    // Equal constants are stored once; what is learned could be equal where it was not expected.
+    ensure!(len <= bytes, "the image takes {len} bytes, {bytes} are allowed; allow {len} bytes or more");
+    Ok(found)
+}
+
+/// Bytes of an image beside those that a rate in bytes counts.
+fn fixed_bytes(mut policy: Policy, options: &Options) -> Result<usize> {
+    let mut values = 0;
+    if options.method == Method::Best {
+        // Numbers that are nowhere else, so that no constant is shared with what changes.
+        for value in policy.graph.changed_vectors(options.learns()).flatten() {
+            values += 1;
+            *value = f32::from_bits(values);
+        }
+    }
+    Ok(emit::bytes_beside_blocks(&policy)? - 4 * values as usize - balance_bytes(&policy.graph))
+}

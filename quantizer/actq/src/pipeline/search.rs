@@ -1,0 +1,238 @@
+//! The smallest budget whose measured error stays within a limit.
+//!
+//! Budgets are multiples of a tenth of a bit per weight. Each try is a whole quantization whose image is run by the
+//! executor. A method that learns first looks with an eighth of the steps, at most `LOOKS` times; then, from the budget
+//! found so, with all its steps. What is returned has kept the limit with all its steps. Tries stop when the next
+//! smaller budget is known to fail, or after `TRIES` (`PLAIN_TRIES` without learning, or with too few steps to share):
+//! then a smaller budget may do, and the tries tell which range is open. The search takes errors as falling with bits.
+
+use std::borrow::Cow;
+use std::path::Path;
+
+use actq_kernels::Width;
+
+use super::quantizer::{QuantizedPolicy, Quantizer};
+use super::tries::{Search, Try};
+use crate::budget::Rate;
+use crate::data::{Dataset, Recording, Recordings};
+use crate::error::{Context, Result, bail};
+use crate::measure::eval;
+use crate::methods::{self, Method, Options, Outcome};
+use crate::policy::Policy;
+
+/// Budgets per bit.
+const PER_BIT: usize = 10;
+/// Tries with a share of the steps, at most, and that share's denominator.
+const LOOKS: usize = 6;
+const SHARE: usize = 8;
+/// Tries with all steps, at most.
+const TRIES: usize = 5;
+/// Tries of a method that does not learn, at most.
+const PLAIN_TRIES: usize = 16;
+/// Where the search starts, in bits.
+const START: usize = 3;
+/// How the logarithm of the error is expected to fall with a bit where nothing is known: rounding to half the step.
+const SLOPE: f64 = 2.0 * std::f64::consts::LN_2;
+
+/// What errors are measured on: the held-out recording; without one, what the method learns from. Missing actions are
+/// those of the f32 network.
+fn measured<'a>(policy: &Policy, recordings: &'a Recordings) -> Result<Cow<'a, Dataset>> {
+    let dataset = recordings.heldout.as_ref().or(recordings.calib.as_ref());
+    let mut dataset = Cow::Borrowed(dataset.with_context(|| Recording::Heldout.missing("a limit to the error"))?);
+    if dataset.action.is_none() {
+        dataset.to_mut().fill_actions(&policy.graph);
+    }
+    Ok(dataset)
+}
+
+/// The image of the smallest budget that has at most the error `limit` (NMSE); `options.budget` does not count.
+/// `progress` gets what is being done and the share of it that is done.
+pub(super) fn smallest(
+    quantizer: &Quantizer<'_>,
+    options: &Options,
+    limit: f64,
+    progress: &mut dyn FnMut(&str, f64),
+) -> Result<QuantizedPolicy> {
+    let policy = quantizer.policy;
+    let dataset = measured(policy, quantizer.recordings)?;
+    let top = top(policy, options)?;
+    let all_steps = quantizer.method.most_steps(options);
+    let mut tries: Vec<Try> = Vec::new();
+    let mut found = None;
+    let mut run = |cell: usize, steps: usize| -> Result<f64> {
+        let budget = cell as f64 / PER_BIT as f64;
+        let options = Options { steps: Some(steps), ..options.clone() };
+        let work = format!("try {}: {budget} bits per weight", tries.len() + 1);
+        let report =
+            match quantizer.at(Rate::BitsPerWeight(budget), &options, &mut |state| progress(&work, state.share())) {
+                Err(error) if error.budget().is_some() => None,
+                Err(error) => return Err(error),
+                Ok(quantized) => {
+                    let report = eval::evaluate(quantized.buffer().image(Path::new("image in memory"))?, &dataset)?;
+                    if report.nmse <= limit && steps == all_steps {
+                        found = Some((quantized, report.nmse, budget));
+                    }
+                    Some(report)
+                }
+            };
+        let error = report.as_ref().map_or(f64::INFINITY, |r| r.nmse);
+        tries.push(Try { budget, steps, report });
+        Ok(error)
+    };
+    let few = all_steps / SHARE;
+    let fails = if few > 0 {
+        let looked = narrow(START * PER_BIT, top, LOOKS, limit, |cell| run(cell, few))?;
+        narrow(looked.passes.map_or(top, |p| p.0), top, TRIES, limit, |cell| run(cell, all_steps))?.fails.0
+    } else {
+        narrow(START * PER_BIT, top, PLAIN_TRIES, limit, |cell| run(cell, all_steps))?.fails.0
+    };
+    let Some((quantized, nmse, budget)) = found else {
+        let reports = tries.iter().filter_map(|t| t.report.as_ref());
+        let best = reports.min_by(|a, b| a.nmse.total_cmp(&b.nmse)).context("no try gave an image")?;
+        bail!(
+            "no budget up to {} bits per weight (8 bits and all scales) keeps the error within {limit}: the lowest was an NMSE \
+             of {:.2e} at {:.3} bits per weight",
+            top as f64 / PER_BIT as f64,
+            best.nmse,
+            best.bpw
+        )
+    };
+    let search = Search {
+        limit,
+        nmse,
+        budget,
+        step: 1.0 / PER_BIT as f64,
+        fails: fails as f64 / PER_BIT as f64,
+        tries,
+        measured_on: dataset.name().into_owned(),
+        held_out: quantizer.recordings.heldout.is_some(),
+    };
+    Ok(QuantizedPolicy { search: Some(search), ..quantized })
+}
+
+/// The first budget that has room for 8 bits everywhere, in steps of the search.
+fn top(policy: &Policy, options: &Options) -> Result<usize> {
+    let plain = Options { method: Method::Rtn, forced: Vec::new(), ..options.clone() };
+    let (_, outcomes) = methods::quantize(&policy.graph, None, Rate::Width(Width::W8), &plain)?;
+    let bytes: usize = outcomes.iter().map(Outcome::bytes).sum();
+    Ok((PER_BIT * 8 * bytes).div_ceil(policy.graph.weights().max(1)))
+}
+
+/// The range in which the smallest budget lies: the largest cell known to fail and the smallest known to pass, with
+/// errors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Range {
+    fails: (usize, f64),
+    passes: Option<(usize, f64)>,
+}
+
+impl Range {
+    /// Whether nothing between is left to try, in cells up to `top`.
+    fn is_closed(&self, top: usize) -> bool {
+        self.fails.0 + 1 > self.passes.map_or(top, |p| p.0 - 1)
+    }
+
+    /// Where the limit is expected, from the errors at the ends: on the line through their logarithms, or from the one
+    /// that is known along [`SLOPE`].
+    fn guess(&self, limit: f64) -> f64 {
+        let (low, low_error) = (self.fails.0 as f64, self.fails.1.max(1e-300).ln());
+        let limit = limit.ln();
+        let slope = SLOPE / PER_BIT as f64;
+        match self.passes {
+            None => low + (low_error - limit) / slope,
+            Some((high, error)) => {
+                let (high, high_error) = (high as f64, error.max(1e-300).ln());
+                if low_error.is_finite() {
+                    low + (high - low) * (low_error - limit) / (low_error - high_error)
+                } else {
+                    high - (limit - high_error) / slope
+                }
+            }
+        }
+    }
+}
+
+/// Narrows the range of cells 1 to `top` with at most `runs` calls of `error`, the first at `first`: by guesses, and by
+/// halves where guesses alone might creep. Where nothing has passed, the last run is at `top`.
+fn narrow(
+    first: usize,
+    top: usize,
+    runs: usize,
+    limit: f64,
+    mut error: impl FnMut(usize) -> Result<f64>,
+) -> Result<Range> {
+    let mut range = Range { fails: (0, f64::INFINITY), passes: None };
+    let mut cell = first.clamp(1, top);
+    for run in 1..=runs {
+        let found = error(cell)?;
+        if found <= limit {
+            range.passes = Some((cell, found));
+        } else {
+            range.fails = (cell, found);
+        }
+        if range.is_closed(top) {
+            break;
+        }
+        let (from, to) = (range.fails.0 + 1, range.passes.map_or(top, |p| p.0 - 1));
+        let halve = run % 2 == 0 && range.passes.is_some() && range.fails.0 > 0;
+        cell = match range.passes {
+            None if run + 1 == runs => top,
+            _ if halve => from.midpoint(to),
+            // Bits that only give the least image or the limit itself have no guess.
+            _ => range.guess(limit).clamp(from as f64, to as f64).round() as usize,
+        };
+    }
+    Ok(range)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Narrows for an error that halves twice a bit from `at_zero` on, and gives the range and the cells tried.
+    fn search(at_zero: f64, least: usize, runs: usize, limit: f64) -> (Range, Vec<usize>) {
+        let mut cells = Vec::new();
+        let range = narrow(30, 83, runs, limit, |cell| {
+            cells.push(cell);
+            Ok(if cell < least { f64::INFINITY } else { at_zero * (-0.12 * cell as f64).exp() })
+        });
+        (range.expect("no run fails"), cells)
+    }
+
+    #[test]
+    fn the_smallest_cell_is_found_and_none_is_tried_twice() {
+        for limit in [1e-4, 1e-3, 0.013, 0.1, 0.5, 2.0] {
+            for least in [1, 12, 20] {
+                let (range, cells) = search(1.0, least, 16, limit);
+                let passing = |cell: &usize| *cell >= least && (-0.12 * *cell as f64).exp() <= limit;
+                assert_eq!(
+                    range.passes.map(|p| p.0),
+                    (1..=83).find(passing),
+                    "limit {limit}, least {least}: {cells:?}"
+                );
+                assert!(cells.iter().all(|c| (1..=83).contains(c)));
+                let mut once = cells.clone();
+                once.sort_unstable();
+                once.dedup();
+                assert_eq!(once.len(), cells.len(), "{cells:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn few_runs_leave_a_range_that_holds_the_answer() {
+        let (range, cells) = search(1.0, 1, 3, 0.01);
+        assert_eq!(cells.len(), 3);
+        let answer = (1..=83).find(|c| (-0.12 * f64::from(*c)).exp() <= 0.01).map(|c| c as usize);
+        assert!(answer > Some(range.fails.0) && range.passes.is_none_or(|p| answer <= Some(p.0)));
+    }
+
+    #[test]
+    fn what_never_passes_is_tried_at_the_top() {
+        for runs in [1, 2, 4, 6] {
+            let (range, cells) = search(1e9, 1, runs, 1e-3);
+            assert_eq!(range.passes, None);
+            assert!(runs == 1 || cells.last() == Some(&83), "{cells:?}");
+        }
+    }
+}

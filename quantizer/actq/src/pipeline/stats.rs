@@ -1,0 +1,224 @@
+//! The statistics and the allocation behind an image, as a JSON file: `docs/QUANTIZER.md` describes its fields.
+
+use std::fs;
+use std::path::Path;
+
+use actq_kernels::{Image, Width};
+use serde::{Deserialize, Serialize};
+
+use super::quantizer::{QuantizedPolicy, Quantizer};
+use crate::budget::Budget;
+use crate::error::{Context, Result, ensure};
+use crate::graph::WeightMatrix;
+use crate::measure::size::{bits_per_weight, hex};
+use crate::methods::actquant::score::Score;
+use crate::methods::best::balance::balance_bytes;
+use crate::methods::{Options, Outcome, Quantized};
+use crate::strict_json;
+
+/// The name of the file's form. It changes when a field changes its meaning or disappears, not when one is added.
+pub const SCHEMA: &str = "actq-stats-1";
+
+/// Everything about one image.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Stats {
+    /// [`SCHEMA`]
+    pub schema: String,
+    /// Version of actq.
+    pub actq: String,
+    /// The policy's name.
+    pub policy: String,
+    /// SHA-256 of the policy, in hexadecimal digits.
+    pub source: String,
+    /// CRC-32 of the image that these statistics belong to, in hexadecimal digits.
+    pub crc32: String,
+    /// Bytes of the image.
+    pub bytes: usize,
+    /// Bits per weight, everything counted.
+    pub bpw: f64,
+    /// The method.
+    pub method: String,
+    /// What was asked for.
+    pub budget: Budget,
+    /// The seed of everything that was drawn.
+    pub seed: u64,
+    /// Steps of distillation; 0 for methods that do not learn.
+    pub steps: usize,
+    /// Bytes of the means and factors that balance the matrices' columns (best).
+    #[serde(default)]
+    pub balance: usize,
+    /// The matrices in the policy's order.
+    pub matrices: Vec<MatrixRecord>,
+}
+
+/// One matrix. "Rows" and "columns" are those of the matrix as it was trained.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MatrixRecord {
+    /// Its tensor's name.
+    pub name: String,
+    /// Rows (outputs).
+    pub rows: usize,
+    /// Columns (inputs).
+    pub cols: usize,
+    /// Columns that share a u8 scale; 0 = one scale a row.
+    pub group: usize,
+    /// Magnitude that activations are quantized to.
+    pub x_max: u16,
+    /// Bytes in the image: codes, padding, scales, steps, block records.
+    pub bytes: usize,
+    /// Bits of each row's codes; 0 for a row without bits.
+    pub widths: Vec<u32>,
+    /// Bits that each row takes: codes, scales and, where widths are mixed, its step; without padding and block
+    /// records.
+    pub bits: Vec<usize>,
+    /// The row behind each row of the image's matrix, in the order of its output.
+    pub image_rows: Vec<usize>,
+    /// The column behind each column of the image's matrix.
+    pub image_cols: Vec<usize>,
+    /// Squared error of the matrix's output over its energy (rtn, gptq, actquant).
+    pub error: Option<f64>,
+    /// Why rows have their widths (best).
+    pub allocation: Option<AllocationRecord>,
+    /// Why the matrix has its width (actquant).
+    pub score: Option<HsicScore>,
+}
+
+/// What the widths of a matrix's rows were chosen from. Errors are squared differences of the actions over their
+/// variances, summed over the network's outputs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AllocationRecord {
+    /// Per row: the error scale, which a width's rounding is a share of.
+    pub energy: Vec<f64>,
+    /// Per row: the expected error without bits.
+    pub removal: Vec<f64>,
+    /// Per row: the expected error at its width.
+    pub expected: Vec<f64>,
+    /// Per column: its importance.
+    pub importance: Vec<f64>,
+}
+
+/// ActQuant's score of a matrix ([`Score`]).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HsicScore {
+    /// F of the matrix's input.
+    pub f_input: f64,
+    /// F of its output.
+    pub f_output: f64,
+    /// `f_output - f_input`
+    pub sens: f64,
+    /// HSIC of the observation and the matrix's input.
+    pub x_input: f64,
+    /// HSIC of the actions and the matrix's input.
+    pub y_input: f64,
+    /// HSIC of the observation and the matrix's output.
+    pub x_output: f64,
+    /// HSIC of the actions and the matrix's output.
+    pub y_output: f64,
+}
+
+impl From<&Score> for HsicScore {
+    fn from(score: &Score) -> Self {
+        let Score { x_input, y_input, x_output, y_output } = *score;
+        let (f_input, f_output, sens) = (score.f_input(), score.f_output(), score.sens());
+        Self { f_input, f_output, sens, x_input, y_input, x_output, y_output }
+    }
+}
+
+impl Stats {
+    /// Of the image that `quantizer` made with `options`.
+    pub fn new(quantizer: &Quantizer<'_>, options: &Options, quantized: &QuantizedPolicy) -> Result<Self> {
+        let (source, scores) = (quantizer.policy, quantizer.method.scores());
+        let buffer = quantized.buffer();
+        let image = buffer.image(Path::new("the new image"))?;
+        let matrices = source.graph.matrices.iter().zip(&quantized.outcomes).enumerate();
+        Ok(Self {
+            schema: SCHEMA.to_owned(),
+            actq: env!("CARGO_PKG_VERSION").to_owned(),
+            policy: source.name.clone(),
+            source: hex(&source.digest),
+            crc32: crc32(&image),
+            bytes: image.bytes(),
+            bpw: bits_per_weight(&image),
+            method: options.method.to_string(),
+            budget: options.budget,
+            seed: options.seed,
+            steps: quantized.steps(),
+            balance: balance_bytes(&quantized.policy.graph),
+            matrices: matrices.map(|(m, (source, outcome))| matrix(source, outcome, scores.get(m))).collect(),
+        })
+    }
+
+    /// The file's content.
+    pub fn json(&self) -> Result<String> {
+        Ok(serde_json::to_string(self)? + "\n")
+    }
+
+    /// Reads the statistics of `image` from a file; refuses those of another image.
+    pub fn read(path: &Path, image: &Image<'_>) -> Result<Self> {
+        let read = || -> Result<Self> {
+            let text = fs::read(path).context("cannot be read")?;
+            let value: serde_json::Value = strict_json::parse(&text).context("not JSON")?;
+            let schema = value.get("schema").and_then(|s| s.as_str()).unwrap_or("none");
+            ensure!(schema == SCHEMA, "not statistics of an image: its schema is {schema}, {SCHEMA} is needed");
+            let stats: Self = serde_json::from_value(value).with_context(|| format!("does not follow {SCHEMA}"))?;
+            let crc = crc32(image);
+            ensure!(
+                stats.crc32 == crc,
+                "belongs to another image (crc32 {}, this one has {crc}); quantize with --save-stats writes both",
+                stats.crc32
+            );
+            stats.check()?;
+            Ok(stats)
+        };
+        read().with_context(|| path.display().to_string())
+    }
+
+    /// That every array has an entry for every row or column, so that no reader needs to ask again.
+    fn check(&self) -> Result<()> {
+        for m in &self.matrices {
+            let per_row = [m.widths.len(), m.bits.len()];
+            let allocation = m.allocation.as_ref().map(|a| [a.energy.len(), a.removal.len(), a.expected.len()]);
+            let whole = per_row.iter().chain(allocation.iter().flatten()).all(|n| *n == m.rows)
+                && m.allocation.as_ref().is_none_or(|a| a.importance.len() == m.cols)
+                && m.image_rows.iter().all(|r| *r < m.rows)
+                && m.image_cols.iter().all(|c| *c < m.cols);
+            ensure!(whole, "the arrays of {:?} do not fit its {} rows and {} columns", m.name, m.rows, m.cols);
+        }
+        Ok(())
+    }
+}
+
+fn crc32(image: &Image<'_>) -> String {
+    format!("{:08x}", image.crc())
+}
+
+fn matrix(source: &WeightMatrix, outcome: &Outcome, score: Option<&Score>) -> MatrixRecord {
+    let quantized = &outcome.quantized;
+    let allocation = outcome.allocation.as_ref();
+    let image_rows = allocation.map_or_else(|| (0..source.rows).collect(), |a| a.rows.clone());
+    let image_cols = allocation.map_or_else(|| (0..source.cols).collect(), |a| a.columns.clone());
+    let stepped = !Quantized::in_order(&outcome.blocks());
+    let overhead = 16 + 8 * quantized.groups() + if stepped { 8 } else { 0 };
+    let bits_of = |width: Width| width.bits() as usize * quantized.cols + overhead;
+    let widths = outcome.trained_widths();
+    MatrixRecord {
+        name: source.name.clone(),
+        rows: source.rows,
+        cols: source.cols,
+        group: quantized.group,
+        x_max: outcome.x_max,
+        bytes: outcome.bytes(),
+        widths: widths.iter().map(|width| width.map_or(0, Width::bits)).collect(),
+        bits: widths.iter().map(|width| width.map_or(0, bits_of)).collect(),
+        image_rows,
+        image_cols,
+        error: outcome.error,
+        allocation: allocation.map(|a| AllocationRecord {
+            energy: a.energy.clone(),
+            removal: a.removal.clone(),
+            expected: a.expected.clone(),
+            importance: a.inputs.clone(),
+        }),
+        score: score.map(HsicScore::from),
+    }
+}

@@ -1,0 +1,218 @@
+//! The error of several methods at several budgets on a policy.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use actq_kernels::Width;
+use serde::Serialize;
+
+use super::quantizer::{QuantizedPolicy, Quantizer};
+use super::stats::HsicScore;
+use crate::budget::Budget;
+use crate::data::{Dataset, Recording, Recordings};
+use crate::error::{Context as _, Result};
+use crate::measure::eval;
+use crate::methods::{Method, Options, Outcome};
+use crate::policy::Policy;
+
+/// One image.
+#[derive(Clone, Debug, Serialize)]
+pub struct Point {
+    /// Bits per weight that were allowed.
+    pub budget: f64,
+    /// Errors, true bits per weight, bytes.
+    #[serde(flatten)]
+    pub report: eval::ErrorReport,
+    /// The allocation: for each matrix how many of its rows, as it was trained, have how many bits (0: none).
+    pub rows: Vec<BTreeMap<u32, usize>>,
+}
+
+/// One method at all budgets.
+#[derive(Clone, Debug, Serialize)]
+pub struct Curve {
+    /// The method's name.
+    pub method: String,
+    /// One per budget; `None` where the budget is too small for the method.
+    pub points: Vec<Option<Point>>,
+    /// ActQuant's scores, per matrix.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scores: Option<Vec<HsicScore>>,
+}
+
+/// The point of the best method beyond which a further bit gains least.
+#[derive(Clone, Debug, Serialize)]
+pub struct Knee {
+    /// The method.
+    pub method: String,
+    /// True bits per weight.
+    pub bpw: f64,
+    /// Its error.
+    pub nmse: f64,
+}
+
+/// All of it.
+#[derive(Clone, Debug, Serialize)]
+pub struct Sweep {
+    /// The policy's name.
+    pub policy: String,
+    /// The names of its matrices.
+    pub matrices: Vec<String>,
+    /// Bits per weight that were allowed.
+    pub budgets: Vec<f64>,
+    /// One per method.
+    pub curves: Vec<Curve>,
+    /// See [`knee`].
+    pub knee: Option<Knee>,
+}
+
+/// What to compare.
+#[derive(Debug)]
+pub struct SweepPlan<'a> {
+    /// The policy.
+    pub policy: &'a Policy,
+    /// What the methods learn from (only rtn does without), and what errors are measured on. The f32 policy gives actions
+    /// that were not recorded.
+    pub recordings: Recordings,
+    /// The methods.
+    pub methods: &'a [Method],
+    /// Bits per weight that are allowed.
+    pub budgets: &'a [f64],
+    /// The most steps of distillation; None: as many as suit the network.
+    pub steps: Option<usize>,
+    /// The most minutes of distillation; None: only the steps bound it.
+    pub minutes: Option<f64>,
+    /// Whether method best counts errors relative to the action's size.
+    pub relative: bool,
+    /// Seed of everything that is drawn.
+    pub seed: u64,
+}
+
+/// Quantizes the policy by every method for every budget and runs each image over the held-out recording. `progress`
+/// gets what is being done and the share of the whole that is done.
+pub fn run(plan: SweepPlan<'_>, mut progress: impl FnMut(&str, f64)) -> Result<Sweep> {
+    let SweepPlan { policy, mut recordings, methods, budgets, steps, minutes, relative, seed } = plan;
+    recordings.fill_actions(&policy.graph);
+    let heldout = recordings.heldout.as_ref().with_context(|| Recording::Heldout.missing("a sweep"))?;
+    let mut curves = Vec::new();
+    for (m, &method) in methods.iter().enumerate() {
+        // Calibration counts as much as one budget.
+        let done = |steps: f64| (m as f64 + steps / (1 + budgets.len()) as f64) / methods.len() as f64;
+        let work = format!("{method}, calibrating");
+        let quantizer = Quantizer::new(policy, &recordings, method, minutes, |share| progress(&work, done(share)))?;
+        let mut points = Vec::new();
+        for (b, &budget) in budgets.iter().enumerate() {
+            let work = format!("{method}, {budget} bits per weight");
+            let plain = Options::new(method, Budget::BitsPerWeight(budget));
+            let relative = relative && method == Method::Best;
+            let options = Options { group: method.default_group(), steps, minutes, relative, seed, ..plain };
+            let share = |_: &str, share| progress(&work, done(1.0 + b as f64 + share));
+            points.push(match quantizer.quantize(&options, share) {
+                Ok(quantized) => Some(point(heldout, budget, &quantized)?),
+                Err(error) if error.budget().is_some() => None,
+                Err(error) => return Err(error),
+            });
+        }
+        let scores = quantizer.method().action_statistics();
+        let scores = scores.map(|statistics| statistics.scores.iter().map(HsicScore::from).collect());
+        curves.push(Curve { method: method.to_string(), points, scores });
+    }
+    let knee = knee(&curves);
+    let matrices = policy.graph.matrices.iter().map(|m| m.name.clone()).collect();
+    Ok(Sweep { policy: policy.name.clone(), matrices, budgets: budgets.to_vec(), curves, knee })
+}
+
+fn point(heldout: &Dataset, budget: f64, quantized: &QuantizedPolicy) -> Result<Point> {
+    let report = eval::evaluate(quantized.buffer().image(Path::new("image in memory"))?, heldout)?;
+    Ok(Point { budget, report, rows: quantized.outcomes.iter().map(rows).collect() })
+}
+
+fn rows(outcome: &Outcome) -> BTreeMap<u32, usize> {
+    let mut rows = BTreeMap::new();
+    for width in outcome.trained_widths() {
+        *rows.entry(width.map_or(0, Width::bits)).or_default() += 1;
+    }
+    rows
+}
+
+/// The knee of the best method.
+///
+/// The best method has the lowest error at most budgets; among equals, the one named first. Its knee is the point
+/// furthest below the chord from its first point to its last, in log error over true bits per weight: up to there a bit
+/// gains more than on average, after it less. `None` where no point is below the chord.
+pub fn knee(curves: &[Curve]) -> Option<Knee> {
+    let budgets = curves.iter().map(|c| c.points.len()).max()?;
+    let mut wins = vec![0; curves.len()];
+    for budget in 0..budgets {
+        let error = |c: usize| Some((c, curves[c].points.get(budget)?.as_ref()?.report.nmse));
+        if let Some((best, _)) = (0..curves.len()).filter_map(error).min_by(|a, b| a.1.total_cmp(&b.1)) {
+            wins[best] += 1;
+        }
+    }
+    let best = (0..curves.len()).rev().max_by_key(|&c| wins[c])?;
+    let line = line(&curves[best]);
+    let (&(x0, y0), &(x1, y1)) = (line.first()?, line.last()?);
+    let below = |&(x, y): &(f64, f64)| y0.ln() + (y1 / y0).ln() * (x - x0) / (x1 - x0) - y.ln();
+    let (depth, (bpw, nmse)) = line.iter().map(|point| (below(point), *point)).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (depth > 1e-9).then(|| Knee { method: curves[best].method.clone(), bpw, nmse })
+}
+
+/// True bits per weight and error of a curve's points, from few bits to many, each image once. An error of 0 has no
+/// logarithm; it counts as the smallest that f32 actions can show.
+pub fn line(curve: &Curve) -> Vec<(f64, f64)> {
+    let mut line: Vec<(f64, f64)> =
+        curve.points.iter().flatten().map(|p| (p.report.bpw, p.report.nmse.max(1e-14))).collect();
+    line.sort_by(|a, b| a.0.total_cmp(&b.0));
+    line.dedup();
+    line
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::methods::actquant::choices::Choices;
+    use crate::methods::actquant::testing::{dataset, lstm};
+
+    #[test]
+    fn observations_alone_give_the_same_errors() {
+        let policy = Policy::of("tiny", lstm());
+        let with_actions = [5, 6].map(|seed| dataset(&policy.graph, seed, 20));
+        let without = with_actions.clone().map(|recording| Dataset { action: None, ..recording });
+        let nmse = |[calib, heldout]: [Dataset; 2]| {
+            let plan = SweepPlan {
+                policy: &policy,
+                recordings: Recordings { calib: Some(calib), heldout: Some(heldout) },
+                methods: &[Method::ActQuant(Choices::default())],
+                budgets: &[50.0, 100.0],
+                steps: None,
+                minutes: None,
+                relative: false,
+                seed: 1,
+            };
+            let points = run(plan, |_, _| {}).expect("a sweep").curves.remove(0).points;
+            points.into_iter().map(|point| point.map(|point| point.report.nmse)).collect::<Vec<_>>()
+        };
+        let measured = nmse(with_actions);
+        assert!(measured.iter().any(Option::is_some), "{measured:?}");
+        assert_eq!(nmse(without), measured);
+    }
+
+    fn curve(method: &str, points: &[(f64, f64)]) -> Curve {
+        let point = |&(bpw, nmse): &(f64, f64)| {
+            let report =
+                eval::ErrorReport { nmse, worst_nmse: nmse, max_abs: 0.0, steps: 1, bpw, bytes: 1, worst_dimension: 0 };
+            (nmse > 0.0).then_some(Point { budget: bpw, report, rows: Vec::new() })
+        };
+        Curve { method: method.to_owned(), points: points.iter().map(point).collect(), scores: None }
+    }
+
+    #[test]
+    fn the_knee_is_where_the_best_curve_bends() {
+        let worse = curve("worse", &[(2.0, 0.9), (2.5, 0.8), (3.0, 0.5), (4.0, 1e-4)]);
+        let better = curve("better", &[(2.0, 0.5), (2.5, 0.01), (3.0, 0.006), (4.0, 0.003)]);
+        let found = knee(&[worse.clone(), better]).expect("a knee");
+        assert_eq!((found.method.as_str(), found.bpw), ("better", 2.5));
+        assert!(knee(&[worse]).is_none(), "a curve above its chord has no knee");
+        assert!(knee(&[]).is_none());
+        assert!(knee(&[curve("one", &[(3.0, 0.1)])]).is_none());
+    }
+}

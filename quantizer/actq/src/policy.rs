@@ -1,0 +1,71 @@
+//! A policy as it was trained.
+
+use std::path::PathBuf;
+
+use actq_kernels::image::Kind;
+
+use crate::contract::ActionContract;
+use crate::error::{Result, ensure};
+use crate::graph::Graph;
+
+/// A policy as it was trained.
+#[derive(Clone, Debug)]
+pub struct Policy {
+    /// Where it was read from.
+    pub dir: PathBuf,
+    /// Its name.
+    pub name: String,
+    /// What its output means.
+    pub kind: Kind,
+    /// Actions in the network's output; 1 for [`Kind::Step`].
+    pub chunk: usize,
+    /// Actions executed of a chunk.
+    pub execute: usize,
+    /// Length of an action.
+    pub act_len: usize,
+    /// Control rate in Hz.
+    pub rate_hz: f32,
+    /// What stands between the output and the robot.
+    pub contract: ActionContract,
+    /// The network.
+    pub graph: Graph,
+    /// Weights of all its matrices as they were trained, which bits per weight refer to.
+    pub weights: usize,
+    /// Its trained values ([`Graph::parameters`]), before what depends on the time alone became tables.
+    pub parameters: usize,
+    /// SHA-256 of policy.json, then policy.safetensors.
+    pub digest: [u8; 32],
+}
+
+impl Policy {
+    /// A policy of kind step that was read from nowhere: the network's output is the action, 50 times a second, without
+    /// a contract.
+    pub fn of(name: &str, graph: Graph) -> Self {
+        Self {
+            dir: PathBuf::new(),
+            name: name.to_owned(),
+            kind: Kind::Step,
+            chunk: 1,
+            execute: 1,
+            act_len: graph.len_of(graph.output()),
+            rate_hz: 50.0,
+            contract: ActionContract::default(),
+            weights: graph.weights(),
+            parameters: graph.parameters(),
+            graph,
+            digest: [0; 32],
+        }
+    }
+
+    /// That output, chunk, action and contract fit each other.
+    ///
+    /// # Errors
+    ///
+    /// What does not fit, by its key in policy.json.
+    pub fn check(&self) -> Result<()> {
+        let (len, expected) = (self.graph.len_of(self.graph.output()), self.chunk * self.act_len);
+        ensure!(len == expected, "the last op gives {len} values, chunk * act_dim is {expected}");
+        self.contract.playback.check(self.chunk, self.execute)?;
+        self.contract.check(self.act_len)
+    }
+}

@@ -1,0 +1,42 @@
+//! Text from files, as it may be shown on a terminal, and as a shell reads it.
+
+use std::borrow::Cow;
+use std::ffi::OsStr;
+
+use crate::error::{Context as _, Result};
+
+/// Whether a character does something to a terminal, or to the order in which the text around it is shown, instead of
+/// being shown itself.
+pub(crate) fn is_control(c: char) -> bool {
+    c.is_control() || matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+/// `text` in one line, with control characters escaped as in Rust: `\u{1b}`.
+pub fn printable(text: &str) -> Cow<'_, str> {
+    if !text.contains(is_control) {
+        return text.into();
+    }
+    let escaped = |c: char| -> String { if is_control(c) { c.escape_default().collect() } else { c.into() } };
+    text.chars().map(escaped).collect::<String>().into()
+}
+
+/// A word as a POSIX shell and Python's `shlex.split` read it.
+pub fn quoted(word: &OsStr) -> Result<String> {
+    let text = word.to_str().with_context(|| format!("{}: the path is not UTF-8", word.to_string_lossy()))?;
+    let plain = |c: char| c.is_ascii_alphanumeric() || "@%+=:,./_-".contains(c);
+    if !text.is_empty() && text.chars().all(plain) {
+        return Ok(text.to_owned());
+    }
+    Ok(format!("'{}'", text.replace('\'', "'\"'\"'")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn control_characters_are_escaped_and_nothing_else() {
+        assert_eq!(printable("arm \"ä\" \\ 腕"), "arm \"ä\" \\ 腕");
+        assert_eq!(printable("a\x1b[2Jb\r\n\u{9b}\u{7f}\u{202e}c"), "a\\u{1b}[2Jb\\r\\n\\u{9b}\\u{7f}\\u{202e}c");
+    }
+}

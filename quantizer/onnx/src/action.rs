@@ -1,0 +1,123 @@
+//! The end of a network as an action contract: factors, offsets and limits behind the last operation.
+
+use actq::import::contract::{Array, JsonContract};
+
+use super::bounds::bounds;
+use super::expr::{Expr, Exprs, Id};
+
+/// Scale, offset and limits of every value, as the contract applies them.
+struct Ends {
+    scale: Vec<f64>,
+    offset: Vec<f64>,
+    low: Vec<f64>,
+    high: Vec<f64>,
+}
+
+/// The value before what the contract of `act_len` values does, and the contract.
+pub(super) fn contract(exprs: &Exprs, root: Id, act_len: usize) -> (Id, Option<JsonContract>) {
+    let n = exprs.len_of(root);
+    let mut ends = Ends {
+        scale: vec![1.0; n],
+        offset: vec![0.0; n],
+        low: vec![f64::NEG_INFINITY; n],
+        high: vec![f64::INFINITY; n],
+    };
+    let (mut at, mut found) = (root, (root, None));
+    loop {
+        at = match exprs.get(at) {
+            Expr::Affine(x, a, b) => {
+                for i in 0..n {
+                    ends.offset[i] += ends.scale[i] * b[i];
+                    ends.scale[i] *= a[i];
+                }
+                *x
+            }
+            Expr::Clip(x, limit) => {
+                for i in 0..n {
+                    let (one, two) = (ends.offset[i] - ends.scale[i] * limit, ends.offset[i] + ends.scale[i] * limit);
+                    let (low, high) = (ends.low[i], ends.high[i]);
+                    ends.low[i] = one.min(two).clamp(low, high);
+                    ends.high[i] = one.max(two).clamp(low, high);
+                }
+                *x
+            }
+            _ => return found,
+        };
+        if !exprs.is_observed(at)
+            && let Some(json) = ends.json(act_len)
+        {
+            found = (at, Some(json));
+        }
+    }
+}
+
+/// Gives each action that the contract does not limit the bounds of its last operation as limits, if it has any; the
+/// contract then, and how many actions these are. `at` is the value before what the contract does.
+pub(super) fn bounded(
+    exprs: &Exprs,
+    at: Id,
+    contract: Option<JsonContract>,
+    act_len: usize,
+) -> (Option<JsonContract>, usize) {
+    let mut json = contract.unwrap_or_default();
+    let own = |i| [value(&json.low, i, f32::MIN), value(&json.high, i, f32::MAX)];
+    let (mut limits, mut found): (Vec<[f32; 2]>, _) = ((0..act_len).map(own).collect(), 0);
+    for (i, limits) in limits.iter_mut().enumerate().filter(|(_, limits)| **limits == [f32::MIN, f32::MAX]) {
+        if let Some(ends) = ends(exprs, at, &json, i, act_len) {
+            (*limits, found) = (ends, found + 1);
+        }
+    }
+    if found > 0 {
+        [json.low, json.high] = [0, 1].map(|side| Some(limits.iter().map(|limits| decimal(limits[side])).collect()));
+    }
+    (Some(json).filter(|json| *json != JsonContract::default()), found)
+}
+
+/// Bounds of action `i`, in all actions of a chunk, after the contract's factor and offset.
+fn ends(exprs: &Exprs, at: Id, json: &JsonContract, i: usize, act_len: usize) -> Option<[f32; 2]> {
+    let (scale, offset) = (value(&json.scale, i, 1.0), value(&json.offset, i, 0.0));
+    let [mut low, mut high] = [f32::MAX, f32::MIN];
+    for place in (i..exprs.len_of(at)).step_by(act_len) {
+        let bounds = if scale == 0.0 { [0.0; 2] } else { bounds(exprs, at, place)? };
+        // As the contract computes in f32, whose roundings keep the order.
+        for end in bounds.map(|bound| bound * scale + offset) {
+            (low, high) = (low.min(end), high.max(end));
+        }
+    }
+    (low > f32::MIN && high < f32::MAX).then_some([low, high])
+}
+
+fn value(array: &Array, i: usize, none: f32) -> f32 {
+    array.as_ref().and_then(|values| values[i]).map_or(none, |value| value as f32)
+}
+
+/// The number of the shortest text that is this f32.
+fn decimal(value: f32) -> Option<f64> {
+    format!("{value:?}").parse().ok()
+}
+
+impl Ends {
+    /// The contract, where all actions of a chunk have the same and f32 holds it.
+    fn json(&self, act_len: usize) -> Option<JsonContract> {
+        let each = |values: &[f64], none: f64, unlimited: f64| -> Option<Array> {
+            let first = values.get(..act_len)?;
+            if values.chunks(act_len).any(|action| action != first) {
+                return None;
+            }
+            if first.iter().all(|v| *v == none) {
+                return Some(None);
+            }
+            let one = |v: &f64| if *v == none { Some(unlimited) } else { decimal(*v as f32) };
+            let values: Vec<f64> = first.iter().map(one).collect::<Option<_>>()?;
+            values.iter().all(|v| (*v as f32).is_finite()).then(|| Some(values.into_iter().map(Some).collect()))
+        };
+        let most = f64::from(f32::MAX);
+        Some(JsonContract {
+            scale: each(&self.scale, 1.0, 1.0)?,
+            offset: each(&self.offset, 0.0, 0.0)?,
+            low: each(&self.low, f64::NEG_INFINITY, -most)?,
+            high: each(&self.high, f64::INFINITY, most)?,
+            ..JsonContract::default()
+        })
+    }
+}

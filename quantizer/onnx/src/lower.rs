@@ -1,0 +1,359 @@
+//! Expressions as the ops of policy.json, with their tensors.
+
+use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
+
+use actq::error::{Context as _, Result, bail, ensure};
+use actq::import::json::{Input, JsonOp};
+
+use super::expr::{Cell, Expr, Exprs, Id, Matrix, Run, Unary};
+
+/// A tensor of policy.safetensors.
+pub(super) struct Weight {
+    pub(super) name: String,
+    pub(super) shape: Vec<usize>,
+    pub(super) data: Vec<f32>,
+}
+
+/// A run of elements of what an op gives; op 0 is the observation, op `i + 1` the op of this index.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Part {
+    slot: usize,
+    from: usize,
+    len: usize,
+}
+
+/// The most repetitions of an element in one operand: each is copied by itself. What is longer repeats a copy of so
+/// many.
+const MOST_COPIES: usize = 64;
+
+/// Ops and tensors so far.
+pub(super) struct Lowered {
+    pub(super) ops: Vec<JsonOp>,
+    pub(super) weights: Vec<Weight>,
+    /// What each op reads.
+    reads: Vec<(Vec<Part>, Option<usize>)>,
+    /// Length of the observation, then of each op's output.
+    lens: Vec<usize>,
+    names: HashSet<String>,
+    /// The last number behind a name that was taken.
+    numbers: HashMap<String, usize>,
+    /// Names of the matrices, which several ops may share.
+    matrices: HashMap<*const Matrix, String>,
+    places: HashMap<Id, Vec<Part>>,
+    /// Which expressions an op of their reader computes along.
+    taken: HashSet<Id>,
+}
+
+/// Lowers a value. `offsets` says where the elements of each graph input stand in the observation, of `obs_len` values.
+/// An error names the expression that has no op.
+pub(super) fn lower(
+    exprs: &Exprs,
+    root: Id,
+    offsets: &HashMap<usize, usize>,
+    obs_len: usize,
+) -> Result<Lowered, (Id, actq::error::Error)> {
+    let mut lowered = Lowered {
+        ops: Vec::new(),
+        weights: Vec::new(),
+        reads: Vec::new(),
+        lens: vec![obs_len],
+        names: HashSet::new(),
+        numbers: HashMap::new(),
+        matrices: HashMap::new(),
+        places: HashMap::new(),
+        taken: HashSet::new(),
+    };
+    let order = exprs.needed(&[root]);
+    let mut readers: HashMap<Id, usize> = HashMap::new();
+    order.iter().flat_map(|&id| exprs.get(id).operands()).for_each(|x| *readers.entry(x).or_default() += 1);
+    // A clip and the factors around it are one op.
+    for &id in &order {
+        let inner = match *exprs.get(id) {
+            Expr::Clip(x, _) if matches!(exprs.get(x), Expr::Affine(..)) => x,
+            Expr::Affine(x, ..) if matches!(exprs.get(x), Expr::Clip(..)) => x,
+            _ => continue,
+        };
+        // What an op takes along, it takes whole: at most a clip, factors, a clip.
+        let over = matches!(exprs.get(id), Expr::Affine(..))
+            && matches!(exprs.get(inner), Expr::Clip(x, _) if lowered.taken.contains(x));
+        if readers.get(&inner) == Some(&1) && !over {
+            lowered.taken.insert(inner);
+        }
+    }
+    for &id in &order {
+        if !lowered.taken.contains(&id) {
+            lowered.value(exprs, id, offsets).map_err(|error| (id, error))?;
+        }
+    }
+    lowered.end(root).map_err(|error| (root, error))?;
+    lowered.slots();
+    Ok(lowered)
+}
+
+impl Lowered {
+    fn value(&mut self, exprs: &Exprs, id: Id, offsets: &HashMap<usize, usize>) -> Result<()> {
+        let place = match exprs.get(id) {
+            Expr::Input(i) => {
+                let from = *offsets.get(i).context("a recurrent state is read outside its cell")?;
+                vec![Part { slot: 0, from, len: exprs.len_of(id) }]
+            }
+            Expr::Pick(runs) => merged(runs.iter().flat_map(|run| self.cut(*run)).collect()),
+            Expr::Spread(x) => self.spread(*x, exprs.len_of(id))?,
+            _ => self.op(exprs, id)?,
+        };
+        self.places.insert(id, place);
+        Ok(())
+    }
+
+    /// An element `n` times.
+    fn spread(&mut self, x: Id, n: usize) -> Result<Vec<Part>> {
+        let one = self.place(x);
+        if n <= MOST_COPIES {
+            return Ok(vec![one; n].concat());
+        }
+        let most = MOST_COPIES * MOST_COPIES;
+        ensure!(n <= most, "computes {n} values with one; up to {most} are taken");
+        let copies = JsonOp { op: "identity".to_owned(), ..JsonOp::default() };
+        let copies = self.push(copies, vec![one; MOST_COPIES].concat(), None, MOST_COPIES);
+        let rest = copies.iter().map(|part| Part { len: n % MOST_COPIES, ..*part }).filter(|part| part.len > 0);
+        Ok(vec![copies.clone(); n / MOST_COPIES].concat().into_iter().chain(rest).collect())
+    }
+
+    fn place(&self, id: Id) -> Vec<Part> {
+        self.places.get(&id).cloned().unwrap_or_default()
+    }
+
+    /// The parts that hold a run.
+    fn cut(&self, run: Run) -> Vec<Part> {
+        let (mut skip, mut left) = (run.from, run.len);
+        let mut parts = Vec::new();
+        for part in self.place(run.of) {
+            let len = part.len.saturating_sub(skip).min(left);
+            if len > 0 {
+                parts.push(Part { from: part.from + skip, len, ..part });
+            }
+            skip = skip.saturating_sub(part.len);
+            left -= len;
+        }
+        parts
+    }
+
+    fn op(&mut self, exprs: &Exprs, id: Id) -> Result<Vec<Part>> {
+        let len = exprs.len_of(id);
+        let op = |name: &str| JsonOp { op: name.to_owned(), ..JsonOp::default() };
+        Ok(match exprs.get(id) {
+            Expr::Affine(..) | Expr::Clip(..) => self.normalize(exprs, id)?,
+            Expr::Linear(x, w, b) => {
+                let name = self.matrix(w)?;
+                let b = self.bias(&name, b)?;
+                self.push(JsonOp { w: Some(name), b, ..op("linear") }, self.place(*x), None, len)
+            }
+            Expr::Unary(Unary::Known(f), x) => self.push(op(f.name()), self.place(*x), None, len),
+            Expr::Add(x, y) | Expr::Mul(x, y) => {
+                let name = if matches!(exprs.get(id), Expr::Add(..)) { "add" } else { "mul" };
+                let with = self.whole(*y)?;
+                self.push(op(name), self.place(*x), Some(with), len)
+            }
+            Expr::LayerNorm(x, weight, bias, eps) => {
+                let w_ln = self.vector("norm.weight", weight)?;
+                let b_ln = self.bias(&w_ln, bias)?;
+                self.push(
+                    JsonOp { w_ln: Some(w_ln), b_ln, eps: Some(*eps), ..op("layernorm") },
+                    self.place(*x),
+                    None,
+                    len,
+                )
+            }
+            Expr::RmsNorm(x, weight, eps) => {
+                let w_ln = Some(self.vector("norm.weight", weight)?);
+                self.push(JsonOp { w_ln, eps: Some(*eps), ..op("rmsnorm") }, self.place(*x), None, len)
+            }
+            Expr::Cell(cell) => self.cell(cell, len)?,
+            Expr::CellState(_) => bail!("an LSTM's cell state is read outside its cell"),
+            Expr::Unary(f, _) => {
+                let what = match f {
+                    Unary::Log => "a logarithm",
+                    Unary::Sqrt => "a square root",
+                    Unary::Erf => "an error function",
+                    Unary::Reciprocal => "a quotient by a value",
+                    _ => "a comparison",
+                };
+                bail!(
+                    "{what} has no kernel here by itself, only within a norm, an activation or a cell; compute it before the policy, \
+                     as an input, or behind it"
+                )
+            }
+            Expr::Sum(_) | Expr::Input(_) | Expr::Integers(_) | Expr::Pick(_) | Expr::Spread(_) => {
+                bail!("is no operation")
+            }
+        })
+    }
+
+    fn cell(&mut self, cell: &Cell, hidden: usize) -> Result<Vec<Part>> {
+        let (w_ih, w_hh) = (self.matrix(&cell.w_ih)?, self.matrix(&cell.w_hh)?);
+        let (b_ih, b_hh) = (self.bias(&w_ih, &cell.b_ih)?, self.bias(&w_hh, &cell.b_hh)?);
+        let name = if cell.lstm { "lstm" } else { "gru" };
+        let op = JsonOp {
+            op: name.to_owned(),
+            hidden: Some(hidden),
+            w_ih: Some(w_ih),
+            w_hh: Some(w_hh),
+            b_ih,
+            b_hh,
+            ..JsonOp::default()
+        };
+        Ok(self.push(op, self.place(cell.x), None, hidden))
+    }
+
+    /// `clip(a clip(x) + b)`, with or without either clip.
+    fn normalize(&mut self, exprs: &Exprs, id: Id) -> Result<Vec<Part>> {
+        let len = exprs.len_of(id);
+        let (mut at, mut clip, mut pre_clip) = (id, None, None);
+        let (mut mean, mut scale) = (vec![0.0; len], vec![1.0; len]);
+        if let Expr::Clip(x, limit) = exprs.get(at) {
+            (at, clip) = (*x, Some(*limit));
+        }
+        if let Expr::Affine(x, a, b) = exprs.get(at)
+            && (at == id || self.taken.contains(&at))
+        {
+            at = *x;
+            mean = a.iter().zip(b).map(|(a, b)| if *b == 0.0 { 0.0 } else { -b / a }).collect();
+            scale.clone_from(a);
+            if let Expr::Clip(x, limit) = exprs.get(at)
+                && self.taken.contains(&at)
+            {
+                (at, pre_clip) = (*x, Some(*limit));
+            }
+        }
+        for limit in [clip, pre_clip].into_iter().flatten() {
+            ensure!(limit > 0.0, "limits a value to nothing but one number");
+        }
+        let mean = Some(self.vector("normalize.mean", &mean)?);
+        let scale = Some(self.vector("normalize.scale", &scale)?);
+        let op = JsonOp { op: "normalize".to_owned(), mean, scale, clip, pre_clip, ..JsonOp::default() };
+        Ok(self.push(op, self.place(at), None, len))
+    }
+
+    fn push(&mut self, op: JsonOp, input: Vec<Part>, with: Option<usize>, len: usize) -> Vec<Part> {
+        self.ops.push(op);
+        self.reads.push((input, with));
+        self.lens.push(len);
+        vec![Part { slot: self.ops.len(), from: 0, len }]
+    }
+
+    /// The slot of a value that is all of one; a new one for a value that is not.
+    fn whole(&mut self, id: Id) -> Result<usize> {
+        let place = self.place(id);
+        match place[..] {
+            [Part { slot, from: 0, len }] if self.lens.get(slot) == Some(&len) => Ok(slot),
+            _ => {
+                let n = place.iter().map(|part| part.len).sum();
+                let moved = self.push(JsonOp { op: "identity".to_owned(), ..JsonOp::default() }, place, None, n);
+                self.places.insert(id, moved);
+                Ok(self.ops.len())
+            }
+        }
+    }
+
+    /// Sees that the last op gives the value.
+    fn end(&mut self, root: Id) -> Result<()> {
+        let last = self.ops.len();
+        if self.place(root)[..] != [Part { slot: last, from: 0, len: self.lens[last] }] || last == 0 {
+            let n = self.place(root).iter().map(|part| part.len).sum();
+            ensure!(
+                self.place(root) != [Part { slot: 0, from: 0, len: self.lens[0] }],
+                "the action is the observation itself"
+            );
+            self.push(JsonOp { op: "identity".to_owned(), ..JsonOp::default() }, self.place(root), None, n);
+        }
+        Ok(())
+    }
+
+    /// Names the slots, those that are read at all but by the op behind them.
+    fn slots(&mut self) {
+        let name = |slot: usize| if slot == 0 { "obs".to_owned() } else { format!("v{slot}") };
+        let mut named = HashSet::new();
+        for (i, (input, with)) in self.reads.iter().enumerate() {
+            let op = &mut self.ops[i];
+            op.with = with.map(name);
+            named.extend(with.iter().copied());
+            let whole = |part: &Part| part.from == 0 && part.len == self.lens[part.slot];
+            op.input = match &input[..] {
+                [part] if whole(part) && part.slot == i => None,
+                [part] if whole(part) => Some(Input::One(name(part.slot))),
+                parts => Some(Input::Many(
+                    parts
+                        .iter()
+                        .map(|part| match whole(part) {
+                            true => name(part.slot),
+                            false => format!("{}[{}:{}]", name(part.slot), part.from, part.from + part.len),
+                        })
+                        .collect(),
+                )),
+            };
+            if op.input.is_some() {
+                named.extend(input.iter().map(|part| part.slot));
+            }
+        }
+        for slot in named.into_iter().filter(|slot| *slot > 0) {
+            self.ops[slot - 1].save = Some(name(slot));
+        }
+    }
+
+    fn matrix(&mut self, w: &Arc<Matrix>) -> Result<String> {
+        if let Some(name) = self.matrices.get(&Arc::as_ptr(w)) {
+            return Ok(name.clone());
+        }
+        let wanted = w.name.clone().unwrap_or_else(|| "layer.weight".to_owned());
+        let name = self.weight(&wanted, vec![w.rows, w.cols], &w.data)?;
+        self.matrices.insert(Arc::as_ptr(w), name.clone());
+        Ok(name)
+    }
+
+    fn vector(&mut self, name: &str, values: &[f64]) -> Result<String> {
+        self.weight(name, vec![values.len()], values)
+    }
+
+    /// The bias beside a weight, where there is one.
+    fn bias(&mut self, weight: &str, values: &[f64]) -> Result<Option<String>> {
+        if values.iter().all(|v| *v == 0.0) {
+            return Ok(None);
+        }
+        let name = match weight.rsplit_once("weight") {
+            Some((before, behind)) => format!("{before}bias{behind}"),
+            None => format!("{weight}.bias"),
+        };
+        self.vector(&name, values).map(Some)
+    }
+
+    /// Takes a tensor, rounded to f32, and gives its name, which has a number where it is taken.
+    fn weight(&mut self, wanted: &str, shape: Vec<usize>, values: &[f64]) -> Result<String> {
+        let data: Vec<f32> = values.iter().map(|&v| v as f32).collect();
+        ensure!(
+            data.iter().all(|v| v.is_finite()),
+            "{wanted:?} holds a value that is not finite, or beyond float32's range"
+        );
+        let mut name = wanted.to_owned();
+        while !self.names.insert(name.clone()) {
+            // One counter a name: a file may ask for thousands of the same.
+            let number = self.numbers.entry(wanted.to_owned()).or_insert(1);
+            *number += 1;
+            name = format!("{wanted}.{number}");
+        }
+        self.weights.push(Weight { name: name.clone(), shape, data });
+        Ok(name)
+    }
+}
+
+/// Neighbours as one.
+fn merged(parts: Vec<Part>) -> Vec<Part> {
+    let mut all: Vec<Part> = Vec::new();
+    for part in parts {
+        match all.last_mut() {
+            Some(last) if last.slot == part.slot && last.from + last.len == part.from => last.len += part.len,
+            _ => all.push(part),
+        }
+    }
+    all
+}

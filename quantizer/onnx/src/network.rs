@@ -1,0 +1,411 @@
+//! From a file to the two files of a policy's folder: which output is the action, which inputs are observed, and the
+//! network between.
+
+use std::collections::{BTreeMap, HashMap};
+use std::path::{Path, PathBuf};
+
+use actq::error::{Context as _, Result, bail, ensure};
+use actq::import::Importer;
+use actq::import::contract::JsonContract;
+use actq::import::json::PolicyJson;
+use actq::policy::Policy;
+use actq::text::printable;
+use prost::bytes::Bytes;
+use safetensors::Dtype;
+use safetensors::tensor::TensorView;
+
+use super::action;
+use super::call::RANDOM;
+use super::expr::{Expr, Exprs, Id};
+use super::follow::{Follower, INTEGERS};
+use super::lower::{Lowered, lower};
+use super::model::{Graph, Model, Port};
+use super::simplify::simplify;
+use super::states::{Cells, Output, is_state, refuse_lost_states};
+use super::tensor::{Element, Tensor};
+
+/// The most names of a message.
+const MOST_LISTED: usize = 20;
+
+/// What the caller chooses; nothing by default.
+#[derive(Clone, Debug, Default)]
+pub struct Choice {
+    /// The value that is the action: an output of the graph, or any value inside.
+    pub output: Option<String>,
+    /// Inputs that hold recurrent state, with the outputs of their next values.
+    pub states: Vec<(String, String)>,
+}
+
+impl Choice {
+    /// Refuses names that the file does not have.
+    fn check(&self, graph: &Graph) -> Result<()> {
+        let outputs = || format!("its outputs are {}", listed(&graph.outputs));
+        if let Some(name) = &self.output {
+            let gives =
+                graph.nodes.iter().flat_map(|node| &node.outputs).chain(graph.outputs.iter().map(|port| &port.name));
+            ensure!(
+                gives.into_iter().any(|given| given == name),
+                "--output {}: the file gives no such value; {}",
+                printable(name),
+                outputs()
+            );
+        }
+        for (from, to) in &self.states {
+            let [state, from_name, to_name] =
+                [&format!("{from}={to}"), from, to].map(|name| printable(name).into_owned());
+            ensure!(
+                graph.inputs.iter().any(|port| port.name == *from),
+                "--state {state}: the file has no input {from_name:?}; its inputs are {}",
+                listed(&graph.inputs)
+            );
+            ensure!(
+                graph.outputs.iter().any(|port| port.name == *to),
+                "--state {state}: the file has no output {to_name:?}; {}",
+                outputs()
+            );
+        }
+        Ok(())
+    }
+}
+
+/// Names for a message.
+fn listed(ports: &[Port]) -> String {
+    let names: Vec<_> = ports.iter().take(MOST_LISTED).map(|port| printable(&port.name)).collect();
+    let more = ports.len() - names.len();
+    names.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
+}
+
+/// An ONNX file as a policy's files, and what became of it.
+#[derive(Clone, Debug)]
+pub struct Imported {
+    /// policy.json
+    pub json: Vec<u8>,
+    /// policy.safetensors
+    pub weights: Vec<u8>,
+    /// What wrote the file.
+    pub producer: String,
+    /// Inputs that are observed, with their lengths: the observation is their concatenation in this order.
+    pub inputs: Vec<(String, usize)>,
+    /// Which of these inputs the file takes as integers: they are observed as such, in float32.
+    pub integers: Vec<String>,
+    /// Inputs that hold recurrent state, the outputs of their next values, and lengths.
+    pub states: Vec<(String, String, usize)>,
+    /// The output that is the action, and its values.
+    pub output: (String, usize),
+    /// Names of the ops, in order.
+    pub ops: Vec<String>,
+    /// Inputs that the action does not depend on.
+    pub cut_inputs: Vec<String>,
+    /// Outputs that are not the action, nor states.
+    pub cut_outputs: Vec<String>,
+    /// Nodes of the file.
+    pub nodes: usize,
+    /// Keys of the action contract that the file's last nodes became.
+    pub contract: Vec<&'static str>,
+    /// Actions whose limits are the bounds of their last operation, as of tanh.
+    pub bounded: usize,
+}
+
+/// Reads an ONNX file. An error names the file, and the node where there is one.
+pub fn import(path: &Path, choice: &Choice) -> Result<Imported> {
+    let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+    let imported = Model::read(path).and_then(|model| network(&model, &name, choice));
+    imported.with_context(|| path.display().to_string())
+}
+
+/// As [`import`], from a file's bytes; tensors in other files are looked for in `folder`.
+pub fn import_bytes(bytes: Vec<u8>, folder: &Path, name: &str, choice: &Choice) -> Result<Imported> {
+    network(&Model::parse(Bytes::from(bytes), folder)?, name, choice)
+}
+
+/// ONNX files as a format, imported without choices.
+#[derive(Clone, Copy, Debug)]
+pub struct Onnx;
+
+impl Importer for Onnx {
+    fn accepts(&self, path: &Path) -> bool {
+        path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("onnx"))
+    }
+
+    fn files(&self, path: &Path) -> Vec<PathBuf> {
+        vec![path.to_owned()]
+    }
+
+    fn load(&self, path: &Path) -> Result<Policy> {
+        let imported = import(path, &Choice::default())?;
+        Policy::of_files(path, [path, path], &imported.json, &imported.weights)
+    }
+}
+
+fn network(model: &Model, name: &str, choice: &Choice) -> Result<Imported> {
+    choice.check(&model.graph)?;
+    let mut follower = Follower::new(model);
+    let mut outputs = Vec::new();
+    let mut errors = Vec::new();
+    for port in &model.graph.outputs {
+        match follower.value(&port.name) {
+            Ok(value) => outputs.push(Output { name: port.name.clone(), value }),
+            Err(error) => errors.push((port.name.clone(), error)),
+        }
+    }
+    if let Some(inner) = &choice.output
+        && !outputs.iter().any(|output| output.name == *inner)
+    {
+        let value = follower.value(inner).with_context(|| format!("the output {:?}", printable(inner)))?;
+        outputs.push(Output { name: inner.clone(), value });
+    }
+    let mut exprs = follower.exprs;
+    let cells = Cells::find(model, &mut exprs, &outputs, &choice.states);
+    let chosen = choose(&exprs, &cells, &outputs, errors, choice)?;
+    let (action, act_shape) = (outputs[chosen].name.clone(), outputs[chosen].value.shape.clone());
+
+    let value = Tensor::of_elements(act_shape.clone(), cells.elements(&outputs[chosen].value));
+    let values = value.elements();
+    // A constant among the values is 0 times another one, and an offset.
+    let first = values.iter().find_map(|e| if let Element::Of(id, i) = e { Some((*id, *i)) } else { None });
+    let first = first.with_context(|| format!("the output {:?} depends on no input", printable(&action)))?;
+    let open: Vec<(Id, usize)> =
+        values.iter().map(|e| if let Element::Of(id, i) = e { (*id, *i) } else { first }).collect();
+    let parts = |e: &Element| if let Element::Known(v) = e { (0.0, *v) } else { (1.0, 0.0) };
+    let (scale, offset) = values.iter().map(parts).unzip();
+    let root = exprs.vector(&open);
+    let root = exprs.affine(root, scale, offset);
+    let live = exprs.needed_instead(&[root], &cells.instead);
+    if let Some(i) = live.iter().find_map(|&id| if let Expr::Integers(i) = exprs.get(id) { Some(*i) } else { None }) {
+        bail!(
+            "the action is computed with the integers of the input {:?}; an observation is of float32, so cast them to that before \
+             anything else",
+            printable(&model.graph.inputs[i].name)
+        );
+    }
+    let pairs = cells.pairs(model, &exprs, &live, &outputs)?;
+    let mut read: Vec<usize> =
+        live.iter().filter_map(|&id| if let Expr::Input(i) = exprs.get(id) { Some(*i) } else { None }).collect();
+    read.sort_unstable();
+    refuse_lost_states(model, &read, &pairs, &outputs, &action, &choice.states)?;
+    read.retain(|i| !pairs.iter().any(|(state, _)| state == i));
+    ensure!(!read.is_empty(), "the output {:?} depends on no input", printable(&action));
+
+    let len_of = |exprs: &Exprs, i: usize| {
+        live.iter().find(|&&id| *exprs.get(id) == Expr::Input(i)).map_or(0, |&id| exprs.len_of(id))
+    };
+    let mut offsets = HashMap::new();
+    let mut inputs = Vec::new();
+    let mut integers = Vec::new();
+    let mut obs_len = 0;
+    for &i in &read {
+        let len = len_of(&exprs, i);
+        offsets.insert(i, obs_len);
+        obs_len += len;
+        let port = &model.graph.inputs[i];
+        inputs.push((printable(&port.name).into_owned(), len));
+        integers.extend(INTEGERS.contains(&port.kind).then(|| printable(&port.name).into_owned()));
+    }
+    let states: Vec<(String, String, usize)> = pairs
+        .iter()
+        .map(|&(i, o)| {
+            let names = [&model.graph.inputs[i].name, &outputs[o].name].map(|name| printable(name).into_owned());
+            let [from, to] = names;
+            (from, to, outputs[o].value.len())
+        })
+        .collect();
+
+    refuse_batch(model, &read, &act_shape)?;
+    let (chunk, act_len) = actions(&act_shape, open.len())?;
+    let (root, contract) = action::contract(&exprs, root, act_len);
+    let last = contract.iter().flat_map(keys).collect();
+    let (contract, bounded) = action::bounded(&exprs, root, contract, act_len);
+    let root = simplify(&mut exprs, root, &cells.instead);
+    let lowered = lower(&exprs, root, &offsets, obs_len).map_err(|(id, error)| at_node(model, &exprs, id, error))?;
+    let used = |name: &str| inputs.iter().any(|(n, _)| n == name) || states.iter().any(|(n, ..)| n == name);
+    let shown = |name: &String| printable(name).into_owned();
+    let cut_inputs: Vec<String> = model
+        .graph
+        .inputs
+        .iter()
+        .filter(|port| !model.graph.initializers.contains_key(&port.name))
+        .map(|port| shown(&port.name))
+        .filter(|name| !used(name))
+        .collect();
+    let is_cut = |name: &String| *name != shown(&action) && !states.iter().any(|(_, to, _)| to == name);
+    let cut_outputs = model.graph.outputs.iter().map(|port| shown(&port.name)).filter(is_cut).collect();
+    let json = PolicyJson {
+        name: printable(name).chars().take(50).collect(),
+        kind: (chunk > 1).then(|| "chunk".to_owned()),
+        chunk: (chunk > 1).then_some(chunk),
+        obs_dim: obs_len,
+        act_dim: act_len,
+        // Without an action, a chunk would be limited to -1 .. 1.
+        action: contract.or_else(|| (chunk > 1).then(JsonContract::default)),
+        ops: Vec::new(),
+        ..PolicyJson::default()
+    };
+    let ops = lowered.ops.iter().map(|op| op.op.clone()).collect();
+    let source = format!("ONNX by {}", model.producer);
+    let json = text(json, &lowered, &inputs, &states, &source)?;
+    Ok(Imported {
+        json,
+        weights: tensors(&lowered)?,
+        producer: model.producer.clone(),
+        inputs,
+        integers,
+        states,
+        output: (shown(&action), open.len()),
+        ops,
+        cut_inputs,
+        cut_outputs,
+        nodes: model.graph.nodes.len(),
+        contract: last,
+        bounded,
+    })
+}
+
+fn keys(contract: &JsonContract) -> Vec<&'static str> {
+    let all =
+        [("scale", &contract.scale), ("offset", &contract.offset), ("low", &contract.low), ("high", &contract.high)];
+    all.into_iter().filter(|(_, values)| values.is_some()).map(|(name, _)| name).collect()
+}
+
+/// The output that is the action: the one that is asked for, or the only one that can be, or the only one called so.
+fn choose(
+    exprs: &Exprs,
+    cells: &Cells,
+    outputs: &[Output],
+    mut errors: Vec<(String, actq::error::Error)>,
+    choice: &Choice,
+) -> Result<usize> {
+    if let Some(name) = &choice.output {
+        return outputs.iter().position(|output| output.name == *name).context("the output is not there");
+    }
+    let mut can: Vec<usize> = (0..outputs.len()).filter(|&i| !outputs[i].value.is_known()).collect();
+    if can.is_empty() {
+        let (name, error) = refused(errors).context("no output depends on an input")?;
+        return Err(error.context(format!("the output {:?} cannot be taken", printable(&name))));
+    }
+    let is_paired = |i: &usize| is_state(cells, exprs, &outputs[*i].value);
+    let named = |i: &usize| choice.states.iter().any(|(_, to)| *to == outputs[*i].name);
+    for keep in [
+        &(|i: &usize| !is_paired(i) && !named(i)) as &dyn Fn(&usize) -> bool,
+        &|i: &usize| is_action(&outputs[*i].name),
+        &|i: &usize| outputs[*i].name.to_lowercase().contains("deterministic"),
+    ] {
+        if can.len() > 1 && can.iter().any(keep) {
+            can.retain(|i| keep(i));
+        }
+    }
+    // An action that cannot be taken is not replaced by something else: a critic's value, or a hidden state. But an
+    // exporter adds the deterministic action to one that is drawn.
+    errors.retain(|(name, error)| is_action(name) || !is_drawn(error));
+    let is_called = can.iter().any(|&i| is_action(&outputs[i].name));
+    if !is_called && let Some((lost, error)) = refused(errors) {
+        can.retain(|i| !is_paired(i) && !named(i));
+        let others = match &can[..] {
+            [] => "the other outputs are states".to_owned(),
+            _ => format!("no other is called action; actq import --output NAME takes {}", sizes(outputs, &can)),
+        };
+        return Err(error.context(format!("the output {:?} cannot be taken, and {others}", printable(&lost))));
+    }
+    match can[..] {
+        [one] => Ok(one),
+        _ => bail!(
+            "several outputs can be the action: {}; choose one with actq import --output NAME",
+            sizes(outputs, &can)
+        ),
+    }
+}
+
+/// Of the outputs that were refused the one called action, or else the last.
+fn refused(mut errors: Vec<(String, actq::error::Error)>) -> Option<(String, actq::error::Error)> {
+    match errors.iter().position(|(name, _)| is_action(name)) {
+        Some(at) => Some(errors.swap_remove(at)),
+        None => errors.pop(),
+    }
+}
+
+/// Some outputs with their lengths, for a message.
+fn sizes(outputs: &[Output], which: &[usize]) -> String {
+    let one = |&i: &usize| format!("{} ({} values)", printable(&outputs[i].name), outputs[i].value.len());
+    which.iter().map(one).collect::<Vec<_>>().join(", ")
+}
+
+fn is_action(name: &str) -> bool {
+    name.to_lowercase().contains("action") && !name.to_lowercase().contains("shape")
+}
+
+/// Whether an output was refused as it draws random numbers.
+fn is_drawn(error: &actq::error::Error) -> bool {
+    error.cause().to_string() == RANDOM
+}
+
+/// Refuses several observations at once: their actions would be taken for a chunk.
+fn refuse_batch(model: &Model, read: &[usize], act_shape: &[usize]) -> Result<()> {
+    let &[batch, _, ..] = act_shape else { return Ok(()) };
+    // A vector has values, not rows. One input with rows is enough: what stands beside it may be the same for all of
+    // them.
+    let in_rows = |i: &&usize| match model.graph.inputs[**i].shape.as_deref() {
+        Some(&[first, _, ..]) => first == Some(batch),
+        _ => false,
+    };
+    if batch > 1
+        && let Some(&i) = read.iter().find(in_rows)
+    {
+        bail!(
+            "the action and the input {:?} have {batch} rows, which is a batch; a control step has one observation, so export with a \
+             batch of 1, and a history with a chunk of its length as [1, {batch}, n]",
+            printable(&model.graph.inputs[i].name)
+        );
+    }
+    Ok(())
+}
+
+/// Actions in the output, and the length of each.
+fn actions(shape: &[usize], n: usize) -> Result<(usize, usize)> {
+    let ones = shape.iter().take_while(|&&n| n == 1).count();
+    match &shape[ones..] {
+        [] => Ok((1, n)),
+        [n] => Ok((1, *n)),
+        [chunk, n] => Ok((*chunk, *n)),
+        _ => bail!("the action has the shape {shape:?}; [value] or [action, value] is taken, behind axes of length 1"),
+    }
+}
+
+fn at_node(model: &Model, exprs: &Exprs, id: Id, error: actq::error::Error) -> actq::error::Error {
+    let at = exprs.origin(id);
+    match model.graph.nodes.get(at) {
+        Some(node) => error.context(format!("node {at} {:?} ({})", node.name, node.op)),
+        None => error,
+    }
+}
+
+/// policy.json, an op a line.
+fn text(
+    json: PolicyJson,
+    lowered: &Lowered,
+    inputs: &[(String, usize)],
+    states: &[(String, String, usize)],
+    source: &str,
+) -> Result<Vec<u8>> {
+    let mut text = serde_json::to_string_pretty(&json)?;
+    let about = |key: &str, value: String| format!("  \"{key}\": {value},\n");
+    let mut extra = about("source", serde_json::to_string(source)?);
+    extra += &about("inputs", serde_json::to_string(inputs)?);
+    if !states.is_empty() {
+        extra += &about("states", serde_json::to_string(states)?);
+    }
+    let ops: Vec<String> =
+        lowered.ops.iter().map(|op| Ok(format!("    {}", serde_json::to_string(op)?))).collect::<Result<_>>()?;
+    let end = text.rfind("  \"ops\": []").context("policy.json has ops")?;
+    text.truncate(end);
+    Ok(format!("{text}{extra}  \"ops\": [\n{}\n  ]\n}}\n", ops.join(",\n")).into_bytes())
+}
+
+fn tensors(lowered: &Lowered) -> Result<Vec<u8>> {
+    let bytes: Vec<Vec<u8>> =
+        lowered.weights.iter().map(|w| w.data.iter().flat_map(|v| v.to_le_bytes()).collect()).collect();
+    let views =
+        lowered.weights.iter().zip(&bytes).map(|(weight, bytes)| {
+            Ok((weight.name.as_str(), TensorView::new(Dtype::F32, weight.shape.clone(), bytes)?))
+        });
+    let views: BTreeMap<&str, TensorView<'_>> = views.collect::<Result<_>>()?;
+    Ok(safetensors::serialize(views, None)?)
+}

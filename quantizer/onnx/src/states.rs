@@ -1,0 +1,205 @@
+//! Which inputs hold recurrent state, and which outputs its next value.
+
+use std::collections::HashMap;
+
+use actq::error::{Context as _, Result, bail, ensure};
+use actq::text::printable;
+
+use super::expr::{Expr, Exprs, Id, Run};
+use super::model::Model;
+use super::tensor::{Element, Tensor};
+
+/// An output of the graph, as far as it can be followed.
+pub(super) struct Output {
+    pub(super) name: String,
+    pub(super) value: Tensor,
+}
+
+/// State inputs with the outputs of their next values, by index.
+pub(super) type Pairs = Vec<(usize, usize)>;
+
+/// Cells that were taken apart: what their states after the step become.
+#[derive(Default)]
+pub(super) struct Cells {
+    pub(super) instead: HashMap<Id, Id>,
+}
+
+impl Cells {
+    /// Finds the cells whose next states are among the outputs. `named` are the pairs that the caller knows, of input
+    /// and output.
+    pub(super) fn find(model: &Model, exprs: &mut Exprs, outputs: &[Output], named: &[(String, String)]) -> Self {
+        let mut found = Self::default();
+        for output in outputs {
+            let elements = output.value.elements();
+            let mut at = 0;
+            while at < elements.len() {
+                let Element::Of(next, 0) = elements[at] else {
+                    at += 1;
+                    continue;
+                };
+                let len = exprs.len_of(next);
+                let whole = (0..len).all(|k| elements.get(at + k) == Some(&Element::Of(next, k)));
+                if whole && !matches!(exprs.get(next), Expr::Cell(_) | Expr::CellState(_) | Expr::Input(_)) {
+                    let candidates = candidates(model, exprs, output, Run { of: 0, from: at, len }, named);
+                    let cell = exprs.gru_of(next).or_else(|| exprs.lstm_of(next, &candidates));
+                    if let Some(cell) = cell {
+                        let h = exprs.put(Expr::Cell(Box::new(cell.cell)), len);
+                        found.instead.insert(next, h);
+                        if let Some(next_c) = cell.next_c {
+                            let c = exprs.put(Expr::CellState(h), len);
+                            found.instead.insert(next_c, c);
+                        }
+                    }
+                }
+                at += if whole { len } else { 1 };
+            }
+        }
+        found
+    }
+
+    /// An element, of the cell where there was one taken apart.
+    fn element(&self, element: Element) -> Element {
+        match element {
+            Element::Of(id, i) => Element::Of(self.instead.get(&id).copied().unwrap_or(id), i),
+            known => known,
+        }
+    }
+
+    /// The elements of a value.
+    pub(super) fn elements(&self, value: &Tensor) -> Vec<Element> {
+        value.elements().into_iter().map(|element| self.element(element)).collect()
+    }
+
+    /// For every cell in use, which output carries its state on. Refuses a state that nothing carries.
+    pub(super) fn pairs(&self, model: &Model, exprs: &Exprs, live: &[Id], outputs: &[Output]) -> Result<Pairs> {
+        let mut pairs = Pairs::new();
+        let cell = |id: Id| if let Expr::Cell(cell) = exprs.get(id) { Some((id, cell)) } else { None };
+        for (h, cell) in live.iter().filter_map(|&id| cell(id)) {
+            for (i, run) in cell.states.iter().enumerate() {
+                let (input, name) = input_of(model, exprs, run)?;
+                let is_next = |element: &Element, k: usize| match *element {
+                    Element::Of(id, at) if i == 0 => id == h && at == k,
+                    Element::Of(id, at) => *exprs.get(id) == Expr::CellState(h) && at == k,
+                    Element::Known(_) => false,
+                };
+                let carries = |output: &Output| {
+                    let elements = self.elements(&output.value);
+                    let part = elements.get(run.from..run.from + run.len);
+                    elements.len() == exprs.len_of(run.of)
+                        && part.is_some_and(|part| part.iter().enumerate().all(|(k, e)| is_next(e, k)))
+                };
+                let output = outputs.iter().position(carries).with_context(|| {
+                    format!("no output holds the next value of the state {name:?}; export it as an output, in the state's order")
+                })?;
+                let known = pairs.iter().find(|(other, _)| *other == input);
+                ensure!(
+                    known.is_none_or(|(_, other)| *other == output),
+                    "the state {name:?} is carried by two outputs; where an exporter was given one tensor for two states, give it two"
+                );
+                if known.is_none() {
+                    pairs.push((input, output));
+                }
+            }
+        }
+        Ok(pairs)
+    }
+}
+
+fn input_of(model: &Model, exprs: &Exprs, run: &Run) -> Result<(usize, String)> {
+    let &Expr::Input(i) = exprs.get(run.of) else { bail!("a state is no input of the graph") };
+    let port = model.graph.inputs.get(i).context("a state is no input of the graph")?;
+    Ok((i, printable(&port.name).into_owned()))
+}
+
+/// Runs of inputs that may be the hidden state whose next value is at `place` of an output: inputs as long as the
+/// output, those first that the caller names, then those whose name says so.
+fn candidates(model: &Model, exprs: &mut Exprs, output: &Output, place: Run, named: &[(String, String)]) -> Vec<Run> {
+    let mut found: Vec<(usize, Run)> = Vec::new();
+    for (i, port) in model.graph.inputs.iter().enumerate() {
+        let len: Option<usize> = port
+            .shape
+            .as_ref()
+            .and_then(|shape| shape.iter().try_fold(1usize, |n, axis| n.checked_mul(axis.unwrap_or(1))));
+        if len != Some(output.value.len()) {
+            continue;
+        }
+        let of = exprs.put(Expr::Input(i), output.value.len());
+        let rank = if named.iter().any(|(from, to)| *from == port.name && *to == output.name) {
+            0
+        } else if stem(&port.name) == stem(&output.name) {
+            1
+        } else {
+            2
+        };
+        found.push((rank, Run { of, ..place }));
+    }
+    found.sort_by_key(|(rank, _)| *rank);
+    found.into_iter().map(|(_, run)| run).collect()
+}
+
+/// A name without what tells a state before a step from the one after it.
+fn stem(name: &str) -> String {
+    const SIDES: [&str; 16] = [
+        "in", "out", "input", "output", "inputs", "outputs", "prev", "next", "new", "old", "last", "state", "states",
+        "0", "n", "t",
+    ];
+    let lower = name.to_lowercase();
+    let parts =
+        lower.split(|c: char| !c.is_ascii_alphanumeric()).filter(|part| !part.is_empty() && !SIDES.contains(part));
+    let joined = parts.collect::<Vec<_>>().join("_");
+    // h0 and hn, hin and hout
+    for end in ["in", "out", "n", "0"] {
+        if let Some(short) = joined.strip_suffix(end).filter(|short| matches!(*short, "h" | "c")) {
+            return short.to_owned();
+        }
+    }
+    joined
+}
+
+/// Refuses what looks like a state and is none that a policy can carry: it would be observed, and never change.
+pub(super) fn refuse_lost_states(
+    model: &Model,
+    live_inputs: &[usize],
+    pairs: &Pairs,
+    outputs: &[Output],
+    action: &str,
+    named: &[(String, String)],
+) -> Result<()> {
+    let help = "only the states of LSTM and GRU cells (torch's forms) are carried from step to step; what else the policy \
+                should remember, observe: an input without an output";
+    for (from, to) in named {
+        let is_pair = |(i, o): &(usize, usize)| model.graph.inputs[*i].name == *from && outputs[*o].name == *to;
+        ensure!(
+            pairs.iter().any(is_pair),
+            "--state {}={}: between them is no cell that the action needs; {help}",
+            printable(from),
+            printable(to)
+        );
+    }
+    for &i in live_inputs.iter().filter(|i| !pairs.iter().any(|(state, _)| state == *i)) {
+        let port = &model.graph.inputs[i];
+        let len: usize = port.shape.iter().flatten().map(|n| n.unwrap_or(1)).product();
+        let same = |output: &&Output| {
+            output.name != action
+                && output.value.len() == len
+                && !stem(&port.name).is_empty()
+                && stem(&port.name) == stem(&output.name)
+        };
+        if let Some(output) = outputs.iter().find(same) {
+            bail!(
+                "the input {:?} and the output {:?} look like a recurrent state, but no LSTM or GRU cell is between them; {help}",
+                printable(&port.name),
+                printable(&output.name)
+            );
+        }
+    }
+    Ok(())
+}
+
+/// Whether an output is nothing but states of cells.
+pub(super) fn is_state(cells: &Cells, exprs: &Exprs, value: &Tensor) -> bool {
+    cells.elements(value).iter().all(|e| match *e {
+        Element::Of(id, _) => matches!(exprs.get(id), Expr::CellState(_) | Expr::Cell(_)),
+        Element::Known(_) => false,
+    })
+}

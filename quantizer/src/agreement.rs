@@ -1,0 +1,111 @@
+//! Which run of an ONNX file is right: the policy's or onnxruntime's, both in float32, by a third in float64.
+
+use anyhow::{Result, bail};
+
+/// Largest error of a run that counts as right, as a share of the largest action.
+const TOLERANCE: f64 = 1e-5;
+
+/// Largest difference of `run` from `right`, as a share of the largest value of `right`; infinite if a value is not
+/// finite.
+pub(crate) fn error(right: &[f64], run: &[f64]) -> f64 {
+    if !right.iter().chain(run).all(|v| v.is_finite()) {
+        return f64::INFINITY;
+    }
+    let scale = right.iter().fold(f64::MIN_POSITIVE, |most, v| most.max(v.abs()));
+    right.iter().zip(run).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs())) / scale
+}
+
+/// Errors of the two float32 runs against the file in float64.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct InFloat64 {
+    /// Of the policy.
+    pub(crate) policy: f64,
+    /// Of onnxruntime.
+    pub(crate) onnxruntime: f64,
+}
+
+/// Says against which run the policy is right, and its error; fails if it is not, or if nothing shows that it is.
+/// `apart` is the error between the two float32 runs; `in_float64` is asked only if they differ.
+pub(crate) fn verdict(apart: f64, in_float64: impl FnOnce() -> Result<InFloat64>) -> Result<String> {
+    if apart <= TOLERANCE {
+        return Ok(format!("against onnxruntime: {} at most", off(apart)));
+    }
+    let InFloat64 { policy, onnxruntime } = match in_float64() {
+        Ok(errors) => errors,
+        Err(reason) => bail!(
+            "the policy and onnxruntime disagree ({}), and float64 cannot show which is right: {reason:#}",
+            off(apart)
+        ),
+    };
+    let errors = format!(
+        "against the file in float64 the policy's actions are {}, onnxruntime's are {}",
+        off(policy),
+        off(onnxruntime)
+    );
+    match (policy <= TOLERANCE, onnxruntime <= TOLERANCE) {
+        (true, _) => Ok(format!(
+            "against the file in float64: {} at most; onnxruntime's are {}, by its float32 arithmetic",
+            off(policy),
+            off(onnxruntime)
+        )),
+        (false, true) => bail!("{errors}; this is an error of this program, please report it"),
+        (false, false) => bail!(
+            "{errors}: no two of the three runs agree, so this does not show which is right; pass recorded observations \
+             with --calib if the drawn ones are outside the policy's range"
+        ),
+    }
+}
+
+fn off(error: f64) -> String {
+    if error.is_finite() { format!("off by {error:.1e} of the largest action") } else { "not finite".to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn said(apart: f64, in_float64: Result<[f64; 2], &str>) -> Result<String, String> {
+        let errors = in_float64.map(|[policy, onnxruntime]| InFloat64 { policy, onnxruntime });
+        verdict(apart, || errors.map_err(|reason| anyhow::anyhow!("{reason}"))).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn runs_that_agree_need_no_float64() {
+        let said = verdict(9e-6, || unreachable!()).expect("they agree");
+        assert_eq!(said, "against onnxruntime: off by 9.0e-6 of the largest action at most");
+    }
+
+    #[test]
+    fn float64_says_which_run_is_right() {
+        let policy = said(4.6e-3, Ok([2e-7, 4.6e-3])).expect("the policy is right");
+        assert!(policy.starts_with("against the file in float64: off by 2.0e-7 of"), "{policy}");
+        assert!(policy.contains("onnxruntime's are off by 4.6e-3 of the largest action, by its float32"), "{policy}");
+        let infinite = said(f64::INFINITY, Ok([2e-7, f64::INFINITY])).expect("the policy is right");
+        assert!(infinite.contains("onnxruntime's are not finite"), "{infinite}");
+        let ours = said(3e-2, Ok([3e-2, 1e-7])).expect_err("onnxruntime is right");
+        assert!(
+            ours.contains("actions are off by 3.0e-2 of the largest action, onnxruntime's are off by 1.0e-7"),
+            "{ours}"
+        );
+        assert!(ours.ends_with("this is an error of this program, please report it"), "{ours}");
+    }
+
+    #[test]
+    fn nobody_is_blamed_without_a_proof() {
+        for undecided in [said(3e-2, Ok([2e-2, 1e-2])), said(3e-2, Err("No module named 'onnx'"))] {
+            let said = undecided.expect_err("undecided");
+            assert!(
+                said.contains("no two of the three runs agree") || said.ends_with("right: No module named 'onnx'"),
+                "{said}"
+            );
+            assert!(!said.contains("error of this program"), "{said}");
+        }
+    }
+
+    #[test]
+    fn an_error_is_a_share_of_the_largest_value() {
+        assert_eq!(error(&[-4.0, 1.0], &[-4.0, 1.5]), 0.125);
+        assert_eq!(error(&[0.0, 1.0], &[f64::NAN, 1.0]), f64::INFINITY);
+        assert_eq!(error(&[f64::INFINITY], &[f64::INFINITY]), f64::INFINITY);
+    }
+}

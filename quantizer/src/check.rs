@@ -1,0 +1,92 @@
+//! `actq import --check`: the policy against its ONNX file, as others run it.
+
+use std::env;
+use std::io::Write as _;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use actq::data::Dataset;
+use actq::measure::actions::actions;
+use actq::policy::Policy;
+use actq::random::Random;
+use actq_onnx::Imported;
+use anyhow::{Context as _, Result, bail, ensure};
+
+use crate::agreement::{InFloat64, error, verdict};
+
+/// Observations that the check draws, or takes from a recording.
+const FRAMES: usize = 256;
+
+/// Ways of `check.py` to run the file.
+#[derive(Clone, Copy)]
+enum Way {
+    Onnxruntime,
+    Float64,
+}
+
+/// Compares the policy's actions with those of its file; says on how many observations, against which run, and its error.
+pub(crate) fn check(model: &Path, imported: &Imported, policy: &Policy, calib: Option<&Dataset>) -> Result<String> {
+    let observations = match calib {
+        Some(calib) => calib.episode(0).take(FRAMES).collect(),
+        None => drawn(imported),
+    };
+    let ours: Vec<f64> = actions(policy, &observations).concat().into_iter().map(f64::from).collect();
+    let of_file = |way| {
+        let values = run(way, model, imported, &observations)?;
+        ensure!(values.len() == ours.len(), "the file gives {} values, the policy {}", values.len(), ours.len());
+        Ok(values)
+    };
+    let expected = of_file(Way::Onnxruntime)?;
+    let in_float64 = || {
+        let exact = of_file(Way::Float64)?;
+        ensure!(exact.iter().all(|v| v.is_finite()), "the file's own actions are not finite in float64");
+        Ok(InFloat64 { policy: error(&exact, &ours), onnxruntime: error(&exact, &expected) })
+    };
+    let said = verdict(error(&expected, &ours), in_float64).with_context(|| model.display().to_string())?;
+    Ok(format!("{} observations {said}", observations.len()))
+}
+
+/// Observations for each input, rounded where the file takes integers.
+fn drawn(imported: &Imported) -> Vec<Vec<f32>> {
+    let mut random = Random::new(1);
+    let whole = |(name, len): &(String, usize)| vec![imported.integers.contains(name); *len];
+    let whole: Vec<bool> = imported.inputs.iter().flat_map(whole).collect();
+    let mut value = |whole: &bool| {
+        let value = 2.0 * random.unit();
+        if *whole { (100.0 * value).round() } else { value }
+    };
+    (0..FRAMES).map(|_| whole.iter().map(&mut value).collect()).collect()
+}
+
+/// Runs the file over the observations from Python, and gives all actions one after the other.
+fn run(way: Way, model: &Path, imported: &Imported, observations: &[Vec<f32>]) -> Result<Vec<f64>> {
+    let states: Vec<[&str; 2]> = imported.states.iter().map(|(from, to, _)| [from.as_str(), to]).collect();
+    let plan = serde_json::json!({ "inputs": imported.inputs, "states": states, "output": imported.output.0 });
+    let python = env::var_os("ACTQ_PYTHON").unwrap_or_else(|| "python3".into());
+    let starts = "--check runs the file with onnxruntime, from Python (python3, or what ACTQ_PYTHON names)";
+    let mut child = Command::new(python)
+        .args(["-c", include_str!("check.py")])
+        .arg(model)
+        .arg(plan.to_string())
+        .arg(match way {
+            Way::Onnxruntime => "onnxruntime",
+            Way::Float64 => "float64",
+        })
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .context(starts)?;
+    let bytes: Vec<u8> = observations.iter().flatten().flat_map(|v| v.to_le_bytes()).collect();
+    // It may have ended without reading; then its message says why.
+    let _ = child.stdin.take().context("it has an input")?.write_all(&bytes);
+    let output = child.wait_with_output().context(starts)?;
+    if !output.status.success() {
+        let said = String::from_utf8_lossy(&output.stderr).trim().to_owned();
+        match way {
+            Way::Onnxruntime => bail!("{starts}: {said}"),
+            Way::Float64 => bail!(said),
+        }
+    }
+    Ok(output.stdout.as_chunks().0.iter().map(|b| f64::from_le_bytes(*b)).collect())
+}

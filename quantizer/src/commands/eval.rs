@@ -1,0 +1,56 @@
+//! `actq eval`
+
+use actq::data::{Range, Recording, Sizes, files_of};
+use actq::measure::{eval, own};
+use actq::runtime::ImageBuffer;
+use anyhow::{Context as _, Result};
+
+use crate::args::EvalArgs;
+use crate::importers::load;
+use crate::report::notes::activation_share;
+use crate::terminal::{Progress, note, print};
+
+/// Runs an image over recordings and says how far it is from the f32 policy.
+pub(crate) fn run(args: &EvalArgs) -> Result<()> {
+    let buffer = ImageBuffer::read(&args.image)?;
+    let image = buffer.image(&args.image)?;
+    let policy = args.policy.as_deref();
+    let driven = files_of(&args.driven)?;
+    let _progress = Progress::new(args.quiet, "running the image over the recordings")?;
+    let source = policy.and_then(|dir| load(dir).ok()).filter(|policy| policy.digest == image.digest());
+    let dataset = eval::heldout_from(policy, args.heldout.as_deref(), source.as_ref(), &image)?;
+    let report = eval::evaluate(image, &dataset)?;
+    let own = (!driven.is_empty()).then(|| own::own_path(image, &driven, source.as_ref())).transpose()?;
+    match Recording::Calib.load(policy, None, Sizes::of_image(&image)) {
+        Ok(calib) => note(calib.and_then(|calib| Range::of(&calib).warning(&dataset))),
+        Err(error) => note([format!("the calibrated range is not known: {error:#}")]),
+    }
+    if args.json {
+        let mut json = serde_json::to_value(&report)?;
+        if let Some(own) = own {
+            json.as_object_mut().context("the report is an object")?.insert("own_nmse".to_owned(), own.nmse.into());
+        }
+        return print(&format!("{json}\n"));
+    }
+    let own = own.map_or(String::new(), |own| {
+        format!("own path       {:.3e}   ({} observations that the image itself has led to)\n", own.nmse, own.steps)
+    });
+    print(&format!(
+        "observations   {}\n\
+         nmse           {:.3e}   (mean squared error / variance, mean over dimensions)\n\
+         {own}\
+         worst nmse     {:.3e}   (dimension {})\n\
+         largest error  {:.4}\n\
+         activations    {}\n\
+         bits/weight    {:.3}\n\
+         image          {} bytes\n",
+        report.steps,
+        report.nmse,
+        report.worst_nmse,
+        report.worst_dimension,
+        report.max_abs,
+        activation_share(&eval::activation_share(image, &dataset, report.nmse)?),
+        report.bpw,
+        report.bytes,
+    ))
+}

@@ -1,0 +1,63 @@
+//! `actq import`
+
+use std::path::Path;
+
+use actq::data::{Dataset, Recording, Sizes};
+use actq::import::FILES;
+use actq::policy::Policy;
+use actq_onnx::{Choice, import};
+use anyhow::{Context as _, Result, ensure};
+
+use crate::args::ImportArgs;
+use crate::check::check;
+use crate::outputs::unfinished::OutputFolder;
+use crate::report::{imported, notes};
+use crate::terminal::{note, print, reserve};
+
+/// Makes a policy's folder of an ONNX file and says what became of it.
+pub(crate) fn run(args: &ImportArgs) -> Result<()> {
+    let choice = Choice { output: args.output.clone(), states: args.state.clone() };
+    let imported = import(&args.model, &choice)?;
+    let [json, weights] = FILES.map(|name| args.out.join(name));
+    let policy = Policy::of_files(&args.out, [&args.model, &args.model], &imported.json, &imported.weights)?;
+    let calib = args.calib.as_ref().map(|path| Dataset::load(path, Sizes::of(&policy))).transpose()?;
+    note(calib.as_ref().and_then(notes::single_steps));
+    note(notes::without_limits((0..policy.act_len).map(|i| policy.contract.limits(i))));
+    let [calib_npz, others @ ..] = Recording::Calib.paths(&args.out);
+    ensure!(
+        args.out.is_dir() || !args.out.exists(),
+        "{}: is there already and no folder; --out names the folder that is made",
+        args.out.display()
+    );
+    for path in [&json, &weights].into_iter().chain(calib.is_some().then_some(&calib_npz)) {
+        ensure!(args.force || !path.exists(), "{}: is there already; --force replaces it", path.display());
+    }
+    let other = others.iter().find(|path| calib.is_some() && path.exists());
+    ensure!(
+        other.is_none(),
+        "{}: is there already, and one recording can be",
+        other.map_or("".into(), |p| p.display().to_string())
+    );
+    let _folder = OutputFolder::new(&args.out).with_context(|| format!("{}: cannot be made", args.out.display()))?;
+    let names: Vec<&Path> =
+        [&json, &weights].into_iter().chain(calib.is_some().then_some(&calib_npz)).map(|p| &**p).collect();
+    let inputs: Vec<_> = [Some(args.model.clone()), args.calib.clone()].into_iter().flatten().collect();
+    let outputs = reserve(&names, &inputs)?;
+    let checked = match args.check {
+        true => Some(check(&args.model, &imported, &policy, calib.as_ref())?),
+        false => None,
+    };
+    let mut contents = vec![imported.json.clone(), imported.weights.clone()];
+    if let Some(calib) = &calib {
+        contents.push(calib.npz()?);
+    }
+    outputs.write(&contents)?;
+    print(&imported::summary(&imported, &policy))?;
+    if let Some(checked) = checked {
+        print(&format!("checked   {checked}\n"))?;
+    }
+    print(&format!(
+        "written   {}\n",
+        names.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ")
+    ))
+}

@@ -1,0 +1,32 @@
+//! `actq inspect`
+
+use actq::measure::time::StepTime;
+use actq::pipeline::stats::Stats;
+use actq::runtime::ImageBuffer;
+use anyhow::Result;
+
+use crate::args::InspectArgs;
+use crate::report::widths::Widths;
+use crate::report::{inspect, time};
+use crate::terminal::{print, reserve};
+
+/// Shows what is in an image.
+pub(crate) fn run(args: &InspectArgs) -> Result<()> {
+    let inputs = [Some(&args.image), args.stats.as_ref()].into_iter().flatten().cloned().collect::<Vec<_>>();
+    let outputs = reserve(args.svg.as_deref().as_slice(), &inputs)?;
+    let buffer = ImageBuffer::read(&args.image)?;
+    let image = buffer.image(&args.image)?;
+    if !args.widths {
+        let step = StepTime::new(&image, args.clock);
+        return print(&match args.json {
+            true => serde_json::to_string(&step)? + "\n",
+            false => format!("{}\n{}", inspect::report(&image), time::report(&step)),
+        });
+    }
+    let stats = args.stats.as_deref().map(|path| Stats::read(path, &image)).transpose()?;
+    let widths = Widths::new(&image, stats.as_ref())?;
+    if args.svg.is_some() {
+        outputs.write(&[widths.svg()])?;
+    }
+    print(&widths.report())
+}

@@ -1,0 +1,153 @@
+//! `actq link`
+
+mod table;
+
+use std::io;
+use std::path::Path;
+use std::time::Duration;
+
+use actq::data::{Dataset, Sizes};
+use actq::runtime::ImageBuffer;
+use actq_device::client::Client;
+use actq_device::connection::Connection;
+use actq_device::keys::Signed;
+use actq_device::log::Log;
+use actq_device::push::{Package, axes_note, push};
+use actq_device::stream::{Pace, stream};
+use actq_device::{port, serve};
+use anyhow::{Context as _, Result, ensure};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::args::link::{LinkArgs, LinkCommand, PortArgs, PushArgs, StreamArgs, WatchArgs};
+use crate::report::notes;
+use crate::terminal::{Progress, note, print, reserve};
+
+/// Between two tables of `watch`.
+const REFRESH: Duration = Duration::from_millis(200);
+
+/// Does what is asked of a controller.
+pub(crate) fn run(args: &LinkArgs) -> Result<()> {
+    match &args.command {
+        LinkCommand::Ports => {
+            let ports = port::list()?;
+            if ports.is_empty() {
+                note(["this machine has no serial port".to_owned()]);
+            }
+            ports.into_iter().try_for_each(|(name, about)| print(&format!("{name}  {about}\n")))
+        }
+        LinkCommand::Watch(args) => watch(args),
+        LinkCommand::Arm(port) => connect(port)?.arm(),
+        LinkCommand::Disarm(port) => connect(port)?.disarm(),
+        LinkCommand::Get(args) => {
+            let value = connect(&args.port)?.get(args.parameter.into(), args.axis)?;
+            print(&format!("{value}\n"))
+        }
+        LinkCommand::Set(args) => connect(&args.of.port)?.set(args.of.parameter.into(), args.of.axis, args.value),
+        LinkCommand::Stream(args) => run_stream(args),
+        LinkCommand::Serve(args) => {
+            serve::serve(&mut connect(&args.port)?, args.arm, io::stdin().lock(), io::stdout().lock())
+        }
+        LinkCommand::Push(args) => run_push(args),
+    }
+}
+
+fn connect(args: &PortArgs) -> Result<Client> {
+    let named = || format!("{}", args.port);
+    let mut client = Client::new(Connection::open(args.port.clone(), args.patience)?, args.patience);
+    client.status().with_context(named)?;
+    Ok(client)
+}
+
+fn watch(args: &WatchArgs) -> Result<()> {
+    let mut client = connect(&args.port)?;
+    let mut shown = || -> Result<String> {
+        let (status, timing, breadcrumb) = (client.status()?, client.timing()?, client.breadcrumb()?);
+        let reopened = client.connection().reopened();
+        Ok(table::table(&status, &timing, &breadcrumb, &client.connection().counters(), reopened).to_string())
+    };
+    if args.once {
+        return print(&(shown()? + "\n"));
+    }
+    let bar = ProgressBar::new_spinner().with_style(ProgressStyle::with_template("{msg}").context("table")?);
+    loop {
+        let table = shown().inspect_err(|_| bar.abandon())?;
+        if bar.is_hidden() {
+            print(&(table + "\n"))?;
+        } else {
+            bar.set_message(table);
+            bar.tick();
+        }
+        std::thread::sleep(REFRESH);
+    }
+}
+
+fn run_stream(args: &StreamArgs) -> Result<()> {
+    let outputs: Vec<&Path> = args.log.as_deref().into_iter().collect();
+    let outputs = reserve(&outputs, &[args.image.clone(), args.recording.clone()])?;
+    let buffer = ImageBuffer::read(&args.image)?;
+    let image = buffer.image(&args.image)?;
+    let recording = Dataset::load(&args.recording, Sizes::of_image(&image))?;
+    let mut client = connect(&args.port)?;
+    let runs = client.status()?.image;
+    ensure!(
+        runs == image.crc(),
+        "the controller runs another image (checksum {runs:08x}) than {} ({:08x}); actq link push sends it",
+        args.image.display(),
+        image.crc()
+    );
+    let rate = args.rate.unwrap_or(f64::from(image.rate_hz()));
+    let pace = Pace { period: Duration::from_secs_f64(1.0 / rate), arm: args.arm };
+    let (progress, mut log) = (Progress::new(false, "streaming")?, Log::default());
+    let frames = recording.frames();
+    let observations = recording.observations().enumerate().map(|(i, observation)| {
+        progress.set_share(i as f64 / frames as f64);
+        observation.to_vec()
+    });
+    let outcome =
+        stream(&mut client, observations, &pace, &mut log, |status| progress.set_work(&status.state.to_string()));
+    drop(progress);
+    // What came before an error is what one wants to see.
+    if args.log.is_some() {
+        outputs.write(&[log.npz()?])?;
+    }
+    let mut latencies = log.latencies();
+    latencies.sort_by(f64::total_cmp);
+    let at = |share: f64| latencies.get((share * latencies.len() as f64) as usize).map_or(f64::NAN, |s| s * 1e3);
+    print(&format!(
+        "{} observations, {} actions; from observation to action {:.1} ms in the median, {:.1} ms in 99 of 100\n",
+        log.observations(),
+        latencies.len(),
+        at(0.5),
+        at(0.99)
+    ))?;
+    outcome
+}
+
+fn run_push(args: &PushArgs) -> Result<()> {
+    let buffer = ImageBuffer::read(&args.image)?;
+    // What the kernels refuse need not be sent.
+    let image = buffer.image(&args.image)?;
+    let signed = args.signature.as_deref().map(|path| read_signature(path, buffer.bytes())).transpose()?;
+    let version = signed.map_or(args.version.unwrap_or(0), |(version, _)| version);
+    let signature = signed.map(|(_, signature)| signature);
+    note(notes::without_limits((0..image.act_len()).map(|i| image.limits(i))));
+    let mut client = connect(&args.port)?;
+    note(axes_note(&mut client)?);
+    let package = Package { image: buffer.bytes(), version, signature: signature.as_ref() };
+    let progress = Progress::new(false, "erasing")?;
+    let outcome = push(&mut client, &package, |taken| {
+        let work = if taken < buffer.bytes().len() { "sending" } else { "checking" };
+        progress.set(work, taken as f64 / buffer.bytes().len() as f64);
+    });
+    drop(progress);
+    outcome?;
+    print(&format!("{} runs, version {version}, {} bytes\n", image.name(), buffer.bytes().len()))
+}
+
+/// Version and signature of an image, from its signature's file.
+fn read_signature(path: &Path, image: &[u8]) -> Result<(u32, [u8; 64])> {
+    let name = || path.display().to_string();
+    let text = std::fs::read_to_string(path).with_context(name)?;
+    let signed: Signed = serde_json::from_str(&text).context("not a signature of actq sign").with_context(name)?;
+    Ok((signed.version, signed.check(image).with_context(name)?))
+}

@@ -1,0 +1,130 @@
+//! `actq quantize`
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use actq::budget::{Budget, TimeLimit};
+use actq::data::{Learned, Recording, Recordings, Sizes, driven_by, files_of};
+use actq::measure::{check, own};
+use actq::methods::{Activations, Method, Options};
+use actq::pipeline::stats::Stats;
+use actq::pipeline::{Quantizer, check_budget};
+use actq_kernels::Width;
+use anyhow::{Result, bail};
+
+use crate::args::{ActivationArg, MethodArg, QuantizeArgs};
+use crate::importers::{load, policy_files};
+use crate::report::learned::learned;
+use crate::report::{notes, quantized, time};
+use crate::terminal::{Progress, note, print, reserve};
+use crate::threads::start_threads;
+
+/// Quantizes a policy, writes the image and says what became of it.
+pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
+    let outputs: Vec<&Path> = [Some(&args.out), args.save_stats.as_ref()].into_iter().flatten().map(|p| &**p).collect();
+    let calib = files_of(&args.calib)?;
+    let inputs: Vec<PathBuf> = policy_files(&args.policy_dir).into_iter().chain(calib.iter().cloned()).collect();
+    let outputs = reserve(&outputs, &inputs)?;
+    let progress = Progress::new(args.run.quiet, "reading")?;
+    let source = load(&args.policy_dir)?;
+    let has_calib = !calib.is_empty() || Recording::Calib.find(&args.policy_dir)?.is_some();
+    let rtn = matches!(args.method, Some(MethodArg::Rtn));
+    if args.policy_dir.is_file() && !has_calib && !rtn {
+        bail!("{}: {}", args.policy_dir.display(), notes::how_to_record(&source));
+    }
+    let options = options(args, has_calib)?;
+    options.check()?;
+    check_budget(&source, &options)?;
+    let (calib, shares) = Learned::load(&source, &calib)?.map(|l| (l.dataset, l.shares)).unzip();
+    let shares = shares.unwrap_or_default();
+    let heldout = Recording::Heldout.load(Some(&args.policy_dir), None, Sizes::of(&source))?;
+    let recordings = Recordings { calib, heldout };
+    note(notes::of_recordings(&recordings));
+    note(notes::without_limits((0..source.act_len).map(|i| source.contract.limits(i))));
+    let started = Instant::now();
+    start_threads(args.run.threads)?;
+    progress.begin("calibrating");
+    let quantizer = Quantizer::new(&source, &recordings, options.method, options.minutes, |share| {
+        progress.set("calibrating", share);
+    })?;
+    note(notes::mixed_units(quantizer.method().mixed_units()));
+    progress.begin("choosing codes");
+    let found = quantizer.quantize(&options, |work, share| progress.set(work, share))?;
+    let mut contents = vec![found.image.clone()];
+    if args.save_stats.is_some() {
+        contents.push(Stats::new(&quantizer, &options, &found)?.json()?.into_bytes());
+    }
+    outputs.write(&contents)?;
+    progress.begin("measuring the error");
+    print(&learned(&shares))?;
+    if let Some(statistics) = quantizer.method().action_statistics() {
+        print(&quantized::scores(&source.graph, statistics, &found))?;
+    }
+    let search = found.search.as_ref().map_or(String::new(), |search| quantized::search(search) + "\n");
+    let sampled = quantizer.method().sampled().map_or(String::new(), quantized::sampled);
+    let learned = sampled + &found.learning.as_ref().map_or(String::new(), quantized::learning);
+    let time = found.time.as_ref().map_or(String::new(), time::sentence);
+    let (parameters, bytes) = (source.parameters, found.image.len());
+    let f32_bytes = 4 * parameters;
+    print(&format!(
+        "{search}{}{learned}\n{}: {bytes} bytes. The policy's {parameters} parameters take {f32_bytes} bytes in f32 ({:.1}x) and {} in \
+         bf16 ({:.1}x).\n{time}Took {:.1} s.\n",
+        quantized::matrices(&found),
+        args.out.display(),
+        f32_bytes as f64 / bytes as f64,
+        f32_bytes / 2,
+        f32_bytes as f64 / 2.0 / bytes as f64,
+        started.elapsed().as_secs_f64(),
+    ))?;
+    note(notes::unused_budget(&found, &options));
+    let buffer = found.buffer();
+    let image = buffer.image(&args.out)?;
+    match check::check(&source, image, &recordings) {
+        Ok(Some(check)) => {
+            print(&format!("\n{}", notes::errors(&check)))?;
+            note(notes::overfit_warning(&check));
+            note(notes::error_warning(&check));
+        }
+        Ok(None) => note(["the error is not known: there is no recording to compare with (--calib FILE)".to_owned()]),
+        // The image is written, and nothing is wrong with it.
+        Err(error) => note([format!("the error is not known: {error:#}")]),
+    }
+    let of_image = |path: &PathBuf| driven_by(path).is_ok_and(|crc| crc == Some(image.crc()));
+    let driven: Vec<PathBuf> = shares.into_iter().map(|share| share.path).filter(of_image).collect();
+    if !driven.is_empty() {
+        print(&notes::own_path(&own::own_path(image, &driven, Some(&source))?))?;
+    }
+    Ok(())
+}
+
+/// What the command line asks for, as far as it says; the method also depends on whether there is a recording.
+fn options(args: &QuantizeArgs, has_calib: bool) -> Result<Options> {
+    let method = match args.method {
+        Some(method) => method.into(),
+        None if !has_calib => Method::Rtn,
+        None => Method::Best,
+    };
+    let method = args.actquant.of(&[method])?[0];
+    let limits = [
+        args.bpw.map(Budget::BitsPerWeight),
+        args.flash.map(Budget::ImageBytes),
+        args.max_nmse.map(Budget::MaxNmse),
+        args.ms.map(|milliseconds| Budget::Time(TimeLimit { milliseconds, clock_hz: args.clock })),
+    ];
+    let width = args.bits.unwrap_or(Width::W3);
+    let protected = args.protect.iter().map(|name| (name.clone(), Width::W8));
+    Ok(Options {
+        group: args.group.unwrap_or(method.default_group()),
+        activations: match args.activations {
+            Some(ActivationArg::Int8) => Activations::Int8,
+            Some(ActivationArg::Int16) => Activations::Int16,
+            None => Activations::Auto,
+        },
+        steps: args.learn.steps,
+        minutes: args.learn.minutes,
+        relative: args.learn.relative,
+        seed: args.run.seed,
+        forced: args.width.iter().cloned().chain(protected).collect(),
+        ..Options::new(method, limits.into_iter().flatten().next().unwrap_or(Budget::Width(width)))
+    })
+}

@@ -1,0 +1,65 @@
+//! `actq sweep`
+
+use std::path::{Path, PathBuf};
+
+use actq::data::{Learned, Recording, Recordings, Sizes, files_of};
+use actq::methods::Method;
+use actq::pipeline::sweep::{self, SweepPlan};
+use anyhow::{Result, ensure};
+
+use crate::args::SweepArgs;
+use crate::importers::{load, policy_files};
+use crate::report::{self, notes};
+use crate::terminal::{Progress, note, print, reserve};
+use crate::threads::start_threads;
+
+/// Quantizes policies by several methods to several budgets and compares the errors.
+pub(crate) fn run(args: &SweepArgs) -> Result<()> {
+    let folders = args.policy_dirs.iter().flat_map(|dir| policy_files(dir));
+    let calib = files_of(&args.calib)?;
+    let inputs: Vec<PathBuf> = folders.chain(calib.iter().chain(&args.heldout).cloned()).collect();
+    let outputs: Vec<&Path> = [&args.svg, &args.json].into_iter().filter_map(|path| path.as_deref()).collect();
+    let outputs = reserve(&outputs, &inputs)?;
+    let progress = Progress::new(args.run.quiet, "reading")?;
+    start_threads(args.run.threads)?;
+    let methods: Vec<Method> = args.methods.iter().map(|&method| method.into()).collect();
+    let methods = args.actquant.of(&methods)?;
+    let policies = args.policy_dirs.iter().map(|dir| load(dir)).collect::<Result<Vec<_>>>()?;
+    let named = !calib.is_empty() || args.heldout.is_some();
+    ensure!(policies.len() == 1 || !named, "--calib and --heldout go with one policy");
+    let mut sweeps = Vec::new();
+    for (p, policy) in policies.iter().enumerate() {
+        let (dir, sizes) = (Some(policy.dir.as_path()), Sizes::of(policy));
+        let calib = Learned::load(policy, &calib)?.map(|learned| learned.dataset);
+        let heldout = Recording::Heldout.require(dir, args.heldout.as_deref(), sizes, "actq sweep")?;
+        let recordings = Recordings { calib, heldout: Some(heldout) };
+        note(notes::of_recordings(&recordings));
+        let plan = SweepPlan {
+            policy,
+            recordings,
+            methods: &methods,
+            budgets: &args.bpw,
+            steps: args.learn.steps,
+            minutes: args.learn.minutes,
+            relative: args.learn.relative,
+            seed: args.run.seed,
+        };
+        sweeps.push(sweep::run(plan, |work, share| {
+            progress.set(&format!("{}: {work}", policy.name), (p as f64 + share) / policies.len() as f64);
+        })?);
+    }
+    drop(progress);
+    let mut knees = String::new();
+    for sweep in &sweeps {
+        if let Some(knee) = &sweep.knee {
+            knees += &format!(
+                "\n* knee of {}: {} at {:.3} bits per weight, NMSE {:.2e}",
+                sweep.policy, knee.method, knee.bpw, knee.nmse
+            );
+        }
+    }
+    print(&format!("{}\n{knees}\n", report::sweep::table(&sweeps)))?;
+    let (svg, json) = (report::sweep::svg(&sweeps), serde_json::to_string_pretty(&sweeps)? + "\n");
+    let contents = [args.svg.is_some().then_some(svg), args.json.is_some().then_some(json)];
+    outputs.write(&contents.into_iter().flatten().collect::<Vec<_>>())
+}

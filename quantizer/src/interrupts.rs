@@ -1,0 +1,38 @@
+//! SIGINT, SIGTERM and SIGHUP end the command at once and leave nothing unfinished.
+
+use std::io::{self, IsTerminal as _, Write as _};
+use std::{fs, process, thread};
+
+use anyhow::{Context as _, Result};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
+
+use crate::outputs::unfinished::Discard;
+use crate::{group, terminal};
+
+/// Waits for the signals in a thread of its own. One that the parent process ignores stays ignored, as under nohup.
+pub(crate) fn watch() -> Result<()> {
+    let ignored = ignored();
+    let caught = [SIGHUP, SIGINT, SIGTERM].into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
+    let mut signals = Signals::new(caught).context("cannot catch signals")?;
+    thread::spawn(move || signals.forever().next().map(end));
+    Ok(())
+}
+
+/// The set of signals that are ignored, of which Linux tells; signal 1 is bit 0.
+fn ignored() -> u64 {
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let set = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    set.and_then(|set| u64::from_str_radix(set.trim(), 16).ok()).unwrap_or(0)
+}
+
+fn end(signal: i32) {
+    // From here on the main thread neither writes nor ends.
+    let discard = Discard::begin();
+    group::stop(signal);
+    let said = if discard.remove() { ": no output was written" } else { "" };
+    // Where a terminal has shown ^C, the line goes on.
+    let line = if !terminal::clear() && io::stderr().is_terminal() { "\n" } else { "" };
+    drop(writeln!(io::stderr(), "{line}actq: interrupted{said}"));
+    process::exit(128 + signal);
+}

@@ -1,0 +1,4 @@
+//! Files that the command writes.
+
+pub mod files;
+pub mod unfinished;

@@ -1,0 +1,186 @@
+//! What the command shows: results, notes and progress.
+
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use actq::text::printable;
+use anyhow::{Context as _, Result};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::outputs::files::{self, Outputs};
+use crate::report::progress::{Cadence, Work};
+
+/// Steps of the progress bar; the work reports the share done.
+const STEPS: u64 = 1000;
+/// Between two drawings of a bar whose work reports nothing.
+const REDRAW: Duration = Duration::from_secs(1);
+
+/// `true` if an output of the command goes to standard output.
+static STDOUT_IS_TAKEN: AtomicBool = AtomicBool::new(false);
+/// The progress of the work that is being done, for whoever else writes to the terminal.
+static SHOWN: Mutex<Option<Shown>> = Mutex::new(None);
+
+/// Reserves a command's outputs ([`files::reserve`]). If one of them is standard output, the report goes to standard
+/// error.
+pub(crate) fn reserve(outputs: &[&Path], inputs: &[PathBuf]) -> Result<Outputs> {
+    let outputs = files::reserve(outputs, inputs)?;
+    STDOUT_IS_TAKEN.store(outputs.include_stream(Path::new("/dev/stdout")), Ordering::Relaxed);
+    Ok(outputs)
+}
+
+/// Notes go to standard error, so that the report stays as it is.
+pub(crate) fn note(notes: impl IntoIterator<Item = String>) {
+    // That nobody reads them is no error.
+    notes.into_iter().for_each(|note| drop(beside_bar(|| writeln!(io::stderr(), "note: {}", printable(&note)))));
+}
+
+/// Prints; that a reader has gone away (as `head` does) is no error.
+pub(crate) fn print(text: &str) -> Result<()> {
+    let lines: Vec<_> = text.split('\n').map(printable).collect();
+    let text = lines.join("\n");
+    let written = beside_bar(|| match STDOUT_IS_TAKEN.load(Ordering::Relaxed) {
+        true => io::stderr().write_all(text.as_bytes()),
+        false => io::stdout().write_all(text.as_bytes()),
+    });
+    match written {
+        Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        other => other.context("standard output cannot be written"),
+    }
+}
+
+/// Progress as it is shown: by the bar, or else by lines.
+struct Shown {
+    begun: Instant,
+    cadence: Cadence,
+    work: Work,
+    bar: Option<ProgressBar>,
+}
+
+fn shown() -> MutexGuard<'static, Option<Shown>> {
+    SHOWN.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Writes without the bar in between.
+fn beside_bar<T>(write: impl FnOnce() -> T) -> T {
+    let bar = shown().as_ref().and_then(|shown| shown.bar.clone());
+    match bar {
+        Some(bar) => bar.suspend(write),
+        None => write(),
+    }
+}
+
+impl Shown {
+    fn update(&self) {
+        if let Some(bar) = &self.bar {
+            bar.set_message(self.work.name.clone());
+            bar.set_position((self.work.share.unwrap_or_default() * STEPS as f64) as u64);
+        }
+    }
+
+    /// Time until [`Self::tick`] has something to do.
+    fn wait(&self) -> Duration {
+        if self.bar.is_some() { REDRAW } else { self.cadence.wait(self.begun.elapsed()) }
+    }
+
+    fn tick(&mut self) {
+        if let Some(bar) = &self.bar {
+            bar.tick();
+        } else if let Some(line) = self.cadence.line(self.begun.elapsed(), &self.work) {
+            drop(writeln!(io::stderr(), "{line}"));
+        }
+    }
+}
+
+/// A bar, if standard error is a terminal.
+fn bar() -> Result<Option<ProgressBar>> {
+    // Within 80 columns: a bar that wraps flickers.
+    let style = ProgressStyle::with_template("{msg:30} {bar:30} {percent:>3}%, {eta} left").context("progress bar")?;
+    let bar = ProgressBar::new(STEPS).with_style(style);
+    Ok((!bar.is_hidden()).then_some(bar))
+}
+
+/// Shows how far long work is while the value lives: by a bar on a terminal, else by a line every 10 s.
+pub(crate) struct Progress {
+    /// Its end is that of the thread that draws what the work does not report.
+    _drawn: Option<Sender<()>>,
+}
+
+impl Progress {
+    /// Begins with this work; shows nothing if `quiet`.
+    pub(crate) fn new(quiet: bool, work: &str) -> Result<Self> {
+        if quiet {
+            return Ok(Self { _drawn: None });
+        }
+        let work = Work { name: work.to_owned(), share: None };
+        *shown() = Some(Shown { begun: Instant::now(), cadence: Cadence::default(), work, bar: bar()? });
+        let (sender, receiver) = channel::<()>();
+        thread::spawn(move || {
+            loop {
+                // Not as the condition of the loop, which would keep the lock.
+                let Some(wait) = shown().as_ref().map(Shown::wait) else { return };
+                if receiver.recv_timeout(wait) != Err(RecvTimeoutError::Timeout) {
+                    return;
+                }
+                shown().iter_mut().for_each(Shown::tick);
+            }
+        });
+        Ok(Self { _drawn: Some(sender) })
+    }
+
+    /// Begins work of which it is not known how far it is.
+    pub(crate) fn begin(&self, work: &str) {
+        self.change(|shown| shown.work = Work { name: work.to_owned(), share: None });
+    }
+
+    /// The work that is being done, and the share of it that is done.
+    pub(crate) fn set(&self, work: &str, share: f64) {
+        self.change(|shown| shown.work = Work { name: work.to_owned(), share: Some(share) });
+    }
+
+    /// The name of the work that is being done.
+    pub(crate) fn set_work(&self, work: &str) {
+        self.change(|shown| work.clone_into(&mut shown.work.name));
+    }
+
+    /// The share of the work that is done.
+    pub(crate) fn set_share(&self, share: f64) {
+        self.change(|shown| shown.work.share = Some(share));
+    }
+
+    /// Does work that writes to the terminal as it likes.
+    pub(crate) fn without_bar<T>(&self, work: impl FnOnce() -> T) -> T {
+        let bar = shown().as_mut().and_then(|shown| shown.bar.take());
+        bar.iter().for_each(ProgressBar::finish_and_clear);
+        let done = work();
+        self.change(|shown| {
+            bar.iter().for_each(ProgressBar::reset);
+            shown.bar = bar;
+        });
+        done
+    }
+
+    fn change(&self, change: impl FnOnce(&mut Shown)) {
+        if let Some(shown) = shown().as_mut() {
+            change(shown);
+            shown.update();
+        }
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        clear();
+    }
+}
+
+/// Ends the progress that is shown. Returns `true` if there was a bar.
+pub(crate) fn clear() -> bool {
+    let bar = shown().take().and_then(|shown| shown.bar);
+    bar.iter().for_each(ProgressBar::finish_and_clear);
+    bar.is_some()
+}
