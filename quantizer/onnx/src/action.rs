@@ -2,8 +2,8 @@
 
 use actq::import::contract::{Array, JsonContract};
 
-use super::bounds::bounds;
-use super::expr::{Expr, Exprs, Id};
+use crate::values::bounds::bounds;
+use crate::values::expr::{Expr, Exprs, Id};
 
 /// Scale, offset and limits of every value, as the contract applies them.
 struct Ends {
@@ -14,7 +14,7 @@ struct Ends {
 }
 
 /// The value before what the contract of `act_len` values does, and the contract.
-pub(super) fn contract(exprs: &Exprs, root: Id, act_len: usize) -> (Id, Option<JsonContract>) {
+pub(crate) fn contract(exprs: &Exprs, root: Id, act_len: usize) -> (Id, Option<JsonContract>) {
     let n = exprs.len_of(root);
     let mut ends = Ends {
         scale: vec![1.0; n],
@@ -53,7 +53,7 @@ pub(super) fn contract(exprs: &Exprs, root: Id, act_len: usize) -> (Id, Option<J
 
 /// Gives each action that the contract does not limit the bounds of its last operation as limits, if it has any; the
 /// contract then, and how many actions these are. `at` is the value before what the contract does.
-pub(super) fn bounded(
+pub(crate) fn bounded(
     exprs: &Exprs,
     at: Id,
     contract: Option<JsonContract>,

@@ -6,13 +6,13 @@ use std::sync::Arc;
 use actq::error::{Context as _, Result, bail, ensure};
 use actq::import::json::{Input, JsonOp};
 
-use super::expr::{Cell, Expr, Exprs, Id, Matrix, Run, Unary};
+use crate::values::expr::{Cell, Expr, Exprs, Id, Matrix, Run, Unary};
 
 /// A tensor of policy.safetensors.
-pub(super) struct Weight {
-    pub(super) name: String,
-    pub(super) shape: Vec<usize>,
-    pub(super) data: Vec<f32>,
+pub(crate) struct Weight {
+    pub(crate) name: String,
+    pub(crate) shape: Vec<usize>,
+    pub(crate) data: Vec<f32>,
 }
 
 /// A run of elements of what an op gives; op 0 is the observation, op `i + 1` the op of this index.
@@ -28,9 +28,9 @@ struct Part {
 const MOST_COPIES: usize = 64;
 
 /// Ops and tensors so far.
-pub(super) struct Lowered {
-    pub(super) ops: Vec<JsonOp>,
-    pub(super) weights: Vec<Weight>,
+pub(crate) struct Lowered {
+    pub(crate) ops: Vec<JsonOp>,
+    pub(crate) weights: Vec<Weight>,
     /// What each op reads.
     reads: Vec<(Vec<Part>, Option<usize>)>,
     /// Length of the observation, then of each op's output.
@@ -47,7 +47,7 @@ pub(super) struct Lowered {
 
 /// Lowers a value. `offsets` says where the elements of each graph input stand in the observation, of `obs_len` values.
 /// An error names the expression that has no op.
-pub(super) fn lower(
+pub(crate) fn lower(
     exprs: &Exprs,
     root: Id,
     offsets: &HashMap<usize, usize>,

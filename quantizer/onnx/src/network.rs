@@ -14,15 +14,15 @@ use prost::bytes::Bytes;
 use safetensors::Dtype;
 use safetensors::tensor::TensorView;
 
-use super::action;
-use super::call::RANDOM;
-use super::expr::{Expr, Exprs, Id};
-use super::follow::{Follower, INTEGERS};
-use super::lower::{Lowered, lower};
-use super::model::{Graph, Model, Port};
-use super::simplify::simplify;
-use super::states::{Cells, Output, is_state, refuse_lost_states};
-use super::tensor::{Element, Tensor};
+use crate::action;
+use crate::file::model::{Graph, Model, Port};
+use crate::lower::{Lowered, lower};
+use crate::nodes::call::RANDOM;
+use crate::nodes::follow::{Follower, INTEGERS};
+use crate::patterns::simplify::simplify;
+use crate::states::{Cells, Output, is_state, refuse_lost_states};
+use crate::values::expr::{Expr, Exprs, Id};
+use crate::values::tensor::{Element, Tensor};
 
 /// The most names of a message.
 const MOST_LISTED: usize = 20;

@@ -5,29 +5,29 @@ use std::collections::HashMap;
 use actq::error::{Context as _, Result, bail, ensure};
 use actq::text::printable;
 
-use super::expr::{Expr, Exprs, Id, Run};
-use super::model::Model;
-use super::tensor::{Element, Tensor};
+use crate::file::model::Model;
+use crate::values::expr::{Expr, Exprs, Id, Run};
+use crate::values::tensor::{Element, Tensor};
 
 /// An output of the graph, as far as it can be followed.
-pub(super) struct Output {
-    pub(super) name: String,
-    pub(super) value: Tensor,
+pub(crate) struct Output {
+    pub(crate) name: String,
+    pub(crate) value: Tensor,
 }
 
 /// State inputs with the outputs of their next values, by index.
-pub(super) type Pairs = Vec<(usize, usize)>;
+pub(crate) type Pairs = Vec<(usize, usize)>;
 
 /// Cells that were taken apart: what their states after the step become.
 #[derive(Default)]
-pub(super) struct Cells {
-    pub(super) instead: HashMap<Id, Id>,
+pub(crate) struct Cells {
+    pub(crate) instead: HashMap<Id, Id>,
 }
 
 impl Cells {
     /// Finds the cells whose next states are among the outputs. `named` are the pairs that the caller knows, of input
     /// and output.
-    pub(super) fn find(model: &Model, exprs: &mut Exprs, outputs: &[Output], named: &[(String, String)]) -> Self {
+    pub(crate) fn find(model: &Model, exprs: &mut Exprs, outputs: &[Output], named: &[(String, String)]) -> Self {
         let mut found = Self::default();
         for output in outputs {
             let elements = output.value.elements();
@@ -66,12 +66,12 @@ impl Cells {
     }
 
     /// The elements of a value.
-    pub(super) fn elements(&self, value: &Tensor) -> Vec<Element> {
+    pub(crate) fn elements(&self, value: &Tensor) -> Vec<Element> {
         value.elements().into_iter().map(|element| self.element(element)).collect()
     }
 
     /// For every cell in use, which output carries its state on. Refuses a state that nothing carries.
-    pub(super) fn pairs(&self, model: &Model, exprs: &Exprs, live: &[Id], outputs: &[Output]) -> Result<Pairs> {
+    pub(crate) fn pairs(&self, model: &Model, exprs: &Exprs, live: &[Id], outputs: &[Output]) -> Result<Pairs> {
         let mut pairs = Pairs::new();
         let cell = |id: Id| if let Expr::Cell(cell) = exprs.get(id) { Some((id, cell)) } else { None };
         for (h, cell) in live.iter().filter_map(|&id| cell(id)) {
@@ -157,7 +157,7 @@ fn stem(name: &str) -> String {
 }
 
 /// Refuses what looks like a state and is none that a policy can carry: it would be observed, and never change.
-pub(super) fn refuse_lost_states(
+pub(crate) fn refuse_lost_states(
     model: &Model,
     live_inputs: &[usize],
     pairs: &Pairs,
@@ -197,7 +197,7 @@ pub(super) fn refuse_lost_states(
 }
 
 /// Whether an output is nothing but states of cells.
-pub(super) fn is_state(cells: &Cells, exprs: &Exprs, value: &Tensor) -> bool {
+pub(crate) fn is_state(cells: &Cells, exprs: &Exprs, value: &Tensor) -> bool {
     cells.elements(value).iter().all(|e| match *e {
         Element::Of(id, _) => matches!(exprs.get(id), Expr::CellState(_) | Expr::Cell(_)),
         Element::Known(_) => false,

@@ -1,0 +1,139 @@
+//! Comparisons of values with numbers, and choices by them where they make up an activation.
+
+use actq::error::{Context as _, Result};
+
+use crate::nodes::call::Call;
+use crate::nodes::moves::expanded;
+use crate::nodes::places::broadcast;
+use crate::values::elements::{apply, value};
+use crate::values::expr::{Expr, Exprs, Unary};
+use crate::values::tensor::{Data, Element, Tensor};
+
+/// A comparison of a value with one number, as whether something is above one.
+pub(crate) fn above(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> {
+    let greater = call.op().starts_with("Greater");
+    let (x, y) = (call.input(0)?, call.input(1)?);
+    let (compared, limit, sign) = match (x.reals(), y.reals()) {
+        (None, Some(y)) => (x, y, if greater { 1.0 } else { -1.0 }),
+        (Some(x), None) => (y, x, if greater { -1.0 } else { 1.0 }),
+        _ => return Ok(None),
+    };
+    // A limit that repeats the value along an axis would change its shape.
+    let (Some(limit), true) =
+        (crate::values::compare::uniform(&limit), broadcast(&x.shape, &y.shape)? == compared.shape)
+    else {
+        return Ok(None);
+    };
+    let elements = compared.elements();
+    let Some(values) = elements.iter().map(value).collect::<Option<Vec<_>>>() else { return Ok(None) };
+    let conditions = apply(exprs, &values, &|exprs, x| {
+        let x = exprs.scaled(x, sign, 0.0);
+        exprs.unary(Unary::Above(sign * limit), x)
+    });
+    Ok(Some(Tensor::of_elements(compared.shape.clone(), conditions)))
+}
+
+/// Whether elements are not numbers, or infinite. Those of values never are: where the network gives such a one, the
+/// image gives no action.
+pub(crate) fn not_finite(call: &Call<'_>) -> Result<Tensor> {
+    let found = |v: f64| match call.op() {
+        "IsNaN" => v.is_nan(),
+        _ => v.is_infinite() && call.int(if v > 0.0 { "detect_positive" } else { "detect_negative" }) != Some(0),
+    };
+    let one = |element: &Element| if let Element::Known(v) = element { found(*v).into() } else { 0 };
+    let x = call.input(0)?;
+    Ok(Tensor::new(x.shape.clone(), Data::Int(x.elements().iter().map(one).collect())))
+}
+
+/// Whether a value is equal to itself, which asks whether it is a number.
+pub(crate) fn itself(call: &Call<'_>) -> Result<Option<Tensor>> {
+    let (x, y) = (call.input(0)?, call.input(1)?);
+    let same = x.shape == y.shape && x.elements() == y.elements();
+    Ok(same.then(|| Tensor::new(x.shape.clone(), Data::Int(vec![1; x.len()]))))
+}
+
+/// `And` and `Or` where one side of every element is known.
+pub(crate) fn both(call: &Call<'_>, most: usize) -> Result<Option<Tensor>> {
+    let (x, y) = (call.input(0)?, call.input(1)?);
+    let shape = broadcast(&x.shape, &y.shape)?;
+    // What decides alone: false of And, true of Or.
+    let decides = f64::from(u8::from(call.op() == "Or"));
+    let one = |(x, y): (Element, Element)| match (x, y) {
+        (Element::Known(v), other) | (other, Element::Known(v)) => {
+            let truth = f64::from(u8::from(v != 0.0));
+            Some(if truth == decides { Element::Known(truth) } else { other })
+        }
+        _ => None,
+    };
+    let (x, y) = (expanded(x, &shape, most)?.elements(), expanded(y, &shape, most)?.elements());
+    let all = x.into_iter().zip(y).map(one).collect::<Option<Vec<_>>>();
+    Ok(all.map(|all| truths(shape, all)))
+}
+
+/// A value as truth values, where it holds some.
+pub(crate) fn as_truth(input: &Tensor, exprs: &Exprs) -> Option<Tensor> {
+    let is_truth = |e: &Element| match *e {
+        Element::Known(v) => v == 0.0 || v == 1.0,
+        Element::Of(id, _) => matches!(exprs.get(id), Expr::Unary(Unary::Above(_), _)),
+    };
+    let elements = input.elements();
+    elements.iter().all(is_truth).then(|| truths(input.shape.clone(), elements))
+}
+
+/// Truth values, as integers where all are known.
+fn truths(shape: Vec<usize>, elements: Vec<Element>) -> Tensor {
+    let tensor = Tensor::of_elements(shape, elements);
+    match tensor.data {
+        Data::Real(values) => Tensor::new(tensor.shape, Data::Int(values.into_iter().map(|v| v as i64).collect())),
+        _ => tensor,
+    }
+}
+
+/// Not above a limit: the negative value is above the negative limit, or at it, where the choices that are taken agree.
+pub(crate) fn not(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> {
+    let input = call.input(0)?;
+    let Some(values) = input.elements().iter().map(value).collect::<Option<Vec<_>>>() else { return Ok(None) };
+    let condition = exprs.vector(&values);
+    let &Expr::Unary(Unary::Above(limit), x) = exprs.get(condition) else { return Ok(None) };
+    let negative = exprs.scaled(x, -1.0, 0.0);
+    let below = exprs.unary(Unary::Above(-limit), negative);
+    Ok(Some(Tensor::of_elements(input.shape.clone(), exprs.elements(below))))
+}
+
+/// A choice by a value of the network, where it makes up an activation.
+pub(crate) fn choice(call: &Call<'_>, exprs: &mut Exprs, most: usize) -> Result<Tensor> {
+    let refused =
+        || format!("chooses by a value of the network in a way that no activation does; {}", crate::nodes::call::HELP,);
+    let (condition, x, y) = (call.input(0)?, call.input(1)?, call.input(2)?);
+    let shape = broadcast(&broadcast(&condition.shape, &x.shape)?, &y.shape)?;
+    let [condition, x, y] = [condition, x, y].map(|tensor| expanded(tensor, &shape, most).map(|t| t.elements()));
+    let (condition, x, y) = (condition?, x?, y?);
+    let values = |elements: &[Element]| elements.iter().map(value).collect::<Option<Vec<_>>>();
+    let uniform = |elements: &[Element]| match elements.first()? {
+        Element::Known(v) => elements.iter().all(|e| e == &elements[0]).then_some(*v),
+        Element::Of(..) => None,
+    };
+    let condition = exprs.vector(&values(&condition).with_context(refused)?);
+    let chosen = match (values(&x), values(&y)) {
+        (Some(x), Some(y)) => {
+            let (x, y) = (exprs.vector(&x), exprs.vector(&y));
+            // Where it compares the negative, the choices are the other way round.
+            exprs.select(condition, x, y).or_else(|| {
+                let &Expr::Unary(Unary::Above(limit), of) = exprs.get(condition) else { return None };
+                let negative = exprs.scaled(of, -1.0, 0.0);
+                let other = exprs.unary(Unary::Above(-limit), negative);
+                exprs.select(other, y, x)
+            })
+        }
+        (Some(open), None) => uniform(&y).and_then(|other| {
+            let open = exprs.vector(&open);
+            exprs.select_constant(condition, open, other, true)
+        }),
+        (None, Some(open)) => uniform(&x).and_then(|other| {
+            let open = exprs.vector(&open);
+            exprs.select_constant(condition, open, other, false)
+        }),
+        _ => None,
+    };
+    Ok(Tensor::of_elements(shape, exprs.elements(chosen.with_context(refused)?)))
+}

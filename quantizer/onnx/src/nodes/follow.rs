@@ -1,0 +1,295 @@
+//! Follows a graph from its inputs to the values that are asked for, node by node.
+
+use std::collections::{BTreeSet, HashMap, HashSet};
+use std::rc::Rc;
+
+use actq::error::{Context as _, Result, bail, ensure};
+use actq::text::printable;
+
+use crate::file::model::{Graph, Model, Node, Port, kind_name};
+use crate::nodes::call::Call;
+use crate::nodes::cells;
+use crate::nodes::conditions;
+use crate::nodes::convolutions;
+use crate::nodes::einsum;
+use crate::nodes::integers;
+use crate::nodes::known;
+use crate::nodes::moves;
+use crate::nodes::pointwise;
+use crate::nodes::pools;
+use crate::nodes::products;
+use crate::nodes::reductions;
+use crate::values::expr::{Expr, Exprs};
+use crate::values::tensor::{Data, Element, Tensor, count};
+
+/// ONNX's type of truth values.
+const TRUTH: i64 = 9;
+
+/// ONNX's int32 and int64.
+pub(crate) const INTEGERS: [i32; 2] = [6, 7];
+
+/// Graphs and functions within each other.
+const MOST_DEPTH: usize = 16;
+
+/// What has a value so far, by name.
+type Scope = HashMap<String, Rc<Tensor>>;
+
+/// A file that is followed.
+pub(crate) struct Follower<'m> {
+    pub(crate) model: &'m Model,
+    pub(crate) exprs: Exprs,
+    /// Elements that may still come up.
+    pub(crate) budget: usize,
+    /// Index of each graph input that was read.
+    pub(crate) read: Vec<usize>,
+}
+
+/// The elements that come up in any file, beside a few for each of its tensors.
+const SOME: usize = 1 << 22;
+/// Elements of what is computed, for each of a tensor in the file.
+const PER_ELEMENT: usize = 8;
+
+impl<'m> Follower<'m> {
+    pub(crate) fn new(model: &'m Model) -> Self {
+        Self { model, exprs: Exprs::default(), budget: SOME, read: Vec::new() }
+    }
+
+    /// The value of this name.
+    pub(crate) fn value(&mut self, name: &str) -> Result<Tensor> {
+        let mut scope = Scope::new();
+        let model = self.model;
+        self.run(&model.graph, &mut scope, &[name.to_owned()], MOST_DEPTH)?;
+        let value = scope.get(name).with_context(|| format!("nothing gives the value {:?}", printable(name)))?;
+        Ok(Tensor::clone(value))
+    }
+
+    /// Follows what `targets` need.
+    fn run(&mut self, graph: &'_ Graph, scope: &mut Scope, targets: &[String], depth: usize) -> Result<()> {
+        ensure!(depth > 0, "more than {MOST_DEPTH} graphs or functions stand within each other");
+        let needed = needed(graph, scope, targets)?;
+        let top = std::ptr::eq(graph, &self.model.graph);
+        for name in &needed.names {
+            if let Some(bytes) = graph.initializers.get(name) {
+                let tensor = self.model.tensor(bytes)?;
+                self.budget = self.budget.saturating_add(PER_ELEMENT * tensor.len());
+                scope.insert(name.clone(), Rc::new(tensor));
+            }
+        }
+        // In the file's order, which the observation has: what is sorted by its values comes out the same every time.
+        for (i, port) in graph.inputs.iter().enumerate().filter(|_| top) {
+            if needed.names.contains(&port.name) && !scope.contains_key(&port.name) {
+                let tensor = self.input(i, port)?;
+                scope.insert(port.name.clone(), Rc::new(tensor));
+            }
+        }
+        for (i, node) in graph.nodes.iter().enumerate().filter(|(i, _)| needed.nodes.contains(i)) {
+            if top {
+                self.exprs.node = i;
+            }
+            self.node(node, scope, depth).with_context(|| {
+                let op = if node.domain.is_empty() {
+                    node.op.clone()
+                } else {
+                    format!("{}.{}", printable(&node.domain), node.op)
+                };
+                format!("node {i} {:?} ({op})", node.name)
+            })?;
+        }
+        Ok(())
+    }
+
+    fn node(&mut self, node: &Node, scope: &mut Scope, depth: usize) -> Result<()> {
+        let input = |name: &String| match name.as_str() {
+            "" => Ok(None),
+            name => match scope.get(name) {
+                Some(tensor) => Ok(Some(Rc::clone(tensor))),
+                None => bail!(
+                    "reads {:?} before anything gives it: the graph has a circle, or its nodes are not in order",
+                    printable(name)
+                ),
+            },
+        };
+        let inputs = node.inputs.iter().map(input).collect::<Result<Vec<_>>>()?;
+        let key = [node.domain.clone(), node.op.clone(), node.overload.clone()];
+        let outputs = if let Some(function) = self.model.functions.get(&key) {
+            let mut inner: Scope = Scope::new();
+            ensure!(inputs.len() <= function.inputs.len(), "the function takes {} inputs", function.inputs.len());
+            for (name, tensor) in function.inputs.iter().zip(inputs) {
+                inner.extend(tensor.map(|tensor| (name.clone(), tensor)));
+            }
+            let mut graph = function.graph.clone();
+            for inside in &mut graph.nodes {
+                for attribute in inside.attributes.values_mut() {
+                    let Some(name) = &attribute.ref_attr_name else { continue };
+                    let given = node.attributes.get(name).or_else(|| function.defaults.get(name));
+                    *attribute = given.cloned().unwrap_or_default();
+                }
+                // What neither the caller nor the function says has the operator's own default.
+                inside.attributes.retain(|_, attribute| attribute.name.is_some());
+            }
+            self.run(&graph, &mut inner, &function.outputs, depth - 1)?;
+            function.outputs.iter().map(|name| inner.get(name).cloned()).collect()
+        } else if node.op == "If" {
+            let condition = inputs.first().cloned().flatten().context("has no condition")?;
+            let Some(&[chosen]) = condition.integers() else {
+                bail!("its condition depends on the observation; export one way only");
+            };
+            let branch = if chosen != 0 { "then_branch" } else { "else_branch" };
+            let bytes = node.attributes.get(branch).and_then(|a| a.g.as_ref()).context("has no branch")?;
+            let graph = Graph::parse(bytes)?;
+            let mut inner = scope.clone();
+            let names: Vec<String> = graph.outputs.iter().map(|port| port.name.clone()).collect();
+            self.run(&graph, &mut inner, &names, depth - 1)?;
+            names.iter().map(|name| inner.get(name).cloned()).collect()
+        } else {
+            let inputs: Vec<Option<&Tensor>> = inputs.iter().map(Option::as_deref).collect();
+            let call = Call { node, inputs: &inputs };
+            self.own(&call)?.into_iter().map(|tensor| Some(Rc::new(tensor))).collect::<Vec<_>>()
+        };
+        for (name, tensor) in node.outputs.iter().zip(outputs) {
+            if !name.is_empty()
+                && let Some(tensor) = tensor
+            {
+                self.budget = self
+                    .budget
+                    .checked_sub(tensor.len())
+                    .context("gives more values than a policy of this size can have")?;
+                let again = scope.insert(name.clone(), tensor).is_some();
+                ensure!(!again, "gives {:?}, which has a value already", printable(name));
+            }
+        }
+        Ok(())
+    }
+
+    /// An operation of ONNX's own.
+    fn own(&mut self, call: &Call<'_>) -> Result<Vec<Tensor>> {
+        let own =
+            ["", "ai.onnx", "com.microsoft", "pkg.onnxscript.torch_lib.common"].contains(&call.node.domain.as_str());
+        ensure!(own, "operations of this domain are not known; {}", crate::nodes::call::HELP);
+        let most = self.budget;
+        if let Some(constant) = call.constant()? {
+            return Ok(vec![self.model.tensor(&constant)?]);
+        }
+        if call.op() == "ConstantOfShape" {
+            let fill = match call.node.attributes.get("value").and_then(|a| a.t.clone()) {
+                Some(bytes) => self.model.tensor(&bytes)?,
+                None => Tensor::new(vec![1], Data::Real(vec![0.0])),
+            };
+            return Ok(vec![moves::constant_of_shape(call, &fill.data, most)?]);
+        }
+        if call.op() == "Cast"
+            && call.int("to") == Some(TRUTH)
+            && let Some(truth) = conditions::as_truth(call.input(0)?, &self.exprs)
+        {
+            return Ok(vec![truth]);
+        }
+        if let Some(output) = integers::cast(call, &mut self.exprs)? {
+            return Ok(vec![output]);
+        }
+        if let Some(outputs) = moves::run(call, most)? {
+            return Ok(outputs);
+        }
+        if let Some(output) = known::run(call, most)? {
+            return Ok(vec![output]);
+        }
+        if let Some(output) = pointwise::run(call, &mut self.exprs, most)? {
+            return Ok(vec![output]);
+        }
+        let exprs = &mut self.exprs;
+        if let Some(output) = products::run(call, exprs, &mut self.budget)? {
+            return Ok(vec![output]);
+        }
+        if let Some(output) = einsum::run(call, exprs, &mut self.budget)? {
+            return Ok(vec![output]);
+        }
+        if let Some(output) = convolutions::run(call, exprs, &mut self.budget)? {
+            return Ok(vec![output]);
+        }
+        if let Some(output) = pools::run(call, exprs, most)? {
+            return Ok(vec![output]);
+        }
+        if let Some(output) = reductions::run(call, exprs)? {
+            return Ok(vec![output]);
+        }
+        if let Some(outputs) = cells::run(call, exprs)? {
+            return Ok(outputs);
+        }
+        call.refuse()
+    }
+
+    fn input(&mut self, i: usize, port: &Port) -> Result<Tensor> {
+        let name = printable(&port.name);
+        let integers = INTEGERS.contains(&port.kind);
+        ensure!(
+            integers || [0, 1, 11].contains(&port.kind),
+            "the input {name:?} is of {}; an observation is of float32, so export it as that",
+            kind_name(port.kind)
+        );
+        let shape =
+            port.shape.as_ref().with_context(|| format!("the input {name:?} has no shape; export it with one"))?;
+        let last = shape.len().saturating_sub(1);
+        let one = |(axis, n): (usize, &Option<usize>)| {
+            ensure!(
+                n.is_some() || axis < last,
+                "the last axis of the input {name:?} has no length; export it with a fixed observation size"
+            );
+            // A dynamic axis is one of a batch, or of time.
+            Ok(n.unwrap_or(1))
+        };
+        let shape = shape.iter().enumerate().map(one).collect::<Result<Vec<usize>>>()?;
+        let n = count(&shape)?;
+        ensure!(
+            (1..=usize::from(u16::MAX)).contains(&n),
+            "the input {name:?} has {n} values; 1 to 65535 can be observed"
+        );
+        let id = self.exprs.put(if integers { Expr::Integers(i) } else { Expr::Input(i) }, n);
+        if !self.read.contains(&i) {
+            self.read.push(i);
+        }
+        Ok(Tensor::new(shape, Data::Open((0..n).map(|k| Element::Of(id, k)).collect())))
+    }
+}
+
+/// The nodes and names that `targets` come from.
+struct Needed {
+    nodes: HashSet<usize>,
+    names: BTreeSet<String>,
+}
+
+fn needed(graph: &Graph, scope: &Scope, targets: &[String]) -> Result<Needed> {
+    let mut giver: HashMap<&str, usize> = HashMap::new();
+    for (i, node) in graph.nodes.iter().enumerate() {
+        for name in node.outputs.iter().filter(|name| !name.is_empty()) {
+            let again = giver.insert(name, i).is_some();
+            ensure!(!again, "the value {:?} is given by two nodes", printable(name));
+        }
+    }
+    let mut found = Needed { nodes: HashSet::new(), names: BTreeSet::new() };
+    let mut open: Vec<String> = targets.to_vec();
+    while let Some(name) = open.pop() {
+        if scope.contains_key(&name) || !found.names.insert(name.clone()) {
+            continue;
+        }
+        if let Some(&i) = giver.get(name.as_str())
+            && found.nodes.insert(i)
+        {
+            open.extend(graph.nodes[i].inputs.iter().filter(|name| !name.is_empty()).cloned());
+            captured(&graph.nodes[i], &mut open, MOST_DEPTH)?;
+        }
+    }
+    Ok(found)
+}
+
+/// What the graphs in a node's attributes read, some of it from outside.
+fn captured(node: &Node, names: &mut Vec<String>, depth: usize) -> Result<()> {
+    ensure!(depth > 0, "more than {MOST_DEPTH} graphs stand within each other");
+    for bytes in node.attributes.values().filter_map(|attribute| attribute.g.as_ref()) {
+        let inner = Graph::parse(bytes)?;
+        names.extend(inner.outputs.iter().map(|port| port.name.clone()));
+        for node in &inner.nodes {
+            names.extend(node.inputs.iter().filter(|name| !name.is_empty()).cloned());
+            captured(node, names, depth - 1)?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,124 @@
+//! Elements at known indices, taken and replaced.
+
+use actq::error::{Context as _, Result, ensure};
+
+use crate::nodes::call::Call;
+use crate::nodes::places::{along, axis};
+use crate::values::tensor::{Tensor, count, room};
+
+/// Slices at known indices of an axis.
+pub(crate) fn gather(call: &Call<'_>, most: usize) -> Result<Tensor> {
+    let input = call.input(0)?;
+    let at = axis(call.int("axis").unwrap_or(0), input.shape.len())?;
+    let n = input.shape[at];
+    let indices = call.integers(1, "the indices")?;
+    let shape = &call.input(1)?.shape;
+    let (before, behind) = (&input.shape[..at], &input.shape[at + 1..]);
+    let out = [before, shape, behind].concat();
+    room(&out, most)?;
+    let chosen = indices.iter().map(|&i| axis(i, n)).collect::<Result<Vec<_>>>()?;
+    let (_, found) = along(&input.shape, at, chosen)?;
+    input.taken(out, &found)
+}
+
+/// Pieces at known places.
+pub(crate) fn gather_nd(call: &Call<'_>, most: usize) -> Result<Tensor> {
+    let input = call.input(0)?;
+    let batch = call.int("batch_dims").and_then(|n| usize::try_from(n).ok()).unwrap_or(0);
+    let indices = call.integers(1, "the indices")?;
+    let (depth, outer) = call.input(1)?.shape.split_last().context("its indices have no axis")?;
+    let piece =
+        batch.checked_add(*depth).and_then(|n| input.shape.get(n..)).context("its indices have too many parts")?;
+    // Batches of length 1 are none.
+    ensure!(*depth > 0 && input.shape[..batch].iter().all(|&n| n == 1), "takes pieces of several batches");
+    let out = [outer, piece].concat();
+    room(&out, most)?;
+    let n = count(piece)?;
+    let mut places = Vec::new();
+    for index in indices.chunks(*depth) {
+        let mut at = 0;
+        for (&i, &n) in index.iter().zip(&input.shape[batch..]) {
+            at = at * n + axis(i, n)?;
+        }
+        places.extend(at * n..(at + 1) * n);
+    }
+    input.taken(out, &places)
+}
+
+/// Rows at known places are replaced.
+pub(crate) fn scatter_nd(call: &Call<'_>) -> Result<Tensor> {
+    let (data, updates) = (call.input(0)?, call.input(2)?);
+    ensure!(
+        matches!(call.text("reduction").as_deref(), None | Some("none")),
+        "only replaces where it has no reduction"
+    );
+    let indices = call.integers(1, "the indices")?;
+    let depth = call.input(1)?.shape.last().copied().unwrap_or(1);
+    ensure!((1..=data.shape.len()).contains(&depth), "its indices have {depth} parts for {} axes", data.shape.len());
+    let piece = count(&data.shape[depth..])?;
+    let rows = indices.chunks(depth);
+    ensure!(updates.len() == rows.len() * piece, "its updates do not fit its indices");
+    let mut places: Vec<usize> = (0..data.len()).collect();
+    for (row, index) in rows.enumerate() {
+        let mut at = 0;
+        for (&i, &n) in index.iter().zip(&data.shape) {
+            at = at * n + axis(i, n)?;
+        }
+        for k in 0..piece {
+            places[at * piece + k] = data.len() + row * piece + k;
+        }
+    }
+    replaced(data, updates, &places)
+}
+
+/// Elements of a tensor at these places, of its updates where the place is behind all of its own.
+fn replaced(data: &Tensor, updates: &Tensor, places: &[usize]) -> Result<Tensor> {
+    let both = match (data.integers(), updates.integers()) {
+        (Some(data), Some(updates)) => Tensor::ints([data, updates].concat()),
+        _ => {
+            let all = [data.elements(), updates.elements()].concat();
+            Tensor::of_elements(vec![all.len()], all)
+        }
+    };
+    both.taken(data.shape.clone(), places)
+}
+
+/// For each element of the indices its place in a tensor of this shape, where they count along one axis.
+fn element_places(call: &Call<'_>, shape: &[usize]) -> Result<Vec<usize>> {
+    let at = axis(call.int("axis").unwrap_or(0), shape.len())?;
+    let (indices, of) = (call.integers(1, "the indices")?, &call.input(1)?.shape);
+    let fits = of.len() == shape.len() && (0..of.len()).all(|i| i == at || of[i] <= shape[i]);
+    ensure!(fits, "its indices of {of:?} do not fit {shape:?}");
+    let one = |(i, &index): (usize, &i64)| {
+        let (mut left, mut place, mut stride) = (i, 0, 1);
+        for k in (0..of.len()).rev() {
+            let along = if k == at { axis(index, shape[k])? } else { left % of[k] };
+            place += along * stride;
+            left /= of[k];
+            stride *= shape[k];
+        }
+        Ok(place)
+    };
+    indices.iter().enumerate().map(one).collect()
+}
+
+/// Single elements at known indices along an axis.
+pub(crate) fn gather_elements(call: &Call<'_>) -> Result<Tensor> {
+    let input = call.input(0)?;
+    input.taken(call.input(1)?.shape.clone(), &element_places(call, &input.shape)?)
+}
+
+/// Single elements at known indices along an axis are replaced.
+pub(crate) fn scatter_elements(call: &Call<'_>) -> Result<Tensor> {
+    let (data, updates) = (call.input(0)?, call.input(2)?);
+    ensure!(
+        matches!(call.text("reduction").as_deref(), None | Some("none")),
+        "only replaces where it has no reduction"
+    );
+    ensure!(updates.shape == call.input(1)?.shape, "its updates do not fit its indices");
+    let mut places: Vec<usize> = (0..data.len()).collect();
+    for (k, place) in element_places(call, &data.shape)?.into_iter().enumerate() {
+        places[place] = data.len() + k;
+    }
+    replaced(data, updates, &places)
+}

@@ -1,0 +1,200 @@
+//! Arithmetic on what is known: shape chains, and constants that exporters compute in the file.
+
+use std::cmp::Ordering;
+
+use actq::error::{Context as _, Result, ensure};
+
+use crate::nodes::call::Call;
+use crate::nodes::moves::expanded;
+use crate::nodes::places::{axis, broadcast};
+use crate::values::tensor::{Data, Tensor, count};
+
+/// Mod with the sign of the first operand, which is the only one of real numbers; without the attribute it is that of
+/// the second.
+const FMOD: &str = "Mod, fmod";
+
+/// The output, where the node computes with known numbers alone.
+pub(crate) fn run(call: &Call<'_>, most: usize) -> Result<Option<Tensor>> {
+    let given: Vec<&Tensor> = call.inputs.iter().copied().flatten().collect();
+    if given.is_empty() || !given.iter().all(|tensor| tensor.is_known()) {
+        return Ok(None);
+    }
+    if let [one] = given[..]
+        && let Some(f) = function(call.op())
+    {
+        return unary(one, call.op(), f).map(Some);
+    }
+    let op = if call.op() == "Mod" && call.int("fmod").unwrap_or(0) != 0 { FMOD } else { call.op() };
+    if let [x, y] = given[..]
+        && (real(op).is_some() || whole(op).is_some() || compared(op).is_some())
+    {
+        let shape = broadcast(&x.shape, &y.shape)?;
+        let (x, y) = (expanded(x, &shape, most)?, expanded(y, &shape, most)?);
+        return binary(op, &x, &y, shape).map(Some);
+    }
+    match call.op() {
+        "ReduceProd" | "ReduceSum" | "ReduceMean" | "ReduceMax" | "ReduceMin" => reduce(call, given[0]).map(Some),
+        "DequantizeLinear" => dequantized(call).map(Some),
+        _ => Ok(None),
+    }
+}
+
+/// What quantized weights stand for: a scale and a zero for all of them, or for each index of an axis.
+fn dequantized(call: &Call<'_>) -> Result<Tensor> {
+    let (x, scale) = (call.input(0)?, call.input(1)?);
+    ensure!(
+        scale.shape.len() < 2 && call.int("block_size").unwrap_or(0) == 0,
+        "has a scale for each block of weights; export it in float32"
+    );
+    let n = scale.len();
+    let each = if n == 1 {
+        x.len()
+    } else {
+        let at = axis(call.int("axis").unwrap_or(1), x.shape.len())?;
+        ensure!(x.shape[at] == n, "has {n} scales for an axis of {}", x.shape[at]);
+        count(&x.shape[at + 1..])?
+    };
+    let (scales, values) = (call.reals(1, "the scale")?, call.reals(0, "what is quantized")?);
+    let zeros = if call.optional(2).is_some() { call.reals(2, "the zero point")? } else { vec![0.0; n] };
+    ensure!(zeros.len() == n, "has {} zero points for {n} scales", zeros.len());
+    let runs = values.chunks(each.max(1)).zip((0..n).cycle());
+    let values = runs.flat_map(|(run, k)| run.iter().map(|v| (v - zeros[k]) * scales[k]).collect::<Vec<f64>>());
+    Ok(Tensor::new(x.shape.clone(), Data::Real(values.collect())))
+}
+
+/// A function of one known number that no value of a network goes through, or that integers do.
+fn function(op: &str) -> Option<fn(f64) -> f64> {
+    Some(match op {
+        "Neg" => |x| -x,
+        "Abs" => f64::abs,
+        "Floor" => f64::floor,
+        "Ceil" => f64::ceil,
+        "Round" => f64::round_ties_even,
+        "Sign" => |x| if x == 0.0 { 0.0 } else { x.signum() },
+        "Not" => |x| f64::from(u8::from(x == 0.0)),
+        _ => return None,
+    })
+}
+
+fn unary(x: &Tensor, op: &str, f: fn(f64) -> f64) -> Result<Tensor> {
+    let data = match (&x.data, op) {
+        (Data::Int(v), "Neg") => Data::Int(v.iter().map(|v| v.wrapping_neg()).collect()),
+        (Data::Int(v), "Abs") => Data::Int(v.iter().map(|v| v.wrapping_abs()).collect()),
+        (Data::Int(v), "Not") => Data::Int(v.iter().map(|&v| i64::from(v == 0)).collect()),
+        (Data::Int(v), "Floor" | "Ceil" | "Round") => Data::Int(v.clone()),
+        _ => Data::Real(x.reals().context("is not known")?.into_iter().map(f).collect()),
+    };
+    Ok(Tensor::new(x.shape.clone(), data))
+}
+
+/// An operation on two known numbers.
+pub(crate) fn real(op: &str) -> Option<fn(f64, f64) -> f64> {
+    Some(match op {
+        "Add" => |x, y| x + y,
+        "Sub" => |x, y| x - y,
+        "Mul" => |x, y| x * y,
+        "Div" => |x, y| x / y,
+        "Pow" => f64::powf,
+        "Max" => f64::max,
+        "Min" => f64::min,
+        FMOD => |x, y| x % y,
+        "PRelu" => |x, slope| if x < 0.0 { slope * x } else { x },
+        _ => return None,
+    })
+}
+
+/// As [`real`], of integers, where the result is one; division goes towards zero.
+fn whole(op: &str) -> Option<fn(i64, i64) -> Option<i64>> {
+    Some(match op {
+        "Add" => i64::checked_add,
+        "Sub" => i64::checked_sub,
+        "Mul" => i64::checked_mul,
+        "Div" => i64::checked_div,
+        "Mod" => |x, y| {
+            let rest = x.checked_rem(y)?;
+            Some(if rest != 0 && (rest < 0) != (y < 0) { rest + y } else { rest })
+        },
+        FMOD => i64::checked_rem,
+        "Pow" => |x, y| x.checked_pow(u32::try_from(y).ok()?),
+        "Max" => |x, y| Some(x.max(y)),
+        "Min" => |x, y| Some(x.min(y)),
+        "And" => |x, y| Some(i64::from(x != 0 && y != 0)),
+        "Or" => |x, y| Some(i64::from(x != 0 || y != 0)),
+        _ => return None,
+    })
+}
+
+/// A comparison.
+fn compared(op: &str) -> Option<fn(Ordering) -> bool> {
+    Some(match op {
+        "Equal" => Ordering::is_eq,
+        "Less" => Ordering::is_lt,
+        "LessOrEqual" => Ordering::is_le,
+        "Greater" => Ordering::is_gt,
+        "GreaterOrEqual" => Ordering::is_ge,
+        _ => return None,
+    })
+}
+
+fn binary(op: &str, x: &Tensor, y: &Tensor, shape: Vec<usize>) -> Result<Tensor> {
+    let truths = |values: Vec<bool>| Data::Int(values.into_iter().map(i64::from).collect());
+    if let (Some(x), Some(y)) = (x.integers(), y.integers()) {
+        if let Some(holds) = compared(op) {
+            return Ok(Tensor::new(shape, truths(x.iter().zip(y).map(|(x, y)| holds(x.cmp(y))).collect())));
+        }
+        if let Some(f) = whole(op) {
+            let values = x.iter().zip(y).map(|(&x, &y)| f(x, y)).collect::<Option<Vec<i64>>>();
+            return Ok(Tensor::new(shape, Data::Int(values.context("its integers overflow, or it divides by 0")?)));
+        }
+    }
+    let (x, y) = (x.reals().context("is not known")?, y.reals().context("is not known")?);
+    let pairs = x.into_iter().zip(y);
+    if let Some(holds) = compared(op) {
+        // What is not a number compares as nothing.
+        return Ok(Tensor::new(shape, truths(pairs.map(|(x, y)| x.partial_cmp(&y).is_some_and(holds)).collect())));
+    }
+    let f = real(op).context("is of integers or truth values, and these are real numbers")?;
+    Ok(Tensor::new(shape, Data::Real(pairs.map(|(x, y)| f(x, y)).collect())))
+}
+
+/// The axes that a Reduce node goes over, and its result's shape, with and without them.
+pub(crate) struct Reduced {
+    pub(crate) axes: Vec<usize>,
+    pub(crate) shape: Vec<usize>,
+}
+
+/// What a Reduce node does to the shape of its input.
+pub(crate) fn reduced(call: &Call<'_>) -> Result<Reduced> {
+    let shape = &call.input(0)?.shape;
+    let axes = match call.ints_or_input("axes", 1)? {
+        Some(axes) if !axes.is_empty() => axes.into_iter().map(|a| axis(a, shape.len())).collect::<Result<Vec<_>>>()?,
+        _ if call.int("noop_with_empty_axes").unwrap_or(0) != 0 => vec![],
+        _ => (0..shape.len()).collect(),
+    };
+    let keep = call.int("keepdims").unwrap_or(1) != 0;
+    let kept = |(i, &n): (usize, &usize)| if axes.contains(&i) { keep.then_some(1) } else { Some(n) };
+    Ok(Reduced { shape: shape.iter().enumerate().filter_map(kept).collect(), axes })
+}
+
+fn reduce(call: &Call<'_>, x: &Tensor) -> Result<Tensor> {
+    let Reduced { axes, shape } = reduced(call)?;
+    // The axes that stay in front, so that each result has its own run.
+    let order: Vec<usize> = (0..x.shape.len()).filter(|i| !axes.contains(i)).chain(axes.iter().copied()).collect();
+    let (turned, places) = crate::nodes::places::transpose(&x.shape, &order)?;
+    let x = x.taken(turned, &places)?;
+    let outputs = count(&shape)?;
+    ensure!(outputs > 0 && !x.shape.contains(&0), "goes over no values");
+    let each = x.len() / outputs;
+    let fold = |run: &[f64]| match call.op() {
+        "ReduceProd" => run.iter().product::<f64>(),
+        "ReduceSum" => run.iter().sum(),
+        "ReduceMean" => run.iter().sum::<f64>() / each as f64,
+        "ReduceMax" => run.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        _ => run.iter().copied().fold(f64::INFINITY, f64::min),
+    };
+    let values: Vec<f64> = x.reals().context("is not known")?.chunks(each).map(fold).collect();
+    // Lengths of axes are far below what f64 counts exactly.
+    let data =
+        if x.integers().is_some() { Data::Int(values.iter().map(|&v| v as i64).collect()) } else { Data::Real(values) };
+    Ok(Tensor::new(shape, data))
+}

@@ -1,0 +1,11 @@
+//! What exporters take apart and is put together again: norms, activations, rows, slices.
+
+pub(crate) mod build;
+pub(crate) mod forms;
+pub(crate) mod norm;
+pub(crate) mod parts;
+pub(crate) mod rows;
+pub(crate) mod select;
+pub(crate) mod simplify;
+pub(crate) mod slices;
+pub(crate) mod totals;

@@ -1,0 +1,90 @@
+//! Rows with a number for each, as the mean of a row is: an operation on all rows and their numbers is done row by row,
+//! so that norms are found.
+
+use std::collections::HashMap;
+
+use crate::patterns::parts::cut;
+use crate::values::elements::value;
+use crate::values::expr::{Expr, Exprs, Id, Run};
+use crate::values::tensor::Element;
+
+/// The most rows: each takes operations of its own.
+const MOST_ROWS: usize = 256;
+/// Operations between sums and a number that is computed of them.
+const DEPTH: usize = 16;
+
+/// What is known of elements that were looked for.
+type Found = HashMap<(Id, usize), Option<Id>>;
+
+/// The places `at`, row by row, where one of two operands has a number for each row; else all of them.
+pub(crate) fn by_row(exprs: &mut Exprs, at: Vec<usize>, operands: [&[Element]; 2]) -> Vec<Vec<usize>> {
+    operands.into_iter().find_map(|operand| rows(exprs, &at, operand)).unwrap_or_else(|| vec![at])
+}
+
+/// The places that have the same element of `operand`, or one that is only that one scaled, where these are sums or
+/// computed of sums.
+fn rows(exprs: &mut Exprs, at: &[usize], operand: &[Element]) -> Option<Vec<Vec<usize>>> {
+    let mut rows: Vec<((Id, usize), Vec<usize>)> = Vec::new();
+    let mut row_of: HashMap<(Id, usize), usize> = HashMap::new();
+    for &place in at {
+        let number = exprs.number(operand[place])?;
+        let row = *row_of.entry(number).or_insert(rows.len());
+        match rows.get_mut(row) {
+            Some((_, places)) => places.push(place),
+            None if row < MOST_ROWS => rows.push((number, vec![place])),
+            None => return None,
+        }
+    }
+    let each = at.len() / rows.len().max(1);
+    let are_rows = rows.len() > 1 && each > 1 && rows.iter().all(|(_, places)| places.len() == each);
+    let of_sums = are_rows && rows.iter().all(|&((of, i), _)| exprs.lone(of, i).is_some());
+    of_sums.then(|| rows.into_iter().map(|(_, places)| places).collect())
+}
+
+impl Exprs {
+    /// An element, or the number that is spread and then scaled to it, which rows have in common.
+    fn number(&self, element: Element) -> Option<(Id, usize)> {
+        let (id, i) = value(&element)?;
+        match *self.get(id) {
+            Expr::Affine(x, ..) if matches!(self.get(x), Expr::Spread(_)) => Some((x, 0)),
+            _ => Some((id, i)),
+        }
+    }
+
+    /// Whether these elements are one number that is computed of sums, each with its factor.
+    pub(crate) fn is_number_of_sums(&mut self, elements: &[Element]) -> bool {
+        let Some(first) = elements.first().and_then(|element| self.number(*element)) else { return false };
+        elements.iter().all(|element| self.number(*element) == Some(first)) && self.lone(first.0, first.1).is_some()
+    }
+
+    /// Element `i` of a value as a value by itself, where it is computed of sums alone.
+    pub(crate) fn lone(&mut self, of: Id, i: usize) -> Option<Id> {
+        self.lone_within(of, i, DEPTH, &mut Found::new())
+    }
+
+    fn lone_within(&mut self, of: Id, i: usize, depth: usize, found: &mut Found) -> Option<Id> {
+        if let Some(&known) = found.get(&(of, i)) {
+            return known;
+        }
+        let depth = depth.checked_sub(1)?;
+        let mut at = |exprs: &mut Self, x: Id, i: usize| exprs.lone_within(x, i, depth, found);
+        let lone = match *self.get(of) {
+            Expr::Sum(_) => Some(of),
+            Expr::Spread(one) => at(self, one, 0),
+            Expr::Pick(ref runs) if runs.len() <= MOST_ROWS => {
+                let run = *cut(runs, Run { of, from: i, len: 1 }).first()?;
+                at(self, run.of, run.from)
+            }
+            Expr::Affine(x, ref a, ref b) => {
+                let (a, b) = (a[i], b[i]);
+                at(self, x, i).map(|x| self.affine(x, vec![a], vec![b]))
+            }
+            Expr::Unary(f, x) => at(self, x, i).map(|x| self.unary(f, x)),
+            Expr::Add(x, y) => at(self, x, i).zip(at(self, y, i)).map(|(x, y)| self.add(x, y)),
+            Expr::Mul(x, y) => at(self, x, i).zip(at(self, y, i)).map(|(x, y)| self.mul(x, y)),
+            _ => None,
+        };
+        found.insert((of, i), lone);
+        lone
+    }
+}

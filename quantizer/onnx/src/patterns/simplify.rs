@@ -1,0 +1,156 @@
+//! Expressions as a network has them: factors and offsets go into the matrices beside them, rows that nobody reads go.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use actq_kernels::math::Function;
+
+use crate::patterns::slices::sums_of_slices;
+use crate::values::expr::{Cell, Expr, Exprs, Id, Matrix, Run, Unary};
+
+/// The same value, simplified. `instead` says which expressions stand for others.
+pub(crate) fn simplify(exprs: &mut Exprs, root: Id, instead: &HashMap<Id, Id>) -> Id {
+    let order = exprs.needed_instead(&[root], instead);
+    let mut readers: HashMap<Id, Vec<Id>> = HashMap::from([(root, vec![root])]);
+    for &id in &order {
+        for operand in exprs.get(id).operands() {
+            readers.entry(instead.get(&operand).copied().unwrap_or(operand)).or_default().push(id);
+        }
+    }
+    let mut new: HashMap<Id, Id> = HashMap::new();
+    // By columns: sums of one length share their row, as matrices are told apart by their place.
+    let mut rows_of_ones: HashMap<usize, Arc<Matrix>> = HashMap::new();
+    // The first norm of each value.
+    let mut norms: HashMap<Id, Id> = HashMap::new();
+    for id in order {
+        let old = exprs.get(id).clone();
+        let of = |operand: &Id| {
+            let operand = instead.get(operand).copied().unwrap_or(*operand);
+            new.get(&operand).copied().unwrap_or(operand)
+        };
+        let read_by =
+            |operand: &Id| readers.get(&instead.get(operand).copied().unwrap_or(*operand)).map_or(&[][..], |r| r);
+        let len = exprs.len_of(id);
+        let done = match old {
+            Expr::Affine(x, a, b) => {
+                let value = of(&x);
+                match exprs.get(value) {
+                    Expr::Linear(y, w, bias) if read_by(&x).len() == 1 => {
+                        let (y, w, bias) = (
+                            *y,
+                            scaled_rows(w, &a),
+                            bias.iter().zip(&a).zip(&b).map(|((bias, a), b)| bias * a + b).collect(),
+                        );
+                        exprs.put(Expr::Linear(y, w, bias), len)
+                    }
+                    _ => exprs.put(Expr::Affine(value, a, b), len),
+                }
+            }
+            Expr::Linear(x, w, bias) => {
+                let value = of(&x);
+                let all_linear = read_by(&x).iter().all(|&reader| matches!(exprs.get(reader), Expr::Linear(..)));
+                match exprs.get(value) {
+                    Expr::Affine(y, a, b) if all_linear && !exprs.is_observed(*y) => {
+                        let (y, w, bias) = (*y, scaled_cols(&w, a), offset(&w, b, bias));
+                        exprs.put(Expr::Linear(y, w, bias), len)
+                    }
+                    _ => exprs.put(Expr::Linear(value, w, bias), len),
+                }
+            }
+            Expr::Pick(runs) => {
+                let runs = sums_of_slices(exprs, &runs, &of);
+                let same = runs.iter().all(|run| run.of == runs[0].of);
+                let runs: Vec<Run> = runs.iter().map(|run| Run { of: of(&run.of), ..*run }).collect();
+                match exprs.get(runs[0].of) {
+                    Expr::Linear(y, w, bias) if same && read_by_one(&readers, id, exprs, instead) => {
+                        let rows: Vec<usize> = runs.iter().flat_map(|run| run.from..run.from + run.len).collect();
+                        let data = rows.iter().flat_map(|&r| &w.data[r * w.cols..(r + 1) * w.cols]).copied().collect();
+                        let bias = rows.iter().map(|&r| bias[r]).collect();
+                        let w = Matrix { name: w.name.clone(), rows: rows.len(), cols: w.cols, data };
+                        let y = *y;
+                        exprs.put(Expr::Linear(y, Arc::new(w), bias), len)
+                    }
+                    _ => exprs.put(Expr::Pick(runs), len),
+                }
+            }
+            Expr::Unary(Unary::Abs, x) => {
+                let x = of(&x);
+                let negative = times(exprs, x, -1.0);
+                let (up, down) = (exprs.function(Function::Relu, x), exprs.function(Function::Relu, negative));
+                exprs.add(up, down)
+            }
+            Expr::Input(_) | Expr::Integers(_) => id,
+            Expr::Spread(x) => exprs.put(Expr::Spread(of(&x)), len),
+            Expr::Unary(f, x) => exprs.put(Expr::Unary(f, of(&x)), len),
+            Expr::Add(x, y) => exprs.put(Expr::Add(of(&x), of(&y)), len),
+            Expr::Mul(x, y) => exprs.put(Expr::Mul(of(&x), of(&y)), len),
+            // A sum that is left is a product with a row of ones.
+            Expr::Sum(x) => {
+                let x = of(&x);
+                let cols = exprs.len_of(x);
+                let ones = rows_of_ones.entry(cols).or_insert_with(|| {
+                    let (name, data) = (Some("sum.weight".to_owned()), vec![1.0; cols]);
+                    Arc::new(Matrix { name, rows: 1, cols, data })
+                });
+                exprs.put(Expr::Linear(x, Arc::clone(ones), vec![0.0]), len)
+            }
+            Expr::Clip(x, limit) => exprs.put(Expr::Clip(of(&x), limit), len),
+            Expr::LayerNorm(x, weight, bias, eps) => {
+                let norm = exprs.put(Expr::LayerNorm(of(&x), weight, bias, eps), len);
+                once(exprs, *norms.entry(of(&x)).or_insert(norm), norm)
+            }
+            Expr::RmsNorm(x, weight, eps) => {
+                let norm = exprs.put(Expr::RmsNorm(of(&x), weight, eps), len);
+                once(exprs, *norms.entry(of(&x)).or_insert(norm), norm)
+            }
+            Expr::Cell(cell) => exprs.put(Expr::Cell(Box::new(Cell { x: of(&cell.x), ..*cell })), len),
+            Expr::CellState(x) => exprs.put(Expr::CellState(of(&x)), len),
+        };
+        exprs.keep_origin(id, done);
+        new.insert(id, done);
+    }
+    new.get(&root).copied().unwrap_or(root)
+}
+
+/// `k x`, also where x is a norm that something else reads: a factor within would need the norm again.
+fn times(exprs: &mut Exprs, x: Id, k: f64) -> Id {
+    let len = exprs.len_of(x);
+    exprs.put(Expr::Affine(x, vec![k; len], vec![0.0; len]), len)
+}
+
+/// A norm, as a multiple of the `first` of the same value where it is one: the sum of a LeakyReLU reads both.
+fn once(exprs: &mut Exprs, first: Id, norm: Id) -> Id {
+    match exprs.ratio(norm, first) {
+        Some(k) if norm != first => times(exprs, first, k),
+        _ => norm,
+    }
+}
+
+/// Whether nothing but this reads what it reads.
+fn read_by_one(readers: &HashMap<Id, Vec<Id>>, reader: Id, exprs: &Exprs, instead: &HashMap<Id, Id>) -> bool {
+    exprs.get(reader).operands().iter().all(|operand| {
+        let operand = instead.get(operand).copied().unwrap_or(*operand);
+        readers.get(&operand).is_some_and(|all| all.iter().all(|other| *other == reader))
+    })
+}
+
+fn scaled_rows(w: &Arc<Matrix>, a: &[f64]) -> Arc<Matrix> {
+    if a.iter().all(|a| *a == 1.0) {
+        return Arc::clone(w);
+    }
+    let data = w.data.chunks(w.cols).zip(a).flat_map(|(row, a)| row.iter().map(move |w| w * a)).collect();
+    Arc::new(Matrix { name: w.name.clone(), rows: w.rows, cols: w.cols, data })
+}
+
+fn scaled_cols(w: &Arc<Matrix>, a: &[f64]) -> Arc<Matrix> {
+    if a.iter().all(|a| *a == 1.0) {
+        return Arc::clone(w);
+    }
+    let data = w.data.chunks(w.cols).flat_map(|row| row.iter().zip(a).map(|(w, a)| w * a)).collect();
+    Arc::new(Matrix { name: w.name.clone(), rows: w.rows, cols: w.cols, data })
+}
+
+fn offset(w: &Matrix, b: &[f64], bias: Vec<f64>) -> Vec<f64> {
+    let products = w.data.chunks(w.cols).map(|row| row.iter().zip(b).map(|(w, b)| w * b).sum::<f64>());
+    bias.into_iter().zip(products).map(|(bias, product)| bias + product).collect()
+}

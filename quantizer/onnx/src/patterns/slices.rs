@@ -1,0 +1,61 @@
+//! Sums over one axis of what stands along another, as a mean over time has.
+
+use crate::values::elements::value;
+use crate::values::expr::{Expr, Exprs, Id, Run};
+
+/// The most elements of a row that is one of a sum of slices.
+const MOST_SLICES: usize = 64;
+
+/// Sums over neighbours in runs beside each other, as a mean over time has, as a sum of slices where that takes fewer
+/// operations. `new` says what expressions have become.
+pub(crate) fn sums_of_slices(exprs: &mut Exprs, runs: &[Run], new: &dyn Fn(&Id) -> Id) -> Vec<Run> {
+    let mut done = Vec::new();
+    let mut rest = runs;
+    while let [run, ..] = rest {
+        let mut rows = Vec::new();
+        while let Some(row) = rest.get(rows.len()).and_then(|run| row_of_sum(exprs, run.of))
+            && rows.last().is_none_or(|last| is_behind(last, &row))
+        {
+            rows.push(row);
+        }
+        let n = rows.len();
+        let Some(each) = rows.first().map(|row| row.elements.len()).filter(|&each| n > 1 && each <= n) else {
+            done.push(*run);
+            rest = &rest[1..];
+            continue;
+        };
+        let slice = |k: usize| rows.iter().map(|row| (new(&row.elements[k].0), row.elements[k].1)).collect::<Vec<_>>();
+        let mut sum = exprs.vector(&slice(0));
+        for k in 1..each {
+            let next = exprs.vector(&slice(k));
+            sum = exprs.add(sum, next);
+        }
+        let (a, b) = rows.iter().map(|row| (row.factor, row.offset)).unzip();
+        done.push(Run { of: exprs.affine(sum, a, b), from: 0, len: n });
+        rest = &rest[n..];
+    }
+    done
+}
+
+/// What a sum goes over, and what is done to it.
+struct RowOfSum {
+    elements: Vec<(Id, usize)>,
+    factor: f64,
+    offset: f64,
+}
+
+fn row_of_sum(exprs: &Exprs, id: Id) -> Option<RowOfSum> {
+    let (sum, factor, offset) = exprs.affine_of(id);
+    let &Expr::Sum(row) = exprs.get(sum) else { return None };
+    if exprs.len_of(row) > MOST_SLICES {
+        return None;
+    }
+    let elements = exprs.elements(row).iter().map(value).collect::<Option<_>>()?;
+    Some(RowOfSum { elements, factor, offset })
+}
+
+/// Whether every element of `next` is the one behind that of `last`.
+fn is_behind(last: &RowOfSum, next: &RowOfSum) -> bool {
+    let behind = |(a, b): (&(Id, usize), &(Id, usize))| (a.0, a.1 + 1) == *b;
+    last.elements.len() == next.elements.len() && last.elements.iter().zip(&next.elements).all(behind)
+}

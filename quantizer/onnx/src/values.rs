@@ -1,0 +1,8 @@
+//! What is followed through a graph: vectors of values as expressions, and tensors of their elements.
+
+pub(crate) mod bounds;
+pub(crate) mod compare;
+pub(crate) mod elements;
+pub(crate) mod evaluation;
+pub(crate) mod expr;
+pub(crate) mod tensor;

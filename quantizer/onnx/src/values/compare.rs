@@ -1,0 +1,81 @@
+//! Whether expressions are the same but for factors, which is what patterns ask.
+
+use actq_kernels::math::Function;
+
+use crate::values::expr::{Expr, Exprs, Id, Unary};
+
+/// Exporters write constants such as `sqrt(2)` in f32.
+const TOLERANCE: f64 = 2e-6;
+
+/// Equal, as far as f32 tells.
+pub(crate) fn near(a: f64, b: f64) -> bool {
+    (a - b).abs() <= TOLERANCE * a.abs().max(b.abs())
+}
+
+/// A power of two, as far as f32 tells: exporters write one as the quotient of rounded constants.
+pub(crate) fn exact(k: f64) -> f64 {
+    let power = k.abs().log2().round().exp2().copysign(k);
+    if near(power, k) { power } else { k }
+}
+
+/// The one value of a vector.
+pub(crate) fn uniform(values: &[f64]) -> Option<f64> {
+    let first = *values.first()?;
+    values.iter().all(|v| *v == first).then_some(first)
+}
+
+impl Exprs {
+    /// `a x + b` with the same a and b for all elements; of any other expression `1 x + 0`.
+    pub(crate) fn affine_of(&self, id: Id) -> (Id, f64, f64) {
+        if let Expr::Affine(x, a, b) = self.get(id)
+            && let (Some(a), Some(b)) = (uniform(a), uniform(b))
+        {
+            return (*x, a, b);
+        }
+        (id, 1.0, 0.0)
+    }
+
+    /// The operand of a function.
+    pub(crate) fn operand_of(&self, id: Id, function: Unary) -> Option<Id> {
+        if let Expr::Unary(f, x) = self.get(id) { (*f == function).then_some(*x) } else { None }
+    }
+
+    /// As [`Self::operand_of`].
+    pub(crate) fn known_of(&self, id: Id, function: Function) -> Option<Id> {
+        self.operand_of(id, Unary::Known(function))
+    }
+
+    /// The coefficients of each element of `y` as a polynomial in that of `x`, from the constant one on, up to the cube.
+    pub(crate) fn polynomials(&self, y: Id, x: Id, depth: usize) -> Option<Vec<[f64; 4]>> {
+        let depth = depth.checked_sub(1)?;
+        if let Some(ratios) = self.ratios(y, x) {
+            return Some(ratios.into_iter().map(|k| [0.0, k, 0.0, 0.0]).collect());
+        }
+        match self.get(y) {
+            Expr::Affine(of, a, b) => {
+                let one = |((p, a), b): (([f64; 4], &f64), &f64)| [a * p[0] + b, a * p[1], a * p[2], a * p[3]];
+                Some(self.polynomials(*of, x, depth)?.into_iter().zip(a).zip(b).map(one).collect())
+            }
+            Expr::Add(p, q) => {
+                let pairs = self.polynomials(*p, x, depth)?.into_iter().zip(self.polynomials(*q, x, depth)?);
+                Some(pairs.map(|(p, q)| [0, 1, 2, 3].map(|i| p[i] + q[i])).collect())
+            }
+            Expr::Mul(p, q) => {
+                let pairs = self.polynomials(*p, x, depth)?.into_iter().zip(self.polynomials(*q, x, depth)?);
+                pairs.map(|(p, q)| product(p, q)).collect()
+            }
+            _ => None,
+        }
+    }
+}
+
+/// The product of two polynomials, where it is none of more than the cube.
+fn product(p: [f64; 4], q: [f64; 4]) -> Option<[f64; 4]> {
+    let mut product = [0.0; 4];
+    for (i, p) in p.into_iter().enumerate() {
+        for (j, q) in q.into_iter().enumerate().filter(|(_, q)| p * q != 0.0) {
+            *product.get_mut(i + j)? += p * q;
+        }
+    }
+    Some(product)
+}

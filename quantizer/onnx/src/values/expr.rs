@@ -1,0 +1,199 @@
+//! What a file computes, as expressions over vectors: every expression once, in the order in which they came up.
+
+use std::collections::HashMap;
+use std::mem::discriminant;
+use std::sync::Arc;
+
+use actq_kernels::math::Function;
+
+/// Index of an expression.
+pub(crate) type Id = usize;
+
+/// A weight matrix, rows are outputs.
+#[derive(Debug, PartialEq)]
+pub(crate) struct Matrix {
+    /// The initializer's name, as far as there is one.
+    pub(crate) name: Option<String>,
+    pub(crate) rows: usize,
+    pub(crate) cols: usize,
+    /// Row-major.
+    pub(crate) data: Vec<f64>,
+}
+
+/// A run of elements of an expression.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Run {
+    pub(crate) of: Id,
+    pub(crate) from: usize,
+    pub(crate) len: usize,
+}
+
+/// A function of every element.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Unary {
+    /// One that the network has.
+    Known(Function),
+    /// `ln x`; only within a pattern, as those below.
+    Log,
+    /// Square root.
+    Sqrt,
+    /// The error function.
+    Erf,
+    /// `1 / x`
+    Reciprocal,
+    /// `|x|`
+    Abs,
+    /// Whether x is above this.
+    Above(f64),
+}
+
+/// An LSTM or GRU cell.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Cell {
+    /// Whether it is an LSTM, of gates `[i f g o]`; else a GRU, of gates `[r z n]`.
+    pub(crate) lstm: bool,
+    /// What it reads.
+    pub(crate) x: Id,
+    pub(crate) w_ih: Arc<Matrix>,
+    pub(crate) w_hh: Arc<Matrix>,
+    pub(crate) b_ih: Vec<f64>,
+    pub(crate) b_hh: Vec<f64>,
+    /// Elements of graph inputs that hold its hidden state, and of an LSTM its cell state, before the step.
+    pub(crate) states: Vec<Run>,
+}
+
+/// An expression; its length stands beside it.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Expr {
+    /// Graph input of this index.
+    Input(usize),
+    /// Graph input of this index, of integers that are not yet cast to float.
+    Integers(usize),
+    /// Runs behind each other.
+    Pick(Vec<Run>),
+    /// The one element of a value, again and again.
+    Spread(Id),
+    /// `a x + b`, element by element.
+    Affine(Id, Vec<f64>, Vec<f64>),
+    /// `W x + b`
+    Linear(Id, Arc<Matrix>, Vec<f64>),
+    Unary(Unary, Id),
+    Add(Id, Id),
+    Mul(Id, Id),
+    /// The sum of all elements.
+    Sum(Id),
+    /// Limited to so much in both directions.
+    Clip(Id, f64),
+    /// Of what, weight, bias, what is added to the variance.
+    LayerNorm(Id, Vec<f64>, Vec<f64>, f64),
+    /// Of what, weight, what is added to the mean square.
+    RmsNorm(Id, Vec<f64>, f64),
+    /// The hidden state after the step.
+    Cell(Box<Cell>),
+    /// The cell state after the step of an LSTM.
+    CellState(Id),
+}
+
+impl Expr {
+    /// What it reads.
+    pub(crate) fn operands(&self) -> Vec<Id> {
+        match self {
+            Self::Input(_) | Self::Integers(_) => vec![],
+            Self::Pick(runs) => runs.iter().map(|run| run.of).collect(),
+            Self::Add(x, y) | Self::Mul(x, y) => vec![*x, *y],
+            Self::Cell(cell) => vec![cell.x],
+            Self::Spread(x)
+            | Self::Affine(x, ..)
+            | Self::Linear(x, ..)
+            | Self::Unary(_, x)
+            | Self::Sum(x)
+            | Self::Clip(x, _)
+            | Self::LayerNorm(x, ..)
+            | Self::RmsNorm(x, ..)
+            | Self::CellState(x) => vec![*x],
+        }
+    }
+}
+
+/// All expressions.
+#[derive(Debug, Default)]
+pub(crate) struct Exprs {
+    all: Vec<(Expr, usize)>,
+    /// By kind, first operand, and where that is cut: rows of one value must not be looked for among each other.
+    known: HashMap<(std::mem::Discriminant<Expr>, Id, usize), Vec<Id>>,
+    /// Values with a limit on one side: of what, and the limits, of which one is infinite.
+    pub(crate) limited: HashMap<Id, (Id, f64, f64)>,
+    /// Which node of the file each came up in.
+    origins: Vec<usize>,
+    /// The node that is followed now.
+    pub(crate) node: usize,
+}
+
+impl Exprs {
+    /// The expression, which may be there already.
+    pub(crate) fn put(&mut self, expr: Expr, len: usize) -> Id {
+        let (first, from) = match &expr {
+            Expr::Pick(runs) => runs.first().map_or((0, 0), |run| (run.of, run.from)),
+            _ => (expr.operands().first().copied().unwrap_or(0), 0),
+        };
+        let key = (discriminant(&expr), first, from);
+        let same = self.known.entry(key).or_default();
+        if let Some(&id) = same.iter().find(|&&id| self.all[id].0 == expr && self.all[id].1 == len) {
+            return id;
+        }
+        let id = self.all.len();
+        same.push(id);
+        self.all.push((expr, len));
+        self.origins.push(self.node);
+        id
+    }
+
+    pub(crate) fn get(&self, id: Id) -> &Expr {
+        &self.all[id].0
+    }
+
+    pub(crate) fn len_of(&self, id: Id) -> usize {
+        self.all[id].1
+    }
+
+    /// The node of the file that it came up in.
+    pub(crate) fn origin(&self, id: Id) -> usize {
+        self.origins[id]
+    }
+
+    /// Says that `id` came up where `old` did.
+    pub(crate) fn keep_origin(&mut self, old: Id, id: Id) {
+        self.origins[id] = self.origins[old];
+    }
+
+    /// Whether a value is nothing but parts of the graph's inputs.
+    pub(crate) fn is_observed(&self, id: Id) -> bool {
+        match self.get(id) {
+            Expr::Input(_) => true,
+            Expr::Pick(runs) => runs.iter().all(|run| matches!(self.get(run.of), Expr::Input(_))),
+            _ => false,
+        }
+    }
+
+    /// Which expressions `roots` need, themselves included, each behind its operands.
+    pub(crate) fn needed(&self, roots: &[Id]) -> Vec<Id> {
+        self.needed_instead(roots, &HashMap::new())
+    }
+
+    /// As [`Self::needed`], where some expressions stand for others.
+    pub(crate) fn needed_instead(&self, roots: &[Id], instead: &HashMap<Id, Id>) -> Vec<Id> {
+        let meant = |id: Id| instead.get(&id).copied().unwrap_or(id);
+        let mut order = Vec::new();
+        let mut seen = vec![false; self.all.len()];
+        let mut stack: Vec<(Id, bool)> = roots.iter().rev().map(|&id| (meant(id), false)).collect();
+        while let Some((id, done)) = stack.pop() {
+            if done {
+                order.push(id);
+            } else if !std::mem::replace(&mut seen[id], true) {
+                stack.push((id, true));
+                stack.extend(self.get(id).operands().into_iter().rev().map(|id| (meant(id), false)));
+            }
+        }
+        order
+    }
+}

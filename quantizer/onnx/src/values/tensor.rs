@@ -1,0 +1,130 @@
+//! Tensors while a graph is followed: of numbers that are known, or of elements of the network's values.
+
+use actq::error::{Result, ensure};
+
+use crate::values::expr::Id;
+
+/// An element of a tensor that is not all known numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Element {
+    /// Element of a value.
+    Of(Id, usize),
+    /// A known number.
+    Known(f64),
+}
+
+/// Elements, row-major.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Data {
+    /// Known real numbers.
+    Real(Vec<f64>),
+    /// Known integers, and truth values as 0 and 1.
+    Int(Vec<i64>),
+    /// At least one element is not known before the network runs.
+    Open(Vec<Element>),
+}
+
+/// A tensor.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Tensor {
+    /// Length of each axis.
+    pub(crate) shape: Vec<usize>,
+    pub(crate) data: Data,
+    /// The initializer's name, as long as its elements have not changed.
+    pub(crate) name: Option<String>,
+}
+
+/// The most elements of a tensor, axes without any counted as 1: what walks over an axis stays short.
+const MOST_ELEMENTS: usize = 1 << 28;
+
+/// Elements of a shape.
+pub(crate) fn count(shape: &[usize]) -> Result<usize> {
+    let product = shape.iter().try_fold(1usize, |n, &d| n.checked_mul(d.max(1)).filter(|&n| n <= MOST_ELEMENTS));
+    let empty = shape.contains(&0);
+    let fits = product.filter(|&n| !empty || n <= 1 << 16);
+    ensure!(fits.is_some(), "the shape {shape:?} has more elements than any policy");
+    Ok(fits.filter(|_| !empty).unwrap_or_default())
+}
+
+/// How many elements a shape has that may come up as a result: at most so many.
+pub(crate) fn room(shape: &[usize], most: usize) -> Result<usize> {
+    let n = count(shape)?;
+    ensure!(n <= most, "{shape:?} are more values than a policy of this size can have");
+    Ok(n)
+}
+
+impl Tensor {
+    pub(crate) fn new(shape: Vec<usize>, data: Data) -> Self {
+        Self { shape, data, name: None }
+    }
+
+    /// One axis of integers.
+    pub(crate) fn ints(values: Vec<i64>) -> Self {
+        Self::new(vec![values.len()], Data::Int(values))
+    }
+
+    /// Elements; what is all known becomes so.
+    pub(crate) fn of_elements(shape: Vec<usize>, elements: Vec<Element>) -> Self {
+        let known = |e: &Element| match e {
+            Element::Known(v) => Some(*v),
+            Element::Of(..) => None,
+        };
+        let numbers: Option<Vec<f64>> = elements.iter().map(known).collect();
+        Self::new(shape, numbers.map_or(Data::Open(elements), Data::Real))
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        match &self.data {
+            Data::Real(v) => v.len(),
+            Data::Int(v) => v.len(),
+            Data::Open(v) => v.len(),
+        }
+    }
+
+    pub(crate) fn is_known(&self) -> bool {
+        !matches!(self.data, Data::Open(_))
+    }
+
+    /// As elements.
+    pub(crate) fn elements(&self) -> Vec<Element> {
+        match &self.data {
+            Data::Real(v) => v.iter().map(|&v| Element::Known(v)).collect(),
+            Data::Int(v) => v.iter().map(|&v| Element::Known(v as f64)).collect(),
+            Data::Open(v) => v.clone(),
+        }
+    }
+
+    /// Known numbers; `None` where an element is not.
+    pub(crate) fn reals(&self) -> Option<Vec<f64>> {
+        match &self.data {
+            Data::Real(v) => Some(v.clone()),
+            Data::Int(v) => Some(v.iter().map(|&v| v as f64).collect()),
+            Data::Open(_) => None,
+        }
+    }
+
+    /// Known integers.
+    pub(crate) fn integers(&self) -> Option<&[i64]> {
+        if let Data::Int(v) = &self.data { Some(v) } else { None }
+    }
+
+    /// The same elements in another shape.
+    pub(crate) fn reshaped(&self, shape: Vec<usize>) -> Result<Self> {
+        ensure!(count(&shape)? == self.len(), "{:?} cannot be reshaped to {shape:?}", self.shape);
+        Ok(Self { shape, ..self.clone() })
+    }
+
+    /// The elements at these places.
+    pub(crate) fn taken(&self, shape: Vec<usize>, places: &[usize]) -> Result<Self> {
+        fn pick<T: Copy>(from: &[T], places: &[usize]) -> Option<Vec<T>> {
+            places.iter().map(|&i| from.get(i).copied()).collect()
+        }
+        let data = match &self.data {
+            Data::Real(v) => pick(v, places).map(Data::Real),
+            Data::Int(v) => pick(v, places).map(Data::Int),
+            Data::Open(v) => return Ok(Self::of_elements(shape, pick(v, places).unwrap_or_default())),
+        };
+        ensure!(data.is_some(), "a place lies outside the tensor");
+        Ok(Self::new(shape, data.unwrap_or(Data::Int(Vec::new()))))
+    }
+}
