@@ -1,3 +1,3 @@
-//! The tests that take more than one crate are in `tests/all`. Here, the examples of README.md are compiled and run.
+//! Tests of more than one crate are in `tests/all`. Here, the Rust examples of the documents are compiled and run.
 #![forbid(unsafe_code)]
 #![cfg_attr(doctest, doc = include_str!(concat!(env!("OUT_DIR"), "/examples.md")))]
