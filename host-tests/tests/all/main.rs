@@ -10,6 +10,7 @@ mod constants;
 mod controller;
 mod denoising;
 mod digests;
+mod docs;
 mod drive;
 mod faults;
 mod flow;

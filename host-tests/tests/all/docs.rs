@@ -1,0 +1,118 @@
+//! The documents against the commands: `docs/CLI.md` holds every help text, and every command that is shown exists.
+
+use std::fs;
+use std::path::PathBuf;
+
+use actq_bench::command::{actq, run, succeeded};
+use actq_bench::root;
+use anyhow::{Context, Result, ensure};
+
+const GENERATED: &str = "<!-- Below, the help of every command. Do not edit; write it anew by\n     \
+                         ACTQ_BLESS=1 cargo test --release -p actq-host-tests docs:: -->\n";
+const OTHERS: &[&str] = &["README.md", "firmware-demo/README.md", "fuzz/README.md", "examples/ur3/README.md"];
+/// Commands of cargo itself, and of cargo-fuzz.
+const CARGO: &[&str] = &["+nightly", "build", "check", "install", "run", "test"];
+
+fn read(path: &str) -> Result<String> {
+    fs::read_to_string(root().join(path)).with_context(|| path.to_owned())
+}
+
+/// The line with breaks before column 110; further lines have its indent.
+fn wrap(line: &str) -> String {
+    let indent = &line[..line.len() - line.trim_start().len()];
+    let (mut text, mut column) = (indent.to_owned(), indent.len());
+    for (i, word) in line.trim_start().split(' ').enumerate() {
+        let is_first = i == 0;
+        if !is_first && column + 1 + word.len() > 110 {
+            text += &format!("\n{indent}{word}");
+            column = indent.len() + word.len();
+        } else {
+            text += &format!("{}{word}", if is_first { "" } else { " " });
+            column += word.len() + usize::from(!is_first);
+        }
+    }
+    text
+}
+
+/// Appends the help of a command as Markdown, then that of its subcommands.
+fn append_help(path: &[&str], to: &mut String) -> Result<()> {
+    let mut command = actq(path);
+    command.arg("--help").env_remove("ACTQ_POLICY");
+    let help = succeeded(&run(command, b"")?)?;
+    let lines: Vec<&str> = help.lines().map(str::trim_end).collect();
+    let wrapped: Vec<String> = lines.iter().map(|line| wrap(line)).collect();
+    *to += &format!("\n## {}\n\n```text\n{}\n```\n", [&["actq"], path].concat().join(" "), wrapped.join("\n"));
+    let listed = lines.iter().skip_while(|line| **line != "Commands:").skip(1).take_while(|line| !line.is_empty());
+    let names = listed.filter_map(|line| line.strip_prefix("  ")?.split(' ').next());
+    names.filter(|name| !["", "help"].contains(name)).try_for_each(|name| append_help(&[path, &[name]].concat(), to))
+}
+
+#[test]
+fn command_reference_is_the_help() -> Result<()> {
+    let text = read("docs/CLI.md")?;
+    let (by_hand, generated) = text.split_once(GENERATED).context("docs/CLI.md has no generated part")?;
+    let mut wanted = String::new();
+    append_help(&[], &mut wanted)?;
+    if std::env::var_os("ACTQ_BLESS").is_some() {
+        return Ok(fs::write(root().join("docs/CLI.md"), format!("{by_hand}{GENERATED}{wanted}"))?);
+    }
+    ensure!(generated == wanted, "docs/CLI.md differs from the help; run this test with ACTQ_BLESS=1");
+    Ok(())
+}
+
+/// The commands in a document's indented lines, listings and code spans, as words.
+fn commands(text: &str) -> impl Iterator<Item = Vec<&str>> {
+    let spans = text.split('`').skip(1).step_by(2).flat_map(str::lines);
+    let lines = text.lines().filter(|line| line.starts_with("    ")).chain(spans);
+    let words = lines.map(|line| line.split_whitespace().skip_while(|word| *word == "$" || word.contains('=')));
+    words.map(Iterator::collect).filter(|words: &Vec<&str>| words.len() > 1 && ["actq", "cargo"].contains(&words[0]))
+}
+
+/// Checks the subcommands and options of `actq` against `docs/CLI.md`.
+fn check_actq(words: &[&str], reference: &str) -> Result<()> {
+    let is_name = |word: &&&str| word.bytes().all(|byte| byte.is_ascii_lowercase());
+    let path: Vec<&str> = words.iter().take_while(is_name).copied().collect();
+    let (_, section) = reference.split_once(&format!("\n## {}\n", path.join(" "))).context("no such subcommand")?;
+    let section = section.split("\n## ").next().unwrap_or(section);
+    let options = words.iter().map(|word| word.trim_matches(['[', ']', ','])).filter(|word| word.starts_with("--"));
+    let mut unknown = options.filter(|word| !section.split_whitespace().any(|w| w.trim_end_matches(',') == *word));
+    ensure!(unknown.next().is_none(), "an option is not in its help");
+    Ok(())
+}
+
+/// Checks the commands of cargo: aliases, those of xtask, and packages.
+fn check_cargo(words: &[&str], aliases: &str, xtask: &str, manifests: &str) -> Result<()> {
+    let is_known = match words[1] {
+        "xtask" => words.get(2).is_none_or(|name| *name == "help" || xtask.contains(&format!("\n  {name} "))),
+        name => CARGO.contains(&name) || aliases.contains(&format!("\n{name} = ")),
+    };
+    ensure!(is_known, "no such command");
+    let packages = words.windows(2).filter(|pair| ["-p", "--package"].contains(&pair[0]));
+    let mut unknown = packages.filter(|pair| !manifests.contains(&format!("\nname = \"{}\"\n", pair[1])));
+    ensure!(unknown.next().is_none(), "a package is not in the workspace");
+    Ok(())
+}
+
+#[test]
+fn every_shown_command_is_known() -> Result<()> {
+    let listed = fs::read_dir(root().join("docs"))?.map(|entry| Ok(entry?.path())).collect::<Result<Vec<PathBuf>>>()?;
+    let documents = listed.into_iter().filter(|path| path.extension().is_some_and(|ending| ending == "md"));
+    let (reference, aliases, xtask) = (read("docs/CLI.md")?, read(".cargo/config.toml")?, read("xtask/src/main.rs")?);
+    let members = read("Cargo.toml")?;
+    let members = members.split('"').map(|member| root().join(member).join("Cargo.toml")).filter(|path| path.is_file());
+    let manifests = members.map(fs::read_to_string).collect::<Result<String, _>>()?;
+    let mut count = 0;
+    for path in documents.chain(OTHERS.iter().map(|path| root().join(path))) {
+        let text = fs::read_to_string(&path)?;
+        for words in commands(text.split(GENERATED).next().unwrap_or(&text)) {
+            let checked = match words[0] {
+                "actq" => check_actq(&words, &reference),
+                _ => check_cargo(&words, &aliases, &xtask, &manifests),
+            };
+            checked.with_context(|| format!("{}: {}", path.display(), words.join(" ")))?;
+            count += 1;
+        }
+    }
+    ensure!(count > 50, "only {count} commands were found");
+    Ok(())
+}
