@@ -6,10 +6,10 @@ use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 use actq_boards::{Clock, Target};
-use actq_device::client::Client;
-use actq_device::connection::Connection;
-use actq_device::event::Event;
-use actq_device::port::{Address, Port};
+use actq_client::client::Client;
+use actq_client::connection::Connection;
+use actq_client::event::Event;
+use actq_client::port::{Address, Port};
 use actq_link::report::Status;
 use anyhow::{Context as _, Result, bail, ensure};
 use tempfile::TempDir;

@@ -5,8 +5,8 @@ use std::io::{self, ErrorKind, Read, Write};
 use std::mem;
 use std::sync::{Arc, Mutex, MutexGuard};
 
-use actq_device::event::Event;
-use actq_device::port::Port;
+use actq_client::event::Event;
+use actq_client::port::Port;
 use actq_link::{Receiver, frame};
 use actq_ur3::random::Random;
 

@@ -5,11 +5,11 @@ use std::path::Path;
 use std::time::Instant;
 
 use actq_boards::{Clock, Target};
+use actq_client::client::Client;
+use actq_client::connection::Connection;
+use actq_client::event::Event;
+use actq_client::push::Push;
 use actq_controller::Axis;
-use actq_device::client::Client;
-use actq_device::connection::Connection;
-use actq_device::event::Event;
-use actq_device::push::Push;
 use actq_kernels::Image;
 use actq_link::code::{Fault, Parameter, State};
 use actq_link::report::Status;

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use actq_device::push::{Package, Push};
+use actq_client::push::{Package, Push};
 use actq_link::code::{Fault, State};
 use actq_ur3::task::{Outcome, POSITION_TOLERANCE};
 use anyhow::{Context as _, Result, bail, ensure};

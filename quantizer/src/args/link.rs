@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use actq_device::port::Address;
+use actq_client::port::Address;
 use actq_link::code::Parameter;
 use clap::{Subcommand, ValueEnum};
 

@@ -8,13 +8,13 @@ use std::time::Duration;
 
 use actq::data::{Dataset, Sizes};
 use actq::runtime::ImageBuffer;
-use actq_device::client::Client;
-use actq_device::connection::Connection;
-use actq_device::keys::Signed;
-use actq_device::log::Log;
-use actq_device::push::{Package, axes_note, push};
-use actq_device::stream::{Pace, stream};
-use actq_device::{port, serve};
+use actq_client::client::Client;
+use actq_client::connection::Connection;
+use actq_client::keys::Signed;
+use actq_client::log::Log;
+use actq_client::push::{Package, axes_note, push};
+use actq_client::stream::{Pace, stream};
+use actq_client::{port, serve};
 use anyhow::{Context as _, Result, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
 

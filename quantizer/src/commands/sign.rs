@@ -1,7 +1,7 @@
 //! `actq keygen` and `actq sign`
 
 use actq::runtime::ImageBuffer;
-use actq_device::keys;
+use actq_client::keys;
 use anyhow::Result;
 
 use crate::args::link::{KeygenArgs, SignArgs};

@@ -13,7 +13,7 @@ use actq_bench::networks::Builder;
 use actq_bench::qemu::{self, Counter, Region};
 use actq_boards::seams::Watchdog;
 use actq_boards::stm32f405::patience;
-use actq_device::keys;
+use actq_client::keys;
 use actq_firmware_demo::image;
 use actq_firmware_demo::patience::{LONGEST, PATIENCE};
 use actq_firmware_demo::running::SLICE;

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use actq_device::keys::{Signed, generate, public, read, sign, write};
+use actq_client::keys::{Signed, generate, public, read, sign, write};
 
 /// RFC 8410, section 10.3: a private key, and its public one from section 10.1.
 const PEM: &str = "-----BEGIN PRIVATE KEY-----\nMC4CAQAwBQYDK2VwBCIEINTuctv5E1hK1bbY8fdp+K06/nwoy/HU++CXqI9EdVhC\n-----END PRIVATE KEY-----\n";

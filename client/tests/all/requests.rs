@@ -3,10 +3,10 @@
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
+use actq_client::client::Client;
+use actq_client::port::Address;
 use actq_controller::Output;
 use actq_controller::slots::Anyone;
-use actq_device::client::Client;
-use actq_device::port::Address;
 use actq_link::code::{Crash, Fault, Parameter, Refusal, ResetCause, State};
 use actq_link::report::BUILT_IN;
 
@@ -103,7 +103,7 @@ fn a_controller_that_was_reset_is_heard_again_and_says_why() {
 #[test]
 fn a_port_that_is_not_there_is_named() {
     let address: Address = "tcp:127.0.0.1:1".parse().expect("it is an address");
-    let error = actq_device::connection::Connection::open(address, Duration::ZERO).err().expect("nobody listens");
+    let error = actq_client::connection::Connection::open(address, Duration::ZERO).err().expect("nobody listens");
     assert!(format!("{error:#}").contains("tcp:127.0.0.1:1"), "{error:#}");
 }
 
@@ -116,5 +116,5 @@ fn addresses_are_read_as_they_are_shown() {
     for text in ["", "tcp:", "tcp:host", "tcp::4000", "tcp:host:70000", "unix:", "COM3@fast", "COM3@0"] {
         assert!(text.parse::<Address>().is_err(), "{text}");
     }
-    actq_device::port::list().expect("a machine may have no serial port, but tells");
+    actq_client::port::list().expect("a machine may have no serial port, but tells");
 }

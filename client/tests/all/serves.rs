@@ -2,9 +2,9 @@
 
 use std::sync::atomic::Ordering;
 
+use actq_client::serve::serve;
 use actq_controller::Output;
 use actq_controller::slots::Anyone;
-use actq_device::serve::serve;
 use actq_link::{NO_ACTION, RESET, STEP};
 
 use crate::simulated::{Control, Simulated};

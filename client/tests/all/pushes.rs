@@ -3,10 +3,10 @@
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
+use actq_client::keys;
+use actq_client::push::{Package, Push, axes_note, push};
 use actq_controller::slots::{Anyone, Key};
 use actq_controller::{Axis, SafeAction};
-use actq_device::keys;
-use actq_device::push::{Package, Push, axes_note, push};
 use actq_link::code::Refusal;
 
 use crate::requests::{arm, observe_until_fresh};

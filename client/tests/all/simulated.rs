@@ -9,13 +9,13 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use actq_boards::ram::Ram;
+use actq_client::client::Client;
+use actq_client::connection::Connection;
+use actq_client::port::Address;
 use actq_controller::breadcrumb::Record;
 use actq_controller::endpoint::Facts;
 use actq_controller::slots::{Authority, Layout, Slots, Updater, Work};
 use actq_controller::{Axis, Check, Endpoint, Guard, Output, SafeAction, Safety, Settings};
-use actq_device::client::Client;
-use actq_device::connection::Connection;
-use actq_device::port::Address;
 use actq_link::code::{Crash, Refusal, ResetCause};
 use actq_link::frame;
 use actq_link::report::{BUILT_IN, Timing};

@@ -4,10 +4,10 @@ use std::io::Cursor;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
+use actq_client::log::Log;
+use actq_client::stream::{Pace, stream};
 use actq_controller::Output;
 use actq_controller::slots::Anyone;
-use actq_device::log::Log;
-use actq_device::stream::{Pace, stream};
 use actq_link::code::State;
 use ndarray::{Array1, Array2};
 use ndarray_npy::NpzReader;
