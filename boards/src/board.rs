@@ -14,8 +14,6 @@ pub struct Board {
     pub emulator: &'static str,
     /// QEMU's machine, as arguments.
     pub machine: &'static [&'static str],
-    /// How the firmware and the host talk.
-    pub transport: Transport,
     /// The measuring binaries of `firmware-bench` that run on it. Its harness runs on every board.
     pub shows: &'static [&'static str],
     /// What the application runs with, where it has a `device` for the board.
@@ -29,20 +27,4 @@ pub struct Application {
     pub about: &'static str,
     /// Words of scratch memory that it gives to a head (the device's `SCRATCH`).
     pub scratch: usize,
-}
-
-/// How the firmware and the host talk.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Transport {
-    /// Calls to the host: command line, files, exit status.
-    Semihosting,
-}
-
-impl Transport {
-    /// QEMU's arguments for it.
-    pub(crate) fn arguments(self) -> &'static [&'static str] {
-        match self {
-            Self::Semihosting => &["-semihosting-config", "enable=on,target=native"],
-        }
-    }
 }

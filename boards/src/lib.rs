@@ -41,7 +41,7 @@ pub mod stm32f405;
 mod vectors;
 
 #[cfg(not(target_os = "none"))]
-pub use board::{Application, Board, Transport};
+pub use board::{Application, Board};
 #[cfg(not(target_os = "none"))]
 pub use link::link;
 #[cfg(all(target_os = "none", any(feature = "mps2-an386", feature = "mps2-an500")))]

@@ -100,7 +100,7 @@ impl Target {
     /// The board with the firmware `elf`, under QEMU, which talks to the host.
     pub fn run(self, elf: &Path) -> Command {
         let mut command = self.emulate(elf, "none");
-        command.args(self.board().transport.arguments());
+        command.args(["-semihosting-config", "enable=on,target=native"]);
         command
     }
 

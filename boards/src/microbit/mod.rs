@@ -1,7 +1,7 @@
 //! The BBC micro:bit: a Cortex-M0 (nRF51822) with 256 KB of flash and 16 KB of RAM. Of the golden cases it runs those
 //! that fit.
 
-use crate::board::{Board, Transport};
+use crate::board::Board;
 
 pub(crate) const BOARD: Board = Board {
     name: "microbit",
@@ -9,7 +9,6 @@ pub(crate) const BOARD: Board = Board {
     small: true,
     emulator: "qemu-system-arm",
     machine: &["-M", "microbit"],
-    transport: Transport::Semihosting,
     shows: &["golden"],
     application: None,
 };

@@ -4,7 +4,7 @@
 pub mod device;
 
 #[cfg(not(target_os = "none"))]
-use crate::board::{Application, Board, Transport};
+use crate::board::{Application, Board};
 
 /// Words of scratch memory that the application gives to a head on Arm's MPS2 boards.
 #[cfg(any(not(target_os = "none"), feature = "cmsdk"))]
@@ -17,7 +17,6 @@ pub(crate) const BOARD: Board = Board {
     small: false,
     emulator: "qemu-system-arm",
     machine: &["-M", "mps2-an386"],
-    transport: Transport::Semihosting,
     shows: &[
         "bench",
         "foc",

@@ -5,7 +5,7 @@
 pub mod device;
 
 #[cfg(not(target_os = "none"))]
-use crate::board::{Application, Board, Transport};
+use crate::board::{Application, Board};
 #[cfg(not(target_os = "none"))]
 use crate::mps2_an386::SCRATCH;
 
@@ -16,7 +16,6 @@ pub(crate) const BOARD: Board = Board {
     small: false,
     emulator: "qemu-system-arm",
     machine: &["-M", "mps2-an505"],
-    transport: Transport::Semihosting,
     shows: &["golden"],
     application: Some(Application { about: "Cortex-M33, QEMU", scratch: SCRATCH }),
 };

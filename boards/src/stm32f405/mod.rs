@@ -8,7 +8,7 @@ pub mod patience;
 pub mod device;
 
 #[cfg(not(target_os = "none"))]
-use crate::board::{Application, Board, Transport};
+use crate::board::{Application, Board};
 
 /// Words of scratch memory: 48 of the 128 KB of RAM.
 pub(crate) const SCRATCH: usize = 12 * 1024;
@@ -20,7 +20,6 @@ pub(crate) const BOARD: Board = Board {
     small: false,
     emulator: "qemu-system-arm",
     machine: &["-M", "netduinoplus2"],
-    transport: Transport::Semihosting,
     shows: &["golden"],
     application: Some(Application {
         about: "Cortex-M4F: ODrive v3, VESC, Crazyflie; QEMU's netduinoplus2",

@@ -1,6 +1,6 @@
 //! QEMU's virt with a SiFive E31, which has RV32IMAC and nothing else: what it lacks is an illegal instruction.
 
-use crate::board::{Board, Transport};
+use crate::board::Board;
 
 pub(crate) const BOARD: Board = Board {
     name: "virt",
@@ -8,7 +8,6 @@ pub(crate) const BOARD: Board = Board {
     small: false,
     emulator: "qemu-system-riscv32",
     machine: &["-M", "virt", "-cpu", "sifive-e31", "-bios", "none"],
-    transport: Transport::Semihosting,
     shows: &["golden", "portable"],
     application: None,
 };
