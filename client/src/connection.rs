@@ -165,11 +165,6 @@ impl Connection {
         Ok(())
     }
 
-    /// Whether the port is there.
-    pub const fn is_open(&self) -> bool {
-        self.port.is_some()
-    }
-
     /// Times that the port was opened again.
     pub const fn reopened(&self) -> u32 {
         self.reopened
