@@ -1,8 +1,7 @@
 //! What host and target say to each other. `docs/LINK.md` has the wire format.
 //!
 //! [`Sender`] makes frames of messages, [`Receiver`] finds messages in bytes. Both are pure state machines: they own no
-//! port, no clock and no heap, and carry on after any byte. How bytes travel is for others to say: a UART, a socket, or
-//! CAN frames ([`can`]).
+//! port, no clock and no heap, and carry on after any byte. The caller moves the bytes: over a UART or a socket.
 //!
 //! [`pipe`] is another, simpler protocol: a simulator that runs an image as its policy through standard input and
 //! output.
@@ -10,7 +9,6 @@
 #![forbid(unsafe_code)]
 
 // Which of these may use which: the table in docs/ARCHITECTURE.md, which a test reads.
-pub mod can;
 pub mod code;
 mod decoder;
 mod fields;

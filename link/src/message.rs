@@ -98,29 +98,42 @@ pub enum Message<'a> {
     },
 }
 
-impl<'a> Message<'a> {
-    /// The kind's number in the frame.
-    pub const fn kind(&self) -> u8 {
-        match self {
-            Self::Observation(_) => 1,
-            Self::Arm { .. } => 2,
-            Self::Disarm => 3,
-            Self::Get { .. } => 4,
-            Self::Set { .. } => 5,
-            Self::Ask(_) => 6,
-            Self::Begin { .. } => 7,
-            Self::Chunk { .. } => 8,
-            Self::Commit { .. } => 9,
-            Self::Abort => 10,
-            Self::Action { .. } => 128,
-            Self::Status(_) => 129,
-            Self::Timing(_) => 130,
-            Self::Breadcrumb(_) => 131,
-            Self::Value { .. } => 132,
-            Self::Ack { .. } => 133,
-        }
-    }
+/// Declares each message's kind number once: a constant to parse by, and [`Message::kind`].
+macro_rules! kinds {
+    ($($message:ident: $kind:ident = $number:literal;)*) => {
+        $(const $kind: u8 = $number;)*
 
+        impl Message<'_> {
+            /// The number of the message's kind in a frame.
+            pub const fn kind(&self) -> u8 {
+                match self {
+                    $(Self::$message { .. } => $kind,)*
+                }
+            }
+        }
+    };
+}
+
+kinds! {
+    Observation: OBSERVATION = 1;
+    Arm: ARM = 2;
+    Disarm: DISARM = 3;
+    Get: GET = 4;
+    Set: SET = 5;
+    Ask: ASK = 6;
+    Begin: BEGIN = 7;
+    Chunk: CHUNK = 8;
+    Commit: COMMIT = 9;
+    Abort: ABORT = 10;
+    Action: ACTION = 128;
+    Status: STATUS = 129;
+    Timing: TIMING = 130;
+    Breadcrumb: BREADCRUMB = 131;
+    Value: VALUE = 132;
+    Ack: ACK = 133;
+}
+
+impl<'a> Message<'a> {
     pub(crate) fn write(&self, w: &mut Writer<'_>) {
         match *self {
             Self::Observation(values) => values.iter().for_each(|value| w.f32(value)),
@@ -171,24 +184,24 @@ impl<'a> Message<'a> {
     pub(crate) fn parse(kind: u8, payload: &'a [u8]) -> Option<Self> {
         let r = &mut Reader(payload);
         let message = match kind {
-            1 => Self::Observation(Floats::of_wire(r.rest())?),
-            2 => Self::Arm { token: r.u32()? },
-            3 => Self::Disarm,
-            4 => Self::Get { parameter: Parameter::from_code(r.u8()?)?, axis: r.u8()? },
-            5 => {
+            OBSERVATION => Self::Observation(Floats::of_wire(r.rest())?),
+            ARM => Self::Arm { token: r.u32()? },
+            DISARM => Self::Disarm,
+            GET => Self::Get { parameter: Parameter::from_code(r.u8()?)?, axis: r.u8()? },
+            SET => {
                 Self::Set { token: r.u32()?, parameter: Parameter::from_code(r.u8()?)?, axis: r.u8()?, value: r.f32()? }
             }
-            6 => Self::Ask(Report::from_code(r.u8()?)?),
-            7 => Self::Begin { token: r.u32()?, length: r.u32()?, crc: r.u32()?, version: r.u32()? },
-            8 => Self::Chunk { offset: r.u32()?, bytes: r.rest() },
-            9 => Self::Commit { signature: if r.is_empty() { None } else { Some(r.array()?) } },
-            10 => Self::Abort,
-            128 => Self::Action { of: r.u32()?, applied: flag(r.u8()?)?, values: Floats::of_wire(r.rest())? },
-            129 => Self::Status(Status::read(r)?),
-            130 => Self::Timing(Timing::read(r)?),
-            131 => Self::Breadcrumb(Breadcrumb::read(r)?),
-            132 => Self::Value { parameter: Parameter::from_code(r.u8()?)?, axis: r.u8()?, value: r.f32()? },
-            133 => Self::Ack { of: r.u32()?, refusal: optional(r.u8()?, Refusal::from_code)?, written: r.u32()? },
+            ASK => Self::Ask(Report::from_code(r.u8()?)?),
+            BEGIN => Self::Begin { token: r.u32()?, length: r.u32()?, crc: r.u32()?, version: r.u32()? },
+            CHUNK => Self::Chunk { offset: r.u32()?, bytes: r.rest() },
+            COMMIT => Self::Commit { signature: if r.is_empty() { None } else { Some(r.array()?) } },
+            ABORT => Self::Abort,
+            ACTION => Self::Action { of: r.u32()?, applied: flag(r.u8()?)?, values: Floats::of_wire(r.rest())? },
+            STATUS => Self::Status(Status::read(r)?),
+            TIMING => Self::Timing(Timing::read(r)?),
+            BREADCRUMB => Self::Breadcrumb(Breadcrumb::read(r)?),
+            VALUE => Self::Value { parameter: Parameter::from_code(r.u8()?)?, axis: r.u8()?, value: r.f32()? },
+            ACK => Self::Ack { of: r.u32()?, refusal: optional(r.u8()?, Refusal::from_code)?, written: r.u32()? },
             _ => return None,
         };
         r.is_empty().then_some(message)
