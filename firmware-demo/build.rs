@@ -1,4 +1,4 @@
-//! Links for the board, writes the build's limits as Rust, and refuses a key that is none.
+//! Links for the board, writes the build's limits as Rust, and refuses an invalid key.
 
 use std::path::PathBuf;
 use std::{env, fs};
@@ -12,18 +12,20 @@ fn main() -> Result<(), String> {
     actq_boards::link()
 }
 
-/// Writes `limits.rs`: an array of the limits in the variable, which commas separate.
+/// Writes `limits.rs`: an array of the comma-separated limits in ACTQ_LIMITS.
 fn write_limits() -> Result<(), String> {
     println!("cargo::rerun-if-env-changed=ACTQ_LIMITS");
     let text = env::var("ACTQ_LIMITS").unwrap_or_default();
     let parts = text.split(',').filter(|_| !text.is_empty());
     let one = |part: &str| part.parse().map_err(|error| format!("ACTQ_LIMITS has {part:?}: {error}"));
     let limits: Vec<Limits> = parts.map(one).collect::<Result<_, _>>()?;
-    let path = PathBuf::from(env::var_os("OUT_DIR").ok_or("cargo sets OUT_DIR")?).join("limits.rs");
+    let path = PathBuf::from(env::var_os("OUT_DIR").ok_or("OUT_DIR is not set; run this build script with cargo")?)
+        .join("limits.rs");
     fs::write(&path, format!("{limits:?}")).map_err(|error| format!("{}: {error}", path.display()))
 }
 
-/// A text that is not 64 hexadecimal digits is refused where it becomes a constant.
+/// Checks that the key is a point of the curve. A text that is not 64 hexadecimal digits fails where it becomes a
+/// constant.
 #[cfg(feature = "signed")]
 fn check_key() -> Result<(), String> {
     use actq_controller::slots::Key;

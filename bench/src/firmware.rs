@@ -115,9 +115,9 @@ pub fn style(name: &str) -> Result<PathBuf> {
 /// Builds the binaries of `firmware-bench` that run on a target's board, and gives the path of one's ELF file.
 pub fn binary(name: &str, target: Target) -> Result<PathBuf> {
     let board = target.board();
-    ensure!(board.shows.contains(&name), "firmware {name} does not run on {}", board.name);
+    ensure!(board.binaries.contains(&name), "firmware {name} does not run on {}", board.name);
     let features = target.feature().unwrap_or_default();
-    let build = || build(BENCH, board.shows, features, &target_dir(), target, target.profile(), &[]);
+    let build = || build(BENCH, board.binaries, features, &target_dir(), target, target.profile(), &[]);
     Ok(once(BENCH, target, build)?.join(name))
 }
 

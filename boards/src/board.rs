@@ -1,30 +1,30 @@
-//! What a folder of this crate gives of its board to the host.
+//! The host's description of a board.
 
-/// A machine.
+/// A board.
 #[derive(Debug)]
 pub struct Board {
-    /// Its name, and that of its folder with hyphens for underscores.
+    /// Name of the board, and of its folder with hyphens for underscores.
     pub name: &'static str,
-    /// Path of the linker script of its memory, from the workspace's root: what link.x includes. That of the default
-    /// board is `memory.x`.
+    /// Path of the memory's linker script from the workspace's root; link.x includes it. The default board's is
+    /// `memory.x`.
     pub memory: &'static str,
-    /// Whether its memory holds little more than a small policy (cfg `actq_small` of the firmware).
+    /// `true` if the memory holds little more than a small policy (cfg `actq_small` of the firmware).
     pub small: bool,
-    /// QEMU's program.
+    /// QEMU's executable.
     pub emulator: &'static str,
-    /// QEMU's machine, as arguments.
+    /// QEMU's arguments for the machine.
     pub machine: &'static [&'static str],
-    /// The measuring binaries of `firmware-bench` that run on it. Its harness runs on every board.
-    pub shows: &'static [&'static str],
-    /// What the application runs with, where it has a `device` for the board.
+    /// Measuring binaries of `firmware-bench` that run on the board. The harness runs on every board.
+    pub binaries: &'static [&'static str],
+    /// The application's properties on the board, if it supports the board.
     pub application: Option<Application>,
 }
 
-/// What the application runs with on a board.
+/// Properties of the application on a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Application {
-    /// What it is, for people.
+    /// Human-readable description of the board.
     pub about: &'static str,
-    /// Words of scratch memory that it gives to a head (the device's `SCRATCH`).
+    /// Scratch memory for a head, in words (the device's `SCRATCH`).
     pub scratch: usize,
 }

@@ -1,5 +1,5 @@
 //! The peripherals of Arm's MPS2 boards: UART and watchdog of the Cortex-M System Design Kit (Arm DDI 0479C, sections
-//! 4.3 and 4.5). No crate has their registers.
+//! 4.3 and 4.5). No public crate has their registers.
 
 use volatile_register::{RW, WO};
 
@@ -17,10 +17,10 @@ struct UartRegisters {
 const TX_FULL: u32 = 1 << 0;
 const RX_FULL: u32 = 1 << 1;
 const RX_OVERRUN: u32 = 1 << 3;
-/// Transmitter and receiver on, an interrupt for each byte received.
+/// Transmitter and receiver on, with an interrupt for each received byte.
 const ON: u32 = 0b1011;
 const TX_INTERRUPT: u32 = 1 << 2;
-/// Those of transmitter and receiver, to be cleared.
+/// Interrupts of transmitter and receiver, to clear.
 const INTERRUPTS: u32 = 0b11;
 
 /// A CMSDK UART.
@@ -28,14 +28,14 @@ const INTERRUPTS: u32 = 0b11;
 pub struct Uart(usize);
 
 impl Uart {
-    /// Switches the UART at `base` on, with 8 bits and no parity.
+    /// Enables the UART at `base`, with 8 bits and no parity.
     ///
     /// # Safety
     ///
-    /// There is a CMSDK UART at `base`, and nothing else uses it.
+    /// A CMSDK UART is at `base`, and nothing else uses it.
     pub(crate) unsafe fn new(base: usize, clock_hz: u32, baud: u32) -> Self {
         let uart = Self(base);
-        // SAFETY: there is a CMSDK UART, as the caller promises; a divider of 16 is the smallest that it takes.
+        // SAFETY: a CMSDK UART is at `base`, as the caller promises; 16 is its smallest divider.
         unsafe {
             uart.registers().divider.write((clock_hz / baud.max(1)).max(16));
             uart.registers().control.write(ON);
@@ -44,7 +44,8 @@ impl Uart {
     }
 
     fn registers(&self) -> &UartRegisters {
-        // SAFETY: `new` was promised that these registers are there, for nothing else; they are volatile cells.
+        // SAFETY: the caller of `new` promised that these registers exist and nothing else uses them; they are volatile
+        // cells.
         unsafe { &*(self.0 as *const UartRegisters) }
     }
 }
@@ -52,11 +53,11 @@ impl Uart {
 impl seams::Uart for Uart {
     fn receive(&mut self) -> Option<Result<u8, Lost>> {
         let registers = self.registers();
-        // SAFETY: clearing what has come before the state is read loses nothing: a byte that comes later sets it again.
+        // SAFETY: clearing the interrupts before reading the state loses nothing: a later byte sets them again.
         unsafe { registers.interrupt.write(INTERRUPTS) };
         let state = registers.state.read();
         if state & RX_OVERRUN != 0 {
-            // SAFETY: writing the bit clears it, and it alone.
+            // SAFETY: writing the bit clears only this bit.
             unsafe { registers.state.write(RX_OVERRUN) };
             return Some(Err(Lost));
         }
@@ -72,7 +73,7 @@ impl seams::Uart for Uart {
         room
     }
 
-    fn ask_for_room(&mut self, on: bool) {
+    fn set_transmit_interrupt(&mut self, on: bool) {
         // SAFETY: interrupts that the board's vector table has a handler for.
         unsafe { self.registers().control.write(if on { ON | TX_INTERRUPT } else { ON }) };
     }
@@ -91,12 +92,12 @@ struct WatchdogRegisters {
 
 const _: () = assert!(core::mem::offset_of!(WatchdogRegisters, lock) == 0xc00);
 
-/// What opens the registers for writing.
+/// Key that unlocks the registers.
 const KEY: u32 = 0x1acc_e551;
-/// An interrupt at the first end of the time, a reset at the second.
+/// Interrupt at the first timeout, reset at the second.
 const INTERRUPT_AND_RESET: u32 = 0b11;
 
-/// A CMSDK watchdog: at the end of the time an NMI, and at the end of another one the reset.
+/// A CMSDK watchdog: an NMI at the first timeout, and the reset at the second.
 #[derive(Debug)]
 pub struct Watchdog {
     base: usize,
@@ -104,19 +105,20 @@ pub struct Watchdog {
 }
 
 impl Watchdog {
-    /// The watchdog at `base`, off.
+    /// Creates the watchdog at `base`, off.
     ///
     /// # Safety
     ///
-    /// There is a CMSDK watchdog at `base`, and nothing else uses it.
+    /// A CMSDK watchdog is at `base`, and nothing else uses it.
     pub(crate) unsafe fn new(base: usize, clock_hz: u32) -> Self {
         Self { base, clock_hz }
     }
 
     fn write(&self, write: impl FnOnce(&WatchdogRegisters)) {
-        // SAFETY: `new` was promised that these registers are there, for nothing else; they are volatile cells.
+        // SAFETY: the caller of `new` promised that these registers exist and nothing else uses them; they are volatile
+        // cells.
         let registers = unsafe { &*(self.base as *const WatchdogRegisters) };
-        // SAFETY: opening and closing the registers changes nothing else.
+        // SAFETY: unlocking and locking the registers changes nothing else.
         unsafe { registers.lock.write(KEY) };
         write(registers);
         // SAFETY: as above.
@@ -128,7 +130,7 @@ impl seams::Watchdog for Watchdog {
     fn start(&mut self, milliseconds: u16) -> bool {
         let cycles = (self.clock_hz / 1000).checked_mul(milliseconds.into()).filter(|cycles| *cycles > 0);
         let Some(cycles) = cycles else { return false };
-        // SAFETY: any time but 0 is allowed; the board's NMI has a handler.
+        // SAFETY: any time except 0 is allowed; the board's NMI has a handler.
         self.write(|registers| unsafe {
             registers.load.write(cycles);
             registers.control.write(INTERRUPT_AND_RESET);
@@ -137,7 +139,7 @@ impl seams::Watchdog for Watchdog {
     }
 
     fn feed(&mut self) {
-        // SAFETY: any value clears the interrupt and loads the time anew.
+        // SAFETY: any value clears the interrupt and reloads the time.
         self.write(|registers| unsafe { registers.clear.write(1) });
     }
 }

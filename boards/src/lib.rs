@@ -1,9 +1,9 @@
-//! The boards that the firmware runs on. A board is a folder of this crate: its memory, how it is emulated, what it can
-//! show, and, for the application, its registers.
+//! The boards that the firmware runs on. Each board is a folder of this crate: its memory, its emulation, the binaries
+//! that run on it, and, for the application, its registers.
 //!
-//! On the host this crate is the table of boards: cargo's runner and the build scripts, tests and measurements read it.
-//! On a target it is the `device` of the board that a feature names, behind the traits of [`seams`], and [`port`], the
-//! serial port that all share.
+//! On the host this crate is the table of boards for cargo's runner, build scripts, tests and measurements. On a target
+//! it is the `device` of the board that a feature selects, behind the traits of [`seams`], and the serial port that all
+//! boards share ([`port`]).
 #![cfg_attr(target_os = "none", no_std)]
 #![cfg_attr(not(target_os = "none"), forbid(unsafe_code))]
 

@@ -1,26 +1,26 @@
-//! What a build script of a firmware tells cargo.
+//! The instructions to cargo from a firmware's build script.
 
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
 use crate::table::Target;
 
-/// The memory of the default board, which link.x finds at the workspace's root.
+/// The default board's memory script, which link.x finds at the workspace's root.
 const DEFAULT_MEMORY: &str = "memory.x";
 
-/// Links the package's binaries for a board; on the host, does nothing. For build scripts of packages one folder below
+/// Links the package's binaries for a board; does nothing for the host. For build scripts of packages one folder below
 /// the workspace's root.
 ///
 /// # Errors
 ///
-/// A feature names a board that the compiler's target does not run on, or two do; or the linker's script cannot be
-/// copied.
+/// Fails if a feature selects a board of another compiler target, if features select two boards, or if a linker script
+/// cannot be written.
 pub fn link() -> Result<(), String> {
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rustc-check-cfg=cfg(actq_small)");
     let Some(target) = target()? else { return Ok(()) };
     let board = target.board();
-    // The variable of this run: a build script may have been compiled for another checkout.
+    // From the variable of this run, because the build script may have been compiled for another checkout.
     let [package, out] =
         ["CARGO_MANIFEST_DIR", "OUT_DIR"].map(|name| PathBuf::from(env::var_os(name).unwrap_or_default()));
     let root = package.parent().unwrap_or(Path::new("."));
@@ -30,14 +30,14 @@ pub fn link() -> Result<(), String> {
         // riscv-rt's link.x includes no memory.x.
         println!("cargo::rustc-link-arg-bins=-T{}", script.display());
     } else {
-        // cortex-m-rt's link.x includes `memory.x`. Cargo starts the linker in the workspace's root, and the linker looks
-        // there before its search path: it always finds the default board's file, and for another board reads that
-        // board's in its place.
+        // cortex-m-rt's link.x includes `memory.x`. Cargo starts the linker in the workspace's root, and the linker
+        // looks there before its search path, so it always finds the default board's file. For another board it is
+        // mapped to that board's file.
         println!("cargo::rustc-link-search={}", root.display());
         if board.memory != DEFAULT_MEMORY {
             println!("cargo::rustc-link-arg-bins=--remap-inputs=*{DEFAULT_MEMORY}={}", script.display());
         }
-        // It also includes device.x: a handler that a program need not have.
+        // link.x also includes device.x, which makes the handler SERIAL optional.
         fs::write(out.join("device.x"), "PROVIDE(SERIAL = DefaultHandler);\n")
             .map_err(|error| format!("device.x: {error}"))?;
         println!("cargo::rustc-link-search={}", out.display());
@@ -52,7 +52,7 @@ pub fn link() -> Result<(), String> {
     Ok(())
 }
 
-/// What is built for: the board that a feature names, else the first one of the compiler's target.
+/// Returns the build's target: the board that a feature selects, else the first one of the compiler's target.
 fn target() -> Result<Option<Target>, String> {
     let triple = env::var("TARGET").unwrap_or_default();
     let Some(default) = Target::of(&triple) else { return Ok(None) };
@@ -68,8 +68,10 @@ fn target() -> Result<Option<Target>, String> {
             let name = board.board().name;
             let same = |target: &Target| target.board().name == name && target.triple() == triple;
             let found = Target::ALL.into_iter().find(same);
-            found.map(Some).ok_or(format!("{name} is built with --target {}, not {triple}", board.triple()))
+            found.map(Some).ok_or(format!("board {name} needs --target {}, not {triple}", board.triple()))
         }
-        [one, other, ..] => Err(format!("features choose two boards: {}, {}", one.board().name, other.board().name)),
+        [one, other, ..] => {
+            Err(format!("features select two boards, {} and {}; select one", one.board().name, other.board().name))
+        }
     }
 }

@@ -1,6 +1,6 @@
-//! `actq-boards TARGET ELF [ARGUMENT ...]`: runs a firmware on the emulated board of a target. It is cargo's runner, so
+//! `actq-boards TARGET ELF [ARGUMENT ...]`: runs a firmware on the emulated board of a target. It is cargo's runner:
 //! `ACTQ_IMAGE=... cargo run --package actq-firmware-bench --bin harness --target thumbv7em-none-eabihf -- serve`
-//! serves.
+//! serves an image.
 #![forbid(unsafe_code)]
 
 use std::path::Path;
@@ -16,7 +16,7 @@ fn main() -> ExitCode {
     };
     let Some(target) = Target::of(triple) else {
         let known = Target::ALL.map(Target::triple).join(", ");
-        eprintln!("error: there is no board for {triple}; there are some for {known}");
+        eprintln!("error: no board for the target {triple}; use one of {known}");
         return ExitCode::from(2);
     };
     let mut command = target.run(Path::new(elf));
@@ -28,7 +28,7 @@ fn main() -> ExitCode {
         Ok(_) => ExitCode::FAILURE,
         Err(error) => {
             eprintln!(
-                "error: {} cannot be started ({error}); `cargo xtask doctor` says how to install it",
+                "error: cannot start {}: {error}; `cargo xtask doctor` shows how to install it",
                 target.board().emulator
             );
             ExitCode::FAILURE

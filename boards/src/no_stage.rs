@@ -1,4 +1,4 @@
-//! A power stage that is not there, for emulated boards and for tests.
+//! A power stage without hardware, for emulated boards and for tests.
 
 use core::convert::Infallible;
 
@@ -6,16 +6,16 @@ use embedded_hal::pwm::{ErrorType, SetDutyCycle};
 
 use crate::seams::Stage;
 
-/// Keeps what it is told. `TOP` is the duty cycle of a switch that is always on.
+/// A power stage that only stores its settings. `TOP` is the duty cycle of a switch that is always on.
 #[derive(Debug, Default)]
 pub struct NoStage<const TOP: u16> {
     phases: [NoPhase<TOP>; 3],
-    /// Whether it would be on.
+    /// `true` if the stage is enabled.
     pub on: bool,
 }
 
 impl<const TOP: u16> NoStage<TOP> {
-    /// The phases' duty cycles, of `TOP`.
+    /// Returns the phases' duty cycles, from 0 to `TOP`.
     pub fn duties(&self) -> [u16; 3] {
         self.phases.each_ref().map(|phase| phase.0)
     }

@@ -1,5 +1,5 @@
-//! A serial port of two queues between an interrupt and the program: [`Wire`] is the interrupt's end, [`Port`] the
-//! program's. Neither waits for the other, nor for the line.
+//! A serial port with two queues between an interrupt and the program: [`Wire`] is the interrupt's end, [`Port`] the
+//! program's. Neither waits for the other or for the line.
 
 use core::convert::Infallible;
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -9,7 +9,8 @@ use heapless::spsc::{Consumer, Producer, Queue};
 
 use crate::seams::Uart;
 
-/// The memory of a port: two queues of `LEN` bytes, one of which is always free. A power of two, for its remainders.
+/// Memory of a port: two queues of `LEN` bytes, each with one byte always free. `LEN` is a power of two, so that its
+/// remainders are masks.
 #[derive(Debug)]
 pub struct Buffers<const LEN: usize> {
     input: Queue<u8, LEN>,
@@ -18,12 +19,12 @@ pub struct Buffers<const LEN: usize> {
 }
 
 impl<const LEN: usize> Buffers<LEN> {
-    /// Empty.
+    /// Creates empty queues.
     pub const fn new() -> Self {
         Self { input: Queue::new(), output: Queue::new(), lost: AtomicU32::new(0) }
     }
 
-    /// Both ends. `kick` makes the interrupt of `uart` come: what it is to transmit is there.
+    /// Splits the port into its ends. `kick` triggers the interrupt of `uart` when there are bytes to transmit.
     pub fn split<U: Uart>(&mut self, uart: U, kick: fn()) -> (Wire<'_, U, LEN>, Port<'_, LEN>) {
         let Self { input, output, lost } = self;
         let ((received, input), (output, waiting)) = (input.split(), output.split());
@@ -46,23 +47,23 @@ pub struct Wire<'b, U, const LEN: usize> {
 }
 
 impl<U: Uart, const LEN: usize> Wire<'_, U, LEN> {
-    /// What the interrupt does: takes what has come, gives what can go.
+    /// Handles the interrupt: takes received bytes and transmits waiting ones.
     pub fn on_interrupt(&mut self) {
         let Self { uart, input, output, lost } = self;
         while let Some(byte) = uart.receive() {
             if !byte.is_ok_and(|byte| put::<LEN>(input, byte)) {
-                // Written here alone, so a load and a store lose nothing.
+                // Only this function writes it, so a load and a store lose nothing.
                 lost.store(lost.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
             }
         }
-        // What puts bytes in cannot interrupt this, so a byte that is seen is whole.
+        // The producer cannot interrupt this function, so a visible byte is complete.
         while let Some(byte) = output.peek() {
             if !uart.transmit(*byte) {
                 break;
             }
             take::<LEN>(output);
         }
-        uart.ask_for_room(output.ready());
+        uart.set_transmit_interrupt(output.ready());
     }
 }
 
@@ -75,21 +76,21 @@ pub struct Port<'b, const LEN: usize> {
 }
 
 impl<const LEN: usize> Port<'_, LEN> {
-    /// Bytes that were received and lost since the start, modulo 2^32: overrun, wrongly framed, or without room in the
-    /// queue.
+    /// Returns the received bytes lost since the start, modulo 2^32: overruns, framing errors, and a full queue.
     pub fn lost(&self) -> u32 {
         self.lost.load(Ordering::Relaxed)
     }
 
-    /// Lets what waits go on, where the interrupt does not come by itself; to be called again and again.
+    /// Triggers the transmission of waiting bytes, for ports whose interrupt does not come automatically. Call it
+    /// regularly.
     pub fn pump(&self) {
         if has_bytes::<LEN>(&self.output) {
             (self.kick)();
         }
     }
 
-    /// Takes a frame to transmit, all of it or nothing; `false` if there is no room for all of it, as where the other end
-    /// does not read.
+    /// Queues a frame to transmit as a whole. Returns `false`, with nothing queued, if it does not fit, such as when
+    /// the other end does not read.
     pub fn send(&mut self, frame: &[u8]) -> bool {
         let has_room = room::<LEN>(&self.output) >= frame.len();
         if has_room {
@@ -111,7 +112,7 @@ impl<const LEN: usize> ReadReady for Port<'_, LEN> {
 }
 
 impl<const LEN: usize> Read for Port<'_, LEN> {
-    /// Waits for a byte, and takes as many as have come.
+    /// Waits for a byte, then takes all received bytes that fit.
     fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Infallible> {
         if buffer.is_empty() {
             return Ok(0);
@@ -128,26 +129,26 @@ impl<const LEN: usize> Read for Port<'_, LEN> {
     }
 }
 
-// Producer and consumer refer to their queue as a view. The compiler then does not know its length, and each remainder
-// is a division with a panic at zero. The comparison in these functions states the length, which makes it a mask. The
-// test of the application's ELF file fails if a panic is left.
+// Producer and consumer refer to their queue as a view, whose length the compiler does not know, so each remainder is a
+// division with a panic at zero. The comparison in these functions states the length, which makes it a mask. The test
+// of the application's ELF file fails if a panic remains.
 
-/// Puts a byte in; `false` if there is no room.
+/// Queues a byte; returns `false` if the queue is full.
 fn put<const LEN: usize>(queue: &mut Producer<'_, u8>, byte: u8) -> bool {
     queue.capacity() == LEN - 1 && queue.enqueue(byte).is_ok()
 }
 
-/// Takes the next byte, if there is one.
+/// Takes the next byte, if any.
 fn take<const LEN: usize>(queue: &mut Consumer<'_, u8>) -> Option<u8> {
     if queue.capacity() == LEN - 1 { queue.dequeue() } else { None }
 }
 
-/// Bytes that there is room for.
+/// Returns the free bytes of the queue.
 fn room<const LEN: usize>(queue: &Producer<'_, u8>) -> usize {
     if queue.capacity() == LEN - 1 { LEN - 1 - queue.len() } else { 0 }
 }
 
-/// Returns `true` if a byte that was put in has not been taken.
+/// Returns `true` if a queued byte has not been taken.
 fn has_bytes<const LEN: usize>(queue: &Producer<'_, u8>) -> bool {
     queue.capacity() == LEN - 1 && !queue.is_empty()
 }
@@ -160,7 +161,7 @@ mod tests {
     use super::*;
     use crate::seams::Lost;
 
-    /// A port with these bytes on its line; its transmitter has room for `room`.
+    /// A UART with these bytes on its line; its transmitter takes `room` bytes.
     #[derive(Default)]
     struct Mock {
         line: VecDeque<Result<u8, Lost>>,
@@ -182,7 +183,7 @@ mod tests {
             room
         }
 
-        fn ask_for_room(&mut self, on: bool) {
+        fn set_transmit_interrupt(&mut self, on: bool) {
             self.asked = on;
         }
     }
@@ -191,7 +192,7 @@ mod tests {
     const ROOM: usize = LEN - 1;
 
     #[test]
-    fn bytes_come_in_order_and_what_has_no_room_is_counted() {
+    fn bytes_arrive_in_order_and_lost_ones_are_counted() {
         // The queue wraps.
         let mut mock = Mock::default();
         let mut buffers = Buffers::<LEN>::new();
@@ -216,7 +217,7 @@ mod tests {
         let mut buffers = Buffers::<LEN>::new();
         let (mut wire, mut port) = buffers.split(&mut mock, || ());
         assert!(!port.send(&[7; ROOM + 1]), "longer than the queue");
-        assert!(port.send(&[7; ROOM - 1]) && !port.send(&[8, 9]) && port.send(&[1]), "what there is room for");
+        assert!(port.send(&[7; ROOM - 1]) && !port.send(&[8, 9]) && port.send(&[1]), "frames that fit");
         wire.on_interrupt();
         assert_eq!((wire.uart.sent.len(), wire.uart.asked), (2, true));
         // The queue wraps.

@@ -1,23 +1,23 @@
-//! RAM with the rules of NOR flash, for emulators without a flash controller, and for tests.
+//! RAM with the rules of NOR flash, for emulators without a flash controller and for tests.
 
 use core::cell::Cell;
 use core::ops::Range;
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 
-/// Memory that is erased to ones in sectors of `SECTOR` bytes, and of which a unit of `UNIT` bytes is programmed once.
-/// Cells, because an image runs in place from one part of a flash while another part is written.
+/// Memory that is erased to ones in sectors of `SECTOR` bytes and programmed once in units of `UNIT` bytes. It consists
+/// of cells, because an image runs in place from one part of a flash while another part is written.
 #[derive(Debug)]
 pub struct Ram<'m, const UNIT: usize, const SECTOR: usize>(pub &'m [Cell<u8>]);
 
-/// Why a request was not done.
+/// Reason for refusing a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RamError {
-    /// It is not within the memory.
+    /// The request is not within the memory.
     Bounds,
-    /// It does not begin or end between two units or sectors.
+    /// The request does not begin and end at a unit or sector boundary.
     Alignment,
-    /// A unit was programmed since it was erased.
+    /// A unit was programmed since its last erase.
     Programmed,
 }
 
@@ -32,7 +32,7 @@ impl NorFlashError for RamError {
 }
 
 impl<'m, const UNIT: usize, const SECTOR: usize> Ram<'m, UNIT, SECTOR> {
-    /// All of `memory`.
+    /// Uses all of `memory`.
     pub fn new(memory: &'m mut [u8]) -> Self {
         Self(Cell::from_mut(memory).as_slice_of_cells())
     }
@@ -90,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ram_has_the_rules_of_flash() {
+    fn ram_follows_the_rules_of_flash() {
         let mut memory = [7; 64];
         let mut ram = Ram::<4, 16>::new(&mut memory);
         assert_eq!(ram.write(0, &[1; 4]), Err(RamError::Programmed), "not erased");

@@ -1,58 +1,58 @@
-//! What the application asks of a board, beyond embedded-hal's PWM: the few things that have no trait there.
+//! The application's interface to a board, beyond embedded-hal's PWM: parts that have no trait there.
 
 use embedded_hal::pwm::SetDutyCycle;
 
-/// Bytes were received and lost, or came with a wrong frame or parity.
+/// Received bytes were lost, or had a wrong frame or parity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lost;
 
-/// Single bytes of a serial port, without waiting: for the handler of its interrupt, which comes with every byte that
-/// is received.
+/// Non-blocking access to single bytes of a serial port, for the handler of its interrupt, which comes with every
+/// received byte.
 pub trait Uart {
-    /// The byte that was received, if one was.
+    /// Returns the received byte, if any.
     fn receive(&mut self) -> Option<Result<u8, Lost>>;
 
-    /// Transmits a byte; false, with nothing done, where the transmitter is full.
+    /// Transmits a byte; returns `false` without any change if the transmitter is full.
     fn transmit(&mut self, byte: u8) -> bool;
 
-    /// Whether the interrupt also comes when the transmitter has room. A port without such an interrupt does nothing
-    /// here.
-    fn ask_for_room(&mut self, on: bool);
+    /// Enables or disables the interrupt for a transmitter with room. A port without such an interrupt does nothing.
+    fn set_transmit_interrupt(&mut self, on: bool);
 }
 
-/// A watchdog, which nothing can stop.
+/// A watchdog, which cannot be stopped.
 pub trait Watchdog {
-    /// Starts it: without [`Watchdog::feed`] for this time it resets the board. False where it cannot be that long.
+    /// Starts the watchdog: without [`Watchdog::feed`] for this time it resets the board. Returns `false` if it does
+    /// not support this time.
     fn start(&mut self, milliseconds: u16) -> bool;
 
-    /// Starts the time anew.
+    /// Restarts the time.
     fn feed(&mut self);
 }
 
-/// What the core's clock runs from.
+/// Source of the core's clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
-    /// What it is meant to run from: a crystal.
+    /// The intended source, a crystal.
     Crystal,
-    /// The oscillator inside of the part, because the crystal's did not start: slower, and not exact.
+    /// The part's internal oscillator, because the crystal did not start: slower and inaccurate.
     Fallback,
 }
 
 /// The core's clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Clock {
-    /// Cycles a second.
+    /// Cycles per second.
     pub hz: u32,
-    /// Its source.
+    /// Source of the clock.
     pub source: Source,
 }
 
-/// Why the board was reset, as far as its registers tell.
+/// Cause of the board's reset, according to its registers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
-    /// Its registers do not tell.
+    /// The registers do not show the cause.
     Unknown,
-    /// Power came on, or sagged.
+    /// Power-on or brown-out.
     Power,
     /// The reset pin.
     Pin,
@@ -63,7 +63,7 @@ pub enum Cause {
 }
 
 impl Cause {
-    /// One word for it.
+    /// Returns one word for the cause.
     pub const fn text(self) -> &'static str {
         match self {
             Self::Unknown => "unknown",
@@ -77,23 +77,23 @@ impl Cause {
 
 /// A motor's power stage.
 pub trait Stage {
-    /// Duty cycle of a phase.
+    /// A phase with its duty cycle.
     type Phase: SetDutyCycle;
 
-    /// The three phases.
+    /// Returns the three phases.
     fn phases(&mut self) -> &mut [Self::Phase; 3];
 
-    /// Switches the outputs on; false where the break input or the hardware keeps them off.
+    /// Switches the outputs on; returns `false` if the break input or the hardware keeps them off.
     fn enable(&mut self) -> bool;
 
-    /// Whether the outputs are on: not after a break, either.
+    /// Returns `true` while the outputs are enabled; a break input disables them.
     fn is_on(&mut self) -> bool;
 
-    /// Switches all six outputs off, now.
+    /// Switches all six outputs off immediately.
     fn disable(&mut self);
 
-    /// Two phase currents that were measured in the middle of the last period, as the ADC gives them (0 to 4095);
-    /// `None` where there are no new ones.
+    /// Returns two phase currents, measured in the middle of the last period, as ADC values from 0 to 4095; `None`
+    /// without new ones.
     fn currents(&mut self) -> Option<[u16; 2]>;
 }
 
@@ -102,7 +102,7 @@ pub trait Stage {
 pub struct Parts<U, W, S> {
     /// The core's clock.
     pub clock: Clock,
-    /// Why it was reset.
+    /// Cause of its last reset.
     pub cause: Cause,
     /// Its serial port.
     pub uart: U,

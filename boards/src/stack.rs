@@ -1,8 +1,8 @@
-//! Where the linker's script puts the stack.
+//! The stack's memory, from the linker script.
 
 use core::ops::Range;
 
-/// The addresses behind all variables, up to the stack's begin.
+/// Returns the addresses from the end of all variables to the stack's start.
 pub(crate) fn memory() -> Range<u32> {
     unsafe extern "C" {
         static _stack_end: u32;

@@ -1,8 +1,8 @@
 //! The table of boards.
 //!
-//! A [`Target`] is a board and the compiler's target for it, one line in the table. From these follow the
-//! linker's scripts ([`link`](crate::link())), cargo's runner (this crate's binary, `.cargo/config.toml`), what is
-//! installed, and what tests and measurements run where.
+//! A [`Target`] is a board and the compiler's target for it, one line in the table. The linker's scripts
+//! ([`link`](crate::link())), cargo's runner (this crate's binary, `.cargo/config.toml`), the toolchain's setup, and
+//! the boards of tests and measurements follow from it.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -11,37 +11,37 @@ use std::process::Command;
 use crate::board::Board;
 use crate::{microbit, mps2_an385, mps2_an386, mps2_an500, mps2_an505, stm32f405, virt};
 
-/// How the time of an emulated board passes. Neither runs ahead of the host's, whose clock is in what it sends.
+/// Clock of an emulated board. It never runs ahead of the host's clock, whose time is in the host's frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Clock {
-    /// By 2^`0` ns an instruction: times are the same in every run. QEMU then takes about a millisecond for a byte of
-    /// the serial port.
+    /// 2^`0` ns per instruction: times are the same in every run. QEMU then takes about a millisecond per byte of the
+    /// serial port.
     Counted(u32),
-    /// With the host's, by as many instructions as that takes. A byte takes some 40 µs.
+    /// The host's time, with a variable number of instructions. A byte takes about 40 µs.
     Host,
 }
 
-/// Declares [`Target`] from a line for each.
+/// Declares [`Target`] from one line per target.
 macro_rules! targets {
     ($($(#[doc = $doc:literal])* $target:ident: $triple:literal on $board:ident;)*) => {
-        /// What the firmware is built for: a board and rustc's target.
+        /// A target of the firmware: a board and rustc's target.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
         pub enum Target {
             $($(#[doc = $doc])* $target,)*
         }
 
         impl Target {
-            /// All of them.
+            /// All targets, in the table's order.
             pub const ALL: [Self; [$($triple),*].len()] = [$(Self::$target),*];
 
-            /// rustc's name.
+            /// Returns rustc's name of the target.
             pub fn triple(self) -> &'static str {
                 match self {
                     $(Self::$target => $triple,)*
                 }
             }
 
-            /// What it runs on.
+            /// Returns the target's board.
             pub fn board(self) -> &'static Board {
                 match self {
                     $(Self::$target => &$board::BOARD,)*
@@ -54,7 +54,7 @@ macro_rules! targets {
 targets! {
     /// Cortex-M4 with FPU.
     Fpu: "thumbv7em-none-eabihf" on mps2_an386;
-    /// Cortex-M4, floats in software: the same bits.
+    /// Cortex-M4 with floats in software, which give the same bits.
     NoFpu: "thumbv7em-none-eabi" on mps2_an386;
     /// Cortex-M3, without the DSP extension: the portable kernels.
     NoDsp: "thumbv7m-none-eabi" on mps2_an385;
@@ -71,40 +71,41 @@ targets! {
 }
 
 impl Target {
-    /// The target with this name of rustc's; where several boards share it, the first one.
+    /// Returns the target with this name of rustc's; if several boards share it, the first one.
     pub fn of(triple: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|target| target.triple() == triple)
     }
 
-    /// The target of the board with this name; where it has several, the first one.
+    /// Returns the target of the board with this name; if it has several, the first one.
     pub fn on(board: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|target| target.board().name == board)
     }
 
-    /// The feature of a firmware package that chooses the board: its name. Without a feature it is that of
-    /// [`Target::of`].
+    /// Returns the feature of a firmware package that selects the board, which is the board's name. `None` for the
+    /// board of [`Target::of`], which needs no feature.
     pub fn feature(self) -> Option<&'static str> {
         (Self::of(self.triple()) != Some(self)).then_some(self.board().name)
     }
 
-    /// Whether the kernels are in assembler, unless `ACTQ_BACKEND` leaves it out.
+    /// Returns `true` if the kernels are in assembler, unless `ACTQ_BACKEND` selects the portable ones.
     pub fn has_assembler(self) -> bool {
         ["thumbv7em", "thumbv8m.main"].iter().any(|core| self.triple().starts_with(core))
     }
 
-    /// The profile of a build (`Cargo.toml`).
+    /// Returns the profile of a build (`Cargo.toml`).
     pub fn profile(self) -> &'static str {
         if self.has_assembler() { "firmware" } else { "firmware-portable" }
     }
 
-    /// The board with the firmware `elf`, under QEMU, which talks to the host.
+    /// Returns the QEMU command that runs the firmware `elf`, with calls to the host (semihosting).
     pub fn run(self, elf: &Path) -> Command {
         let mut command = self.emulate(elf, "none");
         command.args(["-semihosting-config", "enable=on,target=native"]);
         command
     }
 
-    /// The board with the application `elf`, under QEMU, its serial port at one of QEMU's character devices.
+    /// Returns the QEMU command that runs the application `elf`, with its serial port at one of QEMU's character
+    /// devices.
     pub fn run_with_serial(self, elf: &Path, serial: &str, clock: Clock) -> Command {
         let mut command = self.emulate(elf, serial);
         let count = match clock {
@@ -124,17 +125,17 @@ impl Target {
     }
 }
 
-/// The workspace's root.
+/// Returns the workspace's root.
 pub fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."))
 }
 
-/// The folder that cargo builds into.
+/// Returns cargo's target folder.
 pub fn target_dir() -> PathBuf {
     std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), |dir| root().join(dir))
 }
 
-/// First line of the version text of a program: an emulator, the compiler.
+/// Returns the first line of a program's version text.
 pub fn version(program: &str) -> io::Result<String> {
     let output = Command::new(program).arg("--version").output()?;
     Ok(String::from_utf8_lossy(&output.stdout).lines().next().unwrap_or_default().to_owned())
@@ -159,9 +160,9 @@ mod tests {
         }
     }
 
-    /// The default board's memory is at the root, and no file is left that no board links with.
+    /// The default board's memory script is at the root, and each memory script belongs to a board.
     #[test]
-    fn every_memory_script_is_of_a_board() {
+    fn every_memory_script_belongs_to_a_board() {
         let default = Target::of("thumbv7em-none-eabihf").expect("the table's first line").board();
         assert_eq!((default.name, default.memory), ("mps2-an386", "memory.x"));
         let folders = fs::read_dir(root().join("boards/src")).expect("the boards").flatten().map(|entry| entry.path());
@@ -184,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn a_feature_chooses_what_the_triple_does_not() {
+    fn features_select_boards_that_triples_do_not() {
         let chosen: Vec<_> = Target::ALL.into_iter().filter_map(Target::feature).collect();
         assert_eq!(chosen, ["mps2-an500", "stm32f405"]);
     }

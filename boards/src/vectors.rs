@@ -1,7 +1,7 @@
-//! The part of the vector table that belongs to a device: the handler `SERIAL`, which the application has, at its
-//! place. `device.x` ([`crate::link`] on the host) gives a program without it the default handler.
+//! The device's part of the vector table, with the application's handler `SERIAL` at its place. `device.x`
+//! ([`crate::link`] on the host) provides the default handler to programs without it.
 
-/// A handler.
+/// A handler in the vector table.
 pub(crate) type Vector = unsafe extern "C" fn();
 
 unsafe extern "C" {
@@ -9,15 +9,15 @@ unsafe extern "C" {
     fn DefaultHandler();
 }
 
-/// A table with `SERIAL` at one place.
+/// Returns a table with `SERIAL` at the index `serial`.
 pub(crate) const fn table<const LEN: usize>(serial: usize) -> [Vector; LEN] {
     let mut table = [DefaultHandler as Vector; LEN];
     table[serial] = SERIAL as Vector;
     table
 }
 
-/// Declares, for a device, what RTIC asks for and the vector table: the number of the serial port's interrupt and of
-/// all of them.
+/// Declares a device's interrupts for RTIC and its vector table, from the serial port's interrupt number and the number
+/// of interrupts.
 macro_rules! interrupts {
     ($serial:literal of $all:literal) => {
         /// The interrupts that the application has handlers for.
@@ -25,14 +25,14 @@ macro_rules! interrupts {
         #[repr(u16)]
         #[allow(clippy::upper_case_acronyms, reason = "the name of a handler")]
         pub enum Interrupt {
-            /// Of the serial port.
+            /// The serial port's interrupt.
             SERIAL = $serial,
         }
 
-        // The name under which RTIC looks for it.
+        // RTIC looks for this name.
         pub use self::Interrupt as interrupt;
 
-        // SAFETY: the number is that of the serial port's interrupt, and does not change.
+        // SAFETY: the number is the serial port's interrupt number and does not change.
         unsafe impl cortex_m::interrupt::InterruptNumber for Interrupt {
             fn number(self) -> u16 {
                 self as u16

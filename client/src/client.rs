@@ -1,4 +1,4 @@
-//! Requests, each repeated until it is answered.
+//! Requests, each repeated until the controller answers.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -11,65 +11,65 @@ use anyhow::{Context as _, Result, bail};
 use crate::connection::Connection;
 use crate::event::Event;
 
-/// After so long without an answer a request is sent again, then after half as long again each time: a slow line is not
-/// to be filled with repetitions.
+/// Time without an answer before a request is sent again. It grows by half with each repetition, so that repetitions do
+/// not fill a slow line.
 const REPEAT: Duration = Duration::from_millis(150);
-/// But no longer than this.
-const SLOWEST: Duration = Duration::from_secs(1);
-/// How often a change is asked for, each time with the token of now.
-const TRIES: usize = 3;
+/// Longest time between two repetitions.
+const MAX_REPEAT: Duration = Duration::from_secs(1);
+/// Attempts of a change, each with the current token.
+const ATTEMPTS: usize = 3;
 
-/// A controller, to ask.
+/// Client of a controller.
 pub struct Client {
     connection: Connection,
-    /// How long a request is repeated.
-    patience: Duration,
-    /// What came and was not asked for.
+    /// Time after which a request is given up.
+    timeout: Duration,
+    /// Received events that answered no request.
     events: VecDeque<Event>,
 }
 
 impl Client {
-    /// Over a connection; gives a request up after `patience`.
-    pub const fn new(connection: Connection, patience: Duration) -> Self {
-        Self { connection, patience, events: VecDeque::new() }
+    /// Creates a client on a connection. It gives up a request after `timeout`.
+    pub const fn new(connection: Connection, timeout: Duration) -> Self {
+        Self { connection, timeout, events: VecDeque::new() }
     }
 
-    /// The connection.
+    /// Returns the connection.
     pub const fn connection(&self) -> &Connection {
         &self.connection
     }
 
-    /// The connection, to send bytes of one's own.
+    /// Returns the connection, to send raw bytes.
     pub const fn connection_mut(&mut self) -> &mut Connection {
         &mut self.connection
     }
 
-    /// Sends an observation and gives its sequence number.
+    /// Sends an observation and returns its sequence number.
     ///
     /// # Errors
     ///
-    /// As [`Connection::send`].
+    /// Fails as [`Connection::send`] does.
     pub fn observe(&mut self, values: &[f32]) -> Result<u32> {
         self.connection.send(&Message::Observation(Floats::Values(values)))
     }
 
-    /// What came since, and was not asked for.
+    /// Returns the events since the last call that answered no request.
     ///
     /// # Errors
     ///
-    /// As [`Connection::poll`].
+    /// Fails as [`Connection::poll`] does.
     pub fn events(&mut self) -> Result<VecDeque<Event>> {
         let events = &mut self.events;
         self.connection.poll(|event| events.push_back(event))?;
         Ok(std::mem::take(&mut self.events))
     }
 
-    /// Sends `message` until `wanted` takes an event as the answer to one of the numbers it was sent under. The others
+    /// Sends `message` until `wanted` accepts an event as the answer to one of the sequence numbers used. Other events
     /// are kept.
     fn ask<T>(&mut self, message: &Message<'_>, wanted: impl Fn(&Event, &[u32]) -> Option<T>) -> Result<T> {
         let begun = Instant::now();
         let (mut numbers, mut wait) = (Vec::new(), REPEAT);
-        while begun.elapsed() < self.patience {
+        while begun.elapsed() < self.timeout {
             numbers.push(self.connection.send(message)?);
             let sent = Instant::now();
             while sent.elapsed() < wait {
@@ -82,16 +82,16 @@ impl Client {
                     return Ok(answer);
                 }
             }
-            wait = wait.mul_f64(1.5).min(SLOWEST);
+            wait = wait.mul_f64(1.5).min(MAX_REPEAT);
         }
-        bail!("no answer for {:.1?}: {}", self.patience, self.connection.silence())
+        bail!("no answer for {:.1?}: {}", self.timeout, self.connection.silence())
     }
 
-    /// Sends a request until it is acknowledged: bytes of the update that were taken, and why it was not done.
+    /// Sends a request until it is acknowledged. Returns the accepted bytes of the update, and the outcome.
     ///
     /// # Errors
     ///
-    /// Where there is no answer.
+    /// Fails without an answer.
     pub fn request(&mut self, message: &Message<'_>) -> Result<(u32, Result<(), Refusal>)> {
         self.ask(message, |event, numbers| match event {
             Event::Ack { of, refusal, written } if numbers.contains(of) => {
@@ -101,13 +101,13 @@ impl Client {
         })
     }
 
-    /// The status of now.
+    /// Returns the current status.
     ///
     /// # Errors
     ///
-    /// Where there is no answer.
+    /// Fails without an answer.
     pub fn status(&mut self) -> Result<Status> {
-        // One that came before it was asked for may be an old one.
+        // A status from before the request may be outdated.
         self.events()?
             .into_iter()
             .filter(|event| !matches!(event, Event::Status(_)))
@@ -118,11 +118,11 @@ impl Client {
         })
     }
 
-    /// How long things take.
+    /// Returns the measured times.
     ///
     /// # Errors
     ///
-    /// Where there is no answer.
+    /// Fails without an answer.
     pub fn timing(&mut self) -> Result<Timing> {
         self.ask(&Message::Ask(Report::Timing), |event, _| match event {
             Event::Timing(timing) => Some(*timing),
@@ -130,11 +130,11 @@ impl Client {
         })
     }
 
-    /// What the last run left behind.
+    /// Returns the crash record of the last run.
     ///
     /// # Errors
     ///
-    /// Where there is no answer.
+    /// Fails without an answer.
     pub fn breadcrumb(&mut self) -> Result<Breadcrumb> {
         self.ask(&Message::Ask(Report::Breadcrumb), |event, _| match event {
             Event::Breadcrumb(breadcrumb) => Some(*breadcrumb),
@@ -142,60 +142,60 @@ impl Client {
         })
     }
 
-    /// A parameter.
+    /// Returns a parameter.
     ///
     /// # Errors
     ///
-    /// Where there is none, or no answer.
-    pub fn get(&mut self, which: Parameter, whose: u8) -> Result<f32> {
-        let answer = self.ask(&Message::Get { parameter: which, axis: whose }, |event, numbers| match event {
-            Event::Value { parameter, axis, value } if (*parameter, *axis) == (which, whose) => Some(Ok(*value)),
+    /// Fails for an unknown parameter or axis, or without an answer.
+    pub fn get(&mut self, wanted: Parameter, of_axis: u8) -> Result<f32> {
+        let answer = self.ask(&Message::Get { parameter: wanted, axis: of_axis }, |event, numbers| match event {
+            Event::Value { parameter, axis, value } if (*parameter, *axis) == (wanted, of_axis) => Some(Ok(*value)),
             Event::Ack { of, refusal: Some(refusal), .. } if numbers.contains(of) => Some(Err(*refusal)),
             _ => None,
         })?;
-        answer.with_context(|| format!("{which} of axis {whose}"))
+        answer.with_context(|| format!("cannot read {wanted} of axis {of_axis}"))
     }
 
     /// Sets a parameter.
     ///
     /// # Errors
     ///
-    /// Where it is refused, or there is no answer.
+    /// Fails if the controller refuses, or without an answer.
     pub fn set(&mut self, parameter: Parameter, axis: u8, value: f32) -> Result<()> {
         let outcome = self.change(|token| Message::Set { token, parameter, axis, value })?;
-        outcome.with_context(|| format!("{parameter} of axis {axis} is not set to {value}"))
+        outcome.with_context(|| format!("cannot set {parameter} of axis {axis} to {value}"))
     }
 
-    /// Arms.
+    /// Arms the controller.
     ///
     /// # Errors
     ///
-    /// Where it is refused, or there is no answer.
+    /// Fails if the controller refuses, or without an answer.
     pub fn arm(&mut self) -> Result<()> {
-        // A repeated request whose first answer was lost is refused for its token.
+        // The controller refuses the token of a repeated request whose first answer was lost.
         let outcome = self.with_token(|token| Message::Arm { token })?;
         if !(outcome == Err(Refusal::Token) && self.status()?.state == State::Armed) {
             outcome.context("not armed")?;
         }
-        // What was told before speaks of the state before.
+        // Earlier statuses describe the earlier state.
         self.events.retain(|event| !matches!(event, Event::Status(_)));
         Ok(())
     }
 
-    /// Disarms.
+    /// Disarms the controller.
     ///
     /// # Errors
     ///
-    /// Where there is no answer.
+    /// Fails without an answer.
     pub fn disarm(&mut self) -> Result<()> {
         self.request(&Message::Disarm)?.1.context("not disarmed")
     }
 
-    /// As [`Self::with_token`], for what may be asked whatever the state has become: a request before it that was
-    /// repeated may have changed the token once more.
+    /// As [`Self::with_token`], for requests that are valid in any state. It repeats them with a new token, because a
+    /// repetition of an earlier request may have changed the token again.
     pub(crate) fn change<'m>(&mut self, message: impl Fn(u32) -> Message<'m>) -> Result<Result<(), Refusal>> {
         let mut outcome = Err(Refusal::Token);
-        for _ in 0..TRIES {
+        for _ in 0..ATTEMPTS {
             outcome = self.with_token(&message)?;
             if outcome != Err(Refusal::Token) {
                 break;
@@ -204,7 +204,7 @@ impl Client {
         Ok(outcome)
     }
 
-    /// A request with the token of now.
+    /// Sends a request with the current token.
     fn with_token<'m>(&mut self, message: impl FnOnce(u32) -> Message<'m>) -> Result<Result<(), Refusal>> {
         let token = self.status()?.token;
         Ok(self.request(&message(token))?.1)

@@ -1,4 +1,4 @@
-//! Frames over a port that may break, and is opened again.
+//! Frames over a port that is reopened when it breaks.
 
 use std::io::{self, ErrorKind, Read as _, Write as _};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -10,12 +10,12 @@ use anyhow::{Context as _, Result, bail};
 use crate::event::Event;
 use crate::port::{Address, Port};
 
-/// Between two attempts to open a port again.
+/// Time between two attempts to reopen a port.
 const RETRY: Duration = Duration::from_millis(200);
-/// After so long without a good frame the controller may have started anew, and counts from the beginning.
+/// Time without a good frame after which the controller may have restarted, with new sequence numbers.
 const QUIET: Duration = Duration::from_millis(500);
 
-/// Opens a port; called again where it has broken.
+/// Opens a port; called again after it broke.
 pub type Opener = Box<dyn FnMut() -> io::Result<Box<dyn Port>> + Send>;
 
 /// A host's time in µs; wraps.
@@ -27,45 +27,45 @@ fn since_epoch() -> Duration {
 
 /// A link to a controller.
 pub struct Connection {
-    /// What errors call it.
+    /// Name of the port in errors.
     name: String,
     open: Opener,
     port: Option<Box<dyn Port>>,
     receiver: Receiver<{ frame::bytes(frame::MAX_PAYLOAD) }>,
     sender: Sender,
-    /// What a frame says about its time, µs.
+    /// Clock for the frames' times, in µs.
     clock: Clock,
-    /// How long to try to open the port again.
-    patience: Duration,
-    /// Since when the port is gone.
+    /// Time after which reopening the port is given up.
+    timeout: Duration,
+    /// Time and error of the port's loss.
     gone: Option<(Instant, io::Error)>,
     tried: Instant,
     heard: Instant,
-    /// Whether anything has come.
+    /// `true` after the first received byte.
     has_read: bool,
-    /// Times that the port was opened again.
+    /// Number of times that the port was reopened.
     reopened: u32,
 }
 
 impl Connection {
-    /// Opens `address`; where it breaks later, tries for `patience` to open it again.
+    /// Opens `address`. If it breaks later, tries to reopen it for `timeout`.
     ///
     /// # Errors
     ///
-    /// Where it cannot be opened now.
-    pub fn open(address: Address, patience: Duration) -> Result<Self> {
-        Self::open_by(address.to_string(), Box::new(move || address.open()), patience)
+    /// Fails if it cannot be opened now.
+    pub fn open(address: Address, timeout: Duration) -> Result<Self> {
+        Self::open_with(address.to_string(), Box::new(move || address.open()), timeout)
     }
 
-    /// As [`Self::open`], for a port that has no [`Address`]: `name` is what errors call it.
+    /// Opens a port that has no [`Address`], as [`Self::open`] does; errors use `name`.
     ///
     /// # Errors
     ///
-    /// As [`Self::open`].
-    pub fn open_by(name: String, mut open: Opener, patience: Duration) -> Result<Self> {
-        let port = open().with_context(|| format!("{name}: cannot be opened"))?;
+    /// Fails as [`Self::open`] does.
+    pub fn open_with(name: String, mut open: Opener, timeout: Duration) -> Result<Self> {
+        let port = open().with_context(|| format!("{name}: the port cannot be opened"))?;
         let now = Instant::now();
-        // Ahead of what an earlier process has sent, as long as that was less than a thousand frames a second.
+        // Larger than the numbers of an earlier process that sent fewer than a thousand frames a second.
         let first = since_epoch().as_millis() as u32;
         Ok(Self {
             name,
@@ -74,7 +74,7 @@ impl Connection {
             receiver: Receiver::new(),
             sender: Sender::new(first),
             clock: Box::new(|| since_epoch().as_micros() as u32),
-            patience,
+            timeout,
             gone: None,
             tried: now,
             heard: now,
@@ -83,27 +83,27 @@ impl Connection {
         })
     }
 
-    /// Takes the time from another clock than the system's: a simulator's.
+    /// Replaces the system's clock by another one, such as a simulator's.
     pub fn set_clock(&mut self, clock: Clock) {
         self.clock = clock;
     }
 
-    /// Sends a message and gives its sequence number. On a port that is gone it is lost, as on any line.
+    /// Sends a message and returns its sequence number. Without a port the message is lost, as on any line.
     ///
     /// # Errors
     ///
-    /// Where the message is longer than a frame may be.
+    /// Fails if the message is longer than a frame.
     pub fn send(&mut self, message: &Message<'_>) -> Result<u32> {
         let number = self.sender.next();
         let mut buffer = [0; frame::wire_bytes(frame::MAX_PAYLOAD)];
         let wire =
             self.sender.frame(message, (self.clock)(), &mut buffer).context("the message is longer than a frame")?;
-        // A zero first, so that a frame whose end was lost on the way does not take this one with it.
+        // A zero first, so that an earlier frame whose end was lost does not merge with this one.
         self.raw(&[&[0], wire].concat());
         Ok(number)
     }
 
-    /// Sends bytes that are no message: what tests need.
+    /// Sends bytes that are not a message, for tests.
     pub fn raw(&mut self, bytes: &[u8]) {
         if let Some(port) = &mut self.port
             && let Err(error) = port.write_all(bytes).and_then(|()| port.flush())
@@ -112,11 +112,11 @@ impl Connection {
         }
     }
 
-    /// Reads what has come, at most for [`crate::port::WAIT`] where there is nothing.
+    /// Reads the received bytes; waits at most [`crate::port::READ_TIMEOUT`] if there are none.
     ///
     /// # Errors
     ///
-    /// Where the port is gone and could not be opened again for the patience.
+    /// Fails if the port is lost and could not be reopened within the timeout.
     pub fn poll(&mut self, mut event: impl FnMut(Event)) -> Result<()> {
         if self.heard.elapsed() > QUIET {
             self.receiver.reopen();
@@ -147,7 +147,7 @@ impl Connection {
 
     fn reopen(&mut self) -> Result<()> {
         if self.tried.elapsed() < RETRY {
-            std::thread::sleep(crate::port::WAIT);
+            std::thread::sleep(crate::port::READ_TIMEOUT);
             return Ok(());
         }
         self.tried = Instant::now();
@@ -157,31 +157,33 @@ impl Connection {
                 self.reopened += 1;
                 self.receiver.reopen();
             }
-            (Err(error), Some((since, first))) if since.elapsed() >= self.patience => {
-                bail!("{}: lost ({first}), and not there again for {:.1?}: {error}", self.name, self.patience)
+            (Err(error), Some((since, first))) if since.elapsed() >= self.timeout => {
+                bail!("{}: connection lost ({first}) and not reopened within {:.1?}: {error}", self.name, self.timeout)
             }
             (Err(_), _) => {}
         }
         Ok(())
     }
 
-    /// Times that the port was opened again.
+    /// Number of times that the port was reopened.
     pub const fn reopened(&self) -> u32 {
         self.reopened
     }
 
-    /// Why nothing is answered, as far as it can be seen here.
+    /// Returns the likely reason for missing answers.
     pub(crate) const fn silence(&self) -> &'static str {
         match (self.has_read, self.counters().good) {
-            (false, _) => "nothing came; is it a controller that runs, and has no other program the port?",
-            (true, 0) => "what came is not this link's; is it a controller, and at this speed?",
+            (false, _) => {
+                "no bytes received; check that the controller runs and that no other program has the port open"
+            }
+            (true, 0) => "no valid frame received; check that this is a controller's port and that the speed matches",
             (true, _) => {
-                "other frames came; are its firmware and this program of one version, and does the line carry both ways?"
+                "only other frames received; check that firmware and program have the same version and that the line works both ways"
             }
         }
     }
 
-    /// What this end's receiver has seen.
+    /// Returns the counters of this end's receiver.
     pub const fn counters(&self) -> Counters {
         self.receiver.counters()
     }

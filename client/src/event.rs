@@ -1,4 +1,4 @@
-//! What a controller says, kept.
+//! A controller's messages, with owned data.
 
 use actq_link::Message;
 use actq_link::code::{Parameter, Refusal};
@@ -9,43 +9,43 @@ use actq_link::report::{Breadcrumb, Status, Timing};
 pub enum Event {
     /// An action.
     Action {
-        /// Sequence number of its observation.
+        /// Sequence number of the observation's frame.
         of: u32,
-        /// Whether the outputs follow it.
+        /// `true` if the outputs follow the action.
         applied: bool,
         /// The controller's time in µs.
         micros: u32,
-        /// Its values.
+        /// The values.
         values: Vec<f32>,
     },
     /// A status.
     Status(Status),
-    /// Times.
+    /// The measured times.
     Timing(Timing),
-    /// What the last run left behind.
+    /// The crash record of the last run.
     Breadcrumb(Breadcrumb),
-    /// A parameter.
+    /// The value of a parameter.
     Value {
-        /// Which.
+        /// The parameter.
         parameter: Parameter,
-        /// Whose.
+        /// The axis, for a parameter of an axis; else 0.
         axis: u8,
-        /// What it is.
+        /// The current value.
         value: f32,
     },
     /// An acknowledgement.
     Ack {
-        /// Sequence number of the request.
+        /// Sequence number of the request's frame.
         of: u32,
-        /// Why it was not done.
+        /// Reason for a refusal; `None` if the request was done.
         refusal: Option<Refusal>,
-        /// Bytes of the update that were taken.
+        /// Accepted bytes of the update.
         written: u32,
     },
 }
 
 impl Event {
-    /// What a controller may say; `None` for what only a host says.
+    /// Converts a controller's message; `None` for a message that only a host sends.
     pub fn of(message: &Message<'_>, micros: u32) -> Option<Self> {
         Some(match *message {
             Message::Action { of, applied, values } => {

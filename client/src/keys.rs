@@ -11,7 +11,7 @@ use ed25519_dalek::pkcs8::{DecodePrivateKey as _, EncodePrivateKey as _};
 use ed25519_dalek::{Digest as _, Sha512, Signature, SigningKey, VerifyingKey};
 use serde::{Deserialize, Serialize};
 
-/// What stands in a signature's file, as JSON.
+/// Content of a signature's file, as JSON.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Signed {
@@ -23,76 +23,81 @@ pub struct Signed {
     pub signature: String,
 }
 
-/// A new key from the system's randomness, in PKCS #8 as PEM.
+/// Generates a key from the system's random numbers.
 ///
 /// # Errors
 ///
-/// Where the system has none to give.
+/// Fails if the system provides no random numbers.
 pub fn generate() -> Result<SigningKey> {
     let mut seed = [0; 32];
-    getrandom::fill(&mut seed).context("the system gives no random numbers")?;
+    getrandom::fill(&mut seed).context("the system provides no random numbers")?;
     Ok(SigningKey::from_bytes(&seed))
 }
 
-/// Writes a private key into a new file that only its owner may read. A file that is there is never replaced.
+/// Writes a private key to a new file that only its owner may read. An existing file is never replaced.
 ///
 /// # Errors
 ///
-/// Where there is a file already, or none can be made.
+/// Fails if the file exists or cannot be created.
 pub fn write(path: &Path, key: &SigningKey) -> Result<()> {
     let name = path.display();
-    let pem = key.to_pkcs8_pem(LineEnding::LF).context("the key cannot be written as PEM")?;
+    let pem = key.to_pkcs8_pem(LineEnding::LF).context("cannot encode the key as PEM")?;
     let mut options = OpenOptions::new();
     options.write(true).create_new(true);
     #[cfg(unix)]
     std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
     let file = options.open(path);
     let mut file =
-        file.with_context(|| format!("{name}: a key needs a new file; one that is there is never replaced"))?;
-    file.write_all(pem.as_bytes()).and_then(|()| file.sync_all()).with_context(|| format!("{name}: cannot be written"))
+        file.with_context(|| format!("{name}: cannot create the key's file; an existing file is never replaced"))?;
+    file.write_all(pem.as_bytes())
+        .and_then(|()| file.sync_all())
+        .with_context(|| format!("{name}: cannot write the file"))
 }
 
 /// Reads a private key: PKCS #8 as PEM, as `actq keygen` or `openssl genpkey -algorithm ed25519` writes it.
 ///
 /// # Errors
 ///
-/// Where it is none.
+/// Fails if the file is not one.
 pub fn read(path: &Path) -> Result<SigningKey> {
     let name = path.display();
-    let text = std::fs::read_to_string(path).with_context(|| format!("{name}: cannot be read"))?;
+    let text = std::fs::read_to_string(path).with_context(|| format!("{name}: cannot read the file"))?;
     SigningKey::from_pkcs8_pem(&text).with_context(|| format!("{name}: not an Ed25519 private key in PKCS #8 as PEM"))
 }
 
-/// The public key in hexadecimal, as a build takes it.
+/// Returns the public key in hexadecimal, as a build takes it.
 pub fn public(key: &SigningKey) -> String {
     hexadecimal(key.verifying_key().as_bytes())
 }
 
-/// Signs an image of a version.
+/// Signs an image with its version.
 ///
 /// # Errors
 ///
-/// None in practice: the context is shorter than RFC 8032 allows.
+/// Never fails in practice: the context is shorter than RFC 8032 allows.
 pub fn sign(key: &SigningKey, image: &[u8], version: u32) -> Result<Signed> {
     let digest = Sha512::new().chain_update(image);
-    let signature = key.sign_prehashed(digest, Some(&context(version))).context("the image cannot be signed")?;
+    let signature = key.sign_prehashed(digest, Some(&context(version))).context("cannot sign the image")?;
     Ok(Signed { version, public_key: public(key), signature: hexadecimal(&signature.to_bytes()) })
 }
 
 impl Signed {
-    /// The signature's bytes, if it is one of this image by the key that it names.
+    /// Verifies that the signature is one of this image by the key that it names, and returns its bytes.
     ///
     /// # Errors
     ///
-    /// Where it is not.
+    /// Fails if it is not.
     pub fn check(&self, image: &[u8]) -> Result<[u8; 64]> {
-        let key: [u8; 32] = bytes(&self.public_key).context("the public key has not 32 bytes in hexadecimal")?;
-        let signature: [u8; 64] = bytes(&self.signature).context("the signature has not 64 bytes in hexadecimal")?;
-        let key = VerifyingKey::from_bytes(&key).context("the public key is none")?;
+        let key: [u8; 32] = bytes(&self.public_key).context("the public key is not 32 bytes in hexadecimal")?;
+        let signature: [u8; 64] = bytes(&self.signature).context("the signature is not 64 bytes in hexadecimal")?;
+        let key = VerifyingKey::from_bytes(&key).context("the public key is not an Ed25519 key")?;
         let digest = Sha512::new().chain_update(image);
         let verified =
             key.verify_prehashed_strict(digest, Some(&context(self.version)), &Signature::from_bytes(&signature));
-        ensure!(verified.is_ok(), "the signature is not that of this image and version; sign it again (actq sign)");
+        ensure!(
+            verified.is_ok(),
+            "the signature does not match this image and version; sign the image again (actq sign)"
+        );
         Ok(signature)
     }
 }
@@ -101,7 +106,7 @@ fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Bytes in hexadecimal; `None` where they are not `N` of them.
+/// Parses `N` bytes in hexadecimal; `None` for another length.
 fn bytes<const N: usize>(text: &str) -> Option<[u8; N]> {
     let digits = text.as_bytes();
     let mut bytes = [0; N];

@@ -1,12 +1,12 @@
-//! The host's end of the link to a motor controller (`docs/LINK.md`), behind `actq link`, `actq keygen` and
+//! The host's end of the link to a motor controller (`docs/LINK.md`): the library of `actq link`, `actq keygen` and
 //! `actq sign`.
 //!
-//! A [`port::Address`] is opened as a [`connection::Connection`], which is opened again where it breaks. A
-//! [`client::Client`] asks over it and repeats what was not answered; [`push`] sends an image, [`stream`] a recording's
-//! observations, [`serve`] those of a simulator, and [`log`] keeps what came back. [`keys`] makes keys and signatures.
+//! A [`connection::Connection`] opens a [`port::Address`] and reopens it when it breaks. A [`client::Client`] sends
+//! requests over it and repeats unanswered ones. [`push`] sends an image, [`stream`] a recording's observations,
+//! [`serve`] those of a simulator, and [`log`] records the actions. [`keys`] creates keys and signatures.
 #![forbid(unsafe_code)]
 
-// Which of these may use which: the table in docs/ARCHITECTURE.md, which a test reads.
+// The dependencies between these modules are in docs/ARCHITECTURE.md; a test compares them.
 pub mod client;
 pub mod connection;
 pub mod event;

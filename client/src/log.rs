@@ -1,4 +1,4 @@
-//! What was sent and what came back, as arrays.
+//! Log of the observations sent and the actions received, as arrays.
 
 use std::collections::BTreeMap;
 use std::io::Cursor;
@@ -8,7 +8,7 @@ use anyhow::{Result, ensure};
 use ndarray::{Array1, Array2};
 use ndarray_npy::NpzWriter;
 
-/// An observation and its action, where one came.
+/// An observation and its action, if one was received.
 struct Row {
     sent: f64,
     observation: Vec<f32>,
@@ -16,7 +16,7 @@ struct Row {
 }
 
 struct Answer {
-    came: f64,
+    received_at: f64,
     applied: bool,
     action: Vec<f32>,
 }
@@ -36,37 +36,37 @@ impl Default for Log {
 }
 
 impl Log {
-    /// An observation was sent as this frame.
+    /// Records an observation with its frame's sequence number.
     pub fn observed(&mut self, number: u32, observation: &[f32]) {
         self.numbers.insert(number, self.rows.len());
         let sent = self.begun.elapsed().as_secs_f64();
         self.rows.push(Row { sent, observation: observation.to_vec(), answer: None });
     }
 
-    /// Its action came. One of an observation that was not sent is left out.
+    /// Records the action for an observation; ignores one for an unknown observation.
     pub fn acted(&mut self, of: u32, applied: bool, action: Vec<f32>) {
-        let came = self.begun.elapsed().as_secs_f64();
+        let received_at = self.begun.elapsed().as_secs_f64();
         if let Some(row) = self.numbers.get(&of).and_then(|row| self.rows.get_mut(*row)) {
-            row.answer.get_or_insert(Answer { came, applied, action });
+            row.answer.get_or_insert(Answer { received_at, applied, action });
         }
     }
 
-    /// Observations that were sent.
+    /// Returns the number of observations.
     pub fn observations(&self) -> usize {
         self.rows.len()
     }
 
-    /// Seconds from each answered observation to its action, in order.
+    /// Returns the seconds from each answered observation to its action, in order.
     pub fn latencies(&self) -> Vec<f64> {
-        self.rows.iter().filter_map(|row| Some(row.answer.as_ref()?.came - row.sent)).collect()
+        self.rows.iter().filter_map(|row| Some(row.answer.as_ref()?.received_at - row.sent)).collect()
     }
 
-    /// An .npz with the arrays `obs` and `action` (one frame a row; an action that did not come is NaN), `applied` (0
-    /// or 1), and `sent` and `received` (seconds since the log began, NaN where nothing came).
+    /// Returns an .npz file with the arrays `obs` and `action` (one frame a row; NaN for a missing action), `applied`
+    /// (0 or 1), and `sent` and `received` (seconds since the log began; NaN for a missing action).
     ///
     /// # Errors
     ///
-    /// Where actions differ in length.
+    /// Fails if actions differ in length.
     pub fn npz(&self) -> Result<Vec<u8>> {
         let observation_len = self.rows.first().map_or(0, |row| row.observation.len());
         let answers = || self.rows.iter().map(|row| row.answer.as_ref());
@@ -83,7 +83,7 @@ impl Log {
         npz.add_array("action", &Array2::from_shape_vec((self.rows.len(), action_len), actions)?)?;
         npz.add_array("applied", &Array1::from_iter(answers().map(|a| u8::from(a.is_some_and(|a| a.applied)))))?;
         npz.add_array("sent", &Array1::from_iter(self.rows.iter().map(|row| row.sent)))?;
-        npz.add_array("received", &Array1::from_iter(answers().map(|a| a.map_or(f64::NAN, |a| a.came))))?;
+        npz.add_array("received", &Array1::from_iter(answers().map(|a| a.map_or(f64::NAN, |a| a.received_at))))?;
         Ok(npz.finish()?.into_inner())
     }
 }

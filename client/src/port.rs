@@ -1,4 +1,4 @@
-//! Where a controller is: behind a serial port, or a socket, as that of an emulator's serial port.
+//! A controller's port: a serial port, or a socket, such as an emulator's serial port.
 
 use std::fmt;
 use std::io::{self, Read, Write};
@@ -8,24 +8,24 @@ use std::time::Duration;
 
 use anyhow::{Context as _, Result, bail};
 
-/// Bits a second of a serial port, where none are named.
+/// Default bits per second of a serial port.
 const BAUD: u32 = 921_600;
 
-/// What bytes travel over. A read waits for at most [`WAIT`].
+/// A byte stream to a controller. A read waits at most [`READ_TIMEOUT`].
 pub trait Port: Read + Write + Send {}
 
 impl<P: Read + Write + Send> Port for P {}
 
-/// How long a read waits for a first byte.
-pub const WAIT: Duration = Duration::from_millis(2);
+/// Longest time that a read waits for a first byte.
+pub const READ_TIMEOUT: Duration = Duration::from_millis(2);
 
-/// How long a write may take.
-const WRITE: Duration = Duration::from_secs(2);
+/// Longest time that a write may take.
+const WRITE_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// How a controller is reached.
+/// Address of a controller.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Address {
-    /// A serial port: its name, and bits a second.
+    /// A serial port: its name and bits per second.
     Serial(String, u32),
     /// A TCP socket: host and port.
     Tcp(String),
@@ -33,7 +33,7 @@ pub enum Address {
     Unix(String),
 }
 
-/// `NAME`, `NAME@BAUD`, `tcp:HOST:PORT` or `unix:PATH`.
+/// Parses `NAME`, `NAME@BAUD`, `tcp:HOST:PORT` or `unix:PATH`.
 impl FromStr for Address {
     type Err = anyhow::Error;
 
@@ -50,7 +50,7 @@ impl FromStr for Address {
             Some((name, baud)) => (name, baud.parse().ok().filter(|baud| *baud > 0).context("the form is NAME@BAUD")?),
             None => (text, BAUD),
         };
-        if name.is_empty() { bail!("a port has a name") } else { Ok(Self::Serial(name.to_owned(), baud)) }
+        if name.is_empty() { bail!("the port's name is empty") } else { Ok(Self::Serial(name.to_owned(), baud)) }
     }
 }
 
@@ -65,26 +65,26 @@ impl fmt::Display for Address {
 }
 
 impl Address {
-    /// Opens it.
+    /// Opens the port.
     ///
     /// # Errors
     ///
-    /// Where it is not there or may not be opened.
+    /// Fails if the port does not exist or may not be opened.
     pub fn open(&self) -> io::Result<Box<dyn Port>> {
         match self {
             Self::Serial(name, baud) => {
-                let port = serialport::new(name, *baud).timeout(WAIT).open();
-                let told = |error| {
+                let port = serialport::new(name, *baud).timeout(READ_TIMEOUT).open();
+                let explained = |error| {
                     let error = io::Error::from(error);
                     io::Error::new(error.kind(), format!("{error}; `actq link ports` lists the ports"))
                 };
-                Ok(Box::new(port.map_err(told)?))
+                Ok(Box::new(port.map_err(explained)?))
             }
             Self::Tcp(address) => {
                 let stream = TcpStream::connect(address)?;
                 stream.set_nodelay(true)?;
-                stream.set_read_timeout(Some(WAIT))?;
-                stream.set_write_timeout(Some(WRITE))?;
+                stream.set_read_timeout(Some(READ_TIMEOUT))?;
+                stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
                 Ok(Box::new(stream))
             }
             Self::Unix(path) => unix(path),
@@ -95,21 +95,21 @@ impl Address {
 #[cfg(unix)]
 fn unix(path: &str) -> io::Result<Box<dyn Port>> {
     let stream = std::os::unix::net::UnixStream::connect(path)?;
-    stream.set_read_timeout(Some(WAIT))?;
-    stream.set_write_timeout(Some(WRITE))?;
+    stream.set_read_timeout(Some(READ_TIMEOUT))?;
+    stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
     Ok(Box::new(stream))
 }
 
 #[cfg(not(unix))]
 fn unix(_: &str) -> io::Result<Box<dyn Port>> {
-    Err(io::Error::new(io::ErrorKind::Unsupported, "this system has no Unix sockets; use tcp:HOST:PORT"))
+    Err(io::Error::new(io::ErrorKind::Unsupported, "this system has no Unix domain sockets; use tcp:HOST:PORT"))
 }
 
-/// The serial ports of this machine, each with what is known about it.
+/// Lists this machine's serial ports, each with a description.
 ///
 /// # Errors
 ///
-/// Where the system does not tell.
+/// Fails if the system cannot list them.
 pub fn list() -> Result<Vec<(String, String)>> {
     let about = |kind: serialport::SerialPortType| match kind {
         serialport::SerialPortType::UsbPort(usb) => {
@@ -121,6 +121,6 @@ pub fn list() -> Result<Vec<(String, String)>> {
         serialport::SerialPortType::BluetoothPort => "Bluetooth".to_owned(),
         serialport::SerialPortType::Unknown => String::new(),
     };
-    let ports = serialport::available_ports().context("the system does not tell its serial ports")?;
+    let ports = serialport::available_ports().context("the system cannot list its serial ports")?;
     Ok(ports.into_iter().map(|port| (port.port_name, about(port.port_type))).collect())
 }

@@ -1,4 +1,4 @@
-//! Sends an image into a controller's other slot.
+//! Sends an image to a controller's spare slot.
 
 use std::time::{Duration, Instant};
 
@@ -9,29 +9,29 @@ use anyhow::{Context as _, Result, bail, ensure};
 
 use crate::client::Client;
 
-/// The longest payload of a chunk: longer ones gain nothing and lose more where one is damaged.
-const MOST: usize = 1024;
-/// How long a controller may erase, check and test, or switch its outputs off.
-const BUSY: Duration = Duration::from_secs(60);
-/// Between two questions whether it is done.
-const ASK_AGAIN: Duration = Duration::from_millis(20);
+/// Longest payload of a chunk. Longer ones gain nothing, and a damaged one loses more.
+const MAX_PAYLOAD: usize = 1024;
+/// Longest time for a controller to erase, check and test, or to switch its outputs off.
+const BUSY_TIMEOUT: Duration = Duration::from_secs(60);
+/// Time between two repetitions of a request to a busy controller.
+const ASK_INTERVAL: Duration = Duration::from_millis(20);
 
-/// What an image is sent with.
+/// An image to send, with its metadata.
 #[derive(Clone, Copy, Debug)]
 pub struct Package<'a> {
-    /// Its bytes.
+    /// Bytes of the image.
     pub image: &'a [u8],
-    /// Its version.
+    /// Version of the image.
     pub version: u32,
-    /// Its signature, where the controller's build asks for one.
+    /// Signature of the image, if the controller's build requires one.
     pub signature: Option<&'a [u8; 64]>,
 }
 
-/// An image on its way into a controller, a request at a time: observations may be sent in between.
+/// Transfer of an image to a controller, one request at a time: observations may be sent in between.
 #[derive(Debug)]
 pub struct Push<'a> {
     package: Package<'a>,
-    /// Of an image's bytes in a frame.
+    /// Bytes of the image in a frame.
     chunk: usize,
     stage: Stage,
 }
@@ -39,32 +39,32 @@ pub struct Push<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
     Begin,
-    /// So many bytes are written.
+    /// This number of bytes is written.
     Write(usize),
     Done,
 }
 
 impl<'a> Push<'a> {
-    /// Asks the controller how much it takes at once.
+    /// Prepares a transfer; asks the controller for its longest frame.
     ///
     /// # Errors
     ///
-    /// Where there is no answer, or the image or the controller's memory is of no use.
+    /// Fails without an answer, if the controller's frames are too short, or if the image is too long.
     pub fn new(client: &mut Client, package: Package<'a>) -> Result<Self> {
         let payload = usize::from(client.status()?.payload);
-        // Whole words, beside the offset.
-        let chunk = payload.min(MOST).saturating_sub(4) / 4 * 4;
-        ensure!(chunk > 0, "the controller's memory for a frame has no room for a part of an image ({payload} bytes)");
+        // Whole words, in addition to the offset.
+        let chunk = payload.min(MAX_PAYLOAD).saturating_sub(4) / 4 * 4;
+        ensure!(chunk > 0, "the controller's longest payload of {payload} bytes is too short for a part of an image");
         u32::try_from(package.image.len()).context("the image is longer than 4 GiB")?;
         Ok(Self { package, chunk, stage: Stage::Begin })
     }
 
-    /// Sends at most so many bytes in a frame: where the line is slow, observations go in between. At least 4.
-    pub fn in_chunks_of(&mut self, most: usize) {
+    /// Limits the bytes of the image in a frame to `most`, at least 4, so that observations get through on a slow line.
+    pub fn limit_chunks(&mut self, most: usize) {
         self.chunk = self.chunk.min(most.max(4) / 4 * 4);
     }
 
-    /// Bytes that the controller has taken.
+    /// Returns the bytes that the controller accepted.
     pub const fn taken(&self) -> usize {
         match self.stage {
             Stage::Begin => 0,
@@ -73,12 +73,12 @@ impl<'a> Push<'a> {
         }
     }
 
-    /// Does the next request; whether the image runs now. Before the first and the last one the controller may be busy
-    /// for a while, and before any where it was just disarmed.
+    /// Makes the next request; returns `true` if the image runs now. The controller may be busy for a while before the
+    /// first and the last one, and before any after a disarm.
     ///
     /// # Errors
     ///
-    /// Where the controller refuses it, with the reason; the old image runs on.
+    /// Fails with the reason if the controller refuses; the old image continues to run.
     pub fn advance(&mut self, client: &mut Client) -> Result<bool> {
         let Package { image, version, signature } = self.package;
         let length = image.len() as u32;
@@ -86,7 +86,7 @@ impl<'a> Push<'a> {
             Stage::Begin => {
                 let crc = CRC.checksum(image);
                 let begin = |client: &mut Client| client.change(|token| Message::Begin { token, length, crc, version });
-                until_done(client, begin)?.context("the update cannot begin")?;
+                until_done(client, begin)?.context("cannot begin the update")?;
                 self.stage = Stage::Write(0);
             }
             Stage::Write(at) if at < image.len() => {
@@ -98,16 +98,16 @@ impl<'a> Push<'a> {
                     Ok(outcome)
                 })?;
                 match outcome {
-                    // It tells from where to go on.
+                    // `written` says where to continue.
                     Ok(()) | Err(Refusal::Offset) => {}
-                    Err(refusal) => bail!("the image's bytes from {at} on are refused: {refusal}"),
+                    Err(refusal) => bail!("the controller refuses the image's bytes from {at}: {refusal}"),
                 }
-                ensure!(written <= length, "the controller says that it has {written} bytes of {length}");
+                ensure!(written <= length, "the controller reports {written} written bytes of an image of {length}");
                 self.stage = Stage::Write(written as usize);
             }
             Stage::Write(_) => {
                 until_done(client, |client| Ok(client.request(&Message::Commit { signature })?.1))?
-                    .context("the image is refused")?;
+                    .context("the controller refuses the image")?;
                 self.stage = Stage::Done;
             }
             Stage::Done => {}
@@ -116,11 +116,11 @@ impl<'a> Push<'a> {
     }
 }
 
-/// Sends an image, and returns once it runs. `progress` is told bytes taken.
+/// Sends an image and returns when it runs. Passes the accepted bytes to `progress`.
 ///
 /// # Errors
 ///
-/// As [`Push::new`] and [`Push::advance`].
+/// Fails as [`Push::new`] and [`Push::advance`] do.
 pub fn push(client: &mut Client, package: &Package<'_>, mut progress: impl FnMut(usize)) -> Result<()> {
     let mut push = Push::new(client, *package)?;
     while !push.advance(client)? {
@@ -129,21 +129,21 @@ pub fn push(client: &mut Client, package: &Package<'_>, mut progress: impl FnMut
     Ok(())
 }
 
-/// A note on axes of the controller without limits, which no image that is sent brings.
+/// Returns a note that names the controller's axes without limits; an image sent over the link does not set limits.
 ///
 /// # Errors
 ///
-/// Where there is no answer.
+/// Fails without an answer.
 pub fn axes_note(client: &mut Client) -> Result<Option<String>> {
-    let mut still = Vec::new();
+    let mut without_limits = Vec::new();
     for axis in 0..client.status()?.axes {
-        // Only what has no limits has no rate.
+        // Only an axis without limits has no rate.
         if client.get(Parameter::Rate, axis)? == 0.0 {
-            still.push(format!("axis {axis}"));
+            without_limits.push(format!("axis {axis}"));
         }
     }
-    let note = || format!("the controller will refuse to arm, {}: {}", still.join(", "), Refusal::Limits);
-    Ok((!still.is_empty()).then(note))
+    let note = || format!("the controller will refuse to arm, {}: {}", without_limits.join(", "), Refusal::Limits);
+    Ok((!without_limits.is_empty()).then(note))
 }
 
 /// Repeats a request while the controller is busy with it.
@@ -154,7 +154,7 @@ fn until_done(
     let begun = Instant::now();
     loop {
         match request(client)? {
-            Err(Refusal::Busy) if begun.elapsed() < BUSY => std::thread::sleep(ASK_AGAIN),
+            Err(Refusal::Busy) if begun.elapsed() < BUSY_TIMEOUT => std::thread::sleep(ASK_INTERVAL),
             outcome => return Ok(outcome),
         }
     }

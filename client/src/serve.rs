@@ -1,4 +1,4 @@
-//! A controller as a simulator's policy: the pipe protocol (`actq_link::pipe`) on one side, the link on the other.
+//! A controller as a simulator's policy: the pipe protocol ([`actq_link::pipe`]) on one side, the link on the other.
 
 use std::io::{ErrorKind, Read, Write};
 use std::time::{Duration, Instant};
@@ -10,18 +10,17 @@ use anyhow::{Context as _, Result, bail};
 use crate::client::Client;
 use crate::event::Event;
 
-/// Sends an observation again after so long without its action.
+/// Time without an action before an observation is sent again.
 const REPEAT: Duration = Duration::from_millis(200);
-/// Tries before a step is answered by no action.
-const TRIES: usize = 5;
+/// Attempts before a step is answered without an action.
+const ATTEMPTS: usize = 5;
 
-/// Answers the simulator until its requests end. The controller's image sees every observation; with `arm` the outputs
-/// follow it, and the answers are what they are led to. A reset disarms, which resets the head.
+/// Answers the simulator until its requests end. The controller's image receives every observation. With `arm` the
+/// outputs follow its actions, and the answers are the outputs' targets. A reset disarms, which resets the head.
 ///
 /// # Errors
 ///
-/// Where the controller is lost, cannot be armed or has stopped for a fault, or where the simulator breaks the
-/// protocol.
+/// Fails if the controller is lost, cannot be armed or stopped for a fault, or if the simulator violates the protocol.
 pub fn serve(client: &mut Client, arm: bool, mut input: impl Read, mut output: impl Write) -> Result<()> {
     let status = client.status()?;
     let mut bytes = vec![0; 4 * usize::from(status.observation)];
@@ -31,7 +30,7 @@ pub fn serve(client: &mut Client, arm: bool, mut input: impl Read, mut output: i
         let mut command = [0];
         match input.read_exact(&mut command) {
             Err(e) if e.kind() == ErrorKind::UnexpectedEof => return client.disarm(),
-            other => other.context("input cannot be read")?,
+            other => other.context("cannot read the input")?,
         }
         match command {
             [RESET] => {
@@ -50,16 +49,16 @@ pub fn serve(client: &mut Client, arm: bool, mut input: impl Read, mut output: i
                 }
                 let action = step(client, &observation, armed)?.unwrap_or_else(|| no_action.clone());
                 let action: Vec<u8> = action.iter().flat_map(|value| value.to_le_bytes()).collect();
-                output.write_all(&action).and_then(|()| output.flush()).context("output cannot be written")?;
+                output.write_all(&action).and_then(|()| output.flush()).context("cannot write the output")?;
             }
             [other] => bail!("unknown command byte 0x{other:02x}; R resets, S steps"),
         }
     }
 }
 
-/// The action on an observation; `None` where none comes.
+/// Returns the action for an observation; `None` without one.
 fn step(client: &mut Client, observation: &[f32], armed: bool) -> Result<Option<Vec<f32>>> {
-    for _ in 0..TRIES {
+    for _ in 0..ATTEMPTS {
         let number = client.observe(observation)?;
         let sent = Instant::now();
         while sent.elapsed() < REPEAT {

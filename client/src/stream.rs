@@ -1,4 +1,4 @@
-//! Sends observations at their rate, and keeps what comes back.
+//! Sends observations at their rate and logs the actions.
 
 use std::time::{Duration, Instant};
 
@@ -10,23 +10,24 @@ use crate::client::Client;
 use crate::event::Event;
 use crate::log::Log;
 
-/// How observations are sent.
+/// Options for sending observations.
 #[derive(Clone, Copy, Debug)]
 pub struct Pace {
-    /// Time from one to the next.
+    /// Time from one observation to the next.
     pub period: Duration,
-    /// Arms once observations flow, and disarms at the end.
+    /// `true` to arm after the first observations, and to disarm at the end.
     pub arm: bool,
 }
 
-/// Observations that flow before arming.
+/// Observations before arming.
 const BEFORE_ARMING: usize = 5;
 
-/// Sends every observation at its time. `seen` is told each status that comes.
+/// Sends every observation at its time. Passes each received status to `seen`.
 ///
 /// # Errors
 ///
-/// Where the controller cannot be armed, is lost, or stops for a fault while armed; the log holds what came until then.
+/// Fails if the controller cannot be armed, is lost, or stops for a fault while armed. The log then has the actions so
+/// far.
 pub fn stream(
     client: &mut Client,
     observations: impl Iterator<Item = Vec<f32>>,
@@ -41,14 +42,14 @@ pub fn stream(
             armed = true;
         }
         log.observed(client.observe(&observation)?, &observation);
-        // Where arming took longer than a period, no burst makes up for it.
+        // No burst follows if arming took longer than a period.
         due = (due + pace.period).max(Instant::now());
         listen(client, due, armed, log, &mut seen)?;
     }
     if armed {
         client.disarm()?;
     }
-    // What is still on its way.
+    // The actions that are still on their way.
     listen(client, Instant::now() + pace.period.max(Duration::from_millis(100)), false, log, &mut seen)
 }
 

@@ -1,16 +1,16 @@
-//! How old an observation is, by two clocks that nobody has set.
+//! Age of an observation, measured by two clocks that are not synchronized.
 //!
-//! The difference of the receiver's and the sender's clock, less the smallest one seen, is what a frame took longer
-//! than the fastest. The smallest one rises with time, as fast as the sender's clock may run slow: a crystal is right
-//! to 0.01 %, an RC oscillator to 3 %. So no rate has to be learnt, and of each frame let through before, whichever it
-//! was: an age is at least what the frame took longer than that one, less [`DRIFT_BITS`]' share of the time since, and
-//! less what the sender's clock runs fast. A sender whose time stops or jumps back grows old; one whose time jumps
-//! forward is from then on the new time.
+//! The receiver's time minus the sender's time, minus the smallest such difference seen, is how much longer a frame
+//! took than the fastest one. The smallest difference rises with time, as fast as the sender's clock may run slow: a
+//! crystal is accurate to 0.01 %, an RC oscillator to 3 %. So the clocks' rates need not be estimated. Against any
+//! frame accepted earlier, the age is at least the frame's extra delay, minus [`DRIFT_BITS`]' share of the time since,
+//! minus the amount by which the sender's clock runs fast. If the sender's time stops or jumps back, its observations
+//! become old. If it jumps forward, the age is relative to the new time from then on.
 
-/// The smallest difference rises by 1 in 2^5 of the time: 3.1 %.
+/// The smallest difference rises by 1/2^5 of the time: 3.1 %.
 const DRIFT_BITS: u32 = 5;
 
-/// Follows the difference of two clocks in µs, both of which wrap.
+/// Tracks the difference of two clocks in µs, both of which wrap.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Age {
     least: Option<Least>,
@@ -18,15 +18,15 @@ pub(crate) struct Age {
 
 #[derive(Clone, Copy, Debug)]
 struct Least {
-    /// Local time less remote time.
+    /// Local time minus remote time.
     difference: u32,
-    /// Local time up to which the drift is in it.
+    /// Local time up to which the drift is included.
     since: u32,
 }
 
 impl Age {
-    /// Age in µs of what was sent at `remote` and came at `local`, against the fastest delivery. Right up to half an
-    /// hour.
+    /// Returns the age in µs of a message sent at `remote` and received at `local`, relative to the fastest delivery.
+    /// Correct up to half an hour.
     pub(crate) fn of(&mut self, remote: u32, local: u32) -> u32 {
         let difference = local.wrapping_sub(remote);
         let least = self.least.get_or_insert(Least { difference, since: local });

@@ -1,11 +1,11 @@
-//! An axis: its limits, and what it does when nobody tells it what to do.
+//! An axis: its limits and its safe action.
 
 use core::fmt;
 
-/// What an axis does once the controller has latched.
+/// Action of an axis after the controller latched.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SafeAction {
-    /// Drives the last value on: a position that is to be kept.
+    /// Keeps driving the last value: holds a position.
     Hold,
     /// Shorts the motor's windings.
     Brake,
@@ -18,7 +18,7 @@ pub enum SafeAction {
     },
 }
 
-/// What an axis is told in a tick.
+/// Output of an axis in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Output {
     /// A value in the unit of the actions, within the limits.
@@ -39,16 +39,16 @@ pub struct Axis {
     safe: SafeAction,
 }
 
-/// Why an axis cannot be.
+/// Reason why an axis is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AxisError {
     /// A limit is not finite, or the lower one exceeds the upper one.
     Limits,
-    /// The largest change in a tick is not above 0.
+    /// The largest change in a tick is not positive.
     Rate,
     /// The value at the start is outside the limits.
     Start,
-    /// A ramp's step is not above 0 and finite, or 0, where it ends, is outside the limits.
+    /// A ramp's step is not positive and finite, or its end, 0, is outside the limits.
     Ramp,
 }
 
@@ -56,9 +56,9 @@ impl fmt::Display for AxisError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Limits => "an axis' limits are not finite or reversed",
-            Self::Rate => "an axis' largest change in a tick is not above 0",
+            Self::Rate => "an axis' largest change in a tick is not positive",
             Self::Start => "an axis' value at the start is outside its limits",
-            Self::Ramp => "an axis' ramp has no step above 0, or its limits exclude 0, where it ends",
+            Self::Ramp => "an axis' ramp has no positive step, or its limits exclude its end, 0",
         })
     }
 }
@@ -66,15 +66,15 @@ impl fmt::Display for AxisError {
 impl core::error::Error for AxisError {}
 
 impl Axis {
-    /// An axis without limits, and so without a rate: it may not leave 0, and keeps the controller from arming.
+    /// An axis without limits, and so without a rate: it may not leave 0, and prevents arming.
     pub const STILL: Self = Self { low: 0.0, high: 0.0, rate: 0.0, start: 0.0, safe: SafeAction::Coast };
 
-    /// An axis with finite limits `low` to `high`, that changes by at most `rate` in a tick (infinite: at once), and
-    /// whose first value after arming changes by at most that from `start`.
+    /// Creates an axis with finite limits `low` to `high` that changes by at most `rate` in a tick (infinite: at once).
+    /// Its first value after arming differs from `start` by at most `rate`.
     ///
     /// # Errors
     ///
-    /// Where these do not fit; see [`AxisError`].
+    /// Fails if these values are invalid; see [`AxisError`].
     pub fn new(low: f32, high: f32, rate: f32, start: f32, safe: SafeAction) -> Result<Self, AxisError> {
         if !(low.is_finite() && high.is_finite() && low <= high) {
             return Err(AxisError::Limits);
@@ -93,38 +93,38 @@ impl Axis {
         Ok(Self { low, high, rate, start, safe })
     }
 
-    /// `true` for [`Self::STILL`] alone: [`Self::new`] makes none without a rate.
+    /// Returns `true` only for [`Self::STILL`]: an axis of [`Self::new`] always has a rate.
     pub fn is_still(&self) -> bool {
         self.rate == 0.0
     }
 
-    /// The lower limit.
+    /// Returns the lower limit.
     pub const fn low(&self) -> f32 {
         self.low
     }
 
-    /// The upper limit.
+    /// Returns the upper limit.
     pub const fn high(&self) -> f32 {
         self.high
     }
 
-    /// The largest change in a tick.
+    /// Returns the largest change in a tick.
     pub const fn rate(&self) -> f32 {
         self.rate
     }
 
-    /// The value that the first change after arming counts from.
+    /// Returns the value from which the first change after arming is limited.
     pub const fn start(&self) -> f32 {
         self.start
     }
 
-    /// What it does once latched.
+    /// Returns the action after latching.
     pub const fn safe(&self) -> SafeAction {
         self.safe
     }
 
-    /// A finite value, brought within the limits. (By comparisons: a Cortex-M4 has no instruction for `f32::max`, and
-    /// calls a function, while the tick waits.)
+    /// Limits a finite value. It compares, because a Cortex-M4 has no instruction for `f32::max` and would call a
+    /// function in the tick.
     pub(crate) fn limit(&self, value: f32) -> f32 {
         match value {
             below if below < self.low => self.low,
@@ -133,13 +133,14 @@ impl Axis {
         }
     }
 
-    /// One tick on from `last` towards `target`. What was not driven begins at the start value.
+    /// Returns the output one tick after `last` towards `target`. An axis that was not driven begins at the start
+    /// value.
     pub(crate) fn follow(&self, last: Output, target: f32) -> Output {
         let last = if let Output::Drive(value) = last { value } else { self.start };
         Output::Drive(self.limit(towards(last, target, self.rate)))
     }
 
-    /// One tick of the safe action on from `last`. What was not driven has nothing to hold.
+    /// Returns the output of the safe action one tick after `last`. An axis that was not driven has nothing to hold.
     pub(crate) fn rest(&self, last: Output) -> Output {
         match (self.safe, last) {
             (SafeAction::Brake, _) => Output::Brake,
@@ -151,7 +152,7 @@ impl Axis {
     }
 }
 
-/// `from`, moved towards `to` by at most `step`.
+/// Moves `from` towards `to` by at most `step`.
 fn towards(from: f32, to: f32, step: f32) -> f32 {
     let way = to - from;
     if way.abs() <= step { to } else { from + step.copysign(way) }

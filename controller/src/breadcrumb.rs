@@ -1,31 +1,31 @@
-//! What a crash leaves in memory that a reset keeps, for the next start to find.
+//! The record of a crash, in memory that a reset preserves, for the next start to report.
 //!
-//! After power-on that memory holds anything, so that a record has a checksum.
+//! That memory has arbitrary content after power-on, so a record has a checksum.
 
 use actq_link::code::{Crash, ResetCause};
 use actq_link::frame::CRC;
 use actq_link::report::Breadcrumb;
 
-/// Words of a record: the memory to set aside, as a static in a section that the start-up code leaves alone.
+/// Words of a record: reserve them as a static in a section that the start-up code does not initialize.
 pub const WORDS: usize = 6;
 
 /// A crash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Record {
-    /// What it died of.
+    /// Kind of the crash.
     pub crash: Crash,
-    /// Program counter; 0 where it is not known.
+    /// Program counter; 0 if unknown.
     pub pc: u32,
-    /// Fault status, line of the panic, or [`crate::progress::Progress::missing`].
+    /// Detail: fault status, line of the panic, or [`crate::progress::Progress::missing`].
     pub detail: u32,
     /// Ticks since the start.
     pub ticks: u32,
-    /// Crashes since power-on, this one included.
+    /// Crashes since power-on, including this one.
     pub count: u32,
 }
 
 impl Record {
-    /// The words to leave behind.
+    /// Encodes the record.
     pub fn to_words(self) -> [u32; WORDS] {
         let Self { crash, pc, detail, ticks, count } = self;
         let content = [crash.code().into(), pc, detail, ticks, count];
@@ -33,7 +33,7 @@ impl Record {
         [a, b, c, d, e, checksum(&content)]
     }
 
-    /// What was left behind; `None` where the words are none of [`Self::to_words`].
+    /// Decodes a record; `None` if [`Self::to_words`] did not make these words.
     pub fn from_words(words: &[u32; WORDS]) -> Option<Self> {
         let [crash, pc, detail, ticks, count, sum] = *words;
         let crash_code = Crash::from_code(crash.try_into().ok()?)?;
@@ -46,7 +46,7 @@ impl Record {
         })
     }
 
-    /// The report of a start for `reset`, with what was found.
+    /// Returns the report of a start after `reset`, with the record found, if any.
     pub fn report(reset: ResetCause, found: Option<Self>) -> Breadcrumb {
         let [pc, detail, ticks, count] = found.map_or([0; 4], |r| [r.pc, r.detail, r.ticks, r.count]);
         Breadcrumb { reset, crash: found.map(|r| r.crash), pc, detail, ticks, count }

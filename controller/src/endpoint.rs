@@ -1,11 +1,11 @@
-//! The controller's end of the link: what each message does, and what is answered.
+//! The controller's end of the link: it carries out each message and answers it.
 //!
-//! The firmware calls [`Endpoint::receive`] for every byte that came, [`Endpoint::report`] every now and then, and
-//! sends what they give. It lets the head run on [`Endpoint::step`] and hands its action to [`Endpoint::acted`].
+//! The firmware calls [`Endpoint::receive`] for every byte received and [`Endpoint::report`] regularly, and sends the
+//! frames that they return. It runs the head on [`Endpoint::step`] and passes its action to [`Endpoint::acted`].
 //!
-//! An observation, its step and its action belong to the token ([`Safety::token`]) that the observation came under:
-//! with another token they are dropped, and the head begins anew. So a host that reads each token, which a status tells
-//! before the first action under it, can predict every action.
+//! An observation, its step and its action belong to the token ([`Safety::token`]) at the observation's arrival. When
+//! the token changes they are dropped, and the head is reset. A status reports each token before the first action under
+//! it. So a host that reads each token can predict every action.
 
 use core::mem;
 
@@ -18,68 +18,79 @@ use crate::requests::{Settings, request};
 use crate::safety::{Safety, Shared};
 use crate::update::Update;
 
-/// Ticks without a good frame, while not armed, after which a host may have started anew and is listened to from any
-/// number on.
+/// Ticks without a good frame, while not armed, after which the controller accepts any sequence number, because the
+/// host may have restarted.
 pub const QUIET: u32 = 1000;
 
-/// What a controller tells of itself, besides what it decides.
+/// Facts that a controller reports about itself, besides its decisions.
 #[derive(Clone, Copy, Debug)]
 pub struct Facts {
-    /// CRC-32 in the header of the image that runs; 0 without one.
+    /// CRC-32 from the header of the running image; 0 without one.
     pub image: u32,
-    /// Its slot, 0 or 1, or [`actq_link::report::BUILT_IN`].
+    /// The running image's slot, 0 or 1, or [`actq_link::report::BUILT_IN`].
     pub slot: u8,
-    /// How long things take.
+    /// Measured times.
     pub timing: Timing,
-    /// What was left behind before the last reset, and its cause.
+    /// The last reset's cause, and the crash record from before it.
     pub breadcrumb: Breadcrumb,
 }
 
 /// An observation for the head.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step<'a> {
-    /// Sequence number of its frame.
+    /// Sequence number of the observation's frame.
     pub of: u32,
-    /// `true` if the head has to be reset first: the token differs from that of the step before.
+    /// `true` if the head must be reset first: the token differs from that of the previous step.
     pub reset: bool,
-    /// Its values.
+    /// The values of the observation.
     pub observation: &'a [f32],
 }
 
-/// The controller's end of the link. `OBS` is room for an observation's values, `N` for a frame
+/// The controller's end of the link. `OBS` is the capacity for an observation's values, `N` for a frame's bytes
 /// ([`actq_link::frame::bytes`]).
 #[derive(Debug)]
 pub struct Endpoint<'r, const OBS: usize, const N: usize> {
     receiver: Receiver<N>,
     sender: Sender,
     guard: Guard<'r, OBS>,
-    /// To be kept up to date by the firmware.
+    /// Facts that the firmware keeps up to date.
     pub facts: Facts,
     settings: Settings,
-    /// Tick of the last one.
-    reported: u32,
+    /// Tick of the last status.
+    reported_at: u32,
     /// Tick of the last good frame.
-    heard: u32,
+    heard_at: u32,
     /// [`Safety::token`] in the last status.
-    told_token: Option<u32>,
-    /// When the newest observation came.
+    reported_token: Option<u32>,
+    /// [`Safety::token`] at the newest observation's arrival.
     observed_token: Option<u32>,
-    /// When the last step was given.
+    /// [`Safety::token`] when the last step was returned.
     step_token: Option<u32>,
 }
 
 impl<'r, const OBS: usize, const N: usize> Endpoint<'r, OBS, N> {
-    /// An end that has heard nothing yet.
+    /// Creates an endpoint that has received nothing.
     pub const fn new(guard: Guard<'r, OBS>, facts: Facts, settings: Settings) -> Self {
         let receiver = Receiver::new();
         let sender = Sender::new(0);
-        let [told_token, observed_token, step_token] = [None; 3];
-        Self { receiver, sender, guard, facts, settings, reported: 0, heard: 0, told_token, observed_token, step_token }
+        let [reported_token, observed_token, step_token] = [None; 3];
+        Self {
+            receiver,
+            sender,
+            guard,
+            facts,
+            settings,
+            reported_at: 0,
+            heard_at: 0,
+            reported_token,
+            observed_token,
+            step_token,
+        }
     }
 
-    /// Takes a byte that came at `micros`; the frame to send for it, in `out`.
+    /// Takes a byte that arrived at `micros`; returns the frame to send for it, in `out`.
     ///
-    /// `out` needs room for [`actq_link::frame::wire_bytes`] of 46 bytes and of an action; a frame without room is not
+    /// `out` must hold [`actq_link::frame::wire_bytes`] of 46 bytes and of an action; a frame that does not fit is not
     /// sent.
     pub fn receive<'b, const AXES: usize>(
         &mut self,
@@ -90,7 +101,7 @@ impl<'r, const OBS: usize, const N: usize> Endpoint<'r, OBS, N> {
         out: &'b mut [u8],
     ) -> Option<&'b [u8]> {
         let received = self.receiver.push(byte)?;
-        self.heard = safety.with(|safety| safety.ticks());
+        self.heard_at = safety.with(|safety| safety.ticks());
         let of = received.sequence;
         let (guard, settings) = (&mut self.guard, &mut self.settings);
         let answer = match received.message {
@@ -119,14 +130,14 @@ impl<'r, const OBS: usize, const N: usize> Endpoint<'r, OBS, N> {
         };
         let message = match answer {
             Answer::Message(message) => message,
-            Answer::Report(report) => self.of_report(report, safety),
+            Answer::Report(report) => self.report_message(report, safety),
             Answer::Done(outcome) => Message::Ack { of, refusal: outcome.err(), written: update.written() },
         };
         self.sender.frame(&message, micros, out)
     }
 
-    /// A status, where one is due, or the token is another one. To be called at least every few ticks: it also notices
-    /// that the line has fallen silent.
+    /// Returns a status if one is due or the token changed. Call it at least every few ticks: it also detects a silent
+    /// line.
     pub fn report<'b, const AXES: usize>(
         &mut self,
         micros: u32,
@@ -136,39 +147,40 @@ impl<'r, const OBS: usize, const N: usize> Endpoint<'r, OBS, N> {
         self.relearn(safety);
         let (ticks, token) = safety.with(|safety| (safety.ticks(), safety.token()));
         let period = self.settings.status_period;
-        let is_due = period > 0 && ticks.wrapping_sub(self.reported) >= period;
-        if !is_due && self.told_token == Some(token) {
+        let is_due = period > 0 && ticks.wrapping_sub(self.reported_at) >= period;
+        if !is_due && self.reported_token == Some(token) {
             return None;
         }
-        self.reported = ticks;
-        let status = self.of_report(Report::Status, safety);
+        self.reported_at = ticks;
+        let status = self.report_message(Report::Status, safety);
         self.sender.frame(&status, micros, out)
     }
 
-    /// While not armed: learns the clocks anew where no good observation has come in time, and the numbers, too, where
-    /// nothing has for long. What has come under the numbers before may then come once more: its token counts no more.
+    /// While not armed: resets the clock tracking if no valid observation arrived in time, and the sequence numbers if
+    /// no good frame arrived for [`QUIET`] ticks. An earlier frame could then be accepted again, so the token is
+    /// renewed.
     fn relearn<const AXES: usize>(&mut self, safety: &mut impl Shared<AXES>) {
         let (ticks, stale, state) = safety.with(|safety| (safety.ticks(), safety.is_stale(), safety.state()));
         if state == State::Armed {
             return;
         }
-        let is_quiet = ticks.wrapping_sub(self.heard) > QUIET;
+        let is_quiet = ticks.wrapping_sub(self.heard_at) > QUIET;
         if stale || is_quiet {
             self.guard.reopen();
         }
         if is_quiet {
-            self.heard = ticks;
+            self.heard_at = ticks;
             if self.receiver.reopen() {
                 safety.with(Safety::renew);
             }
         }
     }
 
-    /// The newest observation, once, where it has come under the token of now; not before a status has told that. While
-    /// not armed, too: the head's actions are then told and not applied.
+    /// Returns the newest observation once, if it arrived under the current token and a status has reported this token.
+    /// While not armed, the head's actions are reported and not applied.
     pub fn step<const AXES: usize>(&mut self, safety: &mut impl Shared<AXES>) -> Option<Step<'_>> {
         let token = Some(safety.with(|safety| safety.token()));
-        if self.told_token != token {
+        if self.reported_token != token {
             return None;
         }
         let (of, observation) = self.guard.newest()?;
@@ -179,8 +191,8 @@ impl<'r, const OBS: usize, const N: usize> Endpoint<'r, OBS, N> {
         Some(Step { of, reset, observation })
     }
 
-    /// Takes the head's action on the last [`Self::step`], or its failure; the frame to send. An action is dropped where
-    /// the token has changed since the step began; a failure latches all the same.
+    /// Takes the head's action on the last [`Self::step`], or its failure; returns the frame to send. An action is
+    /// dropped if the token changed since the step began; a failure always latches.
     pub fn acted<'b, E, const AXES: usize>(
         &mut self,
         of: u32,
@@ -191,7 +203,7 @@ impl<'r, const OBS: usize, const N: usize> Endpoint<'r, OBS, N> {
     ) -> Option<&'b [u8]> {
         let Ok(action) = action else {
             safety.with(|safety| safety.trip(Fault::Head));
-            let status = self.of_report(Report::Status, safety);
+            let status = self.report_message(Report::Status, safety);
             return self.sender.frame(&status, micros, out);
         };
         let token = self.step_token;
@@ -199,19 +211,23 @@ impl<'r, const OBS: usize, const N: usize> Endpoint<'r, OBS, N> {
         let message = match &applied {
             Ok(Some(target)) => Message::Action { of, applied: true, values: Floats::Values(target) },
             Ok(None) => Message::Action { of, applied: false, values: Floats::Values(action) },
-            Err(_) => self.of_report(Report::Status, safety),
+            Err(_) => self.report_message(Report::Status, safety),
         };
         self.sender.frame(&message, micros, out)
     }
 
-    fn of_report<const AXES: usize>(&mut self, report: Report, safety: &mut impl Shared<AXES>) -> Message<'static> {
+    fn report_message<const AXES: usize>(
+        &mut self,
+        report: Report,
+        safety: &mut impl Shared<AXES>,
+    ) -> Message<'static> {
         match report {
             Report::Timing => Message::Timing(self.facts.timing),
             Report::Breadcrumb => Message::Breadcrumb(self.facts.breadcrumb),
             Report::Status => {
                 let (state, fault, refusal, token, ticks) = safety
                     .with(|safety| (safety.state(), safety.fault(), safety.refusal(), safety.token(), safety.ticks()));
-                self.told_token = Some(token);
+                self.reported_token = Some(token);
                 Message::Status(Status {
                     state,
                     fault,
@@ -232,7 +248,7 @@ impl<'r, const OBS: usize, const N: usize> Endpoint<'r, OBS, N> {
     }
 }
 
-/// What a message is answered with.
+/// Answer to a message.
 enum Answer {
     Message(Message<'static>),
     Report(Report),

@@ -2,8 +2,8 @@
 //! control tick.
 //!
 //! Clarke and Park transforms (amplitude-invariant), a PI controller for each axis of the rotor, and space-vector
-//! modulation; an observer of the rotor for a sensor of sine and cosine. Arithmetic is f32 in a fixed order, sine,
-//! cosine, arctangent and root among it ([`functions`]), so that a host, an emulator and a board give the same bits.
+//! modulation; a rotor observer for a sine-cosine sensor. All arithmetic is f32 in a fixed order, including sine,
+//! cosine, arctangent and root ([`functions`]), so a host, an emulator and a board compute the same bits.
 //!
 //! SI units: ampere, volt, ohm, henry, second, radian (electrical).
 

@@ -1,4 +1,4 @@
-//! What stands before the head: no observation gets there that is not whole, finite, in range and young.
+//! The guard before the head: it passes only observations that are complete, finite, in range and recent.
 
 use core::fmt;
 
@@ -10,33 +10,33 @@ use crate::age::Age;
 /// The range of one value of an observation, ends included.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
-    /// The least.
+    /// Lowest value.
     pub low: f32,
-    /// The greatest.
+    /// Highest value.
     pub high: f32,
 }
 
-/// Why an observation does not get to the head.
+/// Reason for refusing an observation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refused {
-    /// It has another number of values than the image takes.
+    /// The number of values differs from the image's input length.
     Length {
-        /// Values that the image takes.
+        /// Number of values that the image takes.
         expected: usize,
-        /// Values that came.
+        /// Number of values received.
         given: usize,
     },
     /// A value is NaN or infinite.
     NotFinite {
-        /// Which.
+        /// Index of the value.
         index: usize,
     },
     /// A value is outside its range.
     OutOfRange {
-        /// Which.
+        /// Index of the value.
         index: usize,
     },
-    /// It took too long.
+    /// The observation is too old.
     Old {
         /// Age in µs.
         age: u32,
@@ -46,42 +46,42 @@ pub enum Refused {
 impl fmt::Display for Refused {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Length { expected, given } => write!(f, "{given} values, the image takes {expected}"),
+            Self::Length { expected, given } => write!(f, "{given} values; the image takes {expected}"),
             Self::NotFinite { index } => write!(f, "value {index} is not finite"),
             Self::OutOfRange { index } => write!(f, "value {index} is outside its range"),
-            Self::Old { age } => write!(f, "{age} µs older than the fastest"),
+            Self::Old { age } => write!(f, "{age} µs older than the fastest delivery"),
         }
     }
 }
 
 impl core::error::Error for Refused {}
 
-/// The newest observation that the guard let through, until the head takes it. `OBS` is room for the values.
+/// Guard that keeps the newest accepted observation until the head takes it. `OBS` is the capacity for values.
 #[derive(Debug)]
 pub struct Guard<'r, const OBS: usize> {
     ranges: &'r [Range],
-    /// Oldest age in µs.
+    /// Largest accepted age in µs.
     max_age: u32,
-    /// What the build allows at most.
+    /// Largest `max_age` that the build allows, in µs.
     built_max_age: u32,
     age: Age,
     values: [f32; OBS],
     len: usize,
-    /// Sequence number of its frame.
+    /// Sequence number of the kept observation's frame.
     newest: Option<u32>,
     refused: u32,
 }
 
 impl<'r, const OBS: usize> Guard<'r, OBS> {
-    /// A guard for observations of `len` values, each in its range; without `ranges` they only have to be finite.
-    /// Values without a range (where there are fewer) are refused.
+    /// Creates a guard for observations of `len` values, each in its range. With empty `ranges`, values only have to be
+    /// finite; else a value without a range is refused.
     ///
-    /// `None` where there is no room for `len` values.
+    /// Returns `None` if `len` exceeds `OBS`.
     pub fn new(len: usize, ranges: &'r [Range], max_age: u32) -> Option<Self> {
         (len <= OBS).then(|| Self { len, ..Self::full(ranges, max_age) })
     }
 
-    /// As [`Self::new`], for observations of `OBS` values.
+    /// Creates a guard as [`Self::new`] does, for observations of `OBS` values.
     pub fn full(ranges: &'r [Range], max_age: u32) -> Self {
         Self {
             ranges,
@@ -95,12 +95,12 @@ impl<'r, const OBS: usize> Guard<'r, OBS> {
         }
     }
 
-    /// Lets an observation through that was sent at `remote` µs and came at `local` µs. One that is refused is counted,
-    /// and the last one stays.
+    /// Checks an observation that was sent at `remote` µs and received at `local` µs, and keeps it if it is valid. A
+    /// refused one is counted, and the last one stays.
     ///
     /// # Errors
     ///
-    /// Why it is refused.
+    /// Returns the reason for a refusal.
     pub fn take(&mut self, of: u32, values: Floats<'_>, remote: u32, local: u32) -> Result<(), Refused> {
         self.check(values, remote, local).inspect_err(|_| self.refused = self.refused.wrapping_add(1))?;
         self.values.iter_mut().zip(values.iter()).for_each(|(place, value)| *place = value);
@@ -129,21 +129,21 @@ impl<'r, const OBS: usize> Guard<'r, OBS> {
         Ok(())
     }
 
-    /// The newest observation with its frame's number, once.
+    /// Returns the newest observation once, with its frame's number.
     pub fn newest(&mut self) -> Option<(u32, &[f32])> {
         Some((self.newest.take()?, self.values.get(..self.len)?))
     }
 
-    /// Age in µs above which an observation is refused.
+    /// Returns the largest accepted age of an observation, in µs.
     pub const fn max_age(&self) -> u32 {
         self.max_age
     }
 
-    /// Sets it, not above that of the build.
+    /// Sets the largest accepted age in µs, up to the build's limit.
     ///
     /// # Errors
     ///
-    /// [`Refusal::Range`] where it is.
+    /// Returns [`Refusal::Range`] above the build's limit.
     pub fn set_max_age(&mut self, max_age: u32) -> Result<(), Refusal> {
         if max_age > self.built_max_age {
             return Err(Refusal::Range);
@@ -152,18 +152,18 @@ impl<'r, const OBS: usize> Guard<'r, OBS> {
         Ok(())
     }
 
-    /// Forgets how the clocks stand to each other, and what was not taken.
+    /// Resets the clock tracking and drops the observation that was not taken.
     pub fn reopen(&mut self) {
         self.age = Age::default();
         self.newest = None;
     }
 
-    /// Observations refused so far; wraps.
+    /// Returns the number of refused observations; wraps.
     pub const fn refused(&self) -> u32 {
         self.refused
     }
 
-    /// Values of an observation.
+    /// Returns the length of an observation in values.
     pub const fn values(&self) -> usize {
         self.len
     }

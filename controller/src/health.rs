@@ -1,11 +1,11 @@
-//! What has to be right before anything moves.
+//! Checks that must pass before any output moves.
 
 use actq_link::code::{Fault, Refusal};
 
-/// One of the things that have to be right.
+/// A check that must pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Check {
-    /// The image's checksum: at the start, and by the scrub while running.
+    /// The image's checksum, at the start and by the scrub while running.
     Image,
     /// The image's self-test vector, bit for bit.
     SelfTest,
@@ -13,15 +13,15 @@ pub enum Check {
     Clock,
     /// The watchdog runs.
     Watchdog,
-    /// No break input, no overrun since it was last cleared.
+    /// No break input and no overrun since the last clearing.
     Hardware,
 }
 
 impl Check {
-    /// All of them, in the order in which refusals name them.
+    /// All checks, in the order in which refusals name them.
     pub const ALL: [Self; 5] = [Self::Image, Self::SelfTest, Self::Clock, Self::Watchdog, Self::Hardware];
 
-    /// Why it keeps from arming.
+    /// Returns the refusal to arm while this check fails.
     const fn refusal(self) -> Refusal {
         match self {
             Self::Image => Refusal::Image,
@@ -32,7 +32,7 @@ impl Check {
         }
     }
 
-    /// What it does to a controller that is armed.
+    /// Returns the fault of an armed controller when this check fails.
     pub(crate) const fn fault(self) -> Fault {
         match self {
             Self::Image | Self::SelfTest => Fault::Image,
@@ -43,14 +43,14 @@ impl Check {
     }
 }
 
-/// What is known to be right. Nothing is, until it was said.
+/// Outcomes of all checks. A check that was not made counts as failed.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Health {
     passed: [bool; Check::ALL.len()],
 }
 
 impl Health {
-    /// Notes the outcome of a check.
+    /// Records the outcome of a check.
     pub fn set(&mut self, check: Check, passed: bool) {
         for (slot, which) in self.passed.iter_mut().zip(Check::ALL) {
             if which == check {
@@ -59,11 +59,11 @@ impl Health {
         }
     }
 
-    /// The permission to arm.
+    /// Returns the permission to arm.
     ///
     /// # Errors
     ///
-    /// What has failed or was not done, the first of several.
+    /// Returns the refusal for the first check that failed or was not made.
     pub fn ready(&self) -> Result<Ready, Refusal> {
         match self.passed.iter().zip(Check::ALL).find(|(passed, _)| !**passed) {
             None => Ok(Ready(())),
@@ -72,6 +72,6 @@ impl Health {
     }
 }
 
-/// Every check has passed. Only [`Health::ready`] gives it, and nothing is armed without it.
+/// Proof that all checks passed. Only [`Health::ready`] creates it, and arming requires it.
 #[derive(Debug)]
 pub struct Ready(());

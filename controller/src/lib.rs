@@ -1,16 +1,16 @@
-//! What a motor controller decides, without its peripherals: the firmware feeds bytes, ticks and times, and writes the
-//! outputs.
+//! The decisions of a motor controller, without its peripherals: the firmware passes in bytes, ticks and times, and
+//! writes the outputs.
 //!
-//! [`endpoint`] answers the link, [`guard`] lets observations to the head, [`safety`] decides every tick what the
-//! outputs do, [`slots`] which image runs, [`progress`] when the watchdog is fed, [`scrub`] notices that the image has
-//! changed, and [`breadcrumb`] says what the last run died of. [`foc`] is a current loop for the control tick.
-//! `docs/SAFETY.md` has the states, and what is not claimed.
+//! [`endpoint`] answers the link, [`guard`] checks observations for the head, [`safety`] decides the outputs of every
+//! tick, [`slots`] selects the image that runs, [`progress`] decides when to feed the watchdog, [`scrub`] detects a
+//! changed image, and [`breadcrumb`] reports the last crash. [`foc`] is a current loop for the control tick.
+//! `docs/SAFETY.md` documents the states and the limits of these guarantees.
 //!
-//! Nothing here allocates, blocks or panics; each call's work is bounded.
+//! This crate does not allocate, block or panic; each call's work is bounded.
 #![no_std]
 #![forbid(unsafe_code)]
 
-// Which of these may use which: the table in docs/ARCHITECTURE.md, which a test reads.
+// The dependencies between these modules are in docs/ARCHITECTURE.md; a test compares them.
 mod age;
 pub mod axis;
 pub mod breadcrumb;

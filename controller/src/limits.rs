@@ -1,4 +1,4 @@
-//! Limits of an axis as a build states them: `LOW:HIGH` or `LOW:HIGH:RATE`, in the unit of the actions.
+//! Limits of an axis in a build's notation: `LOW:HIGH` or `LOW:HIGH:RATE`, in the unit of the actions.
 
 use core::fmt;
 use core::str::FromStr;
@@ -6,24 +6,24 @@ use core::str::FromStr;
 /// Finite limits of an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// Least value.
+    /// Lowest value.
     pub low: f32,
-    /// Greatest value, not below `low`.
+    /// Highest value, not below `low`.
     pub high: f32,
-    /// Largest change in a second, above 0; `None` leaves it to the firmware.
+    /// Largest change in a second, above 0; with `None` the firmware chooses.
     pub rate: Option<f32>,
 }
 
-/// Why a text states no limits.
+/// Reason why a text is not a valid limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LimitsError {
-    /// It has fewer than two parts, or more than three.
+    /// The text has fewer than two parts or more than three.
     Parts,
     /// A part is not a finite number.
     Number,
     /// The lower limit exceeds the upper one.
     Reversed,
-    /// The rate is not above 0.
+    /// The rate is not positive.
     Rate,
 }
 
@@ -33,7 +33,7 @@ impl fmt::Display for LimitsError {
             Self::Parts => "limits have the form LOW:HIGH or LOW:HIGH:RATE",
             Self::Number => "limits are finite numbers: LOW:HIGH or LOW:HIGH:RATE",
             Self::Reversed => "the lower limit exceeds the upper one; the form is LOW:HIGH",
-            Self::Rate => "the rate must be above 0; it is the largest change in a second",
+            Self::Rate => "the rate, the largest change in a second, must be above 0",
         })
     }
 }
@@ -41,8 +41,8 @@ impl fmt::Display for LimitsError {
 impl core::error::Error for LimitsError {}
 
 impl Limits {
-    /// Limits of axis `i`: the stricter of the image's and of the build's, which has some for each axis, or for all.
-    /// `None` without either, and if they exclude each other.
+    /// Returns the limits of axis `i`: the stricter of the image's and the build's. `built` has limits for each axis,
+    /// or one for all. Returns `None` without any limits, and if the two do not overlap.
     pub fn of_axis(i: usize, image: Option<[f32; 2]>, built: &[Self]) -> Option<Self> {
         let image = image.map(|[low, high]| Self { low, high, rate: None });
         match (image, built.get(i).or(built.first())) {

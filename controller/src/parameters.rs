@@ -1,27 +1,27 @@
-//! What may be set while disarmed, within what the build allows.
+//! Parameters that a host may set while disarmed, within the build's limits.
 
 use actq_link::code::{Parameter, Refusal};
 
 use crate::axis::Axis;
 use crate::safety::Safety;
 
-/// The largest whole number up to which f32 has all of them.
-const MOST_WHOLE: u32 = 1 << 24;
+/// Largest number up to which f32 represents every whole number.
+const MAX_WHOLE: u32 = 1 << 24;
 
-/// A whole number from `least` to `most`.
+/// Converts `value` to a whole number from `least` to `most`.
 pub(crate) fn whole(value: f32, least: u32, most: u32) -> Result<u32, Refusal> {
-    // Saturates, and is 0 for NaN.
+    // The cast saturates, and gives 0 for NaN.
     let number = value as u32;
-    let is_whole = number as f32 == value && (least..=most.min(MOST_WHOLE)).contains(&number);
+    let is_whole = number as f32 == value && (least..=most.min(MAX_WHOLE)).contains(&number);
     if is_whole { Ok(number) } else { Err(Refusal::Range) }
 }
 
 impl<const AXES: usize> Safety<AXES> {
-    /// The value of a parameter of the axes or of the deadline.
+    /// Returns the deadline, or a parameter of an axis.
     ///
     /// # Errors
     ///
-    /// [`Refusal::Parameter`] where it is another one, or there is no such axis.
+    /// Returns [`Refusal::Parameter`] for another parameter and for an unknown axis.
     pub fn get(&self, parameter: Parameter, axis: u8) -> Result<f32, Refusal> {
         if parameter == Parameter::Deadline {
             return Ok(self.deadline as f32);
@@ -36,12 +36,13 @@ impl<const AXES: usize> Safety<AXES> {
         }
     }
 
-    /// Sets one of the parameters that [`Self::get`] gives. Limits, rate and deadline only become stricter than those
-    /// of the build, the deadline not below its least.
+    /// Sets a parameter that [`Self::get`] returns. Limits, rate and deadline may only be stricter than those of the
+    /// build, the deadline not below its minimum.
     ///
     /// # Errors
     ///
-    /// As [`Self::may_change`] and [`Self::get`], and [`Refusal::Range`] where the value is not one that it may have.
+    /// Fails as [`Self::may_change`] and [`Self::get`] do, and with [`Refusal::Range`] for a value outside the allowed
+    /// range.
     pub fn set(&mut self, token: u32, parameter: Parameter, axis: u8, value: f32) -> Result<(), Refusal> {
         self.may_change(token)?;
         if parameter == Parameter::Deadline {

@@ -1,22 +1,22 @@
-//! When the watchdog is fed.
+//! Decides when to feed the watchdog.
 //!
-//! Progress of the link is that its bytes are looked at, not that there are any: what a cut cable needs is the safe
-//! action, which a reset would end. Progress of the head is a piece of a step, or that there is none to do; that of the
-//! output a control tick.
+//! The link makes progress when its bytes are read, even if there are none: a broken cable needs the safe action, which
+//! a reset would end. The head makes progress with a piece of a step, or if it has none to do. The output makes
+//! progress with a control tick.
 
-/// What has made progress since the watchdog was last fed.
+/// Parts that have made progress since the last feeding of the watchdog.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Progress {
-    /// The link's bytes were looked at.
+    /// The link's bytes were read.
     pub link: bool,
-    /// The head has done a piece of its step, or has none to do.
+    /// The head did a piece of its step, or had none to do.
     pub head: bool,
-    /// The outputs were told.
+    /// The outputs were written.
     pub output: bool,
 }
 
 impl Progress {
-    /// Whether to feed the watchdog now: all have made progress. It begins anew then.
+    /// Returns `true` to feed the watchdog: all parts have made progress. Then starts over.
     #[must_use]
     pub fn feed(&mut self) -> bool {
         let all = self.link && self.head && self.output;
@@ -26,7 +26,8 @@ impl Progress {
         all
     }
 
-    /// What has not, for the breadcrumb that a watchdog's early interrupt leaves: link 1, head 2, output 4.
+    /// Returns the parts without progress, for the breadcrumb of the watchdog's early interrupt: link 1, head 2, output
+    /// 4.
     pub const fn missing(&self) -> u32 {
         !self.link as u32 | (!self.head as u32) << 1 | (!self.output as u32) << 2
     }

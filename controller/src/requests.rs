@@ -1,4 +1,4 @@
-//! What is done for the messages that are acknowledged.
+//! The requests that are acknowledged.
 
 use actq_link::Message;
 use actq_link::code::{Parameter, Refusal, State};
@@ -8,24 +8,24 @@ use crate::parameters::whole;
 use crate::safety::{Safety, Shared};
 use crate::update::{Plan, Update};
 
-/// What the link's end does by itself.
+/// Settings of the endpoint.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
-    /// Ticks between two reports of the status; 0: none unasked but that of a new token.
+    /// Ticks between two status reports. With 0, the only unrequested report is that of a new token.
     pub status_period: u32,
-    /// Whether flash can be erased and written while the outputs are driven: not where code is fetched from the same
-    /// bank.
+    /// `true` if flash can be erased and written while the outputs are driven: code is not fetched from the same bank.
     pub flash_while_armed: bool,
 }
 
 impl Settings {
-    /// Whether flash may be written now. Where that stops the tick, not before a tick has switched the power stage off.
+    /// Checks that flash may be written now. If writing stops the tick, a tick must first have switched the power stage
+    /// off.
     fn may_write<const AXES: usize>(&self, safety: &mut impl Shared<AXES>) -> Result<(), Refusal> {
         if self.flash_while_armed { Ok(()) } else { safety.with(|safety| safety.may_stall()) }
     }
 }
 
-/// Does what is acknowledged; `None` for what only a controller says.
+/// Carries out a request; `None` for a message that only a controller sends.
 pub(crate) fn request<const OBS: usize, const AXES: usize>(
     message: &Message<'_>,
     guard: &mut Guard<'_, OBS>,

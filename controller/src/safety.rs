@@ -1,7 +1,7 @@
-//! The state, the limits and the deadline: what stands between actions and outputs.
+//! The state, the limits and the deadline between actions and outputs.
 //!
-//! A control interrupt calls [`Safety::tick`]; everything else comes from below it, through [`Shared`]. Each call takes
-//! time proportional to the number of axes at most.
+//! A control interrupt calls [`Safety::tick`]. All other calls come from lower priorities, through [`Shared`]. A call
+//! takes at most time proportional to the number of axes.
 
 use core::mem;
 use core::ops::RangeInclusive;
@@ -12,49 +12,48 @@ use crate::axis::{Axis, Output};
 use crate::health::{Check, Health};
 use crate::state::{Disarmed, State};
 
-/// A [`Safety`] that a control interrupt uses, too: however the firmware locks it (RTIC's resource, a critical
-/// section).
+/// A [`Safety`] shared with a control interrupt, with the firmware's kind of lock: RTIC's resource, a critical section.
 pub trait Shared<const AXES: usize> {
-    /// Runs `work` on it while no interrupt does.
+    /// Runs `work` while no interrupt has access.
     fn with<R>(&mut self, work: impl FnOnce(&mut Safety<AXES>) -> R) -> R;
 }
 
-/// Where there is no interrupt.
+/// Access without an interrupt.
 impl<const AXES: usize> Shared<AXES> for Safety<AXES> {
     fn with<R>(&mut self, work: impl FnOnce(&mut Safety<AXES>) -> R) -> R {
         work(self)
     }
 }
 
-/// What a build allows at most.
+/// Limits of the build.
 #[derive(Clone, Debug)]
 pub(crate) struct Built<const AXES: usize> {
     pub(crate) axes: [Axis; AXES],
     pub(crate) deadline: RangeInclusive<u32>,
 }
 
-/// Decides, every tick, what the outputs do.
+/// Decides the outputs of every tick.
 #[derive(Debug)]
 pub struct Safety<const AXES: usize> {
     pub(crate) axes: [Axis; AXES],
-    /// Ticks without an observation, or an action, that are bearable.
+    /// Ticks allowed without an observation, or without an action.
     pub(crate) deadline: u32,
-    /// What the build allows at most.
+    /// Limits of the build.
     pub(crate) built: Built<AXES>,
     health: Health,
     state: State<AXES>,
     /// The last fault.
     fault: Option<Fault>,
-    /// Ticks since the last good observation; the largest number where there was none.
+    /// Ticks since the last valid observation; `u32::MAX` if there was none.
     since_observation: u32,
     ticks: u32,
     token: u32,
 }
 
 impl<const AXES: usize> Safety<AXES> {
-    /// Disarmed. `deadline` in ticks: what may be set, at least 1 (0 is taken as 1), and what holds until then, its end.
-    /// `seed` should be another one at every start, so that requests from before it are refused: a count of starts in
-    /// memory that a reset keeps, or a free-running timer.
+    /// Creates a disarmed controller. `deadline` is the range that may be set, in ticks, at least 1 (0 counts as 1);
+    /// its end applies until then. `seed` should differ at every start, so that requests from before the start are
+    /// refused: a count of starts in memory that a reset preserves, or a free-running timer.
     pub fn new(axes: [Axis; AXES], deadline: RangeInclusive<u32>, seed: u32) -> Self {
         let (least, most) = (*deadline.start().max(&1), *deadline.end().max(&1));
         Self {
@@ -70,12 +69,12 @@ impl<const AXES: usize> Safety<AXES> {
         }
     }
 
-    /// What the outputs do from now to the next tick. To be called at every tick, and nowhere else.
+    /// Returns the outputs from now to the next tick. Call it at every tick, and only there.
     pub fn tick(&mut self) -> [Output; AXES] {
         self.ticks = self.ticks.wrapping_add(1);
         self.since_observation = self.since_observation.saturating_add(1);
         if let State::Armed(armed) = &self.state {
-            // The tick that begins now is not counted in the action's age yet.
+            // The action's age does not include the tick that begins now.
             let late = armed.since_action() >= self.deadline;
             if self.is_stale() {
                 self.trip(Fault::Stale);
@@ -90,22 +89,21 @@ impl<const AXES: usize> Safety<AXES> {
         }
     }
 
-    /// Whether no good observation has come within the deadline.
+    /// Returns `true` if no valid observation arrived within the deadline.
     pub const fn is_stale(&self) -> bool {
         self.since_observation > self.deadline
     }
 
-    /// A good observation has come.
+    /// Records a valid observation.
     pub fn observed(&mut self) {
         self.since_observation = 0;
     }
 
-    /// Takes an action of the head; what the outputs are led to by it, within the limits, where it is applied. That is
-    /// only while armed.
+    /// Takes an action of the head. While armed, applies it and returns the outputs' targets, within the limits.
     ///
     /// # Errors
     ///
-    /// A fault where it has not one finite value for each axis. It latches.
+    /// Returns a fault, and latches, unless the action has one finite value for each axis.
     pub fn act(&mut self, action: &[f32]) -> Result<Option<[f32; AXES]>, Fault> {
         let fault = match <&[f32; AXES]>::try_from(action) {
             Err(_) => Fault::ActionLength,
@@ -122,7 +120,7 @@ impl<const AXES: usize> Safety<AXES> {
         Err(fault)
     }
 
-    /// Latches, where armed: the head has failed, a tick took too long, the break input was seen.
+    /// Latches if armed: after a failure of the head, an overlong tick, or a break input.
     pub fn trip(&mut self, fault: Fault) {
         self.state = match mem::replace(&mut self.state, State::Disarmed(Disarmed::new())) {
             State::Armed(armed) => {
@@ -134,7 +132,7 @@ impl<const AXES: usize> Safety<AXES> {
         };
     }
 
-    /// Notes the outcome of a check. One that has failed keeps from arming, and latches where armed.
+    /// Records the outcome of a check. A failed check prevents arming, and latches an armed controller.
     pub fn check(&mut self, check: Check, passed: bool) {
         self.health.set(check, passed);
         if !passed {
@@ -142,7 +140,7 @@ impl<const AXES: usize> Safety<AXES> {
         }
     }
 
-    /// Why arming would be refused now.
+    /// Returns the reason why arming would be refused now.
     pub fn refusal(&self) -> Option<Refusal> {
         if let State::Armed(_) = self.state {
             return Some(Refusal::Armed);
@@ -151,12 +149,12 @@ impl<const AXES: usize> Safety<AXES> {
         self.health.ready().err().or(self.is_stale().then_some(Refusal::Stale)).or_else(limits)
     }
 
-    /// Arms.
+    /// Arms the controller.
     ///
     /// # Errors
     ///
-    /// Where the token is not [`Self::token`], where armed already, where a check has failed or was not done, without a
-    /// fresh observation, and with an axis without limits. Nothing changes then.
+    /// Fails without any change if the token differs from [`Self::token`], if already armed, if a check failed or was
+    /// not made, without a recent observation, and with an axis without limits.
     pub fn arm(&mut self, token: u32) -> Result<(), Refusal> {
         if token != self.token {
             return Err(Refusal::Token);
@@ -174,7 +172,7 @@ impl<const AXES: usize> Safety<AXES> {
         Ok(())
     }
 
-    /// Disarms; never refused.
+    /// Disarms the controller; never refused.
     pub fn disarm(&mut self) {
         self.state = match mem::replace(&mut self.state, State::Disarmed(Disarmed::new())) {
             State::Disarmed(disarmed) => State::Disarmed(disarmed),
@@ -184,11 +182,11 @@ impl<const AXES: usize> Safety<AXES> {
         self.renew();
     }
 
-    /// Whether settings may change: while disarmed, and by who knows the state.
+    /// Checks that settings may change: the controller is disarmed, and the request's token is current.
     ///
     /// # Errors
     ///
-    /// [`Refusal::Token`] or [`Refusal::Armed`].
+    /// Returns [`Refusal::Token`] or [`Refusal::Armed`].
     pub fn may_change(&self, token: u32) -> Result<(), Refusal> {
         match self.state {
             _ if token != self.token => Err(Refusal::Token),
@@ -197,20 +195,21 @@ impl<const AXES: usize> Safety<AXES> {
         }
     }
 
-    /// Whether the tick may stand still, as while flash is written: disarmed, and a tick has let the outputs coast.
+    /// Checks that the tick may stall, as while flash is written: the controller is disarmed, and a tick has let the
+    /// outputs coast.
     ///
     /// # Errors
     ///
-    /// [`Refusal::Armed`], or [`Refusal::Busy`] up to the next tick.
+    /// Returns [`Refusal::Armed`], or [`Refusal::Busy`] until the next tick.
     pub const fn may_stall(&self) -> Result<(), Refusal> {
         match &self.state {
-            State::Disarmed(disarmed) if disarmed.told() => Ok(()),
+            State::Disarmed(disarmed) if disarmed.is_coasting() => Ok(()),
             State::Disarmed(_) => Err(Refusal::Busy),
             State::Armed(_) | State::Latched(_) => Err(Refusal::Armed),
         }
     }
 
-    /// The state's name.
+    /// Returns the state.
     pub const fn state(&self) -> code::State {
         match self.state {
             State::Disarmed(_) => code::State::Disarmed,
@@ -219,33 +218,34 @@ impl<const AXES: usize> Safety<AXES> {
         }
     }
 
-    /// The last fault.
+    /// Returns the last fault.
     pub const fn fault(&self) -> Option<Fault> {
         self.fault
     }
 
-    /// Makes requests, observations and actions from before count no more.
+    /// Changes the token, so that earlier requests, observations and actions are no longer accepted.
     pub fn renew(&mut self) {
         self.token = next_token(self.token);
     }
 
-    /// What requests have to name.
+    /// Returns the token that requests must contain.
     pub const fn token(&self) -> u32 {
         self.token
     }
 
-    /// Ticks since the start; wraps.
+    /// Returns the ticks since the start; wraps.
     pub const fn ticks(&self) -> u32 {
         self.ticks
     }
 
-    /// The axes.
+    /// Returns the axes.
     pub const fn axes(&self) -> &[Axis; AXES] {
         &self.axes
     }
 }
 
-/// The next of 2^32 different numbers (a full-period linear congruential generator; Numerical Recipes' constants).
+/// Returns the next of 2^32 different numbers, by a full-period linear congruential generator with the constants of
+/// Numerical Recipes.
 const fn next_token(token: u32) -> u32 {
     token.wrapping_mul(1_664_525).wrapping_add(1_013_904_223)
 }

@@ -1,9 +1,9 @@
-//! Reads the running image again and again, to notice that flash has changed.
+//! Scrub: reads the running image repeatedly to detect changed flash.
 
 use actq_link::frame::CRC;
 use crc::Digest;
 
-/// CRC-32 of all bytes, in pieces.
+/// CRC-32 of an image, computed in pieces.
 pub struct Scrub {
     expected: u32,
     digest: Digest<'static, u32>,
@@ -11,12 +11,12 @@ pub struct Scrub {
 }
 
 impl Scrub {
-    /// Scrubs an image that is right now: reads it once.
+    /// Creates a scrub of an image that is valid now, and reads it once.
     pub fn new(image: &[u8]) -> Self {
         Self { expected: CRC.checksum(image), digest: CRC.digest(), at: 0 }
     }
 
-    /// Reads up to `bytes` on; at the image's end, whether it is still what it was. Then it begins anew.
+    /// Reads up to `bytes` more bytes. At the image's end, returns `true` if the image is unchanged, and starts over.
     pub fn advance(&mut self, image: &[u8], bytes: usize) -> Option<bool> {
         let end = self.at.saturating_add(bytes).min(image.len());
         self.digest.update(image.get(self.at..end).unwrap_or_default());

@@ -1,12 +1,12 @@
-//! Two places for an image in NOR flash, and the way from one to the other that survives a loss of power at any moment.
+//! Two image slots in NOR flash, and updates that survive a loss of power at any moment.
 //!
-//! A slot is whole sectors: a record of 128 bytes, 128 bytes of marks, and the image. The record is written last, once
-//! the image was read back, so that a slot with a good record has been whole. Marks are words that are programmed one
-//! after the other, each once: a trial begins, the image is confirmed, the image is rejected. The slot that runs is the
-//! confirmed one of the highest generation; the other is the one that an update erases. So the one that runs is never
-//! touched, nothing is ever programmed twice, and there is no word anywhere whose loss takes both with it.
+//! A slot is whole sectors: a record of 128 bytes, 128 bytes of marks, and the image. The record is written last, after
+//! the image was read back, so a slot with a valid record was complete. Marks are words that are programmed one after
+//! another, each one time: a trial begins, the image is confirmed, the image is rejected. The confirmed slot with the
+//! highest generation runs; an update erases the other one. So the running slot is never touched, no word is programmed
+//! twice, and the loss of any single word leaves one of the slots valid.
 //!
-//! Flash is reached by the traits of `embedded-storage`.
+//! Access to flash is through the traits of `embedded-storage`.
 
 mod authority;
 #[cfg(feature = "signature")]

@@ -1,7 +1,7 @@
-//! The states, and the only ways from one to another.
+//! The states, and the only transitions between them.
 //!
-//! Each state is a type, and each way a function that takes the one and gives the other: what is not here cannot be
-//! written. A controller is not armed without [`Ready`], which only passed checks give:
+//! Each state is a type, and each transition a function from one to the other; no other transition compiles. Arming
+//! requires [`Ready`], which only passed checks give:
 //!
 //! ```compile_fail
 //! # use actq_controller::state::{Armed, Disarmed};
@@ -33,25 +33,25 @@ use actq_link::code::Fault;
 use crate::axis::{Axis, Output};
 use crate::health::Ready;
 
-/// Outputs coast.
+/// The disarmed state: outputs coast.
 #[derive(Debug)]
 pub struct Disarmed {
-    /// Whether they do: not before the tick that tells them.
-    told: bool,
+    /// `true` if the outputs coast: after the first tick in this state.
+    is_coasting: bool,
 }
 
-/// Outputs follow the actions.
+/// The armed state: outputs follow the actions.
 #[derive(Debug)]
 pub struct Armed<const AXES: usize> {
-    /// What was last told.
+    /// The outputs of the last tick.
     last: [Output; AXES],
-    /// Where the last action leads; before the first one, outputs stay as they were.
+    /// Target of the last action; before the first action the outputs do not change.
     target: Option<[f32; AXES]>,
     /// Ticks since the last action, or since arming.
     since_action: u32,
 }
 
-/// Outputs do their safe actions.
+/// The latched state: outputs do their safe actions.
 #[derive(Debug)]
 pub struct Latched<const AXES: usize> {
     last: [Output; AXES],
@@ -59,23 +59,23 @@ pub struct Latched<const AXES: usize> {
 }
 
 impl Disarmed {
-    /// Where everything begins: with outputs that are off.
+    /// Returns the initial state, with outputs that are off.
     pub const fn new() -> Self {
-        Self { told: true }
+        Self { is_coasting: true }
     }
 
-    /// Whether the outputs coast by now.
-    pub(crate) const fn told(&self) -> bool {
-        self.told
+    /// Returns `true` if the outputs coast.
+    pub(crate) const fn is_coasting(&self) -> bool {
+        self.is_coasting
     }
 
-    /// The outputs of the next tick.
+    /// Returns the outputs of the next tick.
     pub(crate) fn tick<const AXES: usize>(&mut self) -> [Output; AXES] {
-        self.told = true;
+        self.is_coasting = true;
         [Output::Coast; AXES]
     }
 
-    /// To [`Armed`].
+    /// Goes to [`Armed`].
     pub fn arm<const AXES: usize>(self, _ready: Ready) -> Armed<AXES> {
         Armed { last: [Output::Coast; AXES], target: None, since_action: 0 }
     }
@@ -88,7 +88,7 @@ impl Default for Disarmed {
 }
 
 impl<const AXES: usize> Armed<AXES> {
-    /// Where the outputs are to go from now on: finite values.
+    /// Sets the outputs' target: finite values.
     pub(crate) fn follow(&mut self, target: [f32; AXES]) {
         self.target = Some(target);
         self.since_action = 0;
@@ -99,7 +99,7 @@ impl<const AXES: usize> Armed<AXES> {
         self.since_action
     }
 
-    /// The outputs of the next tick.
+    /// Returns the outputs of the next tick.
     pub(crate) fn tick(&mut self, axes: &[Axis; AXES]) -> [Output; AXES] {
         self.since_action = self.since_action.saturating_add(1);
         if let Some(target) = &self.target {
@@ -110,24 +110,24 @@ impl<const AXES: usize> Armed<AXES> {
         self.last
     }
 
-    /// To [`Latched`].
+    /// Goes to [`Latched`].
     pub fn latch(self, fault: Fault) -> Latched<AXES> {
         Latched { last: self.last, fault }
     }
 
-    /// To [`Disarmed`].
+    /// Goes to [`Disarmed`].
     pub fn disarm(self) -> Disarmed {
-        Disarmed { told: false }
+        Disarmed { is_coasting: false }
     }
 }
 
 impl<const AXES: usize> Latched<AXES> {
-    /// What led here.
+    /// Returns the cause.
     pub const fn fault(&self) -> Fault {
         self.fault
     }
 
-    /// The outputs of the next tick.
+    /// Returns the outputs of the next tick.
     pub(crate) fn tick(&mut self, axes: &[Axis; AXES]) -> [Output; AXES] {
         for (last, axis) in self.last.iter_mut().zip(axes) {
             *last = axis.rest(*last);
@@ -135,24 +135,24 @@ impl<const AXES: usize> Latched<AXES> {
         self.last
     }
 
-    /// To [`Armed`]. Outputs stay as they are until the first action, and go on from there.
+    /// Goes to [`Armed`]. Outputs do not change until the first action, and continue from there.
     pub fn arm(self, _ready: Ready) -> Armed<AXES> {
         Armed { last: self.last, target: None, since_action: 0 }
     }
 
-    /// To [`Disarmed`].
+    /// Goes to [`Disarmed`].
     pub fn disarm(self) -> Disarmed {
-        Disarmed { told: false }
+        Disarmed { is_coasting: false }
     }
 }
 
-/// The state that a controller is in.
+/// The state of a controller.
 #[derive(Debug)]
 pub enum State<const AXES: usize> {
-    /// Outputs coast.
+    /// The disarmed state: outputs coast.
     Disarmed(Disarmed),
-    /// Outputs follow the actions.
+    /// The armed state: outputs follow the actions.
     Armed(Armed<AXES>),
-    /// Outputs do their safe actions.
+    /// The latched state: outputs do their safe actions.
     Latched(Latched<AXES>),
 }

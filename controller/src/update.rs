@@ -1,49 +1,49 @@
-//! What an image update over the link asks of whoever does it.
+//! The interface of an image update over the link.
 
 use actq_link::code::Refusal;
 
-/// What is announced of an image.
+/// Announcement of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Plan {
-    /// Bytes; whole words.
+    /// Length in bytes; whole words.
     pub length: u32,
-    /// CRC-32 (ISO-HDLC) of all of them.
+    /// CRC-32 (ISO-HDLC) of all bytes.
     pub crc: u32,
-    /// Version, which must not be lower than one that was confirmed.
+    /// Version. It must not be lower than a confirmed version.
     pub version: u32,
 }
 
-/// Does the requests of an update. Each may come again where its acknowledgement was lost. Where one takes longer than
-/// a call may, it is [`Refusal::Busy`] until it is done.
+/// Carries out the requests of an update. A host repeats a request whose acknowledgement was lost. A request that takes
+/// longer than a call may returns [`Refusal::Busy`] until it is done.
 pub trait Update {
-    /// Makes room for an image.
+    /// Erases a slot for an image.
     ///
     /// # Errors
     ///
-    /// Why there is none.
+    /// Returns the reason for a refusal.
     fn begin(&mut self, plan: Plan) -> Result<(), Refusal>;
 
     /// Writes the image's next bytes.
     ///
     /// # Errors
     ///
-    /// Why they are not written.
+    /// Returns the reason for not writing them.
     fn chunk(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Refusal>;
 
-    /// Checks the image and makes it the one that runs.
+    /// Checks the image and makes it the running one.
     ///
     /// # Errors
     ///
-    /// Why it does not run.
+    /// Returns the reason for not running it.
     fn commit(&mut self, signature: Option<&[u8; 64]>) -> Result<(), Refusal>;
 
-    /// Gives the update up.
+    /// Cancels the update.
     fn abort(&mut self);
 
-    /// Bytes of the image that were taken.
+    /// Returns the number of accepted bytes of the image.
     fn written(&self) -> u32;
 
-    /// Whether an image is being erased, checked or tested.
+    /// Returns `true` while a slot is being erased, or an image checked or tested.
     fn is_busy(&self) -> bool;
 }
 

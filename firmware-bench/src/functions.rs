@@ -1,27 +1,27 @@
-//! What `src/bin/functions.rs` computes on the target, and `host-tests/tests/all/on_target/functions.rs` on the host: operands,
-//! and the hash of what comes out.
+//! Operands and the hash of results, for `src/bin/functions.rs` on the target and
+//! `host-tests/tests/all/on_target/functions.rs` on the host.
 
-/// Elements.
+/// Number of elements.
 pub const LEN: usize = 256;
 
-/// What leaves f32's range, is not in it, or is nothing.
+/// Values near or outside f32's range, subnormal numbers, and zeros.
 pub const EXTREMES: [f32; 13] =
     [f32::MAX, f32::MIN, 1e38, -1e38, 1.0, -1.0, f32::INFINITY, f32::NEG_INFINITY, f32::NAN, 1e-40, -1e-40, 0.0, -0.0];
 
 /// A denoising step.
 #[derive(Debug)]
 pub struct Denoised {
-    /// What it is called.
+    /// Name of the case.
     pub name: &'static str,
-    /// The factor of the sample, which has a limit; 0: there is none.
+    /// Factor of the limited sample; 0 for a step without a limit.
     pub sample: f32,
-    /// The limit.
+    /// Limit of the sample.
     pub limit: f32,
-    /// Whether noise is added.
+    /// `true` if noise is added.
     pub noise: bool,
 }
 
-/// With limits that strike none, half and all of [`values`].
+/// Steps with limits that affect none, half and all of [`values`].
 pub const DENOISED: [Denoised; 8] = [
     Denoised { name: "denoise", sample: 0.0, limit: f32::INFINITY, noise: false },
     Denoised { name: "denoise with noise", sample: 0.0, limit: f32::INFINITY, noise: true },
@@ -34,23 +34,23 @@ pub const DENOISED: [Denoised; 8] = [
 ];
 
 impl Denoised {
-    /// The step's coefficients, in the image's order, with the shares of iterate and output in the sample.
+    /// Returns the step's coefficients in the image's order, with the shares of iterate and output in the sample.
     pub fn coefficients(&self, x: f32, v: f32) -> [f32; 7] {
         [x * self.sample, v * self.sample, 0.6, 0.2, self.sample, 0.1, 0.3]
     }
 }
 
-/// From -6 up to 0, where no function has a shorter way.
+/// Returns values from -6 to 0, for which no function takes a shortcut.
 pub fn values<const N: usize>() -> [f32; N] {
     core::array::from_fn(|i| i as f32 * (6.0 / N as f32) - 6.0)
 }
 
-/// Every magnitude, with both signs.
+/// Returns values of all magnitudes with both signs.
 pub fn magnitudes<const N: usize>() -> [f32; N] {
     core::array::from_fn(|i| f32::from_bits(((i as u32) << 31) | (i as u32 * (0x7f80_0000 / N as u32))))
 }
 
-/// Of the bits of all results; a NaN is a NaN.
+/// Returns a hash of all results' bits; all NaNs count as one value.
 pub fn hash(results: &[&[f32]]) -> u32 {
     let bits = |v: &f32| if v.is_nan() { f32::NAN.to_bits() } else { v.to_bits() };
     results.iter().copied().flatten().map(bits).fold(0, |hash: u32, bits| hash.rotate_left(5) ^ bits)

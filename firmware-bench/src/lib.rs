@@ -1,17 +1,17 @@
-//! What the measuring programs have in common. On a host they only say what they are.
+//! Shared code of the measuring programs. Built for a host they only print a note.
 #![cfg_attr(target_os = "none", no_std)]
 
 pub mod functions;
 pub mod trigonometry;
 
-/// What the programs do where they are built for a host.
+/// Exits with a note when the programs are built for a host.
 #[cfg(not(target_os = "none"))]
 pub fn main() {
     eprintln!("this is firmware: build it with --target thumbv7em-none-eabihf, or see `cargo xtask bench`");
     std::process::exit(1);
 }
 
-/// Words that look random, the same in every run (Marsaglia's xorshift32).
+/// Returns a generator of pseudorandom words, the same in every run (Marsaglia's xorshift32).
 pub fn random_words() -> impl FnMut() -> u32 {
     let mut seed = 0x1234_5678u32;
     move || {

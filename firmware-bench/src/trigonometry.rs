@@ -1,25 +1,25 @@
-//! The functions that a current loop needs, by each crate that has them: what `src/bin/trigonometry.rs` counts on the
-//! target, and `host-tests/tests/all/on_target/foc.rs` compares with the same on the host.
+//! The functions of a current loop, from each crate that has them. `src/bin/trigonometry.rs` counts them on the target,
+//! and `host-tests/tests/all/on_target/foc.rs` compares them with the host's results.
 
 use actq_controller::foc::functions;
 use actq_kernels::math;
 use micromath::F32;
 
-/// Inputs of a function.
+/// Number of inputs of a function.
 pub const LEN: usize = 256;
 
 /// A function of up to two numbers.
 #[derive(Debug)]
 pub struct Case {
-    /// What it computes, and by what.
+    /// Name of the function and its source.
     pub name: &'static str,
-    /// The function.
+    /// Function to measure.
     pub function: fn(f32, f32) -> [f32; 2],
-    /// The inputs: [`angles`], [`vectors`] or [`squares`].
+    /// Source of the inputs: [`angles`], [`vectors`] or [`squares`].
     pub inputs: fn() -> [[f32; 2]; LEN],
 }
 
-/// The cases. The first one is what a call costs.
+/// All cases. The first one measures the cost of a call.
 pub const CASES: [Case; 13] = [
     Case { name: "nothing", function: |x, y| [x, y], inputs: vectors },
     Case { name: "sine and cosine: libm", function: |x, _| libm::sincosf(x).into(), inputs: angles },
@@ -36,12 +36,12 @@ pub const CASES: [Case; 13] = [
     Case { name: "root: chosen", function: |x, _| [x * functions::inverse_root_below(x), 0.0], inputs: squares },
 ];
 
-/// Angles around the circle, in radians.
+/// Returns angles around the circle, in radians.
 pub fn angles() -> [[f32; 2]; LEN] {
     core::array::from_fn(|i| [(i as f32 + 0.5) * (core::f32::consts::TAU / LEN as f32) - core::f32::consts::PI, 0.0])
 }
 
-/// Vectors around the circle, of lengths from 0.5 to 1.5.
+/// Returns vectors around the circle, of lengths from 0.5 to 1.5.
 pub fn vectors() -> [[f32; 2]; LEN] {
     let mut i = 0.0;
     angles().map(|[radians, _]| {
@@ -51,12 +51,12 @@ pub fn vectors() -> [[f32; 2]; LEN] {
     })
 }
 
-/// Numbers above 0 whose exponents are even and odd.
+/// Returns positive numbers with even and odd exponents.
 pub fn squares() -> [[f32; 2]; LEN] {
     core::array::from_fn(|i| [(i as f32 + 0.5) * (4.0 / LEN as f32), 0.0])
 }
 
-/// The results of a case.
+/// Returns the results of a case.
 pub fn results(case: &Case, inputs: &[[f32; 2]; LEN]) -> [[f32; 2]; LEN] {
     inputs.map(|[x, y]| (case.function)(x, y))
 }

@@ -2,12 +2,12 @@
 
 use core::ops::RangeInclusive;
 
-/// Bits of the line in a second.
+/// Bits per second of the serial line.
 pub const BAUD: u32 = 921_600;
 
-/// Ticks without an observation, or without an action, before the safe action, at `tick_hz` ticks a second: 10 ms to
-/// half a second. Within less, a host that asks for the status before it arms has no fresh observation, or the head no
-/// action: its first one after arming may have to wait for a step under way.
+/// Returns the allowed ticks without an observation, or without an action, before the safe action: 10 ms to half a
+/// second at `tick_hz` ticks per second. With less, a host that reads the status before it arms has no recent
+/// observation, or the head no action: its first one after arming may wait for the current step.
 pub const fn allowed(tick_hz: u32) -> RangeInclusive<u32> {
     tick_hz / 100..=tick_hz / 2
 }
@@ -30,23 +30,23 @@ mod tests {
     use super::*;
 
     const SECOND: u64 = 1_000_000_000;
-    /// Of ten bits, in ns.
+    /// Time of a byte of ten bits, in ns.
     const BYTE: u64 = 10 * SECOND / BAUD as u64;
-    /// Of the head, in ns.
+    /// Time of a step of the head, in ns.
     const STEP: u64 = 5_000_000;
-    /// From a status to what the host sends for it, in ns: a USB frame.
+    /// Time from a status to the host's next request, in ns: a USB frame.
     const TURN: u64 = 1_000_000;
     /// Observations before arming.
-    const BEFORE: u32 = 10;
+    const BEFORE_ARMING: u32 = 10;
 
     fn of_axis(tick_hz: u32) -> Safety<1> {
-        let axis = Axis::new(-1.0, 1.0, 1.0, 0.0, SafeAction::Coast).expect("the axis fits");
+        let axis = Axis::new(-1.0, 1.0, 1.0, 0.0, SafeAction::Coast).expect("the axis is valid");
         let mut safety = Safety::new([axis], 1..=*allowed(tick_hz).end(), 0);
         Check::ALL.into_iter().for_each(|check| safety.check(check, true));
         safety
     }
 
-    /// What a host sends: observations in a row; the status is asked for, and waited for, before it arms.
+    /// A host that sends observations in sequence, and requests and awaits the status before it arms.
     struct Host {
         sender: Sender,
         observations: u32,
@@ -57,18 +57,18 @@ mod tests {
     impl Host {
         fn send(&mut self, message: &Message<'_>) {
             let mut buffer = [0; 256];
-            let frame = self.sender.frame(message, 0, &mut buffer).expect("there is room");
+            let frame = self.sender.frame(message, 0, &mut buffer).expect("the buffer is large enough");
             self.queue.extend([&[0], frame].concat());
         }
 
-        fn speak(&mut self, now: u64, token: u32) {
+        fn send_next(&mut self, now: u64, token: u32) {
             self.observations += 1;
-            if self.observations == BEFORE {
+            if self.observations == BEFORE_ARMING {
                 self.send(&Message::Ask(Report::Status));
                 let bytes = self.queue.len() + frame::wire_bytes(46);
                 self.waits_until = now + bytes as u64 * BYTE + TURN;
             } else {
-                if self.observations == BEFORE + 1 {
+                if self.observations == BEFORE_ARMING + 1 {
                     self.send(&Message::Arm { token });
                 }
                 self.send(&Message::Observation(Floats::Values(&[0.0; 32])));
@@ -76,10 +76,10 @@ mod tests {
         }
     }
 
-    /// Whether the host arms, and the controller is still armed a tenth of a second later.
+    /// Returns `true` if the host arms and the controller is still armed a tenth of a second later.
     fn stays_armed(deadline: u32, tick_hz: u32, phase: u64) -> bool {
         let mut safety = of_axis(tick_hz);
-        safety.set(safety.token(), Parameter::Deadline, 0, deadline as f32).expect("any is allowed here");
+        safety.set(safety.token(), Parameter::Deadline, 0, deadline as f32).expect("any deadline is allowed here");
         let breadcrumb = Record::report(ResetCause::Power, None);
         let facts = Facts { image: 0, slot: BUILT_IN, timing: Default::default(), breadcrumb };
         let settings = Settings { status_period: 0, flash_while_armed: false };
@@ -93,7 +93,7 @@ mod tests {
             }
             let micros = (now / 1000) as u32;
             if host.queue.is_empty() && now >= host.waits_until {
-                host.speak(now, safety.token());
+                host.send_next(now, safety.token());
             }
             if let Some(byte) = host.queue.pop_front() {
                 endpoint.receive(byte, micros, &mut safety, &mut NoUpdate, &mut out);
@@ -111,9 +111,9 @@ mod tests {
         safety.state() == State::Armed
     }
 
-    /// With a head that takes 5 ms, whatever the phase of the ticks. Half of it is not enough.
+    /// The shortest deadline suffices for a head that takes 5 ms, at any phase of the ticks. Half of it does not.
     #[test]
-    fn the_least_deadline_arms_and_a_lower_one_is_refused() {
+    fn the_shortest_deadline_arms_and_shorter_are_refused() {
         for tick_hz in [1000, 8000] {
             let least = *allowed(tick_hz).start();
             let period = SECOND / u64::from(tick_hz);

@@ -1,4 +1,4 @@
-//! What an image has to be for this controller, and what its contract says of the axes.
+//! The checks of an image for this controller, and the axes from its contract.
 
 use actq_boards::seams::Watchdog;
 use actq_controller::{Axis, Limits, SafeAction};
@@ -6,14 +6,14 @@ use actq_kernels::image::header::W_SIZES;
 use actq_kernels::{Head, Image};
 use actq_link::code::Refusal;
 
-use crate::patience::LONGEST;
 use crate::running::SLICE;
+use crate::timeouts::MAX_PIECE;
 
-/// How often an axis may go from one limit to the other in a second, where the build has no rate.
-const WAYS: f32 = 10.0;
+/// Default rate of an axis, in full ranges (low to high) per second, if the build has none.
+const DEFAULT_RANGES: f32 = 10.0;
 
-/// Values of an observation and of an action, by an image's header: an array's length, so that it is known when the
-/// firmware is compiled. One each where the bytes are no image.
+/// Returns the lengths of an observation and of an action from an image's header, at compile time for array lengths.
+/// Returns 1 for both if the bytes are not an image.
 pub const fn lengths(image: &[u8]) -> [usize; 2] {
     let ([b'A', b'C', b'T', b'Q', ..], Some((_, [a, b, c, d, ..]))) = (image, image.split_at_checked(4 * W_SIZES))
     else {
@@ -22,13 +22,13 @@ pub const fn lengths(image: &[u8]) -> [usize; 2] {
     [u16::from_le_bytes([*a, *b]) as usize, u16::from_le_bytes([*c, *d]) as usize]
 }
 
-/// The head of an image that was checked, has these lengths, and whose self-test comes out bit for bit. The watchdog is
-/// fed before the check, which is as long as the image, and before each slice of the self-test, of which no image makes
-/// a longer one than [`LONGEST`].
+/// Opens an image: checks it and its lengths, and runs its self-test, which must match bit for bit. It feeds the
+/// watchdog before the check, whose time grows with the image, and before each slice of the self-test, which is at most
+/// [`MAX_PIECE`].
 ///
 /// # Errors
 ///
-/// Why it may not run.
+/// Returns the reason why the image may not run.
 pub fn open<'i, 's>(
     bytes: &'i [u8],
     scratch: &'s mut [u32],
@@ -41,15 +41,16 @@ pub fn open<'i, 's>(
         return Err(Refusal::Unfit);
     }
     let mut head = Head::new(image, scratch).map_err(|_| Refusal::Unfit)?;
-    if head.least_budget() > LONGEST {
+    if head.least_budget() > MAX_PIECE {
         return Err(Refusal::Unfit);
     }
     head.self_test_in_pieces(SLICE, || watchdog.feed()).map_err(|_| Refusal::SelfTest)?;
     Ok(head)
 }
 
-/// An axis for each value of an image's actions, at `hz` ticks a second, with the stricter limits of its contract and of
-/// the build: each axis has its own there, or all have one. Without finite limits of either, an axis is still.
+/// Returns an axis for each value of an image's actions, at `hz` ticks per second. It has the stricter of the
+/// contract's and the build's limits; the build has limits for each axis, or one for all. Without finite limits an axis
+/// is [`Axis::STILL`].
 pub fn axes<const AXES: usize>(image: Option<&Image<'_>>, built: &[Limits], hz: f32) -> [Axis; AXES] {
     let mut axes = [Axis::STILL; AXES];
     for (i, axis) in axes.iter_mut().enumerate() {
@@ -59,28 +60,28 @@ pub fn axes<const AXES: usize>(image: Option<&Image<'_>>, built: &[Limits], hz: 
     axes
 }
 
-/// An axis with 0 as its safe action.
+/// Returns an axis whose safe action is a ramp to 0, or coasting.
 fn limited(limits: Limits, hz: f32) -> Option<Axis> {
     let Limits { low, high, rate } = limits;
     let step = match rate {
         Some(rate) => rate / hz,
-        // An axis with one value only goes nowhere, at any rate.
+        // An axis with a single value does not move at any rate.
         None if low == high => 1.0,
-        None => (high - low) / (hz / WAYS),
+        None => (high - low) / (hz / DEFAULT_RANGES),
     };
     let start = 0f32.max(low).min(high);
     let ramp = Axis::new(low, high, step, start, SafeAction::Ramp { step });
-    // Where 0 is outside the limits, there is no way to it.
+    // It coasts if 0 is outside the limits.
     ramp.or_else(|_| Axis::new(low, high, step, start, SafeAction::Coast)).ok()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::work::tests::Fed;
+    use crate::work::tests::WatchdogMock;
 
     #[test]
-    fn bytes_that_are_no_image_have_the_least_lengths() {
+    fn bytes_without_an_image_have_lengths_of_1() {
         assert_eq!(lengths(b""), [1; 2]);
         assert_eq!(lengths(&[7; 64]), [1; 2]);
         let mut header = [0; 64];
@@ -91,7 +92,7 @@ mod tests {
 
     #[test]
     fn axes_have_the_limits_of_the_build() {
-        let limits = |text: &str| text.parse::<Limits>().expect("limits");
+        let limits = |text: &str| text.parse::<Limits>().expect("valid limits");
         let all = axes::<2>(None, &[limits("-1:3")], 1000.0);
         assert_eq!(all.map(|axis| (axis.low(), axis.high(), axis.rate(), axis.start())), [(-1.0, 3.0, 0.04, 0.0); 2]);
         let [ramps, coasts, fixed] = axes(None, &["-1:1:20", "2:4:8", "3:3"].map(limits), 1000.0);
@@ -103,6 +104,6 @@ mod tests {
     #[test]
     fn without_an_image_nothing_may_move() {
         assert_eq!(axes::<3>(None, &[], 1000.0), [Axis::STILL; 3]);
-        assert_eq!(open(&[0; 8], &mut [], [1; 2], &mut Fed::default()).err(), Some(Refusal::Unfit));
+        assert_eq!(open(&[0; 8], &mut [], [1; 2], &mut WatchdogMock::default()).err(), Some(Refusal::Unfit));
     }
 }

@@ -1,5 +1,5 @@
-//! The motor controller without a board: what its loop and its tick do with the decisions of `actq_controller`.
-//! `bin/controller` puts it on one.
+//! The motor controller without a board: its loop and its tick, on top of the decisions of `actq_controller`.
+//! `bin/controller` runs it on a board.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -10,8 +10,8 @@ pub mod image;
 #[cfg(feature = "foc")]
 pub mod motor;
 pub mod output;
-pub mod patience;
 pub mod running;
+pub mod timeouts;
 pub mod timing;
 pub mod trace;
 pub mod updates;

@@ -1,8 +1,8 @@
-//! A three-phase motor in the tick: the current loop of `actq_controller::foc` drives a motor that is simulated, so
-//! that the tick does the work that a real one would have. The first axis commands the current that makes torque.
+//! A three-phase motor in the tick: the current loop of `actq_controller::foc` drives a simulated motor, so that the
+//! tick does the work of a real one. The first axis commands the current that produces torque.
 //!
-//! Real currents and signals of a real sensor take the place of `Simulated`'s in `Motor::measure`; the duty cycles go
-//! to the board's power stage as they are.
+//! For a real motor, replace `Simulated`'s currents and sensor signals in `Motor::measure` by measured ones; the duty
+//! cycles already go to the board's power stage.
 
 use actq_boards::seams::Stage;
 use actq_controller::foc::{CurrentLoop, Gains, Measured, Observer, Rotor, Stator};
@@ -10,27 +10,26 @@ use actq_controller::{Axis, Output};
 
 use crate::output::{Bridges, share};
 
-/// A slow motor behind a gear, which a tick of 1 kHz can hold, too: ohm, henry, volt second, pole pairs.
+/// A slow motor with a gear, which a tick of 1 kHz can also control: ohm, henry, volt second, pole pairs.
 const RESISTANCE: f32 = 1.0;
 const INDUCTANCE: f32 = 10e-3;
 const FLUX: f32 = 0.02;
 const PAIRS: f32 = 7.0;
-/// Kilogram square metre, and newton metre second.
+/// In kilogram square metre, and newton metre second.
 const INERTIA: f32 = 1e-3;
 const FRICTION: f32 = 0.05;
-/// Volt.
+/// Supply voltage in volt.
 const SUPPLY: f32 = 24.0;
-/// Ampere, at an axis' limits.
+/// Current at an axis' limits, in ampere.
 const CURRENT: f32 = 1.0;
-/// Of the current loop, in rad/s.
+/// Bandwidth of the current loop, in rad/s.
 const BANDWIDTH: f32 = 300.0;
-/// Of the observer, in rad/s.
+/// Bandwidth of the observer, in rad/s.
 const OBSERVER_BANDWIDTH: f32 = 1000.0;
-/// Ticks from a measurement to the middle of the time in which its duty cycles act: they act in the tick that begins with
-/// it.
+/// Ticks from a measurement to the middle of the tick in which its duty cycles act, which begins with the measurement.
 const AHEAD: f32 = 0.5;
 
-/// A power stage, the current loop before it, and the motor behind it.
+/// A power stage with its current loop and its motor.
 #[derive(Debug)]
 pub struct Motor<S> {
     bridges: Bridges<S>,
@@ -40,7 +39,7 @@ pub struct Motor<S> {
 }
 
 impl<S: Stage> Motor<S> {
-    /// At a stand, of a stage that is off, with so many ticks a second.
+    /// Creates a motor at rest, on a stage that is off, for `tick_hz` ticks per second.
     pub fn new(stage: S, tick_hz: u32) -> Self {
         let tick = 1.0 / tick_hz as f32;
         let gains = Gains::for_motor(RESISTANCE, INDUCTANCE, BANDWIDTH, tick);
@@ -52,13 +51,14 @@ impl<S: Stage> Motor<S> {
         }
     }
 
-    /// Tells the first output of a tick, as [`Bridges::tell`]; false also where what was measured is not that of a motor.
-    pub fn tell(&mut self, outputs: &[Output], axes: &[Axis]) -> bool {
-        // In every tick, so that the rotor is known when the outputs are driven again.
+    /// Applies the first output of a tick, as [`Bridges::apply`]; also returns `false` if the measurements are not
+    /// those of a motor.
+    pub fn apply(&mut self, outputs: &[Output], axes: &[Axis]) -> bool {
+        // In every tick, so that the rotor's angle is known when the outputs are driven again.
         let measured = self.measure();
         let duties = match (outputs.first(), axes.first(), measured) {
             (Some(Output::Drive(value)), Some(axis), Some(measured)) => {
-                // An axis without a way stays still.
+                // An axis with a single value commands no current.
                 let still = axis.low() == axis.high();
                 let q = if still { 0.0 } else { (2.0 * share(*value, axis) - 1.0) * CURRENT };
                 self.control.step(&measured, Rotor { d: 0.0, q }).map(|tick| tick.duties)
@@ -89,16 +89,16 @@ impl<S> Motor<S> {
     }
 }
 
-/// A permanent-magnet synchronous motor, in the axes of its stator, so that no sine is computed: explicit Euler steps
-/// of a tick.
+/// A permanent-magnet synchronous motor in its stator's axes, which need no sine, integrated by explicit Euler steps of
+/// a tick.
 #[derive(Debug)]
 struct Simulated {
     current: Stator,
-    /// Along the flux: cosine and sine of the rotor's angle, as its sensor shows them.
+    /// Unit vector along the flux: cosine and sine of the rotor's angle, the sensor's signals.
     flux: Stator,
-    /// Electrical, in rad/s.
+    /// Electrical speed in rad/s.
     speed: f32,
-    /// Seconds.
+    /// Control period in seconds.
     tick: f32,
 }
 
@@ -107,7 +107,7 @@ impl Simulated {
         Self { current: Stator { alpha: 0.0, beta: 0.0 }, flux: Stator { alpha: 1.0, beta: 0.0 }, speed: 0.0, tick }
     }
 
-    /// One tick with duty cycles; without them no current flows.
+    /// Simulates one tick with duty cycles; without them no current flows.
     fn run(&mut self, duties: Option<[f32; 3]>) {
         let Stator { alpha, beta } = self.flux;
         match duties.map(Stator::of_phases) {
@@ -120,8 +120,8 @@ impl Simulated {
         }
         let torque = 1.5 * PAIRS * FLUX * (alpha * self.current.beta - beta * self.current.alpha);
         self.speed += self.tick / INERTIA * (PAIRS * torque - FRICTION * self.speed);
-        // A turn by so little that its sine and cosine end with these terms; what rounding makes of the length is taken
-        // back.
+        // The angle is so small that these terms of sine and cosine suffice; the length is then normalized against
+        // rounding.
         let turn = self.tick * self.speed;
         let (sin, cos) = (turn - turn * turn * turn / 6.0, 1.0 - 0.5 * turn * turn);
         let (alpha, beta) = (cos * alpha - sin * beta, sin * alpha + cos * beta);
@@ -139,20 +139,20 @@ mod tests {
 
     type Mock = NoStage<1000>;
 
-    /// The motor's current along the torque axis.
+    /// Returns the motor's current along the torque axis.
     fn torque_current(motor: &Motor<Mock>) -> f32 {
         let Simulated { current, flux, .. } = &motor.motor;
         flux.alpha * current.beta - flux.beta * current.alpha
     }
 
     #[test]
-    fn the_current_follows_the_output_and_the_motor_turns() {
-        let axes = [Axis::new(-2.0, 2.0, 1.0, 0.0, SafeAction::Brake).expect("it fits")];
+    fn the_current_follows_the_output() {
+        let axes = [Axis::new(-2.0, 2.0, 1.0, 0.0, SafeAction::Brake).expect("the axis is valid")];
         for tick_hz in [1000, 8000] {
             let mut motor = Motor::new(Mock::default(), tick_hz);
             for (value, current) in [(1.0, 0.5), (-2.0, -1.0), (0.0, 0.0)] {
                 for _ in 0..tick_hz / 2 {
-                    assert!(motor.tell(&[Output::Drive(value)], &axes));
+                    assert!(motor.apply(&[Output::Drive(value)], &axes));
                 }
                 assert!((torque_current(&motor) - current).abs() < 0.03, "{tick_hz} Hz: {}", torque_current(&motor));
                 // Friction balances the torque.
@@ -161,7 +161,7 @@ mod tests {
             }
             let Stator { alpha, beta } = motor.motor.flux;
             let (sin, cos) = motor.observer.step(beta, alpha, 0.0).expect("a turning magnet").sin_cos();
-            assert!((cos - alpha).abs() < 4e-3 && (sin - beta).abs() < 4e-3, "the observer has lost the rotor");
+            assert!((cos - alpha).abs() < 4e-3 && (sin - beta).abs() < 4e-3, "the observer lost the rotor");
         }
     }
 
@@ -169,16 +169,16 @@ mod tests {
     fn coasting_is_off_and_braking_is_on_without_a_duty() {
         let axes = [Axis::STILL];
         let mut motor = Motor::new(Mock::default(), 1000);
-        assert!(motor.tell(&[Output::Brake], &axes) && motor.bridges.stage().on);
+        assert!(motor.apply(&[Output::Brake], &axes) && motor.bridges.stage().on);
         assert_eq!(motor.bridges.stage().duties(), [0; 3]);
-        assert!(motor.tell(&[Output::Coast], &axes) && !motor.bridges.stage().on);
-        // An axis without a way.
-        assert!(motor.tell(&[Output::Drive(0.0)], &axes) && motor.bridges.stage().on);
+        assert!(motor.apply(&[Output::Coast], &axes) && !motor.bridges.stage().on);
+        // An axis with a single value.
+        assert!(motor.apply(&[Output::Drive(0.0)], &axes) && motor.bridges.stage().on);
         assert_eq!((torque_current(&motor), motor.bridges.stage().duties()), (0.0, [500; 3]));
-        // A sensor that is lost.
+        // A lost sensor.
         motor.motor.flux = Stator::default();
-        assert!(!motor.tell(&[Output::Drive(0.0)], &axes) && !motor.bridges.stage().on);
-        // What no controller says.
-        assert!(!motor.tell(&[Output::Drive(f32::NAN)], &[Axis::STILL; 0]) && !motor.bridges.stage().on);
+        assert!(!motor.apply(&[Output::Drive(0.0)], &axes) && !motor.bridges.stage().on);
+        // Outputs that no controller gives.
+        assert!(!motor.apply(&[Output::Drive(f32::NAN)], &[Axis::STILL; 0]) && !motor.bridges.stage().on);
     }
 }

@@ -1,4 +1,4 @@
-//! The image that runs: its head in slices, and its bytes, read again and again.
+//! The running image: its head in slices, and the scrub of its bytes.
 
 use core::task::Poll;
 
@@ -6,50 +6,51 @@ use actq_controller::scrub::Scrub;
 use actq_controller::{Check, Endpoint, Shared};
 use actq_kernels::Head;
 
-/// Modelled instructions of a slice, where an image needs no more: 0.12 ms of a Cortex-M4 at 168 MHz. Bytes that come
-/// wait for as long; the tick does not.
+/// Modelled instructions of a slice, unless an image needs more: 0.12 ms of a Cortex-M4 at 168 MHz. Received bytes wait
+/// that long; the tick does not.
 pub const SLICE: u32 = 20_000;
 
-/// Bytes that the scrub reads in a turn.
-const SCRUBBED: usize = 64;
+/// Bytes that the scrub reads per turn.
+const SCRUB_BYTES: usize = 64;
 
-/// An image that may run.
+/// A running image.
 pub struct Running<'i, 's> {
     head: Head<'i, 's>,
     bytes: &'i [u8],
     scrub: Scrub,
-    step: Option<Begun>,
+    step: Option<Started>,
     /// Longest step so far, in µs.
-    worst: u32,
+    longest_step: u32,
 }
 
-/// A step that was begun.
+/// A started step.
 #[derive(Clone, Copy)]
-struct Begun {
-    /// Number of its observation's frame.
+struct Started {
+    /// Sequence number of the observation's frame.
     of: u32,
     micros: u32,
 }
 
 impl<'i, 's> Running<'i, 's> {
-    /// The head of the image in `bytes`.
+    /// Runs `head`, whose image is in `bytes`.
     pub fn new(head: Head<'i, 's>, bytes: &'i [u8]) -> Self {
-        Self { head, bytes, scrub: Scrub::new(bytes), step: None, worst: 0 }
+        Self { head, bytes, scrub: Scrub::new(bytes), step: None, longest_step: 0 }
     }
 
     /// Longest step so far, in µs.
-    pub const fn worst(&self) -> u32 {
-        self.worst
+    pub const fn longest_step(&self) -> u32 {
+        self.longest_step
     }
 
-    /// Reads a piece of the image; one that has changed keeps from arming, and latches.
+    /// Scrubs a piece of the image; a changed image prevents arming, and latches.
     pub fn scrub<const AXES: usize>(&mut self, safety: &mut impl Shared<AXES>) {
-        if self.scrub.advance(self.bytes, SCRUBBED) == Some(false) {
+        if self.scrub.advance(self.bytes, SCRUB_BYTES) == Some(false) {
             safety.with(|safety| safety.check(Check::Image, false));
         }
     }
 
-    /// Begins a step on the newest observation, or runs a slice of the one that was begun; the frame to send, in `out`.
+    /// Starts a step on the newest observation, or runs a slice of the current one; returns the frame to send, in
+    /// `out`.
     pub fn slice<'b, const AXES: usize, const OBS: usize, const N: usize>(
         &mut self,
         endpoint: &mut Endpoint<'_, OBS, N>,
@@ -57,14 +58,14 @@ impl<'i, 's> Running<'i, 's> {
         safety: &mut impl Shared<AXES>,
         out: &'b mut [u8],
     ) -> Option<&'b [u8]> {
-        let Some(begun) = self.step else {
+        let Some(started) = self.step else {
             let step = endpoint.step(safety)?;
             if step.reset {
                 self.head.reset();
             }
             let of = step.of;
             match self.head.begin(step.observation) {
-                Ok(()) => self.step = Some(Begun { of, micros }),
+                Ok(()) => self.step = Some(Started { of, micros }),
                 Err(error) => return endpoint.acted(of, Err(error), micros, safety, out),
             }
             return None;
@@ -76,7 +77,7 @@ impl<'i, 's> Running<'i, 's> {
             Err(error) => Err(error),
         };
         self.step = None;
-        self.worst = self.worst.max(micros.wrapping_sub(begun.micros));
-        endpoint.acted(begun.of, action, micros, safety, out)
+        self.longest_step = self.longest_step.max(micros.wrapping_sub(started.micros));
+        endpoint.acted(started.of, action, micros, safety, out)
     }
 }

@@ -1,11 +1,11 @@
-//! Where a program was whose stack has overflown.
+//! Location of a program after a stack overflow.
 
-/// The word of a frame that has the program counter.
+/// Index of the program counter in an exception frame.
 const PC: usize = 6;
 
-/// Where the program was, by `words`, those of its stack from the pointer on: the first ones are the frame that the
-/// core has stacked, or it could not, and they tell the innermost call. `half` gives the halfword at an address of the
-/// code; `None` where there is no code.
+/// Returns the program counter from `words`, the stack from its pointer on. With `is_stacked` they begin with the
+/// core's exception frame; else they give the innermost call. `half` reads the halfword at an address of the code;
+/// `None` outside the code.
 pub fn program_counter(
     mut words: impl Iterator<Item = u32>,
     is_stacked: bool,
@@ -14,11 +14,11 @@ pub fn program_counter(
     if is_stacked { words.nth(PC) } else { innermost_call(words, half) }
 }
 
-/// The address of the call whose return address is the first among `words`, those of a stack from its pointer on.
-/// `half` gives the halfword at an address of the code; `None` where there is no code.
+/// Returns the address of the call whose return address is the first one in `words`, the stack from its pointer on.
+/// `half` reads the halfword at an address of the code; `None` outside the code.
 ///
-/// A word counts as a return address where it is odd (a Thumb address) and a call stands before it (Arm DDI 0403E,
-/// A7.7.18 and A7.7.19).
+/// A word counts as a return address if it is odd (a Thumb address) and follows a call (Arm DDI 0403E, A7.7.18 and
+/// A7.7.19).
 fn innermost_call(mut words: impl Iterator<Item = u32>, half: impl Fn(u32) -> Option<u16>) -> Option<u32> {
     words.find_map(|word| {
         let back = word.checked_sub(1).filter(|back| back % 2 == 0)?;
@@ -45,7 +45,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_tells_more_than_the_calls_before_it() {
+    fn an_exception_frame_precedes_the_calls() {
         let words = [1, 2, 3, 4, 5, 0x105, 0x10a, 0x0100_0000];
         assert_eq!(program_counter(words.into_iter(), true, half), Some(0x10a));
         assert_eq!(program_counter(words.into_iter(), false, half), Some(0x100));
@@ -53,11 +53,11 @@ mod tests {
     }
 
     #[test]
-    fn a_return_address_stands_behind_a_call() {
+    fn a_return_address_follows_a_call() {
         let found = |words: &[u32]| innermost_call(words.iter().copied(), half);
         assert_eq!(found(&[0x105]), Some(0x100));
         assert_eq!(found(&[0x109]), Some(0x106));
-        // Even, behind no call, outside of the code, at its begin.
+        // Even, not after a call, outside the code, at its begin.
         assert_eq!(found(&[0x104, 0x107, 0x10b, 0x103, 0x101, 0, 1, 2, u32::MAX]), None);
         assert_eq!(found(&[0xffff_ffff, 0x104, 0x109, 0x105]), Some(0x106));
     }

@@ -1,4 +1,4 @@
-//! Image updates, on a board that has a place for them.
+//! Image updates, on boards with memory for them.
 
 use actq_boards::seams::Watchdog;
 use actq_controller::slots::{Authority, Candidate, Layout, Slot, Slots, Updater, Work};
@@ -6,13 +6,13 @@ use actq_controller::update::{NoUpdate, Plan, Update};
 use actq_link::code::Refusal;
 use embedded_storage::nor_flash::NorFlash;
 
-/// Two slots, or none.
+/// Two image slots, if the board has them.
 pub struct Updates<F, A: Authority>(Option<Updater<F, A>>);
 
 impl<F: NorFlash, A: Authority> Updates<F, A> {
-    /// For the two halves of `flash`, and the image of them that is `authority`'s, passes `test` and so runs. Without
-    /// room for two slots, and without an authority, there are none. The watchdog is fed before each piece of it
-    /// ([`Slots::select`]), and given to the test.
+    /// Uses the two halves of `flash` as slots, and selects the image to run: accepted by `authority` and passed by
+    /// `test`. Without room for two slots or without an authority, updates are not supported. It feeds the watchdog
+    /// before each piece ([`Slots::select`]), and passes it to the test.
     pub fn new<W: Watchdog>(
         flash: F,
         authority: Option<A>,
@@ -33,12 +33,13 @@ impl<F: NorFlash, A: Authority> Updates<F, A> {
         (Self(Some(Updater::new(slots, running.map(|candidate| candidate.slot)))), running)
     }
 
-    /// Whether the next [`Self::work`] takes long ([`Updater::takes_long`]).
+    /// Returns `true` if the next [`Self::work`] takes long ([`Updater::takes_long`]).
     pub fn takes_long(&self) -> bool {
         self.0.as_ref().is_some_and(Updater::takes_long)
     }
 
-    /// Does a piece of what an update takes; an image that waits for its test, whose outcome [`Self::tested`] takes.
+    /// Does a piece of an update's work. Returns an image that waits for its test; pass the outcome to
+    /// [`Self::tested`].
     pub fn work(&mut self) -> Option<Candidate> {
         match self.0.as_mut()?.work() {
             Work::Test(candidate) => Some(candidate),
@@ -46,12 +47,12 @@ impl<F: NorFlash, A: Authority> Updates<F, A> {
         }
     }
 
-    /// Whether an image with this outcome of its test is the one that runs from now on.
+    /// Takes the outcome of a test; returns `true` if the tested image runs from now on.
     pub fn tested(&mut self, outcome: Result<(), Refusal>) -> bool {
         self.0.as_mut().is_some_and(|updater| updater.tested(outcome))
     }
 
-    /// The slot of the image that runs; `None` where that is built in.
+    /// Returns the slot of the running image; `None` if it is built in.
     pub fn running(&self) -> Option<Slot> {
         self.0.as_ref()?.running()
     }

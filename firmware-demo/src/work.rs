@@ -1,4 +1,4 @@
-//! The loop below the tick: bytes of the link, slices of the head, pieces of an update, the watchdog.
+//! The loop below the tick: the link's bytes, slices of the head, pieces of an update, the watchdog.
 
 use actq_boards::port::Port;
 use actq_boards::seams::Watchdog;
@@ -9,57 +9,57 @@ use embedded_io::{Read, ReadReady};
 use embedded_storage::nor_flash::NorFlash;
 
 #[cfg(feature = "faults")]
-use crate::faults::{Asked, Faults};
-use crate::patience::PATIENCE;
+use crate::faults::{Faults, Request};
 use crate::running::Running;
+use crate::timeouts::TIMEOUTS;
 use crate::timing::{Rates, Timing};
 use crate::updates::Updates;
 
-/// Bytes that are taken from the port in one turn.
-const BYTES: usize = 64;
-/// Ticks between two looks at times and stack.
-const LOOK: u32 = 100;
+/// Largest number of bytes taken from the port per turn.
+const TURN_BYTES: usize = 64;
+/// Ticks between two updates of times and stack.
+const TIMING_PERIOD: u32 = 100;
 
-/// What the loop works with.
+/// The loop and its resources.
 pub struct Work<'p, S, W, F, A: Authority, const AXES: usize, const OBS: usize, const N: usize, const LEN: usize> {
-    /// The serial port. A frame that it has no room for is dropped: the loop waits for no host. The frame's number is
-    /// used up, so the host's receiver counts it as lost.
+    /// The serial port. A frame that does not fit is dropped, because the loop waits for no host. The frame's number is
+    /// used, so the host's receiver counts it as lost.
     pub port: &'p mut Port<'static, LEN>,
-    /// The watchdog, which runs.
+    /// The running watchdog.
     pub watchdog: &'p mut W,
-    /// What decides about the outputs.
+    /// The state machine that decides the outputs.
     pub safety: S,
-    /// The link's end.
+    /// The controller's end of the link.
     pub endpoint: Endpoint<'static, OBS, N>,
     /// Image updates.
     pub updates: Updates<F, A>,
-    /// The clock's rates.
+    /// The rates of clock and tick.
     pub rates: Rates,
-    /// Measures the bytes of stack that were in use at most.
+    /// Returns the most bytes of stack in use since the start.
     pub stack: fn() -> u32,
-    /// Room for the longest frame that is sent.
+    /// Buffer for the longest frame sent.
     pub out: &'p mut [u8],
-    /// What the loop has done since it fed the watchdog.
+    /// The loop's state.
     pub state: State,
 }
 
-/// What the loop keeps from turn to turn.
+/// State of the loop between turns.
 #[derive(Debug, Default)]
 pub struct State {
     progress: Progress,
     /// Ticks at the last turn.
     ticks: u32,
-    /// Ticks at the last look at times and stack.
-    looked: Option<u32>,
+    /// Ticks at the last update of times and stack.
+    timed_at: Option<u32>,
     #[cfg(feature = "faults")]
     faults: Faults,
-    /// Progress that is hidden.
+    /// Hidden progress, as bits.
     #[cfg(feature = "faults")]
     hidden: u8,
 }
 
 impl State {
-    /// What has made no progress since the watchdog was fed ([`Progress::missing`]).
+    /// Returns the parts without progress since the watchdog was fed ([`Progress::missing`]).
     pub const fn missing(&self) -> u32 {
         self.progress.missing()
     }
@@ -73,14 +73,14 @@ where
     F: NorFlash,
     A: Authority,
 {
-    /// A turn of the loop: takes what has come, runs one slice of the head, does a piece of an update, and feeds the
-    /// watchdog where all has made progress. Gives the image that an update wants tested.
+    /// Runs a turn of the loop: takes received bytes, runs one slice of the head, does a piece of an update, and feeds
+    /// the watchdog if all parts have made progress. Returns an image that waits for its test.
     pub fn turn(&mut self, running: &mut Option<Running<'_, '_>>, timing: &Timing) -> Option<Candidate> {
         let micros = self.rates.micros(timing.ticks);
-        self.look(running, timing);
+        self.update_timing(running, timing);
         self.port.pump();
         if self.port.read_ready() == Ok(true) {
-            let mut bytes = [0; BYTES];
+            let mut bytes = [0; TURN_BYTES];
             let Ok(len) = self.port.read(&mut bytes);
             bytes.iter().take(len).for_each(|byte| self.take(*byte, micros));
         }
@@ -95,7 +95,7 @@ where
             }
         }
         self.state.progress.head = true;
-        // A tick that has come to its end has told the outputs.
+        // A completed tick has written the outputs.
         self.state.progress.output |= timing.ticks != self.state.ticks;
         self.state.ticks = timing.ticks;
         #[cfg(feature = "faults")]
@@ -107,13 +107,13 @@ where
         if !self.updates.takes_long() {
             return self.updates.work();
         }
-        // The watchdog waits anew for it, which it does only for what has made progress.
+        // Long work needs a new timeout, which is set only after progress of all parts.
         if !fed {
             return None;
         }
-        let _ = self.watchdog.start(PATIENCE.long);
+        let _ = self.watchdog.start(TIMEOUTS.long);
         let candidate = self.updates.work();
-        let watched = self.watchdog.start(PATIENCE.turn);
+        let watched = self.watchdog.start(TIMEOUTS.turn);
         self.safety.with(|safety| safety.check(Check::Watchdog, watched));
         candidate
     }
@@ -121,12 +121,12 @@ where
     fn take(&mut self, byte: u8, micros: u32) {
         #[cfg(feature = "faults")]
         match self.state.faults.push(byte) {
-            Some(Asked::Hide(parts)) => self.state.hidden = parts,
+            Some(Request::Hide(parts)) => self.state.hidden = parts,
             #[cfg(target_os = "none")]
-            Some(Asked::Undefined) => cortex_m::asm::udf(),
+            Some(Request::Undefined) => cortex_m::asm::udf(),
             #[cfg(target_os = "none")]
-            Some(Asked::Recursion) => drop(core::hint::black_box(crate::faults::recurse(0))),
-            Some(Asked::Panic) => panic!("asked for"),
+            Some(Request::Recursion) => drop(core::hint::black_box(crate::faults::recurse(0))),
+            Some(Request::Panic) => panic!("asked for"),
             _ => {}
         }
         let answer = self.endpoint.receive(byte, micros, &mut self.safety, &mut self.updates, self.out);
@@ -135,13 +135,13 @@ where
         }
     }
 
-    /// Tells the link times and stack anew, every now and then.
-    fn look(&mut self, running: &Option<Running<'_, '_>>, timing: &Timing) {
-        if self.state.looked.is_some_and(|looked| timing.ticks.wrapping_sub(looked) < LOOK) {
+    /// Updates the link's times and stack use regularly.
+    fn update_timing(&mut self, running: &Option<Running<'_, '_>>, timing: &Timing) {
+        if self.state.timed_at.is_some_and(|timed_at| timing.ticks.wrapping_sub(timed_at) < TIMING_PERIOD) {
             return;
         }
-        self.state.looked = Some(timing.ticks);
-        let worst_head = running.as_ref().map_or(0, Running::worst);
+        self.state.timed_at = Some(timing.ticks);
+        let worst_head = running.as_ref().map_or(0, Running::longest_step);
         self.endpoint.facts.timing = self.rates.report(timing, worst_head, (self.stack)());
     }
 
@@ -182,9 +182,9 @@ pub(crate) mod tests {
     const LEN: usize = 512;
 
     type Flash = Ram<'static, 4, 512>;
-    type OneAxis<'p> = Work<'p, Safety<1>, Fed, Flash, Anyone, 1, 1, 64, LEN>;
+    type OneAxis<'p> = Work<'p, Safety<1>, WatchdogMock, Flash, Anyone, 1, 1, 64, LEN>;
 
-    /// A line to a host, which still reads so many bytes.
+    /// A line to a host, which reads `room` more bytes.
     #[derive(Default)]
     struct Line {
         sent: VecDeque<u8>,
@@ -210,14 +210,14 @@ pub(crate) mod tests {
             has_room
         }
 
-        fn ask_for_room(&mut self, _: bool) {}
+        fn set_transmit_interrupt(&mut self, _: bool) {}
     }
 
-    /// How often it was fed, and the times that it was given.
+    /// A mock with the number of feedings and the timeouts set.
     #[derive(Default)]
-    pub(crate) struct Fed(u32, Vec<u16>);
+    pub(crate) struct WatchdogMock(u32, Vec<u16>);
 
-    impl Watchdog for Fed {
+    impl Watchdog for WatchdogMock {
         fn start(&mut self, milliseconds: u16) -> bool {
             self.1.push(milliseconds);
             true
@@ -230,12 +230,12 @@ pub(crate) mod tests {
 
     fn work<'p>(
         port: &'p mut Port<'static, LEN>,
-        watchdog: &'p mut Fed,
+        watchdog: &'p mut WatchdogMock,
         flash: &Flash,
         status_period: u32,
         out: &'p mut [u8],
     ) -> OneAxis<'p> {
-        let (updates, _) = Updates::new(Ram(flash.0), Some(Anyone), &mut Fed::default(), |_, _| false);
+        let (updates, _) = Updates::new(Ram(flash.0), Some(Anyone), &mut WatchdogMock::default(), |_, _| false);
         let breadcrumb = Record::report(ResetCause::Power, None);
         let facts = Facts { image: 0, slot: BUILT_IN, timing: Default::default(), breadcrumb };
         let settings = Settings { status_period, flash_while_armed: false };
@@ -248,12 +248,11 @@ pub(crate) mod tests {
         Ram::new(Box::leak(Box::new([0; 2048])))
     }
 
-    /// The watchdog is fed, and waits for what takes long, only where all has made progress: not without a control
-    /// tick.
+    /// Without a control tick the watchdog is not fed, and gets no longer timeout for long work.
     #[test]
     fn without_a_tick_nothing_is_fed_or_erased() {
         let (_, mut port) = Box::leak(Box::new(Buffers::new())).split(End(Rc::default()), || ());
-        let (flash, mut watchdog) = (flash(), Fed::default());
+        let (flash, mut watchdog) = (flash(), WatchdogMock::default());
         let mut work = work(&mut port, &mut watchdog, &flash, 0, &mut []);
         let image = [1; 4];
         let plan = Plan { length: 4, crc: CRC.checksum(&image), version: 0 };
@@ -269,7 +268,7 @@ pub(crate) mod tests {
         }
         assert_eq!(work.updates.begin(plan), Ok(()), "a slot of two sectors");
         assert_eq!([work.updates.chunk(0, &image), work.updates.commit(None)], [Ok(()), Err(Refusal::Busy)]);
-        // The last block, which is the only one, and the test.
+        // The last and only block, and the test.
         let mut test = None;
         for ticks in 3..=4 {
             assert_eq!(work.turn(&mut None, &timing), None);
@@ -277,25 +276,26 @@ pub(crate) mod tests {
             test = work.turn(&mut None, &timing);
         }
         assert_eq!(test.map(|candidate| candidate.length), Some(4));
-        assert_eq!(work.watchdog.1, [PATIENCE.long, PATIENCE.turn].repeat(4));
+        assert_eq!(work.watchdog.1, [TIMEOUTS.long, TIMEOUTS.turn].repeat(4));
     }
 
-    /// Ticks go on and the watchdog is fed, whatever the host does not read: that costs whole frames, whose numbers the
-    /// host misses.
+    /// Ticks continue and the watchdog is fed even if the host does not read: it only loses whole frames, whose numbers
+    /// it misses.
     #[test]
-    fn a_host_that_does_not_read_costs_only_frames() {
+    fn a_host_that_does_not_read_loses_only_frames() {
         const TICKS: u32 = 3000;
-        // Ticks between two statuses, requests in a tick, bytes that the host reads in a tick.
+        // Ticks between two statuses, requests per tick, bytes that the host reads per tick.
         for (status_period, requests, reads) in [(1, 0, 0), (0, 1, 0), (1, 3, 0), (1, 1, 40)] {
             let line = Rc::new(RefCell::new(Line::default()));
             let (mut wire, mut port) = Box::leak(Box::new(Buffers::new())).split(End(line.clone()), || ());
-            let (flash, mut watchdog, mut out) = (flash(), Fed::default(), [0; 64]);
+            let (flash, mut watchdog, mut out) = (flash(), WatchdogMock::default(), [0; 64]);
             let mut work = work(&mut port, &mut watchdog, &flash, status_period, &mut out);
             let (mut host, mut timing) = (Sender::new(0), Timing::default());
             let mut tick = |reads| {
                 let mut buffer = [0; 64];
                 for _ in 0..requests {
-                    let request = host.frame(&Message::Ask(Report::Timing), 0, &mut buffer).expect("there is room");
+                    let request =
+                        host.frame(&Message::Ask(Report::Timing), 0, &mut buffer).expect("the buffer is large enough");
                     line.borrow_mut().sent.extend(request);
                 }
                 line.borrow_mut().room += reads;
@@ -306,17 +306,17 @@ pub(crate) mod tests {
                 wire.on_interrupt();
             };
             (0..TICKS).for_each(|_| tick(reads));
-            // It reads again.
+            // The host reads again.
             (0..2).for_each(|_| tick(usize::MAX / 2));
             assert_eq!((work.safety.ticks(), work.watchdog.0), (TICKS + 2, TICKS + 2));
             let mut answers = Receiver::<64>::new();
             line.borrow().read.iter().for_each(|byte| _ = answers.push(*byte));
             let Counters { good, damaged, malformed, repeated, lost } = answers.counters();
             assert_eq!([damaged, malformed, repeated], [0; 3], "whole frames, in order");
-            // The first token is told unasked, also by a controller that otherwise reports nothing.
+            // The first token is reported without a request, even if the controller sends no other reports.
             let token = u32::from(status_period == 0);
             assert_eq!(good + lost, (TICKS + 2) * (status_period + requests) + token);
-            assert!(lost > TICKS / 2 && good > 2, "{good} frames came, {lost} did not");
+            assert!(lost > TICKS / 2 && good > 2, "{good} frames arrived, {lost} did not");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The parts that are any firmware's own.
+//! The parts that every firmware replaces by its own.
 
 use core::fmt::Write as _;
 use core::future::poll_fn;
@@ -13,11 +13,11 @@ use cortex_m::peripheral::syst::SystClkSource;
 
 actq_firmware_support::panic_to_host!();
 
-/// Values of an observation.
+/// Length of an observation in values.
 pub const OBS: usize = 18;
-/// Values of an action.
+/// Length of an action in values.
 pub const AXES: usize = 6;
-/// Words of scratch memory; `actq inspect` says how many an image needs.
+/// Scratch memory in words; `actq inspect` shows how many an image needs.
 pub const SCRATCH: usize = 2048;
 /// Modelled instructions of a slice: 0.12 ms of a Cortex-M4 at 168 MHz.
 pub const SLICE: u32 = 20_000;
@@ -25,7 +25,7 @@ pub const SLICE: u32 = 20_000;
 /// Cycles of a tick: 1 kHz of the board's 25 MHz.
 const PERIOD: u32 = 25_000;
 
-/// Includes a file at an address that is a multiple of 4.
+/// A wrapper that aligns an included file to 4 bytes.
 #[repr(C, align(4))]
 struct Aligned<T: ?Sized>(T);
 static IMAGE: &Aligned<[u8]> = &Aligned(*include_bytes!(env!(
@@ -36,19 +36,19 @@ static IMAGE: &Aligned<[u8]> = &Aligned(*include_bytes!(env!(
 /// An action.
 pub type Action = [f32; AXES];
 
-/// A head that has passed its self-test. Firmware that moves something says which of these went wrong.
+/// Returns a head that passed its self-test. Firmware that moves a robot should report which check failed.
 pub fn open(scratch: &mut [u32]) -> Option<Head<'static, '_>> {
     let mut head = Head::new(Image::new_checked(&IMAGE.0).ok()?, scratch).ok()?;
     head.self_test().ok()?;
     Some(head)
 }
 
-/// The sensors, which have something new once.
+/// The sensors, which have one observation.
 #[derive(Debug)]
 pub struct Sensors(Option<[f32; OBS]>);
 
 impl Sensors {
-    /// With the first observation of an image's self-test.
+    /// Creates sensors with the first observation of an image's self-test.
     pub fn new(image: &Image<'_>) -> Self {
         let (words, _) = image.self_test(0).unwrap_or_default();
         let mut observation = [0.0; OBS];
@@ -56,12 +56,12 @@ impl Sensors {
         Self(Some(observation))
     }
 
-    /// What has come since the last call.
+    /// Returns the new observation, if any.
     pub fn read(&mut self) -> Option<[f32; OBS]> {
         self.0.take()
     }
 
-    /// Waits for what comes, as an async driver does. It comes once: nothing wakes who waits again.
+    /// Waits for an observation, as an async driver does. Only the first wait ends, because there is one observation.
     pub async fn wait(&mut self) -> [f32; OBS] {
         poll_fn(|_| self.read().map_or(Poll::Pending, Poll::Ready)).await
     }
@@ -76,22 +76,22 @@ pub fn start_tick(mut timer: SYST) {
     timer.enable_interrupt();
 }
 
-/// The motors, and the ticks that they have had.
+/// The motors, with the number of ticks so far.
 #[derive(Debug, Default)]
 pub struct Motors(u32);
 
 impl Motors {
-    /// At a stand.
+    /// Creates motors at rest.
     pub const fn new() -> Self {
         Self(0)
     }
 
-    /// What a control tick tells them: the last action, once there is one.
+    /// Applies the last action, if any, in a control tick.
     pub fn tick(&mut self, action: Option<Action>) {
         self.0 += 1;
         let (Some(action), Some(mut out)) = (action, host::stdout()) else { return };
-        let told = write!(out, "{}", self.0)
+        let written = write!(out, "{}", self.0)
             .and_then(|()| action.iter().try_for_each(|value| write!(out, " {:08x}", value.to_bits())));
-        host::exit(told.is_ok())
+        host::exit(written.is_ok())
     }
 }

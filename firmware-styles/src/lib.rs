@@ -1,8 +1,8 @@
-//! What the three programs have in the place of an application: an image, sensors, motors, a timer.
+//! Shared stand-ins of the three programs for an application: an image, sensors, motors, a timer.
 //!
-//! The sensors show the first observation of the image's self-test, and the motors write the first action that they get
-//! to the host of QEMU, with the number of control ticks that the head has taken for it:
-//! `host-tests/tests/all/on_target/styles.rs` compares.
+//! The sensors provide the first observation of the image's self-test. The motors write the first action to QEMU's
+//! host, with the number of control ticks that the head took for it. `host-tests/tests/all/on_target/styles.rs`
+//! compares both.
 #![cfg_attr(target_os = "none", no_std)]
 
 #[cfg(target_os = "none")]
@@ -10,7 +10,7 @@ mod application;
 #[cfg(target_os = "none")]
 pub use application::*;
 
-/// What the programs do where they are built for a host.
+/// Exits with a note when the programs are built for a host.
 #[cfg(not(target_os = "none"))]
 pub fn main() {
     eprintln!("this is firmware: build it with --target thumbv7em-none-eabihf");

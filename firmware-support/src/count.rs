@@ -1,4 +1,4 @@
-//! Marks for the instruction counter (`xtask/insn-count`): it counts what is executed between a call of
+//! Marks for the instruction counter (`xtask/insn-count`): it counts the instructions between a call of
 //! [`actq_count_begin`] and the next call of [`actq_count_end`].
 
 use crate::machine::asm;
@@ -15,7 +15,7 @@ pub extern "C" fn actq_count_begin() {
 #[unsafe(no_mangle)]
 #[inline(never)]
 pub extern "C" fn actq_count_end() {
-    // One more than in `actq_count_begin`: equal functions are merged into one.
+    // One more than in `actq_count_begin`, because the compiler merges equal functions.
     asm::nop();
     asm::nop();
 }

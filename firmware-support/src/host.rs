@@ -1,5 +1,4 @@
-//! The host that runs QEMU, or a debugger, through semihosting: the command line, standard input and output, the exit
-//! status.
+//! The host of QEMU or of a debugger, through semihosting: command line, standard input and output, exit status.
 
 use core::fmt;
 
@@ -16,7 +15,7 @@ pub fn exit(success: bool) -> ! {
     }
 }
 
-/// The text after the program's name on the command line (QEMU: `-append`); empty where the host gives none.
+/// Returns the text after the program's name on the command line (QEMU: `-append`); empty if the host provides none.
 pub fn arguments() -> String<64> {
     let mut buffer = [0u8; 128];
     let block = [buffer.as_mut_ptr() as usize, buffer.len() - 1];
@@ -30,19 +29,19 @@ pub fn arguments() -> String<64> {
     arguments
 }
 
-/// Standard output, as text. Unlike the stream of the semihosting crates it does not try for ever where the host's end
-/// is closed.
+/// Opens standard output as text. Unlike the semihosting crates' stream it does not retry forever if the host's end is
+/// closed.
 pub fn stdout() -> Option<File> {
     File::open(c":tt", true)
 }
 
-/// Standard error, as [`stdout`].
+/// Opens standard error, as [`stdout`] does.
 pub fn stderr() -> Option<File> {
     File::open_as(c":tt", APPEND)
 }
 
-/// Modes of SYS_OPEN: fopen's "rb", "wb" and "a". The host's terminal ":tt" is standard input, output and error in
-/// these.
+/// Modes of SYS_OPEN: fopen's "rb", "wb" and "a". In these modes the host's terminal ":tt" is standard input, output
+/// and error.
 const READ: usize = 1;
 const WRITE: usize = 5;
 const APPEND: usize = 8;
@@ -63,12 +62,12 @@ impl File {
         (handle != usize::MAX).then_some(Self(handle))
     }
 
-    /// Fills `buffer`; false where the file ended before.
+    /// Fills `buffer`; returns `false` if the file ended before.
     pub fn read_exact(&self, mut buffer: &mut [u8]) -> bool {
         while !buffer.is_empty() {
             // SAFETY: SYS_READ writes at most `len` bytes to the buffer.
             let left = unsafe { syscall!(READ, self.0, buffer.as_mut_ptr() as usize, buffer.len()) };
-            // It returns how many bytes it did not read.
+            // SYS_READ returns the number of bytes that it did not read.
             if left >= buffer.len() {
                 return false;
             }
@@ -78,9 +77,9 @@ impl File {
         true
     }
 
-    /// Writes all of `bytes`; false where the host refused.
+    /// Writes all of `bytes`; returns `false` if the host refused.
     pub fn write_all(&self, bytes: &[u8]) -> bool {
-        // SAFETY: SYS_WRITE reads `len` bytes from the buffer; it returns how many it did not write.
+        // SAFETY: SYS_WRITE reads `len` bytes from the buffer; it returns the number of bytes that it did not write.
         unsafe { syscall!(WRITE, self.0, bytes.as_ptr() as usize, bytes.len()) == 0 }
     }
 }

@@ -1,5 +1,5 @@
-//! What the firmware binaries share: the processor's crates, the host's files through semihosting, the image slot, the
-//! marks between which instructions are counted, and memory that a reset leaves as it is.
+//! Shared code of the firmware binaries: the processor's crates, the host's files through semihosting, the image slot,
+//! the marks of counted regions, and memory that a reset preserves.
 #![no_std]
 #![cfg(target_os = "none")]
 
@@ -15,8 +15,8 @@ pub mod stack;
 use core::fmt::Write as _;
 use core::panic::PanicInfo;
 
-/// What a panic does in firmware with a host: it ends the run with a failure, and says where. [`panic_to_host`] makes
-/// it the handler.
+/// Handles a panic in firmware with a host: prints its message and location, and ends the run with a failure.
+/// [`panic_to_host`] declares it as the handler.
 pub fn panicked(info: &PanicInfo<'_>) -> ! {
     if let Some(mut err) = host::stderr() {
         let _ = writeln!(err, "{info}");
@@ -35,7 +35,7 @@ macro_rules! panic_to_host {
     };
 }
 
-/// An exception ends the run with a failure, too, and says which and where; riscv-rt would loop.
+/// Handles an exception as a panic with its code and address; riscv-rt would loop.
 #[cfg(target_arch = "riscv32")]
 #[unsafe(export_name = "abort")]
 extern "C" fn exception() -> ! {

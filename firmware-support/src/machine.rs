@@ -1,5 +1,5 @@
-//! The processor's own crates. Those for Cortex-M and those for RISC-V have the same names for what the firmware needs:
-//! the entry point, memory that is taken once, single instructions, and semihosting.
+//! The processor's crates. Those for Cortex-M and for RISC-V have the same names for the firmware's needs: the entry
+//! point, memory that is taken once, single instructions, and semihosting.
 
 #[cfg(target_arch = "arm")]
 pub use {

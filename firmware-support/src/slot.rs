@@ -1,4 +1,4 @@
-//! The image slot, and two for updates: regions of code memory that the linker script names, outside the firmware.
+//! The image slot and two update slots: regions of code memory outside the firmware, named by the linker script.
 
 use core::cell::Cell;
 
@@ -9,46 +9,46 @@ unsafe extern "C" {
     static _image_slot_end: u32;
 }
 
-/// The bytes of the image in the slot, as long as its header says; `None` where there is none. Nothing but the length
-/// is checked here.
+/// Returns the bytes of the image in the slot, with the length from its header; `None` if the slot is empty. It checks
+/// only the length.
 pub fn image() -> Option<&'static [u8]> {
     let (start, end) = (&raw const _image_slot_start, &raw const _image_slot_end);
     let bytes = end as usize - start as usize;
-    // SAFETY: the linker script gives the slot these bounds in readable memory, aligned to 4; where there is no slot,
-    // they are equal.
+    // SAFETY: the linker script gives the slot these bounds in readable memory, aligned to 4; without a slot they are
+    // equal.
     let word = |at: usize| (at < bytes / 4).then(|| unsafe { start.add(at).read_volatile() });
     if word(0)? != MAGIC {
         return None;
     }
     let length = word(W_BYTES)? as usize;
-    // SAFETY: within the slot, as above. Nothing writes there while an image is in it: where updates have the same
-    // memory, the application leaves it alone then.
+    // SAFETY: within the slot, as above. Nothing writes to it while it has an image: the application then makes no
+    // updates in the same memory.
     (length <= bytes).then(|| unsafe { core::slice::from_raw_parts(start.cast(), length) })
 }
 
-/// The memory of the slots for updates; empty on a board without.
+/// Returns the memory of the update slots; empty on a board without them.
 ///
 /// # Safety
 ///
-/// To be called once.
+/// Call it once.
 pub unsafe fn updates() -> &'static [Cell<u8>] {
     unsafe extern "C" {
         static _update_slots_start: Cell<u8>;
         static _update_slots_end: Cell<u8>;
     }
     let (start, end) = (&raw const _update_slots_start, &raw const _update_slots_end);
-    // SAFETY: the linker script gives the slots these bounds in memory of which only the board's flash changes a cell,
-    // as the caller calls once; where there are none, they are equal and not null.
+    // SAFETY: the linker script gives the slots these bounds. Only the board's flash changes their cells, as the caller
+    // calls this once. Without slots the bounds are equal and not null.
     unsafe { core::slice::from_raw_parts(start, end as usize - start as usize) }
 }
 
-/// Part of a flash in memory, to run an image in place.
+/// Returns a part of a memory-mapped flash, to run an image in place.
 ///
 /// # Safety
 ///
-/// Nothing writes there for as long as the bytes are used.
+/// Nothing writes to this part while the bytes are in use.
 pub unsafe fn mapped(flash: &'static [Cell<u8>], address: u32, length: u32) -> Option<&'static [u8]> {
     let cells = flash.get(address as usize..)?.get(..length as usize)?;
-    // SAFETY: a cell of a byte is a byte in memory, and the caller promises that none changes.
+    // SAFETY: a cell of a byte is a byte in memory, and the caller promises that it does not change.
     Some(unsafe { core::slice::from_raw_parts(cells.as_ptr().cast(), cells.len()) })
 }

@@ -1,33 +1,33 @@
-//! How deep the stack has gone: memory below the stack pointer is painted, and looked at later.
+//! The stack's high-water mark: paints the memory below the stack pointer and reads it later.
 
 use cortex_m::register::msp;
 
 const PAINT: u32 = 0x5a5a_a5a5;
 
-/// The words of memory below an address that a stack grows into.
+/// Words of memory below an address, into which a stack grows.
 #[derive(Clone, Copy, Debug)]
 pub struct Room {
-    /// The address, in words.
+    /// The address in words.
     top: usize,
     words: usize,
 }
 
 impl Room {
-    /// Below the stack pointer of the caller.
+    /// Covers the memory below the caller's stack pointer.
     ///
     /// # Safety
     ///
-    /// The stack has room for as many words.
+    /// The stack has room for `words` words.
     #[inline(always)]
     pub unsafe fn below_here(words: usize) -> Self {
         Self { top: msp::read() as usize / 4, words }
     }
 
-    /// Below the stack's begin.
+    /// Covers the memory below the stack's start.
     ///
     /// # Safety
     ///
-    /// The stack has room for as many words.
+    /// The stack has room for `words` words.
     pub unsafe fn of_stack(words: usize) -> Self {
         unsafe extern "C" {
             static _stack_start: u32;
@@ -39,24 +39,24 @@ impl Room {
         ((self.top - below) * 4) as *mut u32
     }
 
-    /// Paints what no frame uses.
+    /// Paints the words that no frame uses.
     ///
     /// # Safety
     ///
-    /// No interrupt comes meanwhile.
+    /// No interrupt occurs meanwhile.
     #[inline(always)]
     pub unsafe fn paint(self) {
         let in_use = self.top - msp::read() as usize / 4;
         for below in in_use + 1..=self.words {
-            // SAFETY: memory of the stack, as whoever made this has promised, below its pointer, where nothing lives.
+            // SAFETY: unused memory of the stack below its pointer, as the creator of this value promised.
             unsafe { self.address(below).write_volatile(PAINT) };
         }
     }
 
-    /// Bytes that were written to, up to the deepest.
+    /// Returns the bytes down to the deepest word written.
     pub fn used(self) -> usize {
-        // SAFETY: memory of the stack, as whoever made this has promised; volatile, for what was written there is none
-        // of this function's.
+        // SAFETY: memory of the stack, as the creator of this value promised; volatile, because other functions wrote
+        // it.
         let painted = |below: &usize| unsafe { self.address(*below).read_volatile() } == PAINT;
         4 * (1..=self.words).rev().find(|below| !painted(below)).unwrap_or(0)
     }

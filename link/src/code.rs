@@ -1,4 +1,4 @@
-//! Names for the numbers in messages. A number keeps its meaning in all versions.
+//! Names of the code numbers in messages. A number keeps its meaning in all versions.
 
 use core::fmt;
 
@@ -12,15 +12,15 @@ macro_rules! codes {
         }
 
         impl $name {
-            /// All of them.
+            /// All variants, in order of their numbers.
             pub const ALL: &[Self] = &[$(Self::$variant,)*];
 
-            /// The number.
+            /// Returns the number on the wire.
             pub const fn code(self) -> u8 {
                 self as u8
             }
 
-            /// What a number means; `None` where it means nothing.
+            /// Returns the variant with this number, or `None` for an unknown number.
             pub fn from_code(code: u8) -> Option<Self> {
                 Self::ALL.iter().copied().find(|one| one.code() == code)
             }
@@ -37,37 +37,37 @@ macro_rules! codes {
 }
 
 codes! {
-    /// What the controller does with its outputs.
+    /// State of the controller's outputs.
     State {
         /// Outputs coast.
         Disarmed = 0, "disarmed";
         /// Outputs follow the head.
         Armed = 1, "armed";
-        /// Outputs do each axis' safe action, until armed again or disarmed.
+        /// Outputs do each axis' safe action until the controller is armed again or disarmed.
         Latched = 2, "latched in the safe action";
     }
 }
 
 codes! {
-    /// What took an armed controller to its safe action.
+    /// Cause of the safe action of an armed controller.
     Fault {
-        /// No good observation came within the deadline.
-        Stale = 1, "no good observation came within the deadline";
-        /// Observations came, but no action within the deadline.
-        Late = 2, "the head gave no action within the deadline";
+        /// No valid observation arrived within the deadline.
+        Stale = 1, "no valid observation arrived within the deadline";
+        /// Observations arrived, but no action within the deadline.
+        Late = 2, "the head produced no action within the deadline";
         /// The head ended a step with an error.
         Head = 3, "the head ended a step with an error";
-        /// An action has another number of values than there are axes.
-        ActionLength = 4, "an action has another number of values than there are axes";
-        /// A value of an action is NaN or infinite.
-        ActionNotFinite = 5, "a value of an action is not finite";
-        /// The image in flash has changed.
-        Image = 6, "the image in flash has changed: its checksum differs";
+        /// The number of values in an action differs from the number of axes.
+        ActionLength = 4, "an action's number of values differs from the number of axes";
+        /// A value in an action is NaN or infinite.
+        ActionNotFinite = 5, "a value in an action is not finite";
+        /// The checksum of the image in flash changed.
+        Image = 6, "the image in flash changed: its checksum differs";
         /// The clock failed.
         Clock = 7, "the clock failed";
-        /// The watchdog does not run.
-        Watchdog = 8, "the watchdog does not run";
-        /// A control tick ended after the next one was due.
+        /// The watchdog is not running.
+        Watchdog = 8, "the watchdog is not running";
+        /// A control tick ended after the next tick was due.
         Overrun = 9, "a control tick took longer than its period";
         /// The hardware's break input switched the outputs off.
         Break = 10, "the break input switched the outputs off";
@@ -75,50 +75,52 @@ codes! {
 }
 
 codes! {
-    /// Why a request was not done.
+    /// Reason for refusing a request.
     Refusal {
-        /// The token is not the one of the last status: the request is older than the controller's state.
-        Token = 1, "the token is not the one of the last status; read the status and ask again";
-        /// There is no valid image.
-        Image = 2, "there is no valid image";
+        /// The request's token differs from the token in the last status: the request is older than the controller's
+        /// state.
+        Token = 1, "the token differs from the token in the last status; read the status and repeat the request";
+        /// The controller has no valid image.
+        Image = 2, "the controller has no valid image";
         /// The image's self-test failed.
         SelfTest = 3, "the image's self-test failed";
         /// The clock failed.
         Clock = 4, "the clock failed";
-        /// The watchdog does not run.
-        Watchdog = 5, "the watchdog does not run";
-        /// No good observation came within the deadline.
-        Stale = 6, "no good observation came within the deadline; send observations before arming";
+        /// The watchdog is not running.
+        Watchdog = 5, "the watchdog is not running";
+        /// No valid observation arrived within the deadline.
+        Stale = 6, "no valid observation arrived within the deadline; send observations before arming";
         /// The controller is armed.
-        Armed = 7, "not while armed; disarm first";
-        /// There is no such parameter, or no such axis.
-        Parameter = 8, "there is no such parameter or axis";
-        /// The value is not finite or outside what the parameter takes.
-        Range = 9, "the value is not finite or outside the parameter's range";
-        /// A chunk does not begin where the last one ended, which the acknowledgement's detail says.
-        Offset = 10, "the chunk does not begin where the last one ended";
-        /// The image is empty, no whole words, longer than a slot, or not all there.
-        Length = 11, "the image's length does not fit";
-        /// No update was begun.
-        NoUpdate = 12, "no update was begun";
-        /// An update is being erased or checked, or has to wait until the outputs coast; ask again.
-        Busy = 13, "the update is being erased or checked, or waits for the outputs to coast; ask again";
-        /// The checksum of what was written is not the one announced.
-        Checksum = 14, "the image's checksum is not the one announced";
-        /// The signature is missing or not by the key of this build.
-        Signature = 15, "the signature is missing or not by this build's key";
-        /// The image's version is lower than one that was confirmed.
-        Rollback = 16, "the image's version is lower than one that ran before";
+        Armed = 7, "the controller is armed; disarm it first";
+        /// Unknown parameter or axis.
+        Parameter = 8, "unknown parameter or axis";
+        /// The value is not finite or is outside the parameter's range.
+        Range = 9, "the value is not finite or is outside the parameter's range";
+        /// The chunk does not begin at the end of the last one; [`Message::Ack`](crate::Message::Ack) names that
+        /// offset.
+        Offset = 10, "the chunk does not begin at the end of the last one";
+        /// The image is empty, not whole words, longer than a slot, or incomplete.
+        Length = 11, "the image is empty, incomplete, not whole words, or longer than a slot";
+        /// No update is in progress.
+        NoUpdate = 12, "no update is in progress";
+        /// The update's slot is being erased or checked, or the outputs do not coast yet; repeat the request.
+        Busy = 13, "the update is being erased or checked, or waits for the outputs to coast; repeat the request";
+        /// The checksum of the written bytes differs from the announced one.
+        Checksum = 14, "the image's checksum differs from the announced one";
+        /// The signature is missing or was not made with the key of this build.
+        Signature = 15, "the signature is missing or was not made with the key of this build";
+        /// The image's version is lower than a confirmed one.
+        Rollback = 16, "the image's version is lower than that of an image that already ran";
         /// The flash cannot be erased or written.
         Flash = 17, "the flash cannot be erased or written";
-        /// This end does not do that.
-        Unsupported = 18, "the controller does not do that";
-        /// The image is refused by the kernels, or its lengths are not those of the controller.
-        Unfit = 19, "the image is not one that this controller can run";
+        /// The controller does not support the request.
+        Unsupported = 18, "the controller does not support this request";
+        /// The kernels refuse the image, or its input and output lengths do not match the controller.
+        Unfit = 19, "this controller cannot run the image";
         /// A break or overrun has not been cleared.
         Hardware = 20, "the hardware reports a fault";
-        /// An axis has no finite limits, by the image that is built in or by the build.
-        Limits = 21, "an axis has no limits, so nothing may move; build the firmware with --limits LOW:HIGH, or with an image \
+        /// An axis has no finite limits, neither from the built-in image nor from the build.
+        Limits = 21, "an axis has no limits, so no output may move; build the firmware with --limits LOW:HIGH, or with an image \
             whose actions have low and high";
     }
 }
@@ -126,17 +128,17 @@ codes! {
 impl core::error::Error for Refusal {}
 
 codes! {
-    /// Why the processor started.
+    /// Cause of the processor's last reset.
     ResetCause {
         /// The cause is not known.
         Unknown = 0, "unknown";
-        /// Power came on.
+        /// Power-on.
         Power = 1, "power on";
         /// The reset pin.
         Pin = 2, "reset pin";
         /// The watchdog.
         Watchdog = 3, "watchdog";
-        /// The software asked for it.
+        /// A request by the software.
         Software = 4, "software";
         /// The supply voltage was too low.
         Brownout = 5, "brown-out";
@@ -144,27 +146,27 @@ codes! {
 }
 
 codes! {
-    /// What the firmware was last seen to die of.
+    /// Kind of the firmware's last crash.
     Crash {
         /// A panic.
         Panic = 1, "panic";
-        /// A hard fault or another exception that nothing handles.
+        /// A hard fault or another unhandled exception.
         HardFault = 2, "hard fault";
         /// The stack grew beyond its limit.
         StackOverflow = 3, "stack overflow";
-        /// The watchdog was about to reset: what made no progress is in the record's detail.
+        /// The watchdog was about to reset; the record's detail names the stalled parts.
         Watchdog = 4, "no progress, watchdog";
     }
 }
 
 codes! {
-    /// What can be read and, while not armed, set. Values are f32; counts are whole numbers.
+    /// A parameter, which can be read at any time and set while not armed. Values are f32; counts are whole numbers.
     Parameter {
-        /// Ticks without a good observation, or without an action, after which the safe action follows.
+        /// Ticks without a valid observation, or without an action, before the safe action.
         Deadline = 1, "deadline in ticks";
-        /// Age in µs, against the fastest delivery seen, above which an observation is refused.
+        /// Largest age of an observation in µs, relative to the fastest delivery seen; older ones are refused.
         MaxAge = 2, "oldest observation in µs";
-        /// Ticks between two status reports; 0 sends none unasked but that of a new token.
+        /// Ticks between two status reports. With 0, the only unrequested report is that of a new token.
         StatusPeriod = 3, "ticks between status reports";
         /// Lower limit of an axis.
         Low = 4, "lower limit";
@@ -172,13 +174,13 @@ codes! {
         High = 5, "upper limit";
         /// Largest change of an axis in one tick.
         Rate = 6, "largest change in a tick";
-        /// Value from which an axis' first action after arming is rate-limited.
+        /// Value of an axis at arming, from which its first action is rate-limited.
         Start = 7, "value at the start";
     }
 }
 
 codes! {
-    /// What can be asked for.
+    /// A report that a host can request.
     Report {
         /// [`crate::report::Status`].
         Status = 1, "status";
@@ -189,7 +191,7 @@ codes! {
     }
 }
 
-/// An optional code: 0 is none. The outer `None` is an unknown number.
+/// Reads an optional code, 0 for none. The outer `None` is an unknown number.
 pub(crate) fn optional<T>(code: u8, from_code: impl Fn(u8) -> Option<T>) -> Option<Option<T>> {
     if code == 0 { Some(None) } else { from_code(code).map(Some) }
 }

@@ -1,4 +1,4 @@
-//! From bytes to frames.
+//! Decoder from bytes to frames.
 
 use cobs::{DecodeResult, DecoderState};
 use heapless::Vec;
@@ -8,12 +8,12 @@ use crate::frame::{CHECKSUM, CRC, HEADER};
 /// Finds frames in a stream of bytes. `N` is the length of the longest frame, before stuffing
 /// ([`crate::frame::bytes`]).
 ///
-/// Whatever came before, the frame behind the next zero is found.
+/// It always finds the frame after the next zero, whatever bytes came before.
 #[derive(Debug)]
 pub(crate) struct Decoder<const N: usize> {
     stuffing: DecoderState,
     frame: Vec<u8, N>,
-    /// `true` if a byte of the frame found no room.
+    /// `true` if the frame is longer than `N`.
     too_long: bool,
 }
 
@@ -25,8 +25,8 @@ impl<const N: usize> Decoder<N> {
         Self { stuffing: DecoderState::Idle, frame: Vec::new(), too_long: false }
     }
 
-    /// Takes a byte. At the end of a frame: its bytes without the checksum, which is right, at least [`HEADER`] of
-    /// them.
+    /// Takes a byte. At the end of a frame with a correct checksum, returns its bytes without the checksum, at least
+    /// [`HEADER`] of them.
     pub(crate) fn push(&mut self, byte: u8) -> Option<Result<&[u8], Damaged>> {
         match self.stuffing.feed(byte) {
             Ok(DecodeResult::DataStart) => {
@@ -40,14 +40,14 @@ impl<const N: usize> Decoder<N> {
             }
             Ok(DecodeResult::DataComplete) if self.too_long => Some(Err(Damaged)),
             Ok(DecodeResult::DataComplete) => Some(checked(&self.frame).ok_or(Damaged)),
-            // The zero came too early; it ends this frame all the same.
+            // The zero came too early; it still ends this frame.
             Err(_) => Some(Err(Damaged)),
             Ok(DecodeResult::NoData) => None,
         }
     }
 }
 
-/// The frame without its checksum, if that is right.
+/// Returns the frame without its checksum, if the checksum is correct.
 fn checked(frame: &[u8]) -> Option<&[u8]> {
     let (content, checksum) = frame.split_last_chunk::<CHECKSUM>()?;
     (content.len() >= HEADER && CRC.checksum(content) == u32::from_le_bytes(*checksum)).then_some(content)

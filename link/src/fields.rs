@@ -1,4 +1,4 @@
-//! Little-endian fields, one after the other.
+//! Reader and writer of little-endian fields.
 
 use cobs::CobsEncoder;
 use crc::{Digest, Table};
@@ -32,14 +32,14 @@ impl<'a> Reader<'a> {
         self.take().map(f32::from_le_bytes)
     }
 
-    /// Bytes of a fixed number, in place.
+    /// Returns the next `N` bytes, in place.
     pub(crate) fn array<const N: usize>(&mut self) -> Option<&'a [u8; N]> {
         let (array, rest) = self.0.split_first_chunk()?;
         self.0 = rest;
         Some(array)
     }
 
-    /// All that is left.
+    /// Returns the remaining bytes.
     pub(crate) fn rest(&mut self) -> &'a [u8] {
         core::mem::take(&mut self.0)
     }
@@ -49,7 +49,8 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Stuffs fields into memory as they come, and sums them up. What finds no room is told at the end.
+/// Stuffs fields into a buffer one by one and computes their checksum. [`Writer::finish`] reports a buffer that was too
+/// small.
 pub(crate) struct Writer<'b> {
     cobs: CobsEncoder<'b>,
     crc: Digest<'static, u32, Table<1>>,
@@ -67,7 +68,7 @@ impl<'b> Writer<'b> {
     }
 
     fn push(&mut self, bytes: &[u8]) {
-        // The crate keeps a byte back at the end of what it is given, which it cannot do where that is nothing.
+        // `push` holds back the last byte of its argument, so it cannot take an empty one.
         self.fits &= bytes.is_empty() || self.cobs.push(bytes).is_ok();
     }
 
@@ -87,8 +88,8 @@ impl<'b> Writer<'b> {
         self.bytes(&value.to_le_bytes());
     }
 
-    /// Appends the checksum; the number of bytes in the buffer, without the zero that ends a frame. `None` where it is
-    /// too small.
+    /// Appends the checksum and returns the number of bytes in the buffer, without the zero that ends a frame. `None`
+    /// if the buffer is too small.
     pub(crate) fn finish(mut self) -> Option<usize> {
         let crc = self.crc.clone().finalize();
         self.push(&crc.to_le_bytes());

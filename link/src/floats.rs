@@ -1,22 +1,22 @@
 //! Values of an observation or an action.
 
-/// f32 values, as they are in memory or as they came over the wire.
+/// f32 values, from memory or from the wire.
 #[derive(Clone, Copy, Debug)]
 pub enum Floats<'a> {
     /// In memory.
     Values(&'a [f32]),
-    /// Little-endian, as received; always whole values.
+    /// As received: little-endian, always whole values.
     Wire(&'a [[u8; 4]]),
 }
 
 impl<'a> Floats<'a> {
-    /// What `bytes` hold; `None` where they are no whole values.
+    /// Reads `bytes` as values; `None` if they are not whole values.
     pub(crate) fn of_wire(bytes: &'a [u8]) -> Option<Self> {
         let (values, rest) = bytes.as_chunks();
         rest.is_empty().then_some(Self::Wire(values))
     }
 
-    /// Number of values.
+    /// Returns the number of values.
     pub const fn len(&self) -> usize {
         match self {
             Self::Values(values) => values.len(),
@@ -24,12 +24,12 @@ impl<'a> Floats<'a> {
         }
     }
 
-    /// Whether there are none.
+    /// Returns `true` if there are no values.
     pub const fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The values in order.
+    /// Returns an iterator over the values in order.
     pub fn iter(&self) -> impl Iterator<Item = f32> + use<'a> {
         let (values, wire): (&'a [f32], &'a [[u8; 4]]) = match *self {
             Self::Values(values) => (values, &[]),
@@ -39,7 +39,7 @@ impl<'a> Floats<'a> {
     }
 }
 
-/// Bit for bit, so that a NaN equals itself.
+/// Compares bit for bit, so that a NaN equals itself.
 impl PartialEq for Floats<'_> {
     fn eq(&self, other: &Self) -> bool {
         self.iter().map(f32::to_bits).eq(other.iter().map(f32::to_bits))

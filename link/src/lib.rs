@@ -1,14 +1,13 @@
-//! What host and target say to each other. `docs/LINK.md` has the wire format.
+//! Frames and messages between host and target. `docs/LINK.md` specifies the wire format.
 //!
 //! [`Sender`] makes frames of messages, [`Receiver`] finds messages in bytes. Both are pure state machines: they own no
-//! port, no clock and no heap, and carry on after any byte. The caller moves the bytes: over a UART or a socket.
+//! port, no clock and no heap, and recover after any byte. The caller moves the bytes: over a UART or a socket.
 //!
-//! [`pipe`] is another, simpler protocol: a simulator that runs an image as its policy through standard input and
-//! output.
+//! [`pipe`] is a simpler protocol: a simulator runs an image as its policy through standard input and output.
 #![no_std]
 #![forbid(unsafe_code)]
 
-// Which of these may use which: the table in docs/ARCHITECTURE.md, which a test reads.
+// The dependencies between these modules are in docs/ARCHITECTURE.md; a test compares them.
 pub mod code;
 mod decoder;
 mod fields;

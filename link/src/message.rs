@@ -5,95 +5,95 @@ use crate::fields::{Reader, Writer};
 use crate::floats::Floats;
 use crate::report::{Breadcrumb, Status, Timing};
 
-/// A message. Those of a host have kinds below 128, those of a controller from 128 on.
+/// A message. A host's messages have kinds below 128, a controller's have kinds from 128.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Message<'a> {
-    /// What the robot sees. Not acknowledged: the action is the answer.
+    /// An observation. It is not acknowledged: the action is the answer.
     Observation(Floats<'a>),
     /// Lets the outputs follow the head.
     Arm {
-        /// [`Status::token`].
+        /// [`Status::token`] of the last status.
         token: u32,
     },
     /// Lets the outputs coast.
     Disarm,
     /// Asks for a parameter, which [`Self::Value`] answers.
     Get {
-        /// Which.
+        /// The parameter.
         parameter: Parameter,
-        /// Whose, where it is that of an axis; else 0.
+        /// The axis, for a parameter of an axis; else 0.
         axis: u8,
     },
     /// Sets a parameter.
     Set {
-        /// [`Status::token`].
+        /// [`Status::token`] of the last status.
         token: u32,
-        /// Which.
+        /// The parameter.
         parameter: Parameter,
-        /// Whose, where it is that of an axis; else 0.
+        /// The axis, for a parameter of an axis; else 0.
         axis: u8,
-        /// To what.
+        /// The new value.
         value: f32,
     },
     /// Asks for a report.
     Ask(Report),
     /// Begins an image update: erases the slot that does not run.
     Begin {
-        /// [`Status::token`].
+        /// [`Status::token`] of the last status.
         token: u32,
         /// Bytes of the image; whole words.
         length: u32,
-        /// CRC-32 (ISO-HDLC) of all bytes of the image. (Not the one in its header, which leaves out the words before
-        /// it.)
+        /// CRC-32 (ISO-HDLC) of all bytes of the image. It differs from the one in the image's header, which excludes
+        /// the words before it.
         crc: u32,
-        /// Version of the image, which must not be lower than one that ran before.
+        /// Version of the image. It must not be lower than the version of an image that ran before.
         version: u32,
     },
     /// Some of the image's bytes.
     Chunk {
-        /// Where they stand in the image.
+        /// Offset of the bytes in the image.
         offset: u32,
         /// The bytes.
         bytes: &'a [u8],
     },
     /// Ends an update: the image is checked, tested and then runs.
     Commit {
-        /// Ed25519ph signature of image and version, where the build requires one.
+        /// Ed25519ph signature of image and version, if the build requires one.
         signature: Option<&'a [u8; 64]>,
     },
-    /// Gives an update up.
+    /// Cancels an update.
     Abort,
-    /// What the head made of an observation.
+    /// The head's action for an observation.
     Action {
         /// Sequence number of the observation's frame.
         of: u32,
-        /// Whether the outputs follow it.
+        /// `true` if the outputs follow the action.
         applied: bool,
-        /// The values, after limits and rate limits where it is applied.
+        /// The values; after limits and rate limits if the action is applied.
         values: Floats<'a>,
     },
-    /// State and counters.
+    /// The state and counters.
     Status(Status),
-    /// Times.
+    /// The measured times.
     Timing(Timing),
-    /// What was left behind before the last reset.
+    /// The record that the firmware left before the last reset.
     Breadcrumb(Breadcrumb),
     /// The value of a parameter.
     Value {
-        /// Which.
+        /// The parameter.
         parameter: Parameter,
-        /// Whose.
+        /// The axis.
         axis: u8,
-        /// What it is.
+        /// The current value.
         value: f32,
     },
     /// Answers a request.
     Ack {
         /// Sequence number of the request's frame.
         of: u32,
-        /// Why it was not done; `None` where it was.
+        /// Reason for a refusal; `None` if the request was done.
         refusal: Option<Refusal>,
-        /// Bytes of the update that are written; 0 where there is none.
+        /// Bytes of the update that have been written; 0 if no update is in progress.
         written: u32,
     },
 }
@@ -179,8 +179,7 @@ impl<'a> Message<'a> {
         }
     }
 
-    /// The message of a kind with this payload; `None` where the kind is unknown, or the payload is not one of that
-    /// kind.
+    /// Parses a payload of this kind; `None` if the kind is unknown or the payload does not match it.
     pub(crate) fn parse(kind: u8, payload: &'a [u8]) -> Option<Self> {
         let r = &mut Reader(payload);
         let message = match kind {

@@ -1,4 +1,4 @@
-//! From bytes to messages.
+//! Receiver from bytes to messages.
 
 use crate::decoder::Decoder;
 use crate::fields::Reader;
@@ -7,7 +7,7 @@ use crate::message::Message;
 use crate::report::Counters;
 use crate::window::{Order, Window};
 
-/// A message, and what its frame says about it.
+/// A message with its frame's sequence number and time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Received<'a> {
     /// The frame's sequence number.
@@ -18,10 +18,10 @@ pub struct Received<'a> {
     pub message: Message<'a>,
 }
 
-/// Finds messages in bytes. `N` is the length of the longest frame before stuffing ([`frame::bytes`] of a payload).
+/// Finds messages in bytes. `N` is the length of the longest frame before stuffing: [`frame::bytes`] of a payload.
 ///
-/// A message is given only of a frame that is whole, undamaged, of this version, well-formed and new. All others are
-/// counted, and change nothing else.
+/// A frame gives a message only if it is whole, undamaged, of this version, well-formed and new. All other frames are
+/// only counted.
 #[derive(Debug)]
 pub struct Receiver<const N: usize> {
     decoder: Decoder<N>,
@@ -30,16 +30,16 @@ pub struct Receiver<const N: usize> {
 }
 
 impl<const N: usize> Receiver<N> {
-    /// The longest payload in bytes that finds room.
+    /// Length of the longest payload that fits, in bytes.
     pub const PAYLOAD: usize = N.saturating_sub(frame::bytes(0));
 
-    /// A receiver that takes the first good frame as it comes.
+    /// Creates a receiver that accepts the first good frame with any sequence number.
     pub const fn new() -> Self {
         let counters = Counters { good: 0, damaged: 0, malformed: 0, repeated: 0, lost: 0 };
         Self { decoder: Decoder::new(), window: Window::open(), counters }
     }
 
-    /// Takes a byte; the message whose frame it ends.
+    /// Takes a byte and returns the message whose frame it ends.
     pub fn push(&mut self, byte: u8) -> Option<Received<'_>> {
         let Self { decoder, window, counters } = self;
         let Ok(content) = decoder.push(byte)? else {
@@ -63,14 +63,14 @@ impl<const N: usize> Receiver<N> {
         }
     }
 
-    /// Takes the next good frame with whatever sequence number it has: the other end may have started anew. To be
-    /// called where nothing good has come for long, and where nothing moves. `true` if a frame was let through since it
-    /// was open: such a one may come once more.
+    /// Accepts the next good frame with any sequence number, because the other end may have restarted. Call it only
+    /// after a long time without good frames and while nothing moves. Returns `true` if the window was not open: a
+    /// frame that was accepted before may then be accepted again.
     pub fn reopen(&mut self) -> bool {
         self.window.reopen()
     }
 
-    /// What was seen so far.
+    /// Returns the counters of the frames so far.
     pub const fn counters(&self) -> Counters {
         self.counters
     }

@@ -1,54 +1,54 @@
-//! What a controller tells of itself.
+//! Reports of a controller about itself.
 
 use crate::code::{Crash, Fault, Refusal, ResetCause, State, optional};
 use crate::fields::{Reader, Writer};
 
-/// The number of [`Status::slot`] where the image is not in a slot but was built in.
+/// Value of [`Status::slot`] for the built-in image, which is not in a slot.
 pub const BUILT_IN: u8 = 255;
 
-/// What a receiver has seen. The numbers wrap.
+/// Counters of a receiver's frames. They wrap.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
     /// Frames that gave a message.
     pub good: u32,
     /// Frames that were damaged or longer than the receiver's memory.
     pub damaged: u32,
-    /// Undamaged frames of another version, of an unknown kind, or with a payload that is not one of their kind.
+    /// Undamaged frames of another version, of an unknown kind, or whose payload does not match their kind.
     pub malformed: u32,
-    /// Frames that were here already, or came behind a newer one.
+    /// Frames that had arrived before, or that arrived after a newer one.
     pub repeated: u32,
-    /// Sequence numbers that were left out.
+    /// Missing sequence numbers.
     pub lost: u32,
 }
 
-/// State, and what there is to know for whoever wants to arm.
+/// State of the controller, and what a host must know before it arms.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Status {
-    /// What the outputs do.
+    /// State of the outputs.
     pub state: State,
-    /// What led to [`State::Latched`], the last time.
+    /// Cause of the last transition to [`State::Latched`].
     pub fault: Option<Fault>,
-    /// Why the controller cannot be armed now; the first of several reasons.
+    /// First reason why the controller cannot be armed now, if any.
     pub refusal: Option<Refusal>,
-    /// Why the processor started.
+    /// Cause of the processor's last reset.
     pub reset: ResetCause,
-    /// What a request that changes something has to name; another one after every change of the state and every start.
+    /// Token that a request must contain to change something. It changes with the state and with every start.
     pub token: u32,
     /// Ticks since the start; wraps.
     pub ticks: u32,
-    /// CRC-32 in the image's header; 0 without an image.
+    /// CRC-32 from the image's header; 0 without an image.
     pub image: u32,
     /// The image's slot, 0 or 1, or [`BUILT_IN`].
     pub slot: u8,
-    /// Axes, and values of an action.
+    /// Number of axes, which is the length of an action.
     pub axes: u8,
-    /// Values of an observation.
+    /// Length of an observation in values.
     pub observation: u16,
-    /// The longest payload in bytes that the controller has memory for.
+    /// Length of the longest payload that the controller has memory for, in bytes.
     pub payload: u16,
     /// Observations that the guard refused: length, finiteness, range or age.
     pub refused: u32,
-    /// What the controller's receiver has seen.
+    /// Counters of the controller's receiver.
     pub counters: Counters,
 }
 
@@ -95,20 +95,20 @@ impl Status {
     }
 }
 
-/// What things take. What is not measured is 0.
+/// Measured times and stack use; 0 for what is not measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Timing {
     /// Period of the control tick in ns.
     pub period: u32,
-    /// The longest tick in ns, since the start.
+    /// The longest tick since the start, in ns.
     pub worst_tick: u32,
-    /// The latest start of a tick behind its due time in ns, since the start.
+    /// The longest delay of a tick's start after its due time since the start, in ns.
     pub worst_jitter: u32,
-    /// The longest step of the head in µs, from observation to action, since the start.
+    /// The longest step of the head since the start, from observation to action, in µs.
     pub worst_head: u32,
-    /// Ticks that ended after the next one was due.
+    /// Ticks that ended after the next tick was due.
     pub overruns: u32,
-    /// Bytes of stack that were in use at most.
+    /// Most bytes of stack in use since the start.
     pub stack: u32,
 }
 
@@ -130,20 +130,20 @@ impl Timing {
     }
 }
 
-/// What the firmware left behind before the last reset.
+/// The record that the firmware left before the last reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Breadcrumb {
-    /// Why the processor started.
+    /// Cause of the processor's last reset.
     pub reset: ResetCause,
-    /// What it died of; `None` where it left nothing behind.
+    /// Kind of the crash; `None` if the firmware left no record.
     pub crash: Option<Crash>,
-    /// Program counter at the crash; 0 where it is not known.
+    /// Program counter at the crash; 0 if unknown.
     pub pc: u32,
-    /// A number that the crash adds: the fault status register, the line of a panic, what made no progress.
+    /// Detail of the crash: the fault status register, the line of a panic, or the parts without progress.
     pub detail: u32,
-    /// Ticks since the start, at the crash.
+    /// Ticks from the start to the crash.
     pub ticks: u32,
-    /// Crashes since power came on.
+    /// Crashes since power-on.
     pub count: u32,
 }
 

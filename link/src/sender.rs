@@ -1,28 +1,28 @@
-//! From messages to bytes.
+//! Sender from messages to bytes.
 
 use crate::fields::Writer;
 use crate::frame::VERSION;
 use crate::message::Message;
 
-/// Numbers the frames of one end.
+/// Writes and numbers the frames of one end.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sender {
     next: u32,
 }
 
 impl Sender {
-    /// A sender whose first frame has the number `first`.
+    /// Creates a sender whose first frame has the number `first`.
     pub const fn new(first: u32) -> Self {
         Self { next: first }
     }
 
-    /// The number of the next frame.
+    /// Returns the number of the next frame.
     pub const fn next(&self) -> u32 {
         self.next
     }
 
-    /// Writes a frame at the time `micros` into `buffer`, and gives its bytes with the zero at the end. `None` where
-    /// the buffer is too small ([`crate::frame::wire_bytes`]); no number is used up then.
+    /// Writes a frame with the time `micros` into `buffer` and returns its bytes, including the final zero. `None` if
+    /// the buffer is smaller than [`crate::frame::wire_bytes`]; the number is then not used.
     pub fn frame<'b>(&mut self, message: &Message<'_>, micros: u32, buffer: &'b mut [u8]) -> Option<&'b [u8]> {
         let mut w = Writer::new(buffer);
         w.u8(VERSION);

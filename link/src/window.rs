@@ -1,19 +1,18 @@
-//! The order of frames: what is repeated or late is told from what is new.
+//! The order of frames: separates new ones from repeated or late ones.
 
-/// How a frame stands to those before it.
+/// Order of a frame relative to earlier ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Order {
-    /// It is new; so many were lost before it.
+    /// A new frame.
     New {
-        /// Frames between the last one and this.
+        /// Frames lost between the last one and this one.
         lost: u32,
     },
-    /// It, or one behind it, was here already.
+    /// This frame, or a later one, arrived before.
     Repeated,
 }
 
-/// The last sequence number that was let through. Numbers wrap; half of them count as new (RFC 1982): at 1 kHz those of
-/// 24 days.
+/// The last accepted sequence number. Numbers wrap; half of them count as new (RFC 1982), which at 1 kHz is 24 days.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Window {
     last: Option<u32>,
@@ -24,12 +23,12 @@ impl Window {
         Self { last: None }
     }
 
-    /// Opens it; `true` if it was not open.
+    /// Opens the window; returns `true` if it was not open.
     pub(crate) fn reopen(&mut self) -> bool {
         self.last.take().is_some()
     }
 
-    /// Lets a new frame through.
+    /// Accepts a new frame.
     pub(crate) fn admit(&mut self, sequence: u32) -> Order {
         let ahead = self.last.map_or(1, |last| sequence.wrapping_sub(last));
         if ahead == 0 || ahead >= 1 << 31 {

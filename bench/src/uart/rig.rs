@@ -107,7 +107,7 @@ impl Rig {
         let line = Line::new(controller.address().open().context("the board's serial port")?, seed);
         let end = line.clone();
         let open = Box::new(move || Ok(end.host_end()));
-        let mut connection = Connection::open_by("the line".to_owned(), open, HANG)?;
+        let mut connection = Connection::open_with("the line".to_owned(), open, HANG)?;
         let clock = line.clone();
         connection.set_clock(Box::new(move || clock.now() as u32));
         let mut client = Client::new(connection, HANG);

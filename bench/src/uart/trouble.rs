@@ -167,7 +167,7 @@ impl Rig {
             while push.taken() + IN_FLIGHT < image.len() {
                 push.advance(&mut self.client)?;
             }
-            push.in_chunks_of(CHUNK);
+            push.limit_chunks(CHUNK);
             update = Some(push);
         }
         self.begin(seed, !trouble.goes_on())?;

@@ -1,5 +1,4 @@
-//! The BBC micro:bit: a Cortex-M0 (nRF51822) with 256 KB of flash and 16 KB of RAM. Of the golden cases it runs those
-//! that fit.
+//! The BBC micro:bit: a Cortex-M0 (nRF51822) with 256 KB of flash and 16 KB of RAM. It runs the golden cases that fit.
 
 use crate::board::Board;
 
@@ -9,6 +8,6 @@ pub(crate) const BOARD: Board = Board {
     small: true,
     emulator: "qemu-system-arm",
     machine: &["-M", "microbit"],
-    shows: &["golden"],
+    binaries: &["golden"],
     application: None,
 };

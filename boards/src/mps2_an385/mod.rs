@@ -6,7 +6,7 @@ use crate::mps2_an386::BOARD as AN386;
 pub(crate) const BOARD: Board = Board {
     name: "mps2-an385",
     machine: &["-M", "mps2-an385"],
-    shows: &["golden", "portable"],
+    binaries: &["golden", "portable"],
     application: None,
     ..AN386
 };

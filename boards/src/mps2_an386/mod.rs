@@ -17,7 +17,7 @@ pub(crate) const BOARD: Board = Board {
     small: false,
     emulator: "qemu-system-arm",
     machine: &["-M", "mps2-an386"],
-    shows: &[
+    binaries: &[
         "bench",
         "foc",
         "functions",

@@ -7,7 +7,7 @@ use crate::mps2_an386::{BOARD as AN386, SCRATCH};
 pub(crate) const BOARD: Board = Board {
     name: "mps2-an500",
     machine: &["-M", "mps2-an500"],
-    shows: &["golden"],
+    binaries: &["golden"],
     application: Some(Application { about: "Cortex-M7, QEMU", scratch: SCRATCH }),
     ..AN386
 };

@@ -16,6 +16,6 @@ pub(crate) const BOARD: Board = Board {
     small: false,
     emulator: "qemu-system-arm",
     machine: &["-M", "mps2-an505"],
-    shows: &["golden"],
+    binaries: &["golden"],
     application: Some(Application { about: "Cortex-M33, QEMU", scratch: SCRATCH }),
 };

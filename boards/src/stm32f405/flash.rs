@@ -1,12 +1,12 @@
-//! The flash of an STM32F405, erased and programmed (RM0090, section 3.6): in which order its controller is told what,
-//! what has to hold before, and its errors by name. The registers are behind [`Part`], so that all of it runs on the
-//! host, too, on a [`model`].
+//! Erasing and programming the flash of an STM32F405 (RM0090, section 3.6): the controller's sequences, their
+//! preconditions, and its errors by name. [`Part`] abstracts the registers, so that all of it also runs on the host, on
+//! a [`model`].
 //!
-//! The part has one bank: while a sector is erased, for up to 2 s, or a word is programmed, up to 0.1 ms, the processor
-//! stands still as soon as it fetches an instruction or reads from flash, its interrupts with it. So nothing begins
-//! unless the power stage is off by its register, and no sector is erased but with a watchdog that waits for as long as
-//! the data sheet gives it, and is fed behind that only where it took no longer. Where the controller itself does not
-//! come to an end, that watchdog does.
+//! The part has one bank. While a sector is erased (up to 2 s) or a word is programmed (up to 0.1 ms), any fetch or
+//! read from flash stalls the processor, including its interrupts. So no request starts unless the power stage's
+//! register says that it is off. A sector is erased only with a watchdog timeout of the data sheet's longest erase
+//! time, and the watchdog is fed afterwards only if the erase took no longer. If the controller does not finish, the
+//! watchdog resets the part.
 
 #[cfg(not(target_os = "none"))]
 pub mod model;
@@ -17,12 +17,12 @@ use core::ops::Range;
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 
-/// Sectors: 4 of 16 KB, one of 64 KB, 7 of 128 KB (section 3.4).
+/// Number of sectors: 4 of 16 KB, one of 64 KB, 7 of 128 KB (section 3.4).
 pub const SECTORS: u32 = 12;
-/// Bytes of a sector from the sixth on, which slots for images consist of.
+/// Bytes of a sector from the sixth on. Image slots consist of these.
 pub const LARGE: u32 = 128 << 10;
 
-/// The addresses of a sector, from the flash's first byte on.
+/// Returns the addresses of a sector, relative to the flash's first byte.
 pub const fn sector(number: u32) -> Range<u32> {
     const SMALL: u32 = 16 << 10;
     match number {
@@ -32,8 +32,7 @@ pub const fn sector(number: u32) -> Range<u32> {
     }
 }
 
-/// Milliseconds that the erase of a sector takes at most, in words (data sheet DS8626, characteristics of the flash,
-/// x32).
+/// Returns the longest erase time of a sector in milliseconds (data sheet DS8626, flash characteristics, x32).
 pub const fn longest_erase(number: u32) -> u16 {
     match number {
         0..=3 => 500,
@@ -42,7 +41,7 @@ pub const fn longest_erase(number: u32) -> u16 {
     }
 }
 
-/// A register of the flash's controller (section 3.9).
+/// A register of the flash controller (section 3.9).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Register {
     /// FLASH_ACR: caches.
@@ -55,9 +54,9 @@ pub enum Register {
     Control,
 }
 
-/// What opens FLASH_CR, one after the other.
+/// Keys that unlock FLASH_CR, in order.
 const KEYS: [u32; 2] = [0x4567_0123, 0xcdef_89ab];
-// FLASH_SR: flags that are cleared by writing them.
+// FLASH_SR: writing a flag clears it.
 const WRPERR: u32 = 1 << 4;
 const PGAERR: u32 = 1 << 5;
 const PGPERR: u32 = 1 << 6;
@@ -77,58 +76,58 @@ const DCEN: u32 = 1 << 10;
 const ICRST: u32 = 1 << 11;
 const DCRST: u32 = 1 << 12;
 
-/// Reads of BSY until a word, or a sector, counts as not done. A turn takes 4 cycles at least: above 0.1 ms and 2 s at
-/// 168 MHz.
-const PROGRAMMED: u32 = 17_000;
-const ERASED: u32 = 84_000_000;
+/// Largest number of reads of BSY for a word, and for a sector. A read takes at least 4 cycles, so these are above 0.1
+/// ms and 2 s at 168 MHz.
+const PROGRAM_READS: u32 = 17_000;
+const ERASE_READS: u32 = 84_000_000;
 
-/// What the sequences need of the part.
+/// The part's interface for these sequences.
 pub trait Part {
-    /// A register's value.
+    /// Reads a register.
     fn read(&self, register: Register) -> u32;
 
-    /// Sets a register.
+    /// Writes a register.
     fn write(&mut self, register: Register, value: u32);
 
-    /// The memory that is written.
+    /// Returns the writable memory.
     fn memory(&self) -> &[Cell<u8>];
 
-    /// Writes a word to the memory in one access, at a multiple of 4 within it.
+    /// Writes a word to the memory in one access, at an offset that is a multiple of 4.
     fn program(&mut self, at: u32, word: u32);
 
-    /// Whether the power stage is on.
+    /// Returns `true` if the power stage is on.
     fn is_driving(&self) -> bool;
 
-    /// Whether the supply has the voltage that words need.
+    /// Returns `true` if the supply has the voltage for programming words.
     fn is_supplied(&self) -> bool;
 
-    /// Does `work` while the watchdog waits for so many milliseconds, and gives it its own time again. `None` where it
-    /// does not take that time, with nothing done. Where the work has taken longer, nothing feeds the watchdog any
-    /// more, and it resets the board.
-    fn patiently<R>(&mut self, milliseconds: u16, work: impl FnOnce(&mut Self) -> R) -> Option<R>;
+    /// Does `work` with a watchdog timeout of `milliseconds`, then restores the usual timeout. Returns `None`, with
+    /// nothing done, if the watchdog does not accept the timeout. If the work took longer, nothing feeds the watchdog
+    /// any more, and it resets the board.
+    fn with_watchdog_timeout<R>(&mut self, milliseconds: u16, work: impl FnOnce(&mut Self) -> R) -> Option<R>;
 }
 
-/// Why a request was not done, or not to its end.
+/// Reason why a request failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum FlashError {
-    /// It is not within the memory.
+    /// The request is not within the memory.
     Bounds,
-    /// It does not begin and end between two words, or two sectors.
+    /// The request does not begin and end at a word or sector boundary.
     Alignment,
-    /// What is to be programmed is not erased.
+    /// The memory to program is not erased.
     Programmed,
     /// The power stage is on.
     Driving,
     /// The supply is below the voltage that programming needs.
     Supply,
-    /// The watchdog does not take another time.
+    /// The watchdog does not accept another timeout.
     Watchdog,
-    /// The controller does not open.
+    /// The controller does not unlock.
     Locked,
-    /// The controller does not take what it is told, or is none.
+    /// The controller does not accept its settings, or does not exist.
     Settings,
-    /// The controller does not come to an end.
+    /// The controller does not finish.
     Busy,
     /// WRPERR.
     WriteProtected,
@@ -138,27 +137,27 @@ pub enum FlashError {
     Parallelism,
     /// PGSERR.
     Sequence,
-    /// The memory is not as it was erased or programmed.
+    /// The memory differs from what was erased or programmed.
     Differs,
 }
 
 impl fmt::Display for FlashError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Bounds => "not within the flash that may be written",
-            Self::Alignment => "not between two words or sectors",
-            Self::Programmed => "not erased before it is programmed",
+            Self::Bounds => "the request is not within the writable flash",
+            Self::Alignment => "the request does not begin and end at a word or sector boundary",
+            Self::Programmed => "the flash to program is not erased",
             Self::Driving => "the power stage is on; disarm first",
             Self::Supply => "the supply is below 2.9 V",
-            Self::Watchdog => "the watchdog does not take another time",
-            Self::Locked => "the flash controller does not open (LOCK); only a reset helps",
-            Self::Settings => "the flash controller does not take its settings; is there one?",
-            Self::Busy => "the flash controller does not end (BSY)",
+            Self::Watchdog => "the watchdog does not accept another timeout",
+            Self::Locked => "the flash controller does not unlock (LOCK); reset the board",
+            Self::Settings => "the flash controller does not accept its settings; check that the part has one",
+            Self::Busy => "the flash controller does not finish (BSY)",
             Self::WriteProtected => "the sector is write-protected by the option bytes (WRPERR)",
             Self::Row => "a write crosses a row of 128 bits (PGAERR)",
-            Self::Parallelism => "a write is not as wide as PSIZE says (PGPERR)",
-            Self::Sequence => "a write came without PG (PGSERR)",
-            Self::Differs => "the flash is not as it was erased or programmed",
+            Self::Parallelism => "a write's width differs from PSIZE (PGPERR)",
+            Self::Sequence => "a write without PG (PGSERR)",
+            Self::Differs => "the flash differs from what was erased or programmed",
         })
     }
 }
@@ -175,17 +174,17 @@ impl NorFlashError for FlashError {
     }
 }
 
-/// The flash from some sector of 128 KB on: [`Part::memory`], whose first byte is address 0.
+/// The flash from a 128 KB sector on: [`Part::memory`], whose first byte has address 0.
 #[derive(Clone, Debug)]
 pub struct Flash<P> {
     /// The part.
     pub part: P,
-    /// Where the memory begins, from the flash's first byte on.
+    /// Offset of the memory from the flash's first byte.
     begin: u32,
 }
 
 impl<P: Part> Flash<P> {
-    /// The memory of `part`, which begins at `begin` of the whole flash.
+    /// Uses the memory of `part`, at the offset `begin` in the flash.
     pub const fn new(part: P, begin: u32) -> Self {
         Self { part, begin }
     }
@@ -209,14 +208,14 @@ impl<P: Part> Flash<P> {
 
     fn erase_sector(&mut self, number: u32) -> Result<(), FlashError> {
         self.may_stall()?;
-        let erased = self.part.patiently(longest_erase(number), |part| {
-            let erased = opened(part, |part| {
+        let erased = self.part.with_watchdog_timeout(longest_erase(number), |part| {
+            let erased = unlocked(part, |part| {
                 let chosen = SER | number << SNB | WORDS;
                 set(part, chosen)?;
                 part.write(Register::Control, chosen | STRT);
-                ended(part, ERASED)
+                ended(part, ERASE_READS)
             });
-            // Also where it has failed: some of the sector may be erased.
+            // Also after a failure, because some of the sector may be erased.
             flush(part);
             erased
         });
@@ -227,25 +226,25 @@ impl<P: Part> Flash<P> {
     }
 }
 
-/// Opens the controller, does `work`, and closes it.
-fn opened<P: Part>(part: &mut P, work: impl FnOnce(&mut P) -> Result<(), FlashError>) -> Result<(), FlashError> {
+/// Unlocks the controller, does `work`, and locks it.
+fn unlocked<P: Part>(part: &mut P, work: impl FnOnce(&mut P) -> Result<(), FlashError>) -> Result<(), FlashError> {
     let is_locked = |part: &P| part.read(Register::Control) & LOCK != 0;
-    wait(part, PROGRAMMED)?;
-    // Keys that it does not wait for lock it until the next reset.
+    wait(part, PROGRAM_READS)?;
+    // Unexpected keys lock it until the next reset.
     if is_locked(part) {
         KEYS.into_iter().for_each(|key| part.write(Register::Key, key));
     }
     if is_locked(part) {
         return Err(FlashError::Locked);
     }
-    // What a debugger may have left.
+    // A debugger may have left flags.
     part.write(Register::Status, WRPERR | PGAERR | PGPERR | PGSERR);
     let outcome = work(part);
     part.write(Register::Control, LOCK);
     outcome
 }
 
-/// Sets FLASH_CR, and sees whether it was taken.
+/// Sets FLASH_CR and checks that the controller accepted it.
 fn set(part: &mut impl Part, control: u32) -> Result<(), FlashError> {
     part.write(Register::Control, control);
     if part.read(Register::Control) == control { Ok(()) } else { Err(FlashError::Settings) }
@@ -257,7 +256,7 @@ fn wait(part: &impl Part, turns: u32) -> Result<(), FlashError> {
     if is_idle { Ok(()) } else { Err(FlashError::Busy) }
 }
 
-/// Waits for the end of what was begun, and says how it has ended.
+/// Waits for the end of an operation and returns its outcome.
 fn ended(part: &impl Part, turns: u32) -> Result<(), FlashError> {
     wait(part, turns)?;
     match part.read(Register::Status) {
@@ -269,8 +268,8 @@ fn ended(part: &impl Part, turns: u32) -> Result<(), FlashError> {
     }
 }
 
-/// Forgets what the caches have (section 3.6.3), which must be off for it. Programming changes what they have together
-/// with the flash.
+/// Invalidates the caches (section 3.6.3), which must be off for it. Programming updates the caches together with the
+/// flash.
 fn flush(part: &mut impl Part) {
     let access = part.read(Register::Access);
     let off = access & !(ICEN | DCEN);
@@ -299,7 +298,7 @@ impl<P: Part> ReadNorFlash for Flash<P> {
 
 impl<P: Part> NorFlash for Flash<P> {
     const WRITE_SIZE: usize = 4;
-    /// Of the sectors of slots. Smaller ones are erased as they are.
+    /// Size of the slots' sectors. Smaller sectors are erased as they are.
     const ERASE_SIZE: usize = LARGE as usize;
 
     fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
@@ -316,8 +315,8 @@ impl<P: Part> NorFlash for Flash<P> {
         (first..=last).try_for_each(|number| self.erase_sector(number))
     }
 
-    /// Nothing tells from an erased word one that was programmed with ones; every other word is programmed once. (The
-    /// part itself would take ones away a second time, without an error.)
+    /// Programs each word once, except that a word of ones looks like an erased one. (The part itself would clear more
+    /// ones a second time, without an error.)
     fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
         let (words, []) = bytes.as_chunks() else { return Err(FlashError::Alignment) };
         if !offset.is_multiple_of(4) {
@@ -327,14 +326,14 @@ impl<P: Part> NorFlash for Flash<P> {
             return Err(FlashError::Programmed);
         }
         self.may_stall()?;
-        opened(&mut self.part, |part| {
+        unlocked(&mut self.part, |part| {
             set(part, PG | WORDS)?;
             (offset..).step_by(4).zip(words).try_for_each(|(at, word)| {
                 part.program(at, u32::from_le_bytes(*word));
-                ended(part, PROGRAMMED)
+                ended(part, PROGRAM_READS)
             })
         })?;
-        // What was programmed is in the data cache, too: from here on the flash itself is read.
+        // The data cache also has the programmed words; flush it, so that the flash itself is read.
         flush(&mut self.part);
         let is_written = self.cells(offset, bytes.len())?.iter().zip(bytes).all(|(cell, byte)| cell.get() == *byte);
         if is_written { Ok(()) } else { Err(FlashError::Differs) }
@@ -346,19 +345,19 @@ mod tests {
     use super::model::Model;
     use super::*;
 
-    /// All of the flash, full of `byte`.
+    /// Returns the whole flash, filled with `byte`.
     fn flash(byte: u8) -> Flash<Model> {
         let end = sector(SECTORS - 1).end;
         Flash::new(Model::new(vec![byte; end as usize], 0, 1), 0)
     }
 
-    /// After each request the controller is closed, and no cache has what was erased.
+    /// Returns `true` if the controller is locked and no cache is stale, as after each request.
     fn is_at_rest(flash: &Flash<Model>) -> bool {
         flash.part.read(Register::Control) == LOCK && !flash.part.is_stale
     }
 
     #[test]
-    fn the_sectors_are_those_of_a_megabyte() {
+    fn the_sectors_cover_a_megabyte() {
         let lengths: Vec<u32> = (0..SECTORS).map(|number| sector(number).len() as u32 >> 10).collect();
         assert_eq!(lengths, [16, 16, 16, 16, 64, 128, 128, 128, 128, 128, 128, 128]);
         for number in 1..SECTORS {
@@ -368,7 +367,7 @@ mod tests {
     }
 
     #[test]
-    fn each_sector_is_erased_alone() {
+    fn each_sector_is_erased_separately() {
         for number in 0..SECTORS {
             let mut flash = flash(0x5a);
             let Range { start, end } = sector(number);
@@ -377,7 +376,7 @@ mod tests {
             expected[start as usize..end as usize].fill(0xff);
             assert!(flash.part.bytes() == expected && is_at_rest(&flash), "{number}");
         }
-        // Several, from the begin of what is written.
+        // Several sectors, relative to the writable memory.
         let mut flash = Flash::new(Model::new(vec![0; 4 * LARGE as usize], 4 * LARGE, 1), 4 * LARGE);
         assert_eq!(flash.erase(LARGE, 3 * LARGE), Ok(()));
         let erased: Vec<bool> = flash.part.bytes().chunks(LARGE as usize).map(|part| part[0] == 0xff).collect();
@@ -393,11 +392,11 @@ mod tests {
         assert_eq!((&bytes, is_at_rest(&flash)), (b"\xffflash___\xff", true));
         let before = flash.part.done;
         assert_eq!(flash.write(12, &[0; 4]), Err(FlashError::Programmed));
-        assert_eq!(flash.part.done, before, "nothing was told");
+        assert_eq!(flash.part.done, before, "nothing was written");
     }
 
     #[test]
-    fn what_is_not_words_or_sectors_or_not_there_is_refused() {
+    fn misaligned_and_out_of_bounds_requests_are_refused() {
         use FlashError::{Alignment, Bounds};
         let mut flash = flash(0xff);
         let end = flash.capacity() as u32;
@@ -409,9 +408,9 @@ mod tests {
         assert_eq!(flash.part.done, 0);
     }
 
-    /// What a condition refuses, with nothing told to the controller.
+    /// A failed precondition refuses the request, with nothing written to the controller.
     #[test]
-    fn nothing_begins_that_would_not_be_safe() {
+    fn unsafe_requests_do_not_start() {
         let refused = |change: fn(&mut Model)| {
             let mut flash = flash(0xff);
             change(&mut flash.part);
@@ -420,13 +419,13 @@ mod tests {
         };
         assert_eq!(refused(|part| part.is_driving = true), ([Err(FlashError::Driving); 2], 0));
         assert_eq!(refused(|part| part.is_supplied = false), ([Err(FlashError::Supply); 2], 0));
-        // A word needs no other time of the watchdog.
-        let (outcomes, _) = refused(|part| part.is_lenient = false);
+        // A word needs no other timeout.
+        let (outcomes, _) = refused(|part| part.accepts_timeout = false);
         assert_eq!(outcomes, [Err(FlashError::Watchdog), Ok(())]);
     }
 
     #[test]
-    fn what_the_controller_says_is_told_by_name_and_closes_it() {
+    fn controller_errors_are_named_and_lock_it() {
         for (flags, error) in [
             (WRPERR, FlashError::WriteProtected),
             (PGAERR, FlashError::Row),
@@ -437,7 +436,7 @@ mod tests {
             flash.part.raises = flags;
             assert_eq!([flash.erase(0, LARGE), flash.write(0, &[0; 8])], [Err(error); 2]);
             assert!(is_at_rest(&flash), "{error}");
-            // The flags of one request are not those of the next one.
+            // The flags of one request do not affect the next one.
             flash.part.raises = 0;
             assert_eq!([flash.write(0, &[0; 8]), flash.erase(0, LARGE)], [Ok(()); 2], "{error}");
         }
@@ -449,11 +448,11 @@ mod tests {
     }
 
     #[test]
-    fn a_controller_that_does_not_end_open_or_exist_is_noticed() {
+    fn a_hung_locked_or_missing_controller_is_detected() {
         let mut endless = flash(0xff);
         endless.part.takes = u32::MAX;
         assert_eq!(endless.write(0, &[0; 4]), Err(FlashError::Busy));
-        // Of an erase the watchdog notices it.
+        // During an erase the watchdog detects it.
         assert_eq!((endless.erase(0, LARGE), endless.part.is_reset), (Err(FlashError::Watchdog), true));
         let mut locked = flash(0xff);
         locked.part.write(Register::Key, KEYS[1]);
@@ -461,13 +460,13 @@ mod tests {
         locked.part = locked.part.restarted();
         assert_eq!(locked.write(0, &[0; 4]), Ok(()));
         let mut none = flash(0xff);
-        none.part.is_there = false;
+        none.part.exists = false;
         assert_eq!([none.erase(0, LARGE), none.write(0, &[0; 4])], [Err(FlashError::Settings); 2]);
     }
 
-    /// The watchdog waits for what the data sheet gives a sector, and is not fed behind an erase that has taken longer.
+    /// The watchdog waits for the data sheet's erase time, and is not fed after a longer erase.
     #[test]
-    fn an_erase_that_takes_longer_than_it_may_ends_in_a_reset() {
+    fn an_overlong_erase_ends_in_a_reset() {
         for number in 0..SECTORS {
             let Range { start, end } = sector(number);
             let erased_in = |milliseconds| {
@@ -481,10 +480,10 @@ mod tests {
         }
     }
 
-    /// The model has the rules that the sequences keep: without them the part refuses, too.
+    /// The model enforces the rules of the part that the sequences follow.
     #[test]
     fn the_model_refuses_what_the_part_refuses() {
-        let told = |control: &[u32], at| {
+        let outcome_of = |control: &[u32], at| {
             let mut part = Model::new(vec![0xff; 64], 0, 1);
             if !control.is_empty() {
                 KEYS.into_iter().for_each(|key| part.write(Register::Key, key));
@@ -494,18 +493,17 @@ mod tests {
             let written = part.bytes().contains(&0);
             (part.read(Register::Status) & !BSY, written)
         };
-        assert_eq!(told(&[], 0), (PGSERR, false), "locked");
-        assert_eq!(told(&[WORDS], 0), (PGSERR, false), "without PG");
-        assert_eq!(told(&[PG | WORDS, LOCK], 0), (PGSERR, false), "locked again");
-        assert_eq!(told(&[PG], 0), (PGPERR, false), "bytes");
-        assert_eq!(told(&[PG | WORDS], 14), (PGAERR, false), "over two rows");
-        assert_eq!(told(&[PG | WORDS], 12), (0, true));
+        assert_eq!(outcome_of(&[], 0), (PGSERR, false), "locked");
+        assert_eq!(outcome_of(&[WORDS], 0), (PGSERR, false), "without PG");
+        assert_eq!(outcome_of(&[PG | WORDS, LOCK], 0), (PGSERR, false), "locked again");
+        assert_eq!(outcome_of(&[PG], 0), (PGPERR, false), "bytes");
+        assert_eq!(outcome_of(&[PG | WORDS], 14), (PGAERR, false), "over two rows");
+        assert_eq!(outcome_of(&[PG | WORDS], 12), (0, true));
     }
 
-    /// Wherever the supply fails in the course of a request, nothing outside of it has changed, and it can be done
-    /// again.
+    /// If the supply fails during a request, nothing outside it changes, and it can be repeated.
     #[test]
-    fn a_request_that_was_cut_short_can_be_done_again() {
+    fn an_interrupted_request_can_be_repeated() {
         let (slot, other) = (8 * LARGE - LARGE, 6 * LARGE);
         let mut fresh = Flash::new(Model::new(vec![0x33; 2 * LARGE as usize], other, 5), other);
         fresh.part.takes = 1;
@@ -518,7 +516,7 @@ mod tests {
         for fails_at in 0..whole.part.done {
             let mut flash = fresh.clone();
             flash.part.fails_at = Some(fails_at);
-            // Only what closes the controller, and the four writes that empty the caches, may be missing.
+            // Only the lock and the four writes that invalidate the caches may be missing.
             let outcome = request(&mut flash);
             assert_eq!(outcome.is_ok(), fails_at + 5 >= whole.part.done, "{fails_at}");
             assert!(flash.part.bytes()[..LARGE as usize].iter().all(|byte| *byte == 0x33), "{fails_at}");

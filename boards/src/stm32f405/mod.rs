@@ -1,8 +1,8 @@
-//! The STM32F405 of ODrive v3, VESC and Crazyflie: a Cortex-M4 with FPU at 168 MHz. QEMU's netduinoplus2 has this part,
-//! with its USARTs and without its clocks, PWM, watchdog, DMA and flash controller.
+//! The STM32F405 of ODrive v3, VESC and Crazyflie: a Cortex-M4 with FPU at 168 MHz. QEMU's netduinoplus2 emulates this
+//! part with its USARTs, but without its clocks, PWM, watchdog, DMA and flash controller.
 
 pub mod flash;
-pub mod patience;
+pub mod watchdog_time;
 
 #[cfg(all(target_os = "none", feature = "stm32f405"))]
 pub mod device;
@@ -20,7 +20,7 @@ pub(crate) const BOARD: Board = Board {
     small: false,
     emulator: "qemu-system-arm",
     machine: &["-M", "netduinoplus2"],
-    shows: &["golden"],
+    binaries: &["golden"],
     application: Some(Application {
         about: "Cortex-M4F: ODrive v3, VESC, Crazyflie; QEMU's netduinoplus2",
         scratch: SCRATCH,

@@ -1,4 +1,4 @@
-//! QEMU's virt with a SiFive E31, which has RV32IMAC and nothing else: what it lacks is an illegal instruction.
+//! QEMU's virt with a SiFive E31, which has only RV32IMAC: other extensions are illegal instructions.
 
 use crate::board::Board;
 
@@ -8,6 +8,6 @@ pub(crate) const BOARD: Board = Board {
     small: false,
     emulator: "qemu-system-riscv32",
     machine: &["-M", "virt", "-cpu", "sifive-e31", "-bios", "none"],
-    shows: &["golden", "portable"],
+    binaries: &["golden", "portable"],
     application: None,
 };

@@ -1,4 +1,4 @@
-//! Keys' files and signatures.
+//! Key files and signatures.
 
 use std::fs;
 
@@ -9,43 +9,43 @@ const PEM: &str = "-----BEGIN PRIVATE KEY-----\nMC4CAQAwBQYDK2VwBCIEINTuctv5E1hK
 const PUBLIC: &str = "19bf44096984cdfe8541bac167dc3b96c85086aa30b6b6cb0c5c38ad703166e1";
 
 #[test]
-fn a_key_is_the_owners_alone_and_never_replaced() {
-    let folder = tempfile::tempdir().expect("a folder");
+fn only_its_owner_reads_a_key_never_replaced() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("key.pem");
-    let key = generate().expect("there is randomness");
-    write(&path, &key).expect("there is no file yet");
+    let key = generate().expect("the system has random numbers");
+    write(&path, &key).expect("the file is new");
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt as _;
-        assert_eq!(fs::metadata(&path).expect("it is there").permissions().mode() & 0o777, 0o600);
+        assert_eq!(fs::metadata(&path).expect("the file exists").permissions().mode() & 0o777, 0o600);
     }
-    assert_eq!(read(&path).expect("it is a key").to_bytes(), key.to_bytes());
-    let other = generate().expect("there is randomness");
+    assert_eq!(read(&path).expect("the file is a key").to_bytes(), key.to_bytes());
+    let other = generate().expect("the system has random numbers");
     assert_ne!(other.to_bytes(), key.to_bytes());
     let error = write(&path, &other).expect_err("there is a key already");
     assert!(format!("{error:#}").contains("never replaced"), "{error:#}");
-    assert_eq!(read(&path).expect("it is a key").to_bytes(), key.to_bytes());
+    assert_eq!(read(&path).expect("the file is a key").to_bytes(), key.to_bytes());
 }
 
 #[test]
-fn a_key_of_another_tool_is_read_and_anything_else_is_refused() {
-    let folder = tempfile::tempdir().expect("a folder");
+fn only_keys_in_pkcs8_are_read() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("key.pem");
-    fs::write(&path, PEM).expect("the folder can be written");
-    assert_eq!(public(&read(&path).expect("it is a key")), PUBLIC);
+    fs::write(&path, PEM).expect("the folder is writable");
+    assert_eq!(public(&read(&path).expect("the file is a key")), PUBLIC);
     for text in ["", "key", PUBLIC, &PEM.replace("MC4C", "MC4D"), &PEM.replace("PRIVATE", "PUBLIC")] {
-        fs::write(&path, text).expect("the folder can be written");
-        let error = format!("{:#}", read(&path).expect_err("it is no key"));
+        fs::write(&path, text).expect("the folder is writable");
+        let error = format!("{:#}", read(&path).expect_err("the file is not a key"));
         assert!(error.contains("key.pem") && error.contains("PKCS #8"), "{error}");
     }
 }
 
 #[test]
-fn a_signature_is_that_of_its_image_version_and_key() {
-    let key = generate().expect("there is randomness");
-    let signed = sign(&key, b"image", 3).expect("it can be signed");
-    signed.check(b"image").expect("it is right");
-    let other = public(&generate().expect("there is randomness"));
+fn a_signature_binds_image_version_and_key() {
+    let key = generate().expect("the system has random numbers");
+    let signed = sign(&key, b"image", 3).expect("the image is signed");
+    signed.check(b"image").expect("the signature is valid");
+    let other = public(&generate().expect("the system has random numbers"));
     let wrong = [
         (Signed { version: 4, ..signed.clone() }, &b"image"[..]),
         (Signed { public_key: other, ..signed.clone() }, b"image"),

@@ -1,4 +1,4 @@
-//! A line that damages, loses and repeats what it carries.
+//! A line that damages, loses and repeats frames.
 
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng as _, SeedableRng as _};
@@ -16,7 +16,7 @@ impl Line {
         Self { random: Pcg64Mcg::seed_from_u64(seed), faults, frame: Vec::new() }
     }
 
-    /// What comes out for what goes in.
+    /// Returns the bytes that arrive when `bytes` are sent.
     pub(super) fn carry(&mut self, bytes: &[u8]) -> Vec<u8> {
         let mut out = Vec::new();
         for byte in bytes {

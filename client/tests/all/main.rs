@@ -1,4 +1,4 @@
-//! The host's end of the link against a simulated controller, over a socket and a bad line.
+//! The host's end of the link with a simulated controller, over a socket and a faulty line.
 
 mod keys;
 mod line;

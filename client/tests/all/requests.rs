@@ -1,4 +1,4 @@
-//! Requests over a good and a bad line.
+//! Requests over a good and a faulty line.
 
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -16,16 +16,16 @@ use crate::simulated::{OBSERVATION, Simulated};
 pub(super) fn observe_until_fresh(client: &mut Client) {
     for _ in 0..1000 {
         for _ in 0..5 {
-            client.observe(&[0.4; OBSERVATION]).expect("it fits");
+            client.observe(&[0.4; OBSERVATION]).expect("the observation fits");
         }
-        if client.status().expect("it answers").refusal.is_none() {
+        if client.status().expect("the controller answers").refusal.is_none() {
             return;
         }
     }
     panic!("no observation gets through");
 }
 
-/// Arms, over a line that may lose so much that the observations grow old meanwhile.
+/// Arms over a line that may lose so many frames that the observations become too old.
 pub(super) fn arm(client: &mut Client) {
     for _ in 0..1000 {
         observe_until_fresh(client);
@@ -37,30 +37,30 @@ pub(super) fn arm(client: &mut Client) {
 }
 
 #[test]
-fn every_request_is_answered_however_bad_the_line_is() {
+fn a_faulty_line_loses_no_request() {
     for faults in [0, 100, 300] {
         let controller = Simulated::start(faults, || Anyone);
         let mut client = controller.client();
-        let status = client.status().expect("it answers");
+        let status = client.status().expect("the controller answers");
         assert_eq!((status.state, status.slot, status.axes), (State::Disarmed, BUILT_IN, 2));
         assert_eq!((usize::from(status.observation), status.image), (OBSERVATION, 0x1234));
-        assert_eq!(client.timing().expect("it answers").period, 1_000_000);
-        let breadcrumb = client.breadcrumb().expect("it answers");
+        assert_eq!(client.timing().expect("the controller answers").period, 1_000_000);
+        let breadcrumb = client.breadcrumb().expect("the controller answers");
         assert_eq!((breadcrumb.reset, breadcrumb.crash), (ResetCause::Watchdog, None));
-        client.set(Parameter::High, 1, 0.5).expect("it is stricter");
-        assert_eq!(client.get(Parameter::High, 1).expect("there is one"), 0.5);
+        client.set(Parameter::High, 1, 0.5).expect("the limit is stricter");
+        assert_eq!(client.get(Parameter::High, 1).expect("the parameter exists"), 0.5);
         let error = client.set(Parameter::High, 1, 1.5).expect_err("it is wider");
         assert!(format!("{error:#}").contains(&Refusal::Range.to_string()), "{error:#}");
         let error = client.get(Parameter::High, 2).expect_err("there are two axes");
         assert!(format!("{error:#}").contains(&Refusal::Parameter.to_string()), "{error:#}");
         arm(&mut client);
-        client.disarm().expect("never refused");
-        assert_eq!(client.status().expect("it answers").state, State::Disarmed);
+        client.disarm().expect("a disarm is never refused");
+        assert_eq!(client.status().expect("the controller answers").state, State::Disarmed);
     }
 }
 
 #[test]
-fn arming_without_observations_is_refused_with_the_reason() {
+fn arming_without_observations_is_refused() {
     let controller = Simulated::start(0, || Anyone);
     let mut client = controller.client();
     let error = client.arm().expect_err("there are no observations");
@@ -68,26 +68,26 @@ fn arming_without_observations_is_refused_with_the_reason() {
 }
 
 #[test]
-fn a_cut_cable_is_safe_and_the_connection_comes_back() {
+fn a_broken_cable_is_safe_and_reconnects() {
     let controller = Simulated::start(0, || Anyone);
     let mut client = controller.client();
     arm(&mut client);
     controller.control.cut.store(true, Ordering::Relaxed);
-    // The host goes on; the deadline passes, and the ramp ends at 0.
+    // The host continues; the deadline passes, and the ramp ends at 0.
     controller.control.miss_the_deadline(|| {
-        client.observe(&[1.0; OBSERVATION]).expect("it fits");
-        client.events().expect("it tries again");
+        client.observe(&[1.0; OBSERVATION]).expect("the observation fits");
+        client.events().expect("the client reopens the port");
     });
     assert!(controller.outputs().iter().all(|o| matches!(o, Output::Coast | Output::Drive(0.0))));
     controller.control.cut.store(false, Ordering::Relaxed);
-    let status = client.status().expect("it answers again");
+    let status = client.status().expect("the controller answers again");
     assert_eq!((status.state, status.fault), (State::Latched, Some(Fault::Stale)));
     assert!(client.connection().reopened() >= 1);
     arm(&mut client);
 }
 
 #[test]
-fn a_controller_that_was_reset_is_heard_again_and_says_why() {
+fn a_reset_controller_reports_its_reset() {
     let controller = Simulated::start(0, || Anyone);
     let mut client = controller.client();
     arm(&mut client);
@@ -95,20 +95,20 @@ fn a_controller_that_was_reset_is_heard_again_and_says_why() {
     while controller.control.starts.load(Ordering::Relaxed) < 2 {
         std::thread::sleep(Duration::from_millis(1));
     }
-    assert_eq!(client.status().expect("it answers").state, State::Disarmed);
-    let breadcrumb = client.breadcrumb().expect("it answers");
+    assert_eq!(client.status().expect("the controller answers").state, State::Disarmed);
+    let breadcrumb = client.breadcrumb().expect("the controller answers");
     assert_eq!((breadcrumb.crash, breadcrumb.pc, breadcrumb.count), (Some(Crash::Panic), 0x0800_0100, 1));
 }
 
 #[test]
-fn a_port_that_is_not_there_is_named() {
-    let address: Address = "tcp:127.0.0.1:1".parse().expect("it is an address");
-    let error = actq_client::connection::Connection::open(address, Duration::ZERO).err().expect("nobody listens");
+fn a_missing_port_is_named() {
+    let address: Address = "tcp:127.0.0.1:1".parse().expect("a valid address");
+    let error = actq_client::connection::Connection::open(address, Duration::ZERO).err().expect("no program listens");
     assert!(format!("{error:#}").contains("tcp:127.0.0.1:1"), "{error:#}");
 }
 
 #[test]
-fn addresses_are_read_as_they_are_shown() {
+fn addresses_parse_as_displayed() {
     for text in ["/dev/ttyUSB0@115200", "COM3@921600", "tcp:localhost:4000", "tcp:[::1]:4000", "unix:/tmp/uart"] {
         assert_eq!(text.parse::<Address>().expect(text).to_string(), text);
     }
@@ -116,5 +116,5 @@ fn addresses_are_read_as_they_are_shown() {
     for text in ["", "tcp:", "tcp:host", "tcp::4000", "tcp:host:70000", "unix:", "COM3@fast", "COM3@0"] {
         assert!(text.parse::<Address>().is_err(), "{text}");
     }
-    actq_client::port::list().expect("a machine may have no serial port, but tells");
+    actq_client::port::list().expect("the system lists its serial ports");
 }

@@ -18,7 +18,7 @@ fn actions(bytes: &[u8]) -> Vec<f32> {
 }
 
 #[test]
-fn steps_are_answered_by_the_heads_actions_armed_or_not() {
+fn steps_are_answered_with_the_heads_actions() {
     for (arm, faults) in [(false, 0), (true, 0), (false, 100)] {
         let controller = Simulated::start(faults, || Anyone);
         let mut input = Vec::new();
@@ -29,12 +29,12 @@ fn steps_are_answered_by_the_heads_actions_armed_or_not() {
             }
         }
         let mut output = Vec::new();
-        serve(&mut controller.client(), arm, &input[..], &mut output).expect("it answers");
+        serve(&mut controller.client(), arm, &input[..], &mut output).expect("the controller answers");
         let expected: Vec<f32> =
             (0..3u8).flat_map(|e| (0..20u8).flat_map(move |i| [f32::from(e) / 16.0, f32::from(i) / 64.0])).collect();
         assert_eq!(actions(&output), expected, "armed {arm}, {faults} faults in 1000");
         let coasts = || controller.outputs().iter().all(|output| *output == Output::Coast);
-        // It disarms at the end, and the next tick shows it.
+        // It disarms at the end; the next tick lets the outputs coast.
         while !coasts() {
             std::thread::yield_now();
         }
@@ -42,11 +42,11 @@ fn steps_are_answered_by_the_heads_actions_armed_or_not() {
 }
 
 #[test]
-fn what_the_controller_refuses_has_no_action_and_a_broken_protocol_is_told() {
+fn refused_observations_and_protocol_errors_are_reported() {
     let controller = Simulated::start(0, || Anyone);
     let input = [step([f32::NAN, 0.0, 0.0, 0.0]), step([1.0; 4])].concat();
     let mut output = Vec::new();
-    serve(&mut controller.client(), false, &input[..], &mut output).expect("it answers");
+    serve(&mut controller.client(), false, &input[..], &mut output).expect("the controller answers");
     let bits: Vec<u32> = actions(&output).into_iter().map(f32::to_bits).collect();
     assert_eq!(bits, [NO_ACTION.to_bits(), NO_ACTION.to_bits(), 0.5f32.to_bits(), 0.5f32.to_bits()]);
     let error = serve(&mut controller.client(), false, &b"x"[..], Vec::new()).expect_err("no such command");
@@ -56,10 +56,10 @@ fn what_the_controller_refuses_has_no_action_and_a_broken_protocol_is_told() {
 }
 
 #[test]
-fn a_controller_that_stops_ends_the_serving_with_its_reason() {
+fn a_stopped_controller_ends_serving_with_its_reason() {
     let controller = Simulated::start(0, || Anyone);
     let control = controller.control.clone();
-    /// Requests that pause after some steps, as long as it takes the deadline to pass.
+    /// Requests that pause after some steps until the deadline has passed.
     struct Pausing<'c>(Vec<u8>, usize, &'c Control);
     impl std::io::Read for Pausing<'_> {
         fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
@@ -75,6 +75,6 @@ fn a_controller_that_stops_ends_the_serving_with_its_reason() {
     }
     let input = Pausing((0..100).flat_map(|_| step([0.5; 4])).collect(), 0, &control);
     let error = serve(&mut controller.client(), true, input, Vec::new()).expect_err("it has latched");
-    assert!(error.to_string().contains("no good observation came within the deadline"), "{error:#}");
+    assert!(error.to_string().contains("no valid observation arrived within the deadline"), "{error:#}");
     assert_eq!(control.starts.load(Ordering::Relaxed), 1);
 }

@@ -1,5 +1,5 @@
-//! A controller in a thread, at the other end of a TCP socket: the decisions are those of the firmware's crate. Its time
-//! is counted in turns of its loop, each of which waits a millisecond for bytes.
+//! A controller in a thread at the other end of a TCP socket. It uses the firmware's controller crate. Its clock counts
+//! turns of its loop, each of which waits a millisecond for bytes.
 
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};
@@ -26,28 +26,28 @@ use crate::line::Line;
 pub(super) const OBSERVATION: usize = 4;
 /// Ticks of 1 ms.
 pub(super) const DEADLINE: u32 = 100;
-/// Ticks after the last byte at which time stops, unless a test lets it go on: a machine that holds the host up may not
-/// let a deadline pass.
+/// Ticks after the last byte at which its clock stops, unless a test lets it run: a delayed host must not miss a
+/// deadline.
 const QUIET: u32 = DEADLINE / 4;
-/// Time without an answer after which something is broken; no result depends on it.
+/// Time without an answer after which a test fails; no result depends on it.
 const HANG: Duration = Duration::from_secs(600);
 const SECTOR: usize = 4096;
-/// What an image begins with that passes its test.
+/// First bytes of an image that passes its self-test.
 pub(super) const GOOD: &[u8] = b"good";
 
 type End = Endpoint<'static, OBSERVATION, { frame::bytes(512) }>;
 
-/// What a test does to the controller, and sees of it.
+/// A test's control and view of the controller.
 #[derive(Default)]
 pub(super) struct Control {
     stop: AtomicBool,
-    /// Ends the connection, and takes no other one while it is set.
+    /// Ends the connection and accepts no other one while set.
     pub(super) cut: AtomicBool,
-    /// Starts the controller anew.
+    /// Restarts the controller.
     pub(super) reset: AtomicBool,
-    /// Holds the control tick up.
+    /// Holds the control tick.
     pub(super) hold: AtomicBool,
-    /// Lets time go on though no bytes come.
+    /// Lets the clock run although no bytes arrive.
     pub(super) silence: AtomicBool,
     /// Ticks of all starts.
     ticks: AtomicU32,
@@ -55,12 +55,12 @@ pub(super) struct Control {
     pub(super) starts: AtomicU32,
     /// Outputs of the last tick.
     pub(super) outputs: Mutex<Vec<Output>>,
-    /// The image that runs.
+    /// The running image.
     pub(super) image: Mutex<Vec<u8>>,
 }
 
 impl Control {
-    /// Lets the deadline pass without an observation, and the ramp that follows it end. `meanwhile` is called until
+    /// Waits until the deadline passed without an observation and the following ramp ended. Calls `meanwhile` until
     /// then.
     pub(super) fn miss_the_deadline(&self, mut meanwhile: impl FnMut()) {
         let ticks = || self.ticks.load(Ordering::Relaxed);
@@ -81,22 +81,22 @@ pub(super) struct Simulated {
 }
 
 impl Simulated {
-    /// One whose line has so many faults in a thousand frames, each way.
+    /// Starts a controller whose line has `faults` in a thousand frames, each way.
     pub(super) fn start<A>(faults: u64, authority: impl Fn() -> A + Send + 'static) -> Self
     where
         A: Authority,
     {
-        let axis = Axis::new(-1.0, 1.0, 0.05, 0.0, SafeAction::Ramp { step: 0.01 }).expect("the axis fits");
+        let axis = Axis::new(-1.0, 1.0, 0.05, 0.0, SafeAction::Ramp { step: 0.01 }).expect("the axis is valid");
         Self::start_with([axis; 2], faults, authority)
     }
 
-    /// As [`Self::start`], with other axes.
+    /// Starts a controller as [`Self::start`] does, with other axes.
     pub(super) fn start_with<A>(axes: [Axis; 2], faults: u64, authority: impl Fn() -> A + Send + 'static) -> Self
     where
         A: Authority,
     {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
-        let address = Address::Tcp(listener.local_addr().expect("it is bound").to_string());
+        let address = Address::Tcp(listener.local_addr().expect("the socket is bound").to_string());
         let control = Arc::new(Control::default());
         let shared = control.clone();
         let thread = std::thread::spawn(move || {
@@ -111,7 +111,7 @@ impl Simulated {
     }
 
     pub(super) fn client(&self) -> Client {
-        let connection = Connection::open(self.address.clone(), HANG).expect("it listens");
+        let connection = Connection::open(self.address.clone(), HANG).expect("the controller listens");
         Client::new(connection, HANG)
     }
 
@@ -140,7 +140,7 @@ fn test(image: &[u8]) -> Result<(), Refusal> {
     if image.starts_with(GOOD) { Ok(()) } else { Err(Refusal::SelfTest) }
 }
 
-/// What the firmware does, from a start to a reset.
+/// Does the firmware's work from a start to a reset.
 fn run<A: Authority>(
     control: &Control,
     listener: &TcpListener,
@@ -150,9 +150,9 @@ fn run<A: Authority>(
     faults: u64,
     starts: u32,
 ) {
-    listener.set_nonblocking(true).expect("it is a socket");
+    listener.set_nonblocking(true).expect("the socket has options");
     let flash = Ram::<4, SECTOR>::new(flash);
-    let layout = Layout::new(&flash, 0..8192, 8192..16384).expect("the slots fit");
+    let layout = Layout::new(&flash, 0..8192, 8192..16384).expect("the slots are valid");
     let mut slots = Slots::new(flash, layout, authority);
     let running = slots.select(|| ()).filter(|candidate| !candidate.trial).map(|candidate| candidate.slot);
     let mut updater = Updater::new(slots, running);
@@ -163,7 +163,7 @@ fn run<A: Authority>(
     let breadcrumb = Record::report(ResetCause::Watchdog, (starts > 0).then_some(crash));
     let facts =
         Facts { image: 0x1234, slot: BUILT_IN, timing: Timing { period: 1_000_000, ..Timing::default() }, breadcrumb };
-    let guard = Guard::new(OBSERVATION, &[], 1_000_000).expect("there is room");
+    let guard = Guard::new(OBSERVATION, &[], 1_000_000).expect("the guard has room");
     let mut endpoint = End::new(guard, facts, Settings { status_period: 20, flash_while_armed: false });
 
     let (mut inward, mut outward) = (Line::new(1, faults), Line::new(2, faults));
@@ -174,9 +174,9 @@ fn run<A: Authority>(
         } else if stream.is_none()
             && let Ok((accepted, _)) = listener.accept()
         {
-            accepted.set_nonblocking(false).expect("it is a socket");
-            accepted.set_read_timeout(Some(Duration::from_millis(1))).expect("it is a socket");
-            accepted.set_nodelay(true).expect("it is a socket");
+            accepted.set_nonblocking(false).expect("the socket has options");
+            accepted.set_read_timeout(Some(Duration::from_millis(1))).expect("the socket has options");
+            accepted.set_nodelay(true).expect("the socket has options");
             stream = Some(accepted);
         }
         let micros = 1000 * ticks;
@@ -200,11 +200,11 @@ fn run<A: Authority>(
         };
         for byte in inward.carry(&bytes[..count]) {
             sent.extend(endpoint.receive(byte, micros, &mut safety, &mut updater, &mut out).unwrap_or_default());
-            // The head: half of the first two values. However many frames have come, it takes each observation.
+            // The head: half of the first two values. It takes each observation, however many frames have arrived.
             if let Some(step) = endpoint.step(&mut safety) {
                 let (of, action) = (step.of, [0.5 * step.observation[0], 0.5 * step.observation[1]]);
-                let told = endpoint.acted(of, Ok::<_, ()>(&action[..]), micros, &mut safety, &mut out);
-                sent.extend(told.unwrap_or_default());
+                let sent_frame = endpoint.acted(of, Ok::<_, ()>(&action[..]), micros, &mut safety, &mut out);
+                sent.extend(sent_frame.unwrap_or_default());
             }
         }
         quiet = if count > 0 { 0 } else { quiet + 1 };
@@ -217,7 +217,7 @@ fn run<A: Authority>(
         }
         if let Work::Test(candidate) = updater.work() {
             let mut image = vec![0; candidate.length as usize];
-            updater.slots().flash().read(candidate.address, &mut image).expect("it is in the flash");
+            updater.slots().flash().read(candidate.address, &mut image).expect("the image is within the flash");
             if updater.tested(test(&image)) {
                 endpoint.facts.slot = candidate.slot as u8;
                 *control.image.lock().unwrap_or_else(PoisonError::into_inner) = image;

@@ -1,4 +1,4 @@
-//! Observations at their rate, and the log of what came back.
+//! Observations at their rate, and the log of the actions.
 
 use std::io::Cursor;
 use std::sync::atomic::Ordering;
@@ -21,7 +21,7 @@ fn observations(count: usize) -> impl Iterator<Item = Vec<f32>> {
 }
 
 #[test]
-fn a_recording_moves_the_outputs_and_is_logged_with_its_actions() {
+fn a_streamed_recording_is_logged_with_its_actions() {
     let controller = Simulated::start(50, || Anyone);
     let (mut client, mut log, mut armed) = (controller.client(), Log::default(), 0);
     let mut moved = false;
@@ -29,10 +29,11 @@ fn a_recording_moves_the_outputs_and_is_logged_with_its_actions() {
         armed += u32::from(status.state == State::Armed);
         moved |= controller.outputs() == [Output::Drive(0.25), Output::Drive(-0.125)];
     };
-    stream(&mut client, observations(100), &PACE, &mut log, seen).expect("one in twenty frames lost stops nothing");
+    stream(&mut client, observations(100), &PACE, &mut log, seen).expect("losing one in twenty frames stops nothing");
     assert!(armed > 0 && moved);
-    assert_eq!(client.status().expect("it answers").state, State::Disarmed);
-    let mut npz = NpzReader::new(Cursor::new(log.npz().expect("lengths agree"))).expect("it is a zip");
+    assert_eq!(client.status().expect("the controller answers").state, State::Disarmed);
+    let mut npz =
+        NpzReader::new(Cursor::new(log.npz().expect("the actions have one length"))).expect("the log is a zip file");
     let sent: Array2<f32> = npz.by_name("obs").expect("an array");
     let actions: Array2<f32> = npz.by_name("action").expect("an array");
     let applied: Array1<u8> = npz.by_name("applied").expect("an array");
@@ -49,11 +50,11 @@ fn a_recording_moves_the_outputs_and_is_logged_with_its_actions() {
         assert_eq!([actions[[*row, 0]], actions[[*row, 1]]], [0.25, -0.125]);
         assert!(times[1][*row] >= times[0][*row]);
     }
-    assert!(applied.sum() > 60 && applied.slice(ndarray::s![..5]).sum() == 0, "armed behind the first five");
+    assert!(applied.sum() > 60 && applied.slice(ndarray::s![..5]).sum() == 0, "armed after the first five");
 }
 
 #[test]
-fn a_controller_that_stops_ends_the_stream_with_its_reason_and_the_log_stays() {
+fn a_stopped_controller_ends_the_stream_with_its_reason() {
     let controller = Simulated::start(0, || Anyone);
     let (mut client, mut log) = (controller.client(), Log::default());
     let cut = observations(400).enumerate().map(|(i, values)| {
@@ -65,6 +66,6 @@ fn a_controller_that_stops_ends_the_stream_with_its_reason_and_the_log_stays() {
         values
     });
     let error = stream(&mut client, cut, &PACE, &mut log, |_| ()).expect_err("it has latched");
-    assert!(error.to_string().contains("no good observation came within the deadline"), "{error:#}");
+    assert!(error.to_string().contains("no valid observation arrived within the deadline"), "{error:#}");
     assert!(log.observations() >= 30 && log.latencies().len() >= 25);
 }

@@ -1,21 +1,21 @@
-//! The rotor's angle and speed, observed by a sensor of sine and cosine.
+//! The rotor's angle and speed, from a sine-cosine sensor.
 
 use core::f32::consts::{PI, TAU};
 
 use super::functions::atan2;
 
-/// The shortest and the longest vector of the signals, squared, where 1 is what the sensor should give: beyond it a wire
-/// is broken or the magnet is lost.
+/// Squared lengths of the shortest and the longest vector of the signals; the nominal length is 1. Outside this range a
+/// wire is broken or the magnet is lost.
 const LENGTHS: [f32; 2] = [0.25, 2.25];
 
-/// Follows a sensor whose two signals are sine and cosine of the electrical angle: linear Hall sensors at the rotor's
-/// magnet, or a resolver with as many pole pairs as the motor.
+/// Observer for a sensor whose two signals are the sine and cosine of the electrical angle: linear Hall sensors at the
+/// rotor's magnet, or a resolver with the motor's number of pole pairs.
 ///
-/// A critically damped alpha-beta filter, which has no error at constant speed (Brookner, Tracking and Kalman Filtering
-/// Made Easy, 1998, section 1.2.6). It gives the angle for the time when the duty cycles will act.
+/// It is a critically damped alpha-beta filter, which has no error at constant speed (Brookner, Tracking and Kalman
+/// Filtering Made Easy, 1998, section 1.2.6). It predicts the angle at which the duty cycles act.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observer {
-    /// Shares of a tick's error by which the angle and the speed are corrected.
+    /// Shares of a tick's error that correct the angle and the speed.
     gains: [f32; 2],
     rotor: Option<Motion>,
 }
@@ -28,18 +28,18 @@ struct Motion {
 }
 
 impl Observer {
-    /// An observer that has seen nothing, for a bandwidth in rad/s and a tick in seconds.
+    /// Creates an observer without a measurement, for a bandwidth in rad/s and a tick in seconds.
     pub fn new(bandwidth: f32, tick: f32) -> Self {
-        // The pole of a first-order filter of this bandwidth, by its backward difference.
+        // The pole of a first-order filter of this bandwidth, by backward difference.
         let pole = 1.0 / (1.0 + bandwidth * tick);
         Self { gains: [1.0 - pole * pole, (1.0 - pole) * (1.0 - pole)], rotor: None }
     }
 
-    /// Takes the signals of a tick, of which 1 is the amplitude that the sensor should have. Returns the angle `ahead`
-    /// ticks later, in radians from -pi to pi.
+    /// Takes the signals of a tick, with a nominal amplitude of 1. Returns the angle `ahead` ticks later, in radians
+    /// from -pi to pi.
     ///
-    /// `None` if the signals cannot be those of a turning magnet. The firmware has to switch off; the next signals that
-    /// are good are taken as the first ones.
+    /// Returns `None` if the signals cannot be those of a turning magnet. The firmware must then switch the outputs
+    /// off. The observer restarts with the next valid signals.
     pub fn step(&mut self, sin: f32, cos: f32, ahead: f32) -> Option<f32> {
         let [shortest, longest] = LENGTHS;
         self.rotor = if (shortest..=longest).contains(&(sin * sin + cos * cos)) {
@@ -59,7 +59,7 @@ impl Observer {
     }
 }
 
-/// The same angle between -pi and pi, of one that is at most a turn beyond.
+/// Wraps an angle, at most a turn outside -pi to pi, into this range.
 fn wrapped(angle: f32) -> f32 {
     if angle.abs() > PI { angle - TAU.copysign(angle) } else { angle }
 }

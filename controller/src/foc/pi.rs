@@ -1,7 +1,7 @@
 //! A PI controller with a limited output.
 
-/// Proportional and integral control. What the limit takes away is not integrated: the integral is set to what would
-/// just reach it (anti-windup by tracking; Åström and Hägglund, PID controllers, 1995, section 3.5, with the shortest
+/// Proportional and integral control with anti-windup by tracking: while the output is limited, the integral is set to
+/// the value that just reaches the limit (Åström and Hägglund, PID controllers, 1995, section 3.5, with the shortest
 /// tracking time).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pi {
@@ -9,18 +9,18 @@ pub struct Pi {
 }
 
 impl Pi {
-    /// From nothing.
+    /// Creates a controller with a zero integral.
     pub const fn new() -> Self {
         Self { integral: 0.0 }
     }
 
-    /// The output for an error, within `-limit..=limit`, where `proportional` is the gain and `integral` the gain by
-    /// the time of a tick.
+    /// Returns the output for an error, within `-limit..=limit`. `proportional` is the gain; `integral` is the integral
+    /// gain times the tick.
     pub fn step(&mut self, error: f32, proportional: f32, integral: f32, limit: f32) -> f32 {
         let direct = proportional * error;
         let integral = self.integral + integral * error;
         let output = (direct + integral).max(-limit).min(limit);
-        // Where nothing is limited, the sum less the direct part would not be the integral to the last bit.
+        // Without a limit, the output minus the direct part would differ from the integral in the last bit.
         self.integral = if output == direct + integral { integral } else { (output - direct).max(-limit).min(limit) };
         output
     }

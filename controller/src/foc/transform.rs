@@ -1,4 +1,4 @@
-//! Between three phases, two axes that stand, and two that turn with the rotor.
+//! Transforms between three phases, the stator's two axes, and the rotor's two axes.
 
 use super::functions::sin_cos;
 
@@ -10,18 +10,18 @@ const HALF_SQRT_3: f32 = 0.866_025_4;
 /// A vector in the stator's axes: alpha along phase a, beta a quarter turn ahead.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Stator {
-    /// Along phase a.
+    /// Component along phase a.
     pub alpha: f32,
-    /// A quarter turn ahead.
+    /// Component a quarter turn ahead.
     pub beta: f32,
 }
 
 /// A vector in the rotor's axes: d along its flux, q a quarter turn ahead.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Rotor {
-    /// Along the flux.
+    /// Component along the flux.
     pub d: f32,
-    /// A quarter turn ahead: what makes torque.
+    /// Component a quarter turn ahead, which produces torque.
     pub q: f32,
 }
 
@@ -35,7 +35,7 @@ pub struct Angle {
 }
 
 impl Angle {
-    /// An angle in radians, with the error of [`sin_cos`].
+    /// Computes an angle from radians, with the error of [`sin_cos`].
     pub fn new(radians: f32) -> Self {
         let (sin, cos) = sin_cos(radians);
         Self { sin, cos }
@@ -43,25 +43,25 @@ impl Angle {
 }
 
 impl Stator {
-    /// Clarke transform of three phases, of which only the part without a common mode counts.
+    /// Computes the Clarke transform of three phases. It removes their common mode.
     pub fn of_phases([a, b, c]: [f32; 3]) -> Self {
         Self { alpha: (a + a - b - c) / 3.0, beta: (b - c) * INV_SQRT_3 }
     }
 
-    /// The three phases, whose sum is 0.
+    /// Returns the three phases, whose sum is 0.
     pub fn phases(self) -> [f32; 3] {
         let (half, beta) = (-0.5 * self.alpha, HALF_SQRT_3 * self.beta);
         [self.alpha, half + beta, half - beta]
     }
 
-    /// Park transform.
+    /// Computes the Park transform.
     pub fn to_rotor(self, Angle { sin, cos }: Angle) -> Rotor {
         Rotor { d: self.alpha * cos + self.beta * sin, q: self.beta * cos - self.alpha * sin }
     }
 }
 
 impl Rotor {
-    /// Inverse Park transform.
+    /// Computes the inverse Park transform.
     pub fn to_stator(self, Angle { sin, cos }: Angle) -> Stator {
         Stator { alpha: self.d * cos - self.q * sin, beta: self.d * sin + self.q * cos }
     }

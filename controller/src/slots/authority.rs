@@ -1,21 +1,21 @@
-//! Whose images run.
+//! Authority over the images that may run.
 
-/// Decides by an image's signature. [`Anyone`] asks for none, `Key` (feature `signature`) for that of one key.
+/// Decides by an image's signature. [`Anyone`] requires none, `Key` (feature `signature`) that of one key.
 pub trait Authority {
-    /// Sums up an image's bytes.
+    /// Hash of an image's bytes.
     type Hash;
 
-    /// A sum of nothing.
+    /// Starts a hash.
     fn hash(&self) -> Self::Hash;
 
-    /// Adds bytes.
+    /// Adds bytes to a hash.
     fn add(hash: &mut Self::Hash, bytes: &[u8]);
 
-    /// Whether an image of this sum and version may run with this signature.
+    /// Returns `true` if an image with this hash, version and signature may run.
     fn accepts(&self, hash: Self::Hash, version: u32, signature: Option<&[u8; 64]>) -> bool;
 }
 
-/// Every image runs that is whole.
+/// Authority that accepts every complete image.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Anyone;
 

@@ -1,4 +1,4 @@
-//! Images of one key.
+//! Images signed with one key.
 
 use core::fmt;
 
@@ -6,10 +6,10 @@ use salty::{PublicKey, Sha512, Signature};
 
 use super::authority::Authority;
 
-/// Images run that the owner of a key has signed: Ed25519ph (RFC 8032) with [`context`].
+/// Authority that accepts images signed with one key: Ed25519ph (RFC 8032) with [`context`].
 pub struct Key(PublicKey);
 
-/// The bytes are no point of the curve.
+/// The bytes are not a point of the curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BadKey;
 
@@ -22,17 +22,17 @@ impl fmt::Display for BadKey {
 impl core::error::Error for BadKey {}
 
 impl Key {
-    /// The key of these bytes, as `actq keygen` prints them.
+    /// Reads a key from these bytes, as `actq keygen` prints them.
     ///
     /// # Errors
     ///
-    /// Where they are none.
+    /// Fails if they are not a key.
     pub fn new(bytes: &[u8; 32]) -> Result<Self, BadKey> {
         PublicKey::try_from(bytes).map(Self).map_err(|_| BadKey)
     }
 
-    /// The bytes of 64 hexadecimal digits; `None` where the text is something else. For constants, so that a build with
-    /// another text fails.
+    /// Parses 64 hexadecimal digits; `None` for any other text. It is `const`, so that a build with an invalid key
+    /// fails.
     pub const fn parse(text: &str) -> Option<[u8; 32]> {
         let (pairs, rest) = text.as_bytes().as_chunks();
         if pairs.len() != 32 || !rest.is_empty() {
@@ -51,7 +51,7 @@ impl Key {
     }
 }
 
-/// What is signed besides the image: that it is one, and its version.
+/// Returns the signature's context: a constant text and the image's version.
 pub fn context(version: u32) -> [u8; 14] {
     let mut context = *b"actq image    ";
     if let Some(place) = context.last_chunk_mut() {

@@ -1,4 +1,4 @@
-//! Where the slots are.
+//! Addresses of the slots.
 
 use core::fmt;
 use core::ops::Range;
@@ -8,24 +8,24 @@ use embedded_storage::nor_flash::NorFlash;
 /// Bytes of a slot before the image: record and marks.
 pub const HEADER: u32 = 256;
 
-/// The largest unit in which flash may be written.
-pub(crate) const MOST_WRITE: usize = 32;
+/// Largest unit of writing, in bytes.
+pub(crate) const MAX_WRITE: usize = 32;
 
 /// One of two slots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Slot {
-    /// The first.
+    /// The first slot.
     A = 0,
-    /// The second.
+    /// The second slot.
     B = 1,
 }
 
 impl Slot {
-    /// Both.
+    /// Both slots.
     pub const BOTH: [Self; 2] = [Self::A, Self::B];
 
-    /// The other one.
+    /// Returns the other slot.
     pub const fn other(self) -> Self {
         match self {
             Self::A => Self::B,
@@ -41,12 +41,12 @@ pub struct Layout {
     b: Range<u32>,
 }
 
-/// Why slots cannot be there.
+/// Reason why slots cannot be at these addresses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LayoutError {
-    /// The flash is not read in units of 1, 2 or 4 bytes or not written in units of 1, 2, 4, 8, 16 or 32.
+    /// The flash's read unit is not 1, 2 or 4 bytes, or its write unit not 1, 2, 4, 8, 16 or 32 bytes.
     Granularity,
-    /// A slot does not begin and end between two sectors.
+    /// A slot does not begin and end at a sector boundary.
     Sector,
     /// A slot has no room for an image, or is not within the flash.
     Size,
@@ -57,8 +57,10 @@ pub enum LayoutError {
 impl fmt::Display for LayoutError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Granularity => "flash must be read in at most 4 and written in at most 32 bytes, by powers of two",
-            Self::Sector => "a slot must begin and end between two sectors",
+            Self::Granularity => {
+                "the flash's read unit must be 1, 2 or 4 bytes and its write unit a power of two up to 32 bytes"
+            }
+            Self::Sector => "a slot must begin and end at a sector boundary",
             Self::Size => "a slot has no room for an image, or is not within the flash",
             Self::Overlap => "the slots overlap",
         })
@@ -68,14 +70,14 @@ impl fmt::Display for LayoutError {
 impl core::error::Error for LayoutError {}
 
 impl Layout {
-    /// Slots at these addresses of `flash`.
+    /// Creates slots at these addresses of `flash`.
     ///
     /// # Errors
     ///
-    /// Where they cannot be there; see [`LayoutError`].
+    /// Fails if slots cannot be at these addresses; see [`LayoutError`].
     pub fn new<F: NorFlash>(flash: &F, a: Range<u32>, b: Range<u32>) -> Result<Self, LayoutError> {
         let unit = |size: usize, most: usize| size.is_power_of_two() && size <= most;
-        if !unit(F::READ_SIZE, 4) || !unit(F::WRITE_SIZE, MOST_WRITE) {
+        if !unit(F::READ_SIZE, 4) || !unit(F::WRITE_SIZE, MAX_WRITE) {
             return Err(LayoutError::Granularity);
         }
         let sector = u32::try_from(F::ERASE_SIZE).map_err(|_| LayoutError::Granularity)?;
@@ -95,7 +97,7 @@ impl Layout {
         Ok(Self { a, b })
     }
 
-    /// A slot's addresses.
+    /// Returns a slot's addresses.
     pub const fn range(&self, slot: Slot) -> &Range<u32> {
         match slot {
             Slot::A => &self.a,
@@ -103,12 +105,12 @@ impl Layout {
         }
     }
 
-    /// Where a slot's image begins.
+    /// Returns the address of a slot's image.
     pub const fn image(&self, slot: Slot) -> u32 {
         self.range(slot).start + HEADER
     }
 
-    /// Bytes that the image in a slot may have.
+    /// Returns the largest size of an image in a slot, in bytes.
     pub const fn room(&self, slot: Slot) -> u32 {
         self.range(slot).end - self.image(slot)
     }

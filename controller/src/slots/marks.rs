@@ -1,48 +1,48 @@
-//! The marks behind a record: what became of the image.
+//! The marks after a record: the history of the image.
 //!
-//! A mark is one unit of writing (4 bytes at least), programmed once, in the first one that is erased. One that was cut
-//! short is none of the codes: they have as many ones as each other, and programming only takes ones away.
+//! A mark is one unit of writing (at least 4 bytes), programmed one time, in the first erased unit. An interrupted one
+//! is never a valid code: all codes have the same number of ones, and programming only clears ones.
 
 use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 
-use super::layout::MOST_WRITE;
+use super::layout::MAX_WRITE;
 
 /// Bytes of all marks.
 const AREA: u32 = 128;
 
-/// What a mark says.
+/// Meaning of a mark.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub(super) enum Mark {
     /// A trial of the image begins.
     Trial = 0x6996_5aa5,
-    /// Its self-test has passed.
+    /// The image passed its self-test.
     Confirmed = 0x9669_a55a,
-    /// Its self-test has failed.
+    /// The image failed its self-test.
     Rejected = 0x3cc3_c33c,
 }
 
-/// All marks of a slot together.
+/// Summary of a slot's marks.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Marks {
     pub(super) trials: u32,
     pub(super) confirmed: bool,
     pub(super) rejected: bool,
-    /// Address of the first one that is erased.
+    /// Address of the first erased mark.
     free: Option<u32>,
 }
 
-/// Bytes of a mark.
+/// Returns the bytes of a mark.
 const fn unit<F: NorFlash>() -> usize {
     if F::WRITE_SIZE > 4 { F::WRITE_SIZE } else { 4 }
 }
 
 impl Marks {
-    /// The marks at an address; `None` where they cannot be read.
+    /// Reads the marks at an address; `None` if reading fails.
     pub(super) fn read<F: NorFlash>(flash: &mut F, start: u32) -> Option<Self> {
         let mut marks = Self::default();
         for at in (start..start + AREA).step_by(unit::<F>()) {
-            let mut buffer = [0; MOST_WRITE];
+            let mut buffer = [0; MAX_WRITE];
             let mark = buffer.get_mut(..unit::<F>())?;
             ReadNorFlash::read(flash, at, mark).ok()?;
             if mark.iter().all(|byte| *byte == 0xff) {
@@ -57,9 +57,9 @@ impl Marks {
         Some(marks)
     }
 
-    /// Programs a mark; false where there is no room for it or it cannot be written.
+    /// Programs a mark; returns `false` if no mark is free or writing fails.
     pub(super) fn write<F: NorFlash>(&self, flash: &mut F, mark: Mark) -> bool {
-        let mut buffer = [0xff; MOST_WRITE];
+        let mut buffer = [0xff; MAX_WRITE];
         buffer.iter_mut().zip((mark as u32).to_le_bytes()).for_each(|(place, byte)| *place = byte);
         let bytes = buffer.get(..unit::<F>());
         self.free.zip(bytes).is_some_and(|(at, bytes)| flash.write(at, bytes).is_ok())
@@ -71,7 +71,7 @@ mod tests {
     use super::Mark;
 
     #[test]
-    fn no_code_becomes_another_by_taking_ones_away() {
+    fn no_code_becomes_another_by_clearing_ones() {
         let codes = [Mark::Trial, Mark::Confirmed, Mark::Rejected].map(|mark| mark as u32);
         for a in codes {
             assert_eq!(a.count_ones(), 16);

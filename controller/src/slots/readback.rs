@@ -1,4 +1,4 @@
-//! Reads an image back from flash in pieces, to compare its checksum and its signature.
+//! Reads an image back from flash in pieces, to verify its checksum and signature.
 
 use actq_link::frame::CRC;
 use crc::Digest;
@@ -7,24 +7,24 @@ use embedded_storage::nor_flash::NorFlash;
 use super::authority::Authority;
 use crate::update::Plan;
 
-/// Bytes read at once.
+/// Bytes of a piece.
 const BLOCK: usize = 256;
 
-/// How far an image was read.
+/// State of reading an image back.
 pub(super) struct Readback<H> {
     at: u32,
     crc: Digest<'static, u32>,
     hash: H,
 }
 
-/// What was found.
+/// Outcome of reading an image back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Found {
-    /// It may run.
+    /// The image may run.
     Good,
-    /// Not what was announced, or it cannot be read.
+    /// The image differs from the announced one, or cannot be read.
     Damaged,
-    /// Not signed as it must be.
+    /// The signature is missing or invalid.
     Unsigned,
 }
 
@@ -33,12 +33,12 @@ impl<H> Readback<H> {
         Self { at: 0, crc: CRC.digest(), hash: authority.hash() }
     }
 
-    /// Whether the next block is the last one, with which the signature is checked.
+    /// Returns `true` if the next block is the last one, after which the signature is checked.
     pub(super) const fn is_last(&self, plan: &Plan) -> bool {
         plan.length.saturating_sub(self.at) <= BLOCK as u32
     }
 
-    /// Reads a block of the image at an address on; gives itself back until the image ends.
+    /// Reads the next block of the image at the address `image`. Returns itself until the image ends.
     pub(super) fn advance<F: NorFlash, A: Authority<Hash = H>>(
         mut self,
         flash: &mut F,

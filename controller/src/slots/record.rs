@@ -1,23 +1,23 @@
-//! What a slot's first bytes say about its image.
+//! The record in a slot's first bytes, which describes its image.
 //!
-//! Little-endian words: magic, format, length, CRC-32 of the image, version, generation, whether a signature follows,
-//! the signature (64 bytes), zeros, and the CRC-32 (ISO-HDLC) of all before it.
+//! Little-endian words: magic, format, length, CRC-32 of the image, version, generation, 1 if a signature follows, the
+//! signature (64 bytes), zeros, and the CRC-32 (ISO-HDLC) of all bytes before it.
 
 use actq_link::frame::CRC;
 
 use crate::update::Plan;
 
-/// Bytes of a record; a multiple of every unit in which flash is written.
+/// Bytes of a record; a multiple of each unit of writing.
 pub(super) const BYTES: usize = 128;
 
 const MAGIC: u32 = u32::from_le_bytes(*b"ACTS");
 const FORMAT: u32 = 1;
 
-/// An image that was whole.
+/// Record of a complete image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Record {
     pub(super) plan: Plan,
-    /// One more than that of any slot before.
+    /// One more than the highest generation so far.
     pub(super) generation: u32,
     pub(super) signature: Option<[u8; 64]>,
 }
@@ -36,7 +36,7 @@ impl Record {
         bytes
     }
 
-    /// The record; `None` where the bytes are none.
+    /// Decodes a record; `None` if the bytes are not one.
     pub(super) fn from_bytes(bytes: &[u8; BYTES]) -> Option<Self> {
         let (content, checksum) = bytes.split_last_chunk()?;
         if CRC.checksum(content) != u32::from_le_bytes(*checksum) {

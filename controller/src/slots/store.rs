@@ -1,4 +1,4 @@
-//! The slots' records and marks: which image runs.
+//! The slots' records and marks, which select the image to run.
 
 use embedded_storage::nor_flash::NorFlash;
 
@@ -8,51 +8,50 @@ use super::marks::{Mark, Marks};
 use super::readback::{Found, Readback};
 use super::record::{BYTES, Record};
 
-/// Trials of an image that is not confirmed, before it is taken for one that ends the program. A loss of power ends
-/// one, too.
+/// Trials of an unconfirmed image before it counts as one that crashes the program. A loss of power also ends a trial.
 pub const TRIALS: u32 = 3;
 
-/// Two slots in a flash.
+/// Two image slots in a flash.
 pub struct Slots<F, A> {
     pub(super) flash: F,
     pub(super) layout: Layout,
     pub(super) authority: A,
-    /// Slots that are not to be chosen again before the next start.
+    /// Slots that must not be selected again before the next start.
     refused: [bool; 2],
 }
 
 /// An image to run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Candidate {
-    /// Where it is.
+    /// Slot of the image.
     pub slot: Slot,
     /// Address of its first byte in the flash.
     pub address: u32,
-    /// Its bytes.
+    /// Length in bytes.
     pub length: u32,
-    /// CRC-32 (ISO-HDLC) of all of them.
+    /// CRC-32 (ISO-HDLC) of all bytes.
     pub crc: u32,
-    /// Its version.
+    /// Version of the image.
     pub version: u32,
-    /// Whether it has yet to be confirmed.
+    /// `true` if the image is not confirmed yet.
     pub trial: bool,
 }
 
 impl<F: NorFlash, A: Authority> Slots<F, A> {
-    /// Slots in `flash`, with images of `authority`.
+    /// Creates slots in `flash` for images that `authority` accepts.
     pub const fn new(flash: F, layout: Layout, authority: A) -> Self {
         Self { flash, layout, authority, refused: [false; 2] }
     }
 
-    /// The flash, to read an image where it is not mapped into memory.
+    /// Returns the flash, to read an image that is not mapped into memory.
     pub const fn flash(&mut self) -> &mut F {
         &mut self.flash
     }
 
-    /// The image to run: whole, signed as it must be, not rejected, the newest such. To be tested then, and
-    /// [confirmed](Self::confirm) or [rejected](Self::reject), after which this gives another one or none. Reads one
-    /// image or both, and tells `progress` before each block of them, and so before the check of a signature, which
-    /// comes with the last one.
+    /// Selects the image to run: the newest one that is complete, accepted by the authority and not rejected. The
+    /// caller tests it and [confirms](Self::confirm) or [rejects](Self::reject) it. After a rejection this selects
+    /// another one or none. It reads one image or both, and calls `progress` before each block, and so also before the
+    /// check of a signature, which comes with the last block.
     pub fn select(&mut self, mut progress: impl FnMut()) -> Option<Candidate> {
         let generation = |record: Option<Record>| record.map(|record| record.generation);
         let newest = match generation(self.record(Slot::B)) > generation(self.record(Slot::A)) {
@@ -75,15 +74,15 @@ impl<F: NorFlash, A: Authority> Slots<F, A> {
         Some(Candidate { slot, address: self.layout.image(slot), length, crc, version, trial: !marks.confirmed })
     }
 
-    /// The image in a slot has passed its test; false where that cannot be written.
+    /// Records that the image in a slot passed its test; returns `false` if writing fails.
     #[must_use]
     pub fn confirm(&mut self, slot: Slot) -> bool {
         let Some(marks) = self.marks(slot) else { return false };
         marks.confirmed || marks.write(&mut self.flash, Mark::Confirmed)
     }
 
-    /// The image in a slot has failed its test. One that has never passed it is not tried again; one that has, not
-    /// before the next start.
+    /// Records that the image in a slot failed its test. An image that never passed is not tried again; one that passed
+    /// before is not tried again until the next start.
     pub fn reject(&mut self, slot: Slot) {
         if let Some(refused) = self.refused.get_mut(slot as usize) {
             *refused = true;
@@ -91,12 +90,12 @@ impl<F: NorFlash, A: Authority> Slots<F, A> {
         if let Some(marks) = self.marks(slot)
             && !marks.confirmed
         {
-            // Where it cannot be written, it is tried again after the next start.
+            // If writing fails, the image is tried again after the next start.
             let _ = marks.write(&mut self.flash, Mark::Rejected);
         }
     }
 
-    /// The least version that an update may have: the highest that was confirmed.
+    /// Returns the lowest version that an update may have: the highest confirmed one.
     pub fn least_version(&mut self) -> u32 {
         let versions = Slot::BOTH.map(|slot| {
             let confirmed = self.marks(slot).is_some_and(|marks| marks.confirmed);
@@ -105,13 +104,13 @@ impl<F: NorFlash, A: Authority> Slots<F, A> {
         versions.into_iter().fold(0, u32::max)
     }
 
-    /// The generation of the next image.
+    /// Returns the generation of the next image.
     pub(super) fn next_generation(&mut self) -> u32 {
         let generations = Slot::BOTH.map(|slot| self.record(slot).map_or(0, |record| record.generation));
         generations.into_iter().fold(0, u32::max).saturating_add(1)
     }
 
-    /// The slot that an update may erase while `running` runs; without that, the older one.
+    /// Returns the slot that an update may erase while `running` runs; without a running slot, the older one.
     pub(super) fn spare(&mut self, running: Option<Slot>) -> Slot {
         let generation = |record: Option<Record>| record.map(|record| record.generation);
         match running {
@@ -121,7 +120,7 @@ impl<F: NorFlash, A: Authority> Slots<F, A> {
         }
     }
 
-    /// Writes a record into a slot that holds the image already, and lets it be chosen.
+    /// Writes a record into a slot that already holds the image, and allows its selection.
     pub(super) fn write_record(&mut self, slot: Slot, record: Record) -> bool {
         if let Some(refused) = self.refused.get_mut(slot as usize) {
             *refused = false;
@@ -129,7 +128,7 @@ impl<F: NorFlash, A: Authority> Slots<F, A> {
         self.flash.write(self.layout.range(slot).start, &record.to_bytes()).is_ok()
     }
 
-    /// Marks that a trial begins, outside of [`Self::select`].
+    /// Marks the beginning of a trial outside of [`Self::select`].
     pub(super) fn begin_trial(&mut self, slot: Slot) -> bool {
         self.marks(slot).is_some_and(|marks| marks.write(&mut self.flash, Mark::Trial))
     }

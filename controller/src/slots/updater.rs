@@ -1,75 +1,76 @@
-//! An update, from its announcement to the image that runs.
+//! An update, from its announcement to the running image.
 
 use actq_link::code::Refusal;
 use embedded_storage::nor_flash::NorFlash;
 
 use super::authority::Authority;
-use super::layout::{MOST_WRITE, Slot};
+use super::layout::{MAX_WRITE, Slot};
 use super::readback::{Found, Readback};
 use super::record::Record;
 use super::store::{Candidate, Slots};
 use crate::update::{Plan, Update};
 
-/// Writes images that come over the link into the slot that does not run.
+/// Writes images from the link into the slot that is not running.
 ///
-/// Requests only begin what takes long; [`Self::work`] does it, piece by piece.
+/// Requests only start long work; [`Self::work`] does it piece by piece.
 pub struct Updater<F, A: Authority> {
     slots: Slots<F, A>,
-    /// The slot whose image runs; `None` where that is built in.
+    /// Slot of the running image; `None` if it is built in.
     running: Option<Slot>,
     phase: Phase<A::Hash>,
 }
 
 enum Phase<H> {
-    /// Nothing was begun.
+    /// No update is in progress.
     Idle,
-    /// Sectors from `next` on are to be erased.
+    /// Sectors from `next` on will be erased.
     Erasing { plan: Plan, slot: Slot, next: u32 },
-    /// Bytes are awaited.
+    /// Waiting for bytes.
     Receiving { plan: Plan, slot: Slot, tail: Tail },
-    /// All bytes are there and are read back.
+    /// All bytes are written and are being read back.
     Checking { plan: Plan, slot: Slot, signature: Option<[u8; 64]>, readback: Readback<H> },
     /// The image waits for its test.
     Testing { plan: Plan, slot: Slot },
-    /// It runs, or it does not.
+    /// The update ended, with or without success.
     Done { plan: Plan, outcome: Result<(), Refusal> },
 }
 
-/// Bytes that were taken, the last of which wait until a unit of writing is full.
+/// Accepted bytes; the last of them wait until a unit of writing is full.
 #[derive(Clone, Copy)]
 struct Tail {
     taken: u32,
-    unit: [u8; MOST_WRITE],
+    unit: [u8; MAX_WRITE],
 }
 
-/// What [`Updater::work`] leaves to do.
+/// Work that remains after [`Updater::work`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Work {
-    /// Nothing, until the next request.
+    /// No work until the next request.
     Idle,
-    /// More of the same: to be called again.
+    /// More work: call it again.
     More,
-    /// To run the self-test of this image, which replaces the running one, and to tell [`Updater::tested`].
+    /// Run the self-test of this image, which replaces the running one, and pass its outcome to [`Updater::tested`].
     Test(Candidate),
 }
 
 impl<F: NorFlash, A: Authority> Updater<F, A> {
-    /// For slots of which `running` runs, or none.
+    /// Creates an updater for slots with the running slot, if any.
     pub const fn new(slots: Slots<F, A>, running: Option<Slot>) -> Self {
         Self { slots, running, phase: Phase::Idle }
     }
 
-    /// The slots.
+    /// Returns the slots.
     pub const fn slots(&mut self) -> &mut Slots<F, A> {
         &mut self.slots
     }
 
-    /// The slot whose image runs.
+    /// Returns the slot of the running image.
     pub const fn running(&self) -> Option<Slot> {
         self.running
     }
 
-    /// Whether the next [`Self::work`] takes long: it erases a sector, checks a signature, or asks for a test.
+    /// Returns `true` if the next [`Self::work`] takes long: it erases a sector, checks a signature, or requests a
+    /// test.
     pub const fn takes_long(&self) -> bool {
         match &self.phase {
             Phase::Erasing { .. } | Phase::Testing { .. } => true,
@@ -95,7 +96,7 @@ impl<F: NorFlash, A: Authority> Updater<F, A> {
         self.phase = match self.slots.flash.erase(next, sector) {
             Err(_) => Phase::Done { plan, outcome: Err(Refusal::Flash) },
             Ok(()) if sector < self.slots.layout.range(slot).end => Phase::Erasing { plan, slot, next: sector },
-            Ok(()) => Phase::Receiving { plan, slot, tail: Tail { taken: 0, unit: [0xff; MOST_WRITE] } },
+            Ok(()) => Phase::Receiving { plan, slot, tail: Tail { taken: 0, unit: [0xff; MAX_WRITE] } },
         };
         Work::More
     }
@@ -133,8 +134,8 @@ impl<F: NorFlash, A: Authority> Updater<F, A> {
         Work::Test(Candidate { slot, address, length, crc, version, trial: true })
     }
 
-    /// Takes the outcome of the test; whether the image is confirmed, and so the one that runs. Else the one before has
-    /// to run on.
+    /// Takes the outcome of the test. Returns `true` if the image is confirmed and runs; else the previous one must
+    /// continue.
     pub fn tested(&mut self, outcome: Result<(), Refusal>) -> bool {
         let Phase::Testing { plan, slot } = self.phase else { return false };
         let outcome = match outcome {
@@ -152,7 +153,7 @@ impl<F: NorFlash, A: Authority> Updater<F, A> {
         outcome.is_ok()
     }
 
-    /// Appends bytes; false where the flash cannot be written.
+    /// Appends bytes; returns `false` if writing to flash fails.
     fn append(&mut self, slot: Slot, tail: &mut Tail, bytes: &[u8], length: u32) -> bool {
         let image = self.slots.layout.image(slot);
         for byte in bytes {
@@ -167,7 +168,7 @@ impl<F: NorFlash, A: Authority> Updater<F, A> {
                 if self.slots.flash.write(image + (tail.taken - at - 1), full).is_err() {
                     return false;
                 }
-                tail.unit = [0xff; MOST_WRITE];
+                tail.unit = [0xff; MAX_WRITE];
             }
         }
         true
@@ -233,7 +234,7 @@ impl<F: NorFlash, A: Authority> Update for Updater<F, A> {
         }
     }
 
-    /// An image that waits for its test is tested all the same.
+    /// Cancels the update; an image that waits for its test is still tested.
     fn abort(&mut self) {
         if !matches!(self.phase, Phase::Testing { .. }) {
             self.phase = Phase::Idle;

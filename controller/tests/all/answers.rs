@@ -1,4 +1,4 @@
-//! A host that predicts every action, and a controller whose line repeats, loses and holds up frames, with resets,
+//! A host that predicts every action of a controller over a line that repeats, loses and delays frames, with resets,
 //! disarms and silences.
 
 use std::collections::{HashMap, HashSet};
@@ -16,7 +16,7 @@ use super::random::Random;
 const FRAMES: usize = 1_000_000;
 const FRAME: usize = frame::bytes(64);
 const DEADLINE: u32 = 20;
-/// Frames that the line has seen, and can send once more.
+/// Frames that the line has seen and can send again.
 const REMEMBERED: usize = 500;
 
 /// A head whose every action depends on all observations since its reset.
@@ -30,18 +30,18 @@ impl Head {
     }
 }
 
-/// What the firmware does: one turn of its loop in a tick.
+/// The firmware, with one turn of its loop in a tick.
 struct Controller {
     safety: Safety<1>,
     endpoint: Endpoint<'static, 1, FRAME>,
     head: Head,
-    /// The step under way: its number, its action, and turns until that is ready.
+    /// The current step: its number, its action, and the turns until that is ready.
     step: Option<(u32, f32, usize)>,
 }
 
 impl Controller {
     fn new(seed: u32) -> Self {
-        let axis = Axis::new(0.0, 1.0, 1.0, 0.0, SafeAction::Hold).expect("the axis fits");
+        let axis = Axis::new(0.0, 1.0, 1.0, 0.0, SafeAction::Hold).expect("the axis is valid");
         let mut safety = Safety::new([axis], 1..=DEADLINE, seed);
         Check::ALL.into_iter().for_each(|check| safety.check(check, true));
         let breadcrumb = Record::report(ResetCause::Power, None);
@@ -51,7 +51,7 @@ impl Controller {
         Self { safety, endpoint, head: Head::default(), step: None }
     }
 
-    /// Takes bytes, and gives those that it sends. A step that begins takes so many turns.
+    /// Takes bytes and returns the bytes that it sends. A step that begins takes `turns` turns.
     fn turn(&mut self, bytes: &[u8], micros: u32, turns: usize) -> Vec<u8> {
         let Self { safety, endpoint, head, step } = self;
         let (mut out, mut sent) = ([0; 128], Vec::new());
@@ -80,7 +80,7 @@ impl Controller {
     }
 }
 
-/// The way from the host: 30 frames in 100 are lost, doubled, late, damaged, or come behind an old one.
+/// The line from the host: 30 frames in 100 are lost, doubled, late, damaged, or follow an old one.
 #[derive(Default)]
 struct Line {
     seen: Vec<Vec<u8>>,
@@ -112,27 +112,27 @@ impl Line {
         }
     }
 
-    /// Sends an old frame once more.
+    /// Sends an old frame again.
     fn repeat(&self, random: &mut Random, out: &mut Vec<u8>) {
         out.extend(self.seen.get(random.below(REMEMBERED)).into_iter().flatten());
     }
 }
 
-/// A host with an executor of its own. It has lost nothing of what the controller sent.
+/// A host with its own copy of the head. It receives all frames of the controller.
 struct Host {
     sender: Sender,
     receiver: Receiver<FRAME>,
     token: Option<u32>,
     state: State,
     head: Head,
-    /// What was observed, by the frame's number.
-    shown: HashMap<u32, f32>,
-    /// Numbers of arms and disarms.
+    /// Observations by their frame's number.
+    observed: HashMap<u32, f32>,
+    /// Numbers of arm and disarm requests.
     asked: HashSet<u32>,
-    /// Whether one of these was done since the last status, and the last one that was.
+    /// `true` if one of these requests was done since the last status.
     was_done: bool,
     done: u32,
-    /// Numbers that were answered since the controller has learnt numbers anew.
+    /// Numbers that were answered since the controller last reset the sequence numbers.
     answered: HashSet<u32>,
     applied: HashSet<u32>,
     tally: Tally,
@@ -140,10 +140,10 @@ struct Host {
 
 #[derive(Debug, Default)]
 struct Tally {
-    told: u32,
+    actions: u32,
     armed: u32,
     latched: u32,
-    relearnt: u32,
+    relearned: u32,
     restarted: u32,
 }
 
@@ -159,7 +159,7 @@ impl Host {
                     tally.latched += u32::from((self.state, status.state) == (State::Armed, State::Latched));
                     if self.token.is_none() || self.state == status.state && !self.was_done {
                         self.answered.clear();
-                        *if self.token.is_some() { &mut tally.relearnt } else { &mut tally.restarted } += 1;
+                        *if self.token.is_some() { &mut tally.relearned } else { &mut tally.restarted } += 1;
                     }
                     (self.token, self.state, self.was_done) = (Some(status.token), status.state, false);
                 }
@@ -167,14 +167,14 @@ impl Host {
                     (self.was_done, self.done) = (true, of);
                 }
                 Message::Action { of, applied, values } => {
-                    let expected = self.head.step(self.shown[&of]);
-                    let told: Vec<f32> = values.iter().collect();
-                    assert_eq!(told, [expected], "frame {of} after {:?}", self.tally);
+                    let expected = self.head.step(self.observed[&of]);
+                    let actual: Vec<f32> = values.iter().collect();
+                    assert_eq!(actual, [expected], "frame {of} after {:?}", self.tally);
                     assert!(self.answered.insert(of), "frame {of} is answered again after {:?}", self.tally);
                     assert!(!applied || self.applied.insert(of), "frame {of} is applied again");
                     let is_newer = of.wrapping_sub(self.done) < 1 << 31;
                     assert!(!applied || is_newer, "frame {of} from before frame {} is applied", self.done);
-                    self.tally.told += 1;
+                    self.tally.actions += 1;
                 }
                 _ => {}
             }
@@ -188,12 +188,12 @@ struct World {
     controller: Controller,
     line: Line,
     host: Host,
-    /// The controller's time; the host's runs 1 % slow, from another begin.
+    /// The controller's time. The host's clock runs 1 % slow, with an offset.
     micros: u64,
     offset: u32,
-    /// Ticks for which the host sends nothing yet.
+    /// Remaining ticks in which the host sends nothing.
     silent: u32,
-    /// Turns that a step takes longer than usual.
+    /// Extra turns of a step.
     slow: usize,
 }
 
@@ -205,7 +205,7 @@ impl World {
             token: None,
             state: State::Disarmed,
             head: Head::default(),
-            shown: HashMap::new(),
+            observed: HashMap::new(),
             asked: HashSet::new(),
             was_done: false,
             done: 0,
@@ -220,16 +220,16 @@ impl World {
     fn send(&mut self, message: &Message<'_>, out: &mut Vec<u8>) -> u32 {
         let (number, mut buffer) = (self.host.sender.next(), [0; 64]);
         let micros = self.offset.wrapping_add((self.micros * 99 / 100) as u32);
-        let frame = self.host.sender.frame(message, micros, &mut buffer).expect("there is room");
+        let frame = self.host.sender.frame(message, micros, &mut buffer).expect("the buffer is large enough");
         self.line.carry(&[&[0], frame].concat(), &mut self.random, out);
         number
     }
 
-    /// An observation, and now and then a request.
+    /// Sends an observation, and sometimes a request.
     fn speak(&mut self, out: &mut Vec<u8>) {
-        let observation = self.host.shown.len() as f32;
+        let observation = self.host.observed.len() as f32;
         let number = self.send(&Message::Observation(Floats::Values(&[observation])), out);
-        assert_eq!(self.host.shown.insert(number, observation), None, "numbers of two hosts overlap");
+        assert_eq!(self.host.observed.insert(number, observation), None, "numbers of two hosts overlap");
         let request = match (self.random.below(1000), self.host.token) {
             (0, _) => Message::Disarm,
             (1..100, Some(token)) if self.host.state != State::Armed => Message::Arm { token },
@@ -239,14 +239,14 @@ impl World {
         self.host.asked.insert(number);
     }
 
-    /// Now and then the host falls silent, or host or controller start anew.
-    fn happen(&mut self) {
+    /// Sometimes silences the host, or restarts host or controller.
+    fn disturb(&mut self) {
         self.slow = 0;
         match self.random.below(10_000) {
             0..5 => self.silent = DEADLINE + 5,
             5 => {
                 self.silent = QUIET + DEADLINE + 5;
-                // Some with a step that takes longer than the silence.
+                // Sometimes with a step that takes longer than the silence.
                 self.slow = self.random.below(2) * 2 * QUIET as usize;
             }
             6 => {
@@ -256,7 +256,7 @@ impl World {
             }
             7 => {
                 self.silent = QUIET + DEADLINE + 5;
-                // Another host, whose line remembers nothing of the one before.
+                // Another host, whose line has no frames of the previous host.
                 (self.host.sender, self.line) = (Sender::new(self.random.bits() as u32), Line::default());
                 self.offset = self.random.bits() as u32;
             }
@@ -269,7 +269,7 @@ impl World {
         let mut arriving = Vec::new();
         if self.silent == 0 {
             self.speak(&mut arriving);
-            self.happen();
+            self.disturb();
         } else {
             self.silent -= 1;
             if self.random.below(50) == 0 {
@@ -282,15 +282,16 @@ impl World {
     }
 }
 
-/// A million frames: each is answered at most once while the controller has not learnt the numbers anew, and applied at
-/// most once ever, if it was sent after the arm request. Each action, applied or not, is that of a host whose own head begins anew with every new token.
+/// A million frames: each is answered at most once until the controller resets the sequence numbers, and applied at
+/// most once, only if it was sent after the arm request. Each action, applied or not, equals that of the host's own
+/// head, which is reset with every new token.
 #[test]
-fn every_action_is_predicted_and_comes_once() {
+fn the_host_predicts_every_action_once() {
     let mut world = World::new();
-    while world.host.shown.len() < FRAMES {
+    while world.host.observed.len() < FRAMES {
         world.tick();
     }
     let Host { applied, tally, .. } = &world.host;
-    assert!(applied.len() > 100_000 && tally.told > 200_000, "{} applied, {tally:?}", applied.len());
-    assert!(tally.armed > 500 && tally.latched > 300 && tally.relearnt > 50 && tally.restarted > 50, "{tally:?}");
+    assert!(applied.len() > 100_000 && tally.actions > 200_000, "{} applied, {tally:?}", applied.len());
+    assert!(tally.armed > 500 && tally.latched > 300 && tally.relearned > 50 && tally.restarted > 50, "{tally:?}");
 }

@@ -1,4 +1,4 @@
-//! Messages in, messages and outputs out.
+//! Messages to the controller, its answers and its outputs.
 
 use actq_boards::stm32f405::flash::model::Model;
 use actq_boards::stm32f405::flash::{Flash, LARGE};
@@ -16,7 +16,7 @@ use proptest::prelude::*;
 const FRAME: usize = frame::bytes(128);
 const OBSERVATION: [f32; 3] = [0.5, -0.5, 0.0];
 const DEADLINE: u32 = 10;
-const LEAST_DEADLINE: u32 = 3;
+const MIN_DEADLINE: u32 = 3;
 
 /// A controller and a host without a line between them.
 struct Bench<U = NoUpdate> {
@@ -36,12 +36,12 @@ impl Bench {
 
 impl<U: Update> Bench<U> {
     fn of(settings: Settings, update: U) -> Self {
-        let axis = Axis::new(-1.0, 1.0, 0.1, 0.0, SafeAction::Hold).expect("the axis fits");
-        let mut safety = Safety::new([axis; 2], LEAST_DEADLINE..=DEADLINE, 77);
+        let axis = Axis::new(-1.0, 1.0, 0.1, 0.0, SafeAction::Hold).expect("the axis is valid");
+        let mut safety = Safety::new([axis; 2], MIN_DEADLINE..=DEADLINE, 77);
         Check::ALL.into_iter().for_each(|check| safety.check(check, true));
         let breadcrumb = Record::report(ResetCause::Watchdog, None);
         let facts = Facts { image: 0xabcd, slot: BUILT_IN, timing: Timing::default(), breadcrumb };
-        let guard = Guard::new(3, &[], 50_000).expect("there is room");
+        let guard = Guard::new(3, &[], 50_000).expect("there is enough memory");
         let endpoint = Endpoint::new(guard, facts, settings);
         Self { update, safety, endpoint, host: Sender::new(9), answers: Receiver::new(), micros: 0 }
     }
@@ -70,17 +70,17 @@ impl<U: Update> Bench<U> {
 
     fn frame(&mut self, message: &Message<'_>) -> Vec<u8> {
         let mut buffer = [0; 256];
-        self.host.frame(message, self.micros, &mut buffer).expect("there is room").to_vec()
+        self.host.frame(message, self.micros, &mut buffer).expect("there is enough memory").to_vec()
     }
 
-    /// The outcome of a request.
+    /// Sends a request and returns its outcome.
     fn ask(&mut self, message: &Message<'_>) -> Result<(), Refusal> {
         let number = self.host.next();
         let acknowledged = self.send(message, |answer| match answer {
             Message::Ack { of, refusal, .. } => (of, refusal),
             other => panic!("{other:?}"),
         });
-        let (of, refusal) = acknowledged.expect("it is answered");
+        let (of, refusal) = acknowledged.expect("the controller answers");
         assert_eq!(of, number);
         refusal.map_or(Ok(()), Err)
     }
@@ -90,7 +90,7 @@ impl<U: Update> Bench<U> {
             Message::Status(status) => status,
             other => panic!("{other:?}"),
         });
-        status.expect("it is answered")
+        status.expect("the controller answers")
     }
 
     fn observe(&mut self) {
@@ -103,7 +103,7 @@ impl<U: Update> Bench<U> {
         assert_eq!(self.ask(&Message::Arm { token }), Ok(()));
     }
 
-    /// The next step, behind what is reported: number, reset and values.
+    /// Reports, then returns the next step: number, reset and values.
     fn step(&mut self) -> Option<(u32, bool, Vec<f32>)> {
         let mut out = [0; 256];
         self.endpoint.report(self.micros, &mut self.safety, &mut out);
@@ -131,27 +131,27 @@ fn an_observation_becomes_an_action_and_an_output() {
         let of = bench.host.next();
         bench.observe();
         assert_eq!(bench.step(), Some((of, reset, OBSERVATION.to_vec())));
-        assert_eq!(bench.step(), None, "it is given once");
+        assert_eq!(bench.step(), None, "it is returned once");
         assert_eq!(bench.act(of, &[0.25, -7.0]), Some((of, true, vec![0.25, -1.0])));
     }
     assert_eq!(bench.safety.tick(), [Output::Drive(0.1), Output::Drive(-0.1)]);
 }
 
 #[test]
-fn an_action_of_a_step_from_before_arming_is_dropped() {
+fn actions_of_steps_before_arming_are_dropped() {
     let mut bench = Bench::new();
     bench.observe();
-    let (of, ..) = bench.step().expect("there is an observation");
+    let (of, ..) = bench.step().expect("an observation is waiting");
     assert_eq!(bench.act(of, &[0.25, 0.5]), Some((of, false, vec![0.25, 0.5])), "disarmed");
     bench.observe();
-    let (of, ..) = bench.step().expect("there is an observation");
+    let (of, ..) = bench.step().expect("an observation is waiting");
     bench.arm();
     assert_eq!(bench.act(of, &[0.25, 0.5]), None);
     assert_eq!(bench.safety.tick(), [Output::Coast; 2]);
 }
 
 #[test]
-fn an_action_that_is_not_finite_and_a_head_that_fails_latch_and_are_told() {
+fn a_non_finite_action_and_a_failed_head_latch() {
     let mut bench = Bench::new();
     bench.arm();
     bench.observe();
@@ -166,7 +166,7 @@ fn an_action_that_is_not_finite_and_a_head_that_fails_latch_and_are_told() {
 }
 
 #[test]
-fn parameters_become_stricter_while_disarmed_and_nothing_else() {
+fn parameters_only_become_stricter_while_disarmed() {
     let mut bench = Bench::new();
     let get = |bench: &mut Bench, parameter, axis| {
         bench.send(&Message::Get { parameter, axis }, |answer| match answer {
@@ -216,17 +216,17 @@ fn parameters_become_stricter_while_disarmed_and_nothing_else() {
     bench.arm();
     let changed = Message::Set { token: bench.status().token, parameter: Parameter::Low, axis: 0, value: -0.1 };
     assert_eq!(bench.ask(&changed), Err(Refusal::Armed));
-    assert_eq!(bench.ask(&set(Parameter::Low, 0, -0.1)), Err(Refusal::Token), "an old one");
+    assert_eq!(bench.ask(&set(Parameter::Low, 0, -0.1)), Err(Refusal::Token), "an old token");
 }
 
 #[test]
-fn a_request_of_an_old_state_and_an_update_that_cannot_be_are_refused() {
+fn old_requests_and_unsupported_updates_are_refused() {
     let mut bench = Bench::new();
     bench.observe();
     let token = bench.status().token;
     assert_eq!(bench.ask(&Message::Arm { token: token ^ 1 }), Err(Refusal::Token));
     assert_eq!(bench.ask(&Message::Disarm), Ok(()));
-    assert_eq!(bench.ask(&Message::Arm { token }), Err(Refusal::Token), "it was disarmed since");
+    assert_eq!(bench.ask(&Message::Arm { token }), Err(Refusal::Token), "it was disarmed meanwhile");
     let token = bench.status().token;
     let begin = Message::Begin { token, length: 4, crc: 0, version: 0 };
     assert_eq!(bench.ask(&begin), Err(Refusal::Unsupported));
@@ -239,10 +239,9 @@ fn a_request_of_an_old_state_and_an_update_that_cannot_be_are_refused() {
     assert_eq!(bench.ask(&Message::Commit { signature: None }), Err(Refusal::Armed));
 }
 
-/// Where flash and outputs do not go together, no request gets to the update unless disarmed: what writes would hold up
-/// the tick.
+/// If writing to flash stalls the tick, no request reaches the update unless disarmed.
 #[test]
-fn an_update_that_would_hold_up_the_tick_waits_until_disarmed() {
+fn an_update_that_stalls_the_tick_needs_disarming() {
     let requests = |token| {
         let begin = Message::Begin { token, length: 4, crc: 0, version: 0 };
         [begin, Message::Chunk { offset: 0, bytes: &[0; 4] }, Message::Commit { signature: None }]
@@ -262,32 +261,32 @@ fn an_update_that_would_hold_up_the_tick_waits_until_disarmed() {
         assert_eq!(
             outcomes(&mut bench),
             [if flash_while_armed { done } else { armed }; 3],
-            "outputs go to their safe action"
+            "outputs do their safe action"
         );
         assert_eq!(bench.ask(&Message::Disarm), Ok(()));
         let waits = Err(Refusal::Busy);
-        assert_eq!(outcomes(&mut bench), [if flash_while_armed { done } else { waits }; 3], "not told yet");
+        assert_eq!(outcomes(&mut bench), [if flash_while_armed { done } else { waits }; 3], "outputs do not coast yet");
         bench.safety.tick();
         assert_eq!(outcomes(&mut bench), [done; 3]);
     }
 }
 
-/// A disarm and what comes behind it may come in one read, with the power stage still on, which an STM32F405's driver
-/// takes for an error: the update waits for the tick, and goes on.
+/// A disarm and the next request may arrive in one read, with the power stage still on, which an STM32F405's flash
+/// driver refuses. The update waits for the tick and continues.
 #[test]
-fn an_update_goes_on_behind_a_disarm_in_the_same_read() {
+fn an_update_continues_after_a_disarm_in_one_read() {
     let begin = (1 << 20) - 2 * LARGE;
     let flash = Flash::new(Model::new(vec![0; 2 * LARGE as usize], begin, 1), begin);
-    let layout = Layout::new(&flash, 0..LARGE, LARGE..2 * LARGE).expect("the slots fit");
+    let layout = Layout::new(&flash, 0..LARGE, LARGE..2 * LARGE).expect("the slots are valid");
     let updater = Updater::new(Slots::new(flash, layout, Anyone), None);
     let mut bench = Bench::of(Settings { status_period: 0, flash_while_armed: false }, updater);
-    // Arms, and asks for something behind a disarm.
-    let behind_a_disarm = |bench: &mut Bench<Updater<Flash<Model>, Anyone>>, request: fn(u32) -> Message<'static>| {
+    // Arms, then makes a request after a disarm.
+    let after_a_disarm = |bench: &mut Bench<Updater<Flash<Model>, Anyone>>, request: fn(u32) -> Message<'static>| {
         bench.arm();
         bench.update.slots().flash().part.is_driving = true;
         assert_eq!(bench.ask(&request(bench.safety.token())), Err(Refusal::Armed));
         let disarm = bench.frame(&Message::Disarm);
-        // The token is the next one already.
+        // The token has already changed.
         bench.bytes(&disarm);
         assert_eq!(bench.ask(&request(bench.safety.token())), Err(Refusal::Busy));
         assert_eq!(bench.update.work(), Work::Idle);
@@ -296,15 +295,15 @@ fn an_update_goes_on_behind_a_disarm_in_the_same_read() {
         bench.ask(&request(bench.safety.token()))
     };
     let announced = |token| Message::Begin { token, length: 8, crc: CRC.checksum(b"an image"), version: 0 };
-    assert_eq!(behind_a_disarm(&mut bench, announced), Err(Refusal::Busy), "it is erased");
+    assert_eq!(after_a_disarm(&mut bench, announced), Err(Refusal::Busy), "the slot is being erased");
     while bench.update.work() == Work::More {}
     assert_eq!(bench.ask(&announced(bench.safety.token())), Ok(()));
-    assert_eq!(behind_a_disarm(&mut bench, |_| Message::Chunk { offset: 0, bytes: b"an i" }), Ok(()));
-    assert_eq!(behind_a_disarm(&mut bench, |_| Message::Chunk { offset: 4, bytes: b"mage" }), Ok(()));
+    assert_eq!(after_a_disarm(&mut bench, |_| Message::Chunk { offset: 0, bytes: b"an i" }), Ok(()));
+    assert_eq!(after_a_disarm(&mut bench, |_| Message::Chunk { offset: 4, bytes: b"mage" }), Ok(()));
     assert_eq!(
-        behind_a_disarm(&mut bench, |_| Message::Commit { signature: None }),
+        after_a_disarm(&mut bench, |_| Message::Commit { signature: None }),
         Err(Refusal::Busy),
-        "it is checked"
+        "the image is being checked"
     );
     while bench.update.work() == Work::More {}
     assert!(bench.update.tested(Ok(())));
@@ -312,7 +311,7 @@ fn an_update_goes_on_behind_a_disarm_in_the_same_read() {
 }
 
 #[test]
-fn a_status_comes_every_period_and_a_new_host_is_heard_after_a_silence() {
+fn status_is_periodic_and_silence_admits_a_new_host() {
     let mut bench = Bench::new();
     let token = bench.status().token;
     let set = Message::Set { token, parameter: Parameter::StatusPeriod, axis: 0, value: 50.0 };
@@ -324,10 +323,10 @@ fn a_status_comes_every_period_and_a_new_host_is_heard_after_a_silence() {
         reports += u32::from(bench.endpoint.report(0, &mut bench.safety, &mut out).is_some());
     }
     assert_eq!(reports, 10);
-    // Another host, that counts from below.
+    // Another host, with lower numbers.
     bench.host = Sender::new(3);
     bench.observe();
-    assert!(bench.safety.is_stale(), "not heard: its number is old");
+    assert!(bench.safety.is_stale(), "ignored: its number is old");
     for _ in 0..=QUIET {
         bench.safety.tick();
         bench.endpoint.report(0, &mut bench.safety, &mut out);
@@ -336,7 +335,7 @@ fn a_status_comes_every_period_and_a_new_host_is_heard_after_a_silence() {
     assert!(!bench.safety.is_stale());
 }
 
-/// A frame of any kind and content, with a right checksum.
+/// Returns a frame of any kind and content, with a correct checksum.
 fn frame_of(kind: u8, sequence: u32, payload: &[u8]) -> Vec<u8> {
     let content = [&[frame::VERSION, kind][..], &sequence.to_le_bytes(), &[0; 4], payload].concat();
     let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&content);
@@ -351,10 +350,10 @@ fn frame_of(kind: u8, sequence: u32, payload: &[u8]) -> Vec<u8> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(5000))]
 
-    /// Whatever comes, well-made or not, by whoever does not know the token: but for a disarm, and observations that
-    /// are good, the controller is as it was.
+    /// No frame without the current token changes the controller, well-formed or not, except a disarm and a valid
+    /// observation.
     #[test]
-    fn frames_of_any_content_change_nothing_but_counters(
+    fn frames_without_the_token_change_only_counters(
         armed: bool, kind in prop_oneof![0..12u8, 126..136u8, any::<u8>()],
         payload in prop::collection::vec(any::<u8>(), 0..80), skip in 1..1000u32,
     ) {
@@ -363,7 +362,7 @@ proptest! {
         if armed { bench.arm(); }
         let sequence = bench.host.next().wrapping_add(skip);
         let before = format!("{:?}", bench.safety);
-        // The token of the bench is not in what is drawn, or the case proves nothing.
+        // The drawn payload must not contain the bench's token.
         let token = bench.safety.token().to_le_bytes();
         prop_assume!(payload.first_chunk() != Some(&token));
         bench.bytes(&frame_of(kind, sequence, &payload));
@@ -372,9 +371,9 @@ proptest! {
         prop_assert!(before == after || observation, "{}\n{}", before, after);
     }
 
-    /// Noise of any kind does not stop it either.
+    /// Noise does not stop the controller.
     #[test]
-    fn noise_changes_nothing_but_counters(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
+    fn noise_changes_only_counters(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
         let mut bench = Bench::new();
         bench.arm();
         let before = format!("{:?}", bench.safety);

@@ -1,4 +1,4 @@
-//! Field-oriented control: against f64, against the laws of its parts, and with a motor.
+//! Field-oriented control: against f64, against properties of its parts, and with a simulated motor.
 
 mod functions;
 mod motor;

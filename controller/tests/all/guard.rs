@@ -1,4 +1,4 @@
-//! What gets to the head.
+//! Observations that reach the head.
 
 use actq_controller::Guard;
 use actq_controller::guard::{Range, Refused};
@@ -11,7 +11,7 @@ const RANGES: [Range; 3] =
 const MAX_AGE: u32 = 20_000;
 
 fn guard() -> Guard<'static, 4> {
-    Guard::new(3, &RANGES, MAX_AGE).expect("there is room")
+    Guard::new(3, &RANGES, MAX_AGE).expect("the values fit")
 }
 
 fn take(guard: &mut Guard<'_, 4>, values: &[f32]) -> Result<(), Refused> {
@@ -38,24 +38,24 @@ fn length_finiteness_and_range_of_each_value_are_checked() {
         assert_eq!(take(&mut guard, &values), Err(why));
         assert_eq!(guard.refused() as usize, i + 1);
     }
-    // The last good one is still there, and is given once.
+    // The last valid one is kept and returned once.
     assert_eq!(guard.newest(), Some((1, &good[..])));
     assert_eq!(guard.newest(), None);
 }
 
 #[test]
-fn values_without_a_range_are_refused_where_others_have_one() {
-    let mut guard = Guard::<4>::new(4, &RANGES, MAX_AGE).expect("there is room");
+fn values_without_a_range_among_ranges_are_refused() {
+    let mut guard = Guard::<4>::new(4, &RANGES, MAX_AGE).expect("the values fit");
     assert_eq!(take(&mut guard, &[0.0; 4]), Err(Refused::OutOfRange { index: 3 }));
-    let mut free = Guard::<4>::new(4, &[], MAX_AGE).expect("there is room");
+    let mut free = Guard::<4>::new(4, &[], MAX_AGE).expect("the values fit");
     assert_eq!(take(&mut free, &[f32::MAX; 4]), Ok(()));
-    assert!(Guard::<4>::new(5, &[], MAX_AGE).is_none(), "no room for five values");
+    assert!(Guard::<4>::new(5, &[], MAX_AGE).is_none(), "five values do not fit");
 }
 
-/// Sends an observation every millisecond by two clocks; the frames that are let through.
-fn let_through(frames: u32, remote: impl Fn(u32) -> u32, delay: impl Fn(u32) -> u32) -> Vec<u32> {
+/// Sends an observation every millisecond, by two clocks; returns the accepted frames.
+fn accepted(frames: u32, remote: impl Fn(u32) -> u32, delay: impl Fn(u32) -> u32) -> Vec<u32> {
     let mut guard = guard();
-    // Both clocks wrap on the way.
+    // Both clocks wrap during the test.
     let (local_start, remote_start) = (u32::MAX - 700_000, u32::MAX - 300_000);
     let mut good = Vec::new();
     for n in 0..frames {
@@ -69,56 +69,56 @@ fn let_through(frames: u32, remote: impl Fn(u32) -> u32, delay: impl Fn(u32) -> 
 }
 
 #[test]
-fn clocks_that_wrap_and_jitter_below_the_limit_change_nothing() {
+fn wrapping_clocks_and_small_jitter_are_accepted() {
     let all: Vec<u32> = (0..2000).collect();
-    assert_eq!(let_through(2000, |n| 1000 * n, |_| 0), all);
-    assert_eq!(let_through(2000, |n| 1000 * n, |n| n * 7919 % MAX_AGE), all);
+    assert_eq!(accepted(2000, |n| 1000 * n, |_| 0), all);
+    assert_eq!(accepted(2000, |n| 1000 * n, |n| n * 7919 % MAX_AGE), all);
 }
 
 #[test]
-fn a_frame_that_was_held_up_is_refused() {
-    // A part of the time that it lasts is taken for a clock that runs slow.
+fn a_delayed_frame_is_refused() {
+    // A share of the delay's duration counts as clock drift.
     let late = |n| if (500..510).contains(&n) { MAX_AGE + MAX_AGE / 16 } else { 0 };
-    let good = let_through(1000, |n| 1000 * n, late);
+    let good = accepted(1000, |n| 1000 * n, late);
     assert_eq!(good, (0..500).chain(510..1000).collect::<Vec<_>>());
 }
 
 #[test]
-fn a_clock_that_stands_still_grows_old() {
-    let good = let_through(1000, |n| 1000 * n.min(300), |_| 0);
+fn a_stopped_clock_makes_observations_old() {
+    let good = accepted(1000, |n| 1000 * n.min(300), |_| 0);
     assert_eq!(good, (0..=320).collect::<Vec<_>>());
 }
 
-/// A jump back is forgotten no faster than a 16th of the time; one forward is the new time.
+/// A jump back is forgotten no faster than a 16th of the time; a jump forward is the new time.
 #[test]
-fn a_clock_that_jumps_back_is_refused_and_one_that_jumps_forward_is_not() {
-    let back = |jump| let_through(1000, |n| if n < 400 { 1000 * n } else { (1000 * n).wrapping_sub(jump) }, |_| 0);
+fn only_a_clock_that_jumps_back_is_refused() {
+    let back = |jump| accepted(1000, |n| if n < 400 { 1000 * n } else { (1000 * n).wrapping_sub(jump) }, |_| 0);
     assert_eq!(back(MAX_AGE + 600_000 / 16), (0..400).collect::<Vec<_>>());
     assert_eq!(back(1_000_000_000), (0..400).collect::<Vec<_>>());
-    let forward = let_through(1000, |n| if n < 400 { 1000 * n } else { 1000 * n + 1_000_000_000 }, |_| 0);
+    let forward = accepted(1000, |n| if n < 400 { 1000 * n } else { 1000 * n + 1_000_000_000 }, |_| 0);
     assert_eq!(forward.len(), 1000);
 }
 
-/// A host that sends more than the line carries: what is queued grows by 1 ms in 10, and is refused before it is three
-/// times as old as allowed, with a sender's clock that is right, slow or fast.
+/// A host that sends more than the line carries: the queue grows by 1 ms in 10. Observations are refused before they
+/// are three times as old as allowed, with an accurate, slow or fast sender's clock.
 #[test]
-fn a_queue_that_grows_is_refused() {
+fn a_growing_queue_is_refused() {
     for percent in [-3, 0, 3] {
         let remote = |n: u32| (n as i32 * (1000 + 10 * percent)) as u32;
-        let good = let_through(3000, remote, |n| n * 100);
+        let good = accepted(3000, remote, |n| n * 100);
         assert!(good.last().is_some_and(|n| n * 100 < 3 * MAX_AGE), "{percent} %: {:?}", good.last());
     }
 }
 
-/// Sends for so many ms of local time, by a clock that is wrong by so many parts in 1000; what `each` is told of a
-/// frame is its age (`None`: 0), its delay, and the local time at which it came.
+/// Sends for `ms` of local time, by a clock with an error of `wrong` parts in 1000. Passes each frame's age (0 if
+/// accepted), its delay, and its local arrival time to `each`.
 fn ages(ms: u64, period: u64, wrong: i64, mut delay: impl FnMut() -> Option<u64>, mut each: impl FnMut(u32, u64, u64)) {
-    let mut guard = Guard::<4>::new(3, &[], 0).expect("there is room");
+    let mut guard = Guard::<4>::new(3, &[], 0).expect("the values fit");
     let (local_start, remote_start) = (u32::MAX - 700_000, u32::MAX - 300_000);
     let mut last = 0;
     for sent in (0..ms * 1000).step_by(period as usize) {
         let Some(delay) = delay() else { continue };
-        // Frames come in order.
+        // Frames arrive in order.
         last = last.max(sent + delay);
         let remote = sent as i64 + sent as i64 * wrong / 1000;
         let (remote, local) = (remote_start.wrapping_add(remote as u32), local_start.wrapping_add(last as u32));
@@ -131,9 +131,10 @@ fn ages(ms: u64, period: u64, wrong: i64, mut delay: impl FnMut() -> Option<u64>
     }
 }
 
-/// Two hours, in which both clocks wrap: no frame that is at most so late is older, with 3 frames in 10 lost.
+/// In two hours, in which both clocks wrap, with 3 frames in 10 lost, no frame's age exceeds its largest possible
+/// delay.
 #[test]
-fn clocks_that_differ_by_three_percent_make_no_frame_older_than_it_is() {
+fn clock_drift_makes_no_frame_too_old() {
     for (seed, wrong) in [-30, -20, -5, 0, 5, 20, 30].into_iter().enumerate() {
         for period in [1000, 20_000, 100_000] {
             let mut random = Random::new(seed as u64);
@@ -148,14 +149,15 @@ fn clocks_that_differ_by_three_percent_make_no_frame_older_than_it_is() {
     }
 }
 
-/// The inequality of docs/LINK.md, for every two frames: one that took D longer than one W before it has an age of at
-/// least D - W/16, and none is older than what it took longer than the fastest before it. A µs for rounding.
+/// The inequality of docs/LINK.md for every two frames: a frame that took D longer than one sent W before has an age of
+/// at least D - W/16. No frame's age exceeds its delay minus that of the fastest frame before it. A tolerance of 1 µs
+/// covers rounding.
 #[test]
-fn a_delay_is_seen_but_for_a_sixteenth_of_the_time_it_has_lasted() {
+fn age_underestimates_delay_by_at_most_a_sixteenth() {
     for seed in 0..300 {
         let mut random = Random::new(seed);
         let (wrong, period) = (random.below(61) as i64 - 30, [1000, 10_000, 100_000][random.below(3)]);
-        // A base that is held for some frames, a queue that grows, and jitter.
+        // A base delay for some frames, a growing queue, and jitter.
         let (mut base, mut growth) = (0, 0);
         let delay = || {
             if random.below(20) == 0 {
@@ -179,12 +181,12 @@ fn a_delay_is_seen_but_for_a_sixteenth_of_the_time_it_has_lasted() {
 }
 
 #[test]
-fn begun_anew_the_clocks_may_stand_otherwise() {
+fn reopening_resets_the_clock_tracking() {
     let mut guard = guard();
     assert_eq!(guard.take(1, Floats::Values(&[0.0; 3]), 1_000_000, 0), Ok(()));
     let old = guard.take(2, Floats::Values(&[0.0; 3]), 0, 10);
     assert_eq!(old, Err(Refused::Old { age: 1_000_010 }));
     guard.reopen();
-    assert_eq!(guard.newest(), None, "what came before is gone");
+    assert_eq!(guard.newest(), None, "the earlier observation is dropped");
     assert_eq!(guard.take(3, Floats::Values(&[0.0; 3]), 0, 20), Ok(()));
 }

@@ -1,10 +1,10 @@
-//! Limits as text.
+//! Limits in text form.
 
 use actq_controller::Limits;
 use actq_controller::limits::LimitsError;
 
 #[test]
-fn limits_are_read_written_and_refused() {
+fn limits_are_parsed_displayed_and_refused() {
     let limits = |low, high, rate| Ok(Limits { low, high, rate });
     let cases = [
         ("-1:1", limits(-1.0, 1.0, None)),

@@ -1,4 +1,4 @@
-//! The controller's decisions, one by one and together.
+//! The controller's decisions, separately and together.
 
 mod answers;
 mod endpoint;

@@ -1,4 +1,4 @@
-//! What is told from garbage: breadcrumbs, the scrubbed image; what feeds the watchdog.
+//! Breadcrumbs and the scrubbed image, against damage, and the feeding of the watchdog.
 
 use actq_controller::breadcrumb::{Record, WORDS};
 use actq_controller::progress::Progress;
@@ -10,7 +10,7 @@ use super::random::Random;
 const RECORD: Record = Record { crash: Crash::HardFault, pc: 0x0800_1234, detail: 0x0001_0000, ticks: 77, count: 2 };
 
 #[test]
-fn a_breadcrumb_is_found_and_nothing_else_is() {
+fn only_a_breadcrumb_is_found() {
     let words = RECORD.to_words();
     assert_eq!(Record::from_words(&words), Some(RECORD));
     for bit in 0..32 * WORDS {
@@ -25,7 +25,7 @@ fn a_breadcrumb_is_found_and_nothing_else_is() {
     for _ in 0..1_000_000 {
         let mut words = [0; WORDS];
         words.iter_mut().for_each(|word| *word = random.bits() as u32);
-        // As a crash would have it, so that only the checksum is left to tell.
+        // Valid codes, so that only the checksum can detect the damage.
         words[0] %= 5;
         assert_eq!(Record::from_words(&words), None);
     }
@@ -41,23 +41,24 @@ fn a_breadcrumb_is_reported_with_the_cause_of_the_reset() {
 }
 
 #[test]
-fn the_watchdog_is_fed_only_where_all_three_have_made_progress() {
+fn the_watchdog_needs_progress_of_all_three() {
     for made in 0..8u32 {
         let mut progress = Progress { link: made & 1 != 0, head: made & 2 != 0, output: made & 4 != 0 };
         assert_eq!(progress.missing(), 7 - made);
         let before = progress;
         assert_eq!(progress.feed(), made == 7);
-        // What was made before counts on until the others have made theirs.
+        // Earlier progress counts until the others make theirs.
         assert_eq!(progress, if made == 7 { Progress::default() } else { before });
     }
 }
 
 #[test]
-fn every_flipped_bit_of_an_image_is_noticed_by_the_next_whole_round() {
+fn the_scrub_detects_every_flipped_bit() {
     let image: Vec<u8> = (0..300u32).map(|i| (i * i) as u8).collect();
     for piece in [1, 7, 64, 299, 300, 1000] {
         let mut scrub = Scrub::new(&image);
-        let mut round = |image: &[u8]| (0..=image.len()).find_map(|_| scrub.advance(image, piece)).expect("it ends");
+        let mut round =
+            |image: &[u8]| (0..=image.len()).find_map(|_| scrub.advance(image, piece)).expect("the round ends");
         assert!(round(&image) && round(&image));
         for bit in (0..8 * image.len()).step_by(if piece == 64 { 1 } else { 37 }) {
             let mut decayed = image.clone();

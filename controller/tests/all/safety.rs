@@ -1,4 +1,4 @@
-//! Whatever happens in whatever order: what always holds.
+//! Invariants under any sequence of events.
 
 use actq_controller::{Axis, Check, Output, SafeAction, Safety};
 use actq_link::code::{Fault, State};
@@ -40,21 +40,21 @@ fn safe_actions() -> impl Strategy<Value = SafeAction> {
     ]
 }
 
-/// Limits around 0, from tiny to almost all of f32.
+/// Draws limits around 0, from tiny to almost the range of f32.
 fn axes() -> impl Strategy<Value = Axis> {
     let limit = prop_oneof![4 => 0.01..2.0f32, 1 => Just(f32::MAX), 1 => Just(0.0)];
     let rate = prop_oneof![4 => 0.001..1.0f32, 1 => Just(f32::INFINITY), 1 => Just(f32::MAX)];
     (limit.clone(), limit, rate, safe_actions())
-        .prop_map(|(low, high, rate, safe)| Axis::new(-low, high, rate, 0.0, safe).expect("the axis fits"))
+        .prop_map(|(low, high, rate, safe)| Axis::new(-low, high, rate, 0.0, safe).expect("the axis is valid"))
 }
 
-/// The largest change of an axis in a tick, with what rounding adds to it.
+/// Returns the largest change of an axis in a tick, including rounding.
 fn largest(axis: &Axis, step: f32, from: f32) -> f64 {
     let rounding = f64::from(from.abs().max(axis.high()).max(-axis.low())) * f64::from(f32::EPSILON);
     f64::from(step) + rounding
 }
 
-/// What must hold of the outputs of a tick, after those of the tick before.
+/// Checks the outputs of a tick against those of the previous tick.
 fn check_outputs(safety: &Safety<2>, before: &[Output; 2], now: &[Output; 2]) -> Result<(), TestCaseError> {
     for ((axis, before), now) in safety.axes().iter().zip(before).zip(now) {
         if let Output::Drive(value) = now {
@@ -89,7 +89,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
     #[test]
-    fn limits_hold_and_nothing_is_armed_that_should_not_be(
+    fn limits_hold_and_arming_needs_all_conditions(
         first in axes(), second in axes(), deadline in 1..10u32, seed: u32,
         events in prop::collection::vec(events(), 1..200),
     ) {
@@ -126,11 +126,11 @@ proptest! {
                     passed[*check] = *outcome;
                 }
                 Event::Arm { right_token } => {
-                    let told = safety.refusal();
+                    let refusal = safety.refusal();
                     let armed = safety.arm(if *right_token { token } else { token ^ 0x10 });
                     let may = *right_token && state != State::Armed && passed == [true; 5] && since_observation <= deadline;
                     prop_assert_eq!(armed.is_ok(), may);
-                    if *right_token { prop_assert_eq!(armed.err(), told, "the status says what arming would say"); }
+                    if *right_token { prop_assert_eq!(armed.err(), refusal, "the status names the refusal of arming"); }
                     if may { since_action = 0; }
                 }
                 Event::Disarm => {
@@ -152,29 +152,29 @@ proptest! {
     }
 }
 
-/// For every deadline, whatever the last observation's tick: the output moves up to the deadline, and not at the tick
-/// behind it.
+/// For every deadline and every tick of the last observation, the output moves until the deadline, and not at the tick
+/// after it.
 #[test]
-fn a_cut_cable_leads_to_the_safe_action_at_the_deadline_and_one_tick() {
+fn a_broken_cable_latches_one_tick_after_the_deadline() {
     for deadline in 1..50 {
-        let axis = Axis::new(-1e6, 1e6, 1.0, 0.0, SafeAction::Brake).expect("the axis fits");
+        let axis = Axis::new(-1e6, 1e6, 1.0, 0.0, SafeAction::Brake).expect("the axis is valid");
         let mut safety = Safety::new([axis], 1..=deadline, 0);
         Check::ALL.into_iter().for_each(|check| safety.check(check, true));
         safety.observed();
-        safety.arm(safety.token()).expect("nothing keeps it from arming");
+        safety.arm(safety.token()).expect("the controller may be armed");
         for _ in 0..7 {
             safety.observed();
-            safety.act(&[1e6]).expect("the action is good");
+            safety.act(&[1e6]).expect("the action is valid");
             safety.tick();
         }
         safety.observed();
         for tick in 1..=deadline {
-            safety.act(&[1e6]).expect("a head that still has something to say");
+            safety.act(&[1e6]).expect("the head still gives actions");
             assert!(matches!(safety.tick(), [Output::Drive(_)]), "deadline {deadline}, tick {tick}");
         }
         assert_eq!(safety.tick(), [Output::Brake], "deadline {deadline}");
         for _ in 0..100 {
-            // What comes too late does not unlatch.
+            // A late observation does not unlatch.
             safety.observed();
             assert_eq!(safety.act(&[1e6]), Ok(None));
             assert_eq!(safety.tick(), [Output::Brake]);
@@ -184,13 +184,13 @@ fn a_cut_cable_leads_to_the_safe_action_at_the_deadline_and_one_tick() {
 }
 
 #[test]
-fn a_head_that_gives_no_action_is_late_at_the_deadline_and_one_tick() {
-    let axis = Axis::new(-1.0, 1.0, 1.0, 0.0, SafeAction::Coast).expect("the axis fits");
+fn a_silent_head_latches_one_tick_after_the_deadline() {
+    let axis = Axis::new(-1.0, 1.0, 1.0, 0.0, SafeAction::Coast).expect("the axis is valid");
     let mut safety = Safety::new([axis], 1..=10, 0);
     Check::ALL.into_iter().for_each(|check| safety.check(check, true));
     safety.observed();
-    safety.arm(safety.token()).expect("nothing keeps it from arming");
-    safety.act(&[1.0]).expect("the action is good");
+    safety.arm(safety.token()).expect("the controller may be armed");
+    safety.act(&[1.0]).expect("the action is valid");
     for _ in 0..10 {
         safety.observed();
         assert_eq!(safety.tick(), [Output::Drive(1.0)]);

@@ -1,4 +1,4 @@
-//! Image slots: what runs after every update, and after every loss of power.
+//! Image slots: the image that runs after each update and after each loss of power.
 
 mod device;
 mod nor;

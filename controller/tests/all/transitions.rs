@@ -1,25 +1,25 @@
-//! Every state with every event, against the table of docs/SAFETY.md.
+//! Every event in every state, against the table of docs/SAFETY.md.
 
 use actq_controller::{Axis, Check, Output, SafeAction, Safety};
 use actq_link::code::{Fault, Refusal, State};
 
 const DEADLINE: u32 = 5;
 
-/// A controller of one axis that could be armed.
+/// Returns a controller of one axis that may be armed.
 pub(super) fn ready(safe: SafeAction) -> Safety<1> {
-    let axis = Axis::new(-1.0, 1.0, 0.1, 0.0, safe).expect("the axis fits");
+    let axis = Axis::new(-1.0, 1.0, 0.1, 0.0, safe).expect("the axis is valid");
     let mut safety = Safety::new([axis], 1..=DEADLINE, 1);
     Check::ALL.into_iter().for_each(|check| safety.check(check, true));
     safety.observed();
     safety
 }
 
-/// In the state, with an output of 0.3 behind it where it has one.
+/// Returns a controller in `state`, after an output of 0.3 if the state has outputs.
 pub(super) fn in_state(state: State, safe: SafeAction) -> Safety<1> {
     let mut safety = ready(safe);
     if state != State::Disarmed {
-        safety.arm(safety.token()).expect("nothing keeps it from arming");
-        safety.act(&[0.3]).expect("the action is good");
+        safety.arm(safety.token()).expect("the controller may be armed");
+        safety.act(&[0.3]).expect("the action is valid");
         for _ in 0..3 {
             safety.observed();
             safety.tick();
@@ -44,7 +44,7 @@ const STALE: Event = |s| {
     }
 };
 
-/// The event with the states that Disarmed, Armed and Latched go to.
+/// Events, each with the states after Disarmed, Armed and Latched.
 const TABLE: [(&str, Event, [State; 3]); 15] = {
     use State::{Armed, Disarmed, Latched};
     [
@@ -76,7 +76,7 @@ const TABLE: [(&str, Event, [State; 3]); 15] = {
 };
 
 #[test]
-fn every_event_in_every_state_leads_where_the_table_says() {
+fn every_transition_is_that_of_the_table() {
     for (name, event, to) in TABLE {
         for (from, to) in State::ALL.iter().zip(to) {
             let mut safety = in_state(*from, SafeAction::Hold);
@@ -84,19 +84,19 @@ fn every_event_in_every_state_leads_where_the_table_says() {
             event(&mut safety);
             assert_eq!(safety.state(), to, "{name} in {from:?}");
             if *from != to {
-                assert_ne!(safety.token(), token, "{name} in {from:?}: a request from before it must not count");
+                assert_ne!(safety.token(), token, "{name} in {from:?}: an earlier request must not be accepted");
             }
         }
     }
 }
 
 #[test]
-fn each_fault_latches_and_is_told() {
+fn each_fault_latches_and_is_reported() {
     for fault in Fault::ALL {
         let mut safety = in_state(State::Armed, SafeAction::Hold);
         safety.trip(*fault);
         assert_eq!((safety.state(), safety.fault()), (State::Latched, Some(*fault)));
-        // The first one stays.
+        // The first fault stays.
         safety.trip(Fault::Head);
         assert_eq!(safety.fault(), Some(*fault));
     }
@@ -111,7 +111,7 @@ fn each_fault_latches_and_is_told() {
 }
 
 #[test]
-fn arming_is_refused_for_each_check_that_has_failed_or_was_not_done() {
+fn arming_requires_every_check() {
     let refusals = [Refusal::Image, Refusal::SelfTest, Refusal::Clock, Refusal::Watchdog, Refusal::Hardware];
     for (check, refusal) in Check::ALL.into_iter().zip(refusals) {
         for state in [State::Disarmed, State::Latched] {
@@ -124,30 +124,30 @@ fn arming_is_refused_for_each_check_that_has_failed_or_was_not_done() {
             assert_eq!(safety.arm(safety.token()), Ok(()));
         }
     }
-    let axis = Axis::new(-1.0, 1.0, 0.1, 0.0, SafeAction::Coast).expect("the axis fits");
+    let axis = Axis::new(-1.0, 1.0, 0.1, 0.0, SafeAction::Coast).expect("the axis is valid");
     let mut new = Safety::new([axis], 1..=DEADLINE, 1);
     new.observed();
     for (check, refusal) in Check::ALL.into_iter().zip(refusals) {
-        assert_eq!(new.arm(new.token()), Err(refusal), "nothing is right until it was said");
+        assert_eq!(new.arm(new.token()), Err(refusal), "a check that was not made counts as failed");
         new.check(check, true);
     }
     assert_eq!(new.arm(new.token()), Ok(()));
 }
 
 #[test]
-fn arming_is_refused_without_a_fresh_observation_and_twice() {
+fn arming_requires_a_recent_observation_and_a_new_token() {
     let mut safety = ready(SafeAction::Hold);
     STALE(&mut safety);
     assert_eq!(safety.arm(safety.token()), Err(Refusal::Stale));
     safety.observed();
     let token = safety.token();
     assert_eq!(safety.arm(token), Ok(()));
-    assert_eq!(safety.arm(token), Err(Refusal::Token), "the same request once more");
+    assert_eq!(safety.arm(token), Err(Refusal::Token), "the same request again");
     assert_eq!(safety.arm(safety.token()), Err(Refusal::Armed));
 }
 
 #[test]
-fn an_axis_without_limits_keeps_from_arming() {
+fn an_axis_without_limits_prevents_arming() {
     let axis = Axis::new(0.0, 0.0, 1.0, 0.0, SafeAction::Hold).expect("an axis with one value");
     for (axes, refusal) in [([axis, Axis::STILL], Some(Refusal::Limits)), ([axis; 2], None)] {
         let mut safety = Safety::new(axes, 1..=DEADLINE, 1);
@@ -160,10 +160,10 @@ fn an_axis_without_limits_keeps_from_arming() {
 }
 
 #[test]
-fn safe_actions_do_what_they_say() {
+fn safe_actions_give_their_outputs() {
     let after = |safe, ticks| {
         let mut safety = in_state(State::Latched, safe);
-        (0..ticks).map(|_| safety.tick()[0]).last().expect("there is a tick")
+        (0..ticks).map(|_| safety.tick()[0]).last().expect("at least one tick")
     };
     let Output::Drive(held) = after(SafeAction::Hold, 1) else { panic!("hold drives") };
     assert!((held - 0.3).abs() < 1e-6);
@@ -176,17 +176,17 @@ fn safe_actions_do_what_they_say() {
 }
 
 #[test]
-fn armed_again_the_output_goes_on_from_where_it_is() {
+fn rearmed_outputs_continue_from_their_value() {
     let mut safety = in_state(State::Latched, SafeAction::Hold);
-    safety.arm(safety.token()).expect("nothing keeps it from arming");
+    safety.arm(safety.token()).expect("the controller may be armed");
     let Output::Drive(held) = safety.tick()[0] else { panic!("it holds until the first action") };
-    safety.act(&[-1.0]).expect("the action is good");
+    safety.act(&[-1.0]).expect("the action is valid");
     let Output::Drive(next) = safety.tick()[0] else { panic!("it drives") };
     assert!((held - next - 0.1).abs() < 1e-6);
 }
 
 #[test]
-fn axes_that_cannot_be_are_refused() {
+fn invalid_axes_are_refused() {
     let new = Axis::new;
     let cases = [
         new(f32::NAN, 1.0, 1.0, 0.0, SafeAction::Hold),

@@ -1,8 +1,8 @@
 //! Counted kernel calls: each prints a line `name bits group rows cols`, in the order of the counted regions.
 //!
 //! A region is a whole call: activations from f32, the product, and the results back in f32 with row scales and biases.
-//! What an image would hold stands in the image slot, so that its lines count as fetched from flash. The yardsticks are
-//! a naive loop in f32, and 8-bit rows with SXTB16 and SMLAD as one would write them with intrinsics.
+//! The image's data is in the image slot, so that its cache lines count as fetched from flash. The baselines are a
+//! naive loop in f32, and 8-bit rows with SXTB16 and SMLAD in the usual intrinsics style.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
@@ -28,7 +28,7 @@ mod firmware {
     const ROWS: usize = 512;
     const COLS: usize = 1024;
 
-    /// What an image holds.
+    /// The data of an image.
     #[repr(C)]
     struct Flash {
         codes: [u8; WEIGHTS],
@@ -56,7 +56,7 @@ mod firmware {
         let slot = (&raw const _image_slot_end as usize) - (&raw const _image_slot_start as usize);
         let fits = size_of::<Flash>() <= slot;
         // SAFETY: memory.x gives the slot's bounds, aligned to 4, in memory that nothing else uses; QEMU's code memory
-        // can be written. Every bit pattern is a value of the arrays' types, and this is the only reference.
+        // is writable. Every bit pattern is valid for the arrays' types, and this is the only reference.
         let flash = unsafe { (&raw mut _image_slot_start).as_mut() };
         host::exit(fits && flash.zip(ram).is_some_and(|(flash, ram)| run(flash, ram).is_some()))
     }
@@ -119,7 +119,7 @@ mod firmware {
         }
     }
 
-    /// Signed bytes 0 and 2, or 1 and 3, as halfwords.
+    /// Sign-extends bytes 0 and 2, or 1 and 3, to halfwords.
     macro_rules! sxtb16 {
         ($word:expr $(, $rotate:literal)?) => {{
             let pair: u32;
@@ -144,8 +144,8 @@ mod firmware {
         sum
     }
 
-    /// Four columns a step: a word of weights becomes the pairs (0, 2) and (1, 3), in which order the activations are
-    /// prepared.
+    /// Computes four columns per step: a word of weights becomes the pairs (0, 2) and (1, 3), the order in which the
+    /// activations are prepared.
     #[inline(never)]
     fn int8(
         weights: &[u8],

@@ -1,5 +1,6 @@
-//! The observer and the current loop: ten thousand ticks, of which every hundredth is a counted region. It prints the CRC-32 of all duty
-//! cycles' bits, the number of the test in `controller/tests/all/foc/motor.rs`, whose inputs these are.
+//! The observer and the current loop: ten thousand ticks, of which every hundredth is a counted region. It prints the
+//! CRC-32 of all duty cycles' bits, which the test in `controller/tests/all/foc/motor.rs` computes from the same
+//! inputs.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]

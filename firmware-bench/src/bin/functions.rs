@@ -1,6 +1,6 @@
-//! Counted functions: each prints a line `name elements hash`, in the order of the counted regions. The hash is of the
-//! bits of what was counted and, of functions and cells, of the results for values of every magnitude, which are not
-//! counted; `host-tests/tests/all/on_target/functions.rs` computes the same on the host.
+//! Counted functions: each prints a line `name elements hash`, in the order of the counted regions. The hash covers the
+//! counted results and, for functions and cells, the uncounted results for values of all magnitudes.
+//! `host-tests/tests/all/on_target/functions.rs` computes the same on the host.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]

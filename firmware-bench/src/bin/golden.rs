@@ -1,5 +1,5 @@
-//! Replays golden kernel cases from standard input (see `bench/src/golden.rs`) through the backend that was compiled in
-//! and through the portable one, and ends with a failure at the first sum that differs.
+//! Replays golden kernel cases from standard input (see `bench/src/golden.rs`) through the compiled backend and the
+//! portable one, and fails at the first sum that differs.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
@@ -18,7 +18,7 @@ mod firmware {
     use actq_kernels::layout::{Block, BlockShape, Lanes, Width};
     use actq_kernels::x::{Plan, Prepared, Scale};
 
-    /// Of the largest case, weights and activations.
+    /// Words of the largest case's weights and activations.
     const WORDS: usize = if cfg!(actq_small) { 1536 } else { 16 * 1024 };
     const ROWS: usize = if cfg!(actq_small) { 32 } else { 256 };
     const COLS: usize = if cfg!(actq_small) { 256 } else { 2048 };
@@ -49,10 +49,10 @@ mod firmware {
     }
 
     fn read(input: &File, words: &mut [u32]) -> Result<(), &'static str> {
-        if input.read_exact(bytemuck::cast_slice_mut(words)) { Ok(()) } else { Err("the stream is cut") }
+        if input.read_exact(bytemuck::cast_slice_mut(words)) { Ok(()) } else { Err("the stream is truncated") }
     }
 
-    /// Plays a case; false at the end of the stream.
+    /// Replays a case; returns `false` at the end of the stream.
     fn play(input: &File, buffer: &mut [u32]) -> Result<bool, &'static str> {
         let mut head = [0u32; 6];
         read(input, &mut head[..1])?;
@@ -72,7 +72,7 @@ mod firmware {
         let mut expected = [0i32; ROWS];
         let expected = expected.get_mut(..shape.padded_rows()).ok_or("the case is too large")?;
         if !input.read_exact(bytemuck::cast_slice_mut(expected)) {
-            return Err("the stream is cut");
+            return Err("the stream is truncated");
         }
         let block = Block::new(shape, &buffer[weights]).ok_or("shape")?;
         let x = Prepared::new(&buffer[x], &plan).ok_or("activations")?;
@@ -84,7 +84,7 @@ mod firmware {
             return Err("sums of the compiled backend differ");
         }
         if sums[shape.padded_rows()..].iter().any(|s| *s != 0x5555_5555) {
-            return Err("the compiled backend wrote behind its output");
+            return Err("the compiled backend wrote past its output");
         }
         sums = [0; ROWS];
         portable::gemv(Product::new(&block, &x, 0, &mut sums[..shape.padded_rows()]).map_err(|_| "mismatch")?);
@@ -95,8 +95,8 @@ mod firmware {
         Ok(true)
     }
 
-    /// The way from f32 to f32 on the case's numbers. Integers whose largest magnitude is the limit have the scale 1,
-    /// so the prepared vector must be the case's own, word for word.
+    /// Checks the path from f32 to f32 with the case's numbers. Integers whose largest magnitude is the limit have the
+    /// scale 1, so the prepared vector must equal the case's, word for word.
     fn float_path(block: &Block<'_>, x: &Prepared<'_>, sums: &[i32]) -> Result<(), &'static str> {
         let shape = block.shape();
         let mut floats = [0f32; COLS];
@@ -111,14 +111,14 @@ mod firmware {
         }
         let room = x.plan().room(shape.cols);
         if words[room..].iter().any(|w| *w != 0x5555_5555) {
-            return Err("the quantizer wrote behind its room");
+            return Err("the quantizer wrote past its buffer");
         }
         let scales: [u32; ROWS / 2] = core::array::from_fn(|i| 0x3c80_3f00 + 0x0001_0003 * i as u32);
         let start: [u32; ROWS] = core::array::from_fn(|i| (i as f32 - 7.5).to_bits());
         let rows = RowBlock { block: *block, scales: &scales, steps: &[], first_row: 3 };
         for in_y in [false, true] {
             let mut y = start.map(f32::from_bits);
-            rows.apply(x, scale, (!in_y).then_some(&start), &mut y).ok_or("the block's rows have no room")?;
+            rows.apply(x, scale, (!in_y).then_some(&start), &mut y).ok_or("the block's rows do not fit")?;
             for (i, y) in y.iter().enumerate() {
                 let start = f32::from_bits(start[i]);
                 let sum = i.checked_sub(3).and_then(|row| Some((row, *sums.get(row)?)));

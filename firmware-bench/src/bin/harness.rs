@@ -1,12 +1,11 @@
 //! The harness: checks its image, self-tests it, and runs it for a host.
 //!
-//! Without arguments it plays the image's self-test observations and prints the actions' bits. With the argument
-//! `serve` it reads observations from standard input and writes actions to standard output, in the protocol of
-//! `actq serve`. `poll N` does the same in polls of N instructions, `ops N` in polls of one operation each. `restart`
-//! saves the state before every step, resets, and restores it. Every step, or begin and each poll, is a counted region.
+//! Without arguments it replays the image's self-test observations and prints the actions' bits. With the argument
+//! `serve` it reads observations from standard input and writes actions to standard output, in the protocol of `actq
+//! serve`. `poll N` does the same in polls of N instructions, `ops N` in polls of one operation each. `restart` saves
+//! the state before every step, resets, and restores it. Every step, or begin and each poll, is a counted region.
 //!
-//! The image is the one in the slot, if there is one, else the one that was built in (environment variable
-//! `ACTQ_IMAGE`).
+//! The image is the one in the slot, if any, else the built-in one (environment variable `ACTQ_IMAGE`).
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
@@ -24,7 +23,7 @@ mod firmware {
     use actq_kernels::{Head, Image, StepError};
     use actq_link::{NO_ACTION, RESET, STEP};
 
-    /// Includes a file at an address that is a multiple of 4.
+    /// A wrapper that aligns an included file to 4 bytes.
     #[repr(C, align(4))]
     struct Aligned<T: ?Sized>(T);
     static BUILT_IN: &Aligned<[u8]> = &Aligned(*include_bytes!(env!(
@@ -32,11 +31,11 @@ mod firmware {
         "set ACTQ_IMAGE to the absolute path of the image to build in (`actq quantize` makes one)"
     )));
 
-    /// Scratch words; the image says how many it needs.
+    /// Scratch memory in words; the image's header has its need.
     const SCRATCH: usize = if cfg!(actq_small) { 1536 } else { 24 * 1024 };
-    /// The longest observation that `serve` takes.
+    /// Length of the longest observation for `serve`.
     const MAX_OBSERVATION: usize = if cfg!(actq_small) { 64 } else { 1024 };
-    /// The longest state that `restart` saves, in bytes.
+    /// Length of the longest state for `restart`, in bytes.
     const MAX_SAVED: usize = if cfg!(actq_small) { 1024 } else { 8192 };
 
     #[entry]
@@ -54,7 +53,7 @@ mod firmware {
 
     fn message(what: &str, detail: impl Display) -> Message {
         let mut text = Message::new();
-        // A text longer than the buffer is cut; nothing depends on it.
+        // A text longer than the buffer is truncated; nothing depends on it.
         let _ = write!(text, "{what}: {detail}");
         text
     }
@@ -63,7 +62,7 @@ mod firmware {
         let image = Image::new_checked(slot::image().unwrap_or(&BUILT_IN.0)).map_err(|e| message("image", e))?;
         let scratch = singleton!(: [u32; SCRATCH] = [0; SCRATCH]).ok_or_else(|| message("scratch", "taken twice"))?;
         let mut head = Head::new(image, scratch).map_err(|e| message("head", e))?;
-        // Once, and not within the first step that is counted.
+        // Now, and not within the first counted step.
         head.least_budget();
         head.self_test().map_err(|e| message("self-test", e))?;
         let arguments = host::arguments();
@@ -78,15 +77,15 @@ mod firmware {
         }
     }
 
-    /// How a step is run.
+    /// The way to run a step.
     #[derive(Clone, Copy)]
     enum Run {
         Whole,
         /// From a saved state.
         Restarts,
-        /// In polls of so many instructions.
+        /// In polls of this many instructions.
         Polls(u32),
-        /// In polls that also end behind each operation.
+        /// In polls that also end after each operation.
         Ops(u32),
     }
 
@@ -114,8 +113,7 @@ mod firmware {
         }
     }
 
-    /// Saves the state, forgets it, and restores it; where that fails, the state stays forgotten, and the actions show
-    /// it.
+    /// Saves the state, resets it, and restores it. If that fails, the state stays reset, and the actions differ.
     #[inline(never)]
     fn restart(head: &mut Head<'_, '_>) {
         let mut saved = [0; MAX_SAVED];
@@ -127,7 +125,7 @@ mod firmware {
         }
     }
 
-    /// Plays the self-test observations and prints each action's bits.
+    /// Replays the self-test observations and prints each action's bits.
     fn replay(head: &mut Head<'_, '_>) -> Result<(), Message> {
         let mut out = host::stdout().ok_or_else(|| message("output", "no semihosting host"))?;
         let image = *head.image();
@@ -146,8 +144,8 @@ mod firmware {
         Ok(())
     }
 
-    /// Answers requests of the pipe protocol from standard input until it ends. A step whose observation or whose
-    /// network leaves f32's range has no action: it is answered by NaNs.
+    /// Answers requests of the pipe protocol from standard input until it ends. A step without an action, because the
+    /// observation or the network leaves f32's range, is answered with NaNs.
     fn serve(head: &mut Head<'_, '_>, run: Run) -> Result<(), Message> {
         let input = host::File::open(c"/dev/stdin", false).ok_or_else(|| message("input", "cannot be opened"))?;
         let output = host::File::open(c"/dev/stdout", true).ok_or_else(|| message("output", "cannot be opened"))?;

@@ -1,8 +1,8 @@
-//! Counted products of 256 x 256 weights by the backend that was compiled in: each prints a line
-//! `backend bits lanes group`, in the order of the counted regions.
+//! Counted products of 256 x 256 weights by the compiled backend: each prints a line `backend bits lanes group`, in the
+//! order of the counted regions.
 //!
 //! A region is a whole call: activations from f32, the product, and the results back in f32 with row scales and biases.
-//! The results are compared with those of the plain reference, bit for bit.
+//! The results are compared with the plain reference's, bit for bit.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]

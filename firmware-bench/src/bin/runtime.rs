@@ -1,5 +1,5 @@
-//! The whole runtime, with steps as wholes, and nothing else (no host, no text): `cargo xtask budgets` measures its
-//! code. It is not run.
+//! The whole runtime with whole steps, and nothing else (no host, no text). `cargo xtask budgets` measures its code; it
+//! is not run.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
@@ -22,12 +22,12 @@ mod firmware {
     fn main() -> ! {
         let mut scratch = [0u32; 256];
         loop {
-            // What the compiler cannot see through stays in the code.
+            // The compiler cannot remove what it cannot see through.
             black_box(run(black_box(&[]), black_box(&mut scratch), black_box(&[])));
         }
     }
 
-    /// All that an application calls that does not cut its steps.
+    /// Makes all calls of an application that does not split its steps.
     fn run(image: &[u8], scratch: &mut [u32], observation: &[f32]) -> Option<f32> {
         let mut head = Head::new(Image::new_checked(image).ok()?, scratch).ok()?;
         head.self_test().ok()?;

@@ -1,8 +1,9 @@
-//! What holds the application up, in pieces between which the watchdog is fed: the check of an image that came over the
-//! link, the start that reads two slots, an image's own check, the slices of its self-test. Each is a counted region,
-//! whose name is printed.
+//! The application's long work, in pieces between which the watchdog is fed: the check of an image from the link, the
+//! start that reads two slots, an image's check, the slices of its self-test. Each is a counted region whose name is
+//! printed.
 //!
-//! The image is the one in the slot; standard input gives a public key, and the signature of the image with version 1.
+//! The image is the one in the slot; standard input provides a public key and the signature of the image with version
+//! 1.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
@@ -76,13 +77,13 @@ mod firmware {
         count::actq_count_begin();
         let opened = image::open(image, scratch, lengths, &mut feeds).is_ok();
         count::actq_count_end();
-        // Up to the first time it is fed there is nothing; then comes the check.
+        // Before the first feeding there is no work; then follows the check.
         writeln!(names, "turn\nimage").ok()?;
         (1..feeds.0).try_for_each(|_| writeln!(names, "slice")).ok()?;
         opened.then_some(())
     }
 
-    /// Ends a region and begins one each time that it is fed.
+    /// A watchdog that ends a region and begins one at each feeding.
     struct Feeds(usize);
 
     impl Watchdog for Feeds {
@@ -97,7 +98,7 @@ mod firmware {
         }
     }
 
-    /// An update up to its acknowledgement.
+    /// Makes an update until its acknowledgement.
     fn update(
         mut updater: Updater<Flash, Key>,
         image: &[u8],

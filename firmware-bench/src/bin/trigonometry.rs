@@ -1,5 +1,5 @@
-//! Counted calls of the functions that a current loop needs: each prints a line `name: hash`, in the order of the
-//! counted regions. `host-tests/tests/all/on_target/foc.rs` computes the same hashes on the host.
+//! Counted calls of a current loop's functions: each prints a line `name: hash`, in the order of the counted regions.
+//! `host-tests/tests/all/on_target/foc.rs` computes the same hashes on the host.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]

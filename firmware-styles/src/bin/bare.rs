@@ -1,4 +1,4 @@
-//! A bare loop: the control tick is an exception handler, the head runs below it in slices, and what both share is in a
+//! A bare loop: the control tick is an exception handler, the head runs below it in slices, and they share data in a
 //! critical section.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
@@ -18,7 +18,7 @@ mod firmware {
     use cortex_m_rt::{entry, exception};
     use critical_section::Mutex;
 
-    /// From the loop to the tick: the last action.
+    /// The last action, from the loop to the tick.
     static ACTION: Mutex<Cell<Option<Action>>> = Mutex::new(Cell::new(None));
 
     #[entry]
@@ -30,7 +30,7 @@ mod firmware {
         host::exit(false)
     }
 
-    /// The control tick, which interrupts whatever the loop does.
+    /// The control tick, which interrupts the loop.
     #[exception]
     fn SysTick() {
         static mut MOTORS: Motors = Motors::new();
@@ -38,7 +38,7 @@ mod firmware {
         MOTORS.tick(action);
     }
 
-    /// The loop; it ends where there is no head, or a step of it fails.
+    /// The loop; it ends if the head cannot be opened or a step fails.
     fn control(timer: SYST, scratch: &mut [u32]) -> Option<Infallible> {
         let mut head = open(scratch)?;
         let mut sensors = Sensors::new(head.image());
@@ -47,7 +47,7 @@ mod firmware {
             let Some(observation) = sensors.read() else { continue };
             head.begin(&observation).ok()?;
             let action = loop {
-                // What else the loop has to do has its place here: it waits for a slice at most.
+                // Other work of the loop belongs here: it waits at most for one slice.
                 if let Poll::Ready(action) = head.poll(SLICE).ok()? {
                     break action.try_into().ok()?;
                 }

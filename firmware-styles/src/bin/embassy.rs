@@ -1,6 +1,6 @@
-//! Embassy: the control tick is a task of an executor in an interrupt, the head a task of the one below, which lets
-//! others run between slices. Embassy has no timer for the board: where it has one, an `embassy_time::Ticker` takes the
-//! place of the signal of the timer.
+//! Embassy: the control tick is a task of an interrupt executor, the head a task of the thread executor, which runs
+//! other tasks between slices. Embassy has no timer for this board; where it has one, use an `embassy_time::Ticker`
+//! instead of the timer's signal.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
@@ -22,13 +22,13 @@ mod firmware {
 
     static CONTROL: InterruptExecutor = InterruptExecutor::new();
     static TICK: Signal<CriticalSectionRawMutex, ()> = Signal::new();
-    /// From the head to the tick: the newest action.
+    /// The newest action, from the head to the tick.
     static ACTION: Signal<CriticalSectionRawMutex, Action> = Signal::new();
 
     #[embassy_executor::main(entry = "cortex_m_rt::entry")]
     async fn main(_below: Spawner) {
-        // An interrupt that nothing else here uses, above all that runs in the thread.
-        CONTROL.start(Interrupt::SERIAL).spawn(tick().expect("it is the first"));
+        // An otherwise unused interrupt, with a higher priority than the thread.
+        CONTROL.start(Interrupt::SERIAL).spawn(tick().expect("the first task"));
         let _ = control().await;
         host::exit(false)
     }
@@ -40,11 +40,11 @@ mod firmware {
 
     #[cortex_m_rt::interrupt]
     fn SERIAL() {
-        // SAFETY: this is the executor's interrupt, which it has enabled when it was started.
+        // SAFETY: this is the executor's interrupt, which its start enabled.
         unsafe { CONTROL.on_interrupt() }
     }
 
-    /// The control tick, which interrupts whatever the tasks below do.
+    /// The control tick, which interrupts the tasks of the thread.
     #[embassy_executor::task]
     async fn tick() {
         let (mut motors, mut action) = (Motors::new(), None);
@@ -55,7 +55,7 @@ mod firmware {
         }
     }
 
-    /// The head's task; it ends where there is none, or a step of it fails.
+    /// The head's task; it ends if the head cannot be opened or a step fails.
     async fn control() -> Option<Infallible> {
         let mut head = open(singleton!(: [u32; SCRATCH] = [0; SCRATCH])?)?;
         let mut sensors = Sensors::new(head.image());
@@ -66,7 +66,7 @@ mod firmware {
                 if let Poll::Ready(action) = head.poll(SLICE).ok()? {
                     break action.try_into().ok()?;
                 }
-                // Other tasks wait for a slice at most.
+                // Other tasks wait at most for one slice.
                 yield_now().await;
             });
         }

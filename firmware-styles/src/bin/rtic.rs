@@ -1,5 +1,5 @@
-//! RTIC 2: the control tick is a hardware task, the head runs in `idle` in slices, and what both share is a resource,
-//! whose lock is a priority of the processor.
+//! RTIC 2: the control tick is a hardware task, the head runs in `idle` in slices, and they share a resource whose lock
+//! is a hardware priority.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
@@ -17,7 +17,7 @@ mod app {
 
     #[shared]
     struct Shared {
-        /// From the loop to the tick: the last action.
+        /// The last action, from the loop to the tick.
         action: Option<Action>,
     }
 
@@ -32,7 +32,7 @@ mod app {
         (Shared { action: None }, Local { motors: Motors::new(), timer: Some(cx.core.SYST) })
     }
 
-    /// The control tick, which interrupts whatever the loop does.
+    /// The control tick, which interrupts the loop.
     #[task(binds = SysTick, priority = 2, shared = [action], local = [motors])]
     fn tick(mut cx: tick::Context) {
         let action = cx.shared.action.lock(|action| *action);
@@ -45,16 +45,16 @@ mod app {
         host::exit(false)
     }
 
-    /// The loop; it ends where there is no head, or a step of it fails.
-    fn control(timer: &mut Option<SYST>, scratch: &mut [u32], mut tell: impl FnMut(Action)) -> Option<Infallible> {
+    /// The loop; it ends if the head cannot be opened or a step fails.
+    fn control(timer: &mut Option<SYST>, scratch: &mut [u32], mut publish: impl FnMut(Action)) -> Option<Infallible> {
         let mut head = open(scratch)?;
         let mut sensors = Sensors::new(head.image());
         start_tick(timer.take()?);
         loop {
             let Some(observation) = sensors.read() else { continue };
             head.begin(&observation).ok()?;
-            tell(loop {
-                // What else the loop has to do has its place here: it waits for a slice at most.
+            publish(loop {
+                // Other work of the loop belongs here: it waits at most for one slice.
                 if let Poll::Ready(action) = head.poll(SLICE).ok()? {
                     break action.try_into().ok()?;
                 }

@@ -245,7 +245,7 @@ fn a_controller_is_watched_streamed_to_and_updated_by_the_command() -> Result<()
     succeeded(&controller.actq("set", &["high", "--axis", "2", "50"])?)?;
     assert_eq!(succeeded(&controller.actq("get", &["high", "--axis", "2"])?)?, "50\n");
     failed(&controller.actq("set", &["low", "-101"])?, 1, &["lower limit", "outside the parameter's range"])?;
-    failed(&controller.actq("get", &["low", "--axis", "3"])?, 1, &["no such parameter or axis"])?;
+    failed(&controller.actq("get", &["low", "--axis", "3"])?, 1, &["unknown parameter or axis"])?;
 
     let (recording, log) = (recording.display().to_string(), path("log.npz"));
     let arguments = [&path("old.actq"), &recording, "--arm", "--rate", "50", "--log", &log];
@@ -263,7 +263,11 @@ fn a_controller_is_watched_streamed_to_and_updated_by_the_command() -> Result<()
     failed(&push("wrong.actq", &["--signature", &path("wrong.sig")])?, 1, &["self-test failed"])?;
     let told = succeeded(&push("new.actq", &["--signature", &path("new.sig")])?)?;
     assert!(told.contains("new runs, version 2"), "{told}");
-    failed(&push("old.actq", &["--signature", &path("old.sig")])?, 1, &["lower than one that ran before"])?;
+    failed(
+        &push("old.actq", &["--signature", &path("old.sig")])?,
+        1,
+        &["lower than that of an image that already ran"],
+    )?;
     assert!(succeeded(&controller.actq("watch", &["--once"])?)?.contains("slot "));
     failed(&controller.actq("stream", &arguments)?, 1, &["runs another image", "actq link push"])?;
     let arguments = [&path("new.actq"), &recording, "--rate", "50", "--log", &log];

@@ -1,4 +1,4 @@
-//! A sender and a receiver with a bad line between them.
+//! A sender and a receiver with a faulty line between them.
 
 use std::collections::HashSet;
 
@@ -6,8 +6,7 @@ use actq_link::{Floats, Message, Receiver, Sender, frame};
 
 use super::random::Random;
 
-/// Values of an observation: their bits are the frame's number and what follows from it, so that each tells whether it
-/// is right.
+/// Values of an observation. Their bits follow from the frame's number, so the receiver can check each.
 const VALUES: usize = 12;
 
 fn observation(number: u32) -> [f32; VALUES] {
@@ -16,22 +15,22 @@ fn observation(number: u32) -> [f32; VALUES] {
 
 /// Frames that the line has seen, which it can send again.
 const REMEMBERED: usize = 1000;
-/// Of a hundred frames, those that something happens to.
+/// Faulty frames in a hundred.
 const FAULTS: usize = 30;
 
-/// What a line does to a frame.
+/// A fault of the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum LineFault {
     Loss,
     Duplicate,
-    /// The frame comes behind the next one.
+    /// The frame arrives after the next one.
     Swap,
     Truncate,
     FlipBits,
-    /// A run of bits, as of a disturbance.
+    /// A run of damaged bits, as from a disturbance.
     Burst,
     Garbage,
-    /// An old frame comes once more.
+    /// An old frame arrives again.
     Replay,
     /// The zero between two frames is lost.
     Join,
@@ -60,7 +59,7 @@ struct Line {
 }
 
 impl Line {
-    /// What comes out for a frame that goes in, and whether the frame is whole in it.
+    /// Appends to `out` what arrives when `frame` is sent. Returns `true` if the frame is whole in it.
     fn carry(&mut self, frame: &[u8], out: &mut Vec<u8>) -> bool {
         let held = self.held.take();
         let fault = (self.random.below(100) < FAULTS).then(|| LINE_FAULTS[self.random.below(LINE_FAULTS.len())]);
@@ -123,12 +122,12 @@ impl Line {
     }
 }
 
-/// A million frames, of which 30 in 100 meet a fault: every message is one that was sent, whole, with its own number,
-/// and newer than the one before.
+/// In a million frames, 30 in 100 of them faulty, each received message was sent, is whole, has its own number, and is
+/// newer than the previous one.
 #[test]
-fn no_message_of_a_bad_frame_in_a_million_frames_at_30_in_100_faults() {
+fn a_faulty_line_gives_no_wrong_message() {
     const FRAMES: u32 = 1_000_000;
-    // The numbers wrap on the way.
+    // The numbers wrap during the test.
     const FIRST: u32 = u32::MAX - FRAMES / 2;
     let mut sender = Sender::new(FIRST);
     let mut receiver = Receiver::<{ frame::bytes(4 * VALUES) }>::new();
@@ -138,26 +137,25 @@ fn no_message_of_a_bad_frame_in_a_million_frames_at_30_in_100_faults() {
     for number in 0..FRAMES {
         let message = observation(number);
         let message = Message::Observation(Floats::Values(&message));
-        let frame = sender.frame(&message, number.wrapping_mul(1000), &mut buffer).expect("there is room");
+        let frame = sender.frame(&message, number.wrapping_mul(1000), &mut buffer).expect("the buffer is large enough");
         out.clear();
         whole += u32::from(line.carry(frame, &mut out));
         for byte in &out {
             let Some(received) = receiver.push(*byte) else { continue };
             let number = received.sequence.wrapping_sub(FIRST);
-            assert!(last.is_none_or(|last| number > last), "frame {number} behind {last:?}");
+            assert!(last.is_none_or(|last| number > last), "frame {number} after {last:?}");
             assert_eq!(received.message, Message::Observation(Floats::Values(&observation(number))));
             assert_eq!(received.micros, number.wrapping_mul(1000));
             (last, messages) = (Some(number), messages + 1);
         }
     }
-    assert_eq!(line.faults.len(), LINE_FAULTS.len(), "every fault has happened");
+    assert_eq!(line.faults.len(), LINE_FAULTS.len(), "each fault occurred");
     let counters = receiver.counters();
     assert_eq!(counters.good, messages);
     assert_eq!(counters.malformed, 0);
     assert!(counters.damaged > FRAMES / 10 && counters.repeated > FRAMES / 50);
-    // A frame that is whole is lost only where the end of a damaged one before it is missing, or a held one has passed
-    // it.
+    // A whole frame is lost only if the end of the damaged frame before it is missing, or if a held frame overtook it.
     assert!(messages > whole - FRAMES / 10, "{messages} of {whole} whole frames");
-    // All that is missing is counted, but what was lost behind the last message.
+    // All missing frames are counted, except those lost after the last message.
     assert!(counters.good + counters.lost + 20 > FRAMES, "{counters:?}");
 }

@@ -1,4 +1,4 @@
-//! The link: what is sent arrives as it was, and what is damaged, repeated or made up does not arrive at all.
+//! The link delivers messages unchanged, and delivers no damaged, repeated or forged ones.
 
 mod faults;
 mod messages;

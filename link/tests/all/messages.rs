@@ -8,7 +8,7 @@ use proptest::prelude::*;
 /// Memory for the longest payload.
 pub(super) const LONGEST: usize = frame::bytes(frame::MAX_PAYLOAD);
 
-/// What a message borrows.
+/// The data that a message borrows.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Content {
     values: Vec<f32>,
@@ -20,14 +20,14 @@ pub(super) fn contents() -> impl Strategy<Value = Content> {
     let values = prop::collection::vec(any::<u32>().prop_map(f32::from_bits), 0..300);
     let bytes = prop_oneof![
         prop::collection::vec(any::<u8>(), 0..1000),
-        // Runs without a zero are cut by the stuffing every 254 bytes.
+        // Stuffing splits runs without a zero every 254 bytes.
         prop::collection::vec(1..=255u8, 230..530),
     ];
     let signature = prop::option::of(any::<[u8; 64]>());
     (values, bytes, signature).prop_map(|(values, bytes, signature)| Content { values, bytes, signature })
 }
 
-/// All kinds of messages with this content and these numbers.
+/// Returns a message of each kind with this content and these numbers.
 pub(super) fn all<'a>(content: &'a Content, n: &[u32; 6], pick: usize) -> Vec<Message<'a>> {
     let [token, a, b, c, d, e] = *n;
     let parameter = Parameter::ALL[pick % Parameter::ALL.len()];
@@ -72,7 +72,7 @@ pub(super) fn all<'a>(content: &'a Content, n: &[u32; 6], pick: usize) -> Vec<Me
     ]
 }
 
-/// Bit for bit: a NaN differs from itself.
+/// Compares bit for bit, because a NaN differs from itself.
 pub(super) fn same(a: &Message<'_>, b: &Message<'_>) -> bool {
     let text = |message: &Message<'_>| match message {
         Message::Set { value, .. } | Message::Value { value, .. } => {
@@ -96,7 +96,7 @@ proptest! {
         let mut buffer = [0; frame::wire_bytes(frame::MAX_PAYLOAD)];
         let messages = all(&content, &numbers, pick);
         for (i, message) in messages.iter().enumerate() {
-            let wire = sender.frame(message, micros, &mut buffer).expect("there is room for the longest");
+            let wire = sender.frame(message, micros, &mut buffer).expect("the buffer takes the longest");
             let (end, stuffed) = wire.split_last().expect("a frame is not empty");
             prop_assert!(*end == 0 && !stuffed.contains(&0));
             let mut arrived = 0;
@@ -116,7 +116,7 @@ proptest! {
     }
 
     #[test]
-    fn a_frame_needs_as_much_memory_as_is_said_and_no_more(content in contents()) {
+    fn wire_bytes_is_the_memory_of_a_frame(content in contents()) {
         let message = Message::Chunk { offset: 0, bytes: &content.bytes };
         let room = frame::wire_bytes(4 + content.bytes.len());
         let mut buffer = vec![0; room];
@@ -125,19 +125,19 @@ proptest! {
         prop_assert!(len.is_some_and(|len| len <= room));
         let mut small = vec![0; len.unwrap_or(0) - 1];
         prop_assert_eq!(sender.frame(&message, 0, &mut small), None);
-        prop_assert_eq!(sender.next(), 1, "a frame that was not made has no number");
+        prop_assert_eq!(sender.next(), 1, "a frame that does not fit uses no number");
     }
 }
 
 #[test]
-fn a_frame_longer_than_the_receivers_memory_is_dropped_and_the_next_one_is_not() {
+fn only_frames_that_fit_the_receiver_give_messages() {
     const SMALL: usize = frame::bytes(8);
     let (mut sender, mut receiver) = (Sender::default(), Receiver::<SMALL>::new());
     let mut buffer = [0; 4096];
     let mut good = Vec::new();
     for values in [&[0.0; 2][..], &[0.0; 3], &[0.0; 900], &[1.0; 2]] {
         let message = Message::Observation(Floats::Values(values));
-        let wire = sender.frame(&message, 0, &mut buffer).expect("there is room");
+        let wire = sender.frame(&message, 0, &mut buffer).expect("the buffer is large enough");
         good.extend(wire.iter().filter_map(|byte| receiver.push(*byte).map(|r| r.sequence)));
     }
     assert_eq!(good, [0, 3]);

@@ -1,4 +1,4 @@
-//! What is drawn: the same seed gives the same test on every machine.
+//! Random numbers: the same seed gives the same test on every machine.
 
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng as _, SeedableRng as _};

@@ -1,4 +1,4 @@
-//! The bytes on the wire: the example of docs/LINK.md, every damage to it, and frames that lie.
+//! The bytes on the wire: the example in docs/LINK.md, damaged frames, and frames with invalid content.
 
 use actq_link::code::{Parameter, Refusal, Report, State};
 use actq_link::report::Counters;
@@ -7,12 +7,12 @@ use actq_link::{Floats, Message, Receiver, Sender, frame};
 use super::messages::{Content, LONGEST, all};
 use super::random::Random;
 
-/// The messages that a receiver finds, as text.
+/// Returns the messages that a receiver finds, as text.
 pub(super) fn found<const N: usize>(receiver: &mut Receiver<N>, bytes: &[u8]) -> Vec<String> {
     bytes.iter().filter_map(|byte| receiver.push(*byte).map(|received| format!("{received:?}"))).collect()
 }
 
-/// A frame of these bytes, which need not be a message.
+/// Returns a frame of these bytes, which need not be a message.
 fn frame_of(content: &[u8]) -> Vec<u8> {
     let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(content);
     let frame = [content, &crc.to_le_bytes()].concat();
@@ -29,14 +29,15 @@ fn content(version: u8, kind: u8, sequence: u32, payload: &[u8]) -> Vec<u8> {
 
 const DOCUMENTATION: &str = include_str!("../../../docs/LINK.md");
 
-/// The hexadecimal bytes of the documentation's example behind `label`.
+/// Reads the hexadecimal bytes after `label` in the documentation's example.
 fn example(label: &str) -> Vec<u8> {
-    let line = DOCUMENTATION.lines().find_map(|line| line.trim().strip_prefix(label)).expect("the label stands there");
+    let line =
+        DOCUMENTATION.lines().find_map(|line| line.trim().strip_prefix(label)).expect("docs/LINK.md has the label");
     line.split_whitespace().map(|byte| u8::from_str_radix(byte, 16).expect("a byte in hexadecimal")).collect()
 }
 
 #[test]
-fn the_example_in_the_documentation_is_what_is_sent_and_received() {
+fn the_documented_example_is_sent_and_received() {
     let (wire, plain) = (example("wire:"), example("frame:"));
     let message = Message::Observation(Floats::Values(&[1.0, -0.5, 0.0]));
     let mut buffer = [0; 64];
@@ -49,7 +50,7 @@ fn the_example_in_the_documentation_is_what_is_sent_and_received() {
     assert_eq!((received.sequence, received.micros, received.message), (258, 1_000_000, message));
 }
 
-/// The table of each code names every one of them.
+/// Each table of codes lists all codes.
 #[test]
 fn the_documentation_lists_every_code() {
     let rows = |code: u8, name: String| (format!("| {code} | `{name}`"), name);
@@ -75,11 +76,11 @@ fn the_documentation_lists_every_message() {
 }
 
 #[test]
-fn no_flipped_bit_and_no_cut_gives_a_message() {
+fn flipped_bits_and_truncated_frames_give_no_message() {
     let mut buffer = [0; 128];
     let values: Vec<f32> = (0..16u8).map(f32::from).collect();
     let message = Message::Observation(Floats::Values(&values));
-    let wire = Sender::default().frame(&message, 5, &mut buffer).expect("there is room").to_vec();
+    let wire = Sender::default().frame(&message, 5, &mut buffer).expect("the buffer is large enough").to_vec();
     for bit in 0..8 * wire.len() {
         let mut damaged = wire.clone();
         damaged[bit / 8] ^= 1 << (bit % 8);
@@ -92,14 +93,14 @@ fn no_flipped_bit_and_no_cut_gives_a_message() {
         let mut receiver = Receiver::<LONGEST>::new();
         let mut messages = found(&mut receiver, &wire[..cut]);
         messages.extend(found(&mut receiver, &[0]));
-        assert_eq!(messages, Vec::<String>::new(), "cut behind {cut} bytes");
-        // The frame behind a cut one is found.
-        assert_eq!(found(&mut receiver, &wire).len(), 1, "cut behind {cut} bytes");
+        assert_eq!(messages, Vec::<String>::new(), "truncated after {cut} bytes");
+        // The frame after a truncated one is found.
+        assert_eq!(found(&mut receiver, &wire).len(), 1, "truncated after {cut} bytes");
     }
 }
 
 #[test]
-fn frames_with_a_right_checksum_and_a_wrong_content_are_counted_and_give_nothing() {
+fn frames_with_invalid_content_are_only_counted() {
     let wrong: [(&str, Vec<u8>); 18] = [
         ("version 0", content(0, 3, 1, &[])),
         ("version 2", content(2, 3, 1, &[])),
@@ -130,7 +131,7 @@ fn frames_with_a_right_checksum_and_a_wrong_content_are_counted_and_give_nothing
     }
     let expected = Counters { malformed: wrong.len() as u32, damaged: too_short.len() as u32, ..Counters::default() };
     assert_eq!(receiver.counters(), expected);
-    // They have not moved the window either.
+    // They have not moved the window.
     assert_eq!(found(&mut receiver, &frame_of(&content(1, 3, 1, &[]))).len(), 1);
 }
 
@@ -140,7 +141,7 @@ fn noise_gives_no_message() {
     let mut receiver = Receiver::<{ frame::bytes(64) }>::new();
     for _ in 0..4_000_000 / 8 {
         let mut bytes = random.bits().to_le_bytes();
-        // Plenty of frame ends, so that there are plenty of short frames.
+        // Many frame ends, and so many short frames.
         bytes[0] &= 0x0f;
         for byte in bytes {
             assert_eq!(receiver.push(byte), None);

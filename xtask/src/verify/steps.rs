@@ -125,7 +125,7 @@ impl Steps {
             arguments.extend(["--package", "actq-kernels"]);
             arguments.extend(FIRMWARE.iter().flat_map(|name| ["--package", name]));
             arguments.extend(["--lib", "--bin", "harness"]);
-            arguments.extend(target.board().shows.iter().flat_map(|binary| ["--bin", binary]));
+            arguments.extend(target.board().binaries.iter().flat_map(|binary| ["--bin", binary]));
             arguments.extend(["--features", target.feature().unwrap_or_default()]);
             arguments.extend(DENY);
             self.add_of_firmware(&format!("lints of the firmware, {target:?}"), &arguments, &[]);

@@ -1,5 +1,5 @@
-//! ADC 1 (RM0090, section 13): two phase currents on PC0 and PC1, measured when TIM 1's channel 4 says so. Not run in
-//! QEMU, which has neither the timer nor voltages.
+//! ADC 1 (RM0090, section 13): two phase currents on PC0 and PC1, measured at TIM 1's channel 4. It is not tested in
+//! QEMU, which emulates neither the timer nor voltages.
 
 use stm32f4::stm32f405 as pac;
 
@@ -9,7 +9,7 @@ const CHANNELS: [u8; 2] = [10, 11];
 const TRIGGER: u8 = 0b0000;
 const RISING: u8 = 0b01;
 
-/// The currents.
+/// The phase currents.
 #[derive(Debug)]
 pub struct Currents(pac::ADC1);
 
@@ -17,8 +17,8 @@ impl Currents {
     pub(super) fn new(adc: pac::ADC1, rcc: &pac::RCC, pins: &pac::GPIOC) -> Self {
         rcc.ahb1enr().modify(|_, w| w.gpiocen().set_bit());
         rcc.apb2enr().modify(|_, w| w.adc1en().set_bit());
-        // SAFETY: every value is in its field's range. Of a sequence of two, the third and the fourth place count. The
-        // ADC's clock is half of the bus: too fast at 84 MHz, so a quarter.
+        // SAFETY: every value is in its field's range. A sequence of two uses the third and the fourth place. The ADC's
+        // default clock, half of the bus, is too fast at 84 MHz; a quarter is not.
         unsafe {
             pins.moder().modify(|_, w| w.moder0().bits(0b11).moder1().bits(0b11));
             (*pac::ADC_COMMON::ptr()).ccr().modify(|_, w| w.adcpre().bits(0b01));
@@ -29,7 +29,7 @@ impl Currents {
         Self(adc)
     }
 
-    /// Both, 0 to 4095, where they were measured since the last call.
+    /// Returns both, from 0 to 4095, if they were measured since the last call.
     pub(super) fn take(&mut self) -> Option<[u16; 2]> {
         if !self.0.sr().read().jeoc().bit() {
             return None;

@@ -1,6 +1,6 @@
-//! The registers of the flash controller (RM0090, section 3.9), the supply's voltage (section 5.2.3), and what has to
-//! hold while the processor stands still. In which order they are used is in `../flash.rs`. QEMU has none of them: they
-//! read as 0 there.
+//! The registers of the flash controller (RM0090, section 3.9) and the supply voltage detector (section 5.2.3), and the
+//! preconditions of a stalled processor. `../flash.rs` has the sequences. QEMU does not emulate these registers: they
+//! read as 0.
 
 use core::cell::Cell;
 
@@ -9,16 +9,16 @@ use stm32f4::stm32f405 as pac;
 use super::{clock, pwm, watchdog};
 use crate::stm32f405::flash::{Part, Register};
 
-/// The detector's highest threshold, 2.9 V: with its spread still above the 2.7 V that a word needs.
+/// The detector's highest threshold, 2.9 V: including its tolerance it is above the 2.7 V that programming words needs.
 const VOLTAGE: u8 = 0b111;
 
-/// The flash controller, and the part of the flash that it writes.
+/// The flash controller and the part of the flash that it may write.
 #[derive(Debug)]
 pub struct Controller {
     registers: pac::FLASH,
     power: pac::PWR,
     memory: &'static [Cell<u8>],
-    /// Of the core.
+    /// Core clock in kHz.
     khz: u32,
 }
 
@@ -37,7 +37,7 @@ impl Part for Controller {
     fn read(&self, register: Register) -> u32 {
         match register {
             Register::Access => self.registers.acr().read().bits(),
-            // It can only be written.
+            // The register is write-only.
             Register::Key => 0,
             Register::Status => self.registers.sr().read().bits(),
             Register::Control => self.registers.cr().read().bits(),
@@ -45,8 +45,8 @@ impl Part for Controller {
     }
 
     fn write(&mut self, register: Register, value: u32) {
-        // SAFETY: any value is allowed; what the controller does with one is written memory of its sectors alone, of
-        // which `../flash.rs` chooses those of `memory`, whose cells may change.
+        // SAFETY: any value is allowed; the controller only changes memory in its sectors, of which `../flash.rs`
+        // selects those of `memory`, whose cells may change.
         unsafe {
             match register {
                 Register::Access => self.registers.acr().write(|w| w.bits(value)),
@@ -55,7 +55,7 @@ impl Part for Controller {
                 Register::Control => self.registers.cr().write(|w| w.bits(value)),
             };
         }
-        // What was written before is there, and the memory is read anew, as it may have changed.
+        // Earlier writes complete, and later reads see memory that may have changed.
         cortex_m::asm::dsb();
     }
 
@@ -77,11 +77,11 @@ impl Part for Controller {
     }
 
     fn is_supplied(&self) -> bool {
-        // A detector that is off sees nothing.
+        // A detector that is off reports nothing.
         self.power.cr().read().pvde().bit() && !self.power.csr().read().pvdo().bit()
     }
 
-    fn patiently<R>(&mut self, milliseconds: u16, work: impl FnOnce(&mut Self) -> R) -> Option<R> {
-        watchdog::patiently(milliseconds, self.khz, || work(self))
+    fn with_watchdog_timeout<R>(&mut self, milliseconds: u16, work: impl FnOnce(&mut Self) -> R) -> Option<R> {
+        watchdog::with_watchdog_timeout(milliseconds, self.khz, || work(self))
     }
 }

@@ -1,9 +1,8 @@
-//! The registers of an STM32F405 by its peripheral access crate (RM0090): clocks, USART 1, TIM 1, ADC 1, the
+//! The registers of an STM32F405 through its peripheral access crate (RM0090): clocks, USART 1, TIM 1, ADC 1, the
 //! independent watchdog, the flash.
 //!
-//! The crates that own whole parts, stm32f4xx-hal and embassy-stm32, wait without end for a crystal that does not
-//! start. Here every wait has an end, and the part runs on from its own oscillator; so the registers are set below
-//! them.
+//! stm32f4xx-hal and embassy-stm32 wait forever for a crystal that does not start. Here every wait has a limit, and the
+//! part then runs from its internal oscillator. So this module sets the registers directly.
 
 mod adc;
 mod clock;
@@ -30,38 +29,37 @@ use crate::vectors::interrupts;
 // USART 1.
 interrupts!(37 of 82);
 
-/// Bits of an interrupt's priority.
+/// Number of bits of an interrupt's priority.
 pub const NVIC_PRIO_BITS: u8 = 4;
-/// Words of scratch memory for a head.
+/// Scratch memory for a head, in words.
 pub const SCRATCH: usize = super::SCRATCH;
-/// Whether a non-maskable interrupt says that the watchdog's time has ended: nothing here asks for one.
+/// `true` if a non-maskable interrupt announces the watchdog's reset; this part has none.
 pub const WATCHDOG_NMI: bool = false;
-/// Whether the flash may be written while the outputs are driven: the tick stands still then, for up to 2 s.
+/// `true` if the flash may be written while the outputs are driven; here writing stalls the tick for up to 2 s.
 pub const FLASH_WHILE_ARMED: bool = false;
 
-/// The board.
+/// The parts of the board.
 pub type Parts = seams::Parts<Uart, Watchdog, Stage>;
-/// Its flash, as far as it is for updates.
+/// The board's flash for updates.
 pub type Flash = super::flash::Flash<Controller>;
 
-/// Where the flash begins.
+/// Address of the flash.
 const FLASH: usize = 0x0800_0000;
 
-/// Sets the part up: 168 MHz where the crystal starts, else 16 MHz; its serial port at `baud`; the power stage off, at
-/// 20 kHz.
+/// Sets the part up: 168 MHz if the crystal starts, else 16 MHz; the serial port at `baud`; the power stage off, at 20
+/// kHz.
 ///
 /// Pins: PB6 transmits, PB7 receives; PA8 to PA10 and PB13 to PB15 are the phases and their complements, PB12 low
 /// breaks; PC0 and PC1 are currents.
 ///
 /// # Safety
 ///
-/// To be called once: all of the part's peripherals are the caller's.
+/// Call it once: the caller owns all of the part's peripherals.
 pub unsafe fn start(baud: u32) -> Parts {
-    // SAFETY: nobody else has the peripherals, as the caller promises.
+    // SAFETY: nothing else uses the peripherals, as the caller promises.
     let p = unsafe { pac::Peripherals::steal() };
     let cause = cause(&p.RCC);
-    // A debugger that halts the program stops the watchdog, and the power stage's timer, whose outputs are then off
-    // (section 17.3.21).
+    // A debugger's halt stops the watchdog and the power stage's timer, whose outputs are then off (section 17.3.21).
     p.DBGMCU.apb1_fz().modify(|_, w| w.dbg_iwdg_stop().set_bit());
     p.DBGMCU.apb2_fz().modify(|_, w| w.dbg_tim1_stop().set_bit());
     let clock = clock::start(&p.RCC, &p.FLASH, &p.PWR);
@@ -73,16 +71,16 @@ pub unsafe fn start(baud: u32) -> Parts {
     Parts { clock, cause, uart, watchdog, stage }
 }
 
-/// The part's own flash, of which `memory` is to be written.
+/// Returns the part's flash, of which `memory` may be written.
 ///
 /// # Safety
 ///
-/// To be called once, behind [`start`], and from where the watchdog is fed. `memory` is the part's flash, and nothing
-/// but the flash that is given here changes it.
+/// Call it once, after [`start`], from the loop that feeds the watchdog. `memory` is in the part's flash, and only the
+/// returned value changes it.
 pub unsafe fn flash(memory: &'static [Cell<u8>]) -> Flash {
-    // SAFETY: `start` has set up what it wanted of these, and nobody else has them since.
+    // SAFETY: `start` has finished with these peripherals, and nothing else uses them.
     let p = unsafe { pac::Peripherals::steal() };
-    // SAFETY: as above. The count of cycles is for the watchdog alone.
+    // SAFETY: as above. Only the watchdog uses the cycle counter.
     let mut core = unsafe { cortex_m::Peripherals::steal() };
     core.DCB.enable_trace();
     core.DWT.enable_cycle_counter();
@@ -90,11 +88,11 @@ pub unsafe fn flash(memory: &'static [Cell<u8>]) -> Flash {
     Flash::new(Controller::new(p.FLASH, p.PWR, &p.RCC, memory), begin)
 }
 
-/// What the reset flags say, which are cleared for the next time.
+/// Reads the reset flags and clears them for the next reset.
 fn cause(rcc: &pac::RCC) -> Cause {
     let flags = rcc.csr().read();
     rcc.csr().modify(|_, w| w.rmvf().set_bit());
-    // The pin's flag is set by every reset, that of the power by the first one.
+    // Every reset sets the pin's flag, and power-on sets that of the power.
     if flags.wdgrstf().bit() || flags.wwdgrstf().bit() {
         Cause::Watchdog
     } else if flags.sftrstf().bit() {

@@ -1,8 +1,8 @@
-//! TIM 1 as the power stage's PWM (RM0090, section 17): three phases and their complements with dead time, counted up
-//! and down, and a break input that switches all six off without the program. In the middle of a period it makes the
-//! ADC measure.
+//! TIM 1 as the power stage's PWM (RM0090, section 17): three phases and their complements with dead time,
+//! center-aligned, and a break input that switches all six off in hardware. It triggers the ADC in the middle of a
+//! period.
 //!
-//! QEMU has no TIM 1: nothing here has been run. `docs/BOARDS.md` says what a bench has to show.
+//! QEMU does not emulate TIM 1, so this module has never run. `docs/BOARDS.md` lists the checks on hardware.
 
 use core::convert::Infallible;
 
@@ -12,15 +12,15 @@ use stm32f4::stm32f405 as pac;
 use super::adc::Currents;
 use crate::seams::Stage;
 
-/// Periods a second.
+/// PWM frequency in Hz.
 const PWM_HZ: u32 = 20_000;
-/// Nanoseconds in which neither switch of a phase is on.
+/// Dead time of a phase's switches, in nanoseconds.
 const DEAD_NS: u32 = 500;
-/// The longest dead time that is as many cycles as its field says.
-const DEAD_LONGEST: u32 = 127;
+/// Longest dead time, in cycles, whose field equals its number of cycles.
+const MAX_DEAD: u32 = 127;
 
 const ALTERNATE: u8 = 1;
-/// A channel that is on below its compare value, and takes a new one at the end of a period.
+/// PWM mode 1: a channel is on below its compare value, which is updated at the end of a period.
 const PWM_MODE: u8 = 0b110;
 
 /// The power stage.
@@ -43,10 +43,10 @@ impl Pwm {
         rcc.ahb1enr().modify(|_, w| w.gpioaen().set_bit().gpioben().set_bit());
         rcc.apb2enr().modify(|_, w| w.tim1en().set_bit());
         let top = (timer_hz / (2 * PWM_HZ)) as u16;
-        let dead = (DEAD_NS * (timer_hz / 1_000_000)).div_ceil(1000).min(DEAD_LONGEST) as u8;
+        let dead = (DEAD_NS * (timer_hz / 1_000_000)).div_ceil(1000).min(MAX_DEAD) as u8;
         // SAFETY: every value is in its field's range.
         unsafe {
-            // Counted up and down, compare values taken when the count turns.
+            // Center-aligned; compare values are updated when the count reverses.
             timer.cr1().write(|w| w.cms().bits(0b01).arpe().set_bit());
             timer.arr().write(|w| w.bits(top.into()));
             timer
@@ -55,10 +55,11 @@ impl Pwm {
             timer
                 .ccmr2_output()
                 .write(|w| w.oc3m().bits(PWM_MODE).oc3pe().set_bit().oc4m().bits(PWM_MODE).oc4pe().set_bit());
-            // Channel 4 has no pin: it asks the ADC to measure at the top, where all lower switches are on.
+            // Channel 4 has no pin: it triggers the ADC at the top, where all lower switches are on.
             timer.ccr4().write(|w| w.bits(u32::from(top) - 1));
-            // Off until `enable`, and on no break by itself (AOE is 0); a low level or an open pin breaks; driven low
-            // when off. The lock keeps dead time, break and idle levels as they are until the next reset.
+            // Off until `enable`, and never on again automatically after a break (AOE is 0). A low level or an open pin
+            // breaks. Outputs are driven low when off. The lock protects dead time, break and idle levels until the
+            // next reset.
             timer
                 .bdtr()
                 .write(|w| w.dtg().bits(dead).lock().bits(0b01).ossi().set_bit().ossr().set_bit().bke().set_bit());
@@ -68,7 +69,7 @@ impl Pwm {
                 w.cc3e().set_bit().cc3ne().set_bit().cc4e().set_bit()
             });
             timer.cr1().modify(|_, w| w.cen().set_bit());
-            // The pins last, when what they show is off.
+            // The pins last, when their outputs are off.
             b.pupdr().modify(|_, w| w.pupdr12().bits(0b10));
             a.afrh().modify(|_, w| w.afrh8().bits(ALTERNATE).afrh9().bits(ALTERNATE).afrh10().bits(ALTERNATE));
             b.afrh().modify(|_, w| {
@@ -87,9 +88,9 @@ impl Pwm {
     }
 }
 
-/// Whether the outputs are on, by the register, whoever has the power stage.
+/// Returns `true` if the register says that the outputs are on, independently of the power stage's owner.
 pub(super) fn is_driving() -> bool {
-    // SAFETY: only read, which changes nothing.
+    // SAFETY: reading changes nothing.
     unsafe { &*pac::TIM1::ptr() }.bdtr().read().moe().bit()
 }
 
@@ -145,8 +146,8 @@ impl SetDutyCycle for Phase {
 
     fn set_duty_cycle(&mut self, duty: u16) -> Result<(), Infallible> {
         let duty = u32::from(duty.min(self.top));
-        // SAFETY: the timer runs for as long as the program does; a compare register is written whole, each by one
-        // phase alone.
+        // SAFETY: the timer runs as long as the program does; each compare register is written as a whole, by one phase
+        // only.
         let timer = unsafe { &*pac::TIM1::ptr() };
         // SAFETY: any value up to the top is allowed.
         unsafe {

@@ -1,4 +1,4 @@
-//! USART 1 on PB6 and PB7 (RM0090, section 30), byte by byte with its interrupt.
+//! USART 1 on PB6 and PB7 (RM0090, section 30), byte by byte in its interrupt.
 
 use stm32f4::stm32f405 as pac;
 
@@ -15,8 +15,8 @@ impl Usart {
     pub(super) fn new(usart: pac::USART1, rcc: &pac::RCC, pins: &pac::GPIOB, bus_hz: u32, baud: u32) -> Self {
         rcc.ahb1enr().modify(|_, w| w.gpioben().set_bit());
         rcc.apb2enr().modify(|_, w| w.usart1en().set_bit());
-        // SAFETY: values in the fields' ranges, for pins that only this port uses. The receiver is pulled up: a cable
-        // that is cut is an idle line.
+        // SAFETY: values in the fields' ranges, for pins that only this port uses. The receiver has a pull-up, so a
+        // broken cable is an idle line.
         unsafe {
             pins.afrl().modify(|_, w| w.afrl6().bits(ALTERNATE).afrl7().bits(ALTERNATE));
             pins.pupdr().modify(|_, w| w.pupdr7().bits(0b01));
@@ -38,8 +38,8 @@ impl Uart for Usart {
         if !state.rxne().bit() && !wrong {
             return None;
         }
-        // Reading the state and then the byte clears the flags. An overrun has lost the byte behind this one; what
-        // counts is that something is missing.
+        // Reading the state and then the byte clears the flags. An overrun lost the byte after this one, which also
+        // counts as lost.
         let byte = self.0.dr().read().dr().bits() as u8;
         Some(if wrong { Err(Lost) } else { Ok(byte) })
     }
@@ -53,7 +53,7 @@ impl Uart for Usart {
         room
     }
 
-    fn ask_for_room(&mut self, on: bool) {
+    fn set_transmit_interrupt(&mut self, on: bool) {
         self.0.cr1().modify(|_, w| w.txeie().bit(on));
     }
 }

@@ -1,4 +1,4 @@
-//! The independent watchdog (RM0090, section 21). How long its ticks are is in `../patience.rs`.
+//! The independent watchdog (RM0090, section 21). `../watchdog_time.rs` has the length of its ticks.
 
 use core::sync::atomic::{AtomicU16, Ordering};
 
@@ -9,20 +9,20 @@ use stm32f4::stm32f405::iwdg::RegisterBlock;
 
 use super::wait::wait;
 use crate::seams::Watchdog;
-use crate::stm32f405::patience::{LONGEST, ticks};
+use crate::stm32f405::watchdog_time::{MAX_TICKS, ticks};
 
 const OPEN: u16 = 0x5555;
 const START: u16 = 0xcccc;
 const FEED: u16 = 0xaaaa;
 
-/// Divided by 32: a tick is about a millisecond.
+/// Divides by 32: a tick is about a millisecond.
 const DIVIDER: u8 = 3;
-/// Reads until the registers count as taken; they take 5 cycles of 17 kHz at most, and the watchdog starts with its
-/// reset values where they do not.
-const TAKEN: u32 = 1_000_000;
+/// Largest number of reads until the registers are updated, which takes at most 5 cycles of 17 kHz. If they are not,
+/// the watchdog starts with its reset values.
+const UPDATE_READS: u32 = 1_000_000;
 
-/// The ticks that [`Watchdog::start`] was asked for. (The register has them only once they are taken.)
-static TICKS: AtomicU16 = AtomicU16::new(LONGEST - 1);
+/// The ticks of the last [`Watchdog::start`]. (The register has them only after its update.)
+static TICKS: AtomicU16 = AtomicU16::new(MAX_TICKS - 1);
 
 /// The independent watchdog.
 #[derive(Debug)]
@@ -35,32 +35,32 @@ impl Iwdg {
 }
 
 fn key(iwdg: &RegisterBlock, key: u16) {
-    // SAFETY: the register takes any key, and does nothing on those that it does not know.
+    // SAFETY: the register takes any key, and ignores unknown ones.
     iwdg.kr().write(|w| unsafe { w.bits(key) });
 }
 
-/// Sets the time anew to so many ticks and one, and starts it; false where that is not taken.
+/// Sets the timeout to `ticks` + 1 ticks and restarts it; returns `false` if the registers are not updated.
 fn set(iwdg: &RegisterBlock, ticks: u16) -> bool {
     key(iwdg, OPEN);
     // SAFETY: values in the fields' ranges: 3 of 0 to 7, 12 bits.
     unsafe {
         iwdg.pr().write(|w| w.pr().bits(DIVIDER));
-        iwdg.rlr().write(|w| w.rl().bits(ticks & (LONGEST - 1)));
+        iwdg.rlr().write(|w| w.rl().bits(ticks & (MAX_TICKS - 1)));
     }
-    let taken = wait(TAKEN, || iwdg.sr().read().bits() == 0);
+    let taken = wait(UPDATE_READS, || iwdg.sr().read().bits() == 0);
     if taken {
         key(iwdg, FEED);
     }
     taken
 }
 
-/// Does `work` with a time of so many milliseconds at least, and sets the one before again; `None` where the first one
-/// is not taken, with nothing done. To be called where the watchdog is fed: by the loop. Where the work has taken
-/// longer, by the cycles of the core, of which `khz` are a millisecond, or where its own time is not taken again, it
-/// does not return, and the watchdog resets the board.
-pub(super) fn patiently<R>(milliseconds: u16, khz: u32, work: impl FnOnce() -> R) -> Option<R> {
-    // SAFETY: the registers are there for as long as the program runs; besides the loop, which waits for this, nothing
-    // writes them.
+/// Does `work` with a timeout of at least `milliseconds`, then restores the previous one. Returns `None`, with nothing
+/// done, if the watchdog does not accept the timeout. Only the loop that feeds the watchdog may call it. It does not
+/// return, and the watchdog resets the board, if the work took longer, measured in core cycles (`khz` in a
+/// millisecond), or if the previous timeout cannot be restored.
+pub(super) fn with_watchdog_timeout<R>(milliseconds: u16, khz: u32, work: impl FnOnce() -> R) -> Option<R> {
+    // SAFETY: the registers exist as long as the program runs; only the loop, which waits for this function, writes
+    // them.
     let iwdg = unsafe { &*pac::IWDG::ptr() };
     let outcome = set(iwdg, ticks(milliseconds)).then(|| {
         let begun = DWT::cycle_count();
@@ -78,7 +78,7 @@ pub(super) fn patiently<R>(milliseconds: u16, khz: u32, work: impl FnOnce() -> R
 
 impl Watchdog for Iwdg {
     fn start(&mut self, milliseconds: u16) -> bool {
-        if !(1..=LONGEST).contains(&milliseconds) {
+        if !(1..=MAX_TICKS).contains(&milliseconds) {
             return false;
         }
         TICKS.store(milliseconds - 1, Ordering::Relaxed);

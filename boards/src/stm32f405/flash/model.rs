@@ -1,5 +1,5 @@
-//! The flash controller of an STM32F405 for tests, with the rules of RM0090, section 3, and a supply that may fail in
-//! the course of any write. A rule that only a wrong driver breaks, and that the part has no flag for, panics.
+//! A model of the STM32F405's flash controller for tests, with the rules of RM0090, section 3, and a supply that may
+//! fail during any write. It panics when a driver violates a rule for which the part has no flag.
 
 use core::cell::Cell;
 
@@ -8,10 +8,10 @@ use super::{
     WORDS, WRPERR, longest_erase, sector,
 };
 
-/// The widths that PSIZE has.
+/// Mask of PSIZE.
 const PSIZE: u32 = 0b11 << 8;
 
-/// A part with flash from some sector on.
+/// A part with flash from a given sector on.
 #[derive(Clone, Debug)]
 pub struct Model {
     memory: Vec<Cell<u8>>,
@@ -19,40 +19,40 @@ pub struct Model {
     access: u32,
     status: Cell<u32>,
     control: u32,
-    /// Keys that were right so far; `None` after a wrong one, until a reset.
+    /// Number of correct keys so far; `None` after a wrong one, until a reset.
     keys: Option<usize>,
-    /// Reads of the status until what was begun has ended.
+    /// Remaining reads of the status until the operation ends.
     left: Cell<u32>,
-    /// Milliseconds of all operations so far: each read of the status that finds one takes one.
+    /// Milliseconds of all operations so far: each read of the status during an operation takes one.
     now: Cell<u64>,
-    /// Milliseconds that the watchdog waits for, where it was given more than its own time.
-    patience: Option<u16>,
-    /// What the caches have was erased.
+    /// Extended timeout of the watchdog in milliseconds, if one is set.
+    timeout: Option<u16>,
+    /// `true` if a cache has erased data.
     pub is_stale: bool,
-    /// Milliseconds that an operation takes.
+    /// Duration of an operation in milliseconds.
     pub takes: u32,
-    /// Sectors that are write-protected, a bit each.
+    /// Write-protected sectors, one bit each.
     pub protected: u32,
-    /// Flags that the next operation raises, instead of being done.
+    /// Error flags that the next operation raises instead of being done.
     pub raises: u32,
-    /// The power stage is on.
+    /// `true` if the power stage is on.
     pub is_driving: bool,
-    /// The supply is high enough.
+    /// `true` if the supply voltage is sufficient.
     pub is_supplied: bool,
-    /// The watchdog takes another time.
-    pub is_lenient: bool,
-    /// There is a controller: without one, as in QEMU, all its registers read as 0.
-    pub is_there: bool,
+    /// `true` if the watchdog accepts another timeout.
+    pub accepts_timeout: bool,
+    /// `true` if the controller exists: without one, as in QEMU, all its registers read as 0.
+    pub exists: bool,
     /// Writes to registers and memory so far.
     pub done: usize,
-    /// In the course of which of these the supply fails. From there on nothing changes, and registers read as 0.
+    /// Number of the write during which the supply fails. After it nothing changes, and registers read as 0.
     pub fails_at: Option<usize>,
-    /// The watchdog was not fed, and has reset the part: as if the supply had failed.
+    /// `true` if the watchdog reset the part, with the effect of a supply failure.
     pub is_reset: bool,
     random: u64,
 }
 
-/// What becomes of a write.
+/// Outcome of a write.
 #[derive(PartialEq, Eq)]
 enum Outcome {
     Whole,
@@ -61,7 +61,7 @@ enum Outcome {
 }
 
 impl Model {
-    /// After power-on: locked, both caches on, with `memory` as the flash from `begin` on.
+    /// Creates the part after power-on: locked, both caches on, with `memory` as the flash from `begin` on.
     pub fn new(memory: Vec<u8>, begin: u32, seed: u64) -> Self {
         Self {
             memory: memory.into_iter().map(Cell::new).collect(),
@@ -72,15 +72,15 @@ impl Model {
             keys: Some(0),
             left: Cell::new(0),
             now: Cell::new(0),
-            patience: None,
+            timeout: None,
             is_stale: false,
             takes: 2,
             protected: 0,
             raises: 0,
             is_driving: false,
             is_supplied: true,
-            is_lenient: true,
-            is_there: true,
+            accepts_timeout: true,
+            exists: true,
             done: 0,
             fails_at: None,
             is_reset: false,
@@ -88,13 +88,13 @@ impl Model {
         }
     }
 
-    /// Power goes and comes back.
+    /// Returns the part after a power cycle.
     #[must_use]
     pub fn restarted(self) -> Self {
         Self { memory: self.memory, ..Self::new(Vec::new(), self.begin, self.random) }
     }
 
-    /// The memory's bytes.
+    /// Returns the memory's bytes.
     pub fn bytes(&self) -> Vec<u8> {
         self.memory.iter().map(Cell::get).collect()
     }
@@ -111,7 +111,7 @@ impl Model {
     }
 
     fn is_off(&self) -> bool {
-        !self.is_there || self.is_reset || self.fails_at.is_some_and(|at| self.done > at)
+        !self.exists || self.is_reset || self.fails_at.is_some_and(|at| self.done > at)
     }
 
     /// SplitMix64.
@@ -136,12 +136,12 @@ impl Model {
         let number = self.control >> SNB & 0xf;
         assert!(number < SECTORS && self.control & PG == 0, "no such erase: {:#x}", self.control);
         assert!(!self.is_driving && self.is_supplied, "an erase that must not begin");
-        assert!(self.patience >= Some(longest_erase(number)), "the watchdog would end an erase");
+        assert!(self.timeout >= Some(longest_erase(number)), "the watchdog would end an erase");
         let protected = if self.protected & 1 << number == 0 { 0 } else { WRPERR };
         if self.raises | protected != 0 {
             return self.raise(self.raises | protected);
         }
-        // Some bits are ones already. How many depends on the moment: few, about half, or almost all.
+        // Some bits are ones already: few, about half, or almost all, depending on the moment.
         let moment = self.random() % 3;
         let begin = self.begin;
         for at in sector(number).map(|at| (at - begin) as usize) {
@@ -159,7 +159,7 @@ impl Model {
     }
 
     fn control(&mut self, value: u32, outcome: &Outcome) {
-        // The bus stalls until the end.
+        // The bus stalls until the operation ends.
         self.now.set(self.now.get() + u64::from(self.left.take()));
         self.status.set(self.status.get() & !BSY);
         if self.control & LOCK != 0 {
@@ -209,9 +209,9 @@ impl Part for Model {
 
     fn write(&mut self, register: Register, value: u32) {
         let outcome = self.outcome();
-        // A register is set or not.
+        // A register is written completely or not at all.
         let is_start = register == Register::Control && value & STRT != 0;
-        if !self.is_there || outcome == Outcome::Nothing || outcome == Outcome::Part && !is_start {
+        if !self.exists || outcome == Outcome::Nothing || outcome == Outcome::Part && !is_start {
             return;
         }
         match register {
@@ -232,7 +232,7 @@ impl Part for Model {
 
     fn program(&mut self, at: u32, word: u32) {
         let outcome = self.outcome();
-        if !self.is_there || outcome == Outcome::Nothing {
+        if !self.exists || outcome == Outcome::Nothing {
             return;
         }
         assert!(self.status.get() & BSY == 0 && !self.is_driving && self.is_supplied, "a write that must not begin");
@@ -264,14 +264,14 @@ impl Part for Model {
         self.is_supplied
     }
 
-    fn patiently<R>(&mut self, milliseconds: u16, work: impl FnOnce(&mut Self) -> R) -> Option<R> {
-        if !self.is_lenient {
+    fn with_watchdog_timeout<R>(&mut self, milliseconds: u16, work: impl FnOnce(&mut Self) -> R) -> Option<R> {
+        if !self.accepts_timeout {
             return None;
         }
-        self.patience = Some(milliseconds);
+        self.timeout = Some(milliseconds);
         let begun = self.now.get();
         let outcome = work(self);
-        self.patience = None;
+        self.timeout = None;
         self.is_reset |= self.now.get() - begun > milliseconds.into();
         (!self.is_reset).then_some(outcome)
     }

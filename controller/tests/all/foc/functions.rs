@@ -2,17 +2,17 @@
 
 use std::f64::consts::PI;
 
-use actq_controller::foc::functions::{MOST_RADIANS, atan2, inverse_root_below, sin_cos};
+use actq_controller::foc::functions::{MAX_RADIANS, atan2, inverse_root_below, sin_cos};
 
-/// The angle from one vector to another, in degrees.
+/// Returns the angle from one vector to another, in degrees.
 fn degrees_between([x, y]: [f64; 2], [u, v]: [f64; 2]) -> f64 {
     (x * v - y * u).atan2(x * u + y * v).abs().to_degrees()
 }
 
 #[test]
-fn sine_and_cosine_are_a_unit_vector_of_the_angle() {
+fn sine_and_cosine_form_a_unit_vector() {
     let (mut angle, mut length) = (0.0f64, 0.0f64);
-    for range in [PI as f32, MOST_RADIANS] {
+    for range in [PI as f32, MAX_RADIANS] {
         for i in -1_000_000..=1_000_000i32 {
             let radians = range * (i as f32 / 1e6);
             let (sin, cos) = sin_cos(radians);
@@ -26,7 +26,7 @@ fn sine_and_cosine_are_a_unit_vector_of_the_angle() {
 }
 
 #[test]
-fn arctangent_is_right_at_every_angle_and_length() {
+fn arctangent_is_accurate_at_every_angle_and_length() {
     let mut worst = 0.0f64;
     for length in [0.5f32, 1.0, 1.5, 1e3] {
         for i in -500_000..=500_000 {
@@ -42,9 +42,9 @@ fn arctangent_is_right_at_every_angle_and_length() {
     }
 }
 
-/// All numbers of two powers of two, and so of all of them: the estimate depends on the exponent's parity alone.
+/// All numbers of two octaves, which represent all octaves: the estimate depends only on the exponent's parity.
 #[test]
-fn inverse_root_is_below_the_exact_one_and_close() {
+fn inverse_root_is_below_and_close() {
     let root = |square: f32| f64::from(square * inverse_root_below(square));
     let (mut below, mut above) = (0.0f64, 0.0f64);
     for bits in 1f32.to_bits()..4f32.to_bits() {
@@ -53,7 +53,7 @@ fn inverse_root_is_below_the_exact_one_and_close() {
         (below, above) = (below.max(-share), above.max(share));
     }
     assert!((0.0017..0.001_76).contains(&below), "{below}");
-    // Rounding alone: a share of f32's last bit, which the current loop's reach leaves to it.
+    // Only rounding: a share of f32's last bit, for which the current loop's limit has a margin.
     assert!(above < 2.4e-7, "{above}");
     for square in [0.0, 1e-45, 1e-40, f32::MIN_POSITIVE, f32::MAX] {
         let (root, exact) = (root(square), f64::from(square).sqrt());

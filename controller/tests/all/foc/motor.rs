@@ -2,8 +2,8 @@
 
 use actq_controller::foc::{CurrentLoop, Gains, Measured, Observer, Rotor, Tick};
 
-/// A permanent-magnet synchronous motor of the size of a quadruped's: equations in the rotor's axes, in f64, integrated
-/// by the midpoint rule in 50 steps a control tick.
+/// A permanent-magnet synchronous motor of the size of a quadruped's, in the rotor's axes, in f64, integrated by the
+/// midpoint rule in 50 steps per control tick.
 struct Motor {
     d: f64,
     q: f64,
@@ -11,7 +11,7 @@ struct Motor {
     angle: f64,
     /// Electrical speed in rad/s.
     speed: f64,
-    /// Whether the rotor is held.
+    /// `true` if the rotor is held.
     locked: bool,
 }
 
@@ -21,7 +21,7 @@ const FLUX: f64 = 5e-3;
 const PAIRS: f64 = 14.0;
 const INERTIA: f64 = 2e-4;
 const SUPPLY: f64 = 24.0;
-/// 8 kHz.
+/// Control period in seconds: 8 kHz.
 const TICK: f64 = 125e-6;
 
 impl Motor {
@@ -34,7 +34,7 @@ impl Motor {
         (d_slope, (vq - RESISTANCE * q - self.speed * (INDUCTANCE * d + FLUX)) / INDUCTANCE)
     }
 
-    /// One tick with duty cycles on the bridges.
+    /// Simulates one tick with these duty cycles.
     fn run(&mut self, duties: [f32; 3]) {
         const STEPS: usize = 50;
         let step = TICK / STEPS as f64;
@@ -63,14 +63,14 @@ impl Motor {
 }
 
 fn current_loop() -> CurrentLoop {
-    // 500 Hz.
+    // A bandwidth of 500 Hz.
     CurrentLoop::new(Gains::for_motor(RESISTANCE as f32, INDUCTANCE as f32, 3141.6, TICK as f32))
 }
 
-/// The ticks of a run, and the motor's true currents behind each.
+/// Runs the loop; returns each tick with the motor's true currents after it.
 fn run(motor: &mut Motor, control: &mut CurrentLoop, ticks: usize, q: f32) -> Vec<(Tick, f64, f64)> {
     let tick = |_| {
-        let tick = control.step(&motor.measure(), Rotor { d: 0.0, q }).expect("all is finite");
+        let tick = control.step(&motor.measure(), Rotor { d: 0.0, q }).expect("all values are finite");
         motor.run(tick.duties);
         (tick, motor.d, motor.q)
     };
@@ -78,7 +78,7 @@ fn run(motor: &mut Motor, control: &mut CurrentLoop, ticks: usize, q: f32) -> Ve
 }
 
 #[test]
-fn a_held_motors_current_follows_a_step_within_a_millisecond_and_without_overshoot() {
+fn current_follows_a_step_without_overshoot() {
     let (mut motor, mut control) = (Motor::new(true), current_loop());
     let ticks = run(&mut motor, &mut control, 80, 20.0);
     // Five time constants of 500 Hz, 1.6 ms.
@@ -86,11 +86,11 @@ fn a_held_motors_current_follows_a_step_within_a_millisecond_and_without_oversho
         assert!(d.abs() < 0.1 && *q < 20.0 * 1.05, "tick {i}: {d} {q}");
         assert!(i < 13 || (q - 20.0).abs() < 1.0, "tick {i}: {q}");
     }
-    assert!((motor.q - 20.0).abs() < 0.02, "no error stays");
+    assert!((motor.q - 20.0).abs() < 0.02, "no error remains");
 }
 
 #[test]
-fn a_free_motor_speeds_up_to_what_the_supply_allows_and_brakes_again() {
+fn a_free_motor_reaches_top_speed_and_brakes() {
     let (mut motor, mut control) = (Motor::new(false), current_loop());
     let ticks = run(&mut motor, &mut control, 160, 10.0);
     let late = &ticks[40..];
@@ -99,10 +99,10 @@ fn a_free_motor_speeds_up_to_what_the_supply_allows_and_brakes_again() {
         "the currents are held while it speeds up"
     );
     run(&mut motor, &mut control, 8000, 10.0);
-    // The flux' voltage uses up the supply.
+    // The flux' voltage takes all of the supply.
     let top = SUPPLY / 3f64.sqrt() / FLUX;
     assert!((0.8..1.1).contains(&(motor.speed / top)), "{} of {top} rad/s", motor.speed);
-    // The loop was at its limit for a second; the current turns within a few ticks all the same.
+    // The loop was at its limit for a second; the current still turns within a few ticks.
     let ticks = run(&mut motor, &mut control, 16, -10.0);
     assert!(ticks[15].2 < -5.0, "{}", ticks[15].2);
     let speed = motor.speed;
@@ -110,10 +110,10 @@ fn a_free_motor_speeds_up_to_what_the_supply_allows_and_brakes_again() {
     assert!(motor.speed < 0.9 * speed, "it brakes");
 }
 
-/// CRC-32 of the bits of all duty cycles in ten thousand ticks whose inputs are computed with nothing but f32: the same
-/// number on every machine.
+/// The CRC-32 of all duty cycles' bits in ten thousand ticks is the same on every machine. The inputs are computed in
+/// f32 only.
 #[test]
-fn ten_thousand_ticks_have_the_same_bits_everywhere() {
+fn ticks_have_the_same_bits_everywhere() {
     let mut control = CurrentLoop::new(Gains { proportional: 0.188_5, integral: 0.039_27 });
     let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
     let mut digest = crc.digest();
@@ -124,7 +124,7 @@ fn ten_thousand_ticks_have_the_same_bits_everywhere() {
         (sin, cos) = (0.999_315_6 * sin + 0.036_991_56 * cos, 0.999_315_6 * cos - 0.036_991_56 * sin);
         let angle = observer.step(sin, cos, 1.5).expect("a turning magnet");
         let target = Rotor { d: 0.0, q: f32::from(i % 997) * 0.04 - 20.0 };
-        let tick = control.step(&Measured { phases, angle, supply: 24.0 }, target).expect("all is finite");
+        let tick = control.step(&Measured { phases, angle, supply: 24.0 }, target).expect("all values are finite");
         for (phase, duty) in phases.iter_mut().zip(tick.duties) {
             digest.update(&duty.to_bits().to_le_bytes());
             *phase = 0.9 * *phase + 3.0 * (duty - 0.5);

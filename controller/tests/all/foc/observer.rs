@@ -1,17 +1,17 @@
-//! The observer, with a sensor that turns.
+//! The observer, with a turning sensor.
 
 use std::f64::consts::TAU;
 
 use actq_controller::foc::Observer;
 
-/// Degrees from one angle to another, in radians.
+/// Returns the degrees between two angles in radians.
 fn degrees_between(a: f64, b: f64) -> f64 {
     let difference = (a - b).rem_euclid(TAU);
     difference.min(TAU - difference).to_degrees()
 }
 
-/// Within a quarter of a degree, which is the arctangent's error and what the gains make of it, wherever its signals
-/// have their amplitude.
+/// The error is below a quarter of a degree, which is the arctangent's error amplified by the gains, at any valid
+/// amplitude.
 #[test]
 fn a_rotor_at_constant_speed_is_followed_without_lag() {
     for (tick, most) in [(1e-3, 0.25), (125e-6, 0.18)] {
@@ -34,7 +34,7 @@ fn a_rotor_at_constant_speed_is_followed_without_lag() {
 }
 
 #[test]
-fn a_lost_sensor_is_noticed_and_a_new_one_is_taken_as_it_is() {
+fn a_lost_sensor_is_detected_and_restarted() {
     let mut observer = Observer::new(1000.0, 1e-3);
     for _ in 0..10 {
         assert!(observer.step(0.0, 1.0, 0.0).is_some());
@@ -42,6 +42,6 @@ fn a_lost_sensor_is_noticed_and_a_new_one_is_taken_as_it_is() {
     for (sin, cos) in [(0.0, 0.4), (0.0, 1.6), (0.0, 0.0), (f32::NAN, 1.0), (1.0, f32::NEG_INFINITY)] {
         assert_eq!(observer.step(sin, cos, 0.0), None, "{sin} {cos}");
     }
-    let angle = observer.step(-1.0, 0.0, 1.5).expect("it is back");
-    assert!((angle + std::f32::consts::FRAC_PI_2).abs() < 1e-6, "no speed is left from before: {angle}");
+    let angle = observer.step(-1.0, 0.0, 1.5).expect("the sensor is back");
+    assert!((angle + std::f32::consts::FRAC_PI_2).abs() < 1e-6, "no speed remains from before: {angle}");
 }

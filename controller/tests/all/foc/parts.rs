@@ -1,4 +1,4 @@
-//! Each part against the same in f64, and against what it is to do.
+//! Each part against its equivalent in f64, and against its requirements.
 
 use std::f64::consts::TAU;
 
@@ -29,7 +29,7 @@ proptest! {
         let rotor = stator.to_rotor(angle);
         prop_assert!(near(rotor.d, alpha * cos + beta * sin, 800.0));
         prop_assert!(near(rotor.q, beta * cos - alpha * sin, 800.0));
-        // There and back it is longer by as much as sine and cosine are no unit vector.
+        // The length after both transforms differs by as much as that of sine and cosine from 1.
         let longer = sin * sin + cos * cos;
         let back = rotor.to_stator(angle);
         prop_assert!(near(back.alpha, longer * alpha, 800.0) && near(back.beta, longer * beta, 800.0));
@@ -40,7 +40,7 @@ proptest! {
         }
     }
 
-    /// Line to line, the bridges give what was asked for, while the voltage is within reach.
+    /// Within the limit, the bridges give the requested voltage from line to line.
     #[test]
     fn duties_give_the_voltage(length in 0.0..0.577_35f32, radians in -4.0..4.0f32, supply in 1.0..800.0f32) {
         let length = f64::from(length * supply);
@@ -53,12 +53,12 @@ proptest! {
         let scale = f64::from(supply) * 2.0;
         prop_assert!(near((a - b) * supply, f64::from(phases[0]) - f64::from(phases[1]), scale));
         prop_assert!(near((b - c) * supply, f64::from(phases[1]) - f64::from(phases[2]), scale));
-        // Both zero vectors are equally long.
+        // Both zero vectors have the same length.
         prop_assert!((a.max(b).max(c) + a.min(b).min(c) - 1.0).abs() < 1e-6);
     }
 
     #[test]
-    fn duties_stay_within_0_and_1_whatever_is_asked(phases: [f32; 3], supply in 1e-3..1e5f32) {
+    fn duties_stay_within_0_and_1(phases: [f32; 3], supply in 1e-3..1e5f32) {
         for duty in duties(phases, supply) {
             prop_assert!((0.0..=1.0).contains(&duty));
         }
@@ -71,8 +71,8 @@ proptest! {
             let output = pi.step(*error, 0.5, 0.1, limit);
             prop_assert!(output.abs() <= limit);
         }
-        // However long it was at its limit: an error of the other sign that asks for more than the limit turns it
-        // around at once.
+        // After any time at the limit, an error of opposite sign that exceeds the limit reverses the output
+        // immediately.
         let largest = 2.0 * limit / 0.5 + 1.0;
         prop_assert!(pi.step(-largest, 0.5, 0.1, limit) < 0.0);
     }
@@ -87,7 +87,7 @@ proptest! {
         }
     }
 
-    /// Whatever is measured, the bridges get duty cycles or nothing, and the voltage is one that the supply has.
+    /// For any measurement, a tick gives valid duty cycles or `None`, and a voltage within the supply's limit.
     #[test]
     fn a_tick_gives_duties_or_nothing(values: [f32; 7], tame in [current(), current(), current()], supply in 1.0..100.0f32) {
         let mut wild = CurrentLoop::new(Gains { proportional: 0.3, integral: 0.05 });
@@ -97,11 +97,11 @@ proptest! {
         if let Some(tick) = wild.step(&measured, target) {
             prop_assert!(tick.duties.iter().all(|duty| (0.0..=1.0).contains(duty)), "{tick:?}");
         } else {
-            prop_assert!(wild == calm, "nothing has changed");
+            prop_assert!(wild == calm, "the state is unchanged");
         }
         let measured = Measured { phases: tame, angle: 0.0, supply };
         for _ in 0..50 {
-            let tick = calm.step(&measured, Rotor { d: 30.0, q: -60.0 }).expect("all is finite");
+            let tick = calm.step(&measured, Rotor { d: 30.0, q: -60.0 }).expect("all values are finite");
             let length = f64::from(tick.voltage.d).hypot(f64::from(tick.voltage.q));
             prop_assert!(length <= f64::from(supply) / SQRT_3);
         }
@@ -109,7 +109,7 @@ proptest! {
 }
 
 #[test]
-fn a_broken_sensor_gives_nothing() {
+fn a_broken_sensor_gives_no_duties() {
     let mut control = CurrentLoop::new(Gains { proportional: 0.3, integral: 0.05 });
     let (good, target) = (Measured { phases: [1.0, -2.0, 1.0], angle: 1000.0, supply: 24.0 }, Rotor { d: 0.0, q: 1.0 });
     for measured in [

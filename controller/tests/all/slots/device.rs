@@ -1,11 +1,11 @@
-//! A device with two slots: what its firmware does at the start, and for an update.
+//! A device with two slots: its firmware's start and updates.
 
 use actq_controller::slots::{Authority, Candidate, Layout, Slots, Updater, Work};
 use actq_controller::update::{Plan, Update};
 use actq_link::code::Refusal;
 use embedded_storage::nor_flash::NorFlash;
 
-/// Bytes that stand for an image. The first one says whether its self-test passes.
+/// Bytes in place of an image. The first one decides the outcome of its self-test.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Image {
     pub(super) bytes: Vec<u8>,
@@ -28,7 +28,7 @@ impl Image {
 
 fn read<F: NorFlash, A: Authority>(slots: &mut Slots<F, A>, image: &Candidate) -> Vec<u8> {
     let mut bytes = vec![0; image.length as usize];
-    slots.flash().read(image.address, &mut bytes).expect("the image is within the flash");
+    slots.flash().read(image.address, &mut bytes).expect("the image is inside the flash");
     bytes
 }
 
@@ -39,18 +39,18 @@ fn self_test(image: &[u8]) -> Result<(), Refusal> {
 /// A device after its start.
 pub(super) struct Device<F, A: Authority> {
     pub(super) updater: Updater<F, A>,
-    /// The image that runs, where there is one.
+    /// The running image, if any.
     pub(super) runs: Option<Vec<u8>>,
 }
 
 impl<F: NorFlash, A: Authority> Device<F, A> {
-    /// Power comes on.
+    /// Switches power on.
     pub(super) fn start(flash: F, layout: &Layout, authority: A) -> Self {
         let mut slots = Slots::new(flash, layout.clone(), authority);
         while let Some(candidate) = slots.select(|| ()) {
             let image = read(&mut slots, &candidate);
             if self_test(&image).is_ok() {
-                // Where power fails in here, the device is gone.
+                // If power fails here, the device stops.
                 let _ = !candidate.trial || slots.confirm(candidate.slot);
                 return Self { updater: Updater::new(slots, Some(candidate.slot)), runs: Some(image) };
             }
@@ -59,7 +59,7 @@ impl<F: NorFlash, A: Authority> Device<F, A> {
         Self { updater: Updater::new(slots, None), runs: None }
     }
 
-    /// Does the work that a request has begun, and repeats the request until it is done.
+    /// Does the work of a request and repeats the request until it is done.
     pub(super) fn wait(
         &mut self,
         mut request: impl FnMut(&mut Updater<F, A>) -> Result<(), Refusal>,
@@ -79,7 +79,7 @@ impl<F: NorFlash, A: Authority> Device<F, A> {
         }
     }
 
-    /// A whole update, in chunks of `chunk` bytes.
+    /// Makes a whole update, in chunks of `chunk` bytes.
     pub(super) fn update(&mut self, image: &Image, chunk: usize, signature: Option<&[u8; 64]>) -> Result<(), Refusal> {
         self.wait(|updater| updater.begin(image.plan()))?;
         for (i, bytes) in image.bytes.chunks(chunk).enumerate() {

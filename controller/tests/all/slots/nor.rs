@@ -1,5 +1,5 @@
-//! NOR flash with its rules: erasing gives ones, programming takes ones away, a unit is programmed once after an erase.
-//! Power may fail in the middle of any of it.
+//! A model of NOR flash: erasing sets ones, programming clears ones, and a unit is programmed once after an erase.
+//! Power may fail during any change.
 
 use actq_boards::stm32f405::flash::model::Model;
 use actq_boards::stm32f405::flash::{Flash, LARGE};
@@ -11,16 +11,16 @@ use crate::random::Random;
 #[derive(Clone)]
 pub(super) struct Nor<const UNIT: usize, const SECTOR: usize> {
     pub(super) bytes: Vec<u8>,
-    /// Units that were programmed since they were erased.
+    /// Units programmed since their last erase.
     programmed: Vec<bool>,
-    /// Units programmed and sectors erased, ever.
+    /// Units programmed and sectors erased so far.
     pub(super) done: usize,
-    /// In the course of which of these power fails.
+    /// Number of the change during which power fails, if it does.
     pub(super) fails_at: Option<usize>,
     pub(super) random: Random,
 }
 
-/// Power is gone, or the request breaks a rule.
+/// Power has failed, or the request violates a rule.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NoPower;
 
@@ -30,18 +30,18 @@ impl NorFlashError for NoPower {
     }
 }
 
-/// Flash whose power fails, of as many sectors as a test asks for.
+/// Flash whose power fails, with a test's number of sectors.
 pub(super) trait Fails: NorFlash + Clone {
-    /// As it comes from the factory, or from another use: full of anything.
+    /// Creates flash with arbitrary content, as after another use.
     fn new(sectors: usize, seed: u64) -> Self;
 
-    /// Its bytes.
+    /// Returns all bytes.
     fn bytes(&self) -> Vec<u8>;
 
-    /// Changes so far.
+    /// Returns the number of changes so far.
     fn done(&self) -> usize;
 
-    /// Power comes back, and fails in the course of the change behind so many, if it does.
+    /// Restores power; it fails again during the change after `fails_at` others, if given.
     fn restart(&mut self, fails_at: Option<usize>);
 }
 
@@ -63,7 +63,7 @@ impl<const UNIT: usize, const SECTOR: usize> Fails for Nor<UNIT, SECTOR> {
     }
 }
 
-/// The upper sectors of an STM32F405, by its driver: what fails is a write to a register or to the memory.
+/// The upper sectors of an STM32F405 with its driver: power fails during a write to a register or to memory.
 impl Fails for Flash<Model> {
     fn new(sectors: usize, seed: u64) -> Self {
         let begin = (1 << 20) - sectors as u32 * LARGE;
@@ -87,14 +87,14 @@ impl Fails for Flash<Model> {
 }
 
 impl<const UNIT: usize, const SECTOR: usize> Nor<UNIT, SECTOR> {
-    /// As it comes from the factory, or from another use: full of anything.
+    /// Creates flash with arbitrary content, as after another use.
     pub(super) fn new(sectors: usize, seed: u64) -> Self {
         let mut random = Random::new(seed);
         let bytes = (0..sectors * SECTOR).map(|_| random.bits() as u8).collect();
         Self { bytes, programmed: vec![true; sectors * SECTOR / UNIT], done: 0, fails_at: None, random }
     }
 
-    /// Whether the next change is made whole, in part, or not at all.
+    /// Returns the outcome of the next change: whole, partial, or none.
     fn next(&mut self) -> Outcome {
         let outcome = match self.fails_at {
             Some(at) if self.done == at => Outcome::Part,
@@ -144,7 +144,7 @@ impl<const UNIT: usize, const SECTOR: usize> NorFlash for Nor<UNIT, SECTOR> {
                     self.programmed[start / UNIT..(start + SECTOR) / UNIT].fill(false);
                 }
                 Outcome::Part => {
-                    // Some bits are ones already. How many depends on the moment: few, about half, or almost all.
+                    // Some bits are ones already: few, about half, or almost all, depending on the moment.
                     let moment = self.random.below(3);
                     for at in start..start + SECTOR {
                         let (a, b) = (self.random.bits() as u8, self.random.bits() as u8);

@@ -1,5 +1,5 @@
-//! Power fails in the middle of every single change that a sequence of updates makes to the flash, and again while the
-//! device starts after that.
+//! Power failures during each change that a sequence of updates makes to the flash, and again during the following
+//! start.
 
 use actq_boards::stm32f405::flash::Flash;
 use actq_boards::stm32f405::flash::model::Model;
@@ -9,17 +9,17 @@ use actq_link::code::Refusal;
 use super::device::{Device, Image};
 use super::nor::{Fails, Nor};
 
-/// Images one after the other; the third and the fifth fail their test.
+/// Returns images in sequence; the third and the fifth fail their test.
 fn images() -> Vec<Image> {
     let passes = [true, true, false, true, false, true];
     passes.iter().enumerate().map(|(i, passes)| Image::new(80 + 7 * i, 1 + i as u32, *passes)).collect()
 }
 
-/// What the host knows, and what may be there.
+/// The images that may run, as the host knows.
 struct Known {
-    /// The image that was last acknowledged.
+    /// The last acknowledged image.
     acknowledged: Option<Image>,
-    /// The one that was in flight, and may run as well.
+    /// The image of the interrupted update, which may also run.
     in_flight: Option<Image>,
 }
 
@@ -30,7 +30,7 @@ impl Known {
     }
 }
 
-/// Updates to every image in turn until power fails.
+/// Updates to each image in turn until power fails.
 fn updates<F: Fails>(flash: &mut F, fails_at: Option<usize>, layout: &Layout, images: &[Image], known: &mut Known) {
     flash.restart(fails_at);
     let mut device = Device::start(&mut *flash, layout, Anyone);
@@ -50,12 +50,12 @@ fn updates<F: Fails>(flash: &mut F, fails_at: Option<usize>, layout: &Layout, im
     }
 }
 
-/// With as many kinds of leftovers as there are seeds.
+/// Checks all power failures, with arbitrary flash content for each seed.
 fn check_all_cuts<F: Fails>(seeds: u64) {
     let images = images();
-    // Each slot has two sectors, with others before, between and behind them.
+    // Each slot has two sectors, with others before, between and after them.
     let s = F::ERASE_SIZE as u32;
-    let layout = Layout::new(&F::new(7, 0), s..3 * s, 4 * s..6 * s).expect("the slots fit");
+    let layout = Layout::new(&F::new(7, 0), s..3 * s, 4 * s..6 * s).expect("the slots are valid");
     let mut whole = F::new(7, 0);
     updates(&mut whole, None, &layout, &images, &mut Known { acknowledged: None, in_flight: None });
     let changes = whole.done();
@@ -72,7 +72,7 @@ fn check_all_cuts<F: Fails>(seeds: u64) {
             let mut known = Known { acknowledged: None, in_flight: None };
             updates(&mut flash, Some(fails_at), &layout, &images, &mut known);
             let what = format!("power fails at change {fails_at}, {seed}");
-            // Power fails in each change of the start that follows, too, of which there are few.
+            // Power also fails during each of the few changes of the following start.
             for again in 0.. {
                 let mut once_more = flash.clone();
                 once_more.restart(Some(again));
@@ -85,7 +85,7 @@ fn check_all_cuts<F: Fails>(seeds: u64) {
                     break;
                 }
             }
-            // The host goes on with the last image, as it was not acknowledged.
+            // The host continues with the last image, which was not acknowledged.
             flash.restart(None);
             let mut device = Device::start(&mut flash, &layout, Anyone);
             known.check(device.runs.as_ref(), &what);
@@ -99,37 +99,37 @@ fn check_all_cuts<F: Fails>(seeds: u64) {
 }
 
 #[test]
-fn a_valid_image_runs_after_power_failed_at_any_change_and_no_acknowledged_update_is_lost() {
+fn power_failures_lose_no_acknowledged_update() {
     // Words. QSPI flash: bytes. STM32H5 and U5: 16 bytes.
     check_all_cuts::<Nor<4, 512>>(3);
     check_all_cuts::<Nor<1, 512>>(3);
     check_all_cuts::<Nor<16, 1024>>(3);
 }
 
-/// The same for the registers and the sectors of 128 KB of an STM32F405.
+/// The same check for the registers and the 128 KB sectors of an STM32F405.
 #[test]
-fn a_valid_image_runs_after_power_failed_at_any_write_to_a_register_of_an_stm32f405() {
+fn power_failures_on_an_stm32f405_lose_no_update() {
     check_all_cuts::<Flash<Model>>(1);
 }
 
-/// What an STM32F405's linker script gives: two slots of two sectors, each behind a header.
+/// The slots of the STM32F405's linker script: two sectors each, minus a header.
 #[test]
-fn an_image_of_an_stm32f405_may_have_261888_bytes() {
+fn an_stm32f405_image_has_at_most_261888_bytes() {
     let flash = <Flash<Model> as Fails>::new(4, 0);
     let middle = flash.bytes().len() as u32 / 2;
-    let layout = Layout::new(&flash, 0..middle, middle..2 * middle).expect("the slots fit");
+    let layout = Layout::new(&flash, 0..middle, middle..2 * middle).expect("the slots are valid");
     assert_eq!(Slot::BOTH.map(|slot| layout.room(slot)), [261_888; 2], "docs/BOARDS.md says so");
 }
 
-/// Power fails at every start, in the middle of the trial of a new image, as often as it likes: the image is given up
-/// after three trials, and the old one runs.
+/// Power fails during the trial of a new image at every start: after three trials the image is given up, and the old
+/// one runs.
 #[test]
-fn an_image_whose_trial_never_ends_is_given_up_and_the_old_one_runs() {
+fn an_image_is_given_up_after_three_trials() {
     let mut flash = Nor::<4, 1024>::new(2, 1);
-    let layout = Layout::new(&flash, 0..1024, 1024..2048).expect("the slots fit");
+    let layout = Layout::new(&flash, 0..1024, 1024..2048).expect("the slots are valid");
     let (old, new) = (Image::new(50, 1, true), Image::new(60, 2, true));
     assert_eq!(Device::start(&mut flash, &layout, Anyone).update(&old, 64, None), Ok(()));
-    // Up to the change behind which only the confirmation is missing.
+    // Up to the last change before the confirmation.
     let mut trial = flash.clone();
     assert_eq!(Device::start(&mut trial, &layout, Anyone).update(&new, 64, None), Ok(()));
     (flash.fails_at, trial) = (Some(trial.done - 1), flash.clone());
@@ -139,9 +139,9 @@ fn an_image_whose_trial_never_ends_is_given_up_and_the_old_one_runs() {
     for start in 0..4 {
         flash.fails_at = None;
         let mut chosen = actq_controller::slots::Slots::new(&mut flash, layout.clone(), Anyone);
-        let candidate = chosen.select(|| ()).expect("one of them runs");
+        let candidate = chosen.select(|| ()).expect("one of the images runs");
         slots += u32::from(candidate.trial);
-        // The first trial was that of the update itself.
+        // The update itself was the first trial.
         assert_eq!((candidate.version, candidate.trial), if start < 2 { (2, true) } else { (1, false) }, "{start}");
     }
     assert_eq!(slots, 2);

@@ -1,4 +1,4 @@
-//! Images of one key: signed by another implementation than the one that checks.
+//! Images signed with one key, by a different implementation than the one that verifies.
 
 use actq_controller::slots::{Key, Layout, context};
 use actq_link::code::Refusal;
@@ -15,14 +15,14 @@ fn sign(key: &SigningKey, image: &Image, version: u32) -> [u8; 64] {
 }
 
 fn authority(key: &SigningKey) -> Key {
-    Key::new(key.verifying_key().as_bytes()).expect("it is a point of the curve")
+    Key::new(key.verifying_key().as_bytes()).expect("the key is a point of the curve")
 }
 
 #[test]
-fn only_what_the_key_has_signed_runs() {
+fn only_signed_images_run() {
     let (key, stranger) = (SigningKey::from_bytes(&[7; 32]), SigningKey::from_bytes(&[8; 32]));
     let mut flash = Flash::new(4, 9);
-    let layout = Layout::new(&flash, 0..2048, 2048..4096).expect("the slots fit");
+    let layout = Layout::new(&flash, 0..2048, 2048..4096).expect("the slots are valid");
     let image = Image::new(130, 3, true);
     let good = sign(&key, &image, 3);
     let mut device = Device::start(&mut flash, &layout, authority(&key));
@@ -41,12 +41,12 @@ fn only_what_the_key_has_signed_runs() {
     assert_eq!(device.runs, None);
     assert_eq!(device.update(&image, 64, Some(&good)), Ok(()));
     drop(device);
-    assert_eq!(Device::start(&mut flash, &layout, authority(&key)).runs, Some(image.bytes), "checked at every start");
+    assert_eq!(Device::start(&mut flash, &layout, authority(&key)).runs, Some(image.bytes), "verified at every start");
     assert_eq!(Device::start(&mut flash, &layout, authority(&stranger)).runs, None, "a build with another key");
 }
 
 #[test]
-fn what_is_no_key_is_refused() {
+fn invalid_keys_are_refused() {
     assert!((0..=255).any(|byte| Key::new(&[byte; 32]).is_err()));
 }
 

@@ -1,4 +1,4 @@
-//! Updates over a line that loses and repeats requests, and those that are refused.
+//! Updates over a line that loses and repeats requests, and refused updates.
 
 use actq_controller::slots::{Anyone, Layout, LayoutError, Slot, Slots, TRIALS};
 use actq_controller::update::{Plan, Update};
@@ -13,21 +13,21 @@ type Flash = Nor<4, 1024>;
 
 fn flash() -> (Flash, Layout) {
     let flash = Flash::new(4, 5);
-    let layout = Layout::new(&flash, 0..2048, 2048..4096).expect("the slots fit");
+    let layout = Layout::new(&flash, 0..2048, 2048..4096).expect("the slots are valid");
     (flash, layout)
 }
 
 #[test]
-fn chunks_of_any_length_lost_repeated_and_out_of_order_give_the_image() {
+fn lost_and_repeated_chunks_give_the_image() {
     let mut random = Random::new(6);
     for round in 0..200 {
         let (mut flash, layout) = flash();
         let mut device = Device::start(&mut flash, &layout, Anyone);
         let image = Image::new(1 + random.below(400), 1, true);
-        device.wait(|updater| updater.begin(image.plan())).expect("there is room");
+        device.wait(|updater| updater.begin(image.plan())).expect("the image fits");
         let mut known = 0;
         while known < image.bytes.len() {
-            // A host that has not heard of some acknowledgements, or believes itself further on.
+            // A host that missed acknowledgements, or is ahead.
             let offset = match random.below(4) {
                 0 => random.below(known + 1),
                 1 => (known + random.below(9)).min(image.bytes.len() - 1),
@@ -43,14 +43,14 @@ fn chunks_of_any_length_lost_repeated_and_out_of_order_give_the_image() {
             known = taken;
         }
         assert_eq!(device.wait(|updater| updater.commit(None)), Ok(()), "round {round}");
-        // The acknowledgement was lost, and the host asks again.
+        // The acknowledgement was lost, and the host repeats the request.
         assert_eq!(device.updater.commit(None), Ok(()));
         assert_eq!(device.runs.as_ref(), Some(&image.bytes));
     }
 }
 
 #[test]
-fn what_does_not_fit_is_refused_and_changes_nothing() {
+fn a_refused_update_changes_nothing() {
     let (mut flash, layout) = flash();
     let mut device = Device::start(&mut flash, &layout, Anyone);
     let image = Image::new(100, 5, true);
@@ -63,11 +63,11 @@ fn what_does_not_fit_is_refused_and_changes_nothing() {
         assert_eq!(device.updater.begin(Plan { length, ..plan }), Err(Refusal::Length), "{length}");
     }
     assert_eq!(device.updater.begin(Plan { version: 4, ..plan }), Err(Refusal::Rollback));
-    device.wait(|updater| updater.begin(plan)).expect("the same version may come again");
+    device.wait(|updater| updater.begin(plan)).expect("the same version is allowed again");
     assert_eq!(device.updater.chunk(396, &[0; 5]), Err(Refusal::Length));
     assert_eq!(device.updater.chunk(u32::MAX, &[0; 5]), Err(Refusal::Length));
     assert_eq!(device.updater.chunk(4, &[0; 4]), Err(Refusal::Offset));
-    assert_eq!(device.updater.commit(None), Err(Refusal::Length), "it is not all there");
+    assert_eq!(device.updater.commit(None), Err(Refusal::Length), "the image is incomplete");
     let mut other = image.bytes.clone();
     other[17] ^= 1;
     assert_eq!(device.updater.chunk(0, &other), Ok(()));
@@ -80,14 +80,14 @@ fn what_does_not_fit_is_refused_and_changes_nothing() {
 }
 
 #[test]
-fn an_image_that_fails_its_test_is_not_run_and_not_tried_again() {
+fn an_image_that_fails_its_test_never_runs() {
     let (mut flash, layout) = flash();
     let (good, bad) = (Image::new(100, 1, true), Image::new(90, 2, false));
     let mut device = Device::start(&mut flash, &layout, Anyone);
     assert_eq!(device.update(&good, 64, None), Ok(()));
     assert_eq!(device.update(&bad, 64, None), Err(Refusal::SelfTest));
     assert_eq!(device.runs.as_ref(), Some(&good.bytes));
-    // Its version does not count, as it never ran.
+    // Its version does not count, because it never ran.
     assert_eq!(device.updater.slots().least_version(), 1);
     drop(device);
     let before = flash.bytes.clone();
@@ -96,7 +96,7 @@ fn an_image_that_fails_its_test_is_not_run_and_not_tried_again() {
 }
 
 #[test]
-fn where_the_newest_image_has_decayed_the_other_runs() {
+fn the_other_image_replaces_a_decayed_one() {
     let (mut flash, layout) = flash();
     let images = [Image::new(100, 1, true), Image::new(100, 2, true)];
     for image in &images {
@@ -112,9 +112,9 @@ fn where_the_newest_image_has_decayed_the_other_runs() {
     }
 }
 
-/// Whoever feeds a watchdog at the start feeds it then.
+/// The firmware feeds its watchdog at these calls.
 #[test]
-fn a_start_tells_before_each_block_that_it_reads() {
+fn a_start_reports_progress_before_each_block() {
     let (mut flash, layout) = flash();
     for version in [1, 2] {
         let image = Image::new(100, version, true);
@@ -132,10 +132,10 @@ fn a_start_tells_before_each_block_that_it_reads() {
 }
 
 #[test]
-fn flash_full_of_anything_has_no_image() {
+fn flash_with_arbitrary_content_has_no_image() {
     for seed in 0..500 {
         let mut flash = Flash::new(4, seed);
-        let layout = Layout::new(&flash, 0..2048, 2048..4096).expect("the slots fit");
+        let layout = Layout::new(&flash, 0..2048, 2048..4096).expect("the slots are valid");
         if seed == 0 {
             flash.bytes.fill(0xff);
         }
@@ -145,7 +145,7 @@ fn flash_full_of_anything_has_no_image() {
 }
 
 #[test]
-fn the_slot_that_runs_is_never_the_one_that_is_erased() {
+fn the_running_slot_is_never_erased() {
     let (mut flash, layout) = flash();
     for version in 1..6 {
         let mut device = Device::start(&mut flash, &layout, Anyone);
@@ -154,7 +154,7 @@ fn the_slot_that_runs_is_never_the_one_that_is_erased() {
             let range = layout.range(slot);
             let mut bytes = vec![0; (range.end - range.start) as usize];
             embedded_storage::nor_flash::ReadNorFlash::read(device.updater.slots().flash(), range.start, &mut bytes)
-                .expect("it is within the flash");
+                .expect("the image is within the flash");
             (range.clone(), bytes)
         });
         assert_eq!(device.update(&Image::new(50, version, true), 64, None), Ok(()));
@@ -168,7 +168,7 @@ fn the_slot_that_runs_is_never_the_one_that_is_erased() {
 }
 
 #[test]
-fn slots_that_cannot_be_are_refused() {
+fn invalid_slots_are_refused() {
     fn case<F: NorFlash>(flash: &F, a: (u32, u32), b: (u32, u32)) -> Option<LayoutError> {
         Layout::new(flash, a.0..a.1, b.0..b.1).err()
     }
@@ -182,10 +182,10 @@ fn slots_that_cannot_be_are_refused() {
     assert_eq!(case(&flash, (2048, 1024), (2048, 3072)), Some(LayoutError::Size));
     assert_eq!(case(&flash, (0, 1024), (3072, 5120)), Some(LayoutError::Size));
     assert_eq!(case(&Nor::<64, 1024>::new(4, 0), (0, 1024), (1024, 2048)), Some(LayoutError::Granularity));
-    // The sectors of 128 KiB of an STM32F405, of which two slots of two are taken.
+    // The 128 KiB sectors of an STM32F405, with two slots of two sectors each.
     const SECTOR: u32 = 128 << 10;
     let f405 = Nor::<4, { SECTOR as usize }>::new(5, 0);
     assert_eq!(case(&f405, (SECTOR, 3 * SECTOR), (3 * SECTOR, 5 * SECTOR)), None);
     assert_eq!(case(&f405, (16 << 10, 3 * SECTOR), (3 * SECTOR, 5 * SECTOR)), Some(LayoutError::Sector));
-    drop(Slots::new(flash, Layout::new(&Flash::new(4, 0), 0..1024, 1024..2048).expect("they fit"), Anyone));
+    drop(Slots::new(flash, Layout::new(&Flash::new(4, 0), 0..1024, 1024..2048).expect("the slots are valid"), Anyone));
 }

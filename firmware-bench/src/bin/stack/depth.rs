@@ -1,14 +1,14 @@
-//! How much stack a call takes.
+//! The stack use of a call.
 
 use actq_firmware_support::stack::Room;
 
-/// Words that are painted, and so the most that can be measured.
+/// Painted words, which is the most that can be measured.
 const WORDS: usize = 4 * 1024;
 
-/// Runs `work` and gives how many bytes below this function's frame it wrote to.
+/// Runs `work` and returns the number of bytes below this function's frame that it wrote to.
 #[inline(never)]
 pub(crate) fn depth<T>(work: impl FnOnce() -> T) -> (T, usize) {
-    // SAFETY: the firmware's stack is the end of RAM and has more than WORDS words left, and no interrupt is enabled.
+    // SAFETY: the firmware's stack is at the end of RAM with more than WORDS free words, and no interrupt is enabled.
     let room = unsafe { Room::below_here(WORDS) };
     // SAFETY: as above.
     unsafe { room.paint() };

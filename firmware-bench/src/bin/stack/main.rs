@@ -1,5 +1,5 @@
-//! Measures the stack of the runtime on the image in the slot: prints the bytes that the check of the image, the
-//! self-test and a step take, with the frames of all that they call.
+//! Measures the runtime's stack with the image in the slot: prints the bytes that the check of the image, the self-test
+//! and a step use, including all functions that they call.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]

@@ -1,4 +1,4 @@
-//! What ends the program: each leaves a record, which the next start tells, and resets.
+//! The faults that end the program: each leaves a record, which the next start reports, and resets.
 
 use core::arch::naked_asm;
 use core::panic::PanicInfo;
@@ -18,49 +18,49 @@ static RECORD: Kept<WORDS> = Kept::new();
 #[unsafe(link_section = ".uninit.starts")]
 static STARTS: Kept<1> = Kept::new();
 
-/// Address of the register that says what a fault is.
+/// Address of the configurable fault status register.
 const CFSR: u32 = 0xe000_ed28;
-/// What it says of a stack that has overflown: the core could not stack, the program touched the guard, which is all
-/// that the memory protection unit forbids, or the pointer would have passed its limit (Armv8-M).
+/// Its bits for a stack overflow: the core could not stack, the program touched the guard, which is all that the memory
+/// protection unit forbids, or the pointer would have passed its limit (Armv8-M).
 const STACKING: u32 = 1 << 4;
 const ACCESS: u32 = 1 << 1;
 const LIMIT: u32 = 1 << 20;
 
-/// Where the stack is.
+/// Addresses of the stack's ends.
 static BOTTOM: AtomicU32 = AtomicU32::new(0);
 static TOP: AtomicU32 = AtomicU32::new(0);
 
-/// What a record tells besides the crash.
+/// Data for a record, besides the crash.
 pub(crate) static TICKS: AtomicU32 = AtomicU32::new(0);
 pub(crate) static MISSING: AtomicU32 = AtomicU32::new(0);
 static CRASHES: AtomicU32 = AtomicU32::new(0);
 
-/// What the program before the reset has left, once; the crashes since power-on are counted on.
-pub(crate) fn found() -> Option<Record> {
+/// Returns the record from before the reset, one time; the count of crashes since power-on continues.
+pub(crate) fn take_record() -> Option<Record> {
     let mut words = RECORD.read();
     let found = Record::from_words(&words);
-    // One that was told has its checksum inverted.
+    // A reported record has its checksum inverted.
     if let Some(sum) = words.last_mut() {
         *sum = !*sum;
     }
-    let told = Record::from_words(&words);
-    CRASHES.store(found.or(told).map_or(0, |record| record.count), Ordering::Relaxed);
+    let reported = Record::from_words(&words);
+    CRASHES.store(found.or(reported).map_or(0, |record| record.count), Ordering::Relaxed);
     if found.is_some() {
         RECORD.write(words);
     }
     found
 }
 
-/// Starts since power-on, plus any number.
-pub(crate) fn starts() -> u32 {
+/// Counts a start; returns the number of starts since power-on, plus an arbitrary number.
+pub(crate) fn count_start() -> u32 {
     let [starts] = STARTS.read().map(|starts| starts.wrapping_add(1));
     STARTS.write([starts]);
     starts
 }
 
-/// Lets a stack that overflows be a fault, instead of writing over variables.
+/// Makes a stack overflow a fault, so that it does not overwrite variables.
 pub(crate) fn guard_stack(scb: &mut SCB) {
-    // SAFETY: the start is not deep in the stack, and nothing else here uses the memory protection unit.
+    // SAFETY: the start uses little of the stack, and nothing else uses the memory protection unit.
     let stack = unsafe { device::guard_stack() };
     BOTTOM.store(stack.start, Ordering::Relaxed);
     TOP.store(stack.end, Ordering::Relaxed);
@@ -68,23 +68,23 @@ pub(crate) fn guard_stack(scb: &mut SCB) {
     scb.enable(Exception::UsageFault);
 }
 
-fn leave(crash: Crash, pc: u32, detail: u32) {
+fn leave_record(crash: Crash, pc: u32, detail: u32) {
     let (ticks, count) = (TICKS.load(Ordering::Relaxed), CRASHES.load(Ordering::Relaxed).wrapping_add(1));
     RECORD.write(Record { crash, pc, detail, ticks, count }.to_words());
 }
 
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
-    leave(Crash::Panic, 0, info.location().map_or(0, |location| location.line()));
+    leave_record(Crash::Panic, 0, info.location().map_or(0, |location| location.line()));
     SCB::sys_reset()
 }
 
-/// Faults. Where the stack has overflown, it is left before anything else: what runs here runs at its begin. What the
-/// core has stacked, or could not, is passed on.
+/// Handles faults. After a stack overflow it first resets the stack pointer to the stack's start. It passes on the
+/// exception frame, or its place if the core could not stack it.
 ///
 /// # Safety
 ///
-/// For the vector table alone.
+/// Only for the vector table.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
 unsafe extern "C" fn HardFault() {
@@ -108,22 +108,22 @@ unsafe extern "C" fn HardFault() {
     )
 }
 
-/// The memory protection unit's, or the stack's limit: [`HardFault`] looks which.
+/// Handles faults of the memory protection unit: [`HardFault`] distinguishes them.
 ///
 /// # Safety
 ///
-/// For the vector table alone.
+/// Only for the vector table.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
 unsafe extern "C" fn MemoryManagement() {
     naked_asm!("b {fault}", fault = sym HardFault)
 }
 
-/// As [`MemoryManagement`].
+/// Handles usage faults, such as the stack limit's, as [`MemoryManagement`] does.
 ///
 /// # Safety
 ///
-/// For the vector table alone.
+/// Only for the vector table.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
 unsafe extern "C" fn UsageFault() {
@@ -131,7 +131,7 @@ unsafe extern "C" fn UsageFault() {
 }
 
 extern "C" fn other(frame: &ExceptionFrame, status: u32) -> ! {
-    leave(Crash::HardFault, frame.pc(), status);
+    leave_record(Crash::HardFault, frame.pc(), status);
     SCB::sys_reset()
 }
 
@@ -142,24 +142,24 @@ extern "C" fn overflow(pointer: u32, status: u32) -> ! {
     }
     let code = (&raw const __stext) as u32..(&raw const __etext) as u32;
     let half = |address: u32| {
-        // SAFETY: an even address of the code.
+        // SAFETY: an even address within the code.
         code.contains(&address).then(|| unsafe { (address as *const u16).read() })
     };
     let [bottom, top] = [&BOTTOM, &TOP].map(|address| address.load(Ordering::Relaxed));
     let words = (pointer.max(bottom)..top).step_by(4);
-    // SAFETY: memory of the stack that may be read: words of it, as its pointer and its ends are multiples of 4.
+    // SAFETY: readable words of the stack: its pointer and its ends are multiples of 4.
     let words = words.map(|address| unsafe { (address as *const u32).read_volatile() });
-    // Where the core could not stack, Armv7-M says so, and Armv8-M leaves the pointer at the limit.
+    // If the core could not stack, Armv7-M sets a bit, and Armv8-M leaves the pointer at the limit.
     let is_stacked = status & STACKING == 0 && pointer > bottom;
-    leave(Crash::StackOverflow, program_counter(words, is_stacked, half).unwrap_or(0), status);
+    leave_record(Crash::StackOverflow, program_counter(words, is_stacked, half).unwrap_or(0), status);
     SCB::sys_reset()
 }
 
-/// The non-maskable interrupt, where a board has a reason for it: it passes what the core has stacked on.
+/// Handles the non-maskable interrupt, for boards that use it: passes the exception frame on.
 ///
 /// # Safety
 ///
-/// For the vector table alone.
+/// Only for the vector table.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
 unsafe extern "C" fn NonMaskableInt() {
@@ -168,12 +168,12 @@ unsafe extern "C" fn NonMaskableInt() {
 
 extern "C" fn non_maskable(frame: &ExceptionFrame) -> ! {
     if WATCHDOG_NMI {
-        leave(Crash::Watchdog, frame.pc(), MISSING.load(Ordering::Relaxed));
-        // For the reset that the watchdog makes.
+        leave_record(Crash::Watchdog, frame.pc(), MISSING.load(Ordering::Relaxed));
+        // Wait for the watchdog's reset.
         loop {
             cortex_m::asm::nop();
         }
     }
-    leave(Crash::HardFault, frame.pc(), 0);
+    leave_record(Crash::HardFault, frame.pc(), 0);
     SCB::sys_reset()
 }

@@ -1,9 +1,9 @@
-//! The safety machine between loop and tick.
+//! The safety state machine, shared by loop and tick.
 
 use actq_controller::{Safety, Shared};
 use rtic::Mutex;
 
-/// A resource of RTIC's, whose lock is a priority.
+/// An RTIC resource, whose lock is a priority.
 pub(crate) struct Locked<M>(pub(crate) M);
 
 impl<const AXES: usize, M: Mutex<T = Safety<AXES>>> Shared<AXES> for Locked<M> {

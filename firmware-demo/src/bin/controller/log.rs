@@ -1,6 +1,6 @@
-//! Logs, where a feature asks for them.
+//! Logs, enabled by a feature.
 
-/// Logs as `defmt::info` does; without the feature `defmt`, nothing.
+/// Logs as `defmt::info` does; does nothing without the feature `defmt`.
 macro_rules! info {
     ($($text:tt)*) => {
         #[cfg(feature = "defmt")]

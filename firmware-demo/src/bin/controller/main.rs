@@ -1,9 +1,9 @@
-//! The controller on a board, which a feature names: a control tick at high priority, the head in slices below it, the
-//! link at a serial port, a watchdog. `cargo xtask firmware` builds it.
+//! The controller on a board, selected by a feature: a control tick at high priority, the head in slices below it, the
+//! link over a serial port, a watchdog. `cargo xtask firmware` builds it.
 //!
-//! RTIC runs it: tick and loop share one value, whose lock is a priority that the hardware has, and what may delay the
-//! tick is known when it is compiled. An executor of async tasks, as Embassy's, has its place where much is waited for;
-//! here nothing is.
+//! RTIC runs it: tick and loop share values whose locks are hardware priorities, and all possible delays of the tick
+//! are known at compile time. An async executor such as Embassy's suits programs that wait for many events; this one
+//! waits for none.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]
@@ -26,21 +26,21 @@ use defmt_rtt as _;
 #[cfg(all(target_os = "none", feature = "defmt-semihosting"))]
 use defmt_semihosting as _;
 
-/// What a build allows, and a host may only make stricter.
+/// The build's limits, which a host may only make stricter.
 #[cfg(target_os = "none")]
 mod limits {
     use core::ops::RangeInclusive;
 
     use actq_firmware_demo::deadline;
 
-    /// Ticks a second.
+    /// Ticks per second.
     pub(crate) const TICK_HZ: u32 = if cfg!(feature = "tick-8khz") { 8000 } else { 1000 };
-    /// Ticks without an observation, or without an action, before the safe action.
+    /// Allowed ticks without an observation, or without an action, before the safe action.
     pub(crate) const DEADLINE: RangeInclusive<u32> = deadline::allowed(TICK_HZ);
-    /// Age in us of an observation, against the fastest one.
+    /// Largest age of an observation, relative to the fastest one, in µs.
     pub(crate) const MAX_AGE: u32 = 500_000;
-    /// Ticks between two reports.
-    pub(crate) const REPORT: u32 = TICK_HZ / 10;
+    /// Ticks between two status reports.
+    pub(crate) const STATUS_PERIOD: u32 = TICK_HZ / 10;
 }
 
 #[cfg(target_os = "none")]
@@ -57,11 +57,11 @@ mod app {
     use actq_firmware_demo::deadline::BAUD;
     use actq_firmware_demo::image;
     #[cfg(feature = "foc")]
-    use actq_firmware_demo::motor::Motor as Drives;
+    use actq_firmware_demo::motor::Motor as Actuator;
     #[cfg(not(feature = "foc"))]
-    use actq_firmware_demo::output::Bridges as Drives;
-    use actq_firmware_demo::patience::PATIENCE;
+    use actq_firmware_demo::output::Bridges as Actuator;
     use actq_firmware_demo::running::Running;
+    use actq_firmware_demo::timeouts::TIMEOUTS;
     use actq_firmware_demo::timing::{Rates, Timing};
     use actq_firmware_demo::updates::Updates;
     use actq_firmware_demo::work::{State, Work};
@@ -73,21 +73,21 @@ mod app {
     use cortex_m::peripheral::SYST;
     use cortex_m::peripheral::syst::SystClkSource;
 
-    use crate::limits::{DEADLINE, MAX_AGE, REPORT, TICK_HZ};
+    use crate::limits::{DEADLINE, MAX_AGE, STATUS_PERIOD, TICK_HZ};
     use crate::locked::Locked;
     use crate::log::info;
     use crate::{faults, start};
 
-    /// Values of an observation.
+    /// Length of an observation in values.
     const OBS: usize = start::LENGTHS[0];
     const AXES: usize = start::LENGTHS[1];
-    /// The longest frame that comes: an observation, or a piece of an image.
-    const INWARD: usize = frame::bytes(if 4 * OBS > 516 { 4 * OBS } else { 516 });
-    /// The longest frame that goes: a status or an action.
-    const OUTWARD: usize = frame::wire_bytes(if 4 * AXES + 5 > 46 { 4 * AXES + 5 } else { 46 });
+    /// Longest received frame: an observation or a piece of an image.
+    const RECEIVE_BYTES: usize = frame::bytes(if 4 * OBS > 516 { 4 * OBS } else { 516 });
+    /// Longest sent frame: a status or an action.
+    const SEND_BYTES: usize = frame::wire_bytes(if 4 * AXES + 5 > 46 { 4 * AXES + 5 } else { 46 });
 
-    /// Bytes of the port's queues: what comes in a few ms, and room for several statuses or the longest frame.
-    const QUEUE: usize = if OUTWARD < 512 { 512 } else { (OUTWARD + 1).next_power_of_two() };
+    /// Bytes of the port's queues: received bytes of a few ms, and several statuses or the longest frame.
+    const QUEUE: usize = if SEND_BYTES < 512 { 512 } else { (SEND_BYTES + 1).next_power_of_two() };
 
     #[shared]
     struct Shared {
@@ -100,7 +100,7 @@ mod app {
         wire: Wire<'static, Uart, QUEUE>,
         port: Port<'static, QUEUE>,
         watchdog: Watchdog,
-        drives: Drives<Stage>,
+        actuator: Actuator<Stage>,
         timer: SYST,
         period: u32,
         rates: Rates,
@@ -112,7 +112,7 @@ mod app {
         start::paint_stack();
         let mut core = cx.core;
         faults::guard_stack(&mut core.SCB);
-        let (record, starts) = (faults::found(), faults::starts());
+        let (record, starts) = (faults::take_record(), faults::count_start());
         // SAFETY: RTIC runs this once, and nothing else has the board's peripherals.
         let Parts { clock, cause, uart, mut watchdog, stage } = unsafe { device::start(BAUD) };
         let breadcrumb = start::report(cause, record);
@@ -121,8 +121,8 @@ mod app {
         let axes = image::axes(image.as_ref(), start::LIMITS, TICK_HZ as f32);
         let mut safety = Safety::new(axes, DEADLINE, starts);
         safety.check(Check::Clock, clock.source == Source::Crystal);
-        // Whether it runs counts with the time that it has in the end.
-        let _ = watchdog.start(PATIENCE.long);
+        // The outcome counts later, with the final timeout.
+        let _ = watchdog.start(TIMEOUTS.long);
         let (wire, port) = cx.local.buffers.split(uart, || rtic::pend(Interrupt::SERIAL));
         let mut timer = core.SYST;
         let period = clock.hz / TICK_HZ;
@@ -133,25 +133,25 @@ mod app {
         timer.enable_interrupt();
         let rates = Rates::new(clock.hz, TICK_HZ);
         #[cfg(feature = "foc")]
-        let drives = Drives::new(stage, TICK_HZ);
+        let actuator = Actuator::new(stage, TICK_HZ);
         #[cfg(not(feature = "foc"))]
-        let drives = Drives::new(stage);
-        let local = Local { wire, port, watchdog, drives, timer, period, rates, breadcrumb };
+        let actuator = Actuator::new(stage);
+        let local = Local { wire, port, watchdog, actuator, timer, period, rates, breadcrumb };
         (Shared { safety, timing: Timing::default() }, local)
     }
 
     /// The control tick.
-    #[task(binds = SysTick, priority = 3, shared = [safety, timing], local = [drives, timer, period])]
+    #[task(binds = SysTick, priority = 3, shared = [safety, timing], local = [actuator, timer, period])]
     fn tick(cx: tick::Context) {
         let began = SYST::get_current();
-        // What it says until here is the end that made this tick.
+        // Clears the end that triggered this tick.
         let _ = cx.local.timer.has_wrapped();
         let (mut safety, mut timing) = (cx.shared.safety, cx.shared.timing);
         let ticks = safety.lock(|safety| {
             let outputs = safety.tick();
-            // A break is cleared by disarming: outputs that coast are as they should be.
-            let told = cx.local.drives.tell(&outputs, safety.axes());
-            safety.check(Check::Hardware, told);
+            // Disarming clears a break, because coasting outputs are as intended.
+            let applied = cx.local.actuator.apply(&outputs, safety.axes());
+            safety.check(Check::Hardware, applied);
             safety.ticks()
         });
         faults::TICKS.store(ticks, Ordering::Relaxed);
@@ -159,7 +159,7 @@ mod app {
         if overrun {
             safety.lock(|safety| safety.trip(Fault::Overrun));
         }
-        timing.lock(|timing| timing.note(*cx.local.period, began, ended, overrun));
+        timing.lock(|timing| timing.record(*cx.local.period, began, ended, overrun));
     }
 
     /// The serial port.
@@ -168,19 +168,20 @@ mod app {
         cx.local.wire.on_interrupt();
     }
 
-    /// The loop below.
+    /// The loop below the tick.
     #[idle(shared = [safety, timing], local = [
-        port, watchdog, rates, breadcrumb, scratch: [u32; SCRATCH] = [0; SCRATCH], out: [u8; OUTWARD] = [0; OUTWARD],
+        port, watchdog, rates, breadcrumb, scratch: [u32; SCRATCH] = [0; SCRATCH], out: [u8; SEND_BYTES] = [0; SEND_BYTES],
     ])]
     fn idle(cx: idle::Context) -> ! {
         let idle::LocalResources { port, watchdog, rates, breadcrumb, scratch, out, .. } = cx.local;
         let mut timing = cx.shared.timing;
         // SAFETY: RTIC runs this once.
         let memory = unsafe { start::slots() };
-        // SAFETY: once, by the loop that feeds the watchdog.
+        // SAFETY: called once, by the loop that feeds the watchdog.
         let flash = unsafe { device::flash(memory) };
         let bytes_of = |candidate: &Candidate| {
-            // SAFETY: an update writes to the slot that does not run, and to none while an image waits for its test.
+            // SAFETY: an update only writes to the slot that is not running, and to none while an image waits for its
+            // test.
             unsafe { slot::mapped(memory, candidate.address, candidate.length) }.unwrap_or_default()
         };
         let (updates, running) = Updates::new(flash, start::authority(), watchdog, |candidate, watchdog| {
@@ -188,15 +189,15 @@ mod app {
         });
         let mut bytes = running.as_ref().map_or_else(start::built_in, bytes_of);
         let facts = Facts { image: 0, slot: BUILT_IN, timing: Default::default(), breadcrumb: *breadcrumb };
-        let settings = Settings { status_period: REPORT, flash_while_armed: FLASH_WHILE_ARMED };
-        let endpoint = Endpoint::<OBS, INWARD>::new(Guard::full(&[], MAX_AGE), facts, settings);
+        let settings = Settings { status_period: STATUS_PERIOD, flash_while_armed: FLASH_WHILE_ARMED };
+        let endpoint = Endpoint::<OBS, RECEIVE_BYTES>::new(Guard::full(&[], MAX_AGE), facts, settings);
         let (safety, state) = (Locked(cx.shared.safety), State::default());
         let mut work =
             Work { port, watchdog, safety, endpoint, updates, rates: *rates, stack: start::stack, out, state };
         loop {
             let head = image::open(bytes, scratch, start::LENGTHS, work.watchdog);
             let refusal = head.as_ref().err().copied();
-            let watched = work.watchdog.start(PATIENCE.turn);
+            let watched = work.watchdog.start(TIMEOUTS.turn);
             work.safety.with(|safety| {
                 safety.check(Check::Watchdog, watched);
                 safety.check(Check::Image, matches!(refusal, None | Some(Refusal::SelfTest)));
@@ -218,13 +219,13 @@ mod app {
                 }
                 faults::MISSING.store(work.state.missing(), Ordering::Relaxed);
             };
-            let _ = work.watchdog.start(PATIENCE.long);
+            let _ = work.watchdog.start(TIMEOUTS.long);
             let new = bytes_of(&candidate);
             let outcome = image::open(new, scratch, start::LENGTHS, work.watchdog).map(drop);
             if work.updates.tested(outcome) {
                 bytes = new;
             }
-            // The head begins anew.
+            // The head starts over.
             work.safety.with(Safety::renew);
         }
     }

@@ -1,4 +1,4 @@
-//! What the start finds: the cause of the reset, the image, the stack.
+//! The start: the cause of the reset, the image, the stack.
 
 use core::cell::Cell;
 
@@ -12,7 +12,7 @@ use actq_firmware_support::stack::Room;
 use actq_link::code::{Crash, ResetCause};
 use actq_link::report::Breadcrumb;
 
-/// Includes a file at an address that is a multiple of 4.
+/// A wrapper that aligns an included file to 4 bytes.
 #[repr(C, align(4))]
 struct Aligned<T: ?Sized>(T);
 static BUILT_IN: &Aligned<[u8]> = &Aligned(*include_bytes!(env!(
@@ -20,29 +20,28 @@ static BUILT_IN: &Aligned<[u8]> = &Aligned(*include_bytes!(env!(
     "set ACTQ_IMAGE to the absolute path of the image to build in; `cargo xtask firmware` does"
 )));
 
-/// Values of an observation and of an action: those of the image that is built in. Every image that runs has as many.
+/// Lengths of an observation and of an action, from the built-in image. Every image that runs has the same lengths.
 pub(crate) const LENGTHS: [usize; 2] = lengths(&BUILT_IN.0);
 
-/// Limits of the axes by the build, from the variable ACTQ_LIMITS: one for each, one for all, or none.
+/// The build's limits of the axes, from the variable ACTQ_LIMITS: one for each axis, one for all, or none.
 pub(crate) const LIMITS: &[Limits] = &include!(concat!(env!("OUT_DIR"), "/limits.rs"));
 const _: () = assert!(
     LIMITS.len() < 2 || LIMITS.len() == LENGTHS[1],
-    "ACTQ_LIMITS has neither one entry nor one for each of the image's actions"
+    "ACTQ_LIMITS needs one entry, or one for each value of the image's actions"
 );
 
-/// The image in the image slot, or the one that is built in. A build that asks for signatures does not look at the
-/// slot, where none is.
+/// Returns the image in the image slot, or else the built-in one. A build that requires signatures ignores the slot,
+/// which has no signature.
 pub(crate) fn built_in() -> &'static [u8] {
     let slot = if cfg!(feature = "signed") { None } else { slot::image() };
     slot.unwrap_or(&BUILT_IN.0)
 }
 
-/// The memory of the slots for updates; none where the image that a debugger has put into the same memory is the one
-/// that runs.
+/// Returns the memory of the update slots; empty if a debugger put the running image into the same memory.
 ///
 /// # Safety
 ///
-/// To be called once.
+/// Call it once.
 pub(crate) unsafe fn slots() -> &'static [Cell<u8>] {
     // SAFETY: as the caller promises.
     let memory = unsafe { slot::updates() };
@@ -50,13 +49,13 @@ pub(crate) unsafe fn slots() -> &'static [Cell<u8>] {
     if is_taken { &[] } else { memory }
 }
 
-/// Whose images the link may bring: anyone's.
+/// Returns the authority over images from the link: it accepts every image.
 #[cfg(not(feature = "signed"))]
 pub(crate) fn authority() -> Option<actq_controller::slots::Anyone> {
     Some(actq_controller::slots::Anyone)
 }
 
-/// Whose images the link may bring: those of the build's key. The build script has seen that it is one.
+/// Returns the authority over images from the link: the build's key, which the build script has checked.
 #[cfg(feature = "signed")]
 pub(crate) fn authority() -> Option<actq_controller::slots::Key> {
     const KEY: [u8; 32] = match actq_controller::slots::Key::parse(env!(
@@ -69,14 +68,14 @@ pub(crate) fn authority() -> Option<actq_controller::slots::Key> {
     actq_controller::slots::Key::new(&KEY).ok()
 }
 
-/// Why the processor started, and what the program before has left.
+/// Returns the report of the reset's cause and of the last program's record.
 pub(crate) fn report(cause: Cause, found: Option<Record>) -> Breadcrumb {
     let reset = match (cause, found.map(|record| record.crash)) {
         (Cause::Power, _) => ResetCause::Power,
         (Cause::Pin, _) => ResetCause::Pin,
         (Cause::Software, _) => ResetCause::Software,
         (Cause::Watchdog, _) => ResetCause::Watchdog,
-        // The board tells nothing itself.
+        // The board's registers do not show the cause.
         (Cause::Unknown, Some(Crash::Watchdog)) if WATCHDOG_NMI => ResetCause::Watchdog,
         (Cause::Unknown, Some(_)) => ResetCause::Software,
         (Cause::Unknown, None) => ResetCause::Unknown,
@@ -84,21 +83,21 @@ pub(crate) fn report(cause: Cause, found: Option<Record>) -> Breadcrumb {
     Record::report(reset, found)
 }
 
-/// Words of stack that are painted: more than the program takes, less than any board has.
+/// Painted words of stack: more than the program uses, fewer than any board has.
 const STACK: usize = 2048;
 
 fn room() -> Room {
-    // SAFETY: every board's memory leaves the stack as many words; the linker's script puts it behind all else.
+    // SAFETY: every board's memory has that many words for the stack, which the linker script puts after all else.
     unsafe { Room::of_stack(STACK) }
 }
 
-/// Prepares [`stack`]. To be called before any interrupt comes.
+/// Prepares [`stack`]. Call it before any interrupt is enabled.
 pub(crate) fn paint_stack() {
-    // SAFETY: no interrupt comes yet.
+    // SAFETY: no interrupt is enabled yet.
     unsafe { room().paint() }
 }
 
-/// Bytes of stack that were in use at most.
+/// Returns the most bytes of stack in use since the start.
 pub(crate) fn stack() -> u32 {
     room().used() as u32
 }

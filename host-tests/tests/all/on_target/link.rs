@@ -14,7 +14,7 @@ use actq_bench::controller::{Controller, HANG, act};
 use actq_bench::firmware;
 use actq_bench::qemu::step_request;
 use actq_boards::Clock;
-use actq_firmware_demo::patience::PATIENCE as PATIENCE_OF_WATCHDOG;
+use actq_firmware_demo::timeouts::TIMEOUTS;
 use actq_link::code::{Report, ResetCause, State};
 use actq_link::report::Counters;
 use actq_link::{Message, RESET, Receiver, Sender, frame};
@@ -103,7 +103,7 @@ fn a_host_that_does_not_read_causes_no_reset() -> Result<()> {
     for _ in 0..200 {
         host.write_all(sender.frame(&Message::Ask(Report::Status), 0, &mut buffer).context("room for a request")?)?;
     }
-    let watchdog = Duration::from_millis(PATIENCE_OF_WATCHDOG.turn.into());
+    let watchdog = Duration::from_millis(TIMEOUTS.turn.into());
     thread::sleep(4 * watchdog);
     // The answers that were dropped are missing before the first one after them.
     let (mut answers, mut told, begun) = (Receiver::<{ frame::bytes(64) }>::new(), None, Instant::now());
@@ -146,7 +146,7 @@ fn a_line_that_is_cut_is_told() -> Result<()> {
         drop(stdin.write_all(&step_request(&observation)));
     }
     let output = child.wait_with_output()?;
-    failed(&output, 1, &[&port, "lost", "not there again for 3"])
+    failed(&output, 1, &[&port, "lost", "not reopened within 3"])
 }
 
 /// Two at a time: QEMU's port, as a socket that takes one connection, leaves the second without an answer.
@@ -158,7 +158,7 @@ fn a_port_that_another_program_has_is_told() -> Result<()> {
     failed(
         &link(&controller, &["disarm", "--patience", "1"], b"")?,
         1,
-        &["nothing came", "has no other program the port"],
+        &["no bytes received", "no other program has the port open"],
     )?;
     drop(first);
     succeeded(&link(&controller, &["disarm", "--patience", "600"], b"")?)?;
@@ -171,8 +171,8 @@ fn an_answer_that_is_not_the_links_is_told() -> Result<()> {
     loop {
         let (port, output) = watch_what_chatters()?;
         // On a busy machine the command may give up before the thread has written anything.
-        if !String::from_utf8_lossy(&output.stderr).contains("nothing came") {
-            return failed(&output, 1, &[&port, "what came is not this link's", "speed"]);
+        if !String::from_utf8_lossy(&output.stderr).contains("no bytes received") {
+            return failed(&output, 1, &[&port, "no valid frame received", "speed"]);
         }
     }
 }

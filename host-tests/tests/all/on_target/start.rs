@@ -12,11 +12,11 @@ use actq_bench::firmware::{self, built_in};
 use actq_bench::networks::Builder;
 use actq_bench::qemu::{self, Counter, Region};
 use actq_boards::seams::Watchdog;
-use actq_boards::stm32f405::patience;
+use actq_boards::stm32f405::watchdog_time;
 use actq_client::keys;
 use actq_firmware_demo::image;
-use actq_firmware_demo::patience::{LONGEST, PATIENCE};
 use actq_firmware_demo::running::SLICE;
+use actq_firmware_demo::timeouts::{MAX_PIECE, TIMEOUTS};
 use actq_kernels::Width;
 use actq_link::code::Refusal;
 use anyhow::{Context as _, Result, ensure};
@@ -43,7 +43,7 @@ fn pieces(image: &Path) -> Result<(Code, Vec<(String, Region)>)> {
     Ok((code, names.lines().map(str::to_owned).zip(regions).collect()))
 }
 
-/// The oscillator of its watchdog may be faster than it says, as `boards/src/stm32f405/patience.rs` has it.
+/// The oscillator of its watchdog may be faster than it says, as `boards/src/stm32f405/watchdog_time.rs` has it.
 #[test]
 fn the_watchdog_waits_for_each_piece_of_a_start_and_of_a_check() -> Result<()> {
     let (code, regions) = pieces(built_in()?)?;
@@ -51,17 +51,17 @@ fn the_watchdog_waits_for_each_piece_of_a_start_and_of_a_check() -> Result<()> {
         let of_piece = regions.iter().filter(|(name, _)| name == piece).map(|(_, region)| region);
         let longest = of_piece.max_by_key(|region| region.instructions).context("it has run")?;
         let (instructions, cycles) = (longest.instructions, code.cycles(longest, WAIT_STATES)?);
-        let (took, waits) = (cycles / SLOWEST, if piece == "turn" { PATIENCE.turn } else { PATIENCE.long });
+        let (took, waits) = (cycles / SLOWEST, if piece == "turn" { TIMEOUTS.turn } else { TIMEOUTS.long });
         println!("{piece:6} {instructions:9} instructions {cycles:9} cycles {took:5} ms");
-        assert!(took < patience::milliseconds(waits).into(), "{piece}: {took} ms");
+        assert!(took < watchdog_time::milliseconds(waits).into(), "{piece}: {took} ms");
         // Where a signature is checked, by the update and by the start, it takes most.
         assert!(!["long", "start"].contains(&piece) || instructions > 2_000_000, "{piece}: {instructions}");
         if piece == "slice" {
             // However long a self-test is, this is between two times that the watchdog is fed; and the longest that an
             // image may need, at the cycles of these instructions, is within a turn of the loop, too.
             assert!((SLICE / 2..=SLICE).contains(&(instructions as u32)), "{instructions}");
-            let most = u64::from(LONGEST) * cycles / instructions / SLOWEST;
-            assert!(most < patience::milliseconds(PATIENCE.turn).into(), "{most} ms");
+            let most = u64::from(MAX_PIECE) * cycles / instructions / SLOWEST;
+            assert!(most < watchdog_time::milliseconds(TIMEOUTS.turn).into(), "{most} ms");
         }
     }
     Ok(())

@@ -1,0 +1,21 @@
+//! The watchdog's timeouts.
+
+/// Timeouts of the watchdog, in milliseconds.
+#[derive(Clone, Copy, Debug)]
+pub struct Timeouts {
+    /// Timeout from one turn of the loop with progress to the next.
+    pub turn: u16,
+    /// Timeout for long work: a block or a signature at the start, an erase, the check of a signature, an image's
+    /// check, a slice of its self-test. All of it is slow if the crystal is dead, and the controller is not armed until
+    /// it has ended.
+    pub long: u16,
+}
+
+/// The application's timeouts. `host-tests/tests/all/on_target/start.rs` asserts that each piece is shorter at the
+/// slowest clock.
+pub const TIMEOUTS: Timeouts = Timeouts { turn: 500, long: 4000 };
+
+/// Longest piece of a step that an image may need ([`actq_kernels::Image::least_budget`]), in modelled instructions. An
+/// image with a longer one is refused. `host-tests/tests/all/on_target/start.rs` asserts that it is shorter than
+/// [`Timeouts::turn`] at the slowest clock.
+pub const MAX_PIECE: u32 = 100_000;
