@@ -33,7 +33,7 @@ use self::program::Program;
 const FRAME_WORDS: u32 = 8 + 1;
 const FPU_FRAME_WORDS: u32 = 26 + 1;
 
-/// Bytes below the stack that may be a guard, and that begin at a multiple of them (`boards/src/mpu.rs`).
+/// Bytes below the stack that may be a guard, and that begin at a multiple of them (`boards/src/target/mpu.rs`).
 const GUARD: u32 = 4096;
 
 /// Places of the vector table.

@@ -3,7 +3,7 @@
 /// A board.
 #[derive(Debug)]
 pub struct Board {
-    /// Name of the board, and of its folder with hyphens for underscores.
+    /// Name of the board, and of the feature that selects it.
     pub name: &'static str,
     /// Path of the memory's linker script from the workspace's root; link.x includes it. The default board's is
     /// `memory.x`.

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::board::Board;
-use crate::{microbit, mps2_an385, mps2_an386, mps2_an500, mps2_an505, stm32f405, virt};
+use crate::{microbit, mps2, stm32f405, virt};
 
 /// Clock of an emulated board. It never runs ahead of the host's clock, whose time is in the host's frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,7 +23,7 @@ pub enum Clock {
 
 /// Declares [`Target`] from one line per target.
 macro_rules! targets {
-    ($($(#[doc = $doc:literal])* $target:ident: $triple:literal on $board:ident;)*) => {
+    ($($(#[doc = $doc:literal])* $target:ident: $triple:literal on $board:path;)*) => {
         /// A target of the firmware: a board and rustc's target.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
         pub enum Target {
@@ -44,7 +44,7 @@ macro_rules! targets {
             /// Returns the target's board.
             pub fn board(self) -> &'static Board {
                 match self {
-                    $(Self::$target => &$board::BOARD,)*
+                    $(Self::$target => &$board,)*
                 }
             }
         }
@@ -53,21 +53,21 @@ macro_rules! targets {
 
 targets! {
     /// Cortex-M4 with FPU.
-    Fpu: "thumbv7em-none-eabihf" on mps2_an386;
+    Fpu: "thumbv7em-none-eabihf" on mps2::host::AN386;
     /// Cortex-M4 with floats in software, which give the same bits.
-    NoFpu: "thumbv7em-none-eabi" on mps2_an386;
+    NoFpu: "thumbv7em-none-eabi" on mps2::host::AN386;
     /// Cortex-M3, without the DSP extension: the portable kernels.
-    NoDsp: "thumbv7m-none-eabi" on mps2_an385;
+    NoDsp: "thumbv7m-none-eabi" on mps2::host::AN385;
     /// Cortex-M0: the portable kernels in little memory.
-    Small: "thumbv6m-none-eabi" on microbit;
+    Small: "thumbv6m-none-eabi" on microbit::BOARD;
     /// RV32IMAC: the portable kernels.
-    Riscv: "riscv32imac-unknown-none-elf" on virt;
+    Riscv: "riscv32imac-unknown-none-elf" on virt::BOARD;
     /// Cortex-M33 with FPU and DSP extension.
-    M33: "thumbv8m.main-none-eabihf" on mps2_an505;
+    M33: "thumbv8m.main-none-eabihf" on mps2::host::AN505;
     /// Cortex-M7: the code of the Cortex-M4.
-    M7: "thumbv7em-none-eabihf" on mps2_an500;
+    M7: "thumbv7em-none-eabihf" on mps2::host::AN500;
     /// STM32F405: a Cortex-M4 with the memory of a motor controller.
-    F405: "thumbv7em-none-eabihf" on stm32f405;
+    F405: "thumbv7em-none-eabihf" on stm32f405::host::BOARD;
 }
 
 impl Target {

@@ -24,7 +24,7 @@ const DEFAULT_MAP: u32 = 1 << 2;
 ///
 /// The stack pointer is far from the stack's end, and nothing else uses the unit.
 pub unsafe fn guard_stack() -> Range<u32> {
-    let memory = crate::stack::memory();
+    let memory = super::stack::memory();
     let guard = memory.start.next_multiple_of(1 << SIZE_LOG2);
     // SAFETY: nothing else writes the unit's registers, as the caller promises; the region is aligned to its size, in
     // stack memory that is not in use.

@@ -22,9 +22,9 @@ pub use pwm::{Phase, Pwm as Stage};
 pub use usart::Usart as Uart;
 pub use watchdog::Iwdg as Watchdog;
 
-pub use crate::mpu::guard_stack;
 use crate::seams::{self, Cause};
-use crate::vectors::interrupts;
+pub use crate::target::mpu::guard_stack;
+use crate::target::vectors::interrupts;
 
 // USART 1.
 interrupts!(37 of 82);

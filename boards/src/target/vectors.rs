@@ -42,7 +42,8 @@ macro_rules! interrupts {
         /// The interrupts' part of the vector table.
         #[unsafe(no_mangle)]
         #[unsafe(link_section = ".vector_table.interrupts")]
-        pub static __INTERRUPTS: [crate::vectors::Vector; $all] = crate::vectors::table::<$all>($serial);
+        pub static __INTERRUPTS: [crate::target::vectors::Vector; $all] =
+            crate::target::vectors::table::<$all>($serial);
     };
 }
 pub(crate) use interrupts;
