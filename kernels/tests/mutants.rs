@@ -6,36 +6,13 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use actq_kernels::image::{checksum, header as h, op};
 use actq_kernels::{Head, Image};
-use rand_pcg::Pcg64;
-use rand_pcg::rand_core::{Rng as _, SeedableRng as _};
+use actq_testkit::Random;
 
 /// Mutations of a test.
 const CASES: u64 = if cfg!(miri) { 20 } else { 20_000 };
 
 /// An image with every kind of section, which `host-tests/tests` make and compare.
 const VALID: &[u8] = include_bytes!("valid.actq");
-
-#[derive(Clone)]
-struct Random(Pcg64);
-
-impl Random {
-    fn new(seed: u64) -> Self {
-        Self(Pcg64::seed_from_u64(seed))
-    }
-
-    fn bits(&mut self) -> u64 {
-        self.0.next_u64()
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        (self.bits() % n as u64) as usize
-    }
-
-    /// Uniform in -1..1.
-    fn unit(&mut self) -> f32 {
-        (self.bits() >> 40) as f32 / (1u32 << 23) as f32 - 1.0
-    }
-}
 
 /// An image whose words can be changed.
 struct Draft(Vec<u32>);

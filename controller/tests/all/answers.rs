@@ -10,14 +10,13 @@ use actq_controller::{Axis, Check, Endpoint, Guard, SafeAction, Safety, Settings
 use actq_link::code::{ResetCause, State};
 use actq_link::report::{BUILT_IN, Timing};
 use actq_link::{Floats, Message, Receiver, Sender, frame};
-
-use super::random::Random;
+use actq_testkit::{Line, Random};
 
 const FRAMES: usize = 1_000_000;
 const FRAME: usize = frame::bytes(64);
 const DEADLINE: u32 = 20;
-/// Frames that the line has seen and can send again.
-const REMEMBERED: usize = 500;
+/// Faults in a thousand frames from the host.
+const FAULTS: usize = 300;
 
 /// A head whose every action depends on all observations since its reset.
 #[derive(Default)]
@@ -80,45 +79,7 @@ impl Controller {
     }
 }
 
-/// The line from the host: 30 frames in 100 are lost, doubled, late, damaged, or follow an old one.
-#[derive(Default)]
-struct Line {
-    seen: Vec<Vec<u8>>,
-    held: Vec<u8>,
-}
-
-impl Line {
-    fn carry(&mut self, frame: &[u8], random: &mut Random, out: &mut Vec<u8>) {
-        let held = std::mem::take(&mut self.held);
-        match random.below(17) {
-            0 => {}
-            1 => out.extend([frame, frame].concat()),
-            2 => self.held = frame.to_vec(),
-            3 => {
-                let mut damaged = frame.to_vec();
-                damaged[random.below(frame.len())] ^= 1 << random.below(8);
-                out.extend(damaged);
-            }
-            4 => {
-                self.repeat(random, out);
-                out.extend(frame);
-            }
-            _ => out.extend(frame),
-        }
-        out.extend(held);
-        match self.seen.len() < REMEMBERED {
-            true => self.seen.push(frame.to_vec()),
-            false => self.seen[random.below(REMEMBERED)] = frame.to_vec(),
-        }
-    }
-
-    /// Sends an old frame again.
-    fn repeat(&self, random: &mut Random, out: &mut Vec<u8>) {
-        out.extend(self.seen.get(random.below(REMEMBERED)).into_iter().flatten());
-    }
-}
-
-/// A host with its own copy of the head. It receives all frames of the controller.
+/// A host with an executor of its own. It has lost nothing of what the controller sent.
 struct Host {
     sender: Sender,
     receiver: Receiver<FRAME>,
@@ -213,15 +174,15 @@ impl World {
             applied: HashSet::new(),
             tally: Tally::default(),
         };
-        let (random, controller, line) = (Random::new(27), Controller::new(0), Line::default());
+        let (random, controller, line) = (Random::new(27), Controller::new(0), Line::new(28, FAULTS));
         Self { random, controller, line, host, micros: u64::from(u32::MAX) - 60_000_000, offset: 0, silent: 0, slow: 0 }
     }
 
     fn send(&mut self, message: &Message<'_>, out: &mut Vec<u8>) -> u32 {
         let (number, mut buffer) = (self.host.sender.next(), [0; 64]);
         let micros = self.offset.wrapping_add((self.micros * 99 / 100) as u32);
-        let frame = self.host.sender.frame(message, micros, &mut buffer).expect("the buffer is large enough");
-        self.line.carry(&[&[0], frame].concat(), &mut self.random, out);
+        let frame = self.host.sender.frame(message, micros, &mut buffer).expect("there is room");
+        out.extend(self.line.carry(&[&[0], frame].concat()));
         number
     }
 
@@ -256,8 +217,9 @@ impl World {
             }
             7 => {
                 self.silent = QUIET + DEADLINE + 5;
-                // Another host, whose line has no frames of the previous host.
-                (self.host.sender, self.line) = (Sender::new(self.random.bits() as u32), Line::default());
+                // Another host, whose line remembers nothing of the one before.
+                (self.host.sender, self.line) =
+                    (Sender::new(self.random.bits() as u32), Line::new(self.random.bits(), FAULTS));
                 self.offset = self.random.bits() as u32;
             }
             _ => {}
@@ -273,7 +235,7 @@ impl World {
         } else {
             self.silent -= 1;
             if self.random.below(50) == 0 {
-                self.line.repeat(&mut self.random, &mut arriving);
+                arriving.extend(self.line.replayed());
             }
         }
         let turns = self.slow + self.random.below(3);

@@ -3,8 +3,7 @@
 use actq_controller::Guard;
 use actq_controller::guard::{Range, Refused};
 use actq_link::Floats;
-
-use super::random::Random;
+use actq_testkit::Random;
 
 const RANGES: [Range; 3] =
     [Range { low: -1.0, high: 1.0 }, Range { low: 0.0, high: 100.0 }, Range { low: -1e30, high: 1e30 }];

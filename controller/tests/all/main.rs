@@ -6,7 +6,6 @@ mod foc;
 mod guard;
 mod limits;
 mod memory;
-mod random;
 mod safety;
 mod slots;
 mod transitions;

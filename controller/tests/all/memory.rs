@@ -4,8 +4,7 @@ use actq_controller::breadcrumb::{Record, WORDS};
 use actq_controller::progress::Progress;
 use actq_controller::scrub::Scrub;
 use actq_link::code::{Crash, ResetCause};
-
-use super::random::Random;
+use actq_testkit::Random;
 
 const RECORD: Record = Record { crash: Crash::HardFault, pc: 0x0800_1234, detail: 0x0001_0000, ticks: 77, count: 2 };
 

@@ -1,7 +1,7 @@
 //! Image slots: the image that runs after each update and after each loss of power.
 
 mod device;
-mod nor;
+mod flash;
 mod power;
 #[cfg(feature = "signature")]
 mod signatures;

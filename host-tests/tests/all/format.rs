@@ -13,6 +13,7 @@ use actq_bench::root;
 use actq_kernels::image::{Image, Kind, OpKind, Region, block_bytes, checksum, header as h};
 use actq_kernels::layout::{BlockShape, Lanes, MAX_PAIRED_GROUPED, Width, pack};
 use actq_kernels::x::{Plan, max_prepared_words};
+use actq_testkit::Random;
 use half::bf16;
 
 fn document() -> String {
@@ -301,11 +302,7 @@ impl Documented {
 
 #[test]
 fn layouts_and_bit_diagrams_show_where_codes_stand() {
-    let mut state = 1u32;
-    let mut noise = move || {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        (state >> 24) as u8
-    };
+    let mut random = Random::new(1);
     for layout in Documented::all(&document()) {
         let mut shapes = 0;
         for (rows, cols, group) in [1, 3, 4, 5, 8, 9, 12, 13, 21].into_iter().flat_map(|rows| {
@@ -317,8 +314,8 @@ fn layouts_and_bit_diagrams_show_where_codes_stand() {
             if !shape.is_valid() {
                 continue;
             }
-            let codes: Vec<u8> = (0..rows * cols).map(|_| noise() >> (8 - layout.width.bits())).collect();
-            let scales: Vec<u8> = (0..rows * shape.groups()).map(|_| noise()).collect();
+            let codes: Vec<u8> = (0..rows * cols).map(|_| random.byte() >> (8 - layout.width.bits())).collect();
+            let scales = random.bytes(rows * shape.groups());
             let mut packed = vec![0; shape.words()];
             pack(shape, &codes, &scales, &mut packed).expect("the codes fit the shape");
             layout.check(shape, &codes, &scales, &packed);

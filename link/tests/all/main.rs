@@ -2,5 +2,4 @@
 
 mod faults;
 mod messages;
-mod random;
 mod wire;

@@ -3,9 +3,9 @@
 use actq_link::code::{Parameter, Refusal, Report, State};
 use actq_link::report::Counters;
 use actq_link::{Floats, Message, Receiver, Sender, frame};
+use actq_testkit::Random;
 
 use super::messages::{Content, LONGEST, all};
-use super::random::Random;
 
 /// Returns the messages that a receiver finds, as text.
 pub(super) fn found<const N: usize>(receiver: &mut Receiver<N>, bytes: &[u8]) -> Vec<String> {

@@ -3,6 +3,8 @@
 
 use core::cell::Cell;
 
+use actq_testkit::{Change, Power, Random};
+
 use super::{
     BSY, DCEN, DCRST, ICEN, ICRST, KEYS, LOCK, PG, PGAERR, PGPERR, PGSERR, Part, Register, SECTORS, SER, SNB, STRT,
     WORDS, WRPERR, longest_erase, sector,
@@ -39,25 +41,15 @@ pub struct Model {
     pub is_driving: bool,
     /// `true` if the supply voltage is sufficient.
     pub is_supplied: bool,
-    /// `true` if the watchdog accepts another timeout.
+    /// The watchdog takes another time.
     pub accepts_timeout: bool,
-    /// `true` if the controller exists: without one, as in QEMU, all its registers read as 0.
+    /// There is a controller: without one, as in QEMU, all its registers read as 0.
     pub exists: bool,
-    /// Writes to registers and memory so far.
-    pub done: usize,
-    /// Number of the write during which the supply fails. After it nothing changes, and registers read as 0.
-    pub fails_at: Option<usize>,
-    /// `true` if the watchdog reset the part, with the effect of a supply failure.
+    /// The supply: each write to a register or to the memory is a change. After its failure nothing changes, and
+    /// registers read as 0.
+    pub power: Power,
+    /// The watchdog was not fed, and has reset the part: as if the supply had failed.
     pub is_reset: bool,
-    random: u64,
-}
-
-/// Outcome of a write.
-#[derive(PartialEq, Eq)]
-enum Outcome {
-    Whole,
-    Part,
-    Nothing,
 }
 
 impl Model {
@@ -81,17 +73,16 @@ impl Model {
             is_supplied: true,
             accepts_timeout: true,
             exists: true,
-            done: 0,
-            fails_at: None,
+            power: Power::new(Random::new(seed)),
             is_reset: false,
-            random: seed,
         }
     }
 
     /// Returns the part after a power cycle.
     #[must_use]
-    pub fn restarted(self) -> Self {
-        Self { memory: self.memory, ..Self::new(Vec::new(), self.begin, self.random) }
+    pub fn restarted(mut self) -> Self {
+        self.power.restart(None);
+        Self { memory: self.memory, power: self.power, ..Self::new(Vec::new(), self.begin, 0) }
     }
 
     /// Returns the memory's bytes.
@@ -99,28 +90,12 @@ impl Model {
         self.memory.iter().map(Cell::get).collect()
     }
 
-    fn outcome(&mut self) -> Outcome {
-        let outcome = match self.fails_at {
-            _ if self.is_reset => return Outcome::Nothing,
-            Some(at) if self.done == at => Outcome::Part,
-            Some(at) if self.done > at => return Outcome::Nothing,
-            _ => Outcome::Whole,
-        };
-        self.done += 1;
-        outcome
+    fn change(&mut self) -> Change {
+        if self.is_reset { Change::Nothing } else { self.power.change() }
     }
 
     fn is_off(&self) -> bool {
-        !self.exists || self.is_reset || self.fails_at.is_some_and(|at| self.done > at)
-    }
-
-    /// SplitMix64.
-    fn random(&mut self) -> u8 {
-        self.random = self.random.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut bits = self.random;
-        bits = (bits ^ bits >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        bits = (bits ^ bits >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (bits ^ bits >> 31) as u8
+        !self.exists || self.is_reset || self.power.is_off()
     }
 
     fn raise(&self, flags: u32) {
@@ -132,7 +107,7 @@ impl Model {
         self.left.set(self.takes);
     }
 
-    fn erase(&mut self, outcome: &Outcome) {
+    fn erase(&mut self, change: Change) {
         let number = self.control >> SNB & 0xf;
         assert!(number < SECTORS && self.control & PG == 0, "no such erase: {:#x}", self.control);
         assert!(!self.is_driving && self.is_supplied, "an erase that must not begin");
@@ -141,25 +116,18 @@ impl Model {
         if self.raises | protected != 0 {
             return self.raise(self.raises | protected);
         }
-        // Some bits are ones already: few, about half, or almost all, depending on the moment.
-        let moment = self.random() % 3;
-        let begin = self.begin;
-        for at in sector(number).map(|at| (at - begin) as usize) {
-            let ones = match outcome {
-                Outcome::Whole => 0xff,
-                _ => {
-                    let [a, b, c] = [self.random(), self.random(), self.random()];
-                    [a & b & c, a, a | b][usize::from(moment)]
-                }
-            };
-            self.memory[at].set(self.memory[at].get() | ones);
+        let addresses = sector(number);
+        let sector = &self.memory[(addresses.start - self.begin) as usize..(addresses.end - self.begin) as usize];
+        match change {
+            Change::Whole => sector.iter().for_each(|byte| byte.set(0xff)),
+            _ => sector.iter().zip(self.power.erased()).for_each(|(byte, ones)| byte.set(byte.get() | ones)),
         }
         self.is_stale |= self.access & (ICEN | DCEN) != 0;
         self.begins();
     }
 
-    fn control(&mut self, value: u32, outcome: &Outcome) {
-        // The bus stalls until the operation ends.
+    fn control(&mut self, value: u32, change: Change) {
+        // The bus stalls until the end.
         self.now.set(self.now.get() + u64::from(self.left.take()));
         self.status.set(self.status.get() & !BSY);
         if self.control & LOCK != 0 {
@@ -169,7 +137,7 @@ impl Model {
         if value & LOCK != 0 {
             self.keys = self.keys.map(|_| 0);
         } else if value & (SER | STRT) == SER | STRT {
-            self.erase(outcome);
+            self.erase(change);
         }
     }
 
@@ -208,10 +176,10 @@ impl Part for Model {
     }
 
     fn write(&mut self, register: Register, value: u32) {
-        let outcome = self.outcome();
-        // A register is written completely or not at all.
+        let change = self.change();
+        // A register is set or not.
         let is_start = register == Register::Control && value & STRT != 0;
-        if !self.exists || outcome == Outcome::Nothing || outcome == Outcome::Part && !is_start {
+        if !self.exists || change == Change::Nothing || change == Change::Part && !is_start {
             return;
         }
         match register {
@@ -222,7 +190,7 @@ impl Part for Model {
             }
             Register::Key => self.key(value),
             Register::Status => self.status.set(self.status.get() & !(value & !BSY)),
-            Register::Control => self.control(value, &outcome),
+            Register::Control => self.control(value, change),
         }
     }
 
@@ -231,8 +199,8 @@ impl Part for Model {
     }
 
     fn program(&mut self, at: u32, word: u32) {
-        let outcome = self.outcome();
-        if !self.exists || outcome == Outcome::Nothing {
+        let change = self.change();
+        if !self.exists || change == Change::Nothing {
             return;
         }
         assert!(self.status.get() & BSY == 0 && !self.is_driving && self.is_supplied, "a write that must not begin");
@@ -249,7 +217,7 @@ impl Part for Model {
             self.raise(WRPERR);
         } else {
             for (at, byte) in (at as usize..).zip(word.to_le_bytes()) {
-                let kept = if outcome == Outcome::Part { self.random() } else { 0 };
+                let kept = if change == Change::Part { self.power.kept() } else { 0 };
                 self.memory[at].set(self.memory[at].get() & (byte | kept));
             }
             self.begins();

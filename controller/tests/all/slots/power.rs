@@ -5,9 +5,10 @@ use actq_boards::stm32f405::flash::Flash;
 use actq_boards::stm32f405::flash::model::Model;
 use actq_controller::slots::{Anyone, Layout, Slot};
 use actq_link::code::Refusal;
+use actq_testkit::Nor;
 
 use super::device::{Device, Image};
-use super::nor::{Fails, Nor};
+use super::flash::Fails;
 
 /// Returns images in sequence; the third and the fifth fail their test.
 fn images() -> Vec<Image> {
@@ -132,12 +133,12 @@ fn an_image_is_given_up_after_three_trials() {
     // Up to the last change before the confirmation.
     let mut trial = flash.clone();
     assert_eq!(Device::start(&mut trial, &layout, Anyone).update(&new, 64, None), Ok(()));
-    (flash.fails_at, trial) = (Some(trial.done - 1), flash.clone());
+    (flash.power.fails_at, trial) = (Some(trial.power.done - 1), flash.clone());
     drop(trial);
     assert_eq!(Device::start(&mut flash, &layout, Anyone).update(&new, 64, None), Err(Refusal::Flash));
     let mut slots = 0;
     for start in 0..4 {
-        flash.fails_at = None;
+        flash.power.fails_at = None;
         let mut chosen = actq_controller::slots::Slots::new(&mut flash, layout.clone(), Anyone);
         let candidate = chosen.select(|| ()).expect("one of the images runs");
         slots += u32::from(candidate.trial);

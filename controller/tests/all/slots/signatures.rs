@@ -2,10 +2,10 @@
 
 use actq_controller::slots::{Key, Layout, context};
 use actq_link::code::Refusal;
+use actq_testkit::Nor;
 use ed25519_dalek::{Digest as _, Sha512, SigningKey};
 
 use super::device::{Device, Image};
-use super::nor::Nor;
 
 type Flash = Nor<4, 1024>;
 

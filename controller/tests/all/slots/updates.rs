@@ -3,11 +3,10 @@
 use actq_controller::slots::{Anyone, Layout, LayoutError, Slot, Slots, TRIALS};
 use actq_controller::update::{Plan, Update};
 use actq_link::code::Refusal;
+use actq_testkit::{Nor, Random};
 use embedded_storage::nor_flash::NorFlash;
 
 use super::device::{Device, Image};
-use super::nor::Nor;
-use crate::random::Random;
 
 type Flash = Nor<4, 1024>;
 
@@ -140,7 +139,7 @@ fn flash_with_arbitrary_content_has_no_image() {
             flash.bytes.fill(0xff);
         }
         assert_eq!(Device::start(&mut flash, &layout, Anyone).runs, None);
-        assert_eq!(flash.done, 0, "nothing is written");
+        assert_eq!(flash.power.done, 0, "nothing is written");
     }
 }
 

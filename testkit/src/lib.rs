@@ -1,0 +1,13 @@
+//! Fixtures that the tests of several crates share. Only dev-dependencies and models for tests name this crate, and it
+//! depends on no other crate of the workspace.
+#![forbid(unsafe_code)]
+
+mod line;
+mod nor;
+mod power;
+mod random;
+
+pub use line::{Fault, Line};
+pub use nor::{NoPower, Nor};
+pub use power::{Change, Power};
+pub use random::Random;
