@@ -2,8 +2,8 @@
 //! `cargo xtask fit`, `cargo xtask compare`, `cargo xtask faults`, `cargo xtask firmware`, `cargo xtask stack`,
 //! `cargo xtask doctor`.
 //!
-//! This crate depends on next to nothing, so that it is built and speaks at once. What measures is the binary of
-//! `actq-bench`.
+//! This crate has few dependencies, so that it builds fast and prints soon. The binaries of `actq-bench` and
+//! `actq-research` measure.
 #![forbid(unsafe_code)]
 
 mod cost;
@@ -53,10 +53,10 @@ fn main() -> ExitCode {
                 return ExitCode::from(2);
             }
         },
-        ["compare", ..] => measuring(&words),
+        ["compare", ..] => measuring("actq-research", &words),
         ["stack", ..] => firmware::boards()
             .try_for_each(|(target, _)| setup::rust_target(target.triple()))
-            .and_then(|()| measuring(&words)),
+            .and_then(|()| measuring("actq-bench", &words)),
         ["demo" | "bench" | "faults" | "fit", ..] => measure(&words, &[Target::Fpu]),
         ["budgets", ..] => measure(&words, &[Target::Fpu, Target::M33]),
         ["help" | "-h" | "--help"] => {
@@ -82,13 +82,13 @@ fn measure(arguments: &[&str], targets: &[Target]) -> Result<()> {
     let boards: Vec<&str> = targets.iter().map(|target| target.board().name).collect();
     println!("{}: on {} in QEMU", arguments[0], boards.join(" and "));
     setup::ensure(targets)?;
-    measuring(arguments)
+    measuring("actq-bench", arguments)
 }
 
-/// A command of `actq-bench`.
-fn measuring(arguments: &[&str]) -> Result<()> {
+/// Builds the binary of a package and runs one of its commands.
+fn measuring(package: &str, arguments: &[&str]) -> Result<()> {
     let mut command = setup::cargo();
-    command.args(["run", "--release", "--package", "actq-bench", "--"]).args(arguments);
+    command.args(["run", "--release", "--package", package, "--"]).args(arguments);
     println!("building what quantizes and measures");
     ensure!(command.status().context("cargo cannot be started")?.success(), "{} failed", arguments[0]);
     Ok(())

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use actq_bench::compare::{Cell, Contender, Journal, Plan, run};
+use actq_research::compare::{Cell, Contender, Journal, Plan, run};
 use anyhow::{Context as _, Result, ensure};
 
 fn plan(folder: &Path) -> Plan {

@@ -1,10 +1,10 @@
-//! llama.cpp's K-quants, simulated: what a matrix becomes in them, at their true bits.
+//! llama.cpp's K-quants, simulated: the weights that a matrix has in them, at their true bits.
 //!
-//! Only the weights that codes and scales stand for are made here, not the bytes in llama.cpp's order. A super-block is
-//! 256 weights of a row, in sub-blocks of 16 or 32; a weight is `d * scale * code - d_min * min`, d and d_min being
-//! f16, scale and min small integers of the sub-block. Scales and mins are fitted by least squares, every weight
-//! weighed by its importance: candidates for the clipping point, then the neighbours of the rounded scales, then d and
-//! d_min for the codes that were found.
+//! This module computes only the weights that codes and scales represent, not the bytes in llama.cpp's order. A
+//! super-block is 256 weights of a row, in sub-blocks of 16 or 32; a weight is `d * scale * code - d_min * min`, where
+//! d and d_min are f16, and scale and min small integers of the sub-block. Scales and mins are fitted by least squares,
+//! weighted by importance: candidates for the clipping point, then the neighbours of the rounded scales, then d and
+//! d_min for the chosen codes.
 
 mod fit;
 
@@ -28,16 +28,16 @@ pub enum Format {
     Q6K,
 }
 
-/// What stands in a super-block.
+/// The layout of a super-block.
 #[derive(Clone, Copy, Debug)]
 struct Layout {
-    /// Bits of a code.
+    /// Bits per code.
     bits: u32,
-    /// Weights of a sub-block.
+    /// Weights per sub-block.
     sub_block: usize,
     /// Bits of a sub-block's scale, and of its min.
     scale_bits: u32,
-    /// Whether there are mins. Codes and scales are then at least 0, otherwise they have signs.
+    /// `true` with mins. Codes and scales are then at least 0; otherwise they are signed.
     mins: bool,
 }
 
@@ -69,12 +69,12 @@ impl Format {
         Layout { bits, sub_block, scale_bits, mins }
     }
 
-    /// Bits of a code.
+    /// Returns the bits of a code.
     pub fn bits(self) -> u32 {
         self.layout().bits
     }
 
-    /// Bits of a weight in a whole super-block, everything counted.
+    /// Returns the bits per weight in a whole super-block, everything counted.
     pub fn bits_per_weight(self) -> f64 {
         let Layout { bits, sub_block, scale_bits, mins } = self.layout();
         // A scale, or a scale and a min; and the f16 of each.
@@ -83,13 +83,13 @@ impl Format {
         f64::from(bits) + f64::from(scales) / SUPER_BLOCK as f64
     }
 
-    /// Bytes of so many weights. Where rows do not fill super-blocks, llama.cpp would pad them; here the padding is not
-    /// counted.
+    /// Returns the bytes of this many weights. llama.cpp would pad rows that do not fill super-blocks; here the padding
+    /// is not counted.
     pub fn bytes(self, weights: usize) -> usize {
         (self.bits_per_weight() * weights as f64 / 8.0).ceil() as usize
     }
 
-    /// The weights that codes and scales of a matrix stand for. `importance` has an entry per weight.
+    /// Returns the weights that codes and scales of a matrix represent. `importance` has an entry per weight.
     pub fn rounded(self, weights: &[f32], cols: usize, importance: &[f64]) -> Vec<f32> {
         let rows = weights.chunks(cols.max(1)).zip(importance.chunks(cols.max(1)));
         let blocks = rows.flat_map(|(w, h)| w.chunks(SUPER_BLOCK).zip(h.chunks(SUPER_BLOCK)));
@@ -103,7 +103,7 @@ impl fmt::Display for Format {
     }
 }
 
-/// A super-block; the last of a row may be short, as if what is missing were zeros of no importance.
+/// A super-block; the last of a row may be short, as if the missing weights were zeros of no importance.
 struct Block {
     layout: Layout,
     d: f16,
@@ -125,7 +125,7 @@ impl Block {
                 if layout.mins { fit::affine(w, h, layout.codes().1) } else { (fit::linear(w, h, layout.codes()), 0.0) }
             })
             .collect();
-        // The largest is the integer of the largest magnitude; with signs that is a negative one.
+        // The largest integer goes to the largest magnitude; with signs that is a negative one.
         let (low, high) = layout.scales();
         let extreme = f64::from(if low.abs() > high { low } else { high });
         let largest = fitted.iter().map(|(s, _)| *s).fold(0.0, |m: f64, s| if s.abs() > m.abs() { s } else { m });
@@ -148,8 +148,8 @@ impl Block {
         block
     }
 
-    /// For every sub-block the scale and min next to the present ones, and their codes, that are nearest to the
-    /// weights.
+    /// Chooses for every sub-block the scale and min, next to the present ones, and their codes, that come nearest to
+    /// the weights.
     fn choose_integers(&mut self, weights: &[f32], importance: &[f64]) {
         let (low, high) = self.layout.scales();
         let size = self.layout.sub_block;
@@ -170,7 +170,7 @@ impl Block {
         }
     }
 
-    /// d and d_min by least squares for the integers as they are, where that is better in f16, too.
+    /// Fits d and d_min by least squares to the present integers, if that is still better in f16.
     fn refit(&mut self, weights: &[f32], importance: &[f64]) {
         let size = self.layout.sub_block;
         let terms = (0..weights.len()).map(|i| fit::Term {
@@ -184,7 +184,7 @@ impl Block {
         let before = self.error(weights, importance);
         (self.d, self.d_min) = (f16::from_f64(d), f16::from_f64(d_min));
         let after = self.error(weights, importance);
-        // Also where the new values are not finite.
+        // Also if the new values are not finite.
         if after.is_nan() || after > before {
             (self.d, self.d_min) = known;
         }
@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn bits_are_those_of_the_formats() {
+    fn bits_per_weight_match_the_formats() {
         assert_eq!(Format::ALL.map(Format::bits_per_weight), [2.625, 3.4375, 4.5, 6.5625]);
         assert_eq!(Format::ALL.map(|format| format.bytes(256)), [84, 110, 144, 210]);
         assert_eq!(Format::Q2K.bytes(1), 1, "part of a byte is a byte");
@@ -224,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn integers_stay_within_their_bits_also_in_short_blocks() {
+    fn integers_fit_their_bits_even_in_short_blocks() {
         let mut random = Random::new(1);
         for format in Format::ALL {
             for len in [256, 100, 1] {
@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_format_holds_comes_back() {
+    fn representable_weights_are_recovered() {
         for format in Format::ALL {
             let layout = format.layout();
             let ((low, high), (_, top)) = (layout.codes(), layout.scales());
@@ -265,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn more_bits_and_more_importance_leave_less_error_and_zeros_stay() {
+    fn more_bits_or_importance_reduce_the_error() {
         let mut random = Random::new(2);
         let weights: Vec<f32> = (0..4 * 300).map(|_| random.normal()).collect();
         let equal = vec![1.0; weights.len()];

@@ -1,4 +1,4 @@
-//! The file that every result is appended to, and from which a run goes on.
+//! The file of all results, from which an interrupted run resumes.
 
 use std::fs::{self, File};
 use std::io::Write as _;
@@ -6,26 +6,26 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{SystemTime, UNIX_EPOCH};
 
+use actq_bench::root;
 use anyhow::{Context as _, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::cell::{Cell, CellKey};
 use super::plan::Plan;
-use crate::root;
 
 const FORMAT: &str = "actq-compare-1";
 
-/// The first line: what the results are of.
+/// The first line: the origin of the results.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Header {
-    /// The form of the file.
+    /// The version of the file format.
     pub format: String,
     /// The commit of the sources.
     pub commit: String,
-    /// Whether the sources differed from it.
+    /// `true` if the sources differed from it.
     pub dirty: bool,
-    /// When the run began, UTC.
+    /// Begin of the run, UTC.
     pub date: String,
     /// The plan.
     pub options: Value,
@@ -37,9 +37,9 @@ impl Header {
             let output = Command::new("git").current_dir(root()).args(arguments).output().ok()?;
             output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
         };
-        // Outside a repository, as in an unpacked archive, nothing is known.
+        // Outside a repository, for example in an unpacked archive, nothing is known.
         let commit = git(&["rev-parse", "HEAD"]).unwrap_or_else(|| "unknown".to_owned());
-        // Files that git does not know count for nothing: the results may be among them.
+        // Ignore files that git does not track: the results may be among them.
         let changes = git(&["--no-optional-locks", "status", "--porcelain", "--untracked-files=no"]);
         let dirty = changes.is_none_or(|changes| !changes.is_empty());
         let seconds = SystemTime::now().duration_since(UNIX_EPOCH).context("the clock is before 1970")?.as_secs();
@@ -47,14 +47,14 @@ impl Header {
         Ok(Self { format: FORMAT.to_owned(), commit, dirty, date: date(seconds), options })
     }
 
-    /// Whether results of one run may stand beside those of the other.
+    /// Returns `true` if results of both runs are comparable.
     fn same_run(&self, other: &Self) -> bool {
         (&self.format, &self.commit, self.dirty, &self.options)
             == (&other.format, &other.commit, other.dirty, &other.options)
     }
 }
 
-/// A date and time (UTC) from seconds since 1970: days from the civil calendar's 400-year cycles.
+/// Formats a date and time (UTC) from seconds since 1970: days from the civil calendar's 400-year cycles.
 fn date(seconds: u64) -> String {
     let days = seconds / 86_400 + 719_468;
     let (era, day_of_era) = (days / 146_097, days % 146_097);
@@ -69,27 +69,27 @@ fn date(seconds: u64) -> String {
     format!("{year:04}-{month:02}-{day:02} {hour:02}:{minute:02}")
 }
 
-/// Results that are there, and where the next ones go.
+/// The results so far, and the place of the next ones.
 #[derive(Debug)]
 pub struct Journal {
     /// The first line.
     pub header: Header,
-    /// What is there.
+    /// The results.
     pub cells: Vec<Cell>,
     path: PathBuf,
 }
 
 impl Journal {
-    /// The file in the folder of a run.
+    /// Returns the file in the folder of a run.
     pub fn path(folder: &Path) -> PathBuf {
         folder.join("compare.jsonl")
     }
 
-    /// Begins a run, or goes on with one of the same plan and sources.
+    /// Begins a run, or resumes one with the same plan and sources.
     pub(super) fn open(plan: &Plan) -> Result<Self> {
         let header = Header::now(plan)?;
         let path = Self::path(&plan.out);
-        fs::create_dir_all(&plan.out).with_context(|| format!("{}: cannot be made", plan.out.display()))?;
+        fs::create_dir_all(&plan.out).with_context(|| format!("cannot create {}", plan.out.display()))?;
         if !path.exists() {
             let journal = Self { header, cells: Vec::new(), path };
             fs::write(&journal.path, line(&journal.header)?).with_context(|| journal.failed("written"))?;
@@ -105,32 +105,32 @@ impl Journal {
             if journal.header.dirty { " with changes" } else { "" },
             journal.header.options
         );
-        // A line that was cut short when the run was ended would swallow the next one.
+        // An interrupted run may leave a truncated line, which would swallow the next one.
         let whole = fs::read(&journal.path)?.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
         let cut = || File::options().write(true).open(&journal.path)?.set_len(whole as u64);
         cut().with_context(|| journal.failed("written"))?;
         Ok(journal)
     }
 
-    /// Reads what a run has left.
+    /// Reads the results of a run.
     pub fn read(folder: &Path) -> Result<Self> {
         let path = Self::path(folder);
         let bytes = fs::read(&path)
-            .with_context(|| format!("{}: cannot be read; has a comparison begun there?", path.display()))?;
+            .with_context(|| format!("cannot read {}; has a comparison begun there?", path.display()))?;
         let text = String::from_utf8_lossy(&bytes);
         let whole = text.rfind('\n').map_or("", |end| &text[..end]);
         let mut lines = whole.lines().enumerate();
         let wrong = |number: usize| format!("{}, line {}: not a line of a comparison", path.display(), number + 1);
         let Some((number, first)) = lines.next() else { bail!("{}: is empty; remove it", path.display()) };
         let header: Header = serde_json::from_str(first).with_context(|| wrong(number))?;
-        ensure!(header.format == FORMAT, "{}: its format is {}, not {FORMAT}", path.display(), header.format);
+        ensure!(header.format == FORMAT, "{}: unknown format {}; expected {FORMAT}", path.display(), header.format);
         let cells = lines
             .map(|(number, line)| serde_json::from_str(line).with_context(|| wrong(number)))
             .collect::<Result<Vec<Cell>>>()?;
         Ok(Self { header, cells, path })
     }
 
-    /// A result that is there: the last, where there are several.
+    /// Returns a result: the latest, if there are several.
     pub fn find(&self, key: &CellKey) -> Option<&Cell> {
         self.cells.iter().rev().find(|cell| cell.key == *key)
     }

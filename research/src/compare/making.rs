@@ -1,4 +1,4 @@
-//! Making the image of a cell.
+//! Makes the image of a cell.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -19,19 +19,19 @@ use super::cell::Made;
 use super::plan::{Contender, Plan};
 use crate::kquants::Format;
 
-/// A policy as the methods take it.
+/// A policy and its recordings.
 pub(super) struct Subject {
     policy: Policy,
     recordings: Recordings,
 }
 
-/// What became of a cell.
+/// The outcome of a cell.
 pub(super) enum Attempt {
-    /// An image, and its figures.
+    /// An image and its figures.
     Made(Vec<u8>, Made),
     /// A network without an image, and its figures.
     Simulated(Graph, Made),
-    /// None, and why.
+    /// Impossible, with the reason.
     Impossible(String),
 }
 
@@ -51,7 +51,7 @@ impl Subject {
     }
 }
 
-/// The methods made ready for a policy, each when it is first asked for.
+/// The methods prepared for a policy, each on first use.
 pub(super) struct Maker<'a> {
     subject: &'a Subject,
     plan: &'a Plan,
@@ -68,11 +68,10 @@ impl<'a> Maker<'a> {
         &self.subject.policy
     }
 
-    /// Makes the image of a cell. `progress` gets what is being done and the share of it that is done.
+    /// Makes the image of a cell. `progress` gets the name of the current work and its finished share.
     ///
-    /// The method's default group counts. Only where it does not fit the budget, the others are tried, and of those
-    /// that fit the one with the lowest held-out error is taken: the choice on what errors are measured on is in the
-    /// method's favour.
+    /// Uses the method's default group. Only if it does not fit the budget, tries the other groups, and takes the one
+    /// with the lowest held-out error: a choice in the method's favour.
     pub(super) fn make(
         &mut self,
         contender: Contender,
@@ -111,11 +110,11 @@ impl<'a> Maker<'a> {
         })
     }
 
-    /// ActQuant in K-quants.
+    /// Makes ActQuant in K-quants.
     fn simulate(&self, budget: f64, preparing: f64) -> Result<Attempt> {
         let begun = Instant::now();
         let (quantizer, _) =
-            self.ready.get(&Contender::ActQuantK.method().to_string()).context("the method was not made ready")?;
+            self.ready.get(&Contender::ActQuantK.method().to_string()).context("the method is not prepared")?;
         let statistics = quantizer.method().action_statistics().context("the method has no statistics")?;
         let policy = &self.subject.policy;
         let simulated = match actquant_k::quantize(&policy.graph, statistics, budget, self.subject.heldout()?) {
@@ -141,7 +140,7 @@ impl<'a> Maker<'a> {
         Ok(Attempt::Simulated(simulated.graph, made))
     }
 
-    /// Seconds that the statistics of a method take, which are collected once.
+    /// Returns the seconds of a method's statistics, which are collected once.
     fn prepare(&mut self, method: Method, progress: &mut impl FnMut(&str, f64)) -> Result<f64> {
         if let Some((_, seconds)) = self.ready.get(&method.to_string()) {
             return Ok(*seconds);
@@ -167,7 +166,7 @@ impl<'a> Maker<'a> {
         let plain = Options::new(method, Budget::BitsPerWeight(budget));
         let options = Options { group, steps, seed: self.plan.seed, ..plain };
         let begun = Instant::now();
-        let (quantizer, _) = self.ready.get(&method.to_string()).context("the method was not made ready")?;
+        let (quantizer, _) = self.ready.get(&method.to_string()).context("the method is not prepared")?;
         let quantized = match quantizer.quantize(&options, progress) {
             Ok(quantized) => quantized,
             Err(error) => return error.budget().map(|small| Err(*small)).ok_or(error.into()),
@@ -187,12 +186,12 @@ impl<'a> Maker<'a> {
     }
 }
 
-/// Why a budget is too small.
+/// Explains why a budget is too small.
 fn least(BudgetTooSmall { bytes, weights, .. }: &BudgetTooSmall, with: &str) -> String {
     format!("the least is {:.3} bits per weight, {with}", 8.0 * *bytes as f64 / (*weights).max(1) as f64)
 }
 
-/// A group for people.
+/// Describes a group.
 fn scales(group: usize) -> String {
     if group == 0 { "with one scale a row".to_owned() } else { format!("with groups of {group}") }
 }

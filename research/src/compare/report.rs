@@ -1,4 +1,4 @@
-//! The results for people.
+//! The human-readable results.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -13,10 +13,10 @@ use super::cell::{Cell, CellKey, Made};
 use super::journal::{Header, Journal};
 use super::plan::Contender;
 
-/// How far the robot is from where it should be, by the name that the simulator gives it, with its unit.
+/// Distance of the robot from its target, by the simulator's name for it, with its unit.
 const TRACKING: [(&str, &str); 3] = [("tracking_error_mm", "mm"), ("err_lin", "m/s"), ("dist", "m")];
 
-/// The plots beside the report.
+/// The file of plots beside the report.
 const PICTURE: &str = "compare.svg";
 
 const READING: &str = "\
@@ -34,7 +34,7 @@ bits per weight), a format a matrix by its scores and allocation. Simulated in f
 rows to 256 is not counted, and of its importance with and without llama.cpp's factor of the weights' magnitude the one with the lower \
 held-out error was taken. Its image bytes are those of its blocks and everything else in f32.";
 
-/// Writes the report beside the journal, and gives its path.
+/// Writes the report beside the journal, and returns its path.
 pub(super) fn write(journal: &Journal, folder: &Path) -> Result<PathBuf> {
     let asked = Asked::of(&journal.header)?;
     let path = folder.join("compare.md");
@@ -43,7 +43,7 @@ pub(super) fn write(journal: &Journal, folder: &Path) -> Result<PathBuf> {
     Ok(path)
 }
 
-/// A cell in a line of progress.
+/// Describes a cell in a line of progress.
 pub(super) fn sentence(cell: &Cell) -> String {
     let made = cell
         .made
@@ -55,8 +55,8 @@ pub(super) fn sentence(cell: &Cell) -> String {
     if parts.is_empty() { "not driven".to_owned() } else { parts.join(", ") }
 }
 
-/// What the plan asked for: policies and methods in its order, budgets from few bits to many, in whatever order they
-/// ran.
+/// The plan's request: policies and methods in its order, budgets from few bits to many, independent of the order of
+/// the runs.
 struct Asked {
     policies: Vec<String>,
     methods: Vec<Contender>,
@@ -76,7 +76,7 @@ impl Asked {
     }
 }
 
-/// Success over true bits per weight: a plot of each policy that was driven, a line of each method.
+/// Returns the plots of success over true bits per weight: one of each driven policy, a line for each method.
 fn plots(journal: &Journal, asked: &Asked) -> Vec<Plot> {
     let percent = |cell: &Cell| cell.outcome()?.success().map(|success| 100.0 * success);
     let find = |policy: &str, method, budget| journal.find(&CellKey { policy: policy.to_owned(), method, budget });
@@ -113,7 +113,7 @@ fn markdown(journal: &Journal, asked: &Asked) -> Result<String> {
     Ok(text)
 }
 
-/// Date, sources, command, seeds.
+/// Writes date, sources, command and seeds.
 fn head(header: &Header) -> Result<String> {
     let Header { commit, dirty, date, options, .. } = header;
     let mut text = String::new();
@@ -131,7 +131,7 @@ fn head(header: &Header) -> Result<String> {
     Ok(text)
 }
 
-/// The command that has given these results.
+/// Returns the command of these results.
 fn command(options: &Value) -> String {
     let list = |value: &Value| -> String {
         let plain = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
@@ -209,7 +209,7 @@ fn section(text: &mut String, journal: &Journal, asked: &Asked, policy: &str) ->
     not_driven(text, f32_cell, &cells)
 }
 
-/// Which cells could not be made and why, those of one method and one reason together.
+/// Lists the impossible cells and their reasons; groups those of one method and one reason.
 fn reasons(text: &mut String, cells: &[(Contender, f64, Option<&Cell>)]) -> Result<()> {
     let mut reasons: Vec<(Contender, &str, Vec<String>)> = Vec::new();
     let mut open = Vec::new();
@@ -265,7 +265,7 @@ fn success(outcome: &DriveOutcome) -> Option<String> {
     })
 }
 
-/// The first of the tracking errors that any of these cells has.
+/// Returns the first of the tracking errors that any of these cells has.
 fn unit<'a>(mut cells: impl Iterator<Item = &'a Cell>) -> Option<(&'static str, &'static str)> {
     cells.find_map(|cell| {
         let outcome = cell.outcome()?;

@@ -1,10 +1,10 @@
-//! How long is left.
+//! Estimate of the remaining time.
 
 use super::cell::{Cell, CellKey};
 
-/// Seconds that `missing` cells take, as far as those that are done tell: each as long as its method took on its
-/// policy, or else on any, or else as the mean of all. Making and driving go on at the same time. `None` where nothing
-/// is done yet.
+/// Estimates the seconds of `missing` cells from the finished ones: the time of the same method on the same policy, or
+/// else on any policy, or else the mean of all. Making and driving run at the same time. Returns `None` while nothing
+/// is finished.
 pub(super) fn seconds_left(done: &[Cell], missing: &[CellKey]) -> Option<f64> {
     let mean = |part: &dyn Fn(&Cell) -> Option<f64>, is_like: &dyn Fn(&CellKey) -> bool| -> Option<f64> {
         let values: Vec<f64> = done.iter().filter(|cell| is_like(&cell.key)).filter_map(part).collect();
@@ -18,14 +18,14 @@ pub(super) fn seconds_left(done: &[Cell], missing: &[CellKey]) -> Option<f64> {
     let making = |cell: &Cell| Some(cell.made.as_ref().map_or(0.0, |made| made.seconds));
     let driving = |cell: &Cell| cell.driven.as_ref().map(|_| cell.drive_seconds);
     let made: f64 = missing.iter().filter_map(|key| expected(&making, key)).sum();
-    // How long driving takes depends on the policy, not on the method.
+    // The time to drive depends on the policy, not on the method.
     let drives = |key: &CellKey| mean(&driving, &|k| k.policy == key.policy).or_else(|| mean(&driving, &|_| true));
     let driven: f64 = missing.iter().filter_map(drives).sum();
-    // A sum of nothing is -0.
+    // An empty sum is -0.
     (!done.is_empty()).then(|| made.max(driven) + 0.0)
 }
 
-/// A duration for people.
+/// Formats a duration.
 pub(super) fn duration(seconds: f64) -> String {
     match seconds {
         ..90.0 => format!("{seconds:.0} s"),
@@ -40,7 +40,7 @@ mod tests {
     use crate::compare::plan::Contender;
 
     #[test]
-    fn what_is_left_is_estimated_from_what_is_like_it() {
+    fn remaining_time_follows_from_similar_cells() {
         let key = |policy: &str, method| CellKey { policy: policy.into(), method: Some(method), budget: Some(2.0) };
         let cell =
             |key: CellKey, seconds| Cell { key, made: None, why: None, driven: Some(1.into()), drive_seconds: seconds };

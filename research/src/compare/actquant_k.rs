@@ -1,6 +1,6 @@
 //! ActQuant in the block formats of its paper, llama.cpp's K-quants, simulated.
 //!
-//! Everything that this project's own kernels would cost it is left out, in its favour: activations stay in f32, and
+//! The costs that this project's own kernels would add are excluded, in its favour: activations stay in f32, and
 //! padding to whole super-blocks is not counted.
 
 use std::fs;
@@ -20,7 +20,7 @@ use safetensors::{Dtype, SafeTensors};
 
 use crate::kquants::Format;
 
-/// A network whose weights are those that codes and scales stand for.
+/// A network with the weights that its codes and scales represent.
 pub(super) struct Simulated {
     /// The network.
     pub(super) graph: Graph,
@@ -32,14 +32,14 @@ pub(super) struct Simulated {
     pub(super) bytes: usize,
 }
 
-/// Formats by ActQuant's scores and its allocation, scales by the Fisher importance.
+/// Chooses formats by ActQuant's scores and its allocation, scales by the Fisher importance.
 ///
-/// llama.cpp's search also multiplies the importance by the weights' magnitude, the paper's objective does not. Both
-/// are made, and the one with the lower error on what errors are measured on is taken: a choice in the rival's favour.
+/// llama.cpp's search also multiplies the importance by the weights' magnitude; the paper's objective does not. This
+/// function tries both, and takes the one with the lower held-out error: a choice in the rival's favour.
 ///
 /// # Errors
 ///
-/// [`actq::budget::BudgetTooSmall`] where two bits everywhere take more.
+/// [`actq::budget::BudgetTooSmall`] if two bits everywhere exceed the budget.
 pub(super) fn quantize(
     graph: &Graph,
     statistics: &ActionStatistics,
@@ -73,11 +73,11 @@ pub(super) fn quantize(
 
 /// Writes the policy with the matrices of `graph` into a folder of its own.
 pub(super) fn write_policy(policy: &Policy, graph: &Graph, folder: &Path) -> Result<()> {
-    fs::create_dir_all(folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
+    fs::create_dir_all(folder).with_context(|| format!("cannot create {}", folder.display()))?;
     let [json, tensors] = FILES;
     let read = |name: &str| {
         let path = policy.dir.join(name);
-        fs::read(&path).with_context(|| format!("{}: cannot be read", path.display()))
+        fs::read(&path).with_context(|| format!("cannot read {}", path.display()))
     };
     let bytes = read(tensors)?;
     let source = SafeTensors::deserialize(&bytes).with_context(|| format!("{}: {tensors}", policy.dir.display()))?;
@@ -91,7 +91,7 @@ pub(super) fn write_policy(policy: &Policy, graph: &Graph, folder: &Path) -> Res
                 .chunks_exact(4)
                 .map(|b| [b[0], b[1], b[2], b[3]])
                 .eq(before.data.iter().map(|w| w.to_le_bytes()));
-        ensure!(is_same, "tensor {name}: is not the matrix as it is used, and cannot be replaced");
+        ensure!(is_same, "cannot replace tensor {name}: it differs from the matrix in use");
         let data: Vec<u8> = after.data.iter().flat_map(|w| w.to_le_bytes()).collect();
         replaced.push((name, view.shape().to_vec(), data));
     }

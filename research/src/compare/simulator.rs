@@ -1,4 +1,4 @@
-//! What drives a policy in its own task.
+//! The simulators that drive a policy in its own task.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -7,15 +7,15 @@ use std::process::{Command, Stdio};
 use actq::pipeline::driven::DriveOutcome;
 use actq::runtime::{ImageBuffer, with_head};
 use actq::text::quoted;
+use actq_bench::closed_loop::episode_on_host;
 use actq_ur3::policy_f32::PolicyF32;
 use actq_ur3::summary::summary;
 use actq_ur3::task::{Outcome, run_episode};
 use anyhow::{Context as _, Result, ensure};
 
 use super::plan::UR3;
-use crate::closed_loop::episode_on_host;
 
-/// What is driven.
+/// The driven policy.
 #[derive(Clone, Debug)]
 pub(super) enum Driver {
     /// An image, by the executor.
@@ -27,15 +27,15 @@ pub(super) enum Driver {
 /// A task's simulator.
 #[derive(Clone, Debug)]
 pub(super) enum Simulator {
-    /// Within this process.
+    /// In this process.
     Ur3,
-    /// evaluate.py in a folder, by a Python.
+    /// evaluate.py in a folder, run by a Python.
     MuJoCo { python: PathBuf, folder: PathBuf, task: String },
-    /// None, and why.
+    /// No simulator, with the reason.
     Missing(String),
 }
 
-/// Which episodes.
+/// A range of episodes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Episodes {
     pub(super) first: u64,
@@ -43,7 +43,7 @@ pub(super) struct Episodes {
 }
 
 impl Simulator {
-    /// That of a policy, whose shared folder is `shared`.
+    /// Returns the simulator of a policy, whose shared folder is `shared`.
     pub(super) fn of(policy: &str, shared: Option<&Path>) -> Self {
         let Some(shared) = shared.filter(|_| policy != UR3) else { return Self::Ur3 };
         let variable = if policy.starts_with("fetch_") { "ACTQ_GYMNASIUM_PYTHON" } else { "ACTQ_MUJOCO_PYTHON" };
@@ -52,12 +52,12 @@ impl Simulator {
             _ if !folder.join("evaluate.py").is_file() => {
                 Self::Missing(format!("{} is missing", folder.join("evaluate.py").display()))
             }
-            None => Self::Missing(format!("{variable} is not set, which names the Python with its simulator")),
+            None => Self::Missing(format!("set {variable} to the Python that has its simulator")),
             Some(python) => Self::MuJoCo { python: program(python.into()), folder, task: policy.to_owned() },
         }
     }
 
-    /// Drives, with the command `actq` where there is need of it; `None` without a simulator.
+    /// Drives the policy, with the command `actq` if needed; returns `None` without a simulator.
     pub(super) fn run(&self, driver: &Driver, episodes: Episodes, actq: &Path) -> Result<Option<DriveOutcome>> {
         match self {
             Self::Ur3 => ur3(driver, episodes).map(Some),
@@ -65,7 +65,7 @@ impl Simulator {
                 let mut command = Command::new(python);
                 let [count, first] = [episodes.count, episodes.first].map(|number| number.to_string());
                 command.current_dir(folder).args(["evaluate.py", task, "--episodes", &count, "--seed0", &first]);
-                // As one step of a small network gains nothing by more threads. No cache of Python's is left in the
+                // One thread: a step of a small network gains nothing from more. Python must not leave a cache in the
                 // folder.
                 command.env("OMP_NUM_THREADS", "1").env("PYTHONDONTWRITEBYTECODE", "1");
                 match driver {
@@ -85,8 +85,8 @@ impl Simulator {
     }
 }
 
-/// A program as it is called from another folder: a path is made absolute, a name is looked for as a shell does. Links
-/// stay, by which the Python of a virtual environment knows where it is.
+/// Resolves a program to run from another folder: a path becomes absolute, a name is searched for as a shell does.
+/// Links stay, because the Python of a virtual environment finds itself by them.
 fn program(name: PathBuf) -> PathBuf {
     if name.components().count() > 1 { std::path::absolute(&name).unwrap_or(name) } else { name }
 }
@@ -107,7 +107,7 @@ fn ur3(driver: &Driver, episodes: Episodes) -> Result<DriveOutcome> {
             seeds.by_ref().map(episode).collect()
         }
     };
-    DriveOutcome::parse(&summary(&outcomes).to_string()).context("the summary of episodes is no object")
+    DriveOutcome::parse(&summary(&outcomes).to_string()).context("the summary of episodes is not an object")
 }
 
 /// Runs evaluate.py, which prints a line for every policy.
@@ -115,12 +115,12 @@ fn evaluate(mut command: Command) -> Result<DriveOutcome> {
     let output = command
         .stdin(Stdio::null())
         .output()
-        .with_context(|| format!("{} cannot be started", command.get_program().display()))?;
+        .with_context(|| format!("cannot start {}", command.get_program().display()))?;
     let said = String::from_utf8_lossy(&output.stderr);
     let tail: Vec<&str> = said.lines().rev().take(12).collect();
     let tail = tail.into_iter().rev().collect::<Vec<_>>().join("\n");
-    ensure!(output.status.success(), "the simulator has failed ({}): {command:?}\n{tail}", output.status);
+    ensure!(output.status.success(), "the simulator failed ({}): {command:?}\n{tail}", output.status);
     let lines = String::from_utf8_lossy(&output.stdout).into_owned();
     let outcome = lines.lines().rev().find_map(|line| DriveOutcome::parse(line).filter(|o| o.success().is_some()));
-    outcome.with_context(|| format!("the simulator has printed no line with a success: {command:?}\n{tail}"))
+    outcome.with_context(|| format!("the simulator printed no line with a success: {command:?}\n{tail}"))
 }

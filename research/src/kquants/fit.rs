@@ -14,8 +14,8 @@ pub(super) struct Term {
     pub(super) b: f64,
 }
 
-/// The d and d_min of least weighted squared error, none of them below what the terms ask for: where there is no b, or
-/// a d_min below 0 would be best, d_min is 0.
+/// Computes the d and d_min of least weighted squared error, within the terms' limits: without b, or if a negative
+/// d_min would be best, d_min is 0.
 pub(super) fn least_squares(terms: impl Iterator<Item = Term>) -> (f64, f64) {
     let (mut aa, mut ab, mut bb, mut wa, mut wb) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for Term { importance, weight, a, b } in terms {
@@ -35,7 +35,7 @@ pub(super) fn least_squares(terms: impl Iterator<Item = Term>) -> (f64, f64) {
     (if aa > 0.0 { wa / aa } else { 0.0 }, 0.0)
 }
 
-/// The codes nearest to the weights for `weight = s code - m`, and their weighted squared error.
+/// Returns the codes nearest to the weights for `weight = s code - m`, and their weighted squared error.
 pub(super) fn codes(
     weights: &[f32],
     importance: &[f64],
@@ -53,7 +53,7 @@ pub(super) fn codes(
     (codes, error)
 }
 
-/// The candidate whose codes, with the scale and min that suit them best, leave the least error.
+/// Returns the candidate whose codes, with the best scale and min for them, have the least error.
 fn best(
     weights: &[f32],
     importance: &[f64],
@@ -79,19 +79,19 @@ fn factors() -> impl Iterator<Item = f64> + Clone {
     (0..=CANDIDATES).map(|step| NARROWEST + (WIDEST - NARROWEST) * step as f64 / CANDIDATES as f64)
 }
 
-/// The scale, of either sign, of codes from `low` below zero to `high`.
+/// Fits the scale, of either sign, of codes from `low` below zero to `high`.
 pub(super) fn linear(weights: &[f32], importance: &[f64], limits: (i32, i32)) -> f64 {
     let largest = weights.iter().fold(0.0, |m: f64, w| m.max(f64::from(w.abs())));
     if largest == 0.0 {
         return 0.0;
     }
-    // There is one code more below zero: the outermost weight may have either sign.
+    // There is one more code below zero: the outermost weight may have either sign.
     let widest = largest / f64::from(limits.0);
     let candidates = factors().flat_map(|factor| [factor * widest, -factor * widest]).map(|s| (s, 0.0));
     best(weights, importance, limits, 0.0, candidates).0
 }
 
-/// Scale and min of codes from 0 to `high`, none of them below 0.
+/// Fits the scale and min, both at least 0, of codes from 0 to `high`.
 pub(super) fn affine(weights: &[f32], importance: &[f64], high: i32) -> (f64, f64) {
     let (low, top) =
         weights.iter().fold((0.0, 0.0), |(low, top): (f64, f64), w| (low.min(f64::from(*w)), top.max(f64::from(*w))));
@@ -105,7 +105,7 @@ pub(super) fn affine(weights: &[f32], importance: &[f64], high: i32) -> (f64, f6
         [0.0, 0.5, 1.0].map(|share| (factor * widest, (-low - share * cut).max(0.0)))
     });
     let (s, m) = best(weights, importance, (0, high), 1.0, candidates);
-    // Where all are best left at the min, as when they are all equal.
+    // If the min alone represents all weights best, for example when they are equal.
     (s.max(0.0), m)
 }
 
@@ -114,7 +114,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_can_be_said_exactly_is_found() {
+    fn exactly_representable_weights_are_found() {
         let h = [1.0; 16];
         for codes in [[0, 1, 2, 3], [3, 0, 0, 1]] {
             let weights: Vec<f32> = (0..16).map(|i| 0.5 * codes[i % 4] as f32 - 0.25).collect();
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn a_min_below_zero_is_none() {
+    fn a_negative_min_becomes_zero() {
         let weights: Vec<f32> = (0..16).map(|i| 1.0 + 0.1 * (i % 4) as f32).collect();
         let (s, m) = affine(&weights, &[1.0; 16], 3);
         assert!(s > 0.0 && m == 0.0, "{s} {m}");

@@ -1,6 +1,6 @@
 //! The comparison: every method at every budget on every policy, each image in its own task.
 //!
-//! One thread quantizes, as learning uses all cores; another drives what was made before, and appends it to the
+//! One thread quantizes, as learning uses all cores; another drives the finished images, and appends the results to the
 //! journal.
 
 mod actquant_k;
@@ -21,9 +21,9 @@ use std::time::{Duration, Instant};
 use std::{env, fs};
 
 use actq_cli::outputs::files;
+use actq_bench::{command, ur3};
 use anyhow::{Context as _, Result, anyhow, ensure};
 
-use crate::{command, ur3};
 pub use cell::{Cell, CellKey, Made};
 pub use journal::{Header, Journal};
 use making::{Attempt, Maker, Subject};
@@ -31,33 +31,33 @@ use plan::UR3;
 pub use plan::{Contender, Plan};
 use simulator::{Driver, Episodes, Simulator};
 
-/// The least time between two lines about a cell that takes long.
+/// The least time between two progress lines of a slow cell.
 const BETWEEN_LINES: Duration = Duration::from_secs(60);
 
-/// A policy that takes part.
+/// A policy of the comparison.
 struct Entrant {
     name: String,
     folder: PathBuf,
     simulator: Simulator,
 }
 
-/// A cell that was made, or could not be, and what is to be driven of it.
+/// A cell that was made, or is impossible, and the policy to drive.
 struct Job {
     cell: Cell,
     driver: Option<Driver>,
     simulator: Simulator,
 }
 
-/// Runs what of the plan is not in the journal yet, and writes the report.
+/// Runs the cells of the plan that the journal lacks, and writes the report.
 ///
 /// # Errors
-/// What went wrong with a cell is told at the end; the others are made, and the same plan again tries it again.
+/// Reports failed cells at the end, after all others are made. The same plan run again retries them.
 pub fn run(plan: &Plan) -> Result<()> {
     if !plan.report {
         compare(plan)?;
     }
     let path = report::write(&Journal::read(&plan.out)?, &plan.out)?;
-    eprintln!("{} is written", path.display());
+    eprintln!("wrote {}", path.display());
     Ok(())
 }
 
@@ -67,23 +67,23 @@ fn compare(plan: &Plan) -> Result<()> {
     let all: Vec<(CellKey, &Entrant)> =
         entrants.iter().flat_map(|entrant| keys(plan, &entrant.name).map(move |key| (key, entrant))).collect();
     let is_done = |(key, entrant): &(CellKey, &Entrant)| {
-        // Where a simulator has come since, what was not driven is made once more.
+        // If a simulator has been added since, repeat the cells that were not driven.
         let drivable = !matches!(entrant.simulator, Simulator::Missing(_));
         journal.find(key).is_some_and(|cell| cell.driven.is_some() || cell.why.is_some() || !drivable)
     };
     let missing: Vec<(CellKey, &Entrant)> = all.iter().filter(|cell| !is_done(cell)).cloned().collect();
-    eprintln!("{} of {} cells are there, {} to be made", all.len() - missing.len(), all.len(), missing.len());
+    eprintln!("{} of {} cells are done, {} remain", all.len() - missing.len(), all.len(), missing.len());
     if missing.is_empty() {
         return Ok(());
     }
     let images = absolute(&plan.out)?.join("images");
-    fs::create_dir_all(&images).with_context(|| format!("{}: cannot be made", images.display()))?;
-    // What a rebuild does to the command must not reach a run of hours.
-    let private = tempfile::tempdir().context("no temporary folder can be made")?;
+    fs::create_dir_all(&images).with_context(|| format!("cannot create {}", images.display()))?;
+    // A rebuild of the command must not affect a run of hours.
+    let private = tempfile::tempdir().context("cannot create a temporary folder")?;
     let mut actq = PathBuf::new();
     if missing.iter().any(|(_, entrant)| matches!(entrant.simulator, Simulator::MuJoCo { .. })) {
         actq = private.path().join(format!("actq{}", env::consts::EXE_SUFFIX));
-        fs::copy(command::binary()?, &actq).context("the command actq cannot be copied")?;
+        fs::copy(command::binary()?, &actq).context("cannot copy the command actq")?;
     }
 
     let status = Status { journal: Mutex::new(journal), keys: missing.iter().map(|(key, _)| key.clone()).collect() };
@@ -104,7 +104,7 @@ fn compare(plan: &Plan) -> Result<()> {
                 match make(key, entrant, &mut maker, &images) {
                     Ok(job) => {
                         if to_drive.send(job).is_err() {
-                            // The other thread has ended: it says why.
+                            // The other thread has ended, and reports why.
                             break 'policies;
                         }
                     }
@@ -113,23 +113,23 @@ fn compare(plan: &Plan) -> Result<()> {
             }
         }
         drop(to_drive);
-        failures.extend(driving.join().map_err(|_| anyhow!("the thread that drives has panicked"))??);
+        failures.extend(driving.join().map_err(|_| anyhow!("the driving thread panicked"))??);
         Ok(())
     })?;
     if !failures.is_empty() {
-        // What is there is worth a report all the same.
+        // The finished cells are worth a report all the same.
         report::write(&Journal::read(&plan.out)?, &plan.out)?;
     }
     ensure!(
         failures.is_empty(),
-        "{} cells have failed; the same command tries them again:\n{}",
+        "{} cells failed; the same command retries them:\n{}",
         failures.len(),
         failures.join("\n")
     );
     Ok(())
 }
 
-/// The policies of a plan that are there.
+/// Returns the policies of a plan that are present.
 fn entrants(plan: &Plan) -> Result<Vec<Entrant>> {
     let shared = env::var_os("ACTQ_SHARED").filter(|folder| !folder.is_empty()).map(PathBuf::from);
     let shared = shared.as_deref().map(absolute).transpose()?;
@@ -140,7 +140,7 @@ fn entrants(plan: &Plan) -> Result<Vec<Entrant>> {
             _ if name == UR3 => ur3(),
             Some(shared) => shared.join("policies").join(name),
             None => {
-                eprintln!("{name} is left out: ACTQ_SHARED is not set, which names the folder of the shared policies");
+                eprintln!("{name} is excluded: set ACTQ_SHARED to the folder of the shared policies");
                 continue;
             }
         };
@@ -158,7 +158,7 @@ fn entrants(plan: &Plan) -> Result<Vec<Entrant>> {
     Ok(entrants)
 }
 
-/// The cells of a policy: itself, then every method at every budget.
+/// Returns the cells of a policy: itself, then every method at every budget.
 fn keys<'a>(plan: &'a Plan, policy: &'a str) -> impl Iterator<Item = CellKey> + 'a {
     let key = move |method, budget| CellKey { policy: policy.to_owned(), method, budget };
     let rows = plan.methods.iter().flat_map(|&method| plan.budgets.iter().map(move |&budget| (method, budget)));
@@ -199,20 +199,20 @@ fn make(key: &CellKey, entrant: &Entrant, maker: &mut Maker<'_>, images: &Path) 
     Ok(Job { cell, driver, simulator })
 }
 
-/// What both threads look at.
+/// The state that both threads share.
 struct Status {
     journal: Mutex<Journal>,
-    /// The cells that this run is to make.
+    /// The cells that this run must make.
     keys: Vec<CellKey>,
 }
 
 impl Status {
     fn journal(&self) -> MutexGuard<'_, Journal> {
-        // A panic elsewhere leaves whole lines.
+        // After a panic elsewhere the journal still has whole lines.
         self.journal.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
     }
 
-    /// Appends a cell, and says what it holds and how long is left.
+    /// Appends a cell, and prints its result and the remaining time.
     fn add(&self, cell: Cell) -> Result<()> {
         let title = cell.key.title();
         let what = report::sentence(&cell);
@@ -226,7 +226,7 @@ impl Status {
     }
 }
 
-/// Drives what comes, until nothing comes any more. Gives what has failed.
+/// Drives jobs until the channel closes. Returns the failures.
 fn drive(plan: &Plan, jobs: Receiver<Job>, actq: &Path, status: &Status) -> Result<Vec<String>> {
     let episodes = Episodes { first: plan.seed0, count: plan.episodes };
     let mut failures = Vec::new();
@@ -245,7 +245,7 @@ fn drive(plan: &Plan, jobs: Receiver<Job>, actq: &Path, status: &Status) -> Resu
     Ok(failures)
 }
 
-/// Says that a cell has failed, at once and for the end.
+/// Reports a failed cell immediately, and returns the message for the end.
 fn failed(key: &CellKey, error: &anyhow::Error) -> String {
     let message = format!("{}: {error:#}", key.title());
     eprintln!("FAILED {message}");
@@ -253,5 +253,5 @@ fn failed(key: &CellKey, error: &anyhow::Error) -> String {
 }
 
 fn absolute(path: &Path) -> Result<PathBuf> {
-    fs::canonicalize(path).with_context(|| format!("{}: cannot be read", path.display()))
+    fs::canonicalize(path).with_context(|| format!("cannot read {}", path.display()))
 }

@@ -1,4 +1,4 @@
-//! What is compared.
+//! The plan of a comparison.
 
 use std::path::PathBuf;
 
@@ -39,7 +39,7 @@ pub enum Contender {
 }
 
 impl Contender {
-    /// The method of the quantizer behind it, or whose statistics it takes.
+    /// Returns the quantizer's method, or the one whose statistics it uses.
     pub fn method(self) -> Method {
         match self {
             Self::Rtn => Method::Rtn,
@@ -50,12 +50,12 @@ impl Contender {
         }
     }
 
-    /// As it stands on the command line.
+    /// Returns the name on the command line.
     pub fn name(self) -> String {
         self.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
     }
 
-    /// As it stands in the report.
+    /// Returns the name in the report.
     pub fn title(self) -> &'static str {
         match self {
             Self::Rtn => "rtn",
@@ -69,7 +69,7 @@ impl Contender {
     }
 }
 
-/// Policies, methods, budgets, and on what they are measured.
+/// Policies, methods, budgets, and episodes.
 #[derive(Clone, Debug, Args, Serialize)]
 pub struct Plan {
     /// Folders of policies under $ACTQ_SHARED/policies; ur3 is the project's own
@@ -88,26 +88,26 @@ pub struct Plan {
         default_value = "rtn,gptq,actquant,actquant-k,best-0,best"
     )]
     pub methods: Vec<Contender>,
-    /// Bits per weight that are allowed, everything counted
+    /// Allowed bits per weight, everything counted
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = bits, default_value = "1.5,2,2.3,2.5,3,4")]
     pub budgets: Vec<f64>,
     /// Closed-loop episodes of each cell
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000), default_value_t = 100)]
     pub episodes: u64,
-    /// Seed of the first episode; nothing was ever chosen by the hundred episodes from the default on
+    /// Seed of the first episode; no choice was ever made by the hundred episodes from the default on
     #[arg(long, value_name = "S", value_parser = clap::value_parser!(u64).range(..=u64::from(u32::MAX)), default_value_t = 50_000)]
     pub seed0: u64,
     /// Seed of the quantizer
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// The most steps of learning; as many as suit the network, if not given
+    /// Limit of learning steps; by default chosen for the network
     #[arg(long, value_name = "N")]
     pub steps: Option<usize>,
-    /// Folder of compare.jsonl, compare.md and the images; made where it is missing
+    /// Folder of compare.jsonl, compare.md and the images; created if missing
     #[arg(long, value_name = "DIR")]
     #[serde(skip)]
     pub out: PathBuf,
-    /// Run nothing: write compare.md anew from compare.jsonl
+    /// Run nothing: rewrite compare.md from compare.jsonl
     #[arg(long)]
     #[serde(skip)]
     pub report: bool,

@@ -7,19 +7,19 @@ use actq::pipeline::driven::DriveOutcome;
 
 use super::plan::Contender;
 
-/// Which result: a policy, and what it was quantized by and to; without a method the f32 policy itself.
+/// The key of a result: a policy, its method and its budget; without a method the f32 policy.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CellKey {
     /// The policy's name.
     pub policy: String,
     /// The method.
     pub method: Option<Contender>,
-    /// Bits per weight that were allowed.
+    /// Allowed bits per weight.
     pub budget: Option<f64>,
 }
 
 impl CellKey {
-    /// For people.
+    /// Returns the human-readable name.
     pub(super) fn title(&self) -> String {
         match (self.method, self.budget) {
             (Some(method), Some(budget)) => format!("{}, {} at {budget} bits", self.policy, method.title()),
@@ -28,7 +28,7 @@ impl CellKey {
     }
 }
 
-/// What was made.
+/// The image of a cell.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Made {
     /// Error on the held-out recording.
@@ -37,34 +37,34 @@ pub struct Made {
     pub bpw: f64,
     /// Bytes of the image.
     pub bytes: usize,
-    /// The image's bytes over the parameters of the policy as it was trained.
+    /// Bytes of the image per parameter of the trained policy.
     pub bytes_per_parameter: f64,
-    /// What has a scale: `row`, or so many columns; of K-quants the format of each matrix.
+    /// Weights that share a scale: `row`, or a number of columns; for K-quants the format of each matrix.
     pub format: String,
-    /// Whether the group is the method's default one.
+    /// `true` for the method's default group.
     pub default_group: bool,
-    /// Statistics and quantization; the simulator runs at the same time.
+    /// Seconds of statistics and quantization; the simulator runs at the same time.
     pub seconds: f64,
 }
 
 /// A line of the journal.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Cell {
-    /// Which.
+    /// Key.
     #[serde(flatten)]
     pub key: CellKey,
-    /// What was made; of the f32 policy nothing.
+    /// The image; none for the f32 policy.
     pub made: Option<Made>,
-    /// Why nothing could be made.
+    /// Reason if no image is possible.
     pub why: Option<String>,
-    /// What the closed loop said; `None` where there was none.
+    /// Output of the closed loop; `None` without one.
     pub driven: Option<Value>,
-    /// How long the closed loop took.
+    /// Seconds of the closed loop.
     pub drive_seconds: f64,
 }
 
 impl Cell {
-    /// What the closed loop said.
+    /// Parses the output of the closed loop.
     pub(super) fn outcome(&self) -> Option<DriveOutcome> {
         DriveOutcome::parse(&self.driven.as_ref()?.to_string())
     }
