@@ -4,7 +4,7 @@ use actq_kernels::Head;
 use actq_ur3::task::{Outcome, run_episode};
 use anyhow::Result;
 
-/// One episode with a fallible policy; its first error ends up here.
+/// Runs an episode with a fallible policy; returns its first error.
 pub fn episode(seed: u64, mut step: impl FnMut(&[f32]) -> Result<[f32; 6]>) -> Result<Outcome> {
     let mut failure = None;
     let outcome = run_episode(seed, |obs| {
@@ -19,7 +19,7 @@ pub fn episode(seed: u64, mut step: impl FnMut(&[f32]) -> Result<[f32; 6]>) -> R
     failure.map_or(Ok(outcome), Err)
 }
 
-/// One episode with the executor as the policy, from a reset.
+/// Runs an episode with the executor as the policy, from a reset.
 pub fn episode_on_host(head: &mut Head<'_, '_>, seed: u64) -> Result<Outcome> {
     head.reset();
     episode(seed, |obs| Ok(head.step(obs)?.try_into()?))

@@ -1,4 +1,4 @@
-//! The command `actq` as tests and measurements call it.
+//! The command `actq` for tests and measurements.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -9,35 +9,34 @@ use anyhow::{Context, Result, ensure};
 
 use crate::firmware::cargo_build;
 
-/// The command `actq`; built once, since cargo does not build the binaries of a dependency, in the profile of this
-/// build and beside it.
+/// Returns the path of the command `actq`. Builds it once, in the profile of this build and beside it: cargo does not
+/// build the binaries of a dependency.
 pub fn binary() -> Result<&'static Path> {
     static BINARY: OnceLock<PathBuf> = OnceLock::new();
     if let Some(path) = BINARY.get() {
         return Ok(path);
     }
-    let program = std::env::current_exe().context("the path of this program is not known")?;
-    let folder = program.parent().context("this program is in no folder")?;
-    // A test is in the folder deps of its profile's.
+    let program = std::env::current_exe().context("cannot find the running executable")?;
+    let folder = program.parent().context("the running executable has no folder")?;
+    // A test is in the subfolder `deps` of its profile's folder.
     let folder = if folder.ends_with("deps") { folder.parent().unwrap_or(folder) } else { folder };
-    let profile = folder.file_name().and_then(|name| name.to_str()).context("a profile's name is text")?;
+    let profile = folder.file_name().and_then(|name| name.to_str()).context("the profile's name is not UTF-8")?;
     let profile = if profile == "debug" { "dev" } else { profile };
-    // With this package, for the features that the tests were built with: else cargo would build the quantizer once
-    // more.
+    // Building it with this package selects the features of the tests; otherwise cargo would build the quantizer twice.
     let packages = ["--package", "actq-cli", "--package", env!("CARGO_PKG_NAME")];
     let command = [&packages[..], &["--bin", "actq", "--profile", profile]].concat();
     cargo_build("actq", &command, &[])?;
     Ok(BINARY.get_or_init(|| folder.join(format!("actq{}", std::env::consts::EXE_SUFFIX))))
 }
 
-/// The actq command with arguments.
+/// Returns the command `actq` with arguments.
 pub fn actq(arguments: &[&str]) -> Command {
     let mut command = Command::new(binary().expect("actq builds"));
     command.args(arguments);
     command
 }
 
-/// Runs a command with this standard input.
+/// Runs a command with the standard input `input`.
 pub fn run(mut command: Command, input: &[u8]) -> Result<Output> {
     let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn()?;
     let mut stdin = child.stdin.take().context("no standard input")?;
@@ -47,24 +46,24 @@ pub fn run(mut command: Command, input: &[u8]) -> Result<Output> {
     Ok(child.wait_with_output()?)
 }
 
-/// Standard output of a run that must have ended well.
+/// Returns the standard output of a run that must succeed.
 pub fn succeeded(output: &Output) -> Result<String> {
     Ok(String::from_utf8(answered(output)?.to_vec())?)
 }
 
-/// As [`succeeded`], of an output that is no text.
+/// Does the same as [`succeeded`] for binary output.
 pub fn answered(output: &Output) -> Result<&[u8]> {
     ensure!(output.status.code() == Some(0), "{}: {}", output.status, String::from_utf8_lossy(&output.stderr));
     Ok(&output.stdout)
 }
 
-/// Requires an exit status and a message that holds `words`, and no panic.
+/// Requires an exit status and a message with all of `words`, and no panic.
 pub fn failed(output: &Output, status: i32, words: &[&str]) -> Result<()> {
     let message = String::from_utf8_lossy(&output.stderr);
-    ensure!(output.status.code() == Some(status), "{} instead of {status}: {message}", output.status);
-    ensure!(!message.trim().is_empty() && !message.contains("panicked"), "no message but {message:?}");
+    ensure!(output.status.code() == Some(status), "expected {status}, got {}: {message}", output.status);
+    ensure!(!message.trim().is_empty() && !message.contains("panicked"), "expected an error message, got {message:?}");
     let missing: Vec<_> = words.iter().filter(|word| !message.contains(**word)).collect();
-    ensure!(missing.is_empty(), "{missing:?} not in the message: {message}");
+    ensure!(missing.is_empty(), "the message lacks {missing:?}: {message}");
     Ok(())
 }
 

@@ -17,56 +17,56 @@ use tempfile::TempDir;
 use crate::qemu::{in_slot, spawn};
 
 /// Time without the awaited event after which QEMU counts as hung. No result depends on it: a busy machine, which runs
-/// QEMU slowly, is nowhere near it, and a test waits for it only when something is broken.
+/// QEMU slowly, stays far below it, and a test waits for it only on a failure.
 pub const HANG: Duration = Duration::from_secs(600);
 
-/// log2 of the nanoseconds that an instruction takes: 32 ns.
+/// log2 of the nanoseconds per instruction: 32 ns.
 const INSTRUCTION: u32 = 5;
 
-/// Between two looks whether an observation was refused.
+/// Period of the checks for a refused observation.
 const LOOK: Duration = Duration::from_millis(500);
 
-/// An application under QEMU, whose serial port is a socket. It is ended with the value.
+/// An application under QEMU with a socket as its serial port. Dropping the value ends it.
 #[derive(Debug)]
 pub struct Controller {
     child: Child,
-    /// Of the socket.
+    /// Folder of the socket.
     folder: TempDir,
 }
 
 impl Controller {
-    /// Starts an application, with an image in the slot if one is given. Its time is counted in instructions.
+    /// Starts an application, with an image in the slot if one is given. Its time counts instructions.
     pub fn start(target: Target, elf: &Path, slot: Option<&Path>) -> Result<Self> {
         Self::start_by(target, elf, slot, Clock::Counted(INSTRUCTION))
     }
 
-    /// As [`Self::start`], by another clock.
+    /// Does the same as [`Self::start`] with another clock.
     pub fn start_by(target: Target, elf: &Path, slot: Option<&Path>, clock: Clock) -> Result<Self> {
         let folder = TempDir::new()?;
         let serial = format!("unix:{},server=on,wait=off", socket(&folder).display());
         let mut command = target.run_with_serial(elf, &serial, clock);
         command.arg("-qmp").arg(format!("unix:{},server=on,wait=off", monitor(&folder).display()));
         in_slot(&mut command, elf, slot)?;
-        // With its time aligned to the host's, QEMU says on its output when it is late.
+        // With its time aligned to the host's, QEMU prints a message when it is late.
         let child = spawn(command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::inherit()))?;
         let controller = Self { child, folder };
         let begun = Instant::now();
-        // A socket stands in its folder a moment before QEMU listens at it. What is opened here is closed at once.
+        // The socket appears in its folder a moment before QEMU listens. A connection opened then is closed at once.
         while !(controller.address().open().is_ok() && controller.monitor().open().is_ok()) {
             if begun.elapsed() > HANG {
-                bail!("QEMU does not open its serial port");
+                bail!("QEMU did not open its serial port in {HANG:?}");
             }
             std::thread::sleep(Duration::from_millis(5));
         }
         Ok(controller)
     }
 
-    /// The serial port.
+    /// Returns the serial port.
     pub fn address(&self) -> Address {
         Address::Unix(socket(&self.folder).display().to_string())
     }
 
-    /// Resets the board, as its pin does (QEMU's `system_reset`). Memory keeps what it has.
+    /// Resets the board, as its reset pin does (QEMU's `system_reset`). Memory keeps its content.
     pub fn reset(&self) -> Result<()> {
         let mut monitor = self.monitor().open().context("QEMU's monitor")?;
         for command in ["qmp_capabilities", "system_reset"] {
@@ -76,7 +76,7 @@ impl Controller {
         Ok(())
     }
 
-    /// A host at the serial port.
+    /// Connects a host to the serial port.
     pub fn client(&self) -> Result<Client> {
         Ok(Client::new(Connection::open(self.address(), HANG)?, HANG))
     }
@@ -94,11 +94,11 @@ fn monitor(folder: &TempDir) -> PathBuf {
     folder.path().join("monitor")
 }
 
-/// Waits for the answer to a command of QEMU's monitor. Greeting and events may come before.
+/// Waits for the answer to a command of QEMU's monitor. Greeting and events may come before it.
 fn answered(monitor: &mut dyn Port) -> Result<()> {
     let (begun, mut said) = (Instant::now(), String::new());
     while !said.contains("\"return\"") {
-        ensure!(!said.contains("\"error\"") && begun.elapsed() < HANG, "no success: {said:?}");
+        ensure!(!said.contains("\"error\"") && begun.elapsed() < HANG, "QEMU's monitor command failed: {said:?}");
         let mut bytes = [0; 512];
         match monitor.read(&mut bytes) {
             Ok(count) => said += &String::from_utf8_lossy(bytes.get(..count).unwrap_or_default()),
@@ -109,9 +109,9 @@ fn answered(monitor: &mut dyn Port) -> Result<()> {
     Ok(())
 }
 
-/// The action on an observation, and whether the outputs follow it. On a line without faults, but on a machine that may
-/// stop QEMU for so long that the firmware refuses the observation as an old one, or latches before its action: it is
-/// then sent again.
+/// Returns the action on an observation, and `true` if the outputs follow it. The line has no faults, but the machine
+/// may stop QEMU for so long that the firmware refuses the observation as too old, or latches before its action: then
+/// the observation is sent again.
 pub fn act(client: &mut Client, observation: &[f32]) -> Result<(bool, Vec<f32>)> {
     let known = |status: &Status| (status.refused, status.token);
     let (begun, mut before) = (Instant::now(), known(&client.status()?));
@@ -133,12 +133,12 @@ pub fn act(client: &mut Client, observation: &[f32]) -> Result<(bool, Vec<f32>)>
             number = client.observe(observation)?;
         }
     }
-    bail!("no action: {:?}", client.status()?)
+    bail!("no action came: {:?}", client.status()?)
 }
 
-/// The actions on observations in order, from a new state of the head. The controller takes a new token, and the head
-/// begins anew, where the machine holds up the host for so long that the line counts as silent: they are then all asked
-/// for again.
+/// Returns the actions on observations in order, from a new state of the head. If the machine delays the host for so
+/// long that the line counts as silent, the controller takes a new token and the head restarts: then all are requested
+/// again.
 pub fn act_in_order(client: &mut Client, observations: &[Vec<f32>]) -> Result<Vec<(bool, Vec<f32>)>> {
     let begun = Instant::now();
     while begun.elapsed() < HANG {
@@ -149,26 +149,26 @@ pub fn act_in_order(client: &mut Client, observations: &[Vec<f32>]) -> Result<Ve
             return Ok(actions);
         }
     }
-    bail!("never {} actions under one token: {:?}", observations.len(), client.status()?)
+    bail!("could not get {} actions under one token: {:?}", observations.len(), client.status()?)
 }
 
-/// Asks for the status until `wanted`.
+/// Polls the status until `wanted` accepts it.
 pub fn until(client: &mut Client, what: &str, mut wanted: impl FnMut(&Status) -> bool) -> Result<Status> {
     let begun = Instant::now();
     loop {
-        let status = client.status().with_context(|| format!("waiting until {what}"))?;
+        let status = client.status().with_context(|| format!("cannot wait until {what}"))?;
         if wanted(&status) {
             return Ok(status);
         }
         if begun.elapsed() > HANG {
-            bail!("not {what}: {status:?}");
+            bail!("timeout waiting until {what}: {status:?}");
         }
     }
 }
 
 impl Drop for Controller {
     fn drop(&mut self) {
-        // Where it has ended already, there is nothing to end.
+        // Nothing to do if it has ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

@@ -1,14 +1,14 @@
 //! Cycles of a Cortex-M4, modelled from counted instructions.
 //!
-//! The counter says how often each instruction was executed and how often execution jumped away from it. An instruction
-//! that was not jumped to follows the one before it in memory, so pairs of neighbours, on which the pipeline's stalls
-//! depend, are known exactly as well. What each of them takes is in `instruction.rs`. It is a model.
+//! The counter counts the executions of each instruction, and the jumps away from it. An instruction that was not
+//! jumped to follows the one before it in memory, so the pairs of neighbours, on which pipeline stalls depend, are
+//! known exactly as well. `instruction.rs` has the cost of each. It is a model.
 //!
-//! A board's flash waits. The counter plays every instruction and every load in order through the caches of an STM32F4
-//! (see `xtask/insn-count`), so the lines that they miss are exact for caches that are empty at first. A line costs the
-//! flash's wait states; the next line of code is prefetched while the line before it is executed, one cycle an
-//! instruction. That is a model, too: fetches of code and data do not delay each other, and RAM never waits. An
-//! STM32F405 at 168 MHz has 5 wait states.
+//! A board's flash has wait states. The counter plays every instruction and load in order through the caches of an
+//! STM32F4 (see `xtask/insn-count`), so the missed lines are exact for initially empty caches. A line costs the flash's
+//! wait states; the next line of code is prefetched while the current one is executed, one cycle per instruction. That
+//! is a model, too: fetches of code and data do not delay each other, and RAM has no wait states. An STM32F405 at 168
+//! MHz has 5 wait states.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -20,10 +20,10 @@ use object::{Object as _, ObjectSection as _, ObjectSymbol as _, SectionKind, Sy
 use crate::instruction::{Class, Instruction, Kind, REFILL, branch_target};
 use crate::qemu::Region;
 
-/// Bytes of a line of the STM32F4's flash.
+/// Bytes per line of the STM32F4's flash.
 const LINE: u64 = 16;
 
-/// Lines that its instruction cache holds.
+/// Lines of its instruction cache.
 pub const CODE_LINES: u64 = 64;
 
 /// The code of a firmware.
@@ -40,14 +40,14 @@ pub struct Function {
     pub name: String,
     /// Address, without the Thumb bit.
     pub address: u64,
-    /// Bytes.
+    /// Size, bytes.
     pub size: u64,
 }
 
 impl Code {
     /// Reads the code of an ELF file.
     pub fn read(elf: &Path) -> Result<Self> {
-        let data = std::fs::read(elf).with_context(|| format!("{}: cannot be read", elf.display()))?;
+        let data = std::fs::read(elf).with_context(|| format!("cannot read {}", elf.display()))?;
         let file = object::File::parse(&*data).with_context(|| format!("{}: not an ELF file", elf.display()))?;
         let code = file.sections().filter(|s| s.kind() == SectionKind::Text);
         let sections = code.map(|s| Ok((s.address(), s.data()?.to_vec()))).collect::<Result<_>>()?;
@@ -64,12 +64,12 @@ impl Code {
         Ok(Self { sections, functions })
     }
 
-    /// Bytes of all code.
+    /// Returns the bytes of all code.
     pub fn bytes(&self) -> u64 {
         self.sections.iter().map(|(_, bytes)| bytes.len() as u64).sum()
     }
 
-    /// All functions, by address.
+    /// Returns all functions, by address.
     pub fn functions(&self) -> &[Function] {
         &self.functions
     }
@@ -91,7 +91,7 @@ impl Code {
         let mut before: Option<(u64, u64, Instruction)> = None;
         for executed in &region.executed {
             let instruction = self.instruction(executed.address)?;
-            // Executions that went on from the instruction before in memory.
+            // Executions that continued from the instruction before it in memory.
             let (behind, follows) = match &before {
                 Some((next, count, instruction)) if *next == executed.address => (Some(instruction), *count),
                 _ => (None, 0),
@@ -108,9 +108,9 @@ impl Code {
         Ok(())
     }
 
-    /// Modelled cycles of a region, with flash that makes the fetch of a line wait for so many cycles.
+    /// Models the cycles of a region, with flash that delays the fetch of a line by `wait_states` cycles.
     pub fn cycles(&self, region: &Region, wait_states: u64) -> Result<u64> {
-        // The fetch of a line takes one cycle more than it waits; an instruction before it takes one at least.
+        // The fetch of a line takes one cycle more than its wait; an instruction before it takes at least one.
         let fetch = |executed: u64| (wait_states + 1).saturating_sub(executed).min(wait_states);
         let next: u64 = region.next_lines.iter().zip(1..).map(|(lines, executed)| lines * fetch(executed)).sum();
         let mut cycles = wait_states * (region.code_lines + region.data_lines) + next;
@@ -118,14 +118,14 @@ impl Code {
         Ok(cycles)
     }
 
-    /// The instructions of a region by what they do, in the order of [`Kind::ALL`].
+    /// Counts the instructions of a region by kind, in the order of [`Kind::ALL`].
     pub fn by_kind(&self, region: &Region) -> Result<[u64; Kind::ALL.len()]> {
         let mut counts = [0; Kind::ALL.len()];
         self.walk(region, |_, instruction, cost| counts[instruction.class.kind() as usize] += cost.instructions)?;
         Ok(counts)
     }
 
-    /// What a region spends in each function that it runs, the most instructions first.
+    /// Computes the cost of a region in each of its functions, the most instructions first.
     pub fn by_function(&self, region: &Region) -> Result<Vec<(String, Cost)>> {
         let mut costs: BTreeMap<&str, Cost> = BTreeMap::new();
         self.walk(region, |address, _, cost| {
@@ -141,9 +141,9 @@ impl Code {
         Ok(costs)
     }
 
-    /// Lines of flash that the longest innermost loop of a function takes where the function starts at a line: from the
-    /// target of a conditional branch back to that branch, with no other such loop inside; 0 without loops. A loop of
-    /// more than [`CODE_LINES`] misses a cache that replaces the least recently used line at every line.
+    /// Computes the flash lines of the longest innermost loop of a function that starts at a line: from the target of a
+    /// conditional branch back to that branch, with no other such loop inside; 0 without loops. A loop of more than
+    /// [`CODE_LINES`] misses at every line of a cache that replaces the least recently used line.
     pub fn longest_inner_loop(&self, function: &Function) -> Result<u64> {
         let mut loops: Vec<(u64, u64)> = Vec::new();
         let mut address = function.address;
@@ -169,7 +169,7 @@ mod tests {
     use super::*;
     use crate::qemu::Executed;
 
-    /// A loop in a loop, and one that begins in a line's last halfword.
+    /// Nested loops, and one that begins in a line's last halfword.
     #[test]
     fn the_longest_inner_loop_has_no_other_inside() -> Result<()> {
         let mut halves = [0xbf00u16; 24];

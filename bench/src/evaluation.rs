@@ -1,4 +1,4 @@
-//! What one evaluation of a whole head costs on the target.
+//! The cost of one evaluation of a whole head on the target.
 
 use std::path::Path;
 
@@ -8,12 +8,12 @@ use anyhow::{Context as _, Result, ensure};
 
 use crate::qemu::{self, Counter, Region, Server};
 
-/// Evaluations before the one that is counted, so that recurrent state is none that a reset leaves.
+/// Evaluations before the counted one, so that the recurrent state differs from that after a reset.
 const WARM_UP: usize = 4;
 
 /// Serves `observations` from a reset with the harness at `elf` on a target's board under QEMU, with the image file at
-/// `slot` in the slot or the built-in image; counts one step that evaluates the network, of a chunked head one that
-/// begins a chunk.
+/// `slot` in the slot or the built-in image. Counts one step that evaluates the network; for a head with chunks, one
+/// that begins a chunk.
 pub fn count(
     counter: &Counter,
     target: Target,
@@ -29,12 +29,12 @@ pub fn count(
     let steps = WARM_UP * image.execute() + 1;
     for _ in 0..steps {
         let mut observation = observations.next().context("too few recorded observations")?;
-        // Behind it stands the noise of a recording; the head draws its own.
+        // The recording's noise follows it; the head draws its own.
         observation.truncate(image.obs_len());
         server.step(&observation)?;
     }
     server.finish()?;
     let regions = counter.regions()?;
-    ensure!(regions.len() == steps, "the counter saw {} steps of {steps}", regions.len());
-    regions.into_iter().next_back().context("nothing was counted")
+    ensure!(regions.len() == steps, "the counter counted {} of {steps} steps", regions.len());
+    regions.into_iter().next_back().context("the counter counted no step")
 }

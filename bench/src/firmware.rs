@@ -1,4 +1,4 @@
-//! Building the firmware, and what its ELF files say.
+//! Builds the firmware, and reads its ELF files.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -26,8 +26,8 @@ pub(crate) fn cargo_build(what: &str, arguments: &[&str], environment: &[(&str, 
         .args(arguments)
         .envs(environment.iter().copied())
         .output()
-        .context("cargo cannot be started")?;
-    ensure!(output.status.success(), "{what} does not build:\n{}", String::from_utf8_lossy(&output.stderr));
+        .context("cannot start cargo")?;
+    ensure!(output.status.success(), "cannot build {what}:\n{}", String::from_utf8_lossy(&output.stderr));
     Ok(())
 }
 
@@ -38,14 +38,14 @@ const BENCH: &str = "actq-firmware-bench";
 /// Its binary that runs an image.
 const HARNESS: &str = "harness";
 const STYLES: &str = "actq-firmware-styles";
-/// Its binaries: a head in one's own firmware, each in another style.
+/// Its binaries: a head in a user's own firmware, each in another style.
 pub const STYLE_NAMES: [&str; 3] = ["bare", "rtic", "embassy"];
 
-/// The folders of the ELF files that this process has built, by what they are and target. Even where nothing is to be
-/// built, cargo takes a while to find out.
+/// The folders of the ELF files that this process has built, by name and target. Even with nothing to build, cargo
+/// takes a while to find out.
 static BUILT: Mutex<BTreeMap<(&str, Target), PathBuf>> = Mutex::new(BTreeMap::new());
 
-/// Builds something once.
+/// Builds each name once for a target.
 fn once(what: &'static str, target: Target, build: impl FnOnce() -> Result<PathBuf>) -> Result<PathBuf> {
     // A build that panicked has left nothing in the map.
     let mut built = BUILT.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
@@ -57,8 +57,8 @@ fn once(what: &'static str, target: Target, build: impl FnOnce() -> Result<PathB
     Ok(folder)
 }
 
-/// Builds the harness, which serves an image through semihosting, with an image built in that is the same in all runs,
-/// and gives the path of the ELF file. Other images are run from the slot.
+/// Builds the harness, which serves an image through semihosting, with the same built-in image in all runs, and returns
+/// the path of the ELF file. Other images run from the slot.
 pub fn harness(target: Target) -> Result<PathBuf> {
     let build = || harness_in_folder(target, built_in()?);
     Ok(once(HARNESS, target, build)?.join(HARNESS))
@@ -70,18 +70,18 @@ pub fn harness_with(target: Target, image: &Path) -> Result<PathBuf> {
 }
 
 fn harness_in_folder(target: Target, image: &Path) -> Result<PathBuf> {
-    let image = fs::canonicalize(image).with_context(|| format!("{}: cannot be read", image.display()))?;
+    let image = fs::canonicalize(image).with_context(|| format!("cannot read {}", image.display()))?;
     let image = ("ACTQ_IMAGE", &*image.to_string_lossy());
     build(BENCH, &[HARNESS], target.feature().unwrap_or_default(), &target_dir(), target, target.profile(), &[image])
 }
 
 /// Builds the application for a target's board, with the image of [`harness`] and with more features, separated by
-/// commas, and gives the path of the ELF file.
+/// commas, and returns the path of the ELF file.
 pub fn controller(target: Target, features: &'static str) -> Result<PathBuf> {
     controller_of_key(target, features, "")
 }
 
-/// As [`controller`], for the feature `signed` with a key's 64 hexadecimal digits, the same in every call.
+/// Does the same as [`controller`] with the feature `signed` and a key's 64 hexadecimal digits, the same in every call.
 pub fn controller_of_key(target: Target, features: &'static str, key: &str) -> Result<PathBuf> {
     let build = || controller_in_folder(target, features, key, built_in()?);
     let what = if features.is_empty() { CONTROLLER } else { features };
@@ -94,15 +94,15 @@ pub fn controller_with(target: Target, image: &Path) -> Result<PathBuf> {
 }
 
 fn controller_in_folder(target: Target, features: &str, key: &str, image: &Path) -> Result<PathBuf> {
-    let image = fs::canonicalize(image).with_context(|| format!("{}: cannot be read", image.display()))?;
+    let image = fs::canonicalize(image).with_context(|| format!("cannot read {}", image.display()))?;
     let environment = [("ACTQ_IMAGE", &*image.to_string_lossy()), ("ACTQ_PUBLIC_KEY", key), ("DEFMT_LOG", "info")];
     let more = if features.is_empty() { String::new() } else { format!(",{features}") };
     let all = target.board().name.to_owned() + &more;
     build(APPLICATION, &[CONTROLLER], &all, &target_dir(), target, target.profile(), &environment)
 }
 
-/// Builds the programs of `firmware-styles` for the board that they are written for, with the image of [`harness`], and
-/// gives the path of one's ELF file.
+/// Builds the programs of `firmware-styles` for their board, with the image of [`harness`], and returns the path of
+/// one's ELF file.
 pub fn style(name: &str) -> Result<PathBuf> {
     let target = Target::Fpu;
     let build = || {
@@ -112,7 +112,7 @@ pub fn style(name: &str) -> Result<PathBuf> {
     Ok(once(STYLES, target, build)?.join(name))
 }
 
-/// Builds the binaries of `firmware-bench` that run on a target's board, and gives the path of one's ELF file.
+/// Builds the binaries of `firmware-bench` that run on a target's board, and returns the path of one's ELF file.
 pub fn binary(name: &str, target: Target) -> Result<PathBuf> {
     let board = target.board();
     ensure!(board.binaries.contains(&name), "firmware {name} does not run on {}", board.name);
@@ -121,13 +121,13 @@ pub fn binary(name: &str, target: Target) -> Result<PathBuf> {
     Ok(once(BENCH, target, build)?.join(name))
 }
 
-/// As [`binary`], with a profile of `Cargo.toml` that is not the target's own.
+/// Does the same as [`binary`] with a profile of `Cargo.toml` that is not the target's own.
 pub fn binary_in(profile: &str, name: &str, target: Target) -> Result<PathBuf> {
     let features = target.feature().unwrap_or_default();
     Ok(build(BENCH, &[name], features, &target_dir(), target, profile, &[])?.join(name))
 }
 
-/// As [`binary`], without the assembler (`ACTQ_BACKEND=portable`).
+/// Does the same as [`binary`] without the assembler (`ACTQ_BACKEND=portable`).
 pub fn portable_binary(name: &str, target: Target) -> Result<PathBuf> {
     if !target.has_assembler() {
         return binary(name, target);
@@ -139,8 +139,8 @@ pub fn portable_binary(name: &str, target: Target) -> Result<PathBuf> {
         .join(name))
 }
 
-/// Builds binaries of a package and gives the folder of their ELF files: a folder of the board and its features,
-/// because cargo gives the files of all boards of a triple the same names.
+/// Builds binaries of a package and returns the folder of their ELF files: a folder of the board and its features,
+/// because cargo uses the same names for all boards of a triple.
 fn build(
     package: &str,
     binaries: &[&str],
@@ -161,18 +161,18 @@ fn build(
     cargo_build(&format!("{package} for {}", target.board().name), &arguments, environment)?;
     let built = dir.join(target.triple()).join(profile);
     let own = built.join(if features.is_empty() { target.board().name } else { features });
-    fs::create_dir_all(&own).with_context(|| format!("{}: cannot be made", own.display()))?;
+    fs::create_dir_all(&own).with_context(|| format!("cannot create {}", own.display()))?;
     for binary in binaries {
-        let elf = fs::read(built.join(binary)).with_context(|| format!("{binary}: cannot be read"))?;
+        let elf = fs::read(built.join(binary)).with_context(|| format!("cannot read {binary}"))?;
         files::write(&own.join(binary), &elf)?;
     }
     Ok(own)
 }
 
-/// The image that [`harness`] carries: the UR3 policy at 3 bits, rounded. `cargo xtask firmware` makes the same file.
+/// Returns the image of [`harness`]: the UR3 policy at 3 bits, rounded. `cargo xtask firmware` makes the same file.
 pub fn built_in() -> Result<&'static Path> {
     static FILE: LazyLock<Result<PathBuf, String>> = LazyLock::new(|| write_built_in().map_err(|e| format!("{e:#}")));
-    FILE.as_deref().map_err(|error| anyhow!("the image to build in: {error}"))
+    FILE.as_deref().map_err(|error| anyhow!("cannot make the built-in image: {error}"))
 }
 
 fn write_built_in() -> Result<PathBuf> {
@@ -181,42 +181,44 @@ fn write_built_in() -> Result<PathBuf> {
     let options =
         Options { group: 32, activations: Activations::Int8, ..Options::new(Method::Rtn, Budget::Width(Width::W3)) };
     let bytes = quantize(&policy, &Recordings::default(), &options, |_, _| {})?.image;
-    // Cargo builds anew what includes a newer file.
+    // Cargo rebuilds a crate that includes a newer file.
     if fs::read(&path).ok().as_ref() != Some(&bytes) {
         files::write(&path, &bytes)?;
     }
     Ok(path)
 }
 
-/// Address (without the Thumb bit) and length of a symbol; `None` where the file has none of this name.
+/// Returns the address (without the Thumb bit) and length of a symbol; `None` if the file lacks it.
 pub(crate) fn symbol(elf: &Path, name: &str) -> Result<Option<(u64, u64)>> {
-    let data = fs::read(elf).with_context(|| format!("{}: cannot be read", elf.display()))?;
+    let data = fs::read(elf).with_context(|| format!("cannot read {}", elf.display()))?;
     let file = object::File::parse(&*data).with_context(|| format!("{}: not an ELF file", elf.display()))?;
     let symbol = file.symbols().find(|s| s.name() == Ok(name));
     Ok(symbol.map(|symbol| (symbol.address() & !1, symbol.size())))
 }
 
-/// Bytes of flash that an ELF file takes: code, constants (the built-in image among them) and initial values.
+/// Returns the bytes of flash of an ELF file: code, constants (the built-in image among them) and initial values.
 pub fn flash_bytes(elf: &Path) -> Result<u64> {
     section_bytes(elf, &[".vector_table", ".text", ".rodata", ".data"])
 }
 
-/// Bytes of RAM that an ELF file takes for its variables.
+/// Returns the bytes of RAM of an ELF file's variables.
 pub fn ram_bytes(elf: &Path) -> Result<u64> {
     section_bytes(elf, &[".data", ".bss", ".uninit"])
 }
 
 fn section_bytes(elf: &Path, names: &[&str]) -> Result<u64> {
-    let data = fs::read(elf).with_context(|| format!("{}: cannot be read", elf.display()))?;
+    let data = fs::read(elf).with_context(|| format!("cannot read {}", elf.display()))?;
     let file = object::File::parse(&*data).with_context(|| format!("{}: not an ELF file", elf.display()))?;
     Ok(file.sections().filter(|s| s.name().is_ok_and(|n| names.contains(&n))).map(|s| s.size()).sum())
 }
 
-/// The halfword at an address of the code of an ELF file.
+/// Returns the halfword at an address of the code of an ELF file.
 pub fn halfword_at(elf: &Path, address: u32) -> Result<u16> {
-    let data = fs::read(elf).with_context(|| format!("{}: cannot be read", elf.display()))?;
+    let data = fs::read(elf).with_context(|| format!("cannot read {}", elf.display()))?;
     let file = object::File::parse(&*data).with_context(|| format!("{}: not an ELF file", elf.display()))?;
-    let text = file.section_by_name(".text").context("there is no code")?;
-    let bytes = text.data_range(address.into(), 2)?.with_context(|| format!("{address:x} is not in the code"))?;
+    let text = file.section_by_name(".text").context("the ELF file has no section .text")?;
+    let bytes = text
+        .data_range(address.into(), 2)?
+        .with_context(|| format!("the section .text lacks the address {address:#x}"))?;
     Ok(u16::from_le_bytes(bytes.try_into()?))
 }

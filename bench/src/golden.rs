@@ -8,16 +8,16 @@ pub use actq::random::Random;
 use actq_kernels::layout::{Block, BlockShape, Lanes, Width, pack};
 use actq_kernels::x::{Plan, Prepared, prepare};
 
-/// How a case's numbers are drawn.
+/// Distribution of a case's numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Draw {
     /// Uniform.
     Uniform,
-    /// Weights at either end of their range, activations at plus or minus the largest.
+    /// Weights at either end of their range, activations of the largest magnitude.
     Ends,
-    /// Every product at its largest and of one sign: the worst case of the accumulators.
+    /// Every product of the largest magnitude and of one sign: the worst case of the accumulators.
     Worst,
-    /// All activations equal, each row's weights at one end of their range: the longest way of one lane and not of
+    /// All activations equal, each row's weights at one end of their range: the longest path of one lane and not of
     /// another.
     Aligned,
 }
@@ -68,14 +68,14 @@ impl Case {
         Self { shape, codes, scales, x }
     }
 
-    /// The packed words.
+    /// Returns the packed words.
     pub fn words(&self) -> Vec<u32> {
         let mut words = vec![0; self.shape.words()];
         assert!(pack(self.shape, &self.codes, &self.scales, &mut words).is_some(), "the case fits its shape");
         words
     }
 
-    /// The prepared activations.
+    /// Returns the prepared activations.
     pub fn prepared(&self) -> Vec<u32> {
         let plan = self.plan();
         let mut out = vec![!0; plan.words()];
@@ -83,12 +83,12 @@ impl Case {
         out
     }
 
-    /// How its activations are prepared.
+    /// Returns the plan that prepares its activations.
     pub fn plan(&self) -> Plan {
         Plan::new(self.shape).expect("the shape is valid")
     }
 
-    /// The sums by the definition, straight from codes and activations, modulo 2^32; those of padding rows are 0.
+    /// Computes the sums by the definition, from codes and activations, modulo 2^32; those of padding rows are 0.
     pub fn sums(&self) -> Vec<i32> {
         let shape = self.shape;
         let mut sums = vec![0; shape.padded_rows()];
@@ -129,8 +129,8 @@ impl Case {
     }
 }
 
-/// All layouts and groups over all lengths from 1 to 67 and larger ones, with 1 to 17 rows, random and extreme values,
-/// and activations up to the layout's limit.
+/// Draws cases of all layouts and groups over all lengths from 1 to 67 and larger ones, with 1 to 17 rows, random and
+/// extreme values, and activations up to the layout's limit.
 pub fn cases(seed: u64) -> Vec<Case> {
     let mut random = Random::new(seed);
     let mut cases = Vec::new();
@@ -149,14 +149,14 @@ pub fn cases(seed: u64) -> Vec<Case> {
     cases
 }
 
-/// All valid combinations of width, lanes and group.
+/// Lists all valid combinations of width, lanes and group.
 pub fn layouts() -> impl Iterator<Item = (Width, Lanes, usize)> {
     let of = |(width, lanes)| [0, 32, 64, 128].map(|group| (width, lanes, group));
     let all = Width::ALL.into_iter().flat_map(|width| Lanes::ALL.map(|lanes| (width, lanes)));
     all.flat_map(of).filter(|&(width, lanes, group)| BlockShape { width, lanes, rows: 1, cols: 1, group }.is_valid())
 }
 
-/// The cases as the firmware reads them, at every alignment that words can have in a 16-byte line.
+/// Returns the cases as the firmware reads them, at every alignment of words in a 16-byte line.
 pub fn stream(cases: &[Case]) -> Vec<u8> {
     let mut words = Vec::new();
     for (i, case) in cases.iter().enumerate() {

@@ -1,17 +1,17 @@
 //! Instructions of Armv7E-M with FPU (Thumb-2), as far as their cycles and the stack depend on them.
 //!
-//! What each class of them takes is from the Cortex-M4 Technical Reference Manual, tables 3-1 and 7-1, with memory that
-//! never waits.
+//! The cycles of each class are from the Cortex-M4 Technical Reference Manual, tables 3-1 and 7-1, for memory without
+//! wait states.
 
 /// Cycles to refill the pipeline after a taken branch; the manual gives 1 to 3.
 pub(crate) const REFILL: u64 = 2;
 
-/// What the time of an instruction depends on.
+/// A class of instructions with the same timing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
-    /// Data processing, and all else that takes one cycle.
+    /// Data processing, and everything else that takes one cycle.
     Alu,
-    /// Multiplication in one cycle, the SIMD ones with accumulation among them.
+    /// Multiplication in one cycle, including the SIMD ones with accumulation.
     Multiply,
     /// MLA and MLS.
     MultiplyAccumulate,
@@ -21,25 +21,25 @@ pub enum Class {
     Load,
     /// A store of one register.
     Store,
-    /// A store to an address with a register as offset.
+    /// A store to an address with a register offset.
     StoreIndexed,
     /// LDRD, and VLDR of a double.
     LoadDouble,
     /// STRD, and VSTR of a double.
     StoreDouble,
-    /// LDM, POP and VLDM of so many registers.
+    /// LDM, POP and VLDM of this many registers.
     LoadMultiple(u32),
-    /// STM, PUSH and VSTM of so many registers.
+    /// STM, PUSH and VSTM of this many registers.
     StoreMultiple(u32),
-    /// A load of so many registers, one of them the program counter.
+    /// A load of this many registers, one of them the program counter.
     Return(u32),
-    /// A branch that is always taken.
+    /// An unconditional branch.
     Branch,
-    /// A branch that may be taken.
+    /// A conditional branch.
     Conditional,
     /// IT
     IfThen,
-    /// A floating-point operation of one cycle, whose result comes a cycle later.
+    /// A floating-point operation of one cycle, whose result is ready a cycle later.
     Float,
     /// Floating-point multiplication with accumulation.
     FloatAccumulate,
@@ -49,16 +49,16 @@ pub enum Class {
     FloatMove,
 }
 
-/// What an instruction does, for people.
+/// A kind of instructions, for reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
     /// Data processing.
     Alu,
     /// Multiplication, with or without accumulation, and division.
     Multiply,
-    /// Loads, of floats too.
+    /// Loads, including floats.
     Load,
-    /// Stores, of floats too.
+    /// Stores, including floats.
     Store,
     /// Branches, calls and returns.
     Branch,
@@ -67,12 +67,12 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// All, in order.
+    /// All kinds, in order.
     pub const ALL: [Self; 6] = [Self::Alu, Self::Multiply, Self::Load, Self::Store, Self::Branch, Self::Float];
 }
 
 impl Class {
-    /// What it does.
+    /// Returns the human-readable name.
     pub fn kind(self) -> Kind {
         match self {
             Self::Alu | Self::IfThen => Kind::Alu,
@@ -85,29 +85,29 @@ impl Class {
     }
 }
 
-/// A decoded instruction. Registers are sets of bits.
+/// A decoded instruction. Registers are bit sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Instruction {
-    /// Bytes: 2 or 4.
+    /// Size, bytes: 2 or 4.
     pub size: u64,
     /// Class.
     pub class: Class,
-    /// Core registers that it writes.
+    /// Core registers written.
     pub writes: u32,
-    /// Core registers that its address is made of.
+    /// Core registers of the address.
     pub address: u32,
-    /// Single-precision registers that it writes.
+    /// Single-precision registers written.
     pub float_writes: u64,
-    /// Single-precision registers that it reads.
+    /// Single-precision registers read.
     pub float_reads: u64,
 }
 
-/// Bits `low ..= high` of a halfword.
+/// Extracts the bits `low ..= high` of a halfword.
 fn bits(half: u16, high: u32, low: u32) -> u32 {
     (u32::from(half) >> low) & ((1 << (high - low + 1)) - 1)
 }
 
-/// The set of register `n`.
+/// Returns the set of register `n`.
 fn set(n: u32) -> u32 {
     1 << n
 }
@@ -125,7 +125,7 @@ impl Instruction {
         Self { address: registers, ..self }
     }
 
-    /// Decodes a Thumb-2 instruction from its first halfword and the one that follows.
+    /// Decodes a Thumb-2 instruction from its first halfword and the next one.
     pub fn decode(first: u16, second: u16) -> Self {
         if first >> 11 >= 0b11101 { Self::decode_wide(first, second) } else { Self::decode_narrow(first) }
     }
@@ -253,7 +253,7 @@ impl Instruction {
         let load = bits(first, 4, 4) == 1;
         let core = bits(second, 15, 12);
         let double = bits(second, 8, 8) == 1;
-        // A single is its four bits and one more; doubles do not occur in what is modelled.
+        // A single's number is its four bits and one more; the modelled code has no doubles.
         let d = 1u64 << (core << 1 | bits(first, 6, 6));
         let n = 1u64 << (base << 1 | bits(second, 7, 7));
         let m = 1u64 << (bits(second, 3, 0) << 1 | bits(second, 5, 5));
@@ -293,7 +293,7 @@ impl Instruction {
         Self { float_writes, float_reads, ..new(class) }
     }
 
-    /// Cycles after a jump, a taken conditional branch excepted.
+    /// Returns the cycles after a jump, except for a taken conditional branch.
     pub(crate) fn cycles(&self) -> u64 {
         match self.class {
             Class::Alu | Class::Multiply | Class::IfThen | Class::Float | Class::FloatMove => 1,
@@ -308,7 +308,7 @@ impl Instruction {
         }
     }
 
-    /// Cycles behind `before`.
+    /// Returns the cycles after `before`.
     pub(crate) fn cycles_behind(&self, before: &Self) -> u64 {
         let memory = matches!(self.class.kind(), Kind::Load | Kind::Store);
         let address_comes_late = before.writes & self.address != 0;
@@ -328,7 +328,7 @@ impl Instruction {
     }
 }
 
-/// Where a conditional branch (B<cond>, not CBZ, which only goes forward) at `address` goes to.
+/// Returns the target of a conditional branch (B<cond>, not CBZ, which only goes forward) at `address`.
 pub(crate) fn branch_target(address: u64, first: u16, second: u16) -> Option<u64> {
     if Instruction::decode(first, second).class != Class::Conditional {
         return None;
@@ -429,7 +429,7 @@ mod tests {
     }
 
     #[test]
-    fn floating_point_registers_are_those_of_the_encoding() {
+    fn floating_point_registers_follow_the_encoding() {
         let decoded = Instruction::decode(0xee24, 0x4a80); // vmul.f32 s8, s9, s0
         assert_eq!((decoded.float_writes, decoded.float_reads), (1 << 8, 1 << 9 | 1));
         let decoded = Instruction::decode(0xee38, 0x4a04); // vadd.f32 s8, s16, s8
@@ -451,7 +451,7 @@ mod tests {
     }
 
     #[test]
-    fn branches_go_where_the_encoding_says() {
+    fn branch_targets_follow_the_encoding() {
         assert_eq!(branch_target(0x100, 0xd0fe, 0), Some(0x100)); // beq.n to itself
         assert_eq!(branch_target(0x100, 0xd1f7, 0), Some(0xf2)); // bne.n
         assert_eq!(branch_target(0x100, 0xf47f, 0xaffd), Some(0xfe)); // bne.w

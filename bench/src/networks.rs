@@ -1,4 +1,4 @@
-//! Networks of drawn weights, for measurements and properties.
+//! Networks of random weights, for measurements and property tests.
 
 use std::path::Path;
 
@@ -14,37 +14,37 @@ use actq_kernels::Width;
 use actq_kernels::image::{header as h, op, seal};
 use anyhow::{Context, Result, ensure};
 
-/// A network under construction: parts of the observation go through one operation each.
+/// A network under construction: each operation gets its own part of the observation.
 #[derive(Debug)]
 pub struct Builder {
-    /// So far.
+    /// Length of the observation so far.
     pub graph: Graph,
     outcomes: Vec<Outcome>,
     random: Random,
 }
 
 impl Builder {
-    /// A network without operations.
+    /// Creates a network without operations.
     pub fn new(observation: usize) -> Self {
         Self { graph: Graph::new(observation), outcomes: Vec::new(), random: Random::new(2) }
     }
 
-    /// An operation on values; gives its output.
+    /// Adds an operation on values; returns its output.
     pub fn node(&mut self, kind: impl Into<NodeKind>, inputs: &[ValueId]) -> Result<ValueId> {
         Ok(self.graph.add(kind, inputs)?)
     }
 
-    /// The first values of the observation.
+    /// Returns the first values of the observation.
     pub fn part(&mut self, len: usize) -> Result<ValueId> {
         self.node(Concat(vec![Span { from: 0, len }]), &[0])
     }
 
-    /// Values between -1 and 1.
+    /// Draws values between -1 and 1.
     pub fn values(&mut self, len: usize) -> Vec<f32> {
         (0..len).map(|_| self.random.unit()).collect()
     }
 
-    /// A matrix that keeps the variance of its input, with a width for each row; rows without one have no bits.
+    /// Adds a matrix that keeps the variance of its input, with a width for each row; rows without one have no bits.
     pub fn matrix(
         &mut self,
         rows: usize,
@@ -70,7 +70,7 @@ impl Builder {
         Ok(self.graph.add_matrix(matrix)?)
     }
 
-    /// A product with a part of the observation, with drawn biases or none.
+    /// Adds a product with a part of the observation, with random biases or none.
     pub fn linear(
         &mut self,
         shape: (usize, usize),
@@ -86,7 +86,7 @@ impl Builder {
         self.node(Linear { matrix, bias }, &[input])
     }
 
-    /// The policy, whose action is the last node's output.
+    /// Returns the policy, whose action is the last node's output.
     pub fn finish(self, name: String, contract: bool) -> (Policy, Vec<Outcome>) {
         let act_len = self.graph.len_of(self.graph.output());
         let array = |value: f32| contract.then(|| vec![value; act_len]);
@@ -105,14 +105,14 @@ impl Builder {
         (policy, self.outcomes)
     }
 
-    /// A node of its own part of the observation.
+    /// Adds a node with its own part of the observation.
     pub fn node_of_part(&mut self, len: usize, kind: impl Into<NodeKind>) -> Result<ValueId> {
         let input = self.part(len)?;
         self.node(kind, &[input])
     }
 }
 
-/// Makes a row what it is in `other`, a matrix of the same size and groups.
+/// Copies a row from `other`, a matrix of the same size and groups.
 pub fn replace_row(matrix: &mut Quantized, row: usize, other: &Quantized) {
     let (cols, groups) = (matrix.cols, matrix.groups());
     matrix.widths[row] = other.widths[row];
@@ -121,8 +121,8 @@ pub fn replace_row(matrix: &mut Quantized, row: usize, other: &Quantized) {
     matrix.group_scales[row * groups..][..groups].copy_from_slice(&other.group_scales[row * groups..][..groups]);
 }
 
-/// The image with every linear operation that has biases, and whose output holds something before it, made to
-/// accumulate: the format has such operations, and no graph lowers to one.
+/// Changes every linear operation of the image that has biases, and whose output already holds values, to accumulate:
+/// the format has such operations, and no graph lowers to one.
 pub fn accumulating(bytes: &[u8]) -> Result<Vec<u8>> {
     let name = Path::new("accumulating");
     let mut bytes = bytes.to_vec();
@@ -134,15 +134,15 @@ pub fn accumulating(bytes: &[u8]) -> Result<Vec<u8>> {
         if word(&bytes, record) as u8 == op::LINEAR && word(&bytes, record + 2) != 0 {
             let mut with = bytes.clone();
             with[4 * record + 1] = 1;
-            seal(&mut with).context("the image is too long")?;
-            // Refused where nothing was written there.
+            seal(&mut with).context("cannot seal the image: it is too long")?;
+            // Refused if nothing was written there.
             if ImageBuffer::new(&with).image(name).is_ok() {
                 (bytes, changed) = (with, changed + 1);
             }
         }
     }
-    ensure!(changed > 0, "no operation can accumulate");
-    // Other actions than those that the self-test vector holds.
+    ensure!(changed > 0, "the image has no operation that can accumulate");
+    // The actions differ from those of the self-test vector.
     let buffer = ImageBuffer::new(&bytes);
     let image = buffer.image(name)?;
     let mut at = 4 * word(&bytes, h::W_SELF_TEST) as usize;
@@ -157,6 +157,6 @@ pub fn accumulating(bytes: &[u8]) -> Result<Vec<u8>> {
         }
         Ok(())
     })?;
-    seal(&mut bytes).context("the image is too long")?;
+    seal(&mut bytes).context("cannot seal the image: it is too long")?;
     Ok(bytes)
 }

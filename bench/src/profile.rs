@@ -1,4 +1,4 @@
-//! What the firmware's steps, polls and operations take under QEMU.
+//! The cost of the firmware's steps, polls and operations under QEMU.
 
 use std::path::Path;
 
@@ -9,8 +9,8 @@ use anyhow::{Result, bail, ensure};
 use crate::cycles::Code;
 use crate::qemu::{self, Counter, Server};
 
-/// Runs an image from the slot on observations, after one reset, and gives the cost of every counted region, and the
-/// actions. `arguments` are those of the firmware.
+/// Runs an image from the slot on observations, after one reset, and returns the cost of every counted region, and the
+/// actions. `arguments` are the firmware's.
 pub fn regions(
     elf: &Path,
     counter: &Counter,
@@ -34,7 +34,7 @@ pub fn regions(
     Ok((counter.regions()?.iter().map(cost).collect::<Result<_>>()?, actions))
 }
 
-/// The cost of whole steps.
+/// Measures the cost of whole steps.
 pub fn steps(elf: &Path, counter: &Counter, bytes: &[u8], observations: &[Vec<f32>]) -> Result<Vec<Cost>> {
     Ok(regions(elf, counter, bytes, "serve", observations)?.0)
 }
@@ -42,7 +42,7 @@ pub fn steps(elf: &Path, counter: &Counter, bytes: &[u8], observations: &[Vec<f3
 /// The parts of a step.
 #[derive(Clone, Debug)]
 pub struct Parts {
-    /// Begin.
+    /// `Head::begin`.
     pub begin: Cost,
     /// The operations.
     pub ops: Vec<Cost>,
@@ -50,8 +50,8 @@ pub struct Parts {
     pub action: Cost,
 }
 
-/// The cost of every part of every step of an image that evaluates its network at each, in polls of one operation with
-/// `budget` instructions.
+/// Measures every part of every step of an image that evaluates its network in each step, in polls of one operation
+/// with `budget` instructions.
 pub fn parts(
     elf: &Path,
     counter: &Counter,
@@ -60,7 +60,7 @@ pub fn parts(
     observations: &[Vec<f32>],
     budget: u32,
 ) -> Result<Vec<Parts>> {
-    ensure!(image.execute() == 1, "{} plays chunks", image.name());
+    ensure!(image.execute() == 1, "{} plays chunks; only one action per evaluation can be measured", image.name());
     let (costs, _) = regions(elf, counter, bytes, &format!("ops {budget}"), observations)?;
     let steps = costs.chunks(image.op_count() + 2);
     let parts = |step: &[Cost]| match step {

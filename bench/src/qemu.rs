@@ -1,4 +1,4 @@
-//! Running the firmware under QEMU, and counting what it executes.
+//! Runs the firmware under QEMU, and counts the executed instructions.
 
 use std::fs;
 use std::io::{Read as _, Write as _};
@@ -11,12 +11,12 @@ use anyhow::{Context, Result, bail, ensure};
 
 use crate::firmware::{cargo_build, symbol};
 
-/// QEMU with `elf`, an image in the slot if one is given, and arguments for the firmware.
+/// Returns QEMU's command for `elf`, an image in the slot if one is given, and arguments of the firmware.
 pub fn command(elf: &Path, slot: Option<&Path>, arguments: &str) -> Result<Command> {
     command_on(Target::Fpu, elf, slot, arguments)
 }
 
-/// As [`command`], on the board of a target.
+/// Does the same as [`command`] on the board of a target.
 pub fn command_on(target: Target, elf: &Path, slot: Option<&Path>, arguments: &str) -> Result<Command> {
     let mut command = target.run(elf);
     if !arguments.is_empty() {
@@ -35,38 +35,36 @@ pub(crate) fn in_slot(command: &mut Command, elf: &Path, slot: Option<&Path>) ->
     Ok(())
 }
 
-/// Where the image slot begins that the firmware was linked with.
+/// Returns the address of the firmware's image slot.
 fn slot_address(elf: &Path) -> Result<u64> {
     match (symbol(elf, "_image_slot_start")?, symbol(elf, "_image_slot_end")?) {
         (Some((start, _)), Some((end, _))) if start < end => Ok(start),
-        _ => bail!("{}: this firmware has no image slot", elf.display()),
+        _ => bail!("{} has no image slot", elf.display()),
     }
 }
 
 pub(crate) fn spawn(command: &mut Command) -> Result<Child> {
     let emulator = command.get_program().to_string_lossy().into_owned();
-    command
-        .spawn()
-        .with_context(|| format!("{emulator} cannot be started; `cargo xtask doctor` says how to install it"))
+    command.spawn().with_context(|| format!("cannot start {emulator}; `cargo xtask doctor` shows how to install it"))
 }
 
 /// Runs a firmware that ends by itself; `input` is its standard input.
 pub fn run(mut command: Command, input: &[u8]) -> Result<Output> {
     let mut child = spawn(command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()))?;
-    let mut stdin = child.stdin.take().context("no standard input")?;
+    let mut stdin = child.stdin.take().context("QEMU has no standard input")?;
     std::thread::scope(|scope| {
         // A firmware that stops early closes the pipe; its exit status tells why.
         scope.spawn(move || drop(stdin.write_all(input)));
-        child.wait_with_output().context("QEMU does not end")
+        child.wait_with_output().context("QEMU did not end")
     })
 }
 
-/// A request of the pipe protocol for a step.
+/// A step request of the pipe protocol.
 pub fn step_request(observation: &[f32]) -> Vec<u8> {
     std::iter::once(STEP).chain(observation.iter().flat_map(|v| v.to_le_bytes())).collect()
 }
 
-/// A firmware under QEMU that serves as a policy.
+/// A firmware under QEMU that serves a policy.
 #[derive(Debug)]
 pub struct Server {
     child: Child,
@@ -93,24 +91,24 @@ impl Server {
         self.send(&[RESET])
     }
 
-    /// The action for an observation.
+    /// Returns the action for an observation.
     pub fn step(&mut self, observation: &[f32]) -> Result<Vec<f32>> {
         self.send(&step_request(observation))?;
         let mut bytes = vec![0; 4 * self.act_len];
-        self.stdout.read_exact(&mut bytes).context("the firmware ended without an action")?;
+        self.stdout.read_exact(&mut bytes).context("cannot read an action from the firmware")?;
         Ok(bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
     }
 
-    /// Ends the firmware, which must do so with success.
+    /// Ends the firmware, which must succeed.
     pub fn finish(mut self) -> Result<()> {
         self.stdin = None;
-        let status = self.child.wait().context("QEMU does not end")?;
-        ensure!(status.success(), "the firmware ended with a failure");
+        let status = self.child.wait().context("QEMU did not end")?;
+        ensure!(status.success(), "the firmware failed: {status}");
         Ok(())
     }
 }
 
-/// The profile of the plugin (`Cargo.toml`).
+/// The profile of the plugin (see `Cargo.toml`).
 const PROFILE: &str = "release";
 
 /// Counts instructions in the regions that a firmware marks.
@@ -121,7 +119,7 @@ pub struct Counter {
 }
 
 impl Counter {
-    /// Builds the plugin for the QEMU that is installed.
+    /// Builds the plugin for the installed QEMU.
     pub fn build() -> Result<Self> {
         let api = plugin_api()?;
         cargo_build(
@@ -146,7 +144,7 @@ impl Counter {
         Ok(())
     }
 
-    /// The regions of the run that has ended, in order.
+    /// Returns the regions of the finished run, in order.
     pub fn regions(&self) -> Result<Vec<Region>> {
         let text = fs::read_to_string(self.out.path())?;
         let mut regions: Vec<Region> = Vec::new();
@@ -172,7 +170,7 @@ impl Counter {
     }
 }
 
-/// What was executed between two marks.
+/// Counts between two marks.
 #[derive(Clone, Debug)]
 pub struct Region {
     /// Instructions.
@@ -181,26 +179,26 @@ pub struct Region {
     pub data_lines: u64,
     /// Lines of code fetched from flash after a jump into a cache of 64 lines of 16 bytes, empty at first.
     pub code_lines: u64,
-    /// Lines of code fetched into it behind the line before, by how many instructions, from one on, were executed
+    /// Lines of code fetched into it after the previous line, by how many instructions, at least one, were executed
     /// there.
     pub next_lines: Vec<u64>,
-    /// Each instruction that was executed, by address.
+    /// Executed instructions, by address.
     pub executed: Vec<Executed>,
 }
 
-/// How often an instruction was executed.
+/// The count of an instruction.
 #[derive(Clone, Copy, Debug)]
 pub struct Executed {
     /// Address.
     pub address: u64,
     /// Executions.
     pub count: u64,
-    /// How many of them did not go on at the next instruction.
+    /// Executions that did not continue at the next instruction.
     pub jumps: u64,
 }
 
-/// The plugin API of the installed QEMU: 1 up to 9.0, 2 from 9.1 on (QEMU's docs/devel/tcg-plugins). The emulators of
-/// all targets are taken to be of one release; QEMU refuses a plugin of another API.
+/// Returns the plugin API of the installed QEMU: 1 up to 9.0, 2 from 9.1 on (QEMU's docs/devel/tcg-plugins). It assumes
+/// that the emulators of all targets are of one release; QEMU refuses a plugin of another API.
 fn plugin_api() -> Result<u32> {
     let emulator = Target::Fpu.board().emulator;
     let version = version(emulator).with_context(|| format!("{emulator} is not installed"))?;
@@ -208,7 +206,7 @@ fn plugin_api() -> Result<u32> {
     let mut parts = number.unwrap_or("").split('.').map(|p| p.parse::<u32>().unwrap_or(0));
     let (major, minor) = (parts.next().unwrap_or(0), parts.next().unwrap_or(0));
     match (major, minor) {
-        (..7, _) => bail!("{version} is too old, 7.0 is needed"),
+        (..7, _) => bail!("{version} is too old; install 7.0 or newer"),
         (7 | 8, _) | (9, 0) => Ok(1),
         _ => Ok(2),
     }

@@ -1,14 +1,15 @@
-//! The most stack that the application can take, from the ELF file alone: its functions' frames, read from their
-//! instructions, along the deepest way through their calls, with everything that may interrupt it on top.
+//! The maximum stack of the application, from the ELF file only: the frames of its functions, read from their
+//! instructions, along the deepest path of the call graph, with every possible interrupt on top.
 //!
-//! What is not understood is an error, not a guess: an instruction that changes the stack pointer in another way than
-//! by a constant, ways that come to an instruction with different depths, code that no way leads to, a function that
-//! calls itself, by a pointer, too. A call by a pointer may reach every function whose address is taken anywhere. The
-//! frames of the functions in assembler are read as all others.
+//! Anything unknown is an error, not a guess: an instruction that changes the stack pointer by other than a constant,
+//! paths that reach an instruction with different depths, unreachable code, recursion, also by a pointer. A call by a
+//! pointer may reach every function whose address is taken anywhere. Frames of functions in assembler are read in the
+//! same way.
 //!
-//! An exception may come at any instruction of what has a lower priority. The processor stacks 8 words, or 26 where
-//! floats are in use, and one more to align them (Arm DDI 0403E, section B1.5.6; no board here stacks the FPU's upper
-//! half, as FPCCR.TS asks for). So the worst case is the deepest way of the program and, for every priority, that of
+//! An exception may come at any instruction of lower priority. The processor stacks 8 words, or 26 if floats are in
+//! use, and one more to align them (Arm DDI 0403E, section B1.5.6; no board here stacks the FPU's upper half, as
+//! FPCCR.TS requests). The worst case is the deepest path of the program and, for every priority, that of its deepest
+//! handler, each with such a frame.
 //! its deepest handler, each with such a frame.
 
 mod depth;
@@ -29,78 +30,78 @@ pub use self::depth::Call;
 use self::depth::Depths;
 use self::program::Program;
 
-/// Words that the processor stacks, with and without the FPU's, and the one that aligns them.
+/// Words that the processor stacks, with and without those of the FPU, and the one that aligns them.
 const FRAME_WORDS: u32 = 8 + 1;
 const FPU_FRAME_WORDS: u32 = 26 + 1;
 
-/// Bytes below the stack that may be a guard, and that begin at a multiple of them (`boards/src/target/mpu.rs`).
+/// Bytes below the stack that may be a guard, and their alignment (`boards/src/target/mpu.rs`).
 const GUARD: u32 = 4096;
 
-/// Places of the vector table.
+/// Indices of the vector table.
 const RESET: usize = 1;
 const NMI: usize = 2;
 const HARD_FAULT: usize = 3;
 
-/// The most that the stack can hold.
+/// The maximum content of the stack.
 #[derive(Clone, Debug)]
 pub struct Worst {
-    /// The program and, the lowest priority first, what may interrupt it.
+    /// The program and its interrupts, the lowest priority first.
     pub levels: Vec<Level>,
-    /// Bytes that the linker's script leaves for the stack, without a guard.
+    /// Bytes that the linker script reserves for the stack, without a guard.
     pub room: u32,
     /// The functions that call by a pointer.
     pub by_pointer: Vec<String>,
-    /// The functions that a pointer may point to.
+    /// The functions whose address is taken.
     pub pointed_to: Vec<String>,
     /// Functions that may run, and the bytes of their own frames.
     pub frames: Vec<(String, u32)>,
 }
 
-/// What runs at one priority.
+/// The code of one priority.
 #[derive(Clone, Debug)]
 pub struct Level {
     /// The priority.
     pub priority: Priority,
-    /// Bytes that the processor stacks when it begins.
+    /// Bytes that the processor stacks on entry.
     pub stacked: u32,
-    /// The deepest way.
+    /// The deepest path.
     pub path: Vec<Call>,
 }
 
-/// When something runs.
+/// A priority.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Priority {
-    /// Where nothing else does.
+    /// The program, below every interrupt.
     Thread,
-    /// A task's in the application, the highest one last.
+    /// A task of the application, the highest priority last.
     Task(u8),
-    /// Of faults, and of all that no task is bound to: what a reset gives, above all tasks.
+    /// Faults, and every exception without a task: the priority after a reset, above all tasks.
     Fault,
-    /// Of a hard fault.
+    /// A hard fault.
     HardFault,
-    /// Of the non-maskable interrupt.
+    /// The non-maskable interrupt.
     Nmi,
 }
 
 impl Level {
-    /// Bytes of stack.
+    /// Returns the bytes of stack.
     pub fn bytes(&self) -> u32 {
         self.stacked + self.path.iter().map(|call| call.frame).sum::<u32>()
     }
 }
 
 impl Worst {
-    /// Bytes of stack.
+    /// Returns the bytes of stack.
     pub fn bytes(&self) -> u32 {
         self.levels.iter().map(Level::bytes).sum()
     }
 }
 
-/// The worst case of the application in an ELF file.
+/// Computes the worst case of the application in an ELF file.
 ///
 /// # Errors
 ///
-/// The file cannot be read, or something in it is not understood, as a function that calls itself.
+/// The file cannot be read, or the analysis does not understand a part of it, for example recursion.
 pub fn worst_case(elf: &Path) -> Result<Worst> {
     let program = Program::read(elf)?;
     worst(&program, &tasks()?).with_context(|| elf.display().to_string())
@@ -109,7 +110,7 @@ pub fn worst_case(elf: &Path) -> Result<Worst> {
 fn worst(program: &Program, tasks: &BTreeMap<String, u8>) -> Result<Worst> {
     let mut depths = Depths::new(program);
     let mut handlers: BTreeMap<Priority, Vec<u32>> = BTreeMap::new();
-    // The handlers have names of functions; several vectors may have one.
+    // Function names of the handlers; several vectors may share one.
     for (place, vector) in program.vectors.iter().enumerate().skip(RESET).filter(|(_, vector)| **vector != 0) {
         let address = vector & !1;
         let task = tasks.get(&depths.name(address)?);
@@ -124,7 +125,7 @@ fn worst(program: &Program, tasks: &BTreeMap<String, u8>) -> Result<Worst> {
     }
     let missing: Vec<_> =
         tasks.keys().filter(|task| !program.functions.values().any(|function| function.name == **task)).collect();
-    ensure!(missing.is_empty(), "no functions are the tasks {missing:?}");
+    ensure!(missing.is_empty(), "no functions match the tasks {missing:?}");
     let stacked = 4 * if program.has_fpu { FPU_FRAME_WORDS } else { FRAME_WORDS };
     let mut levels = Vec::new();
     for (priority, handlers) in handlers {
@@ -141,14 +142,14 @@ fn worst(program: &Program, tasks: &BTreeMap<String, u8>) -> Result<Worst> {
     Ok(Worst { levels, room, by_pointer, pointed_to, frames })
 }
 
-/// The priorities of the application's tasks, by the handlers that they are bound to, as its source gives them to RTIC.
+/// Returns the priorities of the application's tasks, by their handlers, as its source declares them to RTIC.
 fn tasks() -> Result<BTreeMap<String, u8>> {
     let path = root().join("firmware-demo/src/bin/controller/main.rs");
     let source = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
     bound(&source).with_context(|| path.display().to_string())
 }
 
-/// As [`tasks`], of a source. RTIC's own default is priority 1.
+/// Does the same as [`tasks`] for a source text. RTIC's default is priority 1.
 fn bound(source: &str) -> Result<BTreeMap<String, u8>> {
     let mut tasks = BTreeMap::new();
     for attribute in source.split("#[task(").skip(1).filter_map(|rest| rest.split_once(")]")).map(|(text, _)| text) {
@@ -157,10 +158,10 @@ fn bound(source: &str) -> Result<BTreeMap<String, u8>> {
                 |part: &str| part.trim().strip_prefix(key)?.trim().strip_prefix('=').map(str::trim).map(str::to_owned);
             attribute.split(',').find_map(of_key)
         };
-        let handler = value("binds").with_context(|| format!("#[task({attribute})] is bound to no handler"))?;
+        let handler = value("binds").with_context(|| format!("#[task({attribute})] has no `binds = HANDLER`"))?;
         let priority = value("priority").map_or(Ok(1), |priority| priority.parse())?;
         tasks.insert(handler, priority);
     }
-    ensure!(!tasks.is_empty(), "there are no tasks");
+    ensure!(!tasks.is_empty(), "the source has no tasks");
     Ok(tasks)
 }

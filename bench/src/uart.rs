@@ -1,10 +1,10 @@
-//! The UR3's arm, driven by the application in QEMU through its serial port, with faults on the line: what the
-//! controller does about each, and how soon.
+//! Drives the UR3 arm with the application in QEMU through its serial port, with faults on the line: how the controller
+//! reacts to each fault, and how soon.
 //!
-//! The arm moves by the controller's own clock. It is told the outputs' state and what they are led to by what the
-//! controller says, which is heard at the board, before any fault. The rate limit and the safe action are the
-//! application's, computed here once more. A host at the other end of the line sends an observation every 20 ms, and
-//! arms again where it reads that the controller has stopped.
+//! The arm moves by the controller's own clock. It follows the state and the targets of the outputs that the controller
+//! reports, read at the board before any fault. The rate limit and the safe action repeat the application's
+//! computation. A host at the other end of the line sends an observation every 20 ms, and arms again when it reads that
+//! the controller has stopped.
 
 mod arm;
 mod bits;

@@ -1,4 +1,4 @@
-//! The deepest way through the calls.
+//! The deepest path of the call graph.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,33 +7,33 @@ use anyhow::{Context as _, Result, bail, ensure};
 use super::flow::{Callee, Frame, frame};
 use super::program::Program;
 
-/// How deep the stack goes below the caller of a function.
+/// Stack depth below the caller of a function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Deepest {
     /// Bytes.
     bytes: u32,
-    /// What is called there, at how many bytes, and by what, if anything is.
+    /// Its deepest callee, if any, with the bytes at the call and the kind of call.
     call: Option<(u32, u32, Callee)>,
 }
 
-/// A function on the deepest way.
+/// A function on the deepest path.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Call {
     /// Its name.
     pub function: String,
-    /// Bytes of its frame, where it calls the next one of the way; all of it in the last one.
+    /// Bytes of its frame at the call of the next function; the whole frame of the last one.
     pub frame: u32,
-    /// Whether the next one is called by a pointer.
+    /// `true` if it calls the next one by a pointer.
     pub by_pointer: bool,
 }
 
-/// The stack of all functions that are asked for.
+/// The stack of all requested functions.
 pub(super) struct Depths<'p> {
     program: &'p Program,
-    /// What a pointer may point to.
+    /// Functions that a pointer may point to.
     taken: BTreeSet<u32>,
     frames: BTreeMap<u32, Frame>,
-    /// `None` while a function's callees are looked at.
+    /// `None` while the callees of a function are visited.
     deepest: BTreeMap<u32, Option<Deepest>>,
 }
 
@@ -42,17 +42,17 @@ impl<'p> Depths<'p> {
         Self { program, taken: program.taken(), frames: BTreeMap::new(), deepest: BTreeMap::new() }
     }
 
-    /// Bytes of stack that a function takes with all that it calls. An error names a function that calls itself, one
-    /// that is not understood, or an address without a function.
+    /// Computes the bytes of stack of a function with all its callees. An error names a recursive function, one that is
+    /// not understood, or an address without a function.
     pub(super) fn of(&mut self, address: u32) -> Result<u32> {
         let name = self.name(address)?;
         match self.deepest.get(&address) {
             Some(Some(deepest)) => return Ok(deepest.bytes),
-            Some(None) => bail!("{name} calls itself: its stack has no bound"),
+            Some(None) => bail!("{name} is recursive: its stack has no bound"),
             None => {}
         }
         let function = &self.program.functions[&address];
-        let own = frame(self.program, function).with_context(|| format!("the stack of {name}"))?;
+        let own = frame(self.program, function).with_context(|| format!("cannot compute the stack of {name}"))?;
         self.deepest.insert(address, None);
         let mut deepest = Deepest { bytes: own.bytes, call: None };
         for (callee, at) in &own.calls {
@@ -73,7 +73,7 @@ impl<'p> Depths<'p> {
         Ok(deepest.bytes)
     }
 
-    /// The deepest way from a function down.
+    /// Returns the deepest path from a function down.
     pub(super) fn path(&mut self, address: u32) -> Result<Vec<Call>> {
         let (mut path, mut next) = (Vec::new(), Some(address));
         while let Some(address) = next {
@@ -87,20 +87,20 @@ impl<'p> Depths<'p> {
         Ok(path)
     }
 
-    /// The functions that call by pointers, and those that pointers may point to.
+    /// Returns the functions that call by pointers, and those that pointers may point to.
     pub(super) fn pointers(&self) -> Result<[Vec<String>; 2]> {
         let calling = self.frames.iter().filter(|(_, frame)| frame.calls.contains_key(&Callee::Pointer));
         let calling = calling.map(|(address, _)| self.name(*address)).collect::<Result<_>>()?;
         Ok([calling, self.taken.iter().map(|address| self.name(*address)).collect::<Result<_>>()?])
     }
 
-    /// Bytes of every function's own frame, by its address.
+    /// Returns the bytes of every function's own frame, by its address.
     pub(super) fn frames(&self) -> impl Iterator<Item = (u32, u32)> {
         self.frames.iter().map(|(address, frame)| (*address, frame.bytes))
     }
 
     pub(super) fn name(&self, address: u32) -> Result<String> {
         let function = self.program.functions.get(&address);
-        Ok(function.with_context(|| format!("no function begins at {address:#x}, which is called"))?.name.clone())
+        Ok(function.with_context(|| format!("a call goes to {address:#x}, where no function begins"))?.name.clone())
     }
 }

@@ -1,4 +1,4 @@
-//! How deep a function's own stack is, and how deep it is where it calls, by following its instructions on all ways.
+//! The depth of a function's own stack, in total and at its calls, found by following its instructions on all paths.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,13 +11,13 @@ use crate::instruction::{Class, Instruction};
 /// Registers that a call may change: r0 to r3, r12 and the link register (AAPCS).
 const CHANGED: u32 = 0x500f;
 
-/// What an assembler fills words with, where it does not take 0.
+/// The filler of an assembler for words, unless it is 0.
 const NOP: u16 = 0xbf00;
 
-/// Bytes before a choice from branches in which their address is taken.
+/// Bytes before a computed branch in which the address of the branches is taken.
 const ADDRESSED: u32 = 32;
 
-/// The register and the address that ADR takes.
+/// Returns the register and the address of ADR.
 fn address_of(at: u32, first: u16, second: u16) -> Option<(u32, u32)> {
     let pc = at.wrapping_add(4) & !3;
     let [first, second] = [first, second].map(u32::from);
@@ -30,37 +30,37 @@ fn address_of(at: u32, first: u16, second: u16) -> Option<(u32, u32)> {
     }
 }
 
-/// What a function calls.
+/// The target of a call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Callee {
     /// The function at an address.
     Function(u32),
-    /// What a pointer points to.
+    /// Anything that a pointer points to.
     Pointer,
 }
 
 /// A function's stack.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Frame {
-    /// Bytes, at most.
+    /// Maximum, bytes.
     pub(super) bytes: u32,
-    /// Bytes at the calls of each function, at most.
+    /// Maximum bytes at the calls of each function.
     pub(super) calls: BTreeMap<Callee, u32>,
 }
 
-/// What is known before an instruction.
+/// The known state before an instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct State {
-    /// Bytes of stack.
+    /// Depth of the stack, bytes.
     depth: i32,
     /// The registers that hold the return address.
     link: u32,
-    /// The flag Z.
+    /// The flag Z, if known.
     zero: Option<bool>,
 }
 
-/// Follows a function from its begin. An error says which instruction is not understood, or which two ways contradict
-/// each other.
+/// Follows a function from its begin. An error names the unknown instruction, or the two paths that contradict each
+/// other.
 pub(super) fn frame(program: &Program, function: &Function) -> Result<Frame> {
     let mut walk = Walk {
         program,
@@ -85,17 +85,16 @@ struct Walk<'p> {
     program: &'p Program,
     function: &'p Function,
     frame: Frame,
-    /// What is known where ways come to. A kernel may have more on its stack where the flag Z is set: these are two
-    /// places.
+    /// The known state at each place. A kernel may have more on its stack when the flag Z is set: these are two places.
     known: BTreeMap<(u32, Option<bool>), State>,
-    /// Places from which the ways have still to be followed.
+    /// Places whose successors are still to be followed.
     left: Vec<(u32, Option<bool>)>,
-    /// Addresses of the instructions that were looked at.
+    /// Addresses of the visited instructions.
     reached: BTreeSet<u32>,
 }
 
 impl Walk<'_> {
-    /// A way comes to an instruction.
+    /// Adds a path that reaches an instruction.
     fn meet(&mut self, at: u32, state: State) -> Result<()> {
         let place = (at, state.zero);
         let before = self.known.get(&place).copied();
@@ -118,7 +117,7 @@ impl Walk<'_> {
         at.wrapping_sub(self.function.address) < self.function.size && self.program.is_code(at)
     }
 
-    /// Where execution may go on behind an instruction, and with what.
+    /// Returns the successors of an instruction, and the state at each.
     fn step(&mut self, at: u32, state: State) -> Result<Vec<(u32, State)>> {
         let [first, second] = self.halves(at)?;
         let instruction = Instruction::decode(first, second);
@@ -142,8 +141,8 @@ impl Walk<'_> {
             Step::Stack(bytes) => {
                 after.depth += bytes;
                 ensure!(after.depth >= 0, "{at:#x} pops what the function has not pushed");
-                // The caller's return address is what a function pushes of the link register, and so what it pops to
-                // it.
+                // A function pushes the caller's return address from the link register, and so pops it to that
+                // register.
                 if bytes < 0 && instruction.writes >> LR & 1 == 1 {
                     after.link |= 1 << LR;
                 }
@@ -151,7 +150,8 @@ impl Walk<'_> {
                 vec![(next, after)]
             }
             Step::SetStack(register) => {
-                // What ends the program begins the stack anew. As if it went on where it was, which is no less.
+                // Code that ends the program resets the stack. Treat it as if it continued at its depth, which is not
+                // less.
                 let begin = self.program.symbol("_stack_start")?;
                 let set = self.constant_before(at, register);
                 ensure!(set == Some(begin), "{at:#x} sets the stack pointer, not to the stack's begin");
@@ -186,7 +186,7 @@ impl Walk<'_> {
                 let callee = if let Step::Call(to) = step { Callee::Function(to) } else { Callee::Pointer };
                 self.call(callee, state);
                 after = State { link: after.link & !CHANGED, zero: None, ..after };
-                // Where no code follows, the callee does not return.
+                // If no code follows, the callee does not return.
                 if self.holds(next) { vec![(next, after)] } else { Vec::new() }
             }
             Step::Return(bytes) => self.end(at, State { depth: state.depth - bytes, ..state })?,
@@ -200,7 +200,7 @@ impl Walk<'_> {
         *depth = (*depth).max(state.depth as u32);
     }
 
-    /// A branch: inside of the function, or a call in place of a return.
+    /// Handles a branch: inside the function, or a tail call.
     fn jump(&mut self, to: u32, state: State) -> Vec<(u32, State)> {
         if to.wrapping_sub(self.function.address) < self.function.size {
             return vec![(to, state)];
@@ -214,17 +214,17 @@ impl Walk<'_> {
         Ok(Vec::new())
     }
 
-    /// The ways through the instructions behind IT: where the condition holds, and where it does not.
+    /// Follows the paths through the instructions after IT: with the condition true, and with it false.
     fn conditional(&mut self, begin: u32, state: State, mask: u32, condition: u32) -> Result<Vec<(u32, State)>> {
         let count = 4 - mask.trailing_zeros();
         let mut ways = Vec::new();
         'ways: for holds in [true, false] {
-            // Here, and only here, MOVS and others do not set the flags.
+            // Only here MOVS and others do not set the flags.
             let (mut at, mut state, mut compared) = (begin, State { zero: None, ..state }, false);
             for i in 0..count {
                 let [first, second] = self.halves(at)?;
                 let instruction = Instruction::decode(first, second);
-                // The first is executed where the condition holds, another one where its bit of the mask is the
+                // The first is executed if the condition is true, each other one if its bit of the mask equals the
                 // condition's.
                 let executed = (i == 0 || mask >> (4 - i) & 1 == condition) == holds;
                 let step = Step::decode(at, first, second);
@@ -250,7 +250,7 @@ impl Walk<'_> {
         Ok(ways)
     }
 
-    /// Where the table behind TBB or TBH leads: it ends where the code goes on, and before what it leads to.
+    /// Returns the targets of the table after TBB or TBH: it ends where code begins, and before its first target.
     fn table(&self, at: u32, size: u32) -> Result<BTreeSet<u32>> {
         let begin = at + 4;
         let end = self.program.data_end(begin).filter(|_| !self.program.is_code(begin));
@@ -272,13 +272,13 @@ impl Walk<'_> {
         Ok(targets)
     }
 
-    /// The addresses of the branches, four bytes each, that stand from `begin` on, where a word begins, and of which
-    /// `register` has one's address. Behind the last of them may stand one that is none of them; its way exists, too.
+    /// Returns the addresses of the branches, four bytes each, from `begin` on, at a word boundary, one of whose
+    /// addresses `register` holds. The last of them may be followed by an unrelated branch; its path exists, too.
     fn branches(&self, at: u32, register: u32, begin: u32) -> Result<Vec<u32>> {
         let before: Vec<(u32, [u16; 2])> = (self.reached.range(at.saturating_sub(ADDRESSED)..at))
             .filter_map(|&before| Some((before, self.program.halves(before)?)))
             .collect();
-        // ADD of a register, shifted by 2, to the address that ADR took.
+        // ADD of a register, shifted by 2, to the address from ADR.
         let is_addressed = before.iter().any(|&(place, [first, second])| {
             address_of(place, first, second).is_some_and(|(to, address)| {
                 let added = [0xeb00 | to, register << 8 | 0x80];
@@ -298,7 +298,7 @@ impl Walk<'_> {
         Ok(entries)
     }
 
-    /// What MOVW and MOVT have put into a register, right before an instruction.
+    /// Returns the constant that MOVW and MOVT have put into a register, right before an instruction.
     fn constant_before(&self, at: u32, register: u32) -> Option<u32> {
         let half = |before| self.program.halves(at - before).and_then(Half::decode);
         let (low, high) = (half(8)?, half(4)?);
@@ -306,13 +306,13 @@ impl Walk<'_> {
         fit.then_some(high.value << 16 | low.value)
     }
 
-    /// No code of the function was left out, but what fills a word: the ways that were followed are all.
+    /// Checks that all code of the function was visited, except word fillers.
     fn all_is_reached(&self) -> Result<()> {
         let mut at = self.function.address;
         while at < self.function.address + self.function.size {
             let size = match self.program.halves(at) {
                 Some([first, second]) if self.program.is_code(at) => {
-                    // The compiler puts UDF behind what does not return.
+                    // The compiler puts UDF after a call that does not return.
                     let fills = matches!(first, NOP | 0) || Step::decode(at, first, second) == Step::Trap;
                     ensure!(self.reached.contains(&at) || fills, "{at:#x} is not reached: a way into it is missing");
                     Instruction::decode(first, second).size as u32

@@ -1,4 +1,4 @@
-//! What an ELF file says of a program, as far as its stack depends on it.
+//! The parts of an ELF file that determine the stack of its program.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -11,8 +11,8 @@ use object::{FileFlags, Object as _, ObjectSection as _, ObjectSymbol as _, Sect
 /// The section of the vector table, whose addresses the processor calls.
 const VECTORS: &str = ".vector_table";
 
-/// The image that is built in (`firmware-demo/src/bin/controller/start.rs`): it holds no addresses, and a hundred
-/// thousand bytes that may look like some.
+/// The built-in image (`firmware-demo/src/bin/controller/start.rs`): it holds no addresses, and a hundred thousand
+/// bytes that may look like some.
 const IMAGE: &str = "controller::start::BUILT_IN";
 
 /// A function.
@@ -22,33 +22,33 @@ pub(super) struct Function {
     pub(super) name: String,
     /// Address, without the Thumb bit.
     pub(super) address: u32,
-    /// Bytes.
+    /// Size, bytes.
     pub(super) size: u32,
 }
 
 /// A program.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Program {
-    /// Bytes by address: code, constants and initial values.
+    /// Memory content by address: code, constants and initial values.
     pub(super) memory: Vec<(u32, Vec<u8>)>,
     /// Functions by address.
     pub(super) functions: BTreeMap<u32, Function>,
-    /// Where code (true) and where data among it begins: the mapping symbols of Arm's ELF (IHI 0044, section 5.5.5).
+    /// Begins of code (true) and of data within it: the mapping symbols of Arm's ELF (IHI 0044, section 5.5.5).
     pub(super) marks: BTreeMap<u32, bool>,
-    /// The addresses of what holds no pointers.
+    /// Address ranges without pointers.
     pub(super) weights: Range<u32>,
-    /// Symbols of the linker's script.
+    /// Symbols of the linker script.
     pub(super) symbols: BTreeMap<String, u32>,
     /// The vector table: the stack's begin, then the addresses of the handlers, with the Thumb bit.
     pub(super) vectors: Vec<u32>,
-    /// Whether floats are passed in the FPU's registers.
+    /// `true` if FPU registers pass floats.
     pub(super) has_fpu: bool,
 }
 
 impl Program {
     /// Reads an ELF file.
     pub(super) fn read(path: &Path) -> Result<Self> {
-        let data = std::fs::read(path).with_context(|| format!("{}: cannot be read", path.display()))?;
+        let data = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
         let file = object::File::parse(&*data).with_context(|| format!("{}: not an ELF file", path.display()))?;
         let mut program = Self::default();
         for section in file.sections() {
@@ -65,7 +65,7 @@ impl Program {
             let demangled = format!("{:#}", rustc_demangle::demangle(name));
             if symbol.kind() == SymbolKind::Text {
                 let (name, address) = (demangled, address & !1);
-                // Several names of one function: the one that has its size.
+                // A function may have several names: take the one with its size.
                 if size > 0 || !program.functions.contains_key(&address) {
                     program.functions.insert(address, Function { name, address, size });
                 }
@@ -82,7 +82,7 @@ impl Program {
         Ok(program)
     }
 
-    /// Bytes at an address.
+    /// Returns the bytes at an address.
     pub(super) fn bytes<const N: usize>(&self, address: u32) -> Option<[u8; N]> {
         self.memory.iter().find_map(|(start, bytes)| {
             let at = address.checked_sub(*start)? as usize;
@@ -90,32 +90,32 @@ impl Program {
         })
     }
 
-    /// The halfword at an address, and the one behind it, or 0.
+    /// Returns the halfword at an address, and the next one, or 0.
     pub(super) fn halves(&self, address: u32) -> Option<[u16; 2]> {
         let half = |address| Some(u16::from_le_bytes(self.bytes(address)?));
         Some([half(address)?, half(address.wrapping_add(2)).unwrap_or(0)])
     }
 
-    /// Whether an address is one of a function's code.
+    /// Returns `true` for an address in a function's code.
     pub(super) fn is_code(&self, address: u32) -> bool {
         let function = self.functions.range(..=address).next_back();
         function.is_some_and(|(start, function)| address - start < function.size)
             && self.marks.range(..=address).next_back().is_some_and(|(_, is_code)| *is_code)
     }
 
-    /// Where the data ends that begins at an address or before.
+    /// Returns the end of the data that begins at an address or before it.
     pub(super) fn data_end(&self, address: u32) -> Option<u32> {
         self.marks.range(address + 1..).find(|(_, is_code)| **is_code).map(|(end, _)| *end)
     }
 
-    /// A symbol of the linker's script.
+    /// Returns a symbol of the linker script.
     pub(super) fn symbol(&self, name: &str) -> Result<u32> {
         self.symbols.get(name).copied().with_context(|| format!("the ELF file has no symbol {name}"))
     }
 
-    /// What a pointer of the program may point to: every function whose address stands among constants or initial
-    /// values, or is made by a function's MOVW and MOVT of one register. The vector table's functions are the
-    /// processor's.
+    /// Returns the possible targets of a pointer: every function whose address occurs among constants or initial
+    /// values, or is built by a function's MOVW and MOVT of one register. Functions of the vector table belong to the
+    /// processor.
     pub(super) fn taken(&self) -> BTreeSet<u32> {
         let mut taken = BTreeSet::new();
         let mut note = |value: u32| {
@@ -133,7 +133,7 @@ impl Program {
             }
         }
         for function in self.functions.values() {
-            // The lower half of the constant in each register: MOVT completes the one that was begun last.
+            // The lower half of the constant in each register: MOVT completes the latest one.
             let mut low = [None; 16];
             let mut at = function.address;
             while at < function.address + function.size {
@@ -150,12 +150,12 @@ impl Program {
     }
 }
 
-/// Half of a constant, by MOVW or MOVT.
+/// Half of a constant, from MOVW or MOVT.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Half {
     pub(super) register: usize,
     pub(super) value: u32,
-    /// Whether it is the upper half.
+    /// `true` for the upper half.
     pub(super) is_high: bool,
 }
 

@@ -1,5 +1,5 @@
-//! What a Thumb-2 instruction does to the stack pointer and to where execution goes on (Arm DDI 0403E, chapters A5 and
-//! A7; DDI 0553 for what Armv8-M adds).
+//! The effect of a Thumb-2 instruction on the stack pointer and on the program counter (Arm DDI 0403E, chapters A5 and
+//! A7; DDI 0553 for the additions of Armv8-M).
 
 use crate::instruction::{Class, Instruction};
 
@@ -11,58 +11,58 @@ const PC: u32 = 15;
 /// The effect of an instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Step {
-    /// None: on to the next one.
+    /// No effect: continues at the next instruction.
     Next,
-    /// The stack grows by so many bytes; where it shrinks, by fewer than none.
+    /// The stack grows by this many bytes; a negative number shrinks it.
     Stack(i32),
-    /// The main stack pointer is set to what a register holds.
+    /// A register's value becomes the main stack pointer.
     SetStack(u32),
-    /// IT: the instructions that follow are executed, or not, by this mask and the condition's last bit.
+    /// IT: this mask and the condition's last bit select which of the next instructions are executed.
     If {
         /// Bits 3 to 0 of the instruction.
         mask: u32,
         /// Bit 4.
         condition: u32,
     },
-    /// A branch that may be taken.
+    /// A conditional branch.
     Conditional {
-        /// Where to.
+        /// Target.
         to: u32,
-        /// What the flag Z is where it is taken, if that is its condition.
+        /// The flag Z when the branch is taken, if Z is its condition.
         zero: Option<bool>,
     },
-    /// A branch that is taken.
+    /// An unconditional branch.
     Branch(u32),
-    /// A branch to what a register holds: a return, or a call in place of one.
+    /// A branch to a register's value: a return or a tail call.
     BranchRegister(u32),
-    /// A branch by a table behind the instruction, whose entries have so many bytes.
+    /// A branch by a table after the instruction, with entries of this many bytes.
     Table(u32),
-    /// A branch to one of the branches behind the instruction.
+    /// A branch to one of the branches after the instruction.
     Branches,
     /// A call.
     Call(u32),
-    /// A call of what a register holds.
+    /// A call of a register's value.
     CallRegister,
-    /// The program counter is popped, with so many bytes in all.
+    /// A pop of the program counter, with this many bytes in all.
     Return(i32),
     /// UDF: a fault.
     Trap,
-    /// The stack pointer or the program counter becomes something that is not followed here.
+    /// The stack pointer or the program counter gets a value that is not followed here.
     Unknown,
 }
 
-/// Bits `low ..= high`.
+/// Extracts the bits `low ..= high`.
 fn bits(half: u16, high: u32, low: u32) -> u32 {
     (u32::from(half) >> low) & ((1 << (high - low + 1)) - 1)
 }
 
-/// Bytes of so many words.
+/// Returns the bytes of this many words.
 fn words(count: u32) -> i32 {
     4 * count as i32
 }
 
 impl Step {
-    /// Of the instruction at `address`, from its first halfword and the one that follows.
+    /// Decodes the instruction at `address`, from its first halfword and the next one.
     pub(super) fn decode(address: u32, first: u16, second: u16) -> Self {
         let pc = address.wrapping_add(4);
         let instruction = Instruction::decode(first, second);
@@ -75,12 +75,12 @@ impl Step {
     }
 }
 
-/// The flag Z where a condition holds, if it is all that the condition asks for: EQ and NE.
+/// Returns the flag Z under a condition that tests only Z: EQ and NE.
 fn equal(condition: u32) -> Option<bool> {
     (condition < 2).then_some(condition == 0)
 }
 
-/// The flag Z behind an instruction outside of IT, as far as it is known.
+/// Returns the flag Z after an instruction outside IT, if known.
 pub(super) fn zero_behind(before: Option<bool>, first: u16, second: u16) -> Option<bool> {
     let sets = match Instruction::decode(first, second) {
         Instruction { size: 2, .. } => first < 0x4600,
@@ -100,7 +100,7 @@ pub(super) fn zero_behind(before: Option<bool>, first: u16, second: u16) -> Opti
     }
 }
 
-/// An instruction of 16 bits.
+/// Decodes an instruction of 16 bits.
 fn narrow(pc: u32, half: u16) -> Option<Step> {
     let to = |offset: i32| pc.wrapping_add_signed(offset);
     let signed = |width: u32| 2 * ((u32::from(half) << (32 - width)) as i32 >> (32 - width));
@@ -126,7 +126,7 @@ fn narrow(pc: u32, half: u16) -> Option<Step> {
     })
 }
 
-/// Loads and stores of 32 bits whose address is the stack pointer.
+/// Decodes loads and stores of 32 bits whose address is the stack pointer.
 fn transfer(first: u16, second: u16) -> Option<Step> {
     let (load, write_back) = (first & 0x10 != 0, first & 0x20 != 0);
     let by = |up: bool, bytes: i32| Step::Stack(if up { -bytes } else { bytes });
@@ -135,8 +135,7 @@ fn transfer(first: u16, second: u16) -> Option<Step> {
     }
     let popped = second & 0x8000 != 0;
     Some(match first & 0xfe40 {
-        // LDM and STM. Without writing back, the stack pointer only stands in the set of what the model takes for
-        // written.
+        // LDM and STM. Without writeback, the model's set of written registers still contains the stack pointer.
         0xe800 if write_back => match (first & 0x0190, words(u32::from(second).count_ones())) {
             (0x0100, bytes) => Step::Stack(bytes),
             (0x0090, bytes) if popped => Step::Return(bytes),
@@ -147,7 +146,7 @@ fn transfer(first: u16, second: u16) -> Option<Step> {
         0xe800 => Step::Next,
         // LDRD and STRD.
         0xe840 if write_back => by(first & 0x80 != 0, words(bits(second, 7, 0))),
-        // LDR and STR with an offset of 8 bits that is written back.
+        // LDR and STR with an offset of 8 bits and writeback.
         0xf800 | 0xf840 if first & 0x80 == 0 && second & 0x0900 == 0x0900 => {
             let (up, bytes) = (second & 0x0200 != 0, bits(second, 7, 0) as i32);
             match (load && bits(second, 15, 12) == PC, up) {
@@ -166,7 +165,7 @@ fn transfer(first: u16, second: u16) -> Option<Step> {
     })
 }
 
-/// Branches of 32 bits, and what is coded beside them.
+/// Decodes branches of 32 bits, and the instructions encoded beside them.
 fn branch(pc: u32, first: u16, second: u16) -> Option<Step> {
     if first & 0xfff0 == 0xe8d0 && second & 0xffe0 == 0xf000 {
         return Some(if bits(first, 3, 0) == PC { Step::Table(1 + bits(second, 4, 4)) } else { Step::Unknown });
@@ -184,7 +183,7 @@ fn branch(pc: u32, first: u16, second: u16) -> Option<Step> {
     Some(match second & 0x5000 {
         0x5000 => Step::Call(far()),
         0x1000 => Step::Branch(far()),
-        // BLX to Arm's instruction set, which these processors do not have.
+        // BLX to Arm's instruction set, which these processors lack.
         0x4000 => Step::Unknown,
         _ if bits(first, 9, 7) < 7 => {
             let high = sign << 20 | two << 19 | one << 18;
@@ -192,7 +191,7 @@ fn branch(pc: u32, first: u16, second: u16) -> Option<Step> {
             Step::Conditional { to, zero: equal(bits(first, 9, 6)) }
         }
         _ if first & 0xfff0 == 0xf7f0 && second & 0xf000 == 0xa000 => Step::Trap,
-        // MSR: the main stack's pointer; the process stack's, and which of them is in use.
+        // MSR: the main stack pointer; the process stack pointer, and the choice between them.
         _ if first & 0xfff0 == 0xf380 => match bits(second, 7, 0) {
             8 => Step::SetStack(bits(first, 3, 0)),
             9 | 20 => Step::Unknown,
@@ -202,7 +201,7 @@ fn branch(pc: u32, first: u16, second: u16) -> Option<Step> {
     })
 }
 
-/// ADD and SUB of a constant to the stack pointer.
+/// Decodes ADD and SUB of a constant to the stack pointer.
 fn adjust(first: u16, second: u16) -> Option<Step> {
     if second & 0x8f00 != 0x0d00 || bits(first, 3, 0) != SP {
         return None;
@@ -210,7 +209,7 @@ fn adjust(first: u16, second: u16) -> Option<Step> {
     let plain = bits(first, 10, 10) << 11 | bits(second, 14, 12) << 8 | bits(second, 7, 0);
     let bytes = match (first & 0xfbe0, plain) {
         (0xf200 | 0xf2a0, _) | (0xf100 | 0xf1a0, 0..0x100) => plain as i32,
-        // Bytes that are repeated are no frame's size.
+        // A constant of repeated bytes is no frame size.
         (0xf100 | 0xf1a0, 0x400..) => i32::try_from((0x80 | plain & 0x7f).rotate_right(plain >> 7)).ok()?,
         _ => return None,
     };
@@ -249,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn what_only_uses_the_stack_pointer_leaves_it() {
+    fn uses_of_the_stack_pointer_leave_it_unchanged() {
         check([0xf1ad, 0x0008], Step::Next); // sub.w r0, sp, #8
         check([0x46ec, 0], Step::Next); // mov r12, sp
         check([0xe88d, 0x5140], Step::Next); // stm.w sp, {r6, r8, r12, lr}
@@ -260,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_followed_is_unknown() {
+    fn unsupported_changes_are_unknown() {
         check([0xebad, 0x0d00], Step::Unknown); // sub.w sp, sp, r0
         check([0x46bd, 0], Step::Unknown); // mov sp, r7
         check([0x4485, 0], Step::Unknown); // add sp, r0
@@ -273,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn execution_goes_on_where_the_encoding_says() {
+    fn branches_and_calls_follow_the_encoding() {
         check([0xd0fe, 0], Step::Conditional { to: AT, zero: Some(true) }); // beq.n
         check([0xd1f7, 0], Step::Conditional { to: AT - 14, zero: Some(false) }); // bne.n
         check([0xd3fe, 0], Step::Conditional { to: AT, zero: None }); // blo.n
@@ -300,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn the_flag_z_is_known_behind_constants_alone() {
+    fn flag_z_is_known_only_after_constants() {
         for before in [None, Some(false), Some(true)] {
             let behind = |first, second| zero_behind(before, first, second);
             assert_eq!([behind(0x2401, 0), behind(0x2400, 0)], [Some(false), Some(true)]); // movs

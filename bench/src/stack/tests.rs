@@ -1,4 +1,4 @@
-//! The analysis on programs of a few instructions, whose functions stand 256 bytes apart.
+//! Tests of the analysis on programs of a few instructions, with functions 256 bytes apart.
 
 use super::depth::Depths;
 use super::flow::{Callee, frame};
@@ -14,12 +14,12 @@ const BLX_R3: u16 = 0x4798;
 const BX_R3: u16 = 0x4718;
 const NOP: u16 = 0xbf00;
 
-/// The address of a function.
+/// Returns the address of a function.
 const fn at(function: u32) -> u32 {
     0x1000 + 0x100 * function
 }
 
-/// BL (`link`) or B.W at an address.
+/// Encodes BL (`link`) or B.W at an address.
 fn far(from: u32, to: u32, link: bool) -> [u16; 2] {
     let offset = to.wrapping_sub(from + 4);
     let [sign, one, two] = [24, 23, 22].map(|bit| (offset >> bit & 1) as u16);
@@ -28,7 +28,7 @@ fn far(from: u32, to: u32, link: bool) -> [u16; 2] {
     [high, jump | (1 ^ one ^ sign) << 13 | (1 ^ two ^ sign) << 11 | (offset >> 1 & 0x7ff) as u16]
 }
 
-/// A program of functions `f0`, `f1` and so on.
+/// Builds a program of functions `f0`, `f1` and so on.
 fn program(functions: &[&[u16]]) -> Program {
     let mut program = Program::default();
     for (i, halves) in functions.iter().enumerate() {
@@ -41,7 +41,7 @@ fn program(functions: &[&[u16]]) -> Program {
     program
 }
 
-/// A function with so many bytes of stack that calls nothing.
+/// Returns a function with this many bytes of stack that calls nothing.
 fn leaf(bytes: u16) -> [u16; 3] {
     let words = bytes / 4;
     [0xb080 | words, 0xb000 | words, BX_LR]
@@ -58,7 +58,8 @@ fn refused(halves: &[u16]) -> String {
 
 type Named = (String, u32, bool);
 
-/// The stack of the first function, and its deepest way: names, bytes, and whether the next one is called by a pointer.
+/// Returns the stack of the first function, and its deepest path: names, bytes, and `true` for a call of the next one
+/// by a pointer.
 fn path(program: &Program) -> Result<(u32, Vec<Named>)> {
     let mut depths = Depths::new(program);
     let calls = depths.path(at(0))?.into_iter().map(|call| (call.function, call.frame, call.by_pointer)).collect();
@@ -66,18 +67,18 @@ fn path(program: &Program) -> Result<(u32, Vec<Named>)> {
 }
 
 #[test]
-fn a_frame_is_the_deepest_of_all_ways() -> Result<()> {
-    // cbz r0: one way takes 8 bytes more, and gives them back.
+fn a_frame_is_the_deepest_of_all_paths() -> Result<()> {
+    // cbz r0: one path takes 8 more bytes, and returns them.
     assert_eq!(frame_of(&[PUSH_R4_LR, 0xb108, SUB_SP_8, ADD_SP_8, POP_R4_PC])?, 16);
-    // Stored and loaded one by one, and floats: str r8, [sp, #-4]!; vpush {d8}; vpop {d8}; ldr r8, [sp], #4.
+    // Single stores and loads, and floats: str r8, [sp, #-4]!; vpush {d8}; vpop {d8}; ldr r8, [sp], #4.
     assert_eq!(frame_of(&[0xf84d, 0x8d04, 0xed2d, 0x8b02, 0xecbd, 0x8b02, 0xf85d, 0x8b04, BX_LR])?, 12);
-    // A loop without an end.
+    // An endless loop.
     assert_eq!(frame_of(&[SUB_SP_8, 0xe7fe])?, 8);
     Ok(())
 }
 
 #[test]
-fn a_choice_from_branches_goes_all_their_ways() -> Result<()> {
+fn a_computed_branch_follows_all_its_branches() -> Result<()> {
     // adr r0, the first branch; add.w r0, r0, r1, lsl #2; mov pc, r0
     let choice = [0xa001, 0xeb00, 0x0081, 0x4687];
     let [first, second] = [far(at(0) + 8, at(0) + 16, false), far(at(0) + 12, at(0) + 22, false)];
@@ -89,8 +90,8 @@ fn a_choice_from_branches_goes_all_their_ways() -> Result<()> {
 }
 
 #[test]
-fn instructions_behind_it_are_executed_together_or_not_at_all() -> Result<()> {
-    // itt ne: addne sp, #8; popne {r4, pc}. Then as without.
+fn instructions_after_it_share_one_condition() -> Result<()> {
+    // itt ne: addne sp, #8; popne {r4, pc}. Then the same without IT.
     let code = [PUSH_R4_LR, SUB_SP_8, 0xbf1c, ADD_SP_8, POP_R4_PC, SUB_SP_8, 0xb004, POP_R4_PC];
     assert_eq!(frame_of(&code)?, 24);
     // ite eq: subeq sp, #8; subne sp, #8.
@@ -103,8 +104,8 @@ fn instructions_behind_it_are_executed_together_or_not_at_all() -> Result<()> {
 }
 
 #[test]
-fn ways_that_contradict_each_other_are_refused() {
-    // cbz r0 leaves the 8 bytes out.
+fn contradicting_paths_are_refused() {
+    // cbz r0 skips the 8 bytes.
     assert_eq!(
         refused(&[0xb100, SUB_SP_8, NOP, ADD_SP_8, BX_LR]),
         "0x1004 is reached with 0 and with 8 bytes of stack"
@@ -118,10 +119,10 @@ fn ways_that_contradict_each_other_are_refused() {
     assert_eq!(refused(&[SUB_SP_8]), "0x1002 is reached, where no code of the function is");
 }
 
-/// As in the kernels that take groups in pairs: movs r4, #1; b; stmdb sp!, {r2, r7-r9}; cmp.w r0, r0; bne; ldmia sp!,
+/// Like the kernels that take groups in pairs: movs r4, #1; b; stmdb sp!, {r2, r7-r9}; cmp.w r0, r0; bne; ldmia sp!,
 /// {r2, r7-r9}.
 #[test]
-fn ways_with_the_flag_z_and_without_are_told_apart() -> Result<()> {
+fn paths_with_and_without_flag_z_stay_apart() -> Result<()> {
     let mut code = [0x2401, 0xe003, 0xe92d, 0x0384, 0xebb0, 0x0f00, 0xd1fa, 0xe8bd, 0x0384, BX_LR];
     assert_eq!(frame_of(&code)?, 16);
     code[0] = 0x2c00; // cmp r4, #0
@@ -130,14 +131,14 @@ fn ways_with_the_flag_z_and_without_are_told_apart() -> Result<()> {
 }
 
 #[test]
-fn tables_lead_to_all_their_entries() -> Result<()> {
-    // tbb [pc, r0] by 2, 3 and 4, and what fills the last word.
+fn all_entries_of_a_table_are_followed() -> Result<()> {
+    // tbb [pc, r0] by 2, 3 and 4, and the filler of the last word.
     let mut program = program(&[&[0xe8df, 0xf000, 0x0302, 0x0004, BX_LR, BX_LR, BX_LR]]);
     program.marks.extend([(0x1004, false), (0x1008, true)]);
     let f0 = &program.functions[&at(0)];
     assert_eq!(frame(&program, f0)?.bytes, 0);
     program.memory[0].1[6] = 9;
-    assert!(frame(&program, f0).is_err(), "it leads behind the function");
+    assert!(frame(&program, f0).is_err(), "it leads beyond the function");
     program.memory[0].1[6] = 3;
     assert!(format!("{:#}", frame(&program, f0).expect_err("an entry is missing")).contains("0x100c is not reached"));
     program.marks.clear();
@@ -147,9 +148,9 @@ fn tables_lead_to_all_their_entries() -> Result<()> {
 }
 
 #[test]
-fn calls_and_branches_out_are_calls_at_their_depth() -> Result<()> {
+fn calls_and_tail_calls_count_at_their_depth() -> Result<()> {
     let [call, jump] = [far(at(0) + 4, at(1), true), far(at(0) + 12, at(2), false)];
-    // pop.w {r4, lr}; b.w: the second callee takes the place of the first.
+    // pop.w {r4, lr}; b.w: the second callee replaces the first.
     let f0 = [PUSH_R4_LR, NOP, call[0], call[1], 0xe8bd, 0x4010, jump[0], jump[1]];
     let program = program(&[&f0, &[SUB_SP_8, ADD_SP_8, BX_LR], &[0xb085, 0xb005, BX_LR]]);
     let frame = frame(&program, &program.functions[&at(0)])?;
@@ -160,7 +161,7 @@ fn calls_and_branches_out_are_calls_at_their_depth() -> Result<()> {
 }
 
 #[test]
-fn a_callee_that_does_not_return_ends_the_way() -> Result<()> {
+fn a_callee_that_never_returns_ends_the_path() -> Result<()> {
     let [one, two] = far(at(0) + 2, at(1), true);
     let program = program(&[&[SUB_SP_8, one, two], &[0xe7fe]]);
     assert_eq!(path(&program)?.0, 8);
@@ -168,7 +169,7 @@ fn a_callee_that_does_not_return_ends_the_way() -> Result<()> {
 }
 
 #[test]
-fn a_pointer_may_point_to_all_whose_address_is_taken() -> Result<()> {
+fn pointers_reach_every_function_with_a_taken_address() -> Result<()> {
     let f0 = [PUSH_R4_LR, BLX_R3, POP_R4_PC];
     let mut by_constant = program(&[&f0, &leaf(16), &leaf(32), &leaf(64)]);
     let told = format!("{:#}", path(&by_constant).expect_err("there is nothing to point to"));
@@ -193,21 +194,21 @@ fn a_pointer_may_point_to_all_whose_address_is_taken() -> Result<()> {
 fn recursion_is_refused() {
     let [one, two] = far(at(0) + 2, at(1), true);
     let [back, to] = far(at(1) + 2, at(0), true);
-    let circle = program(&[&[PUSH_R4_LR, one, two, POP_R4_PC], &[PUSH_R4_LR, back, to, POP_R4_PC]]);
-    let told = format!("{:#}", path(&circle).expect_err("it calls itself"));
-    assert_eq!(told, "called by f0: called by f1: f0 calls itself: its stack has no bound");
+    let cycle = program(&[&[PUSH_R4_LR, one, two, POP_R4_PC], &[PUSH_R4_LR, back, to, POP_R4_PC]]);
+    let told = format!("{:#}", path(&cycle).expect_err("it is recursive"));
+    assert_eq!(told, "called by f0: called by f1: f0 is recursive: its stack has no bound");
     let mut by_pointer = program(&[&[PUSH_R4_LR, BLX_R3, POP_R4_PC]]);
     by_pointer.memory.push((0x8000, (at(0) | 1).to_le_bytes().to_vec()));
-    assert!(format!("{:#}", path(&by_pointer).expect_err("it may call itself")).contains("f0 calls itself"));
+    assert!(format!("{:#}", path(&by_pointer).expect_err("it may be recursive")).contains("f0 is recursive"));
     let [one, two] = far(at(0), 0x5000, true);
     let nowhere = program(&[&[one, two, BX_LR]]);
     let told = format!("{:#}", path(&nowhere).expect_err("there is nothing"));
-    assert!(told.contains("no function begins at 0x5000, which is called"), "{told}");
+    assert!(told.contains("a call goes to 0x5000, where no function begins"), "{told}");
 }
 
-/// The stack's begin is where what ends the program may set the pointer, and nowhere else.
+/// Code that ends the program may reset the pointer to the stack's begin, and to nothing else.
 #[test]
-fn the_stack_may_begin_anew() -> Result<()> {
+fn the_stack_pointer_may_be_reset() -> Result<()> {
     // sub sp, #8; movw r2, #0x8000; movt r2, #0x2000; msr msp, r2; sub sp, #8; b .
     let mut program = program(&[&[SUB_SP_8, 0xf248, 0x0200, 0xf2c2, 0x0200, 0xf382, 0x8808, SUB_SP_8, 0xe7fe]]);
     program.symbols.insert("_stack_start".to_owned(), 0x2000_8000);
@@ -245,7 +246,7 @@ fn every_priority_adds_its_deepest_handler() -> Result<()> {
 }
 
 #[test]
-fn priorities_are_those_of_the_source() -> Result<()> {
+fn task_priorities_come_from_the_source() -> Result<()> {
     assert_eq!(tasks()?, [("SERIAL".to_owned(), 2), ("SysTick".to_owned(), 3)].into());
     assert_eq!(bound("#[task(binds = UART0, local = [x])]")?, [("UART0".to_owned(), 1)].into());
     assert!(bound("#[task(priority = 1)]").is_err());

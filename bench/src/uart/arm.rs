@@ -8,14 +8,14 @@ use actq_ur3::task::{CONTROL_HZ, Outcome, Task};
 /// Ticks of the controller in a control step of the arm: 20 ms.
 pub(crate) const TICKS: u32 = 1000 / CONTROL_HZ as u32;
 
-/// Joint velocities as the outputs drive them. A drive that is off stands still: its brake closes.
+/// Joint velocities that the outputs command. A disabled drive stands still: its brake closes.
 pub(crate) struct Arm {
     pub(crate) task: Task,
     pub(crate) state: State,
     pub(crate) target: [f32; ACT_DIM],
     axes: [Axis; ACT_DIM],
     outputs: [f32; ACT_DIM],
-    /// Sum of the outputs over the ticks since the last control step, and how many.
+    /// Sum of the outputs since the last control step, and number of ticks.
     driven: ([f32; ACT_DIM], u32),
 }
 
@@ -31,22 +31,22 @@ impl Arm {
         }
     }
 
-    /// Another episode; the outputs stay as they are.
+    /// Starts another episode; the outputs keep their values.
     pub(crate) fn begin(&mut self, seed: u64) {
         self.task = Task::new(seed);
     }
 
-    /// The episode's time starts: what was driven before does not count.
+    /// Starts the episode's time, and discards earlier motion.
     pub(crate) fn start(&mut self) {
         self.driven = ([0.0; ACT_DIM], 0);
     }
 
-    /// The largest output, rad/s.
+    /// Returns the largest output, rad/s.
     pub(crate) fn fastest(&self) -> f32 {
         self.outputs.iter().fold(0.0, |most, output| most.max(output.abs()))
     }
 
-    /// A tick of the controller.
+    /// Advances by a tick of the controller.
     pub(crate) fn tick(&mut self) {
         for ((output, axis), target) in self.outputs.iter_mut().zip(&self.axes).zip(self.target) {
             let toward = |to: f32, step: f32| *output + (to - *output).clamp(-step, step);
@@ -61,7 +61,7 @@ impl Arm {
         self.driven.0.iter_mut().zip(self.outputs).for_each(|(sum, output)| *sum += output);
     }
 
-    /// A control step by the mean output of the ticks since the last one.
+    /// Advances by a control step with the mean output of the ticks since the last one.
     pub(crate) fn step(&mut self) {
         let (sum, ticks) = std::mem::take(&mut self.driven);
         self.task.step(&sum.map(|sum| sum / ticks.max(1) as f32));

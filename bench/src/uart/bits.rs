@@ -1,4 +1,4 @@
-//! Whether the board's actions are those of the host's executor.
+//! Compares the board's actions with those of the host's executor.
 
 use std::collections::HashMap;
 
@@ -8,9 +8,9 @@ use anyhow::Result;
 /// An action of the board's head.
 #[derive(Clone, Debug)]
 pub struct Said {
-    /// Number of its observation.
+    /// Number of the observation.
     pub of: u32,
-    /// Its bits.
+    /// Bits of the values.
     pub bits: Vec<u32>,
 }
 
@@ -18,8 +18,9 @@ fn bits(action: &[f32]) -> Vec<u32> {
     action.iter().map(|value| value.to_bits()).collect()
 }
 
-/// How many of the board's actions, in their order, no head of these images gives on their observations: going on from
-/// the action before, from a reset, or as the first one of the next image. And how often a head began anew.
+/// Counts the board's actions, in their order, that no head of these images computes on their observations: continued
+/// from the previous action, from a reset, or as the first action of the next image. Also counts the restarts of a
+/// head.
 pub fn foreign(said: &[Said], shown: &HashMap<u32, Vec<f32>>, images: &[Image<'_>]) -> Result<(usize, usize)> {
     let mut memory: Vec<Vec<u32>> = images.iter().map(|image| vec![0; image.scratch_words()]).collect();
     let mut heads = images

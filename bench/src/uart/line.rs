@@ -1,4 +1,4 @@
-//! The line between host and board, and what happens on it.
+//! The line between host and board, and its faults.
 
 use std::collections::VecDeque;
 use std::io::{self, ErrorKind, Read, Write};
@@ -10,14 +10,14 @@ use actq_client::port::Port;
 use actq_link::{Receiver, frame};
 use actq_ur3::random::Random;
 
-/// Shares of the frames that meet a fault, in each direction; each meets one at most.
+/// Shares of the frames with a fault, in each direction; a frame has one fault at most.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Noise {
-    /// Gone.
+    /// Lost.
     pub drop: f64,
-    /// Late by up to 150 ms, and so behind newer ones.
+    /// Delayed by up to 150 ms, and so after newer frames.
     pub delay: f64,
-    /// Twice.
+    /// Sent twice.
     pub duplicate: f64,
     /// With a wrong byte.
     pub corrupt: f64,
@@ -26,34 +26,35 @@ pub struct Noise {
 /// The longest delay of a frame, µs.
 const LATEST: f64 = 150_000.0;
 
-/// What has happened to frames on their way to the board.
+/// Counts of the frames to the board.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
-    /// All that were sent.
+    /// All sent frames.
     pub sent: u32,
-    /// Gone, where the line was cut, too.
+    /// Lost, including those sent while the line was cut.
     pub dropped: u32,
-    /// Late.
+    /// Delayed.
     pub delayed: u32,
-    /// Twice.
+    /// Sent twice.
     pub duplicated: u32,
     /// With a wrong byte.
     pub corrupted: u32,
 }
 
-/// A line with faults. Both its ends are in this process: [`Line::host_end`] is the port of a host, the board's end is
-/// a port that the line was given.
+/// A line with faults. Both its ends are in this process: [`Line::host_end`] is the host's port; the board's end is the
+/// port that the line was created with.
 #[derive(Clone)]
 pub struct Line(Arc<Mutex<Wires>>);
 
 struct Wires {
     board: Box<dyn Port>,
-    /// What the board says, whatever becomes of it.
+    /// Frames from the board, before any fault.
     tap: Receiver<{ frame::bytes(frame::MAX_PAYLOAD) }>,
     heard: VecDeque<Event>,
-    /// The board's time in µs, over its resets: the time of the line, as a busy machine stops QEMU now and then.
+    /// The board's time in µs, summed over its resets. It is the time of the line, as a busy machine stops QEMU now and
+    /// then.
     now: u64,
-    /// What the board's last frame said of it.
+    /// Time stamp of the board's last frame.
     micros: u32,
     down: Wire,
     up: Wire,
@@ -63,7 +64,7 @@ struct Wires {
     random: Random,
 }
 
-/// A direction: an unfinished frame, and those that wait for their time.
+/// A direction: an unfinished frame, and the frames on their way.
 #[derive(Default)]
 struct Wire {
     partial: Vec<u8>,
@@ -72,7 +73,7 @@ struct Wire {
 }
 
 impl Wire {
-    /// Takes bytes; each frame that they end meets its fate.
+    /// Takes bytes; each complete frame may get a fault.
     fn take(&mut self, bytes: &[u8], now: u64, noise: &Noise, cut: bool, random: &mut Random) {
         for byte in bytes {
             self.partial.push(*byte);
@@ -85,7 +86,7 @@ impl Wire {
 
     fn send(&mut self, mut frame: Vec<u8>, now: u64, noise: &Noise, cut: bool, random: &mut Random) {
         let content = frame.len() - 1;
-        // Zeros between frames are no frames.
+        // A zero between frames is no frame.
         if content == 0 {
             if !cut {
                 self.waiting.push((now, frame));
@@ -110,14 +111,14 @@ impl Wire {
             if falls(noise.corrupt) {
                 tally.corrupted += 1;
                 let byte = &mut frame[(random.unit() * content as f64) as usize];
-                // Another one, and no zero: that would make two frames of it.
+                // A different one, and not zero: that would split the frame.
                 *byte = if *byte == 1 { 2 } else { *byte ^ 1 };
             }
             self.waiting.push((now, frame));
         }
     }
 
-    /// What has arrived, in the order of its arrival.
+    /// Returns the bytes that have arrived, in the order of arrival.
     fn arrived(&mut self, now: u64) -> Vec<u8> {
         let (mut there, waiting): (Vec<_>, Vec<_>) =
             mem::take(&mut self.waiting).into_iter().partition(|(due, _)| *due <= now);
@@ -128,7 +129,7 @@ impl Wire {
 }
 
 impl Wires {
-    /// Gives the board what has arrived there.
+    /// Delivers the arrived bytes to the board.
     fn deliver(&mut self) -> io::Result<()> {
         if self.held {
             return Ok(());
@@ -137,9 +138,9 @@ impl Wires {
         self.board.write_all(&bytes)
     }
 
-    /// Takes what the board has said.
+    /// Reads the bytes from the board.
     fn listen(&mut self) -> io::Result<()> {
-        // All that is there: a host that lags behind would hear old times.
+        // Read everything: a host that lags behind would hear old times.
         let mut bytes = vec![0; 64 << 10];
         let count = match self.board.read(&mut bytes) {
             Ok(0) => return Err(ErrorKind::UnexpectedEof.into()),
@@ -149,10 +150,10 @@ impl Wires {
         };
         let bytes = bytes.get(..count).unwrap_or_default();
         for byte in bytes {
-            // All frames: after a reset the board counts from the beginning.
+            // Accept all frames: after a reset the board counts from 0.
             self.tap.reopen();
             let Some(received) = self.tap.push(*byte) else { continue };
-            // After a reset the board's time begins anew.
+            // After a reset the board's time starts at 0.
             let passed = received.micros.checked_sub(self.micros).unwrap_or(received.micros);
             (self.now, self.micros) = (self.now + u64::from(passed), received.micros);
             self.heard.extend(Event::of(&received.message, received.micros));
@@ -163,7 +164,7 @@ impl Wires {
 }
 
 impl Line {
-    /// A line to a board, without faults. The seed is that of the faults.
+    /// Creates a line to a board, without faults. The seed draws later faults.
     pub fn new(board: Box<dyn Port>, seed: u64) -> Self {
         Self(Arc::new(Mutex::new(Wires {
             board,
@@ -181,46 +182,46 @@ impl Line {
     }
 
     fn wires(&self) -> MutexGuard<'_, Wires> {
-        // Nothing is left half-done where a thread has panicked: whole frames move.
+        // A panic of another thread leaves nothing half-done: whole frames move.
         self.0.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
     }
 
-    /// The host's end.
+    /// Returns the host's end.
     pub fn host_end(&self) -> Box<dyn Port> {
         Box::new(HostEnd(self.clone()))
     }
 
-    /// Sets how many frames meet a fault.
+    /// Sets the shares of the faults.
     pub fn set_noise(&self, noise: Noise) {
         self.wires().noise = noise;
     }
 
-    /// Cuts the line, in both directions, or mends it.
+    /// Cuts the line in both directions, or restores it.
     pub fn cut(&self, cut: bool) {
         self.wires().cut = cut;
     }
 
-    /// Keeps what the host sends, as where its driver stalls, or lets it go all at once.
+    /// Holds back the frames from the host, as a stalled driver does, or releases them all at once.
     pub fn hold(&self, held: bool) {
         self.wires().held = held;
     }
 
-    /// The board's time in µs, over its resets, as of what it said last.
+    /// Returns the board's time in µs, summed over its resets, as of its last frame.
     pub fn now(&self) -> u64 {
         self.wires().now
     }
 
-    /// What the board has said since the last call, whatever became of it on the line.
+    /// Returns the board's messages since the last call, before any fault.
     pub fn heard(&self) -> VecDeque<Event> {
         mem::take(&mut self.wires().heard)
     }
 
-    /// Whether frames to the board are still on their way.
+    /// Returns `true` while frames to the board are on their way.
     pub fn is_waiting(&self) -> bool {
         !self.wires().down.waiting.is_empty()
     }
 
-    /// What has happened to the frames to the board.
+    /// Returns the counts of the frames to the board.
     pub fn tally(&self) -> Tally {
         self.wires().down.tally
     }
@@ -267,7 +268,7 @@ mod tests {
 
     use super::*;
 
-    /// A board that says nothing and keeps what it hears.
+    /// A silent board that stores the bytes it receives.
     #[derive(Clone, Default)]
     struct Board(Arc<Mutex<Vec<u8>>>);
 
@@ -288,7 +289,7 @@ mod tests {
         }
     }
 
-    /// What a receiver at the board makes of `frames` frames: good, damaged, repeated.
+    /// Counts the frames of `frames` at a receiver on the board: good, damaged, repeated.
     fn heard(frames: u32, set: impl FnOnce(&Line)) -> ([u32; 3], Tally) {
         let board = Board::default();
         let line = Line::new(Box::new(board.clone()), 1);
@@ -318,13 +319,13 @@ mod tests {
         assert_eq!(found, [500 - tally.corrupted, tally.corrupted, 0]);
         let (found, tally) = heard(500, |line| line.set_noise(Noise { duplicate: 0.2, ..none }));
         assert!((70..130).contains(&tally.duplicated) && found == [500, 0, tally.duplicated], "{tally:?} {found:?}");
-        // The board says nothing, so its time stands still, and what is late does not come.
+        // The board is silent, so its time stands still, and delayed frames do not arrive.
         let (found, tally) = heard(500, |line| line.set_noise(Noise { delay: 0.2, ..none }));
         assert!((70..130).contains(&tally.delayed) && found == [500 - tally.delayed, 0, 0], "{tally:?} {found:?}");
     }
 
     #[test]
-    fn nothing_passes_a_cut_and_what_is_held_comes_later() {
+    fn a_cut_drops_frames_and_a_hold_delays_them() {
         assert_eq!(heard(50, |line| line.cut(true)).0, [0; 3]);
         let board = Board::default();
         let line = Line::new(Box::new(board.clone()), 1);

@@ -1,4 +1,4 @@
-//! Arm, controller and host.
+//! The arm, the controller and the host.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -22,51 +22,51 @@ use super::bits::Said;
 use super::line::Line;
 use crate::controller::{Controller, HANG};
 
-/// Ticks a second of the application.
+/// Ticks per second of the application.
 const TICK_HZ: f32 = 1000.0;
 
-/// Age above which an observation is refused, µs. The build's 500 ms are as long as the deadline: nothing would be seen
-/// of it.
+/// Age above which the guard refuses an observation, µs. The build's 500 ms equal the deadline, which would hide it.
 const MAX_AGE: f32 = 200_000.0;
 
-/// Ticks between two reports: what is known of the controller's time.
+/// Ticks between two reports: the resolution of the controller's time.
 const REPORTS: f32 = 5.0;
 
-/// Ticks after which an observation's action is not waited for any longer. A control step takes 20; but on a busy
-/// machine QEMU's serial port is slower than a real one, and the arm's time then waits for it.
+/// Ticks to wait for an observation's action. A control step takes 20; but on a busy machine QEMU's serial port is
+/// slower than a real one, and the arm's time then waits for it.
 const ANSWER: u64 = 60;
 
-/// Ticks from one observation to the next above which the host was held up: five control steps, a fifth of the deadline.
+/// Ticks from one observation to the next above which the host was delayed: five control steps, a fifth of the
+/// deadline.
 const LATE: u64 = 100;
 
-/// What a reset forgets.
+/// Settings that a reset clears.
 fn set_up(client: &mut Client) -> Result<()> {
     client.set(Parameter::StatusPeriod, 0, REPORTS)?;
     client.set(Parameter::MaxAge, 0, MAX_AGE)
 }
 
-/// How soon the controller has stopped by itself, in ms of its own clock: from the last good frame to the safe action.
-/// The true time is within; what is known of either moment is between which two reports it was.
+/// Time from the last good frame to the safe action when the controller stops automatically, in ms of its own clock.
+/// The true time lies within: each of the two moments is known only to lie between two reports.
 #[derive(Clone, Copy, Debug)]
 pub struct Reaction {
-    /// Why.
+    /// Cause.
     pub fault: Fault,
-    /// At least.
+    /// Lower bound, ms.
     pub least: u32,
-    /// At most.
+    /// Upper bound, ms.
     pub most: u32,
 }
 
-/// Where an episode is.
+/// Progress of an episode.
 #[derive(Clone, Copy, Debug)]
 pub struct Progress {
     /// Control steps done.
     pub steps: usize,
-    /// What the outputs do.
+    /// State of the outputs.
     pub state: State,
     /// Distance of the tool to its goal, m.
     pub distance: f64,
-    /// The fastest joint's command, rad/s.
+    /// Command of the fastest joint, rad/s.
     pub fastest: f32,
 }
 
@@ -76,32 +76,32 @@ pub struct Rig {
     pub(crate) line: Line,
     pub(crate) client: Client,
     pub(crate) arm: Arm,
-    /// Ticks of the controller since the rig began, over its resets.
+    /// Ticks of the controller since the rig began, summed over its resets.
     pub(crate) time: u64,
-    /// The controller's last status, as it left the board.
+    /// The controller's last status, as sent by the board.
     pub(crate) status: Status,
-    /// The last good frame: the ticks of the reports before and behind it.
+    /// The last good frame: ticks of the reports before and after it.
     good: (u32, u32),
-    /// The last time that the controller has stopped by itself.
+    /// The last automatic stop of the controller.
     pub(crate) reaction: Option<Reaction>,
     /// Resets of the board.
     pub(crate) resets: u32,
-    /// Actions that the outputs were led to.
+    /// Actions that set a target of the outputs.
     pub(crate) applied: u32,
-    /// What the host has read, where that is news, and the ticks of what it read before.
+    /// The host's last reading if it changed, and the ticks of the previous one.
     read: Option<Status>,
     read_ticks: u32,
     said: Vec<Said>,
     shown: HashMap<u32, Vec<f32>>,
     /// The time at which the last observation was sent.
     sent: u64,
-    /// `true` if this machine has held up the host since the episode began: a deadline that the controller then missed
-    /// says nothing of the controller.
+    /// `true` if this machine has delayed the host since the episode began: a missed deadline then tells nothing about
+    /// the controller.
     pub(crate) disturbed: bool,
 }
 
 impl Rig {
-    /// The application `elf` in QEMU, with `image` built in. The seed is that of the line's faults.
+    /// Starts the application `elf` in QEMU, with `image` built in. The seed draws the line's faults.
     pub fn start(target: Target, elf: &Path, image: &Image<'_>, seed: u64) -> Result<Self> {
         let controller = Controller::start_by(target, elf, None, Clock::Host)?;
         let line = Line::new(controller.address().open().context("the board's serial port")?, seed);
@@ -135,31 +135,31 @@ impl Rig {
         })
     }
 
-    /// The line, to make faults on it.
+    /// Returns the line, to inject faults.
     pub const fn line(&self) -> &Line {
         &self.line
     }
 
-    /// What the board's head has said since the start, and the observations by their numbers.
+    /// Returns the actions of the board's head since the start, and the observations by their numbers.
     pub const fn log(&self) -> (&Vec<Said>, &HashMap<u32, Vec<f32>>) {
         (&self.said, &self.shown)
     }
 
-    /// Begins an episode: the controller is armed anew. The arm stands still until then. `exact`: its time is to be
-    /// known to a tick.
+    /// Begins an episode: arms the controller anew. The arm stands still until then. With `exact`, its time is known to
+    /// a tick.
     pub(crate) fn begin(&mut self, seed: u64, exact: bool) -> Result<()> {
         self.client.disarm()?;
         while self.status.state != State::Disarmed {
             self.listen()?;
         }
-        // A report in each tick tells exactly when what has happened, and keeps QEMU busy.
+        // A report in each tick gives exact times, and keeps QEMU busy.
         self.client.set(Parameter::StatusPeriod, 0, if exact { 1.0 } else { REPORTS })?;
         self.arm.begin(seed);
         let begun = Instant::now();
         while self.status.state != State::Armed {
             self.exchange()?;
             self.supervise()?;
-            ensure!(begun.elapsed() < HANG, "not armed: {:?}", self.status);
+            ensure!(begun.elapsed() < HANG, "the controller did not arm in {HANG:?}: {:?}", self.status);
         }
         self.reaction = None;
         self.disturbed = false;
@@ -167,14 +167,14 @@ impl Rig {
         Ok(())
     }
 
-    /// A control step: an observation on its way to the controller, and the arm 20 ms further.
+    /// Runs a control step: sends an observation to the controller, and moves the arm by 20 ms.
     pub(crate) fn step(&mut self) -> Result<()> {
         self.exchange()?;
         self.arm.step();
         self.supervise()
     }
 
-    /// Sends an observation, and listens until its action has come, or might have.
+    /// Sends an observation, and listens until its action has come or is overdue.
     fn exchange(&mut self) -> Result<()> {
         let observation = self.arm.task.observe();
         let number = self.client.observe(&observation)?;
@@ -189,7 +189,7 @@ impl Rig {
                 break;
             }
             self.listen()?;
-            ensure!(begun.elapsed() < HANG, "the controller is silent: {:?}", self.status);
+            ensure!(begun.elapsed() < HANG, "the controller was silent for {HANG:?}: {:?}", self.status);
         }
         Ok(())
     }
@@ -216,7 +216,7 @@ impl Rig {
         Ok(())
     }
 
-    /// A status as it left the board.
+    /// Handles a status as sent by the board.
     fn reported(&mut self, status: Status) {
         let before = std::mem::replace(&mut self.status, status);
         let was_reset = status.ticks < before.ticks;
@@ -234,15 +234,15 @@ impl Rig {
         if let (State::Latched, State::Armed, Some(fault)) = (status.state, self.arm.state, status.fault) {
             let (least, most) = ((before.ticks + 1).saturating_sub(self.good.1), status.ticks - self.good.0);
             self.reaction = Some(Reaction { fault, least, most });
-            // QEMU's clock is the host's here: this machine has held up a tick. By a clock that counts instructions no
-            // tick is too long, as a test on targets asserts.
+            // Here QEMU's clock is the host's: this machine has delayed a tick. With a clock that counts instructions
+            // no tick is too long; a test on targets asserts it.
             self.disturbed |= fault == Fault::Overrun;
         }
         self.arm.state = status.state;
     }
 
-    /// What the host does: sets what a reset has lost, and arms where it reads that the controller could be, and is
-    /// not.
+    /// Acts as the host: restores the settings that a reset cleared, and arms if the status says that the controller is
+    /// ready and not armed.
     fn supervise(&mut self) -> Result<()> {
         let Some(status) = self.read.take() else { return Ok(()) };
         if status.ticks < self.read_ticks {
@@ -250,7 +250,7 @@ impl Rig {
         }
         self.read_ticks = status.ticks;
         if status.state != State::Armed && status.refusal.is_none() {
-            // Refused where it has become stale meanwhile: the next status tells.
+            // Refused if it has become stale meanwhile: the next status tells.
             let _ = self.client.arm();
             self.listen()?;
             self.read = None;
@@ -258,7 +258,7 @@ impl Rig {
         Ok(())
     }
 
-    /// Waits until the board has counted all that was sent.
+    /// Waits until the board has counted all sent frames.
     pub(crate) fn settle(&mut self) -> Result<()> {
         while self.line.is_waiting() {
             self.listen()?;
@@ -278,7 +278,7 @@ impl Rig {
         Progress { steps, state: self.arm.state, distance, fastest: self.arm.fastest() }
     }
 
-    /// Steps until the end of the episode; `seen` is told each, and the controller's time.
+    /// Steps until the end of the episode, and passes each step and the controller's time to `seen`.
     pub(crate) fn finish(&mut self, from: usize, mut seen: impl FnMut(&Progress, u64)) -> Result<Outcome> {
         for step in from..EPISODE_STEPS {
             self.step()?;

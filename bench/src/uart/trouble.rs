@@ -1,4 +1,4 @@
-//! The faults, one in each episode, and what became of it.
+//! The faults, one in each episode, and the results.
 
 use std::fmt;
 
@@ -12,45 +12,45 @@ use super::rig::{Progress, Reaction, Rig};
 
 /// Control step at which a single fault begins: on the way to the first goal.
 const BEGIN: usize = 20;
-/// How long a cut lasts, ms: longer than the controller's deadline of 500.
+/// Duration of a cut, ms: longer than the controller's deadline of 500.
 const CUT: u64 = 800;
-/// How long the host's driver stalls, ms: shorter than the deadline, but what it then sends is in part older than an
-/// observation may be; and longer than the deadline.
+/// Durations of a stall of the host's driver, ms. One is shorter than the deadline, but some held observations then
+/// exceed the allowed age; the other is longer than the deadline.
 const STALLS: [u64; 2] = [280, 1200];
-/// Bytes of an image that are sent while the arm moves, and of them in a frame: QEMU's serial port is slow. What comes
-/// before them is sent before the arm moves.
+/// Bytes of an image to send while the arm moves, and bytes in a frame: QEMU's serial port is slow. The bytes before
+/// them are sent before the arm moves.
 const IN_FLIGHT: usize = 8 << 10;
 const CHUNK: usize = 128;
 /// The controller's deadline, ms.
 const DEADLINE: u32 = 500;
-/// What is not known of the time between two events, ms: each report comes in the tick behind the event, or behind a
-/// slice of the head.
+/// Resolution of the time between two events, ms: each report comes in the tick after the event, or after a slice of
+/// the head.
 const RESOLUTION: u32 = 4;
-/// Share of the frames that meet a fault of one kind: "1 in 10".
+/// Share of the frames with a fault of one kind: "1 in 10".
 const SHARE: f64 = 0.1;
 
-/// The name of all faults of frames.
+/// Name of the episode with all faults of frames.
 const ALL: &str = "all four at once";
 
-/// What happens in an episode.
+/// The fault of an episode.
 #[derive(Clone, Copy, Debug)]
 pub enum Trouble<'a> {
-    /// Nothing.
+    /// No fault.
     None,
-    /// Frames meet these faults, in both directions, all the time.
+    /// Frames have these faults, in both directions, all the time.
     Noise(&'static str, Noise),
-    /// The cable is cut, and mended later.
+    /// The cable is cut, and restored later.
     Cut,
-    /// What the host sends is stuck for so many ms, and then comes all at once.
+    /// Frames from the host are held for this many ms, and then come all at once.
     Stall(u64),
     /// The board is reset.
     Reset,
-    /// A new image is sent while the arm moves; then the host disarms, lets it run, and arms again.
+    /// A new image is sent while the arm moves; then the host disarms, starts the image, and arms again.
     Update(&'a [u8]),
 }
 
 impl<'a> Trouble<'a> {
-    /// All of them; the last one sends `image`.
+    /// Returns all of them; the last one sends `image`.
     pub fn all(image: &'a [u8]) -> Vec<Self> {
         let none = Noise::default();
         let all = Noise { drop: SHARE, delay: SHARE, duplicate: SHARE, corrupt: SHARE };
@@ -69,12 +69,12 @@ impl<'a> Trouble<'a> {
         ]
     }
 
-    /// Whether it shows much in little time: all faults of frames, and a cut.
+    /// Returns `true` for the most telling ones in little time: all faults of frames, and a cut.
     pub fn is_telling(&self) -> bool {
         matches!(self, Self::Noise(ALL, _) | Self::Cut)
     }
 
-    /// Whether the controller goes on through it. Otherwise it stops, and is armed again.
+    /// Returns `true` if the controller continues through it; otherwise it stops, and is armed again.
     pub const fn goes_on(&self) -> bool {
         match self {
             Self::None | Self::Noise(..) => true,
@@ -100,66 +100,66 @@ impl fmt::Display for Trouble<'_> {
 /// An episode with a fault.
 #[derive(Clone, Copy, Debug)]
 pub struct Run {
-    /// How it ended.
+    /// Result.
     pub outcome: Outcome,
-    /// Whether the arm did what it could: reached both goals, or, where something has held it up on the way to the
-    /// first one, the second one.
+    /// `true` if the arm reached both goals, or only the second one when a fault delayed it on the way to the first.
     pub reached: bool,
-    /// Whether the controller was armed at the end.
+    /// `true` if the controller was armed at the end.
     pub armed: bool,
-    /// How soon the controller has stopped by itself.
+    /// Reaction time of an automatic stop of the controller.
     pub reaction: Option<Reaction>,
-    /// From the end of the fault to an armed controller, ms of its own clock.
+    /// Time from the end of the fault to an armed controller, ms of its own clock.
     pub again: Option<u64>,
-    /// What happened to the frames to the board.
+    /// Counts of the frames to the board.
     pub tally: Tally,
-    /// Frames that the board has found damaged, and those that it had before.
+    /// Frames that the board counted as damaged and as repeated.
     pub found: (u32, u32),
-    /// Observations that the guard has refused.
+    /// Observations that the guard refused.
     pub refused: u32,
-    /// Actions that the outputs were led to, of 200.
+    /// Actions that set a target of the outputs, of 200.
     pub applied: u32,
     /// Resets of the board.
     pub resets: u32,
-    /// `true` if this machine has held up the host, beyond the fault: a failed check then says nothing of the controller.
+    /// `true` if this machine has delayed the host beyond the fault: a failed check then tells nothing about the
+    /// controller.
     pub disturbed: bool,
 }
 
 impl Run {
-    /// What is not as it should be.
+    /// Checks the run.
     ///
     /// # Errors
     ///
-    /// The first such thing.
+    /// The first failed check.
     pub fn check(&self, trouble: &Trouble<'_>) -> Result<()> {
         ensure!(self.armed, "the controller is not armed at the end");
-        ensure!(self.reached, "the arm has missed a goal; it ended {:.1} mm from it", 1e3 * self.outcome.final_error_m);
+        ensure!(self.reached, "the arm missed a goal; it ended {:.1} mm from it", 1e3 * self.outcome.final_error_m);
         let deadline = DEADLINE + 1;
         match (self.reaction, trouble) {
             (Some(Reaction { fault: Fault::Stale, least, most }), Trouble::Cut | Trouble::Stall(_))
                 if !trouble.goes_on() =>
             {
                 let in_time = least <= deadline && most <= deadline + RESOLUTION;
-                ensure!(in_time, "safe after {least} to {most} ms, not after the deadline and a tick, {deadline} ms");
+                ensure!(in_time, "safe after {least} to {most} ms, expected the deadline and a tick, {deadline} ms");
             }
-            (None, Trouble::Cut | Trouble::Stall(_)) if !trouble.goes_on() => bail!("the controller has not stopped"),
-            (Some(reaction), _) => bail!("the controller has stopped: {}", reaction.fault),
+            (None, Trouble::Cut | Trouble::Stall(_)) if !trouble.goes_on() => bail!("the controller did not stop"),
+            (Some(reaction), _) => bail!("the controller stopped: {}", reaction.fault),
             (None, _) => {}
         }
         let resets = u32::from(matches!(trouble, Trouble::Reset));
-        ensure!(self.resets == resets, "{} resets of the board, not {resets}", self.resets);
+        ensure!(self.resets == resets, "the board reset {} times; expected {resets}", self.resets);
         let ((damaged, repeated), tally) = (self.found, self.tally);
-        ensure!(damaged == tally.corrupted, "{damaged} of {} damaged frames were found", tally.corrupted);
+        ensure!(damaged == tally.corrupted, "the board counted {damaged} of {} damaged frames", tally.corrupted);
         let repetitions = tally.duplicated..=tally.duplicated + tally.delayed;
-        ensure!(repetitions.contains(&repeated), "{repeated} repetitions were found, not {repetitions:?}");
+        ensure!(repetitions.contains(&repeated), "the board counted {repeated} repetitions; expected {repetitions:?}");
         let old = matches!(trouble, Trouble::Stall(_)) && trouble.goes_on();
-        ensure!(!old || self.refused > 0, "observations that were held up were taken");
+        ensure!(!old || self.refused > 0, "the guard accepted held observations");
         Ok(())
     }
 }
 
 impl Rig {
-    /// An episode with this fault. `seen` is told every control step.
+    /// Runs an episode with this fault, and passes every control step to `seen`.
     pub fn run(&mut self, seed: u64, trouble: Trouble<'_>, mut seen: impl FnMut(&Progress)) -> Result<Run> {
         let mut update = None;
         if let Trouble::Update(image) = trouble {
@@ -180,7 +180,7 @@ impl Rig {
             seen(&self.progress(step + 1));
         }
         let mut steps = BEGIN;
-        // Control steps for so many ms of the controller's time, one at least.
+        // Runs control steps for this many ms of the controller's time, one at least.
         let mut meanwhile = |rig: &mut Self, ms: u64| -> Result<()> {
             let from = rig.time;
             loop {
@@ -211,13 +211,13 @@ impl Rig {
                 }
             }
             Trouble::Update(image) => {
-                let mut push = update.context("it has begun")?;
+                let mut push = update.context("the push has not begun")?;
                 while push.taken() < image.len() {
                     self.push(&mut push)?;
                     meanwhile(self, 0)?;
                 }
                 self.client.disarm()?;
-                ensure!(push.advance(&mut self.client)?, "the image does not run");
+                ensure!(push.advance(&mut self.client)?, "the new image does not run");
             }
         }
         let (ended, mut again) = (self.time, None);

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::{heads, kernels};
 
-/// What the JSON file holds.
+/// /// The content of the JSON file.
 #[derive(Serialize)]
 #[serde(untagged)]
 enum Entry<'a> {
@@ -20,7 +20,7 @@ pub(crate) fn run(json: Option<&Path>, wait_states: u64, by_function: bool) -> R
     let counter = Counter::build()?;
     let kernels = kernels::measure(&counter, wait_states)?;
     println!(
-        "\nWhole calls on the Cortex-M4: instructions counted, cycles modelled\n\n{}",
+        "\nWhole calls on the Cortex-M4: QEMU counts instructions, cycles are modelled\n\n{}",
         kernels::report(&kernels, None)
     );
     let heads = heads::measure(&heads::policies(), &counter, wait_states)?;
@@ -31,14 +31,14 @@ pub(crate) fn run(json: Option<&Path>, wait_states: u64, by_function: bool) -> R
     }
     if wait_states > 0 {
         println!(
-            "\nwith waits: flash of {wait_states} wait states behind the caches of an STM32F4, a model (docs/KERNELS.md)"
+            "\nwith waits: a model of flash with {wait_states} wait states behind the caches of an STM32F4 (docs/KERNELS.md)"
         );
     }
     if let Some(path) = json {
         let kernels = kernels.iter().map(Entry::Kernel);
         let all: Vec<Entry<'_>> = kernels.chain(heads.iter().map(|head| Entry::Head(&head.record))).collect();
         std::fs::write(path, serde_json::to_string_pretty(&all)? + "\n")
-            .with_context(|| format!("{}: cannot be written", path.display()))?;
+            .with_context(|| format!("cannot write {}", path.display()))?;
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! What the application takes on each board, and what a head takes on each core.
+//! The memory of the application on each board, and the cost of a head on each core.
 
 use std::path::Path;
 
@@ -14,14 +14,14 @@ use anyhow::{Context, Result, ensure};
 pub(crate) const FLASH: &str = "bytes of flash, application on ";
 /// Bytes of RAM of the application without its scratch memory: variables, and the most stack.
 pub(crate) const RAM: &str = "bytes of RAM, application on ";
-/// Bytes of stack, from the ELF file alone.
+/// Bytes of stack, computed from the ELF file alone.
 const STACK: &str = "bytes of stack at most, application on ";
 const STEP: &str = "instructions of an evaluation, ur3_reach at 3 bits, rounded, on ";
 
-/// Steps that the application runs before its stack is looked at: chunks of several evaluations.
+/// Steps of the application before the test reads its stack: chunks of several evaluations.
 const STEPS: usize = 20;
 
-/// All figures, by name.
+/// Measures all figures, by name.
 pub(crate) fn measure(counter: &Counter) -> Result<Vec<(String, u64)>> {
     let path = firmware::built_in()?;
     let buffer = ImageBuffer::read(path)?;
@@ -32,13 +32,13 @@ pub(crate) fn measure(counter: &Counter) -> Result<Vec<(String, u64)>> {
         let board = target.board();
         let scratch = board.application.context("the board has no application")?.scratch;
         let elf = firmware::controller(target, "")?;
-        // What a run uses depends on when interrupts come. It is no figure, and may not be above the bound.
+        // The used stack depends on when interrupts come. It is no figure; it must stay below the bound.
         let used = stack(target, &elf, recorded.episode(0))?;
         let worst = worst_case(&elf)?;
         let (stack, room) = (worst.bytes().into(), worst.room.into());
         ensure!(
             used <= stack && stack <= room,
-            "{}: {used} bytes of stack were used, at most {stack} can be, and there is room for {room}",
+            "{}: used {used} bytes of stack; the computed maximum is {stack}, the reserved room {room}",
             board.name
         );
         let harness = firmware::harness(target)?;
@@ -56,14 +56,14 @@ pub(crate) fn measure(counter: &Counter) -> Result<Vec<(String, u64)>> {
     Ok(figures)
 }
 
-/// Bytes of stack that the application has used after some steps.
+/// Measures the bytes of stack that the application has used after some steps.
 fn stack(target: Target, elf: &Path, observations: impl Iterator<Item = Vec<f32>>) -> Result<u64> {
     let controller = Controller::start(target, elf, None)?;
     let mut client = controller.client()?;
     for observation in observations.take(STEPS) {
         act(&mut client, &observation)?;
     }
-    // The firmware looks at its stack every now and then.
+    // The firmware looks at its stack periodically.
     let ticks = client.status()?.ticks;
     until(&mut client, "later", |status| status.ticks.wrapping_sub(ticks) > 300)?;
     Ok(client.timing()?.stack.into())

@@ -1,4 +1,4 @@
-//! `cargo xtask budgets`: what the runtime may cost, in `budgets.json`, against what it costs.
+//! `cargo xtask budgets`: compares the measured cost of the runtime with `budgets.json`.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -13,21 +13,20 @@ use serde::{Deserialize, Serialize};
 
 use crate::{boards, heads, kernels};
 
-/// How far a figure may lie above its budget, in percent, where another rustc made it (the compiler is not pinned), or,
-/// of a head, another processor: widths and activations follow from sums that it may round otherwise.
+/// Tolerance above a budget, in percent, for a compiler other than the recorded one (the compiler is not pinned) and,
+/// for a head, another processor: widths and activations follow from sums that it may round otherwise.
 const SLACK: u64 = 2;
 
-/// Bytes of code that the runtime may take at most, where steps are not cut: 24 KiB for step and chunk policies, and 8
-/// for products of values, five more functions, noise and the steps of flow and diffusion policies, the whole action
+/// Limit for the bytes of code of the runtime without sliced steps: 24 KiB for step and chunk policies, and 8 for
+/// products of values, five more functions, noise and the steps of flow and diffusion policies, the whole action
 /// contract and playback.
 const RUNTIME_MOST: u64 = 32 * 1024;
 
-/// Bytes of flash that the application may take at most, without its image, and bytes of RAM, without its scratch
-/// memory.
+/// Limits for the application: bytes of flash without its image, and bytes of RAM without its scratch memory.
 const APPLICATION_FLASH_MOST: u64 = 64 * 1024;
 const APPLICATION_RAM_MOST: u64 = 24 * 1024;
 
-/// Functions that are shown where the runtime is above its budget.
+/// Functions to list if the runtime exceeds its budget.
 const SHOWN: usize = 20;
 
 const HEAD: &str = "instructions of a step, ";
@@ -41,13 +40,13 @@ type Figures = BTreeMap<String, u64>;
 /// `budgets.json`.
 #[derive(Debug, Serialize, Deserialize)]
 struct Budgets {
-    /// The compiler that made the code that was measured.
+    /// The compiler of the measured code.
     rustc: String,
-    /// What is allowed, by name.
+    /// The allowed figures, by name.
     figures: Figures,
 }
 
-/// A figure above what is allowed.
+/// A figure above its budget.
 #[derive(Debug, PartialEq, Eq)]
 struct Excess {
     name: String,
@@ -62,16 +61,16 @@ pub(crate) fn run(update: bool) -> Result<()> {
     if update {
         let budgets = Budgets { rustc: rustc.clone(), figures: measured.clone() };
         fs::write(&path, serde_json::to_string_pretty(&budgets)? + "\n")
-            .with_context(|| format!("{}: cannot be written", path.display()))?;
-        println!("{} written; `git diff` shows what has changed", path.display());
+            .with_context(|| format!("cannot write {}", path.display()))?;
+        println!("wrote {}; `git diff` shows the changes", path.display());
     }
     let text = fs::read_to_string(&path)
-        .with_context(|| format!("{}: cannot be read; `cargo xtask budgets --update` makes it", path.display()))?;
+        .with_context(|| format!("cannot read {}; `cargo xtask budgets --update` writes it", path.display()))?;
     let budgets: Budgets = serde_json::from_str(&text).with_context(|| path.display().to_string())?;
     let stale = difference(&budgets.figures, &measured);
     ensure!(
         stale.is_empty(),
-        "budgets.json is not about what was measured; `cargo xtask budgets --update` renews it:\n  {}",
+        "budgets.json and the measured figures differ in names; `cargo xtask budgets --update` renews it:\n  {}",
         stale.join("\n  ")
     );
     let excess = compare(&budgets, &measured, &rustc);
@@ -105,8 +104,8 @@ fn difference(budgets: &Figures, measured: &Figures) -> Vec<String> {
     missing.chain(gone).collect()
 }
 
-/// The figures above their budgets, or above the limits of an inner loop, of the runtime and of the application, which
-/// no budget raises.
+/// Returns the figures above their budgets, or above the limits of an inner loop, of the runtime and of the
+/// application, which no budget raises.
 fn compare(budgets: &Budgets, measured: &Figures, rustc: &str) -> Vec<Excess> {
     let allowed = |name: &str| {
         let slack = if budgets.rustc == rustc && !name.starts_with(HEAD) { 0 } else { SLACK };
@@ -119,7 +118,7 @@ fn compare(budgets: &Budgets, measured: &Figures, rustc: &str) -> Vec<Excess> {
         };
         let budget = budgets.figures.get(name).map_or(0, |budget| *budget.min(&most));
         let allowed = budget + budget * slack / 100;
-        // Loops are in assembler, the same with every compiler.
+        // Loops are in assembler: every compiler gives the same.
         if most == CODE_LINES { allowed.min(most) } else { allowed }
     };
     measured
@@ -129,7 +128,7 @@ fn compare(budgets: &Budgets, measured: &Figures, rustc: &str) -> Vec<Excess> {
         .collect()
 }
 
-/// All figures.
+/// Measures all figures.
 fn measure() -> Result<Figures> {
     let counter = Counter::build()?;
     let mut figures = code()?;
@@ -155,8 +154,8 @@ fn measure() -> Result<Figures> {
     Ok(figures)
 }
 
-/// Bytes of code of the whole runtime and of every function in assembler, and the lines of its longest inner loop,
-/// which the instruction cache must hold.
+/// Measures the bytes of code of the whole runtime and of every function in assembler, and the lines of its longest
+/// inner loop, which the instruction cache must hold.
 fn code() -> Result<Figures> {
     let code = runtime()?;
     let with_polls = Code::read(&firmware::binary("runtime-poll", Target::Fpu)?)?;
@@ -169,7 +168,7 @@ fn code() -> Result<Figures> {
     Ok(figures)
 }
 
-/// The code of everything that an application calls that does not cut its steps.
+/// Measures the code of an application that does not slice its steps.
 fn runtime() -> Result<Code> {
     Code::read(&firmware::binary("runtime", Target::Fpu)?)
 }
@@ -205,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn another_compiler_has_some_slack_and_so_has_a_head() {
+    fn another_compiler_and_heads_have_some_tolerance() {
         assert_eq!(excess(("x", 1000), 1020, "rustc 2"), None);
         assert_eq!(excess(("x", 1000), 1021, "rustc 2"), Some((1020, 1021)));
         let head = format!("{HEAD}x");
@@ -222,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn names_must_agree() {
+    fn names_of_budgets_and_figures_must_agree() {
         let differing = difference(&figures(&[("a", 1), ("b", 1)]), &figures(&[("b", 1), ("c", 1)]));
         assert_eq!(differing, ["no budget for c", "not measured: a"]);
     }

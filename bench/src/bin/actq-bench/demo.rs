@@ -1,4 +1,4 @@
-//! `cargo demo`: the UR3's policies from their PyTorch weights to a Cortex-M4, in closed loop.
+//! `cargo demo`: takes the UR3 policies from their PyTorch weights to a Cortex-M4, in closed loop.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -27,18 +27,18 @@ use crate::{faults, heads, kernels};
 /// First seed of the closed-loop episodes; the policy was trained and calibrated on others.
 const FIRST_SEED: u64 = 1000;
 
-/// The most steps of distillation: a quarter of what `actq quantize` takes by default, for an answer within a minute.
+/// Limit of distillation steps: a quarter of the default of `actq quantize`, for a result within a minute.
 const STEPS: usize = 2000;
 
-/// The same of the flow, where a step goes through five of the network's; and the share of the episodes that it drives.
+/// The same for the flow, whose step evaluates the network five times; and one in so many episodes that it drives.
 const FLOW_STEPS: usize = 100;
 const FLOW_SHARE: u64 = 4;
 
-/// Episodes of the f32 policy that are learned from, from seed 0: the 12 of `calib.npz` are a thin tube through what
-/// the policy meets.
+/// Episodes of the f32 policy to learn from, from seed 0: the 12 of `calib.npz` cover only a narrow part of the
+/// observations that the policy meets.
 const RECORDED: usize = 200;
 
-/// The observations of the f32 policy's episodes.
+/// Records the observations of the f32 policy's episodes.
 fn record(policy: &mut PolicyF32) -> Result<Dataset> {
     let mut obs = Vec::with_capacity(RECORDED * EPISODE_STEPS * OBS_DIM);
     for seed in 0..RECORDED as u64 {
@@ -57,16 +57,16 @@ fn record(policy: &mut PolicyF32) -> Result<Dataset> {
     })
 }
 
-/// What the motor controller runs.
+/// The image that the motor controller runs.
 const IN_THE_APPLICATION: &str = "3.0 bits";
 
-/// What is made of a policy, and how it is tried.
+/// The images of a policy, and how to try them.
 struct Trial<'a> {
-    /// For people.
+    /// Human-readable name.
     name: &'a str,
     dir: PathBuf,
     images: Vec<(&'a str, Options)>,
-    /// Learns from episodes of f32 instead of the folder's recording.
+    /// Learns from episodes of the f32 policy instead of the folder's recording.
     recorded: bool,
     episodes: u64,
     qemu_episodes: u64,
@@ -116,24 +116,24 @@ pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
     println!();
     let records = kernels::measure(&counter, 0)?;
     println!(
-        "A whole call each on the Cortex-M4, instructions counted, cycles modelled:\n\n{}",
+        "Whole calls on the Cortex-M4, instructions counted, cycles modelled:\n\n{}",
         kernels::report(&records, Some((256, 256)))
     );
     Ok(())
 }
 
-/// Of the images.
+/// Instructions and cycles of the images.
 fn folder() -> PathBuf {
     target_dir().join("demo")
 }
 
 impl Trial<'_> {
-    /// The image of this name.
+    /// Returns the image of this name.
     fn path(&self, image: &str) -> PathBuf {
         folder().join(format!("{} {image}.actq", self.name).to_lowercase().replace(' ', "-"))
     }
 
-    /// The table, and what the firmware did.
+    /// Fills the table and runs the firmware.
     fn run(&self, counter: &Counter) -> Result<String> {
         let &Self { name: policy_name, recorded, episodes, qemu_episodes, .. } = self;
         let policy_dir = &self.dir;
@@ -163,13 +163,13 @@ impl Trial<'_> {
 
         let mut report = Vec::new();
         let recordings = if recorded {
-            println!("Recording {RECORDED} episodes of f32, to learn from");
+            println!("Recording {RECORDED} episodes of the f32 policy to learn from");
             Recordings { calib: Some(record(&mut reference)?), heldout: None }
         } else {
             Recordings::load(&policy)?
         };
         for (name, options) in &self.images {
-            println!("Quantizing to {name} by {}", options.method);
+            println!("Quantizing to {name} with {}", options.method);
             let quantizer = Quantizer::new(&policy, &recordings, options.method, None, |_| {})?;
             let path = self.path(name);
             let bytes = heads::write_image(&quantizer, options, &path)?;
@@ -197,7 +197,7 @@ impl Trial<'_> {
                     instructions.to_string(),
                     match policy.graph.denoising {
                         None => format!("{:.2}", instructions as f64 / policy.graph.weights() as f64),
-                        // A weight is multiplied once or as often as there are steps.
+                        // A weight is multiplied once in each step.
                         Some(_) => "-".to_owned(),
                     },
                 ],
@@ -235,11 +235,11 @@ fn tracking(outcomes: &[Outcome]) -> String {
     format!("{:.2} mm", 1e3 * mean)
 }
 
-/// What a run of the firmware as the policy gave.
+/// The result of a run with the firmware as the policy.
 struct Firmware {
     outcomes: Vec<Outcome>,
     actions: usize,
-    /// Actions whose bits are those of the host executor on the same observations.
+    /// Actions with the same bits as the host executor's on the same observations.
     identical: usize,
 }
 
@@ -256,7 +256,7 @@ impl Firmware {
                     let same = action.iter().zip(head.step(obs)?).all(|(a, b)| a.to_bits() == b.to_bits());
                     actions += 1;
                     identical += usize::from(same);
-                    action.as_slice().try_into().context("an action has not six values")
+                    action.as_slice().try_into().context("an action must have six values")
                 })
             })
         })?;

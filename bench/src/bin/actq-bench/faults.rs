@@ -1,4 +1,4 @@
-//! `cargo xtask faults`: the arm in closed loop through the controller's serial port, with faults on the line.
+//! `cargo xtask faults`: drives the arm in closed loop through the controller's serial port, with faults on the line.
 
 use std::path::Path;
 
@@ -16,17 +16,16 @@ use actq_ur3::task::EPISODE_STEPS;
 use anyhow::{Result, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// First seed of the episodes; the policy was trained and recorded on others, and `cargo demo`'s other episodes are
-/// others.
+/// First seed of the episodes, none of which the policy was trained or recorded on, or `cargo demo` drives.
 const FIRST_SEED: u64 = 3000;
-/// Of the faults.
+/// Seed of the faults.
 const SEED: u64 = 1;
-/// Attempts at an episode that fails, each undisturbed by this machine, until it counts as failed; and attempts of any
+/// Attempts at an episode that fails, each undisturbed by this machine, before it counts as failed; and attempts of any
 /// kind, after which it is not judged.
 const ATTEMPTS: usize = 5;
 const MOST_ATTEMPTS: usize = 12;
 
-/// All faults, with the UR3's policy in 3 bits, and an update to another image of it.
+/// Runs all faults, with the UR3 policy in 3 bits, and an update to another image of it.
 pub(crate) fn all() -> Result<()> {
     let policy = Policy::load(&ur3())?;
     let options = Options { steps: Some(0), ..Options::new(Method::Best, Budget::BitsPerWeight(3.0)) };
@@ -36,15 +35,15 @@ pub(crate) fn all() -> Result<()> {
     run(Target::Fpu, old, &Trouble::all(new.bytes()), &[buffer.image(old)?, new.image(Path::new("the new image"))?])
 }
 
-/// Two of them, with this image: for a demonstration.
+/// Runs two of them with this image, for a demonstration.
 pub(crate) fn some(image: &Path) -> Result<()> {
     let buffer = ImageBuffer::read(image)?;
     let troubles: Vec<_> = Trouble::all(&[]).into_iter().filter(Trouble::is_telling).collect();
     run(Target::Fpu, image, &troubles, &[buffer.image(image)?])
 }
 
-/// An episode for each of `troubles` with the application for the target's board, which has `image` built in, and the
-/// table of what happened. `images` are the one that is built in and those that updates bring.
+/// Runs an episode for each of `troubles` with the application for the target's board and its built-in `image`, and
+/// prints the table of the results. `images` are the built-in one and those that updates bring.
 pub(crate) fn run(target: Target, image: &Path, troubles: &[Trouble<'_>], images: &[Image<'_>]) -> Result<()> {
     println!(
         "\nClosed loop through the serial port of the controller ({} in QEMU), with faults on the line",
@@ -66,15 +65,15 @@ pub(crate) fn run(target: Target, image: &Path, troubles: &[Trouble<'_>], images
     }
     println!("\n{summary}\n");
     if !busy.is_empty() {
-        println!("not judged, as this machine is too busy to run host and board side by side: {}", busy.join(", "));
+        println!(
+            "not judged, because this machine is too busy to run host and board side by side: {}",
+            busy.join(", ")
+        );
     }
     let (said, shown) = rig.log();
     let (foreign, _) = foreign(said, shown, images)?;
-    println!(
-        "{} actions of the controller, {foreign} of them not those of the host's executor, bit for bit",
-        said.len()
-    );
-    ensure!(foreign == 0, "the controller has given actions that its head does not give");
+    println!("{} actions of the controller, {foreign} of them differ in bits from the host executor's", said.len());
+    ensure!(foreign == 0, "the controller sent {foreign} actions that its head does not compute");
     ensure!(failures.is_empty(), "{}", failures.join("\n"));
     Ok(())
 }
@@ -83,7 +82,7 @@ pub(crate) fn run(target: Target, image: &Path, troubles: &[Trouble<'_>], images
 enum Verdict {
     Passed,
     Failed(anyhow::Error),
-    /// Nothing: this machine has held up the host.
+    /// None: this machine has delayed the host.
     Disturbed,
 }
 
@@ -101,12 +100,12 @@ fn judged(rig: &mut Rig, seed: u64, trouble: &Trouble<'_>) -> Result<(Run, Verdi
         if attempts == MOST_ATTEMPTS {
             return Ok((run, Verdict::Disturbed));
         }
-        let busy = if run.disturbed { ", while this machine held it up" } else { "" };
-        println!("  {trouble}: {why}{busy}; once more");
+        let busy = if run.disturbed { ", while this machine delayed it" } else { "" };
+        println!("  {trouble}: {why}{busy}; trying again");
     }
 }
 
-/// An episode, with a live line on a terminal.
+/// Runs an episode, with a live line on a terminal.
 fn episode(rig: &mut Rig, seed: u64, trouble: &Trouble<'_>) -> Result<Run> {
     let bar = ProgressBar::new(EPISODE_STEPS as u64).with_prefix(trouble.to_string());
     bar.set_style(ProgressStyle::with_template("  {prefix:22} [{bar:30}] {msg}")?.progress_chars("=> "));

@@ -1,8 +1,8 @@
 //! `cargo xtask fit`: the rates of the cost model (`kernels/src/pace/`), from counted operations.
 //!
-//! Images with many shapes of every operation run under QEMU; every operation, and every whole step, is a sample: how
-//! many of each feature it has, and what it took. The rates are the least squares of the relative errors. A feature
-//! that others determine, or whose rate would be negative, gets the rate 0.
+//! Images with many shapes of every operation run under QEMU. Every operation and every whole step is a sample: the
+//! count of each feature, and the measured cost. The rates minimize the squared relative errors. A feature that others
+//! determine, or whose rate would be negative, gets the rate 0.
 
 mod images;
 mod least_squares;
@@ -31,9 +31,9 @@ use sample::{Rates, Sample, predicted};
 
 /// Steps with standard normal observations, whose cost is the expected one.
 const NORMAL: usize = 6;
-/// How many of the worst samples are shown.
+/// Number of the worst samples to show.
 const WORST: usize = 8;
-/// A budget that limits nothing and is counted all the same.
+/// A budget too large to limit anything, which is counted all the same.
 const AMPLE: u32 = 100_000_000;
 
 pub(crate) fn run() -> Result<()> {
@@ -77,7 +77,7 @@ pub(crate) fn run() -> Result<()> {
     Ok(())
 }
 
-/// The rates as the source of the kernels' table: a feature's debug text is its key.
+/// Writes the rates as the source of the kernels' table: a feature's debug text is its key.
 fn table(instructions: &Rates, cycles: &Rates, most: &Rates) -> String {
     let mut text =
         "//! Written by `cargo xtask fit`: expected instructions, expected cycles, instructions at most.\n\n\
@@ -95,7 +95,7 @@ fn table(instructions: &Rates, cycles: &Rates, most: &Rates) -> String {
     text + "];\n"
 }
 
-/// Runs an image, in steps and by operations; `polls` gets what a limit adds to an operation, and the pieces of it.
+/// Runs an image, in steps and by operations. `polls` gets the cost that a limit adds to an operation, and its pieces.
 fn measure(
     (name, bytes): (&str, &[u8]),
     elf: &Path,
@@ -109,7 +109,7 @@ fn measure(
     let frame = features(|add| cost::frame(&image, add));
     let ops: Vec<Op<'_>> = image.ops().collect();
     let of_ops: Vec<_> = ops.iter().map(|op| features(|add| cost::features(op, add))).collect();
-    // There is nothing to lead over from before the second chunk.
+    // Before the second chunk there is none to blend with.
     let expected = |step| (usize::from(image.overlap() > 0)..NORMAL).contains(&step);
     let steps = profile::steps(elf, counter, bytes, &observations)?;
     for (step, cost) in steps.into_iter().enumerate() {
@@ -152,7 +152,7 @@ fn features(list: impl FnOnce(&mut dyn FnMut(Feature, usize))) -> BTreeMap<Featu
     features
 }
 
-/// Pieces of an operation where the budget is ample.
+/// Pieces of an operation under an ample budget.
 fn pieces(op: &Op<'_>) -> usize {
     let (OpKind::Linear { accumulate }, Some(matrix)) = (op.kind, op.matrix()) else { return 1 };
     let bias = matrix.start_values(accumulate).is_none();
@@ -162,7 +162,7 @@ fn pieces(op: &Op<'_>) -> usize {
     1 + usize::from(bias) + widths.len() + blocks
 }
 
-/// What features take at most: values whose code branches on them, and pieces.
+/// Features whose cost is a maximum: values whose code branches on them, and pieces.
 fn most(samples: &[Sample], polls: &[(f64, usize)], rates: &Rates) -> Rates {
     let mut most = rates.clone();
     let rate = |feature: Feature| rates.get(&feature).copied().unwrap_or(0.0);
@@ -180,7 +180,7 @@ fn most(samples: &[Sample], polls: &[(f64, usize)], rates: &Rates) -> Rates {
             Feature::LED,
         ])
         .collect();
-    // Whole steps differ in much; only parts of them by themselves say what a value takes.
+    // Whole steps differ in many features; only their parts tell the cost of a value.
     for sample in samples.iter().filter(|s| s.features.contains_key(&Feature::POLL_OP)) {
         for &feature in &varying {
             let Some(&n) = sample.features.get(&feature).filter(|n| **n >= 30.0) else { continue };
@@ -189,7 +189,7 @@ fn most(samples: &[Sample], polls: &[(f64, usize)], rates: &Rates) -> Rates {
             *at_most = at_most.max(rate(feature) + excess / n);
         }
     }
-    // What a limit adds to an operation, and to each of its pieces.
+    // The cost that a limit adds to an operation and to each of its pieces.
     let n = polls.len() as f64;
     let [x, y] = [polls.iter().map(|p| p.1 as f64).sum::<f64>() / n, polls.iter().map(|p| p.0).sum::<f64>() / n];
     let covariance: f64 = polls.iter().map(|p| (p.1 as f64 - x) * (p.0 - y)).sum();
@@ -200,8 +200,8 @@ fn most(samples: &[Sample], polls: &[(f64, usize)], rates: &Rates) -> Rates {
     most
 }
 
-/// What coming back to a linear operation takes for each of its blocks: from steps in short polls, whose number tells
-/// how often that was. The image's least budget is that of the rates before, which need not be exact here.
+/// Measures the cost of returning to a linear operation for each of its blocks, from steps in short polls, whose number
+/// tells how often that was. The image's least budget comes from the previous rates, which need not be exact here.
 fn resumed(elf: &Path, counter: &Counter, most: &Rates) -> Result<f64> {
     let known: f64 = [Feature::POLL, Feature::ENTERED, Feature::operation(op::LINEAR), Feature::PIECE]
         .map(|f| most[&f])
@@ -233,7 +233,7 @@ fn resumed(elf: &Path, counter: &Counter, most: &Rates) -> Result<f64> {
     Ok(resumed)
 }
 
-/// Standard normal observations, and such as reach the ends of every branch.
+/// Draws standard normal observations, and others that reach the ends of every branch.
 fn observations(len: usize) -> Vec<Vec<f32>> {
     let mut random = Random::new(1);
     let normal = (0..NORMAL).map(|_| (0..len).map(|_| random.normal()).collect::<Vec<_>>()).collect::<Vec<_>>();

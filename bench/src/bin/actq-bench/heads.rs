@@ -24,18 +24,18 @@ use serde::Serialize;
 
 use crate::kernels::Cycles;
 
-/// Steps of distillation: too few for accuracy, but the widths of the rows, which matter here, are chosen before.
-/// (Which matrices take int16 activations is chosen after, and may differ a little.)
+/// Steps of distillation: too few for accuracy, but the row widths, which matter here, are chosen before it. (The
+/// matrices with int16 activations are chosen after it, and may differ a little.)
 const STEPS: usize = 50;
 
-/// Functions that the report by function shows of each head.
+/// Number of functions in the report by function of each head.
 const FUNCTIONS: usize = 8;
 
 /// A counted step.
 #[derive(Debug, Serialize)]
 pub(crate) struct Record {
     pub(crate) policy: String,
-    /// Bits per weight that were asked for.
+    /// Requested bits per weight.
     pub(crate) bits: f64,
     /// Multiplications of the f32 policy: its weights.
     macs: usize,
@@ -44,7 +44,7 @@ pub(crate) struct Record {
     cycles: Cycles,
 }
 
-/// A head that was measured.
+/// A measured head.
 #[derive(Debug)]
 pub(crate) struct Head {
     pub(crate) record: Record,
@@ -65,27 +65,27 @@ impl Record {
         if self.bits == 8.0 { "8".to_owned() } else { format!("{:.1}", self.bits) }
     }
 
-    /// The head for people, by policy and bits.
+    /// Formats the head by policy and bits.
     pub(crate) fn name(&self) -> String {
         format!("{} at {} bits", self.policy, self.bits())
     }
 }
 
-/// The project's own policy and the shared ones, where there are any.
+/// Returns the project's own policy, and the shared ones if present.
 pub(crate) fn policies() -> Vec<PathBuf> {
     let names = ["go1_mlp", "g1_lstm256", "fetch_pickplace"];
     let shared = shared_policies().into_iter().flat_map(|folder| names.map(|name| folder.join(name)));
     std::iter::once(ur3()).chain(shared).collect()
 }
 
-/// Quantizes to an image file, and gives its bytes.
+/// Quantizes to an image file, and returns its bytes.
 pub(crate) fn write_image(quantizer: &Quantizer<'_>, options: &Options, path: &Path) -> Result<Vec<u8>> {
     let bytes = quantizer.quantize(options, |_, _| {})?.image;
     files::write(path, &bytes)?;
     Ok(bytes)
 }
 
-/// Quantizes each policy to 8, 3 and 2 bits a weight, and counts a step that evaluates the network.
+/// Quantizes each policy to 8, 3 and 2 bits per weight, and counts a step that evaluates the network.
 pub(crate) fn measure(policies: &[PathBuf], counter: &Counter, wait_states: u64) -> Result<Vec<Head>> {
     let folder = target_dir().join("heads");
     fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
@@ -126,7 +126,7 @@ pub(crate) fn measure(policies: &[PathBuf], counter: &Counter, wait_states: u64)
     Ok(heads)
 }
 
-/// The heads as a table.
+/// Formats the heads as a table.
 pub(crate) fn report(heads: &[Head]) -> String {
     let waits = heads.iter().any(|h| h.record.cycles.cycles_with_waits.is_some());
     let mut header = vec!["policy", "bits", "MACs", "instructions", "per MAC", "cycles", "per MAC", "ms at 168 MHz"];
@@ -146,7 +146,7 @@ pub(crate) fn report(heads: &[Head]) -> String {
     rows.to_string()
 }
 
-/// Instructions per MAC by kind.
+/// Formats the instructions per MAC by kind.
 pub(crate) fn report_kinds(heads: &[Head]) -> String {
     let kinds = Kind::ALL.map(|kind| format!("{kind:?}").to_lowercase());
     let header: Vec<&str> = ["policy", "bits"].into_iter().chain(kinds.iter().map(String::as_str)).collect();
@@ -158,7 +158,7 @@ pub(crate) fn report_kinds(heads: &[Head]) -> String {
     rows.to_string()
 }
 
-/// The functions with the most instructions.
+/// Formats the functions with the most instructions.
 pub(crate) fn report_functions(heads: &[Head]) -> String {
     let mut rows = table(&["policy", "bits", "instructions", "per MAC", "cycles", "function"]);
     for Head { record, functions, .. } in heads {

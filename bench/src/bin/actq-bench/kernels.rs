@@ -7,13 +7,13 @@ use actq_cli::report::table::{group_name, table};
 use anyhow::{Result, bail, ensure};
 use serde::Serialize;
 
-/// A counted call: activations from f32, the product, and the results back in f32.
+/// A counted call: f32 activations to integers, the product, and the results back to f32.
 #[derive(Debug, Serialize)]
 pub(crate) struct Record {
     pub(crate) name: String,
-    /// Bits of a weight.
+    /// Bits per weight.
     pub(crate) bits: u32,
-    /// Columns per u8 scale; 0 = one scale a row.
+    /// Columns per u8 scale; 0 = one scale per row.
     pub(crate) group: usize,
     pub(crate) rows: usize,
     pub(crate) cols: usize,
@@ -25,15 +25,15 @@ pub(crate) struct Record {
 /// Modelled cycles.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub(crate) struct Cycles {
-    /// With memory that never waits.
+    /// With memory without wait states.
     pub(crate) cycles: u64,
-    /// With the wait states that were asked for.
+    /// With the requested wait states.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) cycles_with_waits: Option<u64>,
 }
 
 impl Cycles {
-    /// `wait_states` 0 asks for none.
+    /// `wait_states` 0 requests none.
     pub(crate) fn new(code: &Code, region: &qemu::Region, wait_states: u64) -> Result<Self> {
         let with_waits = (wait_states > 0).then(|| code.cycles(region, wait_states)).transpose()?;
         Ok(Self { cycles: code.cycles(region, 0)?, cycles_with_waits: with_waits })
@@ -49,7 +49,7 @@ impl Record {
         (self.rows, self.cols)
     }
 
-    /// Whether this is a kernel of the runtime, and not a yardstick.
+    /// Returns `true` for a kernel of the runtime, `false` for a yardstick.
     pub(crate) fn is_kernel(&self) -> bool {
         self.name.starts_with("gemv")
     }
@@ -82,7 +82,7 @@ pub(crate) fn measure(counter: &Counter, wait_states: u64) -> Result<Vec<Record>
     lines.lines().zip(&regions).map(record).collect()
 }
 
-/// The records as a table, all of them or those of one shape.
+/// Formats the records as a table, all of them or those of one shape.
 pub(crate) fn report(records: &[Record], shape: Option<(usize, usize)>) -> String {
     let waits = records.iter().any(|r| r.cycles.cycles_with_waits.is_some());
     let mut header =

@@ -1,4 +1,4 @@
-//! `cargo xtask stack`: the most stack that the application can take, from the calls in its ELF file.
+//! `cargo xtask stack`: computes the maximum stack of the application from the calls in its ELF file.
 
 use std::path::Path;
 
@@ -7,20 +7,20 @@ use actq_bench::{Target, firmware};
 use actq_cli::report::table::table;
 use anyhow::{Context as _, Result, ensure};
 
-/// Of the application for a board.
+/// Shows the maximum stack of the application for a board.
 pub(crate) fn of_board(name: &str) -> Result<()> {
     let target = Target::on(name).filter(|target| target.board().application.is_some());
     let target = target.with_context(|| {
-        format!("there is no application on a board {name:?}; `cargo xtask firmware --list` shows the boards")
+        format!("the board {name:?} has no application; `cargo xtask firmware --list` shows the boards")
     })?;
     show(&firmware::controller(target, "")?)
 }
 
-/// Of the application in an ELF file.
+/// Shows the maximum stack of the application in an ELF file.
 pub(crate) fn show(elf: &Path) -> Result<()> {
     let worst = worst_case(elf)?;
     println!("{}", text(&worst));
-    ensure!(worst.bytes() <= worst.room, "the stack has room for {} bytes only", worst.room);
+    ensure!(worst.bytes() <= worst.room, "the stack needs {} bytes, but has room for {}", worst.bytes(), worst.room);
     Ok(())
 }
 

@@ -1,4 +1,4 @@
-//! The images that are measured: many shapes of every operation.
+//! The measured images: many shapes of every operation.
 
 use actq::contract::{Ensemble, Playback};
 use actq::emit;
@@ -13,7 +13,7 @@ use actq_kernels::math::Function;
 use actq_kernels::ops::denoise::Coefficients;
 use anyhow::Result;
 
-/// Rows and columns of the matrices: strips of all heights, runs of more than one, columns with and without a rest.
+/// Rows and columns of the matrices: strips of all heights, runs of several strips, columns with and without a rest.
 const SHAPES: [(usize, usize); 28] = [
     (4, 8),
     (8, 8),
@@ -63,7 +63,7 @@ pub(super) fn images() -> Result<Vec<(String, Vec<u8>)>> {
             builder.linear((rows, 40), Activations::Int8, |_| Some(Width::W2), 0, true)?;
         }
     }
-    let (policy, outcomes) = builder.finish("biases that are added".to_owned(), false);
+    let (policy, outcomes) = builder.finish("added biases".to_owned(), false);
     images.push((policy.name.clone(), accumulating(&emit::image(&policy, &outcomes)?)?));
     Ok(images)
 }
@@ -149,7 +149,7 @@ fn policies() -> Result<Vec<(Policy, Vec<Outcome>)>> {
         builder.part(12)?;
         policies.push(builder.finish(name.to_owned(), contract));
     }
-    // Chunks that are averaged, and such that lead over from one to the next.
+    // Chunks that are averaged, and chunks that blend into the next.
     for (chunk, act_len) in CHUNKS {
         for (horizon, overlap) in [(chunk, 0), (chunk / 2, 0), (0, chunk - 1), (0, chunk / 2)] {
             let mut builder = Builder::new(chunk * act_len);
@@ -162,7 +162,7 @@ fn policies() -> Result<Vec<(Policy, Vec<Outcome>)>> {
             policies.push((policy, outcomes));
         }
     }
-    // A denoising step, with a limit and noise and without.
+    // A denoising step, with and without limit and noise.
     for (limit, sigma) in [(f32::INFINITY, 0.0), (f32::INFINITY, 0.1), (1.0, 0.0), (1.0, 0.1)] {
         for len in LENGTHS {
             let mut builder = Builder::new(8);

@@ -6,7 +6,7 @@ use actq_kernels::pace::cost::{Cost, Feature};
 
 use super::sample::{Rates, Sample};
 
-/// The rates, none of them negative, with the least sum of squared relative errors (Lawson and Hanson, Solving Least
+/// Computes the non-negative rates with the least sum of squared relative errors (Lawson and Hanson, Solving Least
 /// Squares Problems, 1974, chapter 23, on the normal equations).
 pub(super) fn solve(samples: &[&Sample], of: impl Fn(Cost) -> u64) -> Rates {
     let mut features: Vec<Feature> = samples.iter().flat_map(|s| s.features.keys().copied()).collect();
@@ -17,7 +17,7 @@ pub(super) fn solve(samples: &[&Sample], of: impl Fn(Cost) -> u64) -> Rates {
     let (mut normal, mut right) = (vec![vec![0.0f64; n]; n], vec![0.0f64; n]);
     for sample in samples {
         let target = of(sample.cost) as f64;
-        // Relative errors, and some instructions either way in what is short.
+        // Relative errors; short samples may be off by a few instructions.
         let weight = 1.0 / (target + 100.0);
         let row: Vec<(usize, f64)> = sample.features.iter().map(|(f, count)| (place[f], count * weight)).collect();
         for &(i, a) in &row {
@@ -25,7 +25,7 @@ pub(super) fn solve(samples: &[&Sample], of: impl Fn(Cost) -> u64) -> Rates {
             right[i] += a * target * weight;
         }
     }
-    // Features of the same size, so that one measure of what is small holds for all.
+    // Scale the features alike, so that one threshold for small values holds for all.
     let scale: Vec<f64> = (0..n).map(|i| normal[i][i].sqrt()).collect();
     for i in 0..n {
         right[i] /= scale[i];
@@ -43,7 +43,7 @@ pub(super) fn solve(samples: &[&Sample], of: impl Fn(Cost) -> u64) -> Rates {
         used.push(next);
         loop {
             let wanted = least_squares(&normal, &right, &used);
-            // As far towards the solution as no rate becomes negative; those that would are used no more.
+            // Go towards the solution until a rate would become negative; exclude the rates that would.
             let share = |(&i, &x): (&usize, &f64)| if x > 0.0 { 1.0 } else { rates[i] / (rates[i] - x) };
             let step = used.iter().zip(&wanted).map(share).fold(1.0, f64::min);
             used.iter().zip(&wanted).for_each(|(&i, x)| rates[i] += step * (x - rates[i]));
@@ -57,13 +57,13 @@ pub(super) fn solve(samples: &[&Sample], of: impl Fn(Cost) -> u64) -> Rates {
     (0..n).map(|i| (features[i], rates[i] / scale[i])).collect()
 }
 
-/// The solution of the normal equations for some of the features, by elimination.
+/// Solves the normal equations for some of the features by elimination.
 fn least_squares(normal: &[Vec<f64>], right: &[f64], used: &[usize]) -> Vec<f64> {
     let mut rows: Vec<Vec<f64>> =
         used.iter().map(|&i| used.iter().map(|&j| normal[i][j]).chain([right[i]]).collect()).collect();
     for pivot in 0..rows.len() {
         let row = rows[pivot].clone();
-        // What others determine gets 0.
+        // A feature that others determine gets 0.
         let small = row[pivot] < 1e-9;
         for (i, other) in rows.iter_mut().enumerate() {
             match (i == pivot, small) {

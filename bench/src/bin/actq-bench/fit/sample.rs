@@ -1,4 +1,4 @@
-//! What was counted, and the rates that predict it.
+//! The counted samples, and the rates that predict them.
 
 use std::collections::BTreeMap;
 
@@ -6,18 +6,18 @@ use actq_kernels::pace::cost::{Cost, Feature};
 
 /// A counted operation or step.
 pub(super) struct Sample {
-    /// What it is, for people.
+    /// Human-readable name.
     pub(super) name: String,
     pub(super) features: BTreeMap<Feature, f64>,
     pub(super) cost: Cost,
-    /// Whether the values were drawn as the expected cost has them.
+    /// `true` if the values were drawn as the expected cost assumes.
     pub(super) expected: bool,
 }
 
-/// What a unit of each feature costs.
+/// The cost of a unit of each feature.
 pub(super) type Rates = BTreeMap<Feature, f64>;
 
-/// The cost of a sample by these rates.
+/// Predicts the cost of a sample by these rates.
 pub(super) fn predicted(sample: &Sample, rates: &Rates) -> f64 {
     sample.features.iter().map(|(feature, n)| n * rates.get(feature).copied().unwrap_or(0.0)).sum()
 }
