@@ -1,4 +1,4 @@
-//! An image is refused, or its head runs a step; with whatever checksum it has, and with the right one.
+//! An image, with any checksum or the right one, is refused, or its head runs a step.
 #![no_main]
 
 use std::task::Poll;
@@ -8,7 +8,7 @@ use actq_kernels::image::seal;
 use actq_kernels::pace::cost;
 use libfuzzer_sys::fuzz_target;
 
-/// The longest step that is run.
+/// Instructions of the longest step to run.
 const INSTRUCTIONS: u64 = 10_000_000;
 const SCRATCH_WORDS: usize = 1 << 20;
 

@@ -1,4 +1,4 @@
-//! Bytes on the link, and payloads in frames whose checksum is right: each gives a message or none, and a message can
+//! Bytes on the link, and payloads in frames with the right checksum: each gives a message or none, and a message can
 //! be sent on.
 #![no_main]
 
@@ -16,7 +16,7 @@ fn receive(bytes: &[u8]) -> usize {
         messages += 1;
         let mut again = [0; wire_bytes(FRAME)];
         let sent = Sender::new(received.sequence).frame(&received.message, received.micros, &mut again);
-        let sent = sent.expect("what was received finds room");
+        let sent = sent.expect("a received message fits a frame");
         let mut other = Receiver::<FRAME>::new();
         assert!(sent.iter().filter_map(|&byte| other.push(byte).map(|_| ())).count() == 1, "{:?}", received.message);
     }

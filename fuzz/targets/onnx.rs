@@ -1,4 +1,4 @@
-//! An ONNX file is refused or imported, and what was imported is a policy.
+//! An ONNX file is refused or imported, and an imported file is a valid policy.
 #![no_main]
 
 use std::path::Path;
@@ -10,6 +10,7 @@ use libfuzzer_sys::fuzz_target;
 fuzz_target!(|bytes: &[u8]| {
     let here = Path::new("no such folder");
     if let Ok(imported) = import_bytes(bytes.to_vec(), here, "fuzzed", &Choice::default()) {
-        Policy::of_files(here, [here, here], &imported.json, &imported.weights).expect("what was imported is a policy");
+        Policy::of_files(here, [here, here], &imported.json, &imported.weights)
+            .expect("an imported file is a valid policy");
     }
 });

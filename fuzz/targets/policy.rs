@@ -9,14 +9,14 @@ use libfuzzer_sys::fuzz_target;
 use safetensors::Dtype;
 use safetensors::tensor::{TensorView, serialize};
 
-/// Values of observation, iterate and layers, all alike, so that drawn ops fit together.
+/// Values of observation, iterate and layers, all equal, so that random ops fit together.
 const LEN: usize = 4;
 
 static WEIGHTS: LazyLock<Vec<u8>> = LazyLock::new(|| {
     let bytes: Vec<u8> = (0..4 * LEN * LEN).flat_map(|i| (0.1 * i as f32 - 1.0).to_le_bytes()).collect();
     let tensor = |shape: &[usize]| {
         let len = 4 * shape.iter().product::<usize>();
-        TensorView::new(Dtype::F32, shape.to_vec(), &bytes[..len]).expect("the bytes are those of the shape")
+        TensorView::new(Dtype::F32, shape.to_vec(), &bytes[..len]).expect("the bytes fit the shape")
     };
     let tensors = [
         ("w", tensor(&[LEN, LEN])),

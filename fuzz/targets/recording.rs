@@ -1,4 +1,4 @@
-//! A recording is refused or read. The first byte says which ending its file has.
+//! A recording is refused or read. The first byte selects the file's extension.
 #![no_main]
 
 use std::io::Write as _;

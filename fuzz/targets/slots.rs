@@ -1,5 +1,5 @@
-//! A flash that holds anything gives an image to run or none, and takes what is said about it. The records' checksums
-//! are right where the first byte is odd.
+//! A flash of any content gives an image to run or none, and accepts marks about it. The records have the right
+//! checksums if the first byte is odd.
 #![no_main]
 
 use actq_boards::ram::Ram;
@@ -26,7 +26,7 @@ fn run(mut memory: [u8; FLASH], authority: impl Authority) {
     if let Some(first) = slots.select(|| ()) {
         slots.reject(first.slot);
         if let Some(second) = slots.select(|| ()) {
-            assert_ne!(first.slot, second.slot, "what was rejected runs");
+            assert_ne!(first.slot, second.slot, "a rejected image runs");
             let _ = slots.confirm(second.slot);
         }
     }

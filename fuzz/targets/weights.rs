@@ -7,7 +7,7 @@ use libfuzzer_sys::fuzz_target;
 fuzz_target!(|bytes: &[u8]| {
     let Ok(file) = TensorFile::new(bytes) else { return };
     for name in file.names() {
-        let tensor = file.get(&name).expect("it is there");
+        let tensor = file.get(&name).expect("the file has the tensor");
         let _ = tensor.values.to_f32();
     }
 });

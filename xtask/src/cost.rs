@@ -3,7 +3,7 @@
 use std::fs;
 use std::time::{Duration, Instant};
 
-/// Clock ticks a second in Linux's /proc, on every architecture with a Rust host compiler.
+/// Clock ticks per second in Linux's /proc, on every architecture with a Rust host compiler.
 const TICKS: u64 = 100;
 
 /// Time since a moment.
@@ -30,13 +30,13 @@ pub(crate) struct Cost {
     pub(crate) cpu: Option<Duration>,
 }
 
-/// User and system time of all child processes that have ended, and of their children; `None` without a /proc.
+/// Returns the user and system time of all ended child processes, and of their children; `None` without a /proc.
 fn cpu_of_children() -> Option<Duration> {
     ticks(&fs::read_to_string("/proc/self/stat").ok()?).map(|ticks| Duration::from_millis(1000 / TICKS * ticks))
 }
 
-/// Fields 16 and 17 of `/proc/self/stat` (proc(5): cutime, cstime). The second field is a name in parentheses, which
-/// may hold anything.
+/// Parses fields 16 and 17 of `/proc/self/stat` (proc(5): cutime, cstime). The second field is a name in parentheses,
+/// with any content.
 fn ticks(stat: &str) -> Option<u64> {
     let (_, fields) = stat.rsplit_once(')')?;
     let mut fields = fields.split_whitespace().skip(13);

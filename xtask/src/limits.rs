@@ -7,7 +7,7 @@ use actq_controller::Limits;
 use actq_kernels::Image;
 use anyhow::{Context as _, Result, bail, ensure};
 
-/// The limits that `--limits` names: one for all axes, or those of a file, which has a line for each.
+/// Reads the value of `--limits`: one for all axes, or a file with a line for each.
 pub(crate) fn read(value: &str) -> Result<Vec<Limits>> {
     let error = match value.parse() {
         Ok(limits) => return Ok(vec![limits]),
@@ -15,16 +15,19 @@ pub(crate) fn read(value: &str) -> Result<Vec<Limits>> {
     };
     let path = Path::new(value);
     ensure!(path.is_file(), "--limits {value:?}: no file has this name, and {error}");
-    let text = fs::read_to_string(path).with_context(|| format!("--limits {value}: the file cannot be read"))?;
+    let text = fs::read_to_string(path).with_context(|| format!("cannot read the file of --limits {value}"))?;
     ensure!(!text.trim().is_empty(), "--limits {value}: the file is empty; it takes a line LOW:HIGH for each axis");
     let line = |(i, line): (usize, &str)| line.parse().with_context(|| format!("{value}, line {}: {line:?}", i + 1));
     text.trim_end().lines().enumerate().map(line).collect()
 }
 
-/// Actions of an image that have no finite limits, of their own or of the build: as "action 0".
+/// Lists the actions of an image without finite limits, of their own or of the build, as "action 0".
 pub(crate) fn without_limits(limits: &[Limits], image: &Image<'_>) -> Result<Vec<String>> {
     let (given, actions) = (limits.len(), image.act_len());
-    ensure!(given < 2 || given == actions, "--limits has {given} lines, the image has {actions} actions: one for each");
+    ensure!(
+        given < 2 || given == actions,
+        "--limits has {given} lines, the image has {actions} actions; give one line for each"
+    );
     let mut still = Vec::new();
     for i in 0..actions {
         match (Limits::of_axis(i, image.limits(i), limits), image.limits(i)) {

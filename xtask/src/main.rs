@@ -1,4 +1,4 @@
-//! What people and CI type: `cargo demo`, `cargo verify`, `cargo xtask bench`, `cargo xtask budgets`,
+//! The commands for users and CI: `cargo demo`, `cargo verify`, `cargo xtask bench`, `cargo xtask budgets`,
 //! `cargo xtask fit`, `cargo xtask compare`, `cargo xtask faults`, `cargo xtask firmware`, `cargo xtask stack`,
 //! `cargo xtask doctor`.
 //!
@@ -21,16 +21,16 @@ use anyhow::{Context as _, Result, ensure};
 const USAGE: &str = "\
 Commands of the actq workspace. Usage: cargo xtask COMMAND
 
-  demo     Quantize the UR3 policy, run it on a Cortex-M4 in QEMU in closed loop, and show what it costs and gives
+  demo     Quantize the UR3 policy, run it on a Cortex-M4 in QEMU in closed loop, and show cost and success
   bench    Count the instructions of kernels and whole heads on a Cortex-M4 in QEMU and model their cycles
   budgets  Measure instructions, code, scratch and stack, and compare them with budgets.json
   compare  Compare the quantizer's methods: held-out error, true bits, closed-loop success
   firmware Build the motor controller for a board: --board NAME [--image F.actq] --out FILE.elf; --list shows the boards
   faults   Drive an arm through the serial port of the controller in QEMU, with faults on the line
-  stack    Show the most stack that the controller can take, from the calls in its ELF file: --board NAME, or --elf FILE
-  fit      Measure the cost model's rates anew (after every change of the kernels)
+  stack    Compute the maximum stack of the controller from the calls in its ELF file: --board NAME, or --elf FILE
+  fit      Measure the cost model's rates again (after every change of the kernels)
   verify   Format, lints, tests, a smoke run in QEMU; with --all everything that CI checks
-  doctor   Check and install what the other commands need: Rust targets and QEMU
+  doctor   Check and install the other commands' requirements: Rust targets and QEMU
 
 demo, verify, bench, budgets, compare, faults, fit, firmware and stack show their options with --help.";
 
@@ -45,7 +45,7 @@ fn main() -> ExitCode {
                 return ExitCode::from(2);
             }
         },
-        ["doctor"] => setup::ensure(&Target::ALL).map(|()| println!("all there")),
+        ["doctor"] => setup::ensure(&Target::ALL).map(|()| println!("nothing is missing")),
         ["firmware", options @ ..] => match firmware::Options::parse(options) {
             Ok(options) => options.run(),
             Err(wrong) => {
@@ -77,7 +77,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// A command of `actq-bench` that needs QEMU, and what these targets need.
+/// Installs the requirements of these targets, and runs a command of `actq-bench` in QEMU.
 fn measure(arguments: &[&str], targets: &[Target]) -> Result<()> {
     let boards: Vec<&str> = targets.iter().map(|target| target.board().name).collect();
     println!("{}: on {} in QEMU", arguments[0], boards.join(" and "));
@@ -89,7 +89,7 @@ fn measure(arguments: &[&str], targets: &[Target]) -> Result<()> {
 fn measuring(package: &str, arguments: &[&str]) -> Result<()> {
     let mut command = setup::cargo();
     command.args(["run", "--release", "--package", package, "--"]).args(arguments);
-    println!("building what quantizes and measures");
-    ensure!(command.status().context("cargo cannot be started")?.success(), "{} failed", arguments[0]);
+    println!("building {package}");
+    ensure!(command.status().context("cannot start cargo")?.success(), "{} failed", arguments[0]);
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! A child process whose output is passed on, with a line whenever it has been silent for a while.
+//! A child process whose output is passed on, with a line after each long silence.
 
 use std::io::{self, IsTerminal as _, Read};
 use std::process::{Command, Stdio};
@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result};
 
-/// Silence after which a line says that the child is still at work.
+/// Silence after which a line reports that the child is still running.
 const SILENCE: Duration = Duration::from_secs(10);
 
 /// Runs a command to its end and returns whether it succeeded. `name` is the work that it does.
@@ -81,9 +81,9 @@ mod tests {
         assert_eq!(shell("echo b >&2; exit 3", long), (false, "b\n".to_owned()));
     }
 
-    /// The child waits for the line that its silence brings, so the test does not depend on how fast it runs.
+    /// The child waits for the line after its silence, so the test does not depend on its speed.
     #[test]
-    fn silence_brings_a_line() {
+    fn silence_prints_a_line() {
         struct Kept(Vec<u8>, std::path::PathBuf);
         impl io::Write for Kept {
             fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {

@@ -1,5 +1,4 @@
-//! What must be installed: the Rust targets, QEMU, and for `cargo verify` the toolchain's tools and the oldest
-//! compiler.
+//! The requirements: the Rust targets, QEMU, and for `cargo verify` the toolchain's tools and the oldest compiler.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -7,12 +6,12 @@ use std::process::{Command, Stdio};
 use actq_boards::{Target, version};
 use anyhow::{Context, Result, bail, ensure};
 
-/// The cargo that runs this.
+/// Returns the cargo that runs this program.
 pub(crate) fn cargo() -> Command {
     Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }
 
-/// Installs what these targets need and is missing, where that can be done without asking.
+/// Installs the missing requirements of these targets, if possible without a question.
 pub(crate) fn ensure(targets: &[Target]) -> Result<()> {
     for target in targets {
         rust_target(target.triple())?;
@@ -39,7 +38,7 @@ pub(crate) fn components() -> Result<()> {
     Ok(())
 }
 
-/// Installs a toolchain beside the one in use; gives why that cannot be.
+/// Installs a toolchain beside the one in use; an error tells why that is impossible.
 pub(crate) fn toolchain(release: &str) -> Result<(), String> {
     let installed = output("rustup", &["toolchain", "list"]).map_err(|error| format!("{error:#}"))?;
     if installed.lines().any(|line| line.starts_with(release)) {
@@ -49,7 +48,7 @@ pub(crate) fn toolchain(release: &str) -> Result<(), String> {
     run("rustup", &arguments).map_err(|_| format!("rustup cannot install {release}"))
 }
 
-/// The text that a program prints.
+/// Returns the output of a program.
 fn output(program: &str, arguments: &[&str]) -> Result<String> {
     let output =
         Command::new(program).args(arguments).output().with_context(|| format!("{program} is not installed"))?;

@@ -1,4 +1,4 @@
-//! `cargo verify`: the checks, one step after the other; all failures are reported at the end.
+//! `cargo verify`: the checks, one after the other, with all failures reported at the end.
 
 mod steps;
 
@@ -15,15 +15,15 @@ use crate::{relay, setup};
 const USAGE: &str = "\
 Usage: cargo verify [--all]
 
-Checks formatting and lints, runs the tests of the host, and runs a policy and the motor controller on a Cortex-M4 in QEMU.
+Checks formatting and lints, runs the host tests, and runs a policy and the motor controller on a Cortex-M4 in QEMU.
 
   --all  Everything that CI checks: also the tests on every board in QEMU, lints for every board, documentation, budgets,
          faults on the line, ONNX files against tract, 32-bit words, the oldest compiler
 
-Tests on policies that are not in this repository run when ACTQ_SHARED names their folder.";
+Tests on policies outside this repository run if ACTQ_SHARED names their folder.";
 
 /// Expected minutes from a fresh clone with an empty target directory on two idle cores, by
-/// `docs/records/2026-11-24-verify.md`; those of `--all` leave room above it. Nothing fails when a run takes longer.
+/// `docs/records/2026-11-24-verify.md`; those of `--all` leave a margin. No check fails when a run takes longer.
 struct Expected {
     wall: f64,
     cpu: f64,
@@ -47,7 +47,7 @@ impl Options {
             [] => Ok(Self::Short),
             ["--all"] => Ok(Self::All),
             ["--help" | "-h"] => Ok(Self::Help),
-            _ => Err(format!("error: cannot read the options {}\n\n{USAGE}", words.join(" "))),
+            _ => Err(format!("error: unknown options {}\n\n{USAGE}", words.join(" "))),
         }
     }
 
@@ -79,7 +79,7 @@ enum Outcome {
     Skipped(String),
 }
 
-/// A step that has run.
+/// A finished step.
 struct Done {
     name: String,
     outcome: Outcome,
@@ -92,10 +92,10 @@ fn setup(targets: &[Target], expected: &Expected) -> Result<()> {
     setup::ensure(targets)
 }
 
-/// Runs the steps; an error names those that failed.
+/// Runs the steps; an error names the failed ones.
 fn verify(steps: Vec<Step>, expected: &Expected) -> Result<()> {
     let clock = Clock::start();
-    // Tests write the names of the tests that they skip into this file.
+    // Tests write the names of skipped tests to this file.
     let skipped = std::env::temp_dir().join(format!("actq-skipped-{}", std::process::id()));
     let count = steps.len();
     let mut done = Vec::new();
@@ -129,7 +129,7 @@ fn run(Step { name, command }: Step, number: &str, clock: &Clock) -> Result<Done
     Ok(Done { name, outcome, cost })
 }
 
-/// The command as a user would type it.
+/// Formats the command as a user would type it.
 fn text(command: &Command) -> String {
     let arguments: Vec<_> = command.get_args().map(|argument| argument.to_string_lossy()).collect();
     let program = command.get_program().to_string_lossy();

@@ -325,7 +325,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cut_drops_frames_and_a_hold_delays_them() {
+    fn cuts_drop_frames_and_holds_delay_them() {
         assert_eq!(heard(50, |line| line.cut(true)).0, [0; 3]);
         let board = Board::default();
         let line = Line::new(Box::new(board.clone()), 1);

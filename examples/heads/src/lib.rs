@@ -1,5 +1,5 @@
-//! Action heads of the sizes of published policies, as policy folders. **Their weights are seeded random numbers: sizes
-//! and times are real, accuracy is not.**
+//! Action heads of published sizes, as policy folders. **Their weights are seeded random numbers: sizes and times are
+//! real, accuracy is not.**
 #![forbid(unsafe_code)]
 
 mod network;
@@ -16,7 +16,7 @@ use anyhow::{Context, Result};
 use ndarray::Array3;
 use serde_json::Value;
 
-/// Observations in `calib.npz`: the fewest that every method takes.
+/// Observations in `calib.npz`: the minimum of every method.
 const FRAMES: usize = 256;
 
 /// A policy's two files.
@@ -29,7 +29,7 @@ pub struct Head {
 }
 
 impl Head {
-    /// The policy.
+    /// Parses the policy.
     pub fn policy(&self) -> Result<Policy> {
         let files = ["policy.json", "policy.safetensors"].map(Path::new);
         Ok(Policy::of_files(Path::new("."), files, self.json.to_string().as_bytes(), &self.weights)?)
@@ -52,7 +52,7 @@ impl Head {
             [("policy.json", json), ("policy.safetensors", self.weights.clone()), ("calib.npz", calib.npz()?)]
         {
             let path = dir.join(name);
-            fs::write(&path, bytes).with_context(|| format!("{}: cannot be written", path.display()))?;
+            fs::write(&path, bytes).with_context(|| format!("cannot write {}", path.display()))?;
         }
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! Ops of policy.json with the tensors that they name.
+//! Ops of policy.json with their tensors.
 
 use actq::random::Random;
 use anyhow::Result;
@@ -17,13 +17,13 @@ impl Network {
         Self { tensors: Vec::new(), random: Random::new(1) }
     }
 
-    /// A tensor of standard normal values times `by`.
+    /// Adds a tensor of standard normal values times `by`.
     pub(crate) fn normal(&mut self, name: &str, shape: &[usize], by: f32) {
         let values = (0..shape.iter().product()).map(|_| by * self.random.normal()).collect();
         self.tensors.push((name.to_owned(), shape.to_vec(), values));
     }
 
-    /// A matrix that keeps the variance of its input, and biases.
+    /// Adds a matrix that keeps the variance of its input, and biases.
     pub(crate) fn linear(&mut self, name: &str, rows: usize, cols: usize) -> Value {
         let [w, b] = ["weight", "bias"].map(|part| format!("{name}.{part}"));
         self.normal(&w, &[rows, cols], (cols as f32).recip().sqrt());
@@ -31,7 +31,7 @@ impl Network {
         json!({"op": "linear", "w": w, "b": b})
     }
 
-    /// As a network begins to learn.
+    /// Adds a norm with its initial values.
     pub(crate) fn layernorm(&mut self, name: &str, len: usize, eps: f64) -> Value {
         let [w, b] = ["weight", "bias"].map(|part| format!("{name}.{part}"));
         self.tensors.push((w.clone(), vec![len], vec![1.0; len]));
@@ -51,7 +51,7 @@ impl Network {
     }
 }
 
-/// The op with one more key.
+/// Returns the op with one more key.
 pub(crate) fn with(mut op: Value, key: &str, value: impl Into<Value>) -> Value {
     op[key] = value.into();
     op

@@ -12,15 +12,16 @@ const BLOCKS: usize = 3;
 const TIME: usize = 32;
 const CHUNK: usize = 4;
 const ACT: usize = 7;
-/// Of training, and by default of a call.
+/// Denoising steps of training, and the default of a call.
 pub const STEPS: usize = 20;
 /// Octo limits the iterate to this; actions are normalised to mean 0 and standard deviation 1.
 const MAX_ACTION: f64 = 5.0;
 
-/// The head on a readout token of `token` values (384 in Octo-Small, 768 in Octo-Base), in `steps` denoising steps.
+/// Builds the head on a readout token of `token` values (384 in Octo-Small, 768 in Octo-Base), in `steps` denoising
+/// steps.
 pub fn head(token: usize, steps: usize) -> Result<Head> {
     let mut network = Network::new();
-    // Learned in Octo; this is what they are before.
+    // Octo learns these; here they have their initial values.
     network.normal("time.freq", &[TIME / 2], 0.2);
     let mut ops = vec![
         with(network.linear("time.0", 2 * TIME, TIME), "input", "tfeat"),

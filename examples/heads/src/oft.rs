@@ -13,12 +13,13 @@ const BLOCKS: usize = 2;
 const CHUNK: usize = 8;
 const ACT: usize = 7;
 
-/// Weights of the matrices at a hidden size.
+/// Returns the number of weights of the matrices at a hidden size.
 pub fn weights(hidden: usize) -> usize {
     (ACT * hidden + BLOCKS * hidden + ACT) * hidden
 }
 
-/// The head with hidden states of `hidden` values. The observation is that of the whole chunk: 8 x 7 hidden states.
+/// Builds the head with hidden states of `hidden` values. The observation is that of the whole chunk: 8 x 7 hidden
+/// states.
 pub fn head(hidden: usize) -> Result<Head> {
     let mut network = Network::new();
     let input = ACT * hidden;

@@ -17,14 +17,14 @@ const ANGULAR_LIMIT: f64 = 1.5;
 const DAMPING: f64 = 0.03;
 /// Joint velocity for each radian away from home, within the null space, 1/s.
 const HOME_GAIN: f64 = 1.0;
-/// Joint velocity towards a stop for each radian that is left, 1/s.
+/// Joint velocity towards a stop for each remaining radian, 1/s.
 const STOP_GAIN: f64 = 5.0;
 
 /// Task rows: three of position, two of the tool axis. The turn about the tool axis is free, so that one of the six
 /// joint dimensions remains for the pull to home.
 const ROWS: usize = 5;
 
-/// Joint velocity command (rad/s) towards `goal` at joint angles `angle`.
+/// Computes the joint velocity command (rad/s) towards `goal` at joint angles `angle`.
 pub fn command(angle: &Joints, goal: &Goal) -> Joints {
     let frames = chain(angle);
     let tool = &frames[6];
@@ -56,8 +56,8 @@ pub fn command(angle: &Joints, goal: &Goal) -> Joints {
     })
 }
 
-/// The next [`CHUNK`] commands (rad/s) towards `goal`: the expert run forward on a copy of the arm, without noise or
-/// pushes.
+/// Computes the next [`CHUNK`] commands (rad/s) towards `goal`: the expert run forward on a copy of the arm, without
+/// noise or pushes.
 pub fn plan(servo: &Servo, goal: &Goal) -> [Joints; CHUNK] {
     let mut servo = servo.clone();
     core::array::from_fn(|_| {

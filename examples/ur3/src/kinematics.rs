@@ -45,7 +45,7 @@ impl Frame {
         self.axes[2]
     }
 
-    /// The next frame along the chain: `Rz(theta) Tz(d) Tx(a) Rx(alpha)`.
+    /// Returns the next frame of the chain: `Rz(theta) Tz(d) Tx(a) Rx(alpha)`.
     fn then(&self, link: &Link, theta: f64) -> Self {
         let (s, c) = (libm::sin(theta), libm::cos(theta));
         let [x, y, z] = self.axes;
@@ -62,7 +62,7 @@ impl Frame {
     }
 }
 
-/// Frames 0 (base) to 6 (tool) at joint angles `q`.
+/// Computes the frames 0 (base) to 6 (tool) at joint angles `q`.
 pub fn chain(q: &Joints) -> [Frame; 7] {
     let mut frames = [Frame::BASE; 7];
     for (i, link) in LINKS.iter().enumerate() {
@@ -71,12 +71,13 @@ pub fn chain(q: &Joints) -> [Frame; 7] {
     frames
 }
 
-/// Tool frame at joint angles `q`.
+/// Computes the tool frame at joint angles `q`.
 pub fn tool(q: &Joints) -> Frame {
     chain(q)[6]
 }
 
-/// Geometric Jacobian, one entry for each joint: linear (m/rad) and angular (rad/rad) velocity of the tool.
+/// Computes the geometric Jacobian, one entry for each joint: linear (m/rad) and angular (rad/rad) velocity of the
+/// tool.
 pub fn jacobian(frames: &[Frame; 7]) -> [(Vector, Vector); 6] {
     let tip = frames[6].position;
     core::array::from_fn(|i| {
@@ -85,7 +86,7 @@ pub fn jacobian(frames: &[Frame; 7]) -> [(Vector, Vector); 6] {
     })
 }
 
-/// Where the tool should be and in which direction it should point; the turn about that direction is free.
+/// A target position and direction of the tool; the turn about that direction is free.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Goal {
     /// Tool position, m.
@@ -104,7 +105,7 @@ pub struct PoseError {
     pub rotation: Vector,
 }
 
-/// Error of the tool frame `tool` with respect to `goal`.
+/// Computes the error of the tool frame `tool` with respect to `goal`.
 pub fn pose_error(tool: &Frame, goal: &Goal) -> PoseError {
     let normal = cross(tool.z(), goal.axis);
     let sine = norm(normal);
@@ -113,27 +114,27 @@ pub fn pose_error(tool: &Frame, goal: &Goal) -> PoseError {
     PoseError { position: subtract(goal.position, tool.position), rotation }
 }
 
-/// Sum of two vectors.
+/// Adds two vectors.
 pub fn add(a: Vector, b: Vector) -> Vector {
     core::array::from_fn(|i| a[i] + b[i])
 }
 
-/// `a - b`.
+/// Computes `a - b`.
 pub fn subtract(a: Vector, b: Vector) -> Vector {
     core::array::from_fn(|i| a[i] - b[i])
 }
 
-/// `a` times the number `factor`.
+/// Multiplies `a` by the number `factor`.
 pub fn scale(a: Vector, factor: f64) -> Vector {
     a.map(|x| x * factor)
 }
 
-/// Scalar product.
+/// Computes the scalar product.
 pub fn dot(a: Vector, b: Vector) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Euclidean length.
+/// Computes the Euclidean length.
 pub fn norm(a: Vector) -> f64 {
     dot(a, a).sqrt()
 }

@@ -23,12 +23,12 @@ pub mod task;
 
 use std::path::Path;
 
-/// The folder of the trained policy and its recordings.
+/// Returns the folder of the trained policy and its recordings.
 pub fn policy_folder() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/policy"))
 }
 
-/// The folder of the policy that makes its chunks of noise, with its recordings.
+/// Returns the folder of the flow policy, whose chunks start from noise, with its recordings.
 pub fn flow_folder() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/flow"))
 }

@@ -17,49 +17,49 @@ pub struct PolicyPipe {
 }
 
 impl PolicyPipe {
-    /// Starts a command, given as a shell reads it.
+    /// Starts a command given in shell syntax.
     ///
     /// # Errors
-    /// If it cannot be started.
+    /// The command cannot start.
     pub fn start(command: &str) -> Result<Self> {
         let mut shell = Command::new("sh");
         shell.arg("-c").arg(format!("exec {command}")).stdin(Stdio::piped()).stdout(Stdio::piped());
         let mut child = shell.spawn().with_context(|| format!("start {command}"))?;
-        let requests = child.stdin.take().context("no pipe to the policy")?;
-        let answers = BufReader::new(child.stdout.take().context("no pipe from the policy")?);
+        let requests = child.stdin.take().context("the policy has no standard input")?;
+        let answers = BufReader::new(child.stdout.take().context("the policy has no standard output")?);
         Ok(Self { child, requests, answers })
     }
 
     /// Resets the policy; call it before every episode.
     ///
     /// # Errors
-    /// If the policy has ended.
+    /// The policy has ended.
     pub fn reset(&mut self) -> Result<()> {
-        self.requests.write_all(&[RESET]).context("reset the policy")
+        self.requests.write_all(&[RESET]).context("cannot reset the policy")
     }
 
-    /// The next action (joint velocities, rad/s); not a number where the policy has none.
+    /// Returns the next action (joint velocities, rad/s); NaN if the policy has none.
     ///
     /// # Errors
-    /// If the policy has ended.
+    /// The policy has ended.
     pub fn act(&mut self, obs: &[f32; OBS_DIM]) -> Result<[f32; ACT_DIM]> {
         let request: Vec<u8> = [STEP].into_iter().chain(obs.iter().flat_map(|x| x.to_le_bytes())).collect();
-        self.requests.write_all(&request).context("show the policy an observation")?;
+        self.requests.write_all(&request).context("cannot send an observation to the policy")?;
         let mut answer = [0; 4 * ACT_DIM];
-        self.answers.read_exact(&mut answer).context("read the policy's action")?;
+        self.answers.read_exact(&mut answer).context("cannot read the policy's action")?;
         let (values, _) = answer.as_chunks::<4>();
         Ok(core::array::from_fn(|i| f32::from_le_bytes(values[i])))
     }
 
-    /// Ends the policy, and waits until it has.
+    /// Closes the pipe, and waits until the policy has ended.
     ///
     /// # Errors
-    /// If it has failed.
+    /// The policy has failed.
     pub fn finish(self) -> Result<()> {
         let Self { mut child, requests, answers } = self;
         drop((requests, answers));
-        let status = child.wait().context("wait for the policy")?;
-        ensure!(status.success(), "the policy has failed: {status}");
+        let status = child.wait().context("cannot wait for the policy")?;
+        ensure!(status.success(), "the policy failed: {status}");
         Ok(())
     }
 }

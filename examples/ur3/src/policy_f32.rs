@@ -1,4 +1,4 @@
-//! Plain `f32` runner of an exported policy: the baseline against which quantized policies are judged.
+//! Plain `f32` runner of an exported policy: the baseline for quantized policies.
 
 use std::collections::{HashMap, VecDeque};
 use std::f64::consts::TAU;
@@ -11,14 +11,13 @@ use serde_json::Value;
 use crate::random::Random;
 use crate::{ACT_DIM, OBS_DIM};
 
-/// What a flow's observation is limited to once it is normalised: the default of policy.json.
+/// Limit of a flow's normalised observation: the default of policy.json.
 const OBS_CLIP: f32 = 5.0;
-/// Of a flow's noise, from each reset on.
+/// Seed of a flow's noise after each reset.
 const NOISE_SEED: u64 = 1;
 
-/// A chunk policy: the network proposes a chunk of actions, the first `execute` of them are played, then it is asked
-/// again. The chunk is the network's output, or a flow's: noise that has followed the velocities that the network
-/// gives.
+/// A chunk policy: the network proposes a chunk of actions, and the first `execute` of them are played before the next
+/// evaluation. The chunk is the network's output; for a flow it is noise that has followed the network's velocities.
 #[derive(Debug)]
 pub struct PolicyF32 {
     layers: Vec<Layer>,
@@ -28,11 +27,11 @@ pub struct PolicyF32 {
     queue: VecDeque<[f32; ACT_DIM]>,
 }
 
-/// How a chunk comes of noise: by Euler steps from time 0 to 1.
+/// The denoising of a flow: Euler steps from time 0 to 1.
 #[derive(Debug)]
 struct Flow {
     normalize: Op,
-    /// The network reads cosine and sine of the time at these, in turns.
+    /// Frequencies: the network reads cosine and sine of the time at these, alternating.
     freq: Vec<f32>,
     steps: usize,
     /// Values of a chunk.
@@ -42,10 +41,10 @@ struct Flow {
 
 #[derive(Debug)]
 struct Layer {
-    /// Names of the values that are read one behind the other; where there are none, the output before.
+    /// Names of the concatenated inputs; without names, the previous output.
     input: Vec<String>,
     op: Op,
-    /// Name under which the output is kept.
+    /// Name of the stored output.
     save: Option<String>,
 }
 
@@ -85,8 +84,8 @@ impl PolicyF32 {
     /// Loads `policy.json` and `policy.safetensors` from the folder `dir`.
     ///
     /// # Errors
-    /// If a file is missing or malformed, or if the policy does not map [`OBS_DIM`] observations to chunks of
-    /// [`ACT_DIM`] actions.
+    /// A file is missing or malformed, or the policy does not map [`OBS_DIM`] observations to chunks of [`ACT_DIM`]
+    /// actions.
     pub fn load(dir: &Path) -> Result<Self> {
         let json_path = dir.join("policy.json");
         let tensor_path = dir.join("policy.safetensors");
@@ -147,7 +146,7 @@ impl PolicyF32 {
         Ok(Self { layers, flow, execute, contract, queue: VecDeque::new() })
     }
 
-    /// Forgets the queued actions and begins the noise anew; call it before every episode.
+    /// Clears the queued actions and restarts the noise; call it before every episode.
     pub fn reset(&mut self) {
         self.queue.clear();
         if let Some(flow) = &mut self.flow {
@@ -155,15 +154,15 @@ impl PolicyF32 {
         }
     }
 
-    /// Whether its output depends on noise.
+    /// Returns `true` if its output depends on noise.
     pub fn draws(&self) -> bool {
         self.flow.is_some()
     }
 
-    /// The next action (joint velocities, rad/s) at the observation `obs` ([`OBS_DIM`] values).
+    /// Returns the next action (joint velocities, rad/s) for the observation `obs` ([`OBS_DIM`] values).
     ///
     /// # Panics
-    /// If `obs` has another length.
+    /// `obs` has another length.
     pub fn act(&mut self, obs: &[f32]) -> [f32; ACT_DIM] {
         if self.queue.is_empty() {
             let raw = self.raw(obs);
@@ -173,10 +172,10 @@ impl PolicyF32 {
         self.queue.pop_front().expect("execute is at least 1")
     }
 
-    /// The network's output at `obs` ([`OBS_DIM`] values): normalised actions, chunk step by chunk step.
+    /// Computes the network's output for `obs` ([`OBS_DIM`] values): normalised actions, chunk step by chunk step.
     ///
     /// # Panics
-    /// If `obs` has another length.
+    /// `obs` has another length.
     pub fn raw(&mut self, obs: &[f32]) -> Vec<f32> {
         assert_eq!(obs.len(), OBS_DIM, "length of the observation");
         match &mut self.flow {
@@ -186,7 +185,7 @@ impl PolicyF32 {
     }
 }
 
-/// The output of layers for `x`, and for what else they read by its name.
+/// Runs layers on `x`, and on the values that they read by name.
 fn run<'a>(layers: &'a [Layer], mut x: Vec<f32>, mut saved: HashMap<&'a str, Vec<f32>>) -> Vec<f32> {
     for layer in layers {
         if !layer.input.is_empty() {
@@ -303,7 +302,7 @@ fn read_op(op: &Value, tensors: &SafeTensors<'_>, width: usize, saved: &HashMap<
     })
 }
 
-/// The `f32` tensor `name`, which must have shape `shape`.
+/// Reads the `f32` tensor `name`, which must have shape `shape`.
 fn tensor(tensors: &SafeTensors<'_>, name: &str, shape: &[usize]) -> Result<Vec<f32>> {
     let view = tensors.tensor(name).with_context(|| format!("tensor {name}"))?;
     ensure!(view.dtype() == Dtype::F32, "tensor {name} has type {:?}, expected F32", view.dtype());
@@ -312,7 +311,7 @@ fn tensor(tensors: &SafeTensors<'_>, name: &str, shape: &[usize]) -> Result<Vec<
     Ok(values.iter().map(|&bytes| f32::from_le_bytes(bytes)).collect())
 }
 
-/// The names in `input`: none, one, or a list.
+/// Parses the names in `input`: none, one, or a list.
 fn inputs(op: &Value) -> Result<Vec<String>> {
     let name = |name: &Value| name.as_str().map(str::to_owned);
     match op.get("input") {
@@ -324,22 +323,22 @@ fn inputs(op: &Value) -> Result<Vec<String>> {
 }
 
 fn text<'a>(object: &'a Value, key: &str) -> Result<&'a str> {
-    object.get(key).and_then(Value::as_str).with_context(|| format!("no text {key:?}"))
+    object.get(key).and_then(Value::as_str).with_context(|| format!("{key:?} is not text"))
 }
 
 fn list<'a>(object: &'a Value, key: &str) -> Result<&'a [Value]> {
-    object.get(key).and_then(Value::as_array).map(Vec::as_slice).with_context(|| format!("no list {key:?}"))
+    object.get(key).and_then(Value::as_array).map(Vec::as_slice).with_context(|| format!("{key:?} is not a list"))
 }
 
 fn count(object: &Value, key: &str) -> Result<usize> {
-    let number = object.get(key).and_then(Value::as_u64).with_context(|| format!("no whole number {key:?}"))?;
+    let number = object.get(key).and_then(Value::as_u64).with_context(|| format!("{key:?} is not a whole number"))?;
     // The bound keeps products of sizes far from overflow.
     ensure!(number <= 1 << 16, "{key:?} = {number} is too large");
     Ok(number as usize)
 }
 
 fn positive(object: &Value, key: &str) -> Result<f32> {
-    let number = object.get(key).and_then(Value::as_f64).with_context(|| format!("no number {key:?}"))?;
+    let number = object.get(key).and_then(Value::as_f64).with_context(|| format!("{key:?} is not a number"))?;
     ensure!(number > 0.0, "{key:?} = {number} is not positive");
     Ok(number as f32)
 }
@@ -376,7 +375,7 @@ mod tests {
     }
 
     #[test]
-    fn plays_the_first_actions_of_a_chunk_through_the_contract() {
+    fn chunk_actions_pass_through_the_contract() {
         let mut policy = linear_policy(3, |_| ()).unwrap();
         let obs = [0.0; OBS_DIM];
         assert_eq!(policy.raw(&obs).len(), 3 * ACT_DIM);
@@ -397,7 +396,7 @@ mod tests {
     }
 
     #[test]
-    fn bad_policies_are_errors() {
+    fn malformed_policies_are_refused() {
         for (key, value) in [
             ("chunk", json!(4)),
             ("kind", json!("diffusion")),

@@ -7,7 +7,7 @@ use core::f64::consts::TAU;
 pub struct Random(u64);
 
 impl Random {
-    /// Generator for a seed; equal seeds give equal sequences.
+    /// Creates the generator of a seed; equal seeds give equal sequences.
     pub fn new(seed: u64) -> Self {
         Self(seed)
     }
@@ -20,17 +20,17 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// Uniform in `[0, 1)`.
+    /// Draws a uniform number in `[0, 1)`.
     pub fn unit(&mut self) -> f64 {
         (self.next_u64() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Uniform in `[low, high)`.
+    /// Draws a uniform number in `[low, high)`.
     pub fn range(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
     }
 
-    /// Normal with mean 0 and standard deviation 1 (Box-Muller).
+    /// Draws a normal number with mean 0 and standard deviation 1 (Box-Muller).
     pub fn normal(&mut self) -> f64 {
         // `1 - unit` is in (0, 1], so the logarithm is finite.
         let radius = (-2.0 * libm::log(1.0 - self.unit())).sqrt();

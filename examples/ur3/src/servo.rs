@@ -27,8 +27,8 @@ const FRICTION: f64 = 0.3;
 /// Speed at which friction has half its full value, rad/s; keeps friction continuous through standstill.
 const FRICTION_SPEED: f64 = 0.01;
 
-/// Six joints with velocity loops. The loop is proportional: friction leaves a small velocity error, and a push moves
-/// the joint for good, so that whoever sends the commands must correct the position.
+/// Six joints with velocity loops. The loop is proportional: friction leaves a small velocity error, and a push
+/// displaces the joint permanently, so that the source of the commands must correct the position.
 #[derive(Clone, Debug)]
 pub struct Servo {
     /// Joint angles, rad.
@@ -39,13 +39,13 @@ pub struct Servo {
 }
 
 impl Servo {
-    /// Joints at rest at `angle` (rad).
+    /// Creates joints at rest at `angle` (rad).
     pub fn new(angle: Joints) -> Self {
         Self { angle, velocity: [0.0; 6], in_flight: [[0.0; 6]; DELAY] }
     }
 
-    /// Runs one control step (20 ms) with velocity command `command` (rad/s, clamped to [`COMMAND_LIMIT`]) while
-    /// something outside accelerates the joints by `push` (rad/s²).
+    /// Runs one control step (20 ms) with velocity command `command` (rad/s, clamped to [`COMMAND_LIMIT`]) while an
+    /// external force accelerates the joints by `push` (rad/s²).
     pub fn step(&mut self, command: &Joints, push: &Joints) {
         let command = core::array::from_fn(|i| command[i].clamp(-COMMAND_LIMIT[i], COMMAND_LIMIT[i]));
         for _ in 0..PERIODS_PER_STEP {

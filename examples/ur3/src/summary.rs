@@ -1,11 +1,11 @@
-//! How many episodes went well, and how well.
+//! The share of successful episodes, and the mean errors.
 
 use serde_json::{Value, json};
 
 use crate::task::Outcome;
 
-/// What a run over episodes says of itself: `episodes`, `success` (their share), `ci` (its 95% interval), and the mean
-/// errors over the hold phases.
+/// Summarizes a run over episodes: `episodes`, `success` (their share), `ci` (its 95% interval), and the mean errors
+/// over the hold phases.
 pub fn summary(outcomes: &[Outcome]) -> Value {
     let successes = outcomes.iter().filter(|outcome| outcome.success).count();
     let mean = |part: fn(&Outcome) -> f64| outcomes.iter().map(part).sum::<f64>() / outcomes.len() as f64;
@@ -19,7 +19,8 @@ pub fn summary(outcomes: &[Outcome]) -> Value {
     })
 }
 
-/// The 95% interval of a share (Wilson: Probable inference, the law of succession, and statistical inference, 1927).
+/// Computes the 95% interval of a share (Wilson: Probable inference, the law of succession, and statistical inference,
+/// 1927).
 fn wilson(successes: f64, trials: f64) -> [f64; 2] {
     /// Quantile of the normal distribution.
     const Z: f64 = 1.96;

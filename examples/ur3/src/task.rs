@@ -6,7 +6,7 @@ use crate::random::Random;
 use crate::servo::Servo;
 use crate::{ACT_DIM, OBS_DIM};
 
-/// Control steps in a second.
+/// Control steps per second.
 pub const CONTROL_HZ: usize = 50;
 /// Control steps in an episode (4 s).
 pub const EPISODE_STEPS: usize = GOALS * STEPS_PER_GOAL;
@@ -25,9 +25,9 @@ const PUSH_START: (f64, f64) = (10.0, 50.0);
 const PUSH_STEPS: usize = 5;
 /// Largest acceleration of one joint by a push, rad/s².
 const PUSH_ACCELERATION: f64 = 12.0;
-/// How far from home the joints of start postures and goals are drawn, rad.
+/// Range of the random joints of start postures and goals around home, rad.
 const POSTURE_RANGE: Joints = [0.7, 0.3, 0.4, 0.4, 0.4, 0.6];
-/// Smallest height of the tool in a drawn posture, m: keeps it above the table.
+/// Smallest height of the tool in a random posture, m: keeps it above the table.
 const TABLE_CLEARANCE: f64 = 0.03;
 /// Smallest distance between consecutive postures' tool positions, m: every goal needs a motion.
 const SMALLEST_REACH: f64 = 0.10;
@@ -53,10 +53,10 @@ pub struct Task {
     held: [(f64, f64); GOALS],
 }
 
-/// How an episode went.
+/// The result of an episode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outcome {
-    /// Whether the mean errors of every hold phase are within [`POSITION_TOLERANCE`] and [`AXIS_TOLERANCE`].
+    /// `true` if the mean errors of every hold phase are within [`POSITION_TOLERANCE`] and [`AXIS_TOLERANCE`].
     pub success: bool,
     /// Distance between tool and goal at the end of the episode, m.
     pub final_error_m: f64,
@@ -67,7 +67,7 @@ pub struct Outcome {
 }
 
 impl Task {
-    /// Episode with start posture, goals, pushes and noise drawn from `seed`.
+    /// Creates an episode with start posture, goals, pushes and noise drawn from `seed`.
     pub fn new(seed: u64) -> Self {
         let mut random = Random::new(seed);
         let start = draw_posture(&mut random);
@@ -98,14 +98,14 @@ impl Task {
         task
     }
 
-    /// The current observation: joint angles (6, rad), joint velocities (6, rad/s), goal minus tool position (3, m),
-    /// rotation vector from tool axis to goal axis (3, rad), all with noise, vectors in the base frame.
+    /// Returns the current observation: joint angles (6, rad), joint velocities (6, rad/s), goal minus tool position
+    /// (3, m), rotation vector from tool axis to goal axis (3, rad), all with noise, vectors in the base frame.
     pub fn observe(&self) -> [f32; OBS_DIM] {
         self.observation
     }
 
-    /// Runs one control step (20 ms) with joint velocity commands `action` (rad/s). A value that is not a number
-    /// counts as 0, as a servo's watchdog would have it. No effect once the episode is over.
+    /// Runs one control step (20 ms) with joint velocity commands `action` (rad/s). NaN counts as 0, as with a servo's
+    /// watchdog. No effect after the end of the episode.
     pub fn step(&mut self, action: &[f32; ACT_DIM]) {
         if self.is_over() {
             return;
@@ -126,17 +126,17 @@ impl Task {
         self.sense();
     }
 
-    /// Whether all [`EPISODE_STEPS`] are done.
+    /// Returns `true` after all [`EPISODE_STEPS`].
     pub fn is_over(&self) -> bool {
         self.step == EPISODE_STEPS
     }
 
-    /// The expert's next commands from the true state of the arm, rad/s; see [`expert::plan`].
+    /// Returns the expert's next commands from the true state of the arm, rad/s; see [`expert::plan`].
     pub fn expert_plan(&self) -> [Joints; crate::CHUNK] {
         expert::plan(&self.servo, &self.goals[self.phase()])
     }
 
-    /// How the episode went; meaningful once it is over.
+    /// Returns the result of the episode; meaningful after its end.
     pub fn result(&self) -> Outcome {
         let mean = |part: fn(&(f64, f64)) -> f64| self.held.iter().map(part).sum::<f64>() / GOALS as f64;
         Outcome {
@@ -169,7 +169,7 @@ impl Task {
 }
 
 /// Runs the episode of `seed` with a policy from observation ([`OBS_DIM`] values) to joint velocity commands (rad/s).
-/// A policy that keeps a state, such as a queue of actions, must be reset by the caller before.
+/// The caller must first reset a policy with a state, such as a queue of actions.
 pub fn run_episode<P: FnMut(&[f32]) -> [f32; 6]>(seed: u64, mut policy: P) -> Outcome {
     let mut task = Task::new(seed);
     while !task.is_over() {
@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn steps_after_the_end_and_nan_actions_are_harmless() {
+    fn late_steps_and_nan_actions_are_harmless() {
         let mut task = Task::new(1);
         for _ in 0..EPISODE_STEPS + 5 {
             task.step(&[f32::NAN; 6]);

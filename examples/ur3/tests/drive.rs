@@ -12,7 +12,7 @@ fn drive(policy: &str, round: &str) -> Output {
 }
 
 #[test]
-fn one_json_object_says_how_it_went() {
+fn the_drive_prints_one_json_object() {
     // 200 actions of zeros: the arm never moves.
     let output = drive("sh -c 'head -c 4800 /dev/zero; cat > /dev/null'", "1");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -22,10 +22,10 @@ fn one_json_object_says_how_it_went() {
 }
 
 #[test]
-fn what_cannot_be_driven_is_an_error() {
+fn a_failing_policy_is_an_error() {
     for (policy, round, words) in [
         ("exit 1", "0", "policy"),
-        ("sh -c 'head -c 4800 /dev/zero; cat > /dev/null; exit 3'", "0", "the policy has failed: exit status: 3"),
+        ("sh -c 'head -c 4800 /dev/zero; cat > /dev/null; exit 3'", "0", "the policy failed: exit status: 3"),
         ("cat", "180", "kept for evaluation and training"),
     ] {
         let output = drive(policy, round);

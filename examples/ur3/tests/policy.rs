@@ -23,7 +23,7 @@ fn shipped_policies_solve_the_task() {
 }
 
 #[test]
-fn recorded_outputs_are_those_of_the_policy() {
+fn recorded_outputs_match_the_policy() {
     let mut policy = PolicyF32::load(policy_folder()).unwrap();
     for name in ["calib.npz", "heldout.npz"] {
         let mut npz = NpzReader::new(File::open(policy_folder().join(name)).unwrap()).unwrap();
@@ -39,7 +39,7 @@ fn recorded_outputs_are_those_of_the_policy() {
             assert_eq!(obs.len(), OBS_DIM);
             let raw = policy.raw(&obs.to_vec());
             assert_eq!(raw.len(), action.len());
-            // Room for another order of summation, nothing more.
+            // Tolerance for another order of summation only.
             let worst = raw.iter().zip(action).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
             assert!(worst < 1e-4, "{name}: outputs differ by {worst}");
         }

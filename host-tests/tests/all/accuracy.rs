@@ -1,4 +1,4 @@
-//! The error of quantized policies on held-out recordings: 8 bits, and GPTQ against round to nearest.
+//! Errors of quantized policies on held-out recordings: 8 bits, and GPTQ against round to nearest.
 
 use actq::budget::Budget;
 use actq::data::Recordings;
@@ -13,7 +13,7 @@ use anyhow::Result;
 
 use crate::on_target::qemu::rtn;
 
-/// Held-out NMSE at 8 bits, round to nearest, as the command quantizes by default.
+/// Held-out NMSE at 8 bits, round to nearest, with the command's defaults.
 #[test]
 fn eight_bits_stay_close_to_the_recorded_actions() -> Result<()> {
     let mut limits = vec![(ur3(), 1e-3, 2e-3)];
@@ -28,7 +28,7 @@ fn eight_bits_stay_close_to_the_recorded_actions() -> Result<()> {
             let buffer = ImageBuffer::new(&rtn(&policy, Width::W8, 32, activations)?);
             let image = buffer.image(&dir)?;
             let report = eval::evaluate(image, &eval::heldout(&dir, &image)?)?;
-            assert!(report.nmse < limit, "{}, {activations:?}: {} against {limit}", policy.name, report.nmse);
+            assert!(report.nmse < limit, "{}, {activations:?}: {}, limit {limit}", policy.name, report.nmse);
         }
     }
     Ok(())

@@ -1,5 +1,5 @@
-//! Which source file uses which, in every crate of the workspace: no dependency cycles between files, and, in a library,
-//! only the arrows between folders that `docs/ARCHITECTURE.md` has in its tables.
+//! Dependencies between source files in every crate of the workspace: no dependency cycles between files, and, in a
+//! library, only the arrows between folders that `docs/ARCHITECTURE.md` has in its tables.
 
 mod uses;
 
@@ -18,7 +18,7 @@ type Module = Vec<String>;
 /// The modules of a crate, and the paths in their files.
 type Sources = BTreeMap<Module, Vec<Parts>>;
 
-/// Reads the files below `folder` by module. The crate's root is the file `root`; the other roots beside it, and the
+/// Reads the files below `folder` by module. The file `root` is the crate's root; the other roots beside it, and the
 /// folder `bin`, are crates of their own.
 fn read(folder: &Path, root: &str) -> Result<Sources> {
     let (mut sources, mut tests) = (Sources::new(), Vec::new());
@@ -49,7 +49,7 @@ fn child(module: &Module, name: &str) -> Module {
     module.iter().cloned().chain([name.to_owned()]).collect()
 }
 
-/// The file that `path`, in the file of `module`, leads to, if it is one of the crate.
+/// Returns the file of this crate that `path`, in the file of `module`, refers to.
 fn target(sources: &Sources, module: &Module, path: &[String]) -> Option<Module> {
     let (first, rest) = path.split_first()?;
     let (mut at, rest) = match first.as_str() {
@@ -73,7 +73,7 @@ fn target(sources: &Sources, module: &Module, path: &[String]) -> Option<Module>
     (at != *module).then_some(at)
 }
 
-/// From every file the files that it uses.
+/// Returns for every file the files that it uses.
 fn arrows(sources: &Sources) -> BTreeMap<&Module, BTreeSet<Module>> {
     sources.iter().map(|(module, paths)| (module, targets(sources, module, paths))).collect()
 }
@@ -82,10 +82,10 @@ fn targets(sources: &Sources, module: &Module, paths: &[Parts]) -> BTreeSet<Modu
     paths.iter().filter_map(|path| target(sources, module, path)).collect()
 }
 
-/// A cycle of files, if there is one.
+/// Returns a cycle of files, if there is one.
 fn cycle(arrows: &BTreeMap<&Module, BTreeSet<Module>>) -> Option<String> {
     let mut left: BTreeSet<&Module> = arrows.keys().copied().collect();
-    // Files that use none of those that are left are in no cycle.
+    // A file that uses none of the remaining files is in no cycle.
     while let Some(leaf) = left.iter().copied().find(|module| !arrows[module].iter().any(|to| left.contains(to))) {
         left.remove(leaf);
     }
@@ -104,12 +104,12 @@ fn name(module: &Module) -> String {
     if module.is_empty() { "lib".to_owned() } else { module.join("::") }
 }
 
-/// The folder that a file stands in; a file beside `lib.rs` is a folder of its own.
+/// Returns the folder of a file; a file beside `lib.rs` is a folder of its own.
 fn folder(module: &Module) -> String {
     module.first().cloned().unwrap_or("lib".to_owned())
 }
 
-/// From every folder the folders that it uses.
+/// Returns for every folder the folders that it uses.
 fn folders(arrows: &BTreeMap<&Module, BTreeSet<Module>>) -> BTreeMap<String, BTreeSet<String>> {
     let mut folders: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     for (from, to) in arrows {
@@ -120,7 +120,7 @@ fn folders(arrows: &BTreeMap<&Module, BTreeSet<Module>>) -> BTreeMap<String, BTr
     folders
 }
 
-/// The table below the heading `### title` in `text`: folder and what it may use.
+/// Parses the table below the heading `### title` in `text`: folder and allowed uses.
 fn table(text: &str, title: &str) -> Option<BTreeMap<String, BTreeSet<String>>> {
     let (_, section) = text.split_once(&format!("\n### `{title}`\n"))?;
     let rows = section.lines().take_while(|line| !line.starts_with('#')).filter(|line| line.starts_with("| `"));
@@ -138,7 +138,7 @@ fn rows(folders: &BTreeMap<String, BTreeSet<String>>) -> String {
     folders.iter().map(|(folder, uses)| format!("| `{folder}` | {} |\n", list(uses))).collect()
 }
 
-/// What is wrong with a crate whose folders may use what `allowed` says.
+/// Checks a crate against the allowed uses of its folders.
 fn check(sources: &Sources, allowed: &BTreeMap<String, BTreeSet<String>>) -> Result<()> {
     let arrows = arrows(sources);
     let found = folders(&arrows);
@@ -156,23 +156,24 @@ fn check(sources: &Sources, allowed: &BTreeMap<String, BTreeSet<String>>) -> Res
     }
     for (from, uses) in allowed {
         for to in uses.difference(found.get(from).unwrap_or(&missing)) {
-            wrong.push(format!("{from} -> {to} stands in the table, and nothing needs it"));
+            wrong.push(format!("{from} -> {to} is in the table, but nothing needs it"));
         }
     }
     for from in found.keys().filter(|from| !allowed.contains_key(*from)) {
-        wrong.push(format!("{from} has no row"));
+        wrong.push(format!("{from} has no row in the table"));
     }
-    wrong.extend(cycle(&arrows).map(|cycle| format!("a cycle of files: {cycle}")));
-    ensure!(wrong.is_empty(), "{}\n\nAs it is:\n{}", wrong.join("\n"), rows(&found));
+    wrong.extend(cycle(&arrows).map(|cycle| format!("dependency cycle: {cycle}")));
+    ensure!(wrong.is_empty(), "{}\n\nThe table should be:\n{}", wrong.join("\n"), rows(&found));
     Ok(())
 }
 
-/// The folders of the workspace's crates, with the name of the root file: of each package its library or program, and
-/// its programs of several files.
+/// Returns the folders of the workspace's crates, with the name of the root file: of each package its library or
+/// program, and its programs of several files.
 fn crates() -> Result<Vec<(String, &'static str)>> {
     let manifest = fs::read_to_string(root().join("Cargo.toml")).context("Cargo.toml")?;
     let members = manifest.split_once("members = [").and_then(|(_, rest)| Some(rest.split_once(']')?.0));
-    let members = members.context("the workspace has no members")?.split(',').map(|name| name.trim().trim_matches('"'));
+    let members =
+        members.context("Cargo.toml has no workspace members")?.split(',').map(|name| name.trim().trim_matches('"'));
     let mut crates = Vec::new();
     for member in members.filter(|member| !member.is_empty()) {
         let source = format!("{member}/src");
@@ -191,16 +192,16 @@ fn crates() -> Result<Vec<(String, &'static str)>> {
     Ok(crates)
 }
 
-/// An error if files of a crate use each other.
+/// Returns an error if files of a crate use each other.
 fn no_cycle(sources: &Sources) -> Result<()> {
     match cycle(&arrows(sources)) {
-        Some(cycle) => bail!("a cycle of files: {cycle}"),
+        Some(cycle) => bail!("dependency cycle: {cycle}"),
         None => Ok(()),
     }
 }
 
 #[test]
-fn crates_have_the_arrows_of_the_architecture_and_no_cycles() -> Result<()> {
+fn crates_follow_the_tables_and_have_no_cycles() -> Result<()> {
     let text = fs::read_to_string(root().join("docs/ARCHITECTURE.md")).context("docs/ARCHITECTURE.md")?;
     let titles: BTreeSet<&str> =
         text.lines().filter_map(|line| line.strip_prefix("### `")?.strip_suffix('`')).collect();
@@ -209,17 +210,17 @@ fn crates_have_the_arrows_of_the_architecture_and_no_cycles() -> Result<()> {
     for (folder, root_file) in &crates {
         let sources = read(&root().join(folder), root_file)?;
         let allowed = table(&text, folder);
-        // Between two files there is nothing to decide, and a program is its own only user.
+        // Two files leave no choice, and a program is its own only user.
         let is_small = sources.len() <= 2 || folders(&arrows(&sources)).values().all(BTreeSet::is_empty);
         let outcome = match &allowed {
             Some(allowed) => check(&sources, allowed),
             None if is_small || *root_file == "main" => no_cycle(&sources),
-            None => check(&sources, &BTreeMap::new()).context("it has no table"),
+            None => check(&sources, &BTreeMap::new()).context("docs/ARCHITECTURE.md has no table of it"),
         };
         tables.extend(allowed.map(|_| folder.as_str()));
         wrong.extend(outcome.err().map(|error| format!("{folder}: {error:#}")));
     }
-    wrong.extend(titles.difference(&tables).map(|title| format!("{title}: there is a table, and no crate")));
+    wrong.extend(titles.difference(&tables).map(|title| format!("{title}: the table has no crate")));
     ensure!(wrong.is_empty(), "{}", wrong.join("\n\n"));
     Ok(())
 }
@@ -230,7 +231,7 @@ fn sources(files: &[(&str, &str)]) -> Sources {
 }
 
 #[test]
-fn paths_are_found_wherever_they_stand() {
+fn paths_are_found_everywhere_in_a_file() {
     let files = sources(&[
         ("", "pub mod a; pub mod b; pub const X: u8 = 1;"),
         ("a", "mod c;\nmod d;\npub use c::{self, Name as Other};\nfn f() { d::g(); }\n"),
@@ -249,7 +250,7 @@ fn paths_are_found_wherever_they_stand() {
     };
     assert_eq!(uses("a"), "a::c a::d");
     assert_eq!(uses("a::c"), "lib a::d b");
-    assert_eq!(uses("a::d"), "b::e", "comments, texts and tests do not count");
+    assert_eq!(uses("a::d"), "b::e", "comments, strings and tests do not count");
     assert_eq!(uses("b"), "", "other crates' modules of the same name do not count");
     assert_eq!(uses("b::e"), "b");
 }
@@ -271,9 +272,9 @@ fn forbidden_arrows_cycles_and_stale_rows_are_found() {
     let mut round = good;
     round[4].1 = "fn f() { super::y::g() }";
     let error = said(&round, &table).expect_err("z and y use each other");
-    assert!(error.contains("a cycle of files: b::y -> b::z -> b::y"), "{error}");
+    assert!(error.contains("dependency cycle: b::y -> b::z -> b::y"), "{error}");
     let error = said(&good, &[("lib", &["a"]), ("a", &["b"]), ("b", &[])]).expect_err("lib uses nothing");
-    assert!(error.contains("lib -> a stands in the table, and nothing needs it"), "{error}");
+    assert!(error.contains("lib -> a is in the table, but nothing needs it"), "{error}");
     let error = said(&good, &table[..2]).expect_err("b has no row");
     assert!(error.contains("b has no row"), "{error}");
 }

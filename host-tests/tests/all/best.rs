@@ -1,4 +1,4 @@
-//! The method best on whole policies: budgets, determinism, and the errors to stay below.
+//! The method best on whole policies: budgets, determinism, and limits of the error.
 
 use std::path::Path;
 
@@ -36,15 +36,15 @@ fn budgets_are_kept_and_used() -> Result<()> {
     let quantizer = Quantizer::new(&policy, &recordings, Method::Best, None, |_| {})?;
     for bits in [1.0, 1.5, 2.0, 2.5, 3.0, 4.0] {
         let bpw = report(&ur3(), &image(&quantizer, &best(bits, 2))?)?.bpw;
-        assert!(bpw <= bits && bpw > bits - 0.1, "{bpw} for {bits}");
+        assert!(bpw <= bits && bpw > bits - 0.1, "{bpw} bits for a budget of {bits}");
     }
-    let error = image(&quantizer, &best(1e-6, 2)).expect_err("nothing fits into so few bits");
+    let error = image(&quantizer, &best(1e-6, 2)).expect_err("no image is so small");
     assert!(error.is::<BudgetTooSmall>(), "{error}");
     Ok(())
 }
 
 #[test]
-fn the_image_does_not_depend_on_the_number_of_threads() -> Result<()> {
+fn the_image_is_independent_of_the_thread_count() -> Result<()> {
     let on = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
         pool.install(|| {
@@ -60,14 +60,14 @@ fn the_image_does_not_depend_on_the_number_of_threads() -> Result<()> {
 }
 
 #[test]
-fn an_image_fits_the_flash_that_it_is_given() -> Result<()> {
+fn an_image_fits_its_flash_budget() -> Result<()> {
     let policy = Policy::load(&ur3())?;
     let recordings = Recordings::load(&policy)?;
     let quantizer = Quantizer::new(&policy, &recordings, Method::Best, None, |_| {})?;
     for bytes in [64 << 10, 96 << 10, 200 << 10] {
         let options = Options { budget: Budget::ImageBytes(bytes), ..best(1.0, 2) };
         let len = image(&quantizer, &options)?.len();
-        assert!(len <= bytes && len > bytes - bytes / 10, "{len} for {bytes}");
+        assert!(len <= bytes && len > bytes - bytes / 10, "{len} bytes for a budget of {bytes}");
     }
     let tiny = Options { budget: Budget::ImageBytes(1000), ..best(1.0, 2) };
     assert!(image(&quantizer, &tiny).is_err());
@@ -97,7 +97,7 @@ fn another_seed_gives_another_image() -> Result<()> {
     Ok(())
 }
 
-/// Errors below half of GPTQ's at about the same bits (GPTQ has one scale a row and one width, so it gets a little
+/// Errors below half of GPTQ's at about the same bits (GPTQ has one scale per row and one width, so it gets slightly
 /// more), after a share of the default steps.
 fn halves_gptq(dir: &Path, steps: usize) -> Result<()> {
     let policy = Policy::load(dir)?;
@@ -114,19 +114,19 @@ fn halves_gptq(dir: &Path, steps: usize) -> Result<()> {
 }
 
 #[test]
-fn the_ur3_head_has_less_than_half_of_gptqs_error() -> Result<()> {
+fn the_ur3_head_halves_gptqs_error() -> Result<()> {
     halves_gptq(&ur3(), 1000)
 }
 
 #[test]
-fn a_recurrent_policy_has_less_than_half_of_gptqs_error() -> Result<()> {
+fn a_recurrent_policy_halves_gptqs_error() -> Result<()> {
     let Some(policies) = shared_policies() else { return Ok(()) };
     halves_gptq(&policies.join("g1_lstm256"), 250)
 }
 
-/// Its columns are balanced: without that its error was 3.8e-2.
+/// The method balances its columns: unbalanced, its error was 3.8e-2.
 #[test]
-fn a_recurrent_policy_that_does_not_normalize_stays_below_its_error() -> Result<()> {
+fn a_recurrent_policy_without_normalization_keeps_its_error() -> Result<()> {
     let Some(policies) = shared_policies() else { return Ok(()) };
     let dir = policies.join("g1_lstm64");
     let policy = Policy::load(&dir)?;
@@ -139,7 +139,7 @@ fn a_recurrent_policy_that_does_not_normalize_stays_below_its_error() -> Result<
     Ok(())
 }
 
-/// The whole learning, as the command does it by default, where it takes least, and the first steps of others.
+/// All learning steps, as the command's default, for the smallest policies, and the first steps for the others.
 #[test]
 fn shared_policies_keep_their_errors() -> Result<()> {
     let Some(policies) = shared_policies() else { return Ok(()) };

@@ -1,4 +1,4 @@
-//! Budgets of bits and bytes on drawn networks: they are kept and used, and refused only where no image meets them.
+//! Budgets of bits and bytes on random networks: images keep and use them, and a refusal names the least budget.
 
 use actq::budget::{Budget, BudgetTooSmall};
 use actq::data::{Dataset, Recordings};
@@ -28,7 +28,7 @@ struct Shape {
     seed: u64,
 }
 
-/// A multilayer perceptron of the shape, without or with biases and a norm behind its first layer.
+/// A multilayer perceptron of the shape, without or with biases and a norm after its first layer.
 fn policy(shape: &Shape) -> Result<Policy> {
     let mut random = Random::new(shape.seed);
     let mut graph = Graph::new(shape.sizes[0]);
@@ -39,7 +39,7 @@ fn policy(shape: &Shape) -> Result<Policy> {
         let matrix = graph.add_matrix(WeightMatrix { name: format!("w{layer}"), rows, cols, data })?;
         let bias = (0..rows).map(|_| if shape.biases { 0.1 * random.normal() } else { 0.0 }).collect();
         value = graph.add(Linear { matrix, bias }, &[value])?;
-        // The norm of a few values says little of them.
+        // The norm of a few values is no sound statistic.
         if shape.norm && layer == 0 && rows > 4 {
             value = graph.add(LayerNorm { weight: vec![1.0; rows], bias: vec![0.0; rows], eps: 1e-5 }, &[value])?;
         }
@@ -66,10 +66,10 @@ fn quantize(quantizer: &Quantizer<'_>, budget: Budget) -> Result<QuantizedPolicy
 }
 
 fn too_small(result: Result<impl Sized>) -> Result<BudgetTooSmall> {
-    result.err().context("it was not refused")?.downcast::<BudgetTooSmall>()
+    result.err().context("expected a refusal")?.downcast::<BudgetTooSmall>()
 }
 
-/// The fewest bytes that one row with more bits takes: of `outcome`'s rows, sorted where they were sorted.
+/// The fewest bytes of a row with more bits: of `outcome`'s rows, in their sorted order, if sorted.
 fn next_row(outcome: &Outcome, sorted: bool) -> Option<usize> {
     let widths = &outcome.quantized.widths;
     let widened = |row: usize, width: Width| {
@@ -84,13 +84,13 @@ fn next_row(outcome: &Outcome, sorted: bool) -> Option<usize> {
     (0..widths.len()).flat_map(of_row).map(|(row, width)| widened(row, width)).min()
 }
 
-/// That at least 97% is used, or nothing is left that takes as little as the rest.
+/// Requires that at least 97% is used, or that no remaining step fits.
 fn check_used(found: &QuantizedPolicy, options: &Options, left: usize) -> Result<()> {
     let Some(Unused { used, allowed, reason }) = Unused::of(found, options) else { return Ok(()) };
     let last = found.outcomes.len() - 1;
     let next = found.outcomes.iter().enumerate().filter_map(|(m, outcome)| next_row(outcome, m < last)).min();
     let fits = next.is_some_and(|next| next <= left);
-    ensure!(reason != Reason::Step || !fits, "{used} of {allowed} are used, {left} bytes left, a row takes {next:?}");
+    ensure!(reason != Reason::Step || !fits, "used {used} of {allowed} bytes, {left} left; a row takes {next:?}");
     Ok(())
 }
 
@@ -122,10 +122,10 @@ proptest! {
             for bytes in [least, least + (share * (most - least) as f64) as usize] {
                 let found = quantize(&quantizer, Budget::ImageBytes(bytes))?;
                 let len = found.image.len();
-                ensure!(len <= bytes, "{len} bytes for {bytes}");
+                ensure!(len <= bytes, "{len} bytes for a budget of {bytes}");
                 check_used(&found, &options(Method::Best, Budget::ImageBytes(bytes)), bytes - len)?;
             }
-            ensure!(too_small(quantize(&quantizer, Budget::ImageBytes(least - 1)))?.bytes == least, "another least");
+            ensure!(too_small(quantize(&quantizer, Budget::ImageBytes(least - 1)))?.bytes == least, "the refusal names another least budget");
             Ok(())
         };
         within().map_err(|error| TestCaseError::fail(format!("{error:#}")))?;
@@ -142,7 +142,7 @@ proptest! {
                 Err(error) => return error.downcast::<BudgetTooSmall>().map(drop),
             };
             let used = bits_per_weight(&found.buffer().image("drawn".as_ref())?);
-            ensure!(used <= bits, "{used} for {bits}");
+            ensure!(used <= bits, "{used} bits for a budget of {bits}");
             let left = (bits - used) * policy.weights as f64 / 8.0;
             check_used(&found, &options(Method::Best, Budget::BitsPerWeight(bits)), left as usize)
         };
@@ -163,7 +163,7 @@ fn every_method_names_the_smallest_image() -> Result<()> {
         let least = too_small(Ok(check(0)?)).context(method.to_string())?.bytes;
         ensure!(check(least - 1).is_err() && check(least).is_ok(), "{method}: {least} bytes are not the least");
         let len = quantize(&quantizer, Budget::ImageBytes(least)).context(method.to_string())?.image.len();
-        ensure!(len <= least && len + 4 > least, "{method}: {len} bytes for {least}");
+        ensure!(len <= least && len + 4 > least, "{method}: {len} bytes for a budget of {least}");
     }
     Ok(())
 }
@@ -176,13 +176,13 @@ fn a_learning_image_keeps_its_bytes() -> Result<()> {
     for bytes in [1200, 1600, 2200] {
         let options = Options { steps: Some(5), ..options(Method::Best, Budget::ImageBytes(bytes)) };
         let len = quantizer.quantize(&options, |_, _| {})?.image.len();
-        ensure!(len <= bytes && len as f64 >= 0.97 * bytes as f64, "{len} bytes for {bytes}");
+        ensure!(len <= bytes && len as f64 >= 0.97 * bytes as f64, "{len} bytes for a budget of {bytes}");
     }
     Ok(())
 }
 
 #[test]
-fn a_rest_that_is_not_used_has_a_reason() -> Result<()> {
+fn an_unused_remainder_has_a_reason() -> Result<()> {
     let shape = Shape { sizes: vec![9, 40, 3], biases: true, norm: false, seed: 5 };
     let mut policy = policy(&shape)?;
     let reason = |policy: &Policy, bits: f64| -> Result<Option<Reason>> {

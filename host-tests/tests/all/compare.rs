@@ -1,4 +1,4 @@
-//! The comparison, in little.
+//! A small comparison of methods.
 
 use std::fs;
 use std::path::Path;
@@ -21,7 +21,7 @@ fn plan(folder: &Path) -> Plan {
 }
 
 #[test]
-fn a_comparison_is_made_once_and_says_what_cannot_be_made() -> Result<()> {
+fn a_comparison_runs_once_and_explains_impossible_cells() -> Result<()> {
     let folder = tempfile::tempdir()?;
     let folder = folder.path().join("results");
     let plan = plan(&folder);
@@ -36,7 +36,7 @@ fn a_comparison_is_made_once_and_says_what_cannot_be_made() -> Result<()> {
     ensure!(found[0] == (None, None) && found[1..] == expected, "{found:?}");
     let success = |cell: &Cell| cell.driven.as_ref().and_then(|driven| driven["success"].as_f64());
     ensure!(success(&cells[0]) == Some(1.0), "{:?}", cells[0]);
-    let why = cells[2].why.as_deref().context("rtn has no 1.5 bits")?;
+    let why = cells[2].why.as_deref().context("rtn must be impossible at 1.5 bits")?;
     ensure!(why.contains("the least is 2.078 bits per weight, with one scale a row"), "{why}");
     ensure!(cells[2].made.is_none() && cells[2].driven.is_none(), "{:?}", cells[2]);
     for cell in [&cells[1], &cells[3], &cells[4]] {
@@ -60,34 +60,38 @@ fn a_comparison_is_made_once_and_says_what_cannot_be_made() -> Result<()> {
     let picture = fs::read_to_string(folder.join("compare.svg"))?;
     ensure!(picture.contains("ur3: success over bits per weight (f32: 100%)"), "{picture}");
 
-    // The seconds in it would be others.
+    // The seconds in it would differ.
     let journal = fs::read_to_string(folder.join("compare.jsonl"))?;
     run(&plan)?;
-    ensure!(fs::read_to_string(folder.join("compare.jsonl"))? == journal, "something was run again");
-    // A run that was ended within a line goes on behind the line before.
+    ensure!(fs::read_to_string(folder.join("compare.jsonl"))? == journal, "a finished cell ran again");
+    // A run that stopped within a line resumes after the line before it.
     let cut = journal.trim_end().rfind('\n').context("lines")? + 20;
     fs::write(folder.join("compare.jsonl"), &journal[..cut])?;
     run(&plan)?;
     let again = fs::read_to_string(folder.join("compare.jsonl"))?;
     ensure!(again[..cut] == journal[..cut] && again.lines().count() == journal.lines().count(), "{again}");
 
-    let error = run(&Plan { episodes: 3, ..plan.clone() }).err().context("other options")?.to_string();
+    let error =
+        run(&Plan { episodes: 3, ..plan.clone() }).err().context("expected a refusal of other options")?.to_string();
     ensure!(
         error.contains("compare.jsonl: holds results of other sources or options") && error.contains("--out"),
         "{error}"
     );
     fs::remove_file(folder.join("compare.md"))?;
     run(&Plan { report: true, ..plan })?;
-    ensure!(fs::read_to_string(folder.join("compare.md"))?.lines().count() == report.lines().count(), "another report");
+    ensure!(
+        fs::read_to_string(folder.join("compare.md"))?.lines().count() == report.lines().count(),
+        "the report differs"
+    );
     Ok(())
 }
 
 #[test]
-fn a_policy_that_is_not_there_is_named() -> Result<()> {
+fn a_missing_policy_is_named() -> Result<()> {
     let folder = tempfile::tempdir()?;
     let plan = Plan { policies: vec!["no_such_policy".to_owned()], ..plan(folder.path()) };
-    let error = run(&plan).err().context("no such policy")?.to_string();
-    // With the shared policies the folder is looked for, without them nothing is left.
+    let error = run(&plan).err().context("expected a refusal of the missing policy")?.to_string();
+    // With the shared policies the command looks for the folder; without them no policy remains.
     ensure!(error.contains("no_such_policy: holds no policy.json") || error.contains("no policy is left"), "{error}");
     Ok(())
 }

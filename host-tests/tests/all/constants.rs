@@ -1,4 +1,4 @@
-//! Constants that operations have in common stand once in an image, and run as if they stood twice.
+//! Operations with equal constants share them in an image, and run the same bits as with copies.
 
 use actq::emit;
 use actq::error::Cause;
@@ -14,7 +14,7 @@ const LEN: usize = 32;
 /// Words of a layer norm's constants.
 const CONSTANTS: usize = 1 + 2 * LEN;
 
-/// Three layer norms of a vector, the second with constants of its own, the others with the same.
+/// Three layer norms of a vector: the second with its own constants, the others with equal ones.
 fn image() -> Result<Vec<u8>> {
     let mut builder = Builder::new(LEN);
     let last = builder.linear((LEN, LEN), Activations::Int8, |_| Some(Width::W4), 0, true)?;
@@ -34,17 +34,17 @@ fn words(bytes: &[u8]) -> Vec<u32> {
 
 fn sealed(words: &[u32]) -> Result<Vec<u8>> {
     let mut bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
-    seal(&mut bytes).context("the image is too long")?;
+    seal(&mut bytes).context("cannot seal the image: it is too long")?;
     Ok(bytes)
 }
 
-/// Where the last operation's record names its constants.
+/// Position of the constants in the last operation's record.
 fn last_data(words: &[u32]) -> usize {
     let count = (words[h::W_KIND] >> 16) as usize;
     words[h::W_OPS] as usize + (count - 1) * h::OP_WORDS + 3
 }
 
-/// The image with the last operation's constants standing a second time, before the operation records.
+/// The image with a second copy of the last operation's constants, before the operation records.
 fn with_its_own(bytes: &[u8]) -> Result<Vec<u8>> {
     let mut words = words(bytes);
     let at = words[h::W_OPS] as usize;
@@ -60,7 +60,7 @@ fn with_its_own(bytes: &[u8]) -> Result<Vec<u8>> {
 }
 
 #[test]
-fn an_image_with_common_constants_is_smaller_and_runs_the_same_bits() -> Result<()> {
+fn shared_constants_save_bytes_and_keep_the_bits() -> Result<()> {
     let shared = image()?;
     let own = with_its_own(&shared)?;
     assert_eq!(shared.len() + 4 * CONSTANTS, own.len());
@@ -78,17 +78,17 @@ fn an_image_with_common_constants_is_smaller_and_runs_the_same_bits() -> Result<
 }
 
 #[test]
-fn nothing_but_constants_before_may_be_named_again() -> Result<()> {
+fn only_earlier_constants_can_be_shared() -> Result<()> {
     let plain = words(&image()?);
     let last = last_data(&plain);
-    // Half of these have not been looked at.
+    // The check has not seen half of these.
     let behind = plain[h::W_OPS] as usize - LEN;
     for data in [behind, h::WORDS] {
         let mut words = plain.clone();
         words[last] = data as u32;
         let bytes = sealed(&words)?;
         let refused = ImageBuffer::new(&bytes).image("memory".as_ref()).map(|_| ());
-        let error = refused.expect_err("constants that are none");
+        let error = refused.expect_err("expected a refusal of these constants");
         assert!(matches!(error.cause(), Cause::Image(ImageError::Section)), "{data}: {error:#}");
     }
     Ok(())

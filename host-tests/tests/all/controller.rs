@@ -1,5 +1,5 @@
-//! A whole controller with a real image: what the firmware does, in a thread behind a socket, and the command `actq` at
-//! the other end.
+//! A whole controller with a real image: the firmware's work in a thread behind a socket, and the command `actq` at the
+//! other end.
 
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::net::TcpListener;
@@ -34,16 +34,16 @@ use tempfile::TempDir;
 const OBS: usize = 24;
 const ACT: usize = 3;
 const SECTOR: usize = 16 << 10;
-/// Pieces of a step between two looks at the line, which take a millisecond where nothing comes.
+/// Pieces of a step between two polls of the line, each of which waits a millisecond for bytes.
 const SLICES: usize = 100;
-/// Bytes that are taken in a turn: fewer than an observation has, so that none is superseded before its step begins.
+/// Bytes read in a turn: fewer than an observation has, so that none is superseded before its step begins.
 const TURN: usize = 64;
 /// Ticks without an observation.
 const DEADLINE: u32 = 500;
 
 fn image(name: &str, seed: u64) -> Result<Vec<u8>> {
     let mut builder = Builder::new(OBS);
-    // Other weights for other seeds.
+    // The seed changes the weights.
     builder.values(seed as usize);
     builder.linear((ACT, OBS), actq::methods::Activations::Int8, |_| Some(Width::W3), 0, true)?;
     let (policy, outcomes) = builder.finish(name.to_owned(), false);
@@ -55,7 +55,7 @@ fn with_wrong_self_test(image: &[u8]) -> Vec<u8> {
     let word = |at: usize| u32::from_le_bytes([0, 1, 2, 3].map(|i| image[4 * at + i])) as usize;
     let mut wrong = image.to_vec();
     wrong[4 * (word(h::W_SELF_TEST) + OBS)] ^= 1;
-    seal(&mut wrong).expect("its length is as before");
+    seal(&mut wrong).expect("its length is unchanged");
     wrong
 }
 
@@ -74,19 +74,19 @@ impl Controller {
         Ok(Self { port, stop, thread: Some(thread) })
     }
 
-    /// A command of `actq link` and its output.
+    /// Runs a command of `actq link`.
     fn actq(&self, command: &str, more: &[&str]) -> Result<std::process::Output> {
         run(actq(&[&["link", command, &self.port], more].concat()), &[])
     }
 
     fn end(mut self) -> Result<()> {
         self.stop.store(true, Ordering::Relaxed);
-        let ended = self.thread.take().context("it runs")?.join();
-        ended.map_err(|_| anyhow::anyhow!("the controller has panicked"))?
+        let ended = self.thread.take().context("the controller does not run")?.join();
+        ended.map_err(|_| anyhow::anyhow!("the controller panicked"))?
     }
 }
 
-/// Whether an image may run here: the kernels take it, its lengths are ours, and its self-test passes.
+/// Returns `true` if an image may run here: the kernels accept it, its lengths fit, and its self-test passes.
 fn test(buffer: &ImageBuffer) -> Result<(), Refusal> {
     let image = Image::new_checked(buffer.bytes()).map_err(|_| Refusal::Unfit)?;
     if (image.obs_len(), image.act_len()) != (OBS, ACT) {
@@ -97,8 +97,8 @@ fn test(buffer: &ImageBuffer) -> Result<(), Refusal> {
     head.self_test().map_err(|_| Refusal::SelfTest)
 }
 
-/// The firmware's main, with a socket for a UART. Its time is counted in turns of its loop, each of which waits a
-/// millisecond for bytes; it stops some turns after the last byte, so that a machine that holds the host up lets no
+/// The firmware's main, with a socket for a UART. It counts its time in turns of its loop, each of which waits a
+/// millisecond for bytes. The time stops some turns after the last byte, so that a machine that delays the host lets no
 /// deadline pass.
 fn firmware(listener: &TcpListener, stop: &AtomicBool, built_in: &[u8], key: &[u8; 32]) -> Result<()> {
     let mut memory = vec![0; 4 * SECTOR];
@@ -153,7 +153,7 @@ fn firmware(listener: &TcpListener, stop: &AtomicBool, built_in: &[u8], key: &[u
             let count = match port.as_mut().map(|port| port.read(&mut bytes)) {
                 Some(Ok(count)) if count > 0 => count,
                 Some(Err(e)) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => 0,
-                // The host has gone; another one may come.
+                // The host has closed the connection; another one may come.
                 _ => {
                     port = None;
                     thread::sleep(Duration::from_millis(1));
@@ -178,7 +178,7 @@ fn firmware(listener: &TcpListener, stop: &AtomicBool, built_in: &[u8], key: &[u
                 }
                 stepping = head.begin(step.observation).is_ok().then_some(step.of);
             }
-            // Some slices of the step, and its action behind the last one.
+            // Some slices of the step, and its action after the last one.
             for _ in 0..SLICES {
                 let acted = stepping.and_then(|of| match head.poll(budget) {
                     Ok(Poll::Pending) => None,
@@ -191,7 +191,7 @@ fn firmware(listener: &TcpListener, stop: &AtomicBool, built_in: &[u8], key: &[u
                 }
             }
             if let Some(port) = &mut port {
-                // A host that has gone is noticed by the next read.
+                // The next read notices a closed connection.
                 drop(port.write_all(&sent));
             }
             if let Work::Test(candidate) = updater.work() {
@@ -218,7 +218,7 @@ fn folder() -> Result<(TempDir, PathBuf)> {
 }
 
 #[test]
-fn a_controller_is_watched_streamed_to_and_updated_by_the_command() -> Result<()> {
+fn the_command_watches_streams_and_updates() -> Result<()> {
     let (folder, recording) = folder()?;
     let path = |name: &str| folder.path().join(name).display().to_string();
     let (old, new) = (image("old", 0)?, image("new", 50)?);
@@ -276,7 +276,7 @@ fn a_controller_is_watched_streamed_to_and_updated_by_the_command() -> Result<()
     controller.end()
 }
 
-/// Every action is that of the image on this host, bit for bit.
+/// Requires that every action has the same bits as the image on this host.
 fn check_log(log: &str, image: &[u8]) -> Result<()> {
     let mut npz = NpzReader::new(fs::File::open(log)?)?;
     let (obs, actions): (Array2<f32>, Array2<f32>) = (npz.by_name("obs")?, npz.by_name("action")?);
@@ -295,7 +295,7 @@ fn check_log(log: &str, image: &[u8]) -> Result<()> {
 }
 
 #[test]
-fn a_controller_that_is_not_there_and_a_wrong_command_line_are_told() -> Result<()> {
+fn missing_controllers_and_wrong_command_lines_are_reported() -> Result<()> {
     let link = |arguments: &[&str]| run(actq(&[&["link"], arguments].concat()), &[]);
     succeeded(&link(&["ports"])?)?;
     failed(&link(&["watch", "tcp:127.0.0.1:1", "--once"])?, 1, &["tcp:127.0.0.1:1", "cannot be opened"])?;
@@ -305,7 +305,7 @@ fn a_controller_that_is_not_there_and_a_wrong_command_line_are_told() -> Result<
     {
         failed(&link(arguments)?, 2, &["error"])?;
     }
-    // Something that listens and is no controller.
+    // A listener that is no controller.
     let listener = TcpListener::bind("127.0.0.1:0")?;
     let port = format!("tcp:{}", listener.local_addr()?);
     failed(&link(&["arm", &port, "--patience", "0.3"])?, 1, &["no answer", &port])

@@ -1,6 +1,6 @@
-//! Flow and diffusion policies: their steps against the textbooks' formulas in f64, with weights that are hoisted and
-//! tables that are computed when the image is built; noise; and the same bits however a step is cut, on the host and on
-//! the target.
+//! Flow and diffusion policies: their steps against the textbook formulas in f64, with hoisted weights and tables that
+//! are computed when the image is built; noise; and the same bits in any slicing of a step, on the host and on the
+//! target.
 
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -64,7 +64,7 @@ fn policy(kind: &str, more: Value) -> Value {
     json
 }
 
-/// The policies of these tests, and what a step of theirs is.
+/// The policies of these tests, and the solver of their steps.
 fn policies() -> Vec<(Value, Solver)> {
     let diffusion = |schedule: &str, more: Value| {
         let mut all = json!({"train_steps": 12, "schedule": schedule, "time": {"turns": false, "order": "sin,cos"}});
@@ -117,7 +117,7 @@ enum Solver {
     Ddim { prediction: &'static str, clip: f64 },
 }
 
-/// The output for an observation and noise, by the formulas of the papers in f64.
+/// Computes the output for an observation and noise, by the formulas of the papers in f64.
 fn reference(case: &Case, json: &Value, solver: &Solver, obs: &[f64], noise: &[f64]) -> Vec<f64> {
     let mut network = case.reference();
     let freq = network.tensors[json["time"]["freq"].as_str().unwrap_or("")].clone();
@@ -175,7 +175,7 @@ fn reference(case: &Case, json: &Value, solver: &Solver, obs: &[f64], noise: &[f
             };
             let sample = sample.clamp(-clip, clip);
             x[i] = if let Solver::Ddpm { large, .. } = solver {
-                // Equation 7 of the paper: the mean and the variance of what was before, given the sample.
+                // Equation 7 of the paper: the mean and the variance of the previous iterate, given the sample.
                 let alpha = now / before;
                 let mean = before.sqrt() * (1.0 - alpha) / (1.0 - now) * sample
                     + alpha.sqrt() * (1.0 - before) / (1.0 - now) * x[i];
@@ -194,14 +194,14 @@ fn drawn(random: &mut Random, len: usize, reach: f32) -> Vec<f32> {
 }
 
 #[test]
-fn steps_are_those_of_the_textbooks() -> Result<()> {
+fn steps_match_the_textbook_formulas() -> Result<()> {
     for (json, solver) in policies() {
         let case = Case::new(json.clone())?;
         let policy = Policy::load(case.dir.path())?;
         let graph = &policy.graph;
         let mut evaluator = Evaluator::new(graph);
         let mut random = Random::new(3);
-        // What the time makes is a table, what the observation makes runs once.
+        // The part that depends on time is a table; the part that depends on the observation runs once.
         ensure!(graph.matrices.iter().all(|m| !m.name.starts_with("t ") && m.name != "in 12x21"), "{json}");
         ensure!(graph.denoising.as_ref().is_some_and(|d| d.first >= 3), "{json}");
         let (outcomes, quantized) = {
@@ -224,11 +224,11 @@ fn steps_are_those_of_the_textbooks() -> Result<()> {
                     errors.fold(0.0, f64::max) / rms
                 };
                 let of_f32 = off(&evaluator.step(&[obs.clone(), noise.clone()].concat(), &mut |_, _| {}));
-                assert!(of_f32 < 1e-4, "f32 is off by {of_f32:.1e}: {json}");
+                assert!(of_f32 < 1e-4, "the error of f32 is {of_f32:.1e}: {json}");
                 let of_image = off(head.infer_with_noise(&obs, &noise)?);
-                // 8-bit weights over many steps that build on each other; a wrong coefficient is off by tens of
+                // 8-bit weights over many steps, each based on the one before; a wrong coefficient causes tens of
                 // percent.
-                assert!(of_image < 0.08, "the image is off by {of_image:.1e}: {json}");
+                assert!(of_image < 0.08, "the error of the image is {of_image:.1e}: {json}");
             }
             Ok(())
         })?;
@@ -248,7 +248,7 @@ fn bits(values: &[f32]) -> Vec<u32> {
 }
 
 #[test]
-fn noise_is_the_generators_or_the_callers_and_a_reset_begins_it_anew() -> Result<()> {
+fn a_reset_restarts_generated_noise() -> Result<()> {
     for (json, _) in policies() {
         let buffer = quantized(json.clone())?;
         let image = buffer.image("memory".as_ref())?;
@@ -267,7 +267,7 @@ fn noise_is_the_generators_or_the_callers_and_a_reset_begins_it_anew() -> Result
             assert_ne!(other, first, "{json}");
             head.self_test()?;
             assert_eq!(play(head)?, other, "the self-test changes the seed: {json}");
-            // The same noise, given.
+            // The same noise, supplied by the caller.
             head.seed(7);
             let noise: Vec<f32> = (0..image.noise_len() as u32).map(|i| normal(7, 0, i)).collect();
             let drawn = bits(head.infer(&obs)?);
@@ -284,7 +284,7 @@ fn noise_is_the_generators_or_the_callers_and_a_reset_begins_it_anew() -> Result
 }
 
 #[test]
-fn however_a_step_is_cut_its_bits_are_the_same() -> Result<()> {
+fn any_slicing_gives_the_same_bits() -> Result<()> {
     for (json, _) in policies() {
         let buffer = quantized(json.clone())?;
         let image = buffer.image("memory".as_ref())?;
@@ -341,7 +341,7 @@ fn same_bits(elf: &std::path::Path, buffer: &ImageBuffer, steps: usize) -> Resul
 }
 
 #[test]
-fn policies_that_cannot_be_are_refused() -> Result<()> {
+fn impossible_policies_are_refused() -> Result<()> {
     let flow = |more: Value| policy("flow", more);
     let diffusion = |more: Value| policy("diffusion", more);
     for (json, expected) in [
@@ -398,7 +398,7 @@ fn policies_that_cannot_be_are_refused() -> Result<()> {
 }
 
 #[test]
-fn images_that_cannot_be_are_refused() -> Result<()> {
+fn impossible_images_are_refused() -> Result<()> {
     use actq_kernels::image::{header as h, op, seal};
     let buffer = quantized(policies().swap_remove(3).0)?;
     let image = buffer.image("memory".as_ref())?;
@@ -449,7 +449,7 @@ fn images_that_cannot_be_are_refused() -> Result<()> {
     Ok(())
 }
 
-/// A flow of K steps costs K times its per-step part and once the rest.
+/// A flow of K steps costs K times its per-step part, and the rest once.
 #[test]
 fn steps_cost_what_they_repeat() -> Result<()> {
     let of = |steps: usize| -> Result<u64> {

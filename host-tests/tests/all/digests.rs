@@ -1,5 +1,5 @@
-//! The same policy and options give the same image, from one release to the next: rounding to nearest has no learning
-//! in it, so that its images are the same on every machine, too.
+//! The same policy and options give the same image in every release. Rounding to nearest involves no learning, so that
+//! its images are the same on every machine, too.
 
 use std::fs;
 use std::path::Path;
@@ -11,7 +11,7 @@ use anyhow::{Context, Result, ensure};
 
 const WIDTHS: [&str; 4] = ["8", "4", "3", "2"];
 
-/// The bytes of an image without its self-test vector, which stands last, and their CRC-32 without the header's.
+/// The bytes of an image without its self-test vector, which is last, and their CRC-32 without the header's.
 fn digest(policy_dir: &Path, bits: &str) -> Result<(usize, u32)> {
     // Without recordings, nothing is evaluated.
     let dir = tempfile::tempdir()?;
@@ -22,15 +22,15 @@ fn digest(policy_dir: &Path, bits: &str) -> Result<(usize, u32)> {
     let [folder, image] = [dir.path(), &out].map(|path| path.display().to_string());
     succeeded(&run(actq(&["quantize", &folder, "--method", "rtn", "--bits", bits, "--out", &image]), b"")?)?;
     let mut bytes = fs::read(&out)?;
-    let self_test = bytes.get(4 * h::W_SELF_TEST..).and_then(|b| b.first_chunk()).context("no header")?;
+    let self_test = bytes.get(4 * h::W_SELF_TEST..).and_then(|b| b.first_chunk()).context("the image has no header")?;
     bytes.truncate(4 * u32::from_le_bytes(*self_test) as usize);
-    bytes.get_mut(..4 * h::WORDS).context("no header")?.fill(0);
+    bytes.get_mut(..4 * h::WORDS).context("the image has no header")?.fill(0);
     Ok((bytes.len(), checksum(&bytes)))
 }
 
 fn images_are(policy_dir: &Path, expected: [(usize, u32); 4]) -> Result<()> {
     let digests = WIDTHS.iter().map(|bits| digest(policy_dir, bits)).collect::<Result<Vec<_>>>()?;
-    ensure!(digests == expected, "{}: {digests:#010x?} instead of {expected:#010x?}", policy_dir.display());
+    ensure!(digests == expected, "{}: found {digests:#010x?}, expected {expected:#010x?}", policy_dir.display());
     Ok(())
 }
 

@@ -29,18 +29,18 @@ const ACT: usize = 2;
 const CHUNK: usize = 3;
 const EXECUTE: usize = 2;
 
-/// What the network is.
+/// The kind of network.
 #[derive(Clone, Copy, PartialEq)]
 enum Network {
     /// Feed-forward, with chunks.
     Chunk,
-    /// Recurrent, one action a step.
+    /// Recurrent, one action per step.
     Lstm,
     /// Recurrent, with chunks.
     LstmChunk,
 }
 
-/// A folder with a policy in `policy`, its recordings there, and the image `image.actq`; commands run in it.
+/// A folder with a policy in `policy`, its recordings, and the image `image.actq`; commands run in it.
 struct Fixture {
     dir: TempDir,
     policy: Policy,
@@ -111,14 +111,14 @@ impl Fixture {
         Ok(ImageBuffer::read(&path)?.image(&path)?.crc())
     }
 
-    /// The f32 policy's outputs along an episode.
+    /// The f32 policy's outputs in an episode.
     fn labels(&self, episode: &[Vec<f32>]) -> Vec<Vec<f32>> {
         let mut evaluator = Evaluator::new(&self.policy.graph);
         episode.iter().map(|obs| evaluator.step(obs, &mut |_, _| {})).collect()
     }
 }
 
-/// That a command has ended well; answers are no text.
+/// Requires success of a command with binary output.
 fn ended_well(output: &Output) -> Result<()> {
     ensure!(output.status.success(), "{}: {}", output.status, String::from_utf8_lossy(&output.stderr));
     Ok(())
@@ -144,22 +144,22 @@ fn requests(episodes: &[Vec<Vec<f32>>]) -> Vec<u8> {
     episodes.iter().flat_map(of).collect()
 }
 
-/// What a recording holds, episode by episode.
+/// The content of a recording by episode.
 fn episodes(dataset: &Dataset) -> Vec<Vec<Vec<f32>>> {
     (0..dataset.length.len()).map(|e| dataset.episode(e).collect()).collect()
 }
 
 fn actions(dataset: &Dataset) -> Result<Vec<Vec<f32>>> {
     let steps = dataset.length.iter().enumerate().flat_map(|(e, n)| (0..*n).map(move |s| (e, s)));
-    steps.map(|(e, s)| dataset.action_at(e, s).context("no actions")).collect()
+    steps.map(|(e, s)| dataset.action_at(e, s).context("the recording has no actions")).collect()
 }
 
 #[test]
-fn what_a_policy_is_shown_is_recorded_and_labelled_by_f32() -> Result<()> {
+fn observations_are_recorded_with_labels_of_f32() -> Result<()> {
     for network in [Network::Chunk, Network::Lstm, Network::LstmChunk] {
         let fixture = Fixture::new(network)?;
         let shown = [draw(3, 41), Vec::new(), draw(4, 300), draw(5, 2)];
-        // The observations that reach a recurrent network that plays chunks; of any other policy all.
+        // For a recurrent policy with chunks, the observations that reach its network; for any other policy all.
         let every = if network == Network::LstmChunk { EXECUTE } else { 1 };
         let reach: Vec<Vec<Vec<f32>>> = shown
             .iter()
@@ -168,7 +168,7 @@ fn what_a_policy_is_shown_is_recorded_and_labelled_by_f32() -> Result<()> {
             .collect();
         let plain = fixture.run("serve image.actq", &requests(&shown))?;
         let output = fixture.run("serve image.actq --record drive.npz --policy policy", &requests(&shown))?;
-        assert_eq!(output.stdout, plain.stdout, "recording changes no answer");
+        assert_eq!(output.stdout, plain.stdout, "recording must not change an answer");
         ended_well(&output)?;
         let recorded = fixture.recording("drive.npz")?;
         let frames = |episodes: &[Vec<Vec<f32>>]| episodes.concat();
@@ -183,7 +183,7 @@ fn what_a_policy_is_shown_is_recorded_and_labelled_by_f32() -> Result<()> {
 }
 
 #[test]
-fn what_has_no_action_ends_an_episode() -> Result<()> {
+fn an_observation_without_action_ends_the_episode() -> Result<()> {
     let fixture = Fixture::new(Network::Lstm)?;
     let (first, second) = (draw(3, 5), draw(4, 7));
     let mut bad = draw(5, 1);
@@ -197,16 +197,16 @@ fn what_has_no_action_ends_an_episode() -> Result<()> {
 }
 
 #[test]
-fn the_policy_that_labels_is_the_images_or_none() -> Result<()> {
+fn only_the_images_own_policy_labels() -> Result<()> {
     let fixture = Fixture::new(Network::Chunk)?;
     let input = requests(&[draw(3, 10)]);
-    // Not beside the image: no labels, and said once.
+    // Without its policy beside it: no labels, and one message.
     let output = fixture.run("serve image.actq --record bare.npz", &input)?;
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     ended_well(&output)?;
     assert_eq!(said.matches("gets no array \"action\"").count(), 1, "{said}");
     ensure!(fixture.recording("bare.npz")?.action.is_none());
-    // Beside it; or named by the environment, as actq tune does.
+    // With its policy beside it, or named by the environment, as actq tune does.
     fs::copy(fixture.path("image.actq"), fixture.path("policy/image.actq"))?;
     ended_well(&fixture.run("serve policy/image.actq --record beside.npz", &input)?)?;
     let mut command = fixture.command("serve image.actq --record named.npz");
@@ -226,7 +226,7 @@ fn the_policy_that_labels_is_the_images_or_none() -> Result<()> {
     let long = format!("serve image.actq --record {}.npz", "x".repeat(252));
     failed(&fixture.run(&long, &input)?, 1, &["xxx.npz: cannot be written"])?;
     failed(&fixture.run("serve image.actq --record drive.npy", &input)?, 2, &["its name ends so"])?;
-    // Nothing was shown: nothing is written.
+    // Without observations nothing is written.
     ended_well(&fixture.run("serve image.actq --record empty.npz --policy policy", &[RESET; 3])?)?;
     for name in ["other.npz", "empty.npz"] {
         ensure!(!fixture.path(name).exists(), "{name}");
@@ -239,10 +239,10 @@ fn serve(fixture: &Fixture, line: &str) -> Result<Child> {
     Ok(command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn()?)
 }
 
-/// Shows observations as a simulator does, each once the one before was answered.
+/// Sends observations as a simulator does, each after the answer to the one before.
 fn show(child: &mut Child, observations: &[Vec<f32>]) -> Result<()> {
-    let stdin = child.stdin.as_mut().context("no standard input")?;
-    let stdout = child.stdout.as_mut().context("no standard output")?;
+    let stdin = child.stdin.as_mut().context("the command has no standard input")?;
+    let stdout = child.stdout.as_mut().context("the command has no standard output")?;
     for observation in observations {
         stdin.write_all(&step_request(observation))?;
         stdout.read_exact(&mut [0; 4 * ACT])?;
@@ -251,7 +251,7 @@ fn show(child: &mut Child, observations: &[Vec<f32>]) -> Result<()> {
 }
 
 #[test]
-fn a_killed_recorder_leaves_what_it_was_shown() -> Result<()> {
+fn a_killed_recorder_keeps_earlier_observations() -> Result<()> {
     let fixture = Fixture::new(Network::Lstm)?;
     let observations = draw(6, 3000);
     let mut child = serve(&fixture, "serve image.actq --record drive.npz --policy policy")?;
@@ -261,7 +261,7 @@ fn a_killed_recorder_leaves_what_it_was_shown() -> Result<()> {
     child.wait()?;
     let recorded = fixture.recording("drive.npz")?;
     let kept = recorded.frames();
-    // A twentieth of what there is may be missing, and what waits to be recorded.
+    // A twentieth may be missing, and the observations that wait to be recorded.
     assert!(kept >= 3000 * 19 / 20 - 2 * 256, "{kept}");
     assert_eq!(episodes(&recorded).concat(), observations[..kept]);
     let mut labels = fixture.labels(&observations);
@@ -271,7 +271,7 @@ fn a_killed_recorder_leaves_what_it_was_shown() -> Result<()> {
 }
 
 #[test]
-fn recorders_with_one_name_do_not_take_each_others_file() -> Result<()> {
+fn recorders_with_one_name_use_separate_files() -> Result<()> {
     let fixture = Fixture::new(Network::Chunk)?;
     fs::write(fixture.path("drive-2.npz"), "mine")?;
     let line = "serve image.actq --record drive.npz --policy policy";
@@ -296,13 +296,13 @@ fn recorders_with_one_name_do_not_take_each_others_file() -> Result<()> {
 }
 
 #[test]
-fn a_reader_that_goes_away_leaves_the_recording() -> Result<()> {
+fn a_closed_output_keeps_the_recording() -> Result<()> {
     let fixture = Fixture::new(Network::Chunk)?;
     let mut child = serve(&fixture, "serve image.actq --record drive.npz --policy policy")?;
     let observations = draw(9, 50);
     show(&mut child, &observations)?;
     drop(child.stdout.take());
-    // Whether the pipe breaks at this answer or the next.
+    // The pipe may break at this answer or the next.
     let stdin = child.stdin.as_mut().context("no standard input")?;
     drop(stdin.write_all(&step_request(&observations[0])));
     failed(&child.wait_with_output()?, 1, &["output cannot be written"])?;
@@ -312,7 +312,7 @@ fn a_reader_that_goes_away_leaves_the_recording() -> Result<()> {
 }
 
 #[test]
-fn a_folder_of_recordings_is_learned_from() -> Result<()> {
+fn quantize_learns_from_a_folder_of_recordings() -> Result<()> {
     let fixture = Fixture::new(Network::Chunk)?;
     fs::create_dir(fixture.path("drives"))?;
     let quantize = "quantize policy --method gptq --bits 4 --out x.actq";
@@ -327,9 +327,9 @@ fn a_folder_of_recordings_is_learned_from() -> Result<()> {
     assert_eq!(lines[2], ["drives/a.npz", "1", "40", "40"]);
     assert_eq!(lines[3], ["drives/b.npz", "2", "60", "60"]);
     assert_eq!(lines[4], ["in", "all", "9", "400", "400"]);
-    ensure!(fs::read(fixture.path("x.actq"))? != fs::read(fixture.path("image.actq"))?, "it learned nothing new");
+    ensure!(fs::read(fixture.path("x.actq"))? != fs::read(fixture.path("image.actq"))?, "the image did not change");
     succeeded(&fixture.run("sweep policy --methods gptq --bpw 6 --calib policy/calib.npz --calib drives", b"")?)?;
-    // A file that is wrong is named.
+    // The message names a malformed file.
     fs::write(fixture.path("drives/c.npz"), "no archive")?;
     failed(&fixture.run(&line, b"")?, 1, &["drives/c.npz: not an .npz archive"])?;
     let out = "quantize policy --method gptq --calib drives --out drives/a.npz";
@@ -341,7 +341,7 @@ fn eval_measures_on_the_images_own_path() -> Result<()> {
     let fixture = Fixture::new(Network::Lstm)?;
     let input = requests(&[draw(3, 80), draw(4, 60)]);
     ended_well(&fixture.run("serve image.actq --record drive.npz --policy policy", &input)?)?;
-    // Without labels, the policy gives them.
+    // If the recording has no labels, the policy computes them.
     ended_well(&fixture.run("serve image.actq --record bare.npz", &input)?)?;
     let mut own = Vec::new();
     for file in ["drive.npz", "bare.npz"] {
@@ -357,9 +357,9 @@ fn eval_measures_on_the_images_own_path() -> Result<()> {
     succeeded(&fixture.run("quantize policy --method gptq --bits 2 --out other.actq", b"")?)?;
     let error = fixture.run("eval other.actq --policy policy --driven drive.npz", b"")?;
     failed(&error, 1, &["drive.npz: records what another image was shown"])?;
-    // A recording that names no image is believed.
+    // A recording that names no image is accepted.
     succeeded(&fixture.run("eval other.actq --policy policy --driven policy/calib.npz", b"")?)?;
-    // The same image once more, from recordings among which is its own.
+    // The same image from several recordings, including its own.
     let line = "quantize policy --method rtn --bits 4 --out again.actq";
     succeeded(&fixture.run(line, b"")?)?;
     ended_well(&fixture.run("serve again.actq --record again.npz --policy policy", &input)?)?;
@@ -368,7 +368,7 @@ fn eval_measures_on_the_images_own_path() -> Result<()> {
     Ok(())
 }
 
-/// A command that shows the policy what stands in a file of requests, and says that it went well.
+/// A command that sends a file of requests to the policy, and reports success.
 fn driver(fixture: &Fixture) -> Result<String> {
     fs::write(fixture.path("requests"), requests(&[draw(13, 60), draw(14, 50)]))?;
     Ok("eval \"$POLICY_CMD\" < requests > answers; echo driving; \
@@ -384,8 +384,8 @@ fn tune(fixture: &Fixture, drive: &str, options: &str) -> Result<Output> {
 }
 
 #[test]
-fn tuning_drives_and_learns_again() -> Result<()> {
-    // A folder whose name a shell would take apart.
+fn tune_drives_and_learns_again() -> Result<()> {
+    // A folder whose name a shell would split.
     let fixture = Fixture::new(Network::Chunk)?;
     let drive = driver(&fixture)?;
     let mut command =
@@ -416,7 +416,7 @@ fn tuning_drives_and_learns_again() -> Result<()> {
         assert_eq!(driven_by(&recorded.path)?, Some(fixture.crc(&format!("{kept}.actq"))?));
     }
     let first = fs::read(fixture.path("tuned.actq"))?;
-    // A simulator that has gone before the policy has written what it was shown.
+    // A simulator that exits before the policy has written the observations.
     let gone = format!(
         "mkfifo to from; eval \"$POLICY_CMD\" < to > from & exec 3> to 4< from; cat requests >&3; \
          head -c {} <&4 > answers; rm to from",
@@ -424,15 +424,15 @@ fn tuning_drives_and_learns_again() -> Result<()> {
     );
     succeeded(&tune(&fixture, &gone, "--keep gone")?)?;
     assert_eq!(fixture.recording("gone/round-0/drive.npz")?.obs, fixture.recording("gone/round-1/drive.npz")?.obs);
-    // The same again is the same, and does not mix with what was kept.
+    // A repeated run gives the same bytes, and does not mix with kept files.
     failed(&tune(&fixture, &drive, "--keep policy")?, 1, &["policy: is not empty"])?;
     succeeded(&tune(&fixture, &drive, "--rounds 2")?)?;
-    ensure!(fs::read(fixture.path("tuned.actq"))? == first, "another image");
+    ensure!(fs::read(fixture.path("tuned.actq"))? == first, "the image differs");
     Ok(())
 }
 
 #[test]
-fn a_drive_that_fails_is_told_and_nothing_is_written() -> Result<()> {
+fn a_failed_drive_is_reported_and_writes_nothing() -> Result<()> {
     let fixture = Fixture::new(Network::Chunk)?;
     let drive = driver(&fixture)?;
     for (command, words) in [
@@ -443,7 +443,7 @@ fn a_drive_that_fails_is_told_and_nothing_is_written() -> Result<()> {
     ] {
         failed(&tune(&fixture, command, "")?, 1, words).context(command)?;
     }
-    // What was driven before the failure is kept.
+    // Recordings from before the failure are kept.
     let second = format!("test $ACTQ_ROUND = 1 || exit 4; {drive}");
     failed(
         &tune(&fixture, &second, "--keep kept")?,
@@ -459,7 +459,7 @@ fn a_drive_that_fails_is_told_and_nothing_is_written() -> Result<()> {
 }
 
 #[test]
-fn a_drive_that_says_nothing_of_success_is_no_error() -> Result<()> {
+fn a_drive_without_a_success_figure_is_accepted() -> Result<()> {
     let fixture = Fixture::new(Network::Chunk)?;
     driver(&fixture)?;
     let drive =

@@ -1,4 +1,4 @@
-//! What the executor does with numbers that leave the range of f32, and what an error leaves behind.
+//! The executor with numbers outside the range of f32, and its state after an error.
 
 use std::task::Poll;
 
@@ -16,7 +16,7 @@ use actq_kernels::{Head, StepError, Width};
 const N: usize = 2;
 const MAX_STEP: f32 = 0.25;
 
-/// An image of a policy that multiplies the observation with `gain`, then with `factor`, and then does `nodes`. (The
+/// An image of a policy that multiplies the observation by `gain`, then by `factor`, and then does `nodes`. (The
 /// self-test's observations are about `1 / gain`.)
 fn image(gain: f32, factor: f32, nodes: Vec<NodeKind>, contract: ActionContract) -> ImageBuffer {
     let mut graph = Graph::new(N);
@@ -28,7 +28,7 @@ fn image(gain: f32, factor: f32, nodes: Vec<NodeKind>, contract: ActionContract)
         graph.add(kind, &[input]).expect("it fits");
     }
     let options = Options::new(Method::Rtn, Budget::Width(Width::W8));
-    let (_, outcomes) = quantize(&graph, None, Rate::Width(Width::W8), &options).expect("it is a graph");
+    let (_, outcomes) = quantize(&graph, None, Rate::Width(Width::W8), &options).expect("the graph is valid");
     let policy = Policy { contract, ..Policy::of("faults", graph) };
     ImageBuffer::new(&actq::emit::image(&policy, &outcomes).expect("the policy fits the format"))
 }
@@ -44,7 +44,7 @@ fn step_limit() -> ImageBuffer {
 }
 
 #[test]
-fn an_error_keeps_the_last_action_for_the_step_limit() {
+fn errors_keep_the_last_action_for_limits() {
     let ends: [fn(&mut Head<'_, '_>) -> StepError; 4] = [
         |head| head.step(&[f32::NAN, 0.0]).expect_err("the observation is not finite"),
         |head| head.step(&[0.0]).expect_err("the observation is short"),
@@ -54,7 +54,7 @@ fn an_error_keeps_the_last_action_for_the_step_limit() {
     with_head(&step_limit(), |head| {
         for end in ends {
             head.reset();
-            // The first action after a reset is not limited.
+            // The first action after a reset has no step limit.
             let first = head.step(&[1.0, 1.0]).expect("an action").to_vec();
             assert!(first.iter().all(|a| (a - 1.0).abs() < 0.01), "{first:?}");
             let error = end(head);
@@ -74,8 +74,8 @@ fn an_error_keeps_the_last_action_for_the_step_limit() {
 }
 
 #[test]
-fn an_error_in_the_midst_of_an_action_changes_none_of_its_values() {
-    // The second value's scale carries it out of f32's range where the first stays inside.
+fn an_error_within_an_action_changes_no_value() {
+    // The second value's scale takes it out of f32's range; the first stays inside.
     let contract =
         ActionContract { scale: Some(vec![1.0, 1e38]), max_step: Some(vec![MAX_STEP; N]), ..ActionContract::default() };
     with_head(&image(1.0, 1.0, vec![], contract), |head| {
@@ -83,19 +83,19 @@ fn an_error_in_the_midst_of_an_action_changes_none_of_its_values() {
         let first = head.step(&[1.0, 0.0]).expect("an action").to_vec();
         assert_eq!(head.step(&[-1.0, 100.0]).err(), Some(StepError::NotFinite));
         let next = head.step(&[-1.0, 0.0]).expect("an action");
-        assert_eq!(next[0], first[0] - MAX_STEP, "the failed step has moved the first value");
+        assert_eq!(next[0], first[0] - MAX_STEP, "the failed step moved the first value");
     });
 }
 
-/// An operation that made something finite of a value beyond f32's range would let a broken network drive the robot.
+/// An operation that turned a value beyond f32's range into a finite one would let a broken network drive the robot.
 #[test]
-fn no_operation_hides_a_value_that_has_left_the_range() {
+fn no_operation_hides_an_overflow() {
     let clip = |limit| {
         let (pre_clip, clip) = if limit { (1.0, f32::INFINITY) } else { (f32::INFINITY, 1.0) };
         NodeKind::from(Normalize { mean: vec![0.0; N], scale: vec![1.0; N], pre_clip, clip })
     };
     let one = || vec![1.0; N];
-    // The exponential of values as large as these is infinite by itself: no image passes its self-test.
+    // The exponential of such large values is itself infinite: no image passes its self-test.
     let cases: Vec<(&str, Vec<NodeKind>)> = Function::ALL
         .into_iter()
         .filter(|function| *function != Function::Exp)
@@ -119,7 +119,7 @@ fn no_operation_hides_a_value_that_has_left_the_range() {
 
 /// The values are finite; their squares are not.
 #[test]
-fn a_norm_whose_squares_leave_the_range_is_an_error() {
+fn a_norm_with_overflowing_squares_is_an_error() {
     let one = || vec![1.0; N];
     for norm in
         [LayerNorm { weight: one(), bias: one(), eps: 1e-5 }.into(), RmsNorm { weight: one(), eps: 1e-5 }.into()]

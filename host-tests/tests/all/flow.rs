@@ -1,4 +1,4 @@
-//! The UR3's flow in closed loop: f32, and images of few bits that have learned for a moment.
+//! The UR3 flow in closed loop: f32, and images of few bits after a short learning.
 
 use actq::budget::Budget;
 use actq::data::Recordings;
@@ -12,28 +12,27 @@ use actq_ur3::policy_f32::PolicyF32;
 use actq_ur3::task::{Outcome, run_episode};
 use anyhow::{Context, Result, ensure};
 
-/// Seeds that no recording has.
+/// Seeds of no recording.
 const SEEDS: std::ops::Range<u64> = 1000..1040;
-/// Of distillation, as `cargo demo` takes.
+/// Steps of distillation, as in `cargo demo`.
 const STEPS: usize = 100;
 
-/// Limits of the tracking error in mm, 1.5 times what was measured at most.
+/// Limits of the tracking error in mm, at most 1.5 times the measured value.
 const F32_MM: f64 = 1.3;
 const W3_MM: f64 = 2.4;
 const W2_MM: f64 = 5.6;
 
-/// All but one episode succeed, and the mean tracking error stays below a limit in mm.
+/// Requires success of all episodes but one, and a mean tracking error below a limit in mm.
 fn drives(name: &str, outcomes: &[Outcome], limit_mm: f64) -> Result<()> {
     let solved = outcomes.iter().filter(|outcome| outcome.success).count();
     let error = 1e3 * outcomes.iter().map(|outcome| outcome.tracking_error_m).sum::<f64>() / outcomes.len() as f64;
     println!("{name}: {solved} of {}, tracking error {error:.2} mm", outcomes.len());
     ensure!(solved + 1 >= outcomes.len(), "{name}: {solved} of {}", outcomes.len());
-    ensure!(error < limit_mm, "{name}: {error:.2} mm, {limit_mm} mm is allowed");
+    ensure!(error < limit_mm, "{name}: {error:.2} mm, limit {limit_mm} mm");
     Ok(())
 }
 
-/// Statistics of every denoising step take a share of the time that learning has; those of other policies are of all
-/// frames.
+/// The statistics of every denoising step take a share of the learning time; for other policies they use all frames.
 #[test]
 fn statistics_keep_their_share_of_the_time() -> Result<()> {
     let policy = Policy::load(&ur3_flow())?;
@@ -41,13 +40,13 @@ fn statistics_keep_their_share_of_the_time() -> Result<()> {
     let all = recordings.calib.as_ref().context("a recording")?.frames();
     let sampled = |minutes| -> Result<Sampled> {
         let quantizer = Quantizer::new(&policy, &recordings, Method::Best, minutes, |_| {})?;
-        quantizer.method().sampled().context("an iterative head")
+        quantizer.method().sampled().context("the head is not iterative")
     };
     let (free, bound) = (sampled(None)?, sampled(Some(1e-4))?);
     println!("{free:?}, {bound:?}");
     ensure!(free.frames == all && bound.frames == all);
     ensure!(free.inputs == all.min(8192 / policy.graph.denoising_steps()) && free.outputs == 24 * 128, "{free:?}");
-    // 0.6 ms each are less than the fewest take.
+    // 0.6 ms per frame is less than the fewest frames take.
     ensure!(bound.inputs == 64 && bound.outputs == 2 * 128, "{bound:?}");
     let (policy, recordings) = (Policy::load(&ur3())?, Recordings::load(&Policy::load(&ur3())?)?);
     let quantizer = Quantizer::new(&policy, &recordings, Method::Gptq, Some(1e-4), |_| {})?;
@@ -56,7 +55,7 @@ fn statistics_keep_their_share_of_the_time() -> Result<()> {
 }
 
 #[test]
-fn the_ur3s_flow_drives_at_few_bits() -> Result<()> {
+fn the_ur3_flow_drives_at_few_bits() -> Result<()> {
     let mut reference = PolicyF32::load(&ur3_flow())?;
     let episode = |seed| {
         reference.reset();

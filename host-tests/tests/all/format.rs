@@ -17,7 +17,7 @@ use actq_testkit::Random;
 use half::bf16;
 
 fn document() -> String {
-    fs::read_to_string(root().join("docs/FORMAT.md")).expect("docs/FORMAT.md can be read")
+    fs::read_to_string(root().join("docs/FORMAT.md")).expect("docs/FORMAT.md is readable")
 }
 
 /// The lines of the document's fenced block with this mark.
@@ -32,9 +32,9 @@ fn fenced<'d>(document: &'d str, mark: &str) -> Vec<&'d str> {
 fn example(document: &str) -> Vec<u8> {
     let mut bytes = Vec::new();
     for line in fenced(document, "hex") {
-        let (offset, rest) = line.split_once(':').expect("a line starts with its offset");
+        let (offset, rest) = line.split_once(':').expect("a line begins with its offset");
         assert_eq!(usize::from_str_radix(offset, 16), Ok(bytes.len()), "offset of {line:?}");
-        let (hex, _) = rest.split_once('#').expect("a line says what it means");
+        let (hex, _) = rest.split_once('#').expect("a line has a comment");
         bytes.extend(hex.split_whitespace().map(|b| u8::from_str_radix(b, 16).expect("bytes are hexadecimal")));
     }
     bytes
@@ -46,7 +46,7 @@ const LEVELS: [[i32; 2]; 3] = [[3, -1], [1, 1], [-3, 3]];
 const SCALES: [f32; 3] = [0.5, 0.25, 0.125];
 const BIAS: [f32; 3] = [0.5, -0.25, 1.125];
 
-/// The example's policy, as the quantizer would hand it to the writer.
+/// The example's policy, as the quantizer would pass it to the writer.
 fn library_bytes() -> Vec<u8> {
     let mut graph = Graph::new(2);
     graph.matrices.push(WeightMatrix { name: "w".into(), rows: 3, cols: 2, data: vec![0.0; 6] });
@@ -74,7 +74,7 @@ fn floats(words: &[u32]) -> Vec<f32> {
 }
 
 #[test]
-fn the_hex_example_is_what_the_library_writes() {
+fn the_library_writes_the_hex_example() {
     let (documented, written) = (example(&document()), library_bytes());
     let words = |bytes: &[u8]| bytes.chunks(4).map(|w| format!("{w:02x?}")).collect::<Vec<_>>();
     assert_eq!(words(&documented), words(&written));
@@ -103,7 +103,7 @@ fn the_hex_example_reads_as_documented() {
     assert!(scale.is_empty() && offset.is_empty() && others.iter().all(|array| array.is_empty()));
 
     assert_eq!(image.op_count(), 1);
-    let op = image.ops().next().expect("there is an operation");
+    let op = image.ops().next().expect("the image has an operation");
     assert_eq!(op.kind, OpKind::Linear { accumulate: false });
     assert_eq!((op.src(), op.dst(), op.third()), (image.observation(), image.output(), image.work()));
     let matrix = op.matrix().expect("the operation is linear");
@@ -120,7 +120,7 @@ fn the_hex_example_reads_as_documented() {
         assert_eq!((rows.scale(i), matrix.bias(i)), (SCALES[i], BIAS[i]), "row {i}");
     }
 
-    // The words that the text takes apart.
+    // The words that the text explains.
     for at in [0x80, 0x84] {
         let word = u32::from_le_bytes(bytes[at..at + 4].try_into().expect("a word has four bytes"));
         assert!(document().contains(&format!("0x{word:08x}: row ")), "{word:08x}");
@@ -136,7 +136,7 @@ fn the_hex_example_reads_as_documented() {
 }
 
 #[test]
-fn the_hex_example_computes_what_is_worked_out_by_hand() {
+fn the_hex_example_computes_the_documented_result() {
     let buffer = ImageBuffer::new(&example(&document()));
     let image = buffer.image(Path::new("docs/FORMAT.md")).expect("the example is a valid image");
     with_head::<_, anyhow::Error>(image, |head| {
@@ -148,7 +148,7 @@ fn the_hex_example_computes_what_is_worked_out_by_hand() {
     .expect("the example runs");
 }
 
-/// The cells of the document's table that starts with `head`, row by row.
+/// The cells of the document's table that begins with `head`, row by row.
 fn table<'d>(document: &'d str, head: &str) -> Vec<Vec<&'d str>> {
     let lines = document.lines().skip_while(|l| !l.starts_with(head)).skip(2).take_while(|l| l.starts_with('|'));
     let rows: Vec<_> = lines.map(|l| l.trim_matches('|').split('|').map(str::trim).collect()).collect();
@@ -172,7 +172,7 @@ fn lanes(cell: &str) -> Lanes {
     }
 }
 
-/// Where a bit of a code stands in a cell: a bit of a word, possibly the exclusive or with another one, possibly
+/// The position of a code's bit in a cell: a bit of a word, possibly the exclusive or with another one, possibly
 /// inverted.
 struct Place {
     at: (usize, usize),
@@ -180,7 +180,7 @@ struct Place {
     inverted: bool,
 }
 
-/// A layout as the document has it, from its table and its bit diagram.
+/// A documented layout, from its table and its bit diagram.
 struct Documented {
     width: Width,
     lanes: Lanes,
@@ -188,7 +188,7 @@ struct Documented {
     cell_rows: usize,
     cell_cols: usize,
     cell_words: usize,
-    /// Columns are padded to a multiple of this without groups and with them.
+    /// Columns are padded to a multiple of this, without and with groups.
     pad: [usize; 2],
     /// The bits of a code, by row and column of the cell.
     places: Vec<Vec<Vec<Option<Place>>>>,
@@ -229,14 +229,14 @@ impl Documented {
                 let (row, column) = (of(&rows, word, i).unwrap_or(0), of(&columns, word, i).expect("a column"));
                 let code_bit = of(&code_bits, word, i).expect("a bit of a code");
                 let former = places[row][column][code_bit].replace(place);
-                assert!(former.is_none(), "bit {code_bit} of ({row}, {column}) stands in one place");
+                assert!(former.is_none(), "bit {code_bit} of ({row}, {column}) has two places");
             }
         }
         assert_eq!(cell_rows * cell_cols * width.bits() as usize, 32 * cell_words, "every bit of a code has a place");
         Self { width, lanes, strip, cell_rows, cell_cols, cell_words, pad: [pad, group_pad], places }
     }
 
-    /// Reads a block as documented and compares codes (with their padding) and group scales.
+    /// Reads a block as documented, and compares codes (with their padding) and group scales.
     fn check(&self, shape: BlockShape, codes: &[u8], scales: &[u8], packed: &[u32]) {
         let packed: Vec<u32> = packed.iter().map(|w| u32::from_le(*w)).collect();
         let padded_rows = shape.rows.next_multiple_of(4);
@@ -301,7 +301,7 @@ impl Documented {
 }
 
 #[test]
-fn layouts_and_bit_diagrams_show_where_codes_stand() {
+fn layouts_and_bit_diagrams_match_the_packer() {
     let mut random = Random::new(1);
     for layout in Documented::all(&document()) {
         let mut shapes = 0;
@@ -335,7 +335,7 @@ fn lanes_follow_from_the_matrix_as_documented() {
 }
 
 #[test]
-fn the_table_of_levels_is_what_codes_mean() {
+fn the_table_of_levels_matches_the_codes() {
     let document = document();
     let rows = table(&document, "| width | level of a code |");
     assert_eq!(rows.len(), Width::ALL.len());
@@ -353,7 +353,7 @@ fn the_table_of_levels_is_what_codes_mean() {
 }
 
 #[test]
-fn the_table_of_sizes_is_what_blocks_take() {
+fn the_table_of_sizes_matches_the_blocks() {
     let document = document();
     let layouts = Documented::all(&document);
     let rows = table(&document, "| rows | columns | width | lanes |");
@@ -377,7 +377,7 @@ fn the_table_of_sizes_is_what_blocks_take() {
         );
     }
     assert_eq!(rows.len(), 12);
-    // The same figures where the text works them out, wherever its lines break.
+    // The text repeats these figures, wherever its lines break.
     let text = document.split_whitespace().collect::<Vec<_>>().join(" ");
     let example = "Example, 256 x 256 at 3 bits with paired lanes and one scale a row: 64 strips * 32 units * 3 words + \
                    128 words of scales + 4 words of record = 6276 words = 25104 bytes, \
@@ -434,7 +434,7 @@ fn the_work_area_is_as_long_as_documented() {
 }
 
 #[test]
-fn versions_in_the_text_are_those_of_the_library() {
+fn documented_versions_match_the_library() {
     let document = document();
     assert!(document.contains(&format!("This document describes version {}.", h::VERSION)));
     let layout = actq_kernels::layout::LAYOUT_STAMP;

@@ -1,4 +1,4 @@
-//! The tests that take more than one crate: one binary, so that one is linked and what they build is built once.
+//! The tests of more than one crate: one binary, so that cargo links one, and the tests share their builds.
 
 mod accuracy;
 mod arrows;

@@ -1,5 +1,5 @@
-//! Damaged images, and images with a correct checksum that say something impossible: none may pass
-//! `Image::new_checked`. (That whatever passes runs without a panic, `kernels/tests/mutants.rs` shows.)
+//! Damaged images, and images with a correct checksum and impossible content: `Image::new_checked` must refuse all.
+//! (`kernels/tests/mutants.rs` shows that accepted images run without a panic.)
 
 mod damaged;
 mod draft;
@@ -13,7 +13,7 @@ use draft::{
 };
 
 #[test]
-fn headers_that_cannot_be_are_refused() {
+fn impossible_headers_are_refused() {
     refused(&[
         ("wrong magic", E::Magic, |d| d.set(0, u32::from_le_bytes(*b"ACTP"))),
         ("a later version", E::Version, |d| d.set_low(h::W_VERSION, u32::from(h::VERSION) + 1)),
@@ -68,7 +68,7 @@ fn headers_that_cannot_be_are_refused() {
         ("name at a huge offset", E::Section, |d| d.set(h::W_NAME, HUGE)),
         ("name not UTF-8", E::Name, |d| d.set(d.offset(h::W_NAME), 0xc3c3_c3c3)),
         ("name cut inside a character", E::Name, |d| {
-            // 9 bytes are named; the ninth is the first of a character's two.
+            // The name has 9 bytes; the ninth is the first of two of a character.
             d.set(d.offset(h::W_NAME) + 2, 0xa4c3);
         }),
         ("self-test of no steps", E::SelfTest, |d| d.set_low(h::W_STEPS_NAME, 0)),
@@ -110,12 +110,12 @@ fn headers_that_cannot_be_are_refused() {
 }
 
 #[test]
-fn contracts_that_cannot_be_are_refused() {
-    // Arrays stand in the order of their flags: scale, offset, low, high, max_step.
+fn impossible_contracts_are_refused() {
+    // Arrays are in the order of their flags: scale, offset, low, high, max_step.
     fn array(d: &Draft, which: usize) -> usize {
         d.offset(h::W_CONTRACT) + which * ACT
     }
-    /// Flags of a contract that binarises, and memory for what is on.
+    /// Flags of a contract that binarises, and memory of the values that are on.
     fn binarised(d: &mut Draft, flags: u32) {
         d.set_high(h::W_WORK_FLAGS, flags);
         d.set_high(h::W_ACTION_WORK, d.high(h::W_ACTION_WORK) + ACT as u32);
@@ -134,7 +134,7 @@ fn contracts_that_cannot_be_are_refused() {
         ("max_step NaN", E::Constant, |d| d.set_f32(array(d, 4), NAN)),
         ("thresholds without values", E::Binarise, |d| binarised(d, 0xdf)),
         ("values without thresholds", E::Binarise, |d| d.set_high(h::W_WORK_FLAGS, 0x31f)),
-        // max_step's array as that of smoothing.
+        // max_step's array serves as that of smoothing.
         ("smoothing 0", E::Smoothing, |d| {
             d.set_high(h::W_WORK_FLAGS, 0x2f);
             d.set_f32(array(d, 4) + 1, 0.0);
@@ -143,7 +143,7 @@ fn contracts_that_cannot_be_are_refused() {
             d.set_high(h::W_WORK_FLAGS, 0x2f);
             d.set_f32(array(d, 4) + 1, 1.5);
         }),
-        // As the four arrays that binarise; of its limits' array the thresholds are reversed.
+        // The four arrays serve as those that binarise; the thresholds are reversed, as they take the limits' array.
         ("thresholds reversed", E::Binarise, |d| {
             binarised(d, 0x3c1);
             d.set_f32(array(d, 2), 0.5);
@@ -152,7 +152,7 @@ fn contracts_that_cannot_be_are_refused() {
 }
 
 #[test]
-fn operations_that_cannot_be_are_refused() {
+fn impossible_operations_are_refused() {
     refused(&[
         ("operations outside", E::Section, |d| d.set(h::W_OPS, d.0.len() as u32)),
         ("operations in the header", E::Section, |d| d.set(h::W_OPS, 4)),
@@ -190,7 +190,7 @@ fn operations_that_cannot_be_are_refused() {
 }
 
 #[test]
-fn matrices_that_cannot_be_are_refused() {
+fn impossible_matrices_are_refused() {
     fn scales(d: &Draft) -> usize {
         d.offset(d.block(OUTPUT, 0) + 2)
     }
@@ -273,7 +273,7 @@ fn matrices_that_cannot_be_are_refused() {
 }
 
 #[test]
-fn int32_is_allowed_to_the_last_product() {
+fn int32_sums_are_allowed_to_the_limit() {
     // One row of the 8-bit block decides; x_max may be as large as its sum allows, and no larger.
     let mut draft = VALID.clone();
     let x_max = draft.data(OUTPUT) + 1;
@@ -291,8 +291,8 @@ fn int32_is_allowed_to_the_last_product() {
 }
 
 #[test]
-fn nothing_but_the_contract_may_write_what_the_step_limit_holds_on_to() {
-    // The last action bounds the next one; a stray write there would carry the action out of its limits.
+fn only_the_contract_may_write_the_last_action() {
+    // The last action bounds the next one; a stray write there would move the action out of its limits.
     refused(&[
         ("work area over the action", E::Arena, |d| d.set_low(h::W_ACTION_WORK, d.high(h::W_ACTION_WORK) + 1)),
         ("destination over the action", E::Unwritten, |d| d.set_low(d.op(FUNCTION) + 1, d.low(h::W_ACTION_WORK))),
@@ -301,8 +301,8 @@ fn nothing_but_the_contract_may_write_what_the_step_limit_holds_on_to() {
 }
 
 #[test]
-fn operations_read_nothing_that_their_step_has_not_written() {
-    // Else an action would depend on the step before, or on which backend prepared the activations.
+fn operations_read_only_values_of_their_step() {
+    // Otherwise an action would depend on the step before, or on the backend that prepared the activations.
     refused(&[
         ("a source in the work area", E::Unwritten, |d| d.set_high(d.op(NORMALIZE) + 1, d.high(h::W_ACTION_WORK))),
         ("a source in the last action", E::Unwritten, |d| d.set_high(d.op(NORMALIZE) + 1, d.low(h::W_ACTION_WORK))),
@@ -321,7 +321,7 @@ fn operations_read_nothing_that_their_step_has_not_written() {
 }
 
 #[test]
-fn the_state_may_share_memory_with_nothing_that_a_step_writes() {
+fn the_state_shares_no_memory_with_a_step() {
     refused(&[
         ("state over the observation", E::Arena, |d| d.set_low(h::W_STATE, d.low(h::W_OBS_OUT))),
         ("state over the action", E::Arena, |d| d.set_low(h::W_STATE, d.low(h::W_ACTION_WORK))),
@@ -334,13 +334,13 @@ fn the_state_may_share_memory_with_nothing_that_a_step_writes() {
 
 #[test]
 fn a_network_without_operations_is_refused() {
-    // Its output would be whatever the scratch memory held.
+    // Its output would be the scratch memory's old content.
     refused(&[("no operations", E::Shape, |d| d.set_high(h::W_KIND, 0))]);
 }
 
 #[test]
-fn fields_that_an_operation_does_not_use_are_zero() {
-    // Else a later version could not give them a meaning.
+fn unused_fields_of_an_operation_are_zero() {
+    // Otherwise a later version could not give them a meaning.
     refused(&[
         ("source of a function", E::Reserved, |d| d.set_high(d.op(FUNCTION) + 1, 1)),
         ("constants of a function", E::Reserved, |d| d.set(d.op(FUNCTION) + 3, 32)),

@@ -1,4 +1,4 @@
-//! Scratch memory of whole policies: how much it is, and how far from what liveness allows.
+//! Scratch memory of whole policies: its size, and its distance from the bound of liveness.
 
 use std::path::Path;
 
@@ -13,25 +13,25 @@ use actq_cli::report::memory::{Peak, peak};
 use actq_kernels::Width;
 use anyhow::{Result, ensure};
 
-/// Words of the arena, and of what operations write: where most of that is needed, how many words are, and how many
-/// there are.
+/// Words of the arena, and of the values that operations write: the place of the largest need, the words needed there,
+/// and the words provided.
 fn scratch_is(dir: &Path, words: usize, [op, needed, placed]: [usize; 3]) -> Result<()> {
     let policy = Policy::load(dir)?;
     let options = Options::new(Method::Rtn, Budget::Width(Width::W3));
     let buffer = ImageBuffer::new(&quantize(&policy, &Recordings::default(), &options, |_, _| {})?.image);
     let image = buffer.image(dir)?;
     let (is, expected) = ((image.scratch_words(), peak(&image)), (words, Peak { op, words: needed, placed }));
-    ensure!(is == expected, "{}: {is:?} instead of {expected:?}", dir.display());
+    ensure!(is == expected, "{}: found {is:?}, expected {expected:?}", dir.display());
     Ok(())
 }
 
 #[test]
-fn scratch_of_the_ur3_policy() -> Result<()> {
+fn the_ur3_policy_keeps_its_scratch_size() -> Result<()> {
     scratch_is(&ur3(), 1203, [5, 960, 978])
 }
 
 #[test]
-fn scratch_of_shared_policies() -> Result<()> {
+fn shared_policies_keep_their_scratch_size() -> Result<()> {
     let Some(policies) = shared_policies() else { return Ok(()) };
     for (name, words, values) in [
         ("go1_mlp", 1197, [3, 768, 816]),

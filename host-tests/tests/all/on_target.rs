@@ -1,5 +1,5 @@
-//! The tests that build firmware and run it under QEMU, or read its ELF file: `cargo verify --all` runs them, and
-//! `cargo verify` runs those of [`crate::smoke`] only.
+//! The tests that build firmware and run it under QEMU, or read its ELF file. `cargo verify --all` runs them, and
+//! `cargo verify` runs only those of [`crate::smoke`].
 
 pub(crate) mod application;
 mod cost;

@@ -1,7 +1,7 @@
-//! Every operation of the executor, and the f32 evaluator that calibration uses, against an interpreter of policy.json
-//! in f64 that shares no code with them.
+//! Every operation of the executor, and of the f32 evaluator that calibration uses, against an interpreter of
+//! policy.json in f64 that shares no code with them.
 //!
-//! A tensor's name in these policies ends with its shape ("w 8x5"); its values are drawn.
+//! A tensor's name in these policies ends with its shape ("w 8x5"); its values are random.
 
 mod contract;
 mod reference;
@@ -22,23 +22,23 @@ use serde_json::{Value, json};
 use reference::Reference;
 pub(crate) use reference::{Case, wide};
 
-/// The step before which a run is reset.
+/// The step before which the test resets a run.
 const RESET: usize = 25;
 
-/// Largest error, over the RMS of the output, in parts of activation rounding (1 / x_max). A product rounds each value
-/// of its input by at most amax / (2 x_max), and the drawn matrices keep the variance, so one product is off by about
-/// 0.3 amax / x_max (one sigma), amax being 2 to 4 RMS: one part. Several products in a row, recurrence, and the
-/// largest of a hundred samples or more make it ten. A wrong operation is off by hundreds.
+/// Largest error, over the RMS of the output, in units of activation rounding (1 / x_max). A product rounds each value
+/// of its input by at most amax / (2 x_max), and the random matrices keep the variance, so one product has an error of
+/// about 0.3 amax / x_max (one sigma), where amax is 2 to 4 RMS: one unit. Several products in a row, recurrence, and
+/// the largest of a hundred samples or more make it ten. A wrong operation is off by hundreds.
 const PARTS: f64 = 20.0;
 
-/// What rounding to f32 and the functions' own errors (`kernels/src/math/functions.rs`) leave of a few operations
+/// Error of rounding to f32, and of the functions themselves (`kernels/src/math/functions.rs`), after a few operations
 /// without weights.
 const F32: f64 = 2e-6;
 
-/// [`F32`] through recurrence and a dozen operations with sums of some ten products.
+/// [`F32`] after recurrence and a dozen operations with sums of some ten products.
 const F32_DEEP: f64 = 2e-5;
 
-/// The largest difference of two runs over the RMS of the second. A step takes an observation and whether to reset
+/// The largest difference of two runs over the RMS of the second. A step takes an observation, and `true` to reset
 /// before.
 fn deviation(
     observations: &[Vec<f32>],
@@ -49,7 +49,7 @@ fn deviation(
     for (i, obs) in observations.iter().enumerate() {
         let expected = reference(&wide(obs), i == RESET);
         let given = run(obs, i == RESET).with_context(|| format!("step {i}"))?;
-        ensure!(given.len() == expected.len(), "{} values instead of {}", given.len(), expected.len());
+        ensure!(given.len() == expected.len(), "found {} values, expected {}", given.len(), expected.len());
         for (y, r) in given.iter().zip(&expected) {
             ensure!(y.is_finite(), "{y} at step {i}");
             largest = largest.max((y - r).abs());
@@ -58,7 +58,7 @@ fn deviation(
         }
     }
     let rms = (square / count).sqrt();
-    ensure!(rms > 1e-3, "the reference gives nothing to compare with");
+    ensure!(rms > 1e-3, "the reference output is too small to compare with");
     Ok(largest / rms)
 }
 
@@ -95,7 +95,7 @@ fn check(obs: usize, act: usize, ops: Value) -> Result<()> {
     };
     let off = deviation(&observations, f32_run, follow(case.reference()))?;
     let limit = if policy.graph.matrices.is_empty() { F32 } else { F32_DEEP };
-    ensure!(off < limit, "the f32 evaluator is off by {off:.2e}, {limit:.2e} are allowed");
+    ensure!(off < limit, "the error of the f32 evaluator is {off:.2e}, limit {limit:.2e}");
 
     for group in [0, 32] {
         let outcomes = rtn(&policy, group)?;
@@ -109,12 +109,12 @@ fn check(obs: usize, act: usize, ops: Value) -> Result<()> {
             deviation(&observations, run, follow(case.dequantized(&policy, &outcomes)))
         })?;
         let limit = bound(&outcomes);
-        ensure!(off < limit, "group {group}: the executor is off by {off:.2e}, {limit:.2e} are allowed");
+        ensure!(off < limit, "group {group}: the error of the executor is {off:.2e}, limit {limit:.2e}");
     }
     Ok(())
 }
 
-/// The reference as [`deviation`] takes it.
+/// The reference in the form for [`deviation`].
 fn follow(mut reference: Reference<'_>) -> impl FnMut(&[f64], bool) -> Vec<f64> {
     move |obs, reset| {
         if reset {
@@ -125,7 +125,7 @@ fn follow(mut reference: Reference<'_>) -> impl FnMut(&[f64], bool) -> Vec<f64> 
 }
 
 #[test]
-fn functions() -> Result<()> {
+fn functions_match_the_reference() -> Result<()> {
     let ops = json!([
         {"op": "relu", "input": "obs", "save": "a"},
         {"op": "elu", "input": "obs", "save": "b"},
@@ -141,7 +141,7 @@ fn functions() -> Result<()> {
 }
 
 #[test]
-fn normalize_with_either_clip_both_and_none() -> Result<()> {
+fn normalize_accepts_either_clip_both_or_none() -> Result<()> {
     let ops = json!([
         {"op": "normalize", "mean": "m 7", "scale": "s 7", "input": "obs", "save": "a"},
         {"op": "normalize", "mean": "m 7", "scale": "s 7", "pre_clip": 1.5, "input": "obs", "save": "b"},
@@ -153,8 +153,8 @@ fn normalize_with_either_clip_both_and_none() -> Result<()> {
 }
 
 #[test]
-fn norms_with_given_and_default_eps() -> Result<()> {
-    // Clipped to 0.003 the variance is about the default eps, so that a wrong default shows.
+fn norms_use_a_given_or_the_default_eps() -> Result<()> {
+    // Clipped to 0.003 the variance is about the default eps, so that a wrong default is visible.
     let small = json!({"op": "normalize", "mean": "m 9", "scale": "s 9", "clip": 0.003, "input": "obs"});
     let ops = json!([
         {"op": "layernorm", "w_ln": "w 9", "b_ln": "b 9", "eps": 0.5, "input": "obs", "save": "a"},
@@ -170,11 +170,11 @@ fn norms_with_given_and_default_eps() -> Result<()> {
 }
 
 #[test]
-fn slots_and_slices_behind_each_other() -> Result<()> {
+fn slots_and_slices_are_concatenated_in_order() -> Result<()> {
     let ops = json!([
         {"op": "tanh", "input": "obs[3:10]", "save": "a"},
         {"op": "sigmoid", "input": ["a[:4]", "obs", "a[2:]", "a[:]"], "save": "b"},
-        // A name given again stands for the later value.
+        // A repeated name refers to the later value.
         {"op": "relu", "input": "b[7:14]", "save": "a"},
         {"op": "identity", "input": ["b", "a[1:2]", "obs[11:]", "a"]},
     ]);
@@ -182,7 +182,7 @@ fn slots_and_slices_behind_each_other() -> Result<()> {
 }
 
 #[test]
-fn add_of_a_slot_of_the_observation_and_of_itself() -> Result<()> {
+fn add_accepts_observation_slots_and_itself() -> Result<()> {
     let ops = json!([
         {"op": "add", "with": "obs", "save": "twice"},
         {"op": "tanh", "save": "t"},
@@ -195,12 +195,12 @@ fn add_of_a_slot_of_the_observation_and_of_itself() -> Result<()> {
 }
 
 #[test]
-fn a_policy_without_weights_gives_its_observation() -> Result<()> {
+fn a_policy_without_weights_returns_its_observation() -> Result<()> {
     check(5, 5, json!([{"op": "identity"}]))
 }
 
 #[test]
-fn linear_of_all_remainders() -> Result<()> {
+fn linear_handles_all_remainders() -> Result<()> {
     // One more and one less than quads, pairs, units and groups; one row, one column; with bias and without.
     let ops = json!([
         {"op": "linear", "w": "a 5x33", "b": "b 5", "input": "obs[:33]", "save": "a"},
@@ -214,7 +214,7 @@ fn linear_of_all_remainders() -> Result<()> {
 }
 
 #[test]
-fn a_matrix_that_two_operations_share() -> Result<()> {
+fn two_operations_may_share_a_matrix() -> Result<()> {
     let ops = json!([
         {"op": "linear", "w": "w 12x12", "b": "a 12", "save": "x"},
         {"op": "elu"},
@@ -252,13 +252,13 @@ fn recurrent(op: &str, rows: usize, cols: usize, hidden: usize, name: &str) -> V
 }
 
 #[test]
-fn two_lstms_in_series() -> Result<()> {
+fn two_lstms_run_in_series() -> Result<()> {
     let ops = json!([recurrent("lstm", 28, 9, 7, "first"), recurrent("lstm", 20, 7, 5, "second")]);
     check(9, 5, ops)
 }
 
 #[test]
-fn gru_with_and_without_biases() -> Result<()> {
+fn gru_runs_with_and_without_biases() -> Result<()> {
     let ops = json!([
         recurrent("gru", 18, 8, 6, "first"),
         {"op": "gru", "hidden": 5, "gates": "r,z,n", "w_ih": "w 15x6", "w_hh": "v 15x5"},
@@ -267,7 +267,7 @@ fn gru_with_and_without_biases() -> Result<()> {
 }
 
 #[test]
-fn recurrent_outputs_may_be_overwritten_but_not_the_state() -> Result<()> {
+fn overwriting_a_recurrent_output_keeps_the_state() -> Result<()> {
     for (op, gates) in [("lstm", 4), ("gru", 3)] {
         let ops = json!([
             recurrent(op, gates * 6, 7, 6, "h"),
@@ -280,7 +280,7 @@ fn recurrent_outputs_may_be_overwritten_but_not_the_state() -> Result<()> {
             {"op": "identity", "input": ["h", "a", "b", "c"]},
         ]);
         check(7, 24, ops).context(op)?;
-        // Nothing else reads the state here, so that it is tempting to work in place.
+        // Nothing else reads the state here, so that working in place is tempting.
         let plain = json!([recurrent(op, gates * 6, 7, 6, "h"), {"op": "tanh"}]);
         check(7, 6, plain).context(op)?;
     }
@@ -289,7 +289,7 @@ fn recurrent_outputs_may_be_overwritten_but_not_the_state() -> Result<()> {
 
 const FUNCTIONS: [&str; 6] = ["relu", "elu", "silu", "gelu", "tanh", "sigmoid"];
 
-/// Some operations on earlier values, with names that are given again.
+/// Some operations on earlier values, with repeated names.
 fn drawn_ops(random: &mut Random, obs: usize, act: usize) -> Value {
     let mut slots = BTreeMap::from([("obs".to_owned(), obs)]);
     let mut ops = Vec::new();
@@ -321,7 +321,7 @@ fn drawn_ops(random: &mut Random, obs: usize, act: usize) -> Value {
                 json!({"op": "normalize", "mean": format!("m{i} {len}"), "scale": format!("s{i} {len}"), "clip": 2}),
                 len,
             ),
-            // A large eps: a norm over values that are nearly equal would magnify the rounding without end.
+            // A large eps: a norm over nearly equal values would magnify the rounding without bound.
             5 => (json!({"op": "layernorm", "w_ln": format!("w{i} {len}"), "eps": 0.2}), len),
             6 => (json!({"op": "rmsnorm", "w_ln": format!("w{i} {len}"), "eps": 0.2}), len),
             7..=9 if !fitting.is_empty() => (json!({"op": "add", "with": fitting[random.below(fitting.len())]}), len),
@@ -343,7 +343,7 @@ fn drawn_ops(random: &mut Random, obs: usize, act: usize) -> Value {
 }
 
 #[test]
-fn drawn_graphs() -> Result<()> {
+fn random_graphs_match_the_reference() -> Result<()> {
     let mut random = Random::new(3);
     for _ in 0..400 {
         let ops = drawn_ops(&mut random, 9, 4);

@@ -1,4 +1,4 @@
-//! Where the command's outputs go: never over its inputs, through links, into devices and pipes, whole or not at all.
+//! The command's outputs: never over its inputs, through links, into devices and pipes, whole or not at all.
 #![cfg(unix)]
 
 use std::collections::BTreeMap;
@@ -63,7 +63,7 @@ impl Fixture {
         self.run(&format!("quantize policy --method rtn {options}"))
     }
 
-    /// What every name stands for: a link's target or a file's content.
+    /// The content of every name: a link's target or a file's bytes.
     fn snapshot(&self) -> Result<BTreeMap<PathBuf, Vec<u8>>> {
         let mut found = BTreeMap::new();
         let mut folders = vec![self.0.path().to_owned()];
@@ -84,20 +84,20 @@ impl Fixture {
         Ok(found)
     }
 
-    /// A new image, by another way than the one that is tested.
+    /// A new image, made in another way than the tested one.
     fn image(&self) -> Result<Vec<u8>> {
         Ok(fs::read(self.path("old.actq"))?)
     }
 }
 
-/// Names that are put into the folder before: a link to a path, or another name of a file.
+/// A name to create in the folder first: a link to a path, or another name of a file.
 enum Name {
     Link(&'static str, &'static str),
     Hard(&'static str, &'static str),
     None,
 }
 
-/// The command, the name that is put there, and what the message says.
+/// The command, the name to create, and the expected message.
 const OVERWRITING: &[(&str, Name, &str)] = &[
     (
         "quantize policy --out policy/policy.safetensors",
@@ -107,7 +107,7 @@ const OVERWRITING: &[(&str, Name, &str)] = &[
     ("quantize policy --out policy/policy.json", Name::None, "the same file as policy/policy.json"),
     ("quantize policy --out policy/calib.npz", Name::None, "the same file as policy/calib.npz"),
     ("quantize policy --out policy/heldout.npz", Name::None, "the same file as policy/heldout.npz"),
-    // A recording's name, though none is there.
+    // A recording's name, though no recording has it.
     ("quantize policy --out policy/heldout.safetensors", Name::None, "the same file as policy/heldout.safetensors"),
     ("quantize policy --calib drive.npz --out drive.npz", Name::None, "the same file as drive.npz"),
     ("quantize policy --out x.actq --save-stats policy/policy.json", Name::None, "the same file as policy/policy.json"),
@@ -152,7 +152,7 @@ const OVERWRITING: &[(&str, Name, &str)] = &[
 ];
 
 #[test]
-fn no_output_takes_the_place_of_an_input_or_of_another() -> Result<()> {
+fn no_output_overwrites_an_input_or_another_output() -> Result<()> {
     all(OVERWRITING.iter().map(|(line, name, words)| {
         let run = || {
             let fixture = Fixture::new()?;
@@ -162,12 +162,12 @@ fn no_output_takes_the_place_of_an_input_or_of_another() -> Result<()> {
                 Name::None => {}
             }
             let before = fixture.snapshot()?;
-            // The method that takes any recording, so that nothing else keeps the command from writing.
+            // The method that accepts any recording, so that nothing else stops the command from writing.
             let method = if line.starts_with("quantize") { "--method rtn" } else { "" };
             let output = fixture.run(&format!("{line} {method}"))?;
-            ensure!(output.stdout.is_empty(), "work was done");
+            ensure!(output.stdout.is_empty(), "the command did its work");
             failed(&output, 1, &[words])?;
-            ensure!(fixture.snapshot()? == before, "files have changed");
+            ensure!(fixture.snapshot()? == before, "files changed");
             Ok(())
         };
         ((*line).to_owned(), run())
@@ -175,20 +175,20 @@ fn no_output_takes_the_place_of_an_input_or_of_another() -> Result<()> {
 }
 
 #[test]
-fn a_link_stays_and_its_target_is_written() -> Result<()> {
+fn writing_to_a_link_writes_its_target() -> Result<()> {
     let fixture = Fixture::new()?;
     fs::create_dir(fixture.path("images"))?;
     fs::write(fixture.path("images/there.actq"), "old")?;
-    // To a file, to none, and by way of another link.
+    // To an existing file, to a missing one, and through another link.
     for (link, to) in [("a", "images/there.actq"), ("b", "images/new.actq"), ("c", "b2"), ("b2", "images/third.actq")] {
         symlink(to, fixture.path(link))?;
     }
     for (out, target) in [("a", "there"), ("b", "new"), ("c", "third")] {
         succeeded(&fixture.quantize(&format!("--out {out}"))?)?;
-        ensure!(fs::symlink_metadata(fixture.path(out))?.is_symlink(), "{out} is a link no more");
+        ensure!(fs::symlink_metadata(fixture.path(out))?.is_symlink(), "{out} is no longer a link");
         ensure!(fs::read(fixture.path(&format!("images/{target}.actq")))? == fixture.image()?, "{target}");
     }
-    ensure!(fs::symlink_metadata(fixture.path("b2"))?.is_symlink(), "b2 is a link no more");
+    ensure!(fs::symlink_metadata(fixture.path("b2"))?.is_symlink(), "b2 is no longer a link");
     symlink("round", fixture.path("round"))?;
     failed(&fixture.quantize("--out round")?, 1, &["round: cannot be written"])?;
     symlink("none/image.actq", fixture.path("lost"))?;
@@ -196,7 +196,7 @@ fn a_link_stays_and_its_target_is_written() -> Result<()> {
 }
 
 #[test]
-fn a_pipe_is_written_to() -> Result<()> {
+fn an_output_may_be_a_pipe() -> Result<()> {
     let fixture = Fixture::new()?;
     let pipe = fixture.path("pipe");
     ensure!(Command::new("mkfifo").arg(&pipe).status()?.success(), "no pipe");
@@ -211,9 +211,9 @@ fn a_pipe_is_written_to() -> Result<()> {
 }
 
 #[test]
-fn a_device_is_written_to() -> Result<()> {
+fn an_output_may_be_a_device() -> Result<()> {
     let fixture = Fixture::new()?;
-    // By way of links: whoever may replace a device would lose it to the mistake that this test is for.
+    // Through links: a user with the right to replace a device would lose it by the mistake that this test looks for.
     symlink("/dev/null", fixture.path("null"))?;
     symlink("/dev/stdout", fixture.path("stdout"))?;
     succeeded(&fixture.quantize("--out null")?)?;
@@ -225,13 +225,13 @@ fn a_device_is_written_to() -> Result<()> {
     let svg = fixture.run("inspect old.actq --widths --svg stdout")?;
     let (picture, report) = (String::from_utf8(svg.stdout)?, String::from_utf8(svg.stderr)?);
     ensure!(picture.trim_end().ends_with("</svg>") && !report.is_empty(), "{picture} and {report}");
-    // A file that is open already has a place at which others write.
+    // An open file already has a position at which others write.
     let log = fixture.path("log");
     fs::write(&log, "lines\n")?;
     let mut command = fixture.command("quantize policy --method rtn --out stdout");
     command.stdout(OpenOptions::new().append(true).open(&log)?).stderr(Stdio::piped());
     failed(&command.output()?, 1, &["stdout: cannot be written", "it stands for a file that is open already"])?;
-    ensure!(fs::read(&log)? == b"lines\n", "the file has changed");
+    ensure!(fs::read(&log)? == b"lines\n", "the file changed");
     Ok(())
 }
 
@@ -240,12 +240,12 @@ fn mode(path: &Path) -> Result<u32> {
 }
 
 #[test]
-fn permissions_are_those_of_the_file_before() -> Result<()> {
+fn a_replaced_file_keeps_its_permissions() -> Result<()> {
     let fixture = Fixture::new()?;
     let out = fixture.path("image.actq");
     succeeded(&fixture.quantize("--out image.actq")?)?;
     File::create(fixture.path("new"))?;
-    ensure!(mode(&out)? == mode(&fixture.path("new"))?, "{:o}: not as any new file", mode(&out)?);
+    ensure!(mode(&out)? == mode(&fixture.path("new"))?, "{:o}: not the mode of a new file", mode(&out)?);
     for permissions in [0o600, 0o664, 0o4755] {
         fs::write(&out, "old")?;
         fs::set_permissions(&out, Permissions::from_mode(permissions))?;

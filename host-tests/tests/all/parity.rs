@@ -1,4 +1,4 @@
-//! Packing, the reference and the portable kernels against the definition, by property and on the golden cases.
+//! Packing, the reference and the portable kernels against the definition, by property tests and on the golden cases.
 
 use actq_bench::golden::{self, Case, Draw, Random};
 use actq_kernels::arch::{BACKEND, Backend, Mismatch, Product, gemv, portable, reference};
@@ -43,7 +43,7 @@ proptest! {
     }
 
     #[test]
-    fn unpacking_gives_back_what_was_packed(case in cases()) {
+    fn unpacking_inverts_packing(case in cases()) {
         let words = case.words();
         let block = Block::new(case.shape, &words).expect("the words fit the shape");
         let mask = ((1u32 << case.shape.width.bits()) - 1) as u8;
@@ -65,7 +65,7 @@ proptest! {
         let first = STRIP * first.min((all.len() - 1) / STRIP);
         let last = (first + STRIP * strips).min(all.len());
         let part = case.run(0, |b, x, acc| {
-            gemv(b, x, first, &mut acc[first..last]).expect("the activations belong to the block, the rows to strips");
+            gemv(b, x, first, &mut acc[first..last]).expect("the activations fit the block, and the rows are whole strips");
         });
         prop_assert_eq!(&part[first..last], &all[first..last]);
     }
@@ -99,7 +99,7 @@ proptest! {
         let scale = Scale::new(&x, x_max).expect("all values are finite");
         let prepared = scale.quantize(&x, &plan, &mut words).expect("there is room");
         let scale = scale.get();
-        // What integers give, word for word: start words, sums and padding, too.
+        // The result from integers, word for word: start words, sums and padding, too.
         let integers: Vec<i16> = (0..x.len()).map(|col| prepared.value(col)).collect();
         let mut expected = vec![!0; plan.words() + 1];
         prop_assert_eq!(prepare(&integers, &plan, &mut expected).map(|x| x.words()), Some(prepared.words()));
@@ -123,12 +123,12 @@ fn golden_cases_hold_on_the_host() {
 
 #[test]
 fn this_build_uses_the_portable_backend() {
-    // The firmware's golden run asserts the other one.
+    // The firmware's golden run asserts the other backend.
     assert_eq!(BACKEND, Backend::Portable);
 }
 
 #[test]
-fn shapes_and_lengths_that_do_not_fit_are_refused() {
+fn wrong_shapes_and_lengths_are_refused() {
     let shape = BlockShape { width: Width::W3, lanes: Lanes::Single, rows: 5, cols: 33, group: 0 };
     let mut words = vec![0; shape.words()];
     assert!(pack(shape, &[0; 5 * 33], &[], &mut words).is_some());
@@ -166,7 +166,7 @@ fn shapes_and_lengths_that_do_not_fit_are_refused() {
     }
 }
 
-/// An image's block record with another byte for the lanes, under a valid checksum.
+/// An image's block record with another byte for the lanes, and a valid checksum.
 fn with_lanes(image: &[u8], lanes: u8) -> Vec<u8> {
     use actq_kernels::image::{checksum, header as h};
     let word =
@@ -180,7 +180,7 @@ fn with_lanes(image: &[u8], lanes: u8) -> Vec<u8> {
 }
 
 #[test]
-fn an_image_states_the_lanes_that_follow_from_its_activations() {
+fn lanes_must_follow_from_the_activations() {
     let shape = BlockShape { width: Width::W2, lanes: Lanes::Paired, rows: 9, cols: 40, group: 0 };
     let image = single_matrix_image(&Case::draw(&mut Random::new(7), shape, 1, Draw::Uniform));
     let check = |bytes: &[u8]| {
@@ -193,7 +193,7 @@ fn an_image_states_the_lanes_that_follow_from_its_activations() {
     }
 }
 
-/// Row blocks compute `start + acc * (row_scale * x_scale)` in this order, with biases in one pass or in y before.
+/// Row blocks compute `start + acc * (row_scale * x_scale)` in this order, with biases in one pass or already in y.
 #[test]
 fn scaling_keeps_the_documented_order_of_operations() {
     let mut random = Random::new(11);
@@ -229,7 +229,7 @@ fn scaling_keeps_the_documented_order_of_operations() {
 }
 
 #[test]
-fn vectors_that_are_not_finite_are_refused_and_tiny_ones_are_zero() {
+fn vectors_are_refused_if_infinite_zero_if_tiny() {
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         assert_eq!(Scale::new(&[1.0, bad], 127), Err(NotFinite));
     }
@@ -246,7 +246,7 @@ fn vectors_that_are_not_finite_are_refused_and_tiny_ones_are_zero() {
 }
 
 #[test]
-fn weights_come_back_from_their_codes() {
+fn codes_decode_to_their_weights() {
     let mut random = Random::new(5);
     for width in Width::ALL {
         for group in [0, 32] {

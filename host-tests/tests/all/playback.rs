@@ -1,4 +1,4 @@
-//! The action contract, chunk playback, and saved states, against plain arithmetic in f64. The networks are none: the
+//! The action contract, chunk playback, and saved states, against plain arithmetic in f64. There is no network: the
 //! observation is the raw output, bit for bit.
 
 use std::fs;
@@ -21,7 +21,7 @@ use proptest::prelude::*;
 /// Length of an action.
 const ACT: usize = 2;
 
-/// An image whose raw output is its observation.
+/// An image that returns its observation as the raw output.
 fn echo(chunk: usize, execute: usize, contract: ActionContract) -> ImageBuffer {
     let len = chunk * ACT;
     let mut graph = Graph::new(len);
@@ -40,7 +40,7 @@ fn with_head<T>(buffer: &ImageBuffer, work: impl FnOnce(&mut Head<'_, '_>) -> T)
     work(&mut Head::new(image, &mut scratch).expect("the scratch memory has the image's size"))
 }
 
-/// Sixty-fourths: sums and products of a few are exact in f32, so that a threshold is met or not as in f64.
+/// Sixty-fourths: sums and products of a few are exact in f32, so that thresholds agree with f64.
 fn sixty_fourths(from: i32, to: i32) -> impl Strategy<Value = f32> + Clone {
     (from..=to).prop_map(|n| n as f32 / 64.0)
 }
@@ -120,7 +120,7 @@ fn close(ours: &[f32], expected: &[f64]) -> bool {
 
 proptest! {
     #[test]
-    fn the_contract_is_that_of_plain_arithmetic(
+    fn the_contract_matches_plain_arithmetic(
         contract in contracts(),
         raw in prop::collection::vec(each(sixty_fourths(-160, 160)), 1..40),
     ) {
@@ -130,9 +130,9 @@ proptest! {
             for raw in &raw {
                 let action = head.step(raw).expect("it is finite").to_vec();
                 let expected = oracle.action(&wide(raw));
-                prop_assert!(close(&action, &expected), "{action:?} instead of {expected:?}");
+                prop_assert!(close(&action, &expected), "found {action:?}, expected {expected:?}");
                 for (i, a) in action.iter().enumerate() {
-                    // Limits hold to the last bit, however the low-pass is rounded.
+                    // Limits are exact, however the low-pass filter rounds.
                     prop_assert!(contract.low.as_ref().is_none_or(|low| *a >= low[i]));
                     prop_assert!(contract.high.as_ref().is_none_or(|high| *a <= high[i]));
                     if let (Some(last), Some(step)) = (&last, &contract.max_step) {
@@ -146,14 +146,14 @@ proptest! {
     }
 }
 
-/// What becomes of a control period.
+/// The event of a control period.
 #[derive(Clone, Debug)]
 enum Period {
-    /// A step, at whose end so many periods have passed, in each of which the chunk before played on, or nothing did.
+    /// A step that ends after this many periods, in each of which the previous chunk continued, or nothing played.
     Step(Vec<f32>, Vec<bool>),
-    /// The chunk plays on without an observation.
+    /// The chunk continues without an observation.
     Play,
-    /// Nothing.
+    /// No event.
     Pass(usize),
 }
 
@@ -170,7 +170,7 @@ fn periods(chunk: usize) -> impl Strategy<Value = Vec<Period>> {
     prop::collection::vec(period, 1..60)
 }
 
-/// Chunk and execute length, and how they are played.
+/// Chunk length, execute length, and playback.
 fn playbacks() -> impl Strategy<Value = (usize, usize, Playback)> {
     (2usize..9).prop_flat_map(|chunk| {
         let late = move |oldest: usize| prop::option::of(oldest..=chunk + 1);
@@ -193,9 +193,9 @@ struct Player {
     execute: usize,
     by: Playback,
     now: usize,
-    /// Of the chunk that is played: when it was observed, and its actions.
+    /// The chunk under playback: its observation time, and its actions.
     plan: Option<(usize, Vec<Vec<f64>>)>,
-    /// All chunks, the oldest first: when observed, and from when on they play.
+    /// All chunks, the oldest first: observation time, and start of playback.
     all: Vec<(usize, usize, Vec<Vec<f64>>)>,
 }
 
@@ -204,7 +204,7 @@ impl Player {
         Self { chunk, execute, by, now: 0, plan: None, all: Vec::new() }
     }
 
-    /// The action of now, or none that is young enough.
+    /// Returns the present action, or `None` if none is recent enough.
     fn action(&self) -> Option<Vec<f64>> {
         if let Some(Ensemble { horizon, m }) = self.by.ensemble {
             let now = self.now;
@@ -224,7 +224,7 @@ impl Player {
         self.plan.as_ref().is_none_or(|(seen, _)| self.now - seen >= self.execute)
     }
 
-    /// A chunk that was observed at `seen` is ready now.
+    /// Starts a chunk whose observation was at `seen`.
     fn take(&mut self, seen: usize, raw: &[f32]) {
         let mut plan: Vec<Vec<f64>> = raw.chunks(ACT).map(wide).collect();
         self.all.push((seen, self.now, plan.clone()));
@@ -247,7 +247,7 @@ impl Player {
 
 proptest! {
     #[test]
-    fn chunks_are_played_as_in_plain_arithmetic(
+    fn chunk_playback_matches_plain_arithmetic(
         ((chunk, execute, playback), periods) in playbacks().prop_flat_map(|by| (Just(by), periods(by.0))),
     ) {
         let contract = ActionContract { playback, ..ActionContract::default() };
@@ -273,7 +273,7 @@ proptest! {
                         let (seen, runs) = (player.now, player.runs());
                         head.begin(raw).expect("it is finite");
                         if runs && playback.overlap == 0 {
-                            // Nothing is kept of a chunk that is being replaced.
+                            // Nothing remains of a chunk under replacement.
                             player.plan = None;
                         }
                         for &play in waits {
@@ -299,7 +299,7 @@ proptest! {
                             Poll::Pending => Vec::new(),
                         });
                         let agrees = agree(ours.as_deref().map_err(|e| *e), &expected);
-                        prop_assert!(agrees, "period {i}: {ours:?} instead of {expected:?}");
+                        prop_assert!(agrees, "period {i}: found {ours:?}, expected {expected:?}");
                         match expected {
                             Some(_) => player.now += 1,
                             None => {
@@ -316,7 +316,7 @@ proptest! {
 
     #[test]
     fn a_new_chunk_takes_over_without_a_jump(chunk in 4usize..12, raw in prop::collection::vec(-1.0f32..1.0, 12 * ACT)) {
-        // All of the old chunk is 0: what the new one adds grows by its share of each action.
+        // The old chunk is all 0: the new one's part grows by its share in each action.
         let overlap = chunk - 2;
         let by = Playback { overlap, ..Playback::default() };
         with_head(&echo(chunk, 2, ActionContract { playback: by, ..ActionContract::default() }), |head| {
@@ -338,7 +338,7 @@ proptest! {
 }
 
 #[test]
-fn a_step_policy_has_a_deadline_for_its_observation() {
+fn step_policies_refuse_stale_observations() {
     let by = Playback { deadline: Some(3), ..Playback::default() };
     with_head(&echo(1, 1, ActionContract { playback: by, ..ActionContract::default() }), |head| {
         for (late, plays) in [(0, true), (2, true), (3, false), (usize::MAX, false), (2, true)] {
@@ -380,7 +380,7 @@ fn saved(head: &Head<'_, '_>) -> Vec<u8> {
 }
 
 #[test]
-fn a_restored_head_goes_on_with_the_same_bits() {
+fn a_restored_head_continues_with_the_same_bits() {
     let buffer = remembering(0.1);
     let whole: Vec<Vec<f32>> =
         with_head(&buffer, |head| (0..40).map(|i| head.step(&wave(i)).expect("an action").to_vec()).collect());
@@ -392,11 +392,11 @@ fn a_restored_head_goes_on_with_the_same_bits() {
             saved(head)
         });
         with_head(&buffer, |head| {
-            // Of another life.
+            // State of an unrelated run.
             for i in 0..5 {
                 head.step(&wave(3 * i)).expect("an action");
             }
-            head.restore(&state).expect("it is the image's");
+            head.restore(&state).expect("the state is from this image");
             assert_eq!(saved(head), state);
             for (i, expected) in whole.iter().enumerate().skip(at) {
                 assert_eq!(head.step(&wave(i)).expect("an action"), expected, "saved at {at}, step {i}");
@@ -406,7 +406,7 @@ fn a_restored_head_goes_on_with_the_same_bits() {
 }
 
 #[test]
-fn states_that_are_damaged_or_of_another_image_are_refused() {
+fn damaged_or_foreign_states_are_refused() {
     let buffer = remembering(0.1);
     with_head(&buffer, |head| {
         for i in 0..5 {
@@ -432,7 +432,7 @@ fn states_that_are_damaged_or_of_another_image_are_refused() {
         }
         let other = with_head(&remembering(0.2), |other| saved(other));
         assert_eq!(head.restore(&other), Err(SavedError::Image));
-        assert_eq!(saved(head), before, "a refusal changes nothing");
+        assert_eq!(saved(head), before, "a refusal must change nothing");
         head.begin(&wave(6)).expect("it is finite");
         assert_eq!(
             (head.restore(&state), head.save(&mut vec![0; len])),
@@ -443,9 +443,9 @@ fn states_that_are_damaged_or_of_another_image_are_refused() {
     });
 }
 
-/// On the target every step is one after a warm restart, on the host none is.
+/// On the target a warm restart precedes every step; on the host none does.
 #[test]
-fn six_hundred_steps_have_the_same_bits_through_as_many_restarts_on_the_target() -> Result<()> {
+fn restarts_between_steps_keep_the_bits() -> Result<()> {
     const HIDDEN: usize = 24;
     let mut builder = Builder::new(4 * ACT);
     let mut matrix = |rows: usize, cols| builder.matrix(rows, cols, Activations::Int8, &vec![Some(Width::W3); rows], 0);
@@ -473,6 +473,6 @@ fn six_hundred_steps_have_the_same_bits_through_as_many_restarts_on_the_target()
         }
         Ok(())
     })?;
-    ensure!(different > 300, "the actions hardly change");
+    ensure!(different > 300, "too few actions differ");
     target.finish()
 }

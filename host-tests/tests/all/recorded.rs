@@ -1,4 +1,4 @@
-//! What methods give on the UR3 policy, held to what was recorded: errors, and success in closed loop.
+//! Results of the methods on the UR3 policy against recorded figures: errors, and success in closed loop.
 
 use actq::budget::Budget;
 use actq::data::Recordings;
@@ -12,10 +12,10 @@ use actq_bench::closed_loop::episode_on_host;
 use actq_bench::ur3;
 use anyhow::Result;
 
-/// A figure may be larger than recorded by this: other processors round matrix products differently.
+/// Tolerance above a recorded figure: other processors round matrix products differently.
 pub(crate) const ROOM: f64 = 1.5;
 
-/// Episodes, from a seed that nothing was recorded or trained with.
+/// Episodes, from a seed that no recording or training used.
 const EPISODES: u64 = 40;
 const FIRST_SEED: u64 = 1000;
 
@@ -34,17 +34,17 @@ fn figures(options: &Options) -> Result<(f64, usize, f64)> {
     Ok((nmse, success, tracking))
 }
 
-/// Steps of what learns, a share of the default.
+/// Steps of the methods that learn, a share of the default.
 const STEPS: Option<usize> = Some(1000);
 
-/// The figures, held to those recorded.
+/// Compares the figures with the recorded ones.
 fn hold(method: Method, bits: f64, nmse: f64, tracking: f64) -> Result<(f64, usize, f64)> {
     let plain = Options::new(method, Budget::BitsPerWeight(bits));
     let found = figures(&Options { group: method.default_group(), steps: STEPS, ..plain })?;
     let text = format!("{method} at {bits} bits: NMSE, successes and tracking error are {found:?}");
     assert!(found.0 < ROOM * nmse && found.1 as u64 == EPISODES && found.2 < ROOM * tracking, "{text}");
-    // A record that is far behind holds nothing.
-    assert!(found.0 > nmse / ROOM, "{text}; record the smaller error");
+    // A record far above the result checks nothing.
+    assert!(found.0 > nmse / ROOM, "{text}; record the smaller value");
     Ok(found)
 }
 
@@ -52,7 +52,7 @@ fn hold(method: Method, bits: f64, nmse: f64, tracking: f64) -> Result<(f64, usi
 fn best_keeps_its_error_and_every_episode() -> Result<()> {
     hold(Method::Best, 3.0, 1.4e-3, 1.0)?;
     let (.., even) = hold(Method::Best, 2.0, 6.7e-3, 1.45)?;
-    // What `--relative` is for: actions that are small where the arm holds its goal.
+    // The purpose of `--relative`: small actions while the arm holds its goal.
     let plain = Options::new(Method::Best, Budget::BitsPerWeight(2.0));
     let (_, kept, relative) = figures(&Options { steps: STEPS, relative: true, ..plain })?;
     assert_eq!(kept as u64, EPISODES);

@@ -1,4 +1,4 @@
-//! Recordings of whole policies: what leaves their calibrated range, and windows that begin in a recorded state.
+//! Recordings of whole policies: values outside their calibrated range, and windows that begin in a recorded state.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ use actq_kernels::Width;
 use anyhow::Result;
 use ndarray::{Array2, Array3};
 
-/// The share of held-out observations outside the calibrated range, and whether that is worth a warning.
+/// The share of held-out observations outside the calibrated range, and `true` if it deserves a warning.
 fn outside(dir: &Path) -> Result<(f64, bool)> {
     let policy = Policy::load(dir)?;
     let read = |which: Recording| which.require(Some(dir), None, Sizes::of(&policy), "this test");
@@ -44,7 +44,7 @@ const ACT: usize = 2;
 const STEPS: usize = 200;
 const WINDOW: usize = 5;
 
-/// An LSTM whose state lasts.
+/// An LSTM with a long memory.
 fn policy() -> Policy {
     let mut random = Random::new(11);
     let mut values = |n: usize| -> Vec<f32> { (0..n).map(|_| 0.4 * random.unit()).collect() };
@@ -53,7 +53,7 @@ fn policy() -> Policy {
         graph.matrices.push(WeightMatrix { name: name.into(), rows, cols, data: values(rows * cols) });
     }
     let mut bias = values(4 * HIDDEN);
-    // The forget gate stands open.
+    // The forget gate is open.
     bias[HIDDEN..2 * HIDDEN].iter_mut().for_each(|b| *b += 3.0);
     graph.add(Lstm { hidden: HIDDEN, input: 0, state: 1, bias }, &[0]).expect("it fits");
     graph.add(Linear { matrix: 2, bias: values(ACT) }, &[1]).expect("it fits");
@@ -61,7 +61,7 @@ fn policy() -> Policy {
 }
 
 #[test]
-fn windows_are_evaluated_from_their_recorded_state() -> Result<()> {
+fn windows_start_from_their_recorded_state() -> Result<()> {
     let policy = policy();
     let graph = &policy.graph;
     let mut random = Random::new(12);

@@ -1,5 +1,4 @@
-//! Steps in pieces on the host: the same bits however they are cut, and what begin, step, poll and reset do to each
-//! other.
+//! Sliced steps on the host: the same bits in any slicing, and the interplay of begin, step, poll and reset.
 
 use std::path::Path;
 use std::task::Poll;
@@ -22,7 +21,7 @@ const OBSERVATION: usize = 37;
 /// Steps of a run.
 const STEPS: usize = 7;
 
-/// A network of all operations, with drawn lengths: products with all widths in order and by index, cells, norms,
+/// A network of all operations, with random lengths: products with all widths in order and by index, cells, norms,
 /// functions.
 fn network(seed: u64) -> Result<(Policy, Vec<Outcome>)> {
     let mut random = Random::new(seed);
@@ -93,7 +92,7 @@ fn whole(head: &mut Head<'_, '_>, observations: &[Vec<f32>]) -> Result<Vec<Vec<u
     observations.iter().map(|obs| Ok(bits(head.step(obs)?))).collect()
 }
 
-/// The action in polls whose budgets `budget` gives; and how many those were.
+/// Returns the action from polls with the budgets of `budget`, and the number of polls.
 fn in_polls(head: &mut Head<'_, '_>, obs: &[f32], mut budget: impl FnMut() -> u32) -> Result<(Vec<u32>, usize)> {
     head.begin(obs)?;
     for polls in 1..100_000 {
@@ -101,10 +100,10 @@ fn in_polls(head: &mut Head<'_, '_>, obs: &[f32], mut budget: impl FnMut() -> u3
             return Ok((bits(action), polls));
         }
     }
-    anyhow::bail!("no action after all these polls")
+    anyhow::bail!("no action after the maximum of polls")
 }
 
-/// Some polls of a step, which is not finished by them.
+/// Does some polls of a step, and leaves it unfinished.
 fn part_of_a_step(head: &mut Head<'_, '_>, obs: &[f32], polls: usize) -> Result<()> {
     let budget = head.image().least_budget();
     head.begin(obs)?;
@@ -118,7 +117,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
     #[test]
-    fn however_a_step_is_cut_its_bits_are_the_same(seed in any::<u64>(), spread in 1u32..20_000) {
+    fn any_slicing_gives_the_same_bits(seed in any::<u64>(), spread in 1u32..20_000) {
         let observations = observations(seed);
         let outcome = on_head(seed, |head| {
             let expected = whole(head, &observations)?;
@@ -128,17 +127,17 @@ proptest! {
             let mut cut = 0;
             for (obs, expected) in observations.iter().zip(&expected) {
                 let (action, polls) = in_polls(head, obs, || least + random.below(spread as usize) as u32)?;
-                ensure!(action == *expected, "other bits in polls of {least} and up to {spread} more");
+                ensure!(action == *expected, "the bits differ in polls of {least} and up to {spread} more");
                 cut = cut.max(polls);
             }
-            // The least budget cuts finest, between operations too.
+            // The least budget slices finest, also between operations.
             head.reset();
             for (obs, expected) in observations.iter().zip(&expected) {
                 let (action, polls) = in_polls(head, obs, || least)?;
-                ensure!(action == *expected, "other bits in polls of the least budget, {least}");
+                ensure!(action == *expected, "the bits differ in polls of the least budget, {least}");
                 cut = cut.max(polls);
             }
-            ensure!(cut > 1, "nothing was cut");
+            ensure!(cut > 1, "the step was not sliced");
             Ok(())
         });
         prop_assert!(outcome.is_ok(), "{outcome:?}");
@@ -155,7 +154,7 @@ fn seed(recurrent: bool) -> Result<u64> {
         })
         .unwrap_or(false)
     };
-    (0..400).find(suits).context("no network suits")
+    (0..400).find(suits).context("no seed gives a suitable network")
 }
 
 #[test]
@@ -166,7 +165,7 @@ fn ready_stays_ready_until_the_next_begin() -> Result<()> {
         let (action, _) = in_polls(head, &observations[0], || u32::MAX)?;
         for _ in 0..3 {
             let Poll::Ready(again) = head.poll(head.image().least_budget())? else { anyhow::bail!("pending") };
-            ensure!(bits(again) == action, "another action without a step");
+            ensure!(bits(again) == action, "the action changed without a step");
         }
         // The polls in between were no steps.
         let second = bits(head.step(&observations[1])?);
@@ -204,14 +203,14 @@ fn a_budget_below_the_least_changes_nothing() -> Result<()> {
             assert_eq!(head.poll(given), Err(StepError::Budget { needed, given }));
         }
         let Poll::Ready(action) = head.poll(u32::MAX)? else { anyhow::bail!("pending") };
-        ensure!(bits(action) == expected[1], "the refused polls left something behind");
+        ensure!(bits(action) == expected[1], "the refused polls changed the state");
         Ok(())
     })
 }
 
 #[test]
 fn a_dropped_step_leaves_nothing_behind() -> Result<()> {
-    // Without a recurrent state, the next action is that of a step that was never begun, step limit and all.
+    // Without a recurrent state, the next action equals that without the dropped step, including the step limit.
     let plain = seed(false)?;
     on_head(plain, |head| {
         let observations = observations(plain);
@@ -224,7 +223,7 @@ fn a_dropped_step_leaves_nothing_behind() -> Result<()> {
         }
         Ok(())
     })?;
-    // With one, the state begins anew, where a poll has worked on it.
+    // A recurrent state is reset if a poll has worked on it.
     let recurrent = seed(true)?;
     on_head(recurrent, |head| {
         let observations = observations(recurrent);
@@ -234,7 +233,7 @@ fn a_dropped_step_leaves_nothing_behind() -> Result<()> {
         head.reset();
         head.step(&observations[0])?;
         let carried = bits(head.infer(&observations[1])?);
-        ensure!(fresh != carried, "the state does not matter here");
+        ensure!(fresh != carried, "the state has no effect here");
         for polls in 0..5 {
             head.reset();
             head.step(&observations[0])?;
@@ -242,7 +241,7 @@ fn a_dropped_step_leaves_nothing_behind() -> Result<()> {
             if polls == 0 {
                 head.begin(&observations[1])?;
                 let Poll::Ready(action) = head.poll(u32::MAX)? else { anyhow::bail!("pending") };
-                ensure!(bits(action) == expected[1], "a step that nothing was done for took the state");
+                ensure!(bits(action) == expected[1], "a step without polls changed the state");
             } else {
                 ensure!(bits(head.infer(&observations[1])?) == fresh, "dropped after {polls} polls");
             }
@@ -264,7 +263,7 @@ fn an_error_resets() -> Result<()> {
         ensure!(whole(head, &observations[..1])? == expected, "the head was not reset");
         Ok(())
     })?;
-    // Finite, and too large for two products: the error comes from a poll.
+    // Finite, but too large for two products: the error comes from a poll.
     let mut builder = Builder::new(OBSERVATION);
     let width = |_| Some(Width::W8);
     let hidden = builder.linear((64, OBSERVATION), Activations::Int8, width, 0, true)?;
@@ -291,21 +290,21 @@ fn an_error_resets() -> Result<()> {
 }
 
 #[test]
-fn polls_of_one_operation_end_behind_each() -> Result<()> {
+fn single_operation_polls_end_after_each_operation() -> Result<()> {
     let seed = seed(true)?;
     on_head(seed, |head| {
         head.begin(&observations(seed)[0])?;
         for op in 0..head.image().op_count() {
             ensure!(head.poll_op(u32::MAX)?.is_pending(), "ready before operation {op}");
         }
-        ensure!(head.poll_op(u32::MAX)?.is_ready(), "not ready behind the last operation");
+        ensure!(head.poll_op(u32::MAX)?.is_ready(), "not ready after the last operation");
         Ok(())
     })
 }
 
-/// As in one piece: it passes with the least budget and more, and finds a wrong action at its step.
+/// As in one piece: it passes with the least budget and more, and detects a wrong action at its step.
 #[test]
-fn a_self_test_in_pieces_is_the_same_test() -> Result<()> {
+fn a_sliced_self_test_is_the_same_test() -> Result<()> {
     for seed in 0..4 {
         let (policy, outcomes) = network(seed)?;
         let bytes = emit::image(&policy, &outcomes)?;
@@ -326,7 +325,7 @@ fn a_self_test_in_pieces_is_the_same_test() -> Result<()> {
         let vector = u32::from_le_bytes(bytes[at..at + 4].try_into()?) as usize;
         let mut wrong = bytes;
         wrong[4 * (vector + OBSERVATION)] ^= 1;
-        seal(&mut wrong).context("its length is as before")?;
+        seal(&mut wrong).context("its length is unchanged")?;
         let (refused, whole, ..) = in_pieces(&wrong, 0)?;
         assert_eq!((refused, whole), (Err(StepError::SelfTest { step: 0 }), Err(StepError::SelfTest { step: 0 })));
     }

@@ -16,13 +16,13 @@ fn kernels_give_the_golden_sums() -> Result<()> {
 }
 
 #[test]
-fn the_ur3_policy_has_the_bits_of_the_host() -> Result<()> {
+fn the_ur3_policy_matches_the_host() -> Result<()> {
     let policy = Policy::load(&ur3())?;
     let dataset = Recording::Heldout.require(Some(&ur3()), None, Sizes::of(&policy), "this test")?;
     qemu::same_bits(Target::Fpu, &qemu::rtn(&policy, Width::W3, 0, Activations::Int8)?, &dataset)
 }
 
 #[test]
-fn the_motor_controller_starts_and_acts_with_the_bits_of_the_host() -> Result<()> {
+fn the_motor_controller_starts_and_matches_the_host() -> Result<()> {
     application::starts_and_acts_with_the_bits_of_the_host(Target::Fpu)
 }

@@ -1,4 +1,5 @@
-//! Statistics of an image, the widths that `actq inspect` shows, the search for the fewest bits, and the sweep's files.
+//! Statistics of an image, the widths that `actq inspect` shows, the search for the fewest bits, and the files of a
+//! sweep.
 
 mod fixture;
 mod search;
@@ -30,7 +31,7 @@ fn allocation(matrix: &MatrixRecord) -> Result<&AllocationRecord> {
 }
 
 #[test]
-fn statistics_add_up_to_the_image_and_explain_its_widths() -> Result<()> {
+fn statistics_sum_to_the_image_and_explain_widths() -> Result<()> {
     let fixture = Fixture::new()?;
     let image = fixture.path("ur3.actq");
     let (image, file) = (image.display().to_string(), fixture.path("ur3.json"));
@@ -46,7 +47,7 @@ fn statistics_add_up_to_the_image_and_explain_its_widths() -> Result<()> {
     let bytes: usize = stats.matrices.iter().map(|m| m.bytes).sum();
     assert!((stats.bpw - 8.0 * (bytes + stats.balance) as f64 / weights as f64).abs() < 1e-9);
     for matrix in &stats.matrices {
-        // Padding and block records are all that bits leave out; most where there are 18 columns.
+        // Bits exclude only padding and block records; these are largest at 18 columns.
         let (bits, least) = (matrix.bits.iter().sum::<usize>(), if matrix.cols == 18 { 0.7 } else { 0.9 });
         let share = bits as f64 / (8.0 * matrix.bytes as f64);
         ensure!(share > least && share < 1.0, "{bits} bits in {} bytes", matrix.bytes);
@@ -66,7 +67,7 @@ fn statistics_add_up_to_the_image_and_explain_its_widths() -> Result<()> {
         ensure!(shares.values().is_sorted_by(|a, b| a > b), "{shares:?}");
         ensure!(allocation.importance.iter().all(|h| *h > 0.0));
     }
-    // No hidden vector of this policy may be permuted, so rows are where they were; without bits is not removed.
+    // No hidden vector of this policy may be permuted, so rows keep their places; rows without bits are not removed.
     let without: usize = stats.matrices.iter().flat_map(|m| &m.widths).filter(|w| **w == 0).count();
     let first = stats.matrices.iter().find(|m| m.widths.contains(&0)).context("all rows have bits")?;
     ensure!(stats.matrices.iter().all(|m| m.image_rows.iter().copied().eq(0..m.rows)));
@@ -76,7 +77,7 @@ fn statistics_add_up_to_the_image_and_explain_its_widths() -> Result<()> {
 }
 
 #[test]
-fn image_rows_are_the_policys_rows() -> Result<()> {
+fn image_rows_map_to_policy_rows() -> Result<()> {
     let fixture = Fixture::new()?;
     let policy = Policy::load(&fixture.policy())?;
     let options = Options { steps: Some(2), ..Options::new(Method::Best, Budget::BitsPerWeight(4.0)) };
@@ -89,7 +90,7 @@ fn image_rows_are_the_policys_rows() -> Result<()> {
             let trained: Vec<f32> = allocation.columns.iter().map(|&c| source.data[from * source.cols + c]).collect();
             let dot = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>();
             let cosine = dot(row, &trained) / (dot(row, row) * dot(&trained, &trained)).sqrt();
-            ensure!(cosine > 0.8, "{}: row {from} is another one, cosine {cosine}", source.name);
+            ensure!(cosine > 0.8, "{}: row {from} does not match, cosine {cosine}", source.name);
         }
         removed.push((0..source.rows).filter(|r| !allocation.rows.contains(r)).collect::<Vec<_>>());
     }
@@ -99,7 +100,7 @@ fn image_rows_are_the_policys_rows() -> Result<()> {
 }
 
 #[test]
-fn every_method_saves_what_it_knows() -> Result<()> {
+fn every_method_saves_its_statistics() -> Result<()> {
     let fixture = Fixture::new()?;
     let same = |a: f64, b: f64| (a - b).abs() <= 1e-9 * a.abs().max(1.0);
     for method in ["rtn", "gptq", "actquant"] {
@@ -122,7 +123,7 @@ fn every_method_saves_what_it_knows() -> Result<()> {
 }
 
 #[test]
-fn inspect_shows_a_character_and_a_colour_for_every_row() -> Result<()> {
+fn inspect_draws_every_row() -> Result<()> {
     let fixture = Fixture::new()?;
     let stats = parsed(&fixture.image("leg", "--bpw 4 --steps 2")?)?;
     let plain = succeeded(&fixture.actq("inspect leg.actq --widths --svg plain.svg")?)?;
@@ -153,7 +154,7 @@ fn inspect_shows_a_character_and_a_colour_for_every_row() -> Result<()> {
         let svg = fs::read_to_string(fixture.path(name))?;
         ensure!(svg.ends_with("</svg>\n") && !svg.contains("NaN") && !svg.contains("inf"), "{svg}");
         assert_eq!(svg.matches("<polyline").count(), lines);
-        // What a strip's colours cover is its whole width.
+        // The colours of a strip cover its whole width.
         let width = |line: &str| line.split("width=\"").nth(1)?.split('"').next()?.parse::<f64>().ok();
         let coloured = svg.lines().filter(|l| l.contains("height=\"22.0\" fill=\"#")).filter_map(width).sum::<f64>();
         ensure!((coloured - 3.0 * 648.0).abs() < 1.0, "{coloured} in {name}");
@@ -196,7 +197,7 @@ fn statistics_of_another_image_are_refused() -> Result<()> {
     all(cases.map(|(name, words)| {
         let line = format!("inspect one.actq --widths --stats {name}.json --svg {name}.svg");
         let refused = fixture.actq(&line).and_then(|output| {
-            ensure!(output.stdout.is_empty(), "something is printed");
+            ensure!(output.stdout.is_empty(), "the command printed to standard output");
             failed(&output, 1, words)
         });
         (name.to_owned(), refused)
@@ -207,7 +208,7 @@ fn statistics_of_another_image_are_refused() -> Result<()> {
 }
 
 #[test]
-fn image_and_statistics_are_written_both_or_not_at_all() -> Result<()> {
+fn image_and_statistics_are_written_together_or_not() -> Result<()> {
     let fixture = Fixture::new()?;
     fs::create_dir(fixture.path("folder"))?;
     let before = fixture.files()?;
@@ -222,7 +223,7 @@ fn image_and_statistics_are_written_both_or_not_at_all() -> Result<()> {
     Ok(())
 }
 
-/// The words of the documented schema, so that the two cannot drift apart.
+/// The fields of the documented schema, so that document and code agree.
 #[test]
 fn every_field_is_documented() -> Result<()> {
     let fixture = Fixture::new()?;

@@ -1,4 +1,4 @@
-//! The units of the observations do not matter to the method best.
+//! The method best gives the same error in any units of the observations.
 
 use actq::budget::Budget;
 use actq::data::{Dataset, Recordings};
@@ -16,15 +16,15 @@ use ndarray::Array3;
 const OBS: usize = 16;
 const HIDDEN: usize = 128;
 const ACTIONS: usize = 8;
-/// Errors may differ by the bytes of the operation that undoes the units.
+/// Errors may differ by the bytes of the operation that cancels the units.
 const RATIO: f64 = 1.2;
 
-/// How many of each observation's units make one of the recording's.
+/// The number of each observation's units per unit of the recording.
 type Units = [f32; OBS];
-/// A network that undoes the units where it first reads the observation.
+/// A network that cancels the units where it first reads the observation.
 type Build = fn(&Units) -> Result<Graph>;
 
-/// A network in the making, with weights that are drawn.
+/// A network under construction, with random weights.
 struct Drawn {
     graph: Graph,
     random: Random,
@@ -35,7 +35,7 @@ impl Drawn {
         Self { graph: Graph::new(OBS), random: Random::new(3) }
     }
 
-    /// A matrix whose first columns undo the units.
+    /// A matrix whose first columns cancel the units.
     fn matrix(&mut self, rows: usize, cols: usize, units: &[f32]) -> Result<usize> {
         let unit = |i: usize| units.get(i % cols).copied().unwrap_or(1.0);
         let deviation = 1.3 / (cols as f32).sqrt();
@@ -83,7 +83,7 @@ fn recurrent(units: &Units) -> Result<Graph> {
     drawn.actions(value)
 }
 
-/// The observation is read a second time beside the hidden vector, in a residual block.
+/// Reads the observation a second time beside the hidden vector, in a residual block.
 fn residual(units: &Units) -> Result<Graph> {
     let mut drawn = Drawn::new();
     let first = drawn.hidden(0, units)?;
@@ -94,7 +94,7 @@ fn residual(units: &Units) -> Result<Graph> {
     drawn.actions(sum)
 }
 
-/// Episodes of observations that keep some of the last one.
+/// Episodes of correlated observations.
 fn recorded(seed: u64, units: &Units, graph: &Graph) -> Dataset {
     const EPISODES: usize = 4;
     const STEPS: usize = 200;
@@ -110,7 +110,7 @@ fn recorded(seed: u64, units: &Units, graph: &Graph) -> Dataset {
     dataset
 }
 
-/// The held-out error at 3 bits a weight, everything counted.
+/// The held-out error at 3 bits per weight, everything counted.
 fn error(build: Build, units: &Units, steps: usize) -> Result<f64> {
     let policy = Policy::of("units", build(units)?);
     let recordings = Recordings { calib: Some(recorded(1, units, &policy.graph)), heldout: None };
@@ -145,7 +145,7 @@ fn units_do_not_change_the_error() -> Result<()> {
 }
 
 #[test]
-fn units_do_not_change_what_is_learned() -> Result<()> {
+fn units_do_not_change_learning() -> Result<()> {
     for build in [feed_forward, recurrent] {
         keeps_its_error(build, 40, &[(1, 1e-6), (7, 1e3), (OBS, 1e20)])?;
     }

@@ -1,4 +1,4 @@
-//! Limits of the action that follow from the last operation.
+//! Action limits that follow from the last operation.
 
 use actq::measure::actions::actions;
 use actq_cli::report::imported::summary;
@@ -11,7 +11,7 @@ use super::{drawn, imported};
 
 const LEN: usize = 4;
 
-/// A layer, what `end` makes of its values, and the action of this shape.
+/// A layer, the nodes of `end` after it, and the action of this shape.
 fn file(shape: &[i64], end: impl Fn(&mut File, &str) -> String) -> File {
     let mut file = begun();
     let x = file.gemm("obs", LEN, OBS);
@@ -29,7 +29,8 @@ fn scaled(file: &mut File, op: &str, x: &str, [scale, offset]: [f32; 2]) -> Stri
     file.node("Add", &[&x, &offset], &[])
 }
 
-/// Imports the file, and checks that its limits hold all actions, and that actions come close to them. Gives them.
+/// Imports the file, requires that its limits contain all actions and that actions come close to them, and returns
+/// them.
 fn limits(file: &File) -> Result<Vec<Option<[f32; 2]>>> {
     let (imported, mut policy) = imported(&file.bytes(), &Choice::default())?;
     let limits: Vec<Option<[f32; 2]>> = (0..policy.act_len).map(|i| policy.contract.limits(i)).collect();
@@ -59,7 +60,7 @@ fn limits(file: &File) -> Result<Vec<Option<[f32; 2]>>> {
 }
 
 #[test]
-fn an_operation_that_bounds_the_action_gives_its_limits() -> Result<()> {
+fn bounds_of_the_last_operation_become_limits() -> Result<()> {
     let ends: [(&str, [f32; 2], [f32; 2]); 6] = [
         ("Tanh", [1.0, 0.0], [-1.0, 1.0]),
         ("Sigmoid", [1.0, 0.0], [0.0, 1.0]),
@@ -76,8 +77,8 @@ fn an_operation_that_bounds_the_action_gives_its_limits() -> Result<()> {
 }
 
 #[test]
-fn limits_of_several_ends_and_of_a_chunk_hold_all() -> Result<()> {
-    // A hand's pose and its grip: the factors stay in the network, whose rounding the limits hold, too.
+fn limits_of_several_ends_and_chunks_combine() -> Result<()> {
+    // A hand's pose and its grip: the factors stay in the network, so the limits include its rounding.
     let both = file(&[1, 2 * LEN as i64], |file, x| {
         let (pose, grip) = (scaled(file, "Tanh", x, [1.7, 0.3]), file.node("Sigmoid", &[x], &[]));
         file.node("Concat", &[&pose, &grip], &[("axis", Value::Int(1))])
@@ -88,7 +89,7 @@ fn limits_of_several_ends_and_of_a_chunk_hold_all() -> Result<()> {
         let [low, high] = limits.context("the pose is bounded")?;
         assert!((-1.400_01..=-1.4).contains(&low) && (2.0..2.000_01).contains(&high), "{low}:{high}");
     }
-    // Two actions with other factors each, whose limits are one.
+    // The two actions have different factors, but share their limits.
     let chunk = file(&[1, 2, LEN as i64 / 2], |file, x| {
         let (factors, shape) = (file.reals(&[2, 1], &[1.0, 3.0]), file.ints(&[2, LEN as i64 / 2]));
         let x = file.node("Tanh", &[x], &[]);
@@ -103,14 +104,14 @@ fn limits_of_several_ends_and_of_a_chunk_hold_all() -> Result<()> {
 }
 
 #[test]
-fn limits_of_clip_stay_and_a_layer_has_none() -> Result<()> {
+fn clip_keeps_limits_and_layers_have_none() -> Result<()> {
     let clipped = |file: &mut File, x: &str| {
         let [low, high] = [-0.5, 0.25].map(|v| file.reals(&[], &[v]));
         file.node("Clip", &[x, &low, &high], &[])
     };
     assert_eq!(limits(&file(&[1, LEN as i64], clipped))?, [Some([-0.5, 0.25]); LEN]);
     assert_eq!(limits(&file(&[1, LEN as i64], |_, x| x.to_owned()))?, [None; LEN]);
-    // An action that is held is limited to its value.
+    // A constant action has limits equal to its value.
     let held = file(&[1, LEN as i64 + 1], |file, x| {
         let held = file.reals(&[1, 1], &[0.7]);
         file.node("Concat", &[x, &held], &[("axis", Value::Int(1))])

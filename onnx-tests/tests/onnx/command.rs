@@ -1,4 +1,4 @@
-//! `actq import`, and .onnx files where a policy's folder is taken; PyTorch's way to both.
+//! `actq import`, .onnx files in place of a policy folder, and the export from PyTorch.
 
 use std::ffi::{OsStr, OsString};
 use std::fs;
@@ -57,13 +57,13 @@ fn import_writes_a_folder_and_overwrites_nothing() -> Result<()> {
     assert_eq!(written, ["calib.npz", "policy.json", "policy.safetensors"]);
     failed(&import(&[])?, 1, &["policy.json: is there already; --force replaces it"])?;
     succeeded(&import(&["--force"])?)?;
-    // Frames with the axis of a batch look like episodes.
+    // Frames with a batch axis look like episodes.
     let (rows, out) = (dir.path().join("rows.npy"), dir.path().join("rows"));
     Array3::from_shape_fn((9, 1, OBS), |(i, _, k)| (i * k) as f32).write_npy(fs::File::create(&rows)?)?;
     let noted = actq(&["import", text(&model), "--out", text(&out), "--calib", text(&rows)]).output()?;
     let said = String::from_utf8_lossy(&noted.stderr);
     ensure!(said.contains("rows.npy holds 9 episodes of one step each; if they are one run, save it as"), "{said}");
-    // The file stands for the folder, with the same digest.
+    // The file replaces the folder, with the same digest.
     assert_eq!(Policy::load(&out)?.digest, Policy::load(&model)?.digest);
     failed(
         &import(&["--force", "--output", "nothing"])?,
@@ -75,7 +75,7 @@ fn import_writes_a_folder_and_overwrites_nothing() -> Result<()> {
     let lost = import(&["--force", "--state", "obs=h"])?;
     failed(&lost, 1, &["--state obs=h: the file has no output \"h\"; its outputs are actions"])?;
     failed(&import(&["--force", "--state", "obs=actions"])?, 1, &["--state obs=actions: between them is no cell"])?;
-    // As it comes out of the command, so it goes into an image.
+    // The output of the command makes an image.
     let image = dir.path().join("a.actq");
     let quantize = |more: &[&str]| actq(&[&["quantize", text(&model), "--out", text(&image)], more].concat()).output();
     failed(&quantize(&["--bpw", "3"])?, 1, &["no recording is given", "numpy.save(\"obs.npy\"", "(6 values)"])?;
@@ -87,7 +87,7 @@ fn import_writes_a_folder_and_overwrites_nothing() -> Result<()> {
     Ok(())
 }
 
-/// Python, if it has these modules; else the test is skipped.
+/// Returns a Python with these modules, or skips the test.
 #[track_caller]
 fn python_with(modules: &str) -> Option<OsString> {
     let python = std::env::var_os("ACTQ_PYTHON").unwrap_or_else(|| "python3".into());
@@ -99,7 +99,8 @@ fn python_with(modules: &str) -> Option<OsString> {
     None
 }
 
-/// `actq import --check` of a file with the observation `obs` and one layer, whose values are `x`, before the last one.
+/// Runs `actq import --check` on a file with the observation `obs` and one layer, whose values are `x`, before the last
+/// one.
 fn checked(python: impl AsRef<OsStr>, layer: impl FnOnce(&mut File) -> String) -> Result<Output> {
     let dir = TempDir::new()?;
     let mut file = File::default();

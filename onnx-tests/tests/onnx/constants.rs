@@ -1,4 +1,4 @@
-//! What a file computes with constants alone, against the same file with the results in it.
+//! Computations of constants in a file, against the same file with their results.
 
 use actq::measure::actions::actions;
 use actq_onnx::{Choice, proto};
@@ -15,7 +15,7 @@ fn integers(name: &str, kind: i32, dims: &[usize], values: &[i64]) -> proto::Ten
     proto::Tensor { raw_data: None, data_type: Some(kind), int32_data, int64_data, ..tensor(name, dims, &[]) }
 }
 
-/// That a constant, as `write` computes it, is this one.
+/// Requires that the constant computed by `write` equals this one.
 fn is(expected: [f32; 3], write: impl FnOnce(&mut File) -> String) -> Result<()> {
     let network = |constant: &mut dyn FnMut(&mut File) -> String| {
         let mut file = begun();
@@ -33,7 +33,7 @@ fn is(expected: [f32; 3], write: impl FnOnce(&mut File) -> String) -> Result<()>
 }
 
 #[test]
-fn what_is_cast_to_fewer_digits_is_rounded() -> Result<()> {
+fn casts_to_fewer_digits_round() -> Result<()> {
     // float16 has 11 digits, bfloat16 8.
     for (to, expected) in [(10, [0.300_048_83, 1000.5, -7.0]), (16, [0.300_781_25, 1000.0, -7.0])] {
         is(expected, |file| {
@@ -46,7 +46,7 @@ fn what_is_cast_to_fewer_digits_is_rounded() -> Result<()> {
 }
 
 #[test]
-fn remainders_have_the_sign_that_onnx_says() -> Result<()> {
+fn remainders_have_the_sign_of_onnx() -> Result<()> {
     let whole = |fmod: i64| {
         move |file: &mut File| {
             let (x, y) = (file.ints(&[-7, 7, 6]), file.ints(&[3, -3, 3]));
@@ -63,7 +63,7 @@ fn remainders_have_the_sign_that_onnx_says() -> Result<()> {
 }
 
 #[test]
-fn weights_that_are_quantized_alone_are_what_they_stand_for() -> Result<()> {
+fn quantized_weights_are_read_as_their_values() -> Result<()> {
     is([0.5, -0.25, 1.0], |file| {
         file.initializer(&integers("q", 3, &[3], &[4, 1, 6]));
         file.initializer(&integers("zero", 3, &[], &[2]));
@@ -76,7 +76,7 @@ fn weights_that_are_quantized_alone_are_what_they_stand_for() -> Result<()> {
         let scales = file.reals(&[3], &[0.5, 1.5, 0.25]);
         file.node("DequantizeLinear", &["q", &scales], &[("axis", Value::Int(1))])
     })?;
-    // Values that are quantized on the way are no weights.
+    // Values quantized at run time are not weights.
     let mut file = begun();
     let (scale, zero) = (file.reals(&[], &[0.1]), integers("zero", 3, &[], &[0]));
     file.initializer(&zero);

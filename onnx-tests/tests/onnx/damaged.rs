@@ -1,5 +1,5 @@
-//! Files that were made to harm, or were harmed: each is refused by what is wrong with it, and none ends the process or
-//! fills the memory.
+//! Malicious and damaged files: the importer refuses each with its fault, and none ends the process or fills the
+//! memory.
 
 use actq_onnx::{Choice, import_bytes, proto};
 use anyhow::Result;
@@ -51,7 +51,7 @@ fn external(location: &str) -> Vec<u8> {
 }
 
 #[test]
-fn each_wrong_file_is_refused_by_what_is_wrong_with_it() {
+fn each_malformed_file_is_refused_with_its_fault() {
     refused(Vec::new(), "the file is empty");
     refused(b"not an onnx file".to_vec(), "no ONNX file");
     let bytes = whole();
@@ -88,7 +88,7 @@ fn each_wrong_file_is_refused_by_what_is_wrong_with_it() {
         file.nodes("Identity", &[&x], &["actions"], &[]);
     });
     refused(doubled, "gives more values than a policy of this size can have");
-    // Neither side of the padding alone.
+    // Either side of the padding alone.
     let padded = with(|file| {
         let pads = file.ints(&[0, 600_000, 0, 600_000]);
         let x = file.node("Pad", &["obs", &pads], &[]);
@@ -167,7 +167,7 @@ fn each_wrong_file_is_refused_by_what_is_wrong_with_it() {
 }
 
 #[test]
-fn what_a_node_gives_is_bounded_before_it_is_built() {
+fn node_sizes_are_bounded_before_allocation() {
     let with_input = |dims: &[i64], build: &dyn Fn(&mut File)| {
         let mut file = File::default();
         file.input("obs", dims);
@@ -198,7 +198,7 @@ fn what_a_node_gives_is_bounded_before_it_is_built() {
     for (op, shape) in [("Gather", &[4096][..]), ("GatherND", &[4096, 1])] {
         refused(gathered(op, shape), "[4096, 60000] are more values than a policy of this size can have");
     }
-    // At padding every position has a matrix of its own.
+    // With padding every position has a matrix of its own.
     let convolution = |length: i64, kernel: [usize; 3], biases: usize, pads: [i64; 2]| {
         with_input(&[1, kernel[1] as i64, length], &|file| {
             let (w, b) = (file.drawn(&kernel), file.drawn(&[biases]));
@@ -215,14 +215,14 @@ fn read(bytes: Vec<u8>) -> Result<()> {
 }
 
 #[test]
-fn no_damage_to_a_byte_ends_the_process() {
+fn damaged_bytes_never_end_the_process() {
     let whole = whole();
     assert!(read(whole.clone()).is_ok());
     for at in 0..whole.len() {
         let mut bytes = whole.clone();
         for value in [0, 0xff, whole[at] ^ 1, whole[at] ^ 0x80] {
             bytes[at] = value;
-            // Whatever comes out, it comes back.
+            // Any outcome is right, as long as it returns.
             drop(read(bytes.clone()));
         }
         drop(read(whole[..at].to_vec()));
@@ -231,7 +231,7 @@ fn no_damage_to_a_byte_ends_the_process() {
 
 proptest! {
     #[test]
-    fn no_bytes_end_the_process(bytes in prop::collection::vec(any::<u8>(), 0..400), at in 0usize..800, cut in any::<bool>()) {
+    fn random_bytes_never_end_the_process(bytes in prop::collection::vec(any::<u8>(), 0..400), at in 0usize..800, cut in any::<bool>()) {
         drop(read(bytes.clone()));
         let mut whole = whole();
         let at = at.min(whole.len());

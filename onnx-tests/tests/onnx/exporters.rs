@@ -1,5 +1,4 @@
-//! Forms that PyTorch's exporters and tf2onnx were found to write (docs/records/2026-11-22-exporters.md), against
-//! tract.
+//! Forms found in the output of PyTorch's exporters and tf2onnx (docs/records/2026-11-22-exporters.md), against tract.
 
 use actq::measure::actions::actions;
 use actq_onnx::{Choice, proto};
@@ -13,7 +12,7 @@ use super::{compare, drawn, imported, same};
 /// A step of a network whose value has 16 elements.
 type Step = fn(&mut File, &str) -> String;
 
-/// The ops between two layers, each form compared with tract.
+/// Returns the ops between two layers; compares each form with tract.
 fn between(steps: &[(&str, Step)]) -> Result<()> {
     for (i, (expected, step)) in steps.iter().enumerate() {
         let mut file = begun();
@@ -64,7 +63,7 @@ fn sums_and_means_are_products_with_ones() -> Result<()> {
         let mean = mean(file, x);
         file.node("Sub", &[x, &mean], &[])
     })])?;
-    // Sums of one length share their row of ones.
+    // Sums of equal length share their row of ones.
     let mut file = begun();
     let (x, axes) = (file.gemm("obs", 16, OBS), file.ints(&[-1]));
     let sums = ["Tanh", "Sin"].map(|op| {
@@ -76,7 +75,7 @@ fn sums_and_means_are_products_with_ones() -> Result<()> {
     let both = file.node("Tanh", &[&both], &[]);
     let json = String::from_utf8(same(&ended(file, &both, 2))?.json)?;
     assert!(json.contains("sum.weight") && !json.contains("sum.weight.2"), "{json}");
-    // The mean of an ensemble is of whole vectors.
+    // The mean of an ensemble takes whole vectors.
     let mut file = begun();
     let members = [0; 3].map(|_| {
         let y = file.gemm("obs", 5, OBS);
@@ -104,7 +103,7 @@ fn powers_logarithms_and_lengths_are_found() -> Result<()> {
             let four = file.reals(&[], &[4.0]);
             file.node("Pow", &[x, &four], &[])
         }),
-        // A LeakyReLU behind a norm, which takes the slope.
+        // A LeakyReLU after a norm, with a slope.
         ("layernorm relu normalize add", |file, x| {
             let (w, b) = (file.drawn(&[16]), file.drawn(&[16]));
             let x = file.node("LayerNormalization", &[x, &w, &b], &[("axis", Value::Int(-1))]);
@@ -146,7 +145,7 @@ fn elements_are_taken_replaced_and_padded() -> Result<()> {
 #[test]
 fn convolutions_over_few_positions_are_products() -> Result<()> {
     let ints = |name, values: &[i64]| (name, Value::Ints(values.to_vec()));
-    // Kernel, shape of the value, attributes, values behind it.
+    // Kernel, shape of the value, attributes, values after it.
     let cases = [
         (vec![6, 8, 1], vec![1, 8, 4], vec![], 24),
         (vec![6, 8, 3], vec![1, 8, 4], vec![ints("pads", &[1, 1]), ints("strides", &[2])], 12),
@@ -181,7 +180,7 @@ fn convolutions_over_few_positions_are_products() -> Result<()> {
 }
 
 #[test]
-fn what_a_transpose_scatters_is_computed_in_its_order() -> Result<()> {
+fn transposed_values_are_computed_in_order() -> Result<()> {
     let mut file = begun();
     let x = file.gemm("obs", 16, OBS);
     let (apart, joined) = (file.ints(&[1, 4, 4]), file.ints(&[1, 16]));
@@ -235,7 +234,7 @@ fn norms_of_groups_are_norms_of_rows() -> Result<()> {
 }
 
 #[test]
-fn functions_are_told_apart_by_their_overload() -> Result<()> {
+fn function_overloads_are_distinguished() -> Result<()> {
     let function = |overload: &str, op: &str| {
         let node = proto::Node {
             op_type: Some(op.to_owned()),
@@ -274,7 +273,7 @@ fn functions_are_told_apart_by_their_overload() -> Result<()> {
 }
 
 #[test]
-fn files_that_would_be_misread_are_refused() -> Result<()> {
+fn ambiguous_files_are_refused() -> Result<()> {
     let mut file = begun();
     let x = file.node("Tanh", &["obs"], &[]);
     let x = file.gemm(&x, 3, OBS);
@@ -287,14 +286,14 @@ fn files_that_would_be_misread_are_refused() -> Result<()> {
     };
     refused(&with_opset(None), "does not say which version of ONNX's operators it uses");
     refused(&with_opset(Some(6)), "export it with opset 7 or above");
-    // A batch, which is no chunk of actions.
+    // A batch, not a chunk of actions.
     let mut file = File::default();
     file.input("obs", &[4, OBS as i64]);
     let y = file.gemm("obs", 3, OBS);
     file.nodes("Tanh", &[&y], &["actions"], &[]);
     file.output("actions", &[4, 3]);
     refused(&file.bytes(), "have 4 rows, which is a batch");
-    // One that an input of one row stands beside.
+    // A batch beside an input of one row.
     let mut file = File::default();
     file.input("command", &[1, 2]);
     file.input("obs", &[4, OBS as i64]);
@@ -315,7 +314,7 @@ fn files_that_would_be_misread_are_refused() -> Result<()> {
 
 #[test]
 fn limits_far_from_zero_lose_no_digits() -> Result<()> {
-    // A million is far beyond what a layer of about 1 gives: taken off and added again, 0.06 of it would be lost.
+    // A million is far beyond the output of a layer, about 1: subtracting and adding it would lose 0.06.
     fn clipped(file: &mut File, x: &str, low: &str, high: &str) -> String {
         let limits = [low, high].map(|limit| match limit {
             "" => String::new(),
@@ -327,7 +326,7 @@ fn limits_far_from_zero_lose_no_digits() -> Result<()> {
         ("normalize normalize relu add", |file, x| clipped(file, x, "-1e6", "")),
         ("normalize normalize relu normalize add", |file, x| clipped(file, x, "", "1e6")),
         ("relu normalize", |file, x| clipped(file, x, "0", "1e6")),
-        // Of two limits one behind the other one clip.
+        // One clip has two limits in sequence.
         ("normalize", |file, x| {
             let low = clipped(file, x, "-1e6", "");
             clipped(file, &low, "", "1e6")
@@ -344,7 +343,7 @@ fn limits_far_from_zero_lose_no_digits() -> Result<()> {
             file.node("Where", &[&above, &high, &x], &[])
         }),
     ])?;
-    // A limit for each value, on either side of zero, and none.
+    // A limit for each value, on either side of zero, or none.
     let limits: Vec<f32> =
         (0..16).map(|i| [-1e6, -0.2, 0.0, 0.1, 5.0, -40.0, -3e4, f32::NEG_INFINITY][i % 8]).collect();
     for (op, sign) in [("Max", 1.0), ("Min", -1.0)] {
@@ -359,7 +358,7 @@ fn limits_far_from_zero_lose_no_digits() -> Result<()> {
 }
 
 #[test]
-fn values_of_a_network_are_finite() -> Result<()> {
+fn network_values_count_as_finite() -> Result<()> {
     fn zero(file: &mut File) -> String {
         file.reals(&[], &[0.0])
     }
@@ -399,8 +398,8 @@ fn values_of_a_network_are_finite() -> Result<()> {
 }
 
 #[test]
-fn the_largest_the_least_and_the_mean_of_positions_are_found() -> Result<()> {
-    // A set of points, each through one layer; what is left of them behind the pooling.
+fn max_min_and_mean_over_positions_are_found() -> Result<()> {
+    // A set of points, each through one layer; only their pooled values remain.
     for op in ["ReduceMax", "ReduceMin", "GlobalMaxPool", "GlobalAveragePool", "ReduceL1"] {
         let mut file = File::default();
         file.input("points", &[1, 5, 3]);
@@ -420,8 +419,8 @@ fn the_largest_the_least_and_the_mean_of_positions_are_found() -> Result<()> {
 }
 
 #[test]
-fn several_matrices_at_once_are_several_products() -> Result<()> {
-    // An ensemble of three, as torch.bmm has it.
+fn batched_matrices_become_several_products() -> Result<()> {
+    // An ensemble of three, as from torch.bmm.
     let mut file = begun();
     let (w, b, v) = (file.drawn(&[3, OBS, 8]), file.drawn(&[3, 1, 8]), file.drawn(&[3, 8, 5]));
     let x = file.node("MatMul", &["obs", &w], &[]);
@@ -435,7 +434,7 @@ fn several_matrices_at_once_are_several_products() -> Result<()> {
 }
 
 #[test]
-fn a_norm_takes_constants_beside_values() -> Result<()> {
+fn norms_accept_constants_beside_values() -> Result<()> {
     // SimbaV2: an L2 norm of the observation and a constant.
     let mut file = begun();
     let shift = file.reals(&[1, 1], &[3.0]);
@@ -447,7 +446,7 @@ fn a_norm_takes_constants_beside_values() -> Result<()> {
 }
 
 #[test]
-fn one_value_can_be_joined_to_many() -> Result<()> {
+fn one_value_joins_with_many() -> Result<()> {
     // The time of a denoising step, and its 150 frequencies.
     let mut file = File::default();
     file.input("time", &[1, 1]);
@@ -460,7 +459,7 @@ fn one_value_can_be_joined_to_many() -> Result<()> {
 }
 
 #[test]
-fn choices_that_only_look_like_an_activation_are_refused() -> Result<()> {
+fn choices_that_resemble_an_activation_are_refused() -> Result<()> {
     let softplus = |compare: &str, linear_first: bool| {
         let mut file = begun();
         let (x, limit) = (file.gemm("obs", 16, OBS), file.reals(&[], &[20.0]));

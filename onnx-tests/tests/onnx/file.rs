@@ -4,7 +4,7 @@ use actq_onnx::proto;
 use prost::Message as _;
 use prost::bytes::Bytes;
 
-/// A graph that grows. Values are called by name.
+/// A graph under construction. Values have names.
 #[derive(Clone, Default)]
 pub(super) struct File {
     graph: proto::Graph,
@@ -49,12 +49,12 @@ fn port(name: &str, kind: i32, dims: &[i64]) -> Bytes {
 }
 
 impl File {
-    /// An input; -1 is a dynamic axis.
+    /// Adds an input; -1 is a dynamic axis.
     pub(super) fn input(&mut self, name: &str, dims: &[i64]) {
         self.graph.input.push(port(name, FLOAT, dims));
     }
 
-    /// An input of integers.
+    /// Adds an input of integers.
     pub(super) fn integers(&mut self, name: &str, dims: &[i64]) {
         self.graph.input.push(port(name, INT64, dims));
     }
@@ -67,7 +67,7 @@ impl File {
         self.graph.initializer.push(encoded(tensor));
     }
 
-    /// A weight of these values.
+    /// Adds a weight of these values.
     pub(super) fn reals(&mut self, dims: &[usize], data: &[f32]) -> String {
         self.weights += 1;
         let name = format!("w{}", self.weights);
@@ -75,7 +75,7 @@ impl File {
         name
     }
 
-    /// A weight of drawn values, small enough for sums to stay about 1.
+    /// Adds a weight of random values, small enough for sums to stay about 1.
     pub(super) fn drawn(&mut self, dims: &[usize]) -> String {
         let n: usize = dims.iter().product();
         let scale = if dims.len() > 1 { 1.5 / (dims.iter().max().map_or(1.0, |&n| n as f32)).sqrt() } else { 0.5 };
@@ -88,7 +88,7 @@ impl File {
         self.reals(dims, &data)
     }
 
-    /// Integers.
+    /// Adds a weight of integers.
     pub(super) fn ints(&mut self, data: &[i64]) -> String {
         self.weights += 1;
         let name = format!("w{}", self.weights);
@@ -103,14 +103,14 @@ impl File {
         name
     }
 
-    /// A node with one output, which is called after it.
+    /// Adds a node with one output, and returns the output's name.
     pub(super) fn node(&mut self, op: &str, inputs: &[&str], attributes: &[(&str, Value)]) -> String {
         let name = format!("{}_{}", op.to_lowercase(), self.graph.node.len());
         self.nodes(op, inputs, &[&name], attributes);
         name
     }
 
-    /// A node with these outputs.
+    /// Adds a node with these outputs.
     pub(super) fn nodes(&mut self, op: &str, inputs: &[&str], outputs: &[&str], attributes: &[(&str, Value)]) {
         let attribute = |(name, value): &(&str, Value)| {
             let name = Some((*name).to_owned());
@@ -121,7 +121,7 @@ impl File {
                 Value::Text(s) => proto::Attribute { name, s: Some(s.into()), ..Default::default() },
             })
         };
-        // Readers other than ours want the type beside the value.
+        // Readers other than ours need the type beside the value.
         let typed = |(attribute, value): (Bytes, &Value)| {
             let number: u8 = match value {
                 Value::Real(_) => 1,
@@ -143,7 +143,7 @@ impl File {
         }));
     }
 
-    /// A call of an overload of the function `local.Act`.
+    /// Adds a call of an overload of the function `local.Act`.
     pub(super) fn call(&mut self, overload: &str, x: &str) -> String {
         let name = format!("act_{}", self.graph.node.len());
         self.graph.node.push(encoded(&proto::Node {
@@ -157,7 +157,7 @@ impl File {
         name
     }
 
-    /// `x W + b` as Gemm with weights [out, in].
+    /// Adds `x W + b` as Gemm with weights [out, in].
     pub(super) fn gemm(&mut self, x: &str, rows: usize, cols: usize) -> String {
         let (w, b) = (self.drawn(&[rows, cols]), self.drawn(&[rows]));
         self.node(
@@ -167,12 +167,12 @@ impl File {
         )
     }
 
-    /// The file's bytes.
+    /// Encodes the file.
     pub(super) fn bytes(&self) -> Vec<u8> {
         self.model().encode_to_vec()
     }
 
-    /// The file.
+    /// Returns the model.
     pub(super) fn model(&self) -> proto::Model {
         let opset = proto::OperatorSet { domain: Some(String::new()), version: Some(17) };
         proto::Model {

@@ -1,4 +1,4 @@
-//! Inputs of integers.
+//! Integer inputs.
 
 use actq::measure::actions::actions;
 use actq_onnx::Choice;
@@ -8,7 +8,7 @@ use super::file::{File, Value};
 use super::styles::ended;
 use super::{by_tract, compare, drawn, imported};
 
-/// A denoiser with a time step, which the file takes as an integer or as a float.
+/// A denoiser whose time step is an integer or a float in the file.
 fn denoiser(integers: bool) -> Vec<u8> {
     let mut file = File::default();
     file.input("sample", &[1, 6]);
@@ -28,7 +28,7 @@ fn denoiser(integers: bool) -> Vec<u8> {
 }
 
 #[test]
-fn a_time_step_that_is_cast_is_observed_as_a_float() -> Result<()> {
+fn a_cast_time_step_is_a_float() -> Result<()> {
     let (told, policy) = imported(&denoiser(true), &Choice::default())?;
     assert_eq!((told.inputs.len(), &told.integers[..]), (2, &["time".to_owned()][..]));
     let (floats, _) = imported(&denoiser(false), &Choice::default())?;
@@ -38,7 +38,7 @@ fn a_time_step_that_is_cast_is_observed_as_a_float() -> Result<()> {
 }
 
 #[test]
-fn what_is_computed_with_integers_is_refused() {
+fn integer_computations_are_refused() {
     let refused = |build: fn(&mut File) -> String, expected: &str| {
         let mut file = File::default();
         file.integers("time", &[1, 4]);

@@ -1,5 +1,5 @@
-//! Policies out of ONNX files: what exporters write gives the actions that another reader of ONNX gives, and nothing in
-//! a file does harm.
+//! Policies from ONNX files: the actions of every exporter's form agree with another reader of ONNX, and no file does
+//! harm.
 
 mod bounds;
 mod command;
@@ -24,9 +24,9 @@ use prost::Message as _;
 use prost::bytes::Bytes;
 use tract_onnx::prelude::*;
 
-/// Steps that are compared.
+/// Steps to compare.
 const STEPS: usize = 6;
-/// Of the largest action.
+/// Tolerance, relative to the largest action.
 const TOLERANCE: f32 = 1e-5;
 
 fn imported(bytes: &[u8], choice: &Choice) -> Result<(Imported, Policy)> {
@@ -40,7 +40,7 @@ fn drawn(policy: &Policy) -> Vec<Vec<f32>> {
     (0..STEPS).map(|_| (0..policy.graph.obs_len).map(|_| 2.0 * random.unit()).collect()).collect()
 }
 
-/// What tract gives, step by step, with every state carried on. Inputs have the shapes that the file says, in the
+/// Computes the actions with tract, step by step, with every state carried on. Inputs have the file's shapes, in the
 /// file's order.
 fn by_tract(bytes: &[u8], imported: &Imported, observations: &[Vec<f32>]) -> Result<Vec<Vec<f32>>> {
     let mut model = tract_onnx::onnx().model_for_read(&mut &bytes[..])?;
@@ -77,7 +77,7 @@ fn by_tract(bytes: &[u8], imported: &Imported, observations: &[Vec<f32>]) -> Res
     Ok(all)
 }
 
-/// The inputs of a file with their shapes; what is dynamic is 1.
+/// Returns the inputs of a file with their shapes; a dynamic axis becomes 1.
 fn ports(bytes: &[u8]) -> Result<Vec<(String, Vec<usize>)>> {
     let graph = proto::Graph::decode(proto::Model::decode(bytes)?.graph.context("a graph")?)?;
     let port = |bytes: &Bytes| -> Result<(String, Vec<usize>)> {
@@ -93,7 +93,7 @@ fn values(value: &TValue) -> Result<Vec<f32>> {
     Ok(value.to_plain_array_view::<f32>()?.iter().copied().collect())
 }
 
-/// That the policy gives what tract gives.
+/// Requires that the policy's actions agree with tract's.
 fn same(bytes: &[u8]) -> Result<Imported> {
     let (imported, policy) = imported(bytes, &Choice::default())?;
     let observations = drawn(&policy);
@@ -106,7 +106,7 @@ fn compare(expected: &[Vec<f32>], ours: &[Vec<f32>]) -> Result<()> {
     ensure!(expected.len() == ours.len(), "{} values, {} are ours", expected.len(), ours.len());
     let scale = expected.iter().fold(0f32, |most, v| most.max(v.abs()));
     let error = expected.iter().zip(&ours).fold(0f32, |most, (a, b)| most.max((a - b).abs()));
-    ensure!(scale > 1e-3, "an output that is always 0 says nothing");
-    ensure!(error <= TOLERANCE * scale, "off by {error} of {scale}");
+    ensure!(scale > 1e-3, "an output that is always 0 proves nothing");
+    ensure!(error <= TOLERANCE * scale, "error {error} at scale {scale}");
     Ok(())
 }

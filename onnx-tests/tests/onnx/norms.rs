@@ -1,4 +1,4 @@
-//! Norms by what is before and after them, against tract: no factor, order or constant may hide one.
+//! Norms in every context, against tract: no factor, order or constant before or after them may hide one.
 
 use anyhow::{Context as _, Result};
 
@@ -6,13 +6,13 @@ use super::file::{File, Value};
 use super::rows::{NORMS, Norm};
 use super::styles::{ACTIVATIONS, ended, ops};
 
-/// Values of the observation, and of what is normed.
+/// Values of the observation, and of the norm's input.
 const LEN: usize = 12;
 
-/// What follows a norm: nothing, factors, factors and offsets.
+/// Nodes after a norm: none, factors, factors and offsets.
 const AFFINES: [&[&str]; 3] = [&[], &["Mul"], &["Mul", "Add"]];
 
-/// What gives the values of a norm.
+/// Builds the values of a norm.
 type Front = fn(&mut File) -> String;
 
 fn begun() -> File {
@@ -37,7 +37,7 @@ fn halves(file: &mut File, x: &str) -> [&'static str; 2] {
     ["first", "second"]
 }
 
-/// A norm with its factors and offsets, and the ops that it becomes.
+/// A norm with its factors and offsets, and the resulting ops.
 fn normed(file: &mut File, (name, written): (&str, Norm), x: &str, affine: &[&str]) -> (String, String) {
     let y = written(file, x, LEN);
     let y = affine.iter().fold(y, |y, op| {
@@ -74,7 +74,7 @@ const FRONTS: [(&str, Front); 15] = [
     ("linear tanh ", |file| function(file, "Tanh", &[])),
     ("linear relu normalize add ", |file| function(file, "LeakyRelu", &[("alpha", Value::Real(0.1))])),
     ("linear elu relu normalize add ", |file| function(file, "Selu", &[])),
-    // Celu in its parts: tract's own forgets the last factor.
+    // Celu in its parts: tract's own loses the last factor.
     ("linear elu ", |file| {
         let (x, alpha) = (layer(file), file.reals(&[], &[0.7]));
         let x = file.node("Div", &[&x, &alpha], &[]);
@@ -112,7 +112,7 @@ const FRONTS: [(&str, Front); 15] = [
         let y = file.gemm(&x, LEN, LEN);
         file.node("Add", &[&x, &y], &[])
     }),
-    // Of three positions with four channels each, which are beside each other.
+    // Of three positions with four channels each, in sequence.
     ("linear linear linear tanh ", |file| {
         let (apart, w) = (file.ints(&[1, 3, 4]), file.drawn(&[4, 3, 2]));
         let x = file.node("Reshape", &["obs", &apart], &[]);
@@ -128,7 +128,7 @@ const FRONTS: [(&str, Front); 15] = [
     }),
 ];
 
-/// The ops of a norm after a front, before a tanh and a layer.
+/// Returns the ops of a norm after a front, before a tanh and a layer.
 fn found(front: Front, norm: (&str, Norm)) -> Result<String> {
     let mut file = begun();
     let x = front(&mut file);
@@ -162,7 +162,7 @@ fn constants_in_vectors_hide_no_norm() -> Result<()> {
         file.node("Concat", &[&constants, second], &[("axis", Value::Int(1))])
     }
     for (i, norm) in NORMS.into_iter().enumerate() {
-        // Zeros stay out of a mean of squares, but not out of a mean.
+        // Zeros do not count in a mean of squares, but they do in a mean.
         let expected = if norm.0 == "rmsnorm" { "rmsnorm normalize" } else { "linear layernorm" };
         let ops = found(masked, norm).with_context(|| format!("masked, norm {i}"))?;
         assert_eq!(ops, format!("{expected} tanh linear"), "masked, norm {i}");

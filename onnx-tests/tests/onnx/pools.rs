@@ -8,7 +8,7 @@ use super::file::Value;
 use super::styles::{OBS, begun, ended, ops};
 use super::{imported, same};
 
-/// A pool behind a layer whose values have this shape, with an activation and a layer behind.
+/// A pool after a layer whose values have this shape, then an activation and a layer.
 fn pooled(op: &str, shape: &[i64], attributes: &[(&str, Value)], behind: usize) -> Vec<u8> {
     let mut file = begun();
     let x = file.gemm("obs", shape.iter().product::<i64>() as usize, OBS);
@@ -21,10 +21,10 @@ fn pooled(op: &str, shape: &[i64], attributes: &[(&str, Value)], behind: usize) 
 }
 
 #[test]
-fn pools_are_sums_and_the_largest_of_slices() -> Result<()> {
+fn pools_become_sums_and_maxima_of_slices() -> Result<()> {
     let ints = |name, values: &[i64]| (name, Value::Ints(values.to_vec()));
     let counted = || ("count_include_pad", Value::Int(1));
-    // Shape of the value, attributes, values behind it.
+    // Shape of the value, attributes, values after it.
     let cases = [
         (vec![1, 4, 6], vec![ints("kernel_shape", &[2]), ints("strides", &[2])], 12),
         (vec![1, 4, 6], vec![ints("kernel_shape", &[3]), ints("pads", &[1, 1])], 24),
@@ -42,10 +42,10 @@ fn pools_are_sums_and_the_largest_of_slices() -> Result<()> {
 }
 
 #[test]
-fn positions_of_padding_alone_are_constants() -> Result<()> {
+fn positions_with_only_padding_are_constants() -> Result<()> {
     let ints = |name, values: &[i64]| (name, Value::Ints(values.to_vec()));
     let conv = [ints("kernel_shape", &[1]), ints("strides", &[2]), ints("pads", &[1, 1])];
-    // Without a bias, a position that sees only padding is 0: the largest is a relu of the other.
+    // Without a bias, a position with only padding is 0: the maximum is a relu of the other.
     for (op, expected) in [("GlobalMaxPool", "linear tanh relu linear"), ("GlobalAveragePool", "linear tanh linear")] {
         let mut file = begun();
         let x = file.gemm("obs", 8, OBS);

@@ -1,4 +1,4 @@
-//! Norms and sums of one row and of several, as histories and groups have them, against tract.
+//! Norms and sums of one row and of several, as in histories and groups, against tract.
 
 use anyhow::{Context as _, Result};
 
@@ -6,7 +6,7 @@ use super::file::{File, Value};
 use super::same;
 use super::styles::{OBS, begun, ended, ops};
 
-/// A norm of the last axis of a value, which has so many elements.
+/// A norm of the last axis of a value, which has this many elements.
 pub(super) type Norm = fn(&mut File, &str, usize) -> String;
 
 fn mean(file: &mut File, x: &str) -> String {
@@ -19,15 +19,15 @@ fn root(file: &mut File, square: &str) -> String {
     file.node("Sqrt", &[&sum], &[])
 }
 
-/// The op that each is, and the nodes that exporters make of it.
+/// The op of each, and the nodes that exporters make of it.
 pub(super) const NORMS: [(&str, Norm); 6] = [
     ("layernorm", |file, x, n| {
-        // The first weight is 0, as pruning leaves some.
+        // The first weight is 0, as after pruning.
         let weight: Vec<f32> = (0..n).map(|i| 0.1 * i as f32).collect();
         let (w, b) = (file.reals(&[n], &weight), file.drawn(&[n]));
         file.node("LayerNormalization", &[x, &w, &b], &[("axis", Value::Int(-1))])
     }),
-    // Keras: the mean is taken off behind the product.
+    // Keras subtracts the mean after the product.
     ("layernorm", |file, x, n| {
         let m = mean(file, x);
         let d = file.node("Sub", &[x, &m], &[]);
@@ -80,7 +80,7 @@ pub(super) const NORMS: [(&str, Norm); 6] = [
 ];
 
 #[test]
-fn norms_out_of_sums_and_roots_are_found() -> Result<()> {
+fn norms_from_sums_and_roots_are_found() -> Result<()> {
     for (i, (name, written)) in NORMS.into_iter().enumerate() {
         let mut file = begun();
         let x = file.gemm("obs", 16, OBS);
@@ -92,7 +92,7 @@ fn norms_out_of_sums_and_roots_are_found() -> Result<()> {
 }
 
 #[test]
-fn norms_of_several_rows_are_found_row_by_row() -> Result<()> {
+fn norms_of_rows_are_found_by_row() -> Result<()> {
     for (i, (name, written)) in NORMS.into_iter().enumerate() {
         // Of groups of a layer's values.
         let mut file = begun();
@@ -116,8 +116,8 @@ fn norms_of_several_rows_are_found_row_by_row() -> Result<()> {
 }
 
 #[test]
-fn a_norm_behind_factors_is_found() -> Result<()> {
-    // Each behind a factor for each value, as SimbaV2's L2 norms are.
+fn norms_after_factors_are_found() -> Result<()> {
+    // Each after a factor for each value, as in SimbaV2's L2 norms.
     for (i, (name, written)) in NORMS.into_iter().enumerate() {
         let mut file = begun();
         let factors = file.drawn(&[OBS]);
@@ -130,7 +130,7 @@ fn a_norm_behind_factors_is_found() -> Result<()> {
 }
 
 #[test]
-fn a_norm_is_computed_once() -> Result<()> {
+fn shared_norms_are_computed_once() -> Result<()> {
     for (op, expected) in [("LeakyRelu", "relu normalize add"), ("Abs", "relu normalize relu add")] {
         let mut file = begun();
         let x = file.gemm("obs", 16, OBS);
@@ -143,20 +143,20 @@ fn a_norm_is_computed_once() -> Result<()> {
 }
 
 #[test]
-fn a_mean_over_time_is_a_sum_of_slices() -> Result<()> {
+fn means_over_time_become_sums_of_slices() -> Result<()> {
     let mut file = File::default();
     file.input("history", &[1, 3, 8]);
     let x = file.node("ReduceMean", &["history"], &[("axes", Value::Ints(vec![1])), ("keepdims", Value::Int(0))]);
     let x = file.node("Tanh", &[&x], &[]);
     assert_eq!(ops(&ended(file, &x, 8))?, "identity add identity add normalize tanh linear");
-    // Fewer rows than each has elements stay products with ones.
+    // Fewer rows than elements per row remain products with ones.
     let mut file = File::default();
     file.input("history", &[1, 8, 3]);
     let x = file.node("ReduceMean", &["history"], &[("axes", Value::Ints(vec![1])), ("keepdims", Value::Int(0))]);
     let x = file.node("Tanh", &[&x], &[]);
     let found = ops(&ended(file, &x, 3))?;
     assert_eq!(found.matches("linear").count(), 4, "{found}");
-    // The second of two means stays where it was among other values.
+    // The second of two means keeps its place among other values.
     let mut file = File::default();
     file.input("history", &[1, 3, 8]);
     let means = [-1, 1].map(|axis| {

@@ -1,4 +1,4 @@
-//! Each way in which exporters write a policy, against tract.
+//! Each style in which exporters write a policy, against tract.
 
 use actq::data::{Recording, Sizes};
 use actq_bench::shared_policies;
@@ -20,7 +20,7 @@ pub(super) fn begun() -> File {
     file
 }
 
-/// Ends with a layer and the output `actions`.
+/// Adds a last layer and the output `actions`.
 pub(super) fn ended(mut file: File, last: &str, len: usize) -> Vec<u8> {
     let y = file.gemm(last, 3, len);
     file.nodes("Identity", &[&y], &["actions"], &[]);
@@ -33,7 +33,7 @@ pub(super) fn ops(bytes: &[u8]) -> Result<String> {
 }
 
 #[test]
-fn a_normaliser_and_its_layers_are_ops_of_ours() -> Result<()> {
+fn normalizers_and_layers_become_native_operations() -> Result<()> {
     // rsl_rl: Sub, Div, Gemm, Elu.
     let mut file = begun();
     let (mean, std) = (file.drawn(&[1, OBS]), file.reals(&[1, OBS], &[1.5; OBS]));
@@ -42,7 +42,7 @@ fn a_normaliser_and_its_layers_are_ops_of_ours() -> Result<()> {
     let x = file.gemm(&x, 16, OBS);
     let x = file.node("Elu", &[&x], &[("alpha", Value::Real(1.0))]);
     assert_eq!(ops(&ended(file, &x, 16))?, "normalize linear elu linear");
-    // Brax: weights [in, out], the bias on the left, SiLU taken apart, half of the last layer unused, tanh.
+    // Brax: weights [in, out], the bias on the left, SiLU in its parts, half of the last layer unused, tanh.
     let mut file = begun();
     let (w, b) = (file.drawn(&[OBS, 16]), file.drawn(&[16]));
     let x = file.node("MatMul", &["obs", &w], &[]);
@@ -59,7 +59,7 @@ fn a_normaliser_and_its_layers_are_ops_of_ours() -> Result<()> {
 }
 
 #[test]
-fn factors_and_limits_at_the_end_are_the_action_contract() -> Result<()> {
+fn final_factors_and_limits_become_the_contract() -> Result<()> {
     // Stable-Baselines3: flatten, tanh, clip; then to the robot's range.
     let mut file = begun();
     let x = file.node("Flatten", &["obs"], &[]);
@@ -83,7 +83,7 @@ fn factors_and_limits_at_the_end_are_the_action_contract() -> Result<()> {
 }
 
 #[test]
-fn every_activation_is_itself_or_made_of_others() -> Result<()> {
+fn every_activation_is_native_or_composed() -> Result<()> {
     let cases = [
         ("Relu", "relu"),
         ("Elu", "elu"),
@@ -111,7 +111,7 @@ fn every_activation_is_itself_or_made_of_others() -> Result<()> {
 /// The nodes of a function of a value.
 type Written = fn(&mut File, &str) -> String;
 
-/// The ops that each is, and the nodes that exporters make of it.
+/// The ops of each, and the nodes that exporters make of it.
 pub(super) const ACTIVATIONS: [(&str, Written); 10] = [
     // jax.nn.gelu: 1 - erf(-x / sqrt 2)
     ("gelu", |file, x| {
@@ -197,7 +197,7 @@ pub(super) const ACTIVATIONS: [(&str, Written); 10] = [
 ];
 
 #[test]
-fn activations_that_were_taken_apart_are_found() -> Result<()> {
+fn activations_in_their_parts_are_found() -> Result<()> {
     for (name, written) in ACTIVATIONS {
         let mut file = begun();
         let x = file.gemm("obs", 16, OBS);
@@ -208,7 +208,7 @@ fn activations_that_were_taken_apart_are_found() -> Result<()> {
     Ok(())
 }
 
-/// `x W + h U + b` of a cell that was taken apart, cut into gates.
+/// `x W + h U + b` of a cell in its parts, sliced into gates.
 fn gates(file: &mut File, h: &str, names: &[&str], hidden: usize) {
     let (x, h) = (file.gemm("obs", names.len() * hidden, OBS), file.gemm(h, names.len() * hidden, hidden));
     let sum = file.node("Add", &[&x, &h], &[]);
@@ -247,7 +247,7 @@ fn recurrent_cells_carry_their_states() -> Result<()> {
 }
 
 #[test]
-fn cells_that_were_taken_apart_are_found() -> Result<()> {
+fn cells_in_their_parts_are_found() -> Result<()> {
     const H: usize = 8;
     let mut file = begun();
     file.input("h_in", &[1, H as i64]);
@@ -281,12 +281,12 @@ fn cells_that_were_taken_apart_are_found() -> Result<()> {
 }
 
 #[test]
-fn inputs_are_joined_in_order_and_what_does_not_reach_the_action_is_cut() -> Result<()> {
+fn inputs_join_in_order_and_dead_nodes_vanish() -> Result<()> {
     let mut file = File::default();
     file.input("masks", &[1, 2]);
     file.input("obs_0", &[-1, 4]);
     file.input("obs_1", &[-1, 3]);
-    // A batch that is read from the input.
+    // A batch size read from the input.
     let shape = file.node("Shape", &["obs_0"], &[]);
     let (zero, last) = (file.ints(&[0]), file.ints(&[4]));
     let batch = file.node("Gather", &[&shape, &zero], &[("axis", Value::Int(0))]);
@@ -311,7 +311,7 @@ fn inputs_are_joined_in_order_and_what_does_not_reach_the_action_is_cut() -> Res
     assert_eq!(imported.output.0, "deterministic_continuous_actions");
     assert_eq!(imported.cut_inputs, ["masks"]);
     assert_eq!(imported.cut_outputs, ["version_number", "continuous_actions"]);
-    // What was asked for is not replaced by what can be taken.
+    // An explicit request is not replaced by another possible choice.
     let choice = Choice { output: Some("continuous_actions".to_owned()), ..Choice::default() };
     let error = format!("{:#}", super::imported(&bytes, &choice).expect_err("random"));
     assert!(error.contains("draws random numbers"), "{error}");
@@ -319,7 +319,7 @@ fn inputs_are_joined_in_order_and_what_does_not_reach_the_action_is_cut() -> Res
 }
 
 #[test]
-fn no_batch_products_of_values_and_external_data_are_taken() -> Result<()> {
+fn unbatched_products_and_external_data_are_imported() -> Result<()> {
     // Isaac Gym: rank 1, MatMul and Add.
     let mut file = File::default();
     file.input("x", &[5]);
@@ -364,7 +364,7 @@ fn no_batch_products_of_values_and_external_data_are_taken() -> Result<()> {
 }
 
 #[test]
-fn files_as_their_authors_publish_them_are_imported() -> Result<()> {
+fn published_files_are_imported() -> Result<()> {
     let Some(policies) = shared_policies() else { return Ok(()) };
     let folder = policies.with_file_name("onnx");
     for (name, expected) in [
@@ -377,8 +377,8 @@ fn files_as_their_authors_publish_them_are_imported() -> Result<()> {
         let file = import(&path, &Choice::default())?;
         assert_eq!(file.ops.join(" "), expected);
         let policy = Policy::load(&path)?;
-        // Recorded where there is a recording: beside the path, sums of the drawn values lose more digits than the
-        // bound has.
+        // Uses the recording if there is one: beyond its path, sums of random values lose more digits than the
+        // tolerance allows.
         let observations = match name {
             "brax_go1" => {
                 let recorded =
@@ -390,7 +390,7 @@ fn files_as_their_authors_publish_them_are_imported() -> Result<()> {
         compare(&by_tract(&bytes, &file, &observations)?, &actions(&policy, &observations))
             .with_context(|| name.to_owned())?;
     }
-    // The same network, imported by other hands.
+    // The same network, imported by another tool.
     let [ours, theirs] = [folder.join("brax_go1/model.onnx"), policies.join("go1_mlp")]
         .map(|path| Policy::load(&path))
         .map(Result::unwrap);
@@ -406,9 +406,9 @@ fn files_as_their_authors_publish_them_are_imported() -> Result<()> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// A chain of drawn nodes, some joined with what stood before them.
+    /// A chain of random nodes, some joined with earlier values.
     #[test]
-    fn drawn_graphs_give_what_tract_gives(steps in prop::collection::vec((0usize..14, any::<bool>()), 1..9), batch in any::<bool>()) {
+    fn random_graphs_agree_with_tract(steps in prop::collection::vec((0usize..14, any::<bool>()), 1..9), batch in any::<bool>()) {
         let mut file = File::default();
         file.input("obs", &[if batch { -1 } else { 1 }, OBS as i64]);
         let mut at = "obs".to_owned();
@@ -456,7 +456,7 @@ proptest! {
 }
 
 #[test]
-fn outputs_that_could_both_be_the_action_are_not_guessed() -> Result<()> {
+fn ambiguous_action_outputs_are_refused() -> Result<()> {
     let mut file = begun();
     for name in ["mean", "value"] {
         let y = file.gemm("obs", 2, OBS);
@@ -468,7 +468,7 @@ fn outputs_that_could_both_be_the_action_are_not_guessed() -> Result<()> {
     ensure!(error.contains("mean (2 values), value (2 values); choose one with actq import --output NAME"), "{error}");
     let choice = Choice { output: Some("value".to_owned()), ..Choice::default() };
     assert_eq!(imported(&bytes, &choice)?.0.cut_outputs, ["mean"]);
-    // What stands beside an output that cannot be taken need not be the action.
+    // A value beside an output that cannot be imported need not be the action.
     let mut file = begun();
     let [x, y] = [(); 2].map(|()| file.gemm("obs", 2, OBS));
     for (op, of, name) in [("Softmax", &x, "policy"), ("Identity", &y, "value")] {

@@ -6,16 +6,16 @@
 //! `end` itself is not counted. Addresses are hexadecimal.
 //!
 //! Each such region adds lines to FILE: `region N DATA CODE NEXT1 .. NEXT8` with the number of instructions and of
-//! lines fetched from flash: for data, for code after a jump, and for code that goes on behind a line of which 1 to 8
-//! instructions were executed (meanwhile the next line can be prefetched). Then, for every instruction that was
-//! executed, `ADDR COUNT JUMPS`, where JUMPS says how often execution did not go on at the next instruction.
+//! lines fetched from flash: for data, for code after a jump, and for code after a line of which 1 to 8 instructions
+//! were executed (meanwhile the next line can be prefetched). Then, for every executed instruction, `ADDR COUNT JUMPS`,
+//! where JUMPS counts the executions that did not continue at the next instruction.
 //!
-//! Flash is what lies below 0x20000000, the code region of the Cortex-M's memory map. Fetched lines are those that the
+//! Flash is the memory below 0x20000000, the code region of the Cortex-M's memory map. Fetched lines are those that the
 //! caches of an STM32F4 would miss (reference manual RM0090, section 3.5.2): lines of 16 bytes, 64 for code and 8 for
 //! data, the least recently used one replaced, both empty at the start of a region.
 //!
-//! Only functions that every plugin API since QEMU 7.2 has in the same form are used; the API version that QEMU asks
-//! for is set when the plugin is built (environment variable `ACTQ_QEMU_API`, default 1; 2 from QEMU 9.1 on).
+//! The plugin uses only functions with the same form in every plugin API since QEMU 7.2. The build sets the API version
+//! that QEMU requires (environment variable `ACTQ_QEMU_API`, default 1; 2 from QEMU 9.1 on).
 
 use std::collections::BTreeMap;
 use std::ffi::{CStr, c_char, c_int, c_uint, c_void};
@@ -24,7 +24,7 @@ use std::io::{self, BufWriter, Write as _};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 
-/// The plugin API that this library was built for.
+/// The plugin API of this library's build.
 #[unsafe(no_mangle)]
 pub static qemu_plugin_version: c_int = match option_env!("ACTQ_QEMU_API") {
     Some(text) => (text.as_bytes()[0] - b'0') as c_int,
@@ -63,7 +63,7 @@ static BEGIN: AtomicU64 = AtomicU64::new(0);
 static BEGIN_END: AtomicU64 = AtomicU64::new(0);
 static END: AtomicU64 = AtomicU64::new(0);
 static COUNTING: AtomicBool = AtomicBool::new(false);
-/// Where execution goes on if the last counted instruction does not jump; 0 at the start of a region.
+/// Next address if the last counted instruction does not jump; 0 at the start of a region.
 static NEXT: AtomicU64 = AtomicU64::new(0);
 /// The address of the last counted instruction.
 static LAST: AtomicU64 = AtomicU64::new(0);
@@ -71,23 +71,23 @@ static OUT: Mutex<Option<BufWriter<File>>> = Mutex::new(None);
 /// Every translated instruction by its address. They live as long as QEMU does.
 static INSTRUCTIONS: Mutex<BTreeMap<u64, &'static Instruction>> = Mutex::new(BTreeMap::new());
 
-/// Where the flash ends.
+/// End of the flash.
 const FLASH_END: u64 = 0x2000_0000;
 /// Bytes of a line, as a power of two.
 const LINE: u32 = 4;
-/// `QEMU_PLUGIN_MEM_RW`: loads and stores. (QEMU 7.2 gives stores where only loads are asked for; nothing stores to
+/// `QEMU_PLUGIN_MEM_RW`: loads and stores. (QEMU 7.2 reports stores when only loads are requested; nothing stores to
 /// flash.)
 const ACCESSES: c_int = 3;
-/// Instructions that a line holds.
+/// Instructions per line.
 const LINE_INSTRUCTIONS: usize = 8;
 
 static FLASH: Mutex<Flash> = Mutex::new(Flash::new());
 
-/// The flash's caches, and what they fetched in this region.
+/// The flash's caches, and their fetches in this region.
 struct Flash {
     code: Cache,
     data: Cache,
-    /// The line of the last counted instruction, and how many were executed since execution came to it.
+    /// The line of the last counted instruction, and the instructions executed since execution reached it.
     line: Option<u64>,
     executed: usize,
     data_lines: u64,
@@ -108,15 +108,15 @@ impl Flash {
         }
     }
 
-    /// An instruction is executed. One that straddles two lines counts for its first one; the next one fetches the
-    /// second.
+    /// Counts an executed instruction. One that straddles two lines counts for the first; the next instruction fetches
+    /// the second.
     fn execute(&mut self, line: u64) {
         if self.line != Some(line) {
             if !self.code.access(line) {
                 let next = self.line.is_some_and(|last| last + 1 == line);
                 match self.next_lines.get_mut(self.executed.saturating_sub(1)) {
                     Some(count) if next => *count += 1,
-                    // A loop inside of a line leaves all the time that its successor needs.
+                    // A loop within a line leaves all the time that the next line needs.
                     None if next => self.next_lines[LINE_INSTRUCTIONS - 1] += 1,
                     _ => self.code_lines += 1,
                 }
@@ -138,7 +138,7 @@ struct Cache {
 }
 
 impl Cache {
-    /// Whether the cache has the line; it has it afterwards.
+    /// Returns `true` if the cache has the line; afterwards it has.
     fn access(&mut self, line: u64) -> bool {
         let found = self.lines.iter().rposition(|l| *l == line);
         match found {
@@ -205,7 +205,7 @@ fn count_jump(address: u64) {
     }
 }
 
-/// Writes the counts of the region that has ended, and sets them back.
+/// Writes the counts of the finished region, and resets them.
 fn write_region() -> io::Result<()> {
     let (Ok(mut out), Ok(all)) = (OUT.lock(), INSTRUCTIONS.lock()) else { return Ok(()) };
     let Some(out) = out.as_mut() else { return Ok(()) };
@@ -285,7 +285,7 @@ pub unsafe extern "C" fn qemu_plugin_install(
             ("begin_end", Ok(address)) => BEGIN_END.store(address, Relaxed),
             ("end", Ok(address)) => END.store(address, Relaxed),
             _ => {
-                eprintln!("insn-count: argument {argument:?} is not known");
+                eprintln!("insn-count: unknown argument {argument:?}");
                 return 1;
             }
         }

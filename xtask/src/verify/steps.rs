@@ -13,11 +13,11 @@ const OLDEST: &str = concat!(env!("CARGO_PKG_RUST_VERSION"), ".0");
 /// A host target with 32-bit words that runs on x86-64 Linux. `.cargo/config.toml` has its linker.
 const NARROW: &str = "i686-unknown-linux-musl";
 
-/// The packages that are built for boards only.
+/// The packages built only for boards.
 const FIRMWARE: [&str; 2] = ["actq-firmware-support", "actq-firmware-bench"];
-/// The application; its parts that need no board are built and tested on the host.
+/// The application; its board-independent parts are built and tested on the host.
 const APPLICATION: &str = "actq-firmware-demo";
-/// The head in firmware of other styles.
+/// The head in user firmware.
 const STYLES: &str = "actq-firmware-styles";
 /// The comparison of the ONNX importer with tract, which takes minutes to build.
 const ONNX_TESTS: &str = "actq-onnx-tests";
@@ -30,11 +30,11 @@ const ON_TARGET: &str = "on_target::";
 /// A command with a name.
 pub(super) struct Step {
     pub(super) name: String,
-    /// The command, or why it cannot be run.
+    /// The command, or why it cannot run.
     pub(super) command: Result<Command, String>,
 }
 
-/// What must be installed besides targets and QEMU: for each, why it is not.
+/// Requirements besides targets and QEMU: for each, why it is missing.
 pub(super) struct Installed {
     /// The oldest supported compiler.
     pub(super) oldest: Result<(), String>,
@@ -43,7 +43,7 @@ pub(super) struct Installed {
 }
 
 impl Installed {
-    /// Installs both where that is possible.
+    /// Installs both if possible.
     pub(super) fn ensure() -> Self {
         let narrow = match cfg!(all(target_arch = "x86_64", target_os = "linux")) {
             true => setup::rust_target(NARROW).map_err(|error| format!("{error:#}")),
@@ -53,7 +53,7 @@ impl Installed {
     }
 }
 
-/// The steps of the short run.
+/// Returns the steps of the short run.
 pub(super) fn short() -> Vec<Step> {
     let mut steps = Steps::default();
     steps.format_and_lints();
@@ -62,7 +62,7 @@ pub(super) fn short() -> Vec<Step> {
     steps.0
 }
 
-/// All steps.
+/// Returns all steps.
 pub(super) fn all(installed: Installed) -> Vec<Step> {
     let mut steps = Steps::default();
     steps.format_and_lints();
@@ -81,7 +81,7 @@ pub(super) fn all(installed: Installed) -> Vec<Step> {
 const TESTS: [&str; 3] = ["test", "--release", "--no-fail-fast"];
 const DENY: [&str; 3] = ["--", "-D", "warnings"];
 
-/// All packages for the host, without those that are built for boards only and the comparison with tract.
+/// Returns all packages for the host, without those built only for boards, and without the comparison with tract.
 fn host_packages() -> Vec<&'static str> {
     let [support, benches] = FIRMWARE;
     vec!["--workspace", "--exclude", support, "--exclude", benches, "--exclude", ONNX_TESTS]
@@ -106,7 +106,7 @@ impl Steps {
         self.add_with(name, arguments, &[]);
     }
 
-    /// Adds a command that reads the firmware without running it: for the image that it includes, any file will do.
+    /// Adds a command that reads the firmware without running it: any file can be its image.
     fn add_of_firmware(&mut self, name: &str, arguments: &[&str], environment: &[(&str, &str)]) {
         let any_file = root().join("Cargo.toml").display().to_string();
         self.add_with(name, arguments, &[environment, &[("ACTQ_IMAGE", &any_file)]].concat());
@@ -118,7 +118,7 @@ impl Steps {
         self.add_of_firmware("lints", &arguments, &[]);
     }
 
-    /// Adds the lints of the firmware that measures, for every target.
+    /// Adds the lints of the measuring firmware, for every target.
     fn board_lints(&mut self) {
         for target in Target::ALL {
             let mut arguments = [&["clippy"], &build_for(target)[..]].concat();

@@ -1,4 +1,4 @@
-//! What the heads take: bytes, memory, instructions, time, pieces.
+//! The cost of the heads: bytes, memory, instructions, time, polls.
 #![forbid(unsafe_code)]
 
 use std::path::{Path, PathBuf};
@@ -15,20 +15,20 @@ use actq_kernels::{Image, Width};
 use anyhow::Result;
 use clap::Parser;
 
-/// The controller's flash: 1 MB, of which the program has 64 KB.
+/// The controller's flash for the head: 1 MB without the program's 64 KB.
 const FLASH: usize = (1 << 20) - PROGRAM;
 const PROGRAM: usize = 64 << 10;
-/// Its RAM in one piece, of which everything but the head has 16 KB.
+/// Its contiguous RAM for the head: 128 KB without 16 KB for the rest.
 const RAM: usize = (128 << 10) - REST;
 const REST: usize = 16 << 10;
-/// Ticks of the control loop, per second.
+/// Ticks of the control loop per second.
 const TICKS: f64 = 1000.0;
 
-/// Prints what heads of the sizes of published policies take on a Cortex-M4 at 168 MHz, by the cost model behind
-/// `actq inspect`. Their weights are seeded random numbers: sizes and times are real, accuracy is not.
+/// Prints the cost of heads of published sizes on a Cortex-M4 at 168 MHz, by the cost model of `actq inspect`. Their
+/// weights are seeded random numbers: sizes and times are real, accuracy is not.
 #[derive(Parser)]
 struct Arguments {
-    /// Also writes each head's policy folder here.
+    /// Also write each head's policy folder here.
     #[arg(long)]
     out: Option<PathBuf>,
 }
@@ -57,7 +57,7 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// A head's table.
+/// Prints a head's table.
 fn report(head: &Head) -> Result<String> {
     let policy = head.policy()?;
     let mut rows = table(&[
@@ -97,7 +97,7 @@ fn report(head: &Head) -> Result<String> {
     Ok(format!("{name}: {} weights, {} bytes in f32\n{rows}", policy.weights, 4 * parameters))
 }
 
-/// Polls of a chunk with a budget in instructions.
+/// Counts the polls of a chunk with a budget in instructions.
 fn slices(image: Image<'_>, budget: u32) -> Result<String> {
     if budget < image.least_budget() {
         return Ok("-".to_owned());

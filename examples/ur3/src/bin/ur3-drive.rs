@@ -6,10 +6,10 @@ use actq_ur3::task::{Outcome, Task};
 use anyhow::{Result, ensure};
 use clap::Parser;
 
-/// Seeds kept for driving: above those of calib.npz (0 on), heldout.npz (500 on) and evaluation (1000 on), below those
-/// of demonstrations.
+/// Seeds reserved for driving: above those of calib.npz (0 on), heldout.npz (500 on) and evaluation (1000 on), below
+/// those of demonstrations.
 const DRIVING_SEEDS: std::ops::Range<u64> = 10_000..100_000;
-/// From one round to the next, so that every round drives episodes of its own.
+/// Seeds per round, so that every round drives episodes of its own.
 const SEEDS_OF_A_ROUND: u64 = 500;
 
 /// Runs episodes with the command in POLICY_CMD as the policy, over its standard input and output, and prints one JSON

@@ -7,7 +7,7 @@ use actq_ur3::task::{Outcome, run_episode, run_expert};
 use anyhow::{Context, Result};
 use clap::Parser;
 
-/// Runs episodes and prints how many succeed.
+/// Runs episodes and prints the number of successes.
 #[derive(Parser)]
 struct Options {
     /// Folder with policy.json and policy.safetensors; without it, the expert is run.

@@ -13,9 +13,9 @@ use clap::Parser;
 use ndarray::{Array1, Array2, Array3};
 use ndarray_npy::NpzWriter;
 
-/// The policy's episodes in the calib.npz that is shipped. Seeds count from 0.
+/// Episodes of the policy in the shipped calib.npz. Seeds count from 0.
 const SHIPPED_EPISODES: u32 = 12;
-/// Of demonstrations, where no number is given.
+/// Default number of demonstrations.
 const DEMONSTRATIONS: u32 = 5000;
 /// Seeds of the policy's episodes in heldout.npz.
 const HELDOUT_SEEDS: std::ops::Range<u64> = 500..508;
@@ -24,7 +24,7 @@ const FIRST_TRAINING_SEED: u64 = 100_000;
 
 /// Largest standard deviation of the noise on executed actions, rad/s.
 const ACTION_NOISE: f64 = 0.6;
-/// Share of the noise that stays from one control step to the next: slow noise takes the arm further away.
+/// Share of the noise that persists to the next control step: slow noise moves the arm further away.
 const NOISE_MEMORY: f64 = 0.9;
 
 /// Records demonstrations of the expert (demonstrations.npz), or with --policy calib.npz and heldout.npz.

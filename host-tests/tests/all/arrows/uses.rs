@@ -1,4 +1,4 @@
-//! The paths in the code of a source file, read from its tokens. Comments, texts and tests do not count.
+//! The paths in the code of a source file, read from its tokens. Comments, strings and tests do not count.
 
 use anyhow::{Result, anyhow};
 use proc_macro2::{Delimiter, Spacing, TokenStream, TokenTree};
@@ -6,12 +6,12 @@ use proc_macro2::{Delimiter, Spacing, TokenStream, TokenTree};
 /// The parts of a path: `crate`, `a` and `b` of `crate::a::b`.
 pub(super) type Parts = Vec<String>;
 
-/// What a file names.
+/// The names in a file.
 #[derive(Default)]
 pub(super) struct Uses {
-    /// The paths that a `use` names, and all others of two parts or more.
+    /// The paths of every `use`, and all others of two parts or more.
     pub(super) paths: Vec<Parts>,
-    /// The files that it declares as modules for tests.
+    /// The files that it declares as test modules.
     pub(super) test_modules: Vec<String>,
 }
 
@@ -51,7 +51,7 @@ impl Uses {
         }
     }
 
-    /// Adds the paths of a `use`: `a::{b, c::d}` gives `a::b` and `a::c::d`.
+    /// Adds the paths of a `use`: `a::{b, c::d}` adds `a::b` and `a::c::d`.
     fn expand(&mut self, tree: &[TokenTree], front: &[String]) {
         let (path, after) = path(tree);
         let path = [front, &path].concat();
@@ -60,7 +60,7 @@ impl Uses {
         inner.split(|token| is(token, ',')).filter(|part| !part.is_empty()).for_each(|part| self.expand(part, &path));
     }
 
-    /// Skips an item for tests, which ends with its braces or a semicolon.
+    /// Skips a test item, which ends with its braces or a semicolon.
     fn skip<'t>(&mut self, item: &'t [TokenTree]) -> &'t [TokenTree] {
         let ends = |token: &TokenTree| match token {
             TokenTree::Group(group) => group.delimiter() == Delimiter::Brace,
@@ -77,7 +77,7 @@ impl Uses {
     }
 }
 
-/// The path that the tokens begin with, and the tokens after it.
+/// Returns the path at the begin of the tokens, and the tokens after it.
 fn path(mut tokens: &[TokenTree]) -> (Parts, &[TokenTree]) {
     let mut path = Parts::new();
     while let [TokenTree::Ident(part), after @ ..] = tokens {

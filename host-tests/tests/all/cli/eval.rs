@@ -1,4 +1,4 @@
-//! `actq eval`: its figures, and the recordings that it takes.
+//! `actq eval`: its figures, and the recordings that it accepts.
 
 use std::fs;
 
@@ -22,7 +22,7 @@ fn eval_prints_one_object_with_six_numbers() -> Result<()> {
     assert_eq!(keys, expected);
     assert_eq!(report["steps"], json!(2 * STEPS + 7));
     assert_eq!(report["bytes"], json!(fs::metadata(&path)?.len()));
-    let number = |key: &str| report[key].as_f64().with_context(|| format!("{key} is no number"));
+    let number = |key: &str| report[key].as_f64().with_context(|| format!("{key} is not a number"));
     ensure!(number("nmse")? > 0.0 && number("nmse")? <= number("worst_nmse")? && number("worst_nmse")? < 1e-2);
     ensure!(number("max_abs")? > 0.0 && number("bpw")? > 8.0);
     let people = run(actq(&["eval", &text(&path), "--policy", &text(&fixture.policy())]), b"")?;
@@ -31,7 +31,7 @@ fn eval_prints_one_object_with_six_numbers() -> Result<()> {
 }
 
 #[test]
-fn eval_names_what_is_wrong_with_a_recording() -> Result<()> {
+fn eval_names_the_fault_of_a_recording() -> Result<()> {
     let fixture = Fixture::new()?;
     let image = text(&fixture.image("")?);
     let path = fixture.policy().join("heldout.npz");
@@ -39,7 +39,7 @@ fn eval_names_what_is_wrong_with_a_recording() -> Result<()> {
     let action = |width| Array3::<f32>::zeros((EPISODES, STEPS, width));
     let eval = |words: &[&str]| {
         let output = run(actq(&["eval", &image, "--policy", &text(&fixture.policy()), "--json"]), b"")?;
-        ensure!(output.stdout.is_empty(), "something is printed");
+        ensure!(output.stdout.is_empty(), "the command printed to standard output");
         failed(&output, 1, words)
     };
     write_recording(&path, &obs, Some(&action(ACT)), full)?;
@@ -55,7 +55,7 @@ fn eval_names_what_is_wrong_with_a_recording() -> Result<()> {
 }
 
 #[test]
-fn eval_takes_a_named_recording_and_asks_the_policy_for_its_actions() -> Result<()> {
+fn eval_labels_a_named_recording_by_its_policy() -> Result<()> {
     let fixture = Fixture::new()?;
     let image = text(&fixture.image("--bits 4")?);
     let policy = text(&fixture.policy());
@@ -71,7 +71,7 @@ fn eval_takes_a_named_recording_and_asks_the_policy_for_its_actions() -> Result<
         &["actq eval needs recorded observations: put heldout.npz, heldout.npy or heldout.safetensors", "--heldout"],
     )?;
     failed(&eval(&[])?, 2, &["--policy"])?;
-    // Observations alone: the image's own policy gives the actions, another does not.
+    // Observations only: the image's own policy computes the actions; another one is refused.
     write_recording(&heldout, &draw_observations(6, OBS), None, [STEPS as i64, 7, STEPS as i64])?;
     assert_eq!(succeeded(&eval(&["--policy", &policy])?)?, expected);
     failed(&eval(&["--heldout", &text(&heldout)])?, 1, &["heldout.npz: array \"action\" is missing", "--policy"])?;

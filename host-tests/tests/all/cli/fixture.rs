@@ -1,4 +1,4 @@
-//! A small policy in a folder of its own with recordings, what spoils it, and what every module asks of it.
+//! A small policy in a folder of its own with recordings, the faults that tests add to it, and helpers.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -54,8 +54,8 @@ impl Fixture {
         self.0.path().join("out").join(name)
     }
 
-    /// `actq quantize` of the policy with more arguments, separated by spaces; by gptq where they name no method. (The
-    /// default method learns, for which the recording here is too short.)
+    /// Runs `actq quantize` of the policy with more arguments, separated by spaces; with gptq unless they name a
+    /// method. (The default method learns, for which the recording here is too short.)
     pub(super) fn quantize(&self, out: &Path, options: &str) -> Result<Output> {
         let method = if options.contains("--method") { "" } else { "--method gptq" };
         self.quantize_as_given(out, &format!("{options} {method}"))
@@ -67,7 +67,7 @@ impl Fixture {
         run(command, b"")
     }
 
-    /// An image that must come out.
+    /// Quantizes, and requires success.
     pub(super) fn image(&self, options: &str) -> Result<PathBuf> {
         let out = self.out(&format!("{options}.actq"));
         succeeded(&self.quantize(&out, options)?).context(options.to_owned())?;
@@ -121,7 +121,7 @@ pub(super) fn description() -> Value {
 
 pub(super) type Tensors = BTreeMap<&'static str, (Dtype, Vec<usize>, Vec<u8>)>;
 
-/// Drawn weights; matrices keep the variance of their input.
+/// Random weights; matrices keep the variance of their input.
 pub(super) fn tensors() -> Tensors {
     let mut random = Random::new(4);
     let mut tensor = |name, shape: &[usize]| {
@@ -178,7 +178,7 @@ pub(super) fn edit(policy: &Path, pointer: &str, value: Value) -> Result<()> {
         *place = value;
     } else {
         let (parent, key) = pointer.rsplit_once('/').context("no pointer")?;
-        json.pointer_mut(parent).context("no such place")?[key] = value;
+        json.pointer_mut(parent).context("policy.json lacks this place")?[key] = value;
     }
     write_json(policy, &json)
 }
@@ -203,12 +203,12 @@ pub(super) fn cut(path: &Path, len: usize) -> Result<()> {
     Ok(fs::write(path, &bytes[..len])?)
 }
 
-/// Writes a recording's observations alone.
+/// Writes a recording of observations only.
 pub(super) fn write_npy(path: &Path, obs: &Array3<f32>) -> Result<()> {
     Ok(obs.write_npy(File::create(path)?)?)
 }
 
-/// Lines on standard error, all of them notes, but for the progress of a run that takes longer than its lines wait.
+/// Lines on standard error, all of them notes, except the progress lines of a slow run.
 pub(super) fn notes(output: &Output) -> Result<Vec<String>> {
     succeeded(output)?;
     let text = String::from_utf8(output.stderr.clone())?;

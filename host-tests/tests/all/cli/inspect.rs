@@ -1,4 +1,4 @@
-//! `actq inspect`: what it says about an image, and the time that it predicts.
+//! `actq inspect`: its report on an image, and the predicted time.
 
 use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
@@ -32,7 +32,7 @@ fn inspect_predicts_the_time_of_every_operation() -> Result<()> {
     let step = json("100M")?;
     let ops = step["ops"].as_array().context("no operations")?;
     for key in ["instructions", "cycles", "macs"] {
-        let number = |value: &Value| value[key].as_u64().with_context(|| format!("{key} is no number"));
+        let number = |value: &Value| value[key].as_u64().with_context(|| format!("{key} is not a number"));
         let sum = ops.iter().map(number).sum::<Result<u64>>()?;
         // Operations are rounded one by one.
         ensure!(sum.abs_diff(number(&step)?) <= ops.len() as u64 && sum > 0, "{key}: {sum} against {step}");
@@ -40,7 +40,10 @@ fn inspect_predicts_the_time_of_every_operation() -> Result<()> {
     let milliseconds = |step: &Value| step["milliseconds"].as_f64().context("no milliseconds");
     let cycles = step["cycles"].as_f64().context("no cycles")?;
     ensure!((milliseconds(&step)? - cycles / 100e3).abs() < 1e-9, "{step}");
-    ensure!((milliseconds(&json("50000K")?)? - 2.0 * milliseconds(&step)?).abs() < 1e-9, "half the clock");
+    ensure!(
+        (milliseconds(&json("50000K")?)? - 2.0 * milliseconds(&step)?).abs() < 1e-9,
+        "half the clock must take twice the time"
+    );
     let report = inspect(&[])?;
     let cycles = step["cycles"].to_string();
     ensure!(report.contains("at 168 MHz") && report.contains(&cycles), "{report}");

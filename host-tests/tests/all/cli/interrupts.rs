@@ -1,4 +1,4 @@
-//! A command that is ended by a signal leaves the old file, or the whole new one, and nothing else.
+//! A command that a signal ends leaves the old file or the whole new one, and nothing else.
 #![cfg(unix)]
 
 use std::fs;
@@ -14,7 +14,7 @@ use ndarray::Array3;
 
 use super::fixture::{Fixture, OBS, text, write_npy};
 
-/// A policy with a recording that is long enough to learn from.
+/// A policy with a recording long enough to learn from.
 fn fixture() -> Result<Fixture> {
     let fixture = Fixture::new()?;
     let random = &mut Random::new(8);
@@ -24,10 +24,10 @@ fn fixture() -> Result<Fixture> {
     Ok(fixture)
 }
 
-/// Waits until something is so, which shows that the command is at work.
+/// Waits for a condition which shows that the command is at work.
 fn wait_for(child: &mut Child, is_so: impl Fn() -> Result<bool>) -> Result<()> {
     while !is_so()? {
-        ensure!(child.try_wait()?.is_none(), "the command has ended already");
+        ensure!(child.try_wait()?.is_none(), "the command ended too early");
         sleep(Duration::from_millis(5));
     }
     Ok(())
@@ -39,11 +39,11 @@ fn send(signal: &str, child: &Child) -> Result<()> {
     Ok(())
 }
 
-/// Signals while the quantizer learns. (What a shell starts in the background, tests perhaps among it, ignores SIGINT,
-/// and so would the command.)
+/// Signals while the quantizer learns. (Processes that a shell starts in the background, possibly these tests, ignore
+/// SIGINT, and so would the command.)
 #[cfg(target_os = "linux")]
 #[test]
-fn a_signal_leaves_no_file_and_decides_the_status() -> Result<()> {
+fn signals_leave_no_file_and_set_the_status() -> Result<()> {
     let fixture = fixture()?;
     let out = fixture.out("image.actq");
     fs::write(&out, "an image that is in use")?;
@@ -59,12 +59,12 @@ fn a_signal_leaves_no_file_and_decides_the_status() -> Result<()> {
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(status), "{signal}: {said}");
         ensure!(said.ends_with("actq: interrupted: no output was written\n"), "{said}");
-        ensure!(fixture.snapshot()? == before, "files have changed");
+        ensure!(fixture.snapshot()? == before, "files changed");
     }
     Ok(())
 }
 
-/// `actq tune` in a folder of its own, which also takes its temporary files; the command of `--drive` makes the file
+/// Runs `actq tune` in a folder of its own, also for its temporary files; the command of `--drive` creates the file
 /// `started`.
 fn start_tune(fixture: &Fixture, mut command: Command, drive: &str) -> Result<Child> {
     let folder = fixture.out("tune");
@@ -87,16 +87,16 @@ fn a_signal_ends_all_processes_of_the_drive() -> Result<()> {
     let drive = "(sleep 60; touch survived) & touch started; wait";
     let child = start_tune(&fixture, actq(&[]), drive)?;
     send("TERM", &child)?;
-    // This waits for whoever can still write to standard error: all processes of the drive.
+    // This waits for every process that can still write to standard error: all processes of the drive.
     let output = child.wait_with_output()?;
     assert_eq!(output.status.code(), Some(143), "{output:?}");
     assert_eq!(names(&fixture.out("tune"))?, ["started"]);
     Ok(())
 }
 
-/// As a robot's driver disarms it at the end.
+/// Like a robot's driver, which disarms it at the end.
 #[test]
-fn a_drive_may_end_its_own_way() -> Result<()> {
+fn a_drive_may_handle_the_signal() -> Result<()> {
     let fixture = fixture()?;
     let drive = "trap 'touch disarmed; exit' TERM; touch started; while :; do sleep 0.01; done";
     let child = start_tune(&fixture, actq(&[]), drive)?;
@@ -121,10 +121,9 @@ fn an_ignored_signal_stays_ignored() -> Result<()> {
     Ok(())
 }
 
-/// Signals all over the time that the command takes, the writing among it: the old image is there, or the whole new
-/// one.
+/// Signals throughout the run of the command, including the write: the old image remains, or the whole new one.
 #[test]
-fn a_signal_at_any_time_leaves_a_whole_image() -> Result<()> {
+fn signals_at_any_time_leave_whole_images() -> Result<()> {
     const TRIES: u32 = 40;
     let fixture = Fixture::new()?;
     let out = fixture.out("image.actq");
@@ -133,7 +132,7 @@ fn a_signal_at_any_time_leaves_a_whole_image() -> Result<()> {
         let mut command = actq(&["quantize", &policy, "--method", "rtn", "--out", &file]);
         command.stdout(Stdio::null()).stderr(Stdio::null()).spawn()
     };
-    // The first one may have to wait for the command to be built.
+    // The first run may have to wait for the build of the command.
     ensure!(start()?.wait()?.success());
     let began = Instant::now();
     ensure!(start()?.wait()?.success());
@@ -150,7 +149,7 @@ fn a_signal_at_any_time_leaves_a_whole_image() -> Result<()> {
         assert_eq!(names(&fixture.out(""))?, ["image.actq"], "after signal {i}");
         in_time += u32::from(found != whole);
     }
-    // How many depends on the machine.
+    // The number depends on the machine.
     println!("{in_time} of {TRIES} signals came before the image was written");
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! Policies: whatever is wrong with one is named, and what only people read changes nothing.
+//! Policies: a message names each fault, and human-readable keys change nothing.
 
 use std::fs;
 use std::path::Path;
@@ -20,7 +20,7 @@ use super::fixture::{
     write_recording, write_tensors,
 };
 
-/// How to spoil a policy's folder, the options to quantize with, and what the message must name.
+/// A change of the policy's folder, the options to quantize with, and the words of the message.
 type Spoilt = (&'static str, fn(&Path) -> Result<()>, &'static str, &'static [&'static str]);
 
 const SPOILT: &[Spoilt] = &[
@@ -225,7 +225,7 @@ fn both(policy: &Path, keys: [&str; 2], values: [Value; 2]) -> Result<()> {
     Ok(fs::write(policy.join("policy.json"), json.to_string())?)
 }
 
-/// Of the last of three actions.
+/// Sets a value for the last of three actions.
 fn binarise([on, off]: [f64; 2], [on_value, off_value]: [i32; 2]) -> Value {
     let last = |value: Value| json!([null, null, value]);
     json!({
@@ -248,12 +248,12 @@ fn twice(policy: &Path, key: &str) -> Result<()> {
     Ok(fs::write(policy.join("policy.json"), json)?)
 }
 
-/// Gives a tensor the name of another, which is as long.
+/// Gives a tensor the name of another one of equal length.
 fn tensor_twice(policy: &Path) -> Result<()> {
     let path = policy.join("policy.safetensors");
     let mut bytes = fs::read(&path)?;
     let (from, to) = (b"mid.weight", b"out.weight");
-    let at = bytes.windows(from.len()).position(|part| part == from).context("no such name")?;
+    let at = bytes.windows(from.len()).position(|part| part == from).context("the file has no such name")?;
     bytes[at..at + to.len()].copy_from_slice(to);
     Ok(fs::write(&path, bytes)?)
 }
@@ -278,7 +278,7 @@ fn calib(policy: &Path, width: usize, value: f32, length: i64) -> Result<()> {
 }
 
 #[test]
-fn bad_policies_are_named_and_leave_no_file() -> Result<()> {
+fn faulty_policies_are_named_and_leave_no_file() -> Result<()> {
     all(SPOILT.iter().map(|(what, spoil, options, words)| {
         let run = || {
             let fixture = Fixture::new()?;
@@ -290,7 +290,7 @@ fn bad_policies_are_named_and_leave_no_file() -> Result<()> {
                 }
                 let before = fixture.snapshot()?;
                 failed(&fixture.quantize(&out, options)?, 1, words)?;
-                ensure!(fixture.snapshot()? == before, "files have changed");
+                ensure!(fixture.snapshot()? == before, "files changed");
             }
             Ok(())
         };
@@ -298,9 +298,9 @@ fn bad_policies_are_named_and_leave_no_file() -> Result<()> {
     }))
 }
 
-/// What an exporter tells people about a policy.
+/// Keys with which an exporter describes a policy to people.
 #[test]
-fn keys_for_people_change_nothing() -> Result<()> {
+fn human_readable_keys_change_nothing() -> Result<()> {
     let fixture = Fixture::new()?;
     let before = fs::read(fixture.image("")?)?;
     let mut json = description();
@@ -316,7 +316,7 @@ fn keys_for_people_change_nothing() -> Result<()> {
 }
 
 #[test]
-fn what_a_file_says_cannot_command_the_terminal() -> Result<()> {
+fn file_content_cannot_control_the_terminal() -> Result<()> {
     let fixture = Fixture::new()?;
     // No image holds such a name.
     let mut policy = Policy::load(&fixture.policy())?;
@@ -340,9 +340,9 @@ fn what_a_file_says_cannot_command_the_terminal() -> Result<()> {
     Ok(())
 }
 
-/// As an exporter writes it that puts out every key.
+/// Like an exporter that writes every key.
 #[test]
-fn a_key_without_a_value_says_nothing() -> Result<()> {
+fn a_key_without_value_counts_as_absent() -> Result<()> {
     let fixture = Fixture::new()?;
     let before = fs::read(fixture.image("")?)?;
     edit(&fixture.policy(), "/ops/2/clip", Value::Null)?;

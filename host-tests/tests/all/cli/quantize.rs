@@ -1,4 +1,4 @@
-//! `actq quantize`: budgets, methods and recordings, and what it says about them.
+//! `actq quantize`: budgets, methods and recordings, and its messages about them.
 
 use std::fs;
 use std::path::Path;
@@ -35,12 +35,12 @@ fn a_budget_of_time_is_kept_or_refused() -> Result<()> {
     let limit = 0.98 * slowest;
     let kept = quantize(&["--ms", &limit.to_string()])?;
     succeeded(&kept)?;
-    ensure!(time()? <= limit, "{} ms for {limit}", time()?);
+    ensure!(time()? <= limit, "{} ms, limit {limit}", time()?);
     Ok(())
 }
 
 #[test]
-fn relative_errors_go_with_learning_alone() -> Result<()> {
+fn relative_errors_require_a_method_that_learns() -> Result<()> {
     let dir = TempDir::new()?;
     let (policy, out) = (text(&ur3()), text(&dir.path().join("relative.actq")));
     let quantize = |arguments: &[&str]| {
@@ -53,7 +53,7 @@ fn relative_errors_go_with_learning_alone() -> Result<()> {
     succeeded(&quantize(&["--steps", "8"])?)?;
     let even = fs::read(&out)?;
     succeeded(&quantize(&["--steps", "8", "--relative"])?)?;
-    ensure!(fs::read(&out)? != even, "it changes nothing");
+    ensure!(fs::read(&out)? != even, "the option changes nothing");
     Ok(())
 }
 
@@ -67,7 +67,7 @@ fn widths(path: &Path) -> Result<Vec<u32>> {
 }
 
 #[test]
-fn every_width_does_what_it_says() -> Result<()> {
+fn every_width_reaches_the_image() -> Result<()> {
     let fixture = Fixture::new()?;
     let mut last = (f64::INFINITY, 0.0);
     for width in Width::ALL {
@@ -99,7 +99,7 @@ fn a_budget_is_kept_and_used() -> Result<()> {
 }
 
 #[test]
-fn a_budget_that_is_too_small_names_the_least() -> Result<()> {
+fn too_small_a_budget_names_the_least() -> Result<()> {
     let fixture = Fixture::new()?;
     let narrowest = fixture.eval(&fixture.image("--bits 2")?)?["bpw"].as_f64().context("bpw")?;
     let before = fixture.snapshot()?;
@@ -107,14 +107,14 @@ fn a_budget_that_is_too_small_names_the_least() -> Result<()> {
     let weights = HIDDEN * OBS + HIDDEN * HIDDEN + CHUNK * ACT * HIDDEN;
     let bytes = (narrowest * weights as f64 / 8.0).round();
     failed(&output, 1, &["budget", &format!("{bytes} bytes")])?;
-    ensure!(fixture.snapshot()? == before, "files have changed");
-    // The least itself is enough.
+    ensure!(fixture.snapshot()? == before, "files changed");
+    // The least budget itself is enough.
     fixture.image(&format!("--bpw {}", narrowest + 1e-6))?;
     Ok(())
 }
 
 #[test]
-fn an_impossible_budget_is_refused_before_recordings_are_read() -> Result<()> {
+fn impossible_budgets_are_refused_before_reading_recordings() -> Result<()> {
     let fixture = Fixture::new()?;
     fs::write(fixture.policy().join("calib.npz"), "not a recording")?;
     let out = fixture.out("small.actq");
@@ -151,7 +151,7 @@ fn an_unused_budget_is_explained() -> Result<()> {
 }
 
 #[test]
-fn the_default_method_follows_from_what_is_there() -> Result<()> {
+fn the_default_method_depends_on_the_recordings() -> Result<()> {
     let fixture = Fixture::new()?;
     let out = fixture.out("default.actq");
     let bytes = |options: &str| Ok::<_, anyhow::Error>(fs::read(fixture.image(options)?)?);
@@ -160,7 +160,7 @@ fn the_default_method_follows_from_what_is_there() -> Result<()> {
         Ok::<_, anyhow::Error>(fs::read(&out)?)
     };
     let rtn = bytes("--bits 3 --method rtn --activations 8")?;
-    // A recording: the method that learns, which says how many frames it needs.
+    // With a recording: the method that learns, which names the number of frames that it needs.
     failed(&fixture.quantize_as_given(&out, "")?, 1, &["calib.npz", "frames", "200"])?;
     fs::remove_file(fixture.policy().join("calib.npz"))?;
     assert_eq!(default("")?, rtn);
@@ -231,7 +231,7 @@ fn the_same_input_gives_the_same_bytes() -> Result<()> {
 }
 
 #[test]
-fn a_recording_may_be_named_and_of_any_format() -> Result<()> {
+fn a_recording_may_have_any_name_and_format() -> Result<()> {
     let fixture = Fixture::new()?;
     let policy = fixture.policy();
     let image = fs::read(fixture.image("--bits 3 --group 32")?)?;
@@ -250,19 +250,20 @@ fn a_recording_may_be_named_and_of_any_format() -> Result<()> {
     let out = fixture.out("named.actq");
     succeeded(&fixture.quantize(&out, &options)?)?;
     assert_eq!(fs::read(&out)?, image);
-    // Where there is a recording, wherever it is, the default is the method that learns.
+    // With a recording anywhere, the default is the method that learns.
     failed(&fixture.quantize_as_given(&out, &options)?, 1, &["mine.safetensors", "frames", "200"])?;
     let missing = fixture.quantize(&out, "--calib none.npz")?;
     failed(&missing, 1, &["none.npz: cannot be read"])
 }
 
 #[test]
-fn quantize_tells_both_errors_and_what_is_wrong_with_the_recordings() -> Result<()> {
+fn quantize_reports_both_errors_and_faults_of_recordings() -> Result<()> {
     let fixture = Fixture::new()?;
     let policy = fixture.policy();
     let out = fixture.out("image.actq");
     let quantize = || fixture.quantize(&out, "--bits 8");
-    // Every held-out value is within the calibrated range; no progress bar, no escape sequences where nobody looks.
+    // Every held-out value is within the calibrated range; without a terminal there are no progress bar and no escape
+    // sequences.
     let wide = 1.3 * draw_observations(5, OBS);
     write_recording(&policy.join("calib.npz"), &wide, None, [STEPS as i64; EPISODES])?;
     let output = quantize()?;
@@ -281,7 +282,7 @@ fn quantize_tells_both_errors_and_what_is_wrong_with_the_recordings() -> Result<
     let people = succeeded(&run(actq(&["eval", &text(&out), "--policy", &text(&policy)]), b"")?)?;
     ensure!(people.contains("activations") && people.contains("of the error (int8)"), "{people}");
 
-    // Two dimensions stand still in the recording, and one of them moves in the other.
+    // Two dimensions are constant in the recording, and one of them moves in the other.
     let mut obs = draw_observations(5, OBS);
     for row in obs.rows_mut() {
         let mut row = row;
@@ -300,7 +301,7 @@ fn quantize_tells_both_errors_and_what_is_wrong_with_the_recordings() -> Result<
     ensure!(warnings[1].starts_with(outside), "{warnings:?}");
     let eval = run(actq(&["eval", &text(&out), "--policy", &text(&policy), "--json"]), b"")?;
     assert_eq!(notes(&eval)?, warnings[1..]);
-    // A broken recording to compare with does not keep eval from its work.
+    // A malformed recording for comparison does not stop eval.
     cut(&policy.join("calib.npy"), 100)?;
     let eval = notes(&run(actq(&["eval", &text(&out), "--policy", &text(&policy), "--json"]), b"")?)?;
     ensure!(eval.len() == 1 && eval[0].starts_with("note: the calibrated range is not known: "), "{eval:?}");
@@ -308,7 +309,7 @@ fn quantize_tells_both_errors_and_what_is_wrong_with_the_recordings() -> Result<
 }
 
 #[test]
-fn without_a_held_out_recording_the_calibration_error_is_printed() -> Result<()> {
+fn without_held_out_data_calibration_error_is_printed() -> Result<()> {
     let fixture = Fixture::new()?;
     fs::remove_file(fixture.policy().join("heldout.npz"))?;
     let output = fixture.quantize(&fixture.out("image.actq"), "--bits 8")?;
@@ -318,9 +319,9 @@ fn without_a_held_out_recording_the_calibration_error_is_printed() -> Result<()>
 }
 
 #[test]
-fn an_image_that_fits_its_calibration_alone_is_warned_of() -> Result<()> {
+fn overfitting_the_calibration_is_warned_of() -> Result<()> {
     let fixture = Fixture::new()?;
-    // Held out are small motions, beside which the error that was small for large ones is large.
+    // The held-out motions are small; an error that was small for large motions is large for them.
     let obs = 0.05 * draw_observations(6, OBS);
     write_recording(&fixture.policy().join("heldout.npz"), &obs, None, [STEPS as i64; EPISODES])?;
     let warnings = notes(&fixture.quantize(&fixture.out("image.actq"), "--bits 2")?)?;

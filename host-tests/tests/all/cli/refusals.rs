@@ -1,5 +1,5 @@
-//! What any command refuses: wrong arguments, damaged images, outputs that cannot be written; and a reader that goes
-//! away.
+//! Refusals of any command: wrong arguments, damaged images, outputs that cannot be written; and a reader that closes
+//! the output.
 
 use std::fs;
 use std::process::Stdio;
@@ -45,12 +45,12 @@ fn a_wrong_command_line_has_status_2() -> Result<()> {
     let other =
         lines.map(|line| (format!("{line:?}"), run(actq(line), b"").and_then(|output| failed(&output, 2, &[]))));
     all(quantized.into_iter().chain(other))?;
-    ensure!(fixture.snapshot()? == before, "files have changed");
+    ensure!(fixture.snapshot()? == before, "files changed");
     Ok(())
 }
 
 #[test]
-fn an_output_that_cannot_be_written_leaves_no_file() -> Result<()> {
+fn unwritable_outputs_leave_no_file() -> Result<()> {
     let fixture = Fixture::new()?;
     fs::create_dir(fixture.out("folder"))?;
     let before = fixture.snapshot()?;
@@ -58,11 +58,11 @@ fn an_output_that_cannot_be_written_leaves_no_file() -> Result<()> {
         let out = fixture.out(name);
         (name.to_owned(), fixture.quantize(&out, "").and_then(|output| failed(&output, 1, &[&text(&out)])))
     }))?;
-    ensure!(fixture.snapshot()? == before, "files have changed");
+    ensure!(fixture.snapshot()? == before, "files changed");
     Ok(())
 }
 
-/// There is no policy either; that is what a command would say first if it began its work.
+/// There is no policy either; a command that began its work would report that first.
 #[test]
 fn outputs_are_refused_before_any_work() -> Result<()> {
     let fixture = Fixture::new()?;
@@ -72,7 +72,7 @@ fn outputs_are_refused_before_any_work() -> Result<()> {
     let mut bad =
         vec![text(&fixture.out("none/x")), text(&fixture.out("file/x")), text(&fixture.out(&"x".repeat(256)))];
     if cfg!(target_os = "linux") {
-        // A folder in which nobody can make a file, not even root.
+        // A folder in which no one can create a file, not even root.
         bad.push("/proc/x".to_owned());
     }
     let commands = |bad: &str| {
@@ -90,12 +90,12 @@ fn outputs_are_refused_before_any_work() -> Result<()> {
         let refused = run(actq(&words), b"").and_then(|output| failed(&output, 1, &[bad, "cannot be written"]));
         (command.join(" "), refused)
     }))?;
-    ensure!(fixture.snapshot()? == before, "files have changed");
+    ensure!(fixture.snapshot()? == before, "files changed");
     Ok(())
 }
 
 #[test]
-fn the_longest_name_can_be_written() -> Result<()> {
+fn the_longest_file_name_works() -> Result<()> {
     let fixture = Fixture::new()?;
     let out = fixture.out(&"x".repeat(255));
     succeeded(&fixture.quantize(&out, "")?)?;
@@ -111,7 +111,7 @@ fn long_work_can_be_quiet() -> Result<()> {
 }
 
 #[test]
-fn a_misspelt_option_is_answered_with_the_right_one() -> Result<()> {
+fn a_misspelt_option_gets_a_suggestion() -> Result<()> {
     let lines: [(&[&str], &str); 5] = [
         (&["quantize", "x", "--bwp", "2"], "--bpw"),
         (&["tune", "x", "--bwp=2"], "--bpw"),
@@ -123,14 +123,14 @@ fn a_misspelt_option_is_answered_with_the_right_one() -> Result<()> {
         let answer = format!("a similar argument exists: '{meant}'");
         (line.join(" "), run(actq(line), b"").and_then(|output| failed(&output, 2, &[&answer])))
     }))?;
-    // An option of another command is none of this one's.
+    // An option of another command is not an option of this one.
     let output = run(actq(&["inspect", "x", "--bwp", "2"]), b"")?;
     ensure!(!String::from_utf8_lossy(&output.stderr).contains("similar"), "{output:?}");
     Ok(())
 }
 
 #[test]
-fn a_text_is_no_image() -> Result<()> {
+fn a_text_file_is_not_an_image() -> Result<()> {
     let fixture = Fixture::new()?;
     let path = fixture.out("notes.txt");
     let image = text(&path);
@@ -144,7 +144,7 @@ fn a_text_is_no_image() -> Result<()> {
 }
 
 #[test]
-fn flash_is_taken_in_mebibytes() -> Result<()> {
+fn flash_accepts_mebibytes() -> Result<()> {
     let fixture = Fixture::new()?;
     for size in ["1M", "1m", "1024K", "1024k"] {
         let out = fixture.out(&format!("{size}.actq"));
@@ -198,9 +198,9 @@ fn damaged_images_are_refused_by_every_command() -> Result<()> {
     }))
 }
 
-/// `actq inspect image | head -1` is how people use it.
+/// Users type `actq inspect image | head -1`.
 #[test]
-fn a_reader_that_goes_away_is_no_panic() -> Result<()> {
+fn a_closed_output_causes_no_panic() -> Result<()> {
     let fixture = Fixture::new()?;
     let image = text(&fixture.image("")?);
     let (policy, out) = (text(&fixture.policy()), text(&fixture.out("other.actq")));

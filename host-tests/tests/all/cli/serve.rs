@@ -1,4 +1,4 @@
-//! `actq serve`: the pipe protocol as a simulator speaks it.
+//! `actq serve`: the pipe protocol as a simulator uses it.
 
 use std::io::{Read as _, Write as _};
 use std::process::Stdio;
@@ -13,7 +13,7 @@ use serde_json::Value;
 use super::fixture::{ACT, Fixture, OBS, description, draw_observations, edit, floats, text};
 
 #[test]
-fn serve_plays_a_chunk_and_plans_again() -> Result<()> {
+fn serve_plays_a_chunk_then_plans_again() -> Result<()> {
     let fixture = Fixture::new()?;
     let path = fixture.image("--bits 4")?;
     let obs: Vec<Vec<f32>> = draw_observations(9, OBS).rows().into_iter().take(6).map(|row| row.to_vec()).collect();
@@ -27,7 +27,7 @@ fn serve_plays_a_chunk_and_plans_again() -> Result<()> {
     let raw = with_head(buffer.image(&path)?, |head| {
         obs.iter().map(|obs| Ok(head.infer(obs)?.to_vec())).collect::<Result<Vec<_>>>()
     })?;
-    // Observation, and whose plan at which position is the answer; None resets. The policy has no recurrent state.
+    // Observation, and the plan and position of the answer; None resets. The policy has no recurrent state.
     let session = [
         Some((0, 0, 0)),
         Some((1, 0, 1)),
@@ -39,10 +39,10 @@ fn serve_plays_a_chunk_and_plans_again() -> Result<()> {
         None,
     ];
 
-    // As a simulator does it: every answer is read before the next request.
+    // Like a simulator: read every answer before the next request.
     let mut child = actq(&["serve", &text(&path)]).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
-    let mut stdin = child.stdin.take().context("no standard input")?;
-    let mut stdout = child.stdout.take().context("no standard output")?;
+    let mut stdin = child.stdin.take().context("the command has no standard input")?;
+    let mut stdout = child.stdout.take().context("the command has no standard output")?;
     let mut answers = Vec::new();
     for part in session {
         let Some((seen, plan, position)) = part else {
@@ -58,10 +58,10 @@ fn serve_plays_a_chunk_and_plans_again() -> Result<()> {
     drop(stdin);
     let mut rest = Vec::new();
     stdout.read_to_end(&mut rest)?;
-    ensure!(rest.is_empty(), "{} bytes that nobody asked for", rest.len());
+    ensure!(rest.is_empty(), "{} unexpected bytes", rest.len());
     ensure!(child.wait()?.code() == Some(0), "the end of the input is no error");
 
-    // The same in one go.
+    // The same requests at once.
     let requests = session.map(|part| part.map_or(vec![RESET], |(seen, ..)| step_request(&obs[seen]))).concat();
     let output = run(actq(&["serve", &text(&path)]), &requests)?;
     assert_eq!((output.status.code(), output.stdout), (Some(0), answers));
@@ -69,7 +69,7 @@ fn serve_plays_a_chunk_and_plans_again() -> Result<()> {
 }
 
 #[test]
-fn serve_refuses_what_is_not_the_protocol() -> Result<()> {
+fn serve_refuses_malformed_requests() -> Result<()> {
     let fixture = Fixture::new()?;
     let path = text(&fixture.image("")?);
     let good = step_request(&[0.5; OBS]);
@@ -89,9 +89,9 @@ fn serve_refuses_what_is_not_the_protocol() -> Result<()> {
 }
 
 #[test]
-fn serve_answers_what_is_not_finite_with_no_action_and_goes_on() -> Result<()> {
+fn serve_answers_non_finite_values_without_an_action() -> Result<()> {
     let fixture = Fixture::new()?;
-    // Nothing bounds what the network computes with.
+    // Nothing bounds the network's values.
     edit(&fixture.policy(), "/ops/0/clip", Value::Null)?;
     let path = text(&fixture.image("--bits 4")?);
     let serve = |frames: &[&[u8]]| -> Result<Vec<Vec<u8>>> {
@@ -111,7 +111,7 @@ fn serve_answers_what_is_not_finite_with_no_action_and_goes_on() -> Result<()> {
         ("infinity", step_request(&[f32::NEG_INFINITY; OBS])),
         ("overflow inside", step_request(&[f32::MAX; OBS])),
     ] {
-        // Behind it the policy plans anew, as after a reset.
+        // After it the policy plans anew, as after a reset.
         let answers = serve(&[&rows[0], &rows[0], &bad, &rows[1], &step_request(&one_nan), &rows[2]])?;
         let right = [&expected[0], &expected[1], &no_action, &expected[2], &no_action, &expected[3]];
         ensure!(answers.iter().eq(right), "{what}: {answers:02x?}");

@@ -1,4 +1,4 @@
-//! `actq sweep`, and the recordings that it takes.
+//! `actq sweep`, and the recordings that it accepts.
 
 use std::fs;
 
@@ -8,7 +8,7 @@ use anyhow::{Result, ensure};
 use super::fixture::{Fixture, OBS, draw_observations, text, write_npy};
 
 #[test]
-fn sweep_takes_named_recordings() -> Result<()> {
+fn sweep_accepts_named_recordings() -> Result<()> {
     let fixture = Fixture::new()?;
     let policy = fixture.policy();
     let (calib, heldout) = (fixture.out("c.npz"), fixture.out("h.npz"));
@@ -31,7 +31,7 @@ fn sweep_takes_named_recordings() -> Result<()> {
 
 /// Every method that needs actions takes the f32 policy's, and so do the errors.
 #[test]
-fn sweep_takes_observations_alone() -> Result<()> {
+fn sweep_accepts_recordings_without_actions() -> Result<()> {
     let fixture = Fixture::new()?;
     let policy = fixture.policy();
     let [calib, heldout] =

@@ -1,4 +1,4 @@
-//! Damage: bits that flip, bytes that are missing, memory that changes after the check.
+//! Damage: flipped bits, missing bytes, and memory that changes after the check.
 
 use actq_bench::root;
 use actq_kernels::image::header as h;
@@ -8,7 +8,7 @@ use actq_kernels::{Head, Image, ImageError as E, StepError};
 use super::draft::{Change, Draft, FIRST, FUNCTION, HUGE, LAYER_NORM, LSTM, NORMALIZE, OBS, OUTPUT, UNITS, VALID};
 
 #[test]
-fn the_starting_point_is_valid_and_about_four_kib() {
+fn the_undamaged_image_is_valid_and_four_kib() {
     let image = VALID.check().expect("the image is valid");
     assert!((4096..5120).contains(&image.bytes()), "{} bytes", image.bytes());
     let mut scratch = vec![!0; image.scratch_words()];
@@ -16,15 +16,15 @@ fn the_starting_point_is_valid_and_about_four_kib() {
     head.self_test().expect("the self-test passes");
 }
 
-/// The kernels' own tests change it at random. `ACTQ_BLESS=1` writes it anew.
+/// The kernels' own tests change this image at random. `ACTQ_BLESS=1` rewrites it.
 #[test]
-fn the_kernels_tests_have_this_image() {
+fn the_kernels_tests_use_this_image() {
     let path = root().join("kernels/tests/valid.actq");
     if std::env::var_os("ACTQ_BLESS").is_some() {
         std::fs::write(&path, VALID.bytes()).expect("the file can be written");
     }
     let there = std::fs::read(&path).expect("the file can be read");
-    assert!(there == VALID.bytes(), "{} is of another format: run the test with ACTQ_BLESS=1", path.display());
+    assert!(there == VALID.bytes(), "{} is outdated: run the test with ACTQ_BLESS=1", path.display());
 }
 
 #[test]
@@ -41,7 +41,7 @@ fn every_single_bit_flip_is_refused() {
 }
 
 #[test]
-fn every_truncation_and_every_extension_up_to_64_bytes_is_refused() {
+fn every_truncation_and_short_extension_is_refused() {
     let len = VALID.bytes().len();
     for fill in [0, !0, 0x5a5a_5a5a] {
         let mut draft = VALID.clone();
@@ -50,7 +50,7 @@ fn every_truncation_and_every_extension_up_to_64_bytes_is_refused() {
             let expected = if n < 4 * h::WORDS { E::TooShort } else { E::Length };
             assert_eq!(Image::new_checked(&draft.bytes()[..n]).err(), Some(expected), "{n} bytes");
         }
-        // A header that claims the other length has no checksum to go with it.
+        // The checksum does not match a header that claims the other length.
         for words in (h::WORDS..draft.0.len()).filter(|n| *n != len / 4) {
             let mut other = Draft(draft.0[..words].to_vec());
             other.set(h::W_BYTES, 4 * words as u32);
@@ -70,7 +70,7 @@ fn a_misaligned_start_is_refused() {
     }
 }
 
-/// Flash that decays, or is rewritten behind the head's back: what no longer parses is an error, not a stale action.
+/// Flash that decays, or is rewritten under the head: content that no longer parses is an error, not a stale action.
 #[test]
 fn damage_after_the_check_is_an_error() {
     let cases: &[(&str, Change)] = &[
@@ -103,7 +103,7 @@ fn damage_after_the_check_is_an_error() {
         let mut scratch = vec![0; image.scratch_words()];
         let mut head = Head::new(image, &mut scratch).expect("the scratch memory has the image's size");
         assert_eq!(head.step(&[0.5; OBS]).err(), Some(StepError::Damaged), "{name}");
-        // In pieces, too, and again and again.
+        // In pieces, too, and repeatedly.
         let in_pieces = head.begin(&[0.5; OBS]).and_then(|()| head.poll(u32::MAX).map(|_| ()));
         assert_eq!(in_pieces, Err(StepError::Damaged), "{name}");
     }

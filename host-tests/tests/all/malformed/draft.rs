@@ -1,4 +1,4 @@
-//! A valid image whose words can be changed.
+//! A valid image whose words tests change.
 
 use std::sync::LazyLock;
 
@@ -76,7 +76,7 @@ fn interleaved(a: &Outcome, b: &Outcome) -> Outcome {
     out
 }
 
-/// An image whose words can be changed.
+/// An image whose words tests change.
 #[derive(Clone)]
 pub(super) struct Draft(pub(super) Vec<u32>);
 
@@ -136,23 +136,23 @@ impl Draft {
         self.set(at, self.low(at) | value << 16);
     }
 
-    /// Makes the checksum fit.
+    /// Updates the checksum.
     pub(super) fn seal(&mut self) {
         self.set(h::W_CRC, checksum(self.bytes()));
     }
 
-    /// Where the record of the `nth` operation with this code stands.
+    /// Returns the position of the record of the `nth` operation with this code.
     pub(super) fn op(&self, (code, nth): (u8, usize)) -> usize {
         let records = (0..self.high(h::W_KIND) as usize).map(|i| self.offset(h::W_OPS) + i * h::OP_WORDS);
         records.filter(|&at| self.get(at) as u8 == code).nth(nth).expect("the image has the operation")
     }
 
-    /// Where the constants or the matrix record of an operation stand.
+    /// Returns the position of the constants or the matrix record of an operation.
     pub(super) fn data(&self, which: (u8, usize)) -> usize {
         self.offset(self.op(which) + 3)
     }
 
-    /// Where block record `i` of a linear operation stands.
+    /// Returns the position of block record `i` of a linear operation.
     pub(super) fn block(&self, which: (u8, usize), i: usize) -> usize {
         self.offset(self.data(which) + 3) + i * h::BLOCK_WORDS
     }
@@ -165,11 +165,10 @@ pub(super) const HUGE: u32 = u32::MAX - 1;
 /// A change of an image.
 pub(super) type Change = fn(&mut Draft);
 
-/// What is wrong, the error that must say so, and how the valid image is made so.
+/// The fault, the expected error, and the change of the valid image.
 pub(super) type Case = (&'static str, E, Change);
 
-/// Applies every case to the valid image, makes the checksum fit, and reports all cases that are not refused as
-/// expected.
+/// Applies every case to the valid image, updates the checksum, and reports all cases that are not refused as expected.
 pub(super) fn refused(cases: &[Case]) {
     let wrong = cases.iter().filter_map(|(name, expected, change)| {
         let mut draft = VALID.clone();

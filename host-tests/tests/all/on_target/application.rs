@@ -1,5 +1,5 @@
-//! The application on its boards under QEMU, at the other end of its link: it starts, refuses, acts, is updated, is
-//! reset, and tells why.
+//! The application on its boards under QEMU, at the other end of its link: start, refusals, actions, updates, resets,
+//! and their reported causes.
 
 use std::fs;
 use std::io::Write as _;
@@ -25,9 +25,9 @@ use actq_ur3::{ACT_DIM, OBS_DIM};
 use anyhow::{Context, Result, ensure};
 use tempfile::NamedTempFile;
 
-/// The boards that the application has a device for.
+/// The boards with a device for the application.
 const BOARDS: [Target; 4] = [Target::Fpu, Target::M33, Target::M7, Target::F405];
-/// Those that have a watchdog, a clock and memory for slots in QEMU.
+/// Boards with a watchdog, a clock and memory for slots in QEMU.
 const WHOLE: [Target; 3] = [Target::Fpu, Target::M33, Target::M7];
 
 fn start(target: Target, features: &'static str) -> Result<(Controller, Client)> {
@@ -42,12 +42,12 @@ pub(super) fn self_test(image: &Image<'_>, step: usize) -> Option<(Vec<f32>, Vec
     Some((observation, action.iter().map(|word| u32::from_le(*word)).collect()))
 }
 
-/// A small image of the built-in one's lengths: QEMU's serial ports take a byte at a time.
+/// A small image of the built-in one's lengths: QEMU's serial ports read one byte at a time.
 pub(super) fn small() -> Result<Vec<u8>> {
     small_within(None)
 }
 
-/// As [`small`], with limits in both directions that its actions do not reach.
+/// Does the same as [`small`] with limits in both directions that its actions do not reach.
 pub(super) fn small_with_limits() -> Result<Vec<u8>> {
     small_within(Some(1000.0))
 }
@@ -66,7 +66,7 @@ fn with_wrong_self_test(mut bytes: Vec<u8>) -> Result<Vec<u8>> {
     let at = 4 * h::W_SELF_TEST;
     let begin = u32::from_le_bytes(bytes[at..at + 4].try_into()?) as usize + OBS_DIM;
     bytes[4 * begin] ^= 1;
-    seal(&mut bytes).context("its length is as before")?;
+    seal(&mut bytes).context("its length is unchanged")?;
     Ok(bytes)
 }
 
@@ -77,11 +77,11 @@ pub(super) fn file(bytes: &[u8]) -> Result<NamedTempFile> {
 }
 
 #[test]
-fn every_board_starts_and_acts_with_the_bits_of_the_host() -> Result<()> {
+fn every_board_starts_and_matches_the_host() -> Result<()> {
     BOARDS.into_iter().try_for_each(starts_and_acts_with_the_bits_of_the_host)
 }
 
-/// The application acts with the bits of the host, disarmed; armed, its actions are limited and applied.
+/// Requires that the application gives the host's bits while disarmed; armed, it limits and applies its actions.
 pub(crate) fn starts_and_acts_with_the_bits_of_the_host(target: Target) -> Result<()> {
     let buffer = ImageBuffer::read(built_in()?)?;
     let image = buffer.image(built_in()?)?;
@@ -99,15 +99,15 @@ pub(crate) fn starts_and_acts_with_the_bits_of_the_host(target: Target) -> Resul
         assert_eq!(action.iter().map(|v| v.to_bits()).collect::<Vec<_>>(), expected[step], "{target:?}, step {step}");
     }
     if target == Target::F405 {
-        // QEMU has no clocks for it: the wait for the crystal has ended, and nothing may move at another rate.
+        // QEMU has no clocks for it: the wait for the crystal times out, and nothing may move at another rate.
         assert_eq!(client.status()?.refusal, Some(Refusal::Clock));
-        // Nor a flash controller: an erase is refused, and it runs on.
-        let told = push(&mut client, &package(&small()?), |_| {}).expect_err("nothing can be erased");
+        // QEMU has no flash controller for it either: an erase is refused, and the program continues.
+        let told = push(&mut client, &package(&small()?), |_| {}).expect_err("the erase must be refused");
         assert!(format!("{told:#}").contains(&Refusal::Flash.to_string()), "{told:#}");
         assert_eq!(client.status()?.slot, BUILT_IN);
         return Ok(());
     }
-    let (observation, _) = self_test(&image, 0).context("it has a self-test")?;
+    let (observation, _) = self_test(&image, 0).context("the image has no self-test")?;
     assert_eq!(client.get(actq_link::code::Parameter::High, 0)?, 1.5, "{target:?}: not the contract's limit");
     let mut armed = || -> Result<(bool, Vec<f32>)> {
         arm(&mut client, &observation)?;
@@ -120,7 +120,7 @@ pub(crate) fn starts_and_acts_with_the_bits_of_the_host(target: Target) -> Resul
         if applied {
             break action;
         }
-        ensure!(begun.elapsed() < HANG, "{target:?}: never armed and applied");
+        ensure!(begun.elapsed() < HANG, "{target:?}: no action was applied while armed");
     };
     assert!(action.iter().all(|value| value.abs() <= 2.0), "{target:?}: {action:?}");
     client.disarm()?;
@@ -132,7 +132,7 @@ pub(crate) fn starts_and_acts_with_the_bits_of_the_host(target: Target) -> Resul
     Ok(())
 }
 
-/// Arms behind a fresh observation; again where the machine was so busy that it has become an old one.
+/// Arms after a fresh observation; repeats if the machine was so busy that the observation has become too old.
 pub(super) fn arm(client: &mut Client, observation: &[f32]) -> Result<()> {
     let begun = Instant::now();
     loop {
@@ -148,14 +148,15 @@ fn package(image: &[u8]) -> Package<'_> {
     Package { image, version: 1, signature: None }
 }
 
-/// At 8 kHz, with a head of 330 thousand weights below: no tick is lost, and none begins later or takes longer than a
-/// tenth of a period. An instruction takes QEMU 32 ns. Twenty steps play chunks of several evaluations.
+/// At 8 kHz, with a head of 330 thousand weights in the background: no tick is lost, and none starts later or takes
+/// longer than a tenth of a period. QEMU takes 32 ns for an instruction. Twenty steps play chunks of several
+/// evaluations.
 #[test]
-fn a_head_below_leaves_the_tick_alone() -> Result<()> {
+fn a_background_head_leaves_the_tick_undisturbed() -> Result<()> {
     let buffer = ImageBuffer::read(built_in()?)?;
     let image = buffer.image(built_in()?)?;
     let (_controller, mut client) = start(Target::Fpu, "tick-8khz")?;
-    let (observation, _) = self_test(&image, 0).context("it has a self-test")?;
+    let (observation, _) = self_test(&image, 0).context("the image has no self-test")?;
     for _ in 0..20 {
         act(&mut client, &observation)?;
     }
@@ -167,18 +168,18 @@ fn a_head_below_leaves_the_tick_alone() -> Result<()> {
     Ok(())
 }
 
-/// The tick drives a simulated motor by the current loop, with the same head below: no tick is lost. An instruction
-/// takes QEMU 32 ns.
+/// The tick drives a simulated motor by the current loop, with the same head in the background: no tick is lost. QEMU
+/// takes 32 ns for an instruction.
 #[test]
-fn a_current_loop_in_the_tick_leaves_room_for_the_head() -> Result<()> {
+fn a_current_loop_leaves_room_for_the_head() -> Result<()> {
     let buffer = ImageBuffer::read(built_in()?)?;
     let image = buffer.image(built_in()?)?;
-    let (observation, _) = self_test(&image, 0).context("it has a self-test")?;
+    let (observation, _) = self_test(&image, 0).context("the image has no self-test")?;
     for (features, period) in [("foc", 1_000_000), ("foc,tick-8khz", 125_000)] {
         let elf = firmware::controller(Target::Fpu, features)?;
         let controller = Controller::start(Target::Fpu, &elf, None)?;
         let mut client = controller.client()?;
-        // What latches at the deadline, where the machine is busy, still drives the motor: to 0.
+        // On a busy machine it may latch at the deadline; it then drives the motor to 0.
         arm(&mut client, &observation)?;
         for _ in 0..20 {
             act(&mut client, &observation)?;
@@ -196,7 +197,7 @@ fn a_current_loop_in_the_tick_leaves_room_for_the_head() -> Result<()> {
 }
 
 #[test]
-fn an_image_that_may_not_run_is_refused_with_its_reason() -> Result<()> {
+fn an_unsuitable_image_is_refused_with_its_reason() -> Result<()> {
     let mut damaged = fs::read(built_in()?)?;
     let middle = damaged.len() / 2;
     damaged[middle] ^= 4;
@@ -214,17 +215,18 @@ fn an_image_that_may_not_run_is_refused_with_its_reason() -> Result<()> {
         assert_eq!((status.state, status.refusal, status.image), (State::Disarmed, Some(refusal), 0), "{target:?}");
         assert!(client.arm().is_err(), "{target:?}");
         if target == Target::F405 {
-            let told = push(&mut client, &package(&damaged), |_| {}).expect_err("it would erase the debugger's image");
+            let told =
+                push(&mut client, &package(&damaged), |_| {}).expect_err("the push would erase the debugger's image");
             assert!(format!("{told:#}").contains(&Refusal::Unsupported.to_string()), "{told:#}");
         }
     }
     Ok(())
 }
 
-/// What hides its progress is reset: the link's, the head's, the output's. The loop goes on, so what the watchdog
-/// interrupts is somewhere in it.
+/// A part that stops making progress causes a reset: the link, the head, the output. The loop continues, so the
+/// watchdog interrupts somewhere in it.
 #[test]
-fn the_watchdog_resets_what_makes_no_progress() -> Result<()> {
+fn the_watchdog_resets_a_board_without_progress() -> Result<()> {
     for (target, hidden) in WHOLE.into_iter().zip([1, 2, 4]) {
         let elf = firmware::controller(target, "faults")?;
         let (_controller, mut client) = start(target, "faults")?;
@@ -236,8 +238,8 @@ fn the_watchdog_resets_what_makes_no_progress() -> Result<()> {
         assert_eq!((crumb.detail, crumb.count), (hidden.into(), 1), "{target:?}");
         halfword_at(&elf, crumb.pc)?;
         let second = client.status()?;
-        assert_ne!(first.token, second.token, "{target:?}: a request from before the reset would be taken");
-        // A crash is told once, and counted on.
+        assert_ne!(first.token, second.token, "{target:?}: a request from before the reset would be accepted");
+        // A crash is reported once, and counted further.
         client.connection_mut().raw(&[0, b'p', 0]);
         until(&mut client, "reset", |status| status.reset == ResetCause::Software)?;
         let crumb = client.breadcrumb()?;
@@ -262,10 +264,10 @@ fn a_hard_fault_leaves_its_address() -> Result<()> {
     Ok(())
 }
 
-/// A stack that has grown to its end is found out before it writes over a variable; where the program was, as far as
-/// its stack tells.
+/// The guard detects a stack overflow before it overwrites a variable; the record has the place in the program, if the
+/// stack tells it.
 #[test]
-fn a_stack_that_overflows_leaves_where_it_was() -> Result<()> {
+fn a_stack_overflow_leaves_its_place() -> Result<()> {
     for target in BOARDS {
         let elf = firmware::controller(target, "faults")?;
         let (_controller, mut client) = start(target, "faults")?;
@@ -273,7 +275,7 @@ fn a_stack_that_overflows_leaves_where_it_was() -> Result<()> {
         client.connection_mut().raw(&[0, b's', 0]);
         until(&mut client, "reset", |status| status.reset == ResetCause::Software)?;
         let crumb = client.breadcrumb()?;
-        // That it stands in the record at all: its memory is the nearest below the stack.
+        // The record must survive: its memory is the nearest below the stack.
         assert_eq!((crumb.crash, crumb.count), (Some(Crash::StackOverflow), 1), "{target:?}");
         let code = Code::read(&elf)?;
         let holds = |f: &&Function| (f.address..f.address + f.size).contains(&crumb.pc.into());
@@ -283,28 +285,29 @@ fn a_stack_that_overflows_leaves_where_it_was() -> Result<()> {
     Ok(())
 }
 
-/// Whatever is called and whatever interrupts it, the stack has room; and no frame leaps over the guard, 4 KB, of the
-/// boards that have no limit of the stack. `cargo xtask budgets` holds what was measured below.
+/// The stack has room for every call and every interrupt, and no frame skips the guard, 4 KB, on boards without a stack
+/// limit. `cargo xtask budgets` checks the measured use.
 #[test]
-fn the_stack_has_room_for_the_deepest_calls_and_interrupts() -> Result<()> {
+fn the_stack_fits_the_deepest_calls_and_interrupts() -> Result<()> {
     let foc = [Target::Fpu, Target::M33].map(|target| (target, "foc"));
     for (target, features) in BOARDS.map(|target| (target, "")).into_iter().chain(foc) {
         let worst = worst_case(&firmware::controller(target, features)?)?;
         assert!((4096..=worst.room).contains(&worst.bytes()), "{target:?}: {} of {}", worst.bytes(), worst.room);
-        let (name, bytes) = worst.frames.iter().max_by_key(|(_, bytes)| bytes).context("there are functions")?;
+        let (name, bytes) =
+            worst.frames.iter().max_by_key(|(_, bytes)| bytes).context("the program has no functions")?;
         assert!((1024..4096).contains(bytes), "{target:?}: {name} has a frame of {bytes} bytes");
-        // The loop, the serial port, the tick, the faults, a hard fault, and what cannot be masked.
+        // The loop, the serial port, the tick, the faults, a hard fault, and the non-maskable interrupt.
         assert_eq!(worst.levels.len(), 6, "{target:?}: {:?}", worst.levels);
     }
     let recursion =
-        worst_case(&firmware::controller(Target::Fpu, "faults")?).expect_err("it calls itself when asked to");
+        worst_case(&firmware::controller(Target::Fpu, "faults")?).expect_err("the feature contains a recursion");
     assert!(format!("{recursion:#}").contains("recurse is recursive"), "{recursion:#}");
     Ok(())
 }
 
-/// There is nothing in the application that panics, nor the text of a panic; it has the size that it may have.
+/// The application contains no panic and no panic message, and keeps its size limit.
 #[test]
-fn no_panic_is_in_the_application_and_it_is_small() -> Result<()> {
+fn the_application_is_small_and_has_no_panic() -> Result<()> {
     let image = fs::read(built_in()?)?.len() as u64;
     let foc = [Target::Fpu, Target::M33].map(|target| (target, "foc"));
     for (target, features) in BOARDS.map(|target| (target, "")).into_iter().chain(foc) {
@@ -321,7 +324,7 @@ fn no_panic_is_in_the_application_and_it_is_small() -> Result<()> {
     Ok(())
 }
 
-/// The image of this slot still runs after a reset, and gives these bits.
+/// Requires that the image of this slot still runs after a reset, and gives these bits.
 fn runs_over_a_reset(client: &mut Client, slot: u8, observation: &[f32], bits: &[u32]) -> Result<()> {
     client.connection_mut().raw(&[0, b'p', 0]);
     let status = until(client, "reset", |status| status.reset == ResetCause::Software)?;
@@ -335,26 +338,30 @@ fn runs_over_a_reset(client: &mut Client, slot: u8, observation: &[f32], bits: &
 const PRIVATE_KEY: &str = "-----BEGIN PRIVATE KEY-----\nMC4CAQAwBQYDK2VwBCIEINTuctv5E1hK1bbY8fdp+K06/nwoy/HU++CXqI9EdVhC\n\
     -----END PRIVATE KEY-----\n";
 
-/// A build with a key runs only what the key has signed, over a reset, too, and has no slot for a debugger's image.
+/// A build with a key runs only images that the key has signed, also after a reset, and has no slot for a debugger's
+/// image.
 #[test]
-fn a_build_with_a_key_runs_signed_images_alone() -> Result<()> {
+fn a_keyed_build_runs_only_signed_images() -> Result<()> {
     let pem = file(PRIVATE_KEY.as_bytes())?;
     let key = keys::read(pem.path())?;
     let new = small()?;
     let signature = keys::sign(&key, &new, 1)?.check(&new)?;
     let (observation, bits) =
-        self_test(&ImageBuffer::new(&new).image(Path::new("small"))?, 0).context("it has a self-test")?;
+        self_test(&ImageBuffer::new(&new).image(Path::new("small"))?, 0).context("the image has no self-test")?;
     let slot = file(&new)?;
     for target in WHOLE {
         let elf = firmware::controller_of_key(target, "signed,faults", &keys::public(&key))?;
-        let told = format!("{:#}", Controller::start(target, &elf, Some(slot.path())).expect_err("it has a slot"));
+        let told = format!(
+            "{:#}",
+            Controller::start(target, &elf, Some(slot.path())).expect_err("a build with a key must have no slot")
+        );
         assert!(told.contains("no image slot"), "{target:?}: {told}");
         let controller = Controller::start(target, &elf, None)?;
         let mut client = controller.client()?;
         let wrong = [signature[0] ^ 1].into_iter().chain(signature[1..].iter().copied()).collect::<Vec<u8>>();
-        for refused in [None, Some(&wrong.try_into().expect("as many bytes"))] {
+        for refused in [None, Some(&wrong.try_into().expect("the signature has 64 bytes"))] {
             let told = push(&mut client, &Package { image: &new, version: 1, signature: refused }, |_| {});
-            let told = format!("{:#}", told.expect_err("it is not signed"));
+            let told = format!("{:#}", told.expect_err("an unsigned image must be refused"));
             assert!(told.contains("signature"), "{target:?}: {told}");
             assert_eq!(client.status()?.slot, BUILT_IN, "{target:?}");
         }
@@ -366,21 +373,22 @@ fn a_build_with_a_key_runs_signed_images_alone() -> Result<()> {
     Ok(())
 }
 
-/// No point of the curve has 2 as its y.
+/// No point of the curve has 2 as its y coordinate.
 #[test]
-fn a_key_that_is_none_does_not_build() {
+fn an_invalid_key_does_not_build() {
     let none = "02".to_owned() + &"00".repeat(31);
-    let told = firmware::controller_of_key(Target::Fpu, "signed", &none).expect_err("it is no point of the curve");
+    let told =
+        firmware::controller_of_key(Target::Fpu, "signed", &none).expect_err("the key is not a point of the curve");
     assert!(format!("{told:#}").contains("ACTQ_PUBLIC_KEY is not an Ed25519 public key"), "{told:#}");
 }
 
-/// The application is updated while it runs; what fails its self-test is refused, and the one before runs on, over a
-/// reset, too.
+/// The application is updated while it runs. An image that fails its self-test is refused, and the one before
+/// continues, also after a reset.
 #[test]
-fn an_image_comes_over_the_link_and_one_that_fails_is_rolled_back() -> Result<()> {
+fn updates_install_and_failed_ones_roll_back() -> Result<()> {
     let new = ImageBuffer::new(&small()?);
     let wrong = with_wrong_self_test(small()?)?;
-    let (observation, bits) = self_test(&new.image(Path::new("small"))?, 0).context("it has a self-test")?;
+    let (observation, bits) = self_test(&new.image(Path::new("small"))?, 0).context("the image has no self-test")?;
     for target in WHOLE {
         let (_controller, mut client) = start(target, "faults")?;
         let told = push(&mut client, &package(&wrong), |_| {}).expect_err("its self-test fails");
@@ -397,11 +405,11 @@ fn an_image_comes_over_the_link_and_one_that_fails_is_rolled_back() -> Result<()
     Ok(())
 }
 
-/// Without observations the outputs go to their safe action, which is kept until armed again.
+/// Without observations the outputs go to their safe action, and stay there until armed again.
 #[test]
-fn a_host_that_stops_is_noticed_at_the_deadline() -> Result<()> {
+fn a_silent_host_is_detected_at_the_deadline() -> Result<()> {
     let buffer = ImageBuffer::read(built_in()?)?;
-    let (observation, _) = self_test(&buffer.image(built_in()?)?, 0).context("it has a self-test")?;
+    let (observation, _) = self_test(&buffer.image(built_in()?)?, 0).context("the image has no self-test")?;
     let (_controller, mut client) = start(Target::Fpu, "")?;
     arm(&mut client, &observation)?;
     let status = until(&mut client, "latched", |status| status.state == State::Latched)?;

@@ -1,4 +1,4 @@
-//! The cost model's predictions against what QEMU counts, and the pieces of a step against their budget.
+//! The cost model's predictions against QEMU's counts, and the polls of a step against their budget.
 
 use std::path::Path;
 
@@ -20,9 +20,9 @@ use actq_kernels::pace::cost::{Cost, of_op, of_step};
 use actq_kernels::{StepError, Width};
 use anyhow::{Context, Result, bail, ensure};
 
-/// Steps that each image runs, spread over the held-out recordings.
+/// Steps of each image, spread over the held-out recordings.
 const STEPS: usize = 24;
-/// Largest error of a predicted step.
+/// Largest relative error of a predicted step.
 const ERROR: f64 = 0.01;
 
 fn image(policy: &Policy, options: &Options) -> Result<Vec<u8>> {
@@ -30,7 +30,7 @@ fn image(policy: &Policy, options: &Options) -> Result<Vec<u8>> {
 }
 
 fn best(bits: f64) -> Options {
-    // Steps of learning change the weights' values, on which no time depends.
+    // Learning changes the weights' values, on which no time depends.
     Options { steps: Some(2), ..Options::new(Method::Best, Budget::BitsPerWeight(bits)) }
 }
 
@@ -45,7 +45,7 @@ fn observations(dir: &Path, policy: &Policy) -> Result<Vec<Vec<f32>>> {
     Ok(all.iter().step_by(all.len() / STEPS).take(STEPS).cloned().collect())
 }
 
-/// Predicts the step of every image, and compares with the mean over recorded observations. Gives the counted
+/// Predicts the step of every image, and compares with the mean over recorded observations. Returns the counted
 /// instructions per weight of the f32 policy.
 fn predictions_hold(dir: &Path, images: &[Options]) -> Result<Vec<f64>> {
     let (elf, counter) = (firmware::harness(Target::Fpu)?, Counter::build()?);
@@ -77,9 +77,9 @@ fn predictions_hold(dir: &Path, images: &[Options]) -> Result<Vec<f64>> {
     Ok(per_mac)
 }
 
-/// Chunks that are averaged, and such that lead over from one to the next, of other sizes than those of the fit.
+/// Chunks that are averaged, and chunks that blend into the next, of other sizes than those of the fit.
 #[test]
-fn steps_that_merge_chunks_take_what_was_predicted() -> Result<()> {
+fn steps_that_merge_chunks_match_the_prediction() -> Result<()> {
     let (elf, counter) = (firmware::harness(Target::Fpu)?, Counter::build()?);
     const OBSERVATION: usize = 24;
     let mut random = Random::new(6);
@@ -97,7 +97,7 @@ fn steps_that_merge_chunks_take_what_was_predicted() -> Result<()> {
         let bytes = emit::image(&policy, &outcomes)?;
         let buffer = ImageBuffer::new(&bytes);
         let predicted = of_step(&buffer.image(Path::new("chunks"))?);
-        // Before the second chunk there is nothing to lead over from.
+        // Before the second chunk there is none to blend with.
         let counted = &profile::steps(&elf, &counter, &bytes, &observations)?[1..];
         let mean = |of: fn(&Cost) -> u64| counted.iter().map(of).sum::<u64>() as f64 / counted.len() as f64;
         for (what, predicted, counted) in [
@@ -125,24 +125,24 @@ fn images() -> Vec<Options> {
 }
 
 #[test]
-fn ur3_steps_take_what_was_predicted() -> Result<()> {
+fn ur3_steps_match_the_prediction() -> Result<()> {
     predictions_hold(&ur3(), &images()).map(drop)
 }
 
 #[test]
-fn steps_of_shared_policies_take_what_was_predicted() -> Result<()> {
+fn steps_of_shared_policies_match_the_prediction() -> Result<()> {
     let Some(policies) = shared_policies() else { return Ok(()) };
-    // Instructions per MAC of the whole head at 3 bits, at most.
+    // Limit of the instructions per MAC of the whole head at 3 bits.
     for (name, limit) in [("go1_mlp", 1.25), ("g1_lstm256", 1.30), ("fetch_pickplace", 1.25)] {
         let others = [best(2.0), rtn(Width::W3, 32, Activations::Int8), rtn(Width::W8, 0, Activations::Int16)];
         let per_mac = predictions_hold(&policies.join(name), &[&[best(3.0)], &others[..]].concat())?;
-        ensure!(per_mac[0] <= limit, "{name}: {:.3} instructions per MAC, {limit} are allowed", per_mac[0]);
+        ensure!(per_mac[0] <= limit, "{name}: {:.3} instructions per MAC, limit {limit}", per_mac[0]);
     }
     Ok(())
 }
 
-/// Runs every image in polls of several budgets: each stays within its budget, and the actions have the same bits as on
-/// the host. Gives how many budgets were not below the least.
+/// Runs every image in polls of several budgets: each poll stays within its budget, and the actions have the host's
+/// bits. Returns the number of budgets that were not below the least.
 fn polls_keep_their_budget(dir: &Path, images: &[Options]) -> Result<usize> {
     let (elf, counter) = (firmware::harness(Target::Fpu)?, Counter::build()?);
     let policy = Policy::load(dir)?;
@@ -212,16 +212,16 @@ fn a_budget_of_time_is_kept_and_used() -> Result<()> {
         let found = within(milliseconds)?;
         let step = StepTime::new(&found.buffer().image(Path::new("memory"))?, CLOCK);
         assert_eq!(found.time.map(|time| time.cycles), Some(step.cycles));
-        assert!(step.milliseconds <= milliseconds, "{} ms for {milliseconds}", step.milliseconds);
-        assert!(step.milliseconds > 0.97 * milliseconds, "{} ms for {milliseconds}", step.milliseconds);
+        assert!(step.milliseconds <= milliseconds, "{} ms for a budget of {milliseconds}", step.milliseconds);
+        assert!(step.milliseconds > 0.97 * milliseconds, "{} ms for a budget of {milliseconds}", step.milliseconds);
     }
-    let refused = within(0.01).map(|_| ()).expect_err("nothing is so fast");
+    let refused = within(0.01).map(|_| ()).expect_err("no head is so fast");
     assert!(refused.to_string().contains("the fastest is"), "{refused}");
     Ok(())
 }
 
-/// A matrix of rows of all widths against matrices of its blocks alone, counted; with the rows of a width behind each
-/// other, and scattered, so that they need an index.
+/// Counts a matrix with rows of all widths against matrices of its blocks only; with the rows of a width in sequence,
+/// and scattered, so that they need an index.
 #[test]
 fn mixed_widths_cost_little_more_than_their_blocks() -> Result<()> {
     const ROWS: usize = 64;
@@ -254,7 +254,7 @@ fn mixed_widths_cost_little_more_than_their_blocks() -> Result<()> {
     Ok(())
 }
 
-/// Biases that are added to what an output holds: no graph lowers to such an operation, but an image may have it.
+/// Biases added to the content of an output: no graph lowers to such an operation, but an image may have it.
 #[test]
 fn polls_that_add_biases_stay_within_their_budget() -> Result<()> {
     const ROWS: usize = 1000;
@@ -274,7 +274,7 @@ fn polls_that_add_biases_stay_within_their_budget() -> Result<()> {
         let (costs, _) = profile::regions(&elf, &counter, &bytes, &format!("poll {budget}"), &observations)?;
         let largest = costs.iter().skip(1).map(|c| c.instructions).max().unwrap_or(0);
         println!("{} polls of {budget}, the largest {largest}", costs.len() - 1);
-        ensure!(largest <= u64::from(budget), "{largest} instructions in a poll of {budget}");
+        ensure!(largest <= u64::from(budget), "{largest} instructions in a poll with budget {budget}");
     }
     let parts = profile::parts(&elf, &counter, &image, &bytes, &observations, u32::MAX)?.remove(0);
     let linear = image.ops().zip(&parts.ops).filter(|(op, _)| op.matrix().is_some());

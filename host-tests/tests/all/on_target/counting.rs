@@ -17,7 +17,7 @@ use actq_kernels::Width;
 use anyhow::Result;
 
 #[test]
-fn a_step_of_a_head_reads_each_weight_once() -> Result<()> {
+fn a_step_reads_each_weight_once() -> Result<()> {
     let dir = ur3();
     let policy = Policy::load(&dir)?;
     let options = Options::new(Method::Rtn, Budget::Width(Width::W8));
@@ -34,7 +34,7 @@ fn a_step_of_a_head_reads_each_weight_once() -> Result<()> {
     let region = count()?;
 
     // The network has run: no instruction makes more than four MACs. A line holds 16 weights of 8 bits; biases, scales
-    // and the rest of what is read are a tenth at most.
+    // and the other reads are a tenth at most.
     let weights = policy.graph.weights() as u64;
     assert!(region.instructions > weights / 4, "{}", region.instructions);
     assert!((weights / 16..weights / 16 * 11 / 10).contains(&region.data_lines), "{} of {weights}", region.data_lines);

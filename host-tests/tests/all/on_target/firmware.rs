@@ -1,4 +1,4 @@
-//! `cargo xtask firmware` as it is typed: the application with an image, for a board, in a file.
+//! `cargo xtask firmware` as typed: the application with an image, for a board, in a file.
 
 use std::fs;
 use std::path::Path;
@@ -19,7 +19,7 @@ use tempfile::TempDir;
 
 use super::application::{arm, self_test, small, small_with_limits};
 
-/// Boards that other tools ask for by this command.
+/// Boards that other tools request by this command.
 const BOARDS: [Target; 3] = [Target::Fpu, Target::F405, Target::M33];
 
 fn firmware(words: &[&str]) -> Result<Output> {
@@ -32,10 +32,10 @@ fn text(path: &Path) -> String {
     path.display().to_string()
 }
 
-/// Without an image it is what the other tests run; with one, it acts with its bits. The image has no limits: with those
-/// of the build its axes have them, without any it is not armed.
+/// Without an image the file is the other tests' application; with one, it gives the image's bits. If the image has no
+/// limits, its axes have those of the build; without any limits it cannot be armed.
 #[test]
-fn every_board_gets_the_example_or_an_image_of_ones_own() -> Result<()> {
+fn every_board_accepts_the_example_or_another_image() -> Result<()> {
     let folder = TempDir::new()?;
     let own = folder.path().join("own.actq");
     fs::write(&own, small()?)?;
@@ -43,9 +43,12 @@ fn every_board_gets_the_example_or_an_image_of_ones_own() -> Result<()> {
         let (name, elf) = (target.board().name, folder.path().join("firmware.elf"));
         let told = succeeded(&firmware(&["--board", name, "--out", &text(&elf)])?)?;
         assert!(told.contains(&format!("{}: {name} with {}", text(&elf), text(built_in()?))), "{told}");
-        assert!(fs::read(&elf)? == fs::read(controller(target, "")?)?, "{name}: not the application of the tests");
+        assert!(
+            fs::read(&elf)? == fs::read(controller(target, "")?)?,
+            "{name}: differs from the application of the tests"
+        );
 
-        // A file that is there is replaced.
+        // An existing file is replaced.
         let is_limited = target != Target::M33;
         let limits = if is_limited { &["--limits", "-0.5:0.75:10"][..] } else { &[] };
         let output = firmware(&[&["--board", name, "--image", &text(&own), "--out", &text(&elf)], limits].concat())?;
@@ -58,7 +61,7 @@ fn every_board_gets_the_example_or_an_image_of_ones_own() -> Result<()> {
         let mut client = controller.client()?;
         let status = client.status()?;
         assert_eq!((status.image, status.slot), (image.crc(), BUILT_IN), "{name}");
-        let (observation, bits) = self_test(&image, 0).context("it has a self-test")?;
+        let (observation, bits) = self_test(&image, 0).context("the image has no self-test")?;
         let (_, action) = act(&mut client, &observation)?;
         assert_eq!(action.iter().map(|v| v.to_bits()).collect::<Vec<_>>(), bits, "{name}");
         let axis = [Parameter::Low, Parameter::High, Parameter::Rate].map(|parameter| client.get(parameter, 1));
@@ -76,7 +79,7 @@ fn every_board_gets_the_example_or_an_image_of_ones_own() -> Result<()> {
     Ok(())
 }
 
-/// An image of one product, of more bytes than an STM32F405's program may have, or more scratch memory.
+/// An image of one product, too large for an STM32F405's program memory, or for its scratch memory.
 fn large(rows: usize, cols: usize) -> Result<Vec<u8>> {
     let mut builder = Builder::new(cols);
     builder.linear((rows, cols), Activations::Int8, |_| Some(Width::W8), 0, false)?;
@@ -85,7 +88,7 @@ fn large(rows: usize, cols: usize) -> Result<Vec<u8>> {
 }
 
 #[test]
-fn what_cannot_be_built_is_told_and_leaves_no_file() -> Result<()> {
+fn failed_builds_are_reported_and_leave_no_file() -> Result<()> {
     let folder = TempDir::new()?;
     let path = |name: &str| text(&folder.path().join(name));
     let good = small()?;
@@ -120,14 +123,14 @@ fn what_cannot_be_built_is_told_and_leaves_no_file() -> Result<()> {
         refused(&words, 1, told)
     };
     all([
-        refused(&["--board", "nucleo", "--out", &elf], 2, &["there is no board \"nucleo\"", "stm32f405"]),
+        refused(&["--board", "nucleo", "--out", &elf], 2, &["unknown board \"nucleo\"", "stm32f405"]),
         refused(&["--board", "stm32f405"], 2, &["--out is missing", "Usage: cargo xtask firmware"]),
-        refused(&["--board", "stm32f405", "--img", "a", "--out", &elf], 2, &["\"--img\" is no option", "Usage"]),
-        image("none", &elf, &["none: the image cannot be read"]),
-        image("damaged", &elf, &["damaged: refused", "actq quantize"]),
+        refused(&["--board", "stm32f405", "--img", "a", "--out", &elf], 2, &["unknown option \"--img\"", "Usage"]),
+        image("none", &elf, &["cannot read the image", "none"]),
+        image("damaged", &elf, &["damaged: not a valid image", "actq quantize"]),
         image("wide", &elf, &["wide: needs", "words of scratch memory", "stm32f405 has 12288"]),
         image("long", &elf, &["no room for", "long", "actq quantize --flash", "boards/src/stm32f405/memory.x"]),
-        image("good", &nowhere, &["there is no folder"]),
+        image("good", &nowhere, &["the folder", "does not exist"]),
         image("good", &text(folder.path()), &["is a folder"]),
         image("good", &itself, &["is the image itself"]),
         limited("good", "1:-1", &["--limits \"1:-1\"", "the lower limit exceeds the upper one"]),

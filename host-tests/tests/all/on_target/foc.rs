@@ -1,4 +1,4 @@
-//! The current loop of a motor on the Cortex-M4: the host's bits with and without an FPU, and what it costs with one.
+//! The current loop of a motor on the Cortex-M4: the host's bits with and without an FPU, and its cost with one.
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
@@ -11,7 +11,7 @@ use actq_firmware_bench::trigonometry::{CASES, Case, LEN, results};
 use actq_kernels::pace::cost::Cost;
 use anyhow::{Context as _, Result, ensure};
 
-/// What a firmware prints, and what its counted regions cost.
+/// The firmware's output, and the cost of its counted regions.
 fn counted(name: &str) -> Result<(String, Vec<Cost>)> {
     let (elf, counter) = (firmware::binary(name, Target::Fpu)?, Counter::build()?);
     let mut command = qemu::command(&elf, None, "")?;
@@ -29,27 +29,27 @@ fn without_fpu(name: &str) -> Result<String> {
     Ok(String::from_utf8(qemu::run(qemu::command_on(Target::NoFpu, &elf, None, "")?, &[])?.stdout)?)
 }
 
-/// The bits are those of `controller/tests/all/foc/motor.rs`.
+/// The expected bits are those of `controller/tests/all/foc/motor.rs`.
 #[test]
-fn a_tick_has_the_same_bits_and_stays_within_its_instructions() -> Result<()> {
+fn a_tick_keeps_its_bits_and_instruction_limit() -> Result<()> {
     let (text, mut costs) = counted("foc")?;
     assert_eq!(text, "fc3d4550\n");
     assert_eq!(without_fpu("foc")?, text);
     costs.sort_by_key(|cost| cost.instructions);
-    ensure!(costs.len() == 100, "{} ticks were counted", costs.len());
+    ensure!(costs.len() == 100, "counted {} ticks", costs.len());
     let (median, most) = (costs[50], costs[99]);
     println!("observer and current loop: {median:?} in the median, {most:?} at most");
     assert!((300..=600).contains(&median.instructions) && most.instructions <= 630, "{median:?}, {most:?}");
     Ok(())
 }
 
-/// What a current loop may be off by: degrees of an angle, the share of a current (a step of an ADC of 12 bits), the share
+/// Tolerances of a current loop: degrees of an angle, the share of a current (a step of an ADC of 12 bits), the share
 /// of a voltage's limit.
 const DEGREES: f64 = 0.25;
 const CURRENT: f64 = 1.0 / 4096.0;
 const VOLTAGE: f64 = 0.005;
 
-/// The worst error of a case as a share of what it may be.
+/// The worst error of a case as a share of its tolerance.
 fn worst(kind: &str, case: &Case) -> f64 {
     const STEPS: i32 = 200_000;
     let of = |x: f32, y: f32| (case.function)(x, y).map(f64::from);
@@ -75,19 +75,19 @@ fn worst(kind: &str, case: &Case) -> f64 {
     (0..STEPS).map(error).fold(0.0, f64::max)
 }
 
-/// What is chosen takes the fewest cycles of those that are exact enough.
+/// The chosen case takes the fewest cycles of those that are accurate enough.
 #[test]
-fn trigonometry_has_the_same_bits_and_the_cheapest_is_chosen() -> Result<()> {
+fn trigonometry_keeps_its_bits_and_the_cheapest_wins() -> Result<()> {
     let (text, costs) = counted("trigonometry")?;
     let of_host =
         |case: &Case| format!("{}: {:08x}\n", case.name, hash(&[results(case, &(case.inputs)()).as_flattened()]));
     assert_eq!(text, CASES.iter().map(of_host).collect::<String>());
     assert_eq!(without_fpu("trigonometry")?, text);
-    ensure!(costs.len() == CASES.len(), "{} cases were counted", costs.len());
+    ensure!(costs.len() == CASES.len(), "counted {} cases", costs.len());
     let mut good: BTreeMap<&str, Vec<(f64, &str)>> = BTreeMap::new();
     for (case, cost) in CASES.iter().zip(&costs).skip(1) {
         let each = |of: fn(&Cost) -> u64| (of(cost) as f64 - of(&costs[0]) as f64) / LEN as f64;
-        let (kind, by) = case.name.split_once(": ").context("a kind, and whose it is")?;
+        let (kind, by) = case.name.split_once(": ").context("a case's name is KIND: SOURCE")?;
         let (instructions, cycles, worst) = (each(|c| c.instructions), each(|c| c.cycles), worst(kind, case));
         println!(
             "{:27} {instructions:7.1} instructions {cycles:7.1} cycles, {worst:9.6} of the allowed error",

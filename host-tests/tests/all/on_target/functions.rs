@@ -1,4 +1,4 @@
-//! The functions on the Cortex-M4's FPU: the host's bits, and what they cost.
+//! The functions on the Cortex-M4's FPU: the host's bits, and their cost.
 
 use actq::budget::Budget;
 use actq::data::Recordings;
@@ -18,7 +18,7 @@ use actq_kernels::ops::noise::normal;
 use actq_kernels::ops::{cells, elementwise, norm};
 use anyhow::{Result, ensure};
 
-/// Instructions per element: 12 without a function, 30 for one, and what stands here.
+/// Instructions per element: 12 without a function, 30 for one, and these.
 fn limit(name: &str) -> u64 {
     match name {
         "add" | "mul" | "normalize" | "layernorm" | "rmsnorm" => 12,
@@ -32,8 +32,8 @@ fn limit(name: &str) -> u64 {
     }
 }
 
-/// Functions of an element: an LSTM cell has three gates by sigmoid and two hyperbolic tangents, a GRU cell two gates
-/// and one.
+/// Functions per element: an LSTM cell has three sigmoid gates and two hyperbolic tangents, a GRU cell two gates and
+/// one.
 fn functions(name: &str) -> u64 {
     match name {
         "lstm" => 5,
@@ -42,7 +42,7 @@ fn functions(name: &str) -> u64 {
     }
 }
 
-/// What `firmware-bench/src/bin/functions.rs` computes: names and hashes of the results, in its order.
+/// The output of `firmware-bench/src/bin/functions.rs`: names and hashes of the results, in its order.
 fn expected() -> Vec<(&'static str, u32)> {
     let mut all = Vec::new();
     let constants = values::<LEN>().map(f32::to_bits);
@@ -99,7 +99,7 @@ fn expected() -> Vec<(&'static str, u32)> {
 }
 
 #[test]
-fn every_function_has_the_same_bits_and_stays_within_its_instructions() -> Result<()> {
+fn every_function_keeps_its_bits_and_instruction_limit() -> Result<()> {
     let elf = firmware::binary("functions", Target::Fpu)?;
     let counter = Counter::build()?;
     let mut command = qemu::command(&elf, None, "")?;
@@ -124,7 +124,7 @@ fn every_function_has_the_same_bits_and_stays_within_its_instructions() -> Resul
 
 /// The gates of an LSTM are a small part of its head.
 #[test]
-fn a_head_with_an_lstm_stays_within_its_instructions() -> Result<()> {
+fn an_lstm_head_keeps_its_instruction_limit() -> Result<()> {
     let Some(policies) = shared_policies() else { return Ok(()) };
     let policy = Policy::load(&policies.join("g1_lstm256"))?;
     let options = Options::new(Method::Rtn, Budget::Width(Width::W3));
@@ -140,7 +140,7 @@ fn a_head_with_an_lstm_stays_within_its_instructions() -> Result<()> {
     counter.attach(&mut command, &elf)?;
     ensure!(qemu::run(command, &[])?.status.success(), "the firmware failed");
     let regions = counter.regions()?;
-    ensure!(!regions.is_empty(), "no step was counted");
+    ensure!(!regions.is_empty(), "counted no step");
     for count in regions.into_iter().map(|region| region.instructions) {
         println!("g1_lstm256 at 3 bits: {:.3} instructions per MAC", count as f64 / macs);
         assert!(count as f64 <= 1.30 * macs, "{count} instructions for {macs} MACs");

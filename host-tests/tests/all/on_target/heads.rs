@@ -14,7 +14,7 @@ use actq_kernels::Width;
 use anyhow::{Result, bail, ensure};
 
 const TOKEN: usize = 384;
-/// Largest error of a prediction.
+/// Largest relative error of a prediction.
 const ERROR: f64 = 0.03;
 
 fn near(what: &str, predicted: u64, counted: u64) -> Result<()> {
@@ -24,9 +24,9 @@ fn near(what: &str, predicted: u64, counted: u64) -> Result<()> {
     Ok(())
 }
 
-/// A chunk of Octo's head in 20 denoising steps and in 10: what both have in common runs once, the rest by the step.
+/// A chunk of Octo's head in 20 denoising steps and in 10: the common part runs once, the rest in each step.
 #[test]
-fn octos_head_takes_what_was_predicted_and_gives_the_hosts_bits() -> Result<()> {
+fn octos_head_matches_the_prediction_and_the_host() -> Result<()> {
     let (elf, counter) = (firmware::harness(Target::Fpu)?, Counter::build()?);
     let mut random = Random::new(3);
     let observation: Vec<f32> = (0..TOKEN).map(|_| random.normal()).collect();
@@ -41,22 +41,22 @@ fn octos_head_takes_what_was_predicted_and_gives_the_hosts_bits() -> Result<()> 
         let (costs, actions) = profile::regions(&elf, &counter, &bytes, "serve", std::slice::from_ref(&observation))?;
         let bits = |action: &[f32]| action.iter().map(|a| a.to_bits()).collect::<Vec<_>>();
         let expected = with_head::<_, anyhow::Error>(image, |head| Ok(bits(head.step(&observation)?)))?;
-        ensure!(bits(&actions[0]) == expected, "other bits in {steps} steps");
+        ensure!(bits(&actions[0]) == expected, "the bits differ in {steps} steps");
         let time = StepTime::new(&image, CLOCK);
         near(&format!("a chunk in {steps} steps"), time.instructions, costs[0].instructions)?;
         chunks.push([time.instructions, costs[0].instructions]);
     }
     let [whole, half] = chunks[..] else { bail!("{chunks:?}") };
-    // Noise is drawn before the first step, but as much of it as there are steps.
+    // Noise is drawn before the first step, in an amount that grows with the number of steps.
     let step = [0, 1].map(|i| (whole[i] - half[i]) / (octo::STEPS / 2) as u64);
     let once = [0, 1].map(|i| 2 * half[i] - whole[i]);
     near("a denoising step and its noise", step[0], step[1])?;
     near("what runs once", once[0], once[1])
 }
 
-/// All rows of a chunk share the matrices, which stand in the image once; norms and biases stand there for each row.
+/// All rows of a chunk share the matrices, which are in the image once; norms and biases are repeated for each row.
 #[test]
-fn ofts_head_has_its_matrices_once() -> Result<()> {
+fn ofts_head_stores_its_matrices_once() -> Result<()> {
     const HIDDEN: usize = 64;
     let policy = oft::head(HIDDEN)?.policy()?;
     ensure!(policy.weights == oft::weights(HIDDEN), "{} weights", policy.weights);

@@ -1,5 +1,5 @@
-//! `actq link` at the application in QEMU, through the socket of its serial port: what no other test types, and what it
-//! says where something is wrong with the line.
+//! `actq link` with the application in QEMU, through the socket of its serial port: the commands that no other test
+//! runs, and their messages about a faulty line.
 
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::net::TcpListener;
@@ -23,7 +23,7 @@ use tempfile::NamedTempFile;
 
 use super::application::{file, self_test, small_with_limits};
 
-/// With a small image in the slot, and as fast as the host: a byte takes it 40 µs.
+/// Starts the application with a small image in the slot, as fast as the host: a byte takes 40 µs.
 fn start() -> Result<(Controller, NamedTempFile)> {
     let slot = file(&small_with_limits()?)?;
     let elf = firmware::controller(Target::Fpu, "")?;
@@ -32,13 +32,13 @@ fn start() -> Result<(Controller, NamedTempFile)> {
 
 fn link(controller: &Controller, words: &[&str], input: &[u8]) -> Result<Output> {
     let port = controller.address().to_string();
-    let [command, more @ ..] = words else { anyhow::bail!("a command has a name") };
+    let [command, more @ ..] = words else { anyhow::bail!("the command line is empty") };
     run(actq(&[&["link", command, &port], more].concat()), input)
 }
 
 /// The first observation of the image's self-test, and the bits of its action.
 fn observation(slot: &NamedTempFile) -> Result<(Vec<f32>, Vec<u32>)> {
-    self_test(&ImageBuffer::read(slot.path())?.image(slot.path())?, 0).context("it has a self-test")
+    self_test(&ImageBuffer::read(slot.path())?.image(slot.path())?, 0).context("the image has no self-test")
 }
 
 #[test]
@@ -46,7 +46,7 @@ fn arm_and_disarm_change_the_state() -> Result<()> {
     let (controller, slot) = start()?;
     let (observation, _) = observation(&slot)?;
     failed(&link(&controller, &["arm"], b"")?, 1, &["not armed", "send observations before arming"])?;
-    // An observation is fresh for half a second, in which the command has to start.
+    // An observation is fresh for half a second, in which the command must start.
     let begun = Instant::now();
     loop {
         act(&mut controller.client()?, &observation)?;
@@ -55,9 +55,9 @@ fn arm_and_disarm_change_the_state() -> Result<()> {
             break;
         }
         failed(&output, 1, &["not armed", "send observations before arming"])?;
-        ensure!(begun.elapsed() < HANG, "never within the deadline");
+        ensure!(begun.elapsed() < HANG, "the command never ran within the deadline");
     }
-    // Latched, where the deadline has passed since.
+    // Latched if the deadline has passed since.
     assert_ne!(controller.client()?.status()?.state, State::Disarmed);
     failed(&link(&controller, &["set", "deadline", "100"], b"")?, 1, &["deadline", "not set to 100"])?;
     succeeded(&link(&controller, &["disarm"], b"")?)?;
@@ -70,14 +70,14 @@ fn arm_and_disarm_change_the_state() -> Result<()> {
 }
 
 #[test]
-fn serve_answers_a_simulator_and_disarms_behind_it() -> Result<()> {
+fn serve_answers_a_simulator_then_disarms() -> Result<()> {
     let (controller, slot) = start()?;
     let (observation, bits) = observation(&slot)?;
     let input = [&[RESET][..], &step_request(&observation), &[RESET], &step_request(&observation)].concat();
     let output = link(&controller, &["serve"], &input)?;
     let told: Vec<u32> = answered(&output)?.as_chunks().0.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect();
     assert_eq!(told, [&bits[..], &bits].concat());
-    // Armed, the answers are what the outputs are led to: within the limits, the same.
+    // While armed, the answers are the targets of the outputs: within the limits, the same values.
     let begun = Instant::now();
     loop {
         let output = link(&controller, &["serve", "--arm"], &step_request(&observation))?;
@@ -85,18 +85,19 @@ fn serve_answers_a_simulator_and_disarms_behind_it() -> Result<()> {
             assert_eq!(output.stdout, bits.iter().flat_map(|bits| bits.to_le_bytes()).collect::<Vec<_>>());
             break;
         }
-        // On a machine that is so busy that half a second has passed in between.
+        // On a machine so busy that half a second has passed in between.
         failed(&output, 1, &["within the deadline"])?;
-        ensure!(begun.elapsed() < HANG, "never within the deadline");
+        ensure!(begun.elapsed() < HANG, "the command never ran within the deadline");
     }
     assert_eq!(controller.client()?.status()?.state, State::Disarmed);
     failed(&link(&controller, &["serve"], b"x")?, 1, &["unknown command byte 0x78"])?;
     failed(&link(&controller, &["serve"], &step_request(&observation)[..9])?, 1, &["ended inside an observation"])
 }
 
-/// It asks until QEMU's socket and the port's queue are full, and is silent for longer than the watchdog waits.
+/// It sends requests until QEMU's socket and the port's queue are full, and is silent for longer than the watchdog
+/// timeout.
 #[test]
-fn a_host_that_does_not_read_causes_no_reset() -> Result<()> {
+fn a_host_that_never_reads_causes_no_reset() -> Result<()> {
     let (controller, _slot) = start()?;
     let mut host = controller.address().open()?;
     let (mut sender, mut buffer) = (Sender::new(0), [0; 64]);
@@ -105,10 +106,10 @@ fn a_host_that_does_not_read_causes_no_reset() -> Result<()> {
     }
     let watchdog = Duration::from_millis(TIMEOUTS.turn.into());
     thread::sleep(4 * watchdog);
-    // The answers that were dropped are missing before the first one after them.
+    // The dropped answers are missing before the first one after them.
     let (mut answers, mut told, begun) = (Receiver::<{ frame::bytes(64) }>::new(), None, Instant::now());
     while answers.counters().lost == 0 {
-        ensure!(begun.elapsed() < HANG, "no answer is missing: {told:?}");
+        ensure!(begun.elapsed() < HANG, "expected missing answers: {told:?}");
         match host.read(&mut buffer) {
             Ok(count) => buffer[..count].iter().for_each(|byte| {
                 if let Some(Message::Status(status)) = answers.push(*byte).map(|received| received.message) {
@@ -120,13 +121,13 @@ fn a_host_that_does_not_read_causes_no_reset() -> Result<()> {
     }
     let Counters { damaged, malformed, repeated, .. } = answers.counters();
     assert_eq!([damaged, malformed, repeated], [0; 3]);
-    assert_eq!(told.context("a status comes")?.reset, ResetCause::Unknown);
+    assert_eq!(told.context("no status came")?.reset, ResetCause::Unknown);
     Ok(())
 }
 
-/// The board goes while a simulator is served: the command says so, once its patience is over.
+/// The board goes away while it serves a simulator: the command reports it after its timeout.
 #[test]
-fn a_line_that_is_cut_is_told() -> Result<()> {
+fn a_cut_line_is_reported() -> Result<()> {
     let (controller, slot) = start()?;
     let (observation, bits) = observation(&slot)?;
     let port = controller.address().to_string();
@@ -135,10 +136,10 @@ fn a_line_that_is_cut_is_told() -> Result<()> {
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()?;
-    let mut stdin = child.stdin.take().context("no standard input")?;
+    let mut stdin = child.stdin.take().context("the command has no standard input")?;
     let mut answer = vec![0; 4 * bits.len()];
     stdin.write_all(&step_request(&observation))?;
-    child.stdout.as_mut().context("no standard output")?.read_exact(&mut answer)?;
+    child.stdout.as_mut().context("the command has no standard output")?.read_exact(&mut answer)?;
     assert_eq!(answer, bits.iter().flat_map(|bits| bits.to_le_bytes()).collect::<Vec<_>>());
     drop(controller);
     // Until then a step has no action.
@@ -149,9 +150,9 @@ fn a_line_that_is_cut_is_told() -> Result<()> {
     failed(&output, 1, &[&port, "lost", "not reopened within 3"])
 }
 
-/// Two at a time: QEMU's port, as a socket that takes one connection, leaves the second without an answer.
+/// Two connections: QEMU's port, a socket that accepts one, leaves the second without an answer.
 #[test]
-fn a_port_that_another_program_has_is_told() -> Result<()> {
+fn a_port_in_use_is_reported() -> Result<()> {
     let (controller, _slot) = start()?;
     let mut first = controller.client()?;
     first.status()?;
@@ -165,9 +166,9 @@ fn a_port_that_another_program_has_is_told() -> Result<()> {
     Ok(())
 }
 
-/// What answers is no controller, or one at another speed.
+/// The other end is no controller, or runs at another speed.
 #[test]
-fn an_answer_that_is_not_the_links_is_told() -> Result<()> {
+fn a_foreign_answer_is_reported() -> Result<()> {
     loop {
         let (port, output) = watch_what_chatters()?;
         // On a busy machine the command may give up before the thread has written anything.
@@ -177,19 +178,19 @@ fn an_answer_that_is_not_the_links_is_told() -> Result<()> {
     }
 }
 
-/// The port of something that writes what no controller does, and what `actq link watch` says of it.
+/// Opens a port at which a thread writes foreign bytes, and returns the message of `actq link watch`.
 fn watch_what_chatters() -> Result<(String, Output)> {
     let listener = TcpListener::bind("127.0.0.1:0")?;
     let port = format!("tcp:{}", listener.local_addr()?);
     let chatter = thread::spawn(move || -> Result<()> {
         let (mut stream, _) = listener.accept()?;
-        // Until the command hangs up.
+        // Until the command closes the connection.
         while stream.write_all(b"login: \0").is_ok() {
             thread::sleep(std::time::Duration::from_millis(10));
         }
         Ok(())
     });
     let output = run(actq(&["link", "watch", &port, "--once", "--patience", "0.5"]), b"")?;
-    chatter.join().map_err(|_| anyhow::anyhow!("it has panicked"))??;
+    chatter.join().map_err(|_| anyhow::anyhow!("the writing thread panicked"))??;
     Ok((port, output))
 }

@@ -1,4 +1,4 @@
-//! What the linker was given: each board's firmware is in the memory of the script that the table of boards names.
+//! The linker's input: each board's firmware is in the memory of the script that the table of boards names.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -23,7 +23,7 @@ fn regions(script: &str) -> Result<BTreeMap<String, Range<u64>>> {
             };
         Some((name.trim().to_owned(), origin..origin + length))
     };
-    regions.map(|line| region(line).with_context(|| format!("a region of another form: {line:?}"))).collect()
+    regions.map(|line| region(line).with_context(|| format!("cannot parse the region {line:?}"))).collect()
 }
 
 #[test]
@@ -46,6 +46,6 @@ fn every_board_is_linked_with_its_own_memory() -> Result<()> {
     let mut memories: Vec<_> = scripts.values().collect();
     memories.sort();
     memories.dedup();
-    assert_eq!(memories.len(), scripts.len(), "two scripts cannot be told apart: {scripts:?}");
+    assert_eq!(memories.len(), scripts.len(), "two scripts have the same memory: {scripts:?}");
     Ok(())
 }

@@ -1,7 +1,7 @@
-//! What the application logs at its start, by defmt over semihosting in QEMU.
+//! The application's log at its start, by defmt over semihosting in QEMU.
 //!
-//! The frames are decoded here by the crates below defmt-decoder, whose own tree takes longer to build than all of
-//! these tests may.
+//! This module decodes the frames with the crates below defmt-decoder, whose own dependencies take longer to build than
+//! all of these tests may.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -22,7 +22,7 @@ use object::{Object as _, ObjectSection as _, ObjectSymbol as _};
 fn formats(elf: &Path) -> Result<BTreeMap<u16, String>> {
     let data = fs::read(elf)?;
     let file = object::File::parse(&*data)?;
-    let section = file.section_by_name(".defmt").context("the ELF file has no logs")?.index();
+    let section = file.section_by_name(".defmt").context("the ELF file has no section .defmt")?.index();
     let names = file.symbols().filter(|symbol| symbol.section_index() == Some(section));
     let interned = names.filter_map(|symbol| {
         let json: serde_json::Value = serde_json::from_str(symbol.name().ok()?).ok()?;
@@ -34,8 +34,8 @@ fn formats(elf: &Path) -> Result<BTreeMap<u16, String>> {
 /// The text of a frame: the index of its format string, then the arguments, all little-endian.
 fn text(formats: &BTreeMap<u16, String>, frame: &[u8]) -> Result<String> {
     let frame = rzcobs::decode(frame).map_err(|error| anyhow!("{error:?}: {frame:02x?}"))?;
-    let (index, mut arguments) = frame.split_first_chunk().context("a frame has an index")?;
-    let format = formats.get(&u16::from_le_bytes(*index)).context("a frame's format string is in the ELF file")?;
+    let (index, mut arguments) = frame.split_first_chunk().context("the frame has no index")?;
+    let format = formats.get(&u16::from_le_bytes(*index)).context("the ELF file lacks the frame's format string")?;
     let mut text = String::new();
     for fragment in defmt_parser::parse(format, ParserMode::Strict)? {
         match fragment {
@@ -46,7 +46,7 @@ fn text(formats: &BTreeMap<u16, String>, frame: &[u8]) -> Result<String> {
                     Type::U32 => 4,
                     other => bail!("{other:?} in {format:?}"),
                 };
-                let (argument, rest) = arguments.split_at_checked(len).context("a frame has its arguments")?;
+                let (argument, rest) = arguments.split_at_checked(len).context("the frame lacks an argument")?;
                 let value = argument.iter().rev().fold(0, |value, byte| value << 8 | u64::from(*byte));
                 text += &match parameter.hint {
                     None => value.to_string(),
@@ -62,12 +62,12 @@ fn text(formats: &BTreeMap<u16, String>, frame: &[u8]) -> Result<String> {
     Ok(text)
 }
 
-/// A program that is ended with the value.
+/// A program that dropping the value ends.
 struct Running(Child);
 
 impl Drop for Running {
     fn drop(&mut self) {
-        // Where it has ended already, there is nothing to end.
+        // Nothing to do if it has ended already.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
@@ -79,8 +79,8 @@ fn the_start_is_logged() -> Result<()> {
     let formats = formats(&elf)?;
     let mut command = Target::Fpu.run(&elf);
     let mut running = Running(command.stdin(Stdio::null()).stdout(Stdio::piped()).spawn()?);
-    let stream = running.0.stdout.take().context("it has an output")?;
-    // Zeros stand between frames, one or more.
+    let stream = running.0.stdout.take().context("the program has no output")?;
+    // One or more zeros separate frames.
     let frames = BufReader::new(stream).split(0);
     let mut frames = frames.filter(|frame| !frame.as_ref().is_ok_and(Vec::is_empty));
     let crc = ImageBuffer::read(built_in()?)?.image(built_in()?)?.crc();

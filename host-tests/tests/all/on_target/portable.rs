@@ -1,4 +1,4 @@
-//! What the portable kernels cost where they run alone.
+//! The cost of the portable kernels on targets without the assembler.
 
 use actq_bench::qemu::{self, Counter, Region};
 use actq_bench::{Target, firmware, golden};
@@ -32,18 +32,18 @@ fn stay_within(target: Target, limit: f64) -> Result<()> {
 }
 
 #[test]
-fn without_assembler_a_mac_takes_few_instructions() -> Result<()> {
+fn portable_macs_take_few_instructions() -> Result<()> {
     stay_within(Target::Fpu, 3.5)
 }
 
 /// Without the DSP extension, a product takes more instructions, and the conversions from and to f32 are in software.
 #[test]
-fn without_dsp_and_fpu_a_mac_takes_few_instructions() -> Result<()> {
+fn macs_without_dsp_and_fpu_take_few_instructions() -> Result<()> {
     stay_within(Target::NoDsp, 6.5)
 }
 
 /// RV32IMAC has no instruction that multiplies and adds, and none that extracts bits: a weight takes two of both.
 #[test]
-fn on_riscv_a_mac_takes_few_instructions() -> Result<()> {
+fn macs_on_riscv_take_few_instructions() -> Result<()> {
     stay_within(Target::Riscv, 9.0)
 }

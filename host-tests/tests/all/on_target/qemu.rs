@@ -17,7 +17,7 @@ use actq_kernels::Width;
 use actq_kernels::image::{checksum, header as h, op, worst_case};
 use anyhow::{Context, Result, ensure};
 
-/// Steps that each image runs on the host and in QEMU.
+/// Steps of each image on the host and in QEMU.
 const STEPS: usize = 208;
 
 pub(crate) fn rtn(policy: &Policy, width: Width, group: usize, activations: Activations) -> Result<Vec<u8>> {
@@ -30,7 +30,7 @@ fn kernels_give_the_golden_sums_on_the_target() -> Result<()> {
     Target::ALL.into_iter().filter(|target| target.has_assembler()).try_for_each(kernels_give_the_golden_sums)
 }
 
-/// The kernels in assembler give the sums of the host on a target that has them.
+/// Requires that the kernels in assembler give the host's sums on a target that has them.
 pub(crate) fn kernels_give_the_golden_sums(target: Target) -> Result<()> {
     let cases = golden::cases(1);
     let elf = firmware::binary("golden", target)?;
@@ -42,9 +42,9 @@ pub(crate) fn kernels_give_the_golden_sums(target: Target) -> Result<()> {
 }
 
 #[test]
-fn portable_kernels_give_the_golden_sums_on_the_targets_without_assembler() -> Result<()> {
+fn portable_kernels_give_the_golden_sums_without_assembler() -> Result<()> {
     let cases = golden::cases(1);
-    // What fits the memory of the small one.
+    // The cases that fit the memory of the small target.
     let fits = |c: &&golden::Case| c.shape.cols <= 256 && c.words().len() + c.prepared().len() < 1500;
     let short: Vec<_> = cases.iter().filter(fits).cloned().collect();
     ensure!(short.len() > cases.len() / 2, "too few cases are short");
@@ -62,7 +62,7 @@ fn portable_kernels_give_the_golden_sums_on_the_targets_without_assembler() -> R
 fn a_wrong_sum_fails_the_golden_run() -> Result<()> {
     let mut stream = golden::stream(&golden::cases(1)[..3]);
     let last_sum = stream.len() - 8;
-    // The last case may end in padding rows, whose sums are not compared: all four of its last quad's are changed.
+    // The last case may end in padding rows, whose sums are not compared: change all four of its last quad.
     stream[last_sum - 12..last_sum + 4].iter_mut().for_each(|byte| *byte ^= 1);
     for target in [Target::Fpu, Target::Riscv] {
         let output = qemu::run(qemu::command_on(target, &firmware::binary("golden", target)?, None, "")?, &stream)?;
@@ -91,20 +91,19 @@ fn the_built_in_image_replays_its_self_test() -> Result<()> {
     Ok(())
 }
 
-/// The proof takes the weights apart by the kernels of the machine that it runs on.
+/// The proof reads the weights with the kernels of its own machine.
 #[test]
-fn the_target_allows_int32_to_the_last_product_as_the_host_does() -> Result<()> {
+fn target_and_host_allow_the_same_int32_sums() -> Result<()> {
     for group in [32, 128] {
         let mut bytes = rtn(&Policy::load(&ur3())?, Width::W8, group, Activations::Int16)?;
         let buffer = ImageBuffer::new(&bytes);
         let image = buffer.image(Path::new("ur3"))?;
         let matrices: Vec<_> = image.ops().filter_map(|op| op.matrix()).collect();
-        // Of the matrix with the most columns the shape alone does not prove it; which operation has it, the records
-        // say.
-        let widest = (0..matrices.len()).max_by_key(|i| matrices[*i].cols).context("there is a matrix")?;
+        // The shape alone does not prove the matrix with the most columns; the records tell which operation has it.
+        let widest = (0..matrices.len()).max_by_key(|i| matrices[*i].cols).context("the image has no matrix")?;
         let blocks = matrices[widest].blocks().map(|rows| worst_case(&rows.block, 1));
-        let largest = i64::from(i32::MAX) / blocks.max().context("there is a block")?;
-        ensure!(largest < i64::from(i16::MAX), "scales of {group}: all of int16 is allowed");
+        let largest = i64::from(i32::MAX) / blocks.max().context("the matrix has no block")?;
+        ensure!(largest < i64::from(i16::MAX), "scales of {group}: the limit exceeds int16");
         let words: &[u32] = bytemuck::cast_slice(buffer.bytes());
         let records = words[h::W_OPS] as usize..;
         let mut linear = words[records].chunks(h::OP_WORDS).filter(|record| record[0] as u8 == op::LINEAR);
@@ -118,8 +117,7 @@ fn the_target_allows_int32_to_the_last_product_as_the_host_does() -> Result<()> 
             fs::write(slot.path(), &bytes)?;
             let elf = firmware::harness(Target::Fpu)?;
             let output = qemu::run(qemu::command(&elf, Some(slot.path()), "")?, &[])?;
-            // What is allowed comes to its self-test, which may fail, where its actions were computed with another
-            // x_max.
+            // An accepted image reaches its self-test, which may fail, because another x_max computed its actions.
             let text = String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned();
             let expected = if refused { "can overflow its int32" } else { "self-test" };
             assert!(text.contains(expected), "scales of {group}, target: {text}");
@@ -182,6 +180,7 @@ pub(crate) fn same_bits(target: Target, bytes: &[u8], dataset: &Dataset) -> Resu
 
 /// All widths with int8 and int16 activations; the build without FPU, which is slower, and the other cores run one
 /// image of each.
+/// image of each.
 fn policy_has_the_same_bits(dir: &Path) -> Result<()> {
     let policy = Policy::load(dir)?;
     let dataset = Recording::Heldout.require(Some(dir), None, Sizes::of(&policy), "this test")?;
@@ -214,10 +213,10 @@ fn shared_policies_have_the_same_bits() -> Result<()> {
     Ok(())
 }
 
-/// Whatever an image or an observation holds, there is nothing in the runtime that panics, nor the text of a panic:
-/// also with the profile of an application that has not set one for the kernels.
+/// For any image and any observation, the runtime contains no panic and no panic message, even with the profile of an
+/// application that has not set one for the kernels.
 #[test]
-fn no_panic_is_in_the_runtime() -> Result<()> {
+fn the_runtime_has_no_panic() -> Result<()> {
     for profile in ["firmware", "firmware-portable"] {
         for binary in ["runtime", "runtime-poll"] {
             let code = Code::read(&firmware::binary_in(profile, binary, Target::Fpu)?)?;

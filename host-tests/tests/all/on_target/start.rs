@@ -1,4 +1,4 @@
-//! The watchdog outlasts each piece of what holds the application up, at its slowest clock, with signatures.
+//! The watchdog timeout exceeds each piece that blocks the application, at its slowest clock, with signatures.
 
 use std::fs;
 use std::path::Path;
@@ -23,11 +23,11 @@ use anyhow::{Context as _, Result, ensure};
 
 use super::application::file;
 
-/// An STM32F405 whose crystal is dead: kHz, and the wait states of its flash where the crystal has died late.
+/// An STM32F405 with a dead crystal: kHz, and the wait states of its flash if the crystal has died late.
 const SLOWEST: u64 = 16_000;
 const WAIT_STATES: u64 = 5;
 
-/// The program of the pieces of a start and of a check, and what each piece of an image's took, by its name.
+/// The program of the pieces of a start and of a check, and the cost of each piece of an image, by its name.
 fn pieces(image: &Path) -> Result<(Code, Vec<(String, Region)>)> {
     let (elf, counter) = (firmware::binary("start", Target::Fpu)?, Counter::build()?);
     let (code, bytes) = (Code::read(&elf)?, fs::read(image)?);
@@ -43,21 +43,21 @@ fn pieces(image: &Path) -> Result<(Code, Vec<(String, Region)>)> {
     Ok((code, names.lines().map(str::to_owned).zip(regions).collect()))
 }
 
-/// The oscillator of its watchdog may be faster than it says, as `boards/src/stm32f405/watchdog_time.rs` has it.
+/// The oscillator of its watchdog may be faster than its nominal rate, see `boards/src/stm32f405/watchdog_time.rs`.
 #[test]
-fn the_watchdog_waits_for_each_piece_of_a_start_and_of_a_check() -> Result<()> {
+fn the_watchdog_outlasts_start_and_check() -> Result<()> {
     let (code, regions) = pieces(built_in()?)?;
     for piece in ["key", "turn", "long", "start", "image", "slice"] {
         let of_piece = regions.iter().filter(|(name, _)| name == piece).map(|(_, region)| region);
-        let longest = of_piece.max_by_key(|region| region.instructions).context("it has run")?;
+        let longest = of_piece.max_by_key(|region| region.instructions).context("the piece did not run")?;
         let (instructions, cycles) = (longest.instructions, code.cycles(longest, WAIT_STATES)?);
         let (took, waits) = (cycles / SLOWEST, if piece == "turn" { TIMEOUTS.turn } else { TIMEOUTS.long });
         println!("{piece:6} {instructions:9} instructions {cycles:9} cycles {took:5} ms");
         assert!(took < watchdog_time::milliseconds(waits).into(), "{piece}: {took} ms");
-        // Where a signature is checked, by the update and by the start, it takes most.
+        // A signature check, in the update and at the start, takes the most.
         assert!(!["long", "start"].contains(&piece) || instructions > 2_000_000, "{piece}: {instructions}");
         if piece == "slice" {
-            // However long a self-test is, this is between two times that the watchdog is fed; and the longest that an
+            // This is the time between two feeds of the watchdog for any length of a self-test; the longest that an
             // image may need, at the cycles of these instructions, is within a turn of the loop, too.
             assert!((SLICE / 2..=SLICE).contains(&(instructions as u32)), "{instructions}");
             let most = u64::from(MAX_PIECE) * cycles / instructions / SLOWEST;
@@ -67,7 +67,7 @@ fn the_watchdog_waits_for_each_piece_of_a_start_and_of_a_check() -> Result<()> {
     Ok(())
 }
 
-/// Counts how often it is fed.
+/// Counts the feeds of the watchdog.
 struct Feeds(usize);
 
 impl Watchdog for Feeds {
@@ -80,10 +80,10 @@ impl Watchdog for Feeds {
     }
 }
 
-/// An image of one product with a wide row, which is the longest piece: it runs up to the rule's length, in pieces, and
-/// not beyond.
+/// An image of one product with a wide row, which is the longest piece: it runs in pieces up to the rule's length, and
+/// not beyond it.
 #[test]
-fn an_image_whose_longest_piece_is_too_long_does_not_run() -> Result<()> {
+fn images_with_too_long_pieces_are_refused() -> Result<()> {
     for (cols, outcome) in [(2_000, Ok(())), (24_000, Err(Refusal::Unfit))] {
         let mut builder = Builder::new(cols);
         builder.linear((8, cols), Activations::Int16, |_| Some(Width::W8), 0, false)?;
@@ -94,16 +94,16 @@ fn an_image_whose_longest_piece_is_too_long_does_not_run() -> Result<()> {
         let lengths = [made.obs_len(), made.act_len()];
         let opened = image::open(buffer.bytes(), &mut scratch, lengths, &mut feeds).map(drop);
         assert_eq!((opened, made.least_budget() > LONGEST), (outcome, outcome.is_err()), "{}", made.least_budget());
-        // Before the check; and before a slice, where it comes to that.
+        // Before the check; and before a slice that would reach it.
         assert!(if outcome.is_ok() { feeds.0 > made.self_test_steps() } else { feeds.0 == 1 }, "{}", feeds.0);
     }
     Ok(())
 }
 
-/// Otherwise 500 operations could make the check of a small image last for seconds.
+/// Otherwise 500 operations could make the check of a small image take seconds.
 #[test]
-fn a_matrix_is_checked_once_however_many_share_it() -> Result<()> {
-    // Groups at 8 bits, and so many columns that the bound from the shape does not do: every weight is read.
+fn a_shared_matrix_is_checked_once() -> Result<()> {
+    // Groups at 8 bits, and so many columns that the bound from the shape does not suffice: every weight is read.
     const ROWS: usize = 32;
     const COLS: usize = 768;
     const PAIRS: usize = 12;
@@ -121,7 +121,7 @@ fn a_matrix_is_checked_once_however_many_share_it() -> Result<()> {
         let (policy, outcomes) = builder.finish("shared".to_owned(), false);
         let image = file(&actq::emit::image(&policy, &outcomes)?)?;
         let (_, regions) = pieces(image.path())?;
-        let (_, region) = regions.iter().find(|(name, _)| name == "image").context("the image is checked")?;
+        let (_, region) = regions.iter().find(|(name, _)| name == "image").context("the image was not checked")?;
         Ok(region.instructions)
     };
     let (one, many) = (check(1)?, check(PAIRS)?);

@@ -1,4 +1,4 @@
-//! The head in one's own firmware, in each style of `firmware-styles`, under QEMU.
+//! The head in user firmware, in each style of `firmware-styles`, under QEMU.
 
 use std::fs;
 use std::process::Stdio;
@@ -11,12 +11,12 @@ use actq_bench::firmware::{self, STYLE_NAMES, built_in};
 use actq_bench::{qemu, root};
 use anyhow::{Context, Result, ensure};
 
-/// The first action that the motors get has the host's bits, and control ticks have come while the head ran: a step of
-/// 377 thousand instructions, of which one takes QEMU 32 ns here, and a tick each millisecond.
+/// The motors' first action has the host's bits, and control ticks have come while the head ran: a step of 377 thousand
+/// instructions, of 32 ns each in QEMU here, and a tick each millisecond.
 #[test]
-fn every_style_acts_with_the_bits_of_the_host_below_its_tick() -> Result<()> {
+fn every_style_matches_the_host_below_its_tick() -> Result<()> {
     let buffer = ImageBuffer::read(built_in()?)?;
-    let (_, expected) = buffer.image(built_in()?)?.self_test(0).context("it has a self-test")?;
+    let (_, expected) = buffer.image(built_in()?)?.self_test(0).context("the image has no self-test")?;
     let expected: Vec<String> = expected.iter().map(|word| format!("{:08x}", u32::from_le(*word))).collect();
     for name in STYLE_NAMES {
         let mut command = qemu::command(&firmware::style(name)?, None, "")?;
@@ -24,7 +24,7 @@ fn every_style_acts_with_the_bits_of_the_host_below_its_tick() -> Result<()> {
         let output = qemu::run(command, &[])?;
         let text = String::from_utf8_lossy(&output.stdout);
         ensure!(output.status.success(), "{name}: {text} {}", String::from_utf8_lossy(&output.stderr));
-        let (ticks, action) = text.split_once(' ').context("there is no action")?;
+        let (ticks, action) = text.split_once(' ').context("the output has no action")?;
         assert_eq!(action, expected.join(" "), "{name}");
         assert!((10..20).contains(&ticks.parse::<u32>()?), "{name}: {ticks} ticks in a step");
     }
@@ -33,7 +33,7 @@ fn every_style_acts_with_the_bits_of_the_host_below_its_tick() -> Result<()> {
 
 /// Lines that are neither empty nor a comment.
 #[test]
-fn every_style_has_at_most_sixty_lines_of_code() -> Result<()> {
+fn every_style_has_at_most_sixty_lines() -> Result<()> {
     for name in STYLE_NAMES {
         let source = fs::read_to_string(root().join(format!("firmware-styles/src/bin/{name}.rs")))?;
         let lines = source.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with("//")).count();
@@ -42,9 +42,9 @@ fn every_style_has_at_most_sixty_lines_of_code() -> Result<()> {
     Ok(())
 }
 
-/// Where nobody reads what QEMU writes, the firmware notices, and the run ends.
+/// If nobody reads QEMU's output, the firmware notices, and the run ends.
 #[test]
-fn an_output_that_is_closed_ends_the_run() -> Result<()> {
+fn a_closed_output_ends_the_run() -> Result<()> {
     let mut command = qemu::command(&firmware::style("bare")?, None, "")?;
     let mut child = command.stdin(Stdio::null()).stdout(Stdio::piped()).spawn()?;
     drop(child.stdout.take());

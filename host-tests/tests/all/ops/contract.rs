@@ -1,4 +1,4 @@
-//! The action contract, against its meaning in f64: every part alone, all of them, and chunks.
+//! The action contract, against its meaning in f64: every part on its own, all of them, and chunks.
 
 use actq::policy::Policy;
 use anyhow::{Context, Result, ensure};
@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::reference::{Case, wide};
 use super::{bound, deviation, on_head, recurrent, rtn};
 
-/// What the contract makes of raw output `y` (policy.json's `action`, or its default), and which limits it met.
+/// Applies the contract (policy.json's `action`, or its default) to raw output `y`, and returns the limits that acted.
 fn contract(action: &Value, raw: &[f64], last: Option<&[f64]>, met: &mut [usize; 3]) -> Vec<f64> {
     // The format's constants are f32.
     let at = |name: &str, i: usize| action[name][i].as_f64().map(|v| f64::from(v as f32));
@@ -21,7 +21,7 @@ fn contract(action: &Value, raw: &[f64], last: Option<&[f64]>, met: &mut [usize;
             let wide = |name: &str| action[name][i].as_f64();
             let y = match (wide("mean"), wide("std"), wide("q01"), wide("q99")) {
                 (Some(mean), Some(std), _, _) => y * std + mean,
-                // As RLDS and OpenVLA have it.
+                // As in RLDS and OpenVLA.
                 (_, _, Some(q01), Some(q99)) => 0.5 * (y + 1.0) * (q99 - q01 + 1e-8) + q01,
                 _ => y,
             };
@@ -36,7 +36,7 @@ fn contract(action: &Value, raw: &[f64], last: Option<&[f64]>, met: &mut [usize;
         .collect()
 }
 
-/// Plays the policy through its contract, `execute` actions of each chunk, and gives how often low, high and max_step
+/// Plays the policy through its contract, `execute` actions of each chunk, and counts how often low, high and max_step
 /// acted.
 fn check_actions(mut json: Value, action: &Value) -> Result<[usize; 3]> {
     let act = 2;
@@ -80,7 +80,7 @@ fn check_actions(mut json: Value, action: &Value) -> Result<[usize; 3]> {
         deviation(&case.observations(), run, expected)
     })?;
     let limit = bound(&outcomes);
-    ensure!(off < limit, "actions are off by {off:.2e}, {limit:.2e} are allowed");
+    ensure!(off < limit, "the error of the actions is {off:.2e}, limit {limit:.2e}");
     Ok(met)
 }
 
@@ -91,7 +91,7 @@ fn chunks_go_through_the_whole_contract() -> Result<()> {
     });
     // 3 executed of 4; the reset (step 25) falls inside a chunk.
     let met = check_actions(json!({"kind": "chunk", "chunk": 4, "execute": 3, "action": action}), &action)?;
-    ensure!(met.iter().all(|&n| n > 2), "limits that were not tried: {met:?}");
+    ensure!(met.iter().all(|&n| n > 2), "some limits did not act: {met:?}");
     Ok(())
 }
 
@@ -109,7 +109,7 @@ fn outputs_are_unnormalised_by_moments_or_quantiles() -> Result<()> {
 }
 
 #[test]
-fn each_part_of_the_contract_may_stand_alone() -> Result<()> {
+fn each_part_of_the_contract_works_alone() -> Result<()> {
     for (name, values) in [
         ("scale", [0.5, -3.0]),
         ("offset", [1.0, -2.0]),
@@ -126,11 +126,11 @@ fn each_part_of_the_contract_may_stand_alone() -> Result<()> {
 }
 
 #[test]
-fn without_a_contract_chunks_are_limited_to_one_and_steps_are_not() -> Result<()> {
+fn the_default_contract_limits_only_chunks() -> Result<()> {
     let one = json!({"low": [-1, -1], "high": [1, 1]});
     // Long chunks, so that enough of their values are beyond 1.
     let met = check_actions(json!({"kind": "chunk", "chunk": 20}), &one)?;
-    ensure!(met[0] + met[1] > 2, "the limits were not tried: {met:?}");
+    ensure!(met[0] + met[1] > 2, "the limits did not act: {met:?}");
     check_actions(json!({"kind": "step"}), &Value::Null)?;
     Ok(())
 }

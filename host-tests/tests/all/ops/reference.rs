@@ -1,4 +1,4 @@
-//! policy.json, interpreted in f64: what the executor and the evaluator are compared with, sharing no code with them.
+//! An f64 interpreter of policy.json: the reference of executor and evaluator, which shares no code with them.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -15,7 +15,7 @@ use tempfile::TempDir;
 /// Steps of a run.
 const STEPS: usize = 40;
 
-/// Observations reach from minus to plus this: beyond every clip, into the tails of every function.
+/// Range of the observations in both directions: beyond every clip, into the tails of every function.
 const REACH: f32 = 4.0;
 
 type Tensors = BTreeMap<String, (Vec<usize>, Vec<f32>)>;
@@ -28,7 +28,7 @@ pub(crate) struct Case {
 }
 
 impl Case {
-    /// Writes the policy with drawn tensors: matrices that keep the variance of their input, vectors within -1 to 1.
+    /// Writes the policy with random tensors: matrices that keep the variance of their input, vectors within -1 to 1.
     pub(crate) fn new(json: Value) -> Result<Self> {
         let keys = ["w", "b", "mean", "scale", "w_ln", "b_ln", "w_ih", "w_hh", "b_ih", "b_hh"];
         let mut random = Random::new(1);
@@ -59,7 +59,7 @@ impl Case {
         Reference { ops: ops(&self.json), tensors: self.tensors.iter().map(values).collect(), state: BTreeMap::new() }
     }
 
-    /// The reference with the weights that the codes stand for.
+    /// Returns the reference with the weights that the codes represent.
     pub(super) fn dequantized(&self, policy: &Policy, outcomes: &[Outcome]) -> Reference<'_> {
         let mut reference = self.reference();
         for (matrix, outcome) in policy.graph.matrices.iter().zip(outcomes) {
@@ -83,7 +83,7 @@ pub(crate) fn wide(values: &[f32]) -> Vec<f64> {
     values.iter().map(|&v| f64::from(v)).collect()
 }
 
-/// policy.json, interpreted.
+/// An interpreted policy.json.
 pub(crate) struct Reference<'a> {
     ops: &'a [Value],
     pub(crate) tensors: BTreeMap<String, Vec<f64>>,
@@ -96,7 +96,7 @@ impl Reference<'_> {
         self.run(BTreeMap::from([("obs", obs.to_vec())]))
     }
 
-    /// The ops over these slots; the first op takes the slot `obs` where it names none.
+    /// Runs the ops over these slots; the first op uses the slot `obs` unless it names one.
     pub(crate) fn run<'s>(&'s mut self, mut slots: BTreeMap<&'s str, Vec<f64>>) -> Vec<f64> {
         let mut x = slots["obs"].clone();
         for (i, op) in self.ops.iter().enumerate() {
@@ -156,7 +156,7 @@ impl Reference<'_> {
     }
 }
 
-/// The values of `name` or `name[from:to]`.
+/// Returns the values of `name` or `name[from:to]`.
 fn part(slots: &BTreeMap<&str, Vec<f64>>, text: &str) -> Vec<f64> {
     let Some((name, range)) = text.split_once('[') else { return slots[text].clone() };
     let (from, to) = range.trim_end_matches(']').split_once(':').unwrap_or_default();

@@ -19,7 +19,7 @@ use tempfile::TempDir;
 pub(super) const OBS: usize = 16;
 pub(super) const HIDDEN: usize = 40;
 pub(super) const ACT: usize = 3;
-/// Rows of the first matrix that give next to nothing.
+/// Rows of the first matrix with almost no output.
 pub(super) const IDLE: [usize; 3] = [3, 11, 30];
 
 /// A policy 16 -> 40 tanh -> 40 tanh -> 3 with recordings, and a place for files.
@@ -84,7 +84,7 @@ impl Fixture {
         self.actq(&format!("quantize policy {options}"))
     }
 
-    /// An image `NAME.actq` and its statistics `NAME.json`.
+    /// Makes an image `NAME.actq` and its statistics `NAME.json`.
     pub(super) fn image(&self, name: &str, options: &str) -> Result<Value> {
         succeeded(&self.quantize(&format!("--out {name}.actq --save-stats {name}.json {options}"))?)?;
         Ok(serde_json::from_slice(&fs::read(self.path(&format!("{name}.json")))?)?)

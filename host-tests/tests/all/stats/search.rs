@@ -9,7 +9,7 @@ use serde_json::json;
 use super::fixture::Fixture;
 
 #[test]
-fn the_fewest_bits_keep_the_error() -> Result<()> {
+fn the_search_keeps_the_error_with_fewest_bits() -> Result<()> {
     let fixture = Fixture::new()?;
     for method in ["rtn", "gptq", "actquant"] {
         let value = fixture.image("fewest", &format!("--method {method} --max-nmse 0.02"))?;
@@ -26,19 +26,19 @@ fn the_fewest_bits_keep_the_error() -> Result<()> {
         let image = fs::read(fixture.path("fewest.actq"))?;
         ensure!(image == fs::read(fixture.path("again.actq"))? && image == fs::read(fixture.path("same.actq"))?);
         fixture.image("less", &format!("--method {method} --bpw {less:.1}"))?;
-        ensure!(fixture.nmse("less.actq")? > 0.02, "{method}: {less} bits are enough");
+        ensure!(fixture.nmse("less.actq")? > 0.02, "{method}: {less} bits suffice, too");
     }
     Ok(())
 }
 
-/// The steps of every try, from the table of tries.
+/// Returns the steps of every try, from the table of tries.
 fn steps_tried(said: &str) -> Vec<&str> {
     let cells = said.lines().skip(1).map(|line| line.split_whitespace().nth(1));
     cells.map_while(|steps| steps).collect()
 }
 
 #[test]
-fn a_method_that_learns_looks_with_few_steps_and_ends_with_all() -> Result<()> {
+fn learning_methods_search_with_few_steps() -> Result<()> {
     let fixture = Fixture::new()?;
     let options = "--method best --steps 40 --max-nmse 0.05";
     let said = succeeded(&fixture.quantize(&format!("--out a.actq {options}"))?)?;
@@ -49,7 +49,7 @@ fn a_method_that_learns_looks_with_few_steps_and_ends_with_all() -> Result<()> {
     ensure!(fixture.nmse("a.actq")? <= 0.05, "{said}");
     succeeded(&fixture.quantize(&format!("--out b.actq {options} --threads 1"))?)?;
     ensure!(fs::read(fixture.path("a.actq"))? == fs::read(fixture.path("b.actq"))?, "two runs differ");
-    // Without steps there is nothing to take an eighth of.
+    // Without steps there is no eighth of them.
     let said = succeeded(&fixture.quantize("--out c.actq --method best --steps 0 --max-nmse 0.3")?)?;
     let steps = steps_tried(&said);
     ensure!(!steps.is_empty() && steps.iter().all(|s| *s == "0"), "{said}");
@@ -58,7 +58,7 @@ fn a_method_that_learns_looks_with_few_steps_and_ends_with_all() -> Result<()> {
 }
 
 #[test]
-fn an_error_that_eight_bits_do_not_reach_is_an_error() -> Result<()> {
+fn an_error_below_eight_bits_is_refused() -> Result<()> {
     let fixture = Fixture::new()?;
     let before = fixture.files()?;
     for method in ["gptq", "best --steps 2"] {
@@ -77,13 +77,13 @@ fn an_error_that_eight_bits_do_not_reach_is_an_error() -> Result<()> {
 }
 
 #[test]
-fn without_a_held_out_recording_the_error_is_that_of_calibration() -> Result<()> {
+fn without_held_out_data_calibration_error_counts() -> Result<()> {
     let fixture = Fixture::new()?;
     let options = "--out x.actq --method rtn --max-nmse 0.02";
     ensure!(succeeded(&fixture.quantize(options)?)?.contains("Measured on heldout.npz."));
     fs::remove_file(fixture.policy().join("heldout.npz"))?;
     ensure!(succeeded(&fixture.quantize(options)?)?.contains("Measured on calib.npz"));
-    // It is what eval says of that recording.
+    // `eval` reports the same error on that recording.
     fs::rename(fixture.policy().join("calib.npz"), fixture.policy().join("heldout.npz"))?;
     let nmse = fixture.nmse("x.actq")?;
     ensure!(nmse <= 0.02, "{nmse}");

@@ -10,7 +10,7 @@ use serde_json::Value;
 use super::fixture::{ACT, Fixture, HIDDEN};
 
 #[test]
-fn a_sweep_of_two_policies_keeps_allocations_and_scores() -> Result<()> {
+fn a_sweep_stores_allocations_and_scores() -> Result<()> {
     let (fixture, other) = (Fixture::new()?, Fixture::new()?);
     fs::rename(other.policy(), fixture.path("other"))?;
     let line =
@@ -38,6 +38,6 @@ fn a_sweep_of_two_policies_keeps_allocations_and_scores() -> Result<()> {
         Ok(serde_json::from_slice(&fs::read(fixture.path("t.json"))?)?)
     };
     let (one, again, two) = (seed(1)?, seed(1)?, seed(2)?);
-    ensure!(one == again && one != two, "the seed does not reach the images");
+    ensure!(one == again && one != two, "the seed has no effect on the images");
     Ok(())
 }
