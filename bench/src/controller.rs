@@ -96,12 +96,12 @@ fn monitor(folder: &TempDir) -> PathBuf {
 
 /// Waits for the answer to a command of QEMU's monitor. Greeting and events may come before it.
 fn answered(monitor: &mut dyn Port) -> Result<()> {
-    let (begun, mut said) = (Instant::now(), String::new());
-    while !said.contains("\"return\"") {
-        ensure!(!said.contains("\"error\"") && begun.elapsed() < HANG, "QEMU's monitor command failed: {said:?}");
+    let (begun, mut reply) = (Instant::now(), String::new());
+    while !reply.contains("\"return\"") {
+        ensure!(!reply.contains("\"error\"") && begun.elapsed() < HANG, "QEMU's monitor command failed: {reply:?}");
         let mut bytes = [0; 512];
         match monitor.read(&mut bytes) {
-            Ok(count) => said += &String::from_utf8_lossy(bytes.get(..count).unwrap_or_default()),
+            Ok(count) => reply += &String::from_utf8_lossy(bytes.get(..count).unwrap_or_default()),
             Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
             Err(error) => return Err(error.into()),
         }

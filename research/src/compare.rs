@@ -20,8 +20,8 @@ use std::thread;
 use std::time::{Duration, Instant};
 use std::{env, fs};
 
-use actq_cli::outputs::files;
 use actq_bench::{command, ur3};
+use actq_cli::outputs::files;
 use anyhow::{Context as _, Result, anyhow, ensure};
 
 pub use cell::{Cell, CellKey, Made};
@@ -171,11 +171,11 @@ fn make(key: &CellKey, entrant: &Entrant, maker: &mut Maker<'_>, images: &Path) 
     let (Some(method), Some(budget)) = (key.method, key.budget) else {
         return Ok(Job { cell, driver: Some(Driver::Folder(entrant.folder.clone())), simulator });
     };
-    let mut said = Instant::now();
+    let mut reported_at = Instant::now();
     let attempt = maker.make(method, budget, |work, share| {
-        if said.elapsed() >= BETWEEN_LINES {
+        if reported_at.elapsed() >= BETWEEN_LINES {
             eprintln!("  {}: {work}, {:.0}%", key.title(), 100.0 * share);
-            said = Instant::now();
+            reported_at = Instant::now();
         }
     })?;
     let driver = match attempt {

@@ -2,7 +2,7 @@
 
 use crate::random::Random;
 
-/// How far a change to a memory comes.
+/// The extent of a change to a memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
     /// The change is complete.

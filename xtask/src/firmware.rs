@@ -161,7 +161,8 @@ fn example() -> Result<PathBuf> {
     // Building it with actq-bench selects the features of tests and measurements; otherwise cargo would build the
     // quantizer twice.
     build.current_dir(root()).args(["build", "--quiet", "--release", "--bin", "actq"]);
-    let built = build.args(["--package", "actq-cli", "--package", "actq-bench"]).status().context("cannot start cargo")?;
+    let built =
+        build.args(["--package", "actq-cli", "--package", "actq-bench"]).status().context("cannot start cargo")?;
     ensure!(built.success(), "cannot build actq");
     let mut command =
         Command::new(target_dir().join("release").join("actq").with_extension(std::env::consts::EXE_EXTENSION));

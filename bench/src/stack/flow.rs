@@ -228,7 +228,7 @@ impl Walk<'_> {
                 // condition's.
                 let executed = (i == 0 || mask >> (4 - i) & 1 == condition) == holds;
                 let step = Step::decode(at, first, second);
-                ensure!(!compared || step == Step::Next, "{at:#x} depends on flags that are set behind IT");
+                ensure!(!compared || step == Step::Next, "{at:#x} depends on flags that are set after IT");
                 let sets_flags = instruction.writes & 0x7fff == 0 || instruction.size == 4 && first & 0x10 != 0;
                 compared |= matches!(instruction.class, Class::Alu | Class::FloatMove) && sets_flags;
                 let next = at + instruction.size as u32;

@@ -99,7 +99,7 @@ fn instructions_after_it_share_one_condition() -> Result<()> {
     // it eq: subeq sp, #8.
     assert!(refused(&[0xbf08, SUB_SP_8, ADD_SP_8, BX_LR]).contains("is reached with"));
     // itt eq: cmpeq r1, r0; popeq {r4, pc}.
-    assert!(refused(&[PUSH_R4_LR, 0xbf04, 0x4281, POP_R4_PC, POP_R4_PC]).contains("flags that are set behind IT"));
+    assert!(refused(&[PUSH_R4_LR, 0xbf04, 0x4281, POP_R4_PC, POP_R4_PC]).contains("flags that are set after IT"));
     Ok(())
 }
 
@@ -172,8 +172,8 @@ fn a_callee_that_never_returns_ends_the_path() -> Result<()> {
 fn pointers_reach_every_function_with_a_taken_address() -> Result<()> {
     let f0 = [PUSH_R4_LR, BLX_R3, POP_R4_PC];
     let mut by_constant = program(&[&f0, &leaf(16), &leaf(32), &leaf(64)]);
-    let told = format!("{:#}", path(&by_constant).expect_err("there is nothing to point to"));
-    assert_eq!(told, "f0 calls by a pointer, and no function's address is taken");
+    let error = format!("{:#}", path(&by_constant).expect_err("there is nothing to point to"));
+    assert_eq!(error, "f0 calls by a pointer, and no function's address is taken");
     let word = |function: u32| (at(function) | 1).to_le_bytes().to_vec();
     by_constant.memory.push((0x8000, [word(1), word(2)].concat()));
     assert_eq!(path(&by_constant)?.0, 8 + 32);
@@ -195,15 +195,15 @@ fn recursion_is_refused() {
     let [one, two] = far(at(0) + 2, at(1), true);
     let [back, to] = far(at(1) + 2, at(0), true);
     let cycle = program(&[&[PUSH_R4_LR, one, two, POP_R4_PC], &[PUSH_R4_LR, back, to, POP_R4_PC]]);
-    let told = format!("{:#}", path(&cycle).expect_err("it is recursive"));
-    assert_eq!(told, "called by f0: called by f1: f0 is recursive: its stack has no bound");
+    let error = format!("{:#}", path(&cycle).expect_err("it is recursive"));
+    assert_eq!(error, "called by f0: called by f1: f0 is recursive: its stack has no bound");
     let mut by_pointer = program(&[&[PUSH_R4_LR, BLX_R3, POP_R4_PC]]);
     by_pointer.memory.push((0x8000, (at(0) | 1).to_le_bytes().to_vec()));
     assert!(format!("{:#}", path(&by_pointer).expect_err("it may be recursive")).contains("f0 is recursive"));
     let [one, two] = far(at(0), 0x5000, true);
     let nowhere = program(&[&[one, two, BX_LR]]);
-    let told = format!("{:#}", path(&nowhere).expect_err("there is nothing"));
-    assert!(told.contains("a call goes to 0x5000, where no function begins"), "{told}");
+    let error = format!("{:#}", path(&nowhere).expect_err("there is nothing"));
+    assert!(error.contains("a call goes to 0x5000, where no function begins"), "{error}");
 }
 
 /// Code that ends the program may reset the pointer to the stack's begin, and to nothing else.

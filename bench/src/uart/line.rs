@@ -140,7 +140,7 @@ impl Wires {
 
     /// Reads the bytes from the board.
     fn listen(&mut self) -> io::Result<()> {
-        // Read everything: a host that lags behind would hear old times.
+        // Read everything: a host that falls behind would hear old times.
         let mut bytes = vec![0; 64 << 10];
         let count = match self.board.read(&mut bytes) {
             Ok(0) => return Err(ErrorKind::UnexpectedEof.into()),

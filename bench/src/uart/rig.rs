@@ -18,7 +18,7 @@ use actq_ur3::task::{EPISODE_STEPS, Outcome};
 use anyhow::{Context as _, Result, ensure};
 
 use super::arm::{Arm, TICKS};
-use super::bits::Said;
+use super::bits::HeadAction;
 use super::line::Line;
 use crate::controller::{Controller, HANG};
 
@@ -91,7 +91,7 @@ pub struct Rig {
     /// The host's last reading if it changed, and the ticks of the previous one.
     read: Option<Status>,
     read_ticks: u32,
-    said: Vec<Said>,
+    reported: Vec<HeadAction>,
     shown: HashMap<u32, Vec<f32>>,
     /// The time at which the last observation was sent.
     sent: u64,
@@ -128,7 +128,7 @@ impl Rig {
             applied: 0,
             read: None,
             read_ticks: 0,
-            said: Vec::new(),
+            reported: Vec::new(),
             shown: HashMap::new(),
             sent: 0,
             disturbed: false,
@@ -141,8 +141,8 @@ impl Rig {
     }
 
     /// Returns the actions of the board's head since the start, and the observations by their numbers.
-    pub const fn log(&self) -> (&Vec<Said>, &HashMap<u32, Vec<f32>>) {
-        (&self.said, &self.shown)
+    pub const fn log(&self) -> (&Vec<HeadAction>, &HashMap<u32, Vec<f32>>) {
+        (&self.reported, &self.shown)
     }
 
     /// Begins an episode: arms the controller anew. The arm stands still until then. With `exact`, its time is known to
@@ -184,7 +184,7 @@ impl Rig {
         self.sent = from;
         loop {
             let passed = self.time - from;
-            let answered = self.said.last().is_some_and(|said| said.of == number);
+            let answered = self.reported.last().is_some_and(|reported| reported.of == number);
             if passed >= TICKS.into() && (answered || passed >= ANSWER) {
                 break;
             }
@@ -204,7 +204,7 @@ impl Rig {
             match event {
                 Event::Status(status) => self.reported(status),
                 Event::Action { of, applied, values, .. } => {
-                    self.said.push(Said { of, bits: values.iter().map(|value| value.to_bits()).collect() });
+                    self.reported.push(HeadAction { of, bits: values.iter().map(|value| value.to_bits()).collect() });
                     if applied && let Ok(values) = values.try_into() {
                         self.arm.target = values;
                         self.applied += 1;

@@ -257,24 +257,24 @@ fn paths_are_found_everywhere_in_a_file() {
 
 #[test]
 fn forbidden_arrows_cycles_and_stale_rows_are_found() {
-    let said = |files: &[(&str, &str)], table: &[(&str, &[&str])]| {
+    let checked = |files: &[(&str, &str)], table: &[(&str, &[&str])]| {
         let uses = |names: &[&str]| names.iter().map(|n| (*n).to_owned()).collect();
         let allowed = table.iter().map(|(folder, names)| ((*folder).to_owned(), uses(names))).collect();
         check(&sources(files), &allowed).map_err(|error| error.to_string())
     };
     let good = [("", "pub mod a;"), ("a", ""), ("a::x", "use crate::b::y;"), ("b::y", "use super::z;"), ("b::z", "")];
     let table: [(&str, &[&str]); 3] = [("lib", &[]), ("a", &["b"]), ("b", &[])];
-    assert_eq!(said(&good, &table), Ok(()));
+    assert_eq!(checked(&good, &table), Ok(()));
     let mut back = good;
     back[4].1 = "use crate::a;";
-    let error = said(&back, &table).expect_err("b uses a");
+    let error = checked(&back, &table).expect_err("b uses a");
     assert!(error.contains("b -> a is not in the table (b::z)"), "{error}");
     let mut round = good;
     round[4].1 = "fn f() { super::y::g() }";
-    let error = said(&round, &table).expect_err("z and y use each other");
+    let error = checked(&round, &table).expect_err("z and y use each other");
     assert!(error.contains("dependency cycle: b::y -> b::z -> b::y"), "{error}");
-    let error = said(&good, &[("lib", &["a"]), ("a", &["b"]), ("b", &[])]).expect_err("lib uses nothing");
+    let error = checked(&good, &[("lib", &["a"]), ("a", &["b"]), ("b", &[])]).expect_err("lib uses nothing");
     assert!(error.contains("lib -> a is in the table, but nothing needs it"), "{error}");
-    let error = said(&good, &table[..2]).expect_err("b has no row");
+    let error = checked(&good, &table[..2]).expect_err("b has no row");
     assert!(error.contains("b has no row"), "{error}");
 }

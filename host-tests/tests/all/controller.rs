@@ -226,8 +226,8 @@ fn the_command_watches_streams_and_updates() -> Result<()> {
         fs::write(path(name), bytes)?;
     }
     let key = path("key.pem");
-    let told = succeeded(&run(actq(&["keygen", "--out", &key]), &[])?)?;
-    let public = told.rsplit_once("public key: ").context("no public key")?.1.trim().to_owned();
+    let printed = succeeded(&run(actq(&["keygen", "--out", &key]), &[])?)?;
+    let public = printed.rsplit_once("public key: ").context("no public key")?.1.trim().to_owned();
     failed(&run(actq(&["keygen", "--out", &key]), &[])?, 1, &["key.pem", "never replaced"])?;
     let bytes: Vec<u8> = public
         .as_bytes()
@@ -261,8 +261,8 @@ fn the_command_watches_streams_and_updates() -> Result<()> {
     failed(&push("new.actq", &[])?, 1, &["signature is missing"])?;
     failed(&push("new.actq", &["--signature", &path("old.sig")])?, 1, &["old.sig", "not that of this image"])?;
     failed(&push("wrong.actq", &["--signature", &path("wrong.sig")])?, 1, &["self-test failed"])?;
-    let told = succeeded(&push("new.actq", &["--signature", &path("new.sig")])?)?;
-    assert!(told.contains("new runs, version 2"), "{told}");
+    let printed = succeeded(&push("new.actq", &["--signature", &path("new.sig")])?)?;
+    assert!(printed.contains("new runs, version 2"), "{printed}");
     failed(
         &push("old.actq", &["--signature", &path("old.sig")])?,
         1,

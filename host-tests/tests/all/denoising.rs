@@ -434,7 +434,7 @@ fn impossible_images_are_refused() -> Result<()> {
         ("a limit NaN", constants, nan, ImageError::Constant),
         ("a coefficient NaN", constants + h::DENOISE_WORDS + 5, nan, ImageError::Constant),
         ("noise outside", constants + 1, huge, ImageError::Denoising),
-        ("noise cut off", constants + 1, words[constants + 1] + 1, ImageError::Denoising),
+        ("truncated noise", constants + 1, words[constants + 1] + 1, ImageError::Denoising),
         ("a table NaN", words[table + 3] as usize, nan, ImageError::Constant),
         ("coefficients outside", denoise + 3, words.len() as u32 - 1, ImageError::Section),
     ];

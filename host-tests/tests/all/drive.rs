@@ -202,9 +202,9 @@ fn only_the_images_own_policy_labels() -> Result<()> {
     let input = requests(&[draw(3, 10)]);
     // Without its policy beside it: no labels, and one message.
     let output = fixture.run("serve image.actq --record bare.npz", &input)?;
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
     ended_well(&output)?;
-    assert_eq!(said.matches("gets no array \"action\"").count(), 1, "{said}");
+    assert_eq!(stderr.matches("gets no array \"action\"").count(), 1, "{stderr}");
     ensure!(fixture.recording("bare.npz")?.action.is_none());
     // With its policy beside it, or named by the environment, as actq tune does.
     fs::copy(fixture.path("image.actq"), fixture.path("policy/image.actq"))?;
@@ -280,14 +280,14 @@ fn recorders_with_one_name_use_separate_files() -> Result<()> {
     for (child, observations) in children.iter_mut().zip(&shown) {
         show(child, observations)?;
     }
-    let mut said = String::new();
+    let mut stderr = String::new();
     for child in children {
         let output = child.wait_with_output()?;
-        said += &String::from_utf8_lossy(&output.stderr);
+        stderr += &String::from_utf8_lossy(&output.stderr);
         ended_well(&output)?;
     }
     assert_eq!(fs::read(fixture.path("drive-2.npz"))?, b"mine");
-    ensure!(said.contains("drive.npz is there already; recording into drive-3.npz"), "{said}");
+    ensure!(stderr.contains("drive.npz is there already; recording into drive-3.npz"), "{stderr}");
     let read = |name: &str| Ok::<_, anyhow::Error>(episodes(&fixture.recording(name)?).concat());
     let mut recorded = [read("drive.npz")?, read("drive-3.npz")?];
     recorded.sort_by_key(|frames| std::cmp::Reverse(frames.len()));
@@ -392,10 +392,10 @@ fn tune_drives_and_learns_again() -> Result<()> {
         fixture.command("tune policy --bits 3 --steps 8 --rounds 2 --out tuned.actq --json tuned.json --keep");
     command.arg("it's kept").arg("--drive").arg(&drive);
     let output = run(command, b"")?;
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
     let table = succeeded(&output)?;
-    assert_eq!((said.matches("driving\n").count(), said.matches("done\n").count()), (3, 3), "{said}");
-    ensure!(said.contains("the image of round 0 drove better (success 0.900 (0.100-0.900))"), "{said}");
+    assert_eq!((stderr.matches("driving\n").count(), stderr.matches("done\n").count()), (3, 3), "{stderr}");
+    ensure!(stderr.contains("the image of round 0 drove better (success 0.900 (0.100-0.900))"), "{stderr}");
     let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split_whitespace().collect()).collect();
     for (round, (episodes, frames)) in [("6", "300"), ("8", "410"), ("10", "520")].into_iter().enumerate() {
         assert_eq!(rows[round + 1][..3], [&*round.to_string(), episodes, frames], "{table}");
@@ -465,9 +465,9 @@ fn a_drive_without_a_success_figure_is_accepted() -> Result<()> {
     let drive =
         "eval \"$POLICY_CMD\" < requests > answers; echo '{\"success\": 1'; echo '{\"success\": \"yes\"}'; echo '[1]'";
     let output = tune(&fixture, drive, "")?;
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
     let table = succeeded(&output)?;
-    ensure!(said.contains("has printed no JSON object with a number \"success\""), "{said}");
+    ensure!(stderr.contains("has printed no JSON object with a number \"success\""), "{stderr}");
     ensure!(table.lines().nth(1).is_some_and(|row| row.split_whitespace().nth(5) == Some("-")), "{table}");
     Ok(())
 }

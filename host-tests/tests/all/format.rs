@@ -157,7 +157,7 @@ fn table<'d>(document: &'d str, head: &str) -> Vec<Vec<&'d str>> {
 }
 
 fn number(cell: &str) -> usize {
-    cell.parse().unwrap_or_else(|_| panic!("{cell:?} is no number"))
+    cell.parse().unwrap_or_else(|_| panic!("{cell:?} is not a number"))
 }
 
 fn width(cell: &str) -> Width {
@@ -269,7 +269,7 @@ impl Documented {
                     let expected = |row: usize, at: usize| if row < shape.rows { scales[row * groups + at] } else { 0 };
                     let in_pairs = (self.width, self.lanes, height) == (Width::W2, Lanes::Paired, 8);
                     if in_pairs && at.is_multiple_of(2) && at + 1 < groups {
-                        continue; // behind the next group
+                        continue; // after the next group
                     }
                     let pair = in_pairs && !at.is_multiple_of(2);
                     for row in first_row..first_row + height {

@@ -204,7 +204,7 @@ fn impossible_matrices_are_refused() {
         ("rows 4097", E::Shape, |d| d.set_low(d.data(FIRST), 4097)),
         ("columns 0", E::Shape, |d| d.set_high(d.data(FIRST), 0)),
         ("matrix record inside another", E::Matrix, |d| d.set(d.op(FIRST) + 3, d.get(d.op(FIRST) + 3) + 1)),
-        ("a matrix behind the last", E::Matrix, |d| d.set_low(h::W_MATRIX_COUNT, 3)),
+        ("a matrix after the last", E::Matrix, |d| d.set_low(h::W_MATRIX_COUNT, 3)),
         ("matrix records outside", E::Section, |d| d.set(h::W_MATRICES, d.0.len() as u32 - 3)),
         ("block records outside", E::Section, |d| d.set(d.data(FIRST) + 3, d.0.len() as u32 - 3)),
         ("more rows than the destination", E::Shape, |d| d.set_high(d.op(FIRST), UNITS as u32 - 1)),
@@ -259,7 +259,7 @@ fn impossible_matrices_are_refused() {
                 d.set(d.block(STATE, 0) + word, d.get(d.block(INPUT, 0) + word));
             }
         }),
-        ("biases of an operation before, and behind them", E::Section, |d| {
+        ("biases of an earlier operation, and after them", E::Section, |d| {
             d.set(d.op(INPUT) + 2, d.get(d.op(FIRST) + 2))
         }),
         ("biases in the weights", E::Section, |d| d.set(d.op(FIRST) + 2, d.get(d.block(FIRST, 0) + 1))),
@@ -313,7 +313,7 @@ fn operations_read_only_values_of_their_step() {
         ("a sum with what is written later", E::Unwritten, |d| {
             d.set_low(d.op(FIRST), u32::from(op::LINEAR) | 1 << 8);
         }),
-        ("a destination behind a gap", E::Arena, |d| {
+        ("a destination after a gap", E::Arena, |d| {
             d.set_low(d.op(NORMALIZE) + 1, d.low(d.op(NORMALIZE) + 1) + 1);
         }),
         ("an output that is not written", E::Unwritten, |d| d.set_high(h::W_OBS_OUT, d.low(h::W_ACTION_WORK) - 1)),

@@ -220,7 +220,7 @@ fn an_output_may_be_a_device() -> Result<()> {
     ensure!(fs::metadata(fixture.path("null"))?.file_type().is_char_device(), "the device was replaced");
     let output = fixture.quantize("--out stdout")?;
     let image = fixture.image()?;
-    ensure!(output.status.success() && output.stdout == image, "standard output is not the image alone");
+    ensure!(output.status.success() && output.stdout == image, "standard output is not exactly the image");
     ensure!(String::from_utf8_lossy(&output.stderr).contains("weights"), "no report on standard error");
     let svg = fixture.run("inspect old.actq --widths --svg stdout")?;
     let (picture, report) = (String::from_utf8(svg.stdout)?, String::from_utf8(svg.stderr)?);

@@ -208,12 +208,12 @@ impl Player {
     fn action(&self) -> Option<Vec<f64>> {
         if let Some(Ensemble { horizon, m }) = self.by.ensemble {
             let now = self.now;
-            let told = self.all.iter().filter(|(seen, from, _)| *from <= now && now < seen + horizon);
-            let told: Vec<&Vec<f64>> = told.map(|(seen, _, chunk)| &chunk[now - seen]).collect();
+            let young = self.all.iter().filter(|(seen, from, _)| *from <= now && now < seen + horizon);
+            let young: Vec<&Vec<f64>> = young.map(|(seen, _, chunk)| &chunk[now - seen]).collect();
             let weight = |i: usize| (-m * i as f64).exp();
-            let sum: f64 = (0..told.len()).map(weight).sum();
-            let mean = |d: usize| told.iter().enumerate().map(|(i, a)| weight(i) * a[d]).sum::<f64>() / sum;
-            return (!told.is_empty()).then(|| (0..ACT).map(mean).collect());
+            let sum: f64 = (0..young.len()).map(weight).sum();
+            let mean = |d: usize| young.iter().enumerate().map(|(i, a)| weight(i) * a[d]).sum::<f64>() / sum;
+            return (!young.is_empty()).then(|| (0..ACT).map(mean).collect());
         }
         let (seen, plan) = self.plan.as_ref()?;
         let age = self.now - seen;

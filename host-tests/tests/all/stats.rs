@@ -39,7 +39,7 @@ fn statistics_sum_to_the_image_and_explain_widths() -> Result<()> {
     let options = ["--bpw", "2", "--steps", "2", "--seed", "7"];
     let mut command = actq(&["quantize", &policy, "--out", &image, "--save-stats", &file.display().to_string()]);
     command.args(options);
-    let said = succeeded(&run(command, b"")?)?;
+    let printed = succeeded(&run(command, b"")?)?;
     let stats = parsed(&serde_json::from_slice(&fs::read(&file)?)?)?;
     assert_eq!((stats.policy.as_str(), stats.method.as_str()), ("ur3_reach", "best"));
     assert_eq!((stats.seed, stats.steps, stats.bytes as u64), (7, 2, fs::metadata(&image)?.len()));
@@ -71,8 +71,8 @@ fn statistics_sum_to_the_image_and_explain_widths() -> Result<()> {
     let without: usize = stats.matrices.iter().flat_map(|m| &m.widths).filter(|w| **w == 0).count();
     let first = stats.matrices.iter().find(|m| m.widths.contains(&0)).context("all rows have bits")?;
     ensure!(stats.matrices.iter().all(|m| m.image_rows.iter().copied().eq(0..m.rows)));
-    ensure!(said.contains(&format!("rows: {without} without bits ({} ", first.name)), "{said}");
-    ensure!(!said.contains("removed") && said.contains("\nTook "), "{said}");
+    ensure!(printed.contains(&format!("rows: {without} without bits ({} ", first.name)), "{printed}");
+    ensure!(!printed.contains("removed") && printed.contains("\nTook "), "{printed}");
     Ok(())
 }
 

@@ -44,11 +44,11 @@ fn import_writes_a_folder_and_overwrites_nothing() -> Result<()> {
     let [model, obs, out] = ["model.onnx", "obs.npy", "policy"].map(|name| dir.path().join(name));
     let import = |more: &[&str]| actq(&[&["import", text(&model), "--out", text(&out)], more].concat()).output();
     let imported = import(&["--calib", text(&obs)])?;
-    let said = succeeded(&imported)?;
+    let printed = succeeded(&imported)?;
     let noted = String::from_utf8_lossy(&imported.stderr);
     ensure!(noted.contains("note: no finite limits for actions 0-1: "), "{noted}");
     for line in ["input     obs[0:6] = obs\n", "output    actions, 2 values\n", "ops       linear, tanh, linear\n"] {
-        ensure!(said.contains(line), "{said}");
+        ensure!(printed.contains(line), "{printed}");
     }
     let mut written: Vec<String> = fs::read_dir(&out)?
         .map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned()))
@@ -61,8 +61,8 @@ fn import_writes_a_folder_and_overwrites_nothing() -> Result<()> {
     let (rows, out) = (dir.path().join("rows.npy"), dir.path().join("rows"));
     Array3::from_shape_fn((9, 1, OBS), |(i, _, k)| (i * k) as f32).write_npy(fs::File::create(&rows)?)?;
     let noted = actq(&["import", text(&model), "--out", text(&out), "--calib", text(&rows)]).output()?;
-    let said = String::from_utf8_lossy(&noted.stderr);
-    ensure!(said.contains("rows.npy holds 9 episodes of one step each; if they are one run, save it as"), "{said}");
+    let stderr = String::from_utf8_lossy(&noted.stderr);
+    ensure!(stderr.contains("rows.npy holds 9 episodes of one step each; if they are one run, save it as"), "{stderr}");
     // The file replaces the folder, with the same digest.
     assert_eq!(Policy::load(&out)?.digest, Policy::load(&model)?.digest);
     failed(
@@ -82,8 +82,8 @@ fn import_writes_a_folder_and_overwrites_nothing() -> Result<()> {
     succeeded(&quantize(&["--bpw", "3", "--calib", text(&obs), "--steps", "0"])?)?;
     succeeded(&quantize(&["--bits", "8", "--method", "rtn"])?)?;
     fs::rename(&obs, dir.path().join("heldout.npy"))?;
-    let said = succeeded(&actq(&["eval", text(&image), "--policy", text(&model)]).output()?)?;
-    ensure!(said.contains("observations   300"), "{said}");
+    let printed = succeeded(&actq(&["eval", text(&image), "--policy", text(&model)]).output()?)?;
+    ensure!(printed.contains("observations   300"), "{printed}");
     Ok(())
 }
 
@@ -142,8 +142,8 @@ fn check_finds_dequantized_weights_equal() -> Result<()> {
         let x = file.node("MatMul", &["obs", &w], &[]);
         file.node("Tanh", &[&x], &[])
     })?;
-    let said = succeeded(&output)?;
-    ensure!(said.contains("checked   256 observations against onnxruntime: off by"), "{said}");
+    let printed = succeeded(&output)?;
+    ensure!(printed.contains("checked   256 observations against onnxruntime: off by"), "{printed}");
     Ok(())
 }
 
@@ -158,9 +158,9 @@ fn check_trusts_float64_over_onnxruntime() -> Result<()> {
         let x = file.node("Sigmoid", &[&x], &[]);
         file.node("Log", &[&x], &[])
     })?;
-    let said = succeeded(&output)?;
-    ensure!(said.contains("checked   256 observations against the file in float64: off by"), "{said}");
-    ensure!(said.contains("by its float32 arithmetic"), "{said}");
+    let printed = succeeded(&output)?;
+    ensure!(printed.contains("checked   256 observations against the file in float64: off by"), "{printed}");
+    ensure!(printed.contains("by its float32 arithmetic"), "{printed}");
     Ok(())
 }
 
@@ -169,7 +169,7 @@ fn modules_of_pytorch_become_policies() -> Result<()> {
     let Some(python) = python_with("torch, onnx, onnxruntime") else { return Ok(()) };
     let script = actq_boards::root().join("examples/pytorch/test_actq_export.py");
     let output = Command::new(&python).arg(script).env("ACTQ", binary()?).env("ACTQ_PYTHON", &python).output()?;
-    let said = succeeded(&output)?;
-    ensure!(said.contains("5 modules"), "{said}");
+    let printed = succeeded(&output)?;
+    ensure!(printed.contains("5 modules"), "{printed}");
     Ok(())
 }

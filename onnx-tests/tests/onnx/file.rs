@@ -1,6 +1,7 @@
 //! ONNX files for tests, as exporters write them.
 
 use actq_onnx::proto;
+use actq_testkit::Random;
 use prost::Message as _;
 use prost::bytes::Bytes;
 
@@ -79,12 +80,8 @@ impl File {
     pub(super) fn drawn(&mut self, dims: &[usize]) -> String {
         let n: usize = dims.iter().product();
         let scale = if dims.len() > 1 { 1.5 / (dims.iter().max().map_or(1.0, |&n| n as f32)).sqrt() } else { 0.5 };
-        let mut state = 0x9e37_79b9_7f4a_7c15u64.wrapping_mul(self.weights + 1);
-        let mut next = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            ((state >> 40) as f32 / (1 << 23) as f32 - 1.0) * scale
-        };
-        let data: Vec<f32> = (0..n).map(|_| next()).collect();
+        let mut random = Random::new(self.weights);
+        let data: Vec<f32> = (0..n).map(|_| scale * random.unit()).collect();
         self.reals(dims, &data)
     }
 

@@ -29,8 +29,8 @@ fn denoiser(integers: bool) -> Vec<u8> {
 
 #[test]
 fn a_cast_time_step_is_a_float() -> Result<()> {
-    let (told, policy) = imported(&denoiser(true), &Choice::default())?;
-    assert_eq!((told.inputs.len(), &told.integers[..]), (2, &["time".to_owned()][..]));
+    let (integers, policy) = imported(&denoiser(true), &Choice::default())?;
+    assert_eq!((integers.inputs.len(), &integers.integers[..]), (2, &["time".to_owned()][..]));
     let (floats, _) = imported(&denoiser(false), &Choice::default())?;
     assert!(floats.integers.is_empty());
     let observations = drawn(&policy);

@@ -17,8 +17,8 @@ use std::path::Path;
 
 use actq::measure::actions::actions;
 use actq::policy::Policy;
-use actq_bench::golden::Random;
 use actq_onnx::{Choice, Imported, import_bytes, proto};
+use actq_testkit::Random;
 use anyhow::{Context as _, Result, ensure};
 use prost::Message as _;
 use prost::bytes::Bytes;

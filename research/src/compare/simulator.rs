@@ -116,8 +116,8 @@ fn evaluate(mut command: Command) -> Result<DriveOutcome> {
         .stdin(Stdio::null())
         .output()
         .with_context(|| format!("cannot start {}", command.get_program().display()))?;
-    let said = String::from_utf8_lossy(&output.stderr);
-    let tail: Vec<&str> = said.lines().rev().take(12).collect();
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    let tail: Vec<&str> = stderr.lines().rev().take(12).collect();
     let tail = tail.into_iter().rev().collect::<Vec<_>>().join("\n");
     ensure!(output.status.success(), "the simulator failed ({}): {command:?}\n{tail}", output.status);
     let lines = String::from_utf8_lossy(&output.stdout).into_owned();

@@ -14,7 +14,7 @@ use anyhow::{Context, Result, ensure};
 pub(crate) const FLASH: &str = "bytes of flash, application on ";
 /// Bytes of RAM of the application without its scratch memory: variables, and the most stack.
 pub(crate) const RAM: &str = "bytes of RAM, application on ";
-/// Bytes of stack, computed from the ELF file alone.
+/// Bytes of stack, computed only from the ELF file.
 const STACK: &str = "bytes of stack at most, application on ";
 const STEP: &str = "instructions of an evaluation, ur3_reach at 3 bits, rounded, on ";
 

@@ -30,7 +30,7 @@ const FIRST_SEED: u64 = 1000;
 /// Limit of distillation steps: a quarter of the default of `actq quantize`, for a result within a minute.
 const STEPS: usize = 2000;
 
-/// The same for the flow, whose step evaluates the network five times; and one in so many episodes that it drives.
+/// The same for the flow, whose step evaluates the network five times; and the divisor of the episodes that it drives.
 const FLOW_STEPS: usize = 100;
 const FLOW_SHARE: u64 = 4;
 

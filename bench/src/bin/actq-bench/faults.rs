@@ -70,9 +70,9 @@ pub(crate) fn run(target: Target, image: &Path, troubles: &[Trouble<'_>], images
             busy.join(", ")
         );
     }
-    let (said, shown) = rig.log();
-    let (foreign, _) = foreign(said, shown, images)?;
-    println!("{} actions of the controller, {foreign} of them differ in bits from the host executor's", said.len());
+    let (reported, shown) = rig.log();
+    let (foreign, _) = foreign(reported, shown, images)?;
+    println!("{} actions of the controller, {foreign} of them differ in bits from the host executor's", reported.len());
     ensure!(foreign == 0, "the controller sent {foreign} actions that its head does not compute");
     ensure!(failures.is_empty(), "{}", failures.join("\n"));
     Ok(())

@@ -26,7 +26,7 @@ fn eval_prints_one_object_with_six_numbers() -> Result<()> {
     ensure!(number("nmse")? > 0.0 && number("nmse")? <= number("worst_nmse")? && number("worst_nmse")? < 1e-2);
     ensure!(number("max_abs")? > 0.0 && number("bpw")? > 8.0);
     let people = run(actq(&["eval", &text(&path), "--policy", &text(&fixture.policy())]), b"")?;
-    ensure!(succeeded(&people)?.contains("nmse"), "the report for people lacks the error");
+    ensure!(succeeded(&people)?.contains("nmse"), "the human-readable report lacks the error");
     Ok(())
 }
 

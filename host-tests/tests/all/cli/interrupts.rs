@@ -56,9 +56,9 @@ fn signals_leave_no_file_and_set_the_status() -> Result<()> {
         wait_for(&mut child, || Ok(fixture.snapshot()?.len() > before.len()))?;
         send(signal, &child)?;
         let output = child.wait_with_output()?;
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(status), "{signal}: {said}");
-        ensure!(said.ends_with("actq: interrupted: no output was written\n"), "{said}");
+        let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(status), "{signal}: {stderr}");
+        ensure!(stderr.ends_with("actq: interrupted: no output was written\n"), "{stderr}");
         ensure!(fixture.snapshot()? == before, "files changed");
     }
     Ok(())
@@ -102,9 +102,9 @@ fn a_drive_may_handle_the_signal() -> Result<()> {
     let child = start_tune(&fixture, actq(&[]), drive)?;
     send("TERM", &child)?;
     let output = child.wait_with_output()?;
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    ensure!(output.status.code() == Some(143) && fixture.out("tune/disarmed").exists(), "{said}");
-    ensure!(!said.contains("has failed"), "the signal is not an error of the command: {said}");
+    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+    ensure!(output.status.code() == Some(143) && fixture.out("tune/disarmed").exists(), "{stderr}");
+    ensure!(!stderr.contains("has failed"), "the signal is not an error of the command: {stderr}");
     Ok(())
 }
 

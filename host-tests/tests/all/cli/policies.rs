@@ -29,7 +29,7 @@ const SPOILT: &[Spoilt] = &[
     ("no weights", |p| Ok(fs::remove_file(p.join("policy.safetensors"))?), "", &["policy.safetensors"]),
     ("not JSON", |p| Ok(fs::write(p.join("policy.json"), "{\"name\": ")?), "", &["policy.json"]),
     ("not an object", |p| write_json(p, &json!([1, 2])), "", &["policy.json"]),
-    ("weights cut off", |p| cut(&p.join("policy.safetensors"), 100), "", &["policy.safetensors"]),
+    ("truncated weights", |p| cut(&p.join("policy.safetensors"), 100), "", &["policy.safetensors"]),
     ("weights empty", |p| cut(&p.join("policy.safetensors"), 0), "", &["policy.safetensors"]),
     ("unknown op", |p| edit(p, "/ops/2", json!({"op": "swish"})), "", &["policy.json", "op 2", "swish"]),
     (
@@ -132,7 +132,7 @@ const SPOILT: &[Spoilt] = &[
     ("limits reversed", |p| edit(p, "/action/low", json!([0, 2, 0])), "", &["policy.json", "low"]),
     ("negative step", |p| edit(p, "/action/max_step", json!([1, -1, 1])), "", &["policy.json", "max_step"]),
     ("smoothing 0", |p| edit(p, "/action/smoothing", json!([1, 0, 1])), "", &["action.smoothing must be above 0"]),
-    ("mean alone", |p| edit(p, "/action/mean", json!([0, 0, 0])), "", &["action has mean or std alone"]),
+    ("mean without std", |p| edit(p, "/action/mean", json!([0, 0, 0])), "", &["action has mean or std alone"]),
     ("std 0", |p| both(p, ["mean", "std"], [json!([0, 0, 0]), json!([1, 0, 1])]), "", &["action.std[1] is 0.0"]),
     (
         "quantiles reversed",
@@ -200,7 +200,7 @@ const SPOILT: &[Spoilt] = &[
         "",
         &["heldout.npz and heldout.safetensors are there"],
     ),
-    ("held-out recording cut off", |p| cut(&p.join("heldout.npz"), 100), "", &["heldout.npz", "cut off"]),
+    ("truncated held-out recording", |p| cut(&p.join("heldout.npz"), 100), "", &["heldout.npz", "cut off"]),
     ("too few frames", |p| calib(p, OBS, 0.0, 13), "", &["calib.npz", "15 frames are recorded, 16 are needed"]),
     (
         "too few frames to learn from",
@@ -208,7 +208,7 @@ const SPOILT: &[Spoilt] = &[
         "--method best",
         &["calib.npz", "47 frames are recorded, 200 are needed: learning from fewer repeats them by heart"],
     ),
-    ("recording cut off", |p| cut(&p.join("calib.npz"), 100), "", &["calib.npz"]),
+    ("truncated recording", |p| cut(&p.join("calib.npz"), 100), "", &["calib.npz"]),
     ("recording empty", |p| cut(&p.join("calib.npz"), 0), "", &["calib.npz"]),
     ("wider recording", |p| calib(p, OBS + 1, 0.0, 1), "", &["calib.npz", "obs", "41", "40"]),
     ("recorded NaN", |p| calib(p, OBS, f32::NAN, 1), "", &["calib.npz", "obs", "NaN"]),

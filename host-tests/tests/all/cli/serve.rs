@@ -59,7 +59,7 @@ fn serve_plays_a_chunk_then_plans_again() -> Result<()> {
     let mut rest = Vec::new();
     stdout.read_to_end(&mut rest)?;
     ensure!(rest.is_empty(), "{} unexpected bytes", rest.len());
-    ensure!(child.wait()?.code() == Some(0), "the end of the input is no error");
+    ensure!(child.wait()?.code() == Some(0), "the end of the input must not be an error");
 
     // The same requests at once.
     let requests = session.map(|part| part.map_or(vec![RESET], |(seen, ..)| step_request(&obs[seen]))).concat();
@@ -76,7 +76,7 @@ fn serve_refuses_malformed_requests() -> Result<()> {
     let cases: [(&str, Vec<u8>, usize, &[&str]); 4] = [
         ("unknown byte", vec![RESET, b'X'], 0, &["0x58"]),
         ("end inside an observation", good[..good.len() - 1].to_vec(), 0, &["observation"]),
-        ("end behind S", [&good[..], &[STEP]].concat(), 1, &["observation"]),
+        ("end after S", [&good[..], &[STEP]].concat(), 1, &["observation"]),
         ("text", [&good[..], &good[..], b"\n"].concat(), 2, &["0x0a"]),
     ];
     all(cases.map(|(what, input, answers, words)| {

@@ -102,8 +102,8 @@ pub(crate) fn starts_and_acts_with_the_bits_of_the_host(target: Target) -> Resul
         // QEMU has no clocks for it: the wait for the crystal times out, and nothing may move at another rate.
         assert_eq!(client.status()?.refusal, Some(Refusal::Clock));
         // QEMU has no flash controller for it either: an erase is refused, and the program continues.
-        let told = push(&mut client, &package(&small()?), |_| {}).expect_err("the erase must be refused");
-        assert!(format!("{told:#}").contains(&Refusal::Flash.to_string()), "{told:#}");
+        let error = push(&mut client, &package(&small()?), |_| {}).expect_err("the erase must be refused");
+        assert!(format!("{error:#}").contains(&Refusal::Flash.to_string()), "{error:#}");
         assert_eq!(client.status()?.slot, BUILT_IN);
         return Ok(());
     }
@@ -215,9 +215,9 @@ fn an_unsuitable_image_is_refused_with_its_reason() -> Result<()> {
         assert_eq!((status.state, status.refusal, status.image), (State::Disarmed, Some(refusal), 0), "{target:?}");
         assert!(client.arm().is_err(), "{target:?}");
         if target == Target::F405 {
-            let told =
+            let error =
                 push(&mut client, &package(&damaged), |_| {}).expect_err("the push would erase the debugger's image");
-            assert!(format!("{told:#}").contains(&Refusal::Unsupported.to_string()), "{told:#}");
+            assert!(format!("{error:#}").contains(&Refusal::Unsupported.to_string()), "{error:#}");
         }
     }
     Ok(())
@@ -351,18 +351,18 @@ fn a_keyed_build_runs_only_signed_images() -> Result<()> {
     let slot = file(&new)?;
     for target in WHOLE {
         let elf = firmware::controller_of_key(target, "signed,faults", &keys::public(&key))?;
-        let told = format!(
+        let error = format!(
             "{:#}",
             Controller::start(target, &elf, Some(slot.path())).expect_err("a build with a key must have no slot")
         );
-        assert!(told.contains("no image slot"), "{target:?}: {told}");
+        assert!(error.contains("no image slot"), "{target:?}: {error}");
         let controller = Controller::start(target, &elf, None)?;
         let mut client = controller.client()?;
         let wrong = [signature[0] ^ 1].into_iter().chain(signature[1..].iter().copied()).collect::<Vec<u8>>();
         for refused in [None, Some(&wrong.try_into().expect("the signature has 64 bytes"))] {
-            let told = push(&mut client, &Package { image: &new, version: 1, signature: refused }, |_| {});
-            let told = format!("{:#}", told.expect_err("an unsigned image must be refused"));
-            assert!(told.contains("signature"), "{target:?}: {told}");
+            let error = push(&mut client, &Package { image: &new, version: 1, signature: refused }, |_| {});
+            let error = format!("{:#}", error.expect_err("an unsigned image must be refused"));
+            assert!(error.contains("signature"), "{target:?}: {error}");
             assert_eq!(client.status()?.slot, BUILT_IN, "{target:?}");
         }
         push(&mut client, &Package { image: &new, version: 1, signature: Some(&signature) }, |_| {})?;
@@ -377,9 +377,9 @@ fn a_keyed_build_runs_only_signed_images() -> Result<()> {
 #[test]
 fn an_invalid_key_does_not_build() {
     let none = "02".to_owned() + &"00".repeat(31);
-    let told =
+    let error =
         firmware::controller_of_key(Target::Fpu, "signed", &none).expect_err("the key is not a point of the curve");
-    assert!(format!("{told:#}").contains("ACTQ_PUBLIC_KEY is not an Ed25519 public key"), "{told:#}");
+    assert!(format!("{error:#}").contains("ACTQ_PUBLIC_KEY is not an Ed25519 public key"), "{error:#}");
 }
 
 /// The application is updated while it runs. An image that fails its self-test is refused, and the one before
@@ -391,8 +391,8 @@ fn updates_install_and_failed_ones_roll_back() -> Result<()> {
     let (observation, bits) = self_test(&new.image(Path::new("small"))?, 0).context("the image has no self-test")?;
     for target in WHOLE {
         let (_controller, mut client) = start(target, "faults")?;
-        let told = push(&mut client, &package(&wrong), |_| {}).expect_err("its self-test fails");
-        assert!(format!("{told:#}").contains("self-test failed"), "{told:#}");
+        let error = push(&mut client, &package(&wrong), |_| {}).expect_err("its self-test fails");
+        assert!(format!("{error:#}").contains("self-test failed"), "{error:#}");
         let status = client.status()?;
         assert_eq!((status.slot, status.refusal), (BUILT_IN, Some(Refusal::Stale)), "{target:?}");
         push(&mut client, &package(new.bytes()), |_| {})?;

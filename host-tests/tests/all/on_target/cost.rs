@@ -164,9 +164,9 @@ fn polls_keep_their_budget(dir: &Path, images: &[Options]) -> Result<usize> {
                 let command = qemu::command(&elf, Some(slot.path()), &arguments)?;
                 let output = qemu::run(command, &qemu::step_request(&observations[0]))?;
                 let refusal = StepError::Budget { needed: image.least_budget(), given: budget };
-                let said = String::from_utf8_lossy(&output.stderr);
+                let stderr = String::from_utf8_lossy(&output.stderr);
                 ensure!(!output.status.success() && output.stdout.is_empty(), "{}: {output:?}", at());
-                ensure!(said.trim_end() == format!("firmware: step: {refusal}"), "{}: {said}", at());
+                ensure!(stderr.trim_end() == format!("firmware: step: {refusal}"), "{}: {stderr}", at());
                 continue;
             }
             let run = profile::regions(&elf, &counter, &bytes, &arguments, &observations[..4]);

@@ -41,8 +41,8 @@ fn every_board_accepts_the_example_or_another_image() -> Result<()> {
     fs::write(&own, small()?)?;
     for target in BOARDS {
         let (name, elf) = (target.board().name, folder.path().join("firmware.elf"));
-        let told = succeeded(&firmware(&["--board", name, "--out", &text(&elf)])?)?;
-        assert!(told.contains(&format!("{}: {name} with {}", text(&elf), text(built_in()?))), "{told}");
+        let printed = succeeded(&firmware(&["--board", name, "--out", &text(&elf)])?)?;
+        assert!(printed.contains(&format!("{}: {name} with {}", text(&elf), text(built_in()?))), "{printed}");
         assert!(
             fs::read(&elf)? == fs::read(controller(target, "")?)?,
             "{name}: differs from the application of the tests"
@@ -111,16 +111,16 @@ fn failed_builds_are_reported_and_leave_no_file() -> Result<()> {
     };
     let (before, elf) = (there()?, path("firmware.elf"));
     let (nowhere, itself) = (path("none/firmware.elf"), path("good"));
-    let refused = |words: &[&str], status, told: &[&str]| {
-        let outcome = firmware(words).and_then(|output| failed(&output, status, told));
+    let refused = |words: &[&str], status, expected: &[&str]| {
+        let outcome = firmware(words).and_then(|output| failed(&output, status, expected));
         (words.join(" "), outcome)
     };
-    let image = |name: &str, out: &str, told: &[&str]| {
-        refused(&["--board", "stm32f405", "--image", &path(name), "--out", out], 1, told)
+    let image = |name: &str, out: &str, expected: &[&str]| {
+        refused(&["--board", "stm32f405", "--image", &path(name), "--out", out], 1, expected)
     };
-    let limited = |name: &str, limits: &str, told: &[&str]| {
+    let limited = |name: &str, limits: &str, expected: &[&str]| {
         let words = ["--board", "stm32f405", "--image", &path(name), "--limits", limits, "--out", &elf];
-        refused(&words, 1, told)
+        refused(&words, 1, expected)
     };
     all([
         refused(&["--board", "nucleo", "--out", &elf], 2, &["unknown board \"nucleo\"", "stm32f405"]),

@@ -51,7 +51,7 @@ fn octos_head_matches_the_prediction_and_the_host() -> Result<()> {
     let step = [0, 1].map(|i| (whole[i] - half[i]) / (octo::STEPS / 2) as u64);
     let once = [0, 1].map(|i| 2 * half[i] - whole[i]);
     near("a denoising step and its noise", step[0], step[1])?;
-    near("what runs once", once[0], once[1])
+    near("the part that runs once", once[0], once[1])
 }
 
 /// All rows of a chunk share the matrices, which are in the image once; norms and biases are repeated for each row.

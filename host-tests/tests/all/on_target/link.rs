@@ -64,8 +64,8 @@ fn arm_and_disarm_change_the_state() -> Result<()> {
     assert_eq!(controller.client()?.status()?.state, State::Disarmed);
     succeeded(&link(&controller, &["set", "deadline", "100"], b"")?)?;
     assert_eq!(succeeded(&link(&controller, &["get", "deadline"], b"")?)?, "100\n");
-    let told = succeeded(&link(&controller, &["watch", "--once"], b"")?)?;
-    assert!(told.contains("state                 disarmed"), "{told}");
+    let printed = succeeded(&link(&controller, &["watch", "--once"], b"")?)?;
+    assert!(printed.contains("state                 disarmed"), "{printed}");
     Ok(())
 }
 
@@ -75,8 +75,8 @@ fn serve_answers_a_simulator_then_disarms() -> Result<()> {
     let (observation, bits) = observation(&slot)?;
     let input = [&[RESET][..], &step_request(&observation), &[RESET], &step_request(&observation)].concat();
     let output = link(&controller, &["serve"], &input)?;
-    let told: Vec<u32> = answered(&output)?.as_chunks().0.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect();
-    assert_eq!(told, [&bits[..], &bits].concat());
+    let actions: Vec<u32> = answered(&output)?.as_chunks().0.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect();
+    assert_eq!(actions, [&bits[..], &bits].concat());
     // While armed, the answers are the targets of the outputs: within the limits, the same values.
     let begun = Instant::now();
     loop {
@@ -107,13 +107,13 @@ fn a_host_that_never_reads_causes_no_reset() -> Result<()> {
     let watchdog = Duration::from_millis(TIMEOUTS.turn.into());
     thread::sleep(4 * watchdog);
     // The dropped answers are missing before the first one after them.
-    let (mut answers, mut told, begun) = (Receiver::<{ frame::bytes(64) }>::new(), None, Instant::now());
+    let (mut answers, mut last, begun) = (Receiver::<{ frame::bytes(64) }>::new(), None, Instant::now());
     while answers.counters().lost == 0 {
-        ensure!(begun.elapsed() < HANG, "expected missing answers: {told:?}");
+        ensure!(begun.elapsed() < HANG, "expected missing answers: {last:?}");
         match host.read(&mut buffer) {
             Ok(count) => buffer[..count].iter().for_each(|byte| {
                 if let Some(Message::Status(status)) = answers.push(*byte).map(|received| received.message) {
-                    told = Some(status);
+                    last = Some(status);
                 }
             }),
             Err(error) => ensure!(matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut), "{error}"),
@@ -121,7 +121,7 @@ fn a_host_that_never_reads_causes_no_reset() -> Result<()> {
     }
     let Counters { damaged, malformed, repeated, .. } = answers.counters();
     assert_eq!([damaged, malformed, repeated], [0; 3]);
-    assert_eq!(told.context("no status came")?.reset, ResetCause::Unknown);
+    assert_eq!(last.context("no status came")?.reset, ResetCause::Unknown);
     Ok(())
 }
 

@@ -17,8 +17,8 @@ fn the_search_keeps_the_error_with_fewest_bits() -> Result<()> {
         let nmse = fixture.nmse("fewest.actq")?;
         ensure!(nmse <= 0.02, "{method}: {nmse}");
         // The same bytes as with the budget itself; a tenth of a bit less is too few.
-        let said = succeeded(&fixture.quantize(&format!("--out again.actq --method {method} --max-nmse 0.02"))?)?;
-        let line = said.lines().find(|l| l.contains("keep the error within 0.02")).context("no result")?;
+        let printed = succeeded(&fixture.quantize(&format!("--out again.actq --method {method} --max-nmse 0.02"))?)?;
+        let line = printed.lines().find(|l| l.contains("keep the error within 0.02")).context("no result")?;
         let budget: f64 = line.split_whitespace().next().context("no budget")?.parse()?;
         let less = budget - 0.1;
         ensure!(line.contains(&format!("{less:.1} is too few")), "{line}");
@@ -32,8 +32,8 @@ fn the_search_keeps_the_error_with_fewest_bits() -> Result<()> {
 }
 
 /// Returns the steps of every try, from the table of tries.
-fn steps_tried(said: &str) -> Vec<&str> {
-    let cells = said.lines().skip(1).map(|line| line.split_whitespace().nth(1));
+fn steps_tried(printed: &str) -> Vec<&str> {
+    let cells = printed.lines().skip(1).map(|line| line.split_whitespace().nth(1));
     cells.map_while(|steps| steps).collect()
 }
 
@@ -41,19 +41,19 @@ fn steps_tried(said: &str) -> Vec<&str> {
 fn learning_methods_search_with_few_steps() -> Result<()> {
     let fixture = Fixture::new()?;
     let options = "--method best --steps 40 --max-nmse 0.05";
-    let said = succeeded(&fixture.quantize(&format!("--out a.actq {options}"))?)?;
-    let steps = steps_tried(&said);
+    let printed = succeeded(&fixture.quantize(&format!("--out a.actq {options}"))?)?;
+    let steps = steps_tried(&printed);
     let looks = steps.iter().take_while(|s| **s == "5").count();
-    ensure!((1..=6).contains(&looks) && (1..=5).contains(&(steps.len() - looks)), "{said}");
-    ensure!(steps[looks..].iter().all(|s| *s == "40"), "{said}");
-    ensure!(fixture.nmse("a.actq")? <= 0.05, "{said}");
+    ensure!((1..=6).contains(&looks) && (1..=5).contains(&(steps.len() - looks)), "{printed}");
+    ensure!(steps[looks..].iter().all(|s| *s == "40"), "{printed}");
+    ensure!(fixture.nmse("a.actq")? <= 0.05, "{printed}");
     succeeded(&fixture.quantize(&format!("--out b.actq {options} --threads 1"))?)?;
     ensure!(fs::read(fixture.path("a.actq"))? == fs::read(fixture.path("b.actq"))?, "two runs differ");
     // Without steps there is no eighth of them.
-    let said = succeeded(&fixture.quantize("--out c.actq --method best --steps 0 --max-nmse 0.3")?)?;
-    let steps = steps_tried(&said);
-    ensure!(!steps.is_empty() && steps.iter().all(|s| *s == "0"), "{said}");
-    ensure!(fixture.nmse("c.actq")? <= 0.3, "{said}");
+    let printed = succeeded(&fixture.quantize("--out c.actq --method best --steps 0 --max-nmse 0.3")?)?;
+    let steps = steps_tried(&printed);
+    ensure!(!steps.is_empty() && steps.iter().all(|s| *s == "0"), "{printed}");
+    ensure!(fixture.nmse("c.actq")? <= 0.3, "{printed}");
     Ok(())
 }
 

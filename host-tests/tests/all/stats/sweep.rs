@@ -15,7 +15,7 @@ fn a_sweep_stores_allocations_and_scores() -> Result<()> {
     fs::rename(other.policy(), fixture.path("other"))?;
     let line =
         "sweep policy other --bpw 2.5,3.5,5 --methods actquant,best --steps 3 --threads 2 --json s.json --svg s.svg";
-    let said = succeeded(&fixture.actq(line)?)?;
+    let printed = succeeded(&fixture.actq(line)?)?;
     let value: Value = serde_json::from_slice(&fs::read(fixture.path("s.json"))?)?;
     assert_eq!(value.as_array().map(Vec::len), Some(2));
     let stars = |v: &Value| usize::from(!v["knee"].is_null());
@@ -30,8 +30,8 @@ fn a_sweep_stores_allocations_and_scores() -> Result<()> {
         }
     }
     assert_eq!(value[0], value[1], "the same policy in two folders");
-    let marked = said.lines().filter(|l| !l.starts_with('*')).map(|l| l.matches('*').count()).sum::<usize>();
-    assert_eq!(marked, stars(&value[0]) + stars(&value[1]), "{said}");
+    let marked = printed.lines().filter(|l| !l.starts_with('*')).map(|l| l.matches('*').count()).sum::<usize>();
+    assert_eq!(marked, stars(&value[0]) + stars(&value[1]), "{printed}");
     assert_eq!(fs::read_to_string(fixture.path("s.svg"))?.matches("<polyline").count(), 4);
     let seed = |n: u32| -> Result<Value> {
         succeeded(&fixture.actq(&format!("sweep policy --bpw 4 --methods best --steps 3 --seed {n} --json t.json"))?)?;
