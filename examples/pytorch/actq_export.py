@@ -1,22 +1,22 @@
 #!/usr/bin/env python3
-"""From a PyTorch module to a policy's folder for actq.
+"""Export a PyTorch module as a policy folder for actq.
 
     from actq_export import export
     export(actor, observations, "policies/walker")
 
-`actor` is an nn.Module that takes one batch of observations, or several (a tuple of arrays), and gives actions: Sequential, Linear,
-activations, norms, residual blocks. A recurrent one takes its states behind the observations and gives the next ones behind the
+`actor` is an nn.Module from a batch of observations, or several batches (a tuple of arrays), to actions: Sequential, Linear,
+activations, norms, residual blocks. A recurrent module takes its states after the observations, and returns the next states after the
 action; `states` names them with their shapes:
 
     export(actor, observations, "policies/walker", states={"h": (1, 1, 64), "c": (1, 1, 64)})
 
-`observations` are those that the policy has seen, [frame, value] or [episode, step, value] (several inputs: joined in order); the
-quantizer learns from them. As a command, for a module that torch.save has written whole:
+`observations` are recorded observations of the policy, [frame, value] or [episode, step, value] (several inputs: concatenated in
+order); the quantizer learns from them. As a command, for a whole module written by torch.save:
 
     actq_export.py actor.pt obs.npy policies/walker
 
-Needs torch and numpy, and actq in PATH (or where ACTQ names it). torch.onnx writes the file; actq reads it and refuses, by name, what
-it cannot take.
+Needs torch and numpy, and actq in PATH (or the path in ACTQ). torch.onnx writes the file; actq reads it, and names each operation that
+it refuses.
 """
 import argparse
 import os
@@ -31,10 +31,10 @@ import torch
 
 
 def export(module, observations, folder, sizes=None, states=None, check=False, force=False):
-    """Writes policy.json, policy.safetensors and calib.npz to `folder`; gives what actq says of them.
+    """Writes policy.json, policy.safetensors and calib.npz to `folder`, and returns the report of actq.
 
-    sizes: lengths of the module's inputs, where it has several; their sum is that of an observation.
-    states: names and shapes of a recurrent module's states, a batch of 1 included.
+    sizes: lengths of the module's inputs, if it has several; their sum is the length of an observation.
+    states: names and shapes of a recurrent module's states, including a batch of 1.
     check: compares with onnxruntime, which must be installed beside this torch.
     """
     observations = numpy.asarray(observations, numpy.float32)
@@ -67,7 +67,7 @@ def write_onnx(module, inputs, path, names, states):
     module.eval()
     try:
         with torch.no_grad(), warnings.catch_warnings(), mock.patch.object(torch.nn.RMSNorm, "forward", rms_norm):
-            # The exporter that traces needs no package beside torch. It warns of its age, and of a fixed batch.
+            # The tracing exporter needs only torch. It warns of its age, and of a fixed batch.
             warnings.simplefilter("ignore")
             torch.onnx.export(
                 module,
@@ -83,7 +83,7 @@ def write_onnx(module, inputs, path, names, states):
 
 
 def rms_norm(self, x):
-    """nn.RMSNorm in operations that the tracing exporter knows."""
+    """Expresses nn.RMSNorm by operations that the tracing exporter supports."""
     axes = tuple(range(-len(self.normalized_shape), 0))
     eps = torch.finfo(x.dtype).eps if self.eps is None else self.eps
     y = x * torch.rsqrt((x * x).mean(axes, keepdim=True) + eps)
@@ -92,11 +92,11 @@ def rms_norm(self, x):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("module", help="what torch.save(module, FILE) has written; it is unpickled, so only from whom you trust")
+    parser.add_argument("module", help="a file written by torch.save(module, FILE); it is unpickled: use only trusted files")
     parser.add_argument("observations", help="an .npy array")
     parser.add_argument("folder", help="the policy's folder")
     parser.add_argument("--check", action="store_true", help="compare with onnxruntime")
-    parser.add_argument("--force", action="store_true", help="replace files that are there")
+    parser.add_argument("--force", action="store_true", help="replace existing files")
     args = parser.parse_args()
     module = torch.load(args.module, map_location="cpu", weights_only=False)
     print(export(module, numpy.load(args.observations), args.folder, check=args.check, force=args.force), end="")

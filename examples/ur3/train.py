@@ -16,7 +16,7 @@ from torch.nn import functional as F
 CHUNK, EXECUTE, ACT_DIM, CONTROL_HZ = 8, 4, 6, 50
 BLOCKS, CLIP, EPS = 3, 5.0, 1e-5
 WIDTH = {"residual": 320, "flow": 256}
-# Of the flow: Euler steps, and what the network reads the time by (in turns).
+# Flow: Euler steps, and the frequencies of the time code (cosine and sine alternate).
 STEPS, FREQUENCIES = 5, [0.25, 0.5, 1.0, 2.0]
 # The command limits of the simulated arm, rad/s.
 LIMIT = [1.5, 1.5, 1.5, 2.0, 2.0, 2.0]
@@ -33,7 +33,7 @@ class Block(nn.Module):
 
 
 class Trunk(nn.Module):
-    """Normalised observation, and what else a head reads -> values of a normalised chunk, flattened step by step."""
+    """Normalised observation and further inputs of a head -> values of a normalised chunk, flattened step by step."""
 
     def __init__(self, obs_mean, obs_scale, width, others=0):
         super().__init__()
@@ -76,7 +76,7 @@ class Flow(Trunk):
         return self(obs, angle.cos(), angle.sin(), x)
 
     def loss(self, obs, target):
-        # Only the times at which the steps ask.
+        # Only the times of the Euler steps.
         time = torch.randint(STEPS, (len(obs), 1)) / STEPS
         noise = torch.randn_like(target)
         return F.mse_loss(self.velocity(obs, time, noise + time * (target - noise)), target - noise)
@@ -89,7 +89,7 @@ class Flow(Trunk):
 
 
 def op_list(flow):
-    """The network as the list of operations in policy.json."""
+    """Returns the network as the list of operations in policy.json."""
 
     def linear(name):
         return {"op": "linear", "w": f"{name}.weight", "b": f"{name}.bias"}
@@ -108,7 +108,7 @@ def op_list(flow):
             {"op": "relu"},
             {"op": "add", "with": f"h{i}", "save": f"h{i + 1}"},
         ]
-    # Nothing adds the last block's output again.
+    # No operation reads the last block's saved output.
     del ops[-1]["save"]
     return ops + [layernorm("ln"), linear("out")]
 
@@ -161,7 +161,7 @@ def main():
     action_mean, action_std = action.mean((0, 1)), action.std((0, 1))
     target = ((action - action_mean) / action_std).flatten(1)
 
-    # The last episodes are kept for validation.
+    # The last episodes are held out for validation.
     n_train = len(obs) * 19 // 20
     head = (Flow if args.head == "flow" else Residual)(obs[:n_train].mean(0), 1 / obs[:n_train].std(0))
     steps = args.epochs * (n_train // args.batch)
