@@ -18,13 +18,13 @@ use crate::qemu::{in_slot, spawn};
 
 /// Time without the awaited event after which QEMU counts as hung. No result depends on it: a busy machine, which runs
 /// QEMU slowly, stays far below it, and a test waits for it only on a failure.
-pub const HANG: Duration = Duration::from_secs(600);
+pub const HANG_TIMEOUT: Duration = Duration::from_secs(600);
 
 /// log2 of the nanoseconds per instruction: 32 ns.
 const INSTRUCTION: u32 = 5;
 
 /// Period of the checks for a refused observation.
-const LOOK: Duration = Duration::from_millis(500);
+const REFUSAL_CHECK_PERIOD: Duration = Duration::from_millis(500);
 
 /// An application under QEMU with a socket as its serial port. Dropping the value ends it.
 #[derive(Debug)]
@@ -53,8 +53,8 @@ impl Controller {
         let begun = Instant::now();
         // The socket appears in its folder a moment before QEMU listens. A connection opened then is closed at once.
         while !(controller.address().open().is_ok() && controller.monitor().open().is_ok()) {
-            if begun.elapsed() > HANG {
-                bail!("QEMU did not open its serial port in {HANG:?}");
+            if begun.elapsed() > HANG_TIMEOUT {
+                bail!("QEMU did not open its serial port in {HANG_TIMEOUT:?}");
             }
             std::thread::sleep(Duration::from_millis(5));
         }
@@ -78,7 +78,7 @@ impl Controller {
 
     /// Connects a host to the serial port.
     pub fn client(&self) -> Result<Client> {
-        Ok(Client::new(Connection::open(self.address(), HANG)?, HANG))
+        Ok(Client::new(Connection::open(self.address(), HANG_TIMEOUT)?, HANG_TIMEOUT))
     }
 
     fn monitor(&self) -> Address {
@@ -98,7 +98,10 @@ fn monitor(folder: &TempDir) -> PathBuf {
 fn answered(monitor: &mut dyn Port) -> Result<()> {
     let (begun, mut reply) = (Instant::now(), String::new());
     while !reply.contains("\"return\"") {
-        ensure!(!reply.contains("\"error\"") && begun.elapsed() < HANG, "QEMU's monitor command failed: {reply:?}");
+        ensure!(
+            !reply.contains("\"error\"") && begun.elapsed() < HANG_TIMEOUT,
+            "QEMU's monitor command failed: {reply:?}"
+        );
         let mut bytes = [0; 512];
         match monitor.read(&mut bytes) {
             Ok(count) => reply += &String::from_utf8_lossy(bytes.get(..count).unwrap_or_default()),
@@ -116,9 +119,9 @@ pub fn act(client: &mut Client, observation: &[f32]) -> Result<(bool, Vec<f32>)>
     let known = |status: &Status| (status.refused, status.token);
     let (begun, mut before) = (Instant::now(), known(&client.status()?));
     let mut number = client.observe(observation)?;
-    while begun.elapsed() < HANG {
+    while begun.elapsed() < HANG_TIMEOUT {
         let looked = Instant::now();
-        while looked.elapsed() < LOOK {
+        while looked.elapsed() < REFUSAL_CHECK_PERIOD {
             for event in client.events()? {
                 if let Event::Action { of, applied, values, .. } = event
                     && of == number
@@ -141,7 +144,7 @@ pub fn act(client: &mut Client, observation: &[f32]) -> Result<(bool, Vec<f32>)>
 /// again.
 pub fn act_in_order(client: &mut Client, observations: &[Vec<f32>]) -> Result<Vec<(bool, Vec<f32>)>> {
     let begun = Instant::now();
-    while begun.elapsed() < HANG {
+    while begun.elapsed() < HANG_TIMEOUT {
         client.disarm()?;
         let token = client.status()?.token;
         let actions = observations.iter().map(|observation| act(client, observation)).collect::<Result<_>>()?;
@@ -153,14 +156,14 @@ pub fn act_in_order(client: &mut Client, observations: &[Vec<f32>]) -> Result<Ve
 }
 
 /// Polls the status until `wanted` accepts it.
-pub fn until(client: &mut Client, what: &str, mut wanted: impl FnMut(&Status) -> bool) -> Result<Status> {
+pub fn wait_until(client: &mut Client, what: &str, mut wanted: impl FnMut(&Status) -> bool) -> Result<Status> {
     let begun = Instant::now();
     loop {
         let status = client.status().with_context(|| format!("cannot wait until {what}"))?;
         if wanted(&status) {
             return Ok(status);
         }
-        if begun.elapsed() > HANG {
+        if begun.elapsed() > HANG_TIMEOUT {
             bail!("timeout waiting until {what}: {status:?}");
         }
     }

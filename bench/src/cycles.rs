@@ -98,7 +98,7 @@ impl Code {
             };
             ensure!(follows <= executed.count, "the counts at {:#x} contradict each other", executed.address);
             let mut cycles = (executed.count - follows) * instruction.cycles();
-            cycles += follows * behind.map_or(0, |before| instruction.cycles_behind(before));
+            cycles += follows * behind.map_or(0, |before| instruction.cycles_after(before));
             if instruction.class == Class::Conditional {
                 cycles += executed.jumps * REFILL;
             }

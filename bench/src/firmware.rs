@@ -46,7 +46,7 @@ pub const STYLE_NAMES: [&str; 3] = ["bare", "rtic", "embassy"];
 static BUILT: Mutex<BTreeMap<(&str, Target), PathBuf>> = Mutex::new(BTreeMap::new());
 
 /// Builds each name once for a target.
-fn once(what: &'static str, target: Target, build: impl FnOnce() -> Result<PathBuf>) -> Result<PathBuf> {
+fn build_once(what: &'static str, target: Target, build: impl FnOnce() -> Result<PathBuf>) -> Result<PathBuf> {
     // A build that panicked has left nothing in the map.
     let mut built = BUILT.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     if let Some(folder) = built.get(&(what, target)) {
@@ -61,7 +61,7 @@ fn once(what: &'static str, target: Target, build: impl FnOnce() -> Result<PathB
 /// the path of the ELF file. Other images run from the slot.
 pub fn harness(target: Target) -> Result<PathBuf> {
     let build = || harness_in_folder(target, built_in()?);
-    Ok(once(HARNESS, target, build)?.join(HARNESS))
+    Ok(build_once(HARNESS, target, build)?.join(HARNESS))
 }
 
 /// Builds the harness with `image` built in.
@@ -85,7 +85,7 @@ pub fn controller(target: Target, features: &'static str) -> Result<PathBuf> {
 pub fn controller_of_key(target: Target, features: &'static str, key: &str) -> Result<PathBuf> {
     let build = || controller_in_folder(target, features, key, built_in()?);
     let what = if features.is_empty() { CONTROLLER } else { features };
-    Ok(once(what, target, build)?.join(CONTROLLER))
+    Ok(build_once(what, target, build)?.join(CONTROLLER))
 }
 
 /// Builds the application with `image` built in.
@@ -109,7 +109,7 @@ pub fn style(name: &str) -> Result<PathBuf> {
         let image = built_in()?.to_string_lossy();
         build(STYLES, &STYLE_NAMES, "", &target_dir(), target, target.profile(), &[("ACTQ_IMAGE", &image)])
     };
-    Ok(once(STYLES, target, build)?.join(name))
+    Ok(build_once(STYLES, target, build)?.join(name))
 }
 
 /// Builds the binaries of `firmware-bench` that run on a target's board, and returns the path of one's ELF file.
@@ -118,7 +118,7 @@ pub fn binary(name: &str, target: Target) -> Result<PathBuf> {
     ensure!(board.binaries.contains(&name), "firmware {name} does not run on {}", board.name);
     let features = target.feature().unwrap_or_default();
     let build = || build(BENCH, board.binaries, features, &target_dir(), target, target.profile(), &[]);
-    Ok(once(BENCH, target, build)?.join(name))
+    Ok(build_once(BENCH, target, build)?.join(name))
 }
 
 /// Does the same as [`binary`] with a profile of `Cargo.toml` that is not the target's own.

@@ -309,7 +309,7 @@ impl Instruction {
     }
 
     /// Returns the cycles after `before`.
-    pub(crate) fn cycles_behind(&self, before: &Self) -> u64 {
+    pub(crate) fn cycles_after(&self, before: &Self) -> u64 {
         let memory = matches!(self.class.kind(), Kind::Load | Kind::Store);
         let address_comes_late = before.writes & self.address != 0;
         let computed = matches!(before.class.kind(), Kind::Alu | Kind::Multiply) || before.class == Class::FloatMove;
@@ -443,11 +443,11 @@ mod tests {
         let other = ldr([0x9a01, 0]); // ldr r2, [sp, #4]
         let chained = ldr([0x680a, 0]); // ldr r2, [r1]
         let address = ldr([0x1889, 0]); // adds r1, r1, r2
-        assert_eq!((load.cycles(), other.cycles_behind(&load), chained.cycles_behind(&load)), (2, 1, 2));
-        assert_eq!(chained.cycles_behind(&address), 3);
+        assert_eq!((load.cycles(), other.cycles_after(&load), chained.cycles_after(&load)), (2, 1, 2));
+        assert_eq!(chained.cycles_after(&address), 3);
         let multiply = ldr([0xee24, 0x4a80]); // vmul.f32 s8, s9, s0
         let add = ldr([0xee38, 0x4a04]); // vadd.f32 s8, s16, s8
-        assert_eq!((add.cycles(), add.cycles_behind(&multiply)), (1, 2));
+        assert_eq!((add.cycles(), add.cycles_after(&multiply)), (1, 2));
     }
 
     #[test]

@@ -8,11 +8,11 @@
 
 mod arm;
 mod bits;
+mod disturbance;
 mod line;
 mod rig;
-mod trouble;
 
-pub use bits::foreign;
+pub use bits::count_foreign;
+pub use disturbance::{Disturbance, Run};
 pub use line::{Line, Noise, Tally};
 pub use rig::{Progress, Reaction, Rig};
-pub use trouble::{Run, Trouble};

@@ -5,17 +5,17 @@ use std::collections::{BTreeMap, BTreeSet};
 use anyhow::{Context as _, Result, bail, ensure};
 
 use super::program::{Function, Half, Program};
-use super::step::{LR, Step, zero_behind};
+use super::step::{LR, Step, zero_after};
 use crate::instruction::{Class, Instruction};
 
 /// Registers that a call may change: r0 to r3, r12 and the link register (AAPCS).
-const CHANGED: u32 = 0x500f;
+const CALLER_SAVED: u32 = 0x500f;
 
 /// The filler of an assembler for words, unless it is 0.
 const NOP: u16 = 0xbf00;
 
 /// Bytes before a computed branch in which the address of the branches is taken.
-const ADDRESSED: u32 = 32;
+const ADDRESS_WINDOW: u32 = 32;
 
 /// Returns the register and the address of ADR.
 fn address_of(at: u32, first: u16, second: u16) -> Option<(u32, u32)> {
@@ -126,7 +126,7 @@ impl Walk<'_> {
         self.reached.insert(at);
         let mut after = State {
             link: state.link & !(instruction.writes | instruction.address),
-            zero: zero_behind(state.zero, first, second),
+            zero: zero_after(state.zero, first, second),
             ..state
         };
         Ok(match step {
@@ -185,7 +185,7 @@ impl Walk<'_> {
             Step::Call(_) | Step::CallRegister => {
                 let callee = if let Step::Call(to) = step { Callee::Function(to) } else { Callee::Pointer };
                 self.call(callee, state);
-                after = State { link: after.link & !CHANGED, zero: None, ..after };
+                after = State { link: after.link & !CALLER_SAVED, zero: None, ..after };
                 // If no code follows, the callee does not return.
                 if self.holds(next) { vec![(next, after)] } else { Vec::new() }
             }
@@ -275,7 +275,7 @@ impl Walk<'_> {
     /// Returns the addresses of the branches, four bytes each, from `begin` on, at a word boundary, one of whose
     /// addresses `register` holds. The last of them may be followed by an unrelated branch; its path exists, too.
     fn branches(&self, at: u32, register: u32, begin: u32) -> Result<Vec<u32>> {
-        let before: Vec<(u32, [u16; 2])> = (self.reached.range(at.saturating_sub(ADDRESSED)..at))
+        let before: Vec<(u32, [u16; 2])> = (self.reached.range(at.saturating_sub(ADDRESS_WINDOW)..at))
             .filter_map(|&before| Some((before, self.program.halves(before)?)))
             .collect();
         // ADD of a register, shifted by 2, to the address from ADR.

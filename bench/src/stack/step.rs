@@ -81,7 +81,7 @@ fn equal(condition: u32) -> Option<bool> {
 }
 
 /// Returns the flag Z after an instruction outside IT, if known.
-pub(super) fn zero_behind(before: Option<bool>, first: u16, second: u16) -> Option<bool> {
+pub(super) fn zero_after(before: Option<bool>, first: u16, second: u16) -> Option<bool> {
     let sets = match Instruction::decode(first, second) {
         Instruction { size: 2, .. } => first < 0x4600,
         Instruction { class: Class::Alu, .. } if first >> 8 == 0xfa => first & 0x90 == 0x10 && second & 0xf0 == 0,
@@ -301,14 +301,14 @@ mod tests {
     #[test]
     fn flag_z_is_known_only_after_constants() {
         for before in [None, Some(false), Some(true)] {
-            let behind = |first, second| zero_behind(before, first, second);
-            assert_eq!([behind(0x2401, 0), behind(0x2400, 0)], [Some(false), Some(true)]); // movs
-            assert_eq!([behind(0x4280, 0), behind(0xebb0, 0x0f00)], [Some(true); 2]); // cmp r0, r0
+            let after = |first, second| zero_after(before, first, second);
+            assert_eq!([after(0x2401, 0), after(0x2400, 0)], [Some(false), Some(true)]); // movs
+            assert_eq!([after(0x4280, 0), after(0xebb0, 0x0f00)], [Some(true); 2]); // cmp r0, r0
             // cmp r1, r0; adds.w r4, r5, r6; vmrs APSR_nzcv, fpscr; msr apsr_nzcvq, r0
-            let unknown = [behind(0x4281, 0), behind(0xeb15, 0x0406), behind(0xeef1, 0xfa10), behind(0xf380, 0x8800)];
+            let unknown = [after(0x4281, 0), after(0xeb15, 0x0406), after(0xeef1, 0xfa10), after(0xf380, 0x8800)];
             assert_eq!(unknown, [None; 4]);
             // uxtb16 r2, r3; smlawb r2, r3, r4, r5; stmdb sp!, {r2, r7-r9}; mov r4, r5
-            let kept = [behind(0xfa3f, 0xf283), behind(0xfb33, 0x5204), behind(0xe92d, 0x0384), behind(0x462c, 0)];
+            let kept = [after(0xfa3f, 0xf283), after(0xfb33, 0x5204), after(0xe92d, 0x0384), after(0x462c, 0)];
             assert_eq!(kept, [before; 4]);
         }
     }

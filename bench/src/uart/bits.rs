@@ -21,7 +21,7 @@ fn bits(action: &[f32]) -> Vec<u32> {
 /// Counts the board's actions, in their order, that no head of these images computes on their observations: continued
 /// from the previous action, from a reset, or as the first action of the next image. Also counts the restarts of a
 /// head.
-pub fn foreign(
+pub fn count_foreign(
     reported: &[HeadAction],
     shown: &HashMap<u32, Vec<f32>>,
     images: &[Image<'_>],

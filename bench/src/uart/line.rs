@@ -24,7 +24,7 @@ pub struct Noise {
 }
 
 /// The longest delay of a frame, µs.
-const LATEST: f64 = 150_000.0;
+const MAX_DELAY: f64 = 150_000.0;
 
 /// Counts of the frames to the board.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -103,7 +103,7 @@ impl Wire {
             tally.dropped += 1;
         } else if falls(noise.delay) {
             tally.delayed += 1;
-            self.waiting.push((now + (LATEST * random.unit()) as u64, frame));
+            self.waiting.push((now + (MAX_DELAY * random.unit()) as u64, frame));
         } else if falls(noise.duplicate) {
             tally.duplicated += 1;
             self.waiting.extend([(now, frame.clone()), (now, frame)]);

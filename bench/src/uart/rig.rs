@@ -20,7 +20,7 @@ use anyhow::{Context as _, Result, ensure};
 use super::arm::{Arm, TICKS};
 use super::bits::HeadAction;
 use super::line::Line;
-use crate::controller::{Controller, HANG};
+use crate::controller::{Controller, HANG_TIMEOUT};
 
 /// Ticks per second of the application.
 const TICK_HZ: f32 = 1000.0;
@@ -29,19 +29,19 @@ const TICK_HZ: f32 = 1000.0;
 const MAX_AGE: f32 = 200_000.0;
 
 /// Ticks between two reports: the resolution of the controller's time.
-const REPORTS: f32 = 5.0;
+const REPORT_PERIOD: f32 = 5.0;
 
 /// Ticks to wait for an observation's action. A control step takes 20; but on a busy machine QEMU's serial port is
 /// slower than a real one, and the arm's time then waits for it.
-const ANSWER: u64 = 60;
+const ANSWER_TIMEOUT: u64 = 60;
 
 /// Ticks from one observation to the next above which the host was delayed: five control steps, a fifth of the
 /// deadline.
-const LATE: u64 = 100;
+const DELAYED_HOST: u64 = 100;
 
 /// Settings that a reset clears.
 fn set_up(client: &mut Client) -> Result<()> {
-    client.set(Parameter::StatusPeriod, 0, REPORTS)?;
+    client.set(Parameter::StatusPeriod, 0, REPORT_PERIOD)?;
     client.set(Parameter::MaxAge, 0, MAX_AGE)
 }
 
@@ -107,10 +107,10 @@ impl Rig {
         let line = Line::new(controller.address().open().context("the board's serial port")?, seed);
         let end = line.clone();
         let open = Box::new(move || Ok(end.host_end()));
-        let mut connection = Connection::open_with("the line".to_owned(), open, HANG)?;
+        let mut connection = Connection::open_with("the line".to_owned(), open, HANG_TIMEOUT)?;
         let clock = line.clone();
         connection.set_clock(Box::new(move || clock.now() as u32));
-        let mut client = Client::new(connection, HANG);
+        let mut client = Client::new(connection, HANG_TIMEOUT);
         let status = client.status()?;
         set_up(&mut client)?;
         line.heard();
@@ -153,13 +153,17 @@ impl Rig {
             self.listen()?;
         }
         // A report in each tick gives exact times, and keeps QEMU busy.
-        self.client.set(Parameter::StatusPeriod, 0, if exact { 1.0 } else { REPORTS })?;
+        self.client.set(Parameter::StatusPeriod, 0, if exact { 1.0 } else { REPORT_PERIOD })?;
         self.arm.begin(seed);
         let begun = Instant::now();
         while self.status.state != State::Armed {
             self.exchange()?;
             self.supervise()?;
-            ensure!(begun.elapsed() < HANG, "the controller did not arm in {HANG:?}: {:?}", self.status);
+            ensure!(
+                begun.elapsed() < HANG_TIMEOUT,
+                "the controller did not arm in {HANG_TIMEOUT:?}: {:?}",
+                self.status
+            );
         }
         self.reaction = None;
         self.disturbed = false;
@@ -180,16 +184,20 @@ impl Rig {
         let number = self.client.observe(&observation)?;
         self.shown.insert(number, observation.to_vec());
         let (begun, from) = (Instant::now(), self.time);
-        self.disturbed |= from - self.sent > LATE;
+        self.disturbed |= from - self.sent > DELAYED_HOST;
         self.sent = from;
         loop {
             let passed = self.time - from;
             let answered = self.reported.last().is_some_and(|reported| reported.of == number);
-            if passed >= TICKS.into() && (answered || passed >= ANSWER) {
+            if passed >= TICKS.into() && (answered || passed >= ANSWER_TIMEOUT) {
                 break;
             }
             self.listen()?;
-            ensure!(begun.elapsed() < HANG, "the controller was silent for {HANG:?}: {:?}", self.status);
+            ensure!(
+                begun.elapsed() < HANG_TIMEOUT,
+                "the controller was silent for {HANG_TIMEOUT:?}: {:?}",
+                self.status
+            );
         }
         Ok(())
     }

@@ -13,7 +13,7 @@ use actq_bench::{shared_policies, ur3};
 use actq_kernels::Width;
 use anyhow::Result;
 
-use crate::recorded::ROOM;
+use crate::recorded::TOLERANCE;
 
 fn image(quantizer: &Quantizer<'_>, options: &Options) -> Result<Vec<u8>> {
     Ok(quantizer.quantize(options, |_, _| {})?.image)
@@ -155,7 +155,7 @@ fn shared_policies_keep_their_errors() -> Result<()> {
         for (bits, steps, nmse) in recorded {
             let options = Options { steps, ..Options::new(Method::Best, Budget::BitsPerWeight(bits)) };
             let found = report(&dir, &image(&quantizer, &options)?)?;
-            assert!(found.nmse < ROOM * nmse, "{name} at {bits} bits: {}, recorded {nmse}", found.nmse);
+            assert!(found.nmse < TOLERANCE * nmse, "{name} at {bits} bits: {}, recorded {nmse}", found.nmse);
             assert!(found.bpw <= bits);
         }
     }

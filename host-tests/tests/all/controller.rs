@@ -35,9 +35,9 @@ const OBS: usize = 24;
 const ACT: usize = 3;
 const SECTOR: usize = 16 << 10;
 /// Pieces of a step between two polls of the line, each of which waits a millisecond for bytes.
-const SLICES: usize = 100;
+const SLICES_PER_TURN: usize = 100;
 /// Bytes read in a turn: fewer than an observation has, so that none is superseded before its step begins.
-const TURN: usize = 64;
+const BYTES_PER_TURN: usize = 64;
 /// Ticks without an observation.
 const DEADLINE: u32 = 500;
 
@@ -138,7 +138,7 @@ fn firmware(listener: &TcpListener, stop: &AtomicBool, built_in: &[u8], key: &[u
                 return Ok(());
             }
             let micros = 1000 * ticks;
-            let (mut out, mut sent, mut bytes) = ([0; 512], Vec::new(), [0; TURN]);
+            let (mut out, mut sent, mut bytes) = ([0; 512], Vec::new(), [0; BYTES_PER_TURN]);
             if port.is_none()
                 && let Ok((stream, _)) = {
                     listener.set_nonblocking(true)?;
@@ -179,7 +179,7 @@ fn firmware(listener: &TcpListener, stop: &AtomicBool, built_in: &[u8], key: &[u
                 stepping = head.begin(step.observation).is_ok().then_some(step.of);
             }
             // Some slices of the step, and its action after the last one.
-            for _ in 0..SLICES {
+            for _ in 0..SLICES_PER_TURN {
                 let acted = stepping.and_then(|of| match head.poll(budget) {
                     Ok(Poll::Pending) => None,
                     Ok(Poll::Ready(action)) => Some((of, Ok(action))),

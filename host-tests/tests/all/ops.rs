@@ -29,7 +29,7 @@ const RESET: usize = 25;
 /// of its input by at most amax / (2 x_max), and the random matrices keep the variance, so one product has an error of
 /// about 0.3 amax / x_max (one sigma), where amax is 2 to 4 RMS: one unit. Several products in a row, recurrence, and
 /// the largest of a hundred samples or more make it ten. A wrong operation is off by hundreds.
-const PARTS: f64 = 20.0;
+const ROUNDING_UNITS: f64 = 20.0;
 
 /// Error of rounding to f32, and of the functions themselves (`kernels/src/math/functions.rs`), after a few operations
 /// without weights.
@@ -71,7 +71,7 @@ fn rtn(policy: &Policy, group: usize) -> Result<Vec<Outcome>> {
 /// The largest error that activation rounding explains.
 fn bound(outcomes: &[Outcome]) -> f64 {
     let part = outcomes.iter().map(|o| 1.0 / f64::from(o.x_max)).fold(0.0, f64::max);
-    if part > 0.0 { PARTS * part } else { F32 }
+    if part > 0.0 { ROUNDING_UNITS * part } else { F32 }
 }
 
 /// Runs `work` with a head over the quantized policy.

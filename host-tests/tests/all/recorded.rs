@@ -13,7 +13,7 @@ use actq_bench::ur3;
 use anyhow::Result;
 
 /// Tolerance above a recorded figure: other processors round matrix products differently.
-pub(crate) const ROOM: f64 = 1.5;
+pub(crate) const TOLERANCE: f64 = 1.5;
 
 /// Episodes, from a seed that no recording or training used.
 const EPISODES: u64 = 40;
@@ -42,9 +42,9 @@ fn hold(method: Method, bits: f64, nmse: f64, tracking: f64) -> Result<(f64, usi
     let plain = Options::new(method, Budget::BitsPerWeight(bits));
     let found = figures(&Options { group: method.default_group(), steps: STEPS, ..plain })?;
     let text = format!("{method} at {bits} bits: NMSE, successes and tracking error are {found:?}");
-    assert!(found.0 < ROOM * nmse && found.1 as u64 == EPISODES && found.2 < ROOM * tracking, "{text}");
+    assert!(found.0 < TOLERANCE * nmse && found.1 as u64 == EPISODES && found.2 < TOLERANCE * tracking, "{text}");
     // A record far above the result checks nothing.
-    assert!(found.0 > nmse / ROOM, "{text}; record the smaller value");
+    assert!(found.0 > nmse / TOLERANCE, "{text}; record the smaller value");
     Ok(found)
 }
 

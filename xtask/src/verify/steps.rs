@@ -11,7 +11,7 @@ use crate::{firmware, setup};
 const OLDEST: &str = concat!(env!("CARGO_PKG_RUST_VERSION"), ".0");
 
 /// A host target with 32-bit words that runs on x86-64 Linux. `.cargo/config.toml` has its linker.
-const NARROW: &str = "i686-unknown-linux-musl";
+const TARGET_32_BIT: &str = "i686-unknown-linux-musl";
 
 /// The packages built only for boards.
 const FIRMWARE: [&str; 2] = ["actq-firmware-support", "actq-firmware-bench"];
@@ -46,8 +46,8 @@ impl Installed {
     /// Installs both if possible.
     pub(super) fn ensure() -> Self {
         let narrow = match cfg!(all(target_arch = "x86_64", target_os = "linux")) {
-            true => setup::rust_target(NARROW).map_err(|error| format!("{error:#}")),
-            false => Err(format!("this machine does not run {NARROW}")),
+            true => setup::rust_target(TARGET_32_BIT).map_err(|error| format!("{error:#}")),
+            false => Err(format!("this machine does not run {TARGET_32_BIT}")),
         };
         Self { oldest: setup::toolchain(OLDEST), narrow }
     }
@@ -169,7 +169,7 @@ impl Steps {
         let command = installed.map(|()| {
             let mut command = cargo();
             command.current_dir(root());
-            command.args(["test", "--release", "--package", "actq-kernels", "--target", NARROW]);
+            command.args(["test", "--release", "--package", "actq-kernels", "--target", TARGET_32_BIT]);
             command
         });
         self.0.push(Step { name: "kernels' tests with words of 32 bits".to_owned(), command });

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use actq::measure::eval;
 use actq::runtime::ImageBuffer;
-use actq_bench::controller::{Controller, act, until};
+use actq_bench::controller::{Controller, act, wait_until};
 use actq_bench::qemu::Counter;
 use actq_bench::stack::worst_case;
 use actq_bench::{Target, evaluation, firmware, ur3};
@@ -65,6 +65,6 @@ fn stack(target: Target, elf: &Path, observations: impl Iterator<Item = Vec<f32>
     }
     // The firmware looks at its stack periodically.
     let ticks = client.status()?.ticks;
-    until(&mut client, "later", |status| status.ticks.wrapping_sub(ticks) > 300)?;
+    wait_until(&mut client, "later", |status| status.ticks.wrapping_sub(ticks) > 300)?;
     Ok(client.timing()?.stack.into())
 }

@@ -15,19 +15,19 @@ use crate::{boards, heads, kernels};
 
 /// Tolerance above a budget, in percent, for a compiler other than the recorded one (the compiler is not pinned) and,
 /// for a head, another processor: widths and activations follow from sums that it may round otherwise.
-const SLACK: u64 = 2;
+const TOLERANCE_PERCENT: u64 = 2;
 
 /// Limit for the bytes of code of the runtime without sliced steps: 24 KiB for step and chunk policies, and 8 for
 /// products of values, five more functions, noise and the steps of flow and diffusion policies, the whole action
 /// contract and playback.
-const RUNTIME_MOST: u64 = 32 * 1024;
+const RUNTIME_LIMIT: u64 = 32 * 1024;
 
 /// Limits for the application: bytes of flash without its image, and bytes of RAM without its scratch memory.
-const APPLICATION_FLASH_MOST: u64 = 64 * 1024;
-const APPLICATION_RAM_MOST: u64 = 24 * 1024;
+const APPLICATION_FLASH_LIMIT: u64 = 64 * 1024;
+const APPLICATION_RAM_LIMIT: u64 = 24 * 1024;
 
 /// Functions to list if the runtime exceeds its budget.
-const SHOWN: usize = 20;
+const LISTED_FUNCTIONS: usize = 20;
 
 const HEAD: &str = "instructions of a step, ";
 
@@ -108,16 +108,16 @@ fn difference(budgets: &Figures, measured: &Figures) -> Vec<String> {
 /// application, which no budget raises.
 fn compare(budgets: &Budgets, measured: &Figures, rustc: &str) -> Vec<Excess> {
     let allowed = |name: &str| {
-        let slack = if budgets.rustc == rustc && !name.starts_with(HEAD) { 0 } else { SLACK };
+        let tolerance = if budgets.rustc == rustc && !name.starts_with(HEAD) { 0 } else { TOLERANCE_PERCENT };
         let most = match name {
-            RUNTIME => RUNTIME_MOST,
-            _ if name.starts_with(boards::FLASH) => APPLICATION_FLASH_MOST,
-            _ if name.starts_with(boards::RAM) => APPLICATION_RAM_MOST,
+            RUNTIME => RUNTIME_LIMIT,
+            _ if name.starts_with(boards::FLASH) => APPLICATION_FLASH_LIMIT,
+            _ if name.starts_with(boards::RAM) => APPLICATION_RAM_LIMIT,
             _ if name.starts_with(LOOP) => CODE_LINES,
             _ => u64::MAX,
         };
         let budget = budgets.figures.get(name).map_or(0, |budget| *budget.min(&most));
-        let allowed = budget + budget * slack / 100;
+        let allowed = budget + budget * tolerance / 100;
         // Loops are in assembler: every compiler gives the same.
         if most == CODE_LINES { allowed.min(most) } else { allowed }
     };
@@ -177,7 +177,7 @@ fn largest_functions(code: &Code) -> String {
     let mut functions: Vec<_> = code.functions().iter().collect();
     functions.sort_by_key(|function| std::cmp::Reverse(function.size));
     let mut rows = table(&["bytes", "function"]);
-    for function in functions.iter().take(SHOWN) {
+    for function in functions.iter().take(LISTED_FUNCTIONS) {
         rows.add_row([function.size.to_string(), function.name.clone()]);
     }
     rows.to_string()

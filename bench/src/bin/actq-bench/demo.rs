@@ -32,16 +32,16 @@ const STEPS: usize = 2000;
 
 /// The same for the flow, whose step evaluates the network five times; and the divisor of the episodes that it drives.
 const FLOW_STEPS: usize = 100;
-const FLOW_SHARE: u64 = 4;
+const FLOW_EPISODES_DIVISOR: u64 = 4;
 
 /// Episodes of the f32 policy to learn from, from seed 0: the 12 of `calib.npz` cover only a narrow part of the
 /// observations that the policy meets.
-const RECORDED: usize = 200;
+const RECORDED_EPISODES: usize = 200;
 
 /// Records the observations of the f32 policy's episodes.
 fn record(policy: &mut PolicyF32) -> Result<Dataset> {
-    let mut obs = Vec::with_capacity(RECORDED * EPISODE_STEPS * OBS_DIM);
-    for seed in 0..RECORDED as u64 {
+    let mut obs = Vec::with_capacity(RECORDED_EPISODES * EPISODE_STEPS * OBS_DIM);
+    for seed in 0..RECORDED_EPISODES as u64 {
         policy.reset();
         run_episode(seed, |observation| {
             obs.extend_from_slice(observation);
@@ -50,15 +50,15 @@ fn record(policy: &mut PolicyF32) -> Result<Dataset> {
     }
     Ok(Dataset {
         path: "episodes of f32".into(),
-        obs: Array3::from_shape_vec((RECORDED, EPISODE_STEPS, OBS_DIM), obs)?,
+        obs: Array3::from_shape_vec((RECORDED_EPISODES, EPISODE_STEPS, OBS_DIM), obs)?,
         action: None,
-        length: vec![EPISODE_STEPS; RECORDED],
+        length: vec![EPISODE_STEPS; RECORDED_EPISODES],
         state: None,
     })
 }
 
 /// The image that the motor controller runs.
-const IN_THE_APPLICATION: &str = "3.0 bits";
+const CONTROLLER_IMAGE: &str = "3.0 bits";
 
 /// The images of a policy, and how to try them.
 struct Trial<'a> {
@@ -97,7 +97,7 @@ pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
     let reach = Trial {
         name: "UR3 reach",
         dir: ur3(),
-        images: vec![("8 bits", eight), (IN_THE_APPLICATION, best(3.0, STEPS)), ("2.0 bits", best(2.0, STEPS))],
+        images: vec![("8 bits", eight), (CONTROLLER_IMAGE, best(3.0, STEPS)), ("2.0 bits", best(2.0, STEPS))],
         recorded: true,
         episodes,
         qemu_episodes,
@@ -107,12 +107,12 @@ pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
         dir: ur3_flow(),
         images: vec![("3.0 bits", best(3.0, FLOW_STEPS)), ("2.0 bits", best(2.0, FLOW_STEPS))],
         recorded: false,
-        episodes: (episodes / FLOW_SHARE).max(1),
-        qemu_episodes: (qemu_episodes / FLOW_SHARE).max(1),
+        episodes: (episodes / FLOW_EPISODES_DIVISOR).max(1),
+        qemu_episodes: (qemu_episodes / FLOW_EPISODES_DIVISOR).max(1),
     };
     let reports = [reach.run(&counter)?, flow.run(&counter)?];
     println!("\n{}", reports.join("\n"));
-    faults::some(&reach.path(IN_THE_APPLICATION))?;
+    faults::some(&reach.path(CONTROLLER_IMAGE))?;
     println!();
     let records = kernels::measure(&counter, 0)?;
     println!(
@@ -163,7 +163,7 @@ impl Trial<'_> {
 
         let mut report = Vec::new();
         let recordings = if recorded {
-            println!("Recording {RECORDED} episodes of the f32 policy to learn from");
+            println!("Recording {RECORDED_EPISODES} episodes of the f32 policy to learn from");
             Recordings { calib: Some(record(&mut reference)?), heldout: None }
         } else {
             Recordings::load(&policy)?

@@ -8,7 +8,7 @@ use actq::methods::{Method, Options};
 use actq::pipeline::quantize;
 use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
-use actq_bench::uart::{Rig, Run, Trouble, foreign};
+use actq_bench::uart::{Disturbance, Rig, Run, count_foreign};
 use actq_bench::{Target, firmware, ur3};
 use actq_cli::report::table::table;
 use actq_kernels::Image;
@@ -23,7 +23,7 @@ const SEED: u64 = 1;
 /// Attempts at an episode that fails, each undisturbed by this machine, before it counts as failed; and attempts of any
 /// kind, after which it is not judged.
 const ATTEMPTS: usize = 5;
-const MOST_ATTEMPTS: usize = 12;
+const MAX_ATTEMPTS: usize = 12;
 
 /// Runs all faults, with the UR3 policy in 3 bits, and an update to another image of it.
 pub(crate) fn all() -> Result<()> {
@@ -32,19 +32,19 @@ pub(crate) fn all() -> Result<()> {
     let new = ImageBuffer::new(&quantize(&policy, &Recordings::load(&policy)?, &options, |_, _| {})?.image);
     let old = firmware::built_in()?;
     let buffer = ImageBuffer::read(old)?;
-    run(Target::Fpu, old, &Trouble::all(new.bytes()), &[buffer.image(old)?, new.image(Path::new("the new image"))?])
+    run(Target::Fpu, old, &Disturbance::all(new.bytes()), &[buffer.image(old)?, new.image(Path::new("the new image"))?])
 }
 
 /// Runs two of them with this image, for a demonstration.
 pub(crate) fn some(image: &Path) -> Result<()> {
     let buffer = ImageBuffer::read(image)?;
-    let troubles: Vec<_> = Trouble::all(&[]).into_iter().filter(Trouble::is_telling).collect();
-    run(Target::Fpu, image, &troubles, &[buffer.image(image)?])
+    let disturbances: Vec<_> = Disturbance::all(&[]).into_iter().filter(Disturbance::is_for_demo).collect();
+    run(Target::Fpu, image, &disturbances, &[buffer.image(image)?])
 }
 
-/// Runs an episode for each of `troubles` with the application for the target's board and its built-in `image`, and
+/// Runs an episode for each of `disturbances` with the application for the target's board and its built-in `image`, and
 /// prints the table of the results. `images` are the built-in one and those that updates bring.
-pub(crate) fn run(target: Target, image: &Path, troubles: &[Trouble<'_>], images: &[Image<'_>]) -> Result<()> {
+pub(crate) fn run(target: Target, image: &Path, disturbances: &[Disturbance<'_>], images: &[Image<'_>]) -> Result<()> {
     println!(
         "\nClosed loop through the serial port of the controller ({} in QEMU), with faults on the line",
         target.board().name
@@ -54,14 +54,14 @@ pub(crate) fn run(target: Target, image: &Path, troubles: &[Trouble<'_>], images
     let mut summary =
         table(&["fault", "of frames", "found", "safe after", "armed again", "actions", "goals", "tracking"]);
     let (mut failures, mut busy) = (Vec::new(), Vec::new());
-    for (seed, trouble) in (FIRST_SEED..).zip(troubles) {
-        let (run, verdict) = judged(&mut rig, seed, trouble)?;
+    for (seed, disturbance) in (FIRST_SEED..).zip(disturbances) {
+        let (run, verdict) = judged(&mut rig, seed, disturbance)?;
         match verdict {
             Verdict::Passed => {}
-            Verdict::Failed(why) => failures.push(format!("{trouble}: {why}")),
-            Verdict::Disturbed => busy.push(trouble.to_string()),
+            Verdict::Failed(why) => failures.push(format!("{disturbance}: {why}")),
+            Verdict::Disturbed => busy.push(disturbance.to_string()),
         }
-        summary.add_row(row(trouble, &run));
+        summary.add_row(row(disturbance, &run));
     }
     println!("\n{summary}\n");
     if !busy.is_empty() {
@@ -71,7 +71,7 @@ pub(crate) fn run(target: Target, image: &Path, troubles: &[Trouble<'_>], images
         );
     }
     let (reported, shown) = rig.log();
-    let (foreign, _) = foreign(reported, shown, images)?;
+    let (foreign, _) = count_foreign(reported, shown, images)?;
     println!("{} actions of the controller, {foreign} of them differ in bits from the host executor's", reported.len());
     ensure!(foreign == 0, "the controller sent {foreign} actions that its head does not compute");
     ensure!(failures.is_empty(), "{}", failures.join("\n"));
@@ -87,29 +87,29 @@ enum Verdict {
 }
 
 /// The last attempt at an episode, and the verdict of all.
-fn judged(rig: &mut Rig, seed: u64, trouble: &Trouble<'_>) -> Result<(Run, Verdict)> {
+fn judged(rig: &mut Rig, seed: u64, disturbance: &Disturbance<'_>) -> Result<(Run, Verdict)> {
     let (mut attempts, mut undisturbed) = (0, 0);
     loop {
-        let run = episode(rig, seed, trouble)?;
-        let Err(why) = run.check(trouble) else { return Ok((run, Verdict::Passed)) };
+        let run = episode(rig, seed, disturbance)?;
+        let Err(why) = run.check(disturbance) else { return Ok((run, Verdict::Passed)) };
         attempts += 1;
         undisturbed += usize::from(!run.disturbed);
         if undisturbed == ATTEMPTS {
             return Ok((run, Verdict::Failed(why)));
         }
-        if attempts == MOST_ATTEMPTS {
+        if attempts == MAX_ATTEMPTS {
             return Ok((run, Verdict::Disturbed));
         }
         let busy = if run.disturbed { ", while this machine delayed it" } else { "" };
-        println!("  {trouble}: {why}{busy}; trying again");
+        println!("  {disturbance}: {why}{busy}; trying again");
     }
 }
 
 /// Runs an episode, with a live line on a terminal.
-fn episode(rig: &mut Rig, seed: u64, trouble: &Trouble<'_>) -> Result<Run> {
-    let bar = ProgressBar::new(EPISODE_STEPS as u64).with_prefix(trouble.to_string());
+fn episode(rig: &mut Rig, seed: u64, disturbance: &Disturbance<'_>) -> Result<Run> {
+    let bar = ProgressBar::new(EPISODE_STEPS as u64).with_prefix(disturbance.to_string());
     bar.set_style(ProgressStyle::with_template("  {prefix:22} [{bar:30}] {msg}")?.progress_chars("=> "));
-    let run = rig.run(seed, *trouble, |progress| {
+    let run = rig.run(seed, *disturbance, |progress| {
         bar.set_position(progress.steps as u64);
         let (millimetres, speed) = (1e3 * progress.distance, progress.fastest);
         bar.set_message(format!("{}, {millimetres:.0} mm to the goal, {speed:.1} rad/s", progress.state));
@@ -118,7 +118,7 @@ fn episode(rig: &mut Rig, seed: u64, trouble: &Trouble<'_>) -> Result<Run> {
     run
 }
 
-fn row(trouble: &Trouble<'_>, run: &Run) -> Vec<String> {
+fn row(disturbance: &Disturbance<'_>, run: &Run) -> Vec<String> {
     let dash = || "-".to_owned();
     let tally = run.tally;
     let met = tally.dropped + tally.delayed + tally.duplicated + tally.corrupted;
@@ -129,7 +129,7 @@ fn row(trouble: &Trouble<'_>, run: &Run) -> Vec<String> {
         (false, false) => "missed",
     };
     vec![
-        trouble.to_string(),
+        disturbance.to_string(),
         format!("{met} of {}", tally.sent),
         found.to_string(),
         run.reaction.map_or_else(dash, |reaction| format!("{} to {} ms", reaction.least, reaction.most)),

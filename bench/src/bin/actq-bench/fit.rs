@@ -30,11 +30,11 @@ use least_squares::solve;
 use sample::{Rates, Sample, predicted};
 
 /// Steps with standard normal observations, whose cost is the expected one.
-const NORMAL: usize = 6;
+const NORMAL_STEPS: usize = 6;
 /// Number of the worst samples to show.
-const WORST: usize = 8;
+const WORST_SAMPLES: usize = 8;
 /// A budget too large to limit anything, which is counted all the same.
-const AMPLE: u32 = 100_000_000;
+const AMPLE_BUDGET: u32 = 100_000_000;
 
 pub(crate) fn run() -> Result<()> {
     let elf = firmware::harness(Target::Fpu)?;
@@ -55,7 +55,7 @@ pub(crate) fn run() -> Result<()> {
         let mut by_error: Vec<&&Sample> = expected.iter().collect();
         by_error.sort_by(|a, b| error(b).abs().total_cmp(&error(a).abs()));
         by_error.dedup_by_key(|s| &s.name);
-        for s in by_error.iter().take(WORST) {
+        for s in by_error.iter().take(WORST_SAMPLES) {
             println!("  {:+.2}% of {} in {}", 1e2 * error(s), of(s.cost), s.name);
         }
         let worst = by_error.first().map_or(0.0, |s| error(s).abs());
@@ -110,7 +110,7 @@ fn measure(
     let ops: Vec<Op<'_>> = image.ops().collect();
     let of_ops: Vec<_> = ops.iter().map(|op| features(|add| cost::features(op, add))).collect();
     // Before the second chunk there is none to blend with.
-    let expected = |step| (usize::from(image.overlap() > 0)..NORMAL).contains(&step);
+    let expected = |step| (usize::from(image.overlap() > 0)..NORMAL_STEPS).contains(&step);
     let steps = profile::steps(elf, counter, bytes, &observations)?;
     for (step, cost) in steps.into_iter().enumerate() {
         let mut all = frame.clone();
@@ -118,7 +118,7 @@ fn measure(
         samples.push(Sample { name: format!("{name}, a step"), features: all, cost, expected: expected(step) });
     }
     let single = profile::parts(elf, counter, &image, bytes, &observations, u32::MAX)?;
-    let limited = profile::parts(elf, counter, &image, bytes, &observations[..1], AMPLE)?;
+    let limited = profile::parts(elf, counter, &image, bytes, &observations[..1], AMPLE_BUDGET)?;
     for ((op, cost), plain) in ops.iter().zip(&limited[0].ops).zip(&single[0].ops) {
         polls.push((cost.instructions as f64 - plain.instructions as f64, pieces(op)));
     }
@@ -236,7 +236,7 @@ fn resumed(elf: &Path, counter: &Counter, most: &Rates) -> Result<f64> {
 /// Draws standard normal observations, and others that reach the ends of every branch.
 fn observations(len: usize) -> Vec<Vec<f32>> {
     let mut random = Random::new(1);
-    let normal = (0..NORMAL).map(|_| (0..len).map(|_| random.normal()).collect::<Vec<_>>()).collect::<Vec<_>>();
+    let normal = (0..NORMAL_STEPS).map(|_| (0..len).map(|_| random.normal()).collect::<Vec<_>>()).collect::<Vec<_>>();
     let ends = [0.0, 1e-3, 1.0, -1.0, 30.0, -30.0, 1e4, -1e4];
     normal.into_iter().chain(ends.map(|x| vec![x; len])).collect()
 }

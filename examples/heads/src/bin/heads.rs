@@ -16,11 +16,11 @@ use anyhow::Result;
 use clap::Parser;
 
 /// The controller's flash for the head: 1 MB without the program's 64 KB.
-const FLASH: usize = (1 << 20) - PROGRAM;
-const PROGRAM: usize = 64 << 10;
+const FLASH: usize = (1 << 20) - PROGRAM_FLASH;
+const PROGRAM_FLASH: usize = 64 << 10;
 /// Its contiguous RAM for the head: 128 KB without 16 KB for the rest.
-const RAM: usize = (128 << 10) - REST;
-const REST: usize = 16 << 10;
+const RAM: usize = (128 << 10) - OTHER_RAM;
+const OTHER_RAM: usize = 16 << 10;
 /// Ticks of the control loop per second.
 const TICKS: f64 = 1000.0;
 
@@ -38,8 +38,8 @@ fn main() -> Result<()> {
     println!("Seeded random weights: sizes and times are real, accuracy is not.");
     println!(
         "rtn, one scale a row at 8 bits, in groups of 32 below; flash: 1 MB less {} KB of program; RAM: 128 KB less {} KB.",
-        PROGRAM >> 10,
-        REST >> 10
+        PROGRAM_FLASH >> 10,
+        OTHER_RAM >> 10
     );
     println!("Slices: pieces of a chunk below a tick of 1 kHz, of the least budget and of half a tick's cycles.");
     let full = oft::weights(oft::HIDDEN);

@@ -21,9 +21,9 @@ use super::fixture::{
 };
 
 /// A change of the policy's folder, the options to quantize with, and the words of the message.
-type Spoilt = (&'static str, fn(&Path) -> Result<()>, &'static str, &'static [&'static str]);
+type Fault = (&'static str, fn(&Path) -> Result<()>, &'static str, &'static [&'static str]);
 
-const SPOILT: &[Spoilt] = &[
+const FAULTS: &[Fault] = &[
     ("no folder", |p| Ok(fs::remove_dir_all(p)?), "", &["policy"]),
     ("no policy.json", |p| Ok(fs::remove_file(p.join("policy.json"))?), "", &["policy.json"]),
     ("no weights", |p| Ok(fs::remove_file(p.join("policy.safetensors"))?), "", &["policy.safetensors"]),
@@ -279,10 +279,10 @@ fn calib(policy: &Path, width: usize, value: f32, length: i64) -> Result<()> {
 
 #[test]
 fn faulty_policies_are_named_and_leave_no_file() -> Result<()> {
-    all(SPOILT.iter().map(|(what, spoil, options, words)| {
+    all(FAULTS.iter().map(|(what, change, options, words)| {
         let run = || {
             let fixture = Fixture::new()?;
-            spoil(&fixture.policy())?;
+            change(&fixture.policy())?;
             let out = fixture.out("image.actq");
             for old in [None, Some("an image that is in use")] {
                 if let Some(old) = old {

@@ -9,7 +9,7 @@ use std::time::Instant;
 use actq::methods::Activations;
 use actq::runtime::ImageBuffer;
 use actq_bench::Target;
-use actq_bench::controller::{Controller, HANG, act, act_in_order, until};
+use actq_bench::controller::{Controller, HANG_TIMEOUT, act, act_in_order, wait_until};
 use actq_bench::cycles::{Code, Function};
 use actq_bench::firmware::{self, built_in, halfword_at};
 use actq_bench::networks::Builder;
@@ -28,7 +28,7 @@ use tempfile::NamedTempFile;
 /// The boards with a device for the application.
 const BOARDS: [Target; 4] = [Target::Fpu, Target::M33, Target::M7, Target::F405];
 /// Boards with a watchdog, a clock and memory for slots in QEMU.
-const WHOLE: [Target; 3] = [Target::Fpu, Target::M33, Target::M7];
+const FULL_BOARDS: [Target; 3] = [Target::Fpu, Target::M33, Target::M7];
 
 fn start(target: Target, features: &'static str) -> Result<(Controller, Client)> {
     let controller = Controller::start(target, &firmware::controller(target, features)?, None)?;
@@ -120,13 +120,13 @@ pub(crate) fn starts_and_acts_with_the_bits_of_the_host(target: Target) -> Resul
         if applied {
             break action;
         }
-        ensure!(begun.elapsed() < HANG, "{target:?}: no action was applied while armed");
+        ensure!(begun.elapsed() < HANG_TIMEOUT, "{target:?}: no action was applied while armed");
     };
     assert!(action.iter().all(|value| value.abs() <= 2.0), "{target:?}: {action:?}");
     client.disarm()?;
     let status = client.status()?;
     assert_eq!(status.state, State::Disarmed, "{target:?}");
-    let timing = until(&mut client, "timed", |status| status.ticks > 200).and_then(|_| client.timing())?;
+    let timing = wait_until(&mut client, "timed", |status| status.ticks > 200).and_then(|_| client.timing())?;
     assert_eq!((timing.period, timing.overruns), (1_000_000, 0), "{target:?}");
     assert!(timing.worst_head > 0 && timing.stack > 0, "{target:?}: {timing:?}");
     Ok(())
@@ -138,7 +138,7 @@ pub(super) fn arm(client: &mut Client, observation: &[f32]) -> Result<()> {
     loop {
         act(client, observation)?;
         match client.arm() {
-            Err(_) if begun.elapsed() < HANG && client.status()?.refusal == Some(Refusal::Stale) => {}
+            Err(_) if begun.elapsed() < HANG_TIMEOUT && client.status()?.refusal == Some(Refusal::Stale) => {}
             outcome => return outcome,
         }
     }
@@ -161,7 +161,7 @@ fn a_background_head_leaves_the_tick_undisturbed() -> Result<()> {
         act(&mut client, &observation)?;
     }
     let ticks = client.status()?.ticks;
-    until(&mut client, "later", |status| status.ticks > 1000.max(ticks + 200))?;
+    wait_until(&mut client, "later", |status| status.ticks > 1000.max(ticks + 200))?;
     let timing = client.timing()?;
     assert_eq!((timing.period, timing.overruns), (125_000, 0));
     assert!(timing.worst_tick < 12_500 && timing.worst_jitter < 12_500, "{timing:?}");
@@ -185,7 +185,7 @@ fn a_current_loop_leaves_room_for_the_head() -> Result<()> {
             act(&mut client, &observation)?;
         }
         let ticks = client.status()?.ticks;
-        let status = until(&mut client, "later", |status| status.ticks > ticks + 200)?;
+        let status = wait_until(&mut client, "later", |status| status.ticks > ticks + 200)?;
         assert!(matches!(status.fault, None | Some(Fault::Stale)) && status.state != State::Disarmed, "{status:?}");
         let timing = client.timing()?;
         assert_eq!((timing.period, timing.overruns), (period, 0), "{features}");
@@ -227,12 +227,12 @@ fn an_unsuitable_image_is_refused_with_its_reason() -> Result<()> {
 /// watchdog interrupts somewhere in it.
 #[test]
 fn the_watchdog_resets_a_board_without_progress() -> Result<()> {
-    for (target, hidden) in WHOLE.into_iter().zip([1, 2, 4]) {
+    for (target, hidden) in FULL_BOARDS.into_iter().zip([1, 2, 4]) {
         let elf = firmware::controller(target, "faults")?;
         let (_controller, mut client) = start(target, "faults")?;
         let first = client.status()?;
         client.connection_mut().raw(&[0, b'0' + hidden, 0]);
-        until(&mut client, "reset", |status| status.reset == ResetCause::Watchdog)?;
+        wait_until(&mut client, "reset", |status| status.reset == ResetCause::Watchdog)?;
         let crumb = client.breadcrumb()?;
         assert_eq!((crumb.reset, crumb.crash), (ResetCause::Watchdog, Some(Crash::Watchdog)), "{target:?}");
         assert_eq!((crumb.detail, crumb.count), (hidden.into(), 1), "{target:?}");
@@ -241,7 +241,7 @@ fn the_watchdog_resets_a_board_without_progress() -> Result<()> {
         assert_ne!(first.token, second.token, "{target:?}: a request from before the reset would be accepted");
         // A crash is reported once, and counted further.
         client.connection_mut().raw(&[0, b'p', 0]);
-        until(&mut client, "reset", |status| status.reset == ResetCause::Software)?;
+        wait_until(&mut client, "reset", |status| status.reset == ResetCause::Software)?;
         let crumb = client.breadcrumb()?;
         assert_eq!((crumb.crash, crumb.count), (Some(Crash::Panic), 2), "{target:?}");
     }
@@ -255,7 +255,7 @@ fn a_hard_fault_leaves_its_address() -> Result<()> {
         let (_controller, mut client) = start(target, "faults")?;
         client.status()?;
         client.connection_mut().raw(&[0, b'h', 0]);
-        until(&mut client, "reset", |status| status.reset == ResetCause::Software)?;
+        wait_until(&mut client, "reset", |status| status.reset == ResetCause::Software)?;
         let crumb = client.breadcrumb()?;
         assert_eq!(crumb.crash, Some(Crash::HardFault), "{target:?}");
         let instruction = halfword_at(&elf, crumb.pc)? & 0xff00;
@@ -273,7 +273,7 @@ fn a_stack_overflow_leaves_its_place() -> Result<()> {
         let (_controller, mut client) = start(target, "faults")?;
         client.status()?;
         client.connection_mut().raw(&[0, b's', 0]);
-        until(&mut client, "reset", |status| status.reset == ResetCause::Software)?;
+        wait_until(&mut client, "reset", |status| status.reset == ResetCause::Software)?;
         let crumb = client.breadcrumb()?;
         // The record must survive: its memory is the nearest below the stack.
         assert_eq!((crumb.crash, crumb.count), (Some(Crash::StackOverflow), 1), "{target:?}");
@@ -327,7 +327,7 @@ fn the_application_is_small_and_has_no_panic() -> Result<()> {
 /// Requires that the image of this slot still runs after a reset, and gives these bits.
 fn runs_over_a_reset(client: &mut Client, slot: u8, observation: &[f32], bits: &[u32]) -> Result<()> {
     client.connection_mut().raw(&[0, b'p', 0]);
-    let status = until(client, "reset", |status| status.reset == ResetCause::Software)?;
+    let status = wait_until(client, "reset", |status| status.reset == ResetCause::Software)?;
     ensure!(status.slot == slot, "not kept: {status:?}");
     let (_, action) = act(client, observation)?;
     ensure!(action.iter().map(|v| v.to_bits()).eq(bits.iter().copied()), "other bits: {action:?}");
@@ -349,7 +349,7 @@ fn a_keyed_build_runs_only_signed_images() -> Result<()> {
     let (observation, bits) =
         self_test(&ImageBuffer::new(&new).image(Path::new("small"))?, 0).context("the image has no self-test")?;
     let slot = file(&new)?;
-    for target in WHOLE {
+    for target in FULL_BOARDS {
         let elf = firmware::controller_of_key(target, "signed,faults", &keys::public(&key))?;
         let error = format!(
             "{:#}",
@@ -389,7 +389,7 @@ fn updates_install_and_failed_ones_roll_back() -> Result<()> {
     let new = ImageBuffer::new(&small()?);
     let wrong = with_wrong_self_test(small()?)?;
     let (observation, bits) = self_test(&new.image(Path::new("small"))?, 0).context("the image has no self-test")?;
-    for target in WHOLE {
+    for target in FULL_BOARDS {
         let (_controller, mut client) = start(target, "faults")?;
         let error = push(&mut client, &package(&wrong), |_| {}).expect_err("its self-test fails");
         assert!(format!("{error:#}").contains("self-test failed"), "{error:#}");
@@ -412,7 +412,7 @@ fn a_silent_host_is_detected_at_the_deadline() -> Result<()> {
     let (observation, _) = self_test(&buffer.image(built_in()?)?, 0).context("the image has no self-test")?;
     let (_controller, mut client) = start(Target::Fpu, "")?;
     arm(&mut client, &observation)?;
-    let status = until(&mut client, "latched", |status| status.state == State::Latched)?;
+    let status = wait_until(&mut client, "latched", |status| status.state == State::Latched)?;
     assert_eq!((status.fault, status.refusal), (Some(Fault::Stale), Some(Refusal::Stale)));
     arm(&mut client, &observation)
 }

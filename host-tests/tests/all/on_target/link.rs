@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use actq::runtime::ImageBuffer;
 use actq_bench::Target;
 use actq_bench::command::{actq, answered, failed, run, succeeded};
-use actq_bench::controller::{Controller, HANG, act};
+use actq_bench::controller::{Controller, HANG_TIMEOUT, act};
 use actq_bench::firmware;
 use actq_bench::qemu::step_request;
 use actq_boards::Clock;
@@ -55,7 +55,7 @@ fn arm_and_disarm_change_the_state() -> Result<()> {
             break;
         }
         failed(&output, 1, &["not armed", "send observations before arming"])?;
-        ensure!(begun.elapsed() < HANG, "the command never ran within the deadline");
+        ensure!(begun.elapsed() < HANG_TIMEOUT, "the command never ran within the deadline");
     }
     // Latched if the deadline has passed since.
     assert_ne!(controller.client()?.status()?.state, State::Disarmed);
@@ -87,7 +87,7 @@ fn serve_answers_a_simulator_then_disarms() -> Result<()> {
         }
         // On a machine so busy that half a second has passed in between.
         failed(&output, 1, &["within the deadline"])?;
-        ensure!(begun.elapsed() < HANG, "the command never ran within the deadline");
+        ensure!(begun.elapsed() < HANG_TIMEOUT, "the command never ran within the deadline");
     }
     assert_eq!(controller.client()?.status()?.state, State::Disarmed);
     failed(&link(&controller, &["serve"], b"x")?, 1, &["unknown command byte 0x78"])?;
@@ -109,7 +109,7 @@ fn a_host_that_never_reads_causes_no_reset() -> Result<()> {
     // The dropped answers are missing before the first one after them.
     let (mut answers, mut last, begun) = (Receiver::<{ frame::bytes(64) }>::new(), None, Instant::now());
     while answers.counters().lost == 0 {
-        ensure!(begun.elapsed() < HANG, "expected missing answers: {last:?}");
+        ensure!(begun.elapsed() < HANG_TIMEOUT, "expected missing answers: {last:?}");
         match host.read(&mut buffer) {
             Ok(count) => buffer[..count].iter().for_each(|byte| {
                 if let Some(Message::Status(status)) = answers.push(*byte).map(|received| received.message) {

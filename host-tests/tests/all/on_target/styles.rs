@@ -6,7 +6,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use actq::runtime::ImageBuffer;
-use actq_bench::controller::HANG;
+use actq_bench::controller::HANG_TIMEOUT;
 use actq_bench::firmware::{self, STYLE_NAMES, built_in};
 use actq_bench::{qemu, root};
 use anyhow::{Context, Result, ensure};
@@ -52,7 +52,7 @@ fn a_closed_output_ends_the_run() -> Result<()> {
     let status = loop {
         match child.try_wait()? {
             Some(status) => break Some(status),
-            None if begun.elapsed() > HANG => break None,
+            None if begun.elapsed() > HANG_TIMEOUT => break None,
             None => thread::sleep(Duration::from_millis(20)),
         }
     };

@@ -11,15 +11,15 @@ use super::line::{Noise, Tally};
 use super::rig::{Progress, Reaction, Rig};
 
 /// Control step at which a single fault begins: on the way to the first goal.
-const BEGIN: usize = 20;
+const FAULT_STEP: usize = 20;
 /// Duration of a cut, ms: longer than the controller's deadline of 500.
-const CUT: u64 = 800;
+const CUT_MS: u64 = 800;
 /// Durations of a stall of the host's driver, ms. One is shorter than the deadline, but some held observations then
 /// exceed the allowed age; the other is longer than the deadline.
-const STALLS: [u64; 2] = [280, 1200];
+const STALLS_MS: [u64; 2] = [280, 1200];
 /// Bytes of an image to send while the arm moves, and bytes in a frame: QEMU's serial port is slow. The bytes before
 /// them are sent before the arm moves.
-const IN_FLIGHT: usize = 8 << 10;
+const BYTES_IN_FLIGHT: usize = 8 << 10;
 const CHUNK: usize = 128;
 /// The controller's deadline, ms.
 const DEADLINE: u32 = 500;
@@ -34,7 +34,7 @@ const ALL: &str = "all four at once";
 
 /// The fault of an episode.
 #[derive(Clone, Copy, Debug)]
-pub enum Trouble<'a> {
+pub enum Disturbance<'a> {
     /// No fault.
     None,
     /// Frames have these faults, in both directions, all the time.
@@ -49,7 +49,7 @@ pub enum Trouble<'a> {
     Update(&'a [u8]),
 }
 
-impl<'a> Trouble<'a> {
+impl<'a> Disturbance<'a> {
     /// Returns all of them; the last one sends `image`.
     pub fn all(image: &'a [u8]) -> Vec<Self> {
         let none = Noise::default();
@@ -62,34 +62,34 @@ impl<'a> Trouble<'a> {
             Self::Noise("1 frame in 10 damaged", Noise { corrupt: SHARE, ..none }),
             Self::Noise(ALL, all),
             Self::Cut,
-            Self::Stall(STALLS[0]),
-            Self::Stall(STALLS[1]),
+            Self::Stall(STALLS_MS[0]),
+            Self::Stall(STALLS_MS[1]),
             Self::Reset,
             Self::Update(image),
         ]
     }
 
     /// Returns `true` for the most telling ones in little time: all faults of frames, and a cut.
-    pub fn is_telling(&self) -> bool {
+    pub fn is_for_demo(&self) -> bool {
         matches!(self, Self::Noise(ALL, _) | Self::Cut)
     }
 
     /// Returns `true` if the controller continues through it; otherwise it stops, and is armed again.
-    pub const fn goes_on(&self) -> bool {
+    pub const fn keeps_running(&self) -> bool {
         match self {
             Self::None | Self::Noise(..) => true,
-            Self::Stall(ms) => *ms == STALLS[0],
+            Self::Stall(ms) => *ms == STALLS_MS[0],
             Self::Cut | Self::Reset | Self::Update(_) => false,
         }
     }
 }
 
-impl fmt::Display for Trouble<'_> {
+impl fmt::Display for Disturbance<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(&match self {
             Self::None => "none".to_owned(),
             Self::Noise(name, _) => (*name).to_owned(),
-            Self::Cut => format!("cable cut for {CUT} ms"),
+            Self::Cut => format!("cable cut for {CUT_MS} ms"),
             Self::Stall(ms) => format!("host stalls for {ms} ms"),
             Self::Reset => "board reset".to_owned(),
             Self::Update(_) => "new image".to_owned(),
@@ -131,28 +131,30 @@ impl Run {
     /// # Errors
     ///
     /// The first failed check.
-    pub fn check(&self, trouble: &Trouble<'_>) -> Result<()> {
+    pub fn check(&self, disturbance: &Disturbance<'_>) -> Result<()> {
         ensure!(self.armed, "the controller is not armed at the end");
         ensure!(self.reached, "the arm missed a goal; it ended {:.1} mm from it", 1e3 * self.outcome.final_error_m);
         let deadline = DEADLINE + 1;
-        match (self.reaction, trouble) {
-            (Some(Reaction { fault: Fault::Stale, least, most }), Trouble::Cut | Trouble::Stall(_))
-                if !trouble.goes_on() =>
+        match (self.reaction, disturbance) {
+            (Some(Reaction { fault: Fault::Stale, least, most }), Disturbance::Cut | Disturbance::Stall(_))
+                if !disturbance.keeps_running() =>
             {
                 let in_time = least <= deadline && most <= deadline + RESOLUTION;
                 ensure!(in_time, "safe after {least} to {most} ms, expected the deadline and a tick, {deadline} ms");
             }
-            (None, Trouble::Cut | Trouble::Stall(_)) if !trouble.goes_on() => bail!("the controller did not stop"),
+            (None, Disturbance::Cut | Disturbance::Stall(_)) if !disturbance.keeps_running() => {
+                bail!("the controller did not stop")
+            }
             (Some(reaction), _) => bail!("the controller stopped: {}", reaction.fault),
             (None, _) => {}
         }
-        let resets = u32::from(matches!(trouble, Trouble::Reset));
+        let resets = u32::from(matches!(disturbance, Disturbance::Reset));
         ensure!(self.resets == resets, "the board reset {} times; expected {resets}", self.resets);
         let ((damaged, repeated), tally) = (self.found, self.tally);
         ensure!(damaged == tally.corrupted, "the board counted {damaged} of {} damaged frames", tally.corrupted);
         let repetitions = tally.duplicated..=tally.duplicated + tally.delayed;
         ensure!(repetitions.contains(&repeated), "the board counted {repeated} repetitions; expected {repetitions:?}");
-        let old = matches!(trouble, Trouble::Stall(_)) && trouble.goes_on();
+        let old = matches!(disturbance, Disturbance::Stall(_)) && disturbance.keeps_running();
         ensure!(!old || self.refused > 0, "the guard accepted held observations");
         Ok(())
     }
@@ -160,26 +162,26 @@ impl Run {
 
 impl Rig {
     /// Runs an episode with this fault, and passes every control step to `seen`.
-    pub fn run(&mut self, seed: u64, trouble: Trouble<'_>, mut seen: impl FnMut(&Progress)) -> Result<Run> {
+    pub fn run(&mut self, seed: u64, disturbance: Disturbance<'_>, mut seen: impl FnMut(&Progress)) -> Result<Run> {
         let mut update = None;
-        if let Trouble::Update(image) = trouble {
+        if let Disturbance::Update(image) = disturbance {
             let mut push = Push::new(&mut self.client, Package { image, version: 1, signature: None })?;
-            while push.taken() + IN_FLIGHT < image.len() {
+            while push.taken() + BYTES_IN_FLIGHT < image.len() {
                 push.advance(&mut self.client)?;
             }
             push.limit_chunks(CHUNK);
             update = Some(push);
         }
-        self.begin(seed, !trouble.goes_on())?;
+        self.begin(seed, !disturbance.keeps_running())?;
         let (tally, status, applied, resets) = (self.line.tally(), self.status, self.applied, self.resets);
-        if let Trouble::Noise(_, noise) = trouble {
+        if let Disturbance::Noise(_, noise) = disturbance {
             self.line.set_noise(noise);
         }
-        for step in 0..BEGIN {
+        for step in 0..FAULT_STEP {
             self.step()?;
             seen(&self.progress(step + 1));
         }
-        let mut steps = BEGIN;
+        let mut steps = FAULT_STEP;
         // Runs control steps for this many ms of the controller's time, one at least.
         let mut meanwhile = |rig: &mut Self, ms: u64| -> Result<()> {
             let from = rig.time;
@@ -192,25 +194,25 @@ impl Rig {
                 }
             }
         };
-        match trouble {
-            Trouble::None | Trouble::Noise(..) => {}
-            Trouble::Cut => {
+        match disturbance {
+            Disturbance::None | Disturbance::Noise(..) => {}
+            Disturbance::Cut => {
                 self.line.cut(true);
-                meanwhile(self, CUT)?;
+                meanwhile(self, CUT_MS)?;
                 self.line.cut(false);
             }
-            Trouble::Stall(ms) => {
+            Disturbance::Stall(ms) => {
                 self.line.hold(true);
                 meanwhile(self, ms)?;
                 self.line.hold(false);
             }
-            Trouble::Reset => {
+            Disturbance::Reset => {
                 self.controller.reset()?;
                 while self.resets == resets {
                     meanwhile(self, 0)?;
                 }
             }
-            Trouble::Update(image) => {
+            Disturbance::Update(image) => {
                 let mut push = update.context("the push has not begun")?;
                 while push.taken() < image.len() {
                     self.push(&mut push)?;
@@ -234,13 +236,13 @@ impl Rig {
         let since = |now: u32, then: u32| if self.resets == resets { now.wrapping_sub(then) } else { now };
         Ok(Run {
             outcome,
-            reached: match trouble {
-                Trouble::None | Trouble::Noise(..) => outcome.success,
+            reached: match disturbance {
+                Disturbance::None | Disturbance::Noise(..) => outcome.success,
                 _ => outcome.final_error_m < POSITION_TOLERANCE,
             },
             armed: self.status.state == State::Armed,
             reaction: self.reaction,
-            again: again.filter(|_| !trouble.goes_on()),
+            again: again.filter(|_| !disturbance.keeps_running()),
             tally: Tally {
                 sent: now.sent - tally.sent,
                 dropped: now.dropped - tally.dropped,
