@@ -2,7 +2,6 @@
 
 use actq_boards::seams::Watchdog;
 use actq_controller::{Axis, Limits, SafeAction};
-use actq_kernels::image::header::W_SIZES;
 use actq_kernels::{Head, Image};
 use actq_link::code::Refusal;
 
@@ -11,16 +10,6 @@ use crate::timeouts::MAX_PIECE;
 
 /// Default rate of an axis, in full ranges (low to high) per second, if the build has none.
 const DEFAULT_RANGES: f32 = 10.0;
-
-/// Returns the lengths of an observation and of an action from an image's header, at compile time for array lengths.
-/// Returns 1 for both if the bytes are not an image.
-pub const fn lengths(image: &[u8]) -> [usize; 2] {
-    let ([b'A', b'C', b'T', b'Q', ..], Some((_, [a, b, c, d, ..]))) = (image, image.split_at_checked(4 * W_SIZES))
-    else {
-        return [1; 2];
-    };
-    [u16::from_le_bytes([*a, *b]) as usize, u16::from_le_bytes([*c, *d]) as usize]
-}
 
 /// Opens an image: checks it and its lengths, and runs its self-test, which must match bit for bit. It feeds the
 /// watchdog before the check, whose time grows with the image, and before each slice of the self-test, which is at most
@@ -79,16 +68,6 @@ fn limited(limits: Limits, hz: f32) -> Option<Axis> {
 mod tests {
     use super::*;
     use crate::work::tests::WatchdogMock;
-
-    #[test]
-    fn bytes_without_an_image_have_lengths_of_1() {
-        assert_eq!(lengths(b""), [1; 2]);
-        assert_eq!(lengths(&[7; 64]), [1; 2]);
-        let mut header = [0; 64];
-        header[..4].copy_from_slice(b"ACTQ");
-        header[4 * W_SIZES..][..4].copy_from_slice(&[18, 0, 6, 1]);
-        assert_eq!(lengths(&header), [18, 262]);
-    }
 
     #[test]
     fn axes_have_the_limits_of_the_build() {

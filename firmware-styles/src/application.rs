@@ -7,7 +7,7 @@ use core::task::Poll;
 // The board's vector table.
 use actq_boards as _;
 use actq_firmware_support::host;
-use actq_kernels::{Head, Image};
+use actq_kernels::{Head, Image, include_image};
 use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
 
@@ -25,20 +25,18 @@ pub const SLICE: u32 = 20_000;
 /// Cycles of a tick: 1 kHz of the board's 25 MHz.
 const PERIOD: u32 = 25_000;
 
-/// A wrapper that aligns an included file to 4 bytes.
-#[repr(C, align(4))]
-struct Aligned<T: ?Sized>(T);
-static IMAGE: &Aligned<[u8]> = &Aligned(*include_bytes!(env!(
+/// The image, in flash.
+static IMAGE: &[u8] = include_image!(env!(
     "ACTQ_IMAGE",
     "set ACTQ_IMAGE to the absolute path of an image of the UR3 policy (`actq quantize examples/ur3/policy` makes one)"
-)));
+));
 
 /// An action.
 pub type Action = [f32; AXES];
 
 /// Returns a head that passed its self-test. Firmware that moves a robot should report which check failed.
 pub fn open(scratch: &mut [u32]) -> Option<Head<'static, '_>> {
-    let mut head = Head::new(Image::new_checked(&IMAGE.0).ok()?, scratch).ok()?;
+    let mut head = Head::new(Image::new_checked(IMAGE).ok()?, scratch).ok()?;
     head.self_test().ok()?;
     Some(head)
 }

@@ -2,7 +2,7 @@
 
 use core::cell::Cell;
 
-use actq_kernels::image::header::{MAGIC, W_BYTES};
+use actq_kernels::Image;
 
 unsafe extern "C" {
     static _image_slot_start: u32;
@@ -17,10 +17,10 @@ pub fn image() -> Option<&'static [u8]> {
     // SAFETY: the linker script gives the slot these bounds in readable memory, aligned to 4; without a slot they are
     // equal.
     let word = |at: usize| (at < bytes / 4).then(|| unsafe { start.add(at).read_volatile() });
-    if word(0)? != MAGIC {
+    if word(0)? != Image::MAGIC {
         return None;
     }
-    let length = word(W_BYTES)? as usize;
+    let length = word(Image::LENGTH_WORD)? as usize;
     // SAFETY: within the slot, as above. Nothing writes to it while it has an image: the application then makes no
     // updates in the same memory.
     (length <= bytes).then(|| unsafe { core::slice::from_raw_parts(start.cast(), length) })

@@ -28,6 +28,7 @@ mod cursor;
 mod error;
 pub mod head;
 pub mod image;
+mod include;
 pub mod layout;
 pub mod math;
 mod meter;
@@ -38,5 +39,7 @@ pub mod x;
 
 pub use error::{HeadError, ImageError, SavedError, StepError};
 pub use head::Head;
-pub use image::Image;
+pub use image::{Image, ImageInfo};
+#[doc(hidden)]
+pub use include::included;
 pub use layout::{Block, BlockShape, Width};

@@ -20,16 +20,13 @@ mod firmware {
 
     use actq_firmware_support::machine::{entry, singleton};
     use actq_firmware_support::{count, host, slot};
-    use actq_kernels::{Head, Image, StepError};
+    use actq_kernels::{Head, Image, StepError, include_image};
     use actq_link::{NO_ACTION, RESET, STEP};
 
-    /// A wrapper that aligns an included file to 4 bytes.
-    #[repr(C, align(4))]
-    struct Aligned<T: ?Sized>(T);
-    static BUILT_IN: &Aligned<[u8]> = &Aligned(*include_bytes!(env!(
+    static BUILT_IN: &[u8] = include_image!(env!(
         "ACTQ_IMAGE",
         "set ACTQ_IMAGE to the absolute path of the image to build in (`actq quantize` makes one)"
-    )));
+    ));
 
     /// Scratch memory in words; the image's header has its need.
     const SCRATCH: usize = if cfg!(actq_small) { 1536 } else { 24 * 1024 };
@@ -59,7 +56,7 @@ mod firmware {
     }
 
     fn run() -> Result<(), Message> {
-        let image = Image::new_checked(slot::image().unwrap_or(&BUILT_IN.0)).map_err(|e| message("image", e))?;
+        let image = Image::new_checked(slot::image().unwrap_or(BUILT_IN)).map_err(|e| message("image", e))?;
         let scratch = singleton!(: [u32; SCRATCH] = [0; SCRATCH]).ok_or_else(|| message("scratch", "taken twice"))?;
         let mut head = Head::new(image, scratch).map_err(|e| message("head", e))?;
         // Now, and not within the first counted step.

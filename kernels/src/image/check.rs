@@ -1,8 +1,8 @@
 //! The check of an image: everything that an image says, once. `docs/FORMAT.md` has the list.
 
 use super::contract::{ARRAY_BINARISE, CONTRACT_ARRAYS};
-use super::crc::checksum;
 use super::header as h;
+use super::info::check_whole;
 use super::matrix::{matrix, row_block};
 use super::op::{Form, Op, OpKind, Uses};
 use super::proof::fits_i32;
@@ -11,7 +11,7 @@ use super::text::is_text;
 use super::view::Image;
 use super::words::{high, low, section, word};
 use crate::error::ImageError;
-use crate::layout::{Block, LAYOUT_STAMP};
+use crate::layout::Block;
 use crate::x::Plan;
 
 /// The bits of infinity in bf16.
@@ -36,21 +36,7 @@ impl<'a> Image<'a> {
         }
         let words: &[u32] = bytemuck::try_cast_slice(bytes).map_err(|_| ImageError::Length)?;
         let image = Self { words, header: words.first_chunk().ok_or(ImageError::TooShort)? };
-        if image.head(0) != h::MAGIC {
-            return Err(ImageError::Magic);
-        }
-        if low(image.head(h::W_VERSION)) != h::VERSION as usize || high(image.head(h::W_VERSION)) != h::WORDS {
-            return Err(ImageError::Version);
-        }
-        if image.head(h::W_BYTES) as usize != bytes.len() {
-            return Err(ImageError::Length);
-        }
-        if image.head(h::W_CRC) != checksum(bytes) {
-            return Err(ImageError::Checksum);
-        }
-        if image.head(h::W_LAYOUT) != LAYOUT_STAMP {
-            return Err(ImageError::Layout);
-        }
+        check_whole(image.header, bytes)?;
         image.check()?;
         Ok(image)
     }

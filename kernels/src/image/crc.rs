@@ -3,9 +3,12 @@
 use super::header::{UNCHECKED_WORDS, W_BYTES, W_CRC};
 
 /// CRC-32 (ISO-HDLC) of an image's bytes behind the fields that it does not cover.
-pub fn checksum(bytes: &[u8]) -> u32 {
+pub const fn checksum(bytes: &[u8]) -> u32 {
     const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
-    CRC.checksum(bytes.get(UNCHECKED_WORDS * 4..).unwrap_or(&[]))
+    match bytes.split_at_checked(UNCHECKED_WORDS * 4) {
+        Some((_, checked)) => CRC.checksum(checked),
+        None => CRC.checksum(&[]),
+    }
 }
 
 /// Writes length and checksum into an image that is otherwise complete; `None` where it is shorter than what it should

@@ -13,6 +13,11 @@ pub struct Image<'a> {
 }
 
 impl<'a> Image<'a> {
+    /// `ACTQ`, the first word of every image.
+    pub const MAGIC: u32 = h::MAGIC;
+    /// Index of the header's word that holds the image's length in bytes: to find the end of an image in a flash slot.
+    pub const LENGTH_WORD: usize = h::W_BYTES;
+
     /// An image whose memory may hold anything, as it does where flash has changed since the check: to test what
     /// becomes of it. A step of it ends with an action that means nothing or with [`crate::StepError::Damaged`]. `None`
     /// where the bytes are misaligned, no whole words, or shorter than a header.

@@ -13,12 +13,12 @@ pub(super) fn word(words: &[u32], i: usize) -> u32 {
 }
 
 /// The u16 in the low half.
-pub(super) fn low(word: u32) -> usize {
+pub(super) const fn low(word: u32) -> usize {
     (word & 0xffff) as usize
 }
 
 /// The u16 in the high half.
-pub(super) fn high(word: u32) -> usize {
+pub(super) const fn high(word: u32) -> usize {
     (word >> 16) as usize
 }
 

@@ -6,22 +6,23 @@ use actq_boards::device::WATCHDOG_NMI;
 use actq_boards::seams::Cause;
 use actq_controller::Limits;
 use actq_controller::breadcrumb::Record;
-use actq_firmware_demo::image::lengths;
 use actq_firmware_support::slot;
 use actq_firmware_support::stack::Room;
+use actq_kernels::{ImageInfo, include_image};
 use actq_link::code::{Crash, ResetCause};
 use actq_link::report::Breadcrumb;
 
-/// A wrapper that aligns an included file to 4 bytes.
-#[repr(C, align(4))]
-struct Aligned<T: ?Sized>(T);
-static BUILT_IN: &Aligned<[u8]> = &Aligned(*include_bytes!(env!(
+/// The built-in image.
+static BUILT_IN: &[u8] = include_image!(env!(
     "ACTQ_IMAGE",
     "set ACTQ_IMAGE to the absolute path of the image to build in; `cargo xtask firmware` does"
-)));
+));
 
 /// Lengths of an observation and of an action, from the built-in image. Every image that runs has the same lengths.
-pub(crate) const LENGTHS: [usize; 2] = lengths(&BUILT_IN.0);
+pub(crate) const LENGTHS: [usize; 2] = match ImageInfo::read(BUILT_IN) {
+    Ok(info) => [info.obs_len, info.act_len],
+    Err(_) => panic!("`include_image!` has checked the image"),
+};
 
 /// The build's limits of the axes, from the variable ACTQ_LIMITS: one for each axis, one for all, or none.
 pub(crate) const LIMITS: &[Limits] = &include!(concat!(env!("OUT_DIR"), "/limits.rs"));
@@ -34,7 +35,7 @@ const _: () = assert!(
 /// which has no signature.
 pub(crate) fn built_in() -> &'static [u8] {
     let slot = if cfg!(feature = "signed") { None } else { slot::image() };
-    slot.unwrap_or(&BUILT_IN.0)
+    slot.unwrap_or(BUILT_IN)
 }
 
 /// Returns the memory of the update slots; empty if a debugger put the running image into the same memory.
