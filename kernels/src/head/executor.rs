@@ -84,17 +84,25 @@ pub(super) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
         OpKind::GruCell => {
             arch::gru_elements(range.clone(), f(src), f(third), f(dst));
         }
-        kind => {
+        // The match has no wildcard: an operation that is missing here does not compile. `Linear` and `Denoise` have
+        // returned above.
+        kind @ (OpKind::LayerNorm
+        | OpKind::RmsNorm
+        | OpKind::Normalize { .. }
+        | OpKind::Linear { .. }
+        | OpKind::Denoise) => {
             let (first, second) = (op.part(0, &range), op.part(1, &range));
             if (if kind == OpKind::RmsNorm { first } else { second }).is_empty() {
                 return Err(Fault::Damaged);
             }
             let constant = op.constant(0);
             let (moments, done) = (&mut cursor.moments, units.clone());
-            match kind {
-                OpKind::LayerNorm => norm::layer_norm_units(done, moments, f(dst), first, second, constant),
-                OpKind::RmsNorm => norm::rms_norm_units(done, moments, f(dst), first, constant),
-                _ => elementwise::normalize(f(src), first, second, constant, op.constant(1), f(dst)),
+            if !norm {
+                elementwise::normalize(f(src), first, second, constant, op.constant(1), f(dst));
+            } else if kind == OpKind::RmsNorm {
+                norm::rms_norm_units(done, moments, f(dst), first, constant);
+            } else {
+                norm::layer_norm_units(done, moments, f(dst), first, second, constant);
             }
         }
     }
