@@ -71,7 +71,7 @@ impl Case {
     /// Returns the packed words.
     pub fn words(&self) -> Vec<u32> {
         let mut words = vec![0; self.shape.words()];
-        assert!(pack(self.shape, &self.codes, &self.scales, &mut words).is_some(), "the case fits its shape");
+        assert!(pack(self.shape, &self.codes, &self.scales, &mut words).is_ok(), "the case fits its shape");
         words
     }
 

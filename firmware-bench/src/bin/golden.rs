@@ -118,7 +118,7 @@ mod firmware {
         let rows = RowBlock { block: *block, scales: &scales, steps: &[], first_row: 3 };
         for in_y in [false, true] {
             let mut y = start.map(f32::from_bits);
-            rows.apply(x, scale, (!in_y).then_some(&start), &mut y).ok_or("the block's rows do not fit")?;
+            rows.apply(x, scale, (!in_y).then_some(&start), &mut y).map_err(|_| "the block's rows do not fit")?;
             for (i, y) in y.iter().enumerate() {
                 let start = f32::from_bits(start[i]);
                 let sum = i.checked_sub(3).and_then(|row| Some((row, *sums.get(row)?)));

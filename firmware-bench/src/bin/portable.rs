@@ -89,7 +89,7 @@ mod firmware {
         y: &mut [f32],
     ) -> Option<Scale> {
         let scale = Scale::new(x, x_max).ok()?;
-        rows.apply(&scale.quantize(x, &Plan::of(&rows.block), prepared)?, scale, Some(bias), y)?;
+        rows.apply(&scale.quantize(x, &Plan::of(&rows.block), prepared)?, scale, Some(bias), y).ok()?;
         Some(scale)
     }
 }

@@ -3,7 +3,7 @@
 use actq_bench::golden::{self, Case, Draw, Random};
 use actq_kernels::arch::{BACKEND, Backend, Mismatch, Product, gemv, portable, reference};
 use actq_kernels::image::{RowBlock, largest_sum_bound, worst_case};
-use actq_kernels::layout::{Block, BlockShape, Lanes, MAX_PAIRED_GROUPED, STRIP, Width, pack};
+use actq_kernels::layout::{Block, BlockShape, Lanes, MAX_PAIRED_GROUPED, PackError, STRIP, Width, pack};
 use actq_kernels::x::{NotFinite, Plan, Prepared, Scale, prepare};
 use proptest::prelude::*;
 
@@ -131,10 +131,12 @@ fn this_build_uses_the_portable_backend() {
 fn wrong_shapes_and_lengths_are_refused() {
     let shape = BlockShape { width: Width::W3, lanes: Lanes::Single, rows: 5, cols: 33, group: 0 };
     let mut words = vec![0; shape.words()];
-    assert!(pack(shape, &[0; 5 * 33], &[], &mut words).is_some());
-    assert!(pack(shape, &[0; 5 * 33 - 1], &[], &mut words).is_none(), "too few codes");
-    assert!(pack(shape, &[0; 5 * 33], &[1], &mut words).is_none(), "scales without groups");
-    assert!(pack(shape, &[0; 5 * 33], &[], &mut words[1..]).is_none(), "too few words");
+    assert_eq!(pack(shape, &[0; 5 * 33], &[], &mut words), Ok(()));
+    let refused = |codes: usize, scales: &[u8], out: &mut [u32]| pack(shape, &vec![0; codes], scales, out).err();
+    let (n, len) = (5 * 33, words.len());
+    assert_eq!(refused(n - 1, &[], &mut words), Some(PackError::Codes { expected: n, given: n - 1 }));
+    assert_eq!(refused(n, &[1], &mut words), Some(PackError::Scales { expected: 0, given: 1 }));
+    assert_eq!(refused(n, &[], &mut words[1..]), Some(PackError::Words { expected: len, given: len - 1 }));
     for bad in [
         BlockShape { rows: 0, ..shape },
         BlockShape { cols: 0, ..shape },

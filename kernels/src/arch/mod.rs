@@ -18,10 +18,10 @@ macro_rules! assembler {
 
 #[cfg(actq_armv7em)]
 #[allow(unsafe_code, reason = "the assembler backend; every block carries its proof")]
-pub mod armv7em;
+mod armv7em;
 #[cfg(actq_fpu)]
 #[allow(unsafe_code, reason = "the assembler backend; every block carries its proof")]
-pub mod armv7em_fpu;
+mod armv7em_fpu;
 pub mod portable;
 mod product;
 pub mod reference;
@@ -45,6 +45,7 @@ use crate::x::{Plan, Prepared, Scale};
 
 /// A backend that can be compiled in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Backend {
     /// [`portable`].
     Portable,

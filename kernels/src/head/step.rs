@@ -45,17 +45,6 @@ impl Head<'_, '_> {
         self.take(observation, None)
     }
 
-    /// As [`Self::begin`], with the noise of an iterative head: [`crate::Image::noise_len`] values, the first iterate
-    /// and behind it, where denoising steps add noise, that of each. Within a chunk it is not used.
-    ///
-    /// # Errors
-    ///
-    /// [`StepError::NoiseLength`], [`StepError::NoiseNotFinite`], and those of [`Self::step`].
-    pub fn begin_with_noise(&mut self, observation: &[f32], noise: &[f32]) -> Result<(), StepError> {
-        self.least_budget();
-        self.take(observation, Some(noise))
-    }
-
     /// [`crate::Image::least_budget`], computed once, which takes about as long as a short step. (Not by [`Self::new`]:
     /// where steps are not cut, the cost model is not in the program.)
     pub fn least_budget(&mut self) -> u32 {
@@ -122,7 +111,12 @@ impl Head<'_, '_> {
         self.infer_from(observation, None)
     }
 
-    /// As [`Self::infer`], with the noise of [`Self::begin_with_noise`] and the errors of both.
+    /// As [`Self::infer`], with the noise of an iterative head from the caller: [`crate::Image::noise_len`] values, the
+    /// first iterate, followed by the noise of each denoising step if the steps add noise.
+    ///
+    /// # Errors
+    ///
+    /// [`StepError::NoiseLength`], [`StepError::NoiseNotFinite`], and those of [`Self::infer`].
     pub fn infer_with_noise(&mut self, observation: &[f32], noise: &[f32]) -> Result<&[f32], StepError> {
         self.infer_from(observation, Some(noise))
     }

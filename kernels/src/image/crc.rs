@@ -1,6 +1,7 @@
 //! The checksum.
 
 use super::header::{UNCHECKED_WORDS, W_BYTES, W_CRC};
+use crate::error::ImageError;
 
 /// CRC-32 (ISO-HDLC) of an image's bytes behind the fields that it does not cover.
 pub const fn checksum(bytes: &[u8]) -> u32 {
@@ -11,12 +12,22 @@ pub const fn checksum(bytes: &[u8]) -> u32 {
     }
 }
 
-/// Writes length and checksum into an image that is otherwise complete; `None` where it is shorter than what it should
-/// name.
-pub fn seal(bytes: &mut [u8]) -> Option<()> {
-    let len = u32::try_from(bytes.len()).ok()?;
-    *bytes.get_mut(4 * W_BYTES..)?.first_chunk_mut()? = len.to_le_bytes();
+/// Writes length and checksum into an image that is otherwise complete.
+///
+/// # Errors
+///
+/// [`ImageError::TooShort`] if `bytes` ends before these fields, [`ImageError::Length`] if its length needs more than 32
+/// bits.
+pub fn seal(bytes: &mut [u8]) -> Result<(), ImageError> {
+    let len = u32::try_from(bytes.len()).map_err(|_| ImageError::Length)?;
+    write(bytes, W_BYTES, len)?;
     let crc = checksum(bytes);
-    *bytes.get_mut(4 * W_CRC..)?.first_chunk_mut()? = crc.to_le_bytes();
-    Some(())
+    write(bytes, W_CRC, crc)
+}
+
+/// Writes word `at` of an image.
+fn write(bytes: &mut [u8], at: usize, word: u32) -> Result<(), ImageError> {
+    let field = bytes.get_mut(4 * at..).and_then(|rest| rest.first_chunk_mut()).ok_or(ImageError::TooShort)?;
+    *field = word.to_le_bytes();
+    Ok(())
 }

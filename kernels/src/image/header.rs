@@ -79,6 +79,7 @@ pub const W_PLAYBACK: usize = 31;
 
 /// What a policy's output means.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Kind {
     /// One action per evaluation.
     Step = 0,

@@ -77,7 +77,7 @@ pub use block::{Block, BlockShape};
 pub use format::{Cell, Format, PAD_COLS, QUAD, STRIP, Start, Sums, XLayout};
 pub(crate) use lanes::PAIRED_GROUP;
 pub use lanes::{GROUPS, Lanes, MAX_GROUP, MAX_PAIRED_GROUPED, is_group};
-pub use pack::pack;
+pub use pack::{PackError, pack};
 pub(crate) use pow2::{div_down, div_up, round_up};
 pub(crate) use table::with_format;
 pub use table::{LAYOUTS, Layout, StripLog};

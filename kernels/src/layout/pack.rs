@@ -1,21 +1,70 @@
 //! The packer.
 
+use core::fmt;
+
 use super::block::BlockShape;
 use super::format::Format;
 use super::table::with_format;
 
+/// Why [`pack`] refused its arguments.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum PackError {
+    /// The shape is not valid ([`BlockShape::is_valid`]).
+    Shape,
+    /// The number of codes is not that of the shape.
+    Codes {
+        /// Codes of the shape.
+        expected: usize,
+        /// Codes given.
+        given: usize,
+    },
+    /// The number of group scales is not that of the shape.
+    Scales {
+        /// Scales of the shape.
+        expected: usize,
+        /// Scales given.
+        given: usize,
+    },
+    /// The output's length is not that of the packed block.
+    Words {
+        /// Words of the packed block.
+        expected: usize,
+        /// Words given.
+        given: usize,
+    },
+}
+
+impl fmt::Display for PackError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Shape => f.write_str("the block's shape is not valid"),
+            Self::Codes { expected, given } => write!(f, "the block has {expected} codes; {given} were given"),
+            Self::Scales { expected, given } => write!(f, "the block has {expected} group scales; {given} were given"),
+            Self::Words { expected, given } => write!(f, "the packed block has {expected} words; {given} were given"),
+        }
+    }
+}
+
+impl core::error::Error for PackError {}
+
 /// Packs a block.
 ///
 /// `codes` is row-major, `rows * cols`; `scales` is row-major, `rows * groups()` (empty without groups); `out` holds
-/// exactly [`BlockShape::words`] words and is overwritten. Returns `None` where a length or the shape does not fit.
-pub fn pack(shape: BlockShape, codes: &[u8], scales: &[u8], out: &mut [u32]) -> Option<()> {
-    if !shape.is_valid()
-        || codes.len() != shape.rows * shape.cols
-        || scales.len() != shape.rows * shape.groups()
-        || out.len() != shape.words()
-    {
-        return None;
+/// exactly [`BlockShape::words`] words and is overwritten.
+///
+/// # Errors
+///
+/// [`PackError`] if the shape is not valid or a slice has another length; `out` keeps its words.
+pub fn pack(shape: BlockShape, codes: &[u8], scales: &[u8], out: &mut [u32]) -> Result<(), PackError> {
+    if !shape.is_valid() {
+        return Err(PackError::Shape);
     }
+    let fits = |given: usize, expected: usize| if given == expected { Ok(()) } else { Err((expected, given)) };
+    fits(codes.len(), shape.rows * shape.cols).map_err(|(expected, given)| PackError::Codes { expected, given })?;
+    fits(scales.len(), shape.rows * shape.groups())
+        .map_err(|(expected, given)| PackError::Scales { expected, given })?;
+    fits(out.len(), shape.words()).map_err(|(expected, given)| PackError::Words { expected, given })?;
     out.fill(0);
     with_format!(shape, pack_codes::<_>(shape, codes, out));
     if shape.groups() > 0 {
@@ -29,7 +78,7 @@ pub fn pack(shape: BlockShape, codes: &[u8], scales: &[u8], out: &mut [u32]) -> 
     for word in out.iter_mut() {
         *word = word.to_le();
     }
-    Some(())
+    Ok(())
 }
 
 fn pack_codes<F: Format>(shape: BlockShape, codes: &[u8], out: &mut [u32]) {

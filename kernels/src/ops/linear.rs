@@ -9,7 +9,7 @@ use core::ops::Range;
 
 use super::elementwise::copy_le;
 use crate::arch;
-use crate::arch::gemv;
+use crate::arch::{Mismatch, gemv};
 use crate::cursor::LinearCursor;
 use crate::error::Fault;
 use crate::image::header::BLOCK_WORDS;
@@ -37,9 +37,19 @@ fn outputs<'y>(
 impl RowBlock<'_> {
     /// `y = start + acc * (row_scale * x_scale)` for the block's rows and their places in `y`, with a vector that was
     /// prepared for the block. `start` holds the bits of the whole output's biases; without it, and for rows with
-    /// steps, y itself is the start. `None` where `start` or `y` is too short.
-    pub fn apply(&self, x: &Prepared<'_>, x_scale: Scale, start: Option<&[u32]>, y: &mut [f32]) -> Option<()> {
-        self.apply_rows(0..self.block.shape().rows, &mut 0, x, x_scale, start, y)
+    /// steps, y itself is the start.
+    ///
+    /// # Errors
+    ///
+    /// [`Mismatch`] if `x` was prepared for another shape, or if `start` or `y` is too short.
+    pub fn apply(
+        &self,
+        x: &Prepared<'_>,
+        x_scale: Scale,
+        start: Option<&[u32]>,
+        y: &mut [f32],
+    ) -> Result<(), Mismatch> {
+        self.apply_rows(0..self.block.shape().rows, &mut 0, x, x_scale, start, y).ok_or(Mismatch)
     }
 
     /// As [`Self::apply`], for a run of the block's rows, which starts at a multiple of [`STRIP`] and ends at another

@@ -33,6 +33,7 @@ pub fn report(image: &Image<'_>) -> String {
             let (steps, chunk, execute) = (image.denoising_steps(), image.chunk(), image.execute());
             format!("{kind} in {steps} steps, chunk of {chunk}, {execute} executed")
         }
+        kind => format!("{kind:?}"),
     };
     let (obs, act) = (image.obs_len(), image.act_len());
     let rate = image.rate_hz();

@@ -22,7 +22,7 @@ assembler!("vector.s");
 
 /// As [`crate::arch::gemv`].
 #[inline(always)]
-pub fn gemv(Product { block, x, first_row, acc }: Product<'_>) {
+pub(crate) fn gemv(Product { block, x, first_row, acc }: Product<'_>) {
     let [kernel, four] = kernels(block.shape());
     let layout = x.plan().layout;
     let strip_log = layout.strip_log as u8;
@@ -57,7 +57,7 @@ unsafe extern "C" {
 
 /// `to = from`, as far as both go.
 #[inline(always)]
-pub fn copy(from: &[u32], to: &mut [u32]) {
+pub(crate) fn copy(from: &[u32], to: &mut [u32]) {
     let len = from.len().min(to.len());
     if len > 0 {
         // SAFETY: both hold at least `len` words, and do not overlap, because one of them is borrowed mutably.
@@ -66,7 +66,7 @@ pub fn copy(from: &[u32], to: &mut [u32]) {
 }
 
 /// The bits of the largest magnitude.
-pub fn magnitude(x: &[f32]) -> u32 {
+pub(crate) fn magnitude(x: &[f32]) -> u32 {
     let (eights, rest) = x.split_at(x.len() & !7);
     let largest = if eights.is_empty() {
         0

@@ -41,7 +41,7 @@ unsafe extern "C" {
 /// Quantizes `x` by the plan to the first words of `out`; `None`, with nothing done, where that is shorter than
 /// [`Plan::room`].
 #[inline(always)]
-pub fn quantize(x: &[f32], inverse: f32, plan: &Plan, out: &mut [u32]) -> Option<()> {
+pub(crate) fn quantize(x: &[f32], inverse: f32, plan: &Plan, out: &mut [u32]) -> Option<()> {
     let room = out.get_mut(..plan.room(x.len()))?;
     let (out, words) = (room.as_mut_ptr(), room.len());
     let (x, inverse) = if x.len() == plan.padded {
@@ -89,7 +89,7 @@ unsafe fn filled(x: &[f32], inverse: f32, plan: &Plan, room: *mut u32, words: us
 /// `y[i] = start[i] + sum[i] * (scale[i] * x_scale)`, with two bf16 scales a word; what is `None` stands in y, the sums
 /// with their bits. As far as the shortest goes.
 #[inline(never)]
-pub fn scale(sums: Option<&[i32]>, start: Option<&[u32]>, scales: &[u32], x_scale: f32, y: &mut [f32]) {
+pub(crate) fn scale(sums: Option<&[i32]>, start: Option<&[u32]>, scales: &[u32], x_scale: f32, y: &mut [f32]) {
     let len = y.len().min(2 * scales.len());
     let len = len.min(sums.map_or(len, <[_]>::len)).min(start.map_or(len, <[_]>::len));
     let to = y.as_mut_ptr();
@@ -106,7 +106,7 @@ static CELL: [f32; 6] = {
 };
 
 /// Some elements of [`crate::ops::cells::lstm_cell`].
-pub fn lstm_elements(elements: Range<usize>, gates: &[f32], c: &mut [f32], h: &mut [f32]) {
+pub(crate) fn lstm_elements(elements: Range<usize>, gates: &[f32], c: &mut [f32], h: &mut [f32]) {
     let (Range { start, end }, n) = (elements, h.len());
     if start >= end || end > n || end > c.len() || gates.len() < 3 * n + end {
         return;
@@ -121,7 +121,7 @@ pub fn lstm_elements(elements: Range<usize>, gates: &[f32], c: &mut [f32], h: &m
 }
 
 /// Some elements of [`crate::ops::cells::gru_cell`].
-pub fn gru_elements(elements: Range<usize>, a: &[f32], b: &[f32], h: &mut [f32]) {
+pub(crate) fn gru_elements(elements: Range<usize>, a: &[f32], b: &[f32], h: &mut [f32]) {
     let (Range { start, end }, n) = (elements, h.len());
     if start >= end || end > n || a.len().min(b.len()) < 2 * n + end {
         return;
@@ -135,7 +135,7 @@ pub fn gru_elements(elements: Range<usize>, a: &[f32], b: &[f32], h: &mut [f32])
 
 /// See [`crate::ops::denoise::denoise`]; `by` are its coefficients, in their order.
 #[inline(always)]
-pub fn denoise(by: &[f32; 7], limit: f32, v: &[f32], z: &[f32], x: &mut [f32], y: &mut [f32]) {
+pub(crate) fn denoise(by: &[f32; 7], limit: f32, v: &[f32], z: &[f32], x: &mut [f32], y: &mut [f32]) {
     let len = x.len().min(y.len()).min(v.len());
     let (z, len) = if z.is_empty() { (ptr::null(), len) } else { (z.as_ptr(), len.min(z.len())) };
     // SAFETY: all operands hold at least `len` values, or are none; the kernel reads and writes no others. Noise is
@@ -145,7 +145,7 @@ pub fn denoise(by: &[f32; 7], limit: f32, v: &[f32], z: &[f32], x: &mut [f32], y
 
 /// See [`crate::ops::elementwise::normalize`].
 #[inline(always)]
-pub fn normalize(x: &[f32], mean: &[u32], scale: &[u32], pre_clip: f32, clip: f32, y: &mut [f32]) {
+pub(crate) fn normalize(x: &[f32], mean: &[u32], scale: &[u32], pre_clip: f32, clip: f32, y: &mut [f32]) {
     let len = y.len().min(x.len()).min(mean.len()).min(scale.len());
     // SAFETY: all operands hold at least `len` values, and the kernel reads and writes no others.
     unsafe { actq_normalize(pre_clip, clip, x.as_ptr(), mean.as_ptr(), scale.as_ptr(), y.as_mut_ptr(), len) }
@@ -153,21 +153,21 @@ pub fn normalize(x: &[f32], mean: &[u32], scale: &[u32], pre_clip: f32, clip: f3
 
 /// `start` and the elements of `x`, in order.
 #[inline(always)]
-pub fn sum(start: f32, x: &[f32]) -> f32 {
+pub(crate) fn sum(start: f32, x: &[f32]) -> f32 {
     // SAFETY: the kernel reads the elements of `x`.
     unsafe { actq_sum(start, x.as_ptr(), x.len()) }
 }
 
 /// `start` and the squares of the differences of `x` from `center`, in order.
 #[inline(always)]
-pub fn sum_squares(start: f32, center: f32, x: &[f32]) -> f32 {
+pub(crate) fn sum_squares(start: f32, center: f32, x: &[f32]) -> f32 {
     // SAFETY: the kernel reads the elements of `x`.
     unsafe { actq_sum_squares(start, center, x.as_ptr(), x.len()) }
 }
 
 /// In place `(x - mean) * inverse * weight + bias`, as far as all go.
 #[inline(always)]
-pub fn standardize(mean: f32, inverse: f32, x: &mut [f32], weight: &[u32], bias: &[u32]) {
+pub(crate) fn standardize(mean: f32, inverse: f32, x: &mut [f32], weight: &[u32], bias: &[u32]) {
     let len = x.len().min(weight.len()).min(bias.len());
     // SAFETY: all operands hold at least `len` values; the kernel reads and writes no others.
     unsafe { actq_standardize(mean, inverse, x.as_mut_ptr(), weight.as_ptr(), bias.as_ptr(), len) }
@@ -175,7 +175,7 @@ pub fn standardize(mean: f32, inverse: f32, x: &mut [f32], weight: &[u32], bias:
 
 /// The FPU's square root, which is correctly rounded as IEEE 754 has it.
 #[inline(always)]
-pub fn sqrt(x: f32) -> f32 {
+pub(crate) fn sqrt(x: f32) -> f32 {
     // SAFETY: a function of one register.
     unsafe { actq_sqrt(x) }
 }

@@ -6,8 +6,8 @@ mod gemv;
 mod norm;
 mod vector;
 
-pub use cells::{gru_elements, lstm_elements};
-pub use elementwise::{denoise, normalize};
+pub(crate) use cells::{gru_elements, lstm_elements};
+pub(crate) use elementwise::{denoise, normalize};
 pub use gemv::gemv;
-pub use norm::{standardize, sum, sum_squares};
-pub use vector::{copy, magnitude, quantize, scale, sqrt};
+pub(crate) use norm::{standardize, sum, sum_squares};
+pub(crate) use vector::{copy, magnitude, quantize, scale, sqrt};

@@ -11,7 +11,7 @@ use super::json::PolicyJson;
 use super::numbers::positive;
 use super::ops::{Builder, Weights};
 use super::tensors::TensorFile;
-use crate::error::{Context, Result, ensure};
+use crate::error::{Context, Result, bail, ensure};
 use crate::graph::hoist;
 use crate::policy::Policy;
 
@@ -79,6 +79,7 @@ fn build(dir: &Path, json: &PolicyJson, weights: Weights<'_>, digest: [u8; 32]) 
             ensure!((1..=chunk).contains(&execute), "execute is {execute}, it must be 1 to chunk ({chunk})");
             (chunk, execute)
         }
+        kind => bail!("a policy of kind {kind:?} is not supported"),
     };
     let add = |builder: &mut Builder<'_>| -> Result<()> {
         for (i, op) in json.ops.iter().enumerate() {
