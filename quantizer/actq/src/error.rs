@@ -4,6 +4,7 @@ use std::error::Error as StdError;
 use std::{fmt, io};
 
 use actq_kernels::image::TooLarge;
+use actq_kernels::layout::PackError;
 use actq_kernels::{HeadError, ImageError, StepError};
 
 use crate::budget::BudgetTooSmall;
@@ -106,6 +107,7 @@ macro_rules! from_other {
 
 from_other!(
     HeadError,
+    PackError,
     StepError,
     TooLarge,
     ndarray::ShapeError,

@@ -12,13 +12,14 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use actq::emit::{self, files};
+use actq::emit;
 use actq::methods::Activations;
 use actq::random::Random;
 use actq::runtime::ImageBuffer;
 use actq_bench::networks::Builder;
 use actq_bench::qemu::Counter;
 use actq_bench::{Target, firmware, profile, root};
+use actq_cli::outputs::files;
 use actq_kernels::Width;
 use actq_kernels::image::{Op, OpKind, op};
 use actq_kernels::math::Function;

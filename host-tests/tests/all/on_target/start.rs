@@ -93,7 +93,7 @@ fn images_with_too_long_pieces_are_refused() -> Result<()> {
         let (mut scratch, mut feeds) = (vec![0; made.scratch_words()], Feeds(0));
         let lengths = [made.obs_len(), made.act_len()];
         let opened = image::open(buffer.bytes(), &mut scratch, lengths, &mut feeds).map(drop);
-        assert_eq!((opened, made.least_budget() > LONGEST), (outcome, outcome.is_err()), "{}", made.least_budget());
+        assert_eq!((opened, made.least_budget() > MAX_PIECE), (outcome, outcome.is_err()), "{}", made.least_budget());
         // Before the check; and before a slice that would reach it.
         assert!(if outcome.is_ok() { feeds.0 > made.self_test_steps() } else { feeds.0 == 1 }, "{}", feeds.0);
     }
