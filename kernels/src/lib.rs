@@ -16,30 +16,82 @@
 //! # }
 //! ```
 //!
-//! The arithmetic, in the order in which it happens, is documented in [`ops::linear`]; the packed layouts in
-//! [`layout`]; the image in `docs/FORMAT.md`. Everything outside the integer GEMV is IEEE 754 binary32 in a fixed
-//! order, without fused multiply-add, so that a host, QEMU and a board give identical bits.
+//! `docs/FORMAT.md` documents the image, `docs/KERNELS.md` the kernels. Everything outside the integer GEMV is IEEE 754
+//! binary32 in a fixed order, without fused multiply-add, so that a host, QEMU and a board give identical bits.
+//!
+//! Features:
+//!
+//! - `defmt` derives `defmt::Format` for the error types.
+//! - `writer` makes public what writes images and what checks the kernels: packed layouts, records, arithmetic and the
+//!   parts of the cost model. The quantizer, tests and measurements use it. It is **unstable**: any version may change it.
 #![cfg_attr(not(test), no_std)]
 #![deny(unsafe_code)]
+// Without the feature, what the writer sees is private.
+#![cfg_attr(not(feature = "writer"), allow(unreachable_pub))]
 
-// Which of these may use which: the table in docs/ARCHITECTURE.md, which a test reads.
+/// Declares methods that are public with the feature `writer`, and the crate's own without it.
+macro_rules! writer_methods {
+    ($($(#[$attribute:meta])* fn $name:ident $arguments:tt -> $result:ty $body:block)*) => {
+        $(
+            #[cfg(feature = "writer")]
+            $(#[$attribute])*
+            pub fn $name $arguments -> $result $body
+            #[cfg(not(feature = "writer"))]
+            $(#[$attribute])*
+            pub(crate) fn $name $arguments -> $result $body
+        )*
+    };
+}
+
+// Which of these may use which: the table in docs/ARCHITECTURE.md, which a test reads. A module that the writer needs is
+// public with its feature.
+#[cfg(feature = "writer")]
 pub mod arch;
+#[cfg(not(feature = "writer"))]
+mod arch;
 mod cursor;
 mod error;
+#[cfg(feature = "writer")]
 pub mod head;
+#[cfg(not(feature = "writer"))]
+mod head;
+#[cfg(feature = "writer")]
 pub mod image;
+#[cfg(not(feature = "writer"))]
+mod image;
 mod include;
+#[cfg(feature = "writer")]
 pub mod layout;
+#[cfg(not(feature = "writer"))]
+mod layout;
+#[cfg(feature = "writer")]
 pub mod math;
+#[cfg(not(feature = "writer"))]
+mod math;
 mod meter;
+#[cfg(feature = "writer")]
 pub mod ops;
+#[cfg(not(feature = "writer"))]
+mod ops;
+#[cfg(feature = "writer")]
 pub mod pace;
+#[cfg(not(feature = "writer"))]
+mod pace;
+#[cfg(feature = "writer")]
 pub mod round;
+#[cfg(not(feature = "writer"))]
+mod round;
+#[cfg(feature = "writer")]
 pub mod x;
+#[cfg(not(feature = "writer"))]
+mod x;
 
+pub use arch::{BACKEND, Backend};
 pub use error::{HeadError, ImageError, SavedError, StepError};
 pub use head::Head;
-pub use image::{Image, ImageInfo};
+pub use image::{Image, ImageInfo, Kind};
 #[doc(hidden)]
 pub use include::included;
+#[cfg(feature = "writer")]
 pub use layout::{Block, BlockShape, Width};
+pub use pace::cost::Cost;

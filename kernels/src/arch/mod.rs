@@ -22,8 +22,10 @@ mod armv7em;
 #[cfg(actq_fpu)]
 #[allow(unsafe_code, reason = "the assembler backend; every block carries its proof")]
 mod armv7em_fpu;
+#[cfg(any(feature = "writer", not(actq_fpu)))]
 pub mod portable;
 mod product;
+#[cfg(feature = "writer")]
 pub mod reference;
 
 #[cfg(actq_armv7em)]
@@ -47,13 +49,13 @@ use crate::x::{Plan, Prepared, Scale};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Backend {
-    /// [`portable`].
+    /// Plain Rust, for any target.
     Portable,
-    /// `armv7em`: assembler for Cortex-M4, M7 and M33.
+    /// Assembler for Cortex-M4, M7 and M33.
     Armv7em,
 }
 
-/// The backend that [`gemv`] has in this build.
+/// The backend of this build.
 pub const BACKEND: Backend = if cfg!(actq_armv7em) { Backend::Armv7em } else { Backend::Portable };
 
 /// Multiplies a run of a block's rows ([`Product::new`]) with a prepared vector.

@@ -3,9 +3,13 @@
 use super::arena::{part, regions};
 use crate::arch;
 use crate::cursor::Cursor;
-use crate::error::{Fault, StepError};
+use crate::error::Fault;
+#[cfg(feature = "writer")]
+use crate::error::StepError;
 use crate::image::{Op, OpKind, Region};
-use crate::meter::{Meter, Unlimited, Work};
+#[cfg(feature = "writer")]
+use crate::meter::Unlimited;
+use crate::meter::{Meter, Work};
 use crate::ops::denoise::{Coefficients, denoise};
 use crate::ops::elementwise::{self, copy, copy_le};
 use crate::ops::noise::normal;
@@ -17,6 +21,7 @@ use crate::ops::norm;
 /// # Errors
 ///
 /// As [`Head::step`](super::Head::step).
+#[cfg(feature = "writer")]
 pub fn run_whole(op: &Op<'_>, step: usize, arena: &mut [u32]) -> Result<(), StepError> {
     run(op, arena, &mut Cursor { step, ..Cursor::default() }, &mut Unlimited)?;
     Ok(())

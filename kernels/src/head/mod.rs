@@ -10,6 +10,7 @@ mod self_test;
 mod step;
 
 use self::arena::part;
+#[cfg(feature = "writer")]
 pub use self::executor::run_whole;
 use self::playback::Playback;
 use crate::cursor::Cursor;

@@ -54,7 +54,7 @@ impl Head<'_, '_> {
         self.least_budget
     }
 
-    /// Runs at most `budget` instructions of the step that was begun, by the cost model ([`crate::pace::cost`]), and
+    /// Runs at most `budget` instructions of the step that was begun, by the cost model ([`crate::Image::step_cost`]), and
     /// gives the action once it is ready; then, again and again until the next [`Self::begin`]. Steps that play on from
     /// a chunk have little to do, and are ready at the first poll. A budget of 2^28 or more is no limit.
     ///

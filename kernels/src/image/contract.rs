@@ -11,16 +11,18 @@ pub const CONTRACT_ARRAYS: usize = 10;
 pub(super) const ARRAY_BINARISE: usize = 6;
 
 impl<'a> Image<'a> {
-    /// The arrays, in their order: scale, offset, low, high, max_step, smoothing, on, off, on_value, off_value. Those
-    /// that the contract has not are empty.
-    pub fn contract_arrays(&self) -> [&'a [u32]; CONTRACT_ARRAYS] {
-        let mut offset = self.head(h::W_CONTRACT) as usize;
-        core::array::from_fn(|which| {
-            let len = if self.has_contract(which) { self.act_len() } else { 0 };
-            let array = self.section(offset, len);
-            offset += array.len();
-            array
-        })
+    writer_methods! {
+        /// The arrays, in their order: scale, offset, low, high, max_step, smoothing, on, off, on_value, off_value. Those
+        /// that the contract has not are empty.
+        fn contract_arrays(&self) -> [&'a [u32]; CONTRACT_ARRAYS] {
+            let mut offset = self.head(h::W_CONTRACT) as usize;
+            core::array::from_fn(|which| {
+                let len = if self.has_contract(which) { self.act_len() } else { 0 };
+                let array = self.section(offset, len);
+                offset += array.len();
+                array
+            })
+        }
     }
 
     /// Lower and upper limit of action `i`, if the contract has both. (Where it limits other actions only, f32's largest

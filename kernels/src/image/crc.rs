@@ -1,6 +1,9 @@
 //! The checksum.
 
-use super::header::{UNCHECKED_WORDS, W_BYTES, W_CRC};
+use super::header::UNCHECKED_WORDS;
+#[cfg(feature = "writer")]
+use super::header::{W_BYTES, W_CRC};
+#[cfg(feature = "writer")]
 use crate::error::ImageError;
 
 /// CRC-32 (ISO-HDLC) of an image's bytes behind the fields that it does not cover.
@@ -18,6 +21,7 @@ pub const fn checksum(bytes: &[u8]) -> u32 {
 ///
 /// [`ImageError::TooShort`] if `bytes` ends before these fields, [`ImageError::Length`] if its length needs more than 32
 /// bits.
+#[cfg(feature = "writer")]
 pub fn seal(bytes: &mut [u8]) -> Result<(), ImageError> {
     let len = u32::try_from(bytes.len()).map_err(|_| ImageError::Length)?;
     write(bytes, W_BYTES, len)?;
@@ -26,6 +30,7 @@ pub fn seal(bytes: &mut [u8]) -> Result<(), ImageError> {
 }
 
 /// Writes word `at` of an image.
+#[cfg(feature = "writer")]
 fn write(bytes: &mut [u8], at: usize, word: u32) -> Result<(), ImageError> {
     let field = bytes.get_mut(4 * at..).and_then(|rest| rest.first_chunk_mut()).ok_or(ImageError::TooShort)?;
     *field = word.to_le_bytes();

@@ -1,7 +1,11 @@
 //! The header: where its fields stand, and how they are written. [`Image`](super::Image) reads them.
 
+#[cfg(feature = "writer")]
 use super::region::Region;
-use super::words::{HEADER_WORDS, Records, TooLarge, halves};
+use super::words::HEADER_WORDS;
+#[cfg(feature = "writer")]
+use super::words::{Records, TooLarge, halves};
+#[cfg(feature = "writer")]
 use crate::layout::LAYOUT_STAMP;
 
 /// `ACTQ` in the first four bytes.
@@ -102,6 +106,7 @@ impl Kind {
 }
 
 /// What a writer says in a header.
+#[cfg(feature = "writer")]
 #[derive(Clone, Copy, Debug)]
 pub struct Header {
     /// What the output means.
@@ -156,6 +161,7 @@ pub struct Header {
     pub digest: [u8; 32],
 }
 
+#[cfg(feature = "writer")]
 impl Header {
     /// The header's words, without length and checksum ([`seal`](super::crc::seal)).
     ///

@@ -1,10 +1,14 @@
 //! Matrices: their records and those of their blocks, to read and to write, and what these name.
 
 use super::header::{BLOCK_WORDS, MATRIX_WORDS, MAX_ROWS};
-use super::words::{Records, TooLarge, behind, halves, high, low, record, section};
+use super::words::{Records, behind, high, low, record, section};
+#[cfg(feature = "writer")]
+use super::words::{TooLarge, halves};
 use crate::error::ImageError;
+#[cfg(feature = "writer")]
 use crate::layout::half::{bf16, half_word};
 use crate::layout::{Block, BlockShape, Lanes, Width, is_group};
+#[cfg(feature = "writer")]
 use crate::x::max_prepared_words;
 
 /// The record of a matrix.
@@ -48,6 +52,7 @@ impl MatrixRecord {
     /// # Errors
     ///
     /// [`TooLarge`] where a size has no room in its field.
+    #[cfg(feature = "writer")]
     pub fn emit(&self) -> Result<[u32; MATRIX_WORDS], TooLarge> {
         let Self { rows, cols, group, x_max, blocks } = *self;
         Ok([halves(rows, cols)?, halves(group, x_max.into())?, halves(blocks.count, 0)?, blocks.offset])
@@ -88,6 +93,7 @@ impl BlockRecord {
     /// # Errors
     ///
     /// [`TooLarge`] where a size has no room in its field.
+    #[cfg(feature = "writer")]
     pub fn emit(&self) -> Result<[u32; BLOCK_WORDS], TooLarge> {
         let head = self.width.bits() | u32::from(self.lanes.code()) << 8;
         Ok([halves(head as usize, self.rows)?, self.weights, self.scales, self.steps])
@@ -130,12 +136,14 @@ pub struct RowBlock<'a> {
 impl<'a> RowBlock<'a> {
     /// The scale of the block's row `i`.
     #[inline(always)]
+    #[cfg(feature = "writer")]
     pub fn scale(&self, i: usize) -> f32 {
         bf16(half_word(self.scales, i))
     }
 
     /// The weights of the block's row `i`: `level * group scale * row scale`, the integers multiplied first. Fills
     /// `out` up to the number of columns.
+    #[cfg(feature = "writer")]
     pub fn dequantize(&self, i: usize, out: &mut [f32]) {
         let scale = self.scale(i);
         for (col, out) in out.iter_mut().enumerate().take(self.block.shape().cols) {
@@ -162,6 +170,7 @@ impl<'a> Matrix<'a> {
     }
 
     /// Words that the prepared activations take at most.
+    #[cfg(feature = "writer")]
     pub fn prepared_words(&self) -> usize {
         max_prepared_words(self.cols, self.group)
     }
@@ -178,11 +187,13 @@ impl<'a> Matrix<'a> {
     }
 
     /// Bytes of everything that describes the weights ([`block_bytes`]). Biases and the matrix record are not counted.
+    #[cfg(feature = "writer")]
     pub fn weight_bytes(&self) -> usize {
         self.blocks().map(|rows| block_bytes(rows.block.shape(), !rows.steps.is_empty())).sum()
     }
 
     /// Bias of output `row`; 0 where the matrix has none.
+    #[cfg(feature = "writer")]
     pub fn bias(&self, row: usize) -> f32 {
         self.bias.get(row).map_or(0.0, |w| f32::from_bits(u32::from_le(*w)))
     }
@@ -243,17 +254,20 @@ pub(crate) fn row_block<'a>(
 
 /// Bytes that a block takes: packed words with their padding and group scales, row scales, output steps where the block
 /// is `stepped`, and the block record.
+#[cfg(feature = "writer")]
 pub const fn block_bytes(shape: BlockShape, stepped: bool) -> usize {
     let steps = if stepped { shape.rows.div_ceil(4) } else { 0 };
     4 * (shape.words() + shape.rows.div_ceil(2) + steps + BLOCK_WORDS)
 }
 
 /// Packs u16 values two a word, as scales stand in the image.
+#[cfg(feature = "writer")]
 pub fn half_words(values: &[u16]) -> impl Iterator<Item = u32> + '_ {
     values.chunks(2).map(|pair| pair.iter().rev().fold(0u32, |word, v| word << 16 | u32::from(*v)))
 }
 
 /// Packs u8 values four a word, as steps stand in the image.
+#[cfg(feature = "writer")]
 pub fn quarter_words(values: &[u8]) -> impl Iterator<Item = u32> + '_ {
     values.chunks(4).map(|four| four.iter().rev().fold(0u32, |word, v| word << 8 | u32::from(*v)))
 }

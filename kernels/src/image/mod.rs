@@ -19,15 +19,27 @@ mod text;
 mod view;
 mod words;
 
+#[cfg(feature = "writer")]
 pub use contract::CONTRACT_ARRAYS;
-pub use crc::{checksum, seal};
-pub use header::{Header, Kind};
+pub use crc::checksum;
+#[cfg(feature = "writer")]
+pub use crc::seal;
+#[cfg(feature = "writer")]
+pub use header::Header;
+pub use header::Kind;
 pub use info::ImageInfo;
 pub(crate) use matrix::row_block;
-pub use matrix::{BlockRecord, Matrix, MatrixRecord, RowBlock, block_bytes, half_words, quarter_words};
-pub use op::{Op, OpKind, OpRecord};
+#[cfg(feature = "writer")]
+pub use matrix::{BlockRecord, MatrixRecord, block_bytes, half_words, quarter_words};
+pub use matrix::{Matrix, RowBlock};
+#[cfg(feature = "writer")]
+pub use op::OpRecord;
+pub use op::{Op, OpKind};
+#[cfg(feature = "writer")]
 pub use playback::kept_words;
+#[cfg(feature = "writer")]
 pub use proof::{largest_sum_bound, worst_case};
 pub use region::Region;
 pub use view::Image;
+#[cfg(feature = "writer")]
 pub use words::{Records, TooLarge};

@@ -1,5 +1,6 @@
 //! Operations: a table of all of them, their records to read and to write, and what these name.
 
+#[cfg(feature = "writer")]
 use core::mem::discriminant;
 use core::ops::Range;
 
@@ -7,7 +8,9 @@ use super::header::{self as h, MATRIX_WORDS, OP_WORDS, W_KIND, W_MATRICES, W_MAT
 use super::matrix::{Matrix, matrix};
 use super::region::Region;
 use super::view::Image;
-use super::words::{TooLarge, halves, high, low, record, section, word};
+#[cfg(feature = "writer")]
+use super::words::{TooLarge, halves};
+use super::words::{high, low, record, section, word};
 use crate::error::ImageError;
 use crate::math::Function;
 
@@ -59,11 +62,13 @@ impl OpKind {
         matches!(self, Self::Table | Self::Denoise)
     }
 
+    #[cfg(feature = "writer")]
     fn form(self) -> Option<&'static Form> {
         FORMS.iter().find(|form| discriminant(&form.kind) == discriminant(&self))
     }
 
     /// Its name, for people; a function has its own.
+    #[cfg(feature = "writer")]
     pub fn name(self) -> &'static str {
         match self {
             Self::Function(function) => function.name(),
@@ -129,6 +134,7 @@ macro_rules! operations {
         pub(crate) const NAMES: &[&str] = &[$(stringify!($NAME)),*];
 
         /// What people call them.
+        #[cfg(feature = "writer")]
         static TEXTS: [&str; NAMES.len()] = [$($text),*];
 
         /// By operation code, from 1 on.
@@ -174,6 +180,7 @@ operations! {
 }
 
 /// What a writer says in an operation's record.
+#[cfg(feature = "writer")]
 #[derive(Clone, Copy, Debug)]
 pub struct OpRecord {
     /// What it does.
@@ -190,6 +197,7 @@ pub struct OpRecord {
     pub data: u32,
 }
 
+#[cfg(feature = "writer")]
 impl OpRecord {
     /// The record's words, which [`Image::ops`] reads.
     ///
@@ -233,6 +241,7 @@ impl<'a> Op<'a> {
     }
 
     /// The cell's other region, or the work area of a linear operation, or empty.
+    #[cfg(feature = "writer")]
     pub fn third(&self) -> Region {
         self.regions[2]
     }
@@ -265,6 +274,7 @@ impl<'a> Op<'a> {
     }
 
     /// Array `i` of f32 bits, of the length of `dst`: see [`OpKind`].
+    #[cfg(feature = "writer")]
     pub fn array(&self, i: usize) -> &'a [u32] {
         self.part(i, &(0..self.dst().len))
     }
@@ -301,15 +311,17 @@ impl<'a> Op<'a> {
 }
 
 impl<'a> Image<'a> {
-    /// Number of operations.
-    pub fn op_count(&self) -> usize {
-        high(self.head(W_KIND))
-    }
+    writer_methods! {
+        /// Number of operations.
+        fn op_count(&self) -> usize {
+            high(self.head(W_KIND))
+        }
 
-    /// The operations in order.
-    pub fn ops(&self) -> impl Iterator<Item = Op<'a>> + use<'a> {
-        let image = *self;
-        (0..self.op_count()).filter_map(move |i| image.op(i).ok())
+        /// The operations in order.
+        fn ops(&self) -> impl Iterator<Item = Op<'a>> + use<'a> {
+            let image = *self;
+            (0..self.op_count()).filter_map(move |i| image.op(i).ok())
+        }
     }
 
     /// Values of noise that an evaluation takes; 0 where it takes none.

@@ -21,6 +21,7 @@ impl<'a> Image<'a> {
     /// An image whose memory may hold anything, as it does where flash has changed since the check: to test what
     /// becomes of it. A step of it ends with an action that means nothing or with [`crate::StepError::Damaged`]. `None`
     /// where the bytes are misaligned, no whole words, or shorter than a header.
+    #[cfg(feature = "writer")]
     #[doc(hidden)]
     pub fn unchecked(bytes: &'a [u8]) -> Option<Self> {
         let words: &[u32] = bytemuck::try_cast_slice(bytes).ok()?;
@@ -67,9 +68,11 @@ impl<'a> Image<'a> {
         high(self.head(h::W_CHUNK))
     }
 
-    /// The first of the operations that every denoising step runs; 0 where the network runs once.
-    pub fn once(&self) -> usize {
-        low(self.head(h::W_DENOISING))
+    writer_methods! {
+        /// The first of the operations that every denoising step runs; 0 where the network runs once.
+        fn once(&self) -> usize {
+            low(self.head(h::W_DENOISING))
+        }
     }
 
     /// How often these run: the denoising steps, or 1.
@@ -123,29 +126,31 @@ impl<'a> Image<'a> {
         self.words.len() * 4
     }
 
-    /// Arena region that a reset zeroes.
-    pub fn state(&self) -> Region {
-        Region { offset: low(self.head(h::W_STATE)), len: high(self.head(h::W_STATE)) }
-    }
+    writer_methods! {
+        /// Arena region that a reset zeroes.
+        fn state(&self) -> Region {
+            Region { offset: low(self.head(h::W_STATE)), len: high(self.head(h::W_STATE)) }
+        }
 
-    /// Arena region of the observation.
-    pub fn observation(&self) -> Region {
-        Region { offset: low(self.head(h::W_OBS_OUT)), len: self.obs_len() }
-    }
+        /// Arena region of the observation.
+        fn observation(&self) -> Region {
+            Region { offset: low(self.head(h::W_OBS_OUT)), len: self.obs_len() }
+        }
 
-    /// Arena region of the network's output.
-    pub fn output(&self) -> Region {
-        Region { offset: high(self.head(h::W_OBS_OUT)), len: self.chunk() * self.act_len() }
-    }
+        /// Arena region of the network's output.
+        fn output(&self) -> Region {
+            Region { offset: high(self.head(h::W_OBS_OUT)), len: self.chunk() * self.act_len() }
+        }
 
-    /// Arena region of the action.
-    pub fn action(&self) -> Region {
-        Region { offset: low(self.head(h::W_ACTION_WORK)), len: self.act_len() }
-    }
+        /// Arena region of the action.
+        fn action(&self) -> Region {
+            Region { offset: low(self.head(h::W_ACTION_WORK)), len: self.act_len() }
+        }
 
-    /// Arena region in which activations are prepared.
-    pub fn work(&self) -> Region {
-        Region { offset: high(self.head(h::W_ACTION_WORK)), len: low(self.head(h::W_WORK_FLAGS)) }
+        /// Arena region in which activations are prepared.
+        fn work(&self) -> Region {
+            Region { offset: high(self.head(h::W_ACTION_WORK)), len: low(self.head(h::W_WORK_FLAGS)) }
+        }
     }
 
     /// Steps of the self-test vector.

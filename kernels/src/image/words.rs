@@ -1,5 +1,6 @@
 //! Words of an image and their halves.
 
+#[cfg(feature = "writer")]
 use core::fmt;
 
 use crate::error::ImageError;
@@ -23,18 +24,22 @@ pub(super) const fn high(word: u32) -> usize {
 }
 
 /// A size that no field of a record holds.
+#[cfg(feature = "writer")]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TooLarge(pub usize);
 
+#[cfg(feature = "writer")]
 impl fmt::Display for TooLarge {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "a size of the policy ({}) exceeds the format's limit of 65535", self.0)
     }
 }
 
+#[cfg(feature = "writer")]
 impl core::error::Error for TooLarge {}
 
 /// Two u16 in a word.
+#[cfg(feature = "writer")]
 pub(super) fn halves(low: usize, high: usize) -> Result<u32, TooLarge> {
     let most = if low > high { low } else { high };
     if most > 0xffff { Err(TooLarge(most)) } else { Ok(low as u32 | (high as u32) << 16) }

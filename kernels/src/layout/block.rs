@@ -1,9 +1,13 @@
 //! A block of rows in place: its shape, its words, and where each code and scale stands.
 
-use super::format::{Cell, Format, QUAD, STRIP};
+use super::format::QUAD;
+#[cfg(feature = "writer")]
+use super::format::{Cell, Format, STRIP};
 use super::lanes::{Lanes, MAX_PAIRED_GROUPED, PAIRED_GROUP, is_group};
 use super::pow2::{div_down, div_up, round_up};
-use super::table::{LAYOUTS, Layout, with_format};
+#[cfg(feature = "writer")]
+use super::table::with_format;
+use super::table::{LAYOUTS, Layout};
 use super::width::Width;
 
 /// The shape of a [`Block`]: rows of one width.
@@ -97,11 +101,13 @@ impl BlockShape {
     }
 
     /// Words of the block.
+    #[cfg(feature = "writer")]
     pub const fn words(self) -> usize {
         self.padded_rows() / QUAD * self.quad_words()
     }
 
     /// First row and rows of the strip that `row` is in.
+    #[cfg(feature = "writer")]
     const fn strip(self, row: usize) -> (usize, usize) {
         let height = self.layout().strip;
         let first = row & !(height - 1);
@@ -110,6 +116,7 @@ impl BlockShape {
     }
 
     /// Index of the first word of a cell and the distance to its next word: the cell that holds `row` in unit `unit`.
+    #[cfg(feature = "writer")]
     pub(super) const fn cell_at(self, row: usize, unit: usize) -> (usize, usize) {
         let (first, height) = self.strip(row);
         let Cell { rows, words, .. } = self.layout().cell;
@@ -126,11 +133,13 @@ impl BlockShape {
     }
 
     /// Whether the scales of a strip of so many rows stand behind pairs of groups.
+    #[cfg(feature = "writer")]
     const fn in_pairs(self, height: usize) -> bool {
         self.layout().x.pairs && height == STRIP
     }
 
     /// Index of the word that holds the scale of `group` for `row`, and the scale's first bit.
+    #[cfg(feature = "writer")]
     pub(super) const fn scale_at(self, row: usize, group: usize) -> (usize, usize) {
         let (first, height) = self.strip(row);
         let row = row - first;
@@ -159,6 +168,7 @@ pub struct Block<'a> {
 impl<'a> Block<'a> {
     /// Pairs `words` (little-endian words as they stand in the image) with their shape; `None` where the shape is not
     /// valid or the length differs from [`BlockShape::words`].
+    #[cfg(feature = "writer")]
     pub fn new(shape: BlockShape, words: &'a [u32]) -> Option<Self> {
         if !shape.is_valid() {
             return None;
@@ -196,6 +206,7 @@ impl<'a> Block<'a> {
     }
 
     /// The code at (`row`, `col`); 0 when out of range.
+    #[cfg(feature = "writer")]
     pub fn code(&self, row: usize, col: usize) -> u8 {
         if row >= self.shape.rows || col >= self.shape.cols {
             return 0;
@@ -206,6 +217,7 @@ impl<'a> Block<'a> {
     }
 
     /// The words of the cell that holds `row` in unit `unit`.
+    #[cfg(feature = "writer")]
     fn cell(&self, row: usize, unit: usize) -> [u32; 3] {
         let (at, step) = self.shape.cell_at(row, unit);
         let mut cell = [0u32; 3];
@@ -216,11 +228,13 @@ impl<'a> Block<'a> {
     }
 
     /// The level at (`row`, `col`), without any scale.
+    #[cfg(feature = "writer")]
     pub fn level(&self, row: usize, col: usize) -> i32 {
         self.shape.width.level(self.code(row, col))
     }
 
     /// The u8 scale that (`row`, `col`) is multiplied with; 1 where the block has no group scales.
+    #[cfg(feature = "writer")]
     pub fn group_scale(&self, row: usize, col: usize) -> u8 {
         match self.shape.group {
             0 => 1,
@@ -232,6 +246,7 @@ impl<'a> Block<'a> {
     }
 }
 
+#[cfg(feature = "writer")]
 fn extract<F: Format>(words: &[u32; 3], row: usize, col: usize) -> u8 {
     F::extract(words, row, col)
 }

@@ -96,9 +96,11 @@ pub trait Format {
     const X: XLayout;
 
     /// Puts `code` into a cell's words; the field must be zero before.
+    #[cfg(feature = "writer")]
     fn insert(words: &mut [u32; 3], row: usize, col: usize, code: u8);
 
     /// The code at (`row`, `col`) of a cell.
+    #[cfg(feature = "writer")]
     fn extract(words: &[u32; 3], row: usize, col: usize) -> u8;
 
     /// The sums that a chunk starts with, from its start words.

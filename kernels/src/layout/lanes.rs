@@ -52,6 +52,7 @@ impl Lanes {
     }
 
     /// The inverse of [`Self::code`].
+    #[cfg(feature = "writer")]
     pub const fn from_code(code: u8) -> Option<Self> {
         match code {
             0 => Some(Self::Single),

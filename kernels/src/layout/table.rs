@@ -24,6 +24,7 @@ pub struct Layout {
     /// The same of a unit's columns.
     pub unit_log: u8,
     /// The same of a strip's rows.
+    #[cfg_attr(not(any(feature = "writer", actq_armv7em)), expect(dead_code, reason = "only the assembler reads it"))]
     pub strip_log: StripLog,
     /// The same of the step.
     pub step_log: u8,
@@ -67,6 +68,7 @@ macro_rules! table {
             [$([Layout::of::<$single>(), Layout::of::<$paired>()]),*];
 
         /// Calls a function that is generic over the layout of `$shape`.
+        #[cfg(any(feature = "writer", not(actq_armv7em)))]
         macro_rules! with_format {
             ($shape:expr, $call:ident::<_>$arguments:tt) => {{
                 use $crate::layout::lanes::Lanes;
@@ -77,7 +79,8 @@ macro_rules! table {
                 }
             }};
         }
+        #[cfg(any(feature = "writer", not(actq_armv7em)))]
+        pub(crate) use with_format;
     };
 }
 registry!(table());
-pub(crate) use with_format;

@@ -21,6 +21,7 @@ pub struct W2;
 const _: () = assert!(W2::CELL.is_full(W2::WIDTH.bits()));
 
 /// Where a column's code starts in the word's ring of bits.
+#[cfg(feature = "writer")]
 const fn bit(col: usize) -> u32 {
     (1 + 2 * (col as u32 / 2) + 16 * (col as u32 % 2)) % 32
 }
@@ -32,10 +33,12 @@ impl Format for W2 {
     const STEP: usize = 16;
     const X: XLayout = XLayout::single(-3);
 
+    #[cfg(feature = "writer")]
     fn insert(words: &mut [u32; 3], _row: usize, col: usize, code: u8) {
         words[0] |= (code as u32 & 3).rotate_left(bit(col));
     }
 
+    #[cfg(feature = "writer")]
     fn extract(words: &[u32; 3], _row: usize, col: usize) -> u8 {
         (words[0].rotate_right(bit(col)) & 3) as u8
     }

@@ -37,6 +37,7 @@ const _: () = assert!(2 * 3 * 127 * 255 * (MAX_PAIRED_GROUPED as i64) < 1 << 31)
 const _: () = assert!(W2Paired::X.starts[0].factor.abs() * 127 * (W2Paired::X.chunk as i32) < 0x8000);
 
 /// Where a code starts in the word's ring of bits, and what makes it signed.
+#[cfg(feature = "writer")]
 const fn field(row: usize, col: usize) -> (u32, u32) {
     let bit = 4 * (col as u32 / 2) + 16 * (col as u32 % 2);
     if row == 0 { (bit, 0) } else { ((bit + 14) % 32, 2) }
@@ -57,11 +58,13 @@ impl Format for W2Paired {
         pairs: true,
     };
 
+    #[cfg(feature = "writer")]
     fn insert(words: &mut [u32; 3], row: usize, col: usize, code: u8) {
         let (bit, sign) = field(row, col);
         words[0] |= (code as u32 & 3 ^ sign).rotate_left(bit);
     }
 
+    #[cfg(feature = "writer")]
     fn extract(words: &[u32; 3], row: usize, col: usize) -> u8 {
         let (bit, sign) = field(row, col);
         (words[0].rotate_right(bit) & 3 ^ sign) as u8

@@ -28,12 +28,14 @@ pub struct W3;
 const _: () = assert!(W3::CELL.is_full(W3::WIDTH.bits()));
 
 /// Word and first bit of a column's code, for the pairs 0 to 14.
+#[cfg(feature = "writer")]
 const fn field(col: usize) -> (usize, u32) {
     let (word, field) = (col / 2 / FIELDS, col / 2 % FIELDS);
     (word, (word as u32 + 2 + 3 * field as u32 + 16 * (col as u32 % 2)) % 32)
 }
 
 /// The spare bit of word `k` in the lane of `col`.
+#[cfg(feature = "writer")]
 const fn spare(k: usize, col: usize) -> u32 {
     k as u32 + 1 + 16 * (col as u32 % 2)
 }
@@ -45,6 +47,7 @@ impl Format for W3 {
     const STEP: usize = 32;
     const X: XLayout = XLayout::single(-7);
 
+    #[cfg(feature = "writer")]
     fn insert(words: &mut [u32; 3], _row: usize, col: usize, code: u8) {
         if col / 2 < FIELDS * W3::CELL.words {
             let (word, bit) = field(col);
@@ -56,6 +59,7 @@ impl Format for W3 {
         }
     }
 
+    #[cfg(feature = "writer")]
     fn extract(words: &[u32; 3], _row: usize, col: usize) -> u8 {
         if col / 2 < FIELDS * W3::CELL.words {
             let (word, bit) = field(col);

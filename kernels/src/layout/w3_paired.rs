@@ -25,8 +25,10 @@ use super::width::Width;
 /// The codes of a set.
 const MASK: u32 = 0xe007_e007;
 /// Bits 7 and 8 of both lanes: those of a rotated last set that are not spare in `w0` and `w2`.
+#[cfg(feature = "writer")]
 const TAKEN: u32 = 0x0180_0180;
 /// Bits 9 to 12 of both lanes.
+#[cfg(feature = "writer")]
 const SPARE: u32 = 0x1e00_1e00;
 
 /// The 3-bit layout of paired lanes.
@@ -50,6 +52,7 @@ const fn sets([w0, w1, w2]: [u32; 3]) -> [u32; 8] {
 }
 
 /// The inverse of [`sets`].
+#[cfg(feature = "writer")]
 const fn words(sets: [u32; 8]) -> [u32; 3] {
     let mut w0 = sets[0] | sets[1].rotate_left(6);
     let mut w1 = sets[2] | sets[3].rotate_left(6);
@@ -62,6 +65,7 @@ const fn words(sets: [u32; 8]) -> [u32; 3] {
 }
 
 /// Set, first bit and sign of a code.
+#[cfg(feature = "writer")]
 const fn field(row: usize, col: usize) -> (usize, u32, u32) {
     let set = 2 * (col / 2) + row / 2;
     let lane = 16 * (col as u32 % 2);
@@ -83,6 +87,7 @@ impl Format for W3Paired {
         pairs: false,
     };
 
+    #[cfg(feature = "writer")]
     fn insert(cell: &mut [u32; 3], row: usize, col: usize, code: u8) {
         let (set, bit, sign) = field(row, col);
         let mut all = sets(*cell);
@@ -90,6 +95,7 @@ impl Format for W3Paired {
         *cell = words(all);
     }
 
+    #[cfg(feature = "writer")]
     fn extract(cell: &[u32; 3], row: usize, col: usize) -> u8 {
         let (set, bit, sign) = field(row, col);
         (sets(*cell)[set & 7] >> bit & 7 ^ sign) as u8

@@ -20,6 +20,7 @@ pub struct W4;
 const _: () = assert!(W4::CELL.is_full(W4::WIDTH.bits()));
 
 /// Where a column's code starts in the word's ring of bits.
+#[cfg(feature = "writer")]
 const fn bit(col: usize) -> u32 {
     (1 + 4 * (col as u32 / 2) + 16 * (col as u32 % 2)) % 32
 }
@@ -31,10 +32,12 @@ impl Format for W4 {
     const STEP: usize = 8;
     const X: XLayout = XLayout::single(-15);
 
+    #[cfg(feature = "writer")]
     fn insert(words: &mut [u32; 3], _row: usize, col: usize, code: u8) {
         words[0] |= (code as u32 & 15).rotate_left(bit(col));
     }
 
+    #[cfg(feature = "writer")]
     fn extract(words: &[u32; 3], _row: usize, col: usize) -> u8 {
         (words[0].rotate_right(bit(col)) & 15) as u8
     }

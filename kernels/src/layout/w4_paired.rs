@@ -35,6 +35,7 @@ const _: () = assert!(W4Paired::CELL.is_full(W4Paired::WIDTH.bits()));
 const _: () = assert!(Width::W4.max_level() * 127 * (W4Paired::X.chunk as i32) < 1 << 19);
 
 /// First bit and sign of a code.
+#[cfg(feature = "writer")]
 const fn field(row: usize, col: usize) -> (u32, u32) {
     match row {
         0 => (16 * col as u32, 0),
@@ -60,11 +61,13 @@ impl Format for W4Paired {
         pairs: false,
     };
 
+    #[cfg(feature = "writer")]
     fn insert(words: &mut [u32; 3], row: usize, col: usize, code: u8) {
         let (bit, sign) = field(row, col);
         words[0] |= (code as u32 & 15 ^ sign) << bit;
     }
 
+    #[cfg(feature = "writer")]
     fn extract(words: &[u32; 3], row: usize, col: usize) -> u8 {
         let (bit, sign) = field(row, col);
         (words[0] >> bit & 15 ^ sign) as u8

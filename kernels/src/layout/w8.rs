@@ -17,6 +17,7 @@ pub struct W8;
 const _: () = assert!(W8::CELL.is_full(W8::WIDTH.bits()));
 
 /// Where a column's code starts in the word.
+#[cfg(feature = "writer")]
 const fn bit(col: usize) -> u32 {
     8 * (col as u32 / 2) + 16 * (col as u32 % 2)
 }
@@ -34,10 +35,12 @@ impl Format for W8 {
     const STEP: usize = 4;
     const X: XLayout = XLayout::single(0);
 
+    #[cfg(feature = "writer")]
     fn insert(words: &mut [u32; 3], _row: usize, col: usize, code: u8) {
         words[0] |= (code as u32) << bit(col);
     }
 
+    #[cfg(feature = "writer")]
     fn extract(words: &[u32; 3], _row: usize, col: usize) -> u8 {
         (words[0] >> bit(col)) as u8
     }

@@ -25,6 +25,7 @@ const _: () = assert!(W8Paired::CELL.is_full(W8Paired::WIDTH.bits()));
 const _: () = assert!(Width::W8.max_level() * 127 * (W8Paired::X.chunk as i32) < 1 << 23);
 
 /// First bit and offset of a code.
+#[cfg(feature = "writer")]
 const fn field(row: usize, col: usize) -> (u32, u32) {
     let bit = 16 * col as u32;
     if row == 0 { (bit, 0x80) } else { (bit + 8, 0) }
@@ -45,11 +46,13 @@ impl Format for W8Paired {
         pairs: false,
     };
 
+    #[cfg(feature = "writer")]
     fn insert(words: &mut [u32; 3], row: usize, col: usize, code: u8) {
         let (bit, offset) = field(row, col);
         words[0] |= (code as u32 ^ offset) << bit;
     }
 
+    #[cfg(feature = "writer")]
     fn extract(words: &[u32; 3], row: usize, col: usize) -> u8 {
         let (bit, offset) = field(row, col);
         ((words[0] >> bit) as u8) ^ offset as u8

@@ -63,6 +63,7 @@ pub(crate) fn exp_fraction(x: f32) -> (f32, f32) {
 
 /// `tanh(x)` as a fraction.
 #[inline(always)]
+#[cfg(any(feature = "writer", not(actq_fpu)))]
 pub(crate) fn tanh_fraction(x: f32) -> (f32, f32) {
     let (n, d) = exp2(x * (2.0 * EXP), QUARTER);
     (n - d, n + d)

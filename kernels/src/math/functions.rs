@@ -1,6 +1,8 @@
 //! The elementwise functions.
 
-use super::exp2::{EXP, EXPONENT, FIXED_ONE, QUARTER, exp_fraction, exp2, fraction, power, tanh_fraction};
+#[cfg(any(test, feature = "writer"))]
+use super::exp2::tanh_fraction;
+use super::exp2::{EXP, EXPONENT, FIXED_ONE, QUARTER, exp_fraction, exp2, fraction, power};
 use super::limits::zero_or_nan;
 use crate::round::ROUND;
 
@@ -233,6 +235,7 @@ pub fn relu(x: f32) -> f32 {
 
 /// `x` where positive, else `exp(x) - 1`
 #[inline(always)]
+#[cfg(any(test, feature = "writer"))]
 pub fn elu(x: f32) -> f32 {
     ELU.of(x)
 }
@@ -246,6 +249,7 @@ pub fn sigmoid(x: f32) -> f32 {
 
 /// `(e - 1) / (e + 1)` with `e = exp(2 x)`
 #[inline(always)]
+#[cfg(any(test, feature = "writer"))]
 pub fn tanh(x: f32) -> f32 {
     let (n, d) = tanh_fraction(x);
     n / d

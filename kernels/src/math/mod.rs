@@ -20,6 +20,10 @@ pub(crate) mod exp2;
 mod functions;
 mod limits;
 
-pub use functions::{Function, cos, elu, exp, gelu, gelu_tanh, mish, relu, sigmoid, silu, sin, softplus, tanh};
+pub use functions::Function;
+#[cfg(any(feature = "writer", not(actq_fpu)))]
+pub use functions::sigmoid;
+#[cfg(feature = "writer")]
+pub use functions::{cos, elu, exp, gelu, gelu_tanh, mish, relu, silu, sin, softplus, tanh};
 pub use limits::clamp;
 pub(crate) use limits::zero_or_nan;

@@ -9,7 +9,9 @@ use core::ops::Range;
 
 use super::elementwise::copy_le;
 use crate::arch;
-use crate::arch::{Mismatch, gemv};
+#[cfg(feature = "writer")]
+use crate::arch::Mismatch;
+use crate::arch::gemv;
 use crate::cursor::LinearCursor;
 use crate::error::Fault;
 use crate::image::header::BLOCK_WORDS;
@@ -42,6 +44,7 @@ impl RowBlock<'_> {
     /// # Errors
     ///
     /// [`Mismatch`] if `x` was prepared for another shape, or if `start` or `y` is too short.
+    #[cfg(feature = "writer")]
     pub fn apply(
         &self,
         x: &Prepared<'_>,

@@ -1,5 +1,6 @@
 //! The operations of an image.
 
+#[cfg(feature = "writer")]
 pub mod cells;
 pub mod denoise;
 pub mod elementwise;

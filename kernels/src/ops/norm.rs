@@ -8,6 +8,7 @@ use crate::math::zero_or_nan;
 
 /// In place `(x - mean) / sqrt(variance + eps) * weight + bias`, mean and biased variance over the vector (torch's
 /// LayerNorm). Sums run in order from the first element. Nothing is done where weights or biases are too few.
+#[cfg(feature = "writer")]
 pub fn layer_norm(x: &mut [f32], weight: &[u32], bias: &[u32], eps: f32) {
     layer_norm_units(0..3 * x.len(), &mut Moments::default(), x, weight, bias, eps);
 }
@@ -31,6 +32,7 @@ pub(crate) fn layer_norm_units(
 }
 
 /// In place `x / sqrt(mean(x^2) + eps) * weight`. Nothing is done where weights are too few.
+#[cfg(feature = "writer")]
 pub fn rms_norm(x: &mut [f32], weight: &[u32], eps: f32) {
     rms_norm_units(0..2 * x.len(), &mut Moments::default(), x, weight, eps);
 }

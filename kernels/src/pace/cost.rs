@@ -110,6 +110,14 @@ pub fn of_step(image: &Image<'_>) -> Cost {
     of_frame(image) + image.ops().enumerate().map(|(i, op)| of_op(&op) * times(i)).sum()
 }
 
+impl Image<'_> {
+    /// Expected cost of a step that evaluates the network, for a Cortex-M4 with FPU and memory without wait states. A step
+    /// that plays on from a chunk takes less.
+    pub fn step_cost(&self) -> Cost {
+        of_step(self)
+    }
+}
+
 /// The cost of a step without the network's operations.
 pub fn of_frame(image: &Image<'_>) -> Cost {
     total(|add| frame(image, add))

@@ -126,6 +126,7 @@ impl Feature {
     pub const COUNT: usize = GEMVS + LAYOUTS * Strips::ALL.len() * Gemv::ALL.len();
 
     /// All of them.
+    #[cfg(any(test, feature = "writer"))]
     pub fn all() -> impl Iterator<Item = Self> {
         (0..Self::COUNT as u16).map(Self)
     }

@@ -19,11 +19,13 @@ pub struct Plan {
     pub(crate) first: usize,
     /// Words of the prepared vector.
     pub(super) words: usize,
+    #[cfg_attr(not(any(feature = "writer", actq_armv7em)), expect(dead_code, reason = "only the assembler reads it"))]
     arguments: KernelArguments,
 }
 
 /// The arguments of a kernel in assembler that depend on the vector's lengths. Kept with the plan, because it takes
 /// longer to find than a call may.
+#[cfg_attr(not(any(feature = "writer", actq_armv7em)), expect(dead_code, reason = "only the assembler reads it"))]
 #[derive(Clone, Copy, Debug)]
 pub struct KernelArguments {
     /// The words up to where it stops reading. Single lanes read no more than the block's own units; with row scales,
@@ -97,6 +99,7 @@ impl Plan {
     }
 
     /// Words of the prepared vector.
+    #[cfg(feature = "writer")]
     pub const fn words(&self) -> usize {
         self.words
     }
@@ -109,26 +112,31 @@ impl Plan {
 
     /// What a kernel in assembler is given with the vector.
     #[inline(always)]
+    #[cfg(any(feature = "writer", actq_armv7em))]
     pub const fn arguments(&self) -> KernelArguments {
         self.arguments
     }
 
     /// Columns of a group.
+    #[cfg(any(feature = "writer", not(actq_fpu)))]
     const fn group(&self) -> usize {
         self.first + (self.chunks - 1) * self.layout.x.chunk
     }
 
     /// Words of a group.
+    #[cfg(any(feature = "writer", not(actq_fpu)))]
     pub(super) const fn group_words(&self) -> usize {
         self.group() / 2 + self.chunks * self.layout.x.start_words + self.layout.x.sum as usize
     }
 
     /// Words of a chunk of so many columns.
+    #[cfg(any(feature = "writer", not(actq_fpu)))]
     pub(super) const fn chunk_words(&self, columns: usize) -> usize {
         self.layout.x.start_words + columns / 2
     }
 
     /// Words before the pair of column `col`.
+    #[cfg(feature = "writer")]
     pub(super) const fn words_before(&self, col: usize) -> usize {
         let (group, col) = (col / self.group(), col % self.group());
         let full_before = (col + self.layout.x.chunk - self.first) / self.layout.x.chunk;

@@ -1,6 +1,7 @@
 //! A prepared vector, and the plain way to prepare one.
 
 use super::plan::Plan;
+#[cfg(any(feature = "writer", not(actq_fpu)))]
 use crate::layout::XLayout;
 
 /// A prepared vector.
@@ -31,17 +32,20 @@ impl<'a> Prepared<'a> {
     }
 
     /// The groups' words, each with its sum where the layout has one.
+    #[cfg(any(feature = "writer", not(actq_armv7em)))]
     pub(crate) fn groups(&self) -> impl Iterator<Item = &'a [u32]> {
         self.words.chunks(self.plan.group_words())
     }
 
     /// The chunks of a group's words, without its sum.
+    #[cfg(any(feature = "writer", not(actq_armv7em)))]
     pub(crate) fn chunks(&self, group: &'a [u32]) -> impl Iterator<Item = &'a [u32]> {
         let (first, rest) = group.split_at(self.plan.chunk_words(self.plan.first).min(group.len()));
         core::iter::once(first).chain(rest.chunks(self.plan.chunk_words(self.plan.layout.x.chunk)))
     }
 
     /// The value of column `col`; 0 when out of range.
+    #[cfg(feature = "writer")]
     pub fn value(&self, col: usize) -> i16 {
         if col >= self.plan.padded {
             return 0;
@@ -52,6 +56,7 @@ impl<'a> Prepared<'a> {
 }
 
 /// As [`Scale::quantize`](super::Scale::quantize), of integers.
+#[cfg(feature = "writer")]
 pub fn prepare<'w>(x: &[i16], plan: &'w Plan, out: &'w mut [u32]) -> Option<Prepared<'w>> {
     let x = x.get(..plan.shape.cols).unwrap_or(x);
     lay_out(x, plan, out.get_mut(..plan.words)?, |value| value as u16 as u32);
@@ -59,6 +64,7 @@ pub fn prepare<'w>(x: &[i16], plan: &'w Plan, out: &'w mut [u32]) -> Option<Prep
 }
 
 /// Lays a vector out: any values, of which `integer` makes integers whose low 16 bits count.
+#[cfg(any(feature = "writer", not(actq_fpu)))]
 pub(crate) fn lay_out<V: Copy>(x: &[V], plan: &Plan, out: &mut [u32], integer: impl Fn(V) -> u32) {
     let mut x = x;
     for group in out.chunks_exact_mut(plan.group_words()).take(plan.groups) {
@@ -83,6 +89,7 @@ pub(crate) fn lay_out<V: Copy>(x: &[V], plan: &Plan, out: &mut [u32], integer: i
 }
 
 /// Writes a chunk, as far as `x` goes and then zeros, and returns the sum of its integers.
+#[cfg(any(feature = "writer", not(actq_fpu)))]
 fn chunk<V: Copy>(x: &[V], format: &XLayout, out: &mut [u32], integer: &impl Fn(V) -> u32) -> i32 {
     let (starts, pairs) = out.split_at_mut(format.start_words.min(out.len()));
     let (whole, rest) = x.as_chunks::<2>();

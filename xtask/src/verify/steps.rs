@@ -116,6 +116,8 @@ impl Steps {
         self.add("format", &["fmt", "--all", "--check"]);
         let arguments = [&["clippy", "--all-targets", "--release"], &host_packages()[..], &DENY].concat();
         self.add_of_firmware("lints", &arguments, &[]);
+        let kernels = [&["clippy", "--all-targets", "--release", "--package", "actq-kernels"], &DENY[..]].concat();
+        self.add("lints of the kernels without features", &kernels);
     }
 
     /// Adds the lints of the measuring firmware, for every target.
@@ -160,6 +162,8 @@ impl Steps {
         let deny = [("RUSTDOCFLAGS", "-D warnings")];
         let host = [&["doc", "--no-deps", "--release"], &host_packages()[..], &["--exclude", "xtask"]].concat();
         self.add_of_firmware("documentation", &host, &deny);
+        let kernels = ["doc", "--no-deps", "--release", "--package", "actq-kernels"];
+        self.add_with("documentation of the kernels without features", &kernels, &deny);
         let firmware = FIRMWARE.map(|name| ["--package", name]).concat();
         let firmware = [&["doc", "--no-deps"], &build_for(Target::Fpu)[..], &firmware].concat();
         self.add_of_firmware("documentation of the firmware", &firmware, &deny);
@@ -169,7 +173,16 @@ impl Steps {
         let command = installed.map(|()| {
             let mut command = cargo();
             command.current_dir(root());
-            command.args(["test", "--release", "--package", "actq-kernels", "--target", TARGET_32_BIT]);
+            command.args([
+                "test",
+                "--release",
+                "--package",
+                "actq-kernels",
+                "--features",
+                "writer",
+                "--target",
+                TARGET_32_BIT,
+            ]);
             command
         });
         self.0.push(Step { name: "kernels' tests with words of 32 bits".to_owned(), command });

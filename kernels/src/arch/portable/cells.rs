@@ -15,7 +15,7 @@ fn gated(gate: f32, x: f32) -> f32 {
 
 /// Some elements of [`crate::ops::cells::lstm_cell`]. Nothing is done where a length does not fit.
 #[inline(never)]
-pub(crate) fn lstm_elements(elements: Range<usize>, gates: &[f32], c: &mut [f32], h: &mut [f32]) {
+pub fn lstm_elements(elements: Range<usize>, gates: &[f32], c: &mut [f32], h: &mut [f32]) {
     let _ = lstm(elements, gates, c, h);
 }
 
@@ -35,7 +35,7 @@ fn lstm(elements: Range<usize>, gates: &[f32], c: &mut [f32], h: &mut [f32]) -> 
 
 /// Some elements of [`crate::ops::cells::gru_cell`]. Nothing is done where a length does not fit.
 #[inline(never)]
-pub(crate) fn gru_elements(elements: Range<usize>, a: &[f32], b: &[f32], h: &mut [f32]) {
+pub fn gru_elements(elements: Range<usize>, a: &[f32], b: &[f32], h: &mut [f32]) {
     let _ = gru(elements, a, b, h);
 }
 

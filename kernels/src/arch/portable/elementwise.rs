@@ -2,7 +2,7 @@
 
 /// See [`crate::ops::denoise::denoise`]; `by` are its coefficients, in their order.
 #[inline(never)]
-pub(crate) fn denoise(by: &[f32; 7], limit: f32, v: &[f32], z: &[f32], x: &mut [f32], y: &mut [f32]) {
+pub fn denoise(by: &[f32; 7], limit: f32, v: &[f32], z: &[f32], x: &mut [f32], y: &mut [f32]) {
     let &[sample_x, sample_v, keep, direct, sample, sigma, ahead] = by;
     let is_limited = sample_x != 0.0 || sample_v != 0.0;
     let next = |x: f32, v: f32| {
@@ -25,7 +25,7 @@ pub(crate) fn denoise(by: &[f32; 7], limit: f32, v: &[f32], z: &[f32], x: &mut [
 
 /// See [`crate::ops::elementwise::normalize`].
 #[inline(never)]
-pub(crate) fn normalize(x: &[f32], mean: &[u32], scale: &[u32], pre_clip: f32, clip: f32, y: &mut [f32]) {
+pub fn normalize(x: &[f32], mean: &[u32], scale: &[u32], pre_clip: f32, clip: f32, y: &mut [f32]) {
     let constant = |bits: &u32| f32::from_bits(u32::from_le(*bits));
     for (((y, &x), mean), scale) in y.iter_mut().zip(x).zip(mean).zip(scale) {
         let z = (limited(x, pre_clip) - constant(mean)) * constant(scale);

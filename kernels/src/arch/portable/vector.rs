@@ -1,21 +1,26 @@
 //! Vectors between f32 and integers.
 
 use crate::layout::half::{bf16, half_word};
+#[cfg(not(actq_fpu))]
 use crate::round::ROUND;
+#[cfg(not(actq_fpu))]
 use crate::x::{Plan, lay_out};
 
 /// The bits of the largest magnitude.
-pub(crate) fn magnitude(x: &[f32]) -> u32 {
+#[cfg(any(feature = "writer", not(actq_armv7em)))]
+pub fn magnitude(x: &[f32]) -> u32 {
     x.iter().fold(0u32, |m, v| m.max(v.to_bits() & 0x7fff_ffff))
 }
 
 /// `to = from`, as far as both go.
-pub(crate) fn copy(from: &[u32], to: &mut [u32]) {
+#[cfg(any(feature = "writer", not(actq_armv7em)))]
+pub fn copy(from: &[u32], to: &mut [u32]) {
     to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
 }
 
 /// Quantizes `x` by the plan to the first words of `out`; `None`, with nothing done, where that is shorter than
 /// [`Plan::room`].
+#[cfg(not(actq_fpu))]
 pub(crate) fn quantize(x: &[f32], inverse: f32, plan: &Plan, out: &mut [u32]) -> Option<()> {
     lay_out(x, plan, out.get_mut(..plan.room(x.len()))?, |value: f32| (value * inverse + ROUND).to_bits());
     Some(())
@@ -23,7 +28,7 @@ pub(crate) fn quantize(x: &[f32], inverse: f32, plan: &Plan, out: &mut [u32]) ->
 
 /// `y[i] = start[i] + sum[i] * (scale[i] * x_scale)`, with two bf16 scales a word; what is `None` stands in y, the sums
 /// with their bits.
-pub(crate) fn scale(sums: Option<&[i32]>, start: Option<&[u32]>, scales: &[u32], x_scale: f32, y: &mut [f32]) {
+pub fn scale(sums: Option<&[i32]>, start: Option<&[u32]>, scales: &[u32], x_scale: f32, y: &mut [f32]) {
     for (i, y) in y.iter_mut().enumerate() {
         let start = start.and_then(|s| s.get(i)).map_or(*y, |bits| f32::from_bits(u32::from_le(*bits)));
         let sum = sums.and_then(|s| s.get(i)).map_or(y.to_bits() as i32, |sum| *sum);
@@ -33,6 +38,6 @@ pub(crate) fn scale(sums: Option<&[i32]>, start: Option<&[u32]>, scales: &[u32],
 
 /// The square root, correctly rounded as IEEE 754 has it.
 #[inline(always)]
-pub(crate) fn sqrt(x: f32) -> f32 {
+pub fn sqrt(x: f32) -> f32 {
     libm::sqrtf(x)
 }
