@@ -1,16 +1,13 @@
 //! Observations at their rate, and the log of the actions.
 
-use std::io::Cursor;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use actq_client::log::Log;
+use actq_client::log::{Log, Row};
 use actq_client::stream::{Pace, stream};
 use actq_controller::Output;
 use actq_controller::slots::Anyone;
 use actq_link::code::State;
-use ndarray::{Array1, Array2};
-use ndarray_npy::NpzReader;
 
 use crate::simulated::{OBSERVATION, Simulated};
 
@@ -32,25 +29,20 @@ fn a_streamed_recording_is_logged_with_its_actions() {
     stream(&mut client, observations(100), &PACE, &mut log, seen).expect("losing one in twenty frames stops nothing");
     assert!(armed > 0 && moved);
     assert_eq!(client.status().expect("the controller answers").state, State::Disarmed);
-    let mut npz =
-        NpzReader::new(Cursor::new(log.npz().expect("the actions have one length"))).expect("the log is a zip file");
-    let sent: Array2<f32> = npz.by_name("obs").expect("an array");
-    let actions: Array2<f32> = npz.by_name("action").expect("an array");
-    let applied: Array1<u8> = npz.by_name("applied").expect("an array");
-    let times: [Array1<f64>; 2] = ["sent", "received"].map(|name| npz.by_name(name).expect("an array"));
-    assert_eq!((sent.dim(), actions.dim()), ((100, OBSERVATION), (100, 2)));
-    let answered: Vec<usize> = (0..100).filter(|row| !actions[[*row, 0]].is_nan()).collect();
-    assert!(answered.len() > 70, "{}", answered.len());
-    assert_eq!(log.latencies().len(), answered.len());
-    for row in 0..100 {
-        assert_eq!(sent[[row, 2]], row as f32);
-        assert_eq!(times[1][row].is_nan(), !answered.contains(&row));
+    let rows = log.rows();
+    assert_eq!(rows.len(), 100);
+    let answers: Vec<_> = rows.iter().filter_map(|row| Some((row.sent, row.answer.as_ref()?))).collect();
+    assert!(answers.len() > 70, "{}", answers.len());
+    assert_eq!(log.latencies().len(), answers.len());
+    for (i, row) in rows.iter().enumerate() {
+        assert_eq!((row.observation.len(), row.observation[2]), (OBSERVATION, i as f32));
     }
-    for row in &answered {
-        assert_eq!([actions[[*row, 0]], actions[[*row, 1]]], [0.25, -0.125]);
-        assert!(times[1][*row] >= times[0][*row]);
+    for (sent, answer) in &answers {
+        assert_eq!(answer.action, [0.25, -0.125]);
+        assert!(answer.received_at >= *sent);
     }
-    assert!(applied.sum() > 60 && applied.slice(ndarray::s![..5]).sum() == 0, "armed after the first five");
+    let applied = |rows: &[Row]| rows.iter().filter(|row| row.answer.as_ref().is_some_and(|a| a.applied)).count();
+    assert!(applied(rows) > 60 && applied(&rows[..5]) == 0, "armed after the first five");
 }
 
 #[test]
@@ -67,5 +59,5 @@ fn a_stopped_controller_ends_the_stream_with_its_reason() {
     });
     let error = stream(&mut client, cut, &PACE, &mut log, |_| ()).expect_err("it has latched");
     assert!(error.to_string().contains("no valid observation arrived within the deadline"), "{error:#}");
-    assert!(log.observations() >= 30 && log.latencies().len() >= 25);
+    assert!(log.rows().len() >= 30 && log.latencies().len() >= 25);
 }

@@ -1,5 +1,6 @@
 //! `actq link`
 
+mod log;
 mod table;
 
 use std::io;
@@ -108,14 +109,14 @@ fn run_stream(args: &StreamArgs) -> Result<()> {
     drop(progress);
     // What came before an error is what one wants to see.
     if args.log.is_some() {
-        outputs.write(&[log.npz()?])?;
+        outputs.write(&[log::npz(log.rows())?])?;
     }
     let mut latencies = log.latencies();
     latencies.sort_by(f64::total_cmp);
     let at = |share: f64| latencies.get((share * latencies.len() as f64) as usize).map_or(f64::NAN, |s| s * 1e3);
     print(&format!(
         "{} observations, {} actions; from observation to action {:.1} ms in the median, {:.1} ms in 99 of 100\n",
-        log.observations(),
+        log.rows().len(),
         latencies.len(),
         at(0.5),
         at(0.99)
