@@ -1,9 +1,9 @@
-//! Says which backends the target has; `src/arch/mod.rs` chooses. Stable rustc shows no `target_feature = "dsp"`, so
-//! the target's name decides, and for Armv8-M, where the extension is an option, the processor that the build names
-//! (`-C target-cpu=cortex-m33`). `actq_kernels::arch::BACKEND` says which backend was compiled in. The environment
-//! variable `ACTQ_BACKEND=portable` leaves the assembler out: to compare, or where assembler is not wanted.
+//! Detects the backends of the target; `src/arch/mod.rs` chooses one. Stable rustc does not report
+//! `target_feature = "dsp"`, so the target's name decides. For Armv8-M, where the extension is optional, the processor that
+//! the build names (`-C target-cpu=cortex-m33`) decides. `actq_kernels::BACKEND` is the backend of the build. The environment
+//! variable `ACTQ_BACKEND=portable` excludes the assembler, for comparisons and for builds without assembler.
 
-/// Processors of Armv8-M whose DSP extension LLVM takes for granted.
+/// Armv8-M processors with the DSP extension, by LLVM's defaults.
 const WITH_DSP: [&str; 5] = ["cortex-m33", "cortex-m35p", "cortex-m52", "cortex-m55", "cortex-m85"];
 
 fn main() {
@@ -16,7 +16,7 @@ fn main() {
     let portable = match std::env::var("ACTQ_BACKEND").as_deref() {
         Ok("portable") => true,
         Ok("") | Err(_) => false,
-        Ok(other) => panic!("ACTQ_BACKEND is {other:?}; it may be `portable` or not set"),
+        Ok(other) => panic!("ACTQ_BACKEND is {other:?}; set it to `portable` or unset it"),
     };
     let dsp = target.starts_with("thumbv7em") || target.starts_with("thumbv8m.main") && flags_have_dsp();
     if dsp && !portable {
@@ -24,14 +24,14 @@ fn main() {
         if target.starts_with("thumbv8m") {
             println!("cargo::rustc-cfg=actq_armv8m");
         }
-        // The hard-float target; the kernels that convert from and to f32 need its registers.
+        // The kernels that convert from and to f32 need the registers of the hard-float target.
         if target.ends_with("eabihf") {
             println!("cargo::rustc-cfg=actq_fpu");
         }
     }
 }
 
-/// Whether the last processor that the compiler's flags name has the DSP extension.
+/// Returns `true` if the last processor in the compiler's flags has the DSP extension.
 fn flags_have_dsp() -> bool {
     let flags = std::env::var("CARGO_ENCODED_RUSTFLAGS").unwrap_or_default();
     let processor =

@@ -1,54 +1,55 @@
-//! Where a step in pieces stands.
+//! Progress of a step that runs in slices.
 
 use crate::layout::Width;
 use crate::x::Scale;
 
-/// Where an evaluation stands.
+/// Progress of an evaluation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Cursor {
-    /// The operation.
+    /// Index of the operation.
     pub(crate) op: usize,
-    /// The denoising step that it belongs to.
+    /// Denoising step of the operation.
     pub(crate) step: usize,
-    /// Seed and draw of the noise; `None` where the caller has given it.
+    /// Seed and draw of the noise; `None` if the caller provides the noise.
     pub(crate) draw: Option<[u32; 2]>,
-    /// Its elements that are done, or units of a norm.
+    /// Finished elements of the operation, or units of a norm.
     pub(crate) done: usize,
-    /// Of a norm.
+    /// Sums of a norm.
     pub(crate) moments: Moments,
-    /// Of a linear operation.
+    /// Progress of a linear operation.
     pub(crate) linear: LinearCursor,
 }
 
 impl Cursor {
-    /// Whether work has been done since `begin`, the start of an operation.
-    pub(crate) fn has_left(&self, begin: Self) -> bool {
+    /// Returns `true` if work has been done since `begin`, the start of an operation.
+    pub(crate) fn has_progressed(&self, begin: Self) -> bool {
         // A linear operation begins with its scale.
         self.op != begin.op || self.step > 0 || self.done > 0 || self.linear.scale.is_some()
     }
 }
 
-/// Where a linear operation stands.
+/// Progress of a linear operation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct LinearCursor {
-    /// The scale of its input, once that is known.
+    /// Scale of the input, if known.
     pub(crate) scale: Option<Scale>,
-    /// Outputs that have their biases, where these come first.
+    /// Initialized outputs, if outputs are initialized before the rows.
     pub(crate) started: usize,
-    /// Blocks that are done.
+    /// Finished blocks.
     pub(crate) block: usize,
-    /// The width that the input is prepared for.
+    /// Width that the input is prepared for.
     pub(crate) prepared: Option<Width>,
-    /// Rows of the block that are done.
+    /// Finished rows of the block.
     pub(crate) row: usize,
-    /// The output of the last of them, where the block's rows have steps.
+    /// Output of the last finished row, if the block has output steps.
     pub(crate) output: usize,
 }
 
-/// What a norm has summed so far: a piece of it goes on where the last one ended.
+/// Partial sums of a norm: a slice continues the sums of the previous one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Moments {
+    /// Sum of the elements.
     pub(crate) sum: f32,
-    /// Of the squares of the differences from the mean.
+    /// Sum of the squared differences from the mean.
     pub(crate) squares: f32,
 }

@@ -1,5 +1,5 @@
-//! The errors of parsing, of construction and of a step. Their numbers are for what cannot take an enum: C, a frame of
-//! a few bytes, a register that survives a reset. 0 is no error.
+//! The errors of an image's check, of construction and of a step. Each has a number, for C, for a frame of a few bytes and
+//! for a register that survives a reset. 0 is no error.
 
 use core::fmt;
 
@@ -28,10 +28,10 @@ macro_rules! image_errors {
         }
 
         impl ImageError {
-            /// All of them.
+            /// All errors, by number.
             pub const ALL: &[Self] = &[$(Self::$name,)*];
 
-            /// What [`Display`](fmt::Display) writes, for programs without `core::fmt`.
+            /// Returns the text that [`Display`](fmt::Display) writes, for programs without `core::fmt`.
             pub const fn text(self) -> &'static str {
                 match self {
                     $(Self::$name => $text,)*
@@ -48,7 +48,7 @@ macro_rules! image_errors {
 }
 
 image_errors! {
-    /// The bytes do not start at a multiple of 4 in memory.
+    /// The bytes do not start at a multiple of 4 in memory; [`crate::include_image!`] aligns a file.
     Misaligned = 1, "image is not aligned to 4 bytes";
     /// Fewer bytes than a header.
     TooShort = 2, "image is shorter than its header";
@@ -67,33 +67,33 @@ image_errors! {
     /// The policy kind is unknown.
     Kind = 9, "unknown policy kind";
     /// Chunk or execute length is zero, or execute exceeds chunk.
-    Chunk = 10, "chunk and execute lengths do not fit";
-    /// A section lies outside the image, shares words with another, or does not stand in its place in their order.
-    Section = 11, "a section lies outside the image, or overlaps or precedes one that stands before it";
-    /// The scratch memory is not state, observation, what operations write, action and work area, one behind the other,
-    /// in at most 65535 words; or the work area is too short.
-    Arena = 12, "the scratch memory's regions do not follow each other, or the work area is too short";
+    Chunk = 10, "chunk and execute lengths disagree";
+    /// A section lies outside the image, shares words with another, or is out of order.
+    Section = 11, "a section lies outside the image, overlaps another or is out of order";
+    /// The arena is not state, observation, operation outputs, action and work area, in this order and without gaps, in at
+    /// most 65535 words; or the work area is too short.
+    Arena = 12, "regions of the arena do not follow each other, or the work area is too short";
     /// Regions of an operation overlap.
     Overlap = 13, "regions of an operation overlap";
     /// An operation, or the action, reads words that no operation of the step has written.
-    Unwritten = 14, "an operation reads memory that nothing has written in its step";
+    Unwritten = 14, "an operation reads words that its step has not written";
     /// An operation code is unknown.
     Op = 15, "unknown operation";
     /// A length is zero, or two lengths of an operation disagree.
-    Shape = 16, "lengths of an operation do not fit";
+    Shape = 16, "lengths of an operation disagree";
     /// A linear operation names no matrix of the image.
     Matrix = 17, "an operation names no matrix of the image";
     /// A matrix block's width is not 2, 3, 4 or 8 bits.
     Width = 18, "weight width is not 2, 3, 4 or 8 bits";
-    /// A block's lanes are not those that follow from its matrix's activations and group.
-    Lanes = 19, "lanes of a block do not follow from its matrix's activations and groups";
+    /// A block's lanes differ from those of its matrix's activations and group size.
+    Lanes = 19, "lanes of a block differ from those of its matrix's activations and group size";
     /// A group size is not 0, 32, 64 or 128.
     Group = 20, "group size is not 0, 32, 64 or 128";
-    /// A row's output lies outside the matrix's or has another row.
-    Index = 21, "a row's output is out of range or has another row";
+    /// The output of a row is out of range or belongs to another row, too.
+    Index = 21, "the output of a row is out of range or belongs to two rows";
     /// A constant is NaN, infinite or of the wrong sign.
     Constant = 22, "a constant is not finite or has the wrong sign";
-    /// A row's worst case exceeds the int32 accumulator.
+    /// The largest sum of a row exceeds its int32 accumulator.
     Overflow = 23, "a row can overflow its int32 accumulator";
     /// A lower action limit exceeds the upper one.
     Limits = 24, "action limits are reversed";
@@ -101,20 +101,19 @@ image_errors! {
     Name = 25, "policy name is not UTF-8 or holds control characters";
     /// The self-test vector has no steps.
     SelfTest = 26, "the self-test vector has no steps";
-    /// Denoising steps without operations or of a policy that has none, or noise where none is.
-    Denoising = 27, "denoising steps, their operations and their noise do not fit";
-    /// Playback averages more chunks than there are actions in one, or of chunks of which several actions are executed;
-    /// leads over by more actions than the chunk before has left, or in an average; or has a deadline before the last
-    /// action that is executed.
-    Playback = 28, "horizon, overlap, deadline, chunk and execute lengths do not fit";
-    /// Some of the arrays that binarise are missing, or an upper threshold is below its lower one.
-    Binarise = 29, "an action is binarised without all four arrays, or by thresholds that are reversed";
+    /// Denoising steps without operations, denoising operations in another kind of policy, or noise at a wrong place.
+    Denoising = 27, "denoising steps, their operations and their noise disagree";
+    /// One of these: the horizon exceeds the chunk, or goes with several executed actions or an overlap; the overlap exceeds
+    /// the actions that remain of a chunk; the deadline is before the last executed action.
+    Playback = 28, "horizon, overlap, deadline, chunk and execute lengths disagree";
+    /// Only some of the four binarization arrays are present, or an upper threshold is below the lower one.
+    Binarise = 29, "binarization lacks one of its four arrays, or its thresholds are reversed";
     /// A smoothing coefficient is not above 0 and at most 1.
     Smoothing = 30, "a smoothing coefficient is not above 0 and at most 1";
 }
 
 impl ImageError {
-    /// The error's number, which stays the same in all versions: 1 to 63.
+    /// Returns the error's number, the same in all versions: 1 to 63.
     pub const fn code(self) -> u8 {
         self as u8
     }
@@ -127,7 +126,7 @@ impl core::error::Error for ImageError {}
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum HeadError {
-    /// The scratch slice has fewer words than the image asks for.
+    /// The scratch memory has fewer words than the image needs.
     ScratchTooSmall {
         /// Words needed.
         needed: usize,
@@ -137,7 +136,7 @@ pub enum HeadError {
 }
 
 impl HeadError {
-    /// The error's number, which stays the same in all versions: 64 to 69.
+    /// Returns the error's number, the same in all versions: 64 to 69.
     pub const fn code(self) -> u8 {
         match self {
             Self::ScratchTooSmall { .. } => 64,
@@ -149,7 +148,7 @@ impl fmt::Display for HeadError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::ScratchTooSmall { needed, given } => {
-                write!(f, "scratch memory has {given} words, the image needs {needed}")
+                write!(f, "scratch memory has {given} words; the image needs {needed}")
             }
         }
     }
@@ -157,30 +156,30 @@ impl fmt::Display for HeadError {
 
 impl core::error::Error for HeadError {}
 
-/// Why the state of a head was not saved or restored. Nothing has changed.
+/// Why the state of a head was not saved or restored. The head is unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum SavedError {
-    /// The slice has not the length that the image's state has.
+    /// The length differs from that of the image's state.
     Length {
         /// Bytes needed: [`crate::Head::saved_len`].
         needed: usize,
         /// Bytes given.
         given: usize,
     },
-    /// The bytes are no saved state, or that of another version of it.
+    /// The bytes are not a saved state of this version.
     Version,
-    /// The state is that of another image.
+    /// The state belongs to another image.
     Image,
-    /// The checksum does not match, or a number is impossible: the bytes are damaged.
+    /// The checksum differs, or a number is impossible: the bytes are damaged.
     Damaged,
-    /// A step was begun and is not ready: take it to its end, or reset.
+    /// A step has begun and is not ready: poll it to its end, or reset.
     Begun,
 }
 
 impl SavedError {
-    /// The error's number, which stays the same in all versions: 70 to 79.
+    /// Returns the error's number, the same in all versions: 70 to 79.
     pub const fn code(self) -> u8 {
         match self {
             Self::Length { .. } => 70,
@@ -195,21 +194,19 @@ impl SavedError {
 impl fmt::Display for SavedError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Length { needed, given } => write!(f, "saved state has {given} bytes, the image's has {needed}"),
-            Self::Version => f.write_str("not a saved state, or one of another version; reset instead"),
-            Self::Image => f.write_str("saved state is that of another image; reset instead"),
+            Self::Length { needed, given } => write!(f, "saved state has {given} bytes; the image's has {needed}"),
+            Self::Version => f.write_str("not a saved state of this version; reset instead"),
+            Self::Image => f.write_str("saved state belongs to another image; reset instead"),
             Self::Damaged => f.write_str("saved state is damaged; reset instead"),
-            Self::Begun => {
-                f.write_str("a step was begun and is not ready; poll it to its end before its state is saved")
-            }
+            Self::Begun => f.write_str("a step is not ready; poll it to its end before saving the state"),
         }
     }
 }
 
 impl core::error::Error for SavedError {}
 
-/// Why a step gave no action. The recurrent state and the chunk are as after a reset; the last action stays, so that
-/// the step limit holds across the error. [`StepError::Budget`] and [`StepError::NotBegun`] change nothing.
+/// Why a step gave no action. The recurrent state and the chunk are reset; the last action stays, so that the step limit
+/// holds across the error. [`StepError::Budget`] and [`StepError::NotBegun`] change nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -226,23 +223,23 @@ pub enum StepError {
         /// Its position.
         index: usize,
     },
-    /// A value inside the network or an action left the range of f32.
+    /// A value inside the network or an action exceeded the range of f32.
     NotFinite,
-    /// The image's memory no longer holds what was checked: flash that decays, or was rewritten.
+    /// The image's memory has changed since its check: the flash decayed or was rewritten.
     Damaged,
-    /// The self-test vector gave other bits than the image records.
+    /// A self-test step gave other bits than the image records.
     SelfTest {
-        /// The step of the vector that differed.
+        /// The self-test step that differed, from 0.
         step: usize,
     },
-    /// The budget of a poll is smaller than the image's least.
+    /// The slice budget is below the image's least budget.
     Budget {
-        /// Instructions needed: [`crate::Image::least_budget`].
+        /// Modelled instructions needed: [`crate::Image::least_budget`].
         needed: u32,
-        /// Instructions given.
+        /// Modelled instructions given.
         given: u32,
     },
-    /// A poll without a step that was begun.
+    /// A poll without a step that has begun.
     NotBegun,
     /// The noise's length differs from the image's.
     NoiseLength {
@@ -256,12 +253,12 @@ pub enum StepError {
         /// Its position.
         index: usize,
     },
-    /// Every action at hand is older than its deadline, or was for a time that has passed.
+    /// Every action is older than its deadline, or its period has passed.
     Stale,
 }
 
 impl StepError {
-    /// The error's number, which stays the same in all versions: 80 to 127.
+    /// Returns the error's number, the same in all versions: 80 to 127.
     pub const fn code(self) -> u8 {
         match self {
             Self::ObservationLength { .. } => 80,
@@ -288,7 +285,7 @@ impl From<Fault> for StepError {
     }
 }
 
-/// What goes wrong inside an evaluation.
+/// An error inside an evaluation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Fault {
     /// See [`StepError::NotFinite`].
@@ -309,19 +306,19 @@ impl fmt::Display for StepError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::ObservationLength { expected, given } => {
-                write!(f, "observation has {given} values, the policy takes {expected}")
+                write!(f, "observation has {given} values; the policy takes {expected}")
             }
             Self::ObservationNotFinite { index } => write!(f, "observation value {index} is not finite"),
             Self::NotFinite => f.write_str("the network produced a value that is not finite"),
             Self::Damaged => f.write_str("the image's memory has changed since it was checked"),
             Self::SelfTest { step } => write!(f, "self-test step {step} gave other bits than the image records"),
             Self::Budget { needed, given } => {
-                write!(f, "a poll has {given} instructions, the image needs at least {needed}")
+                write!(f, "a poll has {given} instructions; the image needs at least {needed}")
             }
-            Self::NotBegun => f.write_str("no step was begun: begin takes the observation, then poll"),
-            Self::NoiseLength { expected, given } => write!(f, "noise has {given} values, the policy takes {expected}"),
+            Self::NotBegun => f.write_str("no step has begun; call begin with an observation, then poll"),
+            Self::NoiseLength { expected, given } => write!(f, "noise has {given} values; the policy takes {expected}"),
             Self::NoiseNotFinite { index } => write!(f, "noise value {index} is not finite"),
-            Self::Stale => f.write_str("no action at hand is young enough to play"),
+            Self::Stale => f.write_str("no action is young enough to play"),
         }
     }
 }
@@ -334,9 +331,9 @@ mod tests {
 
     use super::*;
 
-    /// Other programs hold on to the numbers.
+    /// Other programs depend on the numbers.
     #[test]
-    fn codes_stay_what_they_are() {
+    fn error_codes_stay_the_same() {
         let codes: std::vec::Vec<_> = ImageError::ALL.iter().map(|e| (e.code(), format!("{e:?}"))).collect();
         let expected = [
             "Misaligned",

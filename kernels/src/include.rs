@@ -1,12 +1,12 @@
-//! An image in the program: aligned, and checked when the program is compiled.
+//! An image in the program: aligned, and checked at compile time.
 
-/// Includes an image file, as [`include_bytes!`](core::include_bytes) does, and gives `&'static [u8]`.
+/// Includes an image file, as [`include_bytes!`](core::include_bytes) does, and returns `&'static [u8]`.
 ///
 /// The bytes are aligned to 4, as [`Image::new_checked`](crate::Image::new_checked) needs them. At compile time
 /// [`ImageInfo::read`](crate::ImageInfo::read) checks the file: another format version, another kernel layout, a
 /// truncated or a damaged file does not compile. `Image::new_checked` checks the rest at run time.
 ///
-/// A relative path starts from the file that the macro is in.
+/// A relative path starts at the file that calls the macro.
 ///
 /// ```
 /// use actq_kernels::{Head, Image, ImageInfo, include_image};
@@ -41,7 +41,7 @@ macro_rules! include_image {
     }};
 }
 
-/// What [`include_image!`](crate::include_image) expands to. Not for other use.
+/// Parts of the expansion of [`include_image!`](crate::include_image), for no other use.
 #[doc(hidden)]
 pub mod included {
     use crate::image::ImageInfo;

@@ -1,22 +1,22 @@
 //! Low-bit GEMV kernels and an action-head executor for microcontrollers: `no_std`, no allocation, no panic after
 //! [`Image::new_checked`].
 //!
-//! A robot policy's last layers, or a whole small policy, are quantized on a host (by the command `actq`) into one
-//! image of bytes. This crate runs that image in place from flash:
+//! The command `actq` quantizes a robot policy's last layers, or a whole small policy, into one image on a host. This crate
+//! runs that image in place from flash:
 //!
 //! ```
 //! # fn run(bytes: &[u8], scratch: &mut [u32], observation: &[f32]) -> Result<(), Box<dyn std::error::Error>> {
 //! use actq_kernels::{Head, Image};
 //!
-//! let image = Image::new_checked(bytes)?; // checksum, layout, bounds, overflow limits: all of it here, once
-//! let mut head = Head::new(image, scratch)?; // `image.scratch_words()` says how many words
+//! let image = Image::new_checked(bytes)?; // checks checksum, layout, bounds and overflow limits
+//! let mut head = Head::new(image, scratch)?; // `scratch` has at least `image.scratch_words()` words
 //! head.reset();
 //! let action = head.step(observation)?; // the same bits on every machine
 //! # let _ = action; Ok(())
 //! # }
 //! ```
 //!
-//! `docs/FORMAT.md` documents the image, `docs/KERNELS.md` the kernels. Everything outside the integer GEMV is IEEE 754
+//! [`include_image!`] puts an image into the program. `docs/FORMAT.md` documents the image, `docs/KERNELS.md` the kernels. Everything outside the integer GEMV is IEEE 754
 //! binary32 in a fixed order, without fused multiply-add, so that a host, QEMU and a board give identical bits.
 //!
 //! Features:
@@ -26,10 +26,10 @@
 //!   parts of the cost model. The quantizer, tests and measurements use it. It is **unstable**: any version may change it.
 #![cfg_attr(not(test), no_std)]
 #![deny(unsafe_code)]
-// Without the feature, what the writer sees is private.
+// Without the feature, the modules for writers are private, with their public items.
 #![cfg_attr(not(feature = "writer"), allow(unreachable_pub))]
 
-/// Declares methods that are public with the feature `writer`, and the crate's own without it.
+/// Declares methods that are public with the feature `writer`, and private to the crate without it.
 macro_rules! writer_methods {
     ($($(#[$attribute:meta])* fn $name:ident $arguments:tt -> $result:ty $body:block)*) => {
         $(
@@ -43,8 +43,8 @@ macro_rules! writer_methods {
     };
 }
 
-// Which of these may use which: the table in docs/ARCHITECTURE.md, which a test reads. A module that the writer needs is
-// public with its feature.
+// A test checks the dependencies between these modules by the table in docs/ARCHITECTURE.md. A module that writers need is
+// public with the feature `writer`.
 #[cfg(feature = "writer")]
 pub mod arch;
 #[cfg(not(feature = "writer"))]

@@ -1,45 +1,45 @@
-//! Leave to go on: what runs an image in pieces asks here how far it may go, and knows no prices.
+//! The budget of a slice: code that runs an image in slices asks here how far it may go. It does not know any cost.
 
 use crate::image::{Image, Op};
 use crate::layout::{BlockShape, STRIP};
 
-/// Rows whose sums stand on the stack at once.
+/// Rows whose sums are on the stack together.
 pub(crate) const RUN: usize = 8 * STRIP;
 
-/// A kind of work, with all that its price depends on.
+/// A kind of work, with everything that its cost depends on.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Work<'w> {
-    /// Coming to an operation, at its start or in its midst.
+    /// Entering an operation, at its start or inside it.
     Enter(&'w Op<'w>),
     /// Elements of an operation, or units of a norm.
     Elements(&'w Op<'w>),
-    /// Finding the scale of an input of so many values.
+    /// Finding the scale of an input of this number of values.
     Magnitude(usize),
-    /// Setting outputs up before rows are added to them.
+    /// Initializing outputs before rows are added to them.
     Start(OutputStart),
     /// Preparing an input for blocks of this shape.
     Prepare(BlockShape),
-    /// Strips of eight of a block's rows, whose outputs are `in_order`, or by an index, and `start` from the biases.
+    /// Strips of eight of a block's rows, whose outputs are `in_order` or by output steps, and `start` from the biases.
     Strips { shape: BlockShape, in_order: bool, start: bool },
-    /// The way from the network's output to the action.
+    /// Computing the action from the network's output.
     Act(&'w Image<'w>),
 }
 
-/// What outputs are set to before rows are added to them.
+/// The values of outputs before rows are added to them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum OutputStart {
-    /// To 0.
+    /// Zeros.
     Zero,
-    /// To the biases.
+    /// The biases.
     Bias,
-    /// To themselves.
+    /// The old values.
     Kept,
-    /// To themselves and the biases.
+    /// The old values plus the biases.
     Added,
 }
 
 impl OutputStart {
-    /// Of an operation that accumulates or not, with biases or without.
+    /// Returns the start of an operation that accumulates or not, with biases or without.
     pub(crate) const fn of(accumulate: bool, bias: bool) -> Self {
         match (accumulate, bias) {
             (false, false) => Self::Zero,
@@ -50,13 +50,13 @@ impl OutputStart {
     }
 }
 
-/// Says how far a piece of work may go.
+/// A limit of the work in a slice.
 pub(crate) trait Meter {
-    /// Takes as many of `units` as there is room for, and says how many those are.
+    /// Takes as many of `units` as the budget allows, and returns their number.
     fn take(&mut self, units: usize, work: Work<'_>) -> usize;
 }
 
-/// No limit. Where steps are not cut, no code asks for a price, and the cost model is not in the program.
+/// No limit. A program without slices computes no cost and does not include the cost model.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Unlimited;
 

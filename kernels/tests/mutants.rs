@@ -1,6 +1,6 @@
-//! Images changed at random, with a correct checksum: what passes `Image::new_checked` runs without a panic, keeps its
-//! limits, and sees nothing but its observations; and what changes behind the check's back does not panic either. These
-//! tests need nothing but this crate, so that they run where a word has 32 bits, and under Miri, too.
+//! Random changes of a valid image, with a correct checksum. An image that passes `Image::new_checked` runs without a panic,
+//! keeps its limits, and depends only on its observations. An image that changes after the check does not panic either. The
+//! tests need only this crate, so that they also run with words of 32 bits and in Miri.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -8,10 +8,10 @@ use actq_kernels::image::{checksum, header as h, op};
 use actq_kernels::{Head, Image};
 use actq_testkit::Random;
 
-/// Mutations of a test.
+/// Mutations in each test.
 const CASES: u64 = if cfg!(miri) { 20 } else { 20_000 };
 
-/// An image with every kind of section, which `host-tests/tests` make and compare.
+/// An image with every kind of section. A test in `host-tests/tests` writes the same bytes.
 const VALID: &[u8] = include_bytes!("valid.actq");
 
 /// An image whose words can be changed.
@@ -38,12 +38,12 @@ impl Draft {
         self.get(at) as usize
     }
 
-    /// Makes the checksum fit.
+    /// Writes the correct checksum.
     fn seal(&mut self) {
         self.set(h::W_CRC, checksum(self.bytes()));
     }
 
-    /// Words that steer: header, operation records, matrix and block records.
+    /// Returns the words with the image's structure: header, operation, matrix and block records.
     fn structure(&self) -> Vec<usize> {
         let (first, count) = (self.offset(h::W_OPS), (self.get(h::W_KIND) >> 16) as usize);
         let ops = first..first + count * h::OP_WORDS;
@@ -59,7 +59,7 @@ impl Draft {
     }
 }
 
-/// A random change of up to three words, mostly of those that steer.
+/// Changes up to three words at random, mostly words of the structure.
 fn mutate(random: &mut Random, draft: &mut Draft, structure: &[usize]) {
     for _ in 0..1 + random.below(3) {
         let at = match random.below(4) {
@@ -80,8 +80,8 @@ fn mutate(random: &mut Random, draft: &mut Draft, structure: &[usize]) {
     draft.seal();
 }
 
-/// Hands the images of the mutations that are accepted to `see`; gives their number. A panic in `see` fails with the
-/// numbers of all such cases.
+/// Passes each accepted mutation to `see` and returns their number. If `see` panics, the test fails with the numbers of all
+/// such cases.
 fn accepted(see: impl Fn(Image<'_>, &mut Random)) -> u64 {
     let structure = Draft::valid().structure();
     let (mut seen, mut failed) = (0, Vec::new());
@@ -102,8 +102,8 @@ fn accepted(see: impl Fn(Image<'_>, &mut Random)) -> u64 {
     seen
 }
 
-/// Three steps and the self-test in memory of exactly the size that the image asks for, filled with `fill`: the bits of
-/// the actions that it gives.
+/// Runs three steps and the self-test, in memory of exactly the image's size that is filled with `fill`. Returns the bits of
+/// the actions.
 fn play(image: Image<'_>, fill: u32, random: &mut Random) -> Vec<Option<Vec<u32>>> {
     let mut scratch = vec![fill; image.scratch_words()];
     let mut head = Head::new(image, &mut scratch).expect("the scratch memory has the image's size");
@@ -117,7 +117,7 @@ fn play(image: Image<'_>, fill: u32, random: &mut Random) -> Vec<Option<Vec<u32>
 }
 
 #[test]
-fn what_is_accepted_runs_and_keeps_its_limits() {
+fn accepted_images_keep_their_limits() {
     let seen = accepted(|image, random| {
         let [_, _, low, high, ..] = image.contract_arrays();
         let limit = |array: &[u32], i: usize| array.get(i).map(|w| f32::from_bits(u32::from_le(*w)));
@@ -134,7 +134,7 @@ fn what_is_accepted_runs_and_keeps_its_limits() {
 }
 
 #[test]
-fn what_is_accepted_does_not_see_what_its_memory_held() {
+fn old_memory_does_not_change_actions() {
     accepted(|image, random| {
         let other = play(image, 0x3f80_0000, &mut random.clone());
         assert_eq!(play(image, 0, random), other);
@@ -142,7 +142,7 @@ fn what_is_accepted_does_not_see_what_its_memory_held() {
 }
 
 #[test]
-fn a_reset_forgets_everything() {
+fn a_reset_clears_everything() {
     accepted(|image, random| {
         let mut scratch = vec![0; image.scratch_words()];
         let mut head = Head::new(image, &mut scratch).expect("the scratch memory has the image's size");
@@ -158,7 +158,7 @@ fn a_reset_forgets_everything() {
 }
 
 #[test]
-fn damage_of_any_kind_does_not_panic() {
+fn damage_after_the_check_does_not_panic() {
     let structure = Draft::valid().structure();
     let mut outcomes = [0; 2];
     for case in 0..CASES {
@@ -166,7 +166,7 @@ fn damage_of_any_kind_does_not_panic() {
         let mut draft = Draft::valid();
         let scratch = draft.get(h::W_SCRATCH);
         mutate(&mut random, &mut draft, &structure);
-        // What the head was made with does not change any more.
+        // The head's memory stays as the header had it.
         draft.set(h::W_SCRATCH, scratch);
         let image = Image::unchecked(draft.bytes()).expect("the header is there");
         let mut scratch = vec![0; image.scratch_words()];

@@ -1,11 +1,11 @@
-//! What has more than one backend, and the one place that chooses.
+//! Kernels with more than one backend, and the one place that chooses the backend.
 //!
-//! [`mod@reference`] is what all others are compared with, [`portable`] plain Rust for every target, `armv7em`
-//! assembler for Cortex-M4, M7 and M33, `armv7em_fpu` what needs their FPU's registers as well. All of them compute the
-//! same bits; the tests run them on the same data. The build script says what a target has.
+//! `reference` is the standard that tests compare all others with, `portable` is Rust for every target, `armv7em` assembler
+//! for Cortex-M4, M7 and M33, and `armv7em_fpu` assembler that also needs their FPU's registers. All of them compute the
+//! same bits; the tests run them on the same data. The build script detects the backends of a target.
 
-/// Assembles a file. The instructions of a module's assembler are those of its architecture, which in Armv8-M leaves
-/// the DSP extension out whatever processor the build names; so the file says it itself.
+/// Assembles a file. A module's assembler accepts the instructions of its architecture, which for Armv8-M exclude the DSP
+/// extension whatever processor the build names; so the file names the processor.
 #[cfg(actq_armv7em)]
 macro_rules! assembler {
     ($file:literal) => {
@@ -63,12 +63,11 @@ pub const BACKEND: Backend = if cfg!(actq_armv7em) { Backend::Armv7em } else { B
 /// `acc[i]` becomes `sum over groups of scale * sum over columns of level * x`, modulo 2^32, for row `first_row + i`.
 /// The sums of padding rows have no meaning.
 ///
-/// The true sum fits an i32 where [`crate::image::worst_case`] says so, which [`crate::Image::new_checked`] has
-/// verified.
+/// The true sum fits an i32 by [`crate::Image::new_checked`]'s check of the worst case.
 ///
 /// # Errors
 ///
-/// [`Mismatch`] where block, vector and `acc` do not fit each other.
+/// [`Mismatch`] if block, vector and `acc` do not fit each other.
 #[inline(never)]
 pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i32]) -> Result<(), Mismatch> {
     integers::gemv(Product::new(block, x, first_row, acc)?);
@@ -76,18 +75,17 @@ pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i3
 }
 
 impl Scale {
-    /// The scale of `x` for integers in `-x_max ..= x_max`. `x_max` is 127 for int8 activations and at most 32767.
+    /// Computes the scale of `x` for integers in `-x_max ..= x_max`. `x_max` is 127 for int8 activations and at most 32767.
     ///
     /// # Errors
     ///
-    /// Where a value of `x` is NaN or infinite.
+    /// [`NotFinite`] if a value of `x` is NaN or infinite.
     pub fn new(x: &[f32], x_max: u16) -> Result<Self, NotFinite> {
         Self::of_magnitude(integers::magnitude(x), x_max)
     }
 
-    /// Writes the integers of `x` as `plan` has it to the first [`Plan::words`] words of `out`, and names them. Missing
-    /// values of `x` count as zeros. `None`, with nothing written, where `out` is shorter than [`Plan::room`]; all of
-    /// that may be overwritten.
+    /// Quantizes `x` with `plan` to the first words of `out`, and returns the prepared vector. Missing values of `x` count as
+    /// zeros. `None`, with nothing written, if `out` is shorter than [`Plan::room`]; it may overwrite all of these words.
     #[inline(never)]
     pub fn quantize<'w>(self, x: &[f32], plan: &'w Plan, out: &'w mut [u32]) -> Option<Prepared<'w>> {
         let x = x.get(..plan.shape.cols).unwrap_or(x);

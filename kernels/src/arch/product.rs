@@ -1,26 +1,26 @@
-//! What a GEMV is given.
+//! The operands of a GEMV.
 
 use core::fmt;
 
 use crate::layout::{Block, STRIP};
 use crate::x::Prepared;
 
-/// The block and the prepared vector do not belong together (other columns, another group size or layout), or the rows
-/// are no whole strips.
+/// The block and the prepared vector differ in columns, group size or layout, the rows are not whole strips, or a slice is
+/// too short.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Mismatch;
 
 impl fmt::Display for Mismatch {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("block and prepared vector do not belong together, or the rows are no whole strips")
+        f.write_str("block, prepared vector and slices do not fit each other, or the rows are not whole strips")
     }
 }
 
 impl core::error::Error for Mismatch {}
 
-/// A run of a block's rows, a vector that was prepared for its shape, and room for the sums. All of it fits, so that no
-/// backend can fail.
+/// Successive rows of a block, a vector that was prepared for its shape, and room for the sums. All of them fit each other,
+/// so that no backend can fail.
 #[derive(Debug)]
 pub struct Product<'a> {
     pub(super) block: &'a Block<'a>,
@@ -30,8 +30,12 @@ pub struct Product<'a> {
 }
 
 impl<'a> Product<'a> {
-    /// As many rows as `acc` has values. The run starts at a multiple of [`STRIP`]; it ends at another or where the
-    /// block does, padded to a multiple of [`QUAD`](crate::layout::QUAD) rows.
+    /// Combines the operands for the rows from `first_row` on, as many as `acc` has values. They start at a multiple of
+    /// [`STRIP`], and end at another or at the block's end, padded to a multiple of [`QUAD`](crate::layout::QUAD) rows.
+    ///
+    /// # Errors
+    ///
+    /// [`Mismatch`] if they do not fit each other.
     #[inline(always)]
     pub fn new(
         block: &'a Block<'a>,

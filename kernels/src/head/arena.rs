@@ -4,7 +4,7 @@ use core::ops::Range;
 
 use crate::image::Region;
 
-/// Regions as slices; empty where they overlap or lie outside, which the image's check has excluded.
+/// Borrows regions as slices. All are empty if two overlap or one lies outside, which a checked image excludes.
 #[inline(never)]
 pub(super) fn regions<'r>(arena: &'r mut [u32], [a, b, c]: &[Region; 3], more: Region) -> [&'r mut [u32]; 4] {
     match arena.get_disjoint_mut([a.range(), b.range(), c.range(), more.range()]) {
@@ -13,7 +13,7 @@ pub(super) fn regions<'r>(arena: &'r mut [u32], [a, b, c]: &[Region; 3], more: R
     }
 }
 
-/// Some of a region's words; none where they are not all there.
+/// Borrows a range of a region's words; empty unless the region has all of them.
 #[inline(never)]
 pub(super) fn part<'r>(region: &'r mut [u32], range: &Range<usize>) -> &'r mut [u32] {
     region.get_mut(range.clone()).unwrap_or_default()

@@ -1,12 +1,12 @@
-//! The action contract: what stands between the network's output and the robot.
+//! The action contract: the steps from the network's output to the robot's action.
 
 use crate::error::Fault;
 use crate::image::Image;
 use crate::math::clamp;
 use crate::ops::elementwise::copy;
 
-/// Takes the network's output `next` through the contract, against the `last` action where there is one (`started`),
-/// which it becomes. `switches` remembers what is on.
+/// Applies the contract to the network's output `next` and writes the result to `last`. If `started`, `last` holds the
+/// previous action, which limits the step. `switches` keeps the state of binarized values.
 #[inline(always)]
 pub(super) fn apply(
     image: &Image<'_>,
@@ -15,7 +15,7 @@ pub(super) fn apply(
     switches: &mut [u32],
     started: bool,
 ) -> Result<(), Fault> {
-    // First in place of the output, and in a second bit of the switches: an error must not have changed the last
+    // Results replace the output, and new states go to a second bit of the switches: an error must not change the last
     // action, not even in part.
     for (i, (next, last)) in next.iter_mut().zip(&*last).enumerate() {
         let [scale, offset, low, high, max_step, smoothing, on, off, on_value, off_value] = image.contract_of(i);
@@ -36,7 +36,7 @@ pub(super) fn apply(
             let last = f32::from_bits(*last);
             a = clamp(a, last - max_step, last + max_step);
             if smoothing < 1.0 {
-                // On the way there, however it is rounded, so that all limits hold.
+                // Between both values, however it is rounded, so that all limits hold.
                 let (low, high) = if last < a { (last, a) } else { (a, last) };
                 a = clamp(last + smoothing * (a - last), low, high);
             }

@@ -1,4 +1,4 @@
-//! Runs an operation of an image.
+//! Execution of one operation of an image.
 
 use super::arena::{part, regions};
 use crate::arch;
@@ -15,8 +15,8 @@ use crate::ops::elementwise::{self, copy, copy_le};
 use crate::ops::noise::normal;
 use crate::ops::norm;
 
-/// Runs a whole operation over an arena, as a head does in a denoising step: for whoever runs a network's operations
-/// one by one. Noise is that of the arena.
+/// Runs a whole operation over an arena, as a head does in denoising step `step`. It is for callers that run a network's
+/// operations one by one. Noise is read from the arena.
 ///
 /// # Errors
 ///
@@ -27,11 +27,11 @@ pub fn run_whole(op: &Op<'_>, step: usize, arena: &mut [u32]) -> Result<(), Step
     Ok(())
 }
 
-/// Runs an operation from where the cursor stands; true at its end.
+/// Runs an operation from the cursor on; returns `true` at its end.
 ///
 /// # Errors
 ///
-/// [`Fault::Damaged`] where the operation names what is not there, which the image's check has excluded.
+/// [`Fault::Damaged`] if the operation names data that the image does not have, which a checked image excludes.
 #[inline(never)]
 pub(super) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &mut impl Meter) -> Result<bool, Fault> {
     let f = bytemuck::must_cast_slice_mut::<u32, f32>;
@@ -41,7 +41,7 @@ pub(super) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
         let [dst, src, work, _] = regions(arena, &op.regions, Region::default());
         return matrix.resume(&mut cursor.linear, budget, f(src), work, f(dst), accumulate);
     }
-    // Elements that this piece takes, or units of a norm.
+    // Elements of this slice, or units of a norm.
     let (dst, len) = (op.dst(), op.units());
     let units = budget.take(len - cursor.done, Work::Elements(op));
     if units == 0 {
@@ -60,8 +60,8 @@ pub(super) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
         denoise(&by, op.constant(0), v, z, x, y);
         return Ok(units.end == len);
     }
-    let norm = matches!(op.kind, OpKind::LayerNorm | OpKind::RmsNorm);
-    let range = if norm { 0..dst.len } else { units.clone() };
+    let is_norm = matches!(op.kind, OpKind::LayerNorm | OpKind::RmsNorm);
+    let range = if is_norm { 0..dst.len } else { units.clone() };
     let [mut dst, mut src, third, _] = match op.src().len {
         0 => [part(arena, &(dst.offset + range.start..dst.offset + range.end)), &mut [], &mut [], &mut []],
         _ => regions(arena, &op.regions, Region::default()),
@@ -89,7 +89,7 @@ pub(super) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
         OpKind::GruCell => {
             arch::gru_elements(range.clone(), f(src), f(third), f(dst));
         }
-        // The match has no wildcard: an operation that is missing here does not compile. `Linear` and `Denoise` have
+        // The match has no wildcard: it does not compile without an arm for every operation. `Linear` and `Denoise` have
         // returned above.
         kind @ (OpKind::LayerNorm
         | OpKind::RmsNorm
@@ -102,7 +102,7 @@ pub(super) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
             }
             let constant = op.constant(0);
             let (moments, done) = (&mut cursor.moments, units.clone());
-            if !norm {
+            if !is_norm {
                 elementwise::normalize(f(src), first, second, constant, op.constant(1), f(dst));
             } else if kind == OpKind::RmsNorm {
                 norm::rms_norm_units(done, moments, f(dst), first, constant);

@@ -1,5 +1,5 @@
-//! A head: runs an image on observations, a step at once or in pieces, and keeps the recurrent state and the chunk
-//! queue.
+//! A head: runs an image on observations, in whole steps or in slices, and keeps the recurrent state and the action
+//! chunks.
 
 mod arena;
 mod contract;
@@ -22,47 +22,47 @@ use crate::image::{Image, Region};
 pub struct Head<'a, 's> {
     image: Image<'a>,
     arena: &'s mut [u32],
-    /// [`Self::least_budget`], once it was computed; 0 before.
+    /// [`Self::least_budget`]; 0 until it is computed.
     least_budget: u32,
     phase: Phase,
     playback: Playback,
-    /// Whether an action has been given since the reset, so that the step limit has something to hold on to.
+    /// `true` after the first action since the reset; the step limit needs one.
     started: bool,
-    /// Of the noise.
+    /// Seed of the noise.
     seed: u32,
-    /// Evaluations since the reset that drew noise.
+    /// Evaluations since the reset that generated noise.
     draws: u32,
 }
 
-/// What the arena holds of a step.
+/// Progress of a step in the arena.
 #[derive(Clone, Copy, Debug)]
 enum Phase {
-    /// Nothing.
+    /// No step has begun.
     Idle,
-    /// An observation, and what has been done with it.
+    /// The arena holds an observation; the cursor is the progress.
     Begun(Cursor),
-    /// The action.
+    /// The arena holds the action.
     Ready,
 }
 
 impl<'a, 's> Head<'a, 's> {
-    /// Takes `scratch`, of at least [`Image::scratch_words`] words, which it zeroes.
+    /// Creates a head in `scratch`, which needs at least [`Image::scratch_words`] words and is zeroed.
     ///
     /// # Errors
     ///
-    /// [`HeadError::ScratchTooSmall`] where it has fewer.
+    /// [`HeadError::ScratchTooSmall`] if `scratch` has fewer words.
     pub fn new(image: Image<'a>, scratch: &'s mut [u32]) -> Result<Self, HeadError> {
         let (needed, given) = (image.scratch_words(), scratch.len());
         let arena = scratch.get_mut(..needed).ok_or(HeadError::ScratchTooSmall { needed, given })?;
-        // Nothing depends on what the memory held.
+        // No result depends on the previous content of the memory.
         arena.fill(0);
         let mut playback = Playback::default();
         playback.forget(&image, arena);
         Ok(Self { image, arena, least_budget: 0, phase: Phase::Idle, playback, started: false, seed: 0, draws: 0 })
     }
 
-    /// Forgets the recurrent state, all chunks, the last action and a step that was begun. The noise of an iterative
-    /// head begins anew: after a reset the same observations give the same actions.
+    /// Clears the recurrent state, all chunks, the last action and a step that has begun. The noise of a flow or diffusion
+    /// policy starts from the beginning: after a reset the same observations give the same actions.
     #[inline(never)]
     pub fn reset(&mut self) {
         self.abandon();
@@ -71,14 +71,14 @@ impl<'a, 's> Head<'a, 's> {
         self.draws = 0;
     }
 
-    /// The seed of an iterative head's noise, 0 until it is set, and a reset.
+    /// Sets the seed of a flow or diffusion policy's noise, 0 by default, and resets the head.
     pub fn seed(&mut self, seed: u32) {
         self.seed = seed;
         self.reset();
     }
 
-    /// As [`Self::reset`], but the last action stays, and what is on: after an error the robot is still where that left
-    /// it, and the step limit holds on to it.
+    /// Resets, but keeps the last action and the state of binarized values: after an error the robot is still where that
+    /// action put it, and the step limit starts there.
     #[inline(never)]
     fn abandon(&mut self) {
         self.forget();
@@ -92,13 +92,13 @@ impl<'a, 's> Head<'a, 's> {
         self.words_mut(self.image.state()).fill(0);
     }
 
-    /// The recurrent state, to read or to set: of each operation in order an LSTM's hidden, then cell state, or a GRU's
-    /// state. A reset zeroes it.
+    /// Borrows the recurrent state, to read or to set it: for each operation in order, an LSTM's hidden state and then its
+    /// cell state, or a GRU's state. A reset zeroes it.
     pub fn state_mut(&mut self) -> &mut [f32] {
         self.floats_mut(self.image.state())
     }
 
-    /// The image.
+    /// Returns the image.
     pub fn image(&self) -> &Image<'a> {
         &self.image
     }

@@ -1,37 +1,37 @@
-//! Which of the network's outputs is the next action: of a chunk, of one that leads over from the chunk before, or the
-//! average of all chunks that foresaw it.
+//! Choice of the next action among the network's outputs: an action of a chunk, a blend with the previous chunk, or the
+//! average of all chunks that predict it.
 //!
-//! Time counts in control periods: the position of an action in its chunk is its age when it plays. Whatever has begun
-//! to play, or was for a time that has passed, no later chunk changes.
+//! Time counts in control periods: the position of an action in its chunk is its age when it plays. A later chunk never
+//! changes an action that has played or whose period has passed.
 
 use super::arena::{part, regions};
 use crate::error::Fault;
 use crate::image::{Image, Region};
 use crate::ops::elementwise::copy;
 
-/// Where playback stands.
+/// Position of playback.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Playback {
-    /// Whether the output holds a chunk; else it is to be computed.
+    /// `true` if the output holds a chunk; otherwise the network must run.
     pub(super) ready: bool,
-    /// Position of the action that is due in the chunk at hand, or in the one that is to be computed.
+    /// Position of the next action in the current chunk, or in the chunk that the network computes next.
     pub(super) next: usize,
-    /// The same in the chunk before, where that is kept; where nothing of it is left, its length.
+    /// The same in the previous chunk, if that is kept; its length if none of it remains.
     pub(super) old: usize,
-    /// Where the sum for the action that is due stands among those that are kept.
+    /// Index of the next action's sum among the sums that are kept.
     pub(super) slot: usize,
 }
 
 impl Playback {
-    /// Without a chunk.
+    /// Drops all chunks.
     #[inline(never)]
     pub(super) fn forget(&mut self, image: &Image<'_>, arena: &mut [u32]) {
         *self = Self { old: image.chunk(), ..Self::default() };
         counts(image, arena).fill(0);
     }
 
-    /// Whether the network must run for the action that is due. Then what is left of the chunk at hand is kept before
-    /// the output is written anew.
+    /// Returns `true` if the network must run for the next action. If so, it keeps the rest of the current chunk before the
+    /// output is overwritten.
     #[inline(never)]
     pub(super) fn turn(&mut self, image: &Image<'_>, arena: &mut [u32]) -> bool {
         if self.ready && self.next < image.execute() {
@@ -48,7 +48,7 @@ impl Playback {
         true
     }
 
-    /// Takes the chunk that the output holds now, with what earlier ones say of the time from now on.
+    /// Merges the new chunk in the output with what earlier chunks predict for the same periods.
     #[inline(never)]
     pub(super) fn merge(&mut self, image: &Image<'_>, arena: &mut [u32]) -> Result<(), Fault> {
         let (chunk, len) = (image.chunk(), image.act_len());
@@ -56,7 +56,7 @@ impl Playback {
             return Err(Fault::Stale);
         }
         if chunk == 1 {
-            // An action that is for no time in particular.
+            // A single action is for no particular period.
             self.next = 0;
         }
         let [output, kept, ..] = regions(arena, &[image.output(), image.kept(), Region::default()], Region::default());
@@ -117,21 +117,21 @@ impl Playback {
         Ok(Region { offset: from.offset + at * len, len })
     }
 
-    /// Lets so many control periods pass.
+    /// Lets `periods` control periods pass.
     #[inline(never)]
     pub(super) fn pass(&mut self, image: &Image<'_>, arena: &mut [u32], periods: usize) {
         self.next = self.next.saturating_add(periods);
         self.old = self.old.saturating_add(periods).min(image.chunk());
         let horizon = image.horizon();
         for _ in 0..periods.min(horizon) {
-            // What was foreseen for it.
+            // The sum for this period ends.
             counts(image, arena).iter_mut().skip(self.slot).take(1).for_each(|count| *count = 0);
             self.slot = (self.slot + 1) % horizon;
         }
     }
 }
 
-/// How many chunks have foreseen each period that an ensemble keeps.
+/// For each period that an ensemble keeps, the number of chunks that predict it.
 fn counts<'r>(image: &Image<'_>, arena: &'r mut [u32]) -> &'r mut [u32] {
     let (kept, horizon) = (image.kept().range(), image.horizon());
     part(arena, &(kept.end.saturating_sub(horizon)..kept.end))

@@ -1,9 +1,9 @@
-//! The state of a head as bytes, for a warm restart: what the next actions depend on besides the image and the
-//! observations.
+//! The state of a head as bytes, for a warm restart: everything besides the image and the observations that the next
+//! actions depend on.
 //!
-//! Words, little-endian: `ACTS`, version, checksum of the image, checksum of what follows; seed, draws, flags (bit 0:
-//! an action has been given, bit 1: the output holds a chunk), the positions of playback; then, of the arena, the
-//! recurrent state, the output, and all from the last action to the work area.
+//! Words, little-endian: `ACTS`, version, checksum of the image, checksum of the words after it; seed, draws, flags (bit
+//! 0: an action has played, bit 1: the output holds a chunk), the positions of playback; then regions of the arena: the
+//! recurrent state, the output, and everything from the last action to the work area.
 
 use super::playback::Playback;
 use super::{Head, Phase};
@@ -11,26 +11,26 @@ use crate::error::SavedError;
 use crate::image::{Region, checksum};
 
 const MAGIC: u32 = u32::from_le_bytes(*b"ACTS");
-/// Of what is saved.
+/// Version of the saved state.
 const VERSION: u32 = 1;
-/// Words before those of the arena.
+/// Words before the arena's.
 const WORDS: usize = 10;
-/// The checksum's.
+/// Index of the checksum.
 const W_CHECKSUM: usize = 3;
 
 impl Head<'_, '_> {
-    /// Bytes of a saved state: 40, and those of the recurrent state, the output and what stands between the
-    /// observation's values and the work area.
+    /// Returns the bytes of a saved state: 40, plus the recurrent state, the output, and the words from the action to the
+    /// work area.
     pub fn saved_len(&self) -> usize {
         4 * (WORDS + self.saved_regions().iter().map(|region| region.len).sum::<usize>())
     }
 
-    /// Writes the state into `to`, of [`Self::saved_len`] bytes: recurrent state, chunks, last action, what is on, seed
-    /// and draws of the noise. A head that restores it goes on with the same bits.
+    /// Writes the state into `to`, of [`Self::saved_len`] bytes: recurrent state, chunks, last action, states of binarized
+    /// values, seed and draws of the noise. A head that restores it continues with the same bits.
     ///
     /// # Errors
     ///
-    /// [`SavedError::Begun`] between [`Self::begin`] and the action, and [`SavedError::Length`].
+    /// [`SavedError::Begun`] between [`Self::begin`] and the action; [`SavedError::Length`] for another length.
     pub fn save(&self, to: &mut [u8]) -> Result<(), SavedError> {
         self.check_saved(to.len())?;
         let Playback { ready, next, old, slot } = self.playback;
@@ -46,12 +46,12 @@ impl Head<'_, '_> {
         Ok(())
     }
 
-    /// Goes on where the head stood that [`Self::save`]d `from`, of the same image.
+    /// Restores the state in `from`, which a head of the same image [saved](Self::save).
     ///
     /// # Errors
     ///
-    /// Those of [`Self::save`], and where the bytes are those of another version or image, or damaged. They change
-    /// nothing: the head is as it was.
+    /// Those of [`Self::save`]; [`SavedError::Version`], [`SavedError::Image`] and [`SavedError::Damaged`] for the bytes. On
+    /// an error the head keeps its state.
     pub fn restore(&mut self, from: &[u8]) -> Result<(), SavedError> {
         self.check_saved(from.len())?;
         let mut words = from.as_chunks().0.iter().map(|bytes| u32::from_le_bytes(*bytes));
@@ -85,7 +85,7 @@ impl Head<'_, '_> {
         if let Phase::Begun(_) = self.phase { Err(SavedError::Begun) } else { Ok(()) }
     }
 
-    /// What is saved of the arena.
+    /// Regions of the arena that are saved.
     fn saved_regions(&self) -> [Region; 3] {
         let action = self.image.action().offset;
         let len = self.image.work().offset.saturating_sub(action);

@@ -1,4 +1,4 @@
-//! The self-test: an image brings observations and the actions that they must give.
+//! The self-test: an image holds observations and the actions that they must give.
 
 use super::Head;
 use crate::error::{Fault, StepError};
@@ -6,19 +6,19 @@ use crate::ops::elementwise::copy_le;
 use crate::pace::budget::Budget;
 
 impl Head<'_, '_> {
-    /// Plays the image's self-test vector from a reset and compares every action bit for bit; resets again at the end.
+    /// Plays the image's self-test from a reset and compares every action bit for bit; resets again at the end.
     ///
     /// # Errors
     ///
-    /// [`StepError::SelfTest`] with the first step whose bits differ; [`StepError::Damaged`] and
-    /// [`StepError::NotFinite`] as of a step.
+    /// [`StepError::SelfTest`] with the first self-test step whose bits differ; [`StepError::Damaged`] and
+    /// [`StepError::NotFinite`] as for a step.
     pub fn self_test(&mut self) -> Result<(), StepError> {
         self.play_self_test(Self::finish)
     }
 
-    /// As [`Self::self_test`], in pieces of at most `budget` modelled instructions as of [`Self::poll`], or of
-    /// [`Self::least_budget`] where that is more. `before` is told of each piece, so that a watchdog can be fed however
-    /// long all of it takes.
+    /// Runs [`Self::self_test`] in slices of at most `budget` modelled instructions, as [`Self::poll`] does, or of
+    /// [`Self::least_budget`] if that is more. It calls `before` ahead of each slice, so that the caller can feed a
+    /// watchdog however long the test takes.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! Steps: an observation in, the network and playback in one piece or several, an action out.
+//! Steps: an observation in, the network and playback in one slice or several, an action out.
 
 use core::task::Poll;
 
@@ -13,18 +13,18 @@ use crate::ops::elementwise::copy;
 use crate::pace::budget::Budget;
 
 impl Head<'_, '_> {
-    /// The action for `observation`: of the next chunk position where the image is chunked, after the action contract.
-    /// It is [`Self::begin`] and one [`Self::poll`] without a limit. Each action is one control period; [`Self::pass`]
-    /// counts those without.
+    /// Computes the action for `observation`, after the action contract; with action chunks, the chunk's next action. It is
+    /// [`Self::begin`] and one [`Self::poll`] without a limit. Each action counts as one control period; [`Self::pass`]
+    /// counts periods without an action.
     ///
     /// # Errors
     ///
-    /// [`StepError::ObservationLength`] and [`StepError::ObservationNotFinite`] for what is given;
-    /// [`StepError::NotFinite`] where a value inside the network leaves f32's range, [`StepError::Damaged`] where the
-    /// image's memory has changed since its check, [`StepError::Stale`] where the action is older than its deadline.
+    /// [`StepError::ObservationLength`] and [`StepError::ObservationNotFinite`] for the observation;
+    /// [`StepError::NotFinite`] if a value inside the network exceeds f32's range, [`StepError::Damaged`] if the image's
+    /// memory has changed since its check, [`StepError::Stale`] if the action is older than its deadline.
     ///
-    /// On an error the recurrent state and the chunk are reset, so that no part of a failed evaluation reaches a later
-    /// action. The last action stays: the next one is limited by `max_step` as ever.
+    /// An error resets the recurrent state and the chunk, so that no part of a failed evaluation reaches a later action.
+    /// The last action stays, and `max_step` limits the next one from it.
     #[inline(never)]
     pub fn step(&mut self, observation: &[f32]) -> Result<&[f32], StepError> {
         self.take(observation, None)?;
@@ -32,21 +32,23 @@ impl Head<'_, '_> {
         Ok(self.floats(self.image.action()))
     }
 
-    /// Begins a step: takes the observation. The work itself is done by [`Self::poll`].
+    /// Begins a step with an observation. [`Self::poll`] does the work.
     ///
-    /// A step that was begun and is not ready is dropped. If a poll has already worked on it, the recurrent state may
-    /// be partly that of the dropped step, and is zeroed as by [`Self::reset`]; the last action stays, so that the step
-    /// limit holds.
+    /// It drops a step that has begun and is not ready. If a poll has already worked on that step, the recurrent state may
+    /// be partly updated, and is zeroed as by [`Self::reset`]; the last action stays, so that the step limit holds.
     ///
-    /// Errors are those of [`Self::step`]. The first call takes longer where [`Self::least_budget`] was not called
-    /// before.
+    /// The first call takes longer if [`Self::least_budget`] was not called before.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Self::step`] for the observation.
     pub fn begin(&mut self, observation: &[f32]) -> Result<(), StepError> {
         self.least_budget();
         self.take(observation, None)
     }
 
-    /// [`crate::Image::least_budget`], computed once, which takes about as long as a short step. (Not by [`Self::new`]:
-    /// where steps are not cut, the cost model is not in the program.)
+    /// Returns [`crate::Image::least_budget`]. The first call computes it, which takes about as long as a short step.
+    /// ([`Self::new`] does not: a program that never polls does not include the cost model.)
     pub fn least_budget(&mut self) -> u32 {
         if self.least_budget == 0 {
             self.least_budget = self.image.least_budget();
@@ -54,41 +56,45 @@ impl Head<'_, '_> {
         self.least_budget
     }
 
-    /// Runs at most `budget` instructions of the step that was begun, by the cost model ([`crate::Image::step_cost`]), and
-    /// gives the action once it is ready; then, again and again until the next [`Self::begin`]. Steps that play on from
-    /// a chunk have little to do, and are ready at the first poll. A budget of 2^28 or more is no limit.
+    /// Runs a slice of the step that has begun: at most `budget` instructions by the cost model
+    /// ([`crate::Image::step_cost`]). It returns the action as soon as it is ready, and the same action until the next
+    /// [`Self::begin`]. A step that continues a chunk has little to do and is ready at the first poll. A budget of 2^28 or
+    /// more is no limit.
     ///
-    /// The cost model is that of the build for thumbv7em-none-eabihf; elsewhere pieces are cut in the same places.
+    /// The cost model is that of the build for thumbv7em-none-eabihf; on other targets a step is cut in the same places.
     /// However a step is cut, its bits are the same.
     ///
     /// # Errors
     ///
-    /// [`StepError::Budget`] where `budget` is below [`crate::Image::least_budget`], and [`StepError::NotBegun`],
-    /// change nothing. Others are those of [`Self::step`].
+    /// [`StepError::Budget`] if `budget` is below [`crate::Image::least_budget`], and [`StepError::NotBegun`]; both change
+    /// nothing. All others are those of [`Self::step`].
     pub fn poll(&mut self, budget: u32) -> Result<Poll<&[f32]>, StepError> {
         self.poll_until(budget, false)
     }
 
-    /// As [`Self::poll`], but also stops behind each of the image's operations: to measure them one by one.
+    /// Runs a slice as [`Self::poll`] does, and also stops after each operation of the image: to measure them one by one.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Self::poll`].
     pub fn poll_op(&mut self, budget: u32) -> Result<Poll<&[f32]>, StepError> {
         self.poll_until(budget, true)
     }
 
-    /// Lets so many control periods pass without an action: the observation of a step that was begun is so much older
-    /// when it is ready, and the actions that were for these periods never play. (So an observation that is old when it
-    /// comes: first [`Self::begin`], then its age.) Where nothing is left that is younger than the image's deadline,
-    /// the step ends with [`StepError::Stale`].
+    /// Lets `periods` control periods pass without an action. The actions for these periods never play, and the observation
+    /// of a step that has begun ages by as much. (For an observation that is already old, call [`Self::begin`], then this
+    /// with its age.) If no action younger than the image's deadline remains, the step ends with [`StepError::Stale`].
     pub fn pass(&mut self, periods: usize) {
         self.playback.pass(&self.image, self.arena, periods);
     }
 
-    /// The action that is due by what chunks have foreseen, without an observation: while a step is being computed, so
-    /// that the next chunk goes on behind what has been played, or where an observation is missing. Of a chunk that is
-    /// being replaced, only an image with an overlap or an ensemble keeps what is left.
+    /// Plays the next action that chunks predict, without an observation. Call it while a step is being computed, so that
+    /// the next chunk continues after the actions that have played, or when an observation is missing. While a chunk is
+    /// being replaced, only an image with an overlap or a temporal ensemble keeps the rest of it.
     ///
     /// # Errors
     ///
-    /// [`StepError::Stale`] where nothing is left, or nothing young enough, which changes nothing. Others are those of
+    /// [`StepError::Stale`] if no action remains, or none young enough; it changes nothing. All others are those of
     /// [`Self::step`].
     #[inline(never)]
     pub fn play(&mut self) -> Result<&[f32], StepError> {
@@ -101,18 +107,18 @@ impl Head<'_, '_> {
         Ok(self.floats(self.image.action()))
     }
 
-    /// The network's raw output for `observation` (`chunk * act_len` values), before the action contract. Advances the
-    /// recurrent state, and drops what was left of a chunk or of a step that was begun.
+    /// Computes the network's raw output for `observation` (`chunk * act_len` values), before the action contract. It
+    /// advances the recurrent state, and drops the rest of a chunk and a step that has begun.
     ///
     /// # Errors
     ///
-    /// Those of [`Self::step`], but for [`StepError::Stale`]: nothing is played.
+    /// Those of [`Self::step`] except [`StepError::Stale`]: no action plays.
     pub fn infer(&mut self, observation: &[f32]) -> Result<&[f32], StepError> {
         self.infer_from(observation, None)
     }
 
-    /// As [`Self::infer`], with the noise of an iterative head from the caller: [`crate::Image::noise_len`] values, the
-    /// first iterate, followed by the noise of each denoising step if the steps add noise.
+    /// Runs [`Self::infer`] with noise from the caller, for a flow or diffusion policy: [`crate::Image::noise_len`] values,
+    /// the first iterate, followed by the noise of each denoising step if the steps add noise.
     ///
     /// # Errors
     ///
@@ -124,7 +130,7 @@ impl Head<'_, '_> {
     #[inline(never)]
     fn infer_from(&mut self, observation: &[f32], noise: Option<&[f32]>) -> Result<&[f32], StepError> {
         self.drop_step();
-        // From the first operation on, whatever is left of a chunk.
+        // From the first operation on, whatever remains of a chunk.
         self.playback.forget(&self.image, self.arena);
         self.take(observation, noise)?;
         self.evaluate(&mut Unlimited, false).inspect_err(|_| self.abandon())?;
@@ -144,22 +150,22 @@ impl Head<'_, '_> {
         Ok(())
     }
 
-    /// See [`Self::begin`].
+    /// Drops a step that has begun: see [`Self::begin`].
     fn drop_step(&mut self) {
         if let Phase::Begun(cursor) = self.phase
-            && cursor.has_left(self.fresh())
+            && cursor.has_progressed(self.fresh())
         {
             self.forget();
         }
         self.phase = Phase::Idle;
     }
 
-    /// Where a step begins: before the first operation, or, within a chunk, behind the last.
+    /// Returns the start of a step: before the first operation, or, within a chunk, after the last.
     fn fresh(&self) -> Cursor {
         Cursor { op: if self.playback.ready { self.image.op_count() } else { 0 }, ..Cursor::default() }
     }
 
-    /// Checks the observation and puts it into the arena.
+    /// Checks the observation and copies it to the arena.
     fn load(&mut self, observation: &[f32]) -> Result<(), StepError> {
         let (expected, given) = (self.image.obs_len(), observation.len());
         if expected != given {
@@ -173,7 +179,7 @@ impl Head<'_, '_> {
         Ok(())
     }
 
-    /// Checks the noise and puts it into the arena; within a chunk, whose values may stand there, only checks it.
+    /// Checks the noise and copies it to the arena. Within a chunk it only checks: the arena may hold the chunk's values.
     #[inline(never)]
     fn load_noise(&mut self, noise: &[f32]) -> Result<(), StepError> {
         let region = self.image.noise();
@@ -189,8 +195,7 @@ impl Head<'_, '_> {
         Ok(())
     }
 
-    /// Begins a step with the observation that the arena holds, and with noise of the generator or with that of the
-    /// arena.
+    /// Begins a step with the observation in the arena, and with noise from the generator (`draw`) or from the arena.
     #[inline(never)]
     pub(super) fn start(&mut self, draw: bool) {
         let draw = draw.then_some([self.seed, self.draws]);
@@ -211,18 +216,18 @@ impl Head<'_, '_> {
         Ok(if ready { Poll::Ready(self.floats(self.image.action())) } else { Poll::Pending })
     }
 
-    /// Takes the step that was begun to its end.
+    /// Runs the step that has begun to its end.
     pub(super) fn finish(&mut self) -> Result<(), Fault> {
         self.advance(&mut Unlimited, false)?;
         Ok(())
     }
 
-    /// Goes on as far as the budget reaches; true when the action is ready. On an error the step is abandoned.
+    /// Continues as far as the budget allows; returns `true` when the action is ready. An error abandons the step.
     pub(super) fn advance(&mut self, budget: &mut impl Meter, one_op: bool) -> Result<bool, Fault> {
-        self.go_on(budget, one_op).inspect_err(|_| self.abandon())
+        self.proceed(budget, one_op).inspect_err(|_| self.abandon())
     }
 
-    fn go_on(&mut self, budget: &mut impl Meter, one_op: bool) -> Result<bool, Fault> {
+    fn proceed(&mut self, budget: &mut impl Meter, one_op: bool) -> Result<bool, Fault> {
         if let Phase::Begun(_) = self.phase {
             if !self.evaluate(budget, one_op)? || budget.take(1, Work::Act(&self.image)) == 0 {
                 return Ok(false);
@@ -236,7 +241,7 @@ impl Head<'_, '_> {
         Ok(true)
     }
 
-    /// Runs operations from where the step stands; true behind the last one.
+    /// Runs operations from the step's cursor on; returns `true` after the last one.
     #[inline(never)]
     fn evaluate(&mut self, budget: &mut impl Meter, one_op: bool) -> Result<bool, Fault> {
         let Phase::Begun(cursor) = &mut self.phase else { return Ok(true) };
@@ -253,7 +258,7 @@ impl Head<'_, '_> {
             let Cursor { mut op, mut step, draw, .. } = *cursor;
             op += 1;
             if op == self.image.op_count() && step + 1 < self.image.denoising_steps() {
-                (op, step) = (self.image.once(), step + 1);
+                (op, step) = (self.image.first_denoising_op(), step + 1);
             }
             *cursor = Cursor { op, step, draw, ..Cursor::default() };
             if one_op {
@@ -263,8 +268,7 @@ impl Head<'_, '_> {
         Ok(true)
     }
 
-    /// Takes the action that is due through the contract. Not inlined, so that the operations do not run on top of its
-    /// stack.
+    /// Applies the contract to the next action. Not inlined, so that its stack frame is gone while operations run.
     #[inline(never)]
     fn act(&mut self) -> Result<(), Fault> {
         let due = self.playback.due(&self.image, self.arena)?;

@@ -1,4 +1,4 @@
-//! The check of an image: everything that an image says, once. `docs/FORMAT.md` has the list.
+//! The check of an image: everything in it, one time. `docs/FORMAT.md` has the list.
 
 use super::contract::{ARRAY_BINARISE, CONTRACT_ARRAYS};
 use super::header as h;
@@ -20,12 +20,12 @@ const BF16_INFINITY: u16 = (f32::INFINITY.to_bits() >> 16) as u16;
 impl<'a> Image<'a> {
     /// Parses `bytes`, which must start at a multiple of 4 in memory and hold exactly the image.
     ///
-    /// Checks the checksum, every section, every operation, all constants, and that no row can overflow its int32
+    /// It checks the checksum, every section, every operation, all constants, and that no row can overflow its int32
     /// accumulator for any activations. Time is linear in the image's length.
     ///
     /// # Errors
     ///
-    /// The first thing that is found wrong; `docs/FORMAT.md` lists all checks.
+    /// The first check that fails; `docs/FORMAT.md` lists all of them.
     #[inline(never)]
     pub fn new_checked(bytes: &'a [u8]) -> Result<Self, ImageError> {
         if bytes.as_ptr().align_offset(4) != 0 {
@@ -57,18 +57,18 @@ impl<'a> Image<'a> {
         if !averaged || !in_time || overlap > self.chunk() - self.execute() {
             return Err(ImageError::Playback);
         }
-        // Denoising steps have operations, and only an iterative head has them.
-        let (once, steps) = (self.once(), high(self.head(h::W_DENOISING)));
+        // Denoising steps have operations, and only a flow or diffusion policy has them.
+        let (first, steps) = (self.first_denoising_op(), high(self.head(h::W_DENOISING)));
         let denoising =
-            if self.kind().is_iterative() { steps > 0 && once < self.op_count() } else { once | steps == 0 };
+            if self.kind().is_iterative() { steps > 0 && first < self.op_count() } else { first | steps == 0 };
         if !denoising {
             return Err(ImageError::Denoising);
         }
         if self.obs_len() == 0 || self.act_len() == 0 || self.op_count() == 0 {
             return Err(ImageError::Shape);
         }
-        // State, observation, what operations write, action, what is kept with it, work area: in this order and without
-        // a gap. (`check_sections` sees to the middle.)
+        // State, observation, operation outputs, action, what is kept with it, work area: in this order and without gaps.
+        // (`check_sections` checks the middle.)
         let work = self.work();
         if self.state().offset != 0
             || self.observation().offset != self.state().end()
@@ -82,14 +82,14 @@ impl<'a> Image<'a> {
         if !is_positive(self.rate_hz()) {
             return Err(ImageError::Constant);
         }
-        // A head that tests nothing would report success.
+        // A self-test without steps would report success.
         if self.self_test_steps() == 0 {
             return Err(ImageError::SelfTest);
         }
         self.check_sections()
     }
 
-    /// The sections, in the order in which they stand, and what they hold.
+    /// Checks the sections, in their order in the image, and their content.
     fn check_sections(&self) -> Result<(), ImageError> {
         let front = &mut Front { words: self.words, at: h::WORDS, finite: h::WORDS };
         for i in 0..self.matrix_count() {
@@ -112,7 +112,7 @@ impl<'a> Image<'a> {
         if !is_text(bytemuck::must_cast_slice(name).get(..self.name_len()).unwrap_or_default()) {
             return Err(ImageError::Name);
         }
-        // The arena holds both lengths, so that the product fits 32 bits.
+        // The arena holds both lengths, so the product fits 32 bits.
         let self_test = self.self_test_steps() * (self.obs_len() + self.act_len());
         front.take_finite(self.head(h::W_SELF_TEST) as usize, self_test)
     }
@@ -144,8 +144,8 @@ impl<'a> Image<'a> {
         Ok(())
     }
 
-    /// Checks an operation before which the first `written` words of the arena hold something of the step; gives their
-    /// number behind it.
+    /// Checks operation `i`, before which the step has written the first `written` words of the arena; returns their number
+    /// after it.
     #[inline(never)]
     fn check_op(&self, i: usize, front: &mut Front<'a>, written: usize) -> Result<usize, ImageError> {
         let op = self.op(i);
@@ -160,8 +160,8 @@ impl<'a> Image<'a> {
             return Err(ImageError::Shape);
         }
         if op.is_linear() {
-            let behind = op.data().wrapping_sub(self.matrix_at(0));
-            if !behind.is_multiple_of(h::MATRIX_WORDS) || behind / h::MATRIX_WORDS >= self.matrix_count() {
+            let distance = op.data().wrapping_sub(self.matrix_at(0));
+            if !distance.is_multiple_of(h::MATRIX_WORDS) || distance / h::MATRIX_WORDS >= self.matrix_count() {
                 return Err(ImageError::Matrix);
             }
             // The matrix itself was checked with the others.
@@ -174,14 +174,14 @@ impl<'a> Image<'a> {
         } else if op.kind.is_of_step() {
             self.check_denoising(i, op, front)?;
         } else if op.kind == OpKind::Noise {
-            // A head's caller may have filled it before the first operation.
+            // The head's caller may fill it before the first operation.
             if i != 0 {
                 return Err(ImageError::Denoising);
             }
         } else if *constants > 0 {
             let [constants, arrays] = [*constants, *arrays].map(usize::from);
             for constant in front.constants(op.data(), constants)? {
-                // Above 0, and finite but for limits: positive numbers are in the order of their bits.
+                // Above 0, and finite except for limits: positive numbers have the order of their bits.
                 let infinity = f32::INFINITY.to_bits() + u32::from(matches!(op.kind, OpKind::Normalize { .. }));
                 if u32::from_le(*constant).wrapping_sub(1) >= infinity - 1 {
                     return Err(ImageError::Constant);
@@ -193,8 +193,8 @@ impl<'a> Image<'a> {
         if dst.overlaps(src) || dst.overlaps(third) || src.overlaps(third) {
             return Err(ImageError::Overlap);
         }
-        // Nothing is read that no operation of this step has written: what a step before or the caller left there, or
-        // the work area, where backends differ.
+        // An operation reads only words that this step has written: not what an earlier step or the caller put there, nor
+        // the work area, whose content differs between backends.
         let third = if op.is_linear() { Region::default() } else { third };
         let old = if op.reads_dst() { dst.end() } else { 0 };
         if src.end().max(third.end()).max(old) > written {
@@ -206,11 +206,11 @@ impl<'a> Image<'a> {
         Ok(written.max(dst.end()))
     }
 
-    /// What differs between denoising steps: only in operations that these run, with constants for each.
+    /// Checks an operation that differs between denoising steps: it is one that these run, with constants for each.
     #[inline(never)]
     fn check_denoising(&self, i: usize, op: &Op<'_>, front: &mut Front<'a>) -> Result<(), ImageError> {
         let (n, steps) = (op.dst().len, self.denoising_steps());
-        if i < self.once() || !self.kind().is_iterative() {
+        if i < self.first_denoising_op() || !self.kind().is_iterative() {
             return Err(ImageError::Denoising);
         }
         if op.kind == OpKind::Table {
@@ -221,7 +221,7 @@ impl<'a> Image<'a> {
         if limit != f32::INFINITY && !is_positive(limit) {
             return Err(ImageError::Constant);
         }
-        // Noise of every step, behind what the first began from.
+        // Noise of every step, after the noise that the first step starts from.
         let noise = Region { offset: u32::from_le(noise) as usize, len: steps * n };
         let all = self.noise();
         if noise.offset != 0
@@ -233,13 +233,13 @@ impl<'a> Image<'a> {
     }
 }
 
-/// Takes sections in the order in which they stand. None shares a word with another, but constants that several
-/// operations have in common stand once, and are looked at once: so what is checked is no longer than the image.
+/// Takes sections in their order in the image. No two share a word. Constants that several operations have in common are
+/// in the image one time, and are checked one time: so the check is linear in the image's length.
 struct Front<'a> {
     words: &'a [u32],
-    /// The end of the last one.
+    /// End of the last section.
     at: usize,
-    /// From here to that end all words are constants, and finite.
+    /// From here to that end all words are finite constants.
     finite: usize,
 }
 
@@ -257,7 +257,7 @@ impl<'a> Front<'a> {
         Some(section)
     }
 
-    /// As [`Self::take`], of f32 constants, or of some that were taken before and are finite.
+    /// Takes f32 constants as [`Self::take`] does, or again some that were taken before and are finite.
     #[inline(never)]
     fn constants(&mut self, offset: usize, len: usize) -> Result<&'a [u32], ImageError> {
         if self.has(offset, len) {
@@ -271,7 +271,7 @@ impl<'a> Front<'a> {
         Ok(constants)
     }
 
-    /// Constants, refused where one is not finite.
+    /// Takes constants; refuses them if one is not finite.
     #[inline(never)]
     fn take_finite(&mut self, offset: usize, len: usize) -> Result<(), ImageError> {
         if !self.has(offset, len) {
@@ -280,14 +280,14 @@ impl<'a> Front<'a> {
         if self.has(offset, len) { Ok(()) } else { Err(ImageError::Constant) }
     }
 
-    /// Whether these were taken before, and are finite.
+    /// Returns `true` if these were taken before and are finite.
     fn has(&self, offset: usize, len: usize) -> bool {
         self.finite <= offset && offset <= self.at && len <= self.at - offset
     }
 }
 
-/// The matrix of the record at `at`: its blocks, the places of their rows, their sums, and the words of the `work` area
-/// that its input takes.
+/// Checks the matrix of the record at `at`: its blocks, their rows' outputs, their sums, and that its prepared input fits
+/// a work area of `work` words.
 #[inline(never)]
 fn check_matrix(at: usize, front: &mut Front<'_>, work: usize) -> Result<(), ImageError> {
     let matrix = &matrix(front.words, at, 0);
@@ -297,7 +297,7 @@ fn check_matrix(at: usize, front: &mut Front<'_>, work: usize) -> Result<(), Ima
     for record in matrix.records.as_chunks().0 {
         let rows = row_block(matrix, record, first_row);
         let rows = rows.as_ref().map_err(|e| *e)?;
-        // Weights, scales and steps stand behind each other.
+        // Weights, scales and output steps follow each other.
         let [_, weights, scales, steps] = record.map(|word| u32::from_le(word) as usize);
         let to_scales = rows.block.words().len();
         let to_steps = to_scales + rows.scales.len();
@@ -305,7 +305,7 @@ fn check_matrix(at: usize, front: &mut Front<'_>, work: usize) -> Result<(), Ima
             return Err(ImageError::Section);
         }
         front.take(weights, to_steps + rows.steps.len())?;
-        // Magnitudes compare as their bits, and a sign is above them all.
+        // Magnitudes compare as their bits; a sign bit is above all of them.
         if bytemuck::must_cast_slice(rows.scales).iter().any(|scale: &u16| u16::from_le(*scale) >= BF16_INFINITY) {
             return Err(ImageError::Constant);
         }
@@ -328,13 +328,13 @@ fn check_matrix(at: usize, front: &mut Front<'_>, work: usize) -> Result<(), Ima
     Ok(())
 }
 
-/// Words that preparing an input for the block takes.
+/// Returns the words that preparing an input for the block takes.
 #[inline(never)]
 fn room(block: &Block<'_>) -> usize {
     Plan::of(block).room(block.shape().cols)
 }
 
-/// Whether a number is above 0 and finite.
+/// Returns `true` if a number is above 0 and finite.
 fn is_positive(x: f32) -> bool {
     (1..f32::INFINITY.to_bits()).contains(&x.to_bits())
 }

@@ -1,5 +1,5 @@
-//! The action contract: arrays of f32 bits, one per action dimension. `docs/FORMAT.md` has the order in which they
-//! apply.
+//! The action contract: arrays of f32 bits, with a value for each value of an action. `docs/FORMAT.md` has the order in
+//! which they apply.
 
 use super::header as h;
 use super::view::Image;
@@ -7,13 +7,13 @@ use super::words::high;
 
 /// Arrays of the action contract.
 pub const CONTRACT_ARRAYS: usize = 10;
-/// The first of the four arrays that binarise, which are all there or none.
+/// First of the four binarization arrays, of which an image has all or none.
 pub(super) const ARRAY_BINARISE: usize = 6;
 
 impl<'a> Image<'a> {
     writer_methods! {
-        /// The arrays, in their order: scale, offset, low, high, max_step, smoothing, on, off, on_value, off_value. Those
-        /// that the contract has not are empty.
+        /// Returns the arrays, in their order: scale, offset, low, high, max_step, smoothing, on, off, on_value, off_value.
+        /// An array that the contract does not have is empty.
         fn contract_arrays(&self) -> [&'a [u32]; CONTRACT_ARRAYS] {
             let mut offset = self.head(h::W_CONTRACT) as usize;
             core::array::from_fn(|which| {
@@ -25,14 +25,14 @@ impl<'a> Image<'a> {
         }
     }
 
-    /// Lower and upper limit of action `i`, if the contract has both. (Where it limits other actions only, f32's largest
-    /// number is in their place.)
+    /// Returns the lower and upper limit of action value `i`, if the contract has both. (If it limits other values only,
+    /// f32's largest number stands for no limit.)
     pub fn limits(&self, i: usize) -> Option<[f32; 2]> {
         let [_, _, low, high, ..] = self.contract_of(i);
         (low > f32::MIN && high < f32::MAX).then_some([low, high])
     }
 
-    /// The contract of action `i`; numbers that change nothing stand for the arrays that it has not.
+    /// Returns the contract of action value `i`, with neutral numbers for the arrays that the contract does not have.
     pub(crate) fn contract_of(&self, i: usize) -> [f32; CONTRACT_ARRAYS] {
         let mut numbers = [1.0, -0.0, f32::NEG_INFINITY, f32::INFINITY, f32::INFINITY, 1.0, 0.0, 0.0, 0.0, 0.0];
         let (mut flags, len) = (high(self.head(h::W_WORK_FLAGS)), self.act_len());
@@ -50,11 +50,12 @@ impl<'a> Image<'a> {
         numbers
     }
 
-    /// How many arrays there are.
+    /// Returns the number of arrays.
     pub(super) fn contract_count(&self) -> usize {
         high(self.head(h::W_WORK_FLAGS)).count_ones() as usize
     }
 
+    /// Returns `true` if the contract has array `which`.
     pub(super) fn has_contract(&self, which: usize) -> bool {
         high(self.head(h::W_WORK_FLAGS)) >> which & 1 == 1
     }

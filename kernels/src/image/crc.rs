@@ -6,7 +6,7 @@ use super::header::{W_BYTES, W_CRC};
 #[cfg(feature = "writer")]
 use crate::error::ImageError;
 
-/// CRC-32 (ISO-HDLC) of an image's bytes behind the fields that it does not cover.
+/// Computes the CRC-32 (ISO-HDLC) of an image's bytes, after the fields that it does not cover.
 pub const fn checksum(bytes: &[u8]) -> u32 {
     const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
     match bytes.split_at_checked(UNCHECKED_WORDS * 4) {

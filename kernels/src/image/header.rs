@@ -1,4 +1,4 @@
-//! The header: where its fields stand, and how they are written. [`Image`](super::Image) reads them.
+//! The header: the places of its fields, and how they are written. [`Image`](super::Image) reads them.
 
 #[cfg(feature = "writer")]
 use super::region::Region;
@@ -26,9 +26,9 @@ pub const BLOCK_WORDS: usize = 4;
 pub const DENOISE_WORDS: usize = 2;
 /// Coefficients of a denoising step.
 pub const COEFFICIENTS: usize = 7;
-/// The largest output of a matrix, in rows.
+/// Most rows of a matrix.
 pub const MAX_ROWS: usize = 4096;
-/// The most words of an arena: places in it are u16.
+/// Most words of an arena: offsets in it are u16.
 pub const MAX_SCRATCH: usize = 0xffff;
 
 /// u16 version, u16 header words.
@@ -45,7 +45,7 @@ pub const W_KIND: usize = 5;
 pub const W_OPS: usize = 6;
 /// u16 observation length, u16 action length.
 pub const W_SIZES: usize = 7;
-/// u16 actions in a chunk, u16 executed of them.
+/// u16 actions in a chunk, u16 of them executed.
 pub const W_CHUNK: usize = 8;
 /// Arena length in words.
 pub const W_SCRATCH: usize = 9;
@@ -73,43 +73,43 @@ pub const W_WEIGHTS: usize = 19;
 pub const W_DIGEST: usize = 20;
 /// Offset of the matrix records.
 pub const W_MATRICES: usize = 28;
-/// u16 number of matrices, u16 chunks that are averaged for an action; 0 where none are.
+/// u16 number of matrices, u16 chunks that a temporal ensemble averages for an action, or 0.
 pub const W_MATRIX_COUNT: usize = 29;
-/// u16 first operation of those that every denoising step runs, u16 denoising steps; 0 where the network runs once.
+/// u16 first operation that every denoising step runs, u16 denoising steps; both 0 if an evaluation runs the network one
+/// time.
 pub const W_DENOISING: usize = 30;
-/// u16 actions that lead over from one chunk to the next, u16 age from which on an action never plays; 0 where there is
-/// none.
+/// u16 actions that blend one chunk into the next, u16 age from which on an action never plays; 0 for none.
 pub const W_PLAYBACK: usize = 31;
 
-/// What a policy's output means.
+/// The meaning of a policy's output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Kind {
     /// One action per evaluation.
     Step = 0,
-    /// Several future actions per evaluation, of which the first few are executed.
+    /// An action chunk per evaluation, of which the first actions are executed.
     Chunk = 1,
-    /// A chunk, made from noise by a flow.
+    /// A chunk that a flow makes from noise.
     Flow = 2,
-    /// A chunk, made from noise by a diffusion process backwards.
+    /// A chunk that reverse diffusion makes from noise.
     Diffusion = 3,
 }
 
 impl Kind {
-    /// All of them, by number.
+    /// All kinds, by number.
     pub const ALL: [Self; 4] = [Self::Step, Self::Chunk, Self::Flow, Self::Diffusion];
 
-    /// Whether the network runs several times for an output.
+    /// Returns `true` if an evaluation runs the network in several denoising steps.
     pub const fn is_iterative(self) -> bool {
         matches!(self, Self::Flow | Self::Diffusion)
     }
 }
 
-/// What a writer says in a header.
+/// The fields of a header, for a writer.
 #[cfg(feature = "writer")]
 #[derive(Clone, Copy, Debug)]
 pub struct Header {
-    /// What the output means.
+    /// The meaning of the output.
     pub kind: Kind,
     /// Length of an observation.
     pub obs_len: usize,
@@ -117,13 +117,13 @@ pub struct Header {
     pub act_len: usize,
     /// Actions in the network's output.
     pub chunk: usize,
-    /// How many of a chunk's actions are executed.
+    /// Executed actions of a chunk.
     pub execute: usize,
-    /// Chunks that are averaged for an action; 0 where none are.
+    /// Chunks that a temporal ensemble averages for an action, or 0.
     pub horizon: usize,
-    /// Actions that lead over from one chunk to the next.
+    /// Actions that blend one chunk into the next.
     pub overlap: usize,
-    /// Age from which on an action never plays; 0 where there is none.
+    /// Age from which on an action never plays, in control periods, or 0.
     pub deadline: usize,
     /// Control rate in Hz.
     pub rate_hz: f32,
@@ -143,13 +143,13 @@ pub struct Header {
     pub matrices: Records,
     /// The operation records.
     pub ops: Records,
-    /// How many of the operations run once, before those of the denoising steps; 0 where all do.
-    pub once: usize,
-    /// Denoising steps; 0 where the network runs once.
+    /// First operation that every denoising step runs; 0 without denoising steps.
+    pub first_denoising_op: usize,
+    /// Denoising steps; 0 if an evaluation runs the network one time.
     pub denoising_steps: usize,
     /// Offset of the action contract's arrays.
     pub contract: u32,
-    /// Which of them there are, from bit 0 on.
+    /// The arrays that the contract has: array `i` by bit `i`.
     pub contract_flags: usize,
     /// The policy's name, in bytes.
     pub name: Records,
@@ -163,11 +163,11 @@ pub struct Header {
 
 #[cfg(feature = "writer")]
 impl Header {
-    /// The header's words, without length and checksum ([`seal`](super::crc::seal)).
+    /// Returns the header's words, without length and checksum ([`seal`](super::crc::seal)).
     ///
     /// # Errors
     ///
-    /// [`TooLarge`] where a size has no room in its field.
+    /// [`TooLarge`] if a size does not fit its field.
     pub fn emit(&self) -> Result<[u32; WORDS], TooLarge> {
         let mut words = [0; WORDS];
         words[0] = MAGIC;
@@ -193,7 +193,7 @@ impl Header {
         }
         words[W_MATRICES] = self.matrices.offset;
         words[W_MATRIX_COUNT] = halves(self.matrices.count, self.horizon)?;
-        words[W_DENOISING] = halves(self.once, self.denoising_steps)?;
+        words[W_DENOISING] = halves(self.first_denoising_op, self.denoising_steps)?;
         words[W_PLAYBACK] = halves(self.overlap, self.deadline)?;
         Ok(words)
     }

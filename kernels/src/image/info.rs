@@ -1,4 +1,4 @@
-//! What a header says of an image before the image itself is checked: at compile time, too.
+//! Sizes from an image's header, before the image itself is checked: at compile time, too.
 
 use super::crc::checksum;
 use super::header as h;
@@ -6,7 +6,7 @@ use super::words::{high, low};
 use crate::error::ImageError;
 use crate::layout::LAYOUT_STAMP;
 
-/// Lengths from an image's header: those that firmware needs for its arrays at compile time.
+/// Sizes from an image's header, which firmware needs for its arrays at compile time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct ImageInfo {
@@ -21,8 +21,8 @@ pub struct ImageInfo {
 }
 
 impl ImageInfo {
-    /// Reads the header of `bytes`, an image at any alignment. It checks the magic, format version, length, checksum and
-    /// kernel layout; [`Image::new_checked`](super::Image::new_checked) also checks everything inside.
+    /// Reads the header of `bytes`, an image at any alignment. It checks magic, format version, length, checksum and kernel
+    /// layout; [`Image::new_checked`](super::Image::new_checked) also checks the content.
     ///
     /// # Errors
     ///
@@ -45,7 +45,7 @@ impl ImageInfo {
     }
 }
 
-/// The header's words as in memory; `None` if `bytes` is shorter.
+/// Returns the header's words as in memory; `None` if `bytes` is shorter.
 const fn header(bytes: &[u8]) -> Option<[u32; h::WORDS]> {
     let mut header = [0; h::WORDS];
     let mut rest = bytes;
@@ -59,7 +59,7 @@ const fn header(bytes: &[u8]) -> Option<[u32; h::WORDS]> {
     Some(header)
 }
 
-/// Checks what the header, in words as in memory, says of the whole image `bytes`.
+/// Checks the fields about the whole image `bytes` in its header, whose words are as in memory.
 #[inline(always)]
 pub(super) const fn check_whole(header: &[u32; h::WORDS], bytes: &[u8]) -> Result<(), ImageError> {
     if u32::from_le(header[0]) != h::MAGIC {

@@ -1,7 +1,7 @@
-//! Matrices: their records and those of their blocks, to read and to write, and what these name.
+//! Matrices: their records and their blocks' records, to read and to write, and the data that these name.
 
 use super::header::{BLOCK_WORDS, MATRIX_WORDS, MAX_ROWS};
-use super::words::{Records, behind, high, low, record, section};
+use super::words::{Records, high, low, record, rest_from, section};
 #[cfg(feature = "writer")]
 use super::words::{TooLarge, halves};
 use crate::error::ImageError;
@@ -20,14 +20,14 @@ pub struct MatrixRecord {
     pub cols: usize,
     /// Columns per u8 scale; 0 = row scales only.
     pub group: usize,
-    /// Magnitude that the activations are quantized to.
+    /// Largest quantized activation.
     pub x_max: u16,
     /// The block records.
     pub blocks: Records,
 }
 
 impl MatrixRecord {
-    /// Refuses what no matrix has.
+    /// Reads a record; refuses values that no matrix has.
     #[inline(always)]
     pub fn parse(record: &[u32; MATRIX_WORDS]) -> Result<Self, ImageError> {
         let [size, levels, blocks, offset] = record.map(u32::from_le);
@@ -47,11 +47,11 @@ impl MatrixRecord {
         Ok(Self { rows, cols, group, x_max, blocks: Records { offset, count: low(blocks) } })
     }
 
-    /// The record's words.
+    /// Returns the record's words.
     ///
     /// # Errors
     ///
-    /// [`TooLarge`] where a size has no room in its field.
+    /// [`TooLarge`] if a size does not fit its field.
     #[cfg(feature = "writer")]
     pub fn emit(&self) -> Result<[u32; MATRIX_WORDS], TooLarge> {
         let Self { rows, cols, group, x_max, blocks } = *self;
@@ -64,7 +64,7 @@ impl MatrixRecord {
 pub struct BlockRecord {
     /// Code width.
     pub width: Width,
-    /// Weights in a lane.
+    /// Weights in each lane.
     pub lanes: Lanes,
     /// Rows.
     pub rows: usize,
@@ -77,7 +77,7 @@ pub struct BlockRecord {
 }
 
 impl BlockRecord {
-    /// Refuses what no block of a matrix with these lanes has.
+    /// Reads a record; refuses values that no block of a matrix with these lanes has.
     #[inline(always)]
     pub fn parse(record: &[u32; BLOCK_WORDS], lanes: Lanes) -> Result<Self, ImageError> {
         let [head, weights, scales, steps] = record.map(u32::from_le);
@@ -88,11 +88,11 @@ impl BlockRecord {
         Ok(Self { width, lanes, rows: high(head), weights, scales, steps })
     }
 
-    /// The record's words.
+    /// Returns the record's words.
     ///
     /// # Errors
     ///
-    /// [`TooLarge`] where a size has no room in its field.
+    /// [`TooLarge`] if a size does not fit its field.
     #[cfg(feature = "writer")]
     pub fn emit(&self) -> Result<[u32; BLOCK_WORDS], TooLarge> {
         let head = self.width.bits() | u32::from(self.lanes.code()) << 8;
@@ -109,7 +109,7 @@ pub struct Matrix<'a> {
     pub cols: usize,
     /// Columns per u8 scale; 0 = row scales only.
     pub group: usize,
-    /// Magnitude that the activations are quantized to: 127 for int8, up to 32767 for int16.
+    /// Largest quantized activation: 127 for int8, up to 32767 for int16.
     pub x_max: u16,
     /// Bits of the f32 biases in the order of the output, or empty.
     pub(crate) bias: &'a [u32],
@@ -119,29 +119,29 @@ pub struct Matrix<'a> {
     pub(crate) records: &'a [u32],
 }
 
-/// Rows of one width with their scales and places in the output.
+/// Rows of one width with their scales and outputs.
 #[derive(Clone, Copy, Debug)]
 pub struct RowBlock<'a> {
     /// The packed codes.
     pub block: Block<'a>,
     /// bf16 row scales, two a word.
     pub scales: &'a [u32],
-    /// Four u8 a word: the steps from the output of the row before (from output 0, the first) to each row's own; empty
-    /// where the rows follow each other from `first_row` on.
+    /// Output steps, four u8 a word: from the previous row's output (at first from output 0) to each row's own. Empty if
+    /// the rows follow each other from `first_row` on.
     pub steps: &'a [u32],
-    /// The output of the first row, or, where there are steps, 0, which they start from.
+    /// The output of the first row; 0 with output steps, which start from it.
     pub first_row: usize,
 }
 
 impl<'a> RowBlock<'a> {
-    /// The scale of the block's row `i`.
+    /// Returns the row scale of the block's row `i`.
     #[inline(always)]
     #[cfg(feature = "writer")]
     pub fn scale(&self, i: usize) -> f32 {
         bf16(half_word(self.scales, i))
     }
 
-    /// The weights of the block's row `i`: `level * group scale * row scale`, the integers multiplied first. Fills
+    /// Dequantizes the block's row `i` to `level * group scale * row scale`, with the integers multiplied first. It fills
     /// `out` up to the number of columns.
     #[cfg(feature = "writer")]
     pub fn dequantize(&self, i: usize, out: &mut [f32]) {
@@ -151,7 +151,7 @@ impl<'a> RowBlock<'a> {
         }
     }
 
-    /// The outputs of the block's rows, in order.
+    /// Iterates over the outputs of the block's rows, in order.
     pub fn outputs(&self) -> impl Iterator<Item = usize> + use<'a> {
         let steps = bytemuck::must_cast_slice::<u32, u8>(self.steps);
         let mut next = self.first_row;
@@ -164,18 +164,18 @@ impl<'a> RowBlock<'a> {
 }
 
 impl<'a> Matrix<'a> {
-    /// The lanes of the matrix's blocks.
+    /// Returns the lanes of the matrix's blocks.
     pub const fn lanes(&self) -> Lanes {
         Lanes::of(self.x_max, self.group)
     }
 
-    /// Words that the prepared activations take at most.
+    /// Returns the most words that the prepared activations take.
     #[cfg(feature = "writer")]
     pub fn prepared_words(&self) -> usize {
         max_prepared_words(self.cols, self.group)
     }
 
-    /// The blocks in the order of the image.
+    /// Iterates over the blocks in the order of the image.
     pub fn blocks(&self) -> impl Iterator<Item = RowBlock<'a>> + use<'a> {
         let matrix = *self;
         let mut first_row = 0;
@@ -186,30 +186,29 @@ impl<'a> Matrix<'a> {
         })
     }
 
-    /// Bytes of everything that describes the weights ([`block_bytes`]). Biases and the matrix record are not counted.
+    /// Returns the bytes of everything that describes the weights ([`block_bytes`]), without biases and matrix record.
     #[cfg(feature = "writer")]
     pub fn weight_bytes(&self) -> usize {
         self.blocks().map(|rows| block_bytes(rows.block.shape(), !rows.steps.is_empty())).sum()
     }
 
-    /// Bias of output `row`; 0 where the matrix has none.
+    /// Returns the bias of output `row`; 0 if the matrix has none.
     #[cfg(feature = "writer")]
     pub fn bias(&self, row: usize) -> f32 {
         self.bias.get(row).map_or(0.0, |w| f32::from_bits(u32::from_le(*w)))
     }
 
-    /// The bits of the values that the output starts from, where these are the biases and every row is written once, in
-    /// order.
+    /// Returns the bits of the biases if the output starts from them and every row is written one time, in order.
     pub fn start_values(&self, accumulate: bool) -> Option<&[u32]> {
         if accumulate || self.bias.is_empty() || !self.is_whole() { None } else { Some(self.bias) }
     }
 
-    /// Blocks of rows.
+    /// Returns the number of blocks.
     pub(crate) fn block_count(&self) -> usize {
         self.records.len() / BLOCK_WORDS
     }
 
-    /// Whether the blocks hold all rows in the order of the output.
+    /// Returns `true` if the blocks hold all rows in the order of the output.
     fn is_whole(&self) -> bool {
         let mut rows = 0;
         let (records, _) = self.records.as_chunks::<BLOCK_WORDS>();
@@ -220,8 +219,7 @@ impl<'a> Matrix<'a> {
     }
 }
 
-/// The matrix of the record at `at` with the biases at `bias` (0: none), refused where the record says something
-/// impossible.
+/// Reads the matrix of the record at `at` with the biases at `bias` (0: none); refuses an impossible record.
 pub(super) fn matrix(image: &[u32], at: usize, bias: usize) -> Result<Matrix<'_>, ImageError> {
     let MatrixRecord { rows, cols, group, x_max, blocks } = MatrixRecord::parse(record(image, at)?)?;
     let section = |offset, len| section(image, offset, len).ok_or(ImageError::Section);
@@ -230,7 +228,7 @@ pub(super) fn matrix(image: &[u32], at: usize, bias: usize) -> Result<Matrix<'_>
     Ok(Matrix { rows, cols, group, x_max, bias, image, records })
 }
 
-/// The block of a record, refused where the record says something impossible.
+/// Reads the block of a record; refuses an impossible record.
 #[inline(never)]
 pub(crate) fn row_block<'a>(
     matrix: &Matrix<'a>,
@@ -246,13 +244,13 @@ pub(crate) fn row_block<'a>(
     let words = |offset: u32, len| section(matrix.image, offset as usize, len).ok_or(ImageError::Section);
     let scales = words(scales, rows.div_ceil(2))?;
     let (steps, first_row) = if steps == 0 { (&[][..], first_row) } else { (words(steps, rows.div_ceil(4))?, 0) };
-    match Block::leading(shape, behind(matrix.image, weights as usize)) {
+    match Block::leading(shape, rest_from(matrix.image, weights as usize)) {
         Some(block) => Ok(RowBlock { block, scales, steps, first_row }),
         None => Err(ImageError::Section),
     }
 }
 
-/// Bytes that a block takes: packed words with their padding and group scales, row scales, output steps where the block
+/// Returns the bytes of a block: packed words with their padding and group scales, row scales, output steps if the block
 /// is `stepped`, and the block record.
 #[cfg(feature = "writer")]
 pub const fn block_bytes(shape: BlockShape, stepped: bool) -> usize {
@@ -260,13 +258,13 @@ pub const fn block_bytes(shape: BlockShape, stepped: bool) -> usize {
     4 * (shape.words() + shape.rows.div_ceil(2) + steps + BLOCK_WORDS)
 }
 
-/// Packs u16 values two a word, as scales stand in the image.
+/// Packs u16 values two a word, as the image holds row scales.
 #[cfg(feature = "writer")]
 pub fn half_words(values: &[u16]) -> impl Iterator<Item = u32> + '_ {
     values.chunks(2).map(|pair| pair.iter().rev().fold(0u32, |word, v| word << 16 | u32::from(*v)))
 }
 
-/// Packs u8 values four a word, as steps stand in the image.
+/// Packs u8 values four a word, as the image holds output steps.
 #[cfg(feature = "writer")]
 pub fn quarter_words(values: &[u8]) -> impl Iterator<Item = u32> + '_ {
     values.chunks(4).map(|four| four.iter().rev().fold(0u32, |word, v| word << 8 | u32::from(*v)))

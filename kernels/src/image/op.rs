@@ -1,4 +1,4 @@
-//! Operations: a table of all of them, their records to read and to write, and what these name.
+//! Operations: a table of all of them, their records to read and to write, and the data that these name.
 
 #[cfg(feature = "writer")]
 use core::mem::discriminant;
@@ -14,14 +14,14 @@ use super::words::{high, low, record, section, word};
 use crate::error::ImageError;
 use crate::math::Function;
 
-/// What an operation does.
+/// The function of an operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OpKind {
-    /// `dst = clamp((clamp(src, ±pre_clip) - mean) * scale, ±clip)`. Constants: `pre_clip`, `clip`, infinite where
-    /// there is no limit; arrays: `mean`, `scale`, the reciprocals of the standard deviation.
+    /// `dst = clamp((clamp(src, ±pre_clip) - mean) * scale, ±clip)`. Constants: `pre_clip`, `clip`, infinite for no limit;
+    /// arrays: `mean`, `scale`, the reciprocals of the standard deviation.
     Normalize {
-        /// Whether the quantizer added it, for the sake of the matrices that read it: then its constants count among
-        /// their bytes. Nothing else depends on it.
+        /// `true` if the quantizer added it to balance the matrices that read it: then its constants count among their
+        /// bytes. Nothing else depends on it.
         added: bool,
     },
     /// `dst = W src + b`
@@ -31,9 +31,9 @@ pub enum OpKind {
     },
     /// `dst = f(dst)`
     Function(Function),
-    /// `dst = layer_norm(dst)`. Constant: what is added to the variance; arrays: weights, biases.
+    /// `dst = layer_norm(dst)`. Constant: the epsilon added to the variance; arrays: weights, biases.
     LayerNorm,
-    /// `dst = rms_norm(dst)`. Constant: what is added to the mean square; array: weights.
+    /// `dst = rms_norm(dst)`. Constant: the epsilon added to the mean square; array: weights.
     RmsNorm,
     /// `dst += src`
     Add,
@@ -46,18 +46,18 @@ pub enum OpKind {
     GruCell,
     /// `dst *= src`
     Mul,
-    /// `dst` = noise: of the caller, or of the head's generator.
+    /// `dst` = noise, from the caller or from the head's generator.
     Noise,
-    /// `dst` = the row of the array for this denoising step. Arrays: one for each.
+    /// `dst` = the array of this denoising step. Arrays: one for each denoising step.
     Table,
-    /// A denoising step ([`crate::ops::denoise`]) of the iterate `dst` by the network's output `src`; `third` is what
-    /// the network reads next. Constants: the limit of the predicted sample, infinite where there is none; the arena
-    /// offset of the first step's noise, or 0; the coefficients of each step.
+    /// A denoising step ([`crate::ops::denoise`]) of the iterate `dst` by the network's output `src`; `third` is the
+    /// network's next input. Constants: the limit of the predicted sample, infinite for none; the arena offset of the first
+    /// step's noise, or 0; the coefficients of each step.
     Denoise,
 }
 
 impl OpKind {
-    /// Whether what it does differs between denoising steps.
+    /// Returns `true` if the operation differs between denoising steps.
     pub(super) fn is_of_step(self) -> bool {
         matches!(self, Self::Table | Self::Denoise)
     }
@@ -67,7 +67,7 @@ impl OpKind {
         FORMS.iter().find(|form| discriminant(&form.kind) == discriminant(&self))
     }
 
-    /// Its name, for people; a function has its own.
+    /// Returns a human-readable name; each function has its own.
     #[cfg(feature = "writer")]
     pub fn name(self) -> &'static str {
         match self {
@@ -77,37 +77,37 @@ impl OpKind {
     }
 }
 
-/// What stands in the table of an operation.
+/// An operation's entry in the table.
 #[derive(Debug)]
 pub(super) struct Form {
     /// Operation code.
     code: u8,
-    /// With the detail 0.
+    /// Kind with the detail 0.
     kind: OpKind,
     pub(super) uses: Uses,
-    /// Bits of the record's words behind the first that the operation does not use.
+    /// Bits of the record's last three words that the operation does not use.
     pub(super) unused: [u32; 3],
 }
 
-/// What an operation uses, in lengths of `dst`.
+/// The data of an operation, in lengths of `dst`.
 #[derive(Debug)]
 pub(super) struct Uses {
-    /// The highest detail. (Of a function, [`Function::from_code`] decides.)
+    /// Highest detail. (For a function, [`Function::from_code`] decides.)
     pub(super) max_detail: u8,
-    /// Lengths of `src` and of the third region; 0 where there is none. (Linear has its own length.)
+    /// Lengths of `src` and of the third region; 0 for none. (Linear has its own length.)
     src: u8,
     third: u8,
-    /// Single constants, and arrays behind them; of a table, one for each denoising step.
+    /// Single constants, and arrays after them. (A table has one array for each denoising step.)
     pub(super) constants: u8,
     pub(super) arrays: u8,
-    /// Passes over the elements, each of which a step in pieces may stop in.
+    /// Passes over the elements; a slice may end inside each of them.
     passes: u8,
-    /// Whether it works on what `dst` holds. (Of linear, the detail decides.)
+    /// `true` if the operation reads `dst`. (For linear, the detail decides.)
     reads_dst: bool,
 }
 
 impl Uses {
-    /// Nothing but its destination, once.
+    /// Only the destination, in one pass.
     const NONE: Self = Self { max_detail: 0, src: 0, third: 0, constants: 0, arrays: 0, passes: 1, reads_dst: false };
 }
 
@@ -133,7 +133,7 @@ macro_rules! operations {
         /// The names of the codes above, from code 1 on.
         pub(crate) const NAMES: &[&str] = &[$(stringify!($NAME)),*];
 
-        /// What people call them.
+        /// Human-readable names.
         #[cfg(feature = "writer")]
         static TEXTS: [&str; NAMES.len()] = [$($text),*];
 
@@ -179,31 +179,31 @@ operations! {
     DENOISE = 13 "denoise": OpKind::Denoise, Uses { src: 1, third: 1, constants: h::DENOISE_WORDS as u8, reads_dst: true, ..Uses::NONE };
 }
 
-/// What a writer says in an operation's record.
+/// The fields of an operation's record, for a writer.
 #[cfg(feature = "writer")]
 #[derive(Clone, Copy, Debug)]
 pub struct OpRecord {
-    /// What it does.
+    /// Function of the operation.
     pub kind: OpKind,
-    /// What it writes.
+    /// Arena region that it writes.
     pub dst: Region,
-    /// Arena offset of what it reads; 0 where the operation has none.
+    /// Arena offset of the region that it reads; 0 if it reads none.
     pub src: usize,
-    /// Arena offset of its third region; 0 where the operation has none, and of a linear one.
+    /// Arena offset of its third region; 0 for none and for a linear operation.
     pub third: usize,
     /// Offset of the biases of a linear operation; 0: none.
     pub bias: u32,
-    /// Offset of the constants or of the matrix record; 0 where the operation has none.
+    /// Offset of the constants or of the matrix record; 0 for none.
     pub data: u32,
 }
 
 #[cfg(feature = "writer")]
 impl OpRecord {
-    /// The record's words, which [`Image::ops`] reads.
+    /// Returns the record's words, which [`Image::ops`] reads.
     ///
     /// # Errors
     ///
-    /// [`TooLarge`] where a size has no room in its field.
+    /// [`TooLarge`] if a size does not fit its field.
     pub fn emit(&self) -> Result<[u32; OP_WORDS], TooLarge> {
         let code = self.kind.form().map_or(0, |form| form.code);
         let detail = match self.kind {
@@ -219,7 +219,7 @@ impl OpRecord {
 /// An operation of an image.
 #[derive(Clone, Copy, Debug)]
 pub struct Op<'a> {
-    /// What it does.
+    /// Function of the operation.
     pub kind: OpKind,
     /// [`Self::dst`], [`Self::src`], [`Self::third`].
     pub(crate) regions: [Region; 3],
@@ -230,77 +230,77 @@ pub struct Op<'a> {
 }
 
 impl<'a> Op<'a> {
-    /// What it writes. Where there is no [`Self::src`], it works in place.
+    /// Returns the region that it writes. Without [`Self::src`], it works in place.
     pub fn dst(&self) -> Region {
         self.regions[0]
     }
 
-    /// What it reads, or empty.
+    /// Returns the region that it reads, or an empty one.
     pub fn src(&self) -> Region {
         self.regions[1]
     }
 
-    /// The cell's other region, or the work area of a linear operation, or empty.
+    /// Returns a recurrent cell's other region, the work area of a linear operation, or an empty region.
     #[cfg(feature = "writer")]
     pub fn third(&self) -> Region {
         self.regions[2]
     }
 
-    /// The weights of a linear operation.
+    /// Returns the matrix of a linear operation.
     pub fn matrix(&self) -> Option<Matrix<'a>> {
         if self.is_linear() { self.linear_matrix().ok() } else { None }
     }
 
-    /// As [`Self::matrix`], of a linear operation. (Within a checked image never an error.)
+    /// Reads [`Self::matrix`] of a linear operation. (In a checked image there is no error.)
     pub(crate) fn linear_matrix(&self) -> Result<Matrix<'a>, ImageError> {
         matrix(self.image, self.data(), self.bias())
     }
 
-    /// Offset of the biases of a linear operation; 0: none.
+    /// Returns the offset of the biases of a linear operation; 0: none.
     pub(super) fn bias(&self) -> usize {
         u32::from_le(self.record[2]) as usize
     }
 
-    /// Single constant `i`: see [`OpKind`].
+    /// Returns single constant `i`: see [`OpKind`].
     pub fn constant(&self, i: usize) -> f32 {
         f32::from_bits(word(self.image, self.data().wrapping_add(i)))
     }
 
-    /// The coefficients of denoising step `step`, and the arena offset of its noise.
+    /// Returns the coefficients of denoising step `step`, and the arena offset of its noise.
     pub(crate) fn coefficients(&self, step: usize) -> ([f32; h::COEFFICIENTS], usize) {
         let first = h::DENOISE_WORDS + step * h::COEFFICIENTS;
         let noise = word(self.image, self.data().wrapping_add(1)) as usize;
         (core::array::from_fn(|i| self.constant(first + i)), noise.wrapping_add(step * self.dst().len))
     }
 
-    /// Array `i` of f32 bits, of the length of `dst`: see [`OpKind`].
+    /// Returns array `i` of f32 bits, of the length of `dst`: see [`OpKind`].
     #[cfg(feature = "writer")]
     pub fn array(&self, i: usize) -> &'a [u32] {
         self.part(i, &(0..self.dst().len))
     }
 
-    /// Its operation code.
+    /// Returns the operation code.
     pub(crate) fn code(&self) -> u8 {
         self.form.code
     }
 
-    /// What the operation can be cut into: elements, each once for every pass over them.
+    /// Returns the units that slices can cut the operation into: its elements, for each pass over them.
     pub(crate) fn units(&self) -> usize {
         self.dst().len * usize::from(self.form.uses.passes)
     }
 
-    /// A range of array `i`; empty where that is not in the image.
+    /// Returns a range of array `i`; empty if the image does not have it.
     pub(crate) fn part(&self, i: usize, range: &Range<usize>) -> &'a [u32] {
         let before = usize::from(self.form.uses.constants) + i * self.dst().len + range.start;
         section(self.image, self.data().wrapping_add(before), range.len()).unwrap_or_default()
     }
 
-    /// Offset of the constants or of the matrix record.
+    /// Returns the offset of the constants or of the matrix record.
     pub(super) fn data(&self) -> usize {
         u32::from_le(self.record[3]) as usize
     }
 
-    /// Whether the operation reads what its destination held.
+    /// Returns `true` if the operation reads its destination.
     pub(super) fn reads_dst(&self) -> bool {
         self.form.uses.reads_dst || self.kind == OpKind::Linear { accumulate: true }
     }
@@ -312,29 +312,29 @@ impl<'a> Op<'a> {
 
 impl<'a> Image<'a> {
     writer_methods! {
-        /// Number of operations.
+        /// Returns the number of operations.
         fn op_count(&self) -> usize {
             high(self.head(W_KIND))
         }
 
-        /// The operations in order.
+        /// Iterates over the operations in order.
         fn ops(&self) -> impl Iterator<Item = Op<'a>> + use<'a> {
             let image = *self;
             (0..self.op_count()).filter_map(move |i| image.op(i).ok())
         }
     }
 
-    /// Values of noise that an evaluation takes; 0 where it takes none.
+    /// Returns the values of noise that an evaluation takes; 0 for a policy without noise.
     pub fn noise_len(&self) -> usize {
         self.noise().len
     }
 
-    /// Arena region of the noise, which the first operation fills; empty where there is none.
+    /// Returns the arena region of the noise, which the first operation fills; empty without noise.
     pub(crate) fn noise(&self) -> Region {
         self.op(0).ok().filter(|op| op.kind == OpKind::Noise).map_or(Region::default(), |op| op.dst())
     }
 
-    /// Operation `i`, refused where its record says something impossible. (Within a checked image every record parses.)
+    /// Reads operation `i`; refuses an impossible record. (In a checked image every record parses.)
     pub(crate) fn op(&self, i: usize) -> Result<Op<'a>, ImageError> {
         let op = record(self.words, (self.head(W_OPS) as usize).wrapping_add(i * OP_WORDS))?;
         let [head, places, lengths, data] = op.map(u32::from_le);
@@ -356,12 +356,12 @@ impl<'a> Image<'a> {
         Ok(Op { kind, regions: [dst, src, third], record: op, form, image: self.words })
     }
 
-    /// Matrices of the image.
+    /// Returns the number of matrices.
     pub(super) fn matrix_count(&self) -> usize {
         low(self.head(W_MATRIX_COUNT))
     }
 
-    /// Offset of matrix record `i`.
+    /// Returns the offset of matrix record `i`.
     pub(super) fn matrix_at(&self, i: usize) -> usize {
         (self.head(W_MATRICES) as usize).wrapping_add(i * MATRIX_WORDS)
     }

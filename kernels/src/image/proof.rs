@@ -1,22 +1,21 @@
-//! That no sum of a row leaves int32, for any activations.
+//! Proof that no sum of a row exceeds int32, for any activations.
 
 use crate::arch::gemv;
 use crate::layout::{Block, BlockShape, MAX_GROUP, PAD_COLS, STRIP};
 use crate::x::{Plan, Scale, max_prepared_words};
 
-/// The largest magnitude that an int32 sum of the block's rows can reach for activations up to `x_max`: the largest row
-/// sum of `|level| * scale`, times `x_max`. Exact, and so linear in the number of weights.
+/// Computes the largest magnitude that an int32 sum of the block's rows can reach for activations up to `x_max`: the
+/// largest row sum of `|level| * scale`, times `x_max`. It is exact, in time linear in the number of weights.
 #[cfg(feature = "writer")]
 pub fn worst_case(block: &Block<'_>, x_max: u16) -> i64 {
-    // A block of a valid shape always comes apart.
+    // A block of a valid shape always has a sum.
     largest_sum(block).map_or(i64::MAX, |sum| i64::from(sum) * i64::from(x_max))
 }
 
-/// The largest row sum of `|level| * scale`. It has 31 bits, for there are at most 65535 columns of 128 * 255.
+/// Computes the largest row sum of `|level| * scale`. It has 31 bits: there are at most 65535 columns of 128 * 255.
 ///
-/// A strip's columns, as many of them as share a scale (or two where groups are taken in pairs), are a block of their
-/// own, and the GEMV of such a block and a unit vector gives one of its columns. So no other code has to know where the
-/// codes stand.
+/// The columns of a strip that share a scale (or two, in a layout of paired groups) are a block of their own, and the GEMV
+/// of such a block and a unit vector gives one of its columns. So no other code has to know the places of the codes.
 #[inline(never)]
 fn largest_sum(block: &Block<'_>) -> Option<u32> {
     let mut work = [0; max_prepared_words(MAX_GROUP - 1, MAX_GROUP)];
@@ -49,14 +48,14 @@ fn largest_sum(block: &Block<'_>) -> Option<u32> {
     Some(largest)
 }
 
-/// An upper bound of the rows' sums of `|level| * scale`, from the shape alone. It has 31 bits.
+/// Returns an upper bound of the rows' sums of `|level| * scale`, from the shape alone. It has 31 bits.
 pub fn largest_sum_bound(shape: BlockShape) -> u32 {
     let scale = if shape.group == 0 { 1 } else { 255 };
     shape.cols as u32 * shape.width.max_level() as u32 * scale
 }
 
-/// Whether no sum of the block's rows can leave int32 for activations up to `x_max`: from the shape alone where that
-/// says so, else by the codes and scales themselves, as [`worst_case`].
+/// Returns `true` if no sum of the block's rows can exceed int32 for activations up to `x_max`: by the shape alone if that
+/// is enough, otherwise by the codes and scales, as [`worst_case`] does.
 pub(super) fn fits_i32(block: &Block<'_>, x_max: u16) -> bool {
     let most = (i32::MAX as u32).checked_div(x_max.into()).unwrap_or(0);
     largest_sum_bound(block.shape()) <= most || largest_sum(block).is_some_and(|sum| sum <= most)

@@ -5,23 +5,24 @@ use core::ops::Range;
 /// A region of the arena.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Region {
-    /// First word.
+    /// Index of the first word.
     pub offset: usize,
-    /// Words.
+    /// Number of words.
     pub len: usize,
 }
 
 impl Region {
-    /// The words as an index range.
+    /// Returns the words as an index range.
     pub fn range(self) -> Range<usize> {
         self.offset..self.end()
     }
 
-    /// The word behind the last one.
+    /// Returns the index after the last word.
     pub(crate) fn end(self) -> usize {
         self.offset + self.len
     }
 
+    /// Returns `true` if both regions share a word.
     pub(super) fn overlaps(self, other: Self) -> bool {
         self.offset < other.end() && other.offset < self.end()
     }

@@ -1,13 +1,13 @@
-//! Text that a terminal may print.
+//! Text that is safe to print on a terminal.
 
-/// Whether bytes are UTF-8 without control characters (C0, DEL, C1), which would steer the terminal that a name is
-/// printed on. In a quarter of the code of `core::str::from_utf8`.
+/// Returns `true` if bytes are UTF-8 without control characters (C0, DEL, C1), which could control the terminal that prints
+/// a name. It takes a quarter of the code of `core::str::from_utf8`.
 pub(super) fn is_text(bytes: &[u8]) -> bool {
-    // Bytes that must follow, the code point so far, and the least one that needs so many bytes and is no control
+    // Bytes that must follow, the code point so far, and the least code point of this length that is not a control
     // character.
     let (mut more, mut point, mut least) = (0, 0u32, 0);
     for &byte in bytes {
-        // In a lead byte as many as the sequence has bytes, in the others 1; in an ASCII character 0.
+        // In a lead byte, the bytes of its sequence; 1 in the other bytes; 0 in an ASCII character.
         let ones = byte.leading_ones();
         if more > 0 {
             (more, point) = (more - 1, point << 6 | u32::from(byte & 0x3f));
@@ -34,7 +34,7 @@ pub(super) fn is_text(bytes: &[u8]) -> bool {
 mod tests {
     use super::is_text;
 
-    /// All sequences of up to four bytes from those where the rules change.
+    /// Tries all sequences of up to four bytes from the bytes at which the rules change.
     #[test]
     fn text_is_utf8_without_control_characters() {
         let edges = [

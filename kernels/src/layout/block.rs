@@ -1,4 +1,4 @@
-//! A block of rows in place: its shape, its words, and where each code and scale stands.
+//! A block of rows in place: its shape, its words, and the place of each code and scale.
 
 use super::format::QUAD;
 #[cfg(feature = "writer")]
@@ -15,19 +15,19 @@ use super::width::Width;
 pub struct BlockShape {
     /// Code width.
     pub width: Width,
-    /// Weights in a lane.
+    /// Weights in each lane.
     pub lanes: Lanes,
     /// Rows, at least 1.
     pub rows: usize,
     /// Columns, at least 1.
     pub cols: usize,
-    /// Columns that share a u8 scale, one of [`GROUPS`](super::GROUPS); 0 = none, the row's scale alone.
+    /// Group size, one of [`GROUPS`](super::GROUPS); 0 for row scales only.
     pub group: usize,
 }
 
 impl BlockShape {
-    /// Whether the lengths are usable: rows and columns from 1 to 65535 and a group that the lanes know; with groups in
-    /// paired lanes at most [`MAX_PAIRED_GROUPED`] columns.
+    /// Returns `true` if the lengths are valid: rows and columns from 1 to 65535 and a group size of the lanes; with group
+    /// scales in paired lanes at most [`MAX_PAIRED_GROUPED`] columns.
     pub const fn is_valid(self) -> bool {
         let (group, cols) = match self.lanes {
             Lanes::Single => (is_group(self.group), 0xffff),
@@ -42,22 +42,22 @@ impl BlockShape {
         &LAYOUTS[self.width as usize][self.lanes as usize]
     }
 
-    /// Rows of a strip: [`QUAD`] or [`STRIP`].
+    /// Returns the rows of a strip: [`QUAD`] or [`STRIP`](super::STRIP).
     pub(crate) const fn strip_rows(self) -> usize {
         self.layout().strip
     }
 
-    /// Columns of a unit.
+    /// Returns the columns of a unit.
     pub(crate) const fn cell_cols(self) -> usize {
         self.layout().cell.cols
     }
 
-    /// Rows with the padding.
+    /// Returns the rows with padding.
     pub const fn padded_rows(self) -> usize {
         self.rows.next_multiple_of(QUAD)
     }
 
-    /// Columns that the weights are padded to a multiple of. With paired lanes, all groups are whole.
+    /// Returns the columns to whose multiple rows are padded. With paired lanes, all groups are whole.
     #[inline(always)]
     pub(crate) const fn step(self, layout: &Layout) -> usize {
         match (self.lanes, self.group) {
@@ -66,7 +66,7 @@ impl BlockShape {
         }
     }
 
-    /// Units in a row.
+    /// Returns the units of a row.
     pub const fn units(self) -> usize {
         self.units_in(self.layout())
     }
@@ -76,7 +76,7 @@ impl BlockShape {
         round_up(self.cols, self.step(layout)) >> layout.unit_log
     }
 
-    /// Units in a full group; all units of a row where there are no group scales.
+    /// Returns the units of a full group; all units of a row without group scales.
     #[inline(never)]
     pub const fn units_per_group(self) -> usize {
         match self.group {
@@ -85,7 +85,7 @@ impl BlockShape {
         }
     }
 
-    /// Group scales of a row; 0 where there are none.
+    /// Returns the group scales of a row; 0 without group scales.
     pub const fn groups(self) -> usize {
         match self.group {
             0 => 0,
@@ -93,20 +93,20 @@ impl BlockShape {
         }
     }
 
-    /// Words of four rows, scales included; a strip of eight has twice as many.
+    /// Returns the words of four rows, with scales; a strip of eight has twice that.
     #[inline(never)]
     pub const fn quad_words(self) -> usize {
         let layout = self.layout();
         self.units_in(layout) * layout.quad_words + self.groups()
     }
 
-    /// Words of the block.
+    /// Returns the words of the block.
     #[cfg(feature = "writer")]
     pub const fn words(self) -> usize {
         self.padded_rows() / QUAD * self.quad_words()
     }
 
-    /// First row and rows of the strip that `row` is in.
+    /// Returns the first row and the number of rows of the strip that holds `row`.
     #[cfg(feature = "writer")]
     const fn strip(self, row: usize) -> (usize, usize) {
         let height = self.layout().strip;
@@ -115,7 +115,7 @@ impl BlockShape {
         (first, if left < height { left } else { height })
     }
 
-    /// Index of the first word of a cell and the distance to its next word: the cell that holds `row` in unit `unit`.
+    /// Returns the index of the first word of the cell that holds `row` in unit `unit`, and the distance to its next word.
     #[cfg(feature = "writer")]
     pub(super) const fn cell_at(self, row: usize, unit: usize) -> (usize, usize) {
         let (first, height) = self.strip(row);
@@ -124,7 +124,7 @@ impl BlockShape {
             0 => 0,
             _ => div_down(unit, self.units_per_group()),
         };
-        // The scales of a pair stand behind its second group.
+        // The scales of a pair follow its second group.
         let groups_before = if self.in_pairs(height) { groups_before & !1 } else { groups_before };
         let scales_before = groups_before * (height / QUAD);
         let step = div_down(height, rows);
@@ -132,13 +132,13 @@ impl BlockShape {
         (strip + unit * words * step + scales_before + div_down(row - first, rows), step)
     }
 
-    /// Whether the scales of a strip of so many rows stand behind pairs of groups.
+    /// Returns `true` if the scales of a strip of `height` rows follow pairs of groups.
     #[cfg(feature = "writer")]
     const fn in_pairs(self, height: usize) -> bool {
         self.layout().x.pairs && height == STRIP
     }
 
-    /// Index of the word that holds the scale of `group` for `row`, and the scale's first bit.
+    /// Returns the index of the word that holds the scale of `group` for `row`, and the scale's first bit.
     #[cfg(feature = "writer")]
     pub(super) const fn scale_at(self, row: usize, group: usize) -> (usize, usize) {
         let (first, height) = self.strip(row);
@@ -157,7 +157,7 @@ impl BlockShape {
     }
 }
 
-/// A block's words in place, of exactly the length that its shape asks for.
+/// A block's words in place, of exactly the length of its shape.
 #[derive(Clone, Copy, Debug)]
 pub struct Block<'a> {
     shape: BlockShape,
@@ -166,8 +166,8 @@ pub struct Block<'a> {
 }
 
 impl<'a> Block<'a> {
-    /// Pairs `words` (little-endian words as they stand in the image) with their shape; `None` where the shape is not
-    /// valid or the length differs from [`BlockShape::words`].
+    /// Combines `words` (little-endian, as in the image) with their shape; `None` if the shape is not valid or the length
+    /// differs from [`BlockShape::words`].
     #[cfg(feature = "writer")]
     pub fn new(shape: BlockShape, words: &'a [u32]) -> Option<Self> {
         if !shape.is_valid() {
@@ -176,7 +176,7 @@ impl<'a> Block<'a> {
         Self::leading(shape, words).filter(|block| block.words.len() == words.len())
     }
 
-    /// The block of a valid shape that `words` begins with; `None` where words are missing.
+    /// Returns the block of a valid shape at the start of `words`; `None` if words are missing.
     #[inline(always)]
     pub(crate) fn leading(shape: BlockShape, words: &'a [u32]) -> Option<Self> {
         let quad_words = shape.quad_words();
@@ -184,28 +184,28 @@ impl<'a> Block<'a> {
         Some(Self { shape, quad_words, words })
     }
 
-    /// The shape.
+    /// Returns the shape.
     pub fn shape(&self) -> BlockShape {
         self.shape
     }
 
-    /// As [`BlockShape::quad_words`].
+    /// Returns [`BlockShape::quad_words`].
     pub fn quad_words(&self) -> usize {
         self.quad_words
     }
 
-    /// All words.
+    /// Returns all words.
     #[inline(always)]
     pub fn words(&self) -> &'a [u32] {
         self.words
     }
 
-    /// The words of the rows from `first_row`, a multiple of [`STRIP`], on; empty when out of range.
+    /// Returns the words of the rows from `first_row` on, a multiple of [`STRIP`](super::STRIP); empty when out of range.
     pub fn rows_from(&self, first_row: usize) -> &'a [u32] {
         self.words.get((first_row / QUAD).saturating_mul(self.quad_words)..).unwrap_or(&[])
     }
 
-    /// The code at (`row`, `col`); 0 when out of range.
+    /// Returns the code at (`row`, `col`); 0 when out of range.
     #[cfg(feature = "writer")]
     pub fn code(&self, row: usize, col: usize) -> u8 {
         if row >= self.shape.rows || col >= self.shape.cols {
@@ -216,7 +216,7 @@ impl<'a> Block<'a> {
         with_format!(self.shape, extract::<_>(&cell, row & (rows - 1), col & (cols - 1)))
     }
 
-    /// The words of the cell that holds `row` in unit `unit`.
+    /// Returns the words of the cell that holds `row` in unit `unit`.
     #[cfg(feature = "writer")]
     fn cell(&self, row: usize, unit: usize) -> [u32; 3] {
         let (at, step) = self.shape.cell_at(row, unit);
@@ -227,13 +227,13 @@ impl<'a> Block<'a> {
         cell
     }
 
-    /// The level at (`row`, `col`), without any scale.
+    /// Returns the level at (`row`, `col`), without any scale.
     #[cfg(feature = "writer")]
     pub fn level(&self, row: usize, col: usize) -> i32 {
         self.shape.width.level(self.code(row, col))
     }
 
-    /// The u8 scale that (`row`, `col`) is multiplied with; 1 where the block has no group scales.
+    /// Returns the group scale of (`row`, `col`); 1 without group scales.
     #[cfg(feature = "writer")]
     pub fn group_scale(&self, row: usize, col: usize) -> u8 {
         match self.shape.group {

@@ -1,13 +1,13 @@
 //! Values of 16 bits, two a word, the first in the low half.
 
-/// Value `i` of a run of words as they stand in the image; 0 when out of range.
+/// Returns value `i` of little-endian words, as in the image; 0 when out of range.
 #[inline(always)]
 pub(crate) fn half_word(words: &[u32], i: usize) -> u16 {
     let word = words.get(i / 2).copied().unwrap_or(0);
     (u32::from_le(word) >> (16 * (i % 2))) as u16
 }
 
-/// The value of a bf16, which is the upper half of an f32.
+/// Converts a bf16, which is the upper half of an f32.
 #[inline(always)]
 pub(crate) fn bf16(bits: u16) -> f32 {
     f32::from_bits(u32::from(bits) << 16)

@@ -1,26 +1,26 @@
-//! How many weights a lane holds, and how many columns may share a scale.
+//! Weights in a lane, and group sizes.
 
-/// Columns that may share a group scale, small to large; powers of two.
+/// Group sizes in columns, small to large; powers of two.
 pub const GROUPS: [usize; 3] = [32, 64, 128];
 
-/// The most columns that share a group scale.
+/// Largest group size.
 pub const MAX_GROUP: usize = GROUPS[2];
 
-/// The one group that paired lanes know.
+/// The only group size of paired lanes.
 pub(crate) const PAIRED_GROUP: usize = GROUPS[0];
 
-/// Columns that a block of paired lanes may have with group scales. The 2-bit kernel sums twice a row's products
-/// (`w2_paired`), `2 * 3 * 127 * 255` a column at most, in an int32.
+/// Most columns of a block of paired lanes with group scales. The 2-bit kernel sums twice a row's products (`w2_paired`),
+/// `2 * 3 * 127 * 255` a column at most, in an int32.
 pub const MAX_PAIRED_GROUPED: usize = 11_051;
 
-/// Whether `group` is one of [`GROUPS`], or 0: no group scales.
+/// Returns `true` if `group` is one of [`GROUPS`], or 0: no group scales.
 pub const fn is_group(group: usize) -> bool {
     const SMALL: usize = GROUPS[0];
     const MIDDLE: usize = GROUPS[1];
     matches!(group, 0 | SMALL | MIDDLE | MAX_GROUP)
 }
 
-/// How many weights a 16-bit lane of an SMLAD operand holds.
+/// Weights in a 16-bit lane of an SMLAD operand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Lanes {
@@ -31,19 +31,19 @@ pub enum Lanes {
 }
 
 impl Lanes {
-    /// Both.
+    /// All of them.
     pub const ALL: [Self; 2] = [Self::Single, Self::Paired];
 
-    /// The largest activation that paired lanes hold.
+    /// Largest activation of paired lanes.
     pub const PAIRED_X_MAX: u16 = 127;
 
-    /// The lanes of a matrix with activations up to `x_max` and scale groups of `group` columns: paired where they can
-    /// be, which is for int8 activations and row scales or groups of 32 ([`GROUPS`]).
+    /// Returns the lanes of a matrix with activations up to `x_max` and group size `group`: paired for int8 activations with
+    /// row scales or groups of 32 ([`GROUPS`]), otherwise single.
     pub const fn of(x_max: u16, group: usize) -> Self {
         if x_max <= Self::PAIRED_X_MAX && matches!(group, 0 | PAIRED_GROUP) { Self::Paired } else { Self::Single }
     }
 
-    /// As it stands in a block record: 0 or 1.
+    /// Returns the code in a block record: 0 or 1.
     pub const fn code(self) -> u8 {
         match self {
             Self::Single => 0,
@@ -51,7 +51,7 @@ impl Lanes {
         }
     }
 
-    /// The inverse of [`Self::code`].
+    /// Returns the lanes of a [code](Self::code).
     #[cfg(feature = "writer")]
     pub const fn from_code(code: u8) -> Option<Self> {
         match code {

@@ -84,7 +84,7 @@ pub fn pack(shape: BlockShape, codes: &[u8], scales: &[u8], out: &mut [u32]) -> 
 fn pack_codes<F: Format>(shape: BlockShape, codes: &[u8], out: &mut [u32]) {
     for first_row in (0..shape.padded_rows()).step_by(F::CELL.rows) {
         for unit in 0..shape.units() {
-            // Padding has code 0, too, which is not always a field of zeros.
+            // Padding has code 0, too; its field is not always zero.
             let mut words = [0u32; 3];
             for row in 0..F::CELL.rows {
                 for col in 0..F::CELL.cols {

@@ -1,10 +1,10 @@
-//! The registered layouts: by type for code that is generic over them, as a table of constants for code that is not.
+//! The registered layouts: by type for generic code, and as a table of constants for other code.
 
 use super::format::{Cell, Format, PAD_COLS, QUAD, STRIP, XLayout};
 use super::lanes::Lanes;
 use super::width::Width;
 
-/// The constants of a layout, for code that is not generic over it.
+/// Constants of a layout, for code that is not generic over it.
 #[derive(Clone, Copy, Debug)]
 pub struct Layout {
     /// Rows, columns and words of a cell.
@@ -13,25 +13,25 @@ pub struct Layout {
     pub quad_words: usize,
     /// Rows of a strip.
     pub strip: usize,
-    /// Columns that rows are padded to a multiple of.
+    /// Columns to whose multiple rows are padded.
     pub step: usize,
-    /// What the prepared activations look like.
+    /// Form of the prepared activations.
     pub x: XLayout,
-    /// Columns that activations are padded to a multiple of, where their group is not longer.
+    /// Columns to whose multiple activations are padded, unless their group is longer.
     pub pad: usize,
-    /// Binary logarithm of a chunk's columns, because nothing is divided when a GEMV is called.
+    /// Binary logarithm of a column chunk's columns: a call of a GEMV has no division.
     pub chunk_log: u8,
-    /// The same of a unit's columns.
+    /// Binary logarithm of a unit's columns.
     pub unit_log: u8,
-    /// The same of a strip's rows.
+    /// Binary logarithm of a strip's rows.
     #[cfg_attr(not(any(feature = "writer", actq_armv7em)), expect(dead_code, reason = "only the assembler reads it"))]
     pub strip_log: StripLog,
-    /// The same of the step.
+    /// Binary logarithm of the step.
     pub step_log: u8,
 }
 
-/// Binary logarithm of a strip's rows: of [`QUAD`] or of [`STRIP`]. Of an enum the compiler knows that it can be
-/// shifted by.
+/// Binary logarithm of a strip's rows: [`QUAD`] or [`STRIP`]. With an enum, the compiler knows that the shift is in
+/// range.
 #[derive(Clone, Copy, Debug)]
 #[repr(u8)]
 pub enum StripLog {
@@ -41,7 +41,7 @@ pub enum StripLog {
     Strip = STRIP.trailing_zeros() as u8,
 }
 
-// A power of two, by which the table is quick to index.
+// A power of two makes the table quick to index.
 const _: () = assert!(size_of::<usize>() != 4 || size_of::<Layout>() == 64);
 
 impl Layout {
@@ -63,7 +63,7 @@ impl Layout {
 
 macro_rules! table {
     (() $($(#[$doc:meta])* $width:ident = $bits:literal, $grid:ident: $single:path, $paired:path;)*) => {
-        /// By width and lanes. A table in memory takes fewer instructions than a choice for every constant.
+        /// Layouts by width and lanes. A table in memory takes fewer instructions than a branch for every constant.
         pub static LAYOUTS: [[Layout; Lanes::ALL.len()]; Width::ALL.len()] =
             [$([Layout::of::<$single>(), Layout::of::<$paired>()]),*];
 

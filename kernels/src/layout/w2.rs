@@ -1,8 +1,8 @@
 //! 2-bit codes, single lanes: one word holds 16 columns of a row, exactly 2 bits a weight.
 //!
-//! Columns pair up for SMLAD: pair `j` is columns `2j` (low lane) and `2j + 1` (high lane). Its codes stand at bits
-//! `2j + 1` and `2j + 17` of a 32-bit ring, so that `ror(word, 2j) & 0x0006_0006` is both **doubled** codes, each in
-//! its lane:
+//! Columns are paired for SMLAD: pair `j` is columns `2j` (low lane) and `2j + 1` (high lane). Its codes are at bits
+//! `2j + 1` and `2j + 17` of a 32-bit ring, so that `ror(word, 2j) & 0x0006_0006` is both **doubled** codes, each in its
+//! lane:
 //!
 //! ```text
 //! bit  31 30 29 .. 19 18 17 16 15 14 .. 4 3 2 1  0
@@ -20,7 +20,7 @@ pub struct W2;
 
 const _: () = assert!(W2::CELL.is_full(W2::WIDTH.bits()));
 
-/// Where a column's code starts in the word's ring of bits.
+/// Returns the first bit of a column's code in the word's ring of bits.
 #[cfg(feature = "writer")]
 const fn bit(col: usize) -> u32 {
     (1 + 2 * (col as u32 / 2) + 16 * (col as u32 % 2)) % 32

@@ -1,7 +1,7 @@
 //! 2-bit codes, paired lanes: one word holds 8 columns of two rows, exactly 2 bits a weight.
 //!
 //! A lane holds the code of the even row in bits 0 and 1, unsigned, and that of the odd row in bits 14 and 15, as a
-//! signed `code - 2`. Pair `j` (columns `2j`, `2j + 1`) stands rotated left by `4j`, so that
+//! signed `code - 2`. Pair `j` (columns `2j`, `2j + 1`) is rotated left by `4j`, so that
 //! `ror(word, 4j) & 0xc003_c003` is both lanes of the pair: one AND and one SMLAD for four MACs. Around the 32-bit
 //! ring, before the rotation:
 //!
@@ -13,8 +13,8 @@
 //! With `x << 2`, a sum over SMLADs is `t = 4*even + 2^16*odd`. It starts from `0x8000 - 6*sum(x)`, so that it holds
 //! `4*sum((code - 1.5) * x) + 0x8000` in its low half: at most `4 * 1.5 * 127 * 32 = 24384` away from the middle after
 //! a chunk of 32 columns, so the low half never borrows, and `t >> 16` is exactly the odd row's `sum((code - 2) * x)`.
-//! Chunks are summed without being taken apart: the high halves for themselves, and all of `t` modulo 2^32, from which
-//! the sum of the high halves is taken away in the end. The even row's level sum is then half of what is left, the odd
+//! Chunks are summed without separation: the high halves in one sum, and all of `t` modulo 2^32 in another, from which
+//! the sum of the high halves is subtracted at the end. The even row's level sum is then half of the rest, and the odd
 //! row's is `2*odd + sum(x)`.
 //!
 //! With group scales, two groups' low halves without the bias and their high halves, at most `2 * 127 * 32 = 8128`, are
@@ -36,7 +36,7 @@ const _: () = assert!(W2Paired::CELL.is_full(W2Paired::WIDTH.bits()));
 const _: () = assert!(2 * 3 * 127 * 255 * (MAX_PAIRED_GROUPED as i64) < 1 << 31);
 const _: () = assert!(W2Paired::X.starts[0].factor.abs() * 127 * (W2Paired::X.chunk as i32) < 0x8000);
 
-/// Where a code starts in the word's ring of bits, and what makes it signed.
+/// Returns the first bit of a code in the word's ring of bits, and the offset that makes it signed.
 #[cfg(feature = "writer")]
 const fn field(row: usize, col: usize) -> (u32, u32) {
     let bit = 4 * (col as u32 / 2) + 16 * (col as u32 % 2);

@@ -2,7 +2,7 @@
 //!
 //! Pair `j` is columns `2j` (low lane) and `2j + 1` (high lane). A 16-bit lane holds five 3-bit fields and one spare
 //! bit. Word `k` holds pairs `5k` to `5k + 4`; the three words' spare bits hold pair 15, bit `k` of its code in word
-//! `k`. In word `k` the spare bit stands at bit `k + 1`, where it already has the weight of bit `k` of a **doubled**
+//! `k`. In word `k` the spare bit is bit `k + 1`, where it already has the weight of bit `k` of a **doubled**
 //! code, so one AND with an immediate extracts it; the five fields follow it around the 32-bit ring:
 //!
 //! ```text
@@ -27,14 +27,14 @@ pub struct W3;
 
 const _: () = assert!(W3::CELL.is_full(W3::WIDTH.bits()));
 
-/// Word and first bit of a column's code, for the pairs 0 to 14.
+/// Returns the word and first bit of a column's code, for the pairs 0 to 14.
 #[cfg(feature = "writer")]
 const fn field(col: usize) -> (usize, u32) {
     let (word, field) = (col / 2 / FIELDS, col / 2 % FIELDS);
     (word, (word as u32 + 2 + 3 * field as u32 + 16 * (col as u32 % 2)) % 32)
 }
 
-/// The spare bit of word `k` in the lane of `col`.
+/// Returns the spare bit of word `k` in the lane of `col`.
 #[cfg(feature = "writer")]
 const fn spare(k: usize, col: usize) -> u32 {
     k as u32 + 1 + 16 * (col as u32 % 2)

@@ -10,14 +10,14 @@
 //! set    2k     spare   2k+1    2k+1     2k      2k     spare   2k+1    2k+1    2k
 //! ```
 //!
-//! The last two sets stand in the spare bits, where all three words meet: set 6 is
+//! The last two sets are in the spare bits of all three words: set 6 is
 //! `ror(w0 ^ ror(w1, 2), 10) & 0xe007_e007`, set 7 is `ror(w2 ^ ror(w1, 4), 10) & 0xe007_e007`. Of the 12 bits that
-//! such an expression reads, 8 are spare in `w0` (`w2`); the other 4 are spare in `w1` only, bits 9 and 10 for set 6,
+//! each expression reads, 8 are spare in `w0` (`w2`); the other 4 are spare in `w1` only, bits 9 and 10 for set 6,
 //! bits 11 and 12 for set 7 (and 16 further). The packer solves `w1` first, then `w0` and `w2`.
 //!
 //! With `x << 3`, a sum over SMLADs is `t = 8*even + 2^16*odd`. It starts from `0x8000 - 28*sum(x)`, so that its low
 //! half holds `8*sum((code - 3.5) * x) + 0x8000`: at most `8 * 3.5 * 127 * 8 = 28448` away from the middle after a
-//! chunk of 8 columns. All else is as in [`super::w2_paired`].
+//! chunk of 8 columns. The rest is as in [`super::w2_paired`].
 
 use super::format::{Cell, Format, QUAD, Start, Sums, XLayout, smlad};
 use super::width::Width;
@@ -37,7 +37,7 @@ pub struct W3Paired;
 const _: () = assert!(W3Paired::CELL.is_full(W3Paired::WIDTH.bits()));
 const _: () = assert!(W3Paired::X.starts[0].factor.abs() * 127 * (W3Paired::X.chunk as i32) < 0x8000);
 
-/// The sets of a cell.
+/// Returns the sets of a cell.
 const fn sets([w0, w1, w2]: [u32; 3]) -> [u32; 8] {
     [
         w0 & MASK,
@@ -51,7 +51,7 @@ const fn sets([w0, w1, w2]: [u32; 3]) -> [u32; 8] {
     ]
 }
 
-/// The inverse of [`sets`].
+/// Returns the words of a cell: the inverse of [`sets`].
 #[cfg(feature = "writer")]
 const fn words(sets: [u32; 8]) -> [u32; 3] {
     let mut w0 = sets[0] | sets[1].rotate_left(6);
@@ -64,7 +64,7 @@ const fn words(sets: [u32; 8]) -> [u32; 3] {
     [w0, w1, w2]
 }
 
-/// Set, first bit and sign of a code.
+/// Returns the set, first bit and sign of a code.
 #[cfg(feature = "writer")]
 const fn field(row: usize, col: usize) -> (usize, u32, u32) {
     let set = 2 * (col / 2) + row / 2;

@@ -1,6 +1,6 @@
 //! 4-bit codes, single lanes: one word holds 8 columns of a row, exactly 4 bits a weight.
 //!
-//! As [`super::w2`], with four pairs a word: pair `j` is columns `2j` and `2j + 1`, its codes stand at bits `4j + 1`
+//! As [`super::w2`], with four pairs a word: pair `j` is columns `2j` and `2j + 1`, its codes are at bits `4j + 1`
 //! and `4j + 17` of a 32-bit ring, and `ror(word, 4j) & 0x001e_001e` is both doubled codes:
 //!
 //! ```text
@@ -19,7 +19,7 @@ pub struct W4;
 
 const _: () = assert!(W4::CELL.is_full(W4::WIDTH.bits()));
 
-/// Where a column's code starts in the word's ring of bits.
+/// Returns the first bit of a column's code in the word's ring of bits.
 #[cfg(feature = "writer")]
 const fn bit(col: usize) -> u32 {
     (1 + 4 * (col as u32 / 2) + 16 * (col as u32 % 2)) % 32

@@ -9,8 +9,8 @@
 //! ```
 //!
 //! `word & 0xf00f_f00f` is `a + 2^12*b` in each lane, `ror(word, 8) & 0xf00f_f00f` is `c + 2^12*d`, and
-//! `word & 0x0f0f_0f0f` is `a + 2^8*c`: three SMLADs for eight MACs. With `x << 1` and start values that take the
-//! offsets back, the three sums are
+//! `word & 0x0f0f_0f0f` is `a + 2^8*c`: three SMLADs for eight MACs. With `x << 1` and start values that cancel
+//! the offsets, the three sums are
 //!
 //! ```text
 //! p = A + 2^12*B,   q = C + 2^12*D,   k = A + 2^8*C    (modulo 2^32; A to D: the rows' sums of level * x)
@@ -34,7 +34,7 @@ pub struct W4Paired;
 const _: () = assert!(W4Paired::CELL.is_full(W4Paired::WIDTH.bits()));
 const _: () = assert!(Width::W4.max_level() * 127 * (W4Paired::X.chunk as i32) < 1 << 19);
 
-/// First bit and sign of a code.
+/// Returns the first bit and sign of a code.
 #[cfg(feature = "writer")]
 const fn field(row: usize, col: usize) -> (u32, u32) {
     match row {

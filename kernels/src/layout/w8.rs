@@ -16,13 +16,13 @@ pub struct W8;
 
 const _: () = assert!(W8::CELL.is_full(W8::WIDTH.bits()));
 
-/// Where a column's code starts in the word.
+/// Returns the first bit of a column's code in the word.
 #[cfg(feature = "writer")]
 const fn bit(col: usize) -> u32 {
     8 * (col as u32 / 2) + 16 * (col as u32 % 2)
 }
 
-/// Sign-extends bytes 0 and 2 into the two lanes: what SXTB16 computes.
+/// Sign-extends bytes 0 and 2 into the two lanes, as SXTB16 does.
 #[inline(always)]
 fn sxtb16(word: u32) -> u32 {
     (word as i8 as i16 as u16 as u32) | (((word >> 16) as i8 as i16 as u16 as u32) << 16)

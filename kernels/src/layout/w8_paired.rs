@@ -8,14 +8,14 @@
 //! col      1      1     0      0
 //! ```
 //!
-//! SMLAD of the word as it stands sums `even + 2^8*odd`, SMLAD of its UXTB16 sums `even`: three instructions for four
+//! SMLAD of the word itself sums `even + 2^8*odd`, SMLAD of its UXTB16 sums `even`: three instructions for four
 //! MACs. Both start from `-128 * sum(x)`, and the odd row's sum is their difference over 2^8. It has 24 bits as long as
 //! `128 * 127 * 512 = 8323072` is below `2^23 = 8388608`: a chunk has up to 512 columns.
 
 use super::format::{Cell, Format, QUAD, Start, Sums, XLayout, smlad};
 use super::width::Width;
 
-/// The even row in both lanes: what UXTB16 extracts.
+/// The even row in both lanes, as UXTB16 extracts it.
 const EVEN: u32 = 0x00ff_00ff;
 
 /// The 8-bit layout of paired lanes.
@@ -24,7 +24,7 @@ pub struct W8Paired;
 const _: () = assert!(W8Paired::CELL.is_full(W8Paired::WIDTH.bits()));
 const _: () = assert!(Width::W8.max_level() * 127 * (W8Paired::X.chunk as i32) < 1 << 23);
 
-/// First bit and offset of a code.
+/// Returns the first bit and offset of a code.
 #[cfg(feature = "writer")]
 const fn field(row: usize, col: usize) -> (u32, u32) {
     let bit = 16 * col as u32;

@@ -1,8 +1,8 @@
-//! Code widths, and the levels that codes stand for.
+//! Code widths, and the levels of codes.
 
 macro_rules! widths {
     (() $($(#[$doc:meta])* $width:ident = $bits:literal, $grid:ident: $($layouts:path),*;)*) => {
-        /// Bits of a weight code.
+        /// Bits of a code.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
         #[cfg_attr(feature = "defmt", derive(defmt::Format))]
         pub enum Width {
@@ -13,7 +13,7 @@ macro_rules! widths {
             /// All widths, narrow to wide.
             pub const ALL: [Self; [$($bits),*].len()] = [$(Self::$width),*];
 
-            /// The width of `bits`, if there is one.
+            /// Returns the width of `bits` bits, if there is one.
             pub const fn from_bits(bits: u32) -> Option<Self> {
                 Some(match bits {
                     $($bits => Self::$width,)*
@@ -21,7 +21,7 @@ macro_rules! widths {
                 })
             }
 
-            /// Bits of a code.
+            /// Returns the bits of a code.
             pub const fn bits(self) -> u32 {
                 match self {
                     $(Self::$width => $bits,)*
@@ -38,17 +38,17 @@ macro_rules! widths {
 }
 registry!(widths());
 
-/// What codes stand for.
+/// Levels of codes.
 #[derive(Clone, Copy)]
 enum Grid {
-    /// Odd levels, as many below 0 as above: `2*code - (2^b - 1)`.
+    /// Odd levels, symmetric around 0: `2*code - (2^b - 1)`.
     Odd,
     /// The code itself, as two's complement of 8 bits.
     Whole,
 }
 
 impl Width {
-    /// The level (weight divided by its scale) that `code` stands for. Bits of `code` above the width are ignored.
+    /// Returns the level (weight divided by its scale) of `code`. Bits of `code` above the width are ignored.
     #[cfg(feature = "writer")]
     pub const fn level(self, code: u8) -> i32 {
         match self.grid() {
@@ -60,7 +60,7 @@ impl Width {
         }
     }
 
-    /// The largest magnitude of a level.
+    /// Returns the largest magnitude of a level.
     pub const fn max_level(self) -> i32 {
         match self.grid() {
             Grid::Whole => 128,
@@ -68,8 +68,8 @@ impl Width {
         }
     }
 
-    /// The code whose level is nearest to `x` (a weight divided by its scale); ties go to the even code. At 8 bits the
-    /// result is symmetric: -128 is not used. NaN gives the lowest code.
+    /// Returns the code whose level is nearest to `x` (a weight divided by its scale); ties go to the even code. At 8 bits
+    /// the result is symmetric: it is never -128. NaN gives the lowest code.
     #[cfg(feature = "writer")]
     pub fn nearest_code(self, x: f32) -> u8 {
         match self.grid() {

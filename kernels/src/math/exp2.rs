@@ -1,10 +1,10 @@
-//! Powers of two, and of others, as fractions.
+//! Powers of two and exponentials, as fractions.
 
 use crate::round::ROUND;
 
-/// `2^(y / one)` as a fraction of two positive numbers, for a finite y and a power of two: `one` sets the unit, and
-/// changes nothing else. The exponent stays within -33 ..= 33; there, all functions here have come to their limits as
-/// far as f32 tells. What uses the fraction has to divide anyway.
+/// Computes `2^(y / one)` as a fraction of two positive numbers, for a finite y. `one` is a power of two: it sets the unit and
+/// changes nothing else. The exponent stays within -33 ..= 33; there, all functions of this module have reached their limits
+/// in f32. The callers divide anyway.
 ///
 /// In units, `y = n + f` with `|f| <= 1/2`. `2^f = (Q + f P) / (Q - f P)`, where `f P / Q` is `tanh(f ln 2 / 2)` with
 /// `P = p0 + p1 f^2` and `Q = q0 + f^2`, fitted for the smallest relative error, 1e-10. The numerator is multiplied by
@@ -14,11 +14,11 @@ pub(super) fn exp2(y: f32, one: f32) -> (f32, f32) {
     let [round, ..] = exp2_constants(one);
     let whole = (y + round) - round;
     let (n, d) = fraction(y - whole, one);
-    // With 26 bits behind the point, 6 are left for the whole part: the conversion limits it.
+    // With 26 bits after the point, 6 remain for the whole part: the conversion limits it.
     (n * power((whole * (FIXED_ONE / one)) as i32 >> (26 - EXPONENT)), d)
 }
 
-/// `2^(f / one)` as in [`exp2`], for `|f| <= one / 2`.
+/// Computes `2^(f / one)` as in [`exp2`], for `|f| <= one / 2`.
 #[inline(always)]
 pub(super) fn fraction(f: f32, one: f32) -> (f32, f32) {
     let [_, p1, p0, q0] = exp2_constants(one);
@@ -28,40 +28,40 @@ pub(super) fn fraction(f: f32, one: f32) -> (f32, f32) {
     (q + p, q - p)
 }
 
-/// A power of two, by its exponent where that stands in an f32, with zeros below.
+/// Returns a power of two from its exponent, at the bits of an f32's exponent with zeros below.
 #[inline(always)]
 pub(super) fn power(exponent: i32) -> f32 {
     f32::from_bits((1.0f32.to_bits() as i32).wrapping_add(exponent) as u32)
 }
 
-/// The bit at which the exponent of an f32 begins.
+/// First bit of the exponent of an f32.
 pub(super) const EXPONENT: u32 = f32::MANTISSA_DIGITS - 1;
 
-/// What rounds in these units, p1, p0 and q0.
+/// Returns the number that rounds in these units, p1, p0 and q0.
 pub(crate) const fn exp2_constants(one: f32) -> [f32; 4] {
     // 2 more than 1.5 * 2^23, which could be half a unit in the last place of a large y: then the sum would be a tie,
-    // and f not small. (A large positive y whose sum needs a bit more has a large f, but next to the numerator the
-    // denominator is nothing.)
+    // and f not small. (A large positive y whose sum needs another bit has a large f, but then the denominator is negligible
+    // against the numerator.)
     let round = (ROUND + 2.0) * one;
     [round, 0.057_690_073 / one, 7.215_289 * one, 20.818_924 * one * one]
 }
 
-/// 1 with 26 bits behind the point.
+/// 1 with 26 bits after the point.
 pub(super) const FIXED_ONE: f32 = (1 << 26) as f32;
 
-/// Exponents in quarters: no product of an f32 and their factor overflows.
+/// Unit of a quarter for exponents: no product of an f32 and their factor overflows.
 pub(crate) const QUARTER: f32 = 0.25;
 
-/// The factor of x in the exponent of `e^x`, in quarters.
+/// Factor of x in the exponent of `e^x`, in quarters.
 pub(crate) const EXP: f32 = core::f32::consts::LOG2_E * QUARTER;
 
-/// `e^x` as a fraction.
+/// Computes `e^x` as a fraction.
 #[inline(always)]
 pub(crate) fn exp_fraction(x: f32) -> (f32, f32) {
     exp2(x * EXP, QUARTER)
 }
 
-/// `tanh(x)` as a fraction.
+/// Computes `tanh(x)` as a fraction.
 #[inline(always)]
 #[cfg(any(feature = "writer", not(actq_fpu)))]
 pub(crate) fn tanh_fraction(x: f32) -> (f32, f32) {

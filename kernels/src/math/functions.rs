@@ -12,7 +12,7 @@ use crate::round::ROUND;
 pub enum Function {
     /// `max(x, 0)`
     Relu = 0,
-    /// `x` where positive, else `exp(x) - 1`
+    /// `x` if positive, otherwise `exp(x) - 1`
     Elu = 1,
     /// `x * sigmoid(x)`
     Silu = 2,
@@ -53,12 +53,12 @@ impl Function {
         Self::Mish,
     ];
 
-    /// The function of a code in an image.
+    /// Returns the function of a code in an image.
     pub fn from_code(code: u8) -> Option<Self> {
         Self::ALL.get(usize::from(code)).copied()
     }
 
-    /// The name, as in policy.json.
+    /// Returns the name, as in policy.json.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Relu => "relu",
@@ -95,7 +95,7 @@ impl Function {
     }
 }
 
-/// One loop for each function, which is not inlined: the functions take most of the executor's code.
+/// Applies a function in a loop of its own, which is not inlined: the functions take most of the executor's code.
 #[inline(never)]
 fn each<T: Copy>(x: &mut [T], function: impl Fn(T) -> T) {
     for x in x {
@@ -103,7 +103,8 @@ fn each<T: Copy>(x: &mut [T], function: impl Fn(T) -> T) {
     }
 }
 
-/// Two elements in a pass, where the instructions of the loop count; `each` is called once more for an odd one.
+/// Applies a function to two elements in a pass, for few instructions of the loop; an odd element takes one more call of
+/// `each`.
 #[inline(never)]
 fn in_pairs(x: &mut [f32], each: fn(&mut [[f32; 2]])) {
     let (odd, pairs) = x.as_rchunks_mut::<2>();
@@ -115,7 +116,7 @@ fn in_pairs(x: &mut [f32], each: fn(&mut [[f32; 2]])) {
     each(pairs);
 }
 
-/// `(n - a d) / (b n + d)` with `n / d = e^x` or another power, and x itself above `end`.
+/// A function `(n - a d) / (b n + d)` with `n / d = e^x` or another power; above `end` it is x itself.
 struct Ratio {
     factor: f32,
     a: f32,
@@ -138,7 +139,7 @@ impl Ratio {
     }
 }
 
-/// One loop for the functions that are such a ratio.
+/// Applies a function of this form in a loop that they share.
 #[inline(never)]
 fn each_ratio(x: &mut [f32], ratio: &Ratio) {
     for x in x {
@@ -146,15 +147,15 @@ fn each_ratio(x: &mut [f32], ratio: &Ratio) {
     }
 }
 
-/// `e^x`, infinite where f32 has no such number: whole powers of two by two factors, since one does not reach f32's
-/// ends, and a fraction for the rest.
+/// Computes `e^x`, infinite outside f32's range: whole powers of two by two factors, because one does not reach f32's limits,
+/// and a fraction for the rest.
 #[inline(always)]
 pub fn exp(x: f32) -> f32 {
-    // Limited by its bits, which magnitudes compare as.
+    // Limited by its bits: magnitudes compare as their bits.
     const END: u32 = 250f32.to_bits();
     let y = (x * core::f32::consts::LOG2_E).to_bits();
     let y = f32::from_bits(if y << 1 > END << 1 { y & (1 << 31) | END } else { y });
-    // The sum's last bits are the whole part; here they move to where an exponent stands.
+    // The sum's last bits are the whole part; here they move to the bits of an exponent.
     let sum = y + ROUND;
     let whole = (sum.to_bits() << EXPONENT) as i32;
     let (n, d) = fraction(y - (sum - ROUND), 1.0);
@@ -162,35 +163,35 @@ pub fn exp(x: f32) -> f32 {
     n / d * power(half) * power(whole - half) + zero_or_nan(x)
 }
 
-/// Where the nearest zero of sine and of cosine lie, in halves of a turn.
+/// A zero of sine and of cosine, in half turns.
 const SIN: f32 = 0.0;
 const COS: f32 = 0.5;
 
-/// Sine, of radians
+/// Computes the sine of radians
 #[inline(always)]
 pub fn sin(x: f32) -> f32 {
     wave(x, SIN)
 }
 
-/// Cosine, of radians
+/// Computes the cosine of radians
 #[inline(always)]
 pub fn cos(x: f32) -> f32 {
     wave(x, COS)
 }
 
-/// The sine of what x is beyond the nearest zero, of which the function has one at `zero` and then at every half turn;
-/// it rises at every other one. Half a turn is taken off in two parts, the first of which f32 multiplies without error
-/// with every number of them below 2^16 (so Cody and Waite). The sine is a polynomial, fitted for the smallest error,
-/// 3e-9.
+/// Computes a sine wave with zeros at `zero` and at every half turn from it, rising at every other one: the sine of the
+/// difference of x from the nearest zero. Half turns are subtracted in two parts, as Cody and Waite do; f32 multiplies the
+/// first part without error with every number of half turns below 2^16. The sine is a polynomial, fitted for the smallest
+/// error, 3e-9.
 #[inline(always)]
 fn wave(x: f32, zero: f32) -> f32 {
     const TURN: [f32; 2] = [3.140_625, 9.676_536e-4];
     let turns = (x * core::f32::consts::FRAC_1_PI - zero) + ROUND;
     let n = (turns - ROUND) + zero;
     let r = (x - n * TURN[0]) - n * TURN[1];
-    // Beyond 2^22 half turns, where the sum leaves the exponent of ROUND, x says nothing of the angle.
+    // Above 2^22 half turns, the sum has another exponent than ROUND, and x does not determine the angle.
     let r = if turns.to_bits() >> 23 == ROUND.to_bits() >> 23 { r } else { 0.0 * x };
-    // ROUND is even: the sum's last bit says whether the number of half turns is odd. Then the sine falls.
+    // ROUND is even: the sum's last bit is 1 if the number of half turns is odd. Then the sine falls.
     let falls = (turns.to_bits() << 31) ^ (((zero != 0.0) as u32) << 31);
     let r = f32::from_bits(r.to_bits() ^ falls);
     let square = r * r;
@@ -200,7 +201,7 @@ fn wave(x: f32, zero: f32) -> f32 {
     p * square * r + r
 }
 
-/// `ln(1 + exp(x)) = max(x, 0) + ln(1 + e)` with `e = exp(-|x|) = n / d`; of that, `ln(1 + e) = 2 artanh(s)` with
+/// Computes `ln(1 + exp(x)) = max(x, 0) + ln(1 + e)` with `e = exp(-|x|) = n / d`; of that, `ln(1 + e) = 2 artanh(s)` with
 /// `s = e / (2 + e)` at most 1/3, by a polynomial that was fitted for the smallest error, 1.4e-9.
 #[inline(always)]
 pub fn softplus(x: f32) -> f32 {
@@ -217,7 +218,7 @@ pub fn softplus(x: f32) -> f32 {
     (half + magnitude) + (p * square * t + t)
 }
 
-/// `x * tanh(softplus(x))`, which is `x w / (w + 2)` with `w = e (e + 2)` and `e = exp(x) = n / d`.
+/// Computes `x * tanh(softplus(x))`, which is `x w / (w + 2)` with `w = e (e + 2)` and `e = exp(x) = n / d`.
 #[inline(always)]
 pub fn mish(x: f32) -> f32 {
     let (n, d) = exp_fraction(x);
@@ -225,29 +226,29 @@ pub fn mish(x: f32) -> f32 {
     x * (w / (w + 2.0 * (d * d)))
 }
 
-/// `max(x, 0)`; what is not finite stays as it is, so that an overflow is seen behind it. By the bits, as a signed
-/// number: finite negative numbers stand below minus infinity, which stands below all else.
+/// Computes `max(x, 0)`; a number that is not finite stays unchanged, so that an overflow stays visible. It compares the bits
+/// as a signed number: finite negative numbers are below minus infinity, which is below all others.
 #[inline(always)]
 pub fn relu(x: f32) -> f32 {
     let bits = x.to_bits() as i32;
     f32::from_bits(if bits < f32::NEG_INFINITY.to_bits() as i32 { 0 } else { bits as u32 })
 }
 
-/// `x` where positive, else `exp(x) - 1`
+/// Computes `x` if positive, otherwise `exp(x) - 1`
 #[inline(always)]
 #[cfg(any(test, feature = "writer"))]
 pub fn elu(x: f32) -> f32 {
     ELU.of(x)
 }
 
-/// `1 / (1 + exp(-x))`
+/// Computes `1 / (1 + exp(-x))`
 #[inline(always)]
 pub fn sigmoid(x: f32) -> f32 {
     let (n, d) = exp_fraction(x);
     n / (n + d)
 }
 
-/// `(e - 1) / (e + 1)` with `e = exp(2 x)`
+/// Computes `(e - 1) / (e + 1)` with `e = exp(2 x)`
 #[inline(always)]
 #[cfg(any(test, feature = "writer"))]
 pub fn tanh(x: f32) -> f32 {
@@ -255,15 +256,14 @@ pub fn tanh(x: f32) -> f32 {
     n / d
 }
 
-/// `x * sigmoid(x)`
+/// Computes `x * sigmoid(x)`
 #[inline(always)]
 pub fn silu(x: f32) -> f32 {
     x * sigmoid(x)
 }
 
-/// `max(x, 0) - a * tail(a)` with `a = |x|`, where `tail = 1 - Phi` is `p^8`, a power of a polynomial that was fitted
-/// for the smallest error of `a * tail / max(1, a)`, 5e-8. From 5.5 on, `a * tail` is below 1.1e-7 and stays what it is
-/// there. The code takes half of `a`, whose double is in `p^8`.
+/// Computes `max(x, 0) - a * tail(a)` with `a = |x|`. `tail = 1 - Phi` is `p^8`, a power of a polynomial that was fitted for
+/// the smallest error of `a * tail / max(1, a)`, 5e-8. From 5.5 on, `a * tail` is below 1.1e-7 and keeps its value at 5.5. The code takes half of `a`, whose double is in `p^8`.
 #[inline(always)]
 pub fn gelu(x: f32) -> f32 {
     const END: f32 = 5.5 / 2.0;
@@ -285,12 +285,12 @@ pub fn gelu(x: f32) -> f32 {
     positive - p * p * a
 }
 
-/// `x * sigmoid(2 u)` with `u = sqrt(2 / pi) (x + 0.044715 x^3)`, which is `x / 2 * (1 + tanh(u))`.
+/// Computes `x * sigmoid(2 u)` with `u = sqrt(2 / pi) (x + 0.044715 x^3)`, which is `x / 2 * (1 + tanh(u))`.
 #[inline(always)]
 pub fn gelu_tanh(x: f32) -> f32 {
     // The factors of x and x^3 in 2 u log2(e).
     let y = x * (2.302_208_2 * FIXED_ONE + 0.102_943_24 * FIXED_ONE * (x * x));
-    // As an integer, it is limited to -32 ..= 32: the cube of a large x is not finite.
+    // The conversion to an integer limits it to -32 ..= 32: the cube of a large x is not finite.
     let (n, d) = exp2(y as i32 as f32, FIXED_ONE);
     x * (n / (n + d))
 }
@@ -332,9 +332,9 @@ mod tests {
         }
     }
 
-    /// Without the limit of the exponent, huge inputs would go wrong in many ways.
+    /// Without the limit of the exponent, large inputs would give wrong results in many ways.
     #[test]
-    fn every_magnitude_has_a_sensible_value() {
+    fn every_magnitude_has_a_plausible_value() {
         for bits in (0..0x7f80_0000u32).step_by(4001) {
             let x = f32::from_bits(bits);
             for x in [x, -x] {
@@ -353,7 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn loops_have_the_bits_of_their_functions() {
+    fn loops_give_the_bits_of_their_functions() {
         let functions = [relu, elu, silu, gelu, gelu_tanh, tanh, sigmoid, exp, sin, cos, softplus, mish];
         let x: [f32; 999] = core::array::from_fn(|i| (i as f32 - 499.0) / 31.0);
         for (function, of) in Function::ALL.into_iter().zip(functions) {
@@ -364,7 +364,7 @@ mod tests {
     }
 
     #[test]
-    fn not_a_number_stays_so() {
+    fn nan_stays_nan() {
         for f in [exp, elu, sigmoid, tanh, silu, gelu, gelu_tanh, sin, cos, softplus, mish] {
             assert!(f(f32::NAN).is_nan() && f(-f32::NAN).is_nan());
         }
@@ -378,7 +378,7 @@ mod tests {
             }
             assert!(sin(x).abs() <= 1.0 && cos(x).abs() <= 1.0, "{x}");
         }
-        // What f32 does not hold is seen behind it.
+        // An overflow of f32 stays visible.
         assert_eq!([exp(89.0), exp(f32::MAX), exp(-104.5), exp(f32::MIN)], [f32::INFINITY, f32::INFINITY, 0.0, 0.0]);
         assert!(!exp(f32::INFINITY).is_finite() && !exp(f32::NEG_INFINITY).is_finite());
     }

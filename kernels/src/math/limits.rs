@@ -1,6 +1,6 @@
-//! Limits, and what lies beyond them.
+//! Limits, and values outside the range of f32.
 
-/// `x` limited to `low ..= high`; without the panic of `f32::clamp`.
+/// Limits `x` to `low ..= high`, without the panic of `f32::clamp`.
 #[inline(always)]
 pub fn clamp(x: f32, low: f32, high: f32) -> f32 {
     if x < low {
@@ -12,7 +12,7 @@ pub fn clamp(x: f32, low: f32, high: f32) -> f32 {
     }
 }
 
-/// 0 where `x` is finite, else NaN: added to a result, it shows what would be lost in it.
+/// Returns 0 if `x` is finite, otherwise NaN: added to a result, it keeps an overflow visible.
 #[inline(always)]
 #[expect(clippy::eq_op, reason = "the difference of an infinity and itself is NaN")]
 pub(crate) fn zero_or_nan(x: f32) -> f32 {

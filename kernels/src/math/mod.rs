@@ -1,7 +1,7 @@
-//! Elementary functions in f32 by additions, multiplications and at most one division: no tables, no calls into a
-//! system library, so the same bits on every machine. The error bounds are asserted over dense sweeps of the inputs,
-//! small and huge, in the crate's tests; that each function takes at most 30 instructions per element on the
-//! Cortex-M4's FPU (exp, cos and softplus at most 38), by `host-tests/tests/all/on_target/functions.rs`.
+//! Elementary functions in f32 by additions, multiplications and at most one division: no tables and no calls to a system
+//! library, so the same bits on every machine. The crate's tests assert the error bounds over dense sweeps of small and
+//! large inputs. `host-tests/tests/all/on_target/functions.rs` asserts that each function takes at most 30 instructions per
+//! element on the Cortex-M4's FPU (exp, cos and softplus at most 38).
 //!
 //! | function | error bound, against the exact value |
 //! |---|---|
@@ -14,7 +14,7 @@
 //! | [`softplus`] | 1.6e-7 * max(1, abs(x)) |
 //! | [`mish`], [`sin`], [`cos`] | 1.5e-7 * max(1, abs(x)) |
 //!
-//! Where the input is not a number, so is the result; no function makes a finite number of an infinite one.
+//! If the input is NaN, so is the result; no function turns an infinite number into a finite one.
 
 pub(crate) mod exp2;
 mod functions;

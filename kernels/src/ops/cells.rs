@@ -2,16 +2,15 @@
 
 use crate::arch::{gru_elements, lstm_elements};
 
-/// One LSTM cell in torch's gate order: `gates = [i | f | g | o]`, each of the length of `h` and `c`.
-/// `c = sigmoid(f) * c + sigmoid(i) * tanh(g)`, `h = sigmoid(o) * tanh(c)`. Nothing is done where a length does not
-/// fit.
+/// Computes an LSTM cell in torch's gate order: `gates = [i | f | g | o]`, each of the length of `h` and `c`.
+/// `c = sigmoid(f) * c + sigmoid(i) * tanh(g)`, `h = sigmoid(o) * tanh(c)`. It does nothing if a length does not fit.
 pub fn lstm_cell(gates: &[f32], c: &mut [f32], h: &mut [f32]) {
     lstm_elements(0..h.len(), gates, c, h);
 }
 
-/// One GRU cell in torch's gate order: `a = W_ih x + b_ih`, `b = W_hh h + b_hh`, each `[r | z | n]`.
-/// `h = (1 - z) * tanh(a_n + r * b_n) + z * h` with `r = sigmoid(a_r + b_r)`, `z = sigmoid(a_z + b_z)`. Nothing is done
-/// where a length does not fit.
+/// Computes a GRU cell in torch's gate order: `a = W_ih x + b_ih`, `b = W_hh h + b_hh`, each `[r | z | n]`.
+/// `h = (1 - z) * tanh(a_n + r * b_n) + z * h` with `r = sigmoid(a_r + b_r)`, `z = sigmoid(a_z + b_z)`. It does nothing if a
+/// length does not fit.
 pub fn gru_cell(a: &[f32], b: &[f32], h: &mut [f32]) {
     gru_elements(0..h.len(), a, b, h);
 }

@@ -2,19 +2,19 @@
 
 use crate::arch;
 
-/// `y = clamp((clamp(x, ±pre_clip) - mean) * scale, ±clip)`; an infinite clip does nothing. `mean` and `scale` hold f32
-/// bits. An x that is not finite gives NaN. As far as all go.
+/// Computes `y = clamp((clamp(x, ±pre_clip) - mean) * scale, ±clip)`, up to the shortest length; an infinite clip does
+/// nothing. `mean` and `scale` hold f32 bits. An x that is not finite gives NaN.
 pub fn normalize(x: &[f32], mean: &[u32], scale: &[u32], pre_clip: f32, clip: f32, y: &mut [f32]) {
     arch::normalize(x, mean, scale, pre_clip, clip, y);
 }
 
-/// `y += x`, as far as both go.
+/// Computes `y += x`, up to the shorter length.
 #[inline(never)]
 pub fn add(x: &[f32], y: &mut [f32]) {
     in_pairs(x, y, |y, x| y + x);
 }
 
-/// `y *= x`, as far as both go.
+/// Computes `y *= x`, up to the shorter length.
 #[inline(never)]
 pub fn mul(x: &[f32], y: &mut [f32]) {
     in_pairs(x, y, |y, x| y * x);
@@ -32,12 +32,12 @@ fn in_pairs(x: &[f32], y: &mut [f32], of: impl Fn(f32, f32) -> f32) {
     }
 }
 
-/// `to = from`, as far as both go. On the target not by memcpy, which takes as much code as a kernel.
+/// Copies `from` to `to`, up to the shorter length. The target does not use memcpy, which takes as much code as a kernel.
 pub(crate) fn copy(from: &[u32], to: &mut [u32]) {
     arch::copy(from, to);
 }
 
-/// As [`copy`], of words as they stand in the image.
+/// Copies little-endian words of the image as [`copy`] does.
 pub(crate) fn copy_le(from: &[u32], to: &mut [u32]) {
     copy(from, to);
     if cfg!(target_endian = "big") {

@@ -1,9 +1,9 @@
-//! A quantized matrix times a vector, from f32 to f32: the order of operations that every machine follows.
+//! A quantized matrix times a vector, from f32 to f32, in the order of operations of every machine.
 //!
 //! 1. `x` is quantized to integers `q` with one scale ([`crate::x::Scale`]).
 //! 2. Per row, the integer sum `acc = sum_g s_g * sum_c level * q` in int32 ([`crate::arch::gemv`]).
-//! 3. `y = start + acc * (row_scale * x_scale)`, each operation rounded to f32, where `start` is the bias, or, where
-//!    the operation accumulates, the sum of the old `y` and the bias. Rows that no block holds (0 bits) keep `start`.
+//! 3. `y = start + acc * (row_scale * x_scale)`, each operation rounded to f32. `start` is the bias; if the operation
+//!    accumulates, it is the sum of the old `y` and the bias. Rows that no block holds (0 bits) keep `start`.
 
 use core::ops::Range;
 
@@ -21,7 +21,7 @@ use crate::layout::{QUAD, STRIP};
 use crate::meter::{Meter, OutputStart, RUN, Work};
 use crate::x::{Plan, Prepared, Scale};
 
-/// `len` of the outputs from `first` on, with their biases if there are any; `None` where there are too few.
+/// Borrows `len` outputs from `first` on, with their biases if `start` has any; `None` if there are too few.
 #[inline(always)]
 fn outputs<'y>(
     first: usize,
@@ -37,9 +37,9 @@ fn outputs<'y>(
 }
 
 impl RowBlock<'_> {
-    /// `y = start + acc * (row_scale * x_scale)` for the block's rows and their places in `y`, with a vector that was
-    /// prepared for the block. `start` holds the bits of the whole output's biases; without it, and for rows with
-    /// steps, y itself is the start.
+    /// Computes `y = start + acc * (row_scale * x_scale)` for the outputs of the block's rows, with a vector that was prepared
+    /// for the block. `start` holds the bits of the whole output's biases. Without it, and for rows with output steps, `y`
+    /// itself is the start.
     ///
     /// # Errors
     ///
@@ -55,9 +55,9 @@ impl RowBlock<'_> {
         self.apply_rows(0..self.block.shape().rows, &mut 0, x, x_scale, start, y).ok_or(Mismatch)
     }
 
-    /// As [`Self::apply`], for a run of the block's rows, which starts at a multiple of [`STRIP`] and ends at another
-    /// or with the block. Where rows have steps, `output` is that of the row before (0 before the first); it becomes
-    /// that of the last.
+    /// Computes successive rows of the block as `apply` does. They start at a multiple of [`STRIP`], and end at another or
+    /// at the block's end. With output steps, `output` is the previous row's output (0 before the first row), and becomes
+    /// the last row's. `None` if `start` or `y` is too short.
     pub(crate) fn apply_rows(
         &self,
         rows: Range<usize>,
@@ -71,7 +71,7 @@ impl RowBlock<'_> {
         if start.is_none() || !self.steps.is_empty() {
             return self.apply_runs(&mut [0; RUN], rows, output, x, x_scale, start, y);
         }
-        // Rows in order have room for their sums in y itself, except those of a last strip that padding fills.
+        // Sums of rows in order fit in y itself, except those of a last strip with padding.
         let whole = if rows.end.is_multiple_of(QUAD) { rows.end } else { rows.end & !(STRIP - 1) };
         if rows.start < whole {
             let first = self.first_row + rows.start;
@@ -85,9 +85,9 @@ impl RowBlock<'_> {
         Some(())
     }
 
-    /// As [`Self::apply_rows`], as many rows at once as have room in `sums`.
+    /// Computes rows as [`Self::apply_rows`] does, with their sums in `sums`, as many at a time as it holds.
     #[inline(never)]
-    #[expect(clippy::too_many_arguments, reason = "as few as a piece of a product has")]
+    #[expect(clippy::too_many_arguments, reason = "a piece of a product has no fewer")]
     fn apply_runs(
         &self,
         sums: &mut [i32],
@@ -115,13 +115,13 @@ impl RowBlock<'_> {
         Some(())
     }
 
-    /// Turns the sums of as many rows as `y` has, from `first` on, into results. What is `None` stands in y itself.
+    /// Converts the sums of the rows from `first` on, as many as `y` has, to results. If `sums` or `start` is `None`, `y` holds
+    /// them.
     fn scale_in_order(&self, first: usize, sums: Option<&[i32]>, x_scale: f32, start: Option<&[u32]>, y: &mut [f32]) {
         arch::scale(sums, start, self.scales.get(first / 2..).unwrap_or(&[]), x_scale, y);
     }
 
-    /// Adds the sums of the rows from `first` on, scaled, to what stands at the rows' places; `None` where there is no
-    /// such place.
+    /// Adds the scaled sums of the rows from `first` on to the rows' outputs; `None` if an output is out of range.
     #[inline(never)]
     fn scale_in_steps(
         &self,
@@ -131,7 +131,7 @@ impl RowBlock<'_> {
         x_scale: f32,
         y: &mut [f32],
     ) -> Option<()> {
-        // Sections of a block are as long as its rows are many.
+        // Sections of a block have a value for each row.
         let scales = bytemuck::must_cast_slice::<u32, u16>(self.scales).get(first..)?;
         let steps = bytemuck::must_cast_slice::<u32, u8>(self.steps).get(first..)?;
         for ((sum, scale), step) in sums.iter().zip(scales).zip(steps) {
@@ -143,9 +143,8 @@ impl RowBlock<'_> {
 }
 
 impl Matrix<'_> {
-    /// `y = W x + b`, or `y = y + b + W x` where `accumulate`, from where `at` stands and as far as the budget reaches;
-    /// true when all is done. `work` holds at least [`Self::prepared_words`] words; `x` and `y` have the matrix's
-    /// lengths.
+    /// Computes `y = W x + b`, or `y = y + b + W x` to `accumulate`, from `at` on and as far as the budget allows. Returns
+    /// `true` when all is done. `work` has room for the prepared activations; `x` and `y` have the matrix's lengths.
     #[inline(never)]
     pub(crate) fn resume(
         &self,
@@ -164,7 +163,7 @@ impl Matrix<'_> {
             None if budget.take(1, Work::Magnitude(self.cols)) == 0 => return Ok(false),
             None => *at.scale.insert(Scale::new(x, self.x_max)?),
         };
-        // One pass over the output where every row has its bias and is written once, in order.
+        // One pass over the output is enough if every row has its bias and is written one time, in order.
         let start = self.start_values(accumulate);
         if start.is_none() && at.started < y.len() {
             let work = Work::Start(OutputStart::of(accumulate, !self.bias.is_empty()));
@@ -185,7 +184,7 @@ impl Matrix<'_> {
             if i < at.block {
                 continue;
             }
-            // Layouts prepare the activations differently; the blocks of one width share them.
+            // Prepared activations differ between layouts; the blocks of one width share them.
             if !plan.as_ref().is_some_and(|plan| plan.fits(shape)) {
                 let plan = plan.insert(Plan::of(&rows.block));
                 if at.prepared != Some(shape.width) {
@@ -211,7 +210,7 @@ impl Matrix<'_> {
         Ok(true)
     }
 
-    /// Sets outputs to their biases, or adds these.
+    /// Sets outputs to their biases, or adds the biases to `accumulate`.
     fn start(&self, outputs: Range<usize>, y: &mut [f32], accumulate: bool) {
         let bias = self.bias.get(outputs.clone()).unwrap_or(&[]);
         let Some(y) = y.get_mut(outputs) else { return };

@@ -1,12 +1,12 @@
-//! Normal noise with the same bits on every machine.
+//! Normal noise, with the same bits on every machine.
 
 use crate::arch::sqrt;
 
-/// A value of standard normal noise: the one at `index` of draw `draw` under `seed`. Values are independent of each
-/// other and can be asked for in any order.
+/// Computes a value of standard normal noise: the value at `index` of draw `draw` with `seed`. Values are independent of each
+/// other, and the caller can compute them in any order.
 ///
-/// Bits are those of the counter-based generator Philox2x32-10 (Salmon et al., Parallel random numbers: as easy as 1,
-/// 2, 3, SC 2011), normal values come from them by Box and Muller's transform in f32. They lie within ±5.8.
+/// The counter-based generator Philox2x32-10 (Salmon et al., Parallel random numbers: as easy as 1, 2, 3, SC 2011) gives the
+/// bits, and Box and Muller's transform in f32 the normal values. They are within ±5.8.
 #[inline(never)]
 pub fn normal(seed: u32, draw: u32, index: u32) -> f32 {
     let [a, b] = philox(seed, [index, draw]);
@@ -16,7 +16,7 @@ pub fn normal(seed: u32, draw: u32, index: u32) -> f32 {
     sqrt(-2.0 * ln(u)) * cos_turns(v)
 }
 
-/// Ten rounds of Philox on two words.
+/// Computes ten rounds of Philox on two words.
 fn philox(mut key: u32, mut counter: [u32; 2]) -> [u32; 2] {
     for _ in 0..10 {
         let product = u64::from(counter[0]) * 0xd256_d193;
@@ -26,7 +26,7 @@ fn philox(mut key: u32, mut counter: [u32; 2]) -> [u32; 2] {
     counter
 }
 
-/// The natural logarithm of a normal positive number.
+/// Computes the natural logarithm of a normal positive number.
 fn ln(x: f32) -> f32 {
     // x = m 2^e with m in [2/3, 4/3), and ln m = 2 artanh((m - 1) / (m + 1)).
     let e = (x.to_bits() as i32 - (2.0f32 / 3.0).to_bits() as i32) >> 23;
@@ -37,7 +37,7 @@ fn ln(x: f32) -> f32 {
     s * series + e as f32 * core::f32::consts::LN_2
 }
 
-/// The cosine of so many turns, within half a turn of 0: `1 - 2 sin^2` of half the angle, by its Taylor series.
+/// Computes the cosine of `turns` turns, within half a turn of 0: `1 - 2 sin^2` of half the angle, by its Taylor series.
 fn cos_turns(turns: f32) -> f32 {
     let x = turns * core::f32::consts::PI;
     let x2 = x * x;

@@ -6,14 +6,14 @@ use crate::arch::{sqrt, standardize, sum, sum_squares};
 use crate::cursor::Moments;
 use crate::math::zero_or_nan;
 
-/// In place `(x - mean) / sqrt(variance + eps) * weight + bias`, mean and biased variance over the vector (torch's
-/// LayerNorm). Sums run in order from the first element. Nothing is done where weights or biases are too few.
+/// Computes in place `(x - mean) / sqrt(variance + eps) * weight + bias`, with mean and biased variance over the vector
+/// (torch's LayerNorm). Sums run in order from the first element. It does nothing if there are too few weights or biases.
 #[cfg(feature = "writer")]
 pub fn layer_norm(x: &mut [f32], weight: &[u32], bias: &[u32], eps: f32) {
     layer_norm_units(0..3 * x.len(), &mut Moments::default(), x, weight, bias, eps);
 }
 
-/// As [`layer_norm`], for some of its units: every element once to sum it, once for its square, once to norm it.
+/// Computes some units of a layer norm: one pass over the elements for their sum, one for the squares, one for the results.
 #[inline(never)]
 pub(crate) fn layer_norm_units(
     units: Range<usize>,
@@ -31,13 +31,13 @@ pub(crate) fn layer_norm_units(
     standardize(mean, inverse, x.get_mut(normed).unwrap_or_default(), weight, bias);
 }
 
-/// In place `x / sqrt(mean(x^2) + eps) * weight`. Nothing is done where weights are too few.
+/// Computes in place `x / sqrt(mean(x^2) + eps) * weight`. It does nothing if there are too few weights.
 #[cfg(feature = "writer")]
 pub fn rms_norm(x: &mut [f32], weight: &[u32], eps: f32) {
     rms_norm_units(0..2 * x.len(), &mut Moments::default(), x, weight, eps);
 }
 
-/// As [`rms_norm`], for some of its units: every element once for its square, once to norm it.
+/// Computes some units of an RMS norm: one pass over the elements for the squares, one for the results.
 #[inline(never)]
 pub(crate) fn rms_norm_units(units: Range<usize>, moments: &mut Moments, x: &mut [f32], weight: &[u32], eps: f32) {
     let [squared, normed] = [0, 1].map(|pass| elements(&units, pass, x.len()));
@@ -48,17 +48,17 @@ pub(crate) fn rms_norm_units(units: Range<usize>, moments: &mut Moments, x: &mut
     }
 }
 
-/// The elements of a pass over a vector that are among some units of all its passes.
+/// Returns the elements of pass `pass` over a vector that are among `units` of all passes.
 fn elements(units: &Range<usize>, pass: usize, len: usize) -> Range<usize> {
     let of_pass = |unit: usize| unit.saturating_sub(pass * len).min(len);
     of_pass(units.start)..of_pass(units.end)
 }
 
-/// `1 / sqrt(mean((x - center)^2) + eps)`, once all squares are summed; adds those of some more elements.
+/// Adds the squares of some elements; returns `1 / sqrt(mean((x - center)^2) + eps)`, which is valid after all of them.
 #[inline(never)]
 fn inverse_deviation(moments: &mut Moments, x: &[f32], squared: Range<usize>, center: f32, eps: f32) -> f32 {
     moments.squares = sum_squares(moments.squares, center, x.get(squared).unwrap_or(&[]));
-    // Divided by an infinite deviation, a vector would be zeros.
+    // A vector divided by an infinite deviation would be zeros.
     1.0 / sqrt(moments.squares / count(x) + eps) + zero_or_nan(moments.squares)
 }
 

@@ -1,50 +1,51 @@
-//! What the pieces of a step cost, and what a poll may spend.
+//! The cost of the pieces of a slice, and the budget of a poll.
 //!
-//! A piece is a run of units of one kind of work: strips of rows of a matrix, outputs set to their biases, elements of
-//! a function, of a cell, of a copy. Preparing a matrix's input is two pieces, its scale and its integers: neither
+//! A piece is successive units of one kind of work: strips of rows of a matrix, outputs set to their biases, elements of a
+//! function, of a recurrent cell, of a copy. Preparing a matrix's input is two pieces, its scale and its integers: neither
 //! takes longer than a strip of the rows that it is prepared for.
 
 use super::cost::{self, Feature};
 use crate::image::{Image, Op, OpKind, RowBlock};
 use crate::meter::{Meter, OutputStart, Work};
 
-/// Budgets are kept in 16ths of an instruction, so that elements of a few instructions are not rounded up by much.
+/// Parts of an instruction in which budgets count, so that rounding up elements of a few instructions costs little.
 const PARTS: u32 = 16;
 
-/// What is added to every piece for what the rates cannot say exactly, as a share of it.
+/// Margin of every piece for the error of the rates: this fraction of it is added.
 const MARGIN: u32 = 32;
 
-/// 1024ths of an instruction as parts of a budget, rounded up, with the margin.
+/// Converts 1024ths of an instruction to parts of a budget, rounded up, with the margin.
 const fn parts(cost: u32) -> u32 {
     let parts = cost / (1024 / PARTS) + 1;
     parts.saturating_add(parts / MARGIN)
 }
 
-/// The price of a piece.
+/// Cost of a piece, in parts of a budget.
 #[derive(Clone, Copy, Debug)]
-struct Price {
-    /// Of the piece, whatever its length.
+struct PieceCost {
+    /// Cost of the piece at any length.
     first: u32,
-    /// Of a unit.
+    /// Cost of each unit.
     each: u32,
 }
 
-impl Price {
-    /// From 1024ths of an instruction.
+impl PieceCost {
+    /// Converts costs in 1024ths of an instruction.
     fn new(first: u32, each: u32) -> Self {
         let first = first.saturating_add(Feature::PIECE.most());
         Self { first: parts(first), each: parts(each) }
     }
 
-    /// Of a kind of work.
+    /// Returns the cost of a kind of work.
     fn of(work: Work<'_>) -> Self {
         match work {
-            // No piece of its own: what a piece takes is the price of what follows.
+            // Not a piece of its own: the cost of a piece is in the work that follows.
             Work::Enter(op) => Self { first: 0, each: parts(cost::most(|add| cost::enter(op, add))) },
             // A unit of a norm takes less than an element in all passes.
-            Work::Elements(op) => {
-                Self::new(cost::most(|add| cost::piece(op, add)), cost::most(|add| cost::dearest_element(op, add)))
-            }
+            Work::Elements(op) => Self::new(
+                cost::most(|add| cost::piece(op, add)),
+                cost::most(|add| cost::most_expensive_element(op, add)),
+            ),
             Work::Magnitude(cols) => Self::new(cost::most(|add| cost::magnitude(cols, add)), 0),
             Work::Start(start) => Self::new(Feature::BIASED.most(), cost::most(|add| cost::start(start, 1, add))),
             Work::Prepare(shape) => Self::new(cost::most(|add| cost::prepare(shape, add)), 0),
@@ -57,7 +58,7 @@ impl Price {
     }
 }
 
-/// What may still be spent.
+/// Remaining budget of a poll.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Budget {
     left: u32,
@@ -66,7 +67,7 @@ pub(crate) struct Budget {
 impl Budget {
     const UNLIMITED: Self = Self { left: u32::MAX };
 
-    /// The budget of a poll with `instructions`, of which the poll itself takes a part.
+    /// Returns the budget of a poll with `instructions`, minus the cost of the poll itself.
     pub(crate) fn of_poll(instructions: u32) -> Self {
         match instructions.checked_mul(PARTS) {
             Some(parts) => Self { left: parts.saturating_sub(poll()) },
@@ -75,7 +76,7 @@ impl Budget {
     }
 
     #[inline(never)]
-    fn take_priced(&mut self, units: usize, Price { first, each }: Price) -> usize {
+    fn take_priced(&mut self, units: usize, PieceCost { first, each }: PieceCost) -> usize {
         let Some(room) = self.left.checked_sub(first) else { return 0 };
         let units = units.min((room / each) as usize);
         if units > 0 {
@@ -88,23 +89,23 @@ impl Budget {
 impl Meter for Budget {
     #[inline(always)]
     fn take(&mut self, units: usize, work: Work<'_>) -> usize {
-        if self.left == u32::MAX { units } else { self.take_priced(units, Price::of(work)) }
+        if self.left == u32::MAX { units } else { self.take_priced(units, PieceCost::of(work)) }
     }
 }
 
-/// Of a poll, without its pieces.
+/// Returns the cost of a poll without its pieces.
 fn poll() -> u32 {
     parts(Feature::POLL.most())
 }
 
-/// Of the shortest piece of a kind of work.
+/// Returns the cost of the shortest piece of a kind of work.
 fn least(work: Work<'_>) -> u32 {
-    let Price { first, each } = Price::of(work);
+    let PieceCost { first, each } = PieceCost::of(work);
     first.saturating_add(each)
 }
 
 impl Image<'_> {
-    /// The least budget, in modelled instructions, with which [`crate::Head::poll`] runs the image.
+    /// Computes the least budget with which [`crate::Head::poll`] runs the image, in modelled instructions.
     pub fn least_budget(&self) -> u32 {
         let of_op = |op: Op<'_>| -> u32 {
             let piece = match (op.kind, op.matrix()) {

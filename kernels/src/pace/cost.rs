@@ -1,13 +1,13 @@
-//! What a step costs on a Cortex-M4 with FPU (thumbv7em-none-eabihf, zero-wait memory), from the image alone.
+//! The cost of a step on a Cortex-M4 with FPU (thumbv7em-none-eabihf, zero-wait memory), from the image alone.
 //!
-//! An operation is described by [`Feature`]s that follow the loops of its code: how often a GEMV is called, strips,
-//! passes through a kernel's loop, columns, values prepared, rows scaled, elements of a function. A feature's **rate**
-//! says what one of it takes. Rates come from measurements alone: `cargo xtask fit` counts many operations under QEMU,
-//! solves for the rates, and writes `rates.rs`.
+//! [`Feature`]s describe an operation by the loops of its code: calls of a GEMV, strips, passes through a kernel's loop,
+//! columns, prepared values, scaled rows, elements of a function. A feature's **rate** is the cost of one of it. Rates come
+//! from measurements: `cargo xtask fit` counts the instructions of many operations in QEMU, solves for the rates, and writes
+//! `rates.rs`.
 //!
-//! Most code takes the same instructions whatever the values. Where it branches on values (elu and the action's
-//! limits) the expected cost is that of standard normal values, and a third rate says what one element takes
-//! at most; pieces of a step ([`crate::Head::poll`]) are measured by that.
+//! Most code takes the same instructions for all values. Some code branches on values (elu and the action's limits): its
+//! expected cost is that of standard normal values. A third rate is the most that one element takes; slices
+//! ([`crate::Head::poll`]) use it.
 
 pub use super::feature::Feature;
 use super::feature::{Gemv, Prepare, Strips};
@@ -18,12 +18,12 @@ use crate::layout::{BlockShape, QUAD, STRIP};
 use crate::meter::{OutputStart, RUN};
 use crate::x::{Extent, Plan};
 
-/// Instructions, and cycles as the project's model of the Cortex-M4 has them.
+/// Modelled instructions and cycles of a Cortex-M4.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cost {
-    /// Instructions.
+    /// Modelled instructions.
     pub instructions: u64,
-    /// Cycles.
+    /// Modelled cycles.
     pub cycles: u64,
 }
 
@@ -52,8 +52,7 @@ impl core::iter::Sum for Cost {
 /// 1024ths of an instruction or a cycle.
 const ONE: f64 = 1024.0;
 
-/// A column of the measured rates, in 1024ths. Features that were added since the last fit count nothing until the
-/// next.
+/// Returns a column of the measured rates, in 1024ths. A feature that has been added since the last fit costs nothing.
 const fn column(which: usize) -> [u32; Feature::COUNT] {
     let (mut column, mut rated) = ([0; Feature::COUNT], [false; Feature::COUNT]);
     let mut i = 0;
@@ -68,19 +67,19 @@ const fn column(which: usize) -> [u32; Feature::COUNT] {
     column
 }
 
-/// Expected instructions, expected cycles, instructions at most.
+/// Expected instructions of each feature, in 1024ths.
 static INSTRUCTIONS: [u32; Feature::COUNT] = column(0);
 static CYCLES: [u32; Feature::COUNT] = column(1);
 static MOST: [u32; Feature::COUNT] = column(2);
 
 impl Feature {
-    /// Instructions that one of it takes at most, in 1024ths.
+    /// Returns the most instructions that one of this feature takes, in 1024ths.
     pub(super) fn most(self) -> u32 {
         MOST.get(self.index()).copied().unwrap_or(0)
     }
 }
 
-/// The cost of features, which `list` counts.
+/// Computes the cost of the features that `list` counts.
 fn total(list: impl FnOnce(&mut dyn FnMut(Feature, usize))) -> Cost {
     let mut sums = [0u64; 2];
     list(&mut |feature, count| {
@@ -92,69 +91,70 @@ fn total(list: impl FnOnce(&mut dyn FnMut(Feature, usize))) -> Cost {
     Cost { instructions, cycles }
 }
 
-/// What the features of `list` take at most, in 1024ths of an instruction.
+/// Computes the most that the features of `list` take, in 1024ths of an instruction.
 pub(super) fn most(list: impl FnOnce(&mut dyn FnMut(Feature, usize))) -> u32 {
     let mut sum = 0u32;
     list(&mut |feature, count| sum = sum.saturating_add((count as u32).saturating_mul(feature.most())));
     sum
 }
 
-/// The cost of an operation within a step.
+/// Computes the cost of an operation in a step.
 pub fn of_op(op: &Op<'_>) -> Cost {
     total(|add| features(op, add))
 }
 
-/// The cost of a step that evaluates the network; steps that play on from a chunk cost the same without the operations.
+/// Computes the cost of a step that evaluates the network. A step that continues a chunk costs the same without the
+/// operations.
 pub fn of_step(image: &Image<'_>) -> Cost {
-    let times = |i: usize| if i < image.once() { 1 } else { image.denoising_steps() as u64 };
+    let times = |i: usize| if i < image.first_denoising_op() { 1 } else { image.denoising_steps() as u64 };
     of_frame(image) + image.ops().enumerate().map(|(i, op)| of_op(&op) * times(i)).sum()
 }
 
 impl Image<'_> {
-    /// Expected cost of a step that evaluates the network, for a Cortex-M4 with FPU and memory without wait states. A step
-    /// that plays on from a chunk takes less.
+    /// Computes the expected cost of a step that evaluates the network, on a Cortex-M4 with FPU and zero-wait memory. A step
+    /// that continues a chunk costs less.
     pub fn step_cost(&self) -> Cost {
         of_step(self)
     }
 }
 
-/// The cost of a step without the network's operations.
+/// Computes the cost of a step without the network's operations.
 pub fn of_frame(image: &Image<'_>) -> Cost {
     total(|add| frame(image, add))
 }
 
-/// The features of a step without the network's operations.
+/// Counts the features of a step without the network's operations.
 pub fn frame(image: &Image<'_>, add: &mut dyn FnMut(Feature, usize)) {
     begin(image, add);
     action(image, add);
 }
 
-/// The features of taking the observation.
+/// Counts the features of taking the observation.
 pub fn begin(image: &Image<'_>, add: &mut dyn FnMut(Feature, usize)) {
     add(Feature::STEP, 1);
     add(Feature::OBSERVATION, image.obs_len());
     if image.overlap() > 0 {
-        add(Feature::LEFT, 1);
-        add(Feature::LEFT_VALUE, image.kept().len);
+        add(Feature::KEPT, 1);
+        add(Feature::KEPT_VALUE, image.kept().len);
     }
 }
 
-/// The features of the way from the network's output to the action.
+/// Counts the features from the network's output to the action.
 pub fn action(image: &Image<'_>, add: &mut dyn FnMut(Feature, usize)) {
     add(Feature::ACTION, 1);
     add(Feature::ACTION_VALUE, image.act_len());
     add(Feature::CONTRACT, image.contract_arrays().iter().map(|array| array.len()).sum::<usize>());
-    // What a new chunk says of the periods that an ensemble keeps.
-    let foreseen = image.horizon().min(image.chunk());
-    if foreseen > 0 {
+    // Predictions of a new chunk for the periods that an ensemble keeps.
+    let predicted = image.horizon().min(image.chunk());
+    if predicted > 0 {
         add(Feature::ENSEMBLE, 1);
-        add(Feature::FORESEEN, foreseen);
-        add(Feature::FORESEEN_VALUE, (foreseen + 1) * image.act_len());
+        add(Feature::PREDICTED, predicted);
+        add(Feature::PREDICTED_VALUE, (predicted + 1) * image.act_len());
     }
-    add(Feature::LED, image.overlap() * image.act_len());
+    add(Feature::BLENDED, image.overlap() * image.act_len());
 }
 
-/// The features of an operation.
+/// Counts the features of an operation.
 pub fn features(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
     if let (OpKind::Linear { accumulate }, Some(matrix)) = (op.kind, op.matrix()) {
         linear(&matrix, accumulate, add);
@@ -165,21 +165,21 @@ pub fn features(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
     }
 }
 
-/// The features of so many of an operation's values. (Of a denoising step, as if all were like the first.)
+/// Counts the features of `len` values of an operation. (It takes all denoising steps to be like the first.)
 fn elements(op: &Op<'_>, len: usize, add: &mut dyn FnMut(Feature, usize)) {
     add(values(op).1, len);
     rest(op, len % EIGHT, add);
     if op.kind == OpKind::Denoise {
         let ([sample_x, sample_v, _, _, _, sigma, _], _) = op.coefficients(0);
         add(Feature::LIMITED, if [sample_x, sample_v] == [0.0; 2] { 0 } else { len });
-        add(Feature::STIRRED, if sigma == 0.0 { 0 } else { len });
+        add(Feature::NOISY, if sigma == 0.0 { 0 } else { len });
     }
 }
 
-/// Values of a pass through the loops that have a slower one for the rest.
+/// Values of a pass, in loops with a slower loop for the rest.
 const EIGHT: usize = 8;
 
-/// What so many values take more than others because they are the rest, fewer than [`EIGHT`].
+/// Counts the additional features of the last `len` values, fewer than [`EIGHT`].
 fn rest(op: &Op<'_>, len: usize, add: &mut dyn FnMut(Feature, usize)) {
     match op.kind {
         OpKind::Denoise => add(Feature::DENOISED_REST, len),
@@ -188,26 +188,26 @@ fn rest(op: &Op<'_>, len: usize, add: &mut dyn FnMut(Feature, usize)) {
     }
 }
 
-/// The features of a piece of an operation's values, but for those of each of them.
+/// Counts the features of a piece of an operation's values, without those of each value.
 pub(super) fn piece(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
-    // Each piece of a norm computes anew what the sums give.
+    // Each piece of a norm computes the results of the sums again.
     if op.units() != op.dst().len {
         add(values(op).0, 1);
     }
     rest(op, EIGHT - 1, add);
 }
 
-/// The features of one value of an operation, in whichever step it takes most.
-pub(super) fn dearest_element(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
+/// Counts the features of one value of an operation, in the denoising step with the highest cost.
+pub(super) fn most_expensive_element(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
     add(values(op).1, 1);
     if op.kind == OpKind::Denoise {
         add(Feature::LIMITED, 1);
-        add(Feature::STIRRED, 1);
+        add(Feature::NOISY, 1);
     }
 }
 
-/// The features of an operation: its own, that of its values, and how many those are. (Of a linear one, its parts are
-/// counted one by one.)
+/// Returns the feature of an operation, the feature of its values, and their number: 0 for a linear operation, whose parts
+/// are counted one by one.
 pub fn values(op: &Op<'_>) -> (Feature, Feature, usize) {
     let value = match op.kind {
         OpKind::Function(function) => Feature::function(function),
@@ -236,7 +236,7 @@ fn linear(matrix: &Matrix<'_>, accumulate: bool, add: &mut dyn FnMut(Feature, us
     }
 }
 
-/// Coming to an operation, at its start or in its midst.
+/// Counts the features of entering an operation, at its start or inside it.
 pub(super) fn enter(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
     add(Feature::ENTERED, 1);
     add(values(op).0, 1);
@@ -245,7 +245,7 @@ pub(super) fn enter(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
     }
 }
 
-/// Setting outputs up before rows are added to them.
+/// Counts the features of initializing outputs before rows are added to them.
 pub(super) fn start(start: OutputStart, outputs: usize, add: &mut dyn FnMut(Feature, usize)) {
     match start {
         OutputStart::Zero => add(Feature::ZEROED, outputs),
@@ -255,18 +255,18 @@ pub(super) fn start(start: OutputStart, outputs: usize, add: &mut dyn FnMut(Feat
     }
 }
 
-/// Finding the scale of an input.
+/// Counts the features of finding the scale of an input.
 pub(super) fn magnitude(cols: usize, add: &mut dyn FnMut(Feature, usize)) {
     add(Feature::MAGNITUDE_EIGHT, cols / 8);
     add(Feature::MAGNITUDE_REST, cols % 8);
 }
 
-/// Blocks in an image have valid shapes.
+/// Returns the extent of a prepared vector. Blocks in an image have valid shapes.
 fn extent(shape: BlockShape) -> Extent {
     Plan::new(shape).map(|plan| plan.extent()).unwrap_or_default()
 }
 
-/// Preparing an input for blocks of this shape.
+/// Counts the features of preparing an input for blocks of this shape.
 pub(super) fn prepare(shape: BlockShape, add: &mut dyn FnMut(Feature, usize)) {
     let Extent { columns, groups, chunks, .. } = extent(shape);
     let filled = columns != shape.cols;
@@ -282,7 +282,7 @@ pub(super) fn prepare(shape: BlockShape, add: &mut dyn FnMut(Feature, usize)) {
     }
 }
 
-/// The products of a block's rows, and their scaling. `start`: whether the output starts from the biases.
+/// Counts the features of a block's products and their scaling. With `start`, the output starts from the biases.
 fn block(rows: &RowBlock<'_>, start: bool, add: &mut dyn FnMut(Feature, usize)) {
     let shape = rows.block.shape();
     let in_order = rows.steps.is_empty();
@@ -312,7 +312,7 @@ fn block(rows: &RowBlock<'_>, start: bool, add: &mut dyn FnMut(Feature, usize)) 
     }
 }
 
-/// GEMVs of so many rows in so many calls.
+/// Counts the features of GEMVs of `rows` rows in `calls` calls.
 pub(super) fn products(shape: BlockShape, rows: usize, calls: usize, add: &mut dyn FnMut(Feature, usize)) {
     let quads = rows.div_ceil(QUAD);
     let eights = if shape.strip_rows() == STRIP { quads / 2 } else { 0 };
@@ -336,12 +336,12 @@ pub(super) fn products(shape: BlockShape, rows: usize, calls: usize, add: &mut d
     }
 }
 
-/// What a strip's worth of a block's rows ([`STRIP`]) takes at most, and what its rows take once in every piece, in
-/// 1024ths of an instruction.
+/// Computes the most that a piece of a block's rows takes, first at any length, then for each [`STRIP`] of rows, in 1024ths
+/// of an instruction.
 pub(super) fn strips(shape: BlockShape, in_order: bool, start: bool) -> (u32, u32) {
     let row = if in_order { Feature::SCALED_REST } else { Feature::SCALED_STEPPED };
     let first = most(|add| {
-        // The last piece may end with a run of its own for the rest of the rows.
+        // The last piece may need a separate run for the rest of the rows.
         add(Feature::IN_PLACE, 1);
         add(Feature::STACK, 1);
         add(Feature::RUN, 1);

@@ -1,4 +1,4 @@
-//! What the cost model counts.
+//! Features that the cost model counts.
 
 use core::fmt;
 
@@ -6,7 +6,7 @@ use crate::image::op;
 use crate::layout::{BlockShape, Lanes, QUAD, STRIP, Width};
 use crate::math::Function;
 
-/// Something that an operation has a number of. Its debug text is its source, as in `rates.rs`.
+/// An item that the cost model counts. Its debug text is Rust source, as in `rates.rs`.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Feature(u16);
 
@@ -14,38 +14,38 @@ macro_rules! singles {
     ($($name:ident $text:literal)*) => {
         #[allow(non_camel_case_types, clippy::upper_case_acronyms, reason = "only counts the constants")]
         enum Order { $($name,)* END }
-        /// The features that exist once.
+        /// Features that exist one time.
         impl Feature {
             $(#[doc = $text] pub const $name: Self = Self(Order::$name as u16);)*
         }
-        /// Their names, and what they are.
+        /// Names and descriptions of these features.
         const SINGLES: [(&str, &str); Order::END as usize] = [$((stringify!($name), $text),)*];
     };
 }
 singles! {
-    STEP "a step, with its operations and its action aside"
+    STEP "a step, without its operations and its action"
     OBSERVATION "a value of the observation"
     ACTION "an action"
     ACTION_VALUE "a value of the action"
     CONTRACT "a value of an array of the action contract"
     ENSEMBLE "an action that is an average"
-    FORESEEN "an action of a chunk that is added to an average"
-    FORESEEN_VALUE "a value of such an action, or of the average"
-    LEFT "a chunk of which something is kept for the next"
-    LEFT_VALUE "a value of what is kept"
-    LED "a value of an action that leads over to a new chunk"
+    PREDICTED "an action of a chunk that is added to an average"
+    PREDICTED_VALUE "a value of such an action, or of the average"
+    KEPT "a chunk whose rest is kept for the next"
+    KEPT_VALUE "a value of the kept rest"
+    BLENDED "a value of an action that blends into a new chunk"
     LIMITED "a value of an iterate whose predicted sample has a limit"
-    STIRRED "a value of an iterate that noise is added to"
-    DENOISED_REST "a value of an iterate beyond the last eight"
-    NORMALIZED_REST "a value normalized beyond the last eight"
+    NOISY "a value of an iterate that noise is added to"
+    DENOISED_REST "a value of an iterate after the last eight"
+    NORMALIZED_REST "a value normalized after the last eight"
     POLL_OP "a call that runs one operation"
     POLL "a call that runs pieces"
-    ENTERED "an operation that a poll comes to"
+    ENTERED "an operation that a poll enters"
     PIECE "a piece"
-    RESUMED "a block of rows of a linear operation that a poll comes to"
+    RESUMED "a block of rows of a linear operation that a poll enters"
     MAGNITUDE_EIGHT "eight values compared by magnitude"
     MAGNITUDE_REST "a value compared by magnitude"
-    BIASED "a linear operation that sets its output up before the rows are added"
+    BIASED "a linear operation that initializes its output before the rows are added"
     ZEROED "an output set to 0 before the rows are added"
     BIAS "an output set to its bias before the rows are added"
     ADDED "an output that its bias is added to before the rows are"
@@ -54,7 +54,7 @@ singles! {
     RUN "a run of rows with sums on the stack"
     SCALED_EIGHT "eight rows scaled by the assembler"
     SCALED_REST "a row in order scaled"
-    SCALED_STEPPED "a row with a step scaled"
+    SCALED_STEPPED "a row with an output step scaled"
 }
 
 macro_rules! kinds {
@@ -69,8 +69,8 @@ macro_rules! kinds {
     };
 }
 kinds! {
-    /// Features of an operation of each code. Those of linear are many, and all others; a function's values are its
-    /// own.
+    /// Features of an operation of each code. A linear operation also has the other features; a function has a feature of
+    /// its own for its values.
     Operation {
         Once "once"
         Value "a value"
@@ -98,7 +98,7 @@ kinds! {
     }
 }
 kinds! {
-    /// Whether columns share scales.
+    /// Kinds of scales.
     Scales {
         Rows "rows"
         Groups "groups"
@@ -122,21 +122,21 @@ const GEMVS: usize = PREPARES + LAYOUTS * Prepare::ALL.len();
 const LAYOUTS: usize = Width::ALL.len() * Lanes::ALL.len() * Scales::ALL.len();
 
 impl Feature {
-    /// How many there are.
+    /// Number of features.
     pub const COUNT: usize = GEMVS + LAYOUTS * Strips::ALL.len() * Gemv::ALL.len();
 
-    /// All of them.
+    /// Iterates over all features.
     #[cfg(any(test, feature = "writer"))]
     pub fn all() -> impl Iterator<Item = Self> {
         (0..Self::COUNT as u16).map(Self)
     }
 
-    /// An operation of this code.
+    /// Returns the feature of an operation of this code.
     pub const fn operation(code: u8) -> Self {
         Self::of_code(code, Operation::Once)
     }
 
-    /// A value of an operation of this code.
+    /// Returns the feature of a value of an operation of this code.
     pub const fn value(code: u8) -> Self {
         Self::of_code(code, Operation::Value)
     }
@@ -145,7 +145,7 @@ impl Feature {
         Self((OPERATIONS + (code as usize).saturating_sub(1) * Operation::ALL.len() + which as usize) as u16)
     }
 
-    /// An element of a function.
+    /// Returns the feature of an element of a function.
     pub const fn function(function: Function) -> Self {
         Self((FUNCTIONS + function as usize) as u16)
     }
@@ -171,12 +171,12 @@ impl Feature {
         Self::gemv(shape.width, shape.lanes, Scales::of(shape), strips, which)
     }
 
-    /// Its place among the rates.
+    /// Returns the feature's index among the rates.
     pub const fn index(self) -> usize {
         self.0 as usize
     }
 
-    /// What it is.
+    /// Returns the kind of the feature.
     fn kind(self) -> Option<Kind> {
         let i = self.index();
         let layout = |i: usize| {
@@ -208,10 +208,10 @@ impl Scales {
     }
 }
 
-/// Width, lanes and scales, these with their text.
+/// Width, lanes, and scales with their text.
 type Layout = (Width, Lanes, &'static (Scales, &'static str));
 
-/// See [`Feature::kind`]; everything with its text.
+/// Kind of a [`Feature`], with texts.
 enum Kind {
     Single(&'static (&'static str, &'static str)),
     Operation(&'static str, &'static (Operation, &'static str)),
@@ -268,7 +268,7 @@ mod tests {
     use super::*;
     use crate::pace::rates::RATES;
 
-    /// Without a rate, an operation would be too cheap, and its polls too long.
+    /// Without a rate, an operation's cost would be too low, and its polls too long.
     #[test]
     fn every_feature_has_a_rate() {
         let rated: HashSet<Feature> = RATES.iter().map(|(feature, _)| *feature).collect();

@@ -1,5 +1,5 @@
-//! What operations and pieces of a step cost, and what a poll may spend. The prices are here alone: what runs an image
-//! asks a `Meter` (`meter.rs`), and a program whose steps are not cut has none of them.
+//! The cost of operations and slices, and the budget of a poll. Only this module knows costs: code that runs an image asks
+//! a `Meter` (`meter.rs`), and a program without slices does not include them.
 
 pub(crate) mod budget;
 pub mod cost;

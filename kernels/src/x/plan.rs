@@ -1,21 +1,20 @@
-//! How a vector is prepared: all lengths of it.
+//! The plan of a prepared vector: all its lengths.
 
 use crate::layout::{Block, BlockShape, Lanes, Layout, PAD_COLS, PAIRED_GROUP, div_down, div_up, round_up};
 
-/// How a vector is prepared for blocks of a shape, and what their kernels are given with it. Groups and chunks are
-/// whole: zeros fill them.
+/// The lengths of a vector that is prepared for blocks of a shape, and the kernels' arguments. Zeros fill groups and chunks.
 #[derive(Clone, Copy, Debug)]
 pub struct Plan {
-    /// The shape; its rows do not matter.
+    /// Shape of the blocks; its rows do not matter.
     pub(crate) shape: BlockShape,
     pub(crate) layout: &'static Layout,
-    /// Columns with the padding.
+    /// Columns with padding.
     pub(crate) padded: usize,
-    /// Groups; 1 where the weights have no group scales.
+    /// Groups; 1 without group scales.
     pub(crate) groups: usize,
     /// Chunks of a group.
     pub(crate) chunks: usize,
-    /// Columns of a group's first chunk; the others have [`XLayout::chunk`](crate::layout::XLayout::chunk).
+    /// Columns of a group's first chunk; all others have [`XLayout::chunk`](crate::layout::XLayout::chunk).
     pub(crate) first: usize,
     /// Words of the prepared vector.
     pub(super) words: usize,
@@ -23,34 +22,34 @@ pub struct Plan {
     arguments: KernelArguments,
 }
 
-/// The arguments of a kernel in assembler that depend on the vector's lengths. Kept with the plan, because it takes
-/// longer to find than a call may.
+/// Arguments of an assembler kernel that depend on the vector's lengths. The plan keeps them: a call has no time to compute
+/// them.
 #[cfg_attr(not(any(feature = "writer", actq_armv7em)), expect(dead_code, reason = "only the assembler reads it"))]
 #[derive(Clone, Copy, Debug)]
 pub struct KernelArguments {
-    /// The words up to where it stops reading. Single lanes read no more than the block's own units; with row scales,
-    /// the vector's sum stands behind the end, and behind a last group without a partner the pair's word.
+    /// Words that the kernel reads. Single lanes read no more than the block's own units. With row scales, the vector's sum
+    /// follows the end; after a last group without a partner, the pair's word follows.
     pub end: usize,
-    /// Where chunks are summed without being taken apart, minus the biases of all of them; for single lanes with row
-    /// scales 0; else the bytes of a group's first chunk.
+    /// If chunks are summed without separation, minus the biases of all of them; 0 for single lanes with row scales;
+    /// otherwise the bytes of a group's first chunk.
     pub extra: usize,
-    /// Steps that the first pass through the loop of a kernel for row scales leaves out, or the last pair of groups.
+    /// Steps that the first pass through the loop of a kernel for row scales skips, or the last pair of groups.
     pub skip: usize,
 }
 
 impl Plan {
-    /// The plan for blocks of this shape, whose rows do not matter; `None` where it is not valid.
+    /// Creates the plan for blocks of this shape, whose rows do not matter; `None` if the shape is not valid.
     pub const fn new(shape: BlockShape) -> Option<Self> {
         if shape.is_valid() { Some(Self::of_valid(shape)) } else { None }
     }
 
-    /// The plan for a block.
+    /// Creates the plan for a block.
     pub fn of(block: &Block<'_>) -> Self {
         Self::of_valid(block.shape())
     }
 
-    /// Every call of a kernel comes through here; all lengths but the vector's are powers of two, so nothing is
-    /// divided.
+    /// Creates the plan for a valid shape. Every call of a kernel needs it; all lengths except the vector's are powers of
+    /// two, so there is no division.
     #[inline(never)]
     const fn of_valid(shape: BlockShape) -> Self {
         let layout = shape.layout();
@@ -61,7 +60,7 @@ impl Plan {
             (read, padded, padded, 1, format.run)
         } else {
             let read = round_up(shape.cols, shape.step(layout));
-            // Two groups where they are taken in pairs.
+            // Two groups if the layout pairs them.
             let group = shape.group << format.pairs as u32;
             let padded = round_up(read, group);
             (read, padded, group, div_down(padded, group), format.run << format.pairs as u32)
@@ -85,57 +84,57 @@ impl Plan {
                     Lanes::Single if shape.group == 0 => 0,
                     _ => 4 * starts + 2 * first,
                 },
-                // Passes and steps are powers of two, and chunks that are longer than a pass are whole passes.
+                // Passes and steps are powers of two, and a chunk that is longer than a pass is whole passes.
                 skip: (0usize.wrapping_sub(read) & (run - 1)) >> layout.step_log,
             },
         }
     }
 
-    /// Whether what is prepared by this plan is for blocks of this shape.
+    /// Returns `true` if this plan is for blocks of this shape.
     #[inline(always)]
     pub fn fits(&self, shape: BlockShape) -> bool {
         let BlockShape { width, lanes, rows: _, cols, group } = self.shape;
         (width, lanes, cols, group) == (shape.width, shape.lanes, shape.cols, shape.group)
     }
 
-    /// Words of the prepared vector.
+    /// Returns the words of the prepared vector.
     #[cfg(feature = "writer")]
     pub const fn words(&self) -> usize {
         self.words
     }
 
-    /// Words that preparing a vector of `len` values needs. A vector that does not fill its groups is copied first and
-    /// filled up with zeros: to the end of the room, while the prepared words grow from its begin.
+    /// Returns the words that preparing a vector of `len` values needs. A vector that does not fill its groups is first
+    /// copied to the end of these words and filled with zeros, while the prepared words grow from their start.
     pub const fn room(&self, len: usize) -> usize {
         if len == self.padded { self.words } else { self.words + self.padded / 2 }
     }
 
-    /// What a kernel in assembler is given with the vector.
+    /// Returns the arguments of an assembler kernel.
     #[inline(always)]
     #[cfg(any(feature = "writer", actq_armv7em))]
     pub const fn arguments(&self) -> KernelArguments {
         self.arguments
     }
 
-    /// Columns of a group.
+    /// Returns the columns of a group.
     #[cfg(any(feature = "writer", not(actq_fpu)))]
     const fn group(&self) -> usize {
         self.first + (self.chunks - 1) * self.layout.x.chunk
     }
 
-    /// Words of a group.
+    /// Returns the words of a group.
     #[cfg(any(feature = "writer", not(actq_fpu)))]
     pub(super) const fn group_words(&self) -> usize {
         self.group() / 2 + self.chunks * self.layout.x.start_words + self.layout.x.sum as usize
     }
 
-    /// Words of a chunk of so many columns.
+    /// Returns the words of a chunk of `columns` columns.
     #[cfg(any(feature = "writer", not(actq_fpu)))]
     pub(super) const fn chunk_words(&self, columns: usize) -> usize {
         self.layout.x.start_words + columns / 2
     }
 
-    /// Words before the pair of column `col`.
+    /// Returns the words before the pair of column `col`.
     #[cfg(feature = "writer")]
     pub(super) const fn words_before(&self, col: usize) -> usize {
         let (group, col) = (col / self.group(), col % self.group());
@@ -143,7 +142,7 @@ impl Plan {
         group * self.group_words() + (full_before + 1) * self.layout.x.start_words + col / 2
     }
 
-    /// What the cost of preparing and of reading a vector depends on.
+    /// Returns the lengths that the cost of preparing and of reading a vector depends on.
     pub(crate) const fn extent(&self) -> Extent {
         let passes = match (self.shape.group, self.layout.x.run) {
             (0, 1) => 0,
@@ -154,23 +153,23 @@ impl Plan {
     }
 }
 
-/// See [`Plan::extent`].
+/// Lengths that the cost of a prepared vector depends on.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Extent {
-    /// Columns with the padding.
+    /// Columns with padding.
     pub(crate) columns: usize,
-    /// Groups; 1 where the weights have no group scales.
+    /// Groups; 1 without group scales.
     pub(crate) groups: usize,
     /// Chunks of all groups.
     pub(crate) chunks: usize,
-    /// Passes through a kernel's loop that are more than a step of its columns: groups, or runs of a row.
+    /// Passes through a kernel's loop of more than one step: groups, or parts of a row.
     pub(crate) passes: usize,
 }
 
-/// Words that suffice to prepare a vector for blocks of any layout that has such groups: the most that [`Plan::room`]
-/// gives. That is with chunks of eight columns and a sum, or where single lanes or pairs of groups need more columns.
+/// Returns enough words to prepare a vector for blocks of any layout with this group size: the most that [`Plan::room`]
+/// returns. Chunks of eight columns with a sum need the most, unless single lanes or pairs of groups need more columns.
 pub const fn max_prepared_words(cols: usize, group: usize) -> usize {
-    // Pairs of the columns up to a multiple of `unit`, and of a copy, where that has more columns.
+    // Pairs of the columns, rounded up to a multiple of `unit`, and of a copy, if that has more columns.
     const fn pairs(cols: usize, unit: usize) -> usize {
         let padded = round_up(cols, unit);
         if padded == cols { padded / 2 } else { padded }

@@ -1,4 +1,4 @@
-//! A prepared vector, and the plain way to prepare one.
+//! A prepared vector, and its preparation in Rust.
 
 use super::plan::Plan;
 #[cfg(any(feature = "writer", not(actq_fpu)))]
@@ -12,39 +12,39 @@ pub struct Prepared<'a> {
 }
 
 impl<'a> Prepared<'a> {
-    /// Names a vector that [`Scale::quantize`](super::Scale::quantize) or [`prepare`] wrote by this plan to the first
-    /// of `words`; `None` where they are fewer than [`Plan::words`].
+    /// Wraps a vector that [`Scale::quantize`](super::Scale::quantize) wrote with this plan to the start of `words`; `None` if
+    /// they are fewer than the plan's words.
     #[inline(always)]
     pub fn new(words: &'a [u32], plan: &'a Plan) -> Option<Self> {
         Some(Self { words: words.get(..plan.words)?, plan })
     }
 
-    /// How the vector was prepared.
+    /// Returns the plan of the vector.
     #[inline(always)]
     pub fn plan(&self) -> &'a Plan {
         self.plan
     }
 
-    /// All words.
+    /// Returns all words.
     #[inline(always)]
     pub fn words(&self) -> &'a [u32] {
         self.words
     }
 
-    /// The groups' words, each with its sum where the layout has one.
+    /// Iterates over the groups' words, each with its sum if the layout has one.
     #[cfg(any(feature = "writer", not(actq_armv7em)))]
     pub(crate) fn groups(&self) -> impl Iterator<Item = &'a [u32]> {
         self.words.chunks(self.plan.group_words())
     }
 
-    /// The chunks of a group's words, without its sum.
+    /// Iterates over the chunks of a group's words, without its sum.
     #[cfg(any(feature = "writer", not(actq_armv7em)))]
     pub(crate) fn chunks(&self, group: &'a [u32]) -> impl Iterator<Item = &'a [u32]> {
         let (first, rest) = group.split_at(self.plan.chunk_words(self.plan.first).min(group.len()));
         core::iter::once(first).chain(rest.chunks(self.plan.chunk_words(self.plan.layout.x.chunk)))
     }
 
-    /// The value of column `col`; 0 when out of range.
+    /// Returns the value of column `col`; 0 when out of range.
     #[cfg(feature = "writer")]
     pub fn value(&self, col: usize) -> i16 {
         if col >= self.plan.padded {
@@ -55,7 +55,7 @@ impl<'a> Prepared<'a> {
     }
 }
 
-/// As [`Scale::quantize`](super::Scale::quantize), of integers.
+/// Prepares integers as [`Scale::quantize`](super::Scale::quantize) prepares f32 values.
 #[cfg(feature = "writer")]
 pub fn prepare<'w>(x: &[i16], plan: &'w Plan, out: &'w mut [u32]) -> Option<Prepared<'w>> {
     let x = x.get(..plan.shape.cols).unwrap_or(x);
@@ -63,7 +63,7 @@ pub fn prepare<'w>(x: &[i16], plan: &'w Plan, out: &'w mut [u32]) -> Option<Prep
     Prepared::new(out, plan)
 }
 
-/// Lays a vector out: any values, of which `integer` makes integers whose low 16 bits count.
+/// Writes the prepared vector of any values, which `integer` converts to integers whose low 16 bits count.
 #[cfg(any(feature = "writer", not(actq_fpu)))]
 pub(crate) fn lay_out<V: Copy>(x: &[V], plan: &Plan, out: &mut [u32], integer: impl Fn(V) -> u32) {
     let mut x = x;
@@ -79,7 +79,7 @@ pub(crate) fn lay_out<V: Copy>(x: &[V], plan: &Plan, out: &mut [u32], integer: i
             (x, chunks, columns) = (rest_x, rest, plan.layout.x.chunk);
         }
         if let Some(word) = sum_word.first_mut() {
-            // A pair's groups are chunks; without pairs, both halves are the group's.
+            // The groups of a pair are chunks; without pairs, both halves are the group's sum.
             let first = if plan.layout.x.pairs { sum.wrapping_sub(last) } else { sum };
             let second = if plan.layout.x.pairs { last } else { sum };
             let halves = (first & 0xffff) | second << 16;
@@ -88,7 +88,7 @@ pub(crate) fn lay_out<V: Copy>(x: &[V], plan: &Plan, out: &mut [u32], integer: i
     }
 }
 
-/// Writes a chunk, as far as `x` goes and then zeros, and returns the sum of its integers.
+/// Writes a chunk of `x`, filled with zeros, and returns the sum of its integers.
 #[cfg(any(feature = "writer", not(actq_fpu)))]
 fn chunk<V: Copy>(x: &[V], format: &XLayout, out: &mut [u32], integer: &impl Fn(V) -> u32) -> i32 {
     let (starts, pairs) = out.split_at_mut(format.start_words.min(out.len()));

@@ -2,12 +2,11 @@
 
 use crate::error::NotFinite;
 
-/// Vectors whose largest magnitude is below this (2^-100) count as zero, so that the reciprocal of the scale stays
-/// finite.
+/// Least magnitude, 2^-100. A vector without a larger one counts as zero, so that the reciprocal of the scale is finite.
 pub const TINY: f32 = f32::from_bits(27 << 23);
 
 /// The scale of a vector: `x[i]` is about `scale * q[i]`, where `q[i] = round(x[i] * (x_max / amax))` and
-/// `scale = amax / x_max`. It comes from the vector itself, so nothing saturates, whatever the observation.
+/// `scale = amax / x_max`. It comes from the vector itself, so no observation saturates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale {
     scale: f32,
@@ -16,11 +15,11 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// Takes integers as they are.
+    /// Scale of integers that stay as they are.
     pub(crate) const ONE: Self = Self { scale: 1.0, inverse: 1.0 };
 
-    /// The scale of a vector whose largest magnitude has these bits, for integers in `-x_max ..= x_max`. Magnitudes
-    /// compare as their bits, and anything from the infinity's bits up is not finite.
+    /// Returns the scale of a vector whose largest magnitude has these bits, for integers in `-x_max ..= x_max`. Magnitudes
+    /// compare as their bits; infinity's bits and all above are not finite.
     #[inline(always)]
     pub(crate) fn of_magnitude(bits: u32, x_max: u16) -> Result<Self, NotFinite> {
         if bits >= f32::INFINITY.to_bits() {
@@ -33,12 +32,12 @@ impl Scale {
         Ok(Self { scale: amax / x_max, inverse: x_max / amax })
     }
 
-    /// The factor of the integers.
+    /// Returns the factor of the integers.
     pub fn get(self) -> f32 {
         self.scale
     }
 
-    /// The factor that makes integers, before they are rounded.
+    /// Returns the factor from values to integers, before rounding.
     pub(crate) fn inverse(self) -> f32 {
         self.inverse
     }

@@ -27,7 +27,7 @@ pub fn peak(image: &Image<'_>) -> Peak {
     let order = |from: usize| (from..ops.len()).rev();
     // Denoising steps twice: what the first operation of a step finds, the last one of the step before has left.
     let rounds = if image.denoising_steps() > 1 {
-        order(image.once()).chain(order(0))
+        order(image.first_denoising_op()).chain(order(0))
     } else {
         order(0).chain(order(ops.len()))
     };

@@ -177,8 +177,8 @@ fn most(samples: &[Sample], polls: &[(f64, usize)], rates: &Rates) -> Rates {
             Feature::value(op::DENOISE),
             Feature::LIMITED,
             Feature::CONTRACT,
-            Feature::FORESEEN_VALUE,
-            Feature::LED,
+            Feature::PREDICTED_VALUE,
+            Feature::BLENDED,
         ])
         .collect();
     // Whole steps differ in many features; only their parts tell the cost of a value.

@@ -1,11 +1,11 @@
-//! The GEMV in Armv7E-M assembler (Cortex-M4 and M7): SMLAD makes two MACs a cycle, four with paired lanes. Armv8-M
+//! The GEMV in Armv7E-M assembler (Cortex-M4 and M7): SMLAD computes two MACs a cycle, four with paired lanes. Armv8-M
 //! with the DSP extension (Cortex-M33) has the same instructions.
 //!
-//! `single.s` holds one loop nest, stamped over the four layouts of single lanes; the layouts of paired lanes have a
-//! file each, with a kernel for row scales and one for group scales. All compute exactly what [`super::portable`]
-//! computes; the tests run both on the same data.
+//! `single.s` has one loop nest for the four layouts of single lanes. Each layout of paired lanes has a file, with a kernel
+//! for row scales and one for group scales. All compute the same bits as the portable backend; the tests run both on the
+//! same data.
 //!
-//! SMLAD sets the Q flag; the procedure call standard lets a call change it.
+//! SMLAD sets the Q flag; the procedure call standard allows a call to change it.
 
 mod table;
 
@@ -20,7 +20,7 @@ assembler!("paired_w4.s");
 assembler!("paired_w8.s");
 assembler!("vector.s");
 
-/// As [`crate::arch::gemv`].
+/// Computes a product as [`crate::arch::gemv`] does.
 #[inline(always)]
 pub(crate) fn gemv(Product { block, x, first_row, acc }: Product<'_>) {
     let [kernel, four] = kernels(block.shape());
@@ -31,9 +31,9 @@ pub(crate) fn gemv(Product { block, x, first_row, acc }: Product<'_>) {
     let rest = acc.len() - rows;
     let arguments = x.plan().arguments();
     // SAFETY: the rows from `first_row` on, as many as `acc` has, are rows of the block or of its padding: that is what
-    // `Product::new` checks, as is that `first_row` is a multiple of 8, so that a strip begins there. A block has the
+    // `Product::new` checks. It also checks that `first_row` is a multiple of 8, so that a strip starts there. A block has the
     // words of all of its rows (`Block::leading`). Each call reads the words of its strips and writes as many sums. It
-    // reads the prepared vector from its begin to `end`, and the sums of x that stand behind where the layout has sums;
+    // reads the prepared vector from its start to `end`, and the sums of x after it if the layout has sums;
     // both are in the vector, because it was prepared for a block of this shape (`Plan::of`). The slices are of u32 and
     // i32, so every address is a multiple of 4, as LDM and LDRD demand.
     unsafe {
@@ -55,7 +55,7 @@ unsafe extern "C" {
     fn actq_copy(from: *const u32, to: *mut u32, len: usize);
 }
 
-/// `to = from`, as far as both go.
+/// Copies `from` to `to`, up to the shorter length.
 #[inline(always)]
 pub(crate) fn copy(from: &[u32], to: &mut [u32]) {
     let len = from.len().min(to.len());
@@ -65,7 +65,7 @@ pub(crate) fn copy(from: &[u32], to: &mut [u32]) {
     }
 }
 
-/// The bits of the largest magnitude.
+/// Returns the bits of the largest magnitude.
 pub(crate) fn magnitude(x: &[f32]) -> u32 {
     let (eights, rest) = x.split_at(x.len() & !7);
     let largest = if eights.is_empty() {

@@ -1,17 +1,17 @@
 @ GEMV for 2-bit codes in paired lanes (kernels/src/layout/w2_paired.rs): strips of eight rows, or four.
 @
 @ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1; of four rows there is one), [sp] x_end, [sp+4] minus the biases of all chunks,
-@ [sp+8] steps of 8 columns that the first pass through the row kernel's loop leaves out; with group scales not 0 where the last
-@ pair of groups is but one.
-@ x_end is where the last chunk ends; with row scales, the sum of x stands there.
+@ [sp+8] steps of 8 columns that the first pass through the row kernel's loop skips; with group scales, not 0 if the last
+@ pair has one group only.
+@ x_end is the end of the last chunk; with row scales, the sum of x is there.
 @
 @ In the loops: r0 weights, r1 x, r3-r6 activation pairs, r2 and r7-r9 the sums t of row pairs 0 to 3 (r7 and r2 in a strip
-@ of four, and r8 the end of the chunk; r2 is started last, because a chunk's start value comes with its first pairs), r10 and
+@ of four, and r8 the end of the chunk; r2 is started last, because a chunk's start value is loaded with its first pairs), r10 and
 @ r11 weight words, r12 the mask, lr the extracted codes.
 @
 @ Frame: 0-31 sums over chunks, (sum of t, sum of its high half) of each row pair, or sums over groups; 32 mask, 36 x_end, 40 x, 44 minus the biases,
-@ 48 acc, 52 strips, or end of acc, or, where the first pass leaves steps out, acc behind this strip, 56 sum of x, 60 steps left
-@ out, 64 end of acc.
+@ 48 acc, 52 strips, or end of acc, or, if the first pass skips steps, acc after this strip, 56 sum of x, 60 skipped
+@ steps, 64 end of acc.
 
     .syntax unified
     .thumb
@@ -71,7 +71,7 @@
     strd r2, r3, [sp, #48]
 .endm
 
-@ Sums over chunks from `low`, `high`; x to its begin.
+@ Writes the sums over chunks from `low`, `high`; sets x to its start.
 .macro d2_begin low, high
     .irp at, 0, 8, 16, 24
     strd \low, \high, [sp, #\at]
@@ -80,7 +80,7 @@
     ldr r1, [sp, #40]
 .endm
 
-@ What is left of t without its high half is 4 * even = 2 * the even row's level sum; the odd row's is 2 * odd + sum(x).
+@ The rest of t without its high half is 4 * even = 2 * the even row's level sum; the odd row's is 2 * odd + sum(x).
 .macro d2_rows even, odd
     sub \even, \even, \odd, lsl #16
     asr \even, \even, #1
@@ -105,7 +105,7 @@ actq_w2_paired_row:
     str r3, [sp, #52]
     beq.n 1f
 9:
-    @ A short first chunk: all sums start before the first step that is not left out.
+    @ A short first chunk: all sums start before the first step that is not skipped.
     ldr r4, [sp, #44]
     movs r5, #0
     d2_begin r4, r5
@@ -165,7 +165,7 @@ actq_w2_paired_row:
     pop {r4-r11, pc}
     .size actq_w2_paired_row, . - actq_w2_paired_row
 
-@ The last strip of a block, so its loop is short: eight columns. r9: steps that this chunk leaves out.
+@ The last strip of a block, so its loop is short: eight columns. r9: steps that this chunk skips.
     .section .text.actq_w2_paired_row4, "ax", %progbits
     .global actq_w2_paired_row4
     .type actq_w2_paired_row4, %function
@@ -222,7 +222,7 @@ actq_w2_paired_row4:
     smlabt \even1, \t1, \evens, \even1
 .endm
 
-@ Takes the sums t of a row pair in two groups apart: `low` becomes 4 * even of both, |4 * even| <= 24384, `second` odd of both.
+@ Separates the sums t of a row pair in two groups: `low` becomes 4 * even of both, |4 * even| <= 24384, `second` odd of both.
 @ `first` is free then.
 .macro d2_apart first, second, low
     pkhbt \low, \first, \second, lsl #16
@@ -230,7 +230,7 @@ actq_w2_paired_row4:
     eor \low, \low, #0x80008000
 .endm
 
-@ Adds what they mean to the sums of the pair's rows. `scales` holds a byte for the even and one for the odd row in the first
+@ Adds the level sums to the sums of the pair's rows. `scales` holds a byte for the even and one for the odd row in the first
 @ group, then two for the second group; lr the two sums of x, |sum(x)| <= 127 * 32 = 4064. |odd| <= 8128 and the doubled scales,
 @ at most 510, are int16, too.
 .macro d2_scale_two scales, low, high, even, odd, temp
@@ -249,8 +249,8 @@ actq_w2_paired_row4:
     .endr
 .endm
 
-@ Groups are taken in pairs: after the first, Z is clear, and its sums t wait on the stack for those of the second, after which Z
-@ is set; nothing between sets flags. Sums over groups: row pairs 2, 3, 0 and 1. Bit 31 of the strips left says that a last group
+@ Groups are paired: after the first, Z is clear, and its sums t are on the stack until those of the second, after which Z
+@ is set; no instruction between sets flags. Sums over groups: row pairs 2, 3, 0 and 1. Bit 31 of the remaining strips means that a last group
 @ follows the pairs.
     .section .text.actq_w2_paired_group, "ax", %progbits
     .global actq_w2_paired_group
@@ -313,7 +313,7 @@ actq_w2_paired_group:
     add sp, sp, #68
     pop {r4-r11, pc}
 8:
-    @ Behind the pairs, the vector has a last one, whose second group x_end leaves out.
+    @ After the pairs, the vector has a last pair, whose second group x_end excludes.
     ldr r4, [sp, #36]
     sub r4, r4, #76
     str r4, [sp, #36]
@@ -362,7 +362,7 @@ actq_w2_paired_group:
     b.w 9b
     .size actq_w2_paired_group, . - actq_w2_paired_group
 
-@ A strip of four has a word of scales behind each group. r9: from a group's end in x to its sum, 68 bytes in the first of two.
+@ A strip of four has a word of scales after each group. r9: from a group's end in x to its sum, 68 bytes in the first of two.
     .section .text.actq_w2_paired_group4, "ax", %progbits
     .global actq_w2_paired_group4
     .type actq_w2_paired_group4, %function
@@ -372,7 +372,7 @@ actq_w2_paired_group4:
     d2_prologue
     ldr r5, [sp, #112]
     cbz r5, 1f
-    @ Behind the end of the last group are its partner's start word and the sums.
+    @ After the end of the last group are its partner's start word and the sums.
     sub r4, r4, #8
     str r4, [sp, #36]
 1:

@@ -1,17 +1,17 @@
 @ GEMV for 3-bit codes in paired lanes (kernels/src/layout/w3_paired.rs): strips of four rows.
 @
 @ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1), [sp] x_end, [sp+4] minus the biases of all chunks,
-@ [sp+8] steps of 8 columns that the first pass through the row kernel's loop leaves out.
-@ x_end is where the last chunk ends; with row scales, the sum of x stands there.
+@ [sp+8] steps of 8 columns that the first pass through the row kernel's loop skips.
+@ x_end is the end of the last chunk; with row scales, the sum of x is there.
 @
-@ In the loops: r0 weights, r1 x, r2 mask, r3-r5 weight words, r6 the sums t of rows 2 and 3 (it comes first with the chunk's
+@ In the loops: r0 weights, r1 x, r2 mask, r3-r5 weight words, r6 the sums t of rows 2 and 3 (it is loaded first, with the chunk's
 @ start value), r7 and r8 activation pairs, r9 t of rows 0 and 1, r10 and r11 sums of the two t over chunks, r12 sums of their
 @ high halves side by side, lr the extracted codes, or the sum of x.
 @
 @ The high halves of 64 columns stay within `4 * 127 * 64 = 32512`.
 @
-@ Frame of the row kernel: 0 x, 4 and 8 minus the biases, 12 0, 16-23 sums of the high halves, 24 acc, 28 end of acc, or, where the
-@ first pass leaves steps out, acc behind this strip, 32 x_end, 36 sum of x, 40 end of acc, 44 steps left out; of the group kernel:
+@ Frame of the row kernel: 0 x, 4 and 8 minus the biases, 12 0, 16-23 sums of the high halves, 24 acc, 28 end of acc, or, if the
+@ first pass skips steps, acc after this strip, 32 x_end, 36 sum of x, 40 end of acc, 44 skipped steps; of the group kernel:
 @ 0-15 sums over groups, 16 x, 20 acc, 24 end of acc, 28 x_end.
 
     .syntax unified
@@ -27,8 +27,8 @@
     smlad \t, \codes, \pair, \from
 .endm
 
-@ A chunk of eight columns; afterwards r9 and r6 hold its sums t. With `sum`, the sum of x behind the chunk, in both halves of a
-@ word, goes to lr, which the second half leaves alone.
+@ A chunk of eight columns; afterwards r9 and r6 hold its sums t. With `sum`, the sum of x after the chunk, in both halves of a
+@ word, goes to lr, which the second half does not change.
 .macro d3_chunk sum=0, t0=r9, t1=r6
     ldmia.w r1!, {r6-r8}
     ldmia.w r0!, {r3-r5}
@@ -49,7 +49,7 @@
     d3_set r4, r4, 10, r8, \t1, \t1
 .endm
 
-@ the same, then its sums are added to those of the chunks before
+@ the same, then its sums are added to those of the earlier chunks
 .macro d3_next_chunk sum=0
     d3_chunk \sum
     add r10, r10, r9
@@ -110,7 +110,7 @@ actq_w3_paired_row:
     strd r7, r8, [sp, #16]
     cmp r1, lr
     bne.w 2b
-    @ What is left of a sum of t without its high half is 8 * even = 4 * the even row's level sum; the odd row's is
+    @ The rest of a sum of t without its high half is 8 * even = 4 * the even row's level sum; the odd row's is
     @ 2 * odd + sum(x).
     ldr lr, [sp, #36]
     sub r3, r10, r7, lsl #16

@@ -1,15 +1,15 @@
 @ GEMV for 4-bit codes in paired lanes (kernels/src/layout/w4_paired.rs): strips of eight rows, or four.
 @
 @ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1; of four rows there is one), [sp] x_end, [sp+4] bytes of the first chunk
-@ in x, [sp+8] steps of 8 columns that the first pass through the row kernel's loop leaves out.
+@ in x, [sp+8] steps of 8 columns that the first pass through the row kernel's loop skips.
 @
 @ In the loops: r0 weights, r1 x, r2 mask, r6, r7, r5 the sums p, q, k of the first four rows, r8, r3, r4 those of the others (or of
-@ all in a strip of four; two are low registers, because a chunk's start values come with its first pairs), r9-r12 activation pairs
+@ all in a strip of four; two are low registers, because a chunk's start values are loaded with its first pairs), r9-r12 activation pairs
 @ and weight words, lr the extracted codes.
 @
-@ Frame of the row kernel: 0 x behind its first start words, 4-27 r3-r8 as these set them, 28 end of the first chunk, 32 acc,
-@ 36 end of acc, or, where a row has several chunks or its first pass leaves steps out, acc behind this strip, 40 end of this
-@ chunk, 44 x_end, 48 end of acc, 52 steps left out; of the group kernel: 0-31 sums over groups, in the order of the registers
+@ Frame of the row kernel: 0 x after its first start words, 4-27 r3-r8 as these set them, 28 end of the first chunk, 32 acc,
+@ 36 end of acc, or, if a row has several chunks or its first pass skips steps, acc after this strip, 40 end of this
+@ chunk, 44 x_end, 48 end of acc, 52 skipped steps; of the group kernel: 0-31 sums over groups, in the order of the registers
 @ that take them, 32 mask, 36 x_end, 40 acc, 44 end of acc, 48 x.
 
     .syntax unified
@@ -33,7 +33,7 @@
     c4_word \word, \pair, r8, r3, r4, r8, r3, r4
 .endm
 
-@ Four columns of a strip of four. The first four of a chunk come with the start values and start all sums from them.
+@ Four columns of a strip of four. The first four of a chunk are loaded with the start values and start all sums from them.
 .macro c4_cols4 first=0
     .if \first
     ldmia.w r1!, {r3, r4, r11, r12}
@@ -49,9 +49,9 @@
     c4_last r10, r12
 .endm
 
-@ Eight columns of a strip of eight, whose first pair is in r10. Loads take words for which there is room and not those of the next
-@ columns alone, so that there are five and not six. After it r10 holds the next pair, after a last one nothing, or the scales of the
-@ first four rows: two single loads take less time side by side.
+@ Eight columns of a strip of eight, whose first pair is in r10. Loads also take later words if there is room, so that there are
+@ five loads and not six. After it r10 holds the next pair, after a last one nothing, or the scales of the
+@ first four rows: two successive single loads take less time.
 .macro c4_cols8 first=0, last=0, scales=0
     ldmia.w r0!, {r9, r11, r12}
     .if \first
@@ -197,7 +197,7 @@ actq_w4_paired_row:
     add sp, sp, #60
     pop {r4-r11, pc}
 4:
-    @ A later chunk: its sums are added to those before.
+    @ A later chunk: its sums are added to the earlier ones.
     c4_sums r6, r7, r5, r9, r10, r11, lr
     c4_add r9, r10, r11, lr, r5, r6
     c4_sums r8, r3, r4, r5, r6, r7, r9
@@ -206,7 +206,7 @@ actq_w4_paired_row:
     cmp r1, r9
     beq.n 7b
 5:
-    @ All chunks but the first are full: 256 columns and two start words.
+    @ All chunks except the first are full: 256 columns and two start words.
     sub r12, r12, #32
     str r12, [sp, #32]
     add r3, r1, #520
@@ -214,7 +214,7 @@ actq_w4_paired_row:
     b.w 3b
     .size actq_w4_paired_row, . - actq_w4_paired_row
 
-@ The last strip of a block, so its loop is short: eight columns, of which no pass leaves out any. r5: x_end, r6: end of this chunk,
+@ The last strip of a block, so its loop is short: eight columns, of which no pass skips any. r5: x_end, r6: end of this chunk,
 @ r7: acc.
     .section .text.actq_w4_paired_row4, "ax", %progbits
     .global actq_w4_paired_row4
@@ -241,7 +241,7 @@ actq_w4_paired_row4:
     c4_sums r8, r3, r4, r9, r10, r11, lr
     mov r12, r7
     c4_add r9, r10, r11, lr, r3, r4
-    @ All chunks but the first are full: 256 columns and two start words.
+    @ All chunks except the first are full: 256 columns and two start words.
     add r6, r1, #520
     cmp r1, r5
     bne.n 1b
@@ -249,7 +249,7 @@ actq_w4_paired_row4:
     .size actq_w4_paired_row4, . - actq_w4_paired_row4
 
 @ lr, p, k and q become 2^12 * (A, B, C, D), of at most 17 + 12 bits; r10 and r9 2^4 * the scales of rows 0 and 2, 1 and 3: SMLAW
-@ takes 2^16 away from the product. r2 is the mask inverted.
+@ divides the product by 2^16. r2 is the mask inverted.
 .macro c4_rows p, q, k
     sub lr, \k, \q, lsl #8
     lsl lr, lr, #12

@@ -1,14 +1,14 @@
 @ GEMV for 8-bit codes in paired lanes (kernels/src/layout/w8_paired.rs): strips of four rows.
 @
 @ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1), [sp] x_end, [sp+4] bytes of the first chunk
-@ in x, [sp+8] steps of 8 columns that the first pass through the row kernel's loop leaves out.
+@ in x, [sp+8] steps of 8 columns that the first pass through the row kernel's loop skips.
 @
 @ In the loops: r0 weights, r1 x, r2-r5 activation pairs, r6 and r8 the sums of rows 0 and 2, r7 and r9 those of rows 0 and 2
 @ plus 2^8 times those of rows 1 and 3, r10-r12 and lr weight words.
 @
-@ Frame of the row kernel: 0 x behind its first start word, 4-19 that word four times, 20 end of the first chunk, 24 acc, 28 end of
-@ acc, or, where a row has several chunks or its first pass leaves steps out, acc behind this strip, 32 end of this chunk,
-@ 36 x_end, 40 end of acc, 44 steps left out; of the group kernel: 0-15 sums over groups, 16 x, 28 x_end, 32 acc, 36 strips.
+@ Frame of the row kernel: 0 x after its first start word, 4-19 that word four times, 20 end of the first chunk, 24 acc, 28 end of
+@ acc, or, if a row has several chunks or its first pass skips steps, acc after this strip, 32 end of this chunk,
+@ 36 x_end, 40 end of acc, 44 skipped steps; of the group kernel: 0-15 sums over groups, 16 x, 28 x_end, 32 acc, 36 strips.
 
     .syntax unified
     .thumb
@@ -119,7 +119,7 @@ actq_w8_paired_row:
     add sp, sp, #52
     pop {r4-r11, pc}
 4:
-    @ A later chunk: its sums are added to those before.
+    @ A later chunk: its sums are added to the earlier ones.
     ldrd r4, r5, [r10]
     add r6, r6, r4
     add r7, r7, r5
@@ -131,7 +131,7 @@ actq_w8_paired_row:
     cmp r1, r4
     beq.n 7b
 5:
-    @ All chunks but the first are full: 512 columns and a start word.
+    @ All chunks except the first are full: 512 columns and a start word.
     sub r10, r10, #16
     str r10, [sp, #24]
     add r2, r1, #1028

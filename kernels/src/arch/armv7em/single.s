@@ -1,13 +1,13 @@
 @ GEMV loop nest for Armv7E-M, stamped over the layouts of single lanes in kernels/src/layout: strips of four rows.
 @
 @ Arguments: r0 weights, r1 prepared x, r2 acc, r3 strips (>= 1), [sp] x_end, [sp+4] bytes of a group in x, or 0 with row
-@ scales, [sp+8] units that the loop leaves out in a short pass: with row scales it is the first pass, with group scales the last
+@ scales, [sp+8] units that the loop skips in a short pass: with row scales it is the first pass, with group scales the last
 @ group's first.
 @
 @ In the loops: r0 weights, r1 x, r2 mask, r3 and r4 activation pairs, r5-r8 the four rows' sums t, r9-r12 weight words,
 @ lr the extracted pair of codes.
 @
-@ Frame: 0-15 sums over groups, 16 x, 20 acc, 24 strips, 28 x_end, 32 group bytes, 36 end of this group, 40 units left out.
+@ Frame: 0-15 sums over groups, 16 x, 20 acc, 24 strips, 28 x_end, 32 group bytes, 36 end of this group, 40 skipped units.
 
     .syntax unified
     .thumb
@@ -36,7 +36,7 @@
     smlad r8, lr, \pair, r8
 .endm
 
-@ the share of pair 15 that word k of the 3-bit layout holds
+@ the bit of pair 15 in word k of the 3-bit layout
 .macro mac4_spare mask, pair
     and lr, r9, #\mask
     smlad r5, lr, \pair, r5
@@ -68,7 +68,7 @@
     ldmia.w r1!, {r3, r4}
 .endm
 
-@ One unit of each layout. Prepared x of the unit starts at r1 and is passed.
+@ One unit of each layout. Prepared x of the unit starts at r1, which moves to its end.
 .macro unit_w2
     weights
     pairs
@@ -102,7 +102,7 @@
     mac4_bytes r4, , ror #8
 .endm
 
-@ Pair 15 stands in three words; r4 holds it throughout, so the others come one by one through r3.
+@ Pair 15 is in three words; r4 holds it throughout, so r3 loads the others one by one.
 .macro unit_w3
     ldr.w r4, [r1, #60]
     weights
@@ -151,7 +151,7 @@
     mov r7, r8
 .endm
 
-@ Goes to the first unit of a pass that is not left out. `ahead` are the labels of the units but the first, which is at 2.
+@ Jumps to the first unit of a pass that is not skipped. `ahead` are the labels of the units except the first, which is at 2.
 .macro enter_pass ahead
     .ifnb \ahead
     ldr lr, [sp, #40]
@@ -164,7 +164,7 @@
     .endif
 .endm
 
-@ 32 columns; `more` are the labels of the units but the first.
+@ 32 columns; `more` are the labels of the units except the first.
 .macro pass unit, more
     .balign 4
 2:

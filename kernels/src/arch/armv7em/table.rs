@@ -2,9 +2,9 @@
 
 use crate::layout::{BlockShape, Lanes, Width};
 
-/// Reads `strips` strips at `weights` and the prepared vector from `x` up to `x_end`, writes the strips' sums at `acc`.
-/// What `extra` is, the kernel's file says; the first pass through the loop of a kernel for row scales leaves `skip` of
-/// the layout's steps out.
+/// A kernel: it reads `strips` strips at `weights` and the prepared vector from `x` up to `x_end`, and writes the strips' sums
+/// at `acc`. The kernel's file documents `extra`. The first pass through the loop of a kernel for row scales skips `skip` of
+/// the layout's steps.
 pub(super) type Kernel = unsafe extern "C" fn(
     weights: *const u32,
     x: *const u32,
@@ -38,14 +38,13 @@ kernels! {
     actq_w8_paired_row actq_w8_paired_group
 }
 
-/// The kernel for the layout's strips, and that for a last strip of four rows; where strips have four rows, they are
-/// one.
+/// The kernel for the layout's strips, and the kernel for a last strip of four rows; the same if strips have four rows.
 pub(super) type Kernels = [Kernel; 2];
 
 /// A layout's kernels for row scales and for group scales.
 type Both = [Kernels; 2];
 
-/// By width and lanes.
+/// Kernels by width and lanes.
 static KERNELS: [[Both; Lanes::ALL.len()]; Width::ALL.len()] = [
     [[[actq_w2; 2]; 2], [[actq_w2_paired_row, actq_w2_paired_row4], [actq_w2_paired_group, actq_w2_paired_group4]]],
     [[[actq_w3; 2]; 2], [[actq_w3_paired_row; 2], [actq_w3_paired_group; 2]]],
@@ -53,7 +52,7 @@ static KERNELS: [[Both; Lanes::ALL.len()]; Width::ALL.len()] = [
     [[[actq_w8; 2]; 2], [[actq_w8_paired_row; 2], [actq_w8_paired_group; 2]]],
 ];
 
-/// The kernels for blocks of this shape.
+/// Returns the kernels for blocks of this shape.
 #[inline(always)]
 pub(super) fn kernels(shape: BlockShape) -> Kernels {
     KERNELS[shape.width as usize][shape.lanes as usize][usize::from(shape.group != 0)]

@@ -1,12 +1,12 @@
-@ The cells of kernels/src/ops/cells.rs on the FPU of the hard-float target: the same operations in the same order. What occurs
-@ more than once is a call, because exponentials take the most code.
+@ The cells of kernels/src/ops/cells.rs on the FPU of the hard-float target: the same operations in the same order. Repeated parts
+@ are calls, because exponentials take the most code.
 
     .syntax unified
     .thumb
     .fpu fpv4-sp-d16
 
-@ Calls within this file leave all registers alone but those that they name. s8-s13 are `CELL` of mod.rs: the
-@ factors of x in the exponents of e^x and e^2x, in quarters, what rounds such an exponent, and p1, p0 and q0.
+@ Calls within this file change only the registers that they name. s8-s13 are `CELL` of mod.rs: the
+@ factors of x in the exponents of e^x and e^2x, in quarters, the number that rounds such an exponent, and p1, p0 and q0.
 
 @ s0, s1: numerator and denominator of 2^(4 s0). Changes s2, s3, r10, r12.
     .section .text.actq_cell_exp2, "ax", %progbits
@@ -53,8 +53,8 @@ actq_cell_gated:
     bx r9
     .size actq_cell_gated, . - actq_cell_gated
 
-@ Elements of an LSTM cell, [sp] (> 0) of them: r0 gates i, each further gate r1 bytes behind the last; r2 cell states, r3
-@ outputs. [sp+4] is where s8-s13 stand.
+@ Elements of an LSTM cell, [sp] (> 0) of them: r0 gates i, each further gate r1 bytes after the last; r2 cell states, r3
+@ outputs. [sp+4] is the address of s8-s13.
     .section .text.actq_lstm, "ax", %progbits
     .global actq_lstm
     .type actq_lstm, %function
@@ -88,8 +88,8 @@ actq_lstm:
     pop {r4-r10, pc}
     .size actq_lstm, . - actq_lstm
 
-@ Elements of a GRU cell, [sp] (> 0) of them: r0 and r1 gates r of either product, each further gate r2 bytes behind the last;
-@ r3 states. [sp+4] is where s8-s13 stand.
+@ Elements of a GRU cell, [sp] (> 0) of them: r0 and r1 gates r of either product, each further gate r2 bytes after the last;
+@ r3 states. [sp+4] is the address of s8-s13.
     .section .text.actq_gru, "ax", %progbits
     .global actq_gru
     .type actq_gru, %function

@@ -1,6 +1,6 @@
 @ Elements of vectors on the FPU of the hard-float target: the arithmetic of kernels/src/arch/portable/elementwise.rs and norm.rs.
-@ Of up to three vectors, element i of a pass stands in s<i>, s1<i> and s2<i>. VMLA rounds its product and so gives the bits of
-@ VMUL and VADD, in a cycle more and half the code.
+@ Of up to three vectors, element i of a pass is in s<i>, s1<i> and s2<i>. VMLA rounds its product and so gives the bits of
+@ VMUL and VADD, in one more cycle and half the code.
 
     .syntax unified
     .thumb
@@ -24,7 +24,7 @@
 9:
 .endm
 
-@ The bits \x: where their magnitude is above \limit, of which \twice is the double, it becomes that. NaNs are above.
+@ The bits \x: if their magnitude is above \limit, whose double is \twice, it becomes \limit. NaNs are above.
 .macro limit x, limit, twice
     cmp.w \twice, \x, lsl #1
     it lo
@@ -49,7 +49,7 @@
     vmla.f32 s2\j, s31, s28
 .endm
 
-@ s2<i> += s29 s<vector><i>, elements 0 to \last of the vector 0, which has no number, or 1.
+@ s2<i> += s29 s<vector><i>, elements 0 to \last of the vector 0, written without a number, or 1.
 .macro stir vector, last
     .irp i, 0, 1, 2, 3, 4, 5, 6, 7
     .if \i <= \last
@@ -58,7 +58,7 @@
     .endr
 .endm
 
-@ Elements 0 to \last. Of one alone, limits take a second, of what the registers hold, which is not stored.
+@ Elements 0 to \last. With one element, limits also process a second, of any register content, which is not stored.
 .macro denoise_pass last
     vldmia r1!, {s10-s1\last}
     vldmia r3, {s20-s2\last}
@@ -92,7 +92,7 @@
 .endm
 
 @ A denoising step of [sp+4] elements: r0 the coefficients in the order of ops/denoise.rs, s0 the limit, r1 the network's
-@ outputs, r2 the noise or 0, r3 the iterates, [sp] what the network reads next.
+@ outputs, r2 the noise or 0, r3 the iterates, [sp] the network's next input.
     .section .text.actq_denoise, "ax", %progbits
     .global actq_denoise
     .type actq_denoise, %function
@@ -110,7 +110,7 @@ actq_denoise:
     cbnz r2, 0f
     vldr s29, [r0]
 0:
-    @ From here on r0 is 0 where both coefficients of the sample are.
+    @ From here on r0 is 0 if both coefficients of the sample are.
     vmov r6, r7, s8, s9
     orrs r6, r7
     lsls r0, r6, #1
@@ -151,7 +151,7 @@ actq_denoise:
     vstmia r3!, {s10-s1\last}
 .endm
 
-@ Normalizes [sp] elements at r0 to r3: r1 means, r2 factors, s0 the limit before and s1 that after.
+@ Normalizes [sp] elements at r0 to r3: r1 means, r2 factors, s0 the limit before and s1 the limit after.
     .section .text.actq_normalize, "ax", %progbits
     .global actq_normalize
     .type actq_normalize, %function
@@ -181,7 +181,7 @@ actq_normalize:
     .endr
 .endm
 
-@ s0: s0 and in order r1 floats at r0.
+@ s0: s0 plus, in order, r1 floats at r0.
     .section .text.actq_sum, "ax", %progbits
     .global actq_sum
     .type actq_sum, %function
@@ -206,7 +206,7 @@ actq_sum:
     .endr
 .endm
 
-@ s0: s0 and in order the squared differences from s1 of r1 floats at r0.
+@ s0: s0 plus, in order, the squared differences from s1 of r1 floats at r0.
     .section .text.actq_sum_squares, "ax", %progbits
     .global actq_sum_squares
     .type actq_sum_squares, %function
@@ -244,7 +244,7 @@ actq_sum_squares:
     vstmia r0!, {s0-s\last}
 .endm
 
-@ Floats at r0, so many as r3 counts, become (x - s0) s1 weight + bias: weights at r1, biases at r2.
+@ r3 floats at r0 become (x - s0) s1 weight + bias: weights at r1, biases at r2.
     .section .text.actq_standardize, "ax", %progbits
     .global actq_standardize
     .type actq_standardize, %function

@@ -1,4 +1,4 @@
-//! What converts from and to f32, in assembler for the FPU of a Cortex-M4 or M7: the arithmetic of [`super::portable`],
+//! Conversions from and to f32, in assembler for the FPU of a Cortex-M4 or M7: the arithmetic of the portable backend,
 //! operation for operation.
 
 mod table;
@@ -38,7 +38,7 @@ unsafe extern "C" {
     fn actq_scale_add(x_scale: f32, sums: *const i32, scales: *const u32, start: *const f32, y: *mut f32, len: usize);
 }
 
-/// Quantizes `x` by the plan to the first words of `out`; `None`, with nothing done, where that is shorter than
+/// Quantizes `x` with the plan to the first words of `out`; `None`, with nothing written, if `out` is shorter than
 /// [`Plan::room`].
 #[inline(always)]
 pub(crate) fn quantize(x: &[f32], inverse: f32, plan: &Plan, out: &mut [u32]) -> Option<()> {
@@ -47,17 +47,17 @@ pub(crate) fn quantize(x: &[f32], inverse: f32, plan: &Plan, out: &mut [u32]) ->
     let (x, inverse) = if x.len() == plan.padded {
         (NonNull::from(x).cast(), inverse)
     } else {
-        // SAFETY: the room has so many words.
+        // SAFETY: the room has `words` words.
         unsafe { filled(x, inverse, plan, out, words)? }
     };
     let XLayout { shift, chunk, starts: [start, second], .. } = plan.layout.x;
     let (kernel, first, eights) = (quantizer(shift), plan.first / 8, chunk / 8);
     let (x, bias, factor, second) = (x.as_ptr(), start.bias, start.factor, second.factor);
     // SAFETY: x is the plan's padded columns, the caller's or a copy at the end of the room, and the room has at least
-    // the plan's words. What is written never reaches what is still to be read of the copy: behind `n` of its columns
-    // those are `n / 2` words and start words and sums, of which there are as many in all as words before the copy.
+    // the plan's words. The written words never reach the unread part of the copy: after `n` of its columns
+    // they are `n / 2` words, start words and sums, of which there are in all as many as words before the copy.
     // `of_valid` makes all counts 1 or more and all lengths multiples of 8 columns. The kernel reads eight columns
-    // before it writes them. It writes as many start words and sums as the layout has, which `table` asserts, and where
+    // before it writes them. It writes as many start words and sums as the layout has, which `table` asserts, and if
     // it takes eight columns for a chunk, that is the layout's limit and so `first` and `eights`.
     unsafe {
         let (groups, chunks, group) = (plan.groups, plan.chunks, plan.shape.group);
@@ -66,12 +66,12 @@ pub(crate) fn quantize(x: &[f32], inverse: f32, plan: &Plan, out: &mut [u32]) ->
     Some(())
 }
 
-/// A copy, at the end of the room, of a vector that does not fill its groups, with zeros that do. (And `inverse` as it
-/// is, so that no register has to hold it meanwhile.)
+/// Copies a vector that does not fill its groups to the end of the room, and fills it with zeros. (It returns `inverse`
+/// unchanged, so that no register has to hold it during the call.)
 ///
 /// # Safety
 ///
-/// The room has so many words.
+/// The room has `words` words.
 #[cold]
 #[inline(never)]
 unsafe fn filled(x: &[f32], inverse: f32, plan: &Plan, room: *mut u32, words: usize) -> Option<(NonNull<f32>, f32)> {
@@ -86,8 +86,8 @@ unsafe fn filled(x: &[f32], inverse: f32, plan: &Plan, room: *mut u32, words: us
     Some((NonNull::new(copied)?.cast(), inverse))
 }
 
-/// `y[i] = start[i] + sum[i] * (scale[i] * x_scale)`, with two bf16 scales a word; what is `None` stands in y, the sums
-/// with their bits. As far as the shortest goes.
+/// Computes `y[i] = start[i] + sum[i] * (scale[i] * x_scale)`, up to the shortest length, with two bf16 scales a word. If
+/// `sums` or `start` is `None`, `y` holds them, the sums as their bits.
 #[inline(never)]
 pub(crate) fn scale(sums: Option<&[i32]>, start: Option<&[u32]>, scales: &[u32], x_scale: f32, y: &mut [f32]) {
     let len = y.len().min(2 * scales.len());
@@ -95,17 +95,17 @@ pub(crate) fn scale(sums: Option<&[i32]>, start: Option<&[u32]>, scales: &[u32],
     let to = y.as_mut_ptr();
     let sums = sums.map_or(to.cast_const().cast(), <[_]>::as_ptr);
     let start = start.map_or(to.cast_const(), |start| start.as_ptr().cast());
-    // SAFETY: all operands hold at least `len` values; no place in `y` is written before what stands there was read.
+    // SAFETY: all operands hold at least `len` values; no value in `y` is written before it is read.
     unsafe { actq_scale_add(x_scale, sums, scales.as_ptr(), start, to, len) }
 }
 
-/// What the cells take: the factors of x for `e^x` and `e^(2 x)`, and what rounds in these units, p1, p0 and q0.
+/// Constants of the cells: the factors of x for `e^x` and `e^(2 x)`, the number that rounds in these units, p1, p0 and q0.
 static CELL: [f32; 6] = {
     let [round, p1, p0, q0] = exp2_constants(QUARTER);
     [EXP, 2.0 * EXP, round, p1, p0, q0]
 };
 
-/// Some elements of [`crate::ops::cells::lstm_cell`].
+/// Computes some elements of an LSTM cell (`ops::cells`).
 pub(crate) fn lstm_elements(elements: Range<usize>, gates: &[f32], c: &mut [f32], h: &mut [f32]) {
     let (Range { start, end }, n) = (elements, h.len());
     if start >= end || end > n || end > c.len() || gates.len() < 3 * n + end {
@@ -120,30 +120,30 @@ pub(crate) fn lstm_elements(elements: Range<usize>, gates: &[f32], c: &mut [f32]
     }
 }
 
-/// Some elements of [`crate::ops::cells::gru_cell`].
+/// Computes some elements of a GRU cell (`ops::cells`).
 pub(crate) fn gru_elements(elements: Range<usize>, a: &[f32], b: &[f32], h: &mut [f32]) {
     let (Range { start, end }, n) = (elements, h.len());
     if start >= end || end > n || a.len().min(b.len()) < 2 * n + end {
         return;
     }
-    // SAFETY: as for [`lstm_elements`], with three rows of `a` and of `b`.
+    // SAFETY: as for `lstm_elements`, with three rows of `a` and of `b`.
     unsafe {
         let (a, b, h) = (a.as_ptr().add(start), b.as_ptr().add(start), h.as_mut_ptr().add(start));
         actq_gru(a, b, size_of::<f32>() * n, h, end - start, &CELL);
     }
 }
 
-/// See [`crate::ops::denoise::denoise`]; `by` are its coefficients, in their order.
+/// Computes [`crate::ops::denoise::denoise`]; `by` holds its coefficients in their order.
 #[inline(always)]
 pub(crate) fn denoise(by: &[f32; 7], limit: f32, v: &[f32], z: &[f32], x: &mut [f32], y: &mut [f32]) {
     let len = x.len().min(y.len()).min(v.len());
     let (z, len) = if z.is_empty() { (ptr::null(), len) } else { (z.as_ptr(), len.min(z.len())) };
-    // SAFETY: all operands hold at least `len` values, or are none; the kernel reads and writes no others. Noise is
-    // only read where there is any.
+    // SAFETY: all operands hold at least `len` values, except empty noise; the kernel reads and writes no others. It
+    // reads noise only if there is any.
     unsafe { actq_denoise(by, limit, v.as_ptr(), z, x.as_mut_ptr(), y.as_mut_ptr(), len) }
 }
 
-/// See [`crate::ops::elementwise::normalize`].
+/// Computes [`crate::ops::elementwise::normalize`].
 #[inline(always)]
 pub(crate) fn normalize(x: &[f32], mean: &[u32], scale: &[u32], pre_clip: f32, clip: f32, y: &mut [f32]) {
     let len = y.len().min(x.len()).min(mean.len()).min(scale.len());
@@ -151,21 +151,21 @@ pub(crate) fn normalize(x: &[f32], mean: &[u32], scale: &[u32], pre_clip: f32, c
     unsafe { actq_normalize(pre_clip, clip, x.as_ptr(), mean.as_ptr(), scale.as_ptr(), y.as_mut_ptr(), len) }
 }
 
-/// `start` and the elements of `x`, in order.
+/// Adds the elements of `x` to `start`, in order.
 #[inline(always)]
 pub(crate) fn sum(start: f32, x: &[f32]) -> f32 {
     // SAFETY: the kernel reads the elements of `x`.
     unsafe { actq_sum(start, x.as_ptr(), x.len()) }
 }
 
-/// `start` and the squares of the differences of `x` from `center`, in order.
+/// Adds the squared differences of `x` from `center` to `start`, in order.
 #[inline(always)]
 pub(crate) fn sum_squares(start: f32, center: f32, x: &[f32]) -> f32 {
     // SAFETY: the kernel reads the elements of `x`.
     unsafe { actq_sum_squares(start, center, x.as_ptr(), x.len()) }
 }
 
-/// In place `(x - mean) * inverse * weight + bias`, as far as all go.
+/// Computes in place `(x - mean) * inverse * weight + bias`, up to the shortest length.
 #[inline(always)]
 pub(crate) fn standardize(mean: f32, inverse: f32, x: &mut [f32], weight: &[u32], bias: &[u32]) {
     let len = x.len().min(weight.len()).min(bias.len());
@@ -173,7 +173,7 @@ pub(crate) fn standardize(mean: f32, inverse: f32, x: &mut [f32], weight: &[u32]
     unsafe { actq_standardize(mean, inverse, x.as_mut_ptr(), weight.as_ptr(), bias.as_ptr(), len) }
 }
 
-/// The FPU's square root, which is correctly rounded as IEEE 754 has it.
+/// Computes the FPU's square root, correctly rounded as in IEEE 754.
 #[inline(always)]
 pub(crate) fn sqrt(x: f32) -> f32 {
     // SAFETY: a function of one register.

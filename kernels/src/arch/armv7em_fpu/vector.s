@@ -28,14 +28,14 @@
 .endm
 
 @ Quantizes r2 groups of r3 chunks of floats at r0; all counts are 1 or more. Writes to r1, for each chunk, its start words and
-@ its pairs, and behind the chunks of a group, where the layout asks for it, the sum of the group's integers.
+@ its pairs, and after the chunks of a group, if the layout needs it, the sum of the group's integers.
 @
-@ [sp] is how many eights the first chunk of a group has, [sp+4] how many the others; [sp+8] and [sp+12] are the first start
-@ word's bias and factor, [sp+16] the second one's factor, [sp+20] not 0 where sums are halves of a word, at shift 2 of the two
+@ [sp] is the number of eights in the first chunk of a group, [sp+4] that in the others; [sp+8] and [sp+12] are the first start
+@ word's bias and factor, [sp+16] the second one's factor, [sp+20] not 0 if sums are halves of a word, at shift 2 of the two
 @ chunks of a pair of groups, at 3 twice the group's.
 @
-@ r4-r7 pairs, r8 sum of a chunk, r9 where its start words go, r10 sum of a group, both sums times 2^shift, r11 eights left,
-@ r12 a pair of ones. r3 is kept at the frame's begin, so what was at [sp] is 40 bytes further.
+@ r4-r7 pairs, r8 sum of a chunk, r9 the address of its start words, r10 sum of a group, both sums times 2^shift, r11 remaining eights,
+@ r12 a pair of ones. r3 is saved at the frame's start, so [sp] of the call is 40 bytes further.
 .macro quantize shift, starts, sum
     .section .text.actq_quantize\shift, "ax", %progbits
     .global actq_quantize\shift
@@ -102,7 +102,7 @@ actq_quantize\shift:
     quantize 1, 2, 0
     quantize 2, 1, 1
 
-@ As the others, for chunks of eight columns: a chunk is written at once, from its start word r3 on. r8 chunks left, r9 bias, r11
+@ As the others, for chunks of eight columns: a chunk is written in one pass, from its start word r3 on. r8 remaining chunks, r9 bias, r11
 @ factor.
     .section .text.actq_quantize3, "ax", %progbits
     .global actq_quantize3
@@ -146,8 +146,8 @@ actq_quantize3:
     vmov \low, \high, lr, \word
 .endm
 
-@ y[i] = start[i] + acc[i] * (scale[i] * s0) for [sp] sums at r0, bf16 scales at r1, start at r2 and y at r3; y may be where the
-@ sums or the start are.
+@ y[i] = start[i] + acc[i] * (scale[i] * s0) for [sp] sums at r0, bf16 scales at r1, start at r2 and y at r3; y may be at the
+@ address of the sums or the start.
     .section .text.actq_scale_add, "ax", %progbits
     .global actq_scale_add
     .type actq_scale_add, %function

@@ -1,11 +1,11 @@
-//! The cells of [`crate::ops::cells`].
+//! The recurrent cells of `ops::cells`.
 
 use core::ops::Range;
 
 use crate::math::exp2::{exp_fraction, tanh_fraction};
 use crate::math::sigmoid;
 
-/// `sigmoid(gate) * tanh(x)`, by one division.
+/// Computes `sigmoid(gate) * tanh(x)` with one division.
 #[inline(always)]
 fn gated(gate: f32, x: f32) -> f32 {
     let (on, off) = exp_fraction(gate);
@@ -13,7 +13,7 @@ fn gated(gate: f32, x: f32) -> f32 {
     (on * n) / ((on + off) * d)
 }
 
-/// Some elements of [`crate::ops::cells::lstm_cell`]. Nothing is done where a length does not fit.
+/// Computes some elements of an LSTM cell (`ops::cells`). It does nothing if a length does not fit.
 #[inline(never)]
 pub fn lstm_elements(elements: Range<usize>, gates: &[f32], c: &mut [f32], h: &mut [f32]) {
     let _ = lstm(elements, gates, c, h);
@@ -33,7 +33,7 @@ fn lstm(elements: Range<usize>, gates: &[f32], c: &mut [f32], h: &mut [f32]) -> 
     Some(())
 }
 
-/// Some elements of [`crate::ops::cells::gru_cell`]. Nothing is done where a length does not fit.
+/// Computes some elements of a GRU cell (`ops::cells`). It does nothing if a length does not fit.
 #[inline(never)]
 pub fn gru_elements(elements: Range<usize>, a: &[f32], b: &[f32], h: &mut [f32]) {
     let _ = gru(elements, a, b, h);

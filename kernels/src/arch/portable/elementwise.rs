@@ -1,6 +1,6 @@
-//! Elements of vectors with limits.
+//! Elementwise operations with limits.
 
-/// See [`crate::ops::denoise::denoise`]; `by` are its coefficients, in their order.
+/// Computes [`crate::ops::denoise::denoise`]; `by` holds its coefficients in their order.
 #[inline(never)]
 pub fn denoise(by: &[f32; 7], limit: f32, v: &[f32], z: &[f32], x: &mut [f32], y: &mut [f32]) {
     let &[sample_x, sample_v, keep, direct, sample, sigma, ahead] = by;
@@ -23,7 +23,7 @@ pub fn denoise(by: &[f32; 7], limit: f32, v: &[f32], z: &[f32], x: &mut [f32], y
     }
 }
 
-/// See [`crate::ops::elementwise::normalize`].
+/// Computes [`crate::ops::elementwise::normalize`].
 #[inline(never)]
 pub fn normalize(x: &[f32], mean: &[u32], scale: &[u32], pre_clip: f32, clip: f32, y: &mut [f32]) {
     let constant = |bits: &u32| f32::from_bits(u32::from_le(*bits));
@@ -33,7 +33,7 @@ pub fn normalize(x: &[f32], mean: &[u32], scale: &[u32], pre_clip: f32, clip: f3
     }
 }
 
-/// `x` limited to `±limit`; the limit where infinities have made it NaN, whose sign is another one on every machine.
+/// Limits `x` to `±limit`. If infinities made it NaN, whose sign differs between machines, it is the limit.
 #[inline(always)]
 fn limited(x: f32, limit: f32) -> f32 {
     if x < -limit {

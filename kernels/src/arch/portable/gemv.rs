@@ -1,14 +1,13 @@
 //! The GEMV in plain Rust, for any target: the arithmetic of the assembler backend, sum for sum.
 //!
-//! The loops are written for a compiler that has few registers and knows the layout: a strip's cells are walked side by
-//! side, so that an activation is loaded once for all of them, and lengths are constants wherever the layout gives
-//! them.
+//! The loops suit a compiler that has few registers and knows the layout. They process a strip's cells together, so that one
+//! load of an activation serves all of them. Lengths that the layout determines are constants.
 
 use crate::arch::product::Product;
 use crate::layout::{Block, Format, QUAD, Sums, XLayout, with_format};
 use crate::x::Prepared;
 
-/// As [`crate::arch::gemv`].
+/// Computes a product as [`crate::arch::gemv`] does.
 pub fn gemv(Product { block, x, first_row, acc }: Product<'_>) {
     with_format!(block.shape(), strips::<_>(block, x, first_row, acc));
 }
@@ -39,13 +38,13 @@ fn strips<F: Format>(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc:
         quad_group: shape.units_per_group() * F::CELL.words * (QUAD / F::CELL.rows),
         quad_scales: usize::from(shape.group != 0),
     };
-    // Whole groups of 32 columns, the usual ones, have a kernel whose lengths are all known to the compiler.
+    // Whole groups of 32 columns, the usual ones, have a kernel in which all lengths are constants.
     let thirty_two = shape.group == 32 && shape.units() == shape.groups() * shape.units_per_group();
     let mut words = block.rows_from(first_row);
     for acc in acc.chunks_mut(F::STRIP) {
         let (strip, rest) = split(words, acc.len() / QUAD * block.quad_words());
         words = rest;
-        // The number of a strip's cells is known to the compiler, so that their sums stand in registers.
+        // The number of a strip's cells is a constant, so that their sums are in registers.
         match (acc.len() / F::CELL.rows, thirty_two) {
             (1, false) => strip_of::<F, 1>(strip, x.words(), lengths, acc),
             (2, false) => strip_of::<F, 2>(strip, x.words(), lengths, acc),
@@ -57,19 +56,19 @@ fn strips<F: Format>(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc:
     }
 }
 
-/// `split_at` without its panic.
+/// Splits words at `at`, without the panic of `split_at`.
 #[inline(always)]
 fn split(words: &[u32], at: usize) -> (&[u32], &[u32]) {
     words.split_at(at.min(words.len()))
 }
 
-/// A strip of `CELLS` cells, one above the other.
+/// Computes a strip of `CELLS` cells, one above the other.
 #[inline(never)]
 fn strip_of<F: Format, const CELLS: usize>(mut words: &[u32], mut x: &[u32], lengths: Lengths, acc: &mut [i32]) {
     let quads = CELLS * F::CELL.rows / QUAD;
     let scales = lengths.quad_scales * quads;
     let weights_and_scales = lengths.quad_group * quads + scales;
-    // Columns of a row are a multiple of the step; where it has several units, that is an even number.
+    // Columns of a row are a multiple of the step. If a step has several units, their number is even.
     let pass = if F::STEP > F::CELL.cols { 2 } else { 1 };
     let mut totals = [[0i32; QUAD]; CELLS];
     while !x.is_empty() {
@@ -84,7 +83,7 @@ fn strip_of<F: Format, const CELLS: usize>(mut words: &[u32], mut x: &[u32], len
         if F::X.chunk == XLayout::ALL {
             chunk::<F, CELLS>(weights, group, pass, &mut sums);
         } else {
-            // All chunks but the first have a length that the compiler knows.
+            // All chunks except the first have a constant length.
             if lengths.first_chunk != length {
                 let (x, rest) = split(group, lengths.first_chunk);
                 let (now, rest_weights) = split(weights, weights_of::<F>(x.len()) * CELLS);
@@ -104,7 +103,7 @@ fn strip_of<F: Format, const CELLS: usize>(mut words: &[u32], mut x: &[u32], len
     store::<F, CELLS>(&totals, acc);
 }
 
-/// As [`strip_of`], for whole groups of 32 columns.
+/// Computes a strip as [`strip_of`] does, for whole groups of 32 columns.
 #[inline(never)]
 fn strip_of_32<F: Format, const CELLS: usize>(words: &[u32], x: &[u32], acc: &mut [i32]) {
     if F::X.pairs {
@@ -130,7 +129,7 @@ fn strip_of_32<F: Format, const CELLS: usize>(words: &[u32], x: &[u32], acc: &mu
     store::<F, CELLS>(&totals, acc);
 }
 
-/// As [`strip_of_32`], for layouts that take groups in pairs; a group is a chunk.
+/// Computes a strip as [`strip_of_32`] does, for layouts that pair groups; a group is a column chunk.
 #[inline(always)]
 fn strip_of_pairs<F: Format, const CELLS: usize>(mut words: &[u32], x: &[u32], acc: &mut [i32]) {
     let length = F::X.start_words + COLS / 2;
@@ -160,7 +159,7 @@ fn strip_of_pairs<F: Format, const CELLS: usize>(mut words: &[u32], x: &[u32], a
     store::<F, CELLS>(&totals, acc);
 }
 
-/// The scales of four rows; ones where there are none.
+/// Returns the scales of four rows; ones without group scales.
 #[inline(always)]
 fn scale_word(scales: &[u32], quad: usize) -> u32 {
     scales.get(quad).map_or(0x0101_0101, |word| u32::from_le(*word))
@@ -201,7 +200,7 @@ fn store<F: Format, const CELLS: usize>(totals: &[[i32; QUAD]; CELLS], acc: &mut
     }
 }
 
-/// Words of weights in a cell's rows for a chunk of so many words.
+/// Returns the words of weights in a cell's rows for a column chunk of `chunk` words.
 #[inline(always)]
 const fn weights_of<F: Format>(chunk: usize) -> usize {
     chunk.saturating_sub(F::X.start_words) / (F::CELL.cols / 2) * F::CELL.words
@@ -212,10 +211,10 @@ const fn weights_of<F: Format>(chunk: usize) -> usize {
 fn chunk<F: Format, const CELLS: usize>(weights: &[u32], x: &[u32], pass: usize, sums: &mut [[i32; QUAD]; CELLS]) {
     let (starts, x) = split(x, F::X.start_words);
     let mut t = [F::start(starts); CELLS];
-    // Long cells leave registers for no more than two.
+    // Long cells have registers for no more than two.
     if F::CELL.cols == 32 {
         if let [a, b] = t.as_chunks_mut::<2>().0 {
-            // In this order the compiler spills less.
+            // In this order the compiler spills fewer registers.
             cells::<F, CELLS, 2>(weights, x, pass, 2, b);
             cells::<F, CELLS, 2>(weights, x, pass, 0, a);
         }

@@ -1,4 +1,4 @@
-//! Everything in plain Rust, for any target: the arithmetic of the assembler backends, operation for operation.
+//! All kernels in Rust, for any target: the arithmetic of the assembler backends, operation for operation.
 
 mod cells;
 mod elementwise;

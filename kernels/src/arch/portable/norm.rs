@@ -1,16 +1,16 @@
-//! The passes of a norm, see [`crate::ops::norm`].
+//! The passes of a norm: see [`crate::ops::norm`].
 
-/// `start` and the elements of `x`, in order.
+/// Adds the elements of `x` to `start`, in order.
 pub fn sum(start: f32, x: &[f32]) -> f32 {
     x.iter().fold(start, |sum, v| sum + v)
 }
 
-/// `start` and the squares of the differences of `x` from `center`, in order.
+/// Adds the squared differences of `x` from `center` to `start`, in order.
 pub fn sum_squares(start: f32, center: f32, x: &[f32]) -> f32 {
     x.iter().fold(start, |sum, v| sum + (v - center) * (v - center))
 }
 
-/// In place `(x - mean) * inverse * weight + bias`, as far as all go.
+/// Computes in place `(x - mean) * inverse * weight + bias`, up to the shortest length.
 pub fn standardize(mean: f32, inverse: f32, x: &mut [f32], weight: &[u32], bias: &[u32]) {
     for ((x, weight), bias) in x.iter_mut().zip(weight).zip(bias) {
         let [weight, bias] = [weight, bias].map(|bits| f32::from_bits(u32::from_le(*bits)));

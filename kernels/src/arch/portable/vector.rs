@@ -1,4 +1,4 @@
-//! Vectors between f32 and integers.
+//! Conversion of vectors between f32 and integers.
 
 use crate::layout::half::{bf16, half_word};
 #[cfg(not(actq_fpu))]
@@ -6,19 +6,19 @@ use crate::round::ROUND;
 #[cfg(not(actq_fpu))]
 use crate::x::{Plan, lay_out};
 
-/// The bits of the largest magnitude.
+/// Returns the bits of the largest magnitude.
 #[cfg(any(feature = "writer", not(actq_armv7em)))]
 pub fn magnitude(x: &[f32]) -> u32 {
     x.iter().fold(0u32, |m, v| m.max(v.to_bits() & 0x7fff_ffff))
 }
 
-/// `to = from`, as far as both go.
+/// Copies `from` to `to`, up to the shorter length.
 #[cfg(any(feature = "writer", not(actq_armv7em)))]
 pub fn copy(from: &[u32], to: &mut [u32]) {
     to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
 }
 
-/// Quantizes `x` by the plan to the first words of `out`; `None`, with nothing done, where that is shorter than
+/// Quantizes `x` with the plan to the first words of `out`; `None`, with nothing written, if `out` is shorter than
 /// [`Plan::room`].
 #[cfg(not(actq_fpu))]
 pub(crate) fn quantize(x: &[f32], inverse: f32, plan: &Plan, out: &mut [u32]) -> Option<()> {
@@ -26,8 +26,8 @@ pub(crate) fn quantize(x: &[f32], inverse: f32, plan: &Plan, out: &mut [u32]) ->
     Some(())
 }
 
-/// `y[i] = start[i] + sum[i] * (scale[i] * x_scale)`, with two bf16 scales a word; what is `None` stands in y, the sums
-/// with their bits.
+/// Computes `y[i] = start[i] + sum[i] * (scale[i] * x_scale)`, with two bf16 scales a word. If `sums` or `start` is `None`,
+/// `y` holds them, the sums as their bits.
 pub fn scale(sums: Option<&[i32]>, start: Option<&[u32]>, scales: &[u32], x_scale: f32, y: &mut [f32]) {
     for (i, y) in y.iter_mut().enumerate() {
         let start = start.and_then(|s| s.get(i)).map_or(*y, |bits| f32::from_bits(u32::from_le(*bits)));
@@ -36,7 +36,7 @@ pub fn scale(sums: Option<&[i32]>, start: Option<&[u32]>, scales: &[u32], x_scal
     }
 }
 
-/// The square root, correctly rounded as IEEE 754 has it.
+/// Computes the square root, correctly rounded as in IEEE 754.
 #[inline(always)]
 pub fn sqrt(x: f32) -> f32 {
     libm::sqrtf(x)

@@ -148,7 +148,7 @@ impl Writer {
             work: program.work,
             matrices: Records { offset: self.matrices, count: matrices.len() },
             ops: Records { offset: ops, count: program.steps.len() },
-            once: program.once,
+            first_denoising_op: program.once,
             denoising_steps: policy.graph.denoising.as_ref().map_or(0, |denoising| denoising.steps.len()),
             contract,
             contract_flags: flags,

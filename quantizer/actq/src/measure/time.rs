@@ -59,7 +59,7 @@ impl StepTime {
             microseconds: 1e6 * cost.cycles as f64 / clock_hz,
         };
         let of_op = |(i, op): (usize, Op<'_>)| {
-            let runs = if i < image.once() { 1 } else { image.denoising_steps() };
+            let runs = if i < image.first_denoising_op() { 1 } else { image.denoising_steps() };
             let macs = op.matrix().map_or(0, |matrix| matrix.rows * matrix.cols);
             time(op.kind.name(), op.dst().len, runs, runs * macs, cost::of_op(&op) * runs as u64)
         };

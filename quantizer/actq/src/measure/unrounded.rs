@@ -38,7 +38,7 @@ impl<'a> Unrounded<'a> {
             arena[self.ops[0].dst().range()].copy_from_slice(bytemuck::cast_slice(noise));
         }
         for step in 0..self.image.denoising_steps() {
-            let first = if step == 0 { 0 } else { self.image.once() };
+            let first = if step == 0 { 0 } else { self.image.first_denoising_op() };
             for (op, weights) in self.ops[first..].iter().zip(&self.weights[first..]) {
                 match (op.kind, op.matrix()) {
                     (OpKind::Linear { accumulate }, Some(matrix)) => multiply(op, &matrix, weights, accumulate, arena),
