@@ -1,4 +1,4 @@
-//! Marks for the instruction counter (`xtask/insn-count`): it counts the instructions between a call of
+//! Marks for the instruction counter (`tools/xtask/insn-count`): it counts the instructions between a call of
 //! [`actq_count_begin`] and the next call of [`actq_count_end`].
 
 use crate::machine::asm;
