@@ -97,7 +97,8 @@ fn check_cargo(words: &[&str], aliases: &str, xtask: &str, manifests: &str) -> R
 fn every_shown_command_is_known() -> Result<()> {
     let listed = fs::read_dir(root().join("docs"))?.map(|entry| Ok(entry?.path())).collect::<Result<Vec<PathBuf>>>()?;
     let documents = listed.into_iter().filter(|path| path.extension().is_some_and(|ending| ending == "md"));
-    let (reference, aliases, xtask) = (read("docs/CLI.md")?, read(".cargo/config.toml")?, read("tools/xtask/src/main.rs")?);
+    let (reference, aliases, xtask) =
+        (read("docs/CLI.md")?, read(".cargo/config.toml")?, read("tools/xtask/src/main.rs")?);
     let members = read("Cargo.toml")?;
     let members = members.split('"').map(|member| root().join(member).join("Cargo.toml")).filter(|path| path.is_file());
     let manifests = members.map(fs::read_to_string).collect::<Result<String, _>>()?;
