@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use actq::graph::ops::Balance;
 use actq::measure::size::{bits_per_weight, hex};
 use actq::text::printable;
 use actq_kernels::Image;
@@ -103,6 +104,7 @@ fn row(op: &Op<'_>) -> Vec<String> {
         (OpKind::Normalize { added }, _) => {
             format!("clip {} {}{}", op.constant(0), op.constant(1), if added { ", by the quantizer" } else { "" })
         }
+        (OpKind::RmsNorm, _) if op.constant(0) == Balance::FREE_EPS => "factors, by the quantizer".into(),
         (OpKind::LayerNorm | OpKind::RmsNorm, _) => format!("eps {}", op.constant(0)),
         (OpKind::LstmCell, _) => format!("cell {}", region(op.third())),
         (OpKind::GruCell, _) => format!("gates {}", region(op.third())),

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use actq_kernels::Image;
-use actq_kernels::image::{Matrix, OpKind};
+use actq_kernels::image::{Matrix, Op, OpKind};
 
 use crate::graph::ops::Balance;
 
@@ -12,9 +12,17 @@ use crate::graph::ops::Balance;
 /// operations share counts once.
 pub fn bits_per_weight(image: &Image<'_>) -> f64 {
     let bytes: usize = distinct(image).iter().map(Matrix::weight_bytes).sum();
-    let added = image.ops().filter(|op| op.kind == OpKind::Normalize { added: true });
-    let constants: usize = added.map(|op| Balance::bytes(op.dst().len)).sum();
+    let constants: usize = image.ops().map(|op| added_bytes(&op)).sum();
     8.0 * (bytes + constants) as f64 / image.source_weights().max(1) as f64
+}
+
+/// Bytes of the operation's constants, if the quantizer put it before a matrix.
+fn added_bytes(op: &Op<'_>) -> usize {
+    match op.kind {
+        OpKind::Normalize { added: true } => Balance::bytes(op.dst().len),
+        OpKind::RmsNorm if op.constant(0) == Balance::FREE_EPS => Balance::bytes_without_means(op.dst().len),
+        _ => 0,
+    }
 }
 
 /// Bytes as hexadecimal digits.

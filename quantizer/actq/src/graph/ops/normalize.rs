@@ -1,8 +1,10 @@
+use std::ops::Range;
+
 use actq_kernels::image::OpKind;
 use ndarray::Array2;
 
 use crate::error::Result;
-use crate::graph::lowering::{BufferId, Lifetime, Lowering, StepData};
+use crate::graph::lowering::{BufferId, Lifetime, Lowering, Slice, StepData};
 use crate::graph::operation::{Backward, Forward, NodeState, Operation, Saved, expect_len, only};
 use crate::graph::values::{ValueId, WeightMatrix};
 
@@ -50,56 +52,113 @@ impl Operation for Normalize {
     }
 
     fn lower(&self, to: &mut Lowering, inputs: &[ValueId], len: usize) -> BufferId {
-        self.emit(false, to, inputs, len)
+        self.emit(to, inputs, len)
     }
 }
 
 impl Normalize {
     /// As [`Operation::lower`].
-    fn emit(&self, added: bool, to: &mut Lowering, inputs: &[ValueId], len: usize) -> BufferId {
-        let dst = to.buffer(len, Lifetime::Step);
-        let src = to.place(inputs[0]);
-        let data = StepData::Constants([&[self.pre_clip, self.clip], &self.mean[..], &self.scale].concat());
-        to.emit(OpKind::Normalize { added }, to.whole(dst), Some(src), None, data);
+    fn emit(&self, to: &mut Lowering, inputs: &[ValueId], len: usize) -> BufferId {
+        let (dst, src) = (to.buffer(len, Lifetime::Step), to.place(inputs[0]));
+        self.emit_run(false, to, dst, src, 0..len);
         dst
+    }
+
+    /// Emits the operation on a run of the values.
+    fn emit_run(&self, added: bool, to: &mut Lowering, dst: BufferId, src: Slice, run: Range<usize>) {
+        let part = |of: Slice| Slice { offset: of.offset + run.start, len: run.len(), ..of };
+        let (dst, src) = (part(to.whole(dst)), part(src));
+        let (mean, scale) = (&self.mean[run.clone()], &self.scale[run]);
+        let data = StepData::Constants([&[self.pre_clip, self.clip], mean, scale].concat());
+        to.emit(OpKind::Normalize { added }, dst, Some(src), None, data);
     }
 }
 
-/// `(x - mean) * scale`, which the quantizer puts before matrices whose columns it has scaled.
+/// `(x - mean) * scale`, which the quantizer puts before matrices whose columns it has scaled: of all values, or of runs
+/// of them. The other values stay as they are.
 #[derive(Clone, Debug)]
-pub struct Balance(Normalize);
+pub struct Balance {
+    /// Of the other values, the mean is 0 and the scale 1.
+    normalize: Normalize,
+    /// Ascending, with a gap between two.
+    runs: Vec<Range<usize>>,
+    /// Whether the image holds the means; without, all of them are 0.
+    has_means: bool,
+}
 
 impl Balance {
+    /// What is added to the mean square where the image holds no means. An RMS norm with so much is a multiplication:
+    /// below it, squares of values up to 2^47 disappear, and its root is a power of two.
+    pub const FREE_EPS: f32 = f32::from_bits((127 + 120) << 23);
+
     /// With these means and factors.
     pub fn new(mean: Vec<f32>, scale: Vec<f32>) -> Self {
-        Self(Normalize { mean, scale, pre_clip: f32::INFINITY, clip: f32::INFINITY })
+        let all = 0..mean.len();
+        Self::of_runs(Some(mean), scale, vec![all])
     }
 
-    /// Bytes of the constants for so many values: means, scales, and the operation's two limits.
-    pub fn bytes(len: usize) -> usize {
+    /// With these means, or none, and factors, of which only those of `runs` count.
+    pub fn of_runs(mean: Option<Vec<f32>>, mut scale: Vec<f32>, runs: Vec<Range<usize>>) -> Self {
+        let has_means = mean.is_some();
+        let mut mean = mean.unwrap_or_else(|| vec![0.0; scale.len()]);
+        let other = |i: &usize| !runs.iter().any(|run| run.contains(i));
+        for i in (0..mean.len().min(scale.len())).filter(other) {
+            (mean[i], scale[i]) = (0.0, 1.0);
+        }
+        let normalize = Normalize { mean, scale, pre_clip: f32::INFINITY, clip: f32::INFINITY };
+        Self { normalize, runs, has_means }
+    }
+
+    /// Bytes of the constants for a run of so many values: means, scales, and the operation's two limits.
+    pub const fn bytes(len: usize) -> usize {
         4 * (2 * len + 2)
+    }
+
+    /// The same without means: scales, and what is added to the mean square.
+    pub const fn bytes_without_means(len: usize) -> usize {
+        4 * (len + 1)
+    }
+
+    /// Bytes of its constants.
+    pub fn constant_bytes(&self) -> usize {
+        let bytes = if self.has_means { Self::bytes } else { Self::bytes_without_means };
+        self.runs.iter().map(|run| bytes(run.len())).sum()
     }
 
     /// What it computes.
     pub fn normalize(&self) -> &Normalize {
-        &self.0
+        &self.normalize
     }
 }
 
 impl Operation for Balance {
     fn output_len(&self, matrices: &[WeightMatrix], inputs: &[usize]) -> Result<usize> {
-        self.0.output_len(matrices, inputs)
+        self.normalize.output_len(matrices, inputs)
     }
 
     fn forward(&self, run: &Forward<'_>, state: &mut NodeState) -> (Array2<f32>, Saved) {
-        self.0.forward(run, state)
+        self.normalize.forward(run, state)
     }
 
     fn backward(&self, run: &mut Backward<'_>, saved: &Saved, dy: Array2<f32>, d_state: &mut NodeState) {
-        self.0.backward(run, saved, dy, d_state);
+        self.normalize.backward(run, saved, dy, d_state);
     }
 
     fn lower(&self, to: &mut Lowering, inputs: &[ValueId], len: usize) -> BufferId {
-        self.0.emit(true, to, inputs, len)
+        let (dst, src) = (to.buffer(len, Lifetime::Step), to.place(inputs[0]));
+        if !self.has_means || self.runs.iter().map(Range::len).sum::<usize>() < len {
+            to.emit(OpKind::Copy, to.whole(dst), Some(src), None, StepData::None);
+        }
+        for run in &self.runs {
+            if self.has_means {
+                self.normalize.emit_run(true, to, dst, src, run.clone());
+                continue;
+            }
+            let root = Self::FREE_EPS.sqrt();
+            let weights = self.normalize.scale[run.clone()].iter().map(|scale| scale * root);
+            let data = StepData::Constants([Self::FREE_EPS].into_iter().chain(weights).collect());
+            to.emit(OpKind::RmsNorm, Slice { offset: run.start, len: run.len(), ..to.whole(dst) }, None, None, data);
+        }
+        dst
     }
 }

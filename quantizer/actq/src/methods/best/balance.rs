@@ -21,6 +21,7 @@
 
 mod columns;
 mod mixed;
+mod part;
 mod sites;
 
 use nalgebra::{DMatrix, DVector};
@@ -32,6 +33,7 @@ use crate::graph::ops::{Balance, Normalize};
 use crate::graph::{Graph, NodeKind};
 use columns::{Columns, deviations, lost_bits};
 pub use mixed::{MixedUnits, mixed_units};
+use part::Part;
 use sites::{Reading, Site, sites};
 
 /// What an operation more has to save, in bits a weight of the whole policy: 1.4% of the error.
@@ -54,24 +56,26 @@ pub fn balance(graph: &Graph, moments: &mut [Moments], outputs: &[Vec<f64>]) -> 
     for site in sites(graph).into_iter().rev() {
         let columns = Columns::of(graph, &site, moments, outputs);
         let own = own_normalize(graph, &site);
-        if !own && !pays(graph, &site, &columns, moments) {
+        let part = if own { Part::whole(&columns) } else { part(graph, &site, &columns, moments) };
+        if !own && !pays(graph, &site, &columns, &part, moments) {
             continue;
         }
-        let Some(factors) = columns.factors() else { continue };
+        let Some(factors) = columns.factors(&part) else { continue };
+        let mean = part.means(&columns.mean);
         for reading in &site.readings {
-            let (m, mean, factors) =
-                (reading.matrix, reading.spread(&columns.mean, 0.0), reading.spread(&factors, 1.0));
+            let (m, mean, factors) = (reading.matrix, reading.spread(&mean, 0.0), reading.spread(&factors, 1.0));
             let shift = scale(&mut balanced, m, &mean, &factors);
             add_to_bias(&mut balanced, m, &shift);
             moments[m].balance(&mean, &factors);
         }
         if own {
             if let NodeKind::Normalize(normalize) = &mut balanced.nodes[site.value - 1].kind {
-                fold(normalize, &columns.mean, &factors);
+                fold(normalize, &mean, &factors);
             }
         } else {
-            let [mean, scale] = [&columns.mean, &factors].map(|of| of.iter().map(|v| *v as f32).collect());
-            balanced.insert(Balance::new(mean, scale), site.value, &site.readers)?;
+            let [mean, scale]: [Vec<f32>; 2] = [&mean, &factors].map(|of| of.iter().map(|v| *v as f32).collect());
+            let balance = Balance::of_runs(part.has_means.then_some(mean), scale, part.runs);
+            balanced.insert(balance, site.value, &site.readers)?;
         }
     }
     Ok(balanced)
@@ -79,26 +83,51 @@ pub fn balance(graph: &Graph, moments: &mut [Moments], outputs: &[Vec<f64>]) -> 
 
 /// Bytes of what [`balance`] has added to a network.
 pub fn balance_bytes(graph: &Graph) -> usize {
-    let added = graph.nodes.iter().filter(|node| matches!(node.kind, NodeKind::Balance(_)));
-    added.map(|node| Balance::bytes(node.len)).sum()
+    let bytes = |kind: &NodeKind| if let NodeKind::Balance(balance) = kind { balance.constant_bytes() } else { 0 };
+    graph.nodes.iter().map(|node| bytes(&node.kind)).sum()
 }
 
-/// Whether an operation is worth its bytes, or nothing but it keeps the policy whole.
-fn pays(graph: &Graph, site: &Site, columns: &Columns, moments: &[Moments]) -> bool {
-    let weights = |reading: &Reading| graph.matrices[reading.matrix].rows * reading.columns().count();
-    let bits = columns.saved_bits();
-    let saved = site.readings.iter().map(weights).sum::<usize>() as f64 * bits.min(MOST_BITS)
-        - 8.0 * Balance::bytes(columns.mean.len()) as f64;
-    saved >= WORTH * graph.weights() as f64
-        || (bits >= RUINOUS && saved >= 0.0)
+/// What an operation is to scale: the part that saves most, or all columns where only that keeps the policy whole.
+fn part(graph: &Graph, site: &Site, columns: &Columns, moments: &[Moments]) -> Part {
+    let part = Part::best(columns, weights_behind(graph, site), graph.weights());
+    let keeps_whole = |factors: Vec<f64>| {
+        part.takes(&factors) && !site.readings.iter().any(|r| is_apart(graph, r, moments, &factors))
+    };
+    let usable = !columns.are_far() && columns.factors(&part).is_some_and(keeps_whole);
+    if usable { part } else { Part::whole(columns) }
+}
+
+/// Whether an operation is worth its bytes, or nothing but it keeps the policy whole. Where units do not ruin the
+/// policy, one on all columns has to be worth them: a few columns always gain a little.
+fn pays(graph: &Graph, site: &Site, columns: &Columns, part: &Part, moments: &[Moments]) -> bool {
+    let saved = |part: &Part| saved_bits(graph, site, columns, part);
+    let as_they_are = vec![1.0; columns.mean.len()];
+    saved(&Part::whole(columns)) >= WORTH * graph.weights() as f64
+        || (columns.saved_bits() >= RUINOUS && saved(part) >= 0.0)
         || columns.are_far()
-        || site.readings.iter().any(|reading| is_apart(graph, reading, moments))
+        || site.readings.iter().any(|reading| is_apart(graph, reading, moments, &as_they_are))
 }
 
-/// Whether a matrix that also reads another value would be ruined by the unit that all elements of this one share.
-fn is_apart(graph: &Graph, reading: &Reading, moments: &[Moments]) -> bool {
-    let values: Vec<f64> = deviations(&moments[reading.matrix]).into_iter().map(|d| d * d).collect();
-    reading.is_partial() && lost_bits(&graph.matrices[reading.matrix].column_energies(), &values) >= RUINOUS
+/// Bits that an operation saves, those of its own bytes taken off.
+fn saved_bits(graph: &Graph, site: &Site, columns: &Columns, part: &Part) -> f64 {
+    let bits = columns.saved_bits().min(MOST_BITS) - part.lost_bits;
+    weights_behind(graph, site) as f64 * bits - 8.0 * part.bytes() as f64
+}
+
+/// Weights that read the value.
+fn weights_behind(graph: &Graph, site: &Site) -> usize {
+    site.readings.iter().map(|reading| graph.matrices[reading.matrix].rows * reading.columns().count()).sum()
+}
+
+/// Whether a matrix that also reads another value would be ruined by the unit that all elements of this one share, once
+/// they have these factors.
+fn is_apart(graph: &Graph, reading: &Reading, moments: &[Moments], factors: &[f64]) -> bool {
+    let squares: Vec<f64> = reading.spread(factors, 1.0).into_iter().map(|d| d * d).collect();
+    let deviations = deviations(&moments[reading.matrix]);
+    let values: Vec<f64> = deviations.into_iter().zip(&squares).map(|(d, square)| d * d * square).collect();
+    let energies = graph.matrices[reading.matrix].column_energies();
+    let energies: Vec<f64> = energies.into_iter().zip(&squares).map(|(energy, square)| energy / square).collect();
+    reading.is_partial() && lost_bits(&energies, &values) >= RUINOUS
 }
 
 /// Whether the value is that of a normalization without a limit behind it that nothing else reads.
@@ -155,7 +184,7 @@ mod tests {
 
     const COLS: usize = 6;
     /// So many that a balance takes a small share of the weights' bytes.
-    const ROWS: usize = 400;
+    const ROWS: usize = 800;
 
     /// A linear layer behind what `before` builds, over observations that `COLS` different powers of three scale, and
     /// weights that powers of two do.
@@ -364,6 +393,49 @@ mod tests {
         assert_eq!(shared(1.0), []);
         let [MixedUnits { matrix, observations, bits }] = &shared(1e9)[..] else { panic!("one matrix") };
         assert!(matrix == "w" && observations.contains(&0) && *bits > 3.0, "{observations:?} {bits}");
+    }
+
+    /// A linear layer of `rows` that undoes the units of the observation, whose mean is 2 unless `mean` is 0.
+    fn small(rows: usize, units: [f32; COLS], mean: f32) -> (Graph, Vec<Moments>) {
+        let mut random = Random::new(6);
+        let mut graph = Graph::new(COLS);
+        let data = (0..rows * COLS).map(|i| random.normal() / units[i % COLS]).collect();
+        let matrix = graph.add_matrix(WeightMatrix { name: "w".into(), rows, cols: COLS, data }).expect("a matrix");
+        graph.add(Linear { matrix, bias: vec![0.5; rows] }, &[0]).expect("it fits");
+        let mut one = || units.map(|unit| unit * (mean + random.normal())).to_vec();
+        let observations: Vec<Vec<f32>> = (0..400).map(|_| one()).collect();
+        let moments = moments(&graph, &observations);
+        (graph, moments)
+    }
+
+    /// The factors of an operation in a layer of `rows`, and the bytes of its constants.
+    fn scaled(rows: usize, units: [f32; COLS], mean: f32) -> Option<(Vec<f32>, usize)> {
+        let (graph, mut moments) = small(rows, units, mean);
+        let balanced = balance(&graph, &mut moments, &[vec![1.0; rows]]).expect("balanced");
+        let NodeKind::Balance(balance) = &balanced.nodes[0].kind else { return None };
+        Some((balance.normalize().scale.clone(), balance.constant_bytes()))
+    }
+
+    #[test]
+    fn only_columns_in_other_units_are_scaled() {
+        for (unit, rows) in [(1e3, 500), (1e-5, 500), (1e3, 1000)] {
+            let (scale, bytes) = scaled(rows, [1.0, 1.0, unit, 1.0, 1.0, 1.0], 0.0).expect("one unit is another");
+            assert_eq!((scale[1], scale[3], bytes), (1.0, 1.0, Balance::bytes(1)), "{unit}");
+            assert!((scale[2] * unit - 1.0).abs() < 0.2, "{unit}: {scale:?}");
+        }
+        // As few as there are: of two units the one that fewer columns have.
+        let (scale, bytes) = scaled(500, [1e4, 1.0, 1e4, 1e4, 1e4, 1e4], 0.0).expect("one unit is another");
+        assert!((scale[1] / 1e4 - 1.0).abs() < 0.2 && scale[0] == 1.0 && bytes == Balance::bytes(1), "{scale:?}");
+        assert_eq!(scaled(500, [1e4; COLS], 0.0), None);
+    }
+
+    #[test]
+    fn means_are_stored_where_their_bytes_are_few_or_they_matter() {
+        let units = [1.0, 1e3, 1e6, 1e-3, 1e2, 1e-5];
+        let bytes = |rows, mean| scaled(rows, units, mean).map(|(_, bytes)| bytes);
+        assert_eq!(bytes(50, 0.0), Some(Balance::bytes_without_means(COLS)));
+        assert_eq!(bytes(20_000, 0.0), Some(Balance::bytes(COLS)));
+        assert_eq!(bytes(50, 1000.0), Some(Balance::bytes(COLS)));
     }
 
     #[test]

@@ -6,6 +6,7 @@
 
 use nalgebra::DMatrix;
 
+use super::part::Part;
 use super::sites::{Reading, Site};
 use crate::calibrate::moments::Moments;
 use crate::calibrate::sensitivity::{Side, importance};
@@ -55,10 +56,27 @@ impl Columns {
 
     /// Bits that each weight can do without for the error that it has.
     pub(super) fn saved_bits(&self) -> f64 {
+        let (weights, values) = self.as_they_are();
+        lost_bits(&weights, &values)
+    }
+
+    /// `a` and `h` in the values' own units.
+    pub(super) fn as_they_are(&self) -> (Vec<f64>, Vec<f64>) {
         let of = |values: &[f64], factor: &dyn Fn(f64) -> f64| -> Vec<f64> {
             values.iter().zip(&self.units).map(|(value, unit)| value * factor(*unit)).collect()
         };
-        lost_bits(&of(&self.weights, &|unit| unit * unit), &of(&self.values, &|unit| (unit * unit).recip()))
+        (of(&self.weights, &|unit| unit * unit), of(&self.values, &|unit| (unit * unit).recip()))
+    }
+
+    /// Whether a value is so large or small that only a factor brings it where f32 can square it.
+    pub(super) fn is_far(&self, column: usize) -> bool {
+        self.is_beyond(column, FAR)
+    }
+
+    /// Whether a value's mean or deviation is above `most`, or its deviation below one over it.
+    pub(super) fn is_beyond(&self, column: usize, most: f64) -> bool {
+        let deviation = self.deviation[column] / self.units[column];
+        self.mean[column].abs() > most || deviation > 0.0 && !(1.0 / most..=most).contains(&deviation)
     }
 
     /// Whether the values are so large or small that only a factor brings them where f32 can square them.
@@ -86,14 +104,21 @@ impl Columns {
         factors.iter().zip(&self.weights).any(|(factor, a)| *a > 0.0 && beyond(factor))
     }
 
-    /// `d`, so that the deviations of what moved are 1 in the geometric mean; `None` where nothing did.
-    pub(super) fn factors(&self) -> Option<Vec<f64>> {
+    /// `d` of the part's columns, 1 of the others: relative to those, or, where there are none, so that the deviations
+    /// of what moved are 1 in the geometric mean; `None` where nothing moved.
+    pub(super) fn factors(&self, part: &Part) -> Option<Vec<f64>> {
         let (factors, cols) = (self.wanted(), 0..self.mean.len());
         let usual = self.usual(&factors)?;
         let limited = |c: usize| factors[c].clamp(usual / MOST, usual * MOST);
         let moved = cols.clone().filter(|&c| self.deviation[c] > 0.0);
         let unit = geometric_mean(moved.map(|c| limited(c) * self.deviation[c]))?;
-        Some(cols.map(|c| self.units[c] * limited(c) / unit).collect())
+        let unit = part.kept_factor.unwrap_or(unit);
+        let mut found = vec![1.0; cols.len()];
+        for c in part.columns() {
+            let value = self.values[c] / self.units[c].powi(2);
+            found[c] = self.units[c] * limited(c) / unit * part.share(value, self.mean[c]);
+        }
+        Some(found)
     }
 }
 
