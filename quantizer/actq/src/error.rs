@@ -210,7 +210,9 @@ macro_rules! bail {
 #[macro_export]
 macro_rules! ensure {
     ($condition:expr, $($message:tt)*) => {
-        if !$condition {
+        // Not negated: a comparison with NaN fails.
+        if $condition {
+        } else {
             $crate::bail!($($message)*);
         }
     };
