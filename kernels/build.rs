@@ -1,6 +1,6 @@
-//! Detects the backends of the target; `src/arch/mod.rs` chooses one. Stable rustc does not report
-//! `target_feature = "dsp"`, so the target's name decides. For Armv8-M, where the extension is optional, the processor that
-//! the build names (`-C target-cpu=cortex-m33`) decides. `actq_kernels::BACKEND` is the backend of the build. The environment
+//! Detects the backends of the target; `src/arch/mod.rs` chooses one. Stable rustc does not report `target_feature =
+//! "dsp"`, so the target's name decides. For Armv8-M, where the extension is optional, the processor that the build
+//! names (`-C target-cpu=cortex-m33`) decides. `actq_kernels::BACKEND` is the backend of the build. The environment
 //! variable `ACTQ_BACKEND=portable` excludes the assembler, for comparisons and for builds without assembler.
 
 /// Armv8-M processors with the DSP extension, by LLVM's defaults.

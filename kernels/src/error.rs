@@ -1,5 +1,5 @@
-//! The errors of an image's check, of construction and of a step. Each has a number, for C, for a frame of a few bytes and
-//! for a register that survives a reset. 0 is no error.
+//! The errors of an image's check, of construction and of a step. Each has a number, for C, for a frame of a few bytes
+//! and for a register that survives a reset. 0 is no error.
 
 use core::fmt;
 
@@ -70,8 +70,8 @@ image_errors! {
     Chunk = 10, "chunk and execute lengths disagree";
     /// A section lies outside the image, shares words with another, or is out of order.
     Section = 11, "a section lies outside the image, overlaps another or is out of order";
-    /// The arena is not state, observation, operation outputs, action and work area, in this order and without gaps, in at
-    /// most 65535 words; or the work area is too short.
+    /// The arena is not state, observation, operation outputs, action and work area, in this order and without gaps, in
+    /// at most 65535 words; or the work area is too short.
     Arena = 12, "regions of the arena do not follow each other, or the work area is too short";
     /// Regions of an operation overlap.
     Overlap = 13, "regions of an operation overlap";
@@ -103,8 +103,8 @@ image_errors! {
     SelfTest = 26, "the self-test vector has no steps";
     /// Denoising steps without operations, denoising operations in another kind of policy, or noise at a wrong place.
     Denoising = 27, "denoising steps, their operations and their noise disagree";
-    /// One of these: the horizon exceeds the chunk, or goes with several executed actions or an overlap; the overlap exceeds
-    /// the actions that remain of a chunk; the deadline is before the last executed action.
+    /// One of these: the horizon exceeds the chunk, or goes with several executed actions or an overlap; the overlap
+    /// exceeds the actions that remain of a chunk; the deadline is before the last executed action.
     Playback = 28, "horizon, overlap, deadline, chunk and execute lengths disagree";
     /// Only some of the four binarization arrays are present, or an upper threshold is below the lower one.
     Binarise = 29, "binarization lacks one of its four arrays, or its thresholds are reversed";
@@ -205,8 +205,8 @@ impl fmt::Display for SavedError {
 
 impl core::error::Error for SavedError {}
 
-/// Why a step gave no action. The recurrent state and the chunk are reset; the last action stays, so that the step limit
-/// holds across the error. [`StepError::Budget`] and [`StepError::NotBegun`] change nothing.
+/// Why a step gave no action. The recurrent state and the chunk are reset; the last action stays, so that the step
+/// limit holds across the error. [`StepError::Budget`] and [`StepError::NotBegun`] change nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]

@@ -1,8 +1,8 @@
 //! Low-bit GEMV kernels and an action-head executor for microcontrollers: `no_std`, no allocation, no panic after
 //! [`Image::new_checked`].
 //!
-//! The command `actq` quantizes a robot policy's last layers, or a whole small policy, into one image on a host. This crate
-//! runs that image in place from flash:
+//! The command `actq` quantizes a robot policy's last layers, or a whole small policy, into one image on a host. This
+//! crate runs that image in place from flash:
 //!
 //! ```
 //! # fn run(bytes: &[u8], scratch: &mut [u32], observation: &[f32]) -> Result<(), Box<dyn std::error::Error>> {
@@ -16,14 +16,16 @@
 //! # }
 //! ```
 //!
-//! [`include_image!`] puts an image into the program. `docs/FORMAT.md` documents the image, `docs/KERNELS.md` the kernels. Everything outside the integer GEMV is IEEE 754
-//! binary32 in a fixed order, without fused multiply-add, so that a host, QEMU and a board give identical bits.
+//! [`include_image!`] puts an image into the program. `docs/FORMAT.md` documents the image, `docs/KERNELS.md` the
+//! kernels. Everything outside the integer GEMV is IEEE 754 binary32 in a fixed order, without fused multiply-add, so
+//! that a host, QEMU and a board give identical bits.
 //!
 //! Features:
 //!
 //! - `defmt` derives `defmt::Format` for the error types.
 //! - `writer` makes public what writes images and what checks the kernels: packed layouts, records, arithmetic and the
-//!   parts of the cost model. The quantizer, tests and measurements use it. It is **unstable**: any version may change it.
+//!   parts of the cost model. The quantizer, tests and measurements use it. It is **unstable**: any version may change
+//!   it. Its enums are exhaustive, so that a writer that forgets an operation does not compile.
 #![cfg_attr(not(test), no_std)]
 #![deny(unsafe_code)]
 // Without the feature, the modules for writers are private, with their public items.
@@ -43,8 +45,8 @@ macro_rules! writer_methods {
     };
 }
 
-// A test checks the dependencies between these modules by the table in docs/ARCHITECTURE.md. A module that writers need is
-// public with the feature `writer`.
+// A test checks the dependencies between these modules by the table in docs/ARCHITECTURE.md. A module that writers need
+// is public with the feature `writer`.
 #[cfg(feature = "writer")]
 pub mod arch;
 #[cfg(not(feature = "writer"))]

@@ -1,6 +1,6 @@
-//! Random changes of a valid image, with a correct checksum. An image that passes `Image::new_checked` runs without a panic,
-//! keeps its limits, and depends only on its observations. An image that changes after the check does not panic either. The
-//! tests need only this crate, so that they also run with words of 32 bits and in Miri.
+//! Random changes of a valid image, with a correct checksum. An image that passes `Image::new_checked` runs without a
+//! panic, keeps its limits, and depends only on its observations. An image that changes after the check does not panic
+//! either. The tests need only this crate, so that they also run with words of 32 bits and in Miri.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -80,8 +80,8 @@ fn mutate(random: &mut Random, draft: &mut Draft, structure: &[usize]) {
     draft.seal();
 }
 
-/// Passes each accepted mutation to `see` and returns their number. If `see` panics, the test fails with the numbers of all
-/// such cases.
+/// Passes each accepted mutation to `see` and returns their number. If `see` panics, the test fails with the numbers of
+/// all such cases.
 fn accepted(see: impl Fn(Image<'_>, &mut Random)) -> u64 {
     let structure = Draft::valid().structure();
     let (mut seen, mut failed) = (0, Vec::new());
@@ -102,8 +102,8 @@ fn accepted(see: impl Fn(Image<'_>, &mut Random)) -> u64 {
     seen
 }
 
-/// Runs three steps and the self-test, in memory of exactly the image's size that is filled with `fill`. Returns the bits of
-/// the actions.
+/// Runs three steps and the self-test, in memory of exactly the image's size that is filled with `fill`. Returns the
+/// bits of the actions.
 fn play(image: Image<'_>, fill: u32, random: &mut Random) -> Vec<Option<Vec<u32>>> {
     let mut scratch = vec![fill; image.scratch_words()];
     let mut head = Head::new(image, &mut scratch).expect("the scratch memory has the image's size");

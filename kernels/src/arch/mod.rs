@@ -1,11 +1,11 @@
 //! Kernels with more than one backend, and the one place that chooses the backend.
 //!
-//! `reference` is the standard that tests compare all others with, `portable` is Rust for every target, `armv7em` assembler
-//! for Cortex-M4, M7 and M33, and `armv7em_fpu` assembler that also needs their FPU's registers. All of them compute the
-//! same bits; the tests run them on the same data. The build script detects the backends of a target.
+//! `reference` is the standard that tests compare all others with, `portable` is Rust for every target, `armv7em`
+//! assembler for Cortex-M4, M7 and M33, and `armv7em_fpu` assembler that also needs their FPU's registers. All of them
+//! compute the same bits; the tests run them on the same data. The build script detects the backends of a target.
 
-/// Assembles a file. A module's assembler accepts the instructions of its architecture, which for Armv8-M exclude the DSP
-/// extension whatever processor the build names; so the file names the processor.
+/// Assembles a file. A module's assembler accepts the instructions of its architecture, which for Armv8-M exclude the
+/// DSP extension whatever processor the build names; so the file names the processor.
 #[cfg(actq_armv7em)]
 macro_rules! assembler {
     ($file:literal) => {
@@ -75,7 +75,8 @@ pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i3
 }
 
 impl Scale {
-    /// Computes the scale of `x` for integers in `-x_max ..= x_max`. `x_max` is 127 for int8 activations and at most 32767.
+    /// Computes the scale of `x` for integers in `-x_max ..= x_max`. `x_max` is 127 for int8 activations and at most
+    /// 32767.
     ///
     /// # Errors
     ///
@@ -84,8 +85,9 @@ impl Scale {
         Self::of_magnitude(integers::magnitude(x), x_max)
     }
 
-    /// Quantizes `x` with `plan` to the first words of `out`, and returns the prepared vector. Missing values of `x` count as
-    /// zeros. `None`, with nothing written, if `out` is shorter than [`Plan::room`]; it may overwrite all of these words.
+    /// Quantizes `x` with `plan` to the first words of `out`, and returns the prepared vector. Missing values of `x`
+    /// count as zeros. `None`, with nothing written, if `out` is shorter than [`Plan::room`]; it may overwrite all of
+    /// these words.
     #[inline(never)]
     pub fn quantize<'w>(self, x: &[f32], plan: &'w Plan, out: &'w mut [u32]) -> Option<Prepared<'w>> {
         let x = x.get(..plan.shape.cols).unwrap_or(x);

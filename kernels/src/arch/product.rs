@@ -5,8 +5,8 @@ use core::fmt;
 use crate::layout::{Block, STRIP};
 use crate::x::Prepared;
 
-/// The block and the prepared vector differ in columns, group size or layout, the rows are not whole strips, or a slice is
-/// too short.
+/// The block and the prepared vector differ in columns, group size or layout, the rows are not whole strips, or a slice
+/// is too short.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Mismatch;
@@ -19,8 +19,8 @@ impl fmt::Display for Mismatch {
 
 impl core::error::Error for Mismatch {}
 
-/// Successive rows of a block, a vector that was prepared for its shape, and room for the sums. All of them fit each other,
-/// so that no backend can fail.
+/// Successive rows of a block, a vector that was prepared for its shape, and room for the sums. All of them fit each
+/// other, so that no backend can fail.
 #[derive(Debug)]
 pub struct Product<'a> {
     pub(super) block: &'a Block<'a>,

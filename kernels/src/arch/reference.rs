@@ -1,4 +1,5 @@
-//! The reference GEMV: it decodes one weight at a time by the packer's inverse. It is slow; tests compare the others with it.
+//! The reference GEMV: it decodes one weight at a time by the packer's inverse. It is slow; tests compare the others
+//! with it.
 
 use super::product::Product;
 use crate::layout::Block;

@@ -15,8 +15,8 @@ use crate::ops::elementwise::{self, copy, copy_le};
 use crate::ops::noise::normal;
 use crate::ops::norm;
 
-/// Runs a whole operation over an arena, as a head does in denoising step `step`. It is for callers that run a network's
-/// operations one by one. Noise is read from the arena.
+/// Runs a whole operation over an arena, as a head does in denoising step `step`. It is for callers that run a
+/// network's operations one by one. Noise is read from the arena.
 ///
 /// # Errors
 ///
@@ -89,8 +89,8 @@ pub(super) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
         OpKind::GruCell => {
             arch::gru_elements(range.clone(), f(src), f(third), f(dst));
         }
-        // The match has no wildcard: it does not compile without an arm for every operation. `Linear` and `Denoise` have
-        // returned above.
+        // The match has no wildcard: it does not compile without an arm for every operation. `Linear` and `Denoise`
+        // have returned above.
         kind @ (OpKind::LayerNorm
         | OpKind::RmsNorm
         | OpKind::Normalize { .. }

@@ -61,8 +61,8 @@ impl<'a, 's> Head<'a, 's> {
         Ok(Self { image, arena, least_budget: 0, phase: Phase::Idle, playback, started: false, seed: 0, draws: 0 })
     }
 
-    /// Clears the recurrent state, all chunks, the last action and a step that has begun. The noise of a flow or diffusion
-    /// policy starts from the beginning: after a reset the same observations give the same actions.
+    /// Clears the recurrent state, all chunks, the last action and a step that has begun. The noise of a flow or
+    /// diffusion policy starts from the beginning: after a reset the same observations give the same actions.
     #[inline(never)]
     pub fn reset(&mut self) {
         self.abandon();
@@ -77,8 +77,8 @@ impl<'a, 's> Head<'a, 's> {
         self.reset();
     }
 
-    /// Resets, but keeps the last action and the state of binarized values: after an error the robot is still where that
-    /// action put it, and the step limit starts there.
+    /// Resets, but keeps the last action and the state of binarized values: after an error the robot is still where
+    /// that action put it, and the step limit starts there.
     #[inline(never)]
     fn abandon(&mut self) {
         self.forget();
@@ -92,8 +92,8 @@ impl<'a, 's> Head<'a, 's> {
         self.words_mut(self.image.state()).fill(0);
     }
 
-    /// Borrows the recurrent state, to read or to set it: for each operation in order, an LSTM's hidden state and then its
-    /// cell state, or a GRU's state. A reset zeroes it.
+    /// Borrows the recurrent state, to read or to set it: for each operation in order, an LSTM's hidden state and then
+    /// its cell state, or a GRU's state. A reset zeroes it.
     pub fn state_mut(&mut self) -> &mut [f32] {
         self.floats_mut(self.image.state())
     }

@@ -30,8 +30,8 @@ impl Playback {
         counts(image, arena).fill(0);
     }
 
-    /// Returns `true` if the network must run for the next action. If so, it keeps the rest of the current chunk before the
-    /// output is overwritten.
+    /// Returns `true` if the network must run for the next action. If so, it keeps the rest of the current chunk before
+    /// the output is overwritten.
     #[inline(never)]
     pub(super) fn turn(&mut self, image: &Image<'_>, arena: &mut [u32]) -> bool {
         if self.ready && self.next < image.execute() {
@@ -91,11 +91,11 @@ impl Playback {
         Ok(())
     }
 
-    /// Where the action that is due stands, before the contract.
+    /// Returns the arena region of the next action, before the contract.
     ///
     /// # Errors
     ///
-    /// [`Fault::Stale`] where no chunk at hand reaches to it.
+    /// [`Fault::Stale`] if no chunk predicts it.
     #[inline(never)]
     pub(super) fn due(&self, image: &Image<'_>, arena: &mut [u32]) -> Result<Region, Fault> {
         let (len, kept) = (image.act_len(), image.kept());

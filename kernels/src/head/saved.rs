@@ -1,9 +1,9 @@
 //! The state of a head as bytes, for a warm restart: everything besides the image and the observations that the next
 //! actions depend on.
 //!
-//! Words, little-endian: `ACTS`, version, checksum of the image, checksum of the words after it; seed, draws, flags (bit
-//! 0: an action has played, bit 1: the output holds a chunk), the positions of playback; then regions of the arena: the
-//! recurrent state, the output, and everything from the last action to the work area.
+//! Words, little-endian: `ACTS`, version, checksum of the image, checksum of the words after it; seed, draws, flags
+//! (bit 0: an action has played, bit 1: the output holds a chunk), the positions of playback; then regions of the
+//! arena: the recurrent state, the output, and everything from the last action to the work area.
 
 use super::playback::Playback;
 use super::{Head, Phase};
@@ -19,14 +19,14 @@ const WORDS: usize = 10;
 const W_CHECKSUM: usize = 3;
 
 impl Head<'_, '_> {
-    /// Returns the bytes of a saved state: 40, plus the recurrent state, the output, and the words from the action to the
-    /// work area.
+    /// Returns the bytes of a saved state: 40, plus the recurrent state, the output, and the words from the action to
+    /// the work area.
     pub fn saved_len(&self) -> usize {
         4 * (WORDS + self.saved_regions().iter().map(|region| region.len).sum::<usize>())
     }
 
-    /// Writes the state into `to`, of [`Self::saved_len`] bytes: recurrent state, chunks, last action, states of binarized
-    /// values, seed and draws of the noise. A head that restores it continues with the same bits.
+    /// Writes the state into `to`, of [`Self::saved_len`] bytes: recurrent state, chunks, last action, states of
+    /// binarized values, seed and draws of the noise. A head that restores it continues with the same bits.
     ///
     /// # Errors
     ///
@@ -50,8 +50,8 @@ impl Head<'_, '_> {
     ///
     /// # Errors
     ///
-    /// Those of [`Self::save`]; [`SavedError::Version`], [`SavedError::Image`] and [`SavedError::Damaged`] for the bytes. On
-    /// an error the head keeps its state.
+    /// Those of [`Self::save`]; [`SavedError::Version`], [`SavedError::Image`] and [`SavedError::Damaged`] for the
+    /// bytes. On an error the head keeps its state.
     pub fn restore(&mut self, from: &[u8]) -> Result<(), SavedError> {
         self.check_saved(from.len())?;
         let mut words = from.as_chunks().0.iter().map(|bytes| u32::from_le_bytes(*bytes));

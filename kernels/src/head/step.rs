@@ -13,18 +13,18 @@ use crate::ops::elementwise::copy;
 use crate::pace::budget::Budget;
 
 impl Head<'_, '_> {
-    /// Computes the action for `observation`, after the action contract; with action chunks, the chunk's next action. It is
-    /// [`Self::begin`] and one [`Self::poll`] without a limit. Each action counts as one control period; [`Self::pass`]
-    /// counts periods without an action.
+    /// Computes the action for `observation`, after the action contract; with action chunks, the chunk's next action.
+    /// It is [`Self::begin`] and one [`Self::poll`] without a limit. Each action counts as one control period;
+    /// [`Self::pass`] counts periods without an action.
     ///
     /// # Errors
     ///
     /// [`StepError::ObservationLength`] and [`StepError::ObservationNotFinite`] for the observation;
-    /// [`StepError::NotFinite`] if a value inside the network exceeds f32's range, [`StepError::Damaged`] if the image's
-    /// memory has changed since its check, [`StepError::Stale`] if the action is older than its deadline.
+    /// [`StepError::NotFinite`] if a value inside the network exceeds f32's range, [`StepError::Damaged`] if the
+    /// image's memory has changed since its check, [`StepError::Stale`] if the action is older than its deadline.
     ///
-    /// An error resets the recurrent state and the chunk, so that no part of a failed evaluation reaches a later action.
-    /// The last action stays, and `max_step` limits the next one from it.
+    /// An error resets the recurrent state and the chunk, so that no part of a failed evaluation reaches a later
+    /// action. The last action stays, and `max_step` limits the next one from it.
     #[inline(never)]
     pub fn step(&mut self, observation: &[f32]) -> Result<&[f32], StepError> {
         self.take(observation, None)?;
@@ -34,8 +34,8 @@ impl Head<'_, '_> {
 
     /// Begins a step with an observation. [`Self::poll`] does the work.
     ///
-    /// It drops a step that has begun and is not ready. If a poll has already worked on that step, the recurrent state may
-    /// be partly updated, and is zeroed as by [`Self::reset`]; the last action stays, so that the step limit holds.
+    /// It drops a step that has begun and is not ready. If a poll has already worked on that step, the recurrent state
+    /// may be partly updated, and is zeroed as by [`Self::reset`]; the last action stays, so that the step limit holds.
     ///
     /// The first call takes longer if [`Self::least_budget`] was not called before.
     ///
@@ -58,21 +58,22 @@ impl Head<'_, '_> {
 
     /// Runs a slice of the step that has begun: at most `budget` instructions by the cost model
     /// ([`crate::Image::step_cost`]). It returns the action as soon as it is ready, and the same action until the next
-    /// [`Self::begin`]. A step that continues a chunk has little to do and is ready at the first poll. A budget of 2^28 or
-    /// more is no limit.
+    /// [`Self::begin`]. A step that continues a chunk has little to do and is ready at the first poll. A budget of 2^28
+    /// or more is no limit.
     ///
-    /// The cost model is that of the build for thumbv7em-none-eabihf; on other targets a step is cut in the same places.
-    /// However a step is cut, its bits are the same.
+    /// The cost model is that of the build for thumbv7em-none-eabihf; on other targets a step is cut in the same
+    /// places. However a step is cut, its bits are the same.
     ///
     /// # Errors
     ///
-    /// [`StepError::Budget`] if `budget` is below [`crate::Image::least_budget`], and [`StepError::NotBegun`]; both change
-    /// nothing. All others are those of [`Self::step`].
+    /// [`StepError::Budget`] if `budget` is below [`crate::Image::least_budget`], and [`StepError::NotBegun`]; both
+    /// change nothing. All others are those of [`Self::step`].
     pub fn poll(&mut self, budget: u32) -> Result<Poll<&[f32]>, StepError> {
         self.poll_until(budget, false)
     }
 
-    /// Runs a slice as [`Self::poll`] does, and also stops after each operation of the image: to measure them one by one.
+    /// Runs a slice as [`Self::poll`] does, and also stops after each operation of the image: to measure them one by
+    /// one.
     ///
     /// # Errors
     ///
@@ -81,16 +82,17 @@ impl Head<'_, '_> {
         self.poll_until(budget, true)
     }
 
-    /// Lets `periods` control periods pass without an action. The actions for these periods never play, and the observation
-    /// of a step that has begun ages by as much. (For an observation that is already old, call [`Self::begin`], then this
-    /// with its age.) If no action younger than the image's deadline remains, the step ends with [`StepError::Stale`].
+    /// Lets `periods` control periods pass without an action. The actions for these periods never play, and the
+    /// observation of a step that has begun ages by as much. (For an observation that is already old, call
+    /// [`Self::begin`], then this with its age.) If no action younger than the image's deadline remains, the step ends
+    /// with [`StepError::Stale`].
     pub fn pass(&mut self, periods: usize) {
         self.playback.pass(&self.image, self.arena, periods);
     }
 
-    /// Plays the next action that chunks predict, without an observation. Call it while a step is being computed, so that
-    /// the next chunk continues after the actions that have played, or when an observation is missing. While a chunk is
-    /// being replaced, only an image with an overlap or a temporal ensemble keeps the rest of it.
+    /// Plays the next action that chunks predict, without an observation. Call it while a step is being computed, so
+    /// that the next chunk continues after the actions that have played, or when an observation is missing. While a
+    /// chunk is being replaced, only an image with an overlap or a temporal ensemble keeps the rest of it.
     ///
     /// # Errors
     ///
@@ -117,8 +119,8 @@ impl Head<'_, '_> {
         self.infer_from(observation, None)
     }
 
-    /// Runs [`Self::infer`] with noise from the caller, for a flow or diffusion policy: [`crate::Image::noise_len`] values,
-    /// the first iterate, followed by the noise of each denoising step if the steps add noise.
+    /// Runs [`Self::infer`] with noise from the caller, for a flow or diffusion policy: [`crate::Image::noise_len`]
+    /// values, the first iterate, followed by the noise of each denoising step if the steps add noise.
     ///
     /// # Errors
     ///
@@ -179,7 +181,8 @@ impl Head<'_, '_> {
         Ok(())
     }
 
-    /// Checks the noise and copies it to the arena. Within a chunk it only checks: the arena may hold the chunk's values.
+    /// Checks the noise and copies it to the arena. Within a chunk it only checks: the arena may hold the chunk's
+    /// values.
     #[inline(never)]
     fn load_noise(&mut self, noise: &[f32]) -> Result<(), StepError> {
         let region = self.image.noise();

@@ -67,8 +67,8 @@ impl<'a> Image<'a> {
         if self.obs_len() == 0 || self.act_len() == 0 || self.op_count() == 0 {
             return Err(ImageError::Shape);
         }
-        // State, observation, operation outputs, action, what is kept with it, work area: in this order and without gaps.
-        // (`check_sections` checks the middle.)
+        // State, observation, operation outputs, action, what is kept with it, work area: in this order and without
+        // gaps. (`check_sections` checks the middle.)
         let work = self.work();
         if self.state().offset != 0
             || self.observation().offset != self.state().end()
@@ -144,8 +144,8 @@ impl<'a> Image<'a> {
         Ok(())
     }
 
-    /// Checks operation `i`, before which the step has written the first `written` words of the arena; returns their number
-    /// after it.
+    /// Checks operation `i`, before which the step has written the first `written` words of the arena; returns their
+    /// number after it.
     #[inline(never)]
     fn check_op(&self, i: usize, front: &mut Front<'a>, written: usize) -> Result<usize, ImageError> {
         let op = self.op(i);
@@ -193,8 +193,8 @@ impl<'a> Image<'a> {
         if dst.overlaps(src) || dst.overlaps(third) || src.overlaps(third) {
             return Err(ImageError::Overlap);
         }
-        // An operation reads only words that this step has written: not what an earlier step or the caller put there, nor
-        // the work area, whose content differs between backends.
+        // An operation reads only words that this step has written: not what an earlier step or the caller put there,
+        // nor the work area, whose content differs between backends.
         let third = if op.is_linear() { Region::default() } else { third };
         let old = if op.reads_dst() { dst.end() } else { 0 };
         if src.end().max(third.end()).max(old) > written {
@@ -233,8 +233,8 @@ impl<'a> Image<'a> {
     }
 }
 
-/// Takes sections in their order in the image. No two share a word. Constants that several operations have in common are
-/// in the image one time, and are checked one time: so the check is linear in the image's length.
+/// Takes sections in their order in the image. No two share a word. Constants that several operations have in common
+/// are in the image one time, and are checked one time: so the check is linear in the image's length.
 struct Front<'a> {
     words: &'a [u32],
     /// End of the last section.
@@ -286,8 +286,8 @@ impl<'a> Front<'a> {
     }
 }
 
-/// Checks the matrix of the record at `at`: its blocks, their rows' outputs, their sums, and that its prepared input fits
-/// a work area of `work` words.
+/// Checks the matrix of the record at `at`: its blocks, their rows' outputs, their sums, and that its prepared input
+/// fits a work area of `work` words.
 #[inline(never)]
 fn check_matrix(at: usize, front: &mut Front<'_>, work: usize) -> Result<(), ImageError> {
     let matrix = &matrix(front.words, at, 0);

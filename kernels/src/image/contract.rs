@@ -12,8 +12,8 @@ pub(super) const ARRAY_BINARISE: usize = 6;
 
 impl<'a> Image<'a> {
     writer_methods! {
-        /// Returns the arrays, in their order: scale, offset, low, high, max_step, smoothing, on, off, on_value, off_value.
-        /// An array that the contract does not have is empty.
+        /// Returns the arrays, in their order: scale, offset, low, high, max_step, smoothing, on, off, on_value,
+        /// off_value. An array that the contract does not have is empty.
         fn contract_arrays(&self) -> [&'a [u32]; CONTRACT_ARRAYS] {
             let mut offset = self.head(h::W_CONTRACT) as usize;
             core::array::from_fn(|which| {
@@ -25,8 +25,8 @@ impl<'a> Image<'a> {
         }
     }
 
-    /// Returns the lower and upper limit of action value `i`, if the contract has both. (If it limits other values only,
-    /// f32's largest number stands for no limit.)
+    /// Returns the lower and upper limit of action value `i`, if the contract has both. (If it limits other values
+    /// only, f32's largest number stands for no limit.)
     pub fn limits(&self, i: usize) -> Option<[f32; 2]> {
         let [_, _, low, high, ..] = self.contract_of(i);
         (low > f32::MIN && high < f32::MAX).then_some([low, high])

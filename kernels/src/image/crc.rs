@@ -19,8 +19,8 @@ pub const fn checksum(bytes: &[u8]) -> u32 {
 ///
 /// # Errors
 ///
-/// [`ImageError::TooShort`] if `bytes` ends before these fields, [`ImageError::Length`] if its length needs more than 32
-/// bits.
+/// [`ImageError::TooShort`] if `bytes` ends before these fields, [`ImageError::Length`] if its length needs more than
+/// 32 bits.
 #[cfg(feature = "writer")]
 pub fn seal(bytes: &mut [u8]) -> Result<(), ImageError> {
     let len = u32::try_from(bytes.len()).map_err(|_| ImageError::Length)?;

@@ -75,8 +75,8 @@ pub const W_DIGEST: usize = 20;
 pub const W_MATRICES: usize = 28;
 /// u16 number of matrices, u16 chunks that a temporal ensemble averages for an action, or 0.
 pub const W_MATRIX_COUNT: usize = 29;
-/// u16 first operation that every denoising step runs, u16 denoising steps; both 0 if an evaluation runs the network one
-/// time.
+/// u16 first operation that every denoising step runs, u16 denoising steps; both 0 if an evaluation runs the network
+/// one time.
 pub const W_DENOISING: usize = 30;
 /// u16 actions that blend one chunk into the next, u16 age from which on an action never plays; 0 for none.
 pub const W_PLAYBACK: usize = 31;

@@ -21,8 +21,8 @@ pub struct ImageInfo {
 }
 
 impl ImageInfo {
-    /// Reads the header of `bytes`, an image at any alignment. It checks magic, format version, length, checksum and kernel
-    /// layout; [`Image::new_checked`](super::Image::new_checked) also checks the content.
+    /// Reads the header of `bytes`, an image at any alignment. It checks magic, format version, length, checksum and
+    /// kernel layout; [`Image::new_checked`](super::Image::new_checked) also checks the content.
     ///
     /// # Errors
     ///

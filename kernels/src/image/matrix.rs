@@ -126,8 +126,8 @@ pub struct RowBlock<'a> {
     pub block: Block<'a>,
     /// bf16 row scales, two a word.
     pub scales: &'a [u32],
-    /// Output steps, four u8 a word: from the previous row's output (at first from output 0) to each row's own. Empty if
-    /// the rows follow each other from `first_row` on.
+    /// Output steps, four u8 a word: from the previous row's output (at first from output 0) to each row's own. Empty
+    /// if the rows follow each other from `first_row` on.
     pub steps: &'a [u32],
     /// The output of the first row; 0 with output steps, which start from it.
     pub first_row: usize,
@@ -141,8 +141,8 @@ impl<'a> RowBlock<'a> {
         bf16(half_word(self.scales, i))
     }
 
-    /// Dequantizes the block's row `i` to `level * group scale * row scale`, with the integers multiplied first. It fills
-    /// `out` up to the number of columns.
+    /// Dequantizes the block's row `i` to `level * group scale * row scale`, with the integers multiplied first. It
+    /// fills `out` up to the number of columns.
     #[cfg(feature = "writer")]
     pub fn dequantize(&self, i: usize, out: &mut [f32]) {
         let scale = self.scale(i);
@@ -250,8 +250,8 @@ pub(crate) fn row_block<'a>(
     }
 }
 
-/// Returns the bytes of a block: packed words with their padding and group scales, row scales, output steps if the block
-/// is `stepped`, and the block record.
+/// Returns the bytes of a block: packed words with their padding and group scales, row scales, output steps if the
+/// block is `stepped`, and the block record.
 #[cfg(feature = "writer")]
 pub const fn block_bytes(shape: BlockShape, stepped: bool) -> usize {
     let steps = if stepped { shape.rows.div_ceil(4) } else { 0 };

@@ -1,9 +1,9 @@
 //! The image: a sequence of little-endian words, checked one time. `docs/FORMAT.md` has the byte tables.
 //!
 //! [`Image::new_checked`] verifies everything; afterwards no accessor panics or fails. Offsets in the image count
-//! 32-bit words from its start; offsets in the arena (the scratch memory) count words, too. Sums of offsets wrap: if flash
-//! has changed since the check, an offset may be any word, and each read refuses what the image does not have. The same
-//! files read and write: a record's `emit` is next to its `parse`.
+//! 32-bit words from its start; offsets in the arena (the scratch memory) count words, too. Sums of offsets wrap: if
+//! flash has changed since the check, an offset may be any word, and each read refuses what the image does not have.
+//! The same files read and write: a record's `emit` is next to its `parse`.
 
 mod check;
 mod contract;

@@ -17,8 +17,8 @@ use crate::math::Function;
 /// The function of an operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OpKind {
-    /// `dst = clamp((clamp(src, ±pre_clip) - mean) * scale, ±clip)`. Constants: `pre_clip`, `clip`, infinite for no limit;
-    /// arrays: `mean`, `scale`, the reciprocals of the standard deviation.
+    /// `dst = clamp((clamp(src, ±pre_clip) - mean) * scale, ±clip)`. Constants: `pre_clip`, `clip`, infinite for no
+    /// limit; arrays: `mean`, `scale`, the reciprocals of the standard deviation.
     Normalize {
         /// `true` if the quantizer added it to balance the matrices that read it: then its constants count among their
         /// bytes. Nothing else depends on it.
@@ -51,8 +51,8 @@ pub enum OpKind {
     /// `dst` = the array of this denoising step. Arrays: one for each denoising step.
     Table,
     /// A denoising step ([`crate::ops::denoise`]) of the iterate `dst` by the network's output `src`; `third` is the
-    /// network's next input. Constants: the limit of the predicted sample, infinite for none; the arena offset of the first
-    /// step's noise, or 0; the coefficients of each step.
+    /// network's next input. Constants: the limit of the predicted sample, infinite for none; the arena offset of the
+    /// first step's noise, or 0; the coefficients of each step.
     Denoise,
 }
 

@@ -1,5 +1,5 @@
-//! Playback of action chunks: its header fields, and the memory that the action contract and playback keep from one step
-//! to the next.
+//! Playback of action chunks: its header fields, and the memory that the action contract and playback keep from one
+//! step to the next.
 
 use super::contract::ARRAY_BINARISE;
 use super::header as h;
@@ -18,14 +18,14 @@ impl Image<'_> {
         low(self.head(h::W_PLAYBACK))
     }
 
-    /// Returns the age, in control periods since its observation, from which on an action never plays; `None` if actions
-    /// play at any age.
+    /// Returns the age, in control periods since its observation, from which on an action never plays; `None` if
+    /// actions play at any age.
     pub fn deadline(&self) -> Option<usize> {
         Some(high(self.head(h::W_PLAYBACK))).filter(|periods| *periods > 0)
     }
 
-    /// Returns the weight in an ensemble of a chunk that comes after `count` others, and the reciprocal of the sum of their
-    /// weights and its own.
+    /// Returns the weight in an ensemble of a chunk that comes after `count` others, and the reciprocal of the sum of
+    /// their weights and its own.
     pub(crate) fn ensemble(&self, count: usize) -> [f32; 2] {
         let at = self.ensemble_at().wrapping_add(count);
         [at, at.wrapping_add(self.horizon())].map(|at| f32::from_bits(self.word(at)))
@@ -36,15 +36,16 @@ impl Image<'_> {
         (self.head(h::W_CONTRACT) as usize).wrapping_add(self.contract_count() * self.act_len())
     }
 
-    /// Returns the arena region of the on/off states of binarized values, a word for each value of an action; empty without
-    /// binarization.
+    /// Returns the arena region of the on/off states of binarized values, a word for each value of an action; empty
+    /// without binarization.
     pub(crate) fn switches(&self) -> Region {
         let len = if self.has_contract(ARRAY_BINARISE) { self.act_len() } else { 0 };
         Region { offset: self.action().end(), len }
     }
 
-    /// Returns the arena region that playback keeps ([`kept_words`]). With a horizon: for each of that many future periods,
-    /// the weighted sum of its actions; then, for each, their number. With an overlap: the rest of the previous chunk.
+    /// Returns the arena region that playback keeps ([`kept_words`]). With a horizon: for each of that many future
+    /// periods, the weighted sum of its actions; then, for each, their number. With an overlap: the rest of the
+    /// previous chunk.
     pub(crate) fn kept(&self) -> Region {
         let sizes = [self.act_len(), self.chunk(), self.execute()];
         let len = kept_words(sizes, self.horizon(), self.overlap());
@@ -53,8 +54,8 @@ impl Image<'_> {
     }
 }
 
-/// Returns the words that playback keeps, from the lengths of an action, a chunk and its executed actions, the horizon and
-/// the overlap.
+/// Returns the words that playback keeps, from the lengths of an action, a chunk and its executed actions, the horizon
+/// and the overlap.
 pub const fn kept_words([act_len, chunk, execute]: [usize; 3], horizon: usize, overlap: usize) -> usize {
     match (horizon, overlap) {
         (0, 0) => 0,

@@ -14,8 +14,9 @@ pub fn worst_case(block: &Block<'_>, x_max: u16) -> i64 {
 
 /// Computes the largest row sum of `|level| * scale`. It has 31 bits: there are at most 65535 columns of 128 * 255.
 ///
-/// The columns of a strip that share a scale (or two, in a layout of paired groups) are a block of their own, and the GEMV
-/// of such a block and a unit vector gives one of its columns. So no other code has to know the places of the codes.
+/// The columns of a strip that share a scale (or two, in a layout of paired groups) are a block of their own, and the
+/// GEMV of such a block and a unit vector gives one of its columns. So no other code has to know the places of the
+/// codes.
 #[inline(never)]
 fn largest_sum(block: &Block<'_>) -> Option<u32> {
     let mut work = [0; max_prepared_words(MAX_GROUP - 1, MAX_GROUP)];
@@ -54,8 +55,8 @@ pub fn largest_sum_bound(shape: BlockShape) -> u32 {
     shape.cols as u32 * shape.width.max_level() as u32 * scale
 }
 
-/// Returns `true` if no sum of the block's rows can exceed int32 for activations up to `x_max`: by the shape alone if that
-/// is enough, otherwise by the codes and scales, as [`worst_case`] does.
+/// Returns `true` if no sum of the block's rows can exceed int32 for activations up to `x_max`: by the shape alone if
+/// that is enough, otherwise by the codes and scales, as [`worst_case`] does.
 pub(super) fn fits_i32(block: &Block<'_>, x_max: u16) -> bool {
     let most = (i32::MAX as u32).checked_div(x_max.into()).unwrap_or(0);
     largest_sum_bound(block.shape()) <= most || largest_sum(block).is_some_and(|sum| sum <= most)

@@ -1,7 +1,7 @@
 //! Text that is safe to print on a terminal.
 
-/// Returns `true` if bytes are UTF-8 without control characters (C0, DEL, C1), which could control the terminal that prints
-/// a name. It takes a quarter of the code of `core::str::from_utf8`.
+/// Returns `true` if bytes are UTF-8 without control characters (C0, DEL, C1), which could control the terminal that
+/// prints a name. It takes a quarter of the code of `core::str::from_utf8`.
 pub(super) fn is_text(bytes: &[u8]) -> bool {
     // Bytes that must follow, the code point so far, and the least code point of this length that is not a control
     // character.

@@ -18,9 +18,9 @@ impl<'a> Image<'a> {
     /// Index of the header word with the image's length in bytes: to find the end of an image in a flash slot.
     pub const LENGTH_WORD: usize = h::W_BYTES;
 
-    /// Reads an image without its check, for tests of flash that changes after the check. Its steps end with a meaningless
-    /// action or with [`crate::StepError::Damaged`]. Returns `None` if the bytes are misaligned, not whole words, or shorter
-    /// than a header.
+    /// Reads an image without its check, for tests of flash that changes after the check. Its steps end with a
+    /// meaningless action or with [`crate::StepError::Damaged`]. Returns `None` if the bytes are misaligned, not whole
+    /// words, or shorter than a header.
     #[cfg(feature = "writer")]
     #[doc(hidden)]
     pub fn unchecked(bytes: &'a [u8]) -> Option<Self> {
@@ -159,8 +159,8 @@ impl<'a> Image<'a> {
         low(self.head(h::W_STEPS_NAME))
     }
 
-    /// Returns the observation and the expected action of a self-test step, as f32 bits in little-endian words. The steps
-    /// play in order after a reset.
+    /// Returns the observation and the expected action of a self-test step, as f32 bits in little-endian words. The
+    /// steps play in order after a reset.
     pub fn self_test(&self, step: usize) -> Option<(&'a [u32], &'a [u32])> {
         if step >= self.self_test_steps() {
             return None;

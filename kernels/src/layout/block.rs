@@ -26,8 +26,8 @@ pub struct BlockShape {
 }
 
 impl BlockShape {
-    /// Returns `true` if the lengths are valid: rows and columns from 1 to 65535 and a group size of the lanes; with group
-    /// scales in paired lanes at most [`MAX_PAIRED_GROUPED`] columns.
+    /// Returns `true` if the lengths are valid: rows and columns from 1 to 65535 and a group size of the lanes; with
+    /// group scales in paired lanes at most [`MAX_PAIRED_GROUPED`] columns.
     pub const fn is_valid(self) -> bool {
         let (group, cols) = match self.lanes {
             Lanes::Single => (is_group(self.group), 0xffff),
@@ -115,7 +115,8 @@ impl BlockShape {
         (first, if left < height { left } else { height })
     }
 
-    /// Returns the index of the first word of the cell that holds `row` in unit `unit`, and the distance to its next word.
+    /// Returns the index of the first word of the cell that holds `row` in unit `unit`, and the distance to its next
+    /// word.
     #[cfg(feature = "writer")]
     pub(super) const fn cell_at(self, row: usize, unit: usize) -> (usize, usize) {
         let (first, height) = self.strip(row);
@@ -166,8 +167,8 @@ pub struct Block<'a> {
 }
 
 impl<'a> Block<'a> {
-    /// Combines `words` (little-endian, as in the image) with their shape; `None` if the shape is not valid or the length
-    /// differs from [`BlockShape::words`].
+    /// Combines `words` (little-endian, as in the image) with their shape; `None` if the shape is not valid or the
+    /// length differs from [`BlockShape::words`].
     #[cfg(feature = "writer")]
     pub fn new(shape: BlockShape, words: &'a [u32]) -> Option<Self> {
         if !shape.is_valid() {
@@ -200,7 +201,8 @@ impl<'a> Block<'a> {
         self.words
     }
 
-    /// Returns the words of the rows from `first_row` on, a multiple of [`STRIP`](super::STRIP); empty when out of range.
+    /// Returns the words of the rows from `first_row` on, a multiple of [`STRIP`](super::STRIP); empty when out of
+    /// range.
     pub fn rows_from(&self, first_row: usize) -> &'a [u32] {
         self.words.get((first_row / QUAD).saturating_mul(self.quad_words)..).unwrap_or(&[])
     }

@@ -37,8 +37,8 @@ impl Cell {
 pub struct XLayout {
     /// The int16 pairs hold `x << shift`.
     pub shift: u8,
-    /// Columns of a column chunk, a power of two; a chunk also ends with its scale group. If not all chunks of a row are
-    /// full, the first is short.
+    /// Columns of a column chunk, a power of two; a chunk also ends with its scale group. If not all chunks of a row
+    /// are full, the first is short.
     pub chunk: usize,
     /// Columns of a pass through the loop of the kernel for row scales; the first pass may be short.
     pub run: usize,
@@ -46,11 +46,11 @@ pub struct XLayout {
     pub start_words: usize,
     /// Start values in these words.
     pub starts: [Start; 2],
-    /// `true` if the sum of the row's x follows its chunks, and the sum of a group's x follows the group's chunks, in both
-    /// halves of a word.
+    /// `true` if the sum of the row's x follows its chunks, and the sum of a group's x follows the group's chunks, in
+    /// both halves of a word.
     pub sum: bool,
-    /// `true` if groups are paired: two are prepared as one, with their sums in the halves of the word, and in strips of
-    /// eight the scales follow the units of both groups.
+    /// `true` if groups are paired: two are prepared as one, with their sums in the halves of the word, and in strips
+    /// of eight the scales follow the units of both groups.
     pub pairs: bool,
 }
 
@@ -111,8 +111,8 @@ pub trait Format {
     /// Adds a cell's products to its sums, modulo 2^32. `x` holds `CELL.cols / 2` int16 pairs.
     fn mac(words: &[u32; 3], x: &[u32], t: &mut Sums);
 
-    /// Separates a chunk's sums and adds `sum(level * x)` for each of the cell's rows. With [`XLayout::sum`], the sum of the
-    /// group's x is still missing in rows of odd index.
+    /// Separates a chunk's sums and adds `sum(level * x)` for each of the cell's rows. With [`XLayout::sum`], the sum
+    /// of the group's x is still missing in rows of odd index.
     fn finish(t: &Sums, rows: &mut [i32]);
 }
 

@@ -9,8 +9,8 @@ pub const MAX_GROUP: usize = GROUPS[2];
 /// The only group size of paired lanes.
 pub(crate) const PAIRED_GROUP: usize = GROUPS[0];
 
-/// Most columns of a block of paired lanes with group scales. The 2-bit kernel sums twice a row's products (`w2_paired`),
-/// `2 * 3 * 127 * 255` a column at most, in an int32.
+/// Most columns of a block of paired lanes with group scales. The 2-bit kernel sums twice a row's products
+/// (`w2_paired`), `2 * 3 * 127 * 255` a column at most, in an int32.
 pub const MAX_PAIRED_GROUPED: usize = 11_051;
 
 /// Returns `true` if `group` is one of [`GROUPS`], or 0: no group scales.
@@ -37,8 +37,8 @@ impl Lanes {
     /// Largest activation of paired lanes.
     pub const PAIRED_X_MAX: u16 = 127;
 
-    /// Returns the lanes of a matrix with activations up to `x_max` and group size `group`: paired for int8 activations with
-    /// row scales or groups of 32 ([`GROUPS`]), otherwise single.
+    /// Returns the lanes of a matrix with activations up to `x_max` and group size `group`: paired for int8 activations
+    /// with row scales or groups of 32 ([`GROUPS`]), otherwise single.
     pub const fn of(x_max: u16, group: usize) -> Self {
         if x_max <= Self::PAIRED_X_MAX && matches!(group, 0 | PAIRED_GROUP) { Self::Paired } else { Self::Single }
     }

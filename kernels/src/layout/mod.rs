@@ -1,19 +1,20 @@
 //! Packed weight layouts: the weights in flash, defined one time for the packer, the reference and the kernels.
 //!
-//! A [`Block`] is successive rows of one [`Width`]. Its rows are interleaved in **strips** of 4 or 8, so that one load of
-//! activations serves all of them and the weights are read strictly forward. A layout packs **cells**: a few rows by a few
-//! columns in whole words. A strip is a sequence of **units**. A unit has the columns of one cell and as many cells as the
-//! strip's rows need; word `k` of all its cells is next to each other:
+//! A [`Block`] is successive rows of one [`Width`]. Its rows are interleaved in **strips** of 4 or 8, so that one load
+//! of activations serves all of them and the weights are read strictly forward. A layout packs **cells**: a few rows by
+//! a few columns in whole words. A strip is a sequence of **units**. A unit has the columns of one cell and as many
+//! cells as the strip's rows need; word `k` of all its cells is next to each other:
 //!
 //! ```text
 //! strip:  unit 0: w0(cell 0) w0(cell 1) .. [w1(cell 0) w1(cell 1) ..]   unit 1: ...   [scales of group 0]   ...
 //! ```
 //!
-//! With group scales, a word of four u8 for every four rows (the first in the low byte) follows the units of each group.
-//! In strips of eight of [`w2_paired`], the scales of two groups follow the units of both: a word for every two rows, with
-//! their scales in the first group and then those in the second. A last group without a partner has its own words. If at
-//! most four rows remain for the last strip of eight, it is a strip of four. Rows after the block's last one, up to the
-//! strip's end, and columns after the last, up to a multiple of the kernel's step, are padding with code 0.
+//! With group scales, a word of four u8 for every four rows (the first in the low byte) follows the units of each
+//! group. In strips of eight of [`w2_paired`], the scales of two groups follow the units of both: a word for every two
+//! rows, with their scales in the first group and then those in the second. A last group without a partner has its own
+//! words. If at most four rows remain for the last strip of eight, it is a strip of four. Rows after the block's last
+//! one, up to the strip's end, and columns after the last, up to a multiple of the kernel's step, are padding with code
+//! 0.
 //!
 //! Every width has two layouts. In **single** lanes, each signed 16-bit lane of an SMLAD operand holds one weight, and
 //! the activations may have 16 bits. In **paired** lanes a lane holds the weights of two rows, one SMLAD computes four
@@ -31,8 +32,8 @@
 //! | [`w8_paired`] | as w8 | 2 x 2 in 1 | 4 | 8 |
 //!
 //! Narrow widths use the mid-rise grid of odd levels: for bell-shaped weights four levels at ±1, ±3 lose about a third
-//! less than -2 .. 1 do. A level is `2*code - (2^b - 1)`. The kernels multiply with the codes, and the start values in the
-//! prepared activations ([`XLayout`]) cancel the offset of the codes.
+//! less than -2 .. 1 do. A level is `2*code - (2^b - 1)`. The kernels multiply with the codes, and the start values in
+//! the prepared activations ([`XLayout`]) cancel the offset of the codes.
 //!
 //! To add a width: its two layout files here, its line in `registry!` below and in the table above, its kernels' line
 //! in `arch/armv7em/table.rs`, and another [`LAYOUT_STAMP`].
@@ -41,8 +42,8 @@
     allow(dead_code, reason = "the assembler computes what a layout file computes in Rust")
 )]
 
-/// The registry: a line for every width, with its bits, the grid of its levels (`Grid`), and its layouts of single and of
-/// paired lanes. It passes all lines to another macro, after a first argument for that.
+/// The registry: a line for every width, with its bits, the grid of its levels (`Grid`), and its layouts of single and
+/// of paired lanes. It passes all lines to another macro, after a first argument for that.
 macro_rules! registry {
     ($for_all:ident $first:tt) => {
         $for_all! {

@@ -1,8 +1,8 @@
 //! 2-bit codes, single lanes: one word holds 16 columns of a row, exactly 2 bits a weight.
 //!
 //! Columns are paired for SMLAD: pair `j` is columns `2j` (low lane) and `2j + 1` (high lane). Its codes are at bits
-//! `2j + 1` and `2j + 17` of a 32-bit ring, so that `ror(word, 2j) & 0x0006_0006` is both **doubled** codes, each in its
-//! lane:
+//! `2j + 1` and `2j + 17` of a 32-bit ring, so that `ror(word, 2j) & 0x0006_0006` is both **doubled** codes, each in
+//! its lane:
 //!
 //! ```text
 //! bit  31 30 29 .. 19 18 17 16 15 14 .. 4 3 2 1  0

@@ -1,7 +1,7 @@
 //! 4-bit codes, single lanes: one word holds 8 columns of a row, exactly 4 bits a weight.
 //!
-//! As [`super::w2`], with four pairs a word: pair `j` is columns `2j` and `2j + 1`, its codes are at bits `4j + 1`
-//! and `4j + 17` of a 32-bit ring, and `ror(word, 4j) & 0x001e_001e` is both doubled codes:
+//! The layout is that of [`super::w2`], with four pairs a word: pair `j` is columns `2j` and `2j + 1`, its codes are at
+//! bits `4j + 1` and `4j + 17` of a 32-bit ring, and `ror(word, 4j) & 0x001e_001e` is both doubled codes:
 //!
 //! ```text
 //! bit  31-29 28-25 24-21 20-17 16-13 12-9 8-5 4-1 0

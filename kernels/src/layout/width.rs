@@ -68,8 +68,8 @@ impl Width {
         }
     }
 
-    /// Returns the code whose level is nearest to `x` (a weight divided by its scale); ties go to the even code. At 8 bits
-    /// the result is symmetric: it is never -128. NaN gives the lowest code.
+    /// Returns the code whose level is nearest to `x` (a weight divided by its scale); ties go to the even code. At 8
+    /// bits the result is symmetric: it is never -128. NaN gives the lowest code.
     #[cfg(feature = "writer")]
     pub fn nearest_code(self, x: f32) -> u8 {
         match self.grid() {

@@ -2,9 +2,9 @@
 
 use crate::round::ROUND;
 
-/// Computes `2^(y / one)` as a fraction of two positive numbers, for a finite y. `one` is a power of two: it sets the unit and
-/// changes nothing else. The exponent stays within -33 ..= 33; there, all functions of this module have reached their limits
-/// in f32. The callers divide anyway.
+/// Computes `2^(y / one)` as a fraction of two positive numbers, for a finite y. `one` is a power of two: it sets the
+/// unit and changes nothing else. The exponent stays within -33 ..= 33; there, all functions of this module have
+/// reached their limits in f32. The callers divide anyway.
 ///
 /// In units, `y = n + f` with `|f| <= 1/2`. `2^f = (Q + f P) / (Q - f P)`, where `f P / Q` is `tanh(f ln 2 / 2)` with
 /// `P = p0 + p1 f^2` and `Q = q0 + f^2`, fitted for the smallest relative error, 1e-10. The numerator is multiplied by
@@ -40,8 +40,8 @@ pub(super) const EXPONENT: u32 = f32::MANTISSA_DIGITS - 1;
 /// Returns the number that rounds in these units, p1, p0 and q0.
 pub(crate) const fn exp2_constants(one: f32) -> [f32; 4] {
     // 2 more than 1.5 * 2^23, which could be half a unit in the last place of a large y: then the sum would be a tie,
-    // and f not small. (A large positive y whose sum needs another bit has a large f, but then the denominator is negligible
-    // against the numerator.)
+    // and f not small. (A large positive y whose sum needs another bit has a large f, but then the denominator is
+    // negligible against the numerator.)
     let round = (ROUND + 2.0) * one;
     [round, 0.057_690_073 / one, 7.215_289 * one, 20.818_924 * one * one]
 }

@@ -103,8 +103,8 @@ fn each<T: Copy>(x: &mut [T], function: impl Fn(T) -> T) {
     }
 }
 
-/// Applies a function to two elements in a pass, for few instructions of the loop; an odd element takes one more call of
-/// `each`.
+/// Applies a function to two elements in a pass, for few instructions of the loop; an odd element takes one more call
+/// of `each`.
 #[inline(never)]
 fn in_pairs(x: &mut [f32], each: fn(&mut [[f32; 2]])) {
     let (odd, pairs) = x.as_rchunks_mut::<2>();
@@ -147,8 +147,8 @@ fn each_ratio(x: &mut [f32], ratio: &Ratio) {
     }
 }
 
-/// Computes `e^x`, infinite outside f32's range: whole powers of two by two factors, because one does not reach f32's limits,
-/// and a fraction for the rest.
+/// Computes `e^x`, infinite outside f32's range: whole powers of two by two factors, because one does not reach f32's
+/// limits, and a fraction for the rest.
 #[inline(always)]
 pub fn exp(x: f32) -> f32 {
     // Limited by its bits: magnitudes compare as their bits.
@@ -180,9 +180,9 @@ pub fn cos(x: f32) -> f32 {
 }
 
 /// Computes a sine wave with zeros at `zero` and at every half turn from it, rising at every other one: the sine of the
-/// difference of x from the nearest zero. Half turns are subtracted in two parts, as Cody and Waite do; f32 multiplies the
-/// first part without error with every number of half turns below 2^16. The sine is a polynomial, fitted for the smallest
-/// error, 3e-9.
+/// difference of x from the nearest zero. Half turns are subtracted in two parts, as Cody and Waite do; f32 multiplies
+/// the first part without error with every number of half turns below 2^16. The sine is a polynomial, fitted for the
+/// smallest error, 3e-9.
 #[inline(always)]
 fn wave(x: f32, zero: f32) -> f32 {
     const TURN: [f32; 2] = [3.140_625, 9.676_536e-4];
@@ -201,8 +201,8 @@ fn wave(x: f32, zero: f32) -> f32 {
     p * square * r + r
 }
 
-/// Computes `ln(1 + exp(x)) = max(x, 0) + ln(1 + e)` with `e = exp(-|x|) = n / d`; of that, `ln(1 + e) = 2 artanh(s)` with
-/// `s = e / (2 + e)` at most 1/3, by a polynomial that was fitted for the smallest error, 1.4e-9.
+/// Computes `ln(1 + exp(x)) = max(x, 0) + ln(1 + e)` with `e = exp(-|x|) = n / d`; of that, `ln(1 + e) = 2 artanh(s)`
+/// with `s = e / (2 + e)` at most 1/3, by a polynomial that was fitted for the smallest error, 1.4e-9.
 #[inline(always)]
 pub fn softplus(x: f32) -> f32 {
     let half = 0.5 * x;
@@ -226,8 +226,8 @@ pub fn mish(x: f32) -> f32 {
     x * (w / (w + 2.0 * (d * d)))
 }
 
-/// Computes `max(x, 0)`; a number that is not finite stays unchanged, so that an overflow stays visible. It compares the bits
-/// as a signed number: finite negative numbers are below minus infinity, which is below all others.
+/// Computes `max(x, 0)`; a number that is not finite stays unchanged, so that an overflow stays visible. It compares
+/// the bits as a signed number: finite negative numbers are below minus infinity, which is below all others.
 #[inline(always)]
 pub fn relu(x: f32) -> f32 {
     let bits = x.to_bits() as i32;
@@ -262,8 +262,9 @@ pub fn silu(x: f32) -> f32 {
     x * sigmoid(x)
 }
 
-/// Computes `max(x, 0) - a * tail(a)` with `a = |x|`. `tail = 1 - Phi` is `p^8`, a power of a polynomial that was fitted for
-/// the smallest error of `a * tail / max(1, a)`, 5e-8. From 5.5 on, `a * tail` is below 1.1e-7 and keeps its value at 5.5. The code takes half of `a`, whose double is in `p^8`.
+/// Computes `max(x, 0) - a * tail(a)` with `a = |x|`. `tail = 1 - Phi` is `p^8`, a power of a polynomial that was
+/// fitted for the smallest error of `a * tail / max(1, a)`, 5e-8. From 5.5 on, `a * tail` is below 1.1e-7 and keeps its
+/// value at 5.5. The code takes half of `a`, whose double is in `p^8`.
 #[inline(always)]
 pub fn gelu(x: f32) -> f32 {
     const END: f32 = 5.5 / 2.0;
@@ -316,7 +317,7 @@ mod tests {
         // 2 sqrt(2 / pi)
         let u = |x: f64| 1.595_769_121_605_731 * (x + 0.044715 * x.powi(3));
         assert!(worst(87.0, exp, f64::exp, |x| x.exp() * size(x)) < 2.2e-7);
-        // Near zero, where the functions bend, beyond their limits, and far beyond.
+        // Near zero, around the bends of the functions, above their limits, and far above.
         for range in [1.0, 8.0, 40.0, 1e4, 1e30] {
             assert!(worst(range, sigmoid, sig, one) < 1.1e-7);
             assert!(worst(range, tanh, f64::tanh, one) < 1.5e-7);

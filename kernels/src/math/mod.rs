@@ -1,7 +1,7 @@
-//! Elementary functions in f32 by additions, multiplications and at most one division: no tables and no calls to a system
-//! library, so the same bits on every machine. The crate's tests assert the error bounds over dense sweeps of small and
-//! large inputs. `host-tests/tests/all/on_target/functions.rs` asserts that each function takes at most 30 instructions per
-//! element on the Cortex-M4's FPU (exp, cos and softplus at most 38).
+//! Elementary functions in f32 by additions, multiplications and at most one division: no tables and no calls to a
+//! system library, so the same bits on every machine. The crate's tests assert the error bounds over dense sweeps of
+//! small and large inputs. `host-tests/tests/all/on_target/functions.rs` asserts that each function takes at most 30
+//! instructions per element on the Cortex-M4's FPU (exp, cos and softplus at most 38).
 //!
 //! | function | error bound, against the exact value |
 //! |---|---|

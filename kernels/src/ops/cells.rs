@@ -8,8 +8,8 @@ pub fn lstm_cell(gates: &[f32], c: &mut [f32], h: &mut [f32]) {
     lstm_elements(0..h.len(), gates, c, h);
 }
 
-/// Computes a GRU cell in torch's gate order: `a = W_ih x + b_ih`, `b = W_hh h + b_hh`, each `[r | z | n]`.
-/// `h = (1 - z) * tanh(a_n + r * b_n) + z * h` with `r = sigmoid(a_r + b_r)`, `z = sigmoid(a_z + b_z)`. It does nothing if a
+/// Computes a GRU cell in torch's gate order: `a = W_ih x + b_ih`, `b = W_hh h + b_hh`, each `[r | z | n]`. `h = (1 -
+/// z) * tanh(a_n + r * b_n) + z * h` with `r = sigmoid(a_r + b_r)`, `z = sigmoid(a_z + b_z)`. It does nothing if a
 /// length does not fit.
 pub fn gru_cell(a: &[f32], b: &[f32], h: &mut [f32]) {
     gru_elements(0..h.len(), a, b, h);

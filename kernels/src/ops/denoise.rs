@@ -12,9 +12,9 @@ use crate::image::header::COEFFICIENTS;
 /// y  = x' + ahead * v
 /// ```
 ///
-/// each from left to right, where `s` is the predicted sample. So one operation covers Euler's and the midpoint method of a
-/// flow (Lipman et al., Flow matching, arXiv 2210.02747), DDPM (Ho et al., arXiv 2006.11239, equation 11) and DDIM (Song et
-/// al., arXiv 2010.02502, equation 12), with predictions of noise, sample or velocity.
+/// each from left to right, where `s` is the predicted sample. So one operation covers Euler's and the midpoint method
+/// of a flow (Lipman et al., Flow matching, arXiv 2210.02747), DDPM (Ho et al., arXiv 2006.11239, equation 11) and DDIM
+/// (Song et al., arXiv 2010.02502, equation 12), with predictions of noise, sample or velocity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Coefficients {
     /// Coefficient of the iterate in the predicted sample.
@@ -46,9 +46,9 @@ impl Coefficients {
     }
 }
 
-/// Updates the iterate `x` and the network's input `y` by its output `v`, with noise `z` unless that is empty, up to the
-/// shortest length. If `v` is not finite, the results are not finite: a limit hides a value outside f32's range, but the
-/// other terms do not.
+/// Updates the iterate `x` and the network's input `y` by its output `v`, with noise `z` unless that is empty, up to
+/// the shortest length. If `v` is not finite, the results are not finite: a limit hides a value outside f32's range,
+/// but the other terms do not.
 #[inline(never)]
 pub fn denoise(by: &Coefficients, limit: f32, v: &[f32], z: &[f32], x: &mut [f32], y: &mut [f32]) {
     arch::denoise(&by.to_array(), limit, v, z, x, y);

@@ -32,7 +32,8 @@ fn in_pairs(x: &[f32], y: &mut [f32], of: impl Fn(f32, f32) -> f32) {
     }
 }
 
-/// Copies `from` to `to`, up to the shorter length. The target does not use memcpy, which takes as much code as a kernel.
+/// Copies `from` to `to`, up to the shorter length. The target does not use memcpy, which takes as much code as a
+/// kernel.
 pub(crate) fn copy(from: &[u32], to: &mut [u32]) {
     arch::copy(from, to);
 }

@@ -37,9 +37,9 @@ fn outputs<'y>(
 }
 
 impl RowBlock<'_> {
-    /// Computes `y = start + acc * (row_scale * x_scale)` for the outputs of the block's rows, with a vector that was prepared
-    /// for the block. `start` holds the bits of the whole output's biases. Without it, and for rows with output steps, `y`
-    /// itself is the start.
+    /// Computes `y = start + acc * (row_scale * x_scale)` for the outputs of the block's rows, with a vector that was
+    /// prepared for the block. `start` holds the bits of the whole output's biases. Without it, and for rows with
+    /// output steps, `y` itself is the start.
     ///
     /// # Errors
     ///
@@ -55,9 +55,9 @@ impl RowBlock<'_> {
         self.apply_rows(0..self.block.shape().rows, &mut 0, x, x_scale, start, y).ok_or(Mismatch)
     }
 
-    /// Computes successive rows of the block as `apply` does. They start at a multiple of [`STRIP`], and end at another or
-    /// at the block's end. With output steps, `output` is the previous row's output (0 before the first row), and becomes
-    /// the last row's. `None` if `start` or `y` is too short.
+    /// Computes successive rows of the block as `apply` does. They start at a multiple of [`STRIP`], and end at another
+    /// or at the block's end. With output steps, `output` is the previous row's output (0 before the first row), and
+    /// becomes the last row's. `None` if `start` or `y` is too short.
     pub(crate) fn apply_rows(
         &self,
         rows: Range<usize>,
@@ -115,8 +115,8 @@ impl RowBlock<'_> {
         Some(())
     }
 
-    /// Converts the sums of the rows from `first` on, as many as `y` has, to results. If `sums` or `start` is `None`, `y` holds
-    /// them.
+    /// Converts the sums of the rows from `first` on, as many as `y` has, to results. If `sums` or `start` is `None`,
+    /// `y` holds them.
     fn scale_in_order(&self, first: usize, sums: Option<&[i32]>, x_scale: f32, start: Option<&[u32]>, y: &mut [f32]) {
         arch::scale(sums, start, self.scales.get(first / 2..).unwrap_or(&[]), x_scale, y);
     }
@@ -143,8 +143,9 @@ impl RowBlock<'_> {
 }
 
 impl Matrix<'_> {
-    /// Computes `y = W x + b`, or `y = y + b + W x` to `accumulate`, from `at` on and as far as the budget allows. Returns
-    /// `true` when all is done. `work` has room for the prepared activations; `x` and `y` have the matrix's lengths.
+    /// Computes `y = W x + b`, or `y = y + b + W x` to `accumulate`, from `at` on and as far as the budget allows.
+    /// Returns `true` when all is done. `work` has room for the prepared activations; `x` and `y` have the matrix's
+    /// lengths.
     #[inline(never)]
     pub(crate) fn resume(
         &self,

@@ -2,11 +2,11 @@
 
 use crate::arch::sqrt;
 
-/// Computes a value of standard normal noise: the value at `index` of draw `draw` with `seed`. Values are independent of each
-/// other, and the caller can compute them in any order.
+/// Computes a value of standard normal noise: the value at `index` of draw `draw` with `seed`. Values are independent
+/// of each other, and the caller can compute them in any order.
 ///
-/// The counter-based generator Philox2x32-10 (Salmon et al., Parallel random numbers: as easy as 1, 2, 3, SC 2011) gives the
-/// bits, and Box and Muller's transform in f32 the normal values. They are within ±5.8.
+/// The counter-based generator Philox2x32-10 (Salmon et al., Parallel random numbers: as easy as 1, 2, 3, SC 2011)
+/// gives the bits, and Box and Muller's transform in f32 the normal values. They are within ±5.8.
 #[inline(never)]
 pub fn normal(seed: u32, draw: u32, index: u32) -> f32 {
     let [a, b] = philox(seed, [index, draw]);
@@ -37,7 +37,8 @@ fn ln(x: f32) -> f32 {
     s * series + e as f32 * core::f32::consts::LN_2
 }
 
-/// Computes the cosine of `turns` turns, within half a turn of 0: `1 - 2 sin^2` of half the angle, by its Taylor series.
+/// Computes the cosine of `turns` turns, within half a turn of 0: `1 - 2 sin^2` of half the angle, by its Taylor
+/// series.
 fn cos_turns(turns: f32) -> f32 {
     let x = turns * core::f32::consts::PI;
     let x2 = x * x;

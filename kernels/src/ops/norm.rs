@@ -7,13 +7,15 @@ use crate::cursor::Moments;
 use crate::math::zero_or_nan;
 
 /// Computes in place `(x - mean) / sqrt(variance + eps) * weight + bias`, with mean and biased variance over the vector
-/// (torch's LayerNorm). Sums run in order from the first element. It does nothing if there are too few weights or biases.
+/// (torch's LayerNorm). Sums run in order from the first element. It does nothing if there are too few weights or
+/// biases.
 #[cfg(feature = "writer")]
 pub fn layer_norm(x: &mut [f32], weight: &[u32], bias: &[u32], eps: f32) {
     layer_norm_units(0..3 * x.len(), &mut Moments::default(), x, weight, bias, eps);
 }
 
-/// Computes some units of a layer norm: one pass over the elements for their sum, one for the squares, one for the results.
+/// Computes some units of a layer norm: one pass over the elements for their sum, one for the squares, one for the
+/// results.
 #[inline(never)]
 pub(crate) fn layer_norm_units(
     units: Range<usize>,

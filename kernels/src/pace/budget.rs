@@ -1,8 +1,8 @@
 //! The cost of the pieces of a slice, and the budget of a poll.
 //!
-//! A piece is successive units of one kind of work: strips of rows of a matrix, outputs set to their biases, elements of a
-//! function, of a recurrent cell, of a copy. Preparing a matrix's input is two pieces, its scale and its integers: neither
-//! takes longer than a strip of the rows that it is prepared for.
+//! A piece is successive units of one kind of work: strips of rows of a matrix, outputs set to their biases, elements
+//! of a function, of a recurrent cell, of a copy. Preparing a matrix's input is two pieces, its scale and its integers:
+//! neither takes longer than a strip of the rows that it is prepared for.
 
 use super::cost::{self, Feature};
 use crate::image::{Image, Op, OpKind, RowBlock};

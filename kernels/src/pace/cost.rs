@@ -1,12 +1,12 @@
 //! The cost of a step on a Cortex-M4 with FPU (thumbv7em-none-eabihf, zero-wait memory), from the image alone.
 //!
-//! [`Feature`]s describe an operation by the loops of its code: calls of a GEMV, strips, passes through a kernel's loop,
-//! columns, prepared values, scaled rows, elements of a function. A feature's **rate** is the cost of one of it. Rates come
-//! from measurements: `cargo xtask fit` counts the instructions of many operations in QEMU, solves for the rates, and writes
-//! `rates.rs`.
+//! [`Feature`]s describe an operation by the loops of its code: calls of a GEMV, strips, passes through a kernel's
+//! loop, columns, prepared values, scaled rows, elements of a function. A feature's **rate** is the cost of one of it.
+//! Rates come from measurements: `cargo xtask fit` counts the instructions of many operations in QEMU, solves for the
+//! rates, and writes `rates.rs`.
 //!
-//! Most code takes the same instructions for all values. Some code branches on values (elu and the action's limits): its
-//! expected cost is that of standard normal values. A third rate is the most that one element takes; slices
+//! Most code takes the same instructions for all values. Some code branches on values (elu and the action's limits):
+//! its expected cost is that of standard normal values. A third rate is the most that one element takes; slices
 //! ([`crate::Head::poll`]) use it.
 
 pub use super::feature::Feature;
@@ -111,8 +111,8 @@ pub fn of_step(image: &Image<'_>) -> Cost {
 }
 
 impl Image<'_> {
-    /// Computes the expected cost of a step that evaluates the network, on a Cortex-M4 with FPU and zero-wait memory. A step
-    /// that continues a chunk costs less.
+    /// Computes the expected cost of a step that evaluates the network, on a Cortex-M4 with FPU and zero-wait memory. A
+    /// step that continues a chunk costs less.
     pub fn step_cost(&self) -> Cost {
         of_step(self)
     }
@@ -206,8 +206,8 @@ pub(super) fn most_expensive_element(op: &Op<'_>, add: &mut dyn FnMut(Feature, u
     }
 }
 
-/// Returns the feature of an operation, the feature of its values, and their number: 0 for a linear operation, whose parts
-/// are counted one by one.
+/// Returns the feature of an operation, the feature of its values, and their number: 0 for a linear operation, whose
+/// parts are counted one by one.
 pub fn values(op: &Op<'_>) -> (Feature, Feature, usize) {
     let value = match op.kind {
         OpKind::Function(function) => Feature::function(function),
@@ -336,8 +336,8 @@ pub(super) fn products(shape: BlockShape, rows: usize, calls: usize, add: &mut d
     }
 }
 
-/// Computes the most that a piece of a block's rows takes, first at any length, then for each [`STRIP`] of rows, in 1024ths
-/// of an instruction.
+/// Computes the most that a piece of a block's rows takes, first at any length, then for each [`STRIP`] of rows, in
+/// 1024ths of an instruction.
 pub(super) fn strips(shape: BlockShape, in_order: bool, start: bool) -> (u32, u32) {
     let row = if in_order { Feature::SCALED_REST } else { Feature::SCALED_STEPPED };
     let first = most(|add| {

@@ -69,8 +69,8 @@ macro_rules! kinds {
     };
 }
 kinds! {
-    /// Features of an operation of each code. A linear operation also has the other features; a function has a feature of
-    /// its own for its values.
+    /// Features of an operation of each code. A linear operation also has the other features; a function has a feature
+    /// of its own for its values.
     Operation {
         Once "once"
         Value "a value"

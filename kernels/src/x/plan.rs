@@ -2,7 +2,8 @@
 
 use crate::layout::{Block, BlockShape, Lanes, Layout, PAD_COLS, PAIRED_GROUP, div_down, div_up, round_up};
 
-/// The lengths of a vector that is prepared for blocks of a shape, and the kernels' arguments. Zeros fill groups and chunks.
+/// The lengths of a vector that is prepared for blocks of a shape, and the kernels' arguments. Zeros fill groups and
+/// chunks.
 #[derive(Clone, Copy, Debug)]
 pub struct Plan {
     /// Shape of the blocks; its rows do not matter.
@@ -22,13 +23,13 @@ pub struct Plan {
     arguments: KernelArguments,
 }
 
-/// Arguments of an assembler kernel that depend on the vector's lengths. The plan keeps them: a call has no time to compute
-/// them.
+/// Arguments of an assembler kernel that depend on the vector's lengths. The plan keeps them: a call has no time to
+/// compute them.
 #[cfg_attr(not(any(feature = "writer", actq_armv7em)), expect(dead_code, reason = "only the assembler reads it"))]
 #[derive(Clone, Copy, Debug)]
 pub struct KernelArguments {
-    /// Words that the kernel reads. Single lanes read no more than the block's own units. With row scales, the vector's sum
-    /// follows the end; after a last group without a partner, the pair's word follows.
+    /// Words that the kernel reads. Single lanes read no more than the block's own units. With row scales, the vector's
+    /// sum follows the end; after a last group without a partner, the pair's word follows.
     pub end: usize,
     /// If chunks are summed without separation, minus the biases of all of them; 0 for single lanes with row scales;
     /// otherwise the bytes of a group's first chunk.
@@ -48,8 +49,8 @@ impl Plan {
         Self::of_valid(block.shape())
     }
 
-    /// Creates the plan for a valid shape. Every call of a kernel needs it; all lengths except the vector's are powers of
-    /// two, so there is no division.
+    /// Creates the plan for a valid shape. Every call of a kernel needs it; all lengths except the vector's are powers
+    /// of two, so there is no division.
     #[inline(never)]
     const fn of_valid(shape: BlockShape) -> Self {
         let layout = shape.layout();

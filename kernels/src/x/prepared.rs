@@ -12,8 +12,8 @@ pub struct Prepared<'a> {
 }
 
 impl<'a> Prepared<'a> {
-    /// Wraps a vector that [`Scale::quantize`](super::Scale::quantize) wrote with this plan to the start of `words`; `None` if
-    /// they are fewer than the plan's words.
+    /// Wraps a vector that [`Scale::quantize`](super::Scale::quantize) wrote with this plan to the start of `words`;
+    /// `None` if they are fewer than the plan's words.
     #[inline(always)]
     pub fn new(words: &'a [u32], plan: &'a Plan) -> Option<Self> {
         Some(Self { words: words.get(..plan.words)?, plan })

@@ -2,7 +2,8 @@
 
 use crate::error::NotFinite;
 
-/// Least magnitude, 2^-100. A vector without a larger one counts as zero, so that the reciprocal of the scale is finite.
+/// Least magnitude, 2^-100. A vector without a larger one counts as zero, so that the reciprocal of the scale is
+/// finite.
 pub const TINY: f32 = f32::from_bits(27 << 23);
 
 /// The scale of a vector: `x[i]` is about `scale * q[i]`, where `q[i] = round(x[i] * (x_max / amax))` and
@@ -18,8 +19,8 @@ impl Scale {
     /// Scale of integers that stay as they are.
     pub(crate) const ONE: Self = Self { scale: 1.0, inverse: 1.0 };
 
-    /// Returns the scale of a vector whose largest magnitude has these bits, for integers in `-x_max ..= x_max`. Magnitudes
-    /// compare as their bits; infinity's bits and all above are not finite.
+    /// Returns the scale of a vector whose largest magnitude has these bits, for integers in `-x_max ..= x_max`.
+    /// Magnitudes compare as their bits; infinity's bits and all above are not finite.
     #[inline(always)]
     pub(crate) fn of_magnitude(bits: u32, x_max: u16) -> Result<Self, NotFinite> {
         if bits >= f32::INFINITY.to_bits() {

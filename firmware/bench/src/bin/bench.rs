@@ -85,7 +85,7 @@ mod firmware {
                     for group in [0, 32] {
                         let shape = BlockShape { width, lanes: Lanes::of(x_max, group), rows, cols, group };
                         let words = b.words.get_mut(..shape.words())?;
-                        pack(shape, codes, b.scales.get(..rows * shape.groups())?, words)?;
+                        pack(shape, codes, b.scales.get(..rows * shape.groups())?, words).ok()?;
                         let block = Block::new(shape, words)?;
                         let scales = b.row_scales.get(..rows.div_ceil(2))?;
                         let block = RowBlock { block, scales, steps: &[], first_row: 0 };

@@ -57,7 +57,7 @@ mod firmware {
                 for group in [0, 32] {
                     let shape = BlockShape { width, lanes, rows: ROWS, cols: COLS, group };
                     let words = b.words.get_mut(..shape.words())?;
-                    pack(shape, &b.codes, b.scales.get(..ROWS * shape.groups())?, words)?;
+                    pack(shape, &b.codes, b.scales.get(..ROWS * shape.groups())?, words).ok()?;
                     let block = Block::new(shape, words)?;
                     let rows = RowBlock { block, scales: &row_scales, steps: &[], first_row: 0 };
                     let (plan, prepared) = (Plan::of(&block), &mut b.prepared);

@@ -1,9 +1,9 @@
 //! The GEMV in Armv7E-M assembler (Cortex-M4 and M7): SMLAD computes two MACs a cycle, four with paired lanes. Armv8-M
 //! with the DSP extension (Cortex-M33) has the same instructions.
 //!
-//! `single.s` has one loop nest for the four layouts of single lanes. Each layout of paired lanes has a file, with a kernel
-//! for row scales and one for group scales. All compute the same bits as the portable backend; the tests run both on the
-//! same data.
+//! `single.s` has one loop nest for the four layouts of single lanes. Each layout of paired lanes has a file, with a
+//! kernel for row scales and one for group scales. All compute the same bits as the portable backend; the tests run
+//! both on the same data.
 //!
 //! SMLAD sets the Q flag; the procedure call standard allows a call to change it.
 
@@ -31,9 +31,9 @@ pub(crate) fn gemv(Product { block, x, first_row, acc }: Product<'_>) {
     let rest = acc.len() - rows;
     let arguments = x.plan().arguments();
     // SAFETY: the rows from `first_row` on, as many as `acc` has, are rows of the block or of its padding: that is what
-    // `Product::new` checks. It also checks that `first_row` is a multiple of 8, so that a strip starts there. A block has the
-    // words of all of its rows (`Block::leading`). Each call reads the words of its strips and writes as many sums. It
-    // reads the prepared vector from its start to `end`, and the sums of x after it if the layout has sums;
+    // `Product::new` checks. It also checks that `first_row` is a multiple of 8, so that a strip starts there. A block
+    // has the words of all of its rows (`Block::leading`). Each call reads the words of its strips and writes as many
+    // sums. It reads the prepared vector from its start to `end`, and the sums of x after it if the layout has sums;
     // both are in the vector, because it was prepared for a block of this shape (`Plan::of`). The slices are of u32 and
     // i32, so every address is a multiple of 4, as LDM and LDRD demand.
     unsafe {

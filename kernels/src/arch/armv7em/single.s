@@ -218,7 +218,7 @@
     b.w 2f
     .endif
     enter_pass "\ahead"
-    @ The wide instructions here leave nothing for the loop's alignment to fill.
+    @ With the wide instructions here, the loop's alignment needs no padding.
 8:
     str.w r4, [sp, #36]
     start_sums

@@ -2,9 +2,9 @@
 
 use crate::layout::{BlockShape, Lanes, Width};
 
-/// A kernel: it reads `strips` strips at `weights` and the prepared vector from `x` up to `x_end`, and writes the strips' sums
-/// at `acc`. The kernel's file documents `extra`. The first pass through the loop of a kernel for row scales skips `skip` of
-/// the layout's steps.
+/// A kernel: it reads `strips` strips at `weights` and the prepared vector from `x` up to `x_end`, and writes the
+/// strips' sums at `acc`. The kernel's file documents `extra`. The first pass through the loop of a kernel for row
+/// scales skips `skip` of the layout's steps.
 pub(super) type Kernel = unsafe extern "C" fn(
     weights: *const u32,
     x: *const u32,

@@ -86,8 +86,8 @@ unsafe fn filled(x: &[f32], inverse: f32, plan: &Plan, room: *mut u32, words: us
     Some((NonNull::new(copied)?.cast(), inverse))
 }
 
-/// Computes `y[i] = start[i] + sum[i] * (scale[i] * x_scale)`, up to the shortest length, with two bf16 scales a word. If
-/// `sums` or `start` is `None`, `y` holds them, the sums as their bits.
+/// Computes `y[i] = start[i] + sum[i] * (scale[i] * x_scale)`, up to the shortest length, with two bf16 scales a word.
+/// If `sums` or `start` is `None`, `y` holds them, the sums as their bits.
 #[inline(never)]
 pub(crate) fn scale(sums: Option<&[i32]>, start: Option<&[u32]>, scales: &[u32], x_scale: f32, y: &mut [f32]) {
     let len = y.len().min(2 * scales.len());
@@ -99,7 +99,8 @@ pub(crate) fn scale(sums: Option<&[i32]>, start: Option<&[u32]>, scales: &[u32],
     unsafe { actq_scale_add(x_scale, sums, scales.as_ptr(), start, to, len) }
 }
 
-/// Constants of the cells: the factors of x for `e^x` and `e^(2 x)`, the number that rounds in these units, p1, p0 and q0.
+/// Constants of the cells: the factors of x for `e^x` and `e^(2 x)`, the number that rounds in these units, p1, p0 and
+/// q0.
 static CELL: [f32; 6] = {
     let [round, p1, p0, q0] = exp2_constants(QUARTER);
     [EXP, 2.0 * EXP, round, p1, p0, q0]

@@ -4,8 +4,9 @@ use crate::layout::{LAYOUTS, XLayout};
 
 macro_rules! quantize_kernels {
     ($($name:ident)*) => {
-        /// A quantizer: it writes `groups` groups of `chunks` column chunks, the first of `first` times eight values and the
-        /// others of `eights` times eight. `group` is 0 for a single group, whose sum, if any, has a word of its own.
+        /// A quantizer: it writes `groups` groups of `chunks` column chunks, the first of `first` times eight values
+        /// and the others of `eights` times eight. `group` is 0 for a single group, whose sum, if any, has a word of
+        /// its own.
         pub(super) type Quantize = unsafe extern "C" fn(
             inverse: f32, round: f32, x: *const f32, out: *mut u32,
             groups: usize, chunks: usize, first: usize, eights: usize, bias: i32, factor: i32, second_factor: i32, group: usize,
@@ -30,8 +31,8 @@ pub(super) fn quantizer(shift: u8) -> Quantize {
     QUANTIZERS[shift as usize % QUANTIZERS.len()]
 }
 
-/// Returns `true` if that quantizer suits the layout: it writes two start words, the second without a bias, at shift 1; sums
-/// from shift 2 on, those of pairs at 2; chunks of eight columns at 3.
+/// Returns `true` if that quantizer suits the layout: it writes two start words, the second without a bias, at shift 1;
+/// sums from shift 2 on, those of pairs at 2; chunks of eight columns at 3.
 const fn suits(x: &XLayout) -> bool {
     let &XLayout { shift, chunk, start_words, starts: [_, second], sum, pairs, .. } = x;
     let starts = start_words == if shift == 1 { 2 } else { 1 } && second.bias == 0;

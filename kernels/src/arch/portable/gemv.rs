@@ -1,7 +1,7 @@
 //! The GEMV in plain Rust, for any target: the arithmetic of the assembler backend, sum for sum.
 //!
-//! The loops suit a compiler that has few registers and knows the layout. They process a strip's cells together, so that one
-//! load of an activation serves all of them. Lengths that the layout determines are constants.
+//! The loops suit a compiler that has few registers and knows the layout. They process a strip's cells together, so
+//! that one load of an activation serves all of them. Lengths that the layout determines are constants.
 
 use crate::arch::product::Product;
 use crate::layout::{Block, Format, QUAD, Sums, XLayout, with_format};

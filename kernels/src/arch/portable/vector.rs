@@ -26,8 +26,8 @@ pub(crate) fn quantize(x: &[f32], inverse: f32, plan: &Plan, out: &mut [u32]) ->
     Some(())
 }
 
-/// Computes `y[i] = start[i] + sum[i] * (scale[i] * x_scale)`, with two bf16 scales a word. If `sums` or `start` is `None`,
-/// `y` holds them, the sums as their bits.
+/// Computes `y[i] = start[i] + sum[i] * (scale[i] * x_scale)`, with two bf16 scales a word. If `sums` or `start` is
+/// `None`, `y` holds them, the sums as their bits.
 pub fn scale(sums: Option<&[i32]>, start: Option<&[u32]>, scales: &[u32], x_scale: f32, y: &mut [f32]) {
     for (i, y) in y.iter_mut().enumerate() {
         let start = start.and_then(|s| s.get(i)).map_or(*y, |bits| f32::from_bits(u32::from_le(*bits)));
