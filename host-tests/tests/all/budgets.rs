@@ -61,12 +61,13 @@ fn options(method: Method, budget: Budget) -> Options {
     Options { steps: Some(0), ..Options::new(method, budget) }
 }
 
-fn quantize(quantizer: &Quantizer<'_>, budget: Budget) -> Result<QuantizedPolicy> {
-    Ok(quantizer.quantize(&options(quantizer.method().method(), budget), |_, _| {})?)
+fn quantize(quantizer: &Quantizer<'_>, budget: Budget) -> actq::error::Result<QuantizedPolicy> {
+    quantizer.quantize(&options(quantizer.method().method(), budget), |_, _| {})
 }
 
-fn too_small(result: Result<impl Sized>) -> Result<BudgetTooSmall> {
-    result.err().context("expected a refusal")?.downcast::<BudgetTooSmall>()
+fn too_small(result: actq::error::Result<impl Sized>) -> Result<BudgetTooSmall> {
+    let error = result.err().context("expected a refusal")?;
+    error.budget().copied().ok_or(error.into())
 }
 
 /// The fewest bytes of a row with more bits: of `outcome`'s rows, in their sorted order, if sorted.
@@ -139,7 +140,7 @@ proptest! {
             let quantizer = Quantizer::new(&policy, &recordings, Method::Best, None, |_| {})?;
             let found = match quantize(&quantizer, Budget::BitsPerWeight(bits)) {
                 Ok(found) => found,
-                Err(error) => return error.downcast::<BudgetTooSmall>().map(drop),
+                Err(error) => return too_small(Err::<(), _>(error)).map(drop),
             };
             let used = bits_per_weight(&found.buffer().image("drawn".as_ref())?);
             ensure!(used <= bits, "{used} bits for a budget of {bits}");
@@ -160,7 +161,7 @@ fn every_method_names_the_smallest_image() -> Result<()> {
     for method in [Method::Rtn, Method::Gptq, Method::ActQuant(Choices::default()), Method::Best] {
         let quantizer = Quantizer::new(&policy, &recordings, method, None, |_| {})?;
         let check = |bytes: usize| check_budget(&policy, &options(method, Budget::ImageBytes(bytes)));
-        let least = too_small(Ok(check(0)?)).context(method.to_string())?.bytes;
+        let least = too_small(check(0)).context(method.to_string())?.bytes;
         ensure!(check(least - 1).is_err() && check(least).is_ok(), "{method}: {least} bytes are not the least");
         let len = quantize(&quantizer, Budget::ImageBytes(least)).context(method.to_string())?.image.len();
         ensure!(len <= least && len + 4 > least, "{method}: {len} bytes for a budget of {least}");

@@ -120,7 +120,8 @@ impl<'a> Maker<'a> {
         let simulated = match actquant_k::quantize(&policy.graph, statistics, budget, self.subject.heldout()?) {
             Ok(simulated) => simulated,
             Err(error) => {
-                let too_small = error.downcast::<BudgetTooSmall>()?;
+                let error = error.downcast::<actq::error::Error>()?;
+                let Some(&too_small) = error.budget() else { return Err(error.into()) };
                 return Ok(Attempt::Impossible(least(&too_small, &format!("all matrices in {}", Format::ALL[0]))));
             }
         };
