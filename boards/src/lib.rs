@@ -3,8 +3,8 @@
 //! registers (`target`).
 //!
 //! On the host this crate is the table of boards for cargo's runner, build scripts, tests and measurements. On a target
-//! it is the `device` of the board that a feature selects, with the traits of [`seams`], and the serial port that all
-//! boards share ([`port`]).
+//! it has the `device` of the board that a feature selects, the traits of [`seams`], and the shared serial port
+//! ([`port`]).
 #![cfg_attr(target_os = "none", no_std)]
 #![cfg_attr(not(target_os = "none"), forbid(unsafe_code))]
 

@@ -129,9 +129,9 @@ impl<const LEN: usize> Read for Port<'_, LEN> {
     }
 }
 
-// Producer and consumer refer to their queue as a view, whose length the compiler does not know, so each remainder is a
-// division with a panic at zero. The comparison in these functions states the length, which makes it a mask. The test
-// of the application's ELF file fails if a panic remains.
+// Producer and consumer refer to their queue as a view, whose length the compiler does not know. So each remainder
+// would be a division with a panic at zero. The comparison in these functions states the length, which makes it a mask.
+// The test of the application's ELF file fails if a panic remains.
 
 /// Queues a byte; returns `false` if the queue is full.
 fn put<const LEN: usize>(queue: &mut Producer<'_, u8>, byte: u8) -> bool {
@@ -192,7 +192,7 @@ mod tests {
     const ROOM: usize = LEN - 1;
 
     #[test]
-    fn bytes_arrive_in_order_and_lost_ones_are_counted() {
+    fn bytes_keep_their_order_and_losses_are_counted() {
         // The queue wraps.
         let mut mock = Mock::default();
         let mut buffers = Buffers::<LEN>::new();
@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_is_sent_whole_or_not_at_all() {
+    fn frames_are_sent_whole_or_not_at_all() {
         let mut mock = Mock { room: 2, ..Mock::default() };
         let mut buffers = Buffers::<LEN>::new();
         let (mut wire, mut port) = buffers.split(&mut mock, || ());

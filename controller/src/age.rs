@@ -2,10 +2,10 @@
 //!
 //! The receiver's time minus the sender's time, minus the smallest such difference seen, is how much longer a frame
 //! took than the fastest one. The smallest difference rises with time, as fast as the sender's clock may run slow: a
-//! crystal is accurate to 0.01 %, an RC oscillator to 3 %. So the clocks' rates need not be estimated. Against any
-//! frame accepted earlier, the age is at least the frame's extra delay, minus [`DRIFT_BITS`]' share of the time since,
-//! minus the amount by which the sender's clock runs fast. If the sender's time stops or jumps back, its observations
-//! become old. If it jumps forward, the age is relative to the new time from then on.
+//! crystal is accurate to 0.01 %, an RC oscillator to 3 %. So the clocks' rates need not be estimated. Compare a frame
+//! with any earlier accepted one. Its age is at least its extra delay, minus [`DRIFT_BITS`]' share of the time between
+//! them, minus the gain of a fast sender's clock. If the sender's time stops or jumps back, its observations become
+//! old. If it jumps forward, the age is relative to the new time from then on.
 
 /// The smallest difference rises by 1/2^5 of the time: 3.1 %.
 const DRIFT_BITS: u32 = 5;

@@ -3,7 +3,7 @@
 //!
 //! Clarke and Park transforms (amplitude-invariant), a PI controller for each axis of the rotor, and space-vector
 //! modulation; a rotor observer for a sine-cosine sensor. All arithmetic is f32 in a fixed order, including sine,
-//! cosine, arctangent and root ([`functions`]), so a host, an emulator and a board compute the same bits.
+//! cosine, arctangent and root ([`functions`]). So a host, an emulator and a board compute the same bits.
 //!
 //! SI units: ampere, volt, ohm, henry, second, radian (electrical).
 

@@ -1,9 +1,9 @@
 //! The decisions of a motor controller, without its peripherals: the firmware passes in bytes, ticks and times, and
 //! writes the outputs.
 //!
-//! [`endpoint`] answers the link, [`guard`] checks observations for the head, [`safety`] decides the outputs of every
-//! tick, [`slots`] selects the image that runs, [`progress`] decides when to feed the watchdog, [`scrub`] detects a
-//! changed image, and [`breadcrumb`] reports the last crash. [`foc`] is a current loop for the control tick.
+//! [`endpoint`] answers the link, [`guard`] checks observations for the head, and [`safety`] decides the outputs of
+//! every tick. [`slots`] selects the image that runs, and [`scrub`] detects a changed one. [`progress`] decides when to
+//! feed the watchdog, and [`breadcrumb`] reports the last crash. [`foc`] is a current loop for the control tick.
 //! `docs/SAFETY.md` documents the states and the limits of these guarantees.
 //!
 //! This crate does not allocate, block or panic; each call's work is bounded.

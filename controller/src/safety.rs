@@ -153,8 +153,8 @@ impl<const AXES: usize> Safety<AXES> {
     ///
     /// # Errors
     ///
-    /// Fails without any change if the token differs from [`Self::token`], if already armed, if a check failed or was
-    /// not made, without a recent observation, and with an axis without limits.
+    /// Fails without any change if the token differs from [`Self::token`], or if the controller is already armed. The
+    /// same holds after a failed or missing check, without a recent observation, and with an axis without limits.
     pub fn arm(&mut self, token: u32) -> Result<(), Refusal> {
         if token != self.token {
             return Err(Refusal::Token);

@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn coasting_is_off_and_braking_is_on_without_a_duty() {
+    fn coasting_disables_and_braking_shorts_the_bridges() {
         let axes = [Axis::STILL];
         let mut motor = Motor::new(Mock::default(), 1000);
         assert!(motor.apply(&[Output::Brake], &axes) && motor.bridges.stage().on);

@@ -109,7 +109,7 @@ mod tests {
 
     /// The other phases still get their duty cycles: the state machine decides what follows.
     #[test]
-    fn a_phase_that_refuses_its_duty_cycle_is_a_fault() {
+    fn a_refused_duty_cycle_is_a_fault() {
         let axis = Axis::new(0.0, 1.0, 1.0, 0.0, SafeAction::Brake).expect("the axis is valid");
         for failing in [None, Some(0), Some(1), Some(2)] {
             let mut phase = 0;
@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn a_duty_cycle_is_the_position_between_the_limits() {
+    fn duty_cycles_are_positions_between_the_limits() {
         let axis = Axis::new(-1.0, 3.0, 1.0, 0.0, SafeAction::Brake).expect("the axis is valid");
         let (axes, mut bridges) = ([axis; 4], Bridges::new(Mock::default()));
         let duties = |bridges: &Bridges<Mock>| bridges.stage.duties();

@@ -282,7 +282,7 @@ pub(crate) mod tests {
     /// Ticks continue and the watchdog is fed even if the host does not read: it only loses whole frames, whose numbers
     /// it misses.
     #[test]
-    fn a_host_that_does_not_read_loses_only_frames() {
+    fn a_host_that_stops_reading_loses_only_frames() {
         const TICKS: u32 = 3000;
         // Ticks between two statuses, requests per tick, bytes that the host reads per tick.
         for (status_period, requests, reads) in [(1, 0, 0), (0, 1, 0), (1, 3, 0), (1, 1, 40)] {

@@ -2,11 +2,10 @@
 //! preconditions, and its errors by name. [`Part`] abstracts the registers, so that all of it also runs on the host, on
 //! a [`model`].
 //!
-//! The part has one bank. While a sector is erased (up to 2 s) or a word is programmed (up to 0.1 ms), any fetch or
-//! read from flash stalls the processor, including its interrupts. So no request starts unless the power stage's
-//! register says that it is off. A sector is erased only with a watchdog timeout of the data sheet's longest erase
-//! time, and the watchdog is fed afterwards only if the erase took no longer. If the controller does not finish, the
-//! watchdog resets the part.
+//! The part has one bank. An erase takes up to 2 s, and programming a word up to 0.1 ms. During it any fetch or read
+//! from flash stalls the processor, including its interrupts. So no request starts unless the power stage's register
+//! says that it is off. An erase sets the watchdog's timeout to the data sheet's longest erase time. Afterwards the
+//! watchdog is fed only if the erase took no longer. If the controller does not finish, the watchdog resets the part.
 
 #[cfg(any(test, feature = "model"))]
 pub mod model;

@@ -40,7 +40,7 @@ fn images_survive_a_faulty_line_and_a_reset() {
 }
 
 #[test]
-fn a_refused_push_gives_its_reason_and_changes_nothing() {
+fn refused_pushes_give_reasons_and_change_nothing() {
     let controller = Simulated::start(0, || Anyone);
     let mut client = controller.client();
     let good = image(1, 100);

@@ -46,7 +46,7 @@ fn a_streamed_recording_is_logged_with_its_actions() {
 }
 
 #[test]
-fn a_stopped_controller_ends_the_stream_with_its_reason() {
+fn a_stopped_controller_ends_the_stream() {
     let controller = Simulated::start(0, || Anyone);
     let (mut client, mut log) = (controller.client(), Log::default());
     let cut = observations(400).enumerate().map(|(i, values)| {

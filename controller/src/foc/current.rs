@@ -19,8 +19,8 @@ pub struct Gains {
 }
 
 impl Gains {
-    /// Returns the gains that cancel the winding's pole and give a first-order response of `bandwidth` rad/s, for a
-    /// resistance in ohm, an inductance in henry and a tick in seconds.
+    /// Returns the gains that cancel the winding's pole and give a first-order response of `bandwidth` rad/s.
+    /// Resistance is in ohm, inductance in henry, the tick in seconds.
     pub fn for_motor(resistance: f32, inductance: f32, bandwidth: f32, tick: f32) -> Self {
         Self { proportional: bandwidth * inductance, integral: bandwidth * resistance * tick }
     }
@@ -70,9 +70,8 @@ impl CurrentLoop {
     /// Computes one tick towards `target`. The voltage stays within the supply's limit. If it is not enough for both
     /// axes, d has priority, which preserves the flux.
     ///
-    /// Returns `None` without any change if a value is not finite, the angle is beyond [`MAX_RADIANS`], the supply is
-    /// not positive, or its square is not finite. The sensor is then broken, and the firmware must switch the outputs
-    /// off.
+    /// Returns `None` without any change if a value or the supply's square is not finite, the supply is not positive,
+    /// or the angle is beyond [`MAX_RADIANS`]. The sensor is then broken, and the firmware must switch the outputs off.
     pub fn step(&mut self, measured: &Measured, target: Rotor) -> Option<Tick> {
         let Measured { phases, angle, supply } = *measured;
         let [a, b, c] = phases;

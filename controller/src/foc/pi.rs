@@ -1,8 +1,8 @@
 //! A PI controller with a limited output.
 
-/// Proportional and integral control with anti-windup by tracking: while the output is limited, the integral is set to
-/// the value that just reaches the limit (Åström and Hägglund, PID controllers, 1995, section 3.5, with the shortest
-/// tracking time).
+/// Proportional and integral control with anti-windup: while the output is limited, the integral is set to the value
+/// that just reaches the limit. This is tracking with the shortest time (Åström and Hägglund, PID controllers, 1995,
+/// section 3.5).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pi {
     integral: f32,

@@ -50,8 +50,8 @@ impl<F: NorFlash, A: Authority> Slots<F, A> {
 
     /// Selects the image to run: the newest one that is complete, accepted by the authority and not rejected. The
     /// caller tests it and [confirms](Self::confirm) or [rejects](Self::reject) it. After a rejection this selects
-    /// another one or none. It reads one image or both, and calls `progress` before each block, and so also before the
-    /// check of a signature, which comes with the last block.
+    /// another one or none. It reads one image or both, and calls `progress` before each block. The check of a
+    /// signature follows the last block without another call.
     pub fn select(&mut self, mut progress: impl FnMut()) -> Option<Candidate> {
         let generation = |record: Option<Record>| record.map(|record| record.generation);
         let newest = match generation(self.record(Slot::B)) > generation(self.record(Slot::A)) {

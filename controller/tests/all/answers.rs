@@ -244,8 +244,8 @@ impl World {
     }
 }
 
-/// A million frames: each is answered at most once until the controller resets the sequence numbers, and applied at
-/// most once, only if it was sent after the arm request. Each action, applied or not, equals that of the host's own
+/// A million frames: each is answered at most once until the controller resets the sequence numbers. It is applied at
+/// most once, and only if it was sent after the arm request. Each action, applied or not, equals that of the host's own
 /// head, which is reset with every new token.
 #[test]
 fn the_host_predicts_every_action_once() {

@@ -151,7 +151,7 @@ fn actions_of_steps_before_arming_are_dropped() {
 }
 
 #[test]
-fn a_non_finite_action_and_a_failed_head_latch() {
+fn non_finite_actions_and_failed_heads_latch() {
     let mut bench = Bench::new();
     bench.arm();
     bench.observe();
@@ -274,7 +274,7 @@ fn an_update_that_stalls_the_tick_needs_disarming() {
 /// A disarm and the next request may arrive in one read, with the power stage still on, which an STM32F405's flash
 /// driver refuses. The update waits for the tick and continues.
 #[test]
-fn an_update_continues_after_a_disarm_in_one_read() {
+fn an_update_continues_after_a_disarm() {
     let begin = (1 << 20) - 2 * LARGE;
     let flash = Flash::new(Model::new(vec![0; 2 * LARGE as usize], begin, 1), begin);
     let layout = Layout::new(&flash, 0..LARGE, LARGE..2 * LARGE).expect("the slots are valid");
@@ -311,7 +311,7 @@ fn an_update_continues_after_a_disarm_in_one_read() {
 }
 
 #[test]
-fn status_is_periodic_and_silence_admits_a_new_host() {
+fn periodic_status_and_a_new_host_after_silence() {
     let mut bench = Bench::new();
     let token = bench.status().token;
     let set = Message::Set { token, parameter: Parameter::StatusPeriod, axis: 0, value: 50.0 };

@@ -18,7 +18,7 @@ fn take(guard: &mut Guard<'_, 4>, values: &[f32]) -> Result<(), Refused> {
 }
 
 #[test]
-fn length_finiteness_and_range_of_each_value_are_checked() {
+fn length_finiteness_and_range_are_checked() {
     let good = [1.0, 0.0, -1e30];
     let cases = [
         (vec![], Refused::Length { expected: 3, given: 0 }),

@@ -31,7 +31,7 @@ fn only_a_breadcrumb_is_found() {
 }
 
 #[test]
-fn a_breadcrumb_is_reported_with_the_cause_of_the_reset() {
+fn a_breadcrumb_is_reported_with_the_reset_cause() {
     let report = Record::report(ResetCause::Watchdog, Some(RECORD));
     assert_eq!((report.reset, report.crash, report.pc), (ResetCause::Watchdog, Some(Crash::HardFault), RECORD.pc));
     assert_eq!((report.detail, report.ticks, report.count), (RECORD.detail, RECORD.ticks, RECORD.count));

@@ -155,7 +155,7 @@ proptest! {
 /// For every deadline and every tick of the last observation, the output moves until the deadline, and not at the tick
 /// after it.
 #[test]
-fn a_broken_cable_latches_one_tick_after_the_deadline() {
+fn a_broken_cable_latches_after_the_deadline() {
     for deadline in 1..50 {
         let axis = Axis::new(-1e6, 1e6, 1.0, 0.0, SafeAction::Brake).expect("the axis is valid");
         let mut safety = Safety::new([axis], 1..=deadline, 0);
@@ -184,7 +184,7 @@ fn a_broken_cable_latches_one_tick_after_the_deadline() {
 }
 
 #[test]
-fn a_silent_head_latches_one_tick_after_the_deadline() {
+fn a_silent_head_latches_after_the_deadline() {
     let axis = Axis::new(-1.0, 1.0, 1.0, 0.0, SafeAction::Coast).expect("the axis is valid");
     let mut safety = Safety::new([axis], 1..=10, 0);
     Check::ALL.into_iter().for_each(|check| safety.check(check, true));

@@ -135,7 +135,7 @@ fn arming_requires_every_check() {
 }
 
 #[test]
-fn arming_requires_a_recent_observation_and_a_new_token() {
+fn arming_requires_a_recent_observation_and_token() {
     let mut safety = ready(SafeAction::Hold);
     STALE(&mut safety);
     assert_eq!(safety.arm(safety.token()), Err(Refusal::Stale));

@@ -237,7 +237,7 @@ fn the_command_watches_streams_and_updates() -> Result<()> {
     let controller = Controller::start(old.clone(), bytes.as_slice().try_into()?)?;
 
     let shown = succeeded(&controller.actq("watch", &["--once"])?)?;
-    for words in ["disarmed", "refused: no good observation", "built in, 24 values to 3", "power on"] {
+    for words in ["disarmed", "refused: no valid observation", "built in, 24 values to 3", "power on"] {
         assert!(shown.contains(words), "no {words:?} in\n{shown}");
     }
     failed(&controller.actq("arm", &[])?, 1, &["not armed", "send observations"])?;
@@ -259,7 +259,7 @@ fn the_command_watches_streams_and_updates() -> Result<()> {
     }
     let push = |image: &str, more: &[&str]| controller.actq("push", &[&[&*path(image)], more].concat());
     failed(&push("new.actq", &[])?, 1, &["signature is missing"])?;
-    failed(&push("new.actq", &["--signature", &path("old.sig")])?, 1, &["old.sig", "not that of this image"])?;
+    failed(&push("new.actq", &["--signature", &path("old.sig")])?, 1, &["old.sig", "does not match this image"])?;
     failed(&push("wrong.actq", &["--signature", &path("wrong.sig")])?, 1, &["self-test failed"])?;
     let printed = succeeded(&push("new.actq", &["--signature", &path("new.sig")])?)?;
     assert!(printed.contains("new runs, version 2"), "{printed}");

@@ -55,9 +55,9 @@ fn set(iwdg: &RegisterBlock, ticks: u16) -> bool {
 }
 
 /// Does `work` with a timeout of at least `milliseconds`, then restores the previous one. Returns `None`, with nothing
-/// done, if the watchdog does not accept the timeout. Only the loop that feeds the watchdog may call it. It does not
-/// return, and the watchdog resets the board, if the work took longer, measured in core cycles (`khz` in a
-/// millisecond), or if the previous timeout cannot be restored.
+/// done, if the watchdog does not accept the timeout. Only the loop that feeds the watchdog may call it. If the work
+/// took longer, measured in core cycles (`khz` in a millisecond), it does not return, and the watchdog resets the
+/// board. The same happens if the previous timeout cannot be restored.
 pub(super) fn with_watchdog_timeout<R>(milliseconds: u16, khz: u32, work: impl FnOnce() -> R) -> Option<R> {
     // SAFETY: the registers exist as long as the program runs; only the loop, which waits for this function, writes
     // them.

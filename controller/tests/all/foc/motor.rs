@@ -2,8 +2,8 @@
 
 use actq_controller::foc::{CurrentLoop, Gains, Measured, Observer, Rotor, Tick};
 
-/// A permanent-magnet synchronous motor of the size of a quadruped's, in the rotor's axes, in f64, integrated by the
-/// midpoint rule in 50 steps per control tick.
+/// A permanent-magnet synchronous motor of the size of a quadruped's, in the rotor's axes, in f64. It is integrated by
+/// the midpoint rule in 50 steps per control tick.
 struct Motor {
     d: f64,
     q: f64,

@@ -13,7 +13,7 @@ fn degrees_between(a: f64, b: f64) -> f64 {
 /// The error is below a quarter of a degree, which is the arctangent's error amplified by the gains, at any valid
 /// amplitude.
 #[test]
-fn a_rotor_at_constant_speed_is_followed_without_lag() {
+fn constant_speed_is_followed_without_lag() {
     for (tick, most) in [(1e-3, 0.25), (125e-6, 0.18)] {
         for speed in [0.0, 20.0, -300.0, 1000.0, -2000.0] {
             let mut observer = Observer::new(1000.0, tick as f32);

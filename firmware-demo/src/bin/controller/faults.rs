@@ -20,8 +20,8 @@ static STARTS: Kept<1> = Kept::new();
 
 /// Address of the configurable fault status register.
 const CFSR: u32 = 0xe000_ed28;
-/// Its bits for a stack overflow: the core could not stack, the program touched the guard, which is all that the memory
-/// protection unit forbids, or the pointer would have passed its limit (Armv8-M).
+/// Its bits for a stack overflow. STACKING: the core could not stack. ACCESS: the program touched the guard, the only
+/// memory that the memory protection unit forbids. LIMIT: the pointer would have passed its limit (Armv8-M).
 const STACKING: u32 = 1 << 4;
 const ACCESS: u32 = 1 << 1;
 const LIMIT: u32 = 1 << 20;

@@ -59,7 +59,7 @@ fn arm_and_disarm_change_the_state() -> Result<()> {
     }
     // Latched if the deadline has passed since.
     assert_ne!(controller.client()?.status()?.state, State::Disarmed);
-    failed(&link(&controller, &["set", "deadline", "100"], b"")?, 1, &["deadline", "not set to 100"])?;
+    failed(&link(&controller, &["set", "deadline", "100"], b"")?, 1, &["cannot set deadline", "to 100"])?;
     succeeded(&link(&controller, &["disarm"], b"")?)?;
     assert_eq!(controller.client()?.status()?.state, State::Disarmed);
     succeeded(&link(&controller, &["set", "deadline", "100"], b"")?)?;
