@@ -9,7 +9,7 @@ use crate::running::SLICE;
 use crate::timeouts::MAX_PIECE;
 
 /// Default rate of an axis, in full ranges (low to high) per second, if the build has none.
-const DEFAULT_RANGES: f32 = 10.0;
+const RANGES_PER_SECOND: f32 = 10.0;
 
 /// Opens an image: checks it and its lengths, and runs its self-test, which must match bit for bit. It feeds the
 /// watchdog before the check, whose time grows with the image, and before each slice of the self-test, which is at most
@@ -56,7 +56,7 @@ fn limited(limits: Limits, hz: f32) -> Option<Axis> {
         Some(rate) => rate / hz,
         // An axis with a single value does not move at any rate.
         None if low == high => 1.0,
-        None => (high - low) / (hz / DEFAULT_RANGES),
+        None => (high - low) / (hz / RANGES_PER_SECOND),
     };
     let start = 0f32.max(low).min(high);
     let ramp = Axis::new(low, high, step, start, SafeAction::Ramp { step });
