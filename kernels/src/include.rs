@@ -1,5 +1,7 @@
 //! An image in the program: aligned, and checked at compile time.
 
+use crate::image::ImageInfo;
+
 /// Includes an image file, as [`include_bytes!`](core::include_bytes) does, and returns `&'static [u8]`.
 ///
 /// The bytes are aligned to 4, as [`Image::new_checked`](crate::Image::new_checked) needs them. At compile time
@@ -33,28 +35,22 @@
 #[macro_export]
 macro_rules! include_image {
     ($path:expr $(,)?) => {{
-        static ALIGNED: &$crate::included::Aligned<[u8]> = &$crate::included::Aligned(*::core::include_bytes!($path));
+        static ALIGNED: &$crate::include::Aligned<[u8]> = &$crate::include::Aligned(*::core::include_bytes!($path));
         // The checksum of a large image takes more steps than the lint expects.
         #[allow(long_running_const_eval)]
-        const _: () = $crate::included::check(&ALIGNED.0);
+        const _: () = $crate::include::check(&ALIGNED.0);
         &ALIGNED.0
     }};
 }
 
-/// Parts of the expansion of [`include_image!`](crate::include_image), for no other use.
-#[doc(hidden)]
-pub mod included {
-    use crate::image::ImageInfo;
+/// Bytes at an address that is a multiple of 4. Part of the expansion of [`include_image!`](crate::include_image).
+#[derive(Debug)]
+#[repr(C, align(4))]
+pub struct Aligned<T: ?Sized>(pub T);
 
-    /// Bytes at an address that is a multiple of 4.
-    #[derive(Debug)]
-    #[repr(C, align(4))]
-    pub struct Aligned<T: ?Sized>(pub T);
-
-    /// Checks an image at compile time.
-    pub const fn check(bytes: &[u8]) {
-        if let Err(error) = ImageInfo::read(bytes) {
-            panic!("{}", error.text());
-        }
+/// Checks an image at compile time. Part of the expansion of [`include_image!`](crate::include_image).
+pub const fn check(bytes: &[u8]) {
+    if let Err(error) = ImageInfo::read(bytes) {
+        panic!("{}", error.text());
     }
 }

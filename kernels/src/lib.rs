@@ -61,7 +61,8 @@ mod head;
 pub mod image;
 #[cfg(not(feature = "writer"))]
 mod image;
-mod include;
+#[doc(hidden)]
+pub mod include;
 #[cfg(feature = "writer")]
 pub mod layout;
 #[cfg(not(feature = "writer"))]
@@ -92,8 +93,6 @@ pub use arch::{BACKEND, Backend};
 pub use error::{HeadError, ImageError, SavedError, StepError};
 pub use head::Head;
 pub use image::{Image, ImageInfo, Kind};
-#[doc(hidden)]
-pub use include::included;
 #[cfg(feature = "writer")]
 pub use layout::{Block, BlockShape, Width};
 pub use pace::cost::Cost;
