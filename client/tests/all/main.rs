@@ -1,7 +1,6 @@
 //! The host's end of the link with a simulated controller, over a socket and a faulty line.
 
 mod keys;
-mod line;
 mod pushes;
 mod requests;
 mod serves;

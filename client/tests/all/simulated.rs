@@ -19,9 +19,8 @@ use actq_controller::{Axis, Check, Endpoint, Guard, Output, SafeAction, Safety, 
 use actq_link::code::{Crash, Refusal, ResetCause};
 use actq_link::frame;
 use actq_link::report::{BUILT_IN, Timing};
+use actq_testkit::Line;
 use embedded_storage::nor_flash::ReadNorFlash as _;
-
-use crate::line::Line;
 
 pub(super) const OBSERVATION: usize = 4;
 /// Ticks of 1 ms.
@@ -82,7 +81,7 @@ pub(super) struct Simulated {
 
 impl Simulated {
     /// Starts a controller whose line has `faults` in a thousand frames, each way.
-    pub(super) fn start<A>(faults: u64, authority: impl Fn() -> A + Send + 'static) -> Self
+    pub(super) fn start<A>(faults: usize, authority: impl Fn() -> A + Send + 'static) -> Self
     where
         A: Authority,
     {
@@ -91,7 +90,7 @@ impl Simulated {
     }
 
     /// Starts a controller as [`Self::start`] does, with other axes.
-    pub(super) fn start_with<A>(axes: [Axis; 2], faults: u64, authority: impl Fn() -> A + Send + 'static) -> Self
+    pub(super) fn start_with<A>(axes: [Axis; 2], faults: usize, authority: impl Fn() -> A + Send + 'static) -> Self
     where
         A: Authority,
     {
@@ -147,7 +146,7 @@ fn run<A: Authority>(
     flash: &mut [u8],
     authority: A,
     axes: [Axis; 2],
-    faults: u64,
+    faults: usize,
     starts: u32,
 ) {
     listener.set_nonblocking(true).expect("the socket has options");
