@@ -14,10 +14,10 @@
 //! 2211.10438, eq. 4) does to activations' and weights' maxima with alpha 1/2. The values' means go into the biases.
 //!
 //! Where nothing but matrices reads a normalization without a limit, factors and means go into its own and cost
-//! nothing; elsewhere they are an operation [`Balance`], whose bytes count. It is added where it saves more bits: an
-//! error that falls to a share `s` is worth `log2(1 / s) / 2` bits for each weight of the matrices behind. Matrices that
-//! read the observation beside a hidden vector read it through the same operation (`sites.rs`); the others are named
-//! ([`mixed_units`]) where units are far apart.
+//! nothing; elsewhere they are an operation [`Balance`], whose bytes count. It scales the columns that need it
+//! (`part.rs`), and is added where it saves more bits: an error that falls to a share `s` is worth `log2(1 / s) / 2` bits
+//! for each weight of the matrices behind. Matrices that read the observation beside a hidden vector read it through the
+//! same operation (`sites.rs`); the others are named ([`mixed_units`]) where units are far apart.
 
 mod columns;
 mod mixed;
@@ -60,7 +60,7 @@ pub fn balance(graph: &Graph, moments: &mut [Moments], outputs: &[Vec<f64>]) -> 
         if !own && !pays(graph, &site, &columns, &part, moments) {
             continue;
         }
-        let Some(factors) = columns.factors(&part) else { continue };
+        let Some(factors) = part.factors(&columns) else { continue };
         let mean = part.means(&columns.mean);
         for reading in &site.readings {
             let (m, mean, factors) = (reading.matrix, reading.spread(&mean, 0.0), reading.spread(&factors, 1.0));
@@ -93,7 +93,7 @@ fn part(graph: &Graph, site: &Site, columns: &Columns, moments: &[Moments]) -> P
     let keeps_whole = |factors: Vec<f64>| {
         part.takes(&factors) && !site.readings.iter().any(|r| is_apart(graph, r, moments, &factors))
     };
-    let usable = !columns.are_far() && columns.factors(&part).is_some_and(keeps_whole);
+    let usable = !columns.are_far() && part.factors(columns).is_some_and(keeps_whole);
     if usable { part } else { Part::whole(columns) }
 }
 

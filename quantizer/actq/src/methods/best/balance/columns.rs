@@ -6,7 +6,6 @@
 
 use nalgebra::DMatrix;
 
-use super::part::Part;
 use super::sites::{Reading, Site};
 use crate::calibrate::moments::Moments;
 use crate::calibrate::sensitivity::{Side, importance};
@@ -104,21 +103,15 @@ impl Columns {
         factors.iter().zip(&self.weights).any(|(factor, a)| *a > 0.0 && beyond(factor))
     }
 
-    /// `d` of the part's columns, 1 of the others: relative to those, or, where there are none, so that the deviations
-    /// of what moved are 1 in the geometric mean; `None` where nothing moved.
-    pub(super) fn factors(&self, part: &Part) -> Option<Vec<f64>> {
+    /// `d` but for a common factor, and the factor that makes the deviations of what moved 1 in the geometric mean; `None`
+    /// where nothing moved.
+    pub(super) fn factors(&self) -> Option<(Vec<f64>, f64)> {
         let (factors, cols) = (self.wanted(), 0..self.mean.len());
         let usual = self.usual(&factors)?;
         let limited = |c: usize| factors[c].clamp(usual / MOST, usual * MOST);
         let moved = cols.clone().filter(|&c| self.deviation[c] > 0.0);
         let unit = geometric_mean(moved.map(|c| limited(c) * self.deviation[c]))?;
-        let unit = part.kept_factor.unwrap_or(unit);
-        let mut found = vec![1.0; cols.len()];
-        for c in part.columns() {
-            let value = self.values[c] / self.units[c].powi(2);
-            found[c] = self.units[c] * limited(c) / unit * part.share(value, self.mean[c]);
-        }
-        Some(found)
+        Some((cols.map(|c| self.units[c] * limited(c)).collect(), unit))
     }
 }
 

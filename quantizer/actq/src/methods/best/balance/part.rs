@@ -72,8 +72,21 @@ impl Part {
         means
     }
 
+    /// `d` of its columns, 1 of the others: relative to those, or, where there are none, so that the deviations of what
+    /// moved are 1 in the geometric mean. `None` where nothing moved.
+    pub(super) fn factors(&self, columns: &Columns) -> Option<Vec<f64>> {
+        let (of_columns, unit) = columns.factors()?;
+        let unit = self.kept_factor.unwrap_or(unit);
+        let (_, values) = columns.as_they_are();
+        let mut factors = vec![1.0; values.len()];
+        for c in self.columns() {
+            factors[c] = of_columns[c] / unit * self.share(values[c], columns.mean[c]);
+        }
+        Some(factors)
+    }
+
     /// The share of a factor that is left where the mean stays.
-    pub(super) fn share(&self, value: f64, mean: f64) -> f64 {
+    fn share(&self, value: f64, mean: f64) -> f64 {
         if self.has_means { 1.0 } else { (value / with_mean(value, mean)).powf(0.25) }
     }
 
