@@ -299,8 +299,9 @@ fn the_stack_fits_the_deepest_calls_and_interrupts() -> Result<()> {
         // The loop, the serial port, the tick, the faults, a hard fault, and the non-maskable interrupt.
         assert_eq!(worst.levels.len(), 6, "{target:?}: {:?}", worst.levels);
     }
+    // On a board whose code is at large addresses: at small ones, a constant may be taken for a function's address.
     let recursion =
-        worst_case(&firmware::controller(Target::Fpu, "faults")?).expect_err("the feature contains a recursion");
+        worst_case(&firmware::controller(Target::M33, "faults")?).expect_err("the feature contains a recursion");
     assert!(format!("{recursion:#}").contains("recurse is recursive"), "{recursion:#}");
     Ok(())
 }
