@@ -69,7 +69,7 @@ pub(crate) enum Command {
     Eval(EvalArgs),
     /// Drive an image, record, and learn again
     ///
-    /// Quantizes by method best from the f32 policy's recordings. Then, every round, a command drives the newest image:
+    /// Quantizes by method distill from the f32 policy's recordings. Then, every round, a command drives the newest image:
     /// a simulator or a robot that runs what the environment variable POLICY_CMD holds as its policy (actq serve IMAGE
     /// --record FILE, to be split as a shell does). The f32 policy labels what the image was shown, and the next image
     /// learns from all recordings together. The last image is driven, too. At the end: one image a row, with its error
@@ -85,7 +85,7 @@ pub(crate) enum Command {
     ///
     /// A cell of the table is the error (mean squared error / variance of the actions, mean over dimensions) and the
     /// true bits per weight, scales and padding counted; "-" where not even 2 bits fit. Every method uses its default
-    /// groups; activations are int8, for best int16 where it pays. A star marks the knee of a policy's best method.
+    /// groups; activations are int8, for distill int16 where it pays. A star marks the knee of a policy's best method.
     ///
     /// Example: actq sweep policies/ur3 policies/go1 --bpw 2.5,3,4 --svg errors.svg
     Sweep(SweepArgs),
@@ -195,20 +195,20 @@ pub(crate) struct QuantizeArgs {
         value_parser = clock
     )]
     pub(crate) clock: f64,
-    /// Force the width of a matrix, by its tensor's name (method best); may be repeated
+    /// Force the width of a matrix, by its tensor's name (method distill); may be repeated
     #[arg(long, value_name = "NAME=BITS", value_parser = forced)]
     pub(crate) width: Vec<(String, Width)>,
-    /// Keep a matrix at 8 bits (method best); may be repeated
+    /// Keep a matrix at 8 bits (method distill); may be repeated
     #[arg(long, value_name = "NAME")]
     pub(crate) protect: Vec<String>,
     /// Columns that share a u8 scale: 32, 64 or 128; 0 = one scale a row, which the kernels like best [default: 32 for
-    /// rtn and actquant, 0 for gptq and best]
+    /// rtn and actquant, 0 for gptq and distill]
     #[arg(long, value_name = "N", value_parser = group)]
     pub(crate) group: Option<usize>,
-    /// Bits of the activations, whose scale is found at run time [default: for best chosen per matrix, else 8]
+    /// Bits of the activations, whose scale is found at run time [default: for distill chosen per matrix, else 8]
     #[arg(long, value_name = "BITS")]
     pub(crate) activations: Option<ActivationArg>,
-    /// How codes are chosen [default: best where there is a recording to learn from, else rtn]
+    /// How codes are chosen [default: distill where there is a recording to learn from, else rtn]
     #[arg(long)]
     pub(crate) method: Option<MethodArg>,
     #[command(flatten)]
@@ -306,7 +306,7 @@ pub(crate) struct SweepArgs {
     #[arg(required = true)]
     pub(crate) policy_dirs: Vec<PathBuf>,
     /// Methods to compare
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "rtn,gptq,actquant,best")]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "rtn,gptq,actquant,distill")]
     pub(crate) methods: Vec<MethodArg>,
     /// Bits per weight of the whole that are allowed
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "2,2.5,3,4", value_parser = positive)]
@@ -377,7 +377,7 @@ impl ActQuantArgs {
     }
 }
 
-/// How method best learns. It ends by itself when the error no longer falls.
+/// How method distill learns. It ends by itself when the error no longer falls.
 #[derive(clap::Args)]
 pub(crate) struct LearnArgs {
     /// The most steps of distillation; 0 = none, but two-sided error feedback: seconds, and a larger error at few bits
@@ -428,7 +428,8 @@ pub(crate) enum MethodArg {
     /// Widths by HSIC scores, scales by the Fisher information of the actions (needs a recording with actions)
     Actquant,
     /// A width for every row, pruning, and distillation on the recorded observations (needs a recording)
-    Best,
+    #[value(alias = "best")]
+    Distill,
 }
 
 impl From<MethodArg> for Method {
@@ -437,7 +438,7 @@ impl From<MethodArg> for Method {
             MethodArg::Rtn => Self::Rtn,
             MethodArg::Gptq => Self::Gptq,
             MethodArg::Actquant => Self::ActQuant(Choices::default()),
-            MethodArg::Best => Self::Best,
+            MethodArg::Distill => Self::Distill,
         }
     }
 }

@@ -117,14 +117,14 @@ proptest! {
         let within = || -> Result<()> {
             let policy = policy(&shape)?;
             let recordings = recordings(&policy);
-            let quantizer = Quantizer::new(&policy, &recordings, Method::Best, None, |_| {})?;
+            let quantizer = Quantizer::new(&policy, &recordings, Method::Distill, None, |_| {})?;
             let least = too_small(quantize(&quantizer, Budget::ImageBytes(0)))?.bytes;
             let most = quantize(&quantizer, Budget::Width(Width::W8))?.image.len();
             for bytes in [least, least + (share * (most - least) as f64) as usize] {
                 let found = quantize(&quantizer, Budget::ImageBytes(bytes))?;
                 let len = found.image.len();
                 ensure!(len <= bytes, "{len} bytes for a budget of {bytes}");
-                check_used(&found, &options(Method::Best, Budget::ImageBytes(bytes)), bytes - len)?;
+                check_used(&found, &options(Method::Distill, Budget::ImageBytes(bytes)), bytes - len)?;
             }
             ensure!(too_small(quantize(&quantizer, Budget::ImageBytes(least - 1)))?.bytes == least, "the refusal names another least budget");
             Ok(())
@@ -137,7 +137,7 @@ proptest! {
         let within = || -> Result<()> {
             let policy = policy(&shape)?;
             let recordings = recordings(&policy);
-            let quantizer = Quantizer::new(&policy, &recordings, Method::Best, None, |_| {})?;
+            let quantizer = Quantizer::new(&policy, &recordings, Method::Distill, None, |_| {})?;
             let found = match quantize(&quantizer, Budget::BitsPerWeight(bits)) {
                 Ok(found) => found,
                 Err(error) => return too_small(Err::<(), _>(error)).map(drop),
@@ -145,7 +145,7 @@ proptest! {
             let used = bits_per_weight(&found.buffer().image("drawn".as_ref())?);
             ensure!(used <= bits, "{used} bits for a budget of {bits}");
             let left = (bits - used) * policy.weights as f64 / 8.0;
-            check_used(&found, &options(Method::Best, Budget::BitsPerWeight(bits)), left as usize)
+            check_used(&found, &options(Method::Distill, Budget::BitsPerWeight(bits)), left as usize)
         };
         within().map_err(|error| TestCaseError::fail(format!("{error:#}")))?;
     }
@@ -158,7 +158,7 @@ fn every_method_names_the_smallest_image() -> Result<()> {
     if let Some(calib) = &mut recordings.calib {
         calib.fill_actions(&policy.graph);
     }
-    for method in [Method::Rtn, Method::Gptq, Method::ActQuant(Choices::default()), Method::Best] {
+    for method in [Method::Rtn, Method::Gptq, Method::ActQuant(Choices::default()), Method::Distill] {
         let quantizer = Quantizer::new(&policy, &recordings, method, None, |_| {})?;
         let check = |bytes: usize| check_budget(&policy, &options(method, Budget::ImageBytes(bytes)));
         let least = too_small(check(0)).context(method.to_string())?.bytes;
@@ -173,9 +173,9 @@ fn every_method_names_the_smallest_image() -> Result<()> {
 fn a_learning_image_keeps_its_bytes() -> Result<()> {
     let policy = policy(&Shape { sizes: vec![9, 40, 30, 3], biases: false, norm: true, seed: 5 })?;
     let recordings = recordings(&policy);
-    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, None, |_| {})?;
+    let quantizer = Quantizer::new(&policy, &recordings, Method::Distill, None, |_| {})?;
     for bytes in [1200, 1600, 2200] {
-        let options = Options { steps: Some(5), ..options(Method::Best, Budget::ImageBytes(bytes)) };
+        let options = Options { steps: Some(5), ..options(Method::Distill, Budget::ImageBytes(bytes)) };
         let len = quantizer.quantize(&options, |_, _| {})?.image.len();
         ensure!(len <= bytes && len as f64 >= 0.97 * bytes as f64, "{len} bytes for a budget of {bytes}");
     }
@@ -188,9 +188,9 @@ fn an_unused_remainder_has_a_reason() -> Result<()> {
     let mut policy = policy(&shape)?;
     let reason = |policy: &Policy, bits: f64| -> Result<Option<Reason>> {
         let recordings = recordings(policy);
-        let quantizer = Quantizer::new(policy, &recordings, Method::Best, None, |_| {})?;
+        let quantizer = Quantizer::new(policy, &recordings, Method::Distill, None, |_| {})?;
         let budget = Budget::BitsPerWeight(bits);
-        Ok(Unused::of(&quantize(&quantizer, budget)?, &options(Method::Best, budget)).map(|unused| unused.reason))
+        Ok(Unused::of(&quantize(&quantizer, budget)?, &options(Method::Distill, budget)).map(|unused| unused.reason))
     };
     assert_eq!(reason(&policy, 20.0)?, Some(Reason::Widest));
     // Nothing reads the second half of the hidden values.

@@ -9,7 +9,7 @@ use anyhow::{Context as _, Result, ensure};
 fn plan(folder: &Path) -> Plan {
     Plan {
         policies: vec!["ur3".to_owned()],
-        methods: vec![Contender::Rtn, Contender::Best],
+        methods: vec![Contender::Rtn, Contender::Distill],
         budgets: vec![3.0, 1.5],
         episodes: 2,
         seed0: 1000,
@@ -30,7 +30,7 @@ fn a_comparison_runs_once_and_explains_impossible_cells() -> Result<()> {
     let Journal { cells, header, .. } = Journal::read(&folder)?;
     ensure!(header.options["episodes"] == 2, "{header:?}");
     let found: Vec<_> = cells.iter().map(|cell| (cell.key.method, cell.key.budget)).collect();
-    let methods = [Contender::Rtn, Contender::Best].map(Some);
+    let methods = [Contender::Rtn, Contender::Distill].map(Some);
     let [few, many] = [1.5, 3.0].map(Some);
     let expected = [(methods[0], many), (methods[0], few), (methods[1], many), (methods[1], few)];
     ensure!(found[0] == (None, None) && found[1..] == expected, "{found:?}");
@@ -51,7 +51,7 @@ fn a_comparison_runs_once_and_explains_impossible_cells() -> Result<()> {
         "| f32 | 100 (34-100) | 100 (34-100) |",
         "| rtn | - | ",
         "- rtn at 1.5 is not made: the least is 2.078",
-        "--methods rtn,best --budgets 3.0,1.5 --episodes 2 --seed0 1000 --seed 1 --steps 20",
+        "--methods rtn,distill --budgets 3.0,1.5 --episodes 2 --seed0 1000 --seed 1 --steps 20",
         "tracking error, mm",
     ] {
         ensure!(report.contains(words), "{words:?} is not in\n{report}");

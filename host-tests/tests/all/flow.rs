@@ -39,7 +39,7 @@ fn statistics_keep_their_share_of_the_time() -> Result<()> {
     let recordings = Recordings::load(&policy)?;
     let all = recordings.calib.as_ref().context("a recording")?.frames();
     let sampled = |minutes| -> Result<Sampled> {
-        let quantizer = Quantizer::new(&policy, &recordings, Method::Best, minutes, |_| {})?;
+        let quantizer = Quantizer::new(&policy, &recordings, Method::Distill, minutes, |_| {})?;
         quantizer.method().sampled().context("the head is not iterative")
     };
     let (free, bound) = (sampled(None)?, sampled(Some(1e-4))?);
@@ -64,9 +64,9 @@ fn the_ur3_flow_drives_at_few_bits() -> Result<()> {
     drives("f32", &SEEDS.map(episode).collect::<Vec<_>>(), F32_MM)?;
     let policy = Policy::load(&ur3_flow())?;
     let recordings = Recordings::load(&policy)?;
-    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, None, |_| {})?;
+    let quantizer = Quantizer::new(&policy, &recordings, Method::Distill, None, |_| {})?;
     for (bits, limit_mm) in [(3.0, W3_MM), (2.0, W2_MM)] {
-        let options = Options { steps: Some(STEPS), ..Options::new(Method::Best, Budget::BitsPerWeight(bits)) };
+        let options = Options { steps: Some(STEPS), ..Options::new(Method::Distill, Budget::BitsPerWeight(bits)) };
         let buffer = quantizer.quantize(&options, |_, _| {})?.buffer();
         let image = buffer.image("flow".as_ref())?;
         let outcomes =

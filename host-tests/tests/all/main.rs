@@ -2,7 +2,6 @@
 
 mod accuracy;
 mod arrows;
-mod best;
 mod budgets;
 mod cli;
 mod compare;
@@ -10,6 +9,7 @@ mod constants;
 mod controller;
 mod denoising;
 mod digests;
+mod distill;
 mod docs;
 mod drive;
 mod faults;

@@ -49,11 +49,11 @@ fn hold(method: Method, bits: f64, nmse: f64, tracking: f64) -> Result<(f64, usi
 }
 
 #[test]
-fn best_keeps_its_error_and_every_episode() -> Result<()> {
-    hold(Method::Best, 3.0, 1.4e-3, 1.0)?;
-    let (.., even) = hold(Method::Best, 2.0, 6.7e-3, 1.45)?;
+fn distill_keeps_its_error_and_every_episode() -> Result<()> {
+    hold(Method::Distill, 3.0, 1.4e-3, 1.0)?;
+    let (.., even) = hold(Method::Distill, 2.0, 6.7e-3, 1.45)?;
     // The purpose of `--relative`: small actions while the arm holds its goal.
-    let plain = Options::new(Method::Best, Budget::BitsPerWeight(2.0));
+    let plain = Options::new(Method::Distill, Budget::BitsPerWeight(2.0));
     let (_, kept, relative) = figures(&Options { steps: STEPS, relative: true, ..plain })?;
     assert_eq!(kept as u64, EPISODES);
     assert!(relative < even, "{relative} mm, and {even} mm with even errors");

@@ -41,7 +41,7 @@ fn statistics_sum_to_the_image_and_explain_widths() -> Result<()> {
     command.args(options);
     let printed = succeeded(&run(command, b"")?)?;
     let stats = parsed(&serde_json::from_slice(&fs::read(&file)?)?)?;
-    assert_eq!((stats.policy.as_str(), stats.method.as_str()), ("ur3_reach", "best"));
+    assert_eq!((stats.policy.as_str(), stats.method.as_str()), ("ur3_reach", "distill"));
     assert_eq!((stats.seed, stats.steps, stats.bytes as u64), (7, 2, fs::metadata(&image)?.len()));
     let weights: usize = stats.matrices.iter().map(|m| m.rows * m.cols).sum();
     let bytes: usize = stats.matrices.iter().map(|m| m.bytes).sum();
@@ -80,7 +80,7 @@ fn statistics_sum_to_the_image_and_explain_widths() -> Result<()> {
 fn image_rows_map_to_policy_rows() -> Result<()> {
     let fixture = Fixture::new()?;
     let policy = Policy::load(&fixture.policy())?;
-    let options = Options { steps: Some(2), ..Options::new(Method::Best, Budget::BitsPerWeight(4.0)) };
+    let options = Options { steps: Some(2), ..Options::new(Method::Distill, Budget::BitsPerWeight(4.0)) };
     let outcomes = quantize(&policy, &Recordings::load(&policy)?, &options, |_, _| {})?.outcomes;
     let mut removed = Vec::new();
     for (source, outcome) in policy.graph.matrices.iter().zip(&outcomes) {
@@ -229,7 +229,7 @@ fn every_field_is_documented() -> Result<()> {
     let fixture = Fixture::new()?;
     let text = fs::read_to_string(Path::new(root()).join("docs/QUANTIZER.md"))?;
     let mut values = vec![
-        fixture.image("best", "--bpw 4 --steps 2")?,
+        fixture.image("distill", "--bpw 4 --steps 2")?,
         fixture.image("actquant", "--bpw 6 --method actquant")?,
         fixture.image("width", "--bits 3 --method rtn")?,
         fixture.image("bytes", "--flash 4K --method rtn")?,

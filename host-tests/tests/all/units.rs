@@ -1,4 +1,4 @@
-//! The method best gives the same error in any units of the observations.
+//! The method distill gives the same error in any units of the observations.
 
 use actq::budget::Budget;
 use actq::data::{Dataset, Recordings};
@@ -138,7 +138,7 @@ fn error(build: Build, units: &Units, steps: usize) -> Result<f64> {
 fn error_of(graph: Graph, units: &Units, bits: f64, steps: usize) -> Result<f64> {
     let policy = Policy::of("units", graph);
     let recordings = Recordings { calib: Some(recorded(1, units, &policy.graph)), heldout: None };
-    let options = Options { steps: Some(steps), ..Options::new(Method::Best, Budget::BitsPerWeight(bits)) };
+    let options = Options { steps: Some(steps), ..Options::new(Method::Distill, Budget::BitsPerWeight(bits)) };
     let buffer = quantize(&policy, &recordings, &options, |_, _| {})?.buffer();
     Ok(eval::evaluate(buffer.image("image".as_ref())?, &recorded(2, units, &policy.graph))?.nmse)
 }

@@ -36,7 +36,7 @@ fn main() -> actq::error::Result<()> {
     recorded.fill_actions(&policy.graph);
 
     let recordings = Recordings { calib: Some(recorded.clone()), heldout: None };
-    let options = Options { steps: Some(100), ..Options::new(Method::Best, Budget::BitsPerWeight(3.0)) };
+    let options = Options { steps: Some(100), ..Options::new(Method::Distill, Budget::BitsPerWeight(3.0)) };
     let quantized = quantize(&policy, &recordings, &options, |_, _| {})?;
     let image = quantized.buffer();
     let report = eval::evaluate(image.image(&policy.dir)?, &recorded)?;

@@ -1,7 +1,7 @@
 //! Weight matrices into codes and scales.
 
 pub mod actquant;
-pub mod best;
+pub mod distill;
 pub mod gptq;
 mod learning;
 pub mod matrixwise;

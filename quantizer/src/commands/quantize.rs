@@ -102,7 +102,7 @@ fn options(args: &QuantizeArgs, has_calib: bool) -> Result<Options> {
     let method = match args.method {
         Some(method) => method.into(),
         None if !has_calib => Method::Rtn,
-        None => Method::Best,
+        None => Method::Distill,
     };
     let method = args.actquant.of(&[method])?[0];
     let limits = [

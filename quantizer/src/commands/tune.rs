@@ -42,7 +42,7 @@ pub(crate) fn run(args: &TuneArgs) -> Result<()> {
         None => Budget::Width(args.bits.unwrap_or(Width::W3)),
     };
     let LearnArgs { steps, minutes, relative } = args.learn;
-    let options = Options { steps, minutes, relative, seed: args.run.seed, ..Options::new(Method::Best, budget) };
+    let options = Options { steps, minutes, relative, seed: args.run.seed, ..Options::new(Method::Distill, budget) };
     let plan = TunePlan { policy: &policy, calib, heldout, options: &options, rounds: args.rounds };
     let tuned = tune::run(
         plan,

@@ -5,7 +5,7 @@ use actq::data::{Dataset, Range, Recordings, runs};
 use actq::measure::check::{Check, Checked};
 use actq::measure::eval::{ActivationShare, ErrorReport};
 use actq::methods::Options;
-use actq::methods::best::balance::MixedUnits;
+use actq::methods::distill::balance::MixedUnits;
 use actq::pipeline::{QuantizedPolicy, Reason, Unused};
 use actq::policy::Policy;
 
@@ -121,7 +121,7 @@ pub fn mixed_units(mixed: &[MixedUnits]) -> Vec<String> {
     let text = |MixedUnits { matrix, observations: [coarsest, finest], bits }: &MixedUnits| {
         format!(
             "{matrix}: observations come in units far apart (the coarsest is {coarsest}'s, the finest {finest}'s), which takes about \
-             {bits:.0} bits from each weight, and best cannot rescale the matrix's columns: another operation reads the same values or \
+             {bits:.0} bits from each weight, and distill cannot rescale the matrix's columns: another operation reads the same values or \
              weights, or the factors take more bytes than they save; scale the observations by an op normalize in policy.json, and \
              the columns to match"
         )

@@ -4,7 +4,7 @@ use actq::budget::Rate;
 use actq::graph::Graph;
 use actq::measure::eval::ErrorReport;
 use actq::methods::actquant::ActionStatistics;
-use actq::methods::best::balance::balance_bytes;
+use actq::methods::distill::balance::balance_bytes;
 use actq::methods::{Choice, Learning, Sampled, Tried};
 use actq::pipeline::{QuantizedPolicy, Search, Try};
 use comfy_table::Table;

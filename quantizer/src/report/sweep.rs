@@ -72,7 +72,7 @@ mod tests {
     #[test]
     fn the_table_has_every_policy_and_marks_its_knee() {
         let sweep = |policy: &str, points| {
-            let curves = vec![curve("best", points)];
+            let curves = vec![curve("distill", points)];
             let knee = knee(&curves);
             let budgets = vec![2.0, 2.5, 4.0];
             Sweep { policy: policy.into(), matrices: Vec::new(), budgets, curves, knee }

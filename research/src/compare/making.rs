@@ -163,7 +163,7 @@ impl<'a> Maker<'a> {
         progress: &mut impl FnMut(&str, f64),
     ) -> Result<Result<Attempt, BudgetTooSmall>> {
         let method = contender.method();
-        let steps = if contender == Contender::BestNotLearned { Some(0) } else { self.plan.steps };
+        let steps = if contender == Contender::DistillNotLearned { Some(0) } else { self.plan.steps };
         let plain = Options::new(method, Budget::BitsPerWeight(budget));
         let options = Options { group, steps, seed: self.plan.seed, ..plain };
         let begun = Instant::now();

@@ -47,8 +47,8 @@ mod tests {
         assert!(seconds_left(&[], &[key("a", Contender::Rtn)]).is_none());
         let done = [cell(key("a", Contender::Rtn), 10.0), cell(key("b", Contender::Rtn), 30.0)];
         let left = |missing: &[CellKey]| seconds_left(&done, missing).expect("something is done");
-        assert_eq!(left(&[key("b", Contender::Best)]), 30.0);
-        assert_eq!(left(&[key("c", Contender::Best), key("a", Contender::Gptq)]), 30.0);
+        assert_eq!(left(&[key("b", Contender::Distill)]), 30.0);
+        assert_eq!(left(&[key("c", Contender::Distill), key("a", Contender::Gptq)]), 30.0);
         assert_eq!(left(&[]), 0.0);
         assert_eq!([80.0, 600.0, 9000.0].map(duration), ["80 s", "10 min", "2.5 h"]);
     }

@@ -30,12 +30,14 @@ pub enum Contender {
     #[value(name = "actquant-k")]
     #[serde(rename = "actquant-k")]
     ActQuantK,
-    /// best with --steps 0: not learned
-    #[value(name = "best-0")]
-    #[serde(rename = "best-0")]
-    BestNotLearned,
-    /// best
-    Best,
+    /// distill with --steps 0: not learned
+    #[value(name = "distill-0", alias = "best-0")]
+    #[serde(rename = "distill-0", alias = "best-0")]
+    DistillNotLearned,
+    /// distill
+    #[value(alias = "best")]
+    #[serde(alias = "best")]
+    Distill,
 }
 
 impl Contender {
@@ -46,7 +48,7 @@ impl Contender {
             Self::Gptq => Method::Gptq,
             Self::ActQuant | Self::ActQuantK => Method::ActQuant(Choices::default()),
             Self::ActQuantAuthors => Method::ActQuant(Choices::AUTHORS),
-            Self::BestNotLearned | Self::Best => Method::Best,
+            Self::DistillNotLearned | Self::Distill => Method::Distill,
         }
     }
 
@@ -63,8 +65,8 @@ impl Contender {
             Self::ActQuant => "actquant",
             Self::ActQuantAuthors => "actquant, authors' choices",
             Self::ActQuantK => "actquant, K-quants",
-            Self::BestNotLearned => "best, not learned",
-            Self::Best => "best",
+            Self::DistillNotLearned => "distill, not learned",
+            Self::Distill => "distill",
         }
     }
 }
@@ -80,12 +82,12 @@ pub struct Plan {
         default_value = "go1_mlp,g1_lstm256,g1_lstm64,fetch_pickplace,ur3"
     )]
     pub policies: Vec<String>,
-    /// Methods; best-0 is best with --steps 0, not learned; actquant-authors is not in the default
+    /// Methods; distill-0 is distill with --steps 0, not learned; actquant-authors is not in the default
     #[arg(
         long,
         value_name = "LIST",
         value_delimiter = ',',
-        default_value = "rtn,gptq,actquant,actquant-k,best-0,best"
+        default_value = "rtn,gptq,actquant,actquant-k,distill-0,distill"
     )]
     pub methods: Vec<Contender>,
     /// Allowed bits per weight, everything counted

@@ -51,7 +51,7 @@ fn signals_leave_no_file_and_set_the_status() -> Result<()> {
     for (signal, status) in [("HUP", 129), ("INT", 130), ("TERM", 143)] {
         let mut command = Command::new("env");
         command.args(["--default-signal=HUP,INT,TERM".as_ref(), binary()?.as_os_str()]);
-        command.arg("quantize").arg(fixture.policy()).args(["--method", "best", "--steps", "100000000", "--out"]);
+        command.arg("quantize").arg(fixture.policy()).args(["--method", "distill", "--steps", "100000000", "--out"]);
         let mut child = command.arg(&out).stdout(Stdio::null()).stderr(Stdio::piped()).spawn()?;
         wait_for(&mut child, || Ok(fixture.snapshot()?.len() > before.len()))?;
         send(signal, &child)?;

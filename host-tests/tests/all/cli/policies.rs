@@ -205,7 +205,7 @@ const FAULTS: &[Fault] = &[
     (
         "too few frames to learn from",
         |_| Ok(()),
-        "--method best",
+        "--method distill",
         &["calib.npz", "47 frames are recorded, 200 are needed: learning from fewer repeats them by heart"],
     ),
     ("truncated recording", |p| cut(&p.join("calib.npz"), 100), "", &["calib.npz"]),

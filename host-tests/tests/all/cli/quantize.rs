@@ -47,7 +47,7 @@ fn relative_errors_require_a_method_that_learns() -> Result<()> {
         run(actq(&[&["quantize", &policy, "--out", &out, "--bpw", "2.0"], arguments].concat()), b"")
     };
     for arguments in [["--relative", "--method", "rtn"], ["--relative", "--steps", "0"]] {
-        failed(&quantize(&arguments)?, 1, &["--relative says how method best learns", "leave it out"])?;
+        failed(&quantize(&arguments)?, 1, &["--relative says how method distill learns", "leave it out"])?;
         ensure!(!Path::new(&out).exists(), "an image was written");
     }
     succeeded(&quantize(&["--steps", "8"])?)?;
@@ -119,9 +119,9 @@ fn impossible_budgets_are_refused_before_reading_recordings() -> Result<()> {
     fs::write(fixture.policy().join("calib.npz"), "not a recording")?;
     let out = fixture.out("small.actq");
     for (options, words) in [
-        ("--flash 600 --method best", "the smallest image of this policy by this method takes"),
+        ("--flash 600 --method distill", "the smallest image of this policy by this method takes"),
         ("--flash 600", "600 are allowed; allow"),
-        ("--bpw 0.01 --method best", "bits a weight or more"),
+        ("--bpw 0.01 --method distill", "bits a weight or more"),
     ] {
         failed(&fixture.quantize(&out, options)?, 1, &["the budget is too small", words])?;
     }
@@ -205,7 +205,7 @@ fn choices_of_actquant_reach_the_image() -> Result<()> {
     fs::remove_file(&out)?;
     for (options, status, words) in [
         ("--method gptq --actquant authors", 1, "--actquant goes with method actquant, not with gptq"),
-        ("--actquant authors", 1, "not with best"),
+        ("--actquant authors", 1, "not with distill"),
         ("--method actquant --actquant heads=8", 2, "heads is no key; the keys are bandwidth, frames"),
         ("--method actquant --actquant head=5", 2, "head takes 2, 3, 4 or 8, or free"),
     ] {

@@ -29,9 +29,9 @@ fn image(policy: &Policy, options: &Options) -> Result<Vec<u8>> {
     Ok(quantize(policy, &Recordings::load(policy)?, options, |_, _| {})?.image)
 }
 
-fn best(bits: f64) -> Options {
+fn distill(bits: f64) -> Options {
     // Learning changes the weights' values, on which no time depends.
-    Options { steps: Some(2), ..Options::new(Method::Best, Budget::BitsPerWeight(bits)) }
+    Options { steps: Some(2), ..Options::new(Method::Distill, Budget::BitsPerWeight(bits)) }
 }
 
 fn rtn(width: Width, group: usize, activations: Activations) -> Options {
@@ -112,11 +112,11 @@ fn steps_that_merge_chunks_match_the_prediction() -> Result<()> {
     Ok(())
 }
 
-/// Whole steps of rtn images, with groups and without, and of the method best.
+/// Whole steps of rtn images, with groups and without, and of the method distill.
 fn images() -> Vec<Options> {
     vec![
-        best(2.0),
-        best(3.0),
+        distill(2.0),
+        distill(3.0),
         rtn(Width::W4, 32, Activations::Int8),
         rtn(Width::W8, 32, Activations::Int8),
         rtn(Width::W4, 64, Activations::Int16),
@@ -134,8 +134,8 @@ fn steps_of_shared_policies_match_the_prediction() -> Result<()> {
     let Some(policies) = shared_policies() else { return Ok(()) };
     // Limit of the instructions per MAC of the whole head at 3 bits.
     for (name, limit) in [("go1_mlp", 1.25), ("g1_lstm256", 1.30), ("fetch_pickplace", 1.25)] {
-        let others = [best(2.0), rtn(Width::W3, 32, Activations::Int8), rtn(Width::W8, 0, Activations::Int16)];
-        let per_mac = predictions_hold(&policies.join(name), &[&[best(3.0)], &others[..]].concat())?;
+        let others = [distill(2.0), rtn(Width::W3, 32, Activations::Int8), rtn(Width::W8, 0, Activations::Int16)];
+        let per_mac = predictions_hold(&policies.join(name), &[&[distill(3.0)], &others[..]].concat())?;
         ensure!(per_mac[0] <= limit, "{name}: {:.3} instructions per MAC, limit {limit}", per_mac[0]);
     }
     Ok(())
@@ -194,7 +194,7 @@ fn polls_stay_within_their_budget() -> Result<()> {
 fn polls_of_shared_policies_stay_within_their_budget() -> Result<()> {
     let Some(policies) = shared_policies() else { return Ok(()) };
     for name in ["go1_mlp", "g1_lstm256", "fetch_pickplace"] {
-        polls_keep_their_budget(&policies.join(name), &[best(2.0), rtn(Width::W4, 32, Activations::Int8)])?;
+        polls_keep_their_budget(&policies.join(name), &[distill(2.0), rtn(Width::W4, 32, Activations::Int8)])?;
     }
     Ok(())
 }
@@ -203,10 +203,10 @@ fn polls_of_shared_policies_stay_within_their_budget() -> Result<()> {
 fn a_budget_of_time_is_kept_and_used() -> Result<()> {
     let policy = Policy::load(&ur3())?;
     let recordings = Recordings::load(&policy)?;
-    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, None, |_| {})?;
+    let quantizer = Quantizer::new(&policy, &recordings, Method::Distill, None, |_| {})?;
     let within = |milliseconds| {
         let budget = Budget::Time(TimeLimit { milliseconds, clock_hz: CLOCK });
-        quantizer.quantize(&Options { budget, ..best(1.0) }, |_, _| {})
+        quantizer.quantize(&Options { budget, ..distill(1.0) }, |_, _| {})
     };
     for milliseconds in [1.6, 2.4] {
         let found = within(milliseconds)?;

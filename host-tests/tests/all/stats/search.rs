@@ -40,7 +40,7 @@ fn steps_tried(printed: &str) -> Vec<&str> {
 #[test]
 fn learning_methods_search_with_few_steps() -> Result<()> {
     let fixture = Fixture::new()?;
-    let options = "--method best --steps 40 --max-nmse 0.05";
+    let options = "--method distill --steps 40 --max-nmse 0.05";
     let printed = succeeded(&fixture.quantize(&format!("--out a.actq {options}"))?)?;
     let steps = steps_tried(&printed);
     let looks = steps.iter().take_while(|s| **s == "5").count();
@@ -50,7 +50,7 @@ fn learning_methods_search_with_few_steps() -> Result<()> {
     succeeded(&fixture.quantize(&format!("--out b.actq {options} --threads 1"))?)?;
     ensure!(fs::read(fixture.path("a.actq"))? == fs::read(fixture.path("b.actq"))?, "two runs differ");
     // Without steps there is no eighth of them.
-    let printed = succeeded(&fixture.quantize("--out c.actq --method best --steps 0 --max-nmse 0.3")?)?;
+    let printed = succeeded(&fixture.quantize("--out c.actq --method distill --steps 0 --max-nmse 0.3")?)?;
     let steps = steps_tried(&printed);
     ensure!(!steps.is_empty() && steps.iter().all(|s| *s == "0"), "{printed}");
     ensure!(fixture.nmse("c.actq")? <= 0.3, "{printed}");
@@ -61,7 +61,7 @@ fn learning_methods_search_with_few_steps() -> Result<()> {
 fn an_error_below_eight_bits_is_refused() -> Result<()> {
     let fixture = Fixture::new()?;
     let before = fixture.files()?;
-    for method in ["gptq", "best --steps 2"] {
+    for method in ["gptq", "distill --steps 2"] {
         let output =
             fixture.quantize(&format!("--out x.actq --save-stats x.json --method {method} --max-nmse 1e-12"))?;
         failed(&output, 1, &["8 bits", "0.000000000001", "lowest", "NMSE"])?;

@@ -14,7 +14,7 @@ fn a_sweep_stores_allocations_and_scores() -> Result<()> {
     let (fixture, other) = (Fixture::new()?, Fixture::new()?);
     fs::rename(other.policy(), fixture.path("other"))?;
     let line =
-        "sweep policy other --bpw 2.5,3.5,5 --methods actquant,best --steps 3 --threads 2 --json s.json --svg s.svg";
+        "sweep policy other --bpw 2.5,3.5,5 --methods actquant,distill --steps 3 --threads 2 --json s.json --svg s.svg";
     let printed = succeeded(&fixture.actq(line)?)?;
     let value: Value = serde_json::from_slice(&fs::read(fixture.path("s.json"))?)?;
     assert_eq!(value.as_array().map(Vec::len), Some(2));
@@ -34,7 +34,9 @@ fn a_sweep_stores_allocations_and_scores() -> Result<()> {
     assert_eq!(marked, stars(&value[0]) + stars(&value[1]), "{printed}");
     assert_eq!(fs::read_to_string(fixture.path("s.svg"))?.matches("<polyline").count(), 4);
     let seed = |n: u32| -> Result<Value> {
-        succeeded(&fixture.actq(&format!("sweep policy --bpw 4 --methods best --steps 3 --seed {n} --json t.json"))?)?;
+        succeeded(
+            &fixture.actq(&format!("sweep policy --bpw 4 --methods distill --steps 3 --seed {n} --json t.json"))?,
+        )?;
         Ok(serde_json::from_slice(&fs::read(fixture.path("t.json"))?)?)
     };
     let (one, again, two) = (seed(1)?, seed(1)?, seed(2)?);

@@ -19,8 +19,8 @@ pub enum Method {
     /// Round to nearest, widths by HSIC scores, scales by the Fisher information of the action loss (ActQuant, arXiv
     /// 2605.24011); where it may be read in several ways, by these choices.
     ActQuant(Choices),
-    /// Widths by rows, pruning and distillation ([`super::best`]).
-    Best,
+    /// Widths by rows, pruning and distillation ([`super::distill`]).
+    Distill,
 }
 
 impl Method {
@@ -29,7 +29,7 @@ impl Method {
     pub fn default_group(self) -> usize {
         match self {
             Self::Rtn | Self::ActQuant(_) => 32,
-            Self::Gptq | Self::Best => 0,
+            Self::Gptq | Self::Distill => 0,
         }
     }
 }
@@ -44,7 +44,7 @@ impl fmt::Display for Method {
                 return f.pad(&format!("actquant ({choices})"));
             }
             Self::ActQuant(_) => "actquant",
-            Self::Best => "best",
+            Self::Distill => "distill",
         })
     }
 }
@@ -92,11 +92,11 @@ pub struct Options {
     pub steps: Option<usize>,
     /// The most minutes of distillation; None: only the steps bound it.
     pub minutes: Option<f64>,
-    /// Whether what is learned counts errors relative to the action's size, more than it does by itself (method best).
+    /// Whether what is learned counts errors relative to the action's size, more than it does by itself (method distill).
     pub relative: bool,
     /// Seed of everything that is drawn.
     pub seed: u64,
-    /// Matrices, by their tensors' names, whose rows all get a certain width (method best).
+    /// Matrices, by their tensors' names, whose rows all get a certain width (method distill).
     pub forced: Vec<(String, Width)>,
 }
 
@@ -126,7 +126,7 @@ impl Options {
     pub fn check(&self) -> Result<()> {
         ensure!(
             !self.relative || self.learns(),
-            "--relative says how method best learns: leave it out with other methods and with --steps 0"
+            "--relative says how method distill learns: leave it out with other methods and with --steps 0"
         );
         ensure!(is_group(self.group), "group is {}, it must be 0 or one of {GROUPS:?}", self.group);
         Ok(())
@@ -134,7 +134,7 @@ impl Options {
 
     /// `true` if the method learns.
     pub fn learns(&self) -> bool {
-        self.method == Method::Best && self.steps != Some(0)
+        self.method == Method::Distill && self.steps != Some(0)
     }
 
     /// How matrices are packed before any of them is found to need int16 activations.

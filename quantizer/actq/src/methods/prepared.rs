@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use super::actquant::score::Score;
 use super::actquant::{self, ActionStatistics};
-use super::best::balance::MixedUnits;
-use super::best::{self, RowStatistics};
+use super::distill::balance::MixedUnits;
+use super::distill::{self, RowStatistics};
 use super::matrixwise;
 use super::options::{Method, Options};
 use super::progress::Progress;
@@ -18,7 +18,7 @@ use crate::data::{Dataset, Recording};
 use crate::error::{Context as _, Result, ensure};
 use crate::graph::Graph;
 
-/// Frames that every method with a recording needs at least; best needs more.
+/// Frames that every method with a recording needs at least; distill needs more.
 const LEAST_FRAMES: usize = 16;
 
 /// Vectors of an iterative head's matrices that statistics are taken of; every frame gives one for each denoising step.
@@ -42,7 +42,7 @@ enum Statistics {
     Rtn,
     Gptq(Vec<Moments>),
     ActQuant(ActionStatistics),
-    Best(Box<RowStatistics>),
+    Distill(Box<RowStatistics>),
 }
 
 impl<'a> PreparedMethod<'a> {
@@ -95,13 +95,13 @@ impl<'a> PreparedMethod<'a> {
             Method::ActQuant(choices) => {
                 Statistics::ActQuant(ActionStatistics::collect(graph, calib()?, choices, &mut progress)?)
             }
-            Method::Best => {
+            Method::Distill => {
                 let dataset = calib()?;
                 let moments = moments(dataset);
                 let inputs = moments.1;
                 let rows = RowStatistics::collect(graph, dataset, moments, allowance)?;
                 say(dataset.frames(), inputs, rows.outputs_of);
-                Statistics::Best(Box::new(rows))
+                Statistics::Distill(Box::new(rows))
             }
         };
         Ok(Self { graph, statistics, sampled: sampled.filter(|_| steps > 1) })
@@ -112,18 +112,18 @@ impl<'a> PreparedMethod<'a> {
         self.sampled
     }
 
-    /// Matrices that read observations in units far apart, which best could not balance; empty for other methods.
+    /// Matrices that read observations in units far apart, which distill could not balance; empty for other methods.
     pub fn mixed_units(&self) -> &[MixedUnits] {
         match &self.statistics {
-            Statistics::Best(statistics) => &statistics.mixed,
+            Statistics::Distill(statistics) => &statistics.mixed,
             _ => &[],
         }
     }
 
-    /// The network that is quantized: of best with balanced columns.
+    /// The network that is quantized: of distill with balanced columns.
     pub fn graph(&self) -> &Graph {
         match &self.statistics {
-            Statistics::Best(statistics) => statistics.graph(),
+            Statistics::Distill(statistics) => statistics.graph(),
             _ => self.graph,
         }
     }
@@ -134,7 +134,7 @@ impl<'a> PreparedMethod<'a> {
             Statistics::Rtn => Method::Rtn,
             Statistics::Gptq(_) => Method::Gptq,
             Statistics::ActQuant(statistics) => Method::ActQuant(statistics.choices),
-            Statistics::Best(_) => Method::Best,
+            Statistics::Distill(_) => Method::Distill,
         }
     }
 
@@ -149,15 +149,15 @@ impl<'a> PreparedMethod<'a> {
         let (graph, method) = (self.graph, self.method());
         ensure!(options.method == method, "prepared for {method}, not for {}", options.method);
         ensure!(
-            options.forced.is_empty() || method == Method::Best,
-            "widths of single matrices go with method best, not with {method}"
+            options.forced.is_empty() || method == Method::Distill,
+            "widths of single matrices go with method distill, not with {method}"
         );
         options.check()?;
         let outcomes = match &self.statistics {
             Statistics::Rtn => matrixwise::quantize(graph, None, rate, options)?,
             Statistics::Gptq(moments) => matrixwise::quantize(graph, Some(moments), rate, options)?,
             Statistics::ActQuant(statistics) => actquant::quantize(graph, statistics, rate, options)?,
-            Statistics::Best(statistics) => return best::quantize(statistics, rate, options, &mut progress),
+            Statistics::Distill(statistics) => return distill::quantize(statistics, rate, options, &mut progress),
         };
         Ok(QuantizedNetwork { graph: graph.clone(), outcomes, learning: None })
     }
@@ -165,7 +165,7 @@ impl<'a> PreparedMethod<'a> {
     /// The most steps of distillation with these options; 0 for methods that do not learn.
     pub fn most_steps(&self, options: &Options) -> usize {
         match &self.statistics {
-            Statistics::Best(statistics) => statistics.most_steps(options),
+            Statistics::Distill(statistics) => statistics.most_steps(options),
             _ => 0,
         }
     }
@@ -189,7 +189,7 @@ pub fn least_bytes(graph: &Graph, rate: Rate, options: &Options) -> usize {
     match options.method {
         Method::Rtn | Method::Gptq => matrixwise::least_bytes(graph, options),
         Method::ActQuant(choices) => actquant::allocation::least_bytes(graph, &choices, options.packing()),
-        Method::Best => best::least_bytes(graph, rate, options),
+        Method::Distill => distill::least_bytes(graph, rate, options),
     }
 }
 

@@ -133,7 +133,7 @@ pub struct Outcome {
     pub error: Option<f64>,
     /// Activation magnitude.
     pub x_max: u16,
-    /// What became of the rows and columns, where they have widths of their own (method best).
+    /// What became of the rows and columns, where they have widths of their own (method distill).
     pub allocation: Option<RowAllocation>,
 }
 

@@ -4,7 +4,7 @@ use super::quantizer::{QuantizedPolicy, Quantizer};
 use crate::budget::{Budget, BudgetTooSmall, Rate};
 use crate::emit;
 use crate::error::{Error, Result, ensure};
-use crate::methods::best::balance::balance_bytes;
+use crate::methods::distill::balance::balance_bytes;
 use crate::methods::{Method, Options, Progress, least_bytes};
 use crate::policy::Policy;
 
@@ -53,7 +53,7 @@ pub(super) fn within(
 /// Bytes of an image beside those that a rate in bytes counts.
 fn fixed_bytes(mut policy: Policy, options: &Options) -> Result<usize> {
     let mut values = 0;
-    if options.method == Method::Best {
+    if options.method == Method::Distill {
         // Numbers that are nowhere else, so that no constant is shared with what changes.
         for value in policy.graph.changed_vectors(options.learns()).flatten() {
             values += 1;

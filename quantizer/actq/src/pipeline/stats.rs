@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use actq_kernels::{Image, Width};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use super::quantizer::{QuantizedPolicy, Quantizer};
 use crate::budget::Budget;
@@ -12,8 +12,8 @@ use crate::error::{Context, Result, ensure};
 use crate::graph::WeightMatrix;
 use crate::measure::size::{bits_per_weight, hex};
 use crate::methods::actquant::score::Score;
-use crate::methods::best::balance::balance_bytes;
-use crate::methods::{Options, Outcome, Quantized};
+use crate::methods::distill::balance::balance_bytes;
+use crate::methods::{Method, Options, Outcome, Quantized};
 use crate::strict_json;
 
 /// The name of the file's form. It changes when a field changes its meaning or disappears, not when one is added.
@@ -36,7 +36,8 @@ pub struct Stats {
     pub bytes: usize,
     /// Bits per weight, everything counted.
     pub bpw: f64,
-    /// The method.
+    /// The method's name; `best`, the former name of `distill`, is read as `distill`.
+    #[serde(deserialize_with = "method_name")]
     pub method: String,
     /// What was asked for.
     pub budget: Budget,
@@ -44,7 +45,7 @@ pub struct Stats {
     pub seed: u64,
     /// Steps of distillation; 0 for methods that do not learn.
     pub steps: usize,
-    /// Bytes of the means and factors that balance the matrices' columns (best).
+    /// Bytes of the means and factors that balance the matrices' columns (distill).
     #[serde(default)]
     pub balance: usize,
     /// The matrices in the policy's order.
@@ -77,7 +78,7 @@ pub struct MatrixRecord {
     pub image_cols: Vec<usize>,
     /// Squared error of the matrix's output over its energy (rtn, gptq, actquant).
     pub error: Option<f64>,
-    /// Why rows have their widths (best).
+    /// Why rows have their widths (distill).
     pub allocation: Option<AllocationRecord>,
     /// Why the matrix has its width (actquant).
     pub score: Option<HsicScore>,
@@ -186,6 +187,12 @@ impl Stats {
         }
         Ok(())
     }
+}
+
+/// Reads a method's name, former ones included.
+fn method_name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
+    let name = String::deserialize(deserializer)?;
+    Ok(if name == "best" { Method::Distill.to_string() } else { name })
 }
 
 fn crc32(image: &Image<'_>) -> String {

@@ -81,7 +81,7 @@ pub struct SweepPlan<'a> {
     pub steps: Option<usize>,
     /// The most minutes of distillation; None: only the steps bound it.
     pub minutes: Option<f64>,
-    /// Whether method best counts errors relative to the action's size.
+    /// Whether method distill counts errors relative to the action's size.
     pub relative: bool,
     /// Seed of everything that is drawn.
     pub seed: u64,
@@ -103,7 +103,7 @@ pub fn run(plan: SweepPlan<'_>, mut progress: impl FnMut(&str, f64)) -> Result<S
         for (b, &budget) in budgets.iter().enumerate() {
             let work = format!("{method}, {budget} bits per weight");
             let plain = Options::new(method, Budget::BitsPerWeight(budget));
-            let relative = relative && method == Method::Best;
+            let relative = relative && method == Method::Distill;
             let options = Options { group: method.default_group(), steps, minutes, relative, seed, ..plain };
             let share = |_: &str, share| progress(&work, done(1.0 + b as f64 + share));
             points.push(match quantizer.quantize(&options, share) {

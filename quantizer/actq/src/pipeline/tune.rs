@@ -170,7 +170,7 @@ mod tests {
     #[test]
     fn every_round_learns_from_all_that_was_driven_before() {
         let (policy, options) =
-            (policy(), Options { steps: Some(4), ..Options::new(Method::Best, Budget::BitsPerWeight(14.0)) });
+            (policy(), Options { steps: Some(4), ..Options::new(Method::Distill, Budget::BitsPerWeight(14.0)) });
         let plan = || TunePlan {
             policy: &policy,
             calib: vec![dataset(&policy.graph, 5, 50)],

@@ -4,7 +4,7 @@ use actq_kernels::Width;
 
 use super::quantizer::QuantizedPolicy;
 use crate::budget::{Budget, USED};
-use crate::methods::best::balance::balance_bytes;
+use crate::methods::distill::balance::balance_bytes;
 use crate::methods::{Method, Options, Outcome};
 
 /// Rows of which a smaller error is expected have no part in the actions.

@@ -92,12 +92,13 @@ const ROWS: [&str; 9] = [
 
 pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
     let eight = Options::new(Method::Gptq, Budget::Width(Width::W8));
-    let best = |bits, steps| Options { steps: Some(steps), ..Options::new(Method::Best, Budget::BitsPerWeight(bits)) };
+    let distill =
+        |bits, steps| Options { steps: Some(steps), ..Options::new(Method::Distill, Budget::BitsPerWeight(bits)) };
     let counter = Counter::build()?;
     let reach = Trial {
         name: "UR3 reach",
         dir: ur3(),
-        images: vec![("8 bits", eight), (CONTROLLER_IMAGE, best(3.0, STEPS)), ("2.0 bits", best(2.0, STEPS))],
+        images: vec![("8 bits", eight), (CONTROLLER_IMAGE, distill(3.0, STEPS)), ("2.0 bits", distill(2.0, STEPS))],
         recorded: true,
         episodes,
         qemu_episodes,
@@ -105,7 +106,7 @@ pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
     let flow = Trial {
         name: "UR3 flow",
         dir: ur3_flow(),
-        images: vec![("3.0 bits", best(3.0, FLOW_STEPS)), ("2.0 bits", best(2.0, FLOW_STEPS))],
+        images: vec![("3.0 bits", distill(3.0, FLOW_STEPS)), ("2.0 bits", distill(2.0, FLOW_STEPS))],
         recorded: false,
         episodes: (episodes / FLOW_EPISODES_DIVISOR).max(1),
         qemu_episodes: (qemu_episodes / FLOW_EPISODES_DIVISOR).max(1),

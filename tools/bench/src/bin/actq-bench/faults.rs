@@ -28,7 +28,7 @@ const MAX_ATTEMPTS: usize = 12;
 /// Runs all faults, with the UR3 policy in 3 bits, and an update to another image of it.
 pub(crate) fn all() -> Result<()> {
     let policy = Policy::load(&ur3())?;
-    let options = Options { steps: Some(0), ..Options::new(Method::Best, Budget::BitsPerWeight(3.0)) };
+    let options = Options { steps: Some(0), ..Options::new(Method::Distill, Budget::BitsPerWeight(3.0)) };
     let new = ImageBuffer::new(&quantize(&policy, &Recordings::load(&policy)?, &options, |_, _| {})?.image);
     let old = firmware::built_in()?;
     let buffer = ImageBuffer::read(old)?;

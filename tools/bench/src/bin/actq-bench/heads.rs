@@ -91,17 +91,17 @@ pub(crate) fn measure(policies: &[PathBuf], counter: &Counter, wait_states: u64)
     fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
     let elf = firmware::harness(Target::Fpu)?;
     let code = Code::read(&elf)?;
-    let best = |bits| Options { steps: Some(STEPS), ..Options::new(Method::Best, Budget::BitsPerWeight(bits)) };
+    let distill = |bits| Options { steps: Some(STEPS), ..Options::new(Method::Distill, Budget::BitsPerWeight(bits)) };
     let mut heads = Vec::new();
     for dir in policies {
         let policy = Policy::load(dir)?;
         let recordings = Recordings::load(&policy)?;
         let rounded = Quantizer::new(&policy, &recordings, Method::Rtn, None, |_| {})?;
-        let learned = Quantizer::new(&policy, &recordings, Method::Best, None, |_| {})?;
+        let learned = Quantizer::new(&policy, &recordings, Method::Distill, None, |_| {})?;
         for (quantizer, bits, options) in [
             (&rounded, 8.0, Options::new(Method::Rtn, Budget::Width(Width::W8))),
-            (&learned, 3.0, best(3.0)),
-            (&learned, 2.0, best(2.0)),
+            (&learned, 3.0, distill(3.0)),
+            (&learned, 2.0, distill(2.0)),
         ] {
             let path = folder.join(format!("{}-{bits}.actq", policy.name));
             let buffer = ImageBuffer::new(&write_image(quantizer, &options, &path)?);

@@ -8,8 +8,8 @@
 
 use nalgebra::DMatrix;
 
-use super::distill::{Task, distill, loss};
 use super::schedule::Bounds;
+use super::train::{Task, distill, loss};
 use crate::calibrate::moments::Moments;
 use crate::calibrate::sensitivity::{DAMPING_INPUT, drawn_moments};
 use crate::calibrate::widening::Widening;
@@ -133,10 +133,10 @@ mod tests {
     fn chosen(episodes: usize, steps: usize) -> Learning {
         let graph = mlp();
         let recording = dataset(&graph, episodes, 240 / episodes);
-        let method = PreparedMethod::new(&graph, Method::Best, Some(&recording), |_| {}).expect("statistics");
-        let options = Options { steps: Some(steps), ..Options::new(Method::Best, Budget::Width(Width::W3)) };
+        let method = PreparedMethod::new(&graph, Method::Distill, Some(&recording), |_| {}).expect("statistics");
+        let options = Options { steps: Some(steps), ..Options::new(Method::Distill, Budget::Width(Width::W3)) };
         let found = method.quantize(Rate::Width(Width::W3), &options, |_| {}).expect("quantized");
-        found.learning.expect("best says how")
+        found.learning.expect("distill learns")
     }
 
     #[test]

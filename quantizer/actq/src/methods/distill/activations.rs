@@ -4,8 +4,8 @@ use actq_kernels::Width;
 
 use super::allocate::{Rows, allocate};
 use super::dimension::Widths;
-use super::distill::loss;
 use super::size::Size;
+use super::train::loss;
 use crate::calibrate::allowance::Allowance;
 use crate::calibrate::windows::Windows;
 use crate::error::Result;
@@ -152,7 +152,7 @@ mod tests {
         let size = Size { graph: &graph, dimensions: &[], packings: Vec::new(), values: 0 };
         let rows = |energy: f64| Rows { energy: vec![energy; 64], removal: vec![1e9; 64], forced: None };
         let limits = |of_first: f64, activations: Activations| {
-            let plain = Options::new(Method::Best, Budget::BitsPerWeight(4.0));
+            let plain = Options::new(Method::Distill, Budget::BitsPerWeight(4.0));
             let options = Options { activations, ..plain };
             let allowed = 0.5 * graph.weights() as f64;
             let found = allocated(size.clone(), &[rows(of_first), rows(1.0)], &options, allowed).expect("it fits");

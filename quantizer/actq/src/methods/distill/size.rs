@@ -82,7 +82,7 @@ fn are_in_order(widths: &[Option<Width>]) -> bool {
 mod tests {
     use super::*;
     use crate::graph::WeightMatrix;
-    use crate::methods::best::dimension::{dimensions, testing::graph};
+    use crate::methods::distill::dimension::{dimensions, testing::graph};
     use crate::methods::quantized::{Outcome, Quantized};
     use crate::random::Random;
     use half::bf16;

@@ -107,7 +107,7 @@ pub fn add_to_bias(graph: &mut Graph, matrix: usize, values: &[f32]) {
 mod tests {
     use super::*;
     use crate::graph::Evaluator;
-    use crate::methods::best::dimension::{dimensions, testing::graph};
+    use crate::methods::distill::dimension::{dimensions, testing::graph};
     use actq_kernels::Width;
 
     /// Moments of uncorrelated inputs; those of the second matrix have this mean.

@@ -1,4 +1,4 @@
-//! The method best on whole policies: budgets, determinism, and limits of the error.
+//! The method distill on whole policies: budgets, determinism, and limits of the error.
 
 use std::path::Path;
 
@@ -25,20 +25,20 @@ fn report(dir: &Path, bytes: &[u8]) -> Result<ErrorReport> {
     Ok(eval::evaluate(image, &eval::heldout(dir, &image)?)?)
 }
 
-fn best(bits: f64, steps: usize) -> Options {
-    Options { steps: Some(steps), ..Options::new(Method::Best, Budget::BitsPerWeight(bits)) }
+fn distill(bits: f64, steps: usize) -> Options {
+    Options { steps: Some(steps), ..Options::new(Method::Distill, Budget::BitsPerWeight(bits)) }
 }
 
 #[test]
 fn budgets_are_kept_and_used() -> Result<()> {
     let policy = Policy::load(&ur3())?;
     let recordings = Recordings::load(&policy)?;
-    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, None, |_| {})?;
+    let quantizer = Quantizer::new(&policy, &recordings, Method::Distill, None, |_| {})?;
     for bits in [1.0, 1.5, 2.0, 2.5, 3.0, 4.0] {
-        let bpw = report(&ur3(), &image(&quantizer, &best(bits, 2))?)?.bpw;
+        let bpw = report(&ur3(), &image(&quantizer, &distill(bits, 2))?)?.bpw;
         assert!(bpw <= bits && bpw > bits - 0.1, "{bpw} bits for a budget of {bits}");
     }
-    let error = image(&quantizer, &best(1e-6, 2)).expect_err("no image is so small");
+    let error = image(&quantizer, &distill(1e-6, 2)).expect_err("no image is so small");
     assert!(error.budget().is_some(), "{error:#}");
     Ok(())
 }
@@ -49,7 +49,10 @@ fn the_image_is_independent_of_the_thread_count() -> Result<()> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
         pool.install(|| {
             let policy = Policy::load(&ur3())?;
-            image(&Quantizer::new(&policy, &Recordings::load(&policy)?, Method::Best, None, |_| {})?, &best(2.0, 20))
+            image(
+                &Quantizer::new(&policy, &Recordings::load(&policy)?, Method::Distill, None, |_| {})?,
+                &distill(2.0, 20),
+            )
         })
     };
     let one = on(1)?;
@@ -63,13 +66,13 @@ fn the_image_is_independent_of_the_thread_count() -> Result<()> {
 fn an_image_fits_its_flash_budget() -> Result<()> {
     let policy = Policy::load(&ur3())?;
     let recordings = Recordings::load(&policy)?;
-    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, None, |_| {})?;
+    let quantizer = Quantizer::new(&policy, &recordings, Method::Distill, None, |_| {})?;
     for bytes in [64 << 10, 96 << 10, 200 << 10] {
-        let options = Options { budget: Budget::ImageBytes(bytes), ..best(1.0, 2) };
+        let options = Options { budget: Budget::ImageBytes(bytes), ..distill(1.0, 2) };
         let len = image(&quantizer, &options)?.len();
         assert!(len <= bytes && len > bytes - bytes / 10, "{len} bytes for a budget of {bytes}");
     }
-    let tiny = Options { budget: Budget::ImageBytes(1000), ..best(1.0, 2) };
+    let tiny = Options { budget: Budget::ImageBytes(1000), ..distill(1.0, 2) };
     assert!(image(&quantizer, &tiny).is_err());
     Ok(())
 }
@@ -78,8 +81,8 @@ fn an_image_fits_its_flash_budget() -> Result<()> {
 fn a_forced_width_reaches_every_row() -> Result<()> {
     let policy = Policy::load(&ur3())?;
     let recordings = Recordings::load(&policy)?;
-    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, None, |_| {})?;
-    let forced = |name: &str| Options { forced: vec![(name.into(), Width::W4)], ..best(2.0, 2) };
+    let quantizer = Quantizer::new(&policy, &recordings, Method::Distill, None, |_| {})?;
+    let forced = |name: &str| Options { forced: vec![(name.into(), Width::W4)], ..distill(2.0, 2) };
     let outcomes = quantizer.quantize(&forced("out.weight"), |_, _| {})?.outcomes;
     let out = policy.graph.matrices.iter().position(|m| m.name == "out.weight");
     assert!(out.is_some_and(|m| outcomes[m].quantized.widths.iter().all(|w| *w == Some(Width::W4))));
@@ -91,8 +94,8 @@ fn a_forced_width_reaches_every_row() -> Result<()> {
 fn another_seed_gives_another_image() -> Result<()> {
     let policy = Policy::load(&ur3())?;
     let recordings = Recordings::load(&policy)?;
-    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, None, |_| {})?;
-    let options = best(2.0, 5);
+    let quantizer = Quantizer::new(&policy, &recordings, Method::Distill, None, |_| {})?;
+    let options = distill(2.0, 5);
     assert_ne!(image(&quantizer, &options)?, image(&quantizer, &Options { seed: 2, ..options.clone() })?);
     Ok(())
 }
@@ -102,10 +105,10 @@ fn another_seed_gives_another_image() -> Result<()> {
 fn halves_gptq(dir: &Path, steps: usize) -> Result<()> {
     let policy = Policy::load(dir)?;
     let recordings = Recordings::load(&policy)?;
-    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, None, |_| {})?;
+    let quantizer = Quantizer::new(&policy, &recordings, Method::Distill, None, |_| {})?;
     let gptq = Quantizer::new(&policy, &recordings, Method::Gptq, None, |_| {})?;
     for (bits, width) in [(3.0, Width::W3), (2.0, Width::W2)] {
-        let ours = report(dir, &image(&quantizer, &best(bits, steps))?)?;
+        let ours = report(dir, &image(&quantizer, &distill(bits, steps))?)?;
         let theirs = report(dir, &image(&gptq, &Options::new(Method::Gptq, Budget::Width(width)))?)?;
         assert!(ours.bpw < theirs.bpw);
         assert!(ours.nmse < 0.5 * theirs.nmse, "{}: {} against {}", policy.name, ours.nmse, theirs.nmse);
@@ -131,8 +134,8 @@ fn a_recurrent_policy_without_normalization_keeps_its_error() -> Result<()> {
     let dir = policies.join("g1_lstm64");
     let policy = Policy::load(&dir)?;
     let recordings = Recordings::load(&policy)?;
-    let quantizer = Quantizer::new(&policy, &recordings, Method::Best, None, |_| {})?;
-    let options = Options { steps: Some(1500), ..Options::new(Method::Best, Budget::BitsPerWeight(2.0)) };
+    let quantizer = Quantizer::new(&policy, &recordings, Method::Distill, None, |_| {})?;
+    let options = Options { steps: Some(1500), ..Options::new(Method::Distill, Budget::BitsPerWeight(2.0)) };
     let found = report(&dir, &image(&quantizer, &options)?)?;
     assert!(found.nmse < 0.027, "{}", found.nmse);
     assert!(found.bpw <= 2.0);
@@ -151,9 +154,9 @@ fn shared_policies_keep_their_errors() -> Result<()> {
         let dir = policies.join(name);
         let policy = Policy::load(&dir)?;
         let recordings = Recordings::load(&policy)?;
-        let quantizer = Quantizer::new(&policy, &recordings, Method::Best, None, |_| {})?;
+        let quantizer = Quantizer::new(&policy, &recordings, Method::Distill, None, |_| {})?;
         for (bits, steps, nmse) in recorded {
-            let options = Options { steps, ..Options::new(Method::Best, Budget::BitsPerWeight(bits)) };
+            let options = Options { steps, ..Options::new(Method::Distill, Budget::BitsPerWeight(bits)) };
             let found = report(&dir, &image(&quantizer, &options)?)?;
             assert!(found.nmse < TOLERANCE * nmse, "{name} at {bits} bits: {}, recorded {nmse}", found.nmse);
             assert!(found.bpw <= bits);

@@ -95,7 +95,7 @@ pub(super) mod testing {
     use crate::graph::ops::{Add, Linear, Pointwise};
 
     /// 3 -> 5 tanh -> [2 and, through a residual sum, 5] with values that differ everywhere.
-    pub(in crate::methods::best) fn graph() -> Graph {
+    pub(in crate::methods::distill) fn graph() -> Graph {
         let mut graph = Graph::new(3);
         let mut matrix = |rows: usize, cols: usize| {
             let data = (0..rows * cols).map(|i| ((i * 7 + rows) as f32 * 0.37).sin()).collect();

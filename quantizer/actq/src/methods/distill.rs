@@ -8,12 +8,12 @@ pub mod balance;
 pub mod choose;
 pub mod compact;
 pub mod dimension;
-pub mod distill;
 pub mod feedback;
 mod latent;
 mod objective;
 pub mod schedule;
 pub mod size;
+pub mod train;
 
 use std::time::Duration;
 
@@ -40,11 +40,11 @@ use balance::{MixedUnits, balance, mixed_units};
 use choose::{Chosen, choose, choosing};
 use compact::{Compacted, add_to_bias, compact};
 use dimension::{Dimension, dimensions};
-use distill::{Learned, Task, distill};
 use feedback::feedback;
 use objective::Frames;
 use schedule::{Bounds, most_steps};
 use size::Size;
+use train::{Learned, Task, distill};
 
 /// Frames that learning needs at least.
 const LEAST_FRAMES: usize = 200;
