@@ -1,4 +1,4 @@
-//! Quantizes a policy that is in memory to 3 bits per weight, and prints how far its actions are from the original's.
+//! Quantizes a policy in memory to 3 bits per weight, and prints the error of its actions.
 
 use std::path::PathBuf;
 
@@ -29,7 +29,7 @@ fn main() -> actq::error::Result<()> {
     graph.add(Linear { matrix: last, bias: vec![0.0; 4] }, &[hidden])?;
     let policy = Policy::of("in memory", graph);
 
-    // One episode of 500 observations, as a robot or a simulator would record them.
+    // One episode of 500 observations; a robot or a simulator would record them.
     let mut random = Random::new(2);
     let obs = Array3::from_shape_simple_fn((1, 500, 12), || random.unit());
     let mut recorded = Dataset { path: PathBuf::new(), obs, action: None, length: vec![500], state: None };
@@ -46,6 +46,6 @@ fn main() -> actq::error::Result<()> {
 }
 
 #[test]
-fn the_error_is_small() -> actq::error::Result<()> {
+fn quantized_error_is_small() -> actq::error::Result<()> {
     main()
 }

@@ -1,4 +1,4 @@
-//! What is learned of a network from recorded observations, before anything is quantized.
+//! Statistics of a network over recorded observations, collected before anything is quantized.
 
 pub mod allowance;
 pub mod fisher;

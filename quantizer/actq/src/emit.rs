@@ -1,4 +1,4 @@
-//! From a quantized network to the bytes of an image.
+//! The bytes of an image, from a quantized network.
 
 mod lower;
 mod writer;

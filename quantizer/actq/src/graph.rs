@@ -1,7 +1,8 @@
 //! The network: operations over values, what they compute in f32 forwards and backwards, and what they become in an
 //! image.
 //!
-//! An operation is said once, in its file in [`ops`]; everything else asks it through [`operation::Operation`].
+//! Each operation is defined one time, in its file in [`ops`]; everything else uses it through
+//! [`operation::Operation`].
 
 pub mod arrays;
 mod builder;

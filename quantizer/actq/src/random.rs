@@ -1,4 +1,4 @@
-//! The deterministic generator behind everything that is drawn: the same seed gives the same image on every machine.
+//! The deterministic generator of all random numbers: the same seed gives the same image on every machine.
 
 use rand_distr::Distribution as _;
 use rand_distr::StandardNormal;
@@ -11,37 +11,37 @@ use rand_pcg::rand_core::{Rng as _, SeedableRng as _};
 pub struct Random(Pcg64Mcg);
 
 impl Random {
-    /// Equal seeds give equal sequences.
+    /// Makes a generator; equal seeds give equal sequences.
     pub fn new(seed: u64) -> Self {
         Self(Pcg64Mcg::seed_from_u64(seed))
     }
 
-    /// 64 random bits.
+    /// Draws 64 random bits.
     pub fn bits(&mut self) -> u64 {
         self.0.next_u64()
     }
 
-    /// A number below `n`, which is at least 1.
+    /// Draws a number below `n`, which is at least 1.
     pub fn below(&mut self, n: usize) -> usize {
         (self.bits() % n as u64) as usize
     }
 
-    /// Uniform in -1..1, in steps of 2^-23.
+    /// Draws a uniform number from -1 to 1, in steps of 2^-23.
     pub fn unit(&mut self) -> f32 {
         (self.bits() >> 40) as f32 / (1u32 << 23) as f32 - 1.0
     }
 
-    /// Uniform in 0..1, in steps of 2^-24.
+    /// Draws a uniform number from 0 to 1, in steps of 2^-24.
     pub fn share(&mut self) -> f32 {
         (self.bits() >> 40) as f32 / (1u32 << 24) as f32
     }
 
-    /// Standard normal.
+    /// Draws a standard normal number.
     pub fn normal(&mut self) -> f32 {
         StandardNormal.sample(&mut self.0)
     }
 
-    /// -1 or 1.
+    /// Draws -1 or 1.
     pub fn sign(&mut self) -> f32 {
         if self.bits() >> 63 == 0 { 1.0 } else { -1.0 }
     }
@@ -51,7 +51,7 @@ impl Random {
 mod tests {
     use super::*;
 
-    /// Images are made from these sequences, so that no release of a crate may change them unseen.
+    /// Guards the sequences that images depend on against releases of a crate.
     #[test]
     fn sequences_stay_the_same() {
         let mut random = Random::new(1);

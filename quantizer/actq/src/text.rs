@@ -1,17 +1,16 @@
-//! Text from files, as it may be shown on a terminal, and as a shell reads it.
+//! Text from files, made safe for a terminal or quoted for a shell.
 
 use std::borrow::Cow;
 use std::ffi::OsStr;
 
 use crate::error::{Context as _, Result};
 
-/// Whether a character does something to a terminal, or to the order in which the text around it is shown, instead of
-/// being shown itself.
+/// Returns `true` if a character controls the terminal or the order of the text around it.
 pub(crate) fn is_control(c: char) -> bool {
     c.is_control() || matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
-/// `text` in one line, with control characters escaped as in Rust: `\u{1b}`.
+/// Returns `text` in one line, with control characters escaped as in Rust: `\u{1b}`.
 pub fn printable(text: &str) -> Cow<'_, str> {
     if !text.contains(is_control) {
         return text.into();
@@ -20,7 +19,7 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     text.chars().map(escaped).collect::<String>().into()
 }
 
-/// A word as a POSIX shell and Python's `shlex.split` read it.
+/// Quotes a word for a POSIX shell and Python's `shlex.split`.
 pub fn quoted(word: &OsStr) -> Result<String> {
     let text = word.to_str().with_context(|| format!("{}: the path is not UTF-8", word.to_string_lossy()))?;
     let plain = |c: char| c.is_ascii_alphanumeric() || "@%+=:,./_-".contains(c);
@@ -35,7 +34,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn control_characters_are_escaped_and_nothing_else() {
+    fn only_control_characters_are_escaped() {
         assert_eq!(printable("arm \"ä\" \\ 腕"), "arm \"ä\" \\ 腕");
         assert_eq!(printable("a\x1b[2Jb\r\n\u{9b}\u{7f}\u{202e}c"), "a\\u{1b}[2Jb\\r\\n\\u{9b}\\u{7f}\\u{202e}c");
     }

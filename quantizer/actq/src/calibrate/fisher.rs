@@ -9,46 +9,46 @@ use crate::error::{Context, Result};
 use crate::graph::{Graph, Network, Pass, Weights, start_state, zero_state};
 use crate::random::Random;
 
-/// Steps that a recurrent network's gradient runs back.
+/// Steps that the gradient of a recurrent network runs back.
 const WINDOW: usize = 16;
 
-/// Which gradients are taken, and of what.
+/// Selection of the gradients of the Fisher information.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sampling {
-    /// Frames whose gradient is taken, about so many at most; evenly spaced.
+    /// Approximate most frames whose gradient is taken, evenly spaced.
     pub samples: usize,
     /// Frames whose gradients are averaged before they are squared, at least 1: 1 for the Fisher information, more for
-    /// what a training loop's batches give. Successive frames; of a recurrent network as many episodes at the same
-    /// time.
+    /// the batches of a training loop. The frames are successive; for a recurrent network they are as many episodes at
+    /// the same step.
     pub batch: usize,
-    /// Where the recorded actions are the network's own.
+    /// Signs if the recorded actions are the network's own.
     pub signs: Signs,
 }
 
-/// The derivative of `|y - t|` where y is t, or as good as t.
+/// Derivative of `|y - t|` if y equals t, or nearly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Signs {
-    /// 1 or -1, both with equal probability (of a fixed seed). The square's expectation is `sum over d of (dy_d/dw)^2`.
+    /// 1 or -1 with equal probability, from a fixed seed. The expectation of the square is `sum over d of (dy_d/dw)^2`.
     Random,
-    /// What automatic differentiation gives: the sign of however small a difference, and 0 where there is none.
+    /// Result of automatic differentiation: the sign of any difference, however small, and 0 without one.
     Loss,
 }
 
-/// An output that is off its record by less than this share of the dimension's standard deviation counts as equal.
+/// Share of a dimension's standard deviation below which an output counts as equal to its record.
 const EQUAL: f32 = 1e-3;
 
-/// The mean over frames (or batches) of `(dL/dw)^2` for every weight, `L = sum over d of |y_d - t_d|`, as
-/// `[rows, cols]` per matrix: the action-mixed Fisher information of ActQuant (arXiv 2605.24011) at alpha = 1, that is,
-/// without a token loss.
+/// Returns the mean over frames (or batches) of `(dL/dw)^2` for every weight, `L = sum over d of |y_d - t_d|`, as
+/// `[rows, cols]` per matrix. This is the action-mixed Fisher information of ActQuant (arXiv 2605.24011) at alpha = 1,
+/// that is, without a token loss.
 ///
 /// `dL/dy_d` is the sign of `y_d - t_d`. Recorded actions are mostly the policy's own, where `L` has its kink:
 /// [`Signs`].
 ///
-/// A recurrent network's gradient is truncated: episodes are run from their starting state, cut into windows of 16
-/// steps, and each window's last frame is one sample whose gradient runs back to the start of the window. Shorter rests
-/// are left out. All else is exact: contributions of several steps or uses are summed before they are squared.
+/// A recurrent network's gradient is truncated. Episodes run from their starting state and are cut into windows of 16
+/// steps. Each window's last frame is one sample, whose gradient runs back to the start of the window. Shorter rests
+/// are not used. Everything else is exact: contributions of several steps or uses are summed before they are squared.
 ///
-/// `progress` gets the share done.
+/// `progress` receives the share done.
 pub fn importance(
     graph: &Graph,
     dataset: &Dataset,
@@ -72,7 +72,7 @@ pub fn importance(
     let starts: Vec<_> = alive.iter().map(|&episode| dataset.start(episode)).collect();
     let mut state = start_state(graph, &starts);
     let mut fisher = weights.zeros_like().matrices;
-    // The gradients themselves are not asked for, but the backward pass adds to them.
+    // The gradients are not used, but the backward pass adds to them.
     let mut unused = weights.zeros_like();
     let mut random = Random::new(0);
     let mut batches = 0;
@@ -111,7 +111,7 @@ pub fn importance(
     Ok(fisher)
 }
 
-/// The frames of all episodes, `count` successive ones at every step.
+/// Returns the frames of all episodes, `count` successive ones at every step.
 fn side_by_side(dataset: &Dataset, count: usize) -> Dataset {
     let frames: Vec<(usize, usize)> = dataset
         .length
@@ -136,8 +136,8 @@ fn side_by_side(dataset: &Dataset, count: usize) -> Dataset {
     }
 }
 
-/// Runs back from the last of `passes` and adds to `fisher` the squares of gradients, each averaged over a batch of so
-/// many samples.
+/// Runs back from the last of `passes`, and adds to `fisher` the squares of gradients, each averaged over a batch of
+/// samples.
 fn add_squares(
     network: &Network<'_>,
     weights: &Weights,
@@ -182,12 +182,12 @@ fn add_squares(
     }
 }
 
-/// One step of the chosen episodes, `[episode, value]`.
+/// Returns one step of the chosen episodes, `[episode, value]`.
 fn rows(array: &Array3<f32>, episodes: &[usize], step: usize) -> Array2<f32> {
     array.index_axis(Axis(1), step).select(Axis(0), episodes).as_standard_layout().into_owned()
 }
 
-/// The standard deviation of every dimension of the recorded actions.
+/// Returns the standard deviation of every dimension of the recorded actions.
 fn deviations(dataset: &Dataset) -> Option<ndarray::Array1<f32>> {
     let width = dataset.action.as_ref()?.dim().2;
     let mut sums = vec![(0f64, 0f64); width];
@@ -210,7 +210,7 @@ mod tests {
 
     const PLAIN: Sampling = Sampling { samples: 4096, batch: 1, signs: Signs::Random };
 
-    /// The sum over the recorded dimensions of the action error's magnitude at the last frame of a window.
+    /// Computes the sum over the recorded dimensions of the action error's magnitude at the last frame of a window.
     fn loss(
         graph: &Graph,
         weights: &Weights,
@@ -265,7 +265,7 @@ mod tests {
 
     #[test]
     fn agrees_with_finite_differences() {
-        // Batches of 4 reach over the end of an episode, and the last one is short.
+        // Batches of 4 span the end of an episode, and the last one is short.
         for batch in [1, 2, 4] {
             compare(&mlp(), 3, 1, None, batch);
         }
@@ -278,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_are_a_limit() {
+    fn samples_are_limited() {
         let graph = mlp();
         let mut dataset = dataset(&graph, 1, 12);
         dataset.action.as_mut().expect("actions").mapv_inplace(|a| a + 3.0);
@@ -299,8 +299,8 @@ mod tests {
     #[test]
     fn random_signs_give_the_sum_of_the_outputs_squares() {
         let graph = mlp();
-        // Many times the same observation, actions equal to the policy's own. They do not deviate, so even a last bit
-        // would count as a difference: they come from the very pass that they are compared with.
+        // The same observation many times, with the policy's own actions. They do not deviate, so a difference in the
+        // last bit would count: they come from the same pass that they are compared with.
         let mut dataset = dataset(&graph, 1, 1);
         let weights = Weights::of(&graph);
         let network = Network::new(&graph);
@@ -323,7 +323,7 @@ mod tests {
             assert!((found - expected).abs() < 0.05 * largest, "{found} against {expected}");
         }
 
-        // Without random signs equal actions say nothing, and the least difference all.
+        // Without random signs, equal actions give 0, and the smallest difference counts in full.
         let loss = Sampling { signs: Signs::Loss, ..PLAIN };
         let found = importance(&graph, &dataset, loss, &mut |_| {}).expect("importance");
         assert!(found.iter().all(|matrix| matrix.iter().all(|i| *i == 0.0)), "{found:?}");
@@ -338,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn episodes_of_different_lengths_are_taken_as_far_as_they_go() {
+    fn episodes_of_different_lengths_count_in_full() {
         let graph = lstm();
         let mut dataset = dataset(&graph, 3, 40);
         dataset.length = vec![40, 7, 20];

@@ -4,18 +4,18 @@
 
 use ndarray::{Array1, Array2, Axis};
 
-/// How wide a Gaussian kernel is. Either way of an even number of pairs the upper of the two in the middle is the
-/// median, and where it is 0, the mean takes its place.
+/// Width of a Gaussian kernel. Of an even number of pairs, the upper middle one is the median; if it is 0, the mean
+/// replaces it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bandwidth {
-    /// `sigma^2` is the median of the squared distances: the usual heuristic, which no scale of the samples changes.
+    /// `sigma^2` is the median of the squared distances: the usual heuristic, independent of the samples' scale.
     Median,
-    /// `sigma` is that median, but at least 0.01: what ActQuant's code does. Samples on a small scale then all seem far
-    /// apart, those on a large one all alike.
+    /// `sigma` is that median, but at least 0.01, as in ActQuant's code. Samples on a small scale then look far apart,
+    /// and samples on a large one alike.
     SquaredMedian,
 }
 
-/// The least `sigma` of [`Bandwidth::SquaredMedian`].
+/// Least `sigma` of [`Bandwidth::SquaredMedian`].
 const LEAST_SIGMA: f64 = 1e-2;
 
 /// A centred kernel matrix `H K H` of n samples.
@@ -23,16 +23,16 @@ const LEAST_SIGMA: f64 = 1e-2;
 pub struct Kernel(Array2<f64>);
 
 impl Kernel {
-    /// The linear kernel `k(a, b) = a'b` of `samples`, `[sample, element]`.
+    /// Returns the linear kernel `k(a, b) = a'b` of `samples`, `[sample, element]`.
     pub fn linear(samples: &Array2<f64>) -> Self {
         let centred = centred(samples);
         Self(centred.dot(&centred.t()))
     }
 
-    /// The Gaussian kernel `k(a, b) = exp(-|a - b|^2 / (2 sigma^2))` of `samples`, `[sample, element]`.
+    /// Returns the Gaussian kernel `k(a, b) = exp(-|a - b|^2 / (2 sigma^2))` of `samples`, `[sample, element]`.
     ///
-    /// `sigma` follows from `|a - b|^2` over all pairs of different samples. Samples that are all equal give a kernel
-    /// of zeros.
+    /// `sigma` follows from `|a - b|^2` over all pairs of different samples. If all samples are equal, the kernel is
+    /// zero.
     pub fn gaussian(samples: &Array2<f64>, bandwidth: Bandwidth) -> Self {
         let mut kernel = squared_distances(samples);
         let median = median_or_mean(&kernel);
@@ -54,7 +54,7 @@ impl Kernel {
     }
 }
 
-/// `HSIC(A, B)`; 0 for fewer than two samples.
+/// Returns `HSIC(A, B)`; 0 for fewer than two samples.
 ///
 /// # Panics
 ///
@@ -73,7 +73,7 @@ fn centred(samples: &Array2<f64>) -> Array2<f64> {
     if samples.is_empty() { samples.clone() } else { samples - &means(samples) }
 }
 
-/// `|a - b|^2` of all pairs. Centring first keeps the cancellation in `|a|^2 + |b|^2 - 2 a'b` small.
+/// Returns `|a - b|^2` of all pairs. Centring first keeps the cancellation in `|a|^2 + |b|^2 - 2 a'b` small.
 fn squared_distances(samples: &Array2<f64>) -> Array2<f64> {
     let centred = centred(samples);
     let mut distances = centred.dot(&centred.t());
@@ -103,13 +103,13 @@ mod tests {
     use super::*;
     use crate::random::Random;
 
-    /// A small deterministic generator, uniform in -1..1.
+    /// Draws samples from a small deterministic generator, uniform in -1..1.
     fn samples(n: usize, len: usize, seed: u64) -> Array2<f64> {
         let mut random = Random::new(seed);
         Array2::from_shape_fn((n, len), |_| f64::from(random.unit()))
     }
 
-    /// The definition, with H written out.
+    /// Computes the definition, with H written out.
     fn definition(ka: &Array2<f64>, kb: &Array2<f64>) -> f64 {
         let n = ka.nrows();
         let h = Array2::from_shape_fn((n, n), |(i, j)| f64::from(u8::from(i == j)) - 1.0 / n as f64);
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn tells_dependent_from_independent() {
+    fn hsic_separates_dependent_from_independent_samples() {
         let (x, other) = (samples(400, 2, 3), samples(400, 1, 4));
         let of_x = Array2::from_shape_fn((400, 1), |(i, _)| (3.0 * x[(i, 0)]).sin());
         let kernel = Kernel::gaussian(&x, Bandwidth::Median);
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn neither_kernel_sees_a_translation_nor_the_gaussian_one_a_scale() {
+    fn kernels_ignore_translation_and_the_gaussian_one_scale() {
         let (x, y) = (samples(30, 4, 5), samples(30, 2, 6));
         let base = hsic(&Kernel::gaussian(&x, Bandwidth::Median), &Kernel::linear(&y));
         let moved = hsic(&Kernel::gaussian(&(&x * 7.0 + 40.0), Bandwidth::Median), &Kernel::linear(&(&y - 9.0)));
@@ -168,7 +168,7 @@ mod tests {
             let expected = definition(&kernel, &x.dot(&x.t()));
             assert!((hsic(&found, &Kernel::linear(&x)) - expected).abs() < 1e-12, "{bandwidth:?}");
         }
-        // On so small a scale sigma is the least, and all samples are nearly one.
+        // On this small scale, sigma is the least one, and all samples nearly coincide.
         let small = Kernel::gaussian(&(&x * 1e-3), Bandwidth::SquaredMedian);
         assert!(small.0.iter().all(|k| k.abs() < 0.05), "{small:?}");
     }
@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn mostly_equal_samples_fall_back_to_the_mean_distance() {
+    fn mostly_equal_samples_use_the_mean_distance() {
         let mut x = Array2::zeros((10, 1));
         x[(0, 0)] = 1.0;
         let kernel = Kernel::gaussian(&x, Bandwidth::Median);

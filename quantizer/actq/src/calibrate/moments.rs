@@ -5,29 +5,29 @@ use nalgebra::DMatrix;
 use crate::data::Dataset;
 use crate::graph::{Evaluator, Graph, WeightMatrix};
 
-/// `E[x x']` of a matrix's input, and how many vectors it was taken over.
+/// Second moment `E[x x']` of a matrix's input, with mean and count.
 #[derive(Clone, Debug)]
 pub struct Moments {
-    /// `cols * cols`, symmetric.
+    /// Second moment, `cols * cols`, symmetric.
     pub second: DMatrix<f64>,
-    /// `E[x]`
+    /// Mean `E[x]`.
     pub mean: Vec<f64>,
     /// Number of input vectors.
     pub count: usize,
 }
 
 impl Moments {
-    /// `E[(x - E[x]) (x - E[x])']`
+    /// Returns `E[(x - E[x]) (x - E[x])']`.
     pub fn centred(&self) -> DMatrix<f64> {
         let mean = nalgebra::DVectorView::from_slice(&self.mean, self.mean.len());
         &self.second - mean * mean.transpose()
     }
 }
 
-/// Input vectors gathered before they are multiplied out at once.
+/// Input vectors that are collected before they are multiplied together.
 const BATCH: usize = 256;
 
-/// Runs the f32 network over `dataset` and gives the moments of every matrix's input. `progress` is called after each
+/// Runs the f32 network over `dataset` and returns the moments of every matrix's input. `progress` is called after each
 /// episode with the number of frames done.
 pub fn collect(graph: &Graph, dataset: &Dataset, progress: &mut dyn FnMut(usize)) -> Vec<Moments> {
     let mut sums: Vec<_> = graph
@@ -73,8 +73,7 @@ fn flush(moments: &mut Moments, batch: &mut Vec<f64>) {
     batch.clear();
 }
 
-/// `E |(W' - W) x|^2 / E |W x|^2`; of white inputs where there are no moments. 0 for a matrix that never gives
-/// anything.
+/// Returns `E |(W' - W) x|^2 / E |W x|^2`, for white inputs without moments; 0 for a matrix whose output is always 0.
 pub fn relative_error(matrix: &WeightMatrix, quantized: &[f32], moments: Option<&Moments>) -> f64 {
     let energy = |rows: &[f64]| -> f64 {
         rows.chunks_exact(matrix.cols)

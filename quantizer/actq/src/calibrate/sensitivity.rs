@@ -1,9 +1,9 @@
-//! How much an error of a weight moves the actions: second moments on both sides of every matrix.
+//! Sensitivity of the actions to errors of a weight: second moments on both sides of every matrix.
 //!
-//! To second order an error `E` of a matrix adds `tr(E H E' G)` to the squared action error, where `H = E[x x']` is the
-//! moment of its input and `G = E[g g']` that of the action error's derivative at its output (Gauss-Newton). `G` is
-//! taken by running random signs back through the network, each output divided by its standard deviation: over the
-//! signs, the expectation of `g g'` is the sum over the outputs.
+//! To second order, an error `E` of a matrix adds `tr(E H E' G)` to the squared action error (Gauss-Newton). `H = E[x
+//! x']` is the moment of its input, and `G = E[g g']` that of the action error's derivative at its output. To estimate
+//! `G`, random signs run back through the network, with each output divided by its standard deviation. Over the signs,
+//! the expectation of `g g'` is the sum over the outputs.
 
 use nalgebra::DMatrix;
 use ndarray::linalg::general_mat_mul;
@@ -19,17 +19,17 @@ use crate::random::Random;
 /// Batches that `G` is averaged over, and samples in each.
 const BATCHES: usize = 24;
 const SAMPLES: usize = 128;
-/// Batches at least, however little time there is.
+/// Least batches, however short the time.
 const LEAST_BATCHES: usize = 2;
-/// Frames that [`drawn_moments`] are taken of.
+/// Frames of [`drawn_moments`].
 const DRAWN: usize = 12_288;
-/// Added to the diagonal of an input's moment, as a share of its mean.
+/// Damping of an input's moment: added to its diagonal, as a share of the diagonal's mean.
 pub const DAMPING_INPUT: f64 = 0.01;
-/// The same of `G`.
+/// Damping of `G`.
 pub const DAMPING_OUTPUT: f64 = 0.02;
 
-/// `G` of every matrix, `rows * rows`, and how many frames or windows it was taken of: with an allowance, those that
-/// fit.
+/// Returns `G` of every matrix, `rows * rows`, and the number of frames or windows that it was taken over: with an
+/// allowance, those that fit.
 pub fn output_moments(windows: &Windows, allowance: Option<Allowance>, seed: u64) -> (Vec<DMatrix<f64>>, usize) {
     let graph = &windows.graph;
     let mut random = Random::new(seed);
@@ -55,8 +55,8 @@ pub fn output_moments(windows: &Windows, allowance: Option<Allowance>, seed: u64
     (sums.into_iter().zip(counts).map(mean).collect(), batches * samples)
 }
 
-/// Draws so many samples and runs a random sign over the deviation of every output back through the network, past
-/// `see`.
+/// Draws `samples` samples, and runs a random sign over the deviation of every output back through the network; `see`
+/// receives the products.
 fn probe(windows: &Windows, samples: usize, random: &mut Random, grads: &mut Weights, see: &mut See<'_>) {
     let network = Network::new(&windows.graph);
     let batch = windows.batch(samples, None, random);
@@ -70,8 +70,8 @@ fn probe(windows: &Windows, samples: usize, random: &mut Random, grads: &mut Wei
     network.backward(&windows.weights, &pass, signs, &mut d_state, grads, see);
 }
 
-/// The moments on both sides of every matrix, of batches that are drawn: `E[x x']` with its mean, and `G`. What frames
-/// are drawn together is summed at once, and so in a fraction of the time that all frames take one by one.
+/// Returns the moments on both sides of every matrix over drawn batches: `E[x x']` with its mean, and `G`. The frames
+/// of a batch are summed together, in a fraction of the time that frames take one by one.
 pub fn drawn_moments(windows: &Windows, seed: u64) -> Vec<(Moments, DMatrix<f64>)> {
     let graph = &windows.graph;
     let mut random = Random::new(seed);
@@ -84,7 +84,7 @@ pub fn drawn_moments(windows: &Windows, seed: u64) -> Vec<(Moments, DMatrix<f64>
     sums.into_iter().map(Drawn::mean).collect()
 }
 
-/// Sums over the vectors of a matrix's input and the derivatives at its output.
+/// Sums over the inputs of a matrix and the derivatives at its output.
 struct Drawn {
     input: Array2<f32>,
     inputs: Array1<f32>,
@@ -117,18 +117,18 @@ impl Drawn {
     }
 }
 
-/// Which side of a matrix a moment belongs to.
+/// Side of a matrix that a moment belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
-    /// `H`
+    /// The input: `H`.
     Input,
-    /// `G`
+    /// The output: `G`.
     Output,
 }
 
-/// The weight that each row or column has in the action error: the geometric mean of the moment's diagonal, which an
-/// error costs that nothing compensates, and of its conditional diagonal, which remains where those after it (in order
-/// of falling diagonal) compensate as far as they can.
+/// Returns the weight of each row or column in the action error. It is the geometric mean of the moment's diagonal, the
+/// cost of an uncompensated error, and of its conditional diagonal, the cost that remains if later rows or columns (in
+/// order of falling diagonal) compensate as far as they can.
 pub fn importance(second: &DMatrix<f64>, side: Side) -> Vec<f64> {
     let damping = match side {
         Side::Input => DAMPING_INPUT,
@@ -148,8 +148,8 @@ pub fn importance(second: &DMatrix<f64>, side: Side) -> Vec<f64> {
     importance
 }
 
-/// A moment with its rows and columns in order of rising diagonal, and this share of the mean diagonal added to it; and
-/// the order. The triangular factor's diagonal is then conditioned on those that come after, which are the largest.
+/// Returns the order of rising diagonal, and the moment in that order with a share of the mean diagonal added to its
+/// diagonal. The triangular factor's diagonal is then conditioned on the later elements, which are the largest.
 pub fn damped(second: &DMatrix<f64>, share: f64) -> (Vec<usize>, DMatrix<f64>) {
     let n = second.nrows();
     let damping = (share * second.trace() / n as f64).max(1e-30);

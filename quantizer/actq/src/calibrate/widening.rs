@@ -1,38 +1,37 @@
-//! How far learning takes the inputs off the recorded ones.
+//! Noise on the inputs of learning.
 
 use std::fmt;
 
 /// Noise on a window of observations. Its standard deviation is drawn for every window, between 0 and `noise`, in units
-/// of each value's own deviation over the recording; from step to step it keeps [`MEMORY`]. Where a policy drives, its
-/// own errors have taken it off the recorded path, slowly and for a while: that is what such noise stands for. Noise
-/// that is fresh in every step averages out and teaches a recurrent policy to ignore it (docs/QUANTIZER.md has the
-/// figures).
+/// of each value's own deviation over the recording. From step to step it keeps [`MEMORY`]. It imitates a rollout, in
+/// which the policy's own errors leave the recorded path slowly and for a while. Noise that is independent in every
+/// step averages out and teaches a recurrent policy to ignore it (docs/QUANTIZER.md has the figures).
 ///
-/// Half of the windows can also be moved as a whole, by up to `mix` times the difference of two recorded observations,
-/// which keeps the values together that move together.
+/// Half of the windows can also move as a whole, by up to `mix` times the difference of two recorded observations. This
+/// preserves correlations between values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Widening {
-    /// The largest standard deviation of the noise, in units of each value's own.
+    /// Largest standard deviation of the noise, in units of each value's own.
     pub noise: f32,
-    /// It is drawn as `noise` times this power of an even draw from 0 to 1: the higher, the more windows stay close to
-    /// the recorded path.
+    /// Exponent of the uniform draw from 0 to 1 that `noise` is multiplied by: the higher, the more windows stay close
+    /// to the recorded path.
     pub power: i32,
-    /// The largest share of the difference of two recorded observations.
+    /// Largest share of the difference of two recorded observations.
     pub mix: f32,
 }
 
-/// What remains of the noise from one step to the next: at 50 steps a second it lasts for about 0.7 s.
+/// Share of the noise that remains from one step to the next: at 50 steps per second it lasts about 0.7 s.
 pub const MEMORY: f32 = 0.97;
 
 impl Widening {
-    /// What a recurrent policy learns with, and what others take where nothing can be left out to choose by; errors off
-    /// the path are measured with it. A policy that balances needs as many windows far from the path as near it
+    /// The widening of recurrent policies, and of others without episodes to choose by; it also measures errors off the
+    /// path. A policy that balances needs as many windows far from the path as near it
     /// (docs/records/2026-11-22-choice.md and 2026-11-23-balance.md).
     pub const WIDE: Self = Self { noise: 0.8, power: 1, mix: 0.0 };
 
-    /// What can be chosen from. The first of a feed-forward policy has lower errors than [`Self::WIDE`] on its path and
-    /// hardly higher ones off it. Of a recurrent policy nothing narrower has the lowest error off the path, so there is
-    /// no choice.
+    /// Returns the widenings to choose from. The first one of a feed-forward policy has lower errors than
+    /// [`Self::WIDE`] on its path and hardly higher ones off it. A recurrent policy has no choice, since nothing
+    /// narrower has the lowest error off the path.
     pub fn choices(recurrent: bool) -> &'static [Self] {
         const OF_FRAMES: [Widening; 3] = [
             Widening { noise: 0.8, power: 3, mix: 0.5 },

@@ -8,12 +8,12 @@ use crate::data::Dataset;
 use crate::graph::{Graph, Network, State, Weights, start_state, zero_state};
 use crate::random::Random;
 
-/// Steps of a window of a recurrent network.
+/// Steps of a recurrent network's window.
 const WINDOW: usize = 64;
-/// Share of the windows that start from the zero state wherever they stand.
+/// Share of the windows that start from the zero state, wherever they are.
 const FROM_ZERO: f32 = 0.15;
-/// One in so many episodes is left out where others are to be measured on it.
-const LEFT_OUT: usize = 4;
+/// One episode in this many is held out to measure choices.
+const HELD_OUT: usize = 4;
 
 /// A batch of windows: observations, and the state before the first step.
 #[derive(Clone, Debug)]
@@ -44,8 +44,8 @@ pub struct Windows {
 }
 
 impl Windows {
-    /// Runs the f32 network over the recording; where frames do not depend on each other, over one in `every` of them,
-    /// of which the outputs' variance then is.
+    /// Runs the f32 network over the recording. If frames do not depend on each other, it uses one in `every` frames,
+    /// and the outputs' variance covers these.
     pub fn new(graph: Graph, dataset: &Dataset, every: usize) -> Self {
         let weights = Weights::of(&graph);
         let network = Network::new(&graph);
@@ -85,7 +85,7 @@ impl Windows {
         Self { graph, weights, states, deviation, output_variance, episodes, window }
     }
 
-    /// Whether steps depend on each other.
+    /// Returns `true` if steps depend on each other.
     pub fn recurrent(&self) -> bool {
         !self.states.is_empty()
     }
@@ -95,7 +95,7 @@ impl Windows {
         episode.row(random.below(episode.nrows()))
     }
 
-    /// With another network that gives the same outputs and whose nodes have the same states in the same order.
+    /// Replaces the network by another one with the same outputs and the same states in the same order.
     pub fn with(self, graph: Graph) -> Self {
         let moved = |state: State| {
             let mut moved = zero_state(&graph, 0);
@@ -109,7 +109,7 @@ impl Windows {
         Self { weights: Weights::of(&graph), states, graph, ..self }
     }
 
-    /// A batch of `size` windows, at the recorded observations or widened.
+    /// Draws a batch of `size` windows, at the recorded observations or widened.
     pub fn batch(&self, size: usize, widening: Option<Widening>, random: &mut Random) -> Batch {
         let mut frames = Array2::zeros((size * self.window, self.graph.input_len()));
         let mut state = zero_state(&self.graph, size);
@@ -135,7 +135,7 @@ impl Windows {
         Batch { frames, state }
     }
 
-    /// Takes the window in these rows of `frames` off its recorded observations.
+    /// Adds noise to the window in these rows of `frames`.
     fn widen(
         &self,
         widening: Widening,
@@ -159,15 +159,15 @@ impl Windows {
                 *x += shift + amplitude * deviation * *noise;
                 *noise = MEMORY * *noise + fresh * random.normal();
             }
-            // Of a new draw the policy may begin from anything.
+            // Draw the denoising noise anew, since the policy may begin from anything.
             frames.slice_mut(s![row, self.graph.obs_len..]).iter_mut().for_each(|noise| *noise = random.normal());
         }
     }
 
-    /// The windows of three in four episodes, and of the others; `None` where there are not that many.
+    /// Splits the windows into those of three in four episodes and those of the others; `None` if there are too few.
     pub fn split(&self) -> Option<(Self, Self)> {
         let part = |left_out: bool| {
-            let of = |e: &usize| (e % LEFT_OUT == LEFT_OUT - 1) == left_out;
+            let of = |e: &usize| (e % HELD_OUT == HELD_OUT - 1) == left_out;
             let chosen: Vec<usize> = (0..self.episodes.len()).filter(of).collect();
             (!chosen.is_empty()).then(|| Self {
                 graph: self.graph.clone(),
@@ -182,15 +182,15 @@ impl Windows {
         Some((part(false)?, part(true)?))
     }
 
-    /// The f32 network's outputs on a batch, `[frame, element]`.
+    /// Returns the f32 network's outputs on a batch, `[frame, element]`.
     pub fn teach(&self, batch: &Batch) -> Array2<f32> {
         let mut state = batch.state.clone();
         Network::new(&self.graph).forward(&self.weights, batch.frames.clone(), &mut state).into_output()
     }
 }
 
-/// Holds the last observation until the episode has `steps`: so windows need not be as short as the shortest episode,
-/// at whose end a robot may have fallen. The f32 network is asked there as everywhere.
+/// Repeats the last observation until the episode has `steps` steps, so that a short episode, at whose end a robot may
+/// have fallen, does not shorten all windows. The f32 network is evaluated there, too.
 fn last(episode: &mut Array2<f32>, steps: usize) {
     let there = episode.nrows();
     if there < steps {
@@ -198,7 +198,7 @@ fn last(episode: &mut Array2<f32>, steps: usize) {
     }
 }
 
-/// Variance of every column over all rows of all arrays.
+/// Returns the variance of every column over all rows of all arrays.
 fn column_variances(arrays: &[Array2<f32>]) -> Vec<f64> {
     let cols = arrays.first().map_or(0, Array2::ncols);
     let rows = arrays.iter().map(Array2::nrows).sum::<usize>().max(1) as f64;
@@ -213,7 +213,7 @@ fn column_variances(arrays: &[Array2<f32>]) -> Vec<f64> {
     mean(&|i, v| (v - means[i]).powi(2))
 }
 
-/// The root of a variance as f32, in which values of any unit have the same digits: f32 holds no squares from 1e20 on.
+/// Returns the root of a variance as f32, with the same digits in any unit: f32 holds no squares from 1e20 on.
 fn root(variance: f64) -> f32 {
     let unit = 2f64.powi((0.5 * variance.max(f64::MIN_POSITIVE).log2()) as i32);
     ((variance / (unit * unit)) as f32).sqrt() * unit as f32
@@ -225,7 +225,7 @@ mod tests {
     use crate::methods::actquant::testing::{dataset, lstm};
 
     #[test]
-    fn a_short_episode_does_not_shorten_the_windows() {
+    fn short_episodes_do_not_shorten_windows() {
         let graph = lstm();
         let mut dataset = dataset(&graph, 2, 80);
         dataset.length[1] = 5;

@@ -1,10 +1,10 @@
-//! From the graph's values to regions of the arena: which operation reads and writes where.
+//! Places the graph's values in the arena.
 //!
-//! The operations say what they become over buffers ([`crate::graph::lowering`]); here the buffers get their places.
-//! The arena holds the recurrent state, the observation, the values, which share memory by their lifetimes, first fit,
-//! the last action with what is kept beside it, and the work area. Buffers are placed in the order in which they are
-//! written, each as low as it fits: so none leaves a gap, and what a step has written always is the begin of the arena,
-//! as the image's check wants it.
+//! The operations define what they become over buffers ([`crate::graph::lowering`]); this module assigns the buffers
+//! their offsets. The arena holds in this order: the recurrent state, the observation, the values, the last action with
+//! what is kept beside it, and the work area. Values share memory by their lifetimes, first fit. Buffers are placed in
+//! the order in which they are written, each at the lowest offset that fits. No gaps remain, so whatever a step has
+//! written is a prefix of the arena; the image's check requires this.
 
 use actq_kernels::image::{OpKind, Region, kept_words};
 use actq_kernels::x::max_prepared_words;
@@ -17,17 +17,17 @@ use crate::policy::Policy;
 /// The arena and the operations in it.
 #[derive(Debug)]
 pub struct Program {
-    /// The operations in order.
+    /// Operations in order.
     pub steps: Vec<Step<Region>>,
-    /// Zeroed by a reset.
+    /// Recurrent state; zeroed by a reset.
     pub state: Region,
-    /// The observation.
+    /// Observation.
     pub observation: Region,
-    /// How many operations run once, before those of the denoising steps; 0 where all do.
+    /// Operations that run once, before those of the denoising steps; 0 if all run every time.
     pub once: usize,
     /// The network's output.
     pub output: Region,
-    /// The action.
+    /// Action.
     pub action: Region,
     /// Prepared activations.
     pub work: Region,
@@ -72,7 +72,7 @@ pub fn lower(policy: &Policy, group: usize) -> Result<Program> {
     Arena { lowering, kept_len, work_len }.assign(OBSERVATION, once, iterate, act_len)
 }
 
-/// Lowers nodes, one after the other.
+/// Lowers nodes in order.
 fn nodes(nodes: &[Node], lowering: &mut Lowering) {
     for node in nodes {
         let place = node.kind.lower(lowering, &node.inputs, node.len);
@@ -80,19 +80,19 @@ fn nodes(nodes: &[Node], lowering: &mut Lowering) {
     }
 }
 
-/// The buffer of the observation.
+/// Buffer of the observation.
 const OBSERVATION: BufferId = 0;
 
-/// Buffers that need places.
+/// Buffers without offsets.
 struct Arena {
     lowering: Lowering,
-    /// Words that the contract and playback keep beside the last action.
+    /// Words that contract and playback keep beside the last action.
     kept_len: usize,
     work_len: usize,
 }
 
 impl Arena {
-    /// Gives every buffer its place.
+    /// Assigns every buffer its offset.
     fn assign(self, observation: BufferId, once: usize, output: Slice, act_len: usize) -> Result<Program> {
         let Lowering { steps, buffers, .. } = &self.lowering;
         let mut offsets = vec![0; buffers.len()];
@@ -131,7 +131,7 @@ impl Arena {
         let words = work_offset + self.work_len;
         ensure!(
             words <= usize::from(u16::MAX),
-            "the policy needs {words} words of scratch memory, 65535 are supported"
+            "the policy needs {words} words of scratch memory, but at most 65535 are supported; use a smaller network"
         );
         let region = |s: Slice| Region { offset: offsets[s.buffer] + s.offset, len: s.len };
         let whole = |buffer: usize| Region { offset: offsets[buffer], len: buffers[buffer].len };
@@ -162,7 +162,7 @@ impl Arena {
         })
     }
 
-    /// First and last operation during which each value's buffer is needed, in order of the first.
+    /// Returns the first and last operation that needs each value's buffer, in order of the first.
     fn lifetimes(&self) -> Vec<(usize, (usize, usize))> {
         let mut lives: Vec<(usize, (usize, usize))> = Vec::new();
         for (at, step) in self.lowering.steps.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Lays an image out.
+//! Writes an image's words.
 
 use std::path::Path;
 
@@ -16,16 +16,16 @@ use crate::policy::Policy;
 use crate::random::Random;
 use crate::runtime::{ImageBuffer, with_head};
 
-/// The most bytes that a self-test vector of more than one step may take.
+/// Most bytes of a self-test of more than one step.
 const SELF_TEST_BYTES: usize = 64 << 10;
 
-/// The image of a policy with its quantized matrices, one per matrix of the graph. The self-test vector is computed by
-/// the executor itself.
+/// Writes the image of a policy with its quantized matrices, one per matrix of the graph. The executor itself computes
+/// the self-test's actions.
 ///
 /// # Errors
 ///
-/// Where a size of the policy has no room in the format, where the kernels refuse the image, and where the network
-/// leaves f32's range on the self-test's observations.
+/// If a size of the policy exceeds the format, if the kernels refuse the image, or if the network leaves f32's range on
+/// the self-test's observations.
 pub fn image(policy: &Policy, matrices: &[Outcome]) -> Result<Vec<u8>> {
     let group = matrices.first().map_or(0, |m| m.quantized.group);
     let mut writer = Writer::new();
@@ -41,28 +41,28 @@ pub fn image(policy: &Policy, matrices: &[Outcome]) -> Result<Vec<u8>> {
     sealed(&words)
 }
 
-/// Bytes of an image of `policy` beside its matrices' blocks. Values of its matrices do not count.
+/// Returns the bytes of an image of `policy` without its matrices' blocks. Values of its matrices do not count.
 pub fn bytes_beside_blocks(policy: &Policy) -> Result<usize> {
     let records = vec![[0; h::MATRIX_WORDS]; policy.graph.matrices.len()];
     Ok(4 * Writer::new().finish(policy, 0, &records)?.words.len())
 }
 
-/// An image but for the actions of its self-test, length and checksum.
+/// An image without the actions of its self-test, its length and its checksum.
 struct Draft {
     words: Vec<u32>,
-    /// Offset of the self-test vector.
+    /// Offset of the self-test, in words.
     self_test: usize,
     observations: Vec<Vec<f32>>,
 }
 
-/// The image's bytes, with length and checksum.
+/// Returns the image's bytes with length and checksum.
 fn sealed(words: &[u32]) -> Result<Vec<u8>> {
     let mut bytes: Vec<u8> = words.iter().flat_map(|w| w.to_le_bytes()).collect();
-    seal(&mut bytes).context("the image has more than 4 GB")?;
+    seal(&mut bytes).context("the image is larger than 4 GB")?;
     Ok(bytes)
 }
 
-/// Observations that reach every input: spread over about two standard deviations where the policy normalizes, else
+/// Makes observations that reach every input: spread over about two standard deviations if the policy normalizes, else
 /// over -1 to 1, from a fixed generator.
 fn self_test_observations(graph: &Graph, steps: usize) -> Vec<Vec<f32>> {
     let mut random = Random::new(0);
@@ -90,17 +90,17 @@ struct Writer {
     words: Vec<u32>,
     /// Offset of the matrix records.
     matrices: u32,
-    /// From here on all words are finite constants of operations, which others may have, too.
+    /// Offset from which on all words are finite constants of operations, which other operations may share.
     finite: usize,
 }
 
 impl Writer {
-    /// An image with room for its header.
+    /// Makes an image with room for its header.
     fn new() -> Self {
         Self { words: vec![0; h::WORDS], matrices: 0, finite: 0 }
     }
 
-    /// Appends all that follows the matrices' blocks; `matrices` are their records.
+    /// Appends everything after the matrices' blocks; `matrices` are their records.
     fn finish(mut self, policy: &Policy, group: usize, matrices: &[[u32; h::MATRIX_WORDS]]) -> Result<Draft> {
         let program = lower(policy, group)?;
         self.matrices = self.push(matrices.iter().flatten().copied());
@@ -121,7 +121,7 @@ impl Writer {
             self.push_floats(&ensemble.weights());
         }
         let name = self.push_bytes(policy.name.as_bytes());
-        // Where observations are long, fewer than those of a chunk and the next.
+        // If observations are long, use fewer than those of a chunk and the next.
         let room = SELF_TEST_BYTES / (4 * (policy.graph.obs_len + policy.act_len));
         let steps = (policy.execute.max(horizon) + 2).min(room.max(1));
         let observations = self_test_observations(&policy.graph, steps);
@@ -161,7 +161,7 @@ impl Writer {
         Ok(Draft { words: self.words, self_test: self_test as usize, observations })
     }
 
-    /// Appends words and gives their offset.
+    /// Appends words and returns their offset.
     fn push(&mut self, words: impl IntoIterator<Item = u32>) -> u32 {
         let offset = self.words.len() as u32;
         self.words.extend(words);
@@ -172,7 +172,7 @@ impl Writer {
         self.push(values.iter().map(|v| v.to_bits()))
     }
 
-    /// Constants of an operation, where they stand already or at the end.
+    /// Returns the offset of an operation's constants: of equal ones if present, else appends them.
     fn constants(&mut self, values: &[f32]) -> u32 {
         let words: Vec<u32> = values.iter().map(|v| v.to_bits()).collect();
         let same = |window: &[u32]| window == words;
@@ -190,10 +190,15 @@ impl Writer {
         self.push(bytes.chunks(4).map(|c| c.iter().rev().fold(0, |word, b| word << 8 | u32::from(*b))))
     }
 
-    /// Packs a matrix's blocks, and gives its record.
+    /// Packs a matrix's blocks and returns its record.
     fn matrix(&mut self, outcome: &Outcome) -> Result<[u32; h::MATRIX_WORDS]> {
         let matrix = &outcome.quantized;
-        ensure!(matrix.rows <= h::MAX_ROWS, "a matrix has {} rows, {} are supported", matrix.rows, h::MAX_ROWS);
+        ensure!(
+            matrix.rows <= h::MAX_ROWS,
+            "a matrix has {} rows, but at most {} are supported",
+            matrix.rows,
+            h::MAX_ROWS
+        );
         let blocks = outcome.blocks();
         let in_order = Quantized::in_order(&blocks);
         let mut records = Vec::new();
@@ -205,7 +210,7 @@ impl Writer {
                 rows.iter().flat_map(|r| &matrix.group_scales[r * groups..][..groups]).copied().collect();
             let mut words = vec![0; shape.words()];
             layout::pack(*shape, &codes, &group_scales, &mut words).with_context(|| {
-                format!("{shape:?} cannot be packed; docs/FORMAT.md says how many columns may have group scales")
+                format!("cannot pack {shape:?}; docs/FORMAT.md lists how many columns may have group scales")
             })?;
             let weights = self.push(words.into_iter().map(u32::from_le));
             let scales: Vec<u16> = rows.iter().map(|&r| matrix.scales[r].to_bits()).collect();
@@ -222,7 +227,7 @@ impl Writer {
     fn op(&mut self, step: &Step<Region>) -> Result<[u32; h::OP_WORDS]> {
         let (bias, data) = match &step.data {
             StepData::None => (0, 0),
-            // Its first words are not constants of f32 alone, and nothing before them is named again behind them.
+            // Its first words are not only f32 constants, so later operations must not share any words up to here.
             StepData::Constants(values) if step.kind == OpKind::Denoise => {
                 let data = self.push_floats(values);
                 self.finite = self.words.len();
@@ -240,9 +245,9 @@ impl Writer {
     }
 }
 
-/// From the output of each row to that of the next, and from output 0 to the first.
+/// Returns the distances from each row's output to the next row's, and from output 0 to the first.
 fn steps(rows: &[usize]) -> Result<Vec<u8>> {
     let before = std::iter::once(&0).chain(rows);
     let steps = before.zip(rows).map(|(before, row)| u8::try_from(row - before));
-    steps.collect::<Result<_, _>>().context("rows of one width stand more than 255 apart")
+    steps.collect::<Result<_, _>>().context("rows of one width are more than 255 apart")
 }

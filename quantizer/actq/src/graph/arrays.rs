@@ -1,5 +1,5 @@
-//! Arrays `[sample, element]` and what operations do with them: products in either order of summing, rounding as the
-//! kernels round.
+//! Arrays `[sample, element]` and their operations: products in either order of summing, and rounding as in the
+//! kernels.
 
 use std::ops::Range;
 
@@ -7,19 +7,19 @@ use actq_kernels::round::ROUND;
 use actq_kernels::x::TINY;
 use ndarray::{Array2, ArrayView1, ArrayView2, ArrayViewMut1, ArrayViewMut2, Axis, linalg::general_mat_mul, s};
 
-/// The order in which a sum over a row is taken. The results differ in their last bits, and images are made from both.
+/// Order of the sum over a row. The results differ in their last bits, and images depend on both orders.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Sums {
-    /// First element to last: the same bits on every machine. Single frames are evaluated so, and all statistics of the
-    /// matrices' inputs come from it.
+    /// First element to last: the same bits on every machine. Evaluations of single frames and all statistics of the
+    /// matrices' inputs use it.
     #[default]
     InOrder,
-    /// In blocks, as fast as the machine can: for batches.
+    /// In blocks, at the machine's full speed: for batches.
     Blocked,
 }
 
 impl Sums {
-    /// The sum of a row.
+    /// Returns the sum of a row.
     pub fn sum(self, row: &ArrayView1<'_, f32>) -> f32 {
         match self {
             Self::InOrder => row.iter().sum(),
@@ -27,7 +27,7 @@ impl Sums {
         }
     }
 
-    /// `x W' + bias`: `[sample, row]`, rows contiguous.
+    /// Computes `x W' + bias`: `[sample, row]`, rows contiguous.
     pub fn affine(self, x: &Array2<f32>, w: &Array2<f32>, bias: &[f32]) -> Array2<f32> {
         let mut y = Array2::zeros((x.nrows(), bias.len()));
         y += &ArrayView1::from(bias);
@@ -38,7 +38,7 @@ impl Sums {
         y
     }
 
-    /// `w` made ready for many products with few rows each.
+    /// Prepares `w` for many products with few rows each.
     pub fn repeated(self, w: &Array2<f32>) -> Repeated<'_> {
         match self {
             Self::InOrder => Repeated::InOrder(w),
@@ -47,17 +47,17 @@ impl Sums {
     }
 }
 
-/// A matrix that few rows are multiplied with, many times.
+/// A matrix for many products with few rows each.
 #[derive(Debug)]
 pub enum Repeated<'a> {
-    /// As it is, `[row, col]`.
+    /// Unchanged, `[row, col]`.
     InOrder(&'a Array2<f32>),
-    /// `[col, row]`: a product with few rows takes half as long, which otherwise goes into gathering the columns.
+    /// Transposed, `[col, row]`: a product with few rows takes half the time, since no columns are gathered.
     Blocked(Array2<f32>),
 }
 
 impl Repeated<'_> {
-    /// `y += x W'`
+    /// Computes `y += x W'`.
     pub fn add_product(&self, x: &Array2<f32>, mut y: ArrayViewMut2<'_, f32>) {
         match self {
             Self::InOrder(w) => add_in_order(x, w, y),
@@ -66,7 +66,7 @@ impl Repeated<'_> {
     }
 }
 
-/// `w'` with its own rows contiguous, tile by tile: column by column, every value would be a cache miss.
+/// Returns `w'` with contiguous rows. It copies tile by tile: column by column, every value would be a cache miss.
 fn transposed(w: &Array2<f32>) -> Array2<f32> {
     const TILE: usize = 16;
     let mut transposed = Array2::zeros((w.ncols(), w.nrows()));
@@ -86,12 +86,12 @@ fn add_in_order(x: &Array2<f32>, w: &Array2<f32>, mut y: ArrayViewMut2<'_, f32>)
     }
 }
 
-/// The rows of one step of a sequence whose steps have `batch` rows each.
+/// Returns the range of rows of one step, in a sequence of `batch` rows per step.
 pub fn step_rows(step: usize, batch: usize) -> Range<usize> {
     step * batch..(step + 1) * batch
 }
 
-/// Some rows.
+/// Returns a range of rows.
 pub fn rows(array: &Array2<f32>, range: Range<usize>) -> ArrayView2<'_, f32> {
     array.slice(s![range, ..])
 }
@@ -101,7 +101,7 @@ pub fn rows_mut(array: &mut Array2<f32>, range: Range<usize>) -> ArrayViewMut2<'
     array.slice_mut(s![range, ..])
 }
 
-/// Rounds every row to integers of its own scale up to `x_max`, as the kernels do; 0 = not at all.
+/// Rounds every row to integers up to `x_max` with a scale per row, as the kernels do; 0 = no rounding.
 pub fn round_rows(x: ArrayView2<'_, f32>, x_max: u16) -> Array2<f32> {
     let mut y = x.to_owned();
     if x_max > 0 {
@@ -117,14 +117,14 @@ pub fn round_rows(x: ArrayView2<'_, f32>, x_max: u16) -> Array2<f32> {
     y
 }
 
-/// `sum += rows of dy`
+/// Adds the rows of `dy` to `sum`.
 pub fn sum_rows(dy: &Array2<f32>, sum: &mut [f32]) {
     for row in dy.rows() {
         sum.iter_mut().zip(row).for_each(|(s, d)| *s += d);
     }
 }
 
-/// A row as a slice. Every value is made in standard layout.
+/// Returns a row as a slice. All values have the standard layout.
 pub fn contiguous<'a>(row: &'a ArrayView1<'_, f32>) -> &'a [f32] {
     row.as_slice().expect("rows are contiguous")
 }

@@ -1,5 +1,5 @@
-//! How a network grows: every matrix and every node is checked against what is there. Importers call this; what they
-//! call their values is their own affair.
+//! Checked construction of a network: every matrix and every node is checked against the existing ones. Importers call
+//! this; their names of values are their own.
 
 use super::nodes::{Graph, Node};
 use super::ops::{Concat, NodeKind, Span};
@@ -7,7 +7,7 @@ use super::values::{ValueId, WeightMatrix};
 use crate::error::{Result, bail, ensure};
 
 impl Graph {
-    /// Takes a weight matrix, and gives its index.
+    /// Adds a weight matrix and returns its index.
     pub fn add_matrix(&mut self, matrix: WeightMatrix) -> Result<usize> {
         let WeightMatrix { name, rows, cols, data } = &matrix;
         ensure!(*rows > 0 && *cols > 0, "the matrix {name:?} is empty: {rows} x {cols}");
@@ -16,13 +16,13 @@ impl Graph {
         Ok(self.matrices.len() - 1)
     }
 
-    /// Takes a weight matrix that several nodes may share, and gives the index of its first.
+    /// Adds a weight matrix that several nodes may share, and returns the index of the first equal one.
     pub fn share_matrix(&mut self, matrix: WeightMatrix) -> Result<usize> {
         let known = self.matrices.iter().position(|known| *known == matrix);
         known.map_or_else(|| self.add_matrix(matrix), Ok)
     }
 
-    /// Parts of values behind each other; a single one that is whole is the value itself.
+    /// Concatenates parts of values; a single part that is a whole value is that value.
     pub fn join(&mut self, parts: Vec<(ValueId, Span)>) -> Result<ValueId> {
         if let [(value, span)] = parts[..]
             && span.len == self.len_of(value)
@@ -33,13 +33,13 @@ impl Graph {
         self.add(Concat(spans), &values)
     }
 
-    /// Appends a node that reads `inputs`, and gives its output. An operation that these values or the matrices do not
-    /// fit is an error.
+    /// Appends a node that reads `inputs`, and returns its output. An operation that does not fit these values or the
+    /// matrices is an error.
     pub fn add(&mut self, kind: impl Into<NodeKind>, inputs: &[ValueId]) -> Result<ValueId> {
         let kind = kind.into();
         let known = self.output();
         if let Some(value) = inputs.iter().find(|value| **value > known) {
-            bail!("reads the value {value}, but there are only {known} nodes");
+            bail!("reads the value {value}, but the network has only {known} nodes");
         }
         let lens: Vec<usize> = inputs.iter().map(|&value| self.len_of(value)).collect();
         let len = kind.output_len(&self.matrices, &lens)?;
@@ -47,8 +47,8 @@ impl Graph {
         Ok(self.output())
     }
 
-    /// Puts a node behind `value`, for `readers` of it, which then read the new node's output instead; gives that.
-    /// Values behind it have their numbers raised by one.
+    /// Inserts a node after `value`; its `readers` then read the new node's output, which is returned. The numbers of
+    /// later values rise by one.
     pub fn insert(&mut self, kind: impl Into<NodeKind>, value: ValueId, readers: &[usize]) -> Result<ValueId> {
         let kind = kind.into();
         let len = kind.output_len(&self.matrices, &[self.len_of(value)])?;
@@ -81,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_inserted_moves_what_stands_behind_it() {
+    fn insertion_renumbers_later_values() {
         let graph = iterative();
         let mut more = graph.clone();
         let same = Balance::new(vec![0.0; 3], vec![1.0; 3]);
@@ -92,7 +92,7 @@ mod tests {
         let input: Vec<f32> = (0..graph.input_len()).map(|i| 0.3 * i as f32 - 0.5).collect();
         let outputs = [&graph, &more].map(|graph| Evaluator::new(graph).step(&input, &mut |_, _| {}));
         assert_eq!(outputs[0], outputs[1]);
-        // Behind what only the steps read, they begin where they did.
+        // After a value that only the steps read, the first step's node stays the same.
         let read = first(&graph) + 1;
         more.clone_from(&graph);
         let same = Balance::new(vec![0.0; 2], vec![1.0; 2]);
@@ -100,11 +100,11 @@ mod tests {
         assert_eq!((first(&more), more.readers(read)), (first(&graph), vec![read]));
         assert_eq!(Evaluator::new(&more).step(&input, &mut |_, _| {}), outputs[0]);
         let error = more.insert(Balance::new(vec![0.0; 9], vec![1.0; 9]), 0, &[]).expect_err("too many").to_string();
-        assert_eq!(error, "mean has 9 values, 3 are needed");
+        assert_eq!(error, "mean has 9 values, but 3 are needed");
     }
 
     #[test]
-    fn what_does_not_fit_is_refused_and_leaves_the_graph_as_it_was() {
+    fn refused_nodes_leave_the_graph_unchanged() {
         let mut graph = Graph::new(4);
         let w = graph.add_matrix(matrix("w", 3, 4)).expect("a matrix");
         let square = graph.add_matrix(matrix("square", 12, 3)).expect("a matrix");
@@ -118,22 +118,22 @@ mod tests {
             (
                 Linear { matrix: w, bias: vec![0.0; 3] }.into(),
                 vec![y],
-                "the matrix \"w\" takes 4 values, its operand has 3",
+                "the matrix \"w\" takes 4 values, but its operand has 3",
             ),
-            (Linear { matrix: w, bias: vec![0.0; 2] }.into(), vec![0], "bias has 2 values, 3 are needed"),
-            (Linear { matrix: 7, bias: vec![] }.into(), vec![0], "there is no matrix 7"),
+            (Linear { matrix: w, bias: vec![0.0; 2] }.into(), vec![0], "bias has 2 values, but 3 are needed"),
+            (Linear { matrix: 7, bias: vec![] }.into(), vec![0], "the network has no matrix 7"),
             (Add.into(), vec![y, 0], "adds 4 values to 3"),
             (Add.into(), vec![y], "takes two inputs, not 1"),
             (Mul.into(), vec![y, 0], "multiplies 3 values with 4"),
-            (norm(4).into(), vec![y], "weight has 4 values, 3 are needed"),
+            (norm(4).into(), vec![y], "weight has 4 values, but 3 are needed"),
             (norm(3).into(), vec![y, y], "takes one input, not 2"),
-            (RmsNorm { weight: vec![1.0], eps: 1e-5 }.into(), vec![0], "weight has 1 values, 4 are needed"),
+            (RmsNorm { weight: vec![1.0], eps: 1e-5 }.into(), vec![0], "weight has 1 values, but 4 are needed"),
             (Concat(vec![Span { from: 2, len: 2 }]).into(), vec![y], "2:4 reaches beyond the input's 3 values"),
-            (Concat(vec![Span { from: 0, len: 1 }]).into(), vec![y, 0], "1 parts of 2 inputs"),
-            (lstm(2).into(), vec![0], "the matrix \"w\" gives 3 values, 8 are needed"),
-            (gru.into(), vec![0], "the matrix \"square\" takes 3 values, its operand has 1"),
-            (normalize.into(), vec![0], "scale has 3 values, 4 are needed"),
-            (norm(3).into(), vec![9], "reads the value 9, but there are only 1 nodes"),
+            (Concat(vec![Span { from: 0, len: 1 }]).into(), vec![y, 0], "it has 1 parts for 2 inputs"),
+            (lstm(2).into(), vec![0], "the matrix \"w\" gives 3 values, but 8 are needed"),
+            (gru.into(), vec![0], "the matrix \"square\" takes 3 values, but its operand has 1"),
+            (normalize.into(), vec![0], "scale has 3 values, but 4 are needed"),
+            (norm(3).into(), vec![9], "reads the value 9, but the network has only 1 nodes"),
         ];
         for (kind, inputs, expected) in cases {
             let error = graph.add(kind, &inputs).expect_err(expected).to_string();
@@ -143,7 +143,7 @@ mod tests {
         let error =
             graph.add_matrix(WeightMatrix { data: vec![0.0; 5], ..matrix("short", 2, 3) }).expect_err("too short");
         assert_eq!(error.to_string(), "the matrix \"short\" of 2 x 3 has 5 values");
-        // One that is there is shared; another of its name is not.
+        // An equal matrix is shared; a different one of the same name is not.
         let [known, other] = [matrix("square", 12, 3), WeightMatrix { data: vec![7.0; 36], ..matrix("square", 12, 3) }];
         assert_eq!(graph.share_matrix(known).expect("fits"), 1);
         assert_eq!(graph.share_matrix(other).expect("fits"), 2);

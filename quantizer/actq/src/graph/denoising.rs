@@ -1,23 +1,23 @@
-//! What makes a network an iterative head: the steps from noise to its output.
+//! The denoising steps of an iterative head, from noise to its output.
 
 use actq_kernels::ops::denoise::{Coefficients, denoise};
 use ndarray::{Array2, ArrayView2, s};
 
-/// The denoising steps of a flow or a diffusion policy. The network reads the iterate by a node
-/// [`Iterate`](super::ops::Iterate); its last value is what a step makes the next iterate of.
+/// Denoising steps of a flow or a diffusion policy. The network reads the iterate by a node
+/// [`Iterate`](super::ops::Iterate); a step makes the next iterate of its last value.
 #[derive(Clone, Debug)]
 pub struct Denoising {
-    /// The first node that every step runs; those before it depend on the observation alone.
+    /// First node that every step runs; the nodes before it depend on the observation alone.
     pub first: usize,
     /// Values of the iterate.
     pub len: usize,
-    /// Limit of the magnitude of the predicted sample, or of what stands in its place; or infinite.
+    /// Largest magnitude of the predicted sample, or of the value in its place; may be infinite.
     pub limit: f32,
-    /// What each step does.
+    /// Coefficients of each step.
     pub steps: Vec<Coefficients>,
 }
 
-/// The iterate, and what the network reads of it.
+/// The iterate, and the value that the network reads of it.
 #[derive(Clone, Debug)]
 pub(super) struct Iterates {
     pub(super) x: Array2<f32>,
@@ -25,24 +25,24 @@ pub(super) struct Iterates {
 }
 
 impl Denoising {
-    /// Values of noise that an evaluation takes: the first iterate, and behind it, where steps add noise, that of each.
+    /// Returns the noise values of an evaluation: the first iterate and, if steps add noise, that of each step.
     pub fn noise_len(&self) -> usize {
         let draws = if self.draws() { 1 + self.steps.len() } else { 1 };
         self.len * draws
     }
 
-    /// Whether steps add noise.
+    /// Returns `true` if steps add noise.
     pub fn draws(&self) -> bool {
         self.steps.iter().any(|by| by.sigma != 0.0)
     }
 
-    /// Before the first step.
+    /// Returns the iterates before the first step.
     pub(super) fn start(&self, noise: ArrayView2<'_, f32>) -> Iterates {
         let x = noise.slice(s![.., ..self.len]).to_owned();
         Iterates { y: x.clone(), x }
     }
 
-    /// After `step`, in which the network gave `v`: as [`actq_kernels::ops::denoise`].
+    /// Returns the iterates after `step`, in which the network gave `v`: as [`actq_kernels::ops::denoise`].
     pub(super) fn next(&self, step: usize, at: &Iterates, v: &Array2<f32>, noise: ArrayView2<'_, f32>) -> Iterates {
         let by = &self.steps[step];
         let mut x: Vec<f32> = at.x.iter().copied().collect();
@@ -54,8 +54,8 @@ impl Denoising {
         Iterates { x: array(x), y: array(y) }
     }
 
-    /// From the derivatives by the iterate and the network's input after a step to those by the iterate before it and
-    /// by the network's output.
+    /// Goes back through a step: from the derivatives by the iterate and the network's input after it, to those by the
+    /// iterate before it and by the network's output.
     pub(super) fn back(&self, step: usize, at: &Iterates, v: &Array2<f32>, d: Iterates) -> (Array2<f32>, Array2<f32>) {
         let by = &self.steps[step];
         let mut dx = d.x + &d.y;

@@ -16,7 +16,7 @@ pub struct Evaluator<'g> {
 }
 
 impl<'g> Evaluator<'g> {
-    /// Starts from the zero state.
+    /// Makes an evaluator with the zero state.
     pub fn new(graph: &'g Graph) -> Self {
         let state = start_state(graph, &[None]);
         Self { network: Network::in_order(graph), weights: Weights::of(graph), state }
@@ -32,8 +32,8 @@ impl<'g> Evaluator<'g> {
         self.state = start_state(self.network.graph, &[state.map(<[f32]>::to_vec)]);
     }
 
-    /// The network's output for one observation of the graph's length, with its noise. `tap` sees every matrix's index
-    /// and input vector.
+    /// Returns the network's output for one observation of the graph's length, with its noise. `tap` receives every
+    /// matrix's index and input vector.
     pub fn step(&mut self, obs: &[f32], tap: &mut dyn FnMut(usize, &[f32])) -> Vec<f32> {
         let obs = Array2::from_shape_fn((1, obs.len()), |(_, i)| obs[i]);
         let pass = self.network.forward(&self.weights, obs, &mut self.state);

@@ -1,8 +1,8 @@
-//! From a network of observation, time and iterate to an iterative head that computes nothing twice.
+//! Turns a network of observation, time and iterate into an iterative head that computes nothing twice.
 //!
-//! What depends on the time alone becomes a table: the steps are known when the image is built. What depends on the
-//! observation alone runs once for an output. A linear layer of several of these behind each other is cut into their
-//! columns.
+//! Values that depend on the time alone become a table, since the steps are known when the image is built. Values that
+//! depend on the observation alone are computed one time per output. A linear layer over several of these,
+//! concatenated, is split into their columns.
 
 use ndarray::Array2;
 
@@ -14,7 +14,7 @@ use super::values::{ValueId, WeightMatrix};
 use super::weights::{Weights, zero_state};
 use crate::error::{Context, Result, ensure};
 
-/// What a value depends on.
+/// Dependence of a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Needs {
     Time,
@@ -29,24 +29,24 @@ impl Needs {
     }
 }
 
-/// The head that runs `flat`, a network of `[observation | time | iterate]`, in the steps of `denoising`. `times` holds
-/// what it reads as the time in each of them.
+/// Makes the head that runs `flat`, a network of `[observation | time | iterate]`, in the steps of `denoising`. `times`
+/// holds its time input in each step.
 pub fn iterative(flat: &Graph, obs_len: usize, times: &[Vec<f32>], steps: Denoising) -> Result<Graph> {
     let time_len = times.first().map_or(0, Vec::len);
     ensure!(
         steps.steps.len() == times.len() && !times.is_empty(),
-        "there are {} times for {} steps",
+        "the schedule has {} times for {} steps",
         times.len(),
         steps.steps.len()
     );
     ensure!(
         obs_len + time_len + steps.len == flat.obs_len,
-        "observation, time and iterate are not what the network reads"
+        "observation, time and iterate do not add up to the network's input"
     );
     ensure!(flat.state_len() == 0, "a recurrent network cannot be the head of a flow or a diffusion policy");
     let out = flat.len_of(flat.output());
-    ensure!(out == steps.len, "the last op gives {out} values, the iterate has {}", steps.len);
-    // The observation makes no difference to what depends on the time alone.
+    ensure!(out == steps.len, "the last op gives {out} values, but the iterate has {}", steps.len);
+    // The observation does not affect values that depend on the time alone.
     let rows = Array2::from_shape_fn((times.len(), flat.obs_len), |(k, i)| {
         times[k].get(i.wrapping_sub(obs_len)).copied().unwrap_or(0.0)
     });
@@ -72,7 +72,8 @@ pub fn iterative(flat: &Graph, obs_len: usize, times: &[Vec<f32>], steps: Denois
     Ok(graph)
 }
 
-/// What every value needs; the observation of the flat network, which is all three, counts as the step.
+/// Returns the dependence of every value; the observation of the flat network, which holds all three parts, counts as
+/// the step.
 fn needs(flat: &Graph, obs_len: usize, time_len: usize) -> Result<Vec<Needs>> {
     let mut needs = vec![Needs::Step];
     for node in &flat.nodes {
@@ -82,7 +83,8 @@ fn needs(flat: &Graph, obs_len: usize, time_len: usize) -> Result<Vec<Needs>> {
                     if value != 0 {
                         return Ok(needs[value]);
                     }
-                    of_input(span, obs_len, time_len).context("a part reaches over observation, time and iterate")
+                    of_input(span, obs_len, time_len)
+                        .context("a part spans more than one of observation, time and iterate")
                 };
                 node.inputs.iter().zip(spans).map(part).collect::<Result<Vec<_>>>()?
             }
@@ -93,7 +95,7 @@ fn needs(flat: &Graph, obs_len: usize, time_len: usize) -> Result<Vec<Needs>> {
     Ok(needs)
 }
 
-/// Which of the three parts of the flat network's input a span is in.
+/// Returns the part of the flat network's input that a span is in.
 fn of_input(span: &Span, obs_len: usize, time_len: usize) -> Option<Needs> {
     let (from, to) = (span.from, span.from + span.len);
     if to <= obs_len {
@@ -107,30 +109,30 @@ fn of_input(span: &Span, obs_len: usize, time_len: usize) -> Option<Needs> {
 
 struct Hoist<'a> {
     flat: &'a Graph,
-    /// Observation, time and iterate in the flat network's input.
+    /// Ranges of observation, time and iterate in the flat network's input.
     spans: [std::ops::Range<usize>; 3],
     needs: Vec<Needs>,
     /// Values of the flat network at each time.
     tables: Vec<Array2<f32>>,
-    /// The result so far.
+    /// The new graph.
     graph: Graph,
-    /// Its values for those of the flat network.
+    /// The new graph's values for those of the flat network.
     places: Vec<Option<ValueId>>,
-    /// What the observation gives to a linear layer that is cut.
+    /// The observation's share of a split linear layer.
     condition: Vec<Option<ValueId>>,
     iterate: ValueId,
     len: usize,
 }
 
 impl Hoist<'_> {
-    /// Nodes of the observation alone, and the observation's columns of layers that are cut.
+    /// Adds nodes of the observation alone, and the observation's columns of split layers.
     fn once(&mut self) -> Result<()> {
         let flat = self.flat;
         for (i, node) in flat.nodes.iter().enumerate() {
             if self.needs[i + 1] == Needs::Observation {
                 self.copy(i)?;
             } else if let Some((linear, parts)) = self.cut(node) {
-                // The biases stand in the table, where there is one, else here.
+                // The biases are in the table if there is one, else here.
                 let biased = parts.iter().all(|(.., needs)| *needs != Needs::Time);
                 self.condition[i + 1] = self.columns(linear, &parts, Needs::Observation, biased)?;
             }
@@ -138,7 +140,7 @@ impl Hoist<'_> {
         Ok(())
     }
 
-    /// Everything else but what depends on the time alone.
+    /// Adds all remaining nodes except those of the time alone.
     fn of_step(&mut self) -> Result<()> {
         let flat = self.flat;
         self.iterate = self.graph.add(Iterate { len: self.len }, &[])?;
@@ -172,7 +174,7 @@ impl Hoist<'_> {
         Ok(())
     }
 
-    /// Whether nothing but layers that are cut reads the parts that this node puts behind each other.
+    /// Returns `true` if only split layers read the parts that this node concatenates.
     fn only_cut(&self, i: usize) -> bool {
         let readers = self.flat.readers(i + 1);
         matches!(self.flat.nodes[i].kind, NodeKind::Concat(_))
@@ -181,8 +183,8 @@ impl Hoist<'_> {
             && readers.iter().all(|&reader| self.cut(&self.flat.nodes[reader]).is_some())
     }
 
-    /// A linear layer over parts that need different things, and these: value, span, need.
-    #[expect(clippy::type_complexity, reason = "told in the line above")]
+    /// Returns a linear layer over parts of different dependence, with the parts: value, span, dependence.
+    #[expect(clippy::type_complexity, reason = "the line above names the parts")]
     fn cut<'n>(&self, node: &'n Node) -> Option<(&'n Linear, Vec<(ValueId, Span, Needs)>)> {
         let NodeKind::Linear(linear) = &node.kind else { return None };
         let input = node.inputs.first()?.checked_sub(1)?;
@@ -198,7 +200,7 @@ impl Hoist<'_> {
         if value == 0 { of_input(span, obs.len(), time.len()).unwrap_or(Needs::Step) } else { self.needs[value] }
     }
 
-    /// What the time gives to a layer that is cut, with its biases; `None` where it gives nothing.
+    /// Returns the time's share of a split layer, with its biases; `None` if it has none.
     fn table_of(&self, linear: &Linear, parts: &[(ValueId, Span, Needs)]) -> Option<Table> {
         let matrix = &self.flat.matrices[linear.matrix];
         let mut rows = Vec::new();
@@ -220,7 +222,7 @@ impl Hoist<'_> {
         parts.iter().any(|(.., needs)| *needs == Needs::Time).then_some(Table { rows, len: matrix.rows })
     }
 
-    /// The layer of those columns whose parts need this; `None` where there are none.
+    /// Adds the layer of those columns whose parts have this dependence; `None` if there are none.
     fn columns(
         &mut self,
         linear: &Linear,
@@ -252,7 +254,7 @@ impl Hoist<'_> {
         self.graph.add(Linear { matrix, bias }, &[input]).map(Some)
     }
 
-    /// A node as it is, with its matrices.
+    /// Copies a node with its matrices.
     fn copy(&mut self, i: usize) -> Result<()> {
         let node = &self.flat.nodes[i];
         let mut kind = node.kind.clone();
@@ -270,7 +272,7 @@ impl Hoist<'_> {
         Ok(())
     }
 
-    /// Parts of the flat network's values behind each other.
+    /// Concatenates parts of the flat network's values.
     fn joined(&mut self, mut parts: Vec<(ValueId, Span)>) -> Result<ValueId> {
         let [_, time, iterate] = self.spans.clone();
         for (value, span) in &mut parts {
@@ -288,12 +290,15 @@ impl Hoist<'_> {
         self.graph.join(parts)
     }
 
-    /// The result's value for one of the flat network; of the time alone, a table.
+    /// Returns the new value for one of the flat network; a table for a value of the time alone.
     fn place(&mut self, value: ValueId) -> Result<ValueId> {
         if let Some(place) = self.places[value] {
             return Ok(place);
         }
-        ensure!(value != 0 && self.needs[value] == Needs::Time, "an op takes observation, time and iterate as one");
+        ensure!(
+            value != 0 && self.needs[value] == Needs::Time,
+            "an op reads observation, time and iterate as one value; give it them as separate parts"
+        );
         let (rows, len) = (self.tables[value].iter().copied().collect(), self.tables[value].ncols());
         let table = self.graph.add(Table { rows, len }, &[])?;
         self.places[value] = Some(table);

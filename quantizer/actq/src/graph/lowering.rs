@@ -1,6 +1,6 @@
-//! A network as an image's operations over buffers, before the buffers have places in the arena.
+//! A network as an image's operations over buffers, before the buffers have offsets in the arena.
 //!
-//! Every value gets a buffer. Elementwise operations overwrite their input's buffer where nothing needs it any more.
+//! Every value gets a buffer. Elementwise operations overwrite their input's buffer if no later operation needs it.
 
 use actq_kernels::image::OpKind;
 
@@ -9,38 +9,38 @@ use super::values::ValueId;
 /// Index of a buffer.
 pub type BufferId = usize;
 
-/// An image's operation over `R`: parts of buffers while lowering, regions of the arena afterwards.
+/// An image's operation over `R`: parts of buffers during lowering, then regions of the arena.
 #[derive(Clone, Debug)]
 pub struct Step<R> {
-    /// What it does.
+    /// Kind of the operation.
     pub kind: OpKind,
     /// Output, or the operand of an operation in place.
     pub dst: R,
     /// First source.
     pub src: Option<R>,
-    /// Cell state or the state's gates.
+    /// Cell state, or the gates of the state.
     pub third: Option<R>,
-    /// What its record points to.
+    /// Data that its record points to.
     pub data: StepData,
 }
 
-/// What an operation's record points to.
+/// Data that an operation's record points to.
 #[derive(Clone, Debug)]
 pub enum StepData {
-    /// Nothing.
+    /// No data.
     None,
     /// Single constants, then arrays, in the order of [`OpKind`]'s description.
     Constants(Vec<f32>),
-    /// Those of a denoising step, where the second becomes the arena offset of its noise.
+    /// Constants of a denoising step; the second becomes the arena offset of its noise.
     Denoise {
-        /// See [`OpKind::Denoise`].
+        /// Constants in the order of [`OpKind::Denoise`].
         constants: Vec<f32>,
-        /// The first step's noise.
+        /// Noise of the first step.
         noise: Option<Slice>,
     },
-    /// A matrix of the graph, and its bias; empty: none.
+    /// A matrix of the graph and its bias; empty: none.
     Product {
-        /// Index.
+        /// Index of the matrix.
         matrix: usize,
         /// One value per row.
         bias: Vec<f32>,
@@ -58,17 +58,17 @@ pub struct Slice {
     pub len: usize,
 }
 
-/// How long a buffer's content is needed.
+/// Lifetime of a buffer's content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lifetime {
-    /// Between the first and the last operation that names it.
+    /// From the first to the last operation that names it.
     Step,
-    /// From the first operation that names it on: the output, a chunk of which is played over several steps, and what
-    /// every denoising step reads.
+    /// From the first operation that names it on: the output, a chunk of which plays over several steps, and values
+    /// that every denoising step reads.
     Output,
-    /// In a place of its own, written before the first operation.
+    /// At an offset of its own; written before the first operation.
     Observation,
-    /// In a place of its own, beyond the step, and zeroed by a reset.
+    /// At an offset of its own; kept over steps and zeroed by a reset.
     State,
 }
 
@@ -77,11 +77,11 @@ pub enum Lifetime {
 pub struct Buffer {
     /// Values.
     pub len: usize,
-    /// How long they are needed.
+    /// Lifetime of the content.
     pub lifetime: Lifetime,
 }
 
-/// The operations so far, and where the values are.
+/// The operations so far, and the buffers of the values.
 #[derive(Debug)]
 pub struct Lowering {
     /// The operations in order.
@@ -90,31 +90,31 @@ pub struct Lowering {
     pub buffers: Vec<Buffer>,
     /// The buffer of each value.
     places: Vec<BufferId>,
-    /// How many nodes still read each value; the network's output counts as one more.
+    /// Nodes that still read each value; the network's output counts as one more.
     readers: Vec<usize>,
-    /// What the network reads of the iterate.
+    /// Buffer of the value that the network reads of the iterate.
     iterate: BufferId,
 }
 
 impl Lowering {
-    /// Nothing but the observation; `readers` says how many nodes read each value.
+    /// Starts with the observation alone; `readers` holds how many nodes read each value.
     pub fn new(obs_len: usize, readers: Vec<usize>) -> Self {
         let observation = Buffer { len: obs_len, lifetime: Lifetime::Observation };
         Self { steps: Vec::new(), buffers: vec![observation], places: vec![0], readers, iterate: 0 }
     }
 
-    /// A new buffer.
+    /// Adds a buffer.
     pub fn buffer(&mut self, len: usize, lifetime: Lifetime) -> BufferId {
         self.buffers.push(Buffer { len, lifetime });
         self.buffers.len() - 1
     }
 
-    /// All of a buffer.
+    /// Returns the slice of a whole buffer.
     pub fn whole(&self, buffer: BufferId) -> Slice {
         Slice { buffer, offset: 0, len: self.buffers[buffer].len }
     }
 
-    /// Noise, whose first values become the iterate, which is given; to be emitted first.
+    /// Emits the noise, whose first values become the iterate, and returns the iterate; to be called first.
     pub fn noise(&mut self, noise_len: usize, len: usize) -> Slice {
         let noise = self.buffer(noise_len, Lifetime::Output);
         self.emit(OpKind::Noise, self.whole(noise), None, None, StepData::None);
@@ -123,7 +123,7 @@ impl Lowering {
         iterate
     }
 
-    /// The denoising steps begin with the next operation: what these values hold stays. Gives the number of operations
+    /// Begins the denoising steps and keeps the values in `read` for all of them. Returns the number of operations
     /// before.
     pub fn begin_steps(&mut self, iterate: Slice, read: &[ValueId]) -> usize {
         self.emit(OpKind::Copy, self.whole(self.iterate), Some(iterate), None, StepData::None);
@@ -136,17 +136,17 @@ impl Lowering {
         self.steps.len()
     }
 
-    /// What the network reads of the iterate.
+    /// Returns the buffer of the value that the network reads of the iterate.
     pub fn iterate(&self) -> BufferId {
         self.iterate
     }
 
-    /// Where a value is, to be read.
+    /// Returns the slice of a value, for reading.
     pub fn place(&self, value: ValueId) -> Slice {
         self.whole(self.places[value])
     }
 
-    /// The next value is in `buffer`, and the node that gives it has read `inputs`.
+    /// Records that the next value is in `buffer` and that its node has read `inputs`.
     pub fn finish_node(&mut self, buffer: BufferId, inputs: &[ValueId]) {
         self.places.push(buffer);
         for &value in inputs {
@@ -159,7 +159,7 @@ impl Lowering {
         self.steps.push(Step { kind, dst, src, third, data });
     }
 
-    /// A buffer with `value` that may be overwritten: the value's own where this reader is the last, else a copy.
+    /// Returns a buffer with `value` that may be overwritten: the value's own if this is its last reader, else a copy.
     pub fn private(&mut self, value: ValueId) -> BufferId {
         let place = self.places[value];
         if self.readers[value] <= 1 && self.buffers[place].lifetime == Lifetime::Step {
@@ -170,14 +170,14 @@ impl Lowering {
         copy
     }
 
-    /// An operation that overwrites its input; gives the buffer.
+    /// Emits an operation that overwrites its input, and returns the buffer.
     pub fn in_place(&mut self, input: ValueId, kind: OpKind, data: StepData) -> BufferId {
         let dst = self.private(input);
         self.emit(kind, self.whole(dst), None, None, data);
         dst
     }
 
-    /// `dst = W src + bias`, or added to `dst`.
+    /// Emits `dst = W src + bias`, or adds it to `dst`.
     pub fn product(&mut self, (matrix, bias): (usize, &[f32]), src: Slice, dst: BufferId, accumulate: bool) {
         let data = StepData::Product { matrix, bias: bias.to_vec() };
         self.emit(OpKind::Linear { accumulate }, self.whole(dst), Some(src), None, data);

@@ -4,22 +4,22 @@ use super::denoising::Denoising;
 use super::ops::NodeKind;
 use super::values::{ValueId, WeightMatrix};
 
-/// A node: what it computes, from which values, and how long its output is.
+/// A node: operation, inputs, and length of the output.
 #[derive(Clone, Debug)]
 pub struct Node {
     /// The operation.
     pub kind: NodeKind,
-    /// What it reads.
+    /// Values that it reads.
     pub inputs: Vec<ValueId>,
     /// Length of its output.
     pub len: usize,
 }
 
 impl Node {
-    /// For each of its vectors, `true` if quantization changes it.
+    /// Returns for each of its vectors whether quantization changes it.
     fn changed(&self, learns: bool) -> Vec<bool> {
-        let behind = |i: usize| self.kind.products().iter().any(|product| product.bias == i);
-        (0..self.kind.vectors().len()).map(|i| learns || behind(i)).collect()
+        let follows_product = |i: usize| self.kind.products().iter().any(|product| product.bias == i);
+        (0..self.kind.vectors().len()).map(|i| learns || follows_product(i)).collect()
     }
 }
 
@@ -28,64 +28,64 @@ impl Node {
 pub struct Graph {
     /// Length of an observation.
     pub obs_len: usize,
-    /// The weight matrices; each is quantized once, however many nodes use it.
+    /// Weight matrices; each is quantized one time, however many nodes use it.
     pub matrices: Vec<WeightMatrix>,
-    /// The nodes in the order of evaluation; the last one's output is the network's.
+    /// Nodes in the order of evaluation; the last one's output is the network's.
     pub nodes: Vec<Node>,
-    /// The denoising steps, where the network is the head of a flow or a diffusion policy.
+    /// Denoising steps, if the network is the head of a flow or a diffusion policy.
     pub denoising: Option<Denoising>,
 }
 
 impl Graph {
-    /// A network without nodes.
+    /// Makes a network without nodes.
     pub fn new(obs_len: usize) -> Self {
         Self { obs_len, matrices: Vec::new(), nodes: Vec::new(), denoising: None }
     }
 
-    /// Values of noise behind an observation, which an evaluation takes.
+    /// Returns the noise values that an evaluation takes after the observation.
     pub fn noise_len(&self) -> usize {
         self.denoising.as_ref().map_or(0, Denoising::noise_len)
     }
 
-    /// Length of an observation with its noise.
+    /// Returns the length of an observation with its noise.
     pub fn input_len(&self) -> usize {
         self.obs_len + self.noise_len()
     }
 
-    /// How often a step runs its network.
+    /// Returns the evaluations of the network in a step.
     pub fn denoising_steps(&self) -> usize {
         self.denoising.as_ref().map_or(1, |denoising| denoising.steps.len())
     }
 
-    /// The value that the last node gives.
+    /// Returns the value of the last node.
     pub fn output(&self) -> ValueId {
         self.nodes.len()
     }
 
-    /// Length of a value.
+    /// Returns the length of a value.
     pub fn len_of(&self, value: ValueId) -> usize {
         if value == 0 { self.obs_len } else { self.nodes[value - 1].len }
     }
 
-    /// The nodes that read a value.
+    /// Returns the nodes that read a value.
     pub fn readers(&self, value: ValueId) -> Vec<usize> {
         (0..self.nodes.len()).filter(|&n| self.nodes[n].inputs.contains(&value)).collect()
     }
 
-    /// Values of the recurrent state: of each node in order its hidden state, then its cell state. An image keeps them
-    /// in the same order.
+    /// Returns the values of the recurrent state: for each node in order its hidden state, then its cell state. An
+    /// image keeps the same order.
     pub fn state_len(&self) -> usize {
         self.nodes.iter().flat_map(|node| node.kind.state_lens()).sum()
     }
 
-    /// Number of trained values, as the f32 policy stores them: weights, biases, norms. Statistics that normalize the
-    /// observation are not trained and do not count.
+    /// Returns the number of trained values, as the f32 policy stores them: weights, biases, norms. Statistics that
+    /// normalize the observation are not trained and do not count.
     pub fn parameters(&self) -> usize {
         self.nodes.iter().map(|node| node.kind.trained_values()).sum::<usize>() + self.weights()
     }
 
-    /// The vectors that quantization changes: those behind matrices, which take their constant errors, and where it
-    /// `learns` all.
+    /// Returns the vectors that quantization changes: those after matrices, which take constant errors, and all if it
+    /// `learns`.
     pub fn changed_vectors(&mut self, learns: bool) -> impl Iterator<Item = &mut Vec<f32>> {
         self.nodes.iter_mut().flat_map(move |node| {
             let changed = node.changed(learns);
@@ -94,7 +94,7 @@ impl Graph {
         })
     }
 
-    /// Values of [`Self::changed_vectors`].
+    /// Returns the number of values in [`Self::changed_vectors`].
     pub fn changed_values(&self, learns: bool) -> usize {
         let of_node = |node: &Node| -> usize {
             let vectors = node.kind.vectors().into_iter().zip(node.changed(learns));
@@ -103,7 +103,7 @@ impl Graph {
         self.nodes.iter().map(of_node).sum()
     }
 
-    /// Elements of all weight matrices.
+    /// Returns the number of elements of all weight matrices.
     pub fn weights(&self) -> usize {
         self.matrices.iter().map(|m| m.data.len()).sum()
     }

@@ -1,4 +1,4 @@
-//! What a network needs to know of an operation. Each operation says it once, in its own file in [`super::ops`].
+//! The interface of an operation. Each operation implements it in its own file in [`super::ops`].
 
 use ndarray::{Array2, ArrayBase, ArrayView2, Data, Ix2, linalg::general_mat_mul};
 
@@ -12,44 +12,45 @@ use crate::error::{Result, ensure};
 pub struct Product {
     /// Index in the graph's matrices.
     pub matrix: usize,
-    /// Which of [`Operation::vectors`] is added to the product, so that a constant part of its error can go there.
+    /// Index in [`Operation::vectors`] of the vector that is added to the product; a constant part of its error can go
+    /// there.
     pub bias: usize,
-    /// What the matrix is multiplied with.
+    /// Operand of the matrix.
     pub operand: Operand,
 }
 
-/// What a product's matrix is multiplied with.
+/// Operand of a product's matrix.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Operand {
-    /// The node's input, which the node then reads through nothing but such products.
+    /// The node's input, which the node reads through such products only.
     Input,
     /// The node's hidden state.
     State,
 }
 
-/// Hidden and cell state of a node, `[sample, element]`; without elements where it has none.
+/// Hidden and cell state of a node, `[sample, element]`; without elements if it has none.
 pub type NodeState = [Array2<f32>; 2];
 
-/// What a node keeps of a forward pass for the backward pass.
+/// Values that a node keeps from a forward pass for the backward pass.
 #[derive(Debug, Default)]
 pub struct Saved {
-    /// What the matrix of each of [`Operation::products`] was multiplied with.
+    /// Operand of each of [`Operation::products`].
     pub operands: Vec<Array2<f32>>,
-    /// Whatever else the operation needs.
+    /// Other values of the operation.
     pub inner: Vec<Array2<f32>>,
 }
 
-/// An operation: what it computes, forwards and backwards, and what it becomes in an image.
+/// An operation: its computation forwards and backwards, and its form in an image.
 pub trait Operation {
-    /// Length of the output for inputs of these lengths. Errors say what does not fit.
+    /// Returns the length of the output for inputs of these lengths. An error names what does not fit.
     fn output_len(&self, matrices: &[WeightMatrix], inputs: &[usize]) -> Result<usize>;
 
-    /// The matrix products.
+    /// Returns the matrix products.
     fn products(&self) -> Vec<Product> {
         Vec::new()
     }
 
-    /// What can be learned beside the matrices.
+    /// Returns the values that can be learned beside the matrices.
     fn vectors(&self) -> Vec<&Vec<f32>> {
         Vec::new()
     }
@@ -59,48 +60,48 @@ pub trait Operation {
         Vec::new()
     }
 
-    /// Number of trained values beside the matrices, as the f32 policy stores them.
+    /// Returns the number of trained values beside the matrices, as the f32 policy stores them.
     fn trained_values(&self) -> usize {
         self.vectors().into_iter().map(Vec::len).sum()
     }
 
-    /// Lengths of the hidden and of the cell state; 0 where there is none.
+    /// Returns the lengths of the hidden and of the cell state; 0 for none.
     fn state_lens(&self) -> [usize; 2] {
         [0, 0]
     }
 
-    /// The output for a batch, or for a sequence of batches behind each other: a node with a state has one row of it
-    /// for each row of a batch, and `state` advances through the sequence.
+    /// Computes the output for a batch, or for a sequence of batches. A node with a state has one row of it for each
+    /// row of a batch, and `state` advances through the sequence.
     fn forward(&self, run: &Forward<'_>, state: &mut NodeState) -> (Array2<f32>, Saved);
 
-    /// From the derivative `dy` of the loss by the output to those by the inputs and weights, which `run` takes.
-    /// `d_state`, the derivative by the state after the step, becomes that by the state before it.
+    /// Goes from the derivative `dy` of the loss by the output to those by the inputs and weights, which `run`
+    /// receives. `d_state`, the derivative by the state after the step, becomes that by the state before it.
     fn backward(&self, run: &mut Backward<'_>, saved: &Saved, dy: Array2<f32>, d_state: &mut NodeState);
 
-    /// Appends its operations over the values `inputs`, and gives the buffer that then holds its output of `len`
+    /// Appends its operations over the values `inputs`, and returns the buffer that then holds its output of `len`
     /// values.
     fn lower(&self, to: &mut Lowering, inputs: &[ValueId], len: usize) -> BufferId;
 }
 
-/// The length of an operation's only input.
+/// Returns the length of an operation's only input.
 pub fn only(inputs: &[usize]) -> Result<usize> {
     ensure!(inputs.len() == 1, "takes one input, not {}", inputs.len());
     Ok(inputs[0])
 }
 
-/// That `values`, called `what`, are as many as `len`.
+/// Checks that the vector `what` has `len` values.
 pub fn expect_len(what: &str, values: &[f32], len: usize) -> Result<()> {
-    ensure!(values.len() == len, "{what} has {} values, {len} are needed", values.len());
+    ensure!(values.len() == len, "{what} has {} values, but {len} are needed", values.len());
     Ok(())
 }
 
-/// That matrix `index` exists, takes `cols` values and, where `rows` are given, gives as many; returns its rows.
+/// Checks that matrix `index` exists, takes `cols` values and gives `rows`, if given; returns its rows.
 pub fn expect_shape(matrices: &[WeightMatrix], index: usize, rows: Option<usize>, cols: usize) -> Result<usize> {
-    ensure!(index < matrices.len(), "there is no matrix {index}");
+    ensure!(index < matrices.len(), "the network has no matrix {index}");
     let WeightMatrix { name, rows: r, cols: c, .. } = &matrices[index];
-    ensure!(*c == cols, "the matrix {name:?} takes {c} values, its operand has {cols}");
+    ensure!(*c == cols, "the matrix {name:?} takes {c} values, but its operand has {cols}");
     let wanted = rows.unwrap_or(*r);
-    ensure!(wanted == *r, "the matrix {name:?} gives {r} values, {wanted} are needed");
+    ensure!(wanted == *r, "the matrix {name:?} gives {r} values, but {wanted} are needed");
     Ok(*r)
 }
 
@@ -117,20 +118,20 @@ impl<'a> Values<'a> {
     }
 }
 
-/// What a node sees in a forward pass.
+/// Context of a node in a forward pass.
 #[derive(Debug)]
 pub struct Forward<'a> {
     /// Every value so far.
     pub(super) values: Values<'a>,
-    /// The node's inputs among them.
+    /// Indices of the node's inputs.
     pub(super) inputs: &'a [ValueId],
     /// The graph's matrices.
     pub(super) matrices: &'a [Array2<f32>],
     /// As [`Operation::vectors`].
     pub vectors: &'a [Vec<f32>],
-    /// What the network reads of the iterate; `None` outside of denoising steps.
+    /// Value that the network reads of the iterate; `None` outside of denoising steps.
     pub(super) iterate: Option<&'a Array2<f32>>,
-    /// Which denoising step it is; 0 outside of them.
+    /// Number of the denoising step; 0 outside of them.
     pub step: usize,
     /// Activation magnitude of every matrix; empty: activations are not rounded.
     pub(super) x_max: &'a [u16],
@@ -139,84 +140,84 @@ pub struct Forward<'a> {
 }
 
 impl<'a> Forward<'a> {
-    /// An input, `[sample, element]`.
+    /// Returns an input, `[sample, element]`.
     pub fn input(&self, i: usize) -> &'a Array2<f32> {
         self.values.of(self.inputs[i])
     }
 
-    /// All inputs.
+    /// Returns all inputs.
     pub fn inputs(&self) -> impl Iterator<Item = &'a Array2<f32>> {
         let values = self.values;
         self.inputs.iter().map(move |&value| values.of(value))
     }
 
-    /// Rows of every value.
+    /// Returns the rows of every value.
     pub fn samples(&self) -> usize {
         self.values.of(0).nrows()
     }
 
-    /// What the network reads of the iterate.
+    /// Returns the value that the network reads of the iterate.
     pub fn iterate(&self) -> &'a Array2<f32> {
         self.iterate.unwrap_or(self.values.of(0))
     }
 
-    /// `x` as it enters the product with a matrix: rounded where the image's activations are.
+    /// Returns `x` as it enters the product with a matrix: rounded if the image's activations are.
     pub fn operand(&self, matrix: usize, x: ArrayView2<'_, f32>) -> Array2<f32> {
         round_rows(x, self.x_max.get(matrix).copied().unwrap_or(0))
     }
 
-    /// `W x` and the vector.
+    /// Computes `W x` plus a vector.
     pub fn affine(&self, matrix: usize, x: &Array2<f32>, vector: usize) -> Array2<f32> {
         self.sums.affine(x, &self.matrices[matrix], &self.vectors[vector])
     }
 
-    /// A matrix that few rows are multiplied with, many times.
+    /// Prepares a matrix for many products with few rows each.
     pub fn repeated(&self, matrix: usize) -> Repeated<'a> {
         self.sums.repeated(&self.matrices[matrix])
     }
 }
 
-/// Is shown a matrix product: matrix, operand, derivative by the output.
+/// Callback for a matrix product: matrix, operand, derivative by the output.
 pub type See<'a> = dyn FnMut(usize, &Array2<f32>, &Array2<f32>) + 'a;
 
-/// What a node sees, and where derivatives go, in a backward pass.
+/// Context of a node in a backward pass, and the destination of derivatives.
 pub struct Backward<'a> {
-    /// The node.
+    /// Index of the node.
     pub(super) node: usize,
     /// Every value of the forward pass.
     pub(super) values: Values<'a>,
-    /// The node's inputs among them.
+    /// Indices of the node's inputs.
     pub(super) inputs: &'a [ValueId],
     /// The graph's matrices.
     pub(super) matrices: &'a [Array2<f32>],
     /// As [`Operation::vectors`].
     pub vectors: &'a [Vec<f32>],
-    /// Which denoising step it is.
+    /// Number of the denoising step.
     pub step: usize,
-    /// Derivative by what the network reads of the iterate.
+    /// Derivative by the value that the network reads of the iterate.
     pub(super) d_iterate: &'a mut Option<Array2<f32>>,
     /// Derivatives by all values, as far as they are known.
     pub(super) d_values: &'a mut [Option<Array2<f32>>],
     /// Derivatives by the matrices.
     pub(super) d_matrices: &'a mut [Array2<f32>],
-    /// Derivatives by [`Operation::vectors`], to be added to.
+    /// Derivatives by [`Operation::vectors`]; nodes add to them.
     pub d_vectors: &'a mut [Vec<f32>],
-    /// Is shown every matrix product.
+    /// Callback that receives every matrix product.
     pub(super) see: &'a mut See<'a>,
 }
 
 impl<'a> Backward<'a> {
-    /// An input, `[sample, element]`.
+    /// Returns an input, `[sample, element]`.
     pub fn input(&self, i: usize) -> &'a Array2<f32> {
         self.values.of(self.inputs[i])
     }
 
-    /// The node's output.
+    /// Returns the node's output.
     pub fn output(&self) -> &'a Array2<f32> {
         self.values.of(self.node + 1)
     }
 
-    /// Adds the derivative by what the network reads of the iterate.
+    /// Adds the derivative by the value that the network reads of the iterate.
     pub fn give_iterate(&mut self, d: Array2<f32>) {
         match &mut *self.d_iterate {
             Some(sum) => *sum += &d,
@@ -232,18 +233,18 @@ impl<'a> Backward<'a> {
         }
     }
 
-    /// Takes the derivative `dy` by the output of a product: adds that by its matrix, whose operand was `x`.
+    /// Receives the derivative `dy` by the output of a product, and adds that by its matrix, whose operand was `x`.
     pub fn product(&mut self, matrix: usize, x: &Array2<f32>, dy: &Array2<f32>) {
         (self.see)(matrix, x, dy);
         general_mat_mul(1.0, &dy.t(), x, 1.0, &mut self.d_matrices[matrix]);
     }
 
-    /// From the derivative by the output of a matrix to that by its operand.
+    /// Returns the derivative by the operand of a matrix, from that by its output.
     pub fn through<S: Data<Elem = f32>>(&self, matrix: usize, dy: &ArrayBase<S, Ix2>) -> Array2<f32> {
         dy.dot(&self.matrices[matrix])
     }
 
-    /// As [`Self::through`], given to an input. Nobody asks for the observation's derivative.
+    /// Gives [`Self::through`] to an input. The observation's derivative is never needed.
     pub fn give_through(&mut self, i: usize, matrix: usize, dy: &Array2<f32>) {
         if self.inputs[i] != 0 {
             self.give(i, self.through(matrix, dy));

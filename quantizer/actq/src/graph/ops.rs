@@ -30,7 +30,7 @@ use super::operation::Operation;
 
 macro_rules! operations {
     ($($(#[$doc:meta])* $name:ident),* $(,)?) => {
-        /// What a node computes. It dereferences to its [`Operation`].
+        /// Operation of a node; dereferences to its [`Operation`].
         #[derive(Clone, Debug)]
         pub enum NodeKind {
             $($(#[$doc])* $name($name),)*
@@ -79,13 +79,13 @@ operations! {
     Add,
     /// Product of two values, element by element.
     Mul,
-    /// Parts of values behind each other.
+    /// Concatenated parts of values.
     Concat,
     /// A recurrent cell with a cell state.
     Lstm,
     /// A recurrent cell.
     Gru,
-    /// What an iterative head has made of its noise so far.
+    /// The iterate of an iterative head: noise at first.
     Iterate,
     /// Constants of each denoising step.
     Table,

@@ -1,9 +1,8 @@
-//! The network on batches, forwards and backwards: the one interpreter of a graph in f32.
+//! The network on batches, forwards and backwards: the only interpreter of a graph in f32.
 //!
-//! Values are matrices `[sample, element]`, or, where several steps run at once, `[frame, element]`: all samples of the
-//! first step, then all of the second. Only nodes with a state see the difference; for all others a sequence is a
-//! larger batch. The gradient runs back through all steps. The derivatives are checked against finite differences in
-//! the tests.
+//! Values are matrices `[sample, element]`, or, if several steps run at one time, `[frame, element]`: all samples of
+//! the first step, then all of the second. Only nodes with a state see the difference; for all others a sequence is a
+//! larger batch. The gradient runs back through all steps. The tests compare the derivatives with finite differences.
 
 use std::ops::Range;
 
@@ -15,77 +14,77 @@ use super::nodes::Graph;
 use super::operation::{Backward, Forward, Saved, See, Values};
 use super::weights::{State, Weights};
 
-/// A forward pass.
+/// Values of a forward pass.
 #[derive(Debug)]
 pub struct Pass {
-    /// The observation, then every node's output; of an iterative head, of the nodes that run once.
+    /// The observation, then every node's output; for an iterative head, only nodes that run one time.
     pub values: Vec<Array2<f32>>,
     saved: Vec<Saved>,
-    /// Of each denoising step.
+    /// Values of each denoising step.
     steps: Vec<StepPass>,
-    /// What the last denoising step has made.
+    /// The iterate after the last denoising step.
     denoised: Option<Array2<f32>>,
 }
 
-/// What a denoising step leaves.
+/// Values of a denoising step.
 #[derive(Debug)]
 struct StepPass {
-    /// Before it.
+    /// Iterates before it.
     at: Iterates,
     values: Vec<Array2<f32>>,
     saved: Vec<Saved>,
 }
 
-/// A denoising step to run.
+/// Inputs of a denoising step.
 #[derive(Clone, Copy)]
 struct OfStep<'v> {
     step: usize,
-    /// What the network reads of the iterate.
+    /// Value that the network reads of the iterate.
     iterate: &'v Array2<f32>,
-    /// Values of the nodes that run once.
+    /// Values of the nodes that run one time.
     once: &'v [Array2<f32>],
 }
 
 impl Pass {
-    /// The network's output.
+    /// Returns the network's output.
     pub fn output(&self) -> &Array2<f32> {
         self.denoised.as_ref().unwrap_or_else(|| &self.values[self.values.len() - 1])
     }
 
-    /// As [`Self::output`], without the rest.
+    /// Returns the network's output and drops the other values.
     pub fn into_output(mut self) -> Array2<f32> {
         self.denoised.or_else(|| self.values.pop()).unwrap_or_default()
     }
 }
 
-/// A network to run: its structure and how it is computed.
+/// A network to run: its structure and its arithmetic.
 #[derive(Clone, Copy, Debug)]
 pub struct Network<'a> {
-    /// The structure.
+    /// Structure.
     pub graph: &'a Graph,
-    /// Activation magnitude that each matrix's input is rounded to (0 = not at all), or empty.
+    /// Activation magnitude that each matrix's input is rounded to (0 = no rounding), or empty.
     x_max: &'a [u16],
     sums: Sums,
 }
 
 impl<'a> Network<'a> {
-    /// For batches: with sums in blocks and no rounding.
+    /// Computes with sums in blocks and no rounding: for batches.
     pub fn new(graph: &'a Graph) -> Self {
         Self { graph, x_max: &[], sums: Sums::Blocked }
     }
 
-    /// As [`Self::new`], with each matrix's input rounded to this activation magnitude.
+    /// As [`Self::new`], but rounds each matrix's input to this activation magnitude.
     pub fn rounded(graph: &'a Graph, x_max: &'a [u16]) -> Self {
         Self { x_max, ..Self::new(graph) }
     }
 
-    /// As [`Self::new`], with sums in order.
+    /// As [`Self::new`], but with sums in order.
     pub fn in_order(graph: &'a Graph) -> Self {
         Self { sums: Sums::InOrder, ..Self::new(graph) }
     }
 
-    /// One or more steps for a batch of observations, whose size is that of `state`, which advances. Behind an
-    /// observation stands the noise of an iterative head.
+    /// Runs one or more steps for a batch of observations, whose size is that of `state`, which advances. For an
+    /// iterative head, noise follows each observation.
     pub fn forward(&self, weights: &Weights, obs: Array2<f32>, state: &mut State) -> Pass {
         let Some(denoising) = &self.graph.denoising else {
             let (mut values, mut saved) = (vec![obs], Vec::with_capacity(self.graph.nodes.len()));
@@ -115,7 +114,7 @@ impl<'a> Network<'a> {
         Pass { values, saved, steps, denoised: Some(at.x) }
     }
 
-    /// Runs nodes, outside of denoising steps or in one.
+    /// Runs nodes, outside of denoising steps or within one.
     fn run(
         &self,
         weights: &Weights,
@@ -146,7 +145,7 @@ impl<'a> Network<'a> {
         }
     }
 
-    /// Every matrix with what it was multiplied with, in the order of evaluation.
+    /// Returns every matrix with its operand, in the order of evaluation.
     pub fn operands<'p>(&self, pass: &'p Pass) -> impl Iterator<Item = (usize, &'p Array2<f32>)> {
         let nodes = self.graph.nodes.as_slice();
         let of_node = |(node, saved): (&'a super::nodes::Node, &'p Saved)| {
@@ -158,8 +157,8 @@ impl<'a> Network<'a> {
     }
 
     /// Goes back through a pass. `d_output` is the loss's derivative by the network's output; `d_state`, by the state
-    /// after the pass, becomes that by the state before it. `grads` gets the derivatives by the weights added. `see` is
-    /// shown every matrix product.
+    /// after the pass, becomes that by the state before it. The derivatives by the weights are added to `grads`. `see`
+    /// receives every matrix product.
     pub fn backward(
         &self,
         weights: &Weights,
@@ -187,8 +186,8 @@ impl<'a> Network<'a> {
         self.back(weights, pass, None, &mut d_values, d_state, grads, see);
     }
 
-    /// Goes back through the nodes of a denoising step, or those that run once; gives the derivative by what the
-    /// network reads of the iterate.
+    /// Goes back through the nodes of a denoising step, or through those that run one time; returns the derivative by
+    /// the value that the network reads of the iterate.
     #[expect(clippy::too_many_arguments, reason = "those of `backward`")]
     fn back(
         &self,
@@ -211,7 +210,7 @@ impl<'a> Network<'a> {
             let node = &self.graph.nodes[i];
             let dy = match d_values[i + 1].take() {
                 Some(dy) => dy,
-                // What a later step does with the state still counts.
+                // A later step's use of the state still counts.
                 None if node.kind.state_lens() != [0, 0] => Array2::zeros(values.of(i + 1).raw_dim()),
                 None => continue,
             };
@@ -253,7 +252,7 @@ pub(super) mod tests {
         (0..len).map(|_| seed.unit()).collect()
     }
 
-    /// A graph with every kind of node.
+    /// Makes a graph with every kind of node.
     fn graph() -> Graph {
         let mut seed = Random::new(11);
         let mut graph = Graph::new(5);
@@ -275,7 +274,7 @@ pub(super) mod tests {
             last = push(Pointwise(function).into(), &[last]);
             last = push(Add.into(), &[last, kept]);
         }
-        // Both operands of a product, and one that is both.
+        // A product of two values, and one of a value with itself.
         last = push(Mul.into(), &[last, kept]);
         last = push(Mul.into(), &[last, last]);
         last = push(LayerNorm { weight: weight(6, 12), bias: vector(6, 13), eps: 1e-3 }.into(), &[last]);
@@ -298,8 +297,8 @@ pub(super) mod tests {
         (0..STEPS).map(|_| Array2::from_shape_fn((2, 5), |_| seed.unit())).collect()
     }
 
-    /// A head of three values of observation and two of noise, whose steps use every coefficient but that of further
-    /// noise.
+    /// Makes a head of three values of observation and two of noise, whose steps use every coefficient but that of
+    /// further noise.
     pub(in crate::graph) fn iterative() -> Graph {
         let mut seed = Random::new(12);
         let mut graph = Graph::new(3);
@@ -322,7 +321,7 @@ pub(super) mod tests {
         graph
     }
 
-    /// A loss over all steps with different weights on each output.
+    /// Computes a loss over all steps with different weights on each output.
     fn loss(graph: &Graph, weights: &Weights) -> f64 {
         let network = Network::new(graph);
         let mut state = zero_state(graph, 2);
@@ -355,7 +354,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn gradients_go_back_through_denoising_steps() {
+    fn denoising_gradients_agree_with_finite_differences() {
         derivatives_are_right(&iterative());
     }
 
@@ -389,7 +388,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_batch_gives_what_the_evaluator_gives() {
+    fn batches_agree_with_the_evaluator() {
         let graph = graph();
         let weights = Weights::of(&graph);
         let network = Network::new(&graph);

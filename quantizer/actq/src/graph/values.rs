@@ -1,6 +1,6 @@
-//! What a network is made of beside its operations: values, weight matrices.
+//! Values and weight matrices of a network.
 
-/// A value: 0 is the observation; `i + 1` is the output of node `i`.
+/// Index of a value: 0 is the observation; `i + 1` is the output of node `i`.
 pub type ValueId = usize;
 
 /// A weight matrix, row-major, rows are outputs.
@@ -17,7 +17,7 @@ pub struct WeightMatrix {
 }
 
 impl WeightMatrix {
-    /// The sum of squares of each column.
+    /// Returns the sum of squares of each column.
     pub fn column_energies(&self) -> Vec<f64> {
         let mut energies = vec![0.0; self.cols];
         for row in self.data.chunks_exact(self.cols) {

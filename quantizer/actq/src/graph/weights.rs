@@ -1,4 +1,4 @@
-//! What of a network changes while it learns or runs: weights, recurrent state.
+//! The parts of a network that change while it learns or runs: weights and recurrent state.
 
 use ndarray::Array2;
 use rayon::prelude::*;
@@ -7,17 +7,17 @@ use super::nodes::Graph;
 use super::operation::NodeState;
 use super::values::WeightMatrix;
 
-/// All that can be learned: the matrices of a graph and the vectors of its nodes. Gradients have the same form.
+/// All learnable values: the matrices of a graph and the vectors of its nodes. Gradients have the same form.
 #[derive(Clone, Debug)]
 pub struct Weights {
-    /// As [`Graph::matrices`], `[rows, cols]`.
+    /// Matrices as in [`Graph::matrices`], `[rows, cols]`.
     pub matrices: Vec<Array2<f32>>,
-    /// Per node its [`super::operation::Operation::vectors`].
+    /// [`super::operation::Operation::vectors`] of each node.
     pub vectors: Vec<Vec<Vec<f32>>>,
 }
 
 impl Weights {
-    /// The weights of a graph.
+    /// Copies the weights of a graph.
     pub fn of(graph: &Graph) -> Self {
         let array = |m: &WeightMatrix| Array2::from_shape_fn((m.rows, m.cols), |(r, c)| m.data[r * m.cols + c]);
         Self {
@@ -26,7 +26,7 @@ impl Weights {
         }
     }
 
-    /// Zeros of the same form.
+    /// Returns zeros of the same form.
     pub fn zeros_like(&self) -> Self {
         let zeros = |vectors: &Vec<Vec<f32>>| vectors.iter().map(|v| vec![0.0; v.len()]).collect();
         Self {
@@ -35,7 +35,7 @@ impl Weights {
         }
     }
 
-    /// This set and another, added element by element.
+    /// Adds another set, element by element.
     pub fn sum(mut self, other: Self) -> Self {
         for (a, b) in self.matrices.iter_mut().zip(&other.matrices) {
             let (a, b) = (a.as_slice_mut().unwrap_or_default(), b.as_slice().unwrap_or_default());
@@ -45,7 +45,7 @@ impl Weights {
         self
     }
 
-    /// Puts the vectors into a graph's nodes.
+    /// Stores the vectors in a graph's nodes.
     pub fn store_vectors(&self, graph: &mut Graph) {
         for (node, vectors) in graph.nodes.iter_mut().zip(&self.vectors) {
             node.kind.vectors_mut().into_iter().zip(vectors).for_each(|(to, from)| to.clone_from(from));
@@ -53,7 +53,7 @@ impl Weights {
     }
 }
 
-/// Elements that a thread adds at once.
+/// Elements that a thread adds at one time.
 const CHUNK: usize = 1 << 14;
 
 fn add(to: &mut [f32], from: &[f32]) {
@@ -63,12 +63,12 @@ fn add(to: &mut [f32], from: &[f32]) {
 /// Recurrent state of every node.
 pub type State = Vec<NodeState>;
 
-/// The zero state for a batch.
+/// Returns the zero state of a batch.
 pub fn zero_state(graph: &Graph, batch: usize) -> State {
     graph.nodes.iter().map(|n| n.kind.state_lens().map(|len| Array2::zeros((batch, len)))).collect()
 }
 
-/// A batch's state from every sample's values in the order of [`Graph::state_len`]; `None`: zero.
+/// Returns a batch's state from every sample's values in the order of [`Graph::state_len`]; `None`: zero.
 pub fn start_state(graph: &Graph, starts: &[Option<Vec<f32>>]) -> State {
     let mut state = zero_state(graph, starts.len());
     for (sample, start) in starts.iter().enumerate() {

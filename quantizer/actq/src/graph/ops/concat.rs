@@ -6,7 +6,7 @@ use crate::graph::lowering::{BufferId, Lifetime, Lowering, Slice, StepData};
 use crate::graph::operation::{Backward, Forward, NodeState, Operation, Saved};
 use crate::graph::values::{ValueId, WeightMatrix};
 
-/// A run of an input's elements.
+/// A range of an input's elements.
 #[derive(Clone, Copy, Debug)]
 pub struct Span {
     /// First element.
@@ -15,14 +15,14 @@ pub struct Span {
     pub len: usize,
 }
 
-/// A part of each input, behind each other.
+/// A part of each input, concatenated.
 #[derive(Clone, Debug)]
 pub struct Concat(pub Vec<Span>);
 
 impl Operation for Concat {
     fn output_len(&self, _: &[WeightMatrix], inputs: &[usize]) -> Result<usize> {
         let spans = &self.0;
-        ensure!(spans.len() == inputs.len(), "{} parts of {} inputs", spans.len(), inputs.len());
+        ensure!(spans.len() == inputs.len(), "it has {} parts for {} inputs", spans.len(), inputs.len());
         for (span, len) in spans.iter().zip(inputs) {
             let to = span.from + span.len;
             ensure!(span.len > 0 && to <= *len, "{}:{to} reaches beyond the input's {len} values", span.from);

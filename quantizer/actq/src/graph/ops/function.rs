@@ -36,7 +36,7 @@ impl Operation for Pointwise {
     }
 }
 
-/// The derivative of a function at `x`, where its value is `y`.
+/// Returns the derivative of a function at `x` with the value `y`.
 fn derivative(function: Function) -> fn(f32, f32) -> f32 {
     match function {
         Function::Relu => |x, _| if x > 0.0 { 1.0 } else { 0.0 },

@@ -11,18 +11,18 @@ use crate::graph::operation::{
 };
 use crate::graph::values::{ValueId, WeightMatrix};
 
-/// torch's GRU, one layer, one step; gates `[r z n]`.
+/// torch's GRU of one layer, one step; gates `[r z n]`.
 #[derive(Clone, Debug)]
 pub struct Gru {
     /// Length of the state.
     pub hidden: usize,
-    /// W_ih
+    /// Matrix W_ih.
     pub input: usize,
-    /// W_hh
+    /// Matrix W_hh.
     pub state: usize,
-    /// b_ih
+    /// Biases b_ih.
     pub input_bias: Vec<f32>,
-    /// b_hh
+    /// Biases b_hh.
     pub state_bias: Vec<f32>,
 }
 

@@ -5,7 +5,7 @@ use crate::graph::lowering::{BufferId, Lowering};
 use crate::graph::operation::{Backward, Forward, NodeState, Operation, Saved};
 use crate::graph::values::{ValueId, WeightMatrix};
 
-/// What the network reads of the iterate of a flow or a diffusion process: noise at first.
+/// The value that the network reads of the iterate of a flow or a diffusion process: noise at first.
 #[derive(Clone, Copy, Debug)]
 pub struct Iterate {
     /// Values.

@@ -11,9 +11,9 @@ use crate::graph::values::{ValueId, WeightMatrix};
 /// `W x + b`
 #[derive(Clone, Debug)]
 pub struct Linear {
-    /// W
+    /// Matrix W.
     pub matrix: usize,
-    /// b, one value per row.
+    /// Biases b, one value per row.
     pub bias: Vec<f32>,
 }
 

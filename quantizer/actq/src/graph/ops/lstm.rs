@@ -11,16 +11,16 @@ use crate::graph::operation::{
 };
 use crate::graph::values::{ValueId, WeightMatrix};
 
-/// torch's LSTM, one layer, one step; gates `[i f g o]`.
+/// torch's LSTM of one layer, one step; gates `[i f g o]`.
 #[derive(Clone, Debug)]
 pub struct Lstm {
     /// Length of the state.
     pub hidden: usize,
-    /// W_ih
+    /// Matrix W_ih.
     pub input: usize,
-    /// W_hh
+    /// Matrix W_hh.
     pub state: usize,
-    /// b_ih + b_hh, which only ever occur as their sum.
+    /// Biases b_ih + b_hh; only their sum is used.
     pub bias: Vec<f32>,
 }
 
@@ -117,8 +117,8 @@ impl Operation for Lstm {
     }
 }
 
-/// The derivatives of one cell, from those by its hidden state `d_h` and by its new cell state `d_c`, which becomes
-/// that by the one before.
+/// Computes the derivatives of one cell from those by its hidden state `d_h` and by its new cell state `d_c`; `d_c`
+/// becomes the derivative by the previous cell state.
 fn derivative(gates: &[f32], c_before: &[f32], d_h: &[f32], d_gates: &mut [f32], d_c: &mut [f32]) {
     let n = d_h.len();
     let ([i, f, g, o], [d_i, d_f, d_g, d_o]) = (quarters(gates, n), quarters_mut(d_gates, n));

@@ -14,7 +14,7 @@ pub struct LayerNorm {
     pub weight: Vec<f32>,
     /// Biases.
     pub bias: Vec<f32>,
-    /// Added to the variance.
+    /// Constant added to the variance.
     pub eps: f32,
 }
 
@@ -23,7 +23,7 @@ pub struct LayerNorm {
 pub struct RmsNorm {
     /// Weights.
     pub weight: Vec<f32>,
-    /// Added to the mean square.
+    /// Constant added to the mean square.
     pub eps: f32,
 }
 
@@ -87,7 +87,7 @@ impl Operation for RmsNorm {
     }
 }
 
-/// Both norms; keeps the normalized values and the reciprocal deviation of each sample.
+/// Computes either norm without weights; keeps the normalized values and the reciprocal deviation of each sample.
 fn normalized(run: &Forward<'_>, eps: f32, centred: bool) -> (Array2<f32>, Saved) {
     let x = run.input(0);
     let (weight, bias) = (&run.vectors[0], run.vectors.get(1));
@@ -107,7 +107,7 @@ fn normalized(run: &Forward<'_>, eps: f32, centred: bool) -> (Array2<f32>, Saved
     (y, Saved { inner: vec![hat, inverses], ..Saved::default() })
 }
 
-/// Of both norms, all but the derivative by the bias.
+/// Goes back through either norm, except for the derivative by the bias.
 fn back(run: &mut Backward<'_>, saved: &Saved, mut dy: Array2<f32>, centred: bool) {
     let weight = &run.vectors[0];
     let d_weight = &mut run.d_vectors[0];

@@ -15,9 +15,9 @@ pub struct Normalize {
     pub mean: Vec<f32>,
     /// Factors.
     pub scale: Vec<f32>,
-    /// Limit before, or infinity.
+    /// Limit before the normalization, or infinity.
     pub pre_clip: f32,
-    /// Limit after, or infinity.
+    /// Limit after the normalization, or infinity.
     pub clip: f32,
 }
 
@@ -57,7 +57,7 @@ impl Operation for Normalize {
 }
 
 impl Normalize {
-    /// As [`Operation::lower`].
+    /// Appends the operation, as [`Operation::lower`].
     fn emit(&self, to: &mut Lowering, inputs: &[ValueId], len: usize) -> BufferId {
         let (dst, src) = (to.buffer(len, Lifetime::Step), to.place(inputs[0]));
         self.emit_run(false, to, dst, src, 0..len);
@@ -74,30 +74,30 @@ impl Normalize {
     }
 }
 
-/// `(x - mean) * scale`, which the quantizer puts before matrices whose columns it has scaled: of all values, or of runs
-/// of them. The other values stay as they are.
+/// `(x - mean) * scale` of all values or of runs of them; the quantizer adds it before matrices whose columns it has
+/// scaled. The other values stay as they are.
 #[derive(Clone, Debug)]
 pub struct Balance {
     /// Of the other values, the mean is 0 and the scale 1.
     normalize: Normalize,
     /// Ascending, with a gap between two.
     runs: Vec<Range<usize>>,
-    /// Whether the image holds the means; without, all of them are 0.
+    /// `true` if the image holds the means; without, all of them are 0.
     has_means: bool,
 }
 
 impl Balance {
-    /// What is added to the mean square where the image holds no means. An RMS norm with so much is a multiplication:
-    /// below it, squares of values up to 2^47 disappear, and its root is a power of two.
+    /// The `eps` of the RMS norm that multiplies if the image holds no means: 2^120, whose root is a power of two. The
+    /// squares of values up to 2^47 vanish beside it.
     pub const FREE_EPS: f32 = f32::from_bits((127 + 120) << 23);
 
-    /// With these means and factors.
+    /// Makes a balance with these means and factors.
     pub fn new(mean: Vec<f32>, scale: Vec<f32>) -> Self {
         let all = 0..mean.len();
         Self::of_runs(Some(mean), scale, vec![all])
     }
 
-    /// With these means, or none, and factors, of which only those of `runs` count.
+    /// Makes a balance with means, or without, and factors, of which only those of `runs` count.
     pub fn of_runs(mean: Option<Vec<f32>>, mut scale: Vec<f32>, runs: Vec<Range<usize>>) -> Self {
         let has_means = mean.is_some();
         let mut mean = mean.unwrap_or_else(|| vec![0.0; scale.len()]);
@@ -109,23 +109,23 @@ impl Balance {
         Self { normalize, runs, has_means }
     }
 
-    /// Bytes of the constants for a run of so many values: means, scales, and the operation's two limits.
+    /// Returns the bytes of the constants for a run of `len` values: means, scales, and the operation's two limits.
     pub const fn bytes(len: usize) -> usize {
         4 * (2 * len + 2)
     }
 
-    /// The same without means: scales, and what is added to the mean square.
+    /// Returns the same without means: scales and `eps`.
     pub const fn bytes_without_means(len: usize) -> usize {
         4 * (len + 1)
     }
 
-    /// Bytes of its constants.
+    /// Returns the bytes of its constants.
     pub fn constant_bytes(&self) -> usize {
         let bytes = if self.has_means { Self::bytes } else { Self::bytes_without_means };
         self.runs.iter().map(|run| bytes(run.len())).sum()
     }
 
-    /// What it computes.
+    /// Returns the normalization that it computes.
     pub fn normalize(&self) -> &Normalize {
         &self.normalize
     }

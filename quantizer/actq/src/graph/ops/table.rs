@@ -6,10 +6,10 @@ use crate::graph::lowering::{BufferId, Lifetime, Lowering, StepData};
 use crate::graph::operation::{Backward, Forward, NodeState, Operation, Saved};
 use crate::graph::values::{ValueId, WeightMatrix};
 
-/// Constants that differ between denoising steps: what the network makes of the time.
+/// Constants that differ between denoising steps: the network's values of the time.
 #[derive(Clone, Debug)]
 pub struct Table {
-    /// A row for every step, behind each other.
+    /// One row per step, in order.
     pub rows: Vec<f32>,
     /// Values of a row.
     pub len: usize,
