@@ -348,9 +348,9 @@ fn impossible_policies_are_refused() -> Result<()> {
         (flow(json!({})), "needs the key steps"),
         (flow(json!({"steps": 0})), "steps is 0"),
         (flow(json!({"steps": 1001})), "steps is 1001"),
-        (flow(json!({"steps": 2, "euler_steps": 2})), "are the same"),
+        (flow(json!({"steps": 2, "euler_steps": 2})), "are synonyms"),
         (flow(json!({"steps": 2, "solver": "ddim"})), "solver is \"ddim\""),
-        (flow(json!({"steps": 2, "schedule": "cosine"})), "belongs to kind diffusion"),
+        (flow(json!({"steps": 2, "schedule": "cosine"})), "is for kind diffusion"),
         (flow(json!({"steps": 2, "time": {"from": 1.0}})), "time runs from 1 to 1"),
         (flow(json!({"steps": 2, "time": {"order": "tan"}})), "time.order is \"tan\""),
         (
@@ -370,7 +370,10 @@ fn impossible_policies_are_refused() -> Result<()> {
         (diffusion(json!({"schedule": "cosine"})), "needs the key train_steps"),
         (diffusion(json!({"train_steps": 4})), "needs the key schedule"),
         (diffusion(json!({"train_steps": 4, "schedule": "square"})), "schedule is \"square\""),
-        (diffusion(json!({"train_steps": 4, "schedule": "cosine", "steps": 5})), "steps is 5, train_steps only 4"),
+        (
+            diffusion(json!({"train_steps": 4, "schedule": "cosine", "steps": 5})),
+            "steps is 5, but train_steps is only 4",
+        ),
         (
             diffusion(json!({"train_steps": 4, "schedule": "linear", "beta": [0.1, 1.5]})),
             "betas must lie between 0 and 1",
@@ -384,9 +387,9 @@ fn impossible_policies_are_refused() -> Result<()> {
         (diffusion(json!({"train_steps": 4, "schedule": "cosine", "clip_sample": 0.0})), "clip_sample is 0.0"),
         (
             diffusion(json!({"train_steps": 4, "schedule": "cosine", "clip_sample": 1.0, "clip_iterate": 1.0})),
-            "give one of them",
+            "remove one of them",
         ),
-        (flow(json!({"steps": 2, "clip_iterate": 1.0})), "belongs to kind diffusion"),
+        (flow(json!({"steps": 2, "clip_iterate": 1.0})), "is for kind diffusion"),
         (diffusion(json!({"train_steps": 4, "schedule": "cosine", "variance": "none"})), "variance is \"none\""),
     ] {
         let case = Case::new(json.clone())?;

@@ -356,7 +356,7 @@ fn eval_measures_on_the_images_own_path() -> Result<()> {
 
     succeeded(&fixture.run("quantize policy --method gptq --bits 2 --out other.actq", b"")?)?;
     let error = fixture.run("eval other.actq --policy policy --driven drive.npz", b"")?;
-    failed(&error, 1, &["drive.npz: records what another image was shown"])?;
+    failed(&error, 1, &["drive.npz: is a rollout of another image"])?;
     // A recording that names no image is accepted.
     succeeded(&fixture.run("eval other.actq --policy policy --driven policy/calib.npz", b"")?)?;
     // The same image from several recordings, including its own.

@@ -184,7 +184,7 @@ fn statistics_of_another_image_are_refused() -> Result<()> {
     let before = fixture.files()?;
     let cases: [(&str, &[&str]); 10] = [
         ("two", &["two.json", "another image", "crc32"]),
-        ("gone", &["gone.json", "cannot be read"]),
+        ("gone", &["gone.json", "cannot read the file"]),
         ("schema", &["schema.json", "actq-stats-0", "actq-stats-1"]),
         ("none", &["none.json", "schema"]),
         ("short", &["short.json", "second"]),

@@ -1,27 +1,27 @@
-//! What an image may cost, and what that leaves for the weights.
+//! The budget of an image, and what it allows the weights.
 
 use std::fmt;
 
 use actq_kernels::Width;
 use serde::{Deserialize, Serialize};
 
-/// What an image may cost, in the unit that was asked for.
+/// The budget of an image, in the unit that was asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Budget {
     /// One width for every matrix.
     Width(#[serde(with = "bits")] Width),
-    /// The widths that keep the whole below this many bits per weight, everything counted.
+    /// The most bits per weight of the whole, everything counted.
     BitsPerWeight(f64),
-    /// The widths that keep the whole image within this many bytes.
+    /// The most bytes of the whole image.
     ImageBytes(usize),
-    /// The fewest bits whose error (NMSE) is at most this.
+    /// The largest error (NMSE); the fewest bits that keep it are used.
     MaxNmse(f64),
-    /// The most bits whose predicted step takes at most this long.
+    /// The longest predicted step; the most bits that keep it are used.
     Time(TimeLimit),
 }
 
-/// The largest number of milliseconds that a step may take, at a clock.
+/// The longest step, in milliseconds at a clock.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TimeLimit {
     /// Milliseconds.
@@ -30,23 +30,23 @@ pub struct TimeLimit {
     pub clock_hz: f64,
 }
 
-/// The share of a budget that is used at least, where more bits reduce the error and fit.
+/// The least used share of a budget, if more bits fit and reduce the error.
 pub const USED: f64 = 0.97;
 
-/// How many bits the weights may take: what every method works to.
+/// The bits or bytes that the weights may take; every method works to a rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Rate {
     /// One width for every matrix.
     Width(Width),
-    /// The widths that keep the whole below this many bits per weight, everything counted.
+    /// The most bits per weight of the whole, everything counted.
     BitsPerWeight(f64),
-    /// The widths that keep all that a method decides on within this many bytes: the weights, everything counted, and
-    /// the vectors that it changes ([`crate::graph::Graph::changed_vectors`]).
+    /// The most bytes of all that a method decides on: the weights, everything counted, and the vectors that it changes
+    /// ([`crate::graph::Graph::changed_vectors`]).
     Bytes(usize),
 }
 
 impl Rate {
-    /// Bytes that `weights` weights may take; infinite where the width is given.
+    /// Returns the bytes that `weights` weights may take; infinite if the width is given.
     pub fn bytes(self, weights: usize) -> f64 {
         match self {
             Self::Width(_) => f64::INFINITY,
@@ -56,16 +56,16 @@ impl Rate {
     }
 }
 
-/// The error of a budget that not even the narrowest widths keep.
+/// The error of a budget that even the narrowest widths exceed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BudgetTooSmall {
-    /// The fewest bytes of what the budget is for.
+    /// The fewest bytes of the weights, or of the whole image.
     pub bytes: usize,
-    /// What is allowed.
+    /// The allowed bytes.
     pub limit: f64,
     /// Weights of the policy.
     pub weights: usize,
-    /// Whether the budget is for the whole image.
+    /// `true` if the budget is for the whole image.
     pub image: bool,
 }
 
@@ -75,7 +75,7 @@ impl BudgetTooSmall {
         if bytes as f64 <= limit { Ok(()) } else { Err(Self { bytes, limit, weights, image: false }) }
     }
 
-    /// The same for an image of at most `limit` bytes, which has `fixed` bytes beside those.
+    /// Returns the same error for an image of at most `limit` bytes that has `fixed` bytes beside the weights.
     pub fn in_image(self, fixed: usize, limit: usize) -> Self {
         Self { bytes: self.bytes + fixed, limit: limit as f64, image: true, ..self }
     }
@@ -87,17 +87,17 @@ impl fmt::Display for BudgetTooSmall {
         if image {
             return write!(
                 f,
-                "the budget is too small: the smallest image of this policy by this method takes {bytes} bytes, {limit} are \
+                "the budget is too small: the smallest image of this policy by this method takes {bytes} bytes, but {limit} are \
                  allowed; allow {bytes} bytes or more"
             );
         }
         let bits = |bytes: f64| 8.0 * bytes / weights.max(1) as f64;
-        // Rounded up, so that the budget that is named can be kept.
+        // Round up, so that the named budget can be kept.
         let enough = (1000.0 * bits(bytes as f64)).ceil() / 1000.0;
         write!(
             f,
-            "the budget is too small: with scales and padding the weights take at least {bytes} bytes, {limit:.0} are \
-             allowed ({:.3} bits a weight); allow {enough:.3} bits a weight or more",
+            "the budget is too small: with scales and padding the weights take at least {bytes} bytes, but {limit:.0} are \
+             allowed ({:.3} bits per weight); allow {enough:.3} bits per weight or more",
             bits(limit)
         )
     }
@@ -117,7 +117,7 @@ mod bits {
 
     pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Width, D::Error> {
         let bits = u32::deserialize(deserializer)?;
-        Width::from_bits(bits).ok_or_else(|| D::Error::custom(format!("no width has {bits} bits")))
+        Width::from_bits(bits).ok_or_else(|| D::Error::custom(format!("no width has {bits} bits; use 2, 3, 4 or 8")))
     }
 }
 
@@ -126,7 +126,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_budget_is_read_as_it_was_written() {
+    fn budgets_survive_serialization() {
         let time = Budget::Time(TimeLimit { milliseconds: 1.5, clock_hz: 168e6 });
         for (budget, json) in [
             (Budget::Width(Width::W3), r#"{"width":3}"#),

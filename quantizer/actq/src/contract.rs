@@ -1,4 +1,4 @@
-//! What stands between the network's output and the robot.
+//! The action contract, between the network's output and the robot.
 
 use crate::error::{Result, ensure};
 
@@ -16,51 +16,52 @@ pub struct ActionContract {
     pub high: Option<Vec<f32>>,
     /// Largest change from one action to the next.
     pub max_step: Option<Vec<f32>>,
-    /// Of a first-order low-pass: the share of the way from the last action that each one goes, above 0 and at most 1.
+    /// Coefficient of a first-order low-pass: the share of the way from the last action to the new one, above 0 and at
+    /// most 1.
     pub smoothing: Option<Vec<f32>>,
-    /// The two states of actions that have only two.
+    /// Thresholds and values of actions that have only two states.
     pub binarise: Option<Binarise>,
-    /// How chunks are played.
+    /// Playback of chunks.
     pub playback: Playback,
 }
 
-/// Actions that have two states; where both values are the same, the action is none of them.
+/// Actions with two states. An action whose two values are equal is not binarized.
 #[derive(Clone, Debug)]
 pub struct Binarise {
-    /// From here on an action is on.
+    /// Value from which on an action is on.
     pub on: Vec<f32>,
-    /// Up to here it is off; between the two it stays what it was, and is off after a reset.
+    /// Value up to which an action is off. Between `off` and `on` it keeps its state; it is off after a reset.
     pub off: Vec<f32>,
-    /// What it is when it is on.
+    /// Value of an action that is on.
     pub on_value: Vec<f32>,
-    /// What it is when it is off.
+    /// Value of an action that is off.
     pub off_value: Vec<f32>,
 }
 
-/// How chunks are played.
+/// Playback of chunks.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Playback {
-    /// An average over chunks instead of one after the other.
+    /// Temporal ensemble; without it, chunks are played one after the other.
     pub ensemble: Option<Ensemble>,
-    /// Actions that lead over from what is left of the chunk before to a new one.
+    /// Actions over which the rest of the previous chunk blends into a new one.
     pub overlap: usize,
     /// Age in control periods from which on an action never plays.
     pub deadline: Option<usize>,
 }
 
-/// Temporal ensembling (Zhao et al., Learning fine-grained bimanual manipulation with low-cost hardware, arXiv
-/// 2304.13705): an action is the average of what the last chunks foresaw for it, the i-th of them weighted by
-/// `exp(-m i)`, the oldest first.
+/// Temporal ensemble (Zhao et al., Learning fine-grained bimanual manipulation with low-cost hardware, arXiv
+/// 2304.13705): an action is the average of what the last chunks predicted for it. The i-th chunk, the oldest first,
+/// has the weight `exp(-m i)`.
 #[derive(Clone, Copy, Debug)]
 pub struct Ensemble {
-    /// Chunks.
+    /// Chunks in the average.
     pub horizon: usize,
-    /// How fast the weights fall.
+    /// Decay rate of the weights.
     pub m: f64,
 }
 
 impl Ensemble {
-    /// The weight of the i-th chunk, then the reciprocals of the sums of the first i + 1 weights.
+    /// Returns the weights of the chunks, then the reciprocals of the sums of the first i + 1 weights.
     pub fn weights(&self) -> Vec<f32> {
         let weights = || (0..self.horizon).map(|i| (-self.m * i as f64).exp());
         let mut sum = 0.0;
@@ -73,17 +74,20 @@ impl Ensemble {
 }
 
 impl Playback {
-    /// That chunks of `chunk` actions, of which `execute` are executed, can be played so.
+    /// Checks that chunks of `chunk` actions, of which `execute` are executed, can be played in this way.
     ///
     /// # Errors
     ///
-    /// What cannot be, by its key in policy.json, with the values that can.
+    /// Names the key in policy.json that does not fit, with the values that do.
     pub fn check(&self, chunk: usize, execute: usize) -> Result<()> {
         if let Some(ensemble) = self.ensemble {
             let Ensemble { horizon, m } = ensemble;
-            ensure!((1..=chunk).contains(&horizon), "ensemble.horizon is {horizon}, it must be 1 to chunk ({chunk})");
-            ensure!(execute == 1, "execute is {execute}, an ensemble runs the network every step: execute must be 1");
-            ensure!(self.overlap == 0, "ensemble and overlap exclude each other: leave one of them");
+            ensure!((1..=chunk).contains(&horizon), "ensemble.horizon is {horizon}; it must be 1 to chunk ({chunk})");
+            ensure!(
+                execute == 1,
+                "execute is {execute}; an ensemble runs the network every step, so execute must be 1"
+            );
+            ensure!(self.overlap == 0, "ensemble and overlap exclude each other: remove one of them");
             let possible = |v: &f32| *v > 0.0 && v.is_finite();
             let weights = ensemble.weights();
             ensure!(
@@ -92,13 +96,16 @@ impl Playback {
             );
         }
         let (overlap, rest) = (self.overlap, chunk - execute);
-        ensure!(overlap <= rest, "overlap is {overlap}, of a chunk {rest} actions are left when the next one comes");
+        ensure!(
+            overlap <= rest,
+            "overlap is {overlap}, but only {rest} actions of a chunk are left when the next one comes"
+        );
         if let Some(deadline) = self.deadline {
             let oldest = self.ensemble.map_or(execute, |ensemble| ensemble.horizon);
             let most = usize::from(u16::MAX);
             ensure!(
                 (oldest..=most).contains(&deadline),
-                "deadline is {deadline}, it must be {oldest} (what is played of a chunk) to {most}"
+                "deadline is {deadline}; it must be {oldest} (the played actions of a chunk) to {most}"
             );
         }
         Ok(())
@@ -106,7 +113,7 @@ impl Playback {
 }
 
 impl ActionContract {
-    /// The arrays with their names, in the order of the image's flags.
+    /// Returns the arrays with their names, in the order of the image's flags.
     pub fn arrays(&self) -> [(&'static str, Option<&Vec<f32>>); 10] {
         let binarise = self.binarise.as_ref();
         [
@@ -123,22 +130,22 @@ impl ActionContract {
         ]
     }
 
-    /// Lower and upper limit of action `i`, if it has both. (Where only other actions have some, f32's largest number is
-    /// in their place.)
+    /// Returns the lower and upper limit of action `i`, if it has both. If only other actions have some, f32's largest
+    /// number stands in their place.
     pub fn limits(&self, i: usize) -> Option<[f32; 2]> {
         let of = |array: &Option<Vec<f32>>| array.as_ref()?.get(i).copied();
         Some([of(&self.low)?, of(&self.high)?]).filter(|[low, high]| *low > f32::MIN && *high < f32::MAX)
     }
 
-    /// That each array has one finite value per action dimension, and that the limits can be kept.
+    /// Checks that each array has one finite value per action dimension, and that the limits can be kept.
     ///
     /// # Errors
     ///
-    /// The array that does not fit, by its key in policy.json.
+    /// Names the array that does not fit by its key in policy.json.
     pub fn check(&self, act_len: usize) -> Result<()> {
         for (name, array) in self.arrays() {
             let Some(array) = array else { continue };
-            ensure!(array.len() == act_len, "action.{name} has {} values, act_dim is {act_len}", array.len());
+            ensure!(array.len() == act_len, "action.{name} has {} values, but act_dim is {act_len}", array.len());
             ensure!(array.iter().all(|v| v.is_finite()), "action.{name} holds a value that is not finite");
         }
         if let (Some(low), Some(high)) = (&self.low, &self.high) {

@@ -1,4 +1,5 @@
-//! Recorded observations, for calibration and held out. `docs/QUANTIZER.md`, section Recordings, describes the files.
+//! Recordings for calibration and held-out measurements. The section Recordings of `docs/QUANTIZER.md` describes the
+//! files.
 
 mod arrays;
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! The errors of this library: a cause of a known kind, and what was being done when it came up.
+//! The errors of this library: a cause of a known kind, and the context in which it occurred.
 
 use std::error::Error as StdError;
 use std::{fmt, io};
@@ -13,8 +13,8 @@ pub use crate::{bail, ensure};
 /// A value, or an [`Error`].
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// A cause, and the steps that led to it, outermost first. `{}` shows the outermost, `{:#}` all of them; each is the
-/// [`source`](StdError::source) of the one before.
+/// A cause and its contexts, outermost first. `{}` shows the outermost, `{:#}` all of them; each is the
+/// [`source`](StdError::source) of the previous one.
 #[derive(Debug)]
 pub struct Error(Box<Link>);
 
@@ -24,13 +24,13 @@ enum Link {
     Cause(Cause),
 }
 
-/// What went wrong.
+/// The cause of an error.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum Cause {
-    /// A policy, recording, image or option cannot be used as it is. The message names it and says what to do.
+    /// A policy, recording, image or option cannot be used as it is. The message names it and the remedy.
     Input(String),
-    /// Not even the smallest image keeps the budget.
+    /// Even the smallest image exceeds the budget.
     Budget(BudgetTooSmall),
     /// The executor refuses an image.
     Image(ImageError),
@@ -41,7 +41,7 @@ pub enum Cause {
 }
 
 impl Error {
-    /// An error of the caller's input.
+    /// Makes an error of the caller's input.
     pub fn input(message: impl Into<String>) -> Self {
         Cause::Input(message.into()).into()
     }
@@ -51,13 +51,13 @@ impl Error {
         Cause::Other(error.into()).into()
     }
 
-    /// This error in a context.
+    /// Adds a context to this error.
     #[must_use]
     pub fn context(self, message: impl Into<String>) -> Self {
         Self(Box::new(Link::Context(message.into(), self)))
     }
 
-    /// The innermost error.
+    /// Returns the innermost error.
     pub fn cause(&self) -> &Cause {
         match &*self.0 {
             Link::Context(_, inner) => inner.cause(),
@@ -65,7 +65,7 @@ impl Error {
         }
     }
 
-    /// The budget that cannot be kept, if that is the cause.
+    /// Returns the budget that cannot be kept, if that is the cause.
     pub fn budget(&self) -> Option<&BudgetTooSmall> {
         if let Cause::Budget(budget) = self.cause() { Some(budget) } else { None }
     }
@@ -161,16 +161,16 @@ impl StdError for Error {
     }
 }
 
-/// Says what was being done when an error came up.
+/// Adds contexts to errors.
 pub trait Context<T> {
-    /// With a message that is ready.
+    /// Adds a message.
     ///
     /// # Errors
     ///
-    /// The error in this context; of an absent value, the message itself.
+    /// The error in this context; for an absent value, the message itself.
     fn context(self, message: impl Into<String>) -> Result<T>;
 
-    /// With a message that is made only then.
+    /// Adds a message that is made only for an error.
     ///
     /// # Errors
     ///
@@ -225,10 +225,10 @@ mod tests {
     #[test]
     fn contexts_are_shown_outermost_first() {
         let missing = io::Error::from(io::ErrorKind::NotFound);
-        let error = Err::<(), _>(missing).context("cannot be read").context("weights").expect_err("an error");
+        let error = Err::<(), _>(missing).context("cannot read the file").context("weights").expect_err("an error");
         assert_eq!(format!("{error}"), "weights");
-        assert_eq!(format!("{error:#}"), "weights: cannot be read: entity not found");
-        assert_eq!(error.source().map(ToString::to_string), Some("cannot be read".to_owned()));
+        assert_eq!(format!("{error:#}"), "weights: cannot read the file: entity not found");
+        assert_eq!(error.source().map(ToString::to_string), Some("cannot read the file".to_owned()));
         assert!(matches!(error.cause(), Cause::Io(_)));
         let absent = None::<()>.context("nothing").expect_err("an error");
         assert!(matches!(absent.cause(), Cause::Input(message) if message == "nothing"));

@@ -1,5 +1,5 @@
 //! Policies from files. An importer adds nodes to a [`crate::graph::Graph`], which checks that they fit, and fills in
-//! the rest of a [`crate::policy::Policy`]; how its format names values is its own affair.
+//! the rest of a [`crate::policy::Policy`]. The names of values in a format are private to its importer.
 
 #[expect(missing_docs, reason = "docs/POLICY.md describes the keys")]
 pub mod contract;

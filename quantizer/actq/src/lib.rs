@@ -1,11 +1,11 @@
 //! Quantizes a robot policy to one image for a microcontroller.
 //!
-//! [`import`] reads a [`policy::Policy`] with its network, a [`graph::Graph`], and [`data`] the recorded observations.
-//! [`pipeline`] makes an image of them: a method of [`methods`] turns every weight matrix into codes and scales, from
-//! what [`calibrate`] finds in the recordings, and [`emit`] lays the bytes out. [`measure`] runs the
-//! finished image through the same executor that the firmware runs.
+//! [`import`] reads a [`policy::Policy`] with its network, a [`graph::Graph`]; [`data`] reads the recordings.
+//! [`pipeline`] makes an image of them. A method of [`methods`] turns every weight matrix into codes and scales, based
+//! on what [`calibrate`] finds in the recordings. [`emit`] writes the bytes. [`measure`] runs the finished image
+//! through the same executor as the firmware.
 //!
-//! Which folder may use which is written in `docs/ARCHITECTURE.md`, and tested.
+//! `docs/ARCHITECTURE.md` lists which folder may use which, and a test checks it.
 #![deny(unsafe_code)]
 
 pub mod budget;

@@ -1,4 +1,4 @@
-//! What an image does: its errors on recordings, its size, its time on the target.
+//! Measurements of an image: its errors on recordings, its size, its time on the target.
 
 pub mod actions;
 pub mod check;

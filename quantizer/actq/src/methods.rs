@@ -1,4 +1,4 @@
-//! Weight matrices into codes and scales.
+//! Quantization of weight matrices to codes and scales.
 
 pub mod actquant;
 pub mod distill;

@@ -1,4 +1,4 @@
-//! From a policy and its recordings to an image: what the command calls, and whoever else wants images. Nothing here
+//! Makes an image from a policy and its recordings: the interface for the command and other programs. Nothing here
 //! prints or writes files.
 
 mod budgets;

@@ -1,4 +1,4 @@
-//! A policy as it was trained.
+//! The policy as it was trained.
 
 use std::path::PathBuf;
 
@@ -11,11 +11,11 @@ use crate::graph::Graph;
 /// A policy as it was trained.
 #[derive(Clone, Debug)]
 pub struct Policy {
-    /// Where it was read from.
+    /// Folder that it was read from.
     pub dir: PathBuf,
     /// Its name.
     pub name: String,
-    /// What its output means.
+    /// Meaning of its output.
     pub kind: Kind,
     /// Actions in the network's output; 1 for [`Kind::Step`].
     pub chunk: usize,
@@ -25,21 +25,21 @@ pub struct Policy {
     pub act_len: usize,
     /// Control rate in Hz.
     pub rate_hz: f32,
-    /// What stands between the output and the robot.
+    /// Action contract.
     pub contract: ActionContract,
     /// The network.
     pub graph: Graph,
-    /// Weights of all its matrices as they were trained, which bits per weight refer to.
+    /// Weights of all its matrices as they were trained; the divisor of bits per weight.
     pub weights: usize,
-    /// Its trained values ([`Graph::parameters`]), before what depends on the time alone became tables.
+    /// Trained values ([`Graph::parameters`]), counted before what depends on the time alone became tables.
     pub parameters: usize,
     /// SHA-256 of policy.json, then policy.safetensors.
     pub digest: [u8; 32],
 }
 
 impl Policy {
-    /// A policy of kind step that was read from nowhere: the network's output is the action, 50 times a second, without
-    /// a contract.
+    /// Makes a policy of kind step from a network whose output is the action: 50 steps a second, no contract, no
+    /// folder.
     pub fn of(name: &str, graph: Graph) -> Self {
         Self {
             dir: PathBuf::new(),
@@ -57,14 +57,14 @@ impl Policy {
         }
     }
 
-    /// That output, chunk, action and contract fit each other.
+    /// Checks that output, chunk, action and contract fit each other.
     ///
     /// # Errors
     ///
-    /// What does not fit, by its key in policy.json.
+    /// Names the key in policy.json that does not fit.
     pub fn check(&self) -> Result<()> {
         let (len, expected) = (self.graph.len_of(self.graph.output()), self.chunk * self.act_len);
-        ensure!(len == expected, "the last op gives {len} values, chunk * act_dim is {expected}");
+        ensure!(len == expected, "the last op gives {len} values, but chunk * act_dim is {expected}");
         self.contract.playback.check(self.chunk, self.execute)?;
         self.contract.check(self.act_len)
     }

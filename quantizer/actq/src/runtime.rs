@@ -1,4 +1,4 @@
-//! An image in memory and the executor over it, for the host.
+//! Images in memory, and the executor over them, on the host.
 
 use std::fs;
 use std::path::Path;
@@ -25,24 +25,24 @@ impl ImageBuffer {
 
     /// Reads a file; an error names it.
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes = fs::read(path).with_context(|| format!("{}: cannot be read", path.display()))?;
+        let bytes = fs::read(path).with_context(|| format!("{}: cannot read the file", path.display()))?;
         Ok(Self::new(&bytes))
     }
 
-    /// The bytes.
+    /// Returns the bytes.
     pub fn bytes(&self) -> &[u8] {
         &bytemuck::cast_slice(&self.words)[..self.len]
     }
 
-    /// Parses the image; `path` names it in the error.
+    /// Parses the image; an error names `path`.
     pub fn image(&self, path: &Path) -> Result<Image<'_>> {
         let magic = MAGIC.to_le_bytes();
-        ensure!(self.bytes().starts_with(&magic), "{}: is not an actq image", path.display());
+        ensure!(self.bytes().starts_with(&magic), "{}: not an actq image", path.display());
         Image::new_checked(self.bytes()).with_context(|| path.display().to_string())
     }
 }
 
-/// Runs `work` with a head over `image` in fresh scratch memory; the errors are those of `work`.
+/// Runs `work` with a head over `image` in fresh scratch memory; returns the errors of `work`.
 pub fn with_head<T, E: From<HeadError>>(
     image: Image<'_>,
     work: impl FnOnce(&mut Head<'_, '_>) -> Result<T, E>,

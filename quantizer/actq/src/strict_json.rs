@@ -1,12 +1,11 @@
-//! JSON in which every key counts.
+//! JSON without duplicate keys.
 
 use std::fmt;
 
 use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Number, Value};
 
-/// Parses `bytes` and refuses an object with a key that stands in it twice, of which `serde_json` alone would take the
-/// last.
+/// Parses `bytes`, and refuses an object that holds a key twice; `serde_json` alone would keep the last value.
 pub(crate) fn parse(bytes: &[u8]) -> serde_json::Result<Value> {
     let mut input = serde_json::Deserializer::from_slice(bytes);
     let value = Strict.deserialize(&mut input)?;
@@ -14,7 +13,7 @@ pub(crate) fn parse(bytes: &[u8]) -> serde_json::Result<Value> {
     Ok(value)
 }
 
-/// Makes a [`Value`].
+/// Visitor that builds a [`Value`].
 struct Strict;
 
 impl<'de> DeserializeSeed<'de> for Strict {
@@ -68,7 +67,7 @@ impl<'de> Visitor<'de> for Strict {
         let mut object = Map::new();
         while let Some(key) = entries.next_key::<String>()? {
             if object.contains_key(&key) {
-                return Err(A::Error::custom(format!("the key {key:?} is there twice")));
+                return Err(A::Error::custom(format!("the key {key:?} occurs twice")));
             }
             let value = entries.next_value_seed(Strict)?;
             object.insert(key, value);
@@ -82,7 +81,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_parsed_is_what_serde_json_parses() {
+    fn values_equal_those_of_serde_json() {
         let text = r#" {"a": [1, -2, 2.5, 1e300, 18446744073709551615, null, true, "ä\n"], "b": {}, "c": {"a": []}} "#;
         assert_eq!(parse(text.as_bytes()).expect("JSON"), serde_json::from_str::<Value>(text).expect("JSON"));
         for wrong in ["", "{", "{} {}", "1e400", "[1,]", &"[".repeat(100_000)] {
@@ -91,10 +90,10 @@ mod tests {
     }
 
     #[test]
-    fn a_key_that_is_there_twice_is_named_wherever_it_is() {
+    fn duplicate_keys_are_named_at_any_depth() {
         for text in [r#"{"w": 1, "w": 1}"#, r#"[{"a": {"v": 0, "w": [], "w": {}}}]"#, r#"{"w": 1, "\u0077": 2}"#] {
             let error = parse(text.as_bytes()).expect_err(text).to_string();
-            assert!(error.starts_with("the key \"w\" is there twice at line 1 column "), "{error}");
+            assert!(error.starts_with("the key \"w\" occurs twice at line 1 column "), "{error}");
         }
     }
 }

@@ -137,7 +137,7 @@ fn a_text_file_is_not_an_image() -> Result<()> {
     for len in [5, 127, 128, 1001] {
         fs::write(&path, "x".repeat(len))?;
         for command in ["inspect", "serve"] {
-            failed(&run(actq(&[command, &image]), b"")?, 1, &["notes.txt: is not an actq image"])?;
+            failed(&run(actq(&[command, &image]), b"")?, 1, &["notes.txt: not an actq image"])?;
         }
     }
     Ok(())

@@ -1,4 +1,4 @@
-//! The arrays of a recording, out of the files that it may come in.
+//! Reads the arrays of a recording from any supported file format.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -11,10 +11,10 @@ use crate::error::{Context, Result, bail, ensure};
 use crate::import::tensors::TensorFile;
 use crate::import::values::{Tensor, Values};
 
-/// The names that mean something; other arrays are left alone, whatever their type.
+/// Names with a meaning; other arrays are ignored, whatever their type.
 const NAMES: [&str; 5] = ["obs", "action", "length", "state", "noise"];
 
-/// The endings of recordings' names.
+/// File name extensions of recordings.
 pub(super) const ENDINGS: [&str; 3] = ["npz", "npy", "safetensors"];
 
 /// The named arrays of a file.
@@ -25,14 +25,14 @@ pub(super) struct Arrays {
 }
 
 impl Arrays {
-    /// The ending of the file's name says which format it has.
+    /// Reads a file in the format of its extension.
     pub(super) fn read(path: &Path) -> Result<Self> {
-        ensure!(fs::metadata(path).context("cannot be read")?.len() > 0, "the file is empty");
+        ensure!(fs::metadata(path).context("cannot read the file")?.len() > 0, "the file is empty");
         match path.extension().and_then(|e| e.to_str()) {
             Some("npz") => npz(path),
             Some("npy") => npy(path),
             Some("safetensors") => safetensors(path),
-            _ => bail!("a recording's name ends in .npz, .npy or .safetensors"),
+            _ => bail!("unknown recording format; use .npz, .npy or .safetensors"),
         }
     }
 
@@ -40,50 +40,50 @@ impl Arrays {
         self.known.remove(name)
     }
 
-    /// What the file holds, for messages.
+    /// Returns the names of the file's arrays, for messages.
     pub(super) fn names(&self) -> String {
         if self.names.is_empty() { "nothing".to_owned() } else { self.names.join(", ") }
     }
 }
 
-/// One array of a file, without the others; `None` where there is none of this name.
+/// Reads one array of a file without the others; `None` if it has none of this name.
 pub(super) fn one(path: &Path, name: &str) -> Result<Option<Tensor>> {
     match path.extension().and_then(|e| e.to_str()) {
-        Some("npz") => Archive::open(File::open(path).context("cannot be read")?)?.read(name),
-        Some("safetensors") => Ok(TensorFile::new(&fs::read(path).context("cannot be read")?)?.get(name)),
+        Some("npz") => Archive::open(File::open(path).context("cannot read the file")?)?.read(name),
+        Some("safetensors") => Ok(TensorFile::new(&fs::read(path).context("cannot read the file")?)?.get(name)),
         _ => Ok(None),
     }
 }
 
-/// The values of an array as f32; what f32 cannot hold becomes infinite.
+/// Returns the values of an array as f32; values beyond f32 become infinite.
 pub(super) fn floats(array: &Tensor, name: &str) -> Result<Vec<f32>> {
     let of_recordings = matches!(array.values, Values::F32(_) | Values::F64(_));
     let values = if of_recordings { array.values.to_f32() } else { None };
     let found = array.values.type_name();
-    values.with_context(|| format!("array {name:?} is of type {found}, float32 or float64 is needed"))
+    values.with_context(|| format!("array {name:?} is of type {found}; use float32 or float64"))
 }
 
 fn npz(path: &Path) -> Result<Arrays> {
-    let mut archive = Archive::open(File::open(path).context("cannot be read")?)?;
+    let mut archive = Archive::open(File::open(path).context("cannot read the file")?)?;
     let mut known = BTreeMap::new();
     for name in NAMES {
-        let array = archive.read(name).with_context(|| format!("array {name:?} cannot be read"))?;
+        let array = archive.read(name).with_context(|| format!("cannot read array {name:?}"))?;
         known.extend(array.map(|array| (name, array)));
     }
     Ok(Arrays { names: archive.names().map(str::to_owned).collect(), known })
 }
 
-/// One array without a name: the observations.
+/// Reads one array without a name: the observations.
 fn npy(path: &Path) -> Result<Arrays> {
-    let file = File::open(path).context("cannot be read")?;
-    let bytes = file.metadata().context("cannot be read")?.len();
-    let obs = npy::read(&mut BufReader::new(file), bytes).context("not an .npy array, or one that was cut off")?;
+    let file = File::open(path).context("cannot read the file")?;
+    let bytes = file.metadata().context("cannot read the file")?.len();
+    let obs = npy::read(&mut BufReader::new(file), bytes).context("not an .npy array, or a truncated one")?;
     Ok(Arrays { names: vec!["obs".to_owned()], known: BTreeMap::from([("obs", obs)]) })
 }
 
 fn safetensors(path: &Path) -> Result<Arrays> {
-    let bytes = fs::read(path).context("cannot be read")?;
-    let file = TensorFile::new(&bytes).context("not a .safetensors file, or one that was cut off")?;
+    let bytes = fs::read(path).context("cannot read the file")?;
+    let file = TensorFile::new(&bytes).context("not a .safetensors file, or a truncated one")?;
     let known = NAMES.into_iter().filter_map(|name| Some((name, file.get(name)?))).collect();
     Ok(Arrays { names: file.names(), known })
 }

@@ -1,5 +1,4 @@
-//! Recordings that were made to harm, or were harmed: none may end the process, fill the memory or be read as something
-//! else.
+//! Malicious or damaged recordings: none may end the process, exhaust memory or be misread.
 
 use std::fs;
 use std::io::Write as _;
@@ -13,7 +12,7 @@ use super::{Dataset, Sizes};
 
 const SIZES: Sizes = Sizes { obs: 3, noise: 0, out: 2, state: 0 };
 
-/// An array's bytes: `header` in numpy's format of a major version, then the elements.
+/// Returns an array's bytes: `header` in numpy's format of a major version, then the elements.
 fn npy(version: u8, header: &str, elements: &[u8]) -> Vec<u8> {
     let mut bytes = b"\x93NUMPY".to_vec();
     bytes.extend([version, 0]);
@@ -31,12 +30,12 @@ fn floats(values: impl IntoIterator<Item = f32>) -> Vec<u8> {
     values.into_iter().flat_map(f32::to_le_bytes).collect()
 }
 
-/// Four frames of three zeros.
+/// Returns four frames of three zeros.
 fn obs() -> Vec<u8> {
     npy(1, &header("<f4", false, "(4, 3)"), &[0; 48])
 }
 
-/// Of an archive: what is written, and what the directory says of it.
+/// A member of an archive: its content, and its description in the directory.
 struct Member {
     name: &'static str,
     packed: Vec<u8>,
@@ -92,7 +91,7 @@ fn folder() -> TempDir {
 }
 
 #[test]
-fn every_version_order_and_type_of_header_is_read() {
+fn all_header_versions_orders_and_types_are_read() {
     let dir = folder();
     let rows: Vec<f32> = (0..12).map(|i| i as f32).collect();
     let columns = floats((0..12).map(|i| (i % 4 * 3 + i / 4) as f32));
@@ -118,7 +117,7 @@ fn every_version_order_and_type_of_header_is_read() {
 }
 
 #[test]
-fn a_header_that_does_not_fit_the_file_is_named() {
+fn headers_that_contradict_the_file_are_named() {
     let dir = folder();
     let shaped = |shape: &str| npy(1, &header("<f4", false, shape), &[0; 48]);
     let vast = {
@@ -132,21 +131,24 @@ fn a_header_that_does_not_fit_the_file_is_named() {
             "array \"obs\" is empty: [0, 18446744073709551615]",
         ),
         (npy(1, &header("<f4", true, "(0, 18446744073709551615, 3)"), &[]), "array \"obs\" is empty"),
-        (shaped("(0, 5, 3)"), "[0, 5, 3] of 4 bytes each are 0, 48 are there"),
-        (shaped("(18446744073709551615, 3)"), "[18446744073709551615, 3] of 4 bytes each are more than any file has"),
-        (shaped("(4611686018427387904, 3)"), "are more than any file has, 48 are there"),
-        (shaped("(1000000000000, 3)"), "[1000000000000, 3] of 4 bytes each are 12000000000000, 48 are there"),
-        (shaped("(3, 3)"), "[3, 3] of 4 bytes each are 36, 48 are there"),
-        (shaped("(4, -3)"), "its header is not that of a plain array: {'descr': '<f4'"),
-        (npy(1, &"(".repeat(60_000), &[]), "its header is not that of a plain array: (((("),
-        (npy(1, &header("<f4", false, "(4, 3)").replace("'<f4'", "[('x', '<f4')]"), &[0; 48]), "a plain array"),
-        (npy(4, &header("<f4", false, "(4, 3)"), &[0; 48]), "its format has the version 4.0"),
-        (npy(2, &" ".repeat(70_000), &[]), "its header takes 70000 bytes, 65536 are the most"),
-        (vast, "its header takes 4294967295 bytes, 65536 are the most"),
+        (shaped("(0, 5, 3)"), "[0, 5, 3] of 4 bytes each need 0 bytes, but 48 are present"),
         (
-            npy(1, &header("<f2", false, "(4, 3)"), &[0; 24]),
-            "array \"obs\" is of type <f2, float32 or float64 is needed",
+            shaped("(18446744073709551615, 3)"),
+            "[18446744073709551615, 3] of 4 bytes each need more bytes than any file has",
         ),
+        (shaped("(4611686018427387904, 3)"), "more bytes than any file has, but 48 are present"),
+        (
+            shaped("(1000000000000, 3)"),
+            "[1000000000000, 3] of 4 bytes each need 12000000000000 bytes, but 48 are present",
+        ),
+        (shaped("(3, 3)"), "[3, 3] of 4 bytes each need 36 bytes, but 48 are present"),
+        (shaped("(4, -3)"), "its header does not describe a plain array: {'descr': '<f4'"),
+        (npy(1, &"(".repeat(60_000), &[]), "its header does not describe a plain array: (((("),
+        (npy(1, &header("<f4", false, "(4, 3)").replace("'<f4'", "[('x', '<f4')]"), &[0; 48]), "a plain array"),
+        (npy(4, &header("<f4", false, "(4, 3)"), &[0; 48]), "its format version is 4.0"),
+        (npy(2, &" ".repeat(70_000), &[]), "its header takes 70000 bytes, but at most 65536 are allowed"),
+        (vast, "its header takes 4294967295 bytes, but at most 65536 are allowed"),
+        (npy(1, &header("<f2", false, "(4, 3)"), &[0; 24]), "array \"obs\" is of type <f2; use float32 or float64"),
     ];
     for (bytes, expected) in cases {
         for (name, bytes) in [
@@ -161,15 +163,15 @@ fn a_header_that_does_not_fit_the_file_is_named() {
 }
 
 #[test]
-fn an_archive_that_inflates_to_more_than_it_may_is_refused_before() {
+fn oversized_archives_are_refused_before_inflation() {
     let dir = folder();
     let zeros = |frames: usize| npy(1, &header("<f4", false, &format!("({frames}, 3)")), &vec![0; 12 * frames]);
     let mebibytes = |n: usize| zeros((n << 20) / 12);
-    // What never changes is no attack: a thousandth of its size is enough.
+    // Constant data is accepted: it deflates to a thousandth of its size.
     let constant = archive(&[Member::deflated("obs.npy", &mebibytes(8))]);
     assert!(constant.len() < 8 << 12);
     assert_eq!(load(&dir, "constant.npz", &constant).expect("zeros").frames(), (8 << 20) / 12);
-    // Arrays of no meaning are not inflated.
+    // Unused arrays are not inflated.
     let other = archive(&[Member::deflated("other.npy", &mebibytes(65)), Member::stored("obs.npy", &obs())]);
     assert_eq!(load(&dir, "other.npz", &other).expect("another array").frames(), 4);
 
@@ -179,36 +181,36 @@ fn an_archive_that_inflates_to_more_than_it_may_is_refused_before() {
         "an archive of {} bytes may hold 67108864 (64 times its size, at least 64 MiB); save it uncompressed, with numpy.savez",
         bomb.len()
     );
-    assert!(error.starts_with("array \"obs\" cannot be read: it has 6815") && error.ends_with(&expected), "{error}");
+    assert!(error.starts_with("cannot read array \"obs\": it has 6815") && error.ends_with(&expected), "{error}");
     let both = [Member::deflated("obs.npy", &mebibytes(40)), Member::deflated("action.npy", &mebibytes(40))];
     let error = load(&dir, "two.npz", &archive(&both)).expect_err("two halves of a bomb");
-    assert!(error.starts_with("array \"action\" cannot be read: it has 4194"), "{error}");
+    assert!(error.starts_with("cannot read array \"action\": it has 4194"), "{error}");
 }
 
 #[test]
-fn what_an_archive_says_of_a_member_must_be_so() {
+fn false_claims_of_an_archive_are_refused() {
     let dir = folder();
     let frames = |n: usize, bytes: usize| npy(1, &header("<f4", false, &format!("({n}, 3)")), &vec![0; bytes]);
     let whole = frames(100_000, 1_200_000);
     let (deflated, size) = (|| Member::deflated("obs.npy", &whole), whole.len() as u32);
     let cases: [(Vec<Member>, &str); 11] = [
-        (vec![Member { size: size - 1, ..deflated() }], "of 4 bytes each are 1200000, 1199999 are there"),
-        (vec![Member { size: size + 1, ..deflated() }], "of 4 bytes each are 1200000, 1200001 are there"),
-        // The array's header is that of the size which the archive states.
+        (vec![Member { size: size - 1, ..deflated() }], "of 4 bytes each need 1200000 bytes, but 1199999 are present"),
+        (vec![Member { size: size + 1, ..deflated() }], "of 4 bytes each need 1200000 bytes, but 1200001 are present"),
+        // The array's header has the size that the archive declares.
         (
             vec![Member { size: obs().len() as u32, ..Member::deflated("obs.npy", &frames(4, 1_200_000)) }],
-            "it has more than the 118 bytes that the archive says it has",
+            "it has more than the 118 bytes that the archive declares",
         ),
         (
             vec![Member { size, ..Member::deflated("obs.npy", &frames(100_000, 9)) }],
-            "cut off: 9 of 1200000 bytes are there",
+            "truncated: 9 of 1200000 bytes are present",
         ),
         (vec![Member { crc: 7, ..deflated() }], "its checksum is wrong"),
-        (vec![Member { method: 12, ..deflated() }], "it is compressed by method 12; numpy stores or deflates"),
+        (vec![Member { method: 12, ..deflated() }], "it is compressed by method 12; save it with numpy.savez"),
         (vec![Member { flags: 1, ..deflated() }], "it is encrypted"),
-        (vec![Member { method: 8, ..Member::stored("obs.npy", &obs()) }], "array \"obs\" cannot be read"),
-        (vec![Member::stored("obs.npy", &obs()), Member::stored("obs.npy", &whole)], "array \"obs\" is there twice"),
-        (vec![Member::stored("obs", &obs()), deflated()], "array \"obs\" is there twice"),
+        (vec![Member { method: 8, ..Member::stored("obs.npy", &obs()) }], "cannot read array \"obs\""),
+        (vec![Member::stored("obs.npy", &obs()), Member::stored("obs.npy", &whole)], "array \"obs\" occurs twice"),
+        (vec![Member::stored("obs", &obs()), deflated()], "array \"obs\" occurs twice"),
         (vec![], "array \"obs\" is missing; the file holds nothing"),
     ];
     for (members, expected) in cases {
@@ -227,13 +229,13 @@ fn no_damage_to_a_file_ends_the_process() {
     for (name, whole) in [("a.npz", archive(&members)), ("a.npy", obs())] {
         assert!(load(&dir, name, &whole).is_ok());
         for len in 0..whole.len() {
-            load(&dir, name, &whole[..len]).expect_err("cut off");
+            load(&dir, name, &whole[..len]).expect_err("truncated");
         }
         for at in 0..whole.len() {
             for value in [0, 0xff, whole[at] ^ 1, whole[at] ^ 0x80] {
                 let mut bytes = whole.clone();
                 bytes[at] = value;
-                // Whatever comes out, it comes back.
+                // Any result is fine, as long as the call returns.
                 drop(load(&dir, name, &bytes));
             }
         }
@@ -241,11 +243,11 @@ fn no_damage_to_a_file_ends_the_process() {
 }
 
 #[test]
-fn a_tensor_that_is_there_twice_is_refused() {
+fn duplicate_tensors_are_refused() {
     let dir = folder();
-    // Of the same bytes, one as it is, one transposed.
+    // Two tensors over the same bytes, one of them transposed.
     let header = r#"{"obs":{"dtype":"F32","shape":[4,3],"data_offsets":[0,48]},"obs":{"dtype":"F32","shape":[1,4,3],"data_offsets":[0,48]}}"#;
     let bytes = [&(header.len() as u64).to_le_bytes()[..], header.as_bytes(), &[0; 48]].concat();
     let error = load(&dir, "a.safetensors", &bytes).expect_err("twice");
-    assert!(error.contains("its header: the key \"obs\" is there twice"), "{error}");
+    assert!(error.contains("its header: the key \"obs\" occurs twice"), "{error}");
 }

@@ -1,4 +1,5 @@
-//! Recorded observations, for calibration and held out. `docs/QUANTIZER.md`, section Recordings, describes the files.
+//! Recorded observations, for calibration and held-out measurements. The section Recordings of `docs/QUANTIZER.md`
+//! describes the files.
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -13,7 +14,7 @@ use crate::graph::{Evaluator, Graph};
 use crate::import::values::{Tensor, Values};
 use crate::policy::Policy;
 
-/// What a recording's arrays must fit.
+/// Sizes that a recording's arrays must fit.
 #[derive(Clone, Copy, Debug)]
 pub struct Sizes {
     /// Values of an observation.
@@ -27,7 +28,7 @@ pub struct Sizes {
 }
 
 impl Sizes {
-    /// Those of a policy.
+    /// Returns the sizes of a policy.
     pub fn of(policy: &Policy) -> Self {
         let graph = &policy.graph;
         Self {
@@ -38,30 +39,30 @@ impl Sizes {
         }
     }
 
-    /// Those of an image.
+    /// Returns the sizes of an image.
     pub fn of_image(image: &Image<'_>) -> Self {
         Self { obs: image.obs_len(), noise: image.noise_len(), out: image.output().len, state: image.state().len }
     }
 }
 
-/// Episodes of observations, with the f32 policy's own actions where they were recorded.
+/// Episodes of observations, with the f32 policy's own actions if they were recorded.
 #[derive(Clone, Debug)]
 pub struct Dataset {
-    /// The file, for messages.
+    /// File that it was read from, for messages.
     pub path: PathBuf,
-    /// `[episode, step, value]`; behind the values of an observation stands the noise of an iterative head.
+    /// `[episode, step, value]`; the noise of an iterative head follows the values of an observation.
     pub obs: Array3<f32>,
     /// `[episode, step, value]`: the network's raw output at that observation.
     pub action: Option<Array3<f32>>,
     /// Valid steps of each episode.
     pub length: Vec<usize>,
     /// `[episode, value]`: the recurrent state before an episode's first step, in the order of [`Graph::state_len`].
-    /// Zero where there is none.
+    /// Zero if it is absent.
     pub state: Option<Array2<f32>>,
 }
 
 impl Dataset {
-    /// Reads a recording and checks it against what it must fit. Every error names the file and what is wrong in it.
+    /// Reads a recording and checks it against the sizes. Every error names the file and its fault.
     pub fn load(path: &Path, sizes: Sizes) -> Result<Self> {
         Self::read(path, sizes).with_context(|| path.display().to_string())
     }
@@ -75,12 +76,12 @@ impl Dataset {
             [episodes, steps, width] => [episodes, steps, width],
             [frames, width] => [1, frames, width],
             _ => bail!(
-                "array \"obs\" is {:?}; [episode, step, value], or [frame, value] for one episode, is needed",
+                "array \"obs\" has the shape {:?}; use [episode, step, value], or [frame, value] for one episode",
                 obs.shape
             ),
         };
         ensure!(episodes > 0 && steps > 0, "array \"obs\" is empty: {:?}", obs.shape);
-        ensure!(width == sizes.obs, "array \"obs\" has {width} values a step, the policy takes {}", sizes.obs);
+        ensure!(width == sizes.obs, "array \"obs\" has {width} values per step, but the policy takes {}", sizes.obs);
         let noise = arrays.take("noise").filter(|_| sizes.noise > 0);
         let beside_obs = |array: &Option<Tensor>, name: &str, width: usize, what: &str| -> Result<()> {
             let Some(array) = array else { return Ok(()) };
@@ -88,22 +89,22 @@ impl Dataset {
             *expected.last_mut().unwrap_or(&mut 0) = width;
             ensure!(
                 array.shape == expected,
-                "array {name:?} is {:?}, {expected:?} is needed: {what} at every observation",
+                "array {name:?} has the shape {:?}; {expected:?} is needed: {what} at every observation",
                 array.shape
             );
             Ok(())
         };
-        beside_obs(&noise, "noise", sizes.noise, "what the policy began from")?;
-        // Actions from noise that nobody knows say nothing.
+        beside_obs(&noise, "noise", sizes.noise, "the policy's initial noise")?;
+        // Actions from unknown noise cannot be compared.
         let action = arrays.take("action").filter(|_| sizes.noise == 0 || noise.is_some());
         beside_obs(&action, "action", sizes.out, "the network's raw output")?;
         let state = arrays.take("state");
         if let Some(state) = &state {
-            ensure!(sizes.state > 0, "array \"state\" is there, but the policy has no recurrent state");
+            ensure!(sizes.state > 0, "array \"state\" is present, but the policy has no recurrent state");
             let expected = [episodes, sizes.state];
             ensure!(
                 state.shape == expected,
-                "array \"state\" is {:?}, {expected:?} is needed: the recurrent state before each episode's first step, \
+                "array \"state\" has the shape {:?}; {expected:?} is needed: the recurrent state before each episode's first step, \
                  hidden then cell state of each lstm, the state of each gru, in the order of the ops",
                 state.shape
             );
@@ -112,7 +113,7 @@ impl Dataset {
             None => vec![steps; episodes],
             Some(length) => lengths(&length, episodes, steps)?,
         };
-        ensure!(length.iter().any(|n| *n > 0), "it holds no frame: every episode has the length 0");
+        ensure!(length.iter().any(|n| *n > 0), "the recording holds no frame: every episode has length 0");
 
         let rows = |name: &str, array: &Tensor| -> Result<Array3<f32>> {
             let values = floats(array, name)?;
@@ -150,40 +151,44 @@ impl Dataset {
         })
     }
 
-    /// The file's name without its folder, for messages.
+    /// Returns the file's name without its folder, for messages.
     pub fn name(&self) -> Cow<'_, str> {
         self.path.file_name().unwrap_or(self.path.as_os_str()).to_string_lossy()
     }
 
-    /// All valid steps.
+    /// Returns the number of all valid steps.
     pub fn frames(&self) -> usize {
         self.length.iter().sum()
     }
 
-    /// Refuses a recording of fewer than `least` frames; `why` says what they are needed for.
+    /// Refuses a recording of fewer than `least` frames; `why` gives the reason.
     pub fn require_frames(&self, least: usize, why: &str) -> Result<()> {
         let frames = self.frames();
-        ensure!(frames >= least, "{}: {frames} frames are recorded, {least} are needed: {why}", self.path.display());
+        ensure!(
+            frames >= least,
+            "{}: {frames} frames are recorded, but {least} are needed: {why}",
+            self.path.display()
+        );
         Ok(())
     }
 
-    /// The observations of an episode, valid steps only.
+    /// Returns the observations of an episode, valid steps only.
     pub fn episode(&self, episode: usize) -> impl Iterator<Item = Vec<f32>> + '_ {
         (0..self.length[episode]).map(move |step| self.row(&self.obs, episode, step))
     }
 
-    /// All valid observations, episode after episode.
+    /// Returns all valid observations, episode after episode.
     pub fn observations(&self) -> impl Iterator<Item = ArrayView1<'_, f32>> {
         let episodes = self.obs.outer_iter().zip(&self.length);
         episodes.flat_map(|(steps, length)| steps.into_outer_iter().take(*length))
     }
 
-    /// The recorded action at a step, where actions were recorded.
+    /// Returns the recorded action at a step, if actions were recorded.
     pub fn action_at(&self, episode: usize, step: usize) -> Option<Vec<f32>> {
         Some(self.row(self.action.as_ref()?, episode, step))
     }
 
-    /// The recurrent state before an episode's first step; `None`: zero.
+    /// Returns the recurrent state before an episode's first step; `None`: zero.
     pub fn start(&self, episode: usize) -> Option<Vec<f32>> {
         Some(self.state.as_ref()?.row(episode).to_vec())
     }
@@ -192,7 +197,7 @@ impl Dataset {
         array.index_axis(Axis(0), episode).index_axis(Axis(0), step).to_vec()
     }
 
-    /// Where no actions were recorded, puts those of the f32 network there.
+    /// Fills in the actions of the f32 network if none were recorded.
     pub fn fill_actions(&mut self, graph: &Graph) {
         if self.action.is_some() {
             return;
@@ -210,10 +215,10 @@ impl Dataset {
         self.action = Some(action);
     }
 
-    /// At most about `most` frames: evenly spaced ones, or, for a `recurrent` policy, the beginnings of evenly spaced
-    /// episodes.
+    /// Returns at most about `most` frames: evenly spaced ones, or, for a `recurrent` policy, the beginnings of evenly
+    /// spaced episodes.
     pub fn thinned(&self, most: usize, recurrent: bool) -> Cow<'_, Self> {
-        /// Fewer steps than these say little about a recurrent policy.
+        /// Fewer steps describe a recurrent policy badly.
         const STEPS: usize = 64;
         let frames = self.frames();
         if frames <= most {
@@ -248,16 +253,16 @@ fn lengths(array: &Tensor, episodes: usize, steps: usize) -> Result<Vec<usize>> 
     let numbers: Vec<i64> = match &array.values {
         Values::I32(values) => values.iter().map(|&n| n.into()).collect(),
         Values::I64(values) => values.clone(),
-        other => bail!("array \"length\" is of type {}, int32 or int64 is needed", other.type_name()),
+        other => bail!("array \"length\" is of type {}; use int32 or int64", other.type_name()),
     };
     ensure!(
         array.shape == [episodes],
-        "array \"length\" is {:?}, [{episodes}] is needed: the valid steps of each episode",
+        "array \"length\" has the shape {:?}; [{episodes}] is needed: the valid steps of each episode",
         array.shape
     );
     let one = |(episode, n): (usize, i64)| {
         let n = usize::try_from(n).ok().with_context(|| format!("array \"length\" holds {n} for episode {episode}"))?;
-        ensure!(n <= steps, "episode {episode} has the length {n}, but the array \"obs\" holds {steps} steps");
+        ensure!(n <= steps, "episode {episode} has length {n}, but the array \"obs\" holds {steps} steps");
         Ok(n)
     };
     numbers.into_iter().enumerate().map(one).collect()

@@ -11,37 +11,37 @@ use crate::error::{Context as _, Result, ensure};
 use crate::graph::Graph;
 use crate::policy::Policy;
 
-/// Frames that are learned from at most; of more, those are kept that add most (`docs/QUANTIZER.md`, Recordings).
-/// Statistics are collected frame by frame, in order.
+/// Most frames to learn from; a larger recording is thinned to the most diverse frames (`docs/QUANTIZER.md`,
+/// Recordings). Statistics are collected frame by frame, in order.
 pub const MOST_FRAMES: usize = 400_000;
-/// Bytes that a joined recording may take, padding counted.
+/// Most bytes of a joined recording, padding counted.
 const MOST_BYTES: usize = 4 << 30;
 
-/// What is learned from, and where it came from.
+/// The recording to learn from, and its sources.
 #[derive(Clone, Debug)]
 pub struct Learned {
-    /// All of it as one recording.
+    /// All sources as one recording.
     pub dataset: Dataset,
-    /// Every file's share, in the order in which they were named.
+    /// Share of every file, in the order in which they were named.
     pub shares: Vec<Share>,
 }
 
-/// What one file gave.
+/// Contribution of one file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Share {
     /// The file.
     pub path: PathBuf,
-    /// Its episodes that hold a step.
+    /// Episodes of the file that hold a step.
     pub episodes: usize,
-    /// Its frames.
+    /// Frames of the file.
     pub frames: usize,
-    /// Those of them that are learned from.
+    /// Frames that are learned from.
     pub kept: usize,
 }
 
 impl Learned {
-    /// Reads `files`, or where none are named the recording in the policy's folder; `None` where there is none. Every
-    /// error names the file.
+    /// Reads `files`, or without any the recording in the policy's folder; `None` if it has none. Every error names the
+    /// file.
     pub fn load(policy: &Policy, files: &[PathBuf]) -> Result<Option<Self>> {
         let sizes = Sizes::of(policy);
         let mut parts = files.iter().map(|file| Dataset::load(file, sizes)).collect::<Result<Vec<_>>>()?;
@@ -51,9 +51,8 @@ impl Learned {
         if parts.is_empty() { Ok(None) } else { Self::join(&mut parts, &policy.graph).map(Some) }
     }
 
-    /// Joins recordings that fit the network. Episodes are padded to the longest. Where one has actions and another
-    /// none, those of the f32 network are put there (into `parts` as well); where one has states and another none, they
-    /// are zero.
+    /// Joins recordings that fit the network. Episodes are padded to the longest. If only some have actions, the f32
+    /// network fills in the others (in `parts` as well); if only some have states, the others are zero.
     pub fn join(parts: &mut [Dataset], graph: &Graph) -> Result<Self> {
         Self::at_most(MOST_FRAMES, parts, graph)
     }
@@ -84,25 +83,25 @@ impl Learned {
     }
 }
 
-/// All of several recordings as one, without actions where one has none; `state_len` is that of their policy.
+/// Joins several recordings into one, without actions if one has none; `state_len` is that of their policy.
 pub fn joined(parts: &[Dataset], state_len: usize) -> Result<Dataset> {
     let episodes = places(parts);
     gather(parts, &if state_len > 0 { episodes } else { cut(episodes) }, state_len)
 }
 
-/// The steps after which episodes of a feed-forward policy are cut, so that however long the longest is, no more than
-/// twice as much padding stands beside their `frames` frames as is in them.
+/// Returns the steps after which episodes of a feed-forward policy are cut, so that padding is at most twice their
+/// `frames` frames, however long the longest is.
 pub fn longest_piece(frames: usize, episodes: usize) -> usize {
     (2 * frames).div_ceil(episodes.max(1)).max(1)
 }
 
-/// Cuts long episodes of a feed-forward policy, to which it makes no difference.
+/// Cuts long episodes of a feed-forward policy; its result does not change.
 fn cut(episodes: Vec<Vec<Place>>) -> Vec<Vec<Place>> {
     let steps = longest_piece(episodes.iter().map(Vec::len).sum(), episodes.len());
     episodes.iter().flat_map(|episode| episode.chunks(steps)).map(<[Place]>::to_vec).collect()
 }
 
-/// The chosen frames of each episode, as one recording.
+/// Returns the chosen frames of each episode as one recording.
 fn gather(parts: &[Dataset], chosen: &[Vec<Place>], state_len: usize) -> Result<Dataset> {
     let first = parts.first().context("no recording to learn from")?;
     let longest = chosen.iter().map(Vec::len).max().unwrap_or(0);
@@ -166,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn one_short_recording_stays_as_it_is() {
+    fn one_short_recording_is_unchanged() {
         let graph = mlp();
         let whole = named("calib.npz", dataset(&graph, 3, 10));
         let joined = Learned::join(&mut [whole.clone()], &graph).expect("joined");
@@ -176,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn recordings_are_joined_and_what_one_lacks_is_filled() {
+    fn joining_fills_missing_arrays() {
         let graph = lstm();
         let (mut first, mut second) = (named("a.npz", dataset(&graph, 2, 8)), named("b.npz", dataset(&graph, 2, 5)));
         let labels = second.action.take();
@@ -184,7 +183,7 @@ mod tests {
         first.state = Some(Array2::ones((2, 6)));
         let joined = Learned::join(&mut [first.clone(), second.clone()], &graph).expect("joined");
         let all = &joined.dataset;
-        assert_eq!((all.obs.dim(), &all.length[..]), ((3, 8, 2), &[8, 8, 5][..]), "an empty episode is left out");
+        assert_eq!((all.obs.dim(), &all.length[..]), ((3, 8, 2), &[8, 8, 5][..]), "an empty episode is dropped");
         assert_eq!(all.path.to_str(), Some("folder/a.npz and 1 more"));
         assert_eq!(rows(all), [rows(&first), rows(&second)].concat());
         assert_eq!(all.start(1), Some(vec![1.0; 6]));
@@ -199,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn long_recordings_are_thinned_and_their_labels_stay_theirs() {
+    fn thinning_keeps_actions_with_their_observations() {
         for graph in [mlp(), lstm()] {
             let mut parts = [named("a.npz", dataset(&graph, 6, 20)), named("b.npz", dataset(&graph, 4, 30))];
             let joined = Learned::at_most(100, &mut parts, &graph).expect("joined");
@@ -223,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn one_long_episode_does_not_pad_all_others() {
+    fn one_long_episode_limits_padding() {
         let graph = mlp();
         let mut parts = [named("a.npz", dataset(&graph, 1, 1000)), named("b.npz", dataset(&graph, 100, 2))];
         let joined = Learned::join(&mut parts, &graph).expect("joined").dataset;

@@ -9,38 +9,38 @@ use crate::error::{Context, Result, bail, ensure};
 use crate::import::values::{Tensor, Values};
 
 const MAGIC: &[u8] = b"\x93NUMPY";
-/// Bytes of a header's text; numpy writes about a hundred, and reads at most 10,000.
+/// Most bytes of a header's text; numpy writes about a hundred, and reads at most 10,000.
 const MOST_HEADER: usize = 1 << 16;
 
-/// What a header says.
+/// Content of a header.
 #[derive(Debug, PartialEq)]
 struct Header {
-    /// Type of the elements, as `<f4`.
+    /// Type of the elements, for example `<f4`.
     descr: String,
     fortran_order: bool,
     shape: Vec<usize>,
 }
 
-/// Reads an array that takes `bytes` bytes of `source`. Nothing is allocated for elements that are not there.
+/// Reads an array that takes `bytes` bytes of `source`. It allocates no more than the bytes that are present.
 pub(super) fn read(source: &mut impl Read, bytes: u64) -> Result<Tensor> {
     let mut front = [0; 12];
-    source.read_exact(&mut front[..8]).context("cut off in its header")?;
-    ensure!(front.starts_with(MAGIC), "it does not begin as numpy's arrays do");
+    source.read_exact(&mut front[..8]).context("truncated in its header")?;
+    ensure!(front.starts_with(MAGIC), "it does not begin with numpy's magic bytes");
     let length_bytes = match front[6..8] {
         [1, 0] => 2,
         [2 | 3, 0] => 4,
-        [major, minor] => bail!("its format has the version {major}.{minor}; 1.0, 2.0 and 3.0 are known"),
-        _ => bail!("cut off in its header"),
+        [major, minor] => bail!("its format version is {major}.{minor}; use 1.0, 2.0 or 3.0"),
+        _ => bail!("truncated in its header"),
     };
-    source.read_exact(&mut front[8..8 + length_bytes]).context("cut off in its header")?;
+    source.read_exact(&mut front[8..8 + length_bytes]).context("truncated in its header")?;
     let header_len = u32::from_le_bytes([front[8], front[9], front[10], front[11]]) as usize;
-    ensure!(header_len <= MOST_HEADER, "its header takes {header_len} bytes, {MOST_HEADER} are the most");
+    ensure!(header_len <= MOST_HEADER, "its header takes {header_len} bytes, but at most {MOST_HEADER} are allowed");
     let mut text = vec![0; header_len];
-    source.read_exact(&mut text).context("cut off in its header")?;
-    let text = String::from_utf8(text).context("its header is no text")?;
+    source.read_exact(&mut text).context("truncated in its header")?;
+    let text = String::from_utf8(text).context("its header is not UTF-8 text")?;
     let shown = || text.trim_end().chars().take(200).collect::<String>();
     let header =
-        Header::parse(&text).with_context(|| format!("its header is not that of a plain array: {}", shown()))?;
+        Header::parse(&text).with_context(|| format!("its header does not describe a plain array: {}", shown()))?;
 
     let there = bytes.saturating_sub((8 + length_bytes + header_len) as u64);
     let values = match header.descr.as_str() {
@@ -60,7 +60,8 @@ pub(super) fn read(source: &mut impl Read, bytes: u64) -> Result<Tensor> {
     Ok(Tensor { shape: header.shape, values })
 }
 
-/// The header of an array in version 1.0, its last axis the fastest; `descr` is the element's `numpy.dtype.str`.
+/// Returns the header of an array in version 1.0, its last axis the fastest; `descr` is the element's
+/// `numpy.dtype.str`.
 pub fn npy_header(descr: &str, shape: &[usize]) -> Vec<u8> {
     let axes: String = shape.iter().map(|len| format!("{len}, ")).collect();
     let text = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({axes}), }}");
@@ -71,7 +72,7 @@ pub fn npy_header(descr: &str, shape: &[usize]) -> Vec<u8> {
 }
 
 impl Header {
-    /// `{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }`, the keys in any order, each once.
+    /// Parses `{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }`, with the keys in any order, each one time.
     fn parse(text: &str) -> Option<Self> {
         let mut rest = Literal(text);
         let (mut descr, mut fortran_order, mut shape) = (None, None, None);
@@ -94,7 +95,7 @@ impl Header {
         rest.0.trim().is_empty().then_some(Self { descr: descr?, fortran_order: fortran_order?, shape: shape? })
     }
 
-    /// The elements in row-major order, out of the `there` bytes that follow the header.
+    /// Reads the elements in row-major order from the `there` bytes that follow the header.
     fn elements<T: Copy, const N: usize>(
         &self,
         source: &mut impl Read,
@@ -105,12 +106,14 @@ impl Header {
         let product = |dimensions: &[usize]| dimensions.iter().try_fold(N as u64, |n, &d| n.checked_mul(d as u64));
         let needed = if shape.contains(&0) { Some(0) } else { product(shape) };
         if needed != Some(there) {
-            let needed = needed.map_or("more than any file has".to_owned(), |n| n.to_string());
-            bail!("cut off, or its header is wrong: {shape:?} of {N} bytes each are {needed}, {there} are there");
+            let needed = needed.map_or("more bytes than any file has".to_owned(), |n| format!("{n} bytes"));
+            bail!(
+                "truncated, or its header is wrong: {shape:?} of {N} bytes each need {needed}, but {there} are present"
+            );
         }
         let mut bytes = Vec::new();
         source.take(there).read_to_end(&mut bytes)?;
-        ensure!(bytes.len() as u64 == there, "cut off: {} of {there} bytes are there", bytes.len());
+        ensure!(bytes.len() as u64 == there, "truncated: {} of {there} bytes are present", bytes.len());
         let values: Vec<T> = bytes.as_chunks().0.iter().map(|b| element(*b)).collect();
         if values.is_empty() || !self.fortran_order {
             return Ok(values);
@@ -120,18 +123,18 @@ impl Header {
     }
 }
 
-/// What is left of a Python literal.
+/// The unparsed rest of a Python literal.
 struct Literal<'a>(&'a str);
 
 impl<'a> Literal<'a> {
-    /// Takes `token`, if it comes next.
+    /// Takes `token` if it comes next.
     fn token(&mut self, token: &str) -> bool {
         let rest = self.0.trim_start().strip_prefix(token);
         self.0 = rest.unwrap_or(self.0);
         rest.is_some()
     }
 
-    /// A string without escapes.
+    /// Takes a string without escapes.
     fn string(&mut self) -> Option<&'a str> {
         let quote = if self.token("'") { '\'' } else { self.token("\"").then_some('"')? };
         let (string, rest) = self.0.split_once(quote)?;
@@ -143,7 +146,7 @@ impl<'a> Literal<'a> {
         if self.token("True") { Some(true) } else { self.token("False").then_some(false) }
     }
 
-    /// `()`, `(2,)`, `(2, 3)` or `(2, 3,)`
+    /// Takes `()`, `(2,)`, `(2, 3)` or `(2, 3,)`.
     fn tuple(&mut self) -> Option<Vec<usize>> {
         self.token("(").then_some(())?;
         let mut numbers = Vec::new();

@@ -1,7 +1,7 @@
 //! Archives of arrays in numpy's format .npz: a ZIP file (APPNOTE.TXT 6.3) of .npy members, stored or deflated.
 //!
-//! A reader of its own, because an archive can state any size: what a member says is held against the file before
-//! anything is inflated, and no more is inflated than it said.
+//! It is a reader of its own because an archive can declare any size. A member's declared size is compared with the
+//! file before anything is inflated, and no more is inflated than declared.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -14,27 +14,27 @@ use super::npy;
 use crate::error::{Context, Result, bail, ensure};
 use crate::import::values::Tensor;
 
-/// Bytes that the members of any archive may have, inflated.
+/// Inflated bytes that the members of any archive may have.
 const ROOM: u64 = 64 << 20;
-/// Beyond that: times the archive's own size. Recorded motions keep most of their size when they are deflated; what
-/// keeps less than a sixty-fourth hardly changes.
+/// Inflated bytes that a larger archive may have, per byte of its own. Recorded motions keep most of their size when
+/// deflated; data that keeps less than a sixty-fourth hardly changes.
 const RATIO: u64 = 64;
 
-/// The records of the format that are read: signature and length without what varies.
+/// End record of the format: signature, and length without the variable part.
 const END: ([u8; 4], usize) = (*b"PK\x05\x06", 22);
 const ENTRY: ([u8; 4], usize) = (*b"PK\x01\x02", 46);
 const LOCAL: ([u8; 4], usize) = (*b"PK\x03\x04", 30);
 
-/// An archive, and what its directory says.
+/// An archive and its directory.
 pub(super) struct Archive {
     file: File,
     bytes: u64,
     members: BTreeMap<String, Member>,
-    /// What the members that were read had, inflated.
+    /// Inflated bytes of the members read so far.
     inflated: u64,
 }
 
-/// A member, as the directory describes it.
+/// A member as the directory describes it.
 struct Member {
     encrypted: bool,
     method: usize,
@@ -42,28 +42,28 @@ struct Member {
     /// Bytes in the archive, and inflated.
     packed: u64,
     size: u64,
-    /// Where its local header is.
+    /// Offset of its local header.
     at: u64,
 }
 
 impl Archive {
-    /// Reads the directory. Refuses two members of one name.
+    /// Reads the directory. It refuses two members of one name.
     pub(super) fn open(mut file: File) -> Result<Self> {
-        let (bytes, entries) = directory(&mut file).context("not an .npz archive, or one that was cut off")?;
+        let (bytes, entries) = directory(&mut file).context("not an .npz archive, or a truncated one")?;
         let mut members = BTreeMap::new();
         for (name, member) in entries {
             let before = members.insert(name.clone(), member);
-            ensure!(before.is_none(), "array {name:?} is there twice");
+            ensure!(before.is_none(), "array {name:?} occurs twice");
         }
         Ok(Self { file, bytes, members, inflated: 0 })
     }
 
-    /// The names of all arrays.
+    /// Returns the names of all arrays.
     pub(super) fn names(&self) -> impl Iterator<Item = &str> {
         self.members.keys().map(String::as_str)
     }
 
-    /// Reads an array; `None` where there is none of this name.
+    /// Reads an array; `None` if the archive has none of this name.
     pub(super) fn read(&mut self, name: &str) -> Result<Option<Tensor>> {
         let Some(&Member { encrypted, method, crc, packed, size, at }) = self.members.get(name) else {
             return Ok(None);
@@ -72,35 +72,35 @@ impl Archive {
         let limit = ROOM.max(RATIO.saturating_mul(self.bytes));
         ensure!(
             self.inflated <= limit,
-            "it has {size} bytes, and the arrays up to it {}; an archive of {} bytes may hold {limit} ({RATIO} times its size, \
+            "it has {size} bytes, and all arrays up to it {}; an archive of {} bytes may hold {limit} ({RATIO} times its size, \
              at least {} MiB); save it uncompressed, with numpy.savez",
             self.inflated,
             self.bytes,
             ROOM >> 20
         );
-        ensure!(!encrypted, "it is encrypted");
-        let local = read_at(&mut self.file, at, LOCAL.1 as u64).context("cut off")?;
-        ensure!(local.starts_with(&LOCAL.0), "the directory points to something else");
+        ensure!(!encrypted, "it is encrypted; save it without a password");
+        let local = read_at(&mut self.file, at, LOCAL.1 as u64).context("truncated")?;
+        ensure!(local.starts_with(&LOCAL.0), "the directory does not point to a local header");
         let data = at + (LOCAL.1 + u16_at(&local, 26) + u16_at(&local, 28)) as u64;
-        ensure!(data + packed <= self.bytes, "cut off: it reaches beyond the file");
+        ensure!(data + packed <= self.bytes, "truncated: the array extends beyond the file");
         self.file.seek(SeekFrom::Start(data))?;
         let stream = BufReader::new((&self.file).take(packed));
         let inflated: Box<dyn Read> = match method {
             0 => Box::new(stream),
             8 => Box::new(DeflateDecoder::new(stream)),
-            other => bail!("it is compressed by method {other}; numpy stores or deflates"),
+            other => bail!("it is compressed by method {other}; save it with numpy.savez or numpy.savez_compressed"),
         };
-        // One byte more shows a member that has more than it says.
+        // One more byte detects a member that is longer than declared.
         let mut checked = CrcReader::new(inflated.take(size + 1));
         let array = npy::read(&mut checked, size)?;
         let over = checked.read(&mut [0])?;
-        ensure!(over == 0, "it has more than the {size} bytes that the archive says it has");
-        ensure!(u64::from(checked.crc().sum()) == crc, "its checksum is wrong");
+        ensure!(over == 0, "it has more than the {size} bytes that the archive declares");
+        ensure!(u64::from(checked.crc().sum()) == crc, "its checksum is wrong: the file is damaged");
         Ok(Some(array))
     }
 }
 
-/// The archive's size and its members with their names, without the ending .npy.
+/// Returns the archive's size and its members with their names, without the extension .npy.
 fn directory(file: &mut File) -> Result<(u64, Vec<(String, Member)>)> {
     let bytes = file.seek(SeekFrom::End(0))?;
     // The end record is followed by a comment of at most 65535 bytes.
@@ -109,27 +109,27 @@ fn directory(file: &mut File) -> Result<(u64, Vec<(String, Member)>)> {
     let is_end = |at: &usize| tail[*at..].starts_with(&END.0) && u16_at(&tail, at + 20) == tail.len() - at - END.1;
     let end = (0..(tail.len() + 1).saturating_sub(END.1)).rev().find(is_end).context("the directory is missing")?;
     let (count, len, at) = (u16_at(&tail, end + 10), u32_at(&tail, end + 12), u32_at(&tail, end + 16));
-    // Where a number does not fit, ZIP64 has another place for it.
+    // ZIP64 stores numbers elsewhere that do not fit.
     ensure!(count < 0xffff && at < 0xffff_ffff, "archives of 4 GiB or 65535 members are not supported");
-    ensure!(at + len <= tail_at + end as u64, "the directory reaches beyond the file");
+    ensure!(at + len <= tail_at + end as u64, "the directory extends beyond the file");
     let directory = read_at(file, at, len)?;
     let mut rest = &directory[..];
     let mut members = Vec::new();
     for _ in 0..count {
-        let (name, member, behind) = Member::parse(rest).context("the directory is broken")?;
+        let (name, member, following) = Member::parse(rest).context("the directory is damaged")?;
         members.push((name, member));
-        rest = behind;
+        rest = following;
     }
     Ok((bytes, members))
 }
 
 impl Member {
-    /// The first entry of a directory with its name, and what follows it.
+    /// Parses the first entry of a directory; returns it with its name and the bytes that follow.
     fn parse(bytes: &[u8]) -> Option<(String, Self, &[u8])> {
         let entry = bytes.get(..ENTRY.1).filter(|entry| entry.starts_with(&ENTRY.0))?;
         let name_len = u16_at(entry, 28);
         let name = String::from_utf8_lossy(bytes.get(ENTRY.1..ENTRY.1 + name_len)?);
-        let behind = bytes.get(ENTRY.1 + name_len + u16_at(entry, 30) + u16_at(entry, 32)..)?;
+        let following = bytes.get(ENTRY.1 + name_len + u16_at(entry, 30) + u16_at(entry, 32)..)?;
         let member = Self {
             encrypted: u16_at(entry, 8) & 1 != 0,
             method: u16_at(entry, 10),
@@ -138,7 +138,7 @@ impl Member {
             size: u32_at(entry, 24),
             at: u32_at(entry, 42),
         };
-        Some((name.strip_suffix(".npy").unwrap_or(&name).to_owned(), member, behind))
+        Some((name.strip_suffix(".npy").unwrap_or(&name).to_owned(), member, following))
     }
 }
 
@@ -146,11 +146,11 @@ fn read_at(file: &mut File, at: u64, len: u64) -> Result<Vec<u8>> {
     file.seek(SeekFrom::Start(at))?;
     let mut bytes = Vec::new();
     file.take(len).read_to_end(&mut bytes)?;
-    ensure!(bytes.len() as u64 == len, "the file ends in the middle of it");
+    ensure!(bytes.len() as u64 == len, "the file is truncated");
     Ok(bytes)
 }
 
-/// The u16 at `at`, which lies within `bytes`.
+/// Returns the u16 at `at`, which is within `bytes`.
 fn u16_at(bytes: &[u8], at: usize) -> usize {
     usize::from(bytes[at]) | usize::from(bytes[at + 1]) << 8
 }

@@ -1,4 +1,4 @@
-//! Which image was driven when a recording was made.
+//! The image that controlled the robot while a recording was made.
 
 use std::path::Path;
 
@@ -6,10 +6,10 @@ use super::arrays::one;
 use crate::error::{Context as _, Result};
 use crate::import::values::Values;
 
-/// The array that holds the image's CRC-32: one integer.
+/// Name of the array that holds the image's CRC-32: one integer.
 pub const CRC32: &str = "crc32";
 
-/// The CRC-32 of the image that a recording says was driven; `None` where it names none.
+/// Reads the CRC-32 of the image whose rollout a recording is; `None` if it names none.
 pub fn driven_by(path: &Path) -> Result<Option<u32>> {
     let array = one(path, CRC32).with_context(|| path.display().to_string())?;
     let number = array.and_then(|array| match array.values {

@@ -1,35 +1,35 @@
-//! The range that each value of an observation covers in a recording, and what leaves it.
+//! Range of each value of an observation in a recording, and values outside of it.
 
 use super::dataset::Dataset;
 
-/// How far beyond the calibrated range, as a share of its width, a value still counts as inside.
+/// Margin around the calibrated range, as a share of its width, within which a value counts as inside.
 const MARGIN: f32 = 0.1;
-/// Share of observations outside from which on it is worth a warning.
+/// Share of observations outside the range above which a warning is given.
 const WORTH: f64 = 0.05;
-/// Dimensions that a warning names.
+/// Most dimensions that a warning names.
 const NAMED: usize = 5;
 
 /// Smallest and largest recorded value of each dimension of an observation.
 #[derive(Clone, Debug)]
 pub struct Range {
-    /// Where they were recorded, for messages.
+    /// Name of the recording, for messages.
     name: String,
     bounds: Vec<(f32, f32)>,
 }
 
-/// How much of another recording lies outside.
+/// Observations of another recording outside the range.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outside {
-    /// Observations that were looked at.
+    /// Observations examined.
     pub frames: usize,
-    /// Those of them with at least one value outside.
+    /// Observations with at least one value outside.
     pub outside: usize,
-    /// Dimension and how many observations leave its range, the worst first; only where there are any.
+    /// Dimensions outside their range with their numbers of observations, the worst first.
     pub dimensions: Vec<(usize, usize)>,
 }
 
 impl Range {
-    /// Of the valid steps of a recording.
+    /// Returns the range of the valid steps of a recording.
     pub fn of(dataset: &Dataset) -> Self {
         let mut bounds = vec![(f32::INFINITY, f32::NEG_INFINITY); dataset.obs.dim().2];
         for observation in dataset.observations() {
@@ -40,7 +40,7 @@ impl Range {
         Self { name: dataset.name().into_owned(), bounds }
     }
 
-    /// A note that names the dimensions that never change, where there are any.
+    /// Returns a note that names the dimensions that never change, if there are any.
     pub fn constant_note(&self) -> Option<String> {
         let constant: Vec<usize> = (0..self.bounds.len()).filter(|&i| self.bounds[i].0 == self.bounds[i].1).collect();
         let (dimensions, verb, they) = match constant.len() {
@@ -49,7 +49,7 @@ impl Range {
             _ => ("dimensions", "never change", "they move"),
         };
         Some(format!(
-            "observation {dimensions} {} {verb} in {}: nothing is known about what the policy does when {they}; if the \
+            "observation {dimensions} {} {verb} in {}, so the image's response when {they} is not calibrated; if the \
              robot can change {} at run time, record episodes in which it does",
             runs(&constant),
             self.name,
@@ -57,7 +57,7 @@ impl Range {
         ))
     }
 
-    /// How much of `dataset` leaves the range by more than a tenth of its width.
+    /// Counts observations of `dataset` that leave the range by more than a tenth of its width.
     pub fn outside(&self, dataset: &Dataset) -> Outside {
         let mut counts = vec![0; self.bounds.len()];
         let (mut frames, mut outside) = (0, 0);
@@ -78,7 +78,7 @@ impl Range {
         Outside { frames, outside, dimensions }
     }
 
-    /// A warning where more than a twentieth of `dataset` leaves the range.
+    /// Returns a warning if more than a twentieth of `dataset` leaves the range.
     pub fn warning(&self, dataset: &Dataset) -> Option<String> {
         let Outside { frames, outside, dimensions } = self.outside(dataset);
         let percent = |n: usize| format!("{:.1}%", 100.0 * n as f64 / frames.max(1) as f64);
@@ -90,8 +90,8 @@ impl Range {
         let more = dimensions.len().saturating_sub(NAMED);
         let more = if more > 0 { format!(" and {more} more") } else { String::new() };
         Some(format!(
-            "{} of the observations in {} leave the range of {} by more than 10% of it, in dimensions {}{more}: nothing \
-             saturates there, but nothing was fitted there either; record what the robot will see",
+            "{} of the observations in {} leave the range of {} by more than 10% of it, in dimensions {}{more}: values \
+             there do not saturate, but the image was not fitted to them; record what the robot will observe",
             percent(outside),
             dataset.name(),
             self.name,
@@ -100,7 +100,7 @@ impl Range {
     }
 }
 
-/// Rising numbers as text: `3, 7-9`.
+/// Formats rising numbers as text: `3, 7-9`.
 pub fn runs(numbers: &[usize]) -> String {
     let chunks = numbers.chunk_by(|a, b| a + 1 == *b);
     let text = chunks.map(|run| match run {

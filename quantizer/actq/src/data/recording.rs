@@ -1,4 +1,4 @@
-//! Where a policy's recordings are.
+//! The recordings of a policy.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,12 +10,12 @@ use crate::graph::Graph;
 use crate::import::folder_of;
 use crate::policy::Policy;
 
-/// The two recordings that a policy's folder may hold. The only place that knows the files' names.
+/// The two recordings that a policy's folder may hold. Only this type knows the files' names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Recording {
-    /// What the quantizer learns from.
+    /// The recording that the quantizer learns from.
     Calib,
-    /// What nothing learns from, to measure errors on.
+    /// The recording that errors are measured on and nothing learns from.
     Heldout,
 }
 
@@ -31,23 +31,23 @@ impl Recording {
         ENDINGS.map(|ending| format!("{}.{ending}", self.stem()))
     }
 
-    /// Where it may be in a policy's folder, or beside its ONNX file.
+    /// Returns its possible paths in a policy's folder, or beside its ONNX file.
     pub fn paths(self, policy_dir: &Path) -> [PathBuf; 3] {
         self.names().map(|name| folder_of(policy_dir).join(name))
     }
 
-    /// The recording in a policy's folder; `None` where there is none. More than one is an error: which of them counts
+    /// Finds the recording in a policy's folder; `None` if it has none. More than one is an error, since the choice
     /// would be a guess.
     pub fn find(self, policy_dir: &Path) -> Result<Option<PathBuf>> {
         let policy_dir = folder_of(policy_dir);
         let mut there: Vec<String> = self.names().into_iter().filter(|n| policy_dir.join(n).exists()).collect();
         if there.len() > 1 {
-            bail!("{}: {} are there; leave one of them", policy_dir.display(), there.join(" and "));
+            bail!("{}: {} are present; remove all but one", policy_dir.display(), there.join(" and "));
         }
         Ok(there.pop().map(|name| policy_dir.join(name)))
     }
 
-    /// Reads `file`, or where none is given the one in the policy's folder; `None` where there is none.
+    /// Reads `file`, or without it the one in the policy's folder; `None` if it has none.
     pub fn load(self, policy_dir: Option<&Path>, file: Option<&Path>, sizes: Sizes) -> Result<Option<Dataset>> {
         let path = match (file, policy_dir) {
             (Some(file), _) => Some(file.to_owned()),
@@ -57,12 +57,12 @@ impl Recording {
         path.map(|path| Dataset::load(&path, sizes)).transpose()
     }
 
-    /// As [`Self::load`], for `who` can do nothing without.
+    /// As [`Self::load`], but fails without a recording; `who` needs it.
     pub fn require(self, policy_dir: Option<&Path>, file: Option<&Path>, sizes: Sizes, who: &str) -> Result<Dataset> {
         self.load(policy_dir, file, sizes)?.with_context(|| self.missing(who))
     }
 
-    /// The message where `who` needs the recording and it is not there.
+    /// Returns the message that `who` lacks the recording.
     pub fn missing(self, who: &str) -> String {
         let stem = self.stem();
         let [npz, npy, safetensors] = self.names();
@@ -73,7 +73,7 @@ impl Recording {
     }
 }
 
-/// The recordings that are `named`: files, and of folders every .npz, .npy and .safetensors in them, by name.
+/// Returns the recordings that are `named`: files, and every .npz, .npy and .safetensors in named folders, by name.
 pub fn files_of(named: &[PathBuf]) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for path in named {
@@ -82,21 +82,17 @@ pub fn files_of(named: &[PathBuf]) -> Result<Vec<PathBuf>> {
             continue;
         }
         let read = || fs::read_dir(path)?.map(|entry| Ok(entry?.path())).collect::<Result<Vec<PathBuf>>>();
-        let mut found = read().with_context(|| format!("{}: cannot be read", path.display()))?;
+        let mut found = read().with_context(|| format!("{}: cannot read the file", path.display()))?;
         let is_recording = |ending: &str| ENDINGS.contains(&ending);
         found.retain(|f| f.is_file() && f.extension().and_then(|e| e.to_str()).is_some_and(is_recording));
-        ensure!(
-            !found.is_empty(),
-            "{}: the folder holds no recording; their names end in .npz, .npy or .safetensors",
-            path.display()
-        );
+        ensure!(!found.is_empty(), "{}: the folder holds no recording (.npz, .npy or .safetensors)", path.display());
         found.sort();
         files.append(&mut found);
     }
     Ok(files)
 }
 
-/// The two recordings of a policy, as far as they are there.
+/// The two recordings of a policy, if present.
 #[derive(Clone, Debug, Default)]
 pub struct Recordings {
     /// See [`Recording::Calib`].
@@ -112,7 +108,7 @@ impl Recordings {
         Ok(Self { calib: read(Recording::Calib)?, heldout: read(Recording::Heldout)? })
     }
 
-    /// Where a recording holds no actions, puts those of the f32 network there.
+    /// Fills in the actions of the f32 network if a recording has none.
     pub fn fill_actions(&mut self, graph: &Graph) {
         [&mut self.calib, &mut self.heldout].into_iter().flatten().for_each(|dataset| dataset.fill_actions(graph));
     }

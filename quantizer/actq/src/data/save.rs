@@ -1,4 +1,4 @@
-//! Recordings and other arrays as files in numpy's format .npz.
+//! Writes recordings and other arrays as files in numpy's format .npz.
 
 use std::io::{self, Cursor, Seek, Write};
 
@@ -9,16 +9,16 @@ use super::dataset::Dataset;
 use super::npy::npy_header;
 use crate::error::Result;
 
-/// An element of an array, and its name in numpy.
+/// An element of an array, with its name in numpy.
 pub trait Element: Copy {
-    /// As in `numpy.dtype.str`.
+    /// Type as in `numpy.dtype.str`.
     const DESCR: &str;
 
-    /// Writes it, the lowest byte first.
+    /// Writes the element, the lowest byte first.
     ///
     /// # Errors
     ///
-    /// Those of `to`.
+    /// Errors of `to`.
     fn write(self, to: &mut impl Write) -> io::Result<()>;
 }
 
@@ -36,11 +36,11 @@ macro_rules! elements {
 
 elements!(f32: "<f4", f64: "<f8", i64: "<i8", u8: "|u1");
 
-/// Writes an .npz archive, uncompressed.
+/// A writer of an .npz archive, uncompressed.
 pub struct NpzWriter<W: Write + Seek>(ZipWriter<W>);
 
 impl<W: Write + Seek> NpzWriter<W> {
-    /// Writes to `to`.
+    /// Makes a writer to `to`.
     pub fn new(to: W) -> Self {
         Self(ZipWriter::new(to))
     }
@@ -49,7 +49,7 @@ impl<W: Write + Seek> NpzWriter<W> {
     ///
     /// # Errors
     ///
-    /// Those of the file.
+    /// Errors of the file.
     pub fn array<T: Element>(
         &mut self,
         name: &str,
@@ -61,11 +61,11 @@ impl<W: Write + Seek> NpzWriter<W> {
         Ok(values.into_iter().try_for_each(|value| value.write(member))?)
     }
 
-    /// Begins an array, whose header and elements the caller writes.
+    /// Begins an array; the caller writes its header and elements.
     ///
     /// # Errors
     ///
-    /// Those of the file.
+    /// Errors of the file.
     pub fn begin(&mut self, name: &str) -> Result<&mut impl Write> {
         let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
         self.0.start_file(format!("{name}.npy"), options)?;
@@ -76,18 +76,18 @@ impl<W: Write + Seek> NpzWriter<W> {
     ///
     /// # Errors
     ///
-    /// Those of the file.
+    /// Errors of the file.
     pub fn finish(self) -> Result<W> {
         Ok(self.0.finish()?)
     }
 }
 
 impl Dataset {
-    /// The recording as an .npz archive, uncompressed.
+    /// Returns the recording as an .npz archive, uncompressed.
     ///
     /// # Errors
     ///
-    /// Where it takes more bytes than an archive may have.
+    /// If it takes more bytes than an archive may have.
     pub fn npz(&self) -> Result<Vec<u8>> {
         let mut npz = NpzWriter::new(Cursor::new(Vec::new()));
         npz.array("obs", self.obs.shape(), self.obs.iter().copied())?;

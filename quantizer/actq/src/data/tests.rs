@@ -16,7 +16,7 @@ use crate::methods::actquant::testing::{dataset, lstm, mlp};
 const SIZES: Sizes = Sizes { obs: 3, noise: 0, out: 2, state: 0 };
 const RECURRENT: Sizes = Sizes { obs: 3, noise: 0, out: 2, state: 4 };
 
-/// An array of a file that is to be written.
+/// An array of a file to be written.
 enum Array {
     F32(ArrayD<f32>),
     F64(ArrayD<f64>),
@@ -24,7 +24,7 @@ enum Array {
     I64(ArrayD<i64>),
 }
 
-/// 0, 1, 2, ... in the given shape.
+/// Returns 0, 1, 2, ... in the given shape.
 fn count(shape: &[usize]) -> ArrayD<f32> {
     let len = shape.iter().product::<usize>();
     ArrayD::from_shape_vec(IxDyn(shape), (0..len).map(|i| i as f32).collect()).expect("a shape")
@@ -40,7 +40,7 @@ fn obs() -> Array {
 
 type Named = (&'static str, Array);
 
-/// A file of the format that its name says.
+/// Writes a file in the format of its extension.
 fn write(dir: &TempDir, name: &str, arrays: &[Named]) -> PathBuf {
     let path = dir.path().join(name);
     if name.ends_with(".npz") {
@@ -87,7 +87,7 @@ fn folder() -> TempDir {
 }
 
 #[test]
-fn every_format_and_type_gives_the_same() {
+fn formats_and_types_give_equal_recordings() {
     let dir = folder();
     let wide = |a: ArrayD<f32>| Array::F64(a.mapv(f64::from));
     let long = |values: &[i32]| Array::I32(Array1::from(values.to_vec()).into_dyn());
@@ -107,7 +107,7 @@ fn every_format_and_type_gives_the_same() {
             vec![("obs", Array::F32(fortran.clone())), ("action", wide(count(&[2, 5, 2]))), ("length", ints(&[5, 2]))],
         ),
     ] {
-        // An array of no meaning here may have any name and type.
+        // Unused arrays may have any name and type.
         let arrays: Vec<Named> = arrays.into_iter().chain([("seed", ints(&[1]))]).collect();
         let dataset = Dataset::load(&write(&dir, name, &arrays), SIZES).expect(name);
         assert_eq!(dataset.name(), name);
@@ -150,7 +150,7 @@ fn with_f32(place: [usize; 3], value: f32) -> Array {
     Array::F32(array)
 }
 
-/// What is wrong with the arrays, the sizes to fit, and the whole message behind the file's name.
+/// Lists damaged arrays, the sizes to fit, and the whole message after the file's name.
 fn spoilt() -> Vec<(Vec<Named>, Sizes, &'static str)> {
     let floats = |shape: &[usize]| Array::F32(count(shape));
     let mut infinite = count(&[2, 4]);
@@ -160,25 +160,25 @@ fn spoilt() -> Vec<(Vec<Named>, Sizes, &'static str)> {
         (
             vec![("obs", floats(&[5]))],
             SIZES,
-            "array \"obs\" is [5]; [episode, step, value], or [frame, value] for one episode, is needed",
+            "array \"obs\" has the shape [5]; use [episode, step, value], or [frame, value] for one episode",
         ),
         (
             vec![("obs", floats(&[1, 2, 5, 3]))],
             SIZES,
-            "array \"obs\" is [1, 2, 5, 3]; [episode, step, value], or [frame, value] for one episode, is needed",
+            "array \"obs\" has the shape [1, 2, 5, 3]; use [episode, step, value], or [frame, value] for one episode",
         ),
         (vec![("obs", floats(&[0, 5, 3]))], SIZES, "array \"obs\" is empty: [0, 5, 3]"),
         (vec![("obs", floats(&[2, 0, 3]))], SIZES, "array \"obs\" is empty: [2, 0, 3]"),
-        (vec![("obs", floats(&[2, 5, 4]))], SIZES, "array \"obs\" has 4 values a step, the policy takes 3"),
+        (vec![("obs", floats(&[2, 5, 4]))], SIZES, "array \"obs\" has 4 values per step, but the policy takes 3"),
         (
             vec![("obs", ints(&[1]))],
             SIZES,
-            "array \"obs\" is [1]; [episode, step, value], or [frame, value] for one episode, is needed",
+            "array \"obs\" has the shape [1]; use [episode, step, value], or [frame, value] for one episode",
         ),
         (
             vec![("obs", Array::I32(count(&[2, 5, 3]).mapv(|v| v as i32)))],
             SIZES,
-            "array \"obs\" is of type int32, float32 or float64 is needed",
+            "array \"obs\" is of type int32; use float32 or float64",
         ),
         (vec![("obs", with_f32([1, 4, 2], f32::NAN))], SIZES, "array \"obs\" holds NaN at episode 1, step 4, value 2"),
         (
@@ -194,44 +194,48 @@ fn spoilt() -> Vec<(Vec<Named>, Sizes, &'static str)> {
         (
             vec![("obs", obs()), ("action", floats(&[2, 5, 3]))],
             SIZES,
-            "array \"action\" is [2, 5, 3], [2, 5, 2] is needed: the network's raw output at every observation",
+            "array \"action\" has the shape [2, 5, 3]; [2, 5, 2] is needed: the network's raw output at every observation",
         ),
         (
             vec![("obs", floats(&[5, 3])), ("action", floats(&[1, 5, 2]))],
             SIZES,
-            "array \"action\" is [1, 5, 2], [5, 2] is needed: the network's raw output at every observation",
+            "array \"action\" has the shape [1, 5, 2]; [5, 2] is needed: the network's raw output at every observation",
         ),
         (
             vec![("obs", obs()), ("length", ints(&[5, 6]))],
             SIZES,
-            "episode 1 has the length 6, but the array \"obs\" holds 5 steps",
+            "episode 1 has length 6, but the array \"obs\" holds 5 steps",
         ),
         (vec![("obs", obs()), ("length", ints(&[-1, 5]))], SIZES, "array \"length\" holds -1 for episode 0"),
         (
             vec![("obs", obs()), ("length", ints(&[5]))],
             SIZES,
-            "array \"length\" is [1], [2] is needed: the valid steps of each episode",
+            "array \"length\" has the shape [1]; [2] is needed: the valid steps of each episode",
         ),
         (
             vec![("obs", obs()), ("length", floats(&[2]))],
             SIZES,
-            "array \"length\" is of type float32, int32 or int64 is needed",
+            "array \"length\" is of type float32; use int32 or int64",
         ),
-        (vec![("obs", obs()), ("length", ints(&[0, 0]))], SIZES, "it holds no frame: every episode has the length 0"),
+        (
+            vec![("obs", obs()), ("length", ints(&[0, 0]))],
+            SIZES,
+            "the recording holds no frame: every episode has length 0",
+        ),
         (
             vec![("obs", obs()), ("state", floats(&[2, 4]))],
             SIZES,
-            "array \"state\" is there, but the policy has no recurrent state",
+            "array \"state\" is present, but the policy has no recurrent state",
         ),
         (
             vec![("obs", obs()), ("state", floats(&[2, 3]))],
             RECURRENT,
-            "array \"state\" is [2, 3], [2, 4] is needed: the recurrent state before each episode's first step, hidden then cell state of each lstm, the state of each gru, in the order of the ops",
+            "array \"state\" has the shape [2, 3]; [2, 4] is needed: the recurrent state before each episode's first step, hidden then cell state of each lstm, the state of each gru, in the order of the ops",
         ),
         (
             vec![("obs", obs()), ("state", floats(&[4]))],
             RECURRENT,
-            "array \"state\" is [4], [2, 4] is needed: the recurrent state before each episode's first step, hidden then cell state of each lstm, the state of each gru, in the order of the ops",
+            "array \"state\" has the shape [4]; [2, 4] is needed: the recurrent state before each episode's first step, hidden then cell state of each lstm, the state of each gru, in the order of the ops",
         ),
         (
             vec![("obs", obs()), ("state", Array::F32(infinite))],
@@ -242,7 +246,7 @@ fn spoilt() -> Vec<(Vec<Named>, Sizes, &'static str)> {
 }
 
 #[test]
-fn what_is_wrong_is_named() {
+fn errors_name_the_array_and_its_fault() {
     let dir = folder();
     for ending in ["npz", "safetensors"] {
         for (arrays, sizes, expected) in spoilt() {
@@ -254,7 +258,7 @@ fn what_is_wrong_is_named() {
 }
 
 #[test]
-fn what_stands_behind_an_episodes_end_does_not_matter() {
+fn steps_after_an_episodes_end_are_ignored() {
     let dir = folder();
     let arrays = [("obs", with([1, 4, 2], f64::NAN)), ("length", ints(&[5, 4]))];
     let dataset = Dataset::load(&write(&dir, "a.npz", &arrays), SIZES).expect("padding");
@@ -263,7 +267,7 @@ fn what_stands_behind_an_episodes_end_does_not_matter() {
 }
 
 #[test]
-fn a_file_that_is_no_recording_is_named() {
+fn other_files_are_refused_by_name() {
     let dir = folder();
     let error = |path: &Path| {
         let error = format!("{:#}", Dataset::load(path, SIZES).expect_err("no recording"));
@@ -275,24 +279,24 @@ fn a_file_that_is_no_recording_is_named() {
         for len in [1, 20, whole.len() / 2, whole.len() - 1] {
             fs::write(&path, &whole[..len]).expect("a file");
             let error = error(&path);
-            assert!(error.starts_with(&format!("not {is}, or one that was cut off")), "{len} bytes: {error}");
+            assert!(error.starts_with(&format!("not {is}, or a truncated one")), "{len} bytes: {error}");
         }
         fs::write(&path, "observations: 1, 2, 3\n".repeat(20)).expect("a file");
         let text = error(&path);
-        assert!(text.starts_with(&format!("not {is}, or one that was cut off")), "{text}");
+        assert!(text.starts_with(&format!("not {is}, or a truncated one")), "{text}");
         fs::write(&path, "").expect("a file");
         assert_eq!(error(&path), "the file is empty");
         fs::remove_file(&path).expect("the file");
-        assert!(error(&path).starts_with("cannot be read"));
+        assert!(error(&path).starts_with("cannot read the file"));
     }
     let half = write(&dir, "half.npz", &[("obs", obs())]);
     let other = dir.path().join("half.csv");
     fs::rename(half, &other).expect("a file");
-    assert_eq!(error(&other), "a recording's name ends in .npz, .npy or .safetensors");
+    assert_eq!(error(&other), "unknown recording format; use .npz, .npy or .safetensors");
 }
 
 #[test]
-fn one_recording_is_found_and_two_are_refused() {
+fn two_recordings_in_a_folder_are_refused() {
     let dir = folder();
     let at = Some(dir.path());
     assert!(Recording::Calib.load(at, None, SIZES).expect("none").is_none());
@@ -311,19 +315,19 @@ fn one_recording_is_found_and_two_are_refused() {
     }
     let (npy, _) = (write(&dir, "calib.npy", &[("", obs())]), write(&dir, "calib.npz", &[("obs", obs())]));
     let error = Recording::Calib.find(dir.path()).expect_err("two").to_string();
-    assert_eq!(error, format!("{}: calib.npz and calib.npy are there; leave one of them", dir.path().display()));
-    // A file that is named needs no guess.
+    assert_eq!(error, format!("{}: calib.npz and calib.npy are present; remove all but one", dir.path().display()));
+    // A named file needs no search.
     let named = Recording::Calib.load(at, Some(&npy), SIZES).expect("named").expect("named");
     assert_eq!(named.path, npy);
 }
 
 #[test]
-fn a_folder_stands_for_the_recordings_in_it() {
+fn folders_expand_to_their_recordings() {
     let dir = folder();
     fs::create_dir(dir.path().join("drives")).expect("a folder");
     let drives = dir.path().join("drives");
     let error = files_of(std::slice::from_ref(&drives)).expect_err("none").to_string();
-    let words = "the folder holds no recording; their names end in .npz, .npy or .safetensors";
+    let words = "the folder holds no recording (.npz, .npy or .safetensors)";
     assert_eq!(error, format!("{}: {words}", drives.display()));
     let other = write(&dir, "b.npz", &[("obs", obs())]);
     let expected: Vec<PathBuf> = ["drives/1.npy", "drives/2.npz", "drives/3.safetensors"]
@@ -341,10 +345,13 @@ fn too_few_frames_are_named() {
     let dataset = Dataset::load(&write(&dir, "calib.npz", &[("obs", obs())]), SIZES).expect("ten frames");
     assert!(dataset.require_frames(10, "this").is_ok());
     let error = dataset.require_frames(11, "fewer repeat themselves").expect_err("ten").to_string();
-    assert!(error.ends_with("calib.npz: 10 frames are recorded, 11 are needed: fewer repeat themselves"), "{error}");
+    assert!(
+        error.ends_with("calib.npz: 10 frames are recorded, but 11 are needed: fewer repeat themselves"),
+        "{error}"
+    );
 }
 
-/// The same steps, cut into windows with the state at the start of each.
+/// Cuts the same steps into windows, with the state at the start of each.
 fn cut(graph: &Graph, whole: &Dataset, window: usize) -> Dataset {
     let (_, steps, width) = whole.obs.dim();
     let windows = steps / window;
@@ -373,14 +380,14 @@ fn cut(graph: &Graph, whole: &Dataset, window: usize) -> Dataset {
 }
 
 #[test]
-fn windows_with_their_state_are_as_good_as_the_whole_episode() {
+fn windows_with_state_equal_whole_episodes() {
     let graph = lstm();
     assert_eq!(graph.state_len(), 6);
     let whole = dataset(&graph, 1, 20);
     let cut = cut(&graph, &whole, 5);
     let zero = Dataset { state: None, ..cut.clone() };
 
-    // The f32 network's own actions and all that the methods collect.
+    // The f32 network's own actions, and all statistics of the methods.
     let actions = |dataset: &Dataset| {
         let mut dataset = Dataset { action: None, ..dataset.clone() };
         dataset.fill_actions(&graph);
@@ -402,7 +409,7 @@ fn windows_with_their_state_are_as_good_as_the_whole_episode() {
 }
 
 #[test]
-fn missing_actions_are_the_networks_own() {
+fn the_network_fills_missing_actions() {
     let graph = mlp();
     let whole = dataset(&graph, 2, 6);
     let mut filled = Dataset { action: None, length: vec![6, 4], ..whole.clone() };
@@ -439,21 +446,21 @@ fn recorded(name: &str, obs: Array3<f32>) -> Dataset {
 }
 
 #[test]
-fn what_leaves_the_calibrated_range_is_named() {
+fn dimensions_outside_the_range_are_named() {
     // Dimension v covers 0 to 9 v.
     let calib = recorded("calib.npz", Array3::from_shape_fn((2, 10, 4), |(_, s, v)| (s * v) as f32));
     let range = Range::of(&calib);
     let constant = range.constant_note().expect("dimension 0 is constant");
     assert_eq!(
         constant,
-        "observation dimension 0 never changes in calib.npz: nothing is known about what the policy does when it moves; if \
+        "observation dimension 0 never changes in calib.npz, so the image's response when it moves is not calibrated; if \
          the robot can change it at run time, record episodes in which it does"
     );
     let same = range.outside(&calib);
     assert_eq!(same, Outside { frames: 20, outside: 0, dimensions: Vec::new() });
 
     let mut obs = calib.obs.clone();
-    // Within a tenth of the range, and beyond.
+    // Within a tenth of the range, and beyond it.
     (obs[[0, 0, 1]], obs[[0, 1, 1]]) = (9.89, -0.89);
     (obs[[0, 2, 2]], obs[[0, 2, 3]], obs[[0, 3, 3]]) = (-1.9, 30.0, 29.8);
     let heldout = recorded("heldout.npz", obs.clone());
@@ -462,9 +469,9 @@ fn what_leaves_the_calibrated_range_is_named() {
     assert_eq!(
         range.warning(&heldout).expect("a tenth is outside"),
         "10.0% of the observations in heldout.npz leave the range of calib.npz by more than 10% of it, in dimensions 3 \
-         (10.0%), 2 (5.0%): nothing saturates there, but nothing was fitted there either; record what the robot will see"
+         (10.0%), 2 (5.0%): values there do not saturate, but the image was not fitted to them; record what the robot will observe"
     );
-    // One of twenty is not worth a warning; a dimension that never moved has no room at all.
+    // One in twenty gives no warning; a constant dimension has no margin.
     obs[[0, 2, 2]] = 0.0;
     obs[[0, 2, 3]] = 0.0;
     assert_eq!(range.warning(&recorded("heldout.npz", obs.clone())), None);
@@ -476,7 +483,7 @@ fn what_leaves_the_calibrated_range_is_named() {
         Array3::from_shape_fn((1, 9, 12), |(_, s, v)| if [3, 7, 8, 9].contains(&v) { 1.5 } else { s as f32 }),
     );
     let note = Range::of(&constant).constant_note().expect("constant dimensions");
-    assert!(note.starts_with("observation dimensions 3, 7-9 never change in calib.npz: "), "{note}");
+    assert!(note.starts_with("observation dimensions 3, 7-9 never change in calib.npz, "), "{note}");
     let moving = recorded("calib.npz", Array3::from_shape_fn((1, 9, 2), |(_, s, _)| s as f32));
     assert_eq!(Range::of(&moving).constant_note(), None);
 }

@@ -1,8 +1,8 @@
-//! What of a long recording is kept: what adds to the rest, where blind thinning would keep a thousand frames of a
-//! robot that stands still and lose the one in which it stumbles.
+//! Thins a long recording by keeping the most diverse frames. Blind thinning would keep a thousand frames of a robot at
+//! rest and lose the one in which it stumbles.
 //!
-//! Observations are standardized and counted by the cells of a grid. One frame of a cell is kept; the cells are made as
-//! wide as it takes for all of them to have room.
+//! Observations are standardized and counted by the cells of a grid. One frame of a cell is kept. The cells are as wide
+//! as necessary for all frames to fit.
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashSet};
@@ -14,15 +14,15 @@ use super::dataset::Dataset;
 /// A frame of one of several recordings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Place {
-    /// The recording.
+    /// Index of the recording.
     pub(super) part: usize,
-    /// The episode in it.
+    /// Index of the episode in it.
     pub(super) episode: usize,
-    /// The step of the episode.
+    /// Step of the episode.
     pub(super) step: usize,
 }
 
-/// All valid frames, episode after episode; the order of [`observations`].
+/// Returns all valid frames, episode after episode, in the order of [`observations`].
 pub(super) fn places(parts: &[Dataset]) -> Vec<Vec<Place>> {
     let steps = |part: usize, episode: usize, length: usize| -> Vec<Place> {
         (0..length).map(|step| Place { part, episode, step }).collect()
@@ -33,7 +33,7 @@ pub(super) fn places(parts: &[Dataset]) -> Vec<Vec<Place>> {
     parts.iter().enumerate().flat_map(of_part).filter(|episode| !episode.is_empty()).collect()
 }
 
-/// At most `most` frames, the first of every cell, in the order of recording.
+/// Returns at most `most` frames, the first of every cell, in the order of recording.
 pub(super) fn frames(parts: &[Dataset], most: usize) -> Vec<Place> {
     let grid = Grid::fitting(parts, most);
     let mut visited = HashSet::new();
@@ -41,8 +41,8 @@ pub(super) fn frames(parts: &[Dataset], most: usize) -> Vec<Place> {
     all.filter(|(_, observation)| visited.insert(grid.cell(observation))).map(|(place, _)| place).collect()
 }
 
-/// Whole episodes of at most `most` frames together, in the order of recording: again and again the one that visits
-/// most cells which none before it has visited. Of an episode that is longer than that, its beginning counts.
+/// Returns whole episodes of at most `most` frames together, in the order of recording. It repeatedly takes the episode
+/// that visits most cells which no earlier one has visited. A longer episode is cut to its beginning.
 pub(super) fn episodes(parts: &[Dataset], most: usize) -> Vec<Vec<Place>> {
     let grid = Grid::fitting(parts, most);
     let mut observations = observations(parts);
@@ -53,7 +53,7 @@ pub(super) fn episodes(parts: &[Dataset], most: usize) -> Vec<Vec<Place>> {
         episode.truncate(most);
         cells.push(own.into_iter().take(most).collect());
     }
-    // What an episode adds only falls while others are chosen, so that most need not be counted again.
+    // An episode's gain only falls as others are chosen, so most need no recount.
     let mut queue: BinaryHeap<(usize, Reverse<usize>)> =
         cells.iter().enumerate().map(|(e, cells)| (cells.len(), Reverse(e))).collect();
     let (mut visited, mut chosen, mut room) = (HashSet::new(), Vec::new(), most);
@@ -79,33 +79,33 @@ fn observations(parts: &[Dataset]) -> impl Iterator<Item = ArrayView1<'_, f32>> 
     parts.iter().flat_map(Dataset::observations)
 }
 
-/// Cells of equal width over standardized observations; the middle of one is at their mean.
+/// Cells of equal width over standardized observations; one is centred on their mean.
 struct Grid {
     mean: Vec<f64>,
-    /// 1 over the width of a cell, in units of each value; 0 for a value that never changes.
+    /// Reciprocal of a cell's width, in units of each value; 0 for a value that never changes.
     cells: Vec<f64>,
 }
 
 impl Grid {
-    /// The finest that is looked for, in standard deviations: frames nearer to each other say the same.
+    /// Finest cell width, in standard deviations: closer frames are equivalent.
     const FINEST: f64 = 1.0 / 1024.0;
-    /// Halvings of the range in which the width lies, at most.
+    /// Most halvings of the range of widths.
     const HALVINGS: usize = 12;
 
-    /// Of about the smallest cells of which no more than `most` are visited.
+    /// Returns a grid with approximately the smallest cells of which at most `most` are visited.
     fn fitting(parts: &[Dataset], most: usize) -> Self {
         let unit = Self::of(parts);
-        // Widths are searched by their ratio.
+        // Search widths by their ratio.
         let fits = |width: f64| unit.with_width(width).visited(parts, most);
         let (mut narrow, mut wide) = (Self::FINEST, Self::FINEST);
         let mut visited = fits(wide);
-        // No observation is further from the mean than the root of their number, so that one cell holds all in the end.
+        // No observation is further from the mean than the root of their number, so eventually one cell holds all.
         while visited.is_none() {
             (narrow, wide) = (wide, 4.0 * wide);
             visited = fits(wide);
         }
         for _ in 0..Self::HALVINGS {
-            // Nineteen twentieths of the room are used well enough.
+            // Stop when 95% of the room is used.
             if narrow == wide || visited.is_some_and(|n| n >= most - most / 20) {
                 break;
             }
@@ -118,7 +118,7 @@ impl Grid {
         unit.with_width(wide)
     }
 
-    /// With cells one standard deviation wide.
+    /// Makes a grid with cells one standard deviation wide.
     fn of(parts: &[Dataset]) -> Self {
         let values = parts.first().map_or(0, |part| part.obs.dim().2);
         let frames = parts.iter().map(Dataset::frames).sum::<usize>().max(1) as f64;
@@ -138,7 +138,7 @@ impl Grid {
         Self { mean: self.mean.clone(), cells: self.cells.iter().map(|n| n / width).collect() }
     }
 
-    /// How many cells are visited; `None` where they are more than `most`.
+    /// Counts the visited cells; `None` if they are more than `most`.
     fn visited(&self, parts: &[Dataset], most: usize) -> Option<usize> {
         let mut visited = HashSet::new();
         for observation in observations(parts) {
@@ -150,7 +150,7 @@ impl Grid {
         Some(visited.len())
     }
 
-    /// A number for the cell. That two of a million cells share theirs is unlikely, and would cost one frame.
+    /// Returns a hash of the cell. A collision among a million cells is unlikely, and would cost one frame.
     fn cell(&self, observation: &ArrayView1<'_, f32>) -> u64 {
         let mut number = 0u64;
         for ((v, mean), cells) in observation.iter().zip(&self.mean).zip(&self.cells) {
@@ -171,7 +171,7 @@ mod tests {
 
     use super::*;
 
-    /// One value a step: every episode's.
+    /// Makes a recording of episodes with one value per step.
     fn recorded(episodes: &[&[f32]]) -> Dataset {
         let longest = episodes.iter().map(|e| e.len()).max().unwrap_or(0);
         let value = |(e, s, _): (usize, usize, usize)| episodes[e].get(s).copied().unwrap_or(f32::NAN);
@@ -185,8 +185,8 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_that_nothing_is_like_stays() {
-        // A robot that stands, and stumbles once in the second file.
+    fn rare_frames_are_kept() {
+        // A robot that stands still, and stumbles one time in the second file.
         let standing: Vec<f32> = (0..1000).map(|i| 1e-3 * (i % 7) as f32).collect();
         let mut stumbles = standing.clone();
         stumbles[700] = 4.0;
@@ -194,35 +194,35 @@ mod tests {
         let kept = frames(&parts, 20);
         assert!(kept.len() <= 20, "{}", kept.len());
         assert!(kept.contains(&Place { part: 1, episode: 1, step: 700 }), "{kept:?}");
-        assert_eq!(kept[0], Place { part: 0, episode: 0, step: 0 }, "of equal frames the first stays");
+        assert_eq!(kept[0], Place { part: 0, episode: 0, step: 0 }, "the first of equal frames is kept");
     }
 
     #[test]
-    fn the_room_is_used() {
+    fn thinning_uses_most_of_the_limit() {
         let spread: Vec<f32> = (0..5000).map(|i| (i as f32 * 0.37).sin() + 1e-3 * i as f32).collect();
         let parts = [recorded(&[&spread])];
         for most in [1, 10, 100, 1000] {
             let kept = frames(&parts, most).len();
             assert!(kept <= most && kept >= most * 3 / 4, "{kept} of {most}");
         }
-        // A value that never changes has one cell, however much room there is.
+        // A constant value has one cell, whatever the limit.
         assert_eq!(frames(&[recorded(&[&[2.5; 50]])], 10).len(), 1);
     }
 
     #[test]
-    fn episodes_are_chosen_by_what_they_add() {
+    fn episodes_with_new_cells_are_chosen() {
         let walk = |from: f32, n: usize| -> Vec<f32> { (0..n).map(|i| from + i as f32).collect() };
         let (near, far, again, short) = (walk(0.0, 40), walk(100.0, 30), walk(0.0, 39), walk(200.0, 10));
         let parts = [recorded(&[&near, &again]), recorded(&[&far, &short])];
         let chosen = |most: usize| -> Vec<(usize, usize, usize)> {
             episodes(&parts, most).iter().map(|e| (e[0].part, e[0].episode, e.len())).collect()
         };
-        // The repetition adds nothing, though there would be room for it.
+        // The repetition adds nothing, although it would fit.
         assert_eq!(chosen(119), [(0, 0, 40), (1, 0, 30), (1, 1, 10)]);
         assert_eq!(chosen(70), [(0, 0, 40), (1, 0, 30)]);
-        // Too long for what is left; the next one fits.
+        // It is too long for the rest; the next one fits.
         assert_eq!(chosen(55), [(0, 0, 40), (1, 1, 10)]);
-        // None fits: the beginning of one is better than nothing.
+        // None fits: take the beginning of one.
         assert_eq!(chosen(8).iter().map(|e| e.2).collect::<Vec<_>>(), [8]);
     }
 }

@@ -1,4 +1,4 @@
-//! The object `action` of `policy.json`, and what else it says of how actions are played.
+//! The object `action` of `policy.json`, and its keys for the playback of actions.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,10 +6,10 @@ use super::numbers::real;
 use crate::contract::{ActionContract, Binarise};
 use crate::error::{Context, Result, bail, ensure};
 
-/// What RLDS adds to the distance of two quantiles, so that it is not 0.
+/// Constant that RLDS adds to the distance of two quantiles, so that it is not 0.
 const QUANTILE_EPS: f64 = 1e-8;
 
-/// An array with a value for each action; null where it does not concern an action.
+/// An array with a value for each action; null if it does not apply to an action.
 pub type Array = Option<Vec<Option<f64>>>;
 
 /// Keys of `action`.
@@ -59,13 +59,13 @@ pub struct JsonEnsemble {
 }
 
 impl JsonContract {
-    /// Gain and shift of each action, `a = x * gain + shift`, where the network's output is normalised.
+    /// Returns gain and shift of each action, `a = x * gain + shift`, if the network's output is normalized.
     fn unnormalise(&self, act_dim: usize) -> Result<Option<Vec<[f64; 2]>>> {
         let normal = pairs(["mean", "std"], [&self.mean, &self.std], act_dim)?;
         let quantiles = pairs(["q01", "q99"], [&self.q01, &self.q99], act_dim)?;
         let pairs = match (&normal, &quantiles) {
             (None, None) => return Ok(None),
-            (Some(_), Some(_)) => bail!("action has mean and std, and q01 and q99: leave one pair"),
+            (Some(_), Some(_)) => bail!("action has both mean and std, and q01 and q99; remove one pair"),
             (Some(pairs), None) | (None, Some(pairs)) => pairs,
         };
         let affine = |(i, pair): (usize, &Option<[f64; 2]>)| {
@@ -81,7 +81,7 @@ impl JsonContract {
         pairs.iter().enumerate().map(affine).collect::<Result<_>>().map(Some)
     }
 
-    /// The contract of `act_dim` actions, with un-normalisation folded into scale and offset.
+    /// Returns the contract of `act_dim` actions, with denormalization folded into scale and offset.
     pub fn contract(&self, act_dim: usize) -> Result<ActionContract> {
         let values = |name: &str, array: &Array, missing: Option<f64>| values(name, array, missing, act_dim);
         let array = |name: &str, array: &Array| {
@@ -96,8 +96,8 @@ impl JsonContract {
             let plus = |i: usize| plus.as_ref().map_or(0.0, |plus| plus[i]);
             let both = affine.iter().enumerate().map(|(i, [gain, shift])| (gain * by(i), shift * by(i) + plus(i)));
             let (gains, shifts): (Vec<f64>, Vec<f64>) = both.unzip();
-            scale = Some(reals("scale, with un-normalising,", &gains)?);
-            offset = Some(reals("offset, with un-normalising,", &shifts)?);
+            scale = Some(reals("scale, with denormalization,", &gains)?);
+            offset = Some(reals("offset, with denormalization,", &shifts)?);
         }
         let binarise = self.binarise.as_ref().map(|json| json.binarise(act_dim)).transpose()?;
         let [low, high] = [array("low", &self.low)?, array("high", &self.high)?];
@@ -113,7 +113,7 @@ impl JsonBinarise {
         let mut arrays = named.map(|_| Vec::new());
         for (to, (key, array)) in arrays.iter_mut().zip(named) {
             let name = format!("binarise.{key}");
-            // Where both values are 0, nothing is binarised.
+            // If both values are 0, the action is not binarized.
             let values = values(&name, array, Some(0.0), act_dim)?;
             *to = reals(&name, &values.with_context(|| format!("action.{name} is missing"))?)?;
         }
@@ -130,35 +130,35 @@ impl JsonBinarise {
     }
 }
 
-/// The pairs of two arrays, which both are there or none, and null in the same places.
+/// Returns the pairs of two arrays. Both must be present or absent, and null in the same places.
 fn pairs([one, two]: [&str; 2], arrays: [&Array; 2], act_dim: usize) -> Result<Option<Vec<Option<[f64; 2]>>>> {
     let [Some(first), Some(second)] = arrays else {
         ensure!(
             arrays[0].is_none() && arrays[1].is_none(),
-            "action has {one} or {two} alone; un-normalising takes both"
+            "action has only one of {one} and {two}; denormalization needs both"
         );
         return Ok(None);
     };
     for (name, array) in [(one, first), (two, second)] {
         let len = array.len();
-        ensure!(len == act_dim, "action.{name} has {len} values, act_dim is {act_dim}");
+        ensure!(len == act_dim, "action.{name} has {len} values, but act_dim is {act_dim}");
     }
     let pair = |(i, (first, second)): (usize, (&Option<f64>, &Option<f64>))| {
         let same = first.is_some() == second.is_some();
         ensure!(
             same,
-            "action.{one}[{i}] or action.{two}[{i}] alone is null; both are for an action that is not normalised"
+            "only one of action.{one}[{i}] and action.{two}[{i}] is null; set both to null for an action that is not normalized"
         );
         Ok(first.zip(*second).map(|(first, second)| [first, second]))
     };
     first.iter().zip(second).enumerate().map(pair).collect::<Result<_>>().map(Some)
 }
 
-/// An array's values; `missing` stands for null, which is refused where there is none.
+/// Returns an array's values; `missing` replaces null, which is refused without it.
 fn values(name: &str, array: &Array, missing: Option<f64>, act_dim: usize) -> Result<Option<Vec<f64>>> {
     let Some(array) = array else { return Ok(None) };
     let len = array.len();
-    ensure!(len == act_dim, "action.{name} has {len} values, act_dim is {act_dim}");
+    ensure!(len == act_dim, "action.{name} has {len} values, but act_dim is {act_dim}");
     let one = |(i, v): (usize, &Option<f64>)| {
         v.or(missing).with_context(|| format!("action.{name}[{i}] is null; it must be a number"))
     };

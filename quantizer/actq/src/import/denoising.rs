@@ -1,4 +1,4 @@
-//! How a flow or a diffusion policy of `policy.json` gets from noise to its output.
+//! Denoising steps of a flow or a diffusion policy in `policy.json`.
 
 use actq_kernels::ops::denoise::Coefficients;
 use serde::{Deserialize, Serialize};
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Context, Result, bail, ensure};
 use crate::graph::Denoising;
 
-/// The most steps that a policy may take; an image has room for 65535.
+/// Most steps of a policy; an image has room for 65535.
 const MOST_STEPS: usize = 1000;
 
 /// Keys of `policy.json` for the kinds flow and diffusion.
@@ -54,7 +54,7 @@ pub(super) const KEYS: [&str; 12] = [
     "obs_norm",
 ];
 
-/// What the network reads of the time.
+/// Keys of the network's time input.
 #[derive(Debug, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct JsonTime {
@@ -70,7 +70,7 @@ pub(super) struct JsonTime {
     to: Option<f64>,
 }
 
-/// How observations are normalised before the ops.
+/// Keys of the normalization of observations before the ops.
 #[derive(Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct JsonNorm {
@@ -81,12 +81,12 @@ pub(super) struct JsonNorm {
 }
 
 impl JsonTime {
-    /// The tensor of the frequencies.
+    /// Returns the name of the tensor of the frequencies.
     pub(super) fn freq(&self) -> &str {
         self.freq.as_deref().unwrap_or("time.freq")
     }
 
-    /// Cosine and sine of a time at each frequency.
+    /// Returns cosine and sine of a time at each frequency.
     pub(super) fn features(&self, time: f64, freq: &[f32]) -> Result<Vec<f32>> {
         let unit = if self.turns.unwrap_or(true) { std::f64::consts::TAU } else { 1.0 };
         let of =
@@ -94,19 +94,20 @@ impl JsonTime {
         Ok(match self.order.as_deref() {
             None | Some("cos,sin") => [of(&f64::cos), of(&f64::sin)].concat(),
             Some("sin,cos") => [of(&f64::sin), of(&f64::cos)].concat(),
-            Some(other) => bail!("time.order is {other:?}; cos,sin and sin,cos are known"),
+            Some(other) => bail!("time.order is {other:?}; it must be cos,sin or sin,cos"),
         })
     }
 }
 
-/// The steps, and the time that the network reads in each.
+/// The steps, and the network's time input in each.
 pub(super) struct Schedule {
     pub(super) denoising: Denoising,
     pub(super) times: Vec<f64>,
 }
 
 impl JsonDenoising {
-    /// Of a flow over `len` values: Euler's or the midpoint method from the first time to the last.
+    /// Returns the schedule of a flow over `len` values: Euler's or the midpoint method from the first time to the
+    /// last.
     pub(super) fn flow(&self, len: usize) -> Result<Schedule> {
         for (key, given) in [
             ("schedule", self.schedule.is_some()),
@@ -117,12 +118,15 @@ impl JsonDenoising {
             ("variance", self.variance.is_some()),
             ("beta", self.beta.is_some()),
         ] {
-            ensure!(!given, "the key {key:?} belongs to kind diffusion, not to flow");
+            ensure!(!given, "the key {key:?} is for kind diffusion, not for flow; remove it");
         }
         let steps = self.step_count()?;
         let time = self.time.as_ref();
         let (from, to) = (time.and_then(|t| t.from).unwrap_or(0.0), time.and_then(|t| t.to).unwrap_or(1.0));
-        ensure!(from.is_finite() && to.is_finite() && from != to, "time runs from {from} to {to}");
+        ensure!(
+            from.is_finite() && to.is_finite() && from != to,
+            "time runs from {from} to {to}; the ends must be finite and different"
+        );
         let h = (to - from) / steps as f64;
         let at = |k: f64| from + h * k;
         let keep = Coefficients { keep: 1.0, ..Coefficients::default() };
@@ -133,33 +137,33 @@ impl JsonDenoising {
                     by.push(Coefficients { direct: h as f32, ..keep });
                     times.push(at(k as f64));
                 }
-                // The network is asked half a step ahead; from there the whole step is taken.
+                // Evaluate the network half a step ahead, and take the whole step with its result.
                 Some("midpoint") => {
                     by.push(Coefficients { ahead: (0.5 * h) as f32, ..keep });
                     by.push(Coefficients { direct: h as f32, ..keep });
                     times.extend([at(k as f64), at(k as f64 + 0.5)]);
                 }
-                Some(other) => bail!("solver is {other:?}; euler and midpoint are those of a flow"),
+                Some(other) => bail!("solver is {other:?}; a flow takes euler or midpoint"),
             }
         }
         Ok(Schedule { denoising: Denoising { first: 0, len, limit: f32::INFINITY, steps: by }, times })
     }
 
-    /// Of a diffusion process: Ho et al., arXiv 2006.11239, or Song et al., arXiv 2010.02502, with eta 0; the cosine
-    /// schedule is that of Nichol and Dhariwal, arXiv 2102.09672, equation 17.
+    /// Returns the schedule of a diffusion process: Ho et al., arXiv 2006.11239, or Song et al., arXiv 2010.02502, with
+    /// eta 0. The cosine schedule is that of Nichol and Dhariwal, arXiv 2102.09672, equation 17.
     pub(super) fn diffusion(&self, len: usize) -> Result<Schedule> {
         let train = self.train_steps.context("kind diffusion needs the key train_steps")?;
-        ensure!((1..=MOST_STEPS).contains(&train), "train_steps is {train}, it must be 1 to {MOST_STEPS}");
+        ensure!((1..=MOST_STEPS).contains(&train), "train_steps is {train}; it must be 1 to {MOST_STEPS}");
         let steps = if self.steps.or(self.euler_steps).is_some() { self.step_count()? } else { train };
-        ensure!(steps <= train, "steps is {steps}, train_steps only {train}");
+        ensure!(steps <= train, "steps is {steps}, but train_steps is only {train}");
         let remaining = self.remaining(train)?;
-        // Evenly spaced, from the noisiest on; the last is 0.
+        // Evenly spaced, beginning with the noisiest; the last is 0.
         let chosen: Vec<usize> = (0..steps).rev().map(|k| k * (train / steps)).collect();
         let limit = match (self.clip_sample, self.clip_iterate) {
             (None, None) => f32::INFINITY,
             (Some(clip), None) => super::numbers::positive(clip, "clip_sample")?,
             (None, Some(clip)) => super::numbers::positive(clip, "clip_iterate")?,
-            (Some(_), Some(_)) => bail!("clip_sample and clip_iterate limit by one limit; give one of them"),
+            (Some(_), Some(_)) => bail!("clip_sample and clip_iterate share one limit; remove one of them"),
         };
         let mut by = Vec::new();
         for (i, &t) in chosen.iter().enumerate() {
@@ -172,14 +176,14 @@ impl JsonDenoising {
 
     fn step_count(&self) -> Result<usize> {
         let steps = match (self.steps, self.euler_steps) {
-            (Some(_), Some(_)) => bail!("steps and euler_steps are the same; give one of them"),
+            (Some(_), Some(_)) => bail!("steps and euler_steps are synonyms; remove one of them"),
             (steps, euler) => steps.or(euler).context("kind flow needs the key steps")?,
         };
-        ensure!((1..=MOST_STEPS).contains(&steps), "steps is {steps}, it must be 1 to {MOST_STEPS}");
+        ensure!((1..=MOST_STEPS).contains(&steps), "steps is {steps}; it must be 1 to {MOST_STEPS}");
         Ok(steps)
     }
 
-    /// The share of the signal's power that remains after each step of training (alpha bar).
+    /// Returns the share of the signal's power that remains after each step of training (alpha bar).
     fn remaining(&self, train: usize) -> Result<Vec<f64>> {
         let betas: Vec<f64> = match self.schedule.as_deref() {
             Some("cosine" | "squaredcos_cap_v2") => {
@@ -194,10 +198,10 @@ impl JsonDenoising {
                 let share = |i: usize| if train > 1 { i as f64 / (train - 1) as f64 } else { 0.0 };
                 (0..train).map(|i| first + (last - first) * share(i)).collect()
             }
-            Some(other) => bail!("schedule is {other:?}; cosine and linear are known"),
+            Some(other) => bail!("schedule is {other:?}; it must be cosine or linear"),
             None => bail!("kind diffusion needs the key schedule: cosine or linear"),
         };
-        // Each step of training only ever adds noise.
+        // Each step of training must add noise.
         ensure!(betas.iter().all(|b| *b > 0.0 && *b < 1.0), "the schedule's betas must lie between 0 and 1");
         Ok(betas
             .iter()
@@ -208,19 +212,19 @@ impl JsonDenoising {
             .collect())
     }
 
-    /// The step from the signal's share `ab` to `before`.
+    /// Returns the step from the signal's share `ab` to `before`.
     fn step(&self, ab: f64, before: f64) -> Result<Coefficients> {
         let (signal, noise) = (ab.sqrt(), (1.0 - ab).sqrt());
-        // The sample and the noise that the output stands for, each by the iterate and the output.
+        // Sample and noise that the output represents, as coefficients of the iterate and the output.
         let (sample, eps) = match self.prediction.as_deref() {
             None | Some("epsilon") => ([1.0 / signal, -noise / signal], [0.0, 1.0]),
             Some("sample") => ([0.0, 1.0], [1.0 / noise, -signal / noise]),
             Some("v") => ([signal, -noise], [noise, signal]),
-            Some(other) => bail!("prediction is {other:?}; epsilon, sample and v are known"),
+            Some(other) => bail!("prediction is {other:?}; it must be epsilon, sample or v"),
         };
         let numbers = match self.solver.as_deref() {
             Some("ddim") => {
-                ensure!(self.variance.is_none(), "the key \"variance\" belongs to the solver ddpm");
+                ensure!(self.variance.is_none(), "the key \"variance\" is for the solver ddpm only; remove it");
                 let left = (1.0 - before).sqrt();
                 [sample[0], sample[1], left * eps[0], left * eps[1], before.sqrt(), 0.0, 0.0]
             }
@@ -237,14 +241,13 @@ impl JsonDenoising {
                             0.0
                         }
                     }
-                    Some(other) => bail!("variance is {other:?}; small and large are known"),
+                    Some(other) => bail!("variance is {other:?}; it must be small or large"),
                 };
                 [sample[0], sample[1], keep, 0.0, before.sqrt() * (1.0 - alpha) / (1.0 - ab), variance.sqrt(), 0.0]
             }
-            Some(other) => bail!("solver is {other:?}; ddpm and ddim are those of a diffusion policy"),
+            Some(other) => bail!("solver is {other:?}; a diffusion policy takes ddpm or ddim"),
         };
-        // A sample without a limit of its own is a sum like the rest, and its place is free for the iterate, if that
-        // has one.
+        // A sample without a limit is a sum like the others, and its place can hold the iterate's limit.
         let [sample_x, sample_v, keep, direct, sample, sigma, ahead] = numbers;
         let (by_x, by_v) = (keep + sample * sample_x, direct + sample * sample_v);
         let numbers = match (self.clip_sample, self.clip_iterate) {

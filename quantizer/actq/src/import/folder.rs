@@ -1,4 +1,4 @@
-//! A policy folder: `policy.json` (the op list) and `policy.safetensors` (the weights).
+//! Reads a policy folder: `policy.json` (the op list) and `policy.safetensors` (the weights).
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,10 +15,10 @@ use crate::error::{Context, Result, bail, ensure};
 use crate::graph::hoist;
 use crate::policy::Policy;
 
-/// The files that make a policy, in its folder.
+/// Files of a policy in its folder.
 pub const FILES: [&str; 2] = ["policy.json", "policy.safetensors"];
 
-/// Policy folders as a format.
+/// The importer of policy folders.
 #[derive(Clone, Copy, Debug)]
 pub struct PolicyFolder;
 
@@ -41,16 +41,17 @@ impl Policy {
     pub fn load(path: &Path) -> Result<Self> {
         ensure!(
             path.is_dir(),
-            "{}: not a folder; give the one that holds policy.json, or an .onnx file",
+            "{}: not a folder; name a folder that holds policy.json, or an .onnx file",
             path.display()
         );
         let [json_path, weights_path] = FILES.map(|name| path.join(name));
-        let json = fs::read(&json_path).with_context(|| format!("{}: cannot be read", json_path.display()))?;
-        let weights = fs::read(&weights_path).with_context(|| format!("{}: cannot be read", weights_path.display()))?;
+        let json = fs::read(&json_path).with_context(|| format!("{}: cannot read the file", json_path.display()))?;
+        let weights =
+            fs::read(&weights_path).with_context(|| format!("{}: cannot read the file", weights_path.display()))?;
         Self::of_files(path, [&json_path, &weights_path], &json, &weights)
     }
 
-    /// A policy that is at `dir`, from the bytes of its two files, which errors call by `names`.
+    /// Makes a policy at `dir` from the bytes of its two files; `names` are their names in errors.
     pub fn of_files(dir: &Path, names: [&Path; 2], json: &[u8], weights: &[u8]) -> Result<Self> {
         let [json_name, weights_name] = names.map(|name| name.display().to_string());
         let parsed = PolicyJson::parse(json).with_context(|| json_name.clone())?;
@@ -64,22 +65,27 @@ impl Policy {
 }
 
 fn build(dir: &Path, json: &PolicyJson, weights: Weights<'_>, digest: [u8; 32]) -> Result<Policy> {
-    ensure!(json.obs_dim > 0 && json.act_dim > 0, "obs_dim and act_dim must be at least 1");
+    ensure!(
+        json.obs_dim > 0 && json.act_dim > 0,
+        "obs_dim is {} and act_dim {}; both must be at least 1",
+        json.obs_dim,
+        json.act_dim
+    );
     for (name, n) in [("obs_dim", json.obs_dim), ("act_dim", json.act_dim), ("chunk", json.chunk.unwrap_or(1))] {
-        ensure!(n <= usize::from(u16::MAX), "{name} is {n}, 65535 is the most");
+        ensure!(n <= usize::from(u16::MAX), "{name} is {n}; it must be at most 65535");
     }
-    ensure!(!json.ops.is_empty(), "ops is empty");
-    ensure!(json.name.len() <= 200, "name is longer than 200 bytes");
+    ensure!(!json.ops.is_empty(), "ops is empty; a policy needs at least one op");
+    ensure!(json.name.len() <= 200, "name has {} bytes; at most 200 are allowed", json.name.len());
     let kind = json.kind()?;
     let (chunk, execute) = match kind {
         Kind::Step => (1, 1),
         Kind::Chunk | Kind::Flow | Kind::Diffusion => {
-            let chunk = json.chunk.context("a policy of several actions needs the key chunk")?;
+            let chunk = json.chunk.context("the key \"chunk\" is missing; a policy of several actions needs it")?;
             let execute = json.execute(chunk);
-            ensure!((1..=chunk).contains(&execute), "execute is {execute}, it must be 1 to chunk ({chunk})");
+            ensure!((1..=chunk).contains(&execute), "execute is {execute}; it must be 1 to chunk ({chunk})");
             (chunk, execute)
         }
-        kind => bail!("a policy of kind {kind:?} is not supported"),
+        kind => bail!("kind {kind:?} is not supported; use step, chunk, flow or diffusion"),
     };
     let add = |builder: &mut Builder<'_>| -> Result<()> {
         for (i, op) in json.ops.iter().enumerate() {

@@ -1,27 +1,27 @@
-//! What reads policies of one format.
+//! The interface of an importer.
 
 use std::path::{Path, PathBuf};
 
 use crate::error::Result;
 use crate::policy::Policy;
 
-/// Reads policies of one format.
+/// An importer of policies of one format.
 pub trait Importer: Sync {
-    /// Returns `true` if `path` names a policy of this format, whether it is there or not.
+    /// Returns `true` if `path` names a policy of this format, whether or not it exists.
     fn accepts(&self, path: &Path) -> bool;
 
-    /// The files that [`Self::load`] reads.
+    /// Returns the files that [`Self::load`] reads.
     fn files(&self, path: &Path) -> Vec<PathBuf>;
 
     /// Reads the policy.
     ///
     /// # Errors
     ///
-    /// Where a file is missing, damaged or not supported. Every error names the file, and the op, node or tensor.
+    /// If a file is missing, damaged or not supported. Every error names the file, and the op, node or tensor.
     fn load(&self, path: &Path) -> Result<Policy>;
 }
 
-/// The folder in which a policy's recordings are: its own, or the one that its file is in.
+/// Returns the folder of a policy's recordings: its own, or that of its file.
 pub fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(parent) if path.is_file() && parent.as_os_str().is_empty() => Path::new("."),

@@ -1,4 +1,4 @@
-//! `policy.json`: which keys it may have, and their values as f32.
+//! `policy.json`: its permitted keys, and their values as f32.
 
 use actq_kernels::image::Kind;
 use actq_kernels::math::Function;
@@ -53,10 +53,10 @@ const KEYS: [&str; 12] = [
     "action",
     "ops",
 ];
-/// Keys that tell people where a policy is from. Their values are not read.
+/// Keys about a policy's origin. Their values are not read.
 const ABOUT: [&str; 8] = ["source", "commit", "source_path", "license", "recurrent", "n_params", "inputs", "states"];
 
-/// One op; [`op_keys`] says which keys it may have.
+/// One op; [`op_keys`] lists its permitted keys.
 #[derive(Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct JsonOp {
@@ -109,16 +109,16 @@ pub enum Input {
 }
 
 impl PolicyJson {
-    /// Refuses keys that are not known: one that is ignored would be another policy.
+    /// Parses the file, and refuses unknown keys: ignoring one would change the policy.
     pub fn parse(bytes: &[u8]) -> Result<Self> {
         const WRONG: &str = "not a policy description";
         let value = strict_json::parse(bytes).context(WRONG)?;
-        // What the keys of an unknown kind are is not known either.
+        // An unknown kind must be refused before its keys are.
         let iterative = kind(value["kind"].as_str())?.is_iterative();
         let keys = [&KEYS[..], if iterative { &denoising::KEYS } else { &[] }].concat();
         if let Some(key) = given(&value).find(|key| !keys.contains(key) && !ABOUT.contains(key)) {
             let (keys, about) = (keys.join(", "), ABOUT.join(", "));
-            bail!("the key {key:?} is not known; known are {keys} and, for people alone, {about}");
+            bail!("the key {key:?} is not known; the keys are {keys} and, not read, {about}");
         }
         for (i, op) in value["ops"].as_array().into_iter().flatten().enumerate() {
             let Some(name) = op["op"].as_str() else { continue };
@@ -138,8 +138,8 @@ impl PolicyJson {
         kind(self.kind.as_deref())
     }
 
-    /// The action contract. Without the key `action` whatever is chunked is limited to -1..1, as the reference runtime
-    /// of the format does.
+    /// Returns the action contract. Without the key `action`, chunked policies are limited to -1..1, as in the format's
+    /// reference runtime.
     pub fn contract(&self, kind: Kind) -> Result<ActionContract> {
         let contract = match &self.action {
             Some(json) => json.contract(self.act_dim)?,
@@ -153,13 +153,13 @@ impl PolicyJson {
         Ok(ActionContract { playback, ..contract })
     }
 
-    /// How many actions of a chunk are executed where nothing says so: all, but of chunks that are averaged one.
+    /// Returns the default number of executed actions of a chunk: all, but one for an ensemble.
     pub fn execute(&self, chunk: usize) -> usize {
         self.execute.unwrap_or(if self.ensemble.is_some() { 1 } else { chunk })
     }
 }
 
-/// The keys of an object that have a value; one without says nothing.
+/// Returns the keys of an object that have a value; null counts as absent.
 fn given(object: &Value) -> impl Iterator<Item = &str> {
     object.as_object().into_iter().flatten().filter(|(_, value)| !value.is_null()).map(|(key, _)| key.as_str())
 }
@@ -170,11 +170,11 @@ fn kind(name: Option<&str>) -> Result<Kind> {
         Some("chunk") => Ok(Kind::Chunk),
         Some("flow") => Ok(Kind::Flow),
         Some("diffusion") => Ok(Kind::Diffusion),
-        Some(other) => bail!("kind {other:?} is not known; step, chunk, flow and diffusion are"),
+        Some(other) => bail!("kind {other:?} is not known; use step, chunk, flow or diffusion"),
     }
 }
 
-/// The keys of an op beside those of every op; `None` for an unknown op.
+/// Returns the keys of an op beside those of every op; `None` for an unknown op.
 fn op_keys(op: &str) -> Option<&'static [&'static str]> {
     Some(match op {
         "identity" => &[],
@@ -190,7 +190,7 @@ fn op_keys(op: &str) -> Option<&'static [&'static str]> {
     })
 }
 
-/// Refuses control characters in the text within `value`: names are printed.
+/// Refuses control characters in the text within `value`, since names are printed.
 fn check_text(place: &str, value: &Value) -> Result<()> {
     match value {
         Value::String(text) => {

@@ -1,15 +1,15 @@
-//! Numbers of a text as f32.
+//! Conversion of numbers to f32.
 
 use crate::error::{Result, ensure};
 
-/// A number as f32, rounded; refuses what f32 cannot hold.
+/// Rounds a number to f32, and refuses values beyond its range.
 pub fn real(value: f64, name: &str) -> Result<f32> {
     let real = value as f32;
     ensure!(real.is_finite(), "{name} is {value:?}, beyond float32's range");
     Ok(real)
 }
 
-/// As [`real`], above 0.
+/// Rounds a number to f32 as [`real`] does, and refuses values that are not above 0.
 pub fn positive(value: f64, name: &str) -> Result<f32> {
     let real = real(value, name)?;
     let rounded = if value > 0.0 { "float32 rounds that to 0, and " } else { "" };

@@ -1,4 +1,4 @@
-//! The op list of `policy.json` over named slots, with the weights of `policy.safetensors`, as a network.
+//! Builds a network from the op list of `policy.json` over named slots and the weights of `policy.safetensors`.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -20,7 +20,7 @@ pub(super) struct Weights<'a> {
 }
 
 impl Weights<'_> {
-    /// The tensor as f32 with its shape; refuses NaN, infinities and what f32 cannot hold.
+    /// Reads a tensor as f32 with its shape; refuses NaN, infinities and values beyond f32.
     fn read(&self, name: &str) -> Result<(Vec<usize>, Vec<f32>)> {
         let file = self.path.display();
         let Some(tensor) = self.file.get(name) else {
@@ -40,7 +40,7 @@ impl Weights<'_> {
         let (shape, data) = self.read(name)?;
         ensure!(
             data.len() == len,
-            "{}: tensor {name:?} has the shape {shape:?}, {len} values are needed here",
+            "{}: tensor {name:?} has the shape {shape:?}, but {len} values are needed here",
             self.path.display()
         );
         Ok(data)
@@ -51,7 +51,7 @@ impl Weights<'_> {
         let fits = matches!(shape[..], [r, c] if r > 0 && c == cols && rows.is_none_or(|rows| r == rows));
         ensure!(
             fits,
-            "{}: tensor {name:?} has the shape {shape:?}, [{}, {cols}] is needed here (rows are outputs)",
+            "{}: tensor {name:?} has the shape {shape:?}, but [{}, {cols}] is needed here (rows are outputs)",
             self.path.display(),
             rows.map_or("out".to_owned(), |r| r.to_string()),
         );
@@ -62,19 +62,19 @@ impl Weights<'_> {
 /// A network under construction.
 pub(super) struct Builder<'a> {
     weights: Weights<'a>,
-    /// So far.
+    /// Network so far.
     pub(super) graph: Graph,
     slots: HashMap<String, ValueId>,
 }
 
 impl<'a> Builder<'a> {
-    /// Nothing but the observation.
+    /// Begins with the observation alone.
     pub(super) fn new(obs_len: usize, weights: Weights<'a>) -> Self {
         Self { weights, graph: Graph::new(obs_len), slots: HashMap::from([("obs".to_owned(), 0)]) }
     }
 
-    /// The network of observation, time and iterate of a flow or a diffusion policy (slots `obs`, `tfeat` and `x`), and
-    /// what it reads as the time in each step.
+    /// Begins the network of a flow or a diffusion policy over observation, time and iterate (slots `obs`, `tfeat` and
+    /// `x`); returns it with its time input in each step.
     pub(super) fn iterative(
         obs_len: usize,
         by: &JsonDenoising,
@@ -94,7 +94,7 @@ impl<'a> Builder<'a> {
             slots.insert(name.to_owned(), graph.add(Concat(vec![Span { from, len }]), &[0])?);
             from += len;
         }
-        // Files of the format's first exporter name the tensors and no key.
+        // The format's first exporter names the tensors, but writes no key.
         let file = JsonNorm { mean: "obs_norm.mean".to_owned(), scale: "obs_norm.scale".to_owned(), clip: Some(5.0) };
         let implied = weights.file.get(&file.mean).is_some().then_some(&file);
         if let Some(norm) = by.obs_norm.as_ref().or(implied) {
@@ -107,7 +107,7 @@ impl<'a> Builder<'a> {
             let normal = graph.add(normalize, &[slots["obs"]])?;
             slots.insert("obs".to_owned(), normal);
         }
-        // What the network reads is limited as what the step keeps (`Schedule`).
+        // The network's input has the same limit as the step's iterate (`Schedule`).
         if by.clip_iterate.is_some() {
             let len = schedule.denoising.len;
             let limited = Normalize {
@@ -172,8 +172,8 @@ impl<'a> Builder<'a> {
     }
 
     fn recurrent(&mut self, op: &JsonOp, len: usize) -> Result<NodeKind> {
-        let hidden = op.hidden.context("needs the key hidden")?;
-        ensure!((1..=usize::from(u16::MAX)).contains(&hidden), "hidden is {hidden}, it must be 1 to 65535");
+        let hidden = op.hidden.context("the key \"hidden\" is missing")?;
+        ensure!((1..=usize::from(u16::MAX)).contains(&hidden), "hidden is {hidden}; it must be 1 to 65535");
         let (gates, order) = if op.op == "lstm" { (4, "i,f,g,o") } else { (3, "r,z,n") };
         if let Some(gates) = &op.gates {
             ensure!(gates == order, "gates are {gates:?}; only torch's order {order:?} is supported");
@@ -184,7 +184,7 @@ impl<'a> Builder<'a> {
         let input_bias = self.bias(&op.b_ih, rows)?;
         let state_bias = self.bias(&op.b_hh, rows)?;
         Ok(if op.op == "lstm" {
-            // Both biases only ever occur as their sum.
+            // Only the sum of both biases is used.
             let bias = input_bias.iter().zip(&state_bias).map(|(a, b)| a + b).collect();
             Lstm { hidden, input, state, bias }.into()
         } else {
@@ -196,7 +196,7 @@ impl<'a> Builder<'a> {
         name.as_ref().map_or_else(|| Ok(vec![0.0; len]), |name| self.weights.vector(name, len))
     }
 
-    /// The matrix of a tensor; one that several ops share is read once.
+    /// Returns the matrix of a tensor; one that several ops share is read one time.
     fn matrix(&mut self, name: &str, rows: Option<usize>, cols: usize) -> Result<usize> {
         let matrix = self.weights.matrix(name, rows, cols)?;
         self.graph.share_matrix(matrix)
@@ -206,14 +206,14 @@ impl<'a> Builder<'a> {
         self.slots.get(name).copied().with_context(|| {
             let mut known: Vec<_> = self.slots.keys().map(String::as_str).collect();
             known.sort_unstable();
-            format!("slot {name:?} has not been saved before; known are {}", known.join(", "))
+            format!("slot {name:?} has not been saved before; the slots are {}", known.join(", "))
         })
     }
 
-    /// The value of one slot, or of several slots and slices (`name[a:b]`) behind each other.
+    /// Returns the value of one slot, or the concatenation of several slots and slices (`name[a:b]`).
     fn gather(&mut self, names: &[String]) -> Result<ValueId> {
         let parts = names.iter().map(|name| self.part(name)).collect::<Result<Vec<_>>>()?;
-        ensure!(!parts.is_empty(), "input is an empty list");
+        ensure!(!parts.is_empty(), "input is an empty list; name at least one slot");
         self.graph.join(parts)
     }
 
@@ -231,16 +231,16 @@ impl<'a> Builder<'a> {
                     let bound = |s: &str, default| if s.is_empty() { Some(default) } else { s.parse().ok() };
                     Some((bound(a, 0)?, bound(b, whole)?))
                 });
-                parsed.with_context(|| format!("input {text:?} is not name[from:to]"))?
+                parsed.with_context(|| format!("input {text:?} is not of the form name[from:to]"))?
             }
         };
-        ensure!(from < to && to <= whole, "input {text:?} reaches beyond the slot's {whole} values");
+        ensure!(from < to && to <= whole, "input {text:?} exceeds the slot's {whole} values");
         Ok((value, Span { from, len: to - from }))
     }
 }
 
 fn need<'a>(key: &'a Option<String>, name: &str) -> Result<&'a str> {
-    key.as_deref().with_context(|| format!("needs the key {name}"))
+    key.as_deref().with_context(|| format!("the key {name:?} is missing"))
 }
 
 fn clip(value: Option<f64>, name: &str) -> Result<f32> {
@@ -251,11 +251,11 @@ fn function(name: &str, approximate: Option<&str>) -> Result<Function> {
     let name = match (name, approximate) {
         ("gelu", Some("tanh")) => "gelu_tanh",
         (name, None | Some("none")) => name,
-        (_, Some(other)) => bail!("approximate {other:?} is not known; none and tanh are"),
+        (_, Some(other)) => bail!("approximate {other:?} is not known; use none or tanh"),
     };
     Function::ALL.into_iter().find(|f| f.name() == name).with_context(|| {
         format!(
-            "unknown op; known are normalize, linear, layernorm, rmsnorm, add, mul, lstm, gru, identity, {}",
+            "unknown op; the ops are normalize, linear, layernorm, rmsnorm, add, mul, lstm, gru, identity, {}",
             Function::ALL.map(Function::name).join(", ")
         )
     })

@@ -1,4 +1,4 @@
-//! Files of tensors in the format safetensors: policies and recordings.
+//! Tensor files in the format safetensors: policies and recordings.
 
 use half::{bf16, f16};
 use safetensors::{Dtype, SafeTensors};
@@ -12,9 +12,9 @@ use crate::strict_json;
 pub struct TensorFile<'a>(SafeTensors<'a>);
 
 impl<'a> TensorFile<'a> {
-    /// Reads the header. Refuses a name that is there twice, of which the crate alone would take the last.
+    /// Reads the header, and refuses duplicate names; the crate alone would keep the last one.
     pub fn new(bytes: &'a [u8]) -> Result<Self> {
-        // The header, behind its length; whatever is wrong with that is left to the crate.
+        // The header follows its length; the crate refuses a wrong length.
         let header = bytes.split_first_chunk().and_then(|(len, rest)| {
             let len = usize::try_from(u64::from_le_bytes(*len)).ok()?;
             rest.get(..len)
@@ -23,14 +23,14 @@ impl<'a> TensorFile<'a> {
         Ok(Self(SafeTensors::deserialize(bytes)?))
     }
 
-    /// The tensors' names, sorted.
+    /// Returns the tensors' names, sorted.
     pub fn names(&self) -> Vec<String> {
         let mut names: Vec<String> = self.0.names().into_iter().map(str::to_owned).collect();
         names.sort_unstable();
         names
     }
 
-    /// A tensor; `None` where there is none of that name.
+    /// Returns a tensor; `None` if the file has none of that name.
     pub fn get(&self, name: &str) -> Option<Tensor> {
         let view = self.0.tensor(name).ok()?;
         let bytes = view.data();

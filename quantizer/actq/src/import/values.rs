@@ -1,8 +1,8 @@
-//! Arrays as files hold them.
+//! Arrays as stored in files.
 
 use half::{bf16, f16};
 
-/// An array as it was stored, row-major.
+/// An array as stored, row-major.
 #[derive(Clone, Debug)]
 pub struct Tensor {
     /// Length of each axis.
@@ -26,12 +26,13 @@ pub enum Values {
     I32(Vec<i32>),
     /// int64
     I64(Vec<i64>),
-    /// Of a type that neither a policy nor a recording has.
+    /// Any other type; policies and recordings never use it.
     Other(String),
 }
 
 impl Values {
-    /// The values as f32, what f32 cannot hold as infinite; `None` where they are of no type of real numbers.
+    /// Returns the values as f32, values beyond its range as infinities; `None` if their type is not one of real
+    /// numbers.
     pub fn to_f32(&self) -> Option<Vec<f32>> {
         Some(match self {
             Self::F32(values) => values.clone(),
@@ -42,7 +43,7 @@ impl Values {
         })
     }
 
-    /// What is wrong with value `i`, which is not a finite f32.
+    /// Describes value `i`, which is not a finite f32.
     pub fn not_f32(&self, i: usize) -> String {
         match self {
             Self::F64(values) if values[i].is_finite() => format!("holds {:e}, beyond float32's range,", values[i]),
@@ -50,7 +51,7 @@ impl Values {
         }
     }
 
-    /// The type's name.
+    /// Returns the type's name.
     pub fn type_name(&self) -> &str {
         match self {
             Self::F32(_) => "float32",

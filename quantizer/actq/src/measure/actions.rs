@@ -1,12 +1,12 @@
-//! The f32 policy's actions: the network's output through the action contract.
+//! Actions of the f32 policy: the network's output through the action contract.
 
 use ndarray::Array2;
 
 use crate::graph::{Network, Weights, zero_state};
 use crate::policy::Policy;
 
-/// What the f32 policy gives for each of `observations`, from a zero state on: all actions of its output behind each
-/// other, scaled, offset and limited. The step limit is not applied: it is between actions that are executed.
+/// Returns what the f32 policy gives for each of `observations`, from a zero state on: all actions of its output in
+/// order, scaled, offset and limited. The step limit is not applied, since it holds between executed actions only.
 pub fn actions(policy: &Policy, observations: &[Vec<f32>]) -> Vec<Vec<f32>> {
     let (network, weights) = (Network::new(&policy.graph), Weights::of(&policy.graph));
     let mut state = zero_state(&policy.graph, 1);

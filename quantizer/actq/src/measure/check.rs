@@ -1,4 +1,4 @@
-//! What a new image does on the recordings: its errors where it was fitted and where it was not.
+//! Errors of a new image on its calibration and held-out recordings.
 
 use actq_kernels::Image;
 
@@ -7,45 +7,46 @@ use crate::data::{Dataset, Recordings};
 use crate::error::Result;
 use crate::policy::Policy;
 
-/// Multiplications that a run over the calibration recording may take, about half a second of the executor on a host; a
-/// longer recording is thinned.
+/// Most MACs of a run over the calibration recording, about half a second of the executor on a host; a longer recording
+/// is thinned.
 const MOST_MACS: usize = 600_000_000;
 
-/// As [`MOST_MACS`], of the held-out recording: so many that its error is what `actq eval` says, but for the longest.
+/// Most MACs of a run over the held-out recording: all but the longest recordings then give the same error as `actq
+/// eval`.
 const MOST_HELDOUT_MACS: usize = 20_000_000_000;
 
-/// Frames that are kept in any case: an iterative head runs its network many times for each.
+/// Frames that are always kept: an iterative head runs its network many times for each.
 const LEAST_FRAMES: usize = 200;
 
-/// Errors of an image on a recording, or on what is left of it where it is long.
+/// Errors of an image on a recording, or on a thinned one if it is long.
 #[derive(Clone, Debug)]
 pub struct Checked {
-    /// On what was compared.
+    /// Errors on the compared frames.
     pub report: ErrorReport,
-    /// Observations of the whole recording.
+    /// Frames of the whole recording.
     pub recorded: usize,
 }
 
 /// Errors of an image on its policy's recordings.
 #[derive(Clone, Debug)]
 pub struct Check {
-    /// On the held-out recording, where there is one.
+    /// Errors on the held-out recording, if there is one.
     pub heldout: Option<Checked>,
-    /// On the calibration recording, where there is one.
+    /// Errors on the calibration recording, if there is one.
     pub calib: Option<Checked>,
-    /// What rounding the activations adds, on the held-out recording, or else on the calibration recording.
+    /// Error added by rounding the activations, on the held-out recording or else on the calibration recording.
     pub activations: ActivationShare,
 }
 
 impl Check {
-    /// The error to go by: on the held-out recording, or else on the calibration recording.
+    /// Returns the error on the held-out recording, or else on the calibration recording.
     pub fn nmse(&self) -> Option<f64> {
         self.heldout.as_ref().or(self.calib.as_ref()).map(|checked| checked.report.nmse)
     }
 }
 
-/// Runs `image`, made from `source`, over what recordings there are; `None` where there are none. Where one holds no
-/// actions, the f32 policy gives them.
+/// Runs `image`, made from `source`, over the recordings; `None` without any. If one holds no actions, the f32 policy
+/// gives them.
 pub fn check(source: &Policy, image: Image<'_>, recordings: &Recordings) -> Result<Option<Check>> {
     let thinned = |dataset: &Dataset, most: usize| -> Dataset {
         let macs = source.graph.weights().max(1) * source.graph.denoising_steps();

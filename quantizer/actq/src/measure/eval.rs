@@ -1,4 +1,4 @@
-//! How far an image's actions are from the f32 policy's.
+//! Errors of an image's actions against the f32 policy's.
 
 use std::path::Path;
 
@@ -16,13 +16,14 @@ use crate::runtime::with_head;
 /// Errors of the raw network output against recorded f32 actions.
 #[derive(Clone, Debug, Serialize)]
 pub struct ErrorReport {
-    /// Mean over the output's dimensions of (mean squared error / variance of the recorded values).
+    /// Normalized mean squared error: mean over the output's dimensions of (mean squared error / variance of the
+    /// recorded values).
     pub nmse: f64,
-    /// The largest of these ratios.
+    /// Largest ratio of a dimension.
     pub worst_nmse: f64,
-    /// The largest absolute error, in units of the raw output.
+    /// Largest absolute error, in units of the raw output.
     pub max_abs: f64,
-    /// Observations compared.
+    /// Compared observations.
     pub steps: usize,
     /// Bits per weight, everything counted.
     pub bpw: f64,
@@ -34,23 +35,23 @@ pub struct ErrorReport {
 }
 
 /// Runs `image` over the valid steps of `dataset`, each episode from its starting state, and compares its raw output
-/// with the recorded actions. Dimensions that never vary in the record are left out of the ratios.
+/// with the recorded actions. Dimensions that never vary in the recording do not count.
 pub fn evaluate(image: Image<'_>, dataset: &Dataset) -> Result<ErrorReport> {
     with_head(image, |head| compare(&image, dataset, head))
 }
 
-/// The NMSE of a network in f32 over `dataset`, as [`ErrorReport::nmse`] is that of an image.
+/// Returns the NMSE of a network in f32 over `dataset`, comparable to [`ErrorReport::nmse`].
 pub fn network_nmse(graph: &Graph, dataset: &Dataset) -> Result<f64> {
     let mut network = Plain { evaluator: Evaluator::new(graph), output: Vec::new() };
     Ok(differences(graph.len_of(graph.output()), dataset, &mut network)?.nmse)
 }
 
-/// What rounding the activations adds to an image's error.
+/// Error that rounding the activations adds to an image.
 #[derive(Clone, Debug)]
 pub struct ActivationShare {
-    /// Error of the image's weights with activations in f32.
+    /// Error (NMSE) of the image's weights with activations in f32.
     pub unrounded_nmse: f64,
-    /// What is gone then, as a share of the image's error. Below 0 where rounding the activations happens to help.
+    /// Share of the image's error that disappears then; below 0 if rounding the activations happens to help.
     pub share: f64,
     /// Linear operations, counted from 0, whose input is rounded to more than int8.
     pub int16: Vec<usize>,
@@ -58,7 +59,7 @@ pub struct ActivationShare {
     pub linear: usize,
 }
 
-/// Runs the image's weights with activations in f32 over `dataset`, where the image itself has the error `nmse`.
+/// Runs the image's weights with activations in f32 over `dataset`; `nmse` is the error of the image itself.
 pub fn activation_share(image: Image<'_>, dataset: &Dataset, nmse: f64) -> Result<ActivationShare> {
     let unrounded_nmse = compare(&image, dataset, &mut Unrounded::new(image))?.nmse;
     let limits: Vec<u16> = image.ops().filter_map(|op| op.matrix()).map(|matrix| matrix.x_max).collect();
@@ -67,7 +68,7 @@ pub fn activation_share(image: Image<'_>, dataset: &Dataset, nmse: f64) -> Resul
     Ok(ActivationShare { unrounded_nmse, share, int16, linear: limits.len() })
 }
 
-/// What gives raw outputs, step by step.
+/// A network that gives raw outputs, step by step.
 trait Runner {
     /// Starts an episode from a state, or from the zero state.
     fn start(&mut self, state: Option<&[f32]>);
@@ -86,7 +87,7 @@ impl Runner for Head<'_, '_> {
             return Ok(Head::infer(self, observation)?);
         }
         let (observation, noise) =
-            observation.split_at_checked(image.obs_len()).context("an observation without noise")?;
+            observation.split_at_checked(image.obs_len()).context("the observation has no noise")?;
         Ok(self.infer_with_noise(observation, noise)?)
     }
 }
@@ -125,7 +126,7 @@ fn compare(image: &Image<'_>, dataset: &Dataset, network: &mut impl Runner) -> R
     Ok(ErrorReport { nmse, worst_nmse, max_abs, steps, bpw, bytes, worst_dimension })
 }
 
-/// Of a network's outputs to the recorded ones; see [`ErrorReport`].
+/// Differences of a network's outputs to the recorded ones; see [`ErrorReport`].
 struct Differences {
     nmse: f64,
     worst_nmse: f64,
@@ -155,20 +156,24 @@ fn differences(out_len: usize, dataset: &Dataset, network: &mut impl Runner) -> 
         .filter(|&i| signal[i].variance() > 0.0)
         .map(|i| (i, error[i].mean_square() / signal[i].variance()))
         .collect();
-    ensure!(!ratios.is_empty(), "{}: the recorded actions never vary", dataset.path.display());
+    ensure!(
+        !ratios.is_empty(),
+        "{}: the recorded actions never vary; record episodes in which the robot acts",
+        dataset.path.display()
+    );
     let (worst_dimension, worst_nmse) = ratios.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default();
     let nmse = ratios.iter().map(|r| r.1).sum::<f64>() / ratios.len() as f64;
     Ok(Differences { nmse, worst_nmse, worst_dimension, max_abs })
 }
 
-/// The held-out recording of a policy folder, which must belong to `image`.
+/// Reads the held-out recording of a policy folder that must belong to `image`.
 pub fn heldout(policy_dir: &Path, image: &Image<'_>) -> Result<Dataset> {
     let source = Policy::load(policy_dir).ok().filter(|policy| policy.digest == image.digest());
     heldout_from(Some(policy_dir), None, source.as_ref(), image)
 }
 
-/// The held-out recording in `file`, or where none is given in the policy's folder. Where it holds no actions, `source`
-/// gives them, the policy that the image was made from.
+/// Reads the held-out recording in `file`, or without it in the policy's folder. If it holds no actions, `source` gives
+/// them: the policy that the image was made from.
 pub fn heldout_from(
     policy_dir: Option<&Path>,
     file: Option<&Path>,
@@ -180,12 +185,12 @@ pub fn heldout_from(
     Ok(dataset)
 }
 
-/// Puts the actions of `source`, the policy that the image was made from, where a recording has none.
+/// Fills in missing actions by `source`, the policy that the image was made from.
 pub(super) fn fill_actions(dataset: &mut Dataset, source: Option<&Policy>) -> Result<()> {
     if dataset.action.is_none() {
         let source = source.with_context(|| {
             format!(
-                "{}: array \"action\" is missing, and so is the policy that the image was made from, which could give it: \
+                "{}: array \"action\" is missing, and no policy is given that could compute it: \
                  name its folder with --policy",
                 dataset.path.display()
             )
@@ -214,7 +219,7 @@ impl Moment {
     }
 
     fn variance(&self) -> f64 {
-        // A constant sequence leaves rounding noise of either sign.
+        // The rounding noise of a constant sequence may have either sign.
         let variance = self.mean_square() - (self.sum / self.n).powi(2);
         if variance > 1e-12 * self.mean_square() { variance } else { 0.0 }
     }

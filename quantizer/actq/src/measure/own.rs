@@ -1,4 +1,4 @@
-//! How far an image's actions are from the f32 policy's where the image itself has led the robot.
+//! Errors of an image on the path on which it has controlled the robot itself.
 
 use std::path::PathBuf;
 
@@ -9,8 +9,8 @@ use crate::data::{Dataset, Sizes, driven_by, joined};
 use crate::error::{Result, ensure};
 use crate::policy::Policy;
 
-/// The error of `image` on the recordings in `files` of what it was shown itself (`actq serve --record`). Those of
-/// another image are refused, those that name none are believed. Where actions are missing, `source` gives them, the
+/// Returns the error of `image` on recordings of its own rollouts, in `files` (`actq serve --record`). Recordings of
+/// another image are refused; those that name no image are accepted. If actions are missing, `source` gives them: the
 /// policy that the image was made from.
 pub fn own_path(image: Image<'_>, files: &[PathBuf], source: Option<&Policy>) -> Result<ErrorReport> {
     let load = |file: &PathBuf| -> Result<Dataset> {
@@ -19,7 +19,7 @@ pub fn own_path(image: Image<'_>, files: &[PathBuf], source: Option<&Policy>) ->
             let own = image.crc();
             ensure!(
                 other == own,
-                "{name}: records what another image was shown (crc32 {other:08x}, this one has {own:08x}); drive this one with \
+                "{name}: is a rollout of another image (crc32 {other:08x}, this one has {own:08x}); record this one with \
                  actq serve --record"
             );
         }

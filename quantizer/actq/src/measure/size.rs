@@ -1,4 +1,4 @@
-//! How large an image is, and what its parts are called.
+//! Size of an image and its matrices.
 
 use std::collections::BTreeSet;
 
@@ -7,16 +7,16 @@ use actq_kernels::image::{Matrix, Op, OpKind};
 
 use crate::graph::ops::Balance;
 
-/// Bits per weight of the policy as it was trained: codes, padding, scales, steps and block records of all matrices,
-/// and the constants that the quantizer put before them, over the number of the source's weights. A matrix that several
-/// operations share counts once.
+/// Returns the bits per weight of the policy as it was trained: codes, padding, scales, output steps and block records
+/// of all matrices, and the constants that the quantizer put before them, over the number of the original network's
+/// weights. A matrix that several operations share counts once.
 pub fn bits_per_weight(image: &Image<'_>) -> f64 {
     let bytes: usize = distinct(image).iter().map(Matrix::weight_bytes).sum();
     let constants: usize = image.ops().map(|op| added_bytes(&op)).sum();
     8.0 * (bytes + constants) as f64 / image.source_weights().max(1) as f64
 }
 
-/// Bytes of the operation's constants, if the quantizer put it before a matrix.
+/// Returns the bytes of the operation's constants, if the quantizer put it before a matrix.
 fn added_bytes(op: &Op<'_>) -> usize {
     match op.kind {
         OpKind::Normalize { added: true } => Balance::bytes(op.dst().len),
@@ -25,12 +25,12 @@ fn added_bytes(op: &Op<'_>) -> usize {
     }
 }
 
-/// Bytes as hexadecimal digits.
+/// Formats bytes as hexadecimal digits.
 pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
-/// The matrices, each once, in the order of the operations that use them first.
+/// Returns the matrices, each once, in the order of the operations that first use them.
 pub fn distinct<'a>(image: &Image<'a>) -> Vec<Matrix<'a>> {
     let mut seen = BTreeSet::new();
     let place = |m: &Matrix<'a>| m.blocks().next().map(|rows| rows.block.rows_from(0).as_ptr() as usize);

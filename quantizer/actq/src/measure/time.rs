@@ -1,48 +1,48 @@
-//! Time on the target: what the cost model (`actq_kernels::pace::cost`) says of an image at a clock.
+//! Predicted time on the target: the cost model (`actq_kernels::pace::cost`) at a clock.
 
 use actq_kernels::Image;
 use actq_kernels::image::Op;
 use actq_kernels::pace::cost::{self, Cost};
 use serde::Serialize;
 
-/// Clock of the processor that is assumed where none is given: 168 MHz, that of an STM32F405.
+/// Default clock of the processor in Hz: 168 MHz, that of an STM32F405.
 pub const CLOCK: f64 = 168e6;
 
 /// An operation's cost.
 #[derive(Clone, Debug, Serialize)]
 pub struct OpTime {
-    /// The operation's name, as `actq inspect` has it.
+    /// Name of the operation, as `actq inspect` shows it.
     pub op: String,
     /// Values that it writes.
     pub output: usize,
-    /// How often it runs; everything below is of all its runs.
+    /// Runs in a step; all figures below cover all runs.
     pub runs: usize,
-    /// Multiplications of a weight; 0 where the operation has no weights.
+    /// MACs; 0 if the operation has no weights.
     pub macs: usize,
     /// Instructions.
     pub instructions: u64,
     /// Modelled cycles.
     pub cycles: u64,
-    /// At the clock.
+    /// Microseconds at the clock.
     pub microseconds: f64,
 }
 
 /// The cost of a step that evaluates the network, on a Cortex-M4 with FPU.
 #[derive(Clone, Debug, Serialize)]
 pub struct StepTime {
-    /// The processor's clock.
+    /// The processor's clock in Hz.
     pub clock_hz: f64,
-    /// The operations, and last what a step takes beside them.
+    /// Operations, and last the rest of a step.
     pub ops: Vec<OpTime>,
-    /// Of the whole step.
+    /// MACs of the whole step.
     pub macs: usize,
-    /// Of the whole step.
+    /// Instructions of the whole step.
     pub instructions: u64,
-    /// Of the whole step.
+    /// Modelled cycles of the whole step.
     pub cycles: u64,
-    /// Of the whole step.
+    /// Milliseconds of the whole step at the clock.
     pub milliseconds: f64,
-    /// The least budget of a poll, in instructions ([`actq_kernels::Head::poll`]).
+    /// Least slice budget of a poll, in instructions ([`actq_kernels::Head::poll`]).
     pub least_budget: u32,
 }
 

@@ -1,4 +1,4 @@
-//! An image's network with its activations in f32: what is left of the error when only the weights are quantized.
+//! The network of an image with activations in f32: the error that remains if only the weights are quantized.
 
 use actq_kernels::Image;
 use actq_kernels::head::run_whole;
@@ -7,29 +7,29 @@ use ndarray::{Array2, ArrayView1};
 
 use crate::error::Result;
 
-/// Runs the operations of an image as the executor does, but for the linear ones.
+/// Executor of an image with linear operations in f32.
 pub struct Unrounded<'a> {
     image: Image<'a>,
     ops: Vec<Op<'a>>,
-    /// The weights of each operation; empty where it has none.
+    /// Weights of each operation; empty if it has none.
     weights: Vec<Array2<f32>>,
     arena: Vec<u32>,
 }
 
 impl<'a> Unrounded<'a> {
-    /// Takes the weights out of an image.
+    /// Dequantizes the weights of an image.
     pub fn new(image: Image<'a>) -> Self {
         let ops: Vec<Op<'a>> = image.ops().collect();
         let weights = ops.iter().map(|op| op.matrix().map_or(Array2::default((0, 0)), |matrix| dequantized(&matrix)));
         Self { image, weights: weights.collect(), ops, arena: vec![0; image.scratch_words()] }
     }
 
-    /// The recurrent state.
+    /// Returns the recurrent state.
     pub fn state_mut(&mut self) -> &mut [f32] {
         bytemuck::cast_slice_mut(&mut self.arena[self.image.state().range()])
     }
 
-    /// The network's raw output for an observation of the image's length, with its noise.
+    /// Returns the network's raw output for an observation of the image's length, with its noise.
     pub fn infer(&mut self, observation: &[f32]) -> Result<&[f32]> {
         let arena = &mut self.arena;
         let (observation, noise) = observation.split_at(self.image.obs_len());
@@ -62,7 +62,7 @@ fn dequantized(matrix: &Matrix<'_>) -> Array2<f32> {
     weights
 }
 
-/// `dst = W src + b`, or added to `dst`, in f32.
+/// Computes `dst = W src + b`, or adds it to `dst`, in f32.
 fn multiply(op: &Op<'_>, matrix: &Matrix<'_>, weights: &Array2<f32>, accumulate: bool, arena: &mut [u32]) {
     let x: Vec<f32> = floats(&arena[op.src().range()]).to_vec();
     let y = bytemuck::cast_slice_mut::<u32, f32>(&mut arena[op.dst().range()]);
@@ -96,7 +96,7 @@ mod tests {
     const HIDDEN: usize = 8;
     const ACT: usize = 2;
 
-    /// A network with every operation.
+    /// Makes a network with every operation.
     fn graph() -> Graph {
         let mut random = Random::new(3);
         let mut values = |n: usize| -> Vec<f32> { (0..n).map(|_| 0.5 * random.unit()).collect() };
@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_the_f32_network_of_the_images_weights() {
+    fn unrounded_equals_the_f32_network_of_dequantized_weights() {
         let graph = graph();
         let (outcomes, buffer) = image(&graph, Width::W3, Activations::Int8);
         let image = buffer.image(Path::new("memory")).expect("an image");
@@ -172,7 +172,7 @@ mod tests {
         assert!(rounded > 1e-4, "int8 activations make no difference: {rounded}");
     }
 
-    /// The recorded state means the same to the f32 network, to the executor and here.
+    /// Checks that the recorded state means the same to the f32 network, to the executor and to [`Unrounded`].
     #[test]
     fn states_have_one_order() {
         let graph = graph();

@@ -1,13 +1,12 @@
 //! ActQuant (Akbari et al., "Sub-4-bit Action-Guided Quantization for Vision-Language-Action Models", arXiv
 //! 2605.24011).
 //!
-//! Stage 1 gives each matrix a width: [`score`] measures by HSIC how much it adds to what its values say about the
-//! actions, [`allocation`] spends the budget on these scores. Stage 2 fits the scales inside a matrix: they minimise
-//! the rounding error weighted by the [Fisher](fisher) information of the action loss, by the same search that plain
-//! rounding uses. Where the budget is one width for all, stage 1 is skipped.
+//! Stage 1 gives each matrix a width. [`score`] measures by HSIC how much the matrix adds to the information of its
+//! values about the actions, and [`allocation`] spends the budget on these scores. Stage 2 fits the scales inside a
+//! matrix. They minimize the rounding error weighted by the [Fisher](fisher) information of the action loss, by the
+//! same search as plain rounding. If the budget is one width for all, stage 1 is skipped.
 //!
-//! What is done otherwise than in the paper or in its authors' code is a [choice](choices); `docs/QUANTIZER.md` lists
-//! all of it.
+//! Every deviation from the paper or its authors' code is a [choice](choices); `docs/QUANTIZER.md` lists them all.
 
 pub mod allocation;
 pub mod choices;
@@ -27,29 +26,26 @@ use crate::graph::{Graph, WeightMatrix};
 use choices::Choices;
 use score::Score;
 
-/// Share of the matrix's mean importance that every weight has at least. It decides where no recorded frame says
-/// anything, as in rows behind a ReLU that never fires.
+/// Least importance of a weight, as a share of its matrix's mean importance. It decides if no recorded frame gives
+/// information, as for rows after a ReLU that never fires.
 const FLOOR: f64 = 1e-6;
 
-/// What ActQuant takes from the recorded observations, for any number of budgets.
+/// ActQuant's statistics of the recorded observations, for any number of budgets.
 #[derive(Clone, Debug)]
 pub struct ActionStatistics {
-    /// What they were taken by, and how they are used.
+    /// Choices by which they were taken and are used.
     pub choices: Choices,
-    /// Stage 1, per matrix.
+    /// Scores of stage 1, per matrix.
     pub scores: Vec<Score>,
-    /// Stage 2, per matrix `[rows, cols]`.
+    /// Importance of stage 2, per matrix `[rows, cols]`.
     pub importance: Vec<Array2<f32>>,
 }
 
 impl ActionStatistics {
-    /// Runs the f32 network over `dataset`, which must hold actions. `progress` gets the share done.
+    /// Runs the f32 network over `dataset`, which must hold actions. `progress` receives the share done.
     pub fn collect(graph: &Graph, dataset: &Dataset, choices: Choices, progress: &mut dyn FnMut(f64)) -> Result<Self> {
         let path = dataset.path.display();
-        ensure!(
-            dataset.action.is_some(),
-            "{path}: array \"action\" is missing; actquant weighs weights by the actions"
-        );
+        ensure!(dataset.action.is_some(), "{path}: array \"action\" is missing; actquant needs recorded actions");
         Ok(Self {
             choices,
             scores: score::scores(graph, dataset, choices.frames, choices.bandwidth)?,
@@ -57,15 +53,15 @@ impl ActionStatistics {
         })
     }
 
-    /// What the allocation works with: the chosen score, negative ones as 0, or 1 for every matrix where none is above
-    /// 0 (and then `true`): scores that tell nothing apart give every layer the same claim.
+    /// Returns the scores of the allocation: the chosen score, with negative ones as 0. If none is above 0, it returns
+    /// 1 for every matrix and `true`: such scores give every layer the same claim.
     pub fn effective_scores(&self) -> (Vec<f64>, bool) {
         let scores: Vec<f64> = self.scores.iter().map(|s| s.of(self.choices.score).max(0.0)).collect();
         if scores.iter().all(|s| *s == 0.0) { (vec![1.0; scores.len()], true) } else { (scores, false) }
     }
 
-    /// What the fits of scales weigh every weight by, per matrix: its importance and a little more, and where that is
-    /// chosen [`by_magnitude`].
+    /// Returns the importance of every weight in the fits of scales, per matrix: its importance plus [`FLOOR`], and if
+    /// so chosen, [`by_magnitude`].
     pub fn weight_importance(&self, graph: &Graph) -> Vec<Vec<f64>> {
         let matrices = graph.matrices.iter().zip(&self.importance);
         let weighed = |(matrix, importance): (&WeightMatrix, &Array2<f32>)| {
@@ -95,12 +91,12 @@ pub fn quantize(graph: &Graph, statistics: &ActionStatistics, rate: Rate, option
         .collect()
 }
 
-/// Rounds to nearest with scales that minimise `sum of importance * error^2` of each group, or of each row.
+/// Rounds to nearest with scales that minimize `sum of importance * error^2` of each group, or of each row.
 fn quantize_matrix(matrix: &WeightMatrix, width: Width, group: usize, importance: &[f64]) -> Quantized {
     round_to(matrix, width, Scales::fit(matrix, &vec![Some(width); matrix.rows], group, importance))
 }
 
-/// Every importance of a matrix times `sqrt(mean of the row's w^2 + w^2)`, as llama.cpp's fits weigh.
+/// Multiplies every importance of a matrix by `sqrt(mean of the row's w^2 + w^2)`, as llama.cpp's fits do.
 pub fn by_magnitude(mut importance: Vec<f64>, matrix: &WeightMatrix) -> Vec<f64> {
     let cols = matrix.cols.max(1);
     for (importance, row) in importance.chunks_mut(cols).zip(matrix.data.chunks(cols)) {
@@ -137,7 +133,7 @@ pub(crate) mod testing {
         (0..len).map(|_| 0.3 * random.unit()).collect()
     }
 
-    /// 3 -> 4 tanh -> 2
+    /// Makes a network 3 -> 4 tanh -> 2.
     pub(crate) fn mlp() -> Graph {
         let mut random = Random::new(1);
         let mut graph = Graph::new(3);
@@ -148,7 +144,7 @@ pub(crate) mod testing {
         graph
     }
 
-    /// LSTM 2 -> 3, then 3 -> 2
+    /// Makes a network LSTM 2 -> 3, then 3 -> 2.
     pub(crate) fn lstm() -> Graph {
         let mut random = Random::new(2);
         let mut graph = Graph::new(2);
@@ -163,7 +159,7 @@ pub(crate) mod testing {
         graph
     }
 
-    /// Random observations with the network's own actions.
+    /// Makes random observations with the network's own actions.
     pub(crate) fn dataset(graph: &Graph, episodes: usize, steps: usize) -> Dataset {
         let mut random = Random::new(3);
         let obs = Array3::from_shape_fn((episodes, steps, graph.obs_len), |_| random.unit());
@@ -216,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_importance_is_plain_rounding_and_none_is_too() {
+    fn equal_or_no_importance_equals_plain_rounding() {
         let data: Vec<f32> = (0..80).map(|i| (i as f32 * 1.3).cos()).collect();
         let matrix = WeightMatrix { name: "w".into(), rows: 2, cols: 40, data };
         let plain = scale::round_to_nearest(&matrix, Width::W3, 32);
@@ -227,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn a_budget_is_kept_and_a_width_is_taken_as_it_is() {
+    fn budgets_and_fixed_widths_are_kept() {
         let graph = testing::lstm();
         let dataset = testing::dataset(&graph, 2, 24);
         let statistics =
@@ -243,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn actions_are_needed_and_scores_without_a_positive_one_count_as_equal() {
+    fn missing_actions_are_refused_and_negative_scores_equalized() {
         let graph = testing::mlp();
         let mut dataset = testing::dataset(&graph, 1, 8);
         dataset.action = None;

@@ -1,5 +1,5 @@
-//! The pipeline: how much every row matters, a width for each to the budget, removal of what has none, and
-//! distillation, or, with 0 steps of it, two-sided error feedback.
+//! The method distill. It measures how much every row matters, gives each a width within the budget, and removes rows
+//! of width 0. Then it distills, or, with 0 steps, uses two-sided error feedback.
 
 mod activations;
 mod adam;
@@ -46,43 +46,43 @@ use schedule::{Bounds, most_steps};
 use size::Size;
 use train::{Learned, Task, distill};
 
-/// Frames that learning needs at least.
+/// Least frames to learn from.
 const LEAST_FRAMES: usize = 200;
-/// The seed of the statistics, which are the same for every budget.
+/// Seed of the statistics, the same for every budget.
 const SEED: u64 = 1;
 
-/// What the pipeline takes from the recorded observations, for any number of budgets.
+/// Statistics of the recorded observations, for any number of budgets.
 #[derive(Debug)]
 pub struct RowStatistics {
-    /// The network, its columns balanced, and the recorded observations.
+    /// The network with balanced columns, and the recorded observations.
     windows: Windows,
     /// Importance of every matrix's columns; of its columns about their means; of its rows.
     inputs: Vec<Vec<f64>>,
     centred: Vec<Vec<f64>>,
     outputs: Vec<Vec<f64>>,
-    /// Of every matrix's input, and `G`.
+    /// Moments of every matrix's input, and `G`.
     moments: Vec<(Moments, DMatrix<f64>)>,
-    /// Frames or windows that `G` was taken of.
+    /// Frames or windows that `G` was taken over.
     pub(super) outputs_of: usize,
-    /// Matrices whose columns keep units that are far apart.
+    /// Matrices whose columns still have very different units.
     pub(super) mixed: Vec<MixedUnits>,
 }
 
 impl RowStatistics {
-    /// Runs the f32 network over `dataset`, forwards and backwards. `moments` are those of the matrices' inputs, of so
-    /// many frames that no more fit the allowance, if there is one.
+    /// Runs the f32 network over `dataset`, forwards and backwards. `moments` holds the moments of the matrices' inputs
+    /// and the number of frames that they were taken over, as many as the allowance permits.
     pub fn collect(
         graph: &Graph,
         dataset: &Dataset,
         (mut moments, frames): (Vec<Moments>, usize),
         allowance: Option<Allowance>,
     ) -> Result<Self> {
-        dataset.require_frames(LEAST_FRAMES, "learning from fewer repeats them by heart")?;
+        dataset.require_frames(LEAST_FRAMES, "learning from fewer overfits")?;
         let every = if allowance.is_some() { dataset.frames().div_ceil(frames.max(1)) } else { 1 };
         let windows = Windows::new(graph.clone(), dataset, every);
         ensure!(
             windows.output_variance.iter().any(|v| *v > 0.0),
-            "{}: the policy gives the same action at every observation",
+            "{}: the policy gives the same action at every observation; record observations with different actions",
             dataset.path.display()
         );
         let (output_moments, outputs_of) = output_moments(&windows, allowance, SEED);
@@ -99,17 +99,17 @@ impl RowStatistics {
         })
     }
 
-    /// The network, its columns balanced.
+    /// Returns the network with balanced columns.
     pub fn graph(&self) -> &Graph {
         &self.windows.graph
     }
 
-    /// The most steps of distillation with these options.
+    /// Returns the most steps of distillation with these options.
     pub fn most_steps(&self, options: &Options) -> usize {
         options.steps.unwrap_or_else(|| most_steps(&self.windows.graph))
     }
 
-    /// Where learning ends at the latest.
+    /// Returns the limits of learning.
     fn bounds(&self, options: &Options) -> Bounds {
         let most = self.most_steps(options);
         let steps = (options.steps.is_some() || options.minutes.is_none()).then_some(most);
@@ -117,7 +117,7 @@ impl RowStatistics {
     }
 }
 
-/// Quantizes a network. Hidden elements without bits are gone from it, biases and norms have learned.
+/// Quantizes a network. The result lacks hidden elements without bits; its biases and norms have been learned.
 pub fn quantize(
     statistics: &RowStatistics,
     rate: Rate,
@@ -128,7 +128,11 @@ pub fn quantize(
     let graph = &windows.graph;
     for (name, _) in &options.forced {
         let names = || graph.matrices.iter().map(|m| m.name.as_str()).collect::<Vec<_>>().join(", ");
-        ensure!(graph.matrices.iter().any(|m| m.name == *name), "no matrix is named {name:?}; there are {}", names());
+        ensure!(
+            graph.matrices.iter().any(|m| m.name == *name),
+            "no matrix is named {name:?}; the matrices are {}",
+            names()
+        );
     }
     let allowed = rate.bytes(graph.weights());
     let forced = forced(graph, rate, options);
@@ -199,7 +203,7 @@ pub fn quantize(
     };
     let mut outcomes: Vec<Outcome> =
         quantized.iter().zip(learned_with).map(|(q, limit)| outcome(q, limit)).collect::<Result<_>>()?;
-    // int16 is packed in another layout, which may pad more; it is taken where it still fits.
+    // int16 has another layout, which may pad more; use it if it still fits.
     for (m, &limit) in wanted.iter().enumerate() {
         let other = outcome(&quantized[m], limit)?;
         let total = size.beside(&widths) + outcomes.iter().map(Outcome::bytes).sum::<usize>() - outcomes[m].bytes()
@@ -219,7 +223,7 @@ pub fn quantize(
     Ok(QuantizedNetwork { graph: learned, outcomes, learning })
 }
 
-/// The width that is forced on every matrix, if one is.
+/// Returns the width that is forced on every matrix, if any.
 fn forced(graph: &Graph, rate: Rate, options: &Options) -> Vec<Option<Width>> {
     let named = |matrix: &WeightMatrix| options.forced.iter().find(|(name, _)| *name == matrix.name).map(|(_, w)| *w);
     let of_matrix = |matrix: &WeightMatrix| match rate {
@@ -229,7 +233,7 @@ fn forced(graph: &Graph, rate: Rate, options: &Options) -> Vec<Option<Width>> {
     graph.matrices.iter().map(of_matrix).collect()
 }
 
-/// Values of the vectors that a rate counts.
+/// Returns the number of values of the vectors that a rate counts.
 fn values(graph: &Graph, rate: Rate, options: &Options) -> usize {
     match rate {
         Rate::Bytes(_) => graph.changed_values(options.learns()),
@@ -237,7 +241,7 @@ fn values(graph: &Graph, rate: Rate, options: &Options) -> usize {
     }
 }
 
-/// The fewest bytes that a rate can be met with. A balance, which only the recording can ask for, does not count.
+/// Returns the fewest bytes that meet a rate. A balance does not count, since only the recording can require it.
 pub(super) fn least_bytes(graph: &Graph, rate: Rate, options: &Options) -> usize {
     let dimensions = dimensions(graph);
     let size = Size { graph, dimensions: &dimensions, packings: Vec::new(), values: values(graph, rate, options) };
@@ -245,7 +249,7 @@ pub(super) fn least_bytes(graph: &Graph, rate: Rate, options: &Options) -> usize
 }
 
 /// Quantizes without learning: every matrix by two-sided error feedback with the moments of its input and of its
-/// output's derivative, the mean error into the biases.
+/// output's derivative. The mean error goes into the biases.
 fn feed_back(
     compacted: &Compacted,
     group: usize,

@@ -1,5 +1,5 @@
 //! GPTQ (Frantar et al., arXiv 2210.17323, algorithm 1): columns are quantized one after the other, and each column's
-//! error is spread over the columns still to come so that the output changes least.
+//! error is spread over the remaining columns so that the output changes least.
 
 use actq_kernels::layout::Width;
 use nalgebra::DMatrix;
@@ -10,11 +10,11 @@ use crate::calibrate::moments::Moments;
 use crate::error::{Context, Result};
 use crate::graph::WeightMatrix;
 
-/// Share of the mean diagonal that is added to the diagonal of H (the paper's dampening).
+/// Damping (the paper's dampening): share of the mean diagonal that is added to the diagonal of H.
 const DAMPING: f64 = 0.01;
 
 /// Quantizes `matrix` with the second moment `E[x x']` of its input. Columns go in order of falling diagonal
-/// ("act-order"); scales are fitted before, weighted with the diagonal.
+/// ("act-order"). Scales are fitted before, weighted by the diagonal.
 pub fn quantize(matrix: &WeightMatrix, width: Width, group: usize, moments: &Moments) -> Result<Quantized> {
     let (rows, cols) = (matrix.rows, matrix.cols);
     let diagonal: Vec<f64> = moments.second.diagonal().iter().copied().collect();
@@ -50,7 +50,7 @@ pub fn quantize(matrix: &WeightMatrix, width: Width, group: usize, moments: &Mom
     })
 }
 
-/// The lower Cholesky factor of the inverse of the damped moment, rows and columns in `order`.
+/// Returns the lower Cholesky factor of the inverse of the damped moment, with rows and columns in `order`.
 fn feedback(second: &DMatrix<f64>, order: &[usize]) -> Result<DMatrix<f64>> {
     let n = order.len();
     let damping = (DAMPING * second.trace() / n as f64).max(1e-12);
@@ -67,7 +67,7 @@ mod tests {
     use crate::random::Random;
 
     #[test]
-    fn feedback_lowers_the_output_error_for_correlated_inputs() {
+    fn feedback_reduces_output_error_of_correlated_inputs() {
         let (rows, cols) = (16, 48);
         let mut random = Random::new(7);
         let data = (0..rows * cols).map(|_| random.unit()).collect();

@@ -1,17 +1,17 @@
-//! What is said of how a network's codes were chosen.
+//! A report of how a network's codes were chosen.
 
 use std::fmt;
 
 use crate::calibrate::widening::Widening;
 
-/// How codes are chosen.
+/// Way in which codes are chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Choice {
-    /// They are learned, with inputs widened so far.
+    /// Learning with inputs widened by this noise.
     Learning(Widening),
-    /// By two-sided error feedback, with this share of the mean added to the diagonals of the inputs' moments.
+    /// Two-sided error feedback.
     Feedback {
-        /// The share.
+        /// Share of the mean that is added to the diagonals of the inputs' moments.
         damping: f64,
     },
 }
@@ -28,22 +28,21 @@ impl fmt::Display for Choice {
 /// How a network's codes were chosen.
 #[derive(Clone, Debug)]
 pub struct Learning {
-    /// Steps of learning; 0 where nothing was learned.
+    /// Steps of learning; 0 if nothing was learned.
     pub steps: usize,
-    /// The way.
+    /// Selected way.
     pub choice: Choice,
-    /// What was tried to find it.
+    /// Ways that were compared.
     pub tried: Vec<Tried>,
 }
 
-/// A choice and its error on the episodes that were left out: the mean over samples and outputs of squared error over
-/// variance.
+/// A choice and its errors on held-out episodes: the mean over samples and outputs of squared error over variance.
 #[derive(Clone, Copy, Debug)]
 pub struct Tried {
     /// The choice.
     pub choice: Choice,
-    /// At the recorded observations.
+    /// Error at the recorded observations.
     pub recorded: f64,
-    /// At observations widened by [`Widening::WIDE`].
+    /// Error at observations widened by [`Widening::WIDE`].
     pub widened: f64,
 }

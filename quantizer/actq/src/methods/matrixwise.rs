@@ -1,4 +1,4 @@
-//! Methods that quantize every matrix by itself and to one width: round to nearest, and GPTQ. A budget upgrades widths
+//! Methods that quantize every matrix separately and to one width: round to nearest, and GPTQ. A budget widens matrices
 //! greedily.
 
 use actq_kernels::Width;
@@ -12,8 +12,8 @@ use crate::calibrate::moments::Moments;
 use crate::error::Result;
 use crate::graph::{Graph, WeightMatrix};
 
-/// Quantizes every matrix of `graph`: by error feedback with the `moments` of its input, where there are any, or by
-/// rounding to nearest.
+/// Quantizes every matrix of `graph`: by error feedback with the `moments` of its input, if given, or by rounding to
+/// nearest.
 pub fn quantize(graph: &Graph, moments: Option<&[Moments]>, rate: Rate, options: &Options) -> Result<Vec<Outcome>> {
     let one = |m: usize, width| -> Result<Outcome> {
         let matrix: &WeightMatrix = &graph.matrices[m];
@@ -36,7 +36,7 @@ pub fn quantize(graph: &Graph, moments: Option<&[Moments]>, rate: Rate, options:
     }
 }
 
-/// The fewest bytes that the matrices of `graph` take.
+/// Returns the fewest bytes that the matrices of `graph` take.
 pub(super) fn least_bytes(graph: &Graph, options: &Options) -> usize {
     let packing = options.packing();
     let at = |m: &WeightMatrix, width| block_bytes(packing.shape(width, m.rows, m.cols), false);
@@ -44,9 +44,9 @@ pub(super) fn least_bytes(graph: &Graph, options: &Options) -> usize {
     graph.matrices.iter().map(least).sum()
 }
 
-/// One of each matrix's tries so that the bytes stay within `limit`: starting from the smallest, always the change
-/// that lowers the sum of relative errors most per byte and still fits. (A wider try can take fewer bytes, where it
-/// pads less.)
+/// Selects one of each matrix's tries so that the bytes stay within `limit`. It starts from the smallest, and
+/// repeatedly makes the change that most lowers the sum of relative errors per byte and still fits. (A wider try can
+/// take fewer bytes if it pads less.)
 fn allocate(tries: &[Vec<Outcome>], limit: f64, weights: usize) -> Result<Vec<usize>> {
     let size = |m: usize, choice: usize| tries[m][choice].bytes();
     let error = |m: usize, choice: usize| tries[m][choice].error.unwrap_or(0.0);

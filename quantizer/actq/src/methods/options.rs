@@ -1,4 +1,4 @@
-//! What to quantize to.
+//! Method, budget and other options of a quantization.
 
 use std::fmt;
 
@@ -9,7 +9,7 @@ use super::actquant::choices::Choices;
 use crate::budget::Budget;
 use crate::error::{Result, ensure};
 
-/// How codes are chosen.
+/// Method by which codes are chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
     /// Round to nearest, scales by least squared weight error.
@@ -17,15 +17,15 @@ pub enum Method {
     /// Column-wise error feedback with the second moment of the matrix's input (GPTQ, arXiv 2210.17323).
     Gptq,
     /// Round to nearest, widths by HSIC scores, scales by the Fisher information of the action loss (ActQuant, arXiv
-    /// 2605.24011); where it may be read in several ways, by these choices.
+    /// 2605.24011); the choices decide ambiguities.
     ActQuant(Choices),
     /// Widths by rows, pruning and distillation ([`super::distill`]).
     Distill,
 }
 
 impl Method {
-    /// Columns per u8 scale where the user asks for none in particular. Error feedback and learning make good what one
-    /// scale a row loses; rounding has only its scales.
+    /// Returns the default columns per u8 scale. Error feedback and learning compensate the losses of one scale per
+    /// row; rounding has only its scales.
     pub fn default_group(self) -> usize {
         match self {
             Self::Rtn | Self::ActQuant(_) => 32,
@@ -34,7 +34,7 @@ impl Method {
     }
 }
 
-/// The name, and in parentheses other choices of ActQuant's than the defaults.
+/// Shows the name, and in parentheses choices of ActQuant other than the defaults.
 impl fmt::Display for Method {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {
@@ -56,19 +56,19 @@ pub enum Activations {
     Int8,
     /// Up to -32767 to 32767, as far as the int32 accumulator allows.
     Int16,
-    /// int16 where it lowers the error noticeably, int8 elsewhere; methods that do not measure take int8.
+    /// int16 if it lowers the error noticeably, else int8; methods that do not measure it use int8.
     Auto,
-    /// What [`Self::Auto`] has before it measures, with the same widths: for drafts, whose time counts.
+    /// The setting of [`Self::Auto`] before it measures, with the same widths: for drafts, whose time counts.
     Unmeasured,
 }
 
 impl Activations {
-    /// Whether all matrices get what was asked for.
+    /// Returns `true` if all matrices get the requested bits.
     pub fn are_asked_for(self) -> bool {
         matches!(self, Self::Int8 | Self::Int16)
     }
 
-    /// The largest magnitude.
+    /// Returns the largest magnitude.
     pub const fn limit(self) -> u16 {
         match self {
             Self::Int8 | Self::Auto | Self::Unmeasured => 127,
@@ -77,30 +77,30 @@ impl Activations {
     }
 }
 
-/// What to quantize to.
+/// Options of a quantization.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// How codes are chosen.
+    /// Method.
     pub method: Method,
-    /// What the image may cost.
+    /// Budget of the image.
     pub budget: Budget,
     /// Columns per u8 scale; 0 = one scale a row.
     pub group: usize,
     /// Bits of the activations.
     pub activations: Activations,
-    /// The most steps of distillation; None: as many as suit the network.
+    /// Most steps of distillation; `None`: chosen for the network.
     pub steps: Option<usize>,
-    /// The most minutes of distillation; None: only the steps bound it.
+    /// Most minutes of distillation; `None`: no limit but the steps.
     pub minutes: Option<f64>,
-    /// Whether what is learned counts errors relative to the action's size, more than it does by itself (method distill).
+    /// `true` if learning weighs errors relative to the action's size, more than by default (method distill).
     pub relative: bool,
-    /// Seed of everything that is drawn.
+    /// Seed of all random numbers.
     pub seed: u64,
-    /// Matrices, by their tensors' names, whose rows all get a certain width (method distill).
+    /// Matrices, by their tensors' names, whose rows all get the given width (method distill).
     pub forced: Vec<(String, Width)>,
 }
 
-/// How rows are packed, beside their widths.
+/// Packing of rows, beside their widths.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Packing {
     /// Lanes of the activations.
@@ -110,39 +110,39 @@ pub struct Packing {
 }
 
 impl Packing {
-    /// That of activations up to this magnitude.
+    /// Returns the packing for activations up to this magnitude.
     pub fn of(x_max: u16, group: usize) -> Self {
         Self { lanes: Lanes::of(x_max, group), group }
     }
 
-    /// The shape of a block of rows.
+    /// Returns the shape of a block of rows.
     pub fn shape(self, width: Width, rows: usize, cols: usize) -> BlockShape {
         BlockShape { width, lanes: self.lanes, rows, cols, group: self.group }
     }
 }
 
 impl Options {
-    /// Refuses groups that no kernel has, and a way to learn where nothing is learned.
+    /// Refuses groups that no kernel supports, and options of learning without learning.
     pub fn check(&self) -> Result<()> {
         ensure!(
             !self.relative || self.learns(),
-            "--relative says how method distill learns: leave it out with other methods and with --steps 0"
+            "--relative changes how method distill learns; remove it for other methods and for --steps 0"
         );
-        ensure!(is_group(self.group), "group is {}, it must be 0 or one of {GROUPS:?}", self.group);
+        ensure!(is_group(self.group), "group is {}; it must be 0 or one of {GROUPS:?}", self.group);
         Ok(())
     }
 
-    /// `true` if the method learns.
+    /// Returns `true` if the method learns.
     pub fn learns(&self) -> bool {
         self.method == Method::Distill && self.steps != Some(0)
     }
 
-    /// How matrices are packed before any of them is found to need int16 activations.
+    /// Returns the packing of matrices before any of them is found to need int16 activations.
     pub fn packing(&self) -> Packing {
         Packing::of(self.activations.limit(), self.group)
     }
 
-    /// A method and a budget, one scale a row, everything else as it suits the method.
+    /// Makes options of a method and a budget, with one scale per row and defaults for the rest.
     pub fn new(method: Method, budget: Budget) -> Self {
         Self {
             method,

@@ -1,4 +1,4 @@
-//! A method with all that it needs to know about the recorded observations.
+//! A method with its statistics of the recorded observations.
 
 use std::borrow::Cow;
 use std::time::Duration;
@@ -18,17 +18,18 @@ use crate::data::{Dataset, Recording};
 use crate::error::{Context as _, Result, ensure};
 use crate::graph::Graph;
 
-/// Frames that every method with a recording needs at least; distill needs more.
+/// Least frames of a method with a recording; distill needs more.
 const LEAST_FRAMES: usize = 16;
 
-/// Vectors of an iterative head's matrices that statistics are taken of; every frame gives one for each denoising step.
+/// Most input vectors of an iterative head's matrices in statistics; every frame gives one per denoising step.
 const MOST_VECTORS: usize = 8192;
 
-/// Frames of it that are taken however little time there is, and those that tell how much a frame takes.
+/// Least frames of an iterative head in statistics, however short the time; also the frames that measure the time of
+/// one.
 const LEAST_SAMPLED: usize = 64;
 const TIMED: usize = 8;
 
-/// A method made ready once, to quantize a network at any number of rates.
+/// A prepared method, which quantizes a network at any number of rates.
 #[derive(Debug)]
 pub struct PreparedMethod<'a> {
     graph: &'a Graph,
@@ -36,7 +37,7 @@ pub struct PreparedMethod<'a> {
     sampled: Option<Sampled>,
 }
 
-/// What a method takes from the recorded observations.
+/// Statistics of the recorded observations.
 #[derive(Debug)]
 enum Statistics {
     Rtn,
@@ -46,17 +47,19 @@ enum Statistics {
 }
 
 impl<'a> PreparedMethod<'a> {
-    /// Collects what the method needs from `calib`, a recording that fits the network. `progress` gets the share done.
+    /// Collects the method's statistics from `calib`, a recording that fits the network. `progress` receives the share
+    /// done.
     pub fn new(graph: &'a Graph, method: Method, calib: Option<&Dataset>, progress: impl FnMut(f64)) -> Result<Self> {
         Self::before(graph, method, calib, None, progress)
     }
 
-    /// As [`Self::new`], before learning of at most so many `minutes`: the statistics of an iterative head are taken of
-    /// so many frames that they take a share of it. They then depend on the machine, as learning by the clock does.
+    /// As [`Self::new`], for learning of at most this many `minutes`. The statistics of an iterative head are limited
+    /// to as many frames as take a share of that time. They then depend on the machine, like learning with a time
+    /// limit.
     ///
     /// # Errors
     ///
-    /// Where a method that needs a recording has none, or too short a one, and where one of actquant holds no actions.
+    /// If a method lacks a recording that it needs, or has too short a one, and if one of actquant holds no actions.
     pub fn before(
         graph: &'a Graph,
         method: Method,
@@ -69,7 +72,7 @@ impl<'a> PreparedMethod<'a> {
         let allowance = time.map(Allowance::of);
         let calib = || -> Result<&Dataset> {
             let calib = calib.with_context(|| Recording::Calib.missing(&method.to_string()))?;
-            calib.require_frames(LEAST_FRAMES, "statistics of fewer are those of a few chance observations")?;
+            calib.require_frames(LEAST_FRAMES, "statistics of fewer frames are unreliable")?;
             Ok(calib)
         };
         let mut moments = |dataset: &Dataset| {
@@ -107,12 +110,13 @@ impl<'a> PreparedMethod<'a> {
         Ok(Self { graph, statistics, sampled: sampled.filter(|_| steps > 1) })
     }
 
-    /// Of how many frames the statistics of an iterative head were taken; `None` where they are those of all.
+    /// Returns the frames over which the statistics of an iterative head were taken; `None` for all.
     pub fn sampled(&self) -> Option<Sampled> {
         self.sampled
     }
 
-    /// Matrices that read observations in units far apart, which distill could not balance; empty for other methods.
+    /// Returns matrices that read observations in very different units and that distill could not balance; empty for
+    /// other methods.
     pub fn mixed_units(&self) -> &[MixedUnits] {
         match &self.statistics {
             Statistics::Distill(statistics) => &statistics.mixed,
@@ -120,7 +124,7 @@ impl<'a> PreparedMethod<'a> {
         }
     }
 
-    /// The network that is quantized: of distill with balanced columns.
+    /// Returns the network that is quantized; for distill, with balanced columns.
     pub fn graph(&self) -> &Graph {
         match &self.statistics {
             Statistics::Distill(statistics) => statistics.graph(),
@@ -128,7 +132,7 @@ impl<'a> PreparedMethod<'a> {
         }
     }
 
-    /// The method.
+    /// Returns the method.
     pub fn method(&self) -> Method {
         match &self.statistics {
             Statistics::Rtn => Method::Rtn,
@@ -138,8 +142,8 @@ impl<'a> PreparedMethod<'a> {
         }
     }
 
-    /// Quantizes the network. `options.method` is the one that was prepared; not `options.budget` counts, but `rate`.
-    /// `progress` is called by what learns.
+    /// Quantizes the network at `rate`; `options.budget` is ignored. `options.method` must be the prepared method.
+    /// Methods that learn call `progress`.
     pub fn quantize(
         &self,
         rate: Rate,
@@ -147,10 +151,10 @@ impl<'a> PreparedMethod<'a> {
         mut progress: impl FnMut(Progress),
     ) -> Result<QuantizedNetwork> {
         let (graph, method) = (self.graph, self.method());
-        ensure!(options.method == method, "prepared for {method}, not for {}", options.method);
+        ensure!(options.method == method, "the quantizer is prepared for method {method}, not for {}", options.method);
         ensure!(
             options.forced.is_empty() || method == Method::Distill,
-            "widths of single matrices go with method distill, not with {method}"
+            "only method distill takes widths of single matrices, not {method}"
         );
         options.check()?;
         let outcomes = match &self.statistics {
@@ -162,7 +166,7 @@ impl<'a> PreparedMethod<'a> {
         Ok(QuantizedNetwork { graph: graph.clone(), outcomes, learning: None })
     }
 
-    /// The most steps of distillation with these options; 0 for methods that do not learn.
+    /// Returns the most steps of distillation with these options; 0 for methods that do not learn.
     pub fn most_steps(&self, options: &Options) -> usize {
         match &self.statistics {
             Statistics::Distill(statistics) => statistics.most_steps(options),
@@ -170,7 +174,7 @@ impl<'a> PreparedMethod<'a> {
         }
     }
 
-    /// ActQuant's statistics; other methods have none.
+    /// Returns ActQuant's statistics; `None` for other methods.
     pub fn action_statistics(&self) -> Option<&ActionStatistics> {
         match &self.statistics {
             Statistics::ActQuant(statistics) => Some(statistics),
@@ -178,13 +182,13 @@ impl<'a> PreparedMethod<'a> {
         }
     }
 
-    /// ActQuant's scores, per matrix; empty for other methods.
+    /// Returns ActQuant's scores per matrix; empty for other methods.
     pub fn scores(&self) -> &[Score] {
         self.action_statistics().map_or(&[], |statistics| &statistics.scores)
     }
 }
 
-/// The fewest bytes with which a method can meet a rate, from the shapes alone.
+/// Returns the fewest bytes with which a method can meet a rate, from the shapes alone.
 pub fn least_bytes(graph: &Graph, rate: Rate, options: &Options) -> usize {
     match options.method {
         Method::Rtn | Method::Gptq => matrixwise::least_bytes(graph, options),
@@ -193,7 +197,7 @@ pub fn least_bytes(graph: &Graph, rate: Rate, options: &Options) -> usize {
     }
 }
 
-/// Quantizes a network once, by any method: see [`PreparedMethod::quantize`].
+/// Quantizes a network one time, by any method: see [`PreparedMethod::quantize`].
 pub fn quantize(
     graph: &Graph,
     calib: Option<&Dataset>,

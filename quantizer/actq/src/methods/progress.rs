@@ -1,29 +1,29 @@
-//! How far a quantization is.
+//! Progress of a quantization.
 
 use std::fmt;
 
-/// What is being done, with the share of it that is done. Errors are squared differences to the f32 network over the
-/// variance of its outputs, at the widened inputs of learning: they fall, but are not those of a recording.
+/// The present work, and the share of the whole that is done. Errors are squared differences to the f32 network over
+/// the variance of its outputs, at the widened inputs of learning. They fall, but are not the errors on a recording.
 #[derive(Clone, Copy, Debug)]
 pub enum Progress {
-    /// How far to widen the inputs is being chosen.
+    /// Comparing widenings of the inputs.
     Choosing {
-        /// Share done of the whole.
+        /// Share of the whole that is done.
         share: f64,
-        /// The error so far.
+        /// Present error.
         error: f64,
     },
     /// Learning.
     Learning {
-        /// Share done of the whole.
+        /// Share of the whole that is done.
         share: f64,
-        /// The error so far.
+        /// Present error.
         error: f64,
     },
 }
 
 impl Progress {
-    /// Share of the whole that is done.
+    /// Returns the share of the whole that is done.
     pub fn share(self) -> f64 {
         let (Self::Choosing { share, .. } | Self::Learning { share, .. }) = self;
         share

@@ -1,4 +1,4 @@
-//! What a weight matrix becomes.
+//! Quantized weight matrices and networks.
 
 use actq_kernels::image::block_bytes;
 use actq_kernels::layout::{BlockShape, Lanes, Width};
@@ -17,25 +17,25 @@ pub struct Quantized {
     pub rows: usize,
     /// Inputs.
     pub cols: usize,
-    /// Columns per u8 scale; 0 = none.
+    /// Columns per u8 scale; 0 = no group scales.
     pub group: usize,
-    /// The width of each row; a row without one has no bits and gives its bias alone.
+    /// Width of each row; a row without one has no bits and gives its bias only.
     pub widths: Vec<Option<Width>>,
-    /// The scale of each row.
+    /// Scale of each row.
     pub scales: Vec<bf16>,
-    /// `rows * groups` scales; empty without groups.
+    /// Group scales, `rows * groups`; empty without groups.
     pub group_scales: Vec<u8>,
-    /// `rows * cols` codes.
+    /// Codes, `rows * cols`.
     pub codes: Vec<u8>,
 }
 
 impl Quantized {
-    /// Group scales of a row.
+    /// Returns the group scales of a row.
     pub fn groups(&self) -> usize {
         if self.group == 0 { 0 } else { self.cols.div_ceil(self.group) }
     }
 
-    /// Level times group scale at (`row`, `col`): the weight divided by the row's scale.
+    /// Returns level times group scale at (`row`, `col`): the weight divided by the row's scale.
     pub fn integer(&self, row: usize, col: usize) -> i32 {
         let level = self.widths[row].map_or(0, |width| width.level(self.codes[row * self.cols + col]));
         match self.group {
@@ -44,14 +44,14 @@ impl Quantized {
         }
     }
 
-    /// The weights that the codes stand for.
+    /// Returns the dequantized weights.
     pub fn dequantized(&self) -> Vec<f32> {
         (0..self.rows * self.cols)
             .map(|i| self.integer(i / self.cols, i % self.cols) as f32 * self.scales[i / self.cols].to_f32())
             .collect()
     }
 
-    /// How many rows have which width, as text: `3`, or `0x12 2x200 4x44`.
+    /// Formats how many rows have each width: `3`, or `0x12 2x200 4x44`.
     pub fn width_counts(&self) -> String {
         let count = |width: Option<Width>| self.widths.iter().filter(|w| **w == width).count();
         let all = std::iter::once(None).chain(Width::ALL.map(Some));
@@ -63,13 +63,13 @@ impl Quantized {
         }
     }
 
-    /// Whether the blocks' rows follow each other in the order of the output, so that no index is stored. (Missing rows
-    /// may only be the last.)
+    /// Returns `true` if the blocks' rows follow each other in the order of the output, so that no output steps are
+    /// stored. (Missing rows may only be the last.)
     pub fn in_order(blocks: &[(BlockShape, Vec<usize>)]) -> bool {
         blocks.iter().flat_map(|(_, rows)| rows).enumerate().all(|(i, &row)| i == row)
     }
 
-    /// The largest activation magnitude whose worst-case row sum stays within int32, at most `limit`.
+    /// Returns the largest activation magnitude, at most `limit`, whose worst-case row sum stays within int32.
     pub fn x_max(&self, limit: u16) -> Result<u16> {
         let row_sum = |row| (0..self.cols).map(|col| i64::from(self.integer(row, col).abs())).sum::<i64>();
         let largest = (0..self.rows).map(row_sum).max().unwrap_or(0).max(1);
@@ -83,7 +83,7 @@ impl Quantized {
     }
 }
 
-/// The weights of a network whose matrices are `quantized`.
+/// Returns the weights of a network with `quantized` matrices.
 pub(super) fn dequantized(graph: &Graph, quantized: &[Quantized]) -> Weights {
     let mut weights = Weights::of(graph);
     for (weights, quantized) in weights.matrices.iter_mut().zip(quantized) {
@@ -92,53 +92,53 @@ pub(super) fn dequantized(graph: &Graph, quantized: &[Quantized]) -> Weights {
     weights
 }
 
-/// What became of the rows and columns of a matrix as it was trained, and why. Errors are squared differences of the
+/// Bit allocation of the rows and columns of a trained matrix, with its reasons. Errors are squared differences of the
 /// actions over their variances, summed over the network's outputs.
 #[derive(Clone, Debug)]
 pub struct RowAllocation {
-    /// The width of each of its rows; `None` for rows without bits.
+    /// Width of each row; `None` for rows without bits.
     pub widths: Vec<Option<Width>>,
-    /// `g_r sum_c w_rc^2 h_c` of each row.
+    /// Energy `g_r sum_c w_rc^2 h_c` of each row.
     pub energy: Vec<f64>,
-    /// The expected error of leaving each row without bits.
+    /// Predicted error of each row without bits.
     pub removal: Vec<f64>,
-    /// The expected error of each row at its width.
+    /// Predicted error of each row at its width.
     pub expected: Vec<f64>,
-    /// The importance `h` of each of its columns.
+    /// Importance `h` of each column.
     pub inputs: Vec<f64>,
-    /// Its row behind each row that is left.
+    /// Trained row of each remaining row.
     pub rows: Vec<usize>,
-    /// Its column behind each column that is left.
+    /// Trained column of each remaining column.
     pub columns: Vec<usize>,
 }
 
-/// What a network became.
+/// A quantized network.
 #[derive(Clone, Debug)]
 pub struct QuantizedNetwork {
-    /// Its structure: it may have lost elements, its biases may have learned.
+    /// Structure: it may have lost elements, and its biases may have changed.
     pub graph: Graph,
-    /// Its matrices.
+    /// Result for each matrix.
     pub outcomes: Vec<Outcome>,
-    /// What was learned, where something was.
+    /// Learning, if the method learns.
     pub learning: Option<Learning>,
 }
 
-/// The result for one matrix.
+/// Result for one matrix.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// Codes and scales.
     pub quantized: Quantized,
-    /// `E |(W' - W) x|^2 / E |W x|^2` under the second moment of the calibration inputs; without them, of white inputs.
-    /// None where the matrix was learned anew, so that its own error says nothing.
+    /// Relative error `E |(W' - W) x|^2 / E |W x|^2` under the second moment of the calibration inputs, or of white
+    /// inputs without them. `None` if the matrix was learned, so that its own error means nothing.
     pub error: Option<f64>,
     /// Activation magnitude.
     pub x_max: u16,
-    /// What became of the rows and columns, where they have widths of their own (method distill).
+    /// Bit allocation of the rows and columns, if they have widths of their own (method distill).
     pub allocation: Option<RowAllocation>,
 }
 
 impl Outcome {
-    /// Measures what became of `matrix`.
+    /// Measures the error of a quantized `matrix`.
     pub fn new(
         matrix: &WeightMatrix,
         quantized: Quantized,
@@ -150,31 +150,31 @@ impl Outcome {
         Ok(Self { error, quantized, x_max, allocation: None })
     }
 
-    /// The width of every row of the matrix as it was trained: also of those that are gone.
+    /// Returns the width of every trained row, removed ones included.
     pub fn trained_widths(&self) -> &[Option<Width>] {
         self.allocation.as_ref().map_or(&self.quantized.widths, |allocation| &allocation.widths)
     }
 
-    /// Weights of the matrix as it was trained.
+    /// Returns the number of weights of the trained matrix.
     pub fn trained_weights(&self) -> usize {
         let shape = self.allocation.as_ref().map(|allocation| (allocation.widths.len(), allocation.inputs.len()));
         let (rows, cols) = shape.unwrap_or((self.quantized.rows, self.quantized.cols));
         rows * cols
     }
 
-    /// The error that is expected of each row as it was trained, or where only that is known of the whole matrix.
+    /// Returns the predicted error of each trained row, or the one error of the whole matrix if only that is known.
     pub fn expected_errors(&self) -> Vec<f64> {
         let of_matrix = || vec![self.error.unwrap_or(0.0); self.quantized.rows];
         self.allocation.as_ref().map_or_else(of_matrix, |allocation| allocation.expected.clone())
     }
 
-    /// The lanes that the matrix is packed for.
+    /// Returns the lanes that the matrix is packed for.
     pub fn lanes(&self) -> Lanes {
         Lanes::of(self.x_max, self.quantized.group)
     }
 
-    /// Rows sorted by width, as blocks: shape and rows of each. A matrix of one width is one block in the rows' own
-    /// order.
+    /// Returns the rows sorted by width, as blocks: shape and rows of each. A matrix of one width is one block in the
+    /// rows' own order.
     pub fn blocks(&self) -> Vec<(BlockShape, Vec<usize>)> {
         let matrix = &self.quantized;
         let lanes = self.lanes();
@@ -188,7 +188,7 @@ impl Outcome {
             .collect()
     }
 
-    /// Bytes of codes, padding, scales, steps and block records.
+    /// Returns the bytes of codes, padding, scales, output steps and block records.
     pub fn bytes(&self) -> usize {
         let blocks = self.blocks();
         let stepped = !Quantized::in_order(&blocks);

@@ -10,9 +10,9 @@ use crate::graph::WeightMatrix;
 const STEPS: usize = 64;
 const NARROWEST: f32 = 0.3;
 
-/// The scale that minimises the squared error of `weights`, each weighted by `importance` (equal where empty).
+/// Fits the scale that minimizes the squared error of `weights`, each weighted by `importance` (equal if empty).
 ///
-/// A grid over the clipping point, then, for the best codes found, the least-squares scale.
+/// It searches a grid over the clipping point, then takes the least-squares scale of the best codes.
 pub fn fit(weights: &[f32], importance: &[f64], width: Width) -> f32 {
     let largest = weights.iter().fold(0f32, |m, w| m.max(w.abs()));
     let levels = if width == Width::W8 { 127 } else { width.max_level() };
@@ -45,11 +45,11 @@ pub fn fit(weights: &[f32], importance: &[f64], width: Width) -> f32 {
 
 /// Row and group scales of a matrix, before its codes are chosen.
 pub struct Scales {
-    /// Columns per group; 0 = none.
+    /// Columns per group; 0 = no group scales.
     pub group: usize,
-    /// One per row.
+    /// Row scales.
     pub rows: Vec<bf16>,
-    /// `rows * groups`.
+    /// Group scales, `rows * groups`.
     pub groups: Vec<u8>,
 }
 
@@ -75,14 +75,14 @@ impl Scales {
             scales.rows.push(base);
             let base = base.to_f32();
             scales.groups.extend(wanted.iter().map(|s| {
-                // 0 would lose the group for error feedback to come.
+                // With 0, later error feedback would lose the group.
                 if base > 0.0 { (s / base).round().clamp(1.0, 255.0) as u8 } else { 1 }
             }));
         }
         scales
     }
 
-    /// What the row's scale is multiplied with at (`row`, `col`); 1 where there are no groups.
+    /// Returns the group scale at (`row`, `col`); 1 without groups.
     pub fn group_scale(&self, row: usize, col: usize) -> u8 {
         match self.group {
             0 => 1,
@@ -90,12 +90,12 @@ impl Scales {
         }
     }
 
-    /// What a level is multiplied with at (`row`, `col`).
+    /// Returns the factor of a level at (`row`, `col`).
     pub fn at(&self, row: usize, col: usize) -> f32 {
         self.rows[row].to_f32() * f32::from(self.group_scale(row, col))
     }
 
-    /// The code nearest to `weight` at (`row`, `col`).
+    /// Returns the code nearest to `weight` at (`row`, `col`).
     pub fn code(&self, width: Width, row: usize, col: usize, weight: f32) -> u8 {
         let scale = self.at(row, col);
         width.nearest_code(if scale > 0.0 { weight / scale } else { 0.0 })
@@ -126,7 +126,7 @@ pub fn round_to(matrix: &WeightMatrix, width: Width, scales: Scales) -> Quantize
 mod tests {
     use super::*;
 
-    /// A bell-shaped sample without a random generator: the quantiles of a logistic distribution.
+    /// Makes a bell-shaped sample without a random generator: the quantiles of a logistic distribution.
     fn bell(n: usize) -> Vec<f32> {
         (0..n).map(|i| (i as f32 + 0.5) / n as f32).map(|p| (p / (1.0 - p)).ln()).collect()
     }
@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn eight_bits_clip_no_more_than_a_step_of_a_bell_shaped_row() {
+    fn eight_bits_clip_at_most_one_step() {
         let weights = bell(100);
         let scale = fit(&weights, &[], Width::W8);
         let worst =

@@ -1,4 +1,4 @@
-//! Every budget comes down to a rate.
+//! Reduces every budget to a rate.
 
 use super::quantizer::{QuantizedPolicy, Quantizer};
 use super::{flash, search, time};
@@ -8,8 +8,8 @@ use crate::error::Result;
 use crate::methods::{Options, Progress};
 use crate::policy::Policy;
 
-/// Makes one image: [`Quantizer::new`] and [`Quantizer::quantize`]. `progress` gets what is being done and the share of
-/// it that is done.
+/// Makes one image: [`Quantizer::new`] and [`Quantizer::quantize`]. `progress` receives the present work and the share
+/// of it that is done.
 pub fn quantize(
     policy: &Policy,
     recordings: &Recordings,
@@ -23,12 +23,12 @@ pub fn quantize(
 }
 
 impl Quantizer<'_> {
-    /// Makes an image within `options.budget`. `progress` gets what is being done and the share of it that is done.
+    /// Makes an image within `options.budget`. `progress` receives the present work and the share of it that is done.
     ///
     /// # Errors
     ///
-    /// [`crate::budget::BudgetTooSmall`] where not even the fewest bits keep a budget of bits or bytes. The words of
-    /// the others say what can be had.
+    /// [`crate::budget::BudgetTooSmall`] if even the fewest bits exceed a budget of bits or bytes. The message of any
+    /// other error says what is possible.
     pub fn quantize(&self, options: &Options, mut progress: impl FnMut(&str, f64)) -> Result<QuantizedPolicy> {
         let rate = match options.budget {
             Budget::Width(width) => Rate::Width(width),
@@ -41,7 +41,7 @@ impl Quantizer<'_> {
     }
 }
 
-/// As work and the share of it that is done.
+/// Converts [`Progress`] to the present work and the share of it that is done.
 pub(super) fn shown(mut progress: impl FnMut(&str, f64)) -> impl FnMut(Progress) {
     move |state| progress(&state.to_string(), state.share())
 }

@@ -1,48 +1,48 @@
-//! What comes back when a robot or simulator has driven an image.
+//! The result of a rollout of an image by a robot or simulator.
 
 use serde::Serialize;
 use serde_json::{Map, Value};
 
 use crate::data::Dataset;
 
-/// A drive: what the image was shown, and what was said about it.
+/// A rollout: the observations that the image received, and its reported outcome.
 #[derive(Clone, Debug)]
 pub struct Driven {
-    /// Everything that the image was shown, with the f32 policy's actions or without.
+    /// Observations that the image received, with or without the f32 policy's actions.
     pub recordings: Vec<Dataset>,
-    /// How well it went.
+    /// Reported outcome.
     pub outcome: DriveOutcome,
 }
 
-/// How well a drive went, as far as it was said: `success` (a share), its interval `ci`, and any other numbers.
+/// The reported outcome of a rollout: `success` (a share), its interval `ci`, and any other numbers.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[serde(transparent)]
 pub struct DriveOutcome(Map<String, Value>);
 
 impl DriveOutcome {
-    /// Of a line that is one JSON object; its numbers are kept, and `ci`. `None` for any other line.
+    /// Parses a line that is one JSON object, and keeps its numbers and `ci`; `None` for any other line.
     pub fn parse(line: &str) -> Option<Self> {
         let Ok(Value::Object(mut object)) = serde_json::from_str(line) else { return None };
         object.retain(|key, value| value.is_number() || key == "ci" && interval(value).is_some());
         Some(Self(object))
     }
 
-    /// A number that was said.
+    /// Returns a reported number.
     pub fn number(&self, key: &str) -> Option<f64> {
         self.0.get(key)?.as_f64()
     }
 
-    /// The share of episodes that went well.
+    /// Returns the share of successful episodes.
     pub fn success(&self) -> Option<f64> {
         self.number("success")
     }
 
-    /// The interval of [`Self::success`].
+    /// Returns the interval of [`Self::success`].
     pub fn interval(&self) -> Option<[f64; 2]> {
         interval(self.0.get("ci")?)
     }
 
-    /// The names of all numbers.
+    /// Returns the names of all numbers.
     pub fn keys(&self) -> impl Iterator<Item = &str> {
         self.0.iter().filter(|(_, value)| value.is_number()).map(|(key, _)| key.as_str())
     }
@@ -58,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_line_of_json_is_taken_for_its_numbers() {
+    fn json_lines_are_parsed_for_their_numbers() {
         let outcome = DriveOutcome::parse(
             r#" {"success": 0.92, "ci": [0.85, 0.96], "episodes": 100, "task": "reach", "tracking_error_mm": 1.5} "#,
         );

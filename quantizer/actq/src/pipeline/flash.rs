@@ -1,4 +1,4 @@
-//! Images within a number of bytes, and budgets that none can meet.
+//! Images within a number of bytes, and the refusal of budgets that no image can meet.
 
 use super::quantizer::{QuantizedPolicy, Quantizer};
 use crate::budget::{Budget, BudgetTooSmall, Rate};
@@ -8,12 +8,12 @@ use crate::methods::distill::balance::balance_bytes;
 use crate::methods::{Method, Options, Progress, least_bytes};
 use crate::policy::Policy;
 
-/// Refuses a budget of bits or bytes that no image of the policy can meet: from the shapes alone, before any work.
+/// Refuses a budget of bits or bytes that no image of the policy can meet, from the shapes alone, before any work.
 ///
 /// # Errors
 ///
-/// [`BudgetTooSmall`], with what the smallest image takes. A balance, which only the recording can ask for, does not
-/// count: with one, [`Quantizer::quantize`] may need some bytes more.
+/// [`BudgetTooSmall`] with the size of the smallest image. A balance does not count, since only the recording can
+/// require it; with one, [`Quantizer::quantize`] may need some more bytes.
 pub fn check_budget(policy: &Policy, options: &Options) -> Result<()> {
     let weights = policy.graph.weights();
     let check =
@@ -29,14 +29,14 @@ pub fn check_budget(policy: &Policy, options: &Options) -> Result<()> {
     Ok(())
 }
 
-/// The image of at most `bytes` bytes; `options.budget` does not count.
+/// Makes the image of at most `bytes` bytes; `options.budget` is ignored.
 pub(super) fn within(
     quantizer: &Quantizer<'_>,
     options: &Options,
     bytes: usize,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<QuantizedPolicy> {
-    // What the method has balanced has operations more than the policy.
+    // A balanced graph has more operations than the policy's.
     let policy = Policy { graph: quantizer.method.graph().clone(), ..quantizer.policy.clone() };
     let fixed = fixed_bytes(policy, options)?;
     let in_image = |error: Error| match error.budget() {
@@ -45,16 +45,16 @@ pub(super) fn within(
     };
     let found = quantizer.at(Rate::Bytes(bytes.saturating_sub(fixed)), options, progress).map_err(in_image)?;
     let len = found.image.len();
-    // Equal constants are stored once; what is learned could be equal where it was not expected.
-    ensure!(len <= bytes, "the image takes {len} bytes, {bytes} are allowed; allow {len} bytes or more");
+    // Equal constants share storage, and learned ones may be equal or different by chance.
+    ensure!(len <= bytes, "the image takes {len} bytes, but {bytes} are allowed; allow {len} bytes or more");
     Ok(found)
 }
 
-/// Bytes of an image beside those that a rate in bytes counts.
+/// Returns the bytes of an image beside those that a rate in bytes counts.
 fn fixed_bytes(mut policy: Policy, options: &Options) -> Result<usize> {
     let mut values = 0;
     if options.method == Method::Distill {
-        // Numbers that are nowhere else, so that no constant is shared with what changes.
+        // Use numbers that occur nowhere else, so that no constant is shared with a changed vector.
         for value in policy.graph.changed_vectors(options.learns()).flatten() {
             values += 1;
             *value = f32::from_bits(values);

@@ -1,4 +1,4 @@
-//! A policy and a method made ready, and the images that they give.
+//! A prepared policy and method, and the images made from them.
 
 use super::tries::Search;
 use crate::budget::Rate;
@@ -10,7 +10,7 @@ use crate::methods::{Learning, Method, Options, Outcome, PreparedMethod, Progres
 use crate::policy::Policy;
 use crate::runtime::ImageBuffer;
 
-/// A policy and a method made ready once, to make images for any number of budgets.
+/// A policy with a prepared method, for images of any number of budgets.
 #[derive(Debug)]
 pub struct Quantizer<'a> {
     pub(super) policy: &'a Policy,
@@ -18,28 +18,28 @@ pub struct Quantizer<'a> {
     pub(super) method: PreparedMethod<'a>,
 }
 
-/// What became of a policy.
+/// A quantized policy.
 #[derive(Debug)]
 pub struct QuantizedPolicy {
-    /// The policy as it became: its graph may have lost elements, its biases may have learned.
+    /// The quantized policy: its graph may have lost elements, and its biases may have changed.
     pub policy: Policy,
-    /// Its matrices.
+    /// Result for each matrix.
     pub outcomes: Vec<Outcome>,
     /// The image.
     pub image: Vec<u8>,
-    /// What the weights were quantized to.
+    /// Rate that the weights were quantized to.
     pub rate: Rate,
-    /// What was learned, where something was.
+    /// Learning, if the method learns.
     pub learning: Option<Learning>,
-    /// What was tried, where the budget is an error.
+    /// Search, if the budget is an error.
     pub search: Option<Search>,
-    /// The predicted step, where the budget is a time.
+    /// Predicted step, if the budget is a time.
     pub time: Option<StepTime>,
 }
 
 impl<'a> Quantizer<'a> {
-    /// Collects what the method needs from the calibration recording, as [`PreparedMethod::before`] does, with its
-    /// errors. `minutes` is what learning may take at most, [`Options::minutes`].
+    /// Collects the method's statistics from the calibration recording, as [`PreparedMethod::before`] does, with its
+    /// errors. `minutes` limits learning, as [`Options::minutes`].
     pub fn new(
         policy: &'a Policy,
         recordings: &'a Recordings,
@@ -51,12 +51,12 @@ impl<'a> Quantizer<'a> {
         Ok(Self { policy, recordings, method })
     }
 
-    /// The method with its statistics.
+    /// Returns the method with its statistics.
     pub fn method(&self) -> &PreparedMethod<'a> {
         &self.method
     }
 
-    /// Makes an image at a rate; `options.budget` does not count.
+    /// Makes an image at a rate; `options.budget` is ignored.
     pub(super) fn at(
         &self,
         rate: Rate,
@@ -71,12 +71,12 @@ impl<'a> Quantizer<'a> {
 }
 
 impl QuantizedPolicy {
-    /// Steps of distillation; 0 for methods that do not learn.
+    /// Returns the steps of distillation; 0 for methods that do not learn.
     pub fn steps(&self) -> usize {
         self.learning.as_ref().map_or(0, |learning| learning.steps)
     }
 
-    /// The image where the executor can run it.
+    /// Returns the image in a buffer for the executor.
     pub fn buffer(&self) -> ImageBuffer {
         ImageBuffer::new(&self.image)
     }

@@ -1,10 +1,11 @@
-//! The smallest budget whose measured error stays within a limit.
+//! Finds the smallest budget whose measured error stays within a limit.
 //!
 //! Budgets are multiples of a tenth of a bit per weight. Each try is a whole quantization whose image is run by the
-//! executor. A method that learns first looks with an eighth of the steps, at most `LOOKS` times; then, from the budget
-//! found so, with all its steps. What is returned has kept the limit with all its steps. Tries stop when the next
-//! smaller budget is known to fail, or after `TRIES` (`PLAIN_TRIES` without learning, or with too few steps to share):
-//! then a smaller budget may do, and the tries tell which range is open. The search takes errors as falling with bits.
+//! executor. A method that learns first looks with an eighth of the steps, at most `LOOKS` times. From the budget found
+//! in this way, it continues with all its steps. The returned image has kept the limit with all its steps. The search
+//! stops when the next smaller budget is known to fail, or after `TRIES` tries (`PLAIN_TRIES` without learning, or with
+//! too few steps to share). After that many, a smaller budget may still pass, and the tries show which range is open.
+//! The search assumes that errors fall with bits.
 
 use std::borrow::Cow;
 use std::path::Path;
@@ -22,20 +23,20 @@ use crate::policy::Policy;
 
 /// Budgets per bit.
 const PER_BIT: usize = 10;
-/// Tries with a share of the steps, at most, and that share's denominator.
+/// Most tries with a share of the steps, and the divisor of that share.
 const LOOKS: usize = 6;
 const SHARE: usize = 8;
-/// Tries with all steps, at most.
+/// Most tries with all steps.
 const TRIES: usize = 5;
-/// Tries of a method that does not learn, at most.
+/// Most tries of a method that does not learn.
 const PLAIN_TRIES: usize = 16;
-/// Where the search starts, in bits.
+/// First budget, in bits.
 const START: usize = 3;
-/// How the logarithm of the error is expected to fall with a bit where nothing is known: rounding to half the step.
+/// Expected fall of the error's logarithm per bit if nothing is known: rounding to half the step.
 const SLOPE: f64 = 2.0 * std::f64::consts::LN_2;
 
-/// What errors are measured on: the held-out recording; without one, what the method learns from. Missing actions are
-/// those of the f32 network.
+/// Returns the recording that errors are measured on: the held-out recording, else the one that the method learns from.
+/// The f32 network fills in missing actions.
 fn measured<'a>(policy: &Policy, recordings: &'a Recordings) -> Result<Cow<'a, Dataset>> {
     let dataset = recordings.heldout.as_ref().or(recordings.calib.as_ref());
     let mut dataset = Cow::Borrowed(dataset.with_context(|| Recording::Heldout.missing("a limit to the error"))?);
@@ -45,8 +46,8 @@ fn measured<'a>(policy: &Policy, recordings: &'a Recordings) -> Result<Cow<'a, D
     Ok(dataset)
 }
 
-/// The image of the smallest budget that has at most the error `limit` (NMSE); `options.budget` does not count.
-/// `progress` gets what is being done and the share of it that is done.
+/// Makes the image of the smallest budget whose error (NMSE) is at most `limit`; `options.budget` is ignored.
+/// `progress` receives the present work and the share of it that is done.
 pub(super) fn smallest(
     quantizer: &Quantizer<'_>,
     options: &Options,
@@ -88,10 +89,10 @@ pub(super) fn smallest(
     };
     let Some((quantized, nmse, budget)) = found else {
         let reports = tries.iter().filter_map(|t| t.report.as_ref());
-        let best = reports.min_by(|a, b| a.nmse.total_cmp(&b.nmse)).context("no try gave an image")?;
+        let best = reports.min_by(|a, b| a.nmse.total_cmp(&b.nmse)).context("no budget of the search gave an image")?;
         bail!(
-            "no budget up to {} bits per weight (8 bits and all scales) keeps the error within {limit}: the lowest was an NMSE \
-             of {:.2e} at {:.3} bits per weight",
+            "no budget up to {} bits per weight (8 bits and all scales) keeps the error within {limit}; the lowest NMSE was \
+             {:.2e} at {:.3} bits per weight",
             top as f64 / PER_BIT as f64,
             best.nmse,
             best.bpw
@@ -110,7 +111,7 @@ pub(super) fn smallest(
     Ok(QuantizedPolicy { search: Some(search), ..quantized })
 }
 
-/// The first budget that has room for 8 bits everywhere, in steps of the search.
+/// Returns the first budget with room for 8 bits everywhere, in steps of the search.
 fn top(policy: &Policy, options: &Options) -> Result<usize> {
     let plain = Options { method: Method::Rtn, forced: Vec::new(), ..options.clone() };
     let (_, outcomes) = methods::quantize(&policy.graph, None, Rate::Width(Width::W8), &plain)?;
@@ -118,8 +119,7 @@ fn top(policy: &Policy, options: &Options) -> Result<usize> {
     Ok((PER_BIT * 8 * bytes).div_ceil(policy.graph.weights().max(1)))
 }
 
-/// The range in which the smallest budget lies: the largest cell known to fail and the smallest known to pass, with
-/// errors.
+/// Range of the smallest budget: the largest cell known to fail and the smallest known to pass, with errors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Range {
     fails: (usize, f64),
@@ -127,13 +127,13 @@ struct Range {
 }
 
 impl Range {
-    /// Whether nothing between is left to try, in cells up to `top`.
+    /// Returns `true` if no cell up to `top` is left to try in between.
     fn is_closed(&self, top: usize) -> bool {
         self.fails.0 + 1 > self.passes.map_or(top, |p| p.0 - 1)
     }
 
-    /// Where the limit is expected, from the errors at the ends: on the line through their logarithms, or from the one
-    /// that is known along [`SLOPE`].
+    /// Predicts where the limit is reached: on the line through the logarithms of both errors, or from the only known
+    /// one along [`SLOPE`].
     fn guess(&self, limit: f64) -> f64 {
         let (low, low_error) = (self.fails.0 as f64, self.fails.1.max(1e-300).ln());
         let limit = limit.ln();
@@ -152,8 +152,8 @@ impl Range {
     }
 }
 
-/// Narrows the range of cells 1 to `top` with at most `runs` calls of `error`, the first at `first`: by guesses, and by
-/// halves where guesses alone might creep. Where nothing has passed, the last run is at `top`.
+/// Narrows the range of cells 1 to `top` with at most `runs` calls of `error`, the first at `first`. It tries
+/// predictions, and halves the range where they converge slowly. If nothing has passed, the last run is at `top`.
 fn narrow(
     first: usize,
     top: usize,
@@ -178,7 +178,7 @@ fn narrow(
         cell = match range.passes {
             None if run + 1 == runs => top,
             _ if halve => from.midpoint(to),
-            // Bits that only give the least image or the limit itself have no guess.
+            // The least image and the limit itself give no slope.
             _ => range.guess(limit).clamp(from as f64, to as f64).round() as usize,
         };
     }
@@ -189,7 +189,7 @@ fn narrow(
 mod tests {
     use super::*;
 
-    /// Narrows for an error that halves twice a bit from `at_zero` on, and gives the range and the cells tried.
+    /// Narrows for an error that is quartered per bit from `at_zero` on, and returns the range and the tried cells.
     fn search(at_zero: f64, least: usize, runs: usize, limit: f64) -> (Range, Vec<usize>) {
         let mut cells = Vec::new();
         let range = narrow(30, 83, runs, limit, |cell| {
@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn the_smallest_cell_is_found_and_none_is_tried_twice() {
+    fn the_smallest_cell_is_found_without_repeated_tries() {
         for limit in [1e-4, 1e-3, 0.013, 0.1, 0.5, 2.0] {
             for least in [1, 12, 20] {
                 let (range, cells) = search(1.0, least, 16, limit);
@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn few_runs_leave_a_range_that_holds_the_answer() {
+    fn few_runs_leave_a_range_with_the_answer() {
         let (range, cells) = search(1.0, 1, 3, 0.01);
         assert_eq!(cells.len(), 3);
         let answer = (1..=83).find(|c| (-0.12 * f64::from(*c)).exp() <= 0.01).map(|c| c as usize);
@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn what_never_passes_is_tried_at_the_top() {
+    fn hopeless_limits_are_tried_at_the_top() {
         for runs in [1, 2, 4, 6] {
             let (range, cells) = search(1e9, 1, runs, 1e-3);
             assert_eq!(range.passes, None);

@@ -1,4 +1,4 @@
-//! The statistics and the allocation behind an image, as a JSON file: `docs/QUANTIZER.md` describes its fields.
+//! Statistics and bit allocation of an image as a JSON file. `docs/QUANTIZER.md` describes its fields.
 
 use std::fs;
 use std::path::Path;
@@ -16,13 +16,13 @@ use crate::methods::distill::balance::balance_bytes;
 use crate::methods::{Method, Options, Outcome, Quantized};
 use crate::strict_json;
 
-/// The name of the file's form. It changes when a field changes its meaning or disappears, not when one is added.
+/// Version of the file's format. It changes when a field changes its meaning or disappears, not when one is added.
 pub const SCHEMA: &str = "actq-stats-1";
 
-/// Everything about one image.
+/// Statistics of one image.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Stats {
-    /// [`SCHEMA`]
+    /// Always [`SCHEMA`].
     pub schema: String,
     /// Version of actq.
     pub actq: String,
@@ -30,7 +30,7 @@ pub struct Stats {
     pub policy: String,
     /// SHA-256 of the policy, in hexadecimal digits.
     pub source: String,
-    /// CRC-32 of the image that these statistics belong to, in hexadecimal digits.
+    /// CRC-32 of the image, in hexadecimal digits.
     pub crc32: String,
     /// Bytes of the image.
     pub bytes: usize,
@@ -39,9 +39,9 @@ pub struct Stats {
     /// The method's name; `best`, the former name of `distill`, is read as `distill`.
     #[serde(deserialize_with = "method_name")]
     pub method: String,
-    /// What was asked for.
+    /// Requested budget.
     pub budget: Budget,
-    /// The seed of everything that was drawn.
+    /// Seed of all random numbers.
     pub seed: u64,
     /// Steps of distillation; 0 for methods that do not learn.
     pub steps: usize,
@@ -52,10 +52,10 @@ pub struct Stats {
     pub matrices: Vec<MatrixRecord>,
 }
 
-/// One matrix. "Rows" and "columns" are those of the matrix as it was trained.
+/// Statistics of one matrix. Rows and columns are those of the matrix as it was trained.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MatrixRecord {
-    /// Its tensor's name.
+    /// Name of its tensor.
     pub name: String,
     /// Rows (outputs).
     pub rows: usize,
@@ -63,38 +63,37 @@ pub struct MatrixRecord {
     pub cols: usize,
     /// Columns that share a u8 scale; 0 = one scale a row.
     pub group: usize,
-    /// Magnitude that activations are quantized to.
+    /// Largest magnitude of its quantized activations.
     pub x_max: u16,
-    /// Bytes in the image: codes, padding, scales, steps, block records.
+    /// Bytes in the image: codes, padding, scales, output steps, block records.
     pub bytes: usize,
     /// Bits of each row's codes; 0 for a row without bits.
     pub widths: Vec<u32>,
-    /// Bits that each row takes: codes, scales and, where widths are mixed, its step; without padding and block
-    /// records.
+    /// Bits of each row: codes, scales and, for mixed widths, its output step; without padding and block records.
     pub bits: Vec<usize>,
-    /// The row behind each row of the image's matrix, in the order of its output.
+    /// Trained row of each row of the image's matrix, in the order of its output.
     pub image_rows: Vec<usize>,
-    /// The column behind each column of the image's matrix.
+    /// Trained column of each column of the image's matrix.
     pub image_cols: Vec<usize>,
     /// Squared error of the matrix's output over its energy (rtn, gptq, actquant).
     pub error: Option<f64>,
-    /// Why rows have their widths (distill).
+    /// Reasons for the rows' widths (distill).
     pub allocation: Option<AllocationRecord>,
-    /// Why the matrix has its width (actquant).
+    /// Reasons for the matrix's width (actquant).
     pub score: Option<HsicScore>,
 }
 
-/// What the widths of a matrix's rows were chosen from. Errors are squared differences of the actions over their
+/// Values that the widths of a matrix's rows were chosen by. Errors are squared differences of the actions over their
 /// variances, summed over the network's outputs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AllocationRecord {
-    /// Per row: the error scale, which a width's rounding is a share of.
+    /// Error scale of each row; a width's rounding costs a share of it.
     pub energy: Vec<f64>,
-    /// Per row: the expected error without bits.
+    /// Predicted error of each row without bits.
     pub removal: Vec<f64>,
-    /// Per row: the expected error at its width.
+    /// Predicted error of each row at its width.
     pub expected: Vec<f64>,
-    /// Per column: its importance.
+    /// Importance of each column.
     pub importance: Vec<f64>,
 }
 
@@ -105,7 +104,7 @@ pub struct HsicScore {
     pub f_input: f64,
     /// F of its output.
     pub f_output: f64,
-    /// `f_output - f_input`
+    /// Difference `f_output - f_input`.
     pub sens: f64,
     /// HSIC of the observation and the matrix's input.
     pub x_input: f64,
@@ -126,7 +125,7 @@ impl From<&Score> for HsicScore {
 }
 
 impl Stats {
-    /// Of the image that `quantizer` made with `options`.
+    /// Collects the statistics of the image that `quantizer` made with `options`.
     pub fn new(quantizer: &Quantizer<'_>, options: &Options, quantized: &QuantizedPolicy) -> Result<Self> {
         let (source, scores) = (quantizer.policy, quantizer.method.scores());
         let buffer = quantized.buffer();
@@ -149,7 +148,7 @@ impl Stats {
         })
     }
 
-    /// The file's content.
+    /// Returns the file's content.
     pub fn json(&self) -> Result<String> {
         Ok(serde_json::to_string(self)? + "\n")
     }
@@ -157,15 +156,15 @@ impl Stats {
     /// Reads the statistics of `image` from a file; refuses those of another image.
     pub fn read(path: &Path, image: &Image<'_>) -> Result<Self> {
         let read = || -> Result<Self> {
-            let text = fs::read(path).context("cannot be read")?;
-            let value: serde_json::Value = strict_json::parse(&text).context("not JSON")?;
+            let text = fs::read(path).context("cannot read the file")?;
+            let value: serde_json::Value = strict_json::parse(&text).context("not valid JSON")?;
             let schema = value.get("schema").and_then(|s| s.as_str()).unwrap_or("none");
-            ensure!(schema == SCHEMA, "not statistics of an image: its schema is {schema}, {SCHEMA} is needed");
+            ensure!(schema == SCHEMA, "not statistics of an image: its schema is {schema}, but {SCHEMA} is needed");
             let stats: Self = serde_json::from_value(value).with_context(|| format!("does not follow {SCHEMA}"))?;
             let crc = crc32(image);
             ensure!(
                 stats.crc32 == crc,
-                "belongs to another image (crc32 {}, this one has {crc}); quantize with --save-stats writes both",
+                "belongs to another image (crc32 {}, this one has {crc}); write both with quantize --save-stats",
                 stats.crc32
             );
             stats.check()?;
@@ -174,7 +173,7 @@ impl Stats {
         read().with_context(|| path.display().to_string())
     }
 
-    /// That every array has an entry for every row or column, so that no reader needs to ask again.
+    /// Checks that every array has an entry for every row or column, so that readers need not.
     fn check(&self) -> Result<()> {
         for m in &self.matrices {
             let per_row = [m.widths.len(), m.bits.len()];
@@ -183,7 +182,7 @@ impl Stats {
                 && m.allocation.as_ref().is_none_or(|a| a.importance.len() == m.cols)
                 && m.image_rows.iter().all(|r| *r < m.rows)
                 && m.image_cols.iter().all(|c| *c < m.cols);
-            ensure!(whole, "the arrays of {:?} do not fit its {} rows and {} columns", m.name, m.rows, m.cols);
+            ensure!(whole, "the arrays of matrix {:?} do not fit its {} rows and {} columns", m.name, m.rows, m.cols);
         }
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! The error of several methods at several budgets on a policy.
+//! Errors of several methods at several budgets on a policy.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -15,80 +15,80 @@ use crate::measure::eval;
 use crate::methods::{Method, Options, Outcome};
 use crate::policy::Policy;
 
-/// One image.
+/// One image of a sweep.
 #[derive(Clone, Debug, Serialize)]
 pub struct Point {
-    /// Bits per weight that were allowed.
+    /// Allowed bits per weight.
     pub budget: f64,
     /// Errors, true bits per weight, bytes.
     #[serde(flatten)]
     pub report: eval::ErrorReport,
-    /// The allocation: for each matrix how many of its rows, as it was trained, have how many bits (0: none).
+    /// Bit allocation: for each matrix, the number of trained rows of each width (0: no bits).
     pub rows: Vec<BTreeMap<u32, usize>>,
 }
 
-/// One method at all budgets.
+/// Images of one method at all budgets.
 #[derive(Clone, Debug, Serialize)]
 pub struct Curve {
     /// The method's name.
     pub method: String,
-    /// One per budget; `None` where the budget is too small for the method.
+    /// One image per budget; `None` if the budget is too small for the method.
     pub points: Vec<Option<Point>>,
-    /// ActQuant's scores, per matrix.
+    /// Scores of ActQuant per matrix.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scores: Option<Vec<HsicScore>>,
 }
 
-/// The point of the best method beyond which a further bit gains least.
+/// Point of the best method after which a further bit gains least.
 #[derive(Clone, Debug, Serialize)]
 pub struct Knee {
     /// The method.
     pub method: String,
     /// True bits per weight.
     pub bpw: f64,
-    /// Its error.
+    /// Error (NMSE).
     pub nmse: f64,
 }
 
-/// All of it.
+/// Result of a sweep.
 #[derive(Clone, Debug, Serialize)]
 pub struct Sweep {
     /// The policy's name.
     pub policy: String,
-    /// The names of its matrices.
+    /// Names of its matrices.
     pub matrices: Vec<String>,
-    /// Bits per weight that were allowed.
+    /// Allowed bits per weight.
     pub budgets: Vec<f64>,
-    /// One per method.
+    /// One curve per method.
     pub curves: Vec<Curve>,
-    /// See [`knee`].
+    /// The [`knee`].
     pub knee: Option<Knee>,
 }
 
-/// What to compare.
+/// Policy, methods and budgets of a sweep.
 #[derive(Debug)]
 pub struct SweepPlan<'a> {
     /// The policy.
     pub policy: &'a Policy,
-    /// What the methods learn from (only rtn does without), and what errors are measured on. The f32 policy gives actions
-    /// that were not recorded.
+    /// Recordings to learn from (only rtn needs none) and to measure errors on. The f32 policy fills in missing
+    /// actions.
     pub recordings: Recordings,
     /// The methods.
     pub methods: &'a [Method],
-    /// Bits per weight that are allowed.
+    /// Allowed bits per weight.
     pub budgets: &'a [f64],
-    /// The most steps of distillation; None: as many as suit the network.
+    /// Most steps of distillation; `None`: chosen for the network.
     pub steps: Option<usize>,
-    /// The most minutes of distillation; None: only the steps bound it.
+    /// Most minutes of distillation; `None`: no limit but the steps.
     pub minutes: Option<f64>,
-    /// Whether method distill counts errors relative to the action's size.
+    /// `true` if method distill weighs errors relative to the action's size.
     pub relative: bool,
-    /// Seed of everything that is drawn.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
-/// Quantizes the policy by every method for every budget and runs each image over the held-out recording. `progress`
-/// gets what is being done and the share of the whole that is done.
+/// Quantizes the policy by every method for every budget, and runs each image over the held-out recording. `progress`
+/// receives the present work and the share of the whole that is done.
 pub fn run(plan: SweepPlan<'_>, mut progress: impl FnMut(&str, f64)) -> Result<Sweep> {
     let SweepPlan { policy, mut recordings, methods, budgets, steps, minutes, relative, seed } = plan;
     recordings.fill_actions(&policy.graph);
@@ -134,11 +134,11 @@ fn rows(outcome: &Outcome) -> BTreeMap<u32, usize> {
     rows
 }
 
-/// The knee of the best method.
+/// Finds the knee of the best method.
 ///
-/// The best method has the lowest error at most budgets; among equals, the one named first. Its knee is the point
-/// furthest below the chord from its first point to its last, in log error over true bits per weight: up to there a bit
-/// gains more than on average, after it less. `None` where no point is below the chord.
+/// The best method has the lowest error at most budgets; among equals, it is the one named first. Its knee is the point
+/// furthest below the chord from its first point to its last, in log error over true bits per weight. Before the knee a
+/// bit gains more than on average, after it less. `None` if no point is below the chord.
 pub fn knee(curves: &[Curve]) -> Option<Knee> {
     let budgets = curves.iter().map(|c| c.points.len()).max()?;
     let mut wins = vec![0; curves.len()];
@@ -156,8 +156,8 @@ pub fn knee(curves: &[Curve]) -> Option<Knee> {
     (depth > 1e-9).then(|| Knee { method: curves[best].method.clone(), bpw, nmse })
 }
 
-/// True bits per weight and error of a curve's points, from few bits to many, each image once. An error of 0 has no
-/// logarithm; it counts as the smallest that f32 actions can show.
+/// Returns true bits per weight and error of a curve's points, from few bits to many, each image one time. An error of
+/// 0 has no logarithm; it counts as the smallest that f32 actions can show.
 pub fn line(curve: &Curve) -> Vec<(f64, f64)> {
     let mut line: Vec<(f64, f64)> =
         curve.points.iter().flatten().map(|p| (p.report.bpw, p.report.nmse.max(1e-14))).collect();
@@ -173,7 +173,7 @@ mod tests {
     use crate::methods::actquant::testing::{dataset, lstm};
 
     #[test]
-    fn observations_alone_give_the_same_errors() {
+    fn missing_actions_do_not_change_errors() {
         let policy = Policy::of("tiny", lstm());
         let with_actions = [5, 6].map(|seed| dataset(&policy.graph, seed, 20));
         let without = with_actions.clone().map(|recording| Dataset { action: None, ..recording });
@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn the_knee_is_where_the_best_curve_bends() {
+    fn the_knee_is_the_bend_of_the_best_curve() {
         let worse = curve("worse", &[(2.0, 0.9), (2.5, 0.8), (3.0, 0.5), (4.0, 1e-4)]);
         let better = curve("better", &[(2.0, 0.5), (2.5, 0.01), (3.0, 0.006), (4.0, 0.003)]);
         let found = knee(&[worse.clone(), better]).expect("a knee");

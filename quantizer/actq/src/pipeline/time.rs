@@ -1,4 +1,4 @@
-//! The most bits whose step keeps a time.
+//! Finds the most bits whose step keeps a time limit.
 
 use std::path::Path;
 
@@ -9,21 +9,21 @@ use crate::error::{Context, Error, Result, ensure};
 use crate::measure::time::StepTime;
 use crate::methods::{Activations, Options, Progress};
 
-/// More bits than any image takes.
+/// Bits per weight above those of any image.
 const MOST_BITS: f64 = 10.0;
 /// Tries between the least and the most bits; the last two differ by a hundredth of a bit.
 const TRIES: usize = 10;
 
-/// The predicted step of an image.
+/// Predicts the step of an image.
 fn predict(quantized: &QuantizedPolicy, limit: TimeLimit) -> Result<StepTime> {
     Ok(StepTime::new(&quantized.buffer().image(Path::new("the new image"))?, limit.clock_hz))
 }
 
-/// The image of the most bits per weight whose step keeps the limit; `options.budget` does not count.
+/// Makes the image of the most bits per weight whose step keeps the limit; `options.budget` is ignored.
 ///
-/// The bits are found with the activations that are there before any are measured, and without learning, on which no
-/// time depends; then the policy is quantized once. Activations that the method would rather have in int16 are, as far
-/// as the time allows. `progress` gets the share done.
+/// The bits are found with the activations before measurement and without learning, which does not affect time; then
+/// the policy is quantized one time. Activations that the method prefers in int16 get it as far as the time allows.
+/// `progress` receives the share done.
 pub(super) fn most_bits(
     quantizer: &Quantizer<'_>,
     options: &Options,
@@ -42,7 +42,7 @@ pub(super) fn most_bits(
     let fastest = time(low)?;
     ensure!(
         fastest <= allowed,
-        "{allowed} ms are allowed, but the fastest is {fastest:.3} ms at {} MHz, with {low:.3} bits a weight",
+        "{allowed} ms are allowed, but the fastest step takes {fastest:.3} ms at {} MHz, with {low:.3} bits per weight",
         limit.clock_hz / 1e6
     );
     if time(high)? <= allowed {
@@ -57,7 +57,7 @@ pub(super) fn most_bits(
         }
     }
     let mut quantized = quantizer.at(Rate::BitsPerWeight(low), options, progress)?;
-    // Back to int8, the largest matrix first.
+    // Return matrices to int8, the largest first.
     let outcomes = &quantized.outcomes;
     let mut wide: Vec<usize> = (0..outcomes.len()).filter(|&m| outcomes[m].x_max > activations.limit()).collect();
     wide.sort_by_key(|&m| outcomes[m].quantized.codes.len());
@@ -73,12 +73,12 @@ pub(super) fn most_bits(
     }
 }
 
-/// The fewest bits per weight that a method takes, from its refusal of almost none.
+/// Returns the fewest bits per weight of a method, from its refusal of a budget near zero.
 fn least_bits<T>(refused: Result<T>) -> Result<f64> {
     match refused {
         Ok(_) => Ok(f64::MIN_POSITIVE),
         Err(error) => match error.budget() {
-            // A little more, so that the division's rounding does not count.
+            // Add a little for the division's rounding.
             Some(least) => Ok((1.0 + 1e-9) * 8.0 * least.bytes as f64 / least.weights.max(1) as f64),
             None => Err(error),
         },

@@ -1,35 +1,35 @@
-//! What a search for the fewest bits has tried.
+//! The record of a search for the fewest bits.
 
 use crate::measure::eval::ErrorReport;
 
-/// One quantization.
+/// One quantization of a search.
 #[derive(Clone, Debug)]
 pub struct Try {
-    /// Bits per weight that were allowed.
+    /// Allowed bits per weight.
     pub budget: f64,
     /// Steps of distillation.
     pub steps: usize,
-    /// Errors and true bits per weight; `None` where the budget is too small for any image.
+    /// Errors and true bits per weight; `None` if the budget is too small for any image.
     pub report: Option<ErrorReport>,
 }
 
-/// What a search found.
+/// Result of a search.
 #[derive(Clone, Debug)]
 pub struct Search {
-    /// The largest error that was allowed (NMSE).
+    /// Largest allowed error (NMSE).
     pub limit: f64,
-    /// The error that was found.
+    /// Error of the returned image (NMSE).
     pub nmse: f64,
-    /// The budget, in bits per weight.
+    /// Its budget, in bits per weight.
     pub budget: f64,
-    /// The distance of two budgets.
+    /// Distance of two budgets, in bits per weight.
     pub step: f64,
-    /// The largest budget that is known to fail with all steps; 0 where none is.
+    /// Largest budget that is known to fail with all steps; 0 if none is.
     pub fails: f64,
-    /// Everything that was tried, in order.
+    /// All tries in order.
     pub tries: Vec<Try>,
-    /// The file that errors were measured on.
+    /// File that errors were measured on.
     pub measured_on: String,
-    /// Whether the method has not seen it.
+    /// `true` if the method has not learned from it.
     pub held_out: bool,
 }

@@ -1,5 +1,5 @@
-//! Drive, record, learn again: an image is driven, the f32 policy says what it would have done where that has led, and
-//! the next image learns from that as well (DAgger: Ross, Gordon, Bagnell 2011, with the f32 policy as the expert).
+//! On-policy rounds: an image is rolled out, the f32 policy labels what the image observed, and the next image also
+//! learns from that (DAgger: Ross, Gordon, Bagnell 2011, with the f32 policy as the expert).
 
 use std::path::Path;
 use std::time::Instant;
@@ -14,31 +14,31 @@ use crate::measure::eval;
 use crate::methods::Options;
 use crate::policy::Policy;
 
-/// What is tuned, and from what.
+/// Policy, recordings and options of a tuning.
 #[derive(Debug)]
 pub struct TunePlan<'a> {
     /// The policy.
     pub policy: &'a Policy,
-    /// What the first image learns from, and all others too: recordings of the f32 policy.
+    /// Recordings of the f32 policy, which all images learn from.
     pub calib: Vec<Dataset>,
-    /// What the errors on the f32 policy's path are measured on; without it, on `calib`.
+    /// Recording for errors on the f32 policy's path; without it, `calib`.
     pub heldout: Option<Dataset>,
     /// Method and budget of every image.
     pub options: &'a Options,
-    /// How often is learned again.
+    /// On-policy rounds after the first image.
     pub rounds: usize,
 }
 
-/// One image: what it learned from, how far it is from the f32 policy, how it drove.
+/// One image: its recordings, its error against the f32 policy, its rollout.
 #[derive(Clone, Debug, Serialize)]
 pub struct Round {
-    /// 0 for the image that has learned from the f32 policy's recordings alone.
+    /// Number of the round; 0 for the image that has learned from the f32 policy's recordings alone.
     pub round: usize,
     /// Recordings that it learned from.
     pub recordings: usize,
-    /// Their episodes.
+    /// Episodes in them.
     pub episodes: usize,
-    /// Their frames, as many of them as were kept.
+    /// Frames of them that were kept.
     pub frames: usize,
     /// Bits per weight, everything counted.
     pub bpw: f64,
@@ -46,45 +46,45 @@ pub struct Round {
     pub bytes: usize,
     /// Error (NMSE) on the f32 policy's path.
     pub nmse: f64,
-    /// Error (NMSE) on the path on which the image itself has led the robot; `None` where the f32 policy's actions
-    /// never vary there, or the image has none at an observation that it did not plan at.
+    /// Error (NMSE) on the path of the image's own rollout; `None` if the f32 policy's actions never vary there, or if
+    /// the image has none at an observation at which it did not plan.
     pub own_nmse: Option<f64>,
-    /// How it drove.
+    /// Outcome of its rollout.
     pub driven: DriveOutcome,
-    /// Seconds that learning and driving took.
+    /// Seconds of learning and rollout.
     pub seconds: f64,
 }
 
-/// What became of it.
+/// Result of a tuning.
 #[derive(Debug)]
 pub struct Tuned {
     /// The last image.
     pub quantized: QuantizedPolicy,
-    /// A row for every image.
+    /// One row per image.
     pub rounds: Vec<Round>,
-    /// The recording of the errors on the f32 policy's path.
+    /// Recording for the errors on the f32 policy's path.
     pub measured_on: String,
 }
 
 impl Tuned {
-    /// The round whose image drove best, where it was not the last one.
+    /// Returns the round whose image was most successful, if it was not the last one.
     pub fn better(&self) -> Option<&Round> {
         let (last, earlier) = self.rounds.split_last()?;
         let driven = earlier.iter().filter_map(|round| Some((round, round.driven.success()?)));
-        // Of equal ones the latest: it has learned from most.
+        // Of equal ones, take the latest: it has learned from the most recordings.
         let (best, success) = driven.max_by(|a, b| a.1.total_cmp(&b.1))?;
         (success > last.driven.success()?).then_some(best)
     }
 }
 
-/// Learns once from the f32 policy's recordings, then `rounds` times from those and from all that was driven before.
-/// `drive` gets each image, counted from 0, and gives what the image was shown. `progress` gets what is being done and
-/// the share of it that is done.
+/// Learns from the f32 policy's recordings, then `rounds` times from those and all rollouts before. `drive` receives
+/// each image with its number from 0, and returns its rollout. `progress` receives the present work and the share of it
+/// that is done.
 ///
 /// # Errors
 ///
-/// Without a recording to learn from; where a recording cannot be learned from or measured on; those of `drive`, with
-/// the round.
+/// Without a recording to learn from; if a recording cannot be learned from or measured on; errors of `drive`, with the
+/// round.
 pub fn run(
     plan: TunePlan<'_>,
     mut drive: impl FnMut(usize, &[u8]) -> Result<Driven>,
@@ -160,7 +160,7 @@ mod tests {
         DriveOutcome::parse(&format!("{{\"success\": {success}}}")).expect("an object")
     }
 
-    /// Observations that no recording before has shown.
+    /// Makes observations that no earlier recording holds.
     fn elsewhere(round: usize) -> Dataset {
         let mut random = Random::new(100 + round as u64);
         let obs = Array3::from_shape_simple_fn((3, 20, 2), || 1.0 + random.unit());
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn every_round_learns_from_all_that_was_driven_before() {
+    fn rounds_learn_from_all_earlier_rollouts() {
         let (policy, options) =
             (policy(), Options { steps: Some(4), ..Options::new(Method::Distill, Budget::BitsPerWeight(14.0)) });
         let plan = || TunePlan {
@@ -192,7 +192,7 @@ mod tests {
         .expect("tuned");
         let learned: Vec<_> = tuned.rounds.iter().map(|r| (r.round, r.recordings, r.episodes, r.frames)).collect();
         assert_eq!(learned, [(0, 1, 5, 250), (1, 2, 8, 310), (2, 3, 11, 370)]);
-        assert_eq!(images[2], tuned.quantized.image, "the last image is driven, and given");
+        assert_eq!(images[2], tuned.quantized.image, "the last image is rolled out and returned");
         assert!(images[0] != images[1] && images[1] != images[2]);
         assert!(tuned.rounds.iter().all(|r| r.nmse > 0.0 && r.own_nmse.is_some_and(|n| n > 0.0)));
         assert_eq!(tuned.better().map(|r| r.round), Some(1));

@@ -1,4 +1,4 @@
-//! Budgets that an image does not use up.
+//! Unused parts of budgets.
 
 use actq_kernels::Width;
 
@@ -7,33 +7,34 @@ use crate::budget::{Budget, USED};
 use crate::methods::distill::balance::balance_bytes;
 use crate::methods::{Method, Options, Outcome};
 
-/// Rows of which a smaller error is expected have no part in the actions.
+/// Least predicted error of a row that affects the actions.
 const NONE: f64 = 1e-12;
 
-/// A budget of which a good part is left.
+/// A budget with a large unused part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unused {
     /// Bytes of the image, or bits per weight.
     pub used: f64,
-    /// Those that are allowed.
+    /// Allowed bytes or bits per weight.
     pub allowed: f64,
-    /// Why the rest is not used.
+    /// Reason for the unused part.
     pub reason: Reason,
 }
 
-/// Why the rest of a budget is not used.
+/// Reason for the unused part of a budget.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reason {
     /// Every row has the most bits that it may have.
     Widest,
-    /// More bits do not reduce the error: the other rows have no part in the actions.
+    /// More bits do not reduce the error: the other rows do not affect the actions.
     NoError,
-    /// The next rows or matrices with more bits take more than is left.
+    /// The next rows or matrices with more bits take more than the rest.
     Step,
 }
 
 impl Unused {
-    /// Of an image that was made with `options`; `None` where the budget is used or is none of bits or bytes.
+    /// Returns the unused part for an image made with `options`; `None` if the budget is used, or is not of bits or
+    /// bytes.
     pub fn of(found: &QuantizedPolicy, options: &Options) -> Option<Self> {
         let (used, allowed) = match options.budget {
             Budget::ImageBytes(bytes) => (found.image.len() as f64, bytes as f64),
@@ -44,7 +45,7 @@ impl Unused {
     }
 }
 
-/// Bits per weight as the budget counts them.
+/// Returns the bits per weight as the budget counts them.
 fn bits_per_weight(found: &QuantizedPolicy) -> f64 {
     let bytes: usize = found.outcomes.iter().map(Outcome::bytes).sum();
     let weights: usize = found.outcomes.iter().map(Outcome::trained_weights).sum();

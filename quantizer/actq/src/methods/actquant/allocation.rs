@@ -1,4 +1,4 @@
-//! Stage 1 of ActQuant, second half: a width for every matrix from the scores.
+//! Stage 1 of ActQuant, second half: a width for every matrix by its score.
 
 use std::ops::Range;
 
@@ -11,17 +11,17 @@ use crate::error::Result;
 use crate::graph::{Graph, WeightMatrix};
 use crate::methods::options::Packing;
 
-/// Bytes of a matrix at one width: codes, padding, scales and the block record.
+/// Returns the bytes of a matrix at one width: codes, padding, scales and the block record.
 fn bytes(matrix: &WeightMatrix, width: Width, packing: Packing) -> usize {
     block_bytes(packing.shape(width, matrix.rows, matrix.cols), false)
 }
 
-/// The error that a matrix of this score is taken to make with so many bits: `score * 2^(-2 bits)`.
+/// Returns the assumed error of a matrix of this score at this many bits: `score * 2^(-2 bits)`.
 fn noise(score: f64, bits: f64) -> f64 {
     score * (-2.0 * bits).exp2()
 }
 
-/// The layer of every matrix: the node that uses it first, so that both matrices of an LSTM or GRU are one layer.
+/// Returns the layer of every matrix: the node that first uses it. Both matrices of an LSTM or GRU are one layer.
 pub fn layers(graph: &Graph) -> Vec<usize> {
     let mut layers = vec![usize::MAX; graph.matrices.len()];
     for (layer, node) in graph.nodes.iter().enumerate() {
@@ -32,7 +32,7 @@ pub fn layers(graph: &Graph) -> Vec<usize> {
     layers
 }
 
-/// The matrices that the action comes from without another one between.
+/// Returns for each matrix whether the action comes from it without another matrix between.
 fn heads(graph: &Graph) -> Vec<bool> {
     let mut heads = vec![false; graph.matrices.len()];
     let mut reaches = vec![false; graph.nodes.len() + 1];
@@ -50,7 +50,7 @@ fn heads(graph: &Graph) -> Vec<bool> {
     heads
 }
 
-/// The widths that every matrix may get, by their numbers in [`Width::ALL`].
+/// Returns the permitted widths of every matrix, as indices in [`Width::ALL`].
 fn allowed(graph: &Graph, choices: &Choices) -> Vec<Range<usize>> {
     let up_to = |width: Width| Width::ALL.iter().position(|w| *w == width).map_or(0, |choice| choice + 1);
     let of_matrix = |head: bool| match choices.head {
@@ -60,13 +60,13 @@ fn allowed(graph: &Graph, choices: &Choices) -> Vec<Range<usize>> {
     heads(graph).into_iter().map(of_matrix).collect()
 }
 
-/// The fewest bytes that the matrices of `graph` take: those of the narrowest widths.
+/// Returns the fewest bytes that the matrices of `graph` take: those of the narrowest widths.
 pub fn least_bytes(graph: &Graph, choices: &Choices, packing: Packing) -> usize {
     let allowed = allowed(graph, choices);
     graph.matrices.iter().zip(allowed).map(|(m, allowed)| bytes(m, Width::ALL[allowed.start], packing)).sum()
 }
 
-/// A width per matrix within `limit` bytes: see [`spend`].
+/// Allocates a width per matrix within `limit` bytes: see [`spend`].
 ///
 /// # Errors
 ///
@@ -81,12 +81,13 @@ pub fn allocate(graph: &Graph, scores: &[f64], choices: &Choices, packing: Packi
     Ok(chosen.into_iter().map(|choice| Width::ALL[choice]).collect())
 }
 
-/// A format per matrix that keeps the sum over layers of `E_l^2` low, `E_l` being the sum over the layer's matrices of
-/// `score * 2^(-2 bits)`, within `limit` bytes. Formats are numbered from few bits to many; `allowed` has those that
-/// each matrix may get, `bits` gives the bits of a matrix in one of them, and `size` its bytes.
+/// Allocates a format per matrix within `limit` bytes, such that the sum over layers of `E_l^2` is low. `E_l` is the
+/// sum over the layer's matrices of `score * 2^(-2 bits)`. Formats are numbered from few bits to many. `allowed` holds
+/// the permitted ones of each matrix, `bits` returns the bits of a matrix in one of them, and `size` its bytes.
 ///
-/// Greedy, as in the paper: from the narrowest format on, always the upgrade with the largest fall of `E_l^2` per byte
-/// among those that fit. Among equals the narrowest matrix goes first, so that what the scores leave over is spread.
+/// The allocation is greedy, as in the paper: from the narrowest format on, it repeatedly makes the upgrade with the
+/// largest fall of `E_l^2` per byte among those that fit. Among equals the narrowest matrix goes first, so that bytes
+/// which the scores do not claim are spread.
 ///
 /// # Errors
 ///
@@ -137,7 +138,7 @@ mod tests {
     use crate::graph::ops::Linear;
     use crate::methods::actquant::testing::lstm;
 
-    /// A chain of square matrices, each a layer of its own.
+    /// Makes a chain of square matrices, each a layer of its own.
     fn chain(count: usize) -> Graph {
         let mut graph = Graph::new(64);
         for matrix in 0..count {
@@ -156,10 +157,10 @@ mod tests {
         graph.matrices.iter().zip(widths).map(|(m, w)| bytes(m, *w, PACKING)).sum()
     }
 
-    /// For separate layers of equal size the objective is a sum of functions of the bytes that fall ever more slowly,
-    /// where greedy gives the best of all assignments with at most the bytes that it used.
+    /// Checks that greedy gives the best of all assignments with at most the bytes that it used. For separate layers of
+    /// equal size, the objective is a sum of convex functions of the bytes.
     #[test]
-    fn greedy_is_the_best_for_separate_layers_of_equal_size() {
+    fn greedy_is_optimal_for_equal_separate_layers() {
         let graph = chain(4);
         let error = |scores: &[f64], widths: &[Width]| -> f64 {
             scores.iter().zip(widths).map(|(s, w)| noise(*s, f64::from(w.bits())).powi(2)).sum()
@@ -182,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn a_budget_below_two_bits_is_refused_and_zero_scores_still_use_the_rest() {
+    fn tiny_budgets_are_refused_and_zero_scores_spend() {
         let graph = chain(3);
         let error = allocate(&graph, &[1.0; 3], &Choices::default(), PACKING, 2.0 * graph.weights() as f64 / 8.0)
             .expect_err("too small");
@@ -195,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn the_widest_codes_and_the_head_are_kept_to() {
+    fn widest_codes_and_head_width_are_kept() {
         let graph = chain(3);
         let widths = |choices: &Choices, bpw: f64| {
             allocate(&graph, &[0.0, 3.0, 1.0], choices, PACKING, bpw * graph.weights() as f64 / 8.0).expect("fits")
@@ -203,7 +204,7 @@ mod tests {
         let plain = Choices::default();
         assert_eq!(widths(&Choices { widest: Width::W4, ..plain }, 100.0), [Width::W4; 3]);
         assert_eq!(widths(&Choices { head: Some(Width::W3), ..plain }, 100.0), [Width::W8, Width::W8, Width::W3]);
-        // The head's bits count, and it keeps them where others would be worth more.
+        // The head's bits count, and it keeps them although others would gain more.
         let head = Choices { head: Some(Width::W8), ..plain };
         let least = total(&graph, &[Width::W2, Width::W2, Width::W8]);
         let limit = least as f64 - 0.5;
@@ -214,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_of_the_format_counts_its_scales() {
+    fn format_noise_counts_scales() {
         // One matrix has many short rows, whose scales and padding take more bits than those of the long rows of the
         // other.
         let mut graph = Graph::new(8);
@@ -231,7 +232,7 @@ mod tests {
             let limit = (narrow + step(0).max(step(1))) as f64;
             allocate(&graph, &[score, 1.0], &choices, PACKING, limit).expect("fits")
         };
-        // What already takes more bits is taken to have less error, so its score must be larger to get the upgrade.
+        // A matrix with more bits is assumed to have less error, so it needs a larger score for the upgrade.
         let first = |widths: Vec<Width>| widths[0] > Width::W2;
         let needed = |noise| (0..400).map(|i| 1.05f64.powi(i - 20)).find(|&score| first(of(noise, score)));
         let (codes, format) = (needed(NoiseBits::Codes).expect("a score"), needed(NoiseBits::Format).expect("a score"));

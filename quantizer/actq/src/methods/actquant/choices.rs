@@ -1,7 +1,7 @@
-//! Where ActQuant's paper and code leave a choice, or this project has made another one: what is done, and what the
-//! authors do.
+//! Choices that ActQuant's paper and code leave open, or that this project makes differently, with the authors' choice
+//! for each.
 //!
-//! `docs/QUANTIZER.md`, section actquant, has the sources and the reasons.
+//! The section actquant of `docs/QUANTIZER.md` has the sources and the reasons.
 
 use std::fmt;
 use std::str::FromStr;
@@ -11,46 +11,46 @@ use actq_kernels::layout::Width;
 use crate::calibrate::fisher::{Sampling, Signs};
 use crate::calibrate::hsic::Bandwidth;
 
-/// Which of a matrix's values its score is of.
+/// Definition of a matrix's score.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ScoreOf {
-    /// What the matrix adds: `F(output) - F(input)`.
+    /// Gain of the matrix: `F(output) - F(input)`.
     Gain,
-    /// `F(output)` alone.
+    /// Only `F(output)`.
     Output,
 }
 
-/// The bits of a format that its expected error `2^(-2 bits)` is reckoned with.
+/// Bits of a format in its assumed error `2^(-2 bits)`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoiseBits {
-    /// Those of a code.
+    /// Bits of a code.
     Codes,
-    /// All bits per weight that the matrix takes in it, scales and padding counted.
+    /// All bits per weight of the matrix in the format, scales and padding counted.
     Format,
 }
 
-/// All choices.
+/// Choices of ActQuant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Choices {
-    /// Of the Gaussian kernels.
+    /// Bandwidth of the Gaussian kernels.
     pub bandwidth: Bandwidth,
-    /// Frames that HSIC is taken over at most; evenly spaced.
+    /// Most frames for HSIC, evenly spaced.
     pub frames: usize,
-    /// What is scored.
+    /// Definition of the score.
     pub score: ScoreOf,
-    /// What the allocation takes for a format's error.
+    /// Definition of a format's error in the allocation.
     pub noise: NoiseBits,
-    /// The widest codes that the allocation gives.
+    /// Widest codes of the allocation.
     pub widest: Width,
-    /// The width of the matrices that give the action, which the allocation then leaves alone.
+    /// Width of the matrices that give the action; the allocation leaves them unchanged.
     pub head: Option<Width>,
-    /// Of the Fisher information.
+    /// Sampling of the Fisher information.
     pub fisher: Sampling,
-    /// Whether fits of scales multiply the importance by `sqrt(mean of the row's w^2 + w^2)`, as llama.cpp's do.
+    /// `true` if fits of scales multiply the importance by `sqrt(mean of the row's w^2 + w^2)`, as in llama.cpp.
     pub magnitude: bool,
 }
 
-/// This project's.
+/// The choices of this project.
 impl Default for Choices {
     fn default() -> Self {
         Self {
@@ -66,11 +66,11 @@ impl Default for Choices {
     }
 }
 
-/// What stands for no limit.
+/// Value that represents no limit.
 const ALL: usize = usize::MAX;
 
 impl Choices {
-    /// The authors', as far as the formats here have room for them.
+    /// The authors' choices, as far as the image format supports them.
     pub const AUTHORS: Self = Self {
         bandwidth: Bandwidth::SquaredMedian,
         frames: ALL,
@@ -82,7 +82,7 @@ impl Choices {
         magnitude: true,
     };
 
-    /// Every choice as key and value, in the order of the documentation.
+    /// Returns every choice as key and value, in the order of the documentation.
     fn pairs(&self) -> [(&'static str, String); 10] {
         let number = |n: usize| if n == ALL { "all".to_owned() } else { n.to_string() };
         let bits = |width: Width| width.bits().to_string();
@@ -135,17 +135,17 @@ impl Choices {
             ("magnitude", _) => return Err(wrong("yes or no")),
             _ => {
                 let keys = self.pairs().map(|(key, _)| key).join(", ");
-                return Err(format!("{key} is no key; the keys are {keys}"));
+                return Err(format!("{key} is not a key; the keys are {keys}"));
             }
         }
         Ok(())
     }
 }
 
-/// Frames whose gradients may be averaged before they are squared.
+/// Most frames whose gradients are averaged before they are squared.
 const MOST_BATCH: usize = 1024;
 
-/// Reads `KEY=VALUE,KEY=VALUE`; in the first place `authors` may stand for all of the authors' choices.
+/// Parses `KEY=VALUE,KEY=VALUE`; in the first place, `authors` selects all of the authors' choices.
 impl FromStr for Choices {
     type Err = String;
 
@@ -157,10 +157,10 @@ impl FromStr for Choices {
                 choices = Self::AUTHORS;
                 continue;
             }
-            let form = || format!("{part:?}: the form is KEY=VALUE, or authors in the first place");
+            let form = || format!("{part:?}: use KEY=VALUE, or authors in the first place");
             let (key, value) = part.split_once('=').ok_or_else(form)?;
             if seen.contains(&key) {
-                return Err(format!("{key} is there twice"));
+                return Err(format!("{key} occurs twice"));
             }
             seen.push(key);
             choices.set(key, value)?;
@@ -169,8 +169,8 @@ impl FromStr for Choices {
     }
 }
 
-/// As [`FromStr`] reads it: what differs from the defaults, or from the authors' choices where that is less; nothing
-/// for the defaults.
+/// Formats the choices for [`FromStr`]: the differences from the defaults, or from the authors' choices if these are
+/// fewer; nothing for the defaults.
 impl fmt::Display for Choices {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let differing = |from: &Self| -> Vec<String> {
@@ -188,7 +188,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_choice_reads_as_it_is_written() {
+    fn choices_parse_as_formatted() {
         let other = Choices { score: ScoreOf::Output, ..Choices::AUTHORS };
         for (from, to) in [(Choices::default(), other), (other, Choices::default())] {
             for (key, value) in to.pairs() {
@@ -206,13 +206,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_choice_is_named() {
+    fn unknown_choices_are_named() {
         for (text, words) in [
             ("", "KEY=VALUE"),
             ("frames", "KEY=VALUE"),
             ("head=8,authors", "first place"),
             ("heads=8", "the keys are bandwidth, frames, score"),
-            ("head=8,head=4", "head is there twice"),
+            ("head=8,head=4", "head occurs twice"),
             ("head=5", "2, 3, 4 or 8, or free"),
             ("frames=1", "a number from 2, or all"),
             ("batch=0", "1 to 1024"),

@@ -1,4 +1,4 @@
-//! Stage 1 of ActQuant: how much each matrix adds to what its values say about the actions.
+//! Stage 1 of ActQuant: how much each matrix adds to the information of its values about the actions.
 
 use ndarray::Array2;
 use serde::Serialize;
@@ -9,8 +9,7 @@ use crate::data::Dataset;
 use crate::error::{Context, Result, ensure};
 use crate::graph::{Evaluator, Graph, WeightMatrix};
 
-/// Frames that kernels can be built over, at most: time and memory go with the square, and so many take 512 MiB a
-/// kernel.
+/// Most frames of a kernel. Time and memory grow with the square; this many take 512 MiB per kernel.
 pub const MOST_FRAMES: usize = 8192;
 
 /// Weight of the dependence on the network's input (the paper's lambda_x).
@@ -18,12 +17,12 @@ const LAMBDA_X: f64 = 1.0;
 /// Weight of the dependence on the actions (the paper's lambda_y).
 const LAMBDA_Y: f64 = 1.0;
 
-/// The dependences that a matrix's score is made of.
+/// Dependences that a matrix's score consists of.
 ///
-/// ActQuant (arXiv 2605.24011) scores values Z by the HSIC bottleneck
-/// `F(Z) = -lambda_x HSIC(X, Z) + lambda_y HSIC(Y, Z)`, and a matrix by `sens = F(output) - F(input)`. As in the
-/// authors' code, X is the same for every matrix, namely the input of the network's first one, so that `sens` says how
-/// far the matrix moves the values from the observation towards the actions.
+/// ActQuant (arXiv 2605.24011) scores values Z by the HSIC bottleneck `F(Z) = -lambda_x HSIC(X, Z) + lambda_y HSIC(Y,
+/// Z)`, and a matrix by `sens = F(output) - F(input)`. As in the authors' code, X is the same for every matrix: the
+/// input of the network's first one. So `sens` measures how far the matrix moves the values from the observation
+/// towards the actions.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Score {
     /// HSIC(X, the matrix's input)
@@ -37,22 +36,22 @@ pub struct Score {
 }
 
 impl Score {
-    /// `F(input)`
+    /// Returns `F(input)`.
     pub fn f_input(&self) -> f64 {
         LAMBDA_Y * self.y_input - LAMBDA_X * self.x_input
     }
 
-    /// `F(output)`
+    /// Returns `F(output)`.
     pub fn f_output(&self) -> f64 {
         LAMBDA_Y * self.y_output - LAMBDA_X * self.x_output
     }
 
-    /// `F(output) - F(input)`
+    /// Returns `F(output) - F(input)`.
     pub fn sens(&self) -> f64 {
         self.f_output() - self.f_input()
     }
 
-    /// The one that is chosen.
+    /// Returns the chosen score.
     pub fn of(&self, score: ScoreOf) -> f64 {
         match score {
             ScoreOf::Gain => self.sens(),
@@ -61,14 +60,14 @@ impl Score {
     }
 }
 
-/// The scores of all matrices over evenly spaced frames of `dataset`, at most so many; it must hold actions.
+/// Returns the scores of all matrices over at most `most` evenly spaced frames of `dataset`, which must hold actions.
 ///
-/// Gaussian kernels on inputs and outputs, the linear kernel on the actions. A matrix that is used several times in a
-/// frame is scored by the mean of its inputs and outputs. Biases are left out: no kernel sees them.
+/// Inputs and outputs have Gaussian kernels, the actions the linear kernel. A matrix that is used several times in a
+/// frame is scored by the mean of its inputs and outputs. Biases are ignored, since no kernel depends on them.
 pub fn scores(graph: &Graph, dataset: &Dataset, most: usize, bandwidth: Bandwidth) -> Result<Vec<Score>> {
     let frames = dataset.frames();
     let step = frames.div_ceil(most.clamp(1, MOST_FRAMES)).max(1);
-    ensure!(frames.div_ceil(step) >= 2, "{}: at least 2 frames are needed", dataset.path.display());
+    ensure!(frames.div_ceil(step) >= 2, "{}: too few frames; at least 2 frames are needed", dataset.path.display());
     let samples = Samples::collect(graph, dataset, step)?;
     let actions = Kernel::linear(&standardized(&samples.actions));
     let observation = Kernel::gaussian(&samples.inputs[samples.first], bandwidth);
@@ -87,13 +86,13 @@ pub fn scores(graph: &Graph, dataset: &Dataset, most: usize, bandwidth: Bandwidt
     Ok(graph.matrices.iter().zip(&samples.inputs).map(score).collect())
 }
 
-/// Every `step`-th frame.
+/// Values at every `step`-th frame.
 struct Samples {
-    /// Per matrix `[frame, column]`.
+    /// Inputs per matrix, `[frame, column]`.
     inputs: Vec<Array2<f64>>,
-    /// `[frame, element]`
+    /// Actions, `[frame, element]`.
     actions: Array2<f64>,
-    /// The matrix that is evaluated first.
+    /// Matrix that is evaluated first.
     first: usize,
 }
 
@@ -130,7 +129,7 @@ impl Samples {
     }
 }
 
-/// Columns with mean 0 and variance 1; constant columns are left out.
+/// Standardizes columns to mean 0 and variance 1, and drops constant columns.
 fn standardized(samples: &Array2<f64>) -> Array2<f64> {
     let columns: Vec<Vec<f64>> = samples
         .columns()
@@ -151,7 +150,7 @@ mod tests {
     use crate::methods::actquant::testing::{dataset, lstm};
 
     #[test]
-    fn scores_are_finite_and_the_first_matrix_has_the_observation_as_input() {
+    fn the_first_matrix_reads_the_observation() {
         let graph = lstm();
         let dataset = dataset(&graph, 3, 20);
         let scores = scores(&graph, &dataset, 512, Bandwidth::Median).expect("scores");
@@ -164,20 +163,20 @@ mod tests {
     }
 
     #[test]
-    fn frames_are_a_limit() {
+    fn frames_are_limited() {
         let graph = lstm();
         let dataset = dataset(&graph, 1, 24);
         let score = |most| scores(&graph, &dataset, most, Bandwidth::Median).expect("scores")[0].sens();
         assert_eq!(score(24), score(usize::MAX));
         assert_ne!(score(24), score(8));
-        // Not so many as 13, evenly spaced: every second.
+        // Fewer than 13, evenly spaced: every second.
         assert_eq!(score(12), score(13));
         let error = scores(&graph, &Dataset { length: vec![1], ..dataset.clone() }, 24, Bandwidth::Median);
         assert!(error.is_err_and(|error| error.to_string().contains("at least 2 frames")));
     }
 
     #[test]
-    fn standardized_columns_have_unit_variance_and_constant_ones_are_gone() {
+    fn standardization_drops_constant_columns() {
         let samples = Array2::from_shape_fn((50, 3), |(i, j)| if j == 1 { 0.3 } else { 5.0 + (i * (j + 1)) as f64 });
         let found = standardized(&samples);
         assert_eq!(found.dim(), (50, 2));

@@ -1,4 +1,4 @@
-//! Which matrices read int8, and which int16.
+//! Choice between int8 and int16 activations for each matrix.
 
 use actq_kernels::Width;
 
@@ -14,14 +14,14 @@ use crate::methods::options::{Activations, Options, Packing};
 use crate::methods::quantized::{Quantized, dequantized};
 use crate::random::Random;
 
-/// An int16 input must lower the error by this share of it, and by more the more of the weights are behind it: its
+/// Least share of the error that an int16 input must remove, more for matrices with a larger share of the weights: its
 /// kernel takes 1.3 to 1.7 times as long.
 const WORTH: f32 = 0.03;
 const WORTH_OF_ALL: f32 = 0.12;
-/// int8's layout takes this many times int16's bytes where a matrix of few columns has mostly rows of 8 bits: int8 pads
-/// columns to 8, int16 to 4.
+/// Ratio of bytes, int8 layout over int16 layout, above which a matrix of few columns and mostly 8-bit rows gets int16:
+/// int8 pads columns to 8, int16 to 4.
 const PADDED: f64 = 1.15;
-/// A small matrix has at most one in so many of all weights.
+/// Divisor of all weights; a small matrix has at most this share.
 const SMALL: usize = 10;
 const INT8: u16 = Activations::Int8.limit();
 const INT16: u16 = Activations::Int16.limit();
@@ -29,8 +29,8 @@ const INT16: u16 = Activations::Int16.limit();
 const MEASURED: usize = 8;
 const SAMPLES: usize = 256;
 
-/// Widths for all rows, and the activations' magnitudes that learning goes by: where nothing was asked for int8, but
-/// where int16 takes so many bytes less that other rows get them. `size` keeps room for no layout yet.
+/// Allocates widths for all rows, and the activations' magnitudes of learning: int8 unless requested otherwise, or
+/// int16 if it takes so many fewer bytes that other rows can use them. `size` does not reserve room for any layout yet.
 pub(super) fn allocated(size: Size<'_>, rows: &[Rows], options: &Options, allowed: f64) -> Result<(Widths, Vec<u16>)> {
     let asked = vec![options.activations.limit(); size.graph.matrices.len()];
     let within = |limits: &[u16]| {
@@ -50,7 +50,7 @@ pub(super) fn allocated(size: Size<'_>, rows: &[Rows], options: &Options, allowe
     Ok(within(&limits).map_or((widths, asked), |widths| (widths, limits)))
 }
 
-/// The same where there is room for one layout only: the one that can take the fewest bytes.
+/// Does the same if there is room for one layout only: the one that can take the fewest bytes.
 fn tight(size: Size<'_>, rows: &[Rows], options: &Options, allowed: f64) -> Result<(Widths, Vec<u16>)> {
     let forced: Vec<Option<Width>> = rows.iter().map(|rows| rows.forced).collect();
     let limits = smallest_limits(&size, options, &forced);
@@ -58,14 +58,14 @@ fn tight(size: Size<'_>, rows: &[Rows], options: &Options, allowed: f64) -> Resu
     Ok((widths, limits))
 }
 
-/// The fewest bytes that a network takes, all that counts in `size`.
+/// Returns the fewest bytes of a network, all that `size` counts.
 pub(super) fn least_bytes(size: &Size<'_>, options: &Options, forced: &[Option<Width>]) -> usize {
     let limits = smallest_limits(size, options, forced);
     let size = Size { packings: packed(&limits, options), ..size.clone() };
     size.bytes(&size.smallest(forced))
 }
 
-/// The activations' magnitude of every matrix with which it can take the fewest bytes.
+/// Returns the activations' magnitude of every matrix with which it can take the fewest bytes.
 fn smallest_limits(size: &Size<'_>, options: &Options, forced: &[Option<Width>]) -> Vec<u16> {
     let asked = vec![options.activations.limit(); forced.len()];
     if options.activations.are_asked_for() {
@@ -80,13 +80,13 @@ fn smallest_limits(size: &Size<'_>, options: &Options, forced: &[Option<Width>])
     (0..forced.len()).map(|m| if least(m, INT16) < least(m, INT8) { INT16 } else { INT8 }).collect()
 }
 
-/// The layouts of these magnitudes.
+/// Returns the layouts of these magnitudes.
 fn packed(limits: &[u16], options: &Options) -> Vec<Vec<Packing>> {
     limits.iter().map(|&limit| vec![Packing::of(limit, options.group)]).collect()
 }
 
-/// The layouts that room is kept for: that of every matrix's limit, and of int16 where that is still to be chosen and
-/// likely to be worth it, as of the first and the last layer.
+/// Returns the layouts that room is reserved for: that of every matrix's limit, and int16 for matrices that are still
+/// undecided and likely to need it, such as the first and the last layer.
 fn roomy(graph: &Graph, limits: &[u16], options: &Options) -> Vec<Vec<Packing>> {
     let mut packings = packed(limits, options);
     for ((matrix, packings), limit) in graph.matrices.iter().zip(&mut packings).zip(limits) {
@@ -98,8 +98,8 @@ fn roomy(graph: &Graph, limits: &[u16], options: &Options) -> Vec<Vec<Packing>> 
     packings
 }
 
-/// int16 for each matrix whose input, rounded to int8, adds more to the error than int16 costs in time; for the others
-/// what they have at least.
+/// Chooses int16 for each matrix whose input, rounded to int8, adds more to the error than int16 costs in time; the
+/// others keep their least magnitude.
 pub(super) fn choose_activations(
     graph: &Graph,
     quantized: &[Quantized],

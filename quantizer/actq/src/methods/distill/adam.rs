@@ -1,6 +1,6 @@
 //! Adam (arXiv 1412.6980).
 
-/// Adam's moments of a run of parameters.
+/// Adam's moments of a range of parameters.
 #[derive(Clone, Debug)]
 pub(super) struct Adam {
     pub(super) first: Vec<f32>,
@@ -9,27 +9,27 @@ pub(super) struct Adam {
 
 const FIRST: f32 = 0.9;
 const SECOND: f32 = 0.999;
-/// Keeps a parameter without a gradient where it is.
+/// Constant that keeps a parameter without a gradient unchanged.
 const TINY: f32 = 1e-12;
 
-/// How far one step goes.
+/// Size of one step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stride {
     rate: f32,
-    /// What the moments lack after so few steps.
+    /// Bias corrections of the moments after few steps.
     first: f32,
     second: f32,
 }
 
 impl Stride {
-    /// Of step `t`, which counts from 1.
+    /// Returns the stride of step `t`, which counts from 1.
     pub(super) fn new(rate: f32, t: i32) -> Self {
         Self { rate, first: 1.0 / (1.0 - FIRST.powi(t)), second: 1.0 / (1.0 - SECOND.powi(t)) }
     }
 }
 
 impl Adam {
-    /// Of so many parameters.
+    /// Makes moments of `len` parameters.
     pub(super) fn new(len: usize) -> Self {
         Self { first: vec![0.0; len], second: vec![0.0; len] }
     }
@@ -40,7 +40,7 @@ impl Adam {
     }
 }
 
-/// [`Adam::step`] on a part of the parameters and the moments that belong to it.
+/// Does [`Adam::step`] on a part of the parameters and their moments.
 pub(super) fn step(parameters: &mut [f32], grads: &[f32], first: &mut [f32], second: &mut [f32], stride: Stride) {
     for ((p, g), (m, v)) in parameters.iter_mut().zip(grads).zip(first.iter_mut().zip(second)) {
         *m = FIRST * *m + (1.0 - FIRST) * g;

@@ -1,10 +1,10 @@
-//! A width for every row, to a budget.
+//! Allocates a width for every row within a budget.
 //!
-//! Rows (output neurons) differ far more in what they do to the actions than columns do. Row `r` at width `b` is
-//! expected to cost `eps_b * g_r * sum_c w_rc^2 h_c` of squared action error; one Lagrange multiplier, found by
-//! bisection, weighs that against bits. A row of 0 bits gives its bias alone; where its output only feeds matrices
-//! through elementwise functions, it disappears with the columns that it fed (see [`mod@super::compact`]): what those
-//! columns carried is its error, and their bits count as its saving.
+//! Rows (output neurons) differ far more in their effect on the actions than columns do. Row `r` at width `b` is
+//! predicted to cost `eps_b * g_r * sum_c w_rc^2 h_c` of squared action error. One Lagrange multiplier, found by
+//! bisection, weighs that against bits. A row of 0 bits gives its bias only. If its output only feeds matrices through
+//! elementwise functions, it disappears with the columns that it fed (see [`mod@super::compact`]): the contribution of
+//! those columns is its error, and their bits count as its saving.
 
 use actq_kernels::Width;
 
@@ -14,9 +14,9 @@ use crate::budget::{BudgetTooSmall, USED};
 use crate::error::Result;
 use crate::graph::{Graph, WeightMatrix};
 
-/// Expected squared error of a row in units of its own energy: that of the mid-rise grid with error feedback. At 8 bits
-/// more than rounding costs (0.00005), so that 8 bits go only where 4 are far from enough: learning mends the
-/// difference.
+/// Returns the predicted squared error of a row in units of its own energy: that of the mid-rise grid with error
+/// feedback. The value at 8 bits is higher than the cost of rounding (0.00005), so that 8 bits go only to rows for
+/// which 4 bits are far from enough: learning compensates the difference.
 fn epsilon(width: Width) -> f64 {
     match width {
         Width::W2 => 0.125,
@@ -26,40 +26,41 @@ fn epsilon(width: Width) -> f64 {
     }
 }
 
-/// Widths that a row may have.
+/// Permitted widths of a row.
 const CHOICES: [Option<Width>; 5] = [None, Some(Width::W2), Some(Width::W3), Some(Width::W4), Some(Width::W8)];
 
-/// What a bit gains at least where a row is widened to use what is left, of what it gains elsewhere.
+/// Least gain per bit of a row that is widened with the rest, as a share of the gain elsewhere.
 const WORTH: f64 = 0.1;
-/// Rows that are widened at once, at most: blocks are padded to so many.
+/// Most rows that are widened together: blocks are padded to this many.
 const MOST_AT_ONCE: usize = 4;
 
-/// What the allocation needs to know of a matrix.
+/// Properties of a matrix's rows in the allocation.
 #[derive(Clone, Debug)]
 pub struct Rows {
-    /// `g_r * sum_c w_rc^2 h_c` of each row.
+    /// Energy `g_r * sum_c w_rc^2 h_c` of each row.
     pub energy: Vec<f64>,
-    /// Error of leaving each row without bits.
+    /// Error of each row without bits.
     pub removal: Vec<f64>,
-    /// The width that is forced, for all rows.
+    /// Forced width of all rows.
     pub forced: Option<Width>,
 }
 
 impl Rows {
-    /// The expected error of row `r` at a width.
+    /// Returns the predicted error of row `r` at a width.
     pub fn expected(&self, r: usize, width: Option<Width>) -> f64 {
         width.map_or(self.removal[r], |width| epsilon(width) * self.energy[r])
     }
 }
 
-/// The energies of a matrix's rows for the importances of its columns (`h`) and rows (`g`).
+/// Returns the energies of a matrix's rows for the importances of its columns (`h`) and rows (`g`).
 pub fn energies(matrix: &WeightMatrix, h: &[f64], g: &[f64]) -> Vec<f64> {
     let rows = matrix.data.chunks_exact(matrix.cols).zip(g);
     rows.map(|(row, g)| g * row.iter().zip(h).map(|(w, h)| f64::from(*w).powi(2) * h).sum::<f64>()).collect()
 }
 
-/// The error of removing each element of `dimension`: the energies of the columns that it feeds, for the importances
-/// `h` of those columns about their means (which go into the biases) and `g` of the rows that they reach, by matrix.
+/// Returns the error of removing each element of `dimension`: the energies of the columns that it feeds. `h` is the
+/// importance of those columns about their means (which go into the biases), `g` that of the rows that they reach, by
+/// matrix.
 pub fn removals(graph: &Graph, dimension: &Dimension, h: &[Vec<f64>], g: &[Vec<f64>]) -> Vec<f64> {
     let mut removals = vec![0.0; graph.matrices[dimension.maker].rows];
     for &consumer in &dimension.consumers {
@@ -90,8 +91,8 @@ pub fn allocate(size: &Size<'_>, rows: &[Rows], limit: f64) -> Result<Widths> {
     Ok(widths)
 }
 
-/// The lowest multiplier, in units of error per bit, whose widths fit. `None` where not even the highest has any: it
-/// keeps the rows that matter most, and others may take fewer bytes.
+/// Returns the lowest multiplier, in units of error per bit, whose widths fit. `None` if even the highest does not fit:
+/// it keeps the most important rows, and others may take fewer bytes.
 fn lowest_multiplier(size: &Size<'_>, rows: &[Rows], limit: f64) -> Option<f64> {
     let fits = |multiplier: f64| size.bytes(&choose(size, rows, multiplier)) as f64 <= limit;
     // The range covers everything from 8 bits to none for any scale of energies.
@@ -111,7 +112,7 @@ fn lowest_multiplier(size: &Size<'_>, rows: &[Rows], limit: f64) -> Option<f64> 
     Some(high.exp())
 }
 
-/// The widths that take the fewest bytes, if they fit.
+/// Returns the widths that take the fewest bytes, if they fit.
 fn smallest(size: &Size<'_>, rows: &[Rows], limit: f64) -> Result<Widths> {
     let forced: Vec<Option<Width>> = rows.iter().map(|rows| rows.forced).collect();
     let widths = size.smallest(&forced);
@@ -119,10 +120,10 @@ fn smallest(size: &Size<'_>, rows: &[Rows], limit: f64) -> Result<Widths> {
     Ok(widths)
 }
 
-/// Widens rows as long as bytes are left. Blocks of rows are padded, and a row more may take hundreds of bytes or none,
-/// which no multiplier sees: again and again the rows whose errors fall most for the bytes that they take, of one
-/// matrix, one width and at most so many as a block is padded to. Rows that gain less than `least` for a bit stay as
-/// they are: what has no part in the actions shall not take time.
+/// Widens rows as long as bytes are left. Blocks of rows are padded, so one more row may take hundreds of bytes or
+/// none, which no multiplier can predict. It repeatedly widens the rows with the largest fall of error per byte: rows
+/// of one matrix and one width, at most as many as a block is padded to. Rows that gain less than `least` per bit keep
+/// their width, since rows without effect on the actions should not take time.
 fn fill(widths: &mut Widths, size: &Size<'_>, rows: &[Rows], limit: f64, least: f64) {
     let mut taken = size.bytes(widths);
     loop {
@@ -153,23 +154,23 @@ fn fill(widths: &mut Widths, size: &Size<'_>, rows: &[Rows], limit: f64, least: 
     }
 }
 
-/// Every width, and every wider one.
+/// Returns every width with every wider one.
 fn widenings() -> impl Iterator<Item = (Option<Width>, Option<Width>)> {
     let wider = |from| CHOICES.into_iter().filter(move |to| *to > from).map(move |to| (from, to));
     CHOICES.into_iter().flat_map(wider)
 }
 
-/// Whether rows of every width stand at most as far apart as the image's steps reach.
+/// Returns `true` if successive rows of every width are at most as far apart as an output step allows.
 fn are_within_steps(widths: &[Option<Width>]) -> bool {
     Width::ALL.into_iter().all(|width| out_of_reach(widths, width).is_none())
 }
 
-/// What a row of a matrix takes beside the others, without padding.
+/// Bits of one more row of a matrix, without padding.
 struct RowBits {
     cols: f64,
-    /// Scale, step where there is one, and bias where one goes with the row and counts.
+    /// Scale, output step if present, and bias if it is removed with the row and counts.
     overhead: f64,
-    /// What the column saves that a removed row takes along: one bit per bit of each row that it crosses.
+    /// Saving by the column that a removed row takes with it: one bit per bit of each row that it crosses.
     saving: f64,
 }
 
@@ -194,8 +195,8 @@ impl RowBits {
     }
 }
 
-/// The widths that minimise error plus `multiplier` times bits. What a removed row saves elsewhere depends on the other
-/// rows' widths, so the choice is repeated until it settles.
+/// Returns the widths that minimize error plus `multiplier` times bits. The saving of a removed row depends on the
+/// other rows' widths, so the choice is repeated until it settles.
 fn choose(size: &Size<'_>, rows: &[Rows], multiplier: f64) -> Widths {
     let Size { graph, dimensions, .. } = size;
     let mut widths: Widths = graph.matrices.iter().map(|m| vec![Some(Width::W2); m.rows]).collect();
@@ -212,7 +213,7 @@ fn choose(size: &Size<'_>, rows: &[Rows], multiplier: f64) -> Widths {
             })
             .collect();
         widths = next;
-        // A matrix without any rows would cut the actions off from the observations.
+        // A matrix without rows would disconnect the actions from the observations.
         for (widths, rows) in widths.iter_mut().zip(rows) {
             if widths.iter().all(Option::is_none) {
                 let most = (0..rows.energy.len()).max_by(|&a, &b| rows.energy[a].total_cmp(&rows.energy[b]));
@@ -228,22 +229,22 @@ fn choose(size: &Size<'_>, rows: &[Rows], multiplier: f64) -> Widths {
     widths
 }
 
-/// Widens rows until those of every width stand at most as far apart as the image's steps reach.
+/// Widens rows until successive rows of every width are at most as far apart as an output step allows.
 fn within_steps(widths: &mut [Option<Width>]) {
-    // A row that is widened may part those of its former width.
+    // A widened row may separate those of its former width.
     while let Some((row, width)) = Width::ALL.into_iter().find_map(|width| out_of_reach(widths, width)) {
         widths[row] = width;
     }
 }
 
-/// Where a row of this width is too far from the one before: a row to widen, and to which width.
+/// Returns a row to widen and its new width, if a row of this width is too far from the previous one.
 fn out_of_reach(widths: &[Option<Width>], width: Width) -> Option<(usize, Option<Width>)> {
     const REACH: usize = u8::MAX as usize;
     let mut last = 0;
     for row in (0..widths.len()).filter(|&row| widths[row] == Some(width)) {
         if row - last > REACH {
             let between = (last..=last + REACH).rev().find(|&row| widths[row] < Some(width));
-            // Among wider rows alone, it goes with them.
+            // Between wider rows only, it gets their width.
             return Some(between.map_or((row, widths[last + REACH]), |between| (between, Some(width))));
         }
         last = row;
@@ -258,7 +259,7 @@ mod tests {
     use crate::random::Random;
 
     #[test]
-    fn no_row_can_be_widened_with_the_bytes_that_are_left() {
+    fn remaining_bytes_cannot_widen_any_row() {
         let mut random = Random::new(1);
         let mut graph = Graph::new(18);
         for (rows, cols) in [(70, 18), (33, 70)] {
@@ -291,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn the_smallest_widths_fit_and_a_byte_less_is_refused() {
+    fn one_byte_below_the_smallest_widths_is_refused() {
         let mut graph = Graph::new(8);
         graph.matrices = vec![WeightMatrix { name: "m".into(), rows: 300, cols: 8, data: vec![0.0; 2400] }];
         let packings = vec![vec![Packing::of(127, 0)]];
@@ -306,10 +307,10 @@ mod tests {
     }
 
     #[test]
-    fn rows_are_only_widened_until_steps_reach() {
+    fn rows_are_widened_only_as_steps_require() {
         let mut random = Random::new(1);
         for case in 0..200 {
-            // Mostly one width, so that the others are far apart.
+            // Mostly one width, so that the other rows are far apart.
             let most = [None, Some(Width::W2), Some(Width::W4)][case % 3];
             let others = [None, Some(Width::W2), Some(Width::W3), Some(Width::W8)];
             let row = |_| if random.below(300) < case { others[random.below(4)] } else { most };

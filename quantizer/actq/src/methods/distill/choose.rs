@@ -1,10 +1,10 @@
-//! How codes are chosen, and how far learning widens the inputs: what does best on whole episodes that are left out.
+//! Chooses how codes are made, and how far learning widens the inputs, by the errors on whole held-out episodes.
 //!
-//! Each choice has three quarters of the episodes; to learn, it has an eighth of the steps. On the others its error is
-//! measured twice, at the recorded observations and at widened ones. A feed-forward network takes the choice with the
-//! lowest error at the recorded observations, among equals that with the lowest at widened ones; a recurrent one learns
-//! as widely as it can ([`Widening::choices`]), and takes feedback where that is lower at widened ones
-//! (docs/QUANTIZER.md).
+//! Each choice has three quarters of the episodes, and an eighth of the steps to learn. Its error is measured on the
+//! other episodes, at the recorded observations and at widened ones. A feed-forward network takes the choice with the
+//! lowest error at the recorded observations, and among equals the one with the lowest at widened ones. A recurrent
+//! network learns with the widest noise ([`Widening::choices`]), and takes feedback if that has a lower error at
+//! widened observations (docs/QUANTIZER.md).
 
 use nalgebra::DMatrix;
 
@@ -19,44 +19,44 @@ use crate::methods::learning::{Choice, Tried};
 use crate::methods::quantized::{Quantized, dequantized};
 use crate::random::Random;
 
-/// With fewer steps there is nothing to share.
+/// Least steps of which a part is spent on choices.
 const LEAST_STEPS: usize = 3000;
-/// Of the steps, and of the time, for one choice.
+/// Divisor of the steps, and of the time, for one choice.
 const STEPS: usize = 8;
 const TIME: u32 = 12;
-/// What all the steps leave of the error that an eighth of them leaves: 0.6 to 1.15, 0.81 in the mean
+/// Predicted ratio of the errors after all steps and after an eighth of them: 0.6 to 1.15, 0.81 on average
 /// (docs/records/2026-11-22-choice.md).
-const LEFT: f64 = 0.8;
-/// Errors on a few episodes that differ by less say nothing of others (docs/records/2026-11-23-hold.md).
+const ERROR_RATIO: f64 = 0.8;
+/// Relative difference of errors on a few episodes that counts as chance (docs/records/2026-11-23-hold.md).
 const CHANCE: f64 = 0.05;
-/// Dampings of feedback that are tried.
+/// Dampings of feedback to try.
 const DAMPINGS: [f64; 2] = [DAMPING_INPUT, 0.03];
 /// Batches that an error is measured on, and frames in each.
 const BATCHES: usize = 16;
 const FRAMES: usize = 512;
 
-/// What feedback makes of moments and a damping.
+/// Feedback from moments and a damping.
 pub type Feedback<'f> = dyn Fn(&[(Moments, DMatrix<f64>)], f64) -> (Vec<Quantized>, Graph) + 'f;
 
-/// What was chosen.
+/// Result of the choice.
 #[derive(Debug)]
 pub struct Chosen {
-    /// The way.
+    /// Selected way.
     pub choice: Choice,
-    /// What is left for learning.
+    /// Remaining limits of learning.
     pub bounds: Bounds,
-    /// What it was chosen from.
+    /// Ways that were compared.
     pub tried: Vec<Tried>,
 }
 
-/// Roughly the share of all the work.
+/// Returns the approximate share of the choice in all the work.
 pub fn choosing(recurrent: bool) -> f64 {
     let tries = Widening::choices(recurrent).len() as f64 / STEPS as f64;
     tries / (1.0 + tries)
 }
 
-/// Tries all choices. Where no episode can be left out, or few steps are to be learned, nothing is tried. Of an
-/// iterative head feedback is not: its moments over all denoising steps take longer than what they could say is worth.
+/// Tries all choices. If no episode can be held out, or few steps are to be learned, it tries nothing. It does not try
+/// feedback for an iterative head, since moments over all denoising steps take longer than the result is worth.
 pub fn choose(
     task: &Task<'_>,
     windows: &Windows,
@@ -98,10 +98,10 @@ pub fn choose(
     Chosen { choice, bounds: Bounds { steps, time: left }, tried }
 }
 
-/// The best of what was tried: of those whose errors on the path differ by no more than chance, the one that is best
-/// off it. Feedback has all that it will have, learning an eighth of its steps.
+/// Returns the best choice: among those whose errors on the path differ by chance only, the one with the lowest error
+/// off it. Feedback is complete here, whereas learning has had an eighth of its steps.
 fn best(tried: &[Tried], recurrent: bool) -> Option<&Tried> {
-    let left = |tried: &Tried| if matches!(tried.choice, Choice::Learning(_)) { LEFT } else { 1.0 };
+    let left = |tried: &Tried| if matches!(tried.choice, Choice::Learning(_)) { ERROR_RATIO } else { 1.0 };
     let widened = |tried: &Tried| left(tried) * tried.widened;
     let expected = |tried: &Tried| if recurrent { widened(tried) } else { left(tried) * tried.recorded };
     let lowest = tried.iter().map(expected).min_by(f64::total_cmp)?;
@@ -109,7 +109,7 @@ fn best(tried: &[Tried], recurrent: bool) -> Option<&Tried> {
     alike.min_by(|a, b| widened(a).total_cmp(&widened(b)))
 }
 
-/// The errors of a network at recorded and at widened observations, the same for every choice.
+/// Returns the errors of a network at recorded and at widened observations, the same ones for every choice.
 fn errors(task: &Task<'_>, graph: &Graph, quantized: &[Quantized], windows: &Windows) -> [f64; 2] {
     let network = Network::rounded(graph, task.x_max);
     let weights = dequantized(graph, quantized);
@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn with_enough_steps_feedback_stands_beside_learning() {
+    fn with_enough_steps_feedback_competes_with_learning() {
         let Learning { steps, choice, tried } = chosen(4, LEAST_STEPS);
         assert_eq!(tried.len(), DAMPINGS.len() + Widening::choices(false).len());
         assert_eq!(best(&tried, false).map(|tried| tried.choice), Some(choice));
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn feedback_has_to_be_better_than_what_learning_may_still_reach() {
+    fn feedback_must_beat_the_predicted_learning_error() {
         let learned = |i: usize, recorded, widened| {
             let choice = Choice::Learning(Widening::choices(false)[i]);
             Tried { choice, recorded, widened }
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn of_one_episode_or_few_steps_nothing_is_tried() {
+    fn one_episode_or_few_steps_skip_the_choice() {
         let found = |Learning { choice, tried, .. }: Learning| (choice, tried.len());
         assert_eq!(found(chosen(1, 0)), (Choice::Feedback { damping: DAMPING_INPUT }, 0));
         assert_eq!(found(chosen(4, 8)), (Choice::Learning(Widening::WIDE), 0));

@@ -1,4 +1,4 @@
-//! Removing what has no bits, and putting rows in the order of their widths, where both cost nothing at run time.
+//! Removes elements without bits, and sorts rows by their widths, if neither costs anything at run time.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -7,21 +7,21 @@ use crate::calibrate::moments::Moments;
 use crate::calibrate::sensitivity::DAMPING_INPUT;
 use crate::graph::{Graph, NodeKind, WeightMatrix};
 
-/// A graph whose hidden vectors hold only the elements that have bits.
+/// A graph whose hidden vectors hold only the elements with bits.
 #[derive(Clone, Debug)]
 pub struct Compacted {
     /// The graph.
     pub graph: Graph,
     /// Widths of the matrices' rows in the new order.
     pub widths: Widths,
-    /// For every matrix which of the former columns it has, in the new order.
+    /// Former columns of every matrix in the new order.
     pub columns: Vec<Vec<usize>>,
-    /// The same for the rows.
+    /// Former rows of every matrix in the new order.
     pub rows: Vec<Vec<usize>>,
 }
 
-/// Removes the elements that have no bits and sorts the others by width. What a removed element contributed is guessed
-/// from the elements that stay, by the moments of every matrix's input, and goes into their columns and the biases.
+/// Removes the elements without bits and sorts the others by width. The contribution of a removed element is estimated
+/// from the remaining ones by the moments of every matrix's input, and goes into their columns and the biases.
 pub fn compact(graph: &Graph, dimensions: &[Dimension], widths: &Widths, moments: &[&Moments]) -> Compacted {
     let mut graph = graph.clone();
     let mut widths = widths.clone();
@@ -45,7 +45,7 @@ pub fn compact(graph: &Graph, dimensions: &[Dimension], widths: &Widths, moments
         if let NodeKind::Linear(linear) = &mut graph.nodes[dimension.node].kind {
             linear.bias = order.iter().map(|&r| linear.bias[r]).collect();
         }
-        // The functions behind it keep the new length.
+        // The functions after it take the new length.
         let mut value = dimension.node;
         loop {
             graph.nodes[value].len = order.len();
@@ -58,16 +58,15 @@ pub fn compact(graph: &Graph, dimensions: &[Dimension], widths: &Widths, moments
     Compacted { graph, widths, columns: kept, rows: kept_rows }
 }
 
-/// Takes the columns `gone` out of account: the least-squares guess of what they contribute goes to the columns `kept`,
-/// and its constant part is returned, to be added to the biases. Where nothing is correlated, that is the contribution
-/// of their means.
+/// Distributes the least-squares estimate of the contribution of the columns `gone` to the columns `kept`. Returns its
+/// constant part, which is to be added to the biases. Without correlations, that is the contribution of their means.
 fn absorb(matrix: &mut WeightMatrix, gone: &[usize], kept: &[usize], moments: &Moments) -> Vec<f32> {
     let centred = moments.centred();
     let damping = (DAMPING_INPUT * centred.trace() / matrix.cols.max(1) as f64).max(1e-30);
     let among = |i: usize, j: usize| centred[(kept[i], kept[j])] + if i == j { damping } else { 0.0 };
     let among = DMatrix::from_fn(kept.len(), kept.len(), among);
     let across = DMatrix::from_fn(kept.len(), gone.len(), |i, j| centred[(kept[i], gone[j])]);
-    // [kept, gone]: the share of each kept element in the guess of a removed one.
+    // [kept, gone]: the share of each kept element in the estimate of a removed one.
     let guess = among.cholesky().map_or_else(|| DMatrix::zeros(kept.len(), gone.len()), |c| c.solve(&across));
     let mean_of =
         |elements: &[usize]| DVector::from_iterator(elements.len(), elements.iter().map(|&c| moments.mean[c]));
@@ -93,7 +92,7 @@ fn columns(matrix: &WeightMatrix, order: &[usize]) -> WeightMatrix {
     WeightMatrix { name: matrix.name.clone(), rows: matrix.rows, cols: order.len(), data }
 }
 
-/// Adds to the biases behind a matrix.
+/// Adds values to the biases after a matrix.
 pub fn add_to_bias(graph: &mut Graph, matrix: usize, values: &[f32]) {
     for node in &mut graph.nodes {
         for product in node.kind.products().iter().filter(|product| product.matrix == matrix) {
@@ -110,7 +109,7 @@ mod tests {
     use crate::methods::distill::dimension::{dimensions, testing::graph};
     use actq_kernels::Width;
 
-    /// Moments of uncorrelated inputs; those of the second matrix have this mean.
+    /// Makes moments of uncorrelated inputs; those of the second matrix have this mean.
     fn moments(graph: &Graph, hidden: &[f32]) -> Vec<Moments> {
         let of = |(m, matrix): (usize, &WeightMatrix)| {
             let mean: Vec<f64> = (0..matrix.cols).map(|c| if m == 1 { f64::from(hidden[c]) } else { 0.0 }).collect();
@@ -148,11 +147,11 @@ mod tests {
     }
 
     #[test]
-    fn a_removed_element_leaves_its_mean() {
+    fn removal_keeps_the_elements_mean() {
         let graph = graph();
         let mut widths: Widths = graph.matrices.iter().map(|m| vec![Some(Width::W4); m.rows]).collect();
         widths[0][2] = None;
-        // At this observation the removed element has exactly its mean, and no other says anything of it.
+        // At this observation the removed element equals its mean, and no other element correlates with it.
         let mut hidden = Vec::new();
         Evaluator::new(&graph).step(&[0.3, -0.7, 1.1], &mut |m, x| {
             if m == 1 {
@@ -167,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn what_follows_from_the_others_is_not_lost() {
+    fn removed_elements_are_estimated_from_others() {
         // Column 3 is always 2 * column 0 - column 1 + 5.
         let mut random = crate::random::Random::new(5);
         let vectors: Vec<[f64; 4]> = (0..300)

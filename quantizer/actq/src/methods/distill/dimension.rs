@@ -1,49 +1,49 @@
-//! Hidden vectors whose elements may be permuted, and folded into biases where they are constant: those that one matrix
-//! makes and that reach only matrices, through elementwise functions.
+//! Hidden vectors whose elements may be permuted, and folded into biases if they are constant. One matrix makes such a
+//! vector, and it reaches only matrices, through elementwise functions.
 
 use actq_kernels::Width;
 
 use crate::graph::operation::{Operand, Product};
 use crate::graph::{Graph, NodeKind};
 
-/// Per matrix the width of every row; `None` for rows without bits.
+/// Width of every row per matrix; `None` for rows without bits.
 pub type Widths = Vec<Vec<Option<Width>>>;
 
-/// A hidden vector that may be permuted and pruned. Numbers are matrices of the graph.
+/// A hidden vector that may be permuted and pruned. Numbers are indices of the graph's matrices.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Dimension {
-    /// The matrix whose rows make it.
+    /// Matrix whose rows make it.
     pub maker: usize,
-    /// The matrices whose columns it feeds.
+    /// Matrices whose columns it feeds.
     pub consumers: Vec<usize>,
-    /// The linear node that makes it.
+    /// Linear node that makes it.
     pub node: usize,
 }
 
 impl Dimension {
-    /// The dimension that feeds matrix `m`.
+    /// Returns the dimension that feeds matrix `m`.
     pub fn feeding(dimensions: &[Self], m: usize) -> Option<&Self> {
         dimensions.iter().find(|d| d.consumers.contains(&m))
     }
 
-    /// The dimension that matrix `m` makes.
+    /// Returns the dimension that matrix `m` makes.
     pub fn made_by(dimensions: &[Self], m: usize) -> Option<&Self> {
         dimensions.iter().find(|d| d.maker == m)
     }
 
-    /// How many of its elements have bits.
+    /// Returns how many of its elements have bits.
     pub fn kept(&self, widths: &Widths) -> usize {
         widths[self.maker].iter().flatten().count()
     }
 
-    /// The kept elements, narrow to wide.
+    /// Returns the kept elements, narrow to wide.
     pub fn order(&self, widths: &Widths) -> Vec<usize> {
         let of = |width: Width| (0..widths[self.maker].len()).filter(move |&r| widths[self.maker][r] == Some(width));
         Width::ALL.into_iter().flat_map(of).collect()
     }
 }
 
-/// The dimensions of a graph.
+/// Finds the dimensions of a graph.
 pub fn dimensions(graph: &Graph) -> Vec<Dimension> {
     let linear = |n: usize| match &graph.nodes[n].kind {
         NodeKind::Linear(linear) if uses(graph, linear.matrix) == 1 => Some(linear.matrix),
@@ -53,7 +53,7 @@ pub fn dimensions(graph: &Graph) -> Vec<Dimension> {
         .filter_map(|node| {
             let maker = linear(node)?;
             let mut value = node + 1;
-            // Follow the elementwise functions as long as the value has no other reader.
+            // Follow the elementwise functions while the value has no other reader.
             loop {
                 if value == graph.output() {
                     return None;
@@ -72,12 +72,13 @@ pub fn dimensions(graph: &Graph) -> Vec<Dimension> {
         .collect()
 }
 
-/// How many nodes use a matrix.
+/// Returns how many nodes use a matrix.
 fn uses(graph: &Graph, matrix: usize) -> usize {
     graph.nodes.iter().filter(|node| node.kind.products().iter().any(|p| p.matrix == matrix)).count()
 }
 
-/// The matrices through which a node reads its input, where that is all it does with it, and nobody else uses them.
+/// Returns the matrices through which a node reads its input, if it reads it in no other way and no other node uses
+/// them.
 fn consumers(graph: &Graph, node: usize) -> Option<Vec<usize>> {
     let of_input = |product: &Product| product.operand == Operand::Input;
     let products = graph.nodes[node].kind.products().into_iter().filter(of_input);
@@ -94,7 +95,7 @@ pub(super) mod testing {
     use crate::graph::WeightMatrix;
     use crate::graph::ops::{Add, Linear, Pointwise};
 
-    /// 3 -> 5 tanh -> [2 and, through a residual sum, 5] with values that differ everywhere.
+    /// Makes a network 3 -> 5 tanh -> [2 and, through a residual sum, 5] with different values everywhere.
     pub(in crate::methods::distill) fn graph() -> Graph {
         let mut graph = Graph::new(3);
         let mut matrix = |rows: usize, cols: usize| {
@@ -121,7 +122,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_what_feeds_matrices_alone_is_a_dimension() {
+    fn dimensions_feed_only_matrices() {
         // The second matrix's output is also summed, the third's is the network's output.
         let expected = Dimension { maker: 0, consumers: vec![1], node: 0 };
         assert_eq!(dimensions(&graph()), vec![expected]);

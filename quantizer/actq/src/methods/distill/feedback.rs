@@ -1,11 +1,11 @@
-//! Two-sided error feedback, then coordinate descent: codes that keep `tr(E H E' G)` small, where `E` is the matrix's
-//! error, `H` the moment of its input and `G` that of the action error's derivative at its output.
+//! Two-sided error feedback, then coordinate descent: codes with a small `tr(E H E' G)`. `E` is the matrix's error, `H`
+//! the moment of its input, and `G` that of the action error's derivative at its output.
 //!
 //! With `H = L D L'` and `G = M F M'` (unit lower triangles) the error is `sum_rc F_r D_c (M' E L)_rc^2`. Weights are
-//! rounded one by one, in order of falling diagonals, so that each `(M' E L)_rc`, in which it is the last to come, is
-//! as small as its grid allows: what its row (through H) and its column (through G) have got wrong before is taken
-//! back. For `G = I` that is GPTQ (arXiv 2210.17323). Sweeps of coordinate descent then move single codes, all others
-//! standing, and fit the rows' scales to their codes.
+//! rounded one by one, in order of falling diagonals. Each weight is the last one in its `(M' E L)_rc`, and makes it as
+//! small as its grid allows: it compensates the earlier errors of its row (through H) and its column (through G). For
+//! `G = I` that is GPTQ (arXiv 2210.17323). Sweeps of coordinate descent then change single codes, with all others
+//! fixed, and fit the rows' scales to their codes.
 
 use actq_kernels::Width;
 use half::bf16;
@@ -22,16 +22,16 @@ const SWEEPS: usize = 3;
 
 /// A moment as `L D L'` in the order in which rows or columns are rounded.
 struct Factor {
-    /// The damped moment, row by row, in its own order.
+    /// Damped moment, row by row, in its own order.
     moment: Vec<f64>,
     /// Rows or columns, the last to be rounded first.
     order: Vec<usize>,
-    /// The unit lower triangle by `order`, column by column: entry `(i, j)` at `j * n + i`.
+    /// Unit lower triangle by `order`, column by column: entry `(i, j)` at `j * n + i`.
     lower: Vec<f64>,
 }
 
 impl Factor {
-    /// With this share of the mean diagonal added to it.
+    /// Factors a moment with a share `damping` of its mean diagonal added to the diagonal.
     fn new(second: &DMatrix<f64>, damping: f64) -> Self {
         let n = second.nrows();
         let (order, ordered) = damped(second, damping);
@@ -61,18 +61,18 @@ impl Factor {
         &self.moment[r * self.len()..][..self.len()]
     }
 
-    /// The column of the triangle below its diagonal, by place in `order`.
+    /// Returns the column of the triangle below its diagonal, by position in `order`.
     fn below(&self, j: usize) -> &[f64] {
         &self.lower[j * self.len()..][..self.len()]
     }
 }
 
-/// Quantizes `matrix`, whose rows have these widths and `group` columns a scale (0 = none). `input` holds the moments
-/// of its input, `damping` is what is added to their diagonal, as a share of its mean; `output` is `G`; `importance`
-/// weighs the columns for the first scales.
+/// Quantizes `matrix`, whose rows have these widths and `group` columns per scale (0 = no group scales). `input` holds
+/// the moments of its input, `damping` the share of the mean that is added to their diagonal; `output` is `G`;
+/// `importance` weighs the columns for the first scales.
 ///
-/// The mean error is left to the biases, so that `H` is taken about the input's mean: returns the matrix and what is to
-/// be added to the biases behind it.
+/// The biases take the mean error, so `H` is centred on the input's mean. Returns the matrix and the values to be added
+/// to the biases after it.
 pub fn feedback(
     matrix: &WeightMatrix,
     widths: &[Option<Width>],
@@ -85,7 +85,7 @@ pub fn feedback(
     let (h, g) = (Factor::new(&input.centred(), damping), Factor::new(output, DAMPING_OUTPUT));
     let mut scales = Scales::fit(matrix, widths, group, importance);
     let mut codes = vec![0u8; rows * cols];
-    // What is rounded less what was wanted.
+    // Rounded minus wanted weights.
     let mut errors = vec![0f64; rows * cols];
     let value = |scales: &Scales, width: Width, r: usize, c: usize, code: u8| {
         f64::from(width.level(code)) * f64::from(scales.at(r, c))
@@ -156,7 +156,7 @@ pub fn feedback(
     (Quantized { rows, cols, group, widths, scales: scales.rows, group_scales: scales.groups, codes }, shift)
 }
 
-/// `to += factor * from`
+/// Computes `to += factor * from`.
 fn add(to: &mut [f64], factor: f64, from: &[f64]) {
     to.iter_mut().zip(from).for_each(|(to, from)| *to += factor * from);
 }
@@ -175,7 +175,7 @@ mod tests {
     const ROWS: usize = 24;
     const COLS: usize = 40;
 
-    /// A matrix with the moments of inputs and derivatives that have 8 hidden causes each.
+    /// Makes a matrix with the moments of inputs and derivatives that have 8 hidden causes each.
     fn case() -> (WeightMatrix, Moments, DMatrix<f64>) {
         let mut random = Random::new(11);
         let data = (0..ROWS * COLS).map(|_| random.unit()).collect();
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn both_sides_do_better_than_the_columns_alone() {
+    fn two_sided_feedback_beats_columns_alone() {
         let (matrix, input, output) = case();
         for width in [Width::W2, Width::W3, Width::W4] {
             let one_sided = gptq::quantize(&matrix, width, 0, &input).expect("positive definite");
@@ -209,7 +209,7 @@ mod tests {
         }
     }
 
-    /// With unit moments nothing has anything to say about anything else.
+    /// Checks unit moments, in which nothing is correlated.
     #[test]
     fn unit_moments_reduce_to_rounding_with_fitted_scales() {
         let (matrix, ..) = case();
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_without_bits_stay_zero_and_the_biases_take_the_mean_error() {
+    fn biases_absorb_the_mean_error_of_removed_rows() {
         let (matrix, mut input, output) = case();
         input.mean = (0..COLS).map(|c| 0.1 * c as f64).collect();
         let mean = nalgebra::DVector::from_column_slice(&input.mean);

@@ -1,4 +1,4 @@
-//! A matrix while it learns: codes before rounding, in units of the step, and logarithms of the scales.
+//! A matrix during learning: codes before rounding, in units of the step, and logarithms of the scales.
 
 use actq_kernels::Width;
 use actq_kernels::round::ROUND;
@@ -10,12 +10,12 @@ use crate::graph::WeightMatrix;
 use crate::methods::quantized::Quantized;
 use crate::methods::scale::Scales;
 
-/// Scales that are smaller count as this, so that their logarithm is finite.
+/// Least scale, so that its logarithm is finite.
 const SMALLEST: f32 = 1e-12;
-/// Rows that a thread takes at once.
+/// Rows that a thread takes together.
 const ROWS: usize = 16;
 
-/// A matrix while it learns.
+/// A matrix during learning.
 pub(super) struct Latent {
     rows: usize,
     cols: usize,
@@ -24,13 +24,13 @@ pub(super) struct Latent {
     codes: Vec<f32>,
     /// Natural logarithm of each row's scale.
     log_scales: Vec<f32>,
-    /// The scales that learning started from, of which those of groups stay.
+    /// Scales that learning started from; group scales stay fixed.
     fitted: Scales,
     adam_codes: Adam,
     adam_scales: Adam,
 }
 
-/// How a width rounds a latent code: the lowest and highest code, and the level of code `c`, `step * c + base`.
+/// Rounding of a latent code at a width: lowest and highest code, and the level of code `c`, `step * c + base`.
 #[derive(Clone, Copy)]
 struct Grid {
     low: f32,
@@ -48,20 +48,20 @@ impl Grid {
         }
     }
 
-    /// To the nearest code, ties to even; codes are far from where this ends. (The standard library's is a call where
-    /// the processor need not have an instruction for it.)
+    /// Rounds to the nearest code, ties to even; the trick is exact in the range of codes. (The standard library's
+    /// function is a call on processors without an instruction for it.)
     fn round(self, code: f32) -> f32 {
         ((code + ROUND) - ROUND).clamp(self.low, self.high)
     }
 
-    /// The level of the code that is nearest.
+    /// Returns the level of the nearest code.
     fn level(self, code: f32) -> f32 {
         self.round(code) * self.step + self.base
     }
 }
 
 impl Latent {
-    /// What rounds to the nearest codes of `matrix`.
+    /// Makes latent codes that round to the nearest codes of `matrix`.
     pub(super) fn new(matrix: &WeightMatrix, widths: &[Option<Width>], group: usize, importance: &[f64]) -> Self {
         let (rows, cols) = (matrix.rows, matrix.cols);
         let fitted = Scales::fit(matrix, widths, group, importance);
@@ -93,7 +93,7 @@ impl Latent {
         bf16::from_f32(self.log_scales[row].exp()).to_f32()
     }
 
-    /// What the levels of a row are multiplied with, group by group, and how many columns a group has.
+    /// Returns the columns of a group, and the factors of a row's levels, group by group.
     fn scales(&self, row: usize) -> (usize, impl Iterator<Item = f32>) {
         let group = if self.fitted.group == 0 { self.cols } else { self.fitted.group };
         let scale = self.scale(row);
@@ -101,7 +101,7 @@ impl Latent {
         (group, (0..self.cols).step_by(group).map(of))
     }
 
-    /// The weights that the rounded codes stand for, row by row.
+    /// Writes the weights of the rounded codes, row by row.
     pub(super) fn weights(&self, out: &mut [f32]) {
         let rows = out.par_chunks_mut(self.cols).zip(self.codes.par_chunks(self.cols)).enumerate();
         rows.with_min_len(ROWS).for_each(|(r, (out, codes))| {
@@ -116,7 +116,7 @@ impl Latent {
         });
     }
 
-    /// Moves codes and scales along `grads`, the derivative by the weights, which then hold that by the codes.
+    /// Moves codes and scales along `grads`, the derivative by the weights, which becomes that by the codes.
     pub(super) fn learn(&mut self, grads: &mut [f32], by_code: Stride, by_scale: Stride) {
         let cols = self.cols;
         let by_scales: Vec<f32> = grads
@@ -134,7 +134,7 @@ impl Latent {
                 for ((grads, codes), scale) in grads.chunks_mut(group).zip(codes).zip(scales) {
                     for (g, c) in grads.iter_mut().zip(codes) {
                         by_scale += *g * grid.level(*c) * scale;
-                        // Beyond the grid only a pull back inside passes.
+                        // Beyond the grid, only a gradient towards the inside counts.
                         let outside = (*c < grid.low - 0.5 && *g > 0.0) || (*c > grid.high + 0.5 && *g < 0.0);
                         *g = if outside { 0.0 } else { *g * grid.step * scale };
                     }
@@ -150,7 +150,7 @@ impl Latent {
         self.adam_scales.step(&mut self.log_scales, &by_scales, by_scale);
     }
 
-    /// The rounded codes.
+    /// Returns the rounded codes.
     pub(super) fn quantized(&self) -> Quantized {
         let Self { rows, cols, .. } = *self;
         let code = |(at, code): (usize, &f32)| self.grid(at / cols).map_or(0, |grid| grid.round(*code) as i32 as u8);

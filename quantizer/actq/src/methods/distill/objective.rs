@@ -1,35 +1,36 @@
-//! What learning lowers: the squared difference to the f32 network's outputs, over their variances.
+//! The loss of learning: the squared difference to the f32 network's outputs over their variances.
 
 use ndarray::{Array2, ArrayView1};
 
 use crate::graph::Graph;
 use crate::methods::options::Options;
 
-/// The loss of a batch and its derivative.
+/// Loss of a batch, with its derivative.
 #[derive(Debug)]
 pub(super) struct Objective<'a> {
     variance: &'a [f32],
     /// Outputs that vary.
     varying: usize,
-    /// What a frame is weighed by.
+    /// Weighting of frames.
     frames: Frames,
 }
 
-/// How much a frame counts. A robot that holds its goal by small actions stays as far off it as they are wrong, which a
-/// mean over all frames hardly sees. So a frame weighs `1 / (a + c)`, with `a` the mean square of the f32 network's
+/// Weighting of frames. A robot that holds its goal by small actions stays as far off as their error, which a mean over
+/// all frames hardly counts. So a frame has the weight `1 / (a + c)`; `a` is the mean square of the f32 network's
 /// outputs there in units of their variances (docs/records/2026-11-23-hold.md).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Frames {
-    /// All alike.
+    /// Equal weights.
     Even,
-    /// `c` is 1: a frame at rest counts twice as much as the usual one, a wide movement less than it.
+    /// `c` is 1: a frame at rest counts twice as much as a typical one, a wide movement less than that.
     Mild,
     /// `c` is 0.3: errors count in units of the action itself, down to about half of the deviation.
     Relative,
 }
 
 impl Frames {
-    /// What a network learns with. A recurrent policy that balances keeps fewer episodes unless all frames count alike.
+    /// Returns the weighting for a network. A recurrent policy that balances succeeds in fewer episodes unless all
+    /// frames count equally.
     pub(super) fn of(options: &Options, graph: &Graph) -> Self {
         match options.relative {
             true => Self::Relative,
@@ -48,15 +49,15 @@ impl Frames {
 }
 
 impl<'a> Objective<'a> {
-    /// The mean over samples and outputs of squared error over variance and, but for [`Frames::Even`], times the
-    /// frame's weight, which is 1 in the mean over a batch.
+    /// Makes the loss: the mean over samples and outputs of squared error over variance and, except for
+    /// [`Frames::Even`], times the frame's weight, which is 1 on average over a batch.
     pub(super) fn new(variance: &'a [f32], frames: Frames) -> Self {
         let varying = variance.iter().filter(|variance| **variance > 0.0).count().max(1);
         Self { variance, varying, frames }
     }
 
-    /// The derivative by the outputs, `[frame, element]`, and the loss, for what the f32 network gives. Outputs that do
-    /// not vary count for nothing.
+    /// Returns the derivative by the outputs, `[frame, element]`, and the loss against the f32 network's outputs.
+    /// Outputs that do not vary do not count.
     pub(super) fn measure(&self, outputs: &Array2<f32>, target: &Array2<f32>) -> (Array2<f32>, f32) {
         let count = (target.nrows() * self.varying) as f32;
         let weight = |variance: &f32| if *variance > 0.0 { 1.0 / (variance * count) } else { 0.0 };
@@ -73,7 +74,7 @@ impl<'a> Objective<'a> {
         (error, loss)
     }
 
-    /// The weights of frames, 1 in the mean.
+    /// Returns the weights of frames, 1 on average.
     fn of_frames(&self, target: &Array2<f32>) -> Vec<f32> {
         let Some(floor) = self.frames.floor() else { return vec![1.0; target.nrows()] };
         let weight = |row: ArrayView1<'_, f32>| {
@@ -94,11 +95,11 @@ mod tests {
 
     use super::*;
 
-    /// One output, and one that never varies.
+    /// Variances of one output that varies and one that does not.
     const VARIANCE: [f32; 2] = [4.0, 0.0];
 
     #[test]
-    fn errors_of_equal_size_count_more_where_actions_are_small() {
+    fn small_actions_increase_the_weight_of_errors() {
         let target = array![[0.0, 5.0], [2.0, 5.0]];
         let outputs = array![[0.2, 9.0], [2.2, 9.0]];
         let (even, loss) = Objective::new(&VARIANCE, Frames::Even).measure(&outputs, &target);
@@ -106,14 +107,14 @@ mod tests {
         assert!((even[[0, 0]] - even[[1, 0]]).abs() < 1e-7 && even.column(1).iter().all(|d| *d == 0.0));
         for (frames, expected) in [(Frames::Mild, 2.0), (Frames::Relative, 13.0 / 3.0)] {
             let (weighed, loss) = Objective::new(&VARIANCE, frames).measure(&outputs, &target);
-            assert!((loss - 0.01).abs() < 1e-6, "weights are 1 in the mean: {loss}");
+            assert!((loss - 0.01).abs() < 1e-6, "weights are 1 on average: {loss}");
             let ratio = weighed[[0, 0]] / weighed[[1, 0]];
             assert!((ratio - expected).abs() < 1e-3, "{ratio}");
         }
     }
 
     #[test]
-    fn the_derivative_is_that_of_the_loss() {
+    fn the_derivative_agrees_with_the_loss() {
         let target = array![[0.1, 0.0], [-3.0, 0.0], [1.0, 0.0]];
         let outputs = array![[0.5, 0.0], [-2.0, 0.0], [1.5, 0.0]];
         for frames in [Frames::Even, Frames::Mild, Frames::Relative] {

@@ -1,8 +1,8 @@
-//! How long learning takes, and at what rate.
+//! Duration and learning rate of a distillation.
 //!
-//! The rate is held as long as the error falls, and then falls to zero itself, along a cosine, over 3 in 10 of all
-//! steps. So learning ends when it is done, or where it is bound, and is as good at either end as one that had been
-//! planned so long: at equal steps, no worse than a cosine from the first step on (docs/QUANTIZER.md).
+//! The rate is constant as long as the error falls; then it falls to zero along a cosine, over 3 in 10 of all steps. So
+//! learning ends when it has converged or reaches a limit. The result equals that of a schedule planned for this
+//! length: at equal steps, it is no worse than a cosine from the first step on (docs/QUANTIZER.md).
 
 use std::time::{Duration, Instant};
 
@@ -10,24 +10,23 @@ use crate::graph::Graph;
 
 /// Share of the steps at the full rate.
 const HELD: f64 = 0.7;
-/// Steps of a network of [`USUAL`] weights; others take as many as its square root of their size allows: a small
-/// network learns longer, a large one keeps its time. A step costs more where a frame is one of every denoising step of
-/// an iterative head, and four times as much where it is a batch of a recurrent network's windows.
+/// Most steps of a network of [`USUAL`] weights. The steps of others follow the square root of the size: a small
+/// network learns longer, a large one keeps its time. A step costs more for an iterative head, where a frame is one of
+/// every denoising step, and four times as much for a batch of a recurrent network's windows.
 const STEPS: f64 = 20_000.0;
 const DENOISING_STEPS: f64 = 10_000.0;
 const WINDOW_STEPS: f64 = 7_800.0;
 const USUAL: f64 = 200_000.0;
-/// At most.
+/// Most steps of any network.
 const MOST: f64 = 20_000.0;
-/// The error's course is its means over so many parts of the most steps, of so many steps at least.
+/// Parts of the most steps whose mean errors form the error's course, and least steps of a part.
 const PARTS: usize = 16;
 const LEAST_PART: usize = 100;
-/// A part that is not lower than the lowest before it by this share has not fallen; after so many in a row learning is
-/// done.
+/// Least relative fall below the lowest part before; learning ends after several parts in a row without it.
 const FALLEN: f64 = 0.01;
 const FLAT: usize = 2;
 
-/// The most steps of a network, where nothing else is asked for.
+/// Returns the default most steps of a network.
 pub fn most_steps(graph: &Graph) -> usize {
     let usual = match graph.state_len() > 0 {
         true => WINDOW_STEPS,
@@ -37,21 +36,21 @@ pub fn most_steps(graph: &Graph) -> usize {
     scaled(usual, graph.weights())
 }
 
-/// The steps of a network of so many weights.
+/// Returns the steps of a network of this many weights.
 fn scaled(usual: f64, weights: usize) -> usize {
     (usual * (USUAL / weights.max(1) as f64).sqrt()).min(MOST) as usize
 }
 
-/// Where learning ends at the latest.
+/// Limits of learning.
 #[derive(Clone, Copy, Debug)]
 pub struct Bounds {
-    /// Steps; without it, what [`Self::time`] allows.
+    /// Most steps; without them, [`Self::time`] is the limit.
     pub steps: Option<usize>,
-    /// Time on the clock. What is learned then depends on the machine.
+    /// Most time on the clock. The result then depends on the machine.
     pub time: Option<Duration>,
 }
 
-/// Where learning is.
+/// State of learning.
 #[derive(Debug)]
 pub struct Schedule {
     bounds: Bounds,
@@ -59,9 +58,9 @@ pub struct Schedule {
     /// Steps in a part of the error's course.
     part: usize,
     step: usize,
-    /// Steps that were held, once the rate falls.
+    /// Steps at the full rate, as soon as the rate falls.
     held: Option<usize>,
-    /// The sum of the present part's errors, the mean of the last part, the lowest mean, and how many since were not
+    /// Sum of the present part's errors, mean of the last part, lowest mean, and number of parts since that were not
     /// lower.
     sum: f64,
     last: Option<f64>,
@@ -70,7 +69,7 @@ pub struct Schedule {
 }
 
 impl Schedule {
-    /// From the first step; `usual` steps are what the size of the network suggests.
+    /// Starts at the first step; `usual` is the number of steps for the size of the network.
     pub fn new(bounds: Bounds, usual: usize) -> Self {
         let part = (bounds.steps.unwrap_or(usual) / PARTS).max(LEAST_PART);
         Self {
@@ -86,17 +85,17 @@ impl Schedule {
         }
     }
 
-    /// Steps taken.
+    /// Returns the steps taken.
     pub fn steps(&self) -> usize {
         self.step
     }
 
-    /// The mean error of the last whole part, or of the first so far.
+    /// Returns the mean error of the last whole part, or of the first one so far.
     pub fn error(&self) -> Option<f64> {
         self.last.or_else(|| (self.step > 0).then(|| self.sum / self.step as f64))
     }
 
-    /// The share of the rates that the next step has; `None`: learning is done.
+    /// Returns the factor of the rates for the next step; `None` at the end.
     pub fn rate(&mut self) -> Option<f32> {
         if self.held.is_none() && (self.flat >= FLAT || self.share() >= HELD) {
             self.held = Some(self.step);
@@ -111,7 +110,7 @@ impl Schedule {
         Some(0.5 * (1.0 + (std::f32::consts::PI * fallen as f32 / falls as f32).cos()))
     }
 
-    /// A step was taken, with this error.
+    /// Records a step with its error.
     pub fn took(&mut self, error: f32) {
         self.step += 1;
         self.sum += f64::from(error);
@@ -123,7 +122,7 @@ impl Schedule {
         }
     }
 
-    /// The share that is done, of what is bound while the rate is held, of what is left when it falls.
+    /// Returns the share that is done: of the limit at the full rate, of the remaining steps while it falls.
     pub fn share(&self) -> f64 {
         if let Some(held) = self.held {
             return (self.step as f64 * HELD / held.max(1) as f64).min(1.0);
@@ -150,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn all_steps_are_taken_while_the_error_falls() {
+    fn falling_errors_use_all_steps() {
         for steps in [1, 2, 10, 999, 16_000] {
             let rates = learn(steps, |step| 1.0 / step as f32);
             assert_eq!(rates.len(), steps);
@@ -160,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn learning_ends_when_the_error_no_longer_falls() {
+    fn learning_ends_when_the_error_stops_falling() {
         let rates = learn(16_000, |step| if step <= 4000 { 1.0 / step as f32 } else { 1.0 });
         // Two parts of 1,000 steps without a fall, then the fall of the rate.
         let held = rates.iter().filter(|rate| **rate == 1.0).count();
@@ -169,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn time_bounds_it() {
+    fn time_limits_learning() {
         let bounds = Bounds { steps: None, time: Some(Duration::from_millis(50)) };
         let mut schedule = Schedule::new(bounds, 1000);
         while schedule.rate().is_some() {

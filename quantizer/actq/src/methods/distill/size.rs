@@ -1,4 +1,4 @@
-//! Bytes as a function of the rows' widths: what an allocation has to keep within its limit, and the least of it.
+//! Bytes as a function of the rows' widths, for the allocation, and their minimum.
 
 use actq_kernels::Width;
 use actq_kernels::image::block_bytes;
@@ -8,22 +8,22 @@ use super::dimension::{Dimension, Widths};
 use crate::graph::Graph;
 use crate::methods::options::Packing;
 
-/// What the bytes of a network follow from, beside its rows' widths.
+/// Properties that determine the bytes of a network beside its rows' widths.
 #[derive(Clone, Debug)]
 pub struct Size<'a> {
     /// The network.
     pub graph: &'a Graph,
-    /// Its hidden vectors that may be pruned.
+    /// Hidden vectors that may be pruned.
     pub dimensions: &'a [Dimension],
-    /// The layouts that room is kept for, of every matrix.
+    /// Layouts of every matrix that room is reserved for.
     pub packings: Vec<Vec<Packing>>,
-    /// Values of the vectors that count, with all rows.
+    /// Counted values of the vectors, with all rows.
     pub values: usize,
 }
 
 impl Size<'_> {
-    /// Bytes of all that counts: the balance, the vectors, and all matrices. Rows without bits and the columns that
-    /// compaction removes are gone. Of the layouts that a matrix may get, the largest counts.
+    /// Returns all counted bytes: the balance, the vectors, and all matrices. Rows without bits and the columns that
+    /// compaction removes do not count. Of a matrix's possible layouts, the largest counts.
     pub fn bytes(&self, widths: &Widths) -> usize {
         let of_matrix = |m: usize| -> usize {
             self.packings[m].iter().map(|&packing| self.matrix(widths, m, packing)).max().unwrap_or(0)
@@ -31,14 +31,14 @@ impl Size<'_> {
         self.beside(widths) + (0..self.packings.len()).map(of_matrix).sum::<usize>()
     }
 
-    /// Those of the balance and the vectors.
+    /// Returns the bytes of the balance and the vectors.
     pub fn beside(&self, widths: &Widths) -> usize {
         let removed: usize = self.dimensions.iter().map(|d| widths[d.maker].len() - d.kept(widths)).sum();
         balance_bytes(self.graph) + 4 * self.values.saturating_sub(removed)
     }
 
-    /// Bytes of a matrix in one layout. Rows of a dimension are sorted by width; others have steps where their order is
-    /// not that of the blocks.
+    /// Returns the bytes of a matrix in one layout. Rows of a dimension are sorted by width; other matrices have output
+    /// steps if their order is not that of the blocks.
     pub fn matrix(&self, widths: &Widths, m: usize, packing: Packing) -> usize {
         let fed = Dimension::feeding(self.dimensions, m);
         let cols = fed.map_or(self.graph.matrices[m].cols, |d| d.kept(widths).max(1));
@@ -48,8 +48,8 @@ impl Size<'_> {
         used.map(|(width, rows)| block_bytes(packing.shape(width, rows, cols), !sorted)).sum()
     }
 
-    /// The widths that take the fewest bytes: every matrix keeps one row, since without any it would cut the actions off
-    /// from the observations; those that are `forced` keep all.
+    /// Returns the widths that take the fewest bytes. Every matrix keeps one row, since without any it would disconnect
+    /// the actions from the observations; `forced` matrices keep all.
     pub fn smallest(&self, forced: &[Option<Width>]) -> Widths {
         let one_row = |rows: usize, width: Width| {
             let mut widths = vec![None; rows];
@@ -60,7 +60,7 @@ impl Size<'_> {
         let mut widths: Widths = all
             .map(|(m, forced)| forced.map_or(one_row(m.rows, Width::W2), |width| vec![Some(width); m.rows]))
             .collect();
-        // A wider row can take fewer bytes, where it pads less.
+        // A wider row can take fewer bytes if it pads less.
         for m in (0..forced.len()).filter(|&m| forced[m].is_none()) {
             let tries = Width::ALL.map(|width| {
                 widths[m] = one_row(widths[m].len(), width);
@@ -73,7 +73,7 @@ impl Size<'_> {
     }
 }
 
-/// Whether blocks, narrow to wide, hold the rows in their own order; those without bits come last.
+/// Returns `true` if blocks, narrow to wide, hold the rows in their own order, with rows without bits last.
 fn are_in_order(widths: &[Option<Width>]) -> bool {
     widths.is_sorted_by_key(|width| (width.is_none(), *width))
 }
@@ -87,7 +87,7 @@ mod tests {
     use crate::random::Random;
     use half::bf16;
 
-    /// A matrix of the packer's, without codes.
+    /// Makes the packer's matrix, without codes.
     fn outcome(matrix: &WeightMatrix, widths: &[Option<Width>], x_max: u16) -> Outcome {
         let (rows, cols) = (matrix.rows, matrix.cols);
         let (codes, scales) = (Vec::new(), vec![bf16::ONE; rows]);
@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn a_matrix_takes_what_the_packer_writes() {
+    fn matrix_bytes_equal_those_of_the_packer() {
         let mut random = Random::new(4);
         let mut graph = Graph::new(19);
         graph.matrices = vec![WeightMatrix { name: "m".into(), rows: 23, cols: 19, data: Vec::new() }];
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_smaller_than_the_smallest_widths() {
+    fn smallest_widths_take_the_fewest_bytes() {
         let graph = graph();
         let dimensions = dimensions(&graph);
         let packings = vec![vec![Packing::of(127, 0)]; 3];

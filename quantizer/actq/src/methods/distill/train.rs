@@ -1,9 +1,9 @@
-//! Distillation on the recorded observations: the quantized network learns to give what the f32 network gives. No
-//! labels, no environment.
+//! Distillation on the recorded observations: the quantized network learns to give the f32 network's outputs, without
+//! labels or environment.
 //!
-//! Codes are rounded from latent weights in units of the step; the derivative passes the rounding as if it were not
-//! there (straight-through). Row scales, biases and norms learn too. The inputs are widened ([`Widening`]), and the f32
-//! network is asked again at the widened input.
+//! Codes are rounded from latent weights in units of the step; the derivative ignores the rounding (straight-through).
+//! Row scales, biases and norms learn, too. The inputs are widened ([`Widening`]), and the f32 network is evaluated at
+//! the widened inputs.
 
 use actq_kernels::Width;
 use ndarray::Array2;
@@ -22,57 +22,58 @@ use crate::random::Random;
 
 /// Learning rates.
 struct Rates {
-    /// Of latent weights, in steps.
+    /// Rate of latent weights, in steps.
     latent: f32,
-    /// Of the scales' logarithms.
+    /// Rate of the scales' logarithms.
     scale: f32,
-    /// Of biases and norms.
+    /// Rate of biases and norms.
     vector: f32,
 }
 
-/// With higher rates a feed-forward network fits the recording better and what was left out worse.
+/// Rates of feed-forward networks. With higher ones, they fit the recording better and held-out episodes worse.
 const OF_FRAMES: Rates = Rates { latent: 4e-3, scale: 3e-3, vector: 1e-3 };
-/// Recurrent networks take fewer steps: with the rates above g1_lstm64 ends at 1.6 times the error (docs/records).
+/// Rates of recurrent networks, which take fewer steps: with the rates above, g1_lstm64 ends at 1.6 times the error
+/// (docs/records).
 const OF_WINDOWS: Rates = Rates { latent: 3e-2, scale: 1e-2, vector: 1e-2 };
 /// Samples of a batch: frames, or windows of a recurrent network.
 const FRAMES: usize = 256;
 const WINDOWS: usize = 16;
-/// Parts that a batch is cut into, whatever the number of threads, so that sums have one order. The fewer windows in a
-/// part, the slower the products with a recurrent matrix, which have a row for each.
+/// Parts of a batch, whatever the number of threads, so that sums have one order. The fewer windows in a part, the
+/// slower the products with a recurrent matrix, which have a row for each.
 const FRAME_SHARDS: usize = 4;
 const WINDOW_SHARDS: usize = 2;
-/// The gradient's norm is limited to this for recurrent networks.
+/// Largest norm of a recurrent network's gradient.
 const CLIP: f32 = 1.0;
 
-/// What a distillation is to do.
+/// Parameters of a distillation.
 #[derive(Clone, Debug)]
 pub struct Task<'a> {
-    /// The structure to learn, after compaction; its weights are where learning starts.
+    /// Structure to learn, after compaction; its weights are the start of learning.
     pub graph: &'a Graph,
     /// Width of every row of every matrix.
     pub widths: &'a [Vec<Option<Width>>],
-    /// Columns per u8 scale; 0 = none.
+    /// Columns per u8 scale; 0 = no group scales.
     pub group: usize,
     /// Importance of every column of every matrix, for the first scales.
     pub importance: &'a [Vec<f64>],
     /// Activation magnitude of every matrix.
     pub x_max: &'a [u16],
-    /// How far the inputs are taken off the recorded ones.
+    /// Noise on the inputs.
     pub widening: Widening,
-    /// How much a frame counts.
+    /// Weighting of frames.
     pub frames: Frames,
-    /// Where it ends at the latest.
+    /// Limits of learning.
     pub bounds: Bounds,
     /// Seed of the batches.
     pub seed: u64,
 }
 
-/// What was learned.
+/// Result of a distillation.
 #[derive(Debug)]
 pub struct Learned {
     /// The quantized matrices.
     pub quantized: Vec<Quantized>,
-    /// The structure, with the biases and norms that were learned.
+    /// Structure, with the learned biases and norms.
     pub graph: Graph,
     /// Steps taken.
     pub steps: usize,
@@ -90,7 +91,7 @@ pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(f64,
     let mut random = Random::new(task.seed);
     let (size, shards, rates) = match windows.recurrent() {
         true => (WINDOWS, WINDOW_SHARDS, OF_WINDOWS),
-        // A frame of an iterative head is one of every denoising step.
+        // A frame of an iterative head is one frame per denoising step.
         false => ((FRAMES / task.graph.denoising_steps().isqrt()).max(4 * FRAME_SHARDS), FRAME_SHARDS, OF_FRAMES),
     };
     let objective = Objective::new(&windows.output_variance, task.frames);
@@ -129,12 +130,12 @@ pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(f64,
     Learned { quantized: latents.iter().map(Latent::quantized).collect(), graph, steps: schedule.steps() }
 }
 
-/// The elements of a matrix, row by row.
+/// Returns the elements of a matrix, row by row.
 fn values(matrix: &mut Array2<f32>) -> &mut [f32] {
     matrix.as_slice_mut().unwrap_or_default()
 }
 
-/// The loss on a batch, and its derivative by the (rounded) weights.
+/// Computes the loss on a batch, and its derivative by the (rounded) weights.
 fn gradient(
     network: &Network<'_>,
     weights: &Weights,
@@ -152,7 +153,7 @@ fn gradient(
     (loss, grads)
 }
 
-/// The mean over samples and outputs of squared error over variance, against the f32 network.
+/// Returns the mean over samples and outputs of squared error over variance, against the f32 network.
 pub fn loss(network: &Network<'_>, weights: &Weights, windows: &Windows, batch: Batch) -> f32 {
     let target = windows.teach(&batch);
     Objective::new(&windows.output_variance, Frames::Even).measure(forward(network, weights, batch).output(), &target).1
