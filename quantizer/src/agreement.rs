@@ -1,12 +1,12 @@
-//! Which run of an ONNX file is right: the policy's or onnxruntime's, both in float32, by a third in float64.
+//! Decides by a run in float64 which float32 run of an ONNX file is right: the policy's or onnxruntime's.
 
 use anyhow::{Result, bail};
 
-/// Largest error of a run that counts as right, as a share of the largest action.
+/// Largest error of a correct run, as a share of the largest action.
 const TOLERANCE: f64 = 1e-5;
 
-/// Largest difference of `run` from `right`, as a share of the largest value of `right`; infinite if a value is not
-/// finite.
+/// Returns the largest difference of `run` from `right`, as a share of the largest value of `right`; infinite if a
+/// value is not finite.
 pub(crate) fn error(right: &[f64], run: &[f64]) -> f64 {
     if !right.iter().chain(run).all(|v| v.is_finite()) {
         return f64::INFINITY;
@@ -18,23 +18,24 @@ pub(crate) fn error(right: &[f64], run: &[f64]) -> f64 {
 /// Errors of the two float32 runs against the file in float64.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct InFloat64 {
-    /// Of the policy.
+    /// Error of the policy.
     pub(crate) policy: f64,
-    /// Of onnxruntime.
+    /// Error of onnxruntime.
     pub(crate) onnxruntime: f64,
 }
 
-/// Says against which run the policy is right, and its error; fails if it is not, or if nothing shows that it is.
-/// `apart` is the error between the two float32 runs; `in_float64` is asked only if they differ.
-pub(crate) fn verdict(apart: f64, in_float64: impl FnOnce() -> Result<InFloat64>) -> Result<String> {
-    if apart <= TOLERANCE {
-        return Ok(format!("against onnxruntime: {} at most", off(apart)));
+/// Returns the reference that the policy agrees with, and its error, as text. Fails if the policy is wrong, or if no
+/// run proves it right. `difference` is the error between the two float32 runs; `in_float64` is called only if they
+/// differ.
+pub(crate) fn verdict(difference: f64, in_float64: impl FnOnce() -> Result<InFloat64>) -> Result<String> {
+    if difference <= TOLERANCE {
+        return Ok(format!("against onnxruntime: {} at most", off(difference)));
     }
     let InFloat64 { policy, onnxruntime } = match in_float64() {
         Ok(errors) => errors,
         Err(reason) => bail!(
-            "the policy and onnxruntime disagree ({}), and float64 cannot show which is right: {reason:#}",
-            off(apart)
+            "the policy and onnxruntime disagree ({}), and the run in float64 failed, which would show which is right: {reason:#}",
+            off(difference)
         ),
     };
     let errors = format!(
@@ -50,7 +51,7 @@ pub(crate) fn verdict(apart: f64, in_float64: impl FnOnce() -> Result<InFloat64>
         )),
         (false, true) => bail!("{errors}; this is an error of this program, please report it"),
         (false, false) => bail!(
-            "{errors}: no two of the three runs agree, so this does not show which is right; pass recorded observations \
+            "{errors}: no two of the three runs agree, so the check cannot show which is right; pass recorded observations \
              with --calib if the drawn ones are outside the policy's range"
         ),
     }
@@ -64,13 +65,13 @@ fn off(error: f64) -> String {
 mod tests {
     use super::*;
 
-    fn said(apart: f64, in_float64: Result<[f64; 2], &str>) -> Result<String, String> {
+    fn said(difference: f64, in_float64: Result<[f64; 2], &str>) -> Result<String, String> {
         let errors = in_float64.map(|[policy, onnxruntime]| InFloat64 { policy, onnxruntime });
-        verdict(apart, || errors.map_err(|reason| anyhow::anyhow!("{reason}"))).map_err(|error| error.to_string())
+        verdict(difference, || errors.map_err(|reason| anyhow::anyhow!("{reason}"))).map_err(|error| error.to_string())
     }
 
     #[test]
-    fn runs_that_agree_need_no_float64() {
+    fn agreeing_runs_need_no_float64() {
         let said = verdict(9e-6, || unreachable!()).expect("they agree");
         assert_eq!(said, "against onnxruntime: off by 9.0e-6 of the largest action at most");
     }
@@ -91,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_is_blamed_without_a_proof() {
+    fn disagreement_of_all_runs_blames_none() {
         for undecided in [said(3e-2, Ok([2e-2, 1e-2])), said(3e-2, Err("No module named 'onnx'"))] {
             let said = undecided.expect_err("undecided");
             assert!(

@@ -1,7 +1,7 @@
 """Runs an ONNX file over observations: float32 rows on standard input, float64 rows of actions on standard output.
 
-check.py FILE PLAN onnxruntime: by onnxruntime without its optimizer, which may round what it fuses.
-check.py FILE PLAN float64: by the evaluator of the package onnx, with every float32 of the file made float64.
+check.py FILE PLAN onnxruntime: run by onnxruntime without its optimizer, which may change roundings when it fuses.
+check.py FILE PLAN float64: run by the evaluator of the package onnx, with every float32 of the file widened to float64.
 """
 import json
 import sys
@@ -19,7 +19,7 @@ except ImportError as error:
 
 
 def by_onnxruntime():
-    """Gives a function that runs the file, its inputs as zeros, and the names of its outputs."""
+    """Return a function that runs the file, its inputs as zeros, and the names of its outputs."""
     options = onnxruntime.SessionOptions()
     options.log_severity_level = 3
     options.graph_optimization_level = onnxruntime.GraphOptimizationLevel.ORT_DISABLE_ALL
@@ -30,7 +30,7 @@ def by_onnxruntime():
 
 
 def in_float64():
-    """As by_onnxruntime."""
+    """Return the same as by_onnxruntime."""
     model = onnx.load(path)
     widen(model)
     evaluator = onnx.reference.ReferenceEvaluator(model)
@@ -45,7 +45,7 @@ def in_float64():
 
 
 def widen(message):
-    """Makes every float32 tensor, type, constant and cast inside a protobuf message float64."""
+    """Widen every float32 tensor, type, constant and cast inside a protobuf message to float64."""
     single, double = onnx.TensorProto.FLOAT, onnx.TensorProto.DOUBLE
     if isinstance(message, onnx.TensorProto):
         if message.data_type == single:
@@ -77,7 +77,7 @@ def main():
     run, fed, given = in_float64() if way == "float64" else by_onnxruntime()
     outputs = [plan["output"]] + [output for _, output in plan["states"]]
     if not set(outputs) <= set(given):
-        sys.exit(f"{plan['output']} is no output of the file, only a value inside it: onnxruntime cannot show it")
+        sys.exit(f"{plan['output']} is a value inside the file, not an output; onnxruntime cannot return it, so leave out --check")
     width = sum(length for _, length in plan["inputs"])
     for row in numpy.frombuffer(sys.stdin.buffer.read(), "<f4").reshape(-1, width):
         at = 0

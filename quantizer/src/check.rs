@@ -1,4 +1,4 @@
-//! `actq import --check`: the policy against its ONNX file, as others run it.
+//! `actq import --check`: compares the policy with runs of its ONNX file by other programs.
 
 use std::env;
 use std::io::Write as _;
@@ -14,39 +14,45 @@ use anyhow::{Context as _, Result, bail, ensure};
 
 use crate::agreement::{InFloat64, error, verdict};
 
-/// Observations that the check draws, or takes from a recording.
+/// Observations of the check, drawn or from a recording.
 const FRAMES: usize = 256;
 
-/// Ways of `check.py` to run the file.
+/// Programs that `check.py` runs the file with.
 #[derive(Clone, Copy)]
-enum Way {
+enum Runner {
     Onnxruntime,
     Float64,
 }
 
-/// Compares the policy's actions with those of its file; says on how many observations, against which run, and its error.
+/// Compares the policy's actions with those of its file. Returns the number of observations, the reference and the
+/// error as text.
 pub(crate) fn check(model: &Path, imported: &Imported, policy: &Policy, calib: Option<&Dataset>) -> Result<String> {
     let observations = match calib {
         Some(calib) => calib.episode(0).take(FRAMES).collect(),
         None => drawn(imported),
     };
     let ours: Vec<f64> = actions(policy, &observations).concat().into_iter().map(f64::from).collect();
-    let of_file = |way| {
-        let values = run(way, model, imported, &observations)?;
-        ensure!(values.len() == ours.len(), "the file gives {} values, the policy {}", values.len(), ours.len());
+    let of_file = |runner| {
+        let values = run(runner, model, imported, &observations)?;
+        ensure!(
+            values.len() == ours.len(),
+            "the file gives {} values, the policy {}; this is an error of this program, please report it",
+            values.len(),
+            ours.len()
+        );
         Ok(values)
     };
-    let expected = of_file(Way::Onnxruntime)?;
+    let expected = of_file(Runner::Onnxruntime)?;
     let in_float64 = || {
-        let exact = of_file(Way::Float64)?;
+        let exact = of_file(Runner::Float64)?;
         ensure!(exact.iter().all(|v| v.is_finite()), "the file's own actions are not finite in float64");
         Ok(InFloat64 { policy: error(&exact, &ours), onnxruntime: error(&exact, &expected) })
     };
-    let said = verdict(error(&expected, &ours), in_float64).with_context(|| model.display().to_string())?;
-    Ok(format!("{} observations {said}", observations.len()))
+    let summary = verdict(error(&expected, &ours), in_float64).with_context(|| model.display().to_string())?;
+    Ok(format!("{} observations {summary}", observations.len()))
 }
 
-/// Observations for each input, rounded where the file takes integers.
+/// Draws observations for all inputs, rounded if the file takes integers.
 fn drawn(imported: &Imported) -> Vec<Vec<f32>> {
     let mut random = Random::new(1);
     let whole = |(name, len): &(String, usize)| vec![imported.integers.contains(name); *len];
@@ -58,34 +64,35 @@ fn drawn(imported: &Imported) -> Vec<Vec<f32>> {
     (0..FRAMES).map(|_| whole.iter().map(&mut value).collect()).collect()
 }
 
-/// Runs the file over the observations from Python, and gives all actions one after the other.
-fn run(way: Way, model: &Path, imported: &Imported, observations: &[Vec<f32>]) -> Result<Vec<f64>> {
+/// Runs the file over the observations in Python. Returns all actions, one after the other.
+fn run(runner: Runner, model: &Path, imported: &Imported, observations: &[Vec<f32>]) -> Result<Vec<f64>> {
     let states: Vec<[&str; 2]> = imported.states.iter().map(|(from, to, _)| [from.as_str(), to]).collect();
     let plan = serde_json::json!({ "inputs": imported.inputs, "states": states, "output": imported.output.0 });
     let python = env::var_os("ACTQ_PYTHON").unwrap_or_else(|| "python3".into());
-    let starts = "--check runs the file with onnxruntime, from Python (python3, or what ACTQ_PYTHON names)";
+    let failed =
+        "cannot run the file with onnxruntime for --check; set ACTQ_PYTHON to a Python (default python3) that has it";
     let mut child = Command::new(python)
         .args(["-c", include_str!("check.py")])
         .arg(model)
         .arg(plan.to_string())
-        .arg(match way {
-            Way::Onnxruntime => "onnxruntime",
-            Way::Float64 => "float64",
+        .arg(match runner {
+            Runner::Onnxruntime => "onnxruntime",
+            Runner::Float64 => "float64",
         })
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
-        .context(starts)?;
+        .context(failed)?;
     let bytes: Vec<u8> = observations.iter().flatten().flat_map(|v| v.to_le_bytes()).collect();
-    // It may have ended without reading; then its message says why.
-    let _ = child.stdin.take().context("it has an input")?.write_all(&bytes);
-    let output = child.wait_with_output().context(starts)?;
+    // Python may have ended without reading; its message then gives the reason.
+    let _ = child.stdin.take().context("Python has no standard input")?.write_all(&bytes);
+    let output = child.wait_with_output().context(failed)?;
     if !output.status.success() {
-        let said = String::from_utf8_lossy(&output.stderr).trim().to_owned();
-        match way {
-            Way::Onnxruntime => bail!("{starts}: {said}"),
-            Way::Float64 => bail!(said),
+        let message = String::from_utf8_lossy(&output.stderr).trim().to_owned();
+        match runner {
+            Runner::Onnxruntime => bail!("{failed}: {message}"),
+            Runner::Float64 => bail!(message),
         }
     }
     Ok(output.stdout.as_chunks().0.iter().map(|b| f64::from_le_bytes(*b)).collect())

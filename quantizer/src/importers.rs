@@ -1,4 +1,4 @@
-//! The formats of policies that the command reads. To add one, add it to [`IMPORTERS`].
+//! The policy formats that the command reads. To add one, append it to [`IMPORTERS`].
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use actq::policy::Policy;
 use actq_onnx::Onnx;
 use anyhow::Result;
 
-/// The first that accepts a path reads it; a path that none accepts is said to be no policy folder.
+/// All importers. The first that accepts a path reads it; [`PolicyFolder`] reports a path that none accepts.
 static IMPORTERS: [&dyn Importer; 2] = [&Onnx, &PolicyFolder];
 
 fn importer(path: &Path) -> &'static dyn Importer {
@@ -20,7 +20,7 @@ pub(crate) fn load(path: &Path) -> Result<Policy> {
     Ok(importer(path).load(path)?)
 }
 
-/// All files that a policy may be read from, recordings included, whether they are there or not.
+/// Lists all files that a policy may be read from, with its recordings. They need not exist.
 pub(crate) fn policy_files(path: &Path) -> Vec<PathBuf> {
     let own = importer(path).files(path);
     own.into_iter().chain(Recording::Calib.paths(path)).chain(Recording::Heldout.paths(path)).collect()

@@ -1,4 +1,4 @@
-//! SIGINT, SIGTERM and SIGHUP end the command at once and leave nothing unfinished.
+//! SIGINT, SIGTERM and SIGHUP end the command immediately, without partial outputs.
 
 use std::io::{self, IsTerminal as _, Write as _};
 use std::{fs, process, thread};
@@ -10,7 +10,7 @@ use signal_hook::iterator::Signals;
 use crate::outputs::unfinished::Discard;
 use crate::{group, terminal};
 
-/// Waits for the signals in a thread of its own. One that the parent process ignores stays ignored, as under nohup.
+/// Starts a thread that waits for the signals. A signal that the parent process ignores stays ignored, as under nohup.
 pub(crate) fn watch() -> Result<()> {
     let ignored = ignored();
     let caught = [SIGHUP, SIGINT, SIGTERM].into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
@@ -19,7 +19,7 @@ pub(crate) fn watch() -> Result<()> {
     Ok(())
 }
 
-/// The set of signals that are ignored, of which Linux tells; signal 1 is bit 0.
+/// Reads the set of ignored signals from Linux's `/proc`; signal 1 is bit 0.
 fn ignored() -> u64 {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let set = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
@@ -27,12 +27,12 @@ fn ignored() -> u64 {
 }
 
 fn end(signal: i32) {
-    // From here on the main thread neither writes nor ends.
+    // From here on the main thread cannot place files or end the process.
     let discard = Discard::begin();
     group::stop(signal);
-    let said = if discard.remove() { ": no output was written" } else { "" };
-    // Where a terminal has shown ^C, the line goes on.
+    let removed = if discard.remove() { ": no output was written" } else { "" };
+    // A terminal has echoed ^C at the start of the line.
     let line = if !terminal::clear() && io::stderr().is_terminal() { "\n" } else { "" };
-    drop(writeln!(io::stderr(), "{line}actq: interrupted{said}"));
+    drop(writeln!(io::stderr(), "{line}actq: interrupted{removed}"));
     process::exit(128 + signal);
 }

@@ -1,5 +1,5 @@
-//! The command `actq`: command line, tables, plots, progress, and the host's end of the link. What it does with
-//! policies is in the library `actq`.
+//! The command `actq`: command line, tables, plots, progress, and the host's end of the link. The library `actq` does
+//! the work on policies and images.
 #![forbid(unsafe_code)]
 
 mod agreement;
@@ -29,7 +29,7 @@ use outputs::unfinished;
 /// Runs the command line of this process.
 pub fn run() -> ExitCode {
     let outcome = run_command(&suggestions::parse().command);
-    // Where a signal ends the process, it decides the exit status.
+    // If a signal ends the process, the signal decides the exit status.
     let _held = unfinished::hold();
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,4 +1,4 @@
-//! Files that the command writes.
+//! Output files of the command.
 
 pub mod files;
 pub mod unfinished;

@@ -1,4 +1,4 @@
-//! Tables, notes and pictures for people.
+//! Human-readable tables, notes and plots.
 
 pub mod imported;
 pub mod inspect;

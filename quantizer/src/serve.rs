@@ -1,4 +1,4 @@
-//! An image as the policy of a simulator or robot, and recordings of what it was shown.
+//! An image as the policy of a simulator or robot, and recordings of its observations.
 
 mod episodes;
 mod protocol;

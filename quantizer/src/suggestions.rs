@@ -1,4 +1,4 @@
-//! The command line, read; a misspelt option is answered with the one that was meant.
+//! Parsing of the command line, with a suggestion for a misspelt option.
 
 use std::env;
 
@@ -7,10 +7,10 @@ use clap::{CommandFactory as _, Error, Parser as _};
 
 use crate::args::Cli;
 
-/// The most letters that may be missing, wrong, too many, or exchanged with their neighbour.
+/// The most letters of an option that may be missing, wrong, extra, or swapped with their neighbour.
 const MOST_ERRORS: usize = 1;
 
-/// Reads the command line, or ends the process with what is wrong in it.
+/// Parses the command line. On an error, prints it and ends the process.
 pub(crate) fn parse() -> Cli {
     Cli::try_parse().unwrap_or_else(|mut error| {
         suggest(&mut error);
@@ -18,7 +18,7 @@ pub(crate) fn parse() -> Cli {
     })
 }
 
-/// Adds what clap misses: its measure of likeness finds exchanged letters only in long names.
+/// Adds a suggestion that clap misses: its similarity measure finds swapped letters in long names only.
 fn suggest(error: &mut Error) {
     if error.get(ContextKind::SuggestedArg).is_some() {
         return;
@@ -29,7 +29,7 @@ fn suggest(error: &mut Error) {
     error.insert(ContextKind::SuggestedArg, ContextValue::String(format!("--{meant}")));
 }
 
-/// The option of the command that is named in the command line, whose name is nearest.
+/// Returns the nearest option of the subcommand, if it differs by at most [`MOST_ERRORS`] letters.
 fn nearest(given: &str) -> Option<String> {
     let mut command = Cli::command();
     for word in env::args().skip(1) {

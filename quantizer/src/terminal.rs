@@ -1,4 +1,4 @@
-//! What the command shows: results, notes and progress.
+//! Output to the terminal: results, notes and progress.
 
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -15,14 +15,14 @@ use indicatif::{ProgressBar, ProgressStyle};
 use crate::outputs::files::{self, Outputs};
 use crate::report::progress::{Cadence, Work};
 
-/// Steps of the progress bar; the work reports the share done.
+/// Steps of the progress bar.
 const STEPS: u64 = 1000;
-/// Between two drawings of a bar whose work reports nothing.
+/// Time between two drawings of a bar without reports.
 const REDRAW: Duration = Duration::from_secs(1);
 
 /// `true` if an output of the command goes to standard output.
 static STDOUT_IS_TAKEN: AtomicBool = AtomicBool::new(false);
-/// The progress of the work that is being done, for whoever else writes to the terminal.
+/// Progress of the current work, for other writers to the terminal.
 static SHOWN: Mutex<Option<Shown>> = Mutex::new(None);
 
 /// Reserves a command's outputs ([`files::reserve`]). If one of them is standard output, the report goes to standard
@@ -33,13 +33,13 @@ pub(crate) fn reserve(outputs: &[&Path], inputs: &[PathBuf]) -> Result<Outputs> 
     Ok(outputs)
 }
 
-/// Notes go to standard error, so that the report stays as it is.
+/// Prints notes to standard error, apart from the report.
 pub(crate) fn note(notes: impl IntoIterator<Item = String>) {
-    // That nobody reads them is no error.
+    // A closed standard error is not an error.
     notes.into_iter().for_each(|note| drop(beside_bar(|| writeln!(io::stderr(), "note: {}", printable(&note)))));
 }
 
-/// Prints; that a reader has gone away (as `head` does) is no error.
+/// Prints a result. A reader that has closed its end (as `head` does) is not an error.
 pub(crate) fn print(text: &str) -> Result<()> {
     let lines: Vec<_> = text.split('\n').map(printable).collect();
     let text = lines.join("\n");
@@ -49,11 +49,11 @@ pub(crate) fn print(text: &str) -> Result<()> {
     });
     match written {
         Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),
-        other => other.context("standard output cannot be written"),
+        other => other.context("cannot write to standard output"),
     }
 }
 
-/// Progress as it is shown: by the bar, or else by lines.
+/// Progress in display: by the bar, or else by lines.
 struct Shown {
     begun: Instant,
     cadence: Cadence,
@@ -65,7 +65,7 @@ fn shown() -> MutexGuard<'static, Option<Shown>> {
     SHOWN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Writes without the bar in between.
+/// Writes while the bar is hidden.
 fn beside_bar<T>(write: impl FnOnce() -> T) -> T {
     let bar = shown().as_ref().and_then(|shown| shown.bar.clone());
     match bar {
@@ -82,7 +82,7 @@ impl Shown {
         }
     }
 
-    /// Time until [`Self::tick`] has something to do.
+    /// Returns the time until the next [`Self::tick`] is due.
     fn wait(&self) -> Duration {
         if self.bar.is_some() { REDRAW } else { self.cadence.wait(self.begun.elapsed()) }
     }
@@ -96,7 +96,7 @@ impl Shown {
     }
 }
 
-/// A bar, if standard error is a terminal.
+/// Creates a bar, if standard error is a terminal.
 fn bar() -> Result<Option<ProgressBar>> {
     // Within 80 columns: a bar that wraps flickers.
     let style = ProgressStyle::with_template("{msg:30} {bar:30} {percent:>3}%, {eta} left").context("progress bar")?;
@@ -104,24 +104,24 @@ fn bar() -> Result<Option<ProgressBar>> {
     Ok((!bar.is_hidden()).then_some(bar))
 }
 
-/// Shows how far long work is while the value lives: by a bar on a terminal, else by a line every 10 s.
+/// Display of progress while the value lives: a bar on a terminal, else a line every 10 s.
 pub(crate) struct Progress {
-    /// Its end is that of the thread that draws what the work does not report.
-    _drawn: Option<Sender<()>>,
+    /// Dropping it ends the thread that redraws between reports.
+    _redraw: Option<Sender<()>>,
 }
 
 impl Progress {
-    /// Begins with this work; shows nothing if `quiet`.
+    /// Begins with the work of this name. Shows nothing if `quiet`.
     pub(crate) fn new(quiet: bool, work: &str) -> Result<Self> {
         if quiet {
-            return Ok(Self { _drawn: None });
+            return Ok(Self { _redraw: None });
         }
         let work = Work { name: work.to_owned(), share: None };
         *shown() = Some(Shown { begun: Instant::now(), cadence: Cadence::default(), work, bar: bar()? });
         let (sender, receiver) = channel::<()>();
         thread::spawn(move || {
             loop {
-                // Not as the condition of the loop, which would keep the lock.
+                // A `while let` would hold the lock during the loop's body.
                 let Some(wait) = shown().as_ref().map(Shown::wait) else { return };
                 if receiver.recv_timeout(wait) != Err(RecvTimeoutError::Timeout) {
                     return;
@@ -129,30 +129,30 @@ impl Progress {
                 shown().iter_mut().for_each(Shown::tick);
             }
         });
-        Ok(Self { _drawn: Some(sender) })
+        Ok(Self { _redraw: Some(sender) })
     }
 
-    /// Begins work of which it is not known how far it is.
+    /// Begins work that does not report a share.
     pub(crate) fn begin(&self, work: &str) {
         self.change(|shown| shown.work = Work { name: work.to_owned(), share: None });
     }
 
-    /// The work that is being done, and the share of it that is done.
+    /// Sets the current work and its share done.
     pub(crate) fn set(&self, work: &str, share: f64) {
         self.change(|shown| shown.work = Work { name: work.to_owned(), share: Some(share) });
     }
 
-    /// The name of the work that is being done.
+    /// Sets the name of the current work.
     pub(crate) fn set_work(&self, work: &str) {
         self.change(|shown| work.clone_into(&mut shown.work.name));
     }
 
-    /// The share of the work that is done.
+    /// Sets the share done.
     pub(crate) fn set_share(&self, share: f64) {
         self.change(|shown| shown.work.share = Some(share));
     }
 
-    /// Does work that writes to the terminal as it likes.
+    /// Removes the bar while `work` writes to the terminal.
     pub(crate) fn without_bar<T>(&self, work: impl FnOnce() -> T) -> T {
         let bar = shown().as_mut().and_then(|shown| shown.bar.take());
         bar.iter().for_each(ProgressBar::finish_and_clear);
@@ -178,7 +178,7 @@ impl Drop for Progress {
     }
 }
 
-/// Ends the progress that is shown. Returns `true` if there was a bar.
+/// Ends the display of progress. Returns `true` if there was a bar.
 pub(crate) fn clear() -> bool {
     let bar = shown().take().and_then(|shown| shown.bar);
     bar.iter().for_each(ProgressBar::finish_and_clear);

@@ -308,5 +308,5 @@ fn missing_controllers_and_wrong_command_lines_are_reported() -> Result<()> {
     // A listener that is no controller.
     let listener = TcpListener::bind("127.0.0.1:0")?;
     let port = format!("tcp:{}", listener.local_addr()?);
-    failed(&link(&["arm", &port, "--patience", "0.3"])?, 1, &["no answer", &port])
+    failed(&link(&["arm", &port, "--timeout", "0.3"])?, 1, &["no answer", &port])
 }

@@ -217,15 +217,15 @@ fn only_the_images_own_policy_labels() -> Result<()> {
     }
     let other = Fixture::new(Network::Lstm)?;
     let line = format!("serve image.actq --record other.npz --policy {}", other.path("policy").display());
-    failed(&fixture.run(&line, &input)?, 1, &["not the policy that image.actq was made from", "--policy"])?;
+    failed(&fixture.run(&line, &input)?, 1, &["image.actq was made from another policy", "--policy"])?;
     failed(
         &fixture.run("serve image.actq --record no/drive.npz", &input)?,
         1,
-        &["no/drive.npz", "there is no folder no"],
+        &["no/drive.npz", "folder no does not exist"],
     )?;
     let long = format!("serve image.actq --record {}.npz", "x".repeat(252));
-    failed(&fixture.run(&long, &input)?, 1, &["xxx.npz: cannot be written"])?;
-    failed(&fixture.run("serve image.actq --record drive.npy", &input)?, 2, &["its name ends so"])?;
+    failed(&fixture.run(&long, &input)?, 1, &["xxx.npz: cannot write the file"])?;
+    failed(&fixture.run("serve image.actq --record drive.npy", &input)?, 2, &["use a name that ends in .npz"])?;
     // Without observations nothing is written.
     ended_well(&fixture.run("serve image.actq --record empty.npz --policy policy", &[RESET; 3])?)?;
     for name in ["other.npz", "empty.npz"] {
@@ -287,7 +287,7 @@ fn recorders_with_one_name_use_separate_files() -> Result<()> {
         ended_well(&output)?;
     }
     assert_eq!(fs::read(fixture.path("drive-2.npz"))?, b"mine");
-    ensure!(stderr.contains("drive.npz is there already; recording into drive-3.npz"), "{stderr}");
+    ensure!(stderr.contains("drive.npz exists; recording to drive-3.npz"), "{stderr}");
     let read = |name: &str| Ok::<_, anyhow::Error>(episodes(&fixture.recording(name)?).concat());
     let mut recorded = [read("drive.npz")?, read("drive-3.npz")?];
     recorded.sort_by_key(|frames| std::cmp::Reverse(frames.len()));
@@ -305,7 +305,7 @@ fn a_closed_output_keeps_the_recording() -> Result<()> {
     // The pipe may break at this answer or the next.
     let stdin = child.stdin.as_mut().context("no standard input")?;
     drop(stdin.write_all(&step_request(&observations[0])));
-    failed(&child.wait_with_output()?, 1, &["output cannot be written"])?;
+    failed(&child.wait_with_output()?, 1, &["cannot write the output"])?;
     let recorded = episodes(&fixture.recording("drive.npz")?).concat();
     assert_eq!(recorded[..50], observations);
     Ok(())
@@ -352,7 +352,7 @@ fn eval_measures_on_the_images_own_path() -> Result<()> {
     }
     ensure!((own[0] - own[1]).abs() < 1e-6 * own[0], "{own:?}");
     let text = succeeded(&fixture.run("eval image.actq --policy policy --driven drive.npz --driven bare.npz", b"")?)?;
-    ensure!(text.contains("own path") && text.contains("(280 observations that the image itself"), "{text}");
+    ensure!(text.contains("on-policy") && text.contains("(280 observations from the image's own"), "{text}");
 
     succeeded(&fixture.run("quantize policy --method gptq --bits 2 --out other.actq", b"")?)?;
     let error = fixture.run("eval other.actq --policy policy --driven drive.npz", b"")?;
@@ -364,7 +364,7 @@ fn eval_measures_on_the_images_own_path() -> Result<()> {
     succeeded(&fixture.run(line, b"")?)?;
     ended_well(&fixture.run("serve again.actq --record again.npz --policy policy", &input)?)?;
     let text = succeeded(&fixture.run(&format!("{line} --calib again.npz"), b"")?)?;
-    ensure!(text.contains("own-path nmse"), "{text}");
+    ensure!(text.contains("on-policy nmse"), "{text}");
     Ok(())
 }
 
@@ -395,7 +395,7 @@ fn tune_drives_and_learns_again() -> Result<()> {
     let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
     let table = succeeded(&output)?;
     assert_eq!((stderr.matches("driving\n").count(), stderr.matches("done\n").count()), (3, 3), "{stderr}");
-    ensure!(stderr.contains("the image of round 0 drove better (success 0.900 (0.100-0.900))"), "{stderr}");
+    ensure!(stderr.contains("the image of round 0 has more success (0.900 (0.100-0.900))"), "{stderr}");
     let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split_whitespace().collect()).collect();
     for (round, (episodes, frames)) in [("6", "300"), ("8", "410"), ("10", "520")].into_iter().enumerate() {
         assert_eq!(rows[round + 1][..3], [&*round.to_string(), episodes, frames], "{table}");
@@ -436,10 +436,10 @@ fn a_failed_drive_is_reported_and_writes_nothing() -> Result<()> {
     let fixture = Fixture::new(Network::Chunk)?;
     let drive = driver(&fixture)?;
     for (command, words) in [
-        ("exit 3", &["round 0: the command of --drive has failed", "exit status: 3", "POLICY_CMD="][..]),
-        ("kill -9 $$", &["has failed", "signal: 9"]),
-        ("no-such-simulator", &["has failed", "exit status: 127"]),
-        ("true", &["round 0: the command of --drive has recorded nothing", "POLICY_CMD"]),
+        ("exit 3", &["round 0: the --drive command failed", "exit status: 3", "POLICY_CMD="][..]),
+        ("kill -9 $$", &["command failed", "signal: 9"]),
+        ("no-such-simulator", &["command failed", "exit status: 127"]),
+        ("true", &["round 0: the --drive command recorded nothing", "POLICY_CMD"]),
     ] {
         failed(&tune(&fixture, command, "")?, 1, words).context(command)?;
     }
@@ -448,7 +448,7 @@ fn a_failed_drive_is_reported_and_writes_nothing() -> Result<()> {
     failed(
         &tune(&fixture, &second, "--keep kept")?,
         1,
-        &["nothing is written but what kept holds", "round 1", "status: 4"],
+        &["no image is written; kept holds the images", "round 1", "status: 4"],
     )?;
     ensure!(fixture.recording("kept/round-0/drive.npz")?.frames() == 110 && fixture.path("kept/round-1.actq").exists());
     ensure!(!fixture.path("tuned.actq").exists());
@@ -467,7 +467,7 @@ fn a_drive_without_a_success_figure_is_accepted() -> Result<()> {
     let output = tune(&fixture, drive, "")?;
     let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
     let table = succeeded(&output)?;
-    ensure!(stderr.contains("has printed no JSON object with a number \"success\""), "{stderr}");
+    ensure!(stderr.contains("printed no line with one JSON object that holds a number \"success\""), "{stderr}");
     ensure!(table.lines().nth(1).is_some_and(|row| row.split_whitespace().nth(5) == Some("-")), "{table}");
     Ok(())
 }

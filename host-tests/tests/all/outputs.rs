@@ -102,7 +102,7 @@ const OVERWRITING: &[(&str, Name, &str)] = &[
     (
         "quantize policy --out policy/policy.safetensors",
         Name::None,
-        "policy/policy.safetensors: is the same file as policy/policy.safetensors, which the command reads",
+        "policy/policy.safetensors: is the same file as policy/policy.safetensors, an input",
     ),
     ("quantize policy --out policy/policy.json", Name::None, "the same file as policy/policy.json"),
     ("quantize policy --out policy/calib.npz", Name::None, "the same file as policy/calib.npz"),
@@ -115,32 +115,28 @@ const OVERWRITING: &[(&str, Name, &str)] = &[
     (
         "quantize policy --out x.actq",
         Name::Link("x.actq", "policy/policy.safetensors"),
-        "x.actq: is the same file as policy/policy.safetensors, which the command reads",
+        "x.actq: is the same file as policy/policy.safetensors, an input",
     ),
     (
         "quantize policy --out x.actq",
         Name::Hard("x.actq", "policy/policy.safetensors"),
-        "x.actq: is the same file as policy/policy.safetensors, which the command reads",
+        "x.actq: is the same file as policy/policy.safetensors, an input",
     ),
     ("quantize policy --out other/policy.json", Name::Link("other", "policy"), "the same file as policy/policy.json"),
     ("quantize other --out policy/calib.npz", Name::Link("other", "policy"), "the same file as other/calib.npz"),
     (
         "quantize policy --out x.actq --save-stats ./x.actq",
         Name::None,
-        "./x.actq: is the same file as x.actq; every output needs its own",
+        "./x.actq: is the same file as x.actq, another output",
     ),
     ("quantize policy --out old.actq --save-stats policy/../old.actq", Name::None, "is the same file as old.actq"),
     ("quantize policy --out x --save-stats y", Name::Link("y", "x"), "y: is the same file as x"),
     ("quantize policy --out x --save-stats here/x", Name::Link("here", "."), "here/x: is the same file as x"),
     ("quantize policy --out old.actq --save-stats y", Name::Hard("y", "old.actq"), "y: is the same file as old.actq"),
-    (
-        "inspect old.actq --widths --svg old.actq",
-        Name::None,
-        "old.actq: is the same file as old.actq, which the command reads",
-    ),
+    ("inspect old.actq --widths --svg old.actq", Name::None, "old.actq: is the same file as old.actq, an input"),
     ("inspect old.actq --widths --stats old.json --svg old.json", Name::None, "is the same file as old.json"),
     ("inspect old.actq --widths --svg y", Name::Link("y", "old.actq"), "y: is the same file as old.actq"),
-    ("sweep policy --methods rtn --svg z --json z", Name::None, "z: is the same file as z; every output needs its own"),
+    ("sweep policy --methods rtn --svg z --json z", Name::None, "z: is the same file as z, another output"),
     ("sweep policy --methods rtn --svg z --json ./z", Name::None, "./z: is the same file as z"),
     ("sweep policy --methods rtn --svg policy/heldout.npz", Name::None, "the same file as policy/heldout.npz"),
     ("sweep policy --methods rtn --json policy/policy.json", Name::None, "the same file as policy/policy.json"),
@@ -190,9 +186,9 @@ fn writing_to_a_link_writes_its_target() -> Result<()> {
     }
     ensure!(fs::symlink_metadata(fixture.path("b2"))?.is_symlink(), "b2 is no longer a link");
     symlink("round", fixture.path("round"))?;
-    failed(&fixture.quantize("--out round")?, 1, &["round: cannot be written"])?;
+    failed(&fixture.quantize("--out round")?, 1, &["round: cannot write the file"])?;
     symlink("none/image.actq", fixture.path("lost"))?;
-    failed(&fixture.quantize("--out lost")?, 1, &["lost: cannot be written", "none"])
+    failed(&fixture.quantize("--out lost")?, 1, &["lost: cannot write the file", "none"])
 }
 
 #[test]
@@ -230,7 +226,7 @@ fn an_output_may_be_a_device() -> Result<()> {
     fs::write(&log, "lines\n")?;
     let mut command = fixture.command("quantize policy --method rtn --out stdout");
     command.stdout(OpenOptions::new().append(true).open(&log)?).stderr(Stdio::piped());
-    failed(&command.output()?, 1, &["stdout: cannot be written", "it stands for a file that is open already"])?;
+    failed(&command.output()?, 1, &["stdout: cannot write the file", "it is a link to an open file"])?;
     ensure!(fs::read(&log)? == b"lines\n", "the file changed");
     Ok(())
 }
@@ -255,7 +251,11 @@ fn a_replaced_file_keeps_its_permissions() -> Result<()> {
     }
     fs::write(&out, "old")?;
     fs::set_permissions(&out, Permissions::from_mode(0o444))?;
-    failed(&fixture.quantize("--out image.actq")?, 1, &["image.actq: cannot be written: it is read-only"])?;
+    failed(
+        &fixture.quantize("--out image.actq")?,
+        1,
+        &["image.actq: cannot write the file: the existing file is read-only"],
+    )?;
     ensure!(fs::read(&out)? == b"old", "a read-only file was replaced");
     Ok(())
 }

@@ -216,7 +216,7 @@ fn image_and_statistics_are_written_together_or_not() -> Result<()> {
     all(cases.map(|(image, stats)| {
         let wrong = if image == "x.actq" { stats } else { image };
         let output = fixture.quantize(&format!("--bits 3 --method rtn --out {image} --save-stats {stats}"));
-        (format!("{image} {stats}"), output.and_then(|output| failed(&output, 1, &[wrong, "cannot be written"])))
+        (format!("{image} {stats}"), output.and_then(|output| failed(&output, 1, &[wrong, "cannot write the file"])))
     }))?;
     failed(&fixture.quantize("--bits 3 --method rtn --out x.actq --save-stats x.actq")?, 1, &["x.actq"])?;
     assert_eq!(fixture.files()?, before);

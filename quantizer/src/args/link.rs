@@ -17,9 +17,9 @@ pub(crate) struct LinkArgs {
 pub(crate) enum LinkCommand {
     /// List the serial ports
     Ports,
-    /// Show state, counters and times, and follow them until the command is ended
+    /// Show state, counters and times, and update them until the command ends
     Watch(WatchArgs),
-    /// Let the outputs follow the head: for a controller to which something sends observations
+    /// Let the actions drive the outputs; something must already send observations to the controller
     Arm(PortArgs),
     /// Let the outputs coast
     Disarm(PortArgs),
@@ -27,18 +27,18 @@ pub(crate) enum LinkCommand {
     Get(GetArgs),
     /// Set a parameter, while disarmed
     Set(SetArgs),
-    /// Send a recording's observations, each at its time
+    /// Send a recording's observations at their rate
     ///
-    /// The image is the one that the controller runs: it says how long an observation is, and its checksum is compared.
-    /// Episodes follow each other without a reset.
+    /// IMAGE must be the image that the controller runs. It gives the length of an observation, and the command
+    /// compares its checksum. Episodes follow each other without a reset.
     ///
     /// Example: actq link stream /dev/ttyACM0 ur3.actq heldout.npz --arm --log drive.npz
     Stream(StreamArgs),
-    /// Let the controller be a simulator's policy, by the protocol of `actq serve` on standard input and output
+    /// Use the controller as a simulator's policy, by the protocol of `actq serve` on standard input and output
     ///
-    /// A reset disarms, which resets the head. Without --arm the outputs coast, and the head answers all the same.
+    /// A reset disarms, which resets the head. Without --arm the outputs coast, and the head still gives actions.
     Serve(ServeArgs),
-    /// Send an image into the slot that does not run, and let it run
+    /// Send an image into the slot that does not run, then run it
     ///
     /// Example: actq link push /dev/ttyACM0 ur3.actq --signature ur3.sig
     Push(PushArgs),
@@ -46,19 +46,19 @@ pub(crate) enum LinkCommand {
 
 #[derive(clap::Args)]
 pub(crate) struct PortArgs {
-    /// A serial port, as /dev/ttyACM0, COM3 or /dev/ttyUSB0@115200 [921600 bits a second where none are named], or a
-    /// socket: tcp:HOST:PORT or unix:PATH
+    /// A serial port, as /dev/ttyACM0, COM3 or /dev/ttyUSB0@115200 [default rate: 921600 bits per second], or a socket:
+    /// tcp:HOST:PORT or unix:PATH
     pub(crate) port: Address,
-    /// Seconds to ask without an answer, and to wait for a port that is lost
-    #[arg(long, value_name = "SECONDS", default_value = "5", value_parser = seconds)]
-    pub(crate) patience: Duration,
+    /// Seconds without an answer, or without a lost port, after which the command fails
+    #[arg(long, alias = "patience", value_name = "SECONDS", default_value = "5", value_parser = seconds)]
+    pub(crate) timeout: Duration,
 }
 
 #[derive(clap::Args)]
 pub(crate) struct WatchArgs {
     #[command(flatten)]
     pub(crate) port: PortArgs,
-    /// Show them once
+    /// Show them one time and end
     #[arg(long)]
     pub(crate) once: bool,
 }
@@ -66,11 +66,11 @@ pub(crate) struct WatchArgs {
 /// A parameter's name.
 #[derive(Clone, Copy, ValueEnum)]
 pub(crate) enum ParameterArg {
-    /// Ticks without observation or action before the safe action
+    /// Ticks without a good observation or action, before the safe action
     Deadline,
-    /// Oldest observation, in µs
+    /// Largest observation age, in µs
     MaxAge,
-    /// Ticks between two reports of the status; 0: none
+    /// Ticks between two status reports; 0 = none
     StatusPeriod,
     /// Lower limit of an axis
     Low,
@@ -78,7 +78,7 @@ pub(crate) enum ParameterArg {
     High,
     /// Largest change of an axis in a tick
     Rate,
-    /// Value from which an axis' first action is rate-limited
+    /// Value from which the rate limit of an axis' first action counts
     Start,
 }
 
@@ -100,9 +100,9 @@ impl From<ParameterArg> for Parameter {
 pub(crate) struct GetArgs {
     #[command(flatten)]
     pub(crate) port: PortArgs,
-    /// Which
+    /// The parameter
     pub(crate) parameter: ParameterArg,
-    /// Of which axis, from 0 on
+    /// The axis, counted from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) axis: u8,
 }
@@ -124,13 +124,13 @@ pub(crate) struct StreamArgs {
     pub(crate) image: PathBuf,
     /// The recording: .npz, .npy or .safetensors
     pub(crate) recording: PathBuf,
-    /// Observations a second [default: the image's rate]
+    /// Observations per second [default: the image's rate]
     #[arg(long, value_name = "HZ", value_parser = rate)]
     pub(crate) rate: Option<f64>,
-    /// Arm once observations flow, and disarm at the end
+    /// Arm as soon as observations flow, and disarm at the end
     #[arg(long)]
     pub(crate) arm: bool,
-    /// Write what was sent and what came back: obs, action, applied, sent and received (seconds)
+    /// Write a log of observations and replies: obs, action, applied, sent and received (seconds)
     #[arg(long, value_name = "FILE.npz")]
     pub(crate) log: Option<PathBuf>,
 }
@@ -150,17 +150,17 @@ pub(crate) struct PushArgs {
     pub(crate) port: PortArgs,
     /// The image
     pub(crate) image: PathBuf,
-    /// Its version, not lower than one that the controller has run [default: that of the signature, else 0]
+    /// The image's version, at least the highest that the controller has run [default: the signature's, else 0]
     #[arg(long, value_name = "N", conflicts_with = "signature")]
     pub(crate) version: Option<u32>,
-    /// Its signature, by `actq sign`
+    /// The image's signature, by `actq sign`
     #[arg(long, value_name = "FILE")]
     pub(crate) signature: Option<PathBuf>,
 }
 
 #[derive(clap::Args)]
 pub(crate) struct KeygenArgs {
-    /// The file to write the private key to, which only its owner may read; one that is there is never replaced
+    /// The file to write the private key to, readable by its owner only; an existing file is never replaced
     #[arg(long, value_name = "FILE.pem")]
     pub(crate) out: PathBuf,
 }
@@ -169,10 +169,10 @@ pub(crate) struct KeygenArgs {
 pub(crate) struct SignArgs {
     /// The image
     pub(crate) image: PathBuf,
-    /// The private key, as `actq keygen` or `openssl genpkey -algorithm ed25519` writes it
+    /// The private key, by `actq keygen` or `openssl genpkey -algorithm ed25519`
     #[arg(long, value_name = "FILE.pem")]
     pub(crate) key: PathBuf,
-    /// The image's version: a controller that has run a higher one refuses it
+    /// The image's version; a controller that has run a higher one refuses it
     #[arg(long, value_name = "N")]
     pub(crate) version: u32,
     /// The file to write the signature to
@@ -182,10 +182,10 @@ pub(crate) struct SignArgs {
 
 fn seconds(text: &str) -> Result<Duration, String> {
     let seconds = text.parse().ok().filter(|seconds| (0.1..=3600.0).contains(seconds));
-    seconds.map(Duration::from_secs_f64).ok_or_else(|| "0.1 to 3600 seconds".to_owned())
+    seconds.map(Duration::from_secs_f64).ok_or_else(|| "use 0.1 to 3600 seconds".to_owned())
 }
 
 fn rate(text: &str) -> Result<f64, String> {
     let rate = text.parse().ok().filter(|rate| (0.1..=1000.0).contains(rate));
-    rate.ok_or_else(|| "0.1 to 1000 observations a second".to_owned())
+    rate.ok_or_else(|| "use 0.1 to 1000 observations per second".to_owned())
 }

@@ -10,7 +10,7 @@ use crate::importers::load;
 use crate::report::notes::activation_share;
 use crate::terminal::{Progress, note, print};
 
-/// Runs an image over recordings and says how far it is from the f32 policy.
+/// Runs an image over recordings and prints its error against the f32 policy.
 pub(crate) fn run(args: &EvalArgs) -> Result<()> {
     let buffer = ImageBuffer::read(&args.image)?;
     let image = buffer.image(&args.image)?;
@@ -23,17 +23,19 @@ pub(crate) fn run(args: &EvalArgs) -> Result<()> {
     let own = (!driven.is_empty()).then(|| own::own_path(image, &driven, source.as_ref())).transpose()?;
     match Recording::Calib.load(policy, None, Sizes::of_image(&image)) {
         Ok(calib) => note(calib.and_then(|calib| Range::of(&calib).warning(&dataset))),
-        Err(error) => note([format!("the calibrated range is not known: {error:#}")]),
+        Err(error) => note([format!("cannot check the range of the observations: {error:#}")]),
     }
     if args.json {
         let mut json = serde_json::to_value(&report)?;
         if let Some(own) = own {
-            json.as_object_mut().context("the report is an object")?.insert("own_nmse".to_owned(), own.nmse.into());
+            json.as_object_mut()
+                .context("the report is not a JSON object")?
+                .insert("own_nmse".to_owned(), own.nmse.into());
         }
         return print(&format!("{json}\n"));
     }
     let own = own.map_or(String::new(), |own| {
-        format!("own path       {:.3e}   ({} observations that the image itself has led to)\n", own.nmse, own.steps)
+        format!("on-policy      {:.3e}   ({} observations from the image's own rollouts)\n", own.nmse, own.steps)
     });
     print(&format!(
         "observations   {}\n\

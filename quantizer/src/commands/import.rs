@@ -14,7 +14,7 @@ use crate::outputs::unfinished::OutputFolder;
 use crate::report::{imported, notes};
 use crate::terminal::{note, print, reserve};
 
-/// Makes a policy's folder of an ONNX file and says what became of it.
+/// Converts an ONNX file to a policy folder and prints a summary.
 pub(crate) fn run(args: &ImportArgs) -> Result<()> {
     let choice = Choice { output: args.output.clone(), states: args.state.clone() };
     let imported = import(&args.model, &choice)?;
@@ -26,19 +26,20 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
     let [calib_npz, others @ ..] = Recording::Calib.paths(&args.out);
     ensure!(
         args.out.is_dir() || !args.out.exists(),
-        "{}: is there already and no folder; --out names the folder that is made",
+        "{}: exists and is not a folder; pass the name of a folder to --out",
         args.out.display()
     );
     for path in [&json, &weights].into_iter().chain(calib.is_some().then_some(&calib_npz)) {
-        ensure!(args.force || !path.exists(), "{}: is there already; --force replaces it", path.display());
+        ensure!(args.force || !path.exists(), "{}: exists; pass --force to replace it", path.display());
     }
     let other = others.iter().find(|path| calib.is_some() && path.exists());
     ensure!(
         other.is_none(),
-        "{}: is there already, and one recording can be",
+        "{}: exists, and a policy folder takes one calibration recording; remove it or omit --calib",
         other.map_or("".into(), |p| p.display().to_string())
     );
-    let _folder = OutputFolder::new(&args.out).with_context(|| format!("{}: cannot be made", args.out.display()))?;
+    let _folder =
+        OutputFolder::new(&args.out).with_context(|| format!("{}: cannot create the folder", args.out.display()))?;
     let names: Vec<&Path> =
         [&json, &weights].into_iter().chain(calib.is_some().then_some(&calib_npz)).map(|p| &**p).collect();
     let inputs: Vec<_> = [Some(args.model.clone()), args.calib.clone()].into_iter().flatten().collect();

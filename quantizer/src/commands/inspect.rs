@@ -10,7 +10,7 @@ use crate::report::widths::Widths;
 use crate::report::{inspect, time};
 use crate::terminal::{print, reserve};
 
-/// Shows what is in an image.
+/// Prints the content of an image.
 pub(crate) fn run(args: &InspectArgs) -> Result<()> {
     let inputs = [Some(&args.image), args.stats.as_ref()].into_iter().flatten().cloned().collect::<Vec<_>>();
     let outputs = reserve(args.svg.as_deref().as_slice(), &inputs)?;

@@ -23,16 +23,16 @@ use crate::args::link::{LinkArgs, LinkCommand, PortArgs, PushArgs, StreamArgs, W
 use crate::report::notes;
 use crate::terminal::{Progress, note, print, reserve};
 
-/// Between two tables of `watch`.
+/// Time between two tables of `watch`.
 const REFRESH: Duration = Duration::from_millis(200);
 
-/// Does what is asked of a controller.
+/// Runs a subcommand of `actq link`.
 pub(crate) fn run(args: &LinkArgs) -> Result<()> {
     match &args.command {
         LinkCommand::Ports => {
             let ports = port::list()?;
             if ports.is_empty() {
-                note(["this machine has no serial port".to_owned()]);
+                note(["no serial port found".to_owned()]);
             }
             ports.into_iter().try_for_each(|(name, about)| print(&format!("{name}  {about}\n")))
         }
@@ -54,7 +54,7 @@ pub(crate) fn run(args: &LinkArgs) -> Result<()> {
 
 fn connect(args: &PortArgs) -> Result<Client> {
     let named = || format!("{}", args.port);
-    let mut client = Client::new(Connection::open(args.port.clone(), args.patience)?, args.patience);
+    let mut client = Client::new(Connection::open(args.port.clone(), args.timeout)?, args.timeout);
     client.status().with_context(named)?;
     Ok(client)
 }
@@ -92,7 +92,7 @@ fn run_stream(args: &StreamArgs) -> Result<()> {
     let runs = client.status()?.image;
     ensure!(
         runs == image.crc(),
-        "the controller runs another image (checksum {runs:08x}) than {} ({:08x}); actq link push sends it",
+        "the controller runs another image (checksum {runs:08x}) than {} ({:08x}); send it by actq link push",
         args.image.display(),
         image.crc()
     );
@@ -107,7 +107,7 @@ fn run_stream(args: &StreamArgs) -> Result<()> {
     let outcome =
         stream(&mut client, observations, &pace, &mut log, |status| progress.set_work(&status.state.to_string()));
     drop(progress);
-    // What came before an error is what one wants to see.
+    // After an error the log shows what came before it.
     if args.log.is_some() {
         outputs.write(&[log::npz(log.rows())?])?;
     }
@@ -115,7 +115,7 @@ fn run_stream(args: &StreamArgs) -> Result<()> {
     latencies.sort_by(f64::total_cmp);
     let at = |share: f64| latencies.get((share * latencies.len() as f64) as usize).map_or(f64::NAN, |s| s * 1e3);
     print(&format!(
-        "{} observations, {} actions; from observation to action {:.1} ms in the median, {:.1} ms in 99 of 100\n",
+        "{} observations, {} actions; from observation to action {:.1} ms in the median, {:.1} ms at the 99th percentile\n",
         log.rows().len(),
         latencies.len(),
         at(0.5),
@@ -126,7 +126,7 @@ fn run_stream(args: &StreamArgs) -> Result<()> {
 
 fn run_push(args: &PushArgs) -> Result<()> {
     let buffer = ImageBuffer::read(&args.image)?;
-    // What the kernels refuse need not be sent.
+    // An image that the kernels refuse is not sent.
     let image = buffer.image(&args.image)?;
     let signed = args.signature.as_deref().map(|path| read_signature(path, buffer.bytes())).transpose()?;
     let version = signed.map_or(args.version.unwrap_or(0), |(version, _)| version);
@@ -145,10 +145,11 @@ fn run_push(args: &PushArgs) -> Result<()> {
     print(&format!("{} runs, version {version}, {} bytes\n", image.name(), buffer.bytes().len()))
 }
 
-/// Version and signature of an image, from its signature's file.
+/// Reads and checks an image's version and signature from a signature file.
 fn read_signature(path: &Path, image: &[u8]) -> Result<(u32, [u8; 64])> {
     let name = || path.display().to_string();
     let text = std::fs::read_to_string(path).with_context(name)?;
-    let signed: Signed = serde_json::from_str(&text).context("not a signature of actq sign").with_context(name)?;
+    let signed: Signed =
+        serde_json::from_str(&text).context("not a signature file; create one by actq sign").with_context(name)?;
     Ok((signed.version, signed.check(image).with_context(name)?))
 }

@@ -19,7 +19,7 @@ use crate::report::{notes, quantized, time};
 use crate::terminal::{Progress, note, print, reserve};
 use crate::threads::start_threads;
 
-/// Quantizes a policy, writes the image and says what became of it.
+/// Quantizes a policy, writes the image and prints a report.
 pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
     let outputs: Vec<&Path> = [Some(&args.out), args.save_stats.as_ref()].into_iter().flatten().map(|p| &**p).collect();
     let calib = files_of(&args.calib)?;
@@ -85,9 +85,9 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
             note(notes::overfit_warning(&check));
             note(notes::error_warning(&check));
         }
-        Ok(None) => note(["the error is not known: there is no recording to compare with (--calib FILE)".to_owned()]),
-        // The image is written, and nothing is wrong with it.
-        Err(error) => note([format!("the error is not known: {error:#}")]),
+        Ok(None) => note(["the error was not measured, as there is no recording; pass one by --calib FILE".to_owned()]),
+        // The image is written and correct.
+        Err(error) => note([format!("the error was not measured: {error:#}")]),
     }
     let of_image = |path: &PathBuf| driven_by(path).is_ok_and(|crc| crc == Some(image.crc()));
     let driven: Vec<PathBuf> = shares.into_iter().map(|share| share.path).filter(of_image).collect();
@@ -97,7 +97,7 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
     Ok(())
 }
 
-/// What the command line asks for, as far as it says; the method also depends on whether there is a recording.
+/// Returns the options of the command line. Without `--method`, a calibration recording decides the method.
 fn options(args: &QuantizeArgs, has_calib: bool) -> Result<Options> {
     let method = match args.method {
         Some(method) => method.into(),

@@ -13,7 +13,7 @@ use crate::importers::load;
 use crate::serve::{RecordPlan, serve, serve_recorded};
 use crate::terminal::note;
 
-/// Serves an image, and records what it is shown where that was asked for.
+/// Serves an image, and records its observations with `--record`.
 pub(crate) fn run(args: &ServeArgs) -> Result<()> {
     let buffer = ImageBuffer::read(&args.image)?;
     let image = buffer.image(&args.image)?;
@@ -21,15 +21,17 @@ pub(crate) fn run(args: &ServeArgs) -> Result<()> {
     let Some(path) = &args.record else { return serve(image, input, output, |_| {}) };
     let source = source(args, &image)?;
     if source.is_none() {
-        note(["the policy that the image was made from is not in the image's folder: what is recorded gets no array \
-               \"action\" (quantize and eval let the policy give it); --policy names its folder"
-            .to_owned()]);
+        note([
+            "the image's folder does not hold the policy that the image was made from, so the recording gets no array \
+               \"action\" (quantize and eval then compute it); pass the policy folder to --policy"
+                .to_owned(),
+        ]);
     }
     let plan = RecordPlan { path, source: source.as_ref() };
     serve_recorded(image, plan, input, output, |text| note([text]))
 }
 
-/// The policy that the image was made from.
+/// Loads the policy that the image was made from.
 fn source(args: &ServeArgs, image: &Image<'_>) -> Result<Option<Policy>> {
     let made_it = |policy: &Policy| policy.digest == image.digest();
     let Some(dir) = &args.policy else {
@@ -39,7 +41,7 @@ fn source(args: &ServeArgs, image: &Image<'_>) -> Result<Option<Policy>> {
     let policy = load(dir)?;
     ensure!(
         made_it(&policy),
-        "{}: not the policy that {} was made from; name that one's folder (--policy, or ACTQ_POLICY in the environment)",
+        "{}: {} was made from another policy; pass that policy's folder (--policy, or ACTQ_POLICY in the environment)",
         dir.display(),
         args.image.display()
     );

@@ -7,7 +7,7 @@ use anyhow::Result;
 use crate::args::link::{KeygenArgs, SignArgs};
 use crate::terminal::{print, reserve};
 
-/// Makes a key.
+/// Generates a key.
 pub(crate) fn keygen(args: &KeygenArgs) -> Result<()> {
     let key = keys::generate()?;
     keys::write(&args.out, &key)?;

@@ -13,7 +13,7 @@ use crate::report::{self, notes};
 use crate::terminal::{Progress, note, print, reserve};
 use crate::threads::start_threads;
 
-/// Quantizes policies by several methods to several budgets and compares the errors.
+/// Quantizes policies by several methods at several budgets and compares the errors.
 pub(crate) fn run(args: &SweepArgs) -> Result<()> {
     let folders = args.policy_dirs.iter().flat_map(|dir| policy_files(dir));
     let calib = files_of(&args.calib)?;
@@ -26,7 +26,11 @@ pub(crate) fn run(args: &SweepArgs) -> Result<()> {
     let methods = args.actquant.of(&methods)?;
     let policies = args.policy_dirs.iter().map(|dir| load(dir)).collect::<Result<Vec<_>>>()?;
     let named = !calib.is_empty() || args.heldout.is_some();
-    ensure!(policies.len() == 1 || !named, "--calib and --heldout go with one policy");
+    ensure!(
+        policies.len() == 1 || !named,
+        "--calib and --heldout apply to one policy, and {} are given; sweep each policy in its own command",
+        policies.len()
+    );
     let mut sweeps = Vec::new();
     for (p, policy) in policies.iter().enumerate() {
         let (dir, sizes) = (Some(policy.dir.as_path()), Sizes::of(policy));

@@ -19,7 +19,7 @@ use crate::report;
 use crate::terminal::{Progress, note, print, reserve};
 use crate::threads::start_threads;
 
-/// Quantizes, drives, and learns again from what was driven.
+/// Quantizes in on-policy rounds: rolls out, labels, and learns again.
 pub(crate) fn run(args: &TuneArgs) -> Result<()> {
     let outputs: Vec<&Path> = [Some(&args.out), args.json.as_ref()].into_iter().flatten().map(|p| &**p).collect();
     let mut calib = files_of(&args.calib)?;
@@ -47,16 +47,16 @@ pub(crate) fn run(args: &TuneArgs) -> Result<()> {
     let tuned = tune::run(
         plan,
         |round, image| {
-            progress.begin(&format!("round {round}: driving"));
-            // The command prints while it drives.
+            progress.begin(&format!("round {round}: rollout"));
+            // The command prints during the rollout.
             progress.without_bar(|| drive.run(round, image)).map_err(Error::other)
         },
         |work, share| progress.set(work, share),
     );
     drop(progress);
     let tuned = tuned.with_context(|| match &args.keep {
-        Some(dir) => format!("nothing is written but what {} holds", dir.display()),
-        None => "nothing is written (--keep DIR keeps the images and what they drove)".to_owned(),
+        Some(dir) => format!("no image is written; {} holds the images and recordings so far", dir.display()),
+        None => "no image is written; pass --keep DIR to keep images and recordings after an error".to_owned(),
     })?;
     let json = serde_json::to_string_pretty(&report::tuned::json(&tuned, &policy.name, &args.drive))? + "\n";
     let table = args.json.is_some().then_some(json.as_bytes());
@@ -72,32 +72,32 @@ pub(crate) fn run(args: &TuneArgs) -> Result<()> {
     Ok(())
 }
 
-/// Where images and recordings are while rounds are run.
+/// The folder of images and recordings during the rounds.
 enum Folder {
     Kept(PathBuf),
-    Gone(Scratch),
+    Temporary(Scratch),
 }
 
 impl Folder {
-    /// The folder to keep, which is made or is empty, so that no recording of another time is among them; else one that
-    /// goes.
+    /// Creates the folder to keep, which must be new or empty to hold no older recordings; without one, a temporary
+    /// folder.
     fn new(keep: Option<&Path>) -> Result<Self> {
         let Some(dir) = keep else {
-            return Ok(Self::Gone(Scratch::new().context("cannot make a temporary folder for recordings")?));
+            return Ok(Self::Temporary(Scratch::new().context("cannot create a temporary folder for recordings")?));
         };
         let name = dir.display();
         if !dir.exists() {
-            fs::create_dir(dir).with_context(|| format!("{name}: cannot be made"))?;
+            fs::create_dir(dir).with_context(|| format!("{name}: cannot create the folder"))?;
         }
-        let mut entries = fs::read_dir(dir).with_context(|| format!("{name}: cannot be read"))?;
-        ensure!(entries.next().is_none(), "{name}: is not empty; --keep needs a folder of its own");
+        let mut entries = fs::read_dir(dir).with_context(|| format!("{name}: cannot read the folder"))?;
+        ensure!(entries.next().is_none(), "{name}: is not empty; pass a new or empty folder to --keep");
         Ok(Self::Kept(dir.to_owned()))
     }
 
     fn path(&self) -> &Path {
         match self {
             Self::Kept(path) => path,
-            Self::Gone(folder) => folder.path(),
+            Self::Temporary(folder) => folder.path(),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Writing files: each whole or not at all, all or none, and never over what the command reads.
+//! Atomic writing of output files: each is complete or absent, all or none, and no output replaces an input.
 
 use std::ffi::OsStr;
 use std::fs::{self, File, Metadata, OpenOptions, Permissions};
@@ -11,28 +11,27 @@ use anyhow::{Context, Result, bail, ensure};
 
 use super::unfinished::{Part, hold};
 
-/// Links from one to the next that are followed; as many as Linux follows.
+/// The longest chain of symbolic links that is followed, as in Linux.
 const MOST_LINKS: usize = 40;
-/// Numbers that are tried behind a name that is taken.
+/// The highest number that is appended to a taken name.
 const MOST_NUMBERS: usize = 9999;
 
-/// Writes `bytes` to `path` so that neither a failure nor an end of the process leaves part of a file there. (A process
-/// that is killed while it writes can leave a hidden file of this name with the ending .part.)
+/// Writes `bytes` to `path`. A failure or the end of the process leaves no partial file there. (A process that is
+/// killed while it writes can leave a hidden file of this name with the ending .part.)
 ///
-/// A symbolic link stays, and what it points to is written. A file that is replaced keeps its permissions; one that is
-/// read-only is refused. A device or pipe is written to as it is.
+/// A symbolic link stays, and its target is written. A replaced file keeps its permissions; a read-only file is
+/// refused. A device or pipe is written to directly.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     reserve(&[path], &[])?.write(&[bytes])
 }
 
-/// As [`write()`], with the content that `fill` puts into the file.
+/// Writes a file as [`write()`] does, with the content from `fill`.
 pub fn write_with(path: &Path, fill: impl FnOnce(&mut File) -> Result<()>) -> Result<()> {
     Output::place_all([Output::new(path)?.fill(fill)?])
 }
 
-/// Writes a new file, as [`write_with`] does, and gives its name: `path`, or, where something is there already, `path`
-/// with the first number from 2 on behind its stem that is free. Nothing is ever replaced, whoever else is looking for
-/// a name.
+/// Writes a new file as [`write_with`] does, and returns its name: `path`, or, if that exists, `path` with the first
+/// free number from 2 on after its stem. Never replaces a file, even if other processes choose a name at the same time.
 pub fn write_new(path: &Path, fill: impl FnOnce(&mut File) -> Result<()>) -> Result<PathBuf> {
     let create = || -> Result<PathBuf> {
         let (folder, name) = folder_and_name(path)?;
@@ -47,23 +46,23 @@ pub fn write_new(path: &Path, fill: impl FnOnce(&mut File) -> Result<()>) -> Res
                 Err((error, _)) => return Err(error.into()),
             }
         }
-        bail!("all names up to {} are taken", numbered(path, MOST_NUMBERS).display())
+        bail!("all names up to {} exist; choose another name", numbered(path, MOST_NUMBERS).display())
     };
     create().with_context(|| named(path))
 }
 
-/// Refuses, before any work is done, a name for [`write_new`] in whose folder no file can be made.
+/// Fails, before any work, if [`write_new`] cannot create a file in the folder of `path`.
 pub fn check_new(path: &Path) -> Result<()> {
     let check = || -> Result<()> {
         let (folder, name) = folder_and_name(path)?;
-        // No name is too long for a temporary file.
+        // A temporary file's name is shortened; this finds a name that is too long.
         path.try_exists()?;
         Ok(Part::new(folder, name).map(drop)?)
     };
     check().with_context(|| named(path))
 }
 
-/// `path` itself as number 1, then `stem-2.ending`, `stem-3.ending` and so on.
+/// Returns `path` for number 1, then `stem-2.ending`, `stem-3.ending` and so on.
 fn numbered(path: &Path, number: usize) -> PathBuf {
     if number == 1 {
         return path.to_owned();
@@ -77,21 +76,22 @@ fn numbered(path: &Path, number: usize) -> PathBuf {
     path.with_file_name(name)
 }
 
-/// Where a file's temporary neighbour can be.
+/// Splits a path into its folder, which must exist, and its file name.
 fn folder_and_name(path: &Path) -> Result<(&Path, &OsStr)> {
-    let name = path.file_name().context("it names no file")?;
+    let name = path.file_name().context("the path has no file name")?;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    ensure!(folder.is_dir(), "there is no folder {}", folder.display());
+    ensure!(folder.is_dir(), "folder {} does not exist", folder.display());
     Ok((folder, name))
 }
 
-/// Outputs of a command, each with an empty file beside its place: what keeps a file from being written is known before
-/// any work is done. Nothing is left of them if they are not written.
+/// Outputs of a command, each with an empty temporary file beside its place, so that errors of writing show before any
+/// work. The temporary files are removed if the outputs are not written.
 #[derive(Debug)]
 pub struct Outputs(Vec<Output>);
 
-/// Reserves outputs. Refuses those that are one of the command's `inputs` or each other, under whatever names, and those
-/// that cannot be written. An input that does not exist counts as well: a file of its name would be read the next time.
+/// Reserves outputs. Refuses an output that is the same file as one of `inputs` or as another output, under any name,
+/// and one that cannot be written. An input that does not exist counts, too: the next run would read a file of its
+/// name.
 pub fn reserve(outputs: &[&Path], inputs: &[PathBuf]) -> Result<Outputs> {
     let inputs: Vec<(Identity, &PathBuf)> = inputs.iter().filter_map(|path| Some((identity(path)?, path))).collect();
     let mut before: Vec<(Identity, &Path)> = Vec::new();
@@ -100,10 +100,10 @@ pub fn reserve(outputs: &[&Path], inputs: &[PathBuf]) -> Result<Outputs> {
         let Some(own) = identity(output) else { continue };
         let name = output.display();
         if let Some((_, input)) = inputs.iter().find(|(input, _)| *input == own) {
-            bail!("{name}: is the same file as {}, which the command reads; name another output", input.display());
+            bail!("{name}: is the same file as {}, an input; choose another output", input.display());
         }
         if let Some((_, other)) = before.iter().find(|(other, _)| *other == own) {
-            bail!("{name}: is the same file as {}; every output needs its own", other.display());
+            bail!("{name}: is the same file as {}, another output; choose another file", other.display());
         }
         before.push((own, output));
     }
@@ -111,11 +111,11 @@ pub fn reserve(outputs: &[&Path], inputs: &[PathBuf]) -> Result<Outputs> {
 }
 
 impl Outputs {
-    /// Writes all files, one content for each output in their order, or none if one of them cannot be written. What a
-    /// device or pipe was given is given.
+    /// Writes all files, one content for each output in order, or none if one cannot be written. Writes to a device or
+    /// pipe cannot be undone.
     pub fn write(self, contents: &[impl AsRef<[u8]>]) -> Result<()> {
         debug_assert_eq!(self.0.len(), contents.len());
-        // Everything that is likely to fail is done before the first file takes its place.
+        // All steps that are likely to fail come before the first file takes its place.
         let filled = self
             .0
             .into_iter()
@@ -132,16 +132,16 @@ impl Outputs {
 }
 
 fn named(path: &Path) -> String {
-    format!("{}: cannot be written", path.display())
+    format!("{}: cannot write the file", path.display())
 }
 
-/// What makes two names one file.
+/// Key that is equal for two names of one file.
 #[derive(PartialEq)]
 enum Identity {
     /// Device and inode.
     #[cfg(unix)]
     Inode(u64, u64),
-    /// Where no file is yet, and where files have no numbers.
+    /// Path, for a file that does not exist or a system without inodes.
     Place(PathBuf),
 }
 
@@ -153,32 +153,32 @@ fn identity(path: &Path) -> Option<Identity> {
     fs::canonicalize(path).or_else(|_| follow(path)).ok().map(Identity::Place)
 }
 
-/// The path that is meant, its folder resolved and its links followed; a file need not exist there. A link to an open
-/// file, as `/dev/stdout` is one in the end, is not followed.
+/// Resolves the folder and the symbolic links of a path; the file need not exist. Does not follow a link to an open
+/// file, to which `/dev/stdout` leads.
 fn follow(path: &Path) -> Result<PathBuf> {
     let mut path = path.to_owned();
     for _ in 0..MOST_LINKS {
-        let name = path.file_name().context("it names no file")?;
+        let name = path.file_name().context("the path has no file name")?;
         let parent = match path.parent() {
             Some(parent) if !parent.as_os_str().is_empty() => parent,
             _ => Path::new("."),
         };
-        let parent = fs::canonicalize(parent).with_context(|| format!("the folder {}", parent.display()))?;
+        let parent = fs::canonicalize(parent).with_context(|| format!("folder {}", parent.display()))?;
         let place = parent.join(name);
         match fs::read_link(&place) {
             Ok(target) if !holds_open_files(&parent) => path = parent.join(target),
             _ => return Ok(place),
         }
     }
-    bail!("more than {MOST_LINKS} links follow each other");
+    bail!("the chain of symbolic links is longer than {MOST_LINKS}");
 }
 
-/// Whether a folder's entries stand for files that a process has opened.
+/// Returns `true` if the folder's entries are the open files of a process.
 fn holds_open_files(folder: &Path) -> bool {
     folder.starts_with("/proc") || folder == Path::new("/dev/fd")
 }
 
-/// What an output becomes.
+/// Kind and place of an output.
 enum Place {
     /// A file, and the permissions of the one that it replaces.
     File(PathBuf, Option<Permissions>),
@@ -187,13 +187,13 @@ enum Place {
 }
 
 fn place(path: &Path) -> Result<Place> {
-    ensure!(!path.is_dir(), "it is a folder");
+    ensure!(!path.is_dir(), "it is a folder; choose the name of a file");
     let place = follow(path)?;
     match fs::metadata(&place) {
         Ok(old) if old.is_file() => {
             let open = place.parent().is_some_and(holds_open_files);
-            ensure!(!open, "it stands for a file that is open already; name the file itself");
-            ensure!(!old.permissions().readonly(), "it is read-only");
+            ensure!(!open, "it is a link to an open file; use the name of the file itself");
+            ensure!(!old.permissions().readonly(), "the existing file is read-only; choose another name");
             Ok(Place::File(place, Some(kept(&old))))
         }
         Ok(_) => Ok(Place::Stream(place)),
@@ -211,9 +211,9 @@ struct Output {
 
 #[derive(Debug)]
 enum Target {
-    /// A file, the one beside its place that becomes it, and the permissions that it gets.
+    /// Temporary file beside the place, the place, and the permissions of the file.
     File(Part, PathBuf, Option<Permissions>),
-    /// A device or a pipe. It is opened when there is something to write: to open a pipe waits for its reader.
+    /// A device or a pipe. It is opened only to write, as opening a pipe waits for its reader.
     Stream(PathBuf),
 }
 
@@ -230,7 +230,7 @@ impl Output {
         Ok(Self { name: name.to_owned(), target: target().with_context(|| named(name))? })
     }
 
-    /// Writes the content; a file has yet to take its place.
+    /// Writes the content to the temporary file, or to the device or pipe.
     fn fill(mut self, fill: impl FnOnce(&mut File) -> Result<()>) -> Result<Self> {
         let write = || match &mut self.target {
             Target::Stream(place) => fill(&mut OpenOptions::new().write(true).open(place)?),
@@ -246,7 +246,7 @@ impl Output {
         Ok(self)
     }
 
-    /// Moves filled files to their places; a signal ends the process before the first or after the last.
+    /// Moves filled files to their places. A signal can end the process before the first or after the last only.
     fn place_all(filled: impl IntoIterator<Item = Self>) -> Result<()> {
         let _held = hold();
         for Self { name, target } in filled {
@@ -258,7 +258,7 @@ impl Output {
     }
 }
 
-/// The permissions of a file that is replaced, without those that would be another owner's.
+/// Returns the permissions of a replaced file, without the set-id and sticky bits.
 fn kept(old: &Metadata) -> Permissions {
     #[cfg(unix)]
     return Permissions::from_mode(old.permissions().mode() & 0o777);
@@ -286,7 +286,7 @@ mod tests {
         assert_eq!(name(new(&path, b"3").expect("written")), "drive-3.npz");
         let (one, two) = (fs::read(&path).expect("1"), fs::read(dir.path().join("drive-2.npz")).expect("2"));
         assert_eq!((&one[..], &two[..]), (&b"1"[..], &b"mine"[..]));
-        // At once, everyone gets a name of their own, and nothing else is left.
+        // Concurrent writers get different names, and no temporary file is left.
         let write = |i: u8| new(&path, &[i]).expect("written");
         thread::scope(|scope| (0..8).for_each(|i| drop(scope.spawn(move || write(i)))));
         assert_eq!(fs::read_dir(dir.path()).expect("a folder").count(), 3 + 8);

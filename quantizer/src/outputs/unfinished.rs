@@ -1,4 +1,4 @@
-//! Temporary files and folders, listed while they exist, so that a process that is ended by a signal can remove them.
+//! A list of temporary files and folders, for their removal when a signal ends the process.
 
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
@@ -11,42 +11,43 @@ use std::sync::{Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard, RwLockW
 
 use tempfile::{Builder, NamedTempFile, PersistError, TempDir};
 
-/// Characters of an output's name in that of its temporary file, whose name must not be longer than a folder takes.
+/// Characters of an output's name in the name of its temporary file, which must not become too long for the file
+/// system.
 const NAME_CHARS: usize = 48;
 
 type Remove = fn(&Path) -> io::Result<()>;
 
-/// All temporary files and folders of this process, and what removes them.
+/// All temporary files and folders of this process, with the functions that remove them.
 static LISTED: Mutex<BTreeMap<PathBuf, Remove>> = Mutex::new(BTreeMap::new());
-/// Read by who makes temporary files and moves them to their places; written by who removes them all.
+/// Lock for reading while temporary files are created or moved to their places, for writing while all are removed.
 static USED: RwLock<()> = RwLock::new(());
 
 fn listed() -> MutexGuard<'static, BTreeMap<PathBuf, Remove>> {
     LISTED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Keeps [`Discard::begin`] waiting while the value lives; after it, keeps the caller waiting for the end of the process.
+/// Blocks [`Discard::begin`] while the value lives. After that, blocks the caller until the process ends.
 pub fn hold() -> RwLockReadGuard<'static, ()> {
     USED.read().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The right to remove all temporary files and folders of a process that ends at once: while it lives no file is made,
-/// and none takes its place.
+/// Permission to remove all temporary files and folders at the end of the process. While it lives, no file is created
+/// or moved to its place.
 #[derive(Debug)]
 pub struct Discard {
     _held: RwLockWriteGuard<'static, ()>,
 }
 
 impl Discard {
-    /// Waits for what is just being made or moved.
+    /// Waits until no file is being created or moved.
     pub fn begin() -> Self {
         Self { _held: USED.write().unwrap_or_else(PoisonError::into_inner) }
     }
 
-    /// Removes them. Returns `true` if there was any.
+    /// Removes all temporary files and folders. Returns `true` if there were any.
     pub fn remove(&self) -> bool {
         let listed = listed();
-        // In reverse order the files in a folder come before it. Nobody is left to hear of an error.
+        // In reverse order, the files in a folder come before the folder. The process ends, so errors are dropped.
         listed.iter().rev().for_each(|(path, remove)| drop(remove(path)));
         !listed.is_empty()
     }
@@ -77,13 +78,13 @@ pub(super) struct Part {
 }
 
 impl Part {
-    /// An empty file in `folder`, to become the one of this name.
+    /// Creates an empty file in `folder` that will become the file of this name.
     pub(super) fn new(folder: &Path, name: &OsStr) -> io::Result<Self> {
         let name: String = name.to_string_lossy().chars().take(NAME_CHARS).collect();
         let prefix = format!(".{name}.");
         let mut builder = Builder::new();
         builder.prefix(&prefix).suffix(".part");
-        // A temporary file is private to its owner; an output is as readable as the one before it, or as any new file.
+        // By default, temporary files are private to their owner; outputs have the permissions of any new file.
         #[cfg(unix)]
         builder.permissions(fs::Permissions::from_mode(0o666));
         let _held = hold();
@@ -96,12 +97,12 @@ impl Part {
         self.file.as_file_mut()
     }
 
-    /// Replaces the file at `place`; the caller holds [`hold`].
+    /// Replaces the file at `place`. The caller must keep the guard of [`hold`].
     pub(super) fn persist(self, place: &Path) -> io::Result<()> {
         Ok(self.file.persist(place).map(drop)?)
     }
 
-    /// Becomes the file at `place`; gives itself back where one is there.
+    /// Becomes the file at `place`. If one exists, returns itself with the error.
     pub(super) fn persist_new(self, place: &Path) -> Result<(), (io::Error, Self)> {
         let Self { file, listed } = self;
         let _held = hold();
@@ -120,7 +121,7 @@ pub struct Scratch {
 }
 
 impl Scratch {
-    /// A new folder.
+    /// Creates a folder.
     pub fn new() -> io::Result<Self> {
         let _held = hold();
         let folder = TempDir::with_prefix("actq-")?;
@@ -128,18 +129,18 @@ impl Scratch {
         Ok(Self { folder, _listed: listed })
     }
 
-    /// Its path.
+    /// Returns its path.
     pub fn path(&self) -> &Path {
         self.folder.path()
     }
 }
 
-/// A folder for outputs: if this value made it and nothing is in it in the end, it is removed.
+/// A folder for outputs. The drop removes it if this value created it and it is empty.
 #[derive(Debug)]
 pub struct OutputFolder(Vec<(PathBuf, Listed)>);
 
 impl OutputFolder {
-    /// Makes the folder, and those that it is in, unless they are there.
+    /// Creates the folder and its missing parents.
     pub fn new(path: &Path) -> io::Result<Self> {
         let missing = path.ancestors().take_while(|folder| !folder.as_os_str().is_empty() && !folder.exists());
         let missing: Vec<PathBuf> = missing.map(Path::to_owned).collect();
@@ -156,7 +157,7 @@ impl OutputFolder {
 
 impl Drop for OutputFolder {
     fn drop(&mut self) {
-        // One that holds something stays.
+        // A folder that is not empty stays.
         self.0.iter().rev().for_each(|(folder, _)| drop(fs::remove_dir(folder)));
     }
 }
@@ -166,12 +167,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn made_folders_go_unless_they_hold_something() {
+    fn empty_created_folders_are_removed() {
         let dir = TempDir::new().expect("a folder");
         let (there, inner) = (dir.path().join("there"), dir.path().join("there/a/b"));
         fs::create_dir(&there).expect("a folder");
         drop(OutputFolder::new(&inner).expect("made"));
-        assert!(there.exists() && !there.join("a").exists(), "the one that was there stays");
+        assert!(there.exists() && !there.join("a").exists(), "an existing folder stays");
         let folder = OutputFolder::new(&inner).expect("made");
         Part::new(&inner, "x".as_ref()).expect("a file").persist(&inner.join("x")).expect("moved");
         drop(folder);
@@ -179,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_used_up_is_listed_no_more() {
+    fn placed_and_dropped_files_leave_the_list() {
         let dir = TempDir::new().expect("a folder");
         let part = Part::new(dir.path(), "x".as_ref()).expect("a file");
         let (path, scratch) = (part.file.path().to_owned(), Scratch::new().expect("a folder"));

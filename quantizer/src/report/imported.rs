@@ -1,9 +1,9 @@
-//! What became of an ONNX file.
+//! The summary of an imported ONNX file.
 
 use actq::policy::Policy;
 use actq_onnx::Imported;
 
-/// A summary: inputs in order, the output, states, ops, what was cut, what became the action contract.
+/// Formats the summary: inputs in order, states, the output, the action contract, ops, and cut inputs and outputs.
 pub fn summary(imported: &Imported, policy: &Policy) -> String {
     let list = |names: &[String]| names.join(", ");
     let mut text = format!("file      {} nodes, by {}\n", imported.nodes, imported.producer);
@@ -15,12 +15,12 @@ pub fn summary(imported: &Imported, policy: &Policy) -> String {
         at += len;
     }
     for (from, to, len) in &imported.states {
-        text += &format!("state     {from}, {len} values, whose next are {to}; kept by the policy, zero at reset\n");
+        text += &format!("state     {from} -> {to}, {len} values; kept by the policy, zero at reset\n");
     }
     let chunk = if policy.chunk > 1 { format!(": a chunk of {} actions", policy.chunk) } else { String::new() };
     text += &format!("output    {}, {} values{chunk}\n", imported.output.0, imported.output.1);
     if !imported.contract.is_empty() {
-        text += &format!("action    the last nodes became the contract's {}\n", imported.contract.join(", "));
+        text += &format!("action    contract with {}, from the last nodes\n", imported.contract.join(", "));
     }
     if imported.bounded > 0 {
         let of = format!("{} of {} actions", imported.bounded, policy.act_len);
@@ -29,18 +29,18 @@ pub fn summary(imported: &Imported, policy: &Policy) -> String {
     }
     text += &format!("ops       {}\n", list(&counted(&imported.ops)));
     text += &format!(
-        "network   {} weights, {} parameters; everything else in the file is folded into them or only moves values\n",
+        "network   {} weights, {} parameters; all other nodes are folded into them or only move values\n",
         policy.weights, policy.parameters
     );
     for (what, names) in [("inputs", &imported.cut_inputs), ("outputs", &imported.cut_outputs)] {
         if !names.is_empty() {
-            text += &format!("cut       {what} {}: the action does not need them\n", list(names));
+            text += &format!("cut       {what} {}: the action does not depend on them\n", list(names));
         }
     }
     text
 }
 
-/// Neighbours that are the same, with their number.
+/// Formats successive equal names as one name with their count.
 fn counted(ops: &[String]) -> Vec<String> {
     ops.chunk_by(|a, b| a == b)
         .map(|run| if run.len() == 1 { run[0].clone() } else { format!("{} x {}", run.len(), run[0]) })

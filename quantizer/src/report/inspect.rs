@@ -1,4 +1,4 @@
-//! What is in an image, for people.
+//! The report of `actq inspect`.
 
 use std::fmt::Write as _;
 
@@ -12,7 +12,7 @@ use actq_kernels::image::{Kind, Op, OpKind, Region};
 use super::memory::{Peak, peak};
 use super::table::{group_name, table};
 
-/// Widths of a matrix's rows as text: `3`, or `2x200 4x56` where they differ.
+/// Formats the widths of a matrix's rows: `3`, or `2x200 4x56` if they differ.
 pub fn widths(matrix: &Matrix<'_>) -> String {
     let blocks: Vec<_> = matrix.blocks().map(|rows| rows.block.shape()).collect();
     match &blocks[..] {
@@ -22,7 +22,7 @@ pub fn widths(matrix: &Matrix<'_>) -> String {
     }
 }
 
-/// The report that `actq inspect` prints.
+/// Formats the report that `actq inspect` prints.
 pub fn report(image: &Image<'_>) -> String {
     let mut text = String::new();
     let digest = hex(&image.digest());
@@ -46,7 +46,7 @@ pub fn report(image: &Image<'_>) -> String {
     if !playback.is_empty() {
         let _ = writeln!(text, "playback      {}", playback.join(", "));
     }
-    let _ = writeln!(text, "weights       {:.3} bits each, everything counted", bits_per_weight(image));
+    let _ = writeln!(text, "weights       {:.3} bits each, with scales and padding", bits_per_weight(image));
     let _ =
         writeln!(text, "scratch       {} bytes, {} of them state", 4 * image.scratch_words(), 4 * image.state().len);
     let Peak { op, words, placed } = peak(image);
@@ -59,7 +59,7 @@ pub fn report(image: &Image<'_>) -> String {
     }
     let _ = writeln!(text, "{ops}\n");
     let contract = image.contract_arrays();
-    // Of what few policies have, only columns that are there.
+    // Columns after the first five appear only if the contract has them.
     const ALWAYS: usize = 5;
     let names = ["scale", "offset", "low", "high", "max step", "smoothing", "on from", "off to", "on is", "off is"];
     let columns: Vec<_> = names
@@ -79,19 +79,19 @@ pub fn report(image: &Image<'_>) -> String {
     text
 }
 
-/// How chunks are played, where that is said.
+/// Lists the settings of chunk playback that the image has.
 fn playback(image: &Image<'_>) -> Vec<String> {
-    let mut says = Vec::new();
+    let mut settings = Vec::new();
     if image.horizon() > 0 {
-        says.push(format!("average of {} chunks", image.horizon()));
+        settings.push(format!("average of {} chunks", image.horizon()));
     }
     if image.overlap() > 0 {
-        says.push(format!("{} actions lead over to a new chunk", image.overlap()));
+        settings.push(format!("{} actions blend into a new chunk", image.overlap()));
     }
     if let Some(periods) = image.deadline() {
-        says.push(format!("no action plays {periods} or more periods behind its observation"));
+        settings.push(format!("no action plays {periods} or more periods after its observation"));
     }
-    says
+    settings
 }
 
 fn row(op: &Op<'_>) -> Vec<String> {

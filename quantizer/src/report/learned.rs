@@ -1,10 +1,10 @@
-//! What an image was learned from.
+//! The table of calibration recordings.
 
 use actq::data::Share;
 
 use super::table::table;
 
-/// A line for every file, and one for all where there are several; nothing where one file was learned from as it is.
+/// Formats a row for every file, and a sum if there are several. Returns no text if all frames of one file are kept.
 pub fn learned(shares: &[Share]) -> String {
     if shares.len() < 2 && shares.iter().all(|share| share.kept == share.frames) {
         return String::new();
@@ -18,7 +18,7 @@ pub fn learned(shares: &[Share]) -> String {
     }
     if shares.len() > 1 {
         let sum = |of: fn(&Share) -> usize| shares.iter().map(of).sum::<usize>();
-        line("in all".to_owned(), sum(|s| s.episodes), sum(|s| s.frames), sum(|s| s.kept));
+        line("sum".to_owned(), sum(|s| s.episodes), sum(|s| s.frames), sum(|s| s.kept));
     }
     format!("{rows}\n\n")
 }
@@ -32,7 +32,7 @@ mod tests {
     }
 
     #[test]
-    fn files_are_listed_where_there_is_something_to_say() {
+    fn a_single_whole_file_is_not_listed() {
         assert_eq!(learned(&[]), "");
         assert_eq!(learned(&[share("calib.npz", 20, 20)]), "");
         let one = learned(&[share("calib.npz", 20, 10)]);
@@ -41,6 +41,6 @@ mod tests {
         let words = |line: &str| line.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
         let lines: Vec<Vec<String>> = text.lines().map(words).collect();
         assert_eq!(lines[2], ["drives/a.npz", "3", "100", "30"]);
-        assert_eq!(lines[3], ["in", "all", "6", "120", "50"]);
+        assert_eq!(lines[3], ["sum", "6", "120", "50"]);
     }
 }

@@ -1,21 +1,21 @@
-//! How many of an image's scratch words hold something that is still needed, operation by operation.
+//! Liveness of an image's scratch words, operation by operation.
 
 use actq_kernels::Image;
 use actq_kernels::image::{OpKind, Region};
 
-/// Where the values of a step need most memory.
+/// The operation of a step that needs the most memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Peak {
-    /// The operation.
+    /// Index of the operation.
     pub op: usize,
-    /// Words that hold something that it or a later one needs: no placement of the values takes fewer.
+    /// Words that this operation or a later one needs: the lower bound of any placement.
     pub words: usize,
-    /// Words that the image gives to what operations write.
+    /// Words that the image reserves for the outputs of operations.
     pub placed: usize,
 }
 
-/// The first operation at which most values are needed: from the last operation backwards, a word is needed from where
-/// it is written to where it is read. What every denoising step reads is needed through all of them.
+/// Finds the first operation at which the most words are live. A word is live from its write to its last read. A word
+/// that every denoising step reads is live through all of them.
 pub fn peak(image: &Image<'_>) -> Peak {
     let (first, end) = (image.observation().range().end, image.action().offset);
     let words = |region: Region| region.range().filter(|word| (first..end).contains(word)).map(|word| word - first);
@@ -25,7 +25,7 @@ pub fn peak(image: &Image<'_>) -> Peak {
     words(image.output()).for_each(|word| live[word] = true);
     let mut peak = Peak { op: 0, words: 0, placed: live.len() };
     let order = |from: usize| (from..ops.len()).rev();
-    // Denoising steps twice: what the first operation of a step finds, the last one of the step before has left.
+    // Denoising steps run twice: the first operation of a step reads values from the step before.
     let rounds = if image.denoising_steps() > 1 {
         order(image.first_denoising_op()).chain(order(0))
     } else {

@@ -1,4 +1,4 @@
-//! Errors in a few lines, and what is worth a warning.
+//! The error summary, notes and warnings.
 
 use actq::budget::Budget;
 use actq::data::{Dataset, Range, Recordings, runs};
@@ -9,14 +9,16 @@ use actq::methods::distill::balance::MixedUnits;
 use actq::pipeline::{QuantizedPolicy, Reason, Unused};
 use actq::policy::Policy;
 
-/// Held-out errors beyond this multiple of the calibration error, and this much above it, are worth a warning.
-const TIMES: f64 = 3.0;
-const ABOVE: f64 = 0.002;
+/// Ratio of held-out to calibration error above which there is a warning, if [`OVERFIT_DIFFERENCE`] is exceeded, too.
+const OVERFIT_RATIO: f64 = 3.0;
+/// Difference of held-out and calibration error (NMSE) above which there is a warning, if [`OVERFIT_RATIO`] is
+/// exceeded.
+const OVERFIT_DIFFERENCE: f64 = 0.002;
 
-/// Beyond this error the actions have little to do with the policy's.
+/// Error (NMSE) above which there is a warning not to use the image.
 const USELESS: f64 = 0.1;
 
-/// The share of the error that is due to rounded activations, and their types.
+/// Formats the share of the error that comes from rounding the activations, and the activations' types.
 pub fn activation_share(of: &ActivationShare) -> String {
     let types = match of.int16.len() {
         0 => "int8".to_owned(),
@@ -26,31 +28,31 @@ pub fn activation_share(of: &ActivationShare) -> String {
     format!("{:.0}% of the error ({types})", 100.0 * of.share)
 }
 
-/// Where a method needs a recording and there is none: how to make one, and why.
+/// Returns the error for a missing calibration recording, with the steps to record one.
 pub fn how_to_record(policy: &Policy) -> String {
     let n = policy.graph.obs_len;
     format!(
-        "no recording is given (--calib FILE, or calib.npz beside the file). Which weights may be rounded coarsely follows from the \
-         observations that the policy really sees, and no ONNX file holds them. Run the policy in its simulator for a few thousand \
+        "no calibration recording; pass one by --calib FILE, or put calib.npz beside the file. Quantization learns from the \
+         observations of the policy's task, which an ONNX file does not hold. Run the policy in its simulator for a few thousand \
          steps, keep each observation as the file takes it ({n} values), and save them in order: numpy.save(\"obs.npy\", \
-         numpy.reshape(observations, (-1, {n})).astype(\"float32\")). --method rtn works without, with larger errors"
+         numpy.reshape(observations, (-1, {n})).astype(\"float32\")). --method rtn needs no recording, but its errors are larger"
     )
 }
 
-/// A note on the actions without limits, which a motor controller cannot let move.
+/// Returns a note that lists the actions without limits, for which a motor controller refuses to arm.
 pub fn without_limits(limits: impl IntoIterator<Item = Option<[f32; 2]>>) -> Option<String> {
     let limits = limits.into_iter().enumerate();
     let without: Vec<usize> = limits.filter(|(_, limits)| limits.is_none()).map(|(i, _)| i).collect();
     (!without.is_empty()).then(|| {
         format!(
-            "no finite limits for actions {}: a motor controller refuses to arm without; set low and high of action in policy.json, \
-             or build the firmware with cargo xtask firmware --limits LOW:HIGH",
+            "no finite limits for actions {}: a motor controller refuses to arm without limits; set low and high of action in \
+             policy.json, or build the firmware by cargo xtask firmware --limits LOW:HIGH",
             runs(&without)
         )
     })
 }
 
-/// The errors in a few lines.
+/// Formats the errors, a line for each.
 pub fn errors(check: &Check) -> String {
     let of = |name: &str, checked: &Checked| line(name, &checked.report, checked.recorded);
     let calib = check.calib.as_ref().map_or(String::new(), |checked| of("calibration nmse", checked));
@@ -58,9 +60,9 @@ pub fn errors(check: &Check) -> String {
     format!("{calib}{heldout}{:<17} {}\n", "activations", activation_share(&check.activations))
 }
 
-/// The error where the image itself has led.
+/// Formats the on-policy error.
 pub fn own_path(report: &ErrorReport) -> String {
-    line("own-path nmse", report, report.steps)
+    line("on-policy nmse", report, report.steps)
 }
 
 fn line(name: &str, report: &ErrorReport, recorded: usize) -> String {
@@ -68,22 +70,22 @@ fn line(name: &str, report: &ErrorReport, recorded: usize) -> String {
     format!("{name:<17} {:.3e}   ({}{of} observations)\n", report.nmse, report.steps)
 }
 
-/// A warning where the held-out error is far above the calibration error.
+/// Returns a warning if the held-out error is far above the calibration error.
 pub fn overfit_warning(check: &Check) -> Option<String> {
     let (heldout, calib) = (check.heldout.as_ref()?.report.nmse, check.calib.as_ref()?.report.nmse);
-    (heldout > TIMES * calib && heldout > calib + ABOVE).then(|| {
+    (heldout > OVERFIT_RATIO * calib && heldout > calib + OVERFIT_DIFFERENCE).then(|| {
         format!(
-            "the held-out error is {:.1} times the calibration error: the image fits what was recorded for it better \
-             than what it will see; record more episodes, and more varied ones",
+            "the held-out error is {:.1} times the calibration error: the image fits the calibration recording better than \
+             new observations; record more episodes, and more varied ones",
             heldout / calib
         )
     })
 }
 
-/// A warning where the image's actions are far from the policy's, whose error of 1 is that of a constant action.
+/// Returns a warning if the image's actions are far from the policy's. An error of 1 is that of a constant action.
 pub fn error_warning(check: &Check) -> Option<String> {
     let nmse = check.nmse()?;
-    // An error that is not a number is not below the limit either.
+    // A NaN counts as an error above the limit.
     (nmse.is_nan() || nmse > USELESS).then(|| {
         format!(
             "the error is {nmse:.2} (0: the policy's actions, 1: no better than their mean): do not drive a robot with this image; allow \
@@ -92,23 +94,23 @@ pub fn error_warning(check: &Check) -> Option<String> {
     })
 }
 
-/// A note where an image uses much less than its budget of bits or bytes: why, and what to do.
+/// Returns a note with the reason and the remedy if an image uses much less than its budget of bits or bytes.
 pub fn unused_budget(found: &QuantizedPolicy, options: &Options) -> Option<String> {
     let Unused { used, allowed, reason } = Unused::of(found, options)?;
     let unit = if matches!(options.budget, Budget::ImageBytes(_)) { "bytes" } else { "bits per weight" };
     let why = match reason {
-        Reason::Widest => "every row has the most bits that it may have; a smaller budget gives the same image",
+        Reason::Widest => "every row has the most bits that a row can have; a smaller budget gives the same image",
         Reason::NoError => {
-            "more bits do not reduce the error, as the other rows have no part in the recorded actions; pass a smaller budget, \
-             or record more varied episodes"
+            "more bits do not reduce the error, as the other rows do not affect the recorded actions; pass a smaller budget, or \
+             record more varied episodes"
         }
-        Reason::Step => "the next rows with more bits take more than is left; pass a larger budget to get them",
+        Reason::Step => "the next step of bits takes more than the rest of the budget; pass a larger budget for it",
     };
     let rounded = |value: f64| (1000.0 * value).round() / 1000.0;
     Some(format!("the image uses {} of {} {unit}: {why}", rounded(used), rounded(allowed)))
 }
 
-/// All warnings about the recordings themselves, before anything is quantized.
+/// Returns all warnings about the recordings, before quantization.
 pub fn of_recordings(recordings: &Recordings) -> Vec<String> {
     let Some(range) = recordings.calib.as_ref().map(Range::of) else { return Vec::new() };
     let outside = recordings.heldout.as_ref().and_then(|heldout| range.warning(heldout));
@@ -116,25 +118,25 @@ pub fn of_recordings(recordings: &Recordings) -> Vec<String> {
     [single, range.constant_note(), outside].into_iter().flatten().collect()
 }
 
-/// A warning for each matrix that reads observations in units far apart, which are not balanced.
+/// Returns a warning for each matrix that reads observations of very different units without balance.
 pub fn mixed_units(mixed: &[MixedUnits]) -> Vec<String> {
     let text = |MixedUnits { matrix, observations: [coarsest, finest], bits }: &MixedUnits| {
         format!(
-            "{matrix}: observations come in units far apart (the coarsest is {coarsest}'s, the finest {finest}'s), which takes about \
-             {bits:.0} bits from each weight, and distill cannot rescale the matrix's columns: another operation reads the same values or \
-             weights, or the factors take more bytes than they save; scale the observations by an op normalize in policy.json, and \
-             the columns to match"
+            "{matrix}: observations have very different units (the coarsest is {coarsest}'s, the finest {finest}'s), which costs \
+             about {bits:.0} bits of each weight. Method distill cannot rescale the matrix's columns: another operation reads the \
+             same values or weights, or the factors take more bytes than they save. Scale the observations by an op normalize in \
+             policy.json, and the columns to match"
         )
     };
     mixed.iter().map(text).collect()
 }
 
-/// A note where every episode has a single step, as frames with a batch's axis look.
+/// Returns a note if every episode has one step, as in an array of frames with a batch axis.
 pub fn single_steps(recording: &Dataset) -> Option<String> {
     let episodes = recording.length.len();
     (episodes > 1 && recording.length.iter().all(|steps| *steps <= 1)).then(|| {
         format!(
-            "{} holds {episodes} episodes of one step each; if they are one run, save it as [frame, value], without the axis of a batch",
+            "{} holds {episodes} episodes of one step each; if they are one episode, save it as [frame, value], without a batch axis",
             recording.name()
         )
     })
@@ -155,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn a_held_out_error_far_above_the_calibration_error_is_worth_a_warning() {
+    fn held_out_far_above_calibration_error_warns() {
         let warning = overfit_warning(&check(Some(0.002), 0.0084)).expect("a warning");
         assert!(warning.starts_with("the held-out error is 4.2 times the calibration error: "), "{warning}");
         // Less than three times; less than 0.002 above; no calibration recording.
@@ -165,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn an_error_above_a_tenth_is_worth_a_warning() {
+    fn error_above_a_tenth_warns() {
         let calib_only = |nmse| Check { heldout: None, ..check(Some(nmse), 0.0) };
         for of in [check(Some(0.001), 0.11), check(None, 1.0), check(None, f64::NAN), calib_only(0.2)] {
             assert!(error_warning(&of).is_some_and(|text| text.contains("--bpw")), "{of:?}");
@@ -177,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn actions_without_limits_are_worth_a_note() {
+    fn actions_without_limits_are_listed() {
         let limited = Some([-1.0, 1.0]);
         let note = without_limits([None, limited, None, None]).expect("a note");
         assert!(note.starts_with("no finite limits for actions 0, 2-3: ") && note.contains("--limits"), "{note}");
@@ -185,11 +187,11 @@ mod tests {
     }
 
     #[test]
-    fn a_matrix_with_units_far_apart_is_named_with_the_remedy() {
+    fn mixed_units_note_names_matrix_and_remedy() {
         let mixed = MixedUnits { matrix: "leg.weight".into(), observations: [3, 9], bits: 5.2 };
         let [text] = &mixed_units(&[mixed])[..] else { panic!("one note") };
         assert!(
-            text.starts_with("leg.weight: ") && text.contains("3's, the finest 9's), which takes about 5 bits"),
+            text.starts_with("leg.weight: ") && text.contains("3's, the finest 9's), which costs about 5 bits"),
             "{text}"
         );
         assert!(text.contains("op normalize in policy.json"), "{text}");

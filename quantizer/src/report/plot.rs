@@ -1,25 +1,24 @@
-//! Pictures as SVG: the parts that all of them share, and a line plot whose vertical axis is
-//! logarithmic or in percent.
+//! SVG pictures: their shared parts, and a line plot with a vertical axis that is logarithmic or in percent.
 //!
-//! They are drawn by hand after a trial of plotters 0.3.7 with its SVG backend alone. Its three crates would be no
-//! burden, but its backends take whole pixels: a layer of 1,024 rows leaves 0.6 of one for each in the strip of
-//! [`super::widths`], so that rows would merge or vanish, and points of a plot would stand up to half a pixel off.
+//! This module writes SVG itself. We tried plotters 0.3.7 with its SVG backend only. Its three dependencies are
+//! acceptable, but its backends take whole pixels. In the strip of [`super::widths`], a row of a layer with 1,024 rows is
+//! 0.6 pixels wide: rows would merge or vanish. Points of a plot would be up to half a pixel off.
 
 use std::fmt::Write as _;
 
-/// Size of the picture and of the margins around the axes, in SVG's units (pixels at 96 dpi).
+/// Size of the picture, and the margins around the axes, in SVG's units (pixels at 96 dpi).
 const WIDTH: f64 = 980.0;
 const HEIGHT: f64 = 480.0;
-const LEFT: f64 = 84.0;
-/// Holds the legend, which covers nothing there.
-const RIGHT: f64 = 264.0;
-const TOP: f64 = 56.0;
-const BOTTOM: f64 = 64.0;
+const MARGIN_LEFT: f64 = 84.0;
+/// The margin that holds the legend.
+const MARGIN_RIGHT: f64 = 264.0;
+const MARGIN_TOP: f64 = 56.0;
+const MARGIN_BOTTOM: f64 = 64.0;
 
-/// Okabe and Ito's palette, which colour-blind readers can tell apart, in an order of strong contrast on white.
+/// Okabe and Ito's colour-blind safe palette, ordered by contrast on white.
 const COLOURS: [&str; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
 
-/// An SVG document of this size with a white ground, filled by `draw`.
+/// Creates an SVG document of this size with a white background, and draws on it by `draw`.
 pub(crate) fn document(
     width: f64,
     height: f64,
@@ -36,13 +35,13 @@ pub(crate) fn document(
     Ok(svg)
 }
 
-/// Text, escaped.
+/// Appends escaped text.
 pub(crate) fn text(svg: &mut String, x: f64, y: f64, attributes: &str, content: &str) -> std::fmt::Result {
     let content = content.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
     writeln!(svg, r#"<text x="{x:.1}" y="{y:.1}" {attributes}>{content}</text>"#)
 }
 
-/// A power of ten as a label.
+/// Formats a power of ten as a label.
 pub(crate) fn decade_label(decade: i32) -> String {
     match decade {
         -3..=3 => format!("{}", 10f64.powi(decade)),
@@ -50,54 +49,54 @@ pub(crate) fn decade_label(decade: i32) -> String {
     }
 }
 
-/// One line with a marker at every point.
+/// A line with a marker at every point.
 #[derive(Clone, Debug)]
 pub struct Series {
     /// Its name in the legend.
     pub name: String,
-    /// Points (x, y) in the order in which they are joined.
+    /// Points (x, y) in the order of the line.
     pub points: Vec<(f64, f64)>,
 }
 
-/// A point to be pointed out.
+/// A highlighted point.
 #[derive(Clone, Debug)]
 pub struct Mark {
-    /// Where.
+    /// Its place (x, y).
     pub at: (f64, f64),
-    /// What the legend says of it.
+    /// Its text in the legend.
     pub label: String,
 }
 
-/// What the vertical axis is.
+/// Scale of the vertical axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Vertical {
-    /// Decades around the points, which are above 0.
+    /// Logarithmic, in decades around the points, which are above 0.
     Decades,
-    /// From 0 to 100.
+    /// Linear, from 0 to 100.
     Percent,
 }
 
-/// What is drawn.
+/// A line plot.
 #[derive(Clone, Debug)]
 pub struct Plot {
-    /// Above the axes.
+    /// Text above the axes.
     pub title: String,
-    /// Below the horizontal axis.
+    /// Text below the horizontal axis.
     pub x_label: String,
-    /// Beside the vertical axis.
+    /// Text beside the vertical axis.
     pub y_label: String,
-    /// What the vertical axis is.
+    /// Scale of the vertical axis.
     pub vertical: Vertical,
     /// The lines.
     pub series: Vec<Series>,
-    /// A point to be ringed.
+    /// A point with a ring.
     pub mark: Option<Mark>,
 }
 
 /// The ranges of both axes.
 struct Axes {
     x: (f64, f64),
-    /// Decades, or percent.
+    /// In decades, or in percent.
     y: (i32, i32),
     vertical: Vertical,
 }
@@ -113,7 +112,7 @@ impl Axes {
             (x, y) = ((0.0, 1.0), (0.0, 1.0));
         }
         let step = tick_step(x.1 - x.0);
-        // Some air, or the outermost markers would sit on the frame.
+        // Half a step of space, so that no marker is on the frame.
         let x = (x.0 - 0.5 * step, x.1 + 0.5 * step);
         let y = ((y.0 - 0.08).floor() as i32, (y.1 + 0.08).ceil() as i32);
         let y = match vertical {
@@ -124,7 +123,7 @@ impl Axes {
     }
 
     fn x(&self, value: f64) -> f64 {
-        LEFT + (WIDTH - LEFT - RIGHT) * (value - self.x.0) / (self.x.1 - self.x.0)
+        MARGIN_LEFT + (WIDTH - MARGIN_LEFT - MARGIN_RIGHT) * (value - self.x.0) / (self.x.1 - self.x.0)
     }
 
     fn y(&self, value: f64) -> f64 {
@@ -133,11 +132,11 @@ impl Axes {
             Vertical::Percent => value,
         };
         let share = (value - f64::from(self.y.0)) / f64::from(self.y.1 - self.y.0);
-        HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * share
+        HEIGHT - MARGIN_BOTTOM - (HEIGHT - MARGIN_TOP - MARGIN_BOTTOM) * share
     }
 }
 
-/// 1, 2 or 5 times a power of ten, so that a range of this length has 4 to 10 steps.
+/// Returns 1, 2 or 5 times a power of ten that divides a range of this length into 4 to 10 steps.
 fn tick_step(length: f64) -> f64 {
     if length <= 0.0 {
         return 1.0;
@@ -146,7 +145,7 @@ fn tick_step(length: f64) -> f64 {
     [5.0, 2.0, 1.0].into_iter().map(|m| m * power).find(|step| length / step >= 4.0).unwrap_or(power)
 }
 
-/// Plots below each other in one SVG document.
+/// Draws plots below each other in one SVG document.
 pub fn stacked(plots: &[Plot]) -> String {
     // Writing to a string can't fail.
     document(WIDTH, HEIGHT * plots.len() as f64, |svg| {
@@ -161,17 +160,17 @@ pub fn stacked(plots: &[Plot]) -> String {
 }
 
 impl Plot {
-    /// The picture as an SVG document.
+    /// Draws the plot as an SVG document.
     pub fn svg(&self) -> String {
         stacked(std::slice::from_ref(self))
     }
 
     fn write(&self, svg: &mut String) -> std::fmt::Result {
         let axes = &Axes::around(&self.series, self.vertical);
-        let middle = 0.5 * (LEFT + WIDTH - RIGHT);
+        let middle = 0.5 * (MARGIN_LEFT + WIDTH - MARGIN_RIGHT);
         text(svg, middle, 30.0, r#"text-anchor="middle" font-size="17" font-weight="bold""#, &self.title)?;
         text(svg, middle, HEIGHT - 18.0, r#"text-anchor="middle" font-size="14""#, &self.x_label)?;
-        let beside = 0.5 * (TOP + HEIGHT - BOTTOM);
+        let beside = 0.5 * (MARGIN_TOP + HEIGHT - MARGIN_BOTTOM);
         let turned = format!(r#"text-anchor="middle" font-size="14" transform="rotate(-90 24 {beside})""#);
         text(svg, 24.0, beside, &turned, &self.y_label)?;
         grid(svg, axes)?;
@@ -189,7 +188,7 @@ impl Plot {
             self.series.iter().map(|s| s.name.as_str()).chain(self.mark.iter().map(|m| m.label.as_str())).collect();
         let longest = names.iter().map(|name| name.chars().count()).max().unwrap_or(0) as f64;
         let (width, height) = (62.0 + 7.0 * longest, 12.0 + 20.0 * names.len() as f64);
-        let (left, top) = (WIDTH - RIGHT + 14.0, TOP);
+        let (left, top) = (WIDTH - MARGIN_RIGHT + 14.0, MARGIN_TOP);
         writeln!(
             svg,
             r##"<rect x="{left:.1}" y="{top:.1}" width="{width:.1}" height="{height:.1}" rx="3" fill="#fff" fill-opacity="0.9" stroke="#ccc"/>"##
@@ -211,10 +210,10 @@ impl Plot {
 }
 
 fn grid(svg: &mut String, axes: &Axes) -> std::fmt::Result {
-    let (right, bottom) = (WIDTH - RIGHT, HEIGHT - BOTTOM);
+    let (right, bottom) = (WIDTH - MARGIN_RIGHT, HEIGHT - MARGIN_BOTTOM);
     let strong = |svg: &mut String, y: f64, label: &str| {
-        writeln!(svg, r##"<path d="M{LEFT} {y:.1}H{right}" stroke="#d0d0d0"/>"##)?;
-        text(svg, LEFT - 10.0, y + 4.5, r#"text-anchor="end""#, label)
+        writeln!(svg, r##"<path d="M{MARGIN_LEFT} {y:.1}H{right}" stroke="#d0d0d0"/>"##)?;
+        text(svg, MARGIN_LEFT - 10.0, y + 4.5, r#"text-anchor="end""#, label)
     };
     match axes.vertical {
         Vertical::Percent => {
@@ -227,7 +226,7 @@ fn grid(svg: &mut String, axes: &Axes) -> std::fmt::Result {
                 strong(svg, axes.y(10f64.powi(decade)), &decade_label(decade))?;
                 for digit in (2..10).filter(|_| decade < axes.y.1) {
                     let y = axes.y(f64::from(digit) * 10f64.powi(decade));
-                    writeln!(svg, r##"<path d="M{LEFT} {y:.1}H{right}" stroke="#f0f0f0"/>"##)?;
+                    writeln!(svg, r##"<path d="M{MARGIN_LEFT} {y:.1}H{right}" stroke="#f0f0f0"/>"##)?;
                 }
             }
         }
@@ -237,14 +236,14 @@ fn grid(svg: &mut String, axes: &Axes) -> std::fmt::Result {
     for tick in (axes.x.0 / step).ceil() as i64..=(axes.x.1 / step).floor() as i64 {
         let value = tick as f64 * step;
         let x = axes.x(value);
-        writeln!(svg, r##"<path d="M{x:.1} {TOP}V{bottom}" stroke="#e4e4e4"/>"##)?;
+        writeln!(svg, r##"<path d="M{x:.1} {MARGIN_TOP}V{bottom}" stroke="#e4e4e4"/>"##)?;
         text(svg, x, bottom + 20.0, r#"text-anchor="middle""#, &format!("{value:.decimals$}"))?;
     }
     writeln!(
         svg,
-        r##"<rect x="{LEFT}" y="{TOP}" width="{}" height="{}" fill="none" stroke="#888"/>"##,
-        right - LEFT,
-        bottom - TOP
+        r##"<rect x="{MARGIN_LEFT}" y="{MARGIN_TOP}" width="{}" height="{}" fill="none" stroke="#888"/>"##,
+        right - MARGIN_LEFT,
+        bottom - MARGIN_TOP
     )
 }
 
@@ -267,7 +266,7 @@ fn ring(x: f64, y: f64, radius: f64) -> String {
     format!(r##"<circle cx="{x:.1}" cy="{y:.1}" r="{radius}" fill="none" stroke="#333" stroke-width="1.5"/>"##)
 }
 
-/// Every series has its own shape as well as its own colour.
+/// Returns a marker with the series' own shape and colour.
 fn marker(index: usize, x: f64, y: f64) -> String {
     let style = format!(r##"fill="{}" stroke="#fff" stroke-width="1.2""##, COLOURS[index % COLOURS.len()]);
     let polygon = |corners: &[(f64, f64)]| {
@@ -298,23 +297,26 @@ mod tests {
     }
 
     #[test]
-    fn every_point_has_a_marker_inside_the_frame_and_text_is_escaped() {
+    fn markers_are_inside_the_frame_and_text_escaped() {
         let points = vec![(2.0, 0.7), (2.5, 0.05), (4.0, 3e-4)];
         let mut plot = plot(vec![Series { name: "one".into(), points: points.clone() }]);
         plot.mark = Some(Mark { at: points[1], label: "knee".into() });
         let svg = plot.svg();
         assert!(svg.contains("a &lt; b &amp; c"));
-        // Three points and a ring, and both in the legend.
+        // Three points and a ring, and one of each in the legend.
         assert_eq!(svg.matches("<circle").count(), 6);
         let axes = Axes::around(&plot.series, plot.vertical);
         for (x, y) in points {
-            assert!((LEFT..WIDTH - RIGHT).contains(&axes.x(x)) && (TOP..=HEIGHT - BOTTOM).contains(&axes.y(y)));
+            assert!(
+                (MARGIN_LEFT..WIDTH - MARGIN_RIGHT).contains(&axes.x(x))
+                    && (MARGIN_TOP..=HEIGHT - MARGIN_BOTTOM).contains(&axes.y(y))
+            );
         }
-        assert!(axes.y(0.7) < axes.y(0.05), "larger values stand higher");
+        assert!(axes.y(0.7) < axes.y(0.05), "larger values are higher");
     }
 
     #[test]
-    fn no_points_and_one_point_are_drawn_too() {
+    fn plot_takes_no_points_and_one_point() {
         for points in [vec![], vec![(3.0, 1.0)]] {
             let svg = plot(vec![Series { name: "s".into(), points }]).svg();
             assert!(svg.ends_with("</svg>\n") && !svg.contains("NaN") && !svg.contains("inf"), "{svg}");
@@ -322,13 +324,13 @@ mod tests {
     }
 
     #[test]
-    fn percent_go_from_0_to_100() {
+    fn percent_axis_runs_from_0_to_100() {
         let plot = Plot {
             vertical: Vertical::Percent,
             ..plot(vec![Series { name: "s".into(), points: vec![(2.0, 0.0), (3.0, 100.0)] }])
         };
         let axes = Axes::around(&plot.series, plot.vertical);
-        assert_eq!((axes.y(0.0), axes.y(100.0)), (HEIGHT - BOTTOM, TOP));
+        assert_eq!((axes.y(0.0), axes.y(100.0)), (HEIGHT - MARGIN_BOTTOM, MARGIN_TOP));
         let svg = plot.svg();
         assert!(svg.contains(">20</text>") && svg.contains(">100</text>") && !svg.contains("NaN"), "{svg}");
     }

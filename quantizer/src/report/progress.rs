@@ -1,37 +1,37 @@
-//! Lines about work that takes long, for a log or a pipe.
+//! Progress lines of long work, for a log or a pipe.
 
 use std::time::Duration;
 
 use actq::text::printable;
 
-/// Between two lines.
+/// Time between two lines.
 const INTERVAL: Duration = Duration::from_secs(10);
 
-/// Work that is being done.
+/// The current work.
 #[derive(Clone, Debug, Default)]
 pub struct Work {
     /// Its name.
     pub name: String,
-    /// The share that is done, if it is known.
+    /// Its share done, if known.
     pub share: Option<f64>,
 }
 
-/// Decides when a line is due. All times are since the beginning of the work, by the caller's clock.
+/// Schedule of the progress lines. All times count from the start of the work, by the caller's clock.
 #[derive(Debug, Default)]
 pub struct Cadence {
-    said: Duration,
+    last_line: Duration,
 }
 
 impl Cadence {
-    /// Time until the next line is due.
+    /// Returns the time until the next line is due.
     pub fn wait(&self, now: Duration) -> Duration {
-        (self.said + INTERVAL).saturating_sub(now)
+        (self.last_line + INTERVAL).saturating_sub(now)
     }
 
-    /// The line about `work`, if one is due.
+    /// Returns the line about `work`, if one is due.
     pub fn line(&mut self, now: Duration, work: &Work) -> Option<String> {
         self.wait(now).is_zero().then(|| {
-            self.said = now;
+            self.last_line = now;
             let share = work.share.map_or(String::new(), |share| format!(", {:.0}%", 100.0 * share));
             format!("progress: {} s{share}: {}", now.as_secs(), printable(&work.name))
         })
@@ -53,14 +53,14 @@ mod tests {
         assert_eq!([line(0.0), line(9.9)], [None, None]);
         assert_eq!(line(10.0).as_deref(), Some("progress: 10 s, 35%: learning"));
         assert_eq!([line(10.1), line(19.9)], [None, None]);
-        // Late once, the next one is 10 s later and not sooner.
+        // After a late line, the next one is due 10 s later.
         assert_eq!(line(47.5).as_deref(), Some("progress: 47 s, 35%: learning"));
         assert_eq!([line(50.0), line(57.4)], [None, None]);
         assert!(line(57.5).is_some());
     }
 
     #[test]
-    fn waiting_as_told_misses_no_line() {
+    fn waits_end_when_lines_are_due() {
         let (mut cadence, work) = (Cadence::default(), Work { name: "a\x1b".to_owned(), share: None });
         let mut now = Duration::ZERO;
         for lines in 1..=5 {

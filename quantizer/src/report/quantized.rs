@@ -1,4 +1,4 @@
-//! What became of a policy.
+//! The report of `actq quantize`.
 
 use actq::budget::Rate;
 use actq::graph::Graph;
@@ -12,7 +12,7 @@ use comfy_table::Table;
 use super::table::{group_name, table};
 use super::widths;
 
-/// ActQuant's scores, and the bits that they led to.
+/// Formats ActQuant's scores, and the bits that follow from them.
 pub fn scores(graph: &Graph, statistics: &ActionStatistics, quantized: &QuantizedPolicy) -> String {
     let (_, equal) = statistics.effective_scores();
     let mut rows = table(&["matrix", "HSIC score", "bits"]);
@@ -21,14 +21,14 @@ pub fn scores(graph: &Graph, statistics: &ActionStatistics, quantized: &Quantize
         rows.add_row([matrix.name.clone(), format!("{:.4}", score.of(statistics.choices.score)), bits]);
     }
     let note = match quantized.rate {
-        Rate::Width(_) => "One width for all: the scores are not used.",
-        _ if equal => "No score is above 0: every matrix counts the same.",
+        Rate::Width(_) => "One width for all rows: the scores have no effect.",
+        _ if equal => "No score is above 0: all matrices have equal weight.",
         _ => "Scores below 0 count as 0.",
     };
     format!("{rows}\n{note}\n\n")
 }
 
-/// Every matrix, and what all of them take.
+/// Formats a row for every matrix, and the sum of their bytes.
 pub fn matrices(quantized: &QuantizedPolicy) -> String {
     let QuantizedPolicy { policy, outcomes, .. } = quantized;
     let mut rows = table(&["matrix", "shape", "bits", "group", "bytes", "x max", "error"]);
@@ -48,20 +48,20 @@ pub fn matrices(quantized: &QuantizedPolicy) -> String {
         ]);
     }
     let added = balance_bytes(&policy.graph);
-    let with = if added > 0 { format!(" and {added} of the balance before them") } else { String::new() };
+    let with = if added > 0 { format!(" and {added} of balance factors") } else { String::new() };
     let bits = 8.0 * (total + added) as f64 / policy.weights.max(1) as f64;
     let by_row = outcomes.iter().any(|outcome| outcome.allocation.is_some());
     let widths = if by_row { widths::line(policy, outcomes) + "\n" } else { String::new() };
-    format!("{rows}\n\n{total} bytes of weights{with}, {bits:.3} bits each, everything counted\n{widths}")
+    format!("{rows}\n\n{total} bytes of weights{with}, {bits:.3} bits per weight\n{widths}")
 }
 
-/// What the statistics of an iterative head were taken of.
+/// Formats the sample sizes of the statistics of a flow or diffusion policy.
 pub fn sampled(Sampled { frames, inputs, outputs }: Sampled) -> String {
-    let derived = if outputs > 0 { format!(", derivatives at {outputs} drawn ones") } else { String::new() };
+    let derived = if outputs > 0 { format!(", derivatives at {outputs} random ones") } else { String::new() };
     format!("statistics of {inputs} of {frames} frames{derived}, in every denoising step\n")
 }
 
-/// How codes were chosen, and what was tried for it.
+/// Formats the choice of learning, and the settings that were tried.
 pub fn learning(learning: &Learning) -> String {
     let Learning { steps, choice, tried } = learning;
     let mut text = match choice {
@@ -69,7 +69,7 @@ pub fn learning(learning: &Learning) -> String {
         Choice::Feedback { .. } => format!("not learned: {choice}\n"),
     };
     if !tried.is_empty() {
-        let mut rows = table(&["tried", "error, episodes left out", "there, off the path"]);
+        let mut rows = table(&["setting", "held-out error", "with noise"]);
         for Tried { choice, recorded, widened } in tried {
             rows.add_row([choice.to_string(), format!("{recorded:.2e}"), format!("{widened:.2e}")]);
         }
@@ -78,22 +78,22 @@ pub fn learning(learning: &Learning) -> String {
     text
 }
 
-/// The tries, and what follows from them, for people.
+/// Formats the tries of the search for `--max-nmse`, and the result.
 pub fn search(search: &Search) -> String {
     let Search { limit, nmse, budget, step, fails, measured_on: file, .. } = search;
     let cells = ((budget - fails) / step).round();
     let below = if cells <= 1.0 && *fails > 0.0 {
         format!("{fails:.1} is too few")
     } else if *fails > 0.0 {
-        format!("{fails:.1} is too few, what lies between was not tried")
+        format!("{fails:.1} is too few; values between were not tried")
     } else if cells <= 1.0 {
-        "there is none below".to_owned()
+        "this is the least budget".to_owned()
     } else {
-        "none below was tried".to_owned()
+        "smaller budgets were not tried".to_owned()
     };
     let on = match search.held_out {
         true => file.clone(),
-        false => format!("{file}, as there is no held-out recording: on new observations the error may be larger"),
+        false => format!("{file}, as there is no held-out recording; the error on new observations may be larger"),
     };
     format!(
         "{}\n\n{budget:.1} bits per weight keep the error within {limit}: NMSE {nmse:.2e}; {below}.\nMeasured on {on}.\n",
@@ -101,7 +101,7 @@ pub fn search(search: &Search) -> String {
     )
 }
 
-/// One try a row.
+/// Formats a row for each try.
 fn tries(tries: &[Try]) -> Table {
     let mut table = table(&["budget", "steps", "bits per weight", "NMSE"]);
     for t in tries {

@@ -1,4 +1,4 @@
-//! A sweep as a table and as a plot.
+//! The table and the plot of a sweep.
 
 use actq::pipeline::sweep::{Curve, Point, Sweep, line};
 use comfy_table::Table;
@@ -10,7 +10,7 @@ fn plot(sweep: &Sweep) -> Plot {
     let series = |curve: &Curve| Series { name: curve.method.clone(), points: line(curve) };
     Plot {
         title: format!("{}: action error over bits per weight", sweep.policy),
-        x_label: "bits per weight, everything counted".to_owned(),
+        x_label: "bits per weight, with scales and padding".to_owned(),
         y_label: "NMSE of the actions, held-out observations".to_owned(),
         vertical: Vertical::Decades,
         series: sweep.curves.iter().map(series).collect(),
@@ -21,13 +21,13 @@ fn plot(sweep: &Sweep) -> Plot {
     }
 }
 
-/// Whether a point is the knee.
+/// Returns `true` if the point is the knee.
 fn is_knee(sweep: &Sweep, curve: &Curve, point: &Point) -> bool {
     sweep.knee.as_ref().is_some_and(|knee| knee.method == curve.method && knee.bpw == point.report.bpw)
 }
 
-/// One row per policy and budget, one column per method: error and true bits per weight, and a star at each policy's
-/// knee. All sweeps have the same methods.
+/// Formats a row for each policy and budget, with a column for each method: error and true bits per weight, and a star
+/// at each policy's knee. All sweeps must have the same methods.
 pub fn table(sweeps: &[Sweep]) -> Table {
     let methods = sweeps.first().map_or(&[][..], |sweep| &sweep.curves).iter().map(|c| c.method.as_str());
     let header: Vec<&str> = ["policy", "budget"].into_iter().chain(methods).collect();
@@ -49,7 +49,7 @@ pub fn table(sweeps: &[Sweep]) -> Table {
     table
 }
 
-/// Error over true bits per weight, a line per method, a plot per policy.
+/// Draws the error over true bits per weight, with a line for each method and a plot for each policy.
 pub fn svg(sweeps: &[Sweep]) -> String {
     stacked(&sweeps.iter().map(plot).collect::<Vec<_>>())
 }
@@ -70,7 +70,7 @@ mod tests {
     }
 
     #[test]
-    fn the_table_has_every_policy_and_marks_its_knee() {
+    fn table_lists_policies_and_marks_knees() {
         let sweep = |policy: &str, points| {
             let curves = vec![curve("distill", points)];
             let knee = knee(&curves);
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn a_budget_that_is_too_small_leaves_a_dash() {
+    fn budget_that_is_too_small_shows_a_dash() {
         let curves = vec![curve("a", &[(2.0, 0.0), (3.0, 0.1)])];
         let sweep = Sweep { policy: "p".into(), matrices: Vec::new(), budgets: vec![2.0, 3.0], curves, knee: None };
         let text = table(&[sweep]).to_string();

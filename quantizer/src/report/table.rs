@@ -1,8 +1,8 @@
-//! Tables and the like for people.
+//! Human-readable tables.
 
 use comfy_table::{CellAlignment, Table, presets};
 
-/// A table without lines, numbers to the right.
+/// Creates a table without borders, with all columns but the first right-aligned.
 pub fn table(header: &[&str]) -> Table {
     let mut table = Table::new();
     table.load_preset(presets::NOTHING).set_header(header);
@@ -12,7 +12,7 @@ pub fn table(header: &[&str]) -> Table {
     table
 }
 
-/// Group size as text.
+/// Formats a group size.
 pub fn group_name(group: usize) -> String {
     if group == 0 { "row".to_owned() } else { group.to_string() }
 }

@@ -4,7 +4,7 @@ use actq::measure::time::StepTime;
 
 use super::table::table;
 
-/// The table that `actq inspect` prints.
+/// Formats the table that `actq inspect` prints.
 pub fn report(step: &StepTime) -> String {
     let mut rows = table(&["op", "output", "runs", "MACs", "instructions", "per MAC", "cycles", "per MAC", "us"]);
     let mut row = |op: &str, output: String, runs: String, macs: usize, instructions: u64, cycles: u64, us: f64| {
@@ -26,13 +26,13 @@ pub fn report(step: &StepTime) -> String {
         row(&op.op, op.output.to_string(), op.runs.to_string(), op.macs, op.instructions, op.cycles, op.microseconds);
     }
     row("all", String::new(), String::new(), step.macs, step.instructions, step.cycles, 1e3 * step.milliseconds);
-    format!("{rows}\n\n{}Polls of at least {} instructions take it in pieces.\n", sentence(step), step.least_budget)
+    format!("{rows}\n\n{}The least slice budget of a poll is {} instructions.\n", sentence(step), step.least_budget)
 }
 
-/// The time of the step, as a sentence.
+/// Formats the time of the step as a sentence.
 pub fn sentence(step: &StepTime) -> String {
     format!(
-        "A step takes {:.3} ms at {} MHz, predicted for a Cortex-M4 with FPU and memory that never waits.\n",
+        "Predicted time of a step: {:.3} ms at {} MHz, on a Cortex-M4 with FPU and zero-wait-state memory.\n",
         step.milliseconds,
         step.clock_hz / 1e6
     )

@@ -1,4 +1,4 @@
-//! What became of an image that was driven and learned again.
+//! The table of `actq tune`.
 
 use std::path::Path;
 
@@ -8,11 +8,11 @@ use serde_json::{Value, json};
 
 use super::table;
 
-/// What every table shows, from left to right.
-const HEADER: [&str; 7] = ["round", "episodes", "frames", "f32 path", "own path", "success", "seconds"];
+/// Columns of every table, from left to right.
+const HEADER: [&str; 7] = ["round", "episodes", "frames", "f32 path", "on-policy", "success", "seconds"];
 
-/// One image a row: what it learned from, its errors, how it drove. Tracking errors stand in columns of their own, if
-/// any were said.
+/// Formats a row for each image: the recordings it learned from, its errors, and the outcome of its rollout. Each
+/// tracking error that the command printed has a column.
 pub fn table(tuned: &Tuned) -> String {
     let mut tracking: Vec<&str> = tuned.rounds.iter().flat_map(|round| round.driven.keys()).collect();
     tracking.retain(|key| key.starts_with("tracking_error"));
@@ -23,7 +23,7 @@ pub fn table(tuned: &Tuned) -> String {
     header.splice(6..6, names.iter().map(String::as_str));
     let mut rows: Table = table::table(&header);
     for round in &tuned.rounds {
-        let said = tracking.iter().map(|key| round.driven.number(key).map_or("-".to_owned(), |v| format!("{v:.3}")));
+        let errors = tracking.iter().map(|key| round.driven.number(key).map_or("-".to_owned(), |v| format!("{v:.3}")));
         let front = [
             round.round.to_string(),
             round.episodes.to_string(),
@@ -32,15 +32,15 @@ pub fn table(tuned: &Tuned) -> String {
             round.own_nmse.map_or("-".to_owned(), |nmse| format!("{nmse:.3e}")),
             success(round),
         ];
-        rows.add_row(front.into_iter().chain(said).chain([format!("{:.1}", round.seconds)]));
+        rows.add_row(front.into_iter().chain(errors).chain([format!("{:.1}", round.seconds)]));
     }
     format!(
-        "{rows}\n\nEpisodes and frames: learned from. Paths: NMSE on {}, and where the image itself has led.\n",
+        "{rows}\n\nEpisodes and frames: of the recordings learned from. f32 path: NMSE on {}. on-policy: NMSE on the image's own rollout.\n",
         tuned.measured_on
     )
 }
 
-/// The same as a JSON object.
+/// Returns the same as a JSON object.
 pub fn json(tuned: &Tuned, policy: &str, command: &str) -> Value {
     json!({
         "policy": policy,
@@ -50,16 +50,16 @@ pub fn json(tuned: &Tuned, policy: &str, command: &str) -> Value {
     })
 }
 
-/// A note where an earlier image drove better than the last; `kept` is where it is.
+/// Returns a note if an earlier image had more success than the last. `kept` is the folder of `--keep`.
 pub fn better(tuned: &Tuned, kept: Option<&Path>) -> Option<String> {
     let (better, last) = (tuned.better()?, tuned.rounds.last()?);
     let place = match kept {
         Some(dir) => format!("it is {}", dir.join(format!("round-{}.actq", better.round)).display()),
-        None => "--keep DIR keeps it".to_owned(),
+        None => "pass --keep DIR to keep it".to_owned(),
     };
     Some(format!(
-        "the image of round {} drove better (success {}) than the last one (success {}), which was written; {place}. Where the \
-         intervals overlap, more episodes would tell",
+        "the image of round {} has more success ({}) than the last one ({}), which was written; {place}. If the intervals \
+         overlap, run more episodes to decide",
         better.round,
         success(better),
         success(last)

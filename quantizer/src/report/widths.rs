@@ -1,4 +1,4 @@
-//! Which rows of an image have which width, and why: as a table, as text and as a picture.
+//! The widths of an image's rows and the reasons for them: as a table, as text and as a picture.
 
 mod picture;
 
@@ -21,7 +21,7 @@ use super::table::table;
 struct Row {
     /// `None` for rows without bits.
     width: Option<Width>,
-    /// What its width was chosen from, where it is known.
+    /// The values that its width was chosen from, if known.
     reasons: Option<Reasons>,
 }
 
@@ -34,14 +34,14 @@ struct Reasons {
 }
 
 impl Reasons {
-    /// Whether the row's removal costs something else than its own energy: it takes the columns along that it feeds.
+    /// Returns `true` if removing the row costs more than its own energy, as the columns that it feeds go with it.
     fn is_removable(self) -> bool {
         self.removal != self.energy
     }
 }
 
-/// A matrix's rows: without statistics those of the image, in the order of its output; with statistics those of the
-/// matrix as it was trained, in its own order.
+/// A matrix and its rows: with statistics, the rows of the trained matrix; without, those of the image, in the order of
+/// the output.
 #[derive(Clone, Debug)]
 struct Layer {
     name: String,
@@ -56,24 +56,24 @@ struct Layer {
 pub struct Widths {
     policy: String,
     layers: Vec<Layer>,
-    /// Whether rows are those of the matrices as they were trained.
+    /// `true` if the rows are those of the trained matrices.
     trained: bool,
 }
 
-/// What a table, a legend or a strip calls a width.
+/// All widths, in the order of tables and legends.
 const ALL: [Option<Width>; 5] = [None, Some(Width::W2), Some(Width::W3), Some(Width::W4), Some(Width::W8)];
 
 fn bits(width: Option<Width>) -> u32 {
     width.map_or(0, Width::bits)
 }
 
-/// `.`, `2`, `3`, `4` or `8`
+/// Returns the letter of a width: `.`, `2`, `3`, `4` or `8`.
 fn letter(width: Option<Width>) -> char {
     width.and_then(|w| char::from_digit(w.bits(), 10)).unwrap_or('.')
 }
 
 impl Widths {
-    /// The widths in `image`; with its statistics, the reasons too, and what became of the rows that it has no more.
+    /// Reads the widths of `image`. Its statistics add the reasons and the removed rows.
     pub fn new(image: &Image<'_>, stats: Option<&Stats>) -> Result<Self> {
         let matrices = distinct(image);
         if let Some(stats) = stats {
@@ -86,7 +86,8 @@ impl Widths {
             for rows in matrix.blocks() {
                 let shape = rows.block.shape();
                 for output in rows.outputs() {
-                    *widths.get_mut(output).context("a row has no place in the output")? = Some(shape.width);
+                    *widths.get_mut(output).context("a row has no place in the output of its matrix")? =
+                        Some(shape.width);
                 }
                 bytes.push((shape.width, block_bytes(shape, !rows.steps.is_empty())));
             }
@@ -101,7 +102,11 @@ impl Widths {
                     .iter()
                     .zip(&widths)
                     .all(|(&row, width)| stats.widths.get(row) == Some(&bits(*width)));
-            ensure!(same, "the widths of {:?} are others than those in the image", stats.name);
+            ensure!(
+                same,
+                "the widths of {:?} differ from those in the image; pass the statistics that were saved with it",
+                stats.name
+            );
             let rows = (0..stats.rows).map(|r| row(stats, r)).collect::<Result<_>>()?;
             Ok(Layer { name: printable(&stats.name).into_owned(), shape: (stats.rows, stats.cols), rows, bytes })
         };
@@ -109,19 +114,20 @@ impl Widths {
         Ok(Self { policy: printable(image.name()).into_owned(), layers, trained: stats.is_some() })
     }
 
-    /// Table and strips.
+    /// Formats the table and the strips.
     pub fn report(&self) -> String {
         let mut text = format!("{}\n\n", self.table());
         for layer in &self.layers {
             let _ = writeln!(text, "{}", layer.strip());
         }
-        let order = if self.trained { "as trained" } else { "in the order of the image's outputs" };
-        let _ = writeln!(text, "\nOne character a row, rows {order}: . no bits, else its width.");
+        let order =
+            if self.trained { "in the order of the trained matrix" } else { "in the order of the image's outputs" };
+        let _ = writeln!(text, "\nOne character per row, {order}: its width, or . for no bits.");
         text
     }
 
-    /// One row per matrix and width: how many rows, their bytes; with statistics also their energies and expected
-    /// errors.
+    /// Formats a row for each matrix and width: the number of rows and their bytes; with statistics, also their
+    /// energies and expected errors.
     fn table(&self) -> Table {
         let mut header = vec!["matrix", "shape", "bits", "rows", "bytes", "share"];
         let reasons = self.layers.iter().flat_map(|l| &l.rows).any(|r| r.reasons.is_some());
@@ -161,7 +167,7 @@ impl Widths {
     }
 }
 
-/// In a line how many rows of a policy as it was trained got which width, and which matrices have rows without bits.
+/// Formats in one line how many rows of the trained policy have which width, and which matrices have rows without bits.
 pub fn line(policy: &Policy, outcomes: &[Outcome]) -> String {
     let of = |outcome: &Outcome, width| outcome.trained_widths().iter().filter(|w| **w == width).count();
     let mut parts = Vec::new();
@@ -185,8 +191,9 @@ pub fn line(policy: &Policy, outcomes: &[Outcome]) -> String {
 }
 
 fn row(stats: &MatrixRecord, r: usize) -> Result<Row> {
-    let &bits = stats.widths.get(r).context("a row without a width")?;
-    let width = if bits == 0 { None } else { Some(Width::from_bits(bits).context("an unknown width")?) };
+    let &bits = stats.widths.get(r).context("the statistics lack the width of a row")?;
+    let width =
+        if bits == 0 { None } else { Some(Width::from_bits(bits).context("the statistics hold an unknown width")?) };
     let reasons = stats.allocation.as_ref().and_then(|a| {
         Some(Reasons { energy: *a.energy.get(r)?, removal: *a.removal.get(r)?, expected: *a.expected.get(r)? })
     });
@@ -197,14 +204,14 @@ fn percent(part: f64, whole: f64) -> String {
     if whole > 0.0 { format!("{:.1}%", 100.0 * part / whole) } else { "-".to_owned() }
 }
 
-/// Characters of a strip's line.
-const LINE: usize = 100;
+/// Characters in a line of a strip.
+const STRIP_CHARS: usize = 100;
 
 impl Layer {
-    /// The widths as characters, in lines.
+    /// Formats the widths as characters, in lines.
     fn strip(&self) -> String {
         let letters: Vec<char> = self.rows.iter().map(|r| letter(r.width)).collect();
-        let lines: Vec<String> = letters.chunks(LINE).map(|line| line.iter().collect()).collect();
+        let lines: Vec<String> = letters.chunks(STRIP_CHARS).map(|line| line.iter().collect()).collect();
         format!("{}\n  {}", self.name, lines.join("\n  "))
     }
 }

@@ -1,4 +1,4 @@
-//! Recorded episodes, and the file that they make.
+//! Recorded episodes and their file.
 
 use std::fs::File;
 use std::io::{self, BufWriter};
@@ -9,26 +9,27 @@ use anyhow::Result;
 
 use super::spool::Spool;
 
-/// Episodes, one after the other. Only the last may be empty. Their values are on disk.
+/// Episodes in order, with their values on disk. Only the last may be empty.
 #[derive(Debug)]
 pub(super) struct Episodes {
-    /// Whether steps depend on each other, so that no episode may be cut.
+    /// `true` if steps depend on each other, so that no episode may be split.
     recurrent: bool,
-    /// Observations, and the actions if those are recorded.
+    /// Observations, and actions if they are recorded.
     arrays: Vec<(&'static str, Spool)>,
     lengths: Vec<usize>,
     longest: usize,
 }
 
 impl Episodes {
-    /// Episodes of observations and actions of these widths, 0 for no actions; their values are on the disk of `folder`.
+    /// Creates a list with one empty episode. `obs` and `action` are the values of a row, with `action` 0 for no
+    /// actions; the values go to the disk of `folder`.
     pub(super) fn new(folder: &Path, obs: usize, action: usize, recurrent: bool) -> io::Result<Self> {
         let recorded = [("obs", obs), ("action", action)].into_iter().filter(|(_, width)| *width > 0);
         let arrays = recorded.map(|(name, width)| Ok((name, Spool::new(folder, width)?))).collect::<io::Result<_>>()?;
         Ok(Self { recurrent, arrays, lengths: vec![0], longest: 0 })
     }
 
-    /// Begins an episode, unless one has begun that is still empty.
+    /// Begins an episode, unless the last one is empty.
     pub(super) fn begin(&mut self) {
         if self.lengths.last() != Some(&0) {
             self.lengths.push(0);
@@ -51,7 +52,7 @@ impl Episodes {
         self.lengths.iter().sum()
     }
 
-    /// Bytes that the file's arrays take at most, padding counted, with one more step.
+    /// Returns the most bytes of the file's arrays after one more step, with padding.
     pub(super) fn bytes_with_next(&self) -> usize {
         let padded = self.lengths.len().saturating_mul(self.longest + 1);
         let rows = if self.recurrent { padded } else { padded.min(3 * (self.frames() + 1)) };
@@ -59,8 +60,8 @@ impl Episodes {
         rows.saturating_mul(4 * width)
     }
 
-    /// Writes the recording as an .npz archive; `crc` is that of the image that was driven. Nothing is compressed: it
-    /// would take longer than the policy itself.
+    /// Writes the recording as an .npz archive; `crc` is the checksum of the image. Compression would take longer than
+    /// the policy, so the archive is not compressed.
     pub(super) fn write_npz(&mut self, crc: u32, to: &mut File) -> Result<()> {
         let pieces = self.pieces();
         let mut npz = NpzWriter::new(BufWriter::new(to));
@@ -73,7 +74,7 @@ impl Episodes {
         Ok(())
     }
 
-    /// The lengths of the file's episodes. To a feed-forward policy it makes no difference where they are cut.
+    /// Returns the lengths of the file's episodes. For a feed-forward policy, long episodes are split to save padding.
     fn pieces(&self) -> Vec<usize> {
         let lengths = self.lengths.iter().copied().filter(|n| *n > 0);
         if self.recurrent {
@@ -99,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn empty_episodes_are_left_out() {
+    fn empty_episodes_are_not_written() {
         let mut episodes = recorded(&[3, 0, 0, 2], true);
         episodes.begin();
         episodes.begin();
@@ -108,14 +109,14 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_compressed() {
+    fn archive_is_not_compressed() {
         let mut file = tempfile::tempfile().expect("a file");
         recorded(&[500, 500], true).write_npz(7, &mut file).expect("written");
         assert!(file.metadata().expect("a size").len() > 4 * 3 * 1000);
     }
 
     #[test]
-    fn padding_stays_in_proportion_where_episodes_may_be_cut() {
+    fn splitting_bounds_the_padding() {
         let lengths = [vec![1000], vec![3; 100]].concat();
         let cut = recorded(&lengths, false);
         let pieces = cut.pieces();

@@ -1,4 +1,4 @@
-//! The pipe protocol ([`actq_link`]): any simulator runs an image as its policy through standard input and output.
+//! The pipe protocol ([`actq_link`]), by which a simulator runs an image as its policy over standard input and output.
 
 use std::io::{ErrorKind, Read, Write};
 
@@ -7,18 +7,18 @@ use actq_kernels::Image;
 use actq_link::{NO_ACTION, RESET, STEP};
 use anyhow::{Context, Result, bail};
 
-/// What the other side has done with the policy.
+/// A request of the simulator, and its outcome.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Seen<'a> {
-    /// It has reset it.
+    /// It reset the policy.
     Reset,
-    /// It has shown it this observation, which was answered by an action.
+    /// It sent this observation, and the reply was an action.
     Observation(&'a [f32]),
-    /// It has shown it something that has no action: the policy has reset itself.
+    /// It sent an observation without an action; the head has reset itself.
     NoAction,
 }
 
-/// Serves until the input ends. `seen` is told of every request, once it has been answered.
+/// Serves until the input ends. Calls `seen` for every request, after the reply.
 pub(crate) fn serve(
     image: Image<'_>,
     mut input: impl Read,
@@ -32,7 +32,7 @@ pub(crate) fn serve(
             let mut command = [0u8];
             match input.read_exact(&mut command) {
                 Err(e) if e.kind() == ErrorKind::UnexpectedEof => return Ok(()),
-                other => other.context("input cannot be read")?,
+                other => other.context("cannot read the input")?,
             }
             match command[0] {
                 RESET => {
@@ -42,7 +42,7 @@ pub(crate) fn serve(
                 STEP => {
                     input
                         .read_exact(&mut bytes)
-                        .with_context(|| format!("the input ended inside an observation of {} bytes", bytes.len()))?;
+                        .with_context(|| format!("the input ends inside an observation of {} bytes", bytes.len()))?;
                     let observation: Vec<f32> =
                         bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
                     // After an error the head has reset itself.
@@ -53,9 +53,9 @@ pub(crate) fn serve(
                     let action: Vec<u8> = action.iter().flat_map(|a| a.to_le_bytes()).collect();
                     let written = output.write_all(&action).and_then(|()| output.flush());
                     seen(what);
-                    written.context("output cannot be written")?;
+                    written.context("cannot write the output")?;
                 }
-                other => bail!("unknown command byte 0x{other:02x}; R resets, S steps"),
+                other => bail!("unknown command byte 0x{other:02x}; send R to reset or S to step"),
             }
         }
     })

@@ -1,4 +1,4 @@
-//! Records what a served policy is shown, in a thread of its own: no answer waits for a label or for the disk.
+//! Records the observations of a served policy in its own thread, so that replies do not wait for labels or the disk.
 
 use std::fs::File;
 use std::io::{Read, Write};
@@ -16,23 +16,24 @@ use super::protocol::{Seen, serve};
 use super::recorders;
 use crate::outputs::files;
 
-/// New frames from which on the file is written again; and, of a long recording, their share of what it holds. So what
-/// is lost when the process is killed, and how often a frame is written, are both in proportion.
+/// The fewest new frames at which the file is written again.
 const LEAST_NEW: usize = 256;
+/// Divisor of the saved frames that gives the fewest new frames of a long recording. It bounds both the loss when the
+/// process is killed and the number of times that a frame is written.
 const NEW_SHARE: usize = 20;
-/// Requests that may wait to be recorded. Where labels take longer than answers, answers wait from here on, so that
-/// little is lost when the process is killed.
+/// The most requests in the queue of the recorder. If labels take longer than replies, replies wait when it is full, so
+/// that a killed process loses little.
 const QUEUE: usize = 256;
-/// Bytes that the arrays of a recording may take. The quantizer keeps [`actq::data::MOST_FRAMES`] frames, and reads no
+/// The most bytes of a recording's arrays. The quantizer keeps [`actq::data::MOST_FRAMES`] frames, and reads no
 /// archive of 4 GiB.
 const MOST_BYTES: usize = 1 << 30;
 
-/// Where to record to, and who labels.
+/// File of a recording, and the policy that labels it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RecordPlan<'a> {
-    /// The file, which must not exist; where it does, a number is put behind its stem.
+    /// The file; if it exists, the recording's name gets a number after the stem.
     pub(crate) path: &'a Path,
-    /// The policy that the image was made from, whose output becomes the array "action"; without it there is none.
+    /// The policy that the image was made from, whose output becomes the array "action"; `None` for no such array.
     pub(crate) source: Option<&'a Policy>,
 }
 
@@ -49,9 +50,9 @@ enum Event {
     Observation(Vec<f32>),
 }
 
-/// As [`serve`], and everything that the image is shown goes into a recording. It is replaced as a whole, again and
-/// again, so that it can be read whenever the process ends. `note` is told what the user should know at once. Where
-/// nothing can be recorded any more, serving goes on, and the error is returned at the end.
+/// Serves as [`serve`] does, and records all observations. The recording is replaced as a whole, again and again, so
+/// that it is readable whenever the process ends. Calls `note` with messages for the user. If recording fails, serving
+/// goes on, and the error is returned at the end.
 pub(crate) fn serve_recorded(
     image: Image<'_>,
     plan: RecordPlan<'_>,
@@ -60,7 +61,7 @@ pub(crate) fn serve_recorded(
     note: impl Fn(String) + Sync,
 ) -> Result<()> {
     files::check_new(plan.path)?;
-    // Before the first answer: who has got one can wait for the recording.
+    // The lock is taken before the first reply, so that a process with a reply can wait for the recording.
     let _recording = recorders::share(plan.folder());
     let recorder = Recorder::new(&image, plan, &note)?;
     let (sender, receiver) = sync_channel(QUEUE);
@@ -71,28 +72,30 @@ pub(crate) fn serve_recorded(
                 Seen::Reset | Seen::NoAction => Event::Begin,
                 Seen::Observation(observation) => Event::Observation(observation.to_vec()),
             };
-            // A recorder that has ended has said why.
+            // A recorder that has ended has reported its error.
             drop(sender.send(event));
         });
         drop(sender);
-        let recorded = recorder.join().map_err(|_| anyhow!("the recorder has panicked"))?;
+        let recorded = recorder.join().map_err(|_| anyhow!("the recorder thread panicked"))?;
         served.and(recorded)
     })
 }
 
-/// What has been recorded so far.
+/// The recorder, with the recording so far.
 struct Recorder<'a, F> {
     plan: RecordPlan<'a>,
     crc: u32,
-    /// The f32 policy, its recurrent state run along.
+    /// The f32 policy, with its recurrent state.
     labels: Option<Evaluator<'a>>,
     episodes: Episodes,
-    /// Steps since the policy was reset, and after how many of them an observation reaches a recurrent network: one
-    /// that plays the rest of a chunk does not, so that its next step is the one after.
+    /// Steps since the last reset.
     step: usize,
+    /// Steps from one evaluation of a recurrent network to the next. The steps between them play the rest of a chunk
+    /// and are not recorded.
     every: usize,
-    /// Frames in the file, and its name once there is one.
+    /// Frames in the file.
     saved: usize,
+    /// Name of the file, after the first save.
     file: Option<PathBuf>,
     note: &'a F,
 }
@@ -102,7 +105,7 @@ impl<'a, F: Fn(String)> Recorder<'a, F> {
         let recurrent = image.state().len > 0;
         let action = if plan.source.is_some() { image.output().len } else { 0 };
         let episodes = Episodes::new(plan.folder(), image.obs_len(), action, recurrent)
-            .with_context(|| format!("{}: cannot make a temporary file", plan.folder().display()))?;
+            .with_context(|| format!("{}: cannot create a temporary file", plan.folder().display()))?;
         Ok(Self {
             plan,
             crc: image.crc(),
@@ -116,11 +119,11 @@ impl<'a, F: Fn(String)> Recorder<'a, F> {
         })
     }
 
-    /// Records until no more events can come.
+    /// Records until the sender of events is dropped.
     fn run(mut self, events: Receiver<Event>) -> Result<()> {
         let name = self.plan.path.display();
-        self.record(events).with_context(|| format!("{name}: the recording is not complete")).inspect_err(|error| {
-            (self.note)(format!("{error:#}; the policy is served further"));
+        self.record(events).with_context(|| format!("{name}: recording stopped early")).inspect_err(|error| {
+            (self.note)(format!("{error:#}; serving continues"));
         })
     }
 
@@ -136,7 +139,7 @@ impl<'a, F: Fn(String)> Recorder<'a, F> {
                         self.save()?;
                         let mib = MOST_BYTES >> 20;
                         let name = self.plan.path.display();
-                        (self.note)(format!("{name}: {mib} MiB are recorded, and no more than that will be"));
+                        (self.note)(format!("{name}: recording stops at its limit of {mib} MiB; serving continues"));
                         return Ok(());
                     }
                     self.observe(&observation)?;
@@ -157,13 +160,13 @@ impl<'a, F: Fn(String)> Recorder<'a, F> {
     }
 
     fn observe(&mut self, observation: &[f32]) -> Result<()> {
-        let reaches = self.step.is_multiple_of(self.every);
+        let is_evaluated = self.step.is_multiple_of(self.every);
         self.step += 1;
-        if !reaches {
+        if !is_evaluated {
             return Ok(());
         }
         let action = self.labels.as_mut().map_or(Vec::new(), |labels| labels.step(observation, &mut |_, _| {}));
-        // Where the f32 policy itself overflows, there is nothing to learn.
+        // If the f32 policy overflows, the frame has no label.
         if action.iter().all(|v| v.is_finite()) {
             self.episodes.push(observation, &action)?;
         } else {
@@ -180,7 +183,7 @@ impl<'a, F: Fn(String)> Recorder<'a, F> {
                 let file = files::write_new(self.plan.path, write)?;
                 if file != self.plan.path {
                     let (taken, file) = (self.plan.path.display(), file.display());
-                    (self.note)(format!("{taken} is there already; recording into {file}"));
+                    (self.note)(format!("{taken} exists; recording to {file}"));
                 }
                 self.file = Some(file);
             }

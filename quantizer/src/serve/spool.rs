@@ -1,4 +1,4 @@
-//! Rows of values that wait on disk for their place in a recording: its arrays are as long as they are only in the end.
+//! Rows of values on disk, until the recording's array has its final length.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Read as _, Seek as _, SeekFrom, Write};
@@ -6,10 +6,10 @@ use std::path::Path;
 
 use actq::data::npy_header;
 
-/// Bytes that are kept in memory before they are written.
+/// Bytes in memory before a write.
 const BUFFER: usize = 1 << 16;
 
-/// Rows, one after the other, in a file without a name: the system removes it however the process ends.
+/// Rows in order, in a file without a name, which the system removes when the process ends.
 #[derive(Debug)]
 pub(super) struct Spool {
     width: usize,
@@ -17,23 +17,23 @@ pub(super) struct Spool {
 }
 
 impl Spool {
-    /// Rows of `width` values, on the disk of `folder`.
+    /// Creates a spool for rows of `width` values on the disk of `folder`.
     pub(super) fn new(folder: &Path, width: usize) -> io::Result<Self> {
         Ok(Self { width, rows: BufWriter::with_capacity(BUFFER, tempfile::tempfile_in(folder)?) })
     }
 
-    /// Values of a row.
+    /// Returns the number of values in a row.
     pub(super) fn width(&self) -> usize {
         self.width
     }
 
-    /// Adds a row.
+    /// Appends a row.
     pub(super) fn push(&mut self, row: &[f32]) -> io::Result<()> {
         debug_assert_eq!(row.len(), self.width);
         row.iter().try_for_each(|value| self.rows.write_all(&value.to_le_bytes()))
     }
 
-    /// Writes the rows as an array `[episode, step, value]` in the format .npy, with zeros after every episode's end.
+    /// Writes the rows as an array `[episode, step, value]` in .npy format, with zeros after every episode's end.
     pub(super) fn write_npy(&mut self, lengths: &[usize], to: &mut impl Write) -> io::Result<()> {
         let longest = lengths.iter().copied().max().unwrap_or(0);
         let bytes = |steps: usize| 4 * (steps * self.width) as u64;
@@ -54,7 +54,7 @@ impl Spool {
 mod tests {
     use super::*;
 
-    /// Bytes of the rows in memory, and in the file.
+    /// Returns the bytes of rows in memory, and in the file.
     fn bytes(spool: &Spool) -> (usize, u64) {
         (spool.rows.buffer().len(), spool.rows.get_ref().metadata().expect("a file").len())
     }
@@ -74,7 +74,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_follow_those_that_are_written_already() {
+    fn rows_append_after_a_write() {
         let folder = tempfile::TempDir::new().expect("a folder");
         let mut spool = Spool::new(folder.path(), 1).expect("a spool");
         let mut values = |row: f32, lengths: &[usize]| {

@@ -28,7 +28,7 @@ fn a_budget_of_time_is_kept_or_refused() -> Result<()> {
         let json = succeeded(&run(actq(&["inspect", &out, "--json", "--clock", "1M"]), b"")?)?;
         serde_json::from_str::<Value>(&json)?["milliseconds"].as_f64().context("no milliseconds")
     };
-    ensure!(succeeded(&quantize(&["--ms", "1000"])?)?.contains("A step takes"), "the time is not printed");
+    ensure!(succeeded(&quantize(&["--ms", "1000"])?)?.contains("Predicted time of a step"), "the time is not printed");
     let slowest = time()?;
     let refused = quantize(&["--ms", "0.001"])?;
     failed(&refused, 1, &["0.001 ms are allowed", "the fastest step takes", "1 MHz"])?;
@@ -141,12 +141,12 @@ fn an_unused_budget_is_explained() -> Result<()> {
     assert_eq!(
         first_note("--flash 1M")?,
         format!(
-            "note: the image uses {bytes} of 1048576 bytes: every row has the most bits that it may have; a smaller budget \
+            "note: the image uses {bytes} of 1048576 bytes: every row has the most bits that a row can have; a smaller budget \
              gives the same image"
         )
     );
     let step = first_note("--bpw 7")?;
-    ensure!(step.contains(" of 7 bits per weight: the next rows with more bits take more than is left"), "{step}");
+    ensure!(step.contains(" of 7 bits per weight: the next step of bits takes more than the rest"), "{step}");
     Ok(())
 }
 
@@ -204,9 +204,9 @@ fn choices_of_actquant_reach_the_image() -> Result<()> {
 
     fs::remove_file(&out)?;
     for (options, status, words) in [
-        ("--method gptq --actquant authors", 1, "--actquant goes with method actquant, not with gptq"),
-        ("--actquant authors", 1, "not with distill"),
-        ("--method actquant --actquant heads=8", 2, "heads is not a key; the keys are bandwidth, frames"),
+        ("--method gptq --actquant authors", 1, "--actquant has no effect on gptq"),
+        ("--actquant authors", 1, "no effect on distill"),
+        ("--method actquant --actquant heads=8", 2, "heads is no key; the keys are bandwidth, frames"),
         ("--method actquant --actquant head=5", 2, "head takes 2, 3, 4 or 8, or free"),
     ] {
         failed(&quantize(options)?, status, &[words])?;
@@ -214,7 +214,7 @@ fn choices_of_actquant_reach_the_image() -> Result<()> {
     ensure!(!out.exists(), "a file was written");
     let mut sweep = actq(&["sweep"]);
     sweep.arg(ur3()).args(["--methods", "rtn", "--actquant", "head=4"]);
-    failed(&run(sweep, b"")?, 1, &["not with rtn"])
+    failed(&run(sweep, b"")?, 1, &["no effect on rtn"])
 }
 
 #[test]
@@ -304,7 +304,7 @@ fn quantize_reports_both_errors_and_faults_of_recordings() -> Result<()> {
     // A malformed recording for comparison does not stop eval.
     cut(&policy.join("calib.npy"), 100)?;
     let eval = notes(&run(actq(&["eval", &text(&out), "--policy", &text(&policy), "--json"]), b"")?)?;
-    ensure!(eval.len() == 1 && eval[0].starts_with("note: the calibrated range is not known: "), "{eval:?}");
+    ensure!(eval.len() == 1 && eval[0].starts_with("note: cannot check the range of the observations: "), "{eval:?}");
     Ok(())
 }
 

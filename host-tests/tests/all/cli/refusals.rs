@@ -87,7 +87,7 @@ fn outputs_are_refused_before_any_work() -> Result<()> {
     };
     all(bad.iter().flat_map(|bad| commands(bad).map(|command| (bad, command))).map(|(bad, command)| {
         let words: Vec<&str> = command.iter().map(String::as_str).collect();
-        let refused = run(actq(&words), b"").and_then(|output| failed(&output, 1, &[bad, "cannot be written"]));
+        let refused = run(actq(&words), b"").and_then(|output| failed(&output, 1, &[bad, "cannot write the file"]));
         (command.join(" "), refused)
     }))?;
     ensure!(fixture.snapshot()? == before, "files changed");

@@ -131,7 +131,7 @@ fn a_cut_line_is_reported() -> Result<()> {
     let (controller, slot) = start()?;
     let (observation, bits) = observation(&slot)?;
     let port = controller.address().to_string();
-    let mut child = actq(&["link", "serve", &port, "--patience", "3"])
+    let mut child = actq(&["link", "serve", &port, "--timeout", "3"])
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
@@ -157,12 +157,12 @@ fn a_port_in_use_is_reported() -> Result<()> {
     let mut first = controller.client()?;
     first.status()?;
     failed(
-        &link(&controller, &["disarm", "--patience", "1"], b"")?,
+        &link(&controller, &["disarm", "--timeout", "1"], b"")?,
         1,
         &["no bytes received", "no other program has the port open"],
     )?;
     drop(first);
-    succeeded(&link(&controller, &["disarm", "--patience", "600"], b"")?)?;
+    succeeded(&link(&controller, &["disarm", "--timeout", "600"], b"")?)?;
     Ok(())
 }
 
@@ -190,7 +190,7 @@ fn watch_what_chatters() -> Result<(String, Output)> {
         }
         Ok(())
     });
-    let output = run(actq(&["link", "watch", &port, "--once", "--patience", "0.5"]), b"")?;
+    let output = run(actq(&["link", "watch", &port, "--once", "--timeout", "0.5"]), b"")?;
     chatter.join().map_err(|_| anyhow::anyhow!("the writing thread panicked"))??;
     Ok((port, output))
 }

@@ -55,14 +55,17 @@ fn import_writes_a_folder_and_overwrites_nothing() -> Result<()> {
         .collect::<Result<_>>()?;
     written.sort();
     assert_eq!(written, ["calib.npz", "policy.json", "policy.safetensors"]);
-    failed(&import(&[])?, 1, &["policy.json: is there already; --force replaces it"])?;
+    failed(&import(&[])?, 1, &["policy.json: exists; pass --force to replace it"])?;
     succeeded(&import(&["--force"])?)?;
     // Frames with a batch axis look like episodes.
     let (rows, out) = (dir.path().join("rows.npy"), dir.path().join("rows"));
     Array3::from_shape_fn((9, 1, OBS), |(i, _, k)| (i * k) as f32).write_npy(fs::File::create(&rows)?)?;
     let noted = actq(&["import", text(&model), "--out", text(&out), "--calib", text(&rows)]).output()?;
     let stderr = String::from_utf8_lossy(&noted.stderr);
-    ensure!(stderr.contains("rows.npy holds 9 episodes of one step each; if they are one run, save it as"), "{stderr}");
+    ensure!(
+        stderr.contains("rows.npy holds 9 episodes of one step each; if they are one episode, save it as"),
+        "{stderr}"
+    );
     // The file replaces the folder, with the same digest.
     assert_eq!(Policy::load(&out)?.digest, Policy::load(&model)?.digest);
     failed(
@@ -78,7 +81,11 @@ fn import_writes_a_folder_and_overwrites_nothing() -> Result<()> {
     // The output of the command makes an image.
     let image = dir.path().join("a.actq");
     let quantize = |more: &[&str]| actq(&[&["quantize", text(&model), "--out", text(&image)], more].concat()).output();
-    failed(&quantize(&["--bpw", "3"])?, 1, &["no recording is given", "numpy.save(\"obs.npy\"", "(6 values)"])?;
+    failed(
+        &quantize(&["--bpw", "3"])?,
+        1,
+        &["no calibration recording; pass one by --calib", "numpy.save(\"obs.npy\"", "(6 values)"],
+    )?;
     succeeded(&quantize(&["--bpw", "3", "--calib", text(&obs), "--steps", "0"])?)?;
     succeeded(&quantize(&["--bits", "8", "--method", "rtn"])?)?;
     fs::rename(&obs, dir.path().join("heldout.npy"))?;
@@ -95,7 +102,7 @@ fn python_with(modules: &str) -> Option<OsString> {
     if has.is_ok_and(|output| output.status.success()) {
         return Some(python);
     }
-    skipped(&format!("no Python with {modules} (python3, or what ACTQ_PYTHON names)"));
+    skipped(&format!("no Python with {modules} (python3, or the one that ACTQ_PYTHON names)"));
     None
 }
 
@@ -118,7 +125,7 @@ fn checked(python: impl AsRef<OsStr>, layer: impl FnOnce(&mut File) -> String) -
 #[test]
 fn check_needs_a_python() -> Result<()> {
     let output = checked("no-such-python", |file| file.gemm("obs", 20, OBS))?;
-    failed(&output, 1, &["--check runs the file with onnxruntime, from Python (python3, or what ACTQ_PYTHON names)"])
+    failed(&output, 1, &["cannot run the file with onnxruntime for --check; set ACTQ_PYTHON"])
 }
 
 #[test]

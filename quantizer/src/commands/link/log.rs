@@ -1,4 +1,4 @@
-//! The log of a stream as arrays.
+//! The log of `actq link stream` as arrays.
 
 use std::io::Cursor;
 
@@ -6,7 +6,7 @@ use actq::data::NpzWriter;
 use actq_client::log::Row;
 use anyhow::{Result, ensure};
 
-/// An .npz file with the arrays `obs` and `action` (one frame a row; NaN for a missing action), `applied` (0 or 1), and
+/// Returns an .npz file with the arrays `obs` and `action` (one frame per row; NaN for a missing action), `applied` (0 or 1), and
 /// `sent` and `received` (seconds since the log began; NaN for a missing action).
 pub(super) fn npz(rows: &[Row]) -> Result<Vec<u8>> {
     let observation_len = rows.first().map_or(0, |row| row.observation.len());

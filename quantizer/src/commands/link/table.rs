@@ -1,10 +1,10 @@
-//! What `actq link watch` shows.
+//! The table of `actq link watch`.
 
 use actq_link::code::State;
 use actq_link::report::{BUILT_IN, Breadcrumb, Counters, Status, Timing};
 use comfy_table::{Table, presets};
 
-/// State, times and counters of a controller. `here` is what this end's receiver has seen.
+/// Returns state, times and counters of a controller as a table. `here` holds the counters of the host's receiver.
 pub(super) fn table(
     status: &Status,
     timing: &Timing,
@@ -46,7 +46,7 @@ pub(super) fn table(
         row("stack", format!("at most {} bytes", timing.stack));
     }
     row("refused observations", status.refused.to_string());
-    for (name, c) in [("received there", &status.counters), ("received here", here)] {
+    for (name, c) in [("controller received", &status.counters), ("host received", here)] {
         let text = format!(
             "{} good, {} damaged, {} malformed, {} repeated, {} lost",
             c.good, c.damaged, c.malformed, c.repeated, c.lost
@@ -59,7 +59,7 @@ pub(super) fn table(
     row("reset by", status.reset.to_string());
     if let Some(crash) = breadcrumb.crash {
         row(
-            "left behind",
+            "breadcrumb",
             format!(
                 "{crash} at {:#010x}, detail {:#x}, tick {}, {} since power-on",
                 breadcrumb.pc, breadcrumb.detail, breadcrumb.ticks, breadcrumb.count
