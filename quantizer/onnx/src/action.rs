@@ -1,4 +1,4 @@
-//! The end of a network as an action contract: factors, offsets and limits behind the last operation.
+//! The action contract from the end of a network: factors, offsets and limits after the last operation.
 
 use actq::import::contract::{Array, JsonContract};
 
@@ -6,17 +6,17 @@ use crate::values::bounds::bounds;
 use crate::values::expr::{Expr, Exprs, Id};
 
 /// Scale, offset and limits of every value, as the contract applies them.
-struct Ends {
+struct ContractValues {
     scale: Vec<f64>,
     offset: Vec<f64>,
     low: Vec<f64>,
     high: Vec<f64>,
 }
 
-/// The value before what the contract of `act_len` values does, and the contract.
+/// Splits `root` into the value before the contract, and the contract for `act_len` values.
 pub(crate) fn contract(exprs: &Exprs, root: Id, act_len: usize) -> (Id, Option<JsonContract>) {
     let n = exprs.len_of(root);
-    let mut ends = Ends {
+    let mut ends = ContractValues {
         scale: vec![1.0; n],
         offset: vec![0.0; n],
         low: vec![f64::NEG_INFINITY; n],
@@ -51,8 +51,8 @@ pub(crate) fn contract(exprs: &Exprs, root: Id, act_len: usize) -> (Id, Option<J
     }
 }
 
-/// Gives each action that the contract does not limit the bounds of its last operation as limits, if it has any; the
-/// contract then, and how many actions these are. `at` is the value before what the contract does.
+/// Limits each action without limits to the bounds of its last operation, if any. Returns the contract and the number
+/// of these actions. `at` is the value before the contract.
 pub(crate) fn bounded(
     exprs: &Exprs,
     at: Id,
@@ -73,13 +73,13 @@ pub(crate) fn bounded(
     (Some(json).filter(|json| *json != JsonContract::default()), found)
 }
 
-/// Bounds of action `i`, in all actions of a chunk, after the contract's factor and offset.
+/// Returns the bounds of action `i` in all actions of a chunk, after the contract's factor and offset.
 fn ends(exprs: &Exprs, at: Id, json: &JsonContract, i: usize, act_len: usize) -> Option<[f32; 2]> {
     let (scale, offset) = (value(&json.scale, i, 1.0), value(&json.offset, i, 0.0));
     let [mut low, mut high] = [f32::MAX, f32::MIN];
     for place in (i..exprs.len_of(at)).step_by(act_len) {
         let bounds = if scale == 0.0 { [0.0; 2] } else { bounds(exprs, at, place)? };
-        // As the contract computes in f32, whose roundings keep the order.
+        // In f32, as the contract computes; rounding is monotonic.
         for end in bounds.map(|bound| bound * scale + offset) {
             (low, high) = (low.min(end), high.max(end));
         }
@@ -91,13 +91,13 @@ fn value(array: &Array, i: usize, none: f32) -> f32 {
     array.as_ref().and_then(|values| values[i]).map_or(none, |value| value as f32)
 }
 
-/// The number of the shortest text that is this f32.
+/// Returns the f64 of the f32's shortest decimal text.
 fn decimal(value: f32) -> Option<f64> {
     format!("{value:?}").parse().ok()
 }
 
-impl Ends {
-    /// The contract, where all actions of a chunk have the same and f32 holds it.
+impl ContractValues {
+    /// Returns the contract, if it is the same for all actions of a chunk and finite in f32.
     fn json(&self, act_len: usize) -> Option<JsonContract> {
         let each = |values: &[f64], none: f64, unlimited: f64| -> Option<Array> {
             let first = values.get(..act_len)?;

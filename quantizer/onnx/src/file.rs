@@ -1,4 +1,4 @@
-//! The bytes of an ONNX file: protobuf messages, and the graph in them.
+//! Parsing of ONNX files: protobuf messages, and the graph in them.
 
 pub(crate) mod model;
 pub mod proto;

@@ -1,7 +1,8 @@
-//! Policies out of ONNX files, by rule: docs/IMPORT.md says what is taken.
+//! Importer of policies from ONNX files, by the rules in docs/IMPORT.md.
 //!
-//! A file is read (`file`), followed from its inputs to the chosen output (`nodes`, over the expressions of `values`), put
-//! together from what exporters take apart and simplified (`patterns`), and lowered to the ops of policy.json (`lower`).
+//! The import parses a file (`file`) and follows its graph from the inputs to the chosen output (`nodes`), which gives
+//! expressions (`values`). It recognizes norms, activations and cells that exporters decompose, and simplifies
+//! (`patterns`). Then it lowers the expressions to the ops of policy.json (`lower`).
 #![deny(unsafe_code)]
 
 mod action;

@@ -1,4 +1,4 @@
-//! Expressions as the ops of policy.json, with their tensors.
+//! Lowering of expressions to the ops of policy.json, with their tensors.
 
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -15,7 +15,7 @@ pub(crate) struct Weight {
     pub(crate) data: Vec<f32>,
 }
 
-/// A run of elements of what an op gives; op 0 is the observation, op `i + 1` the op of this index.
+/// A run of elements of a slot. Slot 0 is the observation, slot `i + 1` the output of op `i`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Part {
     slot: usize,
@@ -23,30 +23,31 @@ struct Part {
     len: usize,
 }
 
-/// The most repetitions of an element in one operand: each is copied by itself. What is longer repeats a copy of so
-/// many.
+/// The most repetitions of an element in one operand, each of which is a copy. A longer operand repeats an op with this
+/// many copies.
 const MOST_COPIES: usize = 64;
 
-/// Ops and tensors so far.
+/// The ops and tensors.
 pub(crate) struct Lowered {
     pub(crate) ops: Vec<JsonOp>,
     pub(crate) weights: Vec<Weight>,
-    /// What each op reads.
+    /// Input parts of each op, and the slot of its second operand.
     reads: Vec<(Vec<Part>, Option<usize>)>,
     /// Length of the observation, then of each op's output.
     lens: Vec<usize>,
     names: HashSet<String>,
-    /// The last number behind a name that was taken.
+    /// The last number that was appended to a name in use.
     numbers: HashMap<String, usize>,
-    /// Names of the matrices, which several ops may share.
+    /// Names of the matrices. Several ops may share one.
     matrices: HashMap<*const Matrix, String>,
+    /// Parts that hold each expression.
     places: HashMap<Id, Vec<Part>>,
-    /// Which expressions an op of their reader computes along.
-    taken: HashSet<Id>,
+    /// Expressions that the op of their reader includes.
+    included: HashSet<Id>,
 }
 
-/// Lowers a value. `offsets` says where the elements of each graph input stand in the observation, of `obs_len` values.
-/// An error names the expression that has no op.
+/// Lowers a value. `offsets` gives the place of each graph input in the observation of `obs_len` values. An error holds
+/// the expression without an op.
 pub(crate) fn lower(
     exprs: &Exprs,
     root: Id,
@@ -62,7 +63,7 @@ pub(crate) fn lower(
         numbers: HashMap::new(),
         matrices: HashMap::new(),
         places: HashMap::new(),
-        taken: HashSet::new(),
+        included: HashSet::new(),
     };
     let order = exprs.needed(&[root]);
     let mut readers: HashMap<Id, usize> = HashMap::new();
@@ -74,15 +75,15 @@ pub(crate) fn lower(
             Expr::Affine(x, ..) if matches!(exprs.get(x), Expr::Clip(..)) => x,
             _ => continue,
         };
-        // What an op takes along, it takes whole: at most a clip, factors, a clip.
+        // An op includes at most a clip, factors and a clip.
         let over = matches!(exprs.get(id), Expr::Affine(..))
-            && matches!(exprs.get(inner), Expr::Clip(x, _) if lowered.taken.contains(x));
+            && matches!(exprs.get(inner), Expr::Clip(x, _) if lowered.included.contains(x));
         if readers.get(&inner) == Some(&1) && !over {
-            lowered.taken.insert(inner);
+            lowered.included.insert(inner);
         }
     }
     for &id in &order {
-        if !lowered.taken.contains(&id) {
+        if !lowered.included.contains(&id) {
             lowered.value(exprs, id, offsets).map_err(|error| (id, error))?;
         }
     }
@@ -106,14 +107,14 @@ impl Lowered {
         Ok(())
     }
 
-    /// An element `n` times.
+    /// Repeats an element `n` times.
     fn spread(&mut self, x: Id, n: usize) -> Result<Vec<Part>> {
         let one = self.place(x);
         if n <= MOST_COPIES {
             return Ok(vec![one; n].concat());
         }
         let most = MOST_COPIES * MOST_COPIES;
-        ensure!(n <= most, "computes {n} values with one; up to {most} are taken");
+        ensure!(n <= most, "repeats a value {n} times; the limit is {most}");
         let copies = JsonOp { op: "identity".to_owned(), ..JsonOp::default() };
         let copies = self.push(copies, vec![one; MOST_COPIES].concat(), None, MOST_COPIES);
         let rest = copies.iter().map(|part| Part { len: n % MOST_COPIES, ..*part }).filter(|part| part.len > 0);
@@ -124,7 +125,7 @@ impl Lowered {
         self.places.get(&id).cloned().unwrap_or_default()
     }
 
-    /// The parts that hold a run.
+    /// Returns the parts that hold a run.
     fn cut(&self, run: Run) -> Vec<Part> {
         let (mut skip, mut left) = (run.from, run.len);
         let mut parts = Vec::new();
@@ -170,7 +171,7 @@ impl Lowered {
                 self.push(JsonOp { w_ln, eps: Some(*eps), ..op("rmsnorm") }, self.place(*x), None, len)
             }
             Expr::Cell(cell) => self.cell(cell, len)?,
-            Expr::CellState(_) => bail!("an LSTM's cell state is read outside its cell"),
+            Expr::CellState(_) => bail!("an LSTM's cell state is read outside its cell; read the hidden state instead"),
             Expr::Unary(f, _) => {
                 let what = match f {
                     Unary::Log => "a logarithm",
@@ -180,12 +181,12 @@ impl Lowered {
                     _ => "a comparison",
                 };
                 bail!(
-                    "{what} has no kernel here by itself, only within a norm, an activation or a cell; compute it before the policy, \
-                     as an input, or behind it"
+                    "{what} has a kernel only within a norm, an activation or a cell; compute it before the policy, as an input, or \
+                     after the policy"
                 )
             }
             Expr::Sum(_) | Expr::Input(_) | Expr::Integers(_) | Expr::Pick(_) | Expr::Spread(_) => {
-                bail!("is no operation")
+                bail!("has no op; this is an error of this program, please report it")
             }
         })
     }
@@ -206,7 +207,7 @@ impl Lowered {
         Ok(self.push(op, self.place(cell.x), None, hidden))
     }
 
-    /// `clip(a clip(x) + b)`, with or without either clip.
+    /// Lowers `clip(a clip(x) + b)`, with or without either clip.
     fn normalize(&mut self, exprs: &Exprs, id: Id) -> Result<Vec<Part>> {
         let len = exprs.len_of(id);
         let (mut at, mut clip, mut pre_clip) = (id, None, None);
@@ -215,19 +216,19 @@ impl Lowered {
             (at, clip) = (*x, Some(*limit));
         }
         if let Expr::Affine(x, a, b) = exprs.get(at)
-            && (at == id || self.taken.contains(&at))
+            && (at == id || self.included.contains(&at))
         {
             at = *x;
             mean = a.iter().zip(b).map(|(a, b)| if *b == 0.0 { 0.0 } else { -b / a }).collect();
             scale.clone_from(a);
             if let Expr::Clip(x, limit) = exprs.get(at)
-                && self.taken.contains(&at)
+                && self.included.contains(&at)
             {
                 (at, pre_clip) = (*x, Some(*limit));
             }
         }
         for limit in [clip, pre_clip].into_iter().flatten() {
-            ensure!(limit > 0.0, "limits a value to nothing but one number");
+            ensure!(limit > 0.0, "limits a value to a single number; fold it to a constant");
         }
         let mean = Some(self.vector("normalize.mean", &mean)?);
         let scale = Some(self.vector("normalize.scale", &scale)?);
@@ -242,7 +243,7 @@ impl Lowered {
         vec![Part { slot: self.ops.len(), from: 0, len }]
     }
 
-    /// The slot of a value that is all of one; a new one for a value that is not.
+    /// Returns the slot that consists of this value, or copies the value to a new one.
     fn whole(&mut self, id: Id) -> Result<usize> {
         let place = self.place(id);
         match place[..] {
@@ -256,7 +257,7 @@ impl Lowered {
         }
     }
 
-    /// Sees that the last op gives the value.
+    /// Appends an op if the last op does not give the value.
     fn end(&mut self, root: Id) -> Result<()> {
         let last = self.ops.len();
         if self.place(root)[..] != [Part { slot: last, from: 0, len: self.lens[last] }] || last == 0 {
@@ -270,7 +271,7 @@ impl Lowered {
         Ok(())
     }
 
-    /// Names the slots, those that are read at all but by the op behind them.
+    /// Names the slots that are read by an op other than the next one.
     fn slots(&mut self) {
         let name = |slot: usize| if slot == 0 { "obs".to_owned() } else { format!("v{slot}") };
         let mut named = HashSet::new();
@@ -315,28 +316,25 @@ impl Lowered {
         self.weight(name, vec![values.len()], values)
     }
 
-    /// The bias beside a weight, where there is one.
+    /// Adds the bias of a weight, if it is not zero.
     fn bias(&mut self, weight: &str, values: &[f64]) -> Result<Option<String>> {
         if values.iter().all(|v| *v == 0.0) {
             return Ok(None);
         }
         let name = match weight.rsplit_once("weight") {
-            Some((before, behind)) => format!("{before}bias{behind}"),
+            Some((before, after)) => format!("{before}bias{after}"),
             None => format!("{weight}.bias"),
         };
         self.vector(&name, values).map(Some)
     }
 
-    /// Takes a tensor, rounded to f32, and gives its name, which has a number where it is taken.
+    /// Adds a tensor, rounded to f32. Returns its name, with a number if `wanted` is in use.
     fn weight(&mut self, wanted: &str, shape: Vec<usize>, values: &[f64]) -> Result<String> {
         let data: Vec<f32> = values.iter().map(|&v| v as f32).collect();
-        ensure!(
-            data.iter().all(|v| v.is_finite()),
-            "{wanted:?} holds a value that is not finite, or beyond float32's range"
-        );
+        ensure!(data.iter().all(|v| v.is_finite()), "tensor {wanted:?} holds a value that is not finite in float32");
         let mut name = wanted.to_owned();
         while !self.names.insert(name.clone()) {
-            // One counter a name: a file may ask for thousands of the same.
+            // One counter for each name, as a file may have thousands of equal names.
             let number = self.numbers.entry(wanted.to_owned()).or_insert(1);
             *number += 1;
             name = format!("{wanted}.{number}");
@@ -346,7 +344,7 @@ impl Lowered {
     }
 }
 
-/// Neighbours as one.
+/// Merges adjacent parts.
 fn merged(parts: Vec<Part>) -> Vec<Part> {
     let mut all: Vec<Part> = Vec::new();
     for part in parts {

@@ -1,5 +1,5 @@
-//! From a file to the two files of a policy's folder: which output is the action, which inputs are observed, and the
-//! network between.
+//! Conversion of a file to the two files of a policy folder: chooses the action output and the observed inputs, and
+//! converts the network between them.
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
@@ -24,10 +24,10 @@ use crate::states::{Cells, Output, is_state, refuse_lost_states};
 use crate::values::expr::{Expr, Exprs, Id};
 use crate::values::tensor::{Element, Tensor};
 
-/// The most names of a message.
+/// The most names in a message.
 const MOST_LISTED: usize = 20;
 
-/// What the caller chooses; nothing by default.
+/// Choices of the caller; none by default.
 #[derive(Clone, Debug, Default)]
 pub struct Choice {
     /// The value that is the action: an output of the graph, or any value inside.
@@ -37,7 +37,7 @@ pub struct Choice {
 }
 
 impl Choice {
-    /// Refuses names that the file does not have.
+    /// Fails for names that the file does not have.
     fn check(&self, graph: &Graph) -> Result<()> {
         let outputs = || format!("its outputs are {}", listed(&graph.outputs));
         if let Some(name) = &self.output {
@@ -45,7 +45,7 @@ impl Choice {
                 graph.nodes.iter().flat_map(|node| &node.outputs).chain(graph.outputs.iter().map(|port| &port.name));
             ensure!(
                 gives.into_iter().any(|given| given == name),
-                "--output {}: the file gives no such value; {}",
+                "--output {}: the file has no value of this name; {}",
                 printable(name),
                 outputs()
             );
@@ -68,57 +68,57 @@ impl Choice {
     }
 }
 
-/// Names for a message.
+/// Lists names for a message.
 fn listed(ports: &[Port]) -> String {
     let names: Vec<_> = ports.iter().take(MOST_LISTED).map(|port| printable(&port.name)).collect();
     let more = ports.len() - names.len();
     names.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
 }
 
-/// An ONNX file as a policy's files, and what became of it.
+/// The files of an imported policy, and a summary of the import.
 #[derive(Clone, Debug)]
 pub struct Imported {
     /// policy.json
     pub json: Vec<u8>,
     /// policy.safetensors
     pub weights: Vec<u8>,
-    /// What wrote the file.
+    /// Exporter of the file.
     pub producer: String,
-    /// Inputs that are observed, with their lengths: the observation is their concatenation in this order.
+    /// Observed inputs, with their lengths. The observation is their concatenation in this order.
     pub inputs: Vec<(String, usize)>,
-    /// Which of these inputs the file takes as integers: they are observed as such, in float32.
+    /// Observed inputs that the file takes as integers. The observation holds them as integers in float32.
     pub integers: Vec<String>,
-    /// Inputs that hold recurrent state, the outputs of their next values, and lengths.
+    /// Inputs that hold recurrent state, the outputs of their next values, and their lengths.
     pub states: Vec<(String, String, usize)>,
-    /// The output that is the action, and its values.
+    /// The action output, and its number of values.
     pub output: (String, usize),
-    /// Names of the ops, in order.
+    /// Names of the ops in order.
     pub ops: Vec<String>,
     /// Inputs that the action does not depend on.
     pub cut_inputs: Vec<String>,
-    /// Outputs that are not the action, nor states.
+    /// Outputs that are neither the action nor states.
     pub cut_outputs: Vec<String>,
-    /// Nodes of the file.
+    /// Number of nodes in the file.
     pub nodes: usize,
-    /// Keys of the action contract that the file's last nodes became.
+    /// Keys of the action contract that come from the file's last nodes.
     pub contract: Vec<&'static str>,
-    /// Actions whose limits are the bounds of their last operation, as of tanh.
+    /// Number of actions whose limits are the bounds of their last operation, such as tanh.
     pub bounded: usize,
 }
 
-/// Reads an ONNX file. An error names the file, and the node where there is one.
+/// Imports an ONNX file. An error names the file, and the node if known.
 pub fn import(path: &Path, choice: &Choice) -> Result<Imported> {
     let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     let imported = Model::read(path).and_then(|model| network(&model, &name, choice));
     imported.with_context(|| path.display().to_string())
 }
 
-/// As [`import`], from a file's bytes; tensors in other files are looked for in `folder`.
+/// Imports a file's bytes as [`import`] does, with external tensors from `folder`.
 pub fn import_bytes(bytes: Vec<u8>, folder: &Path, name: &str, choice: &Choice) -> Result<Imported> {
     network(&Model::parse(Bytes::from(bytes), folder)?, name, choice)
 }
 
-/// ONNX files as a format, imported without choices.
+/// Importer of ONNX files, without choices.
 #[derive(Clone, Copy, Debug)]
 pub struct Onnx;
 
@@ -151,7 +151,7 @@ fn network(model: &Model, name: &str, choice: &Choice) -> Result<Imported> {
     if let Some(inner) = &choice.output
         && !outputs.iter().any(|output| output.name == *inner)
     {
-        let value = follower.value(inner).with_context(|| format!("the output {:?}", printable(inner)))?;
+        let value = follower.value(inner).with_context(|| format!("output {:?}", printable(inner)))?;
         outputs.push(Output { name: inner.clone(), value });
     }
     let mut exprs = follower.exprs;
@@ -161,9 +161,11 @@ fn network(model: &Model, name: &str, choice: &Choice) -> Result<Imported> {
 
     let value = Tensor::of_elements(act_shape.clone(), cells.elements(&outputs[chosen].value));
     let values = value.elements();
-    // A constant among the values is 0 times another one, and an offset.
+    // A constant value becomes another value times 0, plus an offset.
     let first = values.iter().find_map(|e| if let Element::Of(id, i) = e { Some((*id, *i)) } else { None });
-    let first = first.with_context(|| format!("the output {:?} depends on no input", printable(&action)))?;
+    let first = first.with_context(|| {
+        format!("output {:?} depends on no input; choose another by --output NAME", printable(&action))
+    })?;
     let open: Vec<(Id, usize)> =
         values.iter().map(|e| if let Element::Of(id, i) = e { (*id, *i) } else { first }).collect();
     let parts = |e: &Element| if let Element::Known(v) = e { (0.0, *v) } else { (1.0, 0.0) };
@@ -173,8 +175,8 @@ fn network(model: &Model, name: &str, choice: &Choice) -> Result<Imported> {
     let live = exprs.needed_instead(&[root], &cells.instead);
     if let Some(i) = live.iter().find_map(|&id| if let Expr::Integers(i) = exprs.get(id) { Some(*i) } else { None }) {
         bail!(
-            "the action is computed with the integers of the input {:?}; an observation is of float32, so cast them to that before \
-             anything else",
+            "the action is computed with the integers of the input {:?}, and an observation is float32; cast the input to float32 \
+             first",
             printable(&model.graph.inputs[i].name)
         );
     }
@@ -184,7 +186,7 @@ fn network(model: &Model, name: &str, choice: &Choice) -> Result<Imported> {
     read.sort_unstable();
     refuse_lost_states(model, &read, &pairs, &outputs, &action, &choice.states)?;
     read.retain(|i| !pairs.iter().any(|(state, _)| state == i));
-    ensure!(!read.is_empty(), "the output {:?} depends on no input", printable(&action));
+    ensure!(!read.is_empty(), "output {:?} depends on no input; choose another by --output NAME", printable(&action));
 
     let len_of = |exprs: &Exprs, i: usize| {
         live.iter().find(|&&id| *exprs.get(id) == Expr::Input(i)).map_or(0, |&id| exprs.len_of(id))
@@ -235,7 +237,7 @@ fn network(model: &Model, name: &str, choice: &Choice) -> Result<Imported> {
         chunk: (chunk > 1).then_some(chunk),
         obs_dim: obs_len,
         act_dim: act_len,
-        // Without an action, a chunk would be limited to -1 .. 1.
+        // Without a contract, the actions of a chunk would be limited to -1 .. 1.
         action: contract.or_else(|| (chunk > 1).then(JsonContract::default)),
         ops: Vec::new(),
         ..PolicyJson::default()
@@ -266,7 +268,7 @@ fn keys(contract: &JsonContract) -> Vec<&'static str> {
     all.into_iter().filter(|(_, values)| values.is_some()).map(|(name, _)| name).collect()
 }
 
-/// The output that is the action: the one that is asked for, or the only one that can be, or the only one called so.
+/// Chooses the action output: the one of `--output`, or the only candidate, or the only one named action.
 fn choose(
     exprs: &Exprs,
     cells: &Cells,
@@ -275,12 +277,13 @@ fn choose(
     choice: &Choice,
 ) -> Result<usize> {
     if let Some(name) = &choice.output {
-        return outputs.iter().position(|output| output.name == *name).context("the output is not there");
+        return outputs.iter().position(|output| output.name == *name).context("the chosen output is missing");
     }
     let mut can: Vec<usize> = (0..outputs.len()).filter(|&i| !outputs[i].value.is_known()).collect();
     if can.is_empty() {
-        let (name, error) = refused(errors).context("no output depends on an input")?;
-        return Err(error.context(format!("the output {:?} cannot be taken", printable(&name))));
+        let (name, error) = refused(errors)
+            .context("no output depends on an input; export the policy with its observation as input")?;
+        return Err(error.context(format!("output {:?} cannot be imported", printable(&name))));
     }
     let is_paired = |i: &usize| is_state(cells, exprs, &outputs[*i].value);
     let named = |i: &usize| choice.states.iter().any(|(_, to)| *to == outputs[*i].name);
@@ -293,28 +296,31 @@ fn choose(
             can.retain(|i| keep(i));
         }
     }
-    // An action that cannot be taken is not replaced by something else: a critic's value, or a hidden state. But an
-    // exporter adds the deterministic action to one that is drawn.
+    // An action that cannot be imported must not be replaced by a critic's value or a hidden state. But exporters add
+    // the deterministic action to a random one.
     errors.retain(|(name, error)| is_action(name) || !is_drawn(error));
     let is_called = can.iter().any(|&i| is_action(&outputs[i].name));
     if !is_called && let Some((lost, error)) = refused(errors) {
         can.retain(|i| !is_paired(i) && !named(i));
         let others = match &can[..] {
-            [] => "the other outputs are states".to_owned(),
-            _ => format!("no other is called action; actq import --output NAME takes {}", sizes(outputs, &can)),
+            [] => "all other outputs are states".to_owned(),
+            _ => format!(
+                "no other output is named action; choose one by actq import --output NAME: {}",
+                sizes(outputs, &can)
+            ),
         };
-        return Err(error.context(format!("the output {:?} cannot be taken, and {others}", printable(&lost))));
+        return Err(error.context(format!("output {:?} cannot be imported, and {others}", printable(&lost))));
     }
     match can[..] {
         [one] => Ok(one),
         _ => bail!(
-            "several outputs can be the action: {}; choose one with actq import --output NAME",
+            "several outputs can be the action: {}; choose one by actq import --output NAME",
             sizes(outputs, &can)
         ),
     }
 }
 
-/// Of the outputs that were refused the one called action, or else the last.
+/// Returns the refused output named action, or else the last refused one.
 fn refused(mut errors: Vec<(String, actq::error::Error)>) -> Option<(String, actq::error::Error)> {
     match errors.iter().position(|(name, _)| is_action(name)) {
         Some(at) => Some(errors.swap_remove(at)),
@@ -322,7 +328,7 @@ fn refused(mut errors: Vec<(String, actq::error::Error)>) -> Option<(String, act
     }
 }
 
-/// Some outputs with their lengths, for a message.
+/// Lists outputs with their lengths, for a message.
 fn sizes(outputs: &[Output], which: &[usize]) -> String {
     let one = |&i: &usize| format!("{} ({} values)", printable(&outputs[i].name), outputs[i].value.len());
     which.iter().map(one).collect::<Vec<_>>().join(", ")
@@ -332,16 +338,15 @@ fn is_action(name: &str) -> bool {
     name.to_lowercase().contains("action") && !name.to_lowercase().contains("shape")
 }
 
-/// Whether an output was refused as it draws random numbers.
+/// Returns `true` if an output was refused because it draws random numbers.
 fn is_drawn(error: &actq::error::Error) -> bool {
     error.cause().to_string() == RANDOM
 }
 
-/// Refuses several observations at once: their actions would be taken for a chunk.
+/// Refuses a batch of several observations, whose actions would look like a chunk.
 fn refuse_batch(model: &Model, read: &[usize], act_shape: &[usize]) -> Result<()> {
     let &[batch, _, ..] = act_shape else { return Ok(()) };
-    // A vector has values, not rows. One input with rows is enough: what stands beside it may be the same for all of
-    // them.
+    // A vector has no rows. One input with rows is enough, as other inputs may be the same for all rows.
     let in_rows = |i: &&usize| match model.graph.inputs[**i].shape.as_deref() {
         Some(&[first, _, ..]) => first == Some(batch),
         _ => false,
@@ -350,22 +355,24 @@ fn refuse_batch(model: &Model, read: &[usize], act_shape: &[usize]) -> Result<()
         && let Some(&i) = read.iter().find(in_rows)
     {
         bail!(
-            "the action and the input {:?} have {batch} rows, which is a batch; a control step has one observation, so export with a \
-             batch of 1, and a history with a chunk of its length as [1, {batch}, n]",
+            "the action and the input {:?} have {batch} rows, which is a batch, and a step has one observation; export with a batch of \
+             1, and a history with a chunk of its length as [1, {batch}, n]",
             printable(&model.graph.inputs[i].name)
         );
     }
     Ok(())
 }
 
-/// Actions in the output, and the length of each.
+/// Returns the number of actions in the output, and the length of each.
 fn actions(shape: &[usize], n: usize) -> Result<(usize, usize)> {
     let ones = shape.iter().take_while(|&&n| n == 1).count();
     match &shape[ones..] {
         [] => Ok((1, n)),
         [n] => Ok((1, *n)),
         [chunk, n] => Ok((*chunk, *n)),
-        _ => bail!("the action has the shape {shape:?}; [value] or [action, value] is taken, behind axes of length 1"),
+        _ => bail!(
+            "the action has the shape {shape:?}; export it as [value] or [action, value], after any axes of length 1"
+        ),
     }
 }
 
@@ -377,7 +384,7 @@ fn at_node(model: &Model, exprs: &Exprs, id: Id, error: actq::error::Error) -> a
     }
 }
 
-/// policy.json, an op a line.
+/// Formats policy.json with one op per line.
 fn text(
     json: PolicyJson,
     lowered: &Lowered,

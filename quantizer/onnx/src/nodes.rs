@@ -1,4 +1,4 @@
-//! What each ONNX operator does to the values that reach it.
+//! The conversion of each ONNX operator to expressions.
 
 pub(crate) mod arithmetic;
 pub(crate) mod call;

@@ -1,4 +1,4 @@
-//! What exporters take apart and is put together again: norms, activations, rows, slices.
+//! Recognition of patterns that exporters decompose: norms, activations, cells, rows, slices.
 
 pub(crate) mod build;
 pub(crate) mod forms;

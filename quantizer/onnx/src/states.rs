@@ -1,4 +1,4 @@
-//! Which inputs hold recurrent state, and which outputs its next value.
+//! Pairs of inputs that hold recurrent state and outputs of its next value.
 
 use std::collections::HashMap;
 
@@ -9,24 +9,25 @@ use crate::file::model::Model;
 use crate::values::expr::{Expr, Exprs, Id, Run};
 use crate::values::tensor::{Element, Tensor};
 
-/// An output of the graph, as far as it can be followed.
+/// An output of the graph, with its value.
 pub(crate) struct Output {
     pub(crate) name: String,
     pub(crate) value: Tensor,
 }
 
-/// State inputs with the outputs of their next values, by index.
+/// Indices of state inputs and of the outputs of their next values.
 pub(crate) type Pairs = Vec<(usize, usize)>;
 
-/// Cells that were taken apart: what their states after the step become.
+/// Cells that an exporter decomposed.
 #[derive(Default)]
 pub(crate) struct Cells {
+    /// States after the step in the file, with the expressions of the cells that replace them.
     pub(crate) instead: HashMap<Id, Id>,
 }
 
 impl Cells {
-    /// Finds the cells whose next states are among the outputs. `named` are the pairs that the caller knows, of input
-    /// and output.
+    /// Finds the cells whose next states are among the outputs. `named` are pairs of inputs and outputs from the
+    /// caller.
     pub(crate) fn find(model: &Model, exprs: &mut Exprs, outputs: &[Output], named: &[(String, String)]) -> Self {
         let mut found = Self::default();
         for output in outputs {
@@ -57,7 +58,7 @@ impl Cells {
         found
     }
 
-    /// An element, of the cell where there was one taken apart.
+    /// Replaces an element of a decomposed cell by that of the cell.
     fn element(&self, element: Element) -> Element {
         match element {
             Element::Of(id, i) => Element::Of(self.instead.get(&id).copied().unwrap_or(id), i),
@@ -65,12 +66,12 @@ impl Cells {
         }
     }
 
-    /// The elements of a value.
+    /// Returns the elements of a value, with decomposed cells replaced.
     pub(crate) fn elements(&self, value: &Tensor) -> Vec<Element> {
         value.elements().into_iter().map(|element| self.element(element)).collect()
     }
 
-    /// For every cell in use, which output carries its state on. Refuses a state that nothing carries.
+    /// Finds the outputs that carry the states of all cells in use. Refuses a state without such an output.
     pub(crate) fn pairs(&self, model: &Model, exprs: &Exprs, live: &[Id], outputs: &[Output]) -> Result<Pairs> {
         let mut pairs = Pairs::new();
         let cell = |id: Id| if let Expr::Cell(cell) = exprs.get(id) { Some((id, cell)) } else { None };
@@ -89,12 +90,12 @@ impl Cells {
                         && part.is_some_and(|part| part.iter().enumerate().all(|(k, e)| is_next(e, k)))
                 };
                 let output = outputs.iter().position(carries).with_context(|| {
-                    format!("no output holds the next value of the state {name:?}; export it as an output, in the state's order")
+                    format!("state {name:?} is not carried to the next step; export its next value as an output, in the same order")
                 })?;
                 let known = pairs.iter().find(|(other, _)| *other == input);
                 ensure!(
                     known.is_none_or(|(_, other)| *other == output),
-                    "the state {name:?} is carried by two outputs; where an exporter was given one tensor for two states, give it two"
+                    "two outputs carry the state {name:?}; pass the exporter a separate tensor for each state"
                 );
                 if known.is_none() {
                     pairs.push((input, output));
@@ -106,13 +107,13 @@ impl Cells {
 }
 
 fn input_of(model: &Model, exprs: &Exprs, run: &Run) -> Result<(usize, String)> {
-    let &Expr::Input(i) = exprs.get(run.of) else { bail!("a state is no input of the graph") };
-    let port = model.graph.inputs.get(i).context("a state is no input of the graph")?;
+    let &Expr::Input(i) = exprs.get(run.of) else { bail!("a state is not an input of the graph") };
+    let port = model.graph.inputs.get(i).context("a state is not an input of the graph")?;
     Ok((i, printable(&port.name).into_owned()))
 }
 
-/// Runs of inputs that may be the hidden state whose next value is at `place` of an output: inputs as long as the
-/// output, those first that the caller names, then those whose name says so.
+/// Lists runs of inputs that may be the hidden state whose next value is at `place` of an output: inputs as long as the
+/// output. Inputs that the caller pairs come first, then those with a similar name.
 fn candidates(model: &Model, exprs: &mut Exprs, output: &Output, place: Run, named: &[(String, String)]) -> Vec<Run> {
     let mut found: Vec<(usize, Run)> = Vec::new();
     for (i, port) in model.graph.inputs.iter().enumerate() {
@@ -137,7 +138,7 @@ fn candidates(model: &Model, exprs: &mut Exprs, output: &Output, place: Run, nam
     found.into_iter().map(|(_, run)| run).collect()
 }
 
-/// A name without what tells a state before a step from the one after it.
+/// Strips the parts of a name that distinguish a state before a step from the state after it.
 fn stem(name: &str) -> String {
     const SIDES: [&str; 16] = [
         "in", "out", "input", "output", "inputs", "outputs", "prev", "next", "new", "old", "last", "state", "states",
@@ -156,7 +157,7 @@ fn stem(name: &str) -> String {
     joined
 }
 
-/// Refuses what looks like a state and is none that a policy can carry: it would be observed, and never change.
+/// Refuses inputs that look like a state but belong to no cell: the policy would read them as constant observations.
 pub(crate) fn refuse_lost_states(
     model: &Model,
     live_inputs: &[usize],
@@ -165,13 +166,13 @@ pub(crate) fn refuse_lost_states(
     action: &str,
     named: &[(String, String)],
 ) -> Result<()> {
-    let help = "only the states of LSTM and GRU cells (torch's forms) are carried from step to step; what else the policy \
-                should remember, observe: an input without an output";
+    let help = "only states of LSTM and GRU cells (in torch's forms) are carried from step to step; make any other memory an \
+                observation, an input without an output";
     for (from, to) in named {
         let is_pair = |(i, o): &(usize, usize)| model.graph.inputs[*i].name == *from && outputs[*o].name == *to;
         ensure!(
             pairs.iter().any(is_pair),
-            "--state {}={}: between them is no cell that the action needs; {help}",
+            "--state {}={}: no cell between them leads to the action; {help}",
             printable(from),
             printable(to)
         );
@@ -196,7 +197,7 @@ pub(crate) fn refuse_lost_states(
     Ok(())
 }
 
-/// Whether an output is nothing but states of cells.
+/// Returns `true` if an output consists of states of cells.
 pub(crate) fn is_state(cells: &Cells, exprs: &Exprs, value: &Tensor) -> bool {
     cells.elements(value).iter().all(|e| match *e {
         Element::Of(id, _) => matches!(exprs.get(id), Expr::CellState(_) | Expr::Cell(_)),

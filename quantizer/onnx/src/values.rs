@@ -1,4 +1,4 @@
-//! What is followed through a graph: vectors of values as expressions, and tensors of their elements.
+//! Values of a graph: expressions over vectors, and tensors of their elements.
 
 pub(crate) mod bounds;
 pub(crate) mod compare;

@@ -71,13 +71,13 @@ fn import_writes_a_folder_and_overwrites_nothing() -> Result<()> {
     failed(
         &import(&["--force", "--output", "nothing"])?,
         1,
-        &["--output nothing: the file gives no such value; its outputs are actions"],
+        &["--output nothing: the file has no value of this name; its outputs are actions"],
     )?;
     let lost = import(&["--force", "--state", "h=actions"])?;
     failed(&lost, 1, &["--state h=actions: the file has no input \"h\"; its inputs are obs"])?;
     let lost = import(&["--force", "--state", "obs=h"])?;
     failed(&lost, 1, &["--state obs=h: the file has no output \"h\"; its outputs are actions"])?;
-    failed(&import(&["--force", "--state", "obs=actions"])?, 1, &["--state obs=actions: between them is no cell"])?;
+    failed(&import(&["--force", "--state", "obs=actions"])?, 1, &["--state obs=actions: no cell between them"])?;
     // The output of the command makes an image.
     let image = dir.path().join("a.actq");
     let quantize = |more: &[&str]| actq(&[&["quantize", text(&model), "--out", text(&image)], more].concat()).output();

@@ -84,6 +84,6 @@ fn quantized_weights_are_read_as_their_values() -> Result<()> {
     file.nodes("DequantizeLinear", &[&x, &scale, "zero"], &["actions"], &[]);
     file.output("actions", &[1, OBS as i64]);
     let error = imported(&file.bytes(), &Choice::default()).expect_err("quantized");
-    assert!(format!("{error:#}").contains("(QuantizeLinear): the file is quantized already"), "{error:#}");
+    assert!(format!("{error:#}").contains("(QuantizeLinear): the file is already quantized"), "{error:#}");
     Ok(())
 }

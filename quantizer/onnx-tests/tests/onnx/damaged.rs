@@ -53,9 +53,9 @@ fn external(location: &str) -> Vec<u8> {
 #[test]
 fn each_malformed_file_is_refused_with_its_fault() {
     refused(Vec::new(), "the file is empty");
-    refused(b"not an onnx file".to_vec(), "no ONNX file");
+    refused(b"not an onnx file".to_vec(), "the file is not ONNX");
     let bytes = whole();
-    refused(bytes[..bytes.len() / 2].to_vec(), "damaged, or the file was cut off");
+    refused(bytes[..bytes.len() / 2].to_vec(), "the file is damaged or truncated");
     let vast = |dims: &[usize]| {
         let dims = dims.to_vec();
         with(move |file| {
@@ -63,8 +63,8 @@ fn each_malformed_file_is_refused_with_its_fault() {
             file.nodes("MatMul", &["obs", "w"], &["actions"], &[]);
         })
     };
-    refused(vast(&[4, 1 << 40]), "has more elements than any policy");
-    refused(vast(&[4, 1 << 20]), "needs 4194304 values, 0 are there");
+    refused(vast(&[4, 1 << 40]), "exceeds the limit of a tensor's elements");
+    refused(vast(&[4, 1 << 20]), "needs 4194304 values, and 0 are present");
     let norm = |epsilon: f32| {
         with(|file| {
             let ones = file.reals(&[4], &[1.0; 4]);
@@ -95,27 +95,30 @@ fn each_malformed_file_is_refused_with_its_fault() {
         let pads = file.ints(&[2, 0, 2, 0]);
         file.nodes("Pad", &[&x, &pads], &["actions"], &[]);
     });
-    refused(padded, "(Pad): [5, 1200004] are more values than a policy of this size can have");
+    refused(padded, "(Pad): shape [5, 1200004] has more values than a policy of this size can have");
     refused(external("../secret"), "outside the model's folder");
     refused(external("/etc/passwd"), "outside the model's folder");
-    refused(external("weights.bin"), "is not beside the model; copy both together");
-    let circle = with(|file| {
+    refused(external("weights.bin"), "cannot read \"weights.bin\", which holds the elements; put it beside the model");
+    let cycle = with(|file| {
         file.nodes("Add", &["obs", "b"], &["a"], &[]);
         file.nodes("Tanh", &["a"], &["b"], &[]);
         file.nodes("Tanh", &["b"], &["actions"], &[]);
     });
-    refused(circle, "node 0 \"/node/0\" (Add): reads \"b\" before anything gives it: the graph has a circle");
-    refused(node("Add", &["nowhere"], &[]), "reads \"nowhere\" before anything gives it");
-    refused(node("MaxPool", &["obs"], &[]), "node 0 \"/node/0\" (MaxPool): its kernel does not fit [1, 4]");
-    refused(node("ConvTranspose", &["obs"], &[]), "(ConvTranspose): has no kernel here; export the part behind");
+    refused(cycle, "node 0 \"/node/0\" (Add): reads \"b\" before a node gives it; remove the cycle");
+    refused(node("Add", &["nowhere"], &[]), "reads \"nowhere\" before a node gives it");
+    refused(node("MaxPool", &["obs"], &[]), "node 0 \"/node/0\" (MaxPool): its kernel does not fit the shape [1, 4]");
+    refused(node("ConvTranspose", &["obs"], &[]), "(ConvTranspose): has no kernel here; export the part after");
     refused(node("MatMul", &["obs"], &[]), "multiplies two values of the network, as attention does");
     refused(node("Softmax", &[], &[]), "(Softmax): has no kernel here");
-    refused(node("Sqrt", &[], &[]), "node 0 \"/node/0\" (Sqrt): a square root has no kernel here by itself");
-    refused(node("Frobnicate", &[], &[]), "(Frobnicate): is not known; docs/IMPORT.md lists what is taken");
+    refused(node("Sqrt", &[], &[]), "node 0 \"/node/0\" (Sqrt): a square root has a kernel only within a norm");
+    refused(
+        node("Frobnicate", &[], &[]),
+        "(Frobnicate): is not a supported operator; docs/IMPORT.md lists the supported operators",
+    );
     refused(node("Cast", &[], &[("to", Value::Int(10))]), "rounds a value of the network to float16");
     refused(
         node("Clip", &[], &[("min", Value::Real(2.0)), ("max", Value::Real(1.0))]),
-        "limits to 2 .. 1, which is no range",
+        "limits to 2 .. 1; the lower limit exceeds the upper one",
     );
     let not_finite = with(|file| {
         let w = file.reals(&[4, 4], &[f32::NAN; 16]);
@@ -126,7 +129,7 @@ fn each_malformed_file_is_refused_with_its_fault() {
         let w = file.reals(&[4], &[0.0; 4]);
         file.nodes("Div", &["obs", &w], &["actions"], &[]);
     });
-    refused(divided, "(Div): computes with a constant that is not finite, or divides by 0");
+    refused(divided, "(Div): has a constant that is not finite, or divides by 0");
     let nested = (0..64).fold(proto::Graph::default(), |inner, _| {
         let g =
             proto::Attribute { name: Some("then_branch".to_owned()), g: Some(encoded(&inner)), ..Default::default() };
@@ -141,7 +144,7 @@ fn each_malformed_file_is_refused_with_its_fault() {
     });
     refused(
         encoded(&proto::Model { graph: Some(encoded(&nested)), ..File::default().model() }).to_vec(),
-        "graphs stand within each other",
+        "graphs are nested",
     );
     let forgets = with(|file| {
         let (w, r) = (file.drawn(&[1, 16, 4]), file.drawn(&[1, 16, 4]));
@@ -149,7 +152,7 @@ fn each_malformed_file_is_refused_with_its_fault() {
         let x = file.node("Unsqueeze", &["obs", &axes], &[]);
         file.nodes("LSTM", &[&x, &w, &r], &["actions"], &[("hidden_size", Value::Int(4))]);
     });
-    refused(forgets, "forgets its hidden state after every step; export it as an input of the graph");
+    refused(forgets, "state hidden is not carried to the next step; export it as an input of the graph");
     let reset = with(|file| {
         file.nodes("GRU", &["obs", "obs", "obs"], &["actions"], &[("hidden_size", Value::Int(4))]);
     });
@@ -184,7 +187,7 @@ fn node_sizes_are_bounded_before_allocation() {
         })
     };
     let values = product([1, 1], 1 << 20, [1, 1 << 16]);
-    refused(values, "(MatMul): multiplies [1048576, 1] with [1, 65536], which are more values than a policy");
+    refused(values, "(MatMul): multiplies [1048576, 1] with [1, 65536], which gives more values than a policy");
     let work = product([1, 1024], 2048, [1024, 1024]);
     refused(work, "(MatMul): multiplies [2048, 1024] with [1024, 1024], which takes more work than a policy");
     let gathered = |op: &str, shape: &[i64]| {
@@ -196,7 +199,7 @@ fn node_sizes_are_bounded_before_allocation() {
         })
     };
     for (op, shape) in [("Gather", &[4096][..]), ("GatherND", &[4096, 1])] {
-        refused(gathered(op, shape), "[4096, 60000] are more values than a policy of this size can have");
+        refused(gathered(op, shape), "shape [4096, 60000] has more values than a policy of this size can have");
     }
     // With padding every position has a matrix of its own.
     let convolution = |length: i64, kernel: [usize; 3], biases: usize, pads: [i64; 2]| {
@@ -205,7 +208,10 @@ fn node_sizes_are_bounded_before_allocation() {
             file.nodes("Conv", &["obs", &w, &b], &["actions"], &[("pads", Value::Ints(pads.to_vec()))]);
         })
     };
-    refused(convolution(63, [64, 64, 64], 64, [31, 32]), "(Conv): cuts constants, or padding, out of its matrix");
+    refused(
+        convolution(63, [64, 64, 64], 64, [31, 32]),
+        "(Conv): removes columns of constants or padding from its matrix",
+    );
     refused(convolution(4, [6, 2, 1], 1, [0, 0]), "(Conv): its bias has 1 values for 6 channels");
 }
 

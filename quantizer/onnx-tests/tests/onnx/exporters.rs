@@ -169,13 +169,16 @@ fn convolutions_over_few_positions_are_products() -> Result<()> {
     let w = file.drawn(&[4, 3, 3, 3]);
     let x = file.node("Conv", &["image", &w], &[]);
     let x = file.node("Flatten", &[&x], &[]);
-    refused(&ended(file, &x, 784), "(Conv): goes over 196 positions with 1 groups; 1 to 64 are taken");
+    refused(
+        &ended(file, &x, 784),
+        "(Conv): has 196 positions with 1 groups; the limit of positions times groups is 64",
+    );
     let mut file = File::default();
     file.input("history", &[1, 8, 10]);
     let w = file.drawn(&[8, 1, 1]);
     let x = file.node("Conv", &["history", &w], &[("group", Value::Int(8))]);
     let x = file.node("Flatten", &[&x], &[]);
-    refused(&ended(file, &x, 80), "goes over 10 positions with 8 groups; 1 to 64 are taken, positions times groups");
+    refused(&ended(file, &x, 80), "has 10 positions with 8 groups; the limit of positions times groups is 64");
     Ok(())
 }
 
@@ -284,7 +287,7 @@ fn ambiguous_files_are_refused() -> Result<()> {
         let set = |version| encoded(&proto::OperatorSet { domain: None, version: Some(version) });
         proto::Model { opset_import: version.map(set).into_iter().collect(), ..file.model() }.encode_to_vec()
     };
-    refused(&with_opset(None), "does not say which version of ONNX's operators it uses");
+    refused(&with_opset(None), "does not give the version of its ONNX operators");
     refused(&with_opset(Some(6)), "export it with opset 7 or above");
     // A batch, not a chunk of actions.
     let mut file = File::default();
@@ -414,7 +417,7 @@ fn max_min_and_mean_over_positions_are_found() -> Result<()> {
     let mut file = File::default();
     file.input("points", &[1, 65, 1]);
     let x = file.node("ReduceMax", &["points"], &[("axes", Value::Ints(vec![1])), ("keepdims", Value::Int(0))]);
-    refused(&ended(file, &x, 1), "(ReduceMax): takes the largest or least of 65 values; up to 64 are taken");
+    refused(&ended(file, &x, 1), "(ReduceMax): takes the maximum or minimum of 65 values; the limit is 64");
     Ok(())
 }
 
@@ -473,7 +476,7 @@ fn choices_that_resemble_an_activation_are_refused() -> Result<()> {
     assert_eq!(ops(&softplus("Less", false))?, "linear softplus linear");
     // The linear part below the limit.
     for (compare, linear_first) in [("Less", true), ("Greater", false)] {
-        refused(&softplus(compare, linear_first), "chooses by a value of the network in a way that no activation does");
+        refused(&softplus(compare, linear_first), "chooses by a value of the network and does not form an activation");
     }
     // A limit that repeats the value: [1, 5] and [5, 1] give [5, 5].
     let mut file = begun();
@@ -481,7 +484,7 @@ fn choices_that_resemble_an_activation_are_refused() -> Result<()> {
     let c = file.node("Greater", &[&x, &limit], &[]);
     let zero = file.reals(&[], &[0.0]);
     let y = file.node("Where", &[&c, &x, &zero], &[]);
-    refused(&ended(file, &y, 5), "(Greater): compares with the observation");
+    refused(&ended(file, &y, 5), "(Greater): compares the observation");
     Ok(())
 }
 

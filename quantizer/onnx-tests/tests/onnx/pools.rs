@@ -69,8 +69,8 @@ fn pools_that_need_an_operation_are_refused() {
         assert!(error.contains(expected), "{error} instead of {expected}");
     };
     let kernel = |n: i64| ("kernel_shape", Value::Ints(vec![n]));
-    refused("MaxPool", &[1, 1, 72], &[kernel(65)], "(MaxPool): goes over windows of 65 values; 1 to 64 are taken");
+    refused("MaxPool", &[1, 1, 72], &[kernel(65)], "(MaxPool): has windows of 65 values; the limit is 64");
     let over = [kernel(4), ("strides", Value::Ints(vec![4])), ("ceil_mode", Value::Int(1))];
-    refused("MaxPool", &[1, 8, 6], &over, "(MaxPool): has a last window that reaches over the end");
-    refused("AveragePool", &[1, 8, 6], &[], "(AveragePool): its kernel does not fit [1, 8, 6]");
+    refused("MaxPool", &[1, 8, 6], &over, "(MaxPool): has a last window that extends past the end");
+    refused("AveragePool", &[1, 8, 6], &[], "(AveragePool): its kernel does not fit the shape [1, 8, 6]");
 }

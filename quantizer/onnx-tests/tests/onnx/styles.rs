@@ -465,7 +465,7 @@ fn ambiguous_action_outputs_are_refused() -> Result<()> {
     }
     let bytes = file.bytes();
     let error = format!("{:#}", imported(&bytes, &Choice::default()).expect_err("two outputs"));
-    ensure!(error.contains("mean (2 values), value (2 values); choose one with actq import --output NAME"), "{error}");
+    ensure!(error.contains("mean (2 values), value (2 values); choose one by actq import --output NAME"), "{error}");
     let choice = Choice { output: Some("value".to_owned()), ..Choice::default() };
     assert_eq!(imported(&bytes, &choice)?.0.cut_outputs, ["mean"]);
     // A value beside an output that cannot be imported need not be the action.
@@ -476,7 +476,7 @@ fn ambiguous_action_outputs_are_refused() -> Result<()> {
         file.output(name, &[1, 2]);
     }
     let error = format!("{:#}", imported(&file.bytes(), &Choice::default()).expect_err("a value"));
-    let expected = "\"policy\" cannot be taken, and no other is called action; actq import --output NAME takes value (2 values): node 2";
+    let expected = "\"policy\" cannot be imported, and no other output is named action; choose one by actq import --output NAME: value (2 values): node 2";
     ensure!(error.contains(expected), "{error}");
     Ok(())
 }
@@ -500,6 +500,6 @@ fn a_refused_action_is_not_replaced_by_states() {
     file.nodes("Softsign", &[&y], &["action"], &[]);
     file.output("action", &[1, 3]);
     let error = format!("{:#}", imported(&file.bytes(), &Choice::default()).expect_err("Softsign"));
-    let expected = "the output \"action\" cannot be taken, and the other outputs are states: node 5";
+    let expected = "output \"action\" cannot be imported, and all other outputs are states: node 5";
     assert!(error.contains(expected) && !error.contains("_out"), "{error}");
 }

@@ -1,4 +1,4 @@
-//! An ONNX file, read with care: what it declares is believed only as far as the bytes are there.
+//! A parser of untrusted ONNX files: declared sizes are checked against the bytes of the file.
 
 use std::collections::HashMap;
 use std::fs::{self, File};
@@ -15,11 +15,11 @@ use crate::file::proto;
 use crate::values::tensor::{Data, Tensor, count};
 
 /// The most nodes, initializers, inputs or outputs of a graph, and attributes of a node.
-const MOST: usize = 1 << 16;
-/// The most bytes of a file: protobuf has no longer ones.
+const MOST_ENTRIES: usize = 1 << 16;
+/// The most bytes of a file, which is protobuf's limit.
 const MOST_BYTES: u64 = 1 << 31;
 
-/// The first operator set whose arithmetic repeats operands as numpy does.
+/// The first operator set whose arithmetic broadcasts as numpy does.
 const LEAST_OPSET: i64 = 7;
 
 /// A node.
@@ -38,13 +38,13 @@ pub(crate) struct Node {
 #[derive(Clone, Debug)]
 pub(crate) struct Port {
     pub(crate) name: String,
-    /// ONNX's type of the elements; 0 where it is not said.
+    /// ONNX's type of the elements; 0 if not given.
     pub(crate) kind: i32,
-    /// Length of each axis, `None` where it is dynamic; or nothing where no shape is said.
+    /// Length of each axis, `None` for a dynamic one; `None` as a whole without a shape.
     pub(crate) shape: Option<Vec<Option<usize>>>,
 }
 
-/// Nodes with what they start from.
+/// Nodes, with the initializers, inputs and outputs of their graph.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Graph {
     pub(crate) nodes: Vec<Node>,
@@ -53,7 +53,7 @@ pub(crate) struct Graph {
     pub(crate) outputs: Vec<Port>,
 }
 
-/// A function that the file brings along.
+/// A function that the file defines.
 #[derive(Debug)]
 pub(crate) struct Function {
     pub(crate) inputs: Vec<String>,
@@ -62,36 +62,36 @@ pub(crate) struct Function {
     pub(crate) graph: Graph,
 }
 
-/// A file.
+/// A parsed file.
 #[derive(Debug)]
 pub(crate) struct Model {
     pub(crate) graph: Graph,
-    /// By domain, name and overload.
+    /// Functions by domain, name and overload.
     pub(crate) functions: HashMap<[String; 3], Function>,
-    /// What wrote it, for people.
+    /// Name and version of the exporter, and the opset, human-readable.
     pub(crate) producer: String,
-    /// Where files with its tensors may be.
+    /// Folder of external tensors.
     folder: PathBuf,
 }
 
 fn decode<M: Message + Default>(bytes: &Bytes, what: &str) -> Result<M> {
     M::decode(bytes.clone())
         .map_err(Error::other)
-        .with_context(|| format!("{what} is damaged, or the file was cut off"))
+        .with_context(|| format!("{what} cannot be decoded; the file is damaged or truncated"))
 }
 
 fn all<M: Message + Default>(list: &[Bytes], what: &str) -> Result<Vec<M>> {
-    ensure!(list.len() <= MOST, "there are {} of {what}, {MOST} are the most", list.len());
+    ensure!(list.len() <= MOST_ENTRIES, "{what} have {} entries; the limit is {MOST_ENTRIES}", list.len());
     list.iter().map(|bytes| decode(bytes, what)).collect()
 }
 
 impl Model {
     /// Reads a file.
     pub(crate) fn read(path: &Path) -> Result<Self> {
-        let size = fs::metadata(path).context("cannot be read")?.len();
-        ensure!(size <= MOST_BYTES, "{size} bytes; an ONNX file has at most {MOST_BYTES}");
+        let size = fs::metadata(path).context("cannot read the file")?.len();
+        ensure!(size <= MOST_BYTES, "the file has {size} bytes; the limit for an ONNX file is {MOST_BYTES}");
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        Self::parse(fs::read(path).context("cannot be read")?.into(), folder)
+        Self::parse(fs::read(path).context("cannot read the file")?.into(), folder)
     }
 
     /// Parses a file whose tensors may be in other files of `folder`.
@@ -99,19 +99,19 @@ impl Model {
         ensure!(!bytes.is_empty(), "the file is empty");
         ensure!(
             !bytes.starts_with(b"PK\x03\x04"),
-            "this is no ONNX file but a zip archive, as PyTorch's checkpoints are; export the module to ONNX, or to a policy's folder \
+            "the file is not ONNX but a zip archive, as PyTorch's checkpoints are; export the module to ONNX, or to a policy folder \
              (docs/IMPORT.md, PyTorch)"
         );
-        let model: proto::Model = decode(&bytes, "this is no ONNX file: its protobuf")?;
-        let graph = model.graph.as_ref().context("this is no ONNX file: it holds no graph")?;
+        let model: proto::Model = decode(&bytes, "the file is not ONNX: its protobuf")?;
+        let graph = model.graph.as_ref().context("the file is not ONNX: it holds no graph")?;
         let opsets: Vec<proto::OperatorSet> = all(&model.opset_import, "the operator sets")?;
         let own = opsets.iter().find(|set| ["", "ai.onnx"].contains(&set.domain.as_deref().unwrap_or_default()));
-        let opset = own.and_then(|set| set.version).context(
-            "the file does not say which version of ONNX's operators it uses (opset_import); export it again",
-        )?;
+        let opset = own
+            .and_then(|set| set.version)
+            .context("the file does not give the version of its ONNX operators (opset_import); export it again")?;
         ensure!(
             opset >= LEAST_OPSET,
-            "the file uses version {opset} of ONNX's operators, which join values by other rules; export it with opset {LEAST_OPSET} or above"
+            "the file uses opset {opset}, whose operators broadcast by other rules; export it with opset {LEAST_OPSET} or above"
         );
         let [name, version] = [&model.producer_name, &model.producer_version].map(|t| t.as_deref().unwrap_or_default());
         let producer = format!("{}, opset {opset}", printable(format!("{name} {version}").trim()));
@@ -130,7 +130,7 @@ impl Model {
         })
     }
 
-    /// A tensor of the file.
+    /// Decodes a tensor of the file.
     pub(crate) fn tensor(&self, bytes: &Bytes) -> Result<Tensor> {
         let tensor: proto::Tensor = decode(bytes, "a tensor")?;
         let name = printable(tensor.name.as_deref().unwrap_or_default()).into_owned();
@@ -140,7 +140,7 @@ impl Model {
 
     fn elements(&self, tensor: &proto::Tensor) -> Result<Tensor> {
         let axes = tensor.dims.iter().map(|&d| usize::try_from(d).ok()).collect::<Option<Vec<usize>>>();
-        let shape = axes.with_context(|| format!("its shape {:?} has a negative length", tensor.dims))?;
+        let shape = axes.with_context(|| format!("shape {:?} has a negative length", tensor.dims))?;
         let n = count(&shape)?;
         let kind = tensor.data_type.unwrap_or_default();
         let raw = match (tensor.data_location, &tensor.raw_data) {
@@ -167,49 +167,60 @@ impl Model {
             (2 | 9, Some(raw)) => Data::Int(cut(raw, |b| u8::from_le_bytes(b).into())?),
             (2..=6 | 9, None) => Data::Int(tensor.int32_data.iter().map(|&v| v.into()).collect()),
             (12, None) => Data::Int(tensor.uint64_data.iter().map(|&v| v as i64).collect()),
-            _ => bail!("its type is {}; export it as float32 or int64", kind_name(kind)),
+            _ => bail!("the type {} is not supported; export it as float32 or int64", kind_name(kind)),
         };
         let tensor = Tensor::new(shape, data);
-        ensure!(tensor.len() == n, "its shape {:?} needs {n} values, {} are there", tensor.shape, tensor.len());
+        ensure!(tensor.len() == n, "shape {:?} needs {n} values, and {} are present", tensor.shape, tensor.len());
         Ok(tensor)
     }
 
-    /// The bytes of a tensor of `n` elements in a file of the model's folder.
+    /// Reads the bytes of a tensor of `n` elements from a file in the model's folder.
     fn external(&self, tensor: &proto::Tensor, n: usize) -> Result<Bytes> {
         let entries: Vec<proto::Entry> = all(&tensor.external_data, "the places of a tensor")?;
         let entry = |key: &str| {
             let found = entries.iter().find(|entry| entry.key.as_deref() == Some(key));
             found.and_then(|entry| entry.value.as_deref())
         };
-        let location = entry("location").context("its elements are in another file, which is not named")?;
+        let location =
+            entry("location").context("the elements are in an external file without a name; export the file again")?;
         let shown = printable(location);
         let inside = Path::new(location).components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
-        ensure!(inside && !location.is_empty(), "its elements are in {shown:?}, outside the model's folder");
+        ensure!(
+            inside && !location.is_empty(),
+            "the elements are in {shown:?}, outside the model's folder; move that file beside the model"
+        );
         let path = self.folder.join(location);
-        let missing = || format!("its elements are in {shown:?}, which is not beside the model; copy both together");
+        let missing = || format!("cannot read {shown:?}, which holds the elements; put it beside the model");
         let (real, folder) = (fs::canonicalize(&path).with_context(missing)?, fs::canonicalize(&self.folder)?);
-        ensure!(real.starts_with(folder), "its elements are in {shown:?}, a link that leaves the model's folder");
-        ensure!(real.is_file(), "its elements are in {shown:?}, which is no file");
+        ensure!(
+            real.starts_with(folder),
+            "the elements are in {shown:?}, a link that leaves the model's folder; copy the file instead"
+        );
+        ensure!(real.is_file(), "the elements are in {shown:?}, which is not a file");
         let mut file = File::open(real).with_context(missing)?;
         let there = file.metadata().with_context(missing)?.len();
         let number = |key: &str, default: u64| match entry(key) {
             None => Ok(default),
-            Some(text) => {
-                text.parse().map_err(Error::other).with_context(|| format!("{key} {:?} is no number", printable(text)))
-            }
+            Some(text) => text
+                .parse()
+                .map_err(Error::other)
+                .with_context(|| format!("{key} {:?} is not a number", printable(text))),
         };
         let offset = number("offset", 0)?;
         let length = number("length", there.saturating_sub(offset))?;
         let end = offset.checked_add(length).filter(|end| *end <= there);
-        ensure!(end.is_some(), "its elements are {length} bytes from {offset} on of {shown:?}, which has {there}");
-        ensure!(length <= 8 * n as u64, "its elements are {length} bytes of {shown:?}, too many for {n} values");
+        ensure!(
+            end.is_some(),
+            "the elements are {length} bytes at offset {offset} of {shown:?}, which has {there} bytes"
+        );
+        ensure!(length <= 8 * n as u64, "the elements are {length} bytes of {shown:?}, too many for {n} values");
         let mut bytes = vec![0; usize::try_from(length)?];
         file.seek(SeekFrom::Start(offset)).and_then(|_| file.read_exact(&mut bytes)).with_context(missing)?;
         Ok(bytes.into())
     }
 }
 
-/// What ONNX calls a type of elements.
+/// Returns ONNX's name of a type of elements.
 pub(crate) fn kind_name(kind: i32) -> String {
     const NAMES: [&str; 17] = [
         "undefined",
@@ -236,18 +247,18 @@ pub(crate) fn kind_name(kind: i32) -> String {
 
 fn cut<const N: usize, T>(raw: &Bytes, one: impl Fn([u8; N]) -> T) -> Result<Vec<T>> {
     let (whole, rest) = raw.as_chunks::<N>();
-    ensure!(rest.is_empty(), "its {} bytes are no whole number of elements of {N}", raw.len());
+    ensure!(rest.is_empty(), "{} bytes are not a whole number of elements of {N} bytes", raw.len());
     Ok(whole.iter().map(|bytes| one(*bytes)).collect())
 }
 
 impl Graph {
-    /// A graph of a file or of an attribute.
+    /// Decodes the graph of a file or of an attribute.
     pub(crate) fn parse(bytes: &Bytes) -> Result<Self> {
         let graph: proto::Graph = decode(bytes, "the graph")?;
         let nodes = nodes(&graph.node)?;
         ensure!(
-            graph.initializer.len() <= MOST,
-            "there are {} initializers, {MOST} are the most",
+            graph.initializer.len() <= MOST_ENTRIES,
+            "the graph has {} initializers; the limit is {MOST_ENTRIES}",
             graph.initializer.len()
         );
         let mut initializers = HashMap::new();
@@ -255,13 +266,13 @@ impl Graph {
             let tensor: Name = decode(&bytes, "an initializer")?;
             let name = tensor.name.unwrap_or_default();
             let again = initializers.insert(name.clone(), bytes).is_some();
-            ensure!(!again, "the initializer {:?} is there twice", printable(&name));
+            ensure!(!again, "two initializers have the name {:?}", printable(&name));
         }
         Ok(Self { nodes, initializers, inputs: ports(&graph.input)?, outputs: ports(&graph.output)? })
     }
 }
 
-/// Of a tensor, its name.
+/// The name of a tensor, without its other fields.
 #[derive(Clone, PartialEq, Message)]
 struct Name {
     #[prost(string, optional, tag = "8")]

@@ -1,8 +1,8 @@
-//! The part of ONNX's protobuf messages that an importer reads, by the field numbers of onnx.proto (ONNX IR version 3
-//! to 11).
+//! The fields of ONNX's protobuf messages that the importer reads, with the field numbers of onnx.proto (ONNX IR
+//! version 3 to 11).
 //!
-//! Messages that may occur many times stay bytes of the file until they are looked at: what a file can make prost
-//! allocate is then a small multiple of its size. On the wire, bytes and messages are the same.
+//! Repeated messages stay bytes of the file until the importer decodes them. This limits the memory that prost
+//! allocates to a small multiple of the file's size. In protobuf's encoding, bytes and messages are the same.
 #![allow(missing_docs, reason = "the names are ONNX's own, and onnx.proto documents them")]
 
 use prost::Message;
@@ -16,13 +16,13 @@ pub struct Model {
     pub producer_name: Option<String>,
     #[prost(string, optional, tag = "3")]
     pub producer_version: Option<String>,
-    /// A [`Graph`].
+    /// An encoded message of type [`Graph`].
     #[prost(bytes = "bytes", optional, tag = "7")]
     pub graph: Option<Bytes>,
-    /// Of [`OperatorSet`].
+    /// Encoded messages of type [`OperatorSet`].
     #[prost(bytes = "bytes", repeated, tag = "8")]
     pub opset_import: Vec<Bytes>,
-    /// Of [`Function`].
+    /// Encoded messages of type [`Function`].
     #[prost(bytes = "bytes", repeated, tag = "25")]
     pub functions: Vec<Bytes>,
 }
@@ -37,18 +37,18 @@ pub struct OperatorSet {
 
 #[derive(Clone, PartialEq, Message)]
 pub struct Graph {
-    /// Of [`Node`].
+    /// Encoded messages of type [`Node`].
     #[prost(bytes = "bytes", repeated, tag = "1")]
     pub node: Vec<Bytes>,
     #[prost(string, optional, tag = "2")]
     pub name: Option<String>,
-    /// Of [`Tensor`].
+    /// Encoded messages of type [`Tensor`].
     #[prost(bytes = "bytes", repeated, tag = "5")]
     pub initializer: Vec<Bytes>,
-    /// Of [`ValueInfo`].
+    /// Encoded messages of type [`ValueInfo`].
     #[prost(bytes = "bytes", repeated, tag = "11")]
     pub input: Vec<Bytes>,
-    /// Of [`ValueInfo`].
+    /// Encoded messages of type [`ValueInfo`].
     #[prost(bytes = "bytes", repeated, tag = "12")]
     pub output: Vec<Bytes>,
 }
@@ -63,12 +63,12 @@ pub struct Node {
     pub name: Option<String>,
     #[prost(string, optional, tag = "4")]
     pub op_type: Option<String>,
-    /// Of [`Attribute`].
+    /// Encoded messages of type [`Attribute`].
     #[prost(bytes = "bytes", repeated, tag = "5")]
     pub attribute: Vec<Bytes>,
     #[prost(string, optional, tag = "7")]
     pub domain: Option<String>,
-    /// Which of several functions of one name.
+    /// Selects one of several functions of one name.
     #[prost(string, optional, tag = "8")]
     pub overload: Option<String>,
 }
@@ -83,10 +83,10 @@ pub struct Attribute {
     pub i: Option<i64>,
     #[prost(bytes = "bytes", optional, tag = "4")]
     pub s: Option<Bytes>,
-    /// A [`Tensor`].
+    /// An encoded message of type [`Tensor`].
     #[prost(bytes = "bytes", optional, tag = "5")]
     pub t: Option<Bytes>,
-    /// A [`Graph`].
+    /// An encoded message of type [`Graph`].
     #[prost(bytes = "bytes", optional, tag = "6")]
     pub g: Option<Bytes>,
     #[prost(float, repeated, tag = "7")]
@@ -95,7 +95,7 @@ pub struct Attribute {
     pub ints: Vec<i64>,
     #[prost(bytes = "bytes", repeated, tag = "9")]
     pub strings: Vec<Bytes>,
-    /// In a function: the caller's attribute of this name.
+    /// In a function, the name of the caller's attribute that gives the value.
     #[prost(string, optional, tag = "21")]
     pub ref_attr_name: Option<String>,
 }
@@ -120,10 +120,10 @@ pub struct Tensor {
     pub double_data: Vec<f64>,
     #[prost(uint64, repeated, tag = "11")]
     pub uint64_data: Vec<u64>,
-    /// Of [`Entry`].
+    /// Encoded messages of type [`Entry`].
     #[prost(bytes = "bytes", repeated, tag = "13")]
     pub external_data: Vec<Bytes>,
-    /// 1: the elements are in another file.
+    /// 1 if the elements are in another file.
     #[prost(int32, optional, tag = "14")]
     pub data_location: Option<i32>,
 }
@@ -160,7 +160,7 @@ pub struct TensorType {
 
 #[derive(Clone, PartialEq, Message)]
 pub struct Shape {
-    /// Of [`Dimension`].
+    /// Encoded messages of type [`Dimension`].
     #[prost(bytes = "bytes", repeated, tag = "1")]
     pub dim: Vec<Bytes>,
 }
@@ -181,15 +181,15 @@ pub struct Function {
     pub input: Vec<String>,
     #[prost(string, repeated, tag = "5")]
     pub output: Vec<String>,
-    /// Of [`Node`].
+    /// Encoded messages of type [`Node`].
     #[prost(bytes = "bytes", repeated, tag = "7")]
     pub node: Vec<Bytes>,
     #[prost(string, optional, tag = "10")]
     pub domain: Option<String>,
-    /// Of [`Attribute`]: defaults.
+    /// Encoded messages of type [`Attribute`]: defaults.
     #[prost(bytes = "bytes", repeated, tag = "11")]
     pub attribute_proto: Vec<Bytes>,
-    /// As [`Node::overload`].
+    /// See [`Node::overload`].
     #[prost(string, optional, tag = "13")]
     pub overload: Option<String>,
 }

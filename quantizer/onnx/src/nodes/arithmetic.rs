@@ -11,7 +11,7 @@ use crate::values::elements::{in_order, open_vector, value};
 use crate::values::expr::{Exprs, Id, Unary};
 use crate::values::tensor::{Element, Tensor};
 
-/// Which of two elements are known.
+/// The open, that is not known, ones of two elements.
 #[derive(Clone, Copy, PartialEq)]
 enum Open {
     Neither,
@@ -20,7 +20,7 @@ enum Open {
     Both,
 }
 
-/// An operation on two values, repeated to one shape.
+/// Applies an operation to two values, broadcast to one shape.
 pub(crate) fn two(op: &str, exprs: &mut Exprs, x: &Tensor, y: &Tensor, most: usize) -> Result<Tensor> {
     let shape = broadcast(&x.shape, &y.shape)?;
     let (mut x, mut y) = (expanded(x, &shape, most)?.elements(), expanded(y, &shape, most)?.elements());
@@ -52,7 +52,8 @@ pub(crate) fn two(op: &str, exprs: &mut Exprs, x: &Tensor, y: &Tensor, most: usi
             let [known_x, known_y] = [&x, &y].map(|v| at.iter().map(|&i| known(&v[i])).collect::<Vec<f64>>());
             let result = match kind {
                 Open::Neither => {
-                    let f = known::real(op).with_context(|| format!("{op} of constants beside values is not taken"))?;
+                    let f = known::real(op)
+                        .with_context(|| format!("{op} of constants that are mixed with values is not supported"))?;
                     known_x.into_iter().zip(known_y).map(|(x, y)| Element::Known(f(x, y))).collect()
                 }
                 Open::First => {
@@ -75,8 +76,8 @@ pub(crate) fn two(op: &str, exprs: &mut Exprs, x: &Tensor, y: &Tensor, most: usi
     Ok(Tensor::of_elements(shape, all))
 }
 
-/// Makes vectors of rows with constants in them, where `numbers` has one that is computed of sums for each: what is
-/// divided by its length, or loses its mean, may be normed.
+/// Makes vectors of rows that hold constants, if `numbers` has a number computed from sums for each row. Such a row may
+/// be divided by its length or lose its mean, as in a norm.
 fn open_rows(exprs: &mut Exprs, elements: &mut [Element], numbers: &[Element]) -> Result<()> {
     let is_mixed = |row: &[Element]| row.iter().any(|e| value(e).is_some()) && row.iter().any(|e| value(e).is_none());
     if !is_mixed(elements) {
@@ -92,9 +93,9 @@ fn open_rows(exprs: &mut Exprs, elements: &mut [Element], numbers: &[Element]) -
     Ok(())
 }
 
-/// `a x + b`; what is multiplied with 0 is known.
+/// Computes `a x + b`; elements with a factor of 0 are known.
 fn affine(exprs: &mut Exprs, x: Id, a: Vec<f64>, b: Vec<f64>) -> Result<Vec<Element>> {
-    ensure!(a.iter().chain(&b).all(|v| v.is_finite()), "computes with a constant that is not finite, or divides by 0");
+    ensure!(a.iter().chain(&b).all(|v| v.is_finite()), "has a constant that is not finite, or divides by 0");
     let known: Vec<Option<f64>> = a.iter().zip(&b).map(|(&a, &b)| (a == 0.0).then_some(b)).collect();
     let kept = |values: Vec<f64>, none: f64| {
         values.into_iter().zip(&known).map(|(v, k)| if k.is_some() { none } else { v }).collect()
@@ -122,17 +123,17 @@ fn with_known(op: &str, exprs: &mut Exprs, x: Id, y: &[f64]) -> Result<Vec<Eleme
                 ("Max", Some(low)) => maximum(exprs, x, low),
                 ("Min", Some(high)) => exprs.clip(x, f64::NEG_INFINITY, high),
                 _ => {
-                    ensure!(op != "Pow", "has several exponents; one for all elements is taken");
+                    ensure!(op != "Pow", "has several exponents; use one exponent for all elements");
                     return Ok(exprs.limited_each(x, y, if op == "Max" { 1.0 } else { -1.0 }));
                 }
             };
             Ok(exprs.elements(value))
         }
-        _ => bail!("{op} of a value and a constant is not known"),
+        _ => bail!("{op} of a value and a constant is not supported"),
     }
 }
 
-/// `max(x, low)`, which may be a LeakyReLU's half: that is said by [`both`].
+/// Computes `max(x, low)`. [`both`] handles the maximum of a LeakyReLU.
 fn maximum(exprs: &mut Exprs, x: Id, low: f64) -> Id {
     if low == f64::NEG_INFINITY { x } else { exprs.clip(x, low, f64::INFINITY) }
 }
@@ -151,7 +152,7 @@ fn known_with(op: &str, exprs: &mut Exprs, x: &[f64], y: Id) -> Result<Vec<Eleme
             let power = exprs.function(Function::Exp, exponent);
             Ok(exprs.elements(power))
         }
-        _ => bail!("{op} of a constant and a value is not known"),
+        _ => bail!("{op} of a constant and a value is not supported"),
     }
 }
 
@@ -175,11 +176,11 @@ fn both(op: &str, exprs: &mut Exprs, x: Id, y: Id) -> Result<Id> {
             _ => exprs.max(x, y),
         },
         "Min" => exprs.min(x, y),
-        _ => bail!("{op} of two values of the network is not known"),
+        _ => bail!("{op} of two values of the network is not supported"),
     })
 }
 
-/// `x` to the power p.
+/// Computes `x` to the power p.
 fn power(exprs: &mut Exprs, x: Id, p: f64) -> Result<Id> {
     Ok(match p {
         1.0 => x,
@@ -198,6 +199,6 @@ fn power(exprs: &mut Exprs, x: Id, p: f64) -> Result<Id> {
             exprs.unary(Unary::Reciprocal, root)
         }
         -1.0 => exprs.unary(Unary::Reciprocal, x),
-        _ => bail!("has the exponent {p}; 1, 2, 3, 4, -1 and the square root are taken"),
+        _ => bail!("has the exponent {p}; use 1, 2, 3, 4, -1, 0.5 or -0.5"),
     })
 }

@@ -1,4 +1,4 @@
-//! A node with what it reads: its inputs and attributes, each asked for by the name that ONNX gives it.
+//! A node with its inputs and attributes, by ONNX's names.
 
 use actq::error::{Context as _, Result, bail};
 use prost::bytes::Bytes;
@@ -6,19 +6,19 @@ use prost::bytes::Bytes;
 use crate::file::model::Node;
 use crate::values::tensor::Tensor;
 
-/// What helps where an operation is not known.
+/// Remedy for an operator that is not supported.
 pub(crate) const HELP: &str =
-    "docs/IMPORT.md lists what is taken; actq import --output NAME makes a value before this node the action";
+    "docs/IMPORT.md lists the supported operators; actq import --output NAME makes a value before this node the action";
 
-/// Why a random number is refused.
+/// Error of an operator that draws random numbers.
 pub(crate) const RANDOM: &str =
-    "draws random numbers; export the deterministic action, or name it with actq import --output NAME";
+    "draws random numbers; export the deterministic action, or choose it by actq import --output NAME";
 
 /// A node and its inputs.
 #[derive(Clone, Copy)]
 pub(crate) struct Call<'a> {
     pub(crate) node: &'a Node,
-    /// `None`: left out.
+    /// The inputs; `None` for an omitted one.
     pub(crate) inputs: &'a [Option<&'a Tensor>],
 }
 
@@ -27,7 +27,7 @@ impl<'a> Call<'a> {
         &self.node.op
     }
 
-    /// Input `i`, which must be there.
+    /// Returns input `i`, which must be present.
     pub(crate) fn input(&self, i: usize) -> Result<&'a Tensor> {
         self.optional(i).with_context(|| format!("has no input {i}"))
     }
@@ -36,17 +36,17 @@ impl<'a> Call<'a> {
         self.inputs.get(i).copied().flatten()
     }
 
-    /// Input `i`, all of whose elements must be known; `what` names it.
+    /// Returns input `i`, which must be a known tensor; `what` names it in the error.
     pub(crate) fn reals(&self, i: usize, what: &str) -> Result<Vec<f64>> {
-        self.input(i)?.reals().with_context(|| format!("{what} depends on the observation; only a constant is taken"))
+        self.input(i)?.reals().with_context(|| format!("{what} depends on the observation; it must be a constant"))
     }
 
-    /// As [`Self::reals`], of integers.
+    /// Returns the same as [`Self::reals`], for integers.
     pub(crate) fn integers(&self, i: usize, what: &str) -> Result<Vec<i64>> {
         let tensor = self.input(i)?;
         let known = tensor.integers().map(<[i64]>::to_vec);
         known.with_context(|| {
-            format!("{what} depends on the observation or is not of integers; export with fixed shapes")
+            format!("{what} depends on the observation or is not an integer; export with fixed shapes")
         })
     }
 
@@ -67,7 +67,7 @@ impl<'a> Call<'a> {
         text.map(|bytes| String::from_utf8_lossy(bytes).into_owned())
     }
 
-    /// Integers that older operator sets have as an attribute and newer ones as input `i`.
+    /// Returns integers that older operator sets have as an attribute and newer ones as input `i`.
     pub(crate) fn ints_or_input(&self, name: &str, i: usize) -> Result<Option<Vec<i64>>> {
         match (self.ints(name), self.optional(i)) {
             (Some(ints), _) => Ok(Some(ints)),
@@ -76,16 +76,16 @@ impl<'a> Call<'a> {
         }
     }
 
-    /// The tensor of a Constant node.
+    /// Returns the tensor of a Constant node.
     pub(crate) fn constant(&self) -> Result<Option<Bytes>> {
         if self.op() != "Constant" || !self.node.attributes.contains_key("value") {
             return Ok(None);
         }
         let tensor = self.node.attributes.get("value").and_then(|a| a.t.clone());
-        tensor.context("its value is no tensor").map(Some)
+        tensor.context("its value is not a tensor").map(Some)
     }
 
-    /// The operation is not one that can be taken.
+    /// Fails for an operator that is not supported, with its remedy.
     pub(crate) fn refuse<T>(&self) -> Result<T> {
         match self.op() {
             "RandomNormal" | "RandomNormalLike" | "RandomUniform" | "RandomUniformLike" | "Multinomial"
@@ -100,31 +100,31 @@ impl<'a> Call<'a> {
             | "QGemm"
             | "DynamicQuantizeMatMul"
             | "MatMulNBits" => {
-                bail!("the file is quantized already; export it in float32 and let actq quantize it")
+                bail!("the file is already quantized; export it in float32 and quantize it by actq")
             }
             "Loop" | "Scan" => bail!("runs a loop; export one step of the policy, unrolled"),
             "SequenceAt" | "SequenceConstruct" | "SplitToSequence" | "ConcatFromSequence" => {
                 bail!("works on a list of tensors, as scripted modules do; export by tracing, or with dynamo=True")
             }
             "Attention" | "MultiHeadAttention" | "GroupQueryAttention" => {
-                bail!("attention has no kernel here; export the part behind it as a policy of its own")
+                bail!("attention has no kernel here; export the part after it as a separate policy")
             }
             "ConvTranspose" => {
-                bail!("has no kernel here; export the part behind the encoder as a policy of its own")
+                bail!("has no kernel here; export the part after the encoder as a separate policy")
             }
             "Softmax" | "LogSoftmax" | "ArgMax" | "TopK" => {
                 bail!(
-                    "has no kernel here; where it only chooses among actions, actq import --output NAME takes the value before it"
+                    "has no kernel here; if it only chooses among actions, pass the value before it to actq import --output NAME"
                 )
             }
             "GreaterOrEqual" | "Greater" | "Less" | "LessOrEqual" | "Equal" | "Not" | "And" | "Or" | "IsNaN"
             | "IsInf" => {
-                bail!("compares with the observation; only comparisons of constants are taken; {HELP}")
+                bail!("compares the observation, and only constants can be compared; {HELP}")
             }
             _ if self.node.domain == "com.microsoft" => {
-                bail!("is what onnxruntime's optimizer makes of several operations; import the file from before it")
+                bail!("is an operator of onnxruntime's optimizer; import the file from before the optimizer")
             }
-            _ => bail!("is not known; {HELP}"),
+            _ => bail!("is not a supported operator; {HELP}"),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! ONNX's own LSTM and GRU: one layer, one direction, one step.
+//! ONNX's LSTM and GRU operators: one layer, one direction, one step.
 
 use std::sync::Arc;
 
@@ -9,17 +9,17 @@ use crate::values::elements::open_vector;
 use crate::values::expr::{Cell, Expr, Exprs, Id, Matrix, Run};
 use crate::values::tensor::{Element, Tensor};
 
-/// The outputs, where the node is such an operation.
+/// Returns the outputs, if the node is such an operator.
 pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Vec<Tensor>>> {
-    // Where each of our gates stands among ONNX's: [i o f c] and [z r h].
+    // Place of each of our gates in ONNX's order, [i o f c] and [z r h].
     let (lstm, order): (bool, &[usize]) = match call.op() {
         "LSTM" => (true, &[0, 2, 3, 1]),
         "GRU" => (false, &[1, 0, 2]),
-        "RNN" => bail!("plain recurrent cells have no kernel; LSTM and GRU have"),
+        "RNN" => bail!("plain recurrent cells have no kernel; use an LSTM or a GRU"),
         _ => return Ok(None),
     };
     let direction = call.text("direction").unwrap_or_else(|| "forward".to_owned());
-    ensure!(direction == "forward", "runs {direction}; a policy sees no later step, only forward is taken");
+    ensure!(direction == "forward", "runs {direction}, and a policy cannot read later steps; use forward");
     for name in ["activations", "clip", "input_forget"] {
         let given = call.node.attributes.get(name);
         let plain = match name {
@@ -29,20 +29,28 @@ pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Vec<Tenso
             }),
             _ => given.is_none_or(|a| a.i.unwrap_or(0) == 0 && a.f.is_none_or(|f| f == 0.0)),
         };
-        ensure!(plain, "has its own {name}; the plain cell is taken");
+        ensure!(plain, "sets {name}; use the plain cell");
     }
-    ensure!(!lstm || call.optional(7).is_none(), "has peepholes; the plain cell is taken");
+    ensure!(!lstm || call.optional(7).is_none(), "has peepholes; use the plain cell");
     let reset = "computes the reset gate before the matrix (linear_before_reset = 0, as Keras with reset_after=False); train with \
                  torch's form, or Keras' reset_after=True";
     ensure!(lstm || call.int("linear_before_reset").unwrap_or(0) != 0, "{reset}");
     let x = call.input(0)?;
     let (w, r) = (call.input(1)?, call.input(2)?);
     let (&[1, rows, cols], &[1, _, hidden]) = (&w.shape[..], &r.shape[..]) else {
-        bail!("has weights of {:?} and {:?}; one direction is taken", w.shape, r.shape)
+        bail!("has weights of {:?} and {:?}; use one direction", w.shape, r.shape)
     };
-    ensure!(rows == order.len() * hidden, "has {rows} rows of weights for {hidden} values of state");
-    ensure!(x.shape.len() == 3, "reads {:?}, not [step, batch, value]", x.shape);
-    ensure!(x.len() == cols, "reads {:?}: several steps or a batch; export one step with a batch of 1", x.shape);
+    ensure!(
+        rows == order.len() * hidden,
+        "has {rows} rows of weights for {hidden} values of state, {} are needed",
+        order.len() * hidden
+    );
+    ensure!(x.shape.len() == 3, "reads the shape {:?}, not [step, batch, value]", x.shape);
+    ensure!(
+        x.len() == cols,
+        "reads the shape {:?}, several steps or a batch; export one step with a batch of 1",
+        x.shape
+    );
     let gated = |values: &[f64], width: usize| -> Vec<f64> {
         order.iter().flat_map(|&gate| &values[gate * hidden * width..(gate + 1) * hidden * width]).copied().collect()
     };
@@ -72,19 +80,20 @@ pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Vec<Tenso
     Ok(Some([all, vec![output(exprs, c, vec![1, 1, hidden])]].concat()))
 }
 
-/// The run of a graph input that a cell starts from.
+/// Finds the run of a graph input that holds a cell's state before the step.
 fn state(call: &Call<'_>, exprs: &Exprs, i: usize, what: &str, hidden: usize) -> Result<Run> {
     let carried = "export it as an input of the graph, and its next value as an output";
-    let tensor = call.optional(i).with_context(|| format!("forgets its {what} state after every step; {carried}"))?;
+    let tensor =
+        call.optional(i).with_context(|| format!("state {what} is not carried to the next step; {carried}"))?;
     run_of_input(exprs, &tensor.elements()).filter(|run| run.len == hidden).with_context(|| {
         format!(
-            "its {what} state is a constant, or an input that other nodes change first; {carried}, without what resets it: the policy is \
-             reset as a whole"
+            "state {what} is a constant, or an input that other nodes change first; {carried}, without the nodes that reset it, as a \
+             reset clears the whole policy"
         )
     })
 }
 
-/// The run of one graph input that these elements are.
+/// Returns the run of one graph input that these elements are.
 pub(crate) fn run_of_input(exprs: &Exprs, elements: &[Element]) -> Option<Run> {
     let &Element::Of(of, from) = elements.first()? else { return None };
     let in_order = elements.iter().enumerate().all(|(k, e)| *e == Element::Of(of, from + k));

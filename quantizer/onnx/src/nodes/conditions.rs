@@ -1,4 +1,4 @@
-//! Comparisons of values with numbers, and choices by them where they make up an activation.
+//! Comparisons of values with numbers, and choices by them that form an activation.
 
 use actq::error::{Context as _, Result};
 
@@ -9,7 +9,7 @@ use crate::values::elements::{apply, value};
 use crate::values::expr::{Expr, Exprs, Unary};
 use crate::values::tensor::{Data, Element, Tensor};
 
-/// A comparison of a value with one number, as whether something is above one.
+/// Converts a comparison of a value with one number to [`Unary::Above`].
 pub(crate) fn above(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> {
     let greater = call.op().starts_with("Greater");
     let (x, y) = (call.input(0)?, call.input(1)?);
@@ -18,7 +18,7 @@ pub(crate) fn above(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>
         (Some(x), None) => (y, x, if greater { -1.0 } else { 1.0 }),
         _ => return Ok(None),
     };
-    // A limit that repeats the value along an axis would change its shape.
+    // A limit that broadcasts the value along an axis would change its shape.
     let (Some(limit), true) =
         (crate::values::compare::uniform(&limit), broadcast(&x.shape, &y.shape)? == compared.shape)
     else {
@@ -33,8 +33,7 @@ pub(crate) fn above(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>
     Ok(Some(Tensor::of_elements(compared.shape.clone(), conditions)))
 }
 
-/// Whether elements are not numbers, or infinite. Those of values never are: where the network gives such a one, the
-/// image gives no action.
+/// Tests for NaN or infinity. Elements of values count as finite, as an image gives no action if one is not.
 pub(crate) fn not_finite(call: &Call<'_>) -> Result<Tensor> {
     let found = |v: f64| match call.op() {
         "IsNaN" => v.is_nan(),
@@ -45,18 +44,18 @@ pub(crate) fn not_finite(call: &Call<'_>) -> Result<Tensor> {
     Ok(Tensor::new(x.shape.clone(), Data::Int(x.elements().iter().map(one).collect())))
 }
 
-/// Whether a value is equal to itself, which asks whether it is a number.
+/// Converts the comparison of a value with itself, a test for NaN.
 pub(crate) fn itself(call: &Call<'_>) -> Result<Option<Tensor>> {
     let (x, y) = (call.input(0)?, call.input(1)?);
     let same = x.shape == y.shape && x.elements() == y.elements();
     Ok(same.then(|| Tensor::new(x.shape.clone(), Data::Int(vec![1; x.len()]))))
 }
 
-/// `And` and `Or` where one side of every element is known.
+/// Converts `And` and `Or` if one side of every element is known.
 pub(crate) fn both(call: &Call<'_>, most: usize) -> Result<Option<Tensor>> {
     let (x, y) = (call.input(0)?, call.input(1)?);
     let shape = broadcast(&x.shape, &y.shape)?;
-    // What decides alone: false of And, true of Or.
+    // The side that decides the result: false for And, true for Or.
     let decides = f64::from(u8::from(call.op() == "Or"));
     let one = |(x, y): (Element, Element)| match (x, y) {
         (Element::Known(v), other) | (other, Element::Known(v)) => {
@@ -70,7 +69,7 @@ pub(crate) fn both(call: &Call<'_>, most: usize) -> Result<Option<Tensor>> {
     Ok(all.map(|all| truths(shape, all)))
 }
 
-/// A value as truth values, where it holds some.
+/// Returns a tensor of booleans, if its elements are.
 pub(crate) fn as_truth(input: &Tensor, exprs: &Exprs) -> Option<Tensor> {
     let is_truth = |e: &Element| match *e {
         Element::Known(v) => v == 0.0 || v == 1.0,
@@ -80,7 +79,7 @@ pub(crate) fn as_truth(input: &Tensor, exprs: &Exprs) -> Option<Tensor> {
     elements.iter().all(is_truth).then(|| truths(input.shape.clone(), elements))
 }
 
-/// Truth values, as integers where all are known.
+/// Makes a tensor of booleans, of integers if all are known.
 fn truths(shape: Vec<usize>, elements: Vec<Element>) -> Tensor {
     let tensor = Tensor::of_elements(shape, elements);
     match tensor.data {
@@ -89,7 +88,8 @@ fn truths(shape: Vec<usize>, elements: Vec<Element>) -> Tensor {
     }
 }
 
-/// Not above a limit: the negative value is above the negative limit, or at it, where the choices that are taken agree.
+/// Converts `not (x > limit)` to `-x > -limit`. They differ at the limit only, where both choices of an activation
+/// agree.
 pub(crate) fn not(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> {
     let input = call.input(0)?;
     let Some(values) = input.elements().iter().map(value).collect::<Option<Vec<_>>>() else { return Ok(None) };
@@ -100,10 +100,10 @@ pub(crate) fn not(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> 
     Ok(Some(Tensor::of_elements(input.shape.clone(), exprs.elements(below))))
 }
 
-/// A choice by a value of the network, where it makes up an activation.
+/// Converts a choice by a value of the network that forms an activation.
 pub(crate) fn choice(call: &Call<'_>, exprs: &mut Exprs, most: usize) -> Result<Tensor> {
     let refused =
-        || format!("chooses by a value of the network in a way that no activation does; {}", crate::nodes::call::HELP,);
+        || format!("chooses by a value of the network and does not form an activation; {}", crate::nodes::call::HELP);
     let (condition, x, y) = (call.input(0)?, call.input(1)?, call.input(2)?);
     let shape = broadcast(&broadcast(&condition.shape, &x.shape)?, &y.shape)?;
     let [condition, x, y] = [condition, x, y].map(|tensor| expanded(tensor, &shape, most).map(|t| t.elements()));
@@ -117,7 +117,7 @@ pub(crate) fn choice(call: &Call<'_>, exprs: &mut Exprs, most: usize) -> Result<
     let chosen = match (values(&x), values(&y)) {
         (Some(x), Some(y)) => {
             let (x, y) = (exprs.vector(&x), exprs.vector(&y));
-            // Where it compares the negative, the choices are the other way round.
+            // A comparison of the negative value swaps the choices.
             exprs.select(condition, x, y).or_else(|| {
                 let &Expr::Unary(Unary::Above(limit), of) = exprs.get(condition) else { return None };
                 let negative = exprs.scaled(of, -1.0, 0.0);

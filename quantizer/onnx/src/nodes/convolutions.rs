@@ -1,4 +1,4 @@
-//! Convolutions over few positions, as encoders of histories have: a product for each position and group.
+//! Convolutions over few positions, as in encoders of histories, with a matrix product for each position and group.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use crate::nodes::products::row_product;
 use crate::values::expr::{Exprs, Matrix};
 use crate::values::tensor::{Data, Element, Tensor, count};
 
-/// The most positions, each counted once for every group: the image has an operation for each.
+/// The most positions times groups, each of which is an operation in the image.
 const MOST_PRODUCTS: usize = 64;
 
 /// An axis that the kernel moves along.
@@ -24,20 +24,20 @@ pub(crate) struct Axis {
     dilation: usize,
     /// Zeros before the operand.
     pad: usize,
-    /// Of the kernel.
+    /// Number of positions of the kernel.
     pub(crate) positions: usize,
-    /// Values behind the last position, which the kernel does not reach.
+    /// Values after the last position that the kernel does not reach.
     rest: usize,
 }
 
 impl Axis {
-    /// Whether the positions end with the operand and its padding.
+    /// Returns `true` if the last position ends with the operand and its padding.
     pub(crate) fn is_even(&self) -> bool {
         self.rest == 0
     }
 }
 
-/// The output, where the node is a convolution.
+/// Returns the output, if the node is a convolution.
 pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs, budget: &mut usize) -> Result<Option<Tensor>> {
     if call.op() != "Conv" {
         return Ok(None);
@@ -45,14 +45,14 @@ pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs, budget: &mut usize) -> Res
     let (x, w) = (call.input(0)?, call.input(1)?);
     let weights = call.reals(1, "the kernel")?;
     let (&[1, channels, ref lens @ ..], &[outputs, inputs, ref kernel @ ..]) = (&x.shape[..], &w.shape[..]) else {
-        bail!("takes {:?} with a kernel of {:?}; [1, channel, ..] is taken", x.shape, w.shape)
+        bail!("reads the shape {:?} with a kernel of {:?}; export with [1, channel, ..]", x.shape, w.shape)
     };
     let groups = usize::try_from(call.int("group").unwrap_or(1)).unwrap_or(0);
     let fits =
         groups > 0 && channels == inputs * groups && outputs.is_multiple_of(groups) && lens.len() == kernel.len();
     ensure!(
         fits && x.len() > 0 && w.len() > 0,
-        "takes {:?} with a kernel of {:?} in {groups} groups",
+        "reads the shape {:?} with a kernel of {:?} in {groups} groups, which do not fit",
         x.shape,
         w.shape
     );
@@ -61,13 +61,13 @@ pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs, budget: &mut usize) -> Res
     let positions = count(&shape)?;
     ensure!(
         (1..=MOST_PRODUCTS).contains(&positions.saturating_mul(groups)),
-        "goes over {positions} positions with {groups} groups; 1 to {MOST_PRODUCTS} are taken, positions times groups; export the \
-         part behind the encoder as a policy of its own"
+        "has {positions} positions with {groups} groups; the limit of positions times groups is {MOST_PRODUCTS}; export the part \
+         after the encoder as a separate policy"
     );
     let (rows, cols, size) = (outputs / groups, w.len() / outputs, count(kernel)?);
     let matrix = |(g, data): (usize, &[f64])| {
         let name = w.name.as_ref().map(|name| if groups == 1 { name.clone() } else { format!("{name}.{g}") });
-        // All channels at one place stand together, as the layer before has given them.
+        // The channels of one place are adjacent, as in the output of the layer before.
         let turned = (0..rows * cols).map(|i| data[i / cols * cols + i % inputs * size + i % cols / inputs]).collect();
         Arc::new(Matrix { name, rows, cols, data: turned })
     };
@@ -78,12 +78,12 @@ pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs, budget: &mut usize) -> Res
     for position in 0..positions {
         let places = window(&axes, position);
         for (g, matrix) in matrices.iter().enumerate() {
-            let seen = |place: &Option<usize>| -> Vec<Element> {
+            let channels_at = |place: &Option<usize>| -> Vec<Element> {
                 let of = |channel: usize| place.map_or(Element::Known(0.0), |at| elements[channel * len + at]);
                 (g * inputs..(g + 1) * inputs).map(of).collect()
             };
-            let seen: Vec<Element> = places.iter().flat_map(seen).collect();
-            all.extend(row_product(exprs, &seen, matrix, budget)?);
+            let operand: Vec<Element> = places.iter().flat_map(channels_at).collect();
+            all.extend(row_product(exprs, &operand, matrix, budget)?);
         }
     }
     let mut y = Tensor::of_elements(vec![positions, outputs], all);
@@ -96,13 +96,15 @@ pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs, budget: &mut usize) -> Res
     y.taken(turned, &places)?.reshaped([vec![1, outputs], shape].concat()).map(Some)
 }
 
-/// The axes of a kernel of these lengths along operands of these, by the node's attributes.
+/// Returns the axes of a kernel over an operand, from their lengths and the node's attributes.
 pub(crate) fn axes(call: &Call<'_>, lens: &[usize], kernel: &[usize]) -> Result<Vec<Axis>> {
     let n = lens.len();
     let list = |name: &str, count: usize, default: usize| -> Result<Vec<usize>> {
         let Some(given) = call.ints(name) else { return Ok(vec![default; count]) };
         let given: Option<Vec<usize>> = given.iter().map(|&v| usize::try_from(v).ok()).collect();
-        given.filter(|given| given.len() == count).with_context(|| format!("its {name} do not fit {n} axes"))
+        given
+            .filter(|given| given.len() == count)
+            .with_context(|| format!("its attribute {name} does not fit {n} axes"))
     };
     let (strides, dilations, pads) = (list("strides", n, 1)?, list("dilations", n, 1)?, list("pads", 2 * n, 0)?);
     let auto = call.text("auto_pad").unwrap_or_default();
@@ -110,7 +112,7 @@ pub(crate) fn axes(call: &Call<'_>, lens: &[usize], kernel: &[usize]) -> Result<
         let (len, kernel, stride, dilation) = (lens[i], kernel[i], strides[i], dilations[i]);
         ensure!(stride > 0 && dilation > 0 && kernel > 0, "has a stride, a dilation or a kernel of 0");
         let reach = dilation.saturating_mul(kernel - 1).saturating_add(1);
-        let (before, behind) = match auto.as_str() {
+        let (before, after) = match auto.as_str() {
             "SAME_UPPER" | "SAME_LOWER" => {
                 let both = (len.div_ceil(stride) - 1).saturating_mul(stride).saturating_add(reach).saturating_sub(len);
                 let less = both / 2;
@@ -118,15 +120,15 @@ pub(crate) fn axes(call: &Call<'_>, lens: &[usize], kernel: &[usize]) -> Result<
             }
             _ => (pads[i], pads[n + i]),
         };
-        let whole = len.saturating_add(before).saturating_add(behind);
-        ensure!(reach <= whole, "its kernel reaches over {reach} of {whole} values");
+        let whole = len.saturating_add(before).saturating_add(after);
+        ensure!(reach <= whole, "its kernel spans {reach} values of {whole}; add padding");
         let (steps, rest) = ((whole - reach) / stride, (whole - reach) % stride);
         Ok(Axis { len, kernel, stride, dilation, pad: before, positions: steps + 1, rest })
     };
     (0..n).map(one).collect()
 }
 
-/// What the kernel sees at a position, as places of a channel; `None` is padding.
+/// Lists the places of a channel that the kernel covers at a position; `None` is padding.
 pub(crate) fn window(axes: &[Axis], position: usize) -> Vec<Option<usize>> {
     // The position along each axis, the last one first.
     let mut left = position;

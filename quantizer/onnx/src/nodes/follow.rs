@@ -1,4 +1,4 @@
-//! Follows a graph from its inputs to the values that are asked for, node by node.
+//! Conversion of a graph to expressions, node by node from its inputs to the requested values.
 
 use std::collections::{BTreeSet, HashMap, HashSet};
 use std::rc::Rc;
@@ -22,60 +22,60 @@ use crate::nodes::reductions;
 use crate::values::expr::{Expr, Exprs};
 use crate::values::tensor::{Data, Element, Tensor, count};
 
-/// ONNX's type of truth values.
+/// ONNX's type number of booleans.
 const TRUTH: i64 = 9;
 
-/// ONNX's int32 and int64.
+/// ONNX's type numbers of int32 and int64.
 pub(crate) const INTEGERS: [i32; 2] = [6, 7];
 
-/// Graphs and functions within each other.
+/// The most nested graphs and functions.
 const MOST_DEPTH: usize = 16;
 
-/// What has a value so far, by name.
+/// Values so far, by name.
 type Scope = HashMap<String, Rc<Tensor>>;
 
-/// A file that is followed.
+/// A conversion in progress.
 pub(crate) struct Follower<'m> {
     pub(crate) model: &'m Model,
     pub(crate) exprs: Exprs,
-    /// Elements that may still come up.
+    /// Elements that further results may have.
     pub(crate) budget: usize,
-    /// Index of each graph input that was read.
+    /// Indices of the graph inputs that were read.
     pub(crate) read: Vec<usize>,
 }
 
-/// The elements that come up in any file, beside a few for each of its tensors.
-const SOME: usize = 1 << 22;
-/// Elements of what is computed, for each of a tensor in the file.
-const PER_ELEMENT: usize = 8;
+/// Elements that the results of any file may have.
+const BASE_BUDGET: usize = 1 << 22;
+/// Further elements of results for each element of a tensor in the file.
+const BUDGET_PER_ELEMENT: usize = 8;
 
 impl<'m> Follower<'m> {
     pub(crate) fn new(model: &'m Model) -> Self {
-        Self { model, exprs: Exprs::default(), budget: SOME, read: Vec::new() }
+        Self { model, exprs: Exprs::default(), budget: BASE_BUDGET, read: Vec::new() }
     }
 
-    /// The value of this name.
+    /// Returns the value of this name.
     pub(crate) fn value(&mut self, name: &str) -> Result<Tensor> {
         let mut scope = Scope::new();
         let model = self.model;
         self.run(&model.graph, &mut scope, &[name.to_owned()], MOST_DEPTH)?;
-        let value = scope.get(name).with_context(|| format!("nothing gives the value {:?}", printable(name)))?;
+        let value = scope.get(name).with_context(|| format!("no node gives the value {:?}", printable(name)))?;
         Ok(Tensor::clone(value))
     }
 
-    /// Follows what `targets` need.
+    /// Converts the nodes that `targets` need.
     fn run(&mut self, graph: &'_ Graph, scope: &mut Scope, targets: &[String], depth: usize) -> Result<()> {
-        ensure!(depth > 0, "more than {MOST_DEPTH} graphs or functions stand within each other");
+        ensure!(depth > 0, "more than {MOST_DEPTH} graphs or functions are nested");
         let needed = needed(graph, scope, targets)?;
         let top = std::ptr::eq(graph, &self.model.graph);
         for name in &needed.names {
             if let Some(bytes) = graph.initializers.get(name) {
                 let tensor = self.model.tensor(bytes)?;
-                self.budget = self.budget.saturating_add(PER_ELEMENT * tensor.len());
+                self.budget = self.budget.saturating_add(BUDGET_PER_ELEMENT * tensor.len());
                 scope.insert(name.clone(), Rc::new(tensor));
             }
         }
-        // In the file's order, which the observation has: what is sorted by its values comes out the same every time.
+        // In the file's order, as in the observation, so that sorting by value ids is reproducible.
         for (i, port) in graph.inputs.iter().enumerate().filter(|_| top) {
             if needed.names.contains(&port.name) && !scope.contains_key(&port.name) {
                 let tensor = self.input(i, port)?;
@@ -104,7 +104,7 @@ impl<'m> Follower<'m> {
             name => match scope.get(name) {
                 Some(tensor) => Ok(Some(Rc::clone(tensor))),
                 None => bail!(
-                    "reads {:?} before anything gives it: the graph has a circle, or its nodes are not in order",
+                    "reads {:?} before a node gives it; remove the cycle from the graph, or sort its nodes",
                     printable(name)
                 ),
             },
@@ -113,7 +113,11 @@ impl<'m> Follower<'m> {
         let key = [node.domain.clone(), node.op.clone(), node.overload.clone()];
         let outputs = if let Some(function) = self.model.functions.get(&key) {
             let mut inner: Scope = Scope::new();
-            ensure!(inputs.len() <= function.inputs.len(), "the function takes {} inputs", function.inputs.len());
+            ensure!(
+                inputs.len() <= function.inputs.len(),
+                "the function takes at most {} inputs",
+                function.inputs.len()
+            );
             for (name, tensor) in function.inputs.iter().zip(inputs) {
                 inner.extend(tensor.map(|tensor| (name.clone(), tensor)));
             }
@@ -124,7 +128,7 @@ impl<'m> Follower<'m> {
                     let given = node.attributes.get(name).or_else(|| function.defaults.get(name));
                     *attribute = given.cloned().unwrap_or_default();
                 }
-                // What neither the caller nor the function says has the operator's own default.
+                // An attribute without a value has the operator's default.
                 inside.attributes.retain(|_, attribute| attribute.name.is_some());
             }
             self.run(&graph, &mut inner, &function.outputs, depth - 1)?;
@@ -132,7 +136,7 @@ impl<'m> Follower<'m> {
         } else if node.op == "If" {
             let condition = inputs.first().cloned().flatten().context("has no condition")?;
             let Some(&[chosen]) = condition.integers() else {
-                bail!("its condition depends on the observation; export one way only");
+                bail!("its condition depends on the observation; export one branch only");
             };
             let branch = if chosen != 0 { "then_branch" } else { "else_branch" };
             let bytes = node.attributes.get(branch).and_then(|a| a.g.as_ref()).context("has no branch")?;
@@ -144,7 +148,7 @@ impl<'m> Follower<'m> {
         } else {
             let inputs: Vec<Option<&Tensor>> = inputs.iter().map(Option::as_deref).collect();
             let call = Call { node, inputs: &inputs };
-            self.own(&call)?.into_iter().map(|tensor| Some(Rc::new(tensor))).collect::<Vec<_>>()
+            self.operator(&call)?.into_iter().map(|tensor| Some(Rc::new(tensor))).collect::<Vec<_>>()
         };
         for (name, tensor) in node.outputs.iter().zip(outputs) {
             if !name.is_empty()
@@ -155,17 +159,17 @@ impl<'m> Follower<'m> {
                     .checked_sub(tensor.len())
                     .context("gives more values than a policy of this size can have")?;
                 let again = scope.insert(name.clone(), tensor).is_some();
-                ensure!(!again, "gives {:?}, which has a value already", printable(name));
+                ensure!(!again, "gives {:?}, which already has a value", printable(name));
             }
         }
         Ok(())
     }
 
-    /// An operation of ONNX's own.
-    fn own(&mut self, call: &Call<'_>) -> Result<Vec<Tensor>> {
+    /// Converts a node of a supported operator.
+    fn operator(&mut self, call: &Call<'_>) -> Result<Vec<Tensor>> {
         let own =
             ["", "ai.onnx", "com.microsoft", "pkg.onnxscript.torch_lib.common"].contains(&call.node.domain.as_str());
-        ensure!(own, "operations of this domain are not known; {}", crate::nodes::call::HELP);
+        ensure!(own, "operators of this domain are not supported; {}", crate::nodes::call::HELP);
         let most = self.budget;
         if let Some(constant) = call.constant()? {
             return Ok(vec![self.model.tensor(&constant)?]);
@@ -222,7 +226,7 @@ impl<'m> Follower<'m> {
         let integers = INTEGERS.contains(&port.kind);
         ensure!(
             integers || [0, 1, 11].contains(&port.kind),
-            "the input {name:?} is of {}; an observation is of float32, so export it as that",
+            "the input {name:?} has the type {}, and an observation is float32; export the input as float32",
             kind_name(port.kind)
         );
         let shape =
@@ -233,14 +237,14 @@ impl<'m> Follower<'m> {
                 n.is_some() || axis < last,
                 "the last axis of the input {name:?} has no length; export it with a fixed observation size"
             );
-            // A dynamic axis is one of a batch, or of time.
+            // A dynamic axis is a batch or a time axis.
             Ok(n.unwrap_or(1))
         };
         let shape = shape.iter().enumerate().map(one).collect::<Result<Vec<usize>>>()?;
         let n = count(&shape)?;
         ensure!(
             (1..=usize::from(u16::MAX)).contains(&n),
-            "the input {name:?} has {n} values; 1 to 65535 can be observed"
+            "the input {name:?} has {n} values; an observation has 1 to 65535"
         );
         let id = self.exprs.put(if integers { Expr::Integers(i) } else { Expr::Input(i) }, n);
         if !self.read.contains(&i) {
@@ -250,7 +254,7 @@ impl<'m> Follower<'m> {
     }
 }
 
-/// The nodes and names that `targets` come from.
+/// The nodes and names that the targets depend on.
 struct Needed {
     nodes: HashSet<usize>,
     names: BTreeSet<String>,
@@ -261,7 +265,7 @@ fn needed(graph: &Graph, scope: &Scope, targets: &[String]) -> Result<Needed> {
     for (i, node) in graph.nodes.iter().enumerate() {
         for name in node.outputs.iter().filter(|name| !name.is_empty()) {
             let again = giver.insert(name, i).is_some();
-            ensure!(!again, "the value {:?} is given by two nodes", printable(name));
+            ensure!(!again, "two nodes give the value {:?}", printable(name));
         }
     }
     let mut found = Needed { nodes: HashSet::new(), names: BTreeSet::new() };
@@ -280,9 +284,9 @@ fn needed(graph: &Graph, scope: &Scope, targets: &[String]) -> Result<Needed> {
     Ok(found)
 }
 
-/// What the graphs in a node's attributes read, some of it from outside.
+/// Collects the names that graphs in a node's attributes read, including those from outside.
 fn captured(node: &Node, names: &mut Vec<String>, depth: usize) -> Result<()> {
-    ensure!(depth > 0, "more than {MOST_DEPTH} graphs stand within each other");
+    ensure!(depth > 0, "more than {MOST_DEPTH} graphs are nested");
     for bytes in node.attributes.values().filter_map(|attribute| attribute.g.as_ref()) {
         let inner = Graph::parse(bytes)?;
         names.extend(inner.outputs.iter().map(|port| port.name.clone()));

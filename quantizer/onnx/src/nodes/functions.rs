@@ -1,4 +1,4 @@
-//! Functions of one value, and limits.
+//! Operators with one operand, and limits.
 
 use actq::error::{Context as _, Result, ensure};
 use actq_kernels::math::Function;
@@ -8,10 +8,10 @@ use crate::values::elements::each;
 use crate::values::expr::{Exprs, Id, Unary};
 use crate::values::tensor::Tensor;
 
-/// What works on all elements of a vector.
+/// A function of all elements of a vector.
 type OnVector = Box<dyn Fn(&mut Exprs, Id) -> Id>;
 
-/// A function of one value.
+/// Converts a function of one value.
 pub(crate) fn one(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> {
     let number = |name: &str, default: f64| call.float(name).unwrap_or(default);
     let function = |function: Function| move |exprs: &mut Exprs, x: Id| exprs.function(function, x);
@@ -64,7 +64,7 @@ pub(crate) fn one(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> 
         }),
         "Clip" => {
             let (low, high) = limits(call)?;
-            ensure!(low <= high, "limits to {low} .. {high}, which is no range");
+            ensure!(low <= high, "limits to {low} .. {high}; the lower limit exceeds the upper one");
             if low == f64::NEG_INFINITY && high == f64::INFINITY {
                 return call.input(0).cloned().map(Some);
             }
@@ -76,7 +76,7 @@ pub(crate) fn one(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> 
     each(exprs, call.input(0)?, &*open).map(Some)
 }
 
-/// `x sigmoid(k x)`
+/// Returns `x sigmoid(k x)`.
 fn gate(k: f64) -> OnVector {
     Box::new(move |exprs, x| {
         let scaled = exprs.scaled(x, k, 0.0);
@@ -85,7 +85,7 @@ fn gate(k: f64) -> OnVector {
     })
 }
 
-/// `gamma x` where positive, else `gamma alpha (exp(x) - 1)`.
+/// Returns `gamma x` if x is positive, else `gamma alpha (exp(x) - 1)`.
 fn elu(alpha: f64, gamma: f64) -> OnVector {
     Box::new(move |exprs, x| {
         let elu = exprs.elu(x, alpha);
@@ -98,7 +98,7 @@ fn hard_sigmoid(exprs: &mut Exprs, x: Id, slope: f64, middle: f64) -> Id {
     exprs.clip(line, 0.0, 1.0)
 }
 
-/// The limits of a Clip: attributes before operator set 11, inputs since.
+/// Returns the limits of a Clip: attributes before operator set 11, inputs since.
 fn limits(call: &Call<'_>) -> Result<(f64, f64)> {
     let limit = |i: usize, name: &str, none: f64| match (call.float(name), call.optional(i)) {
         (Some(limit), _) => Ok(limit),
@@ -108,7 +108,7 @@ fn limits(call: &Call<'_>) -> Result<(f64, f64)> {
             values.first().copied().context("a limit has no value")
         }
     };
-    // Exporters write f32's largest number where there is no limit.
+    // Exporters write f32's largest number for no limit.
     let open = |limit: f64| if limit.abs() >= f64::from(f32::MAX) { limit * f64::INFINITY } else { limit };
     Ok((open(limit(1, "min", f64::NEG_INFINITY)?), open(limit(2, "max", f64::INFINITY)?)))
 }

@@ -1,4 +1,4 @@
-//! Elements at known indices, taken and replaced.
+//! Operators that read or replace elements at known indices.
 
 use actq::error::{Context as _, Result, ensure};
 
@@ -6,31 +6,36 @@ use crate::nodes::call::Call;
 use crate::nodes::places::{along, axis};
 use crate::values::tensor::{Tensor, count, room};
 
-/// Slices at known indices of an axis.
+/// Gathers slices at known indices of an axis.
 pub(crate) fn gather(call: &Call<'_>, most: usize) -> Result<Tensor> {
     let input = call.input(0)?;
     let at = axis(call.int("axis").unwrap_or(0), input.shape.len())?;
     let n = input.shape[at];
     let indices = call.integers(1, "the indices")?;
     let shape = &call.input(1)?.shape;
-    let (before, behind) = (&input.shape[..at], &input.shape[at + 1..]);
-    let out = [before, shape, behind].concat();
+    let (before, after) = (&input.shape[..at], &input.shape[at + 1..]);
+    let out = [before, shape, after].concat();
     room(&out, most)?;
     let chosen = indices.iter().map(|&i| axis(i, n)).collect::<Result<Vec<_>>>()?;
     let (_, found) = along(&input.shape, at, chosen)?;
     input.taken(out, &found)
 }
 
-/// Pieces at known places.
+/// Gathers slices at known places.
 pub(crate) fn gather_nd(call: &Call<'_>, most: usize) -> Result<Tensor> {
     let input = call.input(0)?;
     let batch = call.int("batch_dims").and_then(|n| usize::try_from(n).ok()).unwrap_or(0);
     let indices = call.integers(1, "the indices")?;
     let (depth, outer) = call.input(1)?.shape.split_last().context("its indices have no axis")?;
-    let piece =
-        batch.checked_add(*depth).and_then(|n| input.shape.get(n..)).context("its indices have too many parts")?;
-    // Batches of length 1 are none.
-    ensure!(*depth > 0 && input.shape[..batch].iter().all(|&n| n == 1), "takes pieces of several batches");
+    let piece = batch
+        .checked_add(*depth)
+        .and_then(|n| input.shape.get(n..))
+        .context("its indices have more parts than the input has axes")?;
+    // Batch axes of length 1 have no effect.
+    ensure!(
+        *depth > 0 && input.shape[..batch].iter().all(|&n| n == 1),
+        "reads several batches; export with a batch of 1"
+    );
     let out = [outer, piece].concat();
     room(&out, most)?;
     let n = count(piece)?;
@@ -45,12 +50,12 @@ pub(crate) fn gather_nd(call: &Call<'_>, most: usize) -> Result<Tensor> {
     input.taken(out, &places)
 }
 
-/// Rows at known places are replaced.
+/// Replaces slices at known places.
 pub(crate) fn scatter_nd(call: &Call<'_>) -> Result<Tensor> {
     let (data, updates) = (call.input(0)?, call.input(2)?);
     ensure!(
         matches!(call.text("reduction").as_deref(), None | Some("none")),
-        "only replaces where it has no reduction"
+        "has a reduction; only replacement is supported"
     );
     let indices = call.integers(1, "the indices")?;
     let depth = call.input(1)?.shape.last().copied().unwrap_or(1);
@@ -71,7 +76,7 @@ pub(crate) fn scatter_nd(call: &Call<'_>) -> Result<Tensor> {
     replaced(data, updates, &places)
 }
 
-/// Elements of a tensor at these places, of its updates where the place is behind all of its own.
+/// Returns elements at these places of a tensor, followed by its updates.
 fn replaced(data: &Tensor, updates: &Tensor, places: &[usize]) -> Result<Tensor> {
     let both = match (data.integers(), updates.integers()) {
         (Some(data), Some(updates)) => Tensor::ints([data, updates].concat()),
@@ -83,7 +88,7 @@ fn replaced(data: &Tensor, updates: &Tensor, places: &[usize]) -> Result<Tensor>
     both.taken(data.shape.clone(), places)
 }
 
-/// For each element of the indices its place in a tensor of this shape, where they count along one axis.
+/// Returns the place in a tensor of this shape for each index along the node's axis.
 fn element_places(call: &Call<'_>, shape: &[usize]) -> Result<Vec<usize>> {
     let at = axis(call.int("axis").unwrap_or(0), shape.len())?;
     let (indices, of) = (call.integers(1, "the indices")?, &call.input(1)?.shape);
@@ -102,18 +107,18 @@ fn element_places(call: &Call<'_>, shape: &[usize]) -> Result<Vec<usize>> {
     indices.iter().enumerate().map(one).collect()
 }
 
-/// Single elements at known indices along an axis.
+/// Gathers single elements at known indices along an axis.
 pub(crate) fn gather_elements(call: &Call<'_>) -> Result<Tensor> {
     let input = call.input(0)?;
     input.taken(call.input(1)?.shape.clone(), &element_places(call, &input.shape)?)
 }
 
-/// Single elements at known indices along an axis are replaced.
+/// Replaces single elements at known indices along an axis.
 pub(crate) fn scatter_elements(call: &Call<'_>) -> Result<Tensor> {
     let (data, updates) = (call.input(0)?, call.input(2)?);
     ensure!(
         matches!(call.text("reduction").as_deref(), None | Some("none")),
-        "only replaces where it has no reduction"
+        "has a reduction; only replacement is supported"
     );
     ensure!(updates.shape == call.input(1)?.shape, "its updates do not fit its indices");
     let mut places: Vec<usize> = (0..data.len()).collect();

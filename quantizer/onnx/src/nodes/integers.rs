@@ -1,5 +1,5 @@
-//! Inputs of integers, as the time step of a denoiser is: observed as float32 where the file casts them before it
-//! computes.
+//! Integer inputs, such as the time step of a denoiser. They are observed in float32 if the file casts them before it
+//! computes with them.
 
 use actq::error::Result;
 
@@ -7,7 +7,7 @@ use crate::nodes::call::Call;
 use crate::values::expr::{Expr, Exprs};
 use crate::values::tensor::{Data, Element, Tensor};
 
-/// What a cast gives, where it casts such an input.
+/// Returns the output of a cast of such an input.
 pub(crate) fn cast(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> {
     let to = match call.op() {
         "Cast" => call.int("to"),
@@ -31,7 +31,7 @@ pub(crate) fn cast(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>>
             }
             Some(Tensor::new(x.shape.clone(), Data::Open(elements)))
         }
-        // Between int32 and int64: what one of them does not hold, float32 does not hold either.
+        // Casts between int32 and int64 have no effect on observed integers.
         Some(6 | 7) => Some(x.clone()),
         _ => None,
     })

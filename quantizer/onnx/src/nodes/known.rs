@@ -1,4 +1,4 @@
-//! Arithmetic on what is known: shape chains, and constants that exporters compute in the file.
+//! Constant folding: shape computations, and constants that exporters compute in the file.
 
 use std::cmp::Ordering;
 
@@ -9,11 +9,11 @@ use crate::nodes::moves::expanded;
 use crate::nodes::places::{axis, broadcast};
 use crate::values::tensor::{Data, Tensor, count};
 
-/// Mod with the sign of the first operand, which is the only one of real numbers; without the attribute it is that of
-/// the second.
+/// Name of Mod with the attribute fmod: the result has the sign of the first operand, else of the second. Real numbers
+/// require it.
 const FMOD: &str = "Mod, fmod";
 
-/// The output, where the node computes with known numbers alone.
+/// Returns the output, if all inputs are known.
 pub(crate) fn run(call: &Call<'_>, most: usize) -> Result<Option<Tensor>> {
     let given: Vec<&Tensor> = call.inputs.iter().copied().flatten().collect();
     if given.is_empty() || !given.iter().all(|tensor| tensor.is_known()) {
@@ -39,7 +39,7 @@ pub(crate) fn run(call: &Call<'_>, most: usize) -> Result<Option<Tensor>> {
     }
 }
 
-/// What quantized weights stand for: a scale and a zero for all of them, or for each index of an axis.
+/// Dequantizes weights with one scale and zero point for all, or for each index of an axis.
 fn dequantized(call: &Call<'_>) -> Result<Tensor> {
     let (x, scale) = (call.input(0)?, call.input(1)?);
     ensure!(
@@ -54,7 +54,7 @@ fn dequantized(call: &Call<'_>) -> Result<Tensor> {
         ensure!(x.shape[at] == n, "has {n} scales for an axis of {}", x.shape[at]);
         count(&x.shape[at + 1..])?
     };
-    let (scales, values) = (call.reals(1, "the scale")?, call.reals(0, "what is quantized")?);
+    let (scales, values) = (call.reals(1, "the scale")?, call.reals(0, "the quantized tensor")?);
     let zeros = if call.optional(2).is_some() { call.reals(2, "the zero point")? } else { vec![0.0; n] };
     ensure!(zeros.len() == n, "has {} zero points for {n} scales", zeros.len());
     let runs = values.chunks(each.max(1)).zip((0..n).cycle());
@@ -62,7 +62,7 @@ fn dequantized(call: &Call<'_>) -> Result<Tensor> {
     Ok(Tensor::new(x.shape.clone(), Data::Real(values.collect())))
 }
 
-/// A function of one known number that no value of a network goes through, or that integers do.
+/// Returns a function of one known number that has no kernel, or that applies to integers.
 fn function(op: &str) -> Option<fn(f64) -> f64> {
     Some(match op {
         "Neg" => |x| -x,
@@ -87,7 +87,7 @@ fn unary(x: &Tensor, op: &str, f: fn(f64) -> f64) -> Result<Tensor> {
     Ok(Tensor::new(x.shape.clone(), data))
 }
 
-/// An operation on two known numbers.
+/// Returns an operation on two known numbers.
 pub(crate) fn real(op: &str) -> Option<fn(f64, f64) -> f64> {
     Some(match op {
         "Add" => |x, y| x + y,
@@ -103,7 +103,7 @@ pub(crate) fn real(op: &str) -> Option<fn(f64, f64) -> f64> {
     })
 }
 
-/// As [`real`], of integers, where the result is one; division goes towards zero.
+/// Returns an operation on two known integers with an integer result. Division rounds towards zero.
 fn whole(op: &str) -> Option<fn(i64, i64) -> Option<i64>> {
     Some(match op {
         "Add" => i64::checked_add,
@@ -124,7 +124,7 @@ fn whole(op: &str) -> Option<fn(i64, i64) -> Option<i64>> {
     })
 }
 
-/// A comparison.
+/// Returns a comparison.
 fn compared(op: &str) -> Option<fn(Ordering) -> bool> {
     Some(match op {
         "Equal" => Ordering::is_eq,
@@ -150,20 +150,20 @@ fn binary(op: &str, x: &Tensor, y: &Tensor, shape: Vec<usize>) -> Result<Tensor>
     let (x, y) = (x.reals().context("is not known")?, y.reals().context("is not known")?);
     let pairs = x.into_iter().zip(y);
     if let Some(holds) = compared(op) {
-        // What is not a number compares as nothing.
+        // All comparisons with NaN are false.
         return Ok(Tensor::new(shape, truths(pairs.map(|(x, y)| x.partial_cmp(&y).is_some_and(holds)).collect())));
     }
-    let f = real(op).context("is of integers or truth values, and these are real numbers")?;
+    let f = real(op).context("needs integers or booleans, and reads real numbers")?;
     Ok(Tensor::new(shape, Data::Real(pairs.map(|(x, y)| f(x, y)).collect())))
 }
 
-/// The axes that a Reduce node goes over, and its result's shape, with and without them.
+/// The axes that a Reduce node reduces, and the shape of its result.
 pub(crate) struct Reduced {
     pub(crate) axes: Vec<usize>,
     pub(crate) shape: Vec<usize>,
 }
 
-/// What a Reduce node does to the shape of its input.
+/// Returns the axes of a Reduce node and the shape of its result.
 pub(crate) fn reduced(call: &Call<'_>) -> Result<Reduced> {
     let shape = &call.input(0)?.shape;
     let axes = match call.ints_or_input("axes", 1)? {
@@ -178,7 +178,7 @@ pub(crate) fn reduced(call: &Call<'_>) -> Result<Reduced> {
 
 fn reduce(call: &Call<'_>, x: &Tensor) -> Result<Tensor> {
     let Reduced { axes, shape } = reduced(call)?;
-    // The axes that stay in front, so that each result has its own run.
+    // The other axes come first, so that each result reduces one run.
     let order: Vec<usize> = (0..x.shape.len()).filter(|i| !axes.contains(i)).chain(axes.iter().copied()).collect();
     let (turned, places) = crate::nodes::places::transpose(&x.shape, &order)?;
     let x = x.taken(turned, &places)?;
@@ -193,7 +193,7 @@ fn reduce(call: &Call<'_>, x: &Tensor) -> Result<Tensor> {
         _ => run.iter().copied().fold(f64::INFINITY, f64::min),
     };
     let values: Vec<f64> = x.reals().context("is not known")?.chunks(each).map(fold).collect();
-    // Lengths of axes are far below what f64 counts exactly.
+    // f64 holds lengths of axes exactly.
     let data =
         if x.integers().is_some() { Data::Int(values.iter().map(|&v| v as i64).collect()) } else { Data::Real(values) };
     Ok(Tensor::new(shape, data))

@@ -1,4 +1,4 @@
-//! Operations that only move elements, and those about shapes: what is known and what is not goes the same way.
+//! Operators that only move elements, and operators on shapes. They treat known and open elements alike.
 
 use actq::error::{Context as _, Result, bail, ensure};
 use half::{bf16, f16};
@@ -9,7 +9,7 @@ use crate::nodes::gather;
 use crate::nodes::places::{self, Places, along, axis, broadcast};
 use crate::values::tensor::{Data, Element, Tensor, count, room};
 
-/// The outputs, where the node is such an operation; of at most `most` elements.
+/// Returns the outputs, with at most `most` elements, if the node is such an operator.
 pub(crate) fn run(call: &Call<'_>, most: usize) -> Result<Option<Vec<Tensor>>> {
     let one = |tensor: Tensor| Ok(Some(vec![tensor]));
     match call.op() {
@@ -43,7 +43,7 @@ pub(crate) fn run(call: &Call<'_>, most: usize) -> Result<Option<Vec<Tensor>>> {
                 None => (0..rank).filter(|&i| input.shape[i] == 1).collect(),
             };
             let kept = (0..rank).filter(|i| !axes.contains(i)).map(|i| input.shape[i]).collect();
-            one(input.reshaped(kept).context("only axes of length 1 can be squeezed")?)
+            one(input.reshaped(kept).context("squeezes an axis of more than one value")?)
         }
         "Unsqueeze" => {
             let input = call.input(0)?;
@@ -52,7 +52,7 @@ pub(crate) fn run(call: &Call<'_>, most: usize) -> Result<Option<Vec<Tensor>>> {
             let axes = axes.into_iter().map(|a| axis(a, rank)).collect::<Result<Vec<_>>>()?;
             let mut rest = input.shape.iter();
             let shape = (0..rank).map(|i| if axes.contains(&i) { Some(1) } else { rest.next().copied() });
-            one(input.reshaped(shape.collect::<Option<_>>().context("an axis is there twice")?)?)
+            one(input.reshaped(shape.collect::<Option<_>>().context("names an axis twice")?)?)
         }
         "Transpose" => {
             let input = call.input(0)?;
@@ -78,7 +78,7 @@ pub(crate) fn run(call: &Call<'_>, most: usize) -> Result<Option<Vec<Tensor>>> {
             let input = call.input(0)?;
             let times = lengths(&call.integers(1, "the repeats")?)?;
             let out: Option<Vec<usize>> = input.shape.iter().zip(&times).map(|(&n, &t)| n.checked_mul(t)).collect();
-            room(&out.context("the repeats are too many")?, most)?;
+            room(&out.context("the repeats exceed the range of a length")?, most)?;
             one(taken(input, places::tile(&input.shape, &times)?)?)
         }
         "Where" => where_known(call, most),
@@ -93,7 +93,7 @@ fn taken(input: &Tensor, (shape, places): Places) -> Result<Tensor> {
     input.taken(shape, &places)
 }
 
-/// Repeated along axes of length 1, to a shape that fits.
+/// Broadcasts a tensor to a shape.
 pub(crate) fn expanded(input: &Tensor, shape: &[usize], most: usize) -> Result<Tensor> {
     if input.shape == shape {
         return Ok(input.clone());
@@ -107,12 +107,12 @@ fn lengths(shape: &[i64]) -> Result<Vec<usize>> {
     axes.with_context(|| format!("{shape:?} has a negative length"))
 }
 
-/// Known numbers, each rounded to a type of fewer digits.
+/// Rounds known numbers to another type.
 fn rounded(input: &Tensor, to: fn(f64) -> f64) -> Vec<f64> {
     input.reals().unwrap_or_default().into_iter().map(to).collect()
 }
 
-/// An integer as one of ONNX's type `kind`, which keeps the last bits.
+/// Wraps an integer to ONNX's type `kind`, which keeps the low bits.
 fn wrapped(v: i64, kind: i64) -> i64 {
     match kind {
         2 => i64::from(v as u8),
@@ -125,8 +125,7 @@ fn wrapped(v: i64, kind: i64) -> i64 {
     }
 }
 
-/// Between float32 and float64 nothing is lost but digits that float32 has not; values of the network have no other
-/// type.
+/// Converts a cast. Values of the network are float32, so that casts between float32 and float64 keep them.
 fn cast(call: &Call<'_>) -> Result<Tensor> {
     let input = call.input(0)?;
     let to = match call.op() {
@@ -152,7 +151,7 @@ fn cast(call: &Call<'_>) -> Result<Tensor> {
                 let one = *v as i64;
                 ensure!(
                     one as f64 == v.trunc() && wrapped(one, to) == one,
-                    "casts {v} to {}, which does not hold it",
+                    "casts {v} to {}, which cannot hold it",
                     kind_name(to as i32)
                 );
                 Ok(one)
@@ -160,7 +159,7 @@ fn cast(call: &Call<'_>) -> Result<Tensor> {
             Data::Int(v.iter().map(whole).collect::<Result<_>>()?)
         }
         _ => {
-            bail!("rounds a value of the network to {}; export the policy in float32 throughout", kind_name(to as i32))
+            bail!("rounds a value of the network to {}; export the whole policy in float32", kind_name(to as i32))
         }
     };
     Ok(Tensor { data, ..input.clone() })
@@ -176,12 +175,16 @@ fn constant(call: &Call<'_>) -> Result<Tensor> {
     if let Some(v) = call.ints("value_ints") {
         return Ok(Tensor::ints(v));
     }
-    let floats = call.node.attributes.get("value_floats").context("its value is of a type that is not known")?;
+    let floats = call
+        .node
+        .attributes
+        .get("value_floats")
+        .context("its value has an unsupported type; export it as float32 or int64")?;
     let values: Vec<f64> = floats.floats.iter().map(|&v| v.into()).collect();
     Ok(Tensor::new(vec![values.len()], Data::Real(values)))
 }
 
-/// A tensor of a shape that is given, of one number.
+/// Makes a tensor of a known shape from one number.
 pub(crate) fn constant_of_shape(call: &Call<'_>, fill: &Data, most: usize) -> Result<Tensor> {
     let shape = lengths(&call.integers(0, "the shape")?)?;
     let n = room(&shape, most)?;
@@ -200,7 +203,7 @@ fn range(call: &Call<'_>, most: usize) -> Result<Tensor> {
     let bound = |i: usize| call.reals(i, "a bound")?.first().copied().context("has a bound without a value");
     let (start, limit, step) = (bound(0)?, bound(1)?, bound(2)?);
     let n = ((limit - start) / step).ceil().max(0.0);
-    ensure!(n.is_finite() && n <= most as f64, "from {start} to {limit} in steps of {step} is too long");
+    ensure!(n.is_finite() && n <= most as f64, "has too many values from {start} to {limit} in steps of {step}");
     let values = (0..n as usize).map(|i| start + i as f64 * step);
     Ok(Tensor::new(
         vec![n as usize],
@@ -216,12 +219,12 @@ fn reshape(call: &Call<'_>) -> Result<Tensor> {
     let wanted = call.ints_or_input("shape", 1)?.context("has no shape")?;
     let keep = call.int("allowzero").unwrap_or(0) == 0;
     let axis = |(i, n): (usize, i64)| match n {
-        0 if keep => input.shape.get(i).copied().map(Some).context("keeps an axis that is not there"),
+        0 if keep => input.shape.get(i).copied().map(Some).context("keeps the length of an axis that the input lacks"),
         -1 => Ok(None),
-        n => usize::try_from(n).map(Some).with_context(|| format!("{n} is no length of an axis")),
+        n => usize::try_from(n).map(Some).with_context(|| format!("{n} is not a length of an axis")),
     };
     let axes = wanted.into_iter().enumerate().map(axis).collect::<Result<Vec<_>>>()?;
-    ensure!(axes.iter().filter(|a| a.is_none()).count() <= 1, "two lengths are left open");
+    ensure!(axes.iter().filter(|a| a.is_none()).count() <= 1, "leaves two lengths open");
     let rest = count(&axes.iter().map(|a| a.unwrap_or(1)).collect::<Vec<_>>())?;
     let open = input.len().checked_div(rest).unwrap_or(0);
     input.reshaped(axes.into_iter().map(|a| a.unwrap_or(open)).collect())
@@ -235,7 +238,7 @@ fn slice(call: &Call<'_>) -> Result<Tensor> {
     let steps = if call.optional(4).is_some() { call.integers(4, "the steps")? } else { vec![1; starts.len()] };
     ensure!(
         ends.len() == starts.len() && axes.len() == starts.len() && steps.len() == starts.len(),
-        "its lists differ in length"
+        "has starts, ends, axes and steps of different lengths"
     );
     let mut kept = input.clone();
     for (((start, end), at), step) in starts.into_iter().zip(ends).zip(axes).zip(steps) {
@@ -263,7 +266,7 @@ fn split(call: &Call<'_>) -> Result<Vec<Tensor>> {
         }
     };
     let sum = parts.iter().try_fold(0usize, |n, &part| n.checked_add(part));
-    ensure!(sum == Some(n), "its parts {parts:?} are not the {n} values of the axis");
+    ensure!(sum == Some(n), "its parts {parts:?} do not add up to the {n} values of the axis");
     let mut from = 0;
     let mut part = |len: usize| {
         from += len;
@@ -274,19 +277,19 @@ fn split(call: &Call<'_>) -> Result<Vec<Tensor>> {
 
 fn concat(call: &Call<'_>) -> Result<Tensor> {
     let parts = call.inputs.iter().copied().flatten().collect::<Vec<_>>();
-    let first = parts.first().context("joins nothing")?;
+    let first = parts.first().context("has no input to join")?;
     joined(&parts, axis(call.int("axis").unwrap_or(0), first.shape.len())?)
 }
 
-/// Tensors behind each other along an axis.
+/// Joins tensors along an axis.
 fn joined(parts: &[&Tensor], at: usize) -> Result<Tensor> {
-    let first = parts.first().context("joins nothing")?;
+    let first = parts.first().context("has no input to join")?;
     for part in parts {
         let fits = part.shape.len() == first.shape.len();
         let fits = fits && (0..first.shape.len()).all(|i| i == at || part.shape[i] == first.shape[i]);
         ensure!(fits, "joins {:?} to {:?} along axis {at}", part.shape, first.shape);
     }
-    // All elements one part behind the other; then, for each row in front of the axis, its piece of every part.
+    // Concatenates the elements of all parts, then picks each row's piece of every part.
     let mut shape = first.shape.clone();
     shape[at] = parts.iter().map(|part| part.shape[at]).sum();
     let rows = count(&shape[..at])?;
@@ -310,7 +313,7 @@ fn joined(parts: &[&Tensor], at: usize) -> Result<Tensor> {
     all.taken(shape, &found)
 }
 
-/// More values, or fewer, at both ends of axes.
+/// Converts Pad, which adds or removes values at both ends of axes.
 fn pad(call: &Call<'_>, most: usize) -> Result<Tensor> {
     let input = call.input(0)?;
     let pads = call.ints_or_input("pads", 1)?.context("has no pads")?;
@@ -322,28 +325,28 @@ fn pad(call: &Call<'_>, most: usize) -> Result<Tensor> {
     let axes = if call.optional(3).is_some() { call.integers(3, "the axes")? } else { (0..rank as i64).collect() };
     ensure!(pads.len() == 2 * axes.len(), "has {} pads for {} axes", pads.len(), axes.len());
     let mode = call.text("mode").unwrap_or_else(|| "constant".to_owned());
-    ensure!(mode == "constant", "pads with {mode:?}; only constants are taken");
+    ensure!(mode == "constant", "has the mode {mode:?}; only constant padding is supported");
     let mut all = input.clone();
-    for (&at, (&before, &behind)) in axes.iter().zip(pads.iter().zip(&pads[axes.len()..])) {
+    for (&at, (&before, &after)) in axes.iter().zip(pads.iter().zip(&pads[axes.len()..])) {
         let at = axis(at, rank)?;
-        // Negative ones cut.
-        let end = if behind < 0 { behind } else { i64::MAX };
+        // Negative pads remove values.
+        let end = if after < 0 { after } else { i64::MAX };
         let kept = places::slice(all.shape[at], before.min(0).saturating_neg(), end, 1)?;
         let kept = taken(&all, along(&all.shape, at, kept)?)?;
         let of_length = |n: usize| [&kept.shape[..at], &[n], &kept.shape[at + 1..]].concat();
-        let [before, behind] = [before, behind].map(|n| usize::try_from(n.max(0)).unwrap_or(usize::MAX));
-        room(&of_length(kept.shape[at].saturating_add(before).saturating_add(behind)), most)?;
+        let [before, after] = [before, after].map(|n| usize::try_from(n.max(0)).unwrap_or(usize::MAX));
+        room(&of_length(kept.shape[at].saturating_add(before).saturating_add(after)), most)?;
         let block = |n: usize| -> Result<Tensor> {
             let shape = of_length(n);
             let n = count(&shape)?;
             Ok(Tensor::new(shape, Data::Real(vec![fill; n])))
         };
-        all = joined(&[&block(before)?, &kept, &block(behind)?], at)?;
+        all = joined(&[&block(before)?, &kept, &block(after)?], at)?;
     }
     Ok(all)
 }
 
-/// A choice that is known for every element.
+/// Converts a choice that is known for every element.
 fn where_known(call: &Call<'_>, most: usize) -> Result<Option<Vec<Tensor>>> {
     let (choice, x, y) = (call.input(0)?, call.input(1)?, call.input(2)?);
     if choice.integers().is_none() {

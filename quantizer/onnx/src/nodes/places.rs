@@ -1,21 +1,21 @@
-//! Where the elements of a tensor go when it is cut, joined, turned or repeated: for each element of the result its
-//! place in the operand. What is known and what is not moves alike.
+//! Places of elements when a tensor is sliced, joined, transposed or repeated: for each element of the result, its
+//! place in the operand. Known and open elements move alike.
 
 use actq::error::{Context as _, Result, ensure};
 
 use crate::values::tensor::count;
 
-/// A shape, and for each of its elements the place of the operand's element.
+/// A shape, and for each of its elements the place in the operand.
 pub(crate) type Places = (Vec<usize>, Vec<usize>);
 
-/// An axis counted from the end where it is negative.
+/// Returns the index of an axis; a negative axis counts from the end.
 pub(crate) fn axis(axis: i64, rank: usize) -> Result<usize> {
     let from_start = if axis < 0 { axis.checked_add(rank as i64) } else { Some(axis) };
     let found = from_start.and_then(|a| usize::try_from(a).ok()).filter(|&a| a < rank);
-    found.with_context(|| format!("the axis {axis} is not one of {rank}"))
+    found.with_context(|| format!("axis or index {axis} is out of range for {rank}"))
 }
 
-/// The distance of neighbours along every axis.
+/// Returns the distance of neighbours along every axis.
 fn strides(shape: &[usize]) -> Vec<usize> {
     let mut strides = vec![1; shape.len()];
     for i in (1..shape.len()).rev() {
@@ -24,7 +24,7 @@ fn strides(shape: &[usize]) -> Vec<usize> {
     strides
 }
 
-/// All places of `shape`, where each axis has its own places along itself.
+/// Returns all places of `shape` with the chosen indices along each axis.
 fn grid(shape: &[usize], along: &[Vec<usize>]) -> Result<Places> {
     let out: Vec<usize> = along.iter().map(Vec::len).collect();
     let mut places = Vec::with_capacity(count(&out)?);
@@ -35,17 +35,17 @@ fn grid(shape: &[usize], along: &[Vec<usize>]) -> Result<Places> {
     Ok((out, places))
 }
 
-/// All of every axis but one.
+/// Returns the places with the chosen indices of one axis and all indices of the others.
 pub(crate) fn along(shape: &[usize], axis: usize, chosen: Vec<usize>) -> Result<Places> {
-    ensure!(chosen.iter().all(|&i| i < shape[axis]), "an index is beyond the axis' {} values", shape[axis]);
+    ensure!(chosen.iter().all(|&i| i < shape[axis]), "an index is out of range for an axis of {} values", shape[axis]);
     let mut axes: Vec<Vec<usize>> = shape.iter().map(|&n| (0..n).collect()).collect();
     axes[axis] = chosen;
     grid(shape, &axes)
 }
 
-/// What ONNX's Slice keeps of an axis of `len` values.
+/// Returns the indices that ONNX's Slice keeps of an axis of `len` values.
 pub(crate) fn slice(len: usize, start: i64, end: i64, step: i64) -> Result<Vec<usize>> {
-    ensure!(step != 0, "a step of a slice is 0");
+    ensure!(step != 0, "has a step of 0");
     let n = len as i64;
     let from_end = |i: i64| if i < 0 { i.saturating_add(n) } else { i };
     let (low, high) = if step > 0 { (0, n) } else { (-1, n - 1) };
@@ -58,11 +58,15 @@ pub(crate) fn slice(len: usize, start: i64, end: i64, step: i64) -> Result<Vec<u
     Ok(kept)
 }
 
-/// The axes in another order.
+/// Returns the places with the axes in another order.
 pub(crate) fn transpose(shape: &[usize], order: &[usize]) -> Result<Places> {
     let mut seen = vec![false; shape.len()];
     order.iter().for_each(|&axis| seen[axis] = true);
-    ensure!(order.len() == shape.len() && seen.iter().all(|s| *s), "{order:?} is no order of {} axes", shape.len());
+    ensure!(
+        order.len() == shape.len() && seen.iter().all(|s| *s),
+        "{order:?} is not a permutation of {} axes",
+        shape.len()
+    );
     let from = strides(shape);
     let out: Vec<usize> = order.iter().map(|&axis| shape[axis]).collect();
     let mut places = vec![0];
@@ -73,19 +77,19 @@ pub(crate) fn transpose(shape: &[usize], order: &[usize]) -> Result<Places> {
     Ok((out, places))
 }
 
-/// The shape that both can be repeated to, as numpy has it.
+/// Returns the shape that both broadcast to, by numpy's rules.
 pub(crate) fn broadcast(a: &[usize], b: &[usize]) -> Result<Vec<usize>> {
     let rank = a.len().max(b.len());
     let at = |shape: &[usize], i: usize| if i + shape.len() < rank { 1 } else { shape[i + shape.len() - rank] };
     let one = |i: usize| match (at(a, i), at(b, i)) {
         (x, y) if x == y => Ok(x),
         (1, n) | (n, 1) => Ok(n),
-        _ => actq::bail!("{a:?} and {b:?} do not fit each other"),
+        _ => actq::bail!("shapes {a:?} and {b:?} do not broadcast"),
     };
     (0..rank).map(one).collect()
 }
 
-/// Repeated to a shape that [`broadcast`] gave.
+/// Returns the places of a tensor that is broadcast to the shape `out` from [`broadcast`].
 pub(crate) fn expand(shape: &[usize], out: &[usize]) -> Result<Vec<usize>> {
     ensure!(broadcast(shape, out)? == out, "{shape:?} cannot be expanded to {out:?}");
     let mut from = vec![0; out.len() - shape.len()];
@@ -97,9 +101,9 @@ pub(crate) fn expand(shape: &[usize], out: &[usize]) -> Result<Vec<usize>> {
     Ok(places)
 }
 
-/// The whole repeated along every axis.
+/// Returns the places of a tensor that is repeated along every axis.
 pub(crate) fn tile(shape: &[usize], times: &[usize]) -> Result<Places> {
-    ensure!(times.len() == shape.len(), "{} repeats of {} axes", times.len(), shape.len());
+    ensure!(times.len() == shape.len(), "has {} repeats for {} axes", times.len(), shape.len());
     let axes: Vec<Vec<usize>> = shape.iter().zip(times).map(|(&n, &t)| (0..t).flat_map(|_| 0..n).collect()).collect();
     grid(shape, &axes)
 }

@@ -1,4 +1,4 @@
-//! Operations on the elements of values: functions, sums and products, comparisons.
+//! Elementwise operators: functions, sums and products, comparisons.
 
 use actq::error::{Context as _, Result};
 
@@ -10,7 +10,7 @@ use crate::values::elements::each;
 use crate::values::expr::Exprs;
 use crate::values::tensor::Tensor;
 
-/// The output, where the node is such an operation.
+/// Returns the output, if the node is such an operator.
 pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs, most: usize) -> Result<Option<Tensor>> {
     match call.op() {
         "Add" | "Sub" | "Mul" | "Div" | "Pow" | "PRelu" => {

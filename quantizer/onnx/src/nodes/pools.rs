@@ -1,4 +1,4 @@
-//! Pools over few positions: means and largest values of what stands at each place of a window.
+//! Pools over few positions: means and maxima over the places of a window.
 
 use actq::error::{Context as _, Result, bail, ensure};
 
@@ -10,7 +10,7 @@ use crate::nodes::reductions::MOST_COMPARED;
 use crate::values::expr::Exprs;
 use crate::values::tensor::{Data, Element, Tensor, count, room};
 
-/// The output, where the node is a pool.
+/// Returns the output, if the node is a pool.
 pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs, most: usize) -> Result<Option<Tensor>> {
     let op = match call.op() {
         "AveragePool" => "Add",
@@ -18,36 +18,38 @@ pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs, most: usize) -> Result<Opt
         _ => return Ok(None),
     };
     let x = call.input(0)?;
-    let &[1, channels, ref lens @ ..] = &x.shape[..] else { bail!("takes {:?}; [1, channel, ..] is taken", x.shape) };
+    let &[1, channels, ref lens @ ..] = &x.shape[..] else {
+        bail!("reads the shape {:?}; export with [1, channel, ..]", x.shape)
+    };
     let kernel: Option<Vec<usize>> = call.ints("kernel_shape").and_then(|ints| {
         let lens = ints.iter().map(|&n| usize::try_from(n).ok());
         lens.collect()
     });
     let kernel = kernel.filter(|kernel| kernel.len() == lens.len() && !kernel.is_empty());
-    let kernel = kernel.with_context(|| format!("its kernel does not fit {:?}", x.shape))?;
+    let kernel = kernel.with_context(|| format!("its kernel does not fit the shape {:?}", x.shape))?;
     let size = count(&kernel)?;
     ensure!(
         (1..=MOST_COMPARED).contains(&size),
-        "goes over windows of {size} values; 1 to {MOST_COMPARED} are taken; export the part behind the encoder as a policy of its own"
+        "has windows of {size} values; the limit is {MOST_COMPARED}; export the part after the encoder as a separate policy"
     );
     let axes = axes(call, lens, &kernel)?;
     ensure!(
         call.int("ceil_mode").unwrap_or(0) == 0 || axes.iter().all(|axis| axis.is_even()),
-        "has a last window that reaches over the end (ceil_mode); export with whole windows, or with padding"
+        "has a last window that extends past the end (ceil_mode); export with whole windows, or with padding"
     );
     let shape: Vec<usize> = axes.iter().map(|axis| axis.positions).collect();
     let positions = count(&shape)?;
     room(&[positions.saturating_mul(size), channels], most)?;
     let (elements, len) = (x.elements(), count(lens)?);
     let windows: Vec<Vec<Option<usize>>> = (0..positions).map(|position| window(&axes, position)).collect();
-    // What stands at place k of every window, all channels of a position beside each other, as the layer before has
-    // given them.
+    // The elements at place k of every window. The channels of a position are adjacent, as in the output of the layer
+    // before.
     let slice = |k: usize| -> Result<Tensor> {
         let mut slice = Vec::with_capacity(positions * channels);
         for window in &windows {
-            // Padding is 0 in a sum, and never the largest: what is there already may stand in its place.
+            // Padding is 0 in a sum. In a maximum it has no effect, so another element of the window replaces it.
             let place = if op == "Max" { window[k].or(window.iter().find_map(|place| *place)) } else { window[k] };
-            ensure!(place.is_some() || op == "Add", "has a window of nothing but padding");
+            ensure!(place.is_some() || op == "Add", "has a window of padding only; export with less padding");
             slice.extend(
                 (0..channels).map(|channel| place.map_or(Element::Known(0.0), |at| elements[channel * len + at])),
             );

@@ -1,4 +1,4 @@
-//! Products with matrices that are known.
+//! Products with constant matrices.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::values::elements::open_vector;
 use crate::values::expr::{Exprs, Matrix};
 use crate::values::tensor::{Data, Element, Tensor, count};
 
-/// The output, where the node is such an operation.
+/// Returns the output, if the node is such an operator.
 pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs, budget: &mut usize) -> Result<Option<Tensor>> {
     match call.op() {
         "MatMul" => product(exprs, call.input(0)?, call.input(1)?, 1.0, budget).map(Some),
@@ -21,11 +21,11 @@ pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs, budget: &mut usize) -> Res
     }
 }
 
-/// `alpha A B + beta C`
+/// Computes `alpha A B + beta C`.
 fn gemm(call: &Call<'_>, exprs: &mut Exprs, budget: &mut usize) -> Result<Tensor> {
     let turned = |i: usize, name: &str| {
         let x = call.input(i)?;
-        ensure!(x.shape.len() == 2, "takes matrices, not {:?}", x.shape);
+        ensure!(x.shape.len() == 2, "needs a matrix and reads the shape {:?}", x.shape);
         if call.int(name).unwrap_or(0) == 0 {
             return Ok(x.clone());
         }
@@ -47,20 +47,20 @@ fn gemm(call: &Call<'_>, exprs: &mut Exprs, budget: &mut usize) -> Result<Tensor
     two("Add", exprs, &y, &c, y.len())
 }
 
-/// The matrix of a tensor [cols, rows] that is known, times a factor.
+/// Returns the matrix of a known tensor [cols, rows], times a factor.
 fn matrix(w: &Tensor, factor: f64, what: &str) -> Result<Arc<Matrix>> {
-    let &[cols, rows] = &w.shape[..] else { bail!("{what} is {:?}; a matrix is taken", w.shape) };
-    let values = w.reals().with_context(|| format!("{what} is not known"))?;
+    let &[cols, rows] = &w.shape[..] else { bail!("{what} has the shape {:?}; it must be a matrix", w.shape) };
+    let values = w.reals().with_context(|| format!("{what} depends on the observation"))?;
     let data = (0..rows * cols).map(|i| factor * values[i % cols * rows + i / cols]).collect();
     Ok(Arc::new(Matrix { name: w.name.clone(), rows, cols, data }))
 }
 
-/// `factor A B`, one of which is known, or both.
+/// Computes `factor A B`, at least one of which is known.
 pub(crate) fn product(exprs: &mut Exprs, a: &Tensor, b: &Tensor, factor: f64, budget: &mut usize) -> Result<Tensor> {
     ensure!(!a.shape.is_empty() && !b.shape.is_empty(), "multiplies {:?} with {:?}", a.shape, b.shape);
     match (a.is_known(), b.is_known()) {
         (_, true) => {}
-        // A B is B' A', turned.
+        // A B is the transpose of B' A'.
         (true, false) => {
             let flat = |x: &Tensor| -> Result<Tensor> {
                 let mut order: Vec<usize> = (0..x.shape.len()).collect();
@@ -74,11 +74,11 @@ pub(crate) fn product(exprs: &mut Exprs, a: &Tensor, b: &Tensor, factor: f64, bu
             return if a.shape.len() > 1 && b.shape.len() > 1 { flat(&y) } else { Ok(y) };
         }
         (false, false) => bail!(
-            "multiplies two values of the network, as attention does; only products with constant matrices are taken, so export the \
-             part behind it"
+            "multiplies two values of the network, as attention does, and only constant matrices are supported; export the part after \
+             it"
         ),
     }
-    // Leading axes of length 1 say nothing.
+    // Leading axes of length 1 have no effect.
     let ones = b.shape.len().saturating_sub(2);
     if b.shape[..ones].iter().any(|&n| n != 1) {
         return products(exprs, a, b, factor, budget);
@@ -92,11 +92,11 @@ pub(crate) fn product(exprs: &mut Exprs, a: &Tensor, b: &Tensor, factor: f64, bu
     let rows = a.len() / n;
     ensure!(
         rows.checked_mul(w.rows).is_some_and(|values| values <= *budget),
-        "multiplies {:?} with {:?}, which are more values than a policy of this size can have",
+        "multiplies {:?} with {:?}, which gives more values than a policy of this size can have",
         a.shape,
         b.shape
     );
-    // The work is bounded as the values are: adding up what is known takes it for every row, open or not.
+    // The work is bounded, too, as every row multiplies its known elements.
     ensure!(
         a.len().checked_mul(w.rows).is_some_and(|work| work <= budget.saturating_mul(64)),
         "multiplies {:?} with {:?}, which takes more work than a policy of this size can have",
@@ -115,10 +115,10 @@ pub(crate) fn product(exprs: &mut Exprs, a: &Tensor, b: &Tensor, factor: f64, bu
     Ok(Tensor::of_elements([vec![1; missing], out].concat(), all))
 }
 
-/// As [`product`], with several matrices, as those of an ensemble: each has its own rows of `a`.
+/// Computes the product of several matrices, as in an ensemble, each with its own rows of `a`.
 fn products(exprs: &mut Exprs, a: &Tensor, b: &Tensor, factor: f64, budget: &mut usize) -> Result<Tensor> {
     let (&[ref of_a @ .., m, n], &[ref of_b @ .., k, cols]) = (&a.shape[..], &b.shape[..]) else {
-        bail!("multiplies {:?} with {:?}; several matrices are taken with several rows", a.shape, b.shape)
+        bail!("multiplies {:?} with {:?}; several matrices need several rows each", a.shape, b.shape)
     };
     let of_both = broadcast(of_a, of_b)?;
     let of_each = |x: &Tensor, shape: [usize; 2]| {
@@ -137,8 +137,8 @@ fn products(exprs: &mut Exprs, a: &Tensor, b: &Tensor, factor: f64, budget: &mut
     Ok(Tensor::of_elements([of_both, vec![m, cols]].concat(), all))
 }
 
-/// The product of a vector; what is known of it goes into the bias, without its columns. The matrix that is left counts
-/// as values that come up.
+/// Multiplies a vector. Known elements go to the bias, and their columns are removed. The remaining matrix counts in
+/// the budget.
 pub(crate) fn row_product(
     exprs: &mut Exprs,
     x: &[Element],
@@ -158,8 +158,8 @@ pub(crate) fn row_product(
         let (rows, cols) = (w.rows, open.len());
         let left = rows.checked_mul(cols).and_then(|n| budget.checked_sub(n)).with_context(|| {
             format!(
-                "cuts constants, or padding, out of its matrix, and the {rows} x {cols} weights that are left are more than a policy of \
-                 this size can have; export the part behind it"
+                "removes columns of constants or padding from its matrix, and the remaining {rows} x {cols} weights are more than a \
+                 policy of this size can have; export the part after it"
             )
         })?;
         *budget = left;

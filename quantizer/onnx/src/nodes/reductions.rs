@@ -1,4 +1,4 @@
-//! Norms, and sums over axes.
+//! Norms, and reductions over axes.
 
 use actq::error::{Context as _, Result, ensure};
 use actq::import::numbers::positive;
@@ -12,10 +12,10 @@ use crate::values::evaluation::computed;
 use crate::values::expr::{Exprs, Id, Unary};
 use crate::values::tensor::{Data, Element, Tensor, count};
 
-/// The most values of which the largest is taken: each takes operations of its own.
+/// The most values of a maximum, each of which takes several operations.
 pub(crate) const MOST_COMPARED: usize = 64;
 
-/// The output, where the node is such an operation.
+/// Returns the output, if the node is such an operator.
 pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> {
     let epsilon = call.float("epsilon").unwrap_or(1e-5);
     match call.op() {
@@ -45,10 +45,13 @@ pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> 
             reduce(op, x, Reduced { axes: (2..x.shape.len()).collect(), shape }, exprs).map(Some)
         }
         "LpNormalization" => {
-            ensure!(call.int("p").unwrap_or(2) == 2, "only the norm with p = 2 is taken");
+            ensure!(call.int("p").unwrap_or(2) == 2, "has p = {}; only p = 2 is supported", call.int("p").unwrap_or(2));
             let x = call.input(0)?;
             let at = axis(call.int("axis").unwrap_or(-1), x.shape.len())?;
-            ensure!(at + 1 == x.shape.len(), "only the last axis can be normalized; export with Transpose around it");
+            ensure!(
+                at + 1 == x.shape.len(),
+                "normalizes axis {at}, and only the last axis is supported; export with Transpose around it"
+            );
             rows(exprs, x, x.shape[at], &|exprs, row| {
                 let length = root_of_squares(exprs, row);
                 let inverse = exprs.unary(Unary::Reciprocal, length);
@@ -67,7 +70,7 @@ fn root_of_squares(exprs: &mut Exprs, x: Id) -> Id {
     exprs.unary(Unary::Sqrt, sum)
 }
 
-/// What `f` gives of a vector that is known as a whole, or not at all.
+/// Applies `f` to a vector, evaluated if all elements are known.
 fn of_row(exprs: &mut Exprs, row: &[Element], f: &dyn Fn(&mut Exprs, Id) -> Id) -> Result<Vec<Element>> {
     let known = |e: &Element| if let Element::Known(v) = e { Some(*v) } else { None };
     if let Some(numbers) = row.iter().map(known).collect::<Option<Vec<f64>>>() {
@@ -78,9 +81,9 @@ fn of_row(exprs: &mut Exprs, row: &[Element], f: &dyn Fn(&mut Exprs, Id) -> Id) 
     Ok(exprs.known_elements(result))
 }
 
-/// Applies what works on a vector to every run of `n` elements.
+/// Applies a function of vectors to every run of `n` elements.
 fn rows(exprs: &mut Exprs, x: &Tensor, n: usize, f: &dyn Fn(&mut Exprs, Id) -> Id) -> Result<Tensor> {
-    ensure!(n > 0 && x.len() > 0, "works on no values");
+    ensure!(n > 0 && x.len() > 0, "reads no values");
     let mut all = Vec::with_capacity(x.len());
     for row in x.elements().chunks(n) {
         all.extend(of_row(exprs, row, f)?);
@@ -102,12 +105,12 @@ fn norm(
     rows(exprs, x, n, normed)
 }
 
-/// What inference makes of a batch norm: a factor and an offset for each channel.
+/// Converts a batch norm in inference to a factor and an offset for each channel.
 fn batch_norm(call: &Call<'_>, exprs: &mut Exprs, eps: f64) -> Result<Tensor> {
     let x = call.input(0)?;
     ensure!(
         x.shape.len() >= 2 && call.int("training_mode").unwrap_or(0) == 0,
-        "only inference over [batch, channel, ..] is taken"
+        "is in training mode, or does not read [batch, channel, ..]; export for inference"
     );
     let [scale, bias, mean, variance] =
         [(1, "the scale"), (2, "the bias"), (3, "the mean"), (4, "the variance")].map(|(i, what)| call.reals(i, what));
@@ -117,7 +120,7 @@ fn batch_norm(call: &Call<'_>, exprs: &mut Exprs, eps: f64) -> Result<Tensor> {
         [&scale, &bias, &mean, &variance].iter().all(|v| v.len() == n),
         "its constants are not one for each of {n} channels"
     );
-    ensure!(variance.iter().all(|v| v + eps > 0.0), "a variance with epsilon {eps} is not above 0");
+    ensure!(variance.iter().all(|v| v + eps > 0.0), "has a variance that is not above 0 with epsilon {eps}");
     let a: Vec<f64> = scale.iter().zip(&variance).map(|(s, v)| s / (v + eps).sqrt()).collect();
     let b = bias.iter().zip(&mean).zip(&a).map(|((b, m), a)| b - m * a).collect();
     let mut shape = vec![n];
@@ -127,24 +130,24 @@ fn batch_norm(call: &Call<'_>, exprs: &mut Exprs, eps: f64) -> Result<Tensor> {
     two("Add", exprs, &scaled, &b, x.len())
 }
 
-/// Norms of every group of channels, of one channel each where it is an instance norm, then a factor and an offset for
-/// each.
+/// Converts a group norm, or an instance norm with one channel in each group, then a factor and an offset for each
+/// channel.
 fn group_norm(call: &Call<'_>, exprs: &mut Exprs, eps: f64) -> Result<Tensor> {
     let x = call.input(0)?;
-    ensure!(x.shape.len() >= 2 && x.shape[0] == 1, "takes {:?}; [1, channel, ..] is taken", x.shape);
+    ensure!(x.shape.len() >= 2 && x.shape[0] == 1, "reads the shape {:?}; export with [1, channel, ..]", x.shape);
     positive(eps, "epsilon")?;
     let n = x.shape[1];
     let groups = match call.int("num_groups") {
         _ if call.op() == "InstanceNormalization" => n,
         groups => groups.and_then(|g| usize::try_from(g).ok()).context("has no number of groups")?,
     };
-    ensure!(groups > 0 && n.is_multiple_of(groups), "{n} channels are not {groups} groups");
+    ensure!(groups > 0 && n.is_multiple_of(groups), "{n} channels cannot form {groups} groups");
     let each = x.len() / groups;
     let ones = vec![1.0; each];
     let y = rows(exprs, x, each, &|exprs, row| exprs.layer_norm(row, &ones, vec![0.0; each], eps))?;
     let constant = |i: usize, what: &str| -> Result<Tensor> {
         let values = call.reals(i, what)?;
-        // Before operator set 21 there is one for each group.
+        // Before operator set 21 there is one value for each group.
         let per = if values.len() == groups { n / groups } else { 1 };
         ensure!(values.len() * per == n, "{what} has {} values for {n} channels", values.len());
         let mut shape = vec![n];
@@ -183,7 +186,7 @@ fn reduce(op: &str, x: &Tensor, Reduced { axes, shape }: Reduced, exprs: &mut Ex
     if largest || matches!(op, "ReduceSum" | "ReduceMean") && elements.chunks(each).all(of_different_values) {
         ensure!(
             !largest || each <= MOST_COMPARED,
-            "takes the largest or least of {each} values; up to {MOST_COMPARED} are taken; export the part behind it"
+            "takes the maximum or minimum of {each} values; the limit is {MOST_COMPARED}; export the part after it"
         );
         return slices_joined(op, exprs, &elements, each, shape);
     }
@@ -193,7 +196,7 @@ fn reduce(op: &str, x: &Tensor, Reduced { axes, shape }: Reduced, exprs: &mut Ex
     Ok(Tensor::of_elements(shape, all))
 }
 
-/// Whether a sum over these is one of several layers' outputs, rather than over the elements of one.
+/// Returns `true` if a sum over these adds outputs of several layers rather than elements of one.
 fn of_different_values(row: &[Element]) -> bool {
     let mut values: Vec<Id> = row.iter().filter_map(value).map(|(id, _)| id).collect();
     let open = values.len();
@@ -202,7 +205,7 @@ fn of_different_values(row: &[Element]) -> bool {
     values.len() == open && row.len() > 1
 }
 
-/// The sum, mean, largest or least over runs of `each` elements, of whole vectors.
+/// Computes the sum, mean, maximum or minimum over runs of `each` elements by operations on whole vectors.
 fn slices_joined(op: &str, exprs: &mut Exprs, elements: &[Element], each: usize, shape: Vec<usize>) -> Result<Tensor> {
     let slice = |k: usize| Tensor::of_elements(shape.clone(), elements[k..].iter().step_by(each).copied().collect());
     let two_of = match op {

@@ -1,4 +1,4 @@
-//! New expressions: what exporters have taken apart is put together again where it comes up.
+//! Constructors of expressions, which recognize activations and norms that exporters decompose.
 
 use std::sync::Arc;
 
@@ -11,13 +11,14 @@ use crate::values::elements::value;
 use crate::values::expr::{Expr, Exprs, Id, Matrix, Run, Unary};
 use crate::values::tensor::Element;
 
-/// Steps that a polynomial may be written in.
+/// The most nested expressions of a polynomial.
 const DEPTH: usize = 12;
 /// The two coefficients of GELU's tanh form: `sqrt(2 / pi)`, and that times 0.044715.
 const GELU_TANH: [f64; 2] = [0.797_884_560_802_865_4, 0.035_677_408_136_300_125];
-/// A clip within so much is done by one operation about its middle; beyond, that would cost digits.
-const MOST_MIDDLE: f64 = 100.0;
-/// A limit so far from zero may not be taken off a value and added again: what is small would lose its digits.
+/// Largest limit of a clip that becomes one operation about its middle; beyond it, the offset would cost digits.
+const MOST_CLIP: f64 = 100.0;
+/// Largest distance of a limit from zero at which it is subtracted and added again; beyond it, small values would lose
+/// digits.
 const FAR: f64 = 1.0;
 
 /// `factor function(scale of)`
@@ -29,7 +30,7 @@ struct Gated {
 }
 
 impl Exprs {
-    /// The vector of these elements of other expressions.
+    /// Makes a vector of elements of other expressions.
     pub(crate) fn vector(&mut self, elements: &[(Id, usize)]) -> Id {
         let mut runs: Vec<Run> = Vec::new();
         for &(of, at) in elements {
@@ -48,7 +49,7 @@ impl Exprs {
         }
     }
 
-    /// The elements of an expression, as those of what it only moves.
+    /// Returns the elements of an expression, or those of the values that it only moves.
     pub(crate) fn elements(&self, id: Id) -> Vec<Element> {
         match self.get(id) {
             Expr::Spread(one) => vec![Element::Of(*one, 0); self.len_of(id)],
@@ -59,7 +60,7 @@ impl Exprs {
         }
     }
 
-    /// As [`Self::elements`], with those of constants in a vector as what they are.
+    /// Returns the same as [`Self::elements`], with constants as known elements.
     pub(crate) fn known_elements(&self, id: Id) -> Vec<Element> {
         let known = |(element, part): (Element, Part)| match part.source {
             Some(_) => element,
@@ -68,13 +69,13 @@ impl Exprs {
         self.elements(id).into_iter().zip(self.parts(id)).map(known).collect()
     }
 
-    /// `a x + b`, with the same a and b for all elements.
+    /// Returns `a x + b`, with the same a and b for all elements.
     pub(crate) fn scaled(&mut self, x: Id, a: f64, b: f64) -> Id {
         let n = self.len_of(x);
         self.affine(x, vec![a; n], vec![b; n])
     }
 
-    /// `a x + b`
+    /// Returns `a x + b`.
     pub(crate) fn affine(&mut self, x: Id, a: Vec<f64>, b: Vec<f64>) -> Id {
         let len = self.len_of(x);
         let (ones, zeros) = (uniform(&a) == Some(1.0), uniform(&b) == Some(0.0));
@@ -100,8 +101,8 @@ impl Exprs {
                 let norm = Expr::RmsNorm(*of, product(weight, &a), *eps);
                 self.put(norm, len)
             }
-            // Rows that went through the same matrix, with their bias behind them, or through norms.
-            Expr::Pick(runs) if runs.len() > 1 && runs.iter().all(|run| self.takes(run, ones, zeros)) => {
+            // Rows that are outputs of layers or norms.
+            Expr::Pick(runs) if runs.len() > 1 && runs.iter().all(|run| self.absorbs(run, ones, zeros)) => {
                 let (runs, mut at, mut moved) = (runs.clone(), 0, Vec::new());
                 for run in runs {
                     let (a, b) = (a[at..at + run.len].to_vec(), b[at..at + run.len].to_vec());
@@ -119,9 +120,9 @@ impl Exprs {
         }
     }
 
-    /// Whether a run is a whole layer or norm that takes factors and offsets into itself; `ones` and `zeros`: there are
-    /// no factors, or no offsets.
-    fn takes(&self, run: &Run, ones: bool, zeros: bool) -> bool {
+    /// Returns `true` if a run is a whole layer or norm that can absorb the factors and offsets. `ones` means no factors,
+    /// `zeros` no offsets.
+    fn absorbs(&self, run: &Run, ones: bool, zeros: bool) -> bool {
         let of_kind = match self.get(run.of) {
             Expr::Linear(..) => ones,
             Expr::LayerNorm(..) => true,
@@ -131,18 +132,18 @@ impl Exprs {
         of_kind && run.from == 0 && run.len == self.len_of(run.of)
     }
 
-    /// `W x + b`
+    /// Returns `W x + b`.
     pub(crate) fn linear(&mut self, x: Id, w: Arc<Matrix>, b: Vec<f64>) -> Id {
         let rows = w.rows;
         self.put(Expr::Linear(x, w, b), rows)
     }
 
-    /// A function of the network.
+    /// Applies a function of the network.
     pub(crate) fn function(&mut self, function: Function, x: Id) -> Id {
         self.unary(Unary::Known(function), x)
     }
 
-    /// A function of every element.
+    /// Applies a function to every element.
     pub(crate) fn unary(&mut self, f: Unary, x: Id) -> Id {
         let len = self.len_of(x);
         if let &Expr::Spread(one) = self.get(x) {
@@ -174,7 +175,7 @@ impl Exprs {
         }
     }
 
-    /// `x + y`
+    /// Returns `x + y`.
     pub(crate) fn add(&mut self, x: Id, y: Id) -> Id {
         let len = self.len_of(x);
         if x == y {
@@ -201,7 +202,8 @@ impl Exprs {
         self.put(Expr::Add(x.min(y), x.max(y)), len)
     }
 
-    /// Whether `p + q` is `a r x + (b - a r mean(x))`, as Keras norms: the deviations `x - mean(x)`, r, a and b.
+    /// Finds the norm `a r x + (b - a r mean(x))` of Keras in `p + q`. Returns the deviations `x - mean(x)`, r, a and
+    /// b.
     fn late_centring(&mut self, p: Id, q: Id) -> Option<(Id, Id, Vec<f64>, Vec<f64>)> {
         let (product, a, b) = self.split(p);
         let (mean, c, d) = self.split(q);
@@ -213,7 +215,7 @@ impl Exprs {
             let &Expr::Spread(one) = self.get(inverse) else { continue };
             let sum = if m == one { r } else { m };
             let &Expr::Sum(whole) = self.get(sum) else { continue };
-            // Factors of what is normed have come out of the product.
+            // Factors of the operand have moved out of the product.
             let Some(factors) = self.ratios(whole, x) else { continue };
             if (m != one && r != one) || zero != 0.0 {
                 continue;
@@ -229,7 +231,7 @@ impl Exprs {
         None
     }
 
-    /// An expression as `a x + b`.
+    /// Splits an expression into `a x + b`.
     fn split(&self, id: Id) -> (Id, Vec<f64>, Vec<f64>) {
         match self.get(id) {
             Expr::Affine(x, a, b) => (*x, a.clone(), b.clone()),
@@ -237,7 +239,7 @@ impl Exprs {
         }
     }
 
-    /// `x y`
+    /// Returns `x y`.
     pub(crate) fn mul(&mut self, x: Id, y: Id) -> Id {
         let len = self.len_of(x);
         if let (&Expr::Spread(p), &Expr::Spread(q)) = (self.get(x), self.get(y)) {
@@ -252,7 +254,7 @@ impl Exprs {
             }
         }
         for (p, q) in [(x, y), (y, x)] {
-            // A factor that all elements have is one of the norm.
+            // A common factor of all elements is a factor of the norm.
             let (of, k) = if let (of, k, 0.0) = self.affine_of(p) { (of, k) } else { (p, 1.0) };
             if let &Expr::Spread(one) = self.get(q)
                 && let Some(norm) = self.norm(of, one)
@@ -260,8 +262,8 @@ impl Exprs {
                 return self.normed(of, k, &norm);
             }
         }
-        // Factors come out of the product; those of a root that is spread first, as those of what it norms belong to
-        // its squares.
+        // Factors move out of the product. Those of a repeated root move first, as the factors of its operand are in
+        // the root's squares, too.
         let of_spread =
             |id: Id| matches!(self.get(id), Expr::Affine(of, ..) if matches!(self.get(*of), Expr::Spread(_)));
         let (p, q) = if of_spread(y) { (y, x) } else { (x, y) };
@@ -278,7 +280,7 @@ impl Exprs {
         self.put(Expr::Mul(x.min(y), x.max(y)), len)
     }
 
-    /// `k` times a norm.
+    /// Returns `k` times a norm.
     fn normed(&mut self, v: Id, k: f64, norm: &Norm) -> Id {
         let len = self.len_of(v);
         let weight = vec![k * norm.factor; len];
@@ -288,7 +290,7 @@ impl Exprs {
         }
     }
 
-    /// Whether `p q` is a function that multiplies its operand with a gate: SiLU, GELU, Mish.
+    /// Finds a function in `p q` that multiplies its operand with a gate: SiLU, GELU, Mish.
     fn gated(&self, p: Id, q: Id) -> Option<Gated> {
         // f(s) / k, as p is s / k.
         let of_gate = |function: Function, s: Id| {
@@ -303,7 +305,7 @@ impl Exprs {
         {
             return of_gate(Function::Mish, s);
         }
-        // p (b + b gate); with the gate's operand turned around also p (b - b gate), as both gates are odd.
+        // p (b + b gate), or p (b - b gate) with the gate's operand negated, as both gates are odd.
         let (gate, a, b) = self.affine_of(q);
         if a.abs() != b.abs() {
             return None;
@@ -317,7 +319,7 @@ impl Exprs {
         Some(Gated { function, of: p, scale, factor: 2.0 * b / scale })
     }
 
-    /// The k for which `u` is the polynomial of `k p` whose tanh is in GELU's tanh form.
+    /// Returns the k for which `u` is the polynomial of `k p` in GELU's tanh form.
     fn gelu_scale(&self, u: Id, p: Id) -> Option<f64> {
         let polynomials = self.polynomials(u, p, DEPTH)?;
         let k = polynomials.first()?[1] / GELU_TANH[0];
@@ -326,7 +328,7 @@ impl Exprs {
         polynomials.iter().all(is_gelu).then_some(k)
     }
 
-    /// The sum of all elements.
+    /// Returns the sum of all elements.
     pub(crate) fn sum(&mut self, x: Id) -> Id {
         if self.len_of(x) == 1 {
             return x;
@@ -337,7 +339,7 @@ impl Exprs {
         self.put(Expr::Sum(x), 1)
     }
 
-    /// `max(x, low)`
+    /// Returns `max(x, low)`.
     pub(crate) fn at_least(&mut self, x: Id, low: f64) -> Id {
         let limited = if low < -FAR {
             self.beyond(x, -low, 1.0)
@@ -350,7 +352,7 @@ impl Exprs {
         limited
     }
 
-    /// `min(x, high)`
+    /// Returns `min(x, high)`.
     pub(crate) fn at_most(&mut self, x: Id, high: f64) -> Id {
         let limited = if high > FAR {
             self.beyond(x, high, -1.0)
@@ -363,18 +365,18 @@ impl Exprs {
         limited
     }
 
-    /// `x` within `limit` in both directions, and what is beyond it in the direction of `sign`.
+    /// Limits `x` to the magnitude `limit` against the direction of `sign` only: a clip, plus the part beyond it.
     fn beyond(&mut self, x: Id, limit: f64, sign: f64) -> Id {
         let len = self.len_of(x);
         let inside = self.put(Expr::Clip(x, limit), len);
-        // An offset of its own: in the bias of a layer it would need the layer twice.
+        // A separate offset: one in the bias of a layer would need the layer twice.
         let over = self.put(Expr::Affine(x, vec![sign; len], vec![-limit; len]), len);
         let over = self.function(Function::Relu, over);
         let over = self.scaled(over, sign, 0.0);
         self.add(inside, over)
     }
 
-    /// The elements of `max(x, limits)`, or `min` where `sign` is -1, with a limit for each.
+    /// Returns the elements of `max(x, limits)`, or `min` if `sign` is -1, with a limit for each.
     pub(crate) fn limited_each(&mut self, x: Id, limits: &[f64], sign: f64) -> Vec<Element> {
         let mut all = self.elements(x);
         for far in [false, true] {
@@ -393,7 +395,7 @@ impl Exprs {
         all
     }
 
-    /// A limit is taken off and added again.
+    /// Limits each element by subtracting its limit and adding it again.
     fn over_each(&mut self, x: Id, limits: Vec<f64>, sign: f64) -> Id {
         let signs = vec![sign; limits.len()];
         let over = self.affine(x, signs.clone(), limits.iter().map(|limit| -sign * limit).collect());
@@ -401,7 +403,7 @@ impl Exprs {
         self.affine(over, signs, limits)
     }
 
-    /// As [`Self::beyond`]: shares of the limits have one limit.
+    /// Limits each element as [`Self::beyond`] does, scaled so that all have the limit 1.
     fn beyond_each(&mut self, x: Id, limits: &[f64], sign: f64) -> Id {
         let (len, zeros) = (limits.len(), vec![0.0; limits.len()]);
         let sizes: Vec<f64> = limits.iter().map(|limit| limit.abs()).collect();
@@ -414,15 +416,15 @@ impl Exprs {
         self.add(inside, over)
     }
 
-    /// Of a value with a limit on one side what is limited, and the limits, of which one is infinite.
+    /// Returns the operand and both limits, one of which is infinite, of a value with a limit on one side.
     pub(crate) fn limited(&self, x: Id) -> Option<(Id, f64, f64)> {
         let relu = self.known_of(x, Function::Relu).map(|of| (of, 0.0, f64::INFINITY));
         relu.or_else(|| self.limited.get(&x).copied())
     }
 
-    /// Limited to low ..= high, either of which may be infinite.
+    /// Limits `x` to low ..= high, either of which may be infinite.
     pub(crate) fn clip(&mut self, x: Id, low: f64, high: f64) -> Id {
-        // Of two limits one behind the other, as Max and Min have them.
+        // Two successive limits, as by Max and Min.
         if let Some((inner, lowest, highest)) = self.limited(x)
             && low.max(lowest) < high.min(highest)
         {
@@ -433,7 +435,7 @@ impl Exprs {
             return if high < f64::INFINITY { self.put(Expr::Clip(positive, high), len) } else { positive };
         }
         let middle = low / 2.0 + high / 2.0;
-        if middle == 0.0 || low.abs().max(high.abs()) <= MOST_MIDDLE {
+        if middle == 0.0 || low.abs().max(high.abs()) <= MOST_CLIP {
             let len = self.len_of(x);
             let about = self.scaled(x, 1.0, -middle);
             let clipped = self.put(Expr::Clip(about, high - middle), len);
@@ -443,7 +445,7 @@ impl Exprs {
         if high < f64::INFINITY { self.at_most(x, high) } else { x }
     }
 
-    /// `|x|`, `max(x, y)` and `slope x` below zero are sums of relus.
+    /// Returns `max(x, y)`, as `x + relu(y - x)`.
     pub(crate) fn max(&mut self, x: Id, y: Id) -> Id {
         let negative = self.scaled(x, -1.0, 0.0);
         let more = self.add(y, negative);
@@ -451,14 +453,14 @@ impl Exprs {
         self.add(x, more)
     }
 
-    /// `min(x, y)`
+    /// Returns `min(x, y)`.
     pub(crate) fn min(&mut self, x: Id, y: Id) -> Id {
         let (x, y) = (self.scaled(x, -1.0, 0.0), self.scaled(y, -1.0, 0.0));
         let most = self.max(x, y);
         self.scaled(most, -1.0, 0.0)
     }
 
-    /// `x` where positive, else `alpha (exp(x) - 1)`: `alpha (elu(x) + (1 / alpha - 1) relu(x))`.
+    /// Returns `x` if positive, else `alpha (exp(x) - 1)`, as `alpha (elu(x) + (1 / alpha - 1) relu(x))`.
     pub(crate) fn elu(&mut self, x: Id, alpha: f64) -> Id {
         let (elu, relu) = (self.function(Function::Elu, x), self.function(Function::Relu, x));
         match alpha {
@@ -472,7 +474,7 @@ impl Exprs {
         }
     }
 
-    /// `x` where positive, else `slope x`, with a slope for each element.
+    /// Returns `x` if positive, else `slope x`, with a slope for each element.
     pub(crate) fn leaky(&mut self, x: Id, slope: Vec<f64>) -> Id {
         let positive = self.function(Function::Relu, x);
         if let Some(slope) = uniform(&slope)

@@ -1,4 +1,4 @@
-//! What a value is as a sum of matrix products, and cells that an exporter has taken apart.
+//! Values as sums of matrix products, and recognition of cells that an exporter decomposed.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use actq_kernels::math::Function;
 use crate::values::expr::{Cell, Expr, Exprs, Id, Matrix, Run};
 use crate::values::tensor::Element;
 
-/// Steps that a gate may be written in.
+/// The most nested expressions of a gate.
 const DEPTH: usize = 8;
 
 /// `sum of matrix x operand + bias`; the matrices are row-major with a row for each element.
@@ -16,13 +16,13 @@ struct Form {
     bias: Vec<f64>,
 }
 
-/// What a cell's gates read beside the state, the matrices of that and of the state, and the biases.
+/// Input of a cell's gates, the matrices of the input and of the state, and the biases.
 type Gates = (Id, Arc<Matrix>, Arc<Matrix>, Vec<f64>);
 
-/// A cell that was taken apart.
+/// A recognized cell.
 pub(crate) struct Found {
     pub(crate) cell: Cell,
-    /// The expression of its cell state after the step, of an LSTM.
+    /// The expression of an LSTM's cell state after the step.
     pub(crate) next_c: Option<Id>,
 }
 
@@ -61,7 +61,7 @@ impl Exprs {
         }
     }
 
-    /// The run of a graph input that an expression is.
+    /// Returns the run of a graph input that an expression is.
     fn input_run(&self, id: Id) -> Option<Run> {
         crate::nodes::cells::run_of_input(self, &self.elements(id))
     }
@@ -74,8 +74,8 @@ impl Exprs {
         if let &Expr::Add(x, y) = self.get(id) { Some((x, y)) } else { None }
     }
 
-    /// The LSTM whose hidden state after the step is `next`: `o tanh(c')` with `c' = f c + i g`. The state before the
-    /// step is one of `candidates`.
+    /// Finds the LSTM whose hidden state after the step is `next`: `o tanh(c')` with `c' = f c + i g`. The state before
+    /// the step is one of `candidates`.
     pub(crate) fn lstm_of(&mut self, next: Id, candidates: &[Run]) -> Option<Found> {
         let both = |(x, y): (Id, Id)| [(x, y), (y, x)];
         let (o, next_c) = both(self.product(next)?)
@@ -105,7 +105,7 @@ impl Exprs {
         })
     }
 
-    /// The GRU whose state after the step is `next`: `(1 - z) n + z h` with `n = tanh(input + r (W h + b))`.
+    /// Finds the GRU whose state after the step is `next`: `(1 - z) n + z h` with `n = tanh(input + r (W h + b))`.
     pub(crate) fn gru_of(&mut self, next: Id) -> Option<Found> {
         let (z, n, h) = self.mixed(next)?;
         let (x, y) = self.sum_of(self.known_of(n, Function::Tanh)?)?;
@@ -117,7 +117,7 @@ impl Exprs {
             Some((r, self.form(of_input)?, of_state))
         })?;
         let gates = vec![self.form(r)?, self.form(z)?, of_input];
-        // The new gate's two halves stay apart; the state may not be in the input's, nor the input in the state's.
+        // The two halves of the new gate stay separate: one reads the input only, the other the state only.
         if of_state.terms.iter().any(|(x, _)| self.input_run(*x) != Some(h)) || self.reads(&gates[2], &h) {
             return None;
         }
@@ -133,8 +133,8 @@ impl Exprs {
         Some(Found { cell: Cell { lstm: false, x, w_ih, w_hh, b_ih, b_hh, states: vec![h] }, next_c: None })
     }
 
-    /// The update gate's operand, the new value and the old state of `(1 - z) n + z h` or `n + z (h - n)`, also with
-    /// the gate turned around.
+    /// Finds the update gate's operand, the new value and the old state of `(1 - z) n + z h` or `n + z (h - n)`, also with
+    /// `1 - z` as the gate.
     fn mixed(&mut self, next: Id) -> Option<(Id, Id, Run)> {
         let (x, y) = self.sum_of(next)?;
         for (x, y) in [(x, y), (y, x)] {
@@ -177,16 +177,15 @@ impl Exprs {
         None
     }
 
-    /// Whether a form reads all of a run.
+    /// Returns `true` if a form reads elements of a run.
     fn reads(&self, form: &Form, run: &Run) -> bool {
         let of_run = |e: &Element| matches!(e, Element::Of(of, i) if *of == run.of && (run.from..run.from + run.len).contains(i));
         form.terms.iter().any(|(x, _)| self.elements(*x).iter().any(of_run))
     }
 
-    /// The gates behind each other: what they read beside the state, the matrices of it and of the state, and the
-    /// biases.
+    /// Concatenates the gates: returns their input, the matrices of the input and of the state, and the biases.
     fn gates(&mut self, gates: &[Form], h: Run) -> Option<Gates> {
-        // Every element that a gate reads beside the state, once.
+        // Every element that a gate reads apart from the state, without duplicates.
         let mut read: Vec<(Id, usize)> = Vec::new();
         let mut place: std::collections::HashMap<(Id, usize), usize> = std::collections::HashMap::new();
         let in_state = |of: Id, i: usize| of == h.of && (h.from..h.from + h.len).contains(&i);

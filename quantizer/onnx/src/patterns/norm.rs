@@ -1,4 +1,4 @@
-//! Norms out of sums, roots and quotients.
+//! Recognition of norms in sums, roots and quotients.
 
 use actq_kernels::math::Function;
 
@@ -11,19 +11,19 @@ use crate::values::expr::{Expr, Exprs, Id, Unary};
 pub(crate) struct Norm {
     pub(crate) factor: f64,
     pub(crate) eps: f64,
-    /// The value whose mean is taken off first.
+    /// The value whose mean is subtracted first, if any.
     pub(crate) centred: Option<Id>,
 }
 
-/// The least that is added to a mean square: f32 has no smaller normal number.
+/// The least epsilon, the smallest normal number of f32.
 const LEAST_EPS: f64 = 1.2e-38;
-/// The most that is added where a factor has come out of a norm.
+/// The largest epsilon after a factor has moved out of a norm.
 const MOST_EPS: f64 = 1.0;
-/// The longest vector that is divided by `max(its length, limit)` is much longer than this limit, or it is not taken.
+/// Largest limit in a division by `max(length, limit)`; vectors must be much longer than it.
 const MOST_LIMIT: f64 = 1e-8;
 
 impl Exprs {
-    /// Whether `v * s` is a norm of `v`, for an s of one element.
+    /// Finds the norm of `v` in `v * s`, for an s of one element.
     pub(crate) fn norm(&self, v: Id, s: Id) -> Option<Norm> {
         let n = self.len_of(v) as f64;
         let (root, factor, zero) = self.affine_of(s);
@@ -37,18 +37,18 @@ impl Exprs {
                 }
                 (root, limit)
             }
-            // `length + limit` is off that by no more than the limit.
+            // `length + limit` differs from that by at most the limit.
             (root, 1.0, limit) if (0.0..=MOST_LIMIT).contains(&limit) => (root, limit),
             _ => (root, 0.0),
         };
         let (square, a, e) = self.affine_of(self.operand_of(root, Unary::Sqrt)?);
-        // What rounding makes of a variance may be below 0, and some files limit it.
+        // Rounding may make a variance negative, and some files limit it to 0.
         let limited = self.known_of(square, Function::Relu);
         let square = self.total(limited.unwrap_or(square));
         let centred = self.centred(v);
         let multiple = square.over(&self.sum_of_squares(v));
         let (k, rest) = multiple.or_else(|| self.variance(square, centred?))?;
-        // The root is of `scale mean(v^2) + added`.
+        // The operand of the root is `scale mean(v^2) + added`.
         let (scale, added) = (a * k * n, a * rest + e + limit * limit);
         if scale <= 0.0 || added < 0.0 || limited.is_some() && (k < 0.0 || rest < 0.0) {
             return None;
@@ -56,7 +56,7 @@ impl Exprs {
         Some(Norm { factor: factor / scale.sqrt(), eps: (added / scale).max(LEAST_EPS), centred })
     }
 
-    /// The u for which `v = u - mean(u)`.
+    /// Returns the u for which `v = u - mean(u)`.
     fn centred(&self, v: Id) -> Option<Id> {
         let &Expr::Add(x, y) = self.get(v) else { return None };
         [(x, y), (y, x)].into_iter().find(|&(u, mean)| self.is_negative_mean(mean, u)).map(|(u, _)| u)
@@ -68,8 +68,8 @@ impl Exprs {
         self.total(mean).over(&self.sum_of_elements(u)).is_some_and(|(k, rest)| near(k * n, -1.0) && rest == 0.0)
     }
 
-    /// The k and the rest of a square that is `k (sum(u^2) - sum(u)^2 / n) + rest`: the variance as mean square less
-    /// squared mean.
+    /// Returns the k and the rest of a square that is `k (sum(u^2) - sum(u)^2 / n) + rest`, the variance as mean square
+    /// minus squared mean.
     fn variance(&self, mut square: Total, u: Id) -> Option<(f64, f64)> {
         let (sum, of_square) = square.take_square_of_sum(self)?;
         let (k, rest) = square.over(&self.sum_of_squares(u))?;
@@ -78,22 +78,21 @@ impl Exprs {
         (none == 0.0 && near(of_square * of_sum * of_sum * n, -k)).then_some((k, rest))
     }
 
-    /// The operand of a norm without a factor that all its elements have: the operand, the factor's sign, and what is
-    /// then added to the mean square.
+    /// Removes a common factor from the operand of a norm. Returns the operand, the factor's sign, and the new epsilon.
     fn unscaled(&self, x: Id, eps: f64) -> (Id, f64, f64) {
         let (of, k, _) = self.affine_of(x);
         let eps_of = eps / (k * k);
         if (LEAST_EPS..=MOST_EPS).contains(&eps_of) { (of, k.signum(), eps_of) } else { (x, 1.0, eps) }
     }
 
-    /// `x` less its mean, by its deviation: an offset that all elements have is in the mean too.
+    /// Returns the layer norm of `x`. A common offset of all elements cancels, as it is in the mean, too.
     pub(crate) fn layer_norm(&mut self, x: Id, weight: &[f64], bias: Vec<f64>, eps: f64) -> Id {
         let (of, sign, eps) = self.unscaled(x, eps);
         let weight = weight.iter().map(|w| sign * w).collect();
         self.put(Expr::LayerNorm(of, weight, bias, eps), self.len_of(x))
     }
 
-    /// `x` by the root of its mean square. Zeros stay out of it: the mean of the others is larger.
+    /// Returns the RMS norm of `x`. Constant zeros are removed, and the weight corrects the mean over fewer elements.
     pub(crate) fn rms_norm(&mut self, x: Id, weight: &[f64], eps: f64) -> Id {
         let (of, sign, eps) = if self.affine_of(x).2 == 0.0 { self.unscaled(x, eps) } else { (x, 1.0, eps) };
         let mut elements: Vec<(Id, usize)> = self.elements(of).iter().filter_map(value).collect();

@@ -1,22 +1,22 @@
-//! Elements without what moves, scales and shifts them: patterns compare values by these, since an exporter may write
-//! factors and orders anywhere.
+//! Elements stripped of moves, factors and offsets. Patterns compare values by these, as exporters may write factors
+//! and orders anywhere.
 
 use crate::values::compare::near;
 use crate::values::expr::{Expr, Exprs, Id, Run};
 
-/// Moves and factors within each other that are looked through.
+/// The most nested moves and factors that are examined.
 const DEPTH: usize = 16;
 
-/// An element that no move, factor or offset gives.
+/// An element that is not the result of a move, factor or offset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Source {
     of: Id,
     at: usize,
-    /// `of` is the operand of this norm, whose weight and bias are a factor and an offset.
+    /// The norm whose operand is `of`, with its weight and bias as a factor and an offset.
     norm: Option<Norm>,
 }
 
-/// A norm, with the bits of what is added to its mean square.
+/// A norm, with the bits of its epsilon.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Norm {
     Layer(u64),
@@ -32,14 +32,14 @@ pub(crate) struct Part {
 }
 
 impl Source {
-    /// This element and those after it, where they are not of a norm.
+    /// Returns the run from this element on, if it is not of a norm.
     pub(crate) fn run(self, len: usize) -> Option<Run> {
         self.norm.is_none().then_some(Run { of: self.of, from: self.at, len })
     }
 }
 
 impl Part {
-    /// Whether the source of `next` is the one after this one's.
+    /// Returns `true` if the source of `next` follows this one's.
     pub(crate) fn is_before(&self, next: &Self) -> bool {
         self.source.map(|source| Source { at: source.at + 1, ..source }) == next.source
     }
@@ -48,7 +48,7 @@ impl Part {
         self.source.is_none() && self.offset == 0.0
     }
 
-    /// The k for which this is `k x`: not a number where both are 0, so that any would do.
+    /// Returns the k for which this is `k x`; NaN if both are 0, which any k fits.
     fn over(&self, x: &Self) -> Option<f64> {
         let k = if x.factor == 0.0 { self.offset / x.offset } else { self.factor / x.factor };
         let times = if k.is_nan() { 0.0 } else { k };
@@ -58,12 +58,12 @@ impl Part {
 }
 
 impl Exprs {
-    /// The parts of all elements.
+    /// Returns the parts of all elements.
     pub(crate) fn parts(&self, id: Id) -> Vec<Part> {
         self.parts_of(Run { of: id, from: 0, len: self.len_of(id) })
     }
 
-    /// The parts of the elements of a run.
+    /// Returns the parts of the elements of a run.
     pub(crate) fn parts_of(&self, run: Run) -> Vec<Part> {
         self.parts_within(run, DEPTH)
     }
@@ -93,7 +93,7 @@ impl Exprs {
         }
     }
 
-    /// Whether a layer has nothing but biases, as constants in a vector have.
+    /// Returns `true` if a layer has biases only, as constants in a vector do.
     pub(crate) fn is_constant(&self, id: Id) -> bool {
         matches!(self.get(id), Expr::Linear(_, w, _) if w.cols == 1 && w.data.iter().all(|w| *w == 0.0))
     }
@@ -104,7 +104,7 @@ impl Exprs {
         bias[run.from..run.from + run.len].iter().map(constant).collect()
     }
 
-    /// The k of each element for which `y = k x`.
+    /// Returns the k of each element for which `y = k x`.
     pub(crate) fn ratios(&self, y: Id, x: Id) -> Option<Vec<f64>> {
         if self.len_of(y) != self.len_of(x) {
             return None;
@@ -112,7 +112,7 @@ impl Exprs {
         if y == x {
             return Some(vec![1.0; self.len_of(x)]);
         }
-        // The first elements alone show it of most values.
+        // For most values, the first element already decides.
         let [first_y, first_x] = [y, x].map(|of| self.parts_of(Run { of, from: 0, len: 1 }));
         first_y.first()?.over(first_x.first()?)?;
         let ratios: Vec<f64> =
@@ -121,7 +121,7 @@ impl Exprs {
         Some(ratios.into_iter().map(|k| if k.is_nan() { known } else { k }).collect())
     }
 
-    /// The k for which `y = k x`.
+    /// Returns the k for which `y = k x`.
     pub(crate) fn ratio(&self, y: Id, x: Id) -> Option<f64> {
         let ratios = self.ratios(y, x)?;
         let k = *ratios.first()?;
@@ -129,14 +129,14 @@ impl Exprs {
     }
 }
 
-/// `a x + b`
+/// Scales and shifts parts: `a x + b`.
 fn scaled(parts: Vec<Part>, a: &[f64], b: &[f64]) -> Vec<Part> {
     let one =
         |((part, a), b): ((Part, &f64), &f64)| Part { factor: part.factor * a, offset: part.offset * a + b, ..part };
     parts.into_iter().zip(a).zip(b).map(one).collect()
 }
 
-/// The runs that hold a run of a value that consists of `runs`.
+/// Returns the parts of `runs` that hold a run of their concatenation.
 pub(crate) fn cut(runs: &[Run], run: Run) -> Vec<Run> {
     let (mut skip, mut left, mut found) = (run.from, run.len, Vec::new());
     for part in runs {

@@ -1,5 +1,5 @@
-//! Rows with a number for each, as the mean of a row is: an operation on all rows and their numbers is done row by row,
-//! so that norms are found.
+//! Rows with one number each, such as the mean of a row. An operation on all rows and their numbers is split into rows,
+//! so that norms are recognized.
 
 use std::collections::HashMap;
 
@@ -8,21 +8,20 @@ use crate::values::elements::value;
 use crate::values::expr::{Expr, Exprs, Id, Run};
 use crate::values::tensor::Element;
 
-/// The most rows: each takes operations of its own.
+/// The most rows, each of which takes separate operations.
 const MOST_ROWS: usize = 256;
-/// Operations between sums and a number that is computed of them.
+/// The most operations between sums and a number that is computed from them.
 const DEPTH: usize = 16;
 
-/// What is known of elements that were looked for.
+/// Results of previous searches for elements.
 type Found = HashMap<(Id, usize), Option<Id>>;
 
-/// The places `at`, row by row, where one of two operands has a number for each row; else all of them.
+/// Splits the places `at` into rows, if one of two operands has a number for each row; else returns one row.
 pub(crate) fn by_row(exprs: &mut Exprs, at: Vec<usize>, operands: [&[Element]; 2]) -> Vec<Vec<usize>> {
     operands.into_iter().find_map(|operand| rows(exprs, &at, operand)).unwrap_or_else(|| vec![at])
 }
 
-/// The places that have the same element of `operand`, or one that is only that one scaled, where these are sums or
-/// computed of sums.
+/// Groups places by their element of `operand` up to factors, if the elements are sums or computed from sums.
 fn rows(exprs: &mut Exprs, at: &[usize], operand: &[Element]) -> Option<Vec<Vec<usize>>> {
     let mut rows: Vec<((Id, usize), Vec<usize>)> = Vec::new();
     let mut row_of: HashMap<(Id, usize), usize> = HashMap::new();
@@ -42,7 +41,7 @@ fn rows(exprs: &mut Exprs, at: &[usize], operand: &[Element]) -> Option<Vec<Vec<
 }
 
 impl Exprs {
-    /// An element, or the number that is spread and then scaled to it, which rows have in common.
+    /// Returns an element, or the repeated number from which it is scaled, which identifies the row.
     fn number(&self, element: Element) -> Option<(Id, usize)> {
         let (id, i) = value(&element)?;
         match *self.get(id) {
@@ -51,13 +50,13 @@ impl Exprs {
         }
     }
 
-    /// Whether these elements are one number that is computed of sums, each with its factor.
+    /// Returns `true` if these elements are one number, up to factors, that is computed from sums.
     pub(crate) fn is_number_of_sums(&mut self, elements: &[Element]) -> bool {
         let Some(first) = elements.first().and_then(|element| self.number(*element)) else { return false };
         elements.iter().all(|element| self.number(*element) == Some(first)) && self.lone(first.0, first.1).is_some()
     }
 
-    /// Element `i` of a value as a value by itself, where it is computed of sums alone.
+    /// Returns element `i` of a value as a separate value, if it is computed from sums only.
     pub(crate) fn lone(&mut self, of: Id, i: usize) -> Option<Id> {
         self.lone_within(of, i, DEPTH, &mut Found::new())
     }

@@ -1,15 +1,15 @@
-//! Choices by a value's sign or size, which exporters make of activations: `where(x > t, x, f(x))`.
+//! Choices by a value's sign or size, to which exporters decompose activations: `where(x > t, x, f(x))`.
 
 use actq_kernels::math::Function;
 
 use crate::values::compare::near;
 use crate::values::expr::{Expr, Exprs, Id, Unary};
 
-/// From here on f32's softplus is its operand: `ln(1 + e^-15)` is less than half the last digit of 15.
+/// Operand from which on softplus equals its operand in f32: `ln(1 + e^-15)` is less than half the last digit of 15.
 const SOFTPLUS_END: f64 = 15.0;
 
 impl Exprs {
-    /// `where(condition, x, y)`, where that is a function of the network.
+    /// Converts `where(condition, x, y)`, if it is a function of the network.
     pub(crate) fn select(&mut self, condition: Id, x: Id, y: Id) -> Option<Id> {
         let &Expr::Unary(Unary::Above(limit), of) = self.get(condition) else { return None };
         // Softplus above its limit.
@@ -18,13 +18,13 @@ impl Exprs {
             && zero == 0.0
             && near(self.ratio(x, z)?, factor)
         {
-            // Below 0 it compares the other way round: the linear part would stand where softplus bends.
+            // A negative factor reverses the comparison: the linear part would replace the curved one.
             let compared = self.ratio(of, z)?;
             if compared > 0.0 && limit / compared >= SOFTPLUS_END {
                 return Some(y);
             }
         }
-        // Everything else bends at zero.
+        // All other activations change at zero.
         if limit != 0.0 || self.ratio(of, x)? <= 0.0 {
             return None;
         }
@@ -39,11 +39,11 @@ impl Exprs {
         same.then(|| self.elu(x, alpha))
     }
 
-    /// `where(condition, x, limit)`, or with x and the limit the other way round, for a condition by which side of the
-    /// limit x is on.
+    /// Converts `where(condition, x, limit)`, or `where(condition, limit, x)`, if the condition compares x with the
+    /// limit.
     pub(crate) fn select_constant(&mut self, condition: Id, x: Id, limit: f64, where_true: bool) -> Option<Id> {
         let &Expr::Unary(Unary::Above(bound), of) = self.get(condition) else { return None };
-        // What is compared may have a limit already, on the other side or farther away.
+        // The compared value may already have a limit, on the other side or farther away.
         let compared = self.ratio(of, x).or_else(|| {
             let (inner, low, high) = self.limited(x)?;
             (low..=high).contains(&limit).then(|| self.ratio(of, inner))?

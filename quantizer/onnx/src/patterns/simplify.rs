@@ -1,4 +1,4 @@
-//! Expressions as a network has them: factors and offsets go into the matrices beside them, rows that nobody reads go.
+//! Simplification: factors and offsets move into adjacent matrices, and rows without a reader are removed.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -8,7 +8,7 @@ use actq_kernels::math::Function;
 use crate::patterns::slices::sums_of_slices;
 use crate::values::expr::{Cell, Expr, Exprs, Id, Matrix, Run, Unary};
 
-/// The same value, simplified. `instead` says which expressions stand for others.
+/// Simplifies a value. `instead` maps expressions to their replacements.
 pub(crate) fn simplify(exprs: &mut Exprs, root: Id, instead: &HashMap<Id, Id>) -> Id {
     let order = exprs.needed_instead(&[root], instead);
     let mut readers: HashMap<Id, Vec<Id>> = HashMap::from([(root, vec![root])]);
@@ -18,7 +18,7 @@ pub(crate) fn simplify(exprs: &mut Exprs, root: Id, instead: &HashMap<Id, Id>) -
         }
     }
     let mut new: HashMap<Id, Id> = HashMap::new();
-    // By columns: sums of one length share their row, as matrices are told apart by their place.
+    // Rows of ones by length, as sums of one length share a matrix.
     let mut rows_of_ones: HashMap<usize, Arc<Matrix>> = HashMap::new();
     // The first norm of each value.
     let mut norms: HashMap<Id, Id> = HashMap::new();
@@ -62,7 +62,7 @@ pub(crate) fn simplify(exprs: &mut Exprs, root: Id, instead: &HashMap<Id, Id>) -
                 let same = runs.iter().all(|run| run.of == runs[0].of);
                 let runs: Vec<Run> = runs.iter().map(|run| Run { of: of(&run.of), ..*run }).collect();
                 match exprs.get(runs[0].of) {
-                    Expr::Linear(y, w, bias) if same && read_by_one(&readers, id, exprs, instead) => {
+                    Expr::Linear(y, w, bias) if same && is_only_reader(&readers, id, exprs, instead) => {
                         let rows: Vec<usize> = runs.iter().flat_map(|run| run.from..run.from + run.len).collect();
                         let data = rows.iter().flat_map(|&r| &w.data[r * w.cols..(r + 1) * w.cols]).copied().collect();
                         let bias = rows.iter().map(|&r| bias[r]).collect();
@@ -84,7 +84,7 @@ pub(crate) fn simplify(exprs: &mut Exprs, root: Id, instead: &HashMap<Id, Id>) -
             Expr::Unary(f, x) => exprs.put(Expr::Unary(f, of(&x)), len),
             Expr::Add(x, y) => exprs.put(Expr::Add(of(&x), of(&y)), len),
             Expr::Mul(x, y) => exprs.put(Expr::Mul(of(&x), of(&y)), len),
-            // A sum that is left is a product with a row of ones.
+            // A remaining sum becomes a product with a row of ones.
             Expr::Sum(x) => {
                 let x = of(&x);
                 let cols = exprs.len_of(x);
@@ -97,11 +97,11 @@ pub(crate) fn simplify(exprs: &mut Exprs, root: Id, instead: &HashMap<Id, Id>) -
             Expr::Clip(x, limit) => exprs.put(Expr::Clip(of(&x), limit), len),
             Expr::LayerNorm(x, weight, bias, eps) => {
                 let norm = exprs.put(Expr::LayerNorm(of(&x), weight, bias, eps), len);
-                once(exprs, *norms.entry(of(&x)).or_insert(norm), norm)
+                reuse_norm(exprs, *norms.entry(of(&x)).or_insert(norm), norm)
             }
             Expr::RmsNorm(x, weight, eps) => {
                 let norm = exprs.put(Expr::RmsNorm(of(&x), weight, eps), len);
-                once(exprs, *norms.entry(of(&x)).or_insert(norm), norm)
+                reuse_norm(exprs, *norms.entry(of(&x)).or_insert(norm), norm)
             }
             Expr::Cell(cell) => exprs.put(Expr::Cell(Box::new(Cell { x: of(&cell.x), ..*cell })), len),
             Expr::CellState(x) => exprs.put(Expr::CellState(of(&x)), len),
@@ -112,22 +112,23 @@ pub(crate) fn simplify(exprs: &mut Exprs, root: Id, instead: &HashMap<Id, Id>) -
     new.get(&root).copied().unwrap_or(root)
 }
 
-/// `k x`, also where x is a norm that something else reads: a factor within would need the norm again.
+/// Returns `k x` as a separate operation, also of a norm with other readers: a factor inside would need the norm twice.
 fn times(exprs: &mut Exprs, x: Id, k: f64) -> Id {
     let len = exprs.len_of(x);
     exprs.put(Expr::Affine(x, vec![k; len], vec![0.0; len]), len)
 }
 
-/// A norm, as a multiple of the `first` of the same value where it is one: the sum of a LeakyReLU reads both.
-fn once(exprs: &mut Exprs, first: Id, norm: Id) -> Id {
+/// Replaces a norm by a multiple of the `first` norm of the same value, if possible, as the sum of a LeakyReLU reads
+/// both.
+fn reuse_norm(exprs: &mut Exprs, first: Id, norm: Id) -> Id {
     match exprs.ratio(norm, first) {
         Some(k) if norm != first => times(exprs, first, k),
         _ => norm,
     }
 }
 
-/// Whether nothing but this reads what it reads.
-fn read_by_one(readers: &HashMap<Id, Vec<Id>>, reader: Id, exprs: &Exprs, instead: &HashMap<Id, Id>) -> bool {
+/// Returns `true` if `reader` is the only reader of its operands.
+fn is_only_reader(readers: &HashMap<Id, Vec<Id>>, reader: Id, exprs: &Exprs, instead: &HashMap<Id, Id>) -> bool {
     exprs.get(reader).operands().iter().all(|operand| {
         let operand = instead.get(operand).copied().unwrap_or(*operand);
         readers.get(&operand).is_some_and(|all| all.iter().all(|other| *other == reader))

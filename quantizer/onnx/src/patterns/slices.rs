@@ -1,20 +1,20 @@
-//! Sums over one axis of what stands along another, as a mean over time has.
+//! Sums of adjacent runs as sums of slices, as in a mean over time.
 
 use crate::values::elements::value;
 use crate::values::expr::{Expr, Exprs, Id, Run};
 
-/// The most elements of a row that is one of a sum of slices.
+/// The most elements of a row that becomes a sum of slices.
 const MOST_SLICES: usize = 64;
 
-/// Sums over neighbours in runs beside each other, as a mean over time has, as a sum of slices where that takes fewer
-/// operations. `new` says what expressions have become.
+/// Converts sums of adjacent runs to a sum of slices, if that takes fewer operations. `new` maps expressions to their
+/// replacements.
 pub(crate) fn sums_of_slices(exprs: &mut Exprs, runs: &[Run], new: &dyn Fn(&Id) -> Id) -> Vec<Run> {
     let mut done = Vec::new();
     let mut rest = runs;
     while let [run, ..] = rest {
         let mut rows = Vec::new();
         while let Some(row) = rest.get(rows.len()).and_then(|run| row_of_sum(exprs, run.of))
-            && rows.last().is_none_or(|last| is_behind(last, &row))
+            && rows.last().is_none_or(|last| follows(last, &row))
         {
             rows.push(row);
         }
@@ -37,7 +37,7 @@ pub(crate) fn sums_of_slices(exprs: &mut Exprs, runs: &[Run], new: &dyn Fn(&Id) 
     done
 }
 
-/// What a sum goes over, and what is done to it.
+/// The elements of a sum, and the factor and offset of the result.
 struct RowOfSum {
     elements: Vec<(Id, usize)>,
     factor: f64,
@@ -54,8 +54,8 @@ fn row_of_sum(exprs: &Exprs, id: Id) -> Option<RowOfSum> {
     Some(RowOfSum { elements, factor, offset })
 }
 
-/// Whether every element of `next` is the one behind that of `last`.
-fn is_behind(last: &RowOfSum, next: &RowOfSum) -> bool {
-    let behind = |(a, b): (&(Id, usize), &(Id, usize))| (a.0, a.1 + 1) == *b;
-    last.elements.len() == next.elements.len() && last.elements.iter().zip(&next.elements).all(behind)
+/// Returns `true` if every element of `next` follows that of `last`.
+fn follows(last: &RowOfSum, next: &RowOfSum) -> bool {
+    let is_next = |(a, b): (&(Id, usize), &(Id, usize))| (a.0, a.1 + 1) == *b;
+    last.elements.len() == next.elements.len() && last.elements.iter().zip(&next.elements).all(is_next)
 }

@@ -1,4 +1,4 @@
-//! Numbers as sums of products, whatever order and factors a file adds them up with.
+//! Numbers as sums of products, independent of the file's order and factors.
 
 use std::collections::BTreeMap;
 
@@ -6,15 +6,15 @@ use crate::patterns::parts::{Part, Source};
 use crate::values::compare::near;
 use crate::values::expr::{Expr, Exprs, Id, Run};
 
-/// Expressions within each other that are added up.
+/// The most nested sums that are examined.
 const DEPTH: usize = 10;
-/// Less than this share of an offset is what rounding leaves of it.
+/// Share of an offset below which a rest is a rounding error.
 const ROUNDING: f64 = 1e-12;
 
-/// A source, or two that are multiplied.
+/// A source, or a product of two.
 type Product = (Source, Option<Source>);
 
-/// The sum of products with factors, and an offset.
+/// A sum of products with factors, and an offset.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Total {
     terms: BTreeMap<Product, f64>,
@@ -43,7 +43,7 @@ impl Total {
         }
     }
 
-    /// The k and the rest for which this is `k x + rest`.
+    /// Returns the k and the rest for which this is `k x + rest`.
     pub(crate) fn over(&self, x: &Self) -> Option<(f64, f64)> {
         let (product, factor) = x.terms.first_key_value()?;
         let k = self.terms.get(product)? / factor;
@@ -54,7 +54,7 @@ impl Total {
         (is_multiple && k.is_finite()).then_some((k, rest))
     }
 
-    /// Takes out the square of a sum of elements: the sum, and the factor of its square.
+    /// Removes the square of a sum of elements. Returns the sum and the factor of its square.
     pub(crate) fn take_square_of_sum(&mut self, exprs: &Exprs) -> Option<(Id, f64)> {
         let sum_of = |source: Source| source.run(1).filter(|run| matches!(exprs.get(run.of), Expr::Sum(_)));
         let square = |&(x, y): &Product| sum_of(x).filter(|_| y == Some(x)).map(|run| ((x, y), run.of));
@@ -64,17 +64,17 @@ impl Total {
 }
 
 impl Exprs {
-    /// A value of one element.
+    /// Returns the total of a value of one element.
     pub(crate) fn total(&self, id: Id) -> Total {
         self.total_of(Run { of: id, from: 0, len: 1 })
     }
 
-    /// The sum of all elements.
+    /// Returns the sum of all elements.
     pub(crate) fn sum_of_elements(&self, id: Id) -> Total {
         self.total_of(Run { of: id, from: 0, len: self.len_of(id) })
     }
 
-    /// The sum of the squares of all elements.
+    /// Returns the sum of the squares of all elements.
     pub(crate) fn sum_of_squares(&self, id: Id) -> Total {
         let mut total = Total::default();
         self.parts(id).into_iter().for_each(|part| total.add_product(part, part, 1.0));

@@ -1,17 +1,17 @@
-//! Bounds of a value by the last operations that it went through.
+//! Bounds of a value from the last operations before it.
 
 use actq_kernels::math::Function;
 
 use crate::values::expr::{Expr, Exprs, Id, Run, Unary};
 
-/// Operations that are looked through: exporters write fewer.
+/// The most operations that are examined; exporters write fewer.
 const DEPTH: usize = 16;
 
-/// More than what f32 adds to a factor and an offset as an operation of its own, which rounds its two constants, a
-/// difference and a product, and to these bounds.
+/// Upper bound of the relative rounding error in f32 of a factor and an offset: the operation rounds its two constants,
+/// a difference, a product and these bounds.
 const ROUNDING: f64 = 1.0 / (1 << 21) as f64;
 
-/// Bounds, lower first, of all that f32 gives for an element; `None` where no operation bounds it.
+/// Returns the bounds of an element in f32 arithmetic, the lower one first; `None` if no operation bounds it.
 pub(crate) fn bounds(exprs: &Exprs, id: Id, i: usize) -> Option<[f32; 2]> {
     within(exprs, id, i, DEPTH)
 }
@@ -32,7 +32,7 @@ fn within(exprs: &Exprs, id: Id, i: usize, depth: usize) -> Option<[f32; 2]> {
     }
 }
 
-/// The element that is the `i`-th of runs.
+/// Finds the `i`-th element of runs.
 fn place(runs: &[Run], mut i: usize) -> Option<(Id, usize)> {
     for run in runs {
         if i < run.len {
@@ -43,7 +43,7 @@ fn place(runs: &[Run], mut i: usize) -> Option<(Id, usize)> {
     None
 }
 
-/// Bounds of `a x + b`, whose x has these.
+/// Returns the bounds of `a x + b` from those of x.
 fn affine(a: f64, b: f64, ends: [f32; 2]) -> [f32; 2] {
     let [one, two] = ends.map(|end| a * f64::from(end));
     let rounding = ROUNDING * (one.abs().max(two.abs()) + b.abs());

@@ -1,31 +1,31 @@
-//! Whether expressions are the same but for factors, which is what patterns ask.
+//! Comparison of expressions up to factors, for the recognition of patterns.
 
 use actq_kernels::math::Function;
 
 use crate::values::expr::{Expr, Exprs, Id, Unary};
 
-/// Exporters write constants such as `sqrt(2)` in f32.
+/// Relative tolerance of constants, as exporters round those such as `sqrt(2)` to f32.
 const TOLERANCE: f64 = 2e-6;
 
-/// Equal, as far as f32 tells.
+/// Returns `true` if the values are equal within [`TOLERANCE`].
 pub(crate) fn near(a: f64, b: f64) -> bool {
     (a - b).abs() <= TOLERANCE * a.abs().max(b.abs())
 }
 
-/// A power of two, as far as f32 tells: exporters write one as the quotient of rounded constants.
+/// Rounds to a power of two within [`TOLERANCE`], as exporters write one as the quotient of rounded constants.
 pub(crate) fn exact(k: f64) -> f64 {
     let power = k.abs().log2().round().exp2().copysign(k);
     if near(power, k) { power } else { k }
 }
 
-/// The one value of a vector.
+/// Returns the value that all elements of a vector have.
 pub(crate) fn uniform(values: &[f64]) -> Option<f64> {
     let first = *values.first()?;
     values.iter().all(|v| *v == first).then_some(first)
 }
 
 impl Exprs {
-    /// `a x + b` with the same a and b for all elements; of any other expression `1 x + 0`.
+    /// Splits an expression into `a x + b` with one a and b for all elements; any other expression is `1 x + 0`.
     pub(crate) fn affine_of(&self, id: Id) -> (Id, f64, f64) {
         if let Expr::Affine(x, a, b) = self.get(id)
             && let (Some(a), Some(b)) = (uniform(a), uniform(b))
@@ -35,17 +35,17 @@ impl Exprs {
         (id, 1.0, 0.0)
     }
 
-    /// The operand of a function.
+    /// Returns the operand, if the expression is this function.
     pub(crate) fn operand_of(&self, id: Id, function: Unary) -> Option<Id> {
         if let Expr::Unary(f, x) = self.get(id) { (*f == function).then_some(*x) } else { None }
     }
 
-    /// As [`Self::operand_of`].
+    /// Returns the same as [`Self::operand_of`], for a function of the network.
     pub(crate) fn known_of(&self, id: Id, function: Function) -> Option<Id> {
         self.operand_of(id, Unary::Known(function))
     }
 
-    /// The coefficients of each element of `y` as a polynomial in that of `x`, from the constant one on, up to the cube.
+    /// Returns the coefficients of each element of `y` as a polynomial of degree 3 in that of `x`, constant first.
     pub(crate) fn polynomials(&self, y: Id, x: Id, depth: usize) -> Option<Vec<[f64; 4]>> {
         let depth = depth.checked_sub(1)?;
         if let Some(ratios) = self.ratios(y, x) {
@@ -69,7 +69,7 @@ impl Exprs {
     }
 }
 
-/// The product of two polynomials, where it is none of more than the cube.
+/// Multiplies two polynomials; `None` above degree 3.
 fn product(p: [f64; 4], q: [f64; 4]) -> Option<[f64; 4]> {
     let mut product = [0.0; 4];
     for (i, p) in p.into_iter().enumerate() {

@@ -1,4 +1,4 @@
-//! A function of the elements of a tensor, some of which may be known.
+//! Functions of the elements of a tensor, some of which may be constant.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use crate::values::evaluation::computed;
 use crate::values::expr::{Exprs, Id, Matrix};
 use crate::values::tensor::{Element, Tensor};
 
-/// Applies what works on a vector to all elements; those that are known give known ones.
+/// Applies a function of vectors to all elements. Known elements give known elements.
 pub(crate) fn each(exprs: &mut Exprs, x: &Tensor, f: &dyn Fn(&mut Exprs, Id) -> Id) -> Result<Tensor> {
     let mut all = x.elements();
     let at: Vec<usize> = (0..all.len()).filter(|&i| value(&all[i]).is_some()).collect();
@@ -25,12 +25,12 @@ pub(crate) fn each(exprs: &mut Exprs, x: &Tensor, f: &dyn Fn(&mut Exprs, Id) -> 
     Ok(Tensor::of_elements(x.shape.clone(), all))
 }
 
-/// Places in the order in which their values came up, where that makes fewer runs of neighbours: what a transpose has
-/// scattered is computed in the order of the layer before it, and scattered behind.
+/// Sorts places by their values, if that gives fewer runs of neighbours: elements that a transpose scattered are then
+/// computed in the order of the layer before it, and scattered afterwards.
 pub(crate) fn in_order(at: Vec<usize>, values: &dyn Fn(usize) -> [(Id, usize); 2]) -> Vec<usize> {
     let breaks = |order: &[usize]| {
-        let behind = |pair: &&[usize]| values(pair[0]).map(|(of, i)| (of, i + 1)) != values(pair[1]);
-        order.windows(2).filter(behind).count()
+        let is_break = |pair: &&[usize]| values(pair[0]).map(|(of, i)| (of, i + 1)) != values(pair[1]);
+        order.windows(2).filter(is_break).count()
     };
     let given = breaks(&at);
     if given == 0 {
@@ -41,22 +41,23 @@ pub(crate) fn in_order(at: Vec<usize>, values: &dyn Fn(usize) -> [(Id, usize); 2
     if breaks(&sorted) < given { sorted } else { at }
 }
 
-/// What `f` gives of these elements, none of which is known.
+/// Applies `f` to these elements, none of which is known.
 pub(crate) fn apply(exprs: &mut Exprs, values: &[(Id, usize)], f: &dyn Fn(&mut Exprs, Id) -> Id) -> Vec<Element> {
     let x = exprs.vector(values);
     let y = f(exprs, x);
     exprs.elements(y)
 }
 
-/// The value that an element is of, and its place there, where it is not known.
+/// Returns the value and the place of an element; `None` for a known one.
 pub(crate) fn value(element: &Element) -> Option<(Id, usize)> {
     if let Element::Of(id, i) = element { Some((*id, *i)) } else { None }
 }
 
-/// The vector of these elements, of which at least one is not known: those that are come out of a layer that only has a
-/// bias.
+/// Makes a vector of these elements, at least one of which is not known. Known elements become the biases of a layer
+/// with zero weights.
 pub(crate) fn open_vector(exprs: &mut Exprs, elements: &[Element]) -> Result<Id> {
-    let first = elements.iter().find_map(value).context("computes with constants alone; fold them in the exporter")?;
+    let first =
+        elements.iter().find_map(value).context("all operands are constant; let the exporter fold constants")?;
     let known = |element: &Element| if let Element::Known(v) = element { Some(*v) } else { None };
     let biases: Vec<f64> = elements.iter().filter_map(known).collect();
     let mut constants = Vec::new();
@@ -68,5 +69,5 @@ pub(crate) fn open_vector(exprs: &mut Exprs, elements: &[Element]) -> Result<Id>
     }
     let mut constants = constants.into_iter();
     let values: Option<Vec<(Id, usize)>> = elements.iter().map(|e| value(e).or_else(|| constants.next())).collect();
-    Ok(exprs.vector(&values.context("a constant is lost")?))
+    Ok(exprs.vector(&values.context("lost a constant; this is an error of this program, please report it")?))
 }

@@ -1,4 +1,4 @@
-//! What expressions give for known numbers: layers whose input is constant need not be in the network.
+//! Evaluation of expressions for known numbers, which folds layers with a constant input.
 
 use std::collections::HashMap;
 
@@ -7,7 +7,7 @@ use actq_kernels::math::Function;
 
 use crate::values::expr::{Expr, Exprs, Id, Unary};
 
-/// What `f` makes of these numbers.
+/// Evaluates `f` for these numbers.
 pub(crate) fn computed(values: &[f64], f: &dyn Fn(&mut Exprs, Id) -> Id) -> Result<Vec<f64>> {
     if values.is_empty() {
         return Ok(Vec::new());
@@ -15,11 +15,11 @@ pub(crate) fn computed(values: &[f64], f: &dyn Fn(&mut Exprs, Id) -> Id) -> Resu
     let mut exprs = Exprs::default();
     let x = exprs.put(Expr::Input(0), values.len());
     let y = f(&mut exprs, x);
-    exprs.evaluated(y, values).context("is not computed of constants alone; fold them in the exporter")
+    exprs.evaluated(y, values).context("cannot be evaluated for constants; let the exporter fold constants")
 }
 
 impl Exprs {
-    /// The elements of `root`, where `input` is the only input. There is no matrix and no cell on the way.
+    /// Evaluates `root` for `input`, the only input; `None` if it depends on a matrix or a cell.
     fn evaluated(&self, root: Id, input: &[f64]) -> Option<Vec<f64>> {
         let mut values: HashMap<Id, Vec<f64>> = HashMap::new();
         for id in self.needed(&[root]) {
@@ -77,7 +77,7 @@ impl Unary {
     }
 }
 
-/// A function of the network, in f64.
+/// Evaluates a function of the network in f64.
 fn value(function: Function, x: f64) -> f64 {
     let sigmoid = |x: f64| 1.0 / (1.0 + (-x).exp());
     let softplus = |x: f64| x.max(0.0) + (-x.abs()).exp().ln_1p();

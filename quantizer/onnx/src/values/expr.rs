@@ -1,4 +1,4 @@
-//! What a file computes, as expressions over vectors: every expression once, in the order in which they came up.
+//! Expressions over vectors, each stored one time, in the order of the graph.
 
 use std::collections::HashMap;
 use std::mem::discriminant;
@@ -12,7 +12,7 @@ pub(crate) type Id = usize;
 /// A weight matrix, rows are outputs.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Matrix {
-    /// The initializer's name, as far as there is one.
+    /// The initializer's name, if any.
     pub(crate) name: Option<String>,
     pub(crate) rows: usize,
     pub(crate) cols: usize,
@@ -31,9 +31,9 @@ pub(crate) struct Run {
 /// A function of every element.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Unary {
-    /// One that the network has.
+    /// A function that the network has.
     Known(Function),
-    /// `ln x`; only within a pattern, as those below.
+    /// `ln x`. This function and those below are supported in patterns only.
     Log,
     /// Square root.
     Sqrt,
@@ -43,35 +43,35 @@ pub(crate) enum Unary {
     Reciprocal,
     /// `|x|`
     Abs,
-    /// Whether x is above this.
+    /// 1 if x is above this limit, else 0.
     Above(f64),
 }
 
 /// An LSTM or GRU cell.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Cell {
-    /// Whether it is an LSTM, of gates `[i f g o]`; else a GRU, of gates `[r z n]`.
+    /// `true` for an LSTM, with gates `[i f g o]`; `false` for a GRU, with gates `[r z n]`.
     pub(crate) lstm: bool,
-    /// What it reads.
+    /// Input of the cell.
     pub(crate) x: Id,
     pub(crate) w_ih: Arc<Matrix>,
     pub(crate) w_hh: Arc<Matrix>,
     pub(crate) b_ih: Vec<f64>,
     pub(crate) b_hh: Vec<f64>,
-    /// Elements of graph inputs that hold its hidden state, and of an LSTM its cell state, before the step.
+    /// Runs of graph inputs that hold the hidden state, and the cell state of an LSTM, before the step.
     pub(crate) states: Vec<Run>,
 }
 
-/// An expression; its length stands beside it.
+/// An expression; [`Exprs`] holds its length.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Expr {
     /// Graph input of this index.
     Input(usize),
     /// Graph input of this index, of integers that are not yet cast to float.
     Integers(usize),
-    /// Runs behind each other.
+    /// Concatenated runs.
     Pick(Vec<Run>),
-    /// The one element of a value, again and again.
+    /// The one element of a value, repeated.
     Spread(Id),
     /// `a x + b`, element by element.
     Affine(Id, Vec<f64>, Vec<f64>),
@@ -82,11 +82,11 @@ pub(crate) enum Expr {
     Mul(Id, Id),
     /// The sum of all elements.
     Sum(Id),
-    /// Limited to so much in both directions.
+    /// A value limited to this magnitude.
     Clip(Id, f64),
-    /// Of what, weight, bias, what is added to the variance.
+    /// Operand, weight, bias, epsilon of the variance.
     LayerNorm(Id, Vec<f64>, Vec<f64>, f64),
-    /// Of what, weight, what is added to the mean square.
+    /// Operand, weight, epsilon of the mean square.
     RmsNorm(Id, Vec<f64>, f64),
     /// The hidden state after the step.
     Cell(Box<Cell>),
@@ -95,7 +95,7 @@ pub(crate) enum Expr {
 }
 
 impl Expr {
-    /// What it reads.
+    /// Returns the expressions that it reads.
     pub(crate) fn operands(&self) -> Vec<Id> {
         match self {
             Self::Input(_) | Self::Integers(_) => vec![],
@@ -119,18 +119,19 @@ impl Expr {
 #[derive(Debug, Default)]
 pub(crate) struct Exprs {
     all: Vec<(Expr, usize)>,
-    /// By kind, first operand, and where that is cut: rows of one value must not be looked for among each other.
+    /// Expressions by kind, first operand, and the start of its run. The start keeps the lists short for rows of one
+    /// value.
     known: HashMap<(std::mem::Discriminant<Expr>, Id, usize), Vec<Id>>,
-    /// Values with a limit on one side: of what, and the limits, of which one is infinite.
+    /// Values with a limit on one side: the operand and both limits, one of which is infinite.
     pub(crate) limited: HashMap<Id, (Id, f64, f64)>,
-    /// Which node of the file each came up in.
+    /// Index of the node that each expression comes from.
     origins: Vec<usize>,
-    /// The node that is followed now.
+    /// Index of the current node.
     pub(crate) node: usize,
 }
 
 impl Exprs {
-    /// The expression, which may be there already.
+    /// Adds an expression, or finds an equal one.
     pub(crate) fn put(&mut self, expr: Expr, len: usize) -> Id {
         let (first, from) = match &expr {
             Expr::Pick(runs) => runs.first().map_or((0, 0), |run| (run.of, run.from)),
@@ -156,17 +157,17 @@ impl Exprs {
         self.all[id].1
     }
 
-    /// The node of the file that it came up in.
+    /// Returns the index of the node that an expression comes from.
     pub(crate) fn origin(&self, id: Id) -> usize {
         self.origins[id]
     }
 
-    /// Says that `id` came up where `old` did.
+    /// Gives `id` the origin of `old`.
     pub(crate) fn keep_origin(&mut self, old: Id, id: Id) {
         self.origins[id] = self.origins[old];
     }
 
-    /// Whether a value is nothing but parts of the graph's inputs.
+    /// Returns `true` if a value consists of parts of the graph's inputs.
     pub(crate) fn is_observed(&self, id: Id) -> bool {
         match self.get(id) {
             Expr::Input(_) => true,
@@ -175,12 +176,12 @@ impl Exprs {
         }
     }
 
-    /// Which expressions `roots` need, themselves included, each behind its operands.
+    /// Lists the expressions that `roots` need, and the roots, each after its operands.
     pub(crate) fn needed(&self, roots: &[Id]) -> Vec<Id> {
         self.needed_instead(roots, &HashMap::new())
     }
 
-    /// As [`Self::needed`], where some expressions stand for others.
+    /// Lists the same as [`Self::needed`], with some expressions replaced by those in `instead`.
     pub(crate) fn needed_instead(&self, roots: &[Id], instead: &HashMap<Id, Id>) -> Vec<Id> {
         let meant = |id: Id| instead.get(&id).copied().unwrap_or(id);
         let mut order = Vec::new();

@@ -1,13 +1,13 @@
-//! Tensors while a graph is followed: of numbers that are known, or of elements of the network's values.
+//! Tensors of the graph: of known numbers, or of elements of the network's values.
 
 use actq::error::{Result, ensure};
 
 use crate::values::expr::Id;
 
-/// An element of a tensor that is not all known numbers.
+/// An element of a tensor with at least one element that is not known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Element {
-    /// Element of a value.
+    /// Element of this index of a value.
     Of(Id, usize),
     /// A known number.
     Known(f64),
@@ -18,7 +18,7 @@ pub(crate) enum Element {
 pub(crate) enum Data {
     /// Known real numbers.
     Real(Vec<f64>),
-    /// Known integers, and truth values as 0 and 1.
+    /// Known integers, and booleans as 0 and 1.
     Int(Vec<i64>),
     /// At least one element is not known before the network runs.
     Open(Vec<Element>),
@@ -30,26 +30,26 @@ pub(crate) struct Tensor {
     /// Length of each axis.
     pub(crate) shape: Vec<usize>,
     pub(crate) data: Data,
-    /// The initializer's name, as long as its elements have not changed.
+    /// The initializer's name, while the elements are unchanged.
     pub(crate) name: Option<String>,
 }
 
-/// The most elements of a tensor, axes without any counted as 1: what walks over an axis stays short.
+/// The most elements of a tensor, with empty axes counted as 1. It bounds the work along an axis.
 const MOST_ELEMENTS: usize = 1 << 28;
 
-/// Elements of a shape.
+/// Returns the number of elements of a shape.
 pub(crate) fn count(shape: &[usize]) -> Result<usize> {
     let product = shape.iter().try_fold(1usize, |n, &d| n.checked_mul(d.max(1)).filter(|&n| n <= MOST_ELEMENTS));
     let empty = shape.contains(&0);
     let fits = product.filter(|&n| !empty || n <= 1 << 16);
-    ensure!(fits.is_some(), "the shape {shape:?} has more elements than any policy");
+    ensure!(fits.is_some(), "shape {shape:?} exceeds the limit of a tensor's elements");
     Ok(fits.filter(|_| !empty).unwrap_or_default())
 }
 
-/// How many elements a shape has that may come up as a result: at most so many.
+/// Returns the number of elements of a result's shape; fails above `most`.
 pub(crate) fn room(shape: &[usize], most: usize) -> Result<usize> {
     let n = count(shape)?;
-    ensure!(n <= most, "{shape:?} are more values than a policy of this size can have");
+    ensure!(n <= most, "shape {shape:?} has more values than a policy of this size can have");
     Ok(n)
 }
 
@@ -58,12 +58,12 @@ impl Tensor {
         Self { shape, data, name: None }
     }
 
-    /// One axis of integers.
+    /// Makes a tensor with one axis of integers.
     pub(crate) fn ints(values: Vec<i64>) -> Self {
         Self::new(vec![values.len()], Data::Int(values))
     }
 
-    /// Elements; what is all known becomes so.
+    /// Makes a tensor of elements, of known numbers if all are known.
     pub(crate) fn of_elements(shape: Vec<usize>, elements: Vec<Element>) -> Self {
         let known = |e: &Element| match e {
             Element::Known(v) => Some(*v),
@@ -85,7 +85,7 @@ impl Tensor {
         !matches!(self.data, Data::Open(_))
     }
 
-    /// As elements.
+    /// Returns all elements.
     pub(crate) fn elements(&self) -> Vec<Element> {
         match &self.data {
             Data::Real(v) => v.iter().map(|&v| Element::Known(v)).collect(),
@@ -94,7 +94,7 @@ impl Tensor {
         }
     }
 
-    /// Known numbers; `None` where an element is not.
+    /// Returns the numbers of a known tensor.
     pub(crate) fn reals(&self) -> Option<Vec<f64>> {
         match &self.data {
             Data::Real(v) => Some(v.clone()),
@@ -103,18 +103,18 @@ impl Tensor {
         }
     }
 
-    /// Known integers.
+    /// Returns the integers of a known tensor of integers.
     pub(crate) fn integers(&self) -> Option<&[i64]> {
         if let Data::Int(v) = &self.data { Some(v) } else { None }
     }
 
-    /// The same elements in another shape.
+    /// Returns the same elements in another shape.
     pub(crate) fn reshaped(&self, shape: Vec<usize>) -> Result<Self> {
-        ensure!(count(&shape)? == self.len(), "{:?} cannot be reshaped to {shape:?}", self.shape);
+        ensure!(count(&shape)? == self.len(), "shape {:?} cannot be reshaped to {shape:?}", self.shape);
         Ok(Self { shape, ..self.clone() })
     }
 
-    /// The elements at these places.
+    /// Returns the elements at these places.
     pub(crate) fn taken(&self, shape: Vec<usize>, places: &[usize]) -> Result<Self> {
         fn pick<T: Copy>(from: &[T], places: &[usize]) -> Option<Vec<T>> {
             places.iter().map(|&i| from.get(i).copied()).collect()
@@ -124,7 +124,7 @@ impl Tensor {
             Data::Int(v) => pick(v, places).map(Data::Int),
             Data::Open(v) => return Ok(Self::of_elements(shape, pick(v, places).unwrap_or_default())),
         };
-        ensure!(data.is_some(), "a place lies outside the tensor");
+        ensure!(data.is_some(), "a place is outside the tensor; this is an error of this program, please report it");
         Ok(Self::new(shape, data.unwrap_or(Data::Int(Vec::new()))))
     }
 }
