@@ -14,7 +14,7 @@ pub struct Board {
     pub emulator: &'static str,
     /// QEMU's arguments for the machine.
     pub machine: &'static [&'static str],
-    /// Measuring binaries of `firmware-bench` that run on the board. The harness runs on every board.
+    /// Measuring binaries of `firmware/bench` that run on the board. The harness runs on every board.
     pub binaries: &'static [&'static str],
     /// The application's properties on the board, if it supports the board.
     pub application: Option<Application>,

@@ -8,8 +8,8 @@ use crate::table::Target;
 /// The default board's memory script, which link.x finds at the workspace's root.
 const DEFAULT_MEMORY: &str = "memory.x";
 
-/// Links the package's binaries for a board; does nothing for the host. For build scripts of packages one folder below
-/// the workspace's root.
+/// Links the package's binaries for a board; does nothing for the host. For build scripts of packages within the
+/// workspace, whose root has the default board's script.
 ///
 /// # Errors
 ///
@@ -23,7 +23,7 @@ pub fn link() -> Result<(), String> {
     // From the variable of this run, because the build script may have been compiled for another checkout.
     let [package, out] =
         ["CARGO_MANIFEST_DIR", "OUT_DIR"].map(|name| PathBuf::from(env::var_os(name).unwrap_or_default()));
-    let root = package.parent().unwrap_or(Path::new("."));
+    let root = package.ancestors().find(|folder| folder.join(DEFAULT_MEMORY).is_file()).unwrap_or(Path::new("."));
     let script = root.join(board.memory);
     println!("cargo::rerun-if-changed={}", script.display());
     if target.triple().starts_with("riscv") {

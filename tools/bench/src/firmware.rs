@@ -101,7 +101,7 @@ fn controller_in_folder(target: Target, features: &str, key: &str, image: &Path)
     build(APPLICATION, &[CONTROLLER], &all, &target_dir(), target, target.profile(), &environment)
 }
 
-/// Builds the programs of `firmware-styles` for their board, with the image of [`harness`], and returns the path of
+/// Builds the programs of `firmware/styles` for their board, with the image of [`harness`], and returns the path of
 /// one's ELF file.
 pub fn style(name: &str) -> Result<PathBuf> {
     let target = Target::Fpu;
@@ -112,7 +112,7 @@ pub fn style(name: &str) -> Result<PathBuf> {
     Ok(build_once(STYLES, target, build)?.join(name))
 }
 
-/// Builds the binaries of `firmware-bench` that run on a target's board, and returns the path of one's ELF file.
+/// Builds the binaries of `firmware/bench` that run on a target's board, and returns the path of one's ELF file.
 pub fn binary(name: &str, target: Target) -> Result<PathBuf> {
     let board = target.board();
     ensure!(board.binaries.contains(&name), "firmware {name} does not run on {}", board.name);

@@ -42,7 +42,7 @@ fn functions(name: &str) -> u64 {
     }
 }
 
-/// The output of `firmware-bench/src/bin/functions.rs`: names and hashes of the results, in its order.
+/// The output of `firmware/bench/src/bin/functions.rs`: names and hashes of the results, in its order.
 fn expected() -> Vec<(&'static str, u32)> {
     let mut all = Vec::new();
     let constants = values::<LEN>().map(f32::to_bits);

@@ -1,4 +1,4 @@
-//! The head in user firmware, in each style of `firmware-styles`, under QEMU.
+//! The head in user firmware, in each style of `firmware/styles`, under QEMU.
 
 use std::fs;
 use std::process::Stdio;
@@ -35,7 +35,7 @@ fn every_style_matches_the_host_below_its_tick() -> Result<()> {
 #[test]
 fn every_style_has_at_most_sixty_lines() -> Result<()> {
     for name in STYLE_NAMES {
-        let source = fs::read_to_string(root().join(format!("firmware-styles/src/bin/{name}.rs")))?;
+        let source = fs::read_to_string(root().join(format!("firmware/styles/src/bin/{name}.rs")))?;
         let lines = source.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with("//")).count();
         assert!((30..=60).contains(&lines), "{name}: {lines}");
     }
