@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn an_error_is_a_share_of_the_largest_value() {
+    fn error_is_a_share_of_the_largest_value() {
         assert_eq!(error(&[-4.0, 1.0], &[-4.0, 1.5]), 0.125);
         assert_eq!(error(&[0.0, 1.0], &[f64::NAN, 1.0]), f64::INFINITY);
         assert_eq!(error(&[f64::INFINITY], &[f64::INFINITY]), f64::INFINITY);

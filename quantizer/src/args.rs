@@ -51,6 +51,7 @@ pub(crate) enum Command {
     /// beside it.
     ///
     /// Example: actq quantize policies/ur3 --bits 3 --out ur3.actq
+    ///
     /// Example: actq quantize model.onnx --calib obs.npy --bpw 2 --out model.actq
     Quantize(QuantizeArgs),
     /// Show an image: operations, matrices, bits, memory, predicted time on a Cortex-M4, action contract
@@ -62,8 +63,8 @@ pub(crate) enum Command {
     /// The recording is heldout.npz, .npy or .safetensors in POLICY_DIR, or the file that --heldout names. It holds
     /// "obs" and "action"; without "action", the policy in POLICY_DIR gives the actions. The report includes the share
     /// of the error that comes from rounding the activations. If POLICY_DIR holds calib.npz, .npy or .safetensors, the
-    /// command warns when the observations leave its range. With --driven, the report adds the on-policy error: the
-    /// error on observations that the image's own actions led to, which may differ from those of the f32 policy.
+    /// command warns when the observations leave its range. With --driven, the report adds the error on the image's own
+    /// path: on observations that its own actions led to, which may differ from those of the f32 policy.
     ///
     /// Example: actq eval ur3.actq --policy policies/ur3
     Eval(EvalArgs),
@@ -338,24 +339,31 @@ pub(crate) struct SweepArgs {
 /// The choices that the paper of ActQuant leaves open.
 #[derive(clap::Args)]
 pub(crate) struct ActQuantArgs {
-    /// Choices of method actquant: KEY=VALUE,KEY=VALUE, or authors for the choices of its authors, which keys after it
-    /// change
+    /// Choices of method actquant: KEY=VALUE,KEY=VALUE, or authors for its authors' choices
     ///
-    /// [defaults are in brackets; (authors) marks the authors' choice]
+    /// Keys after authors change single choices. Defaults are in brackets; (authors) marks the
+    /// authors' choice.
     ///
-    /// bandwidth=[median]|squared(authors): the Gaussian kernels' sigma^2, or sigma, is the median squared distance.
-    /// frames=N|all(authors) [512]: frames that HSIC is computed over, at most 8192. score=[gain](authors)|output: a
-    /// matrix's score is its gain, F(output) - F(input), or F(output). noise=[codes]|format(authors): a width's
-    /// expected error is 2^(-2 bits), with the bits of a code or with all bits that a weight takes.
-    /// widest=2|3|4(authors)|[8]: the widest codes of the allocation. head=[free]|2|3|4|8(authors): the width of the
-    /// matrices that give the action. (The authors keep them at 16 bits.) samples=N|all(authors) [4096]: frames that
-    /// the Fisher information is computed over, approximately. batch=N [1] (authors: 8): frames whose gradients are
-    /// averaged before they are squared. signs=[random]|loss(authors): the loss's derivative if the recorded action is
-    /// the policy's own: a random sign, or the sign of the remaining difference. magnitude=[no]|yes(authors): fits of
-    /// scales weigh by the importance, or by it times sqrt(mean of the row's w^2 + w^2).
+    /// bandwidth=[median]|squared(authors): the Gaussian kernels' sigma^2, or sigma, is the median
+    ///   squared distance.
+    /// frames=N|all(authors) [512]: frames that HSIC is computed over, at most 8192.
+    /// score=[gain](authors)|output: a matrix's score is its gain, F(output) - F(input), or
+    ///   F(output).
+    /// noise=[codes]|format(authors): a width's expected error is 2^(-2 bits), with the bits of a
+    ///   code or with all bits that a weight takes.
+    /// widest=2|3|4(authors)|[8]: the widest codes of the allocation.
+    /// head=[free]|2|3|4|8(authors): the width of the matrices that give the action. (The authors
+    ///   keep them at 16 bits.)
+    /// samples=N|all(authors) [4096]: frames that the Fisher information is computed over,
+    ///   approximately.
+    /// batch=N [1] (authors: 8): frames whose gradients are averaged before they are squared.
+    /// signs=[random]|loss(authors): the loss's derivative if the recorded action is the policy's
+    ///   own: a random sign, or the sign of the remaining difference.
+    /// magnitude=[no]|yes(authors): fits of scales weigh by the importance, or by it times
+    ///   sqrt(mean of the row's w^2 + w^2).
     ///
-    /// With one width for all (--bits) there is no bit allocation, and only the last four keys have an effect.
-    /// docs/QUANTIZER.md gives sources and reasons.
+    /// With one width for all (--bits) there is no bit allocation, and only the last four keys have
+    /// an effect. docs/QUANTIZER.md gives sources and reasons.
     ///
     /// Example: --method actquant --actquant authors,head=free
     #[arg(long, value_name = "CHOICES", verbatim_doc_comment)]

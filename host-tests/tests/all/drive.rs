@@ -352,7 +352,7 @@ fn eval_measures_on_the_images_own_path() -> Result<()> {
     }
     ensure!((own[0] - own[1]).abs() < 1e-6 * own[0], "{own:?}");
     let text = succeeded(&fixture.run("eval image.actq --policy policy --driven drive.npz --driven bare.npz", b"")?)?;
-    ensure!(text.contains("on-policy") && text.contains("(280 observations from the image's own"), "{text}");
+    ensure!(text.contains("own path") && text.contains("(280 observations from the image's own"), "{text}");
 
     succeeded(&fixture.run("quantize policy --method gptq --bits 2 --out other.actq", b"")?)?;
     let error = fixture.run("eval other.actq --policy policy --driven drive.npz", b"")?;
@@ -364,7 +364,7 @@ fn eval_measures_on_the_images_own_path() -> Result<()> {
     succeeded(&fixture.run(line, b"")?)?;
     ended_well(&fixture.run("serve again.actq --record again.npz --policy policy", &input)?)?;
     let text = succeeded(&fixture.run(&format!("{line} --calib again.npz"), b"")?)?;
-    ensure!(text.contains("on-policy nmse"), "{text}");
+    ensure!(text.contains("own-path nmse"), "{text}");
     Ok(())
 }
 

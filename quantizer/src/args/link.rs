@@ -49,7 +49,7 @@ pub(crate) struct PortArgs {
     /// A serial port, as /dev/ttyACM0, COM3 or /dev/ttyUSB0@115200 [default rate: 921600 bits per second], or a socket:
     /// tcp:HOST:PORT or unix:PATH
     pub(crate) port: Address,
-    /// Seconds without an answer, or without a lost port, after which the command fails
+    /// Seconds to wait for an answer, and for a lost port to return
     #[arg(long, alias = "patience", value_name = "SECONDS", default_value = "5", value_parser = seconds)]
     pub(crate) timeout: Duration,
 }
@@ -58,7 +58,7 @@ pub(crate) struct PortArgs {
 pub(crate) struct WatchArgs {
     #[command(flatten)]
     pub(crate) port: PortArgs,
-    /// Show them one time and end
+    /// Show one table and end
     #[arg(long)]
     pub(crate) once: bool,
 }

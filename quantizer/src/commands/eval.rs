@@ -35,7 +35,7 @@ pub(crate) fn run(args: &EvalArgs) -> Result<()> {
         return print(&format!("{json}\n"));
     }
     let own = own.map_or(String::new(), |own| {
-        format!("on-policy      {:.3e}   ({} observations from the image's own rollouts)\n", own.nmse, own.steps)
+        format!("own path       {:.3e}   ({} observations from the image's own rollouts)\n", own.nmse, own.steps)
     });
     print(&format!(
         "observations   {}\n\

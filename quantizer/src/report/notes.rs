@@ -60,9 +60,9 @@ pub fn errors(check: &Check) -> String {
     format!("{calib}{heldout}{:<17} {}\n", "activations", activation_share(&check.activations))
 }
 
-/// Formats the on-policy error.
+/// Formats the error on the image's own path.
 pub fn own_path(report: &ErrorReport) -> String {
-    line("on-policy nmse", report, report.steps)
+    line("own-path nmse", report, report.steps)
 }
 
 fn line(name: &str, report: &ErrorReport, recorded: usize) -> String {

@@ -1,8 +1,8 @@
 //! SVG pictures: their shared parts, and a line plot with a vertical axis that is logarithmic or in percent.
 //!
 //! This module writes SVG itself. We tried plotters 0.3.7 with its SVG backend only. Its three dependencies are
-//! acceptable, but its backends take whole pixels. In the strip of [`super::widths`], a row of a layer with 1,024 rows is
-//! 0.6 pixels wide: rows would merge or vanish. Points of a plot would be up to half a pixel off.
+//! acceptable, but its backends take whole pixels. In the strip of [`super::widths`], a row of a layer with 1,024 rows
+//! has a width of 0.6 pixels: rows would merge or vanish. Points of a plot would be up to half a pixel off.
 
 use std::fmt::Write as _;
 

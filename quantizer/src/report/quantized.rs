@@ -69,7 +69,7 @@ pub fn learning(learning: &Learning) -> String {
         Choice::Feedback { .. } => format!("not learned: {choice}\n"),
     };
     if !tried.is_empty() {
-        let mut rows = table(&["setting", "held-out error", "with noise"]);
+        let mut rows = table(&["setting", "cross-validation", "with noise"]);
         for Tried { choice, recorded, widened } in tried {
             rows.add_row([choice.to_string(), format!("{recorded:.2e}"), format!("{widened:.2e}")]);
         }

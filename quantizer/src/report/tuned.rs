@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use super::table;
 
 /// Columns of every table, from left to right.
-const HEADER: [&str; 7] = ["round", "episodes", "frames", "f32 path", "on-policy", "success", "seconds"];
+const HEADER: [&str; 7] = ["round", "episodes", "frames", "f32 path", "own path", "success", "seconds"];
 
 /// Formats a row for each image: the recordings it learned from, its errors, and the outcome of its rollout. Each
 /// tracking error that the command printed has a column.
@@ -35,7 +35,7 @@ pub fn table(tuned: &Tuned) -> String {
         rows.add_row(front.into_iter().chain(errors).chain([format!("{:.1}", round.seconds)]));
     }
     format!(
-        "{rows}\n\nEpisodes and frames: of the recordings learned from. f32 path: NMSE on {}. on-policy: NMSE on the image's own rollout.\n",
+        "{rows}\n\nEpisodes and frames: of the recordings learned from. f32 path: NMSE on {}. own path: NMSE on the image's own rollout.\n",
         tuned.measured_on
     )
 }
