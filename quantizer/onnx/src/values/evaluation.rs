@@ -57,7 +57,7 @@ impl Exprs {
     }
 }
 
-/// `1 / sqrt(mean(x^2) + eps)`
+/// Returns `1 / sqrt(mean(x^2) + eps)`.
 fn inverse_root(x: &[f64], eps: f64) -> f64 {
     let square = x.iter().map(|v| v * v).sum::<f64>() / x.len() as f64;
     1.0 / (square + eps).sqrt()
