@@ -29,25 +29,25 @@ pub(crate) struct InFloat64 {
 /// differ.
 pub(crate) fn verdict(difference: f64, in_float64: impl FnOnce() -> Result<InFloat64>) -> Result<String> {
     if difference <= TOLERANCE {
-        return Ok(format!("against onnxruntime: {} at most", off(difference)));
+        return Ok(format!("against onnxruntime: {} at most", error_text(difference)));
     }
     let InFloat64 { policy, onnxruntime } = match in_float64() {
         Ok(errors) => errors,
         Err(reason) => bail!(
             "the policy and onnxruntime disagree ({}), and the run in float64 failed, which would show which is right: {reason:#}",
-            off(difference)
+            error_text(difference)
         ),
     };
     let errors = format!(
         "against the file in float64 the policy's actions are {}, onnxruntime's are {}",
-        off(policy),
-        off(onnxruntime)
+        error_text(policy),
+        error_text(onnxruntime)
     );
     match (policy <= TOLERANCE, onnxruntime <= TOLERANCE) {
         (true, _) => Ok(format!(
             "against the file in float64: {} at most; onnxruntime's are {}, by its float32 arithmetic",
-            off(policy),
-            off(onnxruntime)
+            error_text(policy),
+            error_text(onnxruntime)
         )),
         (false, true) => bail!("{errors}; this is an error of this program, please report it"),
         (false, false) => bail!(
@@ -57,7 +57,7 @@ pub(crate) fn verdict(difference: f64, in_float64: impl FnOnce() -> Result<InFlo
     }
 }
 
-fn off(error: f64) -> String {
+fn error_text(error: f64) -> String {
     if error.is_finite() { format!("off by {error:.1e} of the largest action") } else { "not finite".to_owned() }
 }
 
@@ -65,7 +65,7 @@ fn off(error: f64) -> String {
 mod tests {
     use super::*;
 
-    fn said(difference: f64, in_float64: Result<[f64; 2], &str>) -> Result<String, String> {
+    fn verdict_text(difference: f64, in_float64: Result<[f64; 2], &str>) -> Result<String, String> {
         let errors = in_float64.map(|[policy, onnxruntime]| InFloat64 { policy, onnxruntime });
         verdict(difference, || errors.map_err(|reason| anyhow::anyhow!("{reason}"))).map_err(|error| error.to_string())
     }
@@ -78,12 +78,12 @@ mod tests {
 
     #[test]
     fn float64_says_which_run_is_right() {
-        let policy = said(4.6e-3, Ok([2e-7, 4.6e-3])).expect("the policy is right");
+        let policy = verdict_text(4.6e-3, Ok([2e-7, 4.6e-3])).expect("the policy is right");
         assert!(policy.starts_with("against the file in float64: off by 2.0e-7 of"), "{policy}");
         assert!(policy.contains("onnxruntime's are off by 4.6e-3 of the largest action, by its float32"), "{policy}");
-        let infinite = said(f64::INFINITY, Ok([2e-7, f64::INFINITY])).expect("the policy is right");
+        let infinite = verdict_text(f64::INFINITY, Ok([2e-7, f64::INFINITY])).expect("the policy is right");
         assert!(infinite.contains("onnxruntime's are not finite"), "{infinite}");
-        let ours = said(3e-2, Ok([3e-2, 1e-7])).expect_err("onnxruntime is right");
+        let ours = verdict_text(3e-2, Ok([3e-2, 1e-7])).expect_err("onnxruntime is right");
         assert!(
             ours.contains("actions are off by 3.0e-2 of the largest action, onnxruntime's are off by 1.0e-7"),
             "{ours}"
@@ -93,7 +93,7 @@ mod tests {
 
     #[test]
     fn disagreement_of_all_runs_blames_none() {
-        for undecided in [said(3e-2, Ok([2e-2, 1e-2])), said(3e-2, Err("No module named 'onnx'"))] {
+        for undecided in [verdict_text(3e-2, Ok([2e-2, 1e-2])), verdict_text(3e-2, Err("No module named 'onnx'"))] {
             let said = undecided.expect_err("undecided");
             assert!(
                 said.contains("no two of the three runs agree") || said.ends_with("right: No module named 'onnx'"),

@@ -29,7 +29,7 @@ enum Runner {
 pub(crate) fn check(model: &Path, imported: &Imported, policy: &Policy, calib: Option<&Dataset>) -> Result<String> {
     let observations = match calib {
         Some(calib) => calib.episode(0).take(FRAMES).collect(),
-        None => drawn(imported),
+        None => random_observations(imported),
     };
     let ours: Vec<f64> = actions(policy, &observations).concat().into_iter().map(f64::from).collect();
     let of_file = |runner| {
@@ -53,7 +53,7 @@ pub(crate) fn check(model: &Path, imported: &Imported, policy: &Policy, calib: O
 }
 
 /// Draws observations for all inputs, rounded if the file takes integers.
-fn drawn(imported: &Imported) -> Vec<Vec<f32>> {
+fn random_observations(imported: &Imported) -> Vec<Vec<f32>> {
     let mut random = Random::new(1);
     let whole = |(name, len): &(String, usize)| vec![imported.integers.contains(name); *len];
     let whole: Vec<bool> = imported.inputs.iter().flat_map(whole).collect();

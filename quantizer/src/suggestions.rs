@@ -8,7 +8,7 @@ use clap::{CommandFactory as _, Error, Parser as _};
 use crate::args::Cli;
 
 /// The most letters of an option that may be missing, wrong, extra, or swapped with their neighbour.
-const MOST_ERRORS: usize = 1;
+const MOST_TYPOS: usize = 1;
 
 /// Parses the command line. On an error, prints it and ends the process.
 pub(crate) fn parse() -> Cli {
@@ -29,7 +29,7 @@ fn suggest(error: &mut Error) {
     error.insert(ContextKind::SuggestedArg, ContextValue::String(format!("--{meant}")));
 }
 
-/// Returns the nearest option of the subcommand, if it differs by at most [`MOST_ERRORS`] letters.
+/// Returns the nearest option of the subcommand, if it differs by at most [`MOST_TYPOS`] letters.
 fn nearest(given: &str) -> Option<String> {
     let mut command = Cli::command();
     for word in env::args().skip(1) {
@@ -37,5 +37,5 @@ fn nearest(given: &str) -> Option<String> {
     }
     let longs = command.get_arguments().filter_map(|arg| arg.get_long());
     let distances = longs.map(|long| (strsim::osa_distance(given, long), long));
-    distances.min().filter(|(distance, _)| *distance <= MOST_ERRORS).map(|(_, long)| long.to_owned())
+    distances.min().filter(|(distance, _)| *distance <= MOST_TYPOS).map(|(_, long)| long.to_owned())
 }

@@ -48,7 +48,7 @@ pub fn write_new(path: &Path, fill: impl FnOnce(&mut File) -> Result<()>) -> Res
         }
         bail!("all names up to {} exist; choose another name", numbered(path, MOST_NUMBERS).display())
     };
-    create().with_context(|| named(path))
+    create().with_context(|| cannot_write(path))
 }
 
 /// Fails, before any work, if [`write_new`] cannot create a file in the folder of `path`.
@@ -59,7 +59,7 @@ pub fn check_new(path: &Path) -> Result<()> {
         path.try_exists()?;
         Ok(Part::new(folder, name).map(drop)?)
     };
-    check().with_context(|| named(path))
+    check().with_context(|| cannot_write(path))
 }
 
 /// Returns `path` for number 1, then `stem-2.ending`, `stem-3.ending` and so on.
@@ -96,7 +96,7 @@ pub fn reserve(outputs: &[&Path], inputs: &[PathBuf]) -> Result<Outputs> {
     let inputs: Vec<(Identity, &PathBuf)> = inputs.iter().filter_map(|path| Some((identity(path)?, path))).collect();
     let mut before: Vec<(Identity, &Path)> = Vec::new();
     for &output in outputs {
-        place(output).with_context(|| named(output))?;
+        place(output).with_context(|| cannot_write(output))?;
         let Some(own) = identity(output) else { continue };
         let name = output.display();
         if let Some((_, input)) = inputs.iter().find(|(input, _)| *input == own) {
@@ -131,7 +131,7 @@ impl Outputs {
     }
 }
 
-fn named(path: &Path) -> String {
+fn cannot_write(path: &Path) -> String {
     format!("{}: cannot write the file", path.display())
 }
 
@@ -194,7 +194,7 @@ fn place(path: &Path) -> Result<Place> {
             let open = place.parent().is_some_and(holds_open_files);
             ensure!(!open, "it is a link to an open file; use the name of the file itself");
             ensure!(!old.permissions().readonly(), "the existing file is read-only; choose another name");
-            Ok(Place::File(place, Some(kept(&old))))
+            Ok(Place::File(place, Some(replaced_permissions(&old))))
         }
         Ok(_) => Ok(Place::Stream(place)),
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(Place::File(place, None)),
@@ -227,7 +227,7 @@ impl Output {
             let (folder, file) = folder_and_name(&place)?;
             Ok(Target::File(Part::new(folder, file)?, place, permissions))
         };
-        Ok(Self { name: name.to_owned(), target: target().with_context(|| named(name))? })
+        Ok(Self { name: name.to_owned(), target: target().with_context(|| cannot_write(name))? })
     }
 
     /// Writes the content to the temporary file, or to the device or pipe.
@@ -242,7 +242,7 @@ impl Output {
                 Ok(part.file().sync_all()?)
             }
         };
-        write().with_context(|| named(&self.name))?;
+        write().with_context(|| cannot_write(&self.name))?;
         Ok(self)
     }
 
@@ -251,7 +251,7 @@ impl Output {
         let _held = hold();
         for Self { name, target } in filled {
             if let Target::File(part, place, _) = target {
-                part.persist(&place).with_context(|| named(&name))?;
+                part.persist(&place).with_context(|| cannot_write(&name))?;
             }
         }
         Ok(())
@@ -259,7 +259,7 @@ impl Output {
 }
 
 /// Returns the permissions of a replaced file, without the set-id and sticky bits.
-fn kept(old: &Metadata) -> Permissions {
+fn replaced_permissions(old: &Metadata) -> Permissions {
     #[cfg(unix)]
     return Permissions::from_mode(old.permissions().mode() & 0o777);
     #[cfg(not(unix))]

@@ -18,17 +18,17 @@ const NAME_CHARS: usize = 48;
 type Remove = fn(&Path) -> io::Result<()>;
 
 /// All temporary files and folders of this process, with the functions that remove them.
-static LISTED: Mutex<BTreeMap<PathBuf, Remove>> = Mutex::new(BTreeMap::new());
+static TEMPORARIES: Mutex<BTreeMap<PathBuf, Remove>> = Mutex::new(BTreeMap::new());
 /// Lock for reading while temporary files are created or moved to their places, for writing while all are removed.
-static USED: RwLock<()> = RwLock::new(());
+static FILES_LOCK: RwLock<()> = RwLock::new(());
 
 fn listed() -> MutexGuard<'static, BTreeMap<PathBuf, Remove>> {
-    LISTED.lock().unwrap_or_else(PoisonError::into_inner)
+    TEMPORARIES.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Blocks [`Discard::begin`] while the value lives. After that, blocks the caller until the process ends.
 pub fn hold() -> RwLockReadGuard<'static, ()> {
-    USED.read().unwrap_or_else(PoisonError::into_inner)
+    FILES_LOCK.read().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Permission to remove all temporary files and folders at the end of the process. While it lives, no file is created
@@ -41,7 +41,7 @@ pub struct Discard {
 impl Discard {
     /// Waits until no file is being created or moved.
     pub fn begin() -> Self {
-        Self { _held: USED.write().unwrap_or_else(PoisonError::into_inner) }
+        Self { _held: FILES_LOCK.write().unwrap_or_else(PoisonError::into_inner) }
     }
 
     /// Removes all temporary files and folders. Returns `true` if there were any.

@@ -19,7 +19,7 @@ const GELU_TANH: [f64; 2] = [0.797_884_560_802_865_4, 0.035_677_408_136_300_125]
 const MOST_CLIP: f64 = 100.0;
 /// Largest distance of a limit from zero at which it is subtracted and added again; beyond it, small values would lose
 /// digits.
-const FAR: f64 = 1.0;
+const FAR_LIMIT: f64 = 1.0;
 
 /// `factor function(scale of)`
 struct Gated {
@@ -341,7 +341,7 @@ impl Exprs {
 
     /// Returns `max(x, low)`.
     pub(crate) fn at_least(&mut self, x: Id, low: f64) -> Id {
-        let limited = if low < -FAR {
+        let limited = if low < -FAR_LIMIT {
             self.beyond(x, -low, 1.0)
         } else {
             let over = self.scaled(x, 1.0, -low);
@@ -354,7 +354,7 @@ impl Exprs {
 
     /// Returns `min(x, high)`.
     pub(crate) fn at_most(&mut self, x: Id, high: f64) -> Id {
-        let limited = if high > FAR {
+        let limited = if high > FAR_LIMIT {
             self.beyond(x, high, -1.0)
         } else {
             let under = self.scaled(x, -1.0, high);
@@ -381,7 +381,7 @@ impl Exprs {
         let mut all = self.elements(x);
         for far in [false, true] {
             let side = |i: usize| -sign * limits[i];
-            let at = (0..limits.len()).filter(|&i| side(i) < f64::from(f32::MAX) && (side(i) > FAR) == far);
+            let at = (0..limits.len()).filter(|&i| side(i) < f64::from(f32::MAX) && (side(i) > FAR_LIMIT) == far);
             let at: Vec<usize> = at.collect();
             let values: Vec<(Id, usize)> = at.iter().filter_map(|&i| value(&all[i])).collect();
             if values.is_empty() {
@@ -430,7 +430,7 @@ impl Exprs {
         {
             return self.clip(inner, low.max(lowest), high.min(highest));
         }
-        if low == 0.0 && high > FAR {
+        if low == 0.0 && high > FAR_LIMIT {
             let (len, positive) = (self.len_of(x), self.function(Function::Relu, x));
             return if high < f64::INFINITY { self.put(Expr::Clip(positive, high), len) } else { positive };
         }
