@@ -1,6 +1,6 @@
 //! Erasing and programming the flash of an STM32F405 (RM0090, section 3.6): the controller's sequences, their
 //! preconditions, and its errors by name. [`Part`] abstracts the registers, so that all of it also runs on the host, on
-//! a [`model`].
+//! a model (the feature `model`).
 //!
 //! The part has one bank. An erase takes up to 2 s, and programming a word up to 0.1 ms. During it any fetch or read
 //! from flash stalls the processor, including its interrupts. So no request starts unless the power stage's register
