@@ -209,13 +209,12 @@ macro_rules! bail {
 /// Returns an [`Error::input`] with a formatted message unless a condition holds.
 #[macro_export]
 macro_rules! ensure {
-    ($condition:expr, $($message:tt)*) => {
-        // Not negated: a comparison with NaN fails.
-        if $condition {
-        } else {
+    ($condition:expr, $($message:tt)*) => {{
+        let holds: bool = $condition;
+        if !holds {
             $crate::bail!($($message)*);
         }
-    };
+    }};
 }
 
 #[cfg(test)]
