@@ -41,7 +41,7 @@ fn gptq_beats_rounding_at_low_bits() -> Result<()> {
     let recordings = Recordings::load(&policy)?;
     let nmse = |method| -> Result<f64> {
         let options = Options::new(method, Budget::Width(Width::W3));
-        let buffer = quantize(&policy, &recordings, &options, |_, _| {})?.buffer();
+        let buffer = quantize(&policy, &recordings, &options, ())?.buffer();
         let image = buffer.image(&dir)?;
         Ok(eval::evaluate(image, &eval::heldout(&dir, &image)?)?.nmse)
     };

@@ -62,7 +62,7 @@ fn options(method: Method, budget: Budget) -> Options {
 }
 
 fn quantize(quantizer: &Quantizer<'_>, budget: Budget) -> actq::error::Result<QuantizedPolicy> {
-    quantizer.quantize(&options(quantizer.method().method(), budget), |_, _| {})
+    quantizer.quantize(&options(quantizer.method().method(), budget), ())
 }
 
 fn too_small(result: actq::error::Result<impl Sized>) -> Result<BudgetTooSmall> {
@@ -176,7 +176,7 @@ fn a_learning_image_keeps_its_bytes() -> Result<()> {
     let quantizer = Quantizer::new(&policy, &recordings, Method::Distill, None, |_| {})?;
     for bytes in [1200, 1600, 2200] {
         let options = Options { steps: Some(5), ..options(Method::Distill, Budget::ImageBytes(bytes)) };
-        let len = quantizer.quantize(&options, |_, _| {})?.image.len();
+        let len = quantizer.quantize(&options, ())?.image.len();
         ensure!(len <= bytes && len as f64 >= 0.97 * bytes as f64, "{len} bytes for a budget of {bytes}");
     }
     Ok(())

@@ -207,7 +207,7 @@ fn steps_match_the_textbook_formulas() -> Result<()> {
         let (outcomes, quantized) = {
             let options =
                 Options { activations: Activations::Int16, ..Options::new(Method::Rtn, Budget::Width(Width::W8)) };
-            let quantized = quantize(&policy, &Recordings::default(), &options, |_, _| {})?;
+            let quantized = quantize(&policy, &Recordings::default(), &options, ())?;
             (quantized.outcomes.len(), quantized.image)
         };
         assert_eq!(outcomes, graph.matrices.len());
@@ -240,7 +240,7 @@ fn quantized(json: Value) -> Result<ImageBuffer> {
     let case = Case::new(json)?;
     let policy = Policy::load(case.dir.path())?;
     let options = Options::new(Method::Rtn, Budget::Width(Width::W3));
-    Ok(ImageBuffer::new(&quantize(&policy, &Recordings::default(), &options, |_, _| {})?.image))
+    Ok(ImageBuffer::new(&quantize(&policy, &Recordings::default(), &options, ())?.image))
 }
 
 fn bits(values: &[f32]) -> Vec<u32> {
@@ -473,7 +473,7 @@ fn the_shared_flow_policy_runs_on_the_target() -> Result<()> {
     let elf = firmware::harness(actq_bench::Target::Fpu)?;
     for (width, limit) in [(Width::W8, 5.1e-4), (Width::W3, 0.33), (Width::W2, 3.0)] {
         let options = Options { group: 32, ..Options::new(Method::Rtn, Budget::Width(width)) };
-        let bytes = quantize(&policy, &Recordings::default(), &options, |_, _| {})?.image;
+        let bytes = quantize(&policy, &Recordings::default(), &options, ())?.image;
         let buffer = ImageBuffer::new(&bytes);
         let report = eval::evaluate(buffer.image(&dir)?, &heldout)?;
         println!("fetch_flow, {} bits: NMSE {:.2e}, {} bytes", width.bits(), report.nmse, report.bytes);

@@ -16,7 +16,7 @@ use anyhow::Result;
 use crate::recorded::TOLERANCE;
 
 fn image(quantizer: &Quantizer<'_>, options: &Options) -> actq::error::Result<Vec<u8>> {
-    Ok(quantizer.quantize(options, |_, _| {})?.image)
+    Ok(quantizer.quantize(options, ())?.image)
 }
 
 fn report(dir: &Path, bytes: &[u8]) -> Result<ErrorReport> {
@@ -83,10 +83,10 @@ fn a_forced_width_reaches_every_row() -> Result<()> {
     let recordings = Recordings::load(&policy)?;
     let quantizer = Quantizer::new(&policy, &recordings, Method::Distill, None, |_| {})?;
     let forced = |name: &str| Options { forced: vec![(name.into(), Width::W4)], ..distill(2.0, 2) };
-    let outcomes = quantizer.quantize(&forced("out.weight"), |_, _| {})?.outcomes;
+    let outcomes = quantizer.quantize(&forced("out.weight"), ())?.outcomes;
     let out = policy.graph.matrices.iter().position(|m| m.name == "out.weight");
     assert!(out.is_some_and(|m| outcomes[m].quantized.widths.iter().all(|w| *w == Some(Width::W4))));
-    assert!(quantizer.quantize(&forced("no.such"), |_, _| {}).is_err());
+    assert!(quantizer.quantize(&forced("no.such"), ()).is_err());
     Ok(())
 }
 

@@ -67,7 +67,7 @@ fn the_ur3_flow_drives_at_few_bits() -> Result<()> {
     let quantizer = Quantizer::new(&policy, &recordings, Method::Distill, None, |_| {})?;
     for (bits, limit_mm) in [(3.0, W3_MM), (2.0, W2_MM)] {
         let options = Options { steps: Some(STEPS), ..Options::new(Method::Distill, Budget::BitsPerWeight(bits)) };
-        let buffer = quantizer.quantize(&options, |_, _| {})?.buffer();
+        let buffer = quantizer.quantize(&options, ())?.buffer();
         let image = buffer.image("flow".as_ref())?;
         let outcomes =
             with_head(image, |head| SEEDS.map(|seed| episode_on_host(head, seed)).collect::<Result<Vec<_>>>())?;

@@ -18,7 +18,7 @@ use anyhow::{Result, ensure};
 fn scratch_is(dir: &Path, words: usize, [op, needed, placed]: [usize; 3]) -> Result<()> {
     let policy = Policy::load(dir)?;
     let options = Options::new(Method::Rtn, Budget::Width(Width::W3));
-    let buffer = ImageBuffer::new(&quantize(&policy, &Recordings::default(), &options, |_, _| {})?.image);
+    let buffer = ImageBuffer::new(&quantize(&policy, &Recordings::default(), &options, ())?.image);
     let image = buffer.image(dir)?;
     let (is, expected) = ((image.scratch_words(), peak(&image)), (words, Peak { op, words: needed, placed }));
     ensure!(is == expected, "{}: found {is:?}, expected {expected:?}", dir.display());

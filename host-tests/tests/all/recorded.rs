@@ -23,7 +23,7 @@ const FIRST_SEED: u64 = 1000;
 fn figures(options: &Options) -> Result<(f64, usize, f64)> {
     let policy = Policy::load(&ur3())?;
     let recordings = Recordings::load(&policy)?;
-    let quantized = pipeline::quantize(&policy, &recordings, options, |_, _| {})?;
+    let quantized = pipeline::quantize(&policy, &recordings, options, ())?;
     let buffer = quantized.buffer();
     let image = buffer.image("image in memory".as_ref())?;
     let nmse = eval::evaluate(image, &eval::heldout(&ur3(), &image)?)?.nmse;

@@ -92,7 +92,7 @@ fn windows_start_from_their_recorded_state() -> Result<()> {
 
     let options =
         Options { group: 32, activations: Activations::Int16, ..Options::new(Method::Rtn, Budget::Width(Width::W8)) };
-    let buffer = ImageBuffer::new(&quantize(&policy, &Recordings::default(), &options, |_, _| {})?.image);
+    let buffer = ImageBuffer::new(&quantize(&policy, &Recordings::default(), &options, ())?.image);
     let nmse = |dataset: &Dataset| Ok::<_, anyhow::Error>(evaluate(buffer.image(Path::new("memory"))?, dataset)?.nmse);
     let (whole, cut, from_zero) = (nmse(&whole)?, nmse(&cut)?, nmse(&from_zero)?);
     assert!(cut < 2.0 * whole && from_zero > 100.0 * cut, "{whole}, {cut}, from zero {from_zero}");

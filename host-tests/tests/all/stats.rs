@@ -81,7 +81,7 @@ fn image_rows_map_to_policy_rows() -> Result<()> {
     let fixture = Fixture::new()?;
     let policy = Policy::load(&fixture.policy())?;
     let options = Options { steps: Some(2), ..Options::new(Method::Distill, Budget::BitsPerWeight(4.0)) };
-    let outcomes = quantize(&policy, &Recordings::load(&policy)?, &options, |_, _| {})?.outcomes;
+    let outcomes = quantize(&policy, &Recordings::load(&policy)?, &options, ())?.outcomes;
     let mut removed = Vec::new();
     for (source, outcome) in policy.graph.matrices.iter().zip(&outcomes) {
         let allocation = outcome.allocation.as_ref().context("an allocation")?;

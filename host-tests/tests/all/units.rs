@@ -139,7 +139,7 @@ fn error_of(graph: Graph, units: &Units, bits: f64, steps: usize) -> Result<f64>
     let policy = Policy::of("units", graph);
     let recordings = Recordings { calib: Some(recorded(1, units, &policy.graph)), heldout: None };
     let options = Options { steps: Some(steps), ..Options::new(Method::Distill, Budget::BitsPerWeight(bits)) };
-    let buffer = quantize(&policy, &recordings, &options, |_, _| {})?.buffer();
+    let buffer = quantize(&policy, &recordings, &options, ())?.buffer();
     Ok(eval::evaluate(buffer.image("image".as_ref())?, &recorded(2, units, &policy.graph))?.nmse)
 }
 

@@ -37,7 +37,7 @@ fn main() -> actq::error::Result<()> {
 
     let recordings = Recordings { calib: Some(recorded.clone()), heldout: None };
     let options = Options { steps: Some(100), ..Options::new(Method::Distill, Budget::BitsPerWeight(3.0)) };
-    let quantized = quantize(&policy, &recordings, &options, |_, _| {})?;
+    let quantized = quantize(&policy, &recordings, &options, ())?;
     let image = quantized.buffer();
     let report = eval::evaluate(image.image(&policy.dir)?, &recorded)?;
     println!("{} bytes, NMSE {:.1e}", quantized.image.len(), report.nmse);

@@ -12,9 +12,11 @@ mod time;
 mod tries;
 pub mod tune;
 mod unused;
+mod watch;
 
 pub use budgets::quantize;
 pub use flash::check_budget;
 pub use quantizer::{QuantizedPolicy, Quantizer};
 pub use tries::{Search, Try};
 pub use unused::{Reason, Unused};
+pub use watch::Watch;

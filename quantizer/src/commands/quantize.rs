@@ -49,7 +49,7 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
     })?;
     note(notes::mixed_units(quantizer.method().mixed_units()));
     progress.begin("choosing codes");
-    let found = quantizer.quantize(&options, |work, share| progress.set(work, share))?;
+    let found = quantizer.quantize(&options, |work: &str, share: f64| progress.set(work, share))?;
     let mut contents = vec![found.image.clone()];
     if args.save_stats.is_some() {
         contents.push(Stats::new(&quantizer, &options, &found)?.json()?.into_bytes());

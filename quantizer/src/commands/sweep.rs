@@ -48,7 +48,7 @@ pub(crate) fn run(args: &SweepArgs) -> Result<()> {
             relative: args.learn.relative,
             seed: args.run.seed,
         };
-        sweeps.push(sweep::run(plan, |work, share| {
+        sweeps.push(sweep::run(plan, |work: &str, share: f64| {
             progress.set(&format!("{}: {work}", policy.name), (p as f64 + share) / policies.len() as f64);
         })?);
     }

@@ -51,7 +51,7 @@ pub(crate) fn run(args: &TuneArgs) -> Result<()> {
             // The command prints during the rollout.
             progress.without_bar(|| drive.run(round, image)).map_err(Error::other)
         },
-        |work, share| progress.set(work, share),
+        |work: &str, share: f64| progress.set(work, share),
     );
     drop(progress);
     let tuned = tuned.with_context(|| match &args.keep {

@@ -75,7 +75,7 @@ fn report(head: &Head) -> Result<String> {
         // Rows of thousands of columns may overflow int32 with 8 bits and scales in groups.
         let group = if width == Width::W8 { 0 } else { 32 };
         let options = Options { group, ..Options::new(Method::Rtn, Budget::Width(width)) };
-        let buffer = ImageBuffer::new(&quantize(&policy, &Recordings::default(), &options, |_, _| {})?.image);
+        let buffer = ImageBuffer::new(&quantize(&policy, &Recordings::default(), &options, ())?.image);
         let image = buffer.image(Path::new("memory"))?;
         let time = StepTime::new(&image, CLOCK);
         let half = 0.5 * CLOCK / TICKS * time.instructions as f64 / time.cycles as f64;

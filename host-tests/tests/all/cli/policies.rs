@@ -322,7 +322,7 @@ fn file_content_cannot_control_the_terminal() -> Result<()> {
     let mut policy = Policy::load(&fixture.policy())?;
     policy.name = "arm\x1b[2J\nmatrix\u{9b}".to_owned();
     let options = Options::new(Method::Rtn, Budget::Width(Width::W4));
-    let refused = pipeline::quantize(&policy, &Recordings::default(), &options, |_, _| {}).map(|_| ());
+    let refused = pipeline::quantize(&policy, &Recordings::default(), &options, ()).map(|_| ());
     ensure!(format!("{:#}", refused.expect_err("a name")).contains("control characters"));
 
     // The names of tensors in a message, and those of matrices in statistics.

@@ -26,7 +26,7 @@ const STEPS: usize = 24;
 const ERROR: f64 = 0.01;
 
 fn image(policy: &Policy, options: &Options) -> Result<Vec<u8>> {
-    Ok(quantize(policy, &Recordings::load(policy)?, options, |_, _| {})?.image)
+    Ok(quantize(policy, &Recordings::load(policy)?, options, ())?.image)
 }
 
 fn distill(bits: f64) -> Options {
@@ -206,7 +206,7 @@ fn a_budget_of_time_is_kept_and_used() -> Result<()> {
     let quantizer = Quantizer::new(&policy, &recordings, Method::Distill, None, |_| {})?;
     let within = |milliseconds| {
         let budget = Budget::Time(TimeLimit { milliseconds, clock_hz: CLOCK });
-        quantizer.quantize(&Options { budget, ..distill(1.0) }, |_, _| {})
+        quantizer.quantize(&Options { budget, ..distill(1.0) }, ())
     };
     for milliseconds in [1.6, 2.4] {
         let found = within(milliseconds)?;

@@ -21,7 +21,7 @@ fn a_step_reads_each_weight_once() -> Result<()> {
     let dir = ur3();
     let policy = Policy::load(&dir)?;
     let options = Options::new(Method::Rtn, Budget::Width(Width::W8));
-    let bytes = quantize(&policy, &Recordings::default(), &options, |_, _| {})?.image;
+    let bytes = quantize(&policy, &Recordings::default(), &options, ())?.image;
     let file = tempfile::NamedTempFile::new()?;
     let path = file.path();
     files::write(path, &bytes)?;

@@ -128,7 +128,7 @@ fn an_lstm_head_keeps_its_instruction_limit() -> Result<()> {
     let Some(policies) = shared_policies() else { return Ok(()) };
     let policy = Policy::load(&policies.join("g1_lstm256"))?;
     let options = Options::new(Method::Rtn, Budget::Width(Width::W3));
-    let bytes = quantize(&policy, &Recordings::default(), &options, |_, _| {})?.image;
+    let bytes = quantize(&policy, &Recordings::default(), &options, ())?.image;
     let file = tempfile::NamedTempFile::new()?;
     files::write(file.path(), &bytes)?;
     let buffer = ImageBuffer::new(&bytes);

@@ -34,7 +34,7 @@ fn octos_head_matches_the_prediction_and_the_host() -> Result<()> {
     for steps in [octo::STEPS, octo::STEPS / 2] {
         let policy = octo::head(TOKEN, steps)?.policy()?;
         let options = Options { group: 32, ..Options::new(Method::Rtn, Budget::Width(Width::W3)) };
-        let bytes = quantize(&policy, &Recordings::default(), &options, |_, _| {})?.image;
+        let bytes = quantize(&policy, &Recordings::default(), &options, ())?.image;
         ensure!(bytes.len() < 750_000, "{} bytes", bytes.len());
         let buffer = ImageBuffer::new(&bytes);
         let image = buffer.image("octo".as_ref())?;
@@ -61,7 +61,7 @@ fn ofts_head_stores_its_matrices_once() -> Result<()> {
     let policy = oft::head(HIDDEN)?.policy()?;
     ensure!(policy.weights == oft::weights(HIDDEN), "{} weights", policy.weights);
     let options = Options::new(Method::Rtn, Budget::Width(Width::W8));
-    let bytes = quantize(&policy, &Recordings::default(), &options, |_, _| {})?.image;
+    let bytes = quantize(&policy, &Recordings::default(), &options, ())?.image;
     let buffer = ImageBuffer::new(&bytes);
     let image = buffer.image("oft".as_ref())?;
     let time = StepTime::new(&image, CLOCK);

@@ -22,7 +22,7 @@ const STEPS: usize = 208;
 
 pub(crate) fn rtn(policy: &Policy, width: Width, group: usize, activations: Activations) -> Result<Vec<u8>> {
     let options = Options { group, activations, ..Options::new(Method::Rtn, Budget::Width(width)) };
-    Ok(quantize(policy, &Recordings::default(), &options, |_, _| {})?.image)
+    Ok(quantize(policy, &Recordings::default(), &options, ())?.image)
 }
 
 #[test]

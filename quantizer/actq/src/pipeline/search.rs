@@ -14,6 +14,7 @@ use actq_kernels::Width;
 
 use super::quantizer::{QuantizedPolicy, Quantizer};
 use super::tries::{Search, Try};
+use super::watch::Watch;
 use crate::budget::Rate;
 use crate::data::{Dataset, Recording, Recordings};
 use crate::error::{Context, Result, bail};
@@ -47,12 +48,12 @@ fn measured<'a>(policy: &Policy, recordings: &'a Recordings) -> Result<Cow<'a, D
 }
 
 /// Makes the image of the smallest budget whose error (NMSE) is at most `limit`; `options.budget` is ignored.
-/// `progress` receives the present work and the share of it that is done.
+/// `watch` receives the present work and the share of it that is done.
 pub(super) fn smallest(
     quantizer: &Quantizer<'_>,
     options: &Options,
     limit: f64,
-    progress: &mut dyn FnMut(&str, f64),
+    watch: &mut impl Watch,
 ) -> Result<QuantizedPolicy> {
     let policy = quantizer.policy;
     let dataset = measured(policy, quantizer.recordings)?;
@@ -64,18 +65,19 @@ pub(super) fn smallest(
         let budget = cell as f64 / PER_BIT as f64;
         let options = Options { steps: Some(steps), ..options.clone() };
         let work = format!("try {}: {budget} bits per weight", tries.len() + 1);
-        let report =
-            match quantizer.at(Rate::BitsPerWeight(budget), &options, &mut |state| progress(&work, state.share())) {
-                Err(error) if error.budget().is_some() => None,
-                Err(error) => return Err(error),
-                Ok(quantized) => {
-                    let report = eval::evaluate(quantized.buffer().image(Path::new("image in memory"))?, &dataset)?;
-                    if report.nmse <= limit && steps == all_steps {
-                        found = Some((quantized, report.nmse, budget));
-                    }
-                    Some(report)
+        let report = match quantizer
+            .at(Rate::BitsPerWeight(budget), &options, &mut |state| watch.progress(&work, state.share()))
+        {
+            Err(error) if error.budget().is_some() => None,
+            Err(error) => return Err(error),
+            Ok(quantized) => {
+                let report = eval::evaluate(quantized.buffer().image(Path::new("image in memory"))?, &dataset)?;
+                if report.nmse <= limit && steps == all_steps {
+                    found = Some((quantized, report.nmse, budget));
                 }
-            };
+                Some(report)
+            }
+        };
         let error = report.as_ref().map_or(f64::INFINITY, |r| r.nmse);
         tries.push(Try { budget, steps, report });
         Ok(error)

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::quantizer::{QuantizedPolicy, Quantizer};
 use super::stats::HsicScore;
+use super::watch::Watch;
 use crate::budget::Budget;
 use crate::data::{Dataset, Recording, Recordings};
 use crate::error::{Context as _, Result};
@@ -87,9 +88,9 @@ pub struct SweepPlan<'a> {
     pub seed: u64,
 }
 
-/// Quantizes the policy by every method for every budget, and runs each image over the held-out recording. `progress`
+/// Quantizes the policy by every method for every budget, and runs each image over the held-out recording. `watch`
 /// receives the present work and the share of the whole that is done.
-pub fn run(plan: SweepPlan<'_>, mut progress: impl FnMut(&str, f64)) -> Result<Sweep> {
+pub fn run(plan: SweepPlan<'_>, mut watch: impl Watch) -> Result<Sweep> {
     let SweepPlan { policy, mut recordings, methods, budgets, steps, minutes, relative, seed } = plan;
     recordings.fill_actions(&policy.graph);
     let heldout = recordings.heldout.as_ref().with_context(|| Recording::Heldout.missing("a sweep"))?;
@@ -98,14 +99,15 @@ pub fn run(plan: SweepPlan<'_>, mut progress: impl FnMut(&str, f64)) -> Result<S
         // Calibration counts as much as one budget.
         let done = |steps: f64| (m as f64 + steps / (1 + budgets.len()) as f64) / methods.len() as f64;
         let work = format!("{method}, calibrating");
-        let quantizer = Quantizer::new(policy, &recordings, method, minutes, |share| progress(&work, done(share)))?;
+        let quantizer =
+            Quantizer::new(policy, &recordings, method, minutes, |share| watch.progress(&work, done(share)))?;
         let mut points = Vec::new();
         for (b, &budget) in budgets.iter().enumerate() {
             let work = format!("{method}, {budget} bits per weight");
             let plain = Options::new(method, Budget::BitsPerWeight(budget));
             let relative = relative && method == Method::Distill;
             let options = Options { group: method.default_group(), steps, minutes, relative, seed, ..plain };
-            let share = |_: &str, share| progress(&work, done(1.0 + b as f64 + share));
+            let share = |_: &str, share: f64| watch.progress(&work, done(1.0 + b as f64 + share));
             points.push(match quantizer.quantize(&options, share) {
                 Ok(quantized) => Some(point(heldout, budget, &quantized)?),
                 Err(error) if error.budget().is_some() => None,
@@ -188,7 +190,7 @@ mod tests {
                 relative: false,
                 seed: 1,
             };
-            let points = run(plan, |_, _| {}).expect("a sweep").curves.remove(0).points;
+            let points = run(plan, ()).expect("a sweep").curves.remove(0).points;
             points.into_iter().map(|point| point.map(|point| point.report.nmse)).collect::<Vec<_>>()
         };
         let measured = nmse(with_actions);

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::driven::{DriveOutcome, Driven};
 use super::quantizer::{QuantizedPolicy, Quantizer};
+use super::watch::Watch;
 use crate::data::{Dataset, Learned, Recording, Recordings, Share};
 use crate::error::{Context as _, Result, ensure};
 use crate::measure::eval;
@@ -78,7 +79,7 @@ impl Tuned {
 }
 
 /// Learns from the f32 policy's recordings, then `rounds` times from those and all rollouts before. `drive` receives
-/// each image with its number from 0, and returns its rollout. `progress` receives the present work and the share of it
+/// each image with its number from 0, and returns its rollout. `watch` receives the present work and the share of it
 /// that is done.
 ///
 /// # Errors
@@ -88,7 +89,7 @@ impl Tuned {
 pub fn run(
     plan: TunePlan<'_>,
     mut drive: impl FnMut(usize, &[u8]) -> Result<Driven>,
-    mut progress: impl FnMut(&str, f64),
+    mut watch: impl Watch,
 ) -> Result<Tuned> {
     let TunePlan { policy, calib: mut parts, heldout, options, rounds } = plan;
     ensure!(!parts.is_empty(), "{}", Recording::Calib.missing("actq tune"));
@@ -102,8 +103,9 @@ pub fn run(
         let round = rows.len();
         let started = Instant::now();
         let Learned { dataset, shares } = Learned::join(&mut parts, &policy.graph)?;
-        let quantized =
-            learn(policy, dataset, options, |work, share| progress(&format!("round {round}: {work}"), share))?;
+        let quantized = learn(policy, dataset, options, |work: &str, share| {
+            watch.progress(&format!("round {round}: {work}"), share)
+        })?;
         let buffer = quantized.buffer();
         let image = buffer.image(Path::new("the new image"))?;
         let report = eval::evaluate(image, &f32_path)?;
@@ -130,16 +132,12 @@ pub fn run(
     }
 }
 
-fn learn(
-    policy: &Policy,
-    calib: Dataset,
-    options: &Options,
-    mut progress: impl FnMut(&str, f64),
-) -> Result<QuantizedPolicy> {
+fn learn(policy: &Policy, calib: Dataset, options: &Options, mut watch: impl Watch) -> Result<QuantizedPolicy> {
     let recordings = Recordings { calib: Some(calib), heldout: None };
-    let quantizer =
-        Quantizer::new(policy, &recordings, options.method, options.minutes, |share| progress("calibrating", share))?;
-    quantizer.quantize(options, |work, share| progress(work, share))
+    let quantizer = Quantizer::new(policy, &recordings, options.method, options.minutes, |share| {
+        watch.progress("calibrating", share)
+    })?;
+    quantizer.quantize(options, watch)
 }
 
 #[cfg(test)]
@@ -187,7 +185,7 @@ mod tests {
                 images.push(image.to_vec());
                 Ok(Driven { recordings: vec![elsewhere(round)], outcome: said(successes[round]) })
             },
-            |_, _| {},
+            (),
         )
         .expect("tuned");
         let learned: Vec<_> = tuned.rounds.iter().map(|r| (r.round, r.recordings, r.episodes, r.frames)).collect();
@@ -201,10 +199,10 @@ mod tests {
             ensure!(round == 0, "the robot fell over");
             Ok(Driven { recordings: vec![elsewhere(0)], outcome: DriveOutcome::default() })
         };
-        let error = run(plan(), broken, |_, _| {}).expect_err("it fell");
+        let error = run(plan(), broken, ()).expect_err("it fell");
         assert_eq!(format!("{error:#}"), "round 1: the robot fell over");
         let nothing = TunePlan { calib: Vec::new(), ..plan() };
-        let error = run(nothing, broken, |_, _| {}).expect_err("nothing to learn from").to_string();
+        let error = run(nothing, broken, ()).expect_err("nothing to learn from").to_string();
         assert!(error.starts_with("actq tune needs recorded observations: put calib.npz"), "{error}");
     }
 }

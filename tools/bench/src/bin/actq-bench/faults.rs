@@ -29,7 +29,7 @@ const MAX_ATTEMPTS: usize = 12;
 pub(crate) fn all() -> Result<()> {
     let policy = Policy::load(&ur3())?;
     let options = Options { steps: Some(0), ..Options::new(Method::Distill, Budget::BitsPerWeight(3.0)) };
-    let new = ImageBuffer::new(&quantize(&policy, &Recordings::load(&policy)?, &options, |_, _| {})?.image);
+    let new = ImageBuffer::new(&quantize(&policy, &Recordings::load(&policy)?, &options, ())?.image);
     let old = firmware::built_in()?;
     let buffer = ImageBuffer::read(old)?;
     run(Target::Fpu, old, &Disturbance::all(new.bytes()), &[buffer.image(old)?, new.image(Path::new("the new image"))?])

@@ -80,7 +80,7 @@ pub(crate) fn policies() -> Vec<PathBuf> {
 
 /// Quantizes to an image file, and returns its bytes.
 pub(crate) fn write_image(quantizer: &Quantizer<'_>, options: &Options, path: &Path) -> Result<Vec<u8>> {
-    let bytes = quantizer.quantize(options, |_, _| {})?.image;
+    let bytes = quantizer.quantize(options, ())?.image;
     files::write(path, &bytes)?;
     Ok(bytes)
 }
