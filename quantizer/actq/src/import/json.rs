@@ -56,7 +56,7 @@ const KEYS: [&str; 12] = [
 /// Keys about a policy's origin. Their values are not read.
 const ABOUT: [&str; 8] = ["source", "commit", "source_path", "license", "recurrent", "n_params", "inputs", "states"];
 
-/// One op; [`op_keys`] lists its permitted keys.
+/// One op; `op_keys` lists its permitted keys.
 #[derive(Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct JsonOp {

@@ -60,7 +60,7 @@ impl ActionStatistics {
         if scores.iter().all(|s| *s == 0.0) { (vec![1.0; scores.len()], true) } else { (scores, false) }
     }
 
-    /// Returns the importance of every weight in the fits of scales, per matrix: its importance plus [`FLOOR`], and if
+    /// Returns the importance of every weight in the fits of scales, per matrix: its importance plus `FLOOR`, and if
     /// so chosen, [`by_magnitude`].
     pub fn weight_importance(&self, graph: &Graph) -> Vec<Vec<f64>> {
         let matrices = graph.matrices.iter().zip(&self.importance);

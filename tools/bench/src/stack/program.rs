@@ -11,9 +11,9 @@ use object::{FileFlags, Object as _, ObjectSection as _, ObjectSymbol as _, Sect
 /// The section of the vector table, whose addresses the processor calls.
 const VECTORS: &str = ".vector_table";
 
-/// The built-in image (`firmware-demo/src/bin/controller/start.rs`): it holds no addresses, and a hundred thousand
-/// bytes that may look like some.
-const IMAGE: &str = "controller::start::BUILT_IN";
+/// Constants that hold no addresses, but numbers that may look like some: the built-in image
+/// (`firmware-demo/src/bin/controller/start.rs`) and the tables of the cost model.
+const NUMBERS: [&str; 2] = ["controller::start::BUILT_IN", "actq_kernels::pace::"];
 
 /// A function.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -36,7 +36,7 @@ pub(super) struct Program {
     /// Begins of code (true) and of data within it: the mapping symbols of Arm's ELF (IHI 0044, section 5.5.5).
     pub(super) marks: BTreeMap<u32, bool>,
     /// Address ranges without pointers.
-    pub(super) weights: Range<u32>,
+    pub(super) numbers: Vec<Range<u32>>,
     /// Symbols of the linker script.
     pub(super) symbols: BTreeMap<String, u32>,
     /// The vector table: the stack's begin, then the addresses of the handlers, with the Thumb bit.
@@ -71,8 +71,8 @@ impl Program {
                 }
             } else if let Some(is_code @ ("t" | "d")) = name.strip_prefix('$').and_then(|name| name.get(..1)) {
                 program.marks.insert(address, is_code == "t");
-            } else if demangled.starts_with(IMAGE) {
-                program.weights = address..address.saturating_add(size);
+            } else if NUMBERS.iter().any(|name| demangled.starts_with(name)) {
+                program.numbers.push(address..address.saturating_add(size));
             } else {
                 program.symbols.insert(name.to_owned(), address);
             }
@@ -127,7 +127,7 @@ impl Program {
             let skip = (start.next_multiple_of(4) - start) as usize;
             let words = bytes.get(skip..).unwrap_or_default().chunks_exact(4).map(word);
             for (address, value) in (start.next_multiple_of(4)..).step_by(4).zip(words) {
-                if !self.is_code(address) && !self.weights.contains(&address) {
+                if !self.is_code(address) && !self.numbers.iter().any(|range| range.contains(&address)) {
                     note(value);
                 }
             }
