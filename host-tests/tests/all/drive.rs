@@ -326,7 +326,7 @@ fn quantize_learns_from_a_folder_of_recordings() -> Result<()> {
     assert_eq!(lines[1], ["policy/calib.npz", "6", "300", "300"]);
     assert_eq!(lines[2], ["drives/a.npz", "1", "40", "40"]);
     assert_eq!(lines[3], ["drives/b.npz", "2", "60", "60"]);
-    assert_eq!(lines[4], ["in", "all", "9", "400", "400"]);
+    assert_eq!(lines[4], ["sum", "9", "400", "400"]);
     ensure!(fs::read(fixture.path("x.actq"))? != fs::read(fixture.path("image.actq"))?, "the image did not change");
     succeeded(&fixture.run("sweep policy --methods gptq --bpw 6 --calib policy/calib.npz --calib drives", b"")?)?;
     // The message names a malformed file.

@@ -206,7 +206,7 @@ fn choices_of_actquant_reach_the_image() -> Result<()> {
     for (options, status, words) in [
         ("--method gptq --actquant authors", 1, "--actquant has no effect on gptq"),
         ("--actquant authors", 1, "no effect on distill"),
-        ("--method actquant --actquant heads=8", 2, "heads is no key; the keys are bandwidth, frames"),
+        ("--method actquant --actquant heads=8", 2, "heads is not a key; the keys are bandwidth, frames"),
         ("--method actquant --actquant head=5", 2, "head takes 2, 3, 4 or 8, or free"),
     ] {
         failed(&quantize(options)?, status, &[words])?;
@@ -295,7 +295,7 @@ fn quantize_reports_both_errors_and_faults_of_recordings() -> Result<()> {
     write_recording(&policy.join("heldout.npz"), &moving, None, [STEPS as i64, 7, STEPS as i64])?;
     let warnings = notes(&quantize()?)?;
     ensure!(warnings.len() == 2, "{warnings:?}");
-    ensure!(warnings[0].starts_with("note: observation dimensions 4-5 never change in calib.npy: "), "{warnings:?}");
+    ensure!(warnings[0].starts_with("note: observation dimensions 4-5 never change in calib.npy, "), "{warnings:?}");
     let outside = "note: 100.0% of the observations in heldout.npz leave the range of calib.npy by more than 10% of it, in \
                    dimensions 5 (100.0%)";
     ensure!(warnings[1].starts_with(outside), "{warnings:?}");
