@@ -177,7 +177,7 @@ fn pointers_reach_every_function_with_a_taken_address() -> Result<()> {
     let word = |function: u32| (at(function) | 1).to_le_bytes().to_vec();
     by_constant.memory.push((0x8000, [word(1), word(2)].concat()));
     assert_eq!(path(&by_constant)?.0, 8 + 32);
-    by_constant.numbers = vec![0x8004..0x8008];
+    by_constant.numbers.push(0x8004..0x8008);
     assert_eq!(path(&by_constant)?.0, 8 + 16);
     // movw r3, #0x1301; movt r3, #0; bx r3.
     let by_code = program(&[&[0xf241, 0x3301, 0xf2c0, 0x0300, BX_R3], &leaf(16), &leaf(32), &leaf(64)]);
