@@ -22,7 +22,7 @@ const PICTURE: &str = "compare.svg";
 const READING: &str = "\
 Cells: error on the held-out recording (NMSE, mean over the outputs) · closed-loop success in percent of the episodes (95% interval, \
 Wilson). Every cell of a policy is driven over the same seeds. A column is a budget in bits per weight, scales, steps and padding \
-counted; what each image really takes stands in the second table. `-`: not made, or not driven, and below why.";
+counted; the second table lists the actual size of each image. `-`: not made, or not driven; the reason is below.";
 
 const STARRED: &str = "\
 `*`: the method's default group does not fit the budget; of those that do, the one with the lowest held-out error was taken, which is \

@@ -1,4 +1,4 @@
-//! What tests and measuring commands share: building firmware and running it under QEMU, counted instructions and
+//! Code shared by tests and measuring commands: building firmware and running it under QEMU, counted instructions and
 //! modelled cycles, the maximum stack of the application, golden kernel cases, random networks, the command `actq`,
 //! closed loops.
 #![forbid(unsafe_code)]

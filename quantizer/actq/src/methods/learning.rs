@@ -25,7 +25,7 @@ impl fmt::Display for Choice {
     }
 }
 
-/// How a network's codes were chosen.
+/// Result of choosing a network's codes.
 #[derive(Clone, Debug)]
 pub struct Learning {
     /// Steps of learning; 0 if nothing was learned.

@@ -1,23 +1,25 @@
-//! Columns that weigh alike: what matrices read of the observation is scaled so that no column's weights and no
-//! column's values stand out.
+//! Balances columns: scales the observation values that matrices read, so that no column's weights or values dominate.
 //!
-//! Observations come in units of people's choice. A row has one scale, so an error of its weights has the same size in
-//! every column: a column whose weights are small is rounded to nothing or to much more than it was, and one whose
-//! values are large multiplies what it was rounded by. Activations have one scale a vector, with the same consequence
-//! the other way round. With a factor `d_c` on what column `c` reads and its reciprocal on its weights, the network
-//! computes what it did, and the expected error of the matrices behind is proportional to
+//! Users choose the units of observations. A row has one scale, so rounding errors of its weights have the same size in
+//! every column. In a column of small weights, a weight is rounded to zero or to much more than its value. In a column
+//! of large values, the values multiply the rounding error. Activations have one scale a vector, with the same
+//! consequence if weights and values change places. Multiply the values that column `c` reads by a factor `d_c`, and
+//! its weights by the reciprocal. The network then computes the same function. The expected error of the matrices that
+//! follow is proportional to
 //!
-//! `sum_c a_c / d_c^2 * sum_c h_c d_c^2` with `a_c = sum_r g_r w_rc^2`,
+//! `sum_c a_c / d_c^2 * sum_c h_c d_c^2` with `a_c = sum_r g_r w_rc^2`.
 //!
-//! `h` and `g` the importance of columns and rows, each column in a unit of its own (`columns.rs`). It is least,
-//! `(sum_c sqrt(a_c h_c))^2` by Cauchy and Schwarz, for `d_c = (a_c / h_c)^(1/4)`, which is also what SmoothQuant (arXiv
-//! 2211.10438, eq. 4) does to activations' and weights' maxima with alpha 1/2. The values' means go into the biases.
+//! `h` and `g` are the importance of columns and rows, and each column has its own unit (`columns.rs`). The error is
+//! least, `(sum_c sqrt(a_c h_c))^2` by Cauchy and Schwarz, for `d_c = (a_c / h_c)^(1/4)`. SmoothQuant (arXiv
+//! 2211.10438, eq. 4) with alpha 1/2 uses the same formula for the maxima of activations and weights. Biases absorb the
+//! values' means.
 //!
-//! Where nothing but matrices reads a normalization without a limit, factors and means go into its own and cost
-//! nothing; elsewhere they are an operation [`Balance`], whose bytes count. It scales the columns that need it
-//! (`part.rs`), and is added where it saves more bits: an error that falls to a share `s` is worth `log2(1 / s) / 2` bits
-//! for each weight of the matrices behind. Matrices that read the observation beside a hidden vector read it through the
-//! same operation (`sites.rs`); the others are named ([`mixed_units`]) where units are far apart.
+//! If only matrices read a normalization without an output limit, its own constants absorb factors and means at no
+//! cost. Otherwise an operation [`Balance`] holds them, and its bytes count. It scales the columns that need it
+//! (`part.rs`). It is added if it saves more bits than it costs: an error reduced to a share `s` saves
+//! `log2(1 / s) / 2` bits for each weight of the matrices that follow. Matrices that read the observation beside a
+//! hidden vector read it through the same operation (`sites.rs`). [`mixed_units`] reports the other matrices if their
+//! units are far apart.
 
 mod columns;
 mod mixed;
@@ -36,28 +38,28 @@ pub use mixed::{MixedUnits, mixed_units};
 use part::Part;
 use sites::{Reading, Site, sites};
 
-/// What an operation more has to save, in bits a weight of the whole policy: 1.4% of the error.
-const WORTH: f64 = 0.01;
-/// Beyond so many bits a weight of the matrices alone, units would ruin what they compute, however small their share of
-/// the policy is.
-const RUINOUS: f64 = 1.0;
-/// A weight has no more bits to save.
-const MOST_BITS: f64 = 8.0;
+/// Minimum saving of an added operation, in bits per weight of the whole policy: 1.4% of the error.
+const MIN_SAVED_BITS: f64 = 0.01;
+/// Minimum loss at which units ruin the result of the matrices that read them, in bits per weight of these matrices. It
+/// applies however small their share of the policy is.
+const RUINOUS_BITS: f64 = 1.0;
+/// Maximum saving, in bits per weight: a weight has no more bits to save.
+const MAX_SAVED_BITS: f64 = 8.0;
 
-/// The network with balanced columns; `moments` of the matrices' inputs become those of its inputs. `outputs` is the
-/// importance of the matrices' rows.
+/// Balances the columns of a network. Changes `moments`, those of the matrices' inputs, to those of the balanced
+/// network. `outputs` is the importance of the matrices' rows.
 ///
 /// # Errors
 ///
-/// None for a network that its builder has accepted.
+/// Returns no error for a network that its builder accepted.
 pub fn balance(graph: &Graph, moments: &mut [Moments], outputs: &[Vec<f64>]) -> Result<Graph> {
     let mut balanced = graph.clone();
-    // From the last on: what is inserted moves only what stands behind it.
+    // In reverse order: an inserted node moves only the nodes that follow it.
     for site in sites(graph).into_iter().rev() {
         let columns = Columns::of(graph, &site, moments, outputs);
-        let own = own_normalize(graph, &site);
-        let part = if own { Part::whole(&columns) } else { part(graph, &site, &columns, moments) };
-        if !own && !pays(graph, &site, &columns, &part, moments) {
+        let can_fold = can_fold(graph, &site);
+        let part = if can_fold { Part::whole(&columns) } else { choose_part(graph, &site, &columns, moments) };
+        if !can_fold && !is_worthwhile(graph, &site, &columns, &part, moments) {
             continue;
         }
         let Some(factors) = part.factors(&columns) else { continue };
@@ -68,7 +70,7 @@ pub fn balance(graph: &Graph, moments: &mut [Moments], outputs: &[Vec<f64>]) -> 
             add_to_bias(&mut balanced, m, &shift);
             moments[m].balance(&mean, &factors);
         }
-        if own {
+        if can_fold {
             if let NodeKind::Normalize(normalize) = &mut balanced.nodes[site.value - 1].kind {
                 fold(normalize, &mean, &factors);
             }
@@ -81,64 +83,65 @@ pub fn balance(graph: &Graph, moments: &mut [Moments], outputs: &[Vec<f64>]) -> 
     Ok(balanced)
 }
 
-/// Bytes of what [`balance`] has added to a network.
+/// Counts the constant bytes of the operations that [`balance`] added to a network.
 pub fn balance_bytes(graph: &Graph) -> usize {
     let bytes = |kind: &NodeKind| if let NodeKind::Balance(balance) = kind { balance.constant_bytes() } else { 0 };
     graph.nodes.iter().map(|node| bytes(&node.kind)).sum()
 }
 
-/// What an operation is to scale: the part that saves most, or all columns where only that keeps the policy whole.
-fn part(graph: &Graph, site: &Site, columns: &Columns, moments: &[Moments]) -> Part {
-    let part = Part::best(columns, weights_behind(graph, site), graph.weights());
-    let keeps_whole = |factors: Vec<f64>| {
-        part.takes(&factors) && !site.readings.iter().any(|r| is_apart(graph, r, moments, &factors))
+/// Chooses the columns that an operation scales: the part that saves most, or all columns if that part would not keep
+/// the policy usable.
+fn choose_part(graph: &Graph, site: &Site, columns: &Columns, moments: &[Moments]) -> Part {
+    let part = Part::cheapest(columns, count_reading_weights(graph, site), graph.weights());
+    let keeps_usable = |factors: Vec<f64>| {
+        part.holds(&factors) && !site.readings.iter().any(|r| is_ruined(graph, r, moments, &factors))
     };
-    let usable = !columns.are_far() && part.factors(columns).is_some_and(keeps_whole);
-    if usable { part } else { Part::whole(columns) }
+    let is_usable = !columns.are_far() && part.factors(columns).is_some_and(keeps_usable);
+    if is_usable { part } else { Part::whole(columns) }
 }
 
-/// Whether an operation is worth its bytes, or nothing but it keeps the policy whole. Where units do not ruin the
-/// policy, one on all columns has to be worth them: a few columns always gain a little.
-fn pays(graph: &Graph, site: &Site, columns: &Columns, part: &Part, moments: &[Moments]) -> bool {
+/// `true` if an operation saves more than its bytes cost, or if only the operation keeps the policy usable. If units do
+/// not ruin the policy, an operation on all columns has to save enough: a few columns always gain a little.
+fn is_worthwhile(graph: &Graph, site: &Site, columns: &Columns, part: &Part, moments: &[Moments]) -> bool {
     let saved = |part: &Part| saved_bits(graph, site, columns, part);
-    let as_they_are = vec![1.0; columns.mean.len()];
-    saved(&Part::whole(columns)) >= WORTH * graph.weights() as f64
-        || (columns.saved_bits() >= RUINOUS && saved(part) >= 0.0)
+    let unit_factors = vec![1.0; columns.mean.len()];
+    saved(&Part::whole(columns)) >= MIN_SAVED_BITS * graph.weights() as f64
+        || (columns.saved_bits() >= RUINOUS_BITS && saved(part) >= 0.0)
         || columns.are_far()
-        || site.readings.iter().any(|reading| is_apart(graph, reading, moments, &as_they_are))
+        || site.readings.iter().any(|reading| is_ruined(graph, reading, moments, &unit_factors))
 }
 
-/// Bits that an operation saves, those of its own bytes taken off.
+/// Computes the bits that an operation saves, minus the bits of its own bytes.
 fn saved_bits(graph: &Graph, site: &Site, columns: &Columns, part: &Part) -> f64 {
-    let bits = columns.saved_bits().min(MOST_BITS) - part.lost_bits;
-    weights_behind(graph, site) as f64 * bits - 8.0 * part.bytes() as f64
+    let bits = columns.saved_bits().min(MAX_SAVED_BITS) - part.lost_bits;
+    count_reading_weights(graph, site) as f64 * bits - 8.0 * part.bytes() as f64
 }
 
-/// Weights that read the value.
-fn weights_behind(graph: &Graph, site: &Site) -> usize {
+/// Counts the weights that read the value.
+fn count_reading_weights(graph: &Graph, site: &Site) -> usize {
     site.readings.iter().map(|reading| graph.matrices[reading.matrix].rows * reading.columns().count()).sum()
 }
 
-/// Whether a matrix that also reads another value would be ruined by the unit that all elements of this one share, once
-/// they have these factors.
-fn is_apart(graph: &Graph, reading: &Reading, moments: &[Moments], factors: &[f64]) -> bool {
+/// `true` if the unit that all elements of this value share ruins a matrix that also reads another value, after these
+/// factors are applied.
+fn is_ruined(graph: &Graph, reading: &Reading, moments: &[Moments], factors: &[f64]) -> bool {
     let squares: Vec<f64> = reading.spread(factors, 1.0).into_iter().map(|d| d * d).collect();
     let deviations = deviations(&moments[reading.matrix]);
     let values: Vec<f64> = deviations.into_iter().zip(&squares).map(|(d, square)| d * d * square).collect();
     let energies = graph.matrices[reading.matrix].column_energies();
     let energies: Vec<f64> = energies.into_iter().zip(&squares).map(|(energy, square)| energy / square).collect();
-    reading.is_partial() && lost_bits(&energies, &values) >= RUINOUS
+    reading.is_partial() && lost_bits(&energies, &values) >= RUINOUS_BITS
 }
 
-/// Whether the value is that of a normalization without a limit behind it that nothing else reads.
-fn own_normalize(graph: &Graph, site: &Site) -> bool {
+/// `true` if the value is the output of a normalization without an output limit, and only the site's readers read it.
+fn can_fold(graph: &Graph, site: &Site) -> bool {
     let node = site.value.checked_sub(1).map(|n| &graph.nodes[n].kind);
     matches!(node, Some(NodeKind::Normalize(normalize)) if normalize.clip == f32::INFINITY)
         && site.value != graph.output()
         && graph.readers(site.value) == site.readers
 }
 
-/// Divides a matrix's columns by the factors, and gives what it makes of the mean.
+/// Divides a matrix's columns by the factors, and returns the product of the original matrix and the mean.
 fn scale(graph: &mut Graph, matrix: usize, mean: &[f64], factors: &[f64]) -> Vec<f32> {
     let matrix = &mut graph.matrices[matrix];
     let rows = matrix.data.chunks_exact_mut(matrix.cols);
@@ -150,11 +153,11 @@ fn scale(graph: &mut Graph, matrix: usize, mean: &[f64], factors: &[f64]) -> Vec
     .collect()
 }
 
-/// `((x - mean) * scale - m) * d` as one.
+/// Folds `((x - mean) * scale - m) * d` into one normalization.
 fn fold(normalize: &mut Normalize, mean: &[f64], factors: &[f64]) {
     let Normalize { mean: own, scale, .. } = normalize;
     for ((own, scale), (m, d)) in own.iter_mut().zip(scale).zip(mean.iter().zip(factors)) {
-        // Of a scale of 0 the mean is 0, too.
+        // If the scale is 0, `m` is 0, too.
         if *scale != 0.0 {
             *own = (f64::from(*own) + m / f64::from(*scale)) as f32;
         }
@@ -163,7 +166,7 @@ fn fold(normalize: &mut Normalize, mean: &[f64], factors: &[f64]) {
 }
 
 impl Moments {
-    /// Of `(x - mean) * factors`.
+    /// Changes these moments to those of `(x - mean) * factors`.
     fn balance(&mut self, mean: &[f64], factors: &[f64]) {
         let centred = self.centred();
         self.mean.iter_mut().zip(mean).zip(factors).for_each(|((own, mean), d)| *own = (*own - mean) * d);
@@ -183,11 +186,11 @@ mod tests {
     use crate::random::Random;
 
     const COLS: usize = 6;
-    /// So many that a balance takes a small share of the weights' bytes.
+    /// Enough rows that a balance takes a small share of the weights' bytes.
     const ROWS: usize = 800;
 
-    /// A linear layer behind what `before` builds, over observations that `COLS` different powers of three scale, and
-    /// weights that powers of two do.
+    /// Builds a linear layer after the nodes that `before` builds. `COLS` different powers of three scale the
+    /// observations, and powers of two scale the weights.
     fn linear(before: impl FnOnce(&mut Graph) -> ValueId) -> Graph {
         let mut graph = Graph::new(COLS);
         let value = before(&mut graph);
@@ -199,7 +202,7 @@ mod tests {
         graph
     }
 
-    /// Observations about a mean of 2; the last but one never moves, the last follows the first.
+    /// Generates observations about a mean of 2; the last value but one never moves, and the last equals the first.
     fn observations(count: usize) -> Vec<Vec<f32>> {
         let mut random = Random::new(4);
         let mut one = || {
@@ -214,7 +217,7 @@ mod tests {
         Evaluator::new(graph).step(observation, see)
     }
 
-    /// Moments of every matrix's input.
+    /// Measures the moments of every matrix's input.
     fn moments(graph: &Graph, observations: &[Vec<f32>]) -> Vec<Moments> {
         let zero =
             |m: &WeightMatrix| Moments { second: DMatrix::zeros(m.cols, m.cols), mean: vec![0.0; m.cols], count: 0 };
@@ -238,21 +241,21 @@ mod tests {
         (a - b).abs() <= share * (1.0 + a.abs().max(b.abs()))
     }
 
-    /// The balanced network and what its matrices read, which computes what `graph` does.
+    /// Balances a network, and checks that its outputs are those of `graph` and its moments those of its inputs.
     fn balanced(graph: &Graph) -> (Graph, Vec<Moments>) {
         let observations = observations(400);
-        let mut told = moments(graph, &observations);
+        let mut predicted = moments(graph, &observations);
         let outputs: Vec<Vec<f64>> = graph.matrices.iter().map(|m| vec![1.0; m.rows]).collect();
-        let balanced = balance(graph, &mut told, &outputs).expect("balanced");
+        let balanced = balance(graph, &mut predicted, &outputs).expect("balanced");
         for observation in &observations[..20] {
             let (a, b) = (run(graph, observation, &mut |_, _| {}), run(&balanced, observation, &mut |_, _| {}));
             assert!(a.iter().zip(&b).all(|(a, b)| close((*a).into(), (*b).into(), 1e-4)), "{a:?} {b:?}");
         }
-        for (told, seen) in told.iter().zip(moments(&balanced, &observations)) {
-            assert!(told.mean.iter().zip(&seen.mean).all(|(a, b)| close(*a, *b, 1e-4)));
-            assert!(told.second.iter().zip(&seen.second).all(|(a, b)| close(*a, *b, 1e-3)));
+        for (predicted, seen) in predicted.iter().zip(moments(&balanced, &observations)) {
+            assert!(predicted.mean.iter().zip(&seen.mean).all(|(a, b)| close(*a, *b, 1e-4)));
+            assert!(predicted.second.iter().zip(&seen.second).all(|(a, b)| close(*a, *b, 1e-3)));
         }
-        (balanced, told)
+        (balanced, predicted)
     }
 
     fn added(graph: &Graph) -> usize {
@@ -264,12 +267,12 @@ mod tests {
     }
 
     #[test]
-    fn columns_weigh_what_their_values_do() {
+    fn balanced_columns_weigh_as_their_values() {
         let graph = linear(|_| 0);
         let (balanced, moments) = balanced(&graph);
         assert_eq!((added(&balanced), balance_bytes(&balanced)), (1, 4 * (2 * COLS + 2)));
         let of = |graph: &Graph, moments: &[Moments]| Columns::of(graph, &sites(graph)[0], moments, &[vec![1.0; ROWS]]);
-        // Squares of weights and of deviations are in one proportion wherever values move by themselves.
+        // Squares of weights and of deviations are in one proportion for values that move independently.
         let columns = of(&balanced, &moments);
         let share = |c: usize| columns.weights[c].sqrt() / columns.deviation[c];
         for c in 2..4 {
@@ -278,7 +281,7 @@ mod tests {
         let before = of(&graph, &self::moments(&graph, &observations(400)));
         assert!(before.saved_bits() > 0.3, "{}", before.saved_bits());
         assert!(columns.saved_bits() < 0.2 * before.saved_bits(), "{}", columns.saved_bits());
-        // What did not move reads 0, and its factor is no other than theirs.
+        // A value that did not move reads 0, and its factor is within the range of the others.
         let NodeKind::Balance(balance) = &balanced.nodes[0].kind else { panic!("not before the matrix") };
         let Normalize { mean, scale, .. } = balance.normalize();
         assert_eq!((mean[4], columns.deviation[4]), (7.0, 0.0));
@@ -287,14 +290,14 @@ mod tests {
     }
 
     #[test]
-    fn a_normalization_of_the_policys_own_takes_the_factors() {
+    fn own_unlimited_normalization_absorbs_the_factors() {
         let own = |clip| linear(|graph| graph.add(unit(clip), &[0]).expect("it fits"));
         let (free, _) = balanced(&own(f32::INFINITY));
         assert_eq!((added(&free), free.nodes.len()), (0, 2));
         assert!(
             matches!(&free.nodes[0].kind, NodeKind::Normalize(n) if n.scale.iter().any(|s| *s != 1.0) && n.pre_clip == 9.0)
         );
-        // One with a limit, or that others read, stays as it is.
+        // A normalization with a limit, or with other readers, is unchanged.
         let (limited, _) = balanced(&own(5.0));
         assert_eq!((added(&limited), limited.nodes[2].inputs[0]), (1, 2));
         let shared = linear(|graph| {
@@ -307,12 +310,12 @@ mod tests {
     }
 
     #[test]
-    fn what_gains_nothing_or_cannot_be_stays() {
-        // Once balanced, nothing is left to win.
+    fn balanced_or_unbalanceable_columns_are_unchanged() {
+        // A balanced network gains nothing from balancing it again.
         let (once, _) = balanced(&linear(|_| 0));
         let (twice, _) = balanced(&once);
         assert_eq!(added(&twice), 1);
-        // A matrix that also reads something else has one set of columns.
+        // A matrix has one set of columns, and this one also reads another value.
         let mut shared = linear(|_| 0);
         let part =
             shared.add(Concat(vec![Span { from: 0, len: 4 }, Span { from: 0, len: 2 }]), &[1, 0]).expect("it fits");
@@ -335,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn a_small_matrix_is_balanced_where_units_would_ruin_it() {
+    fn small_matrix_is_balanced_if_units_ruin_it() {
         const FEW: usize = 16;
         let small = |factor: f32| {
             let mut graph = linear(|_| 0);
@@ -354,7 +357,7 @@ mod tests {
         assert_eq!([small(1.0), small(1e4)], [0, 1]);
     }
 
-    /// [observation, tanh of its product] -> sum of products, and what else reads both.
+    /// Builds [observation, tanh of its product] -> product, and the nodes that `others` adds.
     fn beside_a_hidden_vector(others: impl FnOnce(&mut Graph, ValueId)) -> Graph {
         let mut graph = linear(|_| 0);
         let hidden = graph.add(Pointwise(Function::Tanh), &[1]).expect("it fits");
@@ -369,17 +372,17 @@ mod tests {
     }
 
     #[test]
-    fn one_operation_balances_all_that_reads_the_observation() {
+    fn one_operation_balances_all_readers_of_the_observation() {
         let (all, _) = balanced(&beside_a_hidden_vector(|_, _| ()));
         assert_eq!((added(&all), &all.nodes[1].inputs[..], &all.nodes[3].inputs[..]), (1, &[1][..], &[1, 3][..]));
-        // What others read stays as it is.
+        // A value that other nodes read is unchanged.
         let read = |graph: &mut Graph, both| _ = graph.add(Add, &[both, both]).expect("it fits");
         let (part, _) = balanced(&beside_a_hidden_vector(read));
         assert_eq!((added(&part), &part.nodes[1].inputs[..], &part.nodes[3].inputs[..]), (1, &[1][..], &[0, 3][..]));
     }
 
     #[test]
-    fn a_matrix_that_cannot_be_balanced_is_named() {
+    fn unbalanceable_matrix_is_reported() {
         let shared = |factor: f32| {
             let mut graph = linear(|_| 0);
             set_column(&mut graph, 0, |w| *w *= factor);
@@ -395,7 +398,7 @@ mod tests {
         assert!(matrix == "w" && observations.contains(&0) && *bits > 3.0, "{observations:?} {bits}");
     }
 
-    /// A linear layer of `rows` that undoes the units of the observation, whose mean is 2 unless `mean` is 0.
+    /// Builds a linear layer of `rows` that undoes the units of the observation. `mean` is in these units.
     fn small(rows: usize, units: [f32; COLS], mean: f32) -> (Graph, Vec<Moments>) {
         let mut random = Random::new(6);
         let mut graph = Graph::new(COLS);
@@ -408,7 +411,7 @@ mod tests {
         (graph, moments)
     }
 
-    /// The factors of an operation in a layer of `rows`, and the bytes of its constants.
+    /// Returns the factors of an operation in a layer of `rows`, and the bytes of its constants.
     fn scaled(rows: usize, units: [f32; COLS], mean: f32) -> Option<(Vec<f32>, usize)> {
         let (graph, mut moments) = small(rows, units, mean);
         let balanced = balance(&graph, &mut moments, &[vec![1.0; rows]]).expect("balanced");
@@ -419,18 +422,18 @@ mod tests {
     #[test]
     fn only_columns_in_other_units_are_scaled() {
         for (unit, rows) in [(1e3, 500), (1e-5, 500), (1e3, 1000)] {
-            let (scale, bytes) = scaled(rows, [1.0, 1.0, unit, 1.0, 1.0, 1.0], 0.0).expect("one unit is another");
+            let (scale, bytes) = scaled(rows, [1.0, 1.0, unit, 1.0, 1.0, 1.0], 0.0).expect("one unit differs");
             assert_eq!((scale[1], scale[3], bytes), (1.0, 1.0, Balance::bytes(1)), "{unit}");
             assert!((scale[2] * unit - 1.0).abs() < 0.2, "{unit}: {scale:?}");
         }
-        // As few as there are: of two units the one that fewer columns have.
-        let (scale, bytes) = scaled(500, [1e4, 1.0, 1e4, 1e4, 1e4, 1e4], 0.0).expect("one unit is another");
+        // Of two units, only the one that fewer columns have is scaled.
+        let (scale, bytes) = scaled(500, [1e4, 1.0, 1e4, 1e4, 1e4, 1e4], 0.0).expect("one unit differs");
         assert!((scale[1] / 1e4 - 1.0).abs() < 0.2 && scale[0] == 1.0 && bytes == Balance::bytes(1), "{scale:?}");
         assert_eq!(scaled(500, [1e4; COLS], 0.0), None);
     }
 
     #[test]
-    fn means_are_stored_where_their_bytes_are_few_or_they_matter() {
+    fn means_are_stored_if_cheap_or_important() {
         let units = [1.0, 1e3, 1e6, 1e-3, 1e2, 1e-5];
         let bytes = |rows, mean| scaled(rows, units, mean).map(|(_, bytes)| bytes);
         assert_eq!(bytes(50, 0.0), Some(Balance::bytes_without_means(COLS)));
@@ -439,7 +442,7 @@ mod tests {
     }
 
     #[test]
-    fn the_gates_of_a_cell_read_balanced_columns() {
+    fn lstm_gates_read_balanced_columns() {
         let mut graph = linear(|_| 0);
         let mut random = Random::new(5);
         let data = (0..ROWS * ROWS / 4).map(|_| 0.1 * random.normal()).collect();

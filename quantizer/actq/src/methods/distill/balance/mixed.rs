@@ -6,21 +6,22 @@ use crate::graph::operation::Operand;
 use crate::graph::ops::{Concat, Span};
 use crate::graph::{Graph, NodeKind, ValueId};
 
-/// Bits that units take from each weight where they are worth a warning.
+/// Minimum loss from units that is worth a warning, in bits per weight.
 const FAR_APART: f64 = 3.0;
 
 /// A matrix that reads observations in units far apart.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MixedUnits {
-    /// The matrix.
+    /// Name of the matrix.
     pub matrix: String,
-    /// The observations in the largest and in the smallest unit.
+    /// Indices of the observations in the largest and in the smallest unit.
     pub observations: [usize; 2],
-    /// Bits that this takes from each weight.
+    /// Loss from the units, in bits per weight.
     pub bits: f64,
 }
 
-/// The matrices of a balanced network that read observations in units far apart; `moments` are those of their inputs.
+/// Lists the matrices of a balanced network that read observations in units far apart; `moments` are those of their
+/// inputs.
 pub fn mixed_units(graph: &Graph, moments: &[Moments]) -> Vec<MixedUnits> {
     let of_node = |n: usize| {
         let (node, products) = (&graph.nodes[n], graph.nodes[n].kind.products().into_iter());
@@ -35,7 +36,7 @@ pub fn mixed_units(graph: &Graph, moments: &[Moments]) -> Vec<MixedUnits> {
     mixed
 }
 
-/// The observation that each element of a value is; `None` for what is computed.
+/// Returns the observation that each element of a value is; `None` for a computed element.
 fn observations(graph: &Graph, value: ValueId) -> Vec<Option<usize>> {
     let Some(node) = value.checked_sub(1).map(|n| &graph.nodes[n]) else {
         return (0..graph.obs_len).map(Some).collect();
@@ -45,7 +46,7 @@ fn observations(graph: &Graph, value: ValueId) -> Vec<Option<usize>> {
     node.inputs.iter().zip(spans).map(part).collect::<Vec<_>>().concat()
 }
 
-/// The observations whose units in a matrix are furthest apart, if that is far.
+/// Finds the observations whose units in a matrix are furthest apart, if the loss is worth a warning.
 fn furthest(graph: &Graph, m: usize, observations: &[Option<usize>], moments: &Moments) -> Option<MixedUnits> {
     let matrix = &graph.matrices[m];
     let energies = matrix.column_energies();

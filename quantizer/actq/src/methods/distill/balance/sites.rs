@@ -1,49 +1,49 @@
-//! Values that depend on the observation through no matrix, and the columns of matrices that read them.
+//! Values that are computed from the observation without a matrix, and the columns of matrices that read them.
 
 use crate::graph::operation::Operand;
 use crate::graph::ops::{Concat, Span};
 use crate::graph::{Graph, NodeKind, ValueId};
 
-/// A value of the observation, and the columns that read it.
+/// A value computed from the observation without a matrix, and the columns that read it.
 #[derive(Clone, Debug)]
 pub(super) struct Site {
-    /// The value.
+    /// Identifier of the value.
     pub(super) value: ValueId,
-    /// The policy normalizes all of it.
-    pub(super) normalized: bool,
-    /// The nodes that read the value through nothing but these columns.
+    /// `true` if the policy normalizes all of it.
+    pub(super) is_normalized: bool,
+    /// Nodes that read the value only through these columns.
     pub(super) readers: Vec<usize>,
-    /// Each matrix once.
+    /// Readings of the value, one for each matrix.
     pub(super) readings: Vec<Reading>,
 }
 
-/// How a matrix reads a value.
+/// Columns of a matrix, with the elements of a value that they read.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Reading {
-    /// The matrix.
+    /// Index of the matrix.
     pub(super) matrix: usize,
-    /// The element of the value that each column reads; `None` for a column that reads another value.
+    /// Element of the value that each column reads; `None` for a column that reads another value.
     pub(super) elements: Vec<Option<usize>>,
 }
 
 impl Reading {
-    /// The columns that read the value, each with its element.
+    /// Iterates over the columns that read the value, each with its element.
     pub(super) fn columns(&self) -> impl Iterator<Item = (usize, usize)> {
         self.elements.iter().enumerate().filter_map(|(column, element)| Some((column, (*element)?)))
     }
 
-    /// Whether the matrix also reads another value.
+    /// `true` if the matrix also reads another value.
     pub(super) fn is_partial(&self) -> bool {
         self.elements.contains(&None)
     }
 
-    /// What belongs to each column: of `values`, the one of its element; `other` for a column without.
+    /// Spreads `values`, one for each element, over the columns; a column without an element gets `other`.
     pub(super) fn spread(&self, values: &[f64], other: f64) -> Vec<f64> {
         self.elements.iter().map(|element| element.map_or(other, |element| values[element])).collect()
     }
 }
 
-/// The sites of a network, in the order of their values.
+/// Lists the sites of a network, in the order of their values.
 pub(super) fn sites(graph: &Graph) -> Vec<Site> {
     let (mut observed, mut normalized) = (vec![true], vec![false]);
     for node in &graph.nodes {
@@ -52,23 +52,23 @@ pub(super) fn sites(graph: &Graph) -> Vec<Site> {
         normalized.push(all(&normalized) || matches!(node.kind, NodeKind::Normalize(_) | NodeKind::Balance(_)));
     }
     let site = |value: ValueId| {
-        let (readers, mut readings) = alone(graph, readers(graph, &observed, value));
+        let (readers, mut readings) = keep_consistent(graph, readers(graph, &observed, value));
         readings.sort_unstable();
         readings.dedup();
-        (!readings.is_empty()).then_some(Site { value, normalized: normalized[value], readers, readings })
+        (!readings.is_empty()).then_some(Site { value, is_normalized: normalized[value], readers, readings })
     };
     (0..observed.len()).filter(|&value| observed[value]).filter_map(site).collect()
 }
 
-/// The nodes that read a value through columns of matrices alone.
+/// Finds the nodes that read a value only through columns of matrices.
 fn readers(graph: &Graph, observed: &[bool], value: ValueId) -> Vec<(usize, Vec<Reading>)> {
     let whole: Vec<Option<usize>> = (0..graph.len_of(value)).map(Some).collect();
     let of = |n: usize| readings(graph, observed, n, value, &whole).map(|readings| (n, readings));
     graph.readers(value).into_iter().filter_map(of).filter(|(_, readings)| !readings.is_empty()).collect()
 }
 
-/// How node `n` reads a value of these elements; `None` if it reads it otherwise than through matrices. A value that
-/// is joined with others of the observation alone has a site of its own.
+/// Finds the readings of a value of these elements by node `n`; `None` if the node reads it other than through
+/// matrices. A value that is joined only with other values of the observation has its own site.
 fn readings(
     graph: &Graph,
     observed: &[bool],
@@ -95,20 +95,20 @@ fn readings(
     graph.readers(joined).into_iter().map(of).collect::<Option<Vec<_>>>().map(|all| all.concat())
 }
 
-/// Those readers whose matrices are read in one way everywhere: a matrix has one set of columns.
-fn alone(graph: &Graph, mut readers: Vec<(usize, Vec<Reading>)>) -> (Vec<usize>, Vec<Reading>) {
+/// Keeps the readers whose matrices have the same reading in all products: a matrix has one set of columns.
+fn keep_consistent(graph: &Graph, mut readers: Vec<(usize, Vec<Reading>)>) -> (Vec<usize>, Vec<Reading>) {
     loop {
         let all: Vec<Reading> = readers.iter().flat_map(|(_, readings)| readings.clone()).collect();
-        let alike = |reading: &Reading| all.iter().filter(|other| *other == reading).count();
-        let before = readers.len();
-        readers.retain(|(_, readings)| readings.iter().all(|r| uses(graph, r.matrix) == alike(r)));
-        if readers.len() == before {
+        let count_equal = |reading: &Reading| all.iter().filter(|other| *other == reading).count();
+        let count_before = readers.len();
+        readers.retain(|(_, readings)| readings.iter().all(|r| count_products(graph, r.matrix) == count_equal(r)));
+        if readers.len() == count_before {
             return (readers.into_iter().map(|(n, _)| n).collect(), all);
         }
     }
 }
 
-/// How many products use a matrix.
-fn uses(graph: &Graph, matrix: usize) -> usize {
+/// Counts the products that use a matrix.
+fn count_products(graph: &Graph, matrix: usize) -> usize {
     graph.nodes.iter().flat_map(|node| node.kind.products()).filter(|product| product.matrix == matrix).count()
 }
