@@ -2,12 +2,13 @@
 
 use actq::data::{Recording, Sizes};
 use actq_bench::shared_policies;
-use actq_onnx::Choice;
+use actq_onnx::{Choice, Onnx};
 use anyhow::{Context as _, Result, ensure};
 use proptest::prelude::*;
 
 use super::file::{File, Value, encoded, tensor};
 use super::{by_tract, compare, drawn, imported, same};
+use actq::import::Importer as _;
 use actq::measure::actions::actions;
 use actq::policy::Policy;
 use actq_onnx::import;
@@ -357,7 +358,7 @@ fn unbatched_products_and_external_data_are_imported() -> Result<()> {
     std::fs::write(dir.path().join("model.data"), bytes)?;
     let path = dir.path().join("model.onnx");
     std::fs::write(&path, file.bytes())?;
-    let policy = Policy::load(&path)?;
+    let policy = Onnx.load(&path)?;
     let obs: Vec<f32> = (0..OBS).map(|i| i as f32).collect();
     let expected = (0..3).map(|k| (0..OBS).map(|i| obs[i] * data[3 * i + k]).sum()).collect();
     compare(&[expected], &actions(&policy, &[obs]))
@@ -376,7 +377,7 @@ fn published_files_are_imported() -> Result<()> {
         let bytes = std::fs::read(&path)?;
         let file = import(&path, &Choice::default())?;
         assert_eq!(file.ops.join(" "), expected);
-        let policy = Policy::load(&path)?;
+        let policy = Onnx.load(&path)?;
         // Uses the recording if there is one: beyond its path, sums of random values lose more digits than the
         // tolerance allows.
         let observations = match name {
@@ -392,7 +393,7 @@ fn published_files_are_imported() -> Result<()> {
     }
     // The same network, imported by another tool.
     let [ours, theirs] = [folder.join("brax_go1/model.onnx"), policies.join("go1_mlp")]
-        .map(|path| Policy::load(&path))
+        .map(|path| if path.is_dir() { Policy::load(&path) } else { Onnx.load(&path) })
         .map(Result::unwrap);
     assert_eq!(ours.graph.matrices.len(), theirs.graph.matrices.len());
     for (a, b) in ours.graph.matrices.iter().zip(&theirs.graph.matrices) {
