@@ -25,7 +25,7 @@ pub(super) fn observe_until_fresh(client: &mut Client) {
     panic!("no observation gets through");
 }
 
-/// Arms over a line that may lose so many frames that the observations become too old.
+/// Arms over a line whose lost frames may make observations too old.
 pub(super) fn arm(client: &mut Client) {
     for _ in 0..1000 {
         observe_until_fresh(client);
