@@ -19,7 +19,7 @@ fn run(bytes: &[u8]) {
         return;
     }
     let observation = vec![0.5; image.obs_len()];
-    let outcome = with_head(image, |head| {
+    let outcome = with_head::<_, actq::error::Error>(image, |head| {
         // Both may refuse: a value may leave f32's range.
         let _ = head.self_test();
         let whole = head.step(&observation).map(<[f32]>::to_vec);
