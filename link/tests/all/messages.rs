@@ -124,8 +124,10 @@ proptest! {
         let len = sender.frame(&message, 0, &mut buffer).map(<[u8]>::len);
         prop_assert!(len.is_some_and(|len| len <= room));
         let mut small = vec![0; len.unwrap_or(0) - 1];
+        // The same frame again: with another number, its checksum and so its length may differ.
+        let mut sender = Sender::default();
         prop_assert_eq!(sender.frame(&message, 0, &mut small), None);
-        prop_assert_eq!(sender.next(), 1, "a frame that does not fit uses no number");
+        prop_assert_eq!(sender.next(), 0, "a frame that does not fit uses no number");
     }
 }
 
