@@ -7,7 +7,7 @@ use embedded_storage::nor_flash::NorFlash;
 
 /// Flash whose power fails, of as many sectors as a test asks for.
 pub(super) trait Fails: NorFlash + Clone {
-    /// As it comes from the factory, or from another use: full of anything.
+    /// Creates a flash with arbitrary content, as after another use.
     fn new(sectors: usize, seed: u64) -> Self;
 
     /// Its bytes.
@@ -16,7 +16,7 @@ pub(super) trait Fails: NorFlash + Clone {
     /// Changes so far.
     fn done(&self) -> usize;
 
-    /// Power comes back, and fails in the course of the change behind so many, if it does.
+    /// Restores the power; it fails again during the change after `fails_at` changes, if given.
     fn restart(&mut self, fails_at: Option<usize>);
 }
 

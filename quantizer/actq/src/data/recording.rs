@@ -82,7 +82,7 @@ pub fn files_of(named: &[PathBuf]) -> Result<Vec<PathBuf>> {
             continue;
         }
         let read = || fs::read_dir(path)?.map(|entry| Ok(entry?.path())).collect::<Result<Vec<PathBuf>>>();
-        let mut found = read().with_context(|| format!("{}: cannot read the file", path.display()))?;
+        let mut found = read().with_context(|| format!("{}: cannot read the folder", path.display()))?;
         let is_recording = |ending: &str| ENDINGS.contains(&ending);
         found.retain(|f| f.is_file() && f.extension().and_then(|e| e.to_str()).is_some_and(is_recording));
         ensure!(!found.is_empty(), "{}: the folder holds no recording (.npz, .npy or .safetensors)", path.display());

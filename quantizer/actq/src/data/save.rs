@@ -1,6 +1,6 @@
 //! Writes recordings and other arrays as files in numpy's format .npz.
 
-use std::io::{self, Cursor, Seek, Write};
+use std::io::{self, BufWriter, Cursor, Seek, Write};
 
 use zip::CompressionMethod;
 use zip::write::{SimpleFileOptions, ZipWriter};
@@ -56,9 +56,11 @@ impl<W: Write + Seek> NpzWriter<W> {
         shape: &[usize],
         values: impl IntoIterator<Item = T>,
     ) -> Result<()> {
-        let member = self.begin(name)?;
+        // The archive sums every write by itself: not element by element.
+        let mut member = BufWriter::new(self.begin(name)?);
         member.write_all(&npy_header(T::DESCR, shape))?;
-        Ok(values.into_iter().try_for_each(|value| value.write(member))?)
+        values.into_iter().try_for_each(|value| value.write(&mut member))?;
+        Ok(member.flush()?)
     }
 
     /// Begins an array; the caller writes its header and elements.

@@ -168,8 +168,12 @@ fn differences(out_len: usize, dataset: &Dataset, network: &mut impl Runner) -> 
 
 /// Reads the held-out recording of a policy folder that must belong to `image`.
 pub fn heldout(policy_dir: &Path, image: &Image<'_>) -> Result<Dataset> {
-    let source = Policy::load(policy_dir).ok().filter(|policy| policy.digest == image.digest());
-    heldout_from(Some(policy_dir), None, source.as_ref(), image)
+    let mut dataset = Recording::Heldout.require(Some(policy_dir), None, Sizes::of_image(image), "actq eval")?;
+    if dataset.action.is_none() {
+        let source = Policy::load(policy_dir).ok().filter(|policy| policy.digest == image.digest());
+        fill_actions(&mut dataset, source.as_ref())?;
+    }
+    Ok(dataset)
 }
 
 /// Reads the held-out recording in `file`, or without it in the policy's folder. If it holds no actions, `source` gives
