@@ -16,6 +16,7 @@ mod save;
 mod tests;
 mod thinning;
 
+pub use arrays::arrays;
 pub use dataset::{Dataset, Sizes};
 pub use joined::{Learned, MOST_FRAMES, Share, joined, longest_piece};
 pub use npy::npy_header;

@@ -11,8 +11,10 @@ mod lower;
 mod network;
 mod nodes;
 mod patterns;
+mod signature;
 mod states;
 mod values;
 
 pub use file::proto;
 pub use network::{Choice, Imported, Onnx, import, import_bytes};
+pub use signature::Signature;

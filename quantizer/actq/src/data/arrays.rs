@@ -55,6 +55,35 @@ pub(super) fn one(path: &Path, name: &str) -> Result<Option<Tensor>> {
     }
 }
 
+/// Reads all arrays of an .npz file, or the one of an .npy file under the name of the file, whatever their names.
+///
+/// # Errors
+///
+/// If the file cannot be read, is damaged, or has another extension. The error names the file and the array.
+pub fn arrays(path: &Path) -> Result<BTreeMap<String, Tensor>> {
+    let open = || File::open(path).context("cannot read the file");
+    let read = || match path.extension().and_then(|e| e.to_str()) {
+        Some("npz") => {
+            let mut archive = Archive::open(open()?)?;
+            let names: Vec<String> = archive.names().map(str::to_owned).collect();
+            let mut read = |name: String| {
+                let array = archive.read(&name).with_context(|| format!("cannot read array {name:?}"))?;
+                Ok(array.map(|array| (name, array)))
+            };
+            names.into_iter().filter_map(|name| read(name).transpose()).collect()
+        }
+        Some("npy") => {
+            let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+            let file = open()?;
+            let bytes = file.metadata().context("cannot read the file")?.len();
+            let array = npy::read(&mut BufReader::new(file), bytes).context("not an .npy array, or a truncated one")?;
+            Ok(BTreeMap::from([(stem, array)]))
+        }
+        _ => bail!("unknown format of arrays; use .npz or .npy"),
+    };
+    read().with_context(|| path.display().to_string())
+}
+
 /// Returns the values of an array as f32; values beyond f32 become infinite.
 pub(super) fn floats(array: &Tensor, name: &str) -> Result<Vec<f32>> {
     let of_recordings = matches!(array.values, Values::F32(_) | Values::F64(_));

@@ -114,6 +114,12 @@ impl<'a> Network<'a> {
         Pass { values, saved, steps, denoised: Some(at.x) }
     }
 
+    /// Runs one step for one observation, whose noise follows it; returns the network's output.
+    pub fn forward_one(&self, weights: &Weights, obs: &[f32], state: &mut State) -> Vec<f32> {
+        let obs = Array2::from_shape_fn((1, obs.len()), |(_, i)| obs[i]);
+        self.forward(weights, obs, state).into_output().into_iter().collect()
+    }
+
     /// Runs nodes, outside of denoising steps or within one.
     fn run(
         &self,

@@ -43,6 +43,16 @@ impl Values {
         })
     }
 
+    /// Returns the values as f64; `None` if their type is not one of numbers.
+    pub fn to_f64(&self) -> Option<Vec<f64>> {
+        Some(match self {
+            Self::F64(values) => values.clone(),
+            Self::I32(values) => values.iter().map(|&v| v.into()).collect(),
+            Self::I64(values) => values.iter().map(|&v| v as f64).collect(),
+            _ => self.to_f32()?.into_iter().map(f64::from).collect(),
+        })
+    }
+
     /// Describes value `i`, which is not a finite f32.
     pub fn not_f32(&self, i: usize) -> String {
         match self {

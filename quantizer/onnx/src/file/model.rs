@@ -1,6 +1,6 @@
 //! A parser of untrusted ONNX files: declared sizes are checked against the bytes of the file.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fs::{self, File};
 use std::io::{Read as _, Seek as _, SeekFrom};
 use std::path::{Component, Path, PathBuf};
@@ -18,6 +18,9 @@ use crate::values::tensor::{Data, Tensor, count};
 const MOST_ENTRIES: usize = 1 << 16;
 /// The most bytes of a file, which is protobuf's limit.
 const MOST_BYTES: u64 = 1 << 31;
+
+/// The most bytes of the file's metadata: names and gains take a few thousand.
+const MOST_METADATA: usize = 1 << 20;
 
 /// The first operator set whose arithmetic broadcasts as numpy does.
 const LEAST_OPSET: i64 = 7;
@@ -70,8 +73,27 @@ pub(crate) struct Model {
     pub(crate) functions: HashMap<[String; 3], Function>,
     /// Name and version of the exporter, and the opset, human-readable.
     pub(crate) producer: String,
+    /// Texts that the exporter stored beside the graph, by key.
+    pub(crate) metadata: BTreeMap<String, String>,
     /// Folder of external tensors.
     folder: PathBuf,
+}
+
+/// Reads the texts of a file; refuses keys that occur twice and texts of more than [`MOST_METADATA`] bytes.
+fn metadata(entries: &[Bytes]) -> Result<BTreeMap<String, String>> {
+    let mut texts = BTreeMap::new();
+    let mut bytes = 0;
+    for entry in all::<proto::Entry>(entries, "the metadata")? {
+        let (key, value) = (entry.key.unwrap_or_default(), entry.value.unwrap_or_default());
+        bytes += key.len() + value.len();
+        ensure!(
+            bytes <= MOST_METADATA,
+            "the file has more than {MOST_METADATA} bytes of metadata; remove metadata_props"
+        );
+        let before = texts.insert(key.clone(), value);
+        ensure!(before.is_none(), "the metadata has the key {:?} twice; remove one", printable(&key));
+    }
+    Ok(texts)
 }
 
 fn decode<M: Message + Default>(bytes: &Bytes, what: &str) -> Result<M> {
@@ -126,6 +148,7 @@ impl Model {
             graph: Graph::parse(graph)?,
             functions: functions.collect::<Result<_>>()?,
             producer,
+            metadata: metadata(&model.metadata_props)?,
             folder: folder.to_owned(),
         })
     }

@@ -22,6 +22,9 @@ pub struct Model {
     /// Encoded messages of type [`OperatorSet`].
     #[prost(bytes = "bytes", repeated, tag = "8")]
     pub opset_import: Vec<Bytes>,
+    /// Encoded messages of type [`Entry`].
+    #[prost(bytes = "bytes", repeated, tag = "14")]
+    pub metadata_props: Vec<Bytes>,
     /// Encoded messages of type [`Function`].
     #[prost(bytes = "bytes", repeated, tag = "25")]
     pub functions: Vec<Bytes>,

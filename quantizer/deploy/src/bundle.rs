@@ -1,0 +1,135 @@
+//! The files of a bundle.
+
+use std::fs;
+use std::path::{Component, Path, PathBuf};
+
+use actq::data::arrays;
+use actq::error::{Context as _, Result, bail, ensure};
+
+use crate::description::Network;
+use crate::network::OnnxNetwork;
+use crate::sources::{Array, Compute, Sources};
+
+/// The most bytes of a text file.
+const MOST_TEXT: u64 = 4 << 20;
+/// The most files and folders of a bundle.
+const MOST_FILES: usize = 10_000;
+
+/// A folder with a policy's files, or one file.
+#[derive(Clone, Debug)]
+pub struct Bundle {
+    root: PathBuf,
+    /// Paths from the root, in alphabetical order.
+    files: Vec<String>,
+}
+
+impl Bundle {
+    /// Lists a folder's files, without following links out of it; or takes one file.
+    ///
+    /// # Errors
+    ///
+    /// If it is missing, cannot be read, or has more than 10,000 entries.
+    pub fn open(path: &Path) -> Result<Self> {
+        let shown = || path.display().to_string();
+        let is_file = fs::metadata(path).with_context(shown)?.is_file();
+        if is_file {
+            let name = path.file_name().and_then(|name| name.to_str());
+            let name = name.with_context(|| format!("{}: the name is not UTF-8", shown()))?.to_owned();
+            return Ok(Self { root: path.parent().unwrap_or(Path::new("")).to_owned(), files: vec![name] });
+        }
+        let mut files = Vec::new();
+        let (mut open, mut seen) = (vec![String::new()], 0);
+        while let Some(folder) = open.pop() {
+            for entry in fs::read_dir(path.join(&folder)).with_context(shown)? {
+                let entry = entry.with_context(shown)?;
+                seen += 1;
+                ensure!(
+                    seen <= MOST_FILES,
+                    "{}: it has more than {MOST_FILES} files; name the policy's folder",
+                    shown()
+                );
+                let Some(name) = entry.file_name().to_str().map(str::to_owned) else { continue };
+                let name = if folder.is_empty() { name } else { format!("{folder}/{name}") };
+                let kind = entry.file_type().with_context(shown)?;
+                if kind.is_dir() {
+                    open.push(name);
+                } else if kind.is_file() {
+                    files.push(name);
+                }
+            }
+        }
+        files.sort();
+        Ok(Self { root: path.to_owned(), files })
+    }
+
+    /// Returns the folder that paths start at.
+    pub fn root(&self) -> &Path {
+        &self.root
+    }
+
+    /// Returns the files with an extension.
+    pub fn with_ending<'a>(&'a self, ending: &'a str) -> impl Iterator<Item = &'a str> + 'a {
+        let ends = move |file: &&str| Path::new(file).extension().is_some_and(|e| e.eq_ignore_ascii_case(ending));
+        self.files.iter().map(String::as_str).filter(ends)
+    }
+
+    /// Returns the file whose path is, or ends in, `name`; `None` if there is none.
+    ///
+    /// # Errors
+    ///
+    /// If there are several.
+    pub fn find(&self, name: &str) -> Result<Option<&str>> {
+        let fits = |file: &&str| Path::new(file).ends_with(name);
+        let found: Vec<&str> = self.files.iter().map(String::as_str).filter(fits).collect();
+        match found[..] {
+            [] => Ok(None),
+            [one] => Ok(Some(one)),
+            _ => bail!("several files are called {name:?}: {}; name the folder of one policy", found.join(", ")),
+        }
+    }
+
+    /// Returns the path of a file that another one names.
+    ///
+    /// # Errors
+    ///
+    /// If it leaves the bundle.
+    pub fn path(&self, file: &str) -> Result<PathBuf> {
+        let inside = Path::new(file).components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
+        ensure!(
+            inside && !file.is_empty(),
+            "{file:?} is not a file of the bundle: give a path from its folder, without .."
+        );
+        Ok(self.root.join(file))
+    }
+
+    /// Reads a text file.
+    ///
+    /// # Errors
+    ///
+    /// If it is missing, longer than 4 MiB, or not UTF-8.
+    pub fn text(&self, file: &str) -> Result<String> {
+        let path = self.path(file)?;
+        let read = || -> Result<String> {
+            let bytes = fs::metadata(&path)?.len();
+            ensure!(bytes <= MOST_TEXT, "it has {bytes} bytes, and at most {MOST_TEXT} are read");
+            Ok(fs::read_to_string(&path)?)
+        };
+        read().with_context(|| file.to_owned())
+    }
+}
+
+impl Sources for Bundle {
+    fn network(&self, network: &Network, outputs: &[String]) -> Result<Box<dyn Compute>> {
+        Ok(Box::new(OnnxNetwork::open(&self.path(&network.file)?, outputs)?))
+    }
+
+    fn array(&self, file: &str, name: &str) -> Result<Array> {
+        let mut all = arrays(&self.path(file)?)?;
+        let names = all.keys().cloned().collect::<Vec<_>>().join(", ");
+        let array = all.remove(name).with_context(|| format!("{file}: it has no array {name:?}; it has {names}"))?;
+        let values = array.values.to_f64();
+        let values =
+            values.with_context(|| format!("{file}: array {name:?} is of type {}", array.values.type_name()))?;
+        Ok(Array { shape: array.shape, values })
+    }
+}

@@ -1,0 +1,146 @@
+//! A YAML file of a bundle, which knows what has been read of it.
+
+use std::cell::RefCell;
+use std::collections::BTreeSet;
+
+use actq::error::{Context as _, Result};
+use actq::text::printable;
+
+use crate::bundle::Bundle;
+use crate::yaml::Node;
+
+/// Most keys that a message lists.
+const MOST_LISTED: usize = 40;
+
+/// A YAML file.
+#[derive(Debug)]
+pub struct Document {
+    /// Path in the bundle.
+    pub file: String,
+    root: Node,
+    /// Paths that have been read, with all below them.
+    read: RefCell<BTreeSet<String>>,
+}
+
+impl Document {
+    /// Reads a file of a bundle.
+    ///
+    /// # Errors
+    ///
+    /// If it is missing, or not YAML.
+    pub fn read(bundle: &Bundle, file: &str) -> Result<Self> {
+        let root = bundle.text(file).and_then(|text| Node::parse(&text).context(file.to_owned()))?;
+        Ok(Self { file: file.to_owned(), root, read: RefCell::default() })
+    }
+
+    /// Returns the keys of a map at a path of keys with points between them; the empty path is the whole file. Nothing
+    /// counts as read.
+    pub fn keys(&self, path: &str) -> Vec<&str> {
+        self.look(path).map_or(&[][..], Node::entries).iter().map(|(key, _)| key.as_str()).collect()
+    }
+
+    /// Returns the value at a path without counting it as read.
+    pub fn look(&self, path: &str) -> Option<&Node> {
+        if path.is_empty() { Some(&self.root) } else { find(&self.root, path) }
+    }
+
+    /// Returns the value at a path, or `None` if it is missing or null.
+    pub fn get(&self, path: &str) -> Option<&Node> {
+        let node = self.look(path)?;
+        self.read.borrow_mut().insert(path.to_owned());
+        (!node.is_null()).then_some(node)
+    }
+
+    /// Names a path, for reports and errors.
+    pub fn at(&self, path: &str) -> String {
+        format!("{}: {}", self.file, printable(path))
+    }
+
+    /// Returns a value that must be there.
+    ///
+    /// # Errors
+    ///
+    /// If it is missing, or `as_type` does not accept it.
+    pub fn need<'a, T>(&'a self, path: &str, what: &str, as_type: impl Fn(&'a Node) -> Option<T>) -> Result<T> {
+        let node = self.get(path).with_context(|| format!("{} is missing; it must be {what}", self.at(path)))?;
+        as_type(node).with_context(|| format!("{} (line {}) must be {what}", self.at(path), node.line))
+    }
+
+    /// Returns a value, or `None` if it is missing or null.
+    ///
+    /// # Errors
+    ///
+    /// If it is there and `as_type` does not accept it.
+    pub fn maybe<'a, T>(
+        &'a self,
+        path: &str,
+        what: &str,
+        as_type: impl Fn(&'a Node) -> Option<T>,
+    ) -> Result<Option<T>> {
+        let Some(node) = self.get(path) else { return Ok(None) };
+        let value = as_type(node).with_context(|| format!("{} (line {}) must be {what}", self.at(path), node.line))?;
+        Ok(Some(value))
+    }
+
+    /// Returns a finite number.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::need`].
+    pub fn number(&self, path: &str) -> Result<f64> {
+        self.need(path, "a finite number", Node::number)
+    }
+
+    /// Returns a list of finite numbers.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::need`].
+    pub fn numbers(&self, path: &str) -> Result<Vec<f64>> {
+        self.need(path, "a list of finite numbers", Node::numbers)
+    }
+
+    /// Returns a list of texts.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::need`].
+    pub fn texts(&self, path: &str) -> Result<Vec<String>> {
+        self.need(path, "a list of texts", Node::texts)
+    }
+
+    /// Lists the keys that nothing has read and that no pattern of `ignored` names.
+    pub fn unread(&self, ignored: &[String]) -> Vec<String> {
+        let mut unread = Vec::new();
+        self.add_unread(&self.root, "", ignored, &mut unread);
+        unread.truncate(MOST_LISTED);
+        unread
+    }
+
+    fn add_unread(&self, node: &Node, path: &str, ignored: &[String], unread: &mut Vec<String>) {
+        if self.read.borrow().contains(path) || ignored.iter().any(|pattern| fits(pattern, path)) {
+            return;
+        }
+        if node.entries().is_empty() {
+            unread.push(self.at(path));
+        }
+        for (key, inner) in node.entries() {
+            let inner_path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+            self.add_unread(inner, &inner_path, ignored, unread);
+        }
+    }
+}
+
+/// Finds a value; keys may hold points themselves.
+fn find<'a>(node: &'a Node, path: &str) -> Option<&'a Node> {
+    node.entries().iter().find_map(|(key, inner)| {
+        let rest = path.strip_prefix(key.as_str())?;
+        if rest.is_empty() { Some(inner) } else { find(inner, rest.strip_prefix('.')?) }
+    })
+}
+
+/// Returns `true` if a path is, or is below, what a pattern names.
+fn fits(pattern: &str, path: &str) -> bool {
+    let mut parts = path.split('.');
+    pattern.split('.').all(|wanted| parts.next().is_some_and(|part| wanted == "*" || wanted == part))
+}

@@ -1,0 +1,224 @@
+//! What a reader knows, and from where: the bundle's files, the family's profile, or the user's answers. What nothing
+//! states becomes a question.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use actq::error::{Context as _, Error, Result, bail, ensure};
+use actq::text::printable;
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+
+/// Fixed rules of a family, as data: its file is a `profile.toml`.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Profile {
+    /// Name of the family.
+    pub family: String,
+    /// Repository that the rules were read from.
+    pub upstream: String,
+    /// Its commit.
+    pub commit: String,
+    /// Keys of the family's files that no deployment reads, with `*` for any part of a path.
+    #[serde(default)]
+    pub ignored: Vec<String>,
+    /// The rules.
+    #[serde(default, rename = "rule")]
+    pub rules: Vec<Rule>,
+}
+
+/// A fact that no file of a bundle states.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rule {
+    /// Key of the answer.
+    pub key: String,
+    /// What it says, as a question's text.
+    pub meaning: String,
+    /// The family's value; none if it differs between the family's policies.
+    pub value: Option<toml::Value>,
+    /// File and lines of the repository that have it.
+    #[serde(default)]
+    pub from: String,
+}
+
+impl Profile {
+    /// Parses a profile.
+    ///
+    /// # Errors
+    ///
+    /// If it is not one.
+    pub fn parse(text: &str) -> Result<Self> {
+        toml::from_str(text).map_err(Error::other)
+    }
+}
+
+/// The user's answers, by key.
+#[derive(Clone, Debug, Default)]
+pub struct Answers(BTreeMap<String, toml::Value>);
+
+impl Answers {
+    /// Parses a TOML file; tables in it are parts of the keys.
+    ///
+    /// # Errors
+    ///
+    /// If it is not TOML.
+    pub fn parse(text: &str) -> Result<Self> {
+        let table: toml::Table = toml::from_str(text).map_err(|error| Error::input(error.to_string()))?;
+        let mut answers = Self::default();
+        answers.add(String::new(), table);
+        Ok(answers)
+    }
+
+    fn add(&mut self, prefix: String, table: toml::Table) {
+        for (key, value) in table {
+            let key = if prefix.is_empty() { key } else { format!("{prefix}.{key}") };
+            match value {
+                toml::Value::Table(inner) => self.add(key, inner),
+                other => drop(self.0.insert(key, other)),
+            }
+        }
+    }
+}
+
+/// A question that nothing answers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Question {
+    /// Key of the answer.
+    pub key: String,
+    /// What is asked.
+    pub meaning: String,
+    /// What the family's profile says, and where it says so.
+    pub profile: Option<(String, String)>,
+}
+
+/// What a reader knows.
+#[derive(Debug)]
+pub struct Facts {
+    profile: Profile,
+    accepted: bool,
+    answers: Answers,
+    used: BTreeSet<String>,
+    questions: Vec<Question>,
+    sources: BTreeMap<String, String>,
+}
+
+impl Facts {
+    /// Starts with a profile, whether the user accepts its values, and the user's answers.
+    pub fn new(profile: Profile, accepted: bool, answers: Answers) -> Self {
+        Self { profile, accepted, answers, used: BTreeSet::new(), questions: Vec::new(), sources: BTreeMap::new() }
+    }
+
+    /// Returns a fact of the profile: the answer, or the accepted value of the profile, or else a default that stands
+    /// for it while the questions are collected.
+    ///
+    /// # Errors
+    ///
+    /// If the answer has another type, or the profile has no such rule.
+    pub fn get<T: DeserializeOwned + Default>(&mut self, key: &str) -> Result<T> {
+        Ok(self.find(key)?.unwrap_or_default())
+    }
+
+    /// As [`Self::get`], but `None` while it is a question.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::get`].
+    pub fn find<T: DeserializeOwned>(&mut self, key: &str) -> Result<Option<T>> {
+        let rule = self.profile.rules.iter().find(|rule| rule.key == key);
+        let rule = rule.with_context(|| format!("profile {}: there is no rule {key}", self.profile.family))?.clone();
+        if let Some(answer) = self.answers.0.get(key) {
+            self.used.insert(key.to_owned());
+            self.sources.insert(key.to_owned(), "answers".to_owned());
+            return read(answer, &format!("answer {key}")).map(Some);
+        }
+        match (&rule.value, self.accepted) {
+            (Some(value), true) => {
+                self.sources.insert(key.to_owned(), self.of_profile(&rule));
+                read(value, &format!("profile {}: {key}", self.profile.family)).map(Some)
+            }
+            _ => {
+                let profile = rule.value.as_ref().map(|value| (value.to_string(), self.of_profile(&rule)));
+                self.ask(Question { key: key.to_owned(), meaning: rule.meaning, profile });
+                Ok(None)
+            }
+        }
+    }
+
+    /// Asks for something that the reader finds missing, unless the user has answered it.
+    ///
+    /// # Errors
+    ///
+    /// If the answer has another type.
+    pub fn missing<T: DeserializeOwned>(&mut self, key: &str, meaning: &str) -> Result<Option<T>> {
+        if let Some(answer) = self.answers.0.get(key) {
+            self.used.insert(key.to_owned());
+            self.sources.insert(key.to_owned(), "answers".to_owned());
+            return read(answer, &format!("answer {key}")).map(Some);
+        }
+        self.ask(Question { key: key.to_owned(), meaning: meaning.to_owned(), profile: None });
+        Ok(None)
+    }
+
+    fn ask(&mut self, question: Question) {
+        if self.questions.iter().all(|other| other.key != question.key) {
+            self.questions.push(question);
+        }
+    }
+
+    fn of_profile(&self, rule: &Rule) -> String {
+        let from = if rule.from.is_empty() { String::new() } else { format!(" ({})", rule.from) };
+        format!("profile {}{from}", self.profile.family)
+    }
+
+    /// Records where a part of the description comes from, for the report.
+    pub fn note(&mut self, item: &str, source: impl Into<String>) {
+        self.sources.insert(item.to_owned(), source.into());
+    }
+
+    /// Returns where a fact or a part comes from, for [`Self::note`].
+    pub fn source(&self, key: &str) -> String {
+        self.sources.get(key).cloned().unwrap_or_else(|| "a question".to_owned())
+    }
+
+    /// Makes an error of two statements that contradict each other.
+    pub fn contradiction(what: &str, first: (&str, &str), second: (&str, &str)) -> Error {
+        let shown = |text: &str| text.chars().take(300).collect::<String>();
+        Error::input(format!(
+            "{what}: the bundle contradicts itself.\n  {} says {}\n  {} says {}\nCorrect one of them.",
+            first.0,
+            shown(first.1),
+            second.0,
+            shown(second.1)
+        ))
+    }
+
+    /// Returns all sources, the open questions and the keys that nothing ignores.
+    ///
+    /// # Errors
+    ///
+    /// If the user answered what nobody asked.
+    pub(crate) fn finish(self) -> Result<(BTreeMap<String, String>, Vec<Question>)> {
+        let unasked: Vec<&str> =
+            self.answers.0.keys().filter(|key| !self.used.contains(*key)).map(String::as_str).collect();
+        ensure!(
+            unasked.is_empty(),
+            "answers: nothing asks for {}; the keys of this bundle are {}",
+            unasked.join(", "),
+            self.profile.rules.iter().map(|rule| rule.key.as_str()).collect::<Vec<_>>().join(", ")
+        );
+        Ok((self.sources, self.questions))
+    }
+
+    /// Returns the keys of the family's files that need no reader.
+    pub(crate) fn ignored(&self) -> &[String] {
+        &self.profile.ignored
+    }
+}
+
+fn read<T: DeserializeOwned>(value: &toml::Value, key: &str) -> Result<T> {
+    let shown: String = value.to_string().chars().take(100).collect();
+    match value.clone().try_into() {
+        Ok(value) => Ok(value),
+        Err(error) => bail!("{key} = {}: {}", printable(&shown), printable(error.message())),
+    }
+}

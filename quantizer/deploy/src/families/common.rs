@@ -1,0 +1,207 @@
+//! What readers share: a description in the making.
+
+use actq::error::{Result, bail, ensure};
+
+use crate::description::{
+    Clock, Description, Fill, First, From, Gains, History, Input, Network, Numbers, Op, Orientation, SCHEMA, State,
+    Target, TargetKind, Value,
+};
+use crate::facts::Facts;
+
+/// Stands for the policy's output until [`Parts::network`] knows its name.
+const ACTION: &str = "policy.ACTION";
+
+/// How a family keeps histories.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Histories {
+    /// All frames of a term, then the next term; otherwise all terms of a frame.
+    pub(super) by_term: bool,
+    pub(super) first: First,
+    pub(super) fill: Fill,
+}
+
+impl Histories {
+    /// Asks for the rules history.layout, history.first and history.fill.
+    pub(super) fn of(facts: &mut Facts) -> Result<Self> {
+        let layout: Option<String> = facts.find("history.layout")?;
+        let by_term = match layout.as_deref() {
+            Some("term") => true,
+            Some("frame") | None => false,
+            Some(other) => bail!("history.layout = {other:?}: give \"term\" or \"frame\""),
+        };
+        Ok(Self { by_term, first: facts.get("history.first")?, fill: facts.get("history.fill")? })
+    }
+
+    pub(super) fn spec(&self, length: usize) -> History {
+        History { length, stride: 1, first: self.first, fill: self.fill, current: true }
+    }
+}
+
+/// A description in the making.
+#[derive(Debug)]
+pub(super) struct Parts {
+    description: Description,
+    /// Terms of the observation with the lengths of their histories.
+    terms: Vec<(String, usize)>,
+}
+
+impl Parts {
+    pub(super) fn new(name: &str, rate_hz: f64) -> Self {
+        let description = Description {
+            schema: SCHEMA,
+            name: name.to_owned(),
+            rate_hz,
+            action: ACTION.to_owned(),
+            joints: [].into(),
+            constants: [].into(),
+            inputs: Vec::new(),
+            states: Vec::new(),
+            clocks: Vec::new(),
+            motions: Vec::new(),
+            values: Vec::new(),
+            networks: Vec::new(),
+            targets: Vec::new(),
+            gains: None,
+        };
+        Self { description, terms: Vec::new() }
+    }
+
+    pub(super) fn constant(&mut self, name: &str, numbers: Vec<f64>) {
+        self.description.constants.insert(name.to_owned(), numbers);
+    }
+
+    /// Adds a raw input, unless it is there.
+    pub(super) fn raw(&mut self, name: &str, len: usize, unit: &str) {
+        if self.description.inputs.iter().all(|input| input.name != name) {
+            let unit = (!unit.is_empty()).then(|| unit.to_owned());
+            let input = Input { name: name.to_owned(), len: Some(len), joints: None, unit, range: None };
+            self.description.inputs.push(input);
+        }
+    }
+
+    /// Adds a raw input for the term of its name; returns the operations on it, which are none.
+    pub(super) fn input(&mut self, name: &str, len: usize, unit: &str) -> Vec<Op> {
+        self.input_as(name, name, len, unit)
+    }
+
+    /// Adds a raw input for a term.
+    pub(super) fn input_as(&mut self, term: &str, name: &str, len: usize, unit: &str) -> Vec<Op> {
+        self.raw(name, len, unit);
+        self.begin(term, name);
+        Vec::new()
+    }
+
+    /// Adds a state that starts at zero, for the term of its name.
+    pub(super) fn state(&mut self, name: &str, len: usize, next: &str) -> Vec<Op> {
+        let state = State { name: format!("{name}_state"), len, start: Numbers::default(), next: next.to_owned() };
+        self.begin(name, &state.name.clone());
+        self.description.states.push(state);
+        Vec::new()
+    }
+
+    pub(super) fn clock(&mut self, clock: Clock) {
+        self.description.clocks.push(clock);
+    }
+
+    /// Begins a term that is made of another value.
+    pub(super) fn begin(&mut self, term: &str, from: &str) {
+        let name = self.term_name(term);
+        self.description.values.push(Value { name, from: From::One(from.to_owned()), ops: Vec::new() });
+    }
+
+    /// Returns the name of a term's value, which differs from those of inputs.
+    fn term_name(&self, term: &str) -> String {
+        let taken = self.description.inputs.iter().any(|input| input.name == term);
+        if taken { format!("{term}_term") } else { term.to_owned() }
+    }
+
+    /// Ends the term that was begun last; `length` frames of it are observed.
+    pub(super) fn term(&mut self, _term: &str, ops: Vec<Op>, length: usize) {
+        if let Some(value) = self.description.values.last_mut() {
+            value.ops = ops;
+            self.terms.push((value.name.clone(), length));
+        }
+    }
+
+    /// Makes the observation of the terms and their histories.
+    pub(super) fn observe(&mut self, histories: &Histories) -> Result<()> {
+        ensure!(!self.terms.is_empty(), "there are no terms of an observation");
+        let names: Vec<String> = self.terms.iter().map(|(name, _)| name.clone()).collect();
+        let mut observation = Value { name: "observation".to_owned(), from: From::Many(names), ops: Vec::new() };
+        if histories.by_term {
+            for (name, length) in self.terms.iter().filter(|(_, length)| *length > 1) {
+                let value = self.description.values.iter_mut().find(|value| value.name == *name);
+                value.into_iter().for_each(|value| value.ops.push(Op::History(histories.spec(*length))));
+            }
+        } else {
+            let length = self.terms[0].1;
+            ensure!(
+                self.terms.iter().all(|(_, other)| *other == length),
+                "the terms' histories have different lengths, which is not known frame by frame"
+            );
+            observation.ops.extend((length > 1).then(|| Op::History(histories.spec(length))));
+        }
+        self.description.values.push(observation);
+        Ok(())
+    }
+
+    pub(super) fn value(&mut self, name: &str, from: &str, ops: Vec<Op>) {
+        self.description.values.push(Value { name: name.to_owned(), from: From::One(from.to_owned()), ops });
+    }
+
+    /// Adds the policy's network, which reads the observation, and its action's name everywhere.
+    pub(super) fn network(&mut self, file: &str, input: &str, output: &str) {
+        self.description.networks.push(Network {
+            name: "policy".to_owned(),
+            file: file.to_owned(),
+            inputs: [(input.to_owned(), "observation".to_owned())].into(),
+            states: [].into(),
+        });
+        self.act(&format!("policy.{output}"));
+    }
+
+    /// Names the policy's output.
+    pub(super) fn act(&mut self, action: &str) {
+        self.description.action = action.to_owned();
+    }
+
+    pub(super) fn target(&mut self, kind: TargetKind, value: &str) {
+        self.description.targets.push(Target { kind, value: value.to_owned(), joints: None });
+    }
+
+    pub(super) fn gains(&mut self, gains: Gains) {
+        self.description.gains = Some(gains);
+    }
+
+    pub(super) fn finish(self) -> Description {
+        let mut description = self.description;
+        let action = description.action.clone();
+        let named = |name: &mut String| {
+            if name == ACTION {
+                name.clone_from(&action);
+            }
+        };
+        description.states.iter_mut().for_each(|state| named(&mut state.next));
+        for value in &mut description.values {
+            match &mut value.from {
+                From::One(name) => named(name),
+                From::Many(names) => names.iter_mut().for_each(named),
+            }
+        }
+        description
+    }
+}
+
+/// Begins the term projected_gravity, by the rule `gravity`.
+pub(super) fn gravity(parts: &mut Parts, facts: &mut Facts) -> Result<Vec<Op>> {
+    let given: Option<String> = facts.find("gravity")?;
+    let (name, len, orientation) = match given.as_deref() {
+        Some("vector") | None => return Ok(parts.input("projected_gravity", 3, "")),
+        Some("wxyz") => ("orientation", 4, Orientation::Wxyz),
+        Some("xyzw") => ("orientation", 4, Orientation::Xyzw),
+        Some("rpy") => ("rpy", 3, Orientation::Rpy),
+        Some(other) => bail!("gravity = {other:?}: give \"vector\", \"wxyz\", \"xyzw\" or \"rpy\""),
+    };
+    parts.input_as("projected_gravity", name, len, "");
+    Ok(vec![Op::Gravity(orientation)])
+}

@@ -1,0 +1,98 @@
+//! Networks of ONNX files, in f32.
+
+use std::path::Path;
+
+use actq::contract::ActionContract;
+use actq::error::{Context as _, Result, ensure};
+use actq::graph::{Network, State, Weights, zero_state};
+use actq::policy::Policy;
+use actq_onnx::{Choice, Signature, import};
+
+use crate::sources::Compute;
+
+/// An ONNX file's graph, one policy for each of its outputs.
+pub(crate) struct OnnxNetwork {
+    inputs: Vec<(String, usize)>,
+    lens: Vec<usize>,
+    outputs: Vec<Output>,
+}
+
+/// An output and the inputs that it depends on.
+struct Output {
+    policy: Policy,
+    weights: Weights,
+    state: State,
+    /// Numbers of the file's inputs, in the order of its observation.
+    reads: Vec<usize>,
+}
+
+impl OnnxNetwork {
+    /// Opens a file for these outputs.
+    pub(crate) fn open(path: &Path, outputs: &[String]) -> Result<Self> {
+        ensure!(!outputs.is_empty(), "nothing reads an output of it; remove it");
+        let signature = Signature::read(path)?;
+        let mut lens = vec![None; signature.inputs.len()];
+        let mut opened = Vec::new();
+        for name in outputs {
+            let choice = Choice { output: Some(name.clone()), states: Vec::new() };
+            let imported = import(path, &choice)?;
+            let policy = Policy::of_files(path, [path, path], &imported.json, &imported.weights)?;
+            let mut reads = Vec::new();
+            for (input, len) in &imported.inputs {
+                let at = signature.inputs.iter().position(|(name, _)| name == input);
+                let at = at.with_context(|| format!("{}: there is no input {input:?}", path.display()))?;
+                lens[at] = Some(*len);
+                reads.push(at);
+            }
+            let (weights, state) = (Weights::of(&policy.graph), zero_state(&policy.graph, 1));
+            opened.push(Output { policy, weights, state, reads });
+        }
+        // Inputs that no output depends on are left out, and the others move up.
+        let used: Vec<usize> = (0..lens.len()).filter(|i| lens[*i].is_some()).collect();
+        for output in &mut opened {
+            for read in &mut output.reads {
+                *read = used.iter().position(|i| i == read).unwrap_or(0);
+            }
+        }
+        let inputs = used.iter().filter_map(|&i| Some((signature.inputs[i].0.clone(), lens[i]?))).collect();
+        let lens = opened.iter().map(|output| output.policy.chunk * output.policy.act_len).collect();
+        Ok(Self { inputs, lens, outputs: opened })
+    }
+}
+
+impl Compute for OnnxNetwork {
+    fn inputs(&self) -> &[(String, usize)] {
+        &self.inputs
+    }
+
+    fn outputs(&self) -> &[usize] {
+        &self.lens
+    }
+
+    fn reset(&mut self) {
+        for output in &mut self.outputs {
+            output.state = zero_state(&output.policy.graph, 1);
+        }
+    }
+
+    fn step(&mut self, inputs: &[Vec<f32>]) -> Vec<Vec<f32>> {
+        self.outputs.iter_mut().map(|output| output.step(inputs)).collect()
+    }
+}
+
+impl Output {
+    fn step(&mut self, inputs: &[Vec<f32>]) -> Vec<f32> {
+        let obs: Vec<f32> = self.reads.iter().flat_map(|i| inputs[*i].iter().copied()).collect();
+        let pass = Network::in_order(&self.policy.graph).forward_one(&self.weights, &obs, &mut self.state);
+        let (len, contract) = (self.policy.act_len, &self.policy.contract);
+        pass.iter().enumerate().map(|(i, value)| action(contract, i % len, *value)).collect()
+    }
+}
+
+/// Applies what the importer put into the contract of the graph's last operations.
+fn action(contract: &ActionContract, i: usize, value: f32) -> f32 {
+    let of = |array: &Option<Vec<f32>>| array.as_ref().map(|array| array[i]);
+    let value = value * of(&contract.scale).unwrap_or(1.0) + of(&contract.offset).unwrap_or(0.0);
+    let value = of(&contract.low).map_or(value, |low| value.max(low));
+    of(&contract.high).map_or(value, |high| value.min(high))
+}

@@ -1,0 +1,182 @@
+//! The operations of a chain, checked and with their numbers.
+
+use actq::error::{Context as _, Result, bail, ensure};
+
+use super::{Builder, MOST, Maker, Slot};
+use crate::description::{History, Numbers, Op, Operand, Order, Orientation, Value};
+use crate::label::Label;
+
+/// A second operand.
+pub(crate) enum Arg {
+    /// Numbers, one for all or one for each.
+    Numbers(Vec<f64>),
+    /// A value.
+    Slot(Slot),
+}
+
+/// An operation.
+pub(crate) enum Step {
+    Select(Vec<usize>),
+    Place(Vec<usize>),
+    Add(Arg),
+    Subtract(Arg),
+    Scale(Arg),
+    Divide(Arg),
+    Clip([Arg; 2]),
+    Wrap,
+    Gravity(Orientation),
+    Sin,
+    Cos,
+    Norm,
+    History(History),
+}
+
+/// Refuses numbers that are not finite.
+pub(super) fn finite(numbers: &[f64]) -> Result<()> {
+    match numbers.iter().position(|number| !number.is_finite()) {
+        Some(i) => bail!("number {i} is {}; give finite numbers", numbers[i]),
+        None => Ok(()),
+    }
+}
+
+/// Returns a number for each of `len` values.
+pub(super) fn each(numbers: &Numbers, len: usize) -> Result<Vec<f64>> {
+    let numbers = match numbers {
+        Numbers::All(number) => vec![*number; len],
+        Numbers::Each(numbers) => numbers.clone(),
+    };
+    finite(&numbers)?;
+    ensure!(numbers.len() == len, "it has {} numbers, and there are {len} values", numbers.len());
+    Ok(numbers)
+}
+
+/// A value while its chain is followed.
+struct Chain {
+    labels: Vec<Label>,
+    joints: Option<String>,
+}
+
+impl Builder<'_> {
+    /// Makes a value and what its operations read.
+    pub(super) fn chain(&mut self, value: &Value) -> Result<Slot> {
+        let own = format!("value {:?}", value.name);
+        let names = value.from.names();
+        ensure!(!names.is_empty(), "{own}: from is empty");
+        let from = names.iter().map(|name| self.value(name, &format!("{own}: from"))).collect::<Result<Vec<_>>>()?;
+        let mut labels: Vec<Label> = from.iter().flat_map(|slot| self.plan.values[*slot].labels.clone()).collect();
+        let mut joints = None;
+        if let [only] = from[..] {
+            joints.clone_from(&self.plan.values[only].joints);
+            labels.iter_mut().for_each(|label| label.value.clone_from(&value.name));
+        }
+        let mut chain = Chain { labels, joints };
+        let mut steps = Vec::new();
+        for (i, op) in value.ops.iter().enumerate() {
+            let key = format!("{own}: do[{i}]");
+            steps.push(self.op(op, &mut chain, &value.name, &key)?);
+            let len = chain.labels.len();
+            ensure!(0 < len && len <= MOST, "{key}: it gives {len} values; 1 to {MOST} are allowed");
+        }
+        Ok(self.add(&value.name, Maker::Value(from, steps), chain.labels, chain.joints))
+    }
+
+    fn op(&mut self, op: &Op, chain: &mut Chain, name: &str, key: &str) -> Result<Step> {
+        let len = chain.labels.len();
+        let fresh = |len| crate::label::labels(name, len, None);
+        Ok(match op {
+            Op::Select(order) => {
+                let places = self.places(order, chain.joints.as_deref(), len, key)?;
+                chain.labels = places.iter().map(|place| chain.labels[*place].clone()).collect();
+                chain.joints = if let Order::Joints(order) = order { Some(order.clone()) } else { None };
+                Step::Select(places)
+            }
+            Op::Place(order) => {
+                let places = match order {
+                    Order::Places(places) => places.clone(),
+                    Order::Joints(to) => {
+                        let of = chain.joints.as_ref().with_context(|| {
+                            format!("{key}: its values are in no order of joints; give places, or select joints first")
+                        })?;
+                        let (from, to_len) = (Order::Joints(of.clone()), self.joints(to, key)?.len());
+                        self.places(&from, Some(to), to_len, key)?
+                    }
+                };
+                let mut labels: Vec<Option<Label>> = vec![None; len];
+                ensure!(places.len() == len, "{key}: it has {} places for {len} values", places.len());
+                for (label, place) in chain.labels.iter().zip(&places) {
+                    let free = labels.get_mut(*place).filter(|taken| taken.is_none());
+                    *free.with_context(|| format!("{key}: the places are not a permutation of 0 to {}", len - 1))? =
+                        Some(label.clone());
+                }
+                chain.labels = labels.into_iter().flatten().collect();
+                chain.joints = if let Order::Joints(order) = order { Some(order.clone()) } else { None };
+                Step::Place(places)
+            }
+            Op::Add(operand) => Step::Add(self.operand(operand, len, key)?),
+            Op::Subtract(operand) => Step::Subtract(self.operand(operand, len, key)?),
+            Op::Scale(operand) => Step::Scale(self.operand(operand, len, key)?),
+            Op::Divide(operand) => {
+                let arg = self.operand(operand, len, key)?;
+                if let Arg::Numbers(numbers) = &arg {
+                    ensure!(!numbers.contains(&0.0), "{key}: it divides by 0");
+                }
+                Step::Divide(arg)
+            }
+            Op::Clip([low, high]) => {
+                let both = [self.operand(low, len, key)?, self.operand(high, len, key)?];
+                if let [Arg::Numbers(low), Arg::Numbers(high)] = &both {
+                    let at = |list: &[f64], i: usize| list[if list.len() == 1 { 0 } else { i }];
+                    if let Some(i) = (0..len).find(|&i| at(low, i) > at(high, i)) {
+                        bail!("{key}: it clips to {} and {}; give the lower number first", at(low, i), at(high, i));
+                    }
+                }
+                Step::Clip(both)
+            }
+            Op::Wrap => Step::Wrap,
+            Op::Sin => Step::Sin,
+            Op::Cos => Step::Cos,
+            Op::Norm => {
+                *chain = Chain { labels: fresh(1), joints: None };
+                Step::Norm
+            }
+            Op::Gravity(orientation) => {
+                let needed = if *orientation == Orientation::Rpy { 3 } else { 4 };
+                ensure!(len == needed, "{key}: an orientation has {needed} values, and this has {len}");
+                *chain = Chain { labels: fresh(3), joints: None };
+                Step::Gravity(*orientation)
+            }
+            Op::History(history) => {
+                ensure!(history.length > 0 && history.stride > 0, "{key}: length and stride must be at least 1");
+                let all = history.length.checked_mul(history.stride).and_then(|n| n.checked_mul(len));
+                ensure!(all.is_some_and(|all| all <= MOST), "{key}: it keeps more than {MOST} values");
+                let ages = crate::history::ages(history);
+                let aged = |age: &usize| chain.labels.iter().map(|label| label.older(*age)).collect::<Vec<_>>();
+                *chain = Chain { labels: ages.iter().flat_map(aged).collect(), joints: None };
+                Step::History(*history)
+            }
+        })
+    }
+
+    fn operand(&mut self, operand: &Operand, len: usize, key: &str) -> Result<Arg> {
+        let numbers = match operand {
+            Operand::Number(number) => vec![*number],
+            Operand::List(list) => list.clone(),
+            Operand::Name(name) => match self.description.constants.get(name) {
+                Some(list) => list.clone(),
+                None => {
+                    let slot = self.value(name, key)?;
+                    let given = self.plan.values[slot].labels.len();
+                    ensure!(given == len || given == 1, "{key}: {name:?} has {given} values, and the value {len}");
+                    return Ok(Arg::Slot(slot));
+                }
+            },
+        };
+        finite(&numbers).context(key.to_owned())?;
+        ensure!(
+            numbers.len() == len || numbers.len() == 1,
+            "{key}: it has {} numbers, and the value {len}",
+            numbers.len()
+        );
+        Ok(Arg::Numbers(numbers))
+    }
+}

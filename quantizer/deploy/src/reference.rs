@@ -1,0 +1,179 @@
+//! Comparison of a description with what upstream's deploy code computes: raw inputs, and observation, action and
+//! target, tick by tick.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::Path;
+
+use actq::data::arrays;
+use actq::error::{Context as _, Error, Result, ensure};
+
+use crate::plan::Plan;
+use crate::run::Runner;
+use crate::sources::Array;
+
+/// Largest difference, as a share of the largest value of its array.
+pub const TOLERANCE: f64 = 1e-5;
+
+/// A reference: what goes in, and what comes out.
+#[derive(Clone, Debug)]
+pub struct Reference {
+    ticks: usize,
+    /// Raw inputs `[tick, value]` by name.
+    raw: BTreeMap<String, Array>,
+    /// Of "observation", "action" and "target", those that the file has.
+    expected: BTreeMap<&'static str, Array>,
+}
+
+/// Arrays of a reference's second file.
+const KINDS: [&str; 3] = ["observation", "action", "target"];
+
+impl Reference {
+    /// Reads the raw inputs and the expected results, two .npz files.
+    ///
+    /// # Errors
+    ///
+    /// If a file cannot be read, holds no ticks, or arrays of different numbers of ticks.
+    pub fn read(raw: &Path, expect: &Path) -> Result<Self> {
+        let of = |path: &Path| -> Result<BTreeMap<String, Array>> {
+            let numbers = |(name, tensor): (String, actq::import::values::Tensor)| {
+                let values = tensor.values.to_f64();
+                let values = values.with_context(|| {
+                    format!("{}: array {name:?} is of type {}", path.display(), tensor.values.type_name())
+                })?;
+                Ok((name, Array { shape: tensor.shape, values }))
+            };
+            arrays(path)?.into_iter().map(numbers).collect()
+        };
+        let (raw_arrays, mut expected) = (of(raw)?, of(expect)?);
+        let expected: BTreeMap<_, _> =
+            KINDS.into_iter().filter_map(|kind| Some((kind, expected.remove(kind)?))).collect();
+        ensure!(!expected.is_empty(), "{}: it has none of the arrays {}", expect.display(), KINDS.join(", "));
+        let all = raw_arrays.iter().map(|(name, array)| (name.as_str(), array));
+        let all = all.chain(expected.iter().map(|(name, array)| (*name, array)));
+        let mut ticks = None;
+        for (name, array) in all {
+            let (rows, _) = array.rows().with_context(|| format!("array {name:?}"))?;
+            let first = *ticks.get_or_insert(rows);
+            ensure!(rows == first, "array {name:?} has {rows} ticks, and others {first}");
+        }
+        let ticks = ticks.filter(|ticks| *ticks > 0);
+        let ticks = ticks.with_context(|| format!("{}: it has no ticks", raw.display()))?;
+        Ok(Self { ticks, raw: raw_arrays, expected })
+    }
+
+    /// Returns the number of ticks.
+    pub fn ticks(&self) -> usize {
+        self.ticks
+    }
+
+    /// Returns the raw arrays that no input has the name of.
+    pub fn unused<'a>(&'a self, plan: &'a Plan) -> impl Iterator<Item = &'a str> {
+        let known = |name: &&str| plan.inputs.iter().any(|(input, _)| input == name);
+        self.raw.keys().map(String::as_str).filter(move |name| !known(name))
+    }
+
+    /// Returns the raw inputs of each tick, in the plan's order.
+    fn frames(&self, plan: &Plan) -> Result<Vec<Vec<Vec<f64>>>> {
+        let mut frames = vec![Vec::with_capacity(plan.inputs.len()); self.ticks];
+        for (name, len) in &plan.inputs {
+            let array = self.raw.get(name).with_context(|| {
+                let all = self.raw.keys().cloned().collect::<Vec<_>>().join(", ");
+                format!("the reference has no raw array {name:?}; it has {all}")
+            })?;
+            let (_, row) = array.rows()?;
+            ensure!(row == *len, "raw array {name:?} has {row} values a tick, and the input {len}");
+            for (frame, values) in frames.iter_mut().zip(array.values.chunks(row)) {
+                frame.push(values.to_vec());
+            }
+        }
+        Ok(frames)
+    }
+
+    /// Runs a plan on the raw inputs and compares the results.
+    ///
+    /// # Errors
+    ///
+    /// If an array is missing or has another length.
+    pub fn compare(&self, plan: Plan) -> Result<Comparison> {
+        let frames = self.frames(&plan)?;
+        let observation_labels: Vec<String> = plan.observation_labels().iter().map(ToString::to_string).collect();
+        let mut runner = Runner::new(plan);
+        let mut comparison = Comparison { ticks: self.ticks, largest: BTreeMap::new(), first: None };
+        for (t, frame) in frames.iter().enumerate() {
+            let tick = runner.step(frame);
+            let target: Vec<f64> = tick.targets.iter().flat_map(|(_, value)| value.iter().copied()).collect();
+            for (kind, values) in KINDS.into_iter().zip([&tick.observation, &tick.action, &target]) {
+                let Some(expected) = self.expected.get(kind) else { continue };
+                let (_, row) = expected.rows()?;
+                ensure!(
+                    values.len() == row,
+                    "{kind}: the description gives {} values, and the reference has {row}",
+                    values.len()
+                );
+                let scale =
+                    expected.values.iter().fold(0.0f64, |most, value| most.max(value.abs())).max(f64::MIN_POSITIVE);
+                for (i, (got, expected)) in values.iter().zip(&expected.values[t * row..][..row]).enumerate() {
+                    let difference = (got - expected).abs() / scale;
+                    let largest = comparison.largest.entry(kind).or_insert(0.0);
+                    // A NaN is a difference, too.
+                    let fits = difference <= TOLERANCE;
+                    *largest = if difference.is_nan() { f64::INFINITY } else { largest.max(difference) };
+                    if !fits && comparison.first.is_none() {
+                        let what =
+                            if kind == "observation" { observation_labels[i].clone() } else { format!("{kind}[{i}]") };
+                        comparison.first = Some(Difference { tick: t, kind, what, got: *got, expected: *expected });
+                    }
+                }
+            }
+        }
+        Ok(comparison)
+    }
+}
+
+/// Result of a comparison.
+#[derive(Clone, Debug)]
+pub struct Comparison {
+    /// Ticks that were compared.
+    pub ticks: usize,
+    /// Largest difference of each array, as a share of its largest value.
+    pub largest: BTreeMap<&'static str, f64>,
+    /// The first difference above [`TOLERANCE`].
+    pub first: Option<Difference>,
+}
+
+/// A number that differs.
+#[derive(Clone, Debug)]
+pub struct Difference {
+    /// Tick, from 0.
+    pub tick: usize,
+    /// Array.
+    pub kind: &'static str,
+    /// The number, by its term and joint.
+    pub what: String,
+    /// Its value by the description.
+    pub got: f64,
+    /// Its value in the reference.
+    pub expected: f64,
+}
+
+impl fmt::Display for Difference {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { tick, kind, what, got, expected } = self;
+        write!(f, "tick {tick}, {kind}: {what} is {got:.6}, and the reference has {expected:.6}")
+    }
+}
+
+impl Comparison {
+    /// Fails with the first difference, if there is one.
+    ///
+    /// # Errors
+    ///
+    /// The first difference.
+    pub fn require_equal(&self) -> Result<()> {
+        match &self.first {
+            None => Ok(()),
+            Some(first) => Err(Error::input(first.to_string())),
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! A description's reference execution, tick by tick in f64; its networks compute in f32.
+
+use std::f64::consts::PI;
+
+use crate::clock::Phases;
+use crate::description::{End, Orientation, TargetKind};
+use crate::history::Frames;
+use crate::plan::{Arg, Feed, Maker, Plan, Step, Work};
+
+/// Values of a tick.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tick {
+    /// All inputs of all networks, one after the other.
+    pub observation: Vec<f64>,
+    /// The action as the network gives it.
+    pub action: Vec<f64>,
+    /// What the robot gets.
+    pub targets: Vec<(TargetKind, Vec<f64>)>,
+}
+
+/// A description at work.
+pub struct Runner {
+    plan: Plan,
+    values: Vec<Vec<f64>>,
+    states: Vec<Vec<f64>>,
+    outputs: Vec<Vec<Vec<f32>>>,
+    /// Clocks and histories by value, the latter by their operation, too.
+    clocks: Vec<Option<Phases>>,
+    histories: Vec<Vec<Option<Frames>>>,
+    tick: usize,
+}
+
+impl Runner {
+    /// Starts at the state after a reset.
+    pub fn new(plan: Plan) -> Self {
+        let clock =
+            |maker: &Maker| if let Maker::Clock(clock, _) = maker { Some(Phases::new(clock.clone())) } else { None };
+        let frames = |step: &Step| if let Step::History(spec) = step { Some(Frames::new(*spec)) } else { None };
+        let histories = |maker: &Maker| match maker {
+            Maker::Value(_, steps) => steps.iter().map(frames).collect(),
+            _ => Vec::new(),
+        };
+        let mut runner = Self {
+            values: vec![Vec::new(); plan.values.len()],
+            clocks: plan.values.iter().map(|value| clock(&value.maker)).collect(),
+            histories: plan.values.iter().map(|value| histories(&value.maker)).collect(),
+            states: Vec::new(),
+            outputs: Vec::new(),
+            tick: 0,
+            plan,
+        };
+        runner.reset();
+        runner
+    }
+
+    /// Returns what it runs.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// Returns to the state of the start.
+    pub fn reset(&mut self) {
+        self.states = self.plan.states.iter().map(|state| state.start.clone()).collect();
+        self.clocks.iter_mut().flatten().for_each(Phases::reset);
+        self.histories.iter_mut().flatten().flatten().for_each(Frames::reset);
+        for network in &mut self.plan.networks {
+            network.compute.reset();
+        }
+        let zeros = |lens: &[usize]| lens.iter().map(|len| vec![0.0; *len]).collect();
+        self.outputs = self.plan.networks.iter().map(|network| zeros(network.compute.outputs())).collect();
+        self.tick = 0;
+    }
+
+    /// Computes a tick from the raw inputs, in the order and the lengths of [`Plan::inputs`].
+    ///
+    /// # Panics
+    ///
+    /// If their number or a length is another.
+    pub fn step(&mut self, raw: &[Vec<f64>]) -> Tick {
+        assert!(
+            raw.iter().map(Vec::len).eq(self.plan.inputs.iter().map(|(_, len)| *len)),
+            "raw inputs of other lengths"
+        );
+        let mut observations = vec![Vec::new(); self.plan.networks.len()];
+        for i in 0..self.plan.order.len() {
+            match self.plan.order[i] {
+                Work::Make(slot) => self.values[slot] = self.make(slot, raw),
+                Work::Run(network) => observations[network] = self.run(network),
+            }
+        }
+        self.states = self.plan.states.iter().map(|state| self.values[state.next].clone()).collect();
+        self.tick += 1;
+        Tick {
+            observation: observations.concat(),
+            action: self.values[self.plan.action].clone(),
+            targets: self.plan.targets.iter().map(|(kind, slot)| (*kind, self.values[*slot].clone())).collect(),
+        }
+    }
+
+    fn make(&mut self, slot: usize, raw: &[Vec<f64>]) -> Vec<f64> {
+        match &self.plan.values[slot].maker {
+            Maker::Input(i) => raw[*i].clone(),
+            Maker::State(i) => self.states[*i].clone(),
+            Maker::Clock(_, of) => {
+                let norms: Vec<f64> = of.iter().map(|value| norm(&self.values[*value])).collect();
+                self.clocks[slot].as_mut().map_or_else(Vec::new, |phases| phases.step(&norms))
+            }
+            Maker::Motion { rows, lag, end } => {
+                let (count, len) = (rows.shape[0], rows.values.len() / rows.shape[0]);
+                let row = self.tick.saturating_sub(*lag);
+                let row = if *end == End::Repeat { row % count } else { row.min(count - 1) };
+                rows.values[row * len..][..len].to_vec()
+            }
+            Maker::Output(network, output) => {
+                self.outputs[*network][*output].iter().map(|value| f64::from(*value)).collect()
+            }
+            Maker::Value(from, steps) => {
+                let mut value: Vec<f64> = from.iter().flat_map(|slot| self.values[*slot].iter().copied()).collect();
+                for (step, frames) in steps.iter().zip(&mut self.histories[slot]) {
+                    value = match frames {
+                        Some(frames) => frames.step(&value),
+                        None => apply(step, value, &self.values),
+                    };
+                }
+                value
+            }
+        }
+    }
+
+    /// Runs a network; returns its inputs, one after the other.
+    fn run(&mut self, index: usize) -> Vec<f64> {
+        let network = &mut self.plan.networks[index];
+        let of = |feed: &Feed| match feed {
+            Feed::Value(slot) => self.values[*slot].iter().map(|value| *value as f32).collect(),
+            Feed::Before(output, _) => self.outputs[index][*output].clone(),
+        };
+        let inputs: Vec<Vec<f32>> = network.feeds.iter().map(of).collect();
+        self.outputs[index] = network.compute.step(&inputs);
+        inputs.into_iter().flatten().map(f64::from).collect()
+    }
+}
+
+fn norm(value: &[f64]) -> f64 {
+    value.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// Applies an operation that keeps no state.
+fn apply(step: &Step, mut value: Vec<f64>, values: &[Vec<f64>]) -> Vec<f64> {
+    let mut with = |arg: &Arg, f: fn(f64, f64) -> f64| {
+        let other = match arg {
+            Arg::Numbers(numbers) => numbers,
+            Arg::Slot(slot) => &values[*slot],
+        };
+        for (i, x) in value.iter_mut().enumerate() {
+            *x = f(*x, other[if other.len() == 1 { 0 } else { i }]);
+        }
+    };
+    match step {
+        Step::Select(places) => return places.iter().map(|place| value[*place]).collect(),
+        Step::Place(places) => {
+            let mut placed = vec![0.0; value.len()];
+            places.iter().zip(&value).for_each(|(place, x)| placed[*place] = *x);
+            return placed;
+        }
+        Step::Add(arg) => with(arg, |x, y| x + y),
+        Step::Subtract(arg) => with(arg, |x, y| x - y),
+        Step::Scale(arg) => with(arg, |x, y| x * y),
+        Step::Divide(arg) => with(arg, |x, y| x / y),
+        Step::Clip([low, high]) => {
+            with(high, |x, y| if x > y { y } else { x });
+            with(low, |x, y| if x < y { y } else { x });
+        }
+        Step::Wrap => value.iter_mut().for_each(|x| *x = (*x + PI).rem_euclid(2.0 * PI) - PI),
+        Step::Sin => value.iter_mut().for_each(|x| *x = x.sin()),
+        Step::Cos => value.iter_mut().for_each(|x| *x = x.cos()),
+        Step::Norm => return vec![norm(&value)],
+        Step::Gravity(orientation) => return gravity(*orientation, &value),
+        // A history has a state.
+        Step::History(_) => {}
+    }
+    value
+}
+
+/// Returns the direction of gravity, (0, 0, -1) in the world, in the body's frame.
+fn gravity(orientation: Orientation, value: &[f64]) -> Vec<f64> {
+    let [w, x, y, z] = match (orientation, value) {
+        (Orientation::Wxyz, [w, x, y, z]) | (Orientation::Xyzw, [x, y, z, w]) => {
+            let length = norm(value);
+            [w / length, x / length, y / length, z / length]
+        }
+        (Orientation::Rpy, [roll, pitch, _]) => {
+            return vec![pitch.sin(), -roll.sin() * pitch.cos(), -roll.cos() * pitch.cos()];
+        }
+        _ => return vec![f64::NAN; 3],
+    };
+    vec![2.0 * (w * y - x * z), -2.0 * (y * z + w * x), -(1.0 - 2.0 * (x * x + y * y))]
+}

@@ -1,0 +1,58 @@
+//! The files of a description: networks and arrays.
+
+use actq::error::Result;
+
+use crate::description::Network;
+
+/// A network of a description, in f32.
+pub trait Compute {
+    /// Returns the graph's inputs that its outputs depend on, in the graph's order, with their lengths.
+    fn inputs(&self) -> &[(String, usize)];
+
+    /// Returns the lengths of the outputs that were asked for.
+    fn outputs(&self) -> &[usize];
+
+    /// Forgets the recurrent state.
+    fn reset(&mut self);
+
+    /// Computes the outputs of a tick from the inputs.
+    fn step(&mut self, inputs: &[Vec<f32>]) -> Vec<Vec<f32>>;
+}
+
+/// An array of numbers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Array {
+    /// Lengths of its axes.
+    pub shape: Vec<usize>,
+    /// Its values, the last axis the fastest.
+    pub values: Vec<f64>,
+}
+
+impl Array {
+    /// Returns the number of rows and their length; an array of one axis has rows of one value.
+    ///
+    /// # Errors
+    ///
+    /// If it has no axis.
+    pub fn rows(&self) -> Result<(usize, usize)> {
+        let (rows, row) = self.shape.split_first().ok_or_else(|| actq::error::Error::input("it has no axis"))?;
+        Ok((*rows, row.iter().product()))
+    }
+}
+
+/// Where a description's files come from.
+pub trait Sources {
+    /// Opens a network with some of its outputs.
+    ///
+    /// # Errors
+    ///
+    /// If the file is missing or not supported, or has no such output.
+    fn network(&self, network: &Network, outputs: &[String]) -> Result<Box<dyn Compute>>;
+
+    /// Reads an array of a file.
+    ///
+    /// # Errors
+    ///
+    /// If the file is missing or damaged, or has no such array.
+    fn array(&self, file: &str, name: &str) -> Result<Array>;
+}

@@ -1,0 +1,238 @@
+//! Untrusted YAML files as data: tags are ignored and never run, aliases cannot grow beyond a limit, and each value
+//! knows its line.
+
+use actq::error::{Error, Result, bail, ensure};
+use actq::text::printable;
+use saphyr_parser::{Event, Parser, ScalarStyle};
+
+/// Most values of a file, with those that aliases repeat.
+const MOST_NODES: usize = 100_000;
+/// Most levels.
+const MOST_LEVELS: usize = 64;
+
+/// A value.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Node {
+    /// Line of the file, from 1.
+    pub line: usize,
+    /// Content.
+    pub data: Data,
+}
+
+/// Content of a value.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Data {
+    /// A text, number, truth value or nothing, as written; `true` if it was quoted.
+    Scalar(String, bool),
+    /// Values in order.
+    List(Vec<Node>),
+    /// Values by key, in the order of the file.
+    Map(Vec<(String, Node)>),
+}
+
+impl Node {
+    /// Parses a file with one document.
+    ///
+    /// # Errors
+    ///
+    /// If it is not YAML, has a key twice, or is larger than the limits.
+    pub fn parse(text: &str) -> Result<Self> {
+        let mut reader = Reader { open: Vec::new(), anchors: Vec::new(), nodes: 0, root: None };
+        for event in Parser::new_from_str(text) {
+            let (event, span) =
+                event.map_err(|error| Error::input(format!("not YAML: {}", printable(&error.to_string()))))?;
+            reader.take(event, span.start.line())?;
+        }
+        reader.root.ok_or_else(|| Error::input("the file is empty"))
+    }
+
+    /// Returns the value of a key.
+    pub fn get(&self, key: &str) -> Option<&Self> {
+        match &self.data {
+            Data::Map(entries) => entries.iter().find(|(name, _)| name == key).map(|(_, node)| node),
+            _ => None,
+        }
+    }
+
+    /// Returns keys and values of a map; nothing for other values.
+    pub fn entries(&self) -> &[(String, Self)] {
+        if let Data::Map(entries) = &self.data { entries } else { &[] }
+    }
+
+    /// Returns the values of a list; nothing for other values.
+    pub fn items(&self) -> &[Self] {
+        if let Data::List(items) = &self.data { items } else { &[] }
+    }
+
+    /// Returns the text of a scalar.
+    pub fn text(&self) -> Option<&str> {
+        if let Data::Scalar(text, _) = &self.data { Some(text) } else { None }
+    }
+
+    /// Returns `true` if nothing is given: null, or an empty scalar.
+    pub fn is_null(&self) -> bool {
+        matches!(&self.data, Data::Scalar(text, false) if ["", "~", "null", "Null", "NULL"].contains(&text.as_str()))
+    }
+
+    /// Returns a number, if it is one and finite.
+    pub fn number(&self) -> Option<f64> {
+        match &self.data {
+            Data::Scalar(text, false) => text.replace('_', "").parse().ok().filter(|number: &f64| number.is_finite()),
+            _ => None,
+        }
+    }
+
+    /// Returns a truth value.
+    pub fn truth(&self) -> Option<bool> {
+        match self.text()? {
+            "true" | "True" | "TRUE" | "yes" | "on" => Some(true),
+            "false" | "False" | "FALSE" | "no" | "off" => Some(false),
+            _ => None,
+        }
+    }
+
+    /// Returns a list of numbers; a map of numbers counts as one, in the order of the file.
+    pub fn numbers(&self) -> Option<Vec<f64>> {
+        match &self.data {
+            Data::List(items) => items.iter().map(Self::number).collect(),
+            Data::Map(entries) => entries.iter().map(|(_, node)| node.number()).collect(),
+            Data::Scalar(..) => None,
+        }
+    }
+
+    /// Returns a list of texts.
+    pub fn texts(&self) -> Option<Vec<String>> {
+        match &self.data {
+            Data::List(items) => items.iter().map(|item| item.text().map(str::to_owned)).collect(),
+            _ => None,
+        }
+    }
+
+    fn count(&self) -> usize {
+        1 + match &self.data {
+            Data::Scalar(..) => 0,
+            Data::List(items) => items.iter().map(Self::count).sum(),
+            Data::Map(entries) => entries.iter().map(|(_, node)| node.count()).sum(),
+        }
+    }
+}
+
+/// A list or map whose end has not come.
+struct Open {
+    line: usize,
+    anchor: usize,
+    data: Data,
+    /// Key of a map whose value has not come.
+    key: Option<String>,
+}
+
+/// Makes a value of a parser's events.
+struct Reader {
+    open: Vec<Open>,
+    /// Values by the number of their anchor.
+    anchors: Vec<(usize, Node)>,
+    nodes: usize,
+    root: Option<Node>,
+}
+
+impl Reader {
+    fn take(&mut self, event: Event<'_>, line: usize) -> Result<()> {
+        match event {
+            Event::Scalar(text, style, anchor, _) => {
+                let node = Node { line, data: Data::Scalar(text.into_owned(), style != ScalarStyle::Plain) };
+                self.add(node, anchor)
+            }
+            Event::SequenceStart(anchor, ..) => self.begin(line, anchor, Data::List(Vec::new())),
+            Event::MappingStart(anchor, ..) => self.begin(line, anchor, Data::Map(Vec::new())),
+            Event::SequenceEnd | Event::MappingEnd => match self.open.pop() {
+                Some(open) => self.add(Node { line: open.line, data: open.data }, open.anchor),
+                None => Ok(()),
+            },
+            Event::Alias(anchor) => {
+                let node = self.anchors.iter().find(|(number, _)| *number == anchor).map(|(_, node)| node.clone());
+                let Some(node) = node else { bail!("line {line}: it repeats a value that is not complete") };
+                self.add(node, 0)
+            }
+            Event::DocumentStart(_) if self.root.is_some() => {
+                bail!("line {line}: the file has a second document; remove it")
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn begin(&mut self, line: usize, anchor: usize, data: Data) -> Result<()> {
+        ensure!(self.open.len() < MOST_LEVELS, "line {line}: more than {MOST_LEVELS} levels");
+        self.open.push(Open { line, anchor, data, key: None });
+        Ok(())
+    }
+
+    fn add(&mut self, node: Node, anchor: usize) -> Result<()> {
+        let line = node.line;
+        self.nodes += node.count();
+        ensure!(self.nodes <= MOST_NODES, "line {line}: more than {MOST_NODES} values, with those that aliases repeat");
+        if anchor > 0 {
+            self.anchors.push((anchor, node.clone()));
+        }
+        let Some(open) = self.open.last_mut() else {
+            self.root = Some(node);
+            return Ok(());
+        };
+        match &mut open.data {
+            Data::List(items) => items.push(node),
+            Data::Map(entries) => match open.key.take() {
+                Some(key) => {
+                    ensure!(
+                        entries.iter().all(|(name, _)| *name != key),
+                        "line {line}: key {:?} occurs twice",
+                        printable(&key)
+                    );
+                    entries.push((key, node));
+                }
+                None => match node.data {
+                    Data::Scalar(text, _) => open.key = Some(text),
+                    _ => bail!("line {line}: a key is not a text"),
+                },
+            },
+            Data::Scalar(..) => {}
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_read_with_their_lines() -> Result<()> {
+        let text = "a: 1.5\nb: [1, -2e-3, null]\nc:\n  d: 'x'\n  e: true\ntag: !!python/object/apply:builtins.slice [null, 1]\n";
+        let node = Node::parse(text)?;
+        assert_eq!(node.get("a").and_then(Node::number), Some(1.5));
+        let b = node.get("b").map_or(&[][..], Node::items);
+        assert_eq!((b[1].number(), b[2].is_null()), (Some(-2e-3), true));
+        let e = node.get("c").and_then(|c| c.get("e"));
+        assert_eq!((e.and_then(Node::truth), e.map(|e| e.line)), (Some(true), Some(5)));
+        assert_eq!(node.get("tag").map(|tag| tag.items().len()), Some(2), "a tag is data");
+        Ok(())
+    }
+
+    #[test]
+    fn hostile_files_are_refused() {
+        let bomb: String = (0..30)
+            .fold("a0: &a0 [x, x]\n".to_owned(), |text, i| text + &format!("a{0}: &a{0} [*a{i}, *a{i}]\n", i + 1));
+        let cases = [
+            ("aliases that explode", bomb, "more than 100000 values"),
+            ("deep lists", "[".repeat(1000), "limit"),
+            ("a key twice", "a: 1\na: 2\n".to_owned(), "occurs twice"),
+            ("two documents", "a: 1\n---\nb: 2\n".to_owned(), "second document"),
+            ("an alias of itself", "a: &a [*a]\n".to_owned(), "not complete"),
+            ("nothing", String::new(), "empty"),
+            ("no YAML", "a: [1, 2\n".to_owned(), "not YAML"),
+        ];
+        for (name, text, expected) in cases {
+            let error =
+                Node::parse(&text).map_or_else(|error| error.to_string(), |node| format!("accepted as {node:?}"));
+            assert!(error.contains(expected), "{name}: {error}");
+        }
+    }
+}

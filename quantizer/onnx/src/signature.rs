@@ -1,0 +1,43 @@
+//! What a file says about its graph.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use actq::error::{Context as _, Result};
+
+use crate::file::model::{Model, Port};
+
+/// Inputs, outputs and metadata of an ONNX file.
+#[derive(Clone, Debug)]
+pub struct Signature {
+    /// The graph's inputs in order, with their number of values if it is known.
+    pub inputs: Vec<(String, Option<usize>)>,
+    /// Its outputs, likewise.
+    pub outputs: Vec<(String, Option<usize>)>,
+    /// Texts that the exporter stored (`metadata_props`), by key.
+    pub metadata: BTreeMap<String, String>,
+}
+
+impl Signature {
+    /// Reads a file.
+    ///
+    /// # Errors
+    ///
+    /// If it cannot be read, or is not ONNX.
+    pub fn read(path: &Path) -> Result<Self> {
+        let model = Model::read(path).with_context(|| path.display().to_string())?;
+        let given = |port: &&Port| !model.graph.initializers.contains_key(&port.name);
+        Ok(Self {
+            inputs: model.graph.inputs.iter().filter(given).map(named).collect(),
+            outputs: model.graph.outputs.iter().map(named).collect(),
+            metadata: model.metadata,
+        })
+    }
+}
+
+/// Returns a port's name and number of values, where dynamic axes have the length 1.
+fn named(port: &Port) -> (String, Option<usize>) {
+    let len =
+        port.shape.as_ref().and_then(|axes| axes.iter().map(|axis| axis.unwrap_or(1)).try_fold(1, usize::checked_mul));
+    (port.name.clone(), len)
+}
