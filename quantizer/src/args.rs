@@ -12,7 +12,7 @@ use anyhow::ensure;
 use clap::{Parser, Subcommand, ValueEnum, value_parser};
 
 use link::{KeygenArgs, LinkArgs, SignArgs};
-use values::{clock, forced, group, minutes, npz, pair, positive, rounds, size, width};
+use values::{clock, forced, group, minutes, npz, pair, positive, rounds, size, two_files, width};
 
 /// Quantizes robot policies to 2, 3, 4 or 8 bits and packs them into one image for a microcontroller.
 ///
@@ -27,7 +27,7 @@ pub(crate) struct Cli {
 
 #[derive(Subcommand)]
 pub(crate) enum Command {
-    /// Convert an ONNX file to a policy folder
+    /// Convert an ONNX file to a policy folder, or a deploy bundle to a description
     ///
     /// Reads exports of PyTorch, rsl_rl, Brax, MuJoCo Playground, mjlab, Isaac Lab, Stable-Baselines3, CleanRL and
     /// ML-Agents: matrix products, activations, norms, LSTM and GRU cells, convolutions over few positions, and
@@ -36,7 +36,13 @@ pub(crate) enum Command {
     /// the output named action, or else the only candidate. Nodes that do not lead to it are cut. An error names the
     /// node that cannot be imported.
     ///
+    /// A deploy bundle is what a policy's authors publish for a robot: networks with files about joints, scales and
+    /// histories. The command writes them as one file, deploy.toml (docs/DEPLOY.md), with copies of the networks. It
+    /// asks for what the files do not say, and stops until --accept-profile or --answers gives it.
+    ///
     /// Example: actq import model.onnx --out policies/walker --calib obs.npy --check
+    ///
+    /// Example: actq import bundle --accept-profile --reference raw.npz:expect.npz --out policies/walker
     Import(ImportArgs),
     /// Quantize a policy into an image
     ///
@@ -121,12 +127,13 @@ pub(crate) enum Command {
 
 #[derive(clap::Args)]
 pub(crate) struct ImportArgs {
-    /// The ONNX file; tensors in external files beside it are read, too
+    /// The ONNX file, with its external tensors beside it; or a deploy bundle: a folder, a .kinfer file, or an ONNX
+    /// file with one of the options for bundles
     pub(crate) model: PathBuf,
     /// The policy folder to create: policy.json, policy.safetensors and, with --calib, calib.npz
     #[arg(long, value_name = "POLICY_DIR")]
     pub(crate) out: PathBuf,
-    /// The calibration recording: .npy, .npz or .safetensors
+    /// The calibration recording: .npy, .npz or .safetensors; of a bundle: raw inputs [tick, value] by name, .npz
     #[arg(long, value_name = "FILE")]
     pub(crate) calib: Option<PathBuf>,
     /// The output that is the action, or any value of the graph [default: the output named action, or the only
@@ -142,6 +149,16 @@ pub(crate) struct ImportArgs {
     /// (python3, or the interpreter that ACTQ_PYTHON names)
     #[arg(long)]
     pub(crate) check: bool,
+    /// Bundle: the answers to the questions of an earlier run, a TOML file of their keys
+    #[arg(long, value_name = "FILE")]
+    pub(crate) answers: Option<PathBuf>,
+    /// Bundle: accept what the family's deploy code says where the files say nothing
+    #[arg(long)]
+    pub(crate) accept_profile: bool,
+    /// Bundle: compare with a run of the deploy code, tick by tick, to 1e-5 of the largest value. RAW.npz has the raw
+    /// inputs [tick, value] by name, EXPECT.npz the arrays observation, action and target
+    #[arg(long, value_name = "RAW.npz:EXPECT.npz", value_parser = two_files)]
+    pub(crate) reference: Option<(PathBuf, PathBuf)>,
     /// Replace existing files
     #[arg(long)]
     pub(crate) force: bool,

@@ -1,5 +1,6 @@
 //! One file for each subcommand of `actq`.
 
+mod bundle;
 mod drive;
 pub(crate) mod eval;
 pub(crate) mod import;

@@ -1,5 +1,7 @@
 //! The files of a bundle.
 
+use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
@@ -21,6 +23,8 @@ pub struct Bundle {
     root: PathBuf,
     /// Paths from the root, in alphabetical order.
     files: Vec<String>,
+    /// Networks by file and outputs, since reading one takes longer than running it.
+    opened: RefCell<BTreeMap<(String, Vec<String>), OnnxNetwork>>,
 }
 
 impl Bundle {
@@ -35,7 +39,11 @@ impl Bundle {
         if is_file {
             let name = path.file_name().and_then(|name| name.to_str());
             let name = name.with_context(|| format!("{}: the name is not UTF-8", shown()))?.to_owned();
-            return Ok(Self { root: path.parent().unwrap_or(Path::new("")).to_owned(), files: vec![name] });
+            return Ok(Self {
+                root: path.parent().unwrap_or(Path::new("")).to_owned(),
+                files: vec![name],
+                opened: RefCell::default(),
+            });
         }
         let mut files = Vec::new();
         let (mut open, mut seen) = (vec![String::new()], 0);
@@ -59,12 +67,17 @@ impl Bundle {
             }
         }
         files.sort();
-        Ok(Self { root: path.to_owned(), files })
+        Ok(Self { root: path.to_owned(), files, opened: RefCell::default() })
     }
 
     /// Returns the folder that paths start at.
     pub fn root(&self) -> &Path {
         &self.root
+    }
+
+    /// Returns `true` if the bundle has this file, by its path from the root.
+    pub fn has(&self, file: &str) -> bool {
+        self.files.iter().any(|own| own == file)
     }
 
     /// Returns the files with an extension.
@@ -120,7 +133,13 @@ impl Bundle {
 
 impl Sources for Bundle {
     fn network(&self, network: &Network, outputs: &[String]) -> Result<Box<dyn Compute>> {
-        Ok(Box::new(OnnxNetwork::open(&self.path(&network.file)?, outputs)?))
+        let key = (network.file.clone(), outputs.to_vec());
+        if let Some(opened) = self.opened.borrow().get(&key) {
+            return Ok(Box::new(opened.clone()));
+        }
+        let opened = OnnxNetwork::open(&self.path(&network.file)?, outputs)?;
+        self.opened.borrow_mut().insert(key, opened.clone());
+        Ok(Box::new(opened))
     }
 
     fn array(&self, file: &str, name: &str) -> Result<Array> {

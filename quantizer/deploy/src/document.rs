@@ -33,6 +33,11 @@ impl Document {
         Ok(Self { file: file.to_owned(), root, read: RefCell::default() })
     }
 
+    /// Takes a value that is part of another file; `file` names it, for reports and errors.
+    pub fn of(file: &str, root: Node) -> Self {
+        Self { file: file.to_owned(), root, read: RefCell::default() }
+    }
+
     /// Returns the keys of a map at a path of keys with points between them; the empty path is the whole file. Nothing
     /// counts as read.
     pub fn keys(&self, path: &str) -> Vec<&str> {

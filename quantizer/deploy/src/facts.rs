@@ -184,7 +184,7 @@ impl Facts {
     pub fn contradiction(what: &str, first: (&str, &str), second: (&str, &str)) -> Error {
         let shown = |text: &str| text.chars().take(300).collect::<String>();
         Error::input(format!(
-            "{what}: the bundle contradicts itself.\n  {} says {}\n  {} says {}\nCorrect one of them.",
+            "{what}: the bundle contradicts itself: {} says {}, and {} says {}; correct one of them",
             first.0,
             shown(first.1),
             second.0,

@@ -1,9 +1,21 @@
 //! The families that this crate reads. To add one, append it to [`FAMILIES`].
 
 mod common;
+mod holosoma;
+mod humanoidverse;
+mod kinfer;
+mod limx;
+mod mjlab;
 mod unitree_rl_lab;
 
 use crate::family::Family;
 
 /// All families; the first that recognizes a bundle reads it.
-pub static FAMILIES: &[&dyn Family] = &[&unitree_rl_lab::UnitreeRlLab];
+pub static FAMILIES: &[&dyn Family] = &[
+    &limx::Limx,
+    &unitree_rl_lab::UnitreeRlLab,
+    &humanoidverse::Humanoidverse,
+    &holosoma::Holosoma,
+    &kinfer::Kinfer,
+    &mjlab::Mjlab,
+];

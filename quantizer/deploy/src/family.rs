@@ -2,13 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use actq::error::{Context as _, Result, ensure};
+use actq::error::{Context as _, Result, bail};
 
 use crate::bundle::Bundle;
 use crate::description::Description;
 use crate::document::Document;
 use crate::facts::{Answers, Facts, Profile, Question};
 use crate::families::FAMILIES;
+
+/// File of a description, in a bundle's folder. Where it is, no reader is needed.
+pub const DESCRIPTION: &str = "deploy.toml";
 
 /// A family: bundles that one exporter writes and one deploy code reads.
 pub trait Family: Sync {
@@ -64,6 +67,11 @@ pub struct Reading {
 ///
 /// If no family recognizes it, or its reader fails.
 pub fn read(bundle: &Bundle, accepted: bool, answers: Answers) -> Result<Reading> {
+    if bundle.has(DESCRIPTION) {
+        let description = bundle.text(DESCRIPTION).and_then(|text| Description::parse(&text).context(DESCRIPTION))?;
+        let (sources, questions, unread) = Default::default();
+        return Ok(Reading { family: DESCRIPTION.to_owned(), description, sources, questions, unread });
+    }
     for family in FAMILIES {
         let Some(found) = family.recognize(bundle)? else { continue };
         let profile = Profile::parse(family.profile())?;
@@ -76,11 +84,9 @@ pub fn read(bundle: &Bundle, accepted: bool, answers: Answers) -> Result<Reading
     }
     let known = FAMILIES.iter().map(|family| Profile::parse(family.profile()).map(|profile| profile.family));
     let known: Vec<String> = known.collect::<Result<_>>()?;
-    ensure!(
-        false,
+    bail!(
         "{}: no known family of deploy bundles ({}); write deploy.toml beside the files by docs/DEPLOY.md",
         bundle.root().display(),
         known.join(", ")
-    );
-    unreachable!("the condition above is false")
+    )
 }

@@ -1,6 +1,7 @@
 //! Networks of ONNX files, in f32.
 
 use std::path::Path;
+use std::rc::Rc;
 
 use actq::contract::ActionContract;
 use actq::error::{Context as _, Result, ensure};
@@ -10,7 +11,8 @@ use actq_onnx::{Choice, Signature, import};
 
 use crate::sources::Compute;
 
-/// An ONNX file's graph, one policy for each of its outputs.
+/// An ONNX file's graph, one policy for each of its outputs. Clones share the weights and not the recurrent state.
+#[derive(Clone, Debug)]
 pub(crate) struct OnnxNetwork {
     inputs: Vec<(String, usize)>,
     lens: Vec<usize>,
@@ -18,9 +20,10 @@ pub(crate) struct OnnxNetwork {
 }
 
 /// An output and the inputs that it depends on.
+#[derive(Clone, Debug)]
 struct Output {
-    policy: Policy,
-    weights: Weights,
+    policy: Rc<Policy>,
+    weights: Rc<Weights>,
     state: State,
     /// Numbers of the file's inputs, in the order of its observation.
     reads: Vec<usize>,
@@ -45,7 +48,7 @@ impl OnnxNetwork {
                 reads.push(at);
             }
             let (weights, state) = (Weights::of(&policy.graph), zero_state(&policy.graph, 1));
-            opened.push(Output { policy, weights, state, reads });
+            opened.push(Output { policy: Rc::new(policy), weights: Rc::new(weights), state, reads });
         }
         // Inputs that no output depends on are left out, and the others move up.
         let used: Vec<usize> = (0..lens.len()).filter(|i| lens[*i].is_some()).collect();

@@ -14,8 +14,10 @@ use crate::sources::{Array, Compute, Sources};
 pub(crate) use names::Names;
 pub(crate) use ops::{Arg, Step};
 
-/// Most values that one name may have.
-const MOST: usize = 1 << 20;
+/// Most values that one name may have: what an image can address.
+const MOST: usize = u16::MAX as usize;
+/// Most values of all names together.
+const MOST_IN_ALL: usize = 1 << 18;
 
 /// Index of a value among all of a description.
 pub(crate) type Slot = usize;
@@ -38,7 +40,6 @@ pub(crate) enum Maker {
 
 /// A value.
 pub(crate) struct Planned {
-    pub(crate) name: String,
     pub(crate) maker: Maker,
     /// One for each of its numbers.
     pub(crate) labels: Vec<Label>,
@@ -108,6 +109,7 @@ impl Plan {
             sources,
             values: BTreeMap::new(),
             open: Vec::new(),
+            in_all: 0,
             plan: Self {
                 values: Vec::new(),
                 networks: Vec::new(),
@@ -151,6 +153,8 @@ struct Builder<'a> {
     values: BTreeMap<String, Slot>,
     /// Names whose values are being made.
     open: Vec<String>,
+    /// Values of all names so far.
+    in_all: usize,
     plan: Plan,
 }
 
@@ -180,7 +184,7 @@ impl Builder<'_> {
             }
             let labels = labels(&input.name, len, joints);
             self.plan.inputs.push((input.name.clone(), len));
-            self.add(&input.name, Maker::Input(i), labels, input.joints.clone());
+            self.add(&input.name, Maker::Input(i), labels, input.joints.clone())?;
         }
         for (i, state) in description.states.iter().enumerate() {
             ensure!(
@@ -189,7 +193,7 @@ impl Builder<'_> {
                 state.name,
                 state.len
             );
-            self.add(&state.name, Maker::State(i), labels(&state.name, state.len, None), None);
+            self.add(&state.name, Maker::State(i), labels(&state.name, state.len, None), None)?;
         }
         // Every value is made and so checked, even if nothing reads it.
         let all: Vec<String> = self.names.all().map(str::to_owned).collect();
@@ -240,12 +244,14 @@ impl Builder<'_> {
         Ok(())
     }
 
-    fn add(&mut self, name: &str, maker: Maker, labels: Vec<Label>, joints: Option<String>) -> Slot {
+    fn add(&mut self, name: &str, maker: Maker, labels: Vec<Label>, joints: Option<String>) -> Result<Slot> {
+        self.in_all += labels.len();
+        ensure!(self.in_all <= MOST_IN_ALL, "{name:?}: with it there are more than {MOST_IN_ALL} values");
         let slot = self.plan.values.len();
-        self.plan.values.push(Planned { name: name.to_owned(), maker, labels, joints });
+        self.plan.values.push(Planned { maker, labels, joints });
         self.values.insert(name.to_owned(), slot);
         self.plan.order.push(Work::Make(slot));
-        slot
+        Ok(slot)
     }
 
     fn joints(&self, order: &str, key: &str) -> Result<&[String]> {
@@ -284,7 +290,7 @@ impl Builder<'_> {
             );
             ops::finite(&array.values).context(key)?;
             let maker = Maker::Motion { rows: array, lag: motion.lag, end: motion.end };
-            return Ok(self.add(name, maker, labels(name, row, None), None));
+            return self.add(name, maker, labels(name, row, None), None);
         }
         if let Some(value) = description.values.iter().find(|value| value.name == name) {
             return self.chain(value);
@@ -321,7 +327,7 @@ impl Builder<'_> {
             }
         }
         let labels = labels(&clock.name, clock.start.len(), None);
-        Ok(self.add(&clock.name, Maker::Clock(clock.clone(), of), labels, None))
+        self.add(&clock.name, Maker::Clock(clock.clone(), of), labels, None)
     }
 
     /// Opens a network and adds the values of its outputs.
@@ -370,7 +376,7 @@ impl Builder<'_> {
         for (i, (output, len)) in outputs.iter().zip(lens).enumerate() {
             let name = format!("{}.{output}", network.name);
             let labels = labels(&name, len, None);
-            self.add(&name, Maker::Output(number, i), labels, None);
+            self.add(&name, Maker::Output(number, i), labels, None)?;
         }
         Ok(())
     }

@@ -7,79 +7,49 @@ use std::path::Path;
 
 use actq::data::arrays;
 use actq::error::{Context as _, Error, Result, ensure};
+use actq::import::values::Tensor;
 
+use crate::conventions::{Variant, variants};
+use crate::description::Description;
 use crate::plan::Plan;
-use crate::run::Runner;
-use crate::sources::Array;
+use crate::run::{Runner, Tick};
+use crate::sources::{Array, Sources};
 
 /// Largest difference, as a share of the largest value of its array.
 pub const TOLERANCE: f64 = 1e-5;
 
-/// A reference: what goes in, and what comes out.
+/// Raw inputs `[tick, value]` by name.
 #[derive(Clone, Debug)]
-pub struct Reference {
+pub struct Raw {
     ticks: usize,
-    /// Raw inputs `[tick, value]` by name.
-    raw: BTreeMap<String, Array>,
-    /// Of "observation", "action" and "target", those that the file has.
-    expected: BTreeMap<&'static str, Array>,
+    arrays: BTreeMap<String, Array>,
 }
 
-/// Arrays of a reference's second file.
-const KINDS: [&str; 3] = ["observation", "action", "target"];
-
-impl Reference {
-    /// Reads the raw inputs and the expected results, two .npz files.
+impl Raw {
+    /// Reads the arrays of an .npz file.
     ///
     /// # Errors
     ///
-    /// If a file cannot be read, holds no ticks, or arrays of different numbers of ticks.
-    pub fn read(raw: &Path, expect: &Path) -> Result<Self> {
-        let of = |path: &Path| -> Result<BTreeMap<String, Array>> {
-            let numbers = |(name, tensor): (String, actq::import::values::Tensor)| {
-                let values = tensor.values.to_f64();
-                let values = values.with_context(|| {
-                    format!("{}: array {name:?} is of type {}", path.display(), tensor.values.type_name())
-                })?;
-                Ok((name, Array { shape: tensor.shape, values }))
-            };
-            arrays(path)?.into_iter().map(numbers).collect()
-        };
-        let (raw_arrays, mut expected) = (of(raw)?, of(expect)?);
-        let expected: BTreeMap<_, _> =
-            KINDS.into_iter().filter_map(|kind| Some((kind, expected.remove(kind)?))).collect();
-        ensure!(!expected.is_empty(), "{}: it has none of the arrays {}", expect.display(), KINDS.join(", "));
-        let all = raw_arrays.iter().map(|(name, array)| (name.as_str(), array));
-        let all = all.chain(expected.iter().map(|(name, array)| (*name, array)));
-        let mut ticks = None;
-        for (name, array) in all {
-            let (rows, _) = array.rows().with_context(|| format!("array {name:?}"))?;
-            let first = *ticks.get_or_insert(rows);
-            ensure!(rows == first, "array {name:?} has {rows} ticks, and others {first}");
-        }
-        let ticks = ticks.filter(|ticks| *ticks > 0);
-        let ticks = ticks.with_context(|| format!("{}: it has no ticks", raw.display()))?;
-        Ok(Self { ticks, raw: raw_arrays, expected })
-    }
-
-    /// Returns the number of ticks.
-    pub fn ticks(&self) -> usize {
-        self.ticks
+    /// If it cannot be read, or its arrays have no ticks or different numbers of them.
+    pub fn read(path: &Path) -> Result<Self> {
+        let arrays = numbers(path)?;
+        let ticks = ticks(&arrays, None).with_context(|| path.display().to_string())?;
+        Ok(Self { ticks, arrays })
     }
 
     /// Returns the raw arrays that no input has the name of.
     pub fn unused<'a>(&'a self, plan: &'a Plan) -> impl Iterator<Item = &'a str> {
         let known = |name: &&str| plan.inputs.iter().any(|(input, _)| input == name);
-        self.raw.keys().map(String::as_str).filter(move |name| !known(name))
+        self.arrays.keys().map(String::as_str).filter(move |name| !known(name))
     }
 
     /// Returns the raw inputs of each tick, in the plan's order.
     fn frames(&self, plan: &Plan) -> Result<Vec<Vec<Vec<f64>>>> {
         let mut frames = vec![Vec::with_capacity(plan.inputs.len()); self.ticks];
         for (name, len) in &plan.inputs {
-            let array = self.raw.get(name).with_context(|| {
-                let all = self.raw.keys().cloned().collect::<Vec<_>>().join(", ");
-                format!("the reference has no raw array {name:?}; it has {all}")
+            let array = self.arrays.get(name).with_context(|| {
+                let all = self.arrays.keys().cloned().collect::<Vec<_>>().join(", ");
+                format!("there is no raw array {name:?}; there are {all}")
             })?;
             let (_, row) = array.rows()?;
             ensure!(row == *len, "raw array {name:?} has {row} values a tick, and the input {len}");
@@ -90,17 +60,96 @@ impl Reference {
         Ok(frames)
     }
 
+    /// Runs a plan on the raw inputs.
+    ///
+    /// # Errors
+    ///
+    /// If an input is missing or has another length.
+    pub fn run(&self, plan: Plan) -> Result<Vec<Tick>> {
+        let frames = self.frames(&plan)?;
+        let mut runner = Runner::new(plan);
+        Ok(frames.iter().map(|frame| runner.step(frame)).collect())
+    }
+}
+
+/// A reference: what goes in, and what comes out.
+#[derive(Clone, Debug)]
+pub struct Reference {
+    raw: Raw,
+    /// Of "observation", "action" and "target", those that the file has.
+    expected: BTreeMap<&'static str, Array>,
+}
+
+/// Arrays of a reference's second file.
+const KINDS: [&str; 3] = ["observation", "action", "target"];
+
+/// Reads all arrays of a file as numbers.
+fn numbers(path: &Path) -> Result<BTreeMap<String, Array>> {
+    let array = |(name, tensor): (String, Tensor)| {
+        let values = tensor.values.to_f64();
+        let values = values
+            .with_context(|| format!("{}: array {name:?} is of type {}", path.display(), tensor.values.type_name()))?;
+        Ok((name, Array { shape: tensor.shape, values }))
+    };
+    arrays(path)?.into_iter().map(array).collect()
+}
+
+/// Returns the number of ticks of arrays, which all have the same, and `expected` if it is given.
+fn ticks<'a>(
+    arrays: impl IntoIterator<Item = (&'a (impl AsRef<str> + ?Sized + 'a), &'a Array)>,
+    expected: Option<usize>,
+) -> Result<usize> {
+    let mut ticks = expected;
+    for (name, array) in arrays {
+        let name = name.as_ref();
+        let (rows, row) = array.rows().with_context(|| format!("array {name:?}"))?;
+        let first = *ticks.get_or_insert(rows);
+        ensure!(rows == first, "array {name:?} has {rows} ticks, and others {first}");
+        ensure!(row > 0, "array {name:?} has no values");
+    }
+    ticks.filter(|ticks| *ticks > 0).context("it has no ticks")
+}
+
+impl Reference {
+    /// Reads the raw inputs and the expected results, two .npz files.
+    ///
+    /// # Errors
+    ///
+    /// If a file cannot be read, holds no ticks, or arrays of different numbers of ticks.
+    pub fn read(raw: &Path, expect: &Path) -> Result<Self> {
+        let (raw, mut expected) = (Raw::read(raw)?, numbers(expect)?);
+        let expected: BTreeMap<_, _> =
+            KINDS.into_iter().filter_map(|kind| Some((kind, expected.remove(kind)?))).collect();
+        ensure!(!expected.is_empty(), "{}: it has none of the arrays {}", expect.display(), KINDS.join(", "));
+        let named = expected.iter().map(|(name, array)| (*name, array));
+        ticks(named, Some(raw.ticks)).with_context(|| expect.display().to_string())?;
+        Ok(Self { raw, expected })
+    }
+
+    /// Returns the raw inputs.
+    pub fn raw(&self) -> &Raw {
+        &self.raw
+    }
+
     /// Runs a plan on the raw inputs and compares the results.
     ///
     /// # Errors
     ///
     /// If an array is missing or has another length.
     pub fn compare(&self, plan: Plan) -> Result<Comparison> {
-        let frames = self.frames(&plan)?;
+        self.run(plan, false)
+    }
+
+    /// Compares, up to the first difference only if `first` is `true`.
+    fn run(&self, plan: Plan, first: bool) -> Result<Comparison> {
+        let frames = self.raw.frames(&plan)?;
         let observation_labels: Vec<String> = plan.observation_labels().iter().map(ToString::to_string).collect();
         let mut runner = Runner::new(plan);
-        let mut comparison = Comparison { ticks: self.ticks, largest: BTreeMap::new(), first: None };
+        let mut comparison = Comparison { ticks: self.raw.ticks, largest: BTreeMap::new(), first: None };
         for (t, frame) in frames.iter().enumerate() {
+            if first && comparison.first.is_some() {
+                break;
+            }
             let tick = runner.step(frame);
             let target: Vec<f64> = tick.targets.iter().flat_map(|(_, value)| value.iter().copied()).collect();
             for (kind, values) in KINDS.into_iter().zip([&tick.observation, &tick.action, &target]) {
@@ -129,6 +178,21 @@ impl Reference {
         }
         Ok(comparison)
     }
+}
+
+/// Returns the conventions that explain a difference: those that agree with the reference if they alone are changed.
+///
+/// # Errors
+///
+/// If the reference does not fit the description.
+pub fn explain(description: &Description, sources: &dyn Sources, reference: &Reference) -> Result<Vec<String>> {
+    let agrees = |variant: &Variant| -> bool {
+        // A variant whose lengths do not fit is no explanation.
+        let compared = Plan::new(&variant.description, sources).and_then(|plan| reference.run(plan, true));
+        compared.is_ok_and(|comparison| comparison.first.is_none())
+    };
+    reference.raw.frames(&Plan::new(description, sources)?)?;
+    Ok(variants(description).into_iter().filter(agrees).map(|variant| variant.convention).collect())
 }
 
 /// Result of a comparison.

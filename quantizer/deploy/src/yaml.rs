@@ -37,6 +37,14 @@ impl Node {
     ///
     /// If it is not YAML, has a key twice, or is larger than the limits.
     pub fn parse(text: &str) -> Result<Self> {
+        // Other parsers accept a closing bracket in the column of its key, as many files have it.
+        Self::parse_strictly(text).or_else(|error| match with_deeper_brackets(text) {
+            Some(text) => Self::parse_strictly(&text),
+            None => Err(error),
+        })
+    }
+
+    fn parse_strictly(text: &str) -> Result<Self> {
         let mut reader = Reader { open: Vec::new(), anchors: Vec::new(), nodes: 0, root: None };
         for event in Parser::new_from_str(text) {
             let (event, span) =
@@ -115,6 +123,29 @@ impl Node {
             Data::Map(entries) => entries.iter().map(|(_, node)| node.count()).sum(),
         }
     }
+}
+
+/// Moves closing brackets that begin a line to the right of the line before; `None` if there are none, or the text would
+/// grow to a multiple.
+fn with_deeper_brackets(text: &str) -> Option<String> {
+    let mut deeper = String::with_capacity(text.len());
+    let mut before = 0;
+    for line in text.split_inclusive('\n') {
+        let content = line.trim_start_matches(' ');
+        let mut column = line.len() - content.len();
+        if content.starts_with([']', '}']) && column <= before {
+            deeper.extend(std::iter::repeat_n(' ', before + 1 - column));
+            column = before + 1;
+        }
+        if !content.trim().is_empty() {
+            before = column;
+        }
+        deeper.push_str(line);
+        if deeper.len() > 2 * text.len() + 1024 {
+            return None;
+        }
+    }
+    (deeper.len() > text.len()).then_some(deeper)
 }
 
 /// A list or map whose end has not come.
@@ -213,6 +244,19 @@ mod tests {
         let e = node.get("c").and_then(|c| c.get("e"));
         assert_eq!((e.and_then(Node::truth), e.map(|e| e.line)), (Some(true), Some(5)));
         assert_eq!(node.get("tag").map(|tag| tag.items().len()), Some(2), "a tag is data");
+        Ok(())
+    }
+
+    #[test]
+    fn closing_brackets_may_be_in_the_column_of_their_key() -> Result<()> {
+        let text = "a:\n  b: [\n    1,\n    # more\n    2,\n  ] \n  c: {\n    x: [\n      3,\n    ],\n}\n  d: [\n  ]\n  e: 4\n";
+        let node = Node::parse(text)?;
+        let at = |key: &str| node.get("a").and_then(|a| a.get(key)).cloned();
+        assert_eq!(at("b").and_then(|b| b.numbers()), Some(vec![1.0, 2.0]));
+        assert_eq!(at("c").and_then(|c| c.get("x")?.numbers()), Some(vec![3.0]));
+        assert_eq!(at("e").map(|e| (e.number(), e.line)), Some((Some(4.0), 14)));
+        let error = Node::parse("a:\n  b: [\n  ]\n  b: 1\n").expect_err("a key twice");
+        assert!(error.to_string().contains("occurs twice"), "{error}");
         Ok(())
     }
 

@@ -15,6 +15,13 @@ pub(super) fn pair(text: &str) -> Result<(String, String), String> {
     Ok((from.to_owned(), to.to_owned()))
 }
 
+/// Parses two files with a colon between them.
+pub(super) fn two_files(text: &str) -> Result<(PathBuf, PathBuf), String> {
+    let both = text.rsplit_once(':').filter(|(first, second)| !first.is_empty() && !second.is_empty());
+    let (first, second) = both.ok_or_else(|| "use the form RAW.npz:EXPECT.npz".to_owned())?;
+    Ok((first.into(), second.into()))
+}
+
 pub(super) fn rounds(text: &str) -> Result<usize, String> {
     let known = text.parse().ok().filter(|n| (1..=100).contains(n));
     known.ok_or_else(|| "use 1 to 100 rounds".to_owned())

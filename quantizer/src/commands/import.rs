@@ -8,14 +8,18 @@ use actq::policy::Policy;
 use actq_onnx::{Choice, import};
 use anyhow::{Context as _, Result, ensure};
 
+use super::bundle;
 use crate::args::ImportArgs;
 use crate::check::check;
 use crate::outputs::unfinished::OutputFolder;
 use crate::report::{imported, notes};
 use crate::terminal::{note, print, reserve};
 
-/// Converts an ONNX file to a policy folder and prints a summary.
+/// Converts an ONNX file to a policy folder, or a deploy bundle to a description, and prints a summary.
 pub(crate) fn run(args: &ImportArgs) -> Result<()> {
+    if bundle::is_bundle(args) {
+        return bundle::run(args);
+    }
     let choice = Choice { output: args.output.clone(), states: args.state.clone() };
     let imported = import(&args.model, &choice)?;
     let [json, weights] = FILES.map(|name| args.out.join(name));
@@ -24,14 +28,9 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
     note(calib.as_ref().and_then(notes::single_steps));
     note(notes::without_limits((0..policy.act_len).map(|i| policy.contract.limits(i))));
     let [calib_npz, others @ ..] = Recording::Calib.paths(&args.out);
-    ensure!(
-        args.out.is_dir() || !args.out.exists(),
-        "{}: exists and is not a folder; pass the name of a folder to --out",
-        args.out.display()
-    );
-    for path in [&json, &weights].into_iter().chain(calib.is_some().then_some(&calib_npz)) {
-        ensure!(args.force || !path.exists(), "{}: exists; pass --force to replace it", path.display());
-    }
+    let names: Vec<&Path> =
+        [&json, &weights].into_iter().chain(calib.is_some().then_some(&calib_npz)).map(|p| &**p).collect();
+    refuse_existing(args, &names)?;
     let other = others.iter().find(|path| calib.is_some() && path.exists());
     ensure!(
         other.is_none(),
@@ -40,8 +39,6 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
     );
     let _folder =
         OutputFolder::new(&args.out).with_context(|| format!("{}: cannot create the folder", args.out.display()))?;
-    let names: Vec<&Path> =
-        [&json, &weights].into_iter().chain(calib.is_some().then_some(&calib_npz)).map(|p| &**p).collect();
     let inputs: Vec<_> = [Some(args.model.clone()), args.calib.clone()].into_iter().flatten().collect();
     let outputs = reserve(&names, &inputs)?;
     let checked = match args.check {
@@ -61,4 +58,17 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
         "written   {}\n",
         names.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ")
     ))
+}
+
+/// Refuses to replace files without --force, and an output folder that is something else.
+pub(super) fn refuse_existing(args: &ImportArgs, files: &[&Path]) -> Result<()> {
+    ensure!(
+        args.out.is_dir() || !args.out.exists(),
+        "{}: exists and is not a folder; pass the name of a folder to --out",
+        args.out.display()
+    );
+    for path in files {
+        ensure!(args.force || !path.exists(), "{}: exists; pass --force to replace it", path.display());
+    }
+    Ok(())
 }

@@ -7,6 +7,7 @@ use crate::description::{
     Target, TargetKind, Value,
 };
 use crate::facts::Facts;
+use crate::yaml::Node;
 
 /// Stands for the policy's output until [`Parts::network`] knows its name.
 const ACTION: &str = "policy.ACTION";
@@ -79,6 +80,17 @@ impl Parts {
         }
     }
 
+    /// Adds a raw input in the order of a list of joints.
+    pub(super) fn raw_joints(&mut self, name: &str, joints: &str, unit: &str) {
+        let (unit, joints) = (Some(unit.to_owned()), Some(joints.to_owned()));
+        self.description.inputs.push(Input { name: name.to_owned(), len: None, joints, unit, range: None });
+    }
+
+    /// Adds a list of joint names.
+    pub(super) fn joints(&mut self, order: &str, names: Vec<String>) {
+        self.description.joints.insert(order.to_owned(), names);
+    }
+
     /// Adds a raw input for the term of its name; returns the operations on it, which are none.
     pub(super) fn input(&mut self, name: &str, len: usize, unit: &str) -> Vec<Op> {
         self.input_as(name, name, len, unit)
@@ -99,6 +111,24 @@ impl Parts {
         Vec::new()
     }
 
+    /// Adds a state that starts at zero.
+    pub(super) fn kept(&mut self, name: &str, len: usize, next: &str) {
+        let state = State { name: name.to_owned(), len, start: Numbers::default(), next: next.to_owned() };
+        self.description.states.push(state);
+    }
+
+    /// Adds a state that starts at a number.
+    pub(super) fn kept_from(&mut self, name: &str, len: usize, start: f64, next: &str) {
+        let state = State { name: name.to_owned(), len, start: Numbers::All(start), next: next.to_owned() };
+        self.description.states.push(state);
+    }
+
+    /// Adds numbers as a value: a state that stays as it starts.
+    pub(super) fn unchanged(&mut self, name: &str, numbers: Vec<f64>) {
+        let (len, start) = (numbers.len(), Numbers::Each(numbers));
+        self.description.states.push(State { name: name.to_owned(), len, start, next: name.to_owned() });
+    }
+
     pub(super) fn clock(&mut self, clock: Clock) {
         self.description.clocks.push(clock);
     }
@@ -115,12 +145,12 @@ impl Parts {
         if taken { format!("{term}_term") } else { term.to_owned() }
     }
 
-    /// Ends the term that was begun last; `length` frames of it are observed.
-    pub(super) fn term(&mut self, _term: &str, ops: Vec<Op>, length: usize) {
-        if let Some(value) = self.description.values.last_mut() {
-            value.ops = ops;
-            self.terms.push((value.name.clone(), length));
-        }
+    /// Ends the term that was begun last; `length` frames of it are observed. Returns the name of its value.
+    pub(super) fn term(&mut self, ops: Vec<Op>, length: usize) -> String {
+        let Some(value) = self.description.values.last_mut() else { return String::new() };
+        value.ops = ops;
+        self.terms.push((value.name.clone(), length));
+        value.name.clone()
     }
 
     /// Makes the observation of the terms and their histories.
@@ -149,6 +179,28 @@ impl Parts {
         self.description.values.push(Value { name: name.to_owned(), from: From::One(from.to_owned()), ops });
     }
 
+    /// Adds a value made of several.
+    pub(super) fn values(&mut self, name: &str, from: &[&str]) {
+        let from = From::Many(from.iter().map(|&name| name.to_owned()).collect());
+        self.description.values.push(Value { name: name.to_owned(), from, ops: Vec::new() });
+    }
+
+    /// Adds a network that reads one value by its only input; returns the name of its only output's value.
+    pub(super) fn network_of(&mut self, name: &str, ports: &(String, String), file: &str, value: &str) -> String {
+        self.description.networks.push(Network {
+            name: name.to_owned(),
+            file: file.to_owned(),
+            inputs: [(ports.0.clone(), value.to_owned())].into(),
+            states: [].into(),
+        });
+        format!("{name}.{}", ports.1)
+    }
+
+    /// Adds a network with several inputs.
+    pub(super) fn wired(&mut self, network: Network) {
+        self.description.networks.push(network);
+    }
+
     /// Adds the policy's network, which reads the observation, and its action's name everywhere.
     pub(super) fn network(&mut self, file: &str, input: &str, output: &str) {
         self.description.networks.push(Network {
@@ -167,6 +219,11 @@ impl Parts {
 
     pub(super) fn target(&mut self, kind: TargetKind, value: &str) {
         self.description.targets.push(Target { kind, value: value.to_owned(), joints: None });
+    }
+
+    /// Adds a target in the order of a list of joints.
+    pub(super) fn target_joints(&mut self, kind: TargetKind, value: &str, joints: &str) {
+        self.description.targets.push(Target { kind, value: value.to_owned(), joints: Some(joints.to_owned()) });
     }
 
     pub(super) fn gains(&mut self, gains: Gains) {
@@ -204,4 +261,10 @@ pub(super) fn gravity(parts: &mut Parts, facts: &mut Facts) -> Result<Vec<Op>> {
     };
     parts.input_as("projected_gravity", name, len, "");
     Ok(vec![Op::Gravity(orientation)])
+}
+
+/// Reads a number of values or frames.
+pub(super) fn count(node: &Node) -> Option<usize> {
+    let number = node.number()?;
+    (number >= 0.0 && number.fract() == 0.0 && number < 1e5).then_some(number as usize)
 }

@@ -3,7 +3,7 @@
 use actq::error::{Context as _, Result, bail, ensure};
 use actq_onnx::Signature;
 
-use super::common::{Histories, Parts, gravity};
+use super::common::{Histories, Parts, count, gravity};
 use crate::bundle::Bundle;
 use crate::description::{Description, Gains, Op, Operand, Order, TargetKind};
 use crate::document::Document;
@@ -106,7 +106,6 @@ impl Family for UnitreeRlLab {
                     parts.input(other, len, "")
                 }
             };
-            facts.note(term, yaml.at(&path));
             let mut ops = ops;
             let clip =
                 yaml.maybe(&format!("{path}.clip"), "two numbers", |node| <[f64; 2]>::try_from(node.numbers()?).ok())?;
@@ -119,7 +118,8 @@ impl Family for UnitreeRlLab {
             ops.extend(both.into_iter().flatten());
             let length =
                 yaml.maybe(&format!("{path}.history_length"), "a number of frames", count)?.unwrap_or(1).max(1);
-            parts.term(term, ops, length);
+            let name = parts.term(ops, length);
+            facts.note(&name, yaml.at(&path));
         }
         parts.observe(&histories)?;
 
@@ -194,14 +194,10 @@ impl UnitreeRlLab {
         }
         parts.value("processed", "policy.ACTION", ops);
         parts.value("target", "processed", vec![Op::Place(Order::Places(map.to_vec()))]);
+        facts.note("processed", yaml.at(&format!("actions.{action}")));
+        facts.note("observation", facts.source("history.layout"));
         facts.note("target", format!("{}; {}", yaml.at(&format!("actions.{action}")), yaml.at("joint_ids_map")));
         parts.target(kind, "target");
         Ok(())
     }
-}
-
-/// Reads a number of frames.
-fn count(node: &Node) -> Option<usize> {
-    let number = node.number()?;
-    (number >= 0.0 && number.fract() == 0.0 && number < 1e4).then_some(number as usize)
 }

@@ -7,6 +7,8 @@ use actq::text::printable;
 
 use crate::description::{Description, Op, Operand};
 
+/// Most names of a description, which also bounds how deep one value may depend on others.
+const MOST_NAMES: usize = 1000;
 /// Most names in a message.
 const MOST_LISTED: usize = 20;
 
@@ -29,6 +31,7 @@ impl<'a> Names<'a> {
             .chain(description.motions.iter().map(|motion| motion.name.as_str()))
             .chain(description.values.iter().map(|value| value.name.as_str()))
             .collect();
+        ensure!(own.len() <= MOST_NAMES, "there are {} names; at most {MOST_NAMES} are allowed", own.len());
         let networks = description.networks.iter().map(|network| network.name.as_str());
         let mut seen = BTreeSet::new();
         for name in own.iter().copied().chain(networks) {

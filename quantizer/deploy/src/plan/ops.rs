@@ -63,6 +63,8 @@ impl Builder<'_> {
         let names = value.from.names();
         ensure!(!names.is_empty(), "{own}: from is empty");
         let from = names.iter().map(|name| self.value(name, &format!("{own}: from"))).collect::<Result<Vec<_>>>()?;
+        let len: usize = from.iter().map(|slot| self.plan.values[*slot].labels.len()).sum();
+        ensure!(len <= MOST, "{own}: from has {len} values; at most {MOST} are allowed");
         let mut labels: Vec<Label> = from.iter().flat_map(|slot| self.plan.values[*slot].labels.clone()).collect();
         let mut joints = None;
         if let [only] = from[..] {
@@ -77,7 +79,7 @@ impl Builder<'_> {
             let len = chain.labels.len();
             ensure!(0 < len && len <= MOST, "{key}: it gives {len} values; 1 to {MOST} are allowed");
         }
-        Ok(self.add(&value.name, Maker::Value(from, steps), chain.labels, chain.joints))
+        self.add(&value.name, Maker::Value(from, steps), chain.labels, chain.joints)
     }
 
     fn op(&mut self, op: &Op, chain: &mut Chain, name: &str, key: &str) -> Result<Step> {

@@ -1,0 +1,360 @@
+//! holosoma: one ONNX file, whose metadata have the joints' names and gains only.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::{PI, TAU};
+
+use actq::error::{Context as _, Result, bail, ensure};
+use actq_onnx::Signature;
+
+use super::common::{Histories, Parts};
+use crate::bundle::Bundle;
+use crate::description::{Clock, Description, Gains, Op, Operand, Order, Orientation, Standing, TargetKind, When};
+use crate::document::Document;
+use crate::facts::Facts;
+use crate::family::{Family, Found};
+use crate::yaml::{Data, Node};
+
+/// The family.
+#[derive(Debug)]
+pub(super) struct Holosoma;
+
+/// Keys of the metadata that every file of this family has.
+const KEYS: [&str; 3] = ["dof_names", "kp", "kd"];
+/// Source of what is still a question.
+const QUESTION: &str = "a question";
+/// Terms whose scale differs between the family's policies; the rule `scales.other` is that of all others.
+const SCALED: [&str; 3] = ["base_ang_vel", "base_lin_vel", "dof_vel"];
+
+/// Kinds of policies: the rule that lists a kind's terms, and the terms that are placeholders while it is a question.
+struct Kind {
+    rule: &'static str,
+    terms: &'static [&'static str],
+}
+
+const LOCOMOTION: Kind = Kind {
+    rule: "terms",
+    terms: &[
+        "actions",
+        "base_ang_vel",
+        "command_ang_vel",
+        "command_lin_vel",
+        "cos_phase",
+        "dof_pos",
+        "dof_vel",
+        "projected_gravity",
+        "sin_phase",
+    ],
+};
+const TRACKING: Kind = Kind {
+    rule: "tracking.terms",
+    terms: &["actions", "base_ang_vel", "dof_pos", "dof_vel", "motion_command", "motion_ref_ori_b"],
+};
+
+impl Family for Holosoma {
+    fn profile(&self) -> &'static str {
+        include_str!("holosoma/profile.toml")
+    }
+
+    fn recognize(&self, bundle: &Bundle) -> Result<Option<Found>> {
+        let (mut networks, mut documents) = (Vec::new(), Vec::new());
+        for file in bundle.with_ending("onnx") {
+            // A file that is not ONNX decides nothing.
+            let Ok(Signature { metadata, .. }) = Signature::read(&bundle.path(file)?) else { continue };
+            if KEYS.iter().all(|key| metadata.contains_key(*key)) {
+                networks.push(file.to_owned());
+                documents.push(Document::of(&format!("{file} metadata"), Node { line: 1, data: parsed(metadata) }));
+            }
+        }
+        ensure!(networks.len() <= 1, "several files are policies: {}; name one of them", networks.join(", "));
+        Ok((!networks.is_empty()).then(|| Found { documents, networks, others: Vec::new() }))
+    }
+
+    fn read(&self, bundle: &Bundle, found: &Found, facts: &mut Facts) -> Result<Description> {
+        let file = found.networks.first().context("there is no ONNX file")?;
+        let metadata = found.documents.first().context("there are no metadata")?;
+        let signature = Signature::read(&bundle.path(file)?)?;
+        let joints = metadata.texts("dof_names")?;
+        let (kp, kd) = (metadata.numbers("kp")?, metadata.numbers("kd")?);
+        let n = joints.len();
+        ensure!(n > 0, "{} is empty", metadata.at("dof_names"));
+        ensure!(joints.iter().collect::<BTreeSet<_>>().len() == n, "{}: a name occurs twice", metadata.at("dof_names"));
+        for (key, list) in [("kp", &kp), ("kd", &kd)] {
+            if list.len() != n {
+                return Err(Facts::contradiction(
+                    "number of joints",
+                    (&metadata.at("dof_names"), &format!("{n} names")),
+                    (&metadata.at(key), &format!("{} gains", list.len())),
+                ));
+            }
+        }
+        let kind = if signature.inputs.iter().any(|(name, _)| name == "time_step") { TRACKING } else { LOCOMOTION };
+        let ports = |named: &[&str], ports: &[(String, Option<usize>)]| match ports {
+            [one] => Some(one.clone()),
+            several => several.iter().find(|(name, _)| named.contains(&name.as_str())).cloned(),
+        };
+        // A tracking policy's file has inputs and outputs of the motion, which its action does not depend on.
+        let input = ports(&["actor_obs", "obs"], &signature.inputs);
+        let output = ports(&["action", "actions"], &signature.outputs);
+        let (input, seen) = input.with_context(|| format!("{file}: it has no input actor_obs or obs"))?;
+        let (output, acts) = output.with_context(|| format!("{file}: it has no output action or actions"))?;
+        // A graph whose axes are all dynamic does not tell its lengths.
+        let acts = acts.filter(|acts| *acts > 1).unwrap_or(n);
+        if acts > n {
+            return Err(Facts::contradiction(
+                "length of the action",
+                (&metadata.at("dof_names"), &format!("{n} names")),
+                (&format!("{file}, output {output:?}"), &format!("{acts} values")),
+            ));
+        }
+
+        let rate: f64 = facts.find("rate_hz")?.unwrap_or(1.0);
+        ensure!(rate > 0.0, "rate_hz = {rate}: give a number above 0");
+        let default: Option<Vec<f64>> = facts.find("default")?;
+        let default = default.unwrap_or_else(|| vec![0.0; n]);
+        ensure!(
+            default.len() == n,
+            "default has {} values, but {} has {n} names",
+            default.len(),
+            metadata.at("dof_names")
+        );
+        let mut reader = Reader { parts: Parts::new("policy", rate), facts, n, acts, rate, has_clock: false };
+        reader.parts.joints("robot", joints);
+        reader.parts.constant("default", default);
+        let len = reader.observe(&kind)?;
+        let source = reader.facts.source(kind.rule);
+        if let Some(seen) = seen.filter(|seen| *seen > 1 && *seen != len)
+            && source != QUESTION
+        {
+            return Err(Facts::contradiction(
+                "length of the observation",
+                (&format!("{file}, input {input:?}"), &format!("{seen} values")),
+                (&format!("{} ({source})", kind.rule), &format!("{len} values of {n} joints")),
+            ));
+        }
+        reader.parts.network(file, &input, &output);
+        reader.act(metadata)?;
+        reader.parts.gains(Gains { joints: Some("robot".to_owned()), stiffness: kp, damping: kd });
+        reader.facts.note("gains", metadata.at("kp"));
+        reader.facts.note("joints.robot", metadata.at("dof_names"));
+        Ok(reader.parts.finish())
+    }
+}
+
+/// Parses the texts of metadata, which are JSON and so YAML. What cannot be parsed stays a text.
+fn parsed(metadata: BTreeMap<String, String>) -> Data {
+    let entry = |(key, text): (String, String)| {
+        let node = Node::parse(&text);
+        (key, node.unwrap_or(Node { line: 1, data: Data::Scalar(text, true) }))
+    };
+    Data::Map(metadata.into_iter().map(entry).collect())
+}
+
+/// Reads a number, or several in a list or a text with commas.
+fn numbers(node: &Node) -> Option<Vec<f64>> {
+    let parts = || node.text()?.split(',').map(|part| part.trim().parse().ok()).collect();
+    let list: Vec<f64> = node.numbers().or_else(parts)?;
+    (!list.is_empty() && list.iter().all(|number| number.is_finite())).then_some(list)
+}
+
+/// A description in the making.
+struct Reader<'a> {
+    parts: Parts,
+    facts: &'a mut Facts,
+    /// Number of joints.
+    n: usize,
+    /// Length of the action.
+    acts: usize,
+    rate: f64,
+    has_clock: bool,
+}
+
+impl Reader<'_> {
+    /// Adds the observation; returns its length.
+    fn observe(&mut self, kind: &Kind) -> Result<usize> {
+        let key = kind.rule;
+        let terms: Option<Vec<String>> = self.facts.find(key)?;
+        let mut terms = terms.unwrap_or_else(|| kind.terms.iter().map(|&term| term.to_owned()).collect());
+        match self.facts.find::<String>("order")?.as_deref() {
+            Some("sorted") | None => terms.sort(),
+            Some("listed") => {}
+            Some(other) => bail!("order = {other:?}: give \"sorted\" or \"listed\""),
+        }
+        let length: usize = self.facts.find("history.length")?.unwrap_or(1);
+        ensure!((1..=1000).contains(&length), "history.length = {length}: give 1 to 1000");
+        let histories = if length > 1 {
+            Histories::of(self.facts)?
+        } else {
+            Histories { by_term: true, first: Default::default(), fill: Default::default() }
+        };
+        let mut all = 0;
+        for (i, name) in terms.iter().enumerate() {
+            ensure!(!terms.iter().take(i).any(|other| other == name), "{key}: {name:?} occurs twice");
+            let (from, mut ops, len) = self.term(name)?;
+            let scale = format!("scales.{name}");
+            let by: f64 = if SCALED.contains(&name.as_str()) {
+                self.facts.find(&scale)?.unwrap_or(1.0)
+            } else {
+                self.facts.find("scales.other")?.unwrap_or(1.0)
+            };
+            ops.push(Op::Scale(Operand::Number(by)));
+            let rule = if SCALED.contains(&name.as_str()) { scale.as_str() } else { "scales.other" };
+            self.parts.begin(name, &from);
+            let value = self.parts.term(ops, length);
+            self.facts.note(&value, self.facts.source(rule));
+            all += len;
+        }
+        self.parts.observe(&histories)?;
+        let sources = [key, "order", "history.length"].map(|rule| self.facts.source(rule));
+        self.facts.note("observation", sources.join("; "));
+        all.checked_mul(length).context("the observation is too long")
+    }
+
+    /// Returns the value that a term is made of, the operations on it, and its length.
+    fn term(&mut self, name: &str) -> Result<(String, Vec<Op>, usize)> {
+        let n = self.n;
+        let known = match name {
+            "base_ang_vel" => Some((3, "rad/s")),
+            "base_lin_vel" => Some((3, "m/s")),
+            "command_lin_vel" => Some((2, "m/s")),
+            "command_ang_vel" => Some((1, "rad/s")),
+            "command_stand" => Some((1, "1 to walk, 0 to stand")),
+            "command_base_height" => Some((1, "m")),
+            "command_waist_dofs" => Some((3, "rad")),
+            // The orientation of the reference body needs the robot's kinematics.
+            "motion_command" => Some((2 * n, "rad, rad/s")),
+            "motion_ref_pos_b" => Some((3, "m")),
+            "motion_ref_ori_b" => Some((6, "")),
+            _ => None,
+        };
+        if let Some((len, unit)) = known {
+            self.parts.raw(name, len, unit);
+            return Ok((name.to_owned(), Vec::new(), len));
+        }
+        Ok(match name {
+            "dof_pos" => {
+                self.parts.raw_joints(name, "robot", "rad");
+                (name.to_owned(), vec![Op::Subtract(Operand::Name("default".to_owned()))], n)
+            }
+            "dof_vel" => {
+                self.parts.raw_joints(name, "robot", "rad/s");
+                (name.to_owned(), Vec::new(), n)
+            }
+            "projected_gravity" => self.gravity()?,
+            "actions" => {
+                let raw = match self.facts.find::<String>("last_action")?.as_deref() {
+                    Some("clipped") | None => false,
+                    Some("raw") => true,
+                    Some(other) => bail!("last_action = {other:?}: give \"clipped\" or \"raw\""),
+                };
+                self.parts.kept("last_action", self.acts, if raw { "policy.ACTION" } else { "clipped" });
+                self.facts.note("last_action", self.facts.source("last_action"));
+                ("last_action".to_owned(), Vec::new(), self.acts)
+            }
+            "sin_phase" => ("leg_phases".to_owned(), vec![Op::Sin], self.clock()?),
+            "cos_phase" => ("leg_phases".to_owned(), vec![Op::Cos], self.clock()?),
+            other => {
+                // Only the application's code says what it is, so it is an input of its own name.
+                let len: Option<usize> = self.facts.missing(
+                    &format!("raw.{other}"),
+                    &format!("term {other:?} is not known to this reader; how many values does the application give?"),
+                )?;
+                let len = len.unwrap_or(1);
+                ensure!((1..=10_000).contains(&len), "raw.{other} = {len}: give 1 to 10000");
+                self.parts.raw(other, len, "");
+                (other.to_owned(), Vec::new(), len)
+            }
+        })
+    }
+
+    fn gravity(&mut self) -> Result<(String, Vec<Op>, usize)> {
+        let given: Option<String> = self.facts.find("gravity")?;
+        let (name, len, orientation) = match given.as_deref() {
+            Some("rpy") | None => ("rpy", 3, Some(Orientation::Rpy)),
+            Some("wxyz") => ("base_quat", 4, Some(Orientation::Wxyz)),
+            Some("xyzw") => ("base_quat", 4, Some(Orientation::Xyzw)),
+            Some("vector") => ("projected_gravity", 3, None),
+            Some(other) => bail!("gravity = {other:?}: give \"vector\", \"wxyz\", \"xyzw\" or \"rpy\""),
+        };
+        self.parts.raw(name, len, "");
+        self.facts.note(name, self.facts.source("gravity"));
+        Ok((name.to_owned(), orientation.map(Op::Gravity).into_iter().collect(), 3))
+    }
+
+    /// Adds the phases of the legs, unless they are there; returns their number.
+    fn clock(&mut self) -> Result<usize> {
+        let start: Option<Vec<f64>> = self.facts.find("clock.start")?;
+        let start = start.unwrap_or_else(|| vec![0.0, PI]);
+        let legs = start.len();
+        if self.has_clock {
+            return Ok(legs);
+        }
+        self.has_clock = true;
+        let period: f64 = self.facts.find("gait_period")?.unwrap_or(1.0);
+        ensure!(period > 0.0, "gait_period = {period}: give a number above 0");
+        let below: f64 = self.facts.get("clock.standing_below")?;
+        let at: Option<Vec<f64>> = self.facts.find("clock.standing_at")?;
+        let of = [("command_lin_vel", 2, "m/s"), ("command_ang_vel", 1, "rad/s")];
+        for (name, len, unit) in of {
+            self.parts.raw(name, len, unit);
+        }
+        self.parts.clock(Clock {
+            name: "leg_phases".to_owned(),
+            start,
+            advance: TAU / (self.rate * period),
+            when: self.facts.find("clock.when")?.unwrap_or(When::Before),
+            wrap: Some([-PI, PI]),
+            restart_above: None,
+            standing: Some(Standing {
+                of: of.iter().map(|(name, ..)| (*name).to_owned()).collect(),
+                below,
+                at: at.unwrap_or_else(|| vec![PI; legs]),
+            }),
+        });
+        let source = format!("{}; {}", self.facts.source("gait_period"), self.facts.source("clock.start"));
+        self.facts.note("leg_phases", source);
+        Ok(legs)
+    }
+
+    /// Adds the target: the default and the scaled action; 0 for the first joints of an action that is shorter.
+    fn act(&mut self, metadata: &Document) -> Result<()> {
+        let (n, acts) = (self.n, self.acts);
+        let clip: f64 = self.facts.find("action.clip")?.unwrap_or(100.0);
+        let limits = [Operand::Number(-clip), Operand::Number(clip)];
+        self.parts.value("clipped", "policy.ACTION", vec![Op::Clip(limits)]);
+        self.facts.note("clipped", self.facts.source("action.clip"));
+        let (scale, source) = match metadata.maybe("action_scale", "a finite number, or several", numbers)? {
+            Some(scale) => (scale, metadata.at("action_scale")),
+            None => {
+                let scale: f64 = self.facts.get("action_scale")?;
+                (vec![scale], self.facts.source("action_scale"))
+            }
+        };
+        ensure!(
+            scale.len() == 1 || scale.len() == n,
+            "{} has {} values; 1 or {n} are known",
+            metadata.at("action_scale"),
+            scale.len()
+        );
+        let mut ops = Vec::new();
+        let mut from = "clipped";
+        if acts < n {
+            let first: bool = self.facts.find("action.last_joints")?.unwrap_or(true);
+            let moved = if first { n - acts..n } else { 0..acts };
+            self.parts.unchanged("zero", vec![0.0]);
+            self.parts.values("clipped_and_zero", &["clipped", "zero"]);
+            self.facts.note("clipped_and_zero", self.facts.source("action.last_joints"));
+            let places = (0..n).map(|i| if moved.contains(&i) { i - moved.start } else { acts }).collect();
+            ops.push(Op::Select(Order::Places(places)));
+            from = "clipped_and_zero";
+        }
+        ops.push(Op::Scale(match scale[..] {
+            [one] => Operand::Number(one),
+            _ => Operand::List(scale),
+        }));
+        ops.push(Op::Add(Operand::Name("default".to_owned())));
+        self.parts.value("target", from, ops);
+        self.facts.note("target", format!("{source}; {}", self.facts.source("default")));
+        self.parts.target_joints(TargetKind::Position, "target", "robot");
+        Ok(())
+    }
+}

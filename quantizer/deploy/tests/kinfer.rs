@@ -1,0 +1,151 @@
+//! K-Scale's bundles. The published one runs where `ACTQ_SHARED` names the folder of the bundles.
+
+#[path = "common/made.rs"]
+mod made;
+
+use actq::error::{Context as _, Result, ensure};
+use actq_deploy::description::TargetKind;
+use actq_deploy::{Answers, Bundle, read};
+use made::{Made, Onnx, agrees, message, shared};
+
+const NAME: &str = "kinfer_zbot_walking";
+
+#[test]
+fn kinfer_agrees_with_its_deploy_code() -> Result<()> {
+    agrees(NAME, "expect.npz", "")
+}
+
+/// The clock as a raw input gives the same.
+#[test]
+fn clock_may_be_a_raw_input() -> Result<()> {
+    agrees(NAME, "expect.npz", "clock = \"raw\"\n")
+}
+
+#[test]
+fn rules_are_questions_until_accepted() -> Result<()> {
+    let Some(folder) = shared(NAME) else { return Ok(()) };
+    let bundle = Bundle::open(&folder.join("bundle"))?;
+    let reading = read(&bundle, false, Answers::default())?;
+    let asked: Vec<&str> = reading.questions.iter().map(|question| question.key.as_str()).collect();
+    for key in [
+        "clock",
+        "default_pose",
+        "dof_pos.relative",
+        "gravity",
+        "states.prev_actions",
+        "states.buffer",
+        "states.start",
+        "target.output",
+        "target.relative",
+        "gains.places",
+    ] {
+        ensure!(asked.contains(&key), "{key} is not among {asked:?}");
+    }
+    let accepted = read(&bundle, true, Answers::default())?;
+    ensure!(accepted.unread.is_empty(), "{:?}", accepted.unread);
+    let (default, joints) = (&accepted.sources["default"], &accepted.description.joints["robot"]);
+    ensure!(default.contains("keyframe") && default.contains("default_standing differs"), "{default}");
+    ensure!(joints.first().is_some_and(|joint| joint == "L_Hip_Roll") && joints.len() == 10, "{joints:?}");
+    let gains = accepted.description.gains.as_ref().context("gains")?;
+    ensure!(gains.stiffness == [18.18; 10] && gains.damping == [1.46; 10], "{gains:?}");
+    ensure!(accepted.description.targets[0].kind == TargetKind::Position, "{:?}", accepted.description.targets);
+    Ok(())
+}
+
+const XML: &str = r#"<mujoco><worldbody><body><freejoint name="root"/>
+  <body><joint name="a"/><body><joint name="b" type="slide"/></body></body><body><joint name="c"/></body>
+</body></worldbody>
+<keyframe><key name="default" qpos="0 0 0 1 0 0 0 0.1 0.2 0.3"/></keyframe></mujoco>"#;
+
+/// Metadata of a robot with 3 joints, with a part replaced.
+fn json(from: &str, to: &str) -> String {
+    let text = r#"{"input_params": {"t": {}, "dof_pos": {}, "prev_actions": {}, "buffer": {}}, "sim_dt":0.005, "sim_decimation": 4,
+        "num_actions": 3, "num_observations": 12, "robot_stiffness": {"c": 3, "b": 2, "a": 1}, "robot_damping": [4, 5, 6]}"#;
+    assert!(text.contains(from), "{from}");
+    if from.is_empty() { text.to_owned() } else { text.replace(from, to) }
+}
+
+fn files(xml: &str, json: &str) -> Result<Made> {
+    let made = Made::new()?;
+    if !xml.is_empty() {
+        made.write("robot.xml", xml.as_bytes())?;
+    }
+    let onnx = Onnx {
+        inputs: &[("t.1", 1), ("dof_pos.1", 3), ("prev_actions.1", 3), ("buffer.1", 12)],
+        outputs: &[("actions_raw", 3), ("actions", 3), ("x.5", 12)],
+        metadata: &[("kinfer_metadata", json)],
+    };
+    made.write("policy.kinfer", &onnx.bytes())?;
+    Ok(made)
+}
+
+#[test]
+fn other_robots_are_read_by_their_own_files() -> Result<()> {
+    let made = files(XML, &json("", "").replace("0.005", "0.0025"))?;
+    let reading = read(&made.bundle()?, true, Answers::default())?;
+    let description = &reading.description;
+    ensure!(reading.questions.is_empty(), "{:?}", reading.questions);
+    ensure!(description.rate_hz == 100.0, "{}", description.rate_hz);
+    ensure!(description.joints["robot"] == ["a", "b", "c"], "{:?}", description.joints);
+    ensure!(description.constants["default"] == [0.1, 0.2, 0.3], "{:?}", description.constants);
+    let states = &description.networks[0].states;
+    ensure!(states["buffer.1"] == "x.5" && states["prev_actions.1"] == "actions_raw", "{states:?}");
+    ensure!(description.action == "policy.actions_raw", "{}", description.action);
+    let gains = description.gains.as_ref().context("gains")?;
+    ensure!(gains.stiffness == [1.0, 2.0, 3.0] && gains.damping == [4.0, 5.0, 6.0], "{gains:?}");
+    Ok(())
+}
+
+#[test]
+fn missing_files_become_questions() -> Result<()> {
+    let reading = read(&files("", &json("", ""))?.bundle()?, true, Answers::default())?;
+    let asked: Vec<&str> = reading.questions.iter().map(|question| question.key.as_str()).collect();
+    ensure!(asked == ["joints.names", "default_pose"], "{asked:?}");
+    let answers = "joints.names = [\"a\", \"b\", \"c\"]\ndefault_pose = [1, 2, 3]\n";
+    let reading = read(&files("", &json("", ""))?.bundle()?, true, Answers::parse(answers)?)?;
+    ensure!(reading.questions.is_empty(), "{:?}", reading.questions);
+    ensure!(reading.description.constants["default"] == [1.0, 2.0, 3.0], "{:?}", reading.description.constants);
+    Ok(())
+}
+
+#[test]
+fn bad_bundles_are_refused() -> Result<()> {
+    let dtd = format!("<!DOCTYPE mujoco [<!ENTITY a \"b\">]>{XML}");
+    let cases = [
+        ("two joint counts", XML.replace(r#"<joint name="c"/>"#, ""), json("", ""), "2 joints"),
+        ("a keyframe of another length", XML.replace("0.2 0.3", "0.2"), json("", ""), "length of qpos"),
+        ("a number that is not one", XML.replace("0.2 0.3", "0.2 nan"), json("", ""), "finite"),
+        ("a document type", dtd, json("", ""), "not XML"),
+        ("another element", "<mujoco_of/><!-- <mujoco -->".to_owned(), json("", ""), "robot.xml"),
+        ("an include", XML.replace("<worldbody>", "<include file='a'/><worldbody>"), json("", ""), "include"),
+        ("a joint without a name", XML.replace(r#"name="b""#, ""), json("", ""), "has no name"),
+        ("a ball joint", XML.replace("slide", "ball"), json("", ""), "not supported"),
+        ("no decimation", XML.to_owned(), json("sim_decimation", "other"), "sim_decimation is missing"),
+        ("no time step", XML.to_owned(), json("0.005", "0"), "sim_dt"),
+        ("NaN", XML.to_owned(), json("0.005", "NaN"), "finite number"),
+        ("another number of actions", XML.to_owned(), json("\"num_actions\": 3", "\"num_actions\": 4"), "contradicts"),
+        ("another buffer", XML.to_owned(), json("12", "13"), "contradicts"),
+        ("other inputs", XML.to_owned(), json("\"t\": {}, ", ""), "contradicts"),
+        (
+            "another order",
+            XML.to_owned(),
+            json("{\"input", "{\"joint_names\": [\"a\", \"c\", \"b\"], \"input"),
+            "joint 1 is",
+        ),
+        ("no JSON", XML.to_owned(), "{".to_owned(), "kinfer_metadata"),
+        ("a number", XML.to_owned(), "3".to_owned(), "JSON object"),
+    ];
+    for (name, xml, json, expected) in cases {
+        let made = files(&xml, &json)?;
+        let error = message(read(&made.bundle()?, true, Answers::default()));
+        ensure!(error.contains(expected), "{name}: {error}");
+    }
+    let deep = format!("<mujoco><worldbody>{}{}</worldbody></mujoco>", "<body>".repeat(2000), "</body>".repeat(2000));
+    let error = message(read(&files(&deep, &json("", ""))?.bundle()?, true, Answers::default()));
+    ensure!(error.contains("levels") || error.contains("not XML"), "{error}");
+    let made = Made::new()?;
+    made.write("policy.kinfer", b"\x1f\x8b\x08 a tar file")?;
+    let error = message(read(&made.bundle()?, true, Answers::default()));
+    ensure!(error.contains("policy.kinfer"), "{error}");
+    Ok(())
+}

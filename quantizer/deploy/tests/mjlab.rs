@@ -1,0 +1,222 @@
+//! mjlab's bundles. The published one runs where `ACTQ_SHARED` names the folder of the bundles.
+
+#[path = "common/made.rs"]
+mod made;
+
+use std::fs;
+
+use actq::error::{Context as _, Result, ensure};
+use actq_deploy::{Answers, Bundle, Plan, read};
+use made::{Made, Onnx, agrees, appended, message, shared, shared_file};
+
+const NAME: &str = "bitbots_walk_mjlab";
+
+#[test]
+fn two_orders_of_joints_are_refused() -> Result<()> {
+    let Some(folder) = shared(NAME) else { return Ok(()) };
+    let error = message(read(&Bundle::open(&folder.join("bundle"))?, true, Answers::default()));
+    for part in [
+        "contradicts itself",
+        "models/walk_mjlab.onnx metadata: joint_names says joint 0 (the first is 0) is \"r_shoulder_pitch_joint\"",
+        "configs/mjlab_walk_model.yaml: mjlab_walk_node.ros__parameters.joints.ordered_relevant_joint_names says joint 0 (the first is 0) is \"r_hip_pitch_joint\"",
+        "joints.order",
+    ] {
+        ensure!(error.contains(part), "{part} is not in: {error}");
+    }
+    Ok(())
+}
+
+#[test]
+fn mjlab_agrees_in_the_order_that_is_answered() -> Result<()> {
+    agrees(NAME, "expect.npz", "joints.order = \"file\"\n")?;
+    agrees(NAME, "expect_metadata_order.npz", "joints.order = \"metadata\"\n")
+}
+
+#[test]
+fn rules_are_questions_until_accepted() -> Result<()> {
+    let Some(folder) = shared(NAME) else { return Ok(()) };
+    let bundle = Bundle::open(&folder.join("bundle"))?;
+    let answers = "joints.order = \"file\"\n";
+    let asked = read(&bundle, false, Answers::parse(answers)?)?.questions;
+    let asked: Vec<&str> = asked.iter().map(|question| question.key.as_str()).collect();
+    for key in ["terms.plain", "joint_pos.relative", "last_action", "target.base", "ros.gravity"] {
+        ensure!(asked.contains(&key), "{key} is not among {asked:?}");
+    }
+    let unread = read(&bundle, true, Answers::parse(answers)?)?.unread;
+    ensure!(unread.is_empty(), "{unread:?}");
+    Ok(())
+}
+
+/// An export without a YAML file: the mecanum base's network with the exporter's metadata.
+#[test]
+fn metadata_alone_is_read() -> Result<()> {
+    let Some(file) = shared_file("onnx/mjlab_mecanum/model.onnx") else { return Ok(()) };
+    let made = Made::new()?;
+    let metadata = [
+        ("joint_names", "a,b,c,d"),
+        ("joint_stiffness", "1.000,2.000,3.000,4.000"),
+        ("joint_damping", "0.100,0.200,0.300,0.400"),
+        ("default_joint_pos", "0.500,0.000,0.000,-0.500"),
+        ("action_scale", "0.1,0.2,0.3,0.4"),
+        ("observation_names", "base_ang_vel,joint_vel,command"),
+        ("command_names", "twist"),
+        ("run_path", "x"),
+    ];
+    made.write("policy.onnx", &appended(fs::read(file)?, &metadata))?;
+    let bundle = made.bundle()?;
+    let reading = read(&bundle, true, Answers::default())?;
+    let asked: Vec<&str> = reading.questions.iter().map(|question| question.key.as_str()).collect();
+    ensure!(asked == ["rate_hz"], "{asked:?}");
+    let reading = read(&bundle, true, Answers::parse("rate_hz = 25.0\n")?)?;
+    ensure!(reading.questions.is_empty() && reading.unread.is_empty(), "{reading:?}");
+    ensure!(reading.description.rate_hz == 25.0, "{}", reading.description.rate_hz);
+    let plan = Plan::new(&reading.description, &bundle)?;
+    let inputs: Vec<(&str, usize)> = plan.inputs().iter().map(|(name, len)| (name.as_str(), *len)).collect();
+    ensure!(inputs == [("joint_vel", 4), ("base_ang_vel", 3), ("command", 3)], "{inputs:?}");
+    Ok(())
+}
+
+/// Metadata of a robot with 2 joints, with a key replaced.
+fn metadata(key: &str, value: &str) -> Vec<(String, String)> {
+    let all = [
+        ("joint_names", "a,b"),
+        ("joint_stiffness", "1,2"),
+        ("joint_damping", "3,4"),
+        ("default_joint_pos", "0.5,-0.5"),
+        ("action_scale", "0.25"),
+        ("observation_names", "base_lin_vel,base_ang_vel,projected_gravity,joint_pos,joint_vel,actions,command"),
+        ("command_names", "twist"),
+    ];
+    let set = |(name, old): (&str, &str)| (name.to_owned(), if name == key { value } else { old }.to_owned());
+    all.into_iter().map(set).collect()
+}
+
+/// Values of the terms above.
+const FRAME: usize = 3 + 3 + 3 + 2 + 2 + 2 + 3;
+
+fn files(observation: usize, actions: usize, metadata: &[(String, String)], yaml: &str) -> Result<Made> {
+    let made = Made::new()?;
+    let metadata: Vec<(&str, &str)> = metadata.iter().map(|(key, value)| (key.as_str(), value.as_str())).collect();
+    let onnx = Onnx {
+        inputs: &[("obs", observation), ("time_step", 1)],
+        outputs: &[("actions", actions), ("joint_pos", 2)],
+        metadata: &metadata,
+    };
+    made.write("policy.onnx", &onnx.bytes())?;
+    if !yaml.is_empty() {
+        made.write("node.yaml", yaml.as_bytes())?;
+    }
+    Ok(made)
+}
+
+fn reading(made: &Made, answers: &str) -> Result<actq_deploy::Reading> {
+    read(&made.bundle()?, true, Answers::parse(&format!("{answers}\n"))?)
+}
+
+#[test]
+fn histories_are_asked_if_the_length_allows_them() -> Result<()> {
+    let three = files(3 * FRAME, 2, &metadata("", ""), "")?;
+    let asked = reading(&three, "rate_hz = 50")?.questions;
+    ensure!(asked.len() == 1 && asked[0].key == "history.length", "{asked:?}");
+    let description = reading(&three, "rate_hz = 50\nhistory.length = 3")?.description;
+    let text = format!("{:?}", description.values);
+    ensure!(text.matches("History(History { length: 3").count() == 7, "{text}");
+    let error = message(reading(&three, "rate_hz = 50\nhistory.length = 2"));
+    ensure!(error.contains(&format!("takes {}", 3 * FRAME)), "{error}");
+
+    // Some terms only.
+    let some = files(FRAME + 4, 2, &metadata("", ""), "")?;
+    let error = message(reading(&some, "rate_hz = 50"));
+    ensure!(error.contains("contradicts") && error.contains("joint_pos 2"), "{error}");
+    let asked = reading(&some, "rate_hz = 50\nhistory.length = [1, 1, 1, 2, 2, 1, 1]")?.questions;
+    ensure!(asked.is_empty(), "{asked:?}");
+    Ok(())
+}
+
+#[test]
+fn unknown_terms_are_asked() -> Result<()> {
+    let terms = metadata("observation_names", "joint_pos,height_scan,command");
+    let bundle = files(2 + 17 + 3, 2, &terms, "")?;
+    let asked = reading(&bundle, "rate_hz = 50")?.questions;
+    ensure!(asked.len() == 1 && asked[0].key == "raw.height_scan", "{asked:?}");
+    ensure!(asked[0].meaning.contains("17 of the graph's 22 values"), "{}", asked[0].meaning);
+    let description = reading(&bundle, "rate_hz = 50\nraw.height_scan = 17")?.description;
+    let input = description.inputs.iter().find(|input| input.name == "height_scan");
+    ensure!(input.is_some_and(|input| input.len == Some(17)), "{:?}", description.inputs);
+    let error = message(reading(&bundle, "rate_hz = 50\nraw.height_scan = 16"));
+    ensure!(error.contains("contradicts"), "{error}");
+
+    // A command that is not a twist.
+    let path = files(FRAME - 3 + 18, 2, &metadata("command_names", "path"), "")?;
+    let asked = reading(&path, "rate_hz = 50")?.questions;
+    ensure!(asked.len() == 1 && asked[0].key == "raw.command", "{asked:?}");
+    // Joints that do not move.
+    let fixed = files(FRAME - 1, 1, &metadata("", ""), "")?;
+    let asked = reading(&fixed, "rate_hz = 50")?.questions;
+    ensure!(asked.len() == 1 && asked[0].key == "joints.moved", "{asked:?}");
+    let error = message(reading(&fixed, "rate_hz = 50\njoints.moved = [\"z\"]"));
+    ensure!(error.contains("joints.moved"), "{error}");
+    Ok(())
+}
+
+const YAML: &str = "node:\n  ros__parameters:\n    model: policy.onnx\n    joints:\n      ordered_relevant_joint_names: [a, b]\n      \
+    walkready_state: [0.5, -0.5001]\n      kp: [1, 2]\n      kd: [3, 4]\n      action_scales: [0.25, 0.25]\n    phase:\n      control_dt: 0.01\n";
+
+#[test]
+fn yaml_of_the_same_order_needs_no_answer() -> Result<()> {
+    let reading = reading(&files(FRAME, 2, &metadata("", ""), YAML)?, "")?;
+    ensure!(reading.questions.is_empty(), "{:?}", reading.questions);
+    ensure!(reading.description.rate_hz == 100.0, "{}", reading.description.rate_hz);
+    ensure!(reading.description.constants["default"] == [0.5, -0.5001], "{:?}", reading.description.constants);
+    // Signs and joints that others control.
+    let yaml = YAML.replace("      kd:", "      joint_signs: [1, -1]\n      uncontrolled_joint_names: [a]\n      kd:");
+    let reading = self::reading(&files(FRAME, 2, &metadata("", ""), &yaml)?, "")?;
+    let target = reading.description.targets.first().context("a target")?;
+    ensure!(target.joints.as_deref() == Some("sent"), "{target:?}");
+    ensure!(reading.description.joints["sent"] == ["b"], "{:?}", reading.description.joints);
+    ensure!(reading.description.constants["signs"] == [1.0, -1.0], "{:?}", reading.description.constants);
+    Ok(())
+}
+
+#[test]
+fn bad_bundles_are_refused() -> Result<()> {
+    let set = metadata;
+    let plain = || set("", "");
+    let yaml = |from: &str, to: &str| {
+        assert!(YAML.contains(from), "{from}");
+        YAML.replace(from, to)
+    };
+    let none = String::new;
+    let cases = [
+        ("another order", plain(), yaml("[a, b]", "[b, a]"), "joint 0 (the first is 0) is \"b\""),
+        ("another joint", plain(), yaml("[a, b]", "[a, z]"), "names of the joints"),
+        ("a joint twice", plain(), yaml("[a, b]", "[a, a]"), "occurs twice"),
+        ("too few numbers", plain(), yaml("kp: [1, 2]", "kp: [1]"), "kp has 1 values"),
+        ("another pose", plain(), yaml("-0.5001", "0.5"), "default_pose"),
+        ("other gains", plain(), yaml("kp: [1, 2]", "kp: [1, 20]"), "20 for joint \"b\""),
+        ("another scale", plain(), yaml("[0.25, 0.25]", "[0.25, 0.5]"), "action_scale"),
+        ("NaN", plain(), yaml("[3, 4]", "[3, .nan]"), "kd"),
+        ("another model", plain(), yaml("policy.onnx", "other.onnx"), "other.onnx"),
+        ("no model", plain(), yaml("model: policy.onnx", "other: 1"), "model is missing"),
+        ("no time step", plain(), yaml("control_dt: 0.01", "control_dt: 0"), "control_dt"),
+        ("a joint twice in the metadata", set("joint_names", "a,a"), none(), "\"a\" occurs twice"),
+        ("an empty name", set("joint_names", "a,"), none(), "name 1 is empty"),
+        ("a word as a number", set("default_joint_pos", "0.5,x"), none(), "\"x\" is not a finite number"),
+        ("NaN in the metadata", set("joint_stiffness", "nan,1"), none(), "joint_stiffness"),
+        ("too many numbers", set("default_joint_pos", "1,2,3"), none(), "number of joints"),
+        ("too few joints", set("joint_names", "a"), none(), "number of joints"),
+        (
+            "another length",
+            set("observation_names", "joint_pos,joint_vel,command"),
+            none(),
+            "length of the observation",
+        ),
+        ("two terms of a name", set("observation_names", "joint_pos,joint_pos"), none(), "occurs twice"),
+    ];
+    for (name, metadata, yaml, expected) in cases {
+        let answers = if yaml.is_empty() { "rate_hz = 50" } else { "" };
+        let error = message(reading(&files(FRAME, 2, &metadata, &yaml)?, answers));
+        ensure!(error.contains(expected), "{name}: {error}");
+    }
+    Ok(())
+}

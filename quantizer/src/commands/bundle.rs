@@ -1,0 +1,165 @@
+//! `actq import` of a deploy bundle
+
+use std::collections::BTreeMap;
+use std::ffi::OsStr;
+use std::fs;
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+
+use actq::data::NpzWriter;
+use actq::import::FILES;
+use actq_deploy::description::Description;
+use actq_deploy::{Answers, Bundle, DESCRIPTION, Plan, Raw, Reading, Reference, Tick, explain, read};
+use actq_onnx::{Choice, import};
+use anyhow::{Context as _, Result, bail, ensure};
+
+use super::import::refuse_existing;
+use crate::args::ImportArgs;
+use crate::outputs::unfinished::OutputFolder;
+use crate::report::deployment;
+use crate::terminal::{note, print, reserve};
+
+/// Returns `true` if the arguments name a bundle, or have an option that only bundles take.
+pub(super) fn is_bundle(args: &ImportArgs) -> bool {
+    let options = args.answers.is_some() || args.accept_profile || args.reference.is_some();
+    options || args.model.is_dir() || args.model.extension().is_some_and(|ending| ending == "kinfer")
+}
+
+/// Reads a bundle, checks it, and writes its description with copies of the networks.
+pub(super) fn run(args: &ImportArgs) -> Result<()> {
+    let of_files = args.output.is_some() || !args.state.is_empty();
+    ensure!(!of_files, "a bundle takes no --output and no --state: its description names them");
+    ensure!(!args.check || args.reference.is_some(), "--check of a bundle needs --reference RAW.npz:EXPECT.npz");
+    let bundle = Bundle::open(&args.model)?;
+    let answers = match &args.answers {
+        Some(path) => {
+            let text = fs::read_to_string(path).with_context(|| path.display().to_string())?;
+            Answers::parse(&text).with_context(|| path.display().to_string())?
+        }
+        None => Answers::default(),
+    };
+    let reading = read(&bundle, args.accept_profile, answers)?;
+    refuse_open_questions(&reading)?;
+    let plan = Plan::new(&reading.description, &bundle).context(DESCRIPTION)?;
+    let checked = match &args.reference {
+        Some((raw, expect)) => Some(compare(&reading.description, plan, &bundle, &Reference::read(raw, expect)?)?),
+        None => None,
+    };
+    note(deployment::unread(&reading.unread));
+
+    let (description, copies) = gathered(&reading.description)?;
+    let inputs: Vec<PathBuf> = copies.keys().map(|file| bundle.path(file)).collect::<actq::error::Result<_>>()?;
+    let mut files = vec![(DESCRIPTION.to_owned(), description.to_toml(&reading.sources)?.into_bytes())];
+    for (name, path) in copies.into_values().zip(&inputs) {
+        files.push((name, fs::read(path).with_context(|| path.display().to_string())?));
+    }
+    files.extend(policy_folder(&reading.description, &bundle, args.calib.as_deref())?);
+    let (names, contents): (Vec<PathBuf>, Vec<Vec<u8>>) =
+        files.into_iter().map(|(name, content)| (args.out.join(name), content)).unzip();
+    let names: Vec<&Path> = names.iter().map(PathBuf::as_path).collect();
+    refuse_existing(args, &names)?;
+    let _folder =
+        OutputFolder::new(&args.out).with_context(|| format!("{}: cannot create the folder", args.out.display()))?;
+    reserve(&names, &inputs)?.write(&contents)?;
+    print(&deployment::summary(&reading))?;
+    if let Some(checked) = checked {
+        print(&checked)?;
+    }
+    let written: Vec<String> = names.iter().map(|path| path.display().to_string()).collect();
+    print(&format!("written   {}\n", written.join(", ")))
+}
+
+/// Fails with the questions that nothing answers.
+fn refuse_open_questions(reading: &Reading) -> Result<()> {
+    let questions = &reading.questions;
+    if questions.is_empty() {
+        return Ok(());
+    }
+    let by_profile = questions.iter().filter(|question| question.profile.is_some()).count();
+    let accept = match by_profile {
+        0 => String::new(),
+        n => format!("pass --accept-profile to accept what the deploy code says to {n} of them; "),
+    };
+    print(&deployment::questions(questions))?;
+    bail!(
+        "the bundle (family {}) leaves {} questions open; {accept}write answers to a file as KEY = VALUE, and pass it to --answers. \
+         Nothing was written",
+        reading.family,
+        questions.len()
+    )
+}
+
+/// Compares with the reference; an error names the first difference, and the conventions that explain it.
+fn compare(description: &Description, plan: Plan, bundle: &Bundle, reference: &Reference) -> Result<String> {
+    let unused: Vec<String> = reference.raw().unused(&plan).map(str::to_owned).collect();
+    let comparison = reference.compare(plan)?;
+    if let Some(first) = &comparison.first {
+        let reasons = explain(description, bundle, reference)?;
+        let reasons = match &reasons[..] {
+            [] => "no single known convention explains it".to_owned(),
+            _ => format!("it agrees if {}", reasons.join(", or if ")),
+        };
+        bail!("the reference differs at {first}; {reasons}. Nothing was written");
+    }
+    if !unused.is_empty() {
+        note([format!("no input has the name of these raw arrays of the reference: {}", unused.join(", "))]);
+    }
+    Ok(deployment::agreement(&comparison))
+}
+
+/// Returns the description with its files in one folder, and their names there by their paths in the bundle.
+fn gathered(description: &Description) -> Result<(Description, BTreeMap<String, String>)> {
+    let mut description = description.clone();
+    let mut copies: BTreeMap<String, String> = BTreeMap::new();
+    let networks = description.networks.iter_mut().map(|network| &mut network.file);
+    for file in networks.chain(description.motions.iter_mut().map(|motion| &mut motion.file)) {
+        let name = Path::new(file.as_str()).file_name().and_then(OsStr::to_str);
+        let mut name = name.with_context(|| format!("{file:?} is not the name of a file"))?.to_owned();
+        // Files of one name in two folders take the folders' names.
+        if copies.iter().any(|(other, taken)| other != file && *taken == name) {
+            name = file.replace('/', "_");
+        }
+        *file = copies.entry(file.clone()).or_insert(name).clone();
+    }
+    Ok((description, copies))
+}
+
+/// Returns the files of a policy folder for the network alone, and, of raw inputs, the recording that it learns from.
+/// There are none if the description has several networks, outputs or states of a graph.
+fn policy_folder(description: &Description, bundle: &Bundle, raw: Option<&Path>) -> Result<Vec<(String, Vec<u8>)>> {
+    let action = description.action.split_once('.');
+    let alone = match (&description.networks[..], action) {
+        ([network], Some((name, output))) if network.name == name && network.states.is_empty() => {
+            Some((network, output))
+        }
+        _ => None,
+    };
+    let Some((network, output)) = alone else {
+        ensure!(
+            raw.is_none(),
+            "--calib: a policy folder of several networks, or of one with states, is not supported yet"
+        );
+        return Ok(Vec::new());
+    };
+    let choice = Choice { output: Some(output.to_owned()), states: Vec::new() };
+    let imported = import(&bundle.path(&network.file)?, &choice)?;
+    let mut json: serde_json::Map<String, serde_json::Value> = serde_json::from_slice(&imported.json)?;
+    json.insert("control_hz".to_owned(), description.rate_hz.into());
+    let [json_name, weights_name] = FILES;
+    let mut files =
+        vec![(json_name.to_owned(), serde_json::to_vec_pretty(&json)?), (weights_name.to_owned(), imported.weights)];
+    if let Some(raw) = raw {
+        let ticks = Raw::read(raw)?.run(Plan::new(description, bundle).context(DESCRIPTION)?)?;
+        let mut npz = NpzWriter::new(Cursor::new(Vec::new()));
+        fn of(tick: &Tick) -> [&[f64]; 2] {
+            [&tick.observation, &tick.action]
+        }
+        for (i, name) in ["obs", "action"].into_iter().enumerate() {
+            let rows: Vec<&[f64]> = ticks.iter().map(|tick| of(tick)[i]).collect();
+            let shape = [1, rows.len(), rows.first().map_or(0, |row| row.len())];
+            npz.array(name, &shape, rows.concat().into_iter().map(|value| value as f32))?;
+        }
+        files.push(("calib.npz".to_owned(), npz.finish()?.into_inner()));
+    }
+    Ok(files)
+}
