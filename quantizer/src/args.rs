@@ -6,9 +6,8 @@ mod values;
 use std::path::PathBuf;
 
 use actq::methods::Method;
-use actq::methods::actquant::choices::Choices;
 use actq_kernels::Width;
-use anyhow::ensure;
+use anyhow::{Result, bail};
 use clap::{Parser, Subcommand, ValueEnum, value_parser};
 
 use link::{KeygenArgs, LinkArgs, SignArgs};
@@ -59,7 +58,13 @@ pub(crate) enum Command {
     /// Example: actq quantize policies/ur3 --bits 3 --out ur3.actq
     ///
     /// Example: actq quantize model.onnx --calib obs.npy --bpw 2 --out model.actq
-    Quantize(QuantizeArgs),
+    Quantize {
+        #[command(flatten)]
+        args: QuantizeArgs,
+        /// The method that chooses the codes [default: distill if there is a calibration recording, else rtn]
+        #[arg(long)]
+        method: Option<MethodArg>,
+    },
     /// Show an image: operations, matrices, bits, memory, predicted time on a Cortex-M4, action contract
     ///
     /// Example: actq inspect ur3.actq --widths --stats ur3.json --svg ur3.svg
@@ -96,7 +101,13 @@ pub(crate) enum Command {
     /// star marks the knee of the policy's best method.
     ///
     /// Example: actq sweep policies/ur3 policies/go1 --bpw 2.5,3,4 --svg errors.svg
-    Sweep(SweepArgs),
+    Sweep {
+        #[command(flatten)]
+        args: SweepArgs,
+        /// Methods to compare
+        #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "rtn,gptq,distill")]
+        methods: Vec<MethodArg>,
+    },
     /// Run an image as a policy over standard input and output
     ///
     /// Little-endian: "R" resets and has no reply; the reply to "S" and an observation in f32 is the action in f32. If
@@ -177,8 +188,9 @@ pub(crate) struct ServeArgs {
     pub(crate) policy: Option<PathBuf>,
 }
 
-#[derive(clap::Args)]
-pub(crate) struct QuantizeArgs {
+/// Arguments of `actq quantize`, without the method.
+#[derive(clap::Args, Debug)]
+pub struct QuantizeArgs {
     /// The policy folder, or an .onnx file
     pub(crate) policy_dir: PathBuf,
     /// The image to write
@@ -222,18 +234,13 @@ pub(crate) struct QuantizeArgs {
     #[arg(long, value_name = "NAME")]
     pub(crate) protect: Vec<String>,
     /// Group size, the columns that share a u8 scale: 32, 64 or 128; 0 = one scale for each row, the fastest in the
-    /// kernels [default: 32 for rtn and actquant, 0 for gptq and distill]
+    /// kernels [default: 32 for rtn, 0 for gptq and distill]
     #[arg(long, value_name = "N", value_parser = group)]
     pub(crate) group: Option<usize>,
     /// Bits of the activations, whose scale is computed at run time [default: method distill chooses for each matrix,
     /// else 8]
     #[arg(long, value_name = "BITS")]
     pub(crate) activations: Option<ActivationArg>,
-    /// The method that chooses the codes [default: distill if there is a calibration recording, else rtn]
-    #[arg(long)]
-    pub(crate) method: Option<MethodArg>,
-    #[command(flatten)]
-    pub(crate) actquant: ActQuantArgs,
     #[command(flatten)]
     pub(crate) learn: LearnArgs,
     #[command(flatten)]
@@ -321,14 +328,12 @@ pub(crate) struct TuneArgs {
     pub(crate) run: RunArgs,
 }
 
-#[derive(clap::Args)]
-pub(crate) struct SweepArgs {
+/// Arguments of `actq sweep`, without the methods.
+#[derive(clap::Args, Debug)]
+pub struct SweepArgs {
     /// The policy folders
     #[arg(required = true)]
     pub(crate) policy_dirs: Vec<PathBuf>,
-    /// Methods to compare
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "rtn,gptq,actquant,distill")]
-    pub(crate) methods: Vec<MethodArg>,
     /// Budgets, in bits per weight of all weights
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "2,2.5,3,4", value_parser = positive)]
     pub(crate) bpw: Vec<f64>,
@@ -342,70 +347,17 @@ pub(crate) struct SweepArgs {
     /// Draw the error over the bits as SVG, and mark the knee of the best method
     #[arg(long, value_name = "FILE")]
     pub(crate) svg: Option<PathBuf>,
-    /// Write errors, bits, bytes, allocations and scores as JSON: an array with one object for each policy
+    /// Write errors, bits, bytes and allocations as JSON: an array with one object for each policy
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
-    #[command(flatten)]
-    pub(crate) actquant: ActQuantArgs,
     #[command(flatten)]
     pub(crate) learn: LearnArgs,
     #[command(flatten)]
     pub(crate) run: RunArgs,
 }
 
-/// The choices that the paper of ActQuant leaves open.
-#[derive(clap::Args)]
-pub(crate) struct ActQuantArgs {
-    /// Choices of method actquant: KEY=VALUE,KEY=VALUE, or authors for its authors' choices
-    ///
-    /// Keys after authors change single choices. Defaults are in brackets; (authors) marks the
-    /// authors' choice.
-    ///
-    /// bandwidth=[median]|squared(authors): the Gaussian kernels' sigma^2, or sigma, is the median
-    ///   squared distance.
-    /// frames=N|all(authors) [512]: frames that HSIC is computed over, at most 8192.
-    /// score=[gain](authors)|output: a matrix's score is its gain, F(output) - F(input), or
-    ///   F(output).
-    /// noise=[codes]|format(authors): a width's expected error is 2^(-2 bits), with the bits of a
-    ///   code or with all bits that a weight takes.
-    /// widest=2|3|4(authors)|[8]: the widest codes of the allocation.
-    /// head=[free]|2|3|4|8(authors): the width of the matrices that give the action. (The authors
-    ///   keep them at 16 bits.)
-    /// samples=N|all(authors) [4096]: frames that the Fisher information is computed over,
-    ///   approximately.
-    /// batch=N [1] (authors: 8): frames whose gradients are averaged before they are squared.
-    /// signs=[random]|loss(authors): the loss's derivative if the recorded action is the policy's
-    ///   own: a random sign, or the sign of the remaining difference.
-    /// magnitude=[no]|yes(authors): fits of scales weigh by the importance, or by it times
-    ///   sqrt(mean of the row's w^2 + w^2).
-    ///
-    /// With one width for all (--bits) there is no bit allocation, and only the last four keys have
-    /// an effect. docs/QUANTIZER.md gives sources and reasons.
-    ///
-    /// Example: --method actquant --actquant authors,head=free
-    #[arg(long, value_name = "CHOICES", verbatim_doc_comment)]
-    actquant: Option<Choices>,
-}
-
-impl ActQuantArgs {
-    /// Returns the methods, with the choices of `--actquant` in method actquant.
-    pub(crate) fn of(&self, methods: &[Method]) -> anyhow::Result<Vec<Method>> {
-        let choose = |&method| match (method, self.actquant) {
-            (Method::ActQuant(_), Some(choices)) => Method::ActQuant(choices),
-            (other, _) => other,
-        };
-        let methods: Vec<Method> = methods.iter().map(choose).collect();
-        ensure!(
-            self.actquant.is_none() || methods.iter().any(|method| matches!(method, Method::ActQuant(_))),
-            "--actquant has no effect on {}; add actquant to the methods, or remove the option",
-            methods.iter().map(Method::to_string).collect::<Vec<_>>().join(", ")
-        );
-        Ok(methods)
-    }
-}
-
 /// Options of distillation, which also ends when the error no longer falls.
-#[derive(clap::Args)]
+#[derive(clap::Args, Debug)]
 pub(crate) struct LearnArgs {
     /// The most steps of distillation; 0 = two-sided error feedback instead, which takes seconds and gives a larger
     /// error at few bits [default: by the number of weights, 20000 for 200 thousand, recurrent policies 7800, heads
@@ -423,7 +375,7 @@ pub(crate) struct LearnArgs {
 }
 
 /// Options of every quantization.
-#[derive(clap::Args)]
+#[derive(clap::Args, Debug)]
 pub(crate) struct RunArgs {
     /// Seed of all random numbers
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -436,7 +388,7 @@ pub(crate) struct RunArgs {
     pub(crate) quiet: bool,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
+#[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum ActivationArg {
     /// int8
     #[value(name = "8")]
@@ -452,20 +404,25 @@ pub(crate) enum MethodArg {
     Rtn,
     /// Column-wise error feedback with the inputs' second moment (needs a recording)
     Gptq,
-    /// Widths by HSIC scores, scales by the Fisher information of the actions (needs a recording with actions)
-    Actquant,
     /// A width for every row, pruning, and distillation on the recorded observations (needs a recording)
     #[value(alias = "best")]
     Distill,
+    /// Part of `actq-research`
+    #[value(hide = true)]
+    Actquant,
 }
 
-impl From<MethodArg> for Method {
-    fn from(arg: MethodArg) -> Self {
-        match arg {
-            MethodArg::Rtn => Self::Rtn,
-            MethodArg::Gptq => Self::Gptq,
-            MethodArg::Actquant => Self::ActQuant(Choices::default()),
-            MethodArg::Distill => Self::Distill,
-        }
+impl MethodArg {
+    /// Returns the method; refuses actquant, which another command has.
+    pub(crate) fn method(self) -> Result<Method> {
+        Ok(match self {
+            Self::Rtn => Method::Rtn,
+            Self::Gptq => Method::Gptq,
+            Self::Distill => Method::Distill,
+            Self::Actquant => bail!(
+                "method actquant is not part of this command; give the same arguments to `cargo run --release -p actq-research --` \
+                 in the sources of actq"
+            ),
+        })
     }
 }

@@ -1,4 +1,5 @@
-//! One file for each subcommand of `actq`.
+//! One file for each subcommand of `actq`. Programs of other crates run [`quantize`] and [`sweep`] with methods of
+//! their own.
 
 mod bundle;
 mod drive;
@@ -6,8 +7,8 @@ pub(crate) mod eval;
 pub(crate) mod import;
 pub(crate) mod inspect;
 pub(crate) mod link;
-pub(crate) mod quantize;
+pub mod quantize;
 pub(crate) mod serve;
 pub(crate) mod sign;
-pub(crate) mod sweep;
+pub mod sweep;
 pub(crate) mod tune;

@@ -3,9 +3,9 @@
 #![forbid(unsafe_code)]
 
 mod agreement;
-mod args;
+pub mod args;
 mod check;
-mod commands;
+pub mod commands;
 mod group;
 mod importers;
 #[cfg(unix)]
@@ -22,13 +22,22 @@ use std::process::ExitCode;
 use actq::text::printable;
 use anyhow::Result;
 
-use args::Command;
+use args::{Command, MethodArg};
 use commands::{eval, import, inspect, link, quantize, sign, sweep, tune};
 use outputs::unfinished;
 
 /// Runs the command line of this process.
 pub fn run() -> ExitCode {
-    let outcome = run_command(&suggestions::parse().command);
+    let command = suggestions::parse().command;
+    run_work(|| run_command(&command))
+}
+
+/// Runs the work of a command and prints its error. A signal ends the process without partial outputs.
+pub fn run_work(work: impl FnOnce() -> Result<()>) -> ExitCode {
+    #[cfg(unix)]
+    let outcome = interrupts::watch().and_then(|()| work());
+    #[cfg(not(unix))]
+    let outcome = work();
     // If a signal ends the process, the signal decides the exit status.
     let _held = unfinished::hold();
     match outcome {
@@ -41,15 +50,17 @@ pub fn run() -> ExitCode {
 }
 
 fn run_command(command: &Command) -> Result<()> {
-    #[cfg(unix)]
-    interrupts::watch()?;
     match command {
         Command::Import(args) => import::run(args),
-        Command::Quantize(args) => quantize::run(args),
+        Command::Quantize { args, method } => {
+            quantize::run(args, method.map(MethodArg::method).transpose()?, |_, _| String::new())
+        }
         Command::Inspect(args) => inspect::run(args),
         Command::Eval(args) => eval::run(args),
         Command::Tune(args) => tune::run(args),
-        Command::Sweep(args) => sweep::run(args),
+        Command::Sweep { args, methods } => {
+            sweep::run(args, &methods.iter().map(|method| method.method()).collect::<Result<Vec<_>>>()?)
+        }
         Command::Serve(args) => commands::serve::run(args),
         Command::Link(args) => link::run(args),
         Command::Keygen(args) => sign::keygen(args),

@@ -1,5 +1,11 @@
 //! Rivals and comparisons. This crate uses the quantizer's library; the library never uses this crate.
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
+pub mod actquant;
+pub mod commands;
 pub mod compare;
 pub mod kquants;
+// The library's own, which it compiles for its unit tests alone.
+#[cfg(test)]
+#[path = "../../quantizer/actq/src/testing.rs"]
+mod testing;

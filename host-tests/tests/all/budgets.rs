@@ -5,13 +5,14 @@ use actq::data::{Dataset, Recordings};
 use actq::graph::ops::{LayerNorm, Linear, Pointwise};
 use actq::graph::{Graph, WeightMatrix};
 use actq::measure::size::bits_per_weight;
-use actq::methods::actquant::choices::Choices;
 use actq::methods::{Method, Options, Outcome};
 use actq::pipeline::{QuantizedPolicy, Quantizer, Reason, Unused, check_budget};
 use actq::policy::Policy;
 use actq::random::Random;
 use actq_kernels::Width;
 use actq_kernels::math::Function;
+use actq_research::actquant::ActQuant;
+use actq_research::actquant::choices::Choices;
 use anyhow::{Context as _, Result, ensure};
 use ndarray::Array3;
 use proptest::prelude::*;
@@ -62,7 +63,7 @@ fn options(method: Method, budget: Budget) -> Options {
 }
 
 fn quantize(quantizer: &Quantizer<'_>, budget: Budget) -> actq::error::Result<QuantizedPolicy> {
-    quantizer.quantize(&options(quantizer.method().method(), budget), ())
+    quantizer.quantize(&options(quantizer.method().method().clone(), budget), ())
 }
 
 fn too_small(result: actq::error::Result<impl Sized>) -> Result<BudgetTooSmall> {
@@ -158,9 +159,9 @@ fn every_method_names_the_smallest_image() -> Result<()> {
     if let Some(calib) = &mut recordings.calib {
         calib.fill_actions(&policy.graph);
     }
-    for method in [Method::Rtn, Method::Gptq, Method::ActQuant(Choices::default()), Method::Distill] {
-        let quantizer = Quantizer::new(&policy, &recordings, method, None, |_| {})?;
-        let check = |bytes: usize| check_budget(&policy, &options(method, Budget::ImageBytes(bytes)));
+    for method in [Method::Rtn, Method::Gptq, Method::custom(ActQuant(Choices::default())), Method::Distill] {
+        let quantizer = Quantizer::new(&policy, &recordings, method.clone(), None, |_| {})?;
+        let check = |bytes: usize| check_budget(&policy, &options(method.clone(), Budget::ImageBytes(bytes)));
         let least = too_small(check(0)).context(method.to_string())?.bytes;
         ensure!(check(least - 1).is_err() && check(least).is_ok(), "{method}: {least} bytes are not the least");
         let len = quantize(&quantizer, Budget::ImageBytes(least)).context(method.to_string())?.image.len();

@@ -9,7 +9,8 @@ use anyhow::{Context, Result, ensure};
 
 const GENERATED: &str = "<!-- Below, the help of every command. Do not edit; write it anew by\n     \
                          ACTQ_BLESS=1 cargo test --release -p actq-host-tests docs:: -->\n";
-const OTHERS: &[&str] = &["README.md", "firmware-demo/README.md", "fuzz/README.md", "examples/ur3/README.md"];
+const OTHERS: &[&str] =
+    &["README.md", "firmware-demo/README.md", "fuzz/README.md", "examples/ur3/README.md", "research/README.md"];
 /// Commands of cargo itself, and of cargo-fuzz.
 const CARGO: &[&str] = &["+nightly", "build", "check", "install", "run", "test"];
 

@@ -3,13 +3,14 @@
 use actq::budget::Budget;
 use actq::data::Recordings;
 use actq::measure::eval;
-use actq::methods::actquant::choices::Choices;
 use actq::methods::{Method, Options};
 use actq::pipeline;
 use actq::policy::Policy;
 use actq::runtime::with_head;
 use actq_bench::closed_loop::episode_on_host;
 use actq_bench::ur3;
+use actq_research::actquant::ActQuant;
+use actq_research::actquant::choices::Choices;
 use anyhow::Result;
 
 /// Tolerance above a recorded figure: other processors round matrix products differently.
@@ -39,7 +40,7 @@ const STEPS: Option<usize> = Some(1000);
 
 /// Compares the figures with the recorded ones.
 fn hold(method: Method, bits: f64, nmse: f64, tracking: f64) -> Result<(f64, usize, f64)> {
-    let plain = Options::new(method, Budget::BitsPerWeight(bits));
+    let plain = Options::new(method.clone(), Budget::BitsPerWeight(bits));
     let found = figures(&Options { group: method.default_group(), steps: STEPS, ..plain })?;
     let text = format!("{method} at {bits} bits: NMSE, successes and tracking error are {found:?}");
     assert!(found.0 < TOLERANCE * nmse && found.1 as u64 == EPISODES && found.2 < TOLERANCE * tracking, "{text}");
@@ -63,6 +64,6 @@ fn distill_keeps_its_error_and_every_episode() -> Result<()> {
 #[test]
 fn rivals_keep_their_errors() -> Result<()> {
     hold(Method::Gptq, 3.0, 8.4e-3, 1.25)?;
-    hold(Method::ActQuant(Choices::default()), 4.0, 1.56e-2, 2.6)?;
+    hold(Method::custom(ActQuant(Choices::default())), 4.0, 1.56e-2, 2.6)?;
     Ok(())
 }

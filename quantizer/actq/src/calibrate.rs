@@ -1,8 +1,6 @@
 //! Statistics of a network over recorded observations, collected before anything is quantized.
 
 pub mod allowance;
-pub mod fisher;
-pub mod hsic;
 pub mod moments;
 pub mod sensitivity;
 pub mod widening;

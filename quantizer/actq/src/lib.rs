@@ -1,12 +1,16 @@
 //! Quantizes a robot policy to one image for a microcontroller.
 //!
 //! [`import`] reads a [`policy::Policy`] with its network, a [`graph::Graph`]; [`data`] reads the recordings.
-//! [`pipeline`] makes an image of them. A method of [`methods`] turns every weight matrix into codes and scales, based
-//! on what [`calibrate`] finds in the recordings. [`emit`] writes the bytes. [`measure`] runs the finished image
+//! [`pipeline`] makes an image of them. A method of [`methods`], or one of another crate
+//! ([`methods::CustomMethod`]), turns every weight matrix into codes and scales, based on what [`calibrate`] finds in the
+//! recordings. [`emit`] writes the bytes. [`measure`] runs the finished image
 //! through the same executor as the firmware.
 //!
 //! `docs/ARCHITECTURE.md` lists which folder may use which, and a test checks it.
 #![deny(unsafe_code)]
+
+#[cfg(test)]
+extern crate self as actq;
 
 pub mod budget;
 pub mod calibrate;
@@ -23,4 +27,6 @@ pub mod policy;
 pub mod random;
 pub mod runtime;
 mod strict_json;
+#[cfg(test)]
+mod testing;
 pub mod text;

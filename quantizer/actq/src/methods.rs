@@ -1,11 +1,11 @@
 //! Quantization of weight matrices to codes and scales.
 
-pub mod actquant;
 pub mod distill;
 pub mod gptq;
 mod learning;
 pub mod matrixwise;
 mod options;
+mod packing;
 mod prepared;
 mod progress;
 mod quantized;
@@ -13,7 +13,8 @@ pub mod scale;
 
 pub use crate::calibrate::allowance::Sampled;
 pub use learning::{Choice, Learning, Tried};
-pub use options::{Activations, Method, Options, Packing};
+pub use options::{CustomMethod, CustomStatistics, Method, Options};
+pub use packing::{Activations, Packing};
 pub use prepared::{PreparedMethod, least_bytes, quantize};
 pub use progress::Progress;
 pub use quantized::{Outcome, Quantized, QuantizedNetwork, RowAllocation};

@@ -8,19 +8,24 @@ use actq::data::{Learned, Recording, Recordings, Sizes, driven_by, files_of};
 use actq::measure::{check, own};
 use actq::methods::{Activations, Method, Options};
 use actq::pipeline::stats::Stats;
-use actq::pipeline::{Quantizer, check_budget};
+use actq::pipeline::{QuantizedPolicy, Quantizer, check_budget};
 use actq_kernels::Width;
 use anyhow::{Result, bail};
 
-use crate::args::{ActivationArg, MethodArg, QuantizeArgs};
+use crate::args::{ActivationArg, QuantizeArgs};
 use crate::importers::{load, policy_files};
 use crate::report::learned::learned;
 use crate::report::{notes, quantized, time};
 use crate::terminal::{Progress, note, print, reserve};
 use crate::threads::start_threads;
 
-/// Quantizes a policy, writes the image and prints a report.
-pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
+/// Quantizes a policy, writes the image and prints a report. Without a method, a calibration recording decides it.
+/// `describe` returns the report's part on a method of the caller's own, empty for others.
+pub fn run(
+    args: &QuantizeArgs,
+    method: Option<Method>,
+    describe: impl FnOnce(&Quantizer<'_>, &QuantizedPolicy) -> String,
+) -> Result<()> {
     let outputs: Vec<&Path> = [Some(&args.out), args.save_stats.as_ref()].into_iter().flatten().map(|p| &**p).collect();
     let calib = files_of(&args.calib)?;
     let inputs: Vec<PathBuf> = policy_files(&args.policy_dir).into_iter().chain(calib.iter().cloned()).collect();
@@ -28,11 +33,10 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
     let progress = Progress::new(args.run.quiet, "reading")?;
     let source = load(&args.policy_dir)?;
     let has_calib = !calib.is_empty() || Recording::Calib.find(&args.policy_dir)?.is_some();
-    let rtn = matches!(args.method, Some(MethodArg::Rtn));
-    if args.policy_dir.is_file() && !has_calib && !rtn {
+    if args.policy_dir.is_file() && !has_calib && method != Some(Method::Rtn) {
         bail!("{}: {}", args.policy_dir.display(), notes::how_to_record(&source));
     }
-    let options = options(args, has_calib)?;
+    let options = options(args, method.unwrap_or(if has_calib { Method::Distill } else { Method::Rtn }));
     options.check()?;
     check_budget(&source, &options)?;
     let (calib, shares) = Learned::load(&source, &calib)?.map(|l| (l.dataset, l.shares)).unzip();
@@ -44,7 +48,7 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
     let started = Instant::now();
     start_threads(args.run.threads)?;
     progress.begin("calibrating");
-    let quantizer = Quantizer::new(&source, &recordings, options.method, options.minutes, |share| {
+    let quantizer = Quantizer::new(&source, &recordings, options.method.clone(), options.minutes, |share| {
         progress.set("calibrating", share);
     })?;
     note(notes::mixed_units(quantizer.method().mixed_units()));
@@ -57,9 +61,7 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
     outputs.write(&contents)?;
     progress.begin("measuring the error");
     print(&learned(&shares))?;
-    if let Some(statistics) = quantizer.method().action_statistics() {
-        print(&quantized::scores(&source.graph, statistics, &found))?;
-    }
+    print(&describe(&quantizer, &found))?;
     let search = found.search.as_ref().map_or(String::new(), |search| quantized::search(search) + "\n");
     let sampled = quantizer.method().sampled().map_or(String::new(), quantized::sampled);
     let learned = sampled + &found.learning.as_ref().map_or(String::new(), quantized::learning);
@@ -97,14 +99,8 @@ pub(crate) fn run(args: &QuantizeArgs) -> Result<()> {
     Ok(())
 }
 
-/// Returns the options of the command line. Without `--method`, a calibration recording decides the method.
-fn options(args: &QuantizeArgs, has_calib: bool) -> Result<Options> {
-    let method = match args.method {
-        Some(method) => method.into(),
-        None if !has_calib => Method::Rtn,
-        None => Method::Distill,
-    };
-    let method = args.actquant.of(&[method])?[0];
+/// Returns the options of the command line.
+fn options(args: &QuantizeArgs, method: Method) -> Options {
     let limits = [
         args.bpw.map(Budget::BitsPerWeight),
         args.flash.map(Budget::ImageBytes),
@@ -113,7 +109,7 @@ fn options(args: &QuantizeArgs, has_calib: bool) -> Result<Options> {
     ];
     let width = args.bits.unwrap_or(Width::W3);
     let protected = args.protect.iter().map(|name| (name.clone(), Width::W8));
-    Ok(Options {
+    Options {
         group: args.group.unwrap_or(method.default_group()),
         activations: match args.activations {
             Some(ActivationArg::Int8) => Activations::Int8,
@@ -126,5 +122,5 @@ fn options(args: &QuantizeArgs, has_calib: bool) -> Result<Options> {
         seed: args.run.seed,
         forced: args.width.iter().cloned().chain(protected).collect(),
         ..Options::new(method, limits.into_iter().flatten().next().unwrap_or(Budget::Width(width)))
-    })
+    }
 }

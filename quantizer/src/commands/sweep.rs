@@ -14,7 +14,7 @@ use crate::terminal::{Progress, note, print, reserve};
 use crate::threads::start_threads;
 
 /// Quantizes policies by several methods at several budgets and compares the errors.
-pub(crate) fn run(args: &SweepArgs) -> Result<()> {
+pub fn run(args: &SweepArgs, methods: &[Method]) -> Result<()> {
     let folders = args.policy_dirs.iter().flat_map(|dir| policy_files(dir));
     let calib = files_of(&args.calib)?;
     let inputs: Vec<PathBuf> = folders.chain(calib.iter().chain(&args.heldout).cloned()).collect();
@@ -22,8 +22,6 @@ pub(crate) fn run(args: &SweepArgs) -> Result<()> {
     let outputs = reserve(&outputs, &inputs)?;
     let progress = Progress::new(args.run.quiet, "reading")?;
     start_threads(args.run.threads)?;
-    let methods: Vec<Method> = args.methods.iter().map(|&method| method.into()).collect();
-    let methods = args.actquant.of(&methods)?;
     let policies = args.policy_dirs.iter().map(|dir| load(dir)).collect::<Result<Vec<_>>>()?;
     let named = !calib.is_empty() || args.heldout.is_some();
     ensure!(
@@ -41,7 +39,7 @@ pub(crate) fn run(args: &SweepArgs) -> Result<()> {
         let plan = SweepPlan {
             policy,
             recordings,
-            methods: &methods,
+            methods,
             budgets: &args.bpw,
             steps: args.learn.steps,
             minutes: args.learn.minutes,

@@ -1,9 +1,6 @@
 //! The report of `actq quantize`.
 
-use actq::budget::Rate;
-use actq::graph::Graph;
 use actq::measure::eval::ErrorReport;
-use actq::methods::actquant::ActionStatistics;
 use actq::methods::distill::balance::balance_bytes;
 use actq::methods::{Choice, Learning, Sampled, Tried};
 use actq::pipeline::{QuantizedPolicy, Search, Try};
@@ -11,22 +8,6 @@ use comfy_table::Table;
 
 use super::table::{group_name, table};
 use super::widths;
-
-/// Formats ActQuant's scores, and the bits that follow from them.
-pub fn scores(graph: &Graph, statistics: &ActionStatistics, quantized: &QuantizedPolicy) -> String {
-    let (_, equal) = statistics.effective_scores();
-    let mut rows = table(&["matrix", "HSIC score", "bits"]);
-    for ((matrix, score), outcome) in graph.matrices.iter().zip(&statistics.scores).zip(&quantized.outcomes) {
-        let bits = outcome.quantized.width_counts();
-        rows.add_row([matrix.name.clone(), format!("{:.4}", score.of(statistics.choices.score)), bits]);
-    }
-    let note = match quantized.rate {
-        Rate::Width(_) => "One width for all rows: the scores have no effect.",
-        _ if equal => "No score is above 0: all matrices have equal weight.",
-        _ => "Scores below 0 count as 0.",
-    };
-    format!("{rows}\n{note}\n\n")
-}
 
 /// Formats a row for every matrix, and the sum of their bytes.
 pub fn matrices(quantized: &QuantizedPolicy) -> String {

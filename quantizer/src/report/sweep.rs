@@ -66,7 +66,7 @@ mod tests {
                 ErrorReport { nmse, worst_nmse: nmse, max_abs: 0.0, steps: 1, bpw, bytes: 1, worst_dimension: 0 };
             (nmse > 0.0).then_some(Point { budget: bpw, report, rows: Vec::new() })
         };
-        Curve { method: method.to_owned(), points: points.iter().map(point).collect(), scores: None }
+        Curve { method: method.to_owned(), points: points.iter().map(point).collect(), scores: Vec::new() }
     }
 
     #[test]

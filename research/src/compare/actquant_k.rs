@@ -11,13 +11,13 @@ use actq::data::Dataset;
 use actq::graph::Graph;
 use actq::import::FILES;
 use actq::measure::eval;
-use actq::methods::actquant::{self, ActionStatistics, allocation};
 use actq::policy::Policy;
 use actq_cli::outputs::files;
 use anyhow::{Context as _, Result, ensure};
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
 
+use crate::actquant::{self, ActionStatistics, allocation};
 use crate::kquants::Format;
 
 /// A network with the weights that its codes and scales represent.

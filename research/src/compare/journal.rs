@@ -81,7 +81,7 @@ pub struct Journal {
 
 impl Journal {
     /// Returns the file in the folder of a run.
-    pub fn path(folder: &Path) -> PathBuf {
+    fn path(folder: &Path) -> PathBuf {
         folder.join("compare.jsonl")
     }
 

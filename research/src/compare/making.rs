@@ -8,7 +8,7 @@ use actq::budget::{Budget, BudgetTooSmall};
 use actq::data::{Dataset, Recording, Recordings};
 use actq::graph::Graph;
 use actq::measure::eval;
-use actq::methods::{Method, Options};
+use actq::methods::Options;
 use actq::pipeline::Quantizer;
 use actq::policy::Policy;
 use actq_kernels::layout::GROUPS;
@@ -17,6 +17,7 @@ use anyhow::{Context as _, Result};
 use super::actquant_k;
 use super::cell::Made;
 use super::plan::{Contender, Plan};
+use crate::actquant::ActionStatistics;
 use crate::kquants::Format;
 
 /// A policy and its recordings.
@@ -78,13 +79,12 @@ impl<'a> Maker<'a> {
         budget: f64,
         mut progress: impl FnMut(&str, f64),
     ) -> Result<Attempt> {
-        let method = contender.method();
-        let preparing = self.prepare(method, &mut progress)?;
+        self.prepare(contender, &mut progress)?;
         if contender == Contender::ActQuantK {
-            return self.simulate(budget, preparing);
+            return self.simulate(budget);
         }
-        let default = method.default_group();
-        let first = self.with_group(contender, budget, default, preparing, &mut progress)?;
+        let default = contender.method().default_group();
+        let first = self.with_group(contender, budget, default, &mut progress)?;
         let too_small = match first {
             Ok(made) => return Ok(made),
             Err(too_small) => too_small,
@@ -92,7 +92,7 @@ impl<'a> Maker<'a> {
         let mut least_of_all = (too_small, default);
         let mut best: Option<(Vec<u8>, Made)> = None;
         for group in GROUPS.into_iter().chain([0]).filter(|group| *group != default) {
-            match self.with_group(contender, budget, group, preparing, &mut progress)? {
+            match self.with_group(contender, budget, group, &mut progress)? {
                 Ok(Attempt::Made(image, made)) if best.as_ref().is_none_or(|(_, best)| made.nmse < best.nmse) => {
                     best = Some((image, made));
                 }
@@ -111,11 +111,10 @@ impl<'a> Maker<'a> {
     }
 
     /// Makes ActQuant in K-quants.
-    fn simulate(&self, budget: f64, preparing: f64) -> Result<Attempt> {
+    fn simulate(&self, budget: f64) -> Result<Attempt> {
         let begun = Instant::now();
-        let (quantizer, _) =
-            self.ready.get(&Contender::ActQuantK.method().to_string()).context("the method is not prepared")?;
-        let statistics = quantizer.method().action_statistics().context("the method has no statistics")?;
+        let (quantizer, preparing) = self.prepared(Contender::ActQuantK)?;
+        let statistics = quantizer.method().custom::<ActionStatistics>().context("the method has no statistics")?;
         let policy = &self.subject.policy;
         let simulated = match actquant_k::quantize(&policy.graph, statistics, budget, self.subject.heldout()?) {
             Ok(simulated) => simulated,
@@ -141,17 +140,22 @@ impl<'a> Maker<'a> {
         Ok(Attempt::Simulated(simulated.graph, made))
     }
 
-    /// Returns the seconds of a method's statistics, which are collected once.
-    fn prepare(&mut self, method: Method, progress: &mut impl FnMut(&str, f64)) -> Result<f64> {
-        if let Some((_, seconds)) = self.ready.get(&method.to_string()) {
-            return Ok(*seconds);
+    /// Collects the statistics of a contender's method, unless they are there.
+    fn prepare(&mut self, contender: Contender, progress: &mut impl FnMut(&str, f64)) -> Result<()> {
+        let method = contender.method();
+        let name = method.to_string();
+        if !self.ready.contains_key(&name) {
+            let begun = Instant::now();
+            let Subject { policy, recordings } = self.subject;
+            let quantizer = Quantizer::new(policy, recordings, method, None, |share| progress("calibrating", share))?;
+            self.ready.insert(name, (quantizer, begun.elapsed().as_secs_f64()));
         }
-        let begun = Instant::now();
-        let Subject { policy, recordings } = self.subject;
-        let quantizer = Quantizer::new(policy, recordings, method, None, |share| progress("calibrating", share))?;
-        let seconds = begun.elapsed().as_secs_f64();
-        self.ready.insert(method.to_string(), (quantizer, seconds));
-        Ok(seconds)
+        Ok(())
+    }
+
+    /// Returns a contender's prepared method, and the seconds of its statistics.
+    fn prepared(&self, contender: Contender) -> Result<&(Quantizer<'a>, f64)> {
+        self.ready.get(&contender.method().to_string()).context("the method is not prepared")
     }
 
     fn with_group(
@@ -159,15 +163,13 @@ impl<'a> Maker<'a> {
         contender: Contender,
         budget: f64,
         group: usize,
-        preparing: f64,
         progress: &mut impl FnMut(&str, f64),
     ) -> Result<Result<Attempt, BudgetTooSmall>> {
-        let method = contender.method();
         let steps = if contender == Contender::DistillNotLearned { Some(0) } else { self.plan.steps };
-        let plain = Options::new(method, Budget::BitsPerWeight(budget));
+        let plain = Options::new(contender.method(), Budget::BitsPerWeight(budget));
         let options = Options { group, steps, seed: self.plan.seed, ..plain };
         let begun = Instant::now();
-        let (quantizer, _) = self.ready.get(&method.to_string()).context("the method is not prepared")?;
+        let (quantizer, preparing) = self.prepared(contender)?;
         let quantized = match quantizer.quantize(&options, progress) {
             Ok(quantized) => quantized,
             Err(error) => return error.budget().map(|small| Err(*small)).ok_or(error.into()),
@@ -180,7 +182,7 @@ impl<'a> Maker<'a> {
             bytes: report.bytes,
             bytes_per_parameter: report.bytes as f64 / self.subject.policy.parameters.max(1) as f64,
             format: if group == 0 { "row".to_owned() } else { group.to_string() },
-            default_group: group == method.default_group(),
+            default_group: group == options.method.default_group(),
             seconds,
         };
         Ok(Ok(Attempt::Made(quantized.image, made)))

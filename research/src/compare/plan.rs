@@ -3,9 +3,11 @@
 use std::path::PathBuf;
 
 use actq::methods::Method;
-use actq::methods::actquant::choices::Choices;
 use clap::{Args, ValueEnum};
 use serde::{Deserialize, Serialize};
+
+use crate::actquant::ActQuant;
+use crate::actquant::choices::Choices;
 
 /// The name of the project's own policy.
 pub(super) const UR3: &str = "ur3";
@@ -46,8 +48,8 @@ impl Contender {
         match self {
             Self::Rtn => Method::Rtn,
             Self::Gptq => Method::Gptq,
-            Self::ActQuant | Self::ActQuantK => Method::ActQuant(Choices::default()),
-            Self::ActQuantAuthors => Method::ActQuant(Choices::AUTHORS),
+            Self::ActQuant | Self::ActQuantK => Method::custom(ActQuant(Choices::default())),
+            Self::ActQuantAuthors => Method::custom(ActQuant(Choices::AUTHORS)),
             Self::DistillNotLearned | Self::Distill => Method::Distill,
         }
     }

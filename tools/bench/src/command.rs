@@ -1,4 +1,4 @@
-//! The command `actq` for tests and measurements.
+//! The commands `actq` and `actq-research` for tests and measurements.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -9,11 +9,16 @@ use anyhow::{Context, Result, ensure};
 
 use crate::firmware::cargo_build;
 
-/// Returns the path of the command `actq`. Builds it once, in the profile of this build and beside it: cargo does not
-/// build the binaries of a dependency.
+/// Returns the path of the command `actq`, built once.
 pub fn binary() -> Result<&'static Path> {
     static BINARY: OnceLock<PathBuf> = OnceLock::new();
-    if let Some(path) = BINARY.get() {
+    built(&BINARY, "actq-cli", "actq")
+}
+
+/// Builds the command `name` of a package, unless `path` holds its path already, in the profile of this build and
+/// beside it: cargo does not build the binaries of a dependency.
+fn built(path: &'static OnceLock<PathBuf>, package: &str, name: &str) -> Result<&'static Path> {
+    if let Some(path) = path.get() {
         return Ok(path);
     }
     let program = std::env::current_exe().context("cannot find the running executable")?;
@@ -23,15 +28,23 @@ pub fn binary() -> Result<&'static Path> {
     let profile = folder.file_name().and_then(|name| name.to_str()).context("the profile's name is not UTF-8")?;
     let profile = if profile == "debug" { "dev" } else { profile };
     // Building it with this package selects the features of the tests; otherwise cargo would build the quantizer twice.
-    let packages = ["--package", "actq-cli", "--package", env!("CARGO_PKG_NAME")];
-    let command = [&packages[..], &["--bin", "actq", "--profile", profile]].concat();
-    cargo_build("actq", &command, &[])?;
-    Ok(BINARY.get_or_init(|| folder.join(format!("actq{}", std::env::consts::EXE_SUFFIX))))
+    let packages = ["--package", package, "--package", env!("CARGO_PKG_NAME")];
+    let command = [&packages[..], &["--bin", name, "--profile", profile]].concat();
+    cargo_build(name, &command, &[])?;
+    Ok(path.get_or_init(|| folder.join(format!("{name}{}", std::env::consts::EXE_SUFFIX))))
 }
 
 /// Returns the command `actq` with arguments.
 pub fn actq(arguments: &[&str]) -> Command {
     let mut command = Command::new(binary().expect("actq builds"));
+    command.args(arguments);
+    command
+}
+
+/// Returns the command `actq-research` with arguments.
+pub fn research(arguments: &[&str]) -> Command {
+    static BINARY: OnceLock<PathBuf> = OnceLock::new();
+    let mut command = Command::new(built(&BINARY, "actq-research", "actq-research").expect("actq-research builds"));
     command.args(arguments);
     command
 }

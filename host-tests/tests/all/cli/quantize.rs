@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use actq::runtime::ImageBuffer;
-use actq_bench::command::{actq, failed, run, succeeded};
+use actq_bench::command::{actq, failed, research, run, succeeded};
 use actq_bench::ur3;
 use actq_kernels::Width;
 use anyhow::{Context, Result, ensure};
@@ -186,7 +186,7 @@ fn choices_of_actquant_reach_the_image() -> Result<()> {
     let folder = TempDir::new()?;
     let out = folder.path().join("image.actq");
     let quantize = |options: &str| {
-        let mut command = actq(&["quantize"]);
+        let mut command = research(&["quantize"]);
         command.arg(ur3()).arg("--out").arg(&out).args(options.split_whitespace());
         run(command, b"")
     };
@@ -212,9 +212,25 @@ fn choices_of_actquant_reach_the_image() -> Result<()> {
         failed(&quantize(options)?, status, &[words])?;
     }
     ensure!(!out.exists(), "a file was written");
-    let mut sweep = actq(&["sweep"]);
+    let mut sweep = research(&["sweep"]);
     sweep.arg(ur3()).args(["--methods", "rtn", "--actquant", "head=4"]);
     failed(&run(sweep, b"")?, 1, &["no effect on rtn"])
+}
+
+#[test]
+fn actquant_is_refused_with_the_command_that_has_it() -> Result<()> {
+    let folder = TempDir::new()?;
+    let out = folder.path().join("image.actq");
+    let mut quantize = actq(&["quantize", "--method", "actquant", "--out"]);
+    quantize.arg(&out).arg(ur3());
+    let mut sweep = actq(&["sweep", "--methods", "rtn,actquant"]);
+    sweep.arg(ur3());
+    for command in [quantize, sweep] {
+        let words = ["method actquant is not part of this command", "cargo run --release -p actq-research --"];
+        failed(&run(command, b"")?, 1, &words)?;
+    }
+    ensure!(!out.exists(), "an image was written");
+    Ok(())
 }
 
 #[test]

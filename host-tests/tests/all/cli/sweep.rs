@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use actq_bench::command::{actq, failed, run, succeeded};
+use actq_bench::command::{actq, failed, research, run, succeeded};
 use anyhow::{Result, ensure};
 
 use super::fixture::{Fixture, OBS, draw_observations, text, write_npy};
@@ -44,7 +44,7 @@ fn sweep_accepts_recordings_without_actions() -> Result<()> {
     }
     let arguments = ["sweep", &text(&policy), "--methods", "rtn,actquant", "--bpw", "4"];
     let recordings = ["--calib", &text(&calib.0), "--heldout", &text(&heldout.0)];
-    let table = succeeded(&run(actq(&[&arguments[..], &recordings].concat()), b"")?)?;
+    let table = succeeded(&run(research(&[&arguments[..], &recordings].concat()), b"")?)?;
     ensure!(table.contains("actquant"), "{table}");
     Ok(())
 }

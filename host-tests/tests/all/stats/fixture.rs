@@ -6,7 +6,7 @@ use std::process::Output;
 
 use actq::graph::Evaluator;
 use actq::policy::Policy;
-use actq_bench::command::{actq, run, succeeded};
+use actq_bench::command::{actq, research, run, succeeded};
 use actq_bench::golden::Random;
 use anyhow::{Context, Result};
 use ndarray::Array3;
@@ -73,9 +73,10 @@ impl Fixture {
         self.0.path().join(name)
     }
 
-    /// Runs a command, its arguments separated by spaces, in the fixture's folder.
+    /// Runs a command, its arguments separated by spaces, in the fixture's folder; one with method actquant in the
+    /// research command.
     pub(super) fn actq(&self, line: &str) -> Result<Output> {
-        let mut command = actq(&[]);
+        let mut command = if line.contains("actquant") { research(&[]) } else { actq(&[]) };
         command.current_dir(self.0.path()).args(line.split_whitespace());
         run(command, b"")
     }

@@ -222,7 +222,7 @@ fn root(variance: f64) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::methods::actquant::testing::{dataset, lstm};
+    use crate::testing::{dataset, lstm};
 
     #[test]
     fn short_episodes_do_not_shorten_windows() {

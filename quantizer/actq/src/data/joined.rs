@@ -154,7 +154,7 @@ fn gather(parts: &[Dataset], chosen: &[Vec<Place>], state_len: usize) -> Result<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::methods::actquant::testing::{dataset, lstm, mlp};
+    use crate::testing::{dataset, lstm, mlp};
 
     fn named(name: &str, part: Dataset) -> Dataset {
         Dataset { path: format!("folder/{name}").into(), ..part }

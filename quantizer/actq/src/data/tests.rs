@@ -11,7 +11,7 @@ use super::*;
 use crate::calibrate::moments;
 use crate::calibrate::windows::Windows;
 use crate::graph::Graph;
-use crate::methods::actquant::testing::{dataset, lstm, mlp};
+use crate::testing::{dataset, lstm, mlp};
 
 const SIZES: Sizes = Sizes { obs: 3, noise: 0, out: 2, state: 0 };
 const RECURRENT: Sizes = Sizes { obs: 3, noise: 0, out: 2, state: 4 };

@@ -22,7 +22,8 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::learning::{Choice, Learning};
-use super::options::{Activations, Options};
+use super::options::Options;
+use super::packing::Activations;
 use super::progress::Progress;
 use super::quantized::{Outcome, Quantized, QuantizedNetwork, RowAllocation};
 use crate::budget::Rate;

@@ -1,79 +1,114 @@
-//! Method, budget and other options of a quantization.
+//! Methods, built in and of other crates, and the options of a quantization.
 
+use std::any::Any;
+use std::collections::BTreeMap;
 use std::fmt;
+use std::sync::Arc;
 
 use actq_kernels::Width;
-use actq_kernels::layout::{BlockShape, GROUPS, Lanes, is_group};
+use actq_kernels::layout::{GROUPS, is_group};
 
-use super::actquant::choices::Choices;
-use crate::budget::Budget;
+use super::packing::{Activations, Packing};
+use super::quantized::Outcome;
+use crate::budget::{Budget, Rate};
+use crate::data::Dataset;
 use crate::error::{Result, ensure};
+use crate::graph::Graph;
 
 /// Method by which codes are chosen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Method {
     /// Round to nearest, scales by least squared weight error.
     Rtn,
     /// Column-wise error feedback with the second moment of the matrix's input (GPTQ, arXiv 2210.17323).
     Gptq,
-    /// Round to nearest, widths by HSIC scores, scales by the Fisher information of the action loss (ActQuant, arXiv
-    /// 2605.24011); the choices decide ambiguities.
-    ActQuant(Choices),
     /// Widths by rows, pruning and distillation ([`super::distill`]).
     Distill,
+    /// A method of another crate.
+    Custom(Arc<dyn CustomMethod>),
 }
 
 impl Method {
+    /// Wraps a method of another crate.
+    pub fn custom(method: impl CustomMethod + 'static) -> Self {
+        Self::Custom(Arc::new(method))
+    }
+
     /// Returns the default columns per u8 scale. Error feedback and learning compensate the losses of one scale per
     /// row; rounding has only its scales.
-    pub fn default_group(self) -> usize {
+    pub fn default_group(&self) -> usize {
         match self {
-            Self::Rtn | Self::ActQuant(_) => 32,
+            Self::Rtn => 32,
             Self::Gptq | Self::Distill => 0,
+            Self::Custom(method) => method.default_group(),
         }
     }
 }
 
-/// Shows the name, and in parentheses choices of ActQuant other than the defaults.
+/// Shows the name.
 impl fmt::Display for Method {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {
             Self::Rtn => "rtn",
             Self::Gptq => "gptq",
-            Self::ActQuant(choices) if *choices != Choices::default() => {
-                return f.pad(&format!("actquant ({choices})"));
-            }
-            Self::ActQuant(_) => "actquant",
             Self::Distill => "distill",
+            Self::Custom(method) => return f.pad(&method.name()),
         })
     }
 }
 
-/// Bits of the activations.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Activations {
-    /// -127 to 127
-    Int8,
-    /// Up to -32767 to 32767, as far as the int32 accumulator allows.
-    Int16,
-    /// int16 if it lowers the error noticeably, else int8; methods that do not measure it use int8.
-    Auto,
-    /// The setting of [`Self::Auto`] before it measures, with the same widths: for drafts, whose time counts.
-    Unmeasured,
-}
+/// A method of another crate, for [`Method::custom`]. It keeps the network's structure and chooses codes and scales for
+/// each matrix. The pipeline does the rest: the search for a budget of bytes, error or time, the image, and its
+/// measurements. `actq-research` has an example, ActQuant.
+pub trait CustomMethod: fmt::Debug + Send + Sync {
+    /// Returns the name, with all settings that differ from the defaults: methods of one name count as equal.
+    fn name(&self) -> String;
 
-impl Activations {
-    /// Returns `true` if all matrices get the requested bits.
-    pub fn are_asked_for(self) -> bool {
-        matches!(self, Self::Int8 | Self::Int16)
+    /// Returns the default columns per u8 scale; 0 = one scale a row.
+    fn default_group(&self) -> usize;
+
+    /// Returns the widest codes that it gives.
+    fn widest(&self) -> Width {
+        Width::W8
     }
 
-    /// Returns the largest magnitude.
-    pub const fn limit(self) -> u16 {
-        match self {
-            Self::Int8 | Self::Auto | Self::Unmeasured => 127,
-            Self::Int16 => i16::MAX as u16,
-        }
+    /// Returns the fewest bytes that the matrices of `graph` can take, from their shapes alone.
+    fn least_bytes(&self, graph: &Graph, packing: Packing) -> usize;
+
+    /// Collects the statistics of `graph` over `calib`, a recording of at least 16 frames that fits the network; its
+    /// actions may be missing. `progress` receives the share done, 0 to 1.
+    ///
+    /// # Errors
+    ///
+    /// If the method cannot use the recording.
+    fn prepare(
+        &self,
+        graph: &Graph,
+        calib: &Dataset,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Box<dyn CustomStatistics>>;
+}
+
+/// The statistics of a [`CustomMethod`], for any number of budgets.
+pub trait CustomStatistics: Any + fmt::Debug + Send + Sync {
+    /// Quantizes `graph`, the one of the statistics, to the rate. Returns an outcome for each matrix, in the graph's
+    /// order and of the matrix's shape. `options.budget` is to be ignored.
+    ///
+    /// # Errors
+    ///
+    /// [`BudgetTooSmall`](crate::budget::BudgetTooSmall) if the method's fewest bytes exceed the rate; the pipeline
+    /// relies on it.
+    fn quantize(&self, graph: &Graph, rate: Rate, options: &Options) -> Result<Vec<Outcome>>;
+
+    /// Returns figures by name for each matrix, which explain its width in files of statistics; empty without.
+    fn scores(&self) -> Vec<BTreeMap<String, f64>> {
+        Vec::new()
+    }
+}
+
+impl PartialEq for dyn CustomMethod {
+    fn eq(&self, other: &Self) -> bool {
+        self.name() == other.name()
     }
 }
 
@@ -98,27 +133,6 @@ pub struct Options {
     pub seed: u64,
     /// Matrices, by their tensors' names, whose rows all get the given width (method distill).
     pub forced: Vec<(String, Width)>,
-}
-
-/// Packing of rows, beside their widths.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Packing {
-    /// Lanes of the activations.
-    pub lanes: Lanes,
-    /// Columns per u8 scale; 0 = none.
-    pub group: usize,
-}
-
-impl Packing {
-    /// Returns the packing for activations up to this magnitude.
-    pub fn of(x_max: u16, group: usize) -> Self {
-        Self { lanes: Lanes::of(x_max, group), group }
-    }
-
-    /// Returns the shape of a block of rows.
-    pub fn shape(self, width: Width, rows: usize, cols: usize) -> BlockShape {
-        BlockShape { width, lanes: self.lanes, rows, cols, group: self.group }
-    }
 }
 
 impl Options {

@@ -1,14 +1,14 @@
 //! A method with its statistics of the recorded observations.
 
+use std::any::Any;
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::time::Duration;
 
-use super::actquant::score::Score;
-use super::actquant::{self, ActionStatistics};
 use super::distill::balance::MixedUnits;
 use super::distill::{self, RowStatistics};
 use super::matrixwise;
-use super::options::{Method, Options};
+use super::options::{CustomStatistics, Method, Options};
 use super::progress::Progress;
 use super::quantized::{Outcome, QuantizedNetwork};
 use crate::budget::Rate;
@@ -33,6 +33,7 @@ const TIMED: usize = 8;
 #[derive(Debug)]
 pub struct PreparedMethod<'a> {
     graph: &'a Graph,
+    method: Method,
     statistics: Statistics,
     sampled: Option<Sampled>,
 }
@@ -42,8 +43,8 @@ pub struct PreparedMethod<'a> {
 enum Statistics {
     Rtn,
     Gptq(Vec<Moments>),
-    ActQuant(ActionStatistics),
     Distill(Box<RowStatistics>),
+    Custom(Box<dyn CustomStatistics>),
 }
 
 impl<'a> PreparedMethod<'a> {
@@ -59,7 +60,9 @@ impl<'a> PreparedMethod<'a> {
     ///
     /// # Errors
     ///
-    /// If a method lacks a recording that it needs, or has too short a one, and if one of actquant holds no actions.
+    /// If a method lacks a recording that it needs, or has too short a one; errors of [`CustomMethod::prepare`].
+    ///
+    /// [`CustomMethod::prepare`]: super::CustomMethod::prepare
     pub fn before(
         graph: &'a Graph,
         method: Method,
@@ -87,16 +90,13 @@ impl<'a> PreparedMethod<'a> {
         };
         let mut sampled = None;
         let mut say = |frames, inputs, outputs| sampled = Some(Sampled { frames, inputs, outputs });
-        let statistics = match method {
+        let statistics = match &method {
             Method::Rtn => Statistics::Rtn,
             Method::Gptq => {
                 let dataset = calib()?;
                 let (moments, inputs) = moments(dataset);
                 say(dataset.frames(), inputs, 0);
                 Statistics::Gptq(moments)
-            }
-            Method::ActQuant(choices) => {
-                Statistics::ActQuant(ActionStatistics::collect(graph, calib()?, choices, &mut progress)?)
             }
             Method::Distill => {
                 let dataset = calib()?;
@@ -106,8 +106,9 @@ impl<'a> PreparedMethod<'a> {
                 say(dataset.frames(), inputs, rows.outputs_of);
                 Statistics::Distill(Box::new(rows))
             }
+            Method::Custom(custom) => Statistics::Custom(custom.prepare(graph, calib()?, &mut progress)?),
         };
-        Ok(Self { graph, statistics, sampled: sampled.filter(|_| steps > 1) })
+        Ok(Self { graph, method, statistics, sampled: sampled.filter(|_| steps > 1) })
     }
 
     /// Returns the frames over which the statistics of an iterative head were taken; `None` for all.
@@ -133,13 +134,8 @@ impl<'a> PreparedMethod<'a> {
     }
 
     /// Returns the method.
-    pub fn method(&self) -> Method {
-        match &self.statistics {
-            Statistics::Rtn => Method::Rtn,
-            Statistics::Gptq(_) => Method::Gptq,
-            Statistics::ActQuant(statistics) => Method::ActQuant(statistics.choices),
-            Statistics::Distill(_) => Method::Distill,
-        }
+    pub fn method(&self) -> &Method {
+        &self.method
     }
 
     /// Quantizes the network at `rate`; `options.budget` is ignored. `options.method` must be the prepared method.
@@ -150,20 +146,26 @@ impl<'a> PreparedMethod<'a> {
         options: &Options,
         mut progress: impl FnMut(Progress),
     ) -> Result<QuantizedNetwork> {
-        let (graph, method) = (self.graph, self.method());
-        ensure!(options.method == method, "the quantizer is prepared for method {method}, not for {}", options.method);
+        let Self { graph, method, .. } = self;
+        ensure!(options.method == *method, "the quantizer is prepared for method {method}, not for {}", options.method);
         ensure!(
-            options.forced.is_empty() || method == Method::Distill,
+            options.forced.is_empty() || *method == Method::Distill,
             "only method distill takes widths of single matrices, not {method}"
         );
         options.check()?;
         let outcomes = match &self.statistics {
             Statistics::Rtn => matrixwise::quantize(graph, None, rate, options)?,
             Statistics::Gptq(moments) => matrixwise::quantize(graph, Some(moments), rate, options)?,
-            Statistics::ActQuant(statistics) => actquant::quantize(graph, statistics, rate, options)?,
             Statistics::Distill(statistics) => return distill::quantize(statistics, rate, options, &mut progress),
+            Statistics::Custom(statistics) => {
+                let outcomes = statistics.quantize(graph, rate, options)?;
+                let given = outcomes.iter().map(|outcome| (outcome.quantized.rows, outcome.quantized.cols));
+                let is_whole = given.eq(graph.matrices.iter().map(|matrix| (matrix.rows, matrix.cols)));
+                ensure!(is_whole, "method {method} must return an outcome for each matrix, of the matrix's shape");
+                outcomes
+            }
         };
-        Ok(QuantizedNetwork { graph: graph.clone(), outcomes, learning: None })
+        Ok(QuantizedNetwork { graph: (*graph).clone(), outcomes, learning: None })
     }
 
     /// Returns the most steps of distillation with these options; 0 for methods that do not learn.
@@ -174,26 +176,29 @@ impl<'a> PreparedMethod<'a> {
         }
     }
 
-    /// Returns ActQuant's statistics; `None` for other methods.
-    pub fn action_statistics(&self) -> Option<&ActionStatistics> {
+    /// Returns the statistics of a custom method, if they are of this type.
+    pub fn custom<S: CustomStatistics>(&self) -> Option<&S> {
         match &self.statistics {
-            Statistics::ActQuant(statistics) => Some(statistics),
+            Statistics::Custom(statistics) => (&**statistics as &dyn Any).downcast_ref(),
             _ => None,
         }
     }
 
-    /// Returns ActQuant's scores per matrix; empty for other methods.
-    pub fn scores(&self) -> &[Score] {
-        self.action_statistics().map_or(&[], |statistics| &statistics.scores)
+    /// Returns the figures of a custom method per matrix ([`CustomStatistics::scores`]); empty for other methods.
+    pub fn scores(&self) -> Vec<BTreeMap<String, f64>> {
+        match &self.statistics {
+            Statistics::Custom(statistics) => statistics.scores(),
+            _ => Vec::new(),
+        }
     }
 }
 
 /// Returns the fewest bytes with which a method can meet a rate, from the shapes alone.
 pub fn least_bytes(graph: &Graph, rate: Rate, options: &Options) -> usize {
-    match options.method {
+    match &options.method {
         Method::Rtn | Method::Gptq => matrixwise::least_bytes(graph, options),
-        Method::ActQuant(choices) => actquant::allocation::least_bytes(graph, &choices, options.packing()),
         Method::Distill => distill::least_bytes(graph, rate, options),
+        Method::Custom(method) => method.least_bytes(graph, options.packing()),
     }
 }
 
@@ -204,6 +209,67 @@ pub fn quantize(
     rate: Rate,
     options: &Options,
 ) -> Result<(Graph, Vec<Outcome>)> {
-    let quantized = PreparedMethod::new(graph, options.method, calib, |_| {})?.quantize(rate, options, |_| {})?;
+    let quantized =
+        PreparedMethod::new(graph, options.method.clone(), calib, |_| {})?.quantize(rate, options, |_| {})?;
     Ok((quantized.graph, quantized.outcomes))
+}
+
+#[cfg(test)]
+mod tests {
+    use actq_kernels::Width;
+
+    use super::*;
+    use crate::budget::Budget;
+    use crate::methods::scale::round_to_nearest;
+    use crate::methods::{CustomMethod, Packing};
+    use crate::testing::{dataset, mlp};
+
+    /// Rounds the first so many matrices.
+    #[derive(Clone, Copy, Debug)]
+    struct First(usize);
+
+    impl CustomMethod for First {
+        fn name(&self) -> String {
+            format!("first {}", self.0)
+        }
+
+        fn default_group(&self) -> usize {
+            0
+        }
+
+        fn least_bytes(&self, _: &Graph, _: Packing) -> usize {
+            0
+        }
+
+        fn prepare(&self, _: &Graph, _: &Dataset, _: &mut dyn FnMut(f64)) -> Result<Box<dyn CustomStatistics>> {
+            Ok(Box::new(*self))
+        }
+    }
+
+    impl CustomStatistics for First {
+        fn quantize(&self, graph: &Graph, _: Rate, options: &Options) -> Result<Vec<Outcome>> {
+            let rounded = |matrix| {
+                Outcome::new(matrix, round_to_nearest(matrix, Width::W3, options.group), None, options.activations)
+            };
+            graph.matrices.iter().take(self.0).map(rounded).collect()
+        }
+    }
+
+    #[test]
+    fn a_custom_method_must_return_every_matrix() {
+        let graph = mlp();
+        let recording = dataset(&graph, 2, 10);
+        let quantize = |prepared: First, asked: First| {
+            let method = PreparedMethod::new(&graph, Method::custom(prepared), Some(&recording), |_| {})?;
+            let options = Options::new(Method::custom(asked), Budget::Width(Width::W3));
+            Ok::<_, crate::error::Error>(method.quantize(Rate::Width(Width::W3), &options, |_| {})?.outcomes.len())
+        };
+        let error = |prepared, asked| quantize(prepared, asked).expect_err("a refusal").to_string();
+        assert_eq!(quantize(First(2), First(2)).expect("outcomes"), 2);
+        assert_eq!(
+            error(First(1), First(1)),
+            "method first 1 must return an outcome for each matrix, of the matrix's shape"
+        );
+        assert_eq!(error(First(2), First(1)), "the quantizer is prepared for method first 2, not for first 1");
+    }
 }

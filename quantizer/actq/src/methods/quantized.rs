@@ -5,7 +5,7 @@ use actq_kernels::layout::{BlockShape, Lanes, Width};
 use half::bf16;
 
 use super::learning::Learning;
-use super::options::Activations;
+use super::packing::Activations;
 use crate::calibrate::moments::{self, Moments};
 use crate::error::{Result, ensure};
 use crate::graph::{Graph, WeightMatrix, Weights};

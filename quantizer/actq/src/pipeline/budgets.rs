@@ -18,7 +18,7 @@ pub fn quantize(
     mut watch: impl Watch,
 ) -> Result<QuantizedPolicy> {
     flash::check_budget(policy, options)?;
-    let quantizer = Quantizer::new(policy, recordings, options.method, options.minutes, |share| {
+    let quantizer = Quantizer::new(policy, recordings, options.method.clone(), options.minutes, |share| {
         watch.progress("calibrating", share)
     })?;
     quantizer.quantize(options, watch)

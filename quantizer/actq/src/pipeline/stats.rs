@@ -1,5 +1,6 @@
 //! Statistics and bit allocation of an image as a JSON file. `docs/QUANTIZER.md` describes its fields.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
@@ -11,7 +12,6 @@ use crate::budget::Budget;
 use crate::error::{Context, Result, ensure};
 use crate::graph::WeightMatrix;
 use crate::measure::size::{bits_per_weight, hex};
-use crate::methods::actquant::score::Score;
 use crate::methods::distill::balance::balance_bytes;
 use crate::methods::{Method, Options, Outcome, Quantized};
 use crate::strict_json;
@@ -75,12 +75,12 @@ pub struct MatrixRecord {
     pub image_rows: Vec<usize>,
     /// Trained column of each column of the image's matrix.
     pub image_cols: Vec<usize>,
-    /// Squared error of the matrix's output over its energy (rtn, gptq, actquant).
+    /// Squared error of the matrix's output over its energy (all methods but distill).
     pub error: Option<f64>,
     /// Reasons for the rows' widths (distill).
     pub allocation: Option<AllocationRecord>,
-    /// Reasons for the matrix's width (actquant).
-    pub score: Option<HsicScore>,
+    /// Reasons for the matrix's width, as figures by name (custom methods).
+    pub score: Option<BTreeMap<String, f64>>,
 }
 
 /// Values that the widths of a matrix's rows were chosen by. Errors are squared differences of the actions over their
@@ -97,40 +97,13 @@ pub struct AllocationRecord {
     pub importance: Vec<f64>,
 }
 
-/// ActQuant's score of a matrix ([`Score`]).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct HsicScore {
-    /// F of the matrix's input.
-    pub f_input: f64,
-    /// F of its output.
-    pub f_output: f64,
-    /// Difference `f_output - f_input`.
-    pub sens: f64,
-    /// HSIC of the observation and the matrix's input.
-    pub x_input: f64,
-    /// HSIC of the actions and the matrix's input.
-    pub y_input: f64,
-    /// HSIC of the observation and the matrix's output.
-    pub x_output: f64,
-    /// HSIC of the actions and the matrix's output.
-    pub y_output: f64,
-}
-
-impl From<&Score> for HsicScore {
-    fn from(score: &Score) -> Self {
-        let Score { x_input, y_input, x_output, y_output } = *score;
-        let (f_input, f_output, sens) = (score.f_input(), score.f_output(), score.sens());
-        Self { f_input, f_output, sens, x_input, y_input, x_output, y_output }
-    }
-}
-
 impl Stats {
     /// Collects the statistics of the image that `quantizer` made with `options`.
     pub fn new(quantizer: &Quantizer<'_>, options: &Options, quantized: &QuantizedPolicy) -> Result<Self> {
-        let (source, scores) = (quantizer.policy, quantizer.method.scores());
+        let (source, mut scores) = (quantizer.policy, quantizer.method.scores().into_iter());
         let buffer = quantized.buffer();
         let image = buffer.image(Path::new("the new image"))?;
-        let matrices = source.graph.matrices.iter().zip(&quantized.outcomes).enumerate();
+        let matrices = source.graph.matrices.iter().zip(&quantized.outcomes);
         Ok(Self {
             schema: SCHEMA.to_owned(),
             actq: env!("CARGO_PKG_VERSION").to_owned(),
@@ -144,7 +117,7 @@ impl Stats {
             seed: options.seed,
             steps: quantized.steps(),
             balance: balance_bytes(&quantized.policy.graph),
-            matrices: matrices.map(|(m, (source, outcome))| matrix(source, outcome, scores.get(m))).collect(),
+            matrices: matrices.map(|(source, outcome)| matrix(source, outcome, scores.next())).collect(),
         })
     }
 
@@ -198,7 +171,7 @@ fn crc32(image: &Image<'_>) -> String {
     format!("{:08x}", image.crc())
 }
 
-fn matrix(source: &WeightMatrix, outcome: &Outcome, score: Option<&Score>) -> MatrixRecord {
+fn matrix(source: &WeightMatrix, outcome: &Outcome, score: Option<BTreeMap<String, f64>>) -> MatrixRecord {
     let quantized = &outcome.quantized;
     let allocation = outcome.allocation.as_ref();
     let image_rows = allocation.map_or_else(|| (0..source.rows).collect(), |a| a.rows.clone());
@@ -225,6 +198,6 @@ fn matrix(source: &WeightMatrix, outcome: &Outcome, score: Option<&Score>) -> Ma
             expected: a.expected.clone(),
             importance: a.inputs.clone(),
         }),
-        score: score.map(HsicScore::from),
+        score,
     }
 }

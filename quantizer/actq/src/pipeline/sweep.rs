@@ -7,7 +7,6 @@ use actq_kernels::Width;
 use serde::Serialize;
 
 use super::quantizer::{QuantizedPolicy, Quantizer};
-use super::stats::HsicScore;
 use super::watch::Watch;
 use crate::budget::Budget;
 use crate::data::{Dataset, Recording, Recordings};
@@ -35,9 +34,9 @@ pub struct Curve {
     pub method: String,
     /// One image per budget; `None` if the budget is too small for the method.
     pub points: Vec<Option<Point>>,
-    /// Scores of ActQuant per matrix.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub scores: Option<Vec<HsicScore>>,
+    /// Figures of a custom method per matrix; empty for other methods.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub scores: Vec<BTreeMap<String, f64>>,
 }
 
 /// Point of the best method after which a further bit gains least.
@@ -95,17 +94,17 @@ pub fn run(plan: SweepPlan<'_>, mut watch: impl Watch) -> Result<Sweep> {
     recordings.fill_actions(&policy.graph);
     let heldout = recordings.heldout.as_ref().with_context(|| Recording::Heldout.missing("a sweep"))?;
     let mut curves = Vec::new();
-    for (m, &method) in methods.iter().enumerate() {
+    for (m, method) in methods.iter().enumerate() {
         // Calibration counts as much as one budget.
         let done = |steps: f64| (m as f64 + steps / (1 + budgets.len()) as f64) / methods.len() as f64;
         let work = format!("{method}, calibrating");
         let quantizer =
-            Quantizer::new(policy, &recordings, method, minutes, |share| watch.progress(&work, done(share)))?;
+            Quantizer::new(policy, &recordings, method.clone(), minutes, |share| watch.progress(&work, done(share)))?;
         let mut points = Vec::new();
         for (b, &budget) in budgets.iter().enumerate() {
             let work = format!("{method}, {budget} bits per weight");
-            let plain = Options::new(method, Budget::BitsPerWeight(budget));
-            let relative = relative && method == Method::Distill;
+            let plain = Options::new(method.clone(), Budget::BitsPerWeight(budget));
+            let relative = relative && *method == Method::Distill;
             let options = Options { group: method.default_group(), steps, minutes, relative, seed, ..plain };
             let share = |_: &str, share: f64| watch.progress(&work, done(1.0 + b as f64 + share));
             points.push(match quantizer.quantize(&options, share) {
@@ -114,9 +113,7 @@ pub fn run(plan: SweepPlan<'_>, mut watch: impl Watch) -> Result<Sweep> {
                 Err(error) => return Err(error),
             });
         }
-        let scores = quantizer.method().action_statistics();
-        let scores = scores.map(|statistics| statistics.scores.iter().map(HsicScore::from).collect());
-        curves.push(Curve { method: method.to_string(), points, scores });
+        curves.push(Curve { method: method.to_string(), points, scores: quantizer.method().scores() });
     }
     let knee = knee(&curves);
     let matrices = policy.graph.matrices.iter().map(|m| m.name.clone()).collect();
@@ -171,32 +168,6 @@ pub fn line(curve: &Curve) -> Vec<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::methods::actquant::choices::Choices;
-    use crate::methods::actquant::testing::{dataset, lstm};
-
-    #[test]
-    fn missing_actions_do_not_change_errors() {
-        let policy = Policy::of("tiny", lstm());
-        let with_actions = [5, 6].map(|seed| dataset(&policy.graph, seed, 20));
-        let without = with_actions.clone().map(|recording| Dataset { action: None, ..recording });
-        let nmse = |[calib, heldout]: [Dataset; 2]| {
-            let plan = SweepPlan {
-                policy: &policy,
-                recordings: Recordings { calib: Some(calib), heldout: Some(heldout) },
-                methods: &[Method::ActQuant(Choices::default())],
-                budgets: &[50.0, 100.0],
-                steps: None,
-                minutes: None,
-                relative: false,
-                seed: 1,
-            };
-            let points = run(plan, ()).expect("a sweep").curves.remove(0).points;
-            points.into_iter().map(|point| point.map(|point| point.report.nmse)).collect::<Vec<_>>()
-        };
-        let measured = nmse(with_actions);
-        assert!(measured.iter().any(Option::is_some), "{measured:?}");
-        assert_eq!(nmse(without), measured);
-    }
 
     fn curve(method: &str, points: &[(f64, f64)]) -> Curve {
         let point = |&(bpw, nmse): &(f64, f64)| {
@@ -204,7 +175,7 @@ mod tests {
                 eval::ErrorReport { nmse, worst_nmse: nmse, max_abs: 0.0, steps: 1, bpw, bytes: 1, worst_dimension: 0 };
             (nmse > 0.0).then_some(Point { budget: bpw, report, rows: Vec::new() })
         };
-        Curve { method: method.to_owned(), points: points.iter().map(point).collect(), scores: None }
+        Curve { method: method.to_owned(), points: points.iter().map(point).collect(), scores: Vec::new() }
     }
 
     #[test]

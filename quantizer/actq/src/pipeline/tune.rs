@@ -134,7 +134,7 @@ pub fn run(
 
 fn learn(policy: &Policy, calib: Dataset, options: &Options, mut watch: impl Watch) -> Result<QuantizedPolicy> {
     let recordings = Recordings { calib: Some(calib), heldout: None };
-    let quantizer = Quantizer::new(policy, &recordings, options.method, options.minutes, |share| {
+    let quantizer = Quantizer::new(policy, &recordings, options.method.clone(), options.minutes, |share| {
         watch.progress("calibrating", share)
     })?;
     quantizer.quantize(options, watch)
@@ -147,8 +147,8 @@ mod tests {
     use super::*;
     use crate::budget::Budget;
     use crate::methods::Method;
-    use crate::methods::actquant::testing::{dataset, lstm};
     use crate::random::Random;
+    use crate::testing::{dataset, lstm};
 
     fn policy() -> Policy {
         Policy { dir: "policy".into(), digest: [7; 32], ..Policy::of("tiny", lstm()) }

@@ -53,8 +53,8 @@ fn bits_per_weight(found: &QuantizedPolicy) -> f64 {
 }
 
 fn reason(found: &QuantizedPolicy, options: &Options) -> Reason {
-    let widest = match options.method {
-        Method::ActQuant(choices) => choices.widest,
+    let widest = match &options.method {
+        Method::Custom(method) => method.widest(),
         _ => Width::W8,
     };
     let is_free = |m: usize| options.forced.iter().all(|(name, _)| *name != found.policy.graph.matrices[m].name);

@@ -10,7 +10,8 @@ use crate::calibrate::allowance::Allowance;
 use crate::calibrate::windows::Windows;
 use crate::error::Result;
 use crate::graph::{Graph, Network};
-use crate::methods::options::{Activations, Options, Packing};
+use crate::methods::options::Options;
+use crate::methods::packing::{Activations, Packing};
 use crate::methods::quantized::{Quantized, dequantized};
 use crate::random::Random;
 

@@ -255,7 +255,7 @@ fn out_of_reach(widths: &[Option<Width>], width: Width) -> Option<(usize, Option
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::methods::options::Packing;
+    use crate::methods::packing::Packing;
     use crate::random::Random;
 
     #[test]

@@ -127,8 +127,8 @@ mod tests {
 
     use super::*;
     use crate::budget::{Budget, Rate};
-    use crate::methods::actquant::testing::{dataset, mlp};
     use crate::methods::{Learning, Method, Options, PreparedMethod};
+    use crate::testing::{dataset, mlp};
 
     fn chosen(episodes: usize, steps: usize) -> Learning {
         let graph = mlp();

@@ -6,7 +6,7 @@ use actq_kernels::image::block_bytes;
 use super::balance::balance_bytes;
 use super::dimension::{Dimension, Widths};
 use crate::graph::Graph;
-use crate::methods::options::Packing;
+use crate::methods::packing::Packing;
 
 /// Properties that determine the bytes of a network beside its rows' widths.
 #[derive(Clone, Debug)]

@@ -171,7 +171,7 @@ impl Trial<'_> {
         };
         for (name, options) in &self.images {
             println!("Quantizing to {name} with {}", options.method);
-            let quantizer = Quantizer::new(&policy, &recordings, options.method, None, |_| {})?;
+            let quantizer = Quantizer::new(&policy, &recordings, options.method.clone(), None, |_| {})?;
             let path = self.path(name);
             let bytes = heads::write_image(&quantizer, options, &path)?;
             let buffer = ImageBuffer::new(&bytes);

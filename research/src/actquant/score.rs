@@ -1,13 +1,14 @@
 //! Stage 1 of ActQuant: how much each matrix adds to the information of its values about the actions.
 
+use std::collections::BTreeMap;
+
+use actq::data::Dataset;
+use actq::error::{Context, Result, ensure};
+use actq::graph::{Evaluator, Graph, WeightMatrix};
 use ndarray::Array2;
-use serde::Serialize;
 
 use super::choices::ScoreOf;
-use crate::calibrate::hsic::{Bandwidth, Kernel, hsic};
-use crate::data::Dataset;
-use crate::error::{Context, Result, ensure};
-use crate::graph::{Evaluator, Graph, WeightMatrix};
+use super::hsic::{Bandwidth, Kernel, hsic};
 
 /// Most frames of a kernel. Time and memory grow with the square; this many take 512 MiB per kernel.
 pub const MOST_FRAMES: usize = 8192;
@@ -23,7 +24,7 @@ const LAMBDA_Y: f64 = 1.0;
 /// Z)`, and a matrix by `sens = F(output) - F(input)`. As in the authors' code, X is the same for every matrix: the
 /// input of the network's first one. So `sens` measures how far the matrix moves the values from the observation
 /// towards the actions.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug)]
 pub struct Score {
     /// HSIC(X, the matrix's input)
     pub x_input: f64,
@@ -49,6 +50,14 @@ impl Score {
     /// Returns `F(output) - F(input)`.
     pub fn sens(&self) -> f64 {
         self.f_output() - self.f_input()
+    }
+
+    /// Returns all figures by name, for files of statistics.
+    pub fn figures(&self) -> BTreeMap<String, f64> {
+        let Self { x_input, y_input, x_output, y_output } = *self;
+        let differences = [("f_input", self.f_input()), ("f_output", self.f_output()), ("sens", self.sens())];
+        let terms = [("x_input", x_input), ("y_input", y_input), ("x_output", x_output), ("y_output", y_output)];
+        differences.into_iter().chain(terms).map(|(name, figure)| (name.to_owned(), figure)).collect()
     }
 
     /// Returns the chosen score.
@@ -147,7 +156,7 @@ fn standardized(samples: &Array2<f64>) -> Array2<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::methods::actquant::testing::{dataset, lstm};
+    use crate::testing::{dataset, lstm};
 
     #[test]
     fn the_first_matrix_reads_the_observation() {

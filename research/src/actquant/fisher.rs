@@ -2,12 +2,11 @@
 
 use std::borrow::Cow;
 
+use actq::data::Dataset;
+use actq::error::{Context, Result};
+use actq::graph::{Graph, Network, Pass, Weights, start_state, zero_state};
+use actq::random::Random;
 use ndarray::{Array2, Array3, Axis, Zip, linalg::general_mat_mul, s};
-
-use crate::data::Dataset;
-use crate::error::{Context, Result};
-use crate::graph::{Graph, Network, Pass, Weights, start_state, zero_state};
-use crate::random::Random;
 
 /// Steps that the gradient of a recurrent network runs back.
 const WINDOW: usize = 16;
@@ -206,7 +205,7 @@ fn deviations(dataset: &Dataset) -> Option<ndarray::Array1<f32>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::methods::actquant::testing::{dataset, lstm, mlp};
+    use crate::testing::{dataset, lstm, mlp};
 
     const PLAIN: Sampling = Sampling { samples: 4096, batch: 1, signs: Signs::Random };
 

@@ -2,14 +2,14 @@
 
 use std::ops::Range;
 
+use actq::budget::BudgetTooSmall;
+use actq::error::Result;
+use actq::graph::{Graph, WeightMatrix};
+use actq::methods::Packing;
 use actq_kernels::image::block_bytes;
 use actq_kernels::layout::Width;
 
 use super::choices::{Choices, NoiseBits};
-use crate::budget::BudgetTooSmall;
-use crate::error::Result;
-use crate::graph::{Graph, WeightMatrix};
-use crate::methods::options::Packing;
 
 /// Returns the bytes of a matrix at one width: codes, padding, scales and the block record.
 fn bytes(matrix: &WeightMatrix, width: Width, packing: Packing) -> usize {
@@ -22,7 +22,7 @@ fn noise(score: f64, bits: f64) -> f64 {
 }
 
 /// Returns the layer of every matrix: the node that first uses it. Both matrices of an LSTM or GRU are one layer.
-pub fn layers(graph: &Graph) -> Vec<usize> {
+fn layers(graph: &Graph) -> Vec<usize> {
     let mut layers = vec![usize::MAX; graph.matrices.len()];
     for (layer, node) in graph.nodes.iter().enumerate() {
         for product in node.kind.products() {
@@ -131,12 +131,13 @@ pub fn spend(
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use actq::graph::ops::Linear;
     use actq_kernels::layout::Lanes;
 
+    use super::*;
+    use crate::testing::lstm;
+
     const PACKING: Packing = Packing { lanes: Lanes::Paired, group: 32 };
-    use crate::graph::ops::Linear;
-    use crate::methods::actquant::testing::lstm;
 
     /// Makes a chain of square matrices, each a layer of its own.
     fn chain(count: usize) -> Graph {

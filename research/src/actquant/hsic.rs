@@ -100,8 +100,9 @@ fn median_or_mean(distances: &Array2<f64>) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use actq::random::Random;
+
     use super::*;
-    use crate::random::Random;
 
     /// Draws samples from a small deterministic generator, uniform in -1..1.
     fn samples(n: usize, len: usize, seed: u64) -> Array2<f64> {

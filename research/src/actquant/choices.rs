@@ -1,15 +1,15 @@
 //! Choices that ActQuant's paper and code leave open, or that this project makes differently, with the authors' choice
 //! for each.
 //!
-//! The section actquant of `docs/QUANTIZER.md` has the sources and the reasons.
+//! `research/README.md` has the sources and the reasons.
 
 use std::fmt;
 use std::str::FromStr;
 
 use actq_kernels::layout::Width;
 
-use crate::calibrate::fisher::{Sampling, Signs};
-use crate::calibrate::hsic::Bandwidth;
+use super::fisher::{Sampling, Signs};
+use super::hsic::Bandwidth;
 
 /// Definition of a matrix's score.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,29 +6,62 @@
 //! matrix. They minimize the rounding error weighted by the [Fisher](fisher) information of the action loss, by the
 //! same search as plain rounding. If the budget is one width for all, stage 1 is skipped.
 //!
-//! Every deviation from the paper or its authors' code is a [choice](choices); `docs/QUANTIZER.md` lists them all.
+//! Every deviation from the paper or its authors' code is a [choice](choices); `research/README.md` lists them all.
 
 pub mod allocation;
 pub mod choices;
+pub mod fisher;
+pub mod hsic;
 pub mod score;
 
+use std::collections::BTreeMap;
+
+use actq::budget::Rate;
+use actq::data::Dataset;
+use actq::error::{Result, ensure};
+use actq::graph::{Graph, WeightMatrix};
+use actq::methods::scale::{Scales, round_to};
+use actq::methods::{CustomMethod, CustomStatistics, Options, Outcome, Packing, Quantized};
 use actq_kernels::layout::Width;
 use ndarray::Array2;
 
-use super::options::Options;
-use super::quantized::{Outcome, Quantized};
-use super::scale::{Scales, round_to};
-use crate::budget::Rate;
-use crate::calibrate::fisher;
-use crate::data::Dataset;
-use crate::error::{Result, ensure};
-use crate::graph::{Graph, WeightMatrix};
 use choices::Choices;
 use score::Score;
 
 /// Least importance of a weight, as a share of its matrix's mean importance. It decides if no recorded frame gives
 /// information, as for rows after a ReLU that never fires.
 const FLOOR: f64 = 1e-6;
+
+/// The method, with its choices.
+#[derive(Clone, Copy, Debug)]
+pub struct ActQuant(pub Choices);
+
+impl CustomMethod for ActQuant {
+    fn name(&self) -> String {
+        if self.0 == Choices::default() { "actquant".to_owned() } else { format!("actquant ({})", self.0) }
+    }
+
+    fn default_group(&self) -> usize {
+        32
+    }
+
+    fn widest(&self) -> Width {
+        self.0.widest
+    }
+
+    fn least_bytes(&self, graph: &Graph, packing: Packing) -> usize {
+        allocation::least_bytes(graph, &self.0, packing)
+    }
+
+    fn prepare(
+        &self,
+        graph: &Graph,
+        calib: &Dataset,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Box<dyn CustomStatistics>> {
+        Ok(Box::new(ActionStatistics::collect(graph, calib, self.0, progress)?))
+    }
+}
 
 /// ActQuant's statistics of the recorded observations, for any number of budgets.
 #[derive(Clone, Debug)]
@@ -72,23 +105,28 @@ impl ActionStatistics {
     }
 }
 
-/// Quantizes every matrix of `graph`.
-pub fn quantize(graph: &Graph, statistics: &ActionStatistics, rate: Rate, options: &Options) -> Result<Vec<Outcome>> {
-    let widths = match rate {
-        Rate::Width(width) => vec![width; graph.matrices.len()],
-        Rate::BitsPerWeight(_) | Rate::Bytes(_) => {
-            let scores = statistics.effective_scores().0;
-            allocation::allocate(graph, &scores, &statistics.choices, options.packing(), rate.bytes(graph.weights()))?
-        }
-    };
-    let importance = statistics.weight_importance(graph);
-    let matrices = graph.matrices.iter().zip(widths).zip(&importance);
-    matrices
-        .map(|((matrix, width), importance)| {
-            let quantized = quantize_matrix(matrix, width, options.group, importance);
-            Outcome::new(matrix, quantized, None, options.activations)
-        })
-        .collect()
+impl CustomStatistics for ActionStatistics {
+    fn quantize(&self, graph: &Graph, rate: Rate, options: &Options) -> Result<Vec<Outcome>> {
+        let widths = match rate {
+            Rate::Width(width) => vec![width; graph.matrices.len()],
+            Rate::BitsPerWeight(_) | Rate::Bytes(_) => {
+                let (scores, limit) = (self.effective_scores().0, rate.bytes(graph.weights()));
+                allocation::allocate(graph, &scores, &self.choices, options.packing(), limit)?
+            }
+        };
+        let importance = self.weight_importance(graph);
+        let matrices = graph.matrices.iter().zip(widths).zip(&importance);
+        matrices
+            .map(|((matrix, width), importance)| {
+                let quantized = quantize_matrix(matrix, width, options.group, importance);
+                Outcome::new(matrix, quantized, None, options.activations)
+            })
+            .collect()
+    }
+
+    fn scores(&self) -> Vec<BTreeMap<String, f64>> {
+        self.scores.iter().map(Score::figures).collect()
+    }
 }
 
 /// Rounds to nearest with scales that minimize `sum of importance * error^2` of each group, or of each row.
@@ -114,82 +152,45 @@ fn floored(importance: &Array2<f32>) -> Vec<f64> {
 }
 
 #[cfg(test)]
-pub(crate) mod testing {
-    //! Small networks, and recordings of them.
-
-    use ndarray::Array3;
-
-    use super::*;
-    use crate::graph::Evaluator;
-    use crate::graph::ops::{Linear, Lstm, Pointwise};
-    use crate::random::Random;
-    use actq_kernels::math::Function;
-
-    fn matrix(name: &str, rows: usize, cols: usize, random: &mut Random) -> WeightMatrix {
-        WeightMatrix { name: name.into(), rows, cols, data: (0..rows * cols).map(|_| 0.7 * random.unit()).collect() }
-    }
-
-    fn vector(len: usize, random: &mut Random) -> Vec<f32> {
-        (0..len).map(|_| 0.3 * random.unit()).collect()
-    }
-
-    /// Makes a network 3 -> 4 tanh -> 2.
-    pub(crate) fn mlp() -> Graph {
-        let mut random = Random::new(1);
-        let mut graph = Graph::new(3);
-        graph.matrices = vec![matrix("a", 4, 3, &mut random), matrix("b", 2, 4, &mut random)];
-        graph.add(Linear { matrix: 0, bias: vector(4, &mut random) }, &[0]).expect("it fits");
-        graph.add(Pointwise(Function::Tanh), &[1]).expect("it fits");
-        graph.add(Linear { matrix: 1, bias: vector(2, &mut random) }, &[2]).expect("it fits");
-        graph
-    }
-
-    /// Makes a network LSTM 2 -> 3, then 3 -> 2.
-    pub(crate) fn lstm() -> Graph {
-        let mut random = Random::new(2);
-        let mut graph = Graph::new(2);
-        graph.matrices = vec![
-            matrix("w_ih", 12, 2, &mut random),
-            matrix("w_hh", 12, 3, &mut random),
-            matrix("out", 2, 3, &mut random),
-        ];
-        let bias = vector(12, &mut random);
-        graph.add(Lstm { hidden: 3, input: 0, state: 1, bias }, &[0]).expect("it fits");
-        graph.add(Linear { matrix: 2, bias: vector(2, &mut random) }, &[1]).expect("it fits");
-        graph
-    }
-
-    /// Makes random observations with the network's own actions.
-    pub(crate) fn dataset(graph: &Graph, episodes: usize, steps: usize) -> Dataset {
-        let mut random = Random::new(3);
-        let obs = Array3::from_shape_fn((episodes, steps, graph.obs_len), |_| random.unit());
-        let mut action = Array3::zeros((episodes, steps, graph.len_of(graph.output())));
-        let mut evaluator = Evaluator::new(graph);
-        for episode in 0..episodes {
-            evaluator.reset();
-            for step in 0..steps {
-                let x: Vec<f32> = (0..graph.obs_len).map(|i| obs[(episode, step, i)]).collect();
-                for (i, y) in evaluator.step(&x, &mut |_, _| {}).into_iter().enumerate() {
-                    action[(episode, step, i)] = y;
-                }
-            }
-        }
-        Dataset { path: "test".into(), obs, action: Some(action), length: vec![steps; episodes], state: None }
-    }
-}
-
-#[cfg(test)]
 mod tests {
+    use actq::budget::Budget;
+    use actq::data::Recordings;
+    use actq::methods::{Method, scale};
+    use actq::pipeline::sweep::{SweepPlan, run};
+    use actq::policy::Policy;
+
     use super::*;
-    use crate::budget::Budget;
-    use crate::methods::options::Method;
-    use crate::methods::scale;
+    use crate::testing;
     use choices::ScoreOf;
 
     fn quantize_at(graph: &Graph, statistics: &ActionStatistics, rate: Rate) -> Result<Vec<Outcome>> {
-        let options =
-            Options { group: 32, ..Options::new(Method::ActQuant(statistics.choices), Budget::BitsPerWeight(3.0)) };
-        quantize(graph, statistics, rate, &options)
+        let method = Method::custom(ActQuant(statistics.choices));
+        let options = Options { group: 32, ..Options::new(method, Budget::BitsPerWeight(3.0)) };
+        statistics.quantize(graph, rate, &options)
+    }
+
+    #[test]
+    fn missing_actions_do_not_change_errors() {
+        let policy = Policy::of("tiny", testing::lstm());
+        let with_actions = [5, 6].map(|seed| testing::dataset(&policy.graph, seed, 20));
+        let without = with_actions.clone().map(|recording| Dataset { action: None, ..recording });
+        let nmse = |[calib, heldout]: [Dataset; 2]| {
+            let plan = SweepPlan {
+                policy: &policy,
+                recordings: Recordings { calib: Some(calib), heldout: Some(heldout) },
+                methods: &[Method::custom(ActQuant(Choices::default()))],
+                budgets: &[50.0, 100.0],
+                steps: None,
+                minutes: None,
+                relative: false,
+                seed: 1,
+            };
+            let points = run(plan, ()).expect("a sweep").curves.remove(0).points;
+            points.into_iter().map(|point| point.map(|point| point.report.nmse)).collect::<Vec<_>>()
+        };
+        let measured = nmse(with_actions);
+        assert!(measured.iter().any(Option::is_some), "{measured:?}");
+        assert_eq!(nmse(without), measured);
     }
 
     #[test]

@@ -1,0 +1,53 @@
+//! What decides how rows are packed, beside their widths.
+
+use actq_kernels::Width;
+use actq_kernels::layout::{BlockShape, Lanes};
+
+/// Bits of the activations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Activations {
+    /// -127 to 127
+    Int8,
+    /// Up to -32767 to 32767, as far as the int32 accumulator allows.
+    Int16,
+    /// int16 if it lowers the error noticeably, else int8; methods that do not measure it use int8.
+    Auto,
+    /// The setting of [`Self::Auto`] before it measures, with the same widths: for drafts, whose time counts.
+    Unmeasured,
+}
+
+impl Activations {
+    /// Returns `true` if all matrices get the requested bits.
+    pub fn are_asked_for(self) -> bool {
+        matches!(self, Self::Int8 | Self::Int16)
+    }
+
+    /// Returns the largest magnitude.
+    pub const fn limit(self) -> u16 {
+        match self {
+            Self::Int8 | Self::Auto | Self::Unmeasured => 127,
+            Self::Int16 => i16::MAX as u16,
+        }
+    }
+}
+
+/// Packing of rows, beside their widths.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Packing {
+    /// Lanes of the activations.
+    pub lanes: Lanes,
+    /// Columns per u8 scale; 0 = none.
+    pub group: usize,
+}
+
+impl Packing {
+    /// Returns the packing for activations up to this magnitude.
+    pub fn of(x_max: u16, group: usize) -> Self {
+        Self { lanes: Lanes::of(x_max, group), group }
+    }
+
+    /// Returns the shape of a block of rows.
+    pub fn shape(self, width: Width, rows: usize, cols: usize) -> BlockShape {
+        BlockShape { width, lanes: self.lanes, rows, cols, group: self.group }
+    }
+}

@@ -1,0 +1,57 @@
+//! Small networks and recordings of them, for the unit tests of this crate and, by path, of `actq-research`.
+
+use actq::data::Dataset;
+use actq::graph::ops::{Linear, Lstm, Pointwise};
+use actq::graph::{Evaluator, Graph, WeightMatrix};
+use actq::random::Random;
+use actq_kernels::math::Function;
+use ndarray::Array3;
+
+fn matrix(name: &str, rows: usize, cols: usize, random: &mut Random) -> WeightMatrix {
+    WeightMatrix { name: name.into(), rows, cols, data: (0..rows * cols).map(|_| 0.7 * random.unit()).collect() }
+}
+
+fn vector(len: usize, random: &mut Random) -> Vec<f32> {
+    (0..len).map(|_| 0.3 * random.unit()).collect()
+}
+
+/// Makes a network 3 -> 4 tanh -> 2.
+pub(crate) fn mlp() -> Graph {
+    let mut random = Random::new(1);
+    let mut graph = Graph::new(3);
+    graph.matrices = vec![matrix("a", 4, 3, &mut random), matrix("b", 2, 4, &mut random)];
+    graph.add(Linear { matrix: 0, bias: vector(4, &mut random) }, &[0]).expect("it fits");
+    graph.add(Pointwise(Function::Tanh), &[1]).expect("it fits");
+    graph.add(Linear { matrix: 1, bias: vector(2, &mut random) }, &[2]).expect("it fits");
+    graph
+}
+
+/// Makes a network LSTM 2 -> 3, then 3 -> 2.
+pub(crate) fn lstm() -> Graph {
+    let mut random = Random::new(2);
+    let mut graph = Graph::new(2);
+    graph.matrices =
+        vec![matrix("w_ih", 12, 2, &mut random), matrix("w_hh", 12, 3, &mut random), matrix("out", 2, 3, &mut random)];
+    let bias = vector(12, &mut random);
+    graph.add(Lstm { hidden: 3, input: 0, state: 1, bias }, &[0]).expect("it fits");
+    graph.add(Linear { matrix: 2, bias: vector(2, &mut random) }, &[1]).expect("it fits");
+    graph
+}
+
+/// Makes random observations with the network's own actions.
+pub(crate) fn dataset(graph: &Graph, episodes: usize, steps: usize) -> Dataset {
+    let mut random = Random::new(3);
+    let obs = Array3::from_shape_fn((episodes, steps, graph.obs_len), |_| random.unit());
+    let mut action = Array3::zeros((episodes, steps, graph.len_of(graph.output())));
+    let mut evaluator = Evaluator::new(graph);
+    for episode in 0..episodes {
+        evaluator.reset();
+        for step in 0..steps {
+            let x: Vec<f32> = (0..graph.obs_len).map(|i| obs[(episode, step, i)]).collect();
+            for (i, y) in evaluator.step(&x, &mut |_, _| {}).into_iter().enumerate() {
+                action[(episode, step, i)] = y;
+            }
+        }
+    }
+    Dataset { path: "test".into(), obs, action: Some(action), length: vec![steps; episodes], state: None }
+}
