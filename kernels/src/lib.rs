@@ -51,11 +51,9 @@ macro_rules! writer_methods {
 pub mod arch;
 #[cfg(not(feature = "writer"))]
 mod arch;
+mod arena;
 mod cursor;
 mod error;
-#[cfg(feature = "writer")]
-pub mod head;
-#[cfg(not(feature = "writer"))]
 mod head;
 #[cfg(feature = "writer")]
 pub mod image;

@@ -1,18 +1,14 @@
 //! A head: runs an image on observations, in whole steps or in slices, and keeps the recurrent state and the action
 //! chunks.
 
-mod arena;
 mod contract;
-mod executor;
 mod playback;
 mod saved;
 mod self_test;
 mod step;
 
-use self::arena::part;
-#[cfg(feature = "writer")]
-pub use self::executor::run_whole;
 use self::playback::Playback;
+use crate::arena::part;
 use crate::cursor::Cursor;
 use crate::error::HeadError;
 use crate::image::{Image, Region};

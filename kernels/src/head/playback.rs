@@ -4,7 +4,7 @@
 //! Time counts in control periods: the position of an action in its chunk is its age when it plays. A later chunk never
 //! changes an action that has played or whose period has passed.
 
-use super::arena::{part, regions};
+use crate::arena::{part, regions};
 use crate::error::Fault;
 use crate::image::{Image, Region};
 use crate::ops::elementwise::copy;

@@ -2,14 +2,14 @@
 
 use core::task::Poll;
 
-use super::arena::regions;
-use super::executor::run;
 use super::{Head, Phase, contract};
+use crate::arena::regions;
 use crate::cursor::Cursor;
 use crate::error::{Fault, StepError};
 use crate::image::Region;
 use crate::meter::{Meter, Unlimited, Work};
 use crate::ops::elementwise::copy;
+use crate::ops::run;
 use crate::pace::budget::Budget;
 
 impl Head<'_, '_> {

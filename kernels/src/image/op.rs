@@ -67,13 +67,33 @@ impl OpKind {
         FORMS.iter().find(|form| discriminant(&form.kind) == discriminant(&self))
     }
 
+    #[cfg(feature = "writer")]
+    fn texts(self) -> [&'static str; 2] {
+        self.form().and_then(|form| TEXTS.get(usize::from(form.code) - 1)).copied().unwrap_or_default()
+    }
+
     /// Returns a human-readable name; each function has its own.
     #[cfg(feature = "writer")]
     pub fn name(self) -> &'static str {
         match self {
             Self::Function(function) => function.name(),
-            kind => kind.form().and_then(|form| TEXTS.get(usize::from(form.code) - 1)).copied().unwrap_or_default(),
+            kind => kind.texts()[0],
         }
+    }
+
+    /// Returns a human-readable name of the single constants, or of the third region of an operation without
+    /// constants; empty if a report need not show them.
+    #[cfg(feature = "writer")]
+    pub fn label(self) -> &'static str {
+        self.texts()[1]
+    }
+
+    /// Returns `true` if the operation takes these bits as a single constant: above 0, and finite except for limits.
+    #[inline(always)]
+    pub(super) fn takes(self, constant: u32) -> bool {
+        // Positive numbers have the order of their bits.
+        let infinity = f32::INFINITY.to_bits() + u32::from(matches!(self, Self::Normalize { .. }));
+        constant.wrapping_sub(1) < infinity - 1
     }
 }
 
@@ -127,15 +147,15 @@ impl Form {
 }
 
 macro_rules! operations {
-    ($($(#[$doc:meta])* $NAME:ident = $code:literal $text:literal: $kind:expr, $uses:expr;)*) => {
+    ($($(#[$doc:meta])* $NAME:ident = $code:literal $text:literal $($label:literal)?: $kind:expr, $uses:expr;)*) => {
         $($(#[$doc])* pub const $NAME: u8 = $code;)*
 
         /// The names of the codes above, from code 1 on.
         pub(crate) const NAMES: &[&str] = &[$(stringify!($NAME)),*];
 
-        /// Human-readable names.
+        /// Human-readable names, and what they call their constants and third region.
         #[cfg(feature = "writer")]
-        static TEXTS: [&str; NAMES.len()] = [$($text),*];
+        static TEXTS: [[&str; 2]; NAMES.len()] = [$([$text, concat!($($label)?)]),*];
 
         /// By operation code, from 1 on.
         static FORMS: [Form; NAMES.len()] = [$(Form::new($NAME, $kind, $uses)),*];
@@ -152,23 +172,23 @@ macro_rules! operations {
 }
 operations! {
     /// [`OpKind::Normalize`]
-    NORMALIZE = 1 "normalize": OpKind::Normalize { added: false }, Uses { max_detail: 1, src: 1, constants: 2, arrays: 2, ..Uses::NONE };
+    NORMALIZE = 1 "normalize" "clip": OpKind::Normalize { added: false }, Uses { max_detail: 1, src: 1, constants: 2, arrays: 2, ..Uses::NONE };
     /// [`OpKind::Linear`]
     LINEAR = 2 "linear": OpKind::Linear { accumulate: false }, Uses { max_detail: 1, src: 1, ..Uses::NONE };
     /// [`OpKind::Function`]
     FUNCTION = 3 "function": OpKind::Function(Function::Relu), Uses { max_detail: u8::MAX, reads_dst: true, ..Uses::NONE };
     /// [`OpKind::LayerNorm`]
-    LAYER_NORM = 4 "layernorm": OpKind::LayerNorm, Uses { constants: 1, arrays: 2, passes: 3, reads_dst: true, ..Uses::NONE };
+    LAYER_NORM = 4 "layernorm" "eps": OpKind::LayerNorm, Uses { constants: 1, arrays: 2, passes: 3, reads_dst: true, ..Uses::NONE };
     /// [`OpKind::RmsNorm`]
-    RMS_NORM = 5 "rmsnorm": OpKind::RmsNorm, Uses { constants: 1, arrays: 1, passes: 2, reads_dst: true, ..Uses::NONE };
+    RMS_NORM = 5 "rmsnorm" "eps": OpKind::RmsNorm, Uses { constants: 1, arrays: 1, passes: 2, reads_dst: true, ..Uses::NONE };
     /// [`OpKind::Add`]
     ADD = 6 "add": OpKind::Add, Uses { src: 1, reads_dst: true, ..Uses::NONE };
     /// [`OpKind::Copy`]
     COPY = 7 "copy": OpKind::Copy, Uses { src: 1, ..Uses::NONE };
     /// [`OpKind::LstmCell`]
-    LSTM_CELL = 8 "lstm cell": OpKind::LstmCell, Uses { src: 4, third: 1, ..Uses::NONE };
+    LSTM_CELL = 8 "lstm cell" "cell": OpKind::LstmCell, Uses { src: 4, third: 1, ..Uses::NONE };
     /// [`OpKind::GruCell`]
-    GRU_CELL = 9 "gru cell": OpKind::GruCell, Uses { src: 3, third: 3, reads_dst: true, ..Uses::NONE };
+    GRU_CELL = 9 "gru cell" "gates": OpKind::GruCell, Uses { src: 3, third: 3, reads_dst: true, ..Uses::NONE };
     /// [`OpKind::Mul`]
     MUL = 10 "mul": OpKind::Mul, Uses { src: 1, reads_dst: true, ..Uses::NONE };
     /// [`OpKind::Noise`]
@@ -266,6 +286,12 @@ impl<'a> Op<'a> {
         f32::from_bits(word(self.image, self.data().wrapping_add(i)))
     }
 
+    /// Returns the single constants.
+    #[cfg(feature = "writer")]
+    pub fn constants(&self) -> impl Iterator<Item = f32> {
+        (0..usize::from(self.form.uses.constants)).map(|i| self.constant(i))
+    }
+
     /// Returns the coefficients of denoising step `step`, and the arena offset of its noise.
     pub(crate) fn coefficients(&self, step: usize) -> ([f32; h::COEFFICIENTS], usize) {
         let first = h::DENOISE_WORDS + step * h::COEFFICIENTS;
@@ -300,9 +326,11 @@ impl<'a> Op<'a> {
         u32::from_le(self.record[3]) as usize
     }
 
-    /// Returns `true` if the operation reads its destination.
-    pub(super) fn reads_dst(&self) -> bool {
-        self.form.uses.reads_dst || self.kind == OpKind::Linear { accumulate: true }
+    writer_methods! {
+        /// Returns `true` if the operation reads its destination.
+        fn reads_dst(&self) -> bool {
+            self.form.uses.reads_dst || self.kind == OpKind::Linear { accumulate: true }
+        }
     }
 
     pub(super) fn is_linear(&self) -> bool {

@@ -1,4 +1,4 @@
-//! The operations of an image.
+//! The operations of an image: each in its file, and here their list and the executor, which runs one of them.
 
 #[cfg(feature = "writer")]
 pub mod cells;
@@ -7,3 +7,116 @@ pub mod elementwise;
 pub mod linear;
 pub mod noise;
 pub mod norm;
+
+use self::denoise::{Coefficients, denoise};
+use self::elementwise::{copy, copy_le};
+use self::noise::normal;
+use crate::arch;
+use crate::arena::{part, regions};
+use crate::cursor::Cursor;
+use crate::error::Fault;
+#[cfg(feature = "writer")]
+use crate::error::StepError;
+use crate::image::{Op, OpKind, Region};
+#[cfg(feature = "writer")]
+use crate::meter::Unlimited;
+use crate::meter::{Meter, Work};
+
+/// Runs a whole operation over an arena, as a head does in denoising step `step`. It is for callers that run a
+/// network's operations one by one. Noise is read from the arena.
+///
+/// # Errors
+///
+/// As [`Head::step`](crate::Head::step).
+#[cfg(feature = "writer")]
+pub fn run_whole(op: &Op<'_>, step: usize, arena: &mut [u32]) -> Result<(), StepError> {
+    run(op, arena, &mut Cursor { step, ..Cursor::default() }, &mut Unlimited)?;
+    Ok(())
+}
+
+/// Runs an operation from the cursor on; returns `true` at its end.
+///
+/// # Errors
+///
+/// [`Fault::Damaged`] if the operation names data that the image does not have, which a checked image excludes.
+#[inline(never)]
+pub(crate) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &mut impl Meter) -> Result<bool, Fault> {
+    let f = bytemuck::must_cast_slice_mut::<u32, f32>;
+    if let OpKind::Linear { accumulate } = op.kind {
+        let matrix = &op.linear_matrix();
+        let matrix = matrix.as_ref().map_err(|_| Fault::Damaged)?;
+        let [dst, src, work, _] = regions(arena, &op.regions, Region::default());
+        return matrix.resume(&mut cursor.linear, budget, f(src), work, f(dst), accumulate);
+    }
+    // Elements of this slice, or units of a norm.
+    let (dst, len) = (op.dst(), op.units());
+    let units = budget.take(len - cursor.done, Work::Elements(op));
+    if units == 0 {
+        return Ok(false);
+    }
+    let units = cursor.done..cursor.done + units;
+    cursor.done = units.end;
+    if op.kind == OpKind::Denoise {
+        let (by, noise) = op.coefficients(cursor.step);
+        let by = Coefficients::from_array(by);
+        let noise = if by.sigma == 0.0 { Region::default() } else { Region { offset: noise, len: dst.len } };
+        let [x, v, y, z] = regions(arena, &op.regions, noise).map(|all| f(part(all, &units)));
+        if x.is_empty() {
+            return Err(Fault::Damaged);
+        }
+        denoise(&by, op.constant(0), v, z, x, y);
+        return Ok(units.end == len);
+    }
+    let is_norm = matches!(op.kind, OpKind::LayerNorm | OpKind::RmsNorm);
+    let range = if is_norm { 0..dst.len } else { units.clone() };
+    let [mut dst, mut src, third, _] = match op.src().len {
+        0 => [part(arena, &(dst.offset + range.start..dst.offset + range.end)), &mut [], &mut [], &mut []],
+        _ => regions(arena, &op.regions, Region::default()),
+    };
+    if matches!(op.kind, OpKind::Normalize { .. } | OpKind::Add | OpKind::Mul | OpKind::Copy) {
+        (dst, src) = (part(dst, &range), part(src, &range));
+    }
+    if dst.is_empty() {
+        return Err(Fault::Damaged);
+    }
+    match op.kind {
+        OpKind::Function(function) => function.apply(f(dst)),
+        OpKind::Add => elementwise::add(f(src), f(dst)),
+        OpKind::Mul => elementwise::mul(f(src), f(dst)),
+        OpKind::Copy => copy(src, dst),
+        OpKind::Noise => {
+            if let Some([seed, draw]) = cursor.draw {
+                f(dst).iter_mut().zip(range.start as u32..).for_each(|(x, index)| *x = normal(seed, draw, index));
+            }
+        }
+        OpKind::Table => copy_le(op.part(cursor.step, &range), dst),
+        OpKind::LstmCell => {
+            arch::lstm_elements(range.clone(), f(src), f(third), f(dst));
+        }
+        OpKind::GruCell => {
+            arch::gru_elements(range.clone(), f(src), f(third), f(dst));
+        }
+        // The match has no wildcard: it does not compile without an arm for every operation. `Linear` and `Denoise`
+        // have returned above.
+        kind @ (OpKind::LayerNorm
+        | OpKind::RmsNorm
+        | OpKind::Normalize { .. }
+        | OpKind::Linear { .. }
+        | OpKind::Denoise) => {
+            let (first, second) = (op.part(0, &range), op.part(1, &range));
+            if (if kind == OpKind::RmsNorm { first } else { second }).is_empty() {
+                return Err(Fault::Damaged);
+            }
+            let constant = op.constant(0);
+            let (moments, done) = (&mut cursor.moments, units.clone());
+            if !is_norm {
+                elementwise::normalize(f(src), first, second, constant, op.constant(1), f(dst));
+            } else if kind == OpKind::RmsNorm {
+                norm::rms_norm_units(done, moments, f(dst), first, constant);
+            } else {
+                norm::layer_norm_units(done, moments, f(dst), first, second, constant);
+            }
+        }
+    }
+    Ok(units.end == len)
+}

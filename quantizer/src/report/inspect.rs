@@ -101,14 +101,14 @@ fn row(op: &Op<'_>) -> Vec<String> {
         (OpKind::Linear { accumulate }, Some(matrix)) => {
             format!("{}x{}{}", matrix.rows, matrix.cols, if accumulate { " added" } else { "" })
         }
-        (OpKind::Normalize { added }, _) => {
-            format!("clip {} {}{}", op.constant(0), op.constant(1), if added { ", by the quantizer" } else { "" })
-        }
         (OpKind::RmsNorm, _) if op.constant(0) == Balance::FREE_EPS => "factors, by the quantizer".into(),
-        (OpKind::LayerNorm | OpKind::RmsNorm, _) => format!("eps {}", op.constant(0)),
-        (OpKind::LstmCell, _) => format!("cell {}", region(op.third())),
-        (OpKind::GruCell, _) => format!("gates {}", region(op.third())),
-        _ => String::new(),
+        (kind, _) if kind.label().is_empty() => String::new(),
+        (kind, _) => {
+            let constants: String = op.constants().map(|constant| format!(" {constant}")).collect();
+            let values = if constants.is_empty() { format!(" {}", region(op.third())) } else { constants };
+            let by = if kind == (OpKind::Normalize { added: true }) { ", by the quantizer" } else { "" };
+            format!("{}{values}{by}", kind.label())
+        }
     };
     let mut cells = vec![op.kind.name().to_owned(), region(op.dst()), region(op.src()), detail];
     if let Some(matrix) = &matrix {

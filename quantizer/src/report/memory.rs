@@ -33,14 +33,6 @@ pub fn peak(image: &Image<'_>) -> Peak {
     };
     for i in rounds {
         let op = &ops[i];
-        let replaces = matches!(
-            op.kind,
-            OpKind::Normalize { .. }
-                | OpKind::Linear { accumulate: false }
-                | OpKind::Copy
-                | OpKind::Noise
-                | OpKind::Table
-        );
         for region in [op.dst(), op.src(), op.third()] {
             words(region).for_each(|word| live[word] = true);
         }
@@ -48,7 +40,7 @@ pub fn peak(image: &Image<'_>) -> Peak {
         if needed >= peak.words {
             (peak.op, peak.words) = (i, needed);
         }
-        if replaces {
+        if !op.reads_dst() {
             words(op.dst()).for_each(|word| live[word] = false);
         }
         if op.kind == OpKind::Denoise {

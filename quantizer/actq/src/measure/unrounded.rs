@@ -1,8 +1,8 @@
 //! The network of an image with activations in f32: the error that remains if only the weights are quantized.
 
 use actq_kernels::Image;
-use actq_kernels::head::run_whole;
 use actq_kernels::image::{Matrix, Op, OpKind};
+use actq_kernels::ops::run_whole;
 use ndarray::{Array2, ArrayView1};
 
 use crate::error::Result;
