@@ -14,6 +14,7 @@ mod nodes;
 pub mod operation;
 pub mod ops;
 mod run;
+pub mod syntax;
 mod values;
 mod weights;
 

@@ -8,7 +8,6 @@ mod folder;
 mod importer;
 #[expect(missing_docs, reason = "docs/POLICY.md describes the keys")]
 pub mod json;
-pub mod numbers;
 mod ops;
 pub mod tensors;
 pub mod values;

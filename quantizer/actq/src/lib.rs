@@ -22,6 +22,7 @@ pub mod graph;
 pub mod import;
 pub mod measure;
 pub mod methods;
+pub mod numbers;
 pub mod pipeline;
 pub mod policy;
 pub mod random;

@@ -9,6 +9,11 @@ pub fn real(value: f64, name: &str) -> Result<f32> {
     Ok(real)
 }
 
+/// Rounds a limit to f32 as [`positive`] does; without one, returns infinity.
+pub fn limit(value: Option<f64>, name: &str) -> Result<f32> {
+    value.map_or(Ok(f32::INFINITY), |value| positive(value, name))
+}
+
 /// Rounds a number to f32 as [`real`] does, and refuses values that are not above 0.
 pub fn positive(value: f64, name: &str) -> Result<f32> {
     let real = real(value, name)?;

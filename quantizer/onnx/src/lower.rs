@@ -115,8 +115,7 @@ impl Lowered {
         }
         let most = MOST_COPIES * MOST_COPIES;
         ensure!(n <= most, "repeats a value {n} times; the limit is {most}");
-        let copies = JsonOp { op: "identity".to_owned(), ..JsonOp::default() };
-        let copies = self.push(copies, vec![one; MOST_COPIES].concat(), None, MOST_COPIES);
+        let copies = self.push(JsonOp::new("identity"), vec![one; MOST_COPIES].concat(), None, MOST_COPIES);
         let rest = copies.iter().map(|part| Part { len: n % MOST_COPIES, ..*part }).filter(|part| part.len > 0);
         Ok(vec![copies.clone(); n / MOST_COPIES].concat().into_iter().chain(rest).collect())
     }
@@ -142,33 +141,29 @@ impl Lowered {
 
     fn op(&mut self, exprs: &Exprs, id: Id) -> Result<Vec<Part>> {
         let len = exprs.len_of(id);
-        let op = |name: &str| JsonOp { op: name.to_owned(), ..JsonOp::default() };
         Ok(match exprs.get(id) {
             Expr::Affine(..) | Expr::Clip(..) => self.normalize(exprs, id)?,
             Expr::Linear(x, w, b) => {
                 let name = self.matrix(w)?;
                 let b = self.bias(&name, b)?;
-                self.push(JsonOp { w: Some(name), b, ..op("linear") }, self.place(*x), None, len)
+                self.push(JsonOp::new("linear").key("w", Some(name)).key("b", b), self.place(*x), None, len)
             }
-            Expr::Unary(Unary::Known(f), x) => self.push(op(f.name()), self.place(*x), None, len),
+            Expr::Unary(Unary::Known(f), x) => self.push(JsonOp::new(f.name()), self.place(*x), None, len),
             Expr::Add(x, y) | Expr::Mul(x, y) => {
                 let name = if matches!(exprs.get(id), Expr::Add(..)) { "add" } else { "mul" };
                 let with = self.whole(*y)?;
-                self.push(op(name), self.place(*x), Some(with), len)
+                self.push(JsonOp::new(name), self.place(*x), Some(with), len)
             }
             Expr::LayerNorm(x, weight, bias, eps) => {
                 let w_ln = self.vector("norm.weight", weight)?;
                 let b_ln = self.bias(&w_ln, bias)?;
-                self.push(
-                    JsonOp { w_ln: Some(w_ln), b_ln, eps: Some(*eps), ..op("layernorm") },
-                    self.place(*x),
-                    None,
-                    len,
-                )
+                let op = JsonOp::new("layernorm").key("w_ln", Some(w_ln)).key("b_ln", b_ln).key("eps", Some(*eps));
+                self.push(op, self.place(*x), None, len)
             }
             Expr::RmsNorm(x, weight, eps) => {
                 let w_ln = Some(self.vector("norm.weight", weight)?);
-                self.push(JsonOp { w_ln, eps: Some(*eps), ..op("rmsnorm") }, self.place(*x), None, len)
+                let op = JsonOp::new("rmsnorm").key("w_ln", w_ln).key("eps", Some(*eps));
+                self.push(op, self.place(*x), None, len)
             }
             Expr::Cell(cell) => self.cell(cell, len)?,
             Expr::CellState(_) => bail!("an LSTM's cell state is read outside its cell; read the hidden state instead"),
@@ -195,15 +190,8 @@ impl Lowered {
         let (w_ih, w_hh) = (self.matrix(&cell.w_ih)?, self.matrix(&cell.w_hh)?);
         let (b_ih, b_hh) = (self.bias(&w_ih, &cell.b_ih)?, self.bias(&w_hh, &cell.b_hh)?);
         let name = if cell.lstm { "lstm" } else { "gru" };
-        let op = JsonOp {
-            op: name.to_owned(),
-            hidden: Some(hidden),
-            w_ih: Some(w_ih),
-            w_hh: Some(w_hh),
-            b_ih,
-            b_hh,
-            ..JsonOp::default()
-        };
+        let op = JsonOp::new(name).key("hidden", Some(hidden)).key("w_ih", Some(w_ih)).key("w_hh", Some(w_hh));
+        let op = op.key("b_ih", b_ih).key("b_hh", b_hh);
         Ok(self.push(op, self.place(cell.x), None, hidden))
     }
 
@@ -232,12 +220,13 @@ impl Lowered {
         }
         let mean = Some(self.vector("normalize.mean", &mean)?);
         let scale = Some(self.vector("normalize.scale", &scale)?);
-        let op = JsonOp { op: "normalize".to_owned(), mean, scale, clip, pre_clip, ..JsonOp::default() };
+        let op = JsonOp::new("normalize").key("mean", mean).key("scale", scale);
+        let op = op.key("pre_clip", pre_clip).key("clip", clip);
         Ok(self.push(op, self.place(at), None, len))
     }
 
     fn push(&mut self, op: JsonOp, input: Vec<Part>, with: Option<usize>, len: usize) -> Vec<Part> {
-        self.ops.push(op);
+        self.ops.push(op.key("with", with.map(slot_name)));
         self.reads.push((input, with));
         self.lens.push(len);
         vec![Part { slot: self.ops.len(), from: 0, len }]
@@ -250,7 +239,7 @@ impl Lowered {
             [Part { slot, from: 0, len }] if self.lens.get(slot) == Some(&len) => Ok(slot),
             _ => {
                 let n = place.iter().map(|part| part.len).sum();
-                let moved = self.push(JsonOp { op: "identity".to_owned(), ..JsonOp::default() }, place, None, n);
+                let moved = self.push(JsonOp::new("identity"), place, None, n);
                 self.places.insert(id, moved);
                 Ok(self.ops.len())
             }
@@ -266,29 +255,27 @@ impl Lowered {
                 self.place(root) != [Part { slot: 0, from: 0, len: self.lens[0] }],
                 "the action is the observation itself"
             );
-            self.push(JsonOp { op: "identity".to_owned(), ..JsonOp::default() }, self.place(root), None, n);
+            self.push(JsonOp::new("identity"), self.place(root), None, n);
         }
         Ok(())
     }
 
     /// Names the slots that are read by an op other than the next one.
     fn slots(&mut self) {
-        let name = |slot: usize| if slot == 0 { "obs".to_owned() } else { format!("v{slot}") };
         let mut named = HashSet::new();
         for (i, (input, with)) in self.reads.iter().enumerate() {
             let op = &mut self.ops[i];
-            op.with = with.map(name);
             named.extend(with.iter().copied());
             let whole = |part: &Part| part.from == 0 && part.len == self.lens[part.slot];
             op.input = match &input[..] {
                 [part] if whole(part) && part.slot == i => None,
-                [part] if whole(part) => Some(Input::One(name(part.slot))),
+                [part] if whole(part) => Some(Input::One(slot_name(part.slot))),
                 parts => Some(Input::Many(
                     parts
                         .iter()
                         .map(|part| match whole(part) {
-                            true => name(part.slot),
-                            false => format!("{}[{}:{}]", name(part.slot), part.from, part.from + part.len),
+                            true => slot_name(part.slot),
+                            false => format!("{}[{}:{}]", slot_name(part.slot), part.from, part.from + part.len),
                         })
                         .collect(),
                 )),
@@ -298,7 +285,7 @@ impl Lowered {
             }
         }
         for slot in named.into_iter().filter(|slot| *slot > 0) {
-            self.ops[slot - 1].save = Some(name(slot));
+            self.ops[slot - 1].save = Some(slot_name(slot));
         }
     }
 
@@ -342,6 +329,10 @@ impl Lowered {
         self.weights.push(Weight { name: name.clone(), shape, data });
         Ok(name)
     }
+}
+
+fn slot_name(slot: usize) -> String {
+    if slot == 0 { "obs".to_owned() } else { format!("v{slot}") }
 }
 
 /// Merges adjacent parts.

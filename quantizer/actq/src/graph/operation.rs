@@ -4,6 +4,7 @@ use ndarray::{Array2, ArrayBase, ArrayView2, Data, Ix2, linalg::general_mat_mul}
 
 use super::arrays::{Repeated, Sums, round_rows};
 use super::lowering::{BufferId, Lowering};
+use super::syntax::Syntax;
 use super::values::{ValueId, WeightMatrix};
 use crate::error::{Result, ensure};
 
@@ -44,6 +45,14 @@ pub struct Saved {
 pub trait Operation {
     /// Returns the length of the output for inputs of these lengths. An error names what does not fit.
     fn output_len(&self, matrices: &[WeightMatrix], inputs: &[usize]) -> Result<usize>;
+
+    /// Returns the ops of policy.json that become this operation; none if only this library adds it.
+    fn syntax() -> Vec<Syntax<Self>>
+    where
+        Self: Sized,
+    {
+        Vec::new()
+    }
 
     /// Returns the matrix products.
     fn products(&self) -> Vec<Product> {

@@ -10,6 +10,7 @@ mod lstm;
 mod mul;
 mod norm;
 mod normalize;
+mod recurrent;
 mod table;
 
 use std::ops::{Deref, DerefMut};
@@ -27,6 +28,8 @@ pub use normalize::{Balance, Normalize};
 pub use table::Table;
 
 use super::operation::Operation;
+use super::syntax::Keys;
+use crate::error::Result;
 
 macro_rules! operations {
     ($($(#[$doc:meta])* $name:ident),* $(,)?) => {
@@ -54,6 +57,23 @@ macro_rules! operations {
             }
         }
 
+        impl NodeKind {
+            /// Lists the names of the ops of policy.json, with their keys beside those of every op.
+            pub fn syntax() -> Vec<(&'static str, &'static [&'static str])> {
+                let mut all = Vec::new();
+                $(all.extend($name::syntax().iter().map(|op| (op.name, op.keys)));)*
+                all
+            }
+
+            /// Reads an op of policy.json; `None` if no operation has its name.
+            pub fn read(op: &mut dyn Keys) -> Result<Option<Self>> {
+                $(if let Some(syntax) = $name::syntax().iter().find(|syntax| syntax.name == op.op()) {
+                    return Ok(Some((syntax.read)(op)?.into()));
+                })*
+                Ok(None)
+            }
+        }
+
         $(impl From<$name> for NodeKind {
             fn from(operation: $name) -> Self {
                 Self::$name(operation)
@@ -69,8 +89,6 @@ operations! {
     Balance,
     /// A matrix product.
     Linear,
-    /// A function of every element.
-    Pointwise,
     /// torch's LayerNorm.
     LayerNorm,
     /// A norm without a mean.
@@ -89,4 +107,6 @@ operations! {
     Iterate,
     /// Constants of each denoising step.
     Table,
+    /// A function of every element.
+    Pointwise,
 }

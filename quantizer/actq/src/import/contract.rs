@@ -2,9 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::numbers::real;
 use crate::contract::{ActionContract, Binarise};
 use crate::error::{Context, Result, bail, ensure};
+use crate::numbers::real;
 
 /// Constant that RLDS adds to the distance of two quantiles, so that it is not 0.
 const QUANTILE_EPS: f64 = 1e-8;

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Context, Result, bail, ensure};
 use crate::graph::Denoising;
+use crate::numbers::positive;
 
 /// Most steps of a policy; an image has room for 65535.
 const MOST_STEPS: usize = 1000;
@@ -161,8 +162,8 @@ impl JsonDenoising {
         let chosen: Vec<usize> = (0..steps).rev().map(|k| k * (train / steps)).collect();
         let limit = match (self.clip_sample, self.clip_iterate) {
             (None, None) => f32::INFINITY,
-            (Some(clip), None) => super::numbers::positive(clip, "clip_sample")?,
-            (None, Some(clip)) => super::numbers::positive(clip, "clip_iterate")?,
+            (Some(clip), None) => positive(clip, "clip_sample")?,
+            (None, Some(clip)) => positive(clip, "clip_iterate")?,
             (Some(_), Some(_)) => bail!("clip_sample and clip_iterate share one limit; remove one of them"),
         };
         let mut by = Vec::new();

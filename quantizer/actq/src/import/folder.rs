@@ -8,11 +8,11 @@ use sha2::{Digest, Sha256};
 
 use super::importer::Importer;
 use super::json::PolicyJson;
-use super::numbers::positive;
 use super::ops::{Builder, Weights};
 use super::tensors::TensorFile;
 use crate::error::{Context, Result, bail, ensure};
 use crate::graph::hoist;
+use crate::numbers::positive;
 use crate::policy::Policy;
 
 /// Files of a policy in its folder.

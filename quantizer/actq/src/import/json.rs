@@ -1,7 +1,6 @@
 //! `policy.json`: its permitted keys, and their values as f32.
 
 use actq_kernels::image::Kind;
-use actq_kernels::math::Function;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -9,6 +8,7 @@ use super::contract::{JsonContract, JsonEnsemble};
 use super::denoising::{self, JsonDenoising};
 use crate::contract::{ActionContract, Ensemble, Playback};
 use crate::error::{Context, Result, bail};
+use crate::graph::NodeKind;
 use crate::strict_json;
 use crate::text::is_control;
 
@@ -56,49 +56,52 @@ const KEYS: [&str; 12] = [
 /// Keys about a policy's origin. Their values are not read.
 const ABOUT: [&str; 8] = ["source", "commit", "source_path", "license", "recurrent", "n_params", "inputs", "states"];
 
-/// One op; `op_keys` lists its permitted keys.
-#[derive(Default, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
+/// The op that only names or joins values.
+pub(super) const IDENTITY: &str = "identity";
+
+/// One op. [`NodeKind::syntax`] lists the keys of each beside these.
+#[derive(Deserialize, Serialize)]
 pub struct JsonOp {
     pub op: String,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub input: Option<Input>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub save: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub with: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub w: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub b: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mean: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub scale: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub pre_clip: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub clip: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub w_ln: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub b_ln: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub eps: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub hidden: Option<usize>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub gates: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub w_ih: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub w_hh: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub b_ih: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub b_hh: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub approximate: Option<String>,
+    #[serde(flatten, with = "in_order")]
+    keys: Vec<(String, Value)>,
+}
+
+/// Keys of an op as a JSON object, written in their order.
+mod in_order {
+    use serde::{Deserialize, Deserializer, Serializer};
+    use serde_json::{Map, Value};
+
+    pub(super) fn serialize<S: Serializer>(keys: &[(String, Value)], to: S) -> Result<S::Ok, S::Error> {
+        to.collect_map(keys.iter().map(|(key, value)| (key, value)))
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<(String, Value)>, D::Error> {
+        Ok(Map::deserialize(from)?.into_iter().collect())
+    }
+}
+
+impl JsonOp {
+    /// Makes an op without keys of its own.
+    pub fn new(op: &str) -> Self {
+        Self { op: op.to_owned(), input: None, save: None, keys: Vec::new() }
+    }
+
+    /// Appends a key, if it has a value.
+    #[must_use]
+    pub fn key(mut self, key: &str, value: Option<impl Into<Value>>) -> Self {
+        self.keys.extend(value.map(|value| (key.to_owned(), value.into())));
+        self
+    }
+
+    /// Returns the value of a key; null counts as absent.
+    pub(super) fn get(&self, key: &str) -> Option<&Value> {
+        self.keys.iter().find(|(name, value)| name == key && !value.is_null()).map(|(_, value)| value)
+    }
 }
 
 #[derive(Deserialize, Serialize)]
@@ -120,9 +123,11 @@ impl PolicyJson {
             let (keys, about) = (keys.join(", "), ABOUT.join(", "));
             bail!("the key {key:?} is not known; the keys are {keys} and, not read, {about}");
         }
+        let ops = NodeKind::syntax();
         for (i, op) in value["ops"].as_array().into_iter().flatten().enumerate() {
             let Some(name) = op["op"].as_str() else { continue };
-            let Some(own) = op_keys(name) else { continue };
+            let own = ops.iter().find(|(op, _)| *op == name).map(|(_, keys)| *keys);
+            let Some(own) = own.or((name == IDENTITY).then_some(&[])) else { continue };
             let keys = [&["op", "input", "save"], own].concat();
             if let Some(key) = given(op).find(|key| !keys.contains(key)) {
                 bail!("op {i} ({name}) has the key {key:?}; its keys are {}", keys.join(", "));
@@ -172,22 +177,6 @@ fn kind(name: Option<&str>) -> Result<Kind> {
         Some("diffusion") => Ok(Kind::Diffusion),
         Some(other) => bail!("kind {other:?} is not known; use step, chunk, flow or diffusion"),
     }
-}
-
-/// Returns the keys of an op beside those of every op; `None` for an unknown op.
-fn op_keys(op: &str) -> Option<&'static [&'static str]> {
-    Some(match op {
-        "identity" => &[],
-        "normalize" => &["mean", "scale", "pre_clip", "clip"],
-        "linear" => &["w", "b"],
-        "layernorm" => &["w_ln", "b_ln", "eps"],
-        "rmsnorm" => &["w_ln", "eps"],
-        "add" | "mul" => &["with"],
-        "lstm" | "gru" => &["hidden", "gates", "w_ih", "w_hh", "b_ih", "b_hh"],
-        "gelu" => &["approximate"],
-        name if Function::ALL.iter().any(|f| f.name() == name) => &[],
-        _ => return None,
-    })
 }
 
 /// Refuses control characters in the text within `value`, since names are printed.

@@ -3,15 +3,16 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use actq_kernels::math::Function;
+use serde_json::Value;
 
 use super::denoising::{JsonDenoising, JsonNorm, JsonTime, Schedule};
-use super::json::{Input, JsonOp};
-use super::numbers::positive;
+use super::json::{IDENTITY, Input, JsonOp};
 use super::tensors::TensorFile;
 use crate::error::{Context, Result, bail, ensure};
-use crate::graph::ops::{Add, Concat, Gru, LayerNorm, Linear, Lstm, Mul, Normalize, Pointwise, RmsNorm, Span};
+use crate::graph::ops::{Concat, Normalize, Span};
+use crate::graph::syntax::{Keys, required};
 use crate::graph::{Graph, NodeKind, ValueId, WeightMatrix};
+use crate::numbers::limit;
 
 /// The weights, and their file's name for errors.
 pub(super) struct Weights<'a> {
@@ -102,7 +103,7 @@ impl<'a> Builder<'a> {
                 mean: weights.vector(&norm.mean, obs_len)?,
                 scale: weights.vector(&norm.scale, obs_len)?,
                 pre_clip: f32::INFINITY,
-                clip: clip(norm.clip, "obs_norm.clip")?,
+                clip: limit(norm.clip, "obs_norm.clip")?,
             };
             let normal = graph.add(normalize, &[slots["obs"]])?;
             slots.insert("obs".to_owned(), normal);
@@ -129,39 +130,14 @@ impl<'a> Builder<'a> {
             Some(Input::One(name)) => self.gather(std::slice::from_ref(name))?,
             Some(Input::Many(names)) => self.gather(names)?,
         };
-        let len = self.graph.len_of(input);
-        let mut inputs = vec![input];
-        let kind: Option<NodeKind> = match op.op.as_str() {
-            "identity" => None,
-            "normalize" => Some(NodeKind::from(Normalize {
-                mean: self.weights.vector(need(&op.mean, "mean")?, len)?,
-                scale: self.weights.vector(need(&op.scale, "scale")?, len)?,
-                pre_clip: clip(op.pre_clip, "pre_clip")?,
-                clip: clip(op.clip, "clip")?,
-            })),
-            "linear" => {
-                let matrix = self.matrix(need(&op.w, "w")?, None, len)?;
-                let rows = self.graph.matrices[matrix].rows;
-                Some(Linear { matrix, bias: self.bias(&op.b, rows)? }.into())
-            }
-            "layernorm" => Some(NodeKind::from(LayerNorm {
-                weight: self.weights.vector(need(&op.w_ln, "w_ln")?, len)?,
-                bias: self.bias(&op.b_ln, len)?,
-                eps: positive(op.eps.unwrap_or(1e-5), "eps")?,
-            })),
-            "rmsnorm" => Some(NodeKind::from(RmsNorm {
-                weight: self.weights.vector(need(&op.w_ln, "w_ln")?, len)?,
-                eps: positive(op.eps.unwrap_or(1e-6), "eps")?,
-            })),
-            "add" | "mul" => {
-                inputs.push(self.slot(need(&op.with, "with")?)?);
-                Some(if op.op == "add" { Add.into() } else { Mul.into() })
-            }
-            "lstm" | "gru" => Some(self.recurrent(op, len)?),
-            name => Some(Pointwise(function(name, op.approximate.as_deref())?).into()),
-        };
+        let mut keys = OpKeys { op, len: self.graph.len_of(input), inputs: vec![input], builder: self };
+        let kind = NodeKind::read(&mut keys)?;
+        let inputs = keys.inputs;
         if let Some(kind) = kind {
             self.graph.add(kind, &inputs)?;
+        } else if op.op != IDENTITY {
+            let names: Vec<_> = NodeKind::syntax().iter().map(|(name, _)| *name).collect();
+            bail!("unknown op; the ops are {IDENTITY}, {}", names.join(", "));
         } else if input != self.graph.output() {
             bail!("identity cannot take another input; name the slot in the op that uses it");
         }
@@ -169,37 +145,6 @@ impl<'a> Builder<'a> {
             self.slots.insert(name.clone(), self.graph.output());
         }
         Ok(())
-    }
-
-    fn recurrent(&mut self, op: &JsonOp, len: usize) -> Result<NodeKind> {
-        let hidden = op.hidden.context("the key \"hidden\" is missing")?;
-        ensure!((1..=usize::from(u16::MAX)).contains(&hidden), "hidden is {hidden}; it must be 1 to 65535");
-        let (gates, order) = if op.op == "lstm" { (4, "i,f,g,o") } else { (3, "r,z,n") };
-        if let Some(gates) = &op.gates {
-            ensure!(gates == order, "gates are {gates:?}; only torch's order {order:?} is supported");
-        }
-        let rows = gates * hidden;
-        let input = self.matrix(need(&op.w_ih, "w_ih")?, Some(rows), len)?;
-        let state = self.matrix(need(&op.w_hh, "w_hh")?, Some(rows), hidden)?;
-        let input_bias = self.bias(&op.b_ih, rows)?;
-        let state_bias = self.bias(&op.b_hh, rows)?;
-        Ok(if op.op == "lstm" {
-            // Only the sum of both biases is used.
-            let bias = input_bias.iter().zip(&state_bias).map(|(a, b)| a + b).collect();
-            Lstm { hidden, input, state, bias }.into()
-        } else {
-            Gru { hidden, input, state, input_bias, state_bias }.into()
-        })
-    }
-
-    fn bias(&self, name: &Option<String>, len: usize) -> Result<Vec<f32>> {
-        name.as_ref().map_or_else(|| Ok(vec![0.0; len]), |name| self.weights.vector(name, len))
-    }
-
-    /// Returns the matrix of a tensor; one that several ops share is read one time.
-    fn matrix(&mut self, name: &str, rows: Option<usize>, cols: usize) -> Result<usize> {
-        let matrix = self.weights.matrix(name, rows, cols)?;
-        self.graph.share_matrix(matrix)
     }
 
     fn slot(&self, name: &str) -> Result<ValueId> {
@@ -239,24 +184,57 @@ impl<'a> Builder<'a> {
     }
 }
 
-fn need<'a>(key: &'a Option<String>, name: &str) -> Result<&'a str> {
-    key.as_deref().with_context(|| format!("the key {name:?} is missing"))
+/// An op over values of the network.
+struct OpKeys<'k, 'a> {
+    op: &'k JsonOp,
+    /// Length of the first input.
+    len: usize,
+    inputs: Vec<ValueId>,
+    builder: &'k mut Builder<'a>,
 }
 
-fn clip(value: Option<f64>, name: &str) -> Result<f32> {
-    value.map_or(Ok(f32::INFINITY), |value| positive(value, name))
+impl Keys for OpKeys<'_, '_> {
+    fn op(&self) -> &str {
+        &self.op.op
+    }
+
+    fn input_len(&self) -> usize {
+        self.len
+    }
+
+    fn text(&self, key: &str) -> Result<Option<&str>> {
+        self.value(key, "a text", Value::as_str)
+    }
+
+    fn number(&self, key: &str) -> Result<Option<f64>> {
+        self.value(key, "a number", Value::as_f64)
+    }
+
+    fn count(&self, key: &str) -> Result<Option<usize>> {
+        self.value(key, "a whole number that is not negative", |value| value.as_u64()?.try_into().ok())
+    }
+
+    fn vector(&self, key: &str, len: usize) -> Result<Option<Vec<f32>>> {
+        self.text(key)?.map(|name| self.builder.weights.vector(name, len)).transpose()
+    }
+
+    /// Reads a matrix that several ops share one time.
+    fn matrix(&mut self, key: &str, rows: Option<usize>, cols: usize) -> Result<(usize, usize)> {
+        let matrix = self.builder.weights.matrix(required(self.text(key)?, key)?, rows, cols)?;
+        let rows = matrix.rows;
+        Ok((self.builder.graph.share_matrix(matrix)?, rows))
+    }
+
+    fn add_input(&mut self, key: &str) -> Result<()> {
+        let value = self.builder.slot(required(self.text(key)?, key)?)?;
+        self.inputs.push(value);
+        Ok(())
+    }
 }
 
-fn function(name: &str, approximate: Option<&str>) -> Result<Function> {
-    let name = match (name, approximate) {
-        ("gelu", Some("tanh")) => "gelu_tanh",
-        (name, None | Some("none")) => name,
-        (_, Some(other)) => bail!("approximate {other:?} is not known; use none or tanh"),
-    };
-    Function::ALL.into_iter().find(|f| f.name() == name).with_context(|| {
-        format!(
-            "unknown op; the ops are normalize, linear, layernorm, rmsnorm, add, mul, lstm, gru, identity, {}",
-            Function::ALL.map(Function::name).join(", ")
-        )
-    })
+impl OpKeys<'_, '_> {
+    fn value<'v, T>(&'v self, key: &str, what: &str, of: impl Fn(&'v Value) -> Option<T>) -> Result<Option<T>> {
+        let value = |value| of(value).with_context(|| format!("{key} is {value}; it must be {what}"));
+        self.op.get(key).map(value).transpose()
+    }
 }

@@ -1,7 +1,7 @@
 //! Norms, and reductions over axes.
 
 use actq::error::{Context as _, Result, ensure};
-use actq::import::numbers::positive;
+use actq::numbers::positive;
 
 use crate::nodes::arithmetic::two;
 use crate::nodes::call::Call;

@@ -2,10 +2,11 @@ use actq_kernels::image::OpKind;
 use actq_kernels::math::{self, Function};
 use ndarray::{Array2, Zip};
 
-use crate::error::Result;
+use crate::error::{Context, Result, bail};
 use crate::graph::arrays::contiguous_mut;
 use crate::graph::lowering::{BufferId, Lowering, StepData};
 use crate::graph::operation::{Backward, Forward, NodeState, Operation, Saved, only};
+use crate::graph::syntax::{Keys, Syntax};
 use crate::graph::values::{ValueId, WeightMatrix};
 
 /// A function of every element.
@@ -15,6 +16,19 @@ pub struct Pointwise(pub Function);
 impl Operation for Pointwise {
     fn output_len(&self, _: &[WeightMatrix], inputs: &[usize]) -> Result<usize> {
         only(inputs)
+    }
+
+    fn syntax() -> Vec<Syntax<Self>> {
+        let read = |op: &mut dyn Keys| {
+            let name = match (op.op(), op.text("approximate")?) {
+                ("gelu", Some("tanh")) => Function::GeluTanh.name(),
+                (name, None | Some("none")) => name,
+                (_, Some(other)) => bail!("approximate {other:?} is not known; use none or tanh"),
+            };
+            Function::ALL.into_iter().find(|f| f.name() == name).map(Self).context("unknown function")
+        };
+        let keys = |f| if f == Function::Gelu { &["approximate"][..] } else { &[] };
+        Function::ALL.map(|f| Syntax { name: f.name(), keys: keys(f), read }).to_vec()
     }
 
     fn forward(&self, run: &Forward<'_>, _: &mut NodeState) -> (Array2<f32>, Saved) {

@@ -3,12 +3,14 @@ use actq_kernels::math;
 use actq_kernels::ops::cells::gru_cell;
 use ndarray::Array2;
 
+use super::recurrent::{KEYS, Parts};
 use crate::error::Result;
 use crate::graph::arrays::{contiguous, contiguous_mut, rows, rows_mut, step_rows, sum_rows};
 use crate::graph::lowering::{BufferId, Lifetime, Lowering, StepData};
 use crate::graph::operation::{
     Backward, Forward, NodeState, Operand, Operation, Product, Saved, expect_len, expect_shape, only,
 };
+use crate::graph::syntax::{Keys, Syntax};
 use crate::graph::values::{ValueId, WeightMatrix};
 
 /// torch's GRU of one layer, one step; gates `[r z n]`.
@@ -34,6 +36,14 @@ impl Operation for Gru {
         expect_len("the input's bias", &self.input_bias, 3 * self.hidden)?;
         expect_len("the state's bias", &self.state_bias, 3 * self.hidden)?;
         Ok(self.hidden)
+    }
+
+    fn syntax() -> Vec<Syntax<Self>> {
+        let read = |op: &mut dyn Keys| {
+            let Parts { hidden, w_ih, w_hh, b_ih, b_hh } = Parts::read(op, "r,z,n")?;
+            Ok(Self { hidden, input: w_ih, state: w_hh, input_bias: b_ih, state_bias: b_hh })
+        };
+        vec![Syntax { name: "gru", keys: KEYS, read }]
     }
 
     fn products(&self) -> Vec<Product> {

@@ -6,6 +6,7 @@ use crate::graph::lowering::{BufferId, Lifetime, Lowering};
 use crate::graph::operation::{
     Backward, Forward, NodeState, Operand, Operation, Product, Saved, expect_len, expect_shape, only,
 };
+use crate::graph::syntax::{Keys, Syntax};
 use crate::graph::values::{ValueId, WeightMatrix};
 
 /// `W x + b`
@@ -22,6 +23,14 @@ impl Operation for Linear {
         let rows = expect_shape(matrices, self.matrix, None, only(inputs)?)?;
         expect_len("bias", &self.bias, rows)?;
         Ok(rows)
+    }
+
+    fn syntax() -> Vec<Syntax<Self>> {
+        let read = |op: &mut dyn Keys| {
+            let (matrix, rows) = op.matrix("w", None, op.input_len())?;
+            Ok(Self { matrix, bias: op.bias("b", rows)? })
+        };
+        vec![Syntax { name: "linear", keys: &["w", "b"], read }]
     }
 
     fn products(&self) -> Vec<Product> {

@@ -3,12 +3,14 @@ use actq_kernels::math;
 use actq_kernels::ops::cells::lstm_cell;
 use ndarray::Array2;
 
+use super::recurrent::{KEYS, Parts};
 use crate::error::Result;
 use crate::graph::arrays::{contiguous, contiguous_mut, rows, rows_mut, step_rows, sum_rows};
 use crate::graph::lowering::{BufferId, Lifetime, Lowering, StepData};
 use crate::graph::operation::{
     Backward, Forward, NodeState, Operand, Operation, Product, Saved, expect_len, expect_shape, only,
 };
+use crate::graph::syntax::{Keys, Syntax};
 use crate::graph::values::{ValueId, WeightMatrix};
 
 /// torch's LSTM of one layer, one step; gates `[i f g o]`.
@@ -31,6 +33,16 @@ impl Operation for Lstm {
         expect_shape(matrices, self.state, gates, self.hidden)?;
         expect_len("bias", &self.bias, 4 * self.hidden)?;
         Ok(self.hidden)
+    }
+
+    fn syntax() -> Vec<Syntax<Self>> {
+        let read = |op: &mut dyn Keys| {
+            let Parts { hidden, w_ih, w_hh, b_ih, b_hh } = Parts::read(op, "i,f,g,o")?;
+            // Only the sum of both biases is used.
+            let bias = b_ih.iter().zip(&b_hh).map(|(a, b)| a + b).collect();
+            Ok(Self { hidden, input: w_ih, state: w_hh, bias })
+        };
+        vec![Syntax { name: "lstm", keys: KEYS, read }]
     }
 
     fn products(&self) -> Vec<Product> {

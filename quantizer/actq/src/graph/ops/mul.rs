@@ -4,6 +4,7 @@ use ndarray::Array2;
 use crate::error::{Result, bail, ensure};
 use crate::graph::lowering::{BufferId, Lowering, StepData};
 use crate::graph::operation::{Backward, Forward, NodeState, Operation, Saved};
+use crate::graph::syntax::{Keys, Syntax};
 use crate::graph::values::{ValueId, WeightMatrix};
 
 /// The product of two inputs, element by element.
@@ -15,6 +16,11 @@ impl Operation for Mul {
         let &[len, other] = inputs else { bail!("takes two inputs, not {}", inputs.len()) };
         ensure!(other == len, "multiplies {len} values with {other}");
         Ok(len)
+    }
+
+    fn syntax() -> Vec<Syntax<Self>> {
+        let read = |op: &mut dyn Keys| op.add_input("with").map(|()| Self);
+        vec![Syntax { name: "mul", keys: &["with"], read }]
     }
 
     fn forward(&self, run: &Forward<'_>, _: &mut NodeState) -> (Array2<f32>, Saved) {

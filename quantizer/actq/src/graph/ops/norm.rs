@@ -5,7 +5,9 @@ use crate::error::Result;
 use crate::graph::arrays::sum_rows;
 use crate::graph::lowering::{BufferId, Lowering, StepData};
 use crate::graph::operation::{Backward, Forward, NodeState, Operation, Saved, expect_len, only};
+use crate::graph::syntax::{Keys, Syntax, required};
 use crate::graph::values::{ValueId, WeightMatrix};
+use crate::numbers::positive;
 
 /// torch's LayerNorm: `(x - mean(x)) / sqrt(var(x) + eps) * weight + bias`
 #[derive(Clone, Debug)]
@@ -33,6 +35,18 @@ impl Operation for LayerNorm {
         expect_len("weight", &self.weight, len)?;
         expect_len("bias", &self.bias, len)?;
         Ok(len)
+    }
+
+    fn syntax() -> Vec<Syntax<Self>> {
+        let read = |op: &mut dyn Keys| {
+            let len = op.input_len();
+            Ok(Self {
+                weight: required(op.vector("w_ln", len)?, "w_ln")?,
+                bias: op.bias("b_ln", len)?,
+                eps: positive(op.number("eps")?.unwrap_or(1e-5), "eps")?,
+            })
+        };
+        vec![Syntax { name: "layernorm", keys: &["w_ln", "b_ln", "eps"], read }]
     }
 
     fn vectors(&self) -> Vec<&Vec<f32>> {
@@ -63,6 +77,16 @@ impl Operation for RmsNorm {
         let len = only(inputs)?;
         expect_len("weight", &self.weight, len)?;
         Ok(len)
+    }
+
+    fn syntax() -> Vec<Syntax<Self>> {
+        let read = |op: &mut dyn Keys| {
+            Ok(Self {
+                weight: required(op.vector("w_ln", op.input_len())?, "w_ln")?,
+                eps: positive(op.number("eps")?.unwrap_or(1e-6), "eps")?,
+            })
+        };
+        vec![Syntax { name: "rmsnorm", keys: &["w_ln", "eps"], read }]
     }
 
     fn vectors(&self) -> Vec<&Vec<f32>> {

@@ -6,7 +6,9 @@ use ndarray::Array2;
 use crate::error::Result;
 use crate::graph::lowering::{BufferId, Lifetime, Lowering, Slice, StepData};
 use crate::graph::operation::{Backward, Forward, NodeState, Operation, Saved, expect_len, only};
+use crate::graph::syntax::{Keys, Syntax, required};
 use crate::graph::values::{ValueId, WeightMatrix};
+use crate::numbers::limit;
 
 /// `clamp((clamp(x, ±pre_clip) - mean) * scale, ±clip)`
 #[derive(Clone, Debug)]
@@ -27,6 +29,19 @@ impl Operation for Normalize {
         expect_len("mean", &self.mean, len)?;
         expect_len("scale", &self.scale, len)?;
         Ok(len)
+    }
+
+    fn syntax() -> Vec<Syntax<Self>> {
+        let read = |op: &mut dyn Keys| {
+            let len = op.input_len();
+            Ok(Self {
+                mean: required(op.vector("mean", len)?, "mean")?,
+                scale: required(op.vector("scale", len)?, "scale")?,
+                pre_clip: limit(op.number("pre_clip")?, "pre_clip")?,
+                clip: limit(op.number("clip")?, "clip")?,
+            })
+        };
+        vec![Syntax { name: "normalize", keys: &["mean", "scale", "pre_clip", "clip"], read }]
     }
 
     fn forward(&self, run: &Forward<'_>, _: &mut NodeState) -> (Array2<f32>, Saved) {
