@@ -1,7 +1,7 @@
 //! The check of an image: everything in it, one time. `docs/FORMAT.md` has the list.
 
 use super::contract::{ARRAY_BINARISE, CONTRACT_ARRAYS};
-use super::header as h;
+use super::header::{self as h, Words};
 use super::info::check_whole;
 use super::matrix::{matrix, row_block};
 use super::op::{Form, Op, OpKind, Uses};
@@ -9,7 +9,7 @@ use super::proof::fits_i32;
 use super::region::Region;
 use super::text::is_text;
 use super::view::Image;
-use super::words::{high, low, section, word};
+use super::words::{low, section, word};
 use crate::error::ImageError;
 use crate::layout::Block;
 use crate::x::Plan;
@@ -35,17 +35,17 @@ impl<'a> Image<'a> {
             return Err(ImageError::TooShort);
         }
         let words: &[u32] = bytemuck::try_cast_slice(bytes).map_err(|_| ImageError::Length)?;
-        let image = Self { words, header: words.first_chunk().ok_or(ImageError::TooShort)? };
+        let image = Self { words, header: Words(words.first_chunk().ok_or(ImageError::TooShort)?) };
         check_whole(image.header, bytes)?;
         image.check()?;
         Ok(image)
     }
 
     fn check(&self) -> Result<(), ImageError> {
-        if (self.head(h::W_KIND) >> 8) as u8 != 0 || high(self.head(h::W_WORK_FLAGS)) >> CONTRACT_ARRAYS != 0 {
+        if self.header.kind() >> 8 != 0 || self.header.contract_flags() >> CONTRACT_ARRAYS != 0 {
             return Err(ImageError::Reserved);
         }
-        match (self.head(h::W_KIND) as u8, self.chunk(), self.execute()) {
+        match (self.header.kind(), self.chunk(), self.execute()) {
             (0, 1, 1) => {}
             (1..=3, chunk, execute) if (1..=chunk).contains(&execute) => {}
             (0..=3, ..) => return Err(ImageError::Chunk),
@@ -58,7 +58,7 @@ impl<'a> Image<'a> {
             return Err(ImageError::Playback);
         }
         // Denoising steps have operations, and only a flow or diffusion policy has them.
-        let (first, steps) = (self.first_denoising_op(), high(self.head(h::W_DENOISING)));
+        let (first, steps) = (self.first_denoising_op(), self.header.denoising_steps());
         let denoising =
             if self.kind().is_iterative() { steps > 0 && first < self.op_count() } else { first | steps == 0 };
         if !denoising {
@@ -95,7 +95,7 @@ impl<'a> Image<'a> {
         for i in 0..self.matrix_count() {
             check_matrix(self.matrix_at(i), front, self.work().len)?;
         }
-        front.take(self.head(h::W_MATRICES) as usize, self.matrix_count() * h::MATRIX_WORDS)?;
+        front.take(self.header.matrices(), self.matrix_count() * h::MATRIX_WORDS)?;
         let mut written = self.observation().end();
         for i in 0..self.op_count() {
             written = self.check_op(i, front, written)?;
@@ -106,15 +106,15 @@ impl<'a> Image<'a> {
         if written != self.action().offset {
             return Err(ImageError::Arena);
         }
-        front.take(self.head(h::W_OPS) as usize, self.op_count() * h::OP_WORDS)?;
+        front.take(self.header.ops(), self.op_count() * h::OP_WORDS)?;
         self.check_contract(front)?;
-        let name = front.take(self.head(h::W_NAME) as usize, self.name_len().div_ceil(4))?;
+        let name = front.take(self.header.name(), self.name_len().div_ceil(4))?;
         if !is_text(bytemuck::must_cast_slice(name).get(..self.name_len()).unwrap_or_default()) {
             return Err(ImageError::Name);
         }
         // The arena holds both lengths, so the product fits 32 bits.
         let self_test = self.self_test_steps() * (self.obs_len() + self.act_len());
-        front.take_finite(self.head(h::W_SELF_TEST) as usize, self_test)
+        front.take_finite(self.header.self_test(), self_test)
     }
 
     fn check_contract(&self, front: &mut Front<'a>) -> Result<(), ImageError> {
@@ -122,7 +122,7 @@ impl<'a> Image<'a> {
             return Err(ImageError::Binarise);
         }
         let (arrays, horizon) = (self.contract_count() * self.act_len(), self.horizon());
-        front.take_finite(self.head(h::W_CONTRACT) as usize, arrays + 2 * horizon)?;
+        front.take_finite(self.header.contract(), arrays + 2 * horizon)?;
         for i in 0..self.act_len() {
             let [_, _, low, high, max_step, smoothing, on, off, _, _] = self.contract_of(i);
             if low > high {

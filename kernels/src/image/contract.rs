@@ -1,9 +1,7 @@
 //! The action contract: arrays of f32 bits, with a value for each value of an action. `docs/FORMAT.md` has the order in
 //! which they apply.
 
-use super::header as h;
 use super::view::Image;
-use super::words::high;
 
 /// Arrays of the action contract.
 pub const CONTRACT_ARRAYS: usize = 10;
@@ -15,7 +13,7 @@ impl<'a> Image<'a> {
         /// Returns the arrays, in their order: scale, offset, low, high, max_step, smoothing, on, off, on_value,
         /// off_value. An array that the contract does not have is empty.
         fn contract_arrays(&self) -> [&'a [u32]; CONTRACT_ARRAYS] {
-            let mut offset = self.head(h::W_CONTRACT) as usize;
+            let mut offset = self.header.contract();
             core::array::from_fn(|which| {
                 let len = if self.has_contract(which) { self.act_len() } else { 0 };
                 let array = self.section(offset, len);
@@ -35,8 +33,8 @@ impl<'a> Image<'a> {
     /// Returns the contract of action value `i`, with neutral numbers for the arrays that the contract does not have.
     pub(crate) fn contract_of(&self, i: usize) -> [f32; CONTRACT_ARRAYS] {
         let mut numbers = [1.0, -0.0, f32::NEG_INFINITY, f32::INFINITY, f32::INFINITY, 1.0, 0.0, 0.0, 0.0, 0.0];
-        let (mut flags, len) = (high(self.head(h::W_WORK_FLAGS)), self.act_len());
-        let mut at = (self.head(h::W_CONTRACT) as usize).wrapping_add(i);
+        let (mut flags, len) = (self.header.contract_flags(), self.act_len());
+        let mut at = self.header.contract().wrapping_add(i);
         for number in &mut numbers {
             if flags == 0 {
                 break;
@@ -52,11 +50,11 @@ impl<'a> Image<'a> {
 
     /// Returns the number of arrays.
     pub(super) fn contract_count(&self) -> usize {
-        high(self.head(h::W_WORK_FLAGS)).count_ones() as usize
+        self.header.contract_flags().count_ones() as usize
     }
 
     /// Returns `true` if the contract has array `which`.
     pub(super) fn has_contract(&self, which: usize) -> bool {
-        high(self.head(h::W_WORK_FLAGS)) >> which & 1 == 1
+        self.header.contract_flags() >> which & 1 == 1
     }
 }

@@ -1,10 +1,10 @@
-//! The header: the places of its fields, and how they are written. [`Image`](super::Image) reads them.
+//! The header: one table of its fields, by which they are read and written.
 
 #[cfg(feature = "writer")]
 use super::region::Region;
-use super::words::HEADER_WORDS;
+use super::words::{HEADER_WORDS, Part};
 #[cfg(feature = "writer")]
-use super::words::{Records, TooLarge, halves};
+use super::words::{Records, TooLarge};
 #[cfg(feature = "writer")]
 use crate::layout::LAYOUT_STAMP;
 
@@ -31,55 +31,106 @@ pub const MAX_ROWS: usize = 4096;
 /// Most words of an arena: offsets in it are u16.
 pub const MAX_SCRATCH: usize = 0xffff;
 
-/// u16 version, u16 header words.
-pub const W_VERSION: usize = 1;
-/// Length of the image in bytes.
-pub const W_BYTES: usize = 2;
-/// CRC-32 (ISO-HDLC, as in zlib) of all bytes from word 4 on.
-pub const W_CRC: usize = 3;
-/// Kernel layout stamp.
-pub const W_LAYOUT: usize = 4;
-/// u8 kind, u8 zero, u16 number of operations.
-pub const W_KIND: usize = 5;
-/// Offset of the operation records.
-pub const W_OPS: usize = 6;
-/// u16 observation length, u16 action length.
-pub const W_SIZES: usize = 7;
-/// u16 actions in a chunk, u16 of them executed.
-pub const W_CHUNK: usize = 8;
-/// Arena length in words.
-pub const W_SCRATCH: usize = 9;
-/// u16 arena offset and u16 length of the state that a reset zeroes.
-pub const W_STATE: usize = 10;
-/// u16 arena offset of the observation, u16 of the network's output.
-pub const W_OBS_OUT: usize = 11;
-/// u16 arena offset of the action, u16 of the work area.
-pub const W_ACTION_WORK: usize = 12;
-/// u16 length of the work area, u16 flags of the action contract.
-pub const W_WORK_FLAGS: usize = 13;
-/// Offset of the action contract's arrays.
-pub const W_CONTRACT: usize = 14;
-/// f32 control rate in Hz.
-pub const W_RATE: usize = 15;
-/// Offset of the self-test vector.
-pub const W_SELF_TEST: usize = 16;
-/// u16 steps of the self-test, u16 bytes of the name.
-pub const W_STEPS_NAME: usize = 17;
-/// Offset of the policy's name.
-pub const W_NAME: usize = 18;
-/// Weights of the source policy's matrices.
-pub const W_WEIGHTS: usize = 19;
+/// Declares the header's words in one table. Each field has a place for both sides: [`Words`] reads it by its name,
+/// and [`Header::emit`] writes the value that follows it there.
+macro_rules! header {
+    (|$header:ident| $($(#[$doc:meta])* $WORD:ident = $index:literal: $($field:ident $part:ident = $value:expr),+;)*) => {
+        $($(#[$doc])* pub const $WORD: usize = $index;)*
+
+        impl Words<'_> {
+            $($(
+                #[inline(always)]
+                pub(super) const fn $field(self) -> usize {
+                    Part::$part.of(u32::from_le(self.0[$WORD]))
+                }
+            )+)*
+        }
+
+        #[cfg(feature = "writer")]
+        impl Header {
+            /// Returns the header's words, without length and checksum ([`seal`](super::crc::seal)).
+            ///
+            /// # Errors
+            ///
+            /// [`TooLarge`] if a size does not fit its field.
+            pub fn emit(&self) -> Result<[u32; WORDS], TooLarge> {
+                let ($header, mut words) = (self, [0; WORDS]);
+                $($(words[$WORD] |= Part::$part.put($value)?;)+)*
+                for (word, bytes) in words.iter_mut().skip(W_DIGEST).zip(self.digest.as_chunks().0) {
+                    *word = u32::from_le_bytes(*bytes);
+                }
+                Ok(words)
+            }
+        }
+    };
+}
+header! { |header|
+    /// `ACTQ` in the first four bytes.
+    W_MAGIC = 0: magic Whole = MAGIC as usize;
+    /// u16 version, u16 header words.
+    W_VERSION = 1: version Low = VERSION.into(), header_words High = WORDS;
+    /// Length of the image in bytes.
+    W_BYTES = 2: bytes Whole = 0;
+    /// CRC-32 (ISO-HDLC, as in zlib) of all bytes from word 4 on.
+    W_CRC = 3: crc Whole = 0;
+    /// Kernel layout stamp.
+    W_LAYOUT = 4: layout Whole = LAYOUT_STAMP as usize;
+    /// u8 kind, u8 zero, u16 number of operations.
+    W_KIND = 5: kind Low = header.kind as usize, op_count High = header.ops.count;
+    /// Offset of the operation records.
+    W_OPS = 6: ops Whole = header.ops.offset as usize;
+    /// u16 observation length, u16 action length.
+    W_SIZES = 7: obs_len Low = header.obs_len, act_len High = header.act_len;
+    /// u16 actions in a chunk, u16 of them executed.
+    W_CHUNK = 8: chunk Low = header.chunk, execute High = header.execute;
+    /// Arena length in words, which fits a u16.
+    W_SCRATCH = 9: scratch Whole = Part::Low.put(header.scratch)? as usize;
+    /// u16 arena offset and u16 length of the state that a reset zeroes.
+    W_STATE = 10: state Low = header.state.offset, state_len High = header.state.len;
+    /// u16 arena offset of the observation, u16 of the network's output.
+    W_OBS_OUT = 11: observation Low = header.observation, output High = header.output;
+    /// u16 arena offset of the action, u16 of the work area.
+    W_ACTION_WORK = 12: action Low = header.action, work High = header.work.offset;
+    /// u16 length of the work area, u16 flags of the action contract.
+    W_WORK_FLAGS = 13: work_len Low = header.work.len, contract_flags High = header.contract_flags;
+    /// Offset of the action contract's arrays.
+    W_CONTRACT = 14: contract Whole = header.contract as usize;
+    /// f32 control rate in Hz.
+    W_RATE = 15: rate Whole = header.rate_hz.to_bits() as usize;
+    /// Offset of the self-test vector.
+    W_SELF_TEST = 16: self_test Whole = header.self_test.offset as usize;
+    /// u16 steps of the self-test, u16 bytes of the name.
+    W_STEPS_NAME = 17: self_test_steps Low = header.self_test.count, name_len High = header.name.count;
+    /// Offset of the policy's name.
+    W_NAME = 18: name Whole = header.name.offset as usize;
+    /// Weights of the source policy's matrices.
+    W_WEIGHTS = 19: weights Whole = header.weights as usize;
+    /// Offset of the matrix records.
+    W_MATRICES = 28: matrices Whole = header.matrices.offset as usize;
+    /// u16 number of matrices, u16 chunks that a temporal ensemble averages for an action, or 0.
+    W_MATRIX_COUNT = 29: matrix_count Low = header.matrices.count, horizon High = header.horizon;
+    /// u16 first operation that every denoising step runs, u16 denoising steps; both 0 if an evaluation runs the network
+    /// one time.
+    W_DENOISING = 30: first_denoising_op Low = header.first_denoising_op, denoising_steps High = header.denoising_steps;
+    /// u16 actions that blend one chunk into the next, u16 age from which on an action never plays; 0 for none.
+    W_PLAYBACK = 31: overlap Low = header.overlap, deadline High = header.deadline;
+}
 /// SHA-256 of the source policy, 8 words.
 pub const W_DIGEST: usize = 20;
-/// Offset of the matrix records.
-pub const W_MATRICES: usize = 28;
-/// u16 number of matrices, u16 chunks that a temporal ensemble averages for an action, or 0.
-pub const W_MATRIX_COUNT: usize = 29;
-/// u16 first operation that every denoising step runs, u16 denoising steps; both 0 if an evaluation runs the network
-/// one time.
-pub const W_DENOISING: usize = 30;
-/// u16 actions that blend one chunk into the next, u16 age from which on an action never plays; 0 for none.
-pub const W_PLAYBACK: usize = 31;
+
+/// The words of a header as in memory; each method reads a field.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Words<'a>(pub(super) &'a [u32; WORDS]);
+
+impl Words<'_> {
+    pub(super) fn digest(self) -> [u8; 32] {
+        let mut digest = [0; 32];
+        for (out, word) in digest.chunks_exact_mut(4).zip(self.0.iter().skip(W_DIGEST)) {
+            out.copy_from_slice(&word.to_ne_bytes());
+        }
+        digest
+    }
+}
 
 /// The meaning of a policy's output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -159,42 +210,4 @@ pub struct Header {
     pub weights: u32,
     /// SHA-256 of the source policy.
     pub digest: [u8; 32],
-}
-
-#[cfg(feature = "writer")]
-impl Header {
-    /// Returns the header's words, without length and checksum ([`seal`](super::crc::seal)).
-    ///
-    /// # Errors
-    ///
-    /// [`TooLarge`] if a size does not fit its field.
-    pub fn emit(&self) -> Result<[u32; WORDS], TooLarge> {
-        let mut words = [0; WORDS];
-        words[0] = MAGIC;
-        words[W_VERSION] = halves(VERSION.into(), WORDS)?;
-        words[W_LAYOUT] = LAYOUT_STAMP;
-        words[W_KIND] = halves(self.kind as usize, self.ops.count)?;
-        words[W_OPS] = self.ops.offset;
-        words[W_SIZES] = halves(self.obs_len, self.act_len)?;
-        words[W_CHUNK] = halves(self.chunk, self.execute)?;
-        words[W_SCRATCH] = halves(self.scratch, 0)?;
-        words[W_STATE] = halves(self.state.offset, self.state.len)?;
-        words[W_OBS_OUT] = halves(self.observation, self.output)?;
-        words[W_ACTION_WORK] = halves(self.action, self.work.offset)?;
-        words[W_WORK_FLAGS] = halves(self.work.len, self.contract_flags)?;
-        words[W_CONTRACT] = self.contract;
-        words[W_RATE] = self.rate_hz.to_bits();
-        words[W_SELF_TEST] = self.self_test.offset;
-        words[W_STEPS_NAME] = halves(self.self_test.count, self.name.count)?;
-        words[W_NAME] = self.name.offset;
-        words[W_WEIGHTS] = self.weights;
-        for (word, bytes) in words.iter_mut().skip(W_DIGEST).zip(self.digest.as_chunks().0) {
-            *word = u32::from_le_bytes(*bytes);
-        }
-        words[W_MATRICES] = self.matrices.offset;
-        words[W_MATRIX_COUNT] = halves(self.matrices.count, self.horizon)?;
-        words[W_DENOISING] = halves(self.first_denoising_op, self.denoising_steps)?;
-        words[W_PLAYBACK] = halves(self.overlap, self.deadline)?;
-        Ok(words)
-    }
 }

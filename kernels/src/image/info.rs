@@ -1,8 +1,7 @@
 //! Sizes from an image's header, before the image itself is checked: at compile time, too.
 
 use super::crc::checksum;
-use super::header as h;
-use super::words::{high, low};
+use super::header::{self as h, Words};
 use crate::error::ImageError;
 use crate::layout::LAYOUT_STAMP;
 
@@ -32,16 +31,12 @@ impl ImageInfo {
         if !bytes.len().is_multiple_of(4) {
             return Err(ImageError::Length);
         }
-        if let Err(error) = check_whole(&header, bytes) {
+        let header = Words(&header);
+        if let Err(error) = check_whole(header, bytes) {
             return Err(error);
         }
-        let sizes = u32::from_le(header[h::W_SIZES]);
-        Ok(Self {
-            bytes: bytes.len(),
-            obs_len: low(sizes),
-            act_len: high(sizes),
-            scratch_words: u32::from_le(header[h::W_SCRATCH]) as usize,
-        })
+        let (obs_len, act_len, scratch_words) = (header.obs_len(), header.act_len(), header.scratch());
+        Ok(Self { bytes: bytes.len(), obs_len, act_len, scratch_words })
     }
 }
 
@@ -59,23 +54,22 @@ const fn header(bytes: &[u8]) -> Option<[u32; h::WORDS]> {
     Some(header)
 }
 
-/// Checks the fields about the whole image `bytes` in its header, whose words are as in memory.
+/// Checks the fields about the whole image `bytes` in its header.
 #[inline(always)]
-pub(super) const fn check_whole(header: &[u32; h::WORDS], bytes: &[u8]) -> Result<(), ImageError> {
-    if u32::from_le(header[0]) != h::MAGIC {
+pub(super) const fn check_whole(header: Words<'_>, bytes: &[u8]) -> Result<(), ImageError> {
+    if header.magic() != h::MAGIC as usize {
         return Err(ImageError::Magic);
     }
-    let version = u32::from_le(header[h::W_VERSION]);
-    if low(version) != h::VERSION as usize || high(version) != h::WORDS {
+    if header.version() != h::VERSION as usize || header.header_words() != h::WORDS {
         return Err(ImageError::Version);
     }
-    if u32::from_le(header[h::W_BYTES]) as usize != bytes.len() {
+    if header.bytes() != bytes.len() {
         return Err(ImageError::Length);
     }
-    if u32::from_le(header[h::W_CRC]) != checksum(bytes) {
+    if header.crc() as u32 != checksum(bytes) {
         return Err(ImageError::Checksum);
     }
-    if u32::from_le(header[h::W_LAYOUT]) != LAYOUT_STAMP {
+    if header.layout() != LAYOUT_STAMP as usize {
         return Err(ImageError::Layout);
     }
     Ok(())

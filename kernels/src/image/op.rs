@@ -4,7 +4,7 @@
 use core::mem::discriminant;
 use core::ops::Range;
 
-use super::header::{self as h, MATRIX_WORDS, OP_WORDS, W_KIND, W_MATRICES, W_MATRIX_COUNT, W_OPS};
+use super::header::{self as h, MATRIX_WORDS, OP_WORDS};
 use super::matrix::{Matrix, matrix};
 use super::region::Region;
 use super::view::Image;
@@ -342,7 +342,7 @@ impl<'a> Image<'a> {
     writer_methods! {
         /// Returns the number of operations.
         fn op_count(&self) -> usize {
-            high(self.head(W_KIND))
+            self.header.op_count()
         }
 
         /// Iterates over the operations in order.
@@ -364,7 +364,7 @@ impl<'a> Image<'a> {
 
     /// Reads operation `i`; refuses an impossible record. (In a checked image every record parses.)
     pub(crate) fn op(&self, i: usize) -> Result<Op<'a>, ImageError> {
-        let op = record(self.words, (self.head(W_OPS) as usize).wrapping_add(i * OP_WORDS))?;
+        let op = record(self.words, self.header.ops().wrapping_add(i * OP_WORDS))?;
         let [head, places, lengths, data] = op.map(u32::from_le);
         let (code, detail, len) = (head as u8, (head >> 8) as u8, high(head));
         let form = FORMS.get(usize::from(code).wrapping_sub(1)).ok_or(ImageError::Op)?;
@@ -386,11 +386,11 @@ impl<'a> Image<'a> {
 
     /// Returns the number of matrices.
     pub(super) fn matrix_count(&self) -> usize {
-        low(self.head(W_MATRIX_COUNT))
+        self.header.matrix_count()
     }
 
     /// Returns the offset of matrix record `i`.
     pub(super) fn matrix_at(&self, i: usize) -> usize {
-        (self.head(W_MATRICES) as usize).wrapping_add(i * MATRIX_WORDS)
+        self.header.matrices().wrapping_add(i * MATRIX_WORDS)
     }
 }

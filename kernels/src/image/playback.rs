@@ -5,23 +5,22 @@ use super::contract::ARRAY_BINARISE;
 use super::header as h;
 use super::region::Region;
 use super::view::Image;
-use super::words::{high, low};
 
 impl Image<'_> {
     /// Returns the number of chunks that a temporal ensemble averages for an action; 0 without an ensemble.
     pub fn horizon(&self) -> usize {
-        high(self.head(h::W_MATRIX_COUNT))
+        self.header.horizon()
     }
 
     /// Returns the number of actions that blend the rest of a chunk into the next one; 0 if the rest is dropped.
     pub fn overlap(&self) -> usize {
-        low(self.head(h::W_PLAYBACK))
+        self.header.overlap()
     }
 
     /// Returns the age, in control periods since its observation, from which on an action never plays; `None` if
     /// actions play at any age.
     pub fn deadline(&self) -> Option<usize> {
-        Some(high(self.head(h::W_PLAYBACK))).filter(|periods| *periods > 0)
+        Some(self.header.deadline()).filter(|periods| *periods > 0)
     }
 
     /// Returns the weight in an ensemble of a chunk that comes after `count` others, and the reciprocal of the sum of
@@ -33,7 +32,7 @@ impl Image<'_> {
 
     /// Returns the offset of the ensemble's weights: after the contract's arrays.
     fn ensemble_at(&self) -> usize {
-        (self.head(h::W_CONTRACT) as usize).wrapping_add(self.contract_count() * self.act_len())
+        self.header.contract().wrapping_add(self.contract_count() * self.act_len())
     }
 
     /// Returns the arena region of the on/off states of binarized values, a word for each value of an action; empty

@@ -23,6 +23,39 @@ pub(super) const fn high(word: u32) -> usize {
     (word >> 16) as usize
 }
 
+/// The part of a word that holds a field.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Part {
+    /// The low half.
+    Low,
+    /// The high half.
+    High,
+    /// All of it.
+    Whole,
+}
+
+impl Part {
+    /// Returns the field in a word.
+    #[inline(always)]
+    pub(super) const fn of(self, word: u32) -> usize {
+        match self {
+            Self::Low => low(word),
+            Self::High => high(word),
+            Self::Whole => word as usize,
+        }
+    }
+
+    /// Returns a word with this field; its other bits are 0.
+    #[cfg(feature = "writer")]
+    pub(super) fn put(self, value: usize) -> Result<u32, TooLarge> {
+        match self {
+            Self::Low => halves(value, 0),
+            Self::High => halves(0, value),
+            Self::Whole => u32::try_from(value).map_err(|_| TooLarge(value)),
+        }
+    }
+}
+
 /// A size that does not fit its field.
 #[cfg(feature = "writer")]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
