@@ -2,16 +2,17 @@
 
 use actq::contract::{Ensemble, Playback};
 use actq::emit;
-use actq::graph::Denoising;
-use actq::graph::ops::{Add, Gru, Iterate, LayerNorm, Lstm, Mul, Normalize, Pointwise, RmsNorm, Table};
+use actq::error::bail;
+use actq::graph::ops::{Add, Concat, Gru, Iterate, Lstm, Normalize, Span, Table};
+use actq::graph::syntax::Keys;
+use actq::graph::{Denoising, NodeKind, ValueId};
 use actq::methods::{Activations, Outcome};
 use actq::policy::Policy;
 use actq_bench::networks::{Builder, accumulating};
 use actq_kernels::Width;
 use actq_kernels::image::Kind;
-use actq_kernels::math::Function;
 use actq_kernels::ops::denoise::Coefficients;
-use anyhow::Result;
+use anyhow::{Context as _, Result};
 
 /// Rows and columns of the matrices: strips of all heights, runs of several strips, columns with and without a rest.
 const SHAPES: [(usize, usize); 28] = [
@@ -68,6 +69,63 @@ pub(super) fn images() -> Result<Vec<(String, Vec<u8>)>> {
     Ok(images)
 }
 
+/// Ops of policy.json with shapes of their own. All others are measured with [`LENGTHS`], so that a new one needs no
+/// line here.
+const WITH_MATRICES: [&str; 3] = ["linear", "lstm", "gru"];
+
+/// An op of policy.json with the same values for every key.
+struct Filled<'b> {
+    op: &'static str,
+    len: usize,
+    inputs: Vec<ValueId>,
+    builder: &'b mut Builder,
+}
+
+impl Keys for Filled<'_> {
+    fn op(&self) -> &str {
+        self.op
+    }
+
+    fn input_len(&self) -> usize {
+        self.len
+    }
+
+    fn text(&self, _: &str) -> actq::error::Result<Option<&str>> {
+        Ok(None)
+    }
+
+    fn number(&self, _: &str) -> actq::error::Result<Option<f64>> {
+        Ok(Some(5.0))
+    }
+
+    fn count(&self, _: &str) -> actq::error::Result<Option<usize>> {
+        Ok(None)
+    }
+
+    fn vector(&self, _: &str, len: usize) -> actq::error::Result<Option<Vec<f32>>> {
+        Ok(Some(vec![1.5; len]))
+    }
+
+    fn matrix(&mut self, key: &str, _: Option<usize>, _: usize) -> actq::error::Result<(usize, usize)> {
+        bail!("{} has the matrix {key:?}; measure it with shapes of its own", self.op)
+    }
+
+    fn add_input(&mut self, _: &str) -> actq::error::Result<()> {
+        let part = Concat(vec![Span { from: 0, len: self.len }]);
+        self.inputs.push(self.builder.graph.add(part, &[0])?);
+        Ok(())
+    }
+}
+
+/// Adds an op of policy.json over `len` values.
+fn filled(builder: &mut Builder, op: &'static str, len: usize) -> Result<()> {
+    let mut keys = Filled { op, len, inputs: vec![builder.part(len)?], builder };
+    let kind = NodeKind::read(&mut keys)?.context(op)?;
+    let inputs = keys.inputs;
+    builder.node(kind, &inputs)?;
+    Ok(())
+}
+
 fn policies() -> Result<Vec<(Policy, Vec<Outcome>)>> {
     let mut policies = Vec::new();
     for activations in [Activations::Int8, Activations::Int16] {
@@ -112,24 +170,12 @@ fn policies() -> Result<Vec<(Policy, Vec<Outcome>)>> {
     for (name, contract) in [("functions", false), ("functions with contract", true)] {
         let mut builder = Builder::new(if contract { OBSERVATION } else { 256 });
         for len in LENGTHS {
-            for function in Function::ALL {
-                let input = builder.part(len)?;
-                builder.node(Pointwise(function), &[input])?;
+            for (op, _) in NodeKind::syntax().into_iter().filter(|(op, _)| !WITH_MATRICES.contains(op)) {
+                filled(&mut builder, op, len)?;
             }
             let [mean, scale] = [builder.values(len), vec![1.5; len]];
-            builder
-                .node_of_part(len, Normalize { mean: mean.clone(), scale: scale.clone(), pre_clip: 10.0, clip: 5.0 })?;
             let limitless = f32::INFINITY;
-            builder.node_of_part(
-                len,
-                Normalize { mean: mean.clone(), scale: scale.clone(), pre_clip: limitless, clip: limitless },
-            )?;
-            builder.node_of_part(len, LayerNorm { weight: scale.clone(), bias: mean, eps: 1e-5 })?;
-            builder.node_of_part(len, RmsNorm { weight: scale, eps: 1e-5 })?;
-            let (a, b) = (builder.part(len)?, builder.part(len)?);
-            builder.node(Add, &[a, b])?;
-            let (a, b) = (builder.part(len)?, builder.part(len)?);
-            builder.node(Mul, &[a, b])?;
+            builder.node_of_part(len, Normalize { mean, scale, pre_clip: limitless, clip: limitless })?;
         }
         for hidden in HIDDEN {
             for width in [Width::W2, Width::W4] {
@@ -179,4 +225,30 @@ fn policies() -> Result<Vec<(Policy, Vec<Outcome>)>> {
         }
     }
     Ok(policies)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+    use std::path::Path;
+
+    use actq::runtime::ImageBuffer;
+    use actq_kernels::pace::cost::{Feature, values};
+
+    use super::*;
+
+    #[test]
+    fn every_operation_is_measured() -> Result<()> {
+        let mut measured = HashSet::new();
+        for (name, bytes) in images()? {
+            let buffer = ImageBuffer::new(&bytes);
+            let ops = buffer.image(Path::new(&name))?.ops().map(|op| values(&op));
+            measured.extend(ops.flat_map(|(operation, value, _)| [operation, value]));
+        }
+        let name = |feature: &Feature| format!("{feature:?}");
+        let expected = Feature::all().filter(|f| ["operation(", "function("].iter().any(|kind| name(f).contains(kind)));
+        let missing: Vec<Feature> = expected.filter(|feature| !measured.contains(feature)).collect();
+        assert!(missing.is_empty(), "no image has {missing:?}");
+        Ok(())
+    }
 }
