@@ -6,7 +6,7 @@ use std::sync::Arc;
 use actq_kernels::math::Function;
 
 use crate::patterns::slices::sums_of_slices;
-use crate::values::expr::{Cell, Expr, Exprs, Id, Matrix, Run, Unary};
+use crate::values::expr::{Expr, Exprs, Id, Matrix, Run, Unary};
 
 /// Simplifies a value. `instead` maps expressions to their replacements.
 pub(crate) fn simplify(exprs: &mut Exprs, root: Id, instead: &HashMap<Id, Id>) -> Id {
@@ -79,11 +79,6 @@ pub(crate) fn simplify(exprs: &mut Exprs, root: Id, instead: &HashMap<Id, Id>) -
                 let (up, down) = (exprs.function(Function::Relu, x), exprs.function(Function::Relu, negative));
                 exprs.add(up, down)
             }
-            Expr::Input(_) | Expr::Integers(_) => id,
-            Expr::Spread(x) => exprs.put(Expr::Spread(of(&x)), len),
-            Expr::Unary(f, x) => exprs.put(Expr::Unary(f, of(&x)), len),
-            Expr::Add(x, y) => exprs.put(Expr::Add(of(&x), of(&y)), len),
-            Expr::Mul(x, y) => exprs.put(Expr::Mul(of(&x), of(&y)), len),
             // A remaining sum becomes a product with a row of ones.
             Expr::Sum(x) => {
                 let x = of(&x);
@@ -94,17 +89,11 @@ pub(crate) fn simplify(exprs: &mut Exprs, root: Id, instead: &HashMap<Id, Id>) -
                 });
                 exprs.put(Expr::Linear(x, Arc::clone(ones), vec![0.0]), len)
             }
-            Expr::Clip(x, limit) => exprs.put(Expr::Clip(of(&x), limit), len),
-            Expr::LayerNorm(x, weight, bias, eps) => {
-                let norm = exprs.put(Expr::LayerNorm(of(&x), weight, bias, eps), len);
+            Expr::LayerNorm(x, ..) | Expr::RmsNorm(x, ..) => {
+                let norm = exprs.put(old.over(of), len);
                 reuse_norm(exprs, *norms.entry(of(&x)).or_insert(norm), norm)
             }
-            Expr::RmsNorm(x, weight, eps) => {
-                let norm = exprs.put(Expr::RmsNorm(of(&x), weight, eps), len);
-                reuse_norm(exprs, *norms.entry(of(&x)).or_insert(norm), norm)
-            }
-            Expr::Cell(cell) => exprs.put(Expr::Cell(Box::new(Cell { x: of(&cell.x), ..*cell })), len),
-            Expr::CellState(x) => exprs.put(Expr::CellState(of(&x)), len),
+            other => exprs.put(other.over(of), len),
         };
         exprs.keep_origin(id, done);
         new.insert(id, done);

@@ -19,7 +19,8 @@ pub(crate) fn computed(values: &[f64], f: &dyn Fn(&mut Exprs, Id) -> Id) -> Resu
 }
 
 impl Exprs {
-    /// Evaluates `root` for `input`, the only input; `None` if it depends on a matrix or a cell.
+    /// Evaluates `root` for `input`, the only input; `None` if it depends on a matrix, a cell or another expression
+    /// that has no arm here.
     fn evaluated(&self, root: Id, input: &[f64]) -> Option<Vec<f64>> {
         let mut values: HashMap<Id, Vec<f64>> = HashMap::new();
         for id in self.needed(&[root]) {
@@ -49,7 +50,7 @@ impl Exprs {
                     let s = inverse_root(of(x)?, *eps);
                     of(x)?.iter().zip(weight).map(|(v, w)| v * s * w).collect()
                 }
-                Expr::Integers(_) | Expr::Linear(..) | Expr::Cell(_) | Expr::CellState(_) => return None,
+                _ => return None,
             };
             values.insert(id, value);
         }

@@ -113,6 +113,26 @@ impl Expr {
             | Self::CellState(x) => vec![*x],
         }
     }
+
+    /// Returns the same expression of other operands, which `of` maps its own to.
+    pub(crate) fn over(mut self, of: impl Fn(&Id) -> Id) -> Self {
+        match &mut self {
+            Self::Input(_) | Self::Integers(_) => {}
+            Self::Pick(runs) => runs.iter_mut().for_each(|run| run.of = of(&run.of)),
+            Self::Add(x, y) | Self::Mul(x, y) => (*x, *y) = (of(x), of(y)),
+            Self::Cell(cell) => cell.x = of(&cell.x),
+            Self::Spread(x)
+            | Self::Affine(x, ..)
+            | Self::Linear(x, ..)
+            | Self::Unary(_, x)
+            | Self::Sum(x)
+            | Self::Clip(x, _)
+            | Self::LayerNorm(x, ..)
+            | Self::RmsNorm(x, ..)
+            | Self::CellState(x) => *x = of(x),
+        }
+        self
+    }
 }
 
 /// All expressions.
