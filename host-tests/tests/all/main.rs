@@ -27,4 +27,5 @@ mod recordings;
 mod slices;
 mod smoke;
 mod stats;
+mod surface;
 mod units;
