@@ -108,7 +108,7 @@ fn the_hex_example_reads_as_documented() {
     assert_eq!((op.src(), op.dst(), op.third()), (image.observation(), image.output(), image.work()));
     let matrix = op.matrix().expect("the operation is linear");
     assert_eq!((matrix.rows, matrix.cols, matrix.group, matrix.x_max), (3, 2, 0, 127));
-    assert_eq!(matrix.prepared_words(), image.work().len);
+    assert_eq!(max_prepared_words(matrix.cols, matrix.group), image.work().len);
     let blocks: Vec<_> = matrix.blocks().collect();
     let [rows] = &blocks[..] else { panic!("the matrix has one block") };
     let shape = BlockShape { width: Width::W2, lanes: Lanes::Paired, rows: 3, cols: 2, group: 0 };

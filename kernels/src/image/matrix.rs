@@ -8,8 +8,6 @@ use crate::error::ImageError;
 #[cfg(feature = "writer")]
 use crate::layout::half::{bf16, half_word};
 use crate::layout::{Block, BlockShape, Lanes, Width, is_group};
-#[cfg(feature = "writer")]
-use crate::x::max_prepared_words;
 
 /// The record of a matrix.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -167,12 +165,6 @@ impl<'a> Matrix<'a> {
     /// Returns the lanes of the matrix's blocks.
     pub const fn lanes(&self) -> Lanes {
         Lanes::of(self.x_max, self.group)
-    }
-
-    /// Returns the most words that the prepared activations take.
-    #[cfg(feature = "writer")]
-    pub fn prepared_words(&self) -> usize {
-        max_prepared_words(self.cols, self.group)
     }
 
     /// Iterates over the blocks in the order of the image.
