@@ -5,28 +5,18 @@ use actq_cli::report::imported::summary;
 use actq_onnx::Choice;
 use anyhow::{Context as _, Result, ensure};
 
-use super::file::{File, Value};
-use super::styles::{OBS, begun};
+use super::file::File;
+use super::styles::begun;
 use super::{drawn, imported};
 
 const LEN: usize = 4;
 
-/// A layer, the nodes of `end` after it, and the action of this shape.
-fn file(shape: &[i64], end: impl Fn(&mut File, &str) -> String) -> File {
+/// The action of this shape, which the text computes from the output `x` of a layer.
+fn file(shape: &[i64], text: &str) -> File {
     let mut file = begun();
-    let x = file.gemm("obs", LEN, OBS);
-    let y = end(&mut file, &x);
-    file.nodes("Identity", &[&y], &["actions"], &[]);
+    file.write(&[], &format!("x = gemm(obs, 4, 11)\n{text}"));
     file.output("actions", shape);
     file
-}
-
-/// `scale op(x) + offset`
-fn scaled(file: &mut File, op: &str, x: &str, [scale, offset]: [f32; 2]) -> String {
-    let [scale, offset] = [scale, offset].map(|v| file.reals(&[], &[v]));
-    let x = file.node(op, &[x], &[]);
-    let x = file.node("Mul", &[&x, &scale], &[]);
-    file.node("Add", &[&x, &offset], &[])
 }
 
 /// Imports the file, requires that its limits contain all actions and that actions come close to them, and returns
@@ -69,9 +59,9 @@ fn bounds_of_the_last_operation_become_limits() -> Result<()> {
         ("Sigmoid", [-0.3, -0.1], [-0.3 - 0.1, -0.1]),
         ("Tanh", [1e-3, 1e3], [1e3 - 1e-3, 1e3 + 1e-3]),
     ];
-    for (op, by, expected) in ends {
-        let found = limits(&file(&[1, LEN as i64], |file, x| scaled(file, op, x, by)))?;
-        assert_eq!(found, [Some(expected); LEN], "{op} {by:?}");
+    for (op, [scale, offset], expected) in ends {
+        let text = format!("actions := {op}(x) * {scale:?} + {offset:?}");
+        assert_eq!(limits(&file(&[1, LEN as i64], &text))?, [Some(expected); LEN], "{text}");
     }
     Ok(())
 }
@@ -79,10 +69,7 @@ fn bounds_of_the_last_operation_become_limits() -> Result<()> {
 #[test]
 fn limits_of_several_ends_and_chunks_combine() -> Result<()> {
     // A hand's pose and its grip: the factors stay in the network, so the limits include its rounding.
-    let both = file(&[1, 2 * LEN as i64], |file, x| {
-        let (pose, grip) = (scaled(file, "Tanh", x, [1.7, 0.3]), file.node("Sigmoid", &[x], &[]));
-        file.node("Concat", &[&pose, &grip], &[("axis", Value::Int(1))])
-    });
+    let both = file(&[1, 2 * LEN as i64], "actions := Concat(Tanh(x) * 1.7 + 0.3, Sigmoid(x), axis=1)");
     let found = limits(&both)?;
     assert_eq!(found[LEN..], [Some([0.0, 1.0]); LEN]);
     for limits in &found[..LEN] {
@@ -90,12 +77,8 @@ fn limits_of_several_ends_and_chunks_combine() -> Result<()> {
         assert!((-1.400_01..=-1.4).contains(&low) && (2.0..2.000_01).contains(&high), "{low}:{high}");
     }
     // The two actions have different factors, but share their limits.
-    let chunk = file(&[1, 2, LEN as i64 / 2], |file, x| {
-        let (factors, shape) = (file.reals(&[2, 1], &[1.0, 3.0]), file.ints(&[2, LEN as i64 / 2]));
-        let x = file.node("Tanh", &[x], &[]);
-        let x = file.node("Reshape", &[&x, &shape], &[]);
-        file.node("Mul", &[&x, &factors], &[])
-    });
+    let factors = "Reshape([1.0, 3.0], [2, 1])";
+    let chunk = file(&[1, 2, LEN as i64 / 2], &format!("actions := Reshape(Tanh(x), [2, 2]) * {factors}"));
     for limits in limits(&chunk)? {
         let [low, high] = limits.context("the chunk is bounded")?;
         assert!((-3.000_01..=-3.0).contains(&low) && (3.0..3.000_01).contains(&high), "{low}:{high}");
@@ -105,17 +88,11 @@ fn limits_of_several_ends_and_chunks_combine() -> Result<()> {
 
 #[test]
 fn clip_keeps_limits_and_layers_have_none() -> Result<()> {
-    let clipped = |file: &mut File, x: &str| {
-        let [low, high] = [-0.5, 0.25].map(|v| file.reals(&[], &[v]));
-        file.node("Clip", &[x, &low, &high], &[])
-    };
-    assert_eq!(limits(&file(&[1, LEN as i64], clipped))?, [Some([-0.5, 0.25]); LEN]);
-    assert_eq!(limits(&file(&[1, LEN as i64], |_, x| x.to_owned()))?, [None; LEN]);
+    let row = [1, LEN as i64];
+    assert_eq!(limits(&file(&row, "actions := Clip(x, -0.5, 0.25)"))?, [Some([-0.5, 0.25]); LEN]);
+    assert_eq!(limits(&file(&row, "actions := Identity(x)"))?, [None; LEN]);
     // A constant action has limits equal to its value.
-    let held = file(&[1, LEN as i64 + 1], |file, x| {
-        let held = file.reals(&[1, 1], &[0.7]);
-        file.node("Concat", &[x, &held], &[("axis", Value::Int(1))])
-    });
+    let held = file(&[1, LEN as i64 + 1], "actions := Concat(x, full(0.7, 1, 1), axis=1)");
     let found = limits(&held)?;
     assert_eq!((found[..LEN].to_vec(), found[LEN]), (vec![None; LEN], Some([0.7; 2])));
     Ok(())

@@ -28,10 +28,7 @@ fn folder() -> Result<TempDir> {
     let dir = TempDir::new()?;
     let mut file = File::default();
     file.input("obs", &[1, OBS as i64]);
-    let x = file.gemm("obs", 24, OBS);
-    let x = file.node("Tanh", &[&x], &[]);
-    let y = file.gemm(&x, 2, 24);
-    file.nodes("Identity", &[&y], &["actions"], &[]);
+    file.write(&[], "actions := Identity(gemm(Tanh(gemm(obs, 24, 6)), 2, 24))");
     file.output("actions", &[1, 2]);
     fs::write(dir.path().join("model.onnx"), file.bytes())?;
     let obs = Array2::from_shape_fn((300, OBS), |(i, k)| ((7 * i + 3 * k) as f64 / 11.0).sin());
@@ -107,15 +104,13 @@ fn python_with(modules: &str) -> Option<OsString> {
     None
 }
 
-/// Runs `actq import --check` on a file with the observation `obs` and one layer, whose values are `x`, before the last
-/// one.
-fn checked(python: impl AsRef<OsStr>, layer: impl FnOnce(&mut File) -> String) -> Result<Output> {
+/// Runs `actq import --check` on a file with these initializers, the observation `obs`, and one layer of 20 values before the last one.
+fn checked(python: impl AsRef<OsStr>, initializers: &[proto::Tensor], layer: &str) -> Result<Output> {
     let dir = TempDir::new()?;
     let mut file = File::default();
     file.input("obs", &[1, OBS as i64]);
-    let x = layer(&mut file);
-    let y = file.gemm(&x, 2, 20);
-    file.nodes("Identity", &[&y], &["actions"], &[]);
+    initializers.iter().for_each(|tensor| file.initializer(tensor));
+    file.write(&[], &format!("actions := Identity(gemm({layer}, 2, 20))"));
     file.output("actions", &[1, 2]);
     let [model, out] = ["model.onnx", "policy"].map(|name| dir.path().join(name));
     fs::write(&model, file.bytes())?;
@@ -125,7 +120,7 @@ fn checked(python: impl AsRef<OsStr>, layer: impl FnOnce(&mut File) -> String) -
 
 #[test]
 fn check_needs_a_python() -> Result<()> {
-    let output = checked("no-such-python", |file| file.gemm("obs", 20, OBS))?;
+    let output = checked("no-such-python", &[], "gemm(obs, 20, 6)")?;
     failed(&output, 1, &["cannot run the file with onnxruntime for --check; set ACTQ_PYTHON"])
 }
 
@@ -133,23 +128,13 @@ fn check_needs_a_python() -> Result<()> {
 fn check_finds_dequantized_weights_equal() -> Result<()> {
     let Some(python) = python_with("numpy, onnx, onnxruntime") else { return Ok(()) };
     // onnxruntime's optimizer would quantize the observations, too.
-    let output = checked(python, |file| {
-        let codes: Vec<u8> = (0..20 * OBS).map(|i| (37 * i % 255) as u8).collect();
-        file.initializer(&proto::Tensor {
-            data_type: Some(3),
-            raw_data: Some(codes.into()),
-            ..tensor("q", &[OBS, 20], &[])
-        });
-        file.initializer(&proto::Tensor {
-            data_type: Some(3),
-            raw_data: Some(vec![0].into()),
-            ..tensor("z", &[], &[])
-        });
-        let scale = file.reals(&[], &[0.01]);
-        let w = file.node("DequantizeLinear", &["q", &scale, "z"], &[]);
-        let x = file.node("MatMul", &["obs", &w], &[]);
-        file.node("Tanh", &[&x], &[])
-    })?;
+    let codes: Vec<u8> = (0..20 * OBS).map(|i| (37 * i % 255) as u8).collect();
+    let [codes, zero] = [("q", &[OBS, 20][..], codes), ("z", &[], vec![0])].map(|(name, dims, codes)| proto::Tensor {
+        data_type: Some(3),
+        raw_data: Some(codes.into()),
+        ..tensor(name, dims, &[])
+    });
+    let output = checked(python, &[codes, zero], "Tanh(MatMul(obs, DequantizeLinear(q, 0.01, z)))")?;
     let printed = succeeded(&output)?;
     ensure!(printed.contains("checked   256 observations against onnxruntime: off by"), "{printed}");
     Ok(())
@@ -159,13 +144,7 @@ fn check_finds_dequantized_weights_equal() -> Result<()> {
 fn check_trusts_float64_over_onnxruntime() -> Result<()> {
     let Some(python) = python_with("numpy, onnx, onnxruntime") else { return Ok(()) };
     // In float32 the sigmoid is 0, and its logarithm infinite.
-    let output = checked(python, |file| {
-        let steep = file.reals(&[], &[100.0]);
-        let x = file.gemm("obs", 20, OBS);
-        let x = file.node("Mul", &[&x, &steep], &[]);
-        let x = file.node("Sigmoid", &[&x], &[]);
-        file.node("Log", &[&x], &[])
-    })?;
+    let output = checked(python, &[], "Log(Sigmoid(gemm(obs, 20, 6) * 100.0))")?;
     let printed = succeeded(&output)?;
     ensure!(printed.contains("checked   256 observations against the file in float64: off by"), "{printed}");
     ensure!(printed.contains("by its float32 arithmetic"), "{printed}");

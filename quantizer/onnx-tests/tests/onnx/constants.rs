@@ -4,9 +4,9 @@ use actq::measure::actions::actions;
 use actq_onnx::{Choice, proto};
 use anyhow::Result;
 
-use super::file::{File, Value, tensor};
+use super::file::tensor;
 use super::styles::{OBS, begun};
-use super::{compare, drawn, imported};
+use super::{compare, drawn, imported, refused};
 
 /// A tensor of these integers, of ONNX's type `kind`.
 fn integers(name: &str, kind: i32, dims: &[usize], values: &[i64]) -> proto::Tensor {
@@ -15,19 +15,16 @@ fn integers(name: &str, kind: i32, dims: &[usize], values: &[i64]) -> proto::Ten
     proto::Tensor { raw_data: None, data_type: Some(kind), int32_data, int64_data, ..tensor(name, dims, &[]) }
 }
 
-/// Requires that the constant computed by `write` equals this one.
-fn is(expected: [f32; 3], write: impl FnOnce(&mut File) -> String) -> Result<()> {
-    let network = |constant: &mut dyn FnMut(&mut File) -> String| {
+/// Requires that a constant, in a file with these initializers, equals this one.
+fn is(expected: &str, constant: &str, initializers: &[proto::Tensor]) -> Result<()> {
+    let network = |constant: &str| {
         let mut file = begun();
-        let y = file.gemm("obs", 3, OBS);
-        let c = constant(&mut file);
-        file.nodes("Add", &[&y, &c], &["actions"], &[]);
+        initializers.iter().for_each(|tensor| file.initializer(tensor));
+        file.write(&[], &format!("actions := gemm(obs, 3, 11) + {constant}"));
         file.output("actions", &[1, 3]);
         imported(&file.bytes(), &Choice::default())
     };
-    let mut write = Some(write);
-    let (_, ours) = network(&mut |file| write.take().map(|write| write(file)).unwrap_or_default())?;
-    let (_, plain) = network(&mut |file| file.reals(&[3], &expected))?;
+    let ((_, ours), (_, plain)) = (network(constant)?, network(expected)?);
     let observations = drawn(&ours);
     compare(&actions(&plain, &observations), &actions(&ours, &observations))
 }
@@ -35,55 +32,30 @@ fn is(expected: [f32; 3], write: impl FnOnce(&mut File) -> String) -> Result<()>
 #[test]
 fn casts_to_fewer_digits_round() -> Result<()> {
     // float16 has 11 digits, bfloat16 8.
-    for (to, expected) in [(10, [0.300_048_83, 1000.5, -7.0]), (16, [0.300_781_25, 1000.0, -7.0])] {
-        is(expected, |file| {
-            let x = file.reals(&[3], &[0.3, 1000.4, -7.0]);
-            let x = file.node("Cast", &[&x], &[("to", Value::Int(to))]);
-            file.node("Cast", &[&x], &[("to", Value::Int(1))])
-        })?;
-    }
-    Ok(())
+    is("[0.30004883, 1000.5, -7.0]", "Cast(Cast([0.3, 1000.4, -7.0], to=10), to=1)", &[])?;
+    is("[0.30078125, 1000.0, -7.0]", "Cast(Cast([0.3, 1000.4, -7.0], to=16), to=1)", &[])
 }
 
 #[test]
 fn remainders_have_the_sign_of_onnx() -> Result<()> {
-    let whole = |fmod: i64| {
-        move |file: &mut File| {
-            let (x, y) = (file.ints(&[-7, 7, 6]), file.ints(&[3, -3, 3]));
-            let rest = file.node("Mod", &[&x, &y], &[("fmod", Value::Int(fmod))]);
-            file.node("Cast", &[&rest], &[("to", Value::Int(1))])
-        }
-    };
-    is([2.0, -2.0, 0.0], whole(0))?;
-    is([-1.0, 1.0, 0.0], whole(1))?;
-    is([-1.5, 1.5, 0.5], |file| {
-        let (x, y) = (file.reals(&[3], &[-3.5, 3.5, 2.5]), file.reals(&[3], &[2.0, -2.0, 2.0]));
-        file.node("Mod", &[&x, &y], &[("fmod", Value::Int(1))])
-    })
+    is("[2.0, -2.0, 0.0]", "Cast(Mod([-7, 7, 6], [3, -3, 3], fmod=0), to=1)", &[])?;
+    is("[-1.0, 1.0, 0.0]", "Cast(Mod([-7, 7, 6], [3, -3, 3], fmod=1), to=1)", &[])?;
+    is("[-1.5, 1.5, 0.5]", "Mod([-3.5, 3.5, 2.5], [2.0, -2.0, 2.0], fmod=1)", &[])
 }
 
 #[test]
 fn quantized_weights_are_read_as_their_values() -> Result<()> {
-    is([0.5, -0.25, 1.0], |file| {
-        file.initializer(&integers("q", 3, &[3], &[4, 1, 6]));
-        file.initializer(&integers("zero", 3, &[], &[2]));
-        let scale = file.reals(&[], &[0.25]);
-        file.node("DequantizeLinear", &["q", &scale, "zero"], &[])
-    })?;
+    let zero = |number| integers("zero", 3, &[], &[number]);
+    let codes = [integers("q", 3, &[3], &[4, 1, 6]), zero(2)];
+    is("[0.5, -0.25, 1.0]", "DequantizeLinear(q, 0.25, zero)", &codes)?;
     // A scale for each index of an axis, without zero points.
-    is([0.5, 3.0, -1.0], |file| {
-        file.initializer(&integers("q", 3, &[1, 3], &[1, 2, -4]));
-        let scales = file.reals(&[3], &[0.5, 1.5, 0.25]);
-        file.node("DequantizeLinear", &["q", &scales], &[("axis", Value::Int(1))])
-    })?;
+    let codes = [integers("q", 3, &[1, 3], &[1, 2, -4])];
+    is("[0.5, 3.0, -1.0]", "DequantizeLinear(q, [0.5, 1.5, 0.25], axis=1)", &codes)?;
     // Values quantized at run time are not weights.
     let mut file = begun();
-    let (scale, zero) = (file.reals(&[], &[0.1]), integers("zero", 3, &[], &[0]));
-    file.initializer(&zero);
-    let x = file.node("QuantizeLinear", &["obs", &scale, "zero"], &[]);
-    file.nodes("DequantizeLinear", &[&x, &scale, "zero"], &["actions"], &[]);
+    file.initializer(&zero(0));
+    file.write(&[], "scale = 0.1\nactions := DequantizeLinear(QuantizeLinear(obs, scale, zero), scale, zero)");
     file.output("actions", &[1, OBS as i64]);
-    let error = imported(&file.bytes(), &Choice::default()).expect_err("quantized");
-    assert!(format!("{error:#}").contains("(QuantizeLinear): the file is already quantized"), "{error:#}");
+    refused(&file.bytes(), "(QuantizeLinear): the file is already quantized");
     Ok(())
 }

@@ -18,7 +18,7 @@ pub(super) enum Value {
     Int(i64),
     Ints(Vec<i64>),
     Real(f32),
-    Text(&'static str),
+    Text(String),
 }
 
 pub(super) fn tensor(name: &str, dims: &[usize], data: &[f32]) -> proto::Tensor {
@@ -102,9 +102,14 @@ impl File {
 
     /// Adds a node with one output, and returns the output's name.
     pub(super) fn node(&mut self, op: &str, inputs: &[&str], attributes: &[(&str, Value)]) -> String {
-        let name = format!("{}_{}", op.to_lowercase(), self.graph.node.len());
+        let name = self.fresh(op);
         self.nodes(op, inputs, &[&name], attributes);
         name
+    }
+
+    /// Returns a new name for the output of the next node.
+    pub(super) fn fresh(&self, op: &str) -> String {
+        format!("{}_{}", op.to_lowercase(), self.graph.node.len())
     }
 
     /// Adds a node with these outputs.

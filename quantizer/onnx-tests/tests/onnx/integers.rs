@@ -4,9 +4,9 @@ use actq::measure::actions::actions;
 use actq_onnx::Choice;
 use anyhow::Result;
 
-use super::file::{File, Value};
+use super::file::File;
 use super::styles::ended;
-use super::{by_tract, compare, drawn, imported};
+use super::{by_tract, compare, drawn, imported, refused};
 
 /// A denoiser whose time step is an integer or a float in the file.
 fn denoiser(integers: bool) -> Vec<u8> {
@@ -17,13 +17,11 @@ fn denoiser(integers: bool) -> Vec<u8> {
     } else {
         file.input("time", &[1]);
     }
-    let axes = file.ints(&[1]);
-    let time = file.node("Unsqueeze", &["time", &axes], &[]);
-    let time = file.node("Cast", &[&time], &[("to", Value::Int(1))]);
-    let frequencies = file.drawn(&[1, 4]);
-    let angles = file.node("Mul", &[&time, &frequencies], &[]);
-    let (sin, cos) = (file.node("Sin", &[&angles], &[]), file.node("Cos", &[&angles], &[]));
-    let x = file.node("Concat", &["sample", &sin, &cos], &[("axis", Value::Int(1))]);
+    let x = file.write(
+        &[],
+        "angles = Cast(Unsqueeze(time, [1]), to=1) * drawn(1, 4)
+         Concat(sample, Sin(angles), Cos(angles), axis=1)",
+    );
     ended(file, &x, 14)
 }
 
@@ -39,23 +37,14 @@ fn a_cast_time_step_is_a_float() -> Result<()> {
 
 #[test]
 fn integer_computations_are_refused() {
-    let refused = |build: fn(&mut File) -> String, expected: &str| {
+    for (text, expected) in [
+        ("Cast(Div(time, [2]), to=1)", "computed with the integers of the input \"time\""),
+        ("time", "computed with the integers of the input \"time\""),
+        ("Cast(time, to=10)", "rounds a value of the network to float16"),
+    ] {
         let mut file = File::default();
         file.integers("time", &[1, 4]);
-        let x = build(&mut file);
-        let error = imported(&ended(file, &x, 4), &Choice::default()).expect_err(expected);
-        let error = format!("{error:#}");
-        assert!(error.contains(expected), "{error} instead of {expected}");
-    };
-    let computed = "computed with the integers of the input \"time\"";
-    refused(
-        |file| {
-            let two = file.ints(&[2]);
-            let x = file.node("Div", &["time", &two], &[]);
-            file.node("Cast", &[&x], &[("to", Value::Int(1))])
-        },
-        computed,
-    );
-    refused(|_| "time".to_owned(), computed);
-    refused(|file| file.node("Cast", &["time"], &[("to", Value::Int(10))]), "rounds a value of the network to float16");
+        let x = file.write(&[], text);
+        refused(&ended(file, &x, 4), expected);
+    }
 }

@@ -9,6 +9,7 @@ mod exporters;
 mod file;
 mod integers;
 mod norms;
+mod notation;
 mod pools;
 mod rows;
 mod styles;
@@ -99,6 +100,12 @@ fn same(bytes: &[u8]) -> Result<Imported> {
     let observations = drawn(&policy);
     compare(&by_tract(bytes, &imported, &observations)?, &actions(&policy, &observations))?;
     Ok(imported)
+}
+
+/// Requires that the import refuses the file with a message that contains these words.
+fn refused(bytes: &[u8], expected: &str) {
+    let error = format!("{:#}", imported(bytes, &Choice::default()).expect_err(expected));
+    assert!(error.contains(expected), "{error} instead of {expected}");
 }
 
 fn compare(expected: &[Vec<f32>], ours: &[Vec<f32>]) -> Result<()> {

@@ -2,65 +2,39 @@
 
 use anyhow::{Context as _, Result};
 
-use super::file::{File, Value};
-use super::rows::{NORMS, Norm};
+use super::file::File;
+use super::rows::{NORMS, norm};
 use super::styles::{ACTIVATIONS, ended, ops};
 
 /// Values of the observation, and of the norm's input.
 const LEN: usize = 12;
 
 /// Nodes after a norm: none, factors, factors and offsets.
-const AFFINES: [&[&str]; 3] = [&[], &["Mul"], &["Mul", "Add"]];
+const AFFINES: [&str; 3] = ["x", "x * drawn(12)", "x * drawn(12) + drawn(12)"];
 
-/// Builds the values of a norm.
-type Front = fn(&mut File) -> String;
-
-fn begun() -> File {
+/// Returns the ops of a norm after `front`, and of the nodes of `texts` after it, before a layer.
+fn found(front: &str, written: &str, texts: &[&str]) -> Result<String> {
     let mut file = File::default();
     file.input("obs", &[1, LEN as i64]);
-    file
+    let x = file.write(&[], front);
+    let x = norm(&mut file, written, &x, LEN);
+    let x = texts.iter().fold(x, |x, text| file.write(&[&x], text));
+    ops(&ended(file, &x, LEN)).with_context(|| format!("{front:?}, {written:?}, {texts:?}"))
 }
 
-fn layer(file: &mut File) -> String {
-    file.gemm("obs", LEN, LEN)
-}
-
-/// A layer and a function of it.
-fn function(file: &mut File, op: &str, attributes: &[(&str, Value)]) -> String {
-    let x = layer(file);
-    file.node(op, &[&x], attributes)
-}
-
-fn halves(file: &mut File, x: &str) -> [&'static str; 2] {
-    let lens = file.ints(&[6, 6]);
-    file.nodes("Split", &[x, &lens], &["first", "second"], &[("axis", Value::Int(1))]);
-    ["first", "second"]
-}
-
-/// A norm with its factors and offsets, and the resulting ops.
-fn normed(file: &mut File, (name, written): (&str, Norm), x: &str, affine: &[&str]) -> (String, String) {
-    let y = written(file, x, LEN);
-    let y = affine.iter().fold(y, |y, op| {
-        let w = file.drawn(&[LEN]);
-        file.node(op, &[&y, &w], &[])
-    });
-    // An rmsnorm has no bias.
-    let offset = if name == "rmsnorm" && affine.contains(&"Add") { " normalize" } else { "" };
-    (y, format!("{name}{offset}"))
+/// The op of the offsets after a norm: an rmsnorm has no bias.
+fn offset(name: &str, affine: &str) -> &'static str {
+    if name == "rmsnorm" && affine == AFFINES[2] { " normalize" } else { "" }
 }
 
 #[test]
 fn activations_after_norms_are_one_op() -> Result<()> {
-    for (i, norm) in NORMS.into_iter().enumerate() {
+    for (name, written) in NORMS {
         for affine in AFFINES {
-            for (k, (activation, written)) in ACTIVATIONS.into_iter().enumerate() {
-                let mut file = begun();
-                let x = layer(&mut file);
-                let (x, norm) = normed(&mut file, norm, &x, affine);
-                let x = written(&mut file, &x);
-                let case = format!("norm {i} {affine:?} activation {k}");
-                let found = ops(&ended(file, &x, LEN)).with_context(|| case.clone())?;
-                assert_eq!(found, format!("linear {norm} {activation} linear"), "{case}");
+            for (activation, text) in ACTIVATIONS {
+                let found = found("gemm(obs, 12, 12)", written, &[affine, text])?;
+                let offset = offset(name, affine);
+                assert_eq!(found, format!("linear {name}{offset} {activation} linear"), "{written} {affine} {text}");
             }
         }
     }
@@ -68,82 +42,43 @@ fn activations_after_norms_are_one_op() -> Result<()> {
 }
 
 /// The ops before the norm, and the nodes.
-const FRONTS: [(&str, Front); 15] = [
-    ("", |_| "obs".to_owned()),
-    ("linear ", layer),
-    ("linear tanh ", |file| function(file, "Tanh", &[])),
-    ("linear relu normalize add ", |file| function(file, "LeakyRelu", &[("alpha", Value::Real(0.1))])),
-    ("linear elu relu normalize add ", |file| function(file, "Selu", &[])),
+const FRONTS: [(&str, &str); 15] = [
+    ("", "obs"),
+    ("linear ", "gemm(obs, 12, 12)"),
+    ("linear tanh ", "Tanh(gemm(obs, 12, 12))"),
+    ("linear relu normalize add ", "LeakyRelu(gemm(obs, 12, 12), alpha=0.1)"),
+    ("linear elu relu normalize add ", "Selu(gemm(obs, 12, 12))"),
     // Celu in its parts: tract's own loses the last factor.
-    ("linear elu ", |file| {
-        let (x, alpha) = (layer(file), file.reals(&[], &[0.7]));
-        let x = file.node("Div", &[&x, &alpha], &[]);
-        let x = file.node("Elu", &[&x], &[]);
-        file.node("Mul", &[&x, &alpha], &[])
-    }),
-    ("normalize ", |file| {
-        let factors = file.drawn(&[LEN]);
-        file.node("Mul", &["obs", &factors], &[])
-    }),
-    ("normalize ", |file| {
-        let [low, high] = [-0.5, 0.5].map(|v| file.reals(&[], &[v]));
-        file.node("Clip", &["obs", &low, &high], &[])
-    }),
-    ("linear tanh ", |file| {
-        let (x, three) = (function(file, "Tanh", &[]), file.reals(&[], &[3.0]));
-        file.node("Mul", &[&x, &three], &[])
-    }),
-    ("linear tanh ", |file| {
-        let x = function(file, "Tanh", &[]);
-        file.node("Neg", &[&x], &[])
-    }),
-    ("linear relu normalize normalize add ", |file| {
-        let (x, slopes) = (layer(file), file.drawn(&[LEN]));
-        file.node("PRelu", &[&x, &slopes], &[])
-    }),
+    ("linear elu ", "Elu(gemm(obs, 12, 12) / 0.7) * 0.7"),
+    ("normalize ", "obs * drawn(12)"),
+    ("normalize ", "Clip(obs, -0.5, 0.5)"),
+    ("linear tanh ", "Tanh(gemm(obs, 12, 12)) * 3.0"),
+    ("linear tanh ", "Neg(Tanh(gemm(obs, 12, 12)))"),
+    ("linear relu normalize normalize add ", "PRelu(gemm(obs, 12, 12), drawn(12))"),
     // Halves in the other order.
-    ("linear tanh ", |file| {
-        let x = function(file, "Tanh", &[]);
-        let [first, second] = halves(file, &x);
-        file.node("Concat", &[second, first], &[("axis", Value::Int(1))])
-    }),
-    ("linear tanh linear add ", |file| {
-        let x = function(file, "Tanh", &[]);
-        let y = file.gemm(&x, LEN, LEN);
-        file.node("Add", &[&x, &y], &[])
-    }),
+    (
+        "linear tanh ",
+        "first, second := Split(Tanh(gemm(obs, 12, 12)), [6, 6], axis=1)
+         Concat(second, first, axis=1)",
+    ),
+    (
+        "linear tanh linear add ",
+        "x = Tanh(gemm(obs, 12, 12))
+         x + gemm(x, 12, 12)",
+    ),
     // Of three positions with four channels each, in sequence.
-    ("linear linear linear tanh ", |file| {
-        let (apart, w) = (file.ints(&[1, 3, 4]), file.drawn(&[4, 3, 2]));
-        let x = file.node("Reshape", &["obs", &apart], &[]);
-        let x = file.node("Conv", &[&x, &w], &[]);
-        let x = file.node("Tanh", &[&x], &[]);
-        file.node("Flatten", &[&x], &[])
-    }),
+    ("linear linear linear tanh ", "Flatten(Tanh(Conv(Reshape(obs, [1, 3, 4]), drawn(4, 3, 2))))"),
     // A norm of another norm, with a factor.
-    ("layernorm ", |file| {
-        let (w, b, three) = (file.drawn(&[LEN]), file.drawn(&[LEN]), file.reals(&[], &[3.0]));
-        let x = file.node("LayerNormalization", &["obs", &w, &b], &[("axis", Value::Int(-1))]);
-        file.node("Mul", &[&x, &three], &[])
-    }),
+    ("layernorm ", "LayerNormalization(obs, drawn(12), drawn(12), axis=-1) * 3.0"),
 ];
-
-/// Returns the ops of a norm after a front, before a tanh and a layer.
-fn found(front: Front, norm: (&str, Norm)) -> Result<String> {
-    let mut file = begun();
-    let x = front(&mut file);
-    let (x, _) = normed(&mut file, norm, &x, &["Mul", "Add"]);
-    let x = file.node("Tanh", &[&x], &[]);
-    ops(&ended(file, &x, LEN))
-}
 
 #[test]
 fn norms_after_any_values_are_one_op() -> Result<()> {
-    for (k, (before, front)) in FRONTS.into_iter().enumerate() {
-        for (i, norm) in NORMS.into_iter().enumerate() {
-            let found = found(front, norm).with_context(|| format!("front {k} norm {i}"))?;
-            let offset = if norm.0 == "rmsnorm" { " normalize" } else { "" };
-            assert_eq!(found, format!("{before}{}{offset} tanh linear", norm.0), "front {k} norm {i}");
+    for (before, front) in FRONTS {
+        for (name, written) in NORMS {
+            let found = found(front, written, &[AFFINES[2], "Tanh(x)"])?;
+            let offset = offset(name, AFFINES[2]);
+            assert_eq!(found, format!("{before}{name}{offset} tanh linear"), "{front} {written}");
         }
     }
     Ok(())
@@ -151,24 +86,18 @@ fn norms_after_any_values_are_one_op() -> Result<()> {
 
 #[test]
 fn constants_in_vectors_hide_no_norm() -> Result<()> {
-    fn masked(file: &mut File) -> String {
-        let mask: Vec<f32> = (0..LEN).map(|i| f32::from(u8::from(i % 4 > 0))).collect();
-        let mask = file.reals(&[LEN], &mask);
-        file.node("Mul", &["obs", &mask], &[])
-    }
-    fn beside_constants(file: &mut File) -> String {
-        let (x, constants) = (function(file, "Tanh", &[]), file.drawn(&[1, 6]));
-        let [_, second] = halves(file, &x);
-        file.node("Concat", &[&constants, second], &[("axis", Value::Int(1))])
-    }
-    for (i, norm) in NORMS.into_iter().enumerate() {
+    let masked = "obs * [0.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0]";
+    let beside_constants = "first, second := Split(Tanh(gemm(obs, 12, 12)), [6, 6], axis=1)
+                            Concat(drawn(1, 6), second, axis=1)";
+    for (name, written) in NORMS {
         // Zeros do not count in a mean of squares, but they do in a mean.
-        let expected = if norm.0 == "rmsnorm" { "rmsnorm normalize" } else { "linear layernorm" };
-        let ops = found(masked, norm).with_context(|| format!("masked, norm {i}"))?;
-        assert_eq!(ops, format!("{expected} tanh linear"), "masked, norm {i}");
-        let expected = if norm.0 == "rmsnorm" { "rmsnorm normalize" } else { "layernorm" };
-        let ops = found(beside_constants, norm).with_context(|| format!("beside constants, norm {i}"))?;
-        assert_eq!(ops, format!("linear tanh linear {expected} tanh linear"), "beside constants, norm {i}");
+        let is_rms = name == "rmsnorm";
+        let expected = if is_rms { "rmsnorm normalize" } else { "linear layernorm" };
+        let ops = found(masked, written, &[AFFINES[2], "Tanh(x)"])?;
+        assert_eq!(ops, format!("{expected} tanh linear"), "masked, {written}");
+        let expected = if is_rms { "rmsnorm normalize" } else { "layernorm" };
+        let ops = found(beside_constants, written, &[AFFINES[2], "Tanh(x)"])?;
+        assert_eq!(ops, format!("linear tanh linear {expected} tanh linear"), "beside constants, {written}");
     }
     Ok(())
 }

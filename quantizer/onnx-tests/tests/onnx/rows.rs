@@ -2,90 +2,52 @@
 
 use anyhow::{Context as _, Result};
 
-use super::file::{File, Value};
+use super::file::File;
 use super::same;
-use super::styles::{OBS, begun, ended, ops};
+use super::styles::{OBS, begun, between, ended, ops};
 
-/// A norm of the last axis of a value, which has this many elements.
-pub(super) type Norm = fn(&mut File, &str, usize) -> String;
-
-fn mean(file: &mut File, x: &str) -> String {
-    file.node("ReduceMean", &[x], &[("axes", Value::Ints(vec![-1])), ("keepdims", Value::Int(1))])
-}
-
-fn root(file: &mut File, square: &str) -> String {
-    let eps = file.reals(&[], &[1e-5]);
-    let sum = file.node("Add", &[square, &eps], &[]);
-    file.node("Sqrt", &[&sum], &[])
-}
-
-/// The op of each, and the nodes that exporters make of it.
-pub(super) const NORMS: [(&str, Norm); 6] = [
-    ("layernorm", |file, x, n| {
-        // The first weight is 0, as after pruning.
-        let weight: Vec<f32> = (0..n).map(|i| 0.1 * i as f32).collect();
-        let (w, b) = (file.reals(&[n], &weight), file.drawn(&[n]));
-        file.node("LayerNormalization", &[x, &w, &b], &[("axis", Value::Int(-1))])
-    }),
+/// The op of each, and the nodes that exporters make of it: a norm of the last axis of `x`, with `weights` that rise from 0, as after
+/// pruning, and `drawn(n)` for a value of `n` elements.
+pub(super) const NORMS: [(&str, &str); 6] = [
+    ("layernorm", "LayerNormalization(x, weights, drawn(n), axis=-1)"),
     // Keras subtracts the mean after the product.
-    ("layernorm", |file, x, n| {
-        let m = mean(file, x);
-        let d = file.node("Sub", &[x, &m], &[]);
-        let s = file.node("Mul", &[&d, &d], &[]);
-        let s = mean(file, &s);
-        let r = root(file, &s);
-        let r = file.node("Reciprocal", &[&r], &[]);
-        let (w, b) = (file.drawn(&[n]), file.drawn(&[n]));
-        let r = file.node("Mul", &[&r, &w], &[]);
-        let (x, m) = (file.node("Mul", &[x, &r], &[]), file.node("Mul", &[&m, &r], &[]));
-        let m = file.node("Sub", &[&b, &m], &[]);
-        file.node("Add", &[&x, &m], &[])
-    }),
-    ("layernorm", |file, x, n| {
-        let (m, two) = (mean(file, x), file.reals(&[], &[2.0]));
-        let d = file.node("Sub", &[x, &m], &[]);
-        let s = file.node("Pow", &[&d, &two], &[]);
-        let s = mean(file, &s);
-        let s = root(file, &s);
-        let y = file.node("Div", &[&d, &s], &[]);
-        let (w, b) = (file.drawn(&[n]), file.drawn(&[n]));
-        let y = file.node("Mul", &[&y, &w], &[]);
-        file.node("Add", &[&y, &b], &[])
-    }),
+    (
+        "layernorm",
+        "m = ReduceMean(x, axes=[-1], keepdims=1)
+         d = x - m
+         r = Reciprocal(Sqrt(ReduceMean(d * d, axes=[-1], keepdims=1) + 1e-5)) * drawn(n)
+         x * r + (drawn(n) - m * r)",
+    ),
+    (
+        "layernorm",
+        "d = x - ReduceMean(x, axes=[-1], keepdims=1)
+         d / Sqrt(ReduceMean(Pow(d, 2.0), axes=[-1], keepdims=1) + 1e-5) * drawn(n) + drawn(n)",
+    ),
     // flax: the variance as mean square less squared mean.
-    ("layernorm", |file, x, _| {
-        let m = mean(file, x);
-        let s = file.node("Mul", &[x, x], &[]);
-        let s = mean(file, &s);
-        let mm = file.node("Mul", &[&m, &m], &[]);
-        let v = file.node("Sub", &[&s, &mm], &[]);
-        let r = root(file, &v);
-        let r = file.node("Reciprocal", &[&r], &[]);
-        let d = file.node("Sub", &[x, &m], &[]);
-        file.node("Mul", &[&d, &r], &[])
-    }),
-    ("rmsnorm", |file, x, _| {
-        let s = file.node("Mul", &[x, x], &[]);
-        let s = mean(file, &s);
-        let r = root(file, &s);
-        file.node("Div", &[x, &r], &[])
-    }),
-    ("rmsnorm", |file, x, _| {
-        let least = file.reals(&[], &[1e-12]);
-        let axes = ("axes", Value::Ints(vec![-1]));
-        let r = file.node("ReduceL2", &[x], &[axes, ("keepdims", Value::Int(1))]);
-        let r = file.node("Clip", &[&r, &least], &[]);
-        file.node("Div", &[x, &r], &[])
-    }),
+    (
+        "layernorm",
+        "m = ReduceMean(x, axes=[-1], keepdims=1)
+         r = Reciprocal(Sqrt(ReduceMean(x * x, axes=[-1], keepdims=1) - m * m + 1e-5))
+         (x - m) * r",
+    ),
+    ("rmsnorm", "x / Sqrt(ReduceMean(x * x, axes=[-1], keepdims=1) + 1e-5)"),
+    ("rmsnorm", "x / Clip(ReduceL2(x, axes=[-1], keepdims=1), 1e-12)"),
 ];
+
+/// Writes one of [`NORMS`] of `x`, which has `len` elements in a row.
+pub(super) fn norm(file: &mut File, written: &str, x: &str, len: usize) -> String {
+    let weights: Vec<String> = (0..len).map(|i| format!("{:.1}", 0.1 * i as f32)).collect();
+    let text = written.replace("drawn(n)", &format!("drawn({len})"));
+    file.write(&[x], &text.replace("weights", &format!("[{}]", weights.join(", "))))
+}
 
 #[test]
 fn norms_from_sums_and_roots_are_found() -> Result<()> {
-    for (i, (name, written)) in NORMS.into_iter().enumerate() {
+    for (name, written) in NORMS {
         let mut file = begun();
         let x = file.gemm("obs", 16, OBS);
-        let x = written(&mut file, &x, 16);
-        let found = ops(&ended(file, &x, 16)).with_context(|| format!("{i} {name}"))?;
+        let x = norm(&mut file, written, &x, 16);
+        let found = ops(&ended(file, &x, 16)).with_context(|| written.to_owned())?;
         assert_eq!(found, format!("linear {name} linear"));
     }
     Ok(())
@@ -93,24 +55,21 @@ fn norms_from_sums_and_roots_are_found() -> Result<()> {
 
 #[test]
 fn norms_of_rows_are_found_by_row() -> Result<()> {
-    for (i, (name, written)) in NORMS.into_iter().enumerate() {
+    for (name, written) in NORMS {
         // Of groups of a layer's values.
         let mut file = begun();
-        let x = file.gemm("obs", 12, OBS);
-        let (rows, joined) = (file.ints(&[1, 3, 4]), file.ints(&[1, 12]));
-        let x = file.node("Reshape", &[&x, &rows], &[]);
-        let x = written(&mut file, &x, 4);
-        let x = file.node("Reshape", &[&x, &joined], &[]);
-        let found = ops(&ended(file, &x, 12)).with_context(|| format!("{i} {name} of groups"))?;
-        assert_eq!(found, format!("linear {name} {name} {name} linear"), "{i}");
+        let x = file.write(&[], "Reshape(gemm(obs, 12, 11), [1, 3, 4])");
+        let x = norm(&mut file, written, &x, 4);
+        let x = file.write(&[&x], "Reshape(x, [1, 12])");
+        let found = ops(&ended(file, &x, 12)).with_context(|| format!("{written} of groups"))?;
+        assert_eq!(found, format!("linear {name} {name} {name} linear"), "{written}");
         // Of the steps of a history.
         let mut file = File::default();
         file.input("history", &[1, 3, 4]);
-        let x = written(&mut file, "history", 4);
-        let joined = file.ints(&[1, 12]);
-        let x = file.node("Reshape", &[&x, &joined], &[]);
-        let found = ops(&ended(file, &x, 12)).with_context(|| format!("{i} {name} of steps"))?;
-        assert_eq!(found, format!("{name} {name} {name} linear"), "{i}");
+        let x = norm(&mut file, written, "history", 4);
+        let x = file.write(&[&x], "Reshape(x, [1, 12])");
+        let found = ops(&ended(file, &x, 12)).with_context(|| format!("{written} of steps"))?;
+        assert_eq!(found, format!("{name} {name} {name} linear"), "{written}");
     }
     Ok(())
 }
@@ -118,52 +77,39 @@ fn norms_of_rows_are_found_by_row() -> Result<()> {
 #[test]
 fn norms_after_factors_are_found() -> Result<()> {
     // Each after a factor for each value, as in SimbaV2's L2 norms.
-    for (i, (name, written)) in NORMS.into_iter().enumerate() {
+    for (name, written) in NORMS {
         let mut file = begun();
-        let factors = file.drawn(&[OBS]);
-        let x = file.node("Mul", &["obs", &factors], &[]);
-        let x = written(&mut file, &x, OBS);
-        let found = ops(&ended(file, &x, OBS)).with_context(|| format!("{i} {name}"))?;
-        assert_eq!(found, format!("normalize {name} linear"), "{i}");
+        let x = file.write(&[], "obs * drawn(11)");
+        let x = norm(&mut file, written, &x, OBS);
+        let found = ops(&ended(file, &x, OBS)).with_context(|| written.to_owned())?;
+        assert_eq!(found, format!("normalize {name} linear"), "{written}");
     }
     Ok(())
 }
 
 #[test]
 fn shared_norms_are_computed_once() -> Result<()> {
-    for (op, expected) in [("LeakyRelu", "relu normalize add"), ("Abs", "relu normalize relu add")] {
-        let mut file = begun();
-        let x = file.gemm("obs", 16, OBS);
-        let (w, b) = (file.drawn(&[16]), file.drawn(&[16]));
-        let x = file.node("LayerNormalization", &[&x, &w, &b], &[("axis", Value::Int(-1))]);
-        let x = file.node(op, &[&x], &[]);
-        assert_eq!(ops(&ended(file, &x, 16))?, format!("linear layernorm {expected} linear"), "{op}");
-    }
-    Ok(())
+    between(&[
+        ("layernorm relu normalize add", "LeakyRelu(LayerNormalization(x, drawn(16), drawn(16), axis=-1))"),
+        ("layernorm relu normalize relu add", "Abs(LayerNormalization(x, drawn(16), drawn(16), axis=-1))"),
+    ])
 }
 
 #[test]
 fn means_over_time_become_sums_of_slices() -> Result<()> {
-    let mut file = File::default();
-    file.input("history", &[1, 3, 8]);
-    let x = file.node("ReduceMean", &["history"], &[("axes", Value::Ints(vec![1])), ("keepdims", Value::Int(0))]);
-    let x = file.node("Tanh", &[&x], &[]);
-    assert_eq!(ops(&ended(file, &x, 8))?, "identity add identity add normalize tanh linear");
+    let history = |dims: &[i64], text: &str, len: usize| {
+        let mut file = File::default();
+        file.input("history", dims);
+        let x = file.write(&[], text);
+        ended(file, &x, len)
+    };
+    let mean = "Tanh(ReduceMean(history, axes=[1], keepdims=0))";
+    assert_eq!(ops(&history(&[1, 3, 8], mean, 8))?, "identity add identity add normalize tanh linear");
     // Fewer rows than elements per row remain products with ones.
-    let mut file = File::default();
-    file.input("history", &[1, 8, 3]);
-    let x = file.node("ReduceMean", &["history"], &[("axes", Value::Ints(vec![1])), ("keepdims", Value::Int(0))]);
-    let x = file.node("Tanh", &[&x], &[]);
-    let found = ops(&ended(file, &x, 3))?;
+    let found = ops(&history(&[1, 8, 3], mean, 3))?;
     assert_eq!(found.matches("linear").count(), 4, "{found}");
     // The second of two means keeps its place among other values.
-    let mut file = File::default();
-    file.input("history", &[1, 3, 8]);
-    let means = [-1, 1].map(|axis| {
-        let axes = [("axes", Value::Ints(vec![axis])), ("keepdims", Value::Int(0))];
-        file.node("ReduceMean", &["history"], &axes)
-    });
-    let x = file.node("Concat", &[&means[0], &means[1]], &[("axis", Value::Int(1))]);
-    same(&ended(file, &x, 11))?;
+    let both = "Concat(ReduceMean(history, axes=[-1], keepdims=0), ReduceMean(history, axes=[1], keepdims=0), axis=1)";
+    same(&history(&[1, 3, 8], both, 11))?;
     Ok(())
 }

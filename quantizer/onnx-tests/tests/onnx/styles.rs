@@ -3,16 +3,17 @@
 use actq::data::{Recording, Sizes};
 use actq_bench::shared_policies;
 use actq_onnx::{Choice, Onnx};
-use anyhow::{Context as _, Result, ensure};
+use anyhow::{Context as _, Result};
 use proptest::prelude::*;
 
-use super::file::{File, Value, encoded, tensor};
-use super::{by_tract, compare, drawn, imported, same};
+use super::file::{File, encoded, tensor};
+use super::{by_tract, compare, drawn, imported, refused, same};
 use actq::import::Importer as _;
 use actq::measure::actions::actions;
 use actq::policy::Policy;
 use actq_onnx::import;
 
+/// Values of the observation, in texts of the notation 11.
 pub(super) const OBS: usize = 11;
 
 pub(super) fn begun() -> File {
@@ -29,218 +30,135 @@ pub(super) fn ended(mut file: File, last: &str, len: usize) -> Vec<u8> {
     file.bytes()
 }
 
+/// Writes a network of the observation, whose last value has `len` elements, and a last layer.
+pub(super) fn network(text: &str, len: usize) -> Vec<u8> {
+    let mut file = begun();
+    let last = file.write(&[], text);
+    ended(file, &last, len)
+}
+
+/// Writes a network of the observation whose outputs are `actions`, of `len` elements.
+pub(super) fn whole(text: &str, len: i64) -> File {
+    let mut file = begun();
+    file.write(&[], text);
+    file.output("actions", &[1, len]);
+    file
+}
+
 pub(super) fn ops(bytes: &[u8]) -> Result<String> {
     Ok(same(bytes)?.ops.join(" "))
+}
+
+/// Returns the ops of a [`network`].
+pub(super) fn found(text: &str, len: usize) -> Result<String> {
+    ops(&network(text, len)).with_context(|| text.to_owned())
+}
+
+/// Requires these ops between two layers for each text, in which `x` is the first layer's output of 16 values.
+pub(super) fn between(cases: &[(&str, &str)]) -> Result<()> {
+    for (expected, text) in cases {
+        let found = found(&format!("x = gemm(obs, 16, 11)\n{text}"), 16)?;
+        assert_eq!(found, format!("linear {expected} linear"), "{text}");
+    }
+    Ok(())
 }
 
 #[test]
 fn normalizers_and_layers_become_native_operations() -> Result<()> {
     // rsl_rl: Sub, Div, Gemm, Elu.
-    let mut file = begun();
-    let (mean, std) = (file.drawn(&[1, OBS]), file.reals(&[1, OBS], &[1.5; OBS]));
-    let x = file.node("Sub", &["obs", &mean], &[]);
-    let x = file.node("Div", &[&x, &std], &[]);
-    let x = file.gemm(&x, 16, OBS);
-    let x = file.node("Elu", &[&x], &[("alpha", Value::Real(1.0))]);
-    assert_eq!(ops(&ended(file, &x, 16))?, "normalize linear elu linear");
+    let ops_of_rsl_rl = found("Elu(gemm((obs - drawn(1, 11)) / full(1.5, 1, 11), 16, 11), alpha=1.0)", 16)?;
+    assert_eq!(ops_of_rsl_rl, "normalize linear elu linear");
     // Brax: weights [in, out], the bias on the left, SiLU in its parts, half of the last layer unused, tanh.
-    let mut file = begun();
-    let (w, b) = (file.drawn(&[OBS, 16]), file.drawn(&[16]));
-    let x = file.node("MatMul", &["obs", &w], &[]);
-    let x = file.node("Add", &[&b, &x], &[]);
-    let gate = file.node("Sigmoid", &[&x], &[]);
-    let x = file.node("Mul", &[&gate, &x], &[]);
-    let x = file.gemm(&x, 8, 16);
-    let parts = file.ints(&[4, 4]);
-    file.nodes("Split", &[&x, &parts], &["loc", "scale"], &[("axis", Value::Int(1))]);
-    file.nodes("Tanh", &["loc"], &["actions"], &[]);
-    file.output("actions", &[1, 4]);
-    assert_eq!(ops(&file.bytes())?, "linear silu linear tanh");
+    let brax = whole(
+        "x = drawn(16) + MatMul(obs, drawn(11, 16))
+         loc, scale := Split(gemm(Sigmoid(x) * x, 8, 16), [4, 4], axis=1)
+         actions := Tanh(loc)",
+        4,
+    );
+    assert_eq!(ops(&brax.bytes())?, "linear silu linear tanh");
     Ok(())
 }
 
 #[test]
 fn final_factors_and_limits_become_the_contract() -> Result<()> {
     // Stable-Baselines3: flatten, tanh, clip; then to the robot's range.
-    let mut file = begun();
-    let x = file.node("Flatten", &["obs"], &[]);
-    let x = file.gemm(&x, 3, OBS);
-    let x = file.node("Tanh", &[&x], &[]);
-    let [low, high, two, half] = [-0.5, 0.5, 2.0, 0.5].map(|v| file.reals(&[], &[v]));
-    let x = file.node("Clip", &[&x, &low, &high], &[]);
-    let x = file.node("Mul", &[&x, &two], &[]);
-    file.nodes("Add", &[&x, &half], &["actions"], &[]);
-    file.output("actions", &[1, 3]);
-    let imported = same(&file.bytes())?;
+    let text = "actions := Clip(Tanh(gemm(Flatten(obs), 3, 11)), -0.5, 0.5) * 2.0 + 0.5";
+    let imported = same(&whole(text, 3).bytes())?;
     assert_eq!(imported.ops, ["linear", "tanh"]);
     assert_eq!(imported.contract, ["scale", "offset", "low", "high"]);
     // A joint that is held still.
-    let mut file = begun();
-    let (x, held) = (file.gemm("obs", 3, OBS), file.reals(&[1, 1], &[0.7]));
-    file.nodes("Concat", &[&x, &held], &["actions"], &[("axis", Value::Int(1))]);
-    file.output("actions", &[1, 4]);
-    assert_eq!(same(&file.bytes())?.contract, ["scale", "offset"]);
+    let held = whole("actions := Concat(gemm(obs, 3, 11), full(0.7, 1, 1), axis=1)", 4);
+    assert_eq!(same(&held.bytes())?.contract, ["scale", "offset"]);
     Ok(())
 }
 
 #[test]
 fn every_activation_is_native_or_composed() -> Result<()> {
-    let cases = [
-        ("Relu", "relu"),
-        ("Elu", "elu"),
-        ("Tanh", "tanh"),
-        ("Sigmoid", "sigmoid"),
-        ("Softplus", "softplus"),
-        ("LeakyRelu", "relu normalize add"),
-        ("Selu", "elu relu normalize add"),
-        ("HardSwish", "normalize normalize mul"),
-        ("Exp", "exp"),
-        ("Sin", "sin"),
-        ("Cos", "cos"),
-        ("Abs", "relu normalize relu add"),
-    ];
-    for (op, expected) in cases {
-        let mut file = begun();
-        let x = file.gemm("obs", 16, OBS);
-        let x = file.node(op, &[&x], &[]);
-        let found = ops(&ended(file, &x, 16)).with_context(|| op.to_owned())?;
-        assert_eq!(found, format!("linear {expected} linear"), "{op}");
-    }
-    Ok(())
+    between(&[
+        ("relu", "Relu(x)"),
+        ("elu", "Elu(x)"),
+        ("tanh", "Tanh(x)"),
+        ("sigmoid", "Sigmoid(x)"),
+        ("softplus", "Softplus(x)"),
+        ("relu normalize add", "LeakyRelu(x)"),
+        ("elu relu normalize add", "Selu(x)"),
+        ("normalize normalize mul", "HardSwish(x)"),
+        ("exp", "Exp(x)"),
+        ("sin", "Sin(x)"),
+        ("cos", "Cos(x)"),
+        ("relu normalize relu add", "Abs(x)"),
+    ])
 }
 
-/// The nodes of a function of a value.
-type Written = fn(&mut File, &str) -> String;
-
 /// The ops of each, and the nodes that exporters make of it.
-pub(super) const ACTIVATIONS: [(&str, Written); 10] = [
+pub(super) const ACTIVATIONS: [(&str, &str); 10] = [
     // jax.nn.gelu: 1 - erf(-x / sqrt 2)
-    ("gelu", |file, x| {
-        let [root, one, half] = [0.5f32.sqrt(), 1.0, 0.5].map(|v| file.reals(&[], &[v]));
-        let e = file.node("Neg", &[x], &[]);
-        let e = file.node("Mul", &[&e, &root], &[]);
-        let e = file.node("Erf", &[&e], &[]);
-        let e = file.node("Sub", &[&one, &e], &[]);
-        let y = file.node("Mul", &[x, &e], &[]);
-        file.node("Mul", &[&half, &y], &[])
-    }),
-    ("gelu", |file, x| {
-        let [root, one, half] = [2f32.sqrt(), 1.0, 0.5].map(|v| file.reals(&[], &[v]));
-        let e = file.node("Div", &[x, &root], &[]);
-        let e = file.node("Erf", &[&e], &[]);
-        let e = file.node("Add", &[&e, &one], &[]);
-        let y = file.node("Mul", &[x, &e], &[]);
-        file.node("Mul", &[&y, &half], &[])
-    }),
-    ("gelu_tanh", |file, x| {
-        let [three, small, root, one, half] = [3.0, 0.044_715, 0.797_884_6, 1.0, 0.5].map(|v| file.reals(&[], &[v]));
-        let cube = file.node("Pow", &[x, &three], &[]);
-        let cube = file.node("Mul", &[&cube, &small], &[]);
-        let sum = file.node("Add", &[x, &cube], &[]);
-        let sum = file.node("Mul", &[&sum, &root], &[]);
-        let t = file.node("Tanh", &[&sum], &[]);
-        let t = file.node("Add", &[&one, &t], &[]);
-        let h = file.node("Mul", &[x, &half], &[]);
-        file.node("Mul", &[&h, &t], &[])
-    }),
+    ("gelu", "0.5 * (x * (1.0 - Erf(Neg(x) * 0.70710677)))"),
+    ("gelu", "x * (Erf(x / 1.4142135) + 1.0) * 0.5"),
+    ("gelu_tanh", "x * 0.5 * (1.0 + Tanh((x + Pow(x, 3.0) * 0.044715) * 0.7978846))"),
     // TensorFlow: half of x first.
-    ("gelu", |file, x| {
-        let [root, one, half] = [2f32.sqrt(), 1.0, 0.5].map(|v| file.reals(&[], &[v]));
-        let e = file.node("Div", &[x, &root], &[]);
-        let e = file.node("Erf", &[&e], &[]);
-        let e = file.node("Add", &[&e, &one], &[]);
-        let h = file.node("Mul", &[&half, x], &[]);
-        file.node("Mul", &[&h, &e], &[])
-    }),
-    ("gelu", |file, x| {
-        let [root, half] = [2f32.sqrt(), 0.5].map(|v| file.reals(&[], &[v]));
-        let e = file.node("Div", &[x, &root], &[]);
-        let e = file.node("Erf", &[&e], &[]);
-        let e = file.node("Mul", &[&e, &half], &[]);
-        let e = file.node("Add", &[&half, &e], &[]);
-        file.node("Mul", &[x, &e], &[])
-    }),
+    ("gelu", "0.5 * x * (Erf(x / 1.4142135) + 1.0)"),
+    ("gelu", "x * (0.5 + Erf(x / 1.4142135) * 0.5)"),
     // Beside the residual that reads the same value.
-    ("gelu add", |file, x| {
-        let [root, one, half] = [2f32.sqrt(), 1.0, 0.5].map(|v| file.reals(&[], &[v]));
-        let e = file.node("Div", &[x, &root], &[]);
-        let e = file.node("Erf", &[&e], &[]);
-        let e = file.node("Add", &[&e, &one], &[]);
-        let h = file.node("Mul", &[x, &half], &[]);
-        let y = file.node("Mul", &[&h, &e], &[]);
-        file.node("Add", &[&y, x], &[])
-    }),
-    ("mish", |file, x| {
-        let s = file.node("Softplus", &[x], &[]);
-        let t = file.node("Tanh", &[&s], &[]);
-        file.node("Mul", &[x, &t], &[])
-    }),
-    ("silu", |file, x| {
-        let one = file.reals(&[], &[1.0]);
-        let e = file.node("Neg", &[x], &[]);
-        let e = file.node("Exp", &[&e], &[]);
-        let e = file.node("Add", &[&e, &one], &[]);
-        file.node("Div", &[x, &e], &[])
-    }),
-    ("softplus", |file, x| {
-        let one = file.reals(&[], &[1.0]);
-        let e = file.node("Exp", &[x], &[]);
-        let e = file.node("Add", &[&e, &one], &[]);
-        file.node("Log", &[&e], &[])
-    }),
-    ("elu", |file, x| {
-        let [one, zero] = [1.0, 0.0].map(|v| file.reals(&[], &[v]));
-        let e = file.node("Exp", &[x], &[]);
-        let e = file.node("Sub", &[&e, &one], &[]);
-        let above = file.node("Greater", &[x, &zero], &[]);
-        file.node("Where", &[&above, x, &e], &[])
-    }),
+    ("gelu add", "0.5 * x * (Erf(x / 1.4142135) + 1.0) + x"),
+    ("mish", "x * Tanh(Softplus(x))"),
+    ("silu", "x / (Exp(Neg(x)) + 1.0)"),
+    ("softplus", "Log(Exp(x) + 1.0)"),
+    ("elu", "Where(Greater(x, 0.0), x, Exp(x) - 1.0)"),
 ];
 
 #[test]
 fn activations_in_their_parts_are_found() -> Result<()> {
-    for (name, written) in ACTIVATIONS {
-        let mut file = begun();
-        let x = file.gemm("obs", 16, OBS);
-        let x = written(&mut file, &x);
-        let found = ops(&ended(file, &x, 16)).with_context(|| name.to_owned())?;
-        assert_eq!(found, format!("linear {name} linear"));
-    }
-    Ok(())
-}
-
-/// `x W + h U + b` of a cell in its parts, sliced into gates.
-fn gates(file: &mut File, h: &str, names: &[&str], hidden: usize) {
-    let (x, h) = (file.gemm("obs", names.len() * hidden, OBS), file.gemm(h, names.len() * hidden, hidden));
-    let sum = file.node("Add", &[&x, &h], &[]);
-    file.nodes("Split", &[&sum], names, &[("axis", Value::Int(1))]);
+    between(&ACTIVATIONS)
 }
 
 #[test]
 fn recurrent_cells_carry_their_states() -> Result<()> {
-    const H: usize = 8;
-    for op in ["LSTM", "GRU"] {
+    const H: i64 = 8;
+    for (op, states, text) in [
+        (
+            "lstm",
+            &[("h_in", "h_out"), ("c_in", "c_out")][..],
+            "w = drawn(1, 32, 11)
+             y, h_out, c_out := LSTM(Unsqueeze(obs, [0]), w, drawn(1, 32, 8), drawn(1, 64), , h_in, c_in, hidden_size=8)
+             Reshape(y, [1, 8])",
+        ),
+        (
+            "gru",
+            &[("h_in", "h_out")],
+            "w = drawn(1, 24, 11)
+             y, h_out := GRU(Unsqueeze(obs, [0]), w, drawn(1, 24, 8), drawn(1, 48), , h_in, hidden_size=8, linear_before_reset=1)
+             Reshape(y, [1, 8])",
+        ),
+    ] {
         let mut file = begun();
-        let gates = if op == "LSTM" { 4 } else { 3 };
-        let axes = file.ints(&[0]);
-        let x = file.node("Unsqueeze", &["obs", &axes], &[]);
-        let (w, r, b) =
-            (file.drawn(&[1, gates * H, OBS]), file.drawn(&[1, gates * H, H]), file.drawn(&[1, 2 * gates * H]));
-        let states: &[&str] = if op == "LSTM" { &["h_in", "c_in"] } else { &["h_in"] };
-        let nexts: &[&str] = if op == "LSTM" { &["h_out", "c_out"] } else { &["h_out"] };
-        let inputs = [&[x.as_str(), &w, &r, &b, ""], states].concat();
-        let outputs = [&["y"], nexts].concat();
-        let own = if op == "LSTM" { vec![] } else { vec![("linear_before_reset", Value::Int(1))] };
-        file.nodes(op, &inputs, &outputs, &[&[("hidden_size", Value::Int(H as i64))], &own[..]].concat());
-        for (state, next) in states.iter().zip(nexts) {
-            file.input(state, &[1, 1, H as i64]);
-            file.output(next, &[1, 1, H as i64]);
+        for (state, next) in states {
+            file.input(state, &[1, 1, H]);
+            file.output(next, &[1, 1, H]);
         }
-        let shape = file.ints(&[1, H as i64]);
-        let y = file.node("Reshape", &["y", &shape], &[]);
-        let bytes = ended(file, &y, H);
-        let imported = same(&bytes).with_context(|| op.to_owned())?;
-        assert_eq!(imported.ops, [&op.to_lowercase(), "linear"]);
+        let y = file.write(&[], text);
+        let imported = same(&ended(file, &y, H as usize)).with_context(|| op.to_owned())?;
+        assert_eq!(imported.ops, [op, "linear"]);
         assert_eq!(imported.states.len(), states.len());
         assert_eq!(imported.inputs, [("obs".to_owned(), OBS)]);
     }
@@ -249,35 +167,34 @@ fn recurrent_cells_carry_their_states() -> Result<()> {
 
 #[test]
 fn cells_in_their_parts_are_found() -> Result<()> {
-    const H: usize = 8;
-    let mut file = begun();
-    file.input("h_in", &[1, H as i64]);
-    file.input("c_in", &[1, H as i64]);
-    gates(&mut file, "h_in", &["i", "f", "g", "o"], H);
-    let [i, f, o] = ["i", "f", "o"].map(|gate| file.node("Sigmoid", &[gate], &[]));
-    let g = file.node("Tanh", &["g"], &[]);
-    let (kept, new) = (file.node("Mul", &[&f, "c_in"], &[]), file.node("Mul", &[&i, &g], &[]));
-    file.nodes("Add", &[&kept, &new], &["c_out"], &[]);
-    let t = file.node("Tanh", &["c_out"], &[]);
-    file.nodes("Mul", &[&o, &t], &["h_out"], &[]);
-    file.output("h_out", &[1, H as i64]);
-    file.output("c_out", &[1, H as i64]);
-    assert_eq!(ops(&ended(file, "h_out", H))?, "lstm linear");
-
-    let mut file = begun();
-    file.input("h_in", &[1, H as i64]);
-    gates(&mut file, "h_in", &["r", "z"], H);
-    let [r, z] = ["r", "z"].map(|gate| file.node("Sigmoid", &[gate], &[]));
-    let (x, h) = (file.gemm("obs", H, OBS), file.gemm("h_in", H, H));
-    let gated = file.node("Mul", &[&r, &h], &[]);
-    let n = file.node("Add", &[&x, &gated], &[]);
-    let n = file.node("Tanh", &[&n], &[]);
-    let one = file.reals(&[], &[1.0]);
-    let rest = file.node("Sub", &[&one, &z], &[]);
-    let (new, kept) = (file.node("Mul", &[&rest, &n], &[]), file.node("Mul", &[&z, "h_in"], &[]));
-    file.nodes("Add", &[&new, &kept], &["h_out"], &[]);
-    file.output("h_out", &[1, H as i64]);
-    assert_eq!(ops(&ended(file, "h_out", H))?, "gru linear");
+    const H: i64 = 8;
+    // `x W + h U + b`, sliced into gates.
+    for (expected, states, text) in [
+        (
+            "lstm linear",
+            &[("h_in", "h_out"), ("c_in", "c_out")][..],
+            "i, f, g, o := Split(gemm(obs, 32, 11) + gemm(h_in, 32, 8), axis=1)
+             c_out := Sigmoid(f) * c_in + Sigmoid(i) * Tanh(g)
+             h_out := Sigmoid(o) * Tanh(c_out)",
+        ),
+        (
+            "gru linear",
+            &[("h_in", "h_out")],
+            "r, z := Split(gemm(obs, 16, 11) + gemm(h_in, 16, 8), axis=1)
+             r = Sigmoid(r)
+             z = Sigmoid(z)
+             n = Tanh(gemm(obs, 8, 11) + r * gemm(h_in, 8, 8))
+             h_out := (1.0 - z) * n + z * h_in",
+        ),
+    ] {
+        let mut file = begun();
+        for (state, next) in states {
+            file.input(state, &[1, H]);
+            file.output(next, &[1, H]);
+        }
+        file.write(&[], text);
+        assert_eq!(ops(&ended(file, "h_out", H as usize))?, expected);
+    }
     Ok(())
 }
 
@@ -288,24 +205,17 @@ fn inputs_join_in_order_and_dead_nodes_vanish() -> Result<()> {
     file.input("obs_0", &[-1, 4]);
     file.input("obs_1", &[-1, 3]);
     // A batch size read from the input.
-    let shape = file.node("Shape", &["obs_0"], &[]);
-    let (zero, last) = (file.ints(&[0]), file.ints(&[4]));
-    let batch = file.node("Gather", &[&shape, &zero], &[("axis", Value::Int(0))]);
-    let shape = file.node("Concat", &[&batch, &last], &[("axis", Value::Int(0))]);
-    let x = file.node("Reshape", &["obs_0", &shape], &[]);
-    let x = file.node("Concat", &["obs_1", &x], &[("axis", Value::Int(1))]);
-    let y = file.gemm(&x, 3, 7);
-    let noise = file.node("RandomNormal", &[], &[("shape", Value::Ints(vec![1, 3]))]);
-    let random = file.node("Add", &[&y, &noise], &[]);
-    let one = file.reals(&[1], &[3.0]);
-    for (output, value, dims) in [
-        ("version_number", &one, vec![1]),
-        ("continuous_actions", &random, vec![-1, 3]),
-        ("deterministic_continuous_actions", &y, vec![-1, 3]),
-    ] {
-        file.nodes("Identity", &[value], &[output], &[]);
-        file.output(output, &dims);
-    }
+    file.write(
+        &[],
+        "shape = Concat(Gather(Shape(obs_0), [0], axis=0), [4], axis=0)
+         y = gemm(Concat(obs_1, Reshape(obs_0, shape), axis=1), 3, 7)
+         version_number := Identity([3.0])
+         continuous_actions := Identity(y + RandomNormal(shape=[1, 3]))
+         deterministic_continuous_actions := Identity(y)",
+    );
+    file.output("version_number", &[1]);
+    file.output("continuous_actions", &[-1, 3]);
+    file.output("deterministic_continuous_actions", &[-1, 3]);
     let bytes = file.bytes();
     let imported = same(&bytes)?;
     assert_eq!(imported.inputs, [("obs_0".to_owned(), 4), ("obs_1".to_owned(), 3)]);
@@ -324,20 +234,12 @@ fn unbatched_products_and_external_data_are_imported() -> Result<()> {
     // Isaac Gym: rank 1, MatMul and Add.
     let mut file = File::default();
     file.input("x", &[5]);
-    let (w, b) = (file.drawn(&[5, 3]), file.drawn(&[3]));
-    let y = file.node("MatMul", &["x", &w], &[]);
-    file.nodes("Add", &[&b, &y], &["y"], &[]);
+    file.write(&["x"], "y := drawn(3) + MatMul(x, drawn(5, 3))");
     file.output("y", &[3]);
     same(&file.bytes())?;
     // A gate beside a value, and slices of the observation.
-    let mut file = begun();
-    let (a, b) = (file.gemm("obs", 6, OBS), file.gemm("obs", 6, OBS));
-    let gate = file.node("Sigmoid", &[&b], &[]);
-    let x = file.node("Mul", &[&a, &gate], &[]);
-    let [from, to, axis] = [2, 9, 1].map(|i| file.ints(&[i]));
-    let part = file.node("Slice", &["obs", &from, &to, &axis], &[]);
-    let x = file.node("Concat", &[&part, &x], &[("axis", Value::Int(-1))]);
-    assert!(ops(&ended(file, &x, 13))?.contains("mul"));
+    let gated = "gemm(obs, 6, 11) * Sigmoid(gemm(obs, 6, 11))";
+    assert!(found(&format!("Concat(Slice(obs, [2], [9], [1]), {gated}, axis=-1)"), 13)?.contains("mul"));
     // Weights in a file of the model's folder.
     let dir = tempfile::TempDir::new()?;
     let data: Vec<f32> = (0..3 * OBS).map(|i| i as f32 / 20.0 - 0.7).collect();
@@ -424,26 +326,22 @@ proptest! {
                     len = rows;
                     y
                 }
-                4 => file.node("Tanh", &[&at], &[]),
-                5 => file.node("Elu", &[&at], &[]),
-                6 => file.node("Sin", &[&at], &[]),
-                7 => { let w = file.drawn(&[len]); file.node("Mul", &[&at, &w], &[]) }
-                8 => { let w = file.drawn(&[1, len]); file.node("Sub", &[&w, &at], &[]) }
-                9 => { let [a, b] = [-0.6, 0.9].map(|v| file.reals(&[], &[v])); file.node("Clip", &[&at, &a, &b], &[]) }
-                10 => { let s = file.node("Sigmoid", &[&at], &[]); file.node("Mul", &[&at, &s], &[]) }
-                11 => {
-                    let (w, b) = (file.drawn(&[len]), file.drawn(&[len]));
-                    file.node("LayerNormalization", &[&at, &w, &b], &[("axis", Value::Int(-1)), ("epsilon", Value::Real(1e-2))])
-                }
-                12 => file.node("LeakyRelu", &[&at], &[("alpha", Value::Real(0.2))]),
+                4 => file.write(&[&at], "Tanh(x)"),
+                5 => file.write(&[&at], "Elu(x)"),
+                6 => file.write(&[&at], "Sin(x)"),
+                7 => file.write(&[&at], &format!("x * drawn({len})")),
+                8 => file.write(&[&at], &format!("drawn(1, {len}) - x")),
+                9 => file.write(&[&at], "Clip(x, -0.6, 0.9)"),
+                10 => file.write(&[&at], "x * Sigmoid(x)"),
+                11 => file.write(&[&at], &format!("LayerNormalization(x, drawn({len}), drawn({len}), axis=-1, epsilon=1e-2)")),
+                12 => file.write(&[&at], "LeakyRelu(x, alpha=0.2)"),
                 _ => match &before {
-                    Some((other, n)) if *n == len => file.node(if keep { "Add" } else { "Mul" }, &[&at, other], &[]),
+                    Some((other, n)) if *n == len => file.write(&[&at, other], if keep { "x + y" } else { "x * y" }),
                     Some((other, n)) => {
-                        let y = file.node("Concat", &[other, &at], &[("axis", Value::Int(1))]);
                         len += n;
-                        y
+                        file.write(&[other, &at], "Concat(x, y, axis=1)")
                     }
-                    None => file.node("Relu", &[&at], &[]),
+                    None => file.write(&[&at], "Relu(x)"),
                 },
             };
             if keep {
@@ -458,47 +356,38 @@ proptest! {
 
 #[test]
 fn ambiguous_action_outputs_are_refused() -> Result<()> {
-    let mut file = begun();
-    for name in ["mean", "value"] {
-        let y = file.gemm("obs", 2, OBS);
-        file.nodes("Identity", &[&y], &[name], &[]);
-        file.output(name, &[1, 2]);
-    }
-    let bytes = file.bytes();
-    let error = format!("{:#}", imported(&bytes, &Choice::default()).expect_err("two outputs"));
-    ensure!(error.contains("mean (2 values), value (2 values); choose one by actq import --output NAME"), "{error}");
+    let with_outputs = |names: [&str; 2], text: &str| {
+        let mut file = begun();
+        file.write(&[], text);
+        names.iter().for_each(|name| file.output(name, &[1, 2]));
+        file.bytes()
+    };
+    let bytes =
+        with_outputs(["mean", "value"], "mean := Identity(gemm(obs, 2, 11))\nvalue := Identity(gemm(obs, 2, 11))");
+    refused(&bytes, "mean (2 values), value (2 values); choose one by actq import --output NAME");
     let choice = Choice { output: Some("value".to_owned()), ..Choice::default() };
     assert_eq!(imported(&bytes, &choice)?.0.cut_outputs, ["mean"]);
     // A value beside an output that cannot be imported need not be the action.
-    let mut file = begun();
-    let [x, y] = [(); 2].map(|()| file.gemm("obs", 2, OBS));
-    for (op, of, name) in [("Softmax", &x, "policy"), ("Identity", &y, "value")] {
-        file.nodes(op, &[of], &[name], &[]);
-        file.output(name, &[1, 2]);
-    }
-    let error = format!("{:#}", imported(&file.bytes(), &Choice::default()).expect_err("a value"));
+    let text = "x = gemm(obs, 2, 11)\ny = gemm(obs, 2, 11)\npolicy := Softmax(x)\nvalue := Identity(y)";
     let expected = "\"policy\" cannot be imported, and no other output is named action; choose one by actq import --output NAME: value (2 values): node 2";
-    ensure!(error.contains(expected), "{error}");
+    refused(&with_outputs(["policy", "value"], text), expected);
     Ok(())
 }
 
 #[test]
 fn a_refused_action_is_not_replaced_by_states() {
-    const H: usize = 4;
     let mut file = begun();
-    let axes = file.ints(&[0]);
-    let mut x = file.node("Unsqueeze", &["obs", &axes], &[]);
-    for (state, next, len) in [("h", "h_out", OBS), ("k", "k_out", H)] {
-        let [w, r, b] = [vec![1, 3 * H, len], vec![1, 3 * H, H], vec![1, 6 * H]].map(|dims| file.drawn(&dims));
-        let own = [("hidden_size", Value::Int(H as i64)), ("linear_before_reset", Value::Int(1))];
-        file.nodes("GRU", &[&x, &w, &r, &b, "", state], &["", next], &own);
-        file.input(state, &[1, 1, H as i64]);
-        file.output(next, &[1, 1, H as i64]);
-        x = next.to_owned();
+    for (state, next) in [("h", "h_out"), ("k", "k_out")] {
+        file.input(state, &[1, 1, 4]);
+        file.output(next, &[1, 1, 4]);
     }
-    let y = file.node("Squeeze", &["k_out", &axes], &[]);
-    let y = file.gemm(&y, 3, H);
-    file.nodes("Softsign", &[&y], &["action"], &[]);
+    file.write(
+        &[],
+        "x = Unsqueeze(obs, [0])
+         , h_out := GRU(x, drawn(1, 12, 11), drawn(1, 12, 4), drawn(1, 24), , h, hidden_size=4, linear_before_reset=1)
+         , k_out := GRU(h_out, drawn(1, 12, 4), drawn(1, 12, 4), drawn(1, 24), , k, hidden_size=4, linear_before_reset=1)
+         action := Softsign(gemm(Squeeze(k_out, [0]), 3, 4))",
+    );
     file.output("action", &[1, 3]);
     let error = format!("{:#}", imported(&file.bytes(), &Choice::default()).expect_err("Softsign"));
     let expected = "output \"action\" cannot be imported, and all other outputs are states: node 5";
