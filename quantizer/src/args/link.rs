@@ -18,7 +18,13 @@ pub(crate) enum LinkCommand {
     /// List the serial ports
     Ports,
     /// Show state, counters and times, and update them until the command ends
-    Watch(WatchArgs),
+    Watch {
+        #[command(flatten)]
+        port: PortArgs,
+        /// Show one table and end
+        #[arg(long)]
+        once: bool,
+    },
     /// Let the actions drive the outputs; something must already send observations to the controller
     Arm(PortArgs),
     /// Let the outputs coast
@@ -26,7 +32,13 @@ pub(crate) enum LinkCommand {
     /// Read a parameter
     Get(GetArgs),
     /// Set a parameter, while disarmed
-    Set(SetArgs),
+    Set {
+        #[command(flatten)]
+        of: GetArgs,
+        /// The value
+        #[arg(allow_negative_numbers = true)]
+        value: f32,
+    },
     /// Send a recording's observations at their rate
     ///
     /// IMAGE must be the image that the controller runs. It gives the length of an observation, and the command
@@ -37,7 +49,13 @@ pub(crate) enum LinkCommand {
     /// Use the controller as a simulator's policy, by the protocol of `actq serve` on standard input and output
     ///
     /// A reset disarms, which resets the head. Without --arm the outputs coast, and the head still gives actions.
-    Serve(ServeArgs),
+    Serve {
+        #[command(flatten)]
+        port: PortArgs,
+        /// Arm at the first step of an episode
+        #[arg(long)]
+        arm: bool,
+    },
     /// Send an image into the slot that does not run, then run it
     ///
     /// Example: actq link push /dev/ttyACM0 ur3.actq --signature ur3.sig
@@ -52,15 +70,6 @@ pub(crate) struct PortArgs {
     /// Seconds to wait for an answer, and for a lost port to return
     #[arg(long, alias = "patience", value_name = "SECONDS", default_value = "5", value_parser = seconds)]
     pub(crate) timeout: Duration,
-}
-
-#[derive(clap::Args)]
-pub(crate) struct WatchArgs {
-    #[command(flatten)]
-    pub(crate) port: PortArgs,
-    /// Show one table and end
-    #[arg(long)]
-    pub(crate) once: bool,
 }
 
 /// A parameter's name.
@@ -108,15 +117,6 @@ pub(crate) struct GetArgs {
 }
 
 #[derive(clap::Args)]
-pub(crate) struct SetArgs {
-    #[command(flatten)]
-    pub(crate) of: GetArgs,
-    /// The value
-    #[arg(allow_negative_numbers = true)]
-    pub(crate) value: f32,
-}
-
-#[derive(clap::Args)]
 pub(crate) struct StreamArgs {
     #[command(flatten)]
     pub(crate) port: PortArgs,
@@ -133,15 +133,6 @@ pub(crate) struct StreamArgs {
     /// Write a log of observations and replies: obs, action, applied, sent and received (seconds)
     #[arg(long, value_name = "FILE.npz")]
     pub(crate) log: Option<PathBuf>,
-}
-
-#[derive(clap::Args)]
-pub(crate) struct ServeArgs {
-    #[command(flatten)]
-    pub(crate) port: PortArgs,
-    /// Arm at the first step of an episode
-    #[arg(long)]
-    pub(crate) arm: bool,
 }
 
 #[derive(clap::Args)]

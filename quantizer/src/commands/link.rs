@@ -19,7 +19,7 @@ use actq_client::{port, serve};
 use anyhow::{Context as _, Result, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::args::link::{LinkArgs, LinkCommand, PortArgs, PushArgs, StreamArgs, WatchArgs};
+use crate::args::link::{LinkArgs, LinkCommand, PortArgs, PushArgs, StreamArgs};
 use crate::report::notes;
 use crate::terminal::{Progress, note, print, reserve};
 
@@ -36,17 +36,17 @@ pub(crate) fn run(args: &LinkArgs) -> Result<()> {
             }
             ports.into_iter().try_for_each(|(name, about)| print(&format!("{name}  {about}\n")))
         }
-        LinkCommand::Watch(args) => watch(args),
+        LinkCommand::Watch { port, once } => watch(port, *once),
         LinkCommand::Arm(port) => connect(port)?.arm(),
         LinkCommand::Disarm(port) => connect(port)?.disarm(),
         LinkCommand::Get(args) => {
             let value = connect(&args.port)?.get(args.parameter.into(), args.axis)?;
             print(&format!("{value}\n"))
         }
-        LinkCommand::Set(args) => connect(&args.of.port)?.set(args.of.parameter.into(), args.of.axis, args.value),
+        LinkCommand::Set { of, value } => connect(&of.port)?.set(of.parameter.into(), of.axis, *value),
         LinkCommand::Stream(args) => run_stream(args),
-        LinkCommand::Serve(args) => {
-            serve::serve(&mut connect(&args.port)?, args.arm, io::stdin().lock(), io::stdout().lock())
+        LinkCommand::Serve { port, arm } => {
+            serve::serve(&mut connect(port)?, *arm, io::stdin().lock(), io::stdout().lock())
         }
         LinkCommand::Push(args) => run_push(args),
     }
@@ -59,14 +59,14 @@ fn connect(args: &PortArgs) -> Result<Client> {
     Ok(client)
 }
 
-fn watch(args: &WatchArgs) -> Result<()> {
-    let mut client = connect(&args.port)?;
+fn watch(port: &PortArgs, once: bool) -> Result<()> {
+    let mut client = connect(port)?;
     let mut shown = || -> Result<String> {
         let (status, timing, breadcrumb) = (client.status()?, client.timing()?, client.breadcrumb()?);
         let reopened = client.connection().reopened();
         Ok(table::table(&status, &timing, &breadcrumb, &client.connection().counters(), reopened).to_string())
     };
-    if args.once {
+    if once {
         return print(&(shown()? + "\n"));
     }
     let bar = ProgressBar::new_spinner().with_style(ProgressStyle::with_template("{msg}").context("table")?);
