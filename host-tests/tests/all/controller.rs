@@ -12,15 +12,15 @@ use std::time::Duration;
 use std::{fs, thread};
 
 use actq::runtime::ImageBuffer;
+use actq_bench::bits;
 use actq_bench::command::{actq, failed, run, succeeded};
 use actq_bench::golden::Random;
-use actq_bench::networks::Builder;
+use actq_bench::networks::{Builder, with_wrong_self_test};
 use actq_boards::ram::Ram;
 use actq_controller::breadcrumb::Record;
 use actq_controller::endpoint::Facts;
 use actq_controller::slots::{Candidate, Key, Layout, Slots, Updater, Work};
 use actq_controller::{Axis, Check, Endpoint, Guard, SafeAction, Safety, Settings};
-use actq_kernels::image::{header as h, seal};
 use actq_kernels::{Head, Image, Width};
 use actq_link::code::{Refusal, ResetCause};
 use actq_link::frame;
@@ -28,8 +28,10 @@ use actq_link::report::{BUILT_IN, Timing};
 use anyhow::{Context, Result};
 use embedded_storage::nor_flash::ReadNorFlash as _;
 use ndarray::{Array2, Array3};
-use ndarray_npy::{NpzReader, NpzWriter};
+use ndarray_npy::NpzReader;
 use tempfile::TempDir;
+
+use crate::folder::write_observations;
 
 const OBS: usize = 24;
 const ACT: usize = 3;
@@ -46,17 +48,7 @@ fn image(name: &str, seed: u64) -> Result<Vec<u8>> {
     // The seed changes the weights.
     builder.values(seed as usize);
     builder.linear((ACT, OBS), actq::methods::Activations::Int8, |_| Some(Width::W3), 0, true)?;
-    let (policy, outcomes) = builder.finish(name.to_owned(), false);
-    Ok(actq::emit::image(&policy, &outcomes)?)
-}
-
-/// The image with another expected action in its self-test.
-fn with_wrong_self_test(image: &[u8]) -> Vec<u8> {
-    let word = |at: usize| u32::from_le_bytes([0, 1, 2, 3].map(|i| image[4 * at + i])) as usize;
-    let mut wrong = image.to_vec();
-    wrong[4 * (word(h::W_SELF_TEST) + OBS)] ^= 1;
-    seal(&mut wrong).expect("its length is unchanged");
-    wrong
+    builder.image(name)
 }
 
 struct Controller {
@@ -211,9 +203,7 @@ fn folder() -> Result<(TempDir, PathBuf)> {
     let folder = TempDir::new()?;
     let path = folder.path().join("drive.npz");
     let mut random = Random::new(3);
-    let mut npz = NpzWriter::new(fs::File::create(&path)?);
-    npz.add_array("obs", &Array3::from_shape_simple_fn((2, 20, OBS), || random.unit()))?;
-    npz.finish()?;
+    write_observations(&path, &Array3::from_shape_simple_fn((2, 20, OBS), || random.unit()))?;
     Ok((folder, path))
 }
 
@@ -222,7 +212,7 @@ fn the_command_watches_streams_and_updates() -> Result<()> {
     let (folder, recording) = folder()?;
     let path = |name: &str| folder.path().join(name).display().to_string();
     let (old, new) = (image("old", 0)?, image("new", 50)?);
-    for (name, bytes) in [("old.actq", &old), ("new.actq", &new), ("wrong.actq", &with_wrong_self_test(&new))] {
+    for (name, bytes) in [("old.actq", &old), ("new.actq", &new), ("wrong.actq", &with_wrong_self_test(&new)?)] {
         fs::write(path(name), bytes)?;
     }
     let key = path("key.pem");
@@ -286,7 +276,7 @@ fn check_log(log: &str, image: &[u8]) -> Result<()> {
         let mut answered = 0;
         for (obs, action) in obs.outer_iter().zip(actions.outer_iter()).filter(|(_, action)| !action[0].is_nan()) {
             let expected = head.step(&obs.to_vec())?;
-            assert_eq!(action.map(|v| v.to_bits()).to_vec(), expected.iter().map(|v| v.to_bits()).collect::<Vec<_>>());
+            assert_eq!(bits(&action.to_vec()), bits(expected));
             answered += 1;
         }
         assert_eq!(answered, 40);

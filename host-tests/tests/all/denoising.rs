@@ -4,7 +4,6 @@
 
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, TAU};
-use std::fs;
 
 use actq::budget::Budget;
 use actq::data::{Dataset, Recordings, Sizes};
@@ -15,15 +14,18 @@ use actq::pipeline::quantize;
 use actq::policy::Policy;
 use actq::random::Random;
 use actq::runtime::{ImageBuffer, with_head};
-use actq_bench::qemu::Server;
-use actq_bench::{firmware, qemu, shared_policies};
+use actq_bench::{Target, bits, shared_policies};
+use actq_kernels::image::{header as h, op};
 use actq_kernels::ops::noise::normal;
 use actq_kernels::pace::cost;
 use actq_kernels::{Head, ImageError, StepError, Width};
 use anyhow::{Context, Result, ensure};
 use serde_json::{Value, json};
 
-use super::ops::{Case, wide};
+use crate::draft::Draft;
+use crate::on_target;
+use crate::ops::{Case, wide};
+use crate::slices;
 
 const OBS: usize = 5;
 const CHUNK: usize = 3;
@@ -243,10 +245,6 @@ fn quantized(json: Value) -> Result<ImageBuffer> {
     Ok(ImageBuffer::new(&quantize(&policy, &Recordings::default(), &options, ())?.image))
 }
 
-fn bits(values: &[f32]) -> Vec<u32> {
-    values.iter().map(|v| v.to_bits()).collect()
-}
-
 #[test]
 fn a_reset_restarts_generated_noise() -> Result<()> {
     for (json, _) in policies() {
@@ -290,25 +288,14 @@ fn any_slicing_gives_the_same_bits() -> Result<()> {
         let image = buffer.image("memory".as_ref())?;
         let mut random = Random::new(5);
         let observations: Vec<Vec<f32>> = (0..6).map(|_| drawn(&mut random, OBS, 2.0)).collect();
-        let whole = with_head::<_, anyhow::Error>(image, |head| {
-            observations.iter().map(|obs| Ok(bits(head.step(obs)?))).collect::<Result<Vec<_>>>()
-        })?;
+        let whole = with_head(image, |head| slices::whole(head, &observations))?;
         let (cut, polls) = with_head::<_, anyhow::Error>(image, |head| {
             let least = head.least_budget();
-            let mut polls = 0;
-            let step = |obs: &Vec<f32>| -> Result<Vec<u32>> {
-                head.begin(obs)?;
-                loop {
-                    polls += 1;
-                    if let core::task::Poll::Ready(action) = head.poll(least)? {
-                        return Ok(bits(action));
-                    }
-                }
-            };
-            let cut = observations.iter().map(step).collect::<Result<Vec<_>>>()?;
-            Ok((cut, polls))
+            let steps = observations.iter().map(|obs| slices::in_polls(head, obs, || least));
+            steps.collect::<Result<(Vec<_>, Vec<_>)>>()
         })?;
         assert_eq!(cut, whole, "{json}");
+        let polls: usize = polls.iter().sum();
         assert!(polls > 3 * 3 * 3, "{polls} polls: {json}");
     }
     Ok(())
@@ -316,28 +303,18 @@ fn any_slicing_gives_the_same_bits() -> Result<()> {
 
 #[test]
 fn the_target_gives_the_hosts_bits() -> Result<()> {
-    let elf = firmware::harness(actq_bench::Target::Fpu)?;
     for (json, _) in policies() {
-        let buffer = quantized(json.clone())?;
-        same_bits(&elf, &buffer, 12)?;
+        same_bits(quantized(json)?.bytes(), 12)?;
     }
     Ok(())
 }
 
-fn same_bits(elf: &std::path::Path, buffer: &ImageBuffer, steps: usize) -> Result<()> {
-    let slot = tempfile::NamedTempFile::new()?;
-    fs::write(slot.path(), buffer.bytes())?;
-    let image = buffer.image(slot.path())?;
-    let mut server = Server::start(qemu::command(elf, Some(slot.path()), "serve")?, image.act_len())?;
+/// Requires the host's bits in QEMU, in this many steps.
+fn same_bits(image: &[u8], steps: usize) -> Result<()> {
     let mut random = Random::new(9);
-    with_head::<_, anyhow::Error>(image, |head| {
-        for step in 0..steps {
-            let obs = drawn(&mut random, image.obs_len(), 1.0);
-            ensure!(bits(&server.step(&obs)?) == bits(head.step(&obs)?), "{}, step {step}", image.name());
-        }
-        Ok(())
-    })?;
-    server.finish()
+    let obs_len = ImageBuffer::new(image).image("memory".as_ref())?.obs_len();
+    let observations: Vec<_> = (0..steps).map(|_| drawn(&mut random, obs_len, 1.0)).collect();
+    on_target::qemu::same_bits(Target::Fpu, image, &observations)
 }
 
 #[test]
@@ -402,52 +379,37 @@ fn impossible_policies_are_refused() -> Result<()> {
 
 #[test]
 fn impossible_images_are_refused() -> Result<()> {
-    use actq_kernels::image::{header as h, op, seal};
-    let buffer = quantized(policies().swap_remove(3).0)?;
-    let image = buffer.image("memory".as_ref())?;
-    let words: Vec<u32> = bytemuck::cast_slice(buffer.bytes()).to_vec();
-    let record = |code: u8| -> Result<usize> {
-        let first = words[h::W_OPS] as usize;
-        (0..image.op_count()).map(|i| first + i * h::OP_WORDS).find(|at| words[*at] as u8 == code).context("no such op")
-    };
-    let (table, denoise) = (record(op::TABLE)?, record(op::DENOISE)?);
-    let constants = words[denoise + 3] as usize;
-    let first = words[h::W_OPS] as usize;
+    let image = Draft::of(quantized(policies().swap_remove(3).0)?.bytes());
+    let (table, denoise) = (image.op((op::TABLE, 0)), image.op((op::DENOISE, 0)));
+    let (constants, first) = (image.offset(denoise + 3), image.offset(h::W_OPS));
     let (nan, huge) = (f32::NAN.to_bits(), 1 << 20);
-    let half = |word: u32, high: u32| word & 0xffff | high << 16;
+    let (kind, denoising) = (image.get(h::W_KIND), image.get(h::W_DENOISING));
     let cases: [(&str, usize, u32, ImageError); 14] = [
-        ("no steps", h::W_DENOISING, half(words[h::W_DENOISING], 0), ImageError::Denoising),
-        ("more steps than tables", h::W_DENOISING, half(words[h::W_DENOISING], 0xffff), ImageError::Section),
-        (
-            "nothing to repeat",
-            h::W_DENOISING,
-            words[h::W_DENOISING] & !0xffff | image.op_count() as u32,
-            ImageError::Denoising,
-        ),
-        ("a table before the steps", h::W_DENOISING, words[h::W_DENOISING] + 20, ImageError::Denoising),
-        ("a chunk with steps", h::W_KIND, words[h::W_KIND] & !0xff | 1, ImageError::Denoising),
-        ("a kind beyond", h::W_KIND, words[h::W_KIND] & !0xff | 4, ImageError::Kind),
+        ("no steps", h::W_DENOISING, image.low(h::W_DENOISING), ImageError::Denoising),
+        ("more steps than tables", h::W_DENOISING, denoising | 0xffff << 16, ImageError::Section),
+        ("nothing to repeat", h::W_DENOISING, denoising & !0xffff | image.high(h::W_KIND), ImageError::Denoising),
+        ("a table before the steps", h::W_DENOISING, denoising + 20, ImageError::Denoising),
+        ("a chunk with steps", h::W_KIND, kind & !0xff | 1, ImageError::Denoising),
+        ("a kind beyond", h::W_KIND, kind & !0xff | 4, ImageError::Kind),
         (
             "noise after the first operation",
             first + h::OP_WORDS,
-            words[first + h::OP_WORDS] & !0xff | u32::from(op::NOISE),
+            image.get(first + h::OP_WORDS) & !0xff | u32::from(op::NOISE),
             ImageError::Reserved,
         ),
         ("a limit of 0", constants, 0, ImageError::Constant),
         ("a limit NaN", constants, nan, ImageError::Constant),
         ("a coefficient NaN", constants + h::DENOISE_WORDS + 5, nan, ImageError::Constant),
         ("noise outside", constants + 1, huge, ImageError::Denoising),
-        ("truncated noise", constants + 1, words[constants + 1] + 1, ImageError::Denoising),
-        ("a table NaN", words[table + 3] as usize, nan, ImageError::Constant),
-        ("coefficients outside", denoise + 3, words.len() as u32 - 1, ImageError::Section),
+        ("truncated noise", constants + 1, image.get(constants + 1) + 1, ImageError::Denoising),
+        ("a table NaN", image.offset(table + 3), nan, ImageError::Constant),
+        ("coefficients outside", denoise + 3, image.0.len() as u32 - 1, ImageError::Section),
     ];
     for (name, at, word, expected) in cases {
-        let mut changed = words.clone();
-        changed[at] = word;
-        let mut bytes: Vec<u8> = bytemuck::cast_slice(&changed).to_vec();
-        seal(&mut bytes).context("too long")?;
-        let found = actq_kernels::Image::new_checked(ImageBuffer::new(&bytes).bytes()).err();
-        assert_eq!(found, Some(expected), "{name}");
+        let mut changed = image.clone();
+        changed.set(at, word);
+        changed.seal();
+        assert_eq!(changed.check().err(), Some(expected), "{name}");
     }
     Ok(())
 }
@@ -470,7 +432,6 @@ fn the_shared_flow_policy_runs_on_the_target() -> Result<()> {
     let policy = Policy::load(&dir)?;
     let heldout = Dataset::load(&dir.join("heldout.npz"), Sizes::of(&policy))?;
     let heldout = heldout.thinned(60, false);
-    let elf = firmware::harness(actq_bench::Target::Fpu)?;
     for (width, limit) in [(Width::W8, 5.1e-4), (Width::W3, 0.33), (Width::W2, 3.0)] {
         let options = Options { group: 32, ..Options::new(Method::Rtn, Budget::Width(width)) };
         let bytes = quantize(&policy, &Recordings::default(), &options, ())?.image;
@@ -480,7 +441,7 @@ fn the_shared_flow_policy_runs_on_the_target() -> Result<()> {
         ensure!(report.nmse < limit, "{width:?}: NMSE {}", report.nmse);
         if width != Width::W8 {
             ensure!(bytes.len() < 1 << 20, "{} bytes", bytes.len());
-            same_bits(&elf, &buffer, 4)?;
+            same_bits(&bytes, 4)?;
         }
     }
     Ok(())

@@ -1,6 +1,7 @@
 //! The method distill on whole policies: budgets, determinism, and limits of the error.
 
 use std::path::Path;
+use std::sync::LazyLock;
 
 use actq::budget::Budget;
 use actq::data::Recordings;
@@ -25,15 +26,24 @@ fn report(dir: &Path, bytes: &[u8]) -> Result<ErrorReport> {
     Ok(eval::evaluate(image, &eval::heldout(dir, &image)?)?)
 }
 
+/// The UR3 policy with its recordings.
+static UR3: LazyLock<(Policy, Recordings)> = LazyLock::new(|| {
+    let policy = Policy::load(&ur3()).expect("the policy loads");
+    let recordings = Recordings::load(&policy).expect("the recordings load");
+    (policy, recordings)
+});
+
+fn quantizer() -> Result<Quantizer<'static>> {
+    Ok(Quantizer::new(&UR3.0, &UR3.1, Method::Distill, None, |_| {})?)
+}
+
 fn distill(bits: f64, steps: usize) -> Options {
     Options { steps: Some(steps), ..Options::new(Method::Distill, Budget::BitsPerWeight(bits)) }
 }
 
 #[test]
 fn budgets_are_kept_and_used() -> Result<()> {
-    let policy = Policy::load(&ur3())?;
-    let recordings = Recordings::load(&policy)?;
-    let quantizer = Quantizer::new(&policy, &recordings, Method::Distill, None, |_| {})?;
+    let quantizer = quantizer()?;
     for bits in [1.0, 1.5, 2.0, 2.5, 3.0, 4.0] {
         let bpw = report(&ur3(), &image(&quantizer, &distill(bits, 2))?)?.bpw;
         assert!(bpw <= bits && bpw > bits - 0.1, "{bpw} bits for a budget of {bits}");
@@ -64,9 +74,7 @@ fn the_image_is_independent_of_the_thread_count() -> Result<()> {
 
 #[test]
 fn an_image_fits_its_flash_budget() -> Result<()> {
-    let policy = Policy::load(&ur3())?;
-    let recordings = Recordings::load(&policy)?;
-    let quantizer = Quantizer::new(&policy, &recordings, Method::Distill, None, |_| {})?;
+    let quantizer = quantizer()?;
     for bytes in [64 << 10, 96 << 10, 200 << 10] {
         let options = Options { budget: Budget::ImageBytes(bytes), ..distill(1.0, 2) };
         let len = image(&quantizer, &options)?.len();
@@ -79,12 +87,10 @@ fn an_image_fits_its_flash_budget() -> Result<()> {
 
 #[test]
 fn a_forced_width_reaches_every_row() -> Result<()> {
-    let policy = Policy::load(&ur3())?;
-    let recordings = Recordings::load(&policy)?;
-    let quantizer = Quantizer::new(&policy, &recordings, Method::Distill, None, |_| {})?;
+    let quantizer = quantizer()?;
     let forced = |name: &str| Options { forced: vec![(name.into(), Width::W4)], ..distill(2.0, 2) };
     let outcomes = quantizer.quantize(&forced("out.weight"), ())?.outcomes;
-    let out = policy.graph.matrices.iter().position(|m| m.name == "out.weight");
+    let out = UR3.0.graph.matrices.iter().position(|m| m.name == "out.weight");
     assert!(out.is_some_and(|m| outcomes[m].quantized.widths.iter().all(|w| *w == Some(Width::W4))));
     assert!(quantizer.quantize(&forced("no.such"), ()).is_err());
     Ok(())
@@ -92,9 +98,7 @@ fn a_forced_width_reaches_every_row() -> Result<()> {
 
 #[test]
 fn another_seed_gives_another_image() -> Result<()> {
-    let policy = Policy::load(&ur3())?;
-    let recordings = Recordings::load(&policy)?;
-    let quantizer = Quantizer::new(&policy, &recordings, Method::Distill, None, |_| {})?;
+    let quantizer = quantizer()?;
     let options = distill(2.0, 5);
     assert_ne!(image(&quantizer, &options)?, image(&quantizer, &Options { seed: 2, ..options.clone() })?);
     Ok(())

@@ -2,7 +2,7 @@
 //! recordings.
 #![cfg(unix)]
 
-use std::fs::{self, File};
+use std::fs;
 use std::io::{Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
@@ -11,17 +11,16 @@ use actq::data::{Dataset, Sizes, driven_by};
 use actq::graph::Evaluator;
 use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
-use actq_bench::command::{actq, failed, run, succeeded};
+use actq_bench::command::{actq, answered, failed, run, succeeded};
 use actq_bench::golden::Random;
 use actq_bench::qemu::step_request;
 use actq_link::RESET;
 use anyhow::{Context, Result, ensure};
 use ndarray::Array3;
-use ndarray_npy::NpzWriter;
-use safetensors::Dtype;
-use safetensors::tensor::{TensorView, serialize};
 use serde_json::{Value, json};
 use tempfile::TempDir;
+
+use crate::folder::{write_observations, write_policy};
 
 const OBS: usize = 6;
 const HIDDEN: usize = 16;
@@ -63,22 +62,15 @@ impl Fixture {
             json["chunk"] = chunk.into();
             json["execute"] = EXECUTE.into();
         }
-        fs::write(folder.join("policy.json"), json.to_string())?;
         let mut random = Random::new(21);
         let shapes = match network {
             Network::Chunk => vec![("in", HIDDEN, OBS)],
             _ => vec![("ih", 4 * HIDDEN, OBS), ("hh", 4 * HIDDEN, HIDDEN)],
         };
-        let tensors: Vec<(&str, [usize; 2], Vec<u8>)> = shapes
-            .into_iter()
-            .chain([("out", chunk * ACT, HIDDEN)])
-            .map(|(name, rows, cols)| {
-                (name, [rows, cols], (0..rows * cols).flat_map(|_| (0.7 * random.unit()).to_le_bytes()).collect())
-            })
-            .collect();
-        let views =
-            tensors.iter().map(|(name, shape, bytes)| Ok((*name, TensorView::new(Dtype::F32, shape.to_vec(), bytes)?)));
-        fs::write(folder.join("policy.safetensors"), serialize(views.collect::<Result<Vec<_>>>()?, None)?)?;
+        let tensors = shapes.into_iter().chain([("out", chunk * ACT, HIDDEN)]).map(|(name, rows, cols)| {
+            (name, vec![rows, cols], (0..rows * cols).map(|_| 0.7 * random.unit()).collect())
+        });
+        write_policy(&folder, &json, tensors)?;
         for (name, seed) in [("calib.npz", 1), ("heldout.npz", 2)] {
             write_recording(&folder.join(name), seed, 6, 50)?;
         }
@@ -118,18 +110,9 @@ impl Fixture {
     }
 }
 
-/// Requires success of a command with binary output.
-fn ended_well(output: &Output) -> Result<()> {
-    ensure!(output.status.success(), "{}: {}", output.status, String::from_utf8_lossy(&output.stderr));
-    Ok(())
-}
-
 fn write_recording(path: &Path, seed: u64, episodes: usize, steps: usize) -> Result<()> {
     let mut random = Random::new(seed);
-    let mut npz = NpzWriter::new(File::create(path)?);
-    npz.add_array("obs", &Array3::from_shape_simple_fn((episodes, steps, OBS), || random.unit()))?;
-    npz.finish()?;
-    Ok(())
+    write_observations(path, &Array3::from_shape_simple_fn((episodes, steps, OBS), || random.unit()))
 }
 
 fn draw(seed: u64, steps: usize) -> Vec<Vec<f32>> {
@@ -169,7 +152,7 @@ fn observations_are_recorded_with_labels_of_f32() -> Result<()> {
         let plain = fixture.run("serve image.actq", &requests(&shown))?;
         let output = fixture.run("serve image.actq --record drive.npz --policy policy", &requests(&shown))?;
         assert_eq!(output.stdout, plain.stdout, "recording must not change an answer");
-        ended_well(&output)?;
+        answered(&output)?;
         let recorded = fixture.recording("drive.npz")?;
         let frames = |episodes: &[Vec<Vec<f32>>]| episodes.concat();
         assert_eq!(frames(&episodes(&recorded)), frames(&reach));
@@ -189,7 +172,7 @@ fn an_observation_without_action_ends_the_episode() -> Result<()> {
     let mut bad = draw(5, 1);
     bad[0][2] = f32::NAN;
     let frames = [first.clone(), bad.clone(), bad.clone(), second.clone(), bad].concat();
-    ended_well(&fixture.run("serve image.actq --record drive.npz --policy policy", &requests(&[frames]))?)?;
+    answered(&fixture.run("serve image.actq --record drive.npz --policy policy", &requests(&[frames]))?)?;
     let recorded = fixture.recording("drive.npz")?;
     assert_eq!(episodes(&recorded), [first.clone(), second.clone()]);
     assert_eq!(actions(&recorded)?, [fixture.labels(&first), fixture.labels(&second)].concat());
@@ -203,15 +186,15 @@ fn only_the_images_own_policy_labels() -> Result<()> {
     // Without its policy beside it: no labels, and one message.
     let output = fixture.run("serve image.actq --record bare.npz", &input)?;
     let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
-    ended_well(&output)?;
+    answered(&output)?;
     assert_eq!(stderr.matches("gets no array \"action\"").count(), 1, "{stderr}");
     ensure!(fixture.recording("bare.npz")?.action.is_none());
     // With its policy beside it, or named by the environment, as actq tune does.
     fs::copy(fixture.path("image.actq"), fixture.path("policy/image.actq"))?;
-    ended_well(&fixture.run("serve policy/image.actq --record beside.npz", &input)?)?;
+    answered(&fixture.run("serve policy/image.actq --record beside.npz", &input)?)?;
     let mut command = fixture.command("serve image.actq --record named.npz");
     command.env("ACTQ_POLICY", fixture.path("policy"));
-    ended_well(&run(command, &input)?)?;
+    answered(&run(command, &input)?)?;
     for name in ["beside.npz", "named.npz"] {
         ensure!(fixture.recording(name)?.action.is_some(), "{name}");
     }
@@ -227,7 +210,7 @@ fn only_the_images_own_policy_labels() -> Result<()> {
     failed(&fixture.run(&long, &input)?, 1, &["xxx.npz: cannot write the file"])?;
     failed(&fixture.run("serve image.actq --record drive.npy", &input)?, 2, &["use a name that ends in .npz"])?;
     // Without observations nothing is written.
-    ended_well(&fixture.run("serve image.actq --record empty.npz --policy policy", &[RESET; 3])?)?;
+    answered(&fixture.run("serve image.actq --record empty.npz --policy policy", &[RESET; 3])?)?;
     for name in ["other.npz", "empty.npz"] {
         ensure!(!fixture.path(name).exists(), "{name}");
     }
@@ -284,7 +267,7 @@ fn recorders_with_one_name_use_separate_files() -> Result<()> {
     for child in children {
         let output = child.wait_with_output()?;
         stderr += &String::from_utf8_lossy(&output.stderr);
-        ended_well(&output)?;
+        answered(&output)?;
     }
     assert_eq!(fs::read(fixture.path("drive-2.npz"))?, b"mine");
     ensure!(stderr.contains("drive.npz exists; recording to drive-3.npz"), "{stderr}");
@@ -340,9 +323,9 @@ fn quantize_learns_from_a_folder_of_recordings() -> Result<()> {
 fn eval_measures_on_the_images_own_path() -> Result<()> {
     let fixture = Fixture::new(Network::Lstm)?;
     let input = requests(&[draw(3, 80), draw(4, 60)]);
-    ended_well(&fixture.run("serve image.actq --record drive.npz --policy policy", &input)?)?;
+    answered(&fixture.run("serve image.actq --record drive.npz --policy policy", &input)?)?;
     // If the recording has no labels, the policy computes them.
-    ended_well(&fixture.run("serve image.actq --record bare.npz", &input)?)?;
+    answered(&fixture.run("serve image.actq --record bare.npz", &input)?)?;
     let mut own = Vec::new();
     for file in ["drive.npz", "bare.npz"] {
         let json = succeeded(&fixture.run(&format!("eval image.actq --policy policy --json --driven {file}"), b"")?)?;
@@ -362,7 +345,7 @@ fn eval_measures_on_the_images_own_path() -> Result<()> {
     // The same image from several recordings, including its own.
     let line = "quantize policy --method rtn --bits 4 --out again.actq";
     succeeded(&fixture.run(line, b"")?)?;
-    ended_well(&fixture.run("serve again.actq --record again.npz --policy policy", &input)?)?;
+    answered(&fixture.run("serve again.actq --record again.npz --policy policy", &input)?)?;
     let text = succeeded(&fixture.run(&format!("{line} --calib again.npz"), b"")?)?;
     ensure!(text.contains("own-path nmse"), "{text}");
     Ok(())

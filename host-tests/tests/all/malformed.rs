@@ -7,9 +7,10 @@ mod draft;
 use actq_kernels::ImageError as E;
 use actq_kernels::image::{header as h, op};
 
+use crate::draft::Draft;
 use draft::{
-    ACT, CHUNK, Draft, FIRST, FUNCTION, HUGE, INPUT, LAYER_NORM, LSTM, NAN, NORMALIZE, OBS, OUTPUT, STATE, UNITS,
-    VALID, refused,
+    ACT, CHUNK, FIRST, FUNCTION, HUGE, INPUT, LAYER_NORM, LSTM, NAN, NORMALIZE, OBS, OUTPUT, STATE, UNITS, VALID,
+    refused,
 };
 
 #[test]

@@ -1,7 +1,6 @@
 //! The command's outputs: never over its inputs, through links, into devices and pipes, whole or not at all.
 #![cfg(unix)]
 
-use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions, Permissions};
 use std::io::Read as _;
 use std::os::unix::fs::{FileTypeExt as _, PermissionsExt as _, symlink};
@@ -12,11 +11,10 @@ use actq_bench::command::{actq, all, failed, run, succeeded};
 use actq_bench::golden::Random;
 use anyhow::{Result, ensure};
 use ndarray::Array2;
-use ndarray_npy::NpzWriter;
-use safetensors::Dtype;
-use safetensors::tensor::{TensorView, serialize};
 use serde_json::json;
 use tempfile::TempDir;
+
+use crate::folder::{snapshot, write_observations, write_policy};
 
 const OBS: usize = 8;
 const ACT: usize = 2;
@@ -31,15 +29,11 @@ impl Fixture {
         fs::create_dir(fixture.path("policy"))?;
         let ops = [json!({"op": "linear", "w": "w"})];
         let json = json!({"name": "leg", "obs_dim": OBS, "act_dim": ACT, "ops": ops});
-        fs::write(fixture.path("policy/policy.json"), json.to_string())?;
         let mut random = Random::new(3);
-        let weights: Vec<u8> = (0..ACT * OBS).flat_map(|_| random.unit().to_le_bytes()).collect();
-        let view = TensorView::new(Dtype::F32, vec![ACT, OBS], &weights)?;
-        fs::write(fixture.path("policy/policy.safetensors"), serialize([("w", view)], None)?)?;
+        let weights = (0..ACT * OBS).map(|_| random.unit()).collect();
+        write_policy(&fixture.path("policy"), &json, [("w", vec![ACT, OBS], weights)])?;
         for name in ["policy/calib.npz", "policy/heldout.npz", "drive.npz"] {
-            let mut npz = NpzWriter::new(File::create(fixture.path(name))?);
-            npz.add_array("obs", &Array2::from_shape_simple_fn((32, OBS), || random.unit()))?;
-            npz.finish()?;
+            write_observations(&fixture.path(name), &Array2::from_shape_simple_fn((32, OBS), || random.unit()))?;
         }
         succeeded(&fixture.quantize("--out old.actq --save-stats old.json")?)?;
         Ok(fixture)
@@ -61,27 +55,6 @@ impl Fixture {
 
     fn quantize(&self, options: &str) -> Result<Output> {
         self.run(&format!("quantize policy --method rtn {options}"))
-    }
-
-    /// The content of every name: a link's target or a file's bytes.
-    fn snapshot(&self) -> Result<BTreeMap<PathBuf, Vec<u8>>> {
-        let mut found = BTreeMap::new();
-        let mut folders = vec![self.0.path().to_owned()];
-        while let Some(folder) = folders.pop() {
-            for entry in fs::read_dir(&folder)? {
-                let (path, kind) = entry.and_then(|entry| Ok((entry.path(), entry.file_type()?)))?;
-                if kind.is_dir() {
-                    folders.push(path);
-                } else if kind.is_symlink() {
-                    let target = fs::read_link(&path)?;
-                    found.insert(path, target.into_os_string().into_encoded_bytes());
-                } else if kind.is_file() {
-                    let content = fs::read(&path)?;
-                    found.insert(path, content);
-                }
-            }
-        }
-        Ok(found)
     }
 
     /// A new image, made in another way than the tested one.
@@ -157,13 +130,13 @@ fn no_output_overwrites_an_input_or_another_output() -> Result<()> {
                 Name::Hard(name, to) => fs::hard_link(fixture.path(to), fixture.path(name))?,
                 Name::None => {}
             }
-            let before = fixture.snapshot()?;
+            let before = snapshot(fixture.0.path())?;
             // The method that accepts any recording, so that nothing else stops the command from writing.
             let method = if line.starts_with("quantize") { "--method rtn" } else { "" };
             let output = fixture.run(&format!("{line} {method}"))?;
             ensure!(output.stdout.is_empty(), "the command did its work");
             failed(&output, 1, &[words])?;
-            ensure!(fixture.snapshot()? == before, "files changed");
+            ensure!(snapshot(fixture.0.path())? == before, "files changed");
             Ok(())
         };
         ((*line).to_owned(), run())

@@ -1,11 +1,14 @@
 //! Packing, the reference and the portable kernels against the definition, by property tests and on the golden cases.
 
+use actq_bench::bits;
 use actq_bench::golden::{self, Case, Draw, Random};
 use actq_kernels::arch::{BACKEND, Backend, Mismatch, Product, gemv, portable, reference};
-use actq_kernels::image::{RowBlock, largest_sum_bound, worst_case};
+use actq_kernels::image::{RowBlock, header as h, largest_sum_bound, worst_case};
 use actq_kernels::layout::{Block, BlockShape, Lanes, MAX_PAIRED_GROUPED, PackError, STRIP, Width, pack};
 use actq_kernels::x::{NotFinite, Plan, Prepared, Scale, prepare};
 use proptest::prelude::*;
+
+use crate::draft::Draft;
 
 fn shapes() -> impl Strategy<Value = BlockShape> {
     let layout = prop::sample::select(golden::layouts().collect::<Vec<_>>());
@@ -168,30 +171,20 @@ fn wrong_shapes_and_lengths_are_refused() {
     }
 }
 
-/// An image's block record with another byte for the lanes, and a valid checksum.
-fn with_lanes(image: &[u8], lanes: u8) -> Vec<u8> {
-    use actq_kernels::image::{checksum, header as h};
-    let word =
-        |bytes: &[u8], at: usize| u32::from_le_bytes(bytes[4 * at..][..4].try_into().expect("four bytes")) as usize;
-    let block = word(image, word(image, h::W_MATRICES) + 3);
-    let mut image = image.to_vec();
-    image[4 * block + 1] = lanes;
-    let crc = checksum(&image).to_le_bytes();
-    image[4 * h::W_CRC..][..4].copy_from_slice(&crc);
-    image
-}
-
 #[test]
 fn lanes_must_follow_from_the_activations() {
     let shape = BlockShape { width: Width::W2, lanes: Lanes::Paired, rows: 9, cols: 40, group: 0 };
     let image = single_matrix_image(&Case::draw(&mut Random::new(7), shape, 1, Draw::Uniform));
-    let check = |bytes: &[u8]| {
-        let buffer = actq::runtime::ImageBuffer::new(bytes);
-        actq_kernels::Image::new_checked(buffer.bytes()).map(|_| ())
+    let check = |lanes: u32| {
+        let mut image = Draft::of(&image);
+        let block = image.offset(image.offset(h::W_MATRICES) + 3);
+        image.set_low(block, image.low(block) & 0xff | lanes << 8);
+        image.seal();
+        image.check().map(|_| ())
     };
-    assert_eq!(check(&with_lanes(&image, 1)), Ok(()));
+    assert_eq!(check(1), Ok(()));
     for lanes in [0, 2, 255] {
-        assert_eq!(check(&with_lanes(&image, lanes)), Err(actq_kernels::ImageError::Lanes), "{lanes}");
+        assert_eq!(check(lanes), Err(actq_kernels::ImageError::Lanes), "{lanes}");
     }
 }
 
@@ -222,10 +215,10 @@ fn scaling_keeps_the_documented_order_of_operations() {
                 .collect();
             let mut y = vec![0.0; rows];
             block.apply(&prepared, scale, Some(&bias), &mut y).expect("the lengths fit");
-            assert_eq!(y.iter().map(|y| y.to_bits()).collect::<Vec<_>>(), expected, "{shape:?}");
+            assert_eq!(bits(&y), expected, "{shape:?}");
             let mut y: Vec<f32> = bias.iter().map(|b| f32::from_bits(*b)).collect();
             block.apply(&prepared, scale, None, &mut y).expect("the lengths fit");
-            assert_eq!(y.iter().map(|y| y.to_bits()).collect::<Vec<_>>(), expected, "{shape:?}, start in y");
+            assert_eq!(bits(&y), expected, "{shape:?}, start in y");
         }
     }
 }

@@ -1,7 +1,6 @@
 //! The action contract, chunk playback, and saved states, against plain arithmetic in f64. There is no network: the
 //! observation is the raw output, bit for bit.
 
-use std::fs;
 use std::task::Poll;
 
 use actq::contract::{ActionContract, Binarise, Ensemble, Playback};
@@ -12,7 +11,7 @@ use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
 use actq_bench::networks::Builder;
 use actq_bench::qemu::{self, Server};
-use actq_bench::{Target, firmware};
+use actq_bench::{Target, bits, firmware};
 use actq_kernels::image::Kind;
 use actq_kernels::{Head, SavedError, StepError, Width};
 use anyhow::{Result, ensure};
@@ -457,8 +456,7 @@ fn restarts_between_steps_keep_the_bits() -> Result<()> {
     let (mut policy, outcomes) = builder.finish("restarts".to_owned(), false);
     (policy.kind, policy.chunk, policy.act_len, policy.contract) = (Kind::Chunk, 4, ACT, memory(0.1));
     let buffer = ImageBuffer::new(&actq::emit::image(&policy, &outcomes)?);
-    let slot = tempfile::NamedTempFile::new()?;
-    fs::write(slot.path(), buffer.bytes())?;
+    let slot = qemu::slot(buffer.bytes())?;
     let elf = firmware::harness(Target::Fpu)?;
     let mut target = Server::start(qemu::command(&elf, Some(slot.path()), "restart")?, ACT)?;
     let mut different = 0;
@@ -466,8 +464,7 @@ fn restarts_between_steps_keep_the_bits() -> Result<()> {
         let mut before = Vec::new();
         for step in 0..600 {
             let (here, there) = (head.step(&wave(step))?, target.step(&wave(step))?);
-            let same = here.iter().zip(&there).all(|(a, b)| a.to_bits() == b.to_bits());
-            ensure!(same, "step {step}: {there:?} on the target, {here:?} on the host");
+            ensure!(bits(here) == bits(&there), "step {step}: {there:?} on the target, {here:?} on the host");
             different += usize::from(before != there);
             before = there;
         }

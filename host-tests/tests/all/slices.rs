@@ -8,9 +8,10 @@ use actq::graph::ops::{Add, Gru, LayerNorm, Linear, Lstm, Mul, Normalize, Pointw
 use actq::methods::{Activations, Outcome};
 use actq::policy::Policy;
 use actq::runtime::{ImageBuffer, with_head};
+use actq_bench::bits;
 use actq_bench::golden::Random;
-use actq_bench::networks::Builder;
-use actq_kernels::image::{Kind, header as h, seal};
+use actq_bench::networks::{Builder, with_wrong_self_test};
+use actq_kernels::image::Kind;
 use actq_kernels::math::Function;
 use actq_kernels::{Head, StepError, Width};
 use anyhow::{Context, Result, ensure};
@@ -84,16 +85,17 @@ fn observations(seed: u64) -> Vec<Vec<f32>> {
     (0..STEPS).map(|_| (0..OBSERVATION).map(|_| random.normal()).collect()).collect()
 }
 
-fn bits(action: &[f32]) -> Vec<u32> {
-    action.iter().map(|a| a.to_bits()).collect()
-}
-
-fn whole(head: &mut Head<'_, '_>, observations: &[Vec<f32>]) -> Result<Vec<Vec<u32>>> {
+/// Returns the actions of whole steps.
+pub(crate) fn whole(head: &mut Head<'_, '_>, observations: &[Vec<f32>]) -> Result<Vec<Vec<u32>>> {
     observations.iter().map(|obs| Ok(bits(head.step(obs)?))).collect()
 }
 
 /// Returns the action from polls with the budgets of `budget`, and the number of polls.
-fn in_polls(head: &mut Head<'_, '_>, obs: &[f32], mut budget: impl FnMut() -> u32) -> Result<(Vec<u32>, usize)> {
+pub(crate) fn in_polls(
+    head: &mut Head<'_, '_>,
+    obs: &[f32],
+    mut budget: impl FnMut() -> u32,
+) -> Result<(Vec<u32>, usize)> {
     head.begin(obs)?;
     for polls in 1..100_000 {
         if let Poll::Ready(action) = head.poll(budget())? {
@@ -269,8 +271,7 @@ fn an_error_resets() -> Result<()> {
     let hidden = builder.linear((64, OBSERVATION), Activations::Int8, width, 0, true)?;
     let matrix = builder.matrix(3, 64, Activations::Int8, &[Some(Width::W8); 3], 0)?;
     builder.node(Linear { matrix, bias: vec![0.0; 3] }, &[hidden])?;
-    let (policy, outcomes) = builder.finish("overflow".to_owned(), false);
-    let buffer = ImageBuffer::new(&emit::image(&policy, &outcomes)?);
+    let buffer = ImageBuffer::new(&builder.image("overflow")?);
     with_head::<_, anyhow::Error>(buffer.image(Path::new("overflow"))?, |head| {
         let observations = observations(1);
         let expected = whole(head, &observations[..1])?;
@@ -321,12 +322,7 @@ fn a_sliced_self_test_is_the_same_test() -> Result<()> {
         let (passed, _, coarsest, _) = in_pieces(&bytes, u32::MAX)?;
         assert_eq!((passed, coarsest), (Ok(()), steps));
         assert!(finest > 2 * steps, "{finest} pieces of {steps} steps");
-        let at = 4 * h::W_SELF_TEST;
-        let vector = u32::from_le_bytes(bytes[at..at + 4].try_into()?) as usize;
-        let mut wrong = bytes;
-        wrong[4 * (vector + OBSERVATION)] ^= 1;
-        seal(&mut wrong).context("its length is unchanged")?;
-        let (refused, whole, ..) = in_pieces(&wrong, 0)?;
+        let (refused, whole, ..) = in_pieces(&with_wrong_self_test(&bytes)?, 0)?;
         assert_eq!((refused, whole), (Err(StepError::SelfTest { step: 0 }), Err(StepError::SelfTest { step: 0 })));
     }
     Ok(())

@@ -1,7 +1,6 @@
 //! The smoke run of `cargo verify`: the kernels, a whole policy and the motor controller on a Cortex-M4 in QEMU.
 //! [`crate::on_target`] has all tests of this kind, on every board.
 
-use actq::data::{Recording, Sizes};
 use actq::methods::Activations;
 use actq::policy::Policy;
 use actq_bench::{Target, ur3};
@@ -18,8 +17,8 @@ fn kernels_give_the_golden_sums() -> Result<()> {
 #[test]
 fn the_ur3_policy_matches_the_host() -> Result<()> {
     let policy = Policy::load(&ur3())?;
-    let dataset = Recording::Heldout.require(Some(&ur3()), None, Sizes::of(&policy), "this test")?;
-    qemu::same_bits(Target::Fpu, &qemu::rtn(&policy, Width::W3, 0, Activations::Int8)?, &dataset)
+    let image = qemu::rtn(&policy, Width::W3, 0, Activations::Int8)?;
+    qemu::same_bits(Target::Fpu, &image, &qemu::recorded(&ur3(), &policy)?)
 }
 
 #[test]

@@ -103,7 +103,7 @@ pub struct Instruction {
 }
 
 /// Extracts the bits `low ..= high` of a halfword.
-fn bits(half: u16, high: u32, low: u32) -> u32 {
+pub(crate) fn bits(half: u16, high: u32, low: u32) -> u32 {
     (u32::from(half) >> low) & ((1 << (high - low + 1)) - 1)
 }
 

@@ -23,6 +23,11 @@ use std::path::PathBuf;
 pub use actq_boards::{Target, root, target_dir};
 pub use shared::{shared_policies, skipped};
 
+/// Returns the bits of values, to compare them exactly.
+pub fn bits(values: &[f32]) -> Vec<u32> {
+    values.iter().map(|value| value.to_bits()).collect()
+}
+
 /// Returns the folder of the project's own policy.
 pub fn ur3() -> PathBuf {
     actq_ur3::policy_folder().to_owned()

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use actq::contract::ActionContract;
+use actq::emit;
 use actq::graph::ops::{Concat, Linear, Span};
 use actq::graph::{Graph, NodeKind, ValueId, WeightMatrix};
 use actq::methods::scale::round_to_nearest;
@@ -105,6 +106,12 @@ impl Builder {
         (policy, self.outcomes)
     }
 
+    /// Returns the image of the policy without a contract.
+    pub fn image(self, name: &str) -> Result<Vec<u8>> {
+        let (policy, outcomes) = self.finish(name.to_owned(), false);
+        Ok(emit::image(&policy, &outcomes)?)
+    }
+
     /// Adds a node with its own part of the observation.
     pub fn node_of_part(&mut self, len: usize, kind: impl Into<NodeKind>) -> Result<ValueId> {
         let input = self.part(len)?;
@@ -121,12 +128,24 @@ pub fn replace_row(matrix: &mut Quantized, row: usize, other: &Quantized) {
     matrix.group_scales[row * groups..][..groups].copy_from_slice(&other.group_scales[row * groups..][..groups]);
 }
 
+/// Returns the image with another expected action in its self-test.
+pub fn with_wrong_self_test(image: &[u8]) -> Result<Vec<u8>> {
+    let obs_len = ImageBuffer::new(image).image(Path::new("the image"))?.obs_len();
+    let mut wrong = image.to_vec();
+    wrong[4 * (word(image, h::W_SELF_TEST) as usize + obs_len)] ^= 1;
+    seal(&mut wrong).context("cannot seal the image: it is too long")?;
+    Ok(wrong)
+}
+
+fn word(bytes: &[u8], at: usize) -> u32 {
+    u32::from_le_bytes([0, 1, 2, 3].map(|i| bytes[4 * at + i]))
+}
+
 /// Changes every linear operation of the image that has biases, and whose output already holds values, to accumulate:
 /// the format has such operations, and no graph lowers to one.
 pub fn accumulating(bytes: &[u8]) -> Result<Vec<u8>> {
     let name = Path::new("accumulating");
     let mut bytes = bytes.to_vec();
-    let word = |bytes: &[u8], at: usize| u32::from_le_bytes([0, 1, 2, 3].map(|i| bytes[4 * at + i]));
     let count = ImageBuffer::new(&bytes).image(name)?.op_count();
     let first = word(&bytes, h::W_OPS) as usize;
     let mut changed = 0;

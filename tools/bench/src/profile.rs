@@ -18,8 +18,7 @@ pub fn regions(
     arguments: &str,
     observations: &[Vec<f32>],
 ) -> Result<(Vec<Cost>, Vec<Vec<f32>>)> {
-    let slot = tempfile::NamedTempFile::new()?;
-    std::fs::write(slot.path(), bytes)?;
+    let slot = qemu::slot(bytes)?;
     let buffer = actq::runtime::ImageBuffer::new(bytes);
     let image = buffer.image(slot.path())?;
     let mut command = qemu::command(elf, Some(slot.path()), arguments)?;

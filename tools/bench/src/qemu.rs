@@ -8,6 +8,7 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Output, Stdio};
 use actq_boards::{Target, target_dir, version};
 use actq_link::{RESET, STEP};
 use anyhow::{Context, Result, bail, ensure};
+use tempfile::NamedTempFile;
 
 use crate::firmware::{cargo_build, symbol};
 
@@ -33,6 +34,13 @@ pub(crate) fn in_slot(command: &mut Command, elf: &Path, slot: Option<&Path>) ->
         command.arg("-device").arg(format!("loader,file={},addr={address:#x},force-raw=on", image.display()));
     }
     Ok(())
+}
+
+/// Writes an image to a temporary file, to put it into the slot.
+pub fn slot(image: &[u8]) -> Result<NamedTempFile> {
+    let file = NamedTempFile::new()?;
+    fs::write(file.path(), image)?;
+    Ok(file)
 }
 
 /// Returns the address of the firmware's image slot.
@@ -115,7 +123,7 @@ const PROFILE: &str = "release";
 #[derive(Debug)]
 pub struct Counter {
     plugin: PathBuf,
-    out: tempfile::NamedTempFile,
+    out: NamedTempFile,
 }
 
 impl Counter {
@@ -128,7 +136,7 @@ impl Counter {
             &[("ACTQ_QEMU_API", &api.to_string())],
         )?;
         let name = format!("{}insn_count{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
-        Ok(Self { plugin: target_dir().join(PROFILE).join(name), out: tempfile::NamedTempFile::new()? })
+        Ok(Self { plugin: target_dir().join(PROFILE).join(name), out: NamedTempFile::new()? })
     }
 
     /// Adds the plugin to a command that runs `elf`.
@@ -142,6 +150,16 @@ impl Counter {
             begin + begin_len,
         ));
         Ok(())
+    }
+
+    /// Runs a firmware that ends by itself with this standard input, as [`command_on`] without arguments. Returns its output and the
+    /// regions; the firmware must succeed.
+    pub fn run(&self, target: Target, elf: &Path, slot: Option<&Path>, input: &[u8]) -> Result<(String, Vec<Region>)> {
+        let mut command = command_on(target, elf, slot, "")?;
+        self.attach(&mut command, elf)?;
+        let output = run(command, input)?;
+        ensure!(output.status.success(), "{}: {output:?}", elf.display());
+        Ok((String::from_utf8(output.stdout)?, self.regions()?))
     }
 
     /// Returns the regions of the finished run, in order.

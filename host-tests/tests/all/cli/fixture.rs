@@ -13,9 +13,10 @@ use anyhow::{Context, Result, ensure};
 use ndarray::{Array1, Array3};
 use ndarray_npy::{NpzWriter, WriteNpyExt as _};
 use safetensors::Dtype;
-use safetensors::tensor::{TensorView, serialize};
 use serde_json::{Value, json};
 use tempfile::TempDir;
+
+use crate::folder::{self, snapshot};
 
 pub(super) const OBS: usize = 40;
 pub(super) const HIDDEN: usize = 64;
@@ -82,21 +83,7 @@ impl Fixture {
 
     /// Every file's content and every folder.
     pub(super) fn snapshot(&self) -> Result<BTreeMap<PathBuf, Option<Vec<u8>>>> {
-        let mut found = BTreeMap::new();
-        let mut folders = vec![self.0.path().to_owned()];
-        while let Some(folder) = folders.pop() {
-            for entry in fs::read_dir(&folder)? {
-                let path = entry?.path();
-                if path.is_dir() {
-                    folders.push(path.clone());
-                    found.insert(path, None);
-                } else {
-                    let content = fs::read(&path)?;
-                    found.insert(path, Some(content));
-                }
-            }
-        }
-        Ok(found)
+        snapshot(self.0.path())
     }
 }
 
@@ -119,7 +106,7 @@ pub(super) fn description() -> Value {
     })
 }
 
-pub(super) type Tensors = BTreeMap<&'static str, (Dtype, Vec<usize>, Vec<u8>)>;
+pub(super) type Tensors = BTreeMap<&'static str, folder::Tensor>;
 
 /// Random weights; matrices keep the variance of their input.
 pub(super) fn tensors() -> Tensors {
@@ -145,9 +132,7 @@ pub(super) fn write_json(policy: &Path, json: &Value) -> Result<()> {
 }
 
 pub(super) fn write_tensors(policy: &Path, tensors: &Tensors) -> Result<()> {
-    let views =
-        tensors.iter().map(|(name, (dtype, shape, bytes))| Ok((*name, TensorView::new(*dtype, shape.clone(), bytes)?)));
-    Ok(fs::write(policy.join("policy.safetensors"), serialize(views.collect::<Result<Vec<_>>>()?, None)?)?)
+    folder::write_tensors(policy, &tensors.clone().into_iter().collect::<Vec<_>>())
 }
 
 pub(super) fn draw_observations(seed: u64, width: usize) -> Array3<f32> {

@@ -5,7 +5,8 @@ use actq_kernels::image::header as h;
 use actq_kernels::image::op;
 use actq_kernels::{Head, Image, ImageError as E, StepError};
 
-use super::draft::{Change, Draft, FIRST, FUNCTION, HUGE, LAYER_NORM, LSTM, NORMALIZE, OBS, OUTPUT, UNITS, VALID};
+use super::draft::{Change, FIRST, FUNCTION, HUGE, LAYER_NORM, LSTM, NORMALIZE, OBS, OUTPUT, UNITS, VALID};
+use crate::draft::Draft;
 
 #[test]
 fn the_undamaged_image_is_valid_and_four_kib() {

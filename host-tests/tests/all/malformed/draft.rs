@@ -1,4 +1,4 @@
-//! A valid image whose words tests change.
+//! A valid image, and changes of it.
 
 use std::sync::LazyLock;
 
@@ -10,10 +10,12 @@ use actq::methods::{Method, Options, Outcome, quantize};
 use actq::policy::Policy;
 use actq_bench::golden::Random;
 use actq_bench::networks::replace_row;
-use actq_kernels::image::{Kind, checksum, header as h, op};
+use actq_kernels::ImageError as E;
+use actq_kernels::image::{Kind, op};
 use actq_kernels::layout::Width;
 use actq_kernels::math::Function;
-use actq_kernels::{Image, ImageError as E};
+
+use crate::draft::Draft;
 
 pub(super) const OBS: usize = 10;
 pub(super) const UNITS: usize = 24;
@@ -76,14 +78,7 @@ fn interleaved(a: &Outcome, b: &Outcome) -> Outcome {
     out
 }
 
-/// An image whose words tests change.
-#[derive(Clone)]
-pub(super) struct Draft(pub(super) Vec<u32>);
-
-pub(super) static VALID: LazyLock<Draft> = LazyLock::new(|| {
-    let bytes = valid_image();
-    Draft(bytes.chunks_exact(4).map(|w| u32::from_ne_bytes([w[0], w[1], w[2], w[3]])).collect())
-});
+pub(super) static VALID: LazyLock<Draft> = LazyLock::new(|| Draft::of(&valid_image()));
 
 /// Operations of the valid image: linear operations are the first layer, the LSTM's two products and the output layer.
 pub(super) const FIRST: (u8, usize) = (op::LINEAR, 0);
@@ -94,69 +89,6 @@ pub(super) const NORMALIZE: (u8, usize) = (op::NORMALIZE, 0);
 pub(super) const LAYER_NORM: (u8, usize) = (op::LAYER_NORM, 0);
 pub(super) const FUNCTION: (u8, usize) = (op::FUNCTION, 0);
 pub(super) const LSTM: (u8, usize) = (op::LSTM_CELL, 0);
-
-impl Draft {
-    pub(super) fn bytes(&self) -> &[u8] {
-        bytemuck::cast_slice(&self.0)
-    }
-
-    pub(super) fn check(&self) -> Result<Image<'_>, E> {
-        Image::new_checked(self.bytes())
-    }
-
-    pub(super) fn get(&self, at: usize) -> u32 {
-        u32::from_le(self.0[at])
-    }
-
-    pub(super) fn offset(&self, at: usize) -> usize {
-        self.get(at) as usize
-    }
-
-    pub(super) fn low(&self, at: usize) -> u32 {
-        self.get(at) & 0xffff
-    }
-
-    pub(super) fn high(&self, at: usize) -> u32 {
-        self.get(at) >> 16
-    }
-
-    pub(super) fn set(&mut self, at: usize, value: u32) {
-        self.0[at] = value.to_le();
-    }
-
-    pub(super) fn set_f32(&mut self, at: usize, value: f32) {
-        self.set(at, value.to_bits());
-    }
-
-    pub(super) fn set_low(&mut self, at: usize, value: u32) {
-        self.set(at, (self.get(at) & 0xffff_0000) | value);
-    }
-
-    pub(super) fn set_high(&mut self, at: usize, value: u32) {
-        self.set(at, self.low(at) | value << 16);
-    }
-
-    /// Updates the checksum.
-    pub(super) fn seal(&mut self) {
-        self.set(h::W_CRC, checksum(self.bytes()));
-    }
-
-    /// Returns the position of the record of the `nth` operation with this code.
-    pub(super) fn op(&self, (code, nth): (u8, usize)) -> usize {
-        let records = (0..self.high(h::W_KIND) as usize).map(|i| self.offset(h::W_OPS) + i * h::OP_WORDS);
-        records.filter(|&at| self.get(at) as u8 == code).nth(nth).expect("the image has the operation")
-    }
-
-    /// Returns the position of the constants or the matrix record of an operation.
-    pub(super) fn data(&self, which: (u8, usize)) -> usize {
-        self.offset(self.op(which) + 3)
-    }
-
-    /// Returns the position of block record `i` of a linear operation.
-    pub(super) fn block(&self, which: (u8, usize), i: usize) -> usize {
-        self.offset(self.data(which) + 3) + i * h::BLOCK_WORDS
-    }
-}
 
 pub(super) const NAN: f32 = f32::NAN;
 /// Offsets whose sum with a length does not fit 32 bits.

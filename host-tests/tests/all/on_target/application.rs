@@ -2,28 +2,25 @@
 //! and their reported causes.
 
 use std::fs;
-use std::io::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use actq::methods::Activations;
 use actq::runtime::ImageBuffer;
-use actq_bench::Target;
 use actq_bench::controller::{Controller, HANG_TIMEOUT, act, act_in_order, wait_until};
 use actq_bench::cycles::{Code, Function};
 use actq_bench::firmware::{self, built_in, halfword_at};
-use actq_bench::networks::Builder;
+use actq_bench::networks::{Builder, with_wrong_self_test};
 use actq_bench::stack::worst_case;
+use actq_bench::{Target, bits, qemu};
 use actq_client::client::Client;
 use actq_client::keys;
 use actq_client::push::{Package, push};
-use actq_kernels::image::{header as h, seal};
 use actq_kernels::{Image, Width};
 use actq_link::code::{Crash, Fault, Refusal, ResetCause, State};
-use actq_link::report::BUILT_IN;
+use actq_link::report::{BUILT_IN, Breadcrumb};
 use actq_ur3::{ACT_DIM, OBS_DIM};
 use anyhow::{Context, Result, ensure};
-use tempfile::NamedTempFile;
 
 /// The boards with a device for the application.
 const BOARDS: [Target; 4] = [Target::Fpu, Target::M33, Target::M7, Target::F405];
@@ -36,10 +33,17 @@ fn start(target: Target, features: &'static str) -> Result<(Controller, Client)>
     Ok((controller, client))
 }
 
-pub(super) fn self_test(image: &Image<'_>, step: usize) -> Option<(Vec<f32>, Vec<u32>)> {
-    let (observation, action) = image.self_test(step)?;
+/// Returns an observation of the image's self-test, and the bits of its action.
+pub(super) fn self_test(image: &Image<'_>, step: usize) -> Result<(Vec<f32>, Vec<u32>)> {
+    let (observation, action) = image.self_test(step).context("the image has no such step of its self-test")?;
     let observation = observation.iter().map(|word| f32::from_bits(u32::from_le(*word))).collect();
-    Some((observation, action.iter().map(|word| u32::from_le(*word)).collect()))
+    Ok((observation, action.iter().map(|word| u32::from_le(*word)).collect()))
+}
+
+/// Returns the first observation of the built-in image's self-test.
+fn observation() -> Result<Vec<f32>> {
+    let buffer = ImageBuffer::read(built_in()?)?;
+    Ok(self_test(&buffer.image(built_in()?)?, 0)?.0)
 }
 
 /// A small image of the built-in one's lengths: QEMU's serial ports read one byte at a time.
@@ -61,21 +65,6 @@ fn small_within(limit: Option<f32>) -> Result<Vec<u8>> {
     Ok(actq::emit::image(&policy, &outcomes)?)
 }
 
-/// The image with another expected action in its self-test.
-fn with_wrong_self_test(mut bytes: Vec<u8>) -> Result<Vec<u8>> {
-    let at = 4 * h::W_SELF_TEST;
-    let begin = u32::from_le_bytes(bytes[at..at + 4].try_into()?) as usize + OBS_DIM;
-    bytes[4 * begin] ^= 1;
-    seal(&mut bytes).context("its length is unchanged")?;
-    Ok(bytes)
-}
-
-pub(super) fn file(bytes: &[u8]) -> Result<NamedTempFile> {
-    let mut file = NamedTempFile::new()?;
-    file.write_all(bytes)?;
-    Ok(file)
-}
-
 #[test]
 fn every_board_starts_and_matches_the_host() -> Result<()> {
     BOARDS.into_iter().try_for_each(starts_and_acts_with_the_bits_of_the_host)
@@ -92,11 +81,10 @@ pub(crate) fn starts_and_acts_with_the_bits_of_the_host(target: Target) -> Resul
     assert_eq!((usize::from(status.observation), usize::from(status.axes)), (image.obs_len(), image.act_len()));
     assert_eq!(client.breadcrumb()?.crash, None, "{target:?}");
     let steps = (0..image.self_test_steps()).map(|step| self_test(&image, step));
-    let (observations, expected): (Vec<_>, Vec<_>) =
-        steps.collect::<Option<Vec<_>>>().context("a self-test step is missing")?.into_iter().unzip();
+    let (observations, expected): (Vec<_>, Vec<_>) = steps.collect::<Result<Vec<_>>>()?.into_iter().unzip();
     for (step, (applied, action)) in act_in_order(&mut client, &observations)?.into_iter().enumerate() {
         assert!(!applied);
-        assert_eq!(action.iter().map(|v| v.to_bits()).collect::<Vec<_>>(), expected[step], "{target:?}, step {step}");
+        assert_eq!(bits(&action), expected[step], "{target:?}, step {step}");
     }
     if target == Target::F405 {
         // QEMU has no clocks for it: the wait for the crystal times out, and nothing may move at another rate.
@@ -107,7 +95,7 @@ pub(crate) fn starts_and_acts_with_the_bits_of_the_host(target: Target) -> Resul
         assert_eq!(client.status()?.slot, BUILT_IN);
         return Ok(());
     }
-    let (observation, _) = self_test(&image, 0).context("the image has no self-test")?;
+    let (observation, _) = self_test(&image, 0)?;
     assert_eq!(client.get(actq_link::code::Parameter::High, 0)?, 1.5, "{target:?}: not the contract's limit");
     let mut armed = || -> Result<(bool, Vec<f32>)> {
         arm(&mut client, &observation)?;
@@ -153,10 +141,8 @@ fn package(image: &[u8]) -> Package<'_> {
 /// evaluations.
 #[test]
 fn a_background_head_leaves_the_tick_undisturbed() -> Result<()> {
-    let buffer = ImageBuffer::read(built_in()?)?;
-    let image = buffer.image(built_in()?)?;
     let (_controller, mut client) = start(Target::Fpu, "tick-8khz")?;
-    let (observation, _) = self_test(&image, 0).context("the image has no self-test")?;
+    let observation = observation()?;
     for _ in 0..20 {
         act(&mut client, &observation)?;
     }
@@ -172,13 +158,9 @@ fn a_background_head_leaves_the_tick_undisturbed() -> Result<()> {
 /// takes 32 ns for an instruction.
 #[test]
 fn a_current_loop_leaves_room_for_the_head() -> Result<()> {
-    let buffer = ImageBuffer::read(built_in()?)?;
-    let image = buffer.image(built_in()?)?;
-    let (observation, _) = self_test(&image, 0).context("the image has no self-test")?;
+    let observation = observation()?;
     for (features, period) in [("foc", 1_000_000), ("foc,tick-8khz", 125_000)] {
-        let elf = firmware::controller(Target::Fpu, features)?;
-        let controller = Controller::start(Target::Fpu, &elf, None)?;
-        let mut client = controller.client()?;
+        let (_controller, mut client) = start(Target::Fpu, features)?;
         // On a busy machine it may latch at the deadline; it then drives the motor to 0.
         arm(&mut client, &observation)?;
         for _ in 0..20 {
@@ -205,9 +187,9 @@ fn an_unsuitable_image_is_refused_with_its_reason() -> Result<()> {
     for (target, bytes, refusal) in BOARDS
         .map(|target| (target, damaged.clone(), Refusal::Image))
         .into_iter()
-        .chain([(Target::F405, with_wrong_self_test(fs::read(built_in()?)?)?, Refusal::SelfTest)])
+        .chain([(Target::F405, with_wrong_self_test(&fs::read(built_in()?)?)?, Refusal::SelfTest)])
     {
-        let slot = file(&bytes)?;
+        let slot = qemu::slot(&bytes)?;
         let controller = Controller::start(target, &firmware::controller(target, "")?, Some(slot.path()))?;
         let mut client = controller.client()?;
         client.observe(&observation)?;
@@ -248,15 +230,19 @@ fn the_watchdog_resets_a_board_without_progress() -> Result<()> {
     Ok(())
 }
 
+/// Makes a board crash by this command of the feature `faults`. Returns the program, and the record after the reset.
+fn crumb_of(target: Target, command: u8) -> Result<(PathBuf, Breadcrumb)> {
+    let (_controller, mut client) = start(target, "faults")?;
+    client.status()?;
+    client.connection_mut().raw(&[0, command, 0]);
+    wait_until(&mut client, "reset", |status| status.reset == ResetCause::Software)?;
+    Ok((firmware::controller(target, "faults")?, client.breadcrumb()?))
+}
+
 #[test]
 fn a_hard_fault_leaves_its_address() -> Result<()> {
     for target in BOARDS {
-        let elf = firmware::controller(target, "faults")?;
-        let (_controller, mut client) = start(target, "faults")?;
-        client.status()?;
-        client.connection_mut().raw(&[0, b'h', 0]);
-        wait_until(&mut client, "reset", |status| status.reset == ResetCause::Software)?;
-        let crumb = client.breadcrumb()?;
+        let (elf, crumb) = crumb_of(target, b'h')?;
         assert_eq!(crumb.crash, Some(Crash::HardFault), "{target:?}");
         let instruction = halfword_at(&elf, crumb.pc)? & 0xff00;
         ensure!(instruction == 0xde00, "{target:?}: {crumb:?} is {instruction:04x}, not the UDF");
@@ -269,12 +255,7 @@ fn a_hard_fault_leaves_its_address() -> Result<()> {
 #[test]
 fn a_stack_overflow_leaves_its_place() -> Result<()> {
     for target in BOARDS {
-        let elf = firmware::controller(target, "faults")?;
-        let (_controller, mut client) = start(target, "faults")?;
-        client.status()?;
-        client.connection_mut().raw(&[0, b's', 0]);
-        wait_until(&mut client, "reset", |status| status.reset == ResetCause::Software)?;
-        let crumb = client.breadcrumb()?;
+        let (elf, crumb) = crumb_of(target, b's')?;
         // The record must survive: its memory is the nearest below the stack.
         assert_eq!((crumb.crash, crumb.count), (Some(Crash::StackOverflow), 1), "{target:?}");
         let code = Code::read(&elf)?;
@@ -326,12 +307,12 @@ fn the_application_is_small_and_has_no_panic() -> Result<()> {
 }
 
 /// Requires that the image of this slot still runs after a reset, and gives these bits.
-fn runs_over_a_reset(client: &mut Client, slot: u8, observation: &[f32], bits: &[u32]) -> Result<()> {
+fn runs_over_a_reset(client: &mut Client, slot: u8, observation: &[f32], expected: &[u32]) -> Result<()> {
     client.connection_mut().raw(&[0, b'p', 0]);
     let status = wait_until(client, "reset", |status| status.reset == ResetCause::Software)?;
     ensure!(status.slot == slot, "not kept: {status:?}");
     let (_, action) = act(client, observation)?;
-    ensure!(action.iter().map(|v| v.to_bits()).eq(bits.iter().copied()), "other bits: {action:?}");
+    ensure!(bits(&action) == expected, "other bits: {action:?}");
     Ok(())
 }
 
@@ -343,13 +324,12 @@ const PRIVATE_KEY: &str = "-----BEGIN PRIVATE KEY-----\nMC4CAQAwBQYDK2VwBCIEINTu
 /// image.
 #[test]
 fn a_keyed_build_runs_only_signed_images() -> Result<()> {
-    let pem = file(PRIVATE_KEY.as_bytes())?;
+    let pem = qemu::slot(PRIVATE_KEY.as_bytes())?;
     let key = keys::read(pem.path())?;
     let new = small()?;
     let signature = keys::sign(&key, &new, 1)?.check(&new)?;
-    let (observation, bits) =
-        self_test(&ImageBuffer::new(&new).image(Path::new("small"))?, 0).context("the image has no self-test")?;
-    let slot = file(&new)?;
+    let (observation, bits) = self_test(&ImageBuffer::new(&new).image(Path::new("small"))?, 0)?;
+    let slot = qemu::slot(&new)?;
     for target in FULL_BOARDS {
         let elf = firmware::controller_of_key(target, "signed,faults", &keys::public(&key))?;
         let error = format!(
@@ -388,8 +368,8 @@ fn an_invalid_key_does_not_build() {
 #[test]
 fn updates_install_and_failed_ones_roll_back() -> Result<()> {
     let new = ImageBuffer::new(&small()?);
-    let wrong = with_wrong_self_test(small()?)?;
-    let (observation, bits) = self_test(&new.image(Path::new("small"))?, 0).context("the image has no self-test")?;
+    let wrong = with_wrong_self_test(&small()?)?;
+    let (observation, bits) = self_test(&new.image(Path::new("small"))?, 0)?;
     for target in FULL_BOARDS {
         let (_controller, mut client) = start(target, "faults")?;
         let error = push(&mut client, &package(&wrong), |_| {}).expect_err("its self-test fails");
@@ -409,8 +389,7 @@ fn updates_install_and_failed_ones_roll_back() -> Result<()> {
 /// Without observations the outputs go to their safe action, and stay there until armed again.
 #[test]
 fn a_silent_host_is_detected_at_the_deadline() -> Result<()> {
-    let buffer = ImageBuffer::read(built_in()?)?;
-    let (observation, _) = self_test(&buffer.image(built_in()?)?, 0).context("the image has no self-test")?;
+    let observation = observation()?;
     let (_controller, mut client) = start(Target::Fpu, "")?;
     arm(&mut client, &observation)?;
     let status = wait_until(&mut client, "latched", |status| status.state == State::Latched)?;

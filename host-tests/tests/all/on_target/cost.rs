@@ -14,7 +14,7 @@ use actq::random::Random;
 use actq::runtime::{ImageBuffer, with_head};
 use actq_bench::networks::{Builder, accumulating};
 use actq_bench::qemu::{self, Counter};
-use actq_bench::{Target, firmware, profile, shared_policies, ur3};
+use actq_bench::{Target, bits, firmware, profile, shared_policies, ur3};
 use actq_kernels::image::Kind;
 use actq_kernels::pace::cost::{Cost, of_op, of_step};
 use actq_kernels::{StepError, Width};
@@ -45,6 +45,21 @@ fn observations(dir: &Path, policy: &Policy) -> Result<Vec<Vec<f32>>> {
     Ok(all.iter().step_by(all.len() / STEPS).take(STEPS).cloned().collect())
 }
 
+/// Compares a predicted cost with the mean of counted ones, up to a relative error; returns the mean of the instructions.
+fn near(what: &str, predicted: Cost, counted: &[Cost], limit: f64) -> Result<f64> {
+    let mean = |of: fn(&Cost) -> u64| counted.iter().map(of).sum::<u64>() as f64 / counted.len() as f64;
+    let instructions = mean(|c| c.instructions);
+    for (unit, predicted, counted) in
+        [("instructions", predicted.instructions, instructions), ("cycles", predicted.cycles, mean(|c| c.cycles))]
+    {
+        let error = predicted as f64 / counted - 1.0;
+        let text = format!("{what}: {predicted} {unit}, {counted:.0} counted: {:+.2}%", 1e2 * error);
+        println!("{text}");
+        ensure!(error.abs() < limit, "{text}");
+    }
+    Ok(instructions)
+}
+
 /// Predicts the step of every image, and compares with the mean over recorded observations. Returns the counted
 /// instructions per weight of the f32 policy.
 fn predictions_hold(dir: &Path, images: &[Options]) -> Result<Vec<f64>> {
@@ -58,21 +73,11 @@ fn predictions_hold(dir: &Path, images: &[Options]) -> Result<Vec<f64>> {
         let image = buffer.image(dir)?;
         let counted: Vec<Cost> = profile::steps(&elf, &counter, &bytes, &observations)?;
         let evaluated: Vec<Cost> = counted.iter().step_by(image.execute()).copied().collect();
-        let mean = |of: fn(&Cost) -> u64| evaluated.iter().map(of).sum::<u64>() as f64 / evaluated.len() as f64;
         let predicted = of_step(&image);
-        for (what, predicted, counted) in [
-            ("instructions", predicted.instructions, mean(|c| c.instructions)),
-            ("cycles", predicted.cycles, mean(|c| c.cycles)),
-        ] {
-            let error = predicted as f64 / counted - 1.0;
-            let at =
-                format!("{}, {options:?}: {predicted} {what}, {counted:.0} counted: {:+.2}%", policy.name, 1e2 * error);
-            println!("{at}");
-            ensure!(error.abs() < ERROR, "{at}");
-        }
+        let instructions = near(&format!("{}, {options:?}", policy.name), predicted, &evaluated, ERROR)?;
         let time = StepTime::new(&image, CLOCK);
         ensure!(time.cycles == predicted.cycles && time.instructions == predicted.instructions, "{time:?}");
-        per_mac.push(mean(|c| c.instructions) / policy.weights as f64);
+        per_mac.push(instructions / policy.weights as f64);
     }
     Ok(per_mac)
 }
@@ -99,15 +104,7 @@ fn steps_that_merge_chunks_match_the_prediction() -> Result<()> {
         let predicted = of_step(&buffer.image(Path::new("chunks"))?);
         // Before the second chunk there is none to blend with.
         let counted = &profile::steps(&elf, &counter, &bytes, &observations)?[1..];
-        let mean = |of: fn(&Cost) -> u64| counted.iter().map(of).sum::<u64>() as f64 / counted.len() as f64;
-        for (what, predicted, counted) in [
-            ("instructions", predicted.instructions, mean(|c| c.instructions)),
-            ("cycles", predicted.cycles, mean(|c| c.cycles)),
-        ] {
-            let error = predicted as f64 / counted - 1.0;
-            println!("{}: {predicted} {what}, {counted:.0} counted: {:+.2}%", policy.name, 1e2 * error);
-            ensure!(error.abs() < 0.03, "{}: {predicted} {what}, {counted:.0} counted", policy.name);
-        }
+        near(&policy.name, predicted, counted, 0.03)?;
     }
     Ok(())
 }
@@ -159,8 +156,7 @@ fn polls_keep_their_budget(dir: &Path, images: &[Options]) -> Result<usize> {
             let at = || format!("{}, {options:?} in polls of {budget}", policy.name);
             let arguments = format!("poll {budget}");
             if budget < image.least_budget() {
-                let slot = tempfile::NamedTempFile::new()?;
-                std::fs::write(slot.path(), &bytes)?;
+                let slot = qemu::slot(&bytes)?;
                 let command = qemu::command(&elf, Some(slot.path()), &arguments)?;
                 let output = qemu::run(command, &qemu::step_request(&observations[0]))?;
                 let refusal = StepError::Budget { needed: image.least_budget(), given: budget };
@@ -171,8 +167,7 @@ fn polls_keep_their_budget(dir: &Path, images: &[Options]) -> Result<usize> {
             }
             let run = profile::regions(&elf, &counter, &bytes, &arguments, &observations[..4]);
             let (costs, actions) = run.with_context(at)?;
-            let bits = |actions: &[Vec<f32>]| actions.iter().flatten().map(|a| a.to_bits()).collect::<Vec<_>>();
-            ensure!(bits(&actions) == bits(&expected), "{}: other bits", at());
+            ensure!(bits(&actions.concat()) == bits(&expected.concat()), "{}: other bits", at());
             let largest = costs.iter().map(|c| c.instructions).max().unwrap_or(0);
             let all: u64 = costs.iter().map(|c| c.instructions).sum();
             println!("{}: {} polls, the largest {largest}, in all {all}", at(), costs.len());
@@ -237,8 +232,7 @@ fn mixed_widths_cost_little_more_than_their_blocks() -> Result<()> {
         }
         linear(&mut builder, 4 * ROWS, &|row| Width::ALL[row / ROWS])?;
         linear(&mut builder, 4 * ROWS, &|row| Width::ALL[row % 4])?;
-        let (policy, outcomes) = builder.finish("mixed".to_owned(), false);
-        let bytes = emit::image(&policy, &outcomes)?;
+        let bytes = builder.image("mixed")?;
         let buffer = ImageBuffer::new(&bytes);
         let image = buffer.image(Path::new("mixed"))?;
         let observation = (0..COLS).map(|i| (i as f32).sin()).collect();
@@ -265,8 +259,7 @@ fn polls_that_add_biases_stay_within_their_budget() -> Result<()> {
         builder.linear((ROWS, COLS), Activations::Int8, |_| Some(Width::W2), 0, true)?;
     }
     builder.part(2)?;
-    let (policy, outcomes) = builder.finish("biases".to_owned(), false);
-    let bytes = accumulating(&emit::image(&policy, &outcomes)?)?;
+    let bytes = accumulating(&builder.image("biases")?)?;
     let buffer = ImageBuffer::new(&bytes);
     let image = buffer.image(Path::new("biases"))?;
     let observations = [(0..COLS).map(|i| (i as f32).sin()).collect::<Vec<_>>()];
@@ -279,13 +272,7 @@ fn polls_that_add_biases_stay_within_their_budget() -> Result<()> {
     let parts = profile::parts(&elf, &counter, &image, &bytes, &observations, u32::MAX)?.remove(0);
     let linear = image.ops().zip(&parts.ops).filter(|(op, _)| op.matrix().is_some());
     for (op, counted) in linear {
-        let predicted = of_op(&op);
-        println!("{:?}: {predicted:?}, counted {counted:?}", op.kind);
-        for (predicted, counted) in [(predicted.instructions, counted.instructions), (predicted.cycles, counted.cycles)]
-        {
-            let error = predicted as f64 / counted as f64 - 1.0;
-            ensure!(error.abs() < 0.03, "{:?}: {predicted} for {counted}: {:+.2}%", op.kind, 1e2 * error);
-        }
+        near(&format!("{:?}", op.kind), of_op(&op), &[*counted], 0.03)?;
     }
     Ok(())
 }

@@ -10,9 +10,8 @@ use actq::pipeline::quantize;
 use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
 use actq_bench::cycles::Code;
-use actq_bench::qemu::Counter;
+use actq_bench::qemu::{self, Counter};
 use actq_bench::{Target, evaluation, firmware, ur3};
-use actq_cli::outputs::files;
 use actq_kernels::Width;
 use anyhow::Result;
 
@@ -22,9 +21,8 @@ fn a_step_reads_each_weight_once() -> Result<()> {
     let policy = Policy::load(&dir)?;
     let options = Options::new(Method::Rtn, Budget::Width(Width::W8));
     let bytes = quantize(&policy, &Recordings::default(), &options, ())?.image;
-    let file = tempfile::NamedTempFile::new()?;
-    let path = file.path();
-    files::write(path, &bytes)?;
+    let slot = qemu::slot(&bytes)?;
+    let path = slot.path();
     let buffer = ImageBuffer::new(&bytes);
     let image = buffer.image(path)?;
     let recorded = eval::heldout(&dir, &image)?;

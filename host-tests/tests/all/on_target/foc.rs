@@ -13,15 +13,11 @@ use anyhow::{Context as _, Result, ensure};
 
 /// The firmware's output, and the cost of its counted regions.
 fn counted(name: &str) -> Result<(String, Vec<Cost>)> {
-    let (elf, counter) = (firmware::binary(name, Target::Fpu)?, Counter::build()?);
-    let mut command = qemu::command(&elf, None, "")?;
-    counter.attach(&mut command, &elf)?;
-    let output = qemu::run(command, &[])?;
-    ensure!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let elf = firmware::binary(name, Target::Fpu)?;
+    let (text, regions) = Counter::build()?.run(Target::Fpu, &elf, None, &[])?;
     let code = Code::read(&elf)?;
     let cost = |region: Region| Ok(Cost { instructions: region.instructions, cycles: code.cycles(&region, 0)? });
-    let costs = counter.regions()?.into_iter().map(cost).collect::<Result<_>>()?;
-    Ok((String::from_utf8(output.stdout)?, costs))
+    Ok((text, regions.into_iter().map(cost).collect::<Result<_>>()?))
 }
 
 fn without_fpu(name: &str) -> Result<String> {

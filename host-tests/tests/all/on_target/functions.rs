@@ -9,7 +9,6 @@ use actq::runtime::ImageBuffer;
 use actq_bench::cycles::Code;
 use actq_bench::qemu::{self, Counter};
 use actq_bench::{Target, firmware, shared_policies};
-use actq_cli::outputs::files;
 use actq_firmware_bench::functions::{DENOISED, EXTREMES, LEN, hash, magnitudes, values};
 use actq_kernels::Width;
 use actq_kernels::math::Function;
@@ -101,12 +100,8 @@ fn expected() -> Vec<(&'static str, u32)> {
 #[test]
 fn every_function_keeps_its_bits_and_instruction_limit() -> Result<()> {
     let elf = firmware::binary("functions", Target::Fpu)?;
-    let counter = Counter::build()?;
-    let mut command = qemu::command(&elf, None, "")?;
-    counter.attach(&mut command, &elf)?;
-    let output = qemu::run(command, &[])?;
-    ensure!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let (text, regions, code) = (String::from_utf8(output.stdout)?, counter.regions()?, Code::read(&elf)?);
+    let (text, regions) = Counter::build()?.run(Target::Fpu, &elf, None, &[])?;
+    let code = Code::read(&elf)?;
     let expected = expected();
     ensure!(text.lines().count() == expected.len() && regions.len() == expected.len(), "{text}");
     for ((line, region), (name, hash)) in text.lines().zip(regions).zip(expected) {
@@ -129,17 +124,12 @@ fn an_lstm_head_keeps_its_instruction_limit() -> Result<()> {
     let policy = Policy::load(&policies.join("g1_lstm256"))?;
     let options = Options::new(Method::Rtn, Budget::Width(Width::W3));
     let bytes = quantize(&policy, &Recordings::default(), &options, ())?.image;
-    let file = tempfile::NamedTempFile::new()?;
-    files::write(file.path(), &bytes)?;
+    let slot = qemu::slot(&bytes)?;
     let buffer = ImageBuffer::new(&bytes);
-    let matrices = buffer.image(file.path())?.ops().filter_map(|op| op.matrix());
+    let matrices = buffer.image(slot.path())?.ops().filter_map(|op| op.matrix());
     let macs = matrices.map(|matrix| matrix.rows * matrix.cols).sum::<usize>() as f64;
     let elf = firmware::harness(Target::Fpu)?;
-    let counter = Counter::build()?;
-    let mut command = qemu::command(&elf, Some(file.path()), "")?;
-    counter.attach(&mut command, &elf)?;
-    ensure!(qemu::run(command, &[])?.status.success(), "the firmware failed");
-    let regions = counter.regions()?;
+    let (_, regions) = Counter::build()?.run(Target::Fpu, &elf, Some(slot.path()), &[])?;
     ensure!(!regions.is_empty(), "counted no step");
     for count in regions.into_iter().map(|region| region.instructions) {
         println!("g1_lstm256 at 3 bits: {:.3} instructions per MAC", count as f64 / macs);

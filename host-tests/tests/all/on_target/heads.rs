@@ -8,7 +8,7 @@ use actq::pipeline::quantize;
 use actq::random::Random;
 use actq::runtime::{ImageBuffer, with_head};
 use actq_bench::qemu::Counter;
-use actq_bench::{Target, firmware, profile};
+use actq_bench::{Target, bits, firmware, profile};
 use actq_heads::{octo, oft};
 use actq_kernels::Width;
 use anyhow::{Result, bail, ensure};
@@ -39,7 +39,6 @@ fn octos_head_matches_the_prediction_and_the_host() -> Result<()> {
         let buffer = ImageBuffer::new(&bytes);
         let image = buffer.image("octo".as_ref())?;
         let (costs, actions) = profile::regions(&elf, &counter, &bytes, "serve", std::slice::from_ref(&observation))?;
-        let bits = |action: &[f32]| action.iter().map(|a| a.to_bits()).collect::<Vec<_>>();
         let expected = with_head::<_, anyhow::Error>(image, |head| Ok(bits(head.step(&observation)?)))?;
         ensure!(bits(&actions[0]) == expected, "the bits differ in {steps} steps");
         let time = StepTime::new(&image, CLOCK);

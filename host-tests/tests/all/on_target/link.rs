@@ -12,7 +12,7 @@ use actq_bench::Target;
 use actq_bench::command::{actq, answered, failed, run, succeeded};
 use actq_bench::controller::{Controller, HANG_TIMEOUT, act};
 use actq_bench::firmware;
-use actq_bench::qemu::step_request;
+use actq_bench::qemu::{self, step_request};
 use actq_boards::Clock;
 use actq_firmware_demo::timeouts::TIMEOUTS;
 use actq_link::code::{Report, ResetCause, State};
@@ -21,11 +21,11 @@ use actq_link::{Message, RESET, Receiver, Sender, frame};
 use anyhow::{Context as _, Result, ensure};
 use tempfile::NamedTempFile;
 
-use super::application::{file, self_test, small_with_limits};
+use super::application::{self_test, small_with_limits};
 
 /// Starts the application with a small image in the slot, as fast as the host: a byte takes 40 µs.
 fn start() -> Result<(Controller, NamedTempFile)> {
-    let slot = file(&small_with_limits()?)?;
+    let slot = qemu::slot(&small_with_limits()?)?;
     let elf = firmware::controller(Target::Fpu, "")?;
     Ok((Controller::start_by(Target::Fpu, &elf, Some(slot.path()), Clock::Host)?, slot))
 }
@@ -38,7 +38,7 @@ fn link(controller: &Controller, words: &[&str], input: &[u8]) -> Result<Output>
 
 /// The first observation of the image's self-test, and the bits of its action.
 fn observation(slot: &NamedTempFile) -> Result<(Vec<f32>, Vec<u32>)> {
-    self_test(&ImageBuffer::read(slot.path())?.image(slot.path())?, 0).context("the image has no self-test")
+    self_test(&ImageBuffer::read(slot.path())?.image(slot.path())?, 0)
 }
 
 #[test]

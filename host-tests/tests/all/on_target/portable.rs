@@ -1,6 +1,6 @@
 //! The cost of the portable kernels on targets without the assembler.
 
-use actq_bench::qemu::{self, Counter, Region};
+use actq_bench::qemu::{Counter, Region};
 use actq_bench::{Target, firmware, golden};
 use anyhow::{Result, ensure};
 
@@ -8,13 +8,7 @@ use anyhow::{Result, ensure};
 /// the reference's, bit for bit.
 fn counts(target: Target) -> Result<Vec<(String, f64)>> {
     let elf = firmware::portable_binary("portable", target)?;
-    let counter = Counter::build()?;
-    let mut command = qemu::command_on(target, &elf, None, "")?;
-    counter.attach(&mut command, &elf)?;
-    let output = qemu::run(command, &[])?;
-    let text = String::from_utf8(output.stdout)?;
-    ensure!(output.status.success(), "{text}");
-    let regions = counter.regions()?;
+    let (text, regions) = Counter::build()?.run(target, &elf, None, &[])?;
     // The firmware measures every layout with row scales and with groups of 32.
     let layouts = golden::layouts().filter(|(_, _, group)| [0, 32].contains(group)).count();
     ensure!(text.lines().count() == layouts && regions.len() == layouts, "{} regions: {text}", regions.len());

@@ -2,9 +2,10 @@
 
 use std::fs;
 use std::path::Path;
+use std::process::Output;
 
 use actq::budget::Budget;
-use actq::data::{Dataset, Recording, Recordings, Sizes};
+use actq::data::{Recording, Recordings, Sizes};
 use actq::methods::{Activations, Method, Options};
 use actq::pipeline::quantize;
 use actq::policy::Policy;
@@ -12,10 +13,12 @@ use actq::runtime::{ImageBuffer, with_head};
 use actq_bench::cycles::Code;
 use actq_bench::firmware::{self, built_in};
 use actq_bench::qemu::{self, Server};
-use actq_bench::{Target, golden, shared_policies, ur3};
+use actq_bench::{Target, bits, golden, shared_policies, ur3};
 use actq_kernels::Width;
-use actq_kernels::image::{checksum, header as h, op, worst_case};
+use actq_kernels::image::{op, worst_case};
 use anyhow::{Context, Result, ensure};
+
+use crate::draft::Draft;
 
 /// Steps of each image on the host and in QEMU.
 const STEPS: usize = 208;
@@ -32,13 +35,19 @@ fn kernels_give_the_golden_sums_on_the_target() -> Result<()> {
 
 /// Requires that the kernels in assembler give the host's sums on a target that has them.
 pub(crate) fn kernels_give_the_golden_sums(target: Target) -> Result<()> {
-    let cases = golden::cases(1);
-    let elf = firmware::binary("golden", target)?;
-    let output = qemu::run(qemu::command_on(target, &elf, None, "")?, &golden::stream(&cases))?;
+    gives_the_sums(target, &golden::cases(1), "Armv7em")
+}
+
+fn gives_the_sums(target: Target, cases: &[golden::Case], backend: &str) -> Result<()> {
+    let output = golden_run(target, &golden::stream(cases))?;
     let text = String::from_utf8_lossy(&output.stdout);
     ensure!(output.status.success(), "{target:?}: {text}");
-    assert_eq!(text.trim(), format!("Armv7em: {} cases", cases.len()));
+    assert_eq!(text.trim(), format!("{backend}: {} cases", cases.len()));
     Ok(())
+}
+
+fn golden_run(target: Target, stream: &[u8]) -> Result<Output> {
+    qemu::run(qemu::command_on(target, &firmware::binary("golden", target)?, None, "")?, stream)
 }
 
 #[test]
@@ -48,14 +57,9 @@ fn portable_kernels_give_the_golden_sums_without_assembler() -> Result<()> {
     let fits = |c: &&golden::Case| c.shape.cols <= 256 && c.words().len() + c.prepared().len() < 1500;
     let short: Vec<_> = cases.iter().filter(fits).cloned().collect();
     ensure!(short.len() > cases.len() / 2, "too few cases are short");
-    for (target, cases) in [(Target::NoDsp, &cases), (Target::Small, &short), (Target::Riscv, &cases)] {
-        let elf = firmware::binary("golden", target)?;
-        let output = qemu::run(qemu::command_on(target, &elf, None, "")?, &golden::stream(cases))?;
-        let text = String::from_utf8_lossy(&output.stdout);
-        ensure!(output.status.success(), "{target:?}: {text}");
-        assert_eq!(text.trim(), format!("Portable: {} cases", cases.len()));
-    }
-    Ok(())
+    [(Target::NoDsp, &cases), (Target::Small, &short), (Target::Riscv, &cases)]
+        .into_iter()
+        .try_for_each(|(target, cases)| gives_the_sums(target, cases, "Portable"))
 }
 
 #[test]
@@ -65,7 +69,7 @@ fn a_wrong_sum_fails_the_golden_run() -> Result<()> {
     // The last case may end in padding rows, whose sums are not compared: change all four of its last quad.
     stream[last_sum - 12..last_sum + 4].iter_mut().for_each(|byte| *byte ^= 1);
     for target in [Target::Fpu, Target::Riscv] {
-        let output = qemu::run(qemu::command_on(target, &firmware::binary("golden", target)?, None, "")?, &stream)?;
+        let output = golden_run(target, &stream)?;
         let text = String::from_utf8_lossy(&output.stdout);
         assert!(!output.status.success() && text.contains("case 2: sums"), "{target:?}: {text}");
     }
@@ -95,26 +99,19 @@ fn the_built_in_image_replays_its_self_test() -> Result<()> {
 #[test]
 fn target_and_host_allow_the_same_int32_sums() -> Result<()> {
     for group in [32, 128] {
-        let mut bytes = rtn(&Policy::load(&ur3())?, Width::W8, group, Activations::Int16)?;
-        let buffer = ImageBuffer::new(&bytes);
-        let image = buffer.image(Path::new("ur3"))?;
+        let mut draft = Draft::of(&rtn(&Policy::load(&ur3())?, Width::W8, group, Activations::Int16)?);
+        let image = draft.check()?;
         let matrices: Vec<_> = image.ops().filter_map(|op| op.matrix()).collect();
         // The shape alone does not prove the matrix with the most columns; the records tell which operation has it.
         let widest = (0..matrices.len()).max_by_key(|i| matrices[*i].cols).context("the image has no matrix")?;
         let blocks = matrices[widest].blocks().map(|rows| worst_case(&rows.block, 1));
         let largest = i64::from(i32::MAX) / blocks.max().context("the matrix has no block")?;
         ensure!(largest < i64::from(i16::MAX), "scales of {group}: the limit exceeds int16");
-        let words: &[u32] = bytemuck::cast_slice(buffer.bytes());
-        let records = words[h::W_OPS] as usize..;
-        let mut linear = words[records].chunks(h::OP_WORDS).filter(|record| record[0] as u8 == op::LINEAR);
-        let record = linear.nth(widest).context("the operation is linear")?[3] as usize;
         for (x_max, refused) in [(largest, false), (largest + 1, true)] {
-            bytes[4 * record + 6..][..2].copy_from_slice(&u16::try_from(x_max)?.to_le_bytes());
-            let crc = checksum(&bytes);
-            bytes[4 * h::W_CRC..][..4].copy_from_slice(&crc.to_le_bytes());
-            assert_eq!(ImageBuffer::new(&bytes).image(Path::new("ur3")).is_err(), refused, "scales of {group}, host");
-            let slot = tempfile::NamedTempFile::new()?;
-            fs::write(slot.path(), &bytes)?;
+            draft.set_high(draft.data((op::LINEAR, widest)) + 1, u16::try_from(x_max)?.into());
+            draft.seal();
+            assert_eq!(draft.check().is_err(), refused, "scales of {group}, host");
+            let slot = qemu::slot(draft.bytes())?;
             let elf = firmware::harness(Target::Fpu)?;
             let output = qemu::run(qemu::command(&elf, Some(slot.path()), "")?, &[])?;
             // An accepted image reaches its self-test, which may fail, because another x_max computed its actions.
@@ -131,8 +128,7 @@ fn a_damaged_image_in_the_slot_is_refused() -> Result<()> {
     let mut bytes = fs::read(built_in()?)?;
     let middle = bytes.len() / 2;
     bytes[middle] ^= 4;
-    let slot = tempfile::NamedTempFile::new()?;
-    fs::write(slot.path(), bytes)?;
+    let slot = qemu::slot(&bytes)?;
     let elf = firmware::harness(Target::Fpu)?;
     let output = qemu::run(qemu::command(&elf, Some(slot.path()), "")?, &[])?;
     assert!(!output.status.success());
@@ -151,27 +147,32 @@ fn an_unknown_argument_is_refused() -> Result<()> {
     Ok(())
 }
 
-/// Runs an image from the slot on recorded observations, in QEMU and on the host, with a reset in the middle; every
-/// action must have the same bits.
-pub(crate) fn same_bits(target: Target, bytes: &[u8], dataset: &Dataset) -> Result<()> {
+/// Returns the first recorded held-out observations of a policy.
+pub(crate) fn recorded(dir: &Path, policy: &Policy) -> Result<Vec<Vec<f32>>> {
+    let dataset = Recording::Heldout.require(Some(dir), None, Sizes::of(policy), "this test")?;
+    let observations: Vec<Vec<f32>> = (0..dataset.length.len()).flat_map(|e| dataset.episode(e)).take(STEPS).collect();
+    ensure!(observations.len() == STEPS, "too few recorded observations");
+    Ok(observations)
+}
+
+/// Runs an image from the slot on observations, in QEMU and on the host, with a reset in the middle; every action must
+/// have the same bits.
+pub(crate) fn same_bits(target: Target, bytes: &[u8], observations: &[Vec<f32>]) -> Result<()> {
     let elf = firmware::harness(target)?;
-    let slot = tempfile::NamedTempFile::new()?;
-    fs::write(slot.path(), bytes)?;
+    let slot = qemu::slot(bytes)?;
     let buffer = ImageBuffer::new(bytes);
     let image = buffer.image(slot.path())?;
     let mut server = Server::start(qemu::command_on(target, &elf, Some(slot.path()), "serve")?, image.act_len())?;
-    let observations: Vec<Vec<f32>> = (0..dataset.length.len()).flat_map(|e| dataset.episode(e)).take(STEPS).collect();
-    ensure!(observations.len() == STEPS, "too few recorded observations");
     with_head(image, |head| {
         for (step, observation) in observations.iter().enumerate() {
-            if step == STEPS / 2 {
+            if step == observations.len() / 2 {
                 head.reset();
                 server.reset()?;
             }
             let expected = head.step(observation)?;
             let action = server.step(observation)?;
-            let same = action.iter().zip(expected).all(|(a, b)| a.to_bits() == b.to_bits());
-            ensure!(same, "step {step}: {action:?} in QEMU, {expected:?} on the host");
+            let same = bits(&action) == bits(expected);
+            ensure!(same, "{}, step {step}: {action:?} in QEMU, {expected:?} on the host", image.name());
         }
         Ok(())
     })?;
@@ -180,21 +181,20 @@ pub(crate) fn same_bits(target: Target, bytes: &[u8], dataset: &Dataset) -> Resu
 
 /// All widths with int8 and int16 activations; the build without FPU, which is slower, and the other cores run one
 /// image of each.
-/// image of each.
 fn policy_has_the_same_bits(dir: &Path) -> Result<()> {
     let policy = Policy::load(dir)?;
-    let dataset = Recording::Heldout.require(Some(dir), None, Sizes::of(&policy), "this test")?;
+    let observations = recorded(dir, &policy)?;
     for activations in [Activations::Int8, Activations::Int16] {
         for width in Width::ALL {
             for group in [0, 32] {
                 let at = || format!("{}: {width:?}, group {group}, {activations:?}", policy.name);
-                same_bits(Target::Fpu, &rtn(&policy, width, group, activations)?, &dataset).with_context(at)?;
+                same_bits(Target::Fpu, &rtn(&policy, width, group, activations)?, &observations).with_context(at)?;
             }
         }
     }
     let image = rtn(&policy, Width::W3, 0, Activations::Int8)?;
     for target in [Target::NoFpu, Target::M33, Target::M7, Target::F405] {
-        same_bits(target, &image, &dataset).with_context(|| format!("{target:?}"))?;
+        same_bits(target, &image, &observations).with_context(|| format!("{target:?}"))?;
     }
     Ok(())
 }

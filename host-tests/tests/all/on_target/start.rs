@@ -21,24 +21,18 @@ use actq_kernels::Width;
 use actq_link::code::Refusal;
 use anyhow::{Context as _, Result, ensure};
 
-use super::application::file;
-
 /// An STM32F405 with a dead crystal: kHz, and the wait states of its flash if the crystal has died late.
 const SLOWEST: u64 = 16_000;
 const WAIT_STATES: u64 = 5;
 
 /// The program of the pieces of a start and of a check, and the cost of each piece of an image, by its name.
 fn pieces(image: &Path) -> Result<(Code, Vec<(String, Region)>)> {
-    let (elf, counter) = (firmware::binary("start", Target::Fpu)?, Counter::build()?);
+    let elf = firmware::binary("start", Target::Fpu)?;
     let (code, bytes) = (Code::read(&elf)?, fs::read(image)?);
     let key = keys::generate()?;
     let mut input = key.verifying_key().to_bytes().to_vec();
     input.extend(keys::sign(&key, &bytes, 1)?.check(&bytes)?);
-    let mut command = qemu::command(&elf, Some(image), "")?;
-    counter.attach(&mut command, &elf)?;
-    let output = qemu::run(command, &input)?;
-    ensure!(output.status.success(), "{output:?}");
-    let (names, regions) = (String::from_utf8(output.stdout)?, counter.regions()?);
+    let (names, regions) = Counter::build()?.run(Target::Fpu, &elf, Some(image), &input)?;
     ensure!(names.lines().count() == regions.len(), "{} regions: {names}", regions.len());
     Ok((code, names.lines().map(str::to_owned).zip(regions).collect()))
 }
@@ -87,8 +81,7 @@ fn images_with_too_long_pieces_are_refused() -> Result<()> {
     for (cols, outcome) in [(2_000, Ok(())), (24_000, Err(Refusal::Unfit))] {
         let mut builder = Builder::new(cols);
         builder.linear((8, cols), Activations::Int16, |_| Some(Width::W8), 0, false)?;
-        let (policy, outcomes) = builder.finish("wide".to_owned(), false);
-        let buffer = ImageBuffer::new(&actq::emit::image(&policy, &outcomes)?);
+        let buffer = ImageBuffer::new(&builder.image("wide")?);
         let made = buffer.image(Path::new("wide"))?;
         let (mut scratch, mut feeds) = (vec![0; made.scratch_words()], Feeds(0));
         let lengths = [made.obs_len(), made.act_len()];
@@ -118,8 +111,7 @@ fn a_shared_matrix_is_checked_once() -> Result<()> {
             value = builder.node(Linear { matrix: narrow, bias: vec![0.0; ROWS] }, &[value])?;
             value = builder.node(Linear { matrix: wide, bias: vec![0.0; COLS] }, &[value])?;
         }
-        let (policy, outcomes) = builder.finish("shared".to_owned(), false);
-        let image = file(&actq::emit::image(&policy, &outcomes)?)?;
+        let image = qemu::slot(&builder.image("shared")?)?;
         let (_, regions) = pieces(image.path())?;
         let (_, region) = regions.iter().find(|(name, _)| name == "image").context("the image was not checked")?;
         Ok(region.instructions)

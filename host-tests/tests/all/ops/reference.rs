@@ -1,16 +1,15 @@
 //! An f64 interpreter of policy.json: the reference of executor and evaluator, which shares no code with them.
 
 use std::collections::BTreeMap;
-use std::fs;
 
 use actq::methods::Outcome;
 use actq::policy::Policy;
 use actq_bench::golden::Random;
 use anyhow::{Context, Result};
-use safetensors::Dtype;
-use safetensors::tensor::{TensorView, serialize};
 use serde_json::Value;
 use tempfile::TempDir;
+
+use crate::folder::write_policy;
 
 /// Steps of a run.
 const STEPS: usize = 40;
@@ -42,15 +41,9 @@ impl Case {
             let values = (0..shape.iter().product()).map(|_| reach * random.unit()).collect();
             tensors.entry(name.to_owned()).or_insert((shape, values));
         }
-        let bytes: BTreeMap<_, Vec<u8>> =
-            tensors.iter().map(|(name, (_, v))| (name, v.iter().flat_map(|v| v.to_le_bytes()).collect())).collect();
-        let views = tensors
-            .iter()
-            .map(|(name, (shape, _))| Ok((name, TensorView::new(Dtype::F32, shape.clone(), &bytes[name])?)))
-            .collect::<Result<Vec<_>>>()?;
         let dir = TempDir::new()?;
-        fs::write(dir.path().join("policy.safetensors"), serialize(views, None)?)?;
-        fs::write(dir.path().join("policy.json"), json.to_string())?;
+        let owned = tensors.iter().map(|(name, (shape, values))| (name, shape.clone(), values.clone()));
+        write_policy(dir.path(), &json, owned)?;
         Ok(Self { dir, json, tensors })
     }
 

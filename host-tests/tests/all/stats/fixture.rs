@@ -1,5 +1,6 @@
 //! A small policy with recordings, in a folder in which commands run.
 
+use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::path::PathBuf;
 use std::process::Output;
@@ -11,10 +12,10 @@ use actq_bench::golden::Random;
 use anyhow::{Context, Result};
 use ndarray::Array3;
 use ndarray_npy::NpzWriter;
-use safetensors::Dtype;
-use safetensors::tensor::{TensorView, serialize};
 use serde_json::{Value, json};
 use tempfile::TempDir;
+
+use crate::folder;
 
 pub(super) const OBS: usize = 16;
 pub(super) const HIDDEN: usize = 40;
@@ -35,7 +36,6 @@ impl Fixture {
         let json = json!({
             "name": "small leg", "kind": "step", "obs_dim": OBS, "act_dim": ACT, "control_hz": 50, "ops": ops,
         });
-        fs::write(dir.join("policy.json"), json.to_string())?;
         let mut random = Random::new(4);
         let mut matrix = |rows: usize, cols: usize| -> Vec<f32> {
             (0..rows * cols).map(|_| random.unit() * (3.0 / cols as f32).sqrt()).collect()
@@ -44,12 +44,9 @@ impl Fixture {
         for row in IDLE {
             first[row * OBS..][..OBS].iter_mut().for_each(|w| *w *= 1e-3);
         }
-        let bytes = |data: Vec<f32>| data.into_iter().flat_map(f32::to_le_bytes).collect::<Vec<u8>>();
         let tensors = [("first", HIDDEN, OBS, first), ("second", HIDDEN, HIDDEN, second), ("last", ACT, HIDDEN, last)]
-            .map(|(name, rows, cols, data)| (name, vec![rows, cols], bytes(data)));
-        let views =
-            tensors.iter().map(|(name, shape, data)| Ok((*name, TensorView::new(Dtype::F32, shape.clone(), data)?)));
-        fs::write(dir.join("policy.safetensors"), serialize(views.collect::<Result<Vec<_>>>()?, None)?)?;
+            .map(|(name, rows, cols, data)| (name, vec![rows, cols], data));
+        folder::write_policy(&dir, &json, tensors)?;
         let policy = Policy::load(&dir)?;
         for (name, seed) in [("calib.npz", 5), ("heldout.npz", 6)] {
             let mut random = Random::new(seed);
@@ -97,9 +94,8 @@ impl Fixture {
         report["nmse"].as_f64().context("nmse")
     }
 
-    pub(super) fn files(&self) -> Result<Vec<PathBuf>> {
-        let mut files = fs::read_dir(self.0.path())?.map(|e| Ok(e?.path())).collect::<Result<Vec<_>>>()?;
-        files.sort();
-        Ok(files)
+    /// Returns the content of everything in the folder.
+    pub(super) fn files(&self) -> Result<BTreeMap<PathBuf, Option<Vec<u8>>>> {
+        folder::snapshot(self.0.path())
     }
 }

@@ -1,7 +1,7 @@
 //! The effect of a Thumb-2 instruction on the stack pointer and on the program counter (Arm DDI 0403E, chapters A5 and
 //! A7; DDI 0553 for the additions of Armv8-M).
 
-use crate::instruction::{Class, Instruction};
+use crate::instruction::{Class, Instruction, bits};
 
 /// Register numbers.
 pub(super) const SP: u32 = 13;
@@ -49,11 +49,6 @@ pub(super) enum Step {
     Trap,
     /// The stack pointer or the program counter gets a value that is not followed here.
     Unknown,
-}
-
-/// Extracts the bits `low ..= high`.
-fn bits(half: u16, high: u32, low: u32) -> u32 {
-    (u32::from(half) >> low) & ((1 << (high - low + 1)) - 1)
 }
 
 /// Returns the bytes of this many words.

@@ -5,6 +5,8 @@ use std::collections::HashMap;
 use actq_kernels::{Head, Image};
 use anyhow::Result;
 
+use crate::bits;
+
 /// An action of the board's head.
 #[derive(Clone, Debug)]
 pub struct HeadAction {
@@ -12,10 +14,6 @@ pub struct HeadAction {
     pub of: u32,
     /// Bits of the values.
     pub bits: Vec<u32>,
-}
-
-fn bits(action: &[f32]) -> Vec<u32> {
-    action.iter().map(|value| value.to_bits()).collect()
 }
 
 /// Counts the board's actions, in their order, that no head of these images computes on their observations: continued

@@ -20,6 +20,7 @@ use anyhow::{Context as _, Result, ensure};
 use super::arm::{Arm, TICKS};
 use super::bits::HeadAction;
 use super::line::Line;
+use crate::bits;
 use crate::controller::{Controller, HANG_TIMEOUT};
 
 /// Ticks per second of the application.
@@ -212,7 +213,7 @@ impl Rig {
             match event {
                 Event::Status(status) => self.reported(status),
                 Event::Action { of, applied, values, .. } => {
-                    self.reported.push(HeadAction { of, bits: values.iter().map(|value| value.to_bits()).collect() });
+                    self.reported.push(HeadAction { of, bits: bits(&values) });
                     if applied && let Ok(values) = values.try_into() {
                         self.arm.target = values;
                         self.applied += 1;

@@ -13,7 +13,7 @@ use actq::policy::Policy;
 use actq::runtime::{ImageBuffer, with_head};
 use actq_bench::closed_loop::{episode, episode_on_host};
 use actq_bench::qemu::{self, Counter, Server};
-use actq_bench::{Target, evaluation, firmware, target_dir, ur3, ur3_flow};
+use actq_bench::{Target, bits, evaluation, firmware, target_dir, ur3, ur3_flow};
 use actq_cli::report::table::table;
 use actq_kernels::{Image, Width};
 use actq_ur3::OBS_DIM;
@@ -254,7 +254,7 @@ impl Firmware {
                 server.reset()?;
                 episode(seed, |obs| {
                     let action = server.step(obs)?;
-                    let same = action.iter().zip(head.step(obs)?).all(|(a, b)| a.to_bits() == b.to_bits());
+                    let same = bits(&action) == bits(head.step(obs)?);
                     actions += 1;
                     identical += usize::from(same);
                     action.as_slice().try_into().context("an action must have six values")

@@ -12,7 +12,6 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use actq::emit;
 use actq::methods::Activations;
 use actq::random::Random;
 use actq::runtime::ImageBuffer;
@@ -215,8 +214,7 @@ fn resumed(elf: &Path, counter: &Counter, most: &Rates) -> Result<f64> {
                 let width = |row: usize| Some(Width::ALL[if mixed { row % blocks } else { blocks * row / rows }]);
                 let mut builder = Builder::new(cols);
                 builder.linear((rows, cols), Activations::Int8, width, 0, true)?;
-                let (policy, outcomes) = builder.finish("polls".to_owned(), false);
-                let bytes = emit::image(&policy, &outcomes)?;
+                let bytes = builder.image("polls")?;
                 let buffer = ImageBuffer::new(&bytes);
                 let image = buffer.image(Path::new("polls"))?;
                 let observations = &observations(cols)[..1];

@@ -58,13 +58,8 @@ impl Record {
 /// Runs the bench firmware.
 pub(crate) fn measure(counter: &Counter, wait_states: u64) -> Result<Vec<Record>> {
     let elf = firmware::binary("bench", Target::Fpu)?;
-    let mut command = qemu::command(&elf, None, "")?;
-    counter.attach(&mut command, &elf)?;
-    let output = qemu::run(command, &[])?;
-    ensure!(output.status.success(), "the bench firmware failed: {}", String::from_utf8_lossy(&output.stderr));
+    let (lines, regions) = counter.run(Target::Fpu, &elf, None, &[])?;
     let code = Code::read(&elf)?;
-    let regions = counter.regions()?;
-    let lines = String::from_utf8(output.stdout)?;
     ensure!(lines.lines().count() == regions.len(), "the bench firmware and the counter disagree");
     let record = |(line, region): (&str, &qemu::Region)| {
         let fields: Vec<&str> = line.split_whitespace().collect();

@@ -64,8 +64,8 @@ pub(super) fn images() -> Result<Vec<(String, Vec<u8>)>> {
             builder.linear((rows, 40), Activations::Int8, |_| Some(Width::W2), 0, true)?;
         }
     }
-    let (policy, outcomes) = builder.finish("added biases".to_owned(), false);
-    images.push((policy.name.clone(), accumulating(&emit::image(&policy, &outcomes)?)?));
+    let name = "added biases";
+    images.push((name.to_owned(), accumulating(&builder.image(name)?)?));
     Ok(images)
 }
 
