@@ -1,7 +1,7 @@
 //! One file for each subcommand of `actq`. Programs of other crates run [`quantize`] and [`sweep`] with methods of
 //! their own.
 
-mod bundle;
+pub(crate) mod bundle;
 mod drive;
 pub(crate) mod eval;
 pub(crate) mod import;

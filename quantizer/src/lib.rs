@@ -23,7 +23,7 @@ use actq::text::printable;
 use anyhow::Result;
 
 use args::{Command, MethodArg};
-use commands::{eval, import, inspect, link, quantize, sign, sweep, tune};
+use commands::{bundle, eval, import, inspect, link, quantize, sign, sweep, tune};
 use outputs::unfinished;
 
 /// Runs the command line of this process.
@@ -51,6 +51,7 @@ pub fn run_work(work: impl FnOnce() -> Result<()>) -> ExitCode {
 
 fn run_command(command: &Command) -> Result<()> {
     match command {
+        Command::Import(args) if bundle::is_bundle(args) => bundle::run(args),
         Command::Import(args) => import::run(args),
         Command::Quantize { args, method } => {
             quantize::run(args, method.map(MethodArg::method).transpose()?, |_, _| String::new())

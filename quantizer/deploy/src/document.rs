@@ -14,7 +14,7 @@ const MOST_LISTED: usize = 40;
 
 /// A YAML file.
 #[derive(Debug)]
-pub struct Document {
+pub(crate) struct Document {
     /// Path in the bundle.
     pub file: String,
     root: Node,
@@ -28,36 +28,36 @@ impl Document {
     /// # Errors
     ///
     /// If it is missing, or not YAML.
-    pub fn read(bundle: &Bundle, file: &str) -> Result<Self> {
+    pub(crate) fn read(bundle: &Bundle, file: &str) -> Result<Self> {
         let root = bundle.text(file).and_then(|text| Node::parse(&text).context(file.to_owned()))?;
         Ok(Self { file: file.to_owned(), root, read: RefCell::default() })
     }
 
     /// Takes a value that is part of another file; `file` names it, for reports and errors.
-    pub fn of(file: &str, root: Node) -> Self {
+    pub(crate) fn of(file: &str, root: Node) -> Self {
         Self { file: file.to_owned(), root, read: RefCell::default() }
     }
 
     /// Returns the keys of a map at a path of keys with points between them; the empty path is the whole file. Nothing
     /// counts as read.
-    pub fn keys(&self, path: &str) -> Vec<&str> {
+    pub(crate) fn keys(&self, path: &str) -> Vec<&str> {
         self.look(path).map_or(&[][..], Node::entries).iter().map(|(key, _)| key.as_str()).collect()
     }
 
     /// Returns the value at a path without counting it as read.
-    pub fn look(&self, path: &str) -> Option<&Node> {
+    pub(crate) fn look(&self, path: &str) -> Option<&Node> {
         if path.is_empty() { Some(&self.root) } else { find(&self.root, path) }
     }
 
     /// Returns the value at a path, or `None` if it is missing or null.
-    pub fn get(&self, path: &str) -> Option<&Node> {
+    pub(crate) fn get(&self, path: &str) -> Option<&Node> {
         let node = self.look(path)?;
         self.read.borrow_mut().insert(path.to_owned());
         (!node.is_null()).then_some(node)
     }
 
     /// Names a path, for reports and errors.
-    pub fn at(&self, path: &str) -> String {
+    pub(crate) fn at(&self, path: &str) -> String {
         format!("{}: {}", self.file, printable(path))
     }
 
@@ -66,7 +66,7 @@ impl Document {
     /// # Errors
     ///
     /// If it is missing, or `as_type` does not accept it.
-    pub fn need<'a, T>(&'a self, path: &str, what: &str, as_type: impl Fn(&'a Node) -> Option<T>) -> Result<T> {
+    pub(crate) fn need<'a, T>(&'a self, path: &str, what: &str, as_type: impl Fn(&'a Node) -> Option<T>) -> Result<T> {
         let node = self.get(path).with_context(|| format!("{} is missing; it must be {what}", self.at(path)))?;
         as_type(node).with_context(|| format!("{} (line {}) must be {what}", self.at(path), node.line))
     }
@@ -76,7 +76,7 @@ impl Document {
     /// # Errors
     ///
     /// If it is there and `as_type` does not accept it.
-    pub fn maybe<'a, T>(
+    pub(crate) fn maybe<'a, T>(
         &'a self,
         path: &str,
         what: &str,
@@ -92,7 +92,7 @@ impl Document {
     /// # Errors
     ///
     /// As [`Self::need`].
-    pub fn number(&self, path: &str) -> Result<f64> {
+    pub(crate) fn number(&self, path: &str) -> Result<f64> {
         self.need(path, "a finite number", Node::number)
     }
 
@@ -101,7 +101,7 @@ impl Document {
     /// # Errors
     ///
     /// As [`Self::need`].
-    pub fn numbers(&self, path: &str) -> Result<Vec<f64>> {
+    pub(crate) fn numbers(&self, path: &str) -> Result<Vec<f64>> {
         self.need(path, "a list of finite numbers", Node::numbers)
     }
 
@@ -110,12 +110,12 @@ impl Document {
     /// # Errors
     ///
     /// As [`Self::need`].
-    pub fn texts(&self, path: &str) -> Result<Vec<String>> {
+    pub(crate) fn texts(&self, path: &str) -> Result<Vec<String>> {
         self.need(path, "a list of texts", Node::texts)
     }
 
     /// Lists the keys that nothing has read and that no pattern of `ignored` names.
-    pub fn unread(&self, ignored: &[String]) -> Vec<String> {
+    pub(crate) fn unread(&self, ignored: &[String]) -> Vec<String> {
         let mut unread = Vec::new();
         self.add_unread(&self.root, "", ignored, &mut unread);
         unread.truncate(MOST_LISTED);

@@ -11,7 +11,7 @@ use serde::de::DeserializeOwned;
 /// Fixed rules of a family, as data: its file is a `profile.toml`.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Profile {
+pub(crate) struct Profile {
     /// Name of the family.
     pub family: String,
     /// Repository that the rules were read from.
@@ -29,7 +29,7 @@ pub struct Profile {
 /// A fact that no file of a bundle states.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Rule {
+pub(crate) struct Rule {
     /// Key of the answer.
     pub key: String,
     /// What it says, as a question's text.
@@ -47,7 +47,7 @@ impl Profile {
     /// # Errors
     ///
     /// If it is not one.
-    pub fn parse(text: &str) -> Result<Self> {
+    pub(crate) fn parse(text: &str) -> Result<Self> {
         toml::from_str(text).map_err(Error::other)
     }
 }
@@ -93,7 +93,7 @@ pub struct Question {
 
 /// What a reader knows.
 #[derive(Debug)]
-pub struct Facts {
+pub(crate) struct Facts {
     profile: Profile,
     accepted: bool,
     answers: Answers,
@@ -104,7 +104,7 @@ pub struct Facts {
 
 impl Facts {
     /// Starts with a profile, whether the user accepts its values, and the user's answers.
-    pub fn new(profile: Profile, accepted: bool, answers: Answers) -> Self {
+    pub(crate) fn new(profile: Profile, accepted: bool, answers: Answers) -> Self {
         Self { profile, accepted, answers, used: BTreeSet::new(), questions: Vec::new(), sources: BTreeMap::new() }
     }
 
@@ -114,7 +114,7 @@ impl Facts {
     /// # Errors
     ///
     /// If the answer has another type, or the profile has no such rule.
-    pub fn get<T: DeserializeOwned + Default>(&mut self, key: &str) -> Result<T> {
+    pub(crate) fn get<T: DeserializeOwned + Default>(&mut self, key: &str) -> Result<T> {
         Ok(self.find(key)?.unwrap_or_default())
     }
 
@@ -123,7 +123,7 @@ impl Facts {
     /// # Errors
     ///
     /// As [`Self::get`].
-    pub fn find<T: DeserializeOwned>(&mut self, key: &str) -> Result<Option<T>> {
+    pub(crate) fn find<T: DeserializeOwned>(&mut self, key: &str) -> Result<Option<T>> {
         let rule = self.profile.rules.iter().find(|rule| rule.key == key);
         let rule = rule.with_context(|| format!("profile {}: there is no rule {key}", self.profile.family))?.clone();
         if let Some(answer) = self.answers.0.get(key) {
@@ -149,7 +149,7 @@ impl Facts {
     /// # Errors
     ///
     /// If the answer has another type.
-    pub fn missing<T: DeserializeOwned>(&mut self, key: &str, meaning: &str) -> Result<Option<T>> {
+    pub(crate) fn missing<T: DeserializeOwned>(&mut self, key: &str, meaning: &str) -> Result<Option<T>> {
         if let Some(answer) = self.answers.0.get(key) {
             self.used.insert(key.to_owned());
             self.sources.insert(key.to_owned(), "answers".to_owned());
@@ -171,17 +171,17 @@ impl Facts {
     }
 
     /// Records where a part of the description comes from, for the report.
-    pub fn note(&mut self, item: &str, source: impl Into<String>) {
+    pub(crate) fn note(&mut self, item: &str, source: impl Into<String>) {
         self.sources.insert(item.to_owned(), source.into());
     }
 
     /// Returns where a fact or a part comes from, for [`Self::note`].
-    pub fn source(&self, key: &str) -> String {
+    pub(crate) fn source(&self, key: &str) -> String {
         self.sources.get(key).cloned().unwrap_or_else(|| "a question".to_owned())
     }
 
     /// Makes an error of two statements that contradict each other.
-    pub fn contradiction(what: &str, first: (&str, &str), second: (&str, &str)) -> Error {
+    pub(crate) fn contradiction(what: &str, first: (&str, &str), second: (&str, &str)) -> Error {
         let shown = |text: &str| text.chars().take(300).collect::<String>();
         Error::input(format!(
             "{what}: the bundle contradicts itself: {} says {}, and {} says {}; correct one of them",

@@ -11,7 +11,7 @@ mod unitree_rl_lab;
 use crate::family::Family;
 
 /// All families; the first that recognizes a bundle reads it.
-pub static FAMILIES: &[&dyn Family] = &[
+pub(crate) static FAMILIES: &[&dyn Family] = &[
     &limx::Limx,
     &unitree_rl_lab::UnitreeRlLab,
     &humanoidverse::Humanoidverse,

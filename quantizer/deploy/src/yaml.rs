@@ -12,7 +12,7 @@ const MOST_LEVELS: usize = 64;
 
 /// A value.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Node {
+pub(crate) struct Node {
     /// Line of the file, from 1.
     pub line: usize,
     /// Content.
@@ -21,7 +21,7 @@ pub struct Node {
 
 /// Content of a value.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Data {
+pub(crate) enum Data {
     /// A text, number, truth value or nothing, as written; `true` if it was quoted.
     Scalar(String, bool),
     /// Values in order.
@@ -36,7 +36,7 @@ impl Node {
     /// # Errors
     ///
     /// If it is not YAML, has a key twice, or is larger than the limits.
-    pub fn parse(text: &str) -> Result<Self> {
+    pub(crate) fn parse(text: &str) -> Result<Self> {
         // Other parsers accept a closing bracket in the column of its key, as many files have it.
         Self::parse_strictly(text).or_else(|error| match with_deeper_brackets(text) {
             Some(text) => Self::parse_strictly(&text),
@@ -55,7 +55,7 @@ impl Node {
     }
 
     /// Returns the value of a key.
-    pub fn get(&self, key: &str) -> Option<&Self> {
+    pub(crate) fn get(&self, key: &str) -> Option<&Self> {
         match &self.data {
             Data::Map(entries) => entries.iter().find(|(name, _)| name == key).map(|(_, node)| node),
             _ => None,
@@ -63,27 +63,27 @@ impl Node {
     }
 
     /// Returns keys and values of a map; nothing for other values.
-    pub fn entries(&self) -> &[(String, Self)] {
+    pub(crate) fn entries(&self) -> &[(String, Self)] {
         if let Data::Map(entries) = &self.data { entries } else { &[] }
     }
 
     /// Returns the values of a list; nothing for other values.
-    pub fn items(&self) -> &[Self] {
+    pub(crate) fn items(&self) -> &[Self] {
         if let Data::List(items) = &self.data { items } else { &[] }
     }
 
     /// Returns the text of a scalar.
-    pub fn text(&self) -> Option<&str> {
+    pub(crate) fn text(&self) -> Option<&str> {
         if let Data::Scalar(text, _) = &self.data { Some(text) } else { None }
     }
 
     /// Returns `true` if nothing is given: null, or an empty scalar.
-    pub fn is_null(&self) -> bool {
+    pub(crate) fn is_null(&self) -> bool {
         matches!(&self.data, Data::Scalar(text, false) if ["", "~", "null", "Null", "NULL"].contains(&text.as_str()))
     }
 
     /// Returns a number, if it is one and finite.
-    pub fn number(&self) -> Option<f64> {
+    pub(crate) fn number(&self) -> Option<f64> {
         match &self.data {
             Data::Scalar(text, false) => text.replace('_', "").parse().ok().filter(|number: &f64| number.is_finite()),
             _ => None,
@@ -91,7 +91,7 @@ impl Node {
     }
 
     /// Returns a truth value.
-    pub fn truth(&self) -> Option<bool> {
+    pub(crate) fn truth(&self) -> Option<bool> {
         match self.text()? {
             "true" | "True" | "TRUE" | "yes" | "on" => Some(true),
             "false" | "False" | "FALSE" | "no" | "off" => Some(false),
@@ -100,7 +100,7 @@ impl Node {
     }
 
     /// Returns a list of numbers; a map of numbers counts as one, in the order of the file.
-    pub fn numbers(&self) -> Option<Vec<f64>> {
+    pub(crate) fn numbers(&self) -> Option<Vec<f64>> {
         match &self.data {
             Data::List(items) => items.iter().map(Self::number).collect(),
             Data::Map(entries) => entries.iter().map(|(_, node)| node.number()).collect(),
@@ -109,7 +109,7 @@ impl Node {
     }
 
     /// Returns a list of texts.
-    pub fn texts(&self) -> Option<Vec<String>> {
+    pub(crate) fn texts(&self) -> Option<Vec<String>> {
         match &self.data {
             Data::List(items) => items.iter().map(|item| item.text().map(str::to_owned)).collect(),
             _ => None,

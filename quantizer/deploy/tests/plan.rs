@@ -182,7 +182,7 @@ fn mistakes_are_refused_by_their_keys() {
         ("{ add = \"phase\" }", "{ gravity = \"wxyz\" }", "an orientation has 4 values, and this has 2"),
         ("{ add = \"phase\" }", "{ history = { length = 0 } }", "length and stride must be at least 1"),
         ("{ add = \"phase\" }", "{ history = { length = 99999999999 } }", "it keeps more than"),
-        ("{ add = \"phase\" }", "{ history = { length = 2 } }", "it has 4 values"),
+        ("{ add = \"phase\" }", "{ history = { length = 2 } }", "\"motion\" has 2 values, and the value 4"),
         ("{ add = \"phase\" }", "{ tanh = 1 }", "tanh"),
         ("inputs = { x = \"sum\" }", "inputs = {}", "inputs.x is missing"),
         ("inputs = { x = \"sum\" }", "inputs = { x = \"sum\", z = \"sum\" }", "has no input \"z\""),

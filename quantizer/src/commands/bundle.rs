@@ -20,13 +20,13 @@ use crate::report::deployment;
 use crate::terminal::{note, print, reserve};
 
 /// Returns `true` if the arguments name a bundle, or have an option that only bundles take.
-pub(super) fn is_bundle(args: &ImportArgs) -> bool {
+pub(crate) fn is_bundle(args: &ImportArgs) -> bool {
     let options = args.answers.is_some() || args.accept_profile || args.reference.is_some();
     options || args.model.is_dir() || args.model.extension().is_some_and(|ending| ending == "kinfer")
 }
 
 /// Reads a bundle, checks it, and writes its description with copies of the networks.
-pub(super) fn run(args: &ImportArgs) -> Result<()> {
+pub(crate) fn run(args: &ImportArgs) -> Result<()> {
     let of_files = args.output.is_some() || !args.state.is_empty();
     ensure!(!of_files, "a bundle takes no --output and no --state: its description names them");
     ensure!(!args.check || args.reference.is_some(), "--check of a bundle needs --reference RAW.npz:EXPECT.npz");

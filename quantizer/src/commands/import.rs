@@ -8,18 +8,14 @@ use actq::policy::Policy;
 use actq_onnx::{Choice, import};
 use anyhow::{Context as _, Result, ensure};
 
-use super::bundle;
 use crate::args::ImportArgs;
 use crate::check::check;
 use crate::outputs::unfinished::OutputFolder;
 use crate::report::{imported, notes};
 use crate::terminal::{note, print, reserve};
 
-/// Converts an ONNX file to a policy folder, or a deploy bundle to a description, and prints a summary.
+/// Converts an ONNX file to a policy folder and prints a summary.
 pub(crate) fn run(args: &ImportArgs) -> Result<()> {
-    if bundle::is_bundle(args) {
-        return bundle::run(args);
-    }
     let choice = Choice { output: args.output.clone(), states: args.state.clone() };
     let imported = import(&args.model, &choice)?;
     let [json, weights] = FILES.map(|name| args.out.join(name));

@@ -2,53 +2,11 @@
 
 use actq::error::{Context as _, Result, bail, ensure};
 
-use super::{Builder, MOST, Maker, Slot};
-use crate::description::{History, Numbers, Op, Operand, Order, Orientation, Value};
+use super::builder::{Builder, MOST};
+use super::numbers::finite;
+use super::parts::{Arg, Maker, Slot, Step};
+use crate::description::{Op, Operand, Order, Orientation, Value};
 use crate::label::Label;
-
-/// A second operand.
-pub(crate) enum Arg {
-    /// Numbers, one for all or one for each.
-    Numbers(Vec<f64>),
-    /// A value.
-    Slot(Slot),
-}
-
-/// An operation.
-pub(crate) enum Step {
-    Select(Vec<usize>),
-    Place(Vec<usize>),
-    Add(Arg),
-    Subtract(Arg),
-    Scale(Arg),
-    Divide(Arg),
-    Clip([Arg; 2]),
-    Wrap,
-    Gravity(Orientation),
-    Sin,
-    Cos,
-    Norm,
-    History(History),
-}
-
-/// Refuses numbers that are not finite.
-pub(super) fn finite(numbers: &[f64]) -> Result<()> {
-    match numbers.iter().position(|number| !number.is_finite()) {
-        Some(i) => bail!("number {i} is {}; give finite numbers", numbers[i]),
-        None => Ok(()),
-    }
-}
-
-/// Returns a number for each of `len` values.
-pub(super) fn each(numbers: &Numbers, len: usize) -> Result<Vec<f64>> {
-    let numbers = match numbers {
-        Numbers::All(number) => vec![*number; len],
-        Numbers::Each(numbers) => numbers.clone(),
-    };
-    finite(&numbers)?;
-    ensure!(numbers.len() == len, "it has {} numbers, and there are {len} values", numbers.len());
-    Ok(numbers)
-}
 
 /// A value while its chain is followed.
 struct Chain {

@@ -1,0 +1,314 @@
+//! Makes a plan of a description.
+
+use std::collections::BTreeMap;
+
+use actq::error::{Context as _, Result, bail, ensure};
+
+use super::names::Names;
+use super::numbers;
+use super::parts::{Feed, Maker, Plan, Planned, PlannedNetwork, PlannedState, Slot, Work};
+use crate::description::{Clock, Description, Order, SCHEMA};
+use crate::label::{Label, labels};
+use crate::sources::Sources;
+
+/// Most values that one name may have: what an image can address.
+pub(super) const MOST: usize = u16::MAX as usize;
+/// Most values of all names together.
+const MOST_IN_ALL: usize = 1 << 18;
+
+impl Plan {
+    /// Checks a description and opens its files.
+    ///
+    /// # Errors
+    ///
+    /// If a name, a length, an order or a number does not fit; the error names the key of `deploy.toml`.
+    pub fn new(description: &Description, sources: &dyn Sources) -> Result<Self> {
+        ensure!(
+            description.schema == SCHEMA,
+            "schema = {}: this version reads schema {SCHEMA}; import the bundle again",
+            description.schema
+        );
+        let rate = description.rate_hz;
+        ensure!(rate.is_finite() && rate > 0.0, "rate_hz = {rate}: give a number above 0");
+        let names = Names::of(description)?;
+        let mut builder = Builder {
+            description,
+            names: &names,
+            sources,
+            values: BTreeMap::new(),
+            open: Vec::new(),
+            in_all: 0,
+            plan: Self {
+                values: Vec::new(),
+                networks: Vec::new(),
+                states: Vec::new(),
+                inputs: Vec::new(),
+                order: Vec::new(),
+                action: 0,
+                targets: Vec::new(),
+            },
+        };
+        builder.build()?;
+        Ok(builder.plan)
+    }
+}
+
+/// Makes a plan, value by value, each after those that it reads.
+pub(super) struct Builder<'a> {
+    pub(super) description: &'a Description,
+    names: &'a Names<'a>,
+    sources: &'a dyn Sources,
+    values: BTreeMap<String, Slot>,
+    /// Names whose values are being made.
+    open: Vec<String>,
+    /// Values of all names so far.
+    in_all: usize,
+    pub(super) plan: Plan,
+}
+
+impl Builder<'_> {
+    fn build(&mut self) -> Result<()> {
+        let description = self.description;
+        for (i, input) in description.inputs.iter().enumerate() {
+            let key = format!("input {:?}", input.name);
+            let joints = input.joints.as_ref().map(|order| self.joints(order, &key)).transpose()?;
+            let len = match (input.len, joints) {
+                (Some(len), Some(joints)) => {
+                    ensure!(
+                        len == joints.len(),
+                        "{key}: len = {len}, but joints.{} has {} names",
+                        input.joints.as_deref().unwrap_or_default(),
+                        joints.len()
+                    );
+                    len
+                }
+                (Some(len), None) => len,
+                (None, Some(joints)) => joints.len(),
+                (None, None) => bail!("{key}: give len or joints"),
+            };
+            ensure!(0 < len && len <= MOST, "{key}: len = {len}; give 1 to {MOST}");
+            if let Some([low, high]) = input.range {
+                ensure!(low < high, "{key}: range = [{low}, {high}]; give the lowest number first");
+            }
+            let labels = labels(&input.name, len, joints);
+            self.plan.inputs.push((input.name.clone(), len));
+            self.add(&input.name, Maker::Input(i), labels, input.joints.clone())?;
+        }
+        for (i, state) in description.states.iter().enumerate() {
+            ensure!(
+                0 < state.len && state.len <= MOST,
+                "state {:?}: len = {}; give 1 to {MOST}",
+                state.name,
+                state.len
+            );
+            self.add(&state.name, Maker::State(i), labels(&state.name, state.len, None), None)?;
+        }
+        // Every value is made and so checked, even if nothing reads it.
+        let all: Vec<String> = self.names.all().map(str::to_owned).collect();
+        for name in &all {
+            self.value(name, "")?;
+        }
+        for state in &description.states {
+            let key = format!("state {:?}: next", state.name);
+            let next = self.value(&state.next, &key)?;
+            let len = self.plan.values[next].labels.len();
+            ensure!(len == state.len, "{key} = {:?} has {len} values, but len = {}", state.next, state.len);
+            let start =
+                numbers::each(&state.start, state.len).with_context(|| format!("state {:?}: start", state.name))?;
+            self.plan.states.push(PlannedState { start, next });
+        }
+        self.plan.action = self.value(&description.action, "action")?;
+        ensure!(!description.targets.is_empty(), "[[target]]: give at least one");
+        for target in &description.targets {
+            let key = format!("target {:?}: value", target.value);
+            let slot = self.value(&target.value, &key)?;
+            if let Some(order) = &target.joints {
+                let (names, len) = (self.joints(order, &key)?.len(), self.plan.values[slot].labels.len());
+                ensure!(names == len, "{key}: it has {len} values, but joints.{order} has {names} names");
+                let own = self.plan.values[slot].joints.as_ref();
+                ensure!(
+                    own.is_none_or(|own| own == order),
+                    "{key}: its values are in the order joints.{}, not joints.{order}; add {{ place = {order:?} }}",
+                    own.map_or("", String::as_str)
+                );
+            }
+            self.plan.targets.push((target.kind, slot));
+        }
+        self.gains()
+    }
+
+    fn gains(&self) -> Result<()> {
+        let Some(gains) = &self.description.gains else { return Ok(()) };
+        for (name, list) in [("stiffness", &gains.stiffness), ("damping", &gains.damping)] {
+            numbers::finite(list).with_context(|| format!("gains: {name}"))?;
+            if let Some(order) = &gains.joints {
+                let names = self.joints(order, "gains")?.len();
+                ensure!(
+                    list.len() == names,
+                    "gains: {name} has {} values, but joints.{order} {names} names",
+                    list.len()
+                );
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) fn add(&mut self, name: &str, maker: Maker, labels: Vec<Label>, joints: Option<String>) -> Result<Slot> {
+        self.in_all += labels.len();
+        ensure!(self.in_all <= MOST_IN_ALL, "{name:?}: with it there are more than {MOST_IN_ALL} values");
+        let slot = self.plan.values.len();
+        self.plan.values.push(Planned { maker, labels, joints });
+        self.values.insert(name.to_owned(), slot);
+        self.plan.order.push(Work::Make(slot));
+        Ok(slot)
+    }
+
+    pub(super) fn joints(&self, order: &str, key: &str) -> Result<&[String]> {
+        let joints = self.description.joints.get(order);
+        joints.map(Vec::as_slice).with_context(|| format!("{key}: there is no list joints.{order}"))
+    }
+
+    /// Returns the value of a name that `key` refers to; makes it first.
+    pub(super) fn value(&mut self, name: &str, key: &str) -> Result<Slot> {
+        if let Some(slot) = self.values.get(name) {
+            return Ok(*slot);
+        }
+        if self.open.iter().any(|open| open == name) {
+            bail!("{name:?} depends on itself through {}; keep one of them in a [[state]]", self.open.join(", "));
+        }
+        self.open.push(name.to_owned());
+        let slot = self.make(name, key)?;
+        self.open.pop();
+        Ok(slot)
+    }
+
+    fn make(&mut self, name: &str, key: &str) -> Result<Slot> {
+        let description = self.description;
+        if let Some(clock) = description.clocks.iter().find(|clock| clock.name == name) {
+            return self.clock(clock);
+        }
+        if let Some(motion) = description.motions.iter().find(|motion| motion.name == name) {
+            let key = format!("motion {name:?}");
+            let array = self.sources.array(&motion.file, &motion.array).context(key.clone())?;
+            let (rows, row) = array.rows().context(key.clone())?;
+            ensure!(
+                rows > 0 && row > 0 && row <= MOST,
+                "{key}: {:?} in {} is empty or too long",
+                motion.array,
+                motion.file
+            );
+            numbers::finite(&array.values).context(key)?;
+            let maker = Maker::Motion { rows: array, lag: motion.lag, end: motion.end };
+            return self.add(name, maker, labels(name, row, None), None);
+        }
+        if let Some(value) = description.values.iter().find(|value| value.name == name) {
+            return self.chain(value);
+        }
+        if let Some((network, _)) = self.names.output(name) {
+            self.network(network)?;
+            return self.values.get(name).copied().with_context(|| format!("{key}: {name:?} is not computed"));
+        }
+        bail!("{key} = {name:?}: there is no value of this name; there are {}", self.names.listed())
+    }
+
+    fn clock(&mut self, clock: &Clock) -> Result<Slot> {
+        let key = format!("clock {:?}", clock.name);
+        ensure!(!clock.start.is_empty(), "{key}: start is empty");
+        numbers::finite(&clock.start).with_context(|| format!("{key}: start"))?;
+        ensure!(clock.advance.is_finite(), "{key}: advance = {}", clock.advance);
+        if let Some([low, high]) = clock.wrap {
+            ensure!(
+                low < high && high - low < f64::INFINITY,
+                "{key}: wrap = [{low}, {high}]; give the lowest number first"
+            );
+        }
+        let mut of = Vec::new();
+        if let Some(standing) = &clock.standing {
+            ensure!(
+                standing.at.len() == clock.start.len(),
+                "{key}: standing.at has {} values, and start {}",
+                standing.at.len(),
+                clock.start.len()
+            );
+            numbers::finite(&standing.at).with_context(|| format!("{key}: standing.at"))?;
+            for name in &standing.of {
+                of.push(self.value(name, &format!("{key}: standing.of"))?);
+            }
+        }
+        let labels = labels(&clock.name, clock.start.len(), None);
+        self.add(&clock.name, Maker::Clock(clock.clone(), of), labels, None)
+    }
+
+    /// Opens a network and adds the values of its outputs.
+    fn network(&mut self, index: usize) -> Result<()> {
+        let network = &self.description.networks[index];
+        let key = format!("network {:?}", network.name);
+        let outputs = self.names.outputs_of(index);
+        let compute = self.sources.network(network, outputs).context(key.clone())?;
+        let inputs = compute.inputs().to_vec();
+        for given in network.inputs.keys().chain(network.states.keys()) {
+            ensure!(
+                inputs.iter().any(|(name, _)| name == given),
+                "{key}: {} has no input {given:?} that its outputs depend on; these are {}",
+                network.file,
+                inputs.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ")
+            );
+        }
+        let mut feeds = Vec::new();
+        for (input, len) in &inputs {
+            let own = format!("{key}: inputs.{input}");
+            feeds.push(match (network.inputs.get(input), network.states.get(input)) {
+                (Some(_), Some(_)) => bail!("{own}: it is a state, too; remove one of them"),
+                (None, None) => bail!("{own} is missing: name the value of this input, or add it to states"),
+                (Some(value), None) => {
+                    let slot = self.value(value, &own)?;
+                    let given = self.plan.values[slot].labels.len();
+                    ensure!(given == *len, "{own} = {value:?} has {given} values, and the graph takes {len}");
+                    Feed::Value(slot)
+                }
+                (None, Some(output)) => {
+                    let at = outputs.iter().position(|o| o == output).unwrap_or(0);
+                    let given = compute.outputs()[at];
+                    ensure!(
+                        given == *len,
+                        "{key}: states.{input} = {output:?} has {given} values, and the graph takes {len}"
+                    );
+                    Feed::Before(at, *len)
+                }
+            });
+        }
+        let lens = compute.outputs().to_vec();
+        let number = self.plan.networks.len();
+        let inputs = inputs.into_iter().map(|(name, _)| name).collect();
+        self.plan.networks.push(PlannedNetwork { compute, feeds, inputs });
+        self.plan.order.push(Work::Run(number));
+        for (i, (output, len)) in outputs.iter().zip(lens).enumerate() {
+            let name = format!("{}.{output}", network.name);
+            let labels = labels(&name, len, None);
+            self.add(&name, Maker::Output(number, i), labels, None)?;
+        }
+        Ok(())
+    }
+
+    /// Returns the places that `order` names in a value whose values are in the order `of`.
+    pub(super) fn places(&self, order: &Order, of: Option<&str>, len: usize, key: &str) -> Result<Vec<usize>> {
+        let places = match order {
+            Order::Places(places) => places.clone(),
+            Order::Joints(order) => {
+                let of = of.with_context(|| {
+                    format!("{key}: its values are in no order of joints; give places, or joints to the input")
+                })?;
+                let (from, to) = (self.joints(of, key)?, self.joints(order, key)?);
+                let place = |joint: &String| {
+                    let found = from.iter().position(|other| other == joint);
+                    found.with_context(|| format!("{key}: joints.{of} has no {joint:?}, which joints.{order} has"))
+                };
+                to.iter().map(place).collect::<Result<_>>()?
+            }
+        };
+        if let Some(place) = places.iter().find(|place| **place >= len) {
+            bail!("{key}: there is no place {place} in {len} values (the first is 0)");
+        }
+        Ok(places)
+    }
+}

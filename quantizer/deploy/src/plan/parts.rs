@@ -1,0 +1,121 @@
+//! The parts of a plan.
+
+use crate::description::{Clock, End, History, Orientation, TargetKind};
+use crate::label::{Label, labels};
+use crate::sources::{Array, Compute};
+
+/// Index of a value among all of a description.
+pub(crate) type Slot = usize;
+
+/// How a value comes about.
+pub(crate) enum Maker {
+    /// The application writes raw input `0`.
+    Input(usize),
+    /// It is state `0`.
+    State(usize),
+    /// It is clock `0`, which reads the norms of these values.
+    Clock(Clock, Vec<Slot>),
+    /// It is a row of a table.
+    Motion { rows: Array, lag: usize, end: End },
+    /// Operations make it of these values, one after the other.
+    Value(Vec<Slot>, Vec<Step>),
+    /// It is output `1` of network `0`.
+    Output(usize, usize),
+}
+
+/// A value.
+pub(crate) struct Planned {
+    pub(crate) maker: Maker,
+    /// One for each of its numbers.
+    pub(crate) labels: Vec<Label>,
+    /// The list of joints that its values are in the order of.
+    pub(crate) joints: Option<String>,
+}
+
+/// Where a network's input comes from.
+pub(crate) enum Feed {
+    /// A value of this tick.
+    Value(Slot),
+    /// Output number `0` in the tick before, of length `1`; zeros in the first.
+    Before(usize, usize),
+}
+
+/// A network with its inputs.
+pub(crate) struct PlannedNetwork {
+    pub(crate) compute: Box<dyn Compute>,
+    pub(crate) feeds: Vec<Feed>,
+    /// Names of its inputs.
+    pub(crate) inputs: Vec<String>,
+}
+
+/// A state.
+pub(crate) struct PlannedState {
+    pub(crate) start: Vec<f64>,
+    pub(crate) next: Slot,
+}
+
+/// A step of a tick.
+#[derive(Clone, Copy)]
+pub(crate) enum Work {
+    Make(Slot),
+    Run(usize),
+}
+
+/// A checked description.
+pub struct Plan {
+    pub(crate) values: Vec<Planned>,
+    pub(crate) networks: Vec<PlannedNetwork>,
+    pub(crate) states: Vec<PlannedState>,
+    /// Raw inputs with their lengths.
+    pub(crate) inputs: Vec<(String, usize)>,
+    pub(crate) order: Vec<Work>,
+    pub(crate) action: Slot,
+    pub(crate) targets: Vec<(TargetKind, Slot)>,
+}
+
+impl Plan {
+    /// Returns the raw inputs that a tick takes, with their lengths.
+    pub fn inputs(&self) -> &[(String, usize)] {
+        &self.inputs
+    }
+
+    /// Returns the number of values of the action.
+    pub fn action_len(&self) -> usize {
+        self.values[self.action].labels.len()
+    }
+
+    /// Returns the labels of the networks' inputs, one after the other.
+    pub(crate) fn observation_labels(&self) -> Vec<Label> {
+        let feeds = self.networks.iter().flat_map(|network| network.feeds.iter().zip(&network.inputs));
+        let labels = feeds.map(|(feed, input)| match feed {
+            Feed::Value(slot) => self.values[*slot].labels.clone(),
+            Feed::Before(_, len) => labels(input, *len, None),
+        });
+        labels.flatten().collect()
+    }
+}
+
+/// A second operand.
+pub(crate) enum Arg {
+    /// Numbers, one for all or one for each.
+    Numbers(Vec<f64>),
+    /// A value.
+    Slot(Slot),
+}
+
+/// An operation.
+pub(crate) enum Step {
+    Select(Vec<usize>),
+    Place(Vec<usize>),
+    Add(Arg),
+    Subtract(Arg),
+    Scale(Arg),
+    Divide(Arg),
+    Clip([Arg; 2]),
+    Wrap,
+    Gravity(Orientation),
+    Sin,
+    Cos,
+    Norm,
+    History(History),
+}

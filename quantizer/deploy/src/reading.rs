@@ -1,0 +1,62 @@
+//! Reading of bundles by their families.
+
+use std::collections::BTreeMap;
+
+use actq::error::{Context as _, Result, bail};
+
+use crate::bundle::Bundle;
+use crate::description::Description;
+use crate::facts::{Answers, Facts, Profile, Question};
+use crate::families::FAMILIES;
+
+/// File of a description, in a bundle's folder. Where it is, no reader is needed.
+pub const DESCRIPTION: &str = "deploy.toml";
+
+/// A bundle as its family's reader understands it.
+#[derive(Debug)]
+pub struct Reading {
+    /// Name of the family.
+    pub family: String,
+    /// Repository and commit that the family's profile was read from.
+    pub profile: Option<[String; 2]>,
+    /// The description; values that questions ask for are placeholders.
+    pub description: Description,
+    /// Source of each part, by its name or key.
+    pub sources: BTreeMap<String, String>,
+    /// Questions that nothing answers. The description is complete if there are none.
+    pub questions: Vec<Question>,
+    /// Keys of the files that nothing read.
+    pub unread: Vec<String>,
+}
+
+/// Reads a bundle by the first family that recognizes it.
+///
+/// `accepted`: the values of the family's profile hold. They are questions otherwise.
+///
+/// # Errors
+///
+/// If no family recognizes it, or its reader fails.
+pub fn read(bundle: &Bundle, accepted: bool, answers: Answers) -> Result<Reading> {
+    if bundle.has(DESCRIPTION) {
+        let description = bundle.text(DESCRIPTION).and_then(|text| Description::parse(&text).context(DESCRIPTION))?;
+        let (sources, questions, unread) = Default::default();
+        return Ok(Reading { family: DESCRIPTION.to_owned(), profile: None, description, sources, questions, unread });
+    }
+    for family in FAMILIES {
+        let Some(found) = family.recognize(bundle)? else { continue };
+        let profile = Profile::parse(family.profile())?;
+        let (name, upstream) = (profile.family.clone(), [profile.upstream.clone(), profile.commit.clone()]);
+        let mut facts = Facts::new(profile, accepted, answers);
+        let description = family.read(bundle, &found, &mut facts).with_context(|| format!("{name} bundle"))?;
+        let unread = found.documents.iter().flat_map(|document| document.unread(facts.ignored())).collect();
+        let (sources, questions) = facts.finish()?;
+        return Ok(Reading { family: name, profile: Some(upstream), description, sources, questions, unread });
+    }
+    let known = FAMILIES.iter().map(|family| Profile::parse(family.profile()).map(|profile| profile.family));
+    let known: Vec<String> = known.collect::<Result<_>>()?;
+    bail!(
+        "{}: no known family of deploy bundles ({}); write deploy.toml beside the files by docs/DEPLOY.md",
+        bundle.root().display(),
+        known.join(", ")
+    )
+}
