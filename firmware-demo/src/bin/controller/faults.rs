@@ -25,6 +25,8 @@ const CFSR: u32 = 0xe000_ed28;
 const STACKING: u32 = 1 << 4;
 const ACCESS: u32 = 1 << 1;
 const LIMIT: u32 = 1 << 20;
+/// Bit of EXC_RETURN that is 1 if the exception frame has no floating-point registers: 8 words instead of 26.
+const BASIC_FRAME: u32 = 1 << 4;
 
 /// Addresses of the stack's ends.
 static BOTTOM: AtomicU32 = AtomicU32::new(0);
@@ -100,6 +102,7 @@ unsafe extern "C" fn HardFault() {
         "movw r2, #:lower16:_stack_start",
         "movt r2, #:upper16:_stack_start",
         "msr  msp, r2",
+        "mov  r2, lr",
         "b    {overflow}",
         status = const CFSR,
         overflown = const STACKING | ACCESS | LIMIT,
@@ -135,7 +138,9 @@ extern "C" fn other(frame: &ExceptionFrame, status: u32) -> ! {
     SCB::sys_reset()
 }
 
-extern "C" fn overflow(pointer: u32, status: u32) -> ! {
+/// Leaves the record of a stack overflow: `pointer` is the stack's at the entry of the fault, and `exc_return` the link
+/// register.
+extern "C" fn overflow(pointer: u32, status: u32, exc_return: u32) -> ! {
     unsafe extern "C" {
         static __stext: u16;
         static __etext: u16;
@@ -146,7 +151,11 @@ extern "C" fn overflow(pointer: u32, status: u32) -> ! {
         code.contains(&address).then(|| unsafe { (address as *const u16).read() })
     };
     let [bottom, top] = [&BOTTOM, &TOP].map(|address| address.load(Ordering::Relaxed));
-    let words = (pointer.max(bottom)..top).step_by(4);
+    // A frame that could not be stacked lowers the pointer all the same (Arm DDI 0403E, B1.5.6, PushStack). The words
+    // below the pointer of before are what earlier calls left there, with return addresses of theirs.
+    let frame = if exc_return & BASIC_FRAME == 0 { 26 * 4 } else { 8 * 4 };
+    let lowered = if status & STACKING == 0 { 0 } else { frame };
+    let words = (pointer.wrapping_add(lowered).max(bottom)..top).step_by(4);
     // SAFETY: readable words of the stack: its pointer and its ends are multiples of 4.
     let words = words.map(|address| unsafe { (address as *const u32).read_volatile() });
     // If the core could not stack, Armv7-M sets a bit, and Armv8-M leaves the pointer at the limit.
