@@ -1,5 +1,6 @@
 //! The command `actq` as other tools call it: exit status, messages, files, and the pipe protocol.
 
+mod bundle;
 mod eval;
 mod fixture;
 mod inspect;

@@ -159,8 +159,13 @@ impl Facts {
         Ok(None)
     }
 
+    /// Returns `true` if a key is a question that nothing has answered.
+    pub(crate) fn is_open(&self, key: &str) -> bool {
+        self.questions.iter().any(|question| question.key == key)
+    }
+
     fn ask(&mut self, question: Question) {
-        if self.questions.iter().all(|other| other.key != question.key) {
+        if !self.is_open(&question.key) {
             self.questions.push(question);
         }
     }

@@ -99,12 +99,11 @@ impl Node {
         }
     }
 
-    /// Returns a list of numbers; a map of numbers counts as one, in the order of the file.
+    /// Returns a list of numbers.
     pub(crate) fn numbers(&self) -> Option<Vec<f64>> {
         match &self.data {
             Data::List(items) => items.iter().map(Self::number).collect(),
-            Data::Map(entries) => entries.iter().map(|(_, node)| node.number()).collect(),
-            Data::Scalar(..) => None,
+            Data::Map(_) | Data::Scalar(..) => None,
         }
     }
 

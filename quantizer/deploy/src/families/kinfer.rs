@@ -525,12 +525,17 @@ fn gains(meta: &Document, joints: &[String], facts: &mut Facts) -> Result<Option
     let mut lists = Vec::new();
     for path in ["robot_stiffness", "robot_damping"] {
         let Some(node) = meta.get(path) else { return Ok(None) };
+        // Which joint a gain belongs to is not known before the joints' names are.
+        if facts.is_open("joints.names") {
+            continue;
+        }
         let wrong = || format!("{} must be finite numbers", meta.at(path));
-        let numbers = node.numbers().with_context(wrong)?;
+        let kinds: Option<Vec<f64>> = node.entries().iter().map(|(_, kind)| kind.number()).collect();
+        let numbers = node.numbers().or(kinds.filter(|kinds| !kinds.is_empty())).with_context(wrong)?;
         let by_name: Option<Vec<f64>> = joints.iter().map(|joint| node.get(joint)?.number()).collect();
         let list = match by_name {
             Some(list) => list,
-            None if numbers.len() == joints.len() => numbers,
+            None if numbers.len() == joints.len() && node.entries().is_empty() => numbers,
             None => {
                 let key = "gains.places";
                 let fits = |places: &Vec<usize>| {
@@ -558,6 +563,9 @@ fn gains(meta: &Document, joints: &[String], facts: &mut Facts) -> Result<Option
             }
         };
         lists.push(list);
+    }
+    if lists.is_empty() {
+        return Ok(None);
     }
     facts.note("gains", format!("{}; {}", meta.at("robot_stiffness"), meta.at("robot_damping")));
     let [stiffness, damping] = <[Vec<f64>; 2]>::try_from(lists).map_err(|_| Error::input("gains are incomplete"))?;

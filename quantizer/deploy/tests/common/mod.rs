@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use actq::error::{Result, ensure};
+use actq_deploy::description::Description;
 use actq_deploy::{Answers, Bundle, Plan, Reference, read};
 
 /// Returns the folder of a shared bundle.
@@ -22,6 +23,11 @@ pub(crate) fn agrees(name: &str, answers: &str) -> Result<()> {
     let bundle = Bundle::open(&folder.join("bundle"))?;
     let reading = read(&bundle, true, Answers::parse(answers)?)?;
     ensure!(reading.questions.is_empty(), "{name}: {:#?}", reading.questions);
+    let text = reading.description.to_toml(&reading.sources)?;
+    ensure!(
+        Description::parse(&text)? == reading.description,
+        "{name}: deploy.toml does not keep the description: {text}"
+    );
     let reference = Reference::read(&folder.join("raw.npz"), &folder.join("expect.npz"))?;
     let comparison = reference.compare(Plan::new(&reading.description, &bundle)?)?;
     println!("{name}: {:?}, unread {:?}", comparison.largest, reading.unread);

@@ -1,0 +1,205 @@
+//! `actq import` of a deploy bundle.
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use actq::data::{NpzWriter, arrays};
+use actq_bench::command::{actq, run, succeeded};
+use anyhow::{Context, Result, ensure};
+use tempfile::TempDir;
+
+use super::fixture::text;
+
+#[path = "../../../../quantizer/deploy/tests/common/onnx.rs"]
+mod onnx;
+
+/// A robot of two joints whose motors are in the other order, and a history of two frames.
+const YAML: &str = "
+joint_ids_map: [1, 0]
+step_dt: 0.01
+stiffness: [10.0, 20.0]
+damping: [1.0, 2.0]
+default_joint_pos: [0.5, -0.5]
+actions:
+  JointPositionAction: {clip: null, scale: [0.25, 0.5], offset: [0.5, -0.5], joint_ids: null}
+observations:
+  joint_pos_rel: {clip: [-0.4, 0.4], scale: [2.0, 2.0], history_length: 2}
+  last_action: {clip: null, scale: 1.0, history_length: 2}
+";
+const TICKS: usize = 12;
+
+struct Robot {
+    dir: TempDir,
+}
+
+impl Robot {
+    fn new(yaml: &str) -> Result<Self> {
+        let robot = Self { dir: TempDir::new()? };
+        fs::create_dir(robot.path("bundle"))?;
+        fs::write(robot.path("bundle/deploy.yaml"), yaml)?;
+        fs::write(robot.path("bundle/policy.onnx"), onnx::linear(8, 2, &[]))?;
+        let mut raw = NpzWriter::new(File::create(robot.path("raw.npz"))?);
+        let positions = (0..2 * TICKS).map(|i| (0.7 * i as f64).sin());
+        raw.array("joint_pos", &[TICKS, 2], positions)?;
+        raw.finish()?;
+        Ok(robot)
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.dir.path().join(name)
+    }
+
+    /// Returns the command with the bundle, a folder to write and more arguments.
+    fn import(&self, out: &str, more: &[&str]) -> Command {
+        let (bundle, out) = (text(&self.path("bundle")), text(&self.path(out)));
+        actq(&[&["import", &bundle, "--out", &out], more].concat())
+    }
+}
+
+/// Returns the error of a command that must fail.
+fn refused(output: &Output) -> Result<String> {
+    ensure!(output.status.code() == Some(1), "{}: {}", output.status, String::from_utf8_lossy(&output.stdout));
+    Ok(String::from_utf8(output.stderr.clone())?)
+}
+
+/// Writes what deploy code with that YAML computes, without the program under test.
+fn expect(path: &Path, newest_first: bool) -> Result<()> {
+    let weights: Vec<f32> = (0..16).map(|i| 0.01 * (1 + i % 7) as f32).collect();
+    let (mut before, mut last) = (None, [0.0f32; 2]);
+    let (mut observations, mut actions, mut targets) = (Vec::new(), Vec::new(), Vec::new());
+    let mut last_before = [0.0f32; 2];
+    for tick in 0..TICKS {
+        let motor = |i: usize| (0.7 * (2 * tick + i) as f64).sin();
+        let term = [motor(1) - 0.5, motor(0) + 0.5].map(|x| (x.clamp(-0.4, 0.4) * 2.0) as f32);
+        let old = before.replace(term).unwrap_or(term);
+        let frames = if newest_first { [term, old, last, last_before] } else { [old, term, last_before, last] };
+        let observation = frames.concat();
+        let row = |o: usize| 0.5 + (0..8).map(|i| weights[2 * i + o] * observation[i]).sum::<f32>();
+        last_before = last;
+        last = [row(0), row(1)];
+        observations.extend(observation);
+        actions.extend(last);
+        targets.extend([last[1] * 0.5 - 0.5, last[0] * 0.25 + 0.5]);
+    }
+    let mut npz = NpzWriter::new(File::create(path)?);
+    for (name, values) in [("observation", observations), ("action", actions), ("target", targets)] {
+        npz.array(name, &[TICKS, values.len() / TICKS], values)?;
+    }
+    npz.finish()?;
+    Ok(())
+}
+
+#[test]
+fn a_bundle_without_answers_is_asked_about_and_nothing_is_written() -> Result<()> {
+    let robot = Robot::new(YAML)?;
+    let output = run(robot.import("out", &[]), b"")?;
+    let (asked, error) = (String::from_utf8(output.stdout)?, String::from_utf8(output.stderr)?);
+    ensure!(output.status.code() == Some(1), "{:?}", output.status);
+    ensure!(error.contains("questions open") && error.contains("--accept-profile"), "{error}");
+    for key in ["history.layout", "history.first", "history.fill", "clip_first", "last_action", "gains.order"] {
+        ensure!(asked.contains(&format!("  {key}: ")), "{key} is not in\n{asked}");
+    }
+    ensure!(!robot.path("out").exists(), "something was written");
+    Ok(())
+}
+
+#[test]
+fn a_bundle_becomes_a_description_a_policy_and_an_image() -> Result<()> {
+    let robot = Robot::new(YAML)?;
+    expect(&robot.path("expect.npz"), false)?;
+    let (raw, image) = (text(&robot.path("raw.npz")), text(&robot.path("head.actq")));
+    let reference = format!("{raw}:{}", text(&robot.path("expect.npz")));
+    let import = ["--accept-profile", "--reference", &reference, "--calib", &raw];
+    let report = succeeded(&run(robot.import("out", &import), b"")?)?;
+    ensure!(report.contains("12 ticks agree") && report.contains("rate      100.0"), "{report}");
+
+    // The description is a bundle of its own.
+    let out = text(&robot.path("out"));
+    let again = ["import", &out, "--out", &text(&robot.path("again")), "--reference", &reference];
+    succeeded(&run(actq(&again), b"")?)?;
+    let description = |folder: &str| fs::read_to_string(robot.path(folder).join("deploy.toml"));
+    let without_comments = |text: String| text.lines().filter(|line| !line.starts_with('#')).collect::<String>();
+    ensure!(without_comments(description("out")?) == without_comments(description("again")?), "it changed");
+
+    let calib = arrays(&robot.path("out/calib.npz"))?;
+    ensure!(calib["obs"].shape == [1, TICKS, 8] && calib["action"].shape == [1, TICKS, 2]);
+    let policy = fs::read_to_string(robot.path("out/policy.json"))?;
+    ensure!(policy.contains("\"control_hz\": 100.0"), "{policy}");
+    succeeded(&run(actq(&["quantize", &out, "--method", "rtn", "--bits", "8", "--out", &image]), b"")?)?;
+    Ok(())
+}
+
+#[test]
+fn a_difference_from_the_reference_is_explained() -> Result<()> {
+    let robot = Robot::new(YAML)?;
+    expect(&robot.path("expect.npz"), true)?;
+    let reference = format!("{}:{}", text(&robot.path("raw.npz")), text(&robot.path("expect.npz")));
+    let error = refused(&run(robot.import("out", &["--accept-profile", "--reference", &reference]), b"")?)?;
+    ensure!(error.contains("tick 1, observation: joint_pos_rel[1] of the tick before"), "{error}");
+    ensure!(error.contains("it agrees if histories begin with the newest frame."), "{error}");
+    ensure!(!robot.path("out").exists(), "something was written");
+
+    fs::write(robot.path("answers.toml"), "[history]\nfirst = \"newest\"\n")?;
+    let answers = text(&robot.path("answers.toml"));
+    let import = ["--accept-profile", "--answers", &answers, "--reference", &reference];
+    succeeded(&run(robot.import("out", &import), b"")?)?;
+    Ok(())
+}
+
+#[test]
+fn bad_bundles_are_refused_by_file_and_key() -> Result<()> {
+    let cases = [
+        ("step_dt: 0.01", "step_dt: fast", "deploy.yaml: step_dt (line 3) must be a finite number"),
+        ("step_dt: 0.01", "step_dt: 0", "rate_hz = inf"),
+        ("[1, 0]", "[1, 1]", "joint_ids_map: a motor occurs twice"),
+        ("[1, 0]", "[1, 2]", "3 motors"),
+        ("[0.5, -0.5]\nactions", "[0.5]\nactions", "default_joint_pos has 1 values, but joint_ids_map 2"),
+        ("[0.5, -0.5]\nactions", "[0.5, .nan]\nactions", "default_joint_pos"),
+        ("history_length: 2}\n  last", "history_length: 3}\n  last", "has 10 values, and the graph takes 8"),
+        ("history_length: 2}\n  last", "history_length: -1}\n  last", "history_length"),
+        ("JointPositionAction", "JointMusicAction", "JointMusicAction"),
+        ("last_action: {clip: null, scale: 1.0", "last_action: {clip: [1], scale: 1.0", "must be two numbers"),
+        ("stiffness: [10.0, 20.0]", "stiffness: [10.0]", "1 gains for 2 joints"),
+        ("joint_pos_rel:", "last_action: {}\n  last_action:", "occurs twice"),
+    ];
+    for (from, to, expected) in cases {
+        ensure!(YAML.matches(from).count() == 1, "{from:?} must occur once");
+        let robot = Robot::new(&YAML.replace(from, to))?;
+        let error = refused(&run(robot.import("out", &["--accept-profile"]), b"")?).with_context(|| to.to_owned())?;
+        ensure!(error.contains(expected), "{to}: {error}");
+        ensure!(!robot.path("out").exists(), "{to}: something was written");
+    }
+    Ok(())
+}
+
+#[test]
+fn descriptions_that_leave_their_folder_and_wrong_options_are_refused() -> Result<()> {
+    let robot = Robot::new(YAML)?;
+    succeeded(&run(robot.import("out", &["--accept-profile"]), b"")?)?;
+    let error = refused(&run(robot.import("out", &["--accept-profile"]), b"")?)?;
+    ensure!(error.contains("deploy.toml: exists; pass --force to replace it"), "{error}");
+
+    let path = robot.path("out/deploy.toml");
+    let description = fs::read_to_string(&path)?;
+    fs::write(&path, description.replace("file = \"policy.onnx\"", "file = \"../bundle/policy.onnx\""))?;
+    let (folder, other) = (text(&robot.path("out")), text(&robot.path("other")));
+    let error = refused(&run(actq(&["import", &folder, "--out", &other]), b"")?)?;
+    ensure!(error.contains("is not a file of the bundle"), "{error}");
+
+    fs::write(robot.path("answers.toml"), "history.frist = \"newest\"\n")?;
+    let answers = text(&robot.path("answers.toml"));
+    for (more, expected) in [
+        (vec!["--accept-profile", "--check"], "needs --reference"),
+        (vec!["--accept-profile", "--output", "action"], "takes no --output"),
+        (vec!["--accept-profile", "--answers", &answers], "nothing asks for history.frist"),
+    ] {
+        let error = refused(&run(robot.import("new", &more), b"")?)?;
+        ensure!(error.contains(expected), "{more:?}: {error}");
+    }
+    fs::create_dir(robot.path("empty"))?;
+    let empty = text(&robot.path("empty"));
+    let error = refused(&run(actq(&["import", &empty, "--out", &other]), b"")?)?;
+    ensure!(error.contains("no known family of deploy bundles (") && error.contains("unitree_rl_lab"), "{error}");
+    Ok(())
+}
