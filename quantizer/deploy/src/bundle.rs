@@ -146,9 +146,6 @@ impl Sources for Bundle {
         let mut all = arrays(&self.path(file)?)?;
         let names = all.keys().cloned().collect::<Vec<_>>().join(", ");
         let array = all.remove(name).with_context(|| format!("{file}: it has no array {name:?}; it has {names}"))?;
-        let values = array.values.to_f64();
-        let values =
-            values.with_context(|| format!("{file}: array {name:?} is of type {}", array.values.type_name()))?;
-        Ok(Array { shape: array.shape, values })
+        Array::of(array).with_context(|| format!("{file}: array {name:?}"))
     }
 }

@@ -5,7 +5,7 @@ use crate::description::{Description, Fill, First, From, History, Op, Operand, O
 /// A description that differs from another in one convention.
 #[derive(Clone, Debug)]
 pub struct Variant {
-    /// What it does differently.
+    /// The convention that differs.
     pub convention: String,
     /// The description.
     pub description: Description,

@@ -99,7 +99,7 @@ pub struct Clock {
     pub start: Vec<f64>,
     /// Advance in a tick.
     pub advance: f64,
-    /// Whether the first tick sees the start or one advance.
+    /// Time of the advance: before or after the tick reads it.
     #[serde(default)]
     pub when: When,
     /// Interval that phases are wrapped to: from the first number, to below the second.

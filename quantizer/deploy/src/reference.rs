@@ -7,7 +7,6 @@ use std::path::Path;
 
 use actq::data::arrays;
 use actq::error::{Context as _, Error, Result, ensure};
-use actq::import::values::Tensor;
 
 use crate::conventions::{Variant, variants};
 use crate::description::Description;
@@ -85,11 +84,9 @@ const KINDS: [&str; 3] = ["observation", "action", "target"];
 
 /// Reads all arrays of a file as numbers.
 fn numbers(path: &Path) -> Result<BTreeMap<String, Array>> {
-    let array = |(name, tensor): (String, Tensor)| {
-        let values = tensor.values.to_f64();
-        let values = values
-            .with_context(|| format!("{}: array {name:?} is of type {}", path.display(), tensor.values.type_name()))?;
-        Ok((name, Array { shape: tensor.shape, values }))
+    let array = |(name, tensor)| {
+        let array = Array::of(tensor).with_context(|| format!("{}: array {name:?}", path.display()))?;
+        Ok((name, array))
     };
     arrays(path)?.into_iter().map(array).collect()
 }
@@ -144,6 +141,8 @@ impl Reference {
     fn run(&self, plan: Plan, first: bool) -> Result<Comparison> {
         let frames = self.raw.frames(&plan)?;
         let observation_labels: Vec<String> = plan.observation_labels().iter().map(ToString::to_string).collect();
+        let largest = |array: &Array| array.values.iter().fold(f64::MIN_POSITIVE, |most, value| most.max(value.abs()));
+        let scales: BTreeMap<_, _> = self.expected.iter().map(|(kind, array)| (*kind, largest(array))).collect();
         let mut runner = Runner::new(plan);
         let mut comparison = Comparison { ticks: self.raw.ticks, largest: BTreeMap::new(), first: None };
         for (t, frame) in frames.iter().enumerate() {
@@ -160,8 +159,7 @@ impl Reference {
                     "{kind}: the description gives {} values, and the reference has {row}",
                     values.len()
                 );
-                let scale =
-                    expected.values.iter().fold(0.0f64, |most, value| most.max(value.abs())).max(f64::MIN_POSITIVE);
+                let scale = scales[kind];
                 for (i, (got, expected)) in values.iter().zip(&expected.values[t * row..][..row]).enumerate() {
                     let difference = (got - expected).abs() / scale;
                     let largest = comparison.largest.entry(kind).or_insert(0.0);

@@ -1,6 +1,7 @@
 //! The files of a description: networks and arrays.
 
-use actq::error::Result;
+use actq::error::{Context as _, Result};
+use actq::import::values::Tensor;
 
 use crate::description::Network;
 
@@ -29,6 +30,17 @@ pub struct Array {
 }
 
 impl Array {
+    /// Takes an array of a file.
+    ///
+    /// # Errors
+    ///
+    /// If its elements are not numbers.
+    pub fn of(tensor: Tensor) -> Result<Self> {
+        let values = tensor.values.to_f64();
+        let values = values.with_context(|| format!("it is of type {}; use numbers", tensor.values.type_name()))?;
+        Ok(Self { shape: tensor.shape, values })
+    }
+
     /// Returns the number of rows and their length; an array of one axis has rows of one value.
     ///
     /// # Errors

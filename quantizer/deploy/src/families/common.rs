@@ -249,18 +249,29 @@ impl Parts {
     }
 }
 
-/// Begins the term projected_gravity, by the rule `gravity`.
-pub(super) fn gravity(parts: &mut Parts, facts: &mut Facts) -> Result<Vec<Op>> {
-    let given: Option<String> = facts.find("gravity")?;
-    let (name, len, orientation) = match given.as_deref() {
-        Some("vector") | None => return Ok(parts.input("projected_gravity", 3, "")),
-        Some("wxyz") => ("orientation", 4, Orientation::Wxyz),
-        Some("xyzw") => ("orientation", 4, Orientation::Xyzw),
-        Some("rpy") => ("rpy", 3, Orientation::Rpy),
-        Some(other) => bail!("gravity = {other:?}: give \"vector\", \"wxyz\", \"xyzw\" or \"rpy\""),
-    };
+/// Returns the raw input that gives the direction of gravity by a rule, its length, and the operations on it. `open` stands
+/// for the rule while it is a question, and `quaternion` is the family's name of an orientation.
+pub(super) fn given_gravity(
+    facts: &mut Facts,
+    rule: &str,
+    open: &str,
+    quaternion: &'static str,
+) -> Result<(&'static str, usize, Vec<Op>)> {
+    let given: Option<String> = facts.find(rule)?;
+    Ok(match given.as_deref().unwrap_or(open) {
+        "vector" => ("projected_gravity", 3, Vec::new()),
+        "wxyz" => (quaternion, 4, vec![Op::Gravity(Orientation::Wxyz)]),
+        "xyzw" => (quaternion, 4, vec![Op::Gravity(Orientation::Xyzw)]),
+        "rpy" => ("rpy", 3, vec![Op::Gravity(Orientation::Rpy)]),
+        other => bail!("{rule} = {other:?}: give \"vector\", \"wxyz\", \"xyzw\" or \"rpy\""),
+    })
+}
+
+/// Begins the term projected_gravity, by a rule.
+pub(super) fn gravity(parts: &mut Parts, rule: &str, facts: &mut Facts) -> Result<Vec<Op>> {
+    let (name, len, ops) = given_gravity(facts, rule, "vector", "orientation")?;
     parts.input_as("projected_gravity", name, len, "");
-    Ok(vec![Op::Gravity(orientation)])
+    Ok(ops)
 }
 
 /// Reads a number of values or frames.

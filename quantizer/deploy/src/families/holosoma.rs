@@ -6,9 +6,9 @@ use std::f64::consts::{PI, TAU};
 use actq::error::{Context as _, Result, bail, ensure};
 use actq_onnx::Signature;
 
-use super::common::{Histories, Parts};
+use super::common::{Histories, Parts, given_gravity};
 use crate::bundle::Bundle;
-use crate::description::{Clock, Description, Gains, Op, Operand, Order, Orientation, Standing, TargetKind, When};
+use crate::description::{Clock, Description, Gains, Op, Operand, Order, Standing, TargetKind, When};
 use crate::document::Document;
 use crate::facts::Facts;
 use crate::family::{Family, Found};
@@ -267,17 +267,10 @@ impl Reader<'_> {
     }
 
     fn gravity(&mut self) -> Result<(String, Vec<Op>, usize)> {
-        let given: Option<String> = self.facts.find("gravity")?;
-        let (name, len, orientation) = match given.as_deref() {
-            Some("rpy") | None => ("rpy", 3, Some(Orientation::Rpy)),
-            Some("wxyz") => ("base_quat", 4, Some(Orientation::Wxyz)),
-            Some("xyzw") => ("base_quat", 4, Some(Orientation::Xyzw)),
-            Some("vector") => ("projected_gravity", 3, None),
-            Some(other) => bail!("gravity = {other:?}: give \"vector\", \"wxyz\", \"xyzw\" or \"rpy\""),
-        };
+        let (name, len, ops) = given_gravity(self.facts, "gravity", "rpy", "base_quat")?;
         self.parts.raw(name, len, "");
         self.facts.note(name, self.facts.source("gravity"));
-        Ok((name.to_owned(), orientation.map(Op::Gravity).into_iter().collect(), 3))
+        Ok((name.to_owned(), ops, 3))
     }
 
     /// Adds the phases of the legs, unless they are there; returns their number.

@@ -7,9 +7,9 @@ use std::path::Path;
 use actq::error::{Context as _, Result, bail, ensure};
 use actq_onnx::Signature;
 
-use super::common::{Histories, Parts};
+use super::common::{Histories, Parts, given_gravity};
 use crate::bundle::Bundle;
-use crate::description::{Clock, Description, Gains, History, Op, Operand, Order, Orientation, TargetKind, When};
+use crate::description::{Clock, Description, Gains, History, Op, Operand, Order, TargetKind, When};
 use crate::document::Document;
 use crate::facts::Facts;
 use crate::family::{Family, Found};
@@ -534,17 +534,10 @@ impl Reader<'_> {
     fn gravity(&mut self) -> Result<Term> {
         let booster = self.yaml.maybe("SDK_TYPE", "a text", Node::text)? == Some("booster");
         let rule = if booster { "gravity.booster" } else { "gravity.unitree" };
-        let given: Option<String> = self.facts.find(rule)?;
-        let (name, len, orientation) = match given.as_deref() {
-            Some("wxyz") | None => ("base_quat", 4, Some(Orientation::Wxyz)),
-            Some("xyzw") => ("base_quat", 4, Some(Orientation::Xyzw)),
-            Some("rpy") => ("rpy", 3, Some(Orientation::Rpy)),
-            Some("vector") => ("projected_gravity", 3, None),
-            Some(other) => bail!("{rule} = {other:?}: give \"vector\", \"wxyz\", \"xyzw\" or \"rpy\""),
-        };
+        let (name, len, ops) = given_gravity(self.facts, rule, "wxyz", "base_quat")?;
         let raw = self.raw(name, len, "");
         self.facts.note(name, self.facts.source(rule));
-        Ok(Term { ops: orientation.map(Op::Gravity).into_iter().collect(), len: 3, stated: 3, ..raw })
+        Ok(Term { ops, len: 3, stated: 3, ..raw })
     }
 
     /// Returns the value that is the phase of the gait, from 0 to 1; makes it first.

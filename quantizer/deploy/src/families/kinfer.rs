@@ -9,9 +9,9 @@ use actq_onnx::Signature;
 use roxmltree::{Node as Element, ParsingOptions};
 use serde::Deserialize;
 
-use super::common::Parts;
+use super::common::{Parts, given_gravity};
 use crate::bundle::Bundle;
-use crate::description::{Clock, Description, Gains, Network, Op, Operand, Orientation, TargetKind, When};
+use crate::description::{Clock, Description, Gains, Network, Op, Operand, TargetKind, When};
 use crate::document::Document;
 use crate::facts::Facts;
 use crate::family::{Family, Found};
@@ -415,17 +415,13 @@ fn state(
 
 /// Adds the direction of gravity; returns the name of its value, and its source.
 fn gravity(parts: &mut Parts, facts: &mut Facts) -> Result<(String, String)> {
-    let given: Option<String> = facts.find("gravity")?;
+    let (name, len, ops) = given_gravity(facts, "gravity", "vector", "orientation")?;
     let source = facts.source("gravity");
-    let (name, len, orientation) = match given.as_deref() {
-        Some("vector") | None => return Ok((raw(parts, "projected_gravity", 3, ""), source)),
-        Some("wxyz") => ("orientation", 4, Orientation::Wxyz),
-        Some("xyzw") => ("orientation", 4, Orientation::Xyzw),
-        Some("rpy") => ("rpy", 3, Orientation::Rpy),
-        Some(other) => bail!("gravity = {other:?}: give \"vector\", \"wxyz\", \"xyzw\" or \"rpy\""),
-    };
+    if ops.is_empty() {
+        return Ok((raw(parts, name, len, ""), source));
+    }
     parts.raw(name, len, "");
-    parts.value("projected_gravity", name, vec![Op::Gravity(orientation)]);
+    parts.value("projected_gravity", name, ops);
     Ok(("projected_gravity".to_owned(), source))
 }
 

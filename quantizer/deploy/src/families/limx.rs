@@ -3,9 +3,9 @@
 use actq::error::{Context as _, Result, bail, ensure};
 use actq_onnx::Signature;
 
-use super::common::{Histories, Parts, count};
+use super::common::{Histories, Parts, count, given_gravity};
 use crate::bundle::Bundle;
-use crate::description::{Clock, Description, Gains, Op, Operand, Order, Orientation, TargetKind, When};
+use crate::description::{Clock, Description, Gains, Op, Operand, Order, TargetKind, When};
 use crate::document::Document;
 use crate::facts::Facts;
 use crate::family::{Family, Found};
@@ -128,16 +128,9 @@ impl Limx {
         parts.raw("gyro", 3, "rad/s");
         parts.value("scaled_gyro", "gyro", vec![scaled(scale("ang_vel")?)]);
         facts.note("scaled_gyro", yaml.at("PointfootCfg.normalization.obs_scales.ang_vel"));
-        let given: Option<String> = facts.find("gravity")?;
-        let (name, len, orientation) = match given.as_deref() {
-            Some("wxyz") | None => ("quat", 4, Some(Orientation::Wxyz)),
-            Some("xyzw") => ("quat", 4, Some(Orientation::Xyzw)),
-            Some("rpy") => ("rpy", 3, Some(Orientation::Rpy)),
-            Some("vector") => ("projected_gravity", 3, None),
-            Some(other) => bail!("gravity = {other:?}: give \"vector\", \"wxyz\", \"xyzw\" or \"rpy\""),
-        };
+        let (name, len, ops) = given_gravity(facts, "gravity", "wxyz", "quat")?;
         parts.raw(name, len, "");
-        parts.value("gravity", name, orientation.map(Op::Gravity).into_iter().collect());
+        parts.value("gravity", name, ops);
         facts.note("gravity", facts.source("gravity"));
         parts.raw_joints("q", "robot", "rad");
         parts.raw_joints("dq", "robot", "rad/s");

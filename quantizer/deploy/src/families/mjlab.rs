@@ -7,9 +7,9 @@ use actq::error::{Context as _, Result, bail, ensure};
 use actq::text::printable;
 use actq_onnx::Signature;
 
-use super::common::{Histories, Parts};
+use super::common::{Histories, Parts, gravity};
 use crate::bundle::Bundle;
-use crate::description::{Description, Gains, Op, Operand, Order, Orientation, TargetKind};
+use crate::description::{Description, Gains, Op, Operand, Order, TargetKind};
 use crate::document::Document;
 use crate::facts::Facts;
 use crate::family::{Family, Found};
@@ -587,7 +587,7 @@ fn terms(
             Term::Raw(len, unit, name) => parts.input_as(term, if ros.is_some() { name } else { term }, len, unit),
             Term::Gravity => {
                 let rule = if ros.is_some() { "ros.gravity" } else { "gravity" };
-                let ops = gravity(parts, term, rule, facts)?;
+                let ops = gravity(parts, rule, facts)?;
                 source = format!("{source}; {}", facts.source(rule));
                 ops
             }
@@ -701,20 +701,6 @@ fn frames(
         shown()
     );
     Ok(frames)
-}
-
-/// Begins a term with the direction of gravity, by a rule.
-fn gravity(parts: &mut Parts, term: &str, rule: &str, facts: &mut Facts) -> Result<Vec<Op>> {
-    let given: Option<String> = facts.find(rule)?;
-    let (name, len, orientation) = match given.as_deref() {
-        Some("vector") | None => return Ok(parts.input(term, 3, "")),
-        Some("wxyz") => ("orientation", 4, Orientation::Wxyz),
-        Some("xyzw") => ("orientation", 4, Orientation::Xyzw),
-        Some("rpy") => ("rpy", 3, Orientation::Rpy),
-        Some(other) => bail!("{rule} = {other:?}: give \"vector\", \"wxyz\", \"xyzw\" or \"rpy\""),
-    };
-    parts.input_as(term, name, len, "");
-    Ok(vec![Op::Gravity(orientation)])
 }
 
 /// Adds the target: the scaled action, and what it is added to.

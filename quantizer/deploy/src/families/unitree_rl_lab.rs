@@ -70,7 +70,7 @@ impl Family for UnitreeRlLab {
             let path = format!("observations.{term}");
             let ops = match term {
                 "base_ang_vel" => parts.input(term, 3, "rad/s"),
-                "projected_gravity" => gravity(&mut parts, facts)?,
+                "projected_gravity" => gravity(&mut parts, "gravity", facts)?,
                 "velocity_commands" => self.commands(&mut parts, yaml, facts)?,
                 "joint_pos_rel" | "joint_pos" => {
                     let mut ops = parts.input_as(term, "joint_pos", joints, "rad");
